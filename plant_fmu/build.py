@@ -1,0 +1,136 @@
+"""FMU files: made whole or not at all, the same bytes each time, and kept in a cache."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import tempfile
+import zipfile
+from importlib import resources
+from pathlib import Path
+
+import fmpy
+import platformdirs
+
+from plant_fmu.compiler import compile_library, find_compiler, library_suffix, native_platform
+from plant_fmu.description import header, model_description, token
+from plant_fmu.errors import BuildError
+from plant_fmu.vehicle import Vehicle
+
+FMI_VERSIONS = (2, 3)
+
+_SOURCES = ("plant.h", "plant.c", "instance.h", "instance.c")
+_ZIP_DATE = (1980, 1, 1, 0, 0, 0)
+_FMI2_PLATFORMS = {"x86_64-linux": "linux64", "x86_64-windows": "win64", "x86_64-darwin": "darwin64",
+                   "aarch64-linux": "linux64", "aarch64-darwin": "darwin64"}  # fmt: skip
+
+
+def build_fmu(vehicle: Vehicle, fmi: int, out: Path) -> Path:
+    """Write the FMU of a vehicle.
+
+    Parameters
+    ----------
+    vehicle : Vehicle
+        The vehicle, whose numbers become the start values of the FMU's parameters.
+    fmi : int
+        2 for FMI 2.0, 3 for FMI 3.0, both for co-simulation.
+    out : Path
+        The file to write; it appears whole or not at all.
+
+    Returns
+    -------
+    Path
+        `out`.
+
+    Raises
+    ------
+    BuildError
+        If there is no compiler, it fails, or `out` cannot be written.
+    """
+    if fmi not in FMI_VERSIONS:
+        raise BuildError(f"FMI version is {fmi!r}, expected 2 or 3")
+    out = Path(out)
+    place = native_platform()
+    with tempfile.TemporaryDirectory(prefix="plant_fmu-") as scratch:
+        folder = Path(scratch)
+        sources = _write_sources(folder, vehicle, fmi)
+        library = folder / f"{vehicle.name}{library_suffix()}"
+        compile_library(sources, [folder, Path(fmpy.__file__).parent / "c-code"], library)
+        binaries = _FMI2_PLATFORMS[place] if fmi == 2 else place
+        content = {
+            "modelDescription.xml": _description(vehicle, fmi).encode(),
+            f"binaries/{binaries}/{library.name}": library.read_bytes(),
+        }
+    _write_zip(out, content)
+    return out
+
+
+def cached_fmu(vehicle: Vehicle, fmi: int) -> Path:
+    """Return the FMU of a vehicle from the cache, building it first where it is not there.
+
+    Parameters
+    ----------
+    vehicle : Vehicle
+        The vehicle.
+    fmi : int
+        2 or 3.
+
+    Returns
+    -------
+    Path
+        The file, in the user's cache folder; what it is made from is part of its name.
+
+    Raises
+    ------
+    BuildError
+        As `build_fmu`.
+    """
+    made_from = _description(vehicle, fmi).encode() + _source_bytes() + native_platform().encode()
+    digest = hashlib.sha256(made_from).hexdigest()[:16]
+    path = Path(platformdirs.user_cache_dir("subreach")) / "fmu" / f"{vehicle.name}-fmi{fmi}-{digest}.fmu"
+    if path.exists():
+        return path
+    find_compiler()  # so that a missing compiler is said before anything is written
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise BuildError(f"FMU cache {path.parent}: {error.strerror or error}") from error
+    return build_fmu(vehicle, fmi, path)
+
+
+def _description(vehicle: Vehicle, fmi: int) -> str:
+    return model_description(vehicle, fmi, token(vehicle, _source_bytes()))
+
+
+def _source_bytes() -> bytes:
+    folder = resources.files("plant_fmu") / "csrc"
+    return b"".join((folder / name).read_bytes() for name in (*_SOURCES, "fmi2.c", "fmi3.c"))
+
+
+def _write_sources(folder: Path, vehicle: Vehicle, fmi: int) -> list[Path]:
+    """Lay out the C files and the generated header; return the files to compile."""
+    package = resources.files("plant_fmu") / "csrc"
+    for name in (*_SOURCES, f"fmi{fmi}.c"):
+        (folder / name).write_bytes((package / name).read_bytes())
+    (folder / "vehicle.h").write_text(header(vehicle, token(vehicle, _source_bytes())), encoding="utf-8")
+    return sorted(folder.glob("*.c"))
+
+
+def _write_zip(out: Path, content: dict[str, bytes]) -> None:
+    try:
+        with tempfile.NamedTemporaryFile(dir=out.parent, prefix=f".{out.name}-", delete=False) as scratch:
+            pass
+    except OSError as error:
+        raise BuildError(f"{out}: {error.strerror or error}") from error
+    try:
+        with zipfile.ZipFile(scratch.name, "w", zipfile.ZIP_DEFLATED) as archive:
+            for name, data in sorted(content.items()):
+                info = zipfile.ZipInfo(name, _ZIP_DATE)
+                info.compress_type = zipfile.ZIP_DEFLATED
+                info.external_attr = 0o644 << 16
+                archive.writestr(info, data)
+        os.chmod(scratch.name, 0o644)
+        os.replace(scratch.name, out)
+    except OSError as error:
+        Path(scratch.name).unlink(missing_ok=True)
+        raise BuildError(f"{out}: {error.strerror or error}") from error

@@ -1,0 +1,17 @@
+"""What can go wrong while an FMU is made."""
+
+
+class PlantFmuError(Exception):
+    """Base of all errors of this package; its text is one line meant for the user."""
+
+
+class TableError(PlantFmuError):
+    """A TOML file that cannot be read, or a key in it that is missing, unknown or of the wrong kind."""
+
+
+class VehicleError(PlantFmuError):
+    """A vehicle that cannot be: unknown name, or numbers that contradict physics."""
+
+
+class BuildError(PlantFmuError):
+    """No compiler, a compiler that fails, or a place that cannot be written."""

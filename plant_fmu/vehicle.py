@@ -1,0 +1,217 @@
+"""Vehicles: TOML files in, checked numbers out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from importlib import resources
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from plant_fmu.errors import VehicleError
+from plant_fmu.tables import decode, read_toml
+
+Vector3 = tuple[float, float, float]
+Vector6 = tuple[float, float, float, float, float, float]
+Rows = tuple[tuple[float, ...], ...]
+Matrix = tuple[float | tuple[float, ...], ...]  # rows, or a diagonal
+
+
+@dataclass(frozen=True)
+class RigidBody:
+    """Mass, inertia about the body origin, centre of gravity and weight."""
+
+    mass: float  # kg
+    inertia: Matrix  # kg m2, 3 by 3 about the body origin, or its diagonal
+    center_of_gravity: Vector3  # m, body frame
+    weight: float  # N
+
+
+@dataclass(frozen=True)
+class Hydrostatics:
+    """Buoyancy and where it acts."""
+
+    buoyancy: float  # N
+    center_of_buoyancy: Vector3  # m, body frame
+
+
+@dataclass(frozen=True)
+class Hydrodynamics:
+    """Added mass and damping, positive as they stand in the equation of motion."""
+
+    added_mass: Matrix  # kg, kg m, kg m2: 6 by 6, or its diagonal
+    linear_damping: Vector6  # N s/m, N m s/rad
+    quadratic_damping: Vector6  # N s2/m2, N m s2/rad2
+
+
+@dataclass(frozen=True)
+class Thrusters:
+    """What each thruster puts on the body, and what it can give."""
+
+    matrix: Rows  # 6 rows (X Y Z K M N), a column for each thruster: wrench of one newton
+    force_min: float | tuple[float, ...]  # N, most negative force
+    force_max: float | tuple[float, ...]  # N
+    time_constant: float | tuple[float, ...] = 0.0  # s
+
+
+@dataclass(frozen=True)
+class _File:
+    name: str
+    title: str
+    source: str
+    rigid_body: RigidBody
+    hydrostatics: Hydrostatics
+    hydrodynamics: Hydrodynamics
+    thrusters: Thrusters
+
+
+@dataclass(frozen=True, eq=False)
+class Vehicle:
+    """A checked vehicle in SI units; body frame x forward, y right, z down."""
+
+    name: str  # a C identifier
+    title: str  # one line for people
+    source: str  # where the numbers come from
+    mass: float  # kg
+    inertia: NDArray[np.float64]  # (3, 3) kg m2, about the body origin
+    r_G: NDArray[np.float64]  # (3,) m
+    r_B: NDArray[np.float64]  # (3,) m
+    weight: float  # N
+    buoyancy: float  # N
+    added_mass: NDArray[np.float64]  # (6, 6)
+    linear_damping: NDArray[np.float64]  # (6,)
+    quadratic_damping: NDArray[np.float64]  # (6,)
+    thruster_matrix: NDArray[np.float64]  # (6, n) body wrench of one newton of each thruster
+    thrust_min: NDArray[np.float64]  # (n,) N
+    thrust_max: NDArray[np.float64]  # (n,) N
+    thrust_time_constant: NDArray[np.float64]  # (n,) s
+
+    @property
+    def n_thrusters(self) -> int:
+        """Number of thrusters."""
+        return self.thruster_matrix.shape[1]
+
+    @property
+    def mass_matrix(self) -> NDArray[np.float64]:
+        """M of (11), shape (6, 6): rigid body plus added mass, about the body origin."""
+        S = np.cross(np.eye(3), -self.r_G)  # S(r_G), (4)
+        rigid = np.block([[self.mass * np.eye(3), -self.mass * S], [self.mass * S, self.inertia]])
+        return np.asarray(rigid + self.added_mass)
+
+    @property
+    def restoring_parameters(self) -> NDArray[np.float64]:
+        """phi of (12), shape (4,): W-B [N] and r_G W - r_B B [N m]."""
+        return np.concatenate([[self.weight - self.buoyancy], self.r_G * self.weight - self.r_B * self.buoyancy])
+
+
+def shipped_vehicles() -> list[str]:
+    """Return the names of the vehicles that come with the package."""
+    return sorted(f.name.removesuffix(".toml") for f in _folder().iterdir() if f.name.endswith(".toml"))
+
+
+def load_vehicle(name_or_file: str | Path) -> Vehicle:
+    """Load a shipped vehicle by name, or any vehicle by its file.
+
+    Parameters
+    ----------
+    name_or_file : str or Path
+        Such as ``"odin"`` or ``"boats/mine.toml"``.
+
+    Returns
+    -------
+    Vehicle
+        The checked numbers.
+
+    Raises
+    ------
+    VehicleError
+        If there is no such vehicle, or its numbers cannot be right.
+    TableError
+        If the file has a missing, unknown or mistyped key.
+    """
+    text = str(name_or_file)
+    path = Path(text)
+    if path.suffix == ".toml":
+        return _check(decode(read_toml(path), _File), str(path))
+    if text not in shipped_vehicles():
+        known = ", ".join(shipped_vehicles())
+        raise VehicleError(f"vehicle {text!r} is unknown; expected one of {known}, or a file ending in .toml")
+    with resources.as_file(_folder() / f"{text}.toml") as shipped:
+        return _check(decode(read_toml(shipped), _File), text)
+
+
+def _folder() -> resources.abc.Traversable:
+    return resources.files("plant_fmu") / "vehicles"
+
+
+def _check(file: _File, where: str) -> Vehicle:
+    """Turn the file's numbers into arrays, and name the first that cannot be right."""
+
+    def require(good: bool, key: str, came: object, expected: str) -> None:
+        if not good:
+            raise VehicleError(f"{where}: {key} is {came}, expected {expected}")
+
+    def square(value: Matrix, n: int, key: str) -> NDArray[np.float64]:
+        widths = {len(row) if isinstance(row, tuple) else 0 for row in value}
+        good = len(value) == n and widths in ({0}, {n})
+        require(good, key, f"{len(value)} rows of {sorted(widths)} numbers", f"a diagonal of {n}, or {n} by {n}")
+        return np.diag(np.array(value)) if widths == {0} else np.array(value, dtype=float)
+
+    body, statics, dynamics, thrusters = file.rigid_body, file.hydrostatics, file.hydrodynamics, file.thrusters
+    require(file.name.isidentifier() and file.name.isascii(), "name", repr(file.name), "letters, digits and _")
+
+    widths = {len(row) for row in thrusters.matrix}
+    require(
+        len(thrusters.matrix) == 6 and len(widths) == 1 and min(widths) >= 1,
+        "thrusters.matrix",
+        f"{len(thrusters.matrix)} rows of {sorted(widths)} numbers",
+        "6 rows (X Y Z K M N) with one number for each thruster",
+    )
+    (n,) = widths
+
+    def per_thruster(value: float | tuple[float, ...], key: str) -> NDArray[np.float64]:
+        if isinstance(value, tuple):
+            require(len(value) == n, f"thrusters.{key}", f"{len(value)} numbers", f"one, or {n}")
+        return np.broadcast_to(np.asarray(value, dtype=float), (n,)).copy()
+
+    vehicle = Vehicle(
+        name=file.name,
+        title=file.title,
+        source=" ".join(file.source.split()),
+        mass=body.mass,
+        inertia=square(body.inertia, 3, "rigid_body.inertia"),
+        r_G=np.array(body.center_of_gravity),
+        r_B=np.array(statics.center_of_buoyancy),
+        weight=body.weight,
+        buoyancy=statics.buoyancy,
+        added_mass=square(dynamics.added_mass, 6, "hydrodynamics.added_mass"),
+        linear_damping=np.array(dynamics.linear_damping),
+        quadratic_damping=np.array(dynamics.quadratic_damping),
+        thruster_matrix=np.array(thrusters.matrix, dtype=float),
+        thrust_min=per_thruster(thrusters.force_min, "force_min"),
+        thrust_max=per_thruster(thrusters.force_max, "force_max"),
+        thrust_time_constant=per_thruster(thrusters.time_constant, "time_constant"),
+    )
+
+    for key, value in vars(vehicle).items():
+        if not isinstance(value, str):
+            require(bool(np.all(np.isfinite(value))), key, "not finite", "finite numbers")
+            if isinstance(value, np.ndarray):
+                value.setflags(write=False)
+    require(vehicle.mass > 0, "rigid_body.mass", f"{vehicle.mass} kg", "above 0")
+    require(vehicle.weight >= 0, "rigid_body.weight", f"{vehicle.weight} N", "0 or above")
+    require(vehicle.buoyancy >= 0, "hydrostatics.buoyancy", f"{vehicle.buoyancy} N", "0 or above")
+    for key in ("linear_damping", "quadratic_damping"):
+        worst = getattr(vehicle, key).min()
+        require(worst >= 0, f"hydrodynamics.{key}", worst, "0 or above (Property 3)")
+    for key in ("inertia", "added_mass"):
+        matrix = getattr(vehicle, key)
+        require(bool(np.allclose(matrix, matrix.T, rtol=1e-9, atol=1e-9)), key, "not symmetric", "a symmetric matrix")
+    require(bool((vehicle.thrust_min <= vehicle.thrust_max).all()), "thrusters.force_min", "above force_max", "below it")
+    require(bool((vehicle.thrust_time_constant >= 0).all()), "thrusters.time_constant", "negative", "0 or above")
+    rigid = vehicle.mass_matrix - vehicle.added_mass
+    for key, matrix in (("rigid-body mass matrix", rigid), ("mass matrix with added mass", vehicle.mass_matrix)):
+        least = float(np.linalg.eigvalsh(matrix)[0])
+        require(least > 0, key, f"with least eigenvalue {least:.4g}", "positive definite (Property 1)")
+    return vehicle
