@@ -1,0 +1,20 @@
+"""A fuzzy arbiter of prioritised criteria: to what degree does each one matter now?"""
+
+from fuzzy_arbiter.arbiter import ENGINES, Arbiter
+from fuzzy_arbiter.definition import SECTION_VI, Criterion, Rule, Term, hierarchical_rules
+from fuzzy_arbiter.errors import ArbiterError, DefinitionError, MembershipError
+from fuzzy_arbiter.membership import ramp
+
+__all__ = [
+    "ENGINES",
+    "SECTION_VI",
+    "Arbiter",
+    "ArbiterError",
+    "Criterion",
+    "DefinitionError",
+    "MembershipError",
+    "Rule",
+    "Term",
+    "hierarchical_rules",
+    "ramp",
+]

@@ -70,31 +70,27 @@ def decode(table: dict[str, Any], kind: type[T], where: str = "") -> T:
         return msgspec.convert(table, kind)
     except msgspec.ValidationError as error:
         text, _, at = str(error).partition(" - at ")
-        key = ".".join(part for part in (where, at.strip("`").removeprefix("$").lstrip(".")) if part)
-        raise TableError(f"{key or 'file'}: {_plain(text)}{_came(table, at)}") from error
+        raise _mistyped(text, at, table, kind, where) from error
 
 
-def unknown_key(key: str, known: typing.Iterable[str], where: str = "") -> TableError:
-    """Return the error for a key that nothing knows, suggesting the nearest known one.
+def hint(came: str, known: typing.Iterable[str]) -> str:
+    """Return what to say of a name that nothing knows: the nearest known one, else all of them.
 
     Parameters
     ----------
-    key : str
-        What came.
+    came : str
+        The name.
     known : iterable of str
         What was expected.
-    where : str
-        Path of keys to the table.
 
     Returns
     -------
-    TableError
-        To be raised.
+    str
+        Such as ``did you mean 'mass'?``.
     """
     known = sorted(known)
-    near = difflib.get_close_matches(key, known, n=1, cutoff=0.5)
-    hint = f"did you mean {near[0]!r}?" if near else f"expected one of {', '.join(known)}"
-    return TableError(f"{f'{where}.' if where else ''}{key}: unknown key; {hint}")
+    near = difflib.get_close_matches(came, known, n=1, cutoff=0.5)
+    return f"did you mean {near[0]!r}?" if near else f"expected one of {', '.join(known)}"
 
 
 def dataclass_of(annotation: Any) -> type | None:
@@ -119,11 +115,12 @@ def dataclass_of(annotation: Any) -> type | None:
 
 def _refuse_unknown(table: dict[str, Any], kind: Any, where: str) -> None:
     hints = typing.get_type_hints(kind)
+    names = [f.name for f in dataclasses.fields(kind)]
     for key, value in table.items():
-        if key not in hints:
-            raise unknown_key(key, hints, where)
-        inner = dataclass_of(hints[key])
         at = f"{where}.{key}" if where else key
+        if key not in names:
+            raise TableError(f"{at}: unknown key; {hint(key, names)}")
+        inner = dataclass_of(hints[key])
         if inner and isinstance(value, dict):
             _refuse_unknown(value, inner, at)
         elif inner and isinstance(value, list):
@@ -132,21 +129,27 @@ def _refuse_unknown(table: dict[str, Any], kind: Any, where: str) -> None:
                     _refuse_unknown(item, inner, f"{at}.{i}")
 
 
-def _plain(text: str) -> str:
-    """Say in a file's words what the decoder says in its own."""
+def _mistyped(text: str, at: str, table: Any, kind: Any, where: str) -> TableError:
+    """Turn the decoder's complaint, and its path such as ``$.a.b[0]``, into words of the file."""
+    value, annotation, path = table, kind, [where] if where else []
+    for part in at.strip("`").removeprefix("$").replace("[...]", ".*").replace("[", ".").replace("]", "").split("."):
+        if not part:
+            continue
+        if part == "*":  # some key of a mapping to numbers
+            part = next(k for k, v in value.items() if not isinstance(v, (int, float)) or isinstance(v, bool))
+        if isinstance(value, list):
+            value = value[int(part)]
+        else:
+            value = value[part]
+            annotation = typing.get_type_hints(annotation)[part] if dataclasses.is_dataclass(annotation) else None
+            annotation = dataclass_of(annotation) or annotation
+        path.append(part)
+
     words = {"Object": "table", "`object`": "a table", "`array`": "a list", "`float`": "a number", "`int`": "a whole number"}
     for word, plain in words.items():
         text = text.replace(word, plain)
-    return text[:1].lower() + text[1:].replace("`", "'")
-
-
-def _came(table: Any, at: str) -> str:
-    """Return the value at the decoder's path, such as ``$.a.b[0]``."""
-    value = table
-    try:
-        for key in at.strip("`").removeprefix("$").replace("[", ".").replace("]", "").split("."):
-            if key:
-                value = value[int(key)] if isinstance(value, list) else value[key]
-    except (KeyError, IndexError, TypeError, ValueError):
-        return ""
-    return f" (came: {value!r})" if not isinstance(value, dict) else ""
+    text = text[:1].lower() + text[1:].replace("`", "'")
+    if typing.get_origin(annotation) is typing.Literal:
+        text = f"expected one of {', '.join(map(repr, typing.get_args(annotation)))}"
+    came = "" if isinstance(value, dict) else f" (came: {value!r})"
+    return TableError(f"{'.'.join(path) or 'file'}: {text}{came}")

@@ -1,0 +1,102 @@
+"""From a body wrench to thruster forces within their limits."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from controller.compiled import compiled
+from controller.errors import LawError
+
+Array = NDArray[np.float64]
+
+
+@compiled
+def keep_direction(forces: Array, lower: Array, upper: Array) -> None:
+    """Scale thruster forces [N], shape (n,), in place until all are within limits: the wrench keeps its direction."""
+    scale = 1.0
+    for i in range(forces.size):
+        if forces[i] > upper[i]:
+            scale = min(scale, upper[i] / forces[i])
+        elif forces[i] < lower[i]:
+            scale = min(scale, lower[i] / forces[i])
+    forces *= max(scale, 0.0)
+
+
+@compiled
+def clip_each(forces: Array, lower: Array, upper: Array) -> None:
+    """Cut thruster forces [N], shape (n,), in place, each at its own limits: the wrench may turn."""
+    for i in range(forces.size):
+        forces[i] = min(max(forces[i], lower[i]), upper[i])
+
+
+@compiled
+def allocate(inverse: Array, lower: Array, upper: Array, direction: bool, tau: Array, forces: Array) -> None:
+    """Write the least-squares thruster forces for a wrench, within limits, into `forces`.
+
+    Parameters
+    ----------
+    inverse : ndarray, shape (n, 6)
+        Pseudo-inverse of the thruster matrix.
+    lower, upper : ndarray, shape (n,)
+        Limits of each thruster [N].
+    direction : bool
+        Scale all forces together, or cut each on its own.
+    tau : ndarray, shape (6,)
+        Wrench [N, N m], body frame.
+    forces : ndarray, shape (n,)
+        Receives the forces [N].
+    """
+    forces[:] = inverse @ tau
+    if direction:
+        keep_direction(forces, lower, upper)
+    else:
+        clip_each(forces, lower, upper)
+
+
+class Allocation:
+    """Thruster allocation by the pseudo-inverse, the least forces that give a wrench.
+
+    Parameters
+    ----------
+    matrix : ndarray, shape (6, n)
+        Body wrench of one newton of each thruster.
+    lower, upper : ndarray, shape (n,)
+        Limits of each thruster [N]; 0 must lie within them.
+    limits : {"direction", "per-thruster"}
+        How forces beyond the limits are brought within.
+
+    Raises
+    ------
+    LawError
+        If the shapes differ, or zero force is not within the limits.
+    """
+
+    def __init__(
+        self, matrix: Array, lower: Array, upper: Array, limits: Literal["direction", "per-thruster"] = "direction"
+    ) -> None:
+        n = matrix.shape[1]
+        if matrix.shape != (6, n) or lower.shape != (n,) or upper.shape != (n,):
+            raise LawError(f"thruster matrix is {matrix.shape}, limits {lower.shape} and {upper.shape}: expected 6 by n, n")
+        if not (np.all(lower <= 0.0) and np.all(upper >= 0.0)):
+            raise LawError("thruster limits leave out 0 N, expected lower <= 0 <= upper")
+        if limits not in ("direction", "per-thruster"):
+            raise LawError(f"limits is {limits!r}, expected 'direction' or 'per-thruster'")
+        self._inverse = np.ascontiguousarray(np.linalg.pinv(matrix))
+        self._lower = np.array(lower, dtype=float)
+        self._upper = np.array(upper, dtype=float)
+        self._direction = limits == "direction"
+
+    def __call__(self, tau: Array, forces: Array) -> None:
+        """Write the thruster forces for a wrench into `forces`.
+
+        Parameters
+        ----------
+        tau : ndarray, shape (6,)
+            Wrench [N, N m], body frame.
+        forces : ndarray, shape (n,)
+            Receives the forces [N], within the limits.
+        """
+        allocate(self._inverse, self._lower, self._upper, self._direction, tau, forces)

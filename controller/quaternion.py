@@ -1,0 +1,94 @@
+"""Unit quaternions, scalar first, rotating body vectors into the world: equations (1)-(9), (23), (24).
+
+All functions take and return float64 arrays. The sign of the last term of (3) is that which (6), (7) and (10) need: the
+printed matrix is the transpose.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from controller.compiled import compiled
+
+Array = NDArray[np.float64]
+
+
+@compiled
+def from_axis_angle(axis: Array, angle: float) -> Array:
+    """Return the quaternion of a rotation by `angle` [rad] about a unit `axis`, shape (3,): (1), (2)."""
+    e = np.empty(4)
+    e[0] = np.cos(angle / 2.0)
+    e[1:] = axis * np.sin(angle / 2.0)
+    return e
+
+
+@compiled
+def skew(a: Array) -> Array:
+    """Return S(a), shape (3, 3), such that S(a) b = a x b: (4), with the property (5)."""
+    return np.array([[0.0, -a[2], a[1]], [a[2], 0.0, -a[0]], [-a[1], a[0], 0.0]])
+
+
+@compiled
+def rotation_matrix(e: Array) -> Array:
+    """Return R, shape (3, 3), from body to world, of a unit quaternion: (3)."""
+    e0, e1, e2, e3 = e
+    return np.array(
+        [
+            [1.0 - 2.0 * (e2 * e2 + e3 * e3), 2.0 * (e1 * e2 - e0 * e3), 2.0 * (e1 * e3 + e0 * e2)],
+            [2.0 * (e1 * e2 + e0 * e3), 1.0 - 2.0 * (e1 * e1 + e3 * e3), 2.0 * (e2 * e3 - e0 * e1)],
+            [2.0 * (e1 * e3 - e0 * e2), 2.0 * (e2 * e3 + e0 * e1), 1.0 - 2.0 * (e1 * e1 + e2 * e2)],
+        ]
+    )
+
+
+@compiled
+def kinematic_matrix(e: Array) -> Array:
+    """Return E(e), shape (4, 3): (7), with the properties (8)."""
+    e0, e1, e2, e3 = e
+    return np.array([[-e1, -e2, -e3], [e0, -e3, e2], [e3, e0, -e1], [-e2, e1, e0]])
+
+
+@compiled
+def rate(e: Array, omega: Array) -> Array:
+    """Return de/dt, shape (4,), at the body angular velocity `omega` [rad/s]: (6), (24)."""
+    return 0.5 * kinematic_matrix(e) @ omega
+
+
+@compiled
+def angular_velocity(e: Array, e_dot: Array) -> Array:
+    """Return the body angular velocity [rad/s], shape (3,), that turns `e` at `e_dot`: (9)."""
+    return 2.0 * kinematic_matrix(e).T @ e_dot
+
+
+@compiled
+def multiply(a: Array, b: Array) -> Array:
+    """Return the quaternion product of `a` and `b`, shape (4,): first the rotation `b`, then `a`."""
+    return np.array(
+        [
+            a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3],
+            a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2],
+            a[0] * b[2] - a[1] * b[3] + a[2] * b[0] + a[3] * b[1],
+            a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0],
+        ]
+    )
+
+
+@compiled
+def error(desired: Array, actual: Array) -> Array:
+    """Return the error quaternion desired^-1 * actual, shape (4,), of the shortest rotation (scalar part >= 0): (23).
+
+    In body coordinates, so that it moves with the body rates as (24) says.
+    """
+    inverse = np.array([desired[0], -desired[1], -desired[2], -desired[3]])
+    e = multiply(inverse, actual)
+    return -e if e[0] < 0.0 else e
+
+
+@compiled
+def down_in_body(e: Array) -> Array:
+    """Return k = R^T e3, shape (3,): the direction of gravity seen from the body."""
+    e0, e1, e2, e3 = e
+    return np.array(
+        [2.0 * (e1 * e3 - e0 * e2), 2.0 * (e2 * e3 + e0 * e1), 1.0 - 2.0 * (e1 * e1 + e2 * e2)]
+    )

@@ -1,0 +1,50 @@
+"""Box, turned as one likes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from controller.compiled import compiled
+from controller.quaternion import rotation_matrix
+from controller.regions.geometry import product_distance, to_local, to_world
+from controller.regions.shape import Array, Evaluation, Vector3, Vector4, require, require_finite, unit
+
+
+@dataclass(frozen=True)
+class Box:
+    """All points of a cuboid of full `size` [m] about `centre` [m, NED]; g is the signed distance [m].
+
+    `quaternion` (scalar first) turns the box's axes into the world.
+    """
+
+    kind: ClassVar[int] = 3
+    unit: ClassVar[str] = "m"
+    centre: Vector3
+    size: Vector3
+    quaternion: Vector4 = (1.0, 0.0, 0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        require_finite("box", centre=self.centre, size=self.size)
+        require(min(self.size) > 0.0, "box", "size", self.size, "three numbers above 0 m")
+        unit("box", "quaternion", self.quaternion)
+
+    def packed(self) -> tuple[float, ...]:
+        """Return centre, rotation matrix and half sizes."""
+        R = rotation_matrix(np.array(unit("box", "quaternion", self.quaternion)))
+        return (*self.centre, *R.ravel().tolist(), *(s / 2.0 for s in self.size))
+
+
+@compiled
+def box(p: Array, q: Array) -> Evaluation:
+    """Evaluate a packed `Box` at the position `p`."""
+    x, y, z = to_local(p, q, 0)
+    flat, of_x, of_y = product_distance(abs(x) - q[12], abs(y) - q[13])
+    g, of_flat, of_z = product_distance(flat, abs(z) - q[14])
+    gx = of_flat * of_x if x >= 0.0 else -of_flat * of_x
+    gy = of_flat * of_y if y >= 0.0 else -of_flat * of_y
+    gz = of_z if z >= 0.0 else -of_z
+    wx, wy, wz = to_world(q, 3, gx, gy, gz)
+    return g, wx, wy, wz, g

@@ -1,0 +1,46 @@
+"""Cylinder between two points."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar
+
+from controller.compiled import compiled
+from controller.regions.geometry import product_distance
+from controller.regions.shape import Array, Evaluation, Vector3, require, require_finite, unit
+
+
+@dataclass(frozen=True)
+class Cylinder:
+    """All points within `radius` [m] of the axis from `start` to `end` [m, NED]; g is the signed distance [m]."""
+
+    kind: ClassVar[int] = 4
+    unit: ClassVar[str] = "m"
+    start: Vector3
+    end: Vector3
+    radius: float
+
+    def __post_init__(self) -> None:
+        require_finite("cylinder", start=self.start, end=self.end, radius=self.radius)
+        require(self.radius > 0.0, "cylinder", "radius", self.radius, "above 0 m")
+        require(math.dist(self.start, self.end) > 0.0, "cylinder", "end", self.end, "a point other than start")
+
+    def packed(self) -> tuple[float, ...]:
+        """Return the middle, the unit axis, half the length and the radius."""
+        between = tuple(b - a for a, b in zip(self.start, self.end, strict=True))
+        middle = tuple((a + b) / 2.0 for a, b in zip(self.start, self.end, strict=True))
+        return (*middle, *unit("cylinder", "axis", between), math.hypot(*between) / 2.0, self.radius)
+
+
+@compiled
+def cylinder(p: Array, q: Array) -> Evaluation:
+    """Evaluate a packed `Cylinder` at the position `p`."""
+    x, y, z = p[0] - q[0], p[1] - q[1], p[2] - q[2]
+    along = q[3] * x + q[4] * y + q[5] * z
+    x, y, z = x - along * q[3], y - along * q[4], z - along * q[5]
+    radius = math.sqrt(x * x + y * y + z * z)
+    g, of_radius, of_along = product_distance(radius - q[7], abs(along) - q[6])
+    outward = of_radius / radius if radius > 0.0 else 0.0
+    axial = of_along if along >= 0.0 else -of_along
+    return g, outward * x + axial * q[3], outward * y + axial * q[4], outward * z + axial * q[5], g

@@ -1,0 +1,34 @@
+"""Depth band: (47), (48) kept within, (52) kept out of."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from controller.compiled import compiled
+from controller.regions.shape import Array, Evaluation, require, require_finite
+
+
+@dataclass(frozen=True)
+class DepthBand:
+    """All depths within `tolerance` [m] of `depth` [m]; g = (z - z_o)^2 - r^2 [m2]."""
+
+    kind: ClassVar[int] = 1
+    unit: ClassVar[str] = "m2"
+    depth: float
+    tolerance: float
+
+    def __post_init__(self) -> None:
+        require_finite("depth_band", depth=self.depth, tolerance=self.tolerance)
+        require(self.tolerance > 0.0, "depth_band", "tolerance", self.tolerance, "above 0 m")
+
+    def packed(self) -> tuple[float, ...]:
+        """Return depth and tolerance."""
+        return (self.depth, self.tolerance)
+
+
+@compiled
+def depth_band(p: Array, q: Array) -> Evaluation:
+    """Evaluate a packed `DepthBand` at the position `p`."""
+    z = p[2] - q[0]
+    return z * z - q[1] * q[1], 0.0, 0.0, 2.0 * z, abs(z) - q[1]

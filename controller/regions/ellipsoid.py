@@ -1,0 +1,73 @@
+"""Ellipsoid, turned as one likes."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from controller.compiled import compiled
+from controller.quaternion import rotation_matrix
+from controller.regions.geometry import to_local, to_world
+from controller.regions.shape import Array, Evaluation, Vector3, Vector4, require, require_finite, unit
+
+_STEPS = 200  # more than the root below ever takes
+
+
+@dataclass(frozen=True)
+class Ellipsoid:
+    """All points of an ellipsoid about `centre` [m, NED]; g = sum (x_i / a_i)^2 - 1 [-].
+
+    `quaternion` (scalar first) turns the axes, of half lengths `semi_axes` [m], into the world.
+    """
+
+    kind: ClassVar[int] = 5
+    unit: ClassVar[str] = ""
+    centre: Vector3
+    semi_axes: Vector3
+    quaternion: Vector4 = (1.0, 0.0, 0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        require_finite("ellipsoid", centre=self.centre, semi_axes=self.semi_axes)
+        require(min(self.semi_axes) > 0.0, "ellipsoid", "semi_axes", self.semi_axes, "three numbers above 0 m")
+        unit("ellipsoid", "quaternion", self.quaternion)
+
+    def packed(self) -> tuple[float, ...]:
+        """Return centre, rotation matrix and half axes."""
+        R = rotation_matrix(np.array(unit("ellipsoid", "quaternion", self.quaternion)))
+        return (*self.centre, *R.ravel().tolist(), *self.semi_axes)
+
+
+@compiled
+def ellipsoid(p: Array, q: Array) -> Evaluation:
+    """Evaluate a packed `Ellipsoid` at the position `p`."""
+    x, y, z = to_local(p, q, 0)
+    a, b, c = q[12], q[13], q[14]
+    g = (x / a) ** 2 + (y / b) ** 2 + (z / c) ** 2 - 1.0
+    wx, wy, wz = to_world(q, 3, 2.0 * x / (a * a), 2.0 * y / (b * b), 2.0 * z / (c * c))
+    distance = _surface_distance(abs(x), abs(y), abs(z), a, b, c)
+    return g, wx, wy, wz, distance if g > 0.0 else -distance
+
+
+@compiled
+def _surface_distance(x: float, y: float, z: float, a: float, b: float, c: float) -> float:
+    """Distance from a point of the first octant to the surface.
+
+    The nearest point is x_i a_i^2 / (t + a_i^2), with t the root of F(t) = sum (a_i x_i / (t + a_i^2))^2 - 1 above
+    -min a_i^2 (Eberly). F falls and is convex there, so that Newton's method from a point left of the root only grows.
+    """
+    # a point in a plane of symmetry is moved out of it by less than rounding shows
+    x, y, z = max(x, 1e-14 * a), max(y, 1e-14 * b), max(z, 1e-14 * c)
+    t = max(a * x - a * a, b * y - b * b, c * z - c * c)
+    for _ in range(_STEPS):
+        u, v, w = a * x / (t + a * a), b * y / (t + b * b), c * z / (t + c * c)
+        value = u * u + v * v + w * w - 1.0
+        slope = -2.0 * (u * u / (t + a * a) + v * v / (t + b * b) + w * w / (t + c * c))
+        new = t - value / slope
+        if not new > t:
+            break
+        t = new
+    nearest_x, nearest_y, nearest_z = x * a * a / (t + a * a), y * b * b / (t + b * b), z * c * c / (t + c * c)
+    return math.sqrt((x - nearest_x) ** 2 + (y - nearest_y) ** 2 + (z - nearest_z) ** 2)

@@ -1,0 +1,34 @@
+"""Half-space: one side of a plane."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from controller.compiled import compiled
+from controller.regions.shape import Array, Evaluation, Vector3, require_finite, unit
+
+
+@dataclass(frozen=True)
+class HalfSpace:
+    """All points behind the plane through `point` [m, NED] that `normal` points away from; g is the distance [m]."""
+
+    kind: ClassVar[int] = 2
+    unit: ClassVar[str] = "m"
+    point: Vector3
+    normal: Vector3
+
+    def __post_init__(self) -> None:
+        require_finite("half_space", point=self.point)
+        unit("half_space", "normal", self.normal)
+
+    def packed(self) -> tuple[float, ...]:
+        """Return point and unit normal."""
+        return (*self.point, *unit("half_space", "normal", self.normal))
+
+
+@compiled
+def half_space(p: Array, q: Array) -> Evaluation:
+    """Evaluate a packed `HalfSpace` at the position `p`."""
+    g = q[3] * (p[0] - q[0]) + q[4] * (p[1] - q[1]) + q[5] * (p[2] - q[2])
+    return g, q[3], q[4], q[5], g

@@ -1,0 +1,88 @@
+"""Upright prism over a polygon: the complex shape of section V.B, such as a hexagonal one."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar
+
+from controller.compiled import compiled
+from controller.regions.geometry import clamp, product_distance
+from controller.regions.shape import Array, Evaluation, Vector2, require, require_finite
+
+
+@dataclass(frozen=True)
+class Prism:
+    """All points over a polygon, given by its corners [m, north and east], between two depths [m].
+
+    The polygon need not be convex, but its edges must not cross. g is the signed distance [m].
+    """
+
+    kind: ClassVar[int] = 6
+    unit: ClassVar[str] = "m"
+    corners: tuple[Vector2, ...]
+    top: float
+    bottom: float
+
+    def __post_init__(self) -> None:
+        for corner in self.corners:
+            require_finite("prism", corners=corner)
+        require_finite("prism", top=self.top, bottom=self.bottom)
+        require(len(self.corners) >= 3, "prism", "corners", f"{len(self.corners)} points", "3 or more")
+        require(self.bottom > self.top, "prism", "bottom", self.bottom, f"a depth below top ({self.top} m)")
+        require(abs(_signed_area(self.corners)) > 0.0, "prism", "corners", "of no area", "a polygon")
+        require(not _crosses_itself(self.corners), "prism", "corners", "crossing itself", "a simple polygon")
+
+    def packed(self) -> tuple[float, ...]:
+        """Return top, bottom, and the corners in the sense in which the outward normal is to the right."""
+        corners = self.corners if _signed_area(self.corners) > 0.0 else self.corners[::-1]
+        return (self.top, self.bottom, *(x for corner in corners for x in corner))
+
+
+def _signed_area(corners: tuple[Vector2, ...]) -> float:
+    return sum(a[0] * b[1] - b[0] * a[1] for a, b in zip(corners, corners[1:] + corners[:1], strict=True)) / 2.0
+
+
+def _crosses_itself(corners: tuple[Vector2, ...]) -> bool:
+    def side(a: Vector2, b: Vector2, c: Vector2) -> float:
+        return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+
+    edges = list(zip(corners, corners[1:] + corners[:1], strict=True))
+    return any(
+        side(a, b, c) * side(a, b, d) < 0.0 and side(c, d, a) * side(c, d, b) < 0.0
+        for i, (a, b) in enumerate(edges)
+        for c, d in edges[i + 1 :]
+    )
+
+
+@compiled
+def prism(p: Array, q: Array) -> Evaluation:
+    """Evaluate a packed `Prism` at the position `p`."""
+    n = (q.size - 2) // 2
+    nearest = math.inf
+    gx, gy = 0.0, 0.0
+    inside = False
+    for i in range(n):
+        j = i + 1 if i + 1 < n else 0
+        ax, ay, bx, by = q[2 + 2 * i], q[3 + 2 * i], q[2 + 2 * j], q[3 + 2 * j]
+        ex, ey = bx - ax, by - ay
+        x, y = p[0] - ax, p[1] - ay
+        along = clamp((x * ex + y * ey) / (ex * ex + ey * ey), 0.0, 1.0)
+        dx, dy = x - along * ex, y - along * ey
+        distance = math.hypot(dx, dy)
+        if distance < nearest:
+            nearest = distance
+            if distance > 0.0:
+                gx, gy = dx / distance, dy / distance
+            else:  # on the edge: its outward normal
+                length = math.hypot(ex, ey)
+                gx, gy = ey / length, -ex / length
+        # a ray towards east crosses the edge
+        if (ax > p[0]) != (bx > p[0]) and p[1] < ay + (p[0] - ax) / ex * ey:
+            inside = not inside
+    if inside and nearest > 0.0:
+        nearest, gx, gy = -nearest, -gx, -gy
+    vertical = max(q[0] - p[2], p[2] - q[1])
+    down = 1.0 if p[2] - q[1] >= q[0] - p[2] else -1.0
+    g, of_flat, of_vertical = product_distance(nearest, vertical)
+    return g, of_flat * gx, of_flat * gy, of_vertical * down, g

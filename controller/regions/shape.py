@@ -1,0 +1,105 @@
+"""What every shape of region offers, and how its compiled function is called."""
+
+from __future__ import annotations
+
+import math
+from typing import ClassVar, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from controller.errors import RegionError
+
+Array = NDArray[np.float64]
+Vector2 = tuple[float, float]
+Vector3 = tuple[float, float, float]
+Vector4 = tuple[float, float, float, float]
+
+# value of g, its gradient (3 numbers), signed distance [m]
+Evaluation = tuple[float, float, float, float, float]
+
+UP_TO_ROUNDING = 1e-12
+
+
+class Shape(Protocol):
+    """A closed set in the world, given as g(p) <= 0.
+
+    The compiled function of each shape takes a position, shape (3,), and the packed numbers, and returns g, its
+    gradient, and the signed distance [m] to the surface, negative inside. The unit of g is the shape's own.
+    """
+
+    kind: ClassVar[int]  # tells the shapes apart in packed arrays
+    unit: ClassVar[str]  # of g
+
+    def packed(self) -> tuple[float, ...]:
+        """Return the numbers that the compiled function reads."""
+        ...
+
+
+def require(good: bool, shape: str, key: str, came: object, expected: str) -> None:
+    """Raise an error that names the key, unless the condition holds.
+
+    Parameters
+    ----------
+    good : bool
+        The condition.
+    shape, key : str
+        What is wrong.
+    came : object
+        The value that came.
+    expected : str
+        What was expected.
+
+    Raises
+    ------
+    RegionError
+        If `good` is false.
+    """
+    if not good:
+        raise RegionError(f"{shape}: {key} is {came}, expected {expected}")
+
+
+def require_finite(shape: str, **values: float | tuple[float, ...]) -> None:
+    """Raise an error that names the first value that is not finite.
+
+    Parameters
+    ----------
+    shape : str
+        Whose values they are.
+    **values : float or tuple of float
+        By key.
+
+    Raises
+    ------
+    RegionError
+        If one is NaN or infinite.
+    """
+    for key, value in values.items():
+        numbers = value if isinstance(value, tuple) else (value,)
+        require(all(map(math.isfinite, numbers)), shape, key, value, "finite numbers")
+
+
+def unit(shape: str, key: str, vector: tuple[float, ...]) -> tuple[float, ...]:
+    """Return the vector scaled to unit length.
+
+    Parameters
+    ----------
+    shape, key : str
+        What it is, for the message.
+    vector : tuple of float
+        Any length above zero.
+
+    Returns
+    -------
+    tuple of float
+        Of length 1.
+
+    Raises
+    ------
+    RegionError
+        If it has no direction.
+    """
+    require_finite(shape, **{key: vector})
+    length = math.hypot(*vector)
+    require(length > UP_TO_ROUNDING, shape, key, vector, "a direction")
+    return tuple(x / length for x in vector)

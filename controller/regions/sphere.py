@@ -1,0 +1,36 @@
+"""Sphere: the primary region (49) and, kept out of, the repulsive one (46), (50), (51)."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar
+
+from controller.compiled import compiled
+from controller.regions.shape import Array, Evaluation, Vector3, require, require_finite
+
+
+@dataclass(frozen=True)
+class Sphere:
+    """All points within `radius` [m] of `centre` [m, NED]; g = |p - c|^2 - r^2 [m2]."""
+
+    kind: ClassVar[int] = 0
+    unit: ClassVar[str] = "m2"
+    centre: Vector3
+    radius: float
+
+    def __post_init__(self) -> None:
+        require_finite("sphere", centre=self.centre, radius=self.radius)
+        require(self.radius > 0.0, "sphere", "radius", self.radius, "above 0 m")
+
+    def packed(self) -> tuple[float, ...]:
+        """Return centre and radius."""
+        return (*self.centre, self.radius)
+
+
+@compiled
+def sphere(p: Array, q: Array) -> Evaluation:
+    """Evaluate a packed `Sphere` at the position `p`."""
+    x, y, z = p[0] - q[0], p[1] - q[1], p[2] - q[2]
+    square = x * x + y * y + z * z
+    return square - q[3] * q[3], 2.0 * x, 2.0 * y, 2.0 * z, math.sqrt(square) - q[3]

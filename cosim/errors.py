@@ -1,0 +1,21 @@
+"""What can go wrong between a scenario and its run."""
+
+
+class CosimError(Exception):
+    """Base of all errors of this package; its text is one line meant for the user."""
+
+
+class ScenarioError(CosimError):
+    """A scenario that is unknown, or a key in it that cannot be."""
+
+
+class PlantError(CosimError):
+    """An FMU that cannot be loaded, or refuses a value or a step; its own words are in the message."""
+
+
+class RunError(CosimError):
+    """A run folder that cannot be written or read."""
+
+
+class TelemetryError(CosimError):
+    """A telemetry link that cannot be opened."""

@@ -1,0 +1,384 @@
+"""Scenarios: one TOML file holds everything a run depends on."""
+
+from __future__ import annotations
+
+import copy
+import dataclasses
+import math
+import tomllib
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from importlib import resources
+from pathlib import Path
+from typing import Any, Literal
+
+import msgspec
+import tomli_w
+
+from controller import ControllerError, Gains, RegionError
+from controller.printed_law import check_gains
+from controller.regions import SHAPES, Region, Shape
+from cosim.errors import ScenarioError
+from fuzzy_arbiter import SECTION_VI
+from plant_fmu.errors import PlantFmuError
+from plant_fmu.tables import decode, hint, read_toml
+from plant_fmu.vehicle import Vehicle, load_vehicle
+
+Vector3 = tuple[float, float, float]
+Vector4 = tuple[float, float, float, float]
+Vector6 = tuple[float, float, float, float, float, float]
+
+CRITERIA = tuple(c.name for c in SECTION_VI)
+ROUNDING = 1e-6  # of one period, within which periods count as multiples
+MAX_STEPS = 1_000_000_000
+VEHICLE_COPY = "vehicle.toml"  # name in a run folder of a vehicle that is not shipped
+
+
+@dataclass(frozen=True)
+class Time:
+    """Periods; each is a whole multiple of the step."""
+
+    duration: float  # s
+    step: float  # s, co-simulation step of the plant
+    control: float  # s, period of the law
+    arbiter: float  # s, period of the arbiter
+
+
+@dataclass(frozen=True)
+class PlantSetup:
+    """How the plant is run."""
+
+    fmi: Literal[2, 3] = 3
+    current: Vector3 = (0.0, 0.0, 0.0)  # m/s, of the water, world frame
+    substep: float = 0.005  # s, greatest integration step
+    parameters: dict[str, float] = field(default_factory=dict)  # of the FMU, by name, over those of the vehicle
+
+
+@dataclass(frozen=True)
+class Initial:
+    """State of the vehicle at time 0."""
+
+    position: Vector3  # m, NED
+    quaternion: Vector4 = (1.0, 0.0, 0.0, 0.0)  # from body to world, scalar first
+    velocity: Vector6 = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)  # m/s, rad/s, body frame
+
+
+@dataclass(frozen=True)
+class LawSetup:
+    """Which law, with which gains."""
+
+    name: Literal["printed"]
+    desired_quaternion: Vector4  # attitude to be kept, from body to world, scalar first
+    gains: Gains
+
+
+@dataclass(frozen=True)
+class ArbiterSetup:
+    """How memberships become weights."""
+
+    engine: Literal["closed", "skfuzzy"] = "closed"
+    ramp: float = 0.2  # m, width over which a membership falls from 1 to 0 outside its region
+    points: int = 101  # of the output universe, for skfuzzy
+
+
+@dataclass(frozen=True)
+class Limit:
+    """Of the direct body wrench: first the limit, then the lag."""
+
+    force: float = math.inf  # N, on the norm of the body force; its direction is kept, the moment left alone
+    time_constant: float = 0.0  # s
+
+
+@dataclass(frozen=True)
+class Actuation:
+    """What carries the law's wrench to the body."""
+
+    through: Literal["wrench", "thrusters"] = "wrench"
+    limits: Literal["direction", "per-thruster"] = "direction"  # how thruster forces are brought within limits
+
+
+@dataclass(frozen=True)
+class SecondaryRegion:
+    """A region, the criterion it belongs to, and the gain that the arbiter's weight multiplies."""
+
+    region: Region
+    criterion: str  # one of CRITERIA
+    gain: float  # alpha_i of section VII
+
+
+# ---- as they stand in the file -------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class _TimeEntry:
+    duration: float
+    step: float = 0.001
+    control: float | None = None  # default: the step
+    arbiter: float | None = None  # default: the step
+
+
+@dataclass(frozen=True)
+class _LawEntry:
+    name: Literal["printed"] = "printed"
+    desired_quaternion: Vector4 = (1.0, 0.0, 0.0, 0.0)
+    gains: dict[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class _RegionEntry:
+    name: str
+    criterion: Literal["obstacle", "shape", "depth"]
+    keep: Literal["in", "out"]
+    gain: float
+    shape: dict[str, Any]
+
+
+@dataclass(frozen=True)
+class _File:
+    vehicle: str
+    time: _TimeEntry
+    initial: Initial
+    goal: dict[str, Any]
+    title: str = ""
+    compare: Literal["", "paper"] = ""
+    intersection: tuple[str, ...] = ()
+    plant: PlantSetup = PlantSetup()
+    law: _LawEntry = _LawEntry()
+    arbiter: ArbiterSetup = ArbiterSetup()
+    limit: Limit = Limit()
+    actuation: Actuation = Actuation()
+    regions: tuple[_RegionEntry, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Scenario:
+    """A checked scenario."""
+
+    name: str
+    title: str
+    vehicle: Vehicle
+    vehicle_file: Path | None  # where it came from, unless shipped
+    time: Time
+    steps: int  # of the plant
+    control_every: int  # steps
+    arbiter_every: int  # steps
+    plant: PlantSetup
+    initial: Initial
+    law: LawSetup
+    arbiter: ArbiterSetup
+    limit: Limit
+    actuation: Actuation
+    goal: Shape  # the primary region, kept within
+    regions: tuple[SecondaryRegion, ...]
+    intersection: tuple[int, ...]  # indices of the regions whose overlap the summary reports
+    compare: str  # the claims that the report holds the run against
+    table: dict[str, Any]  # as in the file, defaults filled in
+
+    def toml(self) -> str:
+        """Return the scenario as the file that repeats it."""
+        return tomli_w.dumps(self.table)
+
+
+def shipped_scenarios() -> list[str]:
+    """Return the names of the scenarios that come with the package."""
+    return sorted(f.name.removesuffix(".toml") for f in _folder().iterdir() if f.name.endswith(".toml"))
+
+
+def load_scenario(name_or_file: str | Path, overrides: Sequence[str] = ()) -> Scenario:
+    """Load a shipped scenario by name, or any scenario by its file.
+
+    Parameters
+    ----------
+    name_or_file : str or Path
+        Such as ``"paper"`` or ``"mine.toml"``.
+    overrides : sequence of str
+        ``key=value``, with dots between the keys and a TOML value; regions go by index or by name.
+
+    Returns
+    -------
+    Scenario
+        The checked scenario.
+
+    Raises
+    ------
+    ScenarioError
+        If there is no such scenario, a key is unknown, missing or mistyped, or a value cannot be.
+    """
+    try:
+        table, name, folder = _read(str(name_or_file), seen=())
+        for override in overrides:
+            _override(table, override)
+        return _check(table, name, folder)
+    except (PlantFmuError, ControllerError) as error:
+        raise ScenarioError(str(error)) from error
+
+
+def _folder() -> resources.abc.Traversable:
+    return resources.files("cosim") / "scenarios"
+
+
+def _read(name_or_file: str, seen: tuple[str, ...], beside: Path | None = None) -> tuple[dict[str, Any], str, Path]:
+    """Return the table of a scenario, laid over that of its ``base``, with its name and its folder."""
+    path = Path(name_or_file)
+    if path.suffix == ".toml":
+        path = beside / path if beside else path
+        table, name, folder = read_toml(path), path.stem, path.parent
+    elif name_or_file in shipped_scenarios():
+        with resources.as_file(_folder() / f"{name_or_file}.toml") as shipped:
+            table, name, folder = read_toml(shipped), name_or_file, Path()
+    else:
+        known = shipped_scenarios()
+        raise ScenarioError(f"scenario {name_or_file!r} is unknown; {hint(name_or_file, known)} (or a file ending in .toml)")
+    if "base" in table:
+        base = table.pop("base")
+        if not isinstance(base, str) or base in seen:
+            raise ScenarioError(f"{name}: base is {base!r}, expected the name of another scenario")
+        table = _merge(_read(base, (*seen, name_or_file), folder)[0], table)
+    return table, name, folder
+
+
+def _merge(base: dict[str, Any], over: dict[str, Any]) -> dict[str, Any]:
+    result = copy.deepcopy(base)
+    for key, value in over.items():
+        both = isinstance(value, dict) and isinstance(result.get(key), dict)
+        result[key] = _merge(result[key], value) if both else value
+    return result
+
+
+def _override(table: dict[str, Any], override: str) -> None:
+    """Set one key from ``key=value``."""
+    key, equals, text = override.partition("=")
+    if not equals or not key:
+        raise ScenarioError(f"--set {override!r}: expected key=value")
+    try:
+        value = tomllib.loads(f"value = {text}")["value"]
+    except tomllib.TOMLDecodeError:
+        value = text.strip()  # a bare word is a string
+    *path, last = key.strip().split(".")
+    at: Any = table
+    for part in path:
+        at = at[_index(at, part, key)] if isinstance(at, list) else at.setdefault(part, {})
+    if isinstance(at, list):
+        at[_index(at, last, key)] = value
+    elif isinstance(at, dict):
+        at[last] = value
+    else:
+        raise ScenarioError(f"--set {key}: there is no table at {'.'.join(path)!r}")
+
+
+def _index(items: list[Any], part: str, key: str) -> int:
+    """Return the place in a list that a number or an item's name means."""
+    names = [item.get("name") for item in items if isinstance(item, dict)]
+    if part in names:
+        return names.index(part)
+    if part.isdecimal() and int(part) < len(items):
+        return int(part)
+    raise ScenarioError(f"--set {key}: {part!r} is not one of {', '.join(map(str, names))}, nor a number below {len(items)}")
+
+
+def _check(table: dict[str, Any], name: str, folder: Path) -> Scenario:
+    """Turn the file's table into a scenario, and name the first key that cannot be right."""
+    file = decode(table, _File)
+    time = _check_time(file.time)
+    gains = _check_gains(file.law.gains)
+    steps = _multiple("time.duration", time.duration, time.step)
+    _require(steps <= MAX_STEPS, "time.duration", f"{time.duration} s, {steps} steps", f"at most {MAX_STEPS} steps")
+    _require(file.plant.substep > 0.0, "plant.substep", file.plant.substep, "above 0 s")
+    _require(file.limit.force >= 0.0, "limit.force", file.limit.force, "0 N or above (inf for none)")
+    _require(0.0 <= file.limit.time_constant < math.inf, "limit.time_constant", file.limit.time_constant, "0 s or above")
+    _require(0.0 <= file.arbiter.ramp < math.inf, "arbiter.ramp", file.arbiter.ramp, "0 m or above")
+    _require(file.arbiter.points >= 3, "arbiter.points", file.arbiter.points, "3 or more")
+    for key, values in (
+        ("initial.position", file.initial.position),
+        ("initial.velocity", file.initial.velocity),
+        ("plant.current", file.plant.current),
+        *((f"plant.parameters.{k}", (v,)) for k, v in file.plant.parameters.items()),
+    ):
+        _require(all(map(math.isfinite, values)), key, values, "finite numbers")
+    for key, quaternion in (
+        ("initial.quaternion", file.initial.quaternion),
+        ("law.desired_quaternion", file.law.desired_quaternion),
+    ):
+        _require(abs(math.hypot(*quaternion) - 1.0) < 1e-6, key, quaternion, "four numbers of length 1")
+
+    regions = tuple(
+        SecondaryRegion(
+            Region(entry.name, _shape(entry.shape, f"regions.{entry.name}.shape"), entry.keep), entry.criterion, entry.gain
+        )
+        for entry in file.regions
+    )
+    names = [r.region.name for r in regions]
+    for region in regions:
+        key = f"regions.{region.region.name}"
+        _require(names.count(region.region.name) == 1, f"{key}.name", "used twice", "a name of its own")
+        _require(0.0 <= region.gain < math.inf, f"{key}.gain", region.gain, "0 or above")
+    for region_name in file.intersection:
+        if region_name not in names:
+            raise ScenarioError(f"intersection: no region {region_name!r}; {hint(region_name, names)}")
+
+    vehicle_file = folder / file.vehicle if file.vehicle.endswith(".toml") else None
+    vehicle = load_vehicle(vehicle_file or file.vehicle)
+    filled = dataclasses.replace(
+        file,
+        time=_TimeEntry(time.duration, time.step, time.control, time.arbiter),
+        law=dataclasses.replace(file.law, gains=gains._asdict()),
+        vehicle=VEHICLE_COPY if vehicle_file else file.vehicle,
+        intersection=file.intersection or tuple(names),
+    )
+    return Scenario(
+        name=name,
+        title=file.title or name,
+        vehicle=vehicle,
+        vehicle_file=vehicle_file,
+        time=time,
+        steps=steps,
+        control_every=_multiple("time.control", time.control, time.step),
+        arbiter_every=_multiple("time.arbiter", time.arbiter, time.step),
+        plant=file.plant,
+        initial=file.initial,
+        law=LawSetup(file.law.name, file.law.desired_quaternion, gains),
+        arbiter=file.arbiter,
+        limit=file.limit,
+        actuation=file.actuation,
+        goal=_shape(file.goal, "goal"),
+        regions=regions,
+        intersection=tuple(names.index(n) for n in filled.intersection),
+        compare=file.compare,
+        table=msgspec.to_builtins(filled),
+    )
+
+
+def _check_time(entry: _TimeEntry) -> Time:
+    for key in ("duration", "step", "control", "arbiter"):
+        value = getattr(entry, key)
+        _require(value is None or 0.0 < value < math.inf, f"time.{key}", value, "above 0 s")
+    return Time(entry.duration, entry.step, entry.control or entry.step, entry.arbiter or entry.step)
+
+
+def _check_gains(table: dict[str, float]) -> Gains:
+    for key in table:
+        if key not in Gains._fields:
+            raise ScenarioError(f"law.gains.{key}: unknown key; {hint(key, Gains._fields)}")
+    return check_gains(Gains(**table))
+
+
+def _multiple(key: str, period: float, step: float) -> int:
+    """Return how many steps a period takes; it must be a whole number."""
+    n = round(period / step)
+    _require(n >= 1 and abs(period / step - n) < ROUNDING, key, period, f"a whole multiple of time.step ({step} s)")
+    return n
+
+
+def _shape(table: dict[str, Any], where: str) -> Shape:
+    kind = table.get("type")
+    if not isinstance(kind, str) or kind not in SHAPES:
+        raise ScenarioError(f"{where}.type is {kind!r}, unknown shape; {hint(str(kind), SHAPES)}")
+    try:
+        return decode({key: value for key, value in table.items() if key != "type"}, SHAPES[kind], where)
+    except RegionError as error:
+        raise ScenarioError(f"{where}: {error}") from error
+
+
+def _require(good: bool, key: str, came: object, expected: str) -> None:
+    if not good:
+        raise ScenarioError(f"{key} is {came}, expected {expected}")

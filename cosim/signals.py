@@ -1,0 +1,51 @@
+"""One row of signals: all that a step measures, decides and does, side by side in one array."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Column:
+    """One recorded quantity."""
+
+    name: str
+    unit: str
+    description: str
+
+
+class Signals:
+    """A row of float64 in which every group of signals is a view, so that a step writes it and an observer copies it once.
+
+    Parameters
+    ----------
+    columns : sequence of Column
+        In the order of the row.
+
+    Attributes
+    ----------
+    columns : tuple of Column
+        In the order of the row.
+    row : ndarray, shape (n,)
+        The present values.
+    """
+
+    def __init__(self, columns: Sequence[Column]) -> None:
+        self.columns = tuple(columns)
+        self.row: Array = np.zeros(len(self.columns))
+        self._at = {column.name: i for i, column in enumerate(self.columns)}
+
+    def index(self, name: str) -> int:
+        """Return where a column is in the row."""
+        return self._at[name]
+
+    def view(self, first: str, n: int) -> Array:
+        """Return the `n` signals from the column `first` on, shape (n,), as a view into the row."""
+        at = self._at[first]
+        return self.row[at : at + n]

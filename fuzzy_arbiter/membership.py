@@ -1,0 +1,26 @@
+"""From a measured clearance to a degree of membership."""
+
+
+def ramp(clearance: float, width: float) -> float:
+    """Return to what degree a region matters, given the distance that is left to its surface.
+
+    The degree is 1 in the whole region and on its surface, so that the region has its full priority wherever it is
+    violated, and falls linearly to 0 at `width` outside.
+
+    Parameters
+    ----------
+    clearance : float
+        Signed distance to the region's surface [m], positive outside.
+    width : float
+        Where the degree reaches 0 [m]; 0 makes the membership crisp.
+
+    Returns
+    -------
+    float
+        Degree in [0, 1]; NaN for a clearance that is NaN.
+    """
+    if clearance <= 0.0:
+        return 1.0
+    if clearance >= width:
+        return 0.0
+    return 1.0 - clearance / width
