@@ -13,11 +13,14 @@ from pathlib import Path
 from typing import Any, Literal
 
 import msgspec
+import numpy as np
 import tomli_w
+from numpy.typing import NDArray
 
 from controller import ControllerError, Gains, RegionError
 from controller.printed_law import check_gains
 from controller.regions import SHAPES, Region, Shape
+from controller.restoring import parameters
 from cosim.errors import ScenarioError
 from fuzzy_arbiter import SECTION_VI
 from plant_fmu.errors import PlantFmuError
@@ -177,6 +180,16 @@ class Scenario:
     def toml(self) -> str:
         """Return the scenario as the file that repeats it."""
         return tomli_w.dumps(self.table)
+
+    @property
+    def true_restoring_parameters(self) -> NDArray[np.float64]:
+        """phi of (12), shape (4,) [N, N m]: of the vehicle with the parameters that the plant is given over its own."""
+        v, over = self.vehicle, self.plant.parameters
+        r_G, r_B = (
+            np.array([over.get(f"{name}.{axis}", value) for axis, value in zip("xyz", values, strict=True)])
+            for name, values in (("r_G", v.r_G), ("r_B", v.r_B))
+        )
+        return parameters(over.get("weight", v.weight), over.get("buoyancy", v.buoyancy), r_G, r_B)
 
 
 def shipped_scenarios() -> list[str]:

@@ -99,11 +99,6 @@ class Vehicle:
         rigid = np.block([[self.mass * np.eye(3), -self.mass * S], [self.mass * S, self.inertia]])
         return np.asarray(rigid + self.added_mass)
 
-    @property
-    def restoring_parameters(self) -> NDArray[np.float64]:
-        """phi of (12), shape (4,): W-B [N] and r_G W - r_B B [N m]."""
-        return np.concatenate([[self.weight - self.buoyancy], self.r_G * self.weight - self.r_B * self.buoyancy])
-
 
 def shipped_vehicles() -> list[str]:
     """Return the names of the vehicles that come with the package."""

@@ -8,7 +8,7 @@ from controller.regions.ellipsoid import Ellipsoid
 from controller.regions.half_space import HalfSpace
 from controller.regions.pipe import Pipe
 from controller.regions.prism import Prism
-from controller.regions.region_set import SHAPES, PackedRegions, Region, evaluate, pack
+from controller.regions.region_set import SHAPES, PackedRegions, Region, clearances_at, evaluate, pack
 from controller.regions.shape import Shape
 from controller.regions.sphere import Sphere
 
@@ -26,6 +26,7 @@ __all__ = [
     "Region",
     "Shape",
     "Sphere",
+    "clearances_at",
     "evaluate",
     "pack",
 ]

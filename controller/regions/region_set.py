@@ -137,3 +137,30 @@ def evaluate(
         gradients[i, 1] = signs[i] * gy
         gradients[i, 2] = signs[i] * gz
         clearances[i] = -signs[i] * distance
+
+
+def clearances_at(points: Array, region: Region) -> Array:
+    """Return the clearance of a region at many points.
+
+    Parameters
+    ----------
+    points : ndarray, shape (m, 3)
+        [m, NED].
+    region : Region
+        Any.
+
+    Returns
+    -------
+    ndarray, shape (m,)
+        As `evaluate` gives it [m].
+    """
+    packed = pack([region])
+    return _clearances_at(points, packed.kinds[0], packed.signs[0], packed.numbers)
+
+
+@compiled
+def _clearances_at(points: Array, kind: int, sign: float, numbers: Array) -> Array:
+    result = np.empty(points.shape[0])
+    for i in range(points.shape[0]):
+        result[i] = -sign * _evaluate_shape(kind, points[i], numbers)[4]
+    return result

@@ -1,0 +1,139 @@
+"""What the paper states, beside what a run gave, and why they differ."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from cosim.scenario import Scenario
+
+PAPER_WINDOW = (2.65, 2.95)  # s, "An intersection of the secondary sub-regions occurs at 2.65 s to 2.95 s"
+
+
+@dataclass(frozen=True)
+class Claim:
+    """One row of the table."""
+
+    stated: str
+    measured: str
+    why: str
+
+
+def paper_claims(scenario: Scenario, summary: dict[str, Any]) -> list[Claim]:
+    """Return the paper's statements beside this run.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        What was run.
+    summary : dict
+        What it came to.
+
+    Returns
+    -------
+    list of Claim
+        Every word about this run follows from its numbers.
+    """
+    return [
+        _reaching(summary),
+        _window(scenario, summary),
+        _avoiding(scenario, summary),
+        _one_at_a_time(summary),
+        _effort(scenario, summary),
+        _adapting(summary),
+    ]
+
+
+def _limited(scenario: Scenario, summary: dict[str, Any]) -> bool:
+    return bool(summary["saturated_time"] > 0.0)
+
+
+def _reaching(summary: dict[str, Any]) -> Claim:
+    if summary["settled"]:
+        measured = f"In at {summary['reach_time']:.2f} s, in for good at {summary['settle_time']:.2f} s."
+        why = "Agrees that the region is reached; the paper gives no time."
+    elif summary["reached"]:
+        measured = f"In at {summary['reach_time']:.2f} s, but not inside for the last 10 s."
+        why = "The run ends, or the vehicle leaves, before it has settled."
+    else:
+        measured = f"Never in; closest {summary['closest_to_goal']:.2f} m from the region's surface."
+        why = "See the estimate below: adaptation (27) goes on while the actuators give less than the law asks for."
+        if summary["saturated_time"] == 0.0:
+            why = "The force was not limited; the cause is another."
+    return Claim("The vehicle converges into the primary sub-region (Fig. 5, 6).", measured, why)
+
+
+def _window(scenario: Scenario, summary: dict[str, Any]) -> Claim:
+    windows = summary["intersection_windows"]
+    names = " and ".join(summary["intersection"])
+    measured = ", ".join(f"{a:.3f} s to {b:.3f} s" for a, b in windows) + f" inside {names}." if windows else f"Never inside {names}."
+    stated = f"The regions' intersection is crossed at {PAPER_WINDOW[0]} s to {PAPER_WINDOW[1]} s (Fig. 8)."
+    if not windows:
+        return Claim(stated, measured, "The path misses the overlap.")
+    first = windows[0]
+    if scenario.limit.force < float("inf") or scenario.limit.time_constant > 0.0:
+        why = (
+            f"With the body force limited to {scenario.limit.force:g} N and a lag of {scenario.limit.time_constant:g} s. The "
+            "paper states neither; they are this project's, chosen to meet its times, and no evidence of what was simulated."
+        )
+    else:
+        why = (
+            f"Without a limit the law starts with {summary['max_force_asked'] / 1e3:.2f} kN and the vehicle runs at up to "
+            f"{summary['max_speed']:.1f} m/s. The paper's times need a limit on the actuators that it does not state."
+        )
+    if abs(first[0] - PAPER_WINDOW[0]) < 0.05 and abs(first[1] - PAPER_WINDOW[1]) < 0.05:
+        why = "Agrees. " + why
+    return Claim(stated, measured, why)
+
+
+def _avoiding(scenario: Scenario, summary: dict[str, Any]) -> Claim:
+    entered = {name: -c for name, c in summary["min_clearance"].items() if c < 0.0}
+    measured = "; ".join(f"{name}: {c:+.3f} m" for name, c in summary["min_clearance"].items()) + " (negative: violated)."
+    spheres = [r for r in scenario.regions if getattr(r.region.shape, "radius", None)]
+    if entered:
+        push = max((r.gain * r.region.shape.radius**2 for r in spheres), default=0.0)  # type: ignore[attr-defined]
+        why = (
+            f"A sphere pushes with at most gain × r² = {push:.0f} N, against up to {summary['max_force_asked'] / 1e3:.2f} kN "
+            "asked for by the primary region: with the printed gains the obstacle cannot be avoided. "
+            "The paper's own Fig. 8 shows the vehicle inside the intersection."
+        )
+    else:
+        why = "No region was violated."
+    return Claim("The control effort leads the vehicle out of the undesired sub-regions (Fig. 5b).", measured, why)
+
+
+def _one_at_a_time(summary: dict[str, Any]) -> Claim:
+    above = summary["weights_above_half"]
+    return Claim(
+        "Only a single α is high at a time.",
+        f"At most {above} of the weights above ½ at once; their sum at most {summary['weights_sum_max']:.3f}.",
+        "Holds as “at most one”: where no region matters, all three are low."
+        if above <= 1
+        else "Two weights above ½ contradict the rule base.",
+    )
+
+
+def _effort(scenario: Scenario, summary: dict[str, Any]) -> Claim:
+    vehicle = scenario.vehicle
+    limit = float(max(vehicle.thrust_max.max(), -vehicle.thrust_min.min()))
+    return Claim(
+        "Excessive control effort is avoided.",
+        f"Asked for up to {summary['max_force_asked']:.4g} N; acting up to {summary['max_force']:.4g} N.",
+        f"One thruster of this vehicle gives {limit:g} N. f is a square, so k_p1 f ∇f grows with the cube of the distance.",
+    )
+
+
+def _adapting(summary: dict[str, Any]) -> Claim:
+    final, true = summary["estimate_final"][0], summary["estimate_true"][0]
+    low, high = summary["estimate_lowest"][0], summary["estimate_highest"][0]
+    measured = f"φ̂1 between {low:.2f} and {high:.2f} N, at the end {final:.2f} N; true {true:.2f} N."
+    if abs(final - true) < 1.0:
+        why = "Ends within 1 N of the truth."
+    elif summary["saturated_time"] > 0.0:
+        why = (
+            f"Winds up: the actuators were saturated for {summary['saturated_time']:.1f} s, in which (27) took the error for "
+            "an unknown weight."
+        )
+    else:
+        why = "Has not converged to the truth; (27) promises only that the errors vanish."
+    return Claim("The unknown restoring forces are compensated by adaptation.", measured, why)

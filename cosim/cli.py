@@ -1,0 +1,139 @@
+"""The ``cosim`` command."""
+
+from __future__ import annotations
+
+import argparse
+import logging
+import sys
+from collections.abc import Sequence
+from datetime import datetime
+from importlib import metadata
+from pathlib import Path
+
+from controller import ControllerError
+from cosim.errors import CosimError
+from fuzzy_arbiter import ArbiterError
+from plant_fmu import PlantFmuError
+
+_USER_ERRORS = (CosimError, PlantFmuError, ControllerError, ArbiterError)
+
+_EPILOG = """examples:
+  cosim run paper
+  cosim run paper --set arbiter.engine=closed --set regions.SR1.gain=5000 --out runs/strong
+  cosim run my-scene.toml --mavlink udpout:127.0.0.1:14550 --rate 1
+"""
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="cosim",
+        description="Region-reaching underwater vehicles, co-simulated.",
+        epilog=_EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("--version", action="version", version=f"cosim {metadata.version('subreach')}")
+    parser.add_argument("-v", "--verbose", action="store_true", help="log what happens inside")
+    verbs = parser.add_subparsers(dest="verb", required=True, metavar="{run,list,show,calibrate}")
+
+    run = verbs.add_parser("run", help="run a scenario and write its folder")
+    run.add_argument("scenario", help="a shipped name (see cosim list), or a TOML file")
+    run.add_argument("--out", type=Path, metavar="DIR", help="run folder (default: runs/SCENARIO-TIME)")
+    run.add_argument(
+        "--set", action="append", default=[], metavar="KEY=VALUE", dest="overrides",
+        help="change a key of the scenario, such as law.gains.k_p1=10 or regions.SR1.shape.radius=0.7; may be repeated",
+    )  # fmt: skip
+    run.add_argument("--mavlink", metavar="ENDPOINT", help="stream telemetry, such as to udpout:127.0.0.1:14550")
+    run.add_argument("--allow-remote", action="store_true", help="let telemetry leave this machine")
+    run.add_argument(
+        "--rate", type=_rate, default=None, metavar="N|max", help="simulated seconds a second at the most (default: max)"
+    )
+
+    verbs.add_parser("list", help="list the shipped scenarios")
+
+    show = verbs.add_parser("show", help="print a scenario with every default filled in")
+    show.add_argument("scenario", help="a shipped name, or a TOML file")
+    show.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", dest="overrides", help="as for run")
+
+    calibrate = verbs.add_parser("calibrate", help="fit the force limit and lag that bring the paper's window about")
+    calibrate.add_argument("--scenario", default="paper", help="scenario to fit (default: paper)")
+    return parser
+
+
+def _rate(text: str) -> float | None:
+    if text == "max":
+        return None
+    try:
+        value = float(text)
+    except ValueError:
+        value = 0.0
+    if not 0.0 < value < float("inf"):
+        raise argparse.ArgumentTypeError(f"{text!r}: expected a number above 0, or max")
+    return value
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line.
+
+    Parameters
+    ----------
+    arguments : sequence of str, optional
+        Default: those of the process.
+
+    Returns
+    -------
+    int
+        0; 2 where the user must mend something; 130 after Ctrl-C.
+    """
+    options = _parser().parse_args(arguments)
+    logging.basicConfig(level=logging.DEBUG if options.verbose else logging.WARNING, format="%(name)s: %(message)s")
+    try:
+        return _VERBS[options.verb](options)
+    except _USER_ERRORS as error:
+        print(f"cosim: {error}", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        print("cosim: interrupted", file=sys.stderr)
+        return 130
+
+
+def _run(options: argparse.Namespace) -> int:
+    from cosim.report import verdict
+    from cosim.run import run_scenario
+    from cosim.scenario import load_scenario
+    from cosim.telemetry import parse_endpoint
+
+    scenario = load_scenario(options.scenario, options.overrides)
+    mavlink = parse_endpoint(options.mavlink, options.allow_remote) if options.mavlink else None
+    out = options.out or Path("runs") / f"{scenario.name}-{datetime.now():%Y%m%d-%H%M%S}"
+    run = run_scenario(scenario, out, mavlink, options.rate, progress=True)
+    print(verdict(run.summary))
+    print(run.folder / "report.html")
+    return 130 if run.summary["status"] == "interrupted" else 0
+
+
+def _list(options: argparse.Namespace) -> int:
+    from cosim.scenario import load_scenario, shipped_scenarios
+
+    for name in shipped_scenarios():
+        print(f"{name:20} {load_scenario(name).title}")
+    return 0
+
+
+def _show(options: argparse.Namespace) -> int:
+    from cosim.scenario import load_scenario
+
+    print(load_scenario(options.scenario, options.overrides).toml(), end="")
+    return 0
+
+
+def _calibrate(options: argparse.Namespace) -> int:
+    from cosim.calibration import calibrate
+    from cosim.scenario import load_scenario
+
+    fit = calibrate(load_scenario(options.scenario, ["arbiter.engine=closed"]))
+    print(f"limit.force = {fit.force:.1f} N, limit.time_constant = {fit.time_constant:.3f} s")
+    print(f"window {fit.window[0]:.3f} s to {fit.window[1]:.3f} s, least-squares cost {fit.cost:.3e} s2")
+    return 0
+
+
+_VERBS = {"run": _run, "list": _list, "show": _show, "calibrate": _calibrate}

@@ -1,0 +1,179 @@
+"""The report of a run: one HTML file that opens without a network, and its figures as files for papers."""
+
+from __future__ import annotations
+
+import html
+import io
+from pathlib import Path
+from string import Template
+from typing import Any
+
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.backends.backend_svg import FigureCanvasSVG
+
+from cosim.claims import paper_claims
+from cosim.figures import Drawing, Story, drawings
+from cosim.record import Record
+from cosim.scenario import Scenario
+
+REPORT = "report.html"
+FIGURES = "figures"
+
+_DPI = 160
+
+_PAGE = Template("""<!DOCTYPE html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<title>$title</title>
+<style>
+body { font: 16px/1.5 Georgia, serif; color: #1a1a1a; background: #fff; max-width: 46rem; margin: 2rem auto; padding: 0 1rem; }
+h1 { font-size: 1.5rem; line-height: 1.2; } h2 { font-size: 1.15rem; margin-top: 2.2rem; }
+.asked { color: #444; } .verdict { border-left: 4px solid #0072B2; padding: .2rem 0 .2rem 1rem; font-size: 1.08rem; }
+figure { margin: 1.4rem 0; } figure svg { width: 100%; height: auto; } figcaption { font-size: .9rem; color: #444; }
+.wide { overflow-x: auto; } table { border-collapse: collapse; width: 100%; font-size: .88rem; }
+th, td { text-align: left; vertical-align: top; padding: .35rem .6rem; border-bottom: 1px solid #ccc; }
+th { border-bottom: 2px solid #1a1a1a; } td.number { text-align: right; font-variant-numeric: tabular-nums; }
+pre { font-size: .8rem; background: #f5f5f5; padding: .8rem; overflow-x: auto; }
+footer { margin-top: 3rem; font-size: .85rem; color: #555; }
+</style>
+</head>
+<body>
+<h1>$title</h1>
+<p class="asked">$asked</p>
+<p class="verdict">$verdict</p>
+$claims
+<h2>Figures</h2>
+$figures
+<h2>Numbers</h2>
+<div class="wide"><table>$numbers</table></div>
+<h2>Scenario</h2>
+<pre>$scenario</pre>
+<footer>Vehicle: $vehicle. $source Positions north, east, down in metres; the body frame points forward, right, down.
+Every number is in <code>summary.json</code>, every signal in <code>record.parquet</code>.</footer>
+</body>
+</html>
+""")
+
+
+def write_report(folder: Path, scenario: Scenario, record: Record, summary: dict[str, Any]) -> Path:
+    """Write ``report.html`` and the figures as SVG and PNG.
+
+    Parameters
+    ----------
+    folder : Path
+        The run folder.
+    scenario : Scenario
+        What was run.
+    record : Record
+        What it left.
+    summary : dict
+        What it came to.
+
+    Returns
+    -------
+    Path
+        The HTML file.
+    """
+    (folder / FIGURES).mkdir(exist_ok=True)
+    shown = [_figure(folder, drawing) for drawing in drawings(Story(scenario, record, summary))]
+    page = _PAGE.substitute(
+        title=html.escape(scenario.title),
+        asked=html.escape(asked(scenario)),
+        verdict=html.escape(verdict(summary)),
+        claims=_claims(scenario, summary),
+        figures="\n".join(shown),
+        numbers=_numbers(summary),
+        scenario=html.escape(scenario.toml()),
+        vehicle=html.escape(scenario.vehicle.title),
+        source=html.escape(scenario.vehicle.source),
+    )
+    scratch = folder / f".{REPORT}"
+    scratch.write_text(page, encoding="utf-8")
+    return scratch.replace(folder / REPORT)
+
+
+def asked(scenario: Scenario) -> str:
+    """Return what the vehicle was asked to do, in a sentence.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        What is run.
+
+    Returns
+    -------
+    str
+        Plain text.
+    """
+    start = ", ".join(f"{x:g}" for x in scenario.initial.position)
+    regions = [f"{'within' if r.region.keep == 'in' else 'out of'} {r.region.name} ({r.criterion})" for r in scenario.regions]
+    respecting = f", keeping {', '.join(regions)}" if regions else ""
+    kind = type(scenario.goal).__name__
+    at = ", ".join(f"{x:g}" for x in getattr(scenario.goal, "centre", ()))
+    return f"From ({start}) m into the goal region, a {kind.lower()}{f' about ({at}) m' if at else ''}{respecting}; {scenario.law.name} law."
+
+
+def verdict(summary: dict[str, Any]) -> str:
+    """Return what happened, in a sentence or two.
+
+    Parameters
+    ----------
+    summary : dict
+        What the run came to.
+
+    Returns
+    -------
+    str
+        Plain text.
+    """
+    if summary["settled"]:
+        goal = f"The vehicle entered the goal region at {summary['reach_time']:.2f} s and was in for good from {summary['settle_time']:.2f} s"
+    elif summary["reached"]:
+        goal = f"The vehicle entered the goal region at {summary['reach_time']:.2f} s but did not settle there"
+    else:
+        goal = f"The vehicle never entered the goal region; it came within {summary['closest_to_goal']:.2f} m of it"
+    broken = [f"{name} by {-c:.3f} m" for name, c in summary["min_clearance"].items() if c < 0.0]
+    kept = f"; it violated {', '.join(broken)}." if broken else "; it kept every region."
+    force = f" The law asked for up to {summary['max_force_asked']:.4g} N; up to {summary['max_force']:.4g} N acted."
+    ended = "" if summary["status"] == "completed" else f" The run was {summary['status']} at {summary['simulated_time']:.3f} s."
+    return goal + kept + force + ended
+
+
+def _claims(scenario: Scenario, summary: dict[str, Any]) -> str:
+    if scenario.compare != "paper":
+        return ""
+    rows = "".join(
+        "<tr>" + "".join(f"<td>{html.escape(text)}</td>" for text in (c.stated, c.measured, c.why)) + "</tr>"
+        for c in paper_claims(scenario, summary)
+    )
+    head = "<tr><th>The paper states</th><th>This run gave</th><th>Why</th></tr>"
+    return f'<h2>Beside the paper</h2><div class="wide"><table>{head}{rows}</table></div>'
+
+
+def _numbers(summary: dict[str, Any]) -> str:
+    def text(value: Any) -> str:
+        if isinstance(value, float):
+            return f"{value:.6g}"
+        if isinstance(value, dict):
+            return ", ".join(f"{k} {text(v)}" for k, v in value.items())
+        if isinstance(value, (list, tuple)):
+            return ", ".join(f"[{text(v)}]" if isinstance(v, (list, tuple)) else text(v) for v in value) or "none"
+        return {None: "–", True: "yes", False: "no"}.get(value, str(value)) if not isinstance(value, int) or isinstance(value, bool) else str(value)
+
+    return "".join(
+        f"<tr><th>{html.escape(key.replace('_', ' '))}</th><td>{html.escape(text(value))}</td></tr>"
+        for key, value in summary.items()
+    )
+
+
+def _figure(folder: Path, drawing: Drawing) -> str:
+    """Write a figure as SVG and PNG, and return it as a piece of HTML."""
+    svg = io.StringIO()
+    FigureCanvasSVG(drawing.figure).print_svg(svg, metadata={"Date": None})
+    (folder / FIGURES / f"{drawing.name}.svg").write_text(svg.getvalue(), encoding="utf-8")
+    FigureCanvasAgg(drawing.figure)
+    drawing.figure.savefig(folder / FIGURES / f"{drawing.name}.png", dpi=_DPI)
+    inline = svg.getvalue()[svg.getvalue().index("<svg") :]
+    return f"<figure>{inline}<figcaption>{html.escape(drawing.caption)}</figcaption></figure>"

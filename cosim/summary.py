@@ -1,0 +1,108 @@
+"""What a run comes to: numbers from its record alone."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cosim.record import Record
+from cosim.scenario import CRITERIA, Scenario
+from cosim.signals import Array
+
+SETTLED_FOR = 10.0  # s, that the vehicle must be inside at the end
+
+Flags = NDArray[np.bool_]
+
+
+def spans(flags: Flags, time: Array) -> list[tuple[float, float]]:
+    """Return when a condition held, as pairs of the first instant in and the first out.
+
+    Parameters
+    ----------
+    flags : ndarray of bool, shape (steps,)
+        The condition at each step.
+    time : ndarray, shape (steps,)
+        [s].
+
+    Returns
+    -------
+    list of (float, float)
+        [s]; a condition that still holds at the end ends at the last instant.
+    """
+    edges = np.diff(flags.astype(np.int8), prepend=0, append=0)
+    starts, ends = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)
+    last = len(time) - 1
+    return [(float(time[a]), float(time[min(b, last)])) for a, b in zip(starts, ends, strict=True)]
+
+
+def summarise(scenario: Scenario, record: Record, status: str, wall_time: float) -> dict[str, Any]:
+    """Return the summary of a run.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        What was run.
+    record : Record
+        What it left, at least one row.
+    status : str
+        ``"completed"``, ``"interrupted"``, or ``"failed: ..."``.
+    wall_time : float
+        What the stepping took [s].
+
+    Returns
+    -------
+    dict
+        Ready for JSON; times in s, lengths in m, forces in N. Clearances are distances to a region's surface, positive
+        where it is respected, negative where it is violated (inside a region that is to be kept out of).
+    """
+    time = record["time"]
+    inside = record["goal.clearance"] >= 0.0
+    visits = spans(inside, time)
+    settled = bool(visits and inside[-1] and time[-1] - visits[-1][0] >= SETTLED_FOR)
+    names = [secondary.region.name for secondary in scenario.regions]
+    overlap = [record[f"{names[i]}.clearance"] < 0.0 for i in scenario.intersection]
+    force = np.linalg.norm(record.stack([f"actuation.{axis}" for axis in "XYZ"]), axis=1)[:-1]
+    asked = np.linalg.norm(record.stack([f"command.{axis}" for axis in "XYZ"]), axis=1)
+    speed = np.linalg.norm(record.stack([f"velocity.{axis}" for axis in "uvw"]), axis=1)
+    simulated = float(time[-1])
+    weights = record.stack([f"weight.{name}" for name in CRITERIA])
+    return {
+        "scenario": scenario.name,
+        "law": scenario.law.name,
+        "arbiter": scenario.arbiter.engine,
+        "vehicle": scenario.vehicle.name,
+        "status": status,
+        "simulated_time": simulated,
+        "reached": bool(visits),
+        "reach_time": visits[0][0] if visits else None,
+        "settled": settled,
+        "settle_time": visits[-1][0] if visits else None,
+        "final_position": [float(record[f"position.{axis}"][-1]) for axis in "xyz"],
+        "closest_to_goal": float(-record["goal.clearance"].max()),
+        "intersection": [names[i] for i in scenario.intersection],
+        "intersection_windows": spans(np.logical_and.reduce(overlap), time) if overlap else [],
+        "min_clearance": {name: float(record[f"{name}.clearance"].min()) for name in names},
+        "max_force": float(force.max()) if force.size else 0.0,
+        "max_force_asked": float(asked.max()),
+        "max_speed": float(speed.max()),
+        "weights_above_half": int((weights > 0.5).sum(axis=1).max()),
+        "weights_sum_max": float(weights.sum(axis=1).max()),
+        "effort": float(force.sum() * scenario.time.step),
+        "saturated_time": _saturated_time(scenario, record),
+        "estimate_final": [float(record[f"estimate.phi{i}"][-1]) for i in range(1, 5)],
+        "estimate_true": scenario.true_restoring_parameters.tolist(),
+        "estimate_lowest": [float(record[f"estimate.phi{i}"].min()) for i in range(1, 5)],
+        "estimate_highest": [float(record[f"estimate.phi{i}"].max()) for i in range(1, 5)],
+        "steps": len(time) - 1,
+        "wall_time": wall_time,
+        "real_time_factor": simulated / wall_time if wall_time > 0.0 else None,
+    }
+
+
+def _saturated_time(scenario: Scenario, record: Record) -> float:
+    """How long any actuator was asked for more than it gives [s]."""
+    flags = [name for name in record.columns if name.startswith("thrust_saturated[") or name == "wrench_saturated"]
+    any_cut = np.logical_or.reduce([record[name][:-1] > 0.0 for name in flags])
+    return float(np.count_nonzero(any_cut) * scenario.time.step)

@@ -1,0 +1,189 @@
+"""The run as MAVLink 2 telemetry, sent by a thread of its own."""
+
+from __future__ import annotations
+
+import ipaddress
+import logging
+import socket
+import threading
+import time
+from collections import deque
+from typing import Any
+
+from cosim.errors import TelemetryError
+from cosim.scenario import CRITERIA
+from cosim.signals import Array, Signals
+
+log = logging.getLogger(__name__)
+
+SYSTEM_ID = 1
+COMPONENT_ID = 1  # MAV_COMP_ID_AUTOPILOT1: ground stations listen to no other
+
+POSE_PERIOD = 0.1  # s, simulated
+HEARTBEAT_PERIOD = 1.0  # s, simulated; and of wall-clock silence
+_QUEUED = 4096  # snapshots; when the sender falls behind, the oldest go
+_CLOSING = 2.0  # s, that closing waits for what is queued
+_FLOAT_MAX = 3.4e38  # beyond it a float32 field cannot be encoded
+_UINT32 = 0xFFFFFFFF
+
+
+def parse_endpoint(text: str, allow_remote: bool = False) -> tuple[str, int]:
+    """Return host and port of an endpoint such as ``udpout:127.0.0.1:14550``.
+
+    Parameters
+    ----------
+    text : str
+        As pymavlink and MAVProxy write it.
+    allow_remote : bool
+        Accept addresses beyond this machine: MAVLink has no privacy.
+
+    Returns
+    -------
+    (str, int)
+        Address and port.
+
+    Raises
+    ------
+    TelemetryError
+        If it is none, or leaves this machine without leave.
+    """
+    kind, _, rest = text.partition(":")
+    host, _, port = rest.rpartition(":")
+    if kind != "udpout" or not host or not port.isdecimal() or not 0 < int(port) < 65536:
+        raise TelemetryError(f"--mavlink {text!r}: expected udpout:HOST:PORT, such as udpout:127.0.0.1:14550")
+    try:
+        address = socket.getaddrinfo(host, int(port), socket.AF_INET, socket.SOCK_DGRAM)[0][4][0]
+    except OSError as error:
+        raise TelemetryError(f"--mavlink {text!r}: host {host!r}: {error.strerror or error}") from error
+    if not allow_remote and not ipaddress.ip_address(address).is_loopback:
+        raise TelemetryError(f"--mavlink {text!r}: {address} is beyond this machine; --allow-remote lets it through")
+    return str(address), int(port)
+
+
+class Telemetry:
+    """Observer that streams heartbeat, time, pose, weights and estimates as a MAVLink vehicle.
+
+    Rates go by simulated time, and so does the time since boot in the messages. The stepper only copies a row now and then;
+    whatever happens on the link stays in the thread.
+
+    Parameters
+    ----------
+    address : (str, int)
+        Where to send, by UDP.
+    signals : Signals
+        Of the run.
+    step : float
+        Step of the run [s].
+
+    Attributes
+    ----------
+    dropped : int
+        Snapshots that were overtaken by newer ones.
+
+    Raises
+    ------
+    TelemetryError
+        If pymavlink is not installed, or no socket can be had.
+    """
+
+    def __init__(self, address: tuple[str, int], signals: Signals, step: float) -> None:
+        try:
+            from pymavlink.dialects.v20 import all as mavlink
+        except ImportError as error:
+            raise TelemetryError("MAVLink needs pymavlink; pip install 'subreach[mavlink]'") from error
+        self._mavlink = mavlink
+        self._codec = mavlink.MAVLink(None, srcSystem=SYSTEM_ID, srcComponent=COMPONENT_ID)
+        self._every = max(1, round(POSE_PERIOD / step))
+        self._slow_every = self._every * max(1, round(HEARTBEAT_PERIOD / POSE_PERIOD))
+        self._at = {column.name: i for i, column in enumerate(signals.columns)}
+        self._queue: deque[tuple[bool, Array]] = deque(maxlen=_QUEUED)
+        self._wake = threading.Condition()
+        self._closing = False
+        self.dropped = 0
+        self._address = address
+        try:
+            self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+            self._socket.setblocking(False)
+        except OSError as error:
+            raise TelemetryError(f"no UDP socket: {error.strerror or error}") from error
+        self._thread = threading.Thread(target=self._send_queued, name="mavlink", daemon=True)
+        self._thread.start()
+
+    def observe(self, k: int, row: Array) -> None:
+        """Queue a copy of the row of step `k`, where one is due."""
+        if k % self._every:
+            return
+        with self._wake:
+            self.dropped += len(self._queue) == _QUEUED
+            self._queue.append((k % self._slow_every == 0, row.copy()))
+            self._wake.notify()
+
+    def close(self) -> None:
+        """Send what is queued, within a bounded time, and end the thread."""
+        with self._wake:
+            self._closing = True
+            self._wake.notify()
+        self._thread.join(_CLOSING)
+        self._socket.close()
+
+    # ---- in the thread ----
+
+    def _send_queued(self) -> None:
+        while True:
+            with self._wake:
+                if not self._queue and not self._closing:
+                    self._wake.wait(HEARTBEAT_PERIOD)
+                due = self._queue.popleft() if self._queue else None
+                if due is None and self._closing:
+                    return
+            messages = [self._heartbeat()] if due is None else self._messages(*due)
+            for message in messages:
+                self._send(message)
+
+    def _send(self, message: Any) -> None:
+        try:
+            self._socket.sendto(message.pack(self._codec), self._address)
+            self._codec.seq = (self._codec.seq + 1) % 256
+        except OSError as error:  # nobody listens, or the buffer is full: telemetry may be lost
+            log.debug("MAVLink: %s", error)
+
+    def _messages(self, slow: bool, row: Array) -> list[Any]:
+        m, at = self._mavlink, self._at
+
+        def values(first: str, n: int) -> list[float]:
+            return [min(max(x, -_FLOAT_MAX), _FLOAT_MAX) for x in row[at[first] : at[first] + n].tolist()]
+
+        boot_ms = round(row[at["time"]] * 1e3) & _UINT32
+        e0, e1, e2, e3 = values("quaternion.e0", 4)
+        rates = values("velocity.p", 3)
+        messages = []
+        if slow:
+            messages += [self._heartbeat(), m.MAVLink_system_time_message(time.time_ns() // 1000, boot_ms)]
+        messages += [
+            m.MAVLink_attitude_message(boot_ms, *values("attitude.roll", 3), *rates),
+            m.MAVLink_attitude_quaternion_message(boot_ms, e0, e1, e2, e3, *rates),
+            m.MAVLink_local_position_ned_message(boot_ms, *values("position.x", 3), *self._velocity_ned(row)),
+        ]
+        named = {f"w_{name}": f"weight.{name}" for name in CRITERIA} | {f"phi{i}": f"estimate.phi{i}" for i in range(1, 5)}
+        messages += [
+            m.MAVLink_named_value_float_message(boot_ms, name.encode(), *values(column, 1)) for name, column in named.items()
+        ]
+        return messages
+
+    def _velocity_ned(self, row: Array) -> list[float]:
+        e0, *e = row[self._at["quaternion.e0"] : self._at["quaternion.e0"] + 4].tolist()
+        v = row[self._at["velocity.u"] : self._at["velocity.u"] + 3].tolist()
+
+        def cross(a: list[float], b: list[float]) -> list[float]:
+            return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+
+        # R v = v + 2 e x (e x v + e0 v)
+        inner = [c + e0 * x for c, x in zip(cross(e, v), v, strict=True)]
+        return [x + 2.0 * c for x, c in zip(v, cross(e, inner), strict=True)]
+
+    def _heartbeat(self) -> Any:
+        m = self._mavlink
+        mode = m.MAV_MODE_FLAG_SAFETY_ARMED | m.MAV_MODE_FLAG_GUIDED_ENABLED | m.MAV_MODE_FLAG_AUTO_ENABLED
+        return m.MAVLink_heartbeat_message(
+            m.MAV_TYPE_SUBMARINE, m.MAV_AUTOPILOT_GENERIC, mode, 0, m.MAV_STATE_ACTIVE, 3
+        )
