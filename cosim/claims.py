@@ -19,6 +19,22 @@ class Claim:
     why: str
 
 
+def newtons(force: float) -> str:
+    """Return a force [N] in four digits, such as ``26.82 kN``.
+
+    Parameters
+    ----------
+    force : float
+        [N].
+
+    Returns
+    -------
+    str
+        With its unit.
+    """
+    return f"{force / 1e3:.4g} kN" if force >= 1e3 else f"{force:.4g} N"
+
+
 def paper_claims(scenario: Scenario, summary: dict[str, Any]) -> list[Claim]:
     """Return the paper's statements beside this run.
 
@@ -42,10 +58,6 @@ def paper_claims(scenario: Scenario, summary: dict[str, Any]) -> list[Claim]:
         _effort(scenario, summary),
         _adapting(summary),
     ]
-
-
-def _limited(scenario: Scenario, summary: dict[str, Any]) -> bool:
-    return bool(summary["saturated_time"] > 0.0)
 
 
 def _reaching(summary: dict[str, Any]) -> Claim:
@@ -78,7 +90,7 @@ def _window(scenario: Scenario, summary: dict[str, Any]) -> Claim:
         )
     else:
         why = (
-            f"Without a limit the law starts with {summary['max_force_asked'] / 1e3:.2f} kN and the vehicle runs at up to "
+            f"Without a limit the law starts with {newtons(summary['max_force_asked'])} and the vehicle runs at up to "
             f"{summary['max_speed']:.1f} m/s. The paper's times need a limit on the actuators that it does not state."
         )
     if abs(first[0] - PAPER_WINDOW[0]) < 0.05 and abs(first[1] - PAPER_WINDOW[1]) < 0.05:
@@ -93,7 +105,7 @@ def _avoiding(scenario: Scenario, summary: dict[str, Any]) -> Claim:
     if entered:
         push = max((r.gain * r.region.shape.radius**2 for r in spheres), default=0.0)  # type: ignore[attr-defined]
         why = (
-            f"A sphere pushes with at most gain × r² = {push:.0f} N, against up to {summary['max_force_asked'] / 1e3:.2f} kN "
+            f"A sphere pushes with at most gain × r² = {push:.0f} N, against up to {newtons(summary['max_force_asked'])} "
             "asked for by the primary region: with the printed gains the obstacle cannot be avoided. "
             "The paper's own Fig. 8 shows the vehicle inside the intersection."
         )
@@ -118,7 +130,7 @@ def _effort(scenario: Scenario, summary: dict[str, Any]) -> Claim:
     limit = float(max(vehicle.thrust_max.max(), -vehicle.thrust_min.min()))
     return Claim(
         "Excessive control effort is avoided.",
-        f"Asked for up to {summary['max_force_asked']:.4g} N; acting up to {summary['max_force']:.4g} N.",
+        f"Asked for up to {newtons(summary['max_force_asked'])}; acting up to {newtons(summary['max_force'])}.",
         f"One thruster of this vehicle gives {limit:g} N. f is a square, so k_p1 f ∇f grows with the cube of the distance.",
     )
 

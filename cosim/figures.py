@@ -10,6 +10,7 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from controller.regions import Region, clearances_at
 from cosim.record import Record
@@ -112,7 +113,7 @@ def drawings(story: Story) -> Iterator[Drawing]:
         ("clearance", "Clearance to each region, negative where it is violated.", clearance),
         ("forces", "Body force: what the law asks for, and what acts.", forces),
         ("thrusters", "Thruster forces.", thrusters),
-        ("estimates", "Estimated restoring parameters against the truth (dashed).", estimates),
+        ("estimates", "Estimated restoring parameters against the truth (dotted).", estimates),
     ]
     for name, caption, draw in figures:
         if name == "weights-overlap" and not story.summary["intersection_windows"]:
@@ -129,14 +130,17 @@ def drawings(story: Story) -> Iterator[Drawing]:
 def path_3d(story: Story) -> Figure:
     """Draw the path, regions and goal in space."""
     scenario, record = story.scenario, story.record
-    figure = Figure(figsize=(6.4, 5.2))
-    ax = figure.add_subplot(projection="3d")
+    figure = Figure(figsize=(6.8, 4.6))
+    ax = figure.add_axes((0.0, 0.02, 1.0, 0.94), projection="3d")
     low, high = _extent(scenario, record)
+    wide = np.maximum(high - low, 0.4 * (high - low).max())  # a flat path still gets a box with some depth
+    middle = (low + high) / 2.0
+    low, high = middle - wide / 2.0, middle + wide / 2.0
     rng = np.random.default_rng(0)
     for region, colour in _regions(scenario):
         points = _surface_points(region, low, high, rng)
         if points.size:
-            ax.scatter(*points.T, s=1.5, color=colour, alpha=0.35, linewidths=0, rasterized=True)
+            ax.scatter(*points.T, s=3.0, color=colour, alpha=0.45, linewidths=0, rasterized=True)
             ax.plot([], [], [], "o", color=colour, label=region.name)
     path = record.stack(["position.x", "position.y", "position.z"])
     ax.plot(*_thin_path(path).T, color=PATH_COLOUR, label="path")
@@ -144,15 +148,16 @@ def path_3d(story: Story) -> Figure:
     overlap = _overlap(story)
     if overlap.any():
         inside = path[overlap]
-        ax.plot(*inside.T, color=BLACK, linewidth=3)
-        ax.text(*(inside[len(inside) // 2] + [0.0, 0.0, -0.3]), "I", fontweight="bold")
+        ax.plot(*inside.T, color=BLACK, linewidth=3, label="I overlap")
+        ax.text(*(inside[len(inside) // 2] + [0.0, 0.0, -0.12 * wide[2]]), "I", fontweight="bold", ha="center")
     ax.set(xlabel="north x [m]", ylabel="east y [m]", zlabel="depth z [m]")
     ax.set_xlim(low[0], high[0])
     ax.set_ylim(low[1], high[1])
     ax.set_zlim(high[2], low[2])
-    ax.set_box_aspect(high - low, zoom=0.9)
-    ax.view_init(elev=22, azim=-65)
-    ax.legend(loc="upper left", bbox_to_anchor=(0.0, 0.98))
+    ax.yaxis.set_major_locator(MaxNLocator(4))
+    ax.set_box_aspect(wide, zoom=1.12)
+    ax.view_init(elev=20, azim=-70)
+    figure.legend(loc="upper center", ncols=8)
     return figure
 
 
@@ -265,22 +270,53 @@ def _thin_path(path: Array) -> Array:
 
 def _axes(height: float = 2.6, rows: int = 1) -> tuple[Figure, Any]:
     figure = Figure(figsize=(6.8, height), layout="constrained")
-    return figure, figure.subplots(rows, 1, sharex=True)
+    axes = figure.subplots(rows, 1, sharex=True, squeeze=False)[:, 0]
+    axes[-1].set_xlabel("time [s]")
+    return figure, axes
 
 
-def _curves(ax: Axes, story: Story, signals: dict[str, Array], **style: Any) -> None:
-    time, *thinned = thin(story.record["time"], *signals.values())
-    for label, signal in zip(signals, thinned, strict=True):
-        ax.plot(time, signal, label=label, **style)
+def _zoomed(story: Story, height: float, rows: int = 1) -> tuple[Figure, Any]:
+    """Return axes for the whole run, shape (rows, 1), or (rows, 2) with the time of the overlap on the left."""
+    windows = story.summary["intersection_windows"]
+    until = 1.6 * windows[0][1] if windows else np.inf
+    if until > 0.4 * story.summary["simulated_time"]:
+        figure, axes = _axes(height, rows)
+        return figure, axes[:, None]
+    figure = Figure(figsize=(6.8, height), layout="constrained")
+    axes = figure.subplots(rows, 2, sharex="col", sharey="row", squeeze=False, width_ratios=[2, 3])
+    for ax in axes[:, 0]:
+        ax.set_xlim(0.0, until)
+        ax.axvspan(*windows[0], color=BLACK, alpha=0.08)
+    for ax in axes[-1]:
+        ax.set_xlabel("time [s]")
+    return figure, axes
 
 
-def _below(ax: Axes, ncols: int) -> None:
-    ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.24), ncols=ncols)
+def _curves(axes: Any, story: Story, signals: dict[str, Array], **style: Any) -> None:
+    """Draw signals into one axes, or into several that show different spans of time."""
+    for ax in np.atleast_1d(axes):
+        seen = story.record["time"] <= (ax.get_xlim()[1] if not ax.get_autoscalex_on() else np.inf)
+        time, *thinned = thin(story.record["time"][seen], *(signal[seen] for signal in signals.values()))
+        for label, signal in zip(signals, thinned, strict=True):
+            ax.plot(time, signal, label=label, **style)
+
+
+def _legend(figure: Figure, ax: Axes, ncols: int) -> None:
+    figure.legend(*ax.get_legend_handles_labels(), loc="outside upper center", ncols=ncols)
+
+
+def _symlog(ax: Axes, largest: float, linear: float) -> None:
+    """Make an axis linear to about `linear` and logarithmic beyond."""
+    threshold = 10.0 ** np.ceil(np.log10(max(linear, 1.0)))
+    decades = 10.0 ** np.arange(np.log10(threshold), np.ceil(np.log10(largest)) + 1.0)
+    ax.set_yscale("symlog", linthresh=threshold)
+    ax.set_yticks([*-decades[::-1], 0.0, *decades])
+    ax.set_ylim(-1.5 * largest, 1.5 * largest)
 
 
 def position_error(story: Story) -> Figure:
     """Draw the RMS error to the goal's centre, or the distance to the goal where it has none."""
-    figure, ax = _axes()
+    figure, (ax,) = _axes()
     centre, radius = getattr(story.scenario.goal, "centre", None), getattr(story.scenario.goal, "radius", None)
     if centre is None:
         _curves(ax, story, {"distance to the goal": np.maximum(0.0, -story.record["goal.clearance"])})
@@ -292,16 +328,15 @@ def position_error(story: Story) -> Figure:
         if radius is not None:
             ax.axhline(radius / np.sqrt(3.0), color=GOAL_COLOUR, linestyle="--", label="tolerance r_v/√3")
     ax.set_ylim(bottom=0.0)
-    ax.set_xlabel("time [s]")
     ax.legend()
     return figure
 
 
 def attitude(story: Story) -> Figure:
     """Draw roll, pitch and yaw."""
-    figure, ax = _axes()
+    figure, (ax,) = _axes()
     _curves(ax, story, {name: np.rad2deg(story.record[f"attitude.{name}"]) for name in ("roll", "pitch", "yaw")})
-    ax.set(xlabel="time [s]", ylabel="Euler angle [°]")
+    ax.set_ylabel("Euler angle [°]")
     ax.legend(ncols=3)
     return figure
 
@@ -316,58 +351,59 @@ def weights_overlap(story: Story) -> Figure:
         room = max(0.5 * (end - start), 5 * story.scenario.time.step)
         shown = (time >= start - room) & (time <= end + room)
         for i, name in enumerate(CRITERIA):
-            ax.plot(time[shown], story.record[f"weight.{name}"][shown], color=CRITERION_COLOURS[name], label=f"α{i + 1} {name}")
+            weight = story.record[f"weight.{name}"][shown]
+            ax.plot(time[shown], weight, color=CRITERION_COLOURS[name], label=f"α{i + 1} {name}")
         ax.axvspan(start, end, color=BLACK, alpha=0.08, label="overlap")
         ax.set_title(f"{start:.3f} s to {end:.3f} s", fontsize=9)
         ax.set_xlabel("time [s]")
     axes[0].set_ylabel("normalised weight [–]")
     axes[0].set_ylim(-0.05, 1.05)
-    figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=4)
+    _legend(figure, axes[0], 4)
     return figure
 
 
 def weights(story: Story) -> Figure:
     """Draw memberships and weights of each criterion."""
-    figure, axes = _axes(4.2, len(CRITERIA))
-    for i, (ax, name) in enumerate(zip(axes, CRITERIA, strict=True)):
-        _curves(ax, story, {"membership": story.record[f"membership.{name}"]}, color=BLACK, linestyle=":")
-        _curves(ax, story, {"weight": story.record[f"weight.{name}"]}, color=CRITERION_COLOURS[name])
-        ax.set(ylabel=f"α{i + 1} {name}", ylim=(-0.05, 1.05))
-    handles, labels = axes[0].get_legend_handles_labels()
-    axes[-1].set_xlabel("time [s]")
-    figure.legend(handles, labels, loc="outside upper center", ncols=2)
+    figure, axes = _zoomed(story, 4.2, len(CRITERIA))
+    for i, (row, name) in enumerate(zip(axes, CRITERIA, strict=True)):
+        _curves(row, story, {"weight": story.record[f"weight.{name}"]}, color=CRITERION_COLOURS[name])
+        _curves(row, story, {"membership": story.record[f"membership.{name}"]}, color=BLACK, linestyle=":")
+        row[0].set(ylabel=f"α{i + 1} {name}", ylim=(-0.05, 1.05))
+    _legend(figure, axes[0, 0], 2)
     return figure
 
 
 def clearance(story: Story) -> Figure:
     """Draw the clearance to each region and to the goal."""
-    figure, ax = _axes(3.0)
+    figure, axes = _zoomed(story, 3.0)
     styles = ("-", "--", "-.", ":")
     for i, (region, colour) in enumerate(_regions(story.scenario)):
-        _curves(ax, story, {region.name: story.record[f"{region.name}.clearance"]}, color=colour, linestyle=styles[i % 4])
-    ax.axhspan(ax.get_ylim()[0], 0.0, color=RED, alpha=0.06)
-    ax.axhline(0.0, color=BLACK, linewidth=0.8)
-    ax.set(xlabel="time [s]", ylabel="clearance [m]")
-    _below(ax, 8)
+        signal = story.record[f"{region.name}.clearance"]
+        _curves(axes[0], story, {region.name: signal}, color=colour, linestyle=styles[i % 4])
+    for ax in axes[0]:
+        ax.set_ylim(ax.get_ylim())
+        ax.axhspan(ax.get_ylim()[0], 0.0, color=RED, alpha=0.06, linewidth=0)
+        ax.axhline(0.0, color=BLACK, linewidth=0.8)
+    axes[0, 0].set_ylabel("clearance [m]")
+    _legend(figure, axes[0, 0], 8)
     return figure
 
 
 def forces(story: Story) -> Figure:
     """Draw the norm of the body force on a logarithmic axis, and its components."""
-    figure, (norm, parts) = _axes(4.4, 2)
+    figure, (norm, parts) = _axes(4.6, 2)
     asked = np.linalg.norm(story.record.stack([f"command.{a}" for a in "XYZ"]), axis=1)
     acting = np.linalg.norm(story.record.stack([f"actuation.{a}" for a in "XYZ"]), axis=1)
     floor = 1e-2
-    _curves(norm, story, {"asked for": np.maximum(asked, floor)}, color=RED, linestyle="--")
     _curves(norm, story, {"acting": np.maximum(acting, floor)}, color=BLUE)
+    _curves(norm, story, {"asked for": np.maximum(asked, floor)}, color=RED, linestyle="--")
     norm.set(yscale="log", ylabel="‖F‖ [N]")
     norm.legend(ncols=2)
     _curves(parts, story, {f"{a} acting": story.record[f"actuation.{a}"] for a in "XYZ"})
-    largest = max(float(np.abs(story.record[f"actuation.{a}"]).max()) for a in "XYZ")
-    typical = float(np.percentile(acting, 90))
+    largest, typical = float(acting.max()), float(np.percentile(acting, 90))
     if largest > 20.0 * max(typical, 1.0):  # a spike would flatten all the rest
-        parts.set_yscale("symlog", linthresh=max(typical, 1.0))
-    parts.set(xlabel="time [s]", ylabel="force [N]")
+        _symlog(parts, largest, typical)
+    parts.set_ylabel("force [N]")
     parts.legend(ncols=3)
     return figure
 
@@ -390,15 +426,17 @@ def thrusters(story: Story) -> Figure:
     else:
         wrench = story.record.stack([f"actuation.{a}" for a in "XYZKMN"])
         force = wrench @ np.linalg.pinv(vehicle.thruster_matrix).T
-    figure, ax = _axes(3.0)
-    _curves(ax, story, {str(i + 1): force[:, i] for i in range(vehicle.n_thrusters)}, linewidth=1.0)
-    limit = float(max(vehicle.thrust_max.max(), -vehicle.thrust_min.min()))
-    for bound in (float(vehicle.thrust_min.min()), float(vehicle.thrust_max.max())):
+    figure, (ax,) = _axes(3.0)
+    for i in range(vehicle.n_thrusters):
+        style = "-" if i < len(CYCLE) // 2 else "--"
+        _curves(ax, story, {str(i + 1): force[:, i]}, color=CYCLE[i % len(CYCLE)], linestyle=style, linewidth=1.0)
+    lowest, highest = float(vehicle.thrust_min.min()), float(vehicle.thrust_max.max())
+    for bound in (lowest, highest):
         ax.axhline(bound, color=BLACK, linestyle="--", linewidth=0.8)
-    if np.abs(force).max() > 5.0 * limit:
-        ax.set_yscale("symlog", linthresh=limit)
-    ax.set(xlabel="time [s]", ylabel="thrust [N]")
-    _below(ax, 8)
+    if np.abs(force).max() > 5.0 * max(highest, -lowest):
+        _symlog(ax, float(np.abs(force).max()), max(highest, -lowest))
+    ax.set_ylabel("thrust [N]")
+    _legend(figure, ax, 8)
     return figure
 
 
@@ -407,12 +445,13 @@ def estimates(story: Story) -> Figure:
     figure, (force, moment) = _axes(4.2, 2)
     truth = story.scenario.true_restoring_parameters
     labels = ("W − B", "x_G W − x_B B", "y_G W − y_B B", "z_G W − z_B B")
+    styles = ("-", "-", "--", "-")
     for i, label in enumerate(labels):
         ax, colour = (force, BLUE) if i == 0 else (moment, CYCLE[i])
-        _curves(ax, story, {label: story.record[f"estimate.phi{i + 1}"]}, color=colour)
-        ax.axhline(truth[i], color=colour, linestyle="--", linewidth=0.8)
+        _curves(ax, story, {label: story.record[f"estimate.phi{i + 1}"]}, color=colour, linestyle=styles[i])
+        ax.axhline(truth[i], color=colour, linestyle=":", linewidth=1.0)
     force.set_ylabel("φ̂1 [N]")
-    moment.set(xlabel="time [s]", ylabel="φ̂2 … φ̂4 [N m]")
+    moment.set_ylabel("φ̂2 … φ̂4 [N m]")
     force.legend()
     moment.legend(ncols=3)
     return figure

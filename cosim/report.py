@@ -11,7 +11,7 @@ from typing import Any
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 
-from cosim.claims import paper_claims
+from cosim.claims import newtons, paper_claims
 from cosim.figures import Drawing, Story, drawings
 from cosim.record import Record
 from cosim.scenario import Scenario
@@ -134,9 +134,14 @@ def verdict(summary: dict[str, Any]) -> str:
         goal = f"The vehicle entered the goal region at {summary['reach_time']:.2f} s but did not settle there"
     else:
         goal = f"The vehicle never entered the goal region; it came within {summary['closest_to_goal']:.2f} m of it"
-    broken = [f"{name} by {-c:.3f} m" for name, c in summary["min_clearance"].items() if c < 0.0]
+    from_start = summary["violated_at_start"]
+    broken = [
+        f"{name} by {-c:.3f} m" + (" (where it starts)" if name in from_start else "")
+        for name, c in summary["min_clearance"].items()
+        if c < 0.0
+    ]
     kept = f"; it violated {', '.join(broken)}." if broken else "; it kept every region."
-    force = f" The law asked for up to {summary['max_force_asked']:.4g} N; up to {summary['max_force']:.4g} N acted."
+    force = f" The law asked for up to {newtons(summary['max_force_asked'])}; up to {newtons(summary['max_force'])} acted."
     ended = "" if summary["status"] == "completed" else f" The run was {summary['status']} at {summary['simulated_time']:.3f} s."
     return goal + kept + force + ended
 

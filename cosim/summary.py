@@ -84,6 +84,7 @@ def summarise(scenario: Scenario, record: Record, status: str, wall_time: float)
         "intersection": [names[i] for i in scenario.intersection],
         "intersection_windows": spans(np.logical_and.reduce(overlap), time) if overlap else [],
         "min_clearance": {name: float(record[f"{name}.clearance"].min()) for name in names},
+        "violated_at_start": [name for name in names if record[f"{name}.clearance"][0] < 0.0],
         "max_force": float(force.max()) if force.size else 0.0,
         "max_force_asked": float(asked.max()),
         "max_speed": float(speed.max()),
