@@ -227,6 +227,7 @@ class Plant:
         self._hear(status, message)
 
     def _callbacks_fmi2(self) -> fmi2CallbackFunctions:
+        # not through FMPy's logger proxy, which formats variadic messages but serves one instance in the whole process
         def hear(environment: Any, name: bytes, status: int, category: bytes, message: bytes) -> None:
             self._hear(status, message)
 
@@ -234,10 +235,4 @@ class Plant:
         callbacks.logger = fmi2CallbackLoggerTYPE(hear)
         callbacks.allocateMemory = default_callbacks.allocateMemory
         callbacks.freeMemory = default_callbacks.freeMemory
-        try:  # formats the variadic message; FMPy has it for some platforms only
-            from fmpy.logging import addLoggerProxy
-        except (ImportError, OSError, AttributeError):
-            log.debug("FMPy formats no FMI 2.0 messages here")
-        else:
-            addLoggerProxy(ctypes.byref(callbacks))
         return callbacks

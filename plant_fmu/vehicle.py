@@ -95,7 +95,7 @@ class Vehicle:
     @property
     def mass_matrix(self) -> NDArray[np.float64]:
         """M of (11), shape (6, 6): rigid body plus added mass, about the body origin."""
-        S = np.cross(np.eye(3), -self.r_G)  # S(r_G), (4)
+        S = np.cross(np.eye(3), self.r_G)  # S(r_G), (4)
         rigid = np.block([[self.mass * np.eye(3), -self.mass * S], [self.mass * S, self.inertia]])
         return np.asarray(rigid + self.added_mass)
 

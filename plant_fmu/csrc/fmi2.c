@@ -2,11 +2,22 @@
 #include "fmi2Functions.h"
 #include "instance.h"
 
+/* The importer's logger is variadic, like printf. The message goes as the format itself, each % doubled, so that it also
+ * reaches importers that cannot read variadic arguments. */
 static void log_message(const Instance *instance, Status status, const char *category, const char *message)
 {
-    if (instance->logger) /* the message is no format string */
-        ((fmi2CallbackLogger)instance->logger)(instance->environment, instance->name, (fmi2Status)status, category,
-                                               "%s", message);
+    char format[2 * MAX_MESSAGE];
+    size_t n = 0;
+
+    if (!instance->logger)
+        return;
+    for (; *message && n < sizeof format - 2; message++) {
+        format[n++] = *message;
+        if (*message == '%')
+            format[n++] = '%';
+    }
+    format[n] = '\0';
+    ((fmi2CallbackLogger)instance->logger)(instance->environment, instance->name, (fmi2Status)status, category, format);
 }
 
 /* ---- version, logging, life -------------------------------------------------------------------------------- */

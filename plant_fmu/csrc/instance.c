@@ -37,7 +37,7 @@ Status instance_tell(const Instance *instance, Status status, const char *format
 {
     static const char *const categories[] = {
         "logAll", "logStatusWarning", "logStatusDiscard", "logStatusError", "logStatusFatal"};
-    char message[512];
+    char message[MAX_MESSAGE];
     va_list arguments;
 
     if (status < STATUS_ERROR && !instance->logging)

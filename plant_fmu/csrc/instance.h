@@ -8,6 +8,8 @@
 
 #include "plant.h"
 
+enum { MAX_MESSAGE = 512 }; /* bytes of a logged message */
+
 typedef enum { STATUS_OK, STATUS_WARNING, STATUS_DISCARD, STATUS_ERROR, STATUS_FATAL } Status; /* as in FMI */
 
 typedef enum {

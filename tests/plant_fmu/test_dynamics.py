@@ -1,0 +1,214 @@
+"""The plant as physical laws."""
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.spatial.transform import Rotation
+
+from tests.plant_fmu.conftest import STATES, WRENCH
+
+# a body with nothing symmetric about it
+MASS, INERTIA = 20.0, np.array([[1.1, -0.06, 0.05], [-0.06, 1.4, 0.09], [0.05, 0.09, 1.7]])
+R_G, R_B = np.array([0.03, -0.02, 0.05]), np.array([-0.01, 0.02, -0.04])
+rng = np.random.default_rng(7)
+_root = rng.normal(size=(6, 6))
+ADDED = _root @ _root.T * 0.4 + np.diag([9, 12, 16, 0.3, 0.4, 0.5])
+
+
+def asymmetric(**more):
+    values = {"mass": MASS, "weight": 196.2, "buoyancy": 199.0}
+    values |= {f"inertia.{a}{b}": INERTIA[i, j] for i, a in enumerate("xyz") for j, b in enumerate("xyz") if i <= j}
+    values |= {f"r_G.{a}": x for a, x in zip("xyz", R_G, strict=True)}
+    values |= {f"r_B.{a}": x for a, x in zip("xyz", R_B, strict=True)}
+    values |= {f"added_mass[{i + 1},{j + 1}]": ADDED[i, j] for i in range(6) for j in range(i, 6)}
+    values |= {f"{kind}_damping[{i + 1}]": 0.0 for kind in ("linear", "quadratic") for i in range(6)}
+    return values | more
+
+
+def skew(a):
+    return np.cross(np.eye(3), a)
+
+
+def mass_matrices():
+    rigid = np.block([[MASS * np.eye(3), -MASS * skew(R_G)], [MASS * skew(R_G), INERTIA]])
+    return rigid, ADDED
+
+
+START = {"quaternion.e0": 0.6, "quaternion.e1": 0.5, "quaternion.e2": -0.4, "quaternion.e3": 0.48,
+         "velocity.u": 0.7, "velocity.v": -0.3, "velocity.w": 0.4, "velocity.p": 0.5, "velocity.q": -0.6, "velocity.r": 0.3}  # fmt: skip
+
+
+def test_follows_fossens_matrix_equation_with_nothing_symmetric(make_slave, fmi):
+    """A direct transcription with C(nu) from the parametrisation theorem (Fossen 2011, 3.46), integrated by SciPy."""
+    M_RB, M_A = mass_matrices()
+    current, tau = np.array([0.3, -0.2, 0.1]), np.array([3.0, -2.0, 4.0, 0.4, -0.5, 0.3])
+    linear, quadratic = np.array([2, 3, 4, 0.1, 0.2, 0.3]), np.array([5, 6, 7, 0.4, 0.5, 0.6])
+
+    def C(M, nu):
+        a = M[:3, :3] @ nu[:3] + M[:3, 3:] @ nu[3:]
+        b = M[3:, :3] @ nu[:3] + M[3:, 3:] @ nu[3:]
+        return np.block([[np.zeros((3, 3)), -skew(a)], [-skew(a), -skew(b)]])
+
+    def rhs(t, x):
+        e, nu = x[3:7], x[7:]
+        R = Rotation.from_quat(np.roll(e, -1)).as_matrix()
+        v_c = R.T @ current
+        nu_r = nu - np.r_[v_c, 0, 0, 0]
+        nu_c_dot = np.r_[-np.cross(nu[3:], v_c), 0, 0, 0]
+        k = R.T @ [0, 0, 1]
+        g = -np.r_[(196.2 - 199.0) * k, np.cross(R_G * 196.2 - R_B * 199.0, k)]
+        force = tau - C(M_RB, nu) @ nu - C(M_A, nu_r) @ nu_r - (linear + quadratic * abs(nu_r)) * nu_r - g + M_A @ nu_c_dot
+        w = nu[3:]
+        e_dot = 0.5 * np.r_[-e[1:] @ w, e[0] * w + np.cross(e[1:], w)]
+        return np.r_[R @ nu[:3], e_dot, np.linalg.solve(M_RB + M_A, force)]
+
+    values = asymmetric(**START)
+    values |= {f"current.{a}": c for a, c in zip("xyz", current, strict=True)}
+    values |= {f"linear_damping[{i + 1}]": d for i, d in enumerate(linear)}
+    values |= {f"quadratic_damping[{i + 1}]": d for i, d in enumerate(quadratic)}
+    slave = make_slave(fmi=fmi).start(**values, substep=0.001)
+    slave.set_values(dict(zip(WRENCH, tau, strict=True)))
+    x0 = np.array(slave.get(*STATES))
+    slave.step(6.0)
+    expected = solve_ivp(rhs, (0, 6.0), x0, method="DOP853", rtol=1e-12, atol=1e-12).y[:, -1]
+    assert np.abs(slave.get(*STATES) - expected).max() < 1e-8
+
+
+def energy(state):
+    M_RB, M_A = mass_matrices()
+    position, e, nu = np.array(state[:3]), np.array(state[3:7]), np.array(state[7:])
+    R = Rotation.from_quat(np.roll(e, -1)).as_matrix()
+    depth_G, depth_B = position[2] + (R @ R_G)[2], position[2] + (R @ R_B)[2]
+    return 0.5 * nu @ (M_RB + M_A) @ nu - 196.2 * depth_G + 199.0 * depth_B
+
+
+def test_energy_is_conserved_without_damping(make_slave):
+    slave = make_slave().start(**asymmetric(**START), substep=0.001)
+    before = energy(slave.get(*STATES))
+    slave.step(60.0)
+    assert energy(slave.get(*STATES)) == pytest.approx(before, rel=1e-9)
+
+
+def test_damping_takes_energy_out(make_slave):
+    slave = make_slave().start(**asymmetric(**START, **{f"quadratic_damping[{i + 1}]": 5.0 for i in range(6)}))
+    energies = []
+    for _ in range(50):
+        energies.append(energy(slave.get(*STATES)))
+        slave.step(0.1)
+    assert np.all(np.diff(energies) < 0.0)
+
+
+def test_world_momentum_is_conserved_without_forces(make_slave):
+    """Rigid body plus water: the total momentum, seen from the world, stays."""
+    slave = make_slave().start(**asymmetric(**START, weight=0.0, buoyancy=0.0), substep=0.001)
+    M = sum(mass_matrices())
+
+    def momentum():
+        state = np.array(slave.get(*STATES))
+        R = Rotation.from_quat(np.roll(state[3:7], -1)).as_matrix()
+        return R @ (M @ state[7:])[:3]
+
+    before = momentum()
+    slave.step(20.0)
+    assert momentum() == pytest.approx(before, abs=1e-9)
+
+
+def test_quaternion_stays_a_unit(make_slave):
+    slave = make_slave("bluerov2_heavy").start(**START)
+    slave.set_values({"wrench.K": 2.0, "wrench.M": -3.0, "wrench.N": 4.0})
+    for _ in range(50):
+        slave.step(0.5)
+        assert np.linalg.norm(slave.get(*STATES[3:7])) == pytest.approx(1.0, abs=1e-15)
+
+
+def test_quaternion_is_normalised_when_initialisation_ends(make_slave):
+    slave = make_slave().start(**{"quaternion.e0": 0.5, "quaternion.e1": 0.5})
+    assert slave.get("quaternion.e0", "quaternion.e1") == pytest.approx([np.sqrt(0.5)] * 2)
+
+
+def test_drifts_with_the_current(make_slave):
+    """At rest in moving water a neutral vehicle is at rest for the water."""
+    slave = make_slave().start(**asymmetric(
+        weight=196.2, buoyancy=196.2, **{"current.x": 0.4, "current.y": -0.3, "current.z": 0.2},
+        **{"velocity.u": 0.4, "velocity.v": -0.3, "velocity.w": 0.2},
+        **{f"r_{c}.{a}": 0.0 for c in "GB" for a in "xyz"},
+        **{f"quadratic_damping[{i + 1}]": 9.0 for i in range(6)},
+    ))  # fmt: skip
+    slave.step(10.0)
+    assert slave.get("position.x", "position.y", "position.z") == pytest.approx([4.0, -3.0, 2.0], abs=1e-12)
+
+
+def test_euler_angles_are_those_of_the_quaternion(make_slave):
+    slave = make_slave().start(**START)
+    e = slave.get(*STATES[3:7])
+    yaw, pitch, roll = Rotation.from_quat(np.roll(e, -1)).as_euler("ZYX")
+    assert slave.get("attitude.roll", "attitude.pitch", "attitude.yaw") == pytest.approx([roll, pitch, yaw], abs=1e-12)
+
+
+# ---- actuators ----
+
+
+def test_thrusters_saturate_and_say_so(make_slave, fmi):
+    slave = make_slave(fmi=fmi).start()
+    slave.set_values({"thrust[1]": 30.0, "thrust[2]": -30.0, "thrust[3]": 5.0})
+    slave.step(0.01)
+    assert slave.get("thruster_force[1]", "thruster_force[2]", "thruster_force[3]") == [27.0, -27.0, 5.0]
+    assert [slave.flag(f"thrust_saturated[{i}]") for i in (1, 2, 3)] == [True, True, False]
+    slave.set_values({"thrust[1]": 27.0})
+    slave.step(0.01)
+    assert not slave.flag("thrust_saturated[1]")
+
+
+@pytest.mark.parametrize("time_constant", [1e-6, 0.02, 3.0])
+def test_thruster_lag_is_exact_for_any_time_constant(make_slave, time_constant):
+    slave = make_slave().start(**{"thrust_time_constant[1]": time_constant})
+    slave.set_values({"thrust[1]": 20.0})
+    for k in range(1, 20):
+        slave.step(0.05)
+        expected = 20.0 * -np.expm1(-0.05 * k / time_constant)
+        assert slave.get("thruster_force[1]")[0] == pytest.approx(expected, rel=1e-12)
+
+
+def test_lagged_thrust_moves_a_free_body_as_the_integral_says(make_slave):
+    """Double integral of f (1 - exp(-t/T)) / m, which the substeps must meet to fourth order."""
+    T, f, m, t = 0.4, 15.0, MASS, 3.0
+    slave = make_slave().start(**asymmetric(
+        weight=0.0, buoyancy=0.0, wrench_time_constant=T, substep=0.005,
+        **{f"added_mass[{i + 1},{j + 1}]": 0.0 for i in range(6) for j in range(i, 6)},
+        **{f"r_G.{a}": 0.0 for a in "xyz"},
+    ))  # fmt: skip
+    slave.set_values({"wrench.X": f})
+    slave.step(t)
+    assert slave.get("position.x")[0] == pytest.approx(f / m * (t**2 / 2 - T * t - T**2 * np.expm1(-t / T)), rel=1e-10)
+
+
+def test_force_limit_keeps_the_direction_and_leaves_the_moment(make_slave, fmi):
+    slave = make_slave(fmi=fmi).start(wrench_force_limit=10.0)
+    slave.set_values(dict(zip(WRENCH, (30.0, -40.0, 120.0, 50.0, 60.0, 70.0), strict=True)))
+    slave.step(0.01)
+    acting = slave.get(*(f"actuation.{a}" for a in "XYZKMN"))
+    assert acting == pytest.approx([30 / 13, -40 / 13, 120 / 13, 50.0, 60.0, 70.0], rel=1e-14)
+    assert slave.flag("wrench_saturated")
+
+
+def test_without_a_limit_any_force_passes(make_slave):
+    slave = make_slave().start()
+    slave.set_values({"wrench.X": 9e8})
+    assert slave.get("actuation.X") == [9e8]
+    assert not slave.flag("wrench_saturated")
+
+
+def test_thrusters_and_wrench_add_up(make_slave):
+    slave = make_slave().start()
+    slave.set_values({"thrust[1]": 10.0, "wrench.X": 2.0, "wrench.N": 1.0})
+    assert slave.get("actuation.X", "actuation.Y", "actuation.N") == pytest.approx([2.0 + 50**0.5, 50**0.5, 6.08])
+
+
+def test_substeps_are_snapped_to_the_step(make_slave):
+    """A step that is a hair more than whole substeps takes no further one."""
+    ends = []
+    for h in (0.01, np.nextafter(0.01, 1.0)):
+        slave = make_slave().start(**START, substep=0.005)
+        slave.step(h)
+        ends.append(slave.get(*STATES))
+    assert ends[0] == pytest.approx(ends[1], abs=1e-15)

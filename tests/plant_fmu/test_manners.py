@@ -1,0 +1,155 @@
+"""How the FMU refuses: always with a message that names the variable, and without harm."""
+
+import math
+
+import pytest
+from fmpy.fmi1 import FMICallException
+
+from plant_fmu import cached_fmu, load_vehicle
+from tests.plant_fmu.conftest import STATES, Slave
+
+
+def refused(slave, call, *words):
+    slave.said.clear()
+    with pytest.raises(FMICallException):
+        call()
+    text = " ".join(message for _, message in slave.said)
+    assert slave.said, "nothing was logged"
+    assert all(status >= 3 for status, _ in slave.said)
+    for word in words:
+        assert word in text
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
+@pytest.mark.parametrize("name", ["thrust[3]", "wrench.M", "mass", "position.x"])
+def test_no_nan_or_infinity_gets_in(make_slave, fmi, name, value):
+    slave = make_slave(fmi=fmi)
+    before = slave.get(name)
+    refused(slave, lambda: slave.set_values({name: value}), name, "not a finite number")
+    assert slave.get(name) == before
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [("mass", -1e9), ("mass", 0.0), ("thrust_time_constant[1]", -0.1), ("quadratic_damping[2]", -1.0), ("substep", 0.0),
+     ("weight", -1.0), ("wrench_force_limit", -1.0), ("quaternion.e0", 1.5), ("thrust[1]", 1e10)],
+)  # fmt: skip
+def test_values_out_of_range_are_refused(make_slave, fmi, name, value):
+    slave = make_slave(fmi=fmi)
+    refused(slave, lambda: slave.set_values({name: value}), name, "outside [")
+
+
+def test_a_refused_value_sets_none_of_its_company(make_slave, fmi):
+    slave = make_slave(fmi=fmi)
+    refused(slave, lambda: slave.set_values({"weight": 1.0, "mass": -1.0}), "mass")
+    assert slave.get("weight") == [1226.25]
+
+
+def test_mass_matrix_must_be_positive_definite(make_slave, fmi):
+    slave = make_slave(fmi=fmi)
+    refused(slave, lambda: slave.start(**{"added_mass[1,2]": 1e6}), "positive definite")
+
+
+def test_a_tunable_parameter_that_makes_no_vehicle_stops_the_step(make_slave, fmi):
+    slave = make_slave(fmi=fmi).start()
+    slave.set_values({"thrust_min[1]": 30.0})
+    refused(slave, lambda: slave.step(0.1), "thrust_min is above thrust_max")
+
+
+def test_quaternion_must_have_a_direction(make_slave, fmi):
+    slave = make_slave(fmi=fmi)
+    refused(slave, lambda: slave.start(**{"quaternion.e0": 0.0}), "quaternion")
+
+
+def test_outputs_cannot_be_set(make_slave, fmi):
+    slave = make_slave(fmi=fmi)
+    refused(slave, lambda: slave.set_values({"attitude.roll": 0.1}), "attitude.roll", "calculated")
+
+
+def test_states_cannot_be_set_once_running(make_slave, fmi):
+    slave = make_slave(fmi=fmi).start()
+    refused(slave, lambda: slave.set_values({"position.x": 1.0}), "position.x", "initialisation")
+
+
+@pytest.mark.parametrize("step", [0.0, -0.1, math.nan, math.inf])
+def test_steps_must_be_positive(make_slave, fmi, step):
+    slave = make_slave(fmi=fmi).start()
+    refused(slave, lambda: slave.fmu.doStep(0.0, step), "step size")
+
+
+def test_huge_steps_are_refused(make_slave, fmi):
+    slave = make_slave(fmi=fmi).start()
+    refused(slave, lambda: slave.fmu.doStep(0.0, 1e9), "substeps")
+
+
+def test_steps_start_where_the_plant_is(make_slave, fmi):
+    slave = make_slave(fmi=fmi).start()
+    refused(slave, lambda: slave.fmu.doStep(5.0, 0.1), "the plant is at 0")
+
+
+def test_a_state_that_explodes_is_not_taken(make_slave, fmi):
+    slave = make_slave("bluerov2_heavy", fmi).start()
+    slave.set_values({"wrench.X": 9e8})
+    before = slave.get(*STATES)
+    refused(slave, lambda: slave.fmu.doStep(0.0, 1.0), "not taken")
+    assert slave.get(*STATES) == before
+    slave.set_values({"wrench.X": 0.0})
+    slave.fmu.doStep(0.0, 1.0)  # and goes on
+
+
+def test_no_stepping_before_initialisation(make_slave, fmi):
+    slave = make_slave(fmi=fmi)
+    refused(slave, lambda: slave.step(0.1), "before initialisation")
+
+
+def test_a_wrong_token_makes_no_instance(make_slave, fmi):
+    slave = make_slave(fmi=fmi)
+    slave.fmu.guid = "{not this one}"
+    with pytest.raises(Exception, match="Failed to instantiate"):
+        slave.fmu.instantiate()
+
+
+def test_what_is_not_offered_is_logged(make_slave):
+    slave = make_slave(fmi=3).start()
+    refused(slave, lambda: slave.fmu.getFMUState(), "fmi3GetFMUState", "not offered")
+
+
+def test_reset_brings_the_start_back(make_slave, fmi):
+    slave = make_slave(fmi=fmi).start(**{"position.z": 3.0})
+    fresh = slave.get(*STATES)
+    slave.step(1.0)
+    slave.fmu.reset()
+    slave.time = 0.0
+    slave.start(**{"position.z": 3.0})
+    assert slave.get(*STATES) == fresh
+
+
+def test_time_may_start_anywhere_and_be_added_up(make_slave):
+    slave = make_slave(fmi=3)
+    slave.fmu.enterInitializationMode(startTime=100.0)
+    slave.fmu.exitInitializationMode()
+    slave.time = 100.0
+    for _ in range(20_000):  # 0.1 is no binary fraction
+        slave.step(0.1)
+    assert slave.time != 2100.0
+
+
+def test_both_versions_give_the_same_bits(make_slave):
+    ends = []
+    for fmi in (2, 3):
+        slave = make_slave("bluerov2_heavy", fmi).start(**{"velocity.p": 0.3})
+        slave.set_values({"thrust[1]": 12.0})
+        for _ in range(200):
+            slave.step(0.013)
+        ends.append(slave.get(*STATES))
+    assert ends[0] == ends[1]
+
+
+def test_instances_do_not_disturb_each_other():
+    path = cached_fmu(load_vehicle("odin"), 3)
+    slaves = [Slave(path, f"vehicle {i}").start(**{"position.z": float(i)}) for i in range(3)]
+    for slave in slaves:
+        slave.step(0.1)
+    assert [round(slave.get("position.z")[0]) for slave in slaves] == [0, 1, 2]
+    for slave in slaves:
+        slave.close()
