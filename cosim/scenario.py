@@ -217,13 +217,17 @@ def load_scenario(name_or_file: str | Path, overrides: Sequence[str] = ()) -> Sc
     ScenarioError
         If there is no such scenario, a key is unknown, missing or mistyped, or a value cannot be.
     """
+    text = str(name_or_file)
+    if not text.endswith(".toml") and text not in shipped_scenarios():
+        known = hint(text, shipped_scenarios())
+        raise ScenarioError(f"scenario {text!r} is unknown; {known} (or a file ending in .toml)")
     try:
-        table, name, folder = _read(str(name_or_file), seen=())
+        table, name, folder = _read(text, seen=())
         for override in overrides:
             _override(table, override)
         return _check(table, name, folder)
-    except (PlantFmuError, ControllerError) as error:
-        raise ScenarioError(str(error)) from error
+    except (PlantFmuError, ControllerError, ScenarioError) as error:
+        raise ScenarioError(f"{text}: {error}") from error
 
 
 def _folder() -> resources.abc.Traversable:
@@ -240,8 +244,7 @@ def _read(name_or_file: str, seen: tuple[str, ...], beside: Path | None = None) 
         with resources.as_file(_folder() / f"{name_or_file}.toml") as shipped:
             table, name, folder = read_toml(shipped), name_or_file, Path()
     else:
-        known = shipped_scenarios()
-        raise ScenarioError(f"scenario {name_or_file!r} is unknown; {hint(name_or_file, known)} (or a file ending in .toml)")
+        raise ScenarioError(f"base {name_or_file!r} is unknown; {hint(name_or_file, shipped_scenarios())}")
     if "base" in table:
         base = table.pop("base")
         if not isinstance(base, str) or base in seen:

@@ -33,14 +33,14 @@ def read_toml(path: Path) -> dict[str, Any]:
     Raises
     ------
     TableError
-        If it cannot be read, or is no TOML.
+        If it cannot be read, or is no TOML; the caller knows its name.
     """
     try:
         return tomllib.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
-        raise TableError(f"{path}: {error.strerror or error}") from error
+        raise TableError(error.strerror or str(error)) from error
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise TableError(f"{path}: not valid TOML: {error}") from error
+        raise TableError(f"not valid TOML: {error}") from error
 
 
 def decode(table: dict[str, Any], kind: type[T], where: str = "") -> T:

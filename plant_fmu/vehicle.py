@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from plant_fmu.errors import VehicleError
+from plant_fmu.errors import TableError, VehicleError
 from plant_fmu.tables import decode, read_toml
 
 Vector3 = tuple[float, float, float]
@@ -128,12 +128,20 @@ def load_vehicle(name_or_file: str | Path) -> Vehicle:
     text = str(name_or_file)
     path = Path(text)
     if path.suffix == ".toml":
-        return _check(decode(read_toml(path), _File), str(path))
+        return _decode(path, text)
     if text not in shipped_vehicles():
         known = ", ".join(shipped_vehicles())
         raise VehicleError(f"vehicle {text!r} is unknown; expected one of {known}, or a file ending in .toml")
     with resources.as_file(_folder() / f"{text}.toml") as shipped:
-        return _check(decode(read_toml(shipped), _File), text)
+        return _decode(shipped, text)
+
+
+def _decode(path: Path, where: str) -> Vehicle:
+    try:
+        file = decode(read_toml(path), _File)
+    except TableError as error:
+        raise TableError(f"{where}: {error}") from error
+    return _check(file, where)
 
 
 def _folder() -> resources.abc.Traversable:

@@ -1,0 +1,133 @@
+"""Building FMUs, and refusing to."""
+
+import os
+import sys
+from pathlib import Path
+
+import pytest
+
+from plant_fmu import BuildError, TableError, VehicleError, build_fmu, load_vehicle
+from plant_fmu.__main__ import main
+from plant_fmu.compiler import find_compiler
+
+ODIN = (Path(__file__).parents[2] / "plant_fmu" / "vehicles" / "odin.toml").read_text()
+
+
+def written(tmp_path, *changes):
+    text = ODIN
+    for old, new in changes:
+        assert old in text
+        text = text.replace(old, new)
+    path = tmp_path / "boat.toml"
+    path.write_text(text)
+    return path
+
+
+def test_two_builds_give_the_same_bytes(tmp_path, fmi):
+    files = [build_fmu(load_vehicle("odin"), fmi, tmp_path / name) for name in ("a.fmu", "b.fmu")]
+    assert files[0].read_bytes() == files[1].read_bytes()
+
+
+def test_command_line_builds(tmp_path, capsys):
+    out = tmp_path / "mine.fmu"
+    assert main(["build", "--vehicle", "bluerov2_heavy", "--fmi", "2", "--out", str(out)]) == 0
+    assert out.stat().st_size > 10_000
+    assert capsys.readouterr().out == f"{out}\n"
+
+
+def test_command_line_lists(capsys):
+    assert main(["list"]) == 0
+    assert "unsourced" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (("mass = 125.0 ", "mass = -125.0 "), ("rigid_body.mass", "-125.0", "above 0")),
+        (("mass = 125.0 ", 'mass = "heavy" '), ("rigid_body.mass", "heavy", "number")),
+        (("mass = 125.0 ", "mas = 125.0 "), ("rigid_body.mas", "unknown", "'mass'")),
+        (("mass = 125.0 ", "# "), ("rigid_body", "missing", "mass")),
+        (("inertia = [8.0, 8.0, 8.0]", "inertia = [8.0, 8.0]"), ("rigid_body.inertia", "3 by 3")),
+        (("inertia = [8.0, 8.0, 8.0]", "inertia = [8.0, 8.0, nan]"), ("inertia", "finite")),
+        (("[62.5, 62.5, 62.5, 0.0, 0.0, 0.0]", "[-200.0, 62.5, 62.5, 0.0, 0.0, 0.0]"), ("added mass", "positive definite")),
+        (("[0.508, -0.508, 0.508, -0.508, 0, 0, 0, 0],", ""), ("thrusters.matrix", "5 rows", "6 rows")),
+        (("[0.508, -0.508, 0.508, -0.508, 0, 0, 0, 0],", "[0.508],"), ("thrusters.matrix", "6 rows")),
+        (("force_min = -27.0 ", "force_min = [-27.0, -27.0] "), ("force_min", "2 numbers", "8")),
+        (("force_min = -27.0 ", "force_min = 28.0 "), ("force_min", "force_max")),
+        (("[48.0, 48.0, 48.0, 80.0, 80.0, 80.0]", "[48.0, -48.0, 48.0, 80.0, 80.0, 80.0]"), ("quadratic_damping", "-48")),
+        (('name = "odin"', 'name = "my boat"'), ("name", "my boat")),
+        (("[hydrostatics]", "[hydrostatics"), ("TOML",)),
+    ],
+)
+def test_bad_vehicles_are_named_in_one_line(tmp_path, capsys, change, words):
+    out = tmp_path / "boat.fmu"
+    path = written(tmp_path, change)
+    with pytest.raises((VehicleError, TableError)):
+        load_vehicle(path)
+    assert main(["build", "--vehicle", str(path), "--out", str(out)]) == 2
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1
+    for word in ("boat.toml", *words):
+        assert word in said
+    assert not out.exists()
+
+
+def test_unknown_vehicle_lists_the_known(capsys):
+    assert main(["build", "--vehicle", "odyn"]) == 2
+    assert "bluerov2_heavy, odin" in capsys.readouterr().err
+
+
+def test_missing_compiler_is_one_line(tmp_path, capsys, monkeypatch):
+    monkeypatch.setenv("PATH", str(tmp_path))
+    monkeypatch.delenv("CC", raising=False)
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
+    out = tmp_path / "x.fmu"
+    assert main(["build", "--vehicle", "odin", "--out", str(out)]) == 2
+    assert capsys.readouterr().err == (
+        "plant_fmu: no C compiler: neither cc nor the ziglang package was found; pip install 'subreach[build]'\n"
+    )
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_failing_compiler_leaves_nothing(tmp_path, monkeypatch):
+    monkeypatch.setenv("CC", f"{sys.executable} -c raise(SystemExit('error:_no_luck'))")
+    with pytest.raises(BuildError, match="no_luck"):
+        build_fmu(load_vehicle("odin"), 3, tmp_path / "x.fmu")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_unwritable_place_is_one_line(tmp_path, capsys):
+    (tmp_path / "file").write_text("")
+    assert main(["build", "--vehicle", "odin", "--out", str(tmp_path / "file" / "x.fmu")]) == 2
+    assert capsys.readouterr().err.count("\n") == 1
+
+
+def test_ziglang_builds_where_there_is_no_cc(tmp_path, monkeypatch):
+    pytest.importorskip("ziglang", reason="the build extra is not installed")
+    monkeypatch.setenv("PATH", str(tmp_path))
+    monkeypatch.delenv("CC", raising=False)
+    assert find_compiler()[:3] == [sys.executable, "-m", "ziglang"]
+    assert build_fmu(load_vehicle("odin"), 3, tmp_path / "x.fmu").exists()
+
+
+def test_own_vehicle_with_six_thrusters_and_full_added_mass(tmp_path, make_slave):
+    rows = "\n".join(f"    [{', '.join('1.0' if i == j else '0.1' for j in range(6))}]," for i in range(6))
+    path = written(
+        tmp_path,
+        ("[62.5, 62.5, 62.5, 0.0, 0.0, 0.0]", f"[\n{rows}\n]"),
+        (ODIN[ODIN.index("matrix = [") : ODIN.index("force_min")], f"matrix = [\n{rows}\n]\n"),
+    )
+    from tests.plant_fmu.conftest import Slave
+
+    slave = Slave(build_fmu(load_vehicle(path), 3, tmp_path / "six.fmu")).start()
+    assert "thrust[6]" in slave.by_name and "thrust[7]" not in slave.by_name
+    slave.set_values({"thrust[6]": 20.0})
+    slave.step(0.1)
+    assert slave.get("actuation.N", "actuation.X") == pytest.approx([20.0, 2.0])
+    slave.close()
+
+
+def test_environment_is_left_alone(tmp_path):
+    before = dict(os.environ), os.getcwd()
+    build_fmu(load_vehicle("odin"), 2, tmp_path / "x.fmu")
+    assert (dict(os.environ), os.getcwd()) == before

@@ -1,0 +1,104 @@
+"""modelDescription.xml, the C header and the docs page: one table, one truth."""
+
+import re
+import shutil
+import subprocess
+import zipfile
+from pathlib import Path
+
+import pytest
+from fmpy import read_model_description
+from fmpy.validation import validate_fmu
+
+from plant_fmu import cached_fmu, load_vehicle, shipped_vehicles
+from plant_fmu.description import documentation, header, model_description
+from plant_fmu.variables import UNITS, variables
+
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.mark.parametrize("name", shipped_vehicles())
+def test_fmpy_finds_no_problem(name, fmi):
+    assert validate_fmu(str(cached_fmu(load_vehicle(name), fmi))) == []
+
+
+def test_every_variable_has_what_a_user_needs():
+    rows = variables(load_vehicle("odin"))
+    assert len({v.name for v in rows}) == len({v.member for v in rows}) == len(rows)
+    for v in rows:
+        assert v.description
+        assert v.unit in UNITS or v.unit == ""
+        if v.role not in ("time", "flag"):
+            assert v.minimum < v.maximum
+            assert v.minimum <= v.start <= v.maximum
+            assert v.nominal > 0.0
+
+
+def test_the_fmu_starts_with_what_the_description_says(make_slave, fmi):
+    """The XML's start values are compiled into the binary too: a tool that sets none must get the same."""
+    slave = make_slave("bluerov2_heavy", fmi)
+    described = {v.name: float(v.start) for v in slave.description.modelVariables if v.start is not None}
+    assert slave.get(*described) == list(described.values())
+
+
+def test_value_references_reach_the_described_variable(make_slave, fmi):
+    """Each input and parameter keeps the value that is written to it, and no other changes."""
+    slave = make_slave(fmi=fmi)
+    settable = [v for v in slave.description.modelVariables if v.causality in ("input", "parameter")]
+    values = {v.name: float(v.min) + 0.37 * (float(v.max) - float(v.min)) for v in settable}
+    for i, name in enumerate(values):  # all different, where the range lets them be
+        values[name] *= 1.0 + 1e-3 * i / len(values)
+    slave.set_values(values)
+    assert slave.get(*values) == list(values.values())
+
+
+def test_dependencies_name_what_an_output_follows_from(fmi):
+    description = read_model_description(str(cached_fmu(load_vehicle("odin"), fmi)))
+    of = {u.variable.name: {d.name for d in u.dependencies} for u in description.outputs}
+    assert of["position.x"] == set()
+    assert of["thruster_force[2]"] == {"thrust[2]"}
+    assert {"wrench.X", "thrust[1]", "thrust[8]"} <= of["actuation.X"]
+    assert "thrust_saturated[8]" in of and "wrench_saturated" in of
+
+
+def test_header_names_each_variable_once():
+    text = header(load_vehicle("odin"), "{token}")
+    names = re.findall(r'\{"([^"]+)"', text)
+    assert names == [v.name for v in variables(load_vehicle("odin"))]
+
+
+def test_token_changes_with_the_numbers():
+    descriptions = {model_description(load_vehicle(name), 3, "") for name in shipped_vehicles()}
+    tokens = {read_model_description(str(cached_fmu(load_vehicle(name), 3))).guid for name in shipped_vehicles()}
+    assert len(descriptions) == len(tokens) == len(shipped_vehicles())
+
+
+def test_docs_page_is_up_to_date():
+    assert (ROOT / "docs" / "fmu-variables.md").read_text() == documentation(load_vehicle("odin"))
+
+
+def test_odin_is_labelled_as_unsourced():
+    assert "unsourced" in load_vehicle("odin").title
+    assert "unsourced" in model_description(load_vehicle("odin"), 3, "")
+
+
+def test_no_python_inside(fmi, tmp_path):
+    with zipfile.ZipFile(cached_fmu(load_vehicle("odin"), fmi)) as archive:
+        names = archive.namelist()
+        archive.extractall(tmp_path)
+    assert sorted(Path(n).suffix for n in names) in ([".so", ".xml"], [".dll", ".xml"], [".dylib", ".xml"])
+    if shutil.which("readelf"):
+        (library,) = tmp_path.glob("binaries/*/*.so")
+        needed = subprocess.run(["readelf", "-d", library], capture_output=True, text=True, check=True).stdout
+        assert set(re.findall(r"NEEDED.*\[(.+)\]", needed)) <= {"libc.so.6", "libm.so.6"}
+
+
+def test_only_the_api_is_exported(fmi, tmp_path):
+    if not shutil.which("nm"):
+        pytest.skip("needs nm of binutils")
+    with zipfile.ZipFile(cached_fmu(load_vehicle("odin"), fmi)) as archive:
+        archive.extractall(tmp_path)
+    (library,) = tmp_path.glob("binaries/*/*.so")
+    symbols = subprocess.run(["nm", "-D", "--defined-only", library], capture_output=True, text=True, check=True).stdout
+    exported = {line.split()[-1] for line in symbols.splitlines()}
+    assert all(name.startswith(f"fmi{fmi}") for name in exported), exported
