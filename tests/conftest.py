@@ -5,6 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from hypothesis import settings
+
+# no test asserts a time: the first example of many compiles what it calls
+settings.register_profile("subreach", deadline=None, derandomize=True)
+settings.load_profile("subreach")
 
 DATA = Path(__file__).parent / "data"
 

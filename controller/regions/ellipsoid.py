@@ -55,19 +55,22 @@ def ellipsoid(p: Array, q: Array) -> Evaluation:
 def _surface_distance(x: float, y: float, z: float, a: float, b: float, c: float) -> float:
     """Distance from a point of the first octant to the surface.
 
-    The nearest point is x_i a_i^2 / (t + a_i^2), with t the root of F(t) = sum (a_i x_i / (t + a_i^2))^2 - 1 above
-    -min a_i^2 (Eberly). F falls and is convex there, so that Newton's method from a point left of the root only grows.
+    The nearest point is x_i a_i^2 / (t + a_i^2), with t the root of sum (a_i x_i / (t + a_i^2))^2 = 1 above -min a_i^2
+    (Eberly). With s = t + min a_i^2 as the unknown, nothing cancels near the centre. The sum falls and is convex, so that
+    Newton's method from a point left of the root only grows towards it.
     """
+    least = min(a, b, c) ** 2
+    da, db, dc = a * a - least, b * b - least, c * c - least
     # a point in a plane of symmetry is moved out of it by less than rounding shows
     x, y, z = max(x, 1e-14 * a), max(y, 1e-14 * b), max(z, 1e-14 * c)
-    t = max(a * x - a * a, b * y - b * b, c * z - c * c)
+    s = max(a * x - da, b * y - db, c * z - dc)
     for _ in range(_STEPS):
-        u, v, w = a * x / (t + a * a), b * y / (t + b * b), c * z / (t + c * c)
+        u, v, w = a * x / (s + da), b * y / (s + db), c * z / (s + dc)
         value = u * u + v * v + w * w - 1.0
-        slope = -2.0 * (u * u / (t + a * a) + v * v / (t + b * b) + w * w / (t + c * c))
-        new = t - value / slope
-        if not new > t:
+        slope = -2.0 * (u * u / (s + da) + v * v / (s + db) + w * w / (s + dc))
+        new = s - value / slope
+        if not new > s:
             break
-        t = new
-    nearest_x, nearest_y, nearest_z = x * a * a / (t + a * a), y * b * b / (t + b * b), z * c * c / (t + c * c)
+        s = new
+    nearest_x, nearest_y, nearest_z = x * a * a / (s + da), y * b * b / (s + db), z * c * c / (s + dc)
     return math.sqrt((x - nearest_x) ** 2 + (y - nearest_y) ** 2 + (z - nearest_z) ** 2)

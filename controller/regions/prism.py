@@ -61,27 +61,31 @@ def prism(p: Array, q: Array) -> Evaluation:
     n = (q.size - 2) // 2
     nearest = math.inf
     gx, gy = 0.0, 0.0
+    at_corner = False
     inside = False
     for i in range(n):
         j = i + 1 if i + 1 < n else 0
         ax, ay, bx, by = q[2 + 2 * i], q[3 + 2 * i], q[2 + 2 * j], q[3 + 2 * j]
         ex, ey = bx - ax, by - ay
+        length = math.hypot(ex, ey)
         x, y = p[0] - ax, p[1] - ay
-        along = clamp((x * ex + y * ey) / (ex * ex + ey * ey), 0.0, 1.0)
+        along = clamp((x * ex + y * ey) / (length * length), 0.0, 1.0)
         dx, dy = x - along * ex, y - along * ey
         distance = math.hypot(dx, dy)
         if distance < nearest:
             nearest = distance
-            if distance > 0.0:
+            at_corner = distance > 0.0 and (along == 0.0 or along == 1.0)
+            if at_corner:
                 gx, gy = dx / distance, dy / distance
-            else:  # on the edge: its outward normal
-                length = math.hypot(ex, ey)
+            else:  # on both sides of an edge the signed distance grows along its outward normal
                 gx, gy = ey / length, -ex / length
         # a ray towards east crosses the edge
         if (ax > p[0]) != (bx > p[0]) and p[1] < ay + (p[0] - ax) / ex * ey:
             inside = not inside
-    if inside and nearest > 0.0:
-        nearest, gx, gy = -nearest, -gx, -gy
+    if inside:
+        nearest = -nearest
+        if at_corner:
+            gx, gy = -gx, -gy
     vertical = max(q[0] - p[2], p[2] - q[1])
     down = 1.0 if p[2] - q[1] >= q[0] - p[2] else -1.0
     g, of_flat, of_vertical = product_distance(nearest, vertical)

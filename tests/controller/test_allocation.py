@@ -1,0 +1,65 @@
+"""Thruster allocation."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from controller import Allocation, LawError
+from plant_fmu import load_vehicle
+
+VEHICLE = load_vehicle("odin")
+B, LOW, HIGH = VEHICLE.thruster_matrix, VEHICLE.thrust_min, VEHICLE.thrust_max
+wrenches = st.lists(st.floats(-1e4, 1e4), min_size=6, max_size=6).map(np.array)
+
+
+def allocate(tau, limits="direction", low=LOW, high=HIGH):
+    forces = np.empty(8)
+    Allocation(B, low, high, limits)(np.asarray(tau, float), forces)
+    return forces
+
+
+def test_a_small_wrench_is_given_exactly_and_with_least_effort():
+    tau = np.array([10.0, -5.0, 8.0, 1.0, -2.0, 3.0])
+    forces = allocate(tau)
+    assert B @ forces == pytest.approx(tau)
+    assert forces == pytest.approx(np.linalg.lstsq(B, tau, rcond=None)[0])
+
+
+@given(wrenches)
+def test_direction_is_kept_within_limits(tau):
+    forces = allocate(tau)
+    assert np.all(forces >= LOW - 1e-9) and np.all(forces <= HIGH + 1e-9)
+    given_wrench = B @ forces
+    norm = np.linalg.norm(tau)
+    if norm > 1e-6:
+        scale = given_wrench @ tau / norm**2
+        assert 0.0 < scale <= 1.0 + 1e-9
+        assert given_wrench == pytest.approx(scale * tau, abs=1e-6)
+
+
+@given(wrenches)
+def test_each_thruster_on_its_own_is_cut_at_its_limit(tau):
+    assert allocate(tau, "per-thruster") == pytest.approx(np.clip(np.linalg.pinv(B) @ tau, LOW, HIGH), abs=1e-9)
+
+
+def test_limits_may_differ_by_direction():
+    low, high = np.full(8, -5.0), np.full(8, 20.0)
+    forces = allocate([0.0, 0.0, 1000.0, 0.0, 0.0, 0.0], low=low, high=high)  # down: the vertical ones push back
+    assert forces.min() == pytest.approx(-5.0)
+    forces = allocate([0.0, 0.0, -1000.0, 0.0, 0.0, 0.0], low=low, high=high)
+    assert forces.max() == pytest.approx(20.0)
+
+
+def test_a_dead_thruster_in_the_way_stops_the_wrench_that_needs_it():
+    high = HIGH.copy()
+    high[4:] = 0.0
+    assert B @ allocate([0.0, 0.0, -50.0, 0.0, 0.0, 0.0], high=high) == pytest.approx(np.zeros(6))
+
+
+@pytest.mark.parametrize(
+    "arguments", [(B, LOW[:7], HIGH), (B, LOW + 30.0, HIGH), (B[:5], LOW, HIGH), (B, LOW, HIGH, "some")]
+)
+def test_set_up_that_cannot_be_is_refused(arguments):
+    with pytest.raises(LawError):
+        Allocation(*arguments)

@@ -1,0 +1,34 @@
+"""Compilation: what is cached is never older than any source it was made from."""
+
+import numpy as np
+
+from controller import compiled as module
+from controller.compiled import compiled
+from controller.regions import evaluate
+
+
+def test_cached_functions_carry_the_stamp_of_all_sources():
+    assert evaluate._cache._cache_file._source_stamp == module._sources()
+
+
+def test_without_numbas_insides_nothing_is_cached(monkeypatch):
+    real = module.numba.njit
+    made = []
+
+    def njit(**options):
+        def wrap(function):
+            made.append(options)
+            jitted = real(error_model="numpy")(function)
+            if options.get("cache"):
+                monkeypatch.setattr(jitted, "_cache", object(), raising=False)
+            return jitted
+
+        return wrap
+
+    monkeypatch.setattr(module.numba, "njit", njit)
+    assert compiled(lambda x: x + 1.0)(1.0) == 2.0
+    assert [options.get("cache", False) for options in made] == [True, False]
+
+
+def test_division_by_zero_gives_what_numpy_gives():
+    assert np.isinf(compiled(lambda x: 1.0 / x)(0.0))

@@ -1,0 +1,123 @@
+"""The printed law against a transcription of its equations in plain matrices."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from controller import Gains, LawError, PrintedLaw, RegionValues, VehicleState
+from controller.printed_law import primary_error, secondary_error
+
+GAINS = Gains()
+IDENTITY = np.array([1.0, 0.0, 0.0, 0.0])
+rng = np.random.default_rng(11)
+
+
+def random_unit():
+    e = rng.normal(size=4)
+    return e / np.linalg.norm(e)
+
+
+def regions_at(values, gradients):
+    return RegionValues(np.array(values, float), np.array(gradients, float), np.zeros(len(values)))
+
+
+def textbook(e, e_d, nu, f, df, gs, dgs, alphas, phi):
+    """(20)-(29) as matrices, by NumPy and SciPy alone."""
+    R = Rotation.from_quat(np.roll(e, -1)).as_matrix()
+    e_p = max(0.0, f) * df
+    e_s = sum(
+        (alpha / GAINS.k_q * max(0.0, g) * dg / np.linalg.norm(dg) for g, dg, alpha in zip(gs, dgs, alphas, strict=True)),
+        start=np.zeros(3),
+    )
+    between = Rotation.from_quat(np.roll(e_d, -1)).inv() * Rotation.from_quat(np.roll(e, -1))
+    e_e = between.as_quat(canonical=True)[:3]
+    K_0 = np.block([[R.T * GAINS.k_p1, np.zeros((3, 3))], [np.zeros((3, 3)), GAINS.k_p2 * np.eye(3)]])
+    K_s = np.vstack([GAINS.k_q * R.T, np.zeros((3, 3))])
+    K_v = np.diag([GAINS.k_v1] * 3 + [GAINS.k_v2] * 3)
+    k = R.T @ [0.0, 0.0, 1.0]
+    Z = np.zeros((6, 4))
+    Z[:3, 0] = -k
+    Z[3:, 1:] = [[0, -k[2], k[1]], [k[2], 0, -k[0]], [-k[1], k[0], 0]]
+    tau = -K_0 @ np.r_[e_p, e_e] - K_s @ e_s - K_v @ nu + Z @ phi
+    sigma = np.diag([GAINS.sigma_p] * 3 + [GAINS.sigma_a] * 3)
+    J_e = np.r_[R.T @ (e_p + GAINS.k_q / GAINS.k_p1 * e_s), e_e]
+    rate = -np.linalg.inv(GAINS.gamma * np.eye(4)) @ Z.T @ (nu + sigma @ J_e)
+    return tau, rate
+
+
+def test_wrench_and_adaptation_are_the_equations():
+    for _ in range(50):
+        e, e_d, nu, phi = random_unit(), random_unit(), rng.normal(size=6), rng.normal(size=4)
+        f, df = rng.normal() * 5, rng.normal(size=3)
+        gs, dgs, alphas = rng.normal(size=4), rng.normal(size=(4, 3)), rng.uniform(0, 100, 4)
+        law = PrintedLaw(GAINS, e_d, period=0.01)
+        law.estimate[:] = phi
+        tau = np.empty(6)
+        law.step(VehicleState(np.zeros(3), e, nu), regions_at([f], [df]), regions_at(gs, dgs), alphas, tau)
+        expected, rate = textbook(e, e_d, nu, f, df, gs, dgs, alphas, phi)
+        assert tau == pytest.approx(expected, rel=1e-12, abs=1e-10)
+        assert law.estimate == pytest.approx(phi + 0.01 * rate, rel=1e-12, abs=1e-12)
+
+
+def test_force_in_the_world_does_not_depend_on_attitude():
+    """With K_s = [k_q R^T; 0] read right, turning the vehicle turns no region force."""
+    f, df, gs, dgs, alphas = 3.0, rng.normal(size=3), [0.4, 0.2], rng.normal(size=(2, 3)), np.array([90.0, 20.0])
+    forces = []
+    for _ in range(5):
+        e = random_unit()
+        law = PrintedLaw(GAINS, e, 0.001)
+        tau = np.empty(6)
+        law.step(VehicleState(np.zeros(3), e, np.zeros(6)), regions_at([f], [df]), regions_at(gs, dgs), alphas, tau)
+        forces.append(Rotation.from_quat(np.roll(e, -1)).as_matrix() @ tau[:3])
+    assert np.ptp(forces, axis=0) == pytest.approx(np.zeros(3), abs=1e-10)
+
+
+def test_force_at_the_papers_start():
+    """26.82 kN: k_p1 f |grad f| with f = 79.75 m2 and |grad f| = 2 sqrt(80) m; SR3 pushes with 0.5 (1.8^2 - 1.5^2)."""
+    law = PrintedLaw(GAINS, IDENTITY, 0.001)
+    tau = np.empty(6)
+    goal = regions_at([79.75], [[-16.0, 0.0, -8.0]])
+    law.step(VehicleState(np.zeros(3), IDENTITY, np.zeros(6)), goal, regions_at([], np.empty((0, 3))), np.empty(0), tau)
+    assert np.linalg.norm(tau[:3]) == pytest.approx(18.8 * 79.75 * 2 * math.sqrt(80.0), rel=1e-12)
+    assert tau[0] > 0.0 and tau[2] > 0.0
+
+
+def test_satisfied_regions_push_not():
+    assert primary_error(-1.0, np.ones(3)) == pytest.approx(np.zeros(3))
+    assert secondary_error(np.array([-0.1]), np.ones((1, 3)), np.array([5.0])) == pytest.approx(np.zeros(3))
+
+
+def test_a_region_without_gradient_contributes_nothing():
+    assert secondary_error(np.array([0.25]), np.zeros((1, 3)), np.array([1.0])) == pytest.approx(np.zeros(3))
+
+
+def test_a_repulsive_sphere_pushes_at_most_gain_times_radius_squared():
+    """Inside SR1, at its centre, 100 * 0.25 = 25 N: against 26.8 kN there is no avoidance."""
+    depth = 1e-9  # from the centre
+    law = PrintedLaw(GAINS, IDENTITY, 0.001)
+    tau = np.empty(6)
+    sphere = regions_at([0.25 - depth**2], [[-2.0 * depth, 0.0, 0.0]])
+    state = VehicleState(np.zeros(3), IDENTITY, np.zeros(6))
+    law.step(state, regions_at([-1.0], [[0.0, 0.0, 0.0]]), sphere, np.array([100.0]), tau)
+    assert tau[:3] == pytest.approx([25.0, 0.0, 0.0])
+
+
+def test_defaults_are_those_of_section_vii():
+    assert Gains() == (18.8, 36.0, 100.0, 90.0, 40.0, 0.08, 0.9, 2.0)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [({"k_p1": 0.0}, "k_p1"), ({"gamma": -1.0}, "gamma"), ({"k_v1": math.nan}, "k_v1"), ({"sigma_p": -0.1}, "sigma_p")],
+)
+def test_gains_that_cannot_be_are_named(change, words):
+    with pytest.raises(LawError, match=words):
+        PrintedLaw(GAINS._replace(**change), IDENTITY, 0.001)
+
+
+@pytest.mark.parametrize(("attitude", "period"), [(np.array([1.0, 1.0, 0.0, 0.0]), 0.01), (IDENTITY, 0.0)])
+def test_set_up_that_cannot_be_is_refused(attitude, period):
+    with pytest.raises(LawError):
+        PrintedLaw(GAINS, attitude, period)

@@ -1,0 +1,243 @@
+"""Regions: values, gradients and distances, each shape against what its definition says."""
+
+import dataclasses
+import inspect
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.optimize import minimize
+from scipy.spatial.transform import Rotation
+
+from controller import RegionError
+from controller.regions import (
+    SHAPES,
+    Box,
+    Cone,
+    Cylinder,
+    DepthBand,
+    Ellipsoid,
+    HalfSpace,
+    Pipe,
+    Prism,
+    Region,
+    Sphere,
+    clearances_at,
+    evaluate,
+    pack,
+)
+
+TURNED = tuple(np.array([0.9, 0.1, -0.3, 0.2]) / np.linalg.norm([0.9, 0.1, -0.3, 0.2]))
+R = Rotation.from_quat(np.roll(TURNED, -1)).as_matrix()
+
+EXAMPLES = [
+    Sphere((2.0, 0.0, 1.8), 0.5),
+    DepthBand(2.5, 1.8),
+    HalfSpace((0.0, 0.0, 1.0), (1.0, 1.0, 0.2)),
+    Box((1.0, 1.0, 1.0), (2.0, 3.0, 1.0), TURNED),
+    Cylinder((0.0, 0.0, 0.0), (1.0, 2.0, 3.0), 0.7),
+    Ellipsoid((1.0, 0.0, 1.0), (2.0, 1.0, 0.5), TURNED),
+    Prism(((0.0, 0.0), (3.0, 0.0), (3.0, 2.0), (1.0, 0.5), (0.0, 2.0)), 1.0, 3.0),  # not convex
+    Pipe(((0.0, 0.0, 0.0), (2.0, 0.0, 0.0), (2.0, 2.0, 1.0)), 0.4),
+    Cone((1.0, 1.0, 1.0), (-1.0, 0.0, 0.3), 0.6, 3.0),
+]
+each_shape = pytest.mark.parametrize("shape", EXAMPLES, ids=lambda shape: type(shape).__name__)
+points = st.lists(st.floats(-4.0, 5.0), min_size=3, max_size=3).map(np.array)
+
+
+def at(shape, p, keep="in"):
+    """Return g, its gradient and the clearance."""
+    packed = pack([Region("r", shape, keep)])
+    values, gradients, clearances = np.empty(1), np.empty((1, 3)), np.empty(1)
+    evaluate(np.asarray(p, float), packed.kinds, packed.signs, packed.offsets, packed.numbers, values, gradients, clearances)
+    return values[0], gradients[0], clearances[0]
+
+
+def contains(shape, p):
+    """Membership by the words of each definition; shares no code with the shapes."""
+    p = np.asarray(p, float)
+    match shape:
+        case Sphere(centre, radius):
+            return np.linalg.norm(p - centre) <= radius
+        case DepthBand(depth, tolerance):
+            return depth - tolerance <= p[2] <= depth + tolerance
+        case HalfSpace(point, normal):
+            return (p - point) @ normal <= 0.0
+        case Box(centre, size):
+            return bool(np.all(np.abs(R.T @ (p - centre)) <= np.array(size) / 2))
+        case Cylinder(start, end, radius):
+            axis = np.subtract(end, start)
+            along = (p - start) @ axis / (axis @ axis)
+            return 0.0 <= along <= 1.0 and np.linalg.norm(p - start - along * axis) <= radius
+        case Ellipsoid(centre, semi_axes):
+            return np.linalg.norm(R.T @ (p - centre) / semi_axes) <= 1.0
+        case Prism(corners, top, bottom):
+            return top <= p[2] <= bottom and winding(corners, p[:2]) != 0
+        case Pipe(nodes, radius):
+            ends = [np.linspace(a, b, 4001) for a, b in zip(nodes, nodes[1:], strict=False)]
+            return np.linalg.norm(np.vstack(ends) - p, axis=1).min() <= radius
+        case Cone(feature, axis, half_angle, reach):
+            d = p - feature
+            angle = math.acos(np.clip(d @ axis / np.linalg.norm(d) / np.linalg.norm(axis), -1, 1))
+            return np.linalg.norm(d) <= reach and angle <= half_angle
+    raise AssertionError(shape)
+
+
+def winding(corners, p):
+    turns = np.array(corners) - p
+    angles = np.unwrap(np.arctan2(*np.vstack([turns, turns[:1]]).T))
+    return round((angles[-1] - angles[0]) / (2 * math.pi))
+
+
+def test_all_shapes_are_here():
+    assert {type(shape) for shape in EXAMPLES} == set(SHAPES.values())
+    assert sorted(cls.kind for cls in SHAPES.values()) == list(range(len(SHAPES)))
+
+
+@each_shape
+@given(p=points)
+def test_sign_says_inside_or_outside(shape, p):
+    g, _, clearance = at(shape, p)
+    assert g * clearance <= 0.0
+    if abs(clearance) > 1e-6:
+        assert (clearance > 0.0) == contains(shape, p)
+
+
+@each_shape
+@given(p=points)
+def test_gradient_is_that_of_the_value(shape, p):
+    h = 1e-6
+    g, gradient, _ = at(shape, p)
+    ahead, behind = (np.array([at(shape, p + s * h * axis)[0] for axis in np.eye(3)]) for s in (1.0, -1.0))
+    one_sided = np.array([(ahead - g) / h, (g - behind) / h])
+    kink = np.abs(one_sided[0] - one_sided[1]).max()
+    if kink > 1e-3 * max(1.0, np.abs(gradient).max()):
+        return  # a ridge, where there is no gradient
+    assert gradient == pytest.approx((ahead - behind) / (2 * h), abs=0.5 * kink + 1e-6)
+
+
+@each_shape
+@given(p=points, q=points)
+def test_distance_changes_no_faster_than_one_moves(shape, p, q):
+    assert abs(at(shape, p)[2] - at(shape, q)[2]) <= np.linalg.norm(p - q) * (1 + 1e-9) + 1e-12
+
+
+@each_shape
+def test_distance_is_that_of_the_nearest_point_of_the_surface(shape):
+    """Outside by minimising |x - p| over the set, inside by growing a ball until it leaves the set."""
+    rng = np.random.default_rng(5)
+    directions = rng.normal(size=(3000, 3))
+    directions /= np.linalg.norm(directions, axis=1)[:, None]
+    for p in rng.uniform(-3.0, 4.0, (12, 3)):
+        distance = -at(shape, p)[2]
+        if distance > 0.0:
+            inner = np.vstack([p + 12.0 * t * directions for t in np.linspace(0.0, 1.0, 60)])
+            inner = inner[clearances_at(inner, Region("r", shape, "in")) > 0.0]
+            nearest = np.linalg.norm(inner - p, axis=1)
+            starts = inner[np.argsort(nearest)[:3]]
+            best = min(
+                minimize(
+                    lambda x, p=p: float((x - p) @ (x - p)), start, method="SLSQP", options={"ftol": 1e-14},
+                    constraints={"type": "ineq", "fun": lambda x: at(shape, x)[2]},
+                ).fun
+                for start in starts
+            )  # fmt: skip
+            assert distance == pytest.approx(math.sqrt(best), abs=2e-4)
+        elif not isinstance(shape, Pipe):  # whose inside distance is a bound
+            assert all(contains(shape, p + 0.999 * -distance * d) for d in directions[:400])
+            assert not all(contains(shape, p + (0.03 - 1.02 * distance) * d) for d in directions)
+
+
+@each_shape
+@given(p=points)
+def test_keeping_out_is_the_opposite_of_keeping_in(shape, p):
+    for kept_in, kept_out in zip(at(shape, p, "in"), at(shape, p, "out"), strict=True):
+        assert np.array_equal(kept_in, -kept_out)
+
+
+@pytest.mark.parametrize(
+    ("shape", "p"),
+    [
+        (Sphere((1.0, 1.0, 1.0), 0.5), (1.0, 1.0, 1.0)),
+        (DepthBand(2.0, 1.0), (0.0, 0.0, 2.0)),
+        (Box((0.0, 0.0, 0.0), (2.0, 2.0, 2.0)), (0.0, 0.0, 0.0)),
+        (Box((0.0, 0.0, 0.0), (2.0, 2.0, 2.0)), (1.0, 1.0, 1.0)),
+        (Cylinder((0.0, 0.0, 0.0), (0.0, 0.0, 2.0), 0.5), (0.0, 0.0, 1.0)),
+        (Cylinder((0.0, 0.0, 0.0), (0.0, 0.0, 2.0), 0.5), (0.0, 0.0, 3.0)),
+        (Ellipsoid((0.0, 0.0, 0.0), (3.0, 2.0, 1.0)), (0.0, 0.0, 0.0)),
+        (Ellipsoid((0.0, 0.0, 0.0), (3.0, 2.0, 1.0)), (2.9, 0.0, 0.0)),
+        (Prism(((0.0, 0.0), (2.0, 0.0), (0.0, 2.0)), 0.0, 1.0), (0.0, 0.0, 0.0)),
+        (Prism(((0.0, 0.0), (2.0, 0.0), (0.0, 2.0)), 0.0, 1.0), (1.0, 0.0, 0.5)),
+        (Pipe(((0.0, 0.0, 0.0), (2.0, 0.0, 0.0)), 0.4), (1.0, 0.0, 0.0)),
+        (Cone((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), 0.5, 2.0), (0.0, 0.0, 0.0)),
+        (Cone((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), 0.5, 2.0), (1.0, 0.0, 0.0)),
+        (Cone((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), math.pi / 2, 2.0), (-1.0, 0.0, 0.0)),
+    ],
+)
+def test_centres_axes_and_corners_give_numbers(shape, p):
+    g, gradient, clearance = at(shape, p)
+    assert np.isfinite([g, *gradient, clearance]).all()
+
+
+@pytest.mark.parametrize(
+    ("axes", "p", "distance"),
+    [
+        ((3.0, 2.0, 1.0), (0.0, 0.0, 0.0), -1.0),
+        ((3.0, 2.0, 1.0), (5.0, 0.0, 0.0), 2.0),
+        ((3.0, 2.0, 1.0), (0.0, 0.0, 0.4), -0.6),
+        # the nearest point (x, 0, z) has its normal through p: x = p a^2 / (a^2 - c^2) = 9/4
+        ((3.0, 2.0, 1.0), (2.0, 0.0, 0.0), -math.sqrt(0.25**2 + 1.0 - 9.0 / 16.0)),
+        ((1.0, 1.0, 1.0), (0.3, -0.4, 0.0), -0.5),
+        ((100.0, 0.1, 0.1), (0.0, 0.0, 5.0), 4.9),
+    ],
+)
+def test_distance_to_ellipsoids_by_hand(axes, p, distance):
+    assert -at(Ellipsoid((0.0, 0.0, 0.0), axes), p)[2] == pytest.approx(distance, abs=1e-9)
+
+
+def test_paper_regions_have_the_paper_values():
+    """(49)-(52) at the start, with g <= 0 satisfied throughout."""
+    start = (0.0, 0.0, 1.0)
+    assert at(Sphere((8.0, 0.0, 5.0), 0.5), start)[0] == 64.0 + 16.0 - 0.25
+    assert at(Sphere((2.0, 0.0, 1.8), 0.5), start, "out")[0] == pytest.approx(0.25 - 4.64)
+    assert at(DepthBand(2.5, 1.8), start, "out")[0] == pytest.approx(1.8**2 - 1.5**2)
+    assert at(DepthBand(2.5, 1.8), (8.0, 0.0, 5.0), "out")[0] < 0.0
+
+
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (lambda: Sphere((0.0, 0.0, 0.0), 0.0), "radius"),
+        (lambda: Sphere((0.0, math.nan, 0.0), 1.0), "centre"),
+        (lambda: DepthBand(2.0, -1.0), "tolerance"),
+        (lambda: HalfSpace((0.0, 0.0, 0.0), (0.0, 0.0, 0.0)), "normal"),
+        (lambda: Box((0.0, 0.0, 0.0), (1.0, 0.0, 1.0)), "size"),
+        (lambda: Cylinder((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 1.0), "end"),
+        (lambda: Ellipsoid((0.0, 0.0, 0.0), (1.0, -1.0, 1.0)), "semi_axes"),
+        (lambda: Prism(((0.0, 0.0), (1.0, 0.0)), 0.0, 1.0), "corners"),
+        (lambda: Prism(((0.0, 0.0), (1.0, 1.0), (1.0, 0.0), (0.0, 1.0)), 0.0, 1.0), "corners"),
+        (lambda: Prism(((0.0, 0.0), (1.0, 0.0), (0.0, 1.0)), 1.0, 1.0), "bottom"),
+        (lambda: Pipe(((0.0, 0.0, 0.0),), 1.0), "points"),
+        (lambda: Pipe(((0.0, 0.0, 0.0), (0.0, 0.0, 0.0)), 1.0), "points"),
+        (lambda: Cone((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), 2.0, 1.0), "half_angle"),
+        (lambda: Region("r", Sphere((0.0, 0.0, 0.0), 1.0), "off"), "keep"),
+    ],
+)
+def test_regions_that_cannot_be_are_named(make, words):
+    with pytest.raises(RegionError, match=words):
+        make()
+
+
+def test_no_regions_at_all_is_a_scene_too():
+    packed = pack([])
+    nothing = np.empty(0)
+    evaluate(np.zeros(3), packed.kinds, packed.signs, packed.offsets, packed.numbers, nothing, np.empty((0, 3)), nothing)
+
+
+@pytest.mark.parametrize("cls", SHAPES.values())
+def test_shapes_are_frozen_values_whose_unit_is_stated(cls):
+    assert dataclasses.is_dataclass(cls)
+    assert cls.__dataclass_params__.frozen
+    assert "[" in inspect.getdoc(cls)
