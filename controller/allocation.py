@@ -79,7 +79,9 @@ class Allocation:
     ) -> None:
         n = matrix.shape[1]
         if matrix.shape != (6, n) or lower.shape != (n,) or upper.shape != (n,):
-            raise LawError(f"thruster matrix is {matrix.shape}, limits {lower.shape} and {upper.shape}: expected 6 by n, n")
+            raise LawError(
+                f"thruster matrix is {matrix.shape}, limits {lower.shape} and {upper.shape}: expected 6 by n, n"
+            )
         if not (np.all(lower <= 0.0) and np.all(upper >= 0.0)):
             raise LawError("thruster limits leave out 0 N, expected lower <= 0 <= upper")
         if limits not in ("direction", "per-thruster"):

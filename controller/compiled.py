@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Callable
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numba
 
@@ -36,7 +36,7 @@ def compiled(function: F) -> F:
     callable
         The same, compiled at its first call.
     """
-    jitted = numba.njit(cache=True, error_model="numpy")(function)
+    jitted: Any = numba.njit(cache=True, error_model="numpy")(function)
     # Numba takes a cached function for current while its own file is, although what it calls may stand in another one.
     # Stamp it with all sources of the package; should Numba's insides move, rather keep nothing on disk than old code.
     try:

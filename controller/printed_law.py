@@ -1,7 +1,7 @@
-"""The law as printed: equations (16)-(29), faithful to the letter where it can be read, and as resolved where it cannot.
+"""The law as printed: equations (16)-(29), faithful to the letter where it can be read, as resolved where it cannot.
 
-It knows no thrusters and no limits. With the paper's gains it asks for tens of kilonewtons far from the goal; under a limit
-its adaptation (27) winds up. It is here to be studied, not to be put on a vehicle.
+It knows no thrusters and no limits. With the paper's gains it asks for tens of kilonewtons far from the goal; under a
+limit its adaptation (27) winds up. It is here to be studied, not to be put on a vehicle.
 """
 
 from __future__ import annotations

@@ -89,6 +89,4 @@ def error(desired: Array, actual: Array) -> Array:
 def down_in_body(e: Array) -> Array:
     """Return k = R^T e3, shape (3,): the direction of gravity seen from the body."""
     e0, e1, e2, e3 = e
-    return np.array(
-        [2.0 * (e1 * e3 - e0 * e2), 2.0 * (e2 * e3 + e0 * e1), 1.0 - 2.0 * (e1 * e1 + e2 * e2)]
-    )
+    return np.array([2.0 * (e1 * e3 - e0 * e2), 2.0 * (e2 * e3 + e0 * e1), 1.0 - 2.0 * (e1 * e1 + e2 * e2)])

@@ -1,0 +1,1 @@
+"""Co-simulation of an underwater vehicle: scenarios, the master, records, reports and telemetry."""

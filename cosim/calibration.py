@@ -1,7 +1,7 @@
 """A calibration, not a finding: the force limit and lag that bring the paper's window about.
 
-The paper says when the vehicle is inside the intersection of its regions, but not what its actuators give. Here both ends of
-that window are fitted by least squares over a limit on the body force, followed by a first-order lag.
+The paper says when the vehicle is inside the intersection of its regions, but not what its actuators give. Here both
+ends of that window are fitted by least squares over a limit on the body force, followed by a first-order lag.
 """
 
 from __future__ import annotations
@@ -115,7 +115,7 @@ def calibrate(scenario: Scenario) -> Fit:
 
     starts = [
         np.array([x, y])
-        for x in np.linspace(*np.log(FORCE_BOUNDS), _GRID[0])
+        for x in np.linspace(math.log(FORCE_BOUNDS[0]), math.log(FORCE_BOUNDS[1]), _GRID[0])
         for y in np.linspace(*LAG_BOUNDS, _GRID[1])
     ]
     best = min(starts, key=lambda x: float(np.sum(residuals(x) ** 2)))

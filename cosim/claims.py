@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+from controller.regions import Sphere
 from cosim.scenario import Scenario
 
 PAPER_WINDOW = (2.65, 2.95)  # s, "An intersection of the secondary sub-regions occurs at 2.65 s to 2.95 s"
@@ -78,15 +79,19 @@ def _reaching(summary: dict[str, Any]) -> Claim:
 def _window(scenario: Scenario, summary: dict[str, Any]) -> Claim:
     windows = summary["intersection_windows"]
     names = " and ".join(summary["intersection"])
-    measured = ", ".join(f"{a:.3f} s to {b:.3f} s" for a, b in windows) + f" inside {names}." if windows else f"Never inside {names}."
+    measured = (
+        ", ".join(f"{a:.3f} s to {b:.3f} s" for a, b in windows) + f" inside {names}."
+        if windows
+        else f"Never inside {names}."
+    )
     stated = f"The regions' intersection is crossed at {PAPER_WINDOW[0]} s to {PAPER_WINDOW[1]} s (Fig. 8)."
     if not windows:
         return Claim(stated, measured, "The path misses the overlap.")
     first = windows[0]
     if scenario.limit.force < float("inf") or scenario.limit.time_constant > 0.0:
         why = (
-            f"With the body force limited to {scenario.limit.force:g} N and a lag of {scenario.limit.time_constant:g} s. The "
-            "paper states neither; they are this project's, chosen to meet its times, and no evidence of what was simulated."
+            f"With the body force limited to {scenario.limit.force:g} N and a lag of {scenario.limit.time_constant:g} s."
+            " The paper states neither: a calibration, and no evidence of what was simulated there."
         )
     else:
         why = (
@@ -100,13 +105,17 @@ def _window(scenario: Scenario, summary: dict[str, Any]) -> Claim:
 
 def _avoiding(scenario: Scenario, summary: dict[str, Any]) -> Claim:
     entered = {name: -c for name, c in summary["min_clearance"].items() if c < 0.0}
-    measured = "; ".join(f"{name}: {c:+.3f} m" for name, c in summary["min_clearance"].items()) + " (negative: violated)."
-    spheres = [r for r in scenario.regions if getattr(r.region.shape, "radius", None)]
+    measured = (
+        "; ".join(f"{name}: {c:+.3f} m" for name, c in summary["min_clearance"].items()) + " (negative: violated)."
+    )
     if entered:
-        push = max((r.gain * r.region.shape.radius**2 for r in spheres), default=0.0)  # type: ignore[attr-defined]
+        push = max(
+            (r.gain * r.region.shape.radius**2 for r in scenario.regions if isinstance(r.region.shape, Sphere)),
+            default=0.0,
+        )
         why = (
-            f"A sphere pushes with at most gain × r² = {push:.0f} N, against up to {newtons(summary['max_force_asked'])} "
-            "asked for by the primary region: with the printed gains the obstacle cannot be avoided. "
+            f"A sphere pushes with at most gain × r² = {push:.0f} N; the law asked for up to "
+            f"{newtons(summary['max_force_asked'])} in all, nearly all of it towards the goal. "
             "The paper's own Fig. 8 shows the vehicle inside the intersection."
         )
     else:
@@ -131,7 +140,7 @@ def _effort(scenario: Scenario, summary: dict[str, Any]) -> Claim:
     return Claim(
         "Excessive control effort is avoided.",
         f"Asked for up to {newtons(summary['max_force_asked'])}; acting up to {newtons(summary['max_force'])}.",
-        f"One thruster of this vehicle gives {limit:g} N. f is a square, so k_p1 f ∇f grows with the cube of the distance.",
+        f"One thruster of this vehicle gives {limit:g} N; f is a square: k_p1 f ∇f grows as the cube of the distance.",
     )
 
 
@@ -143,8 +152,8 @@ def _adapting(summary: dict[str, Any]) -> Claim:
         why = "Ends within 1 N of the truth."
     elif summary["saturated_time"] > 0.0:
         why = (
-            f"Winds up: the actuators were saturated for {summary['saturated_time']:.1f} s, in which (27) took the error for "
-            "an unknown weight."
+            f"Winds up: the actuators were saturated for {summary['saturated_time']:.1f} s, "
+            "in which (27) took the error for an unknown weight."
         )
     else:
         why = "Has not converged to the truth; (27) promises only that the errors vanish."

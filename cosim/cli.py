@@ -45,7 +45,11 @@ def _parser() -> argparse.ArgumentParser:
     run.add_argument("--mavlink", metavar="ENDPOINT", help="stream telemetry, such as to udpout:127.0.0.1:14550")
     run.add_argument("--allow-remote", action="store_true", help="let telemetry leave this machine")
     run.add_argument(
-        "--rate", type=_rate, default=None, metavar="N|max", help="simulated seconds a second at the most (default: max)"
+        "--rate",
+        type=_rate,
+        default=None,
+        metavar="N|max",
+        help="simulated seconds a second at the most (default: max)",
     )
 
     verbs.add_parser("list", help="list the shipped scenarios")
@@ -112,7 +116,8 @@ def _run(options: argparse.Namespace) -> int:
 
 
 def _list(options: argparse.Namespace) -> int:
-    from cosim.scenario import load_scenario, shipped_scenarios
+    from cosim.scenario import load_scenario
+    from cosim.scenario_file import shipped_scenarios
 
     for name in shipped_scenarios():
         print(f"{name:20} {load_scenario(name).title}")

@@ -1,7 +1,7 @@
 """The co-simulation master: one step of plant, arbiter and controller, from measuring to publishing.
 
-Read `Master.run` from top to bottom: each stage is one call. Observers see the row of signals when a step is done; they can
-neither slow nor break the stepper.
+Read `Master.run` from top to bottom: each stage is one call. Observers see the row of signals when a step is done; they
+can neither slow nor break the stepper.
 """
 
 from __future__ import annotations
@@ -12,7 +12,6 @@ from types import TracebackType
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from controller import Allocation, Law, PrintedLaw, RegionValues, VehicleState
 from controller.regions import Region, evaluate, pack
@@ -59,18 +58,14 @@ class Master:
     def __init__(self, scenario: Scenario) -> None:
         self.scenario = scenario
         self.arbiter = Arbiter(engine=scenario.arbiter.engine, points=scenario.arbiter.points)
-        self.law: Law = PrintedLaw(
-            scenario.law.gains, np.array(scenario.law.desired_quaternion), scenario.time.control
-        )
+        self.law: Law = PrintedLaw(scenario.law.gains, np.array(scenario.law.desired_quaternion), scenario.time.control)
         vehicle = scenario.vehicle
         self.allocation: Allocation | None = None
         if scenario.actuation.through == "thrusters":
             self.allocation = Allocation(
                 vehicle.thruster_matrix, vehicle.thrust_min, vehicle.thrust_max, scenario.actuation.limits
             )
-        self._scene = pack(
-            [Region("goal", scenario.goal, "in"), *(secondary.region for secondary in scenario.regions)]
-        )
+        self._scene = pack([Region("goal", scenario.goal, "in"), *(secondary.region for secondary in scenario.regions)])
         self._criterion_of = [CRITERIA.index(secondary.criterion) for secondary in scenario.regions]
         self._gains = np.array([secondary.gain for secondary in scenario.regions])
 
@@ -93,7 +88,9 @@ class Master:
         self._plant_applied = self.plant.output_values[_STATE:]
 
         self.state = VehicleState(
-            position=s.view("position.x", 3), quaternion=s.view("quaternion.e0", 4), velocity_body=s.view("velocity.u", 6)
+            position=s.view("position.x", 3),
+            quaternion=s.view("quaternion.e0", 4),
+            velocity_body=s.view("velocity.u", 6),
         )
         self._values, self._clearances = s.view("goal.value", n + 1), s.view("goal.clearance", n + 1)
         self._gradients: Array = np.zeros((n + 1, 3))
@@ -163,7 +160,7 @@ class Master:
         )
 
     def _arbitrate(self) -> None:
-        """Memberships from clearances, a criterion's being that of its most pressing region; weights from memberships."""
+        """Turn clearances into memberships, of the most pressing region of each criterion, and these into weights."""
         width = self.scenario.arbiter.ramp
         memberships = [0.0] * len(CRITERIA)
         for criterion, clearance in zip(self._criterion_of, self.regions.clearances.tolist(), strict=True):
@@ -228,10 +225,19 @@ def _columns(scenario: Scenario, plant: Plant) -> list[Column]:
         Column("time", "s", "Simulated time at the beginning of the step"),
         *plant.outputs,
         *(Column(f"{name}.value", shape.unit, f"g of {name}, above 0 where violated") for name, shape in regions),
-        *(Column(f"{name}.clearance", "m", f"Distance to the surface of {name}, below 0 where violated") for name, _ in regions),
-        *(Column(f"membership.{name}", "", f"Degree to which the criterion {name} asks for attention") for name in CRITERIA),
+        *(
+            Column(f"{name}.clearance", "m", f"Distance to the surface of {name}, below 0 where violated")
+            for name, _ in regions
+        ),
+        *(
+            Column(f"membership.{name}", "", f"Degree to which criterion {name} asks for attention")
+            for name in CRITERIA
+        ),
         *(Column(f"weight.{name}", "", f"Weight of the criterion {name} from the arbiter") for name in CRITERIA),
-        *(Column(f"estimate.phi{i + 1}", "N.m" if i else "N", f"Estimate of restoring parameter {i + 1}") for i in range(4)),
-        *(Column(f"command.{name}", unit, "Wrench that the law asks for, body frame") for name, unit in zip("XYZKMN", force_units, strict=True)),
+        *(Column(f"estimate.phi{i + 1}", "N.m" if i else "N", f"Estimate of phi {i + 1} in (12)") for i in range(4)),
+        *(
+            Column(f"command.{name}", unit, "Wrench that the law asks for, body frame")
+            for name, unit in zip("XYZKMN", force_units, strict=True)
+        ),
         *plant.inputs,
-    ]  # fmt: skip
+    ]

@@ -53,7 +53,7 @@ class Plant:
     def __init__(self, path: Path) -> None:
         self._folder = tempfile.mkdtemp(prefix="cosim-")
         self._messages: list[str] = []
-        self._fmu: FMU2Slave | FMU3Slave | None = None
+        self._fmu: Any = None  # FMPy's slave, while there is one
         try:
             self._load(path)
         except BaseException:
@@ -76,7 +76,7 @@ class Plant:
                 fmu.instantiate(callbacks=self._callbacks_fmi2())
             else:
                 fmu.instantiate(logMessage=self._log_fmi3)
-        except Exception as error:  # noqa: BLE001 - FMPy raises bare Exception for whatever is wrong with an FMU
+        except Exception as error:
             raise PlantError(f"{path}: {self._said() or error}") from error
         self._fmu, self._fmi = fmu, fmi
 
@@ -100,7 +100,7 @@ class Plant:
         def references(items: list[Any]) -> Any:
             return (ctypes.c_uint * len(items))(*(v.valueReference for v in items))
 
-        def buffer(values: Array, n: int) -> Any:
+        def buffer(values: Any, n: int) -> Any:
             return (ctypes.c_double * n).from_buffer(values)
 
         # a name looked up with [] is a function object of its own, without FMPy's conversion of each argument
@@ -109,7 +109,7 @@ class Plant:
         self._time, self._step = ctypes.c_double(), ctypes.c_double()
         n_in, n_out, n_flags = (ctypes.c_size_t(n) for n in (len(inputs), n_reals, len(flags)))
         flag_type = ctypes.c_int if fmi == 2 else ctypes.c_bool
-        flag_values = (flag_type * len(flags))()
+        flag_values: Any = (flag_type * len(flags))()
         self._flags = np.frombuffer(flag_values, dtype=np.int32 if fmi == 2 else np.bool_)
         self._flag_outputs = self.output_values[n_reals:]
 
@@ -125,7 +125,9 @@ class Plant:
             set_values, get_values, get_flags = (*set_values, n_in), (*get_values, n_out), (*get_flags, n_flags)
             results = [ctypes.byref(ctypes.c_bool()) for _ in range(3)]
             do_step = (instance, self._time, self._step, ctypes.c_bool(True), *results, ctypes.byref(ctypes.c_double()))
-        self._calls = tuple(zip((library[name] for name in names), (set_values, get_values, get_flags, do_step), strict=True))
+        self._calls = tuple(
+            zip((library[name] for name in names), (set_values, get_values, get_flags, do_step), strict=True)
+        )
 
     # ---- before the first step ----
 
@@ -209,7 +211,7 @@ class Plant:
     def _try(self, call: Any, *arguments: Any, **named: Any) -> None:
         try:
             call(*arguments, **named)
-        except Exception as error:  # noqa: BLE001 - FMPy's own type, which derives from Exception directly
+        except Exception as error:
             raise PlantError(self._said() or str(error)) from error
 
     def _said(self) -> str:

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import html
 import io
+import math
 from pathlib import Path
 from string import Template
 from typing import Any
 
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.backends.backend_svg import FigureCanvasSVG
-
 from cosim.claims import newtons, paper_claims
-from cosim.figures import Drawing, Story, drawings
+from cosim.drawing import Drawing, Story
+from cosim.figures import drawings
 from cosim.record import Record
 from cosim.scenario import Scenario
 
@@ -28,7 +27,8 @@ _PAGE = Template("""<!DOCTYPE html>
 <meta name="viewport" content="width=device-width, initial-scale=1">
 <title>$title</title>
 <style>
-body { font: 16px/1.5 Georgia, serif; color: #1a1a1a; background: #fff; max-width: 46rem; margin: 2rem auto; padding: 0 1rem; }
+body { font: 16px/1.5 Georgia, serif; color: #1a1a1a; background: #fff; }
+body { max-width: 46rem; margin: 2rem auto; padding: 0 1rem; }
 h1 { font-size: 1.5rem; line-height: 1.2; } h2 { font-size: 1.15rem; margin-top: 2.2rem; }
 .asked { color: #444; } .verdict { border-left: 4px solid #0072B2; padding: .2rem 0 .2rem 1rem; font-size: 1.08rem; }
 figure { margin: 1.4rem 0; } figure svg { width: 100%; height: auto; } figcaption { font-size: .9rem; color: #444; }
@@ -108,11 +108,14 @@ def asked(scenario: Scenario) -> str:
         Plain text.
     """
     start = ", ".join(f"{x:g}" for x in scenario.initial.position)
-    regions = [f"{'within' if r.region.keep == 'in' else 'out of'} {r.region.name} ({r.criterion})" for r in scenario.regions]
+    regions = [
+        f"{'within' if r.region.keep == 'in' else 'out of'} {r.region.name} ({r.criterion})" for r in scenario.regions
+    ]
     respecting = f", keeping {', '.join(regions)}" if regions else ""
-    kind = type(scenario.goal).__name__
-    at = ", ".join(f"{x:g}" for x in getattr(scenario.goal, "centre", ()))
-    return f"From ({start}) m into the goal region, a {kind.lower()}{f' about ({at}) m' if at else ''}{respecting}; {scenario.law.name} law."
+    kind = type(scenario.goal).__name__.lower()
+    centre = [sum(pair) / 2.0 for pair in zip(*scenario.goal.bounds(), strict=True)]
+    at = f" about ({', '.join(f'{x:g}' for x in centre)}) m" if all(map(math.isfinite, centre)) else ""
+    return f"From ({start}) m into the goal region, a {kind}{at}{respecting}; {scenario.law.name} law."
 
 
 def verdict(summary: dict[str, Any]) -> str:
@@ -129,7 +132,8 @@ def verdict(summary: dict[str, Any]) -> str:
         Plain text.
     """
     if summary["settled"]:
-        goal = f"The vehicle entered the goal region at {summary['reach_time']:.2f} s and was in for good from {summary['settle_time']:.2f} s"
+        entered, settled = summary["reach_time"], summary["settle_time"]
+        goal = f"The vehicle entered the goal region at {entered:.2f} s and was in for good from {settled:.2f} s"
     elif summary["reached"]:
         goal = f"The vehicle entered the goal region at {summary['reach_time']:.2f} s but did not settle there"
     else:
@@ -141,9 +145,11 @@ def verdict(summary: dict[str, Any]) -> str:
         if c < 0.0
     ]
     kept = f"; it violated {', '.join(broken)}." if broken else "; it kept every region."
-    force = f" The law asked for up to {newtons(summary['max_force_asked'])}; up to {newtons(summary['max_force'])} acted."
-    ended = "" if summary["status"] == "completed" else f" The run was {summary['status']} at {summary['simulated_time']:.3f} s."
-    return goal + kept + force + ended
+    force = (
+        f" The law asked for up to {newtons(summary['max_force_asked'])}; up to {newtons(summary['max_force'])} acted."
+    )
+    ended = f" The run {summary['status']} at {summary['simulated_time']:.3f} s."
+    return goal + kept + force + (ended if summary["status"] != "completed" else "")
 
 
 def _claims(scenario: Scenario, summary: dict[str, Any]) -> str:
@@ -158,27 +164,32 @@ def _claims(scenario: Scenario, summary: dict[str, Any]) -> str:
 
 
 def _numbers(summary: dict[str, Any]) -> str:
-    def text(value: Any) -> str:
-        if isinstance(value, float):
-            return f"{value:.6g}"
-        if isinstance(value, dict):
-            return ", ".join(f"{k} {text(v)}" for k, v in value.items())
-        if isinstance(value, (list, tuple)):
-            return ", ".join(f"[{text(v)}]" if isinstance(v, (list, tuple)) else text(v) for v in value) or "none"
-        return {None: "–", True: "yes", False: "no"}.get(value, str(value)) if not isinstance(value, int) or isinstance(value, bool) else str(value)
-
     return "".join(
-        f"<tr><th>{html.escape(key.replace('_', ' '))}</th><td>{html.escape(text(value))}</td></tr>"
+        f"<tr><th>{html.escape(key.replace('_', ' '))}</th><td>{html.escape(_text(value))}</td></tr>"
         for key, value in summary.items()
     )
+
+
+def _text(value: Any) -> str:
+    match value:
+        case None:
+            return "–"
+        case bool():
+            return "yes" if value else "no"
+        case float():
+            return f"{value:.6g}"
+        case dict():
+            return ", ".join(f"{key} {_text(item)}" for key, item in value.items())
+        case list() | tuple():
+            return "; ".join(" to ".join(map(_text, x)) if isinstance(x, tuple) else _text(x) for x in value) or "none"
+    return str(value)
 
 
 def _figure(folder: Path, drawing: Drawing) -> str:
     """Write a figure as SVG and PNG, and return it as a piece of HTML."""
     svg = io.StringIO()
-    FigureCanvasSVG(drawing.figure).print_svg(svg, metadata={"Date": None})
+    drawing.figure.savefig(svg, format="svg", metadata={"Date": None})
     (folder / FIGURES / f"{drawing.name}.svg").write_text(svg.getvalue(), encoding="utf-8")
-    FigureCanvasAgg(drawing.figure)
     drawing.figure.savefig(folder / FIGURES / f"{drawing.name}.png", dpi=_DPI)
     inline = svg.getvalue()[svg.getvalue().index("<svg") :]
     return f"<figure>{inline}<figcaption>{html.escape(drawing.caption)}</figcaption></figure>"

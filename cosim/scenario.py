@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import copy
 import dataclasses
 import math
-import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from importlib import resources
 from pathlib import Path
 from typing import Any, Literal
 
@@ -22,9 +19,10 @@ from controller.printed_law import check_gains
 from controller.regions import SHAPES, Region, Shape
 from controller.restoring import parameters
 from cosim.errors import ScenarioError
+from cosim.scenario_file import flat, override, read_table, shipped_scenarios
 from fuzzy_arbiter import SECTION_VI
 from plant_fmu.errors import PlantFmuError
-from plant_fmu.tables import decode, hint, read_toml
+from plant_fmu.tables import decode, hint
 from plant_fmu.vehicle import Vehicle, load_vehicle
 
 Vector3 = tuple[float, float, float]
@@ -183,18 +181,13 @@ class Scenario:
 
     @property
     def true_restoring_parameters(self) -> NDArray[np.float64]:
-        """phi of (12), shape (4,) [N, N m]: of the vehicle with the parameters that the plant is given over its own."""
+        """Phi of (12), shape (4,) [N, N m]: of the vehicle with the parameters that the plant is given over its own."""
         v, over = self.vehicle, self.plant.parameters
         r_G, r_B = (
             np.array([over.get(f"{name}.{axis}", value) for axis, value in zip("xyz", values, strict=True)])
             for name, values in (("r_G", v.r_G), ("r_B", v.r_B))
         )
         return parameters(over.get("weight", v.weight), over.get("buoyancy", v.buoyancy), r_G, r_B)
-
-
-def shipped_scenarios() -> list[str]:
-    """Return the names of the scenarios that come with the package."""
-    return sorted(f.name.removesuffix(".toml") for f in _folder().iterdir() if f.name.endswith(".toml"))
 
 
 def load_scenario(name_or_file: str | Path, overrides: Sequence[str] = ()) -> Scenario:
@@ -222,78 +215,19 @@ def load_scenario(name_or_file: str | Path, overrides: Sequence[str] = ()) -> Sc
         known = hint(text, shipped_scenarios())
         raise ScenarioError(f"scenario {text!r} is unknown; {known} (or a file ending in .toml)")
     try:
-        table, name, folder = _read(text, seen=())
-        for override in overrides:
-            _override(table, override)
+        table, name, folder = read_table(text)
+        for change in overrides:
+            override(table, change)
         return _check(table, name, folder)
     except (PlantFmuError, ControllerError, ScenarioError) as error:
         raise ScenarioError(f"{text}: {error}") from error
 
 
-def _folder() -> resources.abc.Traversable:
-    return resources.files("cosim") / "scenarios"
-
-
-def _read(name_or_file: str, seen: tuple[str, ...], beside: Path | None = None) -> tuple[dict[str, Any], str, Path]:
-    """Return the table of a scenario, laid over that of its ``base``, with its name and its folder."""
-    path = Path(name_or_file)
-    if path.suffix == ".toml":
-        path = beside / path if beside else path
-        table, name, folder = read_toml(path), path.stem, path.parent
-    elif name_or_file in shipped_scenarios():
-        with resources.as_file(_folder() / f"{name_or_file}.toml") as shipped:
-            table, name, folder = read_toml(shipped), name_or_file, Path()
-    else:
-        raise ScenarioError(f"base {name_or_file!r} is unknown; {hint(name_or_file, shipped_scenarios())}")
-    if "base" in table:
-        base = table.pop("base")
-        if not isinstance(base, str) or base in seen:
-            raise ScenarioError(f"{name}: base is {base!r}, expected the name of another scenario")
-        table = _merge(_read(base, (*seen, name_or_file), folder)[0], table)
-    return table, name, folder
-
-
-def _merge(base: dict[str, Any], over: dict[str, Any]) -> dict[str, Any]:
-    result = copy.deepcopy(base)
-    for key, value in over.items():
-        both = isinstance(value, dict) and isinstance(result.get(key), dict)
-        result[key] = _merge(result[key], value) if both else value
-    return result
-
-
-def _override(table: dict[str, Any], override: str) -> None:
-    """Set one key from ``key=value``."""
-    key, equals, text = override.partition("=")
-    if not equals or not key:
-        raise ScenarioError(f"--set {override!r}: expected key=value")
-    try:
-        value = tomllib.loads(f"value = {text}")["value"]
-    except tomllib.TOMLDecodeError:
-        value = text.strip()  # a bare word is a string
-    *path, last = key.strip().split(".")
-    at: Any = table
-    for part in path:
-        at = at[_index(at, part, key)] if isinstance(at, list) else at.setdefault(part, {})
-    if isinstance(at, list):
-        at[_index(at, last, key)] = value
-    elif isinstance(at, dict):
-        at[last] = value
-    else:
-        raise ScenarioError(f"--set {key}: there is no table at {'.'.join(path)!r}")
-
-
-def _index(items: list[Any], part: str, key: str) -> int:
-    """Return the place in a list that a number or an item's name means."""
-    names = [item.get("name") for item in items if isinstance(item, dict)]
-    if part in names:
-        return names.index(part)
-    if part.isdecimal() and int(part) < len(items):
-        return int(part)
-    raise ScenarioError(f"--set {key}: {part!r} is not one of {', '.join(map(str, names))}, nor a number below {len(items)}")
-
-
 def _check(table: dict[str, Any], name: str, folder: Path) -> Scenario:
     """Turn the file's table into a scenario, and name the first key that cannot be right."""
+    plant = table.get("plant")
+    if isinstance(plant, dict) and isinstance(plant.get("parameters"), dict):
+        plant["parameters"] = flat(plant["parameters"])
     file = decode(table, _File)
     time = _check_time(file.time)
     gains = _check_gains(file.law.gains)
@@ -301,7 +235,9 @@ def _check(table: dict[str, Any], name: str, folder: Path) -> Scenario:
     _require(steps <= MAX_STEPS, "time.duration", f"{time.duration} s, {steps} steps", f"at most {MAX_STEPS} steps")
     _require(file.plant.substep > 0.0, "plant.substep", file.plant.substep, "above 0 s")
     _require(file.limit.force >= 0.0, "limit.force", file.limit.force, "0 N or above (inf for none)")
-    _require(0.0 <= file.limit.time_constant < math.inf, "limit.time_constant", file.limit.time_constant, "0 s or above")
+    _require(
+        0.0 <= file.limit.time_constant < math.inf, "limit.time_constant", file.limit.time_constant, "0 s or above"
+    )
     _require(0.0 <= file.arbiter.ramp < math.inf, "arbiter.ramp", file.arbiter.ramp, "0 m or above")
     _require(file.arbiter.points >= 3, "arbiter.points", file.arbiter.points, "3 or more")
     for key, values in (
@@ -319,7 +255,9 @@ def _check(table: dict[str, Any], name: str, folder: Path) -> Scenario:
 
     regions = tuple(
         SecondaryRegion(
-            Region(entry.name, _shape(entry.shape, f"regions.{entry.name}.shape"), entry.keep), entry.criterion, entry.gain
+            Region(entry.name, _shape(entry.shape, f"regions.{entry.name}.shape"), entry.keep),
+            entry.criterion,
+            entry.gain,
         )
         for entry in file.regions
     )

@@ -21,7 +21,7 @@ class Column:
 
 
 class Signals:
-    """A row of float64 in which every group of signals is a view, so that a step writes it and an observer copies it once.
+    """A row of float64 in which every group of signals is a view: a step writes into it, an observer copies it once.
 
     Parameters
     ----------

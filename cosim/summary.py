@@ -32,7 +32,7 @@ def spans(flags: Flags, time: Array) -> list[tuple[float, float]]:
         [s]; a condition that still holds at the end ends at the last instant.
     """
     edges = np.diff(flags.astype(np.int8), prepend=0, append=0)
-    starts, ends = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)
+    starts, ends = np.flatnonzero(edges == 1).tolist(), np.flatnonzero(edges == -1).tolist()
     last = len(time) - 1
     return [(float(time[a]), float(time[min(b, last)])) for a, b in zip(starts, ends, strict=True)]
 

@@ -63,8 +63,8 @@ def parse_endpoint(text: str, allow_remote: bool = False) -> tuple[str, int]:
 class Telemetry:
     """Observer that streams heartbeat, time, pose, weights and estimates as a MAVLink vehicle.
 
-    Rates go by simulated time, and so does the time since boot in the messages. The stepper only copies a row now and then;
-    whatever happens on the link stays in the thread.
+    Rates go by simulated time, and so does the time since boot in the messages. The stepper only copies a row now and
+    then; whatever happens on the link stays in the thread.
 
     Parameters
     ----------
@@ -164,9 +164,12 @@ class Telemetry:
             m.MAVLink_attitude_quaternion_message(boot_ms, e0, e1, e2, e3, *rates),
             m.MAVLink_local_position_ned_message(boot_ms, *values("position.x", 3), *self._velocity_ned(row)),
         ]
-        named = {f"w_{name}": f"weight.{name}" for name in CRITERIA} | {f"phi{i}": f"estimate.phi{i}" for i in range(1, 5)}
+        named = {f"w_{name}": f"weight.{name}" for name in CRITERIA} | {
+            f"phi{i}": f"estimate.phi{i}" for i in range(1, 5)
+        }
         messages += [
-            m.MAVLink_named_value_float_message(boot_ms, name.encode(), *values(column, 1)) for name, column in named.items()
+            m.MAVLink_named_value_float_message(boot_ms, name.encode(), *values(column, 1))
+            for name, column in named.items()
         ]
         return messages
 

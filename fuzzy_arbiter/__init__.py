@@ -1,4 +1,4 @@
-"""A fuzzy arbiter of prioritised criteria: to what degree does each one matter now?"""
+"""A fuzzy arbiter of prioritised criteria, which decides to what degree each one matters now."""
 
 from fuzzy_arbiter.arbiter import ENGINES, Arbiter
 from fuzzy_arbiter.definition import SECTION_VI, Criterion, Rule, Term, hierarchical_rules

@@ -112,7 +112,9 @@ def _simulation(criteria: Sequence[Criterion], rules: Sequence[Rule], points: in
         outputs.append(consequent)
 
     def condition(rule: Rule) -> Any:
-        terms = [inputs[t.criterion][criteria[t.criterion].on if t.on else criteria[t.criterion].off] for t in rule.terms]
+        terms = [
+            inputs[t.criterion][criteria[t.criterion].on if t.on else criteria[t.criterion].off] for t in rule.terms
+        ]
         return functools.reduce(operator.and_ if rule.join == "and" else operator.or_, terms)
 
     system = _OrderedSystem(

@@ -12,7 +12,7 @@ from pathlib import Path
 import fmpy
 import platformdirs
 
-from plant_fmu.compiler import compile_library, find_compiler, library_suffix, native_platform
+from plant_fmu.compiler import FLAGS, compile_library, find_compiler, library_suffix, native_platform
 from plant_fmu.description import header, model_description, token
 from plant_fmu.errors import BuildError
 from plant_fmu.vehicle import Vehicle
@@ -21,8 +21,15 @@ FMI_VERSIONS = (2, 3)
 
 _SOURCES = ("plant.h", "plant.c", "instance.h", "instance.c")
 _ZIP_DATE = (1980, 1, 1, 0, 0, 0)
-_FMI2_PLATFORMS = {"x86_64-linux": "linux64", "x86_64-windows": "win64", "x86_64-darwin": "darwin64",
-                   "aarch64-linux": "linux64", "aarch64-darwin": "darwin64"}  # fmt: skip
+# FMI 2.0 names no aarch64: FMPy looks in these folders there, and other tools take them for x86_64
+_FMI2_PLATFORMS = {
+    "x86_64-linux": "linux64",
+    "x86_64-windows": "win64",
+    "x86_64-darwin": "darwin64",
+    "aarch64-linux": "linux64",
+    "aarch64-windows": "win64",
+    "aarch64-darwin": "darwin64",
+}
 
 
 def build_fmu(vehicle: Vehicle, fmi: int, out: Path) -> Path:
@@ -85,7 +92,7 @@ def cached_fmu(vehicle: Vehicle, fmi: int) -> Path:
     BuildError
         As `build_fmu`.
     """
-    made_from = _description(vehicle, fmi).encode() + _source_bytes() + native_platform().encode()
+    made_from = _description(vehicle, fmi).encode() + " ".join((native_platform(), *FLAGS, fmpy.__version__)).encode()
     digest = hashlib.sha256(made_from).hexdigest()[:16]
     path = Path(platformdirs.user_cache_dir("subreach")) / "fmu" / f"{vehicle.name}-fmi{fmi}-{digest}.fmu"
     if path.exists():
@@ -99,7 +106,7 @@ def cached_fmu(vehicle: Vehicle, fmi: int) -> Path:
 
 
 def _description(vehicle: Vehicle, fmi: int) -> str:
-    return model_description(vehicle, fmi, token(vehicle, _source_bytes()))
+    return model_description(vehicle, fmi, token(vehicle, fmi, _source_bytes()))
 
 
 def _source_bytes() -> bytes:
@@ -112,11 +119,13 @@ def _write_sources(folder: Path, vehicle: Vehicle, fmi: int) -> list[Path]:
     package = resources.files("plant_fmu") / "csrc"
     for name in (*_SOURCES, f"fmi{fmi}.c"):
         (folder / name).write_bytes((package / name).read_bytes())
-    (folder / "vehicle.h").write_text(header(vehicle, token(vehicle, _source_bytes())), encoding="utf-8")
+    (folder / "vehicle.h").write_text(header(vehicle, token(vehicle, fmi, _source_bytes())), encoding="utf-8")
     return sorted(folder.glob("*.c"))
 
 
 def _write_zip(out: Path, content: dict[str, bytes]) -> None:
+    if out.is_dir() or (out.exists() and not out.is_file()):
+        raise BuildError(f"{out}: exists and is no file; expected the name of a new one")
     try:
         with tempfile.NamedTemporaryFile(dir=out.parent, prefix=f".{out.name}-", delete=False) as scratch:
             pass
@@ -132,5 +141,6 @@ def _write_zip(out: Path, content: dict[str, bytes]) -> None:
         os.chmod(scratch.name, 0o644)
         os.replace(scratch.name, out)
     except OSError as error:
-        Path(scratch.name).unlink(missing_ok=True)
         raise BuildError(f"{out}: {error.strerror or error}") from error
+    finally:
+        Path(scratch.name).unlink(missing_ok=True)

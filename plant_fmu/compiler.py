@@ -17,8 +17,9 @@ from plant_fmu.errors import BuildError
 
 log = logging.getLogger(__name__)
 
-# no contraction of a*b+c: the same bits from every compiler and machine that follows IEEE 754
-_FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fPIC", "-fvisibility=hidden", "-shared")
+# no contraction of a*b+c, so that compilers differ in no bit beyond what their C libraries do;
+# and no debug information, which would name the folder of the build
+FLAGS = ("-std=c99", "-O2", "-g0", "-ffp-contract=off", "-fPIC", "-fvisibility=hidden", "-shared")
 _WARNINGS = ("-Wall", "-Wextra", "-Wpedantic")
 
 _OLD_GLIBC = "gnu.2.17"  # so that a library built here also loads on older systems
@@ -26,10 +27,13 @@ _OLD_GLIBC = "gnu.2.17"  # so that a library built here also loads on older syst
 
 def native_platform() -> str:
     """Return this machine's platform in FMI 3.0's words, such as ``x86_64-linux``."""
-    machine = {"amd64": "x86_64", "arm64": "aarch64"}.get(platform.machine().lower(), platform.machine().lower())
+    machine = {"amd64": "x86_64", "x86_64": "x86_64", "arm64": "aarch64", "aarch64": "aarch64"}.get(
+        platform.machine().lower()
+    )
     system = {"Linux": "linux", "Windows": "windows", "Darwin": "darwin"}.get(platform.system())
-    if system is None:
-        raise BuildError(f"no FMU can be built on {platform.system()}: expected Linux, Windows or macOS")
+    if system is None or machine is None:
+        here = f"{platform.system()} on {platform.machine()}"
+        raise BuildError(f"no FMU can be built here, {here}: expected Linux, Windows or macOS on x86_64 or aarch64")
     return f"{machine}-{system}"
 
 
@@ -53,7 +57,10 @@ def find_compiler() -> list[str]:
     """
     named = os.environ.get("CC")
     if named:
-        words = shlex.split(named)
+        try:
+            words = shlex.split(named)
+        except ValueError as error:
+            raise BuildError(f"no C compiler: CC is {named!r}: {error}") from error
         if not words or shutil.which(words[0]) is None:
             raise BuildError(f"no C compiler: CC is {named!r}, which is not on the PATH")
         return words
@@ -87,7 +94,7 @@ def compile_library(sources: Sequence[Path], includes: Sequence[Path], library: 
     """
     compiler = find_compiler()
     command = [
-        *compiler, *_FLAGS, *_WARNINGS,
+        *compiler, *FLAGS, *_WARNINGS,
         *(f"-I{folder}" for folder in includes),
         *map(str, sources), "-o", str(library), "-lm",
     ]  # fmt: skip
@@ -96,8 +103,12 @@ def compile_library(sources: Sequence[Path], includes: Sequence[Path], library: 
         done = subprocess.run(command, capture_output=True, text=True, check=False)
     except OSError as error:
         raise BuildError(f"C compiler {compiler[0]}: {error.strerror or error}") from error
-    if done.returncode != 0:
-        said = [line for line in done.stderr.splitlines() if "error" in line] or done.stderr.splitlines() or ["no word"]
+    if done.returncode != 0 or not library.is_file():
+        said = (
+            [line for line in done.stderr.splitlines() if "error" in line]
+            or done.stderr.splitlines()
+            or ["it wrote no library, and no word"]
+        )
         raise BuildError(f"C compiler {shlex.join(compiler)} failed: {said[0].strip()}")
     for line in done.stderr.splitlines():
         log.debug("%s", line)

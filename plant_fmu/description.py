@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import math
 from importlib import metadata
 from xml.etree import ElementTree as ET
 
@@ -61,13 +62,15 @@ def header(vehicle: Vehicle, token: str) -> str:
     return "\n".join([*lines, "#endif", ""])
 
 
-def token(vehicle: Vehicle, sources: bytes) -> str:
+def token(vehicle: Vehicle, fmi: int, sources: bytes) -> str:
     """Return the token that ties a description to the binary made with it.
 
     Parameters
     ----------
     vehicle : Vehicle
         The vehicle.
+    fmi : int
+        2 or 3.
     sources : bytes
         The C sources.
 
@@ -76,7 +79,7 @@ def token(vehicle: Vehicle, sources: bytes) -> str:
     str
         Changes whenever the description or the sources do.
     """
-    text = "".join(model_description(vehicle, fmi, "") for fmi in (2, 3)) + header(vehicle, "")
+    text = model_description(vehicle, fmi, "") + header(vehicle, "")
     digest = hashlib.sha256(text.encode() + sources).hexdigest()
     return "{" + "-".join((digest[:8], digest[8:12], digest[12:16], digest[16:20], digest[20:32])) + "}"
 
@@ -122,13 +125,11 @@ def model_description(vehicle: Vehicle, fmi: int, token: str) -> str:
     for name, exponents in UNITS.items():
         unit = ET.SubElement(units, "Unit", name=name)
         ET.SubElement(unit, "BaseUnit", {key: str(power) for key, power in exponents.items()})
+        if name == "rad":
+            ET.SubElement(unit, "DisplayUnit", name="deg", factor=_number(math.degrees(1.0)))
 
     log = ET.SubElement(root, "LogCategories")
-    for name, description in (
-        ("logStatusWarning", "Warnings"),
-        ("logStatusError", "Refused values and calls; always logged"),
-    ):
-        ET.SubElement(log, "Category", name=name, description=description)
+    ET.SubElement(log, "Category", name="logStatusError", description="Refused values and calls; always logged")
     ET.SubElement(
         root, "DefaultExperiment",
         startTime="0.0", stopTime=_number(DEFAULT_STOP_TIME), stepSize=_number(DEFAULT_STEP),
@@ -158,6 +159,8 @@ def _add_variable(parent: ET.Element, vr: int, v: Variable, fmi: int) -> None:
     kind: dict[str, str] = {}
     if v.unit:
         kind["unit"] = v.unit
+    if v.unit == "rad":
+        kind["displayUnit"] = "deg"
     if v.role not in ("time", "flag"):
         kind |= {"min": _number(v.minimum), "max": _number(v.maximum), "nominal": _number(v.nominal)}
     if v.role in ("state", "input", "parameter"):
@@ -171,7 +174,7 @@ def _add_variable(parent: ET.Element, vr: int, v: Variable, fmi: int) -> None:
 
 
 def _add_structure(parent: ET.Element, rows: list[tuple[int, Variable]], fmi: int) -> None:
-    """Outputs with what they follow from directly, and the unknowns of initialisation."""
+    """Add the outputs with what they follow from directly, and the unknowns of initialisation."""
     # FMI 2.0 names variables by their position in the list, FMI 3.0 by value reference
     number = {v.name: i + 1 if fmi == 2 else vr for i, (vr, v) in enumerate(rows)}
     inputs = {v.name for _, v in rows if v.role == "input"}
@@ -213,7 +216,13 @@ def documentation(vehicle: Vehicle) -> str:
     }
     lines = [f"# Variables of the `{vehicle.name}` FMU", "", vehicle.title + ".", "", vehicle.source]
     for role, title in titles.items():
-        lines += ["", f"## {title}", "", "| name | unit | start | min | max | description |", "|---|---|---|---|---|---|"]
+        lines += [
+            "",
+            f"## {title}",
+            "",
+            "| name | unit | start | min | max | description |",
+            "|---|---|---|---|---|---|",
+        ]
         for v in variables(vehicle):
             if v.role == role:
                 numbers = ["", "", ""] if role == "flag" else [f"{x:g}" for x in (v.start, v.minimum, v.maximum)]

@@ -145,7 +145,13 @@ def _mistyped(text: str, at: str, table: Any, kind: Any, where: str) -> TableErr
             annotation = dataclass_of(annotation) or annotation
         path.append(part)
 
-    words = {"Object": "table", "`object`": "a table", "`array`": "a list", "`float`": "a number", "`int`": "a whole number"}
+    words = {
+        "Object": "table",
+        "`object`": "a table",
+        "`array`": "a list",
+        "`float`": "a number",
+        "`int`": "a whole number",
+    }
     for word, plain in words.items():
         text = text.replace(word, plain)
     text = text[:1].lower() + text[1:].replace("`", "'")

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal
 
+from plant_fmu.errors import VehicleError
 from plant_fmu.vehicle import Vehicle
 
 Role = Literal["time", "state", "input", "output", "parameter", "flag"]
@@ -68,8 +69,13 @@ def variables(vehicle: Vehicle) -> list[Variable]:
     -------
     list of Variable
         Real variables first, then the Boolean ones (role ``"flag"``).
+
+    Raises
+    ------
+    VehicleError
+        If a number of the vehicle is beyond the range of its parameter.
     """
-    return [
+    rows = [
         Variable("time", "time", "time", "Simulated time", "s"),
         *_states(),
         *_inputs(vehicle),
@@ -77,6 +83,12 @@ def variables(vehicle: Vehicle) -> list[Variable]:
         *_parameters(vehicle),
         *_flags(vehicle),
     ]
+    for v in rows:
+        if not v.minimum <= v.start <= v.maximum:
+            raise VehicleError(
+                f"{vehicle.name}: {v.name} is {v.start:g} {v.unit}, expected {v.minimum:g} to {v.maximum:g}"
+            )
+    return rows
 
 
 def _states() -> Iterator[Variable]:
@@ -94,9 +106,9 @@ def _states() -> Iterator[Variable]:
             "", 1.0 if i == 0 else 0.0, -1.0, 1.0, 1.0,
         )  # fmt: skip
     for i, name in enumerate(VELOCITIES):
-        kind, unit = ("Velocity over ground", "m/s") if i < 3 else ("Angular velocity", "rad/s")
+        kind, unit = ("Velocity over ground along", "m/s") if i < 3 else ("Angular velocity about", "rad/s")
         yield Variable(
-            f"velocity.{name}", "state", f"state.rigid[{7 + i}]", f"{kind} along body {AXES[i % 3]}",
+            f"velocity.{name}", "state", f"state.rigid[{7 + i}]", f"{kind} body {AXES[i % 3]}",
             unit, 0.0, -SPEED_MAX, SPEED_MAX, 1.0,
         )  # fmt: skip
 
@@ -164,7 +176,7 @@ def _parameters(vehicle: Vehicle) -> Iterator[Variable]:
     yield parameter("mass", "mass", "Mass in air", "kg", vehicle.mass, 1e-3, 1e9)
     for k, (i, j) in enumerate(((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))):
         yield parameter(
-            f"inertia.{AXES[i]}{AXES[j]}", f"inertia[{k}]", f"Element ({i + 1},{j + 1}) of the inertia about the origin",
+            f"inertia.{AXES[i]}{AXES[j]}", f"inertia[{k}]", f"Inertia about the origin, element ({i + 1},{j + 1})",
             "kg.m2", vehicle.inertia[i, j], 0.0 if i == j else -1e12, 1e12,
         )  # fmt: skip
     for name, what, values in (("r_G", "gravity", vehicle.r_G), ("r_B", "buoyancy", vehicle.r_B)):
@@ -177,9 +189,9 @@ def _parameters(vehicle: Vehicle) -> Iterator[Variable]:
     for i in range(6):
         for j in range(i, 6):
             unit = ("kg", "kg.m", "kg.m2")[(i > 2) + (j > 2)]
+            mirrored = f", and by symmetry ({j + 1},{i + 1})" if i != j else ""
             yield parameter(
-                f"added_mass[{i + 1},{j + 1}]", f"added_mass[{i}][{j}]",
-                f"Added mass ({i + 1},{j + 1}), and by symmetry ({j + 1},{i + 1})" if i != j else f"Added mass ({i + 1},{i + 1})",
+                f"added_mass[{i + 1},{j + 1}]", f"added_mass[{i}][{j}]", f"Added mass ({i + 1},{j + 1}){mirrored}",
                 unit, vehicle.added_mass[i, j], 0.0 if i == j else -1e12, 1e12,
             )  # fmt: skip
     for name, units, values in (
@@ -193,7 +205,9 @@ def _parameters(vehicle: Vehicle) -> Iterator[Variable]:
             )  # fmt: skip
     for i, axis in enumerate(AXES):
         where = ("north", "east", "down")[i]
-        yield parameter(f"current.{axis}", f"current[{i}]", f"Velocity of the water, {where}", "m/s", 0.0, -100.0, 100.0)
+        yield parameter(
+            f"current.{axis}", f"current[{i}]", f"Velocity of the water, {where}", "m/s", 0.0, -100.0, 100.0
+        )
     for i, name in enumerate(FORCES):
         for j in range(vehicle.n_thrusters):
             yield parameter(

@@ -90,7 +90,7 @@ class Vehicle:
     @property
     def n_thrusters(self) -> int:
         """Number of thrusters."""
-        return self.thruster_matrix.shape[1]
+        return int(self.thruster_matrix.shape[1])
 
     @property
     def mass_matrix(self) -> NDArray[np.float64]:
@@ -162,7 +162,10 @@ def _check(file: _File, where: str) -> Vehicle:
         return np.diag(np.array(value)) if widths == {0} else np.array(value, dtype=float)
 
     body, statics, dynamics, thrusters = file.rigid_body, file.hydrostatics, file.hydrodynamics, file.thrusters
-    require(file.name.isidentifier() and file.name.isascii(), "name", repr(file.name), "letters, digits and _")
+    good_name = file.name.isidentifier() and file.name.isascii() and len(file.name) <= 64
+    require(good_name, "name", repr(file.name), "at most 64 letters, digits and _")
+    require(file.title.isprintable(), "title", repr(file.title), "one line of printable characters")
+    require(" ".join(file.source.split()).isprintable(), "source", repr(file.source), "printable characters")
 
     widths = {len(row) for row in thrusters.matrix}
     require(
@@ -211,10 +214,12 @@ def _check(file: _File, where: str) -> Vehicle:
     for key in ("inertia", "added_mass"):
         matrix = getattr(vehicle, key)
         require(bool(np.allclose(matrix, matrix.T, rtol=1e-9, atol=1e-9)), key, "not symmetric", "a symmetric matrix")
-    require(bool((vehicle.thrust_min <= vehicle.thrust_max).all()), "thrusters.force_min", "above force_max", "below it")
+    require(
+        bool((vehicle.thrust_min <= vehicle.thrust_max).all()), "thrusters.force_min", "above force_max", "below it"
+    )
     require(bool((vehicle.thrust_time_constant >= 0).all()), "thrusters.time_constant", "negative", "0 or above")
     rigid = vehicle.mass_matrix - vehicle.added_mass
     for key, matrix in (("rigid-body mass matrix", rigid), ("mass matrix with added mass", vehicle.mass_matrix)):
         least = float(np.linalg.eigvalsh(matrix)[0])
-        require(least > 0, key, f"with least eigenvalue {least:.4g}", "positive definite (Property 1)")
+        require(least > 0, key, f"not positive definite (least eigenvalue {least:.4g})", "that it is (Property 1)")
     return vehicle

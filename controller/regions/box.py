@@ -10,7 +10,7 @@ import numpy as np
 from controller.compiled import compiled
 from controller.quaternion import rotation_matrix
 from controller.regions.geometry import product_distance, to_local, to_world
-from controller.regions.shape import Array, Evaluation, Vector3, Vector4, require, require_finite, unit
+from controller.regions.shape import Array, Bounds, Evaluation, Vector3, Vector4, about, require, require_finite, unit
 
 
 @dataclass(frozen=True)
@@ -35,6 +35,12 @@ class Box:
         """Return centre, rotation matrix and half sizes."""
         R = rotation_matrix(np.array(unit("box", "quaternion", self.quaternion)))
         return (*self.centre, *R.ravel().tolist(), *(s / 2.0 for s in self.size))
+
+    def bounds(self) -> Bounds:
+        """Return the corners of the upright box about it."""
+        R = rotation_matrix(np.array(unit("box", "quaternion", self.quaternion)))
+        reach = np.abs(R) @ np.array(self.size) / 2.0
+        return about(self.centre, reach.tolist())
 
 
 @compiled

@@ -8,7 +8,7 @@ from typing import ClassVar
 
 from controller.compiled import compiled
 from controller.regions.geometry import clamp
-from controller.regions.shape import Array, Evaluation, Vector3, require, require_finite, unit
+from controller.regions.shape import Array, Bounds, Evaluation, Vector3, ball_bounds, require, require_finite, unit
 
 
 @dataclass(frozen=True)
@@ -35,6 +35,10 @@ class Cone:
         """Return feature, unit axis, sine and cosine of the half angle, and range."""
         axis = unit("cone", "axis", self.axis)
         return (*self.feature, *axis, math.sin(self.half_angle), math.cos(self.half_angle), self.range)
+
+    def bounds(self) -> Bounds:
+        """Return the corners of the cube about its range, which hold it."""
+        return ball_bounds(self.feature, self.range)
 
 
 @compiled

@@ -8,7 +8,7 @@ from typing import ClassVar
 
 from controller.compiled import compiled
 from controller.regions.geometry import product_distance
-from controller.regions.shape import Array, Evaluation, Vector3, require, require_finite, unit
+from controller.regions.shape import Array, Bounds, Evaluation, Vector3, about, join, require, require_finite, unit
 
 
 @dataclass(frozen=True)
@@ -31,6 +31,12 @@ class Cylinder:
         between = tuple(b - a for a, b in zip(self.start, self.end, strict=True))
         middle = tuple((a + b) / 2.0 for a, b in zip(self.start, self.end, strict=True))
         return (*middle, *unit("cylinder", "axis", between), math.hypot(*between) / 2.0, self.radius)
+
+    def bounds(self) -> Bounds:
+        """Return the corners of the upright box about it."""
+        axis = unit("cylinder", "axis", tuple(b - a for a, b in zip(self.start, self.end, strict=True)))
+        discs = [about(p, [self.radius * math.sqrt(1.0 - x * x) for x in axis]) for p in (self.start, self.end)]
+        return join(discs)
 
 
 @compiled

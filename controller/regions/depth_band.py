@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import inf
 from typing import ClassVar
 
 from controller.compiled import compiled
-from controller.regions.shape import Array, Evaluation, require, require_finite
+from controller.regions.shape import Array, Bounds, Evaluation, require, require_finite
 
 
 @dataclass(frozen=True)
@@ -25,6 +26,10 @@ class DepthBand:
     def packed(self) -> tuple[float, ...]:
         """Return depth and tolerance."""
         return (self.depth, self.tolerance)
+
+    def bounds(self) -> Bounds:
+        """Return the depths, without end to the sides."""
+        return (-inf, -inf, self.depth - self.tolerance), (inf, inf, self.depth + self.tolerance)
 
 
 @compiled

@@ -11,7 +11,7 @@ import numpy as np
 from controller.compiled import compiled
 from controller.quaternion import rotation_matrix
 from controller.regions.geometry import to_local, to_world
-from controller.regions.shape import Array, Evaluation, Vector3, Vector4, require, require_finite, unit
+from controller.regions.shape import Array, Bounds, Evaluation, Vector3, Vector4, about, require, require_finite, unit
 
 _STEPS = 200  # more than the root below ever takes
 
@@ -39,6 +39,12 @@ class Ellipsoid:
         R = rotation_matrix(np.array(unit("ellipsoid", "quaternion", self.quaternion)))
         return (*self.centre, *R.ravel().tolist(), *self.semi_axes)
 
+    def bounds(self) -> Bounds:
+        """Return the corners of the upright box about it."""
+        R = rotation_matrix(np.array(unit("ellipsoid", "quaternion", self.quaternion)))
+        reach = np.linalg.norm(R * np.array(self.semi_axes), axis=1)
+        return about(self.centre, reach.tolist())
+
 
 @compiled
 def ellipsoid(p: Array, q: Array) -> Evaluation:
@@ -56,8 +62,8 @@ def _surface_distance(x: float, y: float, z: float, a: float, b: float, c: float
     """Distance from a point of the first octant to the surface.
 
     The nearest point is x_i a_i^2 / (t + a_i^2), with t the root of sum (a_i x_i / (t + a_i^2))^2 = 1 above -min a_i^2
-    (Eberly). With s = t + min a_i^2 as the unknown, nothing cancels near the centre. The sum falls and is convex, so that
-    Newton's method from a point left of the root only grows towards it.
+    (Eberly). With s = t + min a_i^2 as unknown, nothing cancels near the centre. The sum falls and is convex: Newton's
+    method from a point left of the root only grows towards it.
     """
     least = min(a, b, c) ** 2
     da, db, dc = a * a - least, b * b - least, c * c - least

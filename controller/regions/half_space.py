@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import inf
 from typing import ClassVar
 
 from controller.compiled import compiled
-from controller.regions.shape import Array, Evaluation, Vector3, require_finite, unit
+from controller.regions.shape import Array, Bounds, Evaluation, Vector3, require_finite, unit
 
 
 @dataclass(frozen=True)
@@ -25,6 +26,10 @@ class HalfSpace:
     def packed(self) -> tuple[float, ...]:
         """Return point and unit normal."""
         return (*self.point, *unit("half_space", "normal", self.normal))
+
+    def bounds(self) -> Bounds:
+        """Return no bounds: it ends in no direction of the axes."""
+        return (-inf, -inf, -inf), (inf, inf, inf)
 
 
 @compiled

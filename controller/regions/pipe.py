@@ -8,7 +8,7 @@ from typing import ClassVar
 
 from controller.compiled import compiled
 from controller.regions.geometry import clamp
-from controller.regions.shape import Array, Evaluation, Vector3, require, require_finite
+from controller.regions.shape import Array, Bounds, Evaluation, Vector3, ball_bounds, join, require, require_finite
 
 
 @dataclass(frozen=True)
@@ -35,6 +35,10 @@ class Pipe:
     def packed(self) -> tuple[float, ...]:
         """Return the radius and the points."""
         return (self.radius, *(x for point in self.points for x in point))
+
+    def bounds(self) -> Bounds:
+        """Return the corners of the upright box about it."""
+        return join([ball_bounds(point, self.radius) for point in self.points])
 
 
 @compiled

@@ -8,7 +8,7 @@ from typing import ClassVar
 
 from controller.compiled import compiled
 from controller.regions.geometry import clamp, product_distance
-from controller.regions.shape import Array, Evaluation, Vector2, require, require_finite
+from controller.regions.shape import Array, Bounds, Evaluation, Vector2, require, require_finite
 
 
 @dataclass(frozen=True)
@@ -37,6 +37,11 @@ class Prism:
         """Return top, bottom, and the corners in the sense in which the outward normal is to the right."""
         corners = self.corners if _signed_area(self.corners) > 0.0 else self.corners[::-1]
         return (self.top, self.bottom, *(x for corner in corners for x in corner))
+
+    def bounds(self) -> Bounds:
+        """Return the corners of the upright box about it."""
+        north, east = zip(*self.corners, strict=True)
+        return (min(north), min(east), self.top), (max(north), max(east), self.bottom)
 
 
 def _signed_area(corners: tuple[Vector2, ...]) -> float:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import ClassVar, Protocol
 
 import numpy as np
@@ -14,6 +15,9 @@ Array = NDArray[np.float64]
 Vector2 = tuple[float, float]
 Vector3 = tuple[float, float, float]
 Vector4 = tuple[float, float, float, float]
+
+# lowest and highest corner of an upright box [m, NED]
+Bounds = tuple[Vector3, Vector3]
 
 # value of g, its gradient (3 numbers), signed distance [m]
 Evaluation = tuple[float, float, float, float, float]
@@ -33,6 +37,10 @@ class Shape(Protocol):
 
     def packed(self) -> tuple[float, ...]:
         """Return the numbers that the compiled function reads."""
+        ...
+
+    def bounds(self) -> Bounds:
+        """Return the corners of an upright box that holds the shape; infinite where it has no end."""
         ...
 
 
@@ -103,3 +111,58 @@ def unit(shape: str, key: str, vector: tuple[float, ...]) -> tuple[float, ...]:
     length = math.hypot(*vector)
     require(length > UP_TO_ROUNDING, shape, key, vector, "a direction")
     return tuple(x / length for x in vector)
+
+
+def about(centre: Vector3, reach: Sequence[float]) -> Bounds:
+    """Return the bounds of what reaches so far from a centre along each axis.
+
+    Parameters
+    ----------
+    centre : tuple of float
+        [m, NED].
+    reach : sequence of float
+        Three lengths [m].
+
+    Returns
+    -------
+    Bounds
+        Lowest and highest corner.
+    """
+    (x, y, z), (dx, dy, dz) = centre, reach
+    return (x - dx, y - dy, z - dz), (x + dx, y + dy, z + dz)
+
+
+def ball_bounds(centre: Vector3, radius: float) -> Bounds:
+    """Return the bounds of a ball.
+
+    Parameters
+    ----------
+    centre : tuple of float
+        [m, NED].
+    radius : float
+        [m].
+
+    Returns
+    -------
+    Bounds
+        Lowest and highest corner.
+    """
+    return about(centre, (radius, radius, radius))
+
+
+def join(parts: Sequence[Bounds]) -> Bounds:
+    """Return the bounds of several parts together.
+
+    Parameters
+    ----------
+    parts : sequence of Bounds
+        At least one.
+
+    Returns
+    -------
+    Bounds
+        Lowest and highest corner.
+    """
+    low = tuple(min(part[0][i] for part in parts) for i in range(3))
+    high = tuple(max(part[1][i] for part in parts) for i in range(3))
+    return (low[0], low[1], low[2]), (high[0], high[1], high[2])

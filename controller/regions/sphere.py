@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from controller.compiled import compiled
-from controller.regions.shape import Array, Evaluation, Vector3, require, require_finite
+from controller.regions.shape import Array, Bounds, Evaluation, Vector3, ball_bounds, require, require_finite
 
 
 @dataclass(frozen=True)
@@ -26,6 +26,10 @@ class Sphere:
     def packed(self) -> tuple[float, ...]:
         """Return centre and radius."""
         return (*self.centre, self.radius)
+
+    def bounds(self) -> Bounds:
+        """Return the corners of the cube about it."""
+        return ball_bounds(self.centre, self.radius)
 
 
 @compiled

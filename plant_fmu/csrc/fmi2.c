@@ -1,4 +1,6 @@
 /* FMI 2.0 co-simulation over instance.h. */
+#include <math.h>
+
 #include "fmi2Functions.h"
 #include "instance.h"
 
@@ -35,8 +37,7 @@ const char *fmi2GetVersion(void)
 fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean loggingOn, size_t nCategories,
                                const fmi2String categories[])
 {
-    (void)nCategories, (void)categories; /* all categories together */
-    ((Instance *)c)->logging = loggingOn != fmi2False;
+    (void)c, (void)loggingOn, (void)nCategories, (void)categories; /* errors are always logged, and nothing else */
     return fmi2OK;
 }
 
@@ -44,7 +45,7 @@ fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2Str
                               fmi2String fmuResourceLocation, const fmi2CallbackFunctions *functions,
                               fmi2Boolean visible, fmi2Boolean loggingOn)
 {
-    (void)fmuResourceLocation, (void)visible;
+    (void)fmuResourceLocation, (void)visible, (void)loggingOn;
     if (!functions)
         return NULL;
     if (fmuType != fmi2CoSimulation) {
@@ -54,7 +55,7 @@ fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2Str
         return NULL;
     }
     return instance_create(instanceName, fmuGUID, log_message, functions->componentEnvironment,
-                           (void (*)(void))functions->logger, loggingOn != fmi2False);
+                           (void (*)(void))functions->logger);
 }
 
 void fmi2FreeInstance(fmi2Component c)
@@ -65,18 +66,13 @@ void fmi2FreeInstance(fmi2Component c)
 fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean toleranceDefined, fmi2Real tolerance, fmi2Real startTime,
                                fmi2Boolean stopTimeDefined, fmi2Real stopTime)
 {
-    Instance *instance = c;
-
-    (void)toleranceDefined, (void)tolerance, (void)stopTimeDefined, (void)stopTime;
-    if (instance->mode != MODE_INSTANTIATED)
-        return (fmi2Status)instance_tell(instance, STATUS_ERROR, "fmi2SetupExperiment: only before initialisation");
-    instance->model.time = startTime;
-    return fmi2OK;
+    (void)toleranceDefined, (void)tolerance;
+    return (fmi2Status)instance_set_experiment(c, startTime, stopTimeDefined ? stopTime : INFINITY);
 }
 
 fmi2Status fmi2EnterInitializationMode(fmi2Component c)
 {
-    return (fmi2Status)instance_enter_initialisation(c, ((const Instance *)c)->model.time);
+    return (fmi2Status)instance_enter_initialisation(c);
 }
 
 fmi2Status fmi2ExitInitializationMode(fmi2Component c)
@@ -143,16 +139,19 @@ fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind s, fmi2Real *
         return (fmi2Status)instance_unsupported(c, #function);     \
     }
 
-UNSUPPORTED(fmi2GetInteger, (fmi2Component c, const fmi2ValueReference vr[], size_t n, fmi2Integer v[]),
-            (void)vr, (void)n, (void)v)
-UNSUPPORTED(fmi2GetString, (fmi2Component c, const fmi2ValueReference vr[], size_t n, fmi2String v[]),
-            (void)vr, (void)n, (void)v)
-UNSUPPORTED(fmi2SetInteger, (fmi2Component c, const fmi2ValueReference vr[], size_t n, const fmi2Integer v[]),
-            (void)vr, (void)n, (void)v)
-UNSUPPORTED(fmi2SetBoolean, (fmi2Component c, const fmi2ValueReference vr[], size_t n, const fmi2Boolean v[]),
-            (void)vr, (void)n, (void)v)
-UNSUPPORTED(fmi2SetString, (fmi2Component c, const fmi2ValueReference vr[], size_t n, const fmi2String v[]),
-            (void)vr, (void)n, (void)v)
+/* reading or writing no variable at all is no fault */
+#define UNSUPPORTED_VALUES(function, type)                                                            \
+    fmi2Status function(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, type value[])     \
+    {                                                                                                 \
+        (void)vr, (void)value;                                                                        \
+        return nvr == 0 ? fmi2OK : (fmi2Status)instance_unsupported(c, #function);                    \
+    }
+
+UNSUPPORTED_VALUES(fmi2GetInteger, fmi2Integer)
+UNSUPPORTED_VALUES(fmi2GetString, fmi2String)
+UNSUPPORTED_VALUES(fmi2SetInteger, const fmi2Integer)
+UNSUPPORTED_VALUES(fmi2SetBoolean, const fmi2Boolean)
+UNSUPPORTED_VALUES(fmi2SetString, const fmi2String)
 UNSUPPORTED(fmi2GetFMUstate, (fmi2Component c, fmi2FMUstate *state), (void)state)
 UNSUPPORTED(fmi2SetFMUstate, (fmi2Component c, fmi2FMUstate state), (void)state)
 UNSUPPORTED(fmi2FreeFMUstate, (fmi2Component c, fmi2FMUstate *state), (void)state)

@@ -1,5 +1,5 @@
 /* FMI 3.0 co-simulation over instance.h. */
-#include <string.h>
+#include <math.h>
 
 #include "fmi3Functions.h"
 #include "instance.h"
@@ -20,8 +20,7 @@ const char *fmi3GetVersion(void)
 fmi3Status fmi3SetDebugLogging(fmi3Instance instance, fmi3Boolean loggingOn, size_t nCategories,
                                const fmi3String categories[])
 {
-    (void)nCategories, (void)categories; /* all categories together */
-    ((Instance *)instance)->logging = loggingOn;
+    (void)instance, (void)loggingOn, (void)nCategories, (void)categories; /* errors are always logged, nothing else is */
     return fmi3OK;
 }
 
@@ -33,10 +32,10 @@ fmi3Instance fmi3InstantiateCoSimulation(fmi3String instanceName, fmi3String ins
                                          fmi3InstanceEnvironment instanceEnvironment, fmi3LogMessageCallback logMessage,
                                          fmi3IntermediateUpdateCallback intermediateUpdate)
 {
-    (void)resourcePath, (void)visible, (void)eventModeUsed, (void)earlyReturnAllowed, (void)intermediateUpdate;
+    (void)resourcePath, (void)visible, (void)loggingOn, (void)eventModeUsed, (void)earlyReturnAllowed, (void)intermediateUpdate;
     (void)requiredIntermediateVariables, (void)nRequiredIntermediateVariables;
     return instance_create(instanceName, instantiationToken, log_message, instanceEnvironment,
-                           (void (*)(void))logMessage, loggingOn);
+                           (void (*)(void))logMessage);
 }
 
 static fmi3Instance refuse_type(fmi3InstanceEnvironment environment, fmi3LogMessageCallback logMessage,
@@ -76,8 +75,10 @@ void fmi3FreeInstance(fmi3Instance instance)
 fmi3Status fmi3EnterInitializationMode(fmi3Instance instance, fmi3Boolean toleranceDefined, fmi3Float64 tolerance,
                                        fmi3Float64 startTime, fmi3Boolean stopTimeDefined, fmi3Float64 stopTime)
 {
-    (void)toleranceDefined, (void)tolerance, (void)stopTimeDefined, (void)stopTime;
-    return (fmi3Status)instance_enter_initialisation(instance, startTime);
+    (void)toleranceDefined, (void)tolerance;
+    if (instance_set_experiment(instance, startTime, stopTimeDefined ? stopTime : INFINITY) != STATUS_OK)
+        return fmi3Error;
+    return (fmi3Status)instance_enter_initialisation(instance);
 }
 
 fmi3Status fmi3ExitInitializationMode(fmi3Instance instance)
@@ -101,7 +102,7 @@ fmi3Status fmi3GetFloat64(fmi3Instance instance, const fmi3ValueReference valueR
                           fmi3Float64 values[], size_t nValues)
 {
     if (nValues != nValueReferences)
-        return (fmi3Status)instance_tell(instance, STATUS_ERROR, "fmi3GetFloat64: all variables are scalars");
+        return (fmi3Status)instance_refuse(instance, "fmi3GetFloat64: all variables are scalars");
     return (fmi3Status)instance_get_reals(instance, valueReferences, nValueReferences, values);
 }
 
@@ -109,7 +110,7 @@ fmi3Status fmi3SetFloat64(fmi3Instance instance, const fmi3ValueReference valueR
                           const fmi3Float64 values[], size_t nValues)
 {
     if (nValues != nValueReferences)
-        return (fmi3Status)instance_tell(instance, STATUS_ERROR, "fmi3SetFloat64: all variables are scalars");
+        return (fmi3Status)instance_refuse(instance, "fmi3SetFloat64: all variables are scalars");
     return (fmi3Status)instance_set_reals(instance, valueReferences, nValueReferences, values);
 }
 
@@ -117,7 +118,7 @@ fmi3Status fmi3GetBoolean(fmi3Instance instance, const fmi3ValueReference valueR
                           fmi3Boolean values[], size_t nValues)
 {
     if (nValues != nValueReferences)
-        return (fmi3Status)instance_tell(instance, STATUS_ERROR, "fmi3GetBoolean: all variables are scalars");
+        return (fmi3Status)instance_refuse(instance, "fmi3GetBoolean: all variables are scalars");
     for (size_t i = 0; i < nValueReferences; i++)
         if (instance_get_flag(instance, valueReferences[i], &values[i]) != STATUS_OK)
             return fmi3Error;
@@ -132,10 +133,14 @@ fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 currentCommunicationPoi
 {
     (void)noSetFMUStatePriorToCurrentPoint;
     const Status status = instance_step(instance, currentCommunicationPoint, communicationStepSize);
-    *eventHandlingNeeded = fmi3False;
-    *terminateSimulation = fmi3False;
-    *earlyReturn = fmi3False;
-    *lastSuccessfulTime = ((const Instance *)instance)->model.time;
+    if (eventHandlingNeeded)
+        *eventHandlingNeeded = fmi3False;
+    if (terminateSimulation)
+        *terminateSimulation = fmi3False;
+    if (earlyReturn)
+        *earlyReturn = fmi3False;
+    if (lastSuccessfulTime)
+        *lastSuccessfulTime = ((const Instance *)instance)->model.time;
     return (fmi3Status)status;
 }
 
@@ -148,13 +153,18 @@ fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 currentCommunicationPoi
         return (fmi3Status)instance_unsupported(instance, #function);                   \
     }
 
-#define UNSUPPORTED_VALUES(type)                                                                                     \
-    UNSUPPORTED(fmi3Get##type, (fmi3Instance instance, const fmi3ValueReference references[], size_t n,              \
-                                fmi3##type values[], size_t nValues), (void)references, (void)n, (void)values,       \
-                (void)nValues)                                                                                       \
-    UNSUPPORTED(fmi3Set##type, (fmi3Instance instance, const fmi3ValueReference references[], size_t n,              \
-                                const fmi3##type values[], size_t nValues), (void)references, (void)n, (void)values, \
-                (void)nValues)
+/* reading or writing no variable at all is no fault */
+#define UNSUPPORTED_VALUES_OF(function, type)                                                                  \
+    fmi3Status function(fmi3Instance instance, const fmi3ValueReference references[], size_t n, type values[], \
+                        size_t nValues)                                                                        \
+    {                                                                                                          \
+        (void)references, (void)values, (void)nValues;                                                         \
+        return n == 0 ? fmi3OK : (fmi3Status)instance_unsupported(instance, #function);                        \
+    }
+
+#define UNSUPPORTED_VALUES(type)                        \
+    UNSUPPORTED_VALUES_OF(fmi3Get##type, fmi3##type)    \
+    UNSUPPORTED_VALUES_OF(fmi3Set##type, const fmi3##type)
 
 UNSUPPORTED_VALUES(Float32)
 UNSUPPORTED_VALUES(Int8)
@@ -167,8 +177,7 @@ UNSUPPORTED_VALUES(Int64)
 UNSUPPORTED_VALUES(UInt64)
 UNSUPPORTED_VALUES(String)
 
-UNSUPPORTED(fmi3SetBoolean, (fmi3Instance instance, const fmi3ValueReference r[], size_t n, const fmi3Boolean v[],
-                             size_t nv), (void)r, (void)n, (void)v, (void)nv)
+UNSUPPORTED_VALUES_OF(fmi3SetBoolean, const fmi3Boolean)
 UNSUPPORTED(fmi3GetBinary, (fmi3Instance instance, const fmi3ValueReference r[], size_t n, size_t sizes[],
                             fmi3Binary v[], size_t nv), (void)r, (void)n, (void)sizes, (void)v, (void)nv)
 UNSUPPORTED(fmi3SetBinary, (fmi3Instance instance, const fmi3ValueReference r[], size_t n, const size_t sizes[],

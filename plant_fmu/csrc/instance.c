@@ -33,32 +33,28 @@ static double *real_at(Model *model, const Variable *variable)
 
 /* ---- messages ---------------------------------------------------------------------------------------------- */
 
-Status instance_tell(const Instance *instance, Status status, const char *format, ...)
+Status instance_refuse(const Instance *instance, const char *format, ...)
 {
-    static const char *const categories[] = {
-        "logAll", "logStatusWarning", "logStatusDiscard", "logStatusError", "logStatusFatal"};
     char message[MAX_MESSAGE];
     va_list arguments;
 
-    if (status < STATUS_ERROR && !instance->logging)
-        return status;
     va_start(arguments, format);
     vsnprintf(message, sizeof message, format, arguments);
     va_end(arguments);
-    instance->log(instance, status, categories[status], message);
-    return status;
+    instance->log(instance, STATUS_ERROR, "logStatusError", message);
+    return STATUS_ERROR;
 }
 
 Status instance_unsupported(Instance *instance, const char *function)
 {
-    return instance_tell(instance, STATUS_ERROR, "%s: not offered by this FMU", function);
+    return instance_refuse(instance, "%s: not offered by this FMU", function);
 }
 
-static Status require_mode(const Instance *instance, int allowed, const char *action)
+static Status require_mode(const Instance *instance, unsigned allowed, const char *action)
 {
-    if (instance->mode & allowed)
+    if ((unsigned)instance->mode & allowed)
         return STATUS_OK;
-    return instance_tell(instance, STATUS_ERROR, "%s: not allowed %s", action,
+    return instance_refuse(instance, "%s: not allowed %s", action,
                          instance->mode == MODE_INSTANTIATED    ? "before initialisation"
                          : instance->mode == MODE_INITIALISING ? "during initialisation"
                          : instance->mode == MODE_STEPPING     ? "once initialisation has ended"
@@ -73,13 +69,14 @@ static void set_start_values(Instance *instance)
     for (int i = 0; i < N_REALS; i++)
         if (REALS[i].role != OUTPUT)
             *real_at(&instance->model, &REALS[i]) = REALS[i].start;
+    instance->model.stop_time = INFINITY;
     instance->mode = MODE_INSTANTIATED;
     instance->unprepared = true;
     instance->outdated = true;
 }
 
 Instance *instance_create(const char *name, const char *token, LogCallback *log, void *environment,
-                          void (*logger)(void), bool logging)
+                          void (*logger)(void))
 {
     const char *shown = name ? name : "";
     Instance *instance = calloc(1, sizeof *instance);
@@ -95,9 +92,8 @@ Instance *instance_create(const char *name, const char *token, LogCallback *log,
     instance->log = log;
     instance->environment = environment;
     instance->logger = logger;
-    instance->logging = logging;
     if (!token || strcmp(token, INSTANTIATION_TOKEN) != 0) {
-        instance_tell(instance, STATUS_ERROR, "instantiation token is \"%s\", expected \"%s\"", token ? token : "",
+        instance_refuse(instance, "instantiation token is \"%s\", expected \"%s\"", token ? token : "",
                       INSTANTIATION_TOKEN);
         instance_free(instance);
         return NULL;
@@ -123,34 +119,49 @@ Status instance_reset(Instance *instance)
 /* Brings the derived constants up to date; tells what is wrong with the parameters. */
 static Status prepare(Instance *instance)
 {
+    const Parameters *p = &instance->model.plant.parameters;
+
     if (!instance->unprepared)
         return STATUS_OK;
+    for (int i = 0; i < N_THRUSTERS; i++)
+        if (p->thrust_min[i] > p->thrust_max[i])
+            return instance_refuse(instance, "thrust_min[%d] = %.9g is above thrust_max[%d] = %.9g", i + 1,
+                                   p->thrust_min[i], i + 1, p->thrust_max[i]);
     const char *fault = plant_prepare(&instance->model.plant);
     if (fault)
-        return instance_tell(instance, STATUS_ERROR, "%s", fault);
+        return instance_refuse(instance, "%s", fault);
     instance->unprepared = false;
     return STATUS_OK;
 }
 
-Status instance_enter_initialisation(Instance *instance, double start_time)
+Status instance_set_experiment(Instance *instance, double start_time, double stop_time)
+{
+    if (require_mode(instance, MODE_INSTANTIATED, "setting the experiment") != STATUS_OK)
+        return STATUS_ERROR;
+    if (!isfinite(start_time))
+        return instance_refuse(instance, "start time is %g s, expected a finite number", start_time);
+    if (!(stop_time >= start_time))
+        return instance_refuse(instance, "stop time is %g s, expected %g s (start time) or later", stop_time, start_time);
+    instance->model.time = start_time;
+    instance->model.stop_time = stop_time;
+    return STATUS_OK;
+}
+
+Status instance_enter_initialisation(Instance *instance)
 {
     if (require_mode(instance, MODE_INSTANTIATED, "entering initialisation") != STATUS_OK)
         return STATUS_ERROR;
-    if (!isfinite(start_time))
-        return instance_tell(instance, STATUS_ERROR, "start time is %g, expected a finite number", start_time);
-    instance->model.time = start_time;
     instance->mode = MODE_INITIALISING;
     return STATUS_OK;
 }
 
 Status instance_exit_initialisation(Instance *instance)
 {
-    if (require_mode(instance, MODE_INITIALISING, "leaving initialisation") != STATUS_OK)
-        return STATUS_ERROR;
-    if (prepare(instance) != STATUS_OK)
+    if (require_mode(instance, MODE_INITIALISING, "leaving initialisation") != STATUS_OK ||
+        prepare(instance) != STATUS_OK)
         return STATUS_ERROR;
     if (!plant_normalise(instance->model.state.rigid))
-        return instance_tell(instance, STATUS_ERROR, "quaternion.e0 … e3 are all zero, expected a direction");
+        return instance_refuse(instance, "quaternion.e0 to e3 have length 0, expected a direction");
     instance->mode = MODE_STEPPING;
     instance->outdated = true;
     return STATUS_OK;
@@ -185,7 +196,7 @@ Status instance_get_reals(Instance *instance, const unsigned references[], size_
     update_outputs(instance);
     for (size_t i = 0; i < n; i++) {
         if (references[i] >= N_REALS)
-            return instance_tell(instance, STATUS_ERROR, "value reference %u is no real variable", references[i]);
+            return instance_refuse(instance, "value reference %u is no real variable", references[i]);
         values[i] = *real_at(&instance->model, &REALS[references[i]]);
     }
     return STATUS_OK;
@@ -194,7 +205,7 @@ Status instance_get_reals(Instance *instance, const unsigned references[], size_
 Status instance_get_flag(Instance *instance, unsigned reference, bool *value)
 {
     if (reference < N_REALS || reference >= N_REALS + N_FLAGS)
-        return instance_tell(instance, STATUS_ERROR, "value reference %u is no Boolean variable", reference);
+        return instance_refuse(instance, "value reference %u is no Boolean variable", reference);
     update_outputs(instance);
     *value = *(const int *)((const char *)&instance->model + FLAGS[reference - N_REALS].offset) != 0;
     return STATUS_OK;
@@ -203,17 +214,17 @@ Status instance_get_flag(Instance *instance, unsigned reference, bool *value)
 static Status check_value(const Instance *instance, unsigned reference, double value)
 {
     if (reference >= N_REALS)
-        return instance_tell(instance, STATUS_ERROR, "value reference %u is no real variable", reference);
+        return instance_refuse(instance, "value reference %u is no real variable", reference);
 
     const Variable *v = &REALS[reference];
     if (v->role == OUTPUT || v->role == TIME)
-        return instance_tell(instance, STATUS_ERROR, "%s: is calculated and cannot be set", v->name);
+        return instance_refuse(instance, "%s: is calculated and cannot be set", v->name);
     if (v->role == STATE && require_mode(instance, MODE_INSTANTIATED | MODE_INITIALISING, v->name) != STATUS_OK)
         return STATUS_ERROR;
     if (!isfinite(value))
-        return instance_tell(instance, STATUS_ERROR, "%s = %g refused: not a finite number", v->name, value);
+        return instance_refuse(instance, "%s = %g refused: not a finite number", v->name, value);
     if (value < v->min || value > v->max)
-        return instance_tell(instance, STATUS_ERROR, "%s = %.9g refused: outside [%.9g, %.9g]", v->name, value, v->min,
+        return instance_refuse(instance, "%s = %.9g refused: outside [%.9g, %.9g]", v->name, value, v->min,
                              v->max);
     return STATUS_OK;
 }
@@ -237,44 +248,67 @@ Status instance_set_reals(Instance *instance, const unsigned references[], size_
 
 /* ---- stepping ---------------------------------------------------------------------------------------------- */
 
-static bool state_is_finite(const State *state)
+/* Returns NULL, or the first state variable that is not within its range. */
+static const Variable *stray_state(Model *model)
 {
-    for (int i = 0; i < N_RIGID; i++)
-        if (!isfinite(state->rigid[i]))
-            return false;
-    return true;
+    for (int i = 0; i < N_REALS; i++) {
+        const double value = *real_at(model, &REALS[i]);
+        if (REALS[i].role == STATE && !(value >= REALS[i].min && value <= REALS[i].max))
+            return &REALS[i];
+    }
+    return NULL;
+}
+
+/* Whether a step from `time` fits the experiment. Masters add up their time: they are allowed their rounding. */
+static Status check_step(const Instance *instance, double time, double step)
+{
+    const Model *m = &instance->model;
+    const double rounding = 1e-3 * step + 1e-9 * fabs(m->time);
+
+    if (!isfinite(step) || step <= 0.0 || m->time + step == m->time)
+        return instance_refuse(instance, "step size is %g s, expected a positive number", step);
+    if (!(fabs(time - m->time) <= rounding))
+        return instance_refuse(instance, "step from t = %.12g s, but the plant is at %.12g s", time, m->time);
+    if (time + step > m->stop_time + rounding)
+        return instance_refuse(instance, "step to t = %.12g s is beyond the stop time of %.12g s", time + step,
+                               m->stop_time);
+    if (step / m->plant.parameters.substep > MAX_SUBSTEPS)
+        return instance_refuse(instance, "step of %g s needs more than %d substeps of %g s", step, MAX_SUBSTEPS,
+                               m->plant.parameters.substep);
+    return STATUS_OK;
 }
 
 Status instance_step(Instance *instance, double time, double step)
 {
     Model *m = &instance->model;
 
-    if (require_mode(instance, MODE_STEPPING, "stepping") != STATUS_OK || prepare(instance) != STATUS_OK)
+    if (require_mode(instance, MODE_STEPPING, "stepping") != STATUS_OK || prepare(instance) != STATUS_OK ||
+        check_step(instance, time, step) != STATUS_OK)
         return STATUS_ERROR;
-    if (!isfinite(step) || step <= 0.0)
-        return instance_tell(instance, STATUS_ERROR, "step size is %g s, expected a positive number", step);
-    /* masters add up their time: allow them their rounding, but no other time */
-    if (!(fabs(time - m->time) <= 1e-3 * step + 1e-9 * fabs(m->time)))
-        return instance_tell(instance, STATUS_ERROR, "step from t = %.12g s, but the plant is at %.12g s", time, m->time);
-    const double count = ceil(step / m->plant.parameters.substep - 1e-9);
-    if (count > MAX_SUBSTEPS)
-        return instance_tell(instance, STATUS_ERROR, "step of %g s needs more than %d substeps of %g s", step,
-                             MAX_SUBSTEPS, m->plant.parameters.substep);
 
-    const int n = count < 1.0 ? 1 : (int)count;
+    /* whole substeps, however the step was rounded */
+    const int n = (int)fmax(1.0, ceil(step / m->plant.parameters.substep - 1e-9));
     const double h = step / n;
-    State next = m->state;
+    const State before = m->state;
     Actuators target;
 
     plant_limit(&m->plant, &m->inputs, &target, m->outputs.thrust_cut, &m->outputs.wrench_cut);
     for (int i = 0; i < n; i++)
-        plant_step(&m->plant, &target, h, &next);
-    if (!state_is_finite(&next))
-        return instance_tell(instance, STATUS_ERROR,
-                             "the state grows beyond all numbers in the step from t = %.9g s of %g s: not taken", time,
-                             step);
+        if (!plant_step(&m->plant, &target, h, &m->state)) {
+            m->state = before;
+            return instance_refuse(instance,
+                                   "step from t = %.9g s not taken: integration steps of %g s are too long for these "
+                                   "forces and this damping (parameter substep)",
+                                   time, h);
+        }
+    const Variable *stray = stray_state(m);
+    if (stray) {
+        const double value = *real_at(m, stray);
+        m->state = before;
+        return instance_refuse(instance, "step from t = %.9g s not taken: %s becomes %.9g, outside [%.9g, %.9g]", time,
+                               stray->name, value, stray->min, stray->max);
+    }
 
-    m->state = next;
     m->time = time + step;
     instance->outdated = true;
     return STATUS_OK;

@@ -31,6 +31,7 @@ typedef struct {
         int wrench_cut;
     } outputs;
     double time;
+    double stop_time; /* INFINITY if there is none */
 } Model; /* plain data: all that an FMU state holds */
 
 typedef struct Instance Instance;
@@ -41,7 +42,6 @@ struct Instance {
     Mode mode;
     bool unprepared;      /* parameters changed since plant_prepare */
     bool outdated;        /* outputs are older than the state, the inputs or the parameters */
-    bool logging;         /* of messages below STATUS_ERROR; errors are always told */
     char *name;
     LogCallback *log;
     void *environment;    /* of the importer, */
@@ -49,14 +49,16 @@ struct Instance {
 };
 
 Instance *instance_create(const char *name, const char *token, LogCallback *log, void *environment,
-                          void (*logger)(void), bool logging);
+                          void (*logger)(void));
 void instance_free(Instance *instance);
 
 Status instance_get_reals(Instance *instance, const unsigned references[], size_t n, double values[]);
 Status instance_set_reals(Instance *instance, const unsigned references[], size_t n, const double values[]);
 Status instance_get_flag(Instance *instance, unsigned reference, bool *value);
 
-Status instance_enter_initialisation(Instance *instance, double start_time);
+/* Sets the experiment's times; a stop time of INFINITY is none. */
+Status instance_set_experiment(Instance *instance, double start_time, double stop_time);
+Status instance_enter_initialisation(Instance *instance);
 Status instance_exit_initialisation(Instance *instance);
 Status instance_step(Instance *instance, double time, double step);
 Status instance_terminate(Instance *instance);
@@ -65,7 +67,8 @@ Status instance_reset(Instance *instance);
 /* Status of a function that this FMU does not offer. */
 Status instance_unsupported(Instance *instance, const char *function);
 
-/* Logs a message in printf's manner and returns the status, so that a check is one line. */
-Status instance_tell(const Instance *instance, Status status, const char *format, ...);
+/* Logs an error in printf's manner, whether logging is on or off, and returns STATUS_ERROR, so that a check is one line.
+ * Nothing but errors is logged. */
+Status instance_refuse(const Instance *instance, const char *format, ...);
 
 #endif

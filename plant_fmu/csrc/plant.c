@@ -92,10 +92,6 @@ const char *plant_prepare(Plant *plant)
     Parameters *p = &plant->parameters;
     double L[6][6];
 
-    for (int i = 0; i < N_THRUSTERS; i++)
-        if (p->thrust_min[i] > p->thrust_max[i])
-            return "thrust_min is above thrust_max";
-
     for (int i = 0; i < 6; i++)
         for (int j = 0; j < i; j++)
             p->added_mass[i][j] = p->added_mass[j][i];
@@ -202,6 +198,22 @@ void plant_derivative(const Plant *plant, const double rigid[N_RIGID], const dou
     multiply6(plant->derived.mass_inverse, wrench, rate + 7);
 }
 
+double plant_damping_rate(const Plant *plant, const double rigid[N_RIGID])
+{
+    const Parameters *p = &plant->parameters;
+    double R[3][3], rate = 0.0;
+
+    rotation(rigid + 3, R);
+    for (int i = 0; i < 6; i++) {
+        double nu_r = rigid[7 + i];
+        if (i < 3)
+            nu_r -= R[0][i] * p->current[0] + R[1][i] * p->current[1] + R[2][i] * p->current[2];
+        const double slope = p->linear_damping[i] + 2.0 * p->quadratic_damping[i] * fabs(nu_r);
+        rate = fmax(rate, slope * plant->derived.mass_inverse[i][i]);
+    }
+    return rate;
+}
+
 /* ---- actuators --------------------------------------------------------------------------------------------- */
 
 void plant_limit(const Plant *plant, const Inputs *inputs, Actuators *target, int thrust_cut[N_THRUSTERS],
@@ -256,7 +268,7 @@ static void advance(const double from[N_RIGID], const double rate[N_RIGID], doub
         to[i] = from[i] + h * rate[i];
 }
 
-void plant_step(const Plant *plant, const Actuators *target, double h, State *state)
+int plant_step(const Plant *plant, const Actuators *target, double h, State *state)
 {
     Actuators middle, end;
     double tau_start[6], tau_middle[6], tau_end[6];
@@ -281,7 +293,8 @@ void plant_step(const Plant *plant, const Actuators *target, double h, State *st
     for (int i = 0; i < N_RIGID; i++)
         state->rigid[i] += h / 6.0 * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i]);
     state->actuators = end;
-    plant_normalise(state->rigid);
+    /* beyond h * rate = 2.785 the method grows what it should damp, and may still look well */
+    return plant_normalise(state->rigid) && h * plant_damping_rate(plant, state->rigid) < 2.5;
 }
 
 int plant_normalise(double rigid[N_RIGID])
@@ -289,7 +302,7 @@ int plant_normalise(double rigid[N_RIGID])
     double *e = rigid + 3;
     const double norm = sqrt(e[0] * e[0] + e[1] * e[1] + e[2] * e[2] + e[3] * e[3]);
 
-    if (!(norm > 1e-6))
+    if (!(norm > 1e-6 && norm < 1e6))
         return 0;
     for (int i = 0; i < 4; i++)
         e[i] /= norm;
@@ -298,9 +311,10 @@ int plant_normalise(double rigid[N_RIGID])
 
 void plant_euler(const double e[4], double euler[3])
 {
-    const double sine = 2.0 * (e[0] * e[2] - e[3] * e[1]);
+    double R[3][3];
 
-    euler[0] = atan2(2.0 * (e[0] * e[1] + e[2] * e[3]), 1.0 - 2.0 * (e[1] * e[1] + e[2] * e[2]));
-    euler[1] = asin(fmin(fmax(sine, -1.0), 1.0));
-    euler[2] = atan2(2.0 * (e[0] * e[3] + e[1] * e[2]), 1.0 - 2.0 * (e[2] * e[2] + e[3] * e[3]));
+    rotation(e, R);
+    euler[0] = atan2(R[2][1], R[2][2]);
+    euler[1] = atan2(-R[2][0], hypot(R[2][1], R[2][2]));
+    euler[2] = atan2(R[1][0], R[0][0]);
 }

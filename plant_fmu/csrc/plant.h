@@ -58,8 +58,11 @@ typedef struct {
 /* Computes the derived constants. Returns NULL, or what is wrong with the parameters. */
 const char *plant_prepare(Plant *plant);
 
-/* Scales the quaternion to unit length. Returns 0 if it has none to scale. */
+/* Scales the quaternion to unit length. Returns 0 if it has none to scale, or is not finite. */
 int plant_normalise(double rigid[N_RIGID]);
+
+/* The fastest rate at which damping now makes a velocity decay, 1/s: what bounds the step of the integration. */
+double plant_damping_rate(const Plant *plant, const double rigid[N_RIGID]);
 
 /* Time derivative of the rigid-body state under the body wrench tau. */
 void plant_derivative(const Plant *plant, const double rigid[N_RIGID], const double tau[6], double rate[N_RIGID]);
@@ -74,10 +77,11 @@ void plant_lag(const Plant *plant, const Actuators *start, const Actuators *targ
 /* The wrench that all actuators together put on the body. */
 void plant_wrench(const Plant *plant, const Actuators *actuators, double tau[6]);
 
-/* Advances the state by h with one Runge-Kutta step of order four, the commands being held. */
-void plant_step(const Plant *plant, const Actuators *target, double h, State *state);
+/* Advances the state by h with one Runge-Kutta step of order four, the commands being held. Returns 0 if the state has
+ * no numbers, or h is beyond what the integration can follow. */
+int plant_step(const Plant *plant, const Actuators *target, double h, State *state);
 
-/* Roll, pitch, yaw (zyx) of a unit quaternion. */
+/* Roll, pitch, yaw (zyx) of a quaternion. */
 void plant_euler(const double quaternion[4], double euler[3]);
 
 #endif

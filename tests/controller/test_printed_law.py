@@ -28,7 +28,10 @@ def textbook(e, e_d, nu, f, df, gs, dgs, alphas, phi):
     R = Rotation.from_quat(np.roll(e, -1)).as_matrix()
     e_p = max(0.0, f) * df
     e_s = sum(
-        (alpha / GAINS.k_q * max(0.0, g) * dg / np.linalg.norm(dg) for g, dg, alpha in zip(gs, dgs, alphas, strict=True)),
+        (
+            alpha / GAINS.k_q * max(0.0, g) * dg / np.linalg.norm(dg)
+            for g, dg, alpha in zip(gs, dgs, alphas, strict=True)
+        ),
         start=np.zeros(3),
     )
     between = Rotation.from_quat(np.roll(e_d, -1)).inv() * Rotation.from_quat(np.roll(e, -1))

@@ -47,7 +47,7 @@ def test_skew_is_the_cross_product(a, b):
 def test_properties_of_the_kinematic_matrix(e):
     """(8)."""
     E = q.kinematic_matrix(e)
-    assert E.T @ E == pytest.approx(np.eye(3), abs=1e-14)
+    assert pytest.approx(np.eye(3), abs=1e-14) == E.T @ E
     assert E.T @ e == pytest.approx(np.zeros(3), abs=1e-14)
 
 
@@ -56,7 +56,9 @@ def test_rates_turn_the_matrix_as_the_body_turns(e, omega):
     """Rdot = R S(w), which decides the sign in (3)."""
     h = 1e-6
     ahead, behind = (e + s * h * q.rate(e, omega) for s in (1, -1))
-    R_dot = (q.rotation_matrix(ahead / np.linalg.norm(ahead)) - q.rotation_matrix(behind / np.linalg.norm(behind))) / (2 * h)
+    R_dot = (q.rotation_matrix(ahead / np.linalg.norm(ahead)) - q.rotation_matrix(behind / np.linalg.norm(behind))) / (
+        2 * h
+    )
     assert R_dot == pytest.approx(q.rotation_matrix(e) @ q.skew(omega), abs=1e-8)
     assert q.angular_velocity(e, q.rate(e, omega)) == pytest.approx(omega, abs=1e-14)  # (9)
 

@@ -51,7 +51,9 @@ def at(shape, p, keep="in"):
     """Return g, its gradient and the clearance."""
     packed = pack([Region("r", shape, keep)])
     values, gradients, clearances = np.empty(1), np.empty((1, 3)), np.empty(1)
-    evaluate(np.asarray(p, float), packed.kinds, packed.signs, packed.offsets, packed.numbers, values, gradients, clearances)
+    evaluate(
+        np.asarray(p, float), packed.kinds, packed.signs, packed.offsets, packed.numbers, values, gradients, clearances
+    )
     return values[0], gradients[0], clearances[0]
 
 
@@ -233,7 +235,9 @@ def test_regions_that_cannot_be_are_named(make, words):
 def test_no_regions_at_all_is_a_scene_too():
     packed = pack([])
     nothing = np.empty(0)
-    evaluate(np.zeros(3), packed.kinds, packed.signs, packed.offsets, packed.numbers, nothing, np.empty((0, 3)), nothing)
+    evaluate(
+        np.zeros(3), packed.kinds, packed.signs, packed.offsets, packed.numbers, nothing, np.empty((0, 3)), nothing
+    )
 
 
 @pytest.mark.parametrize("cls", SHAPES.values())

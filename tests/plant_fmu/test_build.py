@@ -1,6 +1,7 @@
 """Building FMUs, and refusing to."""
 
 import os
+import shutil
 import sys
 from pathlib import Path
 
@@ -23,9 +24,20 @@ def written(tmp_path, *changes):
     return path
 
 
-def test_two_builds_give_the_same_bytes(tmp_path, fmi):
-    files = [build_fmu(load_vehicle("odin"), fmi, tmp_path / name) for name in ("a.fmu", "b.fmu")]
-    assert files[0].read_bytes() == files[1].read_bytes()
+@pytest.mark.parametrize("compiler", ["cc", "ziglang"])
+def test_two_builds_give_the_same_bytes(tmp_path, fmi, compiler, monkeypatch):
+    if compiler == "ziglang":
+        pytest.importorskip("ziglang", reason="the build extra is not installed")
+        monkeypatch.setenv("PATH", str(tmp_path))
+        monkeypatch.delenv("CC", raising=False)
+    elif shutil.which("cc") is None:
+        pytest.skip("there is no cc")
+    contents = []
+    for name in ("one", "another"):  # in folders of different names
+        (tmp_path / name).mkdir()
+        monkeypatch.setattr("tempfile.tempdir", str(tmp_path / name))
+        contents.append(build_fmu(load_vehicle("odin"), fmi, tmp_path / f"{name}.fmu").read_bytes())
+    assert contents[0] == contents[1]
 
 
 def test_command_line_builds(tmp_path, capsys):
@@ -49,13 +61,22 @@ def test_command_line_lists(capsys):
         (("mass = 125.0 ", "# "), ("rigid_body", "missing", "mass")),
         (("inertia = [8.0, 8.0, 8.0]", "inertia = [8.0, 8.0]"), ("rigid_body.inertia", "3 by 3")),
         (("inertia = [8.0, 8.0, 8.0]", "inertia = [8.0, 8.0, nan]"), ("inertia", "finite")),
-        (("[62.5, 62.5, 62.5, 0.0, 0.0, 0.0]", "[-200.0, 62.5, 62.5, 0.0, 0.0, 0.0]"), ("added mass", "positive definite")),
+        (
+            ("[62.5, 62.5, 62.5, 0.0, 0.0, 0.0]", "[-200.0, 62.5, 62.5, 0.0, 0.0, 0.0]"),
+            ("added mass", "positive definite"),
+        ),
         (("[0.508, -0.508, 0.508, -0.508, 0, 0, 0, 0],", ""), ("thrusters.matrix", "5 rows", "6 rows")),
         (("[0.508, -0.508, 0.508, -0.508, 0, 0, 0, 0],", "[0.508],"), ("thrusters.matrix", "6 rows")),
         (("force_min = -27.0 ", "force_min = [-27.0, -27.0] "), ("force_min", "2 numbers", "8")),
         (("force_min = -27.0 ", "force_min = 28.0 "), ("force_min", "force_max")),
-        (("[48.0, 48.0, 48.0, 80.0, 80.0, 80.0]", "[48.0, -48.0, 48.0, 80.0, 80.0, 80.0]"), ("quadratic_damping", "-48")),
+        (
+            ("[48.0, 48.0, 48.0, 80.0, 80.0, 80.0]", "[48.0, -48.0, 48.0, 80.0, 80.0, 80.0]"),
+            ("quadratic_damping", "-48"),
+        ),
         (('name = "odin"', 'name = "my boat"'), ("name", "my boat")),
+        (('title = "ODIN', 'title = "\\u0001 ODIN'), ("title", "printable")),
+        (("mass = 125.0 ", "mass = 1e-4 "), ("mass", "0.0001", "0.001 to 1e+09")),
+        (("force_max = 27.0 ", "force_max = 2e9 "), ("thrust_max[1]", "2e+09")),
         (("[hydrostatics]", "[hydrostatics"), ("TOML",)),
     ],
 )
@@ -63,12 +84,13 @@ def test_bad_vehicles_are_named_in_one_line(tmp_path, capsys, change, words):
     out = tmp_path / "boat.fmu"
     path = written(tmp_path, change)
     with pytest.raises((VehicleError, TableError)):
-        load_vehicle(path)
+        build_fmu(load_vehicle(path), 3, out)
     assert main(["build", "--vehicle", str(path), "--out", str(out)]) == 2
     said = capsys.readouterr().err
     assert said.count("\n") == 1
-    for word in ("boat.toml", *words):
+    for word in words:
         assert word in said
+    assert "boat.toml" in said or "odin: " in said  # the file, or the vehicle that it names
     assert not out.exists()
 
 
@@ -89,11 +111,35 @@ def test_missing_compiler_is_one_line(tmp_path, capsys, monkeypatch):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_failing_compiler_leaves_nothing(tmp_path, monkeypatch):
-    monkeypatch.setenv("CC", f"{sys.executable} -c raise(SystemExit('error:_no_luck'))")
-    with pytest.raises(BuildError, match="no_luck"):
+@pytest.mark.parametrize(
+    ("compiler", "words"),
+    [
+        (f"{sys.executable} -c raise(SystemExit('error:_no_luck'))", "no_luck"),
+        (f"{sys.executable} -c pass", "no library"),
+        ("gcc 'x", "quotation"),
+        ("no-such-compiler", "not on the PATH"),
+    ],
+)
+def test_failing_compiler_leaves_nothing(tmp_path, monkeypatch, compiler, words):
+    monkeypatch.setenv("CC", compiler)
+    with pytest.raises(BuildError, match=words):
         build_fmu(load_vehicle("odin"), 3, tmp_path / "x.fmu")
     assert list(tmp_path.iterdir()) == []
+
+
+def test_machines_without_a_name_in_fmi_are_refused(tmp_path, monkeypatch):
+    monkeypatch.setattr("platform.machine", lambda: "riscv64")
+    with pytest.raises(BuildError, match="riscv64"):
+        build_fmu(load_vehicle("odin"), 3, tmp_path / "x.fmu")
+
+
+def test_only_files_are_replaced(tmp_path):
+    (tmp_path / "folder").mkdir()
+    os.mkfifo(tmp_path / "pipe")
+    for name in ("folder", "pipe"):
+        with pytest.raises(BuildError, match=r"is no file"):
+            build_fmu(load_vehicle("odin"), 3, tmp_path / name)
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["folder", "pipe"]
 
 
 def test_unwritable_place_is_one_line(tmp_path, capsys):

@@ -34,8 +34,7 @@ def mass_matrices():
     return rigid, ADDED
 
 
-START = {"quaternion.e0": 0.6, "quaternion.e1": 0.5, "quaternion.e2": -0.4, "quaternion.e3": 0.48,
-         "velocity.u": 0.7, "velocity.v": -0.3, "velocity.w": 0.4, "velocity.p": 0.5, "velocity.q": -0.6, "velocity.r": 0.3}  # fmt: skip
+START = dict(zip(STATES[3:], (0.6, 0.5, -0.4, 0.48, 0.7, -0.3, 0.4, 0.5, -0.6, 0.3), strict=True))
 
 
 def test_follows_fossens_matrix_equation_with_nothing_symmetric(make_slave, fmi):
@@ -57,7 +56,9 @@ def test_follows_fossens_matrix_equation_with_nothing_symmetric(make_slave, fmi)
         nu_c_dot = np.r_[-np.cross(nu[3:], v_c), 0, 0, 0]
         k = R.T @ [0, 0, 1]
         g = -np.r_[(196.2 - 199.0) * k, np.cross(R_G * 196.2 - R_B * 199.0, k)]
-        force = tau - C(M_RB, nu) @ nu - C(M_A, nu_r) @ nu_r - (linear + quadratic * abs(nu_r)) * nu_r - g + M_A @ nu_c_dot
+        force = (
+            tau - C(M_RB, nu) @ nu - C(M_A, nu_r) @ nu_r - (linear + quadratic * abs(nu_r)) * nu_r - g + M_A @ nu_c_dot
+        )
         w = nu[3:]
         e_dot = 0.5 * np.r_[-e[1:] @ w, e[0] * w + np.cross(e[1:], w)]
         return np.r_[R @ nu[:3], e_dot, np.linalg.solve(M_RB + M_A, force)]
@@ -138,8 +139,14 @@ def test_drifts_with_the_current(make_slave):
     assert slave.get("position.x", "position.y", "position.z") == pytest.approx([4.0, -3.0, 2.0], abs=1e-12)
 
 
-def test_euler_angles_are_those_of_the_quaternion(make_slave):
-    slave = make_slave().start(**START)
+@pytest.mark.parametrize("initialised", [True, False])
+def test_euler_angles_are_those_of_the_quaternion(make_slave, initialised):
+    """Also while the quaternion is not normalised yet."""
+    slave = make_slave()
+    if initialised:
+        slave.start(**START)
+    else:
+        slave.set_values({name: 0.5 * value for name, value in START.items()})
     e = slave.get(*STATES[3:7])
     yaw, pitch, roll = Rotation.from_quat(np.roll(e, -1)).as_euler("ZYX")
     assert slave.get("attitude.roll", "attitude.pitch", "attitude.yaw") == pytest.approx([roll, pitch, yaw], abs=1e-12)

@@ -53,7 +53,7 @@ def test_mass_matrix_must_be_positive_definite(make_slave, fmi):
 def test_a_tunable_parameter_that_makes_no_vehicle_stops_the_step(make_slave, fmi):
     slave = make_slave(fmi=fmi).start()
     slave.set_values({"thrust_min[1]": 30.0})
-    refused(slave, lambda: slave.step(0.1), "thrust_min is above thrust_max")
+    refused(slave, lambda: slave.step(0.1), "thrust_min[1] = 30 is above thrust_max[1] = 27")
 
 
 def test_quaternion_must_have_a_direction(make_slave, fmi):
@@ -87,14 +87,51 @@ def test_steps_start_where_the_plant_is(make_slave, fmi):
     refused(slave, lambda: slave.fmu.doStep(5.0, 0.1), "the plant is at 0")
 
 
-def test_a_state_that_explodes_is_not_taken(make_slave, fmi):
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"wrench.X": 9e8}, "substep"),
+        ({"wrench.K": 1e5}, "substep"),  # finite and within range, yet wrong: the damping outruns the step
+        ({"wrench.K": 2.99e6}, "substep"),
+        ({"wrench.K": 1e9}, "substep"),
+        ({"linear_damping[1]": 2e5, "wrench.X": 10.0}, "substep"),
+    ],
+)  # fmt: skip
+def test_a_step_that_cannot_be_right_is_not_taken(make_slave, fmi, change, words):
     slave = make_slave("bluerov2_heavy", fmi).start()
-    slave.set_values({"wrench.X": 9e8})
+    rest = dict(zip(change, slave.get(*change), strict=True))
+    slave.set_values(change)
     before = slave.get(*STATES)
-    refused(slave, lambda: slave.fmu.doStep(0.0, 1.0), "not taken")
+    refused(slave, lambda: slave.fmu.doStep(0.0, 0.05), "not taken", words)
     assert slave.get(*STATES) == before
-    slave.set_values({"wrench.X": 0.0})
-    slave.fmu.doStep(0.0, 1.0)  # and goes on
+    slave.set_values(rest)
+    slave.fmu.doStep(0.0, 0.05)  # and goes on
+
+
+def test_a_step_that_leaves_the_range_is_not_taken(make_slave, fmi):
+    slave = make_slave(fmi=fmi).start(**{"position.x": 999_999.0, "velocity.u": 100.0})
+    refused(slave, lambda: slave.step(0.1), "position.x becomes 10000", "outside [-1000000, 1000000]")
+    assert slave.get("position.x") == [999_999.0]
+
+
+def test_no_step_beyond_the_stop_time(make_slave):
+    slave = make_slave(fmi=3)
+    slave.fmu.enterInitializationMode(startTime=0.0, stopTime=0.02)
+    slave.fmu.exitInitializationMode()
+    slave.step(0.01)
+    slave.step(0.01 * (1 + 1e-9))  # a master's rounding
+    refused(slave, lambda: slave.step(0.01), "stop time")
+
+
+def test_times_that_cannot_be_are_refused(make_slave):
+    slave = make_slave(fmi=2)
+    refused(slave, lambda: slave.fmu.setupExperiment(startTime=math.nan), "start time")
+    refused(slave, lambda: slave.fmu.setupExperiment(startTime=1.0, stopTime=0.5), "stop time")
+
+
+def test_reading_nothing_is_no_fault(make_slave):
+    assert make_slave(fmi=2).fmu.getInteger([]) == []
+    assert make_slave(fmi=3).fmu.getInt32([]) == []
 
 
 def test_no_stepping_before_initialisation(make_slave, fmi):

@@ -1,0 +1,35 @@
+# make run    the paper's scenario, from nothing to a report
+# make test   all fast tests
+# make lint   formatter, linter and type checker
+PYTHON ?= python3
+VENV ?= .venv
+BIN := $(VENV)/bin
+comma := ,
+# without a C compiler the ziglang package is one
+EXTRAS := mavlink,dev$(if $(shell command -v cc),,$(comma)build)
+PYTEST_FLAGS ?=
+
+.PHONY: run test lint bench clean
+
+run: $(VENV)/ready
+	$(BIN)/cosim run paper
+
+test: $(VENV)/ready
+	$(BIN)/python -m pytest -q $(PYTEST_FLAGS)
+
+lint: $(VENV)/ready
+	$(BIN)/ruff format --check .
+	$(BIN)/ruff check .
+	$(BIN)/mypy
+
+bench: $(VENV)/ready
+	$(BIN)/python -m benchmarks step
+
+$(VENV)/ready: pyproject.toml
+	$(PYTHON) -c 'import sys; sys.exit(None if sys.version_info >= (3, 11) else "Python 3.11 or later is needed")'
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[$(EXTRAS)]'
+	touch $@
+
+clean:
+	rm -rf $(VENV)

@@ -1,0 +1,7 @@
+"""``python -m cosim``: the same as the ``cosim`` command."""
+
+import sys
+
+from cosim.cli import main
+
+sys.exit(main())

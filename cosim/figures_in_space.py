@@ -1,0 +1,131 @@
+"""Where the vehicle went: its path among the regions, in space and in the planes."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+
+from controller.regions import Region, clearances_at
+from cosim.drawing import BLACK, PATH_COLOUR, POINTS, Story, overlap_of, regions_of
+from cosim.record import Record
+from cosim.scenario import Scenario
+from cosim.signals import Array
+
+_GRID = 140  # points a side, where outlines of regions are searched
+_SLICES = 41  # along the line of sight
+
+
+def path_3d(story: Story) -> Figure:
+    """Draw the path, regions and goal in space."""
+    scenario, record = story.scenario, story.record
+    figure = Figure(figsize=(6.8, 4.6))
+    ax: Any = figure.add_axes((0.0, 0.02, 1.0, 0.94), projection="3d")
+    low, high = _extent(scenario, record)
+    wide = np.maximum(high - low, 0.4 * (high - low).max())  # a flat path still gets a box with some depth
+    middle = (low + high) / 2.0
+    low, high = middle - wide / 2.0, middle + wide / 2.0
+    rng = np.random.default_rng(0)
+    for region, colour in regions_of(scenario):
+        points = _surface_points(region, low, high, rng)
+        if points.size:
+            ax.scatter(*points.T, s=3.0, color=colour, alpha=0.45, linewidths=0, rasterized=True)
+            ax.plot([], [], [], "o", color=colour, label=region.name)
+    path = record.stack(["position.x", "position.y", "position.z"])
+    ax.plot(*_thin_path(path).T, color=PATH_COLOUR, label="path")
+    ax.plot(*path[0][:, None], marker="x", color=BLACK, markersize=8, mew=2, linestyle="none", label="X start")
+    overlap = overlap_of(story)
+    if overlap.any():
+        inside = path[overlap]
+        ax.plot(*inside.T, color=BLACK, linewidth=3, label="I overlap")
+        ax.text(*(inside[len(inside) // 2] + [0.0, 0.0, -0.12 * wide[2]]), "I", fontweight="bold", ha="center")
+    ax.set(xlabel="north x [m]", ylabel="east y [m]", zlabel="depth z [m]")
+    ax.set_xlim(low[0], high[0])
+    ax.set_ylim(low[1], high[1])
+    ax.set_zlim(high[2], low[2])
+    ax.yaxis.set_major_locator(MaxNLocator(4))
+    ax.set_box_aspect(wide, zoom=1.12)
+    ax.view_init(elev=20, azim=-70)
+    figure.legend(loc="upper center", ncols=8)
+    return figure
+
+
+def path_plane(story: Story) -> Figure:
+    """Draw the path and the silhouettes of the regions in the vertical and the horizontal plane."""
+    scenario, record = story.scenario, story.record
+    low, high = _extent(scenario, record)
+    side, top = high[2] - low[2], high[1] - low[1]
+    figure = Figure(figsize=(6.8, 2.0 + 6.0 * (side + top) / (high[0] - low[0])), layout="constrained")
+    axes = figure.subplots(2, 1, sharex=True, height_ratios=[side, top])
+    for ax, vertical, other, label in zip(axes, (2, 1), (1, 2), ("depth z [m]", "east y [m]"), strict=True):
+        u, v = np.linspace(low[0], high[0], _GRID), np.linspace(low[vertical], high[vertical], _GRID)
+        for region, colour in regions_of(scenario):
+            inside = _silhouette(region, u, v, vertical, np.linspace(low[other], high[other], _SLICES))
+            if inside.max() > 0.0 > inside.min():
+                ax.contourf(u, v, inside, levels=[0.0, np.inf], colors=[colour], alpha=0.15)
+                ax.contour(u, v, inside, levels=[0.0], colors=[colour], linewidths=1.2)
+        ax.plot(*_thin_path(record.stack(["position.x", f"position.{'xyz'[vertical]}"])).T, color=PATH_COLOUR)
+        ax.plot(record["position.x"][0], record[f"position.{'xyz'[vertical]}"][0], "x", color=BLACK, mew=2)
+        ax.set_ylabel(label)
+        ax.set_xlim(low[0], high[0])
+        ax.set_ylim(low[vertical], high[vertical])
+        ax.set_aspect("equal")
+        overlap = overlap_of(story)
+        if overlap.any():
+            x, w = record["position.x"][overlap], record[f"position.{'xyz'[vertical]}"][overlap]
+            ax.plot(x, w, color=BLACK, linewidth=3)
+    axes[0].invert_yaxis()
+    axes[1].set_xlabel("north x [m]")
+    for region, colour in regions_of(scenario):
+        axes[0].plot([], [], "s", color=colour, alpha=0.5, label=region.name)
+    axes[0].plot([], [], color=PATH_COLOUR, label="path")
+    axes[0].plot([], [], "x", color=BLACK, mew=2, label="start")
+    if overlap_of(story).any():
+        axes[0].plot([], [], color=BLACK, linewidth=3, label="overlap")
+    figure.legend(loc="outside upper center", ncols=7)
+    return figure
+
+
+def _extent(scenario: Scenario, record: Record) -> tuple[Array, Array]:
+    """Return the corners of a box about the path and the goal, with some room."""
+    path = record.stack(["position.x", "position.y", "position.z"])
+    goal = np.array(scenario.goal.bounds())
+    goal = np.where(np.isfinite(goal), goal, path[0])  # an endless goal needs no room
+    points = np.vstack([path, goal])
+    low, high = points.min(axis=0), points.max(axis=0)
+    room = np.maximum(0.06 * (high - low).max(), (1.2 - (high - low)) / 2.0)
+    return low - room, high + room
+
+
+def _silhouette(region: Region, u: Array, v: Array, vertical: int, across: Array) -> Array:
+    """Return how deep each line of sight goes into the shape, shape (len(v), len(u)); below 0 it misses."""
+    other = 3 - vertical
+    points = np.empty((len(across), len(v), len(u), 3))
+    points[..., 0] = u
+    points[..., vertical] = v[:, None]
+    points[..., other] = across[:, None, None]
+    inside = clearances_at(points.reshape(-1, 3), Region(region.name, region.shape, "in"))
+    return np.asarray(inside.reshape(points.shape[:-1]).max(axis=0))
+
+
+def _surface_points(region: Region, low: Array, high: Array, rng: np.random.Generator, n: int = 20000) -> Array:
+    """Return points near the region's surface within the box, at most some hundreds."""
+    lowest, highest = (np.array(corner) for corner in region.shape.bounds())
+    low, high = np.maximum(low, lowest - 0.1), np.minimum(high, highest + 0.1)
+    if (low >= high).any():
+        return np.empty((0, 3))
+    points = rng.uniform(low, high, (n, 3))
+    distance = np.abs(clearances_at(points, region))
+    nearest = np.argsort(distance)[:700]
+    found: Array = points[nearest[distance[nearest] < 0.02 * (high - low).max()]]
+    return found
+
+
+def _thin_path(path: Array) -> Array:
+    """Return about as many points of a path as a figure resolves, evenly spaced along its length."""
+    length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))])
+    wanted = np.searchsorted(length, np.linspace(0.0, length[-1], POINTS))
+    thinned: Array = path[np.unique(np.minimum(wanted, len(path) - 1))]
+    return thinned

@@ -1,0 +1,110 @@
+"""The command: one clear line and exit code 2 for whatever the user must mend."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+from cosim.cli import main
+
+QUICK = ["--set", "arbiter.engine=closed", "--set", "time.duration=0.02"]
+
+
+def test_run_says_what_happened_and_where_to_look(tmp_path, capsys):
+    out = tmp_path / "run"
+    assert main(["run", "paper", "--out", str(out), *QUICK]) == 0
+    said = capsys.readouterr()
+    assert said.out.splitlines()[-1] == str(out / "report.html")
+    assert "never entered the goal region" in said.out
+    assert said.err == ""  # no bar where there is no terminal
+
+
+def test_run_without_out_makes_a_folder_of_its_own(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert main(["run", "paper", *QUICK]) == 0
+    (folder,) = (tmp_path / "runs").iterdir()
+    assert folder.name.startswith("paper-")
+
+
+def test_list_and_show(capsys):
+    assert main(["list"]) == 0
+    assert "paper-limited" in capsys.readouterr().out
+    assert main(["show", "paper", "--set", "limit.force=5"]) == 0
+    assert "force = 5.0" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("arguments", [["--version"], ["--help"], ["run", "--help"]])
+def test_help_and_version(capsys, arguments):
+    with pytest.raises(SystemExit) as left:
+        main(arguments)
+    assert left.value.code == 0
+    assert "cosim" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["run", "papr"], "did you mean 'paper'"),
+        (["run", "paper", "--set", "time.duration=long"], "time.duration"),
+        (["run", "nowhere.toml"], "nowhere.toml"),
+        (["run", "paper", "--set", "plant.parameters.mass=-5"], "mass = -5"),
+        (["run", "paper", "--set", "law.gains.k_p1=1e9"], "wrench"),
+        (["run", "paper", "--out", "/dev/null/run"], "/dev/null/run"),
+        (["run", "paper", "--mavlink", "udpout:192.0.2.1:14550"], "--allow-remote"),
+        (["show", "paper", "--set", "x=1"], "x: unknown key"),
+    ],
+)
+def test_what_the_user_must_mend_is_one_line(tmp_path, capsys, monkeypatch, arguments, words):
+    monkeypatch.chdir(tmp_path)
+    assert main(arguments) == 2
+    said = capsys.readouterr().err
+    assert said.startswith("cosim: ") and said.count("\n") == 1
+    assert words in said
+    assert not any(tmp_path.glob("runs/*"))
+
+
+@pytest.mark.parametrize(
+    "arguments", [[], ["fly"], ["run"], ["run", "paper", "--rate", "-1"], ["run", "paper", "--rat"]]
+)
+def test_wrong_words_exit_with_2(capsys, arguments):
+    with pytest.raises(SystemExit) as left:
+        main(arguments)
+    assert left.value.code == 2
+
+
+def test_missing_compiler_is_one_line(tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr("platformdirs.user_cache_dir", lambda *_, **__: str(tmp_path / "cache"))
+    monkeypatch.setenv("PATH", str(tmp_path))
+    monkeypatch.delenv("CC", raising=False)
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
+    assert main(["run", "paper", "--out", str(tmp_path / "run"), *QUICK]) == 2
+    assert "no C compiler" in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_mavlink_without_pymavlink_is_one_line(tmp_path, capsys, monkeypatch):
+    monkeypatch.setitem(sys.modules, "pymavlink.dialects.v20", None)
+    arguments = ["run", "paper", "--mavlink", "udpout:127.0.0.1:14550", "--out", str(tmp_path / "run"), *QUICK]
+    assert main(arguments) == 2
+    assert "pip install 'subreach[mavlink]'" in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.skipif(os.name != "posix", reason="sends SIGINT")
+def test_ctrl_c_ends_a_real_run_readably(tmp_path):
+    """The process as a user has it: from the start of stepping to a report, no traceback."""
+    out = tmp_path / "run"
+    command = [sys.executable, "-m", "cosim", "run", "paper", "--set", "arbiter.engine=closed",
+               "--set", "time.duration=3000", "--out", str(out)]  # fmt: skip
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    while not (any(out.glob("record.parts/*.parquet")) or process.poll() is not None):
+        time.sleep(0.02)
+    process.send_signal(signal.SIGINT)
+    printed, said = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert "interrupted" in printed
+    assert "Traceback" not in said
+    assert (out / "record.parquet").exists() and (out / "report.html").exists()

@@ -1,0 +1,141 @@
+"""The report: complete, self-contained, and saying no more than the numbers."""
+
+import re
+import struct
+from html.parser import HTMLParser
+from xml.etree import ElementTree as ET
+
+import numpy as np
+import pytest
+
+from cosim.claims import paper_claims
+from cosim.drawing import thin
+from cosim.run import run_scenario
+from cosim.scenario import load_scenario
+
+FIGURES = [
+    "attitude",
+    "clearance",
+    "estimates",
+    "forces",
+    "path-3d",
+    "path-plane",
+    "position-error",
+    "thrusters",
+    "weights",
+]
+VOID = {"meta", "br", "img"}
+
+
+class Checker(HTMLParser):
+    """Collects what a page asks the network for, and whether its tags close."""
+
+    def __init__(self):
+        super().__init__()
+        self.open, self.asked = [], []
+
+    def handle_starttag(self, tag, attributes):
+        if tag not in VOID:
+            self.open.append(tag)
+        for name, value in attributes:
+            if name in ("src", "href", "xlink:href") and value and not value.startswith(("#", "data:")):
+                self.asked.append(value)
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+
+def page_of(run):
+    return (run.folder / "report.html").read_text()
+
+
+@pytest.mark.parametrize("name", ["paper", "paper-limited"])
+def test_page_is_whole_and_needs_no_network(shipped_run, name):
+    page = page_of(shipped_run(name, "arbiter.engine=closed"))
+    checker = Checker()
+    checker.feed(page)
+    assert checker.open == []
+    assert checker.asked == []
+    assert "<script" not in page
+    assert len(page) < 1_000_000
+    assert not re.search(r"\$[a-z]+", page)
+
+
+def test_every_figure_is_there_as_svg_and_png(shipped_run):
+    run = shipped_run("paper", "arbiter.engine=closed")
+    names = sorted([*FIGURES, "weights-overlap"])
+    assert sorted(p.stem for p in run.folder.glob("figures/*.svg")) == names
+    assert page_of(run).count("<figure>") == len(names)
+    for name in names:
+        ET.parse(run.folder / "figures" / f"{name}.svg")
+        png = (run.folder / "figures" / f"{name}.png").read_bytes()
+        assert png[:8] == b"\x89PNG\r\n\x1a\n"
+        width, height = struct.unpack(">II", png[16:24])
+        assert width > 900 and height > 300
+
+
+def test_no_overlap_no_figure_of_it(tmp_path):
+    scenario = load_scenario("paper", ["arbiter.engine=closed", "time.duration=0.05"])
+    run = run_scenario(scenario, tmp_path / "run")
+    assert sorted(p.stem for p in run.folder.glob("figures/*.svg")) == FIGURES
+    assert "Never inside SR1 and SR2" in page_of(run)
+
+
+def test_claims_carry_this_runs_numbers(shipped_run):
+    for name in ("paper", "paper-limited", "paper-calibrated"):
+        scenario = load_scenario(name, ["arbiter.engine=closed"])
+        summary = shipped_run(name, "arbiter.engine=closed").summary
+        reaching, window, avoiding, single, effort, adapting = paper_claims(scenario, summary)
+        (start, end), *_ = summary["intersection_windows"]
+        assert f"{start:.3f} s to {end:.3f} s" in window.measured
+        assert ("Never in" in reaching.measured) == (not summary["reached"])
+        assert ("states neither" in window.why) == (name != "paper")
+        assert f"{summary['min_clearance']['SR1']:+.3f} m" in avoiding.measured
+        assert "At most 1" in single.measured
+        assert "26.82 kN" in effort.measured
+        assert ("Winds up" in adapting.why) == (name != "paper")
+
+
+def test_other_scenarios_are_not_held_against_the_paper(tmp_path):
+    scenario = load_scenario("paper", ["arbiter.engine=closed", "time.duration=0.01", 'compare=""'])
+    assert "Beside the paper" not in page_of(run_scenario(scenario, tmp_path / "run"))
+
+
+def test_names_from_files_are_escaped(tmp_path):
+    scenario = load_scenario("paper", ["time.duration=0.01", 'title="<script>alert(1)</script> & $x"'])
+    page = page_of(run_scenario(scenario, tmp_path / "run"))
+    assert "<script" not in page
+    assert "&lt;script&gt;alert(1)&lt;/script&gt; &amp; $x" in page
+
+
+SHAPES = {
+    "box": '{type="box",centre=[2,0,2],size=[1,1,1]}',
+    "cylinder": '{type="cylinder",start=[2,0,0],end=[2,0,4],radius=0.4}',
+    "ellipsoid": '{type="ellipsoid",centre=[2,0,2],semi_axes=[1,0.5,0.3]}',
+    "half_space": '{type="half_space",point=[6,0,0],normal=[-1,0,0]}',
+    "prism": '{type="prism",corners=[[1,-1],[3,-1],[2,1]],top=1,bottom=3}',
+    "pipe": '{type="pipe",points=[[0,1,1],[2,1,2],[4,1,2]],radius=0.3}',
+    "cone": '{type="cone",feature=[8,0,5],axis=[-1,0,-0.5],half_angle=0.4,range=4}',
+}
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+def test_every_shape_can_be_drawn_and_be_a_goal(tmp_path, shape):
+    overrides = [
+        "arbiter.engine=closed",
+        "time.duration=0.05",
+        f"regions.SR1.shape={SHAPES[shape]}",
+        f"goal={SHAPES[shape]}",
+    ]
+    run = run_scenario(load_scenario("paper", overrides), tmp_path / "run")
+    assert (run.folder / "figures" / "path-3d.png").exists()
+
+
+def test_thinned_curves_keep_their_extremes():
+    time = np.linspace(0.0, 1.0, 100_001)
+    signal = np.sin(40.0 * time)
+    signal[54_321] = 9.0
+    few, thinned = thin(time, signal)
+    assert len(few) < 5000
+    assert thinned.max() == 9.0 and thinned.min() == signal.min()
+    assert few[0] == 0.0 and few[-1] == 1.0

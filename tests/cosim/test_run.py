@@ -1,0 +1,160 @@
+"""Run folders: whole, readable, and complete even after an interruption."""
+
+import json
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+
+from cosim.errors import PlantError, RunError
+from cosim.record import Recorder, load_record
+from cosim.run import run_scenario
+from cosim.scenario import load_scenario
+from cosim.signals import Column
+from cosim.summary import spans
+
+SHORT = ["arbiter.engine=closed", "time.duration=0.3"]
+REQUIRED = {
+    "law", "reached", "reach_time", "settled", "settle_time", "final_position", "intersection_windows", "min_clearance",
+    "max_force", "max_speed", "effort", "estimate_final", "steps", "wall_time", "real_time_factor",
+}  # fmt: skip
+
+
+def test_folder_holds_what_is_promised(shipped_run):
+    folder = shipped_run("paper", "arbiter.engine=closed").folder
+    names = sorted(p.name for p in folder.iterdir())
+    assert names == ["figures", "record.parquet", "report.html", "scenario.toml", "summary.json"]
+    assert json.loads((folder / "summary.json").read_text()).keys() >= REQUIRED
+
+
+def test_record_has_every_signal_with_its_unit(shipped_run):
+    folder = shipped_run("paper", "arbiter.engine=closed").folder
+    schema = pq.read_schema(folder / "record.parquet")
+    units = {f.name: f.metadata[b"unit"].decode() for f in schema}
+    assert all(f.metadata[b"description"] for f in schema)
+    expected = {
+        "time": "s", "position.z": "m", "quaternion.e0": "", "velocity.u": "m/s", "velocity.r": "rad/s",
+        "attitude.yaw": "rad", "thrust[8]": "N", "wrench.K": "N.m", "thruster_force[1]": "N", "actuation.X": "N",
+        "thrust_saturated[1]": "", "wrench_saturated": "", "goal.value": "m2", "goal.clearance": "m", "SR1.value": "m2",
+        "SR3.clearance": "m", "membership.shape": "", "weight.depth": "", "estimate.phi1": "N", "estimate.phi4": "N.m",
+        "command.Z": "N", "command.N": "N.m",
+    }  # fmt: skip
+    assert units.items() >= expected.items()
+    assert load_record(folder).units == units
+
+
+def test_summary_follows_from_the_record(shipped_run):
+    run = shipped_run("paper-limited", "arbiter.engine=closed")
+    record, summary = load_record(run.folder), run.summary
+    force = np.sqrt(sum(record[f"actuation.{a}"] ** 2 for a in "XYZ"))[:-1]
+    assert summary["effort"] == pytest.approx(np.sum(force) * 0.001, rel=1e-12)
+    assert summary["final_position"] == [record[f"position.{a}"][-1] for a in "xyz"]
+    distance = np.sqrt(
+        (record["position.x"] - 2.0) ** 2 + record["position.y"] ** 2 + (record["position.z"] - 1.8) ** 2
+    )
+    assert summary["min_clearance"]["SR1"] == pytest.approx(distance.min() - 0.5, abs=1e-12)
+    assert summary["saturated_time"] == pytest.approx(np.count_nonzero(force > 107.999) * 0.001, abs=0.01)
+
+
+def test_settled_means_inside_for_the_last_ten_seconds(shipped_run):
+    early = shipped_run("paper", "arbiter.engine=closed", "time.duration=20").summary
+    assert early["reached"] and early["settle_time"] == pytest.approx(13.87, abs=0.1) and not early["settled"]
+
+
+def test_spans():
+    time = np.arange(6) * 0.5
+    assert spans(np.array([0, 1, 1, 0, 0, 1], bool), time) == [(0.5, 1.5), (2.5, 2.5)]
+    assert spans(np.array([1, 1, 1, 1, 1, 1], bool), time) == [(0.0, 2.5)]
+    assert spans(np.zeros(6, bool), time) == []
+
+
+def test_a_folder_in_use_is_refused(tmp_path):
+    (tmp_path / "precious").write_text("x")
+    with pytest.raises(RunError, match="not empty"):
+        run_scenario(load_scenario("paper", SHORT), tmp_path)
+    assert [p.name for p in tmp_path.iterdir()] == ["precious"]
+
+
+def test_a_place_that_cannot_be_written_is_refused(tmp_path):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(RunError, match="file"):
+        run_scenario(load_scenario("paper", SHORT), tmp_path / "file" / "run")
+
+
+def test_a_scenario_that_the_fmu_refuses_leaves_no_folder(tmp_path):
+    out = tmp_path / "run"
+    for override in ("plant.parameters.mass=-5", "law.gains.k_p1=1e9"):  # before the first step, and in it
+        with pytest.raises(PlantError):
+            run_scenario(load_scenario("paper", [*SHORT, override]), out)
+        assert not out.exists()
+
+
+def test_a_failure_midway_leaves_what_was_recorded(tmp_path):
+    out = tmp_path / "run"
+    scenario = load_scenario("paper", [*SHORT, "law.gains.k_v1=5e5"])  # which no 1 kHz loop can hold: k_v1 h > 2 m
+    with pytest.raises(PlantError):
+        run_scenario(scenario, out)
+    summary = json.loads((out / "summary.json").read_text())
+    assert summary["status"].startswith("failed: t = ")
+    assert 0 < summary["steps"] < 30
+    assert np.isfinite(load_record(out)["position.x"]).all()
+    assert (out / "report.html").exists()
+
+
+def test_ctrl_c_leaves_a_readable_run(tmp_path, monkeypatch):
+    class Interrupting(Recorder):
+        def observe(self, k, row):
+            super().observe(k, row)
+            if k == 150:
+                raise KeyboardInterrupt
+
+    monkeypatch.setattr("cosim.run.Recorder", Interrupting)
+    run = run_scenario(load_scenario("paper", SHORT), tmp_path / "run")
+    assert run.summary["status"] == "interrupted"
+    assert run.summary["steps"] == 150
+    assert len(load_record(run.folder)["time"]) == 151
+    assert (run.folder / "report.html").exists()
+
+
+COLUMNS = [Column("time", "s", "Time"), Column("x", "m", "Place")]
+
+
+def test_a_killed_recorder_leaves_its_parts(tmp_path):
+    recorder = Recorder(tmp_path, COLUMNS, rows_per_part=10)
+    for k in range(35):
+        recorder.observe(k, np.array([k, 2.0 * k]))
+    record = load_record(tmp_path)  # nobody closed it
+    assert record["time"].tolist() == list(range(30))
+    assert record.units == {"time": "s", "x": "m"}
+
+
+def test_a_record_keeps_every_bit(tmp_path):
+    rows = np.random.default_rng(0).normal(size=(27, 2)) * 1e-300
+    rows[3] = [np.nan, -0.0]
+    recorder = Recorder(tmp_path, COLUMNS, rows_per_part=10)
+    for k, row in enumerate(rows):
+        recorder.observe(k, row)
+    recorder.close()
+    assert load_record(tmp_path).stack(["time", "x"]).tobytes() == rows.tobytes()
+    assert [p.name for p in tmp_path.iterdir()] == ["record.parquet"]
+
+
+def test_no_record_is_a_clear_error(tmp_path):
+    with pytest.raises(RunError, match="no record"):
+        load_record(tmp_path)
+    (tmp_path / "record.parquet").write_bytes(b"PAR1 and then nothing")
+    with pytest.raises(RunError, match="cannot be read"):
+        load_record(tmp_path)
+
+
+def test_own_vehicle_travels_with_the_run(tmp_path):
+    from importlib import resources
+
+    text = (
+        (resources.files("plant_fmu") / "vehicles" / "odin.toml").read_text().replace("mass = 125.0 ", "mass = 126.0 ")
+    )
+    (tmp_path / "boat.toml").write_text(text)
+    (tmp_path / "mine.toml").write_text('base = "paper"\nvehicle = "boat.toml"\n')
+    run = run_scenario(load_scenario(tmp_path / "mine.toml", SHORT), tmp_path / "run")
+    (tmp_path / "boat.toml").unlink()
+    assert load_scenario(run.folder / "scenario.toml").vehicle.mass == 126.0

@@ -1,0 +1,161 @@
+"""Scenario files: every key checked, every fault named."""
+
+import dataclasses
+import tomllib
+
+import pytest
+
+from controller.regions import Pipe, Sphere
+from cosim.errors import ScenarioError
+from cosim.scenario import load_scenario
+from cosim.scenario_file import shipped_scenarios
+from tests.conftest import DATA  # noqa: F401 - keeps the folder a package for pytest
+
+MINIMAL = """
+vehicle = "bluerov2_heavy"
+time = { duration = 2.0 }
+initial = { position = [0.0, 0.0, 1.0] }
+goal = { type = "sphere", centre = [3.0, 0.0, 2.0], radius = 0.5 }
+"""
+
+
+def saved(tmp_path, text, name="mine.toml"):
+    path = tmp_path / name
+    path.write_text(text)
+    return path
+
+
+def test_shipped_scenarios_load():
+    assert shipped_scenarios() == ["paper", "paper-calibrated", "paper-limited"]
+    for name in shipped_scenarios():
+        assert load_scenario(name).title
+
+
+def test_minimal_file_gets_defaults(tmp_path):
+    scenario = load_scenario(saved(tmp_path, MINIMAL))
+    assert scenario.steps == 2000 and scenario.control_every == scenario.arbiter_every == 1
+    assert scenario.arbiter.ramp == 0.2
+    assert scenario.limit.force == float("inf")
+    assert scenario.goal == Sphere((3.0, 0.0, 2.0), 0.5)
+    assert scenario.regions == ()
+
+
+@pytest.mark.parametrize("name", shipped_scenarios())
+def test_written_scenario_reads_back_the_same(tmp_path, name):
+    first = load_scenario(name, ["time.control=0.002"])
+    again = load_scenario(saved(tmp_path, first.toml(), f"{name}.toml"))
+    assert again.toml() == first.toml()
+    for f in dataclasses.fields(first):
+        if f.name not in ("vehicle", "vehicle_file"):
+            assert getattr(again, f.name) == getattr(first, f.name), f.name
+
+
+def test_base_lays_one_scenario_over_another(tmp_path):
+    path = saved(tmp_path, 'base = "paper"\nlimit = { force = 5.0 }\n')
+    scenario = load_scenario(path)
+    assert scenario.limit.force == 5.0
+    assert scenario.limit.time_constant == 0.0
+    assert len(scenario.regions) == 3
+
+
+def test_base_may_be_a_file_beside(tmp_path):
+    saved(tmp_path, MINIMAL, "other.toml")
+    assert load_scenario(saved(tmp_path, 'base = "other.toml"\ntitle = "Mine"\n')).title == "Mine"
+
+
+def test_base_of_itself_is_refused(tmp_path):
+    with pytest.raises(ScenarioError, match="base"):
+        load_scenario(saved(tmp_path, 'base = "mine.toml"\n'))
+
+
+def test_own_vehicle_file_is_found_beside_the_scenario(tmp_path):
+    from importlib import resources
+
+    (tmp_path / "boat.toml").write_text((resources.files("plant_fmu") / "vehicles" / "odin.toml").read_text())
+    scenario = load_scenario(saved(tmp_path, MINIMAL.replace('"bluerov2_heavy"', '"boat.toml"')))
+    assert scenario.vehicle.mass == 125.0
+    assert tomllib.loads(scenario.toml())["vehicle"] == "vehicle.toml"  # its copy in the run folder
+
+
+def test_overrides_reach_every_depth(tmp_path):
+    scenario = load_scenario(
+        "paper",
+        ["law.gains.k_p1=3", "regions.SR2.shape.radius=0.25", "regions.0.gain=7", "limit.force=inf",
+         "vehicle=bluerov2_heavy",
+         "plant.parameters.mass=14", 'regions.SR3.shape={type="pipe",points=[[0,0,0],[1,0,0]],radius=0.3}'],
+    )  # fmt: skip
+    assert scenario.law.gains.k_p1 == 3.0
+    assert scenario.regions[1].region.shape.radius == 0.25
+    assert scenario.regions[0].gain == 7.0
+    assert scenario.vehicle.name == "bluerov2_heavy"
+    assert scenario.plant.parameters == {"mass": 14.0}
+    assert scenario.regions[2].region.shape == Pipe(((0.0, 0.0, 0.0), (1.0, 0.0, 0.0)), 0.3)
+
+
+@pytest.mark.parametrize(
+    ("override", "words"),
+    [
+        ("law.gains.k_p=3", ["law.gains.k_p", "unknown", "k_p"]),
+        ("law.gains.k_p1=abc", ["law.gains.k_p1", "number", "'abc'"]),
+        ("law.gains.k_p1=0", ["law.gains.k_p1", "0"]),
+        ("law.gains.gamma=nan", ["law.gains.gamma", "nan"]),
+        ("law.name=best", ["law.name", "'printed'", "'best'"]),
+        ("arbiter.engine=fast", ["arbiter.engine", "'closed'", "'skfuzzy'", "'fast'"]),
+        ("arbiter.ramp=-1", ["arbiter.ramp", "-1"]),
+        ("arbiter.points=2", ["arbiter.points", "3"]),
+        ("time.duration=-1", ["time.duration", "above 0"]),
+        ("time.duration=long", ["time.duration", "number", "'long'"]),
+        ("time.step=0.0007", ["multiple", "time.step"]),
+        ("time.control=0.0015", ["time.control", "multiple"]),
+        ("time.step=1e-10", ["time.duration", "steps"]),
+        ("vehicle=odinn", ["odinn", "bluerov2_heavy, odin"]),
+        ("vehicle=nowhere.toml", ["nowhere.toml"]),
+        ("initial.position=[1,2]", ["initial.position", "3"]),
+        ("initial.position=[0,0,inf]", ["initial.position", "finite"]),
+        ("initial.quaternion=[1,1,0,0]", ["initial.quaternion", "length 1"]),
+        ("plant.fmi=4", ["plant.fmi", "2, 3"]),
+        ("plant.parameters.mass=nan", ["plant.parameters.mass", "finite"]),
+        ("limit.force=-1", ["limit.force"]),
+        ("goal=5", ["goal", "table"]),
+        ("goal.type=sphear", ["goal.type", "'sphear'", "'sphere'"]),
+        ("goal.radius=-1", ["goal", "radius", "-1"]),
+        ("goal.typo=1", ["goal.typo", "unknown"]),
+        ("regions.SR9.gain=1", ["SR9", "SR1, SR2, SR3"]),
+        ("regions.SR1.gain=-1", ["regions.SR1.gain"]),
+        ("regions.SR1.name=SR2", ["SR2", "own"]),
+        ("regions.SR1.keep=on", ["keep", "'in', 'out'"]),
+        ("regions.SR1.criterion=fear", ["criterion", "'obstacle', 'shape', 'depth'"]),
+        ("regions.SR1.shape.radius=nan", ["SR1", "radius", "nan"]),
+        ('intersection=["SR7"]', ["intersection", "SR7"]),
+        ("tme.duration=3", ["tme", "'time'"]),
+        ("title", ["key=value"]),
+        ("title.x=3", ["title"]),
+    ],
+)
+def test_faults_are_named_in_one_line(override, words):
+    with pytest.raises(ScenarioError) as caught:
+        load_scenario("paper", [override])
+    said = str(caught.value)
+    assert "\n" not in said
+    for word in words:
+        assert word in said
+
+
+@pytest.mark.parametrize("missing", ["vehicle", "time", "initial", "goal"])
+def test_missing_keys_are_named(tmp_path, missing):
+    text = "\n".join(line for line in MINIMAL.splitlines() if not line.startswith(missing))
+    with pytest.raises(ScenarioError, match=rf"mine\.toml.*missing.*{missing}"):
+        load_scenario(saved(tmp_path, text))
+
+
+def test_unknown_scenario_suggests_the_nearest():
+    with pytest.raises(ScenarioError, match=r"'papr' is unknown; did you mean 'paper'"):
+        load_scenario("papr")
+
+
+@pytest.mark.parametrize("content", [b"\xff\xfe", b"a = [", b""])
+def test_broken_files_are_refused(tmp_path, content):
+    path = tmp_path / "broken.toml"
+    path.write_bytes(content)
+    with pytest.raises(ScenarioError, match=r"broken\.toml"):
+        load_scenario(path)

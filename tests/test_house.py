@@ -1,0 +1,49 @@
+"""The house: who may import whom, and what no room does."""
+
+import ast
+import re
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+PACKAGES = ("fuzzy_arbiter", "plant_fmu", "controller", "cosim")
+FILES = [path for package in PACKAGES for path in sorted((ROOT / package).rglob("*.py"))]
+MAY_IMPORT = {
+    "fuzzy_arbiter": {"fuzzy_arbiter"},
+    "plant_fmu": {"plant_fmu"},
+    "controller": {"controller"},
+    "cosim": set(PACKAGES),
+}
+
+
+def imports(path):
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            yield node.module or ""
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda p: str(p.relative_to(ROOT)))
+def test_imports_run_one_way(path):
+    package = path.relative_to(ROOT).parts[0]
+    used = {name.split(".")[0] for name in imports(path)} & set(PACKAGES)
+    assert used <= MAY_IMPORT[package]
+
+
+def test_the_controller_knows_neither_fmi_nor_mavlink_and_the_arbiter_no_vehicle():
+    for package, foreign in (("controller", {"fmpy", "pymavlink"}), ("fuzzy_arbiter", {"numba", "fmpy", "pymavlink"})):
+        for path in (ROOT / package).rglob("*.py"):
+            assert not {name.split(".")[0] for name in imports(path)} & foreign
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda p: str(p.relative_to(ROOT)))
+def test_files_fit_in_the_head(path):
+    assert len(path.read_text().splitlines()) <= 400
+
+
+def test_nothing_needs_what_lies_beside_the_checkout():
+    for path in [*FILES, *(ROOT / "tests").rglob("*.py"), ROOT / "Makefile", ROOT / "README.md"]:
+        if path != Path(__file__):
+            assert not re.search(r"\.\./shared|/work/", path.read_text()), path
