@@ -14,6 +14,13 @@ Array = NDArray[np.float64]
 
 
 @compiled
+def clip_each(forces: Array, lower: Array, upper: Array) -> None:
+    """Cut thruster forces [N], shape (n,), in place, each at its own limits: the wrench may turn."""
+    for i in range(forces.size):
+        forces[i] = min(max(forces[i], lower[i]), upper[i])
+
+
+@compiled
 def keep_direction(forces: Array, lower: Array, upper: Array) -> None:
     """Scale thruster forces [N], shape (n,), in place until all are within limits: the wrench keeps its direction."""
     scale = 1.0
@@ -23,13 +30,7 @@ def keep_direction(forces: Array, lower: Array, upper: Array) -> None:
         elif forces[i] < lower[i]:
             scale = min(scale, lower[i] / forces[i])
     forces *= max(scale, 0.0)
-
-
-@compiled
-def clip_each(forces: Array, lower: Array, upper: Array) -> None:
-    """Cut thruster forces [N], shape (n,), in place, each at its own limits: the wrench may turn."""
-    for i in range(forces.size):
-        forces[i] = min(max(forces[i], lower[i]), upper[i])
+    clip_each(forces, lower, upper)  # of the last bit
 
 
 @compiled

@@ -90,8 +90,8 @@ def _window(scenario: Scenario, summary: dict[str, Any]) -> Claim:
     first = windows[0]
     if scenario.limit.force < float("inf") or scenario.limit.time_constant > 0.0:
         why = (
-            f"With the body force limited to {scenario.limit.force:g} N and a lag of {scenario.limit.time_constant:g} s."
-            " The paper states neither: a calibration, and no evidence of what was simulated there."
+            f"With a body force of at most {scenario.limit.force:g} N and a lag of {scenario.limit.time_constant:g} s. "
+            "The paper states neither: a calibration, and no evidence of what was simulated there."
         )
     else:
         why = (

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import itertools
 import logging
 import sys
 from collections.abc import Sequence
@@ -51,6 +52,7 @@ def _parser() -> argparse.ArgumentParser:
         metavar="N|max",
         help="simulated seconds a second at the most (default: max)",
     )
+    run.add_argument("--no-report", action="store_true", help="leave out the report and its figures")
 
     verbs.add_parser("list", help="list the shipped scenarios")
 
@@ -108,11 +110,17 @@ def _run(options: argparse.Namespace) -> int:
 
     scenario = load_scenario(options.scenario, options.overrides)
     mavlink = parse_endpoint(options.mavlink, options.allow_remote) if options.mavlink else None
-    out = options.out or Path("runs") / f"{scenario.name}-{datetime.now():%Y%m%d-%H%M%S}"
-    run = run_scenario(scenario, out, mavlink, options.rate, progress=True)
+    out = options.out or _new_folder(Path("runs") / f"{scenario.name}-{datetime.now():%Y%m%d-%H%M%S}")
+    run = run_scenario(scenario, out, mavlink, options.rate, progress=True, report=not options.no_report)
     print(verdict(run.summary))
-    print(run.folder / "report.html")
+    print(run.folder / ("summary.json" if options.no_report else "report.html"))
     return 130 if run.summary["status"] == "interrupted" else 0
+
+
+def _new_folder(wanted: Path) -> Path:
+    """Return the folder that is wanted, or one of a similar name that does not exist yet."""
+    numbered = (wanted.with_name(f"{wanted.name}-{i}") for i in itertools.count(2))
+    return next(folder for folder in itertools.chain([wanted], numbered) if not folder.exists())
 
 
 def _list(options: argparse.Namespace) -> int:

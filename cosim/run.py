@@ -60,6 +60,7 @@ def run_scenario(
     mavlink: tuple[str, int] | None = None,
     rate: float | None = None,
     progress: bool = False,
+    report: bool = True,
 ) -> Run:
     """Run a scenario and write its folder.
 
@@ -75,6 +76,8 @@ def run_scenario(
         Simulated seconds a wall-clock second at the most.
     progress : bool
         Show a bar, if there is a terminal.
+    report : bool
+        Write the report and its figures.
 
     Returns
     -------
@@ -92,7 +95,7 @@ def run_scenario(
         telemetry = Telemetry(mavlink, master.signals, scenario.time.step) if mavlink else None
         try:
             _make_folder(out, scenario)
-            return _step_and_write(master, out, telemetry, rate, progress)
+            return _step_and_write(master, out, telemetry, rate, progress, report)
         except OSError as error:
             raise RunError(f"{out}: {error.strerror or error}") from error
         finally:
@@ -112,7 +115,9 @@ def _make_folder(out: Path, scenario: Scenario) -> None:
         shutil.copyfile(scenario.vehicle_file, out / VEHICLE_COPY)
 
 
-def _step_and_write(master: Master, out: Path, telemetry: Telemetry | None, rate: float | None, progress: bool) -> Run:
+def _step_and_write(
+    master: Master, out: Path, telemetry: Telemetry | None, rate: float | None, progress: bool, report: bool
+) -> Run:
     scenario = master.scenario
     recorder = Recorder(out, master.signals.columns)
     bar = _Progress(scenario) if progress else None
@@ -136,7 +141,8 @@ def _step_and_write(master: Master, out: Path, telemetry: Telemetry | None, rate
     record = load_record(out)
     summary = summarise(scenario, record, status, wall_time)
     _write_whole(out / "summary.json", lambda path: path.write_text(json.dumps(summary, indent=2) + "\n", "utf-8"))
-    write_report(out, scenario, record, summary)
+    if report:
+        write_report(out, scenario, record, summary)
     if failure:
         raise failure
     return Run(out, summary)

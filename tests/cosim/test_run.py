@@ -155,6 +155,7 @@ def test_own_vehicle_travels_with_the_run(tmp_path):
     )
     (tmp_path / "boat.toml").write_text(text)
     (tmp_path / "mine.toml").write_text('base = "paper"\nvehicle = "boat.toml"\n')
-    run = run_scenario(load_scenario(tmp_path / "mine.toml", SHORT), tmp_path / "run")
+    run = run_scenario(load_scenario(tmp_path / "mine.toml", SHORT), tmp_path / "run", report=False)
+    assert not (run.folder / "report.html").exists()
     (tmp_path / "boat.toml").unlink()
     assert load_scenario(run.folder / "scenario.toml").vehicle.mass == 126.0
