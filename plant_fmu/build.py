@@ -19,7 +19,7 @@ from plant_fmu.vehicle import Vehicle
 
 FMI_VERSIONS = (2, 3)
 
-_SOURCES = ("plant.h", "plant.c", "instance.h", "instance.c")
+_SOURCES = ("plant.h", "plant.c", "actuators.c", "instance.h", "instance.c")
 _ZIP_DATE = (1980, 1, 1, 0, 0, 0)
 # FMI 2.0 names no aarch64: FMPy looks in these folders there, and other tools take them for x86_64
 _FMI2_PLATFORMS = {
