@@ -12,29 +12,42 @@ from controller.errors import LawError
 
 Array = NDArray[np.float64]
 
-
-@compiled
-def clip_each(forces: Array, lower: Array, upper: Array) -> None:
-    """Cut thruster forces [N], shape (n,), in place, each at its own limits: the wrench may turn."""
-    for i in range(forces.size):
-        forces[i] = min(max(forces[i], lower[i]), upper[i])
+_ROUNDING = 1e-12  # of the greatest force: what is smaller asks for nothing
 
 
 @compiled
-def keep_direction(forces: Array, lower: Array, upper: Array) -> None:
-    """Scale thruster forces [N], shape (n,), in place until all are within limits: the wrench keeps its direction."""
-    scale = 1.0
+def clip_each(forces: Array, lower: Array, upper: Array) -> bool:
+    """Cut thruster forces [N], shape (n,), in place, each at its own limits, and return whether any was beyond them.
+
+    The wrench may turn.
+    """
+    cut, negligible = False, _ROUNDING * np.max(np.abs(forces))
     for i in range(forces.size):
-        if forces[i] > upper[i]:
+        within = min(max(forces[i], lower[i]), upper[i])
+        cut = cut or abs(within - forces[i]) > negligible
+        forces[i] = within
+    return cut
+
+
+@compiled
+def keep_direction(forces: Array, lower: Array, upper: Array) -> bool:
+    """Scale thruster forces [N], shape (n,), in place until all are within limits, and return whether any was beyond.
+
+    The wrench keeps its direction.
+    """
+    scale, negligible = 1.0, _ROUNDING * np.max(np.abs(forces))
+    for i in range(forces.size):
+        if forces[i] > upper[i] and forces[i] > negligible:
             scale = min(scale, upper[i] / forces[i])
-        elif forces[i] < lower[i]:
+        elif forces[i] < lower[i] and forces[i] < -negligible:
             scale = min(scale, lower[i] / forces[i])
-    forces *= max(scale, 0.0)
+    forces *= scale
     clip_each(forces, lower, upper)  # of the last bit
+    return scale < 1.0
 
 
 @compiled
-def allocate(inverse: Array, lower: Array, upper: Array, direction: bool, tau: Array, forces: Array) -> None:
+def allocate(inverse: Array, lower: Array, upper: Array, direction: bool, tau: Array, forces: Array) -> bool:
     """Write the least-squares thruster forces for a wrench, within limits, into `forces`.
 
     Parameters
@@ -49,16 +62,21 @@ def allocate(inverse: Array, lower: Array, upper: Array, direction: bool, tau: A
         Wrench [N, N m], body frame.
     forces : ndarray, shape (n,)
         Receives the forces [N].
+
+    Returns
+    -------
+    bool
+        Whether the limits cut the wrench.
     """
     forces[:] = inverse @ tau
-    if direction:
-        keep_direction(forces, lower, upper)
-    else:
-        clip_each(forces, lower, upper)
+    return keep_direction(forces, lower, upper) if direction else clip_each(forces, lower, upper)
 
 
 class Allocation:
     """Thruster allocation by the pseudo-inverse, the least forces that give a wrench.
+
+    Thrusters whose limits are both 0 are left out. Limits bound what the pseudo-inverse asks; forces are not shared out
+    anew among thrusters with room, so that one-sided thrusters (a limit of 0) stop whatever needs their other side.
 
     Parameters
     ----------
@@ -87,12 +105,13 @@ class Allocation:
             raise LawError("thruster limits leave out 0 N, expected lower <= 0 <= upper")
         if limits not in ("direction", "per-thruster"):
             raise LawError(f"limits is {limits!r}, expected 'direction' or 'per-thruster'")
-        self._inverse = np.ascontiguousarray(np.linalg.pinv(matrix))
+        alive = (lower != 0.0) | (upper != 0.0)
+        self._inverse = np.ascontiguousarray(np.linalg.pinv(np.where(alive, matrix, 0.0)))
         self._lower = np.array(lower, dtype=float)
         self._upper = np.array(upper, dtype=float)
         self._direction = limits == "direction"
 
-    def __call__(self, tau: Array, forces: Array) -> None:
+    def __call__(self, tau: Array, forces: Array) -> bool:
         """Write the thruster forces for a wrench into `forces`.
 
         Parameters
@@ -101,5 +120,10 @@ class Allocation:
             Wrench [N, N m], body frame.
         forces : ndarray, shape (n,)
             Receives the forces [N], within the limits.
+
+        Returns
+        -------
+        bool
+            Whether the limits cut the wrench.
         """
-        allocate(self._inverse, self._lower, self._upper, self._direction, tau, forces)
+        return bool(allocate(self._inverse, self._lower, self._upper, self._direction, tau, forces))

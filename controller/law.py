@@ -62,14 +62,14 @@ class PrintedLaw:
     """
 
     def __init__(self, gains: Gains, desired_quaternion: Array, period: float) -> None:
-        if not period > 0.0:
-            raise LawError(f"control period is {period} s, expected above 0")
-        norm = float(np.linalg.norm(desired_quaternion))
-        if not abs(norm - 1.0) < 1e-6:
-            raise LawError(f"desired quaternion has length {norm}, expected 1")
+        if not 0.0 < period < np.inf:
+            raise LawError(f"control period is {period} s, expected a finite number above 0")
+        desired = np.array(desired_quaternion, dtype=float)
+        if desired.shape != (4,) or not abs(np.linalg.norm(desired) - 1.0) < 1e-6:
+            raise LawError(f"desired quaternion is {desired}, expected four numbers of length 1")
         self.gains = check_gains(gains)
         self.estimate: Array = np.zeros(4)
-        self._desired = np.array(desired_quaternion, dtype=float)
+        self._desired = desired
         self._period = period
 
     def step(self, state: VehicleState, goal: RegionValues, regions: RegionValues, alphas: Array, tau: Array) -> None:

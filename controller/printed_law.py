@@ -25,7 +25,7 @@ class Gains(NamedTuple):
 
     k_p1: float = 18.8  # N/m3, on the primary region (16)
     k_p2: float = 36.0  # N m, on attitude (26)
-    k_q: float = 100.0  # on the secondary regions (22), (26); beta_i k_q = alpha_i, so it acts in (27) alone
+    k_q: float = 100.0  # (22), (26); cancels in (25) and (27), where beta_i k_q = alpha_i: it enters the analysis alone
     k_v1: float = 90.0  # N s/m (26)
     k_v2: float = 40.0  # N m s/rad (26)
     sigma_p: float = 0.08  # 1/(m2 s), of position in the adaptation (27)
@@ -59,14 +59,38 @@ def check_gains(gains: Gains) -> Gains:
 
 
 @compiled
+def violation(value: float) -> float:
+    """Return max(0, g), as in (16), (17), (20) and (22); NaN stays NaN, lest a lost measurement looked like safety."""
+    return 0.0 if value <= 0.0 else value
+
+
+@compiled
+def primary_potential(value: float, k_p1: float) -> float:
+    """Return P_p [N m]: (16), of f."""
+    return 0.5 * k_p1 * violation(value) ** 2
+
+
+@compiled
+def secondary_potential(values: Array, alphas: Array) -> float:
+    """Return P_s: (17), of the g_i and alpha_i, each of shape (n,).
+
+    The law follows its gradient only where |dg_i/dp| = 1: (19) normalises each gradient.
+    """
+    total = 0.0
+    for i in range(values.size):
+        total += 0.5 * alphas[i] * violation(values[i]) ** 2
+    return total
+
+
+@compiled
 def primary_error(value: float, gradient: Array) -> Array:
-    """Return e_p, shape (3,): (20), of f and its gradient."""
-    return max(0.0, value) * gradient
+    """Return e_p, shape (3,): (20), of f and its gradient; k_p1 times it is the gradient (18) of the potential."""
+    return violation(value) * gradient
 
 
 @compiled
 def secondary_error(values: Array, gradients: Array, betas: Array) -> Array:
-    """Return e_s, shape (3,): (21), (22).
+    """Return e_s, shape (3,): (21), (22); k_q times it is (19).
 
     Parameters
     ----------
@@ -79,9 +103,9 @@ def secondary_error(values: Array, gradients: Array, betas: Array) -> Array:
     """
     total = np.zeros(3)
     for i in range(values.size):
-        if values[i] > 0.0:
+        if not values[i] <= 0.0:
             norm = math.sqrt(gradients[i, 0] ** 2 + gradients[i, 1] ** 2 + gradients[i, 2] ** 2)
-            if norm > 0.0:
+            if not norm <= 0.0:
                 total += (betas[i] * values[i] / norm) * gradients[i]
     return total
 

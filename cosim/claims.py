@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -72,7 +73,7 @@ def _reaching(summary: dict[str, Any]) -> Claim:
         measured = f"Never in; closest {summary['closest_to_goal']:.2f} m from the region's surface."
         why = "See the estimate below: adaptation (27) goes on while the actuators give less than the law asks for."
         if summary["saturated_time"] == 0.0:
-            why = "The force was not limited; the cause is another."
+            why = "The actuators were never saturated; the cause is another."
     return Claim("The vehicle converges into the primary sub-region (Fig. 5, 6).", measured, why)
 
 
@@ -88,10 +89,13 @@ def _window(scenario: Scenario, summary: dict[str, Any]) -> Claim:
     if not windows:
         return Claim(stated, measured, "The path misses the overlap.")
     first = windows[0]
-    if scenario.limit.force < float("inf") or scenario.limit.time_constant > 0.0:
+    limits = [f"a body force of at most {newtons(scenario.limit.force)}"] if scenario.limit.force < math.inf else []
+    limits += [f"a lag of {scenario.limit.time_constant:g} s"] if scenario.limit.time_constant > 0.0 else []
+    limits += ["the thrusters' limits"] if scenario.actuation.through == "thrusters" else []
+    if limits:
         why = (
-            f"With a body force of at most {scenario.limit.force:g} N and a lag of {scenario.limit.time_constant:g} s. "
-            "The paper states neither: a calibration, and no evidence of what was simulated there."
+            f"With {' and '.join(limits)}. "
+            "The paper states no limits: these are a choice of this scenario, no evidence of what was simulated there."
         )
     else:
         why = (
@@ -104,22 +108,21 @@ def _window(scenario: Scenario, summary: dict[str, Any]) -> Claim:
 
 
 def _avoiding(scenario: Scenario, summary: dict[str, Any]) -> Claim:
-    entered = {name: -c for name, c in summary["min_clearance"].items() if c < 0.0}
-    measured = (
-        "; ".join(f"{name}: {c:+.3f} m" for name, c in summary["min_clearance"].items()) + " (negative: violated)."
-    )
-    if entered:
-        push = max(
-            (r.gain * r.region.shape.radius**2 for r in scenario.regions if isinstance(r.region.shape, Sphere)),
-            default=0.0,
-        )
+    clearances = summary["min_clearance"]
+    entered = [r for r in scenario.regions if clearances[r.region.name] < 0.0]
+    later = [r for r in entered if r.region.name not in summary["violated_at_start"]]
+    measured = "; ".join(f"{name}: {c:+.3f} m" for name, c in clearances.items()) + " (negative: violated)."
+    push = max((r.gain * r.region.shape.radius**2 for r in later if isinstance(r.region.shape, Sphere)), default=None)
+    if push is not None:
         why = (
             f"A sphere pushes with at most gain × r² = {push:.0f} N; the law asked for up to "
-            f"{newtons(summary['max_force_asked'])} in all, nearly all of it towards the goal. "
+            f"{newtons(summary['max_force_asked'])} in all. "
             "The paper's own Fig. 8 shows the vehicle inside the intersection."
         )
+    elif later:
+        why = f"Entered: {', '.join(r.region.name for r in later)}."
     else:
-        why = "No region was violated."
+        why = "No region was entered" + (", but for those in which the run starts." if entered else ".")
     return Claim("The control effort leads the vehicle out of the undesired sub-regions (Fig. 5b).", measured, why)
 
 

@@ -101,6 +101,7 @@ class Master:
         self._alphas: Array = np.zeros(n)
         self._estimate = s.view("estimate.phi1", 4)
         self._command = s.view("command.X", 6)
+        self._allocation_cut = s.view("allocation_saturated", 1)
         inputs = s.view("thrust[1]", len(self.plant.inputs))
         self._thrusts, self._wrench = inputs[:n_thrusters], inputs[n_thrusters:]
         self._inputs = inputs
@@ -179,7 +180,7 @@ class Master:
         if self.allocation is None:
             self._wrench[:] = self._command
         else:
-            self.allocation(self._command, self._thrusts)
+            self._allocation_cut[0] = self.allocation(self._command, self._thrusts)
 
     def _advance(self, now: float, step: float) -> None:
         self.plant.input_values[:] = self._inputs
@@ -239,5 +240,6 @@ def _columns(scenario: Scenario, plant: Plant) -> list[Column]:
             Column(f"command.{name}", unit, "Wrench that the law asks for, body frame")
             for name, unit in zip("XYZKMN", force_units, strict=True)
         ),
+        Column("allocation_saturated", "", "The thrusters' limits cut the wrench that the law asks for"),
         *plant.inputs,
     ]

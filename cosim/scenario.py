@@ -107,6 +107,18 @@ class SecondaryRegion:
     gain: float  # alpha_i of section VII
 
 
+# parameters of the FMU that have a key of their own in a scenario
+_OWN_KEYS = {
+    "wrench_force_limit": "limit.force",
+    "wrench_time_constant": "limit.time_constant",
+    "substep": "plant.substep",
+    "current": "plant.current",
+    "position": "initial.position",
+    "quaternion": "initial.quaternion",
+    "velocity": "initial.velocity",
+}
+
+
 # ---- as they stand in the file -------------------------------------------------------------------------------------
 
 
@@ -252,6 +264,18 @@ def _check(table: dict[str, Any], name: str, folder: Path) -> Scenario:
         ("law.desired_quaternion", file.law.desired_quaternion),
     ):
         _require(abs(math.hypot(*quaternion) - 1.0) < 1e-6, key, quaternion, "four numbers of length 1")
+
+    if file.actuation.through == "thrusters":
+        unlimited = file.limit == Limit()
+        _require(unlimited, "limit", "given", "none with actuation.through = 'thrusters': it is of the direct wrench")
+    for name in file.plant.parameters:
+        prefix = name.partition(".")[0]
+        _require(
+            prefix not in _OWN_KEYS,
+            f"plant.parameters.{name}",
+            "a parameter",
+            f"the key {_OWN_KEYS.get(prefix)} instead",
+        )
 
     regions = tuple(
         SecondaryRegion(

@@ -63,7 +63,8 @@ def summarise(scenario: Scenario, record: Record, status: str, wall_time: float)
     settled = bool(visits and inside[-1] and time[-1] - visits[-1][0] >= SETTLED_FOR)
     names = [secondary.region.name for secondary in scenario.regions]
     overlap = [record[f"{names[i]}.clearance"] < 0.0 for i in scenario.intersection]
-    force = np.linalg.norm(record.stack([f"actuation.{axis}" for axis in "XYZ"]), axis=1)[:-1]
+    acted = slice(0, scenario.steps)  # the last row of a whole run decides, but acts no more
+    force = np.linalg.norm(record.stack([f"actuation.{axis}" for axis in "XYZ"]), axis=1)[acted]
     asked = np.linalg.norm(record.stack([f"command.{axis}" for axis in "XYZ"]), axis=1)
     speed = np.linalg.norm(record.stack([f"velocity.{axis}" for axis in "uvw"]), axis=1)
     simulated = float(time[-1])
@@ -91,7 +92,7 @@ def summarise(scenario: Scenario, record: Record, status: str, wall_time: float)
         "weights_above_half": int((weights > 0.5).sum(axis=1).max()),
         "weights_sum_max": float(weights.sum(axis=1).max()),
         "effort": float(force.sum() * scenario.time.step),
-        "saturated_time": _saturated_time(scenario, record),
+        "saturated_time": _saturated_time(scenario, record, acted),
         "estimate_final": [float(record[f"estimate.phi{i}"][-1]) for i in range(1, 5)],
         "estimate_true": scenario.true_restoring_parameters.tolist(),
         "estimate_lowest": [float(record[f"estimate.phi{i}"].min()) for i in range(1, 5)],
@@ -102,8 +103,8 @@ def summarise(scenario: Scenario, record: Record, status: str, wall_time: float)
     }
 
 
-def _saturated_time(scenario: Scenario, record: Record) -> float:
+def _saturated_time(scenario: Scenario, record: Record, acted: slice) -> float:
     """How long any actuator was asked for more than it gives [s]."""
-    flags = [name for name in record.columns if name.startswith("thrust_saturated[") or name == "wrench_saturated"]
-    any_cut = np.logical_or.reduce([record[name][:-1] > 0.0 for name in flags])
+    flags = [name for name in record.columns if "_saturated" in name]
+    any_cut = np.logical_or.reduce([record[name][acted] > 0.0 for name in flags])
     return float(np.count_nonzero(any_cut) * scenario.time.step)

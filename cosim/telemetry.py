@@ -10,6 +10,9 @@ import time
 from collections import deque
 from typing import Any
 
+import numpy as np
+
+from controller.quaternion import rotation_matrix
 from cosim.errors import TelemetryError
 from cosim.scenario import CRITERIA
 from cosim.signals import Array, Signals
@@ -25,6 +28,11 @@ _QUEUED = 4096  # snapshots; when the sender falls behind, the oldest go
 _CLOSING = 2.0  # s, that closing waits for what is queued
 _FLOAT_MAX = 3.4e38  # beyond it a float32 field cannot be encoded
 _UINT32 = 0xFFFFFFFF
+
+
+def _float32(x: float) -> float:
+    """Return a number that a float32 field can hold; NaN stays."""
+    return min(max(x, -_FLOAT_MAX), _FLOAT_MAX)
 
 
 def parse_endpoint(text: str, allow_remote: bool = False) -> tuple[str, int]:
@@ -151,7 +159,7 @@ class Telemetry:
         m, at = self._mavlink, self._at
 
         def values(first: str, n: int) -> list[float]:
-            return [min(max(x, -_FLOAT_MAX), _FLOAT_MAX) for x in row[at[first] : at[first] + n].tolist()]
+            return [_float32(x) for x in row[at[first] : at[first] + n].tolist()]
 
         boot_ms = round(row[at["time"]] * 1e3) & _UINT32
         e0, e1, e2, e3 = values("quaternion.e0", 4)
@@ -162,7 +170,9 @@ class Telemetry:
         messages += [
             m.MAVLink_attitude_message(boot_ms, *values("attitude.roll", 3), *rates),
             m.MAVLink_attitude_quaternion_message(boot_ms, e0, e1, e2, e3, *rates),
-            m.MAVLink_local_position_ned_message(boot_ms, *values("position.x", 3), *self._velocity_ned(row)),
+            m.MAVLink_local_position_ned_message(
+                boot_ms, *values("position.x", 3), *map(_float32, self._velocity_ned(row))
+            ),
         ]
         named = {f"w_{name}": f"weight.{name}" for name in CRITERIA} | {
             f"phi{i}": f"estimate.phi{i}" for i in range(1, 5)
@@ -174,15 +184,11 @@ class Telemetry:
         return messages
 
     def _velocity_ned(self, row: Array) -> list[float]:
-        e0, *e = row[self._at["quaternion.e0"] : self._at["quaternion.e0"] + 4].tolist()
-        v = row[self._at["velocity.u"] : self._at["velocity.u"] + 3].tolist()
-
-        def cross(a: list[float], b: list[float]) -> list[float]:
-            return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-
-        # R v = v + 2 e x (e x v + e0 v)
-        inner = [c + e0 * x for c, x in zip(cross(e, v), v, strict=True)]
-        return [x + 2.0 * c for x, c in zip(v, cross(e, inner), strict=True)]
+        at = self._at
+        R = rotation_matrix(row[at["quaternion.e0"] : at["quaternion.e0"] + 4])
+        with np.errstate(invalid="ignore", over="ignore"):
+            velocity: list[float] = (R @ row[at["velocity.u"] : at["velocity.u"] + 3]).tolist()  # (15)
+        return velocity
 
     def _heartbeat(self) -> Any:
         m = self._mavlink

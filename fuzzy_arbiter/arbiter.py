@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from numbers import Real
 from typing import Literal, get_args
 
 from fuzzy_arbiter import closed_form
@@ -46,8 +47,8 @@ class Arbiter:
         if engine == "closed":
             self._weights = closed_form.weights
         elif engine == "skfuzzy":
-            if points < 3:
-                raise DefinitionError(f"points is {points}, expected 3 or more")
+            if not isinstance(points, int) or points < 3:
+                raise DefinitionError(f"points is {points!r}, expected a whole number, 3 or more")
             from fuzzy_arbiter.scikit import ScikitEngine  # a second of imports, for those who ask for it
 
             self._weights = ScikitEngine(self.criteria, self.rules, points).weights
@@ -76,9 +77,9 @@ class Arbiter:
         if len(values) != len(self.criteria):
             raise MembershipError(f"{len(values)} memberships came, expected {len(self.criteria)}")
         for criterion, m in zip(self.criteria, values, strict=True):
-            if not 0.0 <= m <= 1.0:  # NaN fails too
-                raise MembershipError(f"{criterion.name}: membership is {m}, expected a number in [0, 1]")
-        return self._weights(values)
+            if not isinstance(m, Real) or not 0.0 <= m <= 1.0:  # NaN fails too
+                raise MembershipError(f"{criterion.name}: membership is {m!r}, expected a number in [0, 1]")
+        return self._weights([float(m) for m in values])
 
     def _in_order(self, memberships: Mapping[str, float]) -> list[float]:
         names = [c.name for c in self.criteria]

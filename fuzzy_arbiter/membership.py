@@ -23,4 +23,4 @@ def ramp(clearance: float, width: float) -> float:
         return 1.0
     if clearance >= width:
         return 0.0
-    return 1.0 - clearance / width
+    return 1.0 - clearance / width if width > 0.0 else clearance  # NaN alone comes to the latter

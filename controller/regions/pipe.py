@@ -52,7 +52,7 @@ def pipe(p: Array, q: Array) -> Evaluation:
         along = clamp((x * ex + y * ey + z * ez) / (ex * ex + ey * ey + ez * ez), 0.0, 1.0)
         x, y, z = x - along * ex, y - along * ey, z - along * ez
         distance = math.sqrt(x * x + y * y + z * z)
-        if distance < nearest:
+        if not distance >= nearest:  # so that NaN comes through
             nearest, nx, ny, nz = distance, x, y, z
     g = nearest - q[0]
     if nearest > 0.0:

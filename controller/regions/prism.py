@@ -31,7 +31,9 @@ class Prism:
         require(len(self.corners) >= 3, "prism", "corners", f"{len(self.corners)} points", "3 or more")
         require(self.bottom > self.top, "prism", "bottom", self.bottom, f"a depth below top ({self.top} m)")
         require(abs(_signed_area(self.corners)) > 0.0, "prism", "corners", "of no area", "a polygon")
-        require(not _crosses_itself(self.corners), "prism", "corners", "crossing itself", "a simple polygon")
+        require(
+            not _touches_itself(self.corners), "prism", "corners", "crossing or touching itself", "a simple polygon"
+        )
 
     def packed(self) -> tuple[float, ...]:
         """Return top, bottom, and the corners in the sense in which the outward normal is to the right."""
@@ -48,16 +50,33 @@ def _signed_area(corners: tuple[Vector2, ...]) -> float:
     return sum(a[0] * b[1] - b[0] * a[1] for a, b in zip(corners, corners[1:] + corners[:1], strict=True)) / 2.0
 
 
-def _crosses_itself(corners: tuple[Vector2, ...]) -> bool:
+def _touches_itself(corners: tuple[Vector2, ...]) -> bool:
+    """Return whether edges that are no neighbours have a point in common, or neighbours more than their corner."""
+
     def side(a: Vector2, b: Vector2, c: Vector2) -> float:
         return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
 
-    edges = list(zip(corners, corners[1:] + corners[:1], strict=True))
-    return any(
-        side(a, b, c) * side(a, b, d) < 0.0 and side(c, d, a) * side(c, d, b) < 0.0
-        for i, (a, b) in enumerate(edges)
-        for c, d in edges[i + 1 :]
-    )
+    def between(a: Vector2, b: Vector2, c: Vector2) -> bool:
+        """Return whether c, known to be on the line through a and b, lies between them."""
+        return min(a[0], b[0]) <= c[0] <= max(a[0], b[0]) and min(a[1], b[1]) <= c[1] <= max(a[1], b[1])
+
+    def meet(a: Vector2, b: Vector2, c: Vector2, d: Vector2) -> bool:
+        sides = side(a, b, c), side(a, b, d), side(c, d, a), side(c, d, b)
+        if sides[0] * sides[1] < 0.0 and sides[2] * sides[3] < 0.0:
+            return True
+        ends = ((a, b, c), (a, b, d), (c, d, a), (c, d, b))
+        return any(s == 0.0 and between(*end) for s, end in zip(sides, ends, strict=True))
+
+    n = len(corners)
+    edges = [(corners[i], corners[(i + 1) % n]) for i in range(n)]
+    for i, (a, b) in enumerate(edges):
+        _, c = edges[(i + 1) % n]
+        folds_back = side(a, b, c) == 0.0 and (b[0] - a[0]) * (c[0] - b[0]) + (b[1] - a[1]) * (c[1] - b[1]) <= 0.0
+        if a == b or folds_back:
+            return True
+        if any(meet(a, b, *edges[j]) for j in range(i + 2, n) if (j + 1) % n != i):
+            return True
+    return False
 
 
 @compiled
@@ -77,7 +96,7 @@ def prism(p: Array, q: Array) -> Evaluation:
         along = clamp((x * ex + y * ey) / (length * length), 0.0, 1.0)
         dx, dy = x - along * ex, y - along * ey
         distance = math.hypot(dx, dy)
-        if distance < nearest:
+        if not distance >= nearest:  # so that NaN comes through
             nearest = distance
             at_corner = distance > 0.0 and (along == 0.0 or along == 1.0)
             if at_corner:

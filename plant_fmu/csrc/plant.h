@@ -61,7 +61,7 @@ const char *plant_prepare(Plant *plant);
 /* Scales the quaternion to unit length. Returns 0 if it has none to scale, or is not finite. */
 int plant_normalise(double rigid[N_RIGID]);
 
-/* The fastest rate at which damping now makes a velocity decay, 1/s: what bounds the step of the integration. */
+/* A bound of the fastest rate at which damping now makes a velocity decay, 1/s: what limits the integration's step. */
 double plant_damping_rate(const Plant *plant, const double rigid[N_RIGID]);
 
 /* Time derivative of the rigid-body state under the body wrench tau. */

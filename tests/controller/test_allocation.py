@@ -57,6 +57,28 @@ def test_a_dead_thruster_in_the_way_stops_the_wrench_that_needs_it():
     assert B @ allocate([0.0, 0.0, -50.0, 0.0, 0.0, 0.0], high=high) == pytest.approx(np.zeros(6))
 
 
+@pytest.mark.parametrize("dead", range(8))
+@pytest.mark.parametrize("limits", ["direction", "per-thruster"])
+def test_the_rest_goes_on_without_a_dead_thruster(dead, limits):
+    rov = load_vehicle("bluerov2_heavy")
+    low, high = rov.thrust_min.copy(), rov.thrust_max.copy()
+    low[dead] = high[dead] = 0.0
+    allocation, forces = Allocation(rov.thruster_matrix, low, high, limits), np.empty(8)
+    for axis in range(6):
+        tau = np.eye(6)[axis] * (10.0 if axis < 3 else 0.5)
+        assert not allocation(tau, forces)
+        assert rov.thruster_matrix @ forces == pytest.approx(tau, abs=1e-12)
+        assert forces[dead] == 0.0
+
+
+def test_allocation_says_whether_it_cut():
+    forces = np.empty(8)
+    for limits in ("direction", "per-thruster"):
+        allocation = Allocation(B, LOW, HIGH, limits)
+        assert allocation(np.array([500.0, 0, 0, 0, 0, 0]), forces)
+        assert not allocation(np.array([5.0, 0, 0, 0, 0, 0]), forces)
+
+
 @pytest.mark.parametrize(
     "arguments", [(B, LOW[:7], HIGH), (B, LOW + 30.0, HIGH), (B[:5], LOW, HIGH), (B, LOW, HIGH, "some")]
 )

@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from controller import Gains, LawError, PrintedLaw, RegionValues, VehicleState
-from controller.printed_law import primary_error, secondary_error
+from controller.printed_law import primary_error, primary_potential, secondary_error, secondary_potential
 
 GAINS = Gains()
 IDENTITY = np.array([1.0, 0.0, 0.0, 0.0])
@@ -87,6 +87,32 @@ def test_force_at_the_papers_start():
     assert tau[0] > 0.0 and tau[2] > 0.0
 
 
+def test_errors_are_gradients_of_the_potentials():
+    """(18) of (16); (19) of (17) where the gradient of g has length 1."""
+    h, alphas = 1e-6, np.array([3.0, 5.0])
+    slope = (primary_potential(2.0 + h, 18.8) - primary_potential(2.0 - h, 18.8)) / (2 * h)
+    assert slope == pytest.approx(18.8 * primary_error(2.0, np.ones(1))[0])
+    values, unit = np.array([0.3, -0.2]), np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+    pushed = [(secondary_potential(values + s * h * axis, alphas)) for axis in np.eye(2) for s in (1, -1)]
+    slopes = np.array([pushed[0] - pushed[1], pushed[2] - pushed[3], 0.0]) / (2 * h)
+    assert slopes == pytest.approx(100.0 * secondary_error(values, unit, alphas / 100.0), abs=1e-8)
+
+
+def test_a_lost_measurement_is_no_peace():
+    assert np.isnan(primary_error(math.nan, np.ones(3))).all()
+    assert np.isnan(secondary_error(np.array([math.nan]), np.ones((1, 3)), np.ones(1))).all()
+
+
+def test_k_q_cancels():
+    taus = []
+    for k_q in (0.1, 100.0, 1e5):
+        law, tau = PrintedLaw(GAINS._replace(k_q=k_q), IDENTITY, 0.01), np.empty(6)
+        regions = regions_at([0.2], [[1.0, 2.0, 3.0]])
+        law.step(VehicleState(np.zeros(3), IDENTITY, np.zeros(6)), regions, regions, np.array([50.0]), tau)
+        taus.append([*tau, *law.estimate])
+    assert np.ptp(taus, axis=0) == pytest.approx(np.zeros(10), abs=1e-12)
+
+
 def test_satisfied_regions_push_not():
     assert primary_error(-1.0, np.ones(3)) == pytest.approx(np.zeros(3))
     assert secondary_error(np.array([-0.1]), np.ones((1, 3)), np.array([5.0])) == pytest.approx(np.zeros(3))
@@ -120,7 +146,15 @@ def test_gains_that_cannot_be_are_named(change, words):
         PrintedLaw(GAINS._replace(**change), IDENTITY, 0.001)
 
 
-@pytest.mark.parametrize(("attitude", "period"), [(np.array([1.0, 1.0, 0.0, 0.0]), 0.01), (IDENTITY, 0.0)])
+@pytest.mark.parametrize(
+    ("attitude", "period"),
+    [
+        (np.array([1.0, 1.0, 0.0, 0.0]), 0.01),
+        (np.array([1.0, 0.0, 0.0, 0.0, 0.0]), 0.01),
+        (IDENTITY, 0.0),
+        (IDENTITY, np.inf),
+    ],
+)
 def test_set_up_that_cannot_be_is_refused(attitude, period):
     with pytest.raises(LawError):
         PrintedLaw(GAINS, attitude, period)

@@ -220,6 +220,10 @@ def test_paper_regions_have_the_paper_values():
         (lambda: Ellipsoid((0.0, 0.0, 0.0), (1.0, -1.0, 1.0)), "semi_axes"),
         (lambda: Prism(((0.0, 0.0), (1.0, 0.0)), 0.0, 1.0), "corners"),
         (lambda: Prism(((0.0, 0.0), (1.0, 1.0), (1.0, 0.0), (0.0, 1.0)), 0.0, 1.0), "corners"),
+        (lambda: Prism(((0.0, 0.0), (1.0, 1.0), (2.0, 2.0), (2.0, 0.0), (1.0, 1.0), (0.0, 3.0)), 0.0, 1.0), "corners"),
+        (lambda: Prism(((0.0, 0.0), (2.0, 0.0), (2.0, 2.0), (2.0, 4.0), (2.0, 2.0), (0.0, 2.0)), 0.0, 1.0), "corners"),
+        (lambda: Prism(((0.0, 0.0), (2.0, 0.0), (2.0, 0.0), (0.0, 2.0)), 0.0, 1.0), "corners"),
+        (lambda: Prism(((0.0, 0.0), (2.0, 0.0), (2.0, 2.0), (1.0, 0.0), (0.0, 2.0)), 0.0, 1.0), "corners"),
         (lambda: Prism(((0.0, 0.0), (1.0, 0.0), (0.0, 1.0)), 1.0, 1.0), "bottom"),
         (lambda: Pipe(((0.0, 0.0, 0.0),), 1.0), "points"),
         (lambda: Pipe(((0.0, 0.0, 0.0), (0.0, 0.0, 0.0)), 1.0), "points"),
@@ -230,6 +234,24 @@ def test_paper_regions_have_the_paper_values():
 def test_regions_that_cannot_be_are_named(make, words):
     with pytest.raises(RegionError, match=words):
         make()
+
+
+@each_shape
+def test_a_lost_position_never_looks_safe(shape):
+    g, _, clearance = at(shape, (math.nan, math.nan, math.nan), "out")
+    assert math.isnan(g)
+    assert math.isnan(clearance)
+
+
+@each_shape
+def test_bounds_hold_the_shape(shape):
+    low, high = map(np.array, shape.bounds())
+    rng = np.random.default_rng(2)
+    points = rng.uniform(-5.0, 6.0, (20_000, 3))
+    inside = points[clearances_at(points, Region("r", shape, "in")) >= 0.0]
+    assert len(inside) >= 3
+    assert np.all(inside >= low - 1e-12)
+    assert np.all(inside <= high + 1e-12)
 
 
 def test_no_regions_at_all_is_a_scene_too():

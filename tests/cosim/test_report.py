@@ -89,11 +89,30 @@ def test_claims_carry_this_runs_numbers(shipped_run):
         (start, end), *_ = summary["intersection_windows"]
         assert f"{start:.3f} s to {end:.3f} s" in window.measured
         assert ("Never in" in reaching.measured) == (not summary["reached"])
-        assert ("states neither" in window.why) == (name != "paper")
+        assert ("no evidence" in window.why) == (name != "paper")
         assert f"{summary['min_clearance']['SR1']:+.3f} m" in avoiding.measured
         assert "At most 1" in single.measured
         assert "26.82 kN" in effort.measured
         assert ("Winds up" in adapting.why) == (name != "paper")
+
+
+def test_claims_know_of_thrusters(tmp_path):
+    overrides = ["arbiter.engine=closed", "time.duration=20", "actuation.through=thrusters"]
+    scenario = load_scenario("paper", overrides)
+    summary = run_scenario(scenario, tmp_path / "run", report=False).summary
+    assert summary["saturated_time"] == pytest.approx(7.145, abs=0.05)
+    reaching, window, *_, adapting = paper_claims(scenario, summary)
+    assert "never saturated" not in reaching.why
+    assert "thrusters' limits" in window.why
+    assert "Winds up" in adapting.why
+
+
+def test_claims_blame_no_sphere_that_was_not_entered(tmp_path):
+    scenario = load_scenario("paper", ["arbiter.engine=closed", "time.duration=1", "initial.position=[0,3,1]"])
+    summary = run_scenario(scenario, tmp_path / "run", report=False).summary
+    avoiding = paper_claims(scenario, summary)[2]
+    assert "sphere" not in avoiding.why
+    assert "starts" in avoiding.why
 
 
 def test_other_scenarios_are_not_held_against_the_paper(tmp_path):

@@ -115,6 +115,8 @@ def test_overrides_reach_every_depth(tmp_path):
         ("initial.quaternion=[1,1,0,0]", ["initial.quaternion", "length 1"]),
         ("plant.fmi=4", ["plant.fmi", "2, 3"]),
         ("plant.parameters.mass=nan", ["plant.parameters.mass", "finite"]),
+        ("plant.parameters.wrench_force_limit=5", ["plant.parameters.wrench_force_limit", "limit.force"]),
+        ("plant.parameters.current.x=0.5", ["plant.parameters.current.x", "plant.current"]),
         ("limit.force=-1", ["limit.force"]),
         ("goal=5", ["goal", "table"]),
         ("goal.type=sphear", ["goal.type", "'sphear'", "'sphere'"]),
@@ -139,6 +141,11 @@ def test_faults_are_named_in_one_line(override, words):
     assert "\n" not in said
     for word in words:
         assert word in said
+
+
+def test_a_limit_of_the_wrench_says_nothing_of_thrusters():
+    with pytest.raises(ScenarioError, match="limit"):
+        load_scenario("paper-limited", ["actuation.through=thrusters"])
 
 
 @pytest.mark.parametrize("missing", ["vehicle", "time", "initial", "goal"])

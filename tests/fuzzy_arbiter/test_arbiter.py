@@ -137,6 +137,8 @@ def test_memberships_may_be_named():
         ([0.1, math.nan, 0.3], "shape"),
         ([0.1, 0.2, 1.1], "depth"),
         ([-1e-9, 0.2, 0.3], "obstacle"),
+        ([None, 0.2, 0.3], "obstacle"),
+        (["exist", 0.2, 0.3], "obstacle"),
         ({"obstacle": 0.1, "shape": 0.2}, "depth: membership is missing"),
         ({"obstacle": 0.1, "shape": 0.2, "depth": 0.3, "dept": 0.3}, "dept: unknown"),
     ],
@@ -154,6 +156,7 @@ def test_bad_inputs_are_errors(engine, memberships, words):
         ({"criteria": [Criterion("a", "on", "on")]}, "both terms"),
         ({"engine": "fast"}, "closed, skfuzzy"),
         ({"engine": "skfuzzy", "points": 2}, "points"),
+        ({"engine": "skfuzzy", "points": 101.5}, "points"),
     ],
 )
 def test_bad_definitions_are_errors(arguments, words):
@@ -191,6 +194,7 @@ def test_ramp_is_one_up_to_the_boundary_and_falls_outside():
     assert [ramp(c, 0.2) for c in (-1.0, 0.0, 0.05, 0.2, 3.0)] == pytest.approx([1.0, 1.0, 0.75, 0.0, 0.0])
     assert [ramp(c, 0.0) for c in (-1e-9, 1e-9)] == [1.0, 0.0]
     assert math.isnan(ramp(math.nan, 0.2))
+    assert math.isnan(ramp(math.nan, 0.0))
 
 
 def test_alone_it_needs_neither_the_vehicle_nor_matplotlib():

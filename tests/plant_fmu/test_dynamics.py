@@ -1,7 +1,10 @@
 """The plant as physical laws."""
 
+import contextlib
+
 import numpy as np
 import pytest
+from fmpy.fmi1 import FMICallException
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
@@ -150,6 +153,29 @@ def test_euler_angles_are_those_of_the_quaternion(make_slave, initialised):
     e = slave.get(*STATES[3:7])
     yaw, pitch, roll = Rotation.from_quat(np.roll(e, -1)).as_euler("ZYX")
     assert slave.get("attitude.roll", "attitude.pitch", "attitude.yaw") == pytest.approx([roll, pitch, yaw], abs=1e-12)
+
+
+def test_straight_up_is_pitch_and_yaw(make_slave):
+    """Where roll and yaw are one, the angles still give the attitude back."""
+    slave = make_slave().start(**dict(zip(STATES[3:7], (0.5, -0.5, 0.5, 0.5), strict=True)))
+    roll, pitch, yaw = slave.get("attitude.roll", "attitude.pitch", "attitude.yaw")
+    assert (roll, pitch) == (0.0, pytest.approx(np.pi / 2))
+    expected = Rotation.from_quat([-0.5, 0.5, 0.5, 0.5]).as_matrix()
+    assert Rotation.from_euler("ZYX", [yaw, pitch, roll]).as_matrix() == pytest.approx(expected, abs=1e-12)
+
+
+def test_the_guard_bounds_the_fastest_damping_of_any_mass_matrix(make_slave):
+    """Coupled added mass damps faster than its diagonal tells: such a step is refused, not grown."""
+    coupled = {f"added_mass[{i + 1},{j + 1}]": 0.0 for i in range(6) for j in range(i, 6)}
+    coupled |= {f"added_mass[{i},{i}]": 90.0 for i in (1, 2, 3)} | {"added_mass[1,2]": 80.0, "added_mass[2,3]": 80.0}
+    coupled |= {"added_mass[1,3]": 80.0, "mass": 10.0, "linear_damping[1]": 1.2e4, "linear_damping[2]": 1.2e4}
+    slave = make_slave().start(**asymmetric(**coupled, **{"velocity.u": 1e-6, "velocity.v": -1e-6}))
+    grown = 0.0
+    with contextlib.suppress(FMICallException):
+        for _ in range(40):
+            slave.step(0.005)
+            grown = max(grown, *np.abs(slave.get("velocity.u", "velocity.v")))
+    assert grown < 1e-3
 
 
 # ---- actuators ----
