@@ -26,7 +26,7 @@ class VehicleState:
 
 @dataclass(frozen=True, eq=False)
 class RegionValues:
-    """What `controller.regions.evaluate` says of n regions."""
+    """What `controller.regions.PackedRegions.evaluate` says of n regions."""
 
     values: Array  # (n,) g_i
     gradients: Array  # (n, 3) dg_i/dp, world frame

@@ -1,7 +1,7 @@
 """The co-simulation master: one step of plant, arbiter and controller, from measuring to publishing.
 
 Read `Master.run` from top to bottom: each stage is one call. Observers see the row of signals when a step is done; they
-can neither slow nor break the stepper.
+copy what they keep, and cannot change it.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from typing import Protocol
 import numpy as np
 
 from controller import Allocation, Law, PrintedLaw, RegionValues, VehicleState
-from controller.regions import Region, evaluate, pack
+from controller.regions import Region, pack
 from cosim.plant import Plant
 from cosim.scenario import CRITERIA, Scenario
 from cosim.signals import Array, Column, Signals
@@ -124,6 +124,8 @@ class Master:
             If the FMU fails in a step.
         """
         scenario, row = self.scenario, self.signals.row
+        seen = row.view()
+        seen.flags.writeable = False
         step, last = scenario.time.step, scenario.steps
         started = time.perf_counter()
         for k in range(last + 1):
@@ -138,7 +140,7 @@ class Master:
             if k < last:
                 self._advance(k * step, step)
             for observer in observers:
-                observer.observe(k, row)
+                observer.observe(k, seen)
             if rate is not None:
                 time.sleep(max(0.0, started + (k + 1) * step / rate - time.perf_counter()))
 
@@ -148,17 +150,7 @@ class Master:
         self._measured[:] = self._plant_measured
 
     def _evaluate_regions(self) -> None:
-        scene = self._scene
-        evaluate(
-            self.state.position,
-            scene.kinds,
-            scene.signs,
-            scene.offsets,
-            scene.numbers,
-            self._values,
-            self._gradients,
-            self._clearances,
-        )
+        self._scene.evaluate(self.state.position, self._values, self._gradients, self._clearances)
 
     def _arbitrate(self) -> None:
         """Turn clearances into memberships, of the most pressing region of each criterion, and these into weights."""

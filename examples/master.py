@@ -3,7 +3,7 @@
 import numpy as np
 
 from controller import Gains, PrintedLaw, RegionValues, VehicleState
-from controller.regions import Region, Sphere, evaluate, pack
+from controller.regions import Region, Sphere, pack
 from cosim.plant import Plant
 from fuzzy_arbiter import Arbiter, ramp
 from plant_fmu import cached_fmu, load_vehicle
@@ -24,7 +24,7 @@ with Plant(cached_fmu(load_vehicle("odin"), fmi=3)) as plant:
     for k in range(round(DURATION / STEP)):
         out = plant.output_values
         state = VehicleState(position=out[0:3], quaternion=out[3:7], velocity_body=out[7:13])
-        evaluate(state.position, scene.kinds, scene.signs, scene.offsets, scene.numbers, values, gradients, clearances)
+        scene.evaluate(state.position, values, gradients, clearances)
         weights = arbiter({"obstacle": ramp(clearances[1], 0.2), "shape": 0.0, "depth": 0.0})
         goal = RegionValues(values[:1], gradients[:1], clearances[:1])
         rocks = RegionValues(values[1:], gradients[1:], clearances[1:])

@@ -8,7 +8,7 @@ from controller.regions.ellipsoid import Ellipsoid
 from controller.regions.half_space import HalfSpace
 from controller.regions.pipe import Pipe
 from controller.regions.prism import Prism
-from controller.regions.region_set import SHAPES, PackedRegions, Region, clearances_at, evaluate, pack
+from controller.regions.region_set import SHAPES, PackedRegions, Region, clearances_at, evaluate_packed, pack
 from controller.regions.shape import Shape
 from controller.regions.sphere import Sphere
 
@@ -27,6 +27,6 @@ __all__ = [
     "Shape",
     "Sphere",
     "clearances_at",
-    "evaluate",
+    "evaluate_packed",
     "pack",
 ]

@@ -60,6 +60,22 @@ class PackedRegions:
     offsets: NDArray[np.int64]  # (n + 1,) into numbers
     numbers: Array  # what each shape's function reads, one behind the other
 
+    def evaluate(self, position: Array, values: Array, gradients: Array, clearances: Array) -> None:
+        """Evaluate every region at a position, into the given arrays.
+
+        Parameters
+        ----------
+        position : ndarray, shape (3,)
+            [m, NED].
+        values : ndarray, shape (n,)
+            Receives g_i, at most 0 where satisfied, in the unit of the shape.
+        gradients : ndarray, shape (n, 3)
+            Receives dg_i/dp.
+        clearances : ndarray, shape (n,)
+            Receives the distance to the surface [m]: positive where satisfied, negative where violated.
+        """
+        evaluate_packed(position, self.kinds, self.signs, self.offsets, self.numbers, values, gradients, clearances)
+
 
 def pack(regions: Sequence[Region]) -> PackedRegions:
     """Turn regions into arrays.
@@ -105,7 +121,7 @@ def _evaluate_shape(kind: int, p: Array, q: Array) -> Evaluation:
 
 
 @compiled
-def evaluate(
+def evaluate_packed(
     position: Array,
     kinds: NDArray[np.int64],
     signs: Array,
@@ -115,21 +131,7 @@ def evaluate(
     gradients: Array,
     clearances: Array,
 ) -> None:
-    """Evaluate every region at a position, into the given arrays.
-
-    Parameters
-    ----------
-    position : ndarray, shape (3,)
-        [m, NED].
-    kinds, signs, offsets, numbers : ndarray
-        The fields of `PackedRegions`.
-    values : ndarray, shape (n,)
-        Receives g_i, at most 0 where satisfied, in the unit of the shape.
-    gradients : ndarray, shape (n, 3)
-        Receives dg_i/dp.
-    clearances : ndarray, shape (n,)
-        Receives the distance to the surface [m]: positive where satisfied, negative where violated.
-    """
+    """Do what `PackedRegions.evaluate` says, for compiled callers: `kinds` to `numbers` are its fields."""
     for i in range(kinds.size):
         g, gx, gy, gz, distance = _evaluate_shape(kinds[i], position, numbers[offsets[i] : offsets[i + 1]])
         values[i] = signs[i] * g
@@ -152,7 +154,7 @@ def clearances_at(points: Array, region: Region) -> Array:
     Returns
     -------
     ndarray, shape (m,)
-        As `evaluate` gives it [m].
+        As `PackedRegions.evaluate` gives it [m].
     """
     packed = pack([region])
     return _clearances_at(points, packed.kinds[0], packed.signs[0], packed.numbers)

@@ -4,11 +4,11 @@ import numpy as np
 
 from controller import compiled as module
 from controller.compiled import compiled
-from controller.regions import evaluate
+from controller.regions import evaluate_packed
 
 
 def test_cached_functions_carry_the_stamp_of_all_sources():
-    assert evaluate._cache._cache_file._source_stamp == module._sources()
+    assert evaluate_packed._cache._cache_file._source_stamp == module._sources()
 
 
 def test_without_numbas_insides_nothing_is_cached(monkeypatch):

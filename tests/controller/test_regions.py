@@ -25,7 +25,6 @@ from controller.regions import (
     Region,
     Sphere,
     clearances_at,
-    evaluate,
     pack,
 )
 
@@ -51,9 +50,7 @@ def at(shape, p, keep="in"):
     """Return g, its gradient and the clearance."""
     packed = pack([Region("r", shape, keep)])
     values, gradients, clearances = np.empty(1), np.empty((1, 3)), np.empty(1)
-    evaluate(
-        np.asarray(p, float), packed.kinds, packed.signs, packed.offsets, packed.numbers, values, gradients, clearances
-    )
+    packed.evaluate(np.asarray(p, float), values, gradients, clearances)
     return values[0], gradients[0], clearances[0]
 
 
@@ -257,9 +254,7 @@ def test_bounds_hold_the_shape(shape):
 def test_no_regions_at_all_is_a_scene_too():
     packed = pack([])
     nothing = np.empty(0)
-    evaluate(
-        np.zeros(3), packed.kinds, packed.signs, packed.offsets, packed.numbers, nothing, np.empty((0, 3)), nothing
-    )
+    packed.evaluate(np.zeros(3), nothing, np.empty((0, 3)), nothing)
 
 
 @pytest.mark.parametrize("cls", SHAPES.values())
