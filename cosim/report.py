@@ -148,8 +148,11 @@ def verdict(summary: dict[str, Any]) -> str:
     force = (
         f" The law asked for up to {newtons(summary['max_force_asked'])}; up to {newtons(summary['max_force'])} acted."
     )
-    ended = f" The run {summary['status']} at {summary['simulated_time']:.3f} s."
-    return goal + kept + force + (ended if summary["status"] != "completed" else "")
+    ended = {
+        "completed": "",
+        "interrupted": f" The run was interrupted at {summary['simulated_time']:.3f} s.",
+    }.get(summary["status"], f" The run {summary['status']}.")
+    return goal + kept + force + ended
 
 
 def _claims(scenario: Scenario, summary: dict[str, Any]) -> str:
