@@ -3,6 +3,8 @@
 #include <math.h>
 #include <string.h>
 
+static const double LEAST_QUATERNION = 1e-6; /* length below which a quaternion has no direction */
+
 /* ---- small linear algebra ---------------------------------------------------------------------------------- */
 
 static void cross(const double a[3], const double b[3], double out[3])
@@ -21,10 +23,11 @@ static void multiply6(const double A[6][6], const double x[6], double out[6])
     }
 }
 
-/* Rotation from body to world (3); a quaternion slightly off unit length still gives a pure rotation. */
+/* Rotation from body to world (3); a quaternion off unit length still gives a pure rotation, and none at all identity. */
 static void rotation(const double e[4], double R[3][3])
 {
-    const double s = 2.0 / (e[0] * e[0] + e[1] * e[1] + e[2] * e[2] + e[3] * e[3]);
+    const double square = e[0] * e[0] + e[1] * e[1] + e[2] * e[2] + e[3] * e[3];
+    const double s = square > LEAST_QUATERNION * LEAST_QUATERNION ? 2.0 / square : 0.0;
 
     R[0][0] = 1.0 - s * (e[2] * e[2] + e[3] * e[3]);
     R[0][1] = s * (e[1] * e[2] - e[0] * e[3]);
@@ -266,7 +269,7 @@ int plant_normalise(double rigid[N_RIGID])
     double *e = rigid + 3;
     const double norm = sqrt(e[0] * e[0] + e[1] * e[1] + e[2] * e[2] + e[3] * e[3]);
 
-    if (!(norm > 1e-6 && norm < 1e6))
+    if (!(norm > LEAST_QUATERNION && norm < 1.0 / LEAST_QUATERNION))
         return 0;
     for (int i = 0; i < 4; i++)
         e[i] /= norm;
