@@ -55,7 +55,7 @@ def header(vehicle: Vehicle, token: str) -> str:
         for v in rows:
             if (v.role == "flag") == flags:
                 role = "OUTPUT" if flags else v.role.upper()
-                numbers = ", ".join(_number(x) for x in (v.start, v.minimum, v.maximum))
+                numbers = ", ".join(_number(x) for x in (v.start, v.quantity.minimum, v.quantity.maximum))
                 lines.append(f'    {{"{v.name}", {role}, AT({v.member}), {numbers}}}, \\')
         lines[-1] = lines[-1].removesuffix(" \\")
         lines.append("")
@@ -157,12 +157,12 @@ def _add_variable(parent: ET.Element, vr: int, v: Variable, fmi: int) -> None:
     if v.role in _INITIAL:
         common["initial"] = _INITIAL[v.role]
     kind: dict[str, str] = {}
-    if v.unit:
-        kind["unit"] = v.unit
-    if v.unit == "rad":
+    if v.quantity.unit:
+        kind["unit"] = v.quantity.unit
+    if v.quantity.unit == "rad":
         kind["displayUnit"] = "deg"
     if v.role not in ("time", "flag"):
-        kind |= {"min": _number(v.minimum), "max": _number(v.maximum), "nominal": _number(v.nominal)}
+        kind |= {"min": _number(v.quantity.minimum), "max": _number(v.quantity.maximum), "nominal": _number(v.nominal)}
     if v.role in ("state", "input", "parameter"):
         kind["start"] = _number(v.start)
 
@@ -225,8 +225,12 @@ def documentation(vehicle: Vehicle) -> str:
         ]
         for v in variables(vehicle):
             if v.role == role:
-                numbers = ["", "", ""] if role == "flag" else [f"{x:g}" for x in (v.start, v.minimum, v.maximum)]
+                numbers = (
+                    ["", "", ""]
+                    if role == "flag"
+                    else [f"{x:g}" for x in (v.start, v.quantity.minimum, v.quantity.maximum)]
+                )
                 if role == "output":
                     numbers[0] = ""
-                lines.append(f"| `{v.name}` | {v.unit} | {' | '.join(numbers)} | {v.description} |")
+                lines.append(f"| `{v.name}` | {v.quantity.unit} | {' | '.join(numbers)} | {v.description} |")
     return "\n".join([*lines, ""])

@@ -27,10 +27,10 @@ def test_every_variable_has_what_a_user_needs():
     assert len({v.name for v in rows}) == len({v.member for v in rows}) == len(rows)
     for v in rows:
         assert v.description
-        assert v.unit in UNITS or v.unit == ""
+        assert v.quantity.unit in UNITS or v.quantity.unit == ""
         if v.role not in ("time", "flag"):
-            assert v.minimum < v.maximum
-            assert v.minimum <= v.start <= v.maximum
+            assert v.quantity.minimum < v.quantity.maximum
+            assert v.quantity.minimum <= v.start <= v.quantity.maximum
             assert v.nominal > 0.0
 
 
