@@ -36,7 +36,10 @@ def compiled(function: F) -> F:
     callable
         The same, compiled at its first call.
     """
-    jitted: Any = numba.njit(cache=True, error_model="numpy")(function)
+    try:
+        jitted: Any = numba.njit(cache=True, error_model="numpy")(function)
+    except RuntimeError:  # there is no place to keep it
+        jitted = numba.njit(error_model="numpy")(function)
     # Numba takes a cached function for current while its own file is, although what it calls may stand in another one.
     # Stamp it with all sources of the package; should Numba's insides move, rather keep nothing on disk than old code.
     try:

@@ -104,8 +104,12 @@ def calibrate(scenario: Scenario) -> Fit:
     Raises
     ------
     ScenarioError
-        If the scenario names no regions that overlap.
+        If the scenario names no regions that overlap, its path misses them, or it drives thrusters.
     """
+    if scenario.actuation.through != "wrench":
+        raise ScenarioError(
+            "actuation.through is 'thrusters', expected 'wrench': limit and lag are of the direct force"
+        )
     if not scenario.intersection:
         raise ScenarioError("intersection: names no regions, expected those whose overlap is to be fitted")
 
@@ -122,5 +126,7 @@ def calibrate(scenario: Scenario) -> Fit:
     bounds = tuple(np.array(pair) for pair in zip(np.log(FORCE_BOUNDS), LAG_BOUNDS, strict=True))
     inside = np.clip(best, bounds[0] + 1e-6, bounds[1] - 1e-6)
     fit = least_squares(residuals, inside, bounds=bounds, diff_step=1e-3, x_scale=[1.0, 0.5], xtol=1e-6)
+    if np.any(np.abs(fit.fun) >= _MISSED):
+        raise ScenarioError("no limit and lag within the bounds bring the vehicle through the overlap in time")
     force, time_constant = math.exp(fit.x[0]), float(fit.x[1])
     return Fit(force, time_constant, window(scenario, force, time_constant), float(fit.cost))

@@ -73,7 +73,7 @@ def _reaching(summary: dict[str, Any]) -> Claim:
         measured = f"Never in; closest {summary['closest_to_goal']:.2f} m from the region's surface."
         why = "See the estimate below: adaptation (27) goes on while the actuators give less than the law asks for."
         if summary["saturated_time"] == 0.0:
-            why = "The actuators were never saturated; the cause is another."
+            why = f"The actuators were never saturated; the run is {summary['simulated_time']:g} s long."
     return Claim("The vehicle converges into the primary sub-region (Fig. 5, 6).", measured, why)
 
 
@@ -87,7 +87,7 @@ def _window(scenario: Scenario, summary: dict[str, Any]) -> Claim:
     )
     stated = f"The regions' intersection is crossed at {PAPER_WINDOW[0]} s to {PAPER_WINDOW[1]} s (Fig. 8)."
     if not windows:
-        return Claim(stated, measured, "The path misses the overlap.")
+        return Claim(stated, measured, f"In {summary['simulated_time']:g} s the path did not meet the overlap.")
     first = windows[0]
     limits = [f"a body force of at most {newtons(scenario.limit.force)}"] if scenario.limit.force < math.inf else []
     limits += [f"a lag of {scenario.limit.time_constant:g} s"] if scenario.limit.time_constant > 0.0 else []
@@ -150,9 +150,13 @@ def _effort(scenario: Scenario, summary: dict[str, Any]) -> Claim:
 def _adapting(summary: dict[str, Any]) -> Claim:
     final, true = summary["estimate_final"][0], summary["estimate_true"][0]
     low, high = summary["estimate_lowest"][0], summary["estimate_highest"][0]
-    measured = f"φ̂1 between {low:.2f} and {high:.2f} N, at the end {final:.2f} N; true {true:.2f} N."
+    lever, true_lever = summary["estimate_final"][3], summary["estimate_true"][3]
+    measured = (
+        f"φ̂1 between {low:.2f} and {high:.2f} N, at the end {final:.2f} N; true {true:.2f} N. "
+        f"φ̂4 at the end {lever:.2f} N m; true {true_lever:.2f} N m."
+    )
     if abs(final - true) < 1.0:
-        why = "Ends within 1 N of the truth."
+        why = "φ̂1, weight less buoyancy, ends within 1 N of the truth."
     elif summary["saturated_time"] > 0.0:
         why = (
             f"Winds up: the actuators were saturated for {summary['saturated_time']:.1f} s, "

@@ -1,22 +1,21 @@
-"""The ``cosim`` command."""
+"""The ``cosim`` command.
+
+Nothing heavy is imported before a verb needs it, so that help comes at once and Ctrl-C is heeded from the start.
+"""
 
 from __future__ import annotations
 
 import argparse
-import itertools
+import contextlib
 import logging
+import os
+import signal
 import sys
 from collections.abc import Sequence
-from datetime import datetime
 from importlib import metadata
 from pathlib import Path
 
-from controller import ControllerError
-from cosim.errors import CosimError
-from fuzzy_arbiter import ArbiterError
-from plant_fmu import PlantFmuError
-
-_USER_ERRORS = (CosimError, PlantFmuError, ControllerError, ArbiterError)
+INTERRUPTED = 130  # exit code after Ctrl-C
 
 _EPILOG = """examples:
   cosim run paper
@@ -34,7 +33,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--version", action="version", version=f"cosim {metadata.version('subreach')}")
     parser.add_argument("-v", "--verbose", action="store_true", help="log what happens inside")
-    verbs = parser.add_subparsers(dest="verb", required=True, metavar="{run,list,show,calibrate}")
+    verbs = parser.add_subparsers(dest="verb", required=True, metavar="{run,report,list,show,calibrate}")
 
     run = verbs.add_parser("run", help="run a scenario and write its folder")
     run.add_argument("scenario", help="a shipped name (see cosim list), or a TOML file")
@@ -54,6 +53,9 @@ def _parser() -> argparse.ArgumentParser:
     )
     run.add_argument("--no-report", action="store_true", help="leave out the report and its figures")
 
+    report = verbs.add_parser("report", help="write summary and report of a run again, or of a killed one")
+    report.add_argument("folder", type=Path, metavar="DIR", help="the run folder")
+
     verbs.add_parser("list", help="list the shipped scenarios")
 
     show = verbs.add_parser("show", help="print a scenario with every default filled in")
@@ -72,8 +74,8 @@ def _rate(text: str) -> float | None:
         value = float(text)
     except ValueError:
         value = 0.0
-    if not 0.0 < value < float("inf"):
-        raise argparse.ArgumentTypeError(f"{text!r}: expected a number above 0, or max")
+    if not 1e-3 <= value <= 1e6:
+        raise argparse.ArgumentTypeError(f"{text!r}: expected a number from 0.001 to 1e6, or max")
     return value
 
 
@@ -91,15 +93,41 @@ def main(arguments: Sequence[str] | None = None) -> int:
         0; 2 where the user must mend something; 130 after Ctrl-C.
     """
     options = _parser().parse_args(arguments)
-    logging.basicConfig(level=logging.DEBUG if options.verbose else logging.WARNING, format="%(name)s: %(message)s")
+    _log(options.verbose)
     try:
-        return _VERBS[options.verb](options)
-    except _USER_ERRORS as error:
-        print(f"cosim: {error}", file=sys.stderr)
-        return 2
+        code = _guarded(options)
+        sys.stdout.flush()
     except KeyboardInterrupt:
         print("cosim: interrupted", file=sys.stderr)
-        return 130
+        return INTERRUPTED
+    except BrokenPipeError:  # who read our output has gone: no more of it, at exit neither
+        with contextlib.suppress(OSError):
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+    except OSError as error:
+        print(f"cosim: {error.strerror or error}", file=sys.stderr)
+        return 2
+    return code
+
+
+def _guarded(options: argparse.Namespace) -> int:
+    """Run the verb, and say in one line what the user must mend."""
+    from controller import ControllerError
+    from cosim.errors import CosimError
+    from fuzzy_arbiter import ArbiterError
+    from plant_fmu import PlantFmuError
+
+    try:
+        return _VERBS[options.verb](options)
+    except (CosimError, PlantFmuError, ControllerError, ArbiterError) as error:
+        print(f"cosim: {error}", file=sys.stderr)
+        return 2
+
+
+def _log(verbose: bool) -> None:
+    logging.basicConfig(level=logging.WARNING, format="%(name)s: %(message)s")
+    for package in ("fuzzy_arbiter", "plant_fmu", "controller", "cosim"):
+        logging.getLogger(package).setLevel(logging.DEBUG if verbose else logging.WARNING)
 
 
 def _run(options: argparse.Namespace) -> int:
@@ -109,18 +137,23 @@ def _run(options: argparse.Namespace) -> int:
     from cosim.telemetry import parse_endpoint
 
     scenario = load_scenario(options.scenario, options.overrides)
-    mavlink = parse_endpoint(options.mavlink, options.allow_remote) if options.mavlink else None
-    out = options.out or _new_folder(Path("runs") / f"{scenario.name}-{datetime.now():%Y%m%d-%H%M%S}")
-    run = run_scenario(scenario, out, mavlink, options.rate, progress=True, report=not options.no_report)
+    mavlink = parse_endpoint(options.mavlink, options.allow_remote) if options.mavlink is not None else None
+    # a polite kill leaves a readable run too
+    with contextlib.suppress(ValueError):  # which signal raises outside the main thread
+        signal.signal(signal.SIGTERM, signal.default_int_handler)
+    run = run_scenario(scenario, options.out, mavlink, options.rate, progress=True, report=not options.no_report)
     print(verdict(run.summary))
     print(run.folder / ("summary.json" if options.no_report else "report.html"))
-    return 130 if run.summary["status"] == "interrupted" else 0
+    return INTERRUPTED if run.summary["status"] == "interrupted" else 0
 
 
-def _new_folder(wanted: Path) -> Path:
-    """Return the folder that is wanted, or one of a similar name that does not exist yet."""
-    numbered = (wanted.with_name(f"{wanted.name}-{i}") for i in itertools.count(2))
-    return next(folder for folder in itertools.chain([wanted], numbered) if not folder.exists())
+def _report(options: argparse.Namespace) -> int:
+    from cosim.report import verdict
+    from cosim.run_folder import report_again
+
+    print(verdict(report_again(options.folder)))
+    print(options.folder / "report.html")
+    return 0
 
 
 def _list(options: argparse.Namespace) -> int:
@@ -149,4 +182,4 @@ def _calibrate(options: argparse.Namespace) -> int:
     return 0
 
 
-_VERBS = {"run": _run, "list": _list, "show": _show, "calibrate": _calibrate}
+_VERBS = {"run": _run, "report": _report, "list": _list, "show": _show, "calibrate": _calibrate}

@@ -29,7 +29,7 @@ def drawings(story: Story) -> Iterator[Drawing]:
         ("path-3d", "Path in space (after Fig. 5a). X marks the start, I the overlap of regions.", in_space.path_3d),
         (
             "path-plane",
-            "Path from the side and from above (after Fig. 5b); regions as silhouettes.",
+            "Path from the side and above (after Fig. 5b); regions as silhouettes, dashed to be kept within.",
             in_space.path_plane,
         ),
         (

@@ -16,6 +16,7 @@ from cosim.signals import Array
 
 _GRID = 140  # points a side, where outlines of regions are searched
 _SLICES = 41  # along the line of sight
+_TALLEST = 10.0  # inches
 
 
 def path_3d(story: Story) -> Figure:
@@ -57,7 +58,8 @@ def path_plane(story: Story) -> Figure:
     scenario, record = story.scenario, story.record
     low, high = _extent(scenario, record)
     side, top = high[2] - low[2], high[1] - low[1]
-    figure = Figure(figsize=(6.8, 2.0 + 6.0 * (side + top) / (high[0] - low[0])), layout="constrained")
+    height = min(2.0 + 6.0 * (side + top) / (high[0] - low[0]), _TALLEST)
+    figure = Figure(figsize=(6.8, height), layout="constrained")
     axes = figure.subplots(2, 1, sharex=True, height_ratios=[side, top])
     for ax, vertical, other, label in zip(axes, (2, 1), (1, 2), ("depth z [m]", "east y [m]"), strict=True):
         u, v = np.linspace(low[0], high[0], _GRID), np.linspace(low[vertical], high[vertical], _GRID)
@@ -65,7 +67,8 @@ def path_plane(story: Story) -> Figure:
             inside = _silhouette(region, u, v, vertical, np.linspace(low[other], high[other], _SLICES))
             if inside.max() > 0.0 > inside.min():
                 ax.contourf(u, v, inside, levels=[0.0, np.inf], colors=[colour], alpha=0.15)
-                ax.contour(u, v, inside, levels=[0.0], colors=[colour], linewidths=1.2)
+                dashes = "solid" if region.keep == "out" else "dashed"
+                ax.contour(u, v, inside, levels=[0.0], colors=[colour], linewidths=1.2, linestyles=dashes)
         ax.plot(*_thin_path(record.stack(["position.x", f"position.{'xyz'[vertical]}"])).T, color=PATH_COLOUR)
         ax.plot(record["position.x"][0], record[f"position.{'xyz'[vertical]}"][0], "x", color=BLACK, mew=2)
         ax.set_ylabel(label)
@@ -94,6 +97,12 @@ def _extent(scenario: Scenario, record: Record) -> tuple[Array, Array]:
     goal = np.array(scenario.goal.bounds())
     goal = np.where(np.isfinite(goal), goal, path[0])  # an endless goal needs no room
     points = np.vstack([path, goal])
+    low, high = points.min(axis=0), points.max(axis=0)
+    near = 0.5 * (high - low).max()
+    for secondary in scenario.regions:  # with the regions that are not far away
+        bounds = np.array(secondary.region.shape.bounds())
+        if np.isfinite(bounds).all() and (bounds[1] >= low - near).all() and (bounds[0] <= high + near).all():
+            points = np.vstack([points, np.clip(bounds, low - near, high + near)])
     low, high = points.min(axis=0), points.max(axis=0)
     room = np.maximum(0.06 * (high - low).max(), (1.2 - (high - low)) / 2.0)
     return low - room, high + room

@@ -21,6 +21,7 @@ from cosim.signals import Array, Column, Signals
 from fuzzy_arbiter import Arbiter, ramp
 from plant_fmu import cached_fmu
 
+_LONGEST_SLEEP = 3600.0  # s
 _STATE = 16  # outputs measured before a step: position, quaternion, velocity, attitude
 
 
@@ -73,11 +74,11 @@ class Master:
         try:
             self.plant.set(_start_values(scenario))
             self.plant.initialise()
+            self.signals = Signals(_columns(scenario, self.plant))
+            self._bind()
         except BaseException:
             self.plant.close()
             raise
-        self.signals = Signals(_columns(scenario, self.plant))
-        self._bind()
 
     def _bind(self) -> None:
         """Name the parts of the row, and the buffers beside it."""
@@ -107,7 +108,7 @@ class Master:
         self._inputs = inputs
 
     def run(self, observers: Sequence[Observer] = (), rate: float | None = None) -> None:
-        """Step from time 0 to the end, telling the observers of each step.
+        """Step from time 0 to the end, once, telling the observers of each step.
 
         The row of step k holds what was measured and decided at its beginning, and the forces that acted at its end.
 
@@ -142,7 +143,7 @@ class Master:
             for observer in observers:
                 observer.observe(k, seen)
             if rate is not None:
-                time.sleep(max(0.0, started + (k + 1) * step / rate - time.perf_counter()))
+                time.sleep(min(max(0.0, started + (k + 1) * step / rate - time.perf_counter()), _LONGEST_SLEEP))
 
     # ---- the stages of a step ----
 

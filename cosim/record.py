@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+import time
+from collections import OrderedDict
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +17,8 @@ from cosim.signals import Array, Column
 
 RECORD = "record.parquet"
 _PARTS = "record.parts"  # what a killed run leaves
+_PART_SECONDS = 1.0  # of the wall clock, after which a part is written even if it is small
+_KEPT = 24  # signals that a record keeps in memory
 
 
 class Recorder:
@@ -28,7 +31,7 @@ class Recorder:
     columns : sequence of Column
         Of the rows that will come.
     rows_per_part : int
-        A part is written when so many rows have come.
+        A part is written when so many rows have come, or a second of the wall clock has passed.
 
     Attributes
     ----------
@@ -42,12 +45,13 @@ class Recorder:
         self._block: Array = np.empty((rows_per_part, len(columns)))
         self._filled = 0
         self._parts = 0
+        self._flushed = time.monotonic()
         self.rows = 0
         (folder / _PARTS).mkdir()
 
     def observe(self, k: int, row: Array) -> None:
         """Keep the row of step `k`."""
-        if self._filled == len(self._block):
+        if self._filled == len(self._block) or (self._filled and time.monotonic() - self._flushed > _PART_SECONDS):
             self._flush()
         self._block[self._filled] = row
         self._filled += 1
@@ -65,39 +69,66 @@ class Recorder:
         shutil.rmtree(self._folder / _PARTS)
 
     def _flush(self) -> None:
-        if not self._filled:
+        filled, self._filled = self._filled, 0
+        if not filled:
             return
-        columns = [pa.array(column) for column in np.ascontiguousarray(self._block[: self._filled].T)]
+        columns = [pa.array(column) for column in np.ascontiguousarray(self._block[:filled].T)]
         part = self._folder / _PARTS / f"{self._parts:06}.parquet"
         scratch = part.with_suffix(".tmp")
         pq.write_table(pa.Table.from_arrays(columns, schema=self._schema), scratch, **_WRITING)
         scratch.replace(part)
         self._parts += 1
-        self._filled = 0
+        self._flushed = time.monotonic()
 
 
 # measured: bytes of a float64 column compress best when they are split by place, and dictionaries only cost
 _WRITING = {"compression": "zstd", "use_dictionary": False, "use_byte_stream_split": True}
 
 
-@dataclass(frozen=True, eq=False)
 class Record:
-    """A run's signals, each an array over its steps."""
+    """A run's signals, each an array over its steps, read from the files when they are asked for.
 
-    columns: Mapping[str, Array]  # by name, all of one length
-    units: Mapping[str, str]  # by name
+    Parameters
+    ----------
+    files : sequence of Path
+        Parquet files of one schema, one behind the other.
+
+    Attributes
+    ----------
+    units : dict
+        Unit of each signal, by name, in the order of the columns.
+
+    Raises
+    ------
+    RunError
+        If they cannot be read.
+    """
+
+    def __init__(self, files: Sequence[Path]) -> None:
+        self._files = [_opened(file) for file in files]
+        schema = self._files[0].schema_arrow
+        self.units: dict[str, str] = {f.name: (f.metadata or {}).get(b"unit", b"").decode() for f in schema}
+        self._kept: OrderedDict[str, Array] = OrderedDict()
 
     def __getitem__(self, name: str) -> Array:
         """Return one signal, shape (steps,)."""
-        return self.columns[name]
+        if name not in self.units:
+            raise KeyError(name)
+        if name not in self._kept:
+            parts = [file.read(columns=[name])[name].to_numpy() for file in self._files]
+            self._kept[name] = np.concatenate(parts)
+        self._kept.move_to_end(name)
+        while len(self._kept) > _KEPT:
+            self._kept.popitem(last=False)
+        return self._kept[name]
 
     def stack(self, names: Sequence[str]) -> Array:
         """Return several signals side by side, shape (steps, len(names))."""
-        return np.column_stack([self.columns[name] for name in names])
+        return np.column_stack([self[name] for name in names])
 
 
 def load_record(folder: Path) -> Record:
-    """Read the record of a run, whether it was finished or killed.
+    """Open the record of a run, whether it was finished or killed.
 
     Parameters
     ----------
@@ -117,14 +148,14 @@ def load_record(folder: Path) -> Record:
     files = [folder / RECORD] if (folder / RECORD).exists() else _part_files(folder)
     if not files:
         raise RunError(f"{folder}: holds no record of a run")
+    return Record(files)
+
+
+def _opened(file: Path) -> pq.ParquetFile:
     try:
-        table = pa.concat_tables([pq.read_table(file) for file in files])
+        return pq.ParquetFile(file)
     except (OSError, pa.ArrowException) as error:
-        raise RunError(f"{folder}: the record cannot be read: {error}") from error
-    return Record(
-        columns={name: table[name].to_numpy() for name in table.column_names},
-        units={f.name: (f.metadata or {}).get(b"unit", b"").decode() for f in table.schema},
-    )
+        raise RunError(f"{file}: cannot be read: {error}") from error
 
 
 def _part_files(folder: Path) -> list[Path]:

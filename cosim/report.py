@@ -5,10 +5,12 @@ from __future__ import annotations
 import html
 import io
 import math
+import shutil
 from pathlib import Path
 from string import Template
 from typing import Any
 
+from controller.regions import SHAPES
 from cosim.claims import newtons, paper_claims
 from cosim.drawing import Drawing, Story
 from cosim.figures import drawings
@@ -19,6 +21,17 @@ REPORT = "report.html"
 FIGURES = "figures"
 
 _DPI = 160
+
+# of the entries of the summary
+_UNITS = {
+    **dict.fromkeys(("simulated_time", "reach_time", "settle_time", "intersection_windows", "saturated_time"), " [s]"),
+    **dict.fromkeys(("final_position", "closest_to_goal", "min_clearance"), " [m]"),
+    **dict.fromkeys(("max_force", "max_force_asked"), " [N]"),
+    **{f"estimate_{which}": " [N; N m]" for which in ("final", "true", "lowest", "highest")},
+    "max_speed": " [m/s]",
+    "effort": " [N s]",
+    "wall_time": " [s]",
+}
 
 _PAGE = Template("""<!DOCTYPE html>
 <html lang="en">
@@ -34,7 +47,7 @@ h1 { font-size: 1.5rem; line-height: 1.2; } h2 { font-size: 1.15rem; margin-top:
 figure { margin: 1.4rem 0; } figure svg { width: 100%; height: auto; } figcaption { font-size: .9rem; color: #444; }
 .wide { overflow-x: auto; } table { border-collapse: collapse; width: 100%; font-size: .88rem; }
 th, td { text-align: left; vertical-align: top; padding: .35rem .6rem; border-bottom: 1px solid #ccc; }
-th { border-bottom: 2px solid #1a1a1a; } td.number { text-align: right; font-variant-numeric: tabular-nums; }
+thead th { border-bottom: 2px solid #1a1a1a; } tbody th { font-weight: normal; color: #444; }
 pre { font-size: .8rem; background: #f5f5f5; padding: .8rem; overflow-x: auto; }
 footer { margin-top: 3rem; font-size: .85rem; color: #555; }
 </style>
@@ -47,7 +60,7 @@ $claims
 <h2>Figures</h2>
 $figures
 <h2>Numbers</h2>
-<div class="wide"><table>$numbers</table></div>
+<div class="wide"><table><tbody>$numbers</tbody></table></div>
 <h2>Scenario</h2>
 <pre>$scenario</pre>
 <footer>Vehicle: $vehicle. $source Positions north, east, down in metres; the body frame points forward, right, down.
@@ -76,8 +89,15 @@ def write_report(folder: Path, scenario: Scenario, record: Record, summary: dict
     Path
         The HTML file.
     """
-    (folder / FIGURES).mkdir(exist_ok=True)
-    shown = [_figure(folder, drawing) for drawing in drawings(Story(scenario, record, summary))]
+    figures = folder / f".{FIGURES}"
+    shutil.rmtree(figures, ignore_errors=True)
+    figures.mkdir()
+    try:
+        shown = [_figure(figures, drawing) for drawing in drawings(Story(scenario, record, summary))]
+        shutil.rmtree(folder / FIGURES, ignore_errors=True)
+        figures.replace(folder / FIGURES)
+    finally:
+        shutil.rmtree(figures, ignore_errors=True)
     page = _PAGE.substitute(
         title=html.escape(scenario.title),
         asked=html.escape(asked(scenario)),
@@ -112,7 +132,7 @@ def asked(scenario: Scenario) -> str:
         f"{'within' if r.region.keep == 'in' else 'out of'} {r.region.name} ({r.criterion})" for r in scenario.regions
     ]
     respecting = f", keeping {', '.join(regions)}" if regions else ""
-    kind = type(scenario.goal).__name__.lower()
+    kind = next(name for name, shape in SHAPES.items() if isinstance(scenario.goal, shape)).replace("_", " ")
     centre = [sum(pair) / 2.0 for pair in zip(*scenario.goal.bounds(), strict=True)]
     at = f" about ({', '.join(f'{x:g}' for x in centre)}) m" if all(map(math.isfinite, centre)) else ""
     return f"From ({start}) m into the goal region, a {kind}{at}{respecting}; {scenario.law.name} law."
@@ -151,6 +171,7 @@ def verdict(summary: dict[str, Any]) -> str:
     ended = {
         "completed": "",
         "interrupted": f" The run was interrupted at {summary['simulated_time']:.3f} s.",
+        "killed": f" The run was killed; its record ends at {summary['simulated_time']:.3f} s.",
     }.get(summary["status"], f" The run {summary['status']}.")
     return goal + kept + force + ended
 
@@ -162,15 +183,13 @@ def _claims(scenario: Scenario, summary: dict[str, Any]) -> str:
         "<tr>" + "".join(f"<td>{html.escape(text)}</td>" for text in (c.stated, c.measured, c.why)) + "</tr>"
         for c in paper_claims(scenario, summary)
     )
-    head = "<tr><th>The paper states</th><th>This run gave</th><th>Why</th></tr>"
-    return f'<h2>Beside the paper</h2><div class="wide"><table>{head}{rows}</table></div>'
+    head = "<thead><tr><th>The paper states</th><th>This run gave</th><th>Why</th></tr></thead>"
+    return f'<h2>Beside the paper</h2><div class="wide"><table>{head}<tbody>{rows}</tbody></table></div>'
 
 
 def _numbers(summary: dict[str, Any]) -> str:
-    return "".join(
-        f"<tr><th>{html.escape(key.replace('_', ' '))}</th><td>{html.escape(_text(value))}</td></tr>"
-        for key, value in summary.items()
-    )
+    rows = [(key.replace("_", " ") + _UNITS.get(key, ""), _text(value)) for key, value in summary.items()]
+    return "".join(f"<tr><th>{html.escape(name)}</th><td>{html.escape(value)}</td></tr>" for name, value in rows)
 
 
 def _text(value: Any) -> str:
@@ -192,7 +211,7 @@ def _figure(folder: Path, drawing: Drawing) -> str:
     """Write a figure as SVG and PNG, and return it as a piece of HTML."""
     svg = io.StringIO()
     drawing.figure.savefig(svg, format="svg", metadata={"Date": None})
-    (folder / FIGURES / f"{drawing.name}.svg").write_text(svg.getvalue(), encoding="utf-8")
-    drawing.figure.savefig(folder / FIGURES / f"{drawing.name}.png", dpi=_DPI)
+    (folder / f"{drawing.name}.svg").write_text(svg.getvalue(), encoding="utf-8")
+    drawing.figure.savefig(folder / f"{drawing.name}.png", dpi=_DPI)
     inline = svg.getvalue()[svg.getvalue().index("<svg") :]
     return f"<figure>{inline}<figcaption>{html.escape(drawing.caption)}</figcaption></figure>"

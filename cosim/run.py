@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import json
-import logging
-import shutil
+import sys
 import time
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,14 +12,11 @@ from tqdm import tqdm
 
 from cosim.errors import PlantError, RunError
 from cosim.master import Master, Observer
-from cosim.record import Recorder, load_record
-from cosim.report import write_report
-from cosim.scenario import VEHICLE_COPY, Scenario
+from cosim.record import Recorder
+from cosim.run_folder import RunFolder, claim, conclude
+from cosim.scenario import Scenario
 from cosim.signals import Array
-from cosim.summary import summarise
 from cosim.telemetry import Telemetry
-
-log = logging.getLogger(__name__)
 
 _PROGRESS_STEPS = 200  # times that the bar moves
 
@@ -56,7 +50,7 @@ class _Progress:
 
 def run_scenario(
     scenario: Scenario,
-    out: Path,
+    out: Path | None = None,
     mavlink: tuple[str, int] | None = None,
     rate: float | None = None,
     progress: bool = False,
@@ -68,8 +62,8 @@ def run_scenario(
     ----------
     scenario : Scenario
         What to run.
-    out : Path
-        The run folder; it must not exist, or be empty.
+    out : Path, optional
+        The run folder; it must not exist, or be empty. Default: a new one below ``runs``.
     mavlink : (str, int), optional
         Where to stream telemetry.
     rate : float, optional
@@ -88,42 +82,40 @@ def run_scenario(
     ------
     RunError
         If the folder cannot be written.
+    TelemetryError
+        If the link cannot be opened.
+    BuildError, LawError, DefinitionError
+        If plant, law or arbiter cannot be set up.
     PlantError
         If the FMU refuses the scenario, or fails in a step; what was recorded until then is left readable.
     """
     with Master(scenario) as master:
         telemetry = Telemetry(mavlink, master.signals, scenario.time.step) if mavlink else None
         try:
-            _make_folder(out, scenario)
-            return _step_and_write(master, out, telemetry, rate, progress, report)
-        except OSError as error:
-            raise RunError(f"{out}: {error.strerror or error}") from error
+            folder = claim(out, scenario)
+            try:
+                status, wall_time, failure = _step(master, folder, telemetry, rate, progress)
+                summary = conclude(folder.path, scenario, status, wall_time, report)
+            except OSError as error:
+                raise RunError(f"{folder.path}: {error.strerror or error}") from error
         finally:
             if telemetry:
                 telemetry.close()
+    if failure:
+        raise failure
+    return Run(folder.path, summary)
 
 
-def _make_folder(out: Path, scenario: Scenario) -> None:
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-        if any(out.iterdir()):
-            raise RunError(f"{out}: exists and is not empty; expected a new folder")
-    except OSError as error:
-        raise RunError(f"{out}: {error.strerror or error}") from error
-    (out / "scenario.toml").write_text(scenario.toml(), encoding="utf-8")
-    if scenario.vehicle_file:
-        shutil.copyfile(scenario.vehicle_file, out / VEHICLE_COPY)
-
-
-def _step_and_write(
-    master: Master, out: Path, telemetry: Telemetry | None, rate: float | None, progress: bool, report: bool
-) -> Run:
-    scenario = master.scenario
-    recorder = Recorder(out, master.signals.columns)
-    bar = _Progress(scenario) if progress else None
+def _step(
+    master: Master, folder: RunFolder, telemetry: Telemetry | None, rate: float | None, progress: bool
+) -> tuple[str, float, PlantError | None]:
+    """Step through the run and close its record; return how it ended, what it took [s], and why it failed."""
+    recorder = Recorder(folder.path, master.signals.columns)
+    bar = _Progress(master.scenario) if progress and sys.stderr else None
+    if telemetry:
+        telemetry.start()
     observers: list[Observer] = [o for o in (recorder, telemetry, bar) if o is not None]
-    failure: PlantError | None = None
-    status = "completed"
+    status, failure = "completed", None
     started = time.perf_counter()
     try:
         master.run(observers, rate)
@@ -131,24 +123,14 @@ def _step_and_write(
         status = "interrupted"
     except PlantError as error:
         status, failure = f"failed: {error}", error
-    wall_time = time.perf_counter() - started
-    if bar:
-        bar.close()
-    if recorder.rows == 0:  # nothing to read: leave nothing behind
-        shutil.rmtree(out)
+    finally:
+        wall_time = time.perf_counter() - started
+        if bar:
+            bar.close()
+        if recorder.rows == 0:  # nothing to read: leave nothing behind
+            folder.discard()
+        else:
+            recorder.close()
+    if recorder.rows == 0:
         raise failure or KeyboardInterrupt
-    recorder.close()
-    record = load_record(out)
-    summary = summarise(scenario, record, status, wall_time)
-    _write_whole(out / "summary.json", lambda path: path.write_text(json.dumps(summary, indent=2) + "\n", "utf-8"))
-    if report:
-        write_report(out, scenario, record, summary)
-    if failure:
-        raise failure
-    return Run(out, summary)
-
-
-def _write_whole(path: Path, write: Callable[[Path], Any]) -> None:
-    scratch = path.with_name(f".{path.name}")
-    write(scratch)
-    scratch.replace(path)
+    return status, wall_time, failure

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -23,6 +24,7 @@ from cosim.scenario_file import flat, override, read_table, shipped_scenarios
 from fuzzy_arbiter import SECTION_VI
 from plant_fmu.errors import PlantFmuError
 from plant_fmu.tables import decode, hint
+from plant_fmu.variables import variables
 from plant_fmu.vehicle import Vehicle, load_vehicle
 
 Vector3 = tuple[float, float, float]
@@ -31,7 +33,9 @@ Vector6 = tuple[float, float, float, float, float, float]
 
 CRITERIA = tuple(c.name for c in SECTION_VI)
 ROUNDING = 1e-6  # of one period, within which periods count as multiples
-MAX_STEPS = 1_000_000_000
+MAX_STEPS = 100_000_000
+MAX_POINTS = 100_001
+REGION_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9 _-]{0,39}")  # a column of the record, a label of figures
 VEHICLE_COPY = "vehicle.toml"  # name in a run folder of a vehicle that is not shipped
 
 
@@ -113,9 +117,6 @@ _OWN_KEYS = {
     "wrench_time_constant": "limit.time_constant",
     "substep": "plant.substep",
     "current": "plant.current",
-    "position": "initial.position",
-    "quaternion": "initial.quaternion",
-    "velocity": "initial.velocity",
 }
 
 
@@ -227,15 +228,15 @@ def load_scenario(name_or_file: str | Path, overrides: Sequence[str] = ()) -> Sc
         known = hint(text, shipped_scenarios())
         raise ScenarioError(f"scenario {text!r} is unknown; {known} (or a file ending in .toml)")
     try:
-        table, name, folder = read_table(text)
+        table, name = read_table(text)
         for change in overrides:
             override(table, change)
-        return _check(table, name, folder)
+        return _check(table, name)
     except (PlantFmuError, ControllerError, ScenarioError) as error:
         raise ScenarioError(f"{text}: {error}") from error
 
 
-def _check(table: dict[str, Any], name: str, folder: Path) -> Scenario:
+def _check(table: dict[str, Any], name: str) -> Scenario:
     """Turn the file's table into a scenario, and name the first key that cannot be right."""
     plant = table.get("plant")
     if isinstance(plant, dict) and isinstance(plant.get("parameters"), dict):
@@ -244,14 +245,13 @@ def _check(table: dict[str, Any], name: str, folder: Path) -> Scenario:
     time = _check_time(file.time)
     gains = _check_gains(file.law.gains)
     steps = _multiple("time.duration", time.duration, time.step)
-    _require(steps <= MAX_STEPS, "time.duration", f"{time.duration} s, {steps} steps", f"at most {MAX_STEPS} steps")
     _require(file.plant.substep > 0.0, "plant.substep", file.plant.substep, "above 0 s")
     _require(file.limit.force >= 0.0, "limit.force", file.limit.force, "0 N or above (inf for none)")
     _require(
         0.0 <= file.limit.time_constant < math.inf, "limit.time_constant", file.limit.time_constant, "0 s or above"
     )
     _require(0.0 <= file.arbiter.ramp < math.inf, "arbiter.ramp", file.arbiter.ramp, "0 m or above")
-    _require(file.arbiter.points >= 3, "arbiter.points", file.arbiter.points, "3 or more")
+    _require(3 <= file.arbiter.points <= MAX_POINTS, "arbiter.points", file.arbiter.points, f"3 to {MAX_POINTS}")
     for key, values in (
         ("initial.position", file.initial.position),
         ("initial.velocity", file.initial.velocity),
@@ -268,15 +268,6 @@ def _check(table: dict[str, Any], name: str, folder: Path) -> Scenario:
     if file.actuation.through == "thrusters":
         unlimited = file.limit == Limit()
         _require(unlimited, "limit", "given", "none with actuation.through = 'thrusters': it is of the direct wrench")
-    for name in file.plant.parameters:
-        prefix = name.partition(".")[0]
-        _require(
-            prefix not in _OWN_KEYS,
-            f"plant.parameters.{name}",
-            "a parameter",
-            f"the key {_OWN_KEYS.get(prefix)} instead",
-        )
-
     regions = tuple(
         SecondaryRegion(
             Region(entry.name, _shape(entry.shape, f"regions.{entry.name}.shape"), entry.keep),
@@ -289,19 +280,31 @@ def _check(table: dict[str, Any], name: str, folder: Path) -> Scenario:
     for region in regions:
         key = f"regions.{region.region.name}"
         _require(names.count(region.region.name) == 1, f"{key}.name", "used twice", "a name of its own")
+        good = REGION_NAME.fullmatch(region.region.name) and region.region.name != "goal"
+        _require(
+            bool(good), f"{key}.name", repr(region.region.name), "at most 40 letters, digits, blanks, - and _, not goal"
+        )
         _require(0.0 <= region.gain < math.inf, f"{key}.gain", region.gain, "0 or above")
+    kept_out = [r.region.name for r in regions if r.region.keep == "out"]
     for region_name in file.intersection:
-        if region_name not in names:
-            raise ScenarioError(f"intersection: no region {region_name!r}; {hint(region_name, names)}")
+        if region_name not in kept_out:
+            raise ScenarioError(
+                f"intersection: {region_name!r} is no region to be kept out of; {hint(region_name, kept_out)}"
+            )
 
-    vehicle_file = folder / file.vehicle if file.vehicle.endswith(".toml") else None
+    vehicle_file = Path(file.vehicle) if file.vehicle.endswith(".toml") else None
     vehicle = load_vehicle(vehicle_file or file.vehicle)
+    known = [v.name for v in variables(vehicle) if v.role == "parameter" and v.name.partition(".")[0] not in _OWN_KEYS]
+    for parameter in file.plant.parameters:
+        own = _OWN_KEYS.get(parameter.partition(".")[0])
+        tip = f"set {own} instead" if own else hint(parameter, known)
+        _require(parameter in known, f"plant.parameters.{parameter}", "no parameter of the FMU", f"one; {tip}")
     filled = dataclasses.replace(
         file,
         time=_TimeEntry(time.duration, time.step, time.control, time.arbiter),
         law=dataclasses.replace(file.law, gains=gains._asdict()),
         vehicle=VEHICLE_COPY if vehicle_file else file.vehicle,
-        intersection=file.intersection or tuple(names),
+        intersection=file.intersection or tuple(kept_out),
     )
     return Scenario(
         name=name,
@@ -342,13 +345,17 @@ def _check_gains(table: dict[str, float]) -> Gains:
 
 def _multiple(key: str, period: float, step: float) -> int:
     """Return how many steps a period takes; it must be a whole number."""
-    n = round(period / step)
-    _require(n >= 1 and abs(period / step - n) < ROUNDING, key, period, f"a whole multiple of time.step ({step} s)")
+    ratio = period / step if period / step < MAX_STEPS + 1 else math.inf
+    _require(ratio < math.inf, key, f"{period} s, {period / step:.3g} steps", f"at most {MAX_STEPS} steps")
+    n = round(ratio)
+    _require(n >= 1 and abs(ratio - n) < ROUNDING, key, period, f"a whole multiple of time.step ({step} s)")
     return n
 
 
 def _shape(table: dict[str, Any], where: str) -> Shape:
     kind = table.get("type")
+    if kind is None:
+        raise ScenarioError(f"{where}.type is missing, expected one of {', '.join(sorted(SHAPES))}")
     if not isinstance(kind, str) or kind not in SHAPES:
         raise ScenarioError(f"{where}.type is {kind!r}, unknown shape; {hint(str(kind), SHAPES)}")
     try:

@@ -21,9 +21,7 @@ def _folder() -> resources.abc.Traversable:
     return resources.files("cosim") / "scenarios"
 
 
-def read_table(
-    name_or_file: str, seen: tuple[str, ...] = (), beside: Path | None = None
-) -> tuple[dict[str, Any], str, Path]:
+def read_table(name_or_file: str, seen: tuple[str, ...] = (), beside: Path | None = None) -> tuple[dict[str, Any], str]:
     """Read a scenario, laid over that of its ``base``.
 
     Parameters
@@ -37,8 +35,8 @@ def read_table(
 
     Returns
     -------
-    dict, str, Path
-        The table, the scenario's name, and the folder of its file.
+    dict, str
+        The table and the scenario's name.
 
     Raises
     ------
@@ -51,17 +49,23 @@ def read_table(
     if path.suffix == ".toml":
         path = beside / path if beside else path
         table, name, folder = read_toml(path), path.stem, path.parent
+        name_or_file = str(path.resolve())
+        vehicle = table.get("vehicle")
+        if isinstance(vehicle, str) and vehicle.endswith(".toml"):  # beside the file that names it
+            table["vehicle"] = str(folder / vehicle)
     elif name_or_file in shipped_scenarios():
         with resources.as_file(_folder() / f"{name_or_file}.toml") as shipped:
             table, name, folder = read_toml(shipped), name_or_file, Path()
     else:
         raise ScenarioError(f"base {name_or_file!r} is unknown; {hint(name_or_file, shipped_scenarios())}")
+    if name_or_file in seen:
+        raise ScenarioError(f"{name}: is its own base")
     if "base" in table:
         base = table.pop("base")
-        if not isinstance(base, str) or base in seen:
-            raise ScenarioError(f"{name}: base is {base!r}, expected the name of another scenario")
+        if not isinstance(base, str):
+            raise ScenarioError(f"{name}: base is {base!r}, expected the name of a scenario")
         table = _merge(read_table(base, (*seen, name_or_file), folder)[0], table)
-    return table, name, folder
+    return table, name
 
 
 def _merge(base: dict[str, Any], over: dict[str, Any]) -> dict[str, Any]:
@@ -91,13 +95,19 @@ def override(table: dict[str, Any], text: str) -> None:
     if not equals or not key:
         raise ScenarioError(f"--set {text!r}: expected key=value")
     try:
-        value = tomllib.loads(f"value = {value_text}")["value"]
+        parsed = tomllib.loads(f"value = {value_text}")
     except tomllib.TOMLDecodeError:
-        value = value_text.strip()  # a bare word is a string
+        parsed = {"value": value_text.strip()}  # a bare word is a string
+    if len(parsed) > 1:
+        raise ScenarioError(f"--set {text!r}: expected one key=value")
+    value = parsed["value"]
     *path, last = key.strip().split(".")
     at: Any = table
     for part in path:
-        at = at[_index(at, part, key)] if isinstance(at, list) else at.setdefault(part, {})
+        if isinstance(at, list):
+            at = at[_index(at, part, key)]
+        elif isinstance(at, dict):
+            at = at.setdefault(part, {})
     if isinstance(at, list):
         at[_index(at, last, key)] = value
     elif isinstance(at, dict):

@@ -48,4 +48,6 @@ class Signals:
     def view(self, first: str, n: int) -> Array:
         """Return the `n` signals from the column `first` on, shape (n,), as a view into the row."""
         at = self._at[first]
+        if at + n > len(self.row):
+            raise IndexError(f"{n} signals from {first!r} on: the row ends after {len(self.row) - at}")
         return self.row[at : at + n]

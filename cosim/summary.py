@@ -37,7 +37,7 @@ def spans(flags: Flags, time: Array) -> list[tuple[float, float]]:
     return [(float(time[a]), float(time[min(b, last)])) for a, b in zip(starts, ends, strict=True)]
 
 
-def summarise(scenario: Scenario, record: Record, status: str, wall_time: float) -> dict[str, Any]:
+def summarise(scenario: Scenario, record: Record, status: str, wall_time: float | None) -> dict[str, Any]:
     """Return the summary of a run.
 
     Parameters
@@ -47,9 +47,9 @@ def summarise(scenario: Scenario, record: Record, status: str, wall_time: float)
     record : Record
         What it left, at least one row.
     status : str
-        ``"completed"``, ``"interrupted"``, or ``"failed: ..."``.
-    wall_time : float
-        What the stepping took [s].
+        ``"completed"``, ``"interrupted"``, ``"killed"``, or ``"failed: ..."``.
+    wall_time : float or None
+        What the stepping took [s], if that is known.
 
     Returns
     -------
@@ -99,12 +99,12 @@ def summarise(scenario: Scenario, record: Record, status: str, wall_time: float)
         "estimate_highest": [float(record[f"estimate.phi{i}"].max()) for i in range(1, 5)],
         "steps": len(time) - 1,
         "wall_time": wall_time,
-        "real_time_factor": simulated / wall_time if wall_time > 0.0 else None,
+        "real_time_factor": simulated / wall_time if wall_time else None,
     }
 
 
 def _saturated_time(scenario: Scenario, record: Record, acted: slice) -> float:
     """How long any actuator was asked for more than it gives [s]."""
-    flags = [name for name in record.columns if "_saturated" in name]
+    flags = [name for name in record.units if "_saturated" in name]
     any_cut = np.logical_or.reduce([record[name][acted] > 0.0 for name in flags])
     return float(np.count_nonzero(any_cut) * scenario.time.step)

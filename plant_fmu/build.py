@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import atexit
+import functools
 import hashlib
+import logging
 import os
+import shutil
 import tempfile
 import zipfile
 from importlib import resources
@@ -16,6 +20,8 @@ from plant_fmu.compiler import FLAGS, compile_library, find_compiler, library_su
 from plant_fmu.description import header, model_description, token
 from plant_fmu.errors import BuildError
 from plant_fmu.vehicle import Vehicle
+
+log = logging.getLogger(__name__)
 
 FMI_VERSIONS = (2, 3)
 
@@ -85,7 +91,8 @@ def cached_fmu(vehicle: Vehicle, fmi: int) -> Path:
     Returns
     -------
     Path
-        The file, in the user's cache folder; what it is made from is part of its name.
+        The file; what it is made from is part of its name. It lies in the user's cache folder or, where that cannot be
+        made, in one that goes with the process.
 
     Raises
     ------
@@ -101,8 +108,19 @@ def cached_fmu(vehicle: Vehicle, fmi: int) -> Path:
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise BuildError(f"FMU cache {path.parent}: {error.strerror or error}") from error
+        log.warning("FMU cache %s: %s; building for this process alone", path.parent, error.strerror or error)
+        path = _own_folder() / path.name
+        if path.exists():
+            return path
     return build_fmu(vehicle, fmi, path)
+
+
+@functools.cache
+def _own_folder() -> Path:
+    """Return a folder that goes with the process."""
+    folder = tempfile.mkdtemp(prefix="plant_fmu-")
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    return Path(folder)
 
 
 def _description(vehicle: Vehicle, fmi: int) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import difflib
+import math
 import tomllib
 import types
 import typing
@@ -129,6 +130,13 @@ def _refuse_unknown(table: dict[str, Any], kind: Any, where: str) -> None:
                     _refuse_unknown(item, inner, f"{at}.{i}")
 
 
+def _is_number(value: Any) -> bool:
+    try:
+        return not isinstance(value, bool) and math.isfinite(float(value)) and not isinstance(value, str)
+    except (OverflowError, TypeError, ValueError):
+        return False
+
+
 def _mistyped(text: str, at: str, table: Any, kind: Any, where: str) -> TableError:
     """Turn the decoder's complaint, and its path such as ``$.a.b[0]``, into words of the file."""
     value, annotation, path = table, kind, [where] if where else []
@@ -136,7 +144,9 @@ def _mistyped(text: str, at: str, table: Any, kind: Any, where: str) -> TableErr
         if not part:
             continue
         if part == "*":  # some key of a mapping to numbers
-            part = next(k for k, v in value.items() if not isinstance(v, (int, float)) or isinstance(v, bool))
+            part = next((k for k, v in value.items() if not _is_number(v)), part)
+            if part == "*":
+                break
         if isinstance(value, list):
             value = value[int(part)]
         else:

@@ -90,7 +90,7 @@ def test_commands_of_the_tour_are_understood(capsys, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     tour = re.search(r"## A short tour\n+```\n(.*?)```", (ROOT / "README.md").read_text(), re.S).group(1)
     commands = [line.split("#")[0].split() for line in tour.splitlines() if line.startswith("cosim")]
-    assert len(commands) == 5
+    assert len(commands) == 6
     for _, *words in commands:
         words = words[: words.index(">")] if ">" in words else words
         if words[0] == "run":

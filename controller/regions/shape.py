@@ -23,6 +23,7 @@ Bounds = tuple[Vector3, Vector3]
 Evaluation = tuple[float, float, float, float, float]
 
 UP_TO_ROUNDING = 1e-12
+GREATEST = 1e6  # m; squares and their sums stay far from overflow
 
 
 class Shape(Protocol):
@@ -68,7 +69,7 @@ def require(good: bool, shape: str, key: str, came: object, expected: str) -> No
 
 
 def require_finite(shape: str, **values: float | tuple[float, ...]) -> None:
-    """Raise an error that names the first value that is not finite.
+    """Raise an error that names the first value that is not finite, or absurdly great.
 
     Parameters
     ----------
@@ -80,11 +81,11 @@ def require_finite(shape: str, **values: float | tuple[float, ...]) -> None:
     Raises
     ------
     RegionError
-        If one is NaN or infinite.
+        If one is NaN, infinite, or beyond `GREATEST`.
     """
     for key, value in values.items():
         numbers = value if isinstance(value, tuple) else (value,)
-        require(all(map(math.isfinite, numbers)), shape, key, value, "finite numbers")
+        require(all(abs(x) <= GREATEST for x in numbers), shape, key, value, f"finite numbers up to {GREATEST:g}")
 
 
 def unit(shape: str, key: str, vector: tuple[float, ...]) -> tuple[float, ...]:

@@ -30,5 +30,17 @@ def test_without_numbas_insides_nothing_is_cached(monkeypatch):
     assert [options.get("cache", False) for options in made] == [True, False]
 
 
+def test_without_a_place_to_keep_it_nothing_is_cached(monkeypatch):
+    real = module.numba.njit
+
+    def njit(**options):
+        if options.get("cache"):
+            raise RuntimeError("cannot cache function: no locator available")
+        return real(**options)
+
+    monkeypatch.setattr(module.numba, "njit", njit)
+    assert compiled(lambda x: x + 2.0)(1.0) == 3.0
+
+
 def test_division_by_zero_gives_what_numpy_gives():
     assert np.isinf(compiled(lambda x: 1.0 / x)(0.0))

@@ -25,6 +25,18 @@ def test_without_regions_there_is_nothing_to_fit():
         calibrate(load_scenario("paper", ["regions=[]", "intersection=[]"]))
 
 
+def test_thrusters_have_no_limit_to_fit():
+    with pytest.raises(ScenarioError, match="thrusters"):
+        calibrate(load_scenario("paper", ["actuation.through=thrusters"]))
+
+
+@pytest.mark.slow
+def test_a_path_that_misses_the_overlap_has_no_fit():
+    with pytest.raises(ScenarioError, match="overlap"):
+        calibrate(load_scenario("paper", ["arbiter.engine=closed", "initial.position=[0,3,1]", "time.step=0.01",
+                                          "time.control=0.01", "time.arbiter=0.01"]))  # fmt: skip
+
+
 @pytest.mark.slow
 def test_the_shipped_numbers_are_those_of_the_fit():
     fit = calibrate(PAPER)

@@ -54,6 +54,8 @@ def test_help_and_version(capsys, arguments):
         (["run", "paper", "--set", "law.gains.k_p1=1e9"], "wrench"),
         (["run", "paper", "--out", "/dev/null/run"], "/dev/null/run"),
         (["run", "paper", "--mavlink", "udpout:192.0.2.1:14550"], "--allow-remote"),
+        (["run", "paper", "--mavlink", ""], "udpout:HOST:PORT"),
+        (["calibrate", "--scenario", "paper-limited", "--scenario", "nowhere"], "nowhere"),
         (["show", "paper", "--set", "x=1"], "x: unknown key"),
     ],
 )
@@ -67,7 +69,15 @@ def test_what_the_user_must_mend_is_one_line(tmp_path, capsys, monkeypatch, argu
 
 
 @pytest.mark.parametrize(
-    "arguments", [[], ["fly"], ["run"], ["run", "paper", "--rate", "-1"], ["run", "paper", "--rat"]]
+    "arguments",
+    [
+        [],
+        ["fly"],
+        ["run"],
+        ["run", "paper", "--rate", "-1"],
+        ["run", "paper", "--rate", "1e-15"],
+        ["run", "paper", "--rat"],
+    ],
 )
 def test_wrong_words_exit_with_2(capsys, arguments):
     with pytest.raises(SystemExit) as left:
@@ -93,8 +103,75 @@ def test_mavlink_without_pymavlink_is_one_line(tmp_path, capsys, monkeypatch):
     assert list(tmp_path.iterdir()) == []
 
 
+def test_report_makes_the_report_again(tmp_path, capsys):
+    out = tmp_path / "run"
+    assert main(["run", "paper", "--out", str(out), "--no-report", *QUICK]) == 0
+    assert not (out / "report.html").exists()
+    assert main(["report", str(out)]) == 0
+    assert (out / "report.html").exists()
+    assert main(["report", str(tmp_path)]) == 2
+    assert "holds no run" in capsys.readouterr().err
+
+
+def test_help_needs_nothing_heavy():
+    code = "import sys, cosim.cli; print({'numpy', 'numba', 'fmpy', 'matplotlib'} & set(sys.modules))"
+    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "set()\n"
+
+
+def test_a_reader_that_goes_away_is_no_trouble():
+    command = f"{sys.executable} -m cosim show paper | true"
+    done = subprocess.run(command, shell=True, capture_output=True, text=True, check=False)
+    assert done.stderr == ""
+
+
+def test_verbose_tells_of_us_alone(tmp_path):
+    command = [sys.executable, "-m", "cosim", "-v", "run", "paper", "--out", str(tmp_path / "run"), *QUICK]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert all(line.split(".")[0] in ("cosim", "plant_fmu") for line in done.stderr.splitlines())
+
+
+def test_without_a_place_to_keep_compiled_code_it_runs_all_the_same(tmp_path):
+    """Nothing writable but the run folder: compilation is not kept, the FMU goes with the process."""
+    arguments = ["run", "paper", "--no-report", "--out", str(tmp_path / "run"), *QUICK]
+    code = f"""
+import sys
+import numba.core.caching, platformdirs
+numba.core.caching.CacheImpl._locator_classes = []
+platformdirs.user_cache_dir = lambda *_, **__: "/proc/nowhere"
+from cosim.cli import main
+sys.exit(main({arguments!r}))
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert "building for this process alone" in done.stderr
+
+
 @pytest.mark.skipif(os.name != "posix", reason="sends SIGINT")
-def test_ctrl_c_ends_a_real_run_readably(tmp_path):
+@pytest.mark.parametrize("delay", [0.05, 0.3, 0.8])
+def test_ctrl_c_is_heeded_from_the_start(tmp_path, delay):
+    command = [
+        sys.executable,
+        "-m",
+        "cosim",
+        "run",
+        "paper",
+        "--set",
+        "time.duration=3000",
+        "--out",
+        str(tmp_path / "run"),
+    ]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    time.sleep(delay)
+    process.send_signal(signal.SIGINT)
+    _, said = process.communicate(timeout=60)
+    if delay > 0.2:  # before that it may be the interpreter itself that starts
+        assert process.returncode == 130
+        assert "Traceback" not in said
+
+
+@pytest.mark.skipif(os.name != "posix", reason="sends signals")
+@pytest.mark.parametrize("sent", [signal.SIGINT, signal.SIGTERM])
+def test_ctrl_c_ends_a_real_run_readably(tmp_path, sent):
     """The process as a user has it: from the start of stepping to a report, no traceback."""
     out = tmp_path / "run"
     command = [sys.executable, "-m", "cosim", "run", "paper", "--set", "arbiter.engine=closed",
@@ -102,7 +179,7 @@ def test_ctrl_c_ends_a_real_run_readably(tmp_path):
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     while not (any(out.glob("record.parts/*.parquet")) or process.poll() is not None):
         time.sleep(0.02)
-    process.send_signal(signal.SIGINT)
+    process.send_signal(sent)
     printed, said = process.communicate(timeout=60)
     assert process.returncode == 130
     assert "interrupted" in printed

@@ -86,13 +86,13 @@ def test_a_run_repeats_to_the_last_bit(shipped_run, tmp_path):
     first = shipped_run("paper-calibrated", "arbiter.engine=closed", "time.duration=5", "plant.current=[0.1,0.2,0.0]")
     again = run_scenario(load_scenario(first.folder / "scenario.toml"), tmp_path / "again", report=False)
     one, two = load_record(first.folder), load_record(again.folder)
-    assert list(one.columns) == list(two.columns)
-    for name in one.columns:
+    assert list(one.units) == list(two.units)
+    for name in one.units:
         assert np.array_equal(one[name], two[name]), name
 
 
 def test_both_fmi_versions_give_the_same_run(shipped_run):
     short = ("arbiter.engine=closed", "time.duration=3")
     two, three = (load_record(shipped_run("paper-limited", *short, f"plant.fmi={v}").folder) for v in (2, 3))
-    for name in three.columns:
+    for name in three.units:
         assert np.array_equal(two[name], three[name]), name

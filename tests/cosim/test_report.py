@@ -127,6 +127,14 @@ def test_names_from_files_are_escaped(tmp_path):
     assert "&lt;script&gt;alert(1)&lt;/script&gt; &amp; $x" in page
 
 
+def test_a_goal_far_aside_still_fits_the_page(tmp_path):
+    overrides = ["arbiter.engine=closed", "time.duration=0.05", "goal.centre=[0,20,5]"]
+    run = run_scenario(load_scenario("paper", overrides), tmp_path / "run")
+    png = (run.folder / "figures" / "path-plane.png").read_bytes()
+    width, height = struct.unpack(">II", png[16:24])
+    assert height < 2 * width
+
+
 SHAPES = {
     "box": '{type="box",centre=[2,0,2],size=[1,1,1]}',
     "cylinder": '{type="cylinder",start=[2,0,0],end=[2,0,4],radius=0.4}',

@@ -9,6 +9,7 @@ import pytest
 from cosim.errors import PlantError, RunError
 from cosim.record import Recorder, load_record
 from cosim.run import run_scenario
+from cosim.run_folder import claim, report_again
 from cosim.scenario import load_scenario
 from cosim.signals import Column
 from cosim.summary import spans
@@ -41,6 +42,7 @@ def test_record_has_every_signal_with_its_unit(shipped_run):
     }  # fmt: skip
     assert units.items() >= expected.items()
     assert load_record(folder).units == units
+    assert len(units) == len(set(units))
 
 
 def test_summary_follows_from_the_record(shipped_run):
@@ -113,6 +115,7 @@ def test_ctrl_c_leaves_a_readable_run(tmp_path, monkeypatch):
     assert run.summary["status"] == "interrupted"
     assert run.summary["steps"] == 150
     assert len(load_record(run.folder)["time"]) == 151
+    assert "was interrupted at 0.150 s" in (run.folder / "report.html").read_text()
     assert (run.folder / "report.html").exists()
 
 
@@ -137,6 +140,75 @@ def test_a_record_keeps_every_bit(tmp_path):
     recorder.close()
     assert load_record(tmp_path).stack(["time", "x"]).tobytes() == rows.tobytes()
     assert [p.name for p in tmp_path.iterdir()] == ["record.parquet"]
+
+
+def test_a_slow_run_is_written_by_the_clock(tmp_path, monkeypatch):
+    now = iter(np.arange(0.0, 1e3, 0.3))
+    monkeypatch.setattr("cosim.record.time.monotonic", lambda: next(now))
+    recorder = Recorder(tmp_path, COLUMNS)
+    for k in range(40):
+        recorder.observe(k, np.array([k, 2.0 * k]))
+    assert len(load_record(tmp_path)["time"]) >= 30
+
+
+def test_a_record_keeps_few_signals_in_memory(tmp_path):
+    columns = [Column(f"c{i}", "", "x") for i in range(100)]
+    recorder = Recorder(tmp_path, columns)
+    recorder.observe(0, np.arange(100.0))
+    recorder.close()
+    record = load_record(tmp_path)
+    assert [record[c.name][0] for c in columns] == list(range(100))
+    assert len(record._kept) < 30
+    with pytest.raises(KeyError):
+        record["nothing"]
+
+
+def test_a_killed_run_can_be_reported(tmp_path):
+    import shutil
+
+    whole = run_scenario(load_scenario("paper", SHORT), tmp_path / "run", report=False)
+    killed = tmp_path / "killed"
+    (killed / "record.parts").mkdir(parents=True)
+    shutil.copy(whole.folder / "scenario.toml", killed)
+    shutil.copy(whole.folder / "record.parquet", killed / "record.parts" / "000000.parquet")
+    summary = report_again(killed)
+    assert summary["status"] == "killed"
+    assert summary["real_time_factor"] is None
+    assert summary["min_clearance"] == whole.summary["min_clearance"]
+    assert "was killed" in (killed / "report.html").read_text()
+    assert report_again(whole.folder) == whole.summary  # of a whole run it says the same again
+    assert not list(killed.glob(".*"))
+
+
+def test_what_is_no_run_cannot_be_reported(tmp_path):
+    with pytest.raises(RunError, match="no run"):
+        report_again(tmp_path)
+
+
+def test_runs_that_start_together_get_folders_of_their_own(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    scenario = load_scenario("paper", SHORT)
+    paths = [claim(None, scenario).path for _ in range(5)]
+    assert len(set(paths)) == 5
+
+
+def test_a_discarded_run_leaves_the_users_folder(tmp_path):
+    mine = tmp_path / "mine"
+    mine.mkdir()
+    with pytest.raises(PlantError):
+        run_scenario(load_scenario("paper", [*SHORT, "law.gains.k_p1=1e9"]), mine)
+    assert list(mine.iterdir()) == []
+
+
+def test_whatever_goes_wrong_in_a_step_leaves_a_readable_record(tmp_path, monkeypatch):
+    def broken(self):
+        raise ZeroDivisionError
+
+    scenario = load_scenario("paper", [*SHORT, "time.arbiter=0.1"])
+    monkeypatch.setattr("cosim.master.Master._arbitrate", broken)
+    with pytest.raises(ZeroDivisionError):
+        run_scenario(scenario, tmp_path / "none")
+    assert not (tmp_path / "none").exists()
 
 
 def test_no_record_is_a_clear_error(tmp_path):

@@ -68,6 +68,28 @@ def test_base_of_itself_is_refused(tmp_path):
         load_scenario(saved(tmp_path, 'base = "mine.toml"\n'))
 
 
+def test_base_lies_elsewhere_with_its_vehicle(tmp_path):
+    from importlib import resources
+
+    (tmp_path / "common").mkdir()
+    (tmp_path / "mine").mkdir()
+    boat = (resources.files("plant_fmu") / "vehicles" / "odin.toml").read_text()
+    saved(tmp_path / "common", boat, "boat.toml")
+    saved(tmp_path / "common", MINIMAL.replace('"bluerov2_heavy"', '"boat.toml"'), "base.toml")
+    assert load_scenario(saved(tmp_path / "mine", 'base = "../common/base.toml"\n')).vehicle.mass == 125.0
+    # files of one name in two folders are two files
+    saved(tmp_path / "common", 'base = "base.toml"\n', "a.toml")
+    saved(tmp_path / "common", 'base = "a.toml"\n', "b.toml")
+    assert load_scenario(saved(tmp_path / "mine", 'base = "../common/b.toml"\n', "a.toml")).vehicle.mass == 125.0
+
+
+def test_overlap_is_of_regions_to_be_kept_out_of():
+    scenario = load_scenario("paper", ["regions.SR1.keep=in", "intersection=[]"])
+    assert scenario.intersection == (1, 2)
+    with pytest.raises(ScenarioError, match="SR1"):
+        load_scenario("paper", ["regions.SR1.keep=in"])
+
+
 def test_own_vehicle_file_is_found_beside_the_scenario(tmp_path):
     from importlib import resources
 
@@ -130,6 +152,23 @@ def test_overrides_reach_every_depth(tmp_path):
         ("regions.SR1.shape.radius=nan", ["SR1", "radius", "nan"]),
         ('intersection=["SR7"]', ["intersection", "SR7"]),
         ("tme.duration=3", ["tme", "'time'"]),
+        ("time.duration.x.y=1", ["time.duration.x"]),
+        ("title.x.y=3", ["title"]),
+        ("time.duration=1\nb=2", ["one key=value"]),
+        ("time.step=5e-324", ["time.duration", "steps"]),
+        ("time.duration=1e308", ["time.duration", "steps"]),
+        (f"law.gains.k_p1={'9' * 400}", ["law.gains"]),
+        ("arbiter.points=100000000000000", ["arbiter.points", "100001"]),
+        ("plant.parameters.position.x=3", ["plant.parameters.position.x", "no parameter"]),
+        ("plant.parameters.wrench.X=3", ["plant.parameters.wrench.X", "no parameter"]),
+        ("plant.parameters.mas=3", ["plant.parameters.mas", "'mass'"]),
+        ("regions.SR1.name=goal", ["'goal'"]),
+        ("regions.SR1.name=$\\frac$", ["name"]),
+        ("regions.SR1.name=_hidden", ["name"]),
+        ('regions.SR1.name=""', ["name"]),
+        ("regions.SR1.shape.radius=1e300", ["radius", "1e+06"]),
+        ('intersection=["SR1"]\nregions=[]', ["one key=value"]),
+        ("goal={radius=1}", ["goal.type is missing", "sphere"]),
         ("title", ["key=value"]),
         ("title.x=3", ["title"]),
     ],

@@ -1,0 +1,169 @@
+"""Run folders: claimed by one run, concluded with summary and report, or left as if nothing had been."""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+import json
+import shutil
+from dataclasses import dataclass
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+from cosim.errors import RunError
+from cosim.record import load_record
+from cosim.report import write_report
+from cosim.scenario import VEHICLE_COPY, Scenario, load_scenario
+from cosim.summary import summarise
+
+SCENARIO = "scenario.toml"
+SUMMARY = "summary.json"
+
+
+@dataclass(frozen=True)
+class RunFolder:
+    """A folder that belongs to one run."""
+
+    path: Path
+    created: bool  # by the run, not by its user
+
+    def discard(self) -> None:
+        """Take away all that the run has made."""
+        for child in self.path.iterdir():
+            if child.is_dir():
+                shutil.rmtree(child)
+            else:
+                child.unlink()
+        if self.created:
+            self.path.rmdir()
+
+
+def claim(out: Path | None, scenario: Scenario) -> RunFolder:
+    """Make the folder of a run and put the scenario into it.
+
+    Parameters
+    ----------
+    out : Path or None
+        A folder that does not exist or is empty; None for a new one of a name of its own below ``runs``.
+    scenario : Scenario
+        What will be run.
+
+    Returns
+    -------
+    RunFolder
+        No other run has it.
+
+    Raises
+    ------
+    RunError
+        If the folder is in use, or cannot be written.
+    """
+    where = out or Path("runs")
+    try:
+        if out is None:
+            path, created = _new_folder(where, f"{scenario.name}-{datetime.now():%Y%m%d-%H%M%S}"), True
+        else:
+            path, created = out, not out.exists()
+            path.mkdir(parents=True, exist_ok=True)
+            if any(path.iterdir()):
+                raise RunError(f"{path}: exists and is not empty; expected a new folder")
+        folder = RunFolder(path, created)
+        try:
+            with (path / SCENARIO).open("x", encoding="utf-8") as file:
+                file.write(scenario.toml())
+            if scenario.vehicle_file:
+                shutil.copyfile(scenario.vehicle_file, path / VEHICLE_COPY)
+        except FileExistsError as error:  # another run came in between
+            raise RunError(f"{path}: is taken by another run") from error
+        except OSError:
+            folder.discard()
+            raise
+    except OSError as error:
+        raise RunError(f"{where}: {error.strerror or error}") from error
+    return folder
+
+
+def _new_folder(parent: Path, name: str) -> Path:
+    for suffix in itertools.chain([""], (f"-{i}" for i in itertools.count(2))):
+        try:
+            path = parent / f"{name}{suffix}"
+            path.mkdir(parents=True)
+        except FileExistsError:
+            if not parent.is_dir():
+                raise
+        else:
+            return path
+    raise AssertionError("unreachable")
+
+
+def conclude(path: Path, scenario: Scenario, status: str, wall_time: float | None, report: bool) -> dict[str, Any]:
+    """Write summary and report of a run from its record.
+
+    Parameters
+    ----------
+    path : Path
+        The run folder.
+    scenario : Scenario
+        What was run.
+    status : str
+        How it ended.
+    wall_time : float or None
+        What the stepping took [s].
+    report : bool
+        Write the report and its figures too.
+
+    Returns
+    -------
+    dict
+        The summary.
+
+    Raises
+    ------
+    RunError
+        If the record cannot be read.
+    """
+    record = load_record(path)
+    summary = summarise(scenario, record, status, wall_time)
+    scratch = path / f".{SUMMARY}"
+    scratch.write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
+    scratch.replace(path / SUMMARY)
+    if report:
+        write_report(path, scenario, record, summary)
+    return summary
+
+
+def report_again(path: Path) -> dict[str, Any]:
+    """Write summary and report of a run that is done, was interrupted, or was killed.
+
+    Parameters
+    ----------
+    path : Path
+        The run folder.
+
+    Returns
+    -------
+    dict
+        The summary.
+
+    Raises
+    ------
+    RunError
+        If the folder holds no run that can be read, or cannot be written.
+    """
+    if not (path / SCENARIO).is_file():
+        raise RunError(f"{path}: holds no run ({SCENARIO} is missing)")
+    scenario = load_scenario(path / SCENARIO)
+    status, wall_time = "killed", None
+    try:
+        before = json.loads((path / SUMMARY).read_text(encoding="utf-8"))
+        status, wall_time = str(before["status"]), before["wall_time"]
+        scenario = dataclasses.replace(scenario, name=str(before["scenario"]))
+    except FileNotFoundError:
+        pass
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise RunError(f"{path / SUMMARY}: cannot be read: {error}") from error
+    try:
+        return conclude(path, scenario, status, wall_time, report=True)
+    except OSError as error:
+        raise RunError(f"{path}: {error.strerror or error}") from error
