@@ -23,7 +23,7 @@ def path_3d(story: Story) -> Figure:
     """Draw the path, regions and goal in space."""
     scenario, record = story.scenario, story.record
     figure = Figure(figsize=(6.8, 4.6))
-    ax: Any = figure.add_axes((0.0, 0.02, 1.0, 0.94), projection="3d")
+    ax: Any = figure.add_axes((0.0, 0.07, 1.0, 0.86), projection="3d")
     low, high = _extent(scenario, record)
     wide = np.maximum(high - low, 0.4 * (high - low).max())  # a flat path still gets a box with some depth
     middle = (low + high) / 2.0
@@ -47,7 +47,7 @@ def path_3d(story: Story) -> Figure:
     ax.set_ylim(low[1], high[1])
     ax.set_zlim(high[2], low[2])
     ax.yaxis.set_major_locator(MaxNLocator(4))
-    ax.set_box_aspect(wide, zoom=1.12)
+    ax.set_box_aspect(wide)
     ax.view_init(elev=20, azim=-70)
     figure.legend(loc="upper center", ncols=8)
     return figure
