@@ -71,7 +71,7 @@ def claim(out: Path | None, scenario: Scenario) -> RunFolder:
         folder = RunFolder(path, created)
         try:
             with (path / SCENARIO).open("x", encoding="utf-8") as file:
-                file.write(scenario.toml())
+                file.write(scenario.toml(VEHICLE_COPY if scenario.vehicle_file else None))
             if scenario.vehicle_file:
                 shutil.copyfile(scenario.vehicle_file, path / VEHICLE_COPY)
         except FileExistsError as error:  # another run came in between

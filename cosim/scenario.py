@@ -188,9 +188,9 @@ class Scenario:
     compare: str  # the claims that the report holds the run against
     table: dict[str, Any]  # as in the file, defaults filled in
 
-    def toml(self) -> str:
-        """Return the scenario as the file that repeats it."""
-        return tomli_w.dumps(self.table)
+    def toml(self, vehicle: str | None = None) -> str:
+        """Return the scenario as the file that repeats it, with another name for the vehicle's file if one is given."""
+        return tomli_w.dumps(self.table | ({"vehicle": vehicle} if vehicle else {}))
 
     @property
     def true_restoring_parameters(self) -> NDArray[np.float64]:
@@ -243,15 +243,50 @@ def _check(table: dict[str, Any], name: str) -> Scenario:
         plant["parameters"] = flat(plant["parameters"])
     file = decode(table, _File)
     time = _check_time(file.time)
+    _check_numbers(file)
     gains = _check_gains(file.law.gains)
-    steps = _multiple("time.duration", time.duration, time.step)
-    _require(file.plant.substep > 0.0, "plant.substep", file.plant.substep, "above 0 s")
-    _require(file.limit.force >= 0.0, "limit.force", file.limit.force, "0 N or above (inf for none)")
-    _require(
-        0.0 <= file.limit.time_constant < math.inf, "limit.time_constant", file.limit.time_constant, "0 s or above"
+    regions = _check_regions(file.regions)
+    overlapping = _check_intersection(file.intersection, regions)
+    vehicle_file = Path(file.vehicle) if file.vehicle.endswith(".toml") else None
+    vehicle = load_vehicle(vehicle_file or file.vehicle)
+    _check_parameters(file.plant.parameters, vehicle)
+
+    filled = dataclasses.replace(
+        file,
+        time=_TimeEntry(time.duration, time.step, time.control, time.arbiter),
+        law=dataclasses.replace(file.law, gains=gains._asdict()),
+        intersection=tuple(regions[i].region.name for i in overlapping),
     )
-    _require(0.0 <= file.arbiter.ramp < math.inf, "arbiter.ramp", file.arbiter.ramp, "0 m or above")
-    _require(3 <= file.arbiter.points <= MAX_POINTS, "arbiter.points", file.arbiter.points, f"3 to {MAX_POINTS}")
+    return Scenario(
+        name=name,
+        title=file.title or name,
+        vehicle=vehicle,
+        vehicle_file=vehicle_file,
+        time=time,
+        steps=_multiple("time.duration", time.duration, time.step),
+        control_every=_multiple("time.control", time.control, time.step),
+        arbiter_every=_multiple("time.arbiter", time.arbiter, time.step),
+        plant=file.plant,
+        initial=file.initial,
+        law=LawSetup(file.law.name, file.law.desired_quaternion, gains),
+        arbiter=file.arbiter,
+        limit=file.limit,
+        actuation=file.actuation,
+        goal=_shape(file.goal, "goal"),
+        regions=regions,
+        intersection=overlapping,
+        compare=file.compare,
+        table=msgspec.to_builtins(filled),
+    )
+
+
+def _check_numbers(file: _File) -> None:
+    limit, arbiter = file.limit, file.arbiter
+    _require(file.plant.substep > 0.0, "plant.substep", file.plant.substep, "above 0 s")
+    _require(limit.force >= 0.0, "limit.force", limit.force, "0 N or above (inf for none)")
+    _require(0.0 <= limit.time_constant < math.inf, "limit.time_constant", limit.time_constant, "0 s or above")
+    _require(0.0 <= arbiter.ramp < math.inf, "arbiter.ramp", arbiter.ramp, "0 m or above")
+    _require(3 <= arbiter.points <= MAX_POINTS, "arbiter.points", arbiter.points, f"3 to {MAX_POINTS}")
     for key, values in (
         ("initial.position", file.initial.position),
         ("initial.velocity", file.initial.velocity),
@@ -264,69 +299,41 @@ def _check(table: dict[str, Any], name: str) -> Scenario:
         ("law.desired_quaternion", file.law.desired_quaternion),
     ):
         _require(abs(math.hypot(*quaternion) - 1.0) < 1e-6, key, quaternion, "four numbers of length 1")
-
     if file.actuation.through == "thrusters":
-        unlimited = file.limit == Limit()
-        _require(unlimited, "limit", "given", "none with actuation.through = 'thrusters': it is of the direct wrench")
-    regions = tuple(
-        SecondaryRegion(
-            Region(entry.name, _shape(entry.shape, f"regions.{entry.name}.shape"), entry.keep),
-            entry.criterion,
-            entry.gain,
-        )
-        for entry in file.regions
-    )
-    names = [r.region.name for r in regions]
-    for region in regions:
-        key = f"regions.{region.region.name}"
-        _require(names.count(region.region.name) == 1, f"{key}.name", "used twice", "a name of its own")
-        good = REGION_NAME.fullmatch(region.region.name) and region.region.name != "goal"
-        _require(
-            bool(good), f"{key}.name", repr(region.region.name), "at most 40 letters, digits, blanks, - and _, not goal"
-        )
-        _require(0.0 <= region.gain < math.inf, f"{key}.gain", region.gain, "0 or above")
-    kept_out = [r.region.name for r in regions if r.region.keep == "out"]
-    for region_name in file.intersection:
-        if region_name not in kept_out:
-            raise ScenarioError(
-                f"intersection: {region_name!r} is no region to be kept out of; {hint(region_name, kept_out)}"
-            )
+        none_given = limit == Limit()
+        _require(none_given, "limit", "given", "none with actuation.through = 'thrusters': it is of the direct wrench")
 
-    vehicle_file = Path(file.vehicle) if file.vehicle.endswith(".toml") else None
-    vehicle = load_vehicle(vehicle_file or file.vehicle)
-    known = [v.name for v in variables(vehicle) if v.role == "parameter" and v.name.partition(".")[0] not in _OWN_KEYS]
-    for parameter in file.plant.parameters:
-        own = _OWN_KEYS.get(parameter.partition(".")[0])
-        tip = f"set {own} instead" if own else hint(parameter, known)
-        _require(parameter in known, f"plant.parameters.{parameter}", "no parameter of the FMU", f"one; {tip}")
-    filled = dataclasses.replace(
-        file,
-        time=_TimeEntry(time.duration, time.step, time.control, time.arbiter),
-        law=dataclasses.replace(file.law, gains=gains._asdict()),
-        vehicle=VEHICLE_COPY if vehicle_file else file.vehicle,
-        intersection=file.intersection or tuple(kept_out),
-    )
-    return Scenario(
-        name=name,
-        title=file.title or name,
-        vehicle=vehicle,
-        vehicle_file=vehicle_file,
-        time=time,
-        steps=steps,
-        control_every=_multiple("time.control", time.control, time.step),
-        arbiter_every=_multiple("time.arbiter", time.arbiter, time.step),
-        plant=file.plant,
-        initial=file.initial,
-        law=LawSetup(file.law.name, file.law.desired_quaternion, gains),
-        arbiter=file.arbiter,
-        limit=file.limit,
-        actuation=file.actuation,
-        goal=_shape(file.goal, "goal"),
-        regions=regions,
-        intersection=tuple(names.index(n) for n in filled.intersection),
-        compare=file.compare,
-        table=msgspec.to_builtins(filled),
-    )
+
+def _check_regions(entries: tuple[_RegionEntry, ...]) -> tuple[SecondaryRegion, ...]:
+    names = [entry.name for entry in entries]
+    regions = []
+    for entry in entries:
+        key = f"regions.{entry.name}"
+        good = REGION_NAME.fullmatch(entry.name) is not None and entry.name != "goal"
+        _require(good, f"{key}.name", repr(entry.name), "at most 40 letters, digits, blanks, - and _, and not goal")
+        _require(names.count(entry.name) == 1, f"{key}.name", "used twice", "a name of its own")
+        _require(0.0 <= entry.gain < math.inf, f"{key}.gain", entry.gain, "a finite number, 0 or above")
+        region = Region(entry.name, _shape(entry.shape, f"{key}.shape"), entry.keep)
+        regions.append(SecondaryRegion(region, entry.criterion, entry.gain))
+    return tuple(regions)
+
+
+def _check_intersection(wanted: tuple[str, ...], regions: tuple[SecondaryRegion, ...]) -> tuple[int, ...]:
+    """Return the indices of the regions whose overlap is reported: those that are named, else all to be kept out of."""
+    kept_out = {r.region.name: i for i, r in enumerate(regions) if r.region.keep == "out"}
+    for name in wanted:
+        if name not in kept_out:
+            raise ScenarioError(f"intersection: {name!r} is no region to be kept out of; {hint(name, kept_out)}")
+    return tuple(kept_out[name] for name in wanted or kept_out)
+
+
+def _check_parameters(given: dict[str, float], vehicle: Vehicle) -> None:
+    names = [v.name for v in variables(vehicle) if v.role == "parameter"]
+    known = [name for name in names if name.partition(".")[0] not in _OWN_KEYS]
+    for name in given:
+        own = _OWN_KEYS.get(name.partition(".")[0])
+        tip = f"set {own} instead" if own else hint(name, known)
+        _require(name in known, f"plant.parameters.{name}", "no parameter of the FMU", f"one; {tip}")
 
 
 def _check_time(entry: _TimeEntry) -> Time:

@@ -96,7 +96,8 @@ def test_own_vehicle_file_is_found_beside_the_scenario(tmp_path):
     (tmp_path / "boat.toml").write_text((resources.files("plant_fmu") / "vehicles" / "odin.toml").read_text())
     scenario = load_scenario(saved(tmp_path, MINIMAL.replace('"bluerov2_heavy"', '"boat.toml"')))
     assert scenario.vehicle.mass == 125.0
-    assert tomllib.loads(scenario.toml())["vehicle"] == "vehicle.toml"  # its copy in the run folder
+    assert tomllib.loads(scenario.toml())["vehicle"] == str(tmp_path / "boat.toml")
+    assert tomllib.loads(scenario.toml("copy.toml"))["vehicle"] == "copy.toml"
 
 
 def test_overrides_reach_every_depth(tmp_path):
