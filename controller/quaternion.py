@@ -63,7 +63,7 @@ def angular_velocity(e: Array, e_dot: Array) -> Array:
 
 @compiled
 def multiply(a: Array, b: Array) -> Array:
-    """Return the quaternion product of `a` and `b`, shape (4,): first the rotation `b`, then `a`."""
+    """Return the quaternion product of `a` and `b`, shape (4,), for (23): first the rotation `b`, then `a`."""
     return np.array(
         [
             a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3],
@@ -87,6 +87,6 @@ def error(desired: Array, actual: Array) -> Array:
 
 @compiled
 def down_in_body(e: Array) -> Array:
-    """Return k = R^T e3, shape (3,): the direction of gravity seen from the body."""
+    """Return k = R^T e3, shape (3,): the direction of gravity seen from the body, for (12)."""
     e0, e1, e2, e3 = e
     return np.array([2.0 * (e1 * e3 - e0 * e2), 2.0 * (e2 * e3 + e0 * e1), 1.0 - 2.0 * (e1 * e1 + e2 * e2)])

@@ -1,4 +1,4 @@
-"""Box, turned as one likes."""
+"""Box, turned as one likes: the cuboid that section V.B speaks of, with no equation in the paper."""
 
 from __future__ import annotations
 

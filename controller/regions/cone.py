@@ -1,4 +1,4 @@
-"""Cone of visibility: from where a feature can be seen."""
+"""Cone of visibility: from where a feature can be seen, as section I asks; without an equation in the paper."""
 
 from __future__ import annotations
 

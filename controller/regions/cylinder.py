@@ -1,4 +1,4 @@
-"""Cylinder between two points."""
+"""Cylinder between two points. Beyond the paper, as a region of section V."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Ellipsoid, turned as one likes."""
+"""Ellipsoid, turned as one likes. Beyond the paper, as a region of section V."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Half-space: one side of a plane."""
+"""Half-space: one side of a plane. Beyond the paper, as a region of section V."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Pipe: a chain of capsules, such as a bent pipeline."""
+"""Pipe: a chain of capsules, such as the bent pipeline of section V.B, without an equation there."""
 
 from __future__ import annotations
 
