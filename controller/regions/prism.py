@@ -1,4 +1,4 @@
-"""Upright prism over a polygon: the complex shape of section V.B, such as a hexagonal one, without an equation there."""
+"""Upright prism over a polygon: the complex shape of section V.B, such as a hexagonal one, with no equation there."""
 
 from __future__ import annotations
 

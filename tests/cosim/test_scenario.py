@@ -9,7 +9,6 @@ from controller.regions import Pipe, Sphere
 from cosim.errors import ScenarioError
 from cosim.scenario import load_scenario
 from cosim.scenario_file import shipped_scenarios
-from tests.conftest import DATA  # noqa: F401 - keeps the folder a package for pytest
 
 MINIMAL = """
 vehicle = "bluerov2_heavy"
