@@ -16,7 +16,7 @@ from cosim.errors import RunError
 from cosim.signals import Array, Column
 
 RECORD = "record.parquet"
-_PARTS = "record.parts"  # what a killed run leaves
+PARTS = "record.parts"  # what a killed run leaves
 _PART_SECONDS = 1.0  # of the wall clock, after which a part is written even if it is small
 _KEPT = 24  # signals that a record keeps in memory
 
@@ -47,7 +47,7 @@ class Recorder:
         self._parts = 0
         self._flushed = time.monotonic()
         self.rows = 0
-        (folder / _PARTS).mkdir()
+        (folder / PARTS).mkdir()
 
     def observe(self, k: int, row: Array) -> None:
         """Keep the row of step `k`."""
@@ -60,24 +60,32 @@ class Recorder:
     def close(self) -> None:
         """Write what is left, and join the parts to one file."""
         self._flush()
-        parts = _part_files(self._folder)
         scratch = self._folder / f".{RECORD}"
-        with pq.ParquetWriter(scratch, self._schema, **_WRITING) as writer:
-            for part in parts:
-                writer.write_table(pq.read_table(part, schema=self._schema))
-        scratch.replace(self._folder / RECORD)
-        shutil.rmtree(self._folder / _PARTS)
+        try:
+            with pq.ParquetWriter(scratch, self._schema, **_WRITING) as writer:
+                gathered: list[pa.Table] = []
+                for part in _part_files(self._folder):
+                    gathered.append(pq.read_table(part, schema=self._schema))
+                    if sum(table.num_rows for table in gathered) >= len(self._block):
+                        writer.write_table(pa.concat_tables(gathered).combine_chunks())
+                        gathered = []
+                if gathered:
+                    writer.write_table(pa.concat_tables(gathered).combine_chunks())
+            scratch.replace(self._folder / RECORD)
+        finally:
+            scratch.unlink(missing_ok=True)
+        shutil.rmtree(self._folder / PARTS)
 
     def _flush(self) -> None:
-        filled, self._filled = self._filled, 0
-        if not filled:
+        if not self._filled:
             return
-        columns = [pa.array(column) for column in np.ascontiguousarray(self._block[:filled].T)]
-        part = self._folder / _PARTS / f"{self._parts:06}.parquet"
+        columns = [pa.array(column) for column in np.ascontiguousarray(self._block[: self._filled].T)]
+        part = self._folder / PARTS / f"{self._parts:06}.parquet"
         scratch = part.with_suffix(".tmp")
         pq.write_table(pa.Table.from_arrays(columns, schema=self._schema), scratch, **_WRITING)
         scratch.replace(part)
-        self._parts += 1
+        # only now: an interrupted write is done again, into the same part
+        self._parts, self._filled = self._parts + 1, 0
         self._flushed = time.monotonic()
 
 
@@ -105,8 +113,11 @@ class Record:
     """
 
     def __init__(self, files: Sequence[Path]) -> None:
-        self._files = [_opened(file) for file in files]
-        schema = self._files[0].schema_arrow
+        self._files = list(files)
+        try:
+            schema = pq.read_schema(self._files[0])
+        except (OSError, pa.ArrowException) as error:
+            raise RunError(f"{self._files[0]}: cannot be read: {error}") from error
         self.units: dict[str, str] = {f.name: (f.metadata or {}).get(b"unit", b"").decode() for f in schema}
         self._kept: OrderedDict[str, Array] = OrderedDict()
 
@@ -115,8 +126,7 @@ class Record:
         if name not in self.units:
             raise KeyError(name)
         if name not in self._kept:
-            parts = [file.read(columns=[name])[name].to_numpy() for file in self._files]
-            self._kept[name] = np.concatenate(parts)
+            self._kept[name] = np.concatenate([_column(file, name) for file in self._files])
         self._kept.move_to_end(name)
         while len(self._kept) > _KEPT:
             self._kept.popitem(last=False)
@@ -148,18 +158,22 @@ def load_record(folder: Path) -> Record:
     files = [folder / RECORD] if (folder / RECORD).exists() else _part_files(folder)
     if not files:
         raise RunError(f"{folder}: holds no record of a run")
-    return Record(files)
+    record = Record(files)
+    if not len(record[next(iter(record.units))]):
+        raise RunError(f"{folder}: the record of the run is empty")
+    return record
 
 
-def _opened(file: Path) -> pq.ParquetFile:
+def _column(file: Path, name: str) -> Array:
     try:
-        return pq.ParquetFile(file)
+        column: Array = pq.read_table(file, columns=[name])[name].to_numpy()
     except (OSError, pa.ArrowException) as error:
         raise RunError(f"{file}: cannot be read: {error}") from error
+    return column
 
 
 def _part_files(folder: Path) -> list[Path]:
-    return sorted((folder / _PARTS).glob("*.parquet"))
+    return sorted((folder / PARTS).glob("*.parquet"))
 
 
 def _schema(columns: Sequence[Column]) -> pa.Schema:

@@ -6,6 +6,7 @@ import html
 import io
 import math
 import shutil
+import tempfile
 from pathlib import Path
 from string import Template
 from typing import Any
@@ -89,11 +90,10 @@ def write_report(folder: Path, scenario: Scenario, record: Record, summary: dict
     Path
         The HTML file.
     """
-    figures = folder / f".{FIGURES}"
-    shutil.rmtree(figures, ignore_errors=True)
-    figures.mkdir()
+    figures = Path(tempfile.mkdtemp(prefix=f".{FIGURES}-", dir=folder))
     try:
         shown = [_figure(figures, drawing) for drawing in drawings(Story(scenario, record, summary))]
+        figures.chmod(0o755)
         shutil.rmtree(folder / FIGURES, ignore_errors=True)
         figures.replace(folder / FIGURES)
     finally:

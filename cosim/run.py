@@ -110,14 +110,18 @@ def _step(
     master: Master, folder: RunFolder, telemetry: Telemetry | None, rate: float | None, progress: bool
 ) -> tuple[str, float, PlantError | None]:
     """Step through the run and close its record; return how it ended, what it took [s], and why it failed."""
-    recorder = Recorder(folder.path, master.signals.columns)
-    bar = _Progress(master.scenario) if progress and sys.stderr else None
-    if telemetry:
-        telemetry.start()
-    observers: list[Observer] = [o for o in (recorder, telemetry, bar) if o is not None]
-    status, failure = "completed", None
+    status = "completed"
+    failure: PlantError | None = None
+    recorder: Recorder | None = None
+    bar: _Progress | None = None
     started = time.perf_counter()
     try:
+        recorder = Recorder(folder.path, master.signals.columns)
+        bar = _Progress(master.scenario) if progress and sys.stderr else None
+        if telemetry:
+            telemetry.start()
+        observers: list[Observer] = [o for o in (recorder, telemetry, bar) if o is not None]
+        started = time.perf_counter()
         master.run(observers, rate)
     except KeyboardInterrupt:
         status = "interrupted"
@@ -127,10 +131,10 @@ def _step(
         wall_time = time.perf_counter() - started
         if bar:
             bar.close()
-        if recorder.rows == 0:  # nothing to read: leave nothing behind
-            folder.discard()
-        else:
+        if recorder and recorder.rows:
             recorder.close()
-    if recorder.rows == 0:
+        else:  # nothing to read: leave nothing behind
+            folder.discard()
+    if not (recorder and recorder.rows):
         raise failure or KeyboardInterrupt
     return status, wall_time, failure

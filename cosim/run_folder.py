@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import itertools
 import json
+import os
 import shutil
 from dataclasses import dataclass
 from datetime import datetime
@@ -12,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from cosim.errors import RunError
-from cosim.record import load_record
+from cosim.record import PARTS, load_record
 from cosim.report import write_report
 from cosim.scenario import VEHICLE_COPY, Scenario, load_scenario
 from cosim.summary import summarise
@@ -29,14 +31,13 @@ class RunFolder:
     created: bool  # by the run, not by its user
 
     def discard(self) -> None:
-        """Take away all that the run has made."""
-        for child in self.path.iterdir():
-            if child.is_dir():
-                shutil.rmtree(child)
-            else:
-                child.unlink()
+        """Take away all that a run without a record has made. May be called twice."""
+        for name in (SCENARIO, VEHICLE_COPY):
+            (self.path / name).unlink(missing_ok=True)
+        shutil.rmtree(self.path / PARTS, ignore_errors=True)
         if self.created:
-            self.path.rmdir()
+            with contextlib.suppress(OSError):  # its user has put something there
+                self.path.rmdir()
 
 
 def claim(out: Path | None, scenario: Scenario) -> RunFolder:
@@ -76,7 +77,7 @@ def claim(out: Path | None, scenario: Scenario) -> RunFolder:
                 shutil.copyfile(scenario.vehicle_file, path / VEHICLE_COPY)
         except FileExistsError as error:  # another run came in between
             raise RunError(f"{path}: is taken by another run") from error
-        except OSError:
+        except BaseException:
             folder.discard()
             raise
     except OSError as error:
@@ -125,7 +126,7 @@ def conclude(path: Path, scenario: Scenario, status: str, wall_time: float | Non
     """
     record = load_record(path)
     summary = summarise(scenario, record, status, wall_time)
-    scratch = path / f".{SUMMARY}"
+    scratch = path / f".{SUMMARY}-{os.getpid()}"
     scratch.write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
     scratch.replace(path / SUMMARY)
     if report:

@@ -253,6 +253,7 @@ def _check(table: dict[str, Any], name: str) -> Scenario:
 
     filled = dataclasses.replace(
         file,
+        title=file.title or name,
         time=_TimeEntry(time.duration, time.step, time.control, time.arbiter),
         law=dataclasses.replace(file.law, gains=gains._asdict()),
         intersection=tuple(regions[i].region.name for i in overlapping),
@@ -321,6 +322,7 @@ def _check_regions(entries: tuple[_RegionEntry, ...]) -> tuple[SecondaryRegion, 
 def _check_intersection(wanted: tuple[str, ...], regions: tuple[SecondaryRegion, ...]) -> tuple[int, ...]:
     """Return the indices of the regions whose overlap is reported: those that are named, else all to be kept out of."""
     kept_out = {r.region.name: i for i, r in enumerate(regions) if r.region.keep == "out"}
+    _require(len(set(wanted)) == len(wanted), "intersection", f"{list(wanted)}", "each name once")
     for name in wanted:
         if name not in kept_out:
             raise ScenarioError(f"intersection: {name!r} is no region to be kept out of; {hint(name, kept_out)}")

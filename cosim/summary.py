@@ -105,6 +105,7 @@ def summarise(scenario: Scenario, record: Record, status: str, wall_time: float 
 
 def _saturated_time(scenario: Scenario, record: Record, acted: slice) -> float:
     """How long any actuator was asked for more than it gives [s]."""
-    flags = [name for name in record.units if "_saturated" in name]
+    of_all = ("wrench_saturated", "allocation_saturated")
+    flags = [name for name in record.units if name.startswith("thrust_saturated[") or name in of_all]
     any_cut = np.logical_or.reduce([record[name][acted] > 0.0 for name in flags])
     return float(np.count_nonzero(any_cut) * scenario.time.step)

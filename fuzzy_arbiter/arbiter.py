@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from numbers import Real
+from numbers import Integral, Real
 from typing import Literal, get_args
 
 from fuzzy_arbiter import closed_form
@@ -47,7 +47,7 @@ class Arbiter:
         if engine == "closed":
             self._weights = closed_form.weights
         elif engine == "skfuzzy":
-            if not isinstance(points, int) or points < 3:
+            if not isinstance(points, Integral) or points < 3:
                 raise DefinitionError(f"points is {points!r}, expected a whole number, 3 or more")
             from fuzzy_arbiter.scikit import ScikitEngine  # a second of imports, for those who ask for it
 

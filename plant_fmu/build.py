@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import atexit
+import errno
 import functools
 import hashlib
 import logging
@@ -107,6 +108,8 @@ def cached_fmu(vehicle: Vehicle, fmi: int) -> Path:
     find_compiler()  # so that a missing compiler is said before anything is written
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
+        if not os.access(path.parent, os.W_OK):
+            raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
     except OSError as error:
         log.warning("FMU cache %s: %s; building for this process alone", path.parent, error.strerror or error)
         path = _own_folder() / path.name

@@ -91,7 +91,7 @@ def hint(came: str, known: typing.Iterable[str]) -> str:
     """
     known = sorted(known)
     near = difflib.get_close_matches(came, known, n=1, cutoff=0.5)
-    return f"did you mean {near[0]!r}?" if near else f"expected one of {', '.join(known)}"
+    return f"did you mean {near[0]!r}?" if near else f"expected one of {', '.join(known) or '(none)'}"
 
 
 def dataclass_of(annotation: Any) -> type | None:

@@ -54,6 +54,8 @@ def product_distance(first: float, second: float) -> tuple[float, float, float]:
     tuple of float
         Signed distance [m], and its derivatives by `first` and by `second`.
     """
+    if math.isnan(first) or math.isnan(second):  # a lost position is no safe one
+        return math.nan, math.nan, math.nan
     if first > 0.0 and second > 0.0:
         distance = math.hypot(first, second)
         return distance, first / distance, second / distance

@@ -235,9 +235,14 @@ def test_regions_that_cannot_be_are_named(make, words):
 
 @each_shape
 def test_a_lost_position_never_looks_safe(shape):
-    g, _, clearance = at(shape, (math.nan, math.nan, math.nan), "out")
-    assert math.isnan(g)
-    assert math.isnan(clearance)
+    sees = 1 if isinstance(shape, DepthBand) else 3  # a band is of depth alone
+    for axis in range(3)[-sees:]:
+        p = [0.5, 0.5, 0.5]
+        p[axis] = math.nan
+        for keep in ("in", "out"):
+            g, _, clearance = at(shape, p, keep)
+            assert math.isnan(g)
+            assert math.isnan(clearance)
 
 
 @each_shape

@@ -1,5 +1,6 @@
 """Run folders: whole, readable, and complete even after an interruption."""
 
+import contextlib
 import json
 
 import numpy as np
@@ -209,6 +210,54 @@ def test_whatever_goes_wrong_in_a_step_leaves_a_readable_record(tmp_path, monkey
     with pytest.raises(ZeroDivisionError):
         run_scenario(scenario, tmp_path / "none")
     assert not (tmp_path / "none").exists()
+
+
+def test_an_interrupted_write_loses_and_repeats_nothing(tmp_path, monkeypatch):
+    """Ctrl-C within the writing of a part, as Python delivers it: when the call returns."""
+    recorder = Recorder(tmp_path, COLUMNS, rows_per_part=10)
+    real, calls = pq.write_table, []
+
+    def interrupted(*arguments, **named):
+        real(*arguments, **named)
+        calls.append(1)
+        if len(calls) in (1, 3):
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr("cosim.record.pq.write_table", interrupted)
+    k = 0
+    for _ in range(3):  # what is not written yet when it comes, is written when it goes on
+        with contextlib.suppress(KeyboardInterrupt):
+            while k < 35:
+                recorder.observe(k, np.array([k, 2.0 * k]))
+                k += 1
+    recorder.close()
+    assert load_record(tmp_path)["time"].tolist() == list(range(35))
+
+
+def test_many_small_parts_become_few_row_groups(tmp_path):
+    recorder = Recorder(tmp_path, COLUMNS, rows_per_part=1000)
+    for k in range(300):
+        recorder.observe(k, np.array([k, 2.0 * k]))
+        recorder._flush()
+    assert len(load_record(tmp_path)["time"]) == 300
+    recorder.close()
+    assert pq.ParquetFile(tmp_path / "record.parquet").num_row_groups == 1
+    assert load_record(tmp_path)["x"].tolist() == [2.0 * k for k in range(300)]
+
+
+def test_regions_of_any_name_saturate_nothing(tmp_path):
+    scenario = load_scenario("paper", [*SHORT, "regions.SR3.name=not_saturated"])
+    assert run_scenario(scenario, tmp_path / "run", report=False).summary["saturated_time"] == 0.0
+
+
+def test_an_interrupt_before_the_first_step_leaves_nothing(tmp_path, monkeypatch):
+    def interrupted(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("cosim.run.Recorder", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        run_scenario(load_scenario("paper", SHORT), tmp_path / "run")
+    assert not (tmp_path / "run").exists()
 
 
 def test_no_record_is_a_clear_error(tmp_path):
