@@ -1,0 +1,82 @@
+"""Parameter sets in the format of SSP 1.0 (SSV): the numbers of a vehicle for any tool."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from importlib import metadata
+from xml.etree import ElementTree as ET
+
+from plant_fmu.quantities import UNITS
+from plant_fmu.variables import Variable, variables
+from plant_fmu.vehicle import Vehicle
+
+_NAMESPACES = {
+    "xmlns:ssv": "http://ssp-standard.org/SSP1/SystemStructureParameterValues",
+    "xmlns:ssc": "http://ssp-standard.org/SSP1/SystemStructureCommon",
+}
+
+
+def ssv(vehicle: Vehicle) -> str:
+    """Return the parameter set of a vehicle: every parameter of its FMU, with the vehicle's value.
+
+    Parameters
+    ----------
+    vehicle : Vehicle
+        The vehicle.
+
+    Returns
+    -------
+    str
+        XML text. Applied to the FMU of another vehicle with as many thrusters, it makes that one behave as this one.
+
+    Raises
+    ------
+    VehicleError
+        If a number of the vehicle is beyond the range of its parameter.
+    """
+    values = [(v, v.start) for v in variables(vehicle) if v.role == "parameter"]
+    return parameter_set(vehicle.name, f"{vehicle.title}. {vehicle.source}", values)
+
+
+def parameter_set(name: str, description: str, values: Iterable[tuple[Variable, float]]) -> str:
+    """Return values of variables as a parameter set.
+
+    Parameters
+    ----------
+    name : str
+        What the set is called.
+    description : str
+        What it is for.
+    values : iterable of (Variable, float)
+        The variables, which give name, type and unit, and a value for each in SI units.
+
+    Returns
+    -------
+    str
+        XML text, the same for the same values.
+    """
+    root = ET.Element("ssv:ParameterSet", _NAMESPACES, version="1.0", name=name, description=description)
+    root.set("license", "BSD-3-Clause")
+    root.set("generationTool", f"subreach {metadata.version('subreach')}")
+    parameters = ET.SubElement(root, "ssv:Parameters")
+    used: dict[str, None] = {}  # a set that keeps its order
+    for v, value in values:
+        parameter = ET.SubElement(parameters, "ssv:Parameter", name=v.name, description=v.description)
+        element = ET.SubElement(parameter, f"ssv:{v.type.capitalize()}", value=_text(v, value))
+        if v.quantity.unit:
+            element.set("unit", v.quantity.unit)
+            used[v.quantity.unit] = None
+    if used:
+        units = ET.SubElement(root, "ssv:Units")
+        for unit in used:
+            base = {key: str(power) for key, power in UNITS[unit].items()}
+            ET.SubElement(ET.SubElement(units, "ssc:Unit", name=unit), "ssc:BaseUnit", base)
+    ET.indent(root)
+    return '<?xml version="1.0" encoding="UTF-8"?>\n' + ET.tostring(root, encoding="unicode") + "\n"
+
+
+def _text(v: Variable, value: float) -> str:
+    """Write a value so that it reads back as the same one."""
+    if v.type == "boolean":
+        return "true" if value else "false"
+    return str(int(value)) if v.type == "integer" else repr(float(value))
