@@ -1,0 +1,42 @@
+"""What may be done with an FMU: this project's licence, and that of what is compiled into it."""
+
+from __future__ import annotations
+
+from importlib import metadata
+from pathlib import Path
+
+import fmpy
+
+from plant_fmu.errors import BuildError
+
+_NOTE = """
+--------------------------------------------------------------------------------
+The binaries are compiled with the header files of the FMI standard; for those see fmi-headers.txt beside this file.
+"""
+
+
+def licenses(fmi: int) -> dict[str, str]:
+    """Return the files of ``documentation/licenses``, by name.
+
+    Parameters
+    ----------
+    fmi : int
+        2 or 3.
+
+    Returns
+    -------
+    dict of str to str
+        ``license.txt``, which both FMI versions take for the entry, and what it refers to.
+
+    Raises
+    ------
+    BuildError
+        If the installation has lost its licence.
+    """
+    # a distribution carries its licence among its metadata, in wheels and editable installations alike: no second copy
+    text = metadata.distribution("subreach").read_text("licenses/LICENSE")
+    header = (Path(fmpy.__file__).parent / "c-code" / f"fmi{fmi}Functions.h").read_text(encoding="utf-8")
+    start, end = header.find("Copyright"), header.find("*/")
+    if not text or not 0 <= start < end:
+        raise BuildError("the licence of subreach or of FMPy's FMI headers is not installed; install both anew")
+    return {"license.txt": text.rstrip() + "\n" + _NOTE, "fmi-headers.txt": header[start:end].rstrip() + "\n"}
