@@ -1,0 +1,49 @@
+"""What an FMU holds beside its description, binaries and sources: page, licences, icon, terminals, references."""
+
+from __future__ import annotations
+
+from importlib import resources
+from string import Template
+
+from plant_fmu.layered import FOLDER, layered_files
+from plant_fmu.licenses import licenses
+from plant_fmu.page import page, text
+from plant_fmu.terminals import terminals_and_icons
+from plant_fmu.vehicle import Vehicle
+
+
+def contents(vehicle: Vehicle, fmi: int) -> dict[str, bytes]:
+    """Return the members of an FMU that are neither description nor binary nor source.
+
+    Parameters
+    ----------
+    vehicle : Vehicle
+        The vehicle.
+    fmi : int
+        2 or 3.
+
+    Returns
+    -------
+    dict of str to bytes
+        By path in the archive; the same bytes for the same vehicle.
+
+    Raises
+    ------
+    BuildError
+        If the installation has lost its licence.
+    VehicleError
+        If a number of the vehicle is beyond the range of its parameter.
+    """
+    texts = {
+        "documentation/index.html": page(vehicle, fmi),
+        "documentation/fmi-ls-ref.txt": Template(text("fmi-ls-ref.txt")).substitute(name=vehicle.name),
+        **{f"documentation/licenses/{name}": licence for name, licence in licenses(fmi).items()},
+        **{f"{FOLDER}/{name}": file for name, file in layered_files(vehicle).items()},
+    }
+    picture = (resources.files("plant_fmu") / "pages" / "icon.png").read_bytes()
+    pictures = {"model.png": picture}
+    if fmi == 3:
+        texts["terminalsAndIcons/terminalsAndIcons.xml"] = terminals_and_icons(vehicle)
+        texts["terminalsAndIcons/icon.svg"] = text("icon.svg")
+        pictures = {"terminalsAndIcons/icon.png": picture}
+    return pictures | {name: content.encode() for name, content in texts.items()}
