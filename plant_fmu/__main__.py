@@ -1,4 +1,4 @@
-"""Command line: ``python -m plant_fmu {build,list,docs}``."""
+"""Command line: ``python -m plant_fmu {build,list,docs,ssv,reference}``."""
 
 from __future__ import annotations
 
@@ -9,7 +9,10 @@ from pathlib import Path
 
 from plant_fmu.build import FMI_VERSIONS, build_fmu
 from plant_fmu.description import documentation
-from plant_fmu.errors import PlantFmuError
+from plant_fmu.errors import BuildError, PlantFmuError
+from plant_fmu.layered import reference_files
+from plant_fmu.parameter_set import ssv
+from plant_fmu.reference import reference
 from plant_fmu.vehicle import load_vehicle, shipped_vehicles
 
 
@@ -26,7 +29,23 @@ def _parser() -> argparse.ArgumentParser:
 
     docs = verbs.add_parser("docs", help="print the page of an FMU's variables, in Markdown")
     docs.add_argument("--vehicle", required=True, help="a shipped name, or a TOML file")
+
+    ssv = verbs.add_parser("ssv", help="write the parameters of a vehicle as an SSP parameter set")
+    ssv.add_argument("--vehicle", required=True, help="a shipped name, or a TOML file")
+    ssv.add_argument("--out", type=Path, help="file to write (default: NAME.ssv here)")
+
+    reference = verbs.add_parser("reference", help="write a manoeuvre and its results, integrated without the FMU")
+    reference.add_argument("--vehicle", required=True, help="a shipped name, or a TOML file")
+    reference.add_argument("--out", type=Path, default=Path(), help="folder to write to (default: here)")
     return parser
+
+
+def _write(out: Path, text: str) -> Path:
+    try:
+        out.write_text(text, encoding="utf-8", newline="\n")
+    except OSError as error:
+        raise BuildError(f"{out}: {error.strerror or error}") from error
+    return out
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -49,6 +68,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 print(f"{name:16} {load_vehicle(name).title}")
         elif options.verb == "docs":
             print(documentation(load_vehicle(options.vehicle)), end="")
+        elif options.verb == "ssv":
+            vehicle = load_vehicle(options.vehicle)
+            print(_write(options.out or Path(f"{vehicle.name}.ssv"), ssv(vehicle)))
+        elif options.verb == "reference":
+            vehicle = load_vehicle(options.vehicle)
+            for name, text in reference_files(vehicle, reference(vehicle)).items():
+                print(_write(options.out / name, text))
         else:
             vehicle = load_vehicle(options.vehicle)
             print(build_fmu(vehicle, options.fmi, options.out or Path(f"{vehicle.name}.fmu")))

@@ -18,6 +18,7 @@ import fmpy
 import platformdirs
 
 from plant_fmu.compiler import FLAGS, compile_library, find_compiler, library_suffix, native_platform
+from plant_fmu.contents import contents
 from plant_fmu.description import header, model_description, token
 from plant_fmu.errors import BuildError
 from plant_fmu.vehicle import Vehicle
@@ -71,6 +72,7 @@ def build_fmu(vehicle: Vehicle, fmi: int, out: Path) -> Path:
         compile_library(sources, [folder, Path(fmpy.__file__).parent / "c-code"], library)
         binaries = _FMI2_PLATFORMS[place] if fmi == 2 else place
         content = {
+            **contents(vehicle, fmi),
             "modelDescription.xml": _description(vehicle, fmi).encode(),
             f"binaries/{binaries}/{library.name}": library.read_bytes(),
         }
@@ -99,8 +101,9 @@ def cached_fmu(vehicle: Vehicle, fmi: int) -> Path:
     BuildError
         As `build_fmu`.
     """
-    made_from = _description(vehicle, fmi).encode() + " ".join((native_platform(), *FLAGS, fmpy.__version__)).encode()
-    digest = hashlib.sha256(made_from).hexdigest()[:16]
+    made_from = [_description(vehicle, fmi).encode(), *contents(vehicle, fmi).values()]
+    made_from += [part.encode() for part in (native_platform(), *FLAGS, fmpy.__version__)]
+    digest = hashlib.sha256(b"\0".join(made_from)).hexdigest()[:16]
     path = Path(platformdirs.user_cache_dir("subreach")) / "fmu" / f"{vehicle.name}-fmi{fmi}-{digest}.fmu"
     if path.exists():
         return path
