@@ -19,7 +19,7 @@ log = logging.getLogger(__name__)
 
 # no contraction of a*b+c, so that compilers differ in no bit beyond what their C libraries do;
 # and no debug information, which would name the folder of the build
-FLAGS = ("-std=c99", "-O2", "-g0", "-ffp-contract=off", "-fPIC", "-fvisibility=hidden", "-shared")
+FLAGS = ("-std=c99", "-O3", "-fno-math-errno", "-g0", "-ffp-contract=off", "-fPIC", "-fvisibility=hidden", "-shared")
 _WARNINGS = ("-Wall", "-Wextra", "-Wpedantic")
 
 _OLD_GLIBC = "gnu.2.17"  # so that a library built here also loads on older systems
