@@ -102,7 +102,10 @@ class Instance:
     def _load(self, path: Path, folder: str, loaded: list[Any]) -> None:
         try:
             fmpy.extract(str(path), folder)
-            root = ET.parse(Path(folder, "modelDescription.xml")).getroot()
+            described = Path(folder, "modelDescription.xml")
+            if not described.is_file():
+                raise PlantError(f"{path}: no FMU: holds no modelDescription.xml")
+            root = ET.parse(described).getroot()
         except (OSError, zipfile.BadZipFile, ET.ParseError) as error:
             raise PlantError(f"{path}: no FMU: {getattr(error, 'strerror', None) or _one_line(error)}") from error
         version = root.get("fmiVersion", "")

@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from plant_fmu.build import cached_fmu
+from plant_fmu.build import FMI_VERSIONS, cached_fmu
+from plant_fmu.channels import REALS
 from plant_fmu.errors import PlantError
 from plant_fmu.slave import Slave
 from plant_fmu.state import Clock, State, from_bytes, to_bytes
@@ -41,7 +42,7 @@ class Plant(Slave):
     Raises
     ------
     PlantError
-        If the FMU cannot be loaded.
+        If the FMU cannot be loaded, or there is no such FMI version.
     VehicleError, TableError, BuildError
         If there is no such vehicle, or no FMU of it can be made.
 
@@ -143,14 +144,23 @@ class Plant(Slave):
         """
         self._require("derivatives", "provides no directional derivatives")
         self._require_initialised("has no derivatives")
-        rows = [self._variable(name).valueReference for name in unknowns]
-        columns = [self._variable(name).valueReference for name in knowns]
+        rows, columns = ([self._real(name) for name in names] for names in (unknowns, knowns))
         self._send()
         found = np.zeros((len(rows), len(columns)))
-        derivative = self._instance.fmu.getDirectionalDerivative
         for j, column in enumerate(columns if rows else ()):
-            found[:, j] = self._instance.do(derivative, rows, [column], [1.0])
+            try:
+                found[:, j] = self._instance.do(self._instance.fmu.getDirectionalDerivative, rows, [column], [1.0])
+            except PlantError as error:
+                raise PlantError(f"derivatives of {', '.join(unknowns)} by {knowns[j]}: {error}") from error
         return found
+
+    def _real(self, name: str) -> int:
+        """Return the value reference of a variable that has derivatives."""
+        variable = self._variable(name)
+        if variable.type not in REALS or variable.dimensions:
+            kind = "an array" if variable.dimensions else f"of type {variable.type}"
+            raise PlantError(f"{name} is {kind}, expected a real scalar variable")
+        return int(variable.valueReference)
 
     def _require(self, capability: str, what: str) -> None:
         self._require_open()
@@ -159,6 +169,8 @@ class Plant(Slave):
 
 
 def _fmu_of(source: str | Path | Vehicle, fmi: int) -> Path:
+    if fmi not in FMI_VERSIONS:
+        raise PlantError(f"FMI version is {fmi!r}, expected 2 or 3")
     if isinstance(source, Vehicle):
         return cached_fmu(source, fmi)
     if not isinstance(source, (str, Path)):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 import math
 from collections.abc import Mapping
 from pathlib import Path
@@ -15,7 +16,6 @@ from plant_fmu.channels import Bound
 from plant_fmu.errors import PlantError
 from plant_fmu.instance import WARNING, Instance
 from plant_fmu.state import Clock
-from plant_fmu.tables import hint
 from plant_fmu.values import Value, checked, require_settable
 
 _AT_ZERO = Clock(0.0, 0, math.nan)
@@ -143,7 +143,9 @@ class Slave:
     def _variable(self, name: str) -> Any:
         known = self._instance.variables
         if name not in known:
-            raise PlantError(f"FMU variable {name!r} is unknown; {hint(str(name), known)}")
+            near = difflib.get_close_matches(str(name), known, n=1)
+            said = f"did you mean {near[0]!r}?" if near else f"expected one of the {len(known)} in plant.names"
+            raise PlantError(f"FMU variable {name!r} is unknown; {said}")
         return known[name]
 
     def _require_open(self) -> None:
