@@ -45,8 +45,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = _parser().parse_args(arguments)
     try:
         if options.verb == "list":
-            for name in shipped_vehicles():
-                print(f"{name:16} {load_vehicle(name).title}")
+            names = shipped_vehicles()
+            for name in names:
+                print(f"{name:{max(map(len, names))}}  {load_vehicle(name).title}")
         elif options.verb == "docs":
             print(documentation(load_vehicle(options.vehicle)), end="")
         else:

@@ -15,3 +15,7 @@ class VehicleError(PlantFmuError):
 
 class BuildError(PlantFmuError):
     """No compiler, a compiler that fails, or a place that cannot be written."""
+
+
+class PlantError(PlantFmuError):
+    """An FMU that cannot be loaded, or refuses a value or a step; its own words are in the message."""
