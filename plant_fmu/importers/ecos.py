@@ -12,11 +12,24 @@ from plant_fmu.importers.fmu_file import FmuFile
 from plant_fmu.importers.task import Answer, Task
 
 
+def _preload_tbb() -> None:
+    """Load what ecospy's library needs on Linux, and would not find where pip puts it."""
+    if sys.platform != "linux":
+        return
+    for file in metadata.files("tbb") or []:
+        if file.name == "libtbb.so.12":
+            ctypes.CDLL(str(file.locate()), mode=ctypes.RTLD_GLOBAL)
+            return
+    raise ImporterError("the tbb package holds no libtbb.so.12")
+
+
+_preload_tbb()
+
+from ecospy import EcosLib, EcosSimulation, EcosSimulationStructure  # noqa: E402
+
+
 def run(fmu: FmuFile, task: Task, folder: Path) -> Answer:
     """Simulate to the stop time."""
-    _preload_tbb()
-    from ecospy import EcosLib, EcosSimulation, EcosSimulationStructure
-
     EcosLib.set_log_level("err")
     with EcosSimulationStructure() as structure:
         structure.add_model("fmu", str(fmu.path))
@@ -31,14 +44,3 @@ def run(fmu: FmuFile, task: Task, folder: Path) -> Answer:
             values = {v.name: float(simulation.get_real(f"fmu::{v.name}")) for v in fmu.of("output")}
             simulation.terminate()
     return Answer(values)
-
-
-def _preload_tbb() -> None:
-    """Load what ecospy's library needs on Linux, and would not find where pip puts it."""
-    if sys.platform != "linux":
-        return
-    for file in metadata.files("tbb") or []:
-        if file.name == "libtbb.so.12":
-            ctypes.CDLL(str(file.locate()), mode=ctypes.RTLD_GLOBAL)
-            return
-    raise ImporterError("the tbb package holds no libtbb.so.12")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shlex
 import signal
 import subprocess
 import sys
@@ -49,8 +50,8 @@ def run_importer(importer: Importer, fmu: FmuFile, task: Task, timeout: float = 
         line = " ".join(note.split())
         return Result(importer.name, version, importer.interface, status, line, **more)  # type: ignore[arg-type]
 
-    if not version:
-        return result("not installed", f"pip install {' '.join(importer.packages)}")
+    if missing := importer.missing():
+        return result("not installed", f"pip install {shlex.join(missing)}")
     if objection := importer.objection(fmu):
         return result("does not apply", objection)
     with tempfile.TemporaryDirectory(prefix="plant_fmu-", ignore_cleanup_errors=True) as scratch:
@@ -68,6 +69,8 @@ def run_importer(importer: Importer, fmu: FmuFile, task: Task, timeout: float = 
             reply = json.loads((folder / "reply.json").read_text(encoding="utf-8"))
         except (OSError, ValueError):
             return result("failed", f"ended without an answer{said}")
+    if "unusable" in reply:  # which is no fault of the FMU
+        return result("not installed", f"cannot be loaded: {reply['unusable']}")
     if "error" in reply:
         return result("failed", reply["error"] + said)
     return result("ok", **reply)

@@ -7,6 +7,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from importlib import metadata
 
+from packaging.requirements import Requirement
+
 from plant_fmu.importers.fmu_file import FmuFile
 
 
@@ -16,17 +18,18 @@ class Importer:
 
     name: str
     module: str
-    packages: tuple[str, ...]  # what pip must have installed; the version shown is the first one's
+    packages: tuple[str, ...]  # what pip must have installed, as its requirements; the first is the importer itself
     interface: str  # "CS", "ME", or "" where nothing is simulated
     inapplicable: Callable[[FmuFile], str] = lambda fmu: ""  # why it does not apply to an FMU, "" if it does
 
     def version(self) -> str:
         """Return the version that is installed, or ``""`` if there is none."""
-        try:
-            versions = [metadata.version(package) for package in self.packages]  # all of them are needed
-        except metadata.PackageNotFoundError:
-            return ""
-        return versions[0]
+        return _installed(Requirement(self.packages[0]))
+
+    def missing(self) -> list[str]:
+        """Return the packages that are not there, or too old."""
+        needed = {package: Requirement(package) for package in self.packages}
+        return [package for package, r in needed.items() if not (v := _installed(r)) or v not in r.specifier]
 
     def objection(self, fmu: FmuFile) -> str:
         """Return why this importer has nothing to do with an FMU, or ``""``."""
@@ -37,6 +40,13 @@ class Importer:
         if not fmu.runs_here:
             return "the FMU has no binary for this machine"
         return self.inapplicable(fmu)
+
+
+def _installed(package: Requirement) -> str:
+    try:
+        return metadata.version(package.name)
+    except metadata.PackageNotFoundError:
+        return ""
 
 
 def _not_libcosim(fmu: FmuFile) -> str:
@@ -58,15 +68,15 @@ def _not_casadi(fmu: FmuFile) -> str:
 
 
 # ecospy's library needs TBB, and on Linux does not bring it along
-_TBB = ("tbb",) if sys.platform == "linux" else ()
+_TBB = ("tbb>=2021.13",) if sys.platform == "linux" else ()
 
 IMPORTERS = (
-    Importer("FMPy validation", "fmpy_validation", ("fmpy",), ""),
-    Importer("fmu-manipulation-toolbox", "toolbox", ("fmu-manipulation-toolbox",), ""),
-    Importer("FMPy", "fmpy_stepping", ("fmpy",), "CS"),
-    Importer("FMPy FMU state", "fmpy_state", ("fmpy",), "CS", _not_state),
-    Importer("libcosim", "libcosim", ("libcosimpy",), "CS", _not_libcosim),
-    Importer("Ecos", "ecos", ("ecospy", *_TBB), "CS"),
-    Importer("FMPy CVode", "fmpy_cvode", ("fmpy",), "ME"),
-    Importer("CasADi", "casadi_import", ("casadi",), "ME", _not_casadi),
+    Importer("FMPy validation", "fmpy_validation", ("fmpy>=0.3.22",), ""),
+    Importer("fmu-manipulation-toolbox", "toolbox", ("fmu-manipulation-toolbox>=2.0",), ""),
+    Importer("FMPy", "fmpy_stepping", ("fmpy>=0.3.22",), "CS"),
+    Importer("FMPy FMU state", "fmpy_state", ("fmpy>=0.3.22",), "CS", _not_state),
+    Importer("libcosim", "libcosim", ("libcosimpy>=0.0.6",), "CS", _not_libcosim),
+    Importer("Ecos", "ecos", ("ecospy>=0.7", *_TBB), "CS"),
+    Importer("FMPy CVode", "fmpy_cvode", ("fmpy>=0.3.22",), "ME"),
+    Importer("CasADi", "casadi_import", ("casadi>=3.8",), "ME", _not_casadi),
 )
