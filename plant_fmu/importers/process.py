@@ -62,7 +62,7 @@ def run_importer(importer: Importer, fmu: FmuFile, task: Task, timeout: float = 
         if code is None:
             return result("failed", f"not done after {timeout:g} s{said}")
         if code < 0:
-            return result("failed", f"crashed ({signal.Signals(-code).name}){said}")
+            return result("failed", f"crashed (signal {-code}, {signal.strsignal(-code)}){said}")
         if code != 0:
             return result("failed", f"crashed (exit code {code}){said}")
         try:
