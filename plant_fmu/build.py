@@ -26,7 +26,6 @@ log = logging.getLogger(__name__)
 
 FMI_VERSIONS = (2, 3)
 
-_SOURCES = ("plant.h", "plant.c", "actuators.c", "instance.h", "instance.c")
 _ZIP_DATE = (1980, 1, 1, 0, 0, 0)
 # FMI 2.0 names no aarch64: FMPy looks in these folders there, and other tools take them for x86_64
 _FMI2_PLATFORMS = {
@@ -130,16 +129,23 @@ def _description(vehicle: Vehicle, fmi: int) -> str:
     return model_description(vehicle, fmi, token(vehicle, fmi, _source_bytes()))
 
 
-def _source_bytes() -> bytes:
+def _sources(fmi: int | None = None) -> list[resources.abc.Traversable]:
+    """Return the C files of one FMI version, or of both."""
+    other = {2: "fmi3.c", 3: "fmi2.c"}.get(fmi or 0)
     folder = resources.files("plant_fmu") / "csrc"
-    return b"".join((folder / name).read_bytes() for name in (*_SOURCES, "fmi2.c", "fmi3.c"))
+    return sorted(
+        (f for f in folder.iterdir() if f.name[-2:] in (".c", ".h") and f.name != other), key=lambda f: f.name
+    )
+
+
+def _source_bytes() -> bytes:
+    return b"".join(file.read_bytes() for file in _sources())
 
 
 def _write_sources(folder: Path, vehicle: Vehicle, fmi: int) -> list[Path]:
     """Lay out the C files and the generated header; return the files to compile."""
-    package = resources.files("plant_fmu") / "csrc"
-    for name in (*_SOURCES, f"fmi{fmi}.c"):
-        (folder / name).write_bytes((package / name).read_bytes())
+    for file in _sources(fmi):
+        (folder / file.name).write_bytes(file.read_bytes())
     (folder / "vehicle.h").write_text(header(vehicle, token(vehicle, fmi, _source_bytes())), encoding="utf-8")
     return sorted(folder.glob("*.c"))
 

@@ -7,16 +7,42 @@ import math
 from importlib import metadata
 from xml.etree import ElementTree as ET
 
-from plant_fmu.variables import UNITS, Variable, variables
+from plant_fmu.quantities import UNITS
+from plant_fmu.variables import Variable, variables
 from plant_fmu.vehicle import Vehicle
 
 DEFAULT_STOP_TIME = 10.0  # s
 DEFAULT_STEP = 0.01  # s
+DEFAULT_TOLERANCE = 1e-6  # relative
 
-_CAUSALITY = {"time": "independent", "state": "output", "input": "input", "output": "output", "parameter": "parameter",
-              "flag": "output"}  # fmt: skip
-_VARIABILITY = {"parameter": "tunable", "flag": "discrete"}
-_INITIAL = {"state": "exact", "output": "calculated", "flag": "calculated", "parameter": "exact"}
+_CAUSALITY = {"time": "independent", "state": "output", "input": "input", "output": "output", "derivative": "local",
+              "parameter": "parameter"}  # fmt: skip
+_INITIAL = {"state": "exact", "output": "calculated", "derivative": "calculated", "parameter": "exact"}
+_ELEMENT = {  # by FMI version and type
+    2: {"real": "Real", "integer": "Integer", "boolean": "Boolean"},
+    3: {"real": "Float64", "integer": "Int32", "boolean": "Boolean"},
+}
+_INTERFACES = {  # by FMI version
+    2: {
+        "canGetAndSetFMUstate": "true",
+        "canSerializeFMUstate": "true",
+        "providesDirectionalDerivative": "true",
+        "canNotUseMemoryManagementFunctions": "true",
+    },
+    3: {
+        "canGetAndSetFMUState": "true",
+        "canSerializeFMUState": "true",
+        "providesDirectionalDerivatives": "true",
+        "providesAdjointDerivatives": "true",
+    },
+}
+_LOG_CATEGORIES = {
+    "logEvents": "Initialisation, and samples in model exchange",
+    "logStatusWarning": "Values that were mended",
+    "logStatusDiscard": "States that an integrator tried and that lie outside the plant's domain",
+    "logStatusError": "Refused values and calls; logged always",
+    "logAll": "All of these",
+}
 
 
 def _number(value: float) -> str:
@@ -39,6 +65,8 @@ def header(vehicle: Vehicle, token: str) -> str:
     str
         C99 text.
     """
+    rows = variables(vehicle)
+    first_state = next(i for i, v in enumerate(rows) if v.role == "state")
     lines = [
         f"/* {vehicle.name}: generated from plant_fmu's table of variables. */",
         "#ifndef VEHICLE_H",
@@ -46,19 +74,17 @@ def header(vehicle: Vehicle, token: str) -> str:
         "",
         f'#define INSTANTIATION_TOKEN "{token}"',
         "",
-        f"enum {{ N_THRUSTERS = {vehicle.n_thrusters} }};",
+        f"enum {{ N_THRUSTERS = {vehicle.n_thrusters}, FIRST_STATE = {first_state} }};",
         "",
     ]
-    rows = variables(vehicle)
-    for macro, flags in (("VEHICLE_REALS", False), ("VEHICLE_FLAGS", True)):
-        lines.append(f"#define {macro} \\")
-        for v in rows:
-            if (v.role == "flag") == flags:
-                role = "OUTPUT" if flags else v.role.upper()
-                numbers = ", ".join(_number(x) for x in (v.start, v.quantity.minimum, v.quantity.maximum))
-                lines.append(f'    {{"{v.name}", {role}, AT({v.member}), {numbers}}}, \\')
-        lines[-1] = lines[-1].removesuffix(" \\")
-        lines.append("")
+    lines.append("#define VEHICLE_VARIABLES \\")
+    for v in rows:
+        role = "OUTPUT" if v.role == "derivative" else v.role.upper()
+        numbers = (v.start, v.quantity.minimum, v.quantity.maximum, v.nominal)
+        values = ", ".join(_number(x) for x in numbers)
+        lines.append(f'    {{"{v.name}", TYPE_{v.type.upper()}, {role}, AT({v.member}), {values}}}, \\')
+    lines[-1] = lines[-1].removesuffix(" \\")
+    lines.append("")
     return "\n".join([*lines, "#endif", ""])
 
 
@@ -116,10 +142,12 @@ def model_description(vehicle: Vehicle, fmi: int, token: str) -> str:
             "variableNamingConvention": "structured",
         },
     )
-    interface = ET.SubElement(root, "CoSimulation", modelIdentifier=vehicle.name)
-    interface.set("canHandleVariableCommunicationStepSize", "true")
-    if fmi == 2:
-        interface.set("canNotUseMemoryManagementFunctions", "true")
+    for interface in ("ModelExchange", "CoSimulation"):
+        element = ET.SubElement(root, interface, _INTERFACES[fmi], modelIdentifier=vehicle.name)
+        if interface == "CoSimulation":
+            element.set("canHandleVariableCommunicationStepSize", "true")
+        elif fmi == 2:
+            element.set("completedIntegratorStepNotNeeded", "true")
 
     units = ET.SubElement(root, "UnitDefinitions")
     for name, exponents in UNITS.items():
@@ -129,29 +157,34 @@ def model_description(vehicle: Vehicle, fmi: int, token: str) -> str:
             ET.SubElement(unit, "DisplayUnit", name="deg", factor=_number(math.degrees(1.0)))
 
     log = ET.SubElement(root, "LogCategories")
-    ET.SubElement(log, "Category", name="logStatusError", description="Refused values and calls; always logged")
+    for category, what in _LOG_CATEGORIES.items():
+        ET.SubElement(log, "Category", name=category, description=what)
     ET.SubElement(
         root, "DefaultExperiment",
-        startTime="0.0", stopTime=_number(DEFAULT_STOP_TIME), stepSize=_number(DEFAULT_STEP),
+        startTime="0.0", stopTime=_number(DEFAULT_STOP_TIME), tolerance=_number(DEFAULT_TOLERANCE),
+        stepSize=_number(DEFAULT_STEP),
     )  # fmt: skip
 
     # FMI 2.0 needs no variable for the time, and some importers stumble over one
     rows = [(vr, v) for vr, v in enumerate(variables(vehicle)) if fmi == 3 or v.role != "time"]
+    # FMI 2.0 names variables by their position in the list, FMI 3.0 by value reference
+    number = {v.name: str(i + 1 if fmi == 2 else vr) for i, (vr, v) in enumerate(rows)}
     model_variables = ET.SubElement(root, "ModelVariables")
     for vr, v in rows:
-        _add_variable(model_variables, vr, v, fmi)
-    _add_structure(ET.SubElement(root, "ModelStructure"), rows, fmi)
+        _add_variable(model_variables, vr, v, fmi, number)
+    _add_structure(ET.SubElement(root, "ModelStructure"), [v for _, v in rows], fmi, number)
 
     ET.indent(root)
     return '<?xml version="1.0" encoding="UTF-8"?>\n' + ET.tostring(root, encoding="unicode") + "\n"
 
 
-def _add_variable(parent: ET.Element, vr: int, v: Variable, fmi: int) -> None:
+def _add_variable(parent: ET.Element, vr: int, v: Variable, fmi: int, number: dict[str, str]) -> None:
+    real, parameter = v.type == "real", v.role == "parameter"
     common = {
         "name": v.name,
         "valueReference": str(vr),
-        "causality": _CAUSALITY[v.role],
-        "variability": _VARIABILITY.get(v.role, "continuous"),
+        "causality": "local" if v.local else _CAUSALITY[v.role],
+        "variability": "tunable" if parameter else "continuous" if real else "discrete",
         "description": v.description,
     }
     if v.role in _INITIAL:
@@ -161,37 +194,47 @@ def _add_variable(parent: ET.Element, vr: int, v: Variable, fmi: int) -> None:
         kind["unit"] = v.quantity.unit
     if v.quantity.unit == "rad":
         kind["displayUnit"] = "deg"
-    if v.role not in ("time", "flag"):
-        kind |= {"min": _number(v.quantity.minimum), "max": _number(v.quantity.maximum), "nominal": _number(v.nominal)}
+    if v.quantity.bounded and v.type != "boolean":
+        kind |= {"min": _value(v, v.quantity.minimum), "max": _value(v, v.quantity.maximum)}
+    if real and v.role != "time":
+        kind["nominal"] = _number(v.nominal)
     if v.role in ("state", "input", "parameter"):
-        kind["start"] = _number(v.start)
+        kind["start"] = _value(v, v.start)
+    if v.role == "derivative":
+        kind["derivative"] = number[v.name.removeprefix("der(").removesuffix(")")]
 
+    element = _ELEMENT[fmi][v.type]
     if fmi == 2:
-        element = ET.SubElement(parent, "ScalarVariable", common)
-        ET.SubElement(element, "Boolean" if v.role == "flag" else "Real", kind)
+        ET.SubElement(ET.SubElement(parent, "ScalarVariable", common), element, kind)
     else:
-        ET.SubElement(parent, "Boolean" if v.role == "flag" else "Float64", common | kind)
+        ET.SubElement(parent, element, common | kind)
 
 
-def _add_structure(parent: ET.Element, rows: list[tuple[int, Variable]], fmi: int) -> None:
-    """Add the outputs with what they follow from directly, and the unknowns of initialisation."""
-    # FMI 2.0 names variables by their position in the list, FMI 3.0 by value reference
-    number = {v.name: i + 1 if fmi == 2 else vr for i, (vr, v) in enumerate(rows)}
-    inputs = {v.name for _, v in rows if v.role == "input"}
+def _value(v: Variable, value: float) -> str:
+    """Write a value in the way of the variable's type."""
+    if v.type == "boolean":
+        return "true" if value else "false"
+    return str(int(value)) if v.type == "integer" else _number(value)
 
-    def entry(parent: ET.Element, tag: str, v: Variable, knowns: tuple[str, ...]) -> None:
-        references = " ".join(str(number[name]) for name in sorted(knowns, key=number.__getitem__))
-        attribute = "index" if fmi == 2 else "valueReference"
-        ET.SubElement(parent, tag, {attribute: str(number[v.name]), "dependencies": references})
 
-    outputs = [v for _, v in rows if v.role in ("state", "output", "flag")]
-    unknowns = [v for v in outputs if v.role != "state"]
-    of_outputs = ET.SubElement(parent, "Outputs") if fmi == 2 else parent
-    for v in outputs:
-        entry(of_outputs, "Unknown" if fmi == 2 else "Output", v, tuple(d for d in v.depends if d in inputs))
-    of_start = ET.SubElement(parent, "InitialUnknowns") if fmi == 2 else parent
-    for v in unknowns:
-        entry(of_start, "Unknown" if fmi == 2 else "InitialUnknown", v, v.depends)
+def _add_structure(parent: ET.Element, rows: list[Variable], fmi: int, number: dict[str, str]) -> None:
+    """Add outputs and derivatives with what they follow from in an instant, and the unknowns of initialisation."""
+    continuous = {v.name for v in rows if v.role in ("time", "state", "input")}
+    sections = (
+        ("Outputs", "Output", [v for v in rows if v.role in ("state", "output") and not v.local], True),
+        ("Derivatives", "ContinuousStateDerivative", [v for v in rows if v.role == "derivative"], True),
+        ("InitialUnknowns", "InitialUnknown", [v for v in rows if v.role in ("output", "derivative")], False),
+    )
+    for section, tag, unknowns, instant in sections:
+        under = ET.SubElement(parent, section) if fmi == 2 else parent
+        for v in unknowns:
+            depends = (v.name,) if v.role == "state" else v.depends
+            knowns = [number[name] for name in depends if name in number and (name in continuous or not instant)]
+            attribute = "index" if fmi == 2 else "valueReference"
+            references = " ".join(sorted(knowns, key=int))
+            ET.SubElement(
+                under, "Unknown" if fmi == 2 else tag, {attribute: number[v.name], "dependencies": references}
+            )
 
 
 def documentation(vehicle: Vehicle) -> str:
@@ -211,7 +254,7 @@ def documentation(vehicle: Vehicle) -> str:
         "input": "Inputs",
         "state": "States (outputs; start values may be set before initialisation ends)",
         "output": "Outputs",
-        "flag": "Boolean outputs",
+        "derivative": "Derivatives of the states",
         "parameter": "Parameters (tunable)",
     }
     lines = [f"# Variables of the `{vehicle.name}` FMU", "", vehicle.title + ".", "", vehicle.source]
@@ -225,12 +268,14 @@ def documentation(vehicle: Vehicle) -> str:
         ]
         for v in variables(vehicle):
             if v.role == role:
-                numbers = (
-                    ["", "", ""]
-                    if role == "flag"
-                    else [f"{x:g}" for x in (v.start, v.quantity.minimum, v.quantity.maximum)]
+                q = v.quantity
+                start = (
+                    ""
+                    if role in ("output", "derivative")
+                    else _value(v, v.start)
+                    if v.type != "real"
+                    else f"{v.start:g}"
                 )
-                if role == "output":
-                    numbers[0] = ""
-                lines.append(f"| `{v.name}` | {v.quantity.unit} | {' | '.join(numbers)} | {v.description} |")
+                least, most = (f"{q.minimum:g}", f"{q.maximum:g}") if q.bounded and v.type != "boolean" else ("", "")
+                lines.append(f"| `{v.name}` | {q.unit} | {start} | {least} | {most} | {v.description} |")
     return "\n".join([*lines, ""])

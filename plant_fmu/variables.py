@@ -2,73 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
 from typing import Literal
 
+from plant_fmu import quantities as q
 from plant_fmu.errors import VehicleError
+from plant_fmu.quantities import Quantity
 from plant_fmu.vehicle import Vehicle
 
-Role = Literal["time", "state", "input", "output", "parameter", "flag"]
+Role = Literal["time", "state", "input", "output", "derivative", "parameter"]
+Type = Literal["real", "integer", "boolean"]
 
 AXES = "xyz"
 VELOCITIES = "uvwpqr"
 FORCES = "XYZKMN"
-
-# unit: exponents of kg, m, s, rad
-UNITS: dict[str, dict[str, int]] = {
-    "s": {"s": 1},
-    "m": {"m": 1},
-    "m/s": {"m": 1, "s": -1},
-    "rad": {"rad": 1},
-    "rad/s": {"rad": 1, "s": -1},
-    "kg": {"kg": 1},
-    "kg.m": {"kg": 1, "m": 1},
-    "kg.m2": {"kg": 1, "m": 2},
-    "N": {"kg": 1, "m": 1, "s": -2},
-    "N.m": {"kg": 1, "m": 2, "s": -2},
-    "N.m/N": {"m": 1},
-    "N.s/m": {"kg": 1, "s": -1},
-    "N.m.s/rad": {"kg": 1, "m": 2, "s": -1, "rad": -1},
-    "N.s2/m2": {"kg": 1, "m": -1},
-    "N.m.s2/rad2": {"kg": 1, "m": 2, "rad": -2},
-}
-
-
-@dataclass(frozen=True)
-class Quantity:
-    """What a number measures, and the domain in which the plant is meant to be used; values beyond it are refused."""
-
-    unit: str  # a key of UNITS, or "" for a pure number
-    minimum: float
-    maximum: float
-    nominal: float = 1.0
-
-
-TIME = Quantity("s", 0.0, 0.0)
-LENGTH = Quantity("m", -1e6, 1e6)
-UNIT_NUMBER = Quantity("", -1.0, 1.0)
-SPEED = Quantity("m/s", -1e4, 1e4)
-ANGULAR_SPEED = Quantity("rad/s", -1e4, 1e4)
-HALF_TURN = Quantity("rad", -3.1416, 3.1416)
-QUARTER_TURN = Quantity("rad", -1.5708, 1.5708)
-FORCE = Quantity("N", -1e9, 1e9, 10.0)  # far above any vehicle
-MOMENT = Quantity("N.m", -1e9, 1e9, 10.0)
-ALL_FORCES = Quantity("N", -1e12, 1e12, 10.0)
-ALL_MOMENTS = Quantity("N.m", -1e12, 1e12, 10.0)
-FLAG = Quantity("", 0.0, 0.0)
-
-MASS = Quantity("kg", 1e-3, 1e9)
-LEVER = Quantity("m", -1e3, 1e3)
-WEIGHT = Quantity("N", 0.0, 1e10)
-CURRENT = Quantity("m/s", -100.0, 100.0)
-TIME_CONSTANT = Quantity("s", 0.0, 1e3)
-SUBSTEP = Quantity("s", 1e-6, 1.0)
-FORCE_LIMIT = Quantity("N", 0.0, 1e10)  # its maximum is above the norm of any force: no limit
-
-
-def _inertial(unit: str, diagonal: bool) -> Quantity:
-    return Quantity(unit, 0.0 if diagonal else -1e12, 1e12)
 
 
 @dataclass(frozen=True)
@@ -81,7 +29,9 @@ class Variable:
     quantity: Quantity
     description: str
     start: float = 0.0
-    depends: tuple[str, ...] = ()  # names of the inputs, states and parameters that an output follows from directly
+    depends: tuple[str, ...] = ()  # names, or beginnings followed by *, of what a calculated variable follows from
+    type: Type = "real"
+    local: bool = False  # a state that is no output
 
     @property
     def nominal(self) -> float:
@@ -100,7 +50,8 @@ def variables(vehicle: Vehicle) -> list[Variable]:
     Returns
     -------
     list of Variable
-        Real variables first, then the Boolean ones (role ``"flag"``).
+        Real variables first, then the Integer and the Boolean ones. The states stand together, in the order of their
+        derivatives.
 
     Raises
     ------
@@ -108,20 +59,31 @@ def variables(vehicle: Vehicle) -> list[Variable]:
         If a number of the vehicle is beyond the range of its parameter.
     """
     rows = [
-        Variable("time", "time", "time", TIME, "Simulated time"),
-        *_states(),
+        Variable("time", "time", "time", q.TIME, "Simulated time"),
+        *_states(vehicle),
         *_inputs(vehicle),
         *_outputs(vehicle),
+        *_derivatives(vehicle),
         *_parameters(vehicle),
-        *_flags(vehicle),
+        *_environment(vehicle),
+        *_sensors(),
+        *_discrete(vehicle),
     ]
     for v in rows:
-        q = v.quantity
-        if not q.minimum <= v.start <= q.maximum:
+        if not v.quantity.minimum <= v.start <= v.quantity.maximum:
+            least, most = v.quantity.minimum, v.quantity.maximum
             raise VehicleError(
-                f"{vehicle.name}: {v.name} is {v.start:g} {q.unit}, expected {q.minimum:g} to {q.maximum:g}"
+                f"{vehicle.name}: {v.name} is {v.start:g} {v.quantity.unit}, expected {least:g} to {most:g}"
             )
-    return rows
+    names = [v.name for v in rows if v.role in ("time", "state", "input", "parameter")]
+    return [replace(v, depends=_expand(v.depends, names)) for v in rows]
+
+
+def _expand(patterns: tuple[str, ...], names: list[str]) -> tuple[str, ...]:
+    """Return the names that the patterns mean, in the order of the table."""
+    exact = {pattern for pattern in patterns if not pattern.endswith("*")}
+    beginnings = tuple(pattern[:-1] for pattern in patterns if pattern.endswith("*"))
+    return tuple(name for name in names if name in exact or (beginnings and name.startswith(beginnings)))
 
 
 def _along(i: int) -> str:
@@ -129,78 +91,155 @@ def _along(i: int) -> str:
     return f"{'along' if i < 3 else 'about'} body {AXES[i % 3]}"
 
 
-def _states() -> Iterator[Variable]:
+# ---- what moves ----
+
+
+def _states(vehicle: Vehicle) -> Iterator[Variable]:
     for i, where in enumerate(("north", "east", "down (depth)")):
         description = f"Position of the body origin, {where}, world frame NED"
-        yield Variable(f"position.{AXES[i]}", "state", f"state.rigid[{i}]", LENGTH, description)
+        yield Variable(f"position.{AXES[i]}", "state", f"state.rigid[{i}]", q.LENGTH, description)
     for i, part in enumerate(("scalar part", "vector part x", "vector part y", "vector part z")):
         description = f"Attitude as unit quaternion from body to world, {part} (normalised when initialisation ends)"
         start = 1.0 if i == 0 else 0.0
-        yield Variable(f"quaternion.e{i}", "state", f"state.rigid[{3 + i}]", UNIT_NUMBER, description, start)
+        yield Variable(f"quaternion.e{i}", "state", f"state.rigid[{3 + i}]", q.QUATERNION, description, start)
     for i, name in enumerate(VELOCITIES):
-        kind, quantity = ("Velocity over ground", SPEED) if i < 3 else ("Angular velocity", ANGULAR_SPEED)
+        kind, quantity = ("Velocity over ground", q.SPEED) if i < 3 else ("Angular velocity", q.ANGULAR_SPEED)
         yield Variable(f"velocity.{name}", "state", f"state.rigid[{7 + i}]", quantity, f"{kind} {_along(i)}")
+    for i in range(vehicle.n_thrusters):
+        description = f"Force of thruster {i + 1} behind its lag, before its effectiveness; without a lag unused"
+        member = f"state.actuators.thrust[{i}]"
+        yield Variable(f"actuator.thrust[{i + 1}]", "state", member, q.FORCE, description, local=True)
+    for i, name in enumerate(FORCES):
+        description = f"Wrench input's component {name} behind its lag; without a lag unused"
+        member, quantity = f"state.actuators.wrench[{i}]", q.FORCE if i < 3 else q.MOMENT
+        yield Variable(f"actuator.wrench.{name}", "state", member, quantity, description, local=True)
 
 
 def _inputs(vehicle: Vehicle) -> Iterator[Variable]:
     for i in range(vehicle.n_thrusters):
         description = f"Commanded force of thruster {i + 1}, cut at its limits"
-        yield Variable(f"thrust[{i + 1}]", "input", f"inputs.thrust[{i}]", FORCE, description)
+        yield Variable(f"thrust[{i + 1}]", "input", f"inputs.thrust[{i}]", q.FORCE, description)
     for i, name in enumerate(FORCES):
-        kind, quantity = ("force", FORCE) if i < 3 else ("moment", MOMENT)
+        kind, quantity = ("force", q.FORCE) if i < 3 else ("moment", q.MOMENT)
         description = f"Commanded {kind} on the body {_along(i)}, beside the thrusters"
         yield Variable(f"wrench.{name}", "input", f"inputs.wrench[{i}]", quantity, description)
 
 
-def _thrust_knowns(i: int) -> tuple[str, ...]:
-    return tuple(f"{name}[{i + 1}]" for name in ("thrust", "thrust_min", "thrust_max", "thrust_time_constant"))
+# ---- what is calculated ----
+
+_THRUSTER = ("thrust", "thrust_min", "thrust_max", "thrust_dead_band", "thrust_curve", "thrust_time_constant")
+_WRENCH = ("wrench.X", "wrench.Y", "wrench.Z", "wrench_force_limit", "wrench_time_constant")
+_WATER = ("time", "position.z", "current*", "seed")
+_BOTTOM = ("position.z", "bottom_depth")
+_MOTION = (
+    "time", "position.z", "quaternion.*", "velocity.*", "actuator.*", "thrust*", "wrench*", "mass", "inertia.*", "r_G.*",
+    "r_B.*", "weight", "buoyancy", "added_mass*", "linear_damping*", "quadratic_damping*", "current*", "seed",
+    "free_surface", "hull_radius", "bottom_*", "substep",
+)  # fmt: skip
 
 
-_FORCE_KNOWNS = ("wrench.X", "wrench.Y", "wrench.Z", "wrench_force_limit", "wrench_time_constant")
+def _of_thruster(i: int, *names: str) -> tuple[str, ...]:
+    return tuple(f"{name}[{i + 1}]" for name in names)
+
+
+def _of_wrench(i: int, *more: str) -> tuple[str, ...]:
+    known = _WRENCH if i < 3 else (f"wrench.{FORCES[i]}", "wrench_time_constant")
+    return (*known, f"actuator.wrench.{FORCES[i]}", *more)
 
 
 def _outputs(vehicle: Vehicle) -> Iterator[Variable]:
-    quaternion = tuple(f"quaternion.e{i}" for i in range(4))
-    for i, (name, quantity) in enumerate((("roll", HALF_TURN), ("pitch", QUARTER_TURN), ("yaw", HALF_TURN))):
-        description = f"Euler angle {name} (order yaw, pitch, roll)"
-        yield Variable(f"attitude.{name}", "output", f"outputs.euler[{i}]", quantity, description, depends=quaternion)
+    def output(name: str, member: str, quantity: Quantity, description: str, *depends: str) -> Variable:
+        return Variable(name, "output", f"outputs.{member}", quantity, description, depends=depends)
+
+    for i, (name, quantity) in enumerate((("roll", q.HALF_TURN), ("pitch", q.QUARTER_TURN), ("yaw", q.HALF_TURN))):
+        yield output(f"attitude.{name}", f"euler[{i}]", quantity, f"Euler angle {name} (zyx)", "quaternion.*")
+    for i, where in enumerate(("north", "east", "down")):
+        description = f"Velocity of the water at the vehicle, {where}"
+        yield output(f"water_velocity.{AXES[i]}", f"water[{i}]", q.unbounded("m/s"), description, *_WATER)
+    yield output("altitude", "altitude", q.unbounded("m"), "Height of the body origin above the bottom", *_BOTTOM)
+    yield from _measured(output)
     for i in range(vehicle.n_thrusters):
-        name, member = f"thruster_force[{i + 1}]", f"outputs.actuators.thrust[{i}]"
-        description = f"Force that thruster {i + 1} gives now, after limits and lag"
-        yield Variable(name, "output", member, FORCE, description, depends=_thrust_knowns(i))
+        description = f"Force that thruster {i + 1} gives now"
+        depends = (
+            *_of_thruster(i, *_THRUSTER, "thrust_rate_limit", "thrust_effectiveness"),
+            f"actuator.thrust[{i + 1}]",
+        )
+        yield output(f"thruster_force[{i + 1}]", f"thrust[{i}]", q.FORCE, description, *depends)
     for i, name in enumerate(FORCES):
-        kind, quantity = ("Force", ALL_FORCES) if i < 3 else ("Moment", ALL_MOMENTS)
+        kind, quantity = ("Force", q.ALL_FORCES) if i < 3 else ("Moment", q.ALL_MOMENTS)
+        pushing = (f"thruster_matrix[{i + 1},*", "thrust[*", "thrust_*", "actuator.thrust*")
         description = f"{kind} of all actuators on the body {_along(i)}"
-        direct = _FORCE_KNOWNS if i < 3 else (f"wrench.{name}", "wrench_time_constant")
-        pushing = [
-            known
-            for j in range(vehicle.n_thrusters)
-            for known in (*_thrust_knowns(j), f"thruster_matrix[{i + 1},{j + 1}]")
-        ]
-        member = f"outputs.wrench[{i}]"
-        yield Variable(f"actuation.{name}", "output", member, quantity, description, depends=(*direct, *pushing))
+        yield output(f"actuation.{name}", f"wrench[{i}]", quantity, description, *_of_wrench(i, *pushing))
+
+
+def _measured(output: Callable[..., Variable]) -> Iterator[Variable]:
+    def measured(name: str, unit: str, description: str, sensor: str, *depends: str) -> Variable:
+        member = f"measured[{len(channels)}]"
+        channels.append(name)
+        return output(f"measured.{name}", member, q.unbounded(unit), description, f"{sensor}.*", "seed", *depends)
+
+    channels: list[str] = []
+    yield measured("depth", "m", "Depth from the pressure sensor", "depth_sensor", "position.z")
+    for name in VELOCITIES[:3]:
+        description = f"DVL's velocity over ground {_along(VELOCITIES.index(name))}"
+        yield measured(f"velocity.{name}", "m/s", description, "dvl", f"velocity.{name}")
+    yield measured("altitude", "m", "DVL's height above the bottom", "dvl", *_BOTTOM)
+    for i, axis in enumerate(AXES):
+        description = f"IMU's specific force (acceleration less gravity) {_along(i)}"
+        yield measured(f"acceleration.{axis}", "m/s2", description, "imu", "gravity", "thruster_matrix*", *_MOTION)
+    for i, name in enumerate(VELOCITIES[3:]):
+        description = f"IMU's angular velocity {_along(3 + i)}"
+        yield measured(f"angular_velocity.{name}", "rad/s", description, "imu", f"velocity.{name}")
+    yield measured("heading", "rad", "Compass heading, that of yaw", "compass", "quaternion.*")
+    for i, where in enumerate(("north", "east", "down")):
+        yield measured(f"position.{AXES[i]}", "m", f"USBL's position, {where}", "usbl", f"position.{AXES[i]}")
+
+
+def _derivatives(vehicle: Vehicle) -> Iterator[Variable]:
+    units = {"m": "m/s", "": "1/s", "m/s": "m/s2", "rad/s": "rad/s2", "N": "N/s", "N.m": "N.m/s"}
+    for state in _states(vehicle):
+        name = state.name
+        kind, _, part = name.partition(".")
+        if kind == "position":
+            depends: tuple[str, ...] = ("quaternion.*", "velocity.u", "velocity.v", "velocity.w")
+        elif kind == "quaternion":
+            depends = ("quaternion.*", "velocity.p", "velocity.q", "velocity.r")
+        elif kind == "velocity":
+            depends = _MOTION
+        elif part.startswith("thrust"):
+            i = int(part.removeprefix("thrust[").removesuffix("]")) - 1
+            depends = (*_of_thruster(i, *_THRUSTER, "thrust_rate_limit"), name)
+        else:
+            depends = _of_wrench(FORCES.index(part[-1]))
+        member = state.member.replace("state.", "outputs.rate.", 1)
+        quantity = q.unbounded(units[state.quantity.unit], state.quantity.nominal)
+        yield Variable(f"der({name})", "derivative", member, quantity, f"Time derivative of {name}", depends=depends)
+
+
+# ---- parameters ----
+
+
+def _parameter(name: str, member: str, quantity: Quantity, description: str, start: float = 0.0) -> Variable:
+    return Variable(name, "parameter", f"plant.parameters.{member}", quantity, description, float(start))
 
 
 def _parameters(vehicle: Vehicle) -> Iterator[Variable]:
-    def parameter(name: str, member: str, quantity: Quantity, description: str, start: float) -> Variable:
-        return Variable(name, "parameter", f"plant.parameters.{member}", quantity, description, float(start))
-
-    yield parameter("mass", "mass", MASS, "Mass in air", vehicle.mass)
+    yield _parameter("mass", "mass", q.MASS, "Mass in air", vehicle.mass)
     for k, (i, j) in enumerate(((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))):
         name, description = f"inertia.{AXES[i]}{AXES[j]}", f"Inertia about the origin, element ({i + 1},{j + 1})"
-        yield parameter(name, f"inertia[{k}]", _inertial("kg.m2", i == j), description, vehicle.inertia[i, j])
+        yield _parameter(name, f"inertia[{k}]", q.inertial("kg.m2", i == j), description, vehicle.inertia[i, j])
     for name, what, values in (("r_G", "gravity", vehicle.r_G), ("r_B", "buoyancy", vehicle.r_B)):
         for i, axis in enumerate(AXES):
-            yield parameter(f"{name}.{axis}", f"{name}[{i}]", LEVER, f"Centre of {what}, body {axis}", values[i])
-    yield parameter("weight", "weight", WEIGHT, "Weight", vehicle.weight)
-    yield parameter("buoyancy", "buoyancy", WEIGHT, "Buoyancy", vehicle.buoyancy)
+            yield _parameter(f"{name}.{axis}", f"{name}[{i}]", q.LEVER, f"Centre of {what}, body {axis}", values[i])
+    yield _parameter("weight", "weight", q.WEIGHT, "Weight", vehicle.weight)
+    yield _parameter("buoyancy", "buoyancy", q.WEIGHT, "Buoyancy", vehicle.buoyancy)
 
     for i in range(6):
         for j in range(i, 6):
-            quantity = _inertial(("kg", "kg.m", "kg.m2")[(i > 2) + (j > 2)], i == j)
+            quantity = q.inertial(("kg", "kg.m", "kg.m2")[(i > 2) + (j > 2)], i == j)
             mirrored = f", and by symmetry ({j + 1},{i + 1})" if i != j else ""
             name, description = f"added_mass[{i + 1},{j + 1}]", f"Added mass ({i + 1},{j + 1}){mirrored}"
-            yield parameter(name, f"added_mass[{i}][{j}]", quantity, description, vehicle.added_mass[i, j])
+            yield _parameter(name, f"added_mass[{i}][{j}]", quantity, description, vehicle.added_mass[i, j])
     for kind, units, values in (
         ("linear", ("N.s/m", "N.m.s/rad"), vehicle.linear_damping),
         ("quadratic", ("N.s2/m2", "N.m.s2/rad2"), vehicle.quadratic_damping),
@@ -208,35 +247,96 @@ def _parameters(vehicle: Vehicle) -> Iterator[Variable]:
         for i, velocity in enumerate(VELOCITIES):
             name, quantity = f"{kind}_damping[{i + 1}]", Quantity(units[i > 2], 0.0, 1e9)
             description = f"{kind.capitalize()} damping of {velocity}"
-            yield parameter(name, f"{kind}_damping[{i}]", quantity, description, values[i])
-    for i, where in enumerate(("north", "east", "down")):
-        yield parameter(f"current.{AXES[i]}", f"current[{i}]", CURRENT, f"Velocity of the water, {where}", 0.0)
+            yield _parameter(name, f"{kind}_damping[{i}]", quantity, description, values[i])
 
     for i, force in enumerate(FORCES):
         quantity = Quantity("" if i < 3 else "N.m/N", -1e3, 1e3)
         for j in range(vehicle.n_thrusters):
             name, member = f"thruster_matrix[{i + 1},{j + 1}]", f"thruster_matrix[{i}][{j}]"
             description = f"{force} on the body of one newton of thruster {j + 1}"
-            yield parameter(name, member, quantity, description, vehicle.thruster_matrix[i, j])
+            yield _parameter(name, member, quantity, description, vehicle.thruster_matrix[i, j])
     for i in range(vehicle.n_thrusters):
         for name, quantity, what, start in (
-            ("thrust_min", FORCE, "Most negative force of thruster {}", vehicle.thrust_min[i]),
-            ("thrust_max", FORCE, "Greatest force of thruster {}", vehicle.thrust_max[i]),
-            ("thrust_time_constant", TIME_CONSTANT, "Lag of thruster {}, 0 for none", vehicle.thrust_time_constant[i]),
+            ("min", q.FORCE, "Most negative force of thruster {}", vehicle.thrust_min[i]),
+            ("max", q.FORCE, "Greatest force of thruster {}", vehicle.thrust_max[i]),
+            ("time_constant", q.TIME_CONSTANT, "Lag of thruster {}, 0 for none", vehicle.thrust_time_constant[i]),
+            ("rate_limit", q.FORCE_RATE, "Fastest change of thruster {}, 0 for any", vehicle.thrust_rate_limit[i]),
+            ("dead_band", q.DEAD_BAND, "Part of thruster {}'s range without force", vehicle.thrust_dead_band[i]),
+            (
+                "curve",
+                q.FRACTION,
+                "Force of thruster {}: 0 linear in its command, 1 quadratic",
+                vehicle.thrust_curve[i],
+            ),
+            ("effectiveness", q.FRACTION, "Part of its force that thruster {} still gives, 0 when failed", 1.0),
         ):
-            yield parameter(f"{name}[{i + 1}]", f"{name}[{i}]", quantity, what.format(i + 1), start)
+            yield _parameter(f"thrust_{name}[{i + 1}]", f"thrust_{name}[{i}]", quantity, what.format(i + 1), start)
 
     description = "Limit on the norm of the wrench input's force; its direction is kept, the moment left alone"
-    yield parameter("wrench_force_limit", "wrench_force_limit", FORCE_LIMIT, description, FORCE_LIMIT.maximum)
+    yield _parameter("wrench_force_limit", "wrench_force_limit", q.FORCE_LIMIT, description, q.FORCE_LIMIT.maximum)
     description = "Lag of the wrench input, after its limit, 0 for none"
-    yield parameter("wrench_time_constant", "wrench_time_constant", TIME_CONSTANT, description, 0.0)
-    yield parameter("substep", "substep", SUBSTEP, "Greatest step of the integration", 0.005)
+    yield _parameter("wrench_time_constant", "wrench_time_constant", q.TIME_CONSTANT, description, 0.0)
+    yield _parameter("substep", "substep", q.SUBSTEP, "Greatest step of the integration (co-simulation)", 0.005)
 
 
-def _flags(vehicle: Vehicle) -> Iterator[Variable]:
+def _environment(vehicle: Vehicle) -> Iterator[Variable]:
+    for name, quantity, what in (
+        ("current", q.CURRENT, "Velocity of the water at the surface, {}"),
+        ("current_shear", q.SHEAR, "Growth of the current with depth, {}"),
+        ("current_variation", q.CURRENT_DEVIATION, "Standard deviation of the current's Gauss-Markov part, {}"),
+    ):
+        for i, where in enumerate(("north", "east", "down")):
+            yield _parameter(f"{name}.{AXES[i]}", f"{name}[{i}]", quantity, what.format(where))
+    for name, quantity, description, start in (
+        ("current_correlation_time", q.LONG_TIME, "Correlation time of the current's Gauss-Markov part", 60.0),
+        ("current_variation_period", q.LONG_TIME, "Time between knots of that part, straight lines between them", 1.0),
+        ("hull_radius", q.RADIUS, "Radius of the sphere that meets surface and bottom", vehicle.hull_radius),
+        ("bottom_depth", q.LENGTH, "Depth of the flat bottom; the greatest for none", q.LENGTH.maximum),
+        ("bottom_friction", q.FRICTION, "Coulomb's friction coefficient of the bottom", 0.4),
+        ("bottom_time_constant", q.TIME_CONSTANT, "Time in which the bottom stops the hull, 4 substeps at least", 0.02),
+        ("gravity", q.GRAVITY, "Gravity that the IMU feels", 9.81),
+    ):
+        yield _parameter(name, name, quantity, description, start)
+
+
+def _sensors() -> Iterator[Variable]:
+    for i, (sensor, what) in enumerate((
+        ("depth_sensor", "the pressure sensor"), ("dvl", "the DVL"), ("imu", "the IMU"), ("compass", "the compass"),
+        ("usbl", "the USBL"),
+    )):  # fmt: skip
+        description = f"Samples a second of {what}; 0: continuous, without noise"
+        yield _parameter(f"{sensor}.rate", f"sensor_rate[{i}]", q.SAMPLE_RATE, description)
+    for i, (name, unit) in enumerate((
+        ("depth_sensor.noise", "m"), ("dvl.velocity_noise", "m/s"), ("dvl.altitude_noise", "m"),
+        ("imu.acceleration_noise", "m/s2"), ("imu.angular_velocity_noise", "rad/s"), ("compass.noise", "rad"),
+        ("usbl.noise", "m"),
+    )):  # fmt: skip
+        yield _parameter(name, f"noise[{i}]", q.deviation(unit), "Standard deviation of each sample's noise")
+    for name, channel, unit in (
+        ("depth_sensor.bias", "MEASURED_DEPTH", "m"),
+        *((f"imu.acceleration_bias.{axis}", f"MEASURED_ACCELERATION + {i}", "m/s2") for i, axis in enumerate(AXES)),
+        *(
+            (f"imu.angular_velocity_bias.{name}", f"MEASURED_ANGULAR_VELOCITY + {i}", "rad/s")
+            for i, name in enumerate(VELOCITIES[3:])
+        ),
+        ("compass.bias", "MEASURED_HEADING", "rad"),
+    ):
+        yield _parameter(name, f"bias[{channel}]", q.bias(unit), "Constant error")
+
+
+def _discrete(vehicle: Vehicle) -> Iterator[Variable]:
+    """Integers, then Booleans."""
+    description = "Seed of all noise and of the current's variation"
+    yield replace(_parameter("seed", "seed", q.SEED, description), type="integer")
+    description = "Buoyancy fades as the hull leaves the water at depth 0"
+    yield replace(_parameter("free_surface", "free_surface", q.FLAG, description), type="boolean")
+
+    def flag(name: str, member: str, description: str, *depends: str) -> Variable:
+        return Variable(name, "output", f"outputs.{member}", q.FLAG, description, depends=depends, type="boolean")
+
     for i in range(vehicle.n_thrusters):
-        name, member = f"thrust_saturated[{i + 1}]", f"outputs.thrust_cut[{i}]"
         description = f"The command of thruster {i + 1} is beyond its limits"
-        yield Variable(name, "flag", member, FLAG, description, depends=_thrust_knowns(i)[:3])
+        yield flag(f"thrust_saturated[{i + 1}]", f"thrust_cut[{i}]", description, *_of_thruster(i, *_THRUSTER[:3]))
     description = "The force of the wrench input is beyond its limit"
-    yield Variable("wrench_saturated", "flag", "outputs.wrench_cut", FLAG, description, depends=_FORCE_KNOWNS[:4])
+    yield flag("wrench_saturated", "wrench_cut", description, *_WRENCH[:4])
+    yield flag("bottom_contact", "bottom_touched", "The hull touches the bottom", *_BOTTOM, "hull_radius")

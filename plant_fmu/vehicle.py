@@ -53,6 +53,16 @@ class Thrusters:
     force_min: float | tuple[float, ...]  # N, most negative force
     force_max: float | tuple[float, ...]  # N
     time_constant: float | tuple[float, ...] = 0.0  # s
+    rate_limit: float | tuple[float, ...] = 0.0  # N/s, 0: none
+    dead_band: float | tuple[float, ...] = 0.0  # part of the command's range that gives no force
+    curve: float | tuple[float, ...] = 0.0  # from 0, force linear in the command, to 1, quadratic
+
+
+@dataclass(frozen=True)
+class Hull:
+    """The sphere about the body origin that meets surface and bottom."""
+
+    radius: float = 0.0  # m
 
 
 @dataclass(frozen=True)
@@ -64,6 +74,7 @@ class _File:
     hydrostatics: Hydrostatics
     hydrodynamics: Hydrodynamics
     thrusters: Thrusters
+    hull: Hull = Hull()
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,6 +97,10 @@ class Vehicle:
     thrust_min: NDArray[np.float64]  # (n,) N
     thrust_max: NDArray[np.float64]  # (n,) N
     thrust_time_constant: NDArray[np.float64]  # (n,) s
+    thrust_rate_limit: NDArray[np.float64]  # (n,) N/s, 0 for none
+    thrust_dead_band: NDArray[np.float64]  # (n,)
+    thrust_curve: NDArray[np.float64]  # (n,)
+    hull_radius: float  # m
 
     @property
     def n_thrusters(self) -> int:
@@ -198,6 +213,10 @@ def _check(file: _File, where: str) -> Vehicle:
         thrust_min=per_thruster(thrusters.force_min, "force_min"),
         thrust_max=per_thruster(thrusters.force_max, "force_max"),
         thrust_time_constant=per_thruster(thrusters.time_constant, "time_constant"),
+        thrust_rate_limit=per_thruster(thrusters.rate_limit, "rate_limit"),
+        thrust_dead_band=per_thruster(thrusters.dead_band, "dead_band"),
+        thrust_curve=per_thruster(thrusters.curve, "curve"),
+        hull_radius=file.hull.radius,
     )
 
     for key, value in vars(vehicle).items():

@@ -1,4 +1,4 @@
-/* FMI 2.0 co-simulation over instance.h. */
+/* FMI 2.0, co-simulation and model exchange, over instance.h. */
 #include <math.h>
 
 #include "fmi2Functions.h"
@@ -37,24 +37,18 @@ const char *fmi2GetVersion(void)
 fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean loggingOn, size_t nCategories,
                                const fmi2String categories[])
 {
-    (void)c, (void)loggingOn, (void)nCategories, (void)categories; /* errors are always logged, and nothing else */
-    return fmi2OK;
+    return (fmi2Status)instance_set_logging(c, loggingOn != fmi2False, nCategories, categories);
 }
 
 fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2String fmuGUID,
                               fmi2String fmuResourceLocation, const fmi2CallbackFunctions *functions,
                               fmi2Boolean visible, fmi2Boolean loggingOn)
 {
-    (void)fmuResourceLocation, (void)visible, (void)loggingOn;
+    (void)fmuResourceLocation, (void)visible;
     if (!functions)
         return NULL;
-    if (fmuType != fmi2CoSimulation) {
-        if (functions->logger)
-            functions->logger(functions->componentEnvironment, instanceName, fmi2Error, "logStatusError",
-                              "this FMU offers co-simulation, not model exchange");
-        return NULL;
-    }
-    return instance_create(instanceName, fmuGUID, log_message, functions->componentEnvironment,
+    return instance_create(instanceName, fmuGUID, fmuType == fmi2ModelExchange ? MODEL_EXCHANGE : CO_SIMULATION,
+                           loggingOn != fmi2False, log_message, functions->componentEnvironment,
                            (void (*)(void))functions->logger);
 }
 
@@ -102,18 +96,66 @@ fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[], size_t nv
     return (fmi2Status)instance_set_reals(c, vr, nvr, value);
 }
 
-fmi2Status fmi2GetBoolean(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, fmi2Boolean value[])
-{
-    for (size_t i = 0; i < nvr; i++) {
-        bool flag;
-        if (instance_get_flag(c, vr[i], &flag) != STATUS_OK)
-            return fmi2Error;
-        value[i] = flag ? fmi2True : fmi2False;
+#define INTEGERS(type, Type)                                                                                       \
+    fmi2Status fmi2Get##type(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, fmi2##type value[])       \
+    {                                                                                                              \
+        for (size_t i = 0; i < nvr; i++)                                                                           \
+            if (instance_get_integer(c, Type, vr[i], &value[i]) != STATUS_OK)                                      \
+                return fmi2Error;                                                                                  \
+        return fmi2OK;                                                                                             \
+    }                                                                                                              \
+                                                                                                                   \
+    fmi2Status fmi2Set##type(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, const fmi2##type value[]) \
+    {                                                                                                              \
+        for (size_t i = 0; i < nvr; i++)                                                                           \
+            if (instance_set_integer(c, Type, vr[i], value[i]) != STATUS_OK)                                       \
+                return fmi2Error;                                                                                  \
+        return fmi2OK;                                                                                             \
     }
-    return fmi2OK;
+
+INTEGERS(Integer, TYPE_INTEGER)
+INTEGERS(Boolean, TYPE_BOOLEAN) /* an int, too */
+
+fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReference vUnknown_ref[], size_t nUnknown,
+                                        const fmi2ValueReference vKnown_ref[], size_t nKnown,
+                                        const fmi2Real dvKnown[], fmi2Real dvUnknown[])
+{
+    return (fmi2Status)instance_directional_derivative(c, vUnknown_ref, nUnknown, vKnown_ref, nKnown, dvKnown, dvUnknown);
 }
 
-/* ---- stepping ---------------------------------------------------------------------------------------------- */
+/* ---- FMU state --------------------------------------------------------------------------------------------- */
+
+fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *state)
+{
+    return (fmi2Status)instance_save(c, (Saved **)state);
+}
+
+fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate state)
+{
+    return (fmi2Status)instance_restore(c, state);
+}
+
+fmi2Status fmi2FreeFMUstate(fmi2Component c, fmi2FMUstate *state)
+{
+    return (fmi2Status)instance_free_saved(c, (Saved **)state);
+}
+
+fmi2Status fmi2SerializedFMUstateSize(fmi2Component c, fmi2FMUstate state, size_t *size)
+{
+    return (fmi2Status)instance_serialised_size(c, state, size);
+}
+
+fmi2Status fmi2SerializeFMUstate(fmi2Component c, fmi2FMUstate state, fmi2Byte bytes[], size_t size)
+{
+    return (fmi2Status)instance_serialise(c, state, (unsigned char *)bytes, size);
+}
+
+fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte bytes[], size_t size, fmi2FMUstate *state)
+{
+    return (fmi2Status)instance_deserialise(c, (const unsigned char *)bytes, size, (Saved **)state);
+}
+
+/* ---- co-simulation ----------------------------------------------------------------------------------------- */
 
 fmi2Status fmi2DoStep(fmi2Component c, fmi2Real currentCommunicationPoint, fmi2Real communicationStepSize,
                       fmi2Boolean noSetFMUStatePriorToCurrentPoint)
@@ -128,6 +170,81 @@ fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind s, fmi2Real *
         return (fmi2Status)instance_unsupported(c, "fmi2GetRealStatus of this kind");
     *value = ((const Instance *)c)->model.time;
     return fmi2OK;
+}
+
+fmi2Status fmi2GetBooleanStatus(fmi2Component c, const fmi2StatusKind s, fmi2Boolean *value)
+{
+    if (s != fmi2Terminated)
+        return (fmi2Status)instance_unsupported(c, "fmi2GetBooleanStatus of this kind");
+    *value = fmi2False; /* the plant never ends a simulation */
+    return fmi2OK;
+}
+
+/* ---- model exchange ---------------------------------------------------------------------------------------- */
+
+fmi2Status fmi2EnterEventMode(fmi2Component c)
+{
+    return (fmi2Status)instance_enter_event_mode(c);
+}
+
+fmi2Status fmi2NewDiscreteStates(fmi2Component c, fmi2EventInfo *info)
+{
+    bool changed = false;
+    double next = INFINITY;
+    const Status status = instance_update_discrete(c, &changed, &next);
+
+    info->newDiscreteStatesNeeded = fmi2False;
+    info->terminateSimulation = fmi2False;
+    info->nominalsOfContinuousStatesChanged = fmi2False;
+    info->valuesOfContinuousStatesChanged = changed ? fmi2True : fmi2False;
+    info->nextEventTimeDefined = isfinite(next) ? fmi2True : fmi2False;
+    info->nextEventTime = isfinite(next) ? next : 0.0;
+    return (fmi2Status)status;
+}
+
+fmi2Status fmi2EnterContinuousTimeMode(fmi2Component c)
+{
+    return (fmi2Status)instance_enter_continuous_mode(c);
+}
+
+fmi2Status fmi2CompletedIntegratorStep(fmi2Component c, fmi2Boolean noSetFMUStatePriorToCurrentPoint,
+                                       fmi2Boolean *enterEventMode, fmi2Boolean *terminateSimulation)
+{
+    (void)noSetFMUStatePriorToCurrentPoint;
+    *enterEventMode = fmi2False;
+    *terminateSimulation = fmi2False;
+    return (fmi2Status)instance_require(c, MODE_CONTINUOUS, "completing an integrator step");
+}
+
+fmi2Status fmi2SetTime(fmi2Component c, fmi2Real time)
+{
+    return (fmi2Status)instance_set_time(c, time);
+}
+
+fmi2Status fmi2SetContinuousStates(fmi2Component c, const fmi2Real x[], size_t nx)
+{
+    return (fmi2Status)instance_set_states(c, x, nx);
+}
+
+fmi2Status fmi2GetDerivatives(fmi2Component c, fmi2Real derivatives[], size_t nx)
+{
+    return (fmi2Status)instance_get_derivatives(c, derivatives, nx);
+}
+
+fmi2Status fmi2GetEventIndicators(fmi2Component c, fmi2Real eventIndicators[], size_t ni)
+{
+    (void)eventIndicators;
+    return ni == 0 ? fmi2OK : (fmi2Status)instance_refuse(c, "fmi2GetEventIndicators: there are none");
+}
+
+fmi2Status fmi2GetContinuousStates(fmi2Component c, fmi2Real x[], size_t nx)
+{
+    return (fmi2Status)instance_get_states(c, x, nx);
+}
+
+fmi2Status fmi2GetNominalsOfContinuousStates(fmi2Component c, fmi2Real x_nominal[], size_t nx)
+{
+    return (fmi2Status)instance_get_nominals(c, x_nominal, nx);
 }
 
 /* ---- what this FMU does not offer: logged, and an error ----------------------------------------------------- */
@@ -147,34 +264,8 @@ fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind s, fmi2Real *
         return nvr == 0 ? fmi2OK : (fmi2Status)instance_unsupported(c, #function);                    \
     }
 
-UNSUPPORTED_VALUES(fmi2GetInteger, fmi2Integer)
 UNSUPPORTED_VALUES(fmi2GetString, fmi2String)
-UNSUPPORTED_VALUES(fmi2SetInteger, const fmi2Integer)
-UNSUPPORTED_VALUES(fmi2SetBoolean, const fmi2Boolean)
 UNSUPPORTED_VALUES(fmi2SetString, const fmi2String)
-UNSUPPORTED(fmi2GetFMUstate, (fmi2Component c, fmi2FMUstate *state), (void)state)
-UNSUPPORTED(fmi2SetFMUstate, (fmi2Component c, fmi2FMUstate state), (void)state)
-UNSUPPORTED(fmi2FreeFMUstate, (fmi2Component c, fmi2FMUstate *state), (void)state)
-UNSUPPORTED(fmi2SerializedFMUstateSize, (fmi2Component c, fmi2FMUstate state, size_t *size), (void)state, (void)size)
-UNSUPPORTED(fmi2SerializeFMUstate, (fmi2Component c, fmi2FMUstate state, fmi2Byte bytes[], size_t size),
-            (void)state, (void)bytes, (void)size)
-UNSUPPORTED(fmi2DeSerializeFMUstate, (fmi2Component c, const fmi2Byte bytes[], size_t size, fmi2FMUstate *state),
-            (void)bytes, (void)size, (void)state)
-UNSUPPORTED(fmi2GetDirectionalDerivative, (fmi2Component c, const fmi2ValueReference unknown[], size_t nUnknown,
-                                           const fmi2ValueReference known[], size_t nKnown, const fmi2Real seed[],
-                                           fmi2Real sensitivity[]),
-            (void)unknown, (void)nUnknown, (void)known, (void)nKnown, (void)seed, (void)sensitivity)
-UNSUPPORTED(fmi2EnterEventMode, (fmi2Component c), (void)0)
-UNSUPPORTED(fmi2NewDiscreteStates, (fmi2Component c, fmi2EventInfo *info), (void)info)
-UNSUPPORTED(fmi2EnterContinuousTimeMode, (fmi2Component c), (void)0)
-UNSUPPORTED(fmi2CompletedIntegratorStep, (fmi2Component c, fmi2Boolean noSet, fmi2Boolean *event, fmi2Boolean *stop),
-            (void)noSet, (void)event, (void)stop)
-UNSUPPORTED(fmi2SetTime, (fmi2Component c, fmi2Real time), (void)time)
-UNSUPPORTED(fmi2SetContinuousStates, (fmi2Component c, const fmi2Real x[], size_t n), (void)x, (void)n)
-UNSUPPORTED(fmi2GetDerivatives, (fmi2Component c, fmi2Real dx[], size_t n), (void)dx, (void)n)
-UNSUPPORTED(fmi2GetEventIndicators, (fmi2Component c, fmi2Real z[], size_t n), (void)z, (void)n)
-UNSUPPORTED(fmi2GetContinuousStates, (fmi2Component c, fmi2Real x[], size_t n), (void)x, (void)n)
-UNSUPPORTED(fmi2GetNominalsOfContinuousStates, (fmi2Component c, fmi2Real x[], size_t n), (void)x, (void)n)
 UNSUPPORTED(fmi2SetRealInputDerivatives, (fmi2Component c, const fmi2ValueReference vr[], size_t n,
                                           const fmi2Integer order[], const fmi2Real v[]),
             (void)vr, (void)n, (void)order, (void)v)
@@ -184,5 +275,4 @@ UNSUPPORTED(fmi2GetRealOutputDerivatives, (fmi2Component c, const fmi2ValueRefer
 UNSUPPORTED(fmi2CancelStep, (fmi2Component c), (void)0)
 UNSUPPORTED(fmi2GetStatus, (fmi2Component c, const fmi2StatusKind s, fmi2Status *v), (void)s, (void)v)
 UNSUPPORTED(fmi2GetIntegerStatus, (fmi2Component c, const fmi2StatusKind s, fmi2Integer *v), (void)s, (void)v)
-UNSUPPORTED(fmi2GetBooleanStatus, (fmi2Component c, const fmi2StatusKind s, fmi2Boolean *v), (void)s, (void)v)
 UNSUPPORTED(fmi2GetStringStatus, (fmi2Component c, const fmi2StatusKind s, fmi2String *v), (void)s, (void)v)

@@ -1,4 +1,4 @@
-/* FMI 3.0 co-simulation over instance.h. */
+/* FMI 3.0, co-simulation and model exchange, over instance.h. */
 #include <math.h>
 
 #include "fmi3Functions.h"
@@ -20,8 +20,7 @@ const char *fmi3GetVersion(void)
 fmi3Status fmi3SetDebugLogging(fmi3Instance instance, fmi3Boolean loggingOn, size_t nCategories,
                                const fmi3String categories[])
 {
-    (void)instance, (void)loggingOn, (void)nCategories, (void)categories; /* errors are always logged, nothing else is */
-    return fmi3OK;
+    return (fmi3Status)instance_set_logging(instance, loggingOn, nCategories, categories);
 }
 
 fmi3Instance fmi3InstantiateCoSimulation(fmi3String instanceName, fmi3String instantiationToken,
@@ -32,18 +31,10 @@ fmi3Instance fmi3InstantiateCoSimulation(fmi3String instanceName, fmi3String ins
                                          fmi3InstanceEnvironment instanceEnvironment, fmi3LogMessageCallback logMessage,
                                          fmi3IntermediateUpdateCallback intermediateUpdate)
 {
-    (void)resourcePath, (void)visible, (void)loggingOn, (void)eventModeUsed, (void)earlyReturnAllowed, (void)intermediateUpdate;
+    (void)resourcePath, (void)visible, (void)eventModeUsed, (void)earlyReturnAllowed, (void)intermediateUpdate;
     (void)requiredIntermediateVariables, (void)nRequiredIntermediateVariables;
-    return instance_create(instanceName, instantiationToken, log_message, instanceEnvironment,
+    return instance_create(instanceName, instantiationToken, CO_SIMULATION, loggingOn, log_message, instanceEnvironment,
                            (void (*)(void))logMessage);
-}
-
-static fmi3Instance refuse_type(fmi3InstanceEnvironment environment, fmi3LogMessageCallback logMessage,
-                                const char *message)
-{
-    if (logMessage)
-        logMessage(environment, fmi3Error, "logStatusError", message);
-    return NULL;
 }
 
 fmi3Instance fmi3InstantiateModelExchange(fmi3String instanceName, fmi3String instantiationToken,
@@ -51,8 +42,9 @@ fmi3Instance fmi3InstantiateModelExchange(fmi3String instanceName, fmi3String in
                                           fmi3InstanceEnvironment instanceEnvironment,
                                           fmi3LogMessageCallback logMessage)
 {
-    (void)instanceName, (void)instantiationToken, (void)resourcePath, (void)visible, (void)loggingOn;
-    return refuse_type(instanceEnvironment, logMessage, "this FMU offers co-simulation, not model exchange");
+    (void)resourcePath, (void)visible;
+    return instance_create(instanceName, instantiationToken, MODEL_EXCHANGE, loggingOn, log_message, instanceEnvironment,
+                           (void (*)(void))logMessage);
 }
 
 fmi3Instance fmi3InstantiateScheduledExecution(fmi3String instanceName, fmi3String instantiationToken,
@@ -64,7 +56,10 @@ fmi3Instance fmi3InstantiateScheduledExecution(fmi3String instanceName, fmi3Stri
 {
     (void)instanceName, (void)instantiationToken, (void)resourcePath, (void)visible, (void)loggingOn;
     (void)clockUpdate, (void)lockPreemption, (void)unlockPreemption;
-    return refuse_type(instanceEnvironment, logMessage, "this FMU offers co-simulation, not scheduled execution");
+    if (logMessage)
+        logMessage(instanceEnvironment, fmi3Error, "logStatusError",
+                   "this FMU offers co-simulation and model exchange, not scheduled execution");
+    return NULL;
 }
 
 void fmi3FreeInstance(fmi3Instance instance)
@@ -114,18 +109,95 @@ fmi3Status fmi3SetFloat64(fmi3Instance instance, const fmi3ValueReference valueR
     return (fmi3Status)instance_set_reals(instance, valueReferences, nValueReferences, values);
 }
 
-fmi3Status fmi3GetBoolean(fmi3Instance instance, const fmi3ValueReference valueReferences[], size_t nValueReferences,
-                          fmi3Boolean values[], size_t nValues)
+#define INTEGERS(type, Type)                                                                                          \
+    fmi3Status fmi3Get##type(fmi3Instance instance, const fmi3ValueReference valueReferences[],                       \
+                             size_t nValueReferences, fmi3##type values[], size_t nValues)                            \
+    {                                                                                                                 \
+        if (nValues != nValueReferences)                                                                              \
+            return (fmi3Status)instance_refuse(instance, "fmi3Get" #type ": all variables are scalars");              \
+        for (size_t i = 0; i < nValueReferences; i++) {                                                               \
+            int value = 0;                                                                                            \
+            if (instance_get_integer(instance, Type, valueReferences[i], &value) != STATUS_OK)                        \
+                return fmi3Error;                                                                                     \
+            values[i] = (fmi3##type)value;                                                                            \
+        }                                                                                                             \
+        return fmi3OK;                                                                                                \
+    }                                                                                                                 \
+                                                                                                                      \
+    fmi3Status fmi3Set##type(fmi3Instance instance, const fmi3ValueReference valueReferences[],                       \
+                             size_t nValueReferences, const fmi3##type values[], size_t nValues)                      \
+    {                                                                                                                 \
+        if (nValues != nValueReferences)                                                                              \
+            return (fmi3Status)instance_refuse(instance, "fmi3Set" #type ": all variables are scalars");              \
+        for (size_t i = 0; i < nValueReferences; i++)                                                                 \
+            if (instance_set_integer(instance, Type, valueReferences[i], values[i]) != STATUS_OK)                     \
+                return fmi3Error;                                                                                     \
+        return fmi3OK;                                                                                                \
+    }
+
+INTEGERS(Int32, TYPE_INTEGER)
+INTEGERS(Boolean, TYPE_BOOLEAN)
+
+static Status require_scalars(const Instance *instance, size_t nUnknowns, size_t nKnowns, size_t nSeed,
+                              size_t nSensitivity)
 {
-    if (nValues != nValueReferences)
-        return (fmi3Status)instance_refuse(instance, "fmi3GetBoolean: all variables are scalars");
-    for (size_t i = 0; i < nValueReferences; i++)
-        if (instance_get_flag(instance, valueReferences[i], &values[i]) != STATUS_OK)
-            return fmi3Error;
-    return fmi3OK;
+    if (nSeed == nKnowns && nSensitivity == nUnknowns)
+        return STATUS_OK;
+    return instance_refuse(instance, "derivatives: all variables are scalars");
 }
 
-/* ---- stepping ---------------------------------------------------------------------------------------------- */
+fmi3Status fmi3GetDirectionalDerivative(fmi3Instance instance, const fmi3ValueReference unknowns[], size_t nUnknowns,
+                                        const fmi3ValueReference knowns[], size_t nKnowns, const fmi3Float64 seed[],
+                                        size_t nSeed, fmi3Float64 sensitivity[], size_t nSensitivity)
+{
+    if (require_scalars(instance, nUnknowns, nKnowns, nSeed, nSensitivity) != STATUS_OK)
+        return fmi3Error;
+    return (fmi3Status)instance_directional_derivative(instance, unknowns, nUnknowns, knowns, nKnowns, seed, sensitivity);
+}
+
+fmi3Status fmi3GetAdjointDerivative(fmi3Instance instance, const fmi3ValueReference unknowns[], size_t nUnknowns,
+                                    const fmi3ValueReference knowns[], size_t nKnowns, const fmi3Float64 seed[],
+                                    size_t nSeed, fmi3Float64 sensitivity[], size_t nSensitivity)
+{
+    if (require_scalars(instance, nKnowns, nUnknowns, nSeed, nSensitivity) != STATUS_OK)
+        return fmi3Error;
+    return (fmi3Status)instance_adjoint_derivative(instance, unknowns, nUnknowns, knowns, nKnowns, seed, sensitivity);
+}
+
+/* ---- FMU state --------------------------------------------------------------------------------------------- */
+
+fmi3Status fmi3GetFMUState(fmi3Instance instance, fmi3FMUState *FMUState)
+{
+    return (fmi3Status)instance_save(instance, (Saved **)FMUState);
+}
+
+fmi3Status fmi3SetFMUState(fmi3Instance instance, fmi3FMUState FMUState)
+{
+    return (fmi3Status)instance_restore(instance, FMUState);
+}
+
+fmi3Status fmi3FreeFMUState(fmi3Instance instance, fmi3FMUState *FMUState)
+{
+    return (fmi3Status)instance_free_saved(instance, (Saved **)FMUState);
+}
+
+fmi3Status fmi3SerializedFMUStateSize(fmi3Instance instance, fmi3FMUState FMUState, size_t *size)
+{
+    return (fmi3Status)instance_serialised_size(instance, FMUState, size);
+}
+
+fmi3Status fmi3SerializeFMUState(fmi3Instance instance, fmi3FMUState FMUState, fmi3Byte serializedState[], size_t size)
+{
+    return (fmi3Status)instance_serialise(instance, FMUState, serializedState, size);
+}
+
+fmi3Status fmi3DeserializeFMUState(fmi3Instance instance, const fmi3Byte serializedState[], size_t size,
+                                   fmi3FMUState *FMUState)
+{
+    return (fmi3Status)instance_deserialise(instance, serializedState, size, (Saved **)FMUState);
+}
+
+/* ---- co-simulation ------------------------------------------------------------------------------------------ */
 
 fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 currentCommunicationPoint, fmi3Float64 communicationStepSize,
                       fmi3Boolean noSetFMUStatePriorToCurrentPoint, fmi3Boolean *eventHandlingNeeded,
@@ -142,6 +214,92 @@ fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 currentCommunicationPoi
     if (lastSuccessfulTime)
         *lastSuccessfulTime = ((const Instance *)instance)->model.time;
     return (fmi3Status)status;
+}
+
+/* ---- model exchange ---------------------------------------------------------------------------------------- */
+
+fmi3Status fmi3EnterEventMode(fmi3Instance instance)
+{
+    return (fmi3Status)instance_enter_event_mode(instance);
+}
+
+fmi3Status fmi3UpdateDiscreteStates(fmi3Instance instance, fmi3Boolean *discreteStatesNeedUpdate,
+                                    fmi3Boolean *terminateSimulation, fmi3Boolean *nominalsOfContinuousStatesChanged,
+                                    fmi3Boolean *valuesOfContinuousStatesChanged, fmi3Boolean *nextEventTimeDefined,
+                                    fmi3Float64 *nextEventTime)
+{
+    bool changed = false;
+    double next = INFINITY;
+    const Status status = instance_update_discrete(instance, &changed, &next);
+
+    *discreteStatesNeedUpdate = fmi3False;
+    *terminateSimulation = fmi3False;
+    *nominalsOfContinuousStatesChanged = fmi3False;
+    *valuesOfContinuousStatesChanged = changed;
+    *nextEventTimeDefined = isfinite(next);
+    *nextEventTime = isfinite(next) ? next : 0.0;
+    return (fmi3Status)status;
+}
+
+fmi3Status fmi3EnterContinuousTimeMode(fmi3Instance instance)
+{
+    return (fmi3Status)instance_enter_continuous_mode(instance);
+}
+
+fmi3Status fmi3CompletedIntegratorStep(fmi3Instance instance, fmi3Boolean noSetFMUStatePriorToCurrentPoint,
+                                       fmi3Boolean *enterEventMode, fmi3Boolean *terminateSimulation)
+{
+    (void)noSetFMUStatePriorToCurrentPoint;
+    *enterEventMode = fmi3False;
+    *terminateSimulation = fmi3False;
+    return (fmi3Status)instance_require(instance, MODE_CONTINUOUS, "completing an integrator step");
+}
+
+fmi3Status fmi3SetTime(fmi3Instance instance, fmi3Float64 time)
+{
+    return (fmi3Status)instance_set_time(instance, time);
+}
+
+fmi3Status fmi3SetContinuousStates(fmi3Instance instance, const fmi3Float64 continuousStates[],
+                                   size_t nContinuousStates)
+{
+    return (fmi3Status)instance_set_states(instance, continuousStates, nContinuousStates);
+}
+
+fmi3Status fmi3GetContinuousStateDerivatives(fmi3Instance instance, fmi3Float64 derivatives[], size_t nContinuousStates)
+{
+    return (fmi3Status)instance_get_derivatives(instance, derivatives, nContinuousStates);
+}
+
+fmi3Status fmi3GetEventIndicators(fmi3Instance instance, fmi3Float64 eventIndicators[], size_t nEventIndicators)
+{
+    (void)eventIndicators;
+    return nEventIndicators == 0 ? fmi3OK
+                                 : (fmi3Status)instance_refuse(instance, "fmi3GetEventIndicators: there are none");
+}
+
+fmi3Status fmi3GetContinuousStates(fmi3Instance instance, fmi3Float64 continuousStates[], size_t nContinuousStates)
+{
+    return (fmi3Status)instance_get_states(instance, continuousStates, nContinuousStates);
+}
+
+fmi3Status fmi3GetNominalsOfContinuousStates(fmi3Instance instance, fmi3Float64 nominals[], size_t nContinuousStates)
+{
+    return (fmi3Status)instance_get_nominals(instance, nominals, nContinuousStates);
+}
+
+fmi3Status fmi3GetNumberOfEventIndicators(fmi3Instance instance, size_t *nEventIndicators)
+{
+    (void)instance;
+    *nEventIndicators = 0;
+    return fmi3OK;
+}
+
+fmi3Status fmi3GetNumberOfContinuousStates(fmi3Instance instance, size_t *nContinuousStates)
+{
+    (void)instance;
+    *nContinuousStates = N_STATES;
+    return fmi3OK;
 }
 
 /* ---- what this FMU does not offer: logged, and an error ----------------------------------------------------- */
@@ -171,13 +329,11 @@ UNSUPPORTED_VALUES(Int8)
 UNSUPPORTED_VALUES(UInt8)
 UNSUPPORTED_VALUES(Int16)
 UNSUPPORTED_VALUES(UInt16)
-UNSUPPORTED_VALUES(Int32)
 UNSUPPORTED_VALUES(UInt32)
 UNSUPPORTED_VALUES(Int64)
 UNSUPPORTED_VALUES(UInt64)
 UNSUPPORTED_VALUES(String)
 
-UNSUPPORTED_VALUES_OF(fmi3SetBoolean, const fmi3Boolean)
 UNSUPPORTED(fmi3GetBinary, (fmi3Instance instance, const fmi3ValueReference r[], size_t n, size_t sizes[],
                             fmi3Binary v[], size_t nv), (void)r, (void)n, (void)sizes, (void)v, (void)nv)
 UNSUPPORTED(fmi3SetBinary, (fmi3Instance instance, const fmi3ValueReference r[], size_t n, const size_t sizes[],
@@ -192,30 +348,9 @@ UNSUPPORTED(fmi3GetVariableDependencies, (fmi3Instance instance, fmi3ValueRefere
                                           fmi3ValueReference independents[], size_t independentElements[],
                                           fmi3DependencyKind kinds[], size_t n),
             (void)dependent, (void)elements, (void)independents, (void)independentElements, (void)kinds, (void)n)
-UNSUPPORTED(fmi3GetFMUState, (fmi3Instance instance, fmi3FMUState *state), (void)state)
-UNSUPPORTED(fmi3SetFMUState, (fmi3Instance instance, fmi3FMUState state), (void)state)
-UNSUPPORTED(fmi3FreeFMUState, (fmi3Instance instance, fmi3FMUState *state), (void)state)
-UNSUPPORTED(fmi3SerializedFMUStateSize, (fmi3Instance instance, fmi3FMUState state, size_t *size),
-            (void)state, (void)size)
-UNSUPPORTED(fmi3SerializeFMUState, (fmi3Instance instance, fmi3FMUState state, fmi3Byte bytes[], size_t size),
-            (void)state, (void)bytes, (void)size)
-UNSUPPORTED(fmi3DeserializeFMUState, (fmi3Instance instance, const fmi3Byte bytes[], size_t size, fmi3FMUState *state),
-            (void)bytes, (void)size, (void)state)
-UNSUPPORTED(fmi3GetDirectionalDerivative, (fmi3Instance instance, const fmi3ValueReference unknowns[], size_t nUnknowns,
-                                           const fmi3ValueReference knowns[], size_t nKnowns, const fmi3Float64 seed[],
-                                           size_t nSeed, fmi3Float64 sensitivity[], size_t nSensitivity),
-            (void)unknowns, (void)nUnknowns, (void)knowns, (void)nKnowns, (void)seed, (void)nSeed, (void)sensitivity,
-            (void)nSensitivity)
-UNSUPPORTED(fmi3GetAdjointDerivative, (fmi3Instance instance, const fmi3ValueReference unknowns[], size_t nUnknowns,
-                                       const fmi3ValueReference knowns[], size_t nKnowns, const fmi3Float64 seed[],
-                                       size_t nSeed, fmi3Float64 sensitivity[], size_t nSensitivity),
-            (void)unknowns, (void)nUnknowns, (void)knowns, (void)nKnowns, (void)seed, (void)nSeed, (void)sensitivity,
-            (void)nSensitivity)
 UNSUPPORTED(fmi3EnterConfigurationMode, (fmi3Instance instance), (void)0)
 UNSUPPORTED(fmi3ExitConfigurationMode, (fmi3Instance instance), (void)0)
-UNSUPPORTED(fmi3EnterEventMode, (fmi3Instance instance), (void)0)
 UNSUPPORTED(fmi3EnterStepMode, (fmi3Instance instance), (void)0)
-UNSUPPORTED(fmi3EnterContinuousTimeMode, (fmi3Instance instance), (void)0)
 UNSUPPORTED(fmi3EvaluateDiscreteStates, (fmi3Instance instance), (void)0)
 UNSUPPORTED(fmi3GetIntervalDecimal, (fmi3Instance instance, const fmi3ValueReference r[], size_t n,
                                      fmi3Float64 intervals[], fmi3IntervalQualifier qualifiers[]),
@@ -238,23 +373,6 @@ UNSUPPORTED(fmi3SetShiftDecimal, (fmi3Instance instance, const fmi3ValueReferenc
 UNSUPPORTED(fmi3SetShiftFraction, (fmi3Instance instance, const fmi3ValueReference r[], size_t n,
                                    const fmi3UInt64 counters[], const fmi3UInt64 resolutions[]),
             (void)r, (void)n, (void)counters, (void)resolutions)
-UNSUPPORTED(fmi3UpdateDiscreteStates, (fmi3Instance instance, fmi3Boolean *discreteStatesNeedUpdate,
-                                       fmi3Boolean *terminateSimulation, fmi3Boolean *nominalsOfContinuousStatesChanged,
-                                       fmi3Boolean *valuesOfContinuousStatesChanged, fmi3Boolean *nextEventTimeDefined,
-                                       fmi3Float64 *nextEventTime),
-            (void)discreteStatesNeedUpdate, (void)terminateSimulation, (void)nominalsOfContinuousStatesChanged,
-            (void)valuesOfContinuousStatesChanged, (void)nextEventTimeDefined, (void)nextEventTime)
-UNSUPPORTED(fmi3CompletedIntegratorStep, (fmi3Instance instance, fmi3Boolean noSetFMUStatePriorToCurrentPoint,
-                                          fmi3Boolean *enterEventMode, fmi3Boolean *terminateSimulation),
-            (void)noSetFMUStatePriorToCurrentPoint, (void)enterEventMode, (void)terminateSimulation)
-UNSUPPORTED(fmi3SetTime, (fmi3Instance instance, fmi3Float64 time), (void)time)
-UNSUPPORTED(fmi3SetContinuousStates, (fmi3Instance instance, const fmi3Float64 x[], size_t n), (void)x, (void)n)
-UNSUPPORTED(fmi3GetContinuousStateDerivatives, (fmi3Instance instance, fmi3Float64 dx[], size_t n), (void)dx, (void)n)
-UNSUPPORTED(fmi3GetEventIndicators, (fmi3Instance instance, fmi3Float64 z[], size_t n), (void)z, (void)n)
-UNSUPPORTED(fmi3GetContinuousStates, (fmi3Instance instance, fmi3Float64 x[], size_t n), (void)x, (void)n)
-UNSUPPORTED(fmi3GetNominalsOfContinuousStates, (fmi3Instance instance, fmi3Float64 x[], size_t n), (void)x, (void)n)
-UNSUPPORTED(fmi3GetNumberOfEventIndicators, (fmi3Instance instance, size_t *n), (void)n)
-UNSUPPORTED(fmi3GetNumberOfContinuousStates, (fmi3Instance instance, size_t *n), (void)n)
 UNSUPPORTED(fmi3GetOutputDerivatives, (fmi3Instance instance, const fmi3ValueReference r[], size_t n,
                                        const fmi3Int32 orders[], fmi3Float64 v[], size_t nv),
             (void)r, (void)n, (void)orders, (void)v, (void)nv)

@@ -6,77 +6,100 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { MAX_SUBSTEPS = 1000000 };
-
-/* ---- the table of variables -------------------------------------------------------------------------------- */
-
-typedef enum { TIME, STATE, INPUT, OUTPUT, PARAMETER } Role;
-
-typedef struct {
-    const char *name;
-    Role role;
-    size_t offset; /* into Model */
-    double start, min, max;
-} Variable;
-
-#define AT(member) offsetof(Model, member)
-
-static const Variable REALS[] = {VEHICLE_REALS};   /* value reference: the index */
-static const Variable FLAGS[] = {VEHICLE_FLAGS};   /* value reference: N_REALS + the index */
-
-enum { N_REALS = sizeof REALS / sizeof REALS[0], N_FLAGS = sizeof FLAGS / sizeof FLAGS[0] };
-
-static double *real_at(Model *model, const Variable *variable)
-{
-    return (double *)((char *)model + variable->offset);
-}
-
 /* ---- messages ---------------------------------------------------------------------------------------------- */
+
+static const struct {
+    LogCategories category;
+    Status status;
+    const char *name;
+} CATEGORIES[] = {
+    {LOG_EVENTS, STATUS_OK, "logEvents"},
+    {LOG_WARNINGS, STATUS_WARNING, "logStatusWarning"},
+    {LOG_DISCARDS, STATUS_DISCARD, "logStatusDiscard"},
+    {LOG_ALL, STATUS_OK, "logAll"},
+    {0, STATUS_ERROR, "logStatusError"}, /* may be named, and is logged anyway */
+};
+
+enum { N_CATEGORIES = sizeof CATEGORIES / sizeof CATEGORIES[0] };
+
+static void log_formatted(const Instance *instance, Status status, const char *category, const char *format,
+                          va_list arguments)
+{
+    char message[MAX_MESSAGE];
+
+    vsnprintf(message, sizeof message, format, arguments);
+    instance->log(instance, status, category, message);
+}
 
 Status instance_refuse(const Instance *instance, const char *format, ...)
 {
-    char message[MAX_MESSAGE];
     va_list arguments;
 
     va_start(arguments, format);
-    vsnprintf(message, sizeof message, format, arguments);
+    log_formatted(instance, STATUS_ERROR, "logStatusError", format, arguments);
     va_end(arguments);
-    instance->log(instance, STATUS_ERROR, "logStatusError", message);
     return STATUS_ERROR;
 }
 
-Status instance_unsupported(Instance *instance, const char *function)
+Status instance_tell(const Instance *instance, LogCategories category, const char *format, ...)
+{
+    for (int i = 0; i < N_CATEGORIES; i++)
+        if (CATEGORIES[i].category == category) {
+            if (instance->categories & (unsigned)category) {
+                va_list arguments;
+                va_start(arguments, format);
+                log_formatted(instance, CATEGORIES[i].status, CATEGORIES[i].name, format, arguments);
+                va_end(arguments);
+            }
+            return CATEGORIES[i].status;
+        }
+    return STATUS_OK;
+}
+
+Status instance_set_logging(Instance *instance, bool on, size_t n, const char *const categories[])
+{
+    unsigned wanted = n == 0 ? LOG_ALL : 0;
+
+    for (size_t i = 0; i < n; i++) {
+        int known = 0;
+        for (int j = 0; j < N_CATEGORIES; j++)
+            if (categories && categories[i] && strcmp(categories[i], CATEGORIES[j].name) == 0) {
+                wanted |= (unsigned)CATEGORIES[j].category;
+                known = 1;
+            }
+        if (!known)
+            return instance_refuse(instance, "log category \"%s\" is unknown",
+                                   categories && categories[i] ? categories[i] : "");
+    }
+    instance->categories = on ? instance->categories | wanted : instance->categories & ~wanted;
+    return STATUS_OK;
+}
+
+Status instance_unsupported(const Instance *instance, const char *function)
 {
     return instance_refuse(instance, "%s: not offered by this FMU", function);
 }
 
-static Status require_mode(const Instance *instance, unsigned allowed, const char *action)
+Status instance_require(const Instance *instance, unsigned modes, const char *action)
 {
-    if ((unsigned)instance->mode & allowed)
+    if ((unsigned)instance->mode & modes)
         return STATUS_OK;
-    return instance_refuse(instance, "%s: not allowed %s", action,
-                         instance->mode == MODE_INSTANTIATED    ? "before initialisation"
-                         : instance->mode == MODE_INITIALISING ? "during initialisation"
-                         : instance->mode == MODE_STEPPING     ? "once initialisation has ended"
-                                                               : "after termination");
+    const char *when = "after termination";
+    switch (instance->mode) {
+    case MODE_INSTANTIATED: when = "before initialisation"; break;
+    case MODE_INITIALISING: when = "during initialisation"; break;
+    case MODE_STEPPING: when = "once initialisation has ended"; break;
+    case MODE_EVENT: when = "in event mode"; break;
+    case MODE_CONTINUOUS: when = "in continuous-time mode"; break;
+    case MODE_TERMINATED: break;
+    }
+    return instance_refuse(instance, "%s: not allowed %s", action, when);
 }
 
 /* ---- life -------------------------------------------------------------------------------------------------- */
 
-static void set_start_values(Instance *instance)
-{
-    memset(&instance->model, 0, sizeof instance->model);
-    for (int i = 0; i < N_REALS; i++)
-        if (REALS[i].role != OUTPUT)
-            *real_at(&instance->model, &REALS[i]) = REALS[i].start;
-    instance->model.stop_time = INFINITY;
-    instance->mode = MODE_INSTANTIATED;
-    instance->unprepared = true;
-    instance->outdated = true;
-}
-
-Instance *instance_create(const char *name, const char *token, LogCallback *log, void *environment,
-                          void (*logger)(void))
+Instance *instance_create(const char *name, const char *token, Interface interface, bool logging_on, LogCallback *log,
+                          void *environment, void (*logger)(void))
 {
     const char *shown = name ? name : "";
     Instance *instance = calloc(1, sizeof *instance);
@@ -89,16 +112,18 @@ Instance *instance_create(const char *name, const char *token, LogCallback *log,
         return NULL;
     }
     strcpy(instance->name, shown);
+    instance->interface = interface;
+    instance->categories = logging_on ? LOG_ALL : 0;
     instance->log = log;
     instance->environment = environment;
     instance->logger = logger;
     if (!token || strcmp(token, INSTANTIATION_TOKEN) != 0) {
         instance_refuse(instance, "instantiation token is \"%s\", expected \"%s\"", token ? token : "",
-                      INSTANTIATION_TOKEN);
+                        INSTANTIATION_TOKEN);
         instance_free(instance);
         return NULL;
     }
-    set_start_values(instance);
+    instance_reset(instance);
     return instance;
 }
 
@@ -112,34 +137,75 @@ void instance_free(Instance *instance)
 
 Status instance_reset(Instance *instance)
 {
-    set_start_values(instance);
+    variables_start(&instance->model);
+    instance->model.stop_time = INFINITY;
+    instance->mode = MODE_INSTANTIATED;
+    instance->unprepared = true;
+    instance->outdated = true;
     return STATUS_OK;
 }
 
-/* Brings the derived constants up to date; tells what is wrong with the parameters. */
-static Status prepare(Instance *instance)
+/* ---- parameters and outputs -------------------------------------------------------------------------------- */
+
+/* Tells which parameters contradict each other. */
+static Status check_parameters(const Instance *instance)
 {
+    static const struct {
+        const char *noise;
+        int deviation, sensor;
+    } PAIRS[] = {
+        {"depth_sensor.noise", DEPTH_NOISE, DEPTH_SENSOR}, {"dvl.velocity_noise", VELOCITY_NOISE, DVL},
+        {"dvl.altitude_noise", ALTITUDE_NOISE, DVL},       {"imu.acceleration_noise", ACCELERATION_NOISE, IMU},
+        {"imu.angular_velocity_noise", ANGULAR_VELOCITY_NOISE, IMU}, {"compass.noise", HEADING_NOISE, COMPASS},
+        {"usbl.noise", POSITION_NOISE, USBL},
+    };
     const Parameters *p = &instance->model.plant.parameters;
 
-    if (!instance->unprepared)
-        return STATUS_OK;
     for (int i = 0; i < N_THRUSTERS; i++)
         if (p->thrust_min[i] > p->thrust_max[i])
             return instance_refuse(instance, "thrust_min[%d] = %.9g is above thrust_max[%d] = %.9g", i + 1,
                                    p->thrust_min[i], i + 1, p->thrust_max[i]);
-    const char *fault = plant_prepare(&instance->model.plant);
+    for (int i = 0; i < N_NOISES; i++)
+        if (p->noise[PAIRS[i].deviation] > 0.0 && !(p->sensor_rate[PAIRS[i].sensor] > 0.0))
+            return instance_refuse(instance, "%s = %.9g needs the sensor's rate to be above 0, so that there are samples",
+                                   PAIRS[i].noise, p->noise[PAIRS[i].deviation]);
+    if (p->free_surface && !(p->hull_radius > 0.0))
+        return instance_refuse(instance, "free_surface needs hull_radius to be above 0, so that buoyancy can fade");
+    return STATUS_OK;
+}
+
+Status instance_prepare(Instance *instance)
+{
+    if (!instance->unprepared)
+        return STATUS_OK;
+    if (check_parameters(instance) != STATUS_OK)
+        return STATUS_ERROR;
+    const char *fault = model_prepare(&instance->model);
     if (fault)
         return instance_refuse(instance, "%s", fault);
     instance->unprepared = false;
     return STATUS_OK;
 }
 
+Status instance_update(Instance *instance)
+{
+    if (!instance->outdated)
+        return STATUS_OK;
+    if (instance_prepare(instance) != STATUS_OK)
+        return STATUS_ERROR;
+    model_evaluate(&instance->model);
+    instance->outdated = false;
+    return STATUS_OK;
+}
+
+/* ---- modes ------------------------------------------------------------------------------------------------- */
+
 Status instance_set_experiment(Instance *instance, double start_time, double stop_time)
 {
-    if (require_mode(instance, MODE_INSTANTIATED, "setting the experiment") != STATUS_OK)
+    if (instance_require(instance, MODE_INSTANTIATED, "setting the experiment") != STATUS_OK)
         return STATUS_ERROR;
-    if (!isfinite(start_time))
-        return instance_refuse(instance, "start time is %g s, expected a finite number", start_time);
+    if (!(fabs(start_time) <= 1e9))
+        return instance_refuse(instance, "start time is %g s, expected a number within 1e9", start_time);
     if (!(stop_time >= start_time))
         return instance_refuse(instance, "stop time is %g s, expected %g s (start time) or later", stop_time, start_time);
     instance->model.time = start_time;
@@ -149,7 +215,7 @@ Status instance_set_experiment(Instance *instance, double start_time, double sto
 
 Status instance_enter_initialisation(Instance *instance)
 {
-    if (require_mode(instance, MODE_INSTANTIATED, "entering initialisation") != STATUS_OK)
+    if (instance_require(instance, MODE_INSTANTIATED, "entering initialisation") != STATUS_OK)
         return STATUS_ERROR;
     instance->mode = MODE_INITIALISING;
     return STATUS_OK;
@@ -157,159 +223,32 @@ Status instance_enter_initialisation(Instance *instance)
 
 Status instance_exit_initialisation(Instance *instance)
 {
-    if (require_mode(instance, MODE_INITIALISING, "leaving initialisation") != STATUS_OK ||
-        prepare(instance) != STATUS_OK)
+    Model *m = &instance->model;
+    const double *e = m->state.rigid + 3;
+
+    if (instance_require(instance, MODE_INITIALISING, "leaving initialisation") != STATUS_OK)
         return STATUS_ERROR;
-    if (!plant_normalise(instance->model.state.rigid))
+    memset(&m->held, 0, sizeof m->held); /* the clocks start now */
+    instance->unprepared = true;
+    if (instance_prepare(instance) != STATUS_OK)
+        return STATUS_ERROR;
+    const double norm = sqrt(e[0] * e[0] + e[1] * e[1] + e[2] * e[2] + e[3] * e[3]);
+    if (!plant_normalise(m->state.rigid))
         return instance_refuse(instance, "quaternion.e0 to e3 have length 0, expected a direction");
-    instance->mode = MODE_STEPPING;
+    if (fabs(norm - 1.0) > 1e-3)
+        instance_tell(instance, LOG_WARNINGS, "quaternion of length %.9g made a unit quaternion", norm);
+    model_settle(m);
+    model_tick(m);
+    instance->mode = instance->interface == CO_SIMULATION ? MODE_STEPPING : MODE_EVENT;
     instance->outdated = true;
+    instance_tell(instance, LOG_EVENTS, "initialised at t = %.9g s", m->time);
     return STATUS_OK;
 }
 
 Status instance_terminate(Instance *instance)
 {
-    if (require_mode(instance, MODE_STEPPING, "terminating") != STATUS_OK)
+    if (instance_require(instance, MODE_STEPPING | MODE_EVENT | MODE_CONTINUOUS, "terminating") != STATUS_OK)
         return STATUS_ERROR;
     instance->mode = MODE_TERMINATED;
-    return STATUS_OK;
-}
-
-/* ---- variables --------------------------------------------------------------------------------------------- */
-
-static void update_outputs(Instance *instance)
-{
-    Model *m = &instance->model;
-    Actuators target;
-
-    if (!instance->outdated)
-        return;
-    plant_limit(&m->plant, &m->inputs, &target, m->outputs.thrust_cut, &m->outputs.wrench_cut);
-    plant_lag(&m->plant, &m->state.actuators, &target, 0.0, &m->outputs.actuators);
-    plant_wrench(&m->plant, &m->outputs.actuators, m->outputs.wrench);
-    plant_euler(m->state.rigid + 3, m->outputs.euler);
-    instance->outdated = false;
-}
-
-Status instance_get_reals(Instance *instance, const unsigned references[], size_t n, double values[])
-{
-    update_outputs(instance);
-    for (size_t i = 0; i < n; i++) {
-        if (references[i] >= N_REALS)
-            return instance_refuse(instance, "value reference %u is no real variable", references[i]);
-        values[i] = *real_at(&instance->model, &REALS[references[i]]);
-    }
-    return STATUS_OK;
-}
-
-Status instance_get_flag(Instance *instance, unsigned reference, bool *value)
-{
-    if (reference < N_REALS || reference >= N_REALS + N_FLAGS)
-        return instance_refuse(instance, "value reference %u is no Boolean variable", reference);
-    update_outputs(instance);
-    *value = *(const int *)((const char *)&instance->model + FLAGS[reference - N_REALS].offset) != 0;
-    return STATUS_OK;
-}
-
-static Status check_value(const Instance *instance, unsigned reference, double value)
-{
-    if (reference >= N_REALS)
-        return instance_refuse(instance, "value reference %u is no real variable", reference);
-
-    const Variable *v = &REALS[reference];
-    if (v->role == OUTPUT || v->role == TIME)
-        return instance_refuse(instance, "%s: is calculated and cannot be set", v->name);
-    if (v->role == STATE && require_mode(instance, MODE_INSTANTIATED | MODE_INITIALISING, v->name) != STATUS_OK)
-        return STATUS_ERROR;
-    if (!isfinite(value))
-        return instance_refuse(instance, "%s = %g refused: not a finite number", v->name, value);
-    if (value < v->min || value > v->max)
-        return instance_refuse(instance, "%s = %.9g refused: outside [%.9g, %.9g]", v->name, value, v->min,
-                             v->max);
-    return STATUS_OK;
-}
-
-Status instance_set_reals(Instance *instance, const unsigned references[], size_t n, const double values[])
-{
-    if (require_mode(instance, MODE_INSTANTIATED | MODE_INITIALISING | MODE_STEPPING, "setting variables") != STATUS_OK)
-        return STATUS_ERROR;
-    for (size_t i = 0; i < n; i++) /* all or none */
-        if (check_value(instance, references[i], values[i]) != STATUS_OK)
-            return STATUS_ERROR;
-
-    for (size_t i = 0; i < n; i++) {
-        const Variable *v = &REALS[references[i]];
-        *real_at(&instance->model, v) = values[i];
-        instance->unprepared |= v->role == PARAMETER;
-    }
-    instance->outdated = true;
-    return STATUS_OK;
-}
-
-/* ---- stepping ---------------------------------------------------------------------------------------------- */
-
-/* Returns NULL, or the first state variable that is not within its range. */
-static const Variable *stray_state(Model *model)
-{
-    for (int i = 0; i < N_REALS; i++) {
-        const double value = *real_at(model, &REALS[i]);
-        if (REALS[i].role == STATE && !(value >= REALS[i].min && value <= REALS[i].max))
-            return &REALS[i];
-    }
-    return NULL;
-}
-
-/* Whether a step from `time` fits the experiment. Masters add up their time: they are allowed their rounding. */
-static Status check_step(const Instance *instance, double time, double step)
-{
-    const Model *m = &instance->model;
-    const double rounding = 1e-3 * step + 1e-9 * fabs(m->time);
-
-    if (!isfinite(step) || step <= 0.0 || m->time + step == m->time)
-        return instance_refuse(instance, "step size is %g s, expected a positive number", step);
-    if (!(fabs(time - m->time) <= rounding))
-        return instance_refuse(instance, "step from t = %.12g s, but the plant is at %.12g s", time, m->time);
-    if (time + step > m->stop_time + rounding)
-        return instance_refuse(instance, "step to t = %.12g s is beyond the stop time of %.12g s", time + step,
-                               m->stop_time);
-    if (step / m->plant.parameters.substep > MAX_SUBSTEPS)
-        return instance_refuse(instance, "step of %g s needs more than %d substeps of %g s", step, MAX_SUBSTEPS,
-                               m->plant.parameters.substep);
-    return STATUS_OK;
-}
-
-Status instance_step(Instance *instance, double time, double step)
-{
-    Model *m = &instance->model;
-
-    if (require_mode(instance, MODE_STEPPING, "stepping") != STATUS_OK || prepare(instance) != STATUS_OK ||
-        check_step(instance, time, step) != STATUS_OK)
-        return STATUS_ERROR;
-
-    /* whole substeps, however the step was rounded */
-    const int n = (int)fmax(1.0, ceil(step / m->plant.parameters.substep - 1e-9));
-    const double h = step / n;
-    const State before = m->state;
-    Actuators target;
-
-    plant_limit(&m->plant, &m->inputs, &target, m->outputs.thrust_cut, &m->outputs.wrench_cut);
-    for (int i = 0; i < n; i++)
-        if (!plant_step(&m->plant, &target, h, &m->state)) {
-            m->state = before;
-            return instance_refuse(instance,
-                                   "step from t = %.9g s not taken: integration steps of %g s are too long for these "
-                                   "forces and this damping (parameter substep)",
-                                   time, h);
-        }
-    const Variable *stray = stray_state(m);
-    if (stray) {
-        const double value = *real_at(m, stray);
-        m->state = before;
-        return instance_refuse(instance, "step from t = %.9g s not taken: %s becomes %.9g, outside [%.9g, %.9g]", time,
-                               stray->name, value, stray->min, stray->max);
-    }
-
-    m->time = time + step;
-    instance->outdated = true;
     return STATUS_OK;
 }

@@ -6,69 +6,141 @@
 #include <stdbool.h>
 #include <stddef.h>
 
-#include "plant.h"
+#include "model.h"
 
 enum { MAX_MESSAGE = 512 }; /* bytes of a logged message */
 
 typedef enum { STATUS_OK, STATUS_WARNING, STATUS_DISCARD, STATUS_ERROR, STATUS_FATAL } Status; /* as in FMI */
 
+typedef enum { CO_SIMULATION, MODEL_EXCHANGE } Interface;
+
 typedef enum {
     MODE_INSTANTIATED = 1,
     MODE_INITIALISING = 2,
-    MODE_STEPPING = 4,
-    MODE_TERMINATED = 8
+    MODE_STEPPING = 4,    /* co-simulation */
+    MODE_EVENT = 8,       /* model exchange */
+    MODE_CONTINUOUS = 16, /* model exchange */
+    MODE_TERMINATED = 32
 } Mode; /* bits, so that a call can name all the modes it is allowed in */
 
+typedef enum { LOG_EVENTS = 1, LOG_WARNINGS = 2, LOG_DISCARDS = 4, LOG_ALL = 7 } LogCategories; /* errors: always */
+
+typedef enum { TYPE_REAL, TYPE_INTEGER, TYPE_BOOLEAN } Type;
+typedef enum { TIME, STATE, INPUT, OUTPUT, PARAMETER } Role;
+
 typedef struct {
-    Plant plant;
-    State state;
-    Inputs inputs;
-    struct {
-        Actuators actuators;            /* present forces */
-        double wrench[6];               /* what they put on the body */
-        double euler[3];
-        int thrust_cut[N_THRUSTERS];    /* a command was beyond its limits */
-        int wrench_cut;
-    } outputs;
-    double time;
-    double stop_time; /* INFINITY if there is none */
-} Model; /* plain data: all that an FMU state holds */
+    const char *name;
+    Type type; /* a real variable is a double, the others are int */
+    Role role;
+    size_t offset; /* into Model */
+    double start, min, max, nominal;
+} Variable;
 
 typedef struct Instance Instance;
 typedef void LogCallback(const Instance *instance, Status status, const char *category, const char *message);
 
 struct Instance {
     Model model;
+    Interface interface;
     Mode mode;
-    bool unprepared;      /* parameters changed since plant_prepare */
+    bool unprepared;      /* parameters changed since model_prepare */
     bool outdated;        /* outputs are older than the state, the inputs or the parameters */
+    unsigned categories;  /* of LogCategories, that are wanted */
     char *name;
     LogCallback *log;
     void *environment;    /* of the importer, */
     void (*logger)(void); /* whose callback has another type in each FMI version */
 };
 
-Instance *instance_create(const char *name, const char *token, LogCallback *log, void *environment,
-                          void (*logger)(void));
-void instance_free(Instance *instance);
+/* ---- instance.c: life, modes, messages ---- */
 
-Status instance_get_reals(Instance *instance, const unsigned references[], size_t n, double values[]);
-Status instance_set_reals(Instance *instance, const unsigned references[], size_t n, const double values[]);
-Status instance_get_flag(Instance *instance, unsigned reference, bool *value);
+Instance *instance_create(const char *name, const char *token, Interface interface, bool logging_on, LogCallback *log,
+                          void *environment, void (*logger)(void));
+void instance_free(Instance *instance);
+Status instance_reset(Instance *instance);
 
 /* Sets the experiment's times; a stop time of INFINITY is none. */
 Status instance_set_experiment(Instance *instance, double start_time, double stop_time);
 Status instance_enter_initialisation(Instance *instance);
 Status instance_exit_initialisation(Instance *instance);
-Status instance_step(Instance *instance, double time, double step);
 Status instance_terminate(Instance *instance);
-Status instance_reset(Instance *instance);
+
+/* Refuses an action outside the modes it is allowed in. */
+Status instance_require(const Instance *instance, unsigned modes, const char *action);
+
+/* Brings the outputs up to date; fails where the parameters contradict each other. */
+Status instance_update(Instance *instance);
+
+/* Brings constants and clocks up to the parameters. */
+Status instance_prepare(Instance *instance);
+
+/* Logs an error in printf's manner, whether logging is on or off, and returns STATUS_ERROR, so that a check is one line. */
+Status instance_refuse(const Instance *instance, const char *format, ...);
+
+/* Logs, if the category is wanted, in printf's manner. Returns the status that goes with the category. */
+Status instance_tell(const Instance *instance, LogCategories category, const char *format, ...);
+
+Status instance_set_logging(Instance *instance, bool on, size_t n, const char *const categories[]);
 
 /* Status of a function that this FMU does not offer. */
-Status instance_unsupported(Instance *instance, const char *function);
+Status instance_unsupported(const Instance *instance, const char *function);
 
-/* Logs an error in printf's manner, whether logging is on or off, and returns STATUS_ERROR, so that a check is one line.
- * Nothing but errors is logged. */
-Status instance_refuse(const Instance *instance, const char *format, ...);
+/* ---- variables.c ---- */
+
+extern const Variable VARIABLES[]; /* by value reference */
+extern const unsigned N_VARIABLES;
+
+/* Where the model keeps a variable. */
+double *variable_real(Model *model, const Variable *variable);
+int *variable_integer(Model *model, const Variable *variable);
+
+/* Puts every variable but the outputs to its start value, and all else to zero. */
+void variables_start(Model *model);
+
+Status instance_get_reals(Instance *instance, const unsigned references[], size_t n, double values[]);
+Status instance_set_reals(Instance *instance, const unsigned references[], size_t n, const double values[]);
+Status instance_get_integer(Instance *instance, Type type, unsigned reference, int *value);
+Status instance_set_integer(Instance *instance, Type type, unsigned reference, int value);
+
+/* The first variable that is no number or out of its range, among those that are not calculated; NULL if there is none. */
+const Variable *variables_stray(const Model *model);
+/* The same among the states alone. */
+const Variable *variables_stray_state(const Model *model);
+
+/* ---- stepping.c ---- */
+
+Status instance_step(Instance *instance, double time, double step);
+
+Status instance_enter_event_mode(Instance *instance);
+Status instance_enter_continuous_mode(Instance *instance);
+Status instance_update_discrete(Instance *instance, bool *states_changed, double *next_event_time);
+Status instance_set_time(Instance *instance, double time);
+Status instance_set_states(Instance *instance, const double states[], size_t n);
+Status instance_get_states(Instance *instance, double states[], size_t n);
+Status instance_get_derivatives(Instance *instance, double derivatives[], size_t n);
+Status instance_get_nominals(Instance *instance, double nominals[], size_t n);
+
+/* ---- derivatives.c ---- */
+
+/* sensitivity = J seed, with J the partial derivatives of the unknowns with respect to the knowns. */
+Status instance_directional_derivative(Instance *instance, const unsigned unknowns[], size_t n_unknowns,
+                                       const unsigned knowns[], size_t n_knowns, const double seed[],
+                                       double sensitivity[]);
+
+/* sensitivity = J^T seed. */
+Status instance_adjoint_derivative(Instance *instance, const unsigned unknowns[], size_t n_unknowns,
+                                   const unsigned knowns[], size_t n_knowns, const double seed[],
+                                   double sensitivity[]);
+
+/* ---- saved.c: FMU states ---- */
+
+typedef struct Saved Saved;
+
+Status instance_save(Instance *instance, Saved **saved);
+Status instance_restore(Instance *instance, const Saved *saved);
+Status instance_free_saved(Instance *instance, Saved **saved);
+Status instance_serialised_size(Instance *instance, const Saved *saved, size_t *size);
+Status instance_serialise(Instance *instance, const Saved *saved, unsigned char bytes[], size_t size);
+Status instance_deserialise(Instance *instance, const unsigned char bytes[], size_t size, Saved **saved);
 
 #endif

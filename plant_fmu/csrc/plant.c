@@ -3,28 +3,13 @@
 #include <math.h>
 #include <string.h>
 
+#include "linear.h"
+
 static const double LEAST_QUATERNION = 1e-6; /* length below which a quaternion has no direction */
 
-/* ---- small linear algebra ---------------------------------------------------------------------------------- */
+/* ---- attitude ---------------------------------------------------------------------------------------------- */
 
-static void cross(const double a[3], const double b[3], double out[3])
-{
-    out[0] = a[1] * b[2] - a[2] * b[1];
-    out[1] = a[2] * b[0] - a[0] * b[2];
-    out[2] = a[0] * b[1] - a[1] * b[0];
-}
-
-static void multiply6(const double A[6][6], const double x[6], double out[6])
-{
-    for (int i = 0; i < 6; i++) {
-        out[i] = 0.0;
-        for (int j = 0; j < 6; j++)
-            out[i] += A[i][j] * x[j];
-    }
-}
-
-/* Rotation from body to world (3); a quaternion off unit length still gives a pure rotation, and none at all identity. */
-static void rotation(const double e[4], double R[3][3])
+void plant_rotation(const double e[4], double R[3][3])
 {
     const double square = e[0] * e[0] + e[1] * e[1] + e[2] * e[2] + e[3] * e[3];
     const double s = square > LEAST_QUATERNION * LEAST_QUATERNION ? 2.0 / square : 0.0;
@@ -39,6 +24,33 @@ static void rotation(const double e[4], double R[3][3])
     R[2][1] = s * (e[2] * e[3] + e[0] * e[1]);
     R[2][2] = 1.0 - s * (e[1] * e[1] + e[2] * e[2]);
 }
+
+int plant_normalise(double rigid[N_RIGID])
+{
+    double *e = rigid + 3;
+    const double norm = sqrt(e[0] * e[0] + e[1] * e[1] + e[2] * e[2] + e[3] * e[3]);
+
+    if (!(norm > LEAST_QUATERNION && norm < 1.0 / LEAST_QUATERNION))
+        return 0;
+    for (int i = 0; i < 4; i++)
+        e[i] /= norm;
+    return 1;
+}
+
+void plant_euler(const double e[4], double euler[3])
+{
+    double R[3][3];
+
+    plant_rotation(e, R);
+    const double cosine = hypot(R[2][1], R[2][2]);
+    const int upright = cosine > UPRIGHT; /* else roll and yaw are one, and all is called yaw */
+
+    euler[0] = upright ? atan2(R[2][1], R[2][2]) : 0.0;
+    euler[1] = atan2(-R[2][0], cosine);
+    euler[2] = upright ? atan2(R[1][0], R[0][0]) : atan2(-R[0][1], R[1][1]);
+}
+
+/* ---- parameters -------------------------------------------------------------------------------------------- */
 
 /* Lower Cholesky factor in place. Returns 0 if A is not positive definite. */
 static int cholesky(double A[6][6])
@@ -73,8 +85,6 @@ static void solve(const double L[6][6], double b[6])
     }
 }
 
-/* ---- parameters -------------------------------------------------------------------------------------------- */
-
 /* M_RB = [m I, -m S(r_G); m S(r_G), I_b] (Fossen 2011, 3.44) */
 static void rigid_mass_matrix(const Parameters *p, double M[6][6])
 {
@@ -90,33 +100,50 @@ static void rigid_mass_matrix(const Parameters *p, double M[6][6])
     memcpy(M, rows, sizeof rows);
 }
 
+void plant_mass_matrix(const Parameters *p, double M[6][6])
+{
+    rigid_mass_matrix(p, M);
+    for (int i = 0; i < 6; i++)
+        for (int j = 0; j < 6; j++)
+            M[i][j] += p->added_mass[i < j ? i : j][i < j ? j : i];
+}
+
 const char *plant_prepare(Plant *plant)
 {
     Parameters *p = &plant->parameters;
+    Derived *d = &plant->derived;
     double L[6][6];
-
-    for (int i = 0; i < 6; i++)
-        for (int j = 0; j < i; j++)
-            p->added_mass[i][j] = p->added_mass[j][i];
 
     rigid_mass_matrix(p, L);
     if (!cholesky(L))
         return "rigid-body mass matrix is not positive definite (mass, inertia, r_G)";
-
-    rigid_mass_matrix(p, L);
-    for (int i = 0; i < 6; i++)
-        for (int j = 0; j < 6; j++)
-            L[i][j] += p->added_mass[i][j];
+    plant_mass_matrix(p, L);
     if (!cholesky(L))
         return "mass matrix with added mass is not positive definite (Property 1)";
 
+    for (int i = 0; i < 6; i++)
+        for (int j = 0; j < i; j++)
+            p->added_mass[i][j] = p->added_mass[j][i];
     for (int j = 0; j < 6; j++) {
         double column[6] = {0.0};
         column[j] = 1.0;
         solve((const double(*)[6])L, column);
         for (int i = 0; i < 6; i++)
-            plant->derived.mass_inverse[i][j] = column[i];
+            d->mass_inverse[i][j] = column[i];
     }
+
+    /* the greatest eigenvalue of the linear block is at most its greatest row sum */
+    double greatest = 0.0;
+    for (int i = 0; i < 3; i++) {
+        const double *row = d->mass_inverse[i];
+        const double sum = fabs(row[0]) + fabs(row[1]) + fabs(row[2]);
+        if (sum > greatest) {
+            greatest = sum;
+            d->stiffest = i;
+        }
+    }
+    d->contact_mass = 1.0 / greatest;
+    d->contact_time = fmax(p->bottom_time_constant, CONTACT_SUBSTEPS * p->substep);
     return NULL;
 }
 
@@ -138,29 +165,31 @@ static void subtract_coriolis(const double a[3], const double b[3], const double
     }
 }
 
-void plant_derivative(const Plant *plant, const double rigid[N_RIGID], const double tau[6], double rate[N_RIGID])
+void plant_derivative(const Plant *plant, const Drift *drift, double time, const double rigid[N_RIGID],
+                      const double tau[6], double rate[N_RIGID])
 {
     const Parameters *p = &plant->parameters;
     const double *e = rigid + 3, *nu = rigid + 7, *omega = rigid + 10;
     double R[3][3], wrench[6];
 
     /* kinematics (10): p' = R v, e' = E(e) w / 2 */
-    rotation(e, R);
-    for (int i = 0; i < 3; i++)
-        rate[i] = R[i][0] * nu[0] + R[i][1] * nu[1] + R[i][2] * nu[2];
-    rate[3] = -0.5 * (e[1] * omega[0] + e[2] * omega[1] + e[3] * omega[2]);
-    rate[4] = 0.5 * (e[0] * omega[0] - e[3] * omega[1] + e[2] * omega[2]);
-    rate[5] = 0.5 * (e[3] * omega[0] + e[0] * omega[1] - e[1] * omega[2]);
-    rate[6] = 0.5 * (-e[2] * omega[0] + e[1] * omega[1] + e[0] * omega[2]);
+    plant_rotation(e, R);
+    to_world((const double(*)[3])R, nu, rate);
+    quaternion_rate(e, omega, rate + 3);
 
-    /* motion through the water; the steady current, seen from the turning body, changes at -w x (R^T v_c) */
-    double current[3], nu_r[6], current_turn[6] = {0.0};
+    /* motion through the water, whose velocity v_c changes at R^T v_c' - w x R^T v_c, seen from the body */
+    double water[3], water_rate[3], current[3], nu_r[6], nu_c_rate[6] = {0.0}, turning[3];
+    environment_current(p, drift, time, rigid[2], water);
     for (int i = 0; i < 3; i++)
-        current[i] = R[0][i] * p->current[0] + R[1][i] * p->current[1] + R[2][i] * p->current[2];
+        water_rate[i] = drift->slope[i] + (rigid[2] > 0.0 ? p->current_shear[i] * rate[2] : 0.0);
+    to_body((const double(*)[3])R, water, current);
+    to_body((const double(*)[3])R, water_rate, nu_c_rate);
+    cross(omega, current, turning);
     memcpy(nu_r, nu, sizeof nu_r);
-    for (int i = 0; i < 3; i++)
+    for (int i = 0; i < 3; i++) {
         nu_r[i] -= current[i];
-    cross(omega, current, current_turn);
+        nu_c_rate[i] -= turning[i];
+    }
 
     memcpy(wrench, tau, sizeof wrench);
 
@@ -178,39 +207,47 @@ void plant_derivative(const Plant *plant, const double rigid[N_RIGID], const dou
     b[2] += I[4] * omega[0] + I[5] * omega[1] + I[2] * omega[2];
     subtract_coriolis(a, b, nu, omega, wrench);
 
-    /* water that moves along: momentum M_A v_r, and -M_A v_r' less its part in v' */
-    double added[6], turn[6];
+    /* water that moves along: momentum M_A v_r, and the part of -M_A v_r' that is not in v' */
+    double added[6], carried[6];
     multiply6(p->added_mass, nu_r, added);
     subtract_coriolis(added, added + 3, nu_r, omega, wrench);
-    multiply6(p->added_mass, current_turn, turn);
+    multiply6(p->added_mass, nu_c_rate, carried);
 
     for (int i = 0; i < 6; i++)
-        wrench[i] -= turn[i] + (p->linear_damping[i] + p->quadratic_damping[i] * fabs(nu_r[i])) * nu_r[i];
+        wrench[i] += carried[i] - (p->linear_damping[i] + p->quadratic_damping[i] * fabs(nu_r[i])) * nu_r[i];
 
     /* restoring (12): weight at r_G and buoyancy at r_B along k = R^T e3 */
     const double k[3] = {R[2][0], R[2][1], R[2][2]};
+    const double buoyancy = p->buoyancy * environment_submerged(p, rigid[2]);
     double lever[3], moment[3];
     for (int i = 0; i < 3; i++)
-        lever[i] = p->r_G[i] * p->weight - p->r_B[i] * p->buoyancy;
+        lever[i] = p->r_G[i] * p->weight - p->r_B[i] * buoyancy;
     cross(lever, k, moment);
     for (int i = 0; i < 3; i++) {
-        wrench[i] += (p->weight - p->buoyancy) * k[i];
+        wrench[i] += (p->weight - buoyancy) * k[i];
         wrench[3 + i] += moment[i];
+    }
+
+    double contact_world[3], contact[3];
+    if (environment_contact(plant, rigid[2], rate, contact_world)) {
+        to_body((const double(*)[3])R, contact_world, contact);
+        for (int i = 0; i < 3; i++)
+            wrench[i] += contact[i];
     }
 
     multiply6(plant->derived.mass_inverse, wrench, rate + 7);
 }
 
-double plant_damping_rate(const Plant *plant, const double rigid[N_RIGID])
+double plant_damping_rate(const Plant *plant, const Drift *drift, double time, const double rigid[N_RIGID])
 {
     const Parameters *p = &plant->parameters;
-    double R[3][3], root[6], bound = 0.0;
+    double R[3][3], water[3], current[3], root[6], bound = 0.0;
 
-    rotation(rigid + 3, R);
+    plant_rotation(rigid + 3, R);
+    environment_current(p, drift, time, rigid[2], water);
+    to_body((const double(*)[3])R, water, current);
     for (int i = 0; i < 6; i++) {
-        double nu_r = rigid[7 + i];
-        if (i < 3)
-            nu_r -= R[0][i] * p->current[0] + R[1][i] * p->current[1] + R[2][i] * p->current[2];
+        const double nu_r = rigid[7 + i] - (i < 3 ? current[i] : 0.0);
         root[i] = sqrt(p->linear_damping[i] + 2.0 * p->quadratic_damping[i] * fabs(nu_r));
     }
     /* eigenvalues of M^-1 D are those of D^1/2 M^-1 D^1/2, at most its greatest row sum */
@@ -220,7 +257,7 @@ double plant_damping_rate(const Plant *plant, const double rigid[N_RIGID])
             sum += fabs(plant->derived.mass_inverse[i][j]) * root[j];
         bound = fmax(bound, root[i] * sum);
     }
-    return bound;
+    return bound + (rigid[2] + p->hull_radius > p->bottom_depth ? 2.0 / plant->derived.contact_time : 0.0);
 }
 
 /* ---- stepping ---------------------------------------------------------------------------------------------- */
@@ -231,60 +268,36 @@ static void advance(const double from[N_RIGID], const double rate[N_RIGID], doub
         to[i] = from[i] + h * rate[i];
 }
 
-int plant_step(const Plant *plant, const Actuators *target, double h, State *state)
+int plant_step(const Plant *plant, const Drift *drift, double time, const Actuators *target, double h, State *state)
 {
+    const Parameters *p = &plant->parameters;
     Actuators middle, end;
     double tau_start[6], tau_middle[6], tau_end[6];
     double k1[N_RIGID], k2[N_RIGID], k3[N_RIGID], k4[N_RIGID], trial[N_RIGID];
 
     /* beyond h * rate = 2.785 the method grows what it should damp, and may still look well */
-    if (!(h * plant_damping_rate(plant, state->rigid) < 2.5))
+    if (!(h * plant_damping_rate(plant, drift, time, state->rigid) < 2.5))
         return 0;
 
-    /* the lag is linear with a held command: its stages are exact, and stable for any time constant; for one much below h
+    /* lags do not depend on the body, so their stages are exact, and stable for any time constant; for one much below h
      * the step sees Simpson's mean of them, late by up to h/6 */
-    plant_lag(plant, &state->actuators, target, 0.0, &state->actuators);
-    plant_lag(plant, &state->actuators, target, 0.5 * h, &middle);
-    plant_lag(plant, &state->actuators, target, h, &end);
-    plant_wrench(plant, &state->actuators, tau_start);
-    plant_wrench(plant, &middle, tau_middle);
-    plant_wrench(plant, &end, tau_end);
+    actuators_after(p, &state->actuators, target, 0.0, &state->actuators);
+    actuators_after(p, &state->actuators, target, 0.5 * h, &middle);
+    actuators_after(p, &state->actuators, target, h, &end);
+    actuators_wrench(p, &state->actuators, tau_start);
+    actuators_wrench(p, &middle, tau_middle);
+    actuators_wrench(p, &end, tau_end);
 
-    plant_derivative(plant, state->rigid, tau_start, k1);
+    plant_derivative(plant, drift, time, state->rigid, tau_start, k1);
     advance(state->rigid, k1, 0.5 * h, trial);
-    plant_derivative(plant, trial, tau_middle, k2);
+    plant_derivative(plant, drift, time + 0.5 * h, trial, tau_middle, k2);
     advance(state->rigid, k2, 0.5 * h, trial);
-    plant_derivative(plant, trial, tau_middle, k3);
+    plant_derivative(plant, drift, time + 0.5 * h, trial, tau_middle, k3);
     advance(state->rigid, k3, h, trial);
-    plant_derivative(plant, trial, tau_end, k4);
+    plant_derivative(plant, drift, time + h, trial, tau_end, k4);
 
     for (int i = 0; i < N_RIGID; i++)
         state->rigid[i] += h / 6.0 * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i]);
     state->actuators = end;
-    return plant_normalise(state->rigid) && h * plant_damping_rate(plant, state->rigid) < 2.5;
-}
-
-int plant_normalise(double rigid[N_RIGID])
-{
-    double *e = rigid + 3;
-    const double norm = sqrt(e[0] * e[0] + e[1] * e[1] + e[2] * e[2] + e[3] * e[3]);
-
-    if (!(norm > LEAST_QUATERNION && norm < 1.0 / LEAST_QUATERNION))
-        return 0;
-    for (int i = 0; i < 4; i++)
-        e[i] /= norm;
-    return 1;
-}
-
-void plant_euler(const double e[4], double euler[3])
-{
-    double R[3][3];
-
-    rotation(e, R);
-    const double cosine = hypot(R[2][1], R[2][2]);
-    const int upright = cosine > 1e-12; /* else roll and yaw are one, and all is called yaw */
-
-    euler[0] = upright ? atan2(R[2][1], R[2][2]) : 0.0;
-    euler[1] = atan2(-R[2][0], cosine);
-    euler[2] = upright ? atan2(R[1][0], R[0][0]) : atan2(-R[0][1], R[1][1]);
+    return plant_normalise(state->rigid) && h * plant_damping_rate(plant, drift, time + h, state->rigid) < 2.5;
 }

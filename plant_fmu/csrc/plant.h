@@ -1,17 +1,45 @@
-/* Rigid underwater vehicle after Fossen, six degrees of freedom.
+/* Rigid underwater vehicle after Fossen, six degrees of freedom, with its actuators and its water.
  *
  * World frame NED (z is depth), body frame x forward, y right, z down, unit quaternion scalar first, rotating body
  * vectors into the world. Velocities are over ground, in the body frame. SI units everywhere.
  *
  *     M_RB v' + C_RB(v) v + M_A v_r' + C_A(v_r) v_r + D_l v_r + D_q |v_r| v_r + g(eta) = tau            (11)
  *
- * with v_r = v - [R^T v_c; 0] for a constant irrotational current v_c. Nothing here knows of FMI. */
+ * with v_r = v - [R^T v_c; 0], the motion through water that moves at v_c and is taken as uniform around the hull.
+ * Nothing here knows of FMI, and nothing keeps anything between calls. Functions named _tangent give exact directional
+ * derivatives by the rules of calculus: dx is the tangent of x, and a struct has its tangent in a struct of the same
+ * type. At a kink theirs is the branch that the function itself takes. */
 #ifndef PLANT_H
 #define PLANT_H
 
 #include "vehicle.h" /* generated: N_THRUSTERS and the table of variables */
 
-enum { N_RIGID = 13 }; /* position 3, quaternion 4, velocity 6 */
+enum { N_RIGID = 13 };                        /* position 3, quaternion 4, velocity 6 */
+enum { N_STATES = N_RIGID + N_THRUSTERS + 6 };/* and the lagging forces */
+
+enum { DEPTH_SENSOR, DVL, IMU, COMPASS, USBL, N_SENSORS };
+
+enum { /* what the sensors measure, channel by channel */
+    MEASURED_DEPTH,
+    MEASURED_VELOCITY,
+    MEASURED_ALTITUDE = MEASURED_VELOCITY + 3,
+    MEASURED_ACCELERATION,
+    MEASURED_ANGULAR_VELOCITY = MEASURED_ACCELERATION + 3,
+    MEASURED_HEADING = MEASURED_ANGULAR_VELOCITY + 3,
+    MEASURED_POSITION,
+    N_MEASURED = MEASURED_POSITION + 3
+};
+
+enum { /* standard deviations: several channels share one */
+    DEPTH_NOISE,
+    VELOCITY_NOISE,
+    ALTITUDE_NOISE,
+    ACCELERATION_NOISE,
+    ANGULAR_VELOCITY_NOISE,
+    HEADING_NOISE,
+    POSITION_NOISE,
+    N_NOISES
+};
 
 typedef struct {
     double mass;                             /* kg */
@@ -21,18 +49,42 @@ typedef struct {
     double added_mass[6][6];                 /* the upper triangle is given; plant_prepare mirrors it */
     double linear_damping[6];                /* N s/m, N m s/rad */
     double quadratic_damping[6];             /* N s2/m2, N m s2/rad2 */
-    double current[3];                       /* m/s, world frame */
+
+    double current[3];                       /* m/s, world frame, at the surface */
+    double current_shear[3];                 /* 1/s, its growth with depth */
+    double current_variation[3];             /* m/s, standard deviation of its Gauss-Markov part */
+    double current_correlation_time;         /* s */
+    double current_variation_period;         /* s, between the knots of that part */
+    double hull_radius;                      /* m, of a sphere about the origin: for surface and bottom */
+    double bottom_depth;                     /* m */
+    double bottom_friction;                  /* Coulomb's coefficient */
+    double bottom_time_constant;             /* s, in which the bottom stops the hull */
+    double gravity;                          /* m/s2, as an accelerometer feels it */
+    int free_surface;                        /* buoyancy fades where the hull leaves the water */
+
     double thruster_matrix[6][N_THRUSTERS];  /* body wrench of one newton of each thruster */
     double thrust_min[N_THRUSTERS];          /* N, most negative force */
     double thrust_max[N_THRUSTERS];          /* N */
     double thrust_time_constant[N_THRUSTERS];/* s, 0: no lag */
+    double thrust_rate_limit[N_THRUSTERS];   /* N/s, 0: none */
+    double thrust_dead_band[N_THRUSTERS];    /* part of the command's range that gives no force */
+    double thrust_curve[N_THRUSTERS];        /* from 0, force linear in the command, to 1, quadratic */
+    double thrust_effectiveness[N_THRUSTERS];/* 1: whole, 0: failed */
     double wrench_force_limit;               /* N, on the norm of the direct force; its direction is kept */
     double wrench_time_constant;             /* s, 0: no lag */
+
+    double sensor_rate[N_SENSORS];           /* Hz, 0: continuous and without noise */
+    double noise[N_NOISES];                  /* standard deviations, in the channel's unit */
+    double bias[N_MEASURED];
+    int seed;                                /* of all noise and of the current's variation */
     double substep;                          /* s, greatest integration step */
 } Parameters;
 
 typedef struct { /* constants that follow from the parameters */
     double mass_inverse[6][6]; /* of M_RB + M_A */
+    double contact_mass;       /* kg, at most what a force on the origin moves, in any direction */
+    double contact_time;       /* s, bottom_time_constant, or what the substep can follow */
+    int stiffest;              /* row of mass_inverse that tells contact_mass */
 } Derived;
 
 typedef struct {
@@ -47,41 +99,114 @@ typedef struct {
 
 typedef struct {
     double rigid[N_RIGID];
-    Actuators actuators;
+    Actuators actuators; /* of those that lag; the others follow their command */
 } State;
+
+typedef struct { /* the current's Gauss-Markov part between two knots: value + slope (t - since) */
+    double since;
+    double value[3], slope[3];
+} Drift;
 
 typedef struct {
     Parameters parameters;
     Derived derived;
 } Plant;
 
+/* ---- plant.c: the rigid body in water ---- */
+
 /* Computes the derived constants. Returns NULL, or what is wrong with the parameters. */
 const char *plant_prepare(Plant *plant);
+
+/* M_RB + M_A. */
+void plant_mass_matrix(const Parameters *parameters, double M[6][6]);
+
+#define CONTACT_SUBSTEPS 4.0 /* in which the bottom may stop the hull: far from where integration fails */
+
+#define UPRIGHT 1e-12        /* cosine of pitch below which roll and yaw are one */
 
 /* Scales the quaternion to unit length. Returns 0 if it has none to scale, or is not finite. */
 int plant_normalise(double rigid[N_RIGID]);
 
+/* Rotation from body to world (3); a quaternion off unit length still gives a pure rotation, and none at all identity. */
+void plant_rotation(const double quaternion[4], double R[3][3]);
+
 /* A bound of the fastest rate at which damping now makes a velocity decay, 1/s: what limits the integration's step. */
-double plant_damping_rate(const Plant *plant, const double rigid[N_RIGID]);
+double plant_damping_rate(const Plant *plant, const Drift *drift, double time, const double rigid[N_RIGID]);
 
 /* Time derivative of the rigid-body state under the body wrench tau. */
-void plant_derivative(const Plant *plant, const double rigid[N_RIGID], const double tau[6], double rate[N_RIGID]);
-
-/* The commands within their limits. Sets the flags of what was cut. */
-void plant_limit(const Plant *plant, const Inputs *inputs, Actuators *target, int thrust_cut[N_THRUSTERS],
-                 int *wrench_cut);
-
-/* The forces a time dt after `start` while they head for `target`: exact for the first-order lag. */
-void plant_lag(const Plant *plant, const Actuators *start, const Actuators *target, double dt, Actuators *out);
-
-/* The wrench that all actuators together put on the body. */
-void plant_wrench(const Plant *plant, const Actuators *actuators, double tau[6]);
+void plant_derivative(const Plant *plant, const Drift *drift, double time, const double rigid[N_RIGID],
+                      const double tau[6], double rate[N_RIGID]);
 
 /* Advances the state by h with one Runge-Kutta step of order four, the commands being held. Returns 0 if the state has
  * no numbers, or h is beyond what the integration can follow. */
-int plant_step(const Plant *plant, const Actuators *target, double h, State *state);
+int plant_step(const Plant *plant, const Drift *drift, double time, const Actuators *target, double h, State *state);
 
 /* Roll, pitch, yaw (zyx) of a quaternion. */
 void plant_euler(const double quaternion[4], double euler[3]);
+
+/* ---- environment.c ---- */
+
+/* Velocity of the water at a depth, world frame. */
+void environment_current(const Parameters *parameters, const Drift *drift, double time, double depth,
+                         double velocity[3]);
+
+/* Part of the hull's volume that is under water, 0 to 1. */
+double environment_submerged(const Parameters *parameters, double depth);
+
+/* Force of the bottom on the hull, world frame. Returns whether they touch. */
+int environment_contact(const Plant *plant, double depth, const double velocity_world[3], double force[3]);
+
+double environment_submerged_tangent(const Parameters *parameters, const Parameters *dparameters, double depth,
+                                     double ddepth);
+
+/* Of the force, where they touch; dM is the tangent of the mass matrix. */
+void environment_contact_tangent(const Plant *plant, const Parameters *dparameters, const double dM[6][6], double depth,
+                                 double ddepth, const double velocity_world[3], const double dvelocity_world[3],
+                                 double dforce[3]);
+
+/* ---- actuators.c ---- */
+
+/* The forces that the commands ask for once lags are over: limited, and after the thrusters' curves. Sets the flags of
+ * what was cut. */
+void actuators_target(const Parameters *parameters, const Inputs *inputs, Actuators *target,
+                      int thrust_cut[N_THRUSTERS], int *wrench_cut);
+
+#define LEAST_RATE_LAG 1e-3 /* s: time constant, at the least, of a thruster with a rate limit */
+
+/* Time constant of thruster i, 0 if it follows its command at once. */
+double actuators_thrust_lag(const Parameters *parameters, int i);
+
+/* The forces a time dt after `start` while they head for `target`: exact for lag and rate limit. */
+void actuators_after(const Parameters *parameters, const Actuators *start, const Actuators *target, double dt,
+                     Actuators *out);
+
+/* The rate at which they change, 0 for those without a lag. */
+void actuators_rate(const Parameters *parameters, const Actuators *now, const Actuators *target, Actuators *rate);
+
+/* The wrench that all actuators together put on the body. */
+void actuators_wrench(const Parameters *parameters, const Actuators *now, double tau[6]);
+
+/* Of the rates, of the present forces and of their wrench. */
+void actuators_tangent(const Parameters *parameters, const Parameters *dparameters, const Inputs *inputs,
+                       const Inputs *dinputs, const Actuators *now, const Actuators *dnow, Actuators *drate,
+                       Actuators *dforce, double dtau[6]);
+
+/* ---- sensors.c ---- */
+
+/* What sensors without noise and delay would measure, biases included. */
+void sensors_measure(const Parameters *parameters, const double rigid[N_RIGID], const double rate[N_RIGID],
+                     double heading, double altitude, double measured[N_MEASURED]);
+
+/* Makes the sample number `count` of one sensor: what is measured now, with noise. */
+void sensors_sample(const Parameters *parameters, int sensor, unsigned long long count,
+                    const double measured[N_MEASURED], double held[N_MEASURED]);
+
+/* Which sensor a channel belongs to. */
+int sensors_of_channel(int channel);
+
+/* ---- random.c ---- */
+
+/* The standard normal number at a place of a seeded stream: the same at every call (Philox 4x32-10, Box-Muller). */
+double random_normal(int seed, unsigned stream, unsigned long long count);
 
 #endif

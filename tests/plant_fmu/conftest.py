@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 
+import numpy as np
 import pytest
 from fmpy import extract, read_model_description
 from fmpy.fmi2 import FMU2Slave, fmi2CallbackFunctions, fmi2CallbackLoggerTYPE
@@ -51,16 +52,38 @@ class Slave:
         self.set_values(values)
 
     def set_values(self, values):
-        references = [self.by_name[name].valueReference for name in values]
-        setter = self.fmu.setReal if self.fmi == 2 else self.fmu.setFloat64
-        setter(references, list(values.values()))
+        by_type = {}
+        for name, value in values.items():
+            by_type.setdefault(self.by_name[name].type, {})[self.by_name[name].valueReference] = value
+        for kind, numbers in by_type.items():
+            getattr(self.fmu, f"set{kind}")(list(numbers), list(numbers.values()))
 
     def get(self, *names):
+        return [x for name in names for x in self._one(name)] if self._mixed(names) else self._reals(names)
+
+    def _mixed(self, names):
+        return any(self.by_name[name].type not in ("Real", "Float64") for name in names)
+
+    def _reals(self, names):
         references = [self.by_name[name].valueReference for name in names]
         return (self.fmu.getReal if self.fmi == 2 else self.fmu.getFloat64)(references)
 
+    def _one(self, name):
+        variable = self.by_name[name]
+        return getattr(self.fmu, f"get{variable.type}")([variable.valueReference])
+
     def flag(self, name):
-        return bool(self.fmu.getBoolean([self.by_name[name].valueReference])[0])
+        return bool(self._one(name)[0])
+
+    def jacobian(self, unknowns, knowns):
+        """Column by column, from directional derivatives."""
+        u, k = ([self.by_name[name].valueReference for name in names] for names in (unknowns, knowns))
+        get = self.fmu.getDirectionalDerivative
+        if self.fmi == 2:
+            columns = [get(vUnknown_ref=u, vKnown_ref=[ref], dvKnown=[1.0]) for ref in k]
+        else:
+            columns = [get(unknowns=u, knowns=[ref], seed=[1.0], nSensitivity=len(u)) for ref in k]
+        return np.array(columns).T
 
     def start(self, **values):
         self.set_values(values)

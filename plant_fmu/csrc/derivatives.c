@@ -1,0 +1,62 @@
+/* Directional and adjoint derivatives, by the table of variables: a seed stands in a Model of its own, at the place of
+ * what it is the seed of, and a sensitivity is read from where its variable stands. */
+#include <string.h>
+
+#include "instance.h"
+
+static Status prepare(Instance *instance, const unsigned unknowns[], size_t n_unknowns, const unsigned knowns[],
+                      size_t n_knowns)
+{
+    if (instance_require(instance, ~(unsigned)MODE_INSTANTIATED, "derivatives") != STATUS_OK)
+        return STATUS_ERROR;
+    for (size_t i = 0; i < n_unknowns; i++) {
+        const Variable *v = unknowns[i] < N_VARIABLES ? &VARIABLES[unknowns[i]] : NULL;
+        if (!v || v->type != TYPE_REAL || !(v->role == OUTPUT || v->role == STATE))
+            return instance_refuse(instance, "value reference %u is no real output, state or derivative", unknowns[i]);
+    }
+    for (size_t i = 0; i < n_knowns; i++) {
+        const Variable *v = knowns[i] < N_VARIABLES ? &VARIABLES[knowns[i]] : NULL;
+        if (!v || v->type != TYPE_REAL || v->role == OUTPUT)
+            return instance_refuse(instance, "value reference %u is no real input, state, parameter or time", knowns[i]);
+    }
+    return instance_update(instance);
+}
+
+Status instance_directional_derivative(Instance *instance, const unsigned unknowns[], size_t n_unknowns,
+                                       const unsigned knowns[], size_t n_knowns, const double seed[],
+                                       double sensitivity[])
+{
+    Model direction, tangent;
+
+    if (prepare(instance, unknowns, n_unknowns, knowns, n_knowns) != STATUS_OK)
+        return STATUS_ERROR;
+    memset(&direction, 0, sizeof direction);
+    for (size_t i = 0; i < n_knowns; i++)
+        *variable_real(&direction, &VARIABLES[knowns[i]]) += seed[i];
+    model_tangent(&instance->model, &direction, &tangent);
+    for (size_t i = 0; i < n_unknowns; i++)
+        sensitivity[i] = *variable_real(&tangent, &VARIABLES[unknowns[i]]);
+    return STATUS_OK;
+}
+
+/* Row by row the transposed product; there are more unknowns in use than knowns are seeded, so columns come by tangents. */
+Status instance_adjoint_derivative(Instance *instance, const unsigned unknowns[], size_t n_unknowns,
+                                   const unsigned knowns[], size_t n_knowns, const double seed[],
+                                   double sensitivity[])
+{
+    Model direction, tangent;
+
+    if (prepare(instance, unknowns, n_unknowns, knowns, n_knowns) != STATUS_OK)
+        return STATUS_ERROR;
+    memset(&direction, 0, sizeof direction);
+    for (size_t i = 0; i < n_knowns; i++) {
+        double *at = variable_real(&direction, &VARIABLES[knowns[i]]);
+        *at = 1.0;
+        model_tangent(&instance->model, &direction, &tangent);
+        *at = 0.0;
+        sensitivity[i] = 0.0;
+        for (size_t j = 0; j < n_unknowns; j++)
+            sensitivity[i] += seed[j] * *variable_real(&tangent, &VARIABLES[unknowns[j]]);
+    }
+    return STATUS_OK;
+}

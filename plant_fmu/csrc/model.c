@@ -1,0 +1,167 @@
+#include "model.h"
+
+#include <math.h>
+#include <string.h>
+
+/* ---- clocks ------------------------------------------------------------------------------------------------ */
+
+static double period_wanted(const Parameters *p, int clock)
+{
+    if (clock == CURRENT_CLOCK) {
+        const double *v = p->current_variation;
+        return v[0] > 0.0 || v[1] > 0.0 || v[2] > 0.0 ? p->current_variation_period : 0.0;
+    }
+    return p->sensor_rate[clock] > 0.0 ? 1.0 / p->sensor_rate[clock] : 0.0;
+}
+
+const char *model_prepare(Model *m)
+{
+    const char *fault = plant_prepare(&m->plant);
+
+    if (fault)
+        return fault;
+    for (int i = 0; i < N_CLOCKS; i++) {
+        Clock *clock = &m->held.clocks[i];
+        const double period = period_wanted(&m->plant.parameters, i);
+        if (period != clock->period) {
+            clock->period = period;
+            clock->since = m->time;
+            clock->ticks = 0.0;
+        }
+    }
+    if (m->held.clocks[CURRENT_CLOCK].period == 0.0)
+        memset(&m->held.drift, 0, sizeof m->held.drift);
+    return NULL;
+}
+
+static double next_tick_of(const Clock *clock)
+{
+    return clock->period > 0.0 ? clock->since + clock->ticks * clock->period : INFINITY;
+}
+
+double model_next_tick(const Model *m)
+{
+    double next = INFINITY;
+
+    for (int i = 0; i < N_CLOCKS; i++)
+        next = fmin(next, next_tick_of(&m->held.clocks[i]));
+    return next;
+}
+
+/* The current's variation from one knot of a first-order Gauss-Markov process to the next (exact at the knots). */
+static void tick_current(Model *m, unsigned long long count)
+{
+    const Parameters *p = &m->plant.parameters;
+    Drift *drift = &m->held.drift;
+    const double period = m->held.clocks[CURRENT_CLOCK].period, ratio = period / p->current_correlation_time;
+    const double kept = exp(-ratio), fresh = sqrt(-expm1(-2.0 * ratio));
+
+    for (int i = 0; i < 3; i++) {
+        const double deviation = p->current_variation[i];
+        const unsigned stream = (unsigned)(N_MEASURED + i);
+        if (count == 0) /* from the process's own distribution */
+            drift->value[i] = deviation * random_normal(p->seed, stream, 0);
+        else
+            drift->value[i] += drift->slope[i] * fmin(m->time - drift->since, period);
+        const double next = kept * drift->value[i] + fresh * deviation * random_normal(p->seed, stream, count + 1);
+        drift->slope[i] = (next - drift->value[i]) / period;
+    }
+    drift->since = m->time;
+}
+
+int model_tick(Model *m)
+{
+    int ticked = 0, measured = 0;
+
+    for (int i = N_CLOCKS - 1; i >= 0; i--) { /* the current before the sensors, which may feel it */
+        Clock *clock = &m->held.clocks[i];
+        const double due = m->time + 1e-9 * clock->period + 1e-15 * fabs(m->time);
+        const double passed = clock->period > 0.0 ? floor((due - clock->since) / clock->period) + 1.0 : 0.0;
+
+        if (!(passed > clock->ticks))
+            continue;
+        clock->samples += passed - clock->ticks; /* every tick that has gone by takes its place in the stream */
+        clock->ticks = passed;
+        ticked = 1;
+        const unsigned long long count = (unsigned long long)clock->samples - 1;
+        if (i == CURRENT_CLOCK)
+            tick_current(m, count);
+        else {
+            if (!measured)
+                model_evaluate(m);
+            measured = 1;
+            double ideal[N_MEASURED];
+            sensors_measure(&m->plant.parameters, m->state.rigid, m->outputs.rate.rigid, m->outputs.euler[2],
+                            m->outputs.altitude, ideal);
+            sensors_sample(&m->plant.parameters, i, count, ideal, m->held.samples);
+        }
+    }
+    return ticked;
+}
+
+/* ---- evaluation -------------------------------------------------------------------------------------------- */
+
+void model_evaluate(Model *m)
+{
+    const Parameters *p = &m->plant.parameters;
+    Outputs *o = &m->outputs;
+    Actuators target, now;
+    double contact[3];
+
+    actuators_target(p, &m->inputs, &target, o->thrust_cut, &o->wrench_cut);
+    actuators_after(p, &m->state.actuators, &target, 0.0, &now);
+    actuators_wrench(p, &now, o->wrench);
+    for (int i = 0; i < N_THRUSTERS; i++)
+        o->thrust[i] = p->thrust_effectiveness[i] * now.thrust[i];
+
+    plant_derivative(&m->plant, &m->held.drift, m->time, m->state.rigid, o->wrench, o->rate.rigid);
+    actuators_rate(p, &m->state.actuators, &target, &o->rate.actuators);
+
+    plant_euler(m->state.rigid + 3, o->euler);
+    environment_current(p, &m->held.drift, m->time, m->state.rigid[2], o->water);
+    o->altitude = p->bottom_depth - m->state.rigid[2];
+    o->bottom_touched = environment_contact(&m->plant, m->state.rigid[2], o->rate.rigid, contact);
+
+    sensors_measure(p, m->state.rigid, o->rate.rigid, o->euler[2], o->altitude, o->measured);
+    for (int i = 0; i < N_MEASURED; i++)
+        if (m->held.clocks[sensors_of_channel(i)].period > 0.0)
+            o->measured[i] = m->held.samples[i];
+}
+
+int model_settle(Model *m)
+{
+    const Actuators before = m->state.actuators;
+    Actuators target;
+    int thrust_cut[N_THRUSTERS], wrench_cut;
+
+    actuators_target(&m->plant.parameters, &m->inputs, &target, thrust_cut, &wrench_cut);
+    actuators_after(&m->plant.parameters, &before, &target, 0.0, &m->state.actuators);
+    return memcmp(&before, &m->state.actuators, sizeof before) != 0;
+}
+
+/* ---- stepping ---------------------------------------------------------------------------------------------- */
+
+int model_advance(Model *m, double end, double *failed)
+{
+    const double hair = 1e-9 * (end - m->time); /* no segment is shorter */
+    int thrust_cut[N_THRUSTERS], wrench_cut;
+    Actuators target;
+
+    model_tick(m);
+    actuators_target(&m->plant.parameters, &m->inputs, &target, thrust_cut, &wrench_cut);
+    while (m->time < end) {
+        const double tick = model_next_tick(m), until = tick < end - hair ? tick : end;
+        const double start = m->time;
+        const int n = (int)fmax(1.0, ceil((until - start) / m->plant.parameters.substep - 1e-9));
+        const double h = (until - start) / n;
+
+        for (int i = 0; i < n; i++)
+            if (!plant_step(&m->plant, &m->held.drift, start + i * h, &target, h, &m->state)) {
+                *failed = h;
+                return 0;
+            }
+        m->time = until;
+        model_tick(m);
+    }
+    return 1;
+}

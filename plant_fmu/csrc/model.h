@@ -1,0 +1,68 @@
+/* The plant as a whole: what moves, what is sampled and held, what is put in, what comes out. */
+#ifndef MODEL_H
+#define MODEL_H
+
+#include "plant.h"
+
+enum { CURRENT_CLOCK = N_SENSORS, N_CLOCKS }; /* one for each sensor, one for the current's variation */
+
+typedef struct {
+    double period;  /* s, 0: does not run */
+    double since;   /* s, time of its tick 0 */
+    double ticks;   /* since then */
+    double samples; /* in all: the place in the stream of random numbers */
+} Clock;
+
+typedef struct { /* what changes at ticks alone */
+    Clock clocks[N_CLOCKS];
+    double samples[N_MEASURED];
+    Drift drift;
+} Held;
+
+typedef struct {
+    State rate;                  /* time derivative of the state */
+    double thrust[N_THRUSTERS];  /* present forces, N */
+    double wrench[6];            /* what all actuators put on the body */
+    double euler[3];             /* roll, pitch, yaw */
+    double water[3];             /* m/s, world frame */
+    double altitude;             /* m */
+    double measured[N_MEASURED];
+    int thrust_cut[N_THRUSTERS]; /* a command was beyond its limits */
+    int wrench_cut;
+    int bottom_touched;
+} Outputs;
+
+typedef struct {
+    Plant plant;
+    State state;
+    Held held;
+    Inputs inputs;
+    Outputs outputs;
+    double time;
+    double stop_time; /* INFINITY if there is none */
+} Model; /* plain data: all that an FMU state holds */
+
+/* Brings constants and clocks up to the parameters. Returns NULL, or what is wrong with the parameters. */
+const char *model_prepare(Model *model);
+
+/* Fills the outputs from all the rest. */
+void model_evaluate(Model *model);
+
+/* Time of the next tick of any clock, INFINITY if none runs. */
+double model_next_tick(const Model *model);
+
+/* Does all that is due now: samples, and the next piece of the current. Returns whether there was any. */
+int model_tick(Model *model);
+
+/* Forces without a lag are no states of motion: puts them to where their commands point. Returns whether any changed. */
+int model_settle(Model *model);
+
+/* Integrates up to the time `end` with whole substeps from tick to tick. Returns 0 if that is not possible, with the
+ * step that failed in `failed`; the model is then left where it failed. */
+int model_advance(Model *model, double end, double *failed);
+
+/* Exact directional derivative: how the evaluated outputs change along the direction that `seed` holds in its parameters, state,
+ * inputs and time. Of `tangent` the state and the outputs are set. */
+void model_tangent(const Model *model, const Model *seed, Model *tangent);
+
+#endif

@@ -1,0 +1,31 @@
+/* Random numbers without a state: a keyed hash of where in which stream the number stands. A run repeats whatever the
+ * steps, a saved state needs no generator, and streams do not disturb each other. */
+#include "plant.h"
+
+#include <math.h>
+#include <stdint.h>
+
+/* Philox 4x32-10 (Salmon et al., "Parallel random numbers: as easy as 1, 2, 3", SC11). */
+static void philox(uint32_t c[4], uint32_t key0, uint32_t key1)
+{
+    for (int round = 0; round < 10; round++) {
+        const uint64_t a = (uint64_t)0xD2511F53u * c[0], b = (uint64_t)0xCD9E8D57u * c[2];
+        const uint32_t next[4] = {(uint32_t)(b >> 32) ^ c[1] ^ key0, (uint32_t)b, (uint32_t)(a >> 32) ^ c[3] ^ key1,
+                                  (uint32_t)a};
+        for (int i = 0; i < 4; i++)
+            c[i] = next[i];
+        key0 += 0x9E3779B9u;
+        key1 += 0xBB67AE85u;
+    }
+}
+
+double random_normal(int seed, unsigned stream, unsigned long long count)
+{
+    uint32_t c[4] = {(uint32_t)count, (uint32_t)(count >> 32), stream, 0};
+
+    philox(c, (uint32_t)seed, 0);
+    /* two uniform numbers of 53 bits, the first in (0, 1] */
+    const double u = ((double)(c[0] >> 5) * 67108864.0 + (double)(c[1] >> 6) + 1.0) / 9007199254740992.0;
+    const double v = ((double)(c[2] >> 5) * 67108864.0 + (double)(c[3] >> 6)) / 9007199254740992.0;
+    return sqrt(-2.0 * log(u)) * cos(6.283185307179586 * v); /* Box-Muller */
+}

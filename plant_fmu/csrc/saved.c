@@ -1,0 +1,164 @@
+/* FMU states: all that an instance is, as one block of plain data. */
+#include <math.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "instance.h"
+
+struct Saved {
+    uint64_t zero;     /* stays 0: some importers hand the block itself to a function that frees what it points to */
+    uint32_t magic;    /* tells a foreign block, and one of a machine with the other byte order */
+    uint32_t size;
+    uint64_t origin;   /* hash of the instantiation token: blocks of another FMU do not fit */
+    uint64_t checksum; /* of a serialised block: of all that follows */
+    int32_t interface, mode, unprepared, padding;
+    Model model;
+};
+
+static const uint32_t MAGIC = 0x55565331;
+
+/* FNV-1a */
+static uint64_t hash(const void *data, size_t size)
+{
+    const unsigned char *bytes = data;
+    uint64_t value = 14695981039346656037u;
+
+    for (size_t i = 0; i < size; i++)
+        value = (value ^ bytes[i]) * 1099511628211u;
+    return value;
+}
+
+static uint64_t checksum(const Saved *saved)
+{
+    const size_t head = offsetof(Saved, interface);
+
+    return hash((const char *)saved + head, sizeof *saved - head);
+}
+
+static Status check_block(const Instance *instance, const Saved *saved)
+{
+    if (!saved)
+        return instance_refuse(instance, "FMU state is NULL, expected one that was got from this FMU");
+    if (saved->zero != 0 || saved->magic != MAGIC || saved->size != sizeof *saved ||
+        saved->origin != hash(INSTANTIATION_TOKEN, strlen(INSTANTIATION_TOKEN)))
+        return instance_refuse(instance, "FMU state is not one of this FMU");
+    return STATUS_OK;
+}
+
+Status instance_save(Instance *instance, Saved **saved)
+{
+    if (*saved && check_block(instance, *saved) != STATUS_OK) /* one that exists is written again */
+        return STATUS_ERROR;
+    if (!*saved)
+        *saved = calloc(1, sizeof **saved);
+    if (!*saved)
+        return instance_refuse(instance, "no memory for an FMU state");
+
+    Saved *s = *saved;
+    s->magic = MAGIC;
+    s->size = sizeof *s;
+    s->origin = hash(INSTANTIATION_TOKEN, strlen(INSTANTIATION_TOKEN));
+    s->interface = (int32_t)instance->interface;
+    s->mode = (int32_t)instance->mode;
+    s->unprepared = instance->unprepared;
+    memcpy(&s->model, &instance->model, sizeof s->model);
+    return STATUS_OK;
+}
+
+Status instance_restore(Instance *instance, const Saved *saved)
+{
+    if (check_block(instance, saved) != STATUS_OK)
+        return STATUS_ERROR;
+    if (saved->interface != (int32_t)instance->interface)
+        return instance_refuse(instance, "FMU state is of the other interface (co-simulation or model exchange)");
+    memcpy(&instance->model, &saved->model, sizeof instance->model);
+    instance->mode = (Mode)saved->mode;
+    instance->unprepared = saved->unprepared != 0;
+    instance->outdated = true;
+    return STATUS_OK;
+}
+
+Status instance_free_saved(Instance *instance, Saved **saved)
+{
+    if (!saved || !*saved)
+        return STATUS_OK;
+    if (check_block(instance, *saved) != STATUS_OK)
+        return STATUS_ERROR;
+    (*saved)->magic = 0;
+    free(*saved);
+    *saved = NULL;
+    return STATUS_OK;
+}
+
+Status instance_serialised_size(Instance *instance, const Saved *saved, size_t *size)
+{
+    if (check_block(instance, saved) != STATUS_OK)
+        return STATUS_ERROR;
+    *size = sizeof *saved;
+    return STATUS_OK;
+}
+
+Status instance_serialise(Instance *instance, const Saved *saved, unsigned char bytes[], size_t size)
+{
+    if (check_block(instance, saved) != STATUS_OK)
+        return STATUS_ERROR;
+    if (size < sizeof *saved)
+        return instance_refuse(instance, "serialising: %zu bytes given, %zu needed", size, sizeof *saved);
+    memcpy(bytes, saved, sizeof *saved);
+    const uint64_t sum = checksum(saved);
+    memcpy(bytes + offsetof(Saved, checksum), &sum, sizeof sum);
+    return STATUS_OK;
+}
+
+/* Whether what was read can be a state: every value a number and in its range, every clock one that runs forwards. */
+static Status check_content(const Instance *instance, const Saved *saved)
+{
+    const Model *m = &saved->model;
+    const double *numbers = m->held.samples;
+    const Variable *stray = variables_stray(m);
+    bool good = fabs(m->time) <= 1e9 && !isnan(m->stop_time);
+
+    if (stray)
+        return instance_refuse(instance, "serialised FMU state: %s is outside [%.9g, %.9g]", stray->name, stray->min,
+                               stray->max);
+    for (int i = 0; i < N_CLOCKS; i++) {
+        const Clock *clock = &m->held.clocks[i];
+        good = good && clock->period >= 0.0 && clock->period < 1e9 && fabs(clock->since) <= 1e9 &&
+               clock->ticks >= 0.0 && clock->ticks < 1e15 && clock->samples >= 0.0 && clock->samples < 1e15;
+    }
+    for (int i = 0; i < N_MEASURED; i++)
+        good = good && fabs(numbers[i]) < 1e15;
+    for (int i = 0; i < 3; i++)
+        good = good && fabs(m->held.drift.value[i]) < 1e6 && fabs(m->held.drift.slope[i]) < 1e9;
+    good = good && fabs(m->held.drift.since) <= 1e9;
+    const int32_t modes[] = {MODE_INSTANTIATED, MODE_INITIALISING, MODE_TERMINATED, MODE_STEPPING, MODE_EVENT, MODE_CONTINUOUS};
+    bool known = false; /* the last three belong to one interface each */
+    for (int i = 0; i < 6; i++)
+        known = known || (saved->mode == modes[i] && (i < 3 || (i == 3) == (saved->interface == CO_SIMULATION)));
+    good = good && known;
+    return good ? STATUS_OK : instance_refuse(instance, "serialised FMU state holds what no state can");
+}
+
+Status instance_deserialise(Instance *instance, const unsigned char bytes[], size_t size, Saved **saved)
+{
+    if (size != sizeof **saved)
+        return instance_refuse(instance, "serialised FMU state has %zu bytes, expected %zu", size, sizeof **saved);
+    Saved *s = malloc(sizeof *s);
+    if (!s)
+        return instance_refuse(instance, "no memory for an FMU state");
+    memcpy(s, bytes, sizeof *s);
+    Status status = check_block(instance, s);
+    if (status == STATUS_OK && s->checksum != checksum(s))
+        status = instance_refuse(instance, "serialised FMU state is damaged: its checksum does not fit");
+    if (status == STATUS_OK)
+        status = check_content(instance, s);
+    if (status != STATUS_OK) {
+        free(s);
+        return status;
+    }
+    s->checksum = 0;
+    s->unprepared = 1; /* constants are made anew from the parameters, not believed */
+    *saved = s;
+    return STATUS_OK;
+}

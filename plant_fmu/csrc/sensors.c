@@ -1,0 +1,54 @@
+/* What instruments on the vehicle tell: truth, bias, and noise at each sample. */
+#include "plant.h"
+
+#include <math.h>
+
+#include "linear.h"
+
+static const int SENSOR[N_MEASURED] = {DEPTH_SENSOR, DVL,     DVL,  DVL,  DVL,  IMU, IMU, IMU,
+                                       IMU,          IMU,     IMU,  COMPASS, USBL, USBL, USBL};
+static const int NOISE[N_MEASURED] = {
+    DEPTH_NOISE,        VELOCITY_NOISE,         VELOCITY_NOISE,         VELOCITY_NOISE,         ALTITUDE_NOISE,
+    ACCELERATION_NOISE, ACCELERATION_NOISE,     ACCELERATION_NOISE,     ANGULAR_VELOCITY_NOISE, ANGULAR_VELOCITY_NOISE,
+    ANGULAR_VELOCITY_NOISE, HEADING_NOISE,      POSITION_NOISE,         POSITION_NOISE,         POSITION_NOISE};
+
+static const double TURN = 6.283185307179586;
+
+int sensors_of_channel(int channel)
+{
+    return SENSOR[channel];
+}
+
+void sensors_measure(const Parameters *p, const double rigid[N_RIGID], const double rate[N_RIGID], double heading,
+                     double altitude, double measured[N_MEASURED])
+{
+    const double *nu = rigid + 7, *omega = rigid + 10;
+    double R[3][3], turning[3];
+
+    plant_rotation(rigid + 3, R);
+    cross(omega, nu, turning);
+    measured[MEASURED_DEPTH] = rigid[2];
+    measured[MEASURED_ALTITUDE] = altitude;
+    measured[MEASURED_HEADING] = heading;
+    for (int i = 0; i < 3; i++) {
+        measured[MEASURED_VELOCITY + i] = nu[i];
+        /* specific force: acceleration less gravity, v' + w x v - g R^T e3 */
+        measured[MEASURED_ACCELERATION + i] = rate[7 + i] + turning[i] - p->gravity * R[2][i];
+        measured[MEASURED_ANGULAR_VELOCITY + i] = omega[i];
+        measured[MEASURED_POSITION + i] = rigid[i];
+    }
+    for (int i = 0; i < N_MEASURED; i++)
+        measured[i] += p->bias[i];
+    measured[MEASURED_HEADING] = remainder(measured[MEASURED_HEADING], TURN);
+}
+
+void sensors_sample(const Parameters *p, int sensor, unsigned long long count, const double measured[N_MEASURED],
+                    double held[N_MEASURED])
+{
+    for (int i = 0; i < N_MEASURED; i++)
+        if (SENSOR[i] == sensor) {
+            const double deviation = p->noise[NOISE[i]];
+            held[i] = measured[i] + (deviation > 0.0 ? deviation * random_normal(p->seed, (unsigned)i, count) : 0.0);
+        }
+    held[MEASURED_HEADING] = remainder(held[MEASURED_HEADING], TURN);
+}

@@ -1,0 +1,269 @@
+/* Exact directional derivatives of the motion and of all outputs: plant.c and model.c, differentiated line by line. */
+#include <math.h>
+#include <string.h>
+
+#include "linear.h"
+#include "model.h"
+
+/* ---- attitude ---------------------------------------------------------------------------------------------- */
+
+/* The symmetric bilinear form B with R(e) = I + 2 B(e, e) / |e|^2. */
+static void bilinear(const double a[4], const double b[4], double B[3][3])
+{
+    const double inner = a[1] * b[1] + a[2] * b[2] + a[3] * b[3];
+
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++)
+            B[i][j] = 0.5 * (a[1 + i] * b[1 + j] + a[1 + j] * b[1 + i]) - (i == j ? inner : 0.0);
+    for (int i = 0; i < 3; i++) {
+        const int j = (i + 1) % 3, k = (i + 2) % 3;
+        const double turn = 0.5 * (a[0] * b[1 + i] + a[1 + i] * b[0]);
+        B[k][j] += turn;
+        B[j][k] -= turn;
+    }
+}
+
+static void rotation_tangent(const double e[4], const double de[4], double dR[3][3])
+{
+    const double square = e[0] * e[0] + dot3(e + 1, e + 1), inner = e[0] * de[0] + dot3(e + 1, de + 1);
+    double B[3][3], dB[3][3];
+
+    memset(dR, 0, 9 * sizeof(double));
+    if (!(square > 0.0))
+        return;
+    bilinear(e, e, B);
+    bilinear(e, de, dB);
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++)
+            dR[i][j] = 4.0 / square * (dB[i][j] - inner / square * B[i][j]);
+}
+
+static void euler_tangent(const double R[3][3], const double dR[3][3], double deuler[3])
+{
+    const double square = R[2][1] * R[2][1] + R[2][2] * R[2][2], cosine = sqrt(square);
+    const int upright = cosine > UPRIGHT;
+    const double dcosine = upright ? (R[2][1] * dR[2][1] + R[2][2] * dR[2][2]) / cosine : 0.0;
+
+    deuler[0] = upright ? (R[2][2] * dR[2][1] - R[2][1] * dR[2][2]) / square : 0.0;
+    deuler[1] = R[2][0] * dcosine - cosine * dR[2][0];
+    if (upright)
+        deuler[2] = (R[0][0] * dR[1][0] - R[1][0] * dR[0][0]) / (R[0][0] * R[0][0] + R[1][0] * R[1][0]);
+    else
+        deuler[2] = (R[0][1] * dR[1][1] - R[1][1] * dR[0][1]) / (R[0][1] * R[0][1] + R[1][1] * R[1][1]);
+}
+
+/* ---- rigid body -------------------------------------------------------------------------------------------- */
+
+/* Tangent of the momentum M_RB v: a = m (v + w x r_G), b = m r_G x v + I_b w. */
+static void momentum_tangent(const Parameters *p, const Parameters *dp, const double nu[6], const double dnu[6],
+                             double da[3], double db[3])
+{
+    const double *v = nu, *w = nu + 3, *dv = dnu, *dw = dnu + 3, *I = p->inertia, *dI = dp->inertia;
+    double wr[3], dwr[3], wdr[3], rv[3], drv[3], rdv[3];
+
+    cross(w, p->r_G, wr);
+    cross(dw, p->r_G, dwr);
+    cross(w, dp->r_G, wdr);
+    cross(p->r_G, v, rv);
+    cross(dp->r_G, v, drv);
+    cross(p->r_G, dv, rdv);
+    for (int i = 0; i < 3; i++) {
+        da[i] = dp->mass * (v[i] + wr[i]) + p->mass * (dv[i] + dwr[i] + wdr[i]);
+        db[i] = dp->mass * rv[i] + p->mass * (drv[i] + rdv[i]);
+    }
+    db[0] += dI[0] * w[0] + dI[3] * w[1] + dI[4] * w[2] + I[0] * dw[0] + I[3] * dw[1] + I[4] * dw[2];
+    db[1] += dI[3] * w[0] + dI[1] * w[1] + dI[5] * w[2] + I[3] * dw[0] + I[1] * dw[1] + I[5] * dw[2];
+    db[2] += dI[4] * w[0] + dI[5] * w[1] + dI[2] * w[2] + I[4] * dw[0] + I[5] * dw[1] + I[2] * dw[2];
+}
+
+/* Tangent of -C(v) v with the momenta a and b: subtract_coriolis of plant.c. */
+static void subtract_coriolis_tangent(const double a[3], const double da[3], const double b[3], const double db[3],
+                                      const double nu[6], const double dnu[6], double dwrench[6])
+{
+    const double *terms[3][4] = {/* force: w x a; moment: v x a and w x b */
+                                 {nu + 3, a, dnu + 3, da}, {nu, a, dnu, da}, {nu + 3, b, dnu + 3, db}};
+
+    for (int i = 0; i < 3; i++) {
+        double left[3], right[3];
+        cross(terms[i][2], terms[i][1], left);
+        cross(terms[i][0], terms[i][3], right);
+        for (int j = 0; j < 3; j++)
+            dwrench[(i ? 3 : 0) + j] -= left[j] + right[j];
+    }
+}
+
+static void symmetric(const double upper[6][6], double whole[6][6])
+{
+    for (int i = 0; i < 6; i++)
+        for (int j = 0; j < 6; j++)
+            whole[i][j] = i < j ? upper[i][j] : upper[j][i];
+}
+
+/* Tangent of the mass matrix: column by column what momentum_tangent says of a motion that stays. */
+static void mass_matrix_tangent(const Parameters *p, const Parameters *dp, double dM[6][6])
+{
+    static const double still[6] = {0.0};
+
+    symmetric(dp->added_mass, dM);
+    for (int j = 0; j < 6; j++) {
+        double unit[6] = {0.0}, column[6];
+        unit[j] = 1.0;
+        momentum_tangent(p, dp, unit, still, column, column + 3);
+        for (int i = 0; i < 6; i++)
+            dM[i][j] += column[i];
+    }
+}
+
+/* Of plant_derivative, whose result `rate` is known. */
+static void derivative_tangent(const Model *m, const Model *seed, const double rate[N_RIGID], const double dtau[6],
+                               double R[3][3], double dR[3][3], double dwater[3], double drate[N_RIGID])
+{
+    const Parameters *p = &m->plant.parameters, *dp = &seed->plant.parameters;
+    const double *x = m->state.rigid, *e = x + 3, *nu = x + 7, *omega = x + 10;
+    const double *dx = seed->state.rigid, *de = dx + 3, *dnu = dx + 7, *domega = dx + 10;
+    const Drift *drift = &m->held.drift;
+    const double still[6] = {0.0};
+    double left[4], right[4], dwrench[6], dadded_mass[6][6];
+
+    plant_rotation(e, R);
+    rotation_tangent(e, de, dR);
+    for (int i = 0; i < 3; i++)
+        drate[i] = dot3(dR[i], nu) + dot3(R[i], dnu);
+    quaternion_rate(de, omega, left);
+    quaternion_rate(e, domega, right);
+    for (int i = 0; i < 4; i++)
+        drate[3 + i] = left[i] + right[i];
+
+    /* motion through the water */
+    const double below = fmax(x[2], 0.0), under = x[2] > 0.0 ? 1.0 : 0.0;
+    double water[3], current[3], dcurrent[3], nu_r[6], dnu_r[6], nu_c_rate[6] = {0.0}, dnu_c_rate[6] = {0.0};
+    environment_current(p, drift, m->time, x[2], water);
+    for (int i = 0; i < 3; i++)
+        dwater[i] = dp->current[i] + dp->current_shear[i] * below + p->current_shear[i] * under * dx[2] +
+                    drift->slope[i] * seed->time;
+    for (int i = 0; i < 3; i++) {
+        current[i] = dcurrent[i] = 0.0;
+        for (int j = 0; j < 3; j++) {
+            const double water_rate = drift->slope[j] + p->current_shear[j] * under * rate[2];
+            const double dwater_rate = under * (dp->current_shear[j] * rate[2] + p->current_shear[j] * drate[2]);
+            current[i] += R[j][i] * water[j];
+            dcurrent[i] += dR[j][i] * water[j] + R[j][i] * dwater[j];
+            nu_c_rate[i] += R[j][i] * water_rate;
+            dnu_c_rate[i] += dR[j][i] * water_rate + R[j][i] * dwater_rate;
+        }
+    }
+    cross(omega, current, left);
+    for (int i = 0; i < 3; i++)
+        nu_c_rate[i] -= left[i];
+    cross(domega, current, left);
+    cross(omega, dcurrent, right);
+    for (int i = 0; i < 6; i++) {
+        nu_r[i] = nu[i] - (i < 3 ? current[i] : 0.0);
+        dnu_r[i] = dnu[i] - (i < 3 ? dcurrent[i] : 0.0);
+        dnu_c_rate[i] -= i < 3 ? left[i] + right[i] : 0.0;
+    }
+
+    memcpy(dwrench, dtau, sizeof dwrench);
+
+    /* momenta of the body and of the water; M_RB nu itself is linear in nu, so its own tangent gives it */
+    double a[6], da[6], added[6], dadded[6], term[6];
+    const Parameters nothing = {0};
+    momentum_tangent(p, &nothing, still, nu, a, a + 3);
+    momentum_tangent(p, dp, nu, dnu, da, da + 3);
+    subtract_coriolis_tangent(a, da, a + 3, da + 3, nu, dnu, dwrench);
+
+    symmetric(dp->added_mass, dadded_mass);
+    multiply6(p->added_mass, nu_r, added);
+    multiply6(p->added_mass, dnu_r, dadded);
+    multiply6((const double(*)[6])dadded_mass, nu_r, term);
+    for (int i = 0; i < 6; i++)
+        dadded[i] += term[i];
+    subtract_coriolis_tangent(added, dadded, added + 3, dadded + 3, nu_r, dnu_r, dwrench);
+
+    multiply6(p->added_mass, dnu_c_rate, term);
+    for (int i = 0; i < 6; i++)
+        dwrench[i] += term[i];
+    multiply6((const double(*)[6])dadded_mass, nu_c_rate, term);
+    for (int i = 0; i < 6; i++)
+        dwrench[i] += term[i] - (dp->linear_damping[i] + dp->quadratic_damping[i] * fabs(nu_r[i])) * nu_r[i] -
+                      (p->linear_damping[i] + 2.0 * p->quadratic_damping[i] * fabs(nu_r[i])) * dnu_r[i];
+
+    /* restoring */
+    const double submerged = environment_submerged(p, x[2]), buoyancy = p->buoyancy * submerged;
+    const double dbuoyancy =
+        dp->buoyancy * submerged + p->buoyancy * environment_submerged_tangent(p, dp, x[2], dx[2]);
+    double lever[3], dlever[3];
+    for (int i = 0; i < 3; i++) {
+        lever[i] = p->r_G[i] * p->weight - p->r_B[i] * buoyancy;
+        dlever[i] = dp->r_G[i] * p->weight + p->r_G[i] * dp->weight - dp->r_B[i] * buoyancy - p->r_B[i] * dbuoyancy;
+    }
+    cross(dlever, R[2], left);
+    cross(lever, dR[2], right);
+    for (int i = 0; i < 3; i++) {
+        dwrench[i] += (dp->weight - dbuoyancy) * R[2][i] + (p->weight - buoyancy) * dR[2][i];
+        dwrench[3 + i] += left[i] + right[i];
+    }
+
+    double contact[3], dcontact[3];
+    if (environment_contact(&m->plant, x[2], rate, contact)) {
+        double dM[6][6];
+        mass_matrix_tangent(p, dp, dM);
+        environment_contact_tangent(&m->plant, dp, (const double(*)[6])dM, x[2], dx[2], rate, drate, dcontact);
+        for (int i = 0; i < 3; i++)
+            for (int j = 0; j < 3; j++)
+                dwrench[i] += dR[j][i] * contact[j] + R[j][i] * dcontact[j];
+    }
+
+    /* M nu' = wrench */
+    momentum_tangent(p, dp, rate + 7, still, da, da + 3);
+    multiply6((const double(*)[6])dadded_mass, rate + 7, term);
+    for (int i = 0; i < 6; i++)
+        dwrench[i] -= da[i] + term[i];
+    multiply6(m->plant.derived.mass_inverse, dwrench, drate + 7);
+}
+
+/* ---- all outputs ------------------------------------------------------------------------------------------- */
+
+static void measured_tangent(const Model *m, const Model *seed, const double R[3][3], const double dR[3][3],
+                             const Outputs *d, double dmeasured[N_MEASURED])
+{
+    const Parameters *p = &m->plant.parameters, *dp = &seed->plant.parameters;
+    const double *nu = m->state.rigid + 7, *omega = m->state.rigid + 10;
+    const double *dx = seed->state.rigid, *dnu = dx + 7, *domega = dx + 10;
+    double left[3], right[3];
+
+    cross(domega, nu, left);
+    cross(omega, dnu, right);
+    dmeasured[MEASURED_DEPTH] = dx[2];
+    dmeasured[MEASURED_ALTITUDE] = d->altitude;
+    dmeasured[MEASURED_HEADING] = d->euler[2];
+    for (int i = 0; i < 3; i++) {
+        dmeasured[MEASURED_VELOCITY + i] = dnu[i];
+        dmeasured[MEASURED_ACCELERATION + i] =
+            d->rate.rigid[7 + i] + left[i] + right[i] - dp->gravity * R[2][i] - p->gravity * dR[2][i];
+        dmeasured[MEASURED_ANGULAR_VELOCITY + i] = domega[i];
+        dmeasured[MEASURED_POSITION + i] = dx[i];
+    }
+    for (int i = 0; i < N_MEASURED; i++) {
+        const int held = m->held.clocks[sensors_of_channel(i)].period > 0.0; /* until the next tick */
+        dmeasured[i] = held ? 0.0 : dmeasured[i] + dp->bias[i];
+    }
+}
+
+void model_tangent(const Model *m, const Model *seed, Model *tangent)
+{
+    const Parameters *p = &m->plant.parameters, *dp = &seed->plant.parameters;
+    Outputs *d = &tangent->outputs;
+    Actuators dforce;
+    double dtau[6], R[3][3], dR[3][3];
+
+    tangent->state = seed->state;
+    actuators_tangent(p, dp, &m->inputs, &seed->inputs, &m->state.actuators, &seed->state.actuators,
+                      &d->rate.actuators, &dforce, dtau);
+    memcpy(d->thrust, dforce.thrust, sizeof d->thrust);
+    memcpy(d->wrench, dtau, sizeof d->wrench);
+    derivative_tangent(m, seed, m->outputs.rate.rigid, dtau, R, dR, d->water, d->rate.rigid);
+    euler_tangent((const double(*)[3])R, (const double(*)[3])dR, d->euler);
+    d->altitude = dp->bottom_depth - seed->state.rigid[2];
+    measured_tangent(m, seed, (const double(*)[3])R, (const double(*)[3])dR, d, d->measured);
+}

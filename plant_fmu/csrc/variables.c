@@ -1,0 +1,150 @@
+/* The table of variables, and what may be read and written when. */
+#include <math.h>
+#include <stddef.h>
+#include <string.h>
+
+#include "instance.h"
+
+#define AT(member) offsetof(Model, member)
+
+const Variable VARIABLES[] = {VEHICLE_VARIABLES};
+const unsigned N_VARIABLES = sizeof VARIABLES / sizeof VARIABLES[0];
+
+static const char *const TYPE_NAMES[] = {"real", "Integer", "Boolean"};
+
+double *variable_real(Model *model, const Variable *variable)
+{
+    return (double *)((char *)model + variable->offset);
+}
+
+int *variable_integer(Model *model, const Variable *variable)
+{
+    return (int *)((char *)model + variable->offset);
+}
+
+void variables_start(Model *model)
+{
+    memset(model, 0, sizeof *model);
+    for (unsigned i = 0; i < N_VARIABLES; i++) {
+        const Variable *v = &VARIABLES[i];
+        if (v->role == OUTPUT)
+            continue;
+        if (v->type == TYPE_REAL)
+            *variable_real(model, v) = v->start;
+        else
+            *variable_integer(model, v) = (int)v->start;
+    }
+}
+
+/* ---- reading ----------------------------------------------------------------------------------------------- */
+
+/* Whether a reference is of that type. */
+static Status check_reference(const Instance *instance, Type type, unsigned reference)
+{
+    if (reference < N_VARIABLES && VARIABLES[reference].type == type)
+        return STATUS_OK;
+    return instance_refuse(instance, "value reference %u is no %s variable", reference, TYPE_NAMES[type]);
+}
+
+Status instance_get_reals(Instance *instance, const unsigned references[], size_t n, double values[])
+{
+    for (size_t i = 0; i < n; i++) {
+        if (references[i] >= N_VARIABLES || VARIABLES[references[i]].type != TYPE_REAL)
+            return check_reference(instance, TYPE_REAL, references[i]);
+        const Variable *v = &VARIABLES[references[i]];
+        if (instance->outdated && v->role == OUTPUT && instance_update(instance) != STATUS_OK)
+            return STATUS_ERROR;
+        values[i] = *variable_real(&instance->model, v);
+    }
+    return STATUS_OK;
+}
+
+Status instance_get_integer(Instance *instance, Type type, unsigned reference, int *value)
+{
+    if (check_reference(instance, type, reference) != STATUS_OK)
+        return STATUS_ERROR;
+    const Variable *v = &VARIABLES[reference];
+    if (v->role == OUTPUT && instance_update(instance) != STATUS_OK)
+        return STATUS_ERROR;
+    *value = *variable_integer(&instance->model, v);
+    return STATUS_OK;
+}
+
+/* ---- writing ----------------------------------------------------------------------------------------------- */
+
+static unsigned modes_to_set(Role role)
+{
+    const unsigned start = MODE_INSTANTIATED | MODE_INITIALISING;
+
+    return role == STATE ? start : start | MODE_STEPPING | MODE_EVENT | (role == INPUT ? MODE_CONTINUOUS : 0u);
+}
+
+static Status check_value(const Instance *instance, Type type, unsigned reference, double value)
+{
+    if (check_reference(instance, type, reference) != STATUS_OK)
+        return STATUS_ERROR;
+
+    const Variable *v = &VARIABLES[reference];
+    if (v->role == OUTPUT || v->role == TIME)
+        return instance_refuse(instance, "%s: is calculated and cannot be set", v->name);
+    if (!(modes_to_set(v->role) & (unsigned)instance->mode))
+        return instance_require(instance, modes_to_set(v->role), v->name);
+    if (!isfinite(value))
+        return instance_refuse(instance, "%s = %g refused: not a finite number", v->name, value);
+    if (value < v->min || value > v->max)
+        return instance_refuse(instance, "%s = %.9g refused: outside [%.9g, %.9g]", v->name, value, v->min, v->max);
+    return STATUS_OK;
+}
+
+static void note_change(Instance *instance, const Variable *v)
+{
+    instance->unprepared |= v->role == PARAMETER;
+    instance->outdated = true;
+}
+
+Status instance_set_reals(Instance *instance, const unsigned references[], size_t n, const double values[])
+{
+    for (size_t i = 0; i < n; i++) /* all or none */
+        if (check_value(instance, TYPE_REAL, references[i], values[i]) != STATUS_OK)
+            return STATUS_ERROR;
+    for (size_t i = 0; i < n; i++) {
+        *variable_real(&instance->model, &VARIABLES[references[i]]) = values[i];
+        note_change(instance, &VARIABLES[references[i]]);
+    }
+    return STATUS_OK;
+}
+
+Status instance_set_integer(Instance *instance, Type type, unsigned reference, int value)
+{
+    if (check_value(instance, type, reference, value) != STATUS_OK)
+        return STATUS_ERROR;
+    *variable_integer(&instance->model, &VARIABLES[reference]) = value;
+    note_change(instance, &VARIABLES[reference]);
+    return STATUS_OK;
+}
+
+/* ---- ranges ------------------------------------------------------------------------------------------------ */
+
+static bool strays(const Model *model, const Variable *v)
+{
+    const void *at = (const char *)model + v->offset;
+    const double value = v->type == TYPE_REAL ? *(const double *)at : *(const int *)at;
+
+    return !(value >= v->min && value <= v->max);
+}
+
+const Variable *variables_stray(const Model *model)
+{
+    for (unsigned i = 0; i < N_VARIABLES; i++)
+        if (VARIABLES[i].role != OUTPUT && VARIABLES[i].role != TIME && strays(model, &VARIABLES[i]))
+            return &VARIABLES[i];
+    return NULL;
+}
+
+const Variable *variables_stray_state(const Model *model)
+{
+    for (unsigned i = 0; i < N_STATES; i++)
+        if (strays(model, &VARIABLES[FIRST_STATE + i]))
+            return &VARIABLES[FIRST_STATE + i];
+    return NULL;
+}

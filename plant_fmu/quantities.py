@@ -1,0 +1,100 @@
+"""Units, and the domains in which the plant is meant to be used."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+# unit: exponents of kg, m, s, rad
+UNITS: dict[str, dict[str, int]] = {
+    "s": {"s": 1},
+    "Hz": {"s": -1},
+    "1/s": {"s": -1},
+    "m": {"m": 1},
+    "m/s": {"m": 1, "s": -1},
+    "m/s2": {"m": 1, "s": -2},
+    "rad": {"rad": 1},
+    "rad/s": {"rad": 1, "s": -1},
+    "rad/s2": {"rad": 1, "s": -2},
+    "kg": {"kg": 1},
+    "kg.m": {"kg": 1, "m": 1},
+    "kg.m2": {"kg": 1, "m": 2},
+    "N": {"kg": 1, "m": 1, "s": -2},
+    "N/s": {"kg": 1, "m": 1, "s": -3},
+    "N.m": {"kg": 1, "m": 2, "s": -2},
+    "N.m/s": {"kg": 1, "m": 2, "s": -3},
+    "N.m/N": {"m": 1},
+    "N.s/m": {"kg": 1, "s": -1},
+    "N.m.s/rad": {"kg": 1, "m": 2, "s": -1, "rad": -1},
+    "N.s2/m2": {"kg": 1, "m": -1},
+    "N.m.s2/rad2": {"kg": 1, "m": 2, "rad": -2},
+}
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """What a number measures, and the domain in which the plant is meant to be used; values beyond it are refused."""
+
+    unit: str  # a key of UNITS, or "" for a pure number
+    minimum: float
+    maximum: float
+    nominal: float = 1.0
+
+    @property
+    def bounded(self) -> bool:
+        """Whether the domain says anything."""
+        return self.minimum < self.maximum < _ALL
+
+
+_ALL = 1e300  # any number
+
+TIME = Quantity("s", 0.0, 0.0)
+LENGTH = Quantity("m", -1e6, 1e6)
+QUATERNION = Quantity("", -2.0, 2.0)  # wider than a unit quaternion, for what integrators try
+SPEED = Quantity("m/s", -1e4, 1e4)
+ANGULAR_SPEED = Quantity("rad/s", -1e4, 1e4)
+HALF_TURN = Quantity("rad", -3.1416, 3.1416)
+QUARTER_TURN = Quantity("rad", -1.5708, 1.5708)
+FORCE = Quantity("N", -1e9, 1e9, 10.0)  # far above any vehicle
+MOMENT = Quantity("N.m", -1e9, 1e9, 10.0)
+ALL_FORCES = Quantity("N", -1e12, 1e12, 10.0)
+ALL_MOMENTS = Quantity("N.m", -1e12, 1e12, 10.0)
+FLAG = Quantity("", 0.0, 1.0)
+SEED = Quantity("", 0.0, 2.0**31 - 1.0)
+
+MASS = Quantity("kg", 1e-3, 1e9)
+LEVER = Quantity("m", -1e3, 1e3)
+WEIGHT = Quantity("N", 0.0, 1e10)
+CURRENT = Quantity("m/s", -100.0, 100.0)
+SHEAR = Quantity("1/s", -10.0, 10.0)
+CURRENT_DEVIATION = Quantity("m/s", 0.0, 100.0)
+LONG_TIME = Quantity("s", 1e-3, 1e6)
+RADIUS = Quantity("m", 0.0, 1e3)
+FRACTION = Quantity("", 0.0, 1.0)
+DEAD_BAND = Quantity("", 0.0, 0.99)
+FRICTION = Quantity("", 0.0, 10.0)
+GRAVITY = Quantity("m/s2", 0.0, 100.0)
+TIME_CONSTANT = Quantity("s", 0.0, 1e3)
+FORCE_RATE = Quantity("N/s", 0.0, 1e9)
+SAMPLE_RATE = Quantity("Hz", 0.0, 1e4)
+SUBSTEP = Quantity("s", 1e-6, 1.0)
+FORCE_LIMIT = Quantity("N", 0.0, 1e10)  # its maximum is above the norm of any force: no limit
+
+
+def unbounded(unit: str, nominal: float = 1.0) -> Quantity:
+    """Return a calculated quantity whose range says nothing."""
+    return Quantity(unit, -_ALL, _ALL, nominal)
+
+
+def inertial(unit: str, diagonal: bool) -> Quantity:
+    """Return an element of an inertia or added-mass matrix."""
+    return Quantity(unit, 0.0 if diagonal else -1e12, 1e12)
+
+
+def deviation(unit: str) -> Quantity:
+    """Return a standard deviation."""
+    return Quantity(unit, 0.0, 1e6)
+
+
+def bias(unit: str) -> Quantity:
+    """Return an offset of an instrument."""
+    return Quantity(unit, -1e6, 1e6)
