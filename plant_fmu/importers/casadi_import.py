@@ -7,6 +7,7 @@ from pathlib import Path
 import casadi
 import fmpy
 import numpy as np
+from numpy.typing import NDArray
 
 from plant_fmu.errors import ImporterError
 from plant_fmu.importers.fmu_file import FmuFile
@@ -19,13 +20,14 @@ _MAX_STEPS = 10**6
 def run(fmu: FmuFile, task: Task, folder: Path) -> Answer:
     """Simulate to the stop time; take the Jacobian of the states' derivatives at the start."""
     model = casadi.DaeBuilder("fmu", str(fmpy.extract(fmu.path, folder)), {})
-    states, inputs, outputs = model.x(), model.u(), model.y()
+    outputs = [v.name for v in fmu.of("output")]
+    model.set_all("y", outputs)  # without the Boolean ones, which CasADi would read as numbers
+    states, inputs = model.x(), model.u()
     # parameters become constants of the functions; what a function is given as an argument is given here too
     for name, value in task.start.items():
         if name not in states and name not in inputs:
             model.set(name, value)
-    x0 = np.array([task.start.get(name, model.start(name)) for name in states], dtype=float)
-    u0 = np.array([task.start.get(name, model.start(name)) for name in inputs], dtype=float)
+    x0, u0 = (_start(model, names, task) for names in (states, inputs))
     if not np.isfinite(x0).all():
         raise ImporterError(f"no start value of {states[int(np.argmin(np.isfinite(x0)))]} in the model description")
 
@@ -45,3 +47,8 @@ def run(fmu: FmuFile, task: Task, folder: Path) -> Answer:
     values = dict(zip(outputs, y.tolist(), strict=True))
     how = "from directional derivatives" if model.provides_directional_derivatives() else "by finite differences"
     return Answer(values, jacobian, f"Jacobian {how}")
+
+
+def _start(model: casadi.DaeBuilder, names: list[str], task: Task) -> NDArray[np.float64]:
+    given = zip(names, model.start(names), strict=True)
+    return np.array([task.start.get(name, value) for name, value in given], dtype=float)
