@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
@@ -22,7 +23,6 @@ class Verdict:
 
     result: Result
     difference: float | None = None  # in the output's unit; None where there is nothing to compare
-    output: str = ""  # which one
 
 
 def check_fmu(
@@ -75,9 +75,11 @@ def _compare(result: Result, reference: Result) -> Verdict:
     if result is reference or not (result.values and reference.values):
         return Verdict(result)
     differences = {name: abs(value - reference.values[name]) for name, value in result.values.items()}
-    scaled = {name: d / max(1.0, abs(reference.values[name])) for name, d in differences.items()}
-    # written so that a NaN is far off, and is the greatest
-    worst = max(differences, key=lambda name: differences[name] if differences[name] >= 0.0 else float("inf"))
-    if result.interface == "CS" and not all(d <= CS_TOLERANCE for d in scaled.values()):
-        result = replace(result, status="failed", note=f"differs from FMPy: {worst}")
-    return Verdict(result, differences[worst], worst)
+    # a NaN is no difference at all to a comparison, and the greatest to a reader
+    found = {name: difference if difference >= 0.0 else math.inf for name, difference in differences.items()}
+    scaled = {name: difference / max(1.0, abs(reference.values[name])) for name, difference in found.items()}
+    furthest = max(scaled, key=scaled.__getitem__)
+    if result.interface == "CS" and not scaled[furthest] <= CS_TOLERANCE:
+        note = f"{furthest} ends at {result.values[furthest]!r}, but at {reference.values[furthest]!r} in {REFERENCE}"
+        result = replace(result, status="failed", note=note)
+    return Verdict(result, max(found.values()))

@@ -19,8 +19,8 @@ DESCRIPTION = '<fmiModelDescription fmiVersion="3.0"><ModelVariables/></fmiModel
 
 
 @pytest.fixture
-def odin(fmi):
-    return cached_fmu(load_vehicle("odin"), fmi)
+def odin():
+    return cached_fmu(load_vehicle("odin"), 3)
 
 
 def write(path, **members):
@@ -49,7 +49,8 @@ def refused(path, capsys, *words):
         assert word in captured.err
 
 
-def test_check_passes_and_prints_a_table(odin, capsys):
+def test_check_passes_and_prints_a_table(fmi, capsys):
+    odin = cached_fmu(load_vehicle("odin"), fmi)
     assert main(["check", str(odin), "--stop-time", "0.5", "--set", "wrench.X=5", "--set", "wrench.N=0.1"]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert lines[0].split() == ["importer", "version", "type", "verdict", "difference", "note"]
@@ -84,8 +85,8 @@ def test_an_importer_that_ends_elsewhere_fails(monkeypatch, odin):
     monkeypatch.setattr("plant_fmu.check.run_importer", pretend)
     verdicts = {verdict.result.importer: verdict for verdict in check_fmu(odin, 0.1)}
     assert verdicts["Ecos"].result.status == "failed"
-    assert verdicts["Ecos"].difference == pytest.approx(1e-6)
-    assert "differs from FMPy" in verdicts["Ecos"].result.note
+    assert verdicts["Ecos"].difference == pytest.approx(1e-6, rel=1e-3)
+    assert "ends at" in verdicts["Ecos"].result.note
     assert verdicts["libcosim"].result.status == "ok"
 
 
