@@ -132,8 +132,8 @@ _WRENCH = ("wrench.X", "wrench.Y", "wrench.Z", "wrench_force_limit", "wrench_tim
 _WATER = ("time", "position.z", "current*", "seed")
 _BOTTOM = ("position.z", "bottom_depth")
 _MOTION = (
-    "time", "position.z", "quaternion.*", "velocity.*", "actuator.*", "thrust*", "wrench*", "mass", "inertia.*", "r_G.*",
-    "r_B.*", "weight", "buoyancy", "added_mass*", "linear_damping*", "quadratic_damping*", "current*", "seed",
+    "time", "position.z", "quaternion.*", "velocity.*", "actuator.*", "thrust*", "wrench*", "mass", "inertia.*",
+    "r_G.*", "r_B.*", "weight", "buoyancy", "added_mass*", "linear_damping*", "quadratic_damping*", "current*", "seed",
     "free_surface", "hull_radius", "bottom_*", "substep",
 )  # fmt: skip
 

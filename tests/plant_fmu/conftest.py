@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+import ctypes
 import shutil
 
 import numpy as np
 import pytest
 from fmpy import extract, read_model_description
-from fmpy.fmi2 import FMU2Slave, fmi2CallbackFunctions, fmi2CallbackLoggerTYPE
+from fmpy.fmi2 import FMU2Model, FMU2Slave, fmi2CallbackFunctions, fmi2CallbackLoggerTYPE
 from fmpy.fmi2 import defaultCallbacks as defaults
-from fmpy.fmi3 import FMU3Slave
+from fmpy.fmi3 import FMU3Model, FMU3Slave
 
 from plant_fmu import cached_fmu, load_vehicle
 
@@ -21,21 +22,23 @@ STATES = [
 WRENCH = [f"wrench.{a}" for a in "XYZKMN"]
 
 
-class Slave:
-    """A co-simulation instance with variables by name; `said` collects what the FMU logs."""
+KINDS = {(2, "cs"): FMU2Slave, (3, "cs"): FMU3Slave, (2, "me"): FMU2Model, (3, "me"): FMU3Model}
 
-    def __init__(self, path, instance_name="test"):
+
+class Slave:
+    """An instance with variables by name; `said` collects what the FMU logs."""
+
+    def __init__(self, path, interface="cs", logging_on=False):
         self.folder = extract(str(path))
         self.description = read_model_description(self.folder)
         self.by_name = {v.name: v for v in self.description.modelVariables}
         self.fmi = int(self.description.fmiVersion[0])
         self.said = []
-        kind = FMU2Slave if self.fmi == 2 else FMU3Slave
-        self.fmu = kind(
+        self.fmu = KINDS[self.fmi, interface](
             guid=self.description.guid,
             unzipDirectory=self.folder,
             modelIdentifier=self.description.coSimulation.modelIdentifier,
-            instanceName=instance_name,
+            instanceName="test",
         )
         if self.fmi == 2:
             callbacks = fmi2CallbackFunctions()
@@ -43,9 +46,12 @@ class Slave:
                 lambda env, name, status, category, text: self.said.append((status, text.decode()))
             )
             callbacks.allocateMemory, callbacks.freeMemory = defaults.allocateMemory, defaults.freeMemory
-            self.fmu.instantiate(callbacks=callbacks)
+            self.fmu.instantiate(callbacks=callbacks, loggingOn=logging_on)
         else:
-            self.fmu.instantiate(logMessage=lambda env, status, cat, text: self.said.append((status, text.decode())))
+            self.fmu.instantiate(
+                logMessage=lambda env, status, category, text: self.said.append((status, text.decode())),
+                loggingOn=logging_on,
+            )
         self.time = 0.0
 
     def set(self, **values):
@@ -97,6 +103,50 @@ class Slave:
         self.fmu.doStep(self.time, h)
         self.time += h
 
+    # ---- FMU state ----
+
+    def save(self):
+        return self.fmu.getFMUState() if self.fmi == 3 else self.fmu.getFMUstate()
+
+    def restore(self, state):
+        (self.fmu.setFMUState if self.fmi == 3 else self.fmu.setFMUstate)(state)
+
+    def free(self, state):
+        (self.fmu.freeFMUState if self.fmi == 3 else self.fmu.freeFMUstate)(state)
+
+    def serialise(self, state):
+        return bytes(self.fmu.serializeFMUState(state) if self.fmi == 3 else self.fmu.serializeFMUstate(state))
+
+    def deserialise(self, data):
+        return self.fmu.deserializeFMUState(data) if self.fmi == 3 else self.fmu.deSerializeFMUstate(data)
+
+    # ---- model exchange ----
+
+    def update_discrete(self):
+        """Return whether states changed, and the time of the next event or None."""
+        if self.fmi == 2:
+            _, _, _, changed, defined, time = self.fmu.newDiscreteStates()
+        else:
+            _, _, _, changed, defined, time = self.fmu.updateDiscreteStates()
+        return bool(changed), time if defined else None
+
+    def states(self):
+        x = np.zeros(len(self.description.derivatives))
+        pointer = x.ctypes.data_as(ctypes.POINTER(ctypes.c_double))
+        self.fmu.getContinuousStates(pointer, x.size)
+        return x
+
+    def put_states(self, x):
+        x = np.ascontiguousarray(x, dtype=float)
+        self.fmu.setContinuousStates(x.ctypes.data_as(ctypes.POINTER(ctypes.c_double)), x.size)
+
+    def rates(self, n=None):
+        x = np.zeros(n or len(self.description.derivatives))
+        pointer = x.ctypes.data_as(ctypes.POINTER(ctypes.c_double))
+        get = self.fmu.getDerivatives if self.fmi == 2 else self.fmu.getContinuousStateDerivatives
+        get(pointer, x.size)
+        return x
+
     def close(self):
         self.fmu.freeInstance()
         shutil.rmtree(self.folder)
@@ -112,8 +162,8 @@ def make_slave():
     """Return a function that makes slaves, closed when the test ends."""
     slaves = []
 
-    def make(vehicle="odin", fmi=3):
-        slaves.append(Slave(cached_fmu(load_vehicle(vehicle), fmi)))
+    def make(vehicle="odin", fmi=3, **more):
+        slaves.append(Slave(cached_fmu(load_vehicle(vehicle), fmi), **more))
         return slaves[-1]
 
     yield make

@@ -186,9 +186,46 @@ def test_both_versions_give_the_same_bits(make_slave):
 
 def test_instances_do_not_disturb_each_other():
     path = cached_fmu(load_vehicle("odin"), 3)
-    slaves = [Slave(path, f"vehicle {i}").start(**{"position.z": float(i)}) for i in range(3)]
+    slaves = [Slave(path).start(**{"position.z": float(i)}) for i in range(3)]
     for slave in slaves:
         slave.step(0.1)
     assert [round(slave.get("position.z")[0]) for slave in slaves] == [0, 1, 2]
     for slave in slaves:
         slave.close()
+
+
+# ---- logging ----
+
+
+def test_categories_are_logged_when_asked_for(make_slave, fmi):
+    """Errors always; the rest when logging is on, or its category."""
+    quiet, loud = make_slave(fmi=fmi), make_slave(fmi=fmi, logging_on=True)
+    for slave in (quiet, loud):
+        slave.start(**{"quaternion.e0": 0.5})
+    assert quiet.said == []
+    assert [text for _, text in loud.said] == [
+        "quaternion of length 0.5 made a unit quaternion",
+        "initialised at t = 0 s",
+    ]
+    assert [status for status, _ in loud.said] == [1, 0]
+
+
+def test_one_category_is_switched_on_alone(make_slave, fmi):
+    slave = make_slave(fmi=fmi)
+    slave.fmu.setDebugLogging(True, ["logEvents"])
+    slave.start(**{"quaternion.e0": 0.5})
+    assert [text for _, text in slave.said] == ["initialised at t = 0 s"]
+
+
+def test_an_unknown_category_is_refused(make_slave, fmi):
+    slave = make_slave(fmi=fmi)
+    refused(
+        slave, lambda: slave.fmu.setDebugLogging(True, ["logEverything"]), 'log category "logEverything" is unknown'
+    )
+
+
+def test_described_categories_are_those_that_are_known(make_slave, fmi):
+    slave = make_slave(fmi=fmi)
+    described = [category.name for category in slave.description.logCategories]
+    assert {"logEvents", "logStatusError", "logAll"} <= set(described)
+    slave.fmu.setDebugLogging(True, described)

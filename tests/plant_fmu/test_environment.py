@@ -1,0 +1,182 @@
+"""Water, surface and bottom as physical laws."""
+
+import numpy as np
+import pytest
+from fmpy.fmi1 import FMICallException
+from scipy.optimize import brentq
+
+from tests.plant_fmu.philox import normal
+
+NEUTRAL = {"weight": 1228.25, "r_G.z": 0.0}
+
+
+# ---- current ----
+
+
+def test_the_current_grows_with_depth_from_the_surface(make_slave, fmi):
+    shear = {"current.x": 0.5, "current_shear.x": -0.02, "current_shear.y": 0.01}
+    for depth, expected in ((-3.0, [0.5, 0.0]), (0.0, [0.5, 0.0]), (10.0, [0.3, 0.1])):
+        slave = make_slave(fmi=fmi).start(**shear, **{"position.z": depth})
+        assert slave.get("water_velocity.x", "water_velocity.y") == pytest.approx(expected)
+
+
+def test_a_sinking_vehicle_follows_the_sheared_current(make_slave):
+    """Mean drift of a heavily damped body is the current at its depth."""
+    slave = make_slave().start(
+        **NEUTRAL,
+        **{
+            "current_shear.x": 0.05,
+            "wrench.Z": 20.0,
+            "position.z": 1.0,
+            "quadratic_damping[1]": 5e3,
+            "linear_damping[1]": 500.0,
+        },
+    )
+    for k in range(60):
+        slave.fmu.doStep(k * 0.5, 0.5)
+    z, u = slave.get("position.z", "velocity.u")
+    assert u == pytest.approx(0.05 * z, rel=0.05)
+
+
+def test_the_variation_is_a_gauss_markov_process(make_slave, fmi):
+    """Knot by knot: w' = w exp(-dt/T) + s sqrt(1 - exp(-2 dt/T)) n, straight between the knots."""
+    T, dt, s = 5.0, 0.5, 0.2
+    slave = make_slave(fmi=fmi).start(
+        **{
+            "current_variation.y": s,
+            "current_correlation_time": T,
+            "current_variation_period": dt,
+            "seed": 42,
+            "current.y": 0.1,
+        }
+    )
+    kept, fresh = np.exp(-dt / T), s * np.sqrt(1 - np.exp(-2 * dt / T))
+    stream, knots = 15 + 1, [s * normal(42, 16, 0)]
+    for k in range(1, 30):
+        knots.append(kept * knots[-1] + fresh * normal(42, stream, k))
+    for k in range(100):
+        t = 0.1 * k
+        expected = 0.1 + np.interp(t, dt * np.arange(30), knots)
+        assert slave.get("water_velocity.y")[0] == pytest.approx(expected, abs=1e-12)
+        slave.fmu.doStep(t, 0.1)
+
+
+def test_its_deviation_and_correlation_are_those_asked_for(make_slave):
+    T, s = 2.0, 0.3
+    slave = make_slave().start(
+        **{
+            "current_variation.x": s,
+            "current_correlation_time": T,
+            "current_variation_period": 0.1,
+            "substep": 0.5,
+        }
+    )
+    w = []
+    for k in range(20000):
+        slave.fmu.doStep(k * 0.5, 0.5)
+        w.append(slave.get("water_velocity.x")[0])
+    w = np.array(w)
+    assert np.std(w) == pytest.approx(s, rel=0.05)
+    assert np.corrcoef(w[4:], w[:-4])[0, 1] == pytest.approx(np.exp(-1.0), abs=0.05)
+
+
+# ---- surface ----
+
+
+@pytest.mark.parametrize(("depth", "part"), [(2.0, 1.0), (0.3, 1.0), (0.0, 0.5), (-0.3, 0.0), (-1.0, 0.0)])
+def test_buoyancy_is_that_of_the_submerged_cap(make_slave, fmi, depth, part):
+    slave = make_slave(fmi=fmi).start(**NEUTRAL, **{"free_surface": True, "hull_radius": 0.3, "position.z": depth})
+    heave = 1228.25 * (1.0 - part) / (125.0 + 62.5)
+    assert slave.get("der(velocity.w)")[0] == pytest.approx(heave, abs=1e-12)
+
+
+def test_a_buoyant_hull_floats_where_archimedes_says(make_slave, fmi):
+    """Afloat with three quarters of the volume under water."""
+    r = 0.3
+    slave = make_slave(fmi=fmi).start(
+        **{
+            "weight": 0.75 * 1228.25,
+            "r_G.z": 0.05,
+            "free_surface": True,
+            "hull_radius": r,
+            "position.z": 1.0,
+            "linear_damping[3]": 200.0,
+        }
+    )
+    for k in range(100):
+        slave.fmu.doStep(k * 1.0, 1.0)
+    h = brentq(lambda h: h * h * (3 * r - h) / (4 * r**3) - 0.75, 0, 2 * r)
+    assert slave.get("position.z")[0] == pytest.approx(h - r, abs=1e-6)
+
+
+def test_a_surface_needs_a_hull(make_slave, fmi):
+    slave = make_slave(fmi=fmi)
+    with pytest.raises(FMICallException):
+        slave.start(free_surface=True, hull_radius=0.0)
+    assert "free_surface needs hull_radius" in slave.said[-1][1]
+
+
+# ---- bottom ----
+
+SINKING = {"weight": 1300.0, "bottom_depth": 10.0, "hull_radius": 0.3}
+
+
+def test_a_heavy_vehicle_comes_to_rest_on_the_bottom(make_slave, fmi):
+    slave = make_slave(fmi=fmi).start(**SINKING, **{"position.z": 8.0, "velocity.u": 0.5})
+    for k in range(300):
+        slave.fmu.doStep(k * 0.1, 0.1)
+    assert slave.get("velocity.w", "velocity.u") == pytest.approx([0.0, 0.0], abs=1e-6)
+    sinks_in = (1300.0 - 1228.25) * 0.02**2 / (125.0 + 62.5)  # the contact's spring
+    assert slave.get("altitude")[0] == pytest.approx(0.3 - sinks_in, rel=1e-3)
+    assert slave.flag("bottom_contact")
+
+
+@pytest.mark.parametrize("substep", [0.001, 0.02, 0.2])
+@pytest.mark.parametrize("speed", [0.1, 3.0, 100.0])
+@pytest.mark.parametrize("time_constant", [0.0, 0.02, 0.5])
+def test_contact_never_explodes(make_slave, substep, speed, time_constant):
+    """Thrown at the bottom, at any speed and substep: no energy is gained, nor depth beyond a flight of T."""
+    slave = make_slave().start(
+        **SINKING
+        | NEUTRAL
+        | {
+            "position.z": 9.0,
+            "velocity.w": speed,
+            "velocity.u": speed,
+            "substep": substep,
+            "bottom_time_constant": time_constant,
+            "bottom_friction": 1.0,
+            **{f"quadratic_damping[{i}]": 0.0 for i in range(1, 7)},
+            **{f"linear_damping[{i}]": 0.0 for i in range(1, 7)},
+        }
+    )
+    fastest, deepest = 0.0, 0.0
+    for k in range(400):
+        slave.fmu.doStep(k * 0.2, 0.2)
+        u, v, w, z = slave.get("velocity.u", "velocity.v", "velocity.w", "position.z")
+        fastest, deepest = max(fastest, np.hypot(np.hypot(u, v), w)), max(deepest, z)
+    assert fastest <= speed * np.sqrt(2) * (1 + 1e-9)
+    assert deepest - 9.7 <= speed * max(time_constant, 4 * substep)
+
+
+def test_friction_stops_a_slide_as_coulomb_says(make_slave):
+    slave = make_slave().start(
+        **SINKING,
+        **{
+            "position.z": 9.7,
+            "velocity.u": 1.0,
+            "bottom_friction": 0.5,
+            "substep": 0.001,
+            **{f"quadratic_damping[{i}]": 0.0 for i in range(1, 7)},
+            "r_G.z": 0.0,
+        },
+    )
+    slave.step(1.0)
+    slowing = 0.5 * (1300.0 - 1228.25) / (125.0 + 62.5)
+    assert slave.get("velocity.u")[0] == pytest.approx(1.0 - slowing * 1.0, abs=0.01)
+
+
+def test_no_bottom_unless_asked_for(make_slave):
+    slave = make_slave().start(**{"position.z": 5e5, "hull_radius": 0.3})
+    assert not slave.flag("bottom_contact")
+    assert slave.get("altitude")[0] == 5e5

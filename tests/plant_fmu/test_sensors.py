@@ -1,0 +1,186 @@
+"""Measured outputs: truth where nothing is switched on, samples with seeded noise where it is."""
+
+import numpy as np
+import pytest
+from fmpy.fmi1 import FMICallException
+from scipy import stats
+from scipy.spatial.transform import Rotation
+
+from tests.plant_fmu.conftest import STATES
+from tests.plant_fmu.philox import KNOWN, normal, philox
+
+CHANNELS = [
+    "depth",
+    "velocity.u",
+    "velocity.v",
+    "velocity.w",
+    "altitude",
+    "acceleration.x",
+    "acceleration.y",
+    "acceleration.z",
+    "angular_velocity.p",
+    "angular_velocity.q",
+    "angular_velocity.r",
+    "heading",
+    "position.x",
+    "position.y",
+    "position.z",
+]
+TILTED = dict(zip(STATES[3:], (0.6, 0.5, -0.4, 0.48, 0.7, -0.3, 0.4, 0.5, -0.6, 0.3), strict=True))
+
+
+@pytest.mark.parametrize(("counter", "key", "result"), KNOWN)
+def test_the_generator_gives_its_published_answers(counter, key, result):
+    assert philox(counter, key) == result
+
+
+def test_sensors_are_true_where_nothing_is_switched_on(make_slave, fmi):
+    slave = make_slave(fmi=fmi).start(**TILTED, **{"position.z": 5.0, "bottom_depth": 30.0})
+    slave.set_values({"wrench.X": 10.0})
+    slave.step(1.0)
+    true = [*(f"position.{a}" for a in "xyz"), *(f"velocity.{a}" for a in "uvwpqr"), "attitude.yaw", "altitude"]
+    measured = [
+        *(f"measured.position.{a}" for a in "xyz"),
+        *(f"measured.velocity.{a}" for a in "uvw"),
+        *(f"measured.angular_velocity.{a}" for a in "pqr"),
+        "measured.heading",
+        "measured.altitude",
+    ]
+    assert slave.get(*measured) == slave.get(*true)
+    assert slave.get("measured.depth", "altitude") == [*slave.get("position.z"), 30.0 - slave.get("position.z")[0]]
+
+
+def test_an_accelerometer_at_rest_feels_gravity_upwards(make_slave, fmi):
+    """A neutral vehicle at rest, rolled by 30 degrees: the specific force is 9.81 m/s2 towards the surface."""
+    roll = np.radians(30.0)
+    slave = make_slave(fmi=fmi).start(
+        weight=1228.25, **{"quaternion.e0": np.cos(roll / 2), "quaternion.e1": np.sin(roll / 2), "r_G.z": 0.0}
+    )
+    expected = Rotation.from_euler("x", roll).inv().apply([0.0, 0.0, -9.81])
+    assert slave.get(*(f"measured.acceleration.{a}" for a in "xyz")) == pytest.approx(list(expected), abs=1e-12)
+
+
+def test_specific_force_is_the_second_derivative_of_the_path(make_slave):
+    """R f + g is the acceleration of the origin over ground, here from differences of its world velocity."""
+    slave = make_slave().start(**TILTED, substep=0.001)
+    slave.set_values({"wrench.Y": 40.0, "wrench.N": 6.0})
+    forces, attitudes, velocities = [], [], []
+    h = 2e-4
+    for k in range(3):
+        x = slave.get(*STATES)
+        R = Rotation.from_quat(np.roll(x[3:7], -1))
+        attitudes.append(R)
+        velocities.append(R.apply(x[7:10]))
+        forces.append(slave.get(*(f"measured.acceleration.{a}" for a in "xyz")))
+        slave.fmu.doStep(k * h, h)
+    expected = (velocities[2] - velocities[0]) / (2 * h)
+    assert attitudes[1].apply(forces[1]) + np.array([0, 0, 9.81]) == pytest.approx(expected, abs=1e-5)
+
+
+def test_every_channel_has_its_noise_from_its_own_stream(make_slave, fmi):
+    """Sample k of channel i is the standard normal number at that place of the seeded stream."""
+    rates = {
+        "bottom_depth": 50.0,
+        "depth_sensor.rate": 10.0,
+        "dvl.rate": 5.0,
+        "imu.rate": 20.0,
+        "compass.rate": 4.0,
+        "usbl.rate": 2.0,
+    }
+    noise = {
+        "depth_sensor.noise": 0.1,
+        "dvl.velocity_noise": 0.02,
+        "dvl.altitude_noise": 0.3,
+        "imu.acceleration_noise": 0.05,
+        "imu.angular_velocity_noise": 0.01,
+        "compass.noise": 0.02,
+        "usbl.noise": 1.0,
+    }
+    deviation = dict(zip(CHANNELS, [0.1, *[0.02] * 3, 0.3, *[0.05] * 3, *[0.01] * 3, 0.02, *[1.0] * 3], strict=True))
+    rate = dict(zip(CHANNELS, [10.0, *[5.0] * 4, *[20.0] * 6, 4.0, *[2.0] * 3], strict=True))
+    noisy, clean = make_slave(fmi=fmi).start(**rates, **noise, seed=11), make_slave(fmi=fmi).start(**rates)
+    names = [f"measured.{channel}" for channel in CHANNELS]
+    for k in range(41):
+        differences = np.subtract(noisy.get(*names), clean.get(*names))
+        expected = [
+            deviation[c] * normal(11, i, int(np.floor(k * 0.05 * rate[c] + 1e-9))) for i, c in enumerate(CHANNELS)
+        ]
+        assert differences == pytest.approx(expected, abs=1e-12)
+        noisy.fmu.doStep(k * 0.05, 0.05)
+        clean.fmu.doStep(k * 0.05, 0.05)
+
+
+def test_samples_do_not_hang_on_the_communication_step(make_slave, fmi):
+    """A sensor of 7 Hz samples at its own times, within a step or at its end."""
+    ends = []
+    for n in (1, 10, 100, 997):
+        slave = make_slave(fmi=fmi).start(
+            **TILTED, **{"depth_sensor.rate": 7.0, "depth_sensor.noise": 0.2, "substep": 0.001}
+        )
+        for k in range(n):
+            slave.fmu.doStep(3.0 * k / n, 3.0 * (k + 1) / n - 3.0 * k / n)
+        ends.append(slave.get("measured.depth")[0])
+    assert ends == pytest.approx([ends[0]] * 4, abs=1e-9)
+
+
+def test_noise_is_normal_and_white(make_slave):
+    slave = make_slave().start(
+        **{
+            "weight": 1228.25,
+            "depth_sensor.rate": 1000.0,
+            "depth_sensor.noise": 0.5,
+            "usbl.rate": 1000.0,
+            "usbl.noise": 2.0,
+        }
+    )
+    rows = []
+    for k in range(4000):
+        slave.fmu.doStep(k * 1e-3, 1e-3)
+        rows.append(slave.get("measured.depth", "measured.position.x"))
+    depth, x = np.array(rows).T
+    assert stats.kstest(depth / 0.5, "norm").pvalue > 1e-3
+    assert stats.kstest(x / 2.0, "norm").pvalue > 1e-3
+    assert abs(np.corrcoef(depth, x)[0, 1]) < 0.06
+    assert abs(np.corrcoef(depth[1:], depth[:-1])[0, 1]) < 0.06
+
+
+def test_seeds_differ_and_repeat(make_slave, fmi):
+    def samples(seed):
+        slave = make_slave(fmi=fmi).start(**{"usbl.rate": 1.0, "usbl.noise": 1.0, "seed": seed})
+        return slave.get("measured.position.x", "measured.position.y")
+
+    assert samples(1) == samples(1)
+    assert len({*samples(1), *samples(2)}) == 4
+
+
+def test_biases_add_up_and_headings_wrap(make_slave, fmi):
+    half = np.pi / 2 - 0.01  # yaw of pi - 0.02
+    slave = make_slave(fmi=fmi).start(
+        **{
+            "quaternion.e0": np.cos(half),
+            "quaternion.e3": np.sin(half),
+            "compass.bias": 0.05,
+            "depth_sensor.bias": 0.3,
+            "imu.angular_velocity_bias.q": 0.01,
+        }
+    )
+    assert slave.get("measured.heading")[0] == pytest.approx(-np.pi + 0.03)
+    assert slave.get("measured.depth", "measured.angular_velocity.q") == [0.3, 0.01]
+
+
+def test_noise_without_samples_is_refused(make_slave, fmi):
+    slave = make_slave(fmi=fmi)
+    with pytest.raises(FMICallException):
+        slave.start(**{"dvl.velocity_noise": 0.1})
+    assert "dvl.velocity_noise = 0.1 needs the sensor's rate" in slave.said[-1][1]
+
+
+def test_a_rate_may_change_while_it_runs(make_slave, fmi):
+    """Samples then start anew, and the stream of numbers goes on."""
+    slave = make_slave(fmi=fmi).start(**{"depth_sensor.rate": 1.0, "depth_sensor.noise": 1.0, "weight": 1228.25})
+    slave.step(2.5)  # samples 0, 1, 2
+    slave.set_values({"depth_sensor.rate": 10.0})
+    slave.step(0.05)
+    assert slave.get("measured.depth")[0] == pytest.approx(normal(0, 0, 3))
+    slave.step(0.05)
+    assert slave.get("measured.depth")[0] == pytest.approx(normal(0, 0, 4))

@@ -1,0 +1,165 @@
+"""FMU states: kept, restored, carried over as bytes, and refused where they do not fit."""
+
+import numpy as np
+import pytest
+from fmpy.fmi1 import FMICallException
+
+from tests.plant_fmu.conftest import STATES
+
+# everything that moves or is drawn: lags, drifting current, noise of sensors that sample at odd rates
+LIVELY = {
+    "velocity.u": 0.4,
+    "velocity.r": 0.3,
+    "position.z": 2.0,
+    "current.x": 0.2,
+    "seed": 7,
+    "current_variation.x": 0.2,
+    "current_variation.z": 0.1,
+    "current_correlation_time": 3.0,
+    "current_variation_period": 0.13,
+    "depth_sensor.rate": 9.0,
+    "depth_sensor.noise": 0.05,
+    "imu.rate": 70.0,
+    "imu.acceleration_noise": 0.1,
+    "dvl.rate": 7.0,
+    "dvl.velocity_noise": 0.02,
+    "compass.rate": 11.0,
+    "compass.noise": 0.01,
+    "usbl.rate": 1.0,
+    "usbl.noise": 0.5,
+    "thrust_time_constant[1]": 0.2,
+    "thrust_rate_limit[2]": 30.0,
+    "wrench_time_constant": 0.4,
+}
+
+
+def outputs(slave):
+    return [v.name for v in slave.description.modelVariables if v.causality in ("output", "local")]
+
+
+def drive(slave, k0, k1):
+    """Step with changing inputs; return all outputs after each step."""
+    rows = []
+    for k in range(k0, k1):
+        slave.set_values(
+            {"thrust[1]": 5.0 * np.sin(k), "thrust[2]": 20.0 * (-1) ** (k // 7), "wrench.X": 8.0, "wrench.N": 1.0}
+        )
+        slave.fmu.doStep(k * 0.02, 0.02)
+        rows.append(slave.get(*outputs(slave)))
+    return rows
+
+
+def test_a_restored_state_continues_bit_by_bit(make_slave, fmi):
+    slave = make_slave(fmi=fmi).start(**LIVELY)
+    drive(slave, 0, 50)
+    state = slave.save()
+    first = drive(slave, 50, 120)
+    slave.restore(state)
+    assert drive(slave, 50, 120) == first
+    slave.free(state)
+
+
+def test_a_state_goes_on_in_another_instance(make_slave, fmi):
+    """As bytes: what a cluster or a file would carry."""
+    slave, other = make_slave(fmi=fmi).start(**LIVELY), make_slave(fmi=fmi)
+    drive(slave, 0, 50)
+    state = slave.save()
+    data = slave.serialise(state)
+    arrived = other.deserialise(data)
+    other.restore(arrived)
+    assert drive(other, 50, 120) == drive(slave, 50, 120)
+    slave.free(state)
+    other.free(arrived)
+
+
+def test_a_state_holds_the_mode(make_slave, fmi):
+    """One saved before initialisation goes back to it."""
+    slave = make_slave(fmi=fmi)
+    slave.set_values({"position.x": 3.0})
+    state = slave.save()
+    slave.start()
+    slave.step(0.1)
+    slave.restore(state)
+    slave.start(**{"position.y": 4.0})
+    assert slave.get("position.x", "position.y") == [3.0, 4.0]
+    slave.free(state)
+
+
+def test_getting_writes_an_existing_state_again(make_slave, fmi):
+    slave = make_slave(fmi=fmi).start(**LIVELY)
+    state = slave.save()
+    drive(slave, 0, 5)
+    (slave.fmu.fmi3GetFMUState if fmi == 3 else slave.fmu.fmi2GetFMUstate)(slave.fmu.component, state)
+    here = slave.get(*STATES)
+    drive(slave, 5, 9)
+    slave.restore(state)
+    assert slave.get(*STATES) == here
+    slave.free(state)
+
+
+def test_freeing_nothing_is_no_fault(make_slave, fmi):
+    slave = make_slave(fmi=fmi).start()
+    state = slave.save()
+    slave.free(state)
+    slave.free(state)
+
+
+def test_the_first_word_is_zero(make_slave, fmi):
+    """Some importers hand the block, not its address, to the function that frees it."""
+    slave = make_slave(fmi=fmi).start(**LIVELY)
+    state = slave.save()
+    assert slave.serialise(state)[:8] == bytes(8)
+    slave.free(state)
+
+
+def refused(slave, data, words):
+    slave.said.clear()
+    with pytest.raises(FMICallException):
+        slave.deserialise(data)
+    assert words in slave.said[-1][1]
+
+
+def test_bytes_that_are_no_state_are_refused(make_slave, fmi):
+    slave, foreign = make_slave(fmi=fmi).start(), make_slave("bluerov2_heavy", fmi).start()
+    state, strange = slave.save(), foreign.save()
+    data = slave.serialise(state)
+    refused(slave, data[:-8], "bytes, expected")
+    refused(slave, b"", "bytes, expected")
+    refused(slave, bytes(len(data)), "not one of this FMU")
+    refused(slave, foreign.serialise(strange), "not one of this FMU")
+    for at in np.linspace(40, len(data) - 1, 30).astype(int):
+        refused(slave, data[:at] + bytes([data[at] ^ 0x55]) + data[at + 1 :], "checksum")
+    slave.free(state)
+    foreign.free(strange)
+
+
+def fnv1a(data):
+    value = 14695981039346656037
+    for byte in data:
+        value = (value ^ byte) * 1099511628211 % 2**64
+    return value
+
+
+def test_a_forged_state_lets_no_nonsense_in(make_slave, fmi):
+    """With a checksum that fits, and a NaN in it."""
+    slave = make_slave(fmi=fmi).start(**{"position.x": 123.456})
+    state = slave.save()
+    data = slave.serialise(state)
+    at = data.index(np.float64(123.456).tobytes())
+    forged = data[:at] + np.float64(np.nan).tobytes() + data[at + 8 :]
+    forged = forged[:24] + np.uint64(fnv1a(forged[32:])).tobytes() + forged[32:]
+    refused(slave, forged, "position.x is outside")
+    honest = data[:24] + np.uint64(fnv1a(data[32:])).tobytes() + data[32:]
+    assert honest == data
+    slave.free(state)
+
+
+def test_a_state_of_the_other_interface_is_refused(make_slave, fmi):
+    slave, model = make_slave(fmi=fmi).start(), make_slave(fmi=fmi, interface="me").start()
+    state = slave.save()
+    arrived = model.deserialise(slave.serialise(state))
+    with pytest.raises(FMICallException):
+        model.restore(arrived)
+    assert "other interface" in model.said[-1][1]
+    slave.free(state)
+    model.free(arrived)

@@ -1,0 +1,168 @@
+"""The plant once more, from the books in matrix form, by variable names: what the FMU is compared with.
+
+It takes complex numbers, so that complex steps give its derivatives to rounding: f(x + ih) = f(x) + ih f'(x).
+"""
+
+import numpy as np
+
+AXES, VELOCITIES, FORCES = "xyz", "uvwpqr", "XYZKMN"
+TURN = 2 * np.pi
+
+
+def magnitude(x):
+    return x if np.real(x) >= 0 else -x
+
+
+def clip(x, low, high):
+    return low if np.real(x) < np.real(low) else high if np.real(x) > np.real(high) else x
+
+
+def norm(x):
+    return np.sqrt(np.sum(x * x))
+
+
+def skew(a):
+    return np.array([[0, -a[2], a[1]], [a[2], 0, -a[0]], [-a[1], a[0], 0]])
+
+
+def vector(v, prefix, parts=AXES):
+    return np.array([v[f"{prefix}.{part}"] for part in parts])
+
+
+def coriolis(M, nu):
+    """From the parametrisation theorem (Fossen 2011, 3.46)."""
+    a, b = (M @ nu)[:3], (M @ nu)[3:]
+    return np.block([[np.zeros((3, 3)), -skew(a)], [-skew(a), -skew(b)]])
+
+
+def rotation(e):
+    e0, e1, e2, e3 = e / norm(e)
+    return np.array([
+        [1 - 2 * (e2 * e2 + e3 * e3), 2 * (e1 * e2 - e0 * e3), 2 * (e1 * e3 + e0 * e2)],
+        [2 * (e1 * e2 + e0 * e3), 1 - 2 * (e1 * e1 + e3 * e3), 2 * (e2 * e3 - e0 * e1)],
+        [2 * (e1 * e3 - e0 * e2), 2 * (e2 * e3 + e0 * e1), 1 - 2 * (e1 * e1 + e2 * e2)],
+    ])  # fmt: skip
+
+
+def angle(y, x):
+    """atan2 for complex numbers."""
+    return np.arctan2(np.real(y), np.real(x)) + 1j * np.imag(y * np.real(x) - x * np.real(y)) / np.real(x * x + y * y)
+
+
+def mass_matrices(v):
+    names = {("x", "x"): "xx", ("y", "y"): "yy", ("z", "z"): "zz", ("x", "y"): "xy", ("x", "z"): "xz", ("y", "z"): "yz"}
+    inertia = np.array([[v[f"inertia.{names.get((a, b)) or names[b, a]}"] for b in AXES] for a in AXES])
+    m, S = v["mass"], skew(vector(v, "r_G"))
+    rigid = np.block([[m * np.eye(3), -m * S], [m * S, inertia]])
+    added = np.array([[v[f"added_mass[{min(i, j)},{max(i, j)}]"] for j in range(1, 7)] for i in range(1, 7)])
+    return rigid, added
+
+
+def steady_thrust(v, i):
+    low, high = v[f"thrust_min[{i}]"], v[f"thrust_max[{i}]"]
+    command = clip(v[f"thrust[{i}]"], low, high)
+    limit = high if np.real(command) > 0 else low
+    dead, curve = v[f"thrust_dead_band[{i}]"], v[f"thrust_curve[{i}]"]
+    live = (command / limit - dead) / (1 - dead)
+    return limit * ((1 - curve) * live + curve * live**2) if np.real(live) > 0 else 0
+
+
+def steady_wrench(v):
+    w = np.array([v[f"wrench.{a}"] for a in FORCES], dtype=complex)
+    force = norm(w[:3])
+    if np.real(force) > np.real(v["wrench_force_limit"]):
+        w[:3] = w[:3] * v["wrench_force_limit"] / force
+    return w
+
+
+def lagging(present, target, T, limit=0):
+    """Rate and present force of an actuator."""
+    if np.real(limit) > 0 and np.real(T) < 1e-3:
+        T = 1e-3
+    if np.real(T) == 0:
+        return 0, target
+    rate = (target - present) / T
+    return (clip(rate, -limit, limit) if np.real(limit) > 0 else rate), present
+
+
+def contact(v, M, depth, velocity_world):
+    inverse = np.linalg.inv(M)[:3, :3]
+    rows = [sum(magnitude(x) for x in row) for row in inverse]
+    m = 1 / max(rows, key=np.real)
+    T = (
+        v["bottom_time_constant"]
+        if np.real(v["bottom_time_constant"]) >= 4 * np.real(v["substep"])
+        else 4 * v["substep"]
+    )
+    x, u = depth + v["hull_radius"] - v["bottom_depth"], velocity_world[2]
+    if np.real(x) <= 0:
+        return np.zeros(3)
+    normal = m * (x / T**2 + 2 / T * u * x / (x + T * magnitude(u) / 2))
+    normal = normal if np.real(normal) > 0 else 0
+    speed = np.sqrt(velocity_world[0] ** 2 + velocity_world[1] ** 2 + 0.01**2)
+    drag = v["bottom_friction"] * normal / speed
+    drag = drag if np.real(drag) < np.real(m / T) else m / T
+    return np.array([-drag * velocity_world[0], -drag * velocity_world[1], -normal])
+
+
+def evaluate(v, n_thrusters, drift=(0, 0, 0), drift_slope=(0, 0, 0)):
+    """Return all calculated variables of continuous sensors by name; `drift` is the current's variation now."""
+    out = {}
+    forces = []
+    for i in range(1, n_thrusters + 1):
+        lag = v[f"thrust_time_constant[{i}]"], v[f"thrust_rate_limit[{i}]"]
+        rate, force = lagging(v[f"actuator.thrust[{i}]"], steady_thrust(v, i), *lag)
+        out[f"der(actuator.thrust[{i}])"] = rate
+        forces.append(force * v[f"thrust_effectiveness[{i}]"])
+        out[f"thruster_force[{i}]"] = forces[-1]
+    tau = []
+    for i, (name, target) in enumerate(zip(FORCES, steady_wrench(v), strict=True), 1):
+        rate, present = lagging(v[f"actuator.wrench.{name}"], target, v["wrench_time_constant"])
+        out[f"der(actuator.wrench.{name})"] = rate
+        push = sum(v[f"thruster_matrix[{i},{j}]"] * f for j, f in enumerate(forces, 1))
+        tau.append(present + push)
+        out[f"actuation.{name}"] = tau[-1]
+
+    e, nu = np.array([v[f"quaternion.e{i}"] for i in range(4)]), vector(v, "velocity", VELOCITIES)
+    R, omega, depth = rotation(e), nu[3:], v["position.z"]
+    velocity_world = R @ nu[:3]
+    e_rate = 0.5 * np.r_[-e[1:] @ omega, e[0] * omega + np.cross(e[1:], omega)]
+    out |= {f"der(position.{a})": x for a, x in zip(AXES, velocity_world, strict=True)}
+    out |= {f"der(quaternion.e{i})": x for i, x in enumerate(e_rate)}
+
+    under = np.real(depth) > 0
+    water = vector(v, "current") + np.array(drift) + (vector(v, "current_shear") * depth if under else 0)
+    water_rate = np.array(drift_slope) + (vector(v, "current_shear") * velocity_world[2] if under else 0)
+    out |= {f"water_velocity.{a}": x for a, x in zip(AXES, water, strict=True)}
+    nu_c = np.r_[R.T @ water, np.zeros(3)]
+    nu_c_rate = np.r_[R.T @ water_rate - np.cross(omega, R.T @ water), np.zeros(3)]
+    nu_r = nu - nu_c
+
+    M_RB, M_A = mass_matrices(v)
+    damping = [v[f"linear_damping[{i}]"] + v[f"quadratic_damping[{i}]"] * magnitude(x) for i, x in enumerate(nu_r, 1)]
+    submerged, r = 1, v["hull_radius"]
+    if v["free_surface"]:
+        h = clip(depth + r, 0, 2 * r)
+        submerged = h * h * (3 * r - h) / (4 * r**3)  # a spherical cap
+    W, B = v["weight"], v["buoyancy"] * submerged
+    k = R.T @ np.array([0, 0, 1])
+    g = -np.r_[(W - B) * k, np.cross(vector(v, "r_G") * W - vector(v, "r_B") * B, k)]
+    bottom = np.r_[R.T @ contact(v, M_RB + M_A, depth, velocity_world), np.zeros(3)]
+    force = np.array(tau) - coriolis(M_RB, nu) @ nu - coriolis(M_A, nu_r) @ nu_r - damping * nu_r - g
+    nu_rate = np.linalg.solve(M_RB + M_A, force + bottom + M_A @ nu_c_rate)
+    out |= {f"der(velocity.{a})": x for a, x in zip(VELOCITIES, nu_rate, strict=True)}
+
+    roll, yaw = angle(R[2, 1], R[2, 2]), angle(R[1, 0], R[0, 0])
+    out |= {"attitude.roll": roll, "attitude.pitch": -np.arcsin(R[2, 0]), "attitude.yaw": yaw}
+    out["altitude"] = v["bottom_depth"] - depth
+    specific = nu_rate[:3] + np.cross(omega, nu[:3]) - v["gravity"] * k
+    out["measured.depth"] = depth + v["depth_sensor.bias"]
+    out["measured.altitude"] = out["altitude"]
+    out["measured.heading"] = yaw + v["compass.bias"]
+    for i, a in enumerate(AXES):
+        out[f"measured.velocity.{'uvw'[i]}"] = nu[i]
+        out[f"measured.acceleration.{a}"] = specific[i] + v[f"imu.acceleration_bias.{a}"]
+        rate = "pqr"[i]
+        out[f"measured.angular_velocity.{rate}"] = omega[i] + v[f"imu.angular_velocity_bias.{rate}"]
+        out[f"measured.position.{a}"] = v[f"position.{a}"]
+    return out
