@@ -77,7 +77,7 @@ static unsigned modes_to_set(Role role)
     const unsigned start = MODE_INSTANTIATED | MODE_INITIALISING;
 
     switch (role) {
-    case STATE: /* in model exchange they are the importer's; CasADi sets them one by one, not as a vector */
+    case STATE: /* in model exchange also one by one (FMI 3.0.2, 2.3.5 and 3.2.1), as CasADi does */
         return start | MODE_EVENT | MODE_CONTINUOUS;
     case INPUT:
         return start | MODE_STEPPING | MODE_EVENT | MODE_CONTINUOUS;
