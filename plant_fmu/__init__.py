@@ -2,7 +2,7 @@
 
 from plant_fmu.build import build_fmu, cached_fmu
 from plant_fmu.channels import Channel, Channels
-from plant_fmu.errors import BuildError, PlantError, PlantFmuError, TableError, VehicleError
+from plant_fmu.errors import BuildError, FmuFileError, PlantError, PlantFmuError, TableError, VehicleError
 from plant_fmu.plant import Plant
 from plant_fmu.state import State
 from plant_fmu.vehicle import Vehicle, load_vehicle, shipped_vehicles
@@ -11,6 +11,7 @@ __all__ = [
     "BuildError",
     "Channel",
     "Channels",
+    "FmuFileError",
     "Plant",
     "PlantError",
     "PlantFmuError",

@@ -1,4 +1,4 @@
-"""Command line: ``python -m plant_fmu {build,list,docs}``."""
+"""Command line: ``python -m plant_fmu {build,check,list,docs}``."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from plant_fmu.build import FMI_VERSIONS, build_fmu
+from plant_fmu.check import Verdict, check_fmu
 from plant_fmu.description import documentation
 from plant_fmu.errors import PlantFmuError
 from plant_fmu.vehicle import load_vehicle, shipped_vehicles
@@ -22,11 +23,41 @@ def _parser() -> argparse.ArgumentParser:
     build.add_argument("--fmi", type=int, choices=FMI_VERSIONS, default=3, help="FMI 2.0 or 3.0 (default: 3)")
     build.add_argument("--out", type=Path, help="file to write (default: NAME.fmu here)")
 
+    check = verbs.add_parser("check", help="try an FMU in every validator and importer that is installed")
+    check.add_argument("fmu", type=Path, metavar="FILE.fmu", help="any FMU of FMI 2.0 or 3.0; its binary is run")
+    check.add_argument("--stop-time", type=float, metavar="S", help="default: the FMU's own, else 10")
+    check.add_argument("--step", type=float, metavar="S", help="default: the FMU's own, else 0.01")
+    check.add_argument(
+        "--set", type=_assignment, action="append", default=[], metavar="NAME=NUMBER", help="start value of a variable"
+    )
+
     verbs.add_parser("list", help="list the shipped vehicles")
 
     docs = verbs.add_parser("docs", help="print the page of an FMU's variables, in Markdown")
     docs.add_argument("--vehicle", required=True, help="a shipped name, or a TOML file")
     return parser
+
+
+def _assignment(text: str) -> tuple[str, float]:
+    name, _, number = text.rpartition("=")
+    try:
+        return name, float(number)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r}: expected NAME=NUMBER") from None
+
+
+def _print_verdicts(verdicts: Sequence[Verdict]) -> None:
+    rows = [("importer", "version", "type", "verdict", "difference", "note")]
+    for verdict in verdicts:
+        result = verdict.result
+        difference = "" if verdict.difference is None else f"{verdict.difference:.1e}"
+        rows.append((result.importer, result.version, result.interface, result.status, difference, result.note))
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    for row in rows:
+        print("  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip())
+    compared = [verdict for verdict in verdicts if verdict.difference is not None]
+    if compared:
+        print("difference: the greatest of an output at the stop time to FMPy's co-simulation")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -40,7 +71,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns
     -------
     int
-        0, or 2 where the user must mend something.
+        0; 1 if an importer failed with a checked FMU; 2 where the user must mend something.
     """
     options = _parser().parse_args(arguments)
     try:
@@ -50,6 +81,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 print(f"{name:{max(map(len, names))}}  {load_vehicle(name).title}")
         elif options.verb == "docs":
             print(documentation(load_vehicle(options.vehicle)), end="")
+        elif options.verb == "check":
+            verdicts = check_fmu(options.fmu, options.stop_time, options.step, dict(options.set))
+            _print_verdicts(verdicts)
+            return 1 if any(verdict.result.status == "failed" for verdict in verdicts) else 0
         else:
             vehicle = load_vehicle(options.vehicle)
             print(build_fmu(vehicle, options.fmi, options.out or Path(f"{vehicle.name}.fmu")))
