@@ -21,7 +21,7 @@ from fuzzy_arbiter import Arbiter, ramp
 from plant_fmu import Channels, Plant
 
 _LONGEST_SLEEP = 3600.0  # s
-_STATE = 16  # outputs measured before a step: position, quaternion, velocity, attitude
+_FIRST_APPLIED = "thruster_force[1]"  # outputs before it are read at the beginning of a step, from it on at the end
 
 
 class Observer(Protocol):
@@ -84,8 +84,9 @@ class Master:
         s, n, n_thrusters = self.signals, len(self.scenario.regions), self.scenario.vehicle.n_thrusters
         plant, n_outputs = self.plant, len(self.plant.outputs)
         outputs = s.view("position.x", n_outputs + len(plant.flags))
-        self._measured, self._applied, self._flags = np.split(outputs, [_STATE, n_outputs])
-        self._plant_measured, self._plant_applied = np.split(plant.outputs.values, [_STATE])
+        n_measured = plant.outputs.names.index(_FIRST_APPLIED)
+        self._measured, self._applied, self._flags = np.split(outputs, [n_measured, n_outputs])
+        self._plant_measured, self._plant_applied = np.split(plant.outputs.values, [n_measured])
 
         self.state = VehicleState(
             position=s.view("position.x", 3),

@@ -7,7 +7,7 @@ import fmpy
 import pytest
 
 from plant_fmu import load_vehicle
-from plant_fmu.build import write_sources
+from plant_fmu.build import _write_sources
 from plant_fmu.compiler import find_compiler
 
 HERE = Path(__file__).parent
@@ -19,7 +19,7 @@ def fuzzer(tmp_path_factory):
 
     def build(fmi):
         folder = tmp_path_factory.mktemp(f"fuzz{fmi}")
-        sources = write_sources(folder, load_vehicle("odin"), fmi)
+        sources = _write_sources(folder, load_vehicle("odin"), fmi)
         program = folder / "fuzz"
         command = [
             *find_compiler(), "-std=c99", "-g", "-O1", "-fsanitize=address,undefined", "-fno-sanitize-recover=all",
