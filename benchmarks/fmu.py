@@ -17,7 +17,8 @@ from fmpy.simulation import instantiate_fmu
 
 from benchmarks.timing import Row, Timing, time_batches, time_calls
 from plant_fmu import Plant, cached_fmu, load_vehicle
-from plant_fmu.compiler import compile_library, library_suffix
+from plant_fmu.compiler import compile_library, find_compiler
+from plant_fmu.platforms import native_platform
 
 STEPS = 20_000
 RATIO = "x loop"  # of the median to that of the loop in C
@@ -74,8 +75,10 @@ class _Slave(ctypes.Structure):
 
 
 def _compile_loop(folder: Path) -> ctypes.CDLL:
-    library = folder / f"loop{library_suffix()}"
-    compile_library([Path(__file__).with_name("loop.c")], [Path(fmpy.__file__).parent / "c-code"], library)
+    here = native_platform()
+    library = folder / f"loop{here.suffix}"
+    headers = [Path(fmpy.__file__).parent / "c-code"]
+    compile_library(find_compiler(), here, [Path(__file__).with_name("loop.c")], headers, library)
     loop = ctypes.CDLL(str(library))
     for function in (loop.loop_fmi2, loop.loop_fmi3):
         function.restype = ctypes.c_long

@@ -11,6 +11,7 @@ from plant_fmu.build import FMI_VERSIONS, build_fmu
 from plant_fmu.check import Verdict, check_fmu
 from plant_fmu.description import documentation
 from plant_fmu.errors import PlantFmuError
+from plant_fmu.platforms import ALL, NATIVE, PLATFORMS
 from plant_fmu.vehicle import load_vehicle, shipped_vehicles
 
 
@@ -21,6 +22,11 @@ def _parser() -> argparse.ArgumentParser:
     build = verbs.add_parser("build", help="write the FMU of a vehicle")
     build.add_argument("--vehicle", required=True, help="a shipped name, or a TOML file")
     build.add_argument("--fmi", type=int, choices=FMI_VERSIONS, default=3, help="FMI 2.0 or 3.0 (default: 3)")
+    build.add_argument(
+        "--platforms",
+        default=NATIVE,
+        help=f"{NATIVE} for this machine (default); by the ziglang package: {ALL}, or some of {','.join(PLATFORMS)}",
+    )
     build.add_argument("--out", type=Path, help="file to write (default: NAME.fmu here)")
 
     check = verbs.add_parser("check", help="try an FMU in every validator and importer that is installed")
@@ -87,7 +93,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             return 1 if any(verdict.result.status == "failed" for verdict in verdicts) else 0
         else:
             vehicle = load_vehicle(options.vehicle)
-            print(build_fmu(vehicle, options.fmi, options.out or Path(f"{vehicle.name}.fmu")))
+            print(build_fmu(vehicle, options.fmi, options.out or Path(f"{vehicle.name}.fmu"), options.platforms))
     except PlantFmuError as error:
         print(f"plant_fmu: {error}", file=sys.stderr)
         return 2

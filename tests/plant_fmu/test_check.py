@@ -10,9 +10,10 @@ import pytest
 from plant_fmu import FmuFileError, cached_fmu, load_vehicle
 from plant_fmu.__main__ import main
 from plant_fmu.check import check_fmu
-from plant_fmu.compiler import compile_library
+from plant_fmu.compiler import compile_library, find_compiler
 from plant_fmu.errors import TaskError
 from plant_fmu.importers import IMPORTERS, Task, fmu_file, read_fmu, run_importer
+from plant_fmu.platforms import native_platform
 
 FMPY = next(importer for importer in IMPORTERS if importer.name == "FMPy")
 DESCRIPTION = '<fmiModelDescription fmiVersion="3.0"><ModelVariables/></fmiModelDescription>'
@@ -122,7 +123,7 @@ def test_an_fmu_that_takes_its_importer_down(odin, tmp_path, deed, words):
         f"#include <stdlib.h>\n__attribute__((constructor)) static void loaded(void) {{ {deed} }}\nint nothing;\n"
     )
     library = tmp_path / "bad.so"
-    compile_library([tmp_path / "bad.c"], [], library)
+    compile_library(find_compiler(), native_platform(), [tmp_path / "bad.c"], [], library)
 
     def replaced(name, data):
         return library.read_bytes() if name.startswith("binaries/") else data

@@ -7,7 +7,7 @@ import fmpy
 import pytest
 
 from plant_fmu import load_vehicle
-from plant_fmu.build import _write_sources
+from plant_fmu.build import neutral_members
 from plant_fmu.compiler import find_compiler
 
 HERE = Path(__file__).parent
@@ -19,12 +19,14 @@ def fuzzer(tmp_path_factory):
 
     def build(fmi):
         folder = tmp_path_factory.mktemp(f"fuzz{fmi}")
-        sources = _write_sources(folder, load_vehicle("odin"), fmi)
+        for name, data in neutral_members(load_vehicle("odin"), fmi).items():
+            if name.startswith("sources/"):
+                (folder / Path(name).name).write_bytes(data)
         program = folder / "fuzz"
         command = [
             *find_compiler(), "-std=c99", "-g", "-O1", "-fsanitize=address,undefined", "-fno-sanitize-recover=all",
             f"-DFMI={fmi}", f"-I{folder}", f"-I{Path(fmpy.__file__).parent / 'c-code'}",
-            *map(str, sources), str(HERE / "fuzz.c"), "-o", str(program), "-lm",
+            *map(str, folder.glob("*.c")), str(HERE / "fuzz.c"), "-o", str(program), "-lm",
         ]  # fmt: skip
         done = subprocess.run(command, capture_output=True, text=True)
         if done.returncode != 0:
