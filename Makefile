@@ -6,7 +6,7 @@ VENV ?= .venv
 BIN := $(VENV)/bin
 comma := ,
 # without a C compiler the ziglang package is one
-EXTRAS := mavlink,dev$(if $(shell command -v cc),,$(comma)build)
+EXTRAS := mavlink,importers,dev$(if $(shell command -v cc),,$(comma)build)
 PYTEST_FLAGS ?=
 
 .PHONY: run test lint bench clean
@@ -24,6 +24,7 @@ lint: $(VENV)/ready
 
 bench: $(VENV)/ready
 	$(BIN)/python -m benchmarks step
+	$(BIN)/python -m benchmarks fmu
 
 $(VENV)/ready: pyproject.toml
 	$(PYTHON) -c 'import sys; sys.exit(None if sys.version_info >= (3, 11) else "Python 3.11 or later is needed")'

@@ -1,90 +1,34 @@
-"""``python -m benchmarks step``: what a step of the paper's scenario costs, part by part."""
+"""``python -m benchmarks {step,fmu}``: microseconds a step and ratios, in a table."""
 
 from __future__ import annotations
 
 import argparse
-import platform
-import statistics
-import tempfile
-import time
-from collections.abc import Callable
-from pathlib import Path
+from collections.abc import Sequence
 
-import numpy as np
+from benchmarks import fmu, step
+from benchmarks.timing import print_rows
 
-from cosim.master import Master
-from cosim.record import Recorder
-from cosim.scenario import load_scenario
-
+BENCHMARKS = {"step": step, "fmu": fmu}
 REPEATS = 5
-STEPS = 20_000
 
 
-def per_call(work: Callable[[], object], calls: int) -> tuple[float, float, float]:
-    """Return the least, median and greatest microseconds a call over some repeats."""
-    work()  # compile, and warm the caches
-    found = []
-    for _ in range(REPEATS):
-        before = time.perf_counter()
-        for _ in range(calls):
-            work()
-        found.append((time.perf_counter() - before) / calls * 1e6)
-    return min(found), statistics.median(found), max(found)
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run the benchmark that is named on the command line.
 
-
-def whole(engine: str, *, record: bool) -> tuple[float, float, float]:
-    """Return microseconds a step of whole runs, stepped as `cosim run` does."""
-    scenario = load_scenario("paper", [f"arbiter.engine={engine}", f"time.duration={STEPS / 1000}"])
-    found = []
-    for _ in range(REPEATS):
-        with tempfile.TemporaryDirectory() as folder, Master(scenario) as master:
-            observers = [Recorder(Path(folder), master.signals.columns)] if record else []
-            before = time.perf_counter()
-            master.run(observers)
-            for recorder in observers:
-                recorder.close()
-            found.append((time.perf_counter() - before) / scenario.steps * 1e6)
-    return min(found), statistics.median(found), max(found)
-
-
-def step() -> None:
-    """Print what each part of a step costs."""
-    rows: list[tuple[str, tuple[float, float, float]]] = []
-    rng = np.random.default_rng(0)
-    with Master(load_scenario("paper", ["arbiter.engine=closed"])) as master:
-        clock = iter(range(10**9))
-        fmu = f"FMU: set {len(master.plant.inputs)}, step, get {len(master.plant.outputs)}"
-        rows.append((fmu, per_call(lambda: master.plant.step(next(clock) * 1e-3, 1e-3), STEPS)))
-        rows.append(("regions: 4 evaluated", per_call(master._evaluate_regions, STEPS)))
-        rows.append(("arbiter, closed form", per_call(master._arbitrate, STEPS)))
-        rows.append(("controller, printed law", per_call(master._control, STEPS)))
-        with tempfile.TemporaryDirectory() as folder:
-            recorder = Recorder(Path(folder), master.signals.columns)
-            rows.append(("record", per_call(lambda: recorder.observe(0, master.signals.row), STEPS)))
-    with Master(load_scenario("paper", ["arbiter.engine=skfuzzy"])) as master:
-
-        def new_inputs() -> None:
-            master.arbiter(rng.random(3).tolist())
-
-        rows.append(("arbiter, scikit-fuzzy, inputs as before", per_call(master._arbitrate, STEPS)))
-        rows.append(("arbiter, scikit-fuzzy, new inputs", per_call(new_inputs, 400)))
-    rows.append(("whole step, closed form, no record", whole("closed", record=False)))
-    rows.append(("whole step, closed form, with record", whole("closed", record=True)))
-    rows.append(("whole step, scikit-fuzzy, with record", whole("skfuzzy", record=True)))
-
-    reference = rows[0][1][1]
-    print(f"{platform.processor() or platform.machine()}, Python {platform.python_version()}, {REPEATS} repeats")
-    print(f"{'microseconds a step':42} {'least':>8} {'median':>8} {'most':>8} {'x FMU':>7}")
-    for name, (least, median, most) in rows:
-        print(f"{name:42} {least:8.2f} {median:8.2f} {most:8.2f} {median / reference:7.2f}")
-
-
-def main() -> None:
-    """Run the benchmark that is named on the command line."""
+    Parameters
+    ----------
+    arguments : sequence of str, optional
+        Default: those of the process.
+    """
     parser = argparse.ArgumentParser(prog="python -m benchmarks")
-    parser.add_argument("name", choices=["step"], help="which benchmark")
-    parser.parse_args()
-    step()
+    verbs = parser.add_subparsers(dest="name", required=True)
+    for name, benchmark in BENCHMARKS.items():
+        verb = verbs.add_parser(name, help=(benchmark.__doc__ or "").splitlines()[0])
+        verb.add_argument("--steps", type=int, default=benchmark.STEPS, help="a repeat (default: %(default)s)")
+        verb.add_argument("--repeats", type=int, default=REPEATS, help="default: %(default)s")
+    options = parser.parse_args(arguments)
+    benchmark = BENCHMARKS[options.name]
+    print_rows(benchmark.measure(options.steps, options.repeats), options.repeats, benchmark.RATIO)
 
 
 if __name__ == "__main__":

@@ -9,10 +9,6 @@ class ScenarioError(CosimError):
     """A scenario that is unknown, or a key in it that cannot be."""
 
 
-class PlantError(CosimError):
-    """An FMU that cannot be loaded, or refuses a value or a step; its own words are in the message."""
-
-
 class RunError(CosimError):
     """A run folder that cannot be written or read."""
 

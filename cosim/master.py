@@ -15,14 +15,13 @@ import numpy as np
 
 from controller import Allocation, Law, PrintedLaw, RegionValues, VehicleState
 from controller.regions import Region, pack
-from cosim.plant import Plant
 from cosim.scenario import CRITERIA, Scenario
 from cosim.signals import Array, Column, Signals
 from fuzzy_arbiter import Arbiter, ramp
-from plant_fmu import cached_fmu
+from plant_fmu import Channels, Plant
 
 _LONGEST_SLEEP = 3600.0  # s
-_STATE = 16  # outputs measured before a step: position, quaternion, velocity, attitude
+_FIRST_APPLIED = "thruster_force[1]"  # outputs before it are read at the beginning of a step, from it on at the end
 
 
 class Observer(Protocol):
@@ -70,7 +69,7 @@ class Master:
         self._criterion_of = [CRITERIA.index(secondary.criterion) for secondary in scenario.regions]
         self._gains = np.array([secondary.gain for secondary in scenario.regions])
 
-        self.plant = Plant(cached_fmu(vehicle, scenario.plant.fmi))
+        self.plant = Plant(vehicle, scenario.plant.fmi)
         try:
             self.plant.set(_start_values(scenario))
             self.plant.initialise()
@@ -83,10 +82,11 @@ class Master:
     def _bind(self) -> None:
         """Name the parts of the row, and the buffers beside it."""
         s, n, n_thrusters = self.signals, len(self.scenario.regions), self.scenario.vehicle.n_thrusters
-        outputs = s.view("position.x", len(self.plant.outputs))
-        self._measured, self._applied = outputs[:_STATE], outputs[_STATE:]
-        self._plant_measured = self.plant.output_values[:_STATE]
-        self._plant_applied = self.plant.output_values[_STATE:]
+        plant, n_outputs = self.plant, len(self.plant.outputs)
+        outputs = s.view("position.x", n_outputs + len(plant.flags))
+        n_measured = plant.outputs.names.index(_FIRST_APPLIED)
+        self._measured, self._applied, self._flags = np.split(outputs, [n_measured, n_outputs])
+        self._plant_measured, self._plant_applied = np.split(plant.outputs.values, [n_measured])
 
         self.state = VehicleState(
             position=s.view("position.x", 3),
@@ -139,7 +139,7 @@ class Master:
                 self._control()
                 self._actuate()
             if k < last:
-                self._advance(k * step, step)
+                self._advance(step)
             for observer in observers:
                 observer.observe(k, seen)
             if rate is not None:
@@ -175,10 +175,11 @@ class Master:
         else:
             self._allocation_cut[0] = self.allocation(self._command, self._thrusts)
 
-    def _advance(self, now: float, step: float) -> None:
-        self.plant.input_values[:] = self._inputs
-        self.plant.step(now, step)
+    def _advance(self, step: float) -> None:
+        self.plant.inputs.values[:] = self._inputs
+        self.plant.step(step)
         self._applied[:] = self._plant_applied
+        self._flags[:] = self.plant.read_flags()
 
     # ---- the end ----
 
@@ -217,7 +218,8 @@ def _columns(scenario: Scenario, plant: Plant) -> list[Column]:
     force_units = ("N",) * 3 + ("N.m",) * 3
     return [
         Column("time", "s", "Simulated time at the beginning of the step"),
-        *plant.outputs,
+        *_of(plant.outputs),
+        *_of(plant.flags),
         *(Column(f"{name}.value", shape.unit, f"g of {name}, above 0 where violated") for name, shape in regions),
         *(
             Column(f"{name}.clearance", "m", f"Distance to the surface of {name}, below 0 where violated")
@@ -234,5 +236,9 @@ def _columns(scenario: Scenario, plant: Plant) -> list[Column]:
             for name, unit in zip("XYZKMN", force_units, strict=True)
         ),
         Column("allocation_saturated", "", "The thrusters' limits cut the wrench that the law asks for"),
-        *plant.inputs,
+        *_of(plant.inputs),
     ]
+
+
+def _of(channels: Channels) -> list[Column]:
+    return [Column(channel.name, channel.unit, channel.description) for channel in channels.channels]

@@ -10,13 +10,14 @@ from typing import Any
 
 from tqdm import tqdm
 
-from cosim.errors import PlantError, RunError
+from cosim.errors import RunError
 from cosim.master import Master, Observer
 from cosim.record import Recorder
 from cosim.run_folder import RunFolder, claim, conclude
 from cosim.scenario import Scenario
 from cosim.signals import Array
 from cosim.telemetry import Telemetry
+from plant_fmu import PlantError
 
 _PROGRESS_STEPS = 200  # times that the bar moves
 

@@ -56,7 +56,7 @@ class PlantSetup:
     fmi: Literal[2, 3] = 3
     current: Vector3 = (0.0, 0.0, 0.0)  # m/s, of the water, world frame
     substep: float = 0.005  # s, greatest integration step
-    parameters: dict[str, float] = field(default_factory=dict)  # of the FMU, by name, over those of the vehicle
+    parameters: dict[str, float | bool] = field(default_factory=dict)  # of the FMU, by name, over those of the vehicle
 
 
 @dataclass(frozen=True)
@@ -329,7 +329,7 @@ def _check_intersection(wanted: tuple[str, ...], regions: tuple[SecondaryRegion,
     return tuple(kept_out[name] for name in wanted or kept_out)
 
 
-def _check_parameters(given: dict[str, float], vehicle: Vehicle) -> None:
+def _check_parameters(given: dict[str, float | bool], vehicle: Vehicle) -> None:
     names = [v.name for v in variables(vehicle) if v.role == "parameter"]
     known = [name for name in names if name.partition(".")[0] not in _OWN_KEYS]
     for name in given:

@@ -1,4 +1,4 @@
-"""Command line: ``python -m plant_fmu {build,list,docs,ssv,reference}``."""
+"""Command line: ``python -m plant_fmu {build,check,list,docs,ssv,reference}``."""
 
 from __future__ import annotations
 
@@ -8,10 +8,12 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from plant_fmu.build import FMI_VERSIONS, build_fmu
+from plant_fmu.check import Verdict, check_fmu
 from plant_fmu.description import documentation
 from plant_fmu.errors import BuildError, PlantFmuError
 from plant_fmu.layered import reference_files
 from plant_fmu.parameter_set import ssv
+from plant_fmu.platforms import ALL, NATIVE, PLATFORMS
 from plant_fmu.reference import reference
 from plant_fmu.vehicle import load_vehicle, shipped_vehicles
 
@@ -23,20 +25,33 @@ def _parser() -> argparse.ArgumentParser:
     build = verbs.add_parser("build", help="write the FMU of a vehicle")
     build.add_argument("--vehicle", required=True, help="a shipped name, or a TOML file")
     build.add_argument("--fmi", type=int, choices=FMI_VERSIONS, default=3, help="FMI 2.0 or 3.0 (default: 3)")
+    build.add_argument(
+        "--platforms",
+        default=NATIVE,
+        help=f"{NATIVE} for this machine (default); by the ziglang package: {ALL}, or some of {','.join(PLATFORMS)}",
+    )
     build.add_argument("--out", type=Path, help="file to write (default: NAME.fmu here)")
+
+    check = verbs.add_parser("check", help="try an FMU in every validator and importer that is installed")
+    check.add_argument("fmu", type=Path, metavar="FILE.fmu", help="any FMU of FMI 2.0 or 3.0; its binary is run")
+    check.add_argument("--stop-time", type=float, metavar="S", help="default: the FMU's own, else 10")
+    check.add_argument("--step", type=float, metavar="S", help="default: the FMU's own, else 0.01")
+    check.add_argument(
+        "--set", type=_assignment, action="append", default=[], metavar="NAME=NUMBER", help="start value of a variable"
+    )
 
     verbs.add_parser("list", help="list the shipped vehicles")
 
     docs = verbs.add_parser("docs", help="print the page of an FMU's variables, in Markdown")
     docs.add_argument("--vehicle", required=True, help="a shipped name, or a TOML file")
 
-    ssv = verbs.add_parser("ssv", help="write the parameters of a vehicle as an SSP parameter set")
-    ssv.add_argument("--vehicle", required=True, help="a shipped name, or a TOML file")
-    ssv.add_argument("--out", type=Path, help="file to write (default: NAME.ssv here)")
+    numbers = verbs.add_parser("ssv", help="write the parameters of a vehicle as an SSP parameter set")
+    numbers.add_argument("--vehicle", required=True, help="a shipped name, or a TOML file")
+    numbers.add_argument("--out", type=Path, help="file to write (default: NAME.ssv here)")
 
-    reference = verbs.add_parser("reference", help="write a manoeuvre and its results, integrated without the FMU")
-    reference.add_argument("--vehicle", required=True, help="a shipped name, or a TOML file")
-    reference.add_argument("--out", type=Path, default=Path(), help="folder to write to (default: here)")
+    results = verbs.add_parser("reference", help="write a manoeuvre and its results, integrated without the FMU")
+    results.add_argument("--vehicle", required=True, help="a shipped name, or a TOML file")
+    results.add_argument("--out", type=Path, default=Path(), help="folder to write to (default: here)")
     return parser
 
 
@@ -46,6 +61,28 @@ def _write(out: Path, text: str) -> Path:
     except OSError as error:
         raise BuildError(f"{out}: {error.strerror or error}") from error
     return out
+
+
+def _assignment(text: str) -> tuple[str, float]:
+    name, _, number = text.rpartition("=")
+    try:
+        return name, float(number)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r}: expected NAME=NUMBER") from None
+
+
+def _print_verdicts(verdicts: Sequence[Verdict]) -> None:
+    rows = [("importer", "version", "type", "verdict", "difference", "note")]
+    for verdict in verdicts:
+        result = verdict.result
+        difference = "" if verdict.difference is None else f"{verdict.difference:.1e}"
+        rows.append((result.importer, result.version, result.interface, result.status, difference, result.note))
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    for row in rows:
+        print("  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip())
+    compared = [verdict for verdict in verdicts if verdict.difference is not None]
+    if compared:
+        print("difference: the greatest of an output at the stop time to FMPy's co-simulation")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -59,13 +96,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns
     -------
     int
-        0, or 2 where the user must mend something.
+        0; 1 if an importer failed with a checked FMU; 2 where the user must mend something.
     """
     options = _parser().parse_args(arguments)
     try:
         if options.verb == "list":
-            for name in shipped_vehicles():
-                print(f"{name:16} {load_vehicle(name).title}")
+            names = shipped_vehicles()
+            for name in names:
+                print(f"{name:{max(map(len, names))}}  {load_vehicle(name).title}")
         elif options.verb == "docs":
             print(documentation(load_vehicle(options.vehicle)), end="")
         elif options.verb == "ssv":
@@ -75,9 +113,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
             vehicle = load_vehicle(options.vehicle)
             for name, text in reference_files(vehicle, reference(vehicle)).items():
                 print(_write(options.out / name, text))
+        elif options.verb == "check":
+            verdicts = check_fmu(options.fmu, options.stop_time, options.step, dict(options.set))
+            _print_verdicts(verdicts)
+            return 1 if any(verdict.result.status == "failed" for verdict in verdicts) else 0
         else:
             vehicle = load_vehicle(options.vehicle)
-            print(build_fmu(vehicle, options.fmi, options.out or Path(f"{vehicle.name}.fmu")))
+            print(build_fmu(vehicle, options.fmi, options.out or Path(f"{vehicle.name}.fmu"), options.platforms))
     except PlantFmuError as error:
         print(f"plant_fmu: {error}", file=sys.stderr)
         return 2

@@ -10,36 +10,30 @@ import logging
 import os
 import shutil
 import tempfile
-import zipfile
-from importlib import resources
+from collections.abc import Mapping
 from pathlib import Path
 
 import fmpy
 import platformdirs
 
-from plant_fmu.compiler import FLAGS, compile_library, find_compiler, library_suffix, native_platform
+from plant_fmu.archive import write_archive
+from plant_fmu.compiler import FLAGS, compile_library, cross_compiler, find_compiler
 from plant_fmu.contents import contents
 from plant_fmu.description import header, model_description, token
 from plant_fmu.errors import BuildError
+from plant_fmu.platforms import NATIVE, Platform, cross_platforms, native_platform
+from plant_fmu.sources import build_description, c_sources, compiled_files
+from plant_fmu.universal import universal_library
 from plant_fmu.vehicle import Vehicle
 
 log = logging.getLogger(__name__)
 
 FMI_VERSIONS = (2, 3)
 
-_ZIP_DATE = (1980, 1, 1, 0, 0, 0)
-# FMI 2.0 names no aarch64: FMPy looks in these folders there, and other tools take them for x86_64
-_FMI2_PLATFORMS = {
-    "x86_64-linux": "linux64",
-    "x86_64-windows": "win64",
-    "x86_64-darwin": "darwin64",
-    "aarch64-linux": "linux64",
-    "aarch64-windows": "win64",
-    "aarch64-darwin": "darwin64",
-}
+_FMI_HEADERS = Path(fmpy.__file__).parent / "c-code"
 
 
-def build_fmu(vehicle: Vehicle, fmi: int, out: Path) -> Path:
+def build_fmu(vehicle: Vehicle, fmi: int, out: Path, platforms: str = NATIVE) -> Path:
     """Write the FMU of a vehicle.
 
     Parameters
@@ -47,9 +41,12 @@ def build_fmu(vehicle: Vehicle, fmi: int, out: Path) -> Path:
     vehicle : Vehicle
         The vehicle, whose numbers become the start values of the FMU's parameters.
     fmi : int
-        2 for FMI 2.0, 3 for FMI 3.0, both for co-simulation.
+        2 for FMI 2.0, 3 for FMI 3.0, both for co-simulation and model exchange.
     out : Path
         The file to write; it appears whole or not at all.
+    platforms : str
+        ``native`` for this machine, by whatever compiler is here; ``all``, or FMI 3.0's names with commas between them,
+        such as ``x86_64-linux,x86_64-windows``, by the compiler of the ziglang package.
 
     Returns
     -------
@@ -59,24 +56,17 @@ def build_fmu(vehicle: Vehicle, fmi: int, out: Path) -> Path:
     Raises
     ------
     BuildError
-        If there is no compiler, it fails, or `out` cannot be written.
+        If a platform is not known, there is no compiler, it fails, or `out` cannot be written.
     """
     if fmi not in FMI_VERSIONS:
         raise BuildError(f"FMI version is {fmi!r}, expected 2 or 3")
     out = Path(out)
-    place = native_platform()
-    with tempfile.TemporaryDirectory(prefix="plant_fmu-") as scratch:
-        folder = Path(scratch)
-        sources = _write_sources(folder, vehicle, fmi)
-        library = folder / f"{vehicle.name}{library_suffix()}"
-        compile_library(sources, [folder, Path(fmpy.__file__).parent / "c-code"], library)
-        binaries = _FMI2_PLATFORMS[place] if fmi == 2 else place
-        content = {
-            **contents(vehicle, fmi),
-            "modelDescription.xml": _description(vehicle, fmi).encode(),
-            f"binaries/{binaries}/{library.name}": library.read_bytes(),
-        }
-    _write_zip(out, content)
+    if platforms == NATIVE:
+        compilers = [(native_platform(), find_compiler())]
+    else:
+        compilers = [(platform, cross_compiler(platform)) for platform in cross_platforms(platforms)]
+    members = neutral_members(vehicle, fmi)
+    write_archive(out, members | _binaries(vehicle.name, fmi, members, compilers))
     return out
 
 
@@ -101,9 +91,12 @@ def cached_fmu(vehicle: Vehicle, fmi: int) -> Path:
     BuildError
         As `build_fmu`.
     """
-    made_from = [_description(vehicle, fmi).encode(), *contents(vehicle, fmi).values()]
-    made_from += [part.encode() for part in (native_platform(), *FLAGS, fmpy.__version__)]
-    digest = hashlib.sha256(b"\0".join(made_from)).hexdigest()[:16]
+    if fmi not in FMI_VERSIONS:
+        raise BuildError(f"FMI version is {fmi!r}, expected 2 or 3")
+    made_from = hashlib.sha256(" ".join((native_platform().name, *FLAGS, fmpy.__version__)).encode())
+    for name, data in sorted(neutral_members(vehicle, fmi).items()):
+        made_from.update(f"\n{name} {len(data)}\n".encode() + data)
+    digest = made_from.hexdigest()[:16]
     path = Path(platformdirs.user_cache_dir("subreach")) / "fmu" / f"{vehicle.name}-fmi{fmi}-{digest}.fmu"
     if path.exists():
         return path
@@ -128,49 +121,36 @@ def _own_folder() -> Path:
     return Path(folder)
 
 
-def _description(vehicle: Vehicle, fmi: int) -> str:
-    return model_description(vehicle, fmi, token(vehicle, fmi, _source_bytes()))
-
-
-def _sources(fmi: int | None = None) -> list[resources.abc.Traversable]:
-    """Return the C files of one FMI version, or of both."""
-    other = {2: "fmi3.c", 3: "fmi2.c"}.get(fmi or 0)
-    folder = resources.files("plant_fmu") / "csrc"
-    return sorted(
-        (f for f in folder.iterdir() if f.name[-2:] in (".c", ".h") and f.name != other), key=lambda f: f.name
+def neutral_members(vehicle: Vehicle, fmi: int) -> dict[str, bytes]:
+    """Return all that goes into an FMU but the binaries, by name in the archive."""
+    sources = c_sources(fmi)
+    key = token(vehicle, fmi, b"".join(sources.values()))
+    sources["vehicle.h"] = header(vehicle, key).encode()
+    if fmi == 3:
+        sources["buildDescription.xml"] = build_description(vehicle.name).encode()
+    return (
+        contents(vehicle, fmi)
+        | {f"sources/{name}": data for name, data in sources.items()}
+        | {"modelDescription.xml": model_description(vehicle, fmi, key).encode()}
     )
 
 
-def _source_bytes() -> bytes:
-    return b"".join(file.read_bytes() for file in _sources())
-
-
-def _write_sources(folder: Path, vehicle: Vehicle, fmi: int) -> list[Path]:
-    """Lay out the C files and the generated header; return the files to compile."""
-    for file in _sources(fmi):
-        (folder / file.name).write_bytes(file.read_bytes())
-    (folder / "vehicle.h").write_text(header(vehicle, token(vehicle, fmi, _source_bytes())), encoding="utf-8")
-    return sorted(folder.glob("*.c"))
-
-
-def _write_zip(out: Path, content: dict[str, bytes]) -> None:
-    if out.is_dir() or (out.exists() and not out.is_file()):
-        raise BuildError(f"{out}: exists and is no file; expected the name of a new one")
-    try:
-        with tempfile.NamedTemporaryFile(dir=out.parent, prefix=f".{out.name}-", delete=False) as scratch:
-            pass
-    except OSError as error:
-        raise BuildError(f"{out}: {error.strerror or error}") from error
-    try:
-        with zipfile.ZipFile(scratch.name, "w", zipfile.ZIP_DEFLATED) as archive:
-            for name, data in sorted(content.items()):
-                info = zipfile.ZipInfo(name, _ZIP_DATE)
-                info.compress_type = zipfile.ZIP_DEFLATED
-                info.external_attr = 0o644 << 16
-                archive.writestr(info, data)
-        os.chmod(scratch.name, 0o644)
-        os.replace(scratch.name, out)
-    except OSError as error:
-        raise BuildError(f"{out}: {error.strerror or error}") from error
-    finally:
-        Path(scratch.name).unlink(missing_ok=True)
+def _binaries(
+    name: str, fmi: int, members: Mapping[str, bytes], compilers: list[tuple[Platform, list[str]]]
+) -> dict[str, bytes]:
+    """Compile the sources among `members` for each platform; return the libraries by name in the archive."""
+    libraries: dict[str, list[bytes]] = {}
+    with tempfile.TemporaryDirectory(prefix="plant_fmu-") as scratch:
+        folder = Path(scratch)
+        for member, data in members.items():
+            if member.startswith("sources/"):
+                (folder / Path(member).name).write_bytes(data)
+        files = [folder / file for file in compiled_files(fmi)]
+        for platform, compiler in compilers:
+            library = folder / platform.name / f"{name}{platform.suffix}"
+            library.parent.mkdir()
+            compile_library(compiler, platform, files, [folder, _FMI_HEADERS], library)
+            place = platform.fmi2_name if fmi == 2 else platform.name
+            libraries.setdefault(f"binaries/{place}/{library.name}", []).append(library.read_bytes())
+    # FMI 2.0 has one place for the libraries of both Macs
+    return {place: found[0] if len(found) == 1 else universal_library(found) for place, found in libraries.items()}

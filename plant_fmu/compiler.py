@@ -5,7 +5,6 @@ from __future__ import annotations
 import importlib.util
 import logging
 import os
-import platform
 import shlex
 import shutil
 import subprocess
@@ -14,36 +13,19 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from plant_fmu.errors import BuildError
+from plant_fmu.platforms import Platform, native_platform
 
 log = logging.getLogger(__name__)
 
 # no contraction of a*b+c, so that compilers differ in no bit beyond what their C libraries do;
-# and no debug information, which would name the folder of the build
-FLAGS = ("-std=c99", "-O2", "-g0", "-ffp-contract=off", "-fPIC", "-fvisibility=hidden", "-shared")
+# and neither symbols nor debug information, which would name the folder of the build
+FLAGS = ("-std=c99", "-O3", "-fno-math-errno", "-g0", "-ffp-contract=off", "-fPIC", "-fvisibility=hidden", "-shared")
 _WARNINGS = ("-Wall", "-Wextra", "-Wpedantic")
-
-_OLD_GLIBC = "gnu.2.17"  # so that a library built here also loads on older systems
-
-
-def native_platform() -> str:
-    """Return this machine's platform in FMI 3.0's words, such as ``x86_64-linux``."""
-    machine = {"amd64": "x86_64", "x86_64": "x86_64", "arm64": "aarch64", "aarch64": "aarch64"}.get(
-        platform.machine().lower()
-    )
-    system = {"Linux": "linux", "Windows": "windows", "Darwin": "darwin"}.get(platform.system())
-    if system is None or machine is None:
-        here = f"{platform.system()} on {platform.machine()}"
-        raise BuildError(f"no FMU can be built here, {here}: expected Linux, Windows or macOS on x86_64 or aarch64")
-    return f"{machine}-{system}"
-
-
-def library_suffix() -> str:
-    """Return the ending of shared libraries on this machine."""
-    return {"Windows": ".dll", "Darwin": ".dylib"}.get(platform.system(), ".so")
+_INSTALL = "pip install 'subreach[build]'"
 
 
 def find_compiler() -> list[str]:
-    """Return the command of a C compiler: ``CC``, else ``cc``, else that of the ziglang package.
+    """Return the command of a C compiler for this machine: ``CC``, else ``cc``, else that of the ziglang package.
 
     Returns
     -------
@@ -67,19 +49,44 @@ def find_compiler() -> list[str]:
     if path := shutil.which("cc"):
         return [path]
     if importlib.util.find_spec("ziglang"):
-        words = [sys.executable, "-m", "ziglang", "cc"]
-        machine, system = native_platform().split("-")
-        if system == "linux":
-            return [*words, "-target", f"{machine}-linux-{_OLD_GLIBC}"]
-        return [*words, "-mcpu=baseline"]
-    raise BuildError("no C compiler: neither cc nor the ziglang package was found; pip install 'subreach[build]'")
+        return cross_compiler(native_platform())
+    raise BuildError(f"no C compiler: neither cc nor the ziglang package was found; {_INSTALL}")
 
 
-def compile_library(sources: Sequence[Path], includes: Sequence[Path], library: Path) -> None:
+def cross_compiler(platform: Platform) -> list[str]:
+    """Return the command of the ziglang package's C compiler for a platform.
+
+    Parameters
+    ----------
+    platform : Platform
+        What to compile for.
+
+    Returns
+    -------
+    list of str
+        The command and its first arguments.
+
+    Raises
+    ------
+    BuildError
+        If the package is not there.
+    """
+    if importlib.util.find_spec("ziglang") is None:
+        raise BuildError(f"no compiler for other platforms: the ziglang package was not found; {_INSTALL}")
+    return [sys.executable, "-m", "ziglang", "cc", "-target", platform.target]
+
+
+def compile_library(
+    compiler: Sequence[str], platform: Platform, sources: Sequence[Path], includes: Sequence[Path], library: Path
+) -> None:
     """Compile C files into one shared library without any dependency but the C library.
 
     Parameters
     ----------
+    compiler : sequence of str
+        The command and its first arguments.
+    platform : Platform
+        What the compiler compiles for.
     sources : sequence of Path
         The C files.
     includes : sequence of Path
@@ -90,11 +97,14 @@ def compile_library(sources: Sequence[Path], includes: Sequence[Path], library: 
     Raises
     ------
     BuildError
-        If there is no compiler, or it fails; its first complaint is in the message.
+        If the compiler fails; its first complaint is in the message.
     """
-    compiler = find_compiler()
+    link = ["-s"]
+    if platform.system == "darwin":
+        # the linker of macOS knows no -s, and writes the place of the build into the library unless told a name
+        link = ["-Wl,-x", f"-Wl,-install_name,@rpath/{library.name}"]
     command = [
-        *compiler, *FLAGS, *_WARNINGS,
+        *compiler, *FLAGS, *_WARNINGS, *link,
         *(f"-I{folder}" for folder in includes),
         *map(str, sources), "-o", str(library), "-lm",
     ]  # fmt: skip

@@ -8,6 +8,7 @@ from importlib import metadata
 from xml.etree import ElementTree as ET
 
 from plant_fmu.quantities import UNITS
+from plant_fmu.sources import compiled_files
 from plant_fmu.variables import Variable, variables
 from plant_fmu.vehicle import Vehicle
 
@@ -148,6 +149,10 @@ def model_description(vehicle: Vehicle, fmi: int, token: str) -> str:
             element.set("canHandleVariableCommunicationStepSize", "true")
         elif fmi == 2:
             element.set("completedIntegratorStepNotNeeded", "true")
+        if fmi == 2:  # FMI 3.0 lists them in sources/buildDescription.xml
+            files = ET.SubElement(element, "SourceFiles")
+            for name in compiled_files(fmi):
+                ET.SubElement(files, "File", name=name)
 
     units = ET.SubElement(root, "UnitDefinitions")
     for name, exponents in UNITS.items():

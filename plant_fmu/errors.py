@@ -15,3 +15,19 @@ class VehicleError(PlantFmuError):
 
 class BuildError(PlantFmuError):
     """No compiler, a compiler that fails, or a place that cannot be written."""
+
+
+class PlantError(PlantFmuError):
+    """An FMU that cannot be loaded, or refuses a value or a step; its own words are in the message."""
+
+
+class FmuFileError(PlantFmuError):
+    """A file that is no FMU, or one that no importer should extract."""
+
+
+class TaskError(PlantFmuError):
+    """A simulation that cannot be: times that do not fit, or variables that the FMU does not have."""
+
+
+class ImporterError(PlantFmuError):
+    """An importer that refuses an FMU, or fails with it."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
@@ -16,6 +17,30 @@ Vector3 = tuple[float, float, float]
 Vector6 = tuple[float, float, float, float, float, float]
 Rows = tuple[tuple[float, ...], ...]
 Matrix = tuple[float | tuple[float, ...], ...]  # rows, or a diagonal
+
+# a name becomes C text and a file's name: neither may be a word that C99 or Windows keep for themselves
+_RESERVED = re.compile(
+    "auto|break|case|char|const|continue|default|do|double|else|enum|extern|float|for|goto|if|inline|int|long|register|"
+    "restrict|return|short|signed|sizeof|static|struct|switch|typedef|union|unsigned|void|volatile|while|"
+    "(?i:con|prn|aux|nul|com[1-9]|lpt[1-9])"
+)
+
+# where in the file a number of the vehicle stands
+_KEYS = {
+    "mass": "rigid_body.mass",
+    "inertia": "rigid_body.inertia",
+    "r_G": "rigid_body.center_of_gravity",
+    "weight": "rigid_body.weight",
+    "r_B": "hydrostatics.center_of_buoyancy",
+    "buoyancy": "hydrostatics.buoyancy",
+    "added_mass": "hydrodynamics.added_mass",
+    "linear_damping": "hydrodynamics.linear_damping",
+    "quadratic_damping": "hydrodynamics.quadratic_damping",
+    "thruster_matrix": "thrusters.matrix",
+    "thrust_min": "thrusters.force_min",
+    "thrust_max": "thrusters.force_max",
+    "thrust_time_constant": "thrusters.time_constant",
+}
 
 
 @dataclass(frozen=True)
@@ -178,9 +203,11 @@ def _check(file: _File, where: str) -> Vehicle:
 
     body, statics, dynamics, thrusters = file.rigid_body, file.hydrostatics, file.hydrodynamics, file.thrusters
     good_name = file.name.isidentifier() and file.name.isascii() and len(file.name) <= 64
-    require(good_name, "name", repr(file.name), "at most 64 letters, digits and _")
+    require(good_name, "name", repr(file.name[:80]), "at most 64 letters, digits and _, the first no digit")
+    require(not _RESERVED.fullmatch(file.name), "name", repr(file.name), "a word that neither C nor Windows reserves")
     require(file.title.isprintable(), "title", repr(file.title), "one line of printable characters")
-    require(" ".join(file.source.split()).isprintable(), "source", repr(file.source), "printable characters")
+    odd = next((c for c in " ".join(file.source.split()) if not c.isprintable()), "")
+    require(not odd, "source", f"text with {odd!r}", "printable characters")
 
     widths = {len(row) for row in thrusters.matrix}
     require(
@@ -221,7 +248,7 @@ def _check(file: _File, where: str) -> Vehicle:
 
     for key, value in vars(vehicle).items():
         if not isinstance(value, str):
-            require(bool(np.all(np.isfinite(value))), key, "not finite", "finite numbers")
+            require(bool(np.all(np.isfinite(value))), _KEYS.get(key, key), "not finite", "finite numbers")
             if isinstance(value, np.ndarray):
                 value.setflags(write=False)
     require(vehicle.mass > 0, "rigid_body.mass", f"{vehicle.mass} kg", "above 0")
@@ -229,10 +256,11 @@ def _check(file: _File, where: str) -> Vehicle:
     require(vehicle.buoyancy >= 0, "hydrostatics.buoyancy", f"{vehicle.buoyancy} N", "0 or above")
     for key in ("linear_damping", "quadratic_damping"):
         worst = getattr(vehicle, key).min()
-        require(worst >= 0, f"hydrodynamics.{key}", worst, "0 or above (Property 3)")
+        require(worst >= 0, _KEYS[key], worst, "0 or above (Property 3)")
     for key in ("inertia", "added_mass"):
         matrix = getattr(vehicle, key)
-        require(bool(np.allclose(matrix, matrix.T, rtol=1e-9, atol=1e-9)), key, "not symmetric", "a symmetric matrix")
+        symmetric = bool(np.allclose(matrix, matrix.T, rtol=1e-9, atol=1e-9))
+        require(symmetric, _KEYS[key], "not symmetric", "a symmetric matrix")
     require(
         bool((vehicle.thrust_min <= vehicle.thrust_max).all()), "thrusters.force_min", "above force_max", "below it"
     )

@@ -48,6 +48,15 @@ def test_docs_fmu_snippet_runs(tmp_path, monkeypatch):
     assert names["result"]["position.x"][-1] > 1.0
 
 
+def test_docs_fmu_plant_runs():
+    *_, code = re.findall(r"```python\n(.*?)```", (ROOT / "docs" / "fmu.md").read_text(), re.S)
+    names = {}
+    exec(code, names)
+    assert names["speed"] > 0.1 and not names["cut"]
+    assert names["B"].shape == (2, 14) and (names["B"][0, :2] > 0).all()
+    assert names["plant"].time == 1.0
+
+
 def test_readme_names_the_shipped_scenarios():
     assert f"shipped scenarios: {', '.join(shipped_scenarios())}" in (ROOT / "README.md").read_text().replace(
         "paper, paper-limited, paper-calibrated", ", ".join(shipped_scenarios())

@@ -38,10 +38,17 @@ void actuators_target(const Parameters *p, const Inputs *inputs, Actuators *targ
     }
 }
 
+/* Shorter lags than a nanosecond are none: their rates would be beyond numbers. */
+static double lag(double time_constant)
+{
+    return time_constant > 1e-9 ? time_constant : 0.0;
+}
+
 double actuators_thrust_lag(const Parameters *p, int i)
 {
-    return p->thrust_rate_limit[i] > 0.0 ? fmax(p->thrust_time_constant[i], LEAST_RATE_LAG)
-                                        : p->thrust_time_constant[i];
+    const double T = lag(p->thrust_time_constant[i]);
+
+    return p->thrust_rate_limit[i] > 0.0 ? fmax(T, LEAST_RATE_LAG) : T;
 }
 
 /* Solution of x' = (to - x) / T, |x'| at most `limit`: a ramp while the gap is wide, then an exponential. */
@@ -61,15 +68,19 @@ static double lagged(double from, double to, double dt, double time_constant, do
 
 void actuators_after(const Parameters *p, const Actuators *start, const Actuators *target, double dt, Actuators *out)
 {
+    const double T_wrench = lag(p->wrench_time_constant);
+
     for (int i = 0; i < N_THRUSTERS; i++)
         out->thrust[i] = lagged(start->thrust[i], target->thrust[i], dt, actuators_thrust_lag(p, i),
                                 p->thrust_rate_limit[i]);
     for (int i = 0; i < 6; i++)
-        out->wrench[i] = lagged(start->wrench[i], target->wrench[i], dt, p->wrench_time_constant, 0.0);
+        out->wrench[i] = lagged(start->wrench[i], target->wrench[i], dt, T_wrench, 0.0);
 }
 
 void actuators_rate(const Parameters *p, const Actuators *now, const Actuators *target, Actuators *rate)
 {
+    const double T_wrench = lag(p->wrench_time_constant);
+
     for (int i = 0; i < N_THRUSTERS; i++) {
         const double limit = p->thrust_rate_limit[i];
         const double T = actuators_thrust_lag(p, i);
@@ -77,8 +88,7 @@ void actuators_rate(const Parameters *p, const Actuators *now, const Actuators *
         rate->thrust[i] = limit > 0.0 ? fmin(fmax(free, -limit), limit) : free;
     }
     for (int i = 0; i < 6; i++)
-        rate->wrench[i] =
-            p->wrench_time_constant > 0.0 ? (target->wrench[i] - now->wrench[i]) / p->wrench_time_constant : 0.0;
+        rate->wrench[i] = T_wrench > 0.0 ? (target->wrench[i] - now->wrench[i]) / T_wrench : 0.0;
 }
 
 void actuators_wrench(const Parameters *p, const Actuators *now, double tau[6])
@@ -101,11 +111,11 @@ static double curve_tangent(const Parameters *p, const Parameters *dp, int i, do
 
     if (command == 0.0)
         return dead == 0.0 ? dcommand * (1.0 - curve) : 0.0;
-    const double live = (command / limit - dead) / (1.0 - dead);
+    const double part = command / limit, live = (part - dead) / (1.0 - dead);
     if (live <= 0.0)
         return 0.0;
-    const double dlive = (dcommand / limit - command * dlimit / (limit * limit) - ddead + live * ddead) / (1.0 - dead);
-    return dlimit * live * (1.0 - curve + curve * live) + limit * dlive * (1.0 - curve + 2.0 * curve * live) +
+    const double limit_dlive = (dcommand - part * dlimit + limit * (live - 1.0) * ddead) / (1.0 - dead);
+    return dlimit * live * (1.0 - curve + curve * live) + limit_dlive * (1.0 - curve + 2.0 * curve * live) +
            limit * live * (live - 1.0) * dcurve;
 }
 
@@ -128,7 +138,7 @@ static void target_tangent(const Parameters *p, const Parameters *dp, const Inpu
     const double norm = sqrt(dot3(w, w)), limit = p->wrench_force_limit;
     const int cut = norm > limit;
     const double scale = cut ? limit / norm : 1.0;
-    const double dscale = cut ? (dp->wrench_force_limit - limit * dot3(w, dw) / (norm * norm)) / norm : 0.0;
+    const double dscale = cut ? (dp->wrench_force_limit - scale * dot3(w, dw) / norm) / norm : 0.0;
     for (int i = 0; i < 3; i++) {
         d->wrench[i] = scale * dw[i] + dscale * w[i];
         d->wrench[3 + i] = dw[3 + i];
@@ -165,7 +175,7 @@ void actuators_tangent(const Parameters *p, const Parameters *dp, const Inputs *
         dforce->thrust[i] = dp->thrust_effectiveness[i] * given + whole * dgiven;
     }
     for (int i = 0; i < 6; i++) {
-        const double T = p->wrench_time_constant;
+        const double T = lag(p->wrench_time_constant);
         drate->wrench[i] = lag_tangent(target.wrench[i] - now->wrench[i], dtarget.wrench[i] - dnow->wrench[i], T,
                                        dp->wrench_time_constant, 0.0, 0.0);
         dforce->wrench[i] = T > 0.0 ? dnow->wrench[i] : dtarget.wrench[i];

@@ -5,7 +5,7 @@
 
 void environment_current(const Parameters *p, const Drift *drift, double time, double depth, double velocity[3])
 {
-    const double below = fmax(depth, 0.0), elapsed = time - drift->since;
+    const double below = depth > 0.0 ? depth : 0.0, elapsed = time - drift->since;
 
     for (int i = 0; i < 3; i++)
         velocity[i] = p->current[i] + p->current_shear[i] * below + drift->value[i] + drift->slope[i] * elapsed;

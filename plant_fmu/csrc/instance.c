@@ -169,8 +169,8 @@ static Status check_parameters(const Instance *instance)
         if (p->noise[PAIRS[i].deviation] > 0.0 && !(p->sensor_rate[PAIRS[i].sensor] > 0.0))
             return instance_refuse(instance, "%s = %.9g needs the sensor's rate to be above 0, so that there are samples",
                                    PAIRS[i].noise, p->noise[PAIRS[i].deviation]);
-    if (p->free_surface && !(p->hull_radius > 0.0))
-        return instance_refuse(instance, "free_surface needs hull_radius to be above 0, so that buoyancy can fade");
+    if (p->free_surface && !(p->hull_radius >= 1e-3))
+        return instance_refuse(instance, "free_surface needs hull_radius to be 1 mm or more, so that buoyancy can fade");
     return STATUS_OK;
 }
 

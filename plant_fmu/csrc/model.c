@@ -5,13 +5,15 @@
 
 /* ---- clocks ------------------------------------------------------------------------------------------------ */
 
+static const double LONGEST_PERIOD = 1e8; /* s */
+
 static double period_wanted(const Parameters *p, int clock)
 {
     if (clock == CURRENT_CLOCK) {
         const double *v = p->current_variation;
         return v[0] > 0.0 || v[1] > 0.0 || v[2] > 0.0 ? p->current_variation_period : 0.0;
     }
-    return p->sensor_rate[clock] > 0.0 ? 1.0 / p->sensor_rate[clock] : 0.0;
+    return p->sensor_rate[clock] > 0.0 ? fmin(1.0 / p->sensor_rate[clock], LONGEST_PERIOD) : 0.0;
 }
 
 const char *model_prepare(Model *m)
@@ -155,11 +157,12 @@ int model_advance(Model *m, double end, double *failed)
         const int n = (int)fmax(1.0, ceil((until - start) / m->plant.parameters.substep - 1e-9));
         const double h = (until - start) / n;
 
+        *failed = h;
+        if (!plant_follows(&m->plant, &m->held.drift, start, h, m->state.rigid))
+            return 0;
         for (int i = 0; i < n; i++)
-            if (!plant_step(&m->plant, &m->held.drift, start + i * h, &target, h, &m->state)) {
-                *failed = h;
+            if (!plant_step(&m->plant, &m->held.drift, start + i * h, &target, h, &m->state))
                 return 0;
-            }
         m->time = until;
         model_tick(m);
     }

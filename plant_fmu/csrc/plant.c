@@ -6,6 +6,8 @@
 #include "linear.h"
 
 static const double LEAST_QUATERNION = 1e-6; /* length below which a quaternion has no direction */
+static const double MOST_DAMPED = 2.5;       /* h times rate; beyond 2.785 the method grows what it should damp */
+static const double MOST_MOBILE = 1e12;      /* 1/kg, 1/(kg m), 1/(kg m2): of the inverse of the mass matrix */
 
 /* ---- attitude ---------------------------------------------------------------------------------------------- */
 
@@ -128,8 +130,11 @@ const char *plant_prepare(Plant *plant)
         double column[6] = {0.0};
         column[j] = 1.0;
         solve((const double(*)[6])L, column);
-        for (int i = 0; i < 6; i++)
+        for (int i = 0; i < 6; i++) {
+            if (!(fabs(column[i]) < MOST_MOBILE))
+                return "mass matrix with added mass is too close to singular";
             d->mass_inverse[i][j] = column[i];
+        }
     }
 
     /* the greatest eigenvalue of the linear block is at most its greatest row sum */
@@ -142,6 +147,9 @@ const char *plant_prepare(Plant *plant)
             d->stiffest = i;
         }
     }
+    d->lags = p->wrench_time_constant > 0.0;
+    for (int i = 0; i < N_THRUSTERS; i++)
+        d->lags = d->lags || actuators_thrust_lag(p, i) > 0.0;
     d->contact_mass = 1.0 / greatest;
     d->contact_time = fmax(p->bottom_time_constant, CONTACT_SUBSTEPS * p->substep);
     return NULL;
@@ -238,7 +246,8 @@ void plant_derivative(const Plant *plant, const Drift *drift, double time, const
     multiply6(plant->derived.mass_inverse, wrench, rate + 7);
 }
 
-double plant_damping_rate(const Plant *plant, const Drift *drift, double time, const double rigid[N_RIGID])
+/* A bound of the fastest rate at which damping and bottom now make a velocity decay, 1/s. */
+static double damping_rate(const Plant *plant, const Drift *drift, double time, const double rigid[N_RIGID])
 {
     const Parameters *p = &plant->parameters;
     double R[3][3], water[3], current[3], root[6], bound = 0.0;
@@ -260,6 +269,11 @@ double plant_damping_rate(const Plant *plant, const Drift *drift, double time, c
     return bound + (rigid[2] + p->hull_radius > p->bottom_depth ? 2.0 / plant->derived.contact_time : 0.0);
 }
 
+int plant_follows(const Plant *plant, const Drift *drift, double time, double h, const double rigid[N_RIGID])
+{
+    return h * damping_rate(plant, drift, time, rigid) < MOST_DAMPED;
+}
+
 /* ---- stepping ---------------------------------------------------------------------------------------------- */
 
 static void advance(const double from[N_RIGID], const double rate[N_RIGID], double h, double to[N_RIGID])
@@ -271,22 +285,23 @@ static void advance(const double from[N_RIGID], const double rate[N_RIGID], doub
 int plant_step(const Plant *plant, const Drift *drift, double time, const Actuators *target, double h, State *state)
 {
     const Parameters *p = &plant->parameters;
-    Actuators middle, end;
+    Actuators middle;
     double tau_start[6], tau_middle[6], tau_end[6];
     double k1[N_RIGID], k2[N_RIGID], k3[N_RIGID], k4[N_RIGID], trial[N_RIGID];
-
-    /* beyond h * rate = 2.785 the method grows what it should damp, and may still look well */
-    if (!(h * plant_damping_rate(plant, drift, time, state->rigid) < 2.5))
-        return 0;
 
     /* lags do not depend on the body, so their stages are exact, and stable for any time constant; for one much below h
      * the step sees Simpson's mean of them, late by up to h/6 */
     actuators_after(p, &state->actuators, target, 0.0, &state->actuators);
-    actuators_after(p, &state->actuators, target, 0.5 * h, &middle);
-    actuators_after(p, &state->actuators, target, h, &end);
     actuators_wrench(p, &state->actuators, tau_start);
-    actuators_wrench(p, &middle, tau_middle);
-    actuators_wrench(p, &end, tau_end);
+    if (plant->derived.lags) {
+        actuators_after(p, &state->actuators, target, 0.5 * h, &middle);
+        actuators_after(p, &state->actuators, target, h, &state->actuators);
+        actuators_wrench(p, &middle, tau_middle);
+        actuators_wrench(p, &state->actuators, tau_end);
+    } else {
+        memcpy(tau_middle, tau_start, sizeof tau_middle);
+        memcpy(tau_end, tau_start, sizeof tau_end);
+    }
 
     plant_derivative(plant, drift, time, state->rigid, tau_start, k1);
     advance(state->rigid, k1, 0.5 * h, trial);
@@ -298,6 +313,5 @@ int plant_step(const Plant *plant, const Drift *drift, double time, const Actuat
 
     for (int i = 0; i < N_RIGID; i++)
         state->rigid[i] += h / 6.0 * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i]);
-    state->actuators = end;
-    return plant_normalise(state->rigid) && h * plant_damping_rate(plant, drift, time + h, state->rigid) < 2.5;
+    return plant_normalise(state->rigid) && plant_follows(plant, drift, time + h, h, state->rigid);
 }

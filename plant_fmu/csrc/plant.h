@@ -84,6 +84,7 @@ typedef struct { /* constants that follow from the parameters */
     double mass_inverse[6][6]; /* of M_RB + M_A */
     double contact_mass;       /* kg, at most what a force on the origin moves, in any direction */
     double contact_time;       /* s, bottom_time_constant, or what the substep can follow */
+    int lags;                  /* whether any force follows its command with a delay */
     int stiffest;              /* row of mass_inverse that tells contact_mass */
 } Derived;
 
@@ -130,15 +131,15 @@ int plant_normalise(double rigid[N_RIGID]);
 /* Rotation from body to world (3); a quaternion off unit length still gives a pure rotation, and none at all identity. */
 void plant_rotation(const double quaternion[4], double R[3][3]);
 
-/* A bound of the fastest rate at which damping now makes a velocity decay, 1/s: what limits the integration's step. */
-double plant_damping_rate(const Plant *plant, const Drift *drift, double time, const double rigid[N_RIGID]);
+/* Whether steps of h can follow the damping that acts now; where they cannot, results may still look well. */
+int plant_follows(const Plant *plant, const Drift *drift, double time, double h, const double rigid[N_RIGID]);
 
 /* Time derivative of the rigid-body state under the body wrench tau. */
 void plant_derivative(const Plant *plant, const Drift *drift, double time, const double rigid[N_RIGID],
                       const double tau[6], double rate[N_RIGID]);
 
 /* Advances the state by h with one Runge-Kutta step of order four, the commands being held. Returns 0 if the state has
- * no numbers, or h is beyond what the integration can follow. */
+ * no numbers, or h is beyond what the integration can follow at its end (plant_follows tells for its start). */
 int plant_step(const Plant *plant, const Drift *drift, double time, const Actuators *target, double h, State *state);
 
 /* Roll, pitch, yaw (zyx) of a quaternion. */

@@ -76,7 +76,14 @@ static unsigned modes_to_set(Role role)
 {
     const unsigned start = MODE_INSTANTIATED | MODE_INITIALISING;
 
-    return role == STATE ? start : start | MODE_STEPPING | MODE_EVENT | (role == INPUT ? MODE_CONTINUOUS : 0u);
+    switch (role) {
+    case STATE: /* in model exchange also one by one (FMI 3.0.2, 2.3.5 and 3.2.1), as CasADi does */
+        return start | MODE_EVENT | MODE_CONTINUOUS;
+    case INPUT:
+        return start | MODE_STEPPING | MODE_EVENT | MODE_CONTINUOUS;
+    default:
+        return start | MODE_STEPPING | MODE_EVENT;
+    }
 }
 
 static Status check_value(const Instance *instance, Type type, unsigned reference, double value)

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from cosim.errors import PlantError
 from cosim.master import Master
 from cosim.scenario import load_scenario
+from plant_fmu import PlantError
 
 SHORT = ["arbiter.engine=closed", "time.duration=0.5"]
 

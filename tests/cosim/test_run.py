@@ -7,13 +7,14 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from cosim.errors import PlantError, RunError
+from cosim.errors import RunError
 from cosim.record import Recorder, load_record
 from cosim.run import run_scenario
 from cosim.run_folder import claim, report_again
 from cosim.scenario import load_scenario
 from cosim.signals import Column
 from cosim.summary import spans
+from plant_fmu import PlantError
 
 SHORT = ["arbiter.engine=closed", "time.duration=0.3"]
 REQUIRED = {

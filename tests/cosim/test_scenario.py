@@ -130,7 +130,7 @@ def test_overrides_reach_every_depth(tmp_path):
         ("time.step=0.0007", ["multiple", "time.step"]),
         ("time.control=0.0015", ["time.control", "multiple"]),
         ("time.step=1e-10", ["time.duration", "steps"]),
-        ("vehicle=odinn", ["odinn", "bluerov2_heavy, odin"]),
+        ("vehicle=odinn", ["odinn", "bluerov2_heavy, bluerov2_heavy_wu, odin, rexrov"]),
         ("vehicle=nowhere.toml", ["nowhere.toml"]),
         ("initial.position=[1,2]", ["initial.position", "3"]),
         ("initial.position=[0,0,inf]", ["initial.position", "finite"]),

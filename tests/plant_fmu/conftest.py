@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import shutil
+import tempfile
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from fmpy.fmi2 import FMU2Model, FMU2Slave, fmi2CallbackFunctions, fmi2CallbackL
 from fmpy.fmi2 import defaultCallbacks as defaults
 from fmpy.fmi3 import FMU3Model, FMU3Slave
 
-from plant_fmu import cached_fmu, load_vehicle
+from plant_fmu import Plant, cached_fmu, load_vehicle
 
 STATES = [
     *(f"position.{a}" for a in "xyz"),
@@ -169,3 +170,39 @@ def make_slave():
     yield make
     for slave in slaves:
         slave.close()
+
+
+@pytest.fixture
+def make_plant():
+    """Return a function that makes plants, closed when the test ends."""
+    plants = []
+
+    def make(source="odin", fmi=3, *, start=True, **values):
+        plants.append(Plant(source, fmi))
+        plants[-1].set(values)
+        if start:
+            plants[-1].initialise()
+        return plants[-1]
+
+    yield make
+    for plant in plants:
+        plant.close()
+
+
+@pytest.fixture
+def scratch(tmp_path, monkeypatch):
+    """Return a folder in which all temporary folders of the test are made."""
+    folder = tmp_path / "scratch"
+    folder.mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(folder))
+    return folder
+
+
+def drive(plant, steps=50, step=0.01):
+    """Step under inputs that follow from the time; return all outputs of all steps."""
+    rows = []
+    for _ in range(steps):
+        plant.inputs.values[:] = 10.0 * np.sin(plant.time + np.arange(len(plant.inputs)))
+        plant.step(step)
+        rows.append([*plant.outputs.values, *plant.read_flags()])
+    return np.array(rows)

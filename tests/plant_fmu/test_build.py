@@ -96,7 +96,7 @@ def test_bad_vehicles_are_named_in_one_line(tmp_path, capsys, change, words):
 
 def test_unknown_vehicle_lists_the_known(capsys):
     assert main(["build", "--vehicle", "odyn"]) == 2
-    assert "bluerov2_heavy, odin" in capsys.readouterr().err
+    assert "bluerov2_heavy, bluerov2_heavy_wu, odin, rexrov" in capsys.readouterr().err
 
 
 def test_missing_compiler_is_one_line(tmp_path, capsys, monkeypatch):

@@ -101,9 +101,7 @@ def test_no_python_inside(fmi, tmp_path):
     with zipfile.ZipFile(cached_fmu(load_vehicle("odin"), fmi)) as archive:
         names = archive.namelist()
         archive.extractall(tmp_path)
-    (library,) = (n for n in names if n.startswith("binaries/"))
-    assert Path(library).suffix in (".so", ".dll", ".dylib")
-    assert not any(Path(n).suffix.startswith(".py") for n in names)
+    assert not {Path(n).suffix for n in names} & {".py", ".pyc", ".pyd", ".whl"}
     if shutil.which("readelf"):
         (library,) = tmp_path.glob("binaries/*/*.so")
         needed = subprocess.run(["readelf", "-d", library], capture_output=True, text=True, check=True).stdout

@@ -163,8 +163,18 @@ def test_parameters_change_at_events_alone(make_slave, fmi):
     with pytest.raises(FMICallException):
         model.set_values({"mass": 140.0})
     assert "mass: not allowed in continuous-time mode" in model.said[-1][1]
+
+
+def test_states_may_also_be_set_one_by_one(make_slave, fmi):
+    """As CasADi does, which calls neither fmi2SetContinuousStates nor fmi3SetContinuousStates."""
+    model = make_slave(fmi=fmi, interface="me").start()
+    model.update_discrete()
+    model.fmu.enterContinuousTimeMode()
+    model.set_values({"position.x": 1.0})
+    assert model.get("position.x") == [1.0]
     with pytest.raises(FMICallException):
-        model.set_values({"position.x": 1.0})
+        model.set_values({"position.x": 1e7})
+    assert model.get("position.x") == [1.0]
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf, 1e7])

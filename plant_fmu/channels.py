@@ -1,0 +1,135 @@
+"""Inputs and outputs of an FMU as arrays, and the C calls that carry them, prepared once."""
+
+from __future__ import annotations
+
+import ctypes
+import sys
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from plant_fmu.instance import Instance
+
+REALS = ("Real", "Float64")
+
+Call = tuple[Any, tuple[Any, ...]]  # a C function that returns a status, and all its arguments
+
+
+@dataclass(frozen=True)
+class Channel:
+    """One input or output."""
+
+    name: str
+    unit: str
+    description: str
+
+
+@dataclass(frozen=True, eq=False)
+class Channels:
+    """Inputs or outputs side by side, in the order of the model description."""
+
+    channels: tuple[Channel, ...]
+    values: NDArray[Any]  # (n,) the buffer itself: it changes in place
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Their names."""
+        return tuple(channel.name for channel in self.channels)
+
+    def __len__(self) -> int:
+        return len(self.channels)
+
+
+class Bound:
+    """The buffers of an instance, and the calls of a step over them.
+
+    Parameters
+    ----------
+    instance : Instance
+        The FMU's instance; the calls are for its life alone.
+
+    Attributes
+    ----------
+    inputs, outputs, flags : Channels
+        Real inputs, real outputs, Boolean outputs; scalars alone.
+    starts : ndarray, shape (n,)
+        Start values of the inputs.
+    set_inputs, get_outputs, get_flags, do_step : Call
+        Made with ``function(*arguments)``, which is what a step spends its time on.
+    now, length : ctypes.c_double
+        Arguments of `do_step` [s].
+    ended : ctypes.c_bool
+        Result of `do_step`: the FMU asks to end the simulation (FMI 3.0).
+    """
+
+    def __init__(self, instance: Instance) -> None:
+        scalars = [v for v in instance.variables.values() if not v.dimensions]
+        inputs = [v for v in scalars if v.causality == "input" and v.type in REALS]
+        outputs = [v for v in scalars if v.causality == "output" and v.type in REALS]
+        flags = [v for v in scalars if v.causality == "output" and v.type == "Boolean"]
+
+        self.starts = np.array([float(v.start or 0.0) for v in inputs])
+        sent, read = self.starts.copy(), np.zeros(len(outputs))
+        flag_type = ctypes.c_int if instance.fmi == 2 else ctypes.c_bool
+        flag_buffer = (flag_type * len(flags))()
+        self.inputs = Channels(_described(inputs), sent)
+        self.outputs = Channels(_described(outputs), _read_only(read))
+        self.flags = Channels(_described(flags), _read_only(_as_bools(flag_buffer, ctypes.sizeof(flag_type))))
+
+        self.now, self.length, self.ended = ctypes.c_double(), ctypes.c_double(), ctypes.c_bool()
+        if instance.fmi == 2:
+            names = ("fmi2SetReal", "fmi2GetReal", "fmi2GetBoolean")
+        else:
+            names = ("fmi3SetFloat64", "fmi3GetFloat64", "fmi3GetBoolean")
+        self.set_inputs = _of_values(instance, names[0], inputs, _doubles(sent))
+        self.get_outputs = _of_values(instance, names[1], outputs, _doubles(read))
+        self.get_flags = _of_values(instance, names[2], flags, flag_buffer)
+        self.do_step = self._of_step(instance)
+
+    def _of_step(self, instance: Instance) -> Call:
+        component = ctypes.c_void_p(instance.fmu.component)
+        # an FMU may forget what was before a step, unless its state may be restored
+        forgets = "state" not in instance.capabilities
+        if instance.fmi == 2:
+            return instance.fmu.dll["fmi2DoStep"], (component, self.now, self.length, ctypes.c_int(forgets))
+        event, early, last = ctypes.c_bool(), ctypes.c_bool(), ctypes.c_double()
+        results = [ctypes.byref(result) for result in (event, self.ended, early, last)]
+        return instance.fmu.dll["fmi3DoStep"], (component, self.now, self.length, ctypes.c_bool(forgets), *results)
+
+
+def _of_values(instance: Instance, name: str, variables: list[Any], buffer: Any) -> Call:
+    if not variables:  # some FMUs refuse to be asked for nothing
+        return _nothing, ()
+    n = ctypes.c_size_t(len(variables))
+    references = (ctypes.c_uint * len(variables))(*(v.valueReference for v in variables))
+    arguments: tuple[Any, ...] = (ctypes.c_void_p(instance.fmu.component), references, n, buffer)
+    # a function looked up with [] is an object of its own, without FMPy's conversion of each argument
+    return instance.fmu.dll[name], arguments if instance.fmi == 2 else (*arguments, n)
+
+
+def _nothing() -> int:
+    return 0
+
+
+def _doubles(values: NDArray[np.float64]) -> Any:
+    buffer: Any = values
+    return (ctypes.c_double * len(values)).from_buffer(buffer) if len(values) else None
+
+
+def _as_bools(buffer: Any, size: int) -> NDArray[np.bool_]:
+    """Return a view of Booleans of `size` bytes each: of FMI 2.0's ints, 0 or 1, the lowest byte tells."""
+    if not len(buffer):
+        return np.zeros(0, np.bool_)
+    return np.frombuffer(buffer, np.bool_)[0 if sys.byteorder == "little" else size - 1 :: size]
+
+
+def _described(variables: list[Any]) -> tuple[Channel, ...]:
+    return tuple(Channel(v.name, v.unit or "", v.description or "") for v in variables)
+
+
+def _read_only(values: NDArray[Any]) -> NDArray[Any]:
+    view = values.view()
+    view.flags.writeable = False
+    return view

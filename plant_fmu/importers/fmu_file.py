@@ -1,0 +1,152 @@
+"""What an FMU file says of itself, read without running anything of it."""
+
+from __future__ import annotations
+
+import zipfile
+import zlib
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path, PurePosixPath
+from xml.etree import ElementTree as ET
+
+import fmpy
+
+from plant_fmu.errors import FmuFileError
+from plant_fmu.importers.task import Task
+
+MAX_SIZE = 2**30  # bytes of an FMU's files together, and
+MAX_FILES = 100_000  # their number, above which it is refused unread
+
+_INTERFACES = {"CoSimulation": "CS", "ModelExchange": "ME"}
+
+
+@dataclass(frozen=True)
+class FmuVariable:
+    """A scalar variable, as the model description gives it."""
+
+    name: str
+    reference: int
+    kind: str  # of FMI, such as "Real" or "Float64"
+    causality: str
+
+    @property
+    def is_real(self) -> bool:
+        """Whether it is a double precision number."""
+        return self.kind in ("Real", "Float64")
+
+
+@dataclass(frozen=True)
+class FmuFile:
+    """An FMU file that is safe to extract, and what its model description says."""
+
+    path: Path
+    fmi: int  # 2 or 3
+    interfaces: dict[str, dict[str, str]]  # "CS", "ME": the attributes of the interface
+    variables: tuple[FmuVariable, ...]
+    states: int  # continuous ones
+    event_indicators: int
+    stop_time: float  # s, of its default experiment
+    step: float  # s, likewise
+    runs_here: bool  # it has a binary for this machine
+
+    def of(self, causality: str) -> tuple[FmuVariable, ...]:
+        """Return the scalar double precision variables of a causality, such as ``"output"``."""
+        return tuple(v for v in self.variables if v.is_real and v.causality == causality)
+
+    def offers(self, interface: str, capability: str) -> bool:
+        """Tell whether an interface has a capability, whose name is in FMI 3.0's spelling."""
+        attributes = {name.lower(): value for name, value in self.interfaces.get(interface, {}).items()}
+        return attributes.get(capability.lower()) in ("true", "1")  # FMI 2.0 writes canGetAndSetFMUstate
+
+
+def read_fmu(path: Path) -> FmuFile:
+    """Read the model description of an FMU.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+
+    Returns
+    -------
+    FmuFile
+        What it says.
+
+    Raises
+    ------
+    FmuFileError
+        If there is no such file, it is no whole zip, would write outside its folder or become too large when
+        extracted, or has no model description of FMI 2.0 or 3.0.
+    """
+    try:
+        with zipfile.ZipFile(path) as archive:
+            _check_members(path, archive)
+            names = archive.namelist()
+            if "modelDescription.xml" not in names:
+                raise FmuFileError(f"{path}: is no FMU: there is no modelDescription.xml in it")
+            root = ET.fromstring(archive.read("modelDescription.xml"))
+    except OSError as error:
+        raise FmuFileError(f"{path}: {error.strerror or error}") from error
+    except (zipfile.BadZipFile, zlib.error, NotImplementedError, RuntimeError, EOFError) as error:
+        raise FmuFileError(f"{path}: is no FMU: {error}; expected a whole zip file") from error
+    except ET.ParseError as error:
+        raise FmuFileError(f"{path}: modelDescription.xml is no XML: {error}") from error
+    try:
+        return _describe(Path(path), root, names)
+    except (KeyError, ValueError) as error:
+        raise FmuFileError(f"{path}: modelDescription.xml cannot be understood: {error!r}") from error
+
+
+def _check_members(path: Path, archive: zipfile.ZipFile) -> None:
+    """Refuse what no importer should extract: not all of them look where they write."""
+    members = archive.infolist()
+    if len(members) > MAX_FILES:
+        raise FmuFileError(f"{path}: refused: holds {len(members)} files, expected at most {MAX_FILES}")
+    size = sum(member.file_size for member in members)
+    if size > MAX_SIZE:
+        raise FmuFileError(f"{path}: refused: {size} bytes when extracted, expected at most {MAX_SIZE}")
+    for member in members:
+        name = member.orig_filename
+        is_link = member.external_attr >> 16 & 0o170000 == 0o120000
+        if is_link or "\\" in name or ":" in name or name.startswith("/") or ".." in PurePosixPath(name).parts:
+            raise FmuFileError(f"{path}: refused: {name!r} leads out of the folder it is extracted to")
+    damaged = archive.testzip()  # reads no more than the sizes above, and so finds those that lie
+    if damaged is not None:
+        raise FmuFileError(f"{path}: is no FMU: {damaged!r} is damaged")
+
+
+def _describe(path: Path, root: ET.Element, names: list[str]) -> FmuFile:
+    version = root.get("fmiVersion", "")
+    if root.tag != "fmiModelDescription" or version.split(".")[0] not in ("2", "3"):
+        raise FmuFileError(f"{path}: is of FMI version {version!r}, expected 2.0 or 3.0")
+    fmi = int(version.split(".")[0])
+    experiment = root.find("DefaultExperiment")
+    times = {} if experiment is None else experiment.attrib
+    default = Task()
+    folder = fmpy.platform if fmi == 2 else fmpy.platform_tuple
+    if fmi == 2:
+        indicators = int(root.get("numberOfEventIndicators", "0"))
+        states = len(root.findall("ModelStructure/Derivatives/Unknown"))
+    else:
+        indicators = len(root.findall("ModelStructure/EventIndicator"))
+        states = len(root.findall("ModelStructure/ContinuousStateDerivative"))
+    return FmuFile(
+        path=path.absolute(),
+        fmi=fmi,
+        interfaces={short: dict(e.attrib) for e in root if (short := _INTERFACES.get(e.tag))},
+        variables=tuple(_variables(root, fmi)),
+        states=states,
+        event_indicators=indicators,
+        stop_time=float(times.get("stopTime", default.stop_time)),
+        step=float(times.get("stepSize", default.step)),
+        runs_here=any(name.startswith(f"binaries/{folder}/") for name in names),
+    )
+
+
+def _variables(root: ET.Element, fmi: int) -> Iterator[FmuVariable]:
+    for element in root.iterfind("ModelVariables/*"):
+        if element.find("Dimension") is not None:
+            continue  # arrays: not all importers read them
+        kind = next((child.tag for child in element if child.tag != "Annotations"), "") if fmi == 2 else element.tag
+        causality = element.get("causality", "local")
+        yield FmuVariable(element.attrib["name"], int(element.attrib["valueReference"]), kind, causality)

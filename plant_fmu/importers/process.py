@@ -1,0 +1,98 @@
+"""Running a driver in a process of its own, so that an importer that crashes or hangs is a result like any other."""
+
+from __future__ import annotations
+
+import json
+import os
+import shlex
+import signal
+import subprocess
+import sys
+import tempfile
+from dataclasses import asdict
+from pathlib import Path
+
+from plant_fmu.importers.fmu_file import FmuFile
+from plant_fmu.importers.registry import Importer
+from plant_fmu.importers.task import Result, Task
+
+TIMEOUT = 120.0  # s
+
+_TAIL = 4096  # bytes of what was said that are looked at
+_NOISE = "Start attribute is required"  # FMI Library, inside libcosim, says so of any independent variable
+
+
+def run_importer(importer: Importer, fmu: FmuFile, task: Task, timeout: float = TIMEOUT) -> Result:
+    """Let an importer do a task with an FMU.
+
+    The FMU's binary is run, with the rights of this user: a process of its own guards against crashes, not against
+    malice.
+
+    Parameters
+    ----------
+    importer : Importer
+        One of `IMPORTERS`.
+    fmu : FmuFile
+        From `read_fmu`.
+    task : Task
+        What to simulate.
+    timeout : float
+        How long it may take [s].
+
+    Returns
+    -------
+    Result
+        Whatever happens in the other process; nothing is raised.
+    """
+    version = importer.version()
+
+    def result(status: str, note: str, **more: object) -> Result:
+        line = " ".join(note.split())
+        return Result(importer.name, version, importer.interface, status, line, **more)  # type: ignore[arg-type]
+
+    if missing := importer.missing():
+        return result("not installed", f"pip install {shlex.join(missing)}")
+    if objection := importer.objection(fmu):
+        return result("does not apply", objection)
+    with tempfile.TemporaryDirectory(prefix="plant_fmu-", ignore_cleanup_errors=True) as scratch:
+        folder = Path(scratch)
+        request = {"module": importer.module, "fmu": str(fmu.path), "task": asdict(task)}
+        (folder / "request.json").write_text(json.dumps(request), encoding="utf-8")
+        code, said = _run_child(folder, timeout)
+        if code is None:
+            return result("failed", f"not done after {timeout:g} s{said}")
+        if code < 0:
+            return result("failed", f"crashed (signal {-code}, {signal.strsignal(-code)}){said}")
+        if code != 0:
+            return result("failed", f"crashed (exit code {code}){said}")
+        try:
+            reply = json.loads((folder / "reply.json").read_text(encoding="utf-8"))
+        except (OSError, ValueError):
+            return result("failed", f"ended without an answer{said}")
+    if "unusable" in reply:  # which is no fault of the FMU
+        return result("not installed", f"cannot be loaded: {reply['unusable']}")
+    if "error" in reply:
+        return result("failed", reply["error"] + said)
+    return result("ok", **reply)
+
+
+def _run_child(folder: Path, timeout: float) -> tuple[int | None, str]:
+    """Run the driver; return its exit code, None if it was ended, and what was said last of an error."""
+    home = str(Path(__file__).parents[2])  # of this very package, which need not be installed
+    paths = [home, *filter(None, [os.environ.get("PYTHONPATH")])]
+    with open(folder / "said.txt", "wb") as sink:
+        try:
+            code: int | None = subprocess.run(
+                [sys.executable, "-u", "-P", "-m", "plant_fmu.importers"],
+                cwd=folder,
+                env={**os.environ, "PYTHONPATH": os.pathsep.join(paths)},
+                stdin=subprocess.DEVNULL, stdout=sink, stderr=subprocess.STDOUT,
+                timeout=timeout, check=False,
+            ).returncode  # fmt: skip
+        except subprocess.TimeoutExpired:
+            code = None
+    with open(folder / "said.txt", "rb") as source:
+        source.seek(max(0, (folder / "said.txt").stat().st_size - _TAIL))
+        lines = source.read().decode("utf-8", "replace").splitlines()
+    complaints = [line.strip() for line in lines if "error" in line.lower() and _NOISE not in line]
+    return code, f"; it said: {complaints[-1]}" if complaints else ""

@@ -1,0 +1,82 @@
+"""The importers there are drivers for."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib import metadata
+
+from packaging.requirements import Requirement
+
+from plant_fmu.importers.fmu_file import FmuFile
+
+
+@dataclass(frozen=True)
+class Importer:
+    """An importer, or a use of one, with a driver in a module of this package named `module`."""
+
+    name: str
+    module: str
+    packages: tuple[str, ...]  # what pip must have installed, as its requirements; the first is the importer itself
+    interface: str  # "CS", "ME", or "" where nothing is simulated
+    inapplicable: Callable[[FmuFile], str] = lambda fmu: ""  # why it does not apply to an FMU, "" if it does
+
+    def version(self) -> str:
+        """Return the version that is installed, or ``""`` if there is none."""
+        return _installed(Requirement(self.packages[0]))
+
+    def missing(self) -> list[str]:
+        """Return the packages that are not there, or too old."""
+        needed = {package: Requirement(package) for package in self.packages}
+        return [package for package, r in needed.items() if not (v := _installed(r)) or v not in r.specifier]
+
+    def objection(self, fmu: FmuFile) -> str:
+        """Return why this importer has nothing to do with an FMU, or ``""``."""
+        if not self.interface:
+            return self.inapplicable(fmu)
+        if self.interface not in fmu.interfaces:
+            return f"the FMU offers no {'co-simulation' if self.interface == 'CS' else 'model exchange'}"
+        if not fmu.runs_here:
+            return "the FMU has no binary for this machine"
+        return self.inapplicable(fmu)
+
+
+def _installed(package: Requirement) -> str:
+    try:
+        return metadata.version(package.name)
+    except metadata.PackageNotFoundError:
+        return ""
+
+
+def _not_libcosim(fmu: FmuFile) -> str:
+    return "" if fmu.fmi == 2 else "takes FMI 2.0 alone"  # 0.0.6 dies of a segmentation fault on any of FMI 3.0
+
+
+def _not_state(fmu: FmuFile) -> str:
+    if not fmu.offers("CS", "canGetAndSetFMUState"):
+        return "the FMU cannot save its state (canGetAndSetFMUState)"
+    return ""
+
+
+def _not_casadi(fmu: FmuFile) -> str:
+    if fmu.event_indicators:
+        return f"integrates no FMU with state events; this one has {fmu.event_indicators} event indicators"
+    if not fmu.states:
+        return "the FMU has no continuous states"
+    return ""
+
+
+# ecospy's library needs TBB, and on Linux does not bring it along
+_TBB = ("tbb>=2021.13",) if sys.platform == "linux" else ()
+
+IMPORTERS = (
+    Importer("FMPy validation", "fmpy_validation", ("fmpy>=0.3.22",), ""),
+    Importer("fmu-manipulation-toolbox", "toolbox", ("fmu-manipulation-toolbox>=2.0",), ""),
+    Importer("FMPy", "fmpy_stepping", ("fmpy>=0.3.22",), "CS"),
+    Importer("FMPy FMU state", "fmpy_state", ("fmpy>=0.3.22",), "CS", _not_state),
+    Importer("libcosim", "libcosim", ("libcosimpy>=0.0.6",), "CS", _not_libcosim),
+    Importer("Ecos", "ecos", ("ecospy>=0.7", *_TBB), "CS"),
+    Importer("FMPy CVode", "fmpy_cvode", ("fmpy>=0.3.22",), "ME"),
+    Importer("CasADi", "casadi_import", ("casadi>=3.8",), "ME", _not_casadi),
+)

@@ -1,0 +1,72 @@
+"""What an importer is asked to do with an FMU, and what it answers."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Literal
+
+from plant_fmu.errors import TaskError
+
+Status = Literal["ok", "failed", "not installed", "does not apply"]
+Jacobian = dict[str, dict[str, float]]  # by name: [state whose derivative is taken][state or input]
+
+_ROUNDING = 1e-9  # relative, of a stop time against a whole number of steps
+
+
+@dataclass(frozen=True)
+class Task:
+    """A simulation from time 0 with inputs that stay as they start.
+
+    Parameters
+    ----------
+    stop_time, step : float
+        [s]; the stop time is a whole number of steps.
+    start : mapping from str to float
+        Start values of parameters, inputs and states by name, in the units of the model description.
+
+    Raises
+    ------
+    TaskError
+        If a time is not positive, or the stop time is no whole number of steps.
+    """
+
+    stop_time: float = 10.0
+    step: float = 0.01
+    start: Mapping[str, float] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        for name, value in (("stop time", self.stop_time), ("step", self.step)):
+            if not (math.isfinite(value) and value > 0.0):
+                raise TaskError(f"{name} is {value:g} s, expected a positive number")
+        steps = self.stop_time / self.step
+        if self.steps < 1 or abs(steps - self.steps) > _ROUNDING * steps:
+            raise TaskError(f"stop time {self.stop_time:g} s is no whole number of steps of {self.step:g} s")
+
+    @property
+    def steps(self) -> int:
+        """How many steps lead to the stop time."""
+        return round(self.stop_time / self.step)
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What a driver returns from its process when the importer took the FMU."""
+
+    values: dict[str, float] = field(default_factory=dict)  # real outputs at the stop time
+    jacobian: Jacobian = field(default_factory=dict)  # at the start
+    note: str = ""
+
+
+@dataclass(frozen=True)
+class Result:
+    """What came of one importer; `note` is one line, and says why where the status is not ``"ok"``."""
+
+    importer: str
+    version: str  # "" where it is not installed
+    interface: str  # "CS", "ME", or "" where nothing is simulated
+    status: Status
+    note: str = ""
+    values: dict[str, float] = field(default_factory=dict)
+    jacobian: Jacobian = field(default_factory=dict)

@@ -1,0 +1,37 @@
+"""The checks of the FMU manipulation toolbox: the schema, and rules that no schema can express."""
+
+from __future__ import annotations
+
+import logging
+from pathlib import Path
+
+from fmu_manipulation_toolbox.checker import get_checkers
+from fmu_manipulation_toolbox.operations import FMU
+
+from plant_fmu.errors import ImporterError
+from plant_fmu.importers.fmu_file import FmuFile
+from plant_fmu.importers.task import Answer, Task
+
+
+class _Complaints(logging.Handler):
+    """Keeps what is logged as an error, which is how the checks speak."""
+
+    def __init__(self) -> None:
+        super().__init__(level=logging.ERROR)
+        self.texts: list[str] = []
+
+    def emit(self, record: logging.LogRecord) -> None:
+        self.texts.append(record.getMessage())
+
+
+def run(fmu: FmuFile, task: Task, folder: Path) -> Answer:
+    """Apply every check the toolbox has to an FMU."""
+    complaints = _Complaints()
+    logging.getLogger("fmu_manipulation_toolbox").addHandler(complaints)
+    checks = [check() for check in get_checkers()]
+    with FMU(str(fmu.path)) as opened:
+        for check in checks:
+            opened.apply_operation(check)
+    if complaints.texts:
+        raise ImporterError(f"problems found: {len(complaints.texts)}; first: {complaints.texts[0]}")
+    return Answer(note=f"no problems found by {len(checks)} checks")

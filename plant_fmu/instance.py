@@ -1,0 +1,231 @@
+"""One instance of a co-simulation FMU, FMI 2.0 or 3.0, loaded through FMPy: its life, its messages, its variables."""
+
+from __future__ import annotations
+
+import logging
+import os
+import shutil
+import tempfile
+import threading
+import weakref
+import zipfile
+from collections import deque
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree as ET
+
+import fmpy
+from fmpy.fmi2 import FMU2Slave, fmi2CallbackFunctions, fmi2CallbackLoggerTYPE
+from fmpy.fmi2 import defaultCallbacks as default_callbacks
+from fmpy.fmi3 import FMU3Slave
+
+from plant_fmu.errors import PlantError
+
+log = logging.getLogger(__name__)
+
+WARNING = 1  # the highest status that is no failure, in FMI 2.0 and 3.0
+
+_LOADING = threading.Lock()  # FMPy changes the working folder of the whole process while it loads a library
+
+# capability: attribute of CoSimulation in FMI 2.0 and in FMI 3.0; FMPy does not read all of them
+_CAPABILITIES = {
+    "state": ("canGetAndSetFMUstate", "canGetAndSetFMUState"),
+    "serialise": ("canSerializeFMUstate", "canSerializeFMUState"),
+    "derivatives": ("providesDirectionalDerivative", "providesDirectionalDerivatives"),
+}
+
+
+class Messages:
+    """What an FMU says. It knows nothing of the instance, so that callbacks keep nothing alive."""
+
+    def __init__(self) -> None:
+        self._failures: deque[str] = deque(maxlen=4)
+
+    def hear(self, status: int, message: bytes) -> None:
+        """Log a message, and keep it if it tells of a failure."""
+        text = message.decode("utf-8", "replace")
+        log.debug("FMU: %s", text)
+        if status > WARNING:
+            self._failures.append(" ".join(text.split()))
+
+    def said(self) -> str:
+        """Return the failures told of since this was last asked, "" for none."""
+        said = "; ".join(self._failures)
+        self._failures.clear()
+        return said
+
+
+class Instance:
+    """An instantiated FMU in a temporary folder that goes with it.
+
+    Parameters
+    ----------
+    path : Path
+        The FMU file.
+
+    Attributes
+    ----------
+    fmi : int
+        2 or 3.
+    variables : dict from str to fmpy.model_description.ScalarVariable
+        By name, in the order of the model description.
+    fmu : FMU2Slave or FMU3Slave
+        What FMPy offers.
+
+    Raises
+    ------
+    PlantError
+        If it cannot be loaded; nothing is left behind.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.messages = Messages()
+        self._states: dict[int, Any] = {}  # handles to free, by address
+        self._dropped: deque[int] = deque()  # addresses of those that nobody holds any more
+        folder = tempfile.mkdtemp(prefix="plant_fmu-")
+        loaded: list[Any] = []
+        self._end = weakref.finalize(self, _release, loaded, self._states, folder)
+        try:
+            self._load(path, folder, loaded)
+        except PlantError:
+            self._end()
+            raise
+        except Exception as error:
+            self._end()
+            raise PlantError(f"{path}: {self.messages.said() or _one_line(error)}") from error
+        except BaseException:
+            self._end()
+            raise
+
+    def _load(self, path: Path, folder: str, loaded: list[Any]) -> None:
+        try:
+            fmpy.extract(str(path), folder)
+            described = Path(folder, "modelDescription.xml")
+            if not described.is_file():
+                raise PlantError(f"{path}: no FMU: holds no modelDescription.xml")
+            root = ET.parse(described).getroot()
+        except (OSError, zipfile.BadZipFile, ET.ParseError) as error:
+            raise PlantError(f"{path}: no FMU: {getattr(error, 'strerror', None) or _one_line(error)}") from error
+        version = root.get("fmiVersion", "")
+        if version[:2] not in ("2.", "3."):
+            raise PlantError(f"{path}: FMI version is {version!r}, expected 2.0 or 3.0")
+        self.fmi = int(version[0])
+        interface = root.find("CoSimulation")
+        if interface is None:
+            raise PlantError(f"{path}: offers no co-simulation, expected the element CoSimulation")
+        self.capabilities = {
+            name for name, keys in _CAPABILITIES.items() if interface.get(keys[self.fmi - 2]) in ("true", "1")
+        }
+
+        description = fmpy.read_model_description(folder)
+        self.name, self.token = description.modelName, description.guid
+        self.variables = {v.name: v for v in description.modelVariables}
+        identifier = description.coSimulation.modelIdentifier
+        place = fmpy.platform if self.fmi == 2 else fmpy.platform_tuple
+        if not Path(folder, "binaries", place, identifier + fmpy.sharedLibraryExtension).is_file():
+            raise PlantError(f"{path}: has no binary for this machine, expected one in binaries/{place}")
+        with _LOADING:
+            here = os.getcwd()
+            try:
+                kind = FMU2Slave if self.fmi == 2 else FMU3Slave
+                self.fmu = kind(
+                    guid=self.token, unzipDirectory=folder, modelIdentifier=identifier, instanceName=self.name
+                )
+            finally:
+                os.chdir(here)
+        loaded.append(self.fmu)
+        if self.fmi == 2:
+            self.fmu.instantiate(callbacks=_callbacks_fmi2(self.messages))
+        else:
+            hear = self.messages.hear
+            self.fmu.instantiate(logMessage=lambda environment, status, category, message: hear(status, message))
+
+    # ---- calls ----
+
+    def do(self, call: Callable[..., Any], *arguments: Any, **named: Any) -> Any:
+        """Call one of FMPy's methods; what it raises becomes a PlantError in the FMU's own words."""
+        try:
+            return call(*arguments, **named)
+        except Exception as error:
+            raise PlantError(self.messages.said() or _one_line(error)) from error
+
+    def get(self, variable: Any) -> Any:
+        """Return the value of a scalar variable, as a float, int, bool or str."""
+        value = self.do(getattr(self.fmu, f"get{self._type(variable)}"), [variable.valueReference])[0]
+        if isinstance(value, bytes):  # FMPy decodes strings of FMI 3.0 alone
+            return value.decode("utf-8", "replace")
+        return bool(value) if variable.type == "Boolean" else value
+
+    def set(self, variables: list[Any], values: list[Any]) -> None:
+        """Set scalar variables that are all of one type, in one call."""
+        references = [v.valueReference for v in variables]
+        self.do(getattr(self.fmu, f"set{self._type(variables[0])}"), references, values)
+
+    def _type(self, variable: Any) -> str:
+        return ("Integer" if self.fmi == 2 else "Int64") if variable.type == "Enumeration" else str(variable.type)
+
+    # ---- FMU states ----
+
+    def keep(self, handle: Any) -> Any:
+        """Remember a state's handle, to be freed at the end at the latest, and return it."""
+        self._states[handle.value] = handle
+        return handle
+
+    def drop(self, address: int) -> None:
+        """Note that nobody holds a state any more. Any thread may say so; it is freed in the instance's own."""
+        self._dropped.append(address)
+
+    def sweep(self) -> None:
+        """Free the states that nobody holds any more."""
+        while self._dropped:
+            self.free(self._dropped.popleft())
+
+    def free(self, address: int) -> None:
+        """Free a state, once."""
+        if address in self._states:
+            self.do(self.fmu.freeFMUState, self._states.pop(address))
+
+    # ---- the end ----
+
+    @property
+    def closed(self) -> bool:
+        """Whether `close` was called."""
+        return not self._end.alive
+
+    def close(self) -> None:
+        """Free states and instance, unload the library, remove the folder. May be called twice."""
+        self._end()
+
+
+def _release(loaded: list[Any], states: dict[int, Any], folder: str) -> None:
+    try:
+        for fmu in loaded:
+            if fmu.component:
+                for handle in states.values():
+                    fmu.freeFMUState(handle)
+                fmu.freeInstance()
+            else:
+                fmu.freeLibrary()
+    except Exception as error:  # noqa: BLE001 -- an FMU that cannot end well must not keep the folder
+        log.warning("FMU not freed: %s", _one_line(error))
+    finally:
+        states.clear()
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+def _one_line(error: Exception) -> str:
+    return " ".join(str(error).split()) or type(error).__name__
+
+
+def _callbacks_fmi2(messages: Messages) -> fmi2CallbackFunctions:
+    # not through FMPy's logger proxy, which formats variadic messages but serves one instance in the whole process
+    def hear(environment: Any, name: bytes, status: int, category: bytes, message: bytes) -> None:
+        messages.hear(status, message)
+
+    callbacks = fmi2CallbackFunctions()
+    callbacks.logger = fmi2CallbackLoggerTYPE(hear)
+    callbacks.allocateMemory = default_callbacks.allocateMemory
+    callbacks.freeMemory = default_callbacks.freeMemory
+    return callbacks

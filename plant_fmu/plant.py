@@ -1,0 +1,180 @@
+"""A vehicle to step from Python: its FMU, made where it is not there yet, with its state and its derivatives."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from plant_fmu.build import FMI_VERSIONS, cached_fmu
+from plant_fmu.channels import REALS
+from plant_fmu.errors import PlantError
+from plant_fmu.slave import Slave
+from plant_fmu.state import Clock, State, from_bytes, to_bytes
+from plant_fmu.vehicle import Vehicle, load_vehicle
+
+
+class Plant(Slave):
+    """A vehicle, or any co-simulation FMU, that is stepped from Python.
+
+    Parameters
+    ----------
+    source : str, Path or Vehicle
+        A shipped vehicle's name, a vehicle's TOML file, a vehicle, or a file that ends in .fmu.
+    fmi : int
+        2 or 3: which FMU a vehicle gets. An FMU file has its own version.
+
+    Attributes
+    ----------
+    inputs : Channels
+        Real scalar inputs. Write into ``inputs.values``; each step sends them.
+    outputs : Channels
+        Real scalar outputs, as they are after the last step; ``outputs.values`` cannot be written.
+    flags : Channels
+        Boolean outputs; ``flags.values`` is what `read_flags` last read.
+    time : float
+        [s].
+    initialised : bool
+        Whether it can step.
+
+    Raises
+    ------
+    PlantError
+        If the FMU cannot be loaded, or there is no such FMI version.
+    VehicleError, TableError, BuildError
+        If there is no such vehicle, or no FMU of it can be made.
+
+    Notes
+    -----
+    ``plant[name]`` reads any scalar variable; ``plant[name] = value`` sets an input for the next step, or whatever else
+    `set` sets. A plant belongs to one thread at a time; different plants know nothing of each other.
+    """
+
+    def __init__(self, source: str | Path | Vehicle, fmi: int = 3) -> None:
+        super().__init__(_fmu_of(source, fmi))
+
+    def save(self) -> State:
+        """Save the present state: that of the FMU, the time and the inputs.
+
+        Returns
+        -------
+        State
+            For `restore`, as often as wanted.
+
+        Raises
+        ------
+        PlantError
+            If the FMU cannot.
+        """
+        self._require("state", "cannot save its state")
+        self._instance.sweep()
+        handle = self._instance.do(self._instance.fmu.getFMUState)
+        clock = Clock(self._start, self._count, self._last_step)
+        return State(self._instance, handle, clock, self.initialised, self.inputs.values.copy())
+
+    def restore(self, state: State) -> None:
+        """Go back, or on, to a saved state of this plant; all goes on from there to the last bit as it did then.
+
+        Parameters
+        ----------
+        state : State
+            From `save` or `deserialise`.
+
+        Raises
+        ------
+        PlantError
+            If it was freed, or is of another plant.
+        """
+        self._require_open()
+        self._instance.sweep()
+        self._instance.do(self._instance.fmu.setFMUState, state.handle(self._instance))
+        self.inputs.values[:] = state.inputs
+        self._wind(state.clock, initialised=state.initialised)
+        if self.initialised:
+            self._read()
+
+    def free(self, state: State) -> None:
+        """Free a saved state now, rather than when nobody holds it any more. May be called twice."""
+        if not self._instance.closed:
+            state.free(self._instance)
+
+    def serialise(self, state: State) -> bytes:
+        """Return a saved state as bytes, for another plant of the same FMU, another process or a file.
+
+        Raises
+        ------
+        PlantError
+            If the FMU cannot, or the state is not of this plant.
+        """
+        self._require("serialise", "cannot serialise its state")
+        return to_bytes(state, self._instance)
+
+    def deserialise(self, data: bytes) -> State:
+        """Return the state that `serialise` made bytes of.
+
+        Raises
+        ------
+        PlantError
+            If the bytes are of no state, of another FMU's, or damaged.
+        """
+        self._require("serialise", "cannot serialise its state")
+        return from_bytes(data, self._instance)
+
+    def jacobian(self, unknowns: Sequence[str], knowns: Sequence[str]) -> NDArray[np.float64]:
+        """Return the partial derivatives of some variables by others, as things are now.
+
+        Parameters
+        ----------
+        unknowns : sequence of str
+            Names of `m` outputs or derivatives.
+        knowns : sequence of str
+            Names of `n` inputs or states; what else may stand here is the FMU's affair.
+
+        Returns
+        -------
+        ndarray, shape (m, n)
+            Row i, column j: unknown i by known j, in their units.
+
+        Raises
+        ------
+        PlantError
+            If a name is unknown, or the FMU has no such derivative.
+        """
+        self._require("derivatives", "provides no directional derivatives")
+        self._require_initialised("has no derivatives")
+        rows, columns = ([self._real(name) for name in names] for names in (unknowns, knowns))
+        self._send()
+        found = np.zeros((len(rows), len(columns)))
+        for j, column in enumerate(columns if rows else ()):
+            try:
+                found[:, j] = self._instance.do(self._instance.fmu.getDirectionalDerivative, rows, [column], [1.0])
+            except PlantError as error:
+                raise PlantError(f"derivatives of {', '.join(unknowns)} by {knowns[j]}: {error}") from error
+        return found
+
+    def _real(self, name: str) -> int:
+        """Return the value reference of a variable that has derivatives."""
+        variable = self._variable(name)
+        if variable.type not in REALS or variable.dimensions:
+            kind = "an array" if variable.dimensions else f"of type {variable.type}"
+            raise PlantError(f"{name} is {kind}, expected a real scalar variable")
+        return int(variable.valueReference)
+
+    def _require(self, capability: str, what: str) -> None:
+        self._require_open()
+        if capability not in self._instance.capabilities:
+            raise PlantError(f"{self._instance.path}: this FMU {what}")
+
+
+def _fmu_of(source: str | Path | Vehicle, fmi: int) -> Path:
+    if fmi not in FMI_VERSIONS:
+        raise PlantError(f"FMI version is {fmi!r}, expected 2 or 3")
+    if isinstance(source, Vehicle):
+        return cached_fmu(source, fmi)
+    if not isinstance(source, (str, Path)):
+        raise PlantError(f"plant is {source!r}, expected a vehicle, its name, its TOML file or an FMU file")
+    if Path(source).suffix == ".fmu":
+        return Path(source)
+    return cached_fmu(load_vehicle(source), fmi)

@@ -1,0 +1,281 @@
+"""An FMU that steps, driven through FMPy with buffers and calls that are made once."""
+
+from __future__ import annotations
+
+import difflib
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from plant_fmu.channels import Bound
+from plant_fmu.errors import PlantError
+from plant_fmu.instance import WARNING, Instance
+from plant_fmu.state import Clock
+from plant_fmu.values import Value, checked, require_settable
+
+_AT_ZERO = Clock(0.0, 0, math.nan)
+
+
+class Slave:
+    """Any co-simulation FMU, FMI 2.0 or 3.0, that is stepped from Python.
+
+    Parameters
+    ----------
+    path : Path
+        The FMU file.
+
+    Attributes
+    ----------
+    inputs : Channels
+        Real scalar inputs. Write into ``inputs.values``; each step sends them.
+    outputs : Channels
+        Real scalar outputs, as they are after the last step; ``outputs.values`` cannot be written.
+    flags : Channels
+        Boolean outputs; ``flags.values`` is what `read_flags` last read.
+    time : float
+        [s].
+
+    Raises
+    ------
+    PlantError
+        If the FMU cannot be loaded.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._instance = Instance(path)
+        try:
+            self._bound = bound = Bound(self._instance)
+        except BaseException:
+            self._instance.close()
+            raise
+        self.inputs, self.outputs, self.flags = bound.inputs, bound.outputs, bound.flags
+        self._input_at = {name: i for i, name in enumerate(self.inputs.names)}
+        self._output_at = {name: i for i, name in enumerate(self.outputs.names)}
+        self._calls = (*bound.set_inputs, *bound.do_step, *bound.get_outputs)
+        self._now, self._ended = bound.now, bound.ended
+        self._wind(_AT_ZERO, initialised=False)
+
+    def _wind(self, clock: Clock, *, initialised: bool) -> None:
+        """Set the clock. The next step passes through `_pace`, whatever its length, for NaN equals none."""
+        self._start, self._count, self._last_step = clock.start, clock.count, clock.step
+        self._step = math.nan
+        self.time, self.initialised = clock.time, initialised
+
+    # ---- what there is ----
+
+    @property
+    def name(self) -> str:
+        """The name of the model."""
+        return str(self._instance.name)
+
+    @property
+    def fmi(self) -> int:
+        """The FMU's FMI version, 2 or 3."""
+        return self._instance.fmi
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The names of all variables: inputs, outputs, parameters and others."""
+        return tuple(self._instance.variables)
+
+    def __repr__(self) -> str:
+        state = "closed" if self._instance.closed else f"t = {self.time:.6g} s"
+        return f"<{type(self).__name__} {self.name}, FMI {self.fmi}.0, {state}>"
+
+    # ---- values ----
+
+    def set(self, values: Mapping[str, Value]) -> None:
+        """Set parameters, inputs or start values by name.
+
+        Parameters
+        ----------
+        values : mapping from str to float, int, bool or str
+            In the units of the model description; all of one type are set at once.
+
+        Raises
+        ------
+        PlantError
+            If a name is unknown or cannot be set now, a value is of the wrong type, or the FMU refuses it.
+        """
+        self._require_open()
+        batches: dict[str, tuple[list[Any], list[Value]]] = {}
+        for name, value in values.items():
+            variable = self._variable(name)
+            require_settable(variable, self.initialised)
+            variables, numbers = batches.setdefault(variable.type, ([], []))
+            variables.append(variable)
+            numbers.append(checked(variable, value))
+        for variables, numbers in batches.values():
+            self._instance.set(variables, numbers)
+            for variable, number in zip(variables, numbers, strict=True):
+                if variable.name in self._input_at:
+                    self.inputs.values[self._input_at[variable.name]] = number
+        if self.initialised:
+            self._read()
+
+    def __setitem__(self, name: str, value: Value) -> None:
+        if name in self._input_at:
+            self._require_open()
+            self.inputs.values[self._input_at[name]] = checked(self._variable(name), value)
+        else:
+            self.set({name: value})
+
+    def __getitem__(self, name: str) -> Value:
+        self._require_open()
+        if name in self._input_at:
+            return float(self.inputs.values[self._input_at[name]])
+        variable = self._variable(name)
+        if not self.initialised:
+            raise PlantError(f"{name} has no value before initialise()")
+        if name in self._output_at:
+            return float(self.outputs.values[self._output_at[name]])
+        if variable.dimensions or variable.type in ("Binary", "Clock"):
+            kind = "an array" if variable.dimensions else f"of type {variable.type}"
+            raise PlantError(f"{name} is {kind}, expected a scalar number, Boolean or text")
+        value: Value = self._instance.get(variable)
+        return value
+
+    def _variable(self, name: str) -> Any:
+        known = self._instance.variables
+        if name not in known:
+            near = difflib.get_close_matches(str(name), known, n=1)
+            said = f"did you mean {near[0]!r}?" if near else f"expected one of the {len(known)} in plant.names"
+            raise PlantError(f"FMU variable {name!r} is unknown; {said}")
+        return known[name]
+
+    def _require_open(self) -> None:
+        if self._instance.closed:
+            raise PlantError(f"plant {self.name} is closed")
+
+    def _require_initialised(self, what: str) -> None:
+        self._require_open()
+        if not self.initialised:
+            raise PlantError(f"plant {self.name} {what} before initialise()")
+
+    # ---- life ----
+
+    def initialise(self, time: float = 0.0) -> None:
+        """Pass through initialisation, and read the outputs.
+
+        Parameters
+        ----------
+        time : float
+            When to start [s].
+
+        Raises
+        ------
+        PlantError
+            If the FMU finds its parameters wanting, or was initialised before.
+        """
+        self._require_open()
+        if self.initialised:
+            raise PlantError(f"plant {self.name} is initialised already; reset() takes it back")
+        instance, fmu = self._instance, self._instance.fmu
+        self._send()
+        if instance.fmi == 2:
+            instance.do(fmu.setupExperiment, startTime=time)
+            instance.do(fmu.enterInitializationMode)
+        else:
+            instance.do(fmu.enterInitializationMode, startTime=time)
+        instance.do(fmu.exitInitializationMode)
+        self._wind(Clock(time, 0, math.nan), initialised=True)
+        self._read()
+
+    def reset(self) -> None:
+        """Go back to where the plant was after loading: start values of the FMU, not initialised, time 0.
+
+        Raises
+        ------
+        PlantError
+            If the FMU cannot.
+        """
+        self._require_open()
+        self._instance.do(self._instance.fmu.reset)
+        self.inputs.values[:] = self._bound.starts
+        self._wind(_AT_ZERO, initialised=False)
+
+    def step(self, step: float) -> None:
+        """Send the inputs, advance by `step`, and read the outputs.
+
+        Parameters
+        ----------
+        step : float
+            [s].
+
+        Raises
+        ------
+        PlantError
+            If the FMU refuses a value or the step, or the plant is not initialised or closed.
+        """
+        if step != self._step:
+            self._pace(step)
+        set_inputs, of_inputs, do_step, of_step, get_outputs, of_outputs = self._calls
+        self._now.value = self.time
+        if set_inputs(*of_inputs) > WARNING or do_step(*of_step) > WARNING:
+            raise PlantError(f"t = {self.time:.6g} s: {self._said()}")
+        self._count = count = self._count + 1
+        self.time = self._start + count * step
+        if get_outputs(*of_outputs) > WARNING:
+            raise PlantError(f"t = {self.time:.6g} s: {self._said()}")
+        if self._ended.value:
+            raise PlantError(f"t = {self.time:.6g} s: the FMU asks to end the simulation")
+
+    def _pace(self, step: float) -> None:
+        """Prepare steps of another length than before."""
+        self._require_initialised("cannot step")
+        if not (isinstance(step, (int, float, np.integer, np.floating)) and 0.0 < step < math.inf):
+            raise PlantError(f"step is {step!r}, expected seconds above 0")
+        if step != self._last_step:
+            self._start, self._count = self.time, 0
+        self._step = self._last_step = self._bound.length.value = float(step)
+
+    def _send(self) -> None:
+        set_inputs, of_inputs = self._bound.set_inputs
+        if set_inputs(*of_inputs) > WARNING:
+            raise PlantError(f"the inputs are refused: {self._said()}")
+
+    def _said(self) -> str:
+        return self._instance.messages.said() or "the FMU failed without a word"
+
+    def _read(self) -> None:
+        get_outputs, of_outputs = self._bound.get_outputs
+        if get_outputs(*of_outputs) > WARNING:
+            raise PlantError(f"the outputs cannot be read: {self._said()}")
+
+    def read_flags(self) -> NDArray[np.bool_]:
+        """Read the Boolean outputs as they are after the last step.
+
+        Returns
+        -------
+        ndarray of bool, shape (n,)
+            ``flags.values``, which changes in place.
+
+        Raises
+        ------
+        PlantError
+            If the plant is not initialised or closed, or the FMU fails.
+        """
+        if not self.initialised:
+            self._require_initialised("has no flags")
+        get_flags, of_flags = self._bound.get_flags
+        if get_flags(*of_flags) > WARNING:
+            raise PlantError(f"the flags cannot be read: {self._said()}")
+        return self.flags.values
+
+    def close(self) -> None:
+        """Free the instance, unload the library and remove the extracted files. May be called twice."""
+        self._instance.close()
+        self._wind(Clock(self.time, 0, math.nan), initialised=False)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()

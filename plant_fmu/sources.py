@@ -1,0 +1,73 @@
+"""The C sources of the plant, and the list of them that goes into an FMU."""
+
+from __future__ import annotations
+
+from importlib import resources
+from xml.etree import ElementTree as ET
+
+_OTHER_WRAPPER = {2: "fmi3.c", 3: "fmi2.c"}
+
+
+def c_sources(fmi: int) -> dict[str, bytes]:
+    """Return the C files of one FMI version, without the generated ``vehicle.h`` and the headers of FMI.
+
+    Parameters
+    ----------
+    fmi : int
+        2 or 3.
+
+    Returns
+    -------
+    dict of str to bytes
+        Contents by name, in alphabetical order.
+    """
+    folder = resources.files("plant_fmu") / "csrc"
+    files = sorted((file for file in folder.iterdir()), key=lambda file: file.name)
+    return {
+        file.name: file.read_bytes()
+        for file in files
+        if file.name.endswith((".c", ".h")) and file.name != _OTHER_WRAPPER[fmi]
+    }
+
+
+def compiled_files(fmi: int) -> list[str]:
+    """Return the names of those C files that a compiler is given, the rest being headers.
+
+    Parameters
+    ----------
+    fmi : int
+        2 or 3.
+
+    Returns
+    -------
+    list of str
+        Names relative to the FMU's folder ``sources``.
+    """
+    return [name for name in c_sources(fmi) if name.endswith(".c")]
+
+
+def build_description(model_identifier: str) -> str:
+    """Return FMI 3.0's ``sources/buildDescription.xml``.
+
+    Parameters
+    ----------
+    model_identifier : str
+        As in ``modelDescription.xml``.
+
+    Returns
+    -------
+    str
+        XML text. One configuration is for any platform and links libm; those of Windows, which has none, do not.
+    """
+    root = ET.Element("fmiBuildDescription", fmiVersion="3.0")
+    for platform in (None, "x86-windows", "x86_64-windows", "aarch64-windows"):
+        configuration = ET.SubElement(root, "BuildConfiguration", modelIdentifier=model_identifier)
+        files = ET.SubElement(configuration, "SourceFileSet", language="C99")
+        for name in compiled_files(3):
+            ET.SubElement(files, "SourceFile", name=name)
+        if platform:
+            configuration.set("platform", platform)
+        else:
+            ET.SubElement(configuration, "Library", name="m", external="true", description="C's mathematics")
+    ET.indent(root)
+    return '<?xml version="1.0" encoding="UTF-8"?>\n' + ET.tostring(root, encoding="unicode") + "\n"

@@ -1,0 +1,118 @@
+"""A plant's saved state: the FMU's own, and what the master's side of it remembers; as bytes too."""
+
+from __future__ import annotations
+
+import hashlib
+import struct
+import weakref
+import zlib
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from plant_fmu.errors import PlantError
+from plant_fmu.instance import Instance
+
+_HEAD = struct.Struct("<8s8sI")  # magic, FMU, checksum of the body
+_BODY = struct.Struct("<?dqdI")  # initialised, clock, number of inputs; inputs and the FMU's own bytes follow
+_MAGIC = b"PLANTST1"
+
+
+@dataclass(frozen=True)
+class Clock:
+    """Where a plant is in time: `count` steps of `step` after `start`, so that no rounding adds up."""
+
+    start: float  # s
+    count: int
+    step: float  # s, NaN before the first step
+
+    @property
+    def time(self) -> float:
+        """Time [s]."""
+        return self.start + self.count * self.step if self.count else self.start
+
+
+class State:
+    """What `Plant.save` returns. It is freed with `Plant.free`, else when nobody holds it any more.
+
+    Attributes
+    ----------
+    clock : Clock
+        Where in time it was saved.
+    initialised : bool
+        Whether the plant was, then.
+    inputs : ndarray, shape (n,)
+        The inputs then.
+    """
+
+    def __init__(
+        self, instance: Instance, handle: Any, clock: Clock, initialised: bool, inputs: NDArray[np.float64]
+    ) -> None:
+        self._instance, self._handle = instance, instance.keep(handle)
+        self.clock, self.initialised, self.inputs = clock, initialised, inputs
+        self._end = weakref.finalize(self, instance.drop, handle.value)
+        self._end.atexit = False
+
+    @property
+    def time(self) -> float:
+        """When it was saved [s]."""
+        return self.clock.time
+
+    def handle(self, instance: Instance) -> Any:
+        """Return the FMU's handle.
+
+        Raises
+        ------
+        PlantError
+            If it was freed, or is of another plant.
+        """
+        if self._instance is not instance:
+            raise PlantError("the state is of another plant; serialise it there, and deserialise it here")
+        if not self._end.alive:
+            raise PlantError("the state was freed")
+        return self._handle
+
+    def free(self, instance: Instance) -> None:
+        """Free it now; a second time does nothing."""
+        if self._end.alive:
+            self.handle(instance)
+            self._end.detach()
+            instance.free(self._handle.value)
+
+
+def to_bytes(state: State, instance: Instance) -> bytes:
+    """Return a state as bytes that any plant with the same FMU can read, on the same kind of machine."""
+    own: bytes = instance.do(instance.fmu.serializeFMUState, state.handle(instance))
+    clock, inputs = state.clock, state.inputs.astype("<f8")
+    start = _BODY.pack(state.initialised, clock.start, clock.count, clock.step, len(inputs))
+    body = start + inputs.tobytes() + own
+    return _HEAD.pack(_MAGIC, _mark(instance), zlib.crc32(body)) + body
+
+
+def from_bytes(data: bytes, instance: Instance) -> State:
+    """Return the state that `to_bytes` wrote.
+
+    Raises
+    ------
+    PlantError
+        If the bytes are of no state, of another FMU's, or damaged.
+    """
+    if len(data) < _HEAD.size + _BODY.size or not data.startswith(_MAGIC):
+        raise PlantError(f"{len(data)} bytes came, expected a serialised state of a plant")
+    _, mark, checksum = _HEAD.unpack_from(data)
+    if mark != _mark(instance):
+        raise PlantError(f"the serialised state is of another FMU than {instance.path}")
+    body = data[_HEAD.size :]
+    if zlib.crc32(body) != checksum:
+        raise PlantError("the serialised state is damaged: its checksum is wrong")
+    initialised, start, count, step, n = _BODY.unpack_from(body)
+    inputs = np.frombuffer(body, "<f8", n, _BODY.size).astype(np.float64)
+    handle = instance.do(instance.fmu.deserializeFMUState, body[_BODY.size + 8 * n :])
+    return State(instance, handle, Clock(start, count, step), initialised, inputs)
+
+
+def _mark(instance: Instance) -> bytes:
+    """Return what tells one FMU from another."""
+    return hashlib.sha256(f"{instance.fmi} {instance.token}".encode()).digest()[:8]

@@ -1,0 +1,110 @@
+"""Values on their way into an FMU: each is checked against the type of its variable before the FMU sees it."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from plant_fmu.errors import PlantError
+
+Value = float | int | bool | str
+
+_REALS = ("Real", "Float64", "Float32")
+_WHOLE = {  # how many bits, and whether signed
+    "Integer": (32, True),
+    "Enumeration": (32, True),  # of FMI 3.0 it is wider; no enumeration has that many items
+    **{f"Int{bits}": (bits, True) for bits in (8, 16, 32, 64)},
+    **{f"UInt{bits}": (bits, False) for bits in (8, 16, 32, 64)},
+}
+
+
+def checked(variable: Any, value: object) -> Value:
+    """Return a value as its variable's type has it.
+
+    Parameters
+    ----------
+    variable : fmpy.model_description.ScalarVariable
+        Where it goes.
+    value : float, int, bool or str
+        What came. Whole numbers may come as floats, and Booleans as 0 and 1.
+
+    Returns
+    -------
+    float, int, bool or str
+        For FMPy's setter of the variable's type.
+
+    Raises
+    ------
+    PlantError
+        If the value is of another type, NaN, or beyond what the type can hold.
+    """
+    kind = variable.type
+    if variable.dimensions:
+        raise PlantError(f"{variable.name} is an array, expected a scalar: arrays cannot be set")
+    if kind in _REALS:
+        return _real(variable, value)
+    if kind in _WHOLE:
+        return _whole(variable, value, *_WHOLE[kind])
+    if kind == "Boolean":
+        if isinstance(value, (bool, np.bool_)) or (_is_number(value) and value in (0, 1)):
+            return bool(value)
+        raise _refused(variable, value, "true or false")
+    if kind == "String":
+        if isinstance(value, str):
+            return value
+        raise _refused(variable, value, "a text")
+    raise PlantError(f"{variable.name} is of type {kind}, which cannot be set")
+
+
+def require_settable(variable: Any, initialised: bool) -> None:
+    """Refuse to set what FMI does not let be set.
+
+    Parameters
+    ----------
+    variable : fmpy.model_description.ScalarVariable
+        What is to be set.
+    initialised : bool
+        Whether initialisation is over.
+
+    Raises
+    ------
+    PlantError
+        If it is calculated, constant, or fixed by now.
+    """
+    if variable.causality == "input":
+        return
+    calculated = variable.initial == "calculated" or variable.causality in ("calculatedParameter", "independent")
+    if calculated or variable.variability == "constant" or variable.causality == "structuralParameter":
+        raise PlantError(f"{variable.name} cannot be set, expected a parameter, an input or a start value")
+    if initialised and variable.variability != "tunable":
+        raise PlantError(f"{variable.name} cannot be set any more: initialise() fixed it, reset() loosens it")
+
+
+def _real(variable: Any, value: object) -> float:
+    if not _is_number(value):
+        raise _refused(variable, value, "a number")
+    number = float(value)  # type: ignore[arg-type]
+    if math.isnan(number):
+        raise _refused(variable, number, "a number")
+    return number
+
+
+def _whole(variable: Any, value: object, bits: int, signed: bool) -> int:
+    if not _is_number(value) or not math.isfinite(value) or value != int(value):  # type: ignore[arg-type, call-overload]
+        raise _refused(variable, value, "a whole number")
+    number = int(value)  # type: ignore[call-overload]
+    least, greatest = (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1) if signed else (0, 2**bits - 1)
+    if not least <= number <= greatest:
+        raise _refused(variable, number, f"a whole number from {least} to {greatest}")
+    return int(number)
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool)
+
+
+def _refused(variable: Any, value: object, expected: str) -> PlantError:
+    unit = f" in {variable.unit}" if variable.unit else ""
+    return PlantError(f"{variable.name} is {value!r}, expected {expected}{unit}")

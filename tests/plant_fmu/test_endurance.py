@@ -1,0 +1,133 @@
+"""Many instances, one after the other and side by side."""
+
+import ctypes
+import resource
+import threading
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import fmpy
+import numpy as np
+import pytest
+
+from plant_fmu import Plant, cached_fmu, load_vehicle
+from tests.plant_fmu.test_state import LIVELY
+
+needs_proc = pytest.mark.skipif(not Path("/proc/self/statm").exists(), reason="reads memory from /proc")
+
+
+def resident():
+    """Resident memory now [bytes]."""
+    with open("/proc/self/statm") as statm:
+        return int(statm.read().split()[1]) * resource.getpagesize()
+
+
+@pytest.fixture
+def library(tmp_path):
+    """The FMI 3.0 library through ctypes alone, and its token."""
+
+    fmpy.extract(str(cached_fmu(load_vehicle("odin"), 3)), str(tmp_path))
+    description = fmpy.read_model_description(str(tmp_path))
+    (path,) = tmp_path.glob("binaries/*/odin.*")
+    loaded = ctypes.CDLL(str(path))
+    loaded.fmi3InstantiateCoSimulation.restype = ctypes.c_void_p
+    return loaded, description.guid.encode()
+
+
+def live(library, token):
+    """Make, step, save and free one instance."""
+    nothing = ctypes.c_void_p()
+    made = library.fmi3InstantiateCoSimulation(
+        b"x", token, None, *[ctypes.c_bool()] * 4, None, ctypes.c_size_t(0), *[nothing] * 3
+    )
+    instance = ctypes.c_void_p(made)
+    assert instance
+    assert (
+        library.fmi3EnterInitializationMode(
+            instance, False, ctypes.c_double(), ctypes.c_double(), False, ctypes.c_double()
+        )
+        == 0
+    )
+    assert library.fmi3ExitInitializationMode(instance) == 0
+    flags = [ctypes.byref(ctypes.c_bool()) for _ in range(3)]
+    for k in range(10):
+        last = ctypes.byref(ctypes.c_double())
+        assert library.fmi3DoStep(instance, ctypes.c_double(k * 0.01), ctypes.c_double(0.01), True, *flags, last) == 0
+    state = ctypes.c_void_p()
+    assert library.fmi3GetFMUState(instance, ctypes.byref(state)) == 0
+    assert library.fmi3FreeFMUState(instance, ctypes.byref(state)) == 0
+    library.fmi3FreeInstance(instance)
+
+
+@needs_proc
+def test_a_thousand_instances_leave_nothing_behind(library):
+    loaded, token = library
+    for _ in range(1000):
+        live(loaded, token)
+    before = resident()
+    for _ in range(1000):
+        live(loaded, token)
+    assert resident() - before < 200_000
+
+
+@needs_proc
+def test_loading_again_and_again_leaves_little_behind():
+    """The whole way: extract, load, step, free, unload."""
+    path = cached_fmu(load_vehicle("odin"), 3)
+
+    def once():
+        with Plant(path) as plant:
+            plant.initialise()
+            plant.step(0.01)
+
+    for _ in range(50):
+        once()
+    before = resident()
+    for _ in range(100):
+        once()
+    assert resident() - before < 100 * 20_000
+
+
+def test_a_thousand_at_once_are_a_thousand_of_their_own(library):
+    loaded, token = library
+    nothing = ctypes.c_void_p()
+    made = [
+        ctypes.c_void_p(
+            loaded.fmi3InstantiateCoSimulation(
+                b"x", token, None, *[ctypes.c_bool()] * 4, None, ctypes.c_size_t(0), *[nothing] * 3
+            )
+        )
+        for _ in range(1000)
+    ]
+    reference = (ctypes.c_uint * 1)(1)  # position.x
+    one = ctypes.c_size_t(1)
+    for i, instance in enumerate(made):
+        assert loaded.fmi3SetFloat64(instance, reference, one, ctypes.byref(ctypes.c_double(i)), one) == 0
+    value = ctypes.c_double()
+    for i, instance in enumerate(made):
+        assert loaded.fmi3GetFloat64(instance, reference, one, ctypes.byref(value), one) == 0
+        assert value.value == i
+        loaded.fmi3FreeInstance(instance)
+
+
+def run(barrier=None):
+    """All outputs after each of 2,000 steps of a lively plant."""
+    with Plant("odin") as plant:
+        plant.set(LIVELY)
+        plant.initialise()
+        rows = np.zeros((2000, len(plant.outputs)))
+        if barrier:
+            barrier.wait()
+        for k in range(2000):
+            plant["thrust[3]"] = 10.0 * np.sin(k)
+            plant.step(0.005)
+            rows[k] = plant.outputs.values
+    return rows
+
+
+def test_four_threads_give_the_bits_of_one():
+    alone = run()
+    barrier = threading.Barrier(4)
+    with ThreadPoolExecutor(4) as threads:
+        together = list(threads.map(run, [barrier] * 4))
+    assert all(np.array_equal(rows, alone) for rows in together)

@@ -1,0 +1,48 @@
+"""The C code under AddressSanitizer and UndefinedBehaviorSanitizer, called in random orders with random values."""
+
+import subprocess
+from pathlib import Path
+
+import fmpy
+import pytest
+
+from plant_fmu import load_vehicle
+from plant_fmu.build import neutral_members
+from plant_fmu.compiler import find_compiler
+
+HERE = Path(__file__).parent
+
+
+@pytest.fixture(scope="module")
+def fuzzer(tmp_path_factory):
+    """Return a function that builds the fuzzer of one FMI version."""
+
+    def build(fmi):
+        folder = tmp_path_factory.mktemp(f"fuzz{fmi}")
+        for name, data in neutral_members(load_vehicle("odin"), fmi).items():
+            if name.startswith("sources/"):
+                (folder / Path(name).name).write_bytes(data)
+        program = folder / "fuzz"
+        command = [
+            *find_compiler(), "-std=c99", "-g", "-O1", "-fsanitize=address,undefined", "-fno-sanitize-recover=all",
+            f"-DFMI={fmi}", f"-I{folder}", f"-I{Path(fmpy.__file__).parent / 'c-code'}",
+            *map(str, folder.glob("*.c")), str(HERE / "fuzz.c"), "-o", str(program), "-lm",
+        ]  # fmt: skip
+        done = subprocess.run(command, capture_output=True, text=True)
+        if done.returncode != 0:
+            pytest.skip(f"the compiler has no sanitizers: {done.stderr[-300:]}")
+        return program
+
+    return build
+
+
+@pytest.mark.parametrize(
+    ("seed", "calls"), [(1, 200_000), pytest.param(2, 5_000_000, marks=pytest.mark.slow)], ids=["short", "long"]
+)
+def test_no_order_of_calls_does_harm(fuzzer, fmi, seed, calls):
+    """No fault of memory or arithmetic, and no number out that is none; most functions succeed now and then."""
+    done = subprocess.run([fuzzer(fmi), str(seed), str(calls)], capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout[-500:] + done.stderr[-3000:]
+    accepted = [int(n) for n in done.stdout.split("accepted")[1].split()]
+    assert sum(accepted) > calls / 10
+    assert all(n > 0 for i, n in enumerate(accepted) if i != 5)  # 5: reads and writes of Integers by chance

@@ -1,0 +1,125 @@
+"""The same motion in every importer that pip can install: one vehicle, one end."""
+
+import functools
+import tomllib
+
+import fmpy
+import numpy as np
+import pytest
+from fmpy.simulation import instantiate_fmu
+
+from plant_fmu import cached_fmu, load_vehicle
+from plant_fmu.importers import IMPORTERS, Task, read_fmu, run_importer
+from tests.test_house import ROOT
+
+IMPORTER = {importer.name: importer for importer in IMPORTERS}
+
+# off the axes, at a tilt, in a current, pushed and turned: nothing stays zero, and nothing saturates
+START = {
+    "position.z": 2.0,
+    **dict(zip((f"quaternion.e{i}" for i in range(4)), (0.7, 0.5, -0.1, 0.5), strict=True)),
+    **dict(zip((f"velocity.{a}" for a in "uvwpqr"), (0.4, -0.3, 0.2, 0.15, -0.1, 0.25), strict=True)),
+    **{f"thrust[{i + 1}]": force for i, force in enumerate((4.0, -3.0, 2.0, 5.0, -1.0, 3.0, 2.0, -4.0))},
+    **dict(zip((f"wrench.{a}" for a in "XYZKMN"), (6.0, -4.0, 5.0, 0.3, -0.2, 0.4), strict=True)),
+    **dict(zip((f"current.{a}" for a in "xyz"), (0.2, -0.1, 0.05), strict=True)),
+    **{f"thrust_time_constant[{i + 1}]": 0.1 for i in range(8)},
+    "wrench_time_constant": 0.2,
+    "substep": 0.001,  # so that the error of the FMU's own integration is far below what is compared
+}
+
+
+@pytest.fixture(params=["odin", "bluerov2_heavy"])
+def fmu(request, fmi):
+    return read_fmu(cached_fmu(load_vehicle(request.param), fmi))
+
+
+@functools.cache
+def _result(name, path):
+    return run_importer(IMPORTER[name], read_fmu(path), Task(start=START))
+
+
+def answer(name, fmu):
+    """Return what an importer makes of an FMU, or skip the test where it is not installed."""
+    result = _result(name, fmu.path)
+    if result.status == "not installed":
+        pytest.skip(f"{name}: {result.note}")
+    assert result.status == "ok", result.note
+    assert result.version
+    return result
+
+
+def difference(ours, theirs):
+    assert ours.values.keys() == theirs.values.keys()
+    return max(abs(ours.values[name] - theirs.values[name]) for name in ours.values)
+
+
+@pytest.mark.parametrize("name", ["FMPy validation", "fmu-manipulation-toolbox"])
+def test_validators_find_nothing(name, fmu):
+    assert "no problems" in answer(name, fmu).note
+
+
+def test_the_motion_is_in_all_six_degrees_of_freedom(fmu):
+    values = answer("FMPy", fmu).values
+    assert len(values) == len(fmu.of("output"))
+    assert all(abs(values[f"velocity.{axis}"]) > 1e-3 for axis in "uvwpqr")
+
+
+@pytest.mark.parametrize("name", ["libcosim", "Ecos"])
+def test_co_simulation_agrees(name, fmu):
+    if objection := IMPORTER[name].objection(fmu):
+        assert (name, fmu.fmi) == ("libcosim", 3), objection
+        assert _result(name, fmu.path).status in ("does not apply", "not installed")
+        return
+    assert difference(answer("FMPy", fmu), answer(name, fmu)) < 1e-10
+
+
+def test_state_is_saved_and_restored_to_the_bit(fmu):
+    assert "another instance" in answer("FMPy FMU state", fmu).note
+    assert difference(answer("FMPy", fmu), answer("FMPy FMU state", fmu)) == 0.0
+
+
+@pytest.mark.parametrize("name", ["FMPy CVode", "CasADi"])
+def test_model_exchange_ends_where_co_simulation_does(name, fmu):
+    assert difference(answer("FMPy", fmu), answer(name, fmu)) < 1e-7
+
+
+def directional_derivatives(fmu, folder):
+    """Return the FMU's Jacobian of the states' derivatives by states and inputs, column by column, at the start."""
+    description = fmpy.read_model_description(str(fmpy.extract(fmu.path, folder)))
+    instance = instantiate_fmu(str(folder), description, "ModelExchange")
+    by_name = {v.name: v for v in description.modelVariables}
+    references = [by_name[name].valueReference for name in START]
+    if fmu.fmi == 2:
+        instance.setReal(references, list(START.values()))
+        instance.setupExperiment(startTime=0.0)
+    else:
+        instance.setFloat64(references, list(START.values()))
+    instance.enterInitializationMode()
+    instance.exitInitializationMode()
+    instance.enterContinuousTimeMode()
+    derivatives = [unknown.variable for unknown in description.derivatives]
+    states = [v.derivative for v in derivatives]
+    knowns = [
+        *states,
+        *(v for v in description.modelVariables if v.type in ("Real", "Float64") and v.causality == "input"),
+    ]
+    unknowns = [v.valueReference for v in derivatives]
+    columns = [instance.getDirectionalDerivative(unknowns, [known.valueReference], [1.0]) for known in knowns]
+    instance.terminate()
+    instance.freeInstance()
+    return [v.name for v in states], [v.name for v in knowns], np.array(columns, dtype=float).T
+
+
+def test_casadi_reads_the_directional_derivatives(fmu, tmp_path):
+    jacobian = answer("CasADi", fmu).jacobian
+    states, knowns, expected = directional_derivatives(fmu, tmp_path / "fmu")
+    found = np.array([[jacobian[state][known] for known in knowns] for state in states])
+    assert np.abs(found - expected).max() < 1e-9
+    felt = dict(zip(knowns, np.abs(found).max(axis=0), strict=True))
+    assert all(felt[name] > 0.0 for name in START if name in felt and not name.startswith("position"))
+
+
+def test_the_extra_asks_for_what_the_drivers_need():
+    extra = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]["importers"]
+    needed = {package for importer in IMPORTERS for package in importer.packages if not package.startswith("fmpy")}
+    assert needed <= {package.split(";")[0] for package in extra}

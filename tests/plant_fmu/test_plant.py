@@ -1,0 +1,245 @@
+"""`Plant` against FMPy's own calls, and all that a user may do with values and in the wrong order."""
+
+import shutil
+from pathlib import Path
+
+import fmpy
+import numpy as np
+import pytest
+
+import plant_fmu.slave
+from plant_fmu import Plant, PlantError, VehicleError, cached_fmu, load_vehicle
+from tests.plant_fmu.conftest import drive
+
+WRENCH = tuple(f"wrench.{a}" for a in "XYZKMN")
+
+
+# ---- against FMPy's own calls ----
+
+
+def test_steps_as_fmpy_does(make_plant, make_slave, fmi):
+    slave, plant = make_slave("odin", fmi).start(), make_plant("odin", fmi)
+    for k in range(100):
+        inputs = 20.0 * np.sin(0.1 * k + np.arange(14))
+        slave.set_values(dict(zip(plant.inputs.names, inputs.tolist(), strict=True)))
+        slave.time = k * 0.01  # the time that rounding does not move
+        slave.step(0.01)
+        plant.inputs.values[:] = inputs
+        plant.step(0.01)
+        assert plant.outputs.values.tolist() == slave.get(*plant.outputs.names)
+        assert plant.read_flags().tolist() == [slave.flag(name) for name in plant.flags.names]
+    assert not plant.read_flags().any()
+    plant["thrust[2]"] = 28.0
+    plant.step(0.01)
+    assert [n for n, cut in zip(plant.flags.names, plant.read_flags(), strict=True) if cut] == ["thrust_saturated[2]"]
+    assert plant["thrust_saturated[2]"] is True
+
+
+def test_channels_are_those_of_the_description(make_plant, fmi):
+    plant = make_plant("odin", fmi)
+    described = fmpy.read_model_description(str(cached_fmu(load_vehicle("odin"), fmi))).modelVariables
+    assert plant.names == tuple(v.name for v in described)
+    outputs = [v for v in described if v.causality == "output"]
+    for channels, kinds in ((plant.outputs, ("Real", "Float64")), (plant.flags, ("Boolean",))):
+        found = [(c.name, c.unit, c.description) for c in channels.channels]
+        assert found == [(v.name, v.unit or "", v.description) for v in outputs if v.type in kinds]
+        assert len(channels) == len(channels.values)
+        with pytest.raises(ValueError):
+            channels.values[0] = 1
+    assert plant.inputs.names[-6:] == WRENCH and plant.inputs.channels[-1].unit == "N.m"
+
+
+def test_a_plant_is_made_of_a_name_a_file_a_vehicle_or_an_fmu(make_plant, tmp_path):
+    vehicle = load_vehicle("odin")
+    toml = tmp_path / "boat.toml"
+    shutil.copy(Path(plant_fmu.slave.__file__).parent / "vehicles" / "odin.toml", toml)
+    fmu = cached_fmu(vehicle, 2)
+    runs = [drive(make_plant(source)) for source in ("odin", str(toml), toml, vehicle, fmu, str(fmu))]
+    assert all(np.array_equal(run, runs[0]) for run in runs)
+    assert make_plant(fmu).fmi == 2 and make_plant("odin").fmi == 3 and make_plant("odin").name == "odin"
+
+
+@pytest.mark.parametrize(
+    ("source", "fmi", "kind", "words"),
+    [
+        ("odinn", 3, VehicleError, "'odinn' is unknown"),
+        ("missing.fmu", 3, PlantError, r"missing.fmu: no FMU: No such file"),
+        ("odin", 1, PlantError, "FMI version is 1, expected 2 or 3"),
+        (7, 3, PlantError, "plant is 7, expected a vehicle"),
+    ],
+)
+def test_what_is_no_plant_is_said(source, fmi, kind, words):
+    with pytest.raises(kind, match=words):
+        Plant(source, fmi)
+
+
+# ---- values ----
+
+
+def test_values_are_sent_by_their_type(make_plant, fmi):
+    plant = make_plant("odin", fmi, start=False)
+    plant.set({"seed": 7, "free_surface": True, "hull_radius": 0.3, "mass": 130})
+    plant.set({"position.z": np.float32(2.5), "thrust[1]": np.int64(3)})
+    plant.initialise()
+    assert [plant[n] for n in ("seed", "free_surface", "mass", "position.z", "thrust[1]")] == [7, True, 130, 2.5, 3]
+    plant.reset()
+    plant.set({"seed": 8.0, "free_surface": 0.0})
+    plant.initialise()
+    assert (plant["seed"], plant["free_surface"]) == (8, False)
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "words"),
+    [
+        ("mas", 1.0, r"'mas' is unknown; did you mean 'mass'\?"),
+        ("xyzzy!", 1.0, r"'xyzzy!' is unknown; expected one of the \d+ in plant.names"),
+        ("mass", float("nan"), "mass is nan, expected a number in kg"),
+        ("mass", "heavy", "mass is 'heavy', expected a number in kg"),
+        ("mass", True, "mass is True, expected a number"),
+        ("mass", None, "mass is None, expected a number"),
+        ("mass", -5.0, "mass = -5 refused"),
+        ("mass", float("inf"), "mass = inf refused"),
+        ("thrust[1]", float("nan"), r"thrust\[1\] is nan, expected a number in N"),
+        ("seed", 1.5, "seed is 1.5, expected a whole number"),
+        ("seed", 2**31, "seed is 2147483648, expected a whole number from -2147483648 to 2147483647"),
+        ("seed", float("inf"), "seed is inf, expected a whole number"),
+        ("free_surface", 2, "free_surface is 2, expected true or false"),
+        ("free_surface", "yes", "free_surface is 'yes', expected true or false"),
+        ("actuation.X", 1.0, "actuation.X cannot be set, expected a parameter"),
+        ("thrust_saturated[1]", True, r"thrust_saturated\[1\] cannot be set, expected a parameter"),
+    ],
+)
+@pytest.mark.parametrize("how", ["set", "item"])
+def test_wrong_values_are_named(make_plant, how, name, value, words):
+    plant = make_plant(start=False)
+    act = {"set": lambda: plant.set({"buoyancy": 1000.0, name: value}), "item": lambda: plant.__setitem__(name, value)}
+    with pytest.raises(PlantError, match=words) as caught:
+        act[how]()
+    assert "\n" not in str(caught.value)
+    plant.initialise()
+    assert plant["mass"] == 125.0 and plant["buoyancy"] == 1228.25  # nothing was set
+
+
+def test_initialise_fixes_start_values_and_leaves_parameters_tunable(make_plant, fmi):
+    plant = make_plant("odin", fmi)
+    for name in ("position.x", "quaternion.e0"):
+        with pytest.raises(PlantError, match=f"{name} cannot be set any more: initialise"):
+            plant[name] = 1.0
+    plant["buoyancy"] = 1300.0
+    plant.step(0.1)
+    assert plant["velocity.w"] < -0.01 and plant["buoyancy"] == 1300.0
+
+
+def test_inputs_act_from_the_start_and_hold(make_plant, fmi):
+    plant = make_plant("odin", fmi, start=False)
+    plant.set({"wrench.X": 20.0})
+    plant.inputs.values[plant.inputs.names.index("wrench.Y")] = 5.0
+    plant.initialise()
+    assert (plant["actuation.X"], plant["actuation.Y"]) == (20.0, 5.0)
+    plant.step(0.1)
+    plant.step(0.1)
+    assert (plant["wrench.X"], plant["actuation.X"]) == (20.0, 20.0)
+    plant["wrench.X"] = 0.0
+    plant.step(0.1)
+    assert plant["actuation.X"] == 0.0
+
+
+def test_a_nan_among_the_inputs_stops_the_step_and_nothing_else(make_plant, fmi):
+    plant, other = make_plant("odin", fmi), make_plant("odin", fmi)
+    plant.inputs.values[3] = np.nan
+    with pytest.raises(PlantError, match=r"^t = 0 s: thrust\[4\] = nan refused"):
+        plant.step(0.01)
+    plant.inputs.values[3] = 0.0
+    assert plant.time == 0.0
+    assert np.array_equal(drive(plant), drive(other))
+
+
+# ---- the order of things ----
+
+
+def test_nothing_but_setting_comes_before_initialise(make_plant, fmi):
+    plant = make_plant("odin", fmi, start=False)
+    for act in (
+        lambda: plant.step(0.1),
+        plant.read_flags,
+        lambda: plant["mass"],
+        lambda: plant["position.x"],
+        lambda: plant.jacobian(["actuation.X"], ["wrench.X"]),
+    ):
+        with pytest.raises(PlantError, match=r"before initialise\(\)"):
+            act()
+    assert plant["thrust[1]"] == 0.0
+    plant.initialise()
+    with pytest.raises(PlantError, match=r"initialised already; reset\(\) takes it back"):
+        plant.initialise()
+
+
+def test_nothing_comes_after_close(make_plant):
+    plant = make_plant()
+    state = plant.save()
+    plant.close()
+    plant.close()
+    for act in (
+        lambda: plant.step(0.1),
+        plant.read_flags,
+        plant.initialise,
+        plant.reset,
+        plant.save,
+        lambda: plant.restore(state),
+        lambda: plant.serialise(state),
+        lambda: plant.set({"mass": 1.0}),
+        lambda: plant["thrust[1]"],
+        lambda: plant.jacobian([], []),
+    ):
+        with pytest.raises(PlantError, match="plant odin is closed"):
+            act()
+    plant.free(state)
+    assert "closed" in repr(plant) and "FMI 3.0" in repr(plant)
+
+
+@pytest.mark.parametrize("step", [0.0, -0.1, float("nan"), float("inf"), "0.1", None])
+def test_steps_that_are_none_are_refused(make_plant, step):
+    plant = make_plant()
+    plant.step(0.1)
+    with pytest.raises(PlantError, match=r"step is .*, expected seconds above 0"):
+        plant.step(step)
+    plant.step(0.1)
+    assert plant.time == 0.2
+
+
+def test_time_gathers_no_rounding(make_plant):
+    plant = make_plant()
+    for k in range(1, 1001):
+        plant.step(0.001)
+        assert plant.time == k * 0.001
+    assert plant["time"] == pytest.approx(1.0, abs=1e-12)
+    plant.step(0.5)
+    plant.step(0.25)
+    assert plant.time == 1.75
+
+
+def test_it_starts_at_any_time(make_plant, fmi):
+    plant = make_plant("odin", fmi, start=False)
+    plant.initialise(time=100.0)
+    plant.step(0.5)
+    assert plant.time == 100.5
+
+
+def test_parameters_that_contradict_are_refused_when_it_starts(make_plant, fmi):
+    plant = make_plant("odin", fmi, start=False)
+    plant.set({"added_mass[1,1]": 1.0, "added_mass[1,2]": 1e4})
+    with pytest.raises(PlantError, match="positive definite"):
+        plant.initialise()
+    plant.reset()
+    plant.initialise()
+
+
+def test_reset_takes_it_back_to_the_start(make_plant, fmi):
+    plant, fresh = make_plant("odin", fmi), make_plant("odin", fmi)
+    drive(plant)
+    plant["mass"] = 140.0
+    plant.reset()
+    assert plant.time == 0.0 and not plant.initialised and not plant.inputs.values.any()
+    plant.initialise()
+    assert plant["mass"] == 125.0
+    assert np.array_equal(drive(plant), drive(fresh))

@@ -1,0 +1,152 @@
+"""Plants beside each other, plants of foreign FMUs and of broken ones, and what they leave on the disk: nothing."""
+
+import gc
+import os
+import threading
+import zipfile
+from xml.etree import ElementTree as ET
+
+import numpy as np
+import pytest
+
+import plant_fmu.slave
+from plant_fmu import Plant, PlantError, cached_fmu, load_vehicle
+from tests.plant_fmu.conftest import drive
+
+
+def edited(tmp_path, edit, fmi=3, drop=()):
+    """Return a copy of an FMU whose description was edited, and some of whose files were left out."""
+    path = tmp_path / "edited.fmu"
+    with zipfile.ZipFile(cached_fmu(load_vehicle("odin"), fmi)) as old, zipfile.ZipFile(path, "w") as new:
+        for name in old.namelist():
+            if name == "modelDescription.xml":
+                root = ET.fromstring(old.read(name))
+                edit(root)
+                new.writestr(name, ET.tostring(root))
+            elif not name.startswith(drop or "\0"):
+                new.writestr(name, old.read(name))
+    return path
+
+
+# ---- several at once, and foreign ones ----
+
+
+def test_plants_know_nothing_of_each_other(make_plant):
+    plants = [make_plant("odin", fmi) for fmi in (2, 3, 2, 3)]
+    plants[1]["wrench.X"] = plants[2]["wrench.X"] = 50.0
+    for plant in plants:
+        plant.step(0.1)
+    assert [plant["velocity.u"] > 0.0 for plant in plants] == [False, True, True, False]
+    plants[0].close()
+    plants[1].step(0.1)
+
+
+def test_threads_have_a_plant_each(scratch, fmi):
+    here, runs = os.getcwd(), {}
+
+    def work(i):
+        with Plant("odin", fmi) as plant:
+            plant.initialise()
+            state = plant.save()
+            drive(plant)
+            plant.restore(state)
+            runs[i] = drive(plant)
+
+    cached_fmu(load_vehicle("odin"), fmi)
+    threads = [threading.Thread(target=work, args=(i,)) for i in range(6)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert len(runs) == 6 and all(np.array_equal(run, runs[0]) for run in runs.values())
+    assert os.getcwd() == here and list(scratch.iterdir()) == []
+
+
+def shuffle(root):
+    """Turn the variables' order about, and take inputs, Booleans and all that is optional away."""
+    variables, structure, interface = (root.find(tag) for tag in ("ModelVariables", "ModelStructure", "CoSimulation"))
+    gone = {v.get("valueReference") for v in variables if v.get("causality") == "input" or v.tag == "Boolean"}
+    variables[:] = [v for v in reversed(variables) if v.get("valueReference") not in gone]
+    structure[:] = [e for e in structure if e.get("valueReference") not in gone]
+    for entry in structure:
+        entry.attrib.pop("dependencies", None)
+        entry.attrib.pop("dependenciesKind", None)
+    for key in [key for key in interface.attrib if key.startswith(("canGet", "canSer", "provides"))]:
+        del interface.attrib[key]
+
+
+def test_other_orders_no_inputs_no_flags_no_states(make_plant, tmp_path):
+    plant, ours = make_plant(edited(tmp_path, shuffle)), make_plant()
+    assert (len(plant.inputs), len(plant.flags)) == (0, 0)
+    assert plant.outputs.names == ours.outputs.names[::-1]
+    plant["buoyancy"] = ours["buoyancy"] = 1300.0
+    for _ in range(10):
+        plant.step(0.1)
+        ours.step(0.1)
+    assert plant.outputs.values[::-1].tolist() == ours.outputs.values.tolist()
+    assert plant.read_flags().shape == (0,)
+    for act, words in (
+        (plant.save, "cannot save its state"),
+        (lambda: plant.deserialise(b""), "cannot serialise its state"),
+        (lambda: plant.jacobian(["position.x"], ["mass"]), "provides no directional derivatives"),
+    ):
+        with pytest.raises(PlantError, match=words):
+            act()
+
+
+# ---- nothing is left behind ----
+
+
+def test_a_forgotten_plant_is_freed(scratch):
+    plant = Plant("odin")
+    assert len(list(scratch.iterdir())) == 1
+    del plant
+    gc.collect()
+    assert list(scratch.iterdir()) == []
+
+
+def test_failing_construction_leaves_nothing(tmp_path, scratch, monkeypatch):
+    def without_interface(root):
+        root.remove(root.find("CoSimulation"))
+
+    def of_another_time(root):
+        root.set("fmiVersion", "1.0")
+
+    def with_another_token(root):
+        root.set("instantiationToken", "{0}")
+
+    def with_a_wrong_unit(root):
+        root.find("ModelVariables")[0].set("unit", "parsec")
+
+    for edit, drop, words in (
+        (without_interface, (), "offers no co-simulation"),
+        (of_another_time, (), "FMI version is '1.0', expected 2.0 or 3.0"),
+        (with_another_token, (), "token"),
+        (with_a_wrong_unit, (), "parsec"),
+        (lambda root: None, ("binaries/",), "has no binary for this machine"),
+    ):
+        with pytest.raises(PlantError, match=words) as caught:
+            Plant(edited(tmp_path, edit, drop=drop))
+        assert str(caught.value).startswith(str(tmp_path / "edited.fmu: ")) and "\n" not in str(caught.value)
+    for content in (b"", b"no zip"):
+        (tmp_path / "text.fmu").write_bytes(content)
+        with pytest.raises(PlantError, match="no FMU: File is not a zip file"):
+            Plant(tmp_path / "text.fmu")
+    with zipfile.ZipFile(tmp_path / "empty.fmu", "w"):
+        pass
+    with pytest.raises(PlantError, match=r"holds no modelDescription.xml"):
+        Plant(tmp_path / "empty.fmu")
+
+    def interrupted(instance):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(plant_fmu.slave, "Bound", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        Plant("odin")
+    assert list(scratch.iterdir()) == []
+
+
+def test_a_plant_that_fails_in_its_block_is_closed(scratch):
+    with pytest.raises(PlantError, match="unknown"), Plant("odin") as plant:
+        plant["nothing"] = 1.0
+    assert list(scratch.iterdir()) == []

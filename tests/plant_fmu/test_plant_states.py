@@ -1,0 +1,135 @@
+"""A plant's state, saved, restored and as bytes; its derivatives against published mass and thruster matrices."""
+
+import gc
+
+import numpy as np
+import pytest
+
+from plant_fmu import PlantError, load_vehicle
+from tests.plant_fmu.conftest import drive
+
+WRENCH = tuple(f"wrench.{a}" for a in "XYZKMN")
+ACCELERATIONS = tuple(f"der(velocity.{a})" for a in "uvwpqr")
+
+
+# ---- states ----
+
+
+def test_a_restored_run_goes_on_to_the_last_bit(make_plant, fmi):
+    plant = make_plant("rexrov", fmi, **{"imu.rate": 50.0, "imu.acceleration_noise": 0.1, "seed": 3})
+    drive(plant)
+    plant["thrust[1]"] = 77.0
+    state = plant.save()
+    assert state.time == plant.time == 0.5
+    runs = []
+    for _ in range(3):
+        assert plant["thrust[1]"] == 77.0
+        runs.append((drive(plant), plant.time))
+        plant.restore(state)
+    assert all(np.array_equal(run, runs[0][0]) and time == runs[0][1] for run, time in runs)
+    assert plant.outputs.values[0] != runs[0][0][-1][0]
+
+
+def test_a_state_from_before_initialise_takes_it_back_there(make_plant, fmi):
+    plant = make_plant("odin", fmi, start=False)
+    plant["mass"] = 130.0
+    state = plant.save()
+    plant.initialise()
+    first = drive(plant)
+    plant.restore(state)
+    assert not plant.initialised
+    plant.initialise()
+    assert plant["mass"] == 130.0 and np.array_equal(drive(plant), first)
+
+
+def test_a_state_travels_as_bytes(make_plant, fmi):
+    plant, other = make_plant("odin", fmi), make_plant("odin", fmi, start=False)
+    drive(plant)
+    data = plant.serialise(plant.save())
+    assert isinstance(data, bytes)
+    other.restore(other.deserialise(data))
+    assert other.time == plant.time and np.array_equal(other.inputs.values, plant.inputs.values)
+    assert np.array_equal(drive(other), drive(plant))
+
+
+def test_bytes_that_are_no_state_are_refused(make_plant):
+    plant = make_plant()
+    data = plant.serialise(plant.save())
+    flipped = bytearray(data)
+    flipped[-9] ^= 1
+    for wrong, words in (
+        (b"", "0 bytes came, expected a serialised state"),
+        (b"x" * 1000, "1000 bytes came, expected a serialised state"),
+        (data[:-1], "damaged"),
+        (bytes(flipped), "damaged"),
+    ):
+        with pytest.raises(PlantError, match=words):
+            plant.deserialise(wrong)
+    for foreign in (make_plant("odin", 2), make_plant("rexrov")):
+        with pytest.raises(PlantError, match="of another FMU"):
+            plant.deserialise(foreign.serialise(foreign.save()))
+
+
+def test_states_are_freed_once_and_never_used_again(make_plant, fmi):
+    plant, other = make_plant("odin", fmi), make_plant("odin", fmi)
+    state = plant.save()
+    with pytest.raises(PlantError, match="of another plant"):
+        other.restore(state)
+    with pytest.raises(PlantError, match="of another plant"):
+        other.free(state)
+    plant.free(state)
+    plant.free(state)
+    with pytest.raises(PlantError, match="the state was freed"):
+        plant.restore(state)
+
+
+def test_states_that_nobody_holds_are_freed(make_plant, monkeypatch):
+    plant = make_plant()
+    freed = []
+    free = plant._instance.fmu.freeFMUState
+    monkeypatch.setattr(plant._instance.fmu, "freeFMUState", lambda state: (freed.append(state.value), free(state)))
+    kept = plant.save()
+    for _ in range(20):
+        plant.save()
+    gc.collect()
+    plant.restore(kept)
+    assert len(freed) == 20
+    plant.close()
+    assert len(freed) == 21
+
+
+# ---- derivatives ----
+
+
+@pytest.mark.parametrize("name", ["odin", "rexrov"])
+def test_accelerations_by_wrench_are_the_inverse_of_the_mass_matrix(make_plant, name, fmi):
+    plant, vehicle = make_plant(name, fmi), load_vehicle(name)
+    np.testing.assert_allclose(
+        plant.jacobian(ACCELERATIONS, WRENCH), np.linalg.inv(vehicle.mass_matrix), rtol=1e-9, atol=1e-12
+    )
+    thrusts = plant.inputs.names[:8]
+    actuation = [name.replace("wrench", "actuation") for name in WRENCH]
+    if name == "odin":  # without lag
+        np.testing.assert_allclose(plant.jacobian(actuation, thrusts), vehicle.thruster_matrix, atol=1e-12)
+
+
+def test_derivatives_see_inputs_that_no_step_has_sent_yet(make_plant):
+    plant = make_plant()
+    assert plant.jacobian(["actuation.X"], ["thrust[1]"])[0, 0] > 0.7
+    plant["thrust[1]"] = 1000.0  # far beyond its limit
+    assert plant.jacobian(["actuation.X"], ["thrust[1]"])[0, 0] == 0.0
+    assert plant.jacobian([], ["thrust[1]"]).shape == (0, 1)
+    assert plant.jacobian(["actuation.X"], []).shape == (1, 0)
+
+
+@pytest.mark.parametrize(
+    ("unknowns", "knowns", "words"),
+    [
+        (["actuation.Q"], ["wrench.X"], "'actuation.Q' is unknown"),
+        (["thrust_saturated[1]"], ["wrench.X"], r"thrust_saturated\[1\] is of type Boolean, expected a real scalar"),
+        (["actuation.X"], ["actuation.Y"], "derivatives of actuation.X by actuation.Y: "),
+    ],
+)
+def test_derivatives_that_are_none_are_named(make_plant, fmi, unknowns, knowns, words):
+    with pytest.raises(PlantError, match=words):
+        make_plant("odin", fmi).jacobian(unknowns, knowns)

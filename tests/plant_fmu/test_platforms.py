@@ -1,0 +1,241 @@
+"""FMUs for all platforms: what is in them, what it exports and needs, and what it computes where that can be run."""
+
+import functools
+import hashlib
+import os
+import re
+import shutil
+import struct
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+import fmpy
+import pytest
+from fmpy.validation import validate_fmu
+
+from plant_fmu import BuildError, build_fmu, load_vehicle
+from plant_fmu.__main__ import main
+from plant_fmu.platforms import PLATFORMS
+from tests.plant_fmu.conftest import STATES, Slave
+from tests.plant_fmu.libraries import parts, read_libraries
+
+HEADERS = Path(fmpy.__file__).parent / "c-code"
+FOLDERS = {
+    2: {"linux64": ".so", "aarch64-linux": ".so", "win64": ".dll", "darwin64": ".dylib"},
+    3: {
+        "x86_64-linux": ".so",
+        "aarch64-linux": ".so",
+        "x86_64-windows": ".dll",
+        "x86_64-darwin": ".dylib",
+        "aarch64-darwin": ".dylib",
+    },
+}
+MACHINES = {"linux64": ["x86_64"], "win64": ["x86_64"], "darwin64": ["x86_64", "aarch64"]}
+# what lld names in every library for macOS, besides what the program exports
+OF_THE_LINKER = {"_mh_dylib_header", "__dso_handle"}
+
+
+@functools.cache
+def built(fmi, folder):
+    return build_fmu(load_vehicle("odin"), fmi, folder / f"odin-{fmi}.fmu", "all")
+
+
+@pytest.fixture(scope="session")
+def all_platforms(tmp_path_factory):
+    """Return a function that builds the FMU once a session."""
+    pytest.importorskip("ziglang", reason="the build extra is not installed: no binaries for other platforms")
+    folder = tmp_path_factory.mktemp("all-platforms")
+    return lambda fmi: built(fmi, folder)
+
+
+def binaries(path):
+    with zipfile.ZipFile(path) as archive:
+        return {name.split("/")[1]: archive.read(name) for name in archive.namelist() if name.startswith("binaries/")}
+
+
+def test_readers_find_what_others_built():
+    """The readers of this folder, on libraries that FMPy ships."""
+    files = sorted((Path(fmpy.__file__).parent / "sundials").glob("*/sundials_cvode.*"))
+    if not files:
+        pytest.skip("this FMPy ships no libraries")
+    for file in files:
+        for library in read_libraries(file.read_bytes()):
+            assert {"CVode", "CVodeCreate", "CVodeFree"} <= library.exports
+            assert any("sundials_core" in name for name in library.needs)
+
+
+@pytest.mark.slow
+def test_each_platform_has_its_folder(all_platforms, fmi):
+    with zipfile.ZipFile(all_platforms(fmi)) as archive:
+        names = [name for name in archive.namelist() if name.startswith("binaries/")]
+        assert archive.namelist() == sorted(archive.namelist())
+        assert all(
+            info.compress_type == zipfile.ZIP_DEFLATED and "\\" not in info.filename for info in archive.filelist
+        )
+    assert names == sorted(f"binaries/{folder}/odin{suffix}" for folder, suffix in FOLDERS[fmi].items())
+    assert validate_fmu(str(all_platforms(fmi))) == []
+
+
+@pytest.mark.slow
+def test_each_library_is_for_its_machine(all_platforms, fmi):
+    for folder, data in binaries(all_platforms(fmi)).items():
+        machines = MACHINES.get(folder, [folder.split("-")[0]])
+        assert [library.machine for library in read_libraries(data)] == machines
+
+
+@pytest.mark.slow
+def test_the_whole_api_is_exported_and_nothing_else(all_platforms, fmi):
+    header = (HEADERS / f"fmi{fmi}Functions.h").read_text()
+    api = set(re.findall(rf"FMI{fmi}_Export\s+fmi{fmi}\w+TYPE\s+(fmi{fmi}\w+);", header))
+    assert len(api) > 40
+    for folder, data in binaries(all_platforms(fmi)).items():
+        for library in read_libraries(data):
+            assert library.exports - (OF_THE_LINKER if "darwin" in folder else set()) == api, folder
+
+
+@pytest.mark.slow
+def test_libraries_need_what_every_system_has(all_platforms, fmi):
+    for folder, data in binaries(all_platforms(fmi)).items():
+        for library in read_libraries(data):
+            assert library.needs
+            if "linux" in folder:
+                assert library.needs <= {"libc.so.6", "libm.so.6"}
+                versions = {tuple(map(int, v.removeprefix("GLIBC_").split("."))) for v in library.versions}
+                assert max(versions) <= (2, 17)
+            elif "win" in folder and "darwin" not in folder:
+                assert {n for n in library.needs if not n.startswith("api-ms-win-crt-")} == {"KERNEL32.dll"}
+                assert library.name == "odin.dll"
+            else:
+                assert library.needs == {"/usr/lib/libSystem.B.dylib"}
+                assert library.name == "@rpath/odin.dylib"
+                assert library.minimum == "11.0"
+
+
+@pytest.mark.slow
+def test_no_library_names_a_place(all_platforms, fmi):
+    places = {"/tmp", "/root", "/home", "/Users", "C:\\", "plant_fmu", ".pdb", ".c\0", str(Path.home()), sys.prefix}
+    for folder, data in binaries(all_platforms(fmi)).items():
+        assert not [place for place in places if place.encode() in data], folder
+
+
+@pytest.mark.slow
+def test_two_builds_for_all_give_the_same_bytes(all_platforms, fmi, tmp_path, monkeypatch):
+    (tmp_path / "another place").mkdir()
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path / "another place"))
+    again = build_fmu(load_vehicle("odin"), fmi, tmp_path / "again.fmu", ",".join(PLATFORMS))
+    assert again.read_bytes() == all_platforms(fmi).read_bytes()
+
+
+@pytest.mark.slow
+def test_arm_macs_find_their_signature_right(all_platforms, fmi):
+    """They load no library without one; it holds a hash of each page (Apple's cs_blobs.h)."""
+    data = binaries(all_platforms(fmi))["darwin64" if fmi == 2 else "aarch64-darwin"]
+    library = parts(data)[1] if fmi == 2 else data
+    at, signature = 32, None
+    for _ in range(struct.unpack_from("<I", library, 16)[0]):
+        command, size = struct.unpack_from("<II", library, at)
+        if command == 0x1D:
+            (signature,) = struct.unpack_from("<I", library, at + 8)
+        at += size
+    assert signature is not None
+    directory = signature + struct.unpack_from(">I", library, signature + 16)[0]
+    magic, _, _, _, hashes, _, _, slots, limit = struct.unpack_from(">9I", library, directory)
+    size, kind, _, page = struct.unpack_from(">4B", library, directory + 36)
+    assert (magic, size, kind, limit) == (0xFADE0C02, 32, 2, signature)  # SHA-256 of all before the signature
+    assert slots == -(-limit // (1 << page))
+    for i in range(slots):
+        of_page = hashlib.sha256(library[i << page : min((i + 1) << page, limit)]).digest()
+        assert library[directory + hashes + 32 * i :][:32] == of_page
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(shutil.which("file") is None, reason="needs the command file")
+def test_the_command_file_knows_the_universal_library(all_platforms, tmp_path):
+    (tmp_path / "odin.dylib").write_bytes(binaries(all_platforms(2))["darwin64"])
+    said = subprocess.run(["file", tmp_path / "odin.dylib"], capture_output=True, text=True, check=True).stdout
+    assert "universal binary with 2 architectures" in said
+    assert "x86_64" in said and "arm64" in said
+
+
+def command(platform, tmp_path):
+    """Return what starts a program of a platform here; skip where nothing does."""
+    if platform == "x86_64-windows":
+        wine = shutil.which("wine") or shutil.which("wine64")
+        return [wine] if wine else pytest.skip("needs wine to run a Windows library")
+    if platform == "aarch64-linux":
+        root = Path("/usr/aarch64-linux-gnu")  # Debian's libc6-arm64-cross
+        if shutil.which("qemu-aarch64") is None or not (root / "lib" / "libc.so.6").exists():
+            pytest.skip("needs qemu-aarch64 and libc6-arm64-cross to run a library of 64-bit ARM")
+        return ["qemu-aarch64", "-L", str(root)]
+    if (fmpy.system, fmpy.architecture) != ("linux", "x86_64"):
+        pytest.skip("needs Linux on x86-64")
+    return []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("platform", ["x86_64-linux", "aarch64-linux", "x86_64-windows"])
+def test_libraries_compute_the_same(all_platforms, fmi, platform, tmp_path):
+    """A C program steps the library of another platform; FMPy steps the one that was built for this machine."""
+    runner = command(platform, tmp_path)
+    path = all_platforms(fmi)
+    with zipfile.ZipFile(path) as archive:
+        archive.extractall(tmp_path)
+    slave = Slave(build_fmu(load_vehicle("odin"), fmi, tmp_path / "native.fmu")).start()
+    references = [slave.by_name[name].valueReference for name in ("thrust[2]", *STATES)]
+    slave.set_values({"thrust[2]": 20.0})
+    for _ in range(1000):
+        slave.step(0.01)
+    expected = slave.get(*STATES)
+    slave.close()
+    assert max(map(abs, expected[:3])) > 0.1  # it went somewhere
+
+    target = PLATFORMS[platform]
+    program = tmp_path / ("importer.exe" if target.system == "windows" else "importer")
+    subprocess.run(
+        [sys.executable, "-m", "ziglang", "cc", "-target", target.target, "-O2", f"-DFMI={fmi}", f"-I{HEADERS}",
+         Path(__file__).parent / "importer.c", "-o", program, *(["-ldl"] if target.system == "linux" else [])],
+        check=True, capture_output=True,
+    )  # fmt: skip
+    folder = target.fmi2_name if fmi == 2 else platform
+    library = tmp_path / "binaries" / folder / f"odin{target.suffix}"
+    done = subprocess.run(
+        [*runner, program, library, slave.description.guid, "1000", "0.01", *map(str, references[:1]), "20.0",
+         *map(str, references[1:])],
+        capture_output=True, text=True, check=True,
+        env=os.environ | {"WINEPREFIX": str(tmp_path / "wine"), "WINEDEBUG": "-all"},
+    )  # fmt: skip
+    states = [float(line) for line in done.stdout.split()]
+    # to rounding: each C library has its own sine
+    assert states == pytest.approx(expected, rel=1e-12, abs=1e-12)
+
+
+@pytest.mark.slow
+def test_a_list_of_platforms_holds_those_alone(tmp_path):
+    pytest.importorskip("ziglang", reason="the build extra is not installed: no binaries for other platforms")
+    out = tmp_path / "x.fmu"
+    names = "aarch64-linux, x86_64-darwin,aarch64-linux"
+    assert main(["build", "--vehicle", "odin", "--fmi", "2", "--platforms", names, "--out", str(out)]) == 0
+    libraries = binaries(out)
+    assert sorted(libraries) == ["aarch64-linux", "darwin64"]
+    assert libraries["darwin64"][:4] == b"\xcf\xfa\xed\xfe"  # one needs no universal library
+
+
+@pytest.mark.parametrize("text", ["amiga", "linux64", "", "all,x86_64-linux", "native,x86_64-linux", "x86_64-linux,"])
+def test_unknown_platforms_are_named_beside_the_known(tmp_path, capsys, text):
+    assert main(["build", "--vehicle", "odin", "--platforms", text, "--out", str(tmp_path / "x.fmu")]) == 2
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1
+    wrong = next(name for name in text.split(",") if name not in FOLDERS[3])
+    assert repr(wrong) in said
+    for known in ("native", "all", *FOLDERS[3]):
+        assert known in said
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_other_platforms_need_ziglang(tmp_path, monkeypatch):
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
+    with pytest.raises(BuildError, match=r"ziglang package was not found; pip install 'subreach\[build\]'$"):
+        build_fmu(load_vehicle("odin"), 3, tmp_path / "x.fmu", "all")
+    assert list(tmp_path.iterdir()) == []
