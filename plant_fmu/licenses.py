@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from importlib import metadata
+from importlib import resources
 from pathlib import Path
 
 import fmpy
@@ -33,8 +33,10 @@ def licenses(fmi: int) -> dict[str, str]:
     BuildError
         If the installation has lost its licence.
     """
-    # a distribution carries its licence among its metadata, in wheels and editable installations alike: no second copy
-    text = metadata.distribution("subreach").read_text("licenses/LICENSE")
+    package = resources.files("plant_fmu")
+    # a wheel has a copy in the package, a checkout has the one file beside it
+    places = [package / "LICENSE", Path(str(package)).parent / "LICENSE"]
+    text = next((place.read_text(encoding="utf-8") for place in places if place.is_file()), "")
     header = (Path(fmpy.__file__).parent / "c-code" / f"fmi{fmi}Functions.h").read_text(encoding="utf-8")
     start, end = header.find("Copyright"), header.find("*/")
     if not text or not 0 <= start < end:
