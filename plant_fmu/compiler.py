@@ -18,7 +18,7 @@ from plant_fmu.platforms import Platform, native_platform
 log = logging.getLogger(__name__)
 
 # no contraction of a*b+c, so that compilers differ in no bit beyond what their C libraries do;
-# and neither symbols nor debug information, which would name the folder of the build
+# and no debug information, which would name the folder of the build
 FLAGS = ("-std=c99", "-O3", "-fno-math-errno", "-g0", "-ffp-contract=off", "-fPIC", "-fvisibility=hidden", "-shared")
 _WARNINGS = ("-Wall", "-Wextra", "-Wpedantic")
 _INSTALL = "pip install 'subreach[build]'"
@@ -101,8 +101,9 @@ def compile_library(
     """
     link = ["-s"]
     if platform.system == "darwin":
-        # the linker of macOS knows no -s, and writes the place of the build into the library unless told a name
-        link = ["-Wl,-x", f"-Wl,-install_name,@rpath/{library.name}"]
+        # Named, for the linker else writes the place of the build into the library. Names of functions stay: Apple's
+        # linker knows no -s, and ziglang's, told to drop them, leaves some numbers of a table to chance.
+        link = [f"-Wl,-install_name,@rpath/{library.name}"]
     command = [
         *compiler, *FLAGS, *_WARNINGS, *link,
         *(f"-I{folder}" for folder in includes),

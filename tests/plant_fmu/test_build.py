@@ -3,6 +3,8 @@
 import os
 import shutil
 import sys
+import tempfile
+import zipfile
 from pathlib import Path
 
 import pytest
@@ -33,11 +35,15 @@ def test_two_builds_give_the_same_bytes(tmp_path, fmi, compiler, monkeypatch):
     elif shutil.which("cc") is None:
         pytest.skip("there is no cc")
     contents = []
-    for name in ("one", "another"):  # in folders of different names
+    for name in ("one", "another place"):  # in folders of different names
         (tmp_path / name).mkdir()
         monkeypatch.setattr("tempfile.tempdir", str(tmp_path / name))
         contents.append(build_fmu(load_vehicle("odin"), fmi, tmp_path / f"{name}.fmu").read_bytes())
     assert contents[0] == contents[1]
+    with zipfile.ZipFile(tmp_path / "one.fmu") as archive:
+        (library,) = [archive.read(name) for name in archive.namelist() if name.startswith("binaries/")]
+    places = (str(tmp_path), tempfile.gettempdir(), "/tmp", "/home", "/root", sys.prefix, "plant_fmu", ".c\0")
+    assert not [place for place in places if place.encode() in library]
 
 
 def test_command_line_builds(tmp_path, capsys):

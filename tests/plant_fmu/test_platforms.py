@@ -151,6 +151,31 @@ def test_arm_macs_find_their_signature_right(all_platforms, fmi):
 
 
 @pytest.mark.slow
+def test_macs_find_no_number_left_to_chance(all_platforms, fmi):
+    """Each call leaps through a pointer, and both have their symbol's number: ziglang's linker forgets some with -x."""
+    found = [data for folder, data in binaries(all_platforms(fmi)).items() if "darwin" in folder]
+    for library in parts(found[0]) if fmi == 2 else found:
+        numbers, sections, at = (), {}, 32
+        for _ in range(struct.unpack_from("<I", library, 16)[0]):
+            kind, size = struct.unpack_from("<2I", library, at)
+            if kind == 0x0B:  # dynamic symbols
+                place, n = struct.unpack_from("<2I", library, at + 56)
+                numbers = struct.unpack_from(f"<{n}I", library, place)
+            elif kind == 0x19:  # segment
+                for i in range(at + 72, at + size, 80):
+                    name = library[i : i + 16].rstrip(b"\0").decode()
+                    length, first, step = (struct.unpack_from("<Q", library, i + 40)[0],
+                                           *struct.unpack_from("<2I", library, i + 68))  # fmt: skip
+                    sections[name] = (first, length // (step or 8))
+            at += size
+        calls, pointers = (
+            numbers[first : first + n] for first, n in (sections["__stubs"], sections["__la_symbol_ptr"])
+        )
+        assert len(calls) > 10
+        assert calls == pointers
+
+
+@pytest.mark.slow
 @pytest.mark.skipif(shutil.which("file") is None, reason="needs the command file")
 def test_the_command_file_knows_the_universal_library(all_platforms, tmp_path):
     (tmp_path / "odin.dylib").write_bytes(binaries(all_platforms(2))["darwin64"])

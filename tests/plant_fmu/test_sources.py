@@ -1,0 +1,110 @@
+"""The sources in an FMU: all that another needs to compile the plant, and the same plant once compiled."""
+
+import re
+import shutil
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+import fmpy
+import pytest
+from fmpy import read_model_description
+from fmpy.build import build_platform_binary
+from lxml import etree
+
+from plant_fmu import cached_fmu, load_vehicle
+from plant_fmu.compiler import find_compiler
+from plant_fmu.platforms import native_platform
+from tests.plant_fmu.conftest import STATES, Slave
+
+FMPY = Path(fmpy.__file__).parent
+
+
+@pytest.fixture
+def bare(fmi, tmp_path):
+    """The FMU's folder without its binaries."""
+    with zipfile.ZipFile(cached_fmu(load_vehicle("odin"), fmi)) as archive:
+        archive.extractall(tmp_path / "bare")
+    shutil.rmtree(tmp_path / "bare" / "binaries")
+    return tmp_path / "bare"
+
+
+def packed(folder):
+    return Path(shutil.make_archive(str(folder), "zip", folder))
+
+
+def trajectory(path):
+    slave = Slave(path).start(**{"velocity.p": 0.3})
+    slave.set_values({"thrust[2]": 20.0})
+    states = []
+    for _ in range(100):
+        slave.step(0.1)
+        states += slave.get(*STATES)
+    slave.close()
+    return states
+
+
+def test_listed_are_all_files_to_compile(bare, fmi):
+    (configuration, *_) = read_model_description(bare).buildConfigurations
+    assert configuration.modelIdentifier == "odin"
+    (files,) = configuration.sourceFileSets
+    assert sorted(files.sourceFiles) == sorted(path.name for path in (bare / "sources").glob("*.c"))
+    assert f"fmi{fmi}.c" in files.sourceFiles and f"fmi{5 - fmi}.c" not in files.sourceFiles
+    text = (bare / "modelDescription.xml").read_text()
+    assert text.count("<SourceFiles>") == (2 if fmi == 2 else 0)  # of both interfaces
+
+
+def test_sources_are_complete_but_for_the_headers_of_fmi(bare, fmi):
+    names = {path.name for path in (bare / "sources").iterdir()}
+    assert "vehicle.h" in names
+    assert not {name for name in names if re.fullmatch(r"fmi\d\w+\.h", name)}
+    included = {
+        name for path in (bare / "sources").glob("*.[ch]") for name in re.findall(r'#include "(.+)"', path.read_text())
+    }
+    assert included - names == {f"fmi{fmi}Functions.h"}
+
+
+@pytest.mark.parametrize("fmi", [3])
+def test_build_description_keeps_to_the_schema(bare):
+    schema = etree.XMLSchema(etree.parse(FMPY / "schema" / "fmi3" / "fmi3BuildDescription.xsd"))
+    description = etree.parse(bare / "sources" / "buildDescription.xml")
+    schema.assertValid(description)
+    libraries = {
+        configuration.get("platform"): [library.get("name") for library in configuration.findall("Library")]
+        for configuration in description.findall("BuildConfiguration")
+    }
+    assert libraries[None] == ["m"]  # of the one for any platform
+    assert libraries["x86_64-windows"] == []
+    assert {files.get("language") for files in description.iter("SourceFileSet")} == {"C99"}
+
+
+def test_compiled_by_hand_they_are_the_same_plant(bare, fmi):
+    """With the command that the description asks for, and none of our own options."""
+    (configuration, *_) = read_model_description(bare).buildConfigurations
+    with zipfile.ZipFile(cached_fmu(load_vehicle("odin"), fmi)) as archive:
+        (native,) = [name for name in archive.namelist() if name.startswith("binaries/")]
+    (bare / native).parent.mkdir(parents=True)
+    files = [bare / "sources" / name for name in configuration.sourceFileSets[0].sourceFiles]
+    command = [*find_compiler(), "-std=c99", "-O1", "-fPIC", "-shared", f"-I{FMPY / 'c-code'}", *map(str, files), "-lm"]
+    subprocess.run([*command, "-o", str(bare / native)], check=True, capture_output=True)
+    expected = trajectory(cached_fmu(load_vehicle("odin"), fmi))
+    assert max(map(abs, expected)) > 1.0
+    assert trajectory(packed(bare)) == pytest.approx(expected, rel=1e-10, abs=1e-10)
+
+
+@pytest.mark.slow
+def test_fmpy_compiles_them_to_the_same_plant(bare, fmi, tmp_path, monkeypatch):
+    monkeypatch.setenv("PATH", str(Path(sys.executable).parent), prepend=":")  # for the cmake of FMPy's own needs
+    missing = [
+        tools
+        for tools in (("cmake",), ("cc",), ("c++", "g++", "clang++"), ("make",))
+        if not any(map(shutil.which, tools))
+    ]
+    if missing or native_platform().system == "windows":
+        pytest.skip(f"FMPy compiles with CMake, a C and a C++ compiler and make; missing: {missing}")
+    (tmp_path / "build").mkdir()
+    build_platform_binary(bare, tmp_path / "build")
+    assert len(list((bare / "binaries").glob("*/odin.*"))) == 1
+    expected = trajectory(cached_fmu(load_vehicle("odin"), fmi))
+    assert trajectory(packed(bare)) == pytest.approx(expected, rel=1e-10, abs=1e-10)
