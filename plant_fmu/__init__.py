@@ -1,10 +1,8 @@
 """Underwater vehicles as FMI co-simulation units: vehicle files in, FMU files out, and a plant that steps them."""
 
 from plant_fmu.build import build_fmu, cached_fmu
-from plant_fmu.channels import Channel, Channels
 from plant_fmu.errors import BuildError, FmuFileError, PlantError, PlantFmuError, TableError, VehicleError
-from plant_fmu.plant import Plant
-from plant_fmu.state import State
+from plant_fmu.running import Channel, Channels, Plant, State
 from plant_fmu.vehicle import Vehicle, load_vehicle, shipped_vehicles
 
 __all__ = [

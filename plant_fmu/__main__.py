@@ -9,12 +9,12 @@ from pathlib import Path
 
 from plant_fmu.build import FMI_VERSIONS, build_fmu
 from plant_fmu.check import Verdict, check_fmu
+from plant_fmu.contents.layered import reference_files
+from plant_fmu.contents.parameter_set import ssv
+from plant_fmu.contents.reference import reference
 from plant_fmu.description import documentation
 from plant_fmu.errors import BuildError, PlantFmuError
-from plant_fmu.layered import reference_files
-from plant_fmu.parameter_set import ssv
 from plant_fmu.platforms import ALL, NATIVE, PLATFORMS
-from plant_fmu.reference import reference
 from plant_fmu.vehicle import load_vehicle, shipped_vehicles
 
 

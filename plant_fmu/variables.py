@@ -290,9 +290,14 @@ def _environment(vehicle: Vehicle) -> Iterator[Variable]:
     for name, quantity, description, start in (
         ("current_correlation_time", q.LONG_TIME, "Correlation time of the current's Gauss-Markov part", 60.0),
         ("current_variation_period", q.LONG_TIME, "Time between knots of that part, straight lines between them", 1.0),
-        ("hull_radius", q.RADIUS, "Radius of the sphere that meets surface and bottom", vehicle.hull_radius),
+        (
+            "hull_radius",
+            q.RADIUS,
+            "Radius of the sphere that meets surface (about r_B) and bottom (about the origin)",
+            vehicle.hull_radius,
+        ),
         ("bottom_depth", q.LENGTH, "Depth of the flat bottom; the greatest for none", q.LENGTH.maximum),
-        ("bottom_friction", q.FRICTION, "Coulomb's friction coefficient of the bottom", 0.4),
+        ("bottom_friction", q.FRICTION, "Coulomb's friction coefficient of the bottom, viscous below 1 cm/s", 0.4),
         ("bottom_time_constant", q.TIME_CONSTANT, "Time in which the bottom stops the hull, 4 substeps at least", 0.02),
         ("gravity", q.GRAVITY, "Gravity that the IMU feels", 9.81),
     ):

@@ -39,7 +39,7 @@ Status instance_directional_derivative(Instance *instance, const unsigned unknow
     return STATUS_OK;
 }
 
-/* Row by row the transposed product; there are more unknowns in use than knowns are seeded, so columns come by tangents. */
+/* One tangent for each known: exact, and no second set of formulas. */
 Status instance_adjoint_derivative(Instance *instance, const unsigned unknowns[], size_t n_unknowns,
                                    const unsigned knowns[], size_t n_knowns, const double seed[],
                                    double sensitivity[])

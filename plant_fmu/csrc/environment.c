@@ -23,9 +23,16 @@ double environment_submerged(const Parameters *p, double depth)
     return part * part * (3.0 - 2.0 * part);
 }
 
-/* A spring whose damping grows with the depth of contact x, so that the force sets in at zero, never pulls, and gives no
- * energy back beyond the spring's. With T the time constant and u = x', both rates stay below sqrt(5) / T at any speed:
- *     N = m max(0, x / T^2 + 2 / T u x / (x + T |u| / 2)) */
+/* What the spring of the bottom yields to, so that a hull found deep in it leaves at some 2 m/s: half the force at depth
+ * x1, which never is less than what holds 50 m/s2. */
+static double softening(double T)
+{
+    return fmax(4.0 * T, 50.0 * T * T);
+}
+
+/* A softening spring whose damping grows with the depth of contact x, so that the force sets in at zero, never pulls, and
+ * gives no energy back beyond the spring's. With T the time constant and u = x', both rates stay below sqrt(5) / T at any
+ * speed:  N = m max(0, x / (1 + x / x1) / T^2 + 2 / T u x / (x + T |u| / 2)) */
 int environment_contact(const Plant *plant, double depth, const double velocity_world[3], double force[3])
 {
     const Parameters *p = &plant->parameters;
@@ -34,7 +41,8 @@ int environment_contact(const Plant *plant, double depth, const double velocity_
 
     if (!(x > 0.0))
         return 0;
-    const double normal = m * fmax(0.0, x / (T * T) + 2.0 / T * u * x / (x + 0.5 * T * fabs(u)));
+    const double spring = x / (1.0 + x / softening(T)) / (T * T);
+    const double normal = m * fmax(0.0, spring + 2.0 / T * u * x / (x + 0.5 * T * fabs(u)));
 
     /* Coulomb's friction at any speed of note, viscous below 1 cm/s, and never faster than the contact itself */
     const double speed = sqrt(velocity_world[0] * velocity_world[0] + velocity_world[1] * velocity_world[1] + 1e-4);
@@ -80,11 +88,14 @@ void environment_contact_tangent(const Plant *plant, const Parameters *dp, const
     const double x = depth + p->hull_radius - p->bottom_depth, dx = ddepth + dp->hull_radius - dp->bottom_depth;
     const double u = v[2], du = dv[2], speed_u = fabs(u), dspeed_u = u < 0.0 ? -du : du;
 
-    /* normal force m (x / T^2 + 2 g / T) with g = u x / s, s = x + T |u| / 2 */
+    const double x1 = softening(T), dx1 = (x1 == 4.0 * T ? 4.0 : 100.0 * T) * dT, q = 1.0 + x / x1;
+    const double spring = x / q / (T * T);
+    const double dspring = (dx - x * (dx - x * dx1 / x1) / x1 / q) / q / (T * T) - 2.0 * spring * dT / T;
+
+    /* normal force m (spring + 2 g / T) with g = u x / s, s = x + T |u| / 2 */
     const double s = x + 0.5 * T * speed_u, ds = dx + 0.5 * (dT * speed_u + T * dspeed_u);
     const double g = u * x / s, dg = (du * x + u * dx - g * ds) / s;
-    const double push = x / (T * T) + 2.0 / T * g;
-    const double dpush = (dx - 2.0 * x * dT / T) / (T * T) + 2.0 / T * (dg - g * dT / T);
+    const double push = spring + 2.0 / T * g, dpush = dspring + 2.0 / T * (dg - g * dT / T);
     const double normal = m * fmax(0.0, push), dnormal = push > 0.0 ? dm * push + m * dpush : 0.0;
 
     const double speed = sqrt(v[0] * v[0] + v[1] * v[1] + 1e-4), dspeed = (v[0] * dv[0] + v[1] * dv[1]) / speed;

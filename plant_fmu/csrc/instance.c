@@ -98,7 +98,7 @@ Status instance_require(const Instance *instance, unsigned modes, const char *ac
 
 /* ---- life -------------------------------------------------------------------------------------------------- */
 
-Instance *instance_create(const char *name, const char *token, Interface interface, bool logging_on, LogCallback *log,
+Instance *instance_create(const char *name, const char *token, Interface kind, bool logging_on, LogCallback *log,
                           void *environment, void (*logger)(void))
 {
     const char *shown = name ? name : "";
@@ -112,7 +112,7 @@ Instance *instance_create(const char *name, const char *token, Interface interfa
         return NULL;
     }
     strcpy(instance->name, shown);
-    instance->interface = interface;
+    instance->kind = kind;
     instance->categories = logging_on ? LOG_ALL : 0;
     instance->log = log;
     instance->environment = environment;
@@ -204,8 +204,8 @@ Status instance_set_experiment(Instance *instance, double start_time, double sto
 {
     if (instance_require(instance, MODE_INSTANTIATED, "setting the experiment") != STATUS_OK)
         return STATUS_ERROR;
-    if (!(fabs(start_time) <= 1e9))
-        return instance_refuse(instance, "start time is %g s, expected a number within 1e9", start_time);
+    if (!(fabs(start_time) <= MAX_TIME))
+        return instance_refuse(instance, "start time is %g s, expected a number within %g", start_time, MAX_TIME);
     if (!(stop_time >= start_time))
         return instance_refuse(instance, "stop time is %g s, expected %g s (start time) or later", stop_time, start_time);
     instance->model.time = start_time;
@@ -237,9 +237,12 @@ Status instance_exit_initialisation(Instance *instance)
         return instance_refuse(instance, "quaternion.e0 to e3 have length 0, expected a direction");
     if (fabs(norm - 1.0) > 1e-3)
         instance_tell(instance, LOG_WARNINGS, "quaternion of length %.9g made a unit quaternion", norm);
+    const double deep = m->state.rigid[2] + m->plant.parameters.hull_radius - m->plant.parameters.bottom_depth;
+    if (deep > 0.0)
+        instance_tell(instance, LOG_WARNINGS, "the hull begins %.9g m deep in the bottom", deep);
     model_settle(m);
     model_tick(m);
-    instance->mode = instance->interface == CO_SIMULATION ? MODE_STEPPING : MODE_EVENT;
+    instance->mode = instance->kind == CO_SIMULATION ? MODE_STEPPING : MODE_EVENT;
     instance->outdated = true;
     instance_tell(instance, LOG_EVENTS, "initialised at t = %.9g s", m->time);
     return STATUS_OK;

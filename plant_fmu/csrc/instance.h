@@ -10,6 +10,8 @@
 
 enum { MAX_MESSAGE = 512 }; /* bytes of a logged message */
 
+#define MAX_TIME 1e9 /* s */
+
 typedef enum { STATUS_OK, STATUS_WARNING, STATUS_DISCARD, STATUS_ERROR, STATUS_FATAL } Status; /* as in FMI */
 
 typedef enum { CO_SIMULATION, MODEL_EXCHANGE } Interface;
@@ -41,7 +43,7 @@ typedef void LogCallback(const Instance *instance, Status status, const char *ca
 
 struct Instance {
     Model model;
-    Interface interface;
+    Interface kind;
     Mode mode;
     bool unprepared;      /* parameters changed since model_prepare */
     bool outdated;        /* outputs are older than the state, the inputs or the parameters */
@@ -54,7 +56,7 @@ struct Instance {
 
 /* ---- instance.c: life, modes, messages ---- */
 
-Instance *instance_create(const char *name, const char *token, Interface interface, bool logging_on, LogCallback *log,
+Instance *instance_create(const char *name, const char *token, Interface kind, bool logging_on, LogCallback *log,
                           void *environment, void (*logger)(void));
 void instance_free(Instance *instance);
 Status instance_reset(Instance *instance);

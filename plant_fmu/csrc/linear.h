@@ -37,6 +37,14 @@ static inline void quaternion_rate(const double e[4], const double w[3], double 
     out[3] = 0.5 * (-e[2] * w[0] + e[1] * w[1] + e[0] * w[2]);
 }
 
+/* The symmetric matrix of which the upper triangle is given. */
+static inline void symmetric6(const double upper[6][6], double whole[6][6])
+{
+    for (int i = 0; i < 6; i++)
+        for (int j = 0; j < 6; j++)
+            whole[i][j] = i < j ? upper[i][j] : upper[j][i];
+}
+
 static inline void multiply6(const double A[6][6], const double x[6], double out[6])
 {
     for (int i = 0; i < 6; i++) {

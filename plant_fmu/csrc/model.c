@@ -16,23 +16,43 @@ static double period_wanted(const Parameters *p, int clock)
     return p->sensor_rate[clock] > 0.0 ? fmin(1.0 / p->sensor_rate[clock], LONGEST_PERIOD) : 0.0;
 }
 
+/* Lets the current's variation stand as it is now, until its next knot. */
+static void hold_current(Model *m)
+{
+    Drift *drift = &m->held.drift;
+
+    for (int i = 0; i < 3; i++) {
+        drift->value[i] += drift->slope[i] * (fmin(m->time, drift->until) - drift->since);
+        drift->slope[i] = 0.0;
+    }
+    drift->since = m->time;
+}
+
 const char *model_prepare(Model *m)
 {
+    const Parameters *p = &m->plant.parameters;
+    Drift *drift = &m->held.drift;
     const char *fault = plant_prepare(&m->plant);
 
     if (fault)
         return fault;
     for (int i = 0; i < N_CLOCKS; i++) {
         Clock *clock = &m->held.clocks[i];
-        const double period = period_wanted(&m->plant.parameters, i);
-        if (period != clock->period) {
-            clock->period = period;
-            clock->since = m->time;
-            clock->ticks = 0.0;
-        }
+        const double period = period_wanted(p, i);
+        /* a changed deviation of the current is a new knot, too */
+        const int anew = period != clock->period ||
+                         (i == CURRENT_CLOCK && memcmp(drift->deviation, p->current_variation, sizeof drift->deviation));
+        if (!anew)
+            continue;
+        if (i == CURRENT_CLOCK)
+            hold_current(m);
+        clock->period = period;
+        clock->since = m->time;
+        clock->ticks = 0.0;
     }
-    if (m->held.clocks[CURRENT_CLOCK].period == 0.0)
-        memset(&m->held.drift, 0, sizeof m->held.drift);
+    for (int i = 0; i < 3; i++)
+        if (p->current_variation[i] == 0.0)
+            drift->value[i] = drift->slope[i] = drift->deviation[i] = 0.0;
     return NULL;
 }
 
@@ -58,17 +78,19 @@ static void tick_current(Model *m, unsigned long long count)
     const double period = m->held.clocks[CURRENT_CLOCK].period, ratio = period / p->current_correlation_time;
     const double kept = exp(-ratio), fresh = sqrt(-expm1(-2.0 * ratio));
 
+    hold_current(m);
     for (int i = 0; i < 3; i++) {
         const double deviation = p->current_variation[i];
         const unsigned stream = (unsigned)(N_MEASURED + i);
-        if (count == 0) /* from the process's own distribution */
-            drift->value[i] = deviation * random_normal(p->seed, stream, 0);
-        else
-            drift->value[i] += drift->slope[i] * fmin(m->time - drift->since, period);
+        if (deviation == 0.0)
+            continue;
+        if (drift->deviation[i] == 0.0) /* an axis begins: from the process's own distribution */
+            drift->value[i] = deviation * random_normal(p->seed, count ? stream + 3 : stream, count);
         const double next = kept * drift->value[i] + fresh * deviation * random_normal(p->seed, stream, count + 1);
         drift->slope[i] = (next - drift->value[i]) / period;
+        drift->deviation[i] = deviation;
     }
-    drift->since = m->time;
+    drift->until = m->time + period;
 }
 
 int model_tick(Model *m)
@@ -77,11 +99,12 @@ int model_tick(Model *m)
 
     for (int i = N_CLOCKS - 1; i >= 0; i--) { /* the current before the sensors, which may feel it */
         Clock *clock = &m->held.clocks[i];
-        const double due = m->time + 1e-9 * clock->period + 1e-15 * fabs(m->time);
-        const double passed = clock->period > 0.0 ? floor((due - clock->since) / clock->period) + 1.0 : 0.0;
+        /* importers add up their time, and so may come a little early */
+        const double due = m->time + 1e-6 * clock->period + 1e-15 * (fabs(m->time) + fabs(clock->since));
 
-        if (!(passed > clock->ticks))
+        if (!(next_tick_of(clock) <= due))
             continue;
+        const double passed = fmax(clock->ticks, floor((due - clock->since) / clock->period)) + 1.0;
         clock->samples += passed - clock->ticks; /* every tick that has gone by takes its place in the stream */
         clock->ticks = passed;
         ticked = 1;
@@ -102,6 +125,13 @@ int model_tick(Model *m)
 }
 
 /* ---- evaluation -------------------------------------------------------------------------------------------- */
+
+int model_holds(const Model *m, int channel)
+{
+    const Clock *clock = &m->held.clocks[sensors_of_channel(channel)];
+
+    return clock->period > 0.0 && clock->samples > 0.0;
+}
 
 void model_evaluate(Model *m)
 {
@@ -126,7 +156,7 @@ void model_evaluate(Model *m)
 
     sensors_measure(p, m->state.rigid, o->rate.rigid, o->euler[2], o->altitude, o->measured);
     for (int i = 0; i < N_MEASURED; i++)
-        if (m->held.clocks[sensors_of_channel(i)].period > 0.0)
+        if (model_holds(m, i))
             o->measured[i] = m->held.samples[i];
 }
 
@@ -154,7 +184,8 @@ int model_advance(Model *m, double end, double *failed)
     while (m->time < end) {
         const double tick = model_next_tick(m), until = tick < end - hair ? tick : end;
         const double start = m->time;
-        const int n = (int)fmax(1.0, ceil((until - start) / m->plant.parameters.substep - 1e-9));
+        const double rounding = 1e-9 + 1e-15 * fabs(end) / m->plant.parameters.substep;
+        const int n = (int)fmax(1.0, ceil((until - start) / m->plant.parameters.substep - rounding));
         const double h = (until - start) / n;
 
         *failed = h;

@@ -54,6 +54,9 @@ double model_next_tick(const Model *model);
 /* Does all that is due now: samples, and the next piece of the current. Returns whether there was any. */
 int model_tick(Model *model);
 
+/* Whether a measured channel shows its last sample; else, before the first, or without a rate, what is true now. */
+int model_holds(const Model *model, int channel);
+
 /* Forces without a lag are no states of motion: puts them to where their commands point. Returns whether any changed. */
 int model_settle(Model *model);
 

@@ -5,9 +5,9 @@
 
 #include "linear.h"
 
-static const double LEAST_QUATERNION = 1e-6; /* length below which a quaternion has no direction */
-static const double MOST_DAMPED = 2.5;       /* h times rate; beyond 2.785 the method grows what it should damp */
-static const double MOST_MOBILE = 1e12;      /* 1/kg, 1/(kg m), 1/(kg m2): of the inverse of the mass matrix */
+static const double MOST_DAMPED = 2.5; /* h times rate: beyond 2.785 the method grows what it should damp */
+static const double MOST_TURNED = 1.0; /* rad in h: beyond 2.83 it grows what should swing, and is far off before */
+static const double MOST_MOBILE = 1e12; /* 1/kg, 1/(kg m), 1/(kg m2): of the inverse of the mass matrix */
 
 /* ---- attitude ---------------------------------------------------------------------------------------------- */
 
@@ -104,10 +104,30 @@ static void rigid_mass_matrix(const Parameters *p, double M[6][6])
 
 void plant_mass_matrix(const Parameters *p, double M[6][6])
 {
-    rigid_mass_matrix(p, M);
+    double rigid[6][6];
+
+    rigid_mass_matrix(p, rigid);
+    symmetric6(p->added_mass, M);
     for (int i = 0; i < 6; i++)
         for (int j = 0; j < 6; j++)
-            M[i][j] += p->added_mass[i < j ? i : j][i < j ? j : i];
+            M[i][j] += rigid[i][j];
+}
+
+/* Greatest sum of the magnitudes in a row of a block of the inverse mass matrix: no eigenvalue of the block is above. */
+static double mobility(const Derived *d, int first, int last, int *row)
+{
+    double greatest = 0.0;
+
+    for (int i = first; i <= last; i++) {
+        double sum = 0.0;
+        for (int j = first; j <= last; j++)
+            sum += fabs(d->mass_inverse[i][j]);
+        if (sum > greatest) {
+            greatest = sum;
+            *row = i;
+        }
+    }
+    return greatest;
 }
 
 const char *plant_prepare(Plant *plant)
@@ -137,21 +157,19 @@ const char *plant_prepare(Plant *plant)
         }
     }
 
-    /* the greatest eigenvalue of the linear block is at most its greatest row sum */
-    double greatest = 0.0;
-    for (int i = 0; i < 3; i++) {
-        const double *row = d->mass_inverse[i];
-        const double sum = fabs(row[0]) + fabs(row[1]) + fabs(row[2]);
-        if (sum > greatest) {
-            greatest = sum;
-            d->stiffest = i;
-        }
-    }
+    int row;
+    double arm[3];
+    for (int i = 0; i < 3; i++)
+        arm[i] = p->r_G[i] * p->weight - p->r_B[i] * p->buoyancy;
+    const double floating = p->free_surface ? 0.75 * p->buoyancy / p->hull_radius : 0.0; /* N/m, at half submersion */
+    const double r_B = sqrt(dot3(p->r_B, p->r_B));
+    const double stiffness = sqrt(dot3(arm, arm)) + floating * (1.0 + r_B) * (1.0 + r_B);
+    d->swing = sqrt(stiffness * mobility(d, 0, 5, &row));
+    d->contact_mass = 1.0 / mobility(d, 0, 2, &d->stiffest);
+    d->contact_time = fmax(p->bottom_time_constant, CONTACT_SUBSTEPS * p->substep);
     d->lags = p->wrench_time_constant > 0.0;
     for (int i = 0; i < N_THRUSTERS; i++)
         d->lags = d->lags || actuators_thrust_lag(p, i) > 0.0;
-    d->contact_mass = 1.0 / greatest;
-    d->contact_time = fmax(p->bottom_time_constant, CONTACT_SUBSTEPS * p->substep);
     return NULL;
 }
 
@@ -226,7 +244,7 @@ void plant_derivative(const Plant *plant, const Drift *drift, double time, const
 
     /* restoring (12): weight at r_G and buoyancy at r_B along k = R^T e3 */
     const double k[3] = {R[2][0], R[2][1], R[2][2]};
-    const double buoyancy = p->buoyancy * environment_submerged(p, rigid[2]);
+    const double buoyancy = p->buoyancy * environment_submerged(p, rigid[2] + dot3(k, p->r_B));
     double lever[3], moment[3];
     for (int i = 0; i < 3; i++)
         lever[i] = p->r_G[i] * p->weight - p->r_B[i] * buoyancy;
@@ -264,14 +282,18 @@ static double damping_rate(const Plant *plant, const Drift *drift, double time, 
         double sum = 0.0;
         for (int j = 0; j < 6; j++)
             sum += fabs(plant->derived.mass_inverse[i][j]) * root[j];
-        bound = fmax(bound, root[i] * sum);
+        if (!(root[i] * sum <= bound)) /* also where it is no number */
+            bound = root[i] * sum;
     }
     return bound + (rigid[2] + p->hull_radius > p->bottom_depth ? 2.0 / plant->derived.contact_time : 0.0);
 }
 
 int plant_follows(const Plant *plant, const Drift *drift, double time, double h, const double rigid[N_RIGID])
 {
-    return h * damping_rate(plant, drift, time, rigid) < MOST_DAMPED;
+    const double *omega = rigid + 10;
+
+    return h * damping_rate(plant, drift, time, rigid) < MOST_DAMPED &&
+           h * (sqrt(dot3(omega, omega)) + plant->derived.swing) < MOST_TURNED;
 }
 
 /* ---- stepping ---------------------------------------------------------------------------------------------- */
@@ -309,6 +331,8 @@ int plant_step(const Plant *plant, const Drift *drift, double time, const Actuat
     advance(state->rigid, k2, 0.5 * h, trial);
     plant_derivative(plant, drift, time + 0.5 * h, trial, tau_middle, k3);
     advance(state->rigid, k3, h, trial);
+    if (!plant_follows(plant, drift, time + h, h, trial)) /* a step may end in rest by chance, but not all its stages */
+        return 0;
     plant_derivative(plant, drift, time + h, trial, tau_end, k4);
 
     for (int i = 0; i < N_RIGID; i++)

@@ -55,7 +55,7 @@ typedef struct {
     double current_variation[3];             /* m/s, standard deviation of its Gauss-Markov part */
     double current_correlation_time;         /* s */
     double current_variation_period;         /* s, between the knots of that part */
-    double hull_radius;                      /* m, of a sphere about the origin: for surface and bottom */
+    double hull_radius;                      /* m, of a sphere: about r_B for the surface, about the origin for the bottom */
     double bottom_depth;                     /* m */
     double bottom_friction;                  /* Coulomb's coefficient */
     double bottom_time_constant;             /* s, in which the bottom stops the hull */
@@ -84,6 +84,7 @@ typedef struct { /* constants that follow from the parameters */
     double mass_inverse[6][6]; /* of M_RB + M_A */
     double contact_mass;       /* kg, at most what a force on the origin moves, in any direction */
     double contact_time;       /* s, bottom_time_constant, or what the substep can follow */
+    double swing;              /* rad/s, at most what weight, buoyancy and surface make the body oscillate at */
     int lags;                  /* whether any force follows its command with a delay */
     int stiffest;              /* row of mass_inverse that tells contact_mass */
 } Derived;
@@ -104,8 +105,9 @@ typedef struct {
 } State;
 
 typedef struct { /* the current's Gauss-Markov part between two knots: value + slope (t - since) */
-    double since;
+    double since, until;
     double value[3], slope[3];
+    double deviation[3]; /* that the axis goes by; 0: it stands still */
 } Drift;
 
 typedef struct {
@@ -123,6 +125,7 @@ void plant_mass_matrix(const Parameters *parameters, double M[6][6]);
 
 #define CONTACT_SUBSTEPS 4.0 /* in which the bottom may stop the hull: far from where integration fails */
 
+#define LEAST_QUATERNION 1e-6 /* length below which a quaternion has no direction */
 #define UPRIGHT 1e-12        /* cosine of pitch below which roll and yaw are one */
 
 /* Scales the quaternion to unit length. Returns 0 if it has none to scale, or is not finite. */
@@ -131,7 +134,8 @@ int plant_normalise(double rigid[N_RIGID]);
 /* Rotation from body to world (3); a quaternion off unit length still gives a pure rotation, and none at all identity. */
 void plant_rotation(const double quaternion[4], double R[3][3]);
 
-/* Whether steps of h can follow the damping that acts now; where they cannot, results may still look well. */
+/* Whether steps of h can follow the damping, the swinging and the turning of now; where they cannot, results may still look
+ * well. */
 int plant_follows(const Plant *plant, const Drift *drift, double time, double h, const double rigid[N_RIGID]);
 
 /* Time derivative of the rigid-body state under the body wrench tau. */
@@ -151,7 +155,7 @@ void plant_euler(const double quaternion[4], double euler[3]);
 void environment_current(const Parameters *parameters, const Drift *drift, double time, double depth,
                          double velocity[3]);
 
-/* Part of the hull's volume that is under water, 0 to 1. */
+/* Part of the hull's volume that is under water, 0 to 1; depth is that of its centre, r_B. */
 double environment_submerged(const Parameters *parameters, double depth);
 
 /* Force of the bottom on the hull, world frame. Returns whether they touch. */

@@ -12,7 +12,7 @@ struct Saved {
     uint32_t size;
     uint64_t origin;   /* hash of the instantiation token: blocks of another FMU do not fit */
     uint64_t checksum; /* of a serialised block: of all that follows */
-    int32_t interface, mode, unprepared, padding;
+    int32_t kind, mode, unprepared, padding;
     Model model;
 };
 
@@ -31,7 +31,7 @@ static uint64_t hash(const void *data, size_t size)
 
 static uint64_t checksum(const Saved *saved)
 {
-    const size_t head = offsetof(Saved, interface);
+    const size_t head = offsetof(Saved, kind);
 
     return hash((const char *)saved + head, sizeof *saved - head);
 }
@@ -59,7 +59,7 @@ Status instance_save(Instance *instance, Saved **saved)
     s->magic = MAGIC;
     s->size = sizeof *s;
     s->origin = hash(INSTANTIATION_TOKEN, strlen(INSTANTIATION_TOKEN));
-    s->interface = (int32_t)instance->interface;
+    s->kind = (int32_t)instance->kind;
     s->mode = (int32_t)instance->mode;
     s->unprepared = instance->unprepared;
     memcpy(&s->model, &instance->model, sizeof s->model);
@@ -70,7 +70,7 @@ Status instance_restore(Instance *instance, const Saved *saved)
 {
     if (check_block(instance, saved) != STATUS_OK)
         return STATUS_ERROR;
-    if (saved->interface != (int32_t)instance->interface)
+    if (saved->kind != (int32_t)instance->kind)
         return instance_refuse(instance, "FMU state is of the other interface (co-simulation or model exchange)");
     memcpy(&instance->model, &saved->model, sizeof instance->model);
     instance->mode = (Mode)saved->mode;
@@ -117,25 +117,26 @@ static Status check_content(const Instance *instance, const Saved *saved)
     const Model *m = &saved->model;
     const double *numbers = m->held.samples;
     const Variable *stray = variables_stray(m);
-    bool good = fabs(m->time) <= 1e9 && !isnan(m->stop_time);
+    bool good = fabs(m->time) <= MAX_TIME && !isnan(m->stop_time);
 
     if (stray)
         return instance_refuse(instance, "serialised FMU state: %s is outside [%.9g, %.9g]", stray->name, stray->min,
                                stray->max);
     for (int i = 0; i < N_CLOCKS; i++) {
         const Clock *clock = &m->held.clocks[i];
-        good = good && clock->period >= 0.0 && clock->period < 1e9 && fabs(clock->since) <= 1e9 &&
+        good = good && clock->period >= 0.0 && clock->period < 1e9 && fabs(clock->since) <= MAX_TIME &&
                clock->ticks >= 0.0 && clock->ticks < 1e15 && clock->samples >= 0.0 && clock->samples < 1e15;
     }
     for (int i = 0; i < N_MEASURED; i++)
         good = good && fabs(numbers[i]) < 1e15;
     for (int i = 0; i < 3; i++)
-        good = good && fabs(m->held.drift.value[i]) < 1e6 && fabs(m->held.drift.slope[i]) < 1e9;
-    good = good && fabs(m->held.drift.since) <= 1e9;
+        good = good && fabs(m->held.drift.value[i]) < 1e6 && fabs(m->held.drift.slope[i]) < 1e9 &&
+               m->held.drift.deviation[i] >= 0.0 && m->held.drift.deviation[i] < 1e6;
+    good = good && fabs(m->held.drift.since) <= MAX_TIME && fabs(m->held.drift.until) <= 2.0 * MAX_TIME;
     const int32_t modes[] = {MODE_INSTANTIATED, MODE_INITIALISING, MODE_TERMINATED, MODE_STEPPING, MODE_EVENT, MODE_CONTINUOUS};
     bool known = false; /* the last three belong to one interface each */
     for (int i = 0; i < 6; i++)
-        known = known || (saved->mode == modes[i] && (i < 3 || (i == 3) == (saved->interface == CO_SIMULATION)));
+        known = known || (saved->mode == modes[i] && (i < 3 || (i == 3) == (saved->kind == CO_SIMULATION)));
     good = good && known;
     return good ? STATUS_OK : instance_refuse(instance, "serialised FMU state holds what no state can");
 }

@@ -12,15 +12,20 @@ static const double MAX_SUBSTEPS = 1e6; /* in one step */
 static Status check_step(const Instance *instance, double time, double step)
 {
     const Model *m = &instance->model;
-    const double rounding = 1e-3 * step + 1e-9 * fabs(m->time);
+    const double rounding = 1e-3 * step + 1e-14 * fabs(m->time);
 
     if (!isfinite(step) || step <= 0.0 || m->time + step == m->time)
         return instance_refuse(instance, "step size is %g s, expected a positive number", step);
     if (!(fabs(time - m->time) <= rounding))
         return instance_refuse(instance, "step from t = %.12g s, but the plant is at %.12g s", time, m->time);
+    if (!(time + step > m->time))
+        return instance_refuse(instance, "step of %g s from t = %.12g s does not advance", step, time);
     if (time + step > m->stop_time + rounding)
         return instance_refuse(instance, "step to t = %.12g s is beyond the stop time of %.12g s", time + step,
                                m->stop_time);
+
+    if (time + step > MAX_TIME)
+        return instance_refuse(instance, "step to t = %.12g s is beyond %g s", time + step, MAX_TIME);
 
     double substeps = step / m->plant.parameters.substep;
     for (int i = 0; i < N_CLOCKS; i++)
@@ -58,8 +63,8 @@ Status instance_step(Instance *instance, double time, double step)
         return instance_refuse(instance, "step from t = %.9g s not taken: %s becomes %.9g, outside [%.9g, %.9g]", time,
                                stray->name, value, stray->min, stray->max);
     return instance_refuse(instance,
-                           "step from t = %.9g s not taken: integration steps of %g s are too long for these forces and "
-                           "this damping (parameter substep)",
+                           "step from t = %.9g s not taken: integration steps of %g s are too long for this motion, its "
+                           "forces or its damping (parameter substep)",
                            time, failed);
 }
 
@@ -111,8 +116,8 @@ Status instance_set_time(Instance *instance, double time)
 {
     if (instance_require(instance, MODE_EVENT | MODE_CONTINUOUS, "setting the time") != STATUS_OK)
         return STATUS_ERROR;
-    if (!(fabs(time) <= 1e9))
-        return instance_refuse(instance, "time is %g s, expected a number within 1e9", time);
+    if (!(fabs(time) <= MAX_TIME))
+        return instance_refuse(instance, "time is %g s, expected a number within %g", time, MAX_TIME);
     instance->model.time = time;
     instance->outdated = true;
     return STATUS_OK;

@@ -29,7 +29,7 @@ static void rotation_tangent(const double e[4], const double de[4], double dR[3]
     double B[3][3], dB[3][3];
 
     memset(dR, 0, 9 * sizeof(double));
-    if (!(square > 0.0))
+    if (!(square > LEAST_QUATERNION * LEAST_QUATERNION))
         return;
     bilinear(e, e, B);
     bilinear(e, de, dB);
@@ -76,27 +76,24 @@ static void momentum_tangent(const Parameters *p, const Parameters *dp, const do
     db[2] += dI[4] * w[0] + dI[5] * w[1] + dI[2] * w[2] + I[4] * dw[0] + I[5] * dw[1] + I[2] * dw[2];
 }
 
-/* Tangent of -C(v) v with the momenta a and b: subtract_coriolis of plant.c. */
-static void subtract_coriolis_tangent(const double a[3], const double da[3], const double b[3], const double db[3],
-                                      const double nu[6], const double dnu[6], double dwrench[6])
+/* Subtracts the tangent of a x b. */
+static void subtract_cross(const double a[3], const double da[3], const double b[3], const double db[3], double out[3])
 {
-    const double *terms[3][4] = {/* force: w x a; moment: v x a and w x b */
-                                 {nu + 3, a, dnu + 3, da}, {nu, a, dnu, da}, {nu + 3, b, dnu + 3, db}};
+    double left[3], right[3];
 
-    for (int i = 0; i < 3; i++) {
-        double left[3], right[3];
-        cross(terms[i][2], terms[i][1], left);
-        cross(terms[i][0], terms[i][3], right);
-        for (int j = 0; j < 3; j++)
-            dwrench[(i ? 3 : 0) + j] -= left[j] + right[j];
-    }
+    cross(da, b, left);
+    cross(a, db, right);
+    for (int i = 0; i < 3; i++)
+        out[i] -= left[i] + right[i];
 }
 
-static void symmetric(const double upper[6][6], double whole[6][6])
+/* Of subtract_coriolis of plant.c: p holds the momenta, linear and angular. */
+static void subtract_coriolis_tangent(const double p[6], const double dp[6], const double nu[6], const double dnu[6],
+                                      double dwrench[6])
 {
-    for (int i = 0; i < 6; i++)
-        for (int j = 0; j < 6; j++)
-            whole[i][j] = i < j ? upper[i][j] : upper[j][i];
+    subtract_cross(nu + 3, dnu + 3, p, dp, dwrench);             /* w x a */
+    subtract_cross(nu, dnu, p, dp, dwrench + 3);                 /* v x a */
+    subtract_cross(nu + 3, dnu + 3, p + 3, dp + 3, dwrench + 3); /* w x b */
 }
 
 /* Tangent of the mass matrix: column by column what momentum_tangent says of a motion that stays. */
@@ -104,7 +101,7 @@ static void mass_matrix_tangent(const Parameters *p, const Parameters *dp, doubl
 {
     static const double still[6] = {0.0};
 
-    symmetric(dp->added_mass, dM);
+    symmetric6(dp->added_mass, dM);
     for (int j = 0; j < 6; j++) {
         double unit[6] = {0.0}, column[6];
         unit[j] = 1.0;
@@ -170,15 +167,15 @@ static void derivative_tangent(const Model *m, const Model *seed, const double r
     const Parameters nothing = {0};
     momentum_tangent(p, &nothing, still, nu, a, a + 3);
     momentum_tangent(p, dp, nu, dnu, da, da + 3);
-    subtract_coriolis_tangent(a, da, a + 3, da + 3, nu, dnu, dwrench);
+    subtract_coriolis_tangent(a, da, nu, dnu, dwrench);
 
-    symmetric(dp->added_mass, dadded_mass);
+    symmetric6(dp->added_mass, dadded_mass);
     multiply6(p->added_mass, nu_r, added);
     multiply6(p->added_mass, dnu_r, dadded);
     multiply6((const double(*)[6])dadded_mass, nu_r, term);
     for (int i = 0; i < 6; i++)
         dadded[i] += term[i];
-    subtract_coriolis_tangent(added, dadded, added + 3, dadded + 3, nu_r, dnu_r, dwrench);
+    subtract_coriolis_tangent(added, dadded, nu_r, dnu_r, dwrench);
 
     multiply6(p->added_mass, dnu_c_rate, term);
     for (int i = 0; i < 6; i++)
@@ -189,9 +186,11 @@ static void derivative_tangent(const Model *m, const Model *seed, const double r
                       (p->linear_damping[i] + 2.0 * p->quadratic_damping[i] * fabs(nu_r[i])) * dnu_r[i];
 
     /* restoring */
-    const double submerged = environment_submerged(p, x[2]), buoyancy = p->buoyancy * submerged;
+    const double depth_B = x[2] + dot3(R[2], p->r_B);
+    const double ddepth_B = dx[2] + dot3(dR[2], p->r_B) + dot3(R[2], dp->r_B);
+    const double submerged = environment_submerged(p, depth_B), buoyancy = p->buoyancy * submerged;
     const double dbuoyancy =
-        dp->buoyancy * submerged + p->buoyancy * environment_submerged_tangent(p, dp, x[2], dx[2]);
+        dp->buoyancy * submerged + p->buoyancy * environment_submerged_tangent(p, dp, depth_B, ddepth_B);
     double lever[3], dlever[3];
     for (int i = 0; i < 3; i++) {
         lever[i] = p->r_G[i] * p->weight - p->r_B[i] * buoyancy;
@@ -245,8 +244,7 @@ static void measured_tangent(const Model *m, const Model *seed, const double R[3
         dmeasured[MEASURED_POSITION + i] = dx[i];
     }
     for (int i = 0; i < N_MEASURED; i++) {
-        const int held = m->held.clocks[sensors_of_channel(i)].period > 0.0; /* until the next tick */
-        dmeasured[i] = held ? 0.0 : dmeasured[i] + dp->bias[i];
+        dmeasured[i] = model_holds(m, i) ? 0.0 : dmeasured[i] + dp->bias[i];
     }
 }
 

@@ -15,7 +15,7 @@ from lxml import etree
 
 from plant_fmu import cached_fmu, load_vehicle, shipped_vehicles
 from plant_fmu.contents import contents
-from plant_fmu.page import page
+from plant_fmu.contents.page import page
 from plant_fmu.variables import variables
 
 ROOT = Path(__file__).parents[2]
@@ -120,7 +120,7 @@ def test_licences(vehicle, fmi):
 
 
 def test_the_icon_is_a_picture_with_clear_corners():
-    folder = ROOT / "plant_fmu" / "pages"
+    folder = ROOT / "plant_fmu" / "contents" / "pages"
     picture = matplotlib.image.imread(folder / "icon.png")
     assert picture.shape == (128, 128, 4)
     assert picture[0, 0, 3] == 0.0 and picture[64, 64, 3] == 1.0

@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 from fmpy.fmi1 import FMICallException
 from scipy.optimize import brentq
+from scipy.spatial.transform import Rotation
 
+from tests.plant_fmu.conftest import STATES
 from tests.plant_fmu.philox import normal
 
 NEUTRAL = {"weight": 1228.25, "r_G.z": 0.0}
@@ -180,3 +182,81 @@ def test_no_bottom_unless_asked_for(make_slave):
     slave = make_slave().start(**{"position.z": 5e5, "hull_radius": 0.3})
     assert not slave.flag("bottom_contact")
     assert slave.get("altitude")[0] == 5e5
+
+
+def test_a_hull_found_deep_in_the_bottom_leaves_it_slowly(make_slave, fmi):
+    """However it got there: the bottom's spring is no catapult."""
+    slave = make_slave(fmi=fmi, logging_on=True).start(**SINKING | NEUTRAL | {"position.z": 12.0})
+    assert "the hull begins 2.3 m deep in the bottom" in [text for _, text in slave.said]
+    fastest = 0.0
+    for k in range(2000):
+        slave.fmu.doStep(k * 0.005, 0.005)
+        fastest = min(fastest, slave.get("velocity.w")[0])
+    assert -2.5 < fastest < -0.5
+    assert slave.get("altitude")[0] > 0.3
+
+
+def test_a_rolling_float_keeps_its_energy(make_slave):
+    """Buoyancy fades with the depth of the point it acts at, so that it has a potential."""
+    r, B, W = 0.3, 1228.25, 900.0
+    r_B = np.array([0.0, 0.1, -0.1])
+    slave = make_slave().start(**{
+        "weight": W, "r_G.z": 0.05, "r_B.y": r_B[1], "r_B.z": r_B[2], "free_surface": True, "hull_radius": r,
+        "position.z": 0.2, "quaternion.e0": np.cos(0.4), "quaternion.e1": np.sin(0.4), "substep": 0.001,
+        **{f"{kind}_damping[{i}]": 0.0 for kind in ("linear", "quadratic") for i in range(1, 7)},
+    })  # fmt: skip
+    M = np.diag([187.5] * 3 + [8.0] * 3)
+    S = np.array([[0, -0.05, 0], [0.05, 0, 0], [0, 0, 0]])  # of r_G
+    M[:3, 3:], M[3:, :3] = -125.0 * S, 125.0 * S
+
+    def energy():
+        x = np.array(slave.get(*STATES))
+        R = Rotation.from_quat(np.roll(x[3:7], -1)).as_matrix()
+        z_G, z_B = x[2] + R[2] @ [0, 0, 0.05], x[2] + R[2] @ r_B
+        part = np.clip((z_B + r) / (2 * r), 0, 1)  # the integral of 3 s^2 - 2 s^3 over the depth
+        lifted = 2 * r * (part**3 - part**4 / 2) + max(z_B - r, 0.0)
+        return 0.5 * x[7:] @ M @ x[7:] - W * z_G + B * lifted
+
+    before, energies = energy(), []
+    for k in range(600):
+        slave.fmu.doStep(k * 0.1, 0.1)
+        energies.append(energy())
+    assert energies == pytest.approx([before] * 600, abs=1e-4)
+
+
+# ---- changes on the way ----
+
+VARYING = {"current_variation.x": 1.0, "current_correlation_time": 1000.0, "current_variation_period": 100.0, "seed": 3}
+
+
+def test_a_changed_knot_period_does_not_make_the_water_jump(make_slave, fmi):
+    slave = make_slave(fmi=fmi).start(**VARYING)
+    for _ in range(50):
+        slave.step(1.0)
+    before = slave.get("water_velocity.x")[0]
+    slave.set_values({"current_variation_period": 1.0})
+    slave.step(1e-6)
+    assert slave.get("water_velocity.x")[0] == pytest.approx(before, abs=1e-6)
+
+
+def test_an_axis_that_begins_later_is_stationary_from_its_beginning(make_slave):
+    """Over seeds, the deviation just after switching on (again) is the one asked for."""
+    first, again, other = [], [], []
+    slave = make_slave()
+    for seed in range(300):
+        slave.fmu.reset()
+        slave.time = 0.0
+        slave.start(**VARYING | {"seed": seed})
+        slave.step(1.0)
+        first.append(slave.get("water_velocity.x")[0])
+        slave.set_values({"current_variation.x": 0.0})
+        slave.step(1.0)
+        assert slave.get("water_velocity.x")[0] == 0.0
+        slave.set_values({"current_variation.x": 1.0, "current_variation.y": 1.0})
+        slave.step(1.0)
+        again.append(slave.get("water_velocity.x")[0])
+        other.append(slave.get("water_velocity.y")[0])
+    assert np.std(first) == pytest.approx(1.0, abs=0.12)
+    assert np.std(again) == pytest.approx(1.0, abs=0.12)
+    assert np.std(other) == pytest.approx(1.0, abs=0.12)
+    assert abs(np.corrcoef(first, again)[0, 1]) < 0.2

@@ -14,8 +14,8 @@ from lxml import etree
 
 from plant_fmu import build_fmu, cached_fmu, load_vehicle, shipped_vehicles
 from plant_fmu.__main__ import main
-from plant_fmu.layered import FOLDER, layered_files, reference_files
-from plant_fmu.reference import COLUMNS, reference
+from plant_fmu.contents.layered import FOLDER, layered_files, reference_files
+from plant_fmu.contents.reference import COLUMNS, reference
 
 XSD = Path(fmpy.__file__).parent / "schema" / "fmi3" / "fmi3LayeredStandardManifest.xsd"
 LS = "{http://fmi-standard.org/fmi-ls-manifest}"

@@ -97,7 +97,8 @@ def contact(v, M, depth, velocity_world):
     x, u = depth + v["hull_radius"] - v["bottom_depth"], velocity_world[2]
     if np.real(x) <= 0:
         return np.zeros(3)
-    normal = m * (x / T**2 + 2 / T * u * x / (x + T * magnitude(u) / 2))
+    x1 = 4 * T if np.real(4 * T) >= np.real(50 * T**2) else 50 * T**2  # where the spring gives half
+    normal = m * (x / (1 + x / x1) / T**2 + 2 / T * u * x / (x + T * magnitude(u) / 2))
     normal = normal if np.real(normal) > 0 else 0
     speed = np.sqrt(velocity_world[0] ** 2 + velocity_world[1] ** 2 + 0.01**2)
     drag = v["bottom_friction"] * normal / speed
@@ -141,11 +142,11 @@ def evaluate(v, n_thrusters, drift=(0, 0, 0), drift_slope=(0, 0, 0)):
     M_RB, M_A = mass_matrices(v)
     damping = [v[f"linear_damping[{i}]"] + v[f"quadratic_damping[{i}]"] * magnitude(x) for i, x in enumerate(nu_r, 1)]
     submerged, r = 1, v["hull_radius"]
+    k = R.T @ np.array([0, 0, 1])
     if v["free_surface"]:
-        h = clip(depth + r, 0, 2 * r)
+        h = clip(depth + k @ vector(v, "r_B") + r, 0, 2 * r)
         submerged = h * h * (3 * r - h) / (4 * r**3)  # a spherical cap
     W, B = v["weight"], v["buoyancy"] * submerged
-    k = R.T @ np.array([0, 0, 1])
     g = -np.r_[(W - B) * k, np.cross(vector(v, "r_G") * W - vector(v, "r_B") * B, k)]
     bottom = np.r_[R.T @ contact(v, M_RB + M_A, depth, velocity_world), np.zeros(3)]
     force = np.array(tau) - coriolis(M_RB, nu) @ nu - coriolis(M_A, nu_r) @ nu_r - damping * nu_r - g

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from plant_fmu.build import FMI_VERSIONS, cached_fmu
-from plant_fmu.channels import REALS
 from plant_fmu.errors import PlantError
-from plant_fmu.slave import Slave
-from plant_fmu.state import Clock, State, from_bytes, to_bytes
+from plant_fmu.running.channels import REALS
+from plant_fmu.running.slave import Slave
+from plant_fmu.running.state import Clock, State, from_bytes, to_bytes
 from plant_fmu.vehicle import Vehicle, load_vehicle
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from plant_fmu.errors import PlantError
-from plant_fmu.instance import Instance
+from plant_fmu.running.instance import Instance
 
 _HEAD = struct.Struct("<8s8sI")  # magic, FMU, checksum of the body
 _BODY = struct.Struct("<?dqdI")  # initialised, clock, number of inputs; inputs and the FMU's own bytes follow

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from plant_fmu.instance import Instance
+from plant_fmu.running.instance import Instance
 
 REALS = ("Real", "Float64")
 

@@ -7,8 +7,8 @@ from xml.etree import ElementTree as ET
 
 import numpy as np
 
-from plant_fmu.parameter_set import parameter_set, ssv
-from plant_fmu.reference import COLUMNS, CURRENT, START, Reference
+from plant_fmu.contents.parameter_set import parameter_set, ssv
+from plant_fmu.contents.reference import COLUMNS, CURRENT, START, Reference
 from plant_fmu.variables import variables
 from plant_fmu.vehicle import Vehicle, load_vehicle, shipped_vehicles
 
@@ -45,7 +45,7 @@ def layered_files(vehicle: Vehicle) -> dict[str, str]:
     files = {f"{name}.ssv": ssv(vehicle)}
     if _is_shipped(vehicle):
         # computed once and kept: the last digits of an integration depend on the machine, those of an FMU must not
-        folder = resources.files("plant_fmu") / "references"
+        folder = resources.files("plant_fmu.contents") / "references"
         results = [
             (f"{name}_start.ssv", _SSV, "parameter", _START),
             (f"{name}_in.csv", "text/csv", "testcase", "Inputs of the reference manoeuvre, held until they jump"),

@@ -12,11 +12,11 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from plant_fmu.channels import Bound
 from plant_fmu.errors import PlantError
-from plant_fmu.instance import WARNING, Instance
-from plant_fmu.state import Clock
-from plant_fmu.values import Value, checked, require_settable
+from plant_fmu.running.channels import Bound
+from plant_fmu.running.instance import WARNING, Instance
+from plant_fmu.running.state import Clock
+from plant_fmu.running.values import Value, checked, require_settable
 
 _AT_ZERO = Clock(0.0, 0, math.nan)
 

@@ -65,7 +65,7 @@ def text(name: str) -> str:
     str
         What is in it.
     """
-    return (resources.files("plant_fmu") / "pages" / name).read_text(encoding="utf-8")
+    return (resources.files("plant_fmu.contents") / "pages" / name).read_text(encoding="utf-8")
 
 
 def _glance(vehicle: Vehicle) -> list[str]:

@@ -5,10 +5,10 @@ from __future__ import annotations
 from importlib import resources
 from string import Template
 
-from plant_fmu.layered import FOLDER, layered_files
-from plant_fmu.licenses import licenses
-from plant_fmu.page import page, text
-from plant_fmu.terminals import terminals_and_icons
+from plant_fmu.contents.layered import FOLDER, layered_files
+from plant_fmu.contents.licenses import licenses
+from plant_fmu.contents.page import page, text
+from plant_fmu.contents.terminals import terminals_and_icons
 from plant_fmu.vehicle import Vehicle
 
 
@@ -40,7 +40,7 @@ def contents(vehicle: Vehicle, fmi: int) -> dict[str, bytes]:
         **{f"documentation/licenses/{name}": licence for name, licence in licenses(fmi).items()},
         **{f"{FOLDER}/{name}": file for name, file in layered_files(vehicle).items()},
     }
-    picture = (resources.files("plant_fmu") / "pages" / "icon.png").read_bytes()
+    picture = (resources.files("plant_fmu.contents") / "pages" / "icon.png").read_bytes()
     pictures = {"model.png": picture}
     if fmi == 3:
         texts["terminalsAndIcons/terminalsAndIcons.xml"] = terminals_and_icons(vehicle)

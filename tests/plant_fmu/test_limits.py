@@ -1,0 +1,120 @@
+"""What integration cannot follow, and times at the edge of numbers: refused, or done right, never almost right."""
+
+import numpy as np
+import pytest
+from fmpy.fmi1 import FMICallException
+
+SLOW = {"weight": 131.588, "substep": 0.5}
+
+
+def test_a_step_whose_stages_outrun_the_damping_is_refused(make_slave):
+    """Ends may rest by chance while the stages between do not: each accepted run stays near the true speed."""
+    for force in np.linspace(1.0, 400.0, 120):
+        slave = make_slave("bluerov2_heavy").start(**SLOW)
+        slave.set_values({"wrench.X": force})
+        true = (-13.7 + np.sqrt(13.7**2 + 4 * 141.0 * force)) / (2 * 141.0)
+        try:
+            for _ in range(40):
+                slave.step(0.5)
+        except FMICallException:
+            continue
+        assert slave.get("velocity.u")[0] == pytest.approx(true, rel=0.1), force
+
+
+@pytest.mark.parametrize(
+    ("values", "substep"),
+    [
+        ({"velocity.r": 300.0, **{f"{k}_damping[6]": 0.0 for k in ("linear", "quadratic")}}, 0.005),
+        ({"r_G.z": 0.1, "quaternion.e1": 0.01}, 0.75),
+        ({"weight": 600.0, "free_surface": True, "hull_radius": 0.1, "position.z": 0.01}, 0.2),
+    ],
+    ids=["spin", "pendulum", "float"],
+)
+def test_motion_too_quick_for_the_substep_is_refused(make_slave, fmi, values, substep):
+    slave = make_slave(fmi=fmi).start(**values, substep=substep)
+    with pytest.raises(FMICallException):
+        slave.step(10 * substep)
+    assert "too long for this motion" in slave.said[-1][1]
+
+
+def begin(slave, time):
+    """Initialise at a time."""
+    if slave.fmi == 2:
+        slave.fmu.setupExperiment(startTime=time)
+        slave.fmu.enterInitializationMode()
+    else:
+        slave.fmu.enterInitializationMode(startTime=time)
+    slave.fmu.exitInitializationMode()
+    slave.time = time
+
+
+def test_ticks_go_on_through_time_zero(make_slave, fmi):
+    """Rounding is coarser at the start than near zero, where ticks must still come one after the other."""
+    model = make_slave(fmi=fmi, interface="me")
+    model.set_values({"imu.rate": 1e4})
+    begin(model, -1500.0)
+    for near in (-15.0886, -1.9999, -1e-3):
+        _, following = model.update_discrete()
+        model.fmu.enterContinuousTimeMode()
+        model.fmu.setTime(near)
+        model.fmu.enterEventMode()
+        for _ in range(300):
+            _, following = model.update_discrete()
+            model.fmu.enterContinuousTimeMode()
+            model.fmu.setTime(following)
+            model.fmu.enterEventMode()
+            _, after = model.update_discrete()
+            assert after > following
+
+
+def test_a_master_that_adds_up_its_time_gets_every_sample(make_slave, fmi):
+    """A minute and more of 10 ms steps at 100 Hz: each step ends with its own sample."""
+    slave = make_slave(fmi=fmi).start(**{"depth_sensor.rate": 100.0, "wrench.Z": 20.0, "substep": 0.01})
+    t = 0.0
+    for _ in range(30_000):
+        slave.fmu.doStep(t, 0.01)
+        t += 0.01
+        measured, true = slave.get("measured.depth", "position.z")
+        assert abs(measured - true) < 1e-7
+
+
+@pytest.mark.parametrize("start", [1e6, 1e8])
+def test_a_step_is_not_taken_twice(make_slave, fmi, start):
+    slave = make_slave(fmi=fmi)
+    begin(slave, start)
+    slave.fmu.doStep(start, 1e-3)
+    for time in (start, start + 0.05):
+        with pytest.raises(FMICallException):
+            slave.fmu.doStep(time, 1e-3)
+
+
+def test_time_ends_where_states_can_still_be_kept(make_slave, fmi):
+    slave = make_slave(fmi=fmi)
+    begin(slave, 1e9)
+    with pytest.raises(FMICallException):
+        slave.step(1.0)
+    assert "beyond 1e+09 s" in slave.said[-1][1]
+
+
+def test_sampled_sensors_show_the_start_before_their_first_sample(make_slave, fmi):
+    slave = make_slave(fmi=fmi)
+    slave.set_values({"depth_sensor.rate": 10.0, "position.z": 5.0})
+    if fmi == 2:
+        slave.fmu.setupExperiment(startTime=0.0)
+    slave.fmu.enterInitializationMode()
+    assert slave.get("measured.depth") == [5.0]
+
+
+@pytest.mark.parametrize("length", [1e-160, 1e-7])
+def test_a_quaternion_without_a_direction_has_derivatives_of_what_it_gives(make_slave, fmi, length):
+    """Identity, whatever its last digits."""
+    model = make_slave(fmi=fmi, interface="me").start(**{"velocity.u": 1.0})
+    model.update_discrete()
+    model.fmu.enterContinuousTimeMode()
+    x = model.states()
+    x[3:7] = [length, 0.0, 0.0, 0.0]
+    model.put_states(x)
+    found = model.jacobian(
+        ["der(position.x)", "attitude.yaw", "der(velocity.w)"], [f"quaternion.e{i}" for i in range(4)]
+    )
+    assert (found == 0.0).all()
