@@ -47,6 +47,12 @@ static double value_of(unsigned reference)
     return v->start + (uniform() - 0.5) * (draw(3) ? 0.1 : 3.0) * (v->nominal > 0.0 ? v->nominal : 1.0);
 }
 
+/* Mostly as what the variable is. */
+static int as_integer(unsigned reference)
+{
+    return reference < N_VARIABLES && draw(9) ? VARIABLES[reference].type == TYPE_INTEGER : draw(2) != 0;
+}
+
 static void check(int status, const double values[], size_t n, const char *what)
 {
     for (size_t i = 0; status < 2 && i < n; i++)
@@ -119,7 +125,7 @@ static int integers(Unit c, unsigned reference, int value)
     fmi2Boolean b = value & 1;
     fmi2GetInteger(c, &reference, 1, &i);
     fmi2GetBoolean(c, &reference, 1, &b);
-    return (int)(draw(2) ? fmi2SetInteger(c, &reference, 1, &value) : fmi2SetBoolean(c, &reference, 1, &b));
+    return (int)(as_integer(reference) ? fmi2SetInteger(c, &reference, 1, &value) : fmi2SetBoolean(c, &reference, 1, &b));
 }
 
 #else
@@ -178,7 +184,7 @@ static int integers(Unit c, unsigned reference, int value)
     fmi3Boolean b = value & 1;
     fmi3GetInt32(c, &reference, 1, &i, 1);
     fmi3GetBoolean(c, &reference, 1, &b, 1);
-    return (int)(draw(2) ? fmi3SetInt32(c, &reference, 1, &value, 1) : fmi3SetBoolean(c, &reference, 1, &b, 1));
+    return (int)(as_integer(reference) ? fmi3SetInt32(c, &reference, 1, &value, 1) : fmi3SetBoolean(c, &reference, 1, &b, 1));
 }
 
 #endif
@@ -231,8 +237,7 @@ static void call(Unit c, Kept kept[KEPT], double *t)
     switch (which) {
     case 0: case 1: case 2: status = (int)SET_REALS(c, vr, n > 3 ? 1 : n, v); break;
     case 3: case 4: status = (int)GET_REALS(c, vr, n, v); check(status, v, n, "get"); break;
-    case 5: status = integers(c, vr[0], (int)draw(5) - 1); break;
-    case 6: status = integers(c, N_VARIABLES - 1 - (unsigned)draw(20), (int)draw(3)); break;
+    case 5: case 6: status = integers(c, draw(9) ? N_VARIABLES - 1 - (unsigned)draw(14) : vr[0], (int)draw(5) - 1); break;
     case 7: status = initialise(c); break;
     case 8: status = (int)CALL(ExitInitializationMode)(c); break;
     case 9: status = draw(30) ? 2 : (int)CALL(Terminate)(c); break;

@@ -45,4 +45,4 @@ def test_no_order_of_calls_does_harm(fuzzer, fmi, seed, calls):
     assert done.returncode == 0, done.stdout[-500:] + done.stderr[-3000:]
     accepted = [int(n) for n in done.stdout.split("accepted")[1].split()]
     assert sum(accepted) > calls / 10
-    assert all(n > 0 for i, n in enumerate(accepted) if i != 5)  # 5: reads and writes of Integers by chance
+    assert min(accepted) > 0
