@@ -150,7 +150,7 @@ def _binaries(
             library = folder / platform.name / f"{name}{platform.suffix}"
             library.parent.mkdir()
             compile_library(compiler, platform, files, [folder, _FMI_HEADERS], library)
-            place = platform.fmi2_name if fmi == 2 else platform.name
-            libraries.setdefault(f"binaries/{place}/{library.name}", []).append(library.read_bytes())
+            for place in platform.fmi2_names if fmi == 2 else (platform.name,):
+                libraries.setdefault(f"binaries/{place}/{library.name}", []).append(library.read_bytes())
     # FMI 2.0 has one place for the libraries of both Macs
     return {place: found[0] if len(found) == 1 else universal_library(found) for place, found in libraries.items()}

@@ -19,7 +19,10 @@ log = logging.getLogger(__name__)
 
 # no contraction of a*b+c, so that compilers differ in no bit beyond what their C libraries do;
 # and no debug information, which would name the folder of the build
-FLAGS = ("-std=c99", "-O3", "-fno-math-errno", "-g0", "-ffp-contract=off", "-fPIC", "-fvisibility=hidden", "-shared")
+FLAGS = (
+    "-std=c99", "-O3", "-fno-math-errno", "-g0", "-ffp-contract=off", "-fPIC", "-fvisibility=hidden", "-shared",
+    "-DFMI2_OVERRIDE_FUNCTION_PREFIX", "-DFMI3_OVERRIDE_FUNCTION_PREFIX",
+)  # fmt: skip
 _WARNINGS = ("-Wall", "-Wextra", "-Wpedantic")
 _INSTALL = "pip install 'subreach[build]'"
 

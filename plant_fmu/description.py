@@ -8,7 +8,7 @@ from importlib import metadata
 from xml.etree import ElementTree as ET
 
 from plant_fmu.quantities import UNITS
-from plant_fmu.sources import compiled_files
+from plant_fmu.sources import compiled_files, external_names
 from plant_fmu.variables import Variable, variables
 from plant_fmu.vehicle import Vehicle
 
@@ -67,6 +67,7 @@ def header(vehicle: Vehicle, token: str) -> str:
         C99 text.
     """
     rows = variables(vehicle)
+    names = [f"#define {name} {vehicle.name}_{name}" for name in external_names()]
     first_state = next(i for i, v in enumerate(rows) if v.role == "state")
     lines = [
         f"/* {vehicle.name}: generated from plant_fmu's table of variables. */",
@@ -74,6 +75,12 @@ def header(vehicle: Vehicle, token: str) -> str:
         "#define VEHICLE_H",
         "",
         f'#define INSTANTIATION_TOKEN "{token}"',
+        "",
+        "/* Names of this vehicle's own, so that several link into one program; a shared library overrides those",
+        " * of FMI, which importers look up as they stand in the standard. */",
+        f"#define FMI2_FUNCTION_PREFIX {vehicle.name}_",
+        f"#define FMI3_FUNCTION_PREFIX {vehicle.name}_",
+        *names,
         "",
         f"enum {{ N_THRUSTERS = {vehicle.n_thrusters}, FIRST_STATE = {first_state} }};",
         "",
@@ -143,6 +150,8 @@ def model_description(vehicle: Vehicle, fmi: int, token: str) -> str:
             "variableNamingConvention": "structured",
         },
     )
+    if fmi == 2:
+        root.set("numberOfEventIndicators", "0")
     for interface in ("ModelExchange", "CoSimulation"):
         element = ET.SubElement(root, interface, _INTERFACES[fmi], modelIdentifier=vehicle.name)
         if interface == "CoSimulation":
@@ -205,6 +214,8 @@ def _add_variable(parent: ET.Element, vr: int, v: Variable, fmi: int, number: di
         kind["nominal"] = _number(v.nominal)
     if v.role in ("state", "input", "parameter"):
         kind["start"] = _value(v, v.start)
+    if v.role == "state" and v.local:
+        kind["reinit"] = "true"  # at events, where they have no lag
     if v.role == "derivative":
         kind["derivative"] = number[v.name.removeprefix("der(").removesuffix(")")]
 

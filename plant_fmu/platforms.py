@@ -16,7 +16,7 @@ class Platform:
     """One machine and operating system."""
 
     name: str  # of the folder in an FMI 3.0 FMU
-    fmi2_name: str  # of the folder in an FMI 2.0 FMU
+    fmi2_names: tuple[str, ...]  # of the folders in an FMI 2.0 FMU
     target: str  # of the ziglang package's compiler
     suffix: str  # of shared libraries
 
@@ -28,22 +28,24 @@ class Platform:
 
 # glibc 2.17 and macOS 11 so that a library built on a newer system also loads on older ones; the gnu target of Windows
 # takes its C library from Windows itself (UCRT).
-# FMI 2.0 names no 64-bit ARM. On a Mac its one name serves both processors; on Linux FMI 3.0's name is used,
-# since `linux64` is x86-64 to every tool.
+# FMI 2.0 has FMI 3.0's names for 64-bit ARM. Older importers know no such names, and look for a Mac's in `darwin64`:
+# that one is universal, for both processors. `linux64` is x86-64 to every tool.
 PLATFORMS = {
-    name: Platform(name, *rest)
-    for name, *rest in (
-        ("x86_64-linux", "linux64", "x86_64-linux-gnu.2.17", ".so"),
-        ("aarch64-linux", "aarch64-linux", "aarch64-linux-gnu.2.17", ".so"),
-        ("x86_64-windows", "win64", "x86_64-windows-gnu", ".dll"),
-        ("x86_64-darwin", "darwin64", "x86_64-macos.11.0", ".dylib"),
-        ("aarch64-darwin", "darwin64", "aarch64-macos.11.0", ".dylib"),
+    platform.name: platform
+    for platform in (
+        Platform("x86_64-linux", ("linux64",), "x86_64-linux-gnu.2.17", ".so"),
+        Platform("aarch64-linux", ("aarch64-linux",), "aarch64-linux-gnu.2.17", ".so"),
+        Platform("x86_64-windows", ("win64",), "x86_64-windows-gnu", ".dll"),
+        Platform("x86_64-darwin", ("darwin64",), "x86_64-macos.11.0", ".dylib"),
+        Platform("aarch64-darwin", ("darwin64", "aarch64-darwin"), "aarch64-macos.11.0", ".dylib"),
     )
 }
 
-# alone on its machine a library lies where FMPy looks there: 64-bit ARM in the folders of x86-64
+# alone on its machine a library of 64-bit ARM also lies where FMPy looks there: in the folders of x86-64
 _NATIVE_FMI2 = {"linux": "linux64", "windows": "win64", "darwin": "darwin64"}
-_ARM_WINDOWS = Platform("aarch64-windows", "win64", "aarch64-windows-gnu", ".dll")  # built where it is at home only
+_ARM_WINDOWS = Platform(
+    "aarch64-windows", ("aarch64-windows",), "aarch64-windows-gnu", ".dll"
+)  # built where it is at home only
 
 
 def native_platform() -> Platform:
@@ -67,7 +69,7 @@ def native_platform() -> Platform:
         place = f"{platform.system()} on {platform.machine()}"
         raise BuildError(f"no FMU can be built here, {place}: expected Linux, Windows or macOS on x86_64 or aarch64")
     here = PLATFORMS.get(f"{machine}-{system}", _ARM_WINDOWS)
-    return replace(here, fmi2_name=_NATIVE_FMI2[system])
+    return replace(here, fmi2_names=tuple(dict.fromkeys((_NATIVE_FMI2[system], *here.fmi2_names))))
 
 
 def cross_platforms(text: str) -> list[Platform]:

@@ -2,8 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from importlib import resources
 from xml.etree import ElementTree as ET
+
+# a function is named after its file, at the beginning of a line; data are declared extern
+_DECLARED = re.compile(
+    r"^(?!static|typedef)(?:\w[\w ]*[ *]+)([a-z]\w*)\(|^extern [^;\[]*?(\w+)(?:\[\])?;", re.MULTILINE
+)
 
 _OTHER_WRAPPER = {2: "fmi3.c", 3: "fmi2.c"}
 
@@ -28,6 +34,19 @@ def c_sources(fmi: int) -> dict[str, bytes]:
         for file in files
         if file.name.endswith((".c", ".h")) and file.name != _OTHER_WRAPPER[fmi]
     }
+
+
+def external_names() -> list[str]:
+    """Return the names that the C files share with each other, which the linker sees.
+
+    Returns
+    -------
+    list of str
+        Functions and data that the headers declare, in alphabetical order.
+    """
+    folder = resources.files("plant_fmu") / "csrc"
+    headers = (file.read_text(encoding="utf-8") for file in folder.iterdir() if file.name.endswith(".h"))
+    return sorted({name for text in headers for groups in _DECLARED.findall(text) for name in groups if name})
 
 
 def compiled_files(fmi: int) -> list[str]:
@@ -65,6 +84,10 @@ def build_description(model_identifier: str) -> str:
         files = ET.SubElement(configuration, "SourceFileSet", language="C99")
         for name in compiled_files(3):
             ET.SubElement(files, "SourceFile", name=name)
+        ET.SubElement(
+            files, "PreprocessorDefinition", name="FMI3_OVERRIDE_FUNCTION_PREFIX", value="", optional="true",
+            description="FMI's functions by their plain names, for a shared library",
+        )  # fmt: skip
         if platform:
             configuration.set("platform", platform)
         else:

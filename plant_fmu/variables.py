@@ -105,12 +105,13 @@ def _states(vehicle: Vehicle) -> Iterator[Variable]:
     for i, name in enumerate(VELOCITIES):
         kind, quantity = ("Velocity over ground", q.SPEED) if i < 3 else ("Angular velocity", q.ANGULAR_SPEED)
         yield Variable(f"velocity.{name}", "state", f"state.rigid[{7 + i}]", quantity, f"{kind} {_along(i)}")
+    unlagged = "without a lag its command, brought up to date at initialisation and events"
     for i in range(vehicle.n_thrusters):
-        description = f"Force of thruster {i + 1} behind its lag, before its effectiveness; without a lag unused"
+        description = f"Force of thruster {i + 1} behind its lag, before its effectiveness; {unlagged}"
         member = f"state.actuators.thrust[{i}]"
         yield Variable(f"actuator.thrust[{i + 1}]", "state", member, q.FORCE, description, local=True)
     for i, name in enumerate(FORCES):
-        description = f"Wrench input's component {name} behind its lag; without a lag unused"
+        description = f"Wrench input's component {name} behind its lag; {unlagged}"
         member, quantity = f"state.actuators.wrench[{i}]", q.FORCE if i < 3 else q.MOMENT
         yield Variable(f"actuator.wrench.{name}", "state", member, quantity, description, local=True)
 
@@ -341,7 +342,9 @@ def _discrete(vehicle: Vehicle) -> Iterator[Variable]:
 
     for i in range(vehicle.n_thrusters):
         description = f"The command of thruster {i + 1} is beyond its limits"
-        yield flag(f"thrust_saturated[{i + 1}]", f"thrust_cut[{i}]", description, *_of_thruster(i, *_THRUSTER[:3]))
+        yield flag(
+            f"thrust_saturated[{i + 1}]", f"flags.thrust_cut[{i}]", description, *_of_thruster(i, *_THRUSTER[:3])
+        )
     description = "The force of the wrench input is beyond its limit"
-    yield flag("wrench_saturated", "wrench_cut", description, *_WRENCH[:4])
-    yield flag("bottom_contact", "bottom_touched", "The hull touches the bottom", *_BOTTOM, "hull_radius")
+    yield flag("wrench_saturated", "flags.wrench_cut", description, *_WRENCH[:4])
+    yield flag("bottom_contact", "flags.bottom_touched", "The hull touches the bottom", *_BOTTOM, "hull_radius")

@@ -22,6 +22,11 @@ static Status prepare(Instance *instance, const unsigned unknowns[], size_t n_un
     return instance_update(instance);
 }
 
+static int starting(const Instance *instance)
+{
+    return instance->mode == MODE_INITIALISING;
+}
+
 Status instance_directional_derivative(Instance *instance, const unsigned unknowns[], size_t n_unknowns,
                                        const unsigned knowns[], size_t n_knowns, const double seed[],
                                        double sensitivity[])
@@ -33,7 +38,7 @@ Status instance_directional_derivative(Instance *instance, const unsigned unknow
     memset(&direction, 0, sizeof direction);
     for (size_t i = 0; i < n_knowns; i++)
         *variable_real(&direction, &VARIABLES[knowns[i]]) += seed[i];
-    model_tangent(&instance->model, &direction, &tangent);
+    model_tangent(&instance->model, &direction, starting(instance), &tangent);
     for (size_t i = 0; i < n_unknowns; i++)
         sensitivity[i] = *variable_real(&tangent, &VARIABLES[unknowns[i]]);
     return STATUS_OK;
@@ -52,7 +57,7 @@ Status instance_adjoint_derivative(Instance *instance, const unsigned unknowns[]
     for (size_t i = 0; i < n_knowns; i++) {
         double *at = variable_real(&direction, &VARIABLES[knowns[i]]);
         *at = 1.0;
-        model_tangent(&instance->model, &direction, &tangent);
+        model_tangent(&instance->model, &direction, starting(instance), &tangent);
         *at = 0.0;
         sensitivity[i] = 0.0;
         for (size_t j = 0; j < n_unknowns; j++)

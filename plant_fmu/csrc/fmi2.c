@@ -1,8 +1,8 @@
 /* FMI 2.0, co-simulation and model exchange, over instance.h. */
 #include <math.h>
 
+#include "instance.h" /* names the functions, before */
 #include "fmi2Functions.h"
-#include "instance.h"
 
 /* The importer's logger is variadic, like printf. The message goes as the format itself, each % doubled, so that it also
  * reaches importers that cannot read variadic arguments. */
@@ -184,7 +184,7 @@ fmi2Status fmi2GetBooleanStatus(fmi2Component c, const fmi2StatusKind s, fmi2Boo
 
 fmi2Status fmi2EnterEventMode(fmi2Component c)
 {
-    return (fmi2Status)instance_enter_event_mode(c);
+    return (fmi2Status)instance_enter_event_mode(c, MODE_EVENT | MODE_CONTINUOUS); /* again is no fault in 2.0 */
 }
 
 fmi2Status fmi2NewDiscreteStates(fmi2Component c, fmi2EventInfo *info)
@@ -264,14 +264,18 @@ fmi2Status fmi2GetNominalsOfContinuousStates(fmi2Component c, fmi2Real x_nominal
         return nvr == 0 ? fmi2OK : (fmi2Status)instance_unsupported(c, #function);                    \
     }
 
+#define UNSUPPORTED_DERIVATIVES(function, type)                                                             \
+    fmi2Status function(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, const fmi2Integer order[], \
+                        type value[])                                                                       \
+    {                                                                                                       \
+        (void)vr, (void)order, (void)value;                                                                 \
+        return nvr == 0 ? fmi2OK : (fmi2Status)instance_unsupported(c, #function);                          \
+    }
+
 UNSUPPORTED_VALUES(fmi2GetString, fmi2String)
 UNSUPPORTED_VALUES(fmi2SetString, const fmi2String)
-UNSUPPORTED(fmi2SetRealInputDerivatives, (fmi2Component c, const fmi2ValueReference vr[], size_t n,
-                                          const fmi2Integer order[], const fmi2Real v[]),
-            (void)vr, (void)n, (void)order, (void)v)
-UNSUPPORTED(fmi2GetRealOutputDerivatives, (fmi2Component c, const fmi2ValueReference vr[], size_t n,
-                                           const fmi2Integer order[], fmi2Real v[]),
-            (void)vr, (void)n, (void)order, (void)v)
+UNSUPPORTED_DERIVATIVES(fmi2SetRealInputDerivatives, const fmi2Real)
+UNSUPPORTED_DERIVATIVES(fmi2GetRealOutputDerivatives, fmi2Real)
 UNSUPPORTED(fmi2CancelStep, (fmi2Component c), (void)0)
 UNSUPPORTED(fmi2GetStatus, (fmi2Component c, const fmi2StatusKind s, fmi2Status *v), (void)s, (void)v)
 UNSUPPORTED(fmi2GetIntegerStatus, (fmi2Component c, const fmi2StatusKind s, fmi2Integer *v), (void)s, (void)v)

@@ -1,8 +1,8 @@
 /* FMI 3.0, co-simulation and model exchange, over instance.h. */
 #include <math.h>
 
+#include "instance.h" /* names the functions, before */
 #include "fmi3Functions.h"
-#include "instance.h"
 
 static void log_message(const Instance *instance, Status status, const char *category, const char *message)
 {
@@ -23,6 +23,14 @@ fmi3Status fmi3SetDebugLogging(fmi3Instance instance, fmi3Boolean loggingOn, siz
     return (fmi3Status)instance_set_logging(instance, loggingOn, nCategories, categories);
 }
 
+static fmi3Instance refuse_instance(fmi3InstanceEnvironment environment, fmi3LogMessageCallback logMessage,
+                                const char *message)
+{
+    if (logMessage)
+        logMessage(environment, fmi3Error, "logStatusError", message);
+    return NULL;
+}
+
 fmi3Instance fmi3InstantiateCoSimulation(fmi3String instanceName, fmi3String instantiationToken,
                                          fmi3String resourcePath, fmi3Boolean visible, fmi3Boolean loggingOn,
                                          fmi3Boolean eventModeUsed, fmi3Boolean earlyReturnAllowed,
@@ -31,8 +39,10 @@ fmi3Instance fmi3InstantiateCoSimulation(fmi3String instanceName, fmi3String ins
                                          fmi3InstanceEnvironment instanceEnvironment, fmi3LogMessageCallback logMessage,
                                          fmi3IntermediateUpdateCallback intermediateUpdate)
 {
-    (void)resourcePath, (void)visible, (void)eventModeUsed, (void)earlyReturnAllowed, (void)intermediateUpdate;
+    (void)resourcePath, (void)visible, (void)earlyReturnAllowed, (void)intermediateUpdate;
     (void)requiredIntermediateVariables, (void)nRequiredIntermediateVariables;
+    if (eventModeUsed)
+        return refuse_instance(instanceEnvironment, logMessage, "this FMU has no event mode in co-simulation (eventModeUsed)");
     return instance_create(instanceName, instantiationToken, CO_SIMULATION, loggingOn, log_message, instanceEnvironment,
                            (void (*)(void))logMessage);
 }
@@ -56,10 +66,8 @@ fmi3Instance fmi3InstantiateScheduledExecution(fmi3String instanceName, fmi3Stri
 {
     (void)instanceName, (void)instantiationToken, (void)resourcePath, (void)visible, (void)loggingOn;
     (void)clockUpdate, (void)lockPreemption, (void)unlockPreemption;
-    if (logMessage)
-        logMessage(instanceEnvironment, fmi3Error, "logStatusError",
-                   "this FMU offers co-simulation and model exchange, not scheduled execution");
-    return NULL;
+    return refuse_instance(instanceEnvironment, logMessage,
+                       "this FMU offers co-simulation and model exchange, not scheduled execution");
 }
 
 void fmi3FreeInstance(fmi3Instance instance)
@@ -220,7 +228,13 @@ fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 currentCommunicationPoi
 
 fmi3Status fmi3EnterEventMode(fmi3Instance instance)
 {
-    return (fmi3Status)instance_enter_event_mode(instance);
+    return (fmi3Status)instance_enter_event_mode(instance, MODE_CONTINUOUS);
+}
+
+/* There is nothing to evaluate that would not be, and no flag that offers it: importers may call it all the same. */
+fmi3Status fmi3EvaluateDiscreteStates(fmi3Instance instance)
+{
+    return (fmi3Status)instance_require(instance, MODE_INITIALISING | MODE_EVENT, "evaluating discrete states");
 }
 
 fmi3Status fmi3UpdateDiscreteStates(fmi3Instance instance, fmi3Boolean *discreteStatesNeedUpdate,
@@ -312,6 +326,13 @@ fmi3Status fmi3GetNumberOfContinuousStates(fmi3Instance instance, size_t *nConti
     }
 
 /* reading or writing no variable at all is no fault */
+#define UNSUPPORTED_FOR_ALL(function, parameters, ...)                                            \
+    fmi3Status function parameters                                                                \
+    {                                                                                             \
+        __VA_ARGS__;                                                                              \
+        return n == 0 ? fmi3OK : (fmi3Status)instance_unsupported(instance, #function);           \
+    }
+
 #define UNSUPPORTED_VALUES_OF(function, type)                                                                  \
     fmi3Status function(fmi3Instance instance, const fmi3ValueReference references[], size_t n, type values[], \
                         size_t nValues)                                                                        \
@@ -334,14 +355,14 @@ UNSUPPORTED_VALUES(Int64)
 UNSUPPORTED_VALUES(UInt64)
 UNSUPPORTED_VALUES(String)
 
-UNSUPPORTED(fmi3GetBinary, (fmi3Instance instance, const fmi3ValueReference r[], size_t n, size_t sizes[],
-                            fmi3Binary v[], size_t nv), (void)r, (void)n, (void)sizes, (void)v, (void)nv)
-UNSUPPORTED(fmi3SetBinary, (fmi3Instance instance, const fmi3ValueReference r[], size_t n, const size_t sizes[],
-                            const fmi3Binary v[], size_t nv), (void)r, (void)n, (void)sizes, (void)v, (void)nv)
-UNSUPPORTED(fmi3GetClock, (fmi3Instance instance, const fmi3ValueReference r[], size_t n, fmi3Clock v[]),
-            (void)r, (void)n, (void)v)
-UNSUPPORTED(fmi3SetClock, (fmi3Instance instance, const fmi3ValueReference r[], size_t n, const fmi3Clock v[]),
-            (void)r, (void)n, (void)v)
+UNSUPPORTED_FOR_ALL(fmi3GetBinary, (fmi3Instance instance, const fmi3ValueReference r[], size_t n, size_t sizes[],
+                            fmi3Binary v[], size_t nv), (void)r, (void)sizes, (void)v, (void)nv)
+UNSUPPORTED_FOR_ALL(fmi3SetBinary, (fmi3Instance instance, const fmi3ValueReference r[], size_t n, const size_t sizes[],
+                            const fmi3Binary v[], size_t nv), (void)r, (void)sizes, (void)v, (void)nv)
+UNSUPPORTED_FOR_ALL(fmi3GetClock, (fmi3Instance instance, const fmi3ValueReference r[], size_t n, fmi3Clock v[]),
+            (void)r, (void)v)
+UNSUPPORTED_FOR_ALL(fmi3SetClock, (fmi3Instance instance, const fmi3ValueReference r[], size_t n, const fmi3Clock v[]),
+            (void)r, (void)v)
 UNSUPPORTED(fmi3GetNumberOfVariableDependencies, (fmi3Instance instance, fmi3ValueReference r, size_t *n),
             (void)r, (void)n)
 UNSUPPORTED(fmi3GetVariableDependencies, (fmi3Instance instance, fmi3ValueReference dependent, size_t elements[],
@@ -351,30 +372,29 @@ UNSUPPORTED(fmi3GetVariableDependencies, (fmi3Instance instance, fmi3ValueRefere
 UNSUPPORTED(fmi3EnterConfigurationMode, (fmi3Instance instance), (void)0)
 UNSUPPORTED(fmi3ExitConfigurationMode, (fmi3Instance instance), (void)0)
 UNSUPPORTED(fmi3EnterStepMode, (fmi3Instance instance), (void)0)
-UNSUPPORTED(fmi3EvaluateDiscreteStates, (fmi3Instance instance), (void)0)
-UNSUPPORTED(fmi3GetIntervalDecimal, (fmi3Instance instance, const fmi3ValueReference r[], size_t n,
+UNSUPPORTED_FOR_ALL(fmi3GetIntervalDecimal, (fmi3Instance instance, const fmi3ValueReference r[], size_t n,
                                      fmi3Float64 intervals[], fmi3IntervalQualifier qualifiers[]),
-            (void)r, (void)n, (void)intervals, (void)qualifiers)
-UNSUPPORTED(fmi3GetIntervalFraction, (fmi3Instance instance, const fmi3ValueReference r[], size_t n,
+            (void)r, (void)intervals, (void)qualifiers)
+UNSUPPORTED_FOR_ALL(fmi3GetIntervalFraction, (fmi3Instance instance, const fmi3ValueReference r[], size_t n,
                                       fmi3UInt64 counters[], fmi3UInt64 resolutions[],
                                       fmi3IntervalQualifier qualifiers[]),
-            (void)r, (void)n, (void)counters, (void)resolutions, (void)qualifiers)
-UNSUPPORTED(fmi3GetShiftDecimal, (fmi3Instance instance, const fmi3ValueReference r[], size_t n, fmi3Float64 shifts[]),
-            (void)r, (void)n, (void)shifts)
-UNSUPPORTED(fmi3GetShiftFraction, (fmi3Instance instance, const fmi3ValueReference r[], size_t n, fmi3UInt64 counters[],
-                                   fmi3UInt64 resolutions[]), (void)r, (void)n, (void)counters, (void)resolutions)
-UNSUPPORTED(fmi3SetIntervalDecimal, (fmi3Instance instance, const fmi3ValueReference r[], size_t n,
-                                     const fmi3Float64 intervals[]), (void)r, (void)n, (void)intervals)
-UNSUPPORTED(fmi3SetIntervalFraction, (fmi3Instance instance, const fmi3ValueReference r[], size_t n,
+            (void)r, (void)counters, (void)resolutions, (void)qualifiers)
+UNSUPPORTED_FOR_ALL(fmi3GetShiftDecimal, (fmi3Instance instance, const fmi3ValueReference r[], size_t n, fmi3Float64 shifts[]),
+            (void)r, (void)shifts)
+UNSUPPORTED_FOR_ALL(fmi3GetShiftFraction, (fmi3Instance instance, const fmi3ValueReference r[], size_t n, fmi3UInt64 counters[],
+                                   fmi3UInt64 resolutions[]), (void)r, (void)counters, (void)resolutions)
+UNSUPPORTED_FOR_ALL(fmi3SetIntervalDecimal, (fmi3Instance instance, const fmi3ValueReference r[], size_t n,
+                                     const fmi3Float64 intervals[]), (void)r, (void)intervals)
+UNSUPPORTED_FOR_ALL(fmi3SetIntervalFraction, (fmi3Instance instance, const fmi3ValueReference r[], size_t n,
                                       const fmi3UInt64 counters[], const fmi3UInt64 resolutions[]),
-            (void)r, (void)n, (void)counters, (void)resolutions)
-UNSUPPORTED(fmi3SetShiftDecimal, (fmi3Instance instance, const fmi3ValueReference r[], size_t n,
-                                  const fmi3Float64 shifts[]), (void)r, (void)n, (void)shifts)
-UNSUPPORTED(fmi3SetShiftFraction, (fmi3Instance instance, const fmi3ValueReference r[], size_t n,
+            (void)r, (void)counters, (void)resolutions)
+UNSUPPORTED_FOR_ALL(fmi3SetShiftDecimal, (fmi3Instance instance, const fmi3ValueReference r[], size_t n,
+                                  const fmi3Float64 shifts[]), (void)r, (void)shifts)
+UNSUPPORTED_FOR_ALL(fmi3SetShiftFraction, (fmi3Instance instance, const fmi3ValueReference r[], size_t n,
                                    const fmi3UInt64 counters[], const fmi3UInt64 resolutions[]),
-            (void)r, (void)n, (void)counters, (void)resolutions)
-UNSUPPORTED(fmi3GetOutputDerivatives, (fmi3Instance instance, const fmi3ValueReference r[], size_t n,
+            (void)r, (void)counters, (void)resolutions)
+UNSUPPORTED_FOR_ALL(fmi3GetOutputDerivatives, (fmi3Instance instance, const fmi3ValueReference r[], size_t n,
                                        const fmi3Int32 orders[], fmi3Float64 v[], size_t nv),
-            (void)r, (void)n, (void)orders, (void)v, (void)nv)
+            (void)r, (void)orders, (void)v, (void)nv)
 UNSUPPORTED(fmi3ActivateModelPartition, (fmi3Instance instance, fmi3ValueReference clock, fmi3Float64 time),
             (void)clock, (void)time)

@@ -17,7 +17,7 @@ static const struct {
     {LOG_WARNINGS, STATUS_WARNING, "logStatusWarning"},
     {LOG_DISCARDS, STATUS_DISCARD, "logStatusDiscard"},
     {LOG_ALL, STATUS_OK, "logAll"},
-    {0, STATUS_ERROR, "logStatusError"}, /* may be named, and is logged anyway */
+    {LOG_ERRORS, STATUS_ERROR, "logStatusError"},
 };
 
 enum { N_CATEGORIES = sizeof CATEGORIES / sizeof CATEGORIES[0] };
@@ -35,6 +35,8 @@ Status instance_refuse(const Instance *instance, const char *format, ...)
 {
     va_list arguments;
 
+    if (!(instance->categories & LOG_ERRORS))
+        return STATUS_ERROR;
     va_start(arguments, format);
     log_formatted(instance, STATUS_ERROR, "logStatusError", format, arguments);
     va_end(arguments);
@@ -113,7 +115,7 @@ Instance *instance_create(const char *name, const char *token, Interface kind, b
     }
     strcpy(instance->name, shown);
     instance->kind = kind;
-    instance->categories = logging_on ? LOG_ALL : 0;
+    instance->categories = logging_on ? LOG_ALL : LOG_ERRORS; /* errors until they are switched off */
     instance->log = log;
     instance->environment = environment;
     instance->logger = logger;
@@ -187,13 +189,29 @@ Status instance_prepare(Instance *instance)
     return STATUS_OK;
 }
 
+static bool before_start(const Instance *instance)
+{
+    return instance->mode == MODE_INSTANTIATED || instance->mode == MODE_INITIALISING;
+}
+
 Status instance_update(Instance *instance)
 {
     if (!instance->outdated)
         return STATUS_OK;
+    Model *m = &instance->model;
+    const Flags flags = m->outputs.flags;
+
+    if (before_start(instance)) { /* the first samples and the first current are those that will be */
+        memset(&m->held, 0, sizeof m->held);
+        instance->unprepared = true;
+    }
     if (instance_prepare(instance) != STATUS_OK)
         return STATUS_ERROR;
-    model_evaluate(&instance->model);
+    if (before_start(instance))
+        model_tick(m);
+    model_evaluate(m);
+    if (instance->mode == MODE_CONTINUOUS) /* discrete variables change at events alone */
+        m->outputs.flags = flags;
     instance->outdated = false;
     return STATUS_OK;
 }

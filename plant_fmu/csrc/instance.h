@@ -25,7 +25,7 @@ typedef enum {
     MODE_TERMINATED = 32
 } Mode; /* bits, so that a call can name all the modes it is allowed in */
 
-typedef enum { LOG_EVENTS = 1, LOG_WARNINGS = 2, LOG_DISCARDS = 4, LOG_ALL = 7 } LogCategories; /* errors: always */
+typedef enum { LOG_EVENTS = 1, LOG_WARNINGS = 2, LOG_DISCARDS = 4, LOG_ERRORS = 8, LOG_ALL = 15 } LogCategories;
 
 typedef enum { TYPE_REAL, TYPE_INTEGER, TYPE_BOOLEAN } Type;
 typedef enum { TIME, STATE, INPUT, OUTPUT, PARAMETER } Role;
@@ -76,7 +76,8 @@ Status instance_update(Instance *instance);
 /* Brings constants and clocks up to the parameters. */
 Status instance_prepare(Instance *instance);
 
-/* Logs an error in printf's manner, whether logging is on or off, and returns STATUS_ERROR, so that a check is one line. */
+/* Logs an error in printf's manner, unless errors were switched off, and returns STATUS_ERROR, so that a check is one
+ * line. */
 Status instance_refuse(const Instance *instance, const char *format, ...);
 
 /* Logs, if the category is wanted, in printf's manner. Returns the status that goes with the category. */
@@ -113,7 +114,8 @@ const Variable *variables_stray_state(const Model *model);
 
 Status instance_step(Instance *instance, double time, double step);
 
-Status instance_enter_event_mode(Instance *instance);
+/* `from` are the modes that it may be entered from. */
+Status instance_enter_event_mode(Instance *instance, unsigned from);
 Status instance_enter_continuous_mode(Instance *instance);
 Status instance_update_discrete(Instance *instance, bool *states_changed, double *next_event_time);
 Status instance_set_time(Instance *instance, double time);

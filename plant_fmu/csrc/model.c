@@ -140,7 +140,7 @@ void model_evaluate(Model *m)
     Actuators target, now;
     double contact[3];
 
-    actuators_target(p, &m->inputs, &target, o->thrust_cut, &o->wrench_cut);
+    actuators_target(p, &m->inputs, &target, o->flags.thrust_cut, &o->flags.wrench_cut);
     actuators_after(p, &m->state.actuators, &target, 0.0, &now);
     actuators_wrench(p, &now, o->wrench);
     for (int i = 0; i < N_THRUSTERS; i++)
@@ -152,7 +152,7 @@ void model_evaluate(Model *m)
     plant_euler(m->state.rigid + 3, o->euler);
     environment_current(p, &m->held.drift, m->time, m->state.rigid[2], o->water);
     o->altitude = p->bottom_depth - m->state.rigid[2];
-    o->bottom_touched = environment_contact(&m->plant, m->state.rigid[2], o->rate.rigid, contact);
+    o->flags.bottom_touched = environment_contact(&m->plant, m->state.rigid[2], o->rate.rigid, contact);
 
     sensors_measure(p, m->state.rigid, o->rate.rigid, o->euler[2], o->altitude, o->measured);
     for (int i = 0; i < N_MEASURED; i++)

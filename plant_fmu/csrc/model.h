@@ -20,6 +20,12 @@ typedef struct { /* what changes at ticks alone */
 } Held;
 
 typedef struct {
+    int thrust_cut[N_THRUSTERS]; /* a command was beyond its limits */
+    int wrench_cut;
+    int bottom_touched;
+} Flags;
+
+typedef struct {
     State rate;                  /* time derivative of the state */
     double thrust[N_THRUSTERS];  /* present forces, N */
     double wrench[6];            /* what all actuators put on the body */
@@ -27,9 +33,7 @@ typedef struct {
     double water[3];             /* m/s, world frame */
     double altitude;             /* m */
     double measured[N_MEASURED];
-    int thrust_cut[N_THRUSTERS]; /* a command was beyond its limits */
-    int wrench_cut;
-    int bottom_touched;
+    Flags flags;
 } Outputs;
 
 typedef struct {
@@ -65,7 +69,8 @@ int model_settle(Model *model);
 int model_advance(Model *model, double end, double *failed);
 
 /* Exact directional derivative: how the evaluated outputs change along the direction that `seed` holds in its parameters, state,
- * inputs and time. Of `tangent` the state and the outputs are set. */
-void model_tangent(const Model *model, const Model *seed, Model *tangent);
+ * inputs and time, with random numbers as they were drawn. Samples follow the state when `starting`, before their time begins,
+ * and are held afterwards. Of `tangent` the state and the outputs are set. */
+void model_tangent(const Model *model, const Model *seed, int starting, Model *tangent);
 
 #endif

@@ -77,9 +77,9 @@ static Status require_count(const Instance *instance, size_t n, const char *acti
     return instance_refuse(instance, "%s: %zu values, expected %d", action, n, (int)N_STATES);
 }
 
-Status instance_enter_event_mode(Instance *instance)
+Status instance_enter_event_mode(Instance *instance, unsigned from)
 {
-    if (instance_require(instance, MODE_CONTINUOUS, "entering event mode") != STATUS_OK ||
+    if (instance_require(instance, from, "entering event mode") != STATUS_OK ||
         instance_prepare(instance) != STATUS_OK)
         return STATUS_ERROR;
     model_settle(&instance->model);
@@ -91,7 +91,7 @@ Status instance_enter_event_mode(Instance *instance)
 Status instance_enter_continuous_mode(Instance *instance)
 {
     if (instance_require(instance, MODE_EVENT, "entering continuous-time mode") != STATUS_OK ||
-        instance_prepare(instance) != STATUS_OK)
+        instance_update(instance) != STATUS_OK) /* sets the discrete outputs for the time that comes */
         return STATUS_ERROR;
     instance->mode = MODE_CONTINUOUS;
     return STATUS_OK;

@@ -223,8 +223,8 @@ static void derivative_tangent(const Model *m, const Model *seed, const double r
 
 /* ---- all outputs ------------------------------------------------------------------------------------------- */
 
-static void measured_tangent(const Model *m, const Model *seed, const double R[3][3], const double dR[3][3],
-                             const Outputs *d, double dmeasured[N_MEASURED])
+static void measured_tangent(const Model *m, const Model *seed, int starting, const double R[3][3],
+                             const double dR[3][3], const Outputs *d, double dmeasured[N_MEASURED])
 {
     const Parameters *p = &m->plant.parameters, *dp = &seed->plant.parameters;
     const double *nu = m->state.rigid + 7, *omega = m->state.rigid + 10;
@@ -244,11 +244,11 @@ static void measured_tangent(const Model *m, const Model *seed, const double R[3
         dmeasured[MEASURED_POSITION + i] = dx[i];
     }
     for (int i = 0; i < N_MEASURED; i++) {
-        dmeasured[i] = model_holds(m, i) ? 0.0 : dmeasured[i] + dp->bias[i];
+        dmeasured[i] = !starting && model_holds(m, i) ? 0.0 : dmeasured[i] + dp->bias[i];
     }
 }
 
-void model_tangent(const Model *m, const Model *seed, Model *tangent)
+void model_tangent(const Model *m, const Model *seed, int starting, Model *tangent)
 {
     const Parameters *p = &m->plant.parameters, *dp = &seed->plant.parameters;
     Outputs *d = &tangent->outputs;
@@ -263,5 +263,5 @@ void model_tangent(const Model *m, const Model *seed, Model *tangent)
     derivative_tangent(m, seed, m->outputs.rate.rigid, dtau, R, dR, d->water, d->rate.rigid);
     euler_tangent((const double(*)[3])R, (const double(*)[3])dR, d->euler);
     d->altitude = dp->bottom_depth - seed->state.rigid[2];
-    measured_tangent(m, seed, (const double(*)[3])R, (const double(*)[3])dR, d, d->measured);
+    measured_tangent(m, seed, starting, (const double(*)[3])R, (const double(*)[3])dR, d, d->measured);
 }

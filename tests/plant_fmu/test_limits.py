@@ -96,13 +96,26 @@ def test_time_ends_where_states_can_still_be_kept(make_slave, fmi):
     assert "beyond 1e+09 s" in slave.said[-1][1]
 
 
-def test_sampled_sensors_show_the_start_before_their_first_sample(make_slave, fmi):
+def test_outputs_of_initialisation_are_those_after_it(make_slave, fmi):
+    """First samples with their noise, and the current as it begins."""
+    values = {
+        "depth_sensor.rate": 10.0,
+        "depth_sensor.noise": 0.1,
+        "position.z": 5.0,
+        "current_variation.x": 0.5,
+        "seed": 9,
+    }
     slave = make_slave(fmi=fmi)
-    slave.set_values({"depth_sensor.rate": 10.0, "position.z": 5.0})
+    slave.set_values(values)
     if fmi == 2:
         slave.fmu.setupExperiment(startTime=0.0)
     slave.fmu.enterInitializationMode()
-    assert slave.get("measured.depth") == [5.0]
+    names = ["measured.depth", "water_velocity.x", "der(velocity.u)"]
+    during = slave.get(*names)
+    assert slave.jacobian(["measured.depth"], ["position.z"]) == [[1.0]]
+    slave.fmu.exitInitializationMode()
+    assert during == slave.get(*names)
+    assert during[0] != 5.0 and during[1] != 0.0
 
 
 @pytest.mark.parametrize("length", [1e-160, 1e-7])

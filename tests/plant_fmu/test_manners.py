@@ -1,5 +1,6 @@
 """How the FMU refuses: always with a message that names the variable, and without harm."""
 
+import ctypes
 import math
 
 import pytest
@@ -229,3 +230,40 @@ def test_described_categories_are_those_that_are_known(make_slave, fmi):
     described = [category.name for category in slave.description.logCategories]
     assert {"logEvents", "logStatusError", "logAll"} <= set(described)
     slave.fmu.setDebugLogging(True, described)
+
+
+def test_errors_are_silent_once_switched_off(make_slave, fmi):
+    slave = make_slave(fmi=fmi).start()
+    slave.fmu.setDebugLogging(False, [])
+    with pytest.raises(FMICallException):
+        slave.set_values({"mass": -1.0})
+    assert slave.said == []
+
+
+def test_asking_for_nothing_is_no_fault(make_slave, fmi):
+    """Of types that the plant has not, too."""
+    slave = make_slave(fmi=fmi).start()
+    names = ["fmi2GetString", "fmi2SetString"] if fmi == 2 else ["fmi3GetFloat32", "fmi3GetClock", "fmi3SetUInt64"]
+    for name in names:
+        assert (
+            slave.fmu.dll[name](
+                ctypes.c_void_p(slave.fmu.component), None, ctypes.c_size_t(0), None, ctypes.c_size_t(0)
+            )
+            == 0
+        )
+
+
+def test_event_mode_in_co_simulation_is_refused_at_once(make_slave):
+    """As the FMU says that it has none (FMI 3.0)."""
+    slave = make_slave()
+    said = []
+    callback = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_int, ctypes.c_char_p, ctypes.c_char_p)(
+        lambda environment, status, category, text: said.append(text.decode())
+    )
+    instantiate = slave.fmu.dll["fmi3InstantiateCoSimulation"]
+    instantiate.restype = ctypes.c_void_p
+    off, on, nothing = ctypes.c_bool(False), ctypes.c_bool(True), ctypes.c_void_p()
+    token = slave.description.guid.encode()
+    made = instantiate(b"x", token, None, off, off, on, off, None, ctypes.c_size_t(0), nothing, callback, nothing)
+    assert made is None
+    assert said == ["this FMU has no event mode in co-simulation (eventModeUsed)"]

@@ -1,6 +1,8 @@
 """Model exchange: the same plant under an importer's own integrator."""
 
 import ctypes
+from pathlib import Path
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -208,6 +210,40 @@ def test_each_interface_has_its_own_functions(make_slave, fmi):
     assert "stepping: not allowed in event mode" in model.said[-1][1]
     assert slave.fmu.dll[f"{version}EnterContinuousTimeMode"](ctypes.c_void_p(slave.fmu.component)) == 3
     assert "not allowed once initialisation has ended" in slave.said[-1][1]
+
+
+def test_boolean_outputs_change_at_events_alone(make_slave, fmi):
+    """As the standards ask of discrete variables."""
+    model = make_slave(fmi=fmi, interface="me").start(hull_radius=0.3, bottom_depth=50.0)
+    model.update_discrete()
+    model.fmu.enterContinuousTimeMode()
+    model.set_values({"thrust[1]": 1e3})
+    x = model.states()
+    x[2] = 49.9
+    model.put_states(x)
+    model.rates()
+    assert not model.flag("thrust_saturated[1]") and not model.flag("bottom_contact")
+    model.fmu.enterEventMode()
+    model.update_discrete()
+    assert model.flag("thrust_saturated[1]") and model.flag("bottom_contact")
+
+
+def test_what_is_reinitialised_says_so(make_slave, fmi):
+    """Forces without a lag jump with their commands."""
+    folder = make_slave(fmi=fmi, interface="me").folder
+    root = ElementTree.parse(Path(folder) / "modelDescription.xml").getroot()
+    parents = {child: parent for parent in root.iter() for child in parent}
+    elements = [e if fmi == 3 else parents[e] for e in root.iter() if e.get("reinit") == "true"]
+    assert len(elements) == 14 and all(e.get("name").startswith("actuator.") for e in elements)
+
+
+def test_event_mode_may_be_entered_again_in_fmi_2(make_slave, fmi):
+    model = make_slave(fmi=fmi, interface="me").start()
+    if fmi == 2:
+        model.fmu.enterEventMode()
+        return
+    with pytest.raises(FMICallException):
+        model.fmu.enterEventMode()
 
 
 def test_nominals_are_those_of_the_description(make_slave, fmi):

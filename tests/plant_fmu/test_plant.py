@@ -7,7 +7,7 @@ import fmpy
 import numpy as np
 import pytest
 
-import plant_fmu.running.slave
+import plant_fmu
 from plant_fmu import Plant, PlantError, VehicleError, cached_fmu, load_vehicle
 from tests.plant_fmu.conftest import drive
 
@@ -52,7 +52,7 @@ def test_channels_are_those_of_the_description(make_plant, fmi):
 def test_a_plant_is_made_of_a_name_a_file_a_vehicle_or_an_fmu(make_plant, tmp_path):
     vehicle = load_vehicle("odin")
     toml = tmp_path / "boat.toml"
-    shutil.copy(Path(plant_fmu.running.slave.__file__).parent / "vehicles" / "odin.toml", toml)
+    shutil.copy(Path(plant_fmu.__file__).parent / "vehicles" / "odin.toml", toml)
     fmu = cached_fmu(vehicle, 2)
     runs = [drive(make_plant(source)) for source in ("odin", str(toml), toml, vehicle, fmu, str(fmu))]
     assert all(np.array_equal(run, runs[0]) for run in runs)

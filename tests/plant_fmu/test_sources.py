@@ -80,13 +80,24 @@ def test_build_description_keeps_to_the_schema(bare):
 
 
 def test_compiled_by_hand_they_are_the_same_plant(bare, fmi):
-    """With the command that the description asks for, and none of our own options."""
+    """With the command that the description asks for, for a shared library, and none of our own options."""
     (configuration, *_) = read_model_description(bare).buildConfigurations
     with zipfile.ZipFile(cached_fmu(load_vehicle("odin"), fmi)) as archive:
         (native,) = [name for name in archive.namelist() if name.startswith("binaries/")]
     (bare / native).parent.mkdir(parents=True)
     files = [bare / "sources" / name for name in configuration.sourceFileSets[0].sourceFiles]
-    command = [*find_compiler(), "-std=c99", "-O1", "-fPIC", "-shared", f"-I{FMPY / 'c-code'}", *map(str, files), "-lm"]
+    plain = f"-DFMI{fmi}_OVERRIDE_FUNCTION_PREFIX"
+    command = [
+        *find_compiler(),
+        "-std=c99",
+        "-O1",
+        plain,
+        "-fPIC",
+        "-shared",
+        f"-I{FMPY / 'c-code'}",
+        *map(str, files),
+        "-lm",
+    ]
     subprocess.run([*command, "-o", str(bare / native)], check=True, capture_output=True)
     expected = trajectory(cached_fmu(load_vehicle("odin"), fmi))
     assert max(map(abs, expected)) > 1.0
@@ -108,3 +119,52 @@ def test_fmpy_compiles_them_to_the_same_plant(bare, fmi, tmp_path, monkeypatch):
     assert len(list((bare / "binaries").glob("*/odin.*"))) == 1
     expected = trajectory(cached_fmu(load_vehicle("odin"), fmi))
     assert trajectory(packed(bare)) == pytest.approx(expected, rel=1e-10, abs=1e-10)
+
+
+TWO = """
+#include "fmi3PlatformTypes.h"
+#include "fmi3FunctionTypes.h"
+#include <stdio.h>
+extern fmi3InstantiateCoSimulationTYPE odin_fmi3InstantiateCoSimulation, rexrov_fmi3InstantiateCoSimulation;
+extern fmi3GetFloat64TYPE odin_fmi3GetFloat64, rexrov_fmi3GetFloat64;
+
+int main(int argc, char **argv)
+{
+    (void)argc;
+    fmi3Instance one = odin_fmi3InstantiateCoSimulation("1", argv[1], 0, 0, 0, 0, 0, 0, 0, 0, 0, 0);
+    fmi3Instance two = rexrov_fmi3InstantiateCoSimulation("2", argv[2], 0, 0, 0, 0, 0, 0, 0, 0, 0, 0);
+    fmi3ValueReference odin_mass = ODIN_MASS, rexrov_mass = REXROV_MASS;
+    double masses[2];
+    if (!one || !two || odin_fmi3GetFloat64(one, &odin_mass, 1, &masses[0], 1) ||
+        rexrov_fmi3GetFloat64(two, &rexrov_mass, 1, &masses[1], 1))
+        return 1;
+    printf("%g %g", masses[0], masses[1]);
+    return 0;
+}
+"""
+
+
+def test_two_vehicles_link_into_one_program(tmp_path):
+    """Each under its own names, and each with its own numbers."""
+    compiler, tokens, objects, references = find_compiler(), [], [], []
+    for name in ("odin", "rexrov"):
+        folder = tmp_path / name
+        with zipfile.ZipFile(cached_fmu(load_vehicle(name), 3)) as archive:
+            archive.extractall(folder)
+        description = read_model_description(folder)
+        tokens.append(description.guid)
+        (mass,) = (v.valueReference for v in description.modelVariables if v.name == "mass")
+        references.append(f"-D{name.upper()}_MASS={mass}")
+        sources = [str(path) for path in (folder / "sources").glob("*.c")]
+        done = subprocess.run(
+            [*compiler, "-std=c99", "-c", f"-I{FMPY / 'c-code'}", *sources], cwd=folder, capture_output=True
+        )
+        assert done.returncode == 0, done.stderr
+        objects += [str(path) for path in folder.glob("*.o")]
+    (tmp_path / "two.c").write_text(TWO)
+    program = str(tmp_path / "two")
+    command = [*compiler, f"-I{FMPY / 'c-code'}", *references, str(tmp_path / "two.c"), *objects, "-o", program, "-lm"]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    done = subprocess.run([program, *tokens], capture_output=True, text=True)
+    assert (done.returncode, done.stdout) == (0, "125 1862.87")
