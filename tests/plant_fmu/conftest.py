@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import atexit
 import ctypes
+import functools
 import shutil
 import tempfile
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -23,6 +26,14 @@ STATES = [
 WRENCH = [f"wrench.{a}" for a in "XYZKMN"]
 
 
+@functools.cache
+def extracted(path, modified):
+    """Return the folder of an FMU and its description, made once for all the tests of a process."""
+    folder = extract(str(path))
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    return folder, read_model_description(folder)
+
+
 KINDS = {(2, "cs"): FMU2Slave, (3, "cs"): FMU3Slave, (2, "me"): FMU2Model, (3, "me"): FMU3Model}
 
 
@@ -30,8 +41,7 @@ class Slave:
     """An instance with variables by name; `said` collects what the FMU logs."""
 
     def __init__(self, path, interface="cs", logging_on=False):
-        self.folder = extract(str(path))
-        self.description = read_model_description(self.folder)
+        self.folder, self.description = extracted(Path(path), Path(path).stat().st_mtime_ns)
         self.by_name = {v.name: v for v in self.description.modelVariables}
         self.fmi = int(self.description.fmiVersion[0])
         self.said = []
@@ -150,7 +160,6 @@ class Slave:
 
     def close(self):
         self.fmu.freeInstance()
-        shutil.rmtree(self.folder)
 
 
 @pytest.fixture(params=[2, 3], ids=["fmi2", "fmi3"])
