@@ -79,6 +79,7 @@ def test_every_key_of_a_scenario_is_documented():
         assert f"`{key}" in text, key
 
 
+@pytest.mark.slow
 def test_reproduction_table_holds_the_measured_figures(shipped_run):
     text = (ROOT / "docs" / "reproduction.md").read_text()
     rows = {

@@ -130,6 +130,7 @@ def test_verbose_tells_of_us_alone(tmp_path):
     assert all(line.split(".")[0] in ("cosim", "plant_fmu") for line in done.stderr.splitlines())
 
 
+@pytest.mark.slow
 def test_without_a_place_to_keep_compiled_code_it_runs_all_the_same(tmp_path):
     """Nothing writable but the run folder: compilation is not kept, the FMU goes with the process."""
     arguments = ["run", "paper", "--no-report", "--out", str(tmp_path / "run"), *QUICK]

@@ -71,6 +71,7 @@ def test_other_limits(shipped_run, limit, window, speed):
     assert not summary["reached"]
 
 
+@pytest.mark.slow
 def test_paper_calibrated_meets_the_papers_window(shipped_run):
     summary = shipped_run("paper-calibrated", "arbiter.engine=closed").summary
     ((entered, left),) = summary["intersection_windows"]

@@ -71,6 +71,7 @@ def test_a_thousand_instances_leave_nothing_behind(library):
 
 
 @needs_proc
+@pytest.mark.slow
 def test_loading_again_and_again_leaves_little_behind():
     """The whole way: extract, load, step, free, unload."""
     path = cached_fmu(load_vehicle("odin"), 3)
