@@ -17,6 +17,8 @@ from plant_fmu.errors import TableError
 
 T = TypeVar("T")
 
+_LISTED = 30  # names that a message still lists
+
 
 def read_toml(path: Path) -> dict[str, Any]:
     """Return the content of a TOML file.
@@ -91,7 +93,10 @@ def hint(came: str, known: typing.Iterable[str]) -> str:
     """
     known = sorted(known)
     near = difflib.get_close_matches(came, known, n=1, cutoff=0.5)
-    return f"did you mean {near[0]!r}?" if near else f"expected one of {', '.join(known) or '(none)'}"
+    if near:
+        return f"did you mean {near[0]!r}?"
+    listed = ", ".join(known) if len(known) <= _LISTED else f"{len(known)} names, such as {', '.join(known[:3])}"
+    return f"expected one of {listed or '(none)'}"
 
 
 def dataclass_of(annotation: Any) -> type | None:

@@ -46,7 +46,7 @@ def run(fmu: FmuFile, task: Task, folder: Path) -> Answer:
     y = np.array(ode(task.stop_time, end, u0)[1]).ravel()
     values = dict(zip(outputs, y.tolist(), strict=True))
     how = "from directional derivatives" if model.provides_directional_derivatives() else "by finite differences"
-    return Answer(values, jacobian, f"Jacobian {how}")
+    return Answer(values, jacobian, f"Jacobian {how}; CasADi knows no time events")
 
 
 def _start(model: casadi.DaeBuilder, names: list[str], task: Task) -> NDArray[np.float64]:
