@@ -146,7 +146,7 @@ SHAPES = {
 }
 
 
-@pytest.mark.parametrize("shape", SHAPES)
+@pytest.mark.parametrize("shape", ["prism", *(pytest.param(s, marks=pytest.mark.slow) for s in SHAPES if s != "prism")])
 def test_every_shape_can_be_drawn_and_be_a_goal(tmp_path, shape):
     overrides = [
         "arbiter.engine=closed",

@@ -10,7 +10,6 @@ import fmpy
 import matplotlib.image
 import pytest
 from fmpy import read_model_description
-from fmpy.validation import validate_fmu
 from lxml import etree
 
 from plant_fmu import cached_fmu, load_vehicle, shipped_vehicles
@@ -73,7 +72,6 @@ def test_the_fmu_holds_them_and_they_are_the_same_each_time(vehicle, fmi):
     made = contents(vehicle, fmi)
     assert made == contents(vehicle, fmi)
     assert made.items() <= members(vehicle, fmi).items()
-    assert not validate_fmu(str(cached_fmu(vehicle, fmi)))
 
 
 def test_each_fmi_version_has_its_own_places(vehicle):
