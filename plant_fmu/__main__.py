@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -56,17 +57,25 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _write(out: Path, text: str) -> Path:
+    """Write a text file that appears whole or not at all."""
+    scratch = out.with_name(f".{out.name}.part")
     try:
-        out.write_text(text, encoding="utf-8", newline="\n")
+        scratch.write_text(text, encoding="utf-8", newline="\n")
+        scratch.replace(out)
     except OSError as error:
         raise BuildError(f"{out}: {error.strerror or error}") from error
+    finally:
+        scratch.unlink(missing_ok=True)
     return out
 
 
 def _assignment(text: str) -> tuple[str, float]:
     name, _, number = text.rpartition("=")
     try:
-        return name, float(number)
+        value = float(number)
+        if math.isfinite(value):
+            return name, value
+        raise ValueError(number)
     except ValueError:
         raise argparse.ArgumentTypeError(f"{text!r}: expected NAME=NUMBER") from None
 
@@ -96,7 +105,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns
     -------
     int
-        0; 1 if an importer failed with a checked FMU; 2 where the user must mend something.
+        0; 1 if an importer failed with a checked FMU; 2 where the user must mend something; 130 if interrupted.
     """
     options = _parser().parse_args(arguments)
     try:
@@ -123,6 +132,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except PlantFmuError as error:
         print(f"plant_fmu: {error}", file=sys.stderr)
         return 2
+    except OSError as error:  # a full disk, or a reader that has gone
+        print(f"plant_fmu: {error.filename or 'output'}: {error.strerror or error}", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        print("plant_fmu: interrupted", file=sys.stderr)
+        return 130
     return 0
 
 

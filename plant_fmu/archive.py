@@ -29,9 +29,9 @@ def write_archive(out: Path, members: Mapping[str, bytes]) -> None:
     BuildError
         If `out` cannot be written, or is there and is no file.
     """
-    if out.is_dir() or (out.exists() and not out.is_file()):
-        raise BuildError(f"{out}: exists and is no file; expected the name of a new one")
     try:
+        if out.is_dir() or (out.exists() and not out.is_file()):
+            raise BuildError(f"{out}: exists and is no file; expected the name of a new one")
         with tempfile.NamedTemporaryFile(dir=out.parent, prefix=f".{out.name}-", delete=False) as scratch:
             pass
     except OSError as error:

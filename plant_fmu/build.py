@@ -33,6 +33,12 @@ FMI_VERSIONS = (2, 3)
 _FMI_HEADERS = Path(fmpy.__file__).parent / "c-code"
 
 
+def require_version(fmi: int) -> None:
+    """Refuse what is no version of FMI that an FMU can be built for."""
+    if type(fmi) is not int or fmi not in FMI_VERSIONS:
+        raise BuildError(f"FMI version is {fmi!r}, expected 2 or 3")
+
+
 def build_fmu(vehicle: Vehicle, fmi: int, out: Path, platforms: str = NATIVE) -> Path:
     """Write the FMU of a vehicle.
 
@@ -58,8 +64,7 @@ def build_fmu(vehicle: Vehicle, fmi: int, out: Path, platforms: str = NATIVE) ->
     BuildError
         If a platform is not known, there is no compiler, it fails, or `out` cannot be written.
     """
-    if fmi not in FMI_VERSIONS:
-        raise BuildError(f"FMI version is {fmi!r}, expected 2 or 3")
+    require_version(fmi)
     out = Path(out)
     if platforms == NATIVE:
         compilers = [(native_platform(), find_compiler())]
@@ -91,8 +96,7 @@ def cached_fmu(vehicle: Vehicle, fmi: int) -> Path:
     BuildError
         As `build_fmu`.
     """
-    if fmi not in FMI_VERSIONS:
-        raise BuildError(f"FMI version is {fmi!r}, expected 2 or 3")
+    require_version(fmi)
     made_from = hashlib.sha256(" ".join((native_platform().name, *FLAGS, fmpy.__version__)).encode())
     for name, data in sorted(neutral_members(vehicle, fmi).items()):
         made_from.update(f"\n{name} {len(data)}\n".encode() + data)

@@ -41,6 +41,8 @@ class Task:
             if not (math.isfinite(value) and value > 0.0):
                 raise TaskError(f"{name} is {value:g} s, expected a positive number")
         steps = self.stop_time / self.step
+        if not math.isfinite(steps):
+            raise TaskError(f"stop time {self.stop_time:g} s has too many steps of {self.step:g} s")
         if self.steps < 1 or abs(steps - self.steps) > _ROUNDING * steps:
             raise TaskError(f"stop time {self.stop_time:g} s is no whole number of steps of {self.step:g} s")
 

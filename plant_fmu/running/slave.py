@@ -13,11 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from plant_fmu.errors import PlantError
-from plant_fmu.running.channels import Bound
+from plant_fmu.running.channels import REALS, Bound
 from plant_fmu.running.instance import WARNING, Instance
 from plant_fmu.running.state import Clock
 from plant_fmu.running.values import Value, checked, require_settable
 
+_LONGEST_STEP = 1e9  # s
 _AT_ZERO = Clock(0.0, 0, math.nan)
 
 
@@ -110,7 +111,8 @@ class Slave:
             variables, numbers = batches.setdefault(variable.type, ([], []))
             variables.append(variable)
             numbers.append(checked(variable, value))
-        for variables, numbers in batches.values():
+        # real numbers go in one call, of which the FMU takes all or none: last, after what may be refused one by one
+        for _, (variables, numbers) in sorted(batches.items(), key=lambda batch: batch[0] in REALS):
             self._instance.set(variables, numbers)
             for variable, number in zip(variables, numbers, strict=True):
                 if variable.name in self._input_at:
@@ -170,19 +172,25 @@ class Slave:
         Raises
         ------
         PlantError
-            If the FMU finds its parameters wanting, or was initialised before.
+            If the FMU finds its parameters wanting, or was initialised before; `reset` takes the plant back then.
         """
         self._require_open()
         if self.initialised:
             raise PlantError(f"plant {self.name} is initialised already; reset() takes it back")
+        if not isinstance(time, (int, float, np.integer, np.floating)):
+            raise PlantError(f"start time is {time!r}, expected seconds")
+        time = float(time)
         instance, fmu = self._instance, self._instance.fmu
         self._send()
-        if instance.fmi == 2:
-            instance.do(fmu.setupExperiment, startTime=time)
-            instance.do(fmu.enterInitializationMode)
-        else:
-            instance.do(fmu.enterInitializationMode, startTime=time)
-        instance.do(fmu.exitInitializationMode)
+        try:
+            if instance.fmi == 2:
+                instance.do(fmu.setupExperiment, startTime=time)
+                instance.do(fmu.enterInitializationMode)
+            else:
+                instance.do(fmu.enterInitializationMode, startTime=time)
+            instance.do(fmu.exitInitializationMode)
+        except PlantError as error:
+            raise PlantError(f"{error}; reset(), then set what is right") from error
         self._wind(Clock(time, 0, math.nan), initialised=True)
         self._read()
 
@@ -219,7 +227,7 @@ class Slave:
         if set_inputs(*of_inputs) > WARNING or do_step(*of_step) > WARNING:
             raise PlantError(f"t = {self.time:.6g} s: {self._said()}")
         self._count = count = self._count + 1
-        self.time = self._start + count * step
+        self.time = self._start + count * self._step
         if get_outputs(*of_outputs) > WARNING:
             raise PlantError(f"t = {self.time:.6g} s: {self._said()}")
         if self._ended.value:
@@ -228,7 +236,8 @@ class Slave:
     def _pace(self, step: float) -> None:
         """Prepare steps of another length than before."""
         self._require_initialised("cannot step")
-        if not (isinstance(step, (int, float, np.integer, np.floating)) and 0.0 < step < math.inf):
+        number = isinstance(step, (int, float, np.integer, np.floating)) and not isinstance(step, bool)
+        if not (number and 0.0 < step < _LONGEST_STEP):
             raise PlantError(f"step is {step!r}, expected seconds above 0")
         if step != self._last_step:
             self._start, self._count = self.time, 0
@@ -271,6 +280,9 @@ class Slave:
         """Free the instance, unload the library and remove the extracted files. May be called twice."""
         self._instance.close()
         self._wind(Clock(self.time, 0, math.nan), initialised=False)
+
+    def __reduce_ex__(self, protocol: Any) -> Any:
+        raise PlantError("a plant cannot be copied or pickled, expected save() and serialise() for its state")
 
     def __enter__(self) -> Self:
         return self

@@ -60,6 +60,9 @@ class State:
         """When it was saved [s]."""
         return self.clock.time
 
+    def __reduce_ex__(self, protocol: Any) -> Any:
+        raise PlantError("a state cannot be copied or pickled, expected plant.serialise(state)")
+
     def handle(self, instance: Instance) -> Any:
         """Return the FMU's handle.
 

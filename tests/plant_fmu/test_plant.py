@@ -1,5 +1,7 @@
 """`Plant` against FMPy's own calls, and all that a user may do with values and in the wrong order."""
 
+import copy
+import pickle
 import shutil
 from pathlib import Path
 
@@ -243,3 +245,45 @@ def test_reset_takes_it_back_to_the_start(make_plant, fmi):
     plant.initialise()
     assert plant["mass"] == 125.0
     assert np.array_equal(drive(plant), drive(fresh))
+
+
+@pytest.mark.parametrize("duplicate", [copy.copy, copy.deepcopy, pickle.dumps])
+def test_a_plant_and_a_state_cannot_be_copied(make_plant, duplicate):
+    """Two hands on one instance would free it under each other."""
+    plant = make_plant("odin")
+    for thing in (plant, plant.save()):
+        with pytest.raises(PlantError, match="cannot be copied or pickled"):
+            duplicate(thing)
+
+
+def test_a_step_of_single_precision_leaves_the_time_exact(make_plant):
+    plant = make_plant("odin")
+    for _ in range(30_000):
+        plant.step(np.float32(0.01))
+    assert type(plant.time) is float
+    assert plant.time == 30_000 * float(np.float32(0.01))
+
+
+@pytest.mark.parametrize("step", [True, 10**400], ids=["bool", "huge"])
+def test_a_step_that_is_no_number_of_seconds(make_plant, step):
+    plant = make_plant("odin")
+    with pytest.raises(PlantError, match="expected seconds above 0"):
+        plant.step(step)
+
+
+def test_a_refused_integer_leaves_the_real_numbers_as_they_were(make_plant):
+    plant = make_plant("odin")
+    mass = plant["mass"]
+    with pytest.raises(PlantError, match="seed"):
+        plant.set({"mass": 50.0, "thrust[1]": 5.0, "seed": -1})
+    assert plant["mass"] == mass and plant["thrust[1]"] == 0.0
+
+
+def test_a_refused_initialisation_says_the_way_out():
+    with Plant("odin") as plant:
+        plant.set({"dvl.velocity_noise": 0.1})
+        with pytest.raises(PlantError, match=r"needs the sensor's rate .*; reset\(\), then set what is right"):
+            plant.initialise()
+        plant.reset()
+        plant.set({"dvl.velocity_noise": 0.1, "dvl.rate": 5.0})
+        plant.initialise()
