@@ -115,6 +115,7 @@ def test_claims_blame_no_sphere_that_was_not_entered(tmp_path):
     assert "starts" in avoiding.why
 
 
+@pytest.mark.slow
 def test_other_scenarios_are_not_held_against_the_paper(tmp_path):
     scenario = load_scenario("paper", ["arbiter.engine=closed", "time.duration=0.01", 'compare=""'])
     assert "Beside the paper" not in page_of(run_scenario(scenario, tmp_path / "run"))

@@ -27,6 +27,7 @@ def written(tmp_path, *changes):
 
 
 @pytest.mark.parametrize("compiler", ["cc", "ziglang"])
+@pytest.mark.slow
 def test_two_builds_give_the_same_bytes(tmp_path, fmi, compiler, monkeypatch):
     if compiler == "ziglang":
         pytest.importorskip("ziglang", reason="the build extra is not installed")

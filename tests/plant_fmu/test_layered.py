@@ -112,6 +112,7 @@ def test_the_files_are_what_the_equations_give(name, tmp_path):
 
 
 @pytest.mark.parametrize("name", shipped_vehicles())
+@pytest.mark.slow
 def test_the_manoeuvre_moves_every_axis_and_meets_the_limits(name):
     vehicle = load_vehicle(name)
     made = reference(vehicle)
