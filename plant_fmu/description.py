@@ -7,6 +7,7 @@ import math
 from importlib import metadata
 from xml.etree import ElementTree as ET
 
+from plant_fmu.markup import xml_text
 from plant_fmu.quantities import UNITS
 from plant_fmu.sources import compiled_files, external_names
 from plant_fmu.variables import Variable, variables
@@ -41,7 +42,7 @@ _LOG_CATEGORIES = {
     "logEvents": "Initialisation, and samples in model exchange",
     "logStatusWarning": "Values that were mended",
     "logStatusDiscard": "States that an integrator tried and that lie outside the plant's domain",
-    "logStatusError": "Refused values and calls; logged always",
+    "logStatusError": "Refused values and calls; logged until switched off",
     "logAll": "All of these",
 }
 
@@ -188,8 +189,7 @@ def model_description(vehicle: Vehicle, fmi: int, token: str) -> str:
         _add_variable(model_variables, vr, v, fmi, number)
     _add_structure(ET.SubElement(root, "ModelStructure"), [v for _, v in rows], fmi, number)
 
-    ET.indent(root)
-    return '<?xml version="1.0" encoding="UTF-8"?>\n' + ET.tostring(root, encoding="unicode") + "\n"
+    return xml_text(root)
 
 
 def _add_variable(parent: ET.Element, vr: int, v: Variable, fmi: int, number: dict[str, str]) -> None:
@@ -209,11 +209,11 @@ def _add_variable(parent: ET.Element, vr: int, v: Variable, fmi: int, number: di
     if v.quantity.unit == "rad":
         kind["displayUnit"] = "deg"
     if v.quantity.bounded and v.type != "boolean":
-        kind |= {"min": _value(v, v.quantity.minimum), "max": _value(v, v.quantity.maximum)}
+        kind |= {"min": v.text(v.quantity.minimum), "max": v.text(v.quantity.maximum)}
     if real and v.role != "time":
         kind["nominal"] = _number(v.nominal)
     if v.role in ("state", "input", "parameter"):
-        kind["start"] = _value(v, v.start)
+        kind["start"] = v.text(v.start)
     if v.role == "state" and v.local:
         kind["reinit"] = "true"  # at events, where they have no lag
     if v.role == "derivative":
@@ -224,13 +224,6 @@ def _add_variable(parent: ET.Element, vr: int, v: Variable, fmi: int, number: di
         ET.SubElement(ET.SubElement(parent, "ScalarVariable", common), element, kind)
     else:
         ET.SubElement(parent, element, common | kind)
-
-
-def _value(v: Variable, value: float) -> str:
-    """Write a value in the way of the variable's type."""
-    if v.type == "boolean":
-        return "true" if value else "false"
-    return str(int(value)) if v.type == "integer" else _number(value)
 
 
 def _add_structure(parent: ET.Element, rows: list[Variable], fmi: int, number: dict[str, str]) -> None:
@@ -285,13 +278,9 @@ def documentation(vehicle: Vehicle) -> str:
         for v in variables(vehicle):
             if v.role == role:
                 q = v.quantity
-                start = (
-                    ""
-                    if role in ("output", "derivative")
-                    else _value(v, v.start)
-                    if v.type != "real"
-                    else f"{v.start:g}"
-                )
+                start = f"{v.start:g}" if v.type == "real" else v.text(v.start)
+                if role in ("output", "derivative"):
+                    start = ""
                 least, most = (f"{q.minimum:g}", f"{q.maximum:g}") if q.bounded and v.type != "boolean" else ("", "")
                 lines.append(f"| `{v.name}` | {q.unit} | {start} | {least} | {most} | {v.description} |")
     return "\n".join([*lines, ""])

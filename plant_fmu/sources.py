@@ -6,6 +6,8 @@ import re
 from importlib import resources
 from xml.etree import ElementTree as ET
 
+from plant_fmu.markup import xml_text
+
 # a function is named after its file, at the beginning of a line; data are declared extern
 _DECLARED = re.compile(
     r"^(?!static|typedef)(?:\w[\w ]*[ *]+)([a-z]\w*)\(|^extern [^;\[]*?(\w+)(?:\[\])?;", re.MULTILINE
@@ -92,5 +94,4 @@ def build_description(model_identifier: str) -> str:
             configuration.set("platform", platform)
         else:
             ET.SubElement(configuration, "Library", name="m", external="true", description="C's mathematics")
-    ET.indent(root)
-    return '<?xml version="1.0" encoding="UTF-8"?>\n' + ET.tostring(root, encoding="unicode") + "\n"
+    return xml_text(root)

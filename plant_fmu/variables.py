@@ -38,6 +38,12 @@ class Variable:
         """A typical magnitude: that of the start value for a parameter, else that of the quantity."""
         return (abs(self.start) if self.role == "parameter" else 0.0) or self.quantity.nominal
 
+    def text(self, value: float) -> str:
+        """Write a value of this variable as XML has it; a real number reads back to the same bits."""
+        if self.type == "boolean":
+            return "true" if value else "false"
+        return str(int(value)) if self.type == "integer" else repr(float(value))
+
 
 def variables(vehicle: Vehicle) -> list[Variable]:
     """Return every variable of a vehicle's FMU; the index in this list is the value reference.

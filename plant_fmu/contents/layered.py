@@ -9,6 +9,7 @@ import numpy as np
 
 from plant_fmu.contents.parameter_set import parameter_set, ssv
 from plant_fmu.contents.reference import COLUMNS, CURRENT, START, Reference
+from plant_fmu.markup import xml_text
 from plant_fmu.variables import variables
 from plant_fmu.vehicle import Vehicle, load_vehicle, shipped_vehicles
 
@@ -57,9 +58,7 @@ def layered_files(vehicle: Vehicle) -> dict[str, str]:
     root = ET.Element("fmiReferences", _MANIFEST)
     for source, kind, role, description in related:
         ET.SubElement(root, "Related", type=kind, source=source, role=role, description=description)
-    ET.indent(root)
-    manifest = '<?xml version="1.0" encoding="UTF-8"?>\n' + ET.tostring(root, encoding="unicode") + "\n"
-    return {"fmi-ls-manifest.xml": manifest, **files}
+    return {"fmi-ls-manifest.xml": xml_text(root), **files}
 
 
 def reference_files(vehicle: Vehicle, results: Reference) -> dict[str, str]:

@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from importlib import metadata
 from xml.etree import ElementTree as ET
 
+from plant_fmu.markup import xml_text
 from plant_fmu.quantities import UNITS
 from plant_fmu.variables import Variable, variables
 from plant_fmu.vehicle import Vehicle
@@ -62,7 +63,7 @@ def parameter_set(name: str, description: str, values: Iterable[tuple[Variable, 
     used: dict[str, None] = {}  # a set that keeps its order
     for v, value in values:
         parameter = ET.SubElement(parameters, "ssv:Parameter", name=v.name, description=v.description)
-        element = ET.SubElement(parameter, f"ssv:{v.type.capitalize()}", value=_text(v, value))
+        element = ET.SubElement(parameter, f"ssv:{v.type.capitalize()}", value=v.text(value))
         if v.quantity.unit:
             element.set("unit", v.quantity.unit)
             used[v.quantity.unit] = None
@@ -71,12 +72,4 @@ def parameter_set(name: str, description: str, values: Iterable[tuple[Variable, 
         for unit in used:
             base = {key: str(power) for key, power in UNITS[unit].items()}
             ET.SubElement(ET.SubElement(units, "ssc:Unit", name=unit), "ssc:BaseUnit", base)
-    ET.indent(root)
-    return '<?xml version="1.0" encoding="UTF-8"?>\n' + ET.tostring(root, encoding="unicode") + "\n"
-
-
-def _text(v: Variable, value: float) -> str:
-    """Write a value so that it reads back as the same one."""
-    if v.type == "boolean":
-        return "true" if value else "false"
-    return str(int(value)) if v.type == "integer" else repr(float(value))
+    return xml_text(root)

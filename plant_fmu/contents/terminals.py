@@ -6,6 +6,7 @@ import re
 from dataclasses import dataclass, field
 from xml.etree import ElementTree as ET
 
+from plant_fmu.markup import xml_text
 from plant_fmu.variables import Variable, variables
 from plant_fmu.vehicle import Vehicle
 
@@ -70,8 +71,7 @@ def terminals_and_icons(vehicle: Vehicle) -> str:
     ET.SubElement(picture, "CoordinateSystem", square, suggestedScalingFactorTo_mm="0.1")
     ET.SubElement(picture, "Icon", square)
     _write(ET.SubElement(document, "Terminals"), root, "")
-    ET.indent(document)
-    return '<?xml version="1.0" encoding="UTF-8"?>\n' + ET.tostring(document, encoding="unicode") + "\n"
+    return xml_text(document)
 
 
 def _place(v: Variable) -> tuple[tuple[str, ...], str] | None:
