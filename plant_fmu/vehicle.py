@@ -40,6 +40,10 @@ _KEYS = {
     "thrust_min": "thrusters.force_min",
     "thrust_max": "thrusters.force_max",
     "thrust_time_constant": "thrusters.time_constant",
+    "thrust_rate_limit": "thrusters.rate_limit",
+    "thrust_dead_band": "thrusters.dead_band",
+    "thrust_curve": "thrusters.curve",
+    "hull_radius": "hull.radius",
 }
 
 
@@ -264,7 +268,16 @@ def _check(file: _File, where: str) -> Vehicle:
     require(
         bool((vehicle.thrust_min <= vehicle.thrust_max).all()), "thrusters.force_min", "above force_max", "below it"
     )
-    require(bool((vehicle.thrust_time_constant >= 0).all()), "thrusters.time_constant", "negative", "0 or above")
+    for key, most in (
+        ("thrust_time_constant", np.inf),
+        ("thrust_rate_limit", np.inf),
+        ("thrust_dead_band", 1.0),
+        ("thrust_curve", 1.0),
+        ("hull_radius", np.inf),
+    ):
+        values = np.atleast_1d(getattr(vehicle, key))
+        require(bool((values >= 0).all()), _KEYS[key], f"negative, {values.min():g}", "0 or above")
+        require(bool((values <= most).all()), _KEYS[key], f"{values.max():g}", f"at most {most:g}")
     rigid = vehicle.mass_matrix - vehicle.added_mass
     for key, matrix in (("rigid-body mass matrix", rigid), ("mass matrix with added mass", vehicle.mass_matrix)):
         least = float(np.linalg.eigvalsh(matrix)[0])

@@ -150,6 +150,13 @@ def test_names_that_are_no_identifiers_are_refused(tmp_path, name):
         (("matrix = [", "matrix = []\nmatrix_was = ["), "matrix_was: unknown key"),
         (("Rest no", "\\u0007 Rest no"), r"source is text with '\\x07', expected printable"),
         (("time_constant = 0.0 ", "time_constant = -0.1 "), "thrusters.time_constant is negative"),
+        (
+            ("force_min =", "rate_limit = -5.0\nforce_min ="),
+            "thrusters.rate_limit is negative, -5, expected 0 or above",
+        ),
+        (("force_min =", "dead_band = 1.5\nforce_min ="), "thrusters.dead_band is 1.5, expected at most 1"),
+        (("force_min =", "curve = -1.0\nforce_min ="), "thrusters.curve is negative"),
+        (("radius = 0.315", "radius = -1.0"), "hull.radius is negative"),
     ],
 )
 def test_numbers_that_cannot_be_are_named_by_their_key(tmp_path, change, words):
