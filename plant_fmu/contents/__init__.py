@@ -34,11 +34,15 @@ def contents(vehicle: Vehicle, fmi: int) -> dict[str, bytes]:
     VehicleError
         If a number of the vehicle is beyond the range of its parameter.
     """
+    references = layered_files(vehicle)
+    guide = text("fmi-ls-ref.txt")
+    if f"{vehicle.name}_out.csv" in references:
+        guide += text("fmi-ls-ref-results.txt")
     texts = {
         "documentation/index.html": page(vehicle, fmi),
-        "documentation/fmi-ls-ref.txt": Template(text("fmi-ls-ref.txt")).substitute(name=vehicle.name),
+        "documentation/fmi-ls-ref.txt": Template(guide).substitute(name=vehicle.name),
         **{f"documentation/licenses/{name}": licence for name, licence in licenses(fmi).items()},
-        **{f"{FOLDER}/{name}": file for name, file in layered_files(vehicle).items()},
+        **{f"{FOLDER}/{name}": file for name, file in references.items()},
     }
     picture = (resources.files("plant_fmu.contents") / "pages" / "icon.png").read_bytes()
     pictures = {"model.png": picture}

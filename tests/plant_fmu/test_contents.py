@@ -1,5 +1,6 @@
 """What lies in an FMU beside description and binary, against FMPy's schemas and parsers of HTML and of images."""
 
+import re
 import zipfile
 from dataclasses import replace
 from html.parser import HTMLParser
@@ -168,3 +169,16 @@ def test_a_vehicle_with_one_thruster_has_it_all(fmi):
     rows = {cells[0] for cells in Page(contents(one, fmi)["documentation/index.html"].decode()).rows if cells}
     assert {v.name for v in variables(one) if v.role != "time"} <= rows
     assert "thrust[2]" not in rows
+
+
+@pytest.mark.parametrize("own", [False, True], ids=["shipped", "own"])
+def test_the_guide_names_the_files_that_are_there(own):
+    """One of the package brings a manoeuvre, one's own brings none."""
+    vehicle = load_vehicle("odin")
+    if own:
+        vehicle = replace(vehicle, name="mine", mass=126.0)
+    made = contents(vehicle, 3)
+    files = {Path(name).name for name in made if name.startswith("extra/")} - {"fmi-ls-manifest.xml"}
+    named = set(re.findall(rf"^{vehicle.name}\S*", made["documentation/fmi-ls-ref.txt"].decode(), re.MULTILINE))
+    assert named == files
+    assert len(files) == (1 if own else 4)
