@@ -8,13 +8,14 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from plant_fmu.archive import write_whole
 from plant_fmu.build import FMI_VERSIONS, build_fmu
 from plant_fmu.check import Verdict, check_fmu
 from plant_fmu.contents.layered import reference_files
 from plant_fmu.contents.parameter_set import ssv
 from plant_fmu.contents.reference import reference
 from plant_fmu.description import documentation
-from plant_fmu.errors import BuildError, PlantFmuError
+from plant_fmu.errors import PlantFmuError
 from plant_fmu.platforms import ALL, NATIVE, PLATFORMS
 from plant_fmu.vehicle import load_vehicle, shipped_vehicles
 
@@ -57,15 +58,7 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _write(out: Path, text: str) -> Path:
-    """Write a text file that appears whole or not at all."""
-    scratch = out.with_name(f".{out.name}.part")
-    try:
-        scratch.write_text(text, encoding="utf-8", newline="\n")
-        scratch.replace(out)
-    except OSError as error:
-        raise BuildError(f"{out}: {error.strerror or error}") from error
-    finally:
-        scratch.unlink(missing_ok=True)
+    write_whole(out, text.encode())
     return out
 
 

@@ -10,13 +10,14 @@ import logging
 import os
 import shutil
 import tempfile
+import zipfile
 from collections.abc import Mapping
 from pathlib import Path
 
 import fmpy
 import platformdirs
 
-from plant_fmu.archive import write_archive
+from plant_fmu.archive import require_place, write_archive
 from plant_fmu.compiler import FLAGS, compile_library, cross_compiler, find_compiler
 from plant_fmu.contents import contents
 from plant_fmu.description import header, model_description, token
@@ -70,6 +71,7 @@ def build_fmu(vehicle: Vehicle, fmi: int, out: Path, platforms: str = NATIVE) ->
         compilers = [(native_platform(), find_compiler())]
     else:
         compilers = [(platform, cross_compiler(platform)) for platform in cross_platforms(platforms)]
+    require_place(out)
     members = neutral_members(vehicle, fmi)
     write_archive(out, members | _binaries(vehicle.name, fmi, members, compilers))
     return out
@@ -102,7 +104,7 @@ def cached_fmu(vehicle: Vehicle, fmi: int) -> Path:
         made_from.update(f"\n{name} {len(data)}\n".encode() + data)
     digest = made_from.hexdigest()[:16]
     path = Path(platformdirs.user_cache_dir("subreach")) / "fmu" / f"{vehicle.name}-fmi{fmi}-{digest}.fmu"
-    if path.exists():
+    if zipfile.is_zipfile(path):  # one that was damaged is built anew
         return path
     find_compiler()  # so that a missing compiler is said before anything is written
     try:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from plant_fmu import BuildError, TableError, VehicleError, build_fmu, load_vehicle
+from plant_fmu import BuildError, TableError, VehicleError, build_fmu, cached_fmu, load_vehicle
 from plant_fmu.__main__ import main
 from plant_fmu.compiler import find_compiler
 
@@ -184,3 +184,36 @@ def test_environment_is_left_alone(tmp_path):
     before = dict(os.environ), os.getcwd()
     build_fmu(load_vehicle("odin"), 2, tmp_path / "x.fmu")
     assert (dict(os.environ), os.getcwd()) == before
+
+
+def test_a_place_that_cannot_be_written_is_said_before_the_work(tmp_path, monkeypatch):
+    """No compiler has run by then."""
+    ran = tmp_path / "ran"
+    compiler = tmp_path / "cc"
+    compiler.write_text(f"#!/bin/sh\ntouch {ran}\nexit 1\n")
+    compiler.chmod(0o755)
+    monkeypatch.setenv("CC", str(compiler))
+    with pytest.raises(BuildError, match="No such file or directory"):
+        build_fmu(load_vehicle("odin"), 3, tmp_path / "nowhere" / "odin.fmu")
+    assert not ran.exists()
+
+
+def test_a_damaged_file_in_the_cache_is_built_anew(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    path = cached_fmu(load_vehicle("odin"), 3)
+    whole = path.read_bytes()
+    path.write_bytes(whole[: len(whole) // 2])
+    assert cached_fmu(load_vehicle("odin"), 3) == path
+    assert path.read_bytes() == whole
+
+
+def test_a_text_that_does_not_fit_leaves_no_part_of_it(tmp_path, monkeypatch, capsys):
+    """The disk is full when the last byte comes."""
+
+    def full(source, target):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("os.replace", full)
+    assert main(["ssv", "--vehicle", "odin", "--out", str(tmp_path / "odin.ssv")]) == 2
+    assert "No space left on device" in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []
