@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from plant_fmu.running.instance import Instance
 
-REALS = ("Real", "Float64")
+DOUBLES = ("Real", "Float64")
 
 Call = tuple[Any, tuple[Any, ...]]  # a C function that returns a status, and all its arguments
 
@@ -66,8 +66,8 @@ class Bound:
 
     def __init__(self, instance: Instance) -> None:
         scalars = [v for v in instance.variables.values() if not v.dimensions]
-        inputs = [v for v in scalars if v.causality == "input" and v.type in REALS]
-        outputs = [v for v in scalars if v.causality == "output" and v.type in REALS]
+        inputs = [v for v in scalars if v.causality == "input" and v.type in DOUBLES]
+        outputs = [v for v in scalars if v.causality == "output" and v.type in DOUBLES]
         flags = [v for v in scalars if v.causality == "output" and v.type == "Boolean"]
 
         self.starts = np.array([float(v.start or 0.0) for v in inputs])

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from plant_fmu.build import FMI_VERSIONS, cached_fmu
 from plant_fmu.errors import PlantError
-from plant_fmu.running.channels import REALS
+from plant_fmu.running.channels import DOUBLES
 from plant_fmu.running.slave import Slave
 from plant_fmu.running.state import Clock, State, from_bytes, to_bytes
 from plant_fmu.vehicle import Vehicle, load_vehicle
@@ -157,7 +157,7 @@ class Plant(Slave):
     def _real(self, name: str) -> int:
         """Return the value reference of a variable that has derivatives."""
         variable = self._variable(name)
-        if variable.type not in REALS or variable.dimensions:
+        if variable.type not in DOUBLES or variable.dimensions:
             kind = "an array" if variable.dimensions else f"of type {variable.type}"
             raise PlantError(f"{name} is {kind}, expected a real scalar variable")
         return int(variable.valueReference)

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from plant_fmu.errors import PlantError
-from plant_fmu.running.channels import REALS, Bound
+from plant_fmu.running.channels import DOUBLES, Bound
 from plant_fmu.running.instance import WARNING, Instance
 from plant_fmu.running.state import Clock
 from plant_fmu.running.values import Value, checked, require_settable
@@ -112,7 +112,7 @@ class Slave:
             variables.append(variable)
             numbers.append(checked(variable, value))
         # real numbers go in one call, of which the FMU takes all or none: last, after what may be refused one by one
-        for _, (variables, numbers) in sorted(batches.items(), key=lambda batch: batch[0] in REALS):
+        for _, (variables, numbers) in sorted(batches.items(), key=lambda batch: batch[0] in DOUBLES):
             self._instance.set(variables, numbers)
             for variable, number in zip(variables, numbers, strict=True):
                 if variable.name in self._input_at:

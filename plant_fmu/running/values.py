@@ -8,10 +8,11 @@ from typing import Any
 import numpy as np
 
 from plant_fmu.errors import PlantError
+from plant_fmu.running.channels import DOUBLES
 
 Value = float | int | bool | str
 
-_REALS = ("Real", "Float64", "Float32")
+_REALS = (*DOUBLES, "Float32")
 _WHOLE = {  # how many bits, and whether signed
     "Integer": (32, True),
     "Enumeration": (32, True),  # of FMI 3.0 it is wider; no enumeration has that many items

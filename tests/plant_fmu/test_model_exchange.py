@@ -29,6 +29,14 @@ MOVING = {
 LAGS = {"thrust_time_constant[1]": 0.3, "thrust_rate_limit[6]": 15.0, "wrench_time_constant": 0.5}
 
 
+def by_cvode(fmi, values, end, interval, output):
+    """Run the model in FMPy with CVODE; return the recorded outputs."""
+    return simulate_fmu(
+        str(cached_fmu(load_vehicle("odin"), fmi)), fmi_type="ModelExchange", solver="CVode", relative_tolerance=1e-10,
+        stop_time=end, output_interval=interval, start_values=values, output=output,
+    )  # fmt: skip
+
+
 def end_of(result):
     return np.array([result[name][-1] for name in STATES])
 
@@ -42,16 +50,7 @@ def cosimulated(make_slave, fmi, values, end, step=0.01, **more):
 
 @pytest.mark.parametrize("more", [{}, LAGS, {"current_shear.y": 0.1, "bottom_depth": 3.0, "hull_radius": 0.3}])
 def test_cvode_ends_where_co_simulation_does(make_slave, fmi, more):
-    result = simulate_fmu(
-        str(cached_fmu(load_vehicle("odin"), fmi)),
-        fmi_type="ModelExchange",
-        solver="CVode",
-        relative_tolerance=1e-10,
-        stop_time=10.0,
-        output_interval=1.0,
-        start_values=MOVING | more,
-        output=STATES,
-    )
+    result = by_cvode(fmi, MOVING | more, 10.0, 1.0, STATES)
     slave = cosimulated(make_slave, fmi, MOVING | more, 10.0, substep=0.0025)
     tolerance = 1e-7 if "bottom_depth" not in more else 1e-4  # the contact's kinks
     assert np.abs(end_of(result) - slave.get(*STATES)).max() < tolerance
@@ -66,16 +65,7 @@ def test_a_drifting_current_is_the_same_in_both(make_slave, fmi):
         "seed": 5,
         "current_variation_period": 0.37,
     }
-    result = simulate_fmu(
-        str(cached_fmu(load_vehicle("odin"), fmi)),
-        fmi_type="ModelExchange",
-        solver="CVode",
-        relative_tolerance=1e-10,
-        stop_time=10.0,
-        output_interval=0.01,
-        start_values=MOVING | drift,
-        output=[*STATES, "water_velocity.x"],
-    )
+    result = by_cvode(fmi, MOVING | drift, 10.0, 0.01, [*STATES, "water_velocity.x"])
     slave = cosimulated(make_slave, fmi, MOVING | drift, 10.0, substep=0.0025)
     assert np.abs(end_of(result) - slave.get(*STATES)).max() < 1e-7
     assert np.std(result["water_velocity.x"]) > 0.02
@@ -83,16 +73,7 @@ def test_a_drifting_current_is_the_same_in_both(make_slave, fmi):
 
 def test_samples_are_the_same_in_both(make_slave, fmi):
     noisy = {"depth_sensor.rate": 4.0, "depth_sensor.noise": 0.1, "seed": 3}
-    result = simulate_fmu(
-        str(cached_fmu(load_vehicle("odin"), fmi)),
-        fmi_type="ModelExchange",
-        solver="CVode",
-        relative_tolerance=1e-10,
-        stop_time=5.0,
-        output_interval=0.1,
-        start_values=MOVING | noisy,
-        output=["measured.depth"],
-    )
+    result = by_cvode(fmi, MOVING | noisy, 5.0, 0.1, ["measured.depth"])
     slave = make_slave(fmi=fmi).start(**MOVING, **noisy)
     rows = [slave.get("measured.depth")[0]]
     for k in range(50):
