@@ -1,20 +1,46 @@
 """A fuzzy arbiter of prioritised criteria, which decides to what degree each one matters now."""
 
-from fuzzy_arbiter.arbiter import ENGINES, Arbiter
-from fuzzy_arbiter.definition import SECTION_VI, Criterion, Rule, Term, hierarchical_rules
-from fuzzy_arbiter.errors import ArbiterError, DefinitionError, MembershipError
+from fuzzy_arbiter.arbiter import Arbiter
+from fuzzy_arbiter.definition import Output, Rule, System, Term, Variable
+from fuzzy_arbiter.errors import (
+    ArbiterError,
+    DefinitionError,
+    EngineError,
+    FormatError,
+    InputError,
+    UndefinedOutputError,
+    UnsupportedError,
+)
+from fuzzy_arbiter.hierarchy import SECTION_VI, Criterion, prioritised
 from fuzzy_arbiter.membership import ramp
+from fuzzy_arbiter.propositions import Is
+from fuzzy_arbiter.rule_text import parse_proposition, parse_rule
+from fuzzy_arbiter.shapes import Shape, falling, rising, trapezoid, triangle
 
 __all__ = [
-    "ENGINES",
     "SECTION_VI",
     "Arbiter",
     "ArbiterError",
     "Criterion",
     "DefinitionError",
-    "MembershipError",
+    "EngineError",
+    "FormatError",
+    "InputError",
+    "Is",
+    "Output",
     "Rule",
+    "Shape",
+    "System",
     "Term",
-    "hierarchical_rules",
+    "UndefinedOutputError",
+    "UnsupportedError",
+    "Variable",
+    "falling",
+    "parse_proposition",
+    "parse_rule",
+    "prioritised",
     "ramp",
+    "rising",
+    "trapezoid",
+    "triangle",
 ]

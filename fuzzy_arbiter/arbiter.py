@@ -1,35 +1,59 @@
-"""The arbiter: memberships in, weights out, by the engine of one's choice."""
+"""The arbiter: inputs in, weights out, by the engine of one's choice."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from numbers import Integral, Real
-from typing import Literal, get_args
+from collections.abc import Mapping, Sequence
+from numbers import Real
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
-from fuzzy_arbiter import closed_form
-from fuzzy_arbiter.definition import SECTION_VI, Criterion, Rule, check_criteria, hierarchical_rules
-from fuzzy_arbiter.errors import DefinitionError, MembershipError
+import numpy as np
+from numpy.typing import ArrayLike
 
-EngineName = Literal["closed", "skfuzzy"]
-ENGINES: tuple[str, ...] = get_args(EngineName)
+from fuzzy_arbiter.definition import Normalisation, Output, Outside, System, variable_names
+from fuzzy_arbiter.engines import choose
+from fuzzy_arbiter.engines.firing import Array
+from fuzzy_arbiter.errors import DefinitionError, InputError
+from fuzzy_arbiter.hierarchy import SECTION_VI, WEIGHT, Criterion, Form, prioritised
+
+if TYPE_CHECKING:
+    from fuzzy_arbiter.explanation import Explanation
+    from fuzzy_arbiter.verification import Verification
+
+Sample = Sequence[float] | Mapping[str, float]
 
 
 class Arbiter:
-    """Decides which of several prioritised criteria matters now, in the manner of a human pilot.
+    """Decides to what degree each of several prioritised criteria matters now, in the manner of a human pilot.
+
+    Nothing in it changes after it is made; threads may share it.
 
     Parameters
     ----------
     criteria : sequence of Criterion
         In order of priority, the highest first; default: obstacle, shape, depth of the paper's section VI.
-    engine : {"closed", "skfuzzy"}
-        ``closed`` evaluates the exact closed form; ``skfuzzy`` samples the output universe with scikit-fuzzy.
-    points : int
-        Points of the output universe, for the ``skfuzzy`` engine.
+    form, weight, normalisation, outside, points
+        How the criteria become a system, as of `prioritised`.
+    system : System, optional
+        Any other Mamdani system, in the place of all of the above.
+    engine : {"auto", "closed", "exact", "grid", "skfuzzy"}
+        ``closed`` is the exact centroid in closed form, for outputs of two complementary terms; ``exact`` the exact
+        centroid of any system; ``grid`` what scikit-fuzzy's sampling gives, without the sampling; ``skfuzzy`` is
+        scikit-fuzzy itself. ``auto`` takes ``closed`` where that is possible, else ``exact``.
+
+    Attributes
+    ----------
+    system : System
+        What is evaluated.
+    engine : str
+        Name of the engine that evaluates it.
+    why : str
+        Why it is this engine.
 
     Raises
     ------
     DefinitionError
-        If the definition makes no arbiter.
+        If the definition makes no arbiter, or the engine cannot evaluate it.
 
     Examples
     --------
@@ -37,62 +61,256 @@ class Arbiter:
     (1.0, 0.0, 0.0)
     """
 
+    __slots__ = ("_engine", "_limits", "_names", "_weights", "engine", "system", "why")
+
+    system: System
+    engine: str
+    why: str
+
     def __init__(
-        self, criteria: Sequence[Criterion] = SECTION_VI, engine: EngineName = "closed", points: int = 101
+        self,
+        criteria: Sequence[Criterion] = SECTION_VI,
+        *,
+        form: Form = "hierarchical",
+        weight: Output = WEIGHT,
+        normalisation: Normalisation = "range",
+        outside: Outside = "refuse",
+        points: int = 101,
+        system: System | None = None,
+        engine: str = "auto",
     ) -> None:
-        self.criteria: tuple[Criterion, ...] = check_criteria(criteria)
-        self.rules: tuple[Rule, ...] = hierarchical_rules(len(self.criteria))
-        self.engine = engine
-        self._weights: Callable[[Sequence[float]], tuple[float, ...]]
-        if engine == "closed":
-            self._weights = closed_form.weights
-        elif engine == "skfuzzy":
-            if not isinstance(points, Integral) or points < 3:
-                raise DefinitionError(f"points is {points!r}, expected a whole number, 3 or more")
-            from fuzzy_arbiter.scikit import ScikitEngine  # a second of imports, for those who ask for it
+        if system is None:
+            system = prioritised(criteria, form, weight, normalisation, outside, points)
+        elif (criteria, form, weight, normalisation, outside, points) != (*_DEFAULTS,):
+            raise DefinitionError(
+                "system: came with criteria, form, weight, normalisation, outside or points, which it has"
+            )
+        self._set("system", system)
+        chosen, why = choose(system, engine)
+        self._set("engine", chosen.name)
+        self._set("why", why)
+        self._set("_engine", chosen)
+        self._set("_weights", chosen.weights)
+        self._set("_limits", tuple(v.universe for v in system.inputs))
+        self._set("_names", variable_names(system.inputs))
 
-            self._weights = ScikitEngine(self.criteria, self.rules, points).weights
-        else:
-            raise DefinitionError(f"engine is {engine!r}, expected one of {', '.join(ENGINES)}")
-
-    def __call__(self, memberships: Sequence[float] | Mapping[str, float]) -> tuple[float, ...]:
-        """Return the weight of each criterion.
+    def __call__(self, inputs: Sample) -> tuple[float, ...]:
+        """Return the weights for one sample.
 
         Parameters
         ----------
-        memberships : sequence of float, or mapping from criterion's name to float
-            Degree in [0, 1] to which each criterion asks for attention (its on-term).
+        inputs : sequence of float, or mapping from input's name to float
+            One value for each input; for plain criteria the degree in [0, 1] to which each asks for attention.
 
         Returns
         -------
         tuple of float
-            Weights in [0, 1], in order of priority.
+            One weight for each output.
 
         Raises
         ------
-        MembershipError
-            If one is missing, unknown, NaN, or outside [0, 1].
+        InputError
+            If an input is missing, unknown, not a number, or outside its universe (unless that clips).
+        UndefinedOutputError
+            If no rule fires for an output without default.
         """
-        values = self._in_order(memberships) if isinstance(memberships, Mapping) else memberships
-        if len(values) != len(self.criteria):
-            raise MembershipError(f"{len(values)} memberships came, expected {len(self.criteria)}")
-        for criterion, m in zip(self.criteria, values, strict=True):
-            if not isinstance(m, Real) or not 0.0 <= m <= 1.0:  # NaN fails too
-                raise MembershipError(f"{criterion.name}: membership is {m!r}, expected a number in [0, 1]")
-        return self._weights([float(m) for m in values])
+        return self._weights(self._checked(inputs))
 
-    def _in_order(self, memberships: Mapping[str, float]) -> list[float]:
-        names = [c.name for c in self.criteria]
-        for name in names:
-            if name not in memberships:
-                raise MembershipError(f"{name}: membership is missing")
-        for name in memberships:
-            if name not in names:
-                raise MembershipError(f"{name}: unknown criterion; expected {', '.join(names)}")
-        return [memberships[name] for name in names]
+    def batch(self, inputs: ArrayLike) -> Array:
+        """Return the weights for many samples.
+
+        Parameters
+        ----------
+        inputs : array_like, shape (n, inputs)
+            One sample in each row.
+
+        Returns
+        -------
+        ndarray, shape (n, outputs)
+            Weights, in each row those that the arbiter gives for that sample alone, to rounding.
+
+        Raises
+        ------
+        InputError
+            If the shape is another, or a value is not a number or outside its universe; the first such row is named.
+        UndefinedOutputError
+            If no rule fires for an output without default; the first such row is named.
+        """
+        return self._engine.weights_of_many(self._checked_many(inputs))
+
+    def _checked(self, inputs: Sample) -> Sequence[float]:
+        try:
+            values = inputs if type(inputs) is list or type(inputs) is tuple else self._in_order(inputs)
+            for x, (low, high) in zip(values, self._limits, strict=True):
+                if not low <= x <= high:  # NaN too
+                    return self._clipped(values)
+        except (TypeError, ValueError):
+            raise self._fault(inputs) from None
+        return values
+
+    def _clipped(self, values: Sequence[float]) -> list[float]:
+        if self.system.outside != "clip" or any(x != x for x in values):
+            raise self._fault(values)
+        return [min(max(x, low), high) for x, (low, high) in zip(values, self._limits, strict=True)]
+
+    def _in_order(self, inputs: Sample) -> list[float]:
+        if isinstance(inputs, Mapping):
+            for name in self._names:
+                if name not in inputs:
+                    raise InputError(f"{name}: input is missing, expected {', '.join(self._names)}")
+            for name in inputs:
+                if name not in self._names:
+                    raise InputError(f"{name}: unknown input, expected {', '.join(self._names)}")
+            return [inputs[name] for name in self._names]
+        return inputs.tolist() if isinstance(inputs, np.ndarray) else list(inputs)
+
+    def _fault(self, inputs: Sample) -> InputError:
+        """Find out what is wrong with a sample that was refused."""
+        if isinstance(inputs, str) or not isinstance(inputs, Sequence | Mapping | np.ndarray):
+            return InputError(f"inputs are {inputs!r}, expected {len(self._names)} numbers")
+        values = self._in_order(inputs)
+        if len(values) != len(self._names):
+            return InputError(f"{len(values)} inputs came, expected {len(self._names)}: {', '.join(self._names)}")
+        for name, x, (low, high) in zip(self._names, values, self._limits, strict=True):
+            if not isinstance(x, Real) or x != x or (self.system.outside == "refuse" and not low <= x <= high):
+                return InputError(f"{name}: input is {x!r}, expected a number in [{low:g}, {high:g}]")
+        return InputError(f"inputs are {inputs!r}, expected {len(self._names)} numbers")
+
+    def _checked_many(self, inputs: ArrayLike) -> Array:
+        try:
+            values = np.asarray(inputs, dtype=np.float64)
+        except (TypeError, ValueError) as error:
+            raise InputError(f"inputs: {error}, expected numbers") from None
+        if values.ndim != 2 or values.shape[1] != len(self._names):
+            raise InputError(f"inputs have the shape {values.shape}, expected (n, {len(self._names)})")
+        low, high = np.array(self._limits).T
+        clip = self.system.outside == "clip"
+        good = ~np.isnan(values) if clip else (low <= values) & (values <= high)
+        if not good.all():
+            row, i = np.argwhere(~good)[0]
+            expected = f"expected a number in [{low[i]:g}, {high[i]:g}]"
+            raise InputError(f"row {row}: {self._names[i]} is {values[row, i]!r}, {expected}")
+        return np.clip(values, low, high) if clip else values
+
+    def explain(self, inputs: Sample) -> Explanation:
+        """Return which rules fired for one sample, how strongly, and which decided.
+
+        Parameters
+        ----------
+        inputs : sequence of float, or mapping from input's name to float
+            As for a call.
+
+        Returns
+        -------
+        Explanation
+            As data; its text is for people.
+
+        Raises
+        ------
+        InputError, UndefinedOutputError
+            As for a call.
+        """
+        from fuzzy_arbiter.explanation import explain
+
+        return explain(self, self._checked(inputs))
+
+    def verify(self) -> Verification:
+        """Return whether the rules are complete, consistent and exclusive, and the terms without gaps.
+
+        Returns
+        -------
+        Verification
+            As data; its text is for people.
+        """
+        from fuzzy_arbiter.verification import verify
+
+        return verify(self.system)
+
+    @classmethod
+    def load(cls, path: str | Path, engine: str = "auto") -> Arbiter:
+        """Return the arbiter that a file defines.
+
+        Parameters
+        ----------
+        path : str or Path
+            Of a JSON, TOML, FCL, FIS or FLL file, told by its suffix.
+        engine : str
+            As of `Arbiter`.
+
+        Returns
+        -------
+        Arbiter
+            Of the system in the file.
+
+        Raises
+        ------
+        FormatError
+            If the file cannot be read, is not of its format, or says what this package does not know.
+        DefinitionError
+            If what it defines cannot be.
+        """
+        from fuzzy_arbiter.formats import load
+
+        return cls(system=load(path), engine=engine)
+
+    def save(self, path: str | Path) -> None:
+        """Write the definition to a file.
+
+        Parameters
+        ----------
+        path : str or Path
+            Of a JSON, TOML, FCL, FIS or FLL file, told by its suffix.
+
+        Raises
+        ------
+        UnsupportedError
+            If the format cannot say all of the definition; nothing is written then.
+        FormatError
+            If the file cannot be written.
+        """
+        from fuzzy_arbiter.formats import save
+
+        save(self.system, path)
+
+    def with_engine(self, engine: str) -> Arbiter:
+        """Return an arbiter of the same system with another engine.
+
+        Parameters
+        ----------
+        engine : str
+            As of `Arbiter`.
+
+        Returns
+        -------
+        Arbiter
+            A new one.
+        """
+        return Arbiter(system=self.system, engine=engine)
+
+    def _set(self, key: str, value: Any) -> None:
+        object.__setattr__(self, key, value)
+
+    def __setattr__(self, key: str, value: Any) -> None:
+        raise AttributeError(f"{key}: an arbiter does not change; make another")
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _rebuilt, (self.system, self.engine)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Arbiter) and (self.system, self.engine) == (other.system, other.engine)
+
+    def __hash__(self) -> int:
+        return hash((self.system, self.engine))
 
     def __repr__(self) -> str:
-        return f"Arbiter(criteria={self.criteria!r}, engine={self.engine!r})"
+        return f"Arbiter(system={self.system!r}, engine={self.engine!r})"
 
     def __str__(self) -> str:
-        return "\n".join(f"R{i + 1}: {rule.text(self.criteria)}" for i, rule in enumerate(self.rules))
+        return str(self.system)
+
+
+def _rebuilt(system: System, engine: str) -> Arbiter:
+    return Arbiter(system=system, engine=engine)
+
+
+_DEFAULTS = (SECTION_VI, "hierarchical", WEIGHT, "range", "refuse", 101)

@@ -1,4 +1,4 @@
-"""What can go wrong when an arbiter is defined or asked."""
+"""What can go wrong when an arbiter is defined, read, or asked."""
 
 
 class ArbiterError(Exception):
@@ -6,8 +6,24 @@ class ArbiterError(Exception):
 
 
 class DefinitionError(ArbiterError):
-    """An arbiter that cannot be: no criteria, two of one name, an unknown engine."""
+    """A definition that cannot be: an unknown term in a rule, two variables of one name, a shape that turns back."""
 
 
-class MembershipError(ArbiterError):
-    """A membership that is missing, unknown, not a number, or outside [0, 1]."""
+class EngineError(DefinitionError):
+    """An engine that does not exist, or that cannot evaluate this system."""
+
+
+class FormatError(ArbiterError):
+    """A text that is not of its format, or says what this package does not know."""
+
+
+class UnsupportedError(ArbiterError):
+    """A definition that the wished format cannot say."""
+
+
+class InputError(ArbiterError):
+    """An input that is missing, unknown, not a number, or outside its universe."""
+
+
+class UndefinedOutputError(ArbiterError):
+    """An output for which no rule fires and which has no default."""

@@ -1,0 +1,238 @@
+"""What every engine is: from one sample or many to centroids, and from these to weights."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from typing import ClassVar
+
+import numpy as np
+
+from fuzzy_arbiter.definition import Output, System, variable_names
+from fuzzy_arbiter.engines.firing import Array, Firing
+from fuzzy_arbiter.errors import EngineError, UndefinedOutputError
+
+
+class Engine(ABC):
+    """A way to evaluate a system; it never changes, so that threads may share it.
+
+    Subclasses say what the centroid of one output is, given the cuts of its terms; the rest is common.
+
+    Parameters
+    ----------
+    system : System
+        What is evaluated.
+
+    Raises
+    ------
+    EngineError
+        If this engine cannot evaluate this system, or an output's range is a single value, so that it has no scale.
+    """
+
+    name: ClassVar[str]
+
+    def __init__(self, system: System) -> None:
+        self.system = system
+        self.firing = Firing(system)
+        self._scale = [] if system.normalisation == "none" else [self._ends(k) for k in range(len(system.outputs))]
+
+    @abstractmethod
+    def centroid(self, k: int, cuts: Sequence[float]) -> float:
+        """Return the centroid of an output.
+
+        Parameters
+        ----------
+        k : int
+            Which output.
+        cuts : sequence of float
+            Degree in [0, 1] at which each of its terms is cut; not all are 0.
+
+        Returns
+        -------
+        float
+            In the output's universe.
+        """
+
+    @abstractmethod
+    def centroid_of_many(self, k: int, cuts: Array) -> Array:
+        """Return the centroids of an output for many samples.
+
+        Parameters
+        ----------
+        k : int
+            Which output.
+        cuts : ndarray, shape (terms, n)
+            Degrees in [0, 1]; not all of one sample are 0.
+
+        Returns
+        -------
+        ndarray, shape (n,)
+            In the output's universe.
+        """
+
+    def centroids(self, inputs: Sequence[float]) -> list[float]:
+        """Return the raw value of each output for one sample.
+
+        Parameters
+        ----------
+        inputs : sequence of float
+            One value in its universe for each input.
+
+        Returns
+        -------
+        list of float
+            Centroids, or the output's default where no rule fires.
+
+        Raises
+        ------
+        UndefinedOutputError
+            If no rule fires for an output without default.
+        """
+        cuts = self.firing.cuts(self.firing.strengths(inputs))
+        return [
+            self.centroid(k, cut)
+            if any(cut)
+            else _default(output, dict(zip(variable_names(self.system.inputs), inputs)))
+            for k, (output, cut) in enumerate(zip(self.system.outputs, cuts, strict=True))
+        ]
+
+    def centroids_of_many(self, inputs: Array) -> Array:
+        """Return the raw value of each output for many samples.
+
+        Parameters
+        ----------
+        inputs : ndarray, shape (n, inputs)
+            Values in their universes.
+
+        Returns
+        -------
+        ndarray, shape (n, outputs)
+            Centroids, or the output's default where no rule fires.
+
+        Raises
+        ------
+        UndefinedOutputError
+            If no rule fires for an output without default; the first such row is named.
+        """
+        result = np.empty((len(inputs), len(self.system.outputs)))
+        for k, cuts in enumerate(self.firing.cuts_of_many(self.firing.strengths_of_many(inputs))):
+            fires = cuts.any(axis=0)
+            if fires.all():
+                result[:, k] = self.centroid_of_many(k, cuts)
+                continue
+            row = int(np.argmin(fires))
+            names = variable_names(self.system.inputs)
+            default = _default(self.system.outputs[k], dict(zip(names, inputs[row].tolist(), strict=True)), row)
+            result[~fires, k] = default
+            result[fires, k] = self.centroid_of_many(k, cuts[:, fires])
+        return result
+
+    def weights(self, inputs: Sequence[float]) -> tuple[float, ...]:
+        """Return the normalised value of each output for one sample.
+
+        Parameters
+        ----------
+        inputs : sequence of float
+            One value in its universe for each input.
+
+        Returns
+        -------
+        tuple of float
+            As the system's normalisation says.
+
+        Raises
+        ------
+        UndefinedOutputError
+            If no rule fires for an output without default.
+        """
+        raw = self.centroids(inputs)
+        if not self._scale:
+            return tuple(raw)
+        scaled = [min(max((c - low) / (high - low), 0.0), 1.0) for c, (low, high) in zip(raw, self._scale, strict=True)]
+        return shared(scaled, self.system.normalisation)
+
+    def weights_of_many(self, inputs: Array) -> Array:
+        """Return the normalised value of each output for many samples.
+
+        Parameters
+        ----------
+        inputs : ndarray, shape (n, inputs)
+            Values in their universes.
+
+        Returns
+        -------
+        ndarray, shape (n, outputs)
+            As the system's normalisation says.
+
+        Raises
+        ------
+        UndefinedOutputError
+            If no rule fires for an output without default; the first such row is named.
+        """
+        raw = self.centroids_of_many(inputs)
+        if not self._scale:
+            return raw
+        low, high = np.array(self._scale).T
+        return shared_of_many(np.clip((raw - low) / (high - low), 0.0, 1.0), self.system.normalisation)
+
+    def _ends(self, k: int) -> tuple[float, float]:
+        """The centroids that become 0 and 1: of the least and of the greatest term, each alone and whole."""
+        output = self.system.outputs[k]
+        alone = [self.centroid(k, [float(i == j) for i in range(len(output.terms))]) for j in range(len(output.terms))]
+        low, high = min(alone), max(alone)
+        if not low < high:
+            raise EngineError(
+                f"output {output.name!r}: its terms have one centroid, {low:g}, which leaves no range to normalise; "
+                "expected normalisation 'none'"
+            )
+        return low, high
+
+
+def shared(weights: Sequence[float], normalisation: str) -> tuple[float, ...]:
+    """Return range-normalised weights as a normalisation over all outputs wants them.
+
+    Parameters
+    ----------
+    weights : sequence of float
+        In [0, 1].
+    normalisation : {"range", "sum", "max"}
+        ``range`` leaves them.
+
+    Returns
+    -------
+    tuple of float
+        Divided by their sum or their greatest; all 0 if that is 0.
+    """
+    if normalisation == "range":
+        return tuple(weights)
+    whole = sum(weights) if normalisation == "sum" else max(weights)
+    return tuple(w / whole for w in weights) if whole > 0.0 else (0.0,) * len(weights)
+
+
+def shared_of_many(weights: Array, normalisation: str) -> Array:
+    """Return range-normalised weights of many samples as a normalisation over all outputs wants them.
+
+    Parameters
+    ----------
+    weights : ndarray, shape (n, outputs)
+        In [0, 1].
+    normalisation : {"range", "sum", "max"}
+        ``range`` leaves them.
+
+    Returns
+    -------
+    ndarray, shape (n, outputs)
+        Each row divided by its sum or its greatest; all 0 if that is 0.
+    """
+    if normalisation == "range":
+        return weights
+    whole = (np.sum if normalisation == "sum" else np.max)(weights, axis=1, keepdims=True)
+    return np.divide(weights, whole, out=np.zeros_like(weights), where=whole > 0.0)
+
+
+def _default(output: Output, inputs: dict[str, float], row: int | None = None) -> float:
+    if output.default is not None:
+        return output.default
+    where = "" if row is None else f"row {row}, "
+    values = ", ".join(f"{name} = {value:g}" for name, value in inputs.items())
+    raise UndefinedOutputError(f"output {output.name!r}: no rule fires at {where}{values}, and it has no default")

@@ -1,0 +1,183 @@
+"""Prioritised criteria, and the rule bases that give each the floor if none of higher priority wants it."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Literal, get_args
+
+from fuzzy_arbiter.definition import Normalisation, Output, Outside, Rule, System, Term, Variable
+from fuzzy_arbiter.errors import DefinitionError
+from fuzzy_arbiter.propositions import And, Is, Or, Proposition
+from fuzzy_arbiter.shapes import Shape, falling, rising
+
+Form = Literal["hierarchical", "minimal", "conjunctive", "complete"]
+FORMS: tuple[str, ...] = get_args(Form)
+MAX_COMPLETE = 16  # criteria; the complete form of 16 has a million rules
+
+DEGREE = rising(0.0, 1.0)
+# the pair of section VI: low is the triangle (0, 0, 1), high the triangle (0, 1, 1)
+WEIGHT = Output("alpha", (0.0, 1.0), (Term("low", falling(0.0, 1.0)), Term("high", rising(0.0, 1.0))))
+
+
+@dataclass(frozen=True, slots=True)
+class Criterion:
+    """Something that may ask for attention: an input variable with two complementary terms.
+
+    Attributes
+    ----------
+    name : str
+        Name of the input.
+    on, off : str
+        Term that asks for attention, and its complement.
+    membership : Shape
+        Degree of the on-term at each place; by default the input is that degree itself, in [0, 1].
+
+    Raises
+    ------
+    DefinitionError
+        If both terms have one name, or the membership jumps or is the same everywhere.
+    """
+
+    name: str
+    on: str = "on"
+    off: str = "off"
+    membership: Shape = DEGREE
+
+    def __post_init__(self) -> None:
+        if self.on == self.off:
+            raise DefinitionError(f"criterion {self.name!r}: both terms are {self.on!r}, expected two names")
+        if len(self.membership.points) < 2 or self.membership.jumps:
+            raise DefinitionError(
+                f"criterion {self.name!r}: membership is {self.membership.points}, expected one that changes without jumps"
+            )
+
+    @property
+    def variable(self) -> Variable:
+        """The input, on the universe from the membership's first point to its last."""
+        points = self.membership.points
+        terms = (Term(self.off, self.membership.complement()), Term(self.on, self.membership))
+        return Variable(self.name, (points[0][0], points[-1][0]), terms)
+
+
+# section VI of Ismail & Dunnigan, in their order of priority
+SECTION_VI = (
+    Criterion("obstacle", on="exist", off="not_exist"),
+    Criterion("shape", on="complex", off="simple"),
+    Criterion("depth", on="not_maintain", off="maintain"),
+)
+
+
+def prioritised(
+    criteria: Sequence[Criterion] = SECTION_VI,
+    form: Form = "hierarchical",
+    weight: Output = WEIGHT,
+    normalisation: Normalisation = "range",
+    outside: Outside = "refuse",
+    points: int = 101,
+    name: str = "arbiter",
+) -> System:
+    """Return the system in which each criterion gets its weight if none of higher priority wants it.
+
+    Parameters
+    ----------
+    criteria : sequence of Criterion
+        In order of priority, the highest first.
+    form : {"hierarchical", "minimal", "conjunctive", "complete"}
+        How the rules are said, for N criteria: in 3N - 1 rules, as the paper does; in 2N with a long *or* each; in
+        N + N (N + 1) / 2 without any *or*; or as the complete table of N 2^N. The first three give the same weights
+        always, the complete table on crisp inputs (see ``docs/arbiter.md``).
+    weight : Output
+        Pattern of the outputs, whose names get the criterion's number: the first term is the low one.
+    normalisation, outside, points, name
+        As of `System`.
+
+    Returns
+    -------
+    System
+        Complete and consistent: on crisp inputs each weight is either high or low, and at most one is high.
+
+    Raises
+    ------
+    DefinitionError
+        If there is no criterion, two share a name, or the pattern has not two terms.
+    """
+    criteria = tuple(criteria)
+    if not criteria:
+        raise DefinitionError("criteria: none came, expected at least one")
+    if form not in FORMS:
+        raise DefinitionError(f"form is {form!r}, expected one of {', '.join(FORMS)}")
+    if len(weight.terms) != 2:
+        raise DefinitionError(f"weight {weight.name!r}: {len(weight.terms)} terms came, expected two, low and high")
+    outputs = tuple(replace(weight, name=f"{weight.name}_{k + 1}") for k in range(len(criteria)))
+    on = tuple(Is(c.name, c.on) for c in criteria)
+    off = tuple(Is(c.name, c.off) for c in criteria)
+    rules = _RULES[form](on, off, outputs)
+    inputs = tuple(c.variable for c in criteria)
+    return System(inputs, outputs, rules, name, normalisation=normalisation, outside=outside, points=points)
+
+
+Statements = tuple[Is, ...]
+Rules = tuple[Rule, ...]
+
+
+def _hierarchical(on: Statements, off: Statements, outputs: Sequence[Output]) -> Rules:
+    """For three criteria the eight rules of section VI, in the paper's order."""
+    rules = [_high(on, off, outputs, 0), _low(off[0], outputs[0])]
+    for k in range(1, len(on)):
+        rules += [_low(_any(on[:k]), outputs[k]), _low(off[k], outputs[k]), _high(on, off, outputs, k)]
+    return tuple(rules)
+
+
+def _minimal(on: Statements, off: Statements, outputs: Sequence[Output]) -> Rules:
+    """One rule for high and one for low."""
+    rules = []
+    for k, output in enumerate(outputs):
+        rules += [_high(on, off, outputs, k), _low(_any((*on[:k], off[k])), output)]
+    return tuple(rules)
+
+
+def _conjunctive(on: Statements, off: Statements, outputs: Sequence[Output]) -> Rules:
+    """A rule of its own for each reason to be low."""
+    rules = []
+    for k, output in enumerate(outputs):
+        rules += [_high(on, off, outputs, k), *(_low(reason, output) for reason in (*on[:k], off[k]))]
+    return tuple(rules)
+
+
+def _complete(on: Statements, off: Statements, outputs: Sequence[Output]) -> Rules:
+    """A rule for every output and every combination of terms."""
+    if len(on) > MAX_COMPLETE:
+        raise DefinitionError(f"complete form of {len(on)} criteria, expected at most {MAX_COMPLETE}")
+    rules = []
+    for combination in itertools.product((True, False), repeat=len(on)):
+        condition = _all(tuple(on[j] if asks else off[j] for j, asks in enumerate(combination)))
+        floor = combination.index(True) if True in combination else None
+        rules += [Rule(condition, (o[o.term_names[1 if k == floor else 0]],)) for k, o in enumerate(outputs)]
+    return tuple(rules)
+
+
+_RULES: dict[str, Callable[[Statements, Statements, Sequence[Output]], Rules]] = {
+    "hierarchical": _hierarchical,
+    "minimal": _minimal,
+    "conjunctive": _conjunctive,
+    "complete": _complete,
+}
+
+
+def _high(on: Statements, off: Statements, outputs: Sequence[Output], k: int) -> Rule:
+    """If no criterion above k asks, and k does, then its weight is high."""
+    return Rule(_all((*off[:k], on[k])), (outputs[k][outputs[k].term_names[1]],))
+
+
+def _low(condition: Proposition, output: Output) -> Rule:
+    return Rule(condition, (output[output.term_names[0]],))
+
+
+def _all(statements: Statements) -> Proposition:
+    return And(statements) if len(statements) > 1 else statements[0]
+
+
+def _any(statements: Statements) -> Proposition:
+    return Or(statements) if len(statements) > 1 else statements[0]

@@ -1,0 +1,138 @@
+"""What a rule can ask: a variable is in a term, and the conjunctions, disjunctions and negations of that."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from fuzzy_arbiter.errors import DefinitionError
+
+KEYWORDS = ("if", "then", "and", "or", "not", "is", "with")
+_PLAIN = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
+
+
+def is_identifier(name: str) -> bool:
+    """Return whether a name can stand in a rule as it is, and in every format.
+
+    Parameters
+    ----------
+    name : str
+        Name of a variable or of a term.
+
+    Returns
+    -------
+    bool
+        True for letters, digits and underscores that do not begin with a digit, except the words of rules.
+    """
+    return _PLAIN.fullmatch(name) is not None and name.lower() not in KEYWORDS
+
+
+def quoted(name: str) -> str:
+    """Return a name as it stands in a rule's text.
+
+    Parameters
+    ----------
+    name : str
+        Name of a variable or of a term.
+
+    Returns
+    -------
+    str
+        The name, in double quotes unless it is an identifier.
+    """
+    return name if is_identifier(name) else f'"{name}"'
+
+
+class Proposition:
+    """Something that holds to a degree; ``&``, ``|`` and ``~`` combine propositions."""
+
+    __slots__ = ()
+
+    def __and__(self, other: Proposition) -> And:
+        return And((self, other)) if isinstance(other, Proposition) else NotImplemented
+
+    def __or__(self, other: Proposition) -> Or:
+        return Or((self, other)) if isinstance(other, Proposition) else NotImplemented
+
+    def __invert__(self) -> Not:
+        return Not(self)
+
+    def __bool__(self) -> bool:
+        raise DefinitionError(f"{self}: a proposition is not true or false; combine with &, | and ~, not and, or, not")
+
+    def terms(self) -> Iterator[Is]:
+        """Yield every statement about a term, from left to right."""
+        raise NotImplementedError
+
+
+@dataclass(frozen=True, slots=True)
+class Is(Proposition):
+    """A variable is in a term."""
+
+    variable: str
+    term: str
+
+    def terms(self) -> Iterator[Is]:
+        """Yield this statement."""
+        yield self
+
+    def __str__(self) -> str:
+        return f"{quoted(self.variable)} is {quoted(self.term)}"
+
+
+@dataclass(frozen=True, slots=True)
+class _Join(Proposition):
+    """Two or more propositions under one connective; nested ones of the same kind are one."""
+
+    parts: tuple[Proposition, ...]
+
+    def __post_init__(self) -> None:
+        flat: list[Proposition] = []
+        for part in self.parts:
+            if not isinstance(part, Proposition):
+                raise DefinitionError(f"{part!r} is not a proposition, expected such as variable['term']")
+            flat += part.parts if isinstance(part, _Join) and type(part) is type(self) else [part]
+        if len(flat) < 2:
+            raise DefinitionError(f"{type(self).__name__} of {len(flat)} propositions, expected two or more")
+        object.__setattr__(self, "parts", tuple(flat))
+
+    def terms(self) -> Iterator[Is]:
+        """Yield the statements of all parts."""
+        for part in self.parts:
+            yield from part.terms()
+
+    def _joined(self, word: str) -> str:
+        return f" {word} ".join(f"({part})" if isinstance(part, _Join) else str(part) for part in self.parts)
+
+
+@dataclass(frozen=True, slots=True)
+class And(_Join):
+    """All of the parts hold."""
+
+    def __str__(self) -> str:
+        return self._joined("and")
+
+
+@dataclass(frozen=True, slots=True)
+class Or(_Join):
+    """Any of the parts holds."""
+
+    def __str__(self) -> str:
+        return self._joined("or")
+
+
+@dataclass(frozen=True, slots=True)
+class Not(Proposition):
+    """The part does not hold."""
+
+    part: Proposition
+
+    def terms(self) -> Iterator[Is]:
+        """Yield the statements of the part."""
+        yield from self.part.terms()
+
+    def __str__(self) -> str:
+        if isinstance(self.part, Is):
+            return f"{quoted(self.part.variable)} is not {quoted(self.part.term)}"
+        return f"not ({self.part})"

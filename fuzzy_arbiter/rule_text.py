@@ -1,0 +1,158 @@
+"""Rules as text: ``if a is b and (c is not d or e is f) then y is high with 0.5``."""
+
+from __future__ import annotations
+
+import re
+
+from fuzzy_arbiter.definition import Rule
+from fuzzy_arbiter.errors import DefinitionError
+from fuzzy_arbiter.propositions import KEYWORDS, And, Is, Not, Or, Proposition
+
+_TOKEN = re.compile(
+    r"""\s*(?: (?P<quoted>"[^"]*") | (?P<number>[0-9.]+(?:[eE][+-]?[0-9]+)?(?![A-Za-z_]))
+        | (?P<word>[^\W\d]\w*) | (?P<sign>[()&|~,]) | (?P<other>\S) )""",
+    re.VERBOSE,
+)
+_SIGNS = {"&": "and", "|": "or", "~": "not", ",": ","}
+
+
+def parse_rule(text: str) -> Rule:
+    """Return the rule that a text says.
+
+    Words of rules may be in any case; ``&``, ``|``, ``~`` stand for *and*, *or*, *not*; *not* binds before *and*, *and*
+    before *or*. Names that are no identifiers stand in double quotes.
+
+    Parameters
+    ----------
+    text : str
+        One rule.
+
+    Returns
+    -------
+    Rule
+        Whose own text reads as the same rule again.
+
+    Raises
+    ------
+    DefinitionError
+        If the text is no rule; it is quoted.
+    """
+    return _Parser(text).rule()
+
+
+def parse_proposition(text: str) -> Proposition:
+    """Return the proposition that a text says, such as ``a is b or c is not d``.
+
+    Parameters
+    ----------
+    text : str
+        What can stand between *if* and *then*.
+
+    Returns
+    -------
+    Proposition
+        Whose own text reads as the same proposition again.
+
+    Raises
+    ------
+    DefinitionError
+        If the text is no proposition; it is quoted.
+    """
+    parser = _Parser(text)
+    proposition = parser.disjunction()
+    parser.end()
+    return proposition
+
+
+class _Parser:
+    """Reads one text by recursive descent."""
+
+    def __init__(self, text: str) -> None:
+        self.text = text
+        self.tokens: list[tuple[str, str]] = []  # kind (keyword or sign itself, "name", "number", "end") and text
+        for match in _TOKEN.finditer(text):
+            kind, token = str(match.lastgroup), match.group(match.lastgroup or 0)
+            if kind == "quoted":
+                self.tokens.append(("name", token[1:-1]))
+            elif kind == "word":
+                self.tokens.append((token.lower() if token.lower() in KEYWORDS else "name", token))
+            elif kind == "sign":
+                self.tokens.append((_SIGNS.get(token, token), token))
+            elif kind == "number":
+                self.tokens.append(("number", token))
+            else:
+                raise self.fault(f"{token!r} cannot stand in a rule")
+        self.tokens.append(("end", "the end"))
+        self.at = 0
+
+    def fault(self, what: str) -> DefinitionError:
+        return DefinitionError(f"rule {self.text.strip()!r}: {what}")
+
+    def accept(self, kind: str) -> bool:
+        if self.tokens[self.at][0] != kind:
+            return False
+        self.at += 1
+        return True
+
+    def take(self, kind: str, what: str) -> str:
+        found, token = self.tokens[self.at]
+        if found != kind:
+            before = f" after {self.tokens[self.at - 1][1]!r}" if self.at else ""
+            raise self.fault(f"{token if found == 'end' else repr(token)} came{before}, expected {what}")
+        self.at += 1
+        return token
+
+    def end(self) -> None:
+        self.take("end", "the end, 'and' or 'or'")
+
+    def rule(self) -> Rule:
+        self.take("if", "'if'")
+        condition = self.disjunction()
+        self.take("then", "'then', 'and' or 'or'")
+        conclusions = [self.conclusion()]
+        while self.accept("and") or self.accept(","):
+            conclusions.append(self.conclusion())
+        weight = self.number() if self.accept("with") else 1.0
+        self.take("end", "'and', 'with' or the end")
+        return Rule(condition, tuple(conclusions), weight)
+
+    def number(self) -> float:
+        token = self.take("number", "the rule's weight")
+        try:
+            return float(token)
+        except ValueError:
+            raise self.fault(f"{token!r} is not a number") from None
+
+    def conclusion(self) -> Is:
+        variable = self.take("name", "an output's name")
+        self.take("is", "'is'")
+        return Is(variable, self.take("name", "a term's name"))
+
+    def disjunction(self) -> Proposition:
+        parts = [self.conjunction()]
+        while self.accept("or"):
+            parts.append(self.conjunction())
+        return Or(tuple(parts)) if len(parts) > 1 else parts[0]
+
+    def conjunction(self) -> Proposition:
+        parts = [self.statement()]
+        while self.accept("and"):
+            parts.append(self.statement())
+        return And(tuple(parts)) if len(parts) > 1 else parts[0]
+
+    def statement(self) -> Proposition:
+        if self.accept("not"):
+            return Not(self.statement())
+        if self.accept("("):
+            inner = self.disjunction()
+            self.take(")", "')', 'and' or 'or'")
+            return inner
+        variable = self.take("name", "an input's name, 'not' or '('")
+        self.take("is", "'is'")
+        negations = 0
+        while self.accept("not"):
+            negations += 1
+        statement: Proposition = Is(variable, self.take("name", "a term's name"))
+        for _ in range(negations):
+            statement = Not(statement)
+        return statement

@@ -1,0 +1,225 @@
+"""Membership functions: piecewise-linear, given by their points."""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_left
+from dataclasses import dataclass
+from fractions import Fraction
+
+from fuzzy_arbiter.errors import DefinitionError
+
+Point = tuple[float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Shape:
+    """A piecewise-linear membership function, constant beyond its first and its last point.
+
+    Points that change nothing are dropped at both ends, so that equal functions of the usual kinds are equal shapes.
+
+    Attributes
+    ----------
+    points : tuple of (float, float)
+        Places, which never decrease, and degrees in [0, 1]. Two points of one place make a jump, where the shape has the
+        greater of the two degrees.
+
+    Raises
+    ------
+    DefinitionError
+        If there is no point, or one is not finite, turns back, or has a degree outside [0, 1].
+
+    Examples
+    --------
+    >>> Shape(((0, 1), (2, 0)))(0.5)
+    0.75
+    """
+
+    points: tuple[Point, ...]
+
+    def __post_init__(self) -> None:
+        try:
+            points = [(float(x), float(degree)) for x, degree in self.points]
+        except (TypeError, ValueError):
+            raise DefinitionError(f"shape {self.points!r}: expected pairs of numbers (place, degree)") from None
+        if not points:
+            raise DefinitionError("shape: no points came, expected at least one")
+        for x, degree in points:
+            if not (math.isfinite(x) and 0.0 <= degree <= 1.0):
+                raise DefinitionError(f"shape: point ({x}, {degree}), expected a finite place and a degree in [0, 1]")
+        for (a, _), (b, _) in zip(points, points[1:], strict=False):
+            if b < a:
+                raise DefinitionError(f"shape: place {b} comes after {a}, expected places that never decrease")
+        for (a, _), (b, _) in zip(points, points[2:], strict=False):
+            if a == b:
+                raise DefinitionError(f"shape: more than two points at {a}, expected at most two, which make a jump")
+        while len(points) > 1 and points[0][1] == points[1][1]:
+            del points[0]
+        while len(points) > 1 and points[-1][1] == points[-2][1]:
+            del points[-1]
+        object.__setattr__(self, "points", tuple(points))
+
+    def __call__(self, x: float) -> float:
+        """Return the degree at a place.
+
+        Parameters
+        ----------
+        x : float
+            Any place, within the points or beyond.
+
+        Returns
+        -------
+        float
+            Degree in [0, 1]; NaN for a place that is NaN.
+        """
+        if x != x:
+            return x
+        points = self.points
+        i = bisect_left(points, x, key=_place)
+        if i == len(points):
+            return points[-1][1]
+        b, right = points[i]
+        if b == x:
+            return max(right, points[i + 1][1]) if i + 1 < len(points) and points[i + 1][0] == x else right
+        if i == 0:
+            return right
+        a, left = points[i - 1]
+        return left + (right - left) * ((x - a) / (b - a))
+
+    @property
+    def jumps(self) -> bool:
+        """Whether there is a jump."""
+        return any(a == b for (a, _), (b, _) in zip(self.points, self.points[1:], strict=False))
+
+    def complement(self) -> Shape:
+        """Return the shape that has one minus this one's degree everywhere.
+
+        Returns
+        -------
+        Shape
+            Shape of the same places.
+
+        Raises
+        ------
+        DefinitionError
+            If this shape jumps: where it does, both would have the greater degree.
+        """
+        if self.jumps:
+            raise DefinitionError(
+                f"shape {self.points}: a shape that jumps has no complement, expected a continuous one"
+            )
+        return Shape(tuple((x, 1.0 - degree) for x, degree in self.points))
+
+    def within(self, universe: tuple[float, float]) -> Shape:
+        """Return the shape without the points that do not matter in a universe; nothing is rounded.
+
+        Parameters
+        ----------
+        universe : (float, float)
+            Least and greatest place that matter.
+
+        Returns
+        -------
+        Shape
+            The same degrees in the universe, at most one point beyond each of its ends.
+        """
+        points = list(self.points)
+        low, high = universe
+        while len(points) > 1 and points[1][0] <= low:
+            del points[0]
+        while len(points) > 1 and points[-2][0] >= high:
+            del points[-1]
+        return Shape(tuple(points))
+
+    def area(self, universe: tuple[float, float]) -> float:
+        """Return the integral of the degree over a universe.
+
+        Parameters
+        ----------
+        universe : (float, float)
+            Least and greatest place.
+
+        Returns
+        -------
+        float
+            Area, to rounding.
+        """
+        low, high = map(Fraction, universe)
+        points = [(Fraction(x), Fraction(degree)) for x, degree in self.points]
+        points = [(min(low, points[0][0]), points[0][1]), *points, (max(high, points[-1][0]), points[-1][1])]
+        area = Fraction(0)
+        for (a, left), (b, right) in zip(points, points[1:], strict=False):
+            start, end = max(a, low), min(b, high)
+            if start < end:
+                slope = (right - left) / (b - a)
+                area += (end - start) * (left + slope * ((start + end) / 2 - a))
+        return float(area)
+
+
+def _place(point: Point) -> float:
+    return point[0]
+
+
+def triangle(left: float, peak: float, right: float) -> Shape:
+    """Return a triangle; two equal places make a vertical edge.
+
+    Parameters
+    ----------
+    left, peak, right : float
+        Places of degree 0, 1, 0.
+
+    Returns
+    -------
+    Shape
+        As ``trimf`` of other tools.
+    """
+    return trapezoid(left, peak, peak, right)
+
+
+def trapezoid(left: float, rise: float, fall: float, right: float) -> Shape:
+    """Return a trapezoid; two equal places make a vertical edge.
+
+    Parameters
+    ----------
+    left, rise, fall, right : float
+        Places of degree 0, 1, 1, 0.
+
+    Returns
+    -------
+    Shape
+        As ``trapmf`` of other tools.
+    """
+    top = ((rise, 1.0),) if rise == fall else ((rise, 1.0), (fall, 1.0))
+    return Shape(((left, 0.0), *top, (right, 0.0)))
+
+
+def rising(start: float, end: float) -> Shape:
+    """Return a shoulder that rises from 0 to 1.
+
+    Parameters
+    ----------
+    start, end : float
+        Last place of degree 0, first of degree 1.
+
+    Returns
+    -------
+    Shape
+        0 below the start and 1 above the end.
+    """
+    return Shape(((start, 0.0), (end, 1.0)))
+
+
+def falling(start: float, end: float) -> Shape:
+    """Return a shoulder that falls from 1 to 0.
+
+    Parameters
+    ----------
+    start, end : float
+        Last place of degree 1, first of degree 0.
+
+    Returns
+    -------
+    Shape
+        1 below the start and 0 above the end.
+    """
+    return Shape(((start, 1.0), (end, 0.0)))
