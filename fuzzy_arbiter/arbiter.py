@@ -41,15 +41,6 @@ class Arbiter:
         centroid of any system; ``grid`` what scikit-fuzzy's sampling gives, without the sampling; ``skfuzzy`` is
         scikit-fuzzy itself. ``auto`` takes ``closed`` where that is possible, else ``exact``.
 
-    Attributes
-    ----------
-    system : System
-        What is evaluated.
-    engine : str
-        Name of the engine that evaluates it.
-    why : str
-        Why it is this engine.
-
     Raises
     ------
     DefinitionError
@@ -60,12 +51,6 @@ class Arbiter:
     >>> Arbiter()([1.0, 1.0, 0.0])
     (1.0, 0.0, 0.0)
     """
-
-    __slots__ = ("_engine", "_limits", "_names", "_weights", "engine", "system", "why")
-
-    system: System
-    engine: str
-    why: str
 
     def __init__(
         self,
@@ -85,14 +70,26 @@ class Arbiter:
             raise DefinitionError(
                 "system: came with criteria, form, weight, normalisation, outside or points, which it has"
             )
-        self._set("system", system)
-        chosen, why = choose(system, engine)
-        self._set("engine", chosen.name)
-        self._set("why", why)
-        self._set("_engine", chosen)
-        self._set("_weights", chosen.weights)
-        self._set("_limits", tuple(v.universe for v in system.inputs))
-        self._set("_names", variable_names(system.inputs))
+        self._system = system
+        self._engine, self._why = choose(system, engine)
+        self._weights = self._engine.evaluator()
+        self._limits = tuple(v.universe for v in system.inputs)
+        self._names = variable_names(system.inputs)
+
+    @property
+    def system(self) -> System:
+        """What is evaluated."""
+        return self._system
+
+    @property
+    def engine(self) -> str:
+        """Name of the engine that evaluates it."""
+        return self._engine.name
+
+    @property
+    def why(self) -> str:
+        """Why it is this engine."""
+        return self._why
 
     def __call__(self, inputs: Sample) -> tuple[float, ...]:
         """Return the weights for one sample.
@@ -149,7 +146,7 @@ class Arbiter:
         return values
 
     def _clipped(self, values: Sequence[float]) -> list[float]:
-        if self.system.outside != "clip" or any(x != x for x in values):
+        if self._system.outside != "clip" or any(x != x for x in values):
             raise self._fault(values)
         return [min(max(x, low), high) for x, (low, high) in zip(values, self._limits, strict=True)]
 
@@ -172,7 +169,7 @@ class Arbiter:
         if len(values) != len(self._names):
             return InputError(f"{len(values)} inputs came, expected {len(self._names)}: {', '.join(self._names)}")
         for name, x, (low, high) in zip(self._names, values, self._limits, strict=True):
-            if not isinstance(x, Real) or x != x or (self.system.outside == "refuse" and not low <= x <= high):
+            if not isinstance(x, Real) or x != x or (self._system.outside == "refuse" and not low <= x <= high):
                 return InputError(f"{name}: input is {x!r}, expected a number in [{low:g}, {high:g}]")
         return InputError(f"inputs are {inputs!r}, expected {len(self._names)} numbers")
 
@@ -184,7 +181,9 @@ class Arbiter:
         if values.ndim != 2 or values.shape[1] != len(self._names):
             raise InputError(f"inputs have the shape {values.shape}, expected (n, {len(self._names)})")
         low, high = np.array(self._limits).T
-        clip = self.system.outside == "clip"
+        if values.size and low.max() <= values.min() and values.max() <= high.min():  # for NaN neither holds
+            return values
+        clip = self._system.outside == "clip"
         good = ~np.isnan(values) if clip else (low <= values) & (values <= high)
         if not good.all():
             row, i = np.argwhere(~good)[0]
@@ -224,7 +223,7 @@ class Arbiter:
         """
         from fuzzy_arbiter.verification import verify
 
-        return verify(self.system)
+        return verify(self._system)
 
     @classmethod
     def load(cls, path: str | Path, engine: str = "auto") -> Arbiter:
@@ -270,7 +269,7 @@ class Arbiter:
         """
         from fuzzy_arbiter.formats import save
 
-        save(self.system, path)
+        save(self._system, path)
 
     def with_engine(self, engine: str) -> Arbiter:
         """Return an arbiter of the same system with another engine.
@@ -285,28 +284,22 @@ class Arbiter:
         Arbiter
             A new one.
         """
-        return Arbiter(system=self.system, engine=engine)
-
-    def _set(self, key: str, value: Any) -> None:
-        object.__setattr__(self, key, value)
-
-    def __setattr__(self, key: str, value: Any) -> None:
-        raise AttributeError(f"{key}: an arbiter does not change; make another")
+        return Arbiter(system=self._system, engine=engine)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return _rebuilt, (self.system, self.engine)
+        return _rebuilt, (self._system, self.engine)
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, Arbiter) and (self.system, self.engine) == (other.system, other.engine)
+        return isinstance(other, Arbiter) and (self._system, self.engine) == (other.system, other.engine)
 
     def __hash__(self) -> int:
-        return hash((self.system, self.engine))
+        return hash((self._system, self.engine))
 
     def __repr__(self) -> str:
-        return f"Arbiter(system={self.system!r}, engine={self.engine!r})"
+        return f"Arbiter(system={self._system!r}, engine={self.engine!r})"
 
     def __str__(self) -> str:
-        return str(self.system)
+        return str(self._system)
 
 
 def _rebuilt(system: System, engine: str) -> Arbiter:

@@ -50,7 +50,7 @@ class Criterion:
             raise DefinitionError(f"criterion {self.name!r}: both terms are {self.on!r}, expected two names")
         if len(self.membership.points) < 2 or self.membership.jumps:
             raise DefinitionError(
-                f"criterion {self.name!r}: membership is {self.membership.points}, expected one that changes without jumps"
+                f"criterion {self.name!r}: membership is {self.membership.points}, expected a change without jumps"
             )
 
     @property
@@ -123,7 +123,7 @@ Rules = tuple[Rule, ...]
 
 
 def _hierarchical(on: Statements, off: Statements, outputs: Sequence[Output]) -> Rules:
-    """For three criteria the eight rules of section VI, in the paper's order."""
+    """Say what section VI says, for three criteria in its eight rules and their order."""
     rules = [_high(on, off, outputs, 0), _low(off[0], outputs[0])]
     for k in range(1, len(on)):
         rules += [_low(_any(on[:k]), outputs[k]), _low(off[k], outputs[k]), _high(on, off, outputs, k)]
@@ -131,7 +131,7 @@ def _hierarchical(on: Statements, off: Statements, outputs: Sequence[Output]) ->
 
 
 def _minimal(on: Statements, off: Statements, outputs: Sequence[Output]) -> Rules:
-    """One rule for high and one for low."""
+    """Give each output one rule for high and one for low."""
     rules = []
     for k, output in enumerate(outputs):
         rules += [_high(on, off, outputs, k), _low(_any((*on[:k], off[k])), output)]
@@ -139,7 +139,7 @@ def _minimal(on: Statements, off: Statements, outputs: Sequence[Output]) -> Rule
 
 
 def _conjunctive(on: Statements, off: Statements, outputs: Sequence[Output]) -> Rules:
-    """A rule of its own for each reason to be low."""
+    """Give each reason to be low a rule of its own."""
     rules = []
     for k, output in enumerate(outputs):
         rules += [_high(on, off, outputs, k), *(_low(reason, output) for reason in (*on[:k], off[k]))]
@@ -147,7 +147,7 @@ def _conjunctive(on: Statements, off: Statements, outputs: Sequence[Output]) -> 
 
 
 def _complete(on: Statements, off: Statements, outputs: Sequence[Output]) -> Rules:
-    """A rule for every output and every combination of terms."""
+    """Give every combination of terms a rule for each output."""
     if len(on) > MAX_COMPLETE:
         raise DefinitionError(f"complete form of {len(on)} criteria, expected at most {MAX_COMPLETE}")
     rules = []

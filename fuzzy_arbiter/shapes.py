@@ -21,8 +21,8 @@ class Shape:
     Attributes
     ----------
     points : tuple of (float, float)
-        Places, which never decrease, and degrees in [0, 1]. Two points of one place make a jump, where the shape has the
-        greater of the two degrees.
+        Places, which never decrease, and degrees in [0, 1]. Two points of one place make a jump, where the greater
+        degree holds.
 
     Raises
     ------

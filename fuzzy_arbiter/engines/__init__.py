@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Literal, get_args
 
 from fuzzy_arbiter.definition import System
+from fuzzy_arbiter.engines.closed import ClosedEngine, NoClosedFormError
 from fuzzy_arbiter.engines.engine import Engine
 from fuzzy_arbiter.engines.exact import ExactEngine
 from fuzzy_arbiter.errors import EngineError
@@ -35,6 +36,27 @@ def choose(system: System, engine: str) -> tuple[Engine, str]:
     EngineError
         If there is no such engine, or it cannot evaluate this system.
     """
+    if engine == "auto":
+        try:
+            return ClosedEngine(
+                system
+            ), "the outputs' cuts are h and 1 - h for all inputs, so that there is a closed form"
+        except NoClosedFormError as error:
+            return ExactEngine(system), f"there is no closed form: {error.reason}"
     if engine not in ENGINES:
         raise EngineError(f"engine is {engine!r}, expected one of {', '.join(ENGINES)}")
-    return ExactEngine(system), "it was asked for"
+    return _engine(engine)(system), "it was asked for"
+
+
+def _engine(name: str) -> type[Engine]:
+    if name == "closed":
+        return ClosedEngine
+    if name == "exact":
+        return ExactEngine
+    if name == "grid":
+        from fuzzy_arbiter.engines.grid import GridEngine
+
+        return GridEngine
+    from fuzzy_arbiter.engines.scikit import ScikitEngine  # a second of imports, for those who ask for it
+
+    return ScikitEngine

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import ClassVar
 
 import numpy as np
@@ -11,6 +11,8 @@ import numpy as np
 from fuzzy_arbiter.definition import Output, System, variable_names
 from fuzzy_arbiter.engines.firing import Array, Firing
 from fuzzy_arbiter.errors import EngineError, UndefinedOutputError
+
+_EACH_BY_ITSELF = ("range", "none")  # normalisations that look at one output at a time
 
 
 class Engine(ABC):
@@ -92,7 +94,7 @@ class Engine(ABC):
         return [
             self.centroid(k, cut)
             if any(cut)
-            else _default(output, dict(zip(variable_names(self.system.inputs), inputs)))
+            else _default(output, dict(zip(variable_names(self.system.inputs), inputs, strict=True)))
             for k, (output, cut) in enumerate(zip(self.system.outputs, cuts, strict=True))
         ]
 
@@ -175,8 +177,18 @@ class Engine(ABC):
         low, high = np.array(self._scale).T
         return shared_of_many(np.clip((raw - low) / (high - low), 0.0, 1.0), self.system.normalisation)
 
+    def evaluator(self) -> Callable[[Sequence[float]], tuple[float, ...]]:
+        """Return the function that gives the weights for one sample.
+
+        Returns
+        -------
+        callable
+            `weights`, or what does the same sooner for this system.
+        """
+        return self.weights
+
     def _ends(self, k: int) -> tuple[float, float]:
-        """The centroids that become 0 and 1: of the least and of the greatest term, each alone and whole."""
+        """Return the centroids that become 0 and 1: of the least and of the greatest term, each alone and whole."""
         output = self.system.outputs[k]
         alone = [self.centroid(k, [float(i == j) for i in range(len(output.terms))]) for j in range(len(output.terms))]
         low, high = min(alone), max(alone)
@@ -195,15 +207,15 @@ def shared(weights: Sequence[float], normalisation: str) -> tuple[float, ...]:
     ----------
     weights : sequence of float
         In [0, 1].
-    normalisation : {"range", "sum", "max"}
-        ``range`` leaves them.
+    normalisation : {"range", "none", "sum", "max"}
+        The first two leave them.
 
     Returns
     -------
     tuple of float
         Divided by their sum or their greatest; all 0 if that is 0.
     """
-    if normalisation == "range":
+    if normalisation in _EACH_BY_ITSELF:
         return tuple(weights)
     whole = sum(weights) if normalisation == "sum" else max(weights)
     return tuple(w / whole for w in weights) if whole > 0.0 else (0.0,) * len(weights)
@@ -216,18 +228,18 @@ def shared_of_many(weights: Array, normalisation: str) -> Array:
     ----------
     weights : ndarray, shape (n, outputs)
         In [0, 1].
-    normalisation : {"range", "sum", "max"}
-        ``range`` leaves them.
+    normalisation : {"range", "none", "sum", "max"}
+        The first two leave them.
 
     Returns
     -------
     ndarray, shape (n, outputs)
         Each row divided by its sum or its greatest; all 0 if that is 0.
     """
-    if normalisation == "range":
+    if normalisation in _EACH_BY_ITSELF:
         return weights
     whole = (np.sum if normalisation == "sum" else np.max)(weights, axis=1, keepdims=True)
-    return np.divide(weights, whole, out=np.zeros_like(weights), where=whole > 0.0)
+    return np.asarray(np.divide(weights, whole, out=np.zeros_like(weights), where=whole > 0.0))
 
 
 def _default(output: Output, inputs: dict[str, float], row: int | None = None) -> float:

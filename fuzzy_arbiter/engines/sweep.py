@@ -1,96 +1,106 @@
 """The exact centroid of one output: a sweep over the breakpoints of its joined terms.
 
-Between two neighbouring knots of its terms each term is a straight line. Clipped at (or scaled by) their cuts and joined by
-the maximum they make a piecewise-linear outline, which can break only where a line meets a cut - its own or another
-term's - or another line. Between these places it is integrated as a trapezoid.
+Between two neighbouring knots of its terms each term is a straight line. Clipped at (or scaled by) their cuts and
+joined by the maximum they make a piecewise-linear envelope, which can break only where a line meets a cut - its own or
+another term's - or another line. Between these places it is integrated as a trapezoid.
 
-The functions work on floats, on fractions, and in code that Numba compiles.
+The functions work on floats and on fractions alike; Numba compiles them as they are.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
 
 from fuzzy_arbiter.definition import Variable
 
+Numbers = Sequence[Any]  # all floats, or all fractions
+TINY = 1e-120  # if no cut is greater, all are made larger alike: the centroid stays, and nothing underflows
+LARGER = 2.0**266
 
-def outline(variable: Variable) -> tuple[tuple[float, ...], tuple[float, ...], tuple[float, ...]]:
+
+class Outline(NamedTuple):
+    """The straight pieces of a variable's terms over its universe.
+
+    Attributes
+    ----------
+    places : tuple of float, length pieces + 1
+        Ends of the universe and the knots of all terms in it, which increase.
+    left, right : tuple of float, length pieces * terms
+        Degree of each term just right of each piece's start, and just left of its end; those of a piece stand together.
+    """
+
+    places: tuple[Any, ...]
+    left: tuple[Any, ...]
+    right: tuple[Any, ...]
+
+
+def outline(variable: Variable, number: Callable[[float], Any] = float) -> Outline:
     """Return the straight pieces of a variable's terms over its universe.
 
     Parameters
     ----------
     variable : Variable
         An output.
+    number : callable
+        `float`, or `fractions.Fraction` for exact results.
 
     Returns
     -------
-    places : tuple of float, length pieces + 1
-        Ends of the universe and the knots of all terms in it, which increase.
-    left : tuple of float, length pieces * terms
-        Degree of each term just right of each piece's start; the terms of one piece stand together.
-    right : tuple of float, length pieces * terms
-        Degree of each term just left of each piece's end.
+    Outline
+        In these numbers.
     """
     low, high = variable.universe
     knots = {x for term in variable.terms for x, _ in term.shape.points if low < x < high}
-    places = (low, *sorted(knots), high)
+    places = tuple(map(number, (low, *sorted(knots), high)))
+    shapes = [[(number(x), number(y)) for x, y in term.shape.points] for term in variable.terms]
     left, right = [], []
     for a, b in zip(places, places[1:], strict=False):
-        for term in variable.terms:
-            points = term.shape.points
-            # the term's points around this piece, of which the ones at its ends belong to this side of a jump
-            before = [p for p in points if p[0] <= a]
-            after = [p for p in points if p[0] >= b]
-            if not before or not after:
-                left.append((before or after)[-1 if before else 0][1])
-                right.append(left[-1])
-                continue
+        for points in shapes:
+            # the last point before and the first one after, so that at a jump each piece sees its own side
+            before = [p for p in points if p[0] <= a] or points[:1]
+            after = [p for p in points if p[0] >= b] or points[-1:]
             (x0, y0), (x1, y1) = before[-1], after[0]
-            left.append(y0 if x0 == a else y0 + (y1 - y0) * ((a - x0) / (x1 - x0)))
-            right.append(y1 if x1 == b else y0 + (y1 - y0) * ((b - x0) / (x1 - x0)))
-    return places, tuple(left), tuple(right)
+            slope = (y1 - y0) / (x1 - x0) if x0 < x1 else y1 - y1
+            left.append(y0 + slope * (a - x0) if x0 < a else y0)
+            right.append(y1 + slope * (b - x1) if b < x1 else y1)
+    return Outline(places, tuple(left), tuple(right))
 
 
-def centroid(
-    cuts: Sequence[float],
-    places: Sequence[float],
-    left: Sequence[float],
-    right: Sequence[float],
-    scaled: bool,
-) -> float:
-    """Return the centroid of clipped (or scaled) terms, joined by their maximum.
+def area_and_moment(cuts: Numbers, places: Numbers, left: Numbers, right: Numbers, scaled: bool) -> tuple[Any, Any]:
+    """Return the area under the envelope of clipped (or scaled) terms, and its moment.
 
     Parameters
     ----------
     cuts : sequence of float, length terms
-        Degree at which each term is clipped; not all are 0.
+        Degree at which each term is clipped.
     places, left, right
-        As from `outline`.
+        As of `Outline`.
     scaled : bool
         Whether a cut scales its term in the place of clipping it.
 
     Returns
     -------
-    float
-        Centroid, in the universe.
+    area : float
+        Integral of the envelope over the universe.
+    moment : float
+        Integral of the envelope times the place's distance from the start of the universe.
     """
+    zero = cuts[0] * 0
+    one = zero + 1
     terms = len(cuts)
-    area = moment = 0
+    area = moment = zero
     for piece in range(len(places) - 1):
-        start = places[piece]
-        width = places[piece + 1] - start
         first = piece * terms
-        # where the outline may break, in shares of the piece
-        breaks = [0.0, 1.0]
+        width = places[piece + 1] - places[piece]
+        start = places[piece] - places[0]
+        # where the envelope may break, in shares of the piece
+        breaks = [zero, one]
         for t in range(terms):
-            if cuts[t] <= 0:
-                continue
             a, b = left[first + t], right[first + t]
             if scaled:
                 a, b = a * cuts[t], b * cuts[t]
             for u in range(terms):
-                if cuts[u] <= 0:
-                    continue
                 if not scaled and (a < cuts[u]) != (b < cuts[u]):
                     breaks.append((cuts[u] - a) / (b - a))
                 if u < t:
@@ -100,25 +110,63 @@ def centroid(
                     if (a < c) != (b < d):
                         breaks.append((c - a) / ((b - a) - (d - c)))
         breaks.sort()
-        x0 = breaks[0]
-        y0 = _height(cuts, left, right, first, x0, scaled)
-        for x1 in breaks[1:]:
-            if x1 > x0:
-                y1 = _height(cuts, left, right, first, x1, scaled)
+        x0 = zero
+        y0 = envelope(cuts, left, right, first, x0, scaled)
+        for x1 in breaks:
+            if x0 < x1 <= one:
+                y1 = envelope(cuts, left, right, first, x1, scaled)
                 w = (x1 - x0) * width
                 area += w * (y0 + y1) / 2
                 moment += w * ((start + x0 * width) * (2 * y0 + y1) + (start + x1 * width) * (y0 + 2 * y1)) / 6
                 x0, y0 = x1, y1
-    return moment / area
+    return area, moment
 
 
-def _height(
-    cuts: Sequence[float], left: Sequence[float], right: Sequence[float], first: int, share: float, scaled: bool
-) -> float:
-    """Height of the outline at a share of the piece whose degrees begin at `first`."""
+def envelope(cuts: Numbers, left: Numbers, right: Numbers, first: int, share: Any, scaled: bool) -> Any:
+    """Return the height of the envelope in one piece.
+
+    Parameters
+    ----------
+    cuts, left, right, scaled
+        As of `area_and_moment`.
+    first : int
+        Where the piece's degrees begin.
+    share : float
+        Place in the piece, from 0 to 1.
+
+    Returns
+    -------
+    float
+        Greatest of the clipped (or scaled) degrees.
+    """
     height = cuts[0] * 0
     for t in range(len(cuts)):
-        y = left[first + t] + (right[first + t] - left[first + t]) * share
-        y = y * cuts[t] if scaled else min(y, cuts[t])
-        height = max(height, y)
+        degree = left[first + t] + (right[first + t] - left[first + t]) * share
+        height = max(height, degree * cuts[t] if scaled else min(degree, cuts[t]))
     return height
+
+
+def centroid(cuts: Numbers, places: Numbers, left: Numbers, right: Numbers, scaled: bool) -> Any:
+    """Return the centroid of clipped (or scaled) terms, joined by their maximum.
+
+    Parameters
+    ----------
+    cuts : sequence of float, length terms
+        Degree at which each term is clipped; not all are 0.
+    places, left, right, scaled
+        As of `area_and_moment`.
+
+    Returns
+    -------
+    float
+        Centroid, in the universe.
+    """
+    largest = cuts[0]
+    for cut in cuts:
+        largest = max(largest, cut)
+    if largest < TINY:
+        larger = [cut * LARGER for cut in cuts]
+        area, moment = area_and_moment(larger, places, left, right, scaled)
+    else:
+        area, moment = area_and_moment(cuts, places, left, right, scaled)
+    return places[0] + moment / area

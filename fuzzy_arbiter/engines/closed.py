@@ -1,0 +1,242 @@
+"""The closed form: exact, and thousands of times faster than sampling.
+
+If the cuts of an output's two terms are 1 - h and h for all inputs, its centroid is a function C(h) alone, piecewise
+cubic over quadratic. For prioritised criteria, with m the degree to which each asks for attention,
+
+    h_k = min(1 - m_1, ..., 1 - m_(k-1), m_k),
+
+and for low = triangle (0, 0, 1), high = triangle (0, 1, 1) the joined area is 1/2 for every h and
+
+    C(h) = 1/3 + h^2 - 2/3 h^3,
+
+which scaled to [0, 1] is the smoothstep 3 h^2 - 2 h^3.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import ClassVar
+
+import numpy as np
+
+from fuzzy_arbiter.definition import Output, System
+from fuzzy_arbiter.engines.engine import Engine, shared, shared_of_many
+from fuzzy_arbiter.engines.firing import Array, degrees_of_many
+from fuzzy_arbiter.engines.normal_form import Clause, Literal, high_clauses, ladder
+from fuzzy_arbiter.engines.pieces import Piece, pieces
+from fuzzy_arbiter.errors import EngineError
+from fuzzy_arbiter.hierarchy import DEGREE
+
+BLOCK = 4096  # samples evaluated at a time, which the processor's caches hold
+
+
+class NoClosedFormError(EngineError):
+    """A system that this engine cannot evaluate.
+
+    Attributes
+    ----------
+    reason : str
+        Why, in words.
+    """
+
+    def __init__(self, reason: str) -> None:
+        super().__init__(f"engine 'closed': {reason}")
+        self.reason = reason
+
+
+class ClosedEngine(Engine):
+    """Evaluates C(h) for outputs of two terms whose cuts are 1 - h and h, which is proved from the rules.
+
+    Attributes
+    ----------
+    clauses : tuple of tuple of frozenset
+        For each output, the literals of which the least degree, and of all clauses the greatest, is h.
+    ladder : tuple, or None
+        The literals m_1, m_2, .. if the rules are those of prioritised criteria.
+    raw, scaled : tuple of tuple of Piece
+        C(h) of each output, and the weight it becomes.
+
+    Raises
+    ------
+    NoClosedFormError
+        If an output has not two terms, or the proof fails.
+    """
+
+    name: ClassVar[str] = "closed"
+
+    def __init__(self, system: System) -> None:
+        clauses = _proved(system)
+        if isinstance(clauses, str):
+            raise NoClosedFormError(clauses)
+        self.clauses = clauses
+        self.ladder = ladder(system, clauses)
+        self.raw = _pieces(system.outputs, scale=False)
+        self.scaled = self.raw if system.normalisation == "none" else _pieces(system.outputs, scale=True)
+        super().__init__(system)
+        self._index = {v.name: i for i, v in enumerate(system.inputs)}
+        self._shapes = {(v.name, t.name): t.shape for v in system.inputs for t in v.terms}
+        self._cubic = _one_cubic(self.scaled)
+        # prioritised criteria in the order of the inputs, which are the degrees themselves: nothing to look up
+        self._plain = self._cubic is not None and self.ladder is not None and len(self.ladder) == len(system.inputs)
+        for step, variable in zip(self.ladder or (), system.inputs, strict=False):
+            name, term, affirmed = step
+            plain = name == variable.name and affirmed and variable.universe == (0.0, 1.0)
+            self._plain = self._plain and plain and self._shapes[name, term] == DEGREE
+
+    def centroid(self, k: int, cuts: Sequence[float]) -> float:
+        """Return C(h) of an output, of which the cuts are 1 - h and h."""
+        return _value(self.raw[k], cuts[1])
+
+    def centroid_of_many(self, k: int, cuts: Array) -> Array:
+        """Return C(h) of an output for many samples, of which the cuts are 1 - h and h."""
+        return _values(self.raw[k], cuts[1])
+
+    def centroids(self, inputs: Sequence[float]) -> list[float]:
+        """Return the raw value of each output for one sample; as of `Engine`."""
+        return [_value(forms, h) for forms, h in zip(self.raw, self._highs(inputs), strict=True)]
+
+    def centroids_of_many(self, inputs: Array) -> Array:
+        """Return the raw value of each output for many samples; as of `Engine`."""
+        highs = self._highs_of_many(inputs)
+        return np.stack([_values(forms, h) for forms, h in zip(self.raw, highs, strict=True)], axis=1)
+
+    def weights(self, inputs: Sequence[float]) -> tuple[float, ...]:
+        """Return the normalised value of each output for one sample; as of `Engine`."""
+        result = [_value(forms, h) for forms, h in zip(self.scaled, self._highs(inputs), strict=True)]
+        return shared(result, self.system.normalisation)
+
+    def weights_of_many(self, inputs: Array) -> Array:
+        """Return the normalised value of each output for many samples; as of `Engine`."""
+        result = np.empty((len(inputs), len(self.system.outputs)))
+        for start in range(0, len(inputs), BLOCK):
+            block = inputs[start : start + BLOCK]
+            highs = self._highs_of_many(block)
+            if self._cubic is not None:
+                values = _horner(self._cubic, highs)
+            else:
+                values = np.stack([_values(forms, h) for forms, h in zip(self.scaled, highs, strict=True)])
+            result[start : start + BLOCK] = values.T
+        return shared_of_many(result, self.system.normalisation)
+
+    def evaluator(self) -> Callable[[Sequence[float]], tuple[float, ...]]:
+        """Return the function that gives the weights for one sample; a short one for the usual kind of system."""
+        each_by_itself = self.system.normalisation in ("range", "none")
+        if self._plain and each_by_itself and self._cubic is not None and self._cubic[:2] == (0.0, 0.0):
+            return _smooth_ladder(*self._cubic[2:])
+        return self.weights
+
+    def _highs(self, inputs: Sequence[float]) -> list[float]:
+        """Return the cut h of each output's second term."""
+        if self.ladder is None:
+            return [max(min(self._degree(x, inputs) for x in clause) for clause in forms) for forms in self.clauses]
+        result = []
+        unclaimed = 1.0
+        for step in self.ladder:
+            m = self._degree(step, inputs)
+            result.append(min(m, unclaimed))
+            unclaimed = min(unclaimed, 1.0 - m)
+        return result
+
+    def _degree(self, literal: Literal, inputs: Sequence[float]) -> float:
+        variable, term, affirmed = literal
+        degree = self._shapes[variable, term](inputs[self._index[variable]])
+        return degree if affirmed else 1.0 - degree
+
+    def _highs_of_many(self, inputs: Array) -> Array:
+        """Return the cuts h, shape (outputs, n)."""
+        if self._plain:
+            degrees = inputs.T.copy()  # rows to be read one after another
+        elif self.ladder is not None:
+            degrees = np.stack([self._degrees(step, inputs) for step in self.ladder])
+        else:
+            known = {x: self._degrees(x, inputs) for forms in self.clauses for clause in forms for x in clause}
+            least = [[np.min([known[x] for x in clause], axis=0) for clause in forms] for forms in self.clauses]
+            return np.stack([np.max(clauses, axis=0) for clauses in least])
+        highs = np.empty_like(degrees)
+        unclaimed = np.ones(len(inputs))
+        spare = np.empty(len(inputs))
+        for m, h in zip(degrees, highs, strict=True):
+            np.minimum(m, unclaimed, out=h)
+            np.subtract(1.0, m, out=spare)
+            np.minimum(unclaimed, spare, out=unclaimed)
+        return highs
+
+    def _degrees(self, literal: Literal, inputs: Array) -> Array:
+        variable, term, affirmed = literal
+        degrees = degrees_of_many(self._shapes[variable, term], inputs[:, self._index[variable]])
+        return degrees if affirmed else 1.0 - degrees
+
+
+def _proved(system: System) -> tuple[tuple[Clause, ...], ...] | str:
+    """Return the clauses of each output's h, or why there is no h."""
+    if (system.conjunction, system.disjunction, system.implication) != ("min", "max", "min"):
+        return f"norms are {system.conjunction}, {system.disjunction}, {system.implication}, expected min, max, min"
+    for i, rule in enumerate(system.rules):
+        if rule.weight != 1.0:
+            return f"R{i + 1} has the weight {rule.weight!r}, expected 1"
+    for output in system.outputs:
+        if len(output.terms) != 2:
+            return f"output {output.name!r} has the terms {', '.join(output.term_names)}, expected two"
+    clauses = high_clauses(system)
+    return clauses if isinstance(clauses, str) else tuple(clauses)
+
+
+def _pieces(outputs: Sequence[Output], scale: bool) -> tuple[tuple[Piece, ...], ...]:
+    """Return C(h) of each output, worked out once for those that differ in name alone."""
+    patterns = [replace(output, name="any") for output in outputs]
+    known = {pattern: pieces(pattern, scale) for pattern in set(patterns)}
+    return tuple(known[pattern] for pattern in patterns)
+
+
+def _one_cubic(forms: Sequence[tuple[Piece, ...]]) -> tuple[float, ...] | None:
+    """Return the coefficients of the cubic that all outputs have in common, if they have."""
+    if len(set(forms)) > 1 or len(forms[0]) != 1 or forms[0][0].denominator != (1.0, 0.0, 0.0):
+        return None
+    return forms[0][0].numerator
+
+
+def _smooth_ladder(n2: float, n3: float) -> Callable[[Sequence[float]], tuple[float, ...]]:
+    """Return the weights (n2 + n3 h) h^2 of criteria whose degrees are the inputs, in their order."""
+
+    def weights(degrees: Sequence[float]) -> tuple[float, ...]:
+        result = []
+        unclaimed = 1.0  # degree to which no criterion of higher priority asks
+        for m in degrees:
+            h = m if m < unclaimed else unclaimed
+            result.append((n2 + n3 * h) * h * h)
+            if 1.0 - m < unclaimed:
+                unclaimed = 1.0 - m
+        return tuple(result)
+
+    return weights
+
+
+def _value(forms: tuple[Piece, ...], h: float) -> float:
+    if len(forms) == 1:
+        return forms[0](h)
+    return forms[bisect_right(forms, h, key=_start) - 1](h)
+
+
+def _start(piece: Piece) -> float:
+    return piece.start
+
+
+def _values(forms: tuple[Piece, ...], h: Array) -> Array:
+    piece = np.searchsorted([p.start for p in forms], h, side="right") - 1
+    t = h - np.array([p.start for p in forms])[piece]
+    above, below = (np.array(c)[piece].T for c in zip(*((p.numerator, p.denominator) for p in forms), strict=True))
+    return np.asarray(_horner(above, t) / _horner(below, t))
+
+
+def _horner(coefficients: Sequence[float] | Array, t: Array) -> Array:
+    """Evaluate a polynomial; coefficients that are the number 0 cost nothing."""
+    result = coefficients[-1] * t
+    for c in reversed(coefficients[1:-1]):
+        if not (isinstance(c, float) and c == 0.0):
+            result += c
+        result *= t
+    if not (isinstance(coefficients[0], float) and coefficients[0] == 0.0):
+        result += coefficients[0]
+    return result

@@ -1,0 +1,147 @@
+"""Proofs that an output's two terms are cut at h and 1 - h for all inputs, in the algebra of min, max and 1 - x.
+
+A condition is brought to its disjunctive normal form, a set of clauses, each a set of literals, in which no clause
+contains another. With min, max and 1 - x that form is unique, and by De Morgan so is the one of its negation. If the
+negation of all conditions for one term has the clauses of the conditions for the other, then the cuts are h and 1 - h.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+from fuzzy_arbiter.definition import Output, System, Variable
+from fuzzy_arbiter.propositions import And, Is, Not, Or, Proposition
+
+Literal = tuple[str, str, bool]  # variable, term, and whether it is affirmed
+Clause = frozenset[Literal]
+
+MAX_CLAUSES = 512  # more are given up
+
+
+def complementary(variable: Variable) -> bool:
+    """Return whether a variable has two terms whose degrees are one minus each other, to the last bit.
+
+    Parameters
+    ----------
+    variable : Variable
+        An input.
+
+    Returns
+    -------
+    bool
+        True if they are.
+    """
+    if len(variable.terms) != 2:
+        return False
+    first, second = (term.shape for term in variable.terms)
+    return not first.jumps and second == first.complement() and first == second.complement()
+
+
+def ladder(system: System, clauses: Sequence[Sequence[Clause]]) -> tuple[Literal, ...] | None:
+    """Return the literals of prioritised criteria, if that is what the clauses say.
+
+    Parameters
+    ----------
+    system : System
+        Whose rules they are.
+    clauses : sequence of sequence of frozenset
+        As from `high_clauses`.
+
+    Returns
+    -------
+    tuple, or None
+        For each output the literal that makes it high, if none of those before it holds.
+    """
+    complements = _complements(system)
+    steps: list[Literal] = []
+    above: set[Literal] = set()  # that the ones before do not hold
+    for forms in clauses:
+        if len(forms) != 1 or not above < forms[0] or len(forms[0]) != len(above) + 1:
+            return None
+        (step,) = forms[0] - above
+        steps.append(step)
+        above.add(_opposite(step, complements))
+    return tuple(steps)
+
+
+def high_clauses(system: System) -> list[tuple[Clause, ...]] | str:
+    """Return, for each output, the clauses of the condition under which its second term is concluded.
+
+    Parameters
+    ----------
+    system : System
+        With conjunction min and disjunction max.
+
+    Returns
+    -------
+    list of tuple of frozenset, or str
+        For each output, such that the cut of its second term is the greatest of the clauses' least degrees, and that of
+        its first term one minus this; or why that is not so.
+    """
+    complements = _complements(system)
+    result = []
+    for output in system.outputs:
+        low, high = (_conditions(system, output, name) for name in output.term_names)
+        if not low or not high:
+            return f"output {output.name!r} has a term that no rule concludes"
+        high_form = _joined((_clauses(p, True, complements) for p in high), any_of=True)
+        low_negated = _joined((_clauses(p, False, complements) for p in low), any_of=False)
+        if high_form is None or low_negated is None:
+            return f"output {output.name!r} has conditions of more than {MAX_CLAUSES} clauses"
+        if high_form != low_negated:
+            first, second = map(repr, output.term_names)
+            return f"output {output.name!r}: the cut of {first} is not 1 minus that of {second} for all inputs"
+        result.append(tuple(sorted(high_form, key=sorted)))
+    return result
+
+
+def _conditions(system: System, output: Output, term: str) -> list[Proposition]:
+    return [rule.condition for rule in system.rules if Is(output.name, term) in rule.conclusions]
+
+
+def _complements(system: System) -> dict[str, tuple[str, str]]:
+    return {v.name: (v.terms[0].name, v.terms[1].name) for v in system.inputs if complementary(v)}
+
+
+def _opposite(literal: Literal, complements: dict[str, tuple[str, str]]) -> Literal:
+    """Negate a literal; where a variable has two complementary terms, the negation of one is the other."""
+    variable, term, affirmed = literal
+    if variable not in complements:
+        return variable, term, not affirmed
+    first, second = complements[variable]
+    return variable, second if term == first else first, affirmed
+
+
+def _clauses(
+    proposition: Proposition, affirmed: bool, complements: dict[str, tuple[str, str]]
+) -> frozenset[Clause] | None:
+    """Disjunctive normal form of a proposition or of its negation; None if it is too long."""
+    if isinstance(proposition, Not):
+        return _clauses(proposition.part, not affirmed, complements)
+    if isinstance(proposition, Is):
+        literal = (proposition.variable, proposition.term, True)
+        return frozenset((frozenset((literal if affirmed else _opposite(literal, complements),)),))
+    assert isinstance(proposition, And | Or)
+    parts = (_clauses(part, affirmed, complements) for part in proposition.parts)
+    return _joined(parts, any_of=isinstance(proposition, Or) is affirmed)
+
+
+def _joined(parts: Iterable[frozenset[Clause] | None], any_of: bool) -> frozenset[Clause] | None:
+    """Disjunction or conjunction of normal forms, in normal form."""
+    result: frozenset[Clause] = frozenset() if any_of else frozenset((frozenset(),))
+    for part in parts:
+        if part is None:
+            return None
+        result = _absorbed(result | part if any_of else (a | b for a in result for b in part))
+        if len(result) > MAX_CLAUSES:
+            return None
+    return result
+
+
+def _absorbed(clauses: Iterable[Clause]) -> frozenset[Clause]:
+    """Drop each clause that contains another, which it cannot exceed."""
+    kept: list[Clause] = []
+    for clause in sorted(set(clauses), key=len):
+        if not any(other <= clause for other in kept):
+            kept.append(clause)
+    return frozenset(kept)

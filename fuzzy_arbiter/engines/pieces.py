@@ -1,0 +1,142 @@
+"""The centroid of an output of two terms, cut at 1 - h and h, as a function of h: cubic over quadratic, in pieces.
+
+The places where the envelope of the two clipped terms breaks move linearly with h, so that its area is a quadratic and
+its moment a cubic of h as long as no two of them meet and none passes a knot. Between these values of h both
+polynomials are fitted to exact values, in fractions.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+
+from fuzzy_arbiter.definition import Output
+from fuzzy_arbiter.engines.sweep import Outline, area_and_moment, outline
+
+Polynomial = tuple[Fraction, ...]  # coefficients of t^0, t^1, ..
+
+
+@dataclass(frozen=True, slots=True)
+class Piece:
+    """A piece of C(h): a cubic over a quadratic of t = h - start.
+
+    Attributes
+    ----------
+    start : float
+        Where the piece begins; it ends where the next one begins, the last one at 1.
+    numerator : tuple of 4 float
+        Coefficients of t^0 to t^3.
+    denominator : tuple of 3 float
+        Coefficients of t^0 to t^2; (1, 0, 0) if it is constant.
+    """
+
+    start: float
+    numerator: tuple[float, ...]
+    denominator: tuple[float, ...]
+
+    def __call__(self, h: float) -> float:
+        """Return C(h).
+
+        Parameters
+        ----------
+        h : float
+            In this piece.
+
+        Returns
+        -------
+        float
+            Centroid, or the weight that it is scaled to.
+        """
+        t = h - self.start
+        n0, n1, n2, n3 = self.numerator
+        d0, d1, d2 = self.denominator
+        return (n0 + t * (n1 + t * (n2 + t * n3))) / (d0 + t * (d1 + t * d2))
+
+
+def pieces(output: Output, scale: bool) -> tuple[Piece, ...]:
+    """Return the pieces of an output's centroid as a function of the cut h of its second term, if 1 - h is its first's.
+
+    Parameters
+    ----------
+    output : Output
+        With two terms.
+    scale : bool
+        Whether the lesser of C(0) and C(1) becomes 0 and the greater one 1.
+
+    Returns
+    -------
+    tuple of Piece
+        From h = 0 to 1; none if C(0) = C(1) and that shall be scaled.
+    """
+    shape = outline(output, Fraction)
+    ends = [_centroid(shape, Fraction(h)) for h in (0, 1)]
+    low, high = (min(ends), max(ends)) if scale else (Fraction(0), Fraction(1))
+    if low == high:
+        return ()
+    result: list[tuple[Fraction, Polynomial, Polynomial]] = []
+    whole: tuple[Polynomial, Polynomial] | None = None
+    events = _events(shape)
+    for start, end in zip(events, events[1:], strict=False):
+        at = [start + (end - start) * Fraction(i, 3) for i in range(4)]
+        areas, moments = zip(*(area_and_moment((1 - h, h), *shape, False) for h in at), strict=True)
+        # (M / A - low) / (high - low), where moments are taken about the universe's start
+        shift = shape.places[0] - low
+        denominator = _fitted(at, [a * (high - low) for a in areas])
+        numerator = _fitted(at, [m + shift * a for m, a in zip(moments, areas, strict=True)])
+        if (numerator, denominator) != whole:
+            whole = numerator, denominator
+            result.append((start, numerator, denominator))
+    forms = [_floats(*piece) for piece in result]
+    last = float((ends[1] - low) / (high - low))
+    if forms[-1](1.0) != last:  # rounded
+        forms.append(Piece(1.0, (last, 0.0, 0.0, 0.0), (1.0, 0.0, 0.0)))
+    return tuple(forms)
+
+
+def _centroid(shape: Outline, h: Fraction) -> Fraction:
+    area, moment = area_and_moment((1 - h, h), *shape, False)
+    return Fraction(shape.places[0] + moment / area)
+
+
+def _events(shape: Outline) -> list[Fraction]:
+    """Return 0, 1, and all h between at which two breakpoints of the envelope may meet, or one a knot."""
+    levels = {Fraction(0), Fraction(1, 2)}
+    for i in range(0, len(shape.left), 2):
+        (a, c), (b, d) = shape.left[i : i + 2], shape.right[i : i + 2]
+        levels |= {Fraction(y) for y in (a, b, c, d)}
+        for gap_left, gap_right in ((a - c, b - d), (a + c - 1, b + d - 1)):  # terms equal; terms one minus each other
+            if gap_left * gap_right < 0:
+                share = gap_left / (gap_left - gap_right)
+                levels |= {Fraction(a + (b - a) * share), Fraction(c + (d - c) * share)}
+    return sorted({h for level in levels for h in (level, 1 - level)})
+
+
+def _fitted(at: Sequence[Fraction], values: Sequence[Fraction]) -> Polynomial:
+    """Return the coefficients of the polynomial through some values, by Newton's divided differences."""
+    differences = list(values)
+    for order in range(1, len(at)):
+        for i in range(len(at) - 1, order - 1, -1):
+            differences[i] = (differences[i] - differences[i - 1]) / (at[i] - at[i - order])
+    coefficients = [Fraction(0)] * len(at)
+    for place, difference in zip(reversed(at), reversed(differences), strict=True):
+        # multiply by (h - place), add the difference
+        shifted = [Fraction(0), *coefficients[:-1]]
+        coefficients = [s - place * c for s, c in zip(shifted, coefficients, strict=True)]
+        coefficients[0] += difference
+    return tuple(coefficients)
+
+
+def _about(start: Fraction, polynomial: Polynomial) -> Polynomial:
+    """Return the coefficients of the same polynomial in t = h - start."""
+    coefficients = list(polynomial)
+    for low in range(len(coefficients)):
+        for i in range(len(coefficients) - 2, low - 1, -1):
+            coefficients[i] += start * coefficients[i + 1]
+    return tuple(coefficients)
+
+
+def _floats(start: Fraction, numerator: Polynomial, denominator: Polynomial) -> Piece:
+    above, below = _about(start, numerator), _about(start, denominator)
+    unit = below[0]  # the area at the start, above 0
+    return Piece(float(start), tuple(float(c / unit) for c in above), tuple(float(c / unit) for c in below[:3]))
