@@ -60,12 +60,22 @@ class GridEngine(Engine):
                 cell = math.floor(min(max((cuts[u] - left) / rise * piece.cells, 0.0), piece.cells - 1.0))
                 shares += cell / piece.cells, (cell + 1.0) / piece.cells
             shares.sort()
-            heights = [max(min(left + rise * x, cuts[t]) for t, left, rise in piece.terms) for x in shares]
             # twice the area and six times the moment of the trapezoids, in shares of the piece
-            twice = sixfold = 0.0
-            for x0, x1, y0, y1 in zip(shares, shares[1:], heights, heights[1:], strict=False):
-                twice += (x1 - x0) * (y0 + y1)
-                sixfold += (x1 - x0) * (x0 * (y0 + y1 + y0) + x1 * (y0 + y1 + y1))
+            x0 = y0 = twice = sixfold = 0.0
+            for x1 in shares:
+                y1 = 0.0
+                for t, left, rise in piece.terms:
+                    y = left + rise * x1
+                    cut = cuts[t]
+                    if y > cut:
+                        y = cut
+                    if y > y1:
+                        y1 = y
+                width = x1 - x0
+                height = y0 + y1
+                twice += width * height
+                sixfold += width * (x0 * (height + y0) + x1 * (height + y1))
+                x0, y0 = x1, y1
             area += piece.width / 2.0 * twice
             moment += piece.start * piece.width / 2.0 * twice + piece.width * piece.width / 6.0 * sixfold
         low = self.system.outputs[k].universe[0]
