@@ -95,6 +95,8 @@ def weights(system, inputs):
     """Exact range-normalised weight of every output."""
     result = []
     for output, raw in zip(system.outputs, centroids(system, inputs), strict=True):
-        alone = [centroid(output, [Fraction(i == j) for i in range(len(output.terms))]) for j in range(len(output.terms))]
+        alone = [
+            centroid(output, [Fraction(i == j) for i in range(len(output.terms))]) for j in range(len(output.terms))
+        ]
         result.append(min(max((raw - min(alone)) / (max(alone) - min(alone)), Fraction(0)), Fraction(1)))
     return result

@@ -8,7 +8,19 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from fuzzy_arbiter import Arbiter, Criterion, EngineError, Output, Shape, System, Term, Variable, falling, prioritised, rising
+from fuzzy_arbiter import (
+    Arbiter,
+    Criterion,
+    EngineError,
+    Output,
+    Shape,
+    System,
+    Term,
+    Variable,
+    falling,
+    prioritised,
+    rising,
+)
 from fuzzy_arbiter.engines.closed import ClosedEngine
 from fuzzy_arbiter.engines.exact import ExactEngine
 from fuzzy_arbiter.engines.pieces import pieces
@@ -67,7 +79,8 @@ def test_the_number_of_pieces():
     """One cubic for the full triangles, also for trapezoids that meet there; three for the asymmetric pair."""
 
     def count(low, high):
-        return len(pieces(Output("y", (0, 1), (Term("low", low), Term("high", high))), scale=True))
+        _, scaled = pieces(Output("y", (0, 1), (Term("low", low), Term("high", high))))
+        return len(scaled)
 
     assert count(falling(0, 1), rising(0, 1)) == 1
     assert count(falling(0.3, 0.7), rising(0.3, 0.7)) == 1
@@ -154,9 +167,9 @@ def test_what_has_no_closed_form_is_said(rules, words):
 def test_terms_that_are_no_complements_are_not_taken_for_them():
     gap = Variable("a", (0, 1), (Term("off", falling(0, 0.4)), Term("on", rising(0.6, 1))))
     output = Output("y", (0, 1), (Term("low", falling(0, 1)), Term("high", rising(0, 1))))
-    assert Arbiter(system=System((gap,), (output,), ("if a is on then y is high", "if a is off then y is low"))).engine == (
-        "exact"
-    )
+    assert Arbiter(
+        system=System((gap,), (output,), ("if a is on then y is high", "if a is off then y is low"))
+    ).engine == ("exact")
     negated = System((gap,), (output,), ("if a is on then y is high", "if a is not on then y is low"))
     assert Arbiter(system=negated).engine == "closed"
 

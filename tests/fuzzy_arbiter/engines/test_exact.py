@@ -40,7 +40,7 @@ def test_it_is_the_exact_centroid_of_any_system(system, data):
             arbiter.batch([inputs])
     else:
         assert arbiter(inputs) == pytest.approx([float(c) for c in exact], abs=8 * EPS)
-        assert arbiter.batch([inputs])[0] == pytest.approx(arbiter(inputs), abs=8 * EPS)
+        assert tuple(arbiter.batch([inputs])[0]) == arbiter(inputs)
 
 
 def test_the_tipping_answer():
@@ -78,7 +78,7 @@ def test_degrees_next_to_nothing_do_not_underflow(implication):
 def test_an_output_of_one_centroid_cannot_be_scaled():
     output = Output("y", (0, 1), (Term("any", triangle(0, 0.5, 1)),))
     system = System((Variable("x", (0, 1), (Term("on", rising(0, 1)),)),), (output,), ("if x is on then y is any",))
-    with pytest.raises(EngineError, match="output 'y': its terms have one centroid, 0.5"):
+    with pytest.raises(EngineError, match=r"output 'y': its terms have one centroid, 0\.5"):
         Arbiter(system=system)
 
 
@@ -97,7 +97,9 @@ def test_of_many_rows_the_first_undefined_one_is_named():
     output = Output("y", (0, 1), (Term("a", falling(0, 1)), Term("b", rising(0, 1))))
     inputs = (Variable("x", (0, 1), (Term("on", rising(0.5, 1)),)),)
     arbiter = Arbiter(system=System(inputs, (output,), ("if x is on then y is b",)))
-    with pytest.raises(UndefinedOutputError, match=r"output 'y': no rule fires at row 2, x = 0.25, and it has no default"):
+    with pytest.raises(
+        UndefinedOutputError, match=r"output 'y': no rule fires at row 2, x = 0.25, and it has no default"
+    ):
         arbiter.batch([[1.0], [0.75], [0.25], [0.1]])
 
 
