@@ -12,6 +12,7 @@ from fuzzy_arbiter.errors import (
     UnsupportedError,
 )
 from fuzzy_arbiter.hierarchy import SECTION_VI, Criterion, prioritised
+from fuzzy_arbiter.hysteresis import HysteresisArbiter
 from fuzzy_arbiter.membership import ramp
 from fuzzy_arbiter.propositions import Is
 from fuzzy_arbiter.rule_text import parse_proposition, parse_rule
@@ -25,6 +26,7 @@ __all__ = [
     "DefinitionError",
     "EngineError",
     "FormatError",
+    "HysteresisArbiter",
     "InputError",
     "Is",
     "Output",

@@ -2,25 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from numbers import Real
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 from numpy.typing import ArrayLike
 
-from fuzzy_arbiter.definition import Normalisation, Output, Outside, System, variable_names
+from fuzzy_arbiter.definition import Normalisation, Output, Outside, System
 from fuzzy_arbiter.engines import choose
 from fuzzy_arbiter.engines.firing import Array
-from fuzzy_arbiter.errors import DefinitionError, InputError
+from fuzzy_arbiter.errors import DefinitionError
 from fuzzy_arbiter.hierarchy import SECTION_VI, WEIGHT, Criterion, Form, prioritised
+from fuzzy_arbiter.samples import Sample, Samples
 
 if TYPE_CHECKING:
     from fuzzy_arbiter.explanation import Explanation
     from fuzzy_arbiter.verification import Verification
-
-Sample = Sequence[float] | Mapping[str, float]
 
 
 class Arbiter:
@@ -73,8 +70,7 @@ class Arbiter:
         self._system = system
         self._engine, self._why = choose(system, engine)
         self._shortcut = self._engine.shortcut()
-        self._limits = tuple(v.universe for v in system.inputs)
-        self._names = variable_names(system.inputs)
+        self._samples = Samples(system)
 
     @property
     def system(self) -> System:
@@ -90,6 +86,11 @@ class Arbiter:
     def why(self) -> str:
         """Why it is this engine."""
         return self._why
+
+    @property
+    def samples(self) -> Samples:
+        """What checks the inputs."""
+        return self._samples
 
     def __call__(self, inputs: Sample) -> tuple[float, ...]:
         """Return the weights for one sample.
@@ -115,7 +116,7 @@ class Arbiter:
             weights = self._shortcut(inputs)
             if weights is not None:
                 return weights
-        return self._engine.weights(self._checked(inputs))
+        return self._engine.weights(self._samples.one(inputs))
 
     def batch(self, inputs: ArrayLike) -> Array:
         """Return the weights for many samples.
@@ -137,68 +138,27 @@ class Arbiter:
         UndefinedOutputError
             If no rule fires for an output without default; the first such row is named.
         """
-        return self._engine.weights_of_many(self._checked_many(inputs))
+        return self._engine.weights_of_many(self._samples.many(inputs))
 
-    def _checked(self, inputs: Sample) -> Sequence[float]:
-        try:
-            values = inputs if type(inputs) is list or type(inputs) is tuple else self._in_order(inputs)
-            for x, (low, high) in zip(values, self._limits, strict=True):
-                if not low <= x <= high:  # NaN too
-                    return self._clipped(values)
-        except (TypeError, ValueError):
-            raise self._fault(inputs) from None
-        return values
+    def centroids(self, inputs: Sample) -> tuple[float, ...]:
+        """Return the raw value of each output for one sample, before normalisation.
 
-    def _clipped(self, values: Sequence[float]) -> list[float]:
-        if self._system.outside != "clip" or any(x != x for x in values):
-            raise self._fault(values)
-        return [min(max(x, low), high) for x, (low, high) in zip(values, self._limits, strict=True)]
+        Parameters
+        ----------
+        inputs : sequence of float, or mapping from input's name to float
+            As for a call.
 
-    def _in_order(self, inputs: Sample) -> list[float]:
-        if isinstance(inputs, Mapping):
-            for name in self._names:
-                if name not in inputs:
-                    raise InputError(f"{name}: input is missing, expected {', '.join(self._names)}")
-            for name in inputs:
-                if name not in self._names:
-                    raise InputError(f"{name}: unknown input, expected {', '.join(self._names)}")
-            return [inputs[name] for name in self._names]
-        if isinstance(inputs, np.ndarray):
-            return list(inputs.tolist())
-        if isinstance(inputs, Sequence):
-            return list(inputs)
-        raise TypeError(inputs)
+        Returns
+        -------
+        tuple of float
+            Centroids in the outputs' universes, or the defaults where no rule fires.
 
-    def _fault(self, inputs: Sample) -> InputError:
-        """Find out what is wrong with a sample that was refused."""
-        try:
-            values = self._in_order(inputs)
-        except TypeError:
-            return InputError(f"inputs are {inputs!r}, expected {len(self._names)} numbers")
-        if len(values) != len(self._names):
-            return InputError(f"{len(values)} inputs came, expected {len(self._names)}: {', '.join(self._names)}")
-        for name, x, (low, high) in zip(self._names, values, self._limits, strict=True):
-            if not isinstance(x, Real) or x != x or (self._system.outside == "refuse" and not low <= x <= high):
-                return InputError(f"{name}: input is {x!r}, expected a number in [{low:g}, {high:g}]")
-        return InputError(f"inputs are {inputs!r}, expected {len(self._names)} numbers")
-
-    def _checked_many(self, inputs: ArrayLike) -> Array:
-        try:
-            values = np.asarray(inputs, dtype=np.float64)
-        except (TypeError, ValueError) as error:
-            raise InputError(f"inputs: {error}, expected numbers") from None
-        if values.ndim != 2 or values.shape[1] != len(self._names):
-            raise InputError(f"inputs have the shape {values.shape}, expected (n, {len(self._names)})")
-        low, high = np.array(self._limits).T
-        if values.size and low.max() <= values.min() and values.max() <= high.min():  # for NaN neither holds
-            return values
-        clip = self._system.outside == "clip"
-        good = ~np.isnan(values) if clip else (low <= values) & (values <= high)
-        if not good.all():
-            row, i = np.argwhere(~good)[0]
-            expected = f"expected a number in [{low[i]:g}, {high[i]:g}]"
-            raise InputError(f"row {row}: {self._names[i]} is {float(values[row, i])!r}, {expected}")
-        return np.clip(values, low, high) if clip else values
+        Raises
+        ------
+        InputError, UndefinedOutputError
+            As for a call.
+        """
+        return tuple(self._engine.centroids(self._samples.one(inputs)))
 
     def explain(self, inputs: Sample) -> Explanation:
         """Return which rules fired for one sample, how strongly, and which decided.
@@ -220,7 +180,7 @@ class Arbiter:
         """
         from fuzzy_arbiter.explanation import explain
 
-        return explain(self, self._checked(inputs))
+        return explain(self, self._samples.one(inputs))
 
     def verify(self) -> Verification:
         """Return whether the rules are complete, consistent and exclusive, and the terms without gaps.

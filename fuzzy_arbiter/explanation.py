@@ -7,6 +7,7 @@ from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
 from fuzzy_arbiter.definition import System, variable_names
+from fuzzy_arbiter.engines.firing import Firing
 from fuzzy_arbiter.table import aligned
 
 if TYPE_CHECKING:
@@ -174,8 +175,8 @@ def explain(arbiter: Arbiter, inputs: Sequence[float]) -> Explanation:
     """
     system = arbiter.system
     weights = arbiter(inputs)
-    centroids = arbiter._engine.centroids(inputs)
-    firing = arbiter._engine.firing
+    centroids = arbiter.centroids(inputs)
+    firing = Firing(system)
     strengths = firing.strengths(inputs)
     rules = tuple(
         FiredRule(f"R{i + 1}", str(rule), strength, {c.variable: c.term for c in rule.conclusions})

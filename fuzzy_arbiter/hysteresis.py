@@ -10,11 +10,12 @@ from typing import NoReturn
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fuzzy_arbiter.arbiter import Arbiter, Sample
+from fuzzy_arbiter.arbiter import Arbiter
 from fuzzy_arbiter.definition import System, Variable, variable_names
 from fuzzy_arbiter.engines.firing import Array, degrees_of_many
 from fuzzy_arbiter.errors import DefinitionError, InputError
 from fuzzy_arbiter.propositions import Is
+from fuzzy_arbiter.samples import Sample
 from fuzzy_arbiter.shapes import Shape
 from fuzzy_arbiter.verification.cells import stretches
 from fuzzy_arbiter.verification.questions import Effort, Questions, greatest_term
@@ -145,7 +146,7 @@ class HysteresisArbiter:
             If no rule fires for an output without default; the state is then as before.
         """
         now = _checked_time(time, self._time)
-        values = self.arbiter._checked(inputs)
+        values = self.arbiter.samples.one(inputs)
         degrees = [shape(x) for shape, x in zip(self._shapes, values, strict=True)]
         closed, since, places = self._next(self._closed, self._since, values, degrees, now)
         weights = self.arbiter(places)
@@ -175,7 +176,7 @@ class HysteresisArbiter:
         UndefinedOutputError
             If no rule fires for an output without default; the state is then as before.
         """
-        values = self.arbiter._checked_many(inputs)
+        values = self.arbiter.samples.many(inputs)
         moments = _checked_times(times, len(values), self._time)
         degrees = np.column_stack([degrees_of_many(s, values[:, i]) for i, s in enumerate(self._shapes)])
         closed, since = self._closed, self._since

@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import operator
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import ClassVar
 
 import numpy as np
@@ -102,7 +102,7 @@ class Engine(ABC):
         return [
             self.centroid(k, cut)
             if any(cut)
-            else _default(output, dict(zip(variable_names(self.system.inputs), inputs, strict=True)))
+            else default_of(output, dict(zip(variable_names(self.system.inputs), inputs, strict=True)))
             for k, (output, cut) in enumerate(zip(self.system.outputs, cuts, strict=True))
         ]
 
@@ -132,7 +132,7 @@ class Engine(ABC):
                 continue
             row = int(np.argmin(fires))
             names = variable_names(self.system.inputs)
-            default = _default(self.system.outputs[k], dict(zip(names, inputs[row].tolist(), strict=True)), row)
+            default = default_of(self.system.outputs[k], dict(zip(names, inputs[row].tolist(), strict=True)), row)
             result[~fires, k] = default
             result[fires, k] = self.centroid_of_many(k, cuts[:, fires])
         return result
@@ -252,7 +252,28 @@ def shared_of_many(weights: Array, normalisation: str) -> Array:
     return np.asarray(np.divide(weights, whole, out=np.zeros_like(weights), where=whole > 0.0))
 
 
-def _default(output: Output, inputs: dict[str, float], row: int | None = None) -> float:
+def default_of(output: Output, inputs: Mapping[str, float], row: int | None = None) -> float:
+    """Return the value of an output for which no rule fires.
+
+    Parameters
+    ----------
+    output : Output
+        Of which no rule fires.
+    inputs : mapping from input's name to float
+        Where that is.
+    row : int, optional
+        Which of many samples.
+
+    Returns
+    -------
+    float
+        Its default.
+
+    Raises
+    ------
+    UndefinedOutputError
+        If it has none.
+    """
     if output.default is not None:
         return output.default
     where = "" if row is None else f"row {row}, "

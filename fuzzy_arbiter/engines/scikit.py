@@ -15,7 +15,7 @@ from skfuzzy.defuzzify import EmptyMembershipError
 from skfuzzy.fuzzymath.fuzzy_ops import _interp_universe_fast, interp_membership
 
 from fuzzy_arbiter.definition import System, Variable, variable_names
-from fuzzy_arbiter.engines.engine import Engine, _default
+from fuzzy_arbiter.engines.engine import Engine, default_of
 from fuzzy_arbiter.engines.firing import Array
 from fuzzy_arbiter.engines.grid import require_clipping, sampled
 from fuzzy_arbiter.errors import EngineError
@@ -78,7 +78,7 @@ class ScikitEngine(Engine):
         if not hasattr(self._local, "runner"):
             self._local.runner = _Runner(self.system, self._samples)
         return [
-            _default(output, dict(zip(variable_names(self.system.inputs), inputs, strict=True)), row)
+            default_of(output, dict(zip(variable_names(self.system.inputs), inputs, strict=True)), row)
             if value is None
             else value
             for output, value in zip(self.system.outputs, self._local.runner(inputs), strict=True)
