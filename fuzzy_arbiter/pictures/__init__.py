@@ -1,0 +1,11 @@
+"""Pictures of an arbiter: its terms, what its rules do at a sample, and its weights over its inputs.
+
+Every function draws on the axes that it is given, or on those of a new figure, and returns them; none shows or saves
+anything. Matplotlib is needed only when one is called.
+"""
+
+from fuzzy_arbiter.pictures.fields import decisions, surface
+from fuzzy_arbiter.pictures.firing import rules
+from fuzzy_arbiter.pictures.lines import normalisations, profile, terms
+
+__all__ = ["decisions", "normalisations", "profile", "rules", "surface", "terms"]
