@@ -10,8 +10,9 @@ import numpy as np
 
 from fuzzy_arbiter.arbiter import Arbiter
 from fuzzy_arbiter.definition import Variable
-from fuzzy_arbiter.engines.firing import Array, Firing
+from fuzzy_arbiter.engines.firing import Array
 from fuzzy_arbiter.errors import DefinitionError
+from fuzzy_arbiter.sampling import defined
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -215,14 +216,10 @@ def weights_at(arbiter: Arbiter, fixed: Mapping[str, float], over: Mapping[str, 
     samples = np.empty((n, len(system.inputs)))
     for i, variable in enumerate(system.inputs):
         samples[:, i] = over[variable.name] if variable.name in over else fixed[variable.name]
-    firing = Firing(system)
-    defined = np.ones(n, dtype=bool)
-    for output, cuts in zip(system.outputs, firing.cuts_of_many(firing.strengths_of_many(samples)), strict=True):
-        if output.default is None:
-            defined &= cuts.any(axis=0)
+    known = defined(system, samples)
     weights = np.full((n, len(system.outputs)), np.nan)
-    if defined.any():
-        weights[defined] = arbiter.batch(samples[defined])
+    if known.any():
+        weights[known] = arbiter.batch(samples[known])
     return weights
 
 
