@@ -1,125 +1,221 @@
-"""The reference engine: the same definition on scikit-fuzzy's control API (min-max, centroid)."""
+"""The reference engine: the same definition on scikit-fuzzy's control API."""
 
 from __future__ import annotations
 
 import functools
-import operator
 import threading
-from collections.abc import Iterable, Sequence
-from typing import Any
+import weakref
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any, ClassVar
 
 import numpy as np
-from skfuzzy import control, trimf
+from skfuzzy import control, defuzz
+from skfuzzy.control.term import Term, WeightedTerm
+from skfuzzy.defuzzify import EmptyMembershipError
+from skfuzzy.fuzzymath.fuzzy_ops import _interp_universe_fast, interp_membership
 
-from fuzzy_arbiter.closed_form import CENTROID_HIGH, CENTROID_LOW
-from fuzzy_arbiter.definition import Criterion, Rule
+from fuzzy_arbiter.definition import System, Variable, variable_names
+from fuzzy_arbiter.engines.engine import Engine, _default
+from fuzzy_arbiter.engines.firing import Array
+from fuzzy_arbiter.engines.grid import require_clipping, sampled
+from fuzzy_arbiter.errors import EngineError
+from fuzzy_arbiter.propositions import And, Is, Not, Or, Proposition
+
+Values = tuple[float | None, ...]  # of the outputs; None where no rule fires
 
 _REMEMBERED = 4096  # results kept for inputs that come again, as crisp ones do
+_CONJUNCTIONS = {"min": np.fmin, "prod": np.multiply}
+_DISJUNCTIONS: dict[str, Callable[..., Any]] = {"max": np.fmax, "probor": lambda a, b: a + b - a * b}
 
 
-class ScikitEngine:
-    """Runs the rules in scikit-fuzzy; safe to call from several threads, each of which gets a system of its own."""
+class ScikitEngine(Engine):
+    """Runs the rules in scikit-fuzzy, of which each thread gets a system of its own.
 
-    def __init__(self, criteria: Sequence[Criterion], rules: Sequence[Rule], points: int) -> None:
-        self._criteria = tuple(criteria)
-        self._rules = tuple(rules)
-        self._points = points
+    Inputs are sampled at the knots of their terms, which is exact, outputs at `System.points` places. How far that is
+    off the exact centroid stands at `GridEngine`, which gives the same values.
+
+    Raises
+    ------
+    EngineError
+        If the implication is not the minimum, an input's term jumps, or an output's term is 0 at all points.
+    """
+
+    name: ClassVar[str] = "skfuzzy"
+
+    def __init__(self, system: System) -> None:
+        require_clipping(system, self.name)
+        for variable in system.inputs:
+            for term in variable.terms:
+                if term.shape.jumps:
+                    raise EngineError(
+                        f"engine {self.name!r}: input {variable.name!r}: term {term.name!r} jumps, where scikit-fuzzy "
+                        "interpolates; expected a continuous shape, or engine 'exact' or 'grid'"
+                    )
+        self._samples = [sampled(output, system.points) for output in system.outputs]
         self._local = threading.local()
+        super().__init__(system)
 
-    def weights(self, memberships: Sequence[float]) -> tuple[float, ...]:
-        """Return the range-normalised weight of each criterion.
+    def centroid(self, k: int, cuts: Sequence[float]) -> float:
+        """Return the centroid of an output as scikit-fuzzy defuzzifies it."""
+        grid, samples = self._samples[k]
+        return _centroid(grid, list(zip(cuts, samples, strict=True)))
 
-        Parameters
-        ----------
-        memberships : sequence of float
-            Degree of each criterion's on-term in [0, 1].
+    def centroid_of_many(self, k: int, cuts: Array) -> Array:
+        """Return the centroids of an output for many samples as scikit-fuzzy defuzzifies them."""
+        return np.array([self.centroid(k, column) for column in cuts.T.tolist()])
 
-        Returns
-        -------
-        tuple of float
-            Weights in [0, 1].
-        """
-        scale = 1.0 / (CENTROID_HIGH - CENTROID_LOW)
-        return tuple(min(max((c - CENTROID_LOW) * scale, 0.0), 1.0) for c in self.centroids(memberships))
+    def centroids(self, inputs: Sequence[float]) -> list[float]:
+        """Return the raw value of each output for one sample, all of it by scikit-fuzzy."""
+        return self._centroids(inputs)
 
-    def centroids(self, memberships: Sequence[float]) -> tuple[float, ...]:
-        """Return the raw centroid of each output, in [1/3, 2/3].
+    def centroids_of_many(self, inputs: Array) -> Array:
+        """Return the raw value of each output for many samples, one by one."""
+        rows = [self._centroids(inputs, row) for row, inputs in enumerate(inputs.tolist())]
+        return np.array(rows).reshape(len(rows), len(self.system.outputs))
 
-        Parameters
-        ----------
-        memberships : sequence of float
-            Degree of each criterion's on-term in [0, 1].
+    def _centroids(self, inputs: Sequence[float], row: int | None = None) -> list[float]:
+        # each thread has a simulation, since scikit-fuzzy keeps inputs and results in the system itself
+        if not hasattr(self._local, "runner"):
+            self._local.runner = _Runner(self.system, self._samples)
+        return [
+            _default(output, dict(zip(variable_names(self.system.inputs), inputs, strict=True)), row)
+            if value is None
+            else value
+            for output, value in zip(self.system.outputs, self._local.runner(inputs), strict=True)
+        ]
 
-        Returns
-        -------
-        tuple of float
-            Centroids, off the exact ones by at most the square of the grid step over 6.
-        """
-        if not hasattr(self._local, "simulation"):
-            self._local.simulation = _simulation(self._criteria, self._rules, self._points)
-            self._local.known = {}
-        known: dict[tuple[float, ...], tuple[float, ...]] = self._local.known
-        key = tuple(map(float, memberships))
-        if key not in known:
-            if len(known) >= _REMEMBERED:
-                known.clear()
-            known[key] = self._compute(key)
-        return known[key]
-
-    def _compute(self, memberships: tuple[float, ...]) -> tuple[float, ...]:
-        simulation = self._local.simulation
-        # all inputs, every time: scikit-fuzzy forgets them when it flushes its cache
-        for i, m in enumerate(memberships):
-            simulation.input[_input(i)] = m
-        simulation.compute()
-        return tuple(float(simulation.output[_output(i)]) for i in range(len(memberships)))
+    def __reduce__(self) -> tuple[Any, ...]:
+        return ScikitEngine, (self.system,)
 
 
-class _OrderedSystem(control.ControlSystem):  # type: ignore[misc]
-    """A control system that works out the order of its rules once, not at every evaluation."""
+class _Runner:
+    """A simulation of scikit-fuzzy, and what it gave for the last inputs; for one thread."""
 
-    _ordered: tuple[control.Rule, ...] | None = None
+    def __init__(self, system: System, samples: Sequence[tuple[Array, Array]]) -> None:
+        self._inputs = variable_names(system.inputs)
+        self._outputs = variable_names(system.outputs)
+        self._known: dict[tuple[float, ...], Values] = {}
+        built = _build(system, samples)
+        # cache=False: each run begins without what former runs left, and leaves nothing
+        self._simulation = _Simulation(built, clip_to_bounds=False, cache=False)
+        weakref.finalize(self, _forget, _stateful(built)).atexit = False
+
+    def __call__(self, inputs: Sequence[float]) -> Values:
+        key = tuple(map(float, inputs))
+        if key not in self._known:
+            if len(self._known) >= _REMEMBERED:
+                self._known.clear()
+            self._known[key] = self._run(key)
+        return self._known[key]
+
+    def _run(self, inputs: tuple[float, ...]) -> Values:
+        # all inputs, every time: scikit-fuzzy forgets them after each run
+        for name, x in zip(self._inputs, inputs, strict=True):
+            self._simulation.input[name] = x
+        self._simulation.compute()
+        return tuple(self._simulation.output.get(name) for name in self._outputs)
+
+
+class _ControlSystem(control.ControlSystem):  # type: ignore[misc]
+    """A control system whose rules stand in one order, since none needs another's result.
+
+    scikit-fuzzy works the order out at each run, and again at each rule that is added, from a graph that also links
+    terms and rules.
+    """
+
+    def __init__(self, variables: Iterable[Any], rules: Iterable[control.Rule]) -> None:
+        super().__init__()
+        self.graph.add_nodes_from(variables)
+        self._in_order = tuple(rules)
 
     @property
-    def rules(self) -> Iterable[control.Rule]:
-        return super().rules if self._ordered is None else self._ordered
-
-    def freeze(self) -> None:
-        self._ordered = tuple(super().rules)
+    def rules(self) -> tuple[control.Rule, ...]:
+        return self._in_order
 
 
-def _input(i: int) -> str:
-    return f"m_{i + 1}"
+class _Simulation(control.ControlSystemSimulation):  # type: ignore[misc]
+    """A simulation that gives no value where no rule fires, and uses nothing that NumPy is about to withdraw.
+
+    scikit-fuzzy's own way to join terms passes NumPy's `maximum` its result by position, which warns since NumPy 2.4.
+    """
+
+    def defuzz_consequents(self) -> dict[str, float]:
+        results = {}
+        for consequent in self.ctrl.consequents:
+            cuts = [(term.membership_value[self], term.mf) for term in consequent.terms.values()]
+            cuts = [(cut, degrees) for cut, degrees in cuts if cut is not None]
+            try:
+                results[consequent.label] = _centroid(consequent.universe, cuts)
+            except EmptyMembershipError:
+                continue
+        return results
 
 
-def _output(i: int) -> str:
-    return f"alpha_{i + 1}"
+def _centroid(grid: Array, terms: Sequence[tuple[float, Array]]) -> float:
+    """Return the centroid of terms (cut, samples) by the steps, and with the functions, of scikit-fuzzy."""
+    places = np.union1d(grid, [x for cut, degrees in terms for x in _interp_universe_fast(grid, degrees, cut)])
+    outline = np.zeros_like(places)
+    for cut, degrees in terms:
+        np.maximum(outline, np.minimum(cut, interp_membership(grid, degrees, places)), out=outline)
+    return float(defuzz(places, outline, "centroid"))
 
 
-def _simulation(criteria: Sequence[Criterion], rules: Sequence[Rule], points: int) -> Any:
-    """Build the system; its inputs are degrees of the on-terms, which a two-point universe represents exactly."""
-    knots = np.array([0.0, 1.0])
-    universe = np.linspace(0.0, 1.0, points)
-    inputs, outputs = [], []
-    for i, criterion in enumerate(criteria):
-        antecedent = control.Antecedent(knots, _input(i))
-        antecedent[criterion.off] = 1.0 - knots
-        antecedent[criterion.on] = knots
-        inputs.append(antecedent)
-        consequent = control.Consequent(universe, _output(i), defuzzify_method="centroid")
-        consequent["low"] = trimf(universe, [0.0, 0.0, 1.0])
-        consequent["high"] = trimf(universe, [0.0, 1.0, 1.0])
-        outputs.append(consequent)
+def _build(system: System, samples: Sequence[tuple[Array, Array]]) -> _ControlSystem:
+    inputs = {variable.name: _antecedent(variable) for variable in system.inputs}
+    outputs = {}
+    for output, (grid, degrees) in zip(system.outputs, samples, strict=True):
+        consequent = outputs[output.name] = control.Consequent(grid, output.name)
+        for term, sample in zip(output.terms, degrees, strict=True):
+            consequent[term.name] = sample
+    methods = {"and_func": _CONJUNCTIONS[system.conjunction], "or_func": _DISJUNCTIONS[system.disjunction]}
+    rules = [
+        control.Rule(
+            _condition(rule.condition, inputs),
+            [outputs[conclusion.variable][conclusion.term] % rule.weight for conclusion in rule.conclusions],
+            label=f"R{i + 1}",
+            **methods,
+        )
+        for i, rule in enumerate(system.rules)
+    ]
+    return _ControlSystem([*inputs.values(), *outputs.values()], rules)
 
-    def condition(rule: Rule) -> Any:
-        terms = [
-            inputs[t.criterion][criteria[t.criterion].on if t.on else criteria[t.criterion].off] for t in rule.terms
-        ]
-        return functools.reduce(operator.and_ if rule.join == "and" else operator.or_, terms)
 
-    system = _OrderedSystem(
-        control.Rule(condition(rule), outputs[rule.criterion]["high" if rule.high else "low"], label=f"R{i + 1}")
-        for i, rule in enumerate(rules)
-    )
-    system.freeze()
-    return control.ControlSystemSimulation(system, clip_to_bounds=False, lenient=False)
+def _antecedent(variable: Variable) -> Any:
+    """Return an input, sampled at its ends and at the knots of its terms, between which all are straight lines."""
+    low, high = variable.universe
+    knots = {x for term in variable.terms for x, _ in term.shape.points if low < x < high}
+    places = [low, *sorted(knots), high]
+    antecedent = control.Antecedent(np.array(places), variable.name)
+    for term in variable.terms:
+        antecedent[term.name] = np.array([term.shape(x) for x in places])
+    return antecedent
+
+
+def _condition(proposition: Proposition, inputs: dict[str, Any]) -> Any:
+    if isinstance(proposition, Is):
+        return inputs[proposition.variable][proposition.term]
+    if isinstance(proposition, Not):
+        return ~_condition(proposition.part, inputs)
+    assert isinstance(proposition, And | Or)
+    parts = [_condition(part, inputs) for part in proposition.parts]
+    return functools.reduce(lambda a, b: a & b if isinstance(proposition, And) else a | b, parts)
+
+
+def _stateful(system: _ControlSystem) -> list[tuple[dict[Any, Any], Any]]:
+    """Return where scikit-fuzzy keeps the state of a system: dictionaries of its classes, and the key in each."""
+    variables = list(system.graph.nodes())
+    terms = [term for variable in variables for term in variable.terms.values()]
+    return [
+        *((control.Antecedent.input.data, variable) for variable in variables),
+        *((control.Consequent.output.data, variable) for variable in variables),
+        *((Term.membership_value.data, term) for term in terms),
+        *((Term.cuts.data, term) for term in terms),
+        *((control.Rule.aggregate_firing.data, rule) for rule in system.rules),
+        *((WeightedTerm.activation.data, conclusion) for rule in system.rules for conclusion in rule.consequent),
+    ]
+
+
+def _forget(state: Sequence[tuple[dict[Any, Any], Any]]) -> None:
+    """Drop the state of a system, which scikit-fuzzy would keep for ever."""
+    for kept, key in state:
+        kept.pop(key, None)

@@ -1,0 +1,340 @@
+"""The engine that is scikit-fuzzy gives what scikit-fuzzy gives, and has none of its traps."""
+
+import gc
+import multiprocessing
+import pickle
+import subprocess
+import sys
+import threading
+import tracemalloc
+import warnings
+from functools import reduce
+from operator import and_, or_
+
+import numpy as np
+import pytest
+from skfuzzy import control
+from skfuzzy.control.term import Term as ScikitTerm
+from skfuzzy.control.term import WeightedTerm
+
+from fuzzy_arbiter import (
+    Criterion,
+    EngineError,
+    Output,
+    Rule,
+    Shape,
+    System,
+    Term,
+    UndefinedOutputError,
+    Variable,
+    falling,
+    parse_rule,
+    prioritised,
+    rising,
+    trapezoid,
+    triangle,
+)
+from fuzzy_arbiter.engines.firing import degrees_of_many
+from fuzzy_arbiter.engines.scikit import ScikitEngine
+from fuzzy_arbiter.propositions import And, Is, Not, Or
+
+STATES = (
+    control.Antecedent.input,
+    control.Consequent.output,
+    control.Rule.aggregate_firing,
+    ScikitTerm.membership_value,
+    ScikitTerm.cuts,
+    WeightedTerm.activation,
+)
+
+QUALITY = Variable(
+    "quality", (0, 10), (Term("poor", falling(0, 5)), Term("average", triangle(0, 5, 10)), Term("good", rising(5, 10)))
+)
+SERVICE = Variable(
+    "service", (0, 10), (Term("poor", falling(0, 5)), Term("average", triangle(0, 5, 10)), Term("good", rising(5, 10)))
+)
+TIP = Output(
+    "tip", (0, 25), (Term("low", falling(0, 13)), Term("medium", triangle(0, 13, 25)), Term("high", rising(13, 25)))
+)
+TIPPING = System(
+    (QUALITY, SERVICE),
+    (TIP,),
+    (
+        parse_rule("if quality is poor or service is poor then tip is low"),
+        parse_rule("if service is average then tip is medium"),
+        parse_rule("if service is good or quality is good then tip is high"),
+    ),
+    name="tipping",
+    normalisation="none",
+    points=26,
+)
+# nested conditions, weights, two conclusions, knots off the grid, a jump, a term that no rule concludes
+MIXED_OUTPUTS = (
+    Output(
+        "u",
+        (-1, 2),
+        (
+            Term("a", triangle(-1.5, -0.4, 0.31)),
+            Term("b", trapezoid(-0.2, 0.5, 0.77, 1.4)),
+            Term("c", Shape(((1.013, 0), (1.013, 0.8), (1.9, 0.2)))),
+            Term("never", triangle(0, 1, 2)),
+        ),
+        default=0.0,
+    ),
+    Output("v", (10, 30), (Term("a", falling(10, 23)), Term("b", rising(13.3, 29))), default=12.5),
+)
+MIXED_RULES = (
+    Rule((QUALITY["poor"] | ~SERVICE["poor"]) & ~(QUALITY["good"] & SERVICE["average"]), MIXED_OUTPUTS[0]["a"], 0.7),
+    Rule(
+        QUALITY["average"] & (SERVICE["good"] | QUALITY["good"]), (MIXED_OUTPUTS[0]["b"], MIXED_OUTPUTS[1]["a"]), 0.35
+    ),
+    Rule(~(QUALITY["average"] | ~SERVICE["good"]), (MIXED_OUTPUTS[0]["c"], MIXED_OUTPUTS[1]["b"])),
+    Rule(SERVICE["poor"] & QUALITY["poor"] & ~SERVICE["average"], (MIXED_OUTPUTS[1]["b"],), 0.05),
+)
+
+
+def mixed(conjunction="min", disjunction="max", points=101):
+    options = {"conjunction": conjunction, "disjunction": disjunction, "points": points}
+    return System((QUALITY, SERVICE), MIXED_OUTPUTS, MIXED_RULES, normalisation="none", **options)
+
+
+def stock(system):
+    """The system in scikit-fuzzy's own classes, as its examples build it, but with knots as universes of the inputs."""
+
+    def variable(kind, definition, universe):
+        made = kind(universe, definition.name)
+        for term in definition.terms:
+            made[term.name] = degrees_of_many(term.shape, universe)
+        return made
+
+    def condition(proposition):
+        if isinstance(proposition, Is):
+            return known[proposition.variable][proposition.term]
+        if isinstance(proposition, Not):
+            return ~condition(proposition.part)
+        join = {And: and_, Or: or_}[type(proposition)]
+        return reduce(join, map(condition, proposition.parts))
+
+    known = {}
+    for v in system.inputs:
+        knots = {x for term in v.terms for x, _ in term.shape.points if v.universe[0] < x < v.universe[1]}
+        known[v.name] = variable(control.Antecedent, v, np.array(sorted({*knots, *v.universe})))
+    for v in system.outputs:
+        known[v.name] = variable(control.Consequent, v, np.linspace(*v.universe, system.points))
+    functions = {"min": np.fmin, "max": np.fmax, "prod": np.multiply, "probor": lambda a, b: a + b - a * b}
+    rules = [
+        control.Rule(
+            condition(rule.condition),
+            [known[c.variable][c.term] % rule.weight for c in rule.conclusions],
+            and_func=functions[system.conjunction],
+            or_func=functions[system.disjunction],
+        )
+        for rule in system.rules
+    ]
+    return control.ControlSystem(rules)
+
+
+def sizes():
+    return [len(state.data) for state in STATES]
+
+
+@pytest.mark.parametrize(
+    "system",
+    [
+        TIPPING,
+        prioritised(points=11),
+        prioritised(form="complete"),
+        mixed(),
+        mixed("prod", "probor", 37),
+        mixed("prod"),
+    ],
+    ids=lambda system: f"{system.name}, {len(system.rules)} rules, {system.conjunction}, {system.disjunction}",
+)
+def test_all_of_it_is_what_stock_scikit_fuzzy_gives_to_the_last_bit(system):
+    engine, built = ScikitEngine(system), stock(system)
+    rng = np.random.default_rng(1)
+    low, high = np.array([v.universe for v in system.inputs]).T
+    for row in (low + (high - low) * np.vstack([rng.random((25, len(low))), np.eye(len(low))])).tolist():
+        simulation = control.ControlSystemSimulation(built)
+        simulation.inputs(dict(zip((v.name for v in system.inputs), row, strict=True)))
+        simulation.compute()
+        expected = [simulation.output.get(v.name, v.default) for v in system.outputs]
+        assert engine.centroids(row) == expected
+
+
+def test_many_evaluations_forget_no_input():
+    """scikit-fuzzy forgets all inputs when it clears its cache, after 1000 runs."""
+    engine = ScikitEngine(prioritised(points=3))
+    first = engine.centroids([0.1, 0.25, 0.75])
+    for x in np.linspace(0.2, 0.9, 1100).tolist():
+        assert engine.centroids([x, 0.25, 0.75])[0] > first[0]
+
+
+@pytest.mark.parametrize("n", range(1, 6))
+def test_crisp_rows_give_exactly_zero_and_one(n):
+    engine = ScikitEngine(prioritised([Criterion(f"c{i}") for i in range(n)], points=50))
+    for number in range(2**n):
+        row = [number >> i & 1 for i in range(n)]
+        floor = row.index(1) if 1 in row else None
+        assert engine.weights(row) == tuple(float(k == floor) for k in range(n))
+
+
+def gap(default=None):
+    """No rule fires between 4 and 6."""
+    x = Variable("x", (0, 10), (Term("a", falling(0, 4)), Term("b", rising(6, 10))))
+    y = Output("y", (5, 6), (Term("a", triangle(5, 5.2, 5.4)), Term("b", triangle(5.4, 5.8, 6))), default=default)
+    return System((x,), (y,), (Rule(x["a"], y["a"]), Rule(x["b"], y["b"])), normalisation="none")
+
+
+def test_an_output_for_which_no_rule_fires_is_never_an_earlier_value():
+    engine = ScikitEngine(gap())
+    for _ in range(2):
+        assert engine.centroids([1.0])[0] == pytest.approx(5.2)
+        with pytest.raises(UndefinedOutputError, match="'y': no rule fires at x = 5"):
+            engine.centroids([5.0])
+    with pytest.raises(UndefinedOutputError, match="no rule fires at row 2, x = 4"):
+        engine.weights_of_many(np.array([[1.0], [9.0], [4.0], [5.0]]))
+    assert ScikitEngine(gap(default=7.0)).centroids_of_many(np.array([[5.0], [1.0]]))[:, 0] == pytest.approx([7, 5.2])
+
+
+def test_a_batch_is_its_rows_and_may_be_empty():
+    engine = ScikitEngine(mixed())
+    rows = np.random.default_rng(3).random((20, 2)) * 10
+    assert engine.centroids_of_many(rows).tolist() == [engine.centroids(row) for row in rows.tolist()]
+    assert engine.weights_of_many(np.empty((0, 2))).shape == (0, 2)
+
+
+@pytest.mark.parametrize(
+    ("system", "words"),
+    [
+        (System(TIPPING.inputs, TIPPING.outputs, TIPPING.rules, implication="prod"), "implication is 'prod'"),
+        (
+            System(
+                (Variable("x", (0, 1), (Term("step", Shape(((0.5, 0), (0.5, 1)))),)),),
+                (TIP,),
+                ("if x is step then tip is low",),
+                normalisation="none",
+            ),
+            "input 'x': term 'step' jumps",
+        ),
+        (
+            System(
+                (QUALITY,),
+                (Output("y", (0, 1), (Term("thin", triangle(0.501, 0.505, 0.509)),)),),
+                ("if quality is poor then y is thin",),
+                normalisation="none",
+            ),
+            "term 'thin' is 0 at all 101 points; expected more points",
+        ),
+        (
+            System(
+                (QUALITY,),
+                (Output("y", (1, 1 + 1e-15), (Term("all", Shape(((1, 1),))),)),),
+                ("if quality is poor then y is all",),
+                normalisation="none",
+            ),
+            "101 points do not fit",
+        ),
+    ],
+)
+def test_what_scikit_fuzzy_cannot_run_is_refused_by_name(system, words):
+    with pytest.raises(EngineError, match=words):
+        ScikitEngine(system)
+
+
+def test_edges_at_the_ends_of_an_input_are_no_jumps():
+    x = Variable("x", (0, 1), (Term("low", triangle(0, 0, 1)), Term("high", triangle(0, 1, 1))))
+    engine = ScikitEngine(System((x,), (TIP,), ("if x is low then tip is low",), normalisation="none"))
+    assert engine.centroids([0.0]) == [engine.centroid(0, [1, 0, 0])]
+
+
+def test_threads_do_not_disturb_each_other():
+    engine = ScikitEngine(prioritised(points=11))
+    inputs = np.random.default_rng(0).random((4, 60, 3))
+    expected = engine.centroids_of_many(inputs.reshape(-1, 3)).reshape(4, 60, 3)
+    engine = ScikitEngine(engine.system)
+    found = np.zeros_like(expected)
+
+    def work(i):
+        for row in range(60):
+            found[i, row] = engine.centroids(inputs[i, row])
+
+    threads = [threading.Thread(target=work, args=(i,)) for i in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert found.tolist() == expected.tolist()
+
+
+def test_nothing_of_an_engine_or_of_a_thread_stays():
+    """scikit-fuzzy keeps each system that was ever run, 51 KB of it, in dictionaries of its classes."""
+    system = prioritised(points=11)
+
+    def use(engine):
+        engine.weights([0.2, 0.3, 0.4])
+
+    use(ScikitEngine(system))
+    gc.collect()
+    before = sizes(), sum(isinstance(thing, ScikitTerm) for thing in gc.get_objects())
+    kept = ScikitEngine(system)
+    tracemalloc.start()
+    for i in range(60):
+        use(ScikitEngine(system))
+        thread = threading.Thread(target=use, args=(kept,))
+        thread.start()
+        thread.join()
+        if i == 9:
+            gc.collect()
+            early = tracemalloc.get_traced_memory()[0]
+    gc.collect()
+    growth = tracemalloc.get_traced_memory()[0] - early
+    tracemalloc.stop()
+    assert (sizes(), sum(isinstance(thing, ScikitTerm) for thing in gc.get_objects())) == before
+    assert growth < 51_000
+
+
+def test_nothing_of_a_run_stays():
+    engine = ScikitEngine(prioritised(points=3))
+    engine.weights([0.1, 0.2, 0.3])
+    before = sizes()
+    for x in np.random.default_rng(2).random((30, 3)):
+        engine.weights(x.tolist())
+    assert sizes() == before
+    mine = list(engine._local.runner._simulation.ctrl.antecedents)
+    for state in STATES:
+        assert all(len(kept._sim_data) == 1 for key, kept in state.data.items() if key in mine)
+
+
+def test_results_that_are_remembered_are_few(monkeypatch):
+    monkeypatch.setattr("fuzzy_arbiter.engines.scikit._REMEMBERED", 5)
+    engine = ScikitEngine(prioritised(points=3))
+    for x in np.linspace(0, 1, 23):
+        engine.weights([x, 0, 0])
+        assert len(engine._local.runner._known) <= 5
+
+
+def test_an_engine_can_be_sent_to_another_process_and_forked():
+    engine = ScikitEngine(mixed(points=11))
+    here = engine.centroids([3.0, 4.0])
+    assert pickle.loads(pickle.dumps(engine)).centroids([3.0, 4.0]) == here
+    if "fork" in multiprocessing.get_all_start_methods():
+        ours, theirs = multiprocessing.Pipe()
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", DeprecationWarning)  # that this process has threads
+            process = multiprocessing.get_context("fork").Process(
+                target=lambda: theirs.send([engine.centroids([3.0, 4.0]), engine.centroids([3.5, 4.0])])
+            )
+            process.start()
+        assert ours.poll(30)
+        assert ours.recv() == [here, engine.centroids([3.5, 4.0])]
+        process.join()
+
+
+def test_no_warning_of_scikit_fuzzy_reaches_a_run():
+    code = (
+        "from fuzzy_arbiter import prioritised; from fuzzy_arbiter.engines.scikit import ScikitEngine;"
+        "print(ScikitEngine(prioritised()).weights([1, 0, 0]))"
+    )
+    done = subprocess.run([sys.executable, "-W", "error", "-c", code], capture_output=True, text=True, check=False)
+    assert (done.stdout.strip(), done.stderr) == ("(1.0, 0.0, 0.0)", "")
