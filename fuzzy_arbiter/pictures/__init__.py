@@ -7,5 +7,6 @@ anything. Matplotlib is needed only when one is called.
 from fuzzy_arbiter.pictures.fields import decisions, surface
 from fuzzy_arbiter.pictures.firing import rules
 from fuzzy_arbiter.pictures.lines import normalisations, profile, terms
+from fuzzy_arbiter.pictures.style import COLOURS
 
-__all__ = ["decisions", "normalisations", "profile", "rules", "surface", "terms"]
+__all__ = ["COLOURS", "decisions", "normalisations", "profile", "rules", "surface", "terms"]
