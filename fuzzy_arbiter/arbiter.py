@@ -271,6 +271,24 @@ class Arbiter:
 
         save(self._system, path)
 
+    def compiled(self) -> Any:
+        """Return the arbiter as a function that compiled loops can call; Numba is needed.
+
+        Returns
+        -------
+        numba dispatcher
+            ``evaluate(inputs, outputs) -> int`` on arrays of float64: fills the outputs with what a call gives, and
+            returns 0, or -i if the i-th input is bad, or k if the k-th output is undefined.
+
+        Raises
+        ------
+        EngineError
+            If Numba is not installed.
+        """
+        from fuzzy_arbiter.compiled import compiled
+
+        return compiled(self._system)
+
     def with_engine(self, engine: str) -> Arbiter:
         """Return an arbiter of the same system with another engine.
 

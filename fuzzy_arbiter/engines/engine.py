@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+import operator
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from typing import ClassVar
@@ -25,6 +27,11 @@ class Engine(ABC):
     system : System
         What is evaluated.
 
+    Attributes
+    ----------
+    scale : list of (float, float)
+        For each output the centroids that become 0 and 1; none if they are not normalised.
+
     Raises
     ------
     EngineError
@@ -36,7 +43,7 @@ class Engine(ABC):
     def __init__(self, system: System) -> None:
         self.system = system
         self.firing = Firing(system)
-        self._scale = [] if system.normalisation == "none" else [self._ends(k) for k in range(len(system.outputs))]
+        self.scale = [] if system.normalisation == "none" else [self._ends(k) for k in range(len(system.outputs))]
 
     @abstractmethod
     def centroid(self, k: int, cuts: Sequence[float]) -> float:
@@ -148,9 +155,9 @@ class Engine(ABC):
             If no rule fires for an output without default.
         """
         raw = self.centroids(inputs)
-        if not self._scale:
+        if not self.scale:
             return tuple(raw)
-        scaled = [min(max((c - low) / (high - low), 0.0), 1.0) for c, (low, high) in zip(raw, self._scale, strict=True)]
+        scaled = [min(max((c - low) / (high - low), 0.0), 1.0) for c, (low, high) in zip(raw, self.scale, strict=True)]
         return shared(scaled, self.system.normalisation)
 
     def weights_of_many(self, inputs: Array) -> Array:
@@ -172,9 +179,9 @@ class Engine(ABC):
             If no rule fires for an output without default; the first such row is named.
         """
         raw = self.centroids_of_many(inputs)
-        if not self._scale:
+        if not self.scale:
             return raw
-        low, high = np.array(self._scale).T
+        low, high = np.array(self.scale).T
         return shared_of_many(np.clip((raw - low) / (high - low), 0.0, 1.0), self.system.normalisation)
 
     def evaluator(self) -> Callable[[Sequence[float]], tuple[float, ...]]:
@@ -217,7 +224,8 @@ def shared(weights: Sequence[float], normalisation: str) -> tuple[float, ...]:
     """
     if normalisation in _EACH_BY_ITSELF:
         return tuple(weights)
-    whole = sum(weights) if normalisation == "sum" else max(weights)
+    # not sum(), which newer Pythons round otherwise than exported code
+    whole = functools.reduce(operator.add, weights) if normalisation == "sum" else max(weights)
     return tuple(w / whole for w in weights) if whole > 0.0 else (0.0,) * len(weights)
 
 

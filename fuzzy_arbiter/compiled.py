@@ -1,0 +1,40 @@
+"""The arbiter as a function that Numba compiles, to be called from compiled loops."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from fuzzy_arbiter.definition import System
+from fuzzy_arbiter.errors import EngineError
+from fuzzy_arbiter.export import to_python
+
+
+def compiled(system: System) -> Any:
+    """Return a compiled function ``evaluate(inputs, outputs) -> int``.
+
+    Parameters
+    ----------
+    system : System
+        Any.
+
+    Returns
+    -------
+    numba dispatcher
+        The function of `to_python`; arrays of float64 in, and filled.
+
+    Raises
+    ------
+    EngineError
+        If Numba is not installed.
+    """
+    try:
+        import numba
+    except ImportError:
+        raise EngineError("compiled: Numba is not installed, expected such as pip install numba") from None
+    namespace: dict[str, Any] = {}
+    exec(compile(to_python(system), f"<{system.name}>", "exec"), namespace)
+    # each function finds those it calls in the same namespace
+    for name in ("least", "greatest", "either", "envelope", "area_and_moment", "centroid", "evaluate"):
+        if name in namespace:
+            namespace[name] = numba.njit(namespace[name])
+    return namespace["evaluate"]

@@ -1,0 +1,6 @@
+"""Export to code that needs nothing of this package."""
+
+from fuzzy_arbiter.export.c import to_c
+from fuzzy_arbiter.export.python import to_python
+
+__all__ = ["to_c", "to_python"]

@@ -1,0 +1,255 @@
+"""What exported code does, before a language says it: statements, whose expressions are the same in C and in Python.
+
+``least``, ``greatest`` and ``either`` are functions of two degrees: their minimum, maximum and probabilistic sum.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import reduce
+
+from fuzzy_arbiter.definition import System
+from fuzzy_arbiter.engines import choose
+from fuzzy_arbiter.engines.closed import ClosedEngine
+from fuzzy_arbiter.engines.engine import Engine
+from fuzzy_arbiter.engines.firing import Logic
+from fuzzy_arbiter.engines.pieces import Piece
+from fuzzy_arbiter.engines.sweep import Outline, outline
+from fuzzy_arbiter.hierarchy import DEGREE
+from fuzzy_arbiter.propositions import Is
+from fuzzy_arbiter.shapes import Shape
+
+_JOINS = {"min": "least({}, {})", "max": "greatest({}, {})", "prod": "({} * {})", "probor": "either({}, {})"}
+
+
+@dataclass(frozen=True, slots=True)
+class Assign:
+    """A number gets a name; the words say what it is."""
+
+    name: str
+    expression: str
+    words: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Choose:
+    """The first branch of which the condition holds; an empty condition always does."""
+
+    branches: tuple[tuple[str, tuple[Statement, ...]], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Sweep:
+    """A number becomes the centroid of the k-th output, whose terms are cut at these numbers."""
+
+    name: str
+    k: int
+    cuts: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Return:
+    """The end, with a status."""
+
+    status: int
+
+
+Statement = Assign | Choose | Sweep | Return
+
+
+@dataclass(frozen=True, slots=True)
+class Program:
+    """Everything that is evaluated, in its order.
+
+    Attributes
+    ----------
+    system : System
+        What is said.
+    statements : tuple of Statement
+        From the inputs ``x1``, ``x2``, .. to the outputs ``y1``, ``y2``, ..
+    outlines : tuple of Outline
+        Of the outputs, if they are swept; else none.
+    """
+
+    system: System
+    statements: tuple[Statement, ...]
+    outlines: tuple[Outline, ...]
+
+
+def program(system: System) -> Program:
+    """Return what evaluates a system: the closed form where there is one, else the sweep.
+
+    Parameters
+    ----------
+    system : System
+        Any.
+
+    Returns
+    -------
+    Program
+        With the results of the engine that ``auto`` takes, to the last bit.
+    """
+    engine, _ = choose(system, "auto")
+    closed = isinstance(engine, ClosedEngine)
+    statements = (*_inputs(system), *(_closed(engine) if isinstance(engine, ClosedEngine) else _swept(engine)))
+    outlines = () if closed else tuple(map(outline, system.outputs))
+    return Program(system, (*statements, *_shared(system)), outlines)
+
+
+def _inputs(system: System) -> Iterator[Statement]:
+    """Check each input, or clip it."""
+    for i, variable in enumerate(system.inputs):
+        x, (low, high) = f"x{i + 1}", variable.universe
+        good = f"{x} == {x}" if system.outside == "clip" else f"{low!r} <= {x} and {x} <= {high!r}"
+        yield Choose(((f"not ({good})", (Return(-i - 1),)),))  # NaN too
+        if system.outside == "clip":
+            yield Assign(x, f"least(greatest({x}, {low!r}), {high!r})")
+
+
+class _Degrees:
+    """Degrees of the inputs' terms, each worked out once."""
+
+    def __init__(self, system: System) -> None:
+        self._terms = {(v.name, t.name): (i, v, t.shape) for i, v in enumerate(system.inputs, 1) for t in v.terms}
+        self._names: dict[tuple[str, str], str] = {}
+        self.statements: list[Statement] = []
+
+    def of(self, statement: Is) -> str:
+        """Return the name of a degree."""
+        key = (statement.variable, statement.term)
+        if key not in self._names:
+            name = f"m{len(self._names) + 1}"
+            i, variable, shape = self._terms[key]
+            values = _degree(f"x{i}", shape, variable.universe)
+            self.statements += _chosen(name, values, str(statement))
+            self._names[key] = name
+        return self._names[key]
+
+
+def _chosen(name: str, values: Sequence[tuple[str, str]], words: str) -> Iterator[Statement]:
+    """Give a name to the first value of which the condition holds."""
+    if len(values) == 1:
+        yield Assign(name, values[0][1], words)
+    else:
+        yield Assign(name, "0.0", words)
+        yield Choose(tuple((condition, (Assign(name, value),)) for condition, value in values))
+
+
+def _degree(x: str, shape: Shape, universe: tuple[float, float]) -> list[tuple[str, str]]:
+    """Say a membership function in its universe, as the shape itself evaluates it."""
+    if shape == DEGREE and universe == (0.0, 1.0):
+        return [("", x)]
+    knots: list[tuple[float, float, float]] = []  # place, degree left and right of it
+    for place, degree in shape.points:
+        if knots and knots[-1][0] == place:
+            knots[-1] = (place, knots[-1][1], degree)
+        else:
+            knots.append((place, degree, degree))
+    place, left, right = knots[0]
+    if len(knots) == 1 and left == right:
+        return [("", repr(left))]
+    values = [(f"{x} < {place!r}", repr(left)), (f"{x} == {place!r}", repr(max(left, right)))]
+    if left >= right:
+        values = [(f"{x} <= {place!r}", repr(left))]
+    for (a, _, start), (place, left, right) in zip(knots, knots[1:], strict=False):
+        values.append((f"{x} < {place!r}", _line(x, a, start, place - a, left - start)))
+        values.append((f"{x} == {place!r}", repr(max(left, right))))
+    if values[-1][1] == repr(right):
+        del values[-1]
+    return [*values, ("", repr(right))]
+
+
+def _line(x: str, a: float, start: float, run: float, rise: float) -> str:
+    """Say start + rise * ((x - a) / run), without what changes no bit."""
+    share = (x if a == 0.0 else f"({x} - {a!r})") + ("" if run == 1.0 else f" / {run!r}")
+    if rise == 0.0:
+        return repr(start)
+    climb = share if rise == 1.0 else f"{rise!r} * ({share})" if " " in share else f"{rise!r} * {share}"
+    return climb if start == 0.0 else f"{start!r} + {climb}"
+
+
+def _closed(engine: ClosedEngine) -> Iterator[Statement]:
+    """Work out h of each output, and C(h)."""
+    degrees = _Degrees(engine.system)
+    values: list[Statement] = []
+    unclaimed = ""
+    for k, (output, clauses) in enumerate(zip(engine.system.outputs, engine.clauses, strict=True), 1):
+        if engine.ladder is not None:  # the running minimum of prioritised criteria
+            m = _literal(engine.ladder[k - 1], degrees)
+            high = f"least({m}, {unclaimed})" if unclaimed else m
+            free = f"least({unclaimed}, 1.0 - {m})" if unclaimed else f"1.0 - {m}"
+            unclaimed = f"u{k}"
+        else:
+            least = (reduce(_JOINS["min"].format, (_literal(x, degrees) for x in sorted(c))) for c in clauses)
+            high = reduce(_JOINS["max"].format, least)
+        values.append(Assign(f"h{k}", high, str(Is(output.name, output.term_names[1]))))
+        if engine.ladder is not None and k < len(engine.clauses):
+            values.append(Assign(unclaimed, free, "no criterion so far asks"))
+    yield from degrees.statements
+    yield from values
+    for k, (output, forms) in enumerate(zip(engine.system.outputs, engine.scaled, strict=True), 1):
+        ends = [*(f"h{k} < {piece.start!r}" for piece in forms[1:]), ""]
+        values_of_h = [_piece(piece, f"h{k}") for piece in forms]
+        yield from _chosen(f"y{k}", list(zip(ends, values_of_h, strict=True)), output.name)
+
+
+def _literal(literal: tuple[str, str, bool], degrees: _Degrees) -> str:
+    variable, term, affirmed = literal
+    degree = degrees.of(Is(variable, term))
+    return degree if affirmed else f"(1.0 - {degree})"
+
+
+def _piece(piece: Piece, h: str) -> str:
+    t = h if piece.start == 0.0 else f"({h} - {piece.start!r})"
+    above = _horner(piece.numerator, t)
+    return above if piece.denominator == (1.0, 0.0, 0.0) else f"({above}) / ({_horner(piece.denominator, t)})"
+
+
+def _horner(coefficients: Sequence[float], t: str) -> str:
+    result = ""
+    for c in reversed(coefficients):
+        product = f"{t} * ({result})" if " + " in result else f"{t} * {result}" if result else ""
+        result = (f"{c!r} + {product}" if c else product) if product else repr(c) if c else ""
+    return result or "0.0"
+
+
+def _swept(engine: Engine) -> Iterator[Statement]:
+    """Work out the strength of each rule, the cut of each output's term, and the centroids."""
+    system = engine.system
+    degrees = _Degrees(system)
+    logic: Logic[str] = Logic(
+        _JOINS[system.conjunction].format, _JOINS[system.disjunction].format, lambda a: f"(1.0 - {a})"
+    )
+    rules = []
+    for i, rule in enumerate(system.rules, 1):
+        degree = logic.degree(rule.condition, degrees.of)
+        weighted = degree if rule.weight == 1.0 else f"{degree} * {rule.weight!r}"
+        rules.append(Assign(f"r{i}", weighted, str(rule)))
+    yield from degrees.statements
+    yield from rules
+    for k, output in enumerate(system.outputs, 1):
+        cuts = []
+        for j, term in enumerate(output.term_names, 1):
+            fires = [f"r{i}" for i, rule in enumerate(system.rules, 1) if output[term] in rule.conclusions]
+            cuts.append(f"c{k}_{j}")
+            yield Assign(cuts[-1], reduce(_JOINS["max"].format, fires) if fires else "0.0", str(output[term]))
+        default = Return(k) if output.default is None else Assign(f"y{k}", repr(output.default))
+        yield Assign(f"y{k}", "0.0", output.name)
+        any_fires = " or ".join(f"{cut} > 0.0" for cut in cuts)
+        yield Choose(((any_fires, (Sweep(f"y{k}", k, tuple(cuts)),)), ("", (default,))))
+        if engine.scale:
+            low, high = engine.scale[k - 1]
+            scaled = f"(y{k} - {low!r}) / {high - low!r}"
+            yield Assign(f"y{k}", f"least(greatest({scaled}, 0.0), 1.0)")
+
+
+def _shared(system: System) -> Iterator[Statement]:
+    """Divide by the sum or the greatest of all, if that is the normalisation."""
+    if system.normalisation not in ("sum", "max"):
+        return
+    ys = [f"y{k}" for k in range(1, len(system.outputs) + 1)]
+    whole = " + ".join(ys) if system.normalisation == "sum" else reduce(_JOINS["max"].format, ys)
+    yield Assign("whole", whole)
+    # where all are 0 they stay so
+    yield Choose((("whole > 0.0", tuple(Assign(y, f"{y} / whole") for y in ys)),))
