@@ -96,14 +96,12 @@ def convert(file: str, out: str, native: bool) -> None:
     UnsupportedError
         If the format cannot say all of the system; nothing is written then.
     """
-    from fuzzy_arbiter.formats import FORMATS, save
+    from fuzzy_arbiter.formats import FORMATS, natively, save
 
     suffix = Path(out).suffix[1:].lower()
     require_suffix(out, (*FORMATS, *EXPORTS))
     system = load_system(file)
     if native:
-        from fuzzy_arbiter.formats.native import natively
-
         system = natively(system)
     if suffix in EXPORTS:
         from fuzzy_arbiter.export import to_c, to_python
