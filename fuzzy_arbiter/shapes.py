@@ -21,8 +21,8 @@ class Shape:
     Attributes
     ----------
     points : tuple of (float, float)
-        Places, which never decrease, and degrees in [0, 1]. Two points of one place make a jump, where the shape has the
-        greater of the two degrees.
+        Places, which never decrease, and degrees in [0, 1]. Two points of one place make a jump, where the shape has
+        the greater of the two degrees.
 
     Raises
     ------
@@ -129,7 +129,9 @@ class Shape:
         # a jump at an end of the universe matters if its outer point is the higher one, whose degree counts there
         while len(points) > 1 and points[1][0] <= low and not (points[0][0] == low and points[0][1] > points[1][1]):
             del points[0]
-        while len(points) > 1 and points[-2][0] >= high and not (points[-1][0] == high and points[-1][1] > points[-2][1]):
+        while (
+            len(points) > 1 and points[-2][0] >= high and not (points[-1][0] == high and points[-1][1] > points[-2][1])
+        ):
             del points[-1]
         inside = Shape(tuple(points))
         return inside if len(inside.points) > 1 else Shape(((low, inside.points[0][1]),))
