@@ -91,7 +91,7 @@ class _Reader:
         return read_number(self.tokens[self.at - 1].text, self.tokens[self.at - 1].line, what)
 
     def system(self, settings: dict[str, Any]) -> System:
-        self.take("FUNCTION_BLOCK")
+        begin = self.take("FUNCTION_BLOCK")
         name = self.name("the block's name").text if self.here.text.lower() not in RESERVED else "arbiter"
         sections: dict[str, Callable[[], None]] = {
             "VAR_INPUT": lambda: self.variables(self.inputs),
@@ -111,8 +111,7 @@ class _Reader:
         for variable, draft in self.outputs.items():
             with located(f"line {draft.line}"):
                 outputs.append(Output(*self.parts(variable, draft, "DEFUZZIFY"), draft.default))
-        with located("FUNCTION_BLOCK"):
-            return assembled(inputs, outputs, self.rules, name=name, **(self.norms or {}), **settings)
+        return assembled(begin.line, inputs, outputs, self.rules, name=name, **(self.norms or {}), **settings)
 
     def parts(self, name: str, draft: _Draft, section: str) -> tuple[str, tuple[float, float], tuple[Term, ...]]:
         if draft.terms is None:

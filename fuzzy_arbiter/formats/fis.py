@@ -112,7 +112,7 @@ def _rule(system: System, i: int) -> str:
     for part in parts:
         statement = _statement(part)
         if statement is None:
-            raise cannot_say("fis", i, rule, "one connective per rule, and only single terms negated")
+            raise cannot_say("fis", i, rule, "one connective per rule, and only terms negated")
         k = names.index(statement.variable)
         if k <= last:
             raise cannot_say("fis", i, rule, "each input once, in the order of the inputs")

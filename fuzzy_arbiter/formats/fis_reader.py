@@ -79,8 +79,7 @@ def read(text: str) -> System:
         with located(f"line {line}: {row!r}"):
             rules.append((line, _rule(line, row, inputs, outputs)))
     made = [Output(v.name, v.universe, v.terms) for v in outputs]
-    with located(f"line {system.line}"):
-        return assembled(inputs, made, rules, name=name or "arbiter", **norms, **settings)
+    return assembled(system.line, inputs, made, rules, name=name or "arbiter", **norms, **settings)
 
 
 def _sections(text: str) -> tuple[dict[str, _Section], list[tuple[int, str]]]:

@@ -81,5 +81,5 @@ def _condition(p: Proposition, i: int, rule: Rule) -> str:
     while isinstance(p, Not):
         p, negations = p.part, negations + 1
     if not isinstance(p, Is):
-        raise cannot_say("fll", i, rule, "only single terms negated")
+        raise cannot_say("fll", i, rule, "only terms negated")
     return f"{p.variable} is {'not ' * negations}{p.term}"

@@ -84,8 +84,7 @@ def read(text: str) -> System:
         rules += found
     name = engines[0].name or "arbiter"
     options = {"outside": clips or "refuse", "points": points or RESOLUTION, **(norms or {}), **settings}
-    with located(f"line {engines[0].line}"):
-        return assembled(variables, results, rules, name=name, **options)
+    return assembled(engines[0].line, variables, results, rules, name=name, **options)
 
 
 def _blocks(text: str) -> tuple[list[_Block], list[tuple[int, str]]]:

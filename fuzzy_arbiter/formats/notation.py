@@ -94,7 +94,23 @@ def refuse(line: int, what: str) -> NoReturn:
     FormatError
         Always.
     """
-    raise FormatError(f"line {line}: {what}")
+    raise FormatError(f"line {line}: {shortened(what)}")
+
+
+def shortened(text: str) -> str:
+    """Return a text without its middle if it is long.
+
+    Parameters
+    ----------
+    text : str
+        Part of a fault, which may quote a long line.
+
+    Returns
+    -------
+    str
+        At most 400 characters.
+    """
+    return text if len(text) <= 400 else f"{text[:250]} ... {text[-140:]}"
 
 
 @contextmanager
@@ -114,16 +130,22 @@ def located(where: str) -> Iterator[None]:
     try:
         yield
     except DefinitionError as error:
-        raise type(error)(f"{where}: {error}") from None
+        raise type(error)(f"{shortened(where)}: {shortened(str(error))}") from None
 
 
 def assembled(
-    inputs: Sequence[Variable], outputs: Sequence[Output], rules: Sequence[tuple[int, Rule]], **options: Any
+    line: int,
+    inputs: Sequence[Variable],
+    outputs: Sequence[Output],
+    rules: Sequence[tuple[int, Rule]],
+    **options: Any,
 ) -> System:
     """Return the system of a file.
 
     Parameters
     ----------
+    line : int
+        Where the system begins.
     inputs, outputs
         As of `System`.
     rules : sequence of (int, Rule)
@@ -139,13 +161,14 @@ def assembled(
     Raises
     ------
     DefinitionError
-        If it cannot be; a fault of a rule names its line.
+        If it cannot be; the line is named, for a rule its own.
     """
     try:
         return System(tuple(inputs), tuple(outputs), tuple(rule for _, rule in rules), **options)
     except DefinitionError as error:
         fault = re.match(r"R(\d+) ", str(error))
-        raise (type(error)(f"line {rules[int(fault[1]) - 1][0]}: {error}") if fault else error) from None
+        where = rules[int(fault[1]) - 1][0] if fault else line
+        raise type(error)(f"line {where}: {shortened(str(error))}") from None
 
 
 def require_words(system: System, format: str, reserved: frozenset[str]) -> None:
@@ -212,9 +235,7 @@ def cannot_say(format: str, i: int, rule: Rule, why: str, what: str = "condition
     UnsupportedError
         To be raised.
     """
-    text = str(rule)
-    quoted = text if len(text) <= 200 else f"{text[:200]}..."
-    return UnsupportedError(f"{format} cannot say the {what} of R{i + 1} {quoted!r}: {why}")
+    return UnsupportedError(f"{format} cannot say the {what} of R{i + 1} {shortened(str(rule))!r}: expected {why}")
 
 
 def require_shallow(system: System, format: str) -> None:
@@ -234,7 +255,7 @@ def require_shallow(system: System, format: str) -> None:
     """
     for i, rule in enumerate(system.rules):
         if _nesting(rule.condition) > MAX_NESTING:
-            raise cannot_say(format, i, rule, f"expected nesting to {MAX_NESTING} levels")
+            raise cannot_say(format, i, rule, f"nesting to {MAX_NESTING} levels")
 
 
 def _nesting(proposition: Proposition) -> int:

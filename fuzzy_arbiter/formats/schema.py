@@ -11,6 +11,7 @@ from fuzzy_arbiter.definition import Output, System, Term, Variable
 from fuzzy_arbiter.errors import FormatError
 from fuzzy_arbiter.formats.notation import located
 from fuzzy_arbiter.hierarchy import DEGREE, WEIGHT, Criterion, prioritised
+from fuzzy_arbiter.propositions import is_identifier
 from fuzzy_arbiter.rule_text import parse_rule
 from fuzzy_arbiter.shapes import Shape, falling, rising, trapezoid, triangle
 
@@ -78,7 +79,7 @@ def _variable(data: object, where: str, kind: type[Variable]) -> Any:
     bounds = _numbers(_needed(table, "universe", where), 2, f"{where}.universe")
     terms = []
     for term, shape in _table(_needed(table, "terms", where), f"{where}.terms").items():
-        terms.append(Term(term, _shape(shape, f"{where}.terms.{term}")))
+        terms.append(Term(term, _shape(shape, _path(f"{where}.terms", term))))
     options = {}
     if table.get("default") is not None:
         options["default"] = _number(table["default"], f"{where}.default")
@@ -115,14 +116,18 @@ def _table(data: object, where: str, known: tuple[str, ...] = ()) -> dict[str, A
         if known and key not in known:
             near = difflib.get_close_matches(key, known, 1)
             hint = f"; did you mean {near[0]!r}" if near else ""
-            path = f"{where}.{key}" if where else key
-            raise FormatError(f"{path}: unknown key, expected one of {', '.join(known)}{hint}")
+            raise FormatError(f"{_path(where, key)}: unknown key, expected one of {', '.join(known)}{hint}")
     return data
+
+
+def _path(where: str, key: str) -> str:
+    name = key if is_identifier(key) else repr(key)
+    return f"{where}.{name}" if where else name
 
 
 def _needed(table: dict[str, Any], key: str, where: str) -> Any:
     if key not in table:
-        raise FormatError(f"{where}.{key}: key is missing" if where else f"{key}: key is missing")
+        raise FormatError(f"{_path(where, key)}: key is missing")
     return table[key]
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 import re
 from collections.abc import Iterable, Sequence
 from typing import Any, get_args
@@ -36,15 +37,14 @@ def say_settings(system: System, keys: Sequence[str]) -> list[str]:
     texts = [f"{MARK} {', '.join(said)}"] if said else []
     if system.normalisation == "none":
         return texts
-    texts.append("other tools give the raw centroid c of each output; its weight is")
+    texts.append("other tools give the raw centroid c of each output; the weights are")
     for output in system.outputs:
         low, high = range_ends(output)
-        texts.append(
-            f"  {output.name}: (c - {say_number(float(low))}) / {say_number(float(high - low))}, within [0, 1]"
-        )
+        zero, scale = say_number(float(low)), say_number(float(high - low))
+        texts.append(f"  (c - {zero}) / {scale}, held within [0, 1], for {output.name}")
     if system.normalisation in ("sum", "max"):
         whole = "sum" if system.normalisation == "sum" else "greatest"
-        texts.append(f"  and then each is divided by the {whole} of all, unless that is 0")
+        texts.append(f"  and then each divided by the {whole} of all, unless that is 0")
     return texts
 
 
@@ -66,12 +66,15 @@ def read_settings(comments: Iterable[tuple[int, str]], keys: Sequence[str]) -> d
     Raises
     ------
     FormatError
-        If a comment that begins as ours says what there is not, or there are two.
+        If a comment that begins as ours, or almost so, says what there is not, or there are two.
     """
     settings = {key: PLAIN[key] for key in keys}
     first: int | None = None
     for line, text in comments:
         if not text.strip().startswith(MARK):
+            word = re.match(r"\s*([\w-]*)", text)
+            if word and difflib.SequenceMatcher(None, word[1].lower(), MARK[:-1]).ratio() > 0.8:
+                refuse(line, f"{text.strip()!r} is almost such a comment, expected {MARK!r} or another first word")
             continue
         if first is not None:
             refuse(line, f"{text.strip()!r} is the second such comment after line {first}, expected one")
