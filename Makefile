@@ -25,6 +25,7 @@ lint: $(VENV)/ready
 bench: $(VENV)/ready
 	$(BIN)/python -m benchmarks step
 	$(BIN)/python -m benchmarks fmu
+	$(BIN)/python -m benchmarks fuzzy
 
 $(VENV)/ready: pyproject.toml
 	$(PYTHON) -c 'import sys; sys.exit(None if sys.version_info >= (3, 11) else "Python 3.11 or later is needed")'

@@ -1,14 +1,14 @@
-"""``python -m benchmarks {step,fmu}``: microseconds a step and ratios, in a table."""
+"""``python -m benchmarks {step,fmu,fuzzy}``: microseconds a step and ratios, in a table."""
 
 from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
 
-from benchmarks import fmu, step
+from benchmarks import fmu, fuzzy, step
 from benchmarks.timing import print_rows
 
-BENCHMARKS = {"step": step, "fmu": fmu}
+BENCHMARKS = {"step": step, "fmu": fmu, "fuzzy": fuzzy}
 REPEATS = 5
 
 

@@ -66,5 +66,9 @@ def print_rows(rows: Sequence[Row], repeats: int, ratio: str) -> None:
             print(f"{row.name:{width}} {row.timing}")
             continue
         t = row.timing
-        to_base = f"{t.median / medians[row.base]:8.2f}"
-        print(f"{row.name:{width}} {t.least:8.2f} {t.median:8.2f} {t.most:8.2f} {to_base}")
+        figures = (t.least, t.median, t.most, t.median / medians[row.base])
+        print(f"{row.name:{width}} {' '.join(map(_figure, figures))}")
+
+
+def _figure(x: float) -> str:
+    return f"{x:8.2f}" if x >= 0.1 else f"{x:8.2g}"

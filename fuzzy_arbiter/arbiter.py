@@ -159,13 +159,18 @@ class Arbiter:
                 if name not in self._names:
                     raise InputError(f"{name}: unknown input, expected {', '.join(self._names)}")
             return [inputs[name] for name in self._names]
-        return inputs.tolist() if isinstance(inputs, np.ndarray) else list(inputs)
+        if isinstance(inputs, np.ndarray):
+            return list(inputs.tolist())
+        if isinstance(inputs, Sequence):
+            return list(inputs)
+        raise TypeError(inputs)
 
     def _fault(self, inputs: Sample) -> InputError:
         """Find out what is wrong with a sample that was refused."""
-        if isinstance(inputs, str) or not isinstance(inputs, Sequence | Mapping | np.ndarray):
+        try:
+            values = self._in_order(inputs)
+        except TypeError:
             return InputError(f"inputs are {inputs!r}, expected {len(self._names)} numbers")
-        values = self._in_order(inputs)
         if len(values) != len(self._names):
             return InputError(f"{len(values)} inputs came, expected {len(self._names)}: {', '.join(self._names)}")
         for name, x, (low, high) in zip(self._names, values, self._limits, strict=True):
@@ -188,7 +193,7 @@ class Arbiter:
         if not good.all():
             row, i = np.argwhere(~good)[0]
             expected = f"expected a number in [{low[i]:g}, {high[i]:g}]"
-            raise InputError(f"row {row}: {self._names[i]} is {values[row, i]!r}, {expected}")
+            raise InputError(f"row {row}: {self._names[i]} is {float(values[row, i])!r}, {expected}")
         return np.clip(values, low, high) if clip else values
 
     def explain(self, inputs: Sample) -> Explanation:

@@ -72,8 +72,8 @@ class ClosedEngine(Engine):
             raise NoClosedFormError(clauses)
         self.clauses = clauses
         self.ladder = ladder(system, clauses)
-        self.raw = _pieces(system.outputs, scale=False)
-        self.scaled = self.raw if system.normalisation == "none" else _pieces(system.outputs, scale=True)
+        self.raw, scaled = _pieces(system.outputs)
+        self.scaled = self.raw if system.normalisation == "none" else scaled
         super().__init__(system)
         self._index = {v.name: i for i, v in enumerate(system.inputs)}
         self._shapes = {(v.name, t.name): t.shape for v in system.inputs for t in v.terms}
@@ -183,11 +183,11 @@ def _proved(system: System) -> tuple[tuple[Clause, ...], ...] | str:
     return clauses if isinstance(clauses, str) else tuple(clauses)
 
 
-def _pieces(outputs: Sequence[Output], scale: bool) -> tuple[tuple[Piece, ...], ...]:
-    """Return C(h) of each output, worked out once for those that differ in name alone."""
+def _pieces(outputs: Sequence[Output]) -> tuple[tuple[tuple[Piece, ...], ...], tuple[tuple[Piece, ...], ...]]:
+    """Return C(h) of each output, raw and scaled, worked out once for those that differ in name alone."""
     patterns = [replace(output, name="any") for output in outputs]
-    known = {pattern: pieces(pattern, scale) for pattern in set(patterns)}
-    return tuple(known[pattern] for pattern in patterns)
+    known = {pattern: pieces(pattern) for pattern in dict.fromkeys(patterns)}
+    return tuple(known[pattern][0] for pattern in patterns), tuple(known[pattern][1] for pattern in patterns)
 
 
 def _one_cubic(forms: Sequence[tuple[Piece, ...]]) -> tuple[float, ...] | None:

@@ -46,20 +46,22 @@ def _centroids(cuts: Array, shape: Outline, scaled: bool) -> Array:
     left, right = (np.reshape(side, (-1, terms, 1)) for side in (shape.left, shape.right))
     for piece, (a, b) in enumerate(zip(left, right, strict=True)):
         start, width = shape.places[piece] - shape.places[0], shape.places[piece + 1] - shape.places[piece]
-        if scaled:
-            a, b = a * cuts, b * cuts
+        start_at, end_at = (a * cuts, b * cuts) if scaled else (a, b)
         levels = [] if scaled else [(a, b, cut, cut) for cut in cuts]  # each term against each cut
-        others = [(a[:t], b[:t], a[t], b[t]) for t in range(1, terms)]  # and against the terms before it
+        # and each against those before it
+        others = [(start_at[t], end_at[t], start_at[:t], end_at[:t]) for t in range(1, terms)]
         breaks = [np.zeros((1, n)), np.ones((1, n)), *(_crossings(*pair, n) for pair in (*levels, *others))]
         places = np.sort(np.concatenate(breaks), axis=0)
         heights = np.zeros_like(places)
         for t in range(terms):
             degrees = a[t] + (b[t] - a[t]) * places
-            np.maximum(heights, degrees if scaled else np.minimum(degrees, cuts[t]), out=heights)
+            np.maximum(heights, degrees * cuts[t] if scaled else np.minimum(degrees, cuts[t]), out=heights)
         x, w = start + places * width, np.diff(places, axis=0) * width
-        area += (w * (heights[:-1] + heights[1:])).sum(axis=0) / 2.0
-        both = x[:-1] * (2.0 * heights[:-1] + heights[1:]) + x[1:] * (heights[:-1] + 2.0 * heights[1:])
-        moment += (w * both).sum(axis=0) / 6.0
+        for i, width_i in enumerate(w):  # one after another, as for one sample, to the same bits
+            area += width_i * (heights[i] + heights[i + 1]) / 2
+            moment += (
+                width_i * (x[i] * (2 * heights[i] + heights[i + 1]) + x[i + 1] * (heights[i] + 2 * heights[i + 1])) / 6
+            )
     return np.asarray(shape.places[0] + moment / area)
 
 

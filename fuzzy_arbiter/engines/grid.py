@@ -60,12 +60,22 @@ class GridEngine(Engine):
                 cell = math.floor(min(max((cuts[u] - left) / rise * piece.cells, 0.0), piece.cells - 1.0))
                 shares += cell / piece.cells, (cell + 1.0) / piece.cells
             shares.sort()
-            heights = [max(min(left + rise * x, cuts[t]) for t, left, rise in piece.terms) for x in shares]
             # twice the area and six times the moment of the trapezoids, in shares of the piece
-            twice = sixfold = 0.0
-            for x0, x1, y0, y1 in zip(shares, shares[1:], heights, heights[1:], strict=False):
-                twice += (x1 - x0) * (y0 + y1)
-                sixfold += (x1 - x0) * (x0 * (y0 + y1 + y0) + x1 * (y0 + y1 + y1))
+            x0 = y0 = twice = sixfold = 0.0
+            for x1 in shares:
+                y1 = 0.0
+                for t, left, rise in piece.terms:
+                    y = left + rise * x1
+                    cut = cuts[t]
+                    if y > cut:
+                        y = cut
+                    if y > y1:
+                        y1 = y
+                width = x1 - x0
+                height = y0 + y1
+                twice += width * height
+                sixfold += width * (x0 * (height + y0) + x1 * (height + y1))
+                x0, y0 = x1, y1
             area += piece.width / 2.0 * twice
             moment += piece.start * piece.width / 2.0 * twice + piece.width * piece.width / 6.0 * sixfold
         low = self.system.outputs[k].universe[0]
@@ -73,15 +83,15 @@ class GridEngine(Engine):
 
     def centroid_of_many(self, k: int, cuts: Array) -> Array:
         """Return the centroids of an output for many samples, each to the last bit as for that sample alone."""
-        n = cuts.shape[1]
-        if n == 1:  # whose sums NumPy takes in another order
-            return np.array([self.centroid(k, cuts[:, 0].tolist())])
-        result = np.empty(n)
+        result = np.empty(cuts.shape[1])
         low = self.system.outputs[k].universe[0]
-        for first in range(0, n, _BLOCK):
-            block = slice(first, first + _BLOCK)
-            area, moment = _integrals(self._pieces[k], cuts[:, block])
-            result[block] = np.where(
+        for first in range(0, len(result), _BLOCK):
+            block = cuts[:, first : first + _BLOCK]
+            if block.shape[1] == 1:  # of which NumPy takes sums in another order
+                result[first] = self.centroid(k, block[:, 0].tolist())
+                continue
+            area, moment = _integrals(self._pieces[k], block)
+            result[first : first + _BLOCK] = np.where(
                 area >= LEAST_AREA, low + moment / np.maximum(area, LEAST_AREA), (low * area + moment) / LEAST_AREA
             )
         return result
@@ -211,6 +221,7 @@ def _piece(grid: Array, samples: Array, a: int, b: int) -> _Piece:
     return _Piece(start, width, b - a, tuple(padded), tuple(own), tuple(foreign))
 
 
+@np.errstate(over="ignore")  # of a share on a line that hardly rises, which is beyond the piece in any case
 def _integrals(pieces: Sequence[_Piece], cuts: Array) -> tuple[Array, Array]:
     """Return area and moment about the universe's least place for cuts of shape (terms, n)."""
     n = cuts.shape[1]

@@ -54,43 +54,52 @@ class Piece:
         return (n0 + t * (n1 + t * (n2 + t * n3))) / (d0 + t * (d1 + t * d2))
 
 
-def pieces(output: Output, scale: bool) -> tuple[Piece, ...]:
-    """Return the pieces of an output's centroid as a function of the cut h of its second term, if 1 - h is its first's.
+def pieces(output: Output) -> tuple[tuple[Piece, ...], tuple[Piece, ...]]:
+    """Return an output's centroid as a function of the cut h of its second term, if that of its first is 1 - h.
 
     Parameters
     ----------
     output : Output
         With two terms.
-    scale : bool
-        Whether the lesser of C(0) and C(1) becomes 0 and the greater one 1.
 
     Returns
     -------
-    tuple of Piece
-        From h = 0 to 1; none if C(0) = C(1) and that shall be scaled.
+    raw : tuple of Piece
+        C(h), from h = 0 to 1.
+    scaled : tuple of Piece
+        The same, such that the lesser of C(0) and C(1) becomes 0 and the greater one 1; empty if they are equal.
     """
     shape = outline(output, Fraction)
-    ends = [_centroid(shape, Fraction(h)) for h in (0, 1)]
-    low, high = (min(ends), max(ends)) if scale else (Fraction(0), Fraction(1))
-    if low == high:
-        return ()
-    result: list[tuple[Fraction, Polynomial, Polynomial]] = []
-    whole: tuple[Polynomial, Polynomial] | None = None
+    fits: list[tuple[Fraction, Polynomial, Polynomial]] = []  # start, area, moment
     events = _events(shape)
     for start, end in zip(events, events[1:], strict=False):
         at = [start + (end - start) * Fraction(i, 3) for i in range(4)]
         areas, moments = zip(*(area_and_moment((1 - h, h), *shape, False) for h in at), strict=True)
-        # (M / A - low) / (high - low), where moments are taken about the universe's start
-        shift = shape.places[0] - low
-        denominator = _fitted(at, [a * (high - low) for a in areas])
-        numerator = _fitted(at, [m + shift * a for m, a in zip(moments, areas, strict=True)])
-        if (numerator, denominator) != whole:
-            whole = numerator, denominator
-            result.append((start, numerator, denominator))
-    forms = [_floats(*piece) for piece in result]
-    last = float((ends[1] - low) / (high - low))
-    if forms[-1](1.0) != last:  # rounded
-        forms.append(Piece(1.0, (last, 0.0, 0.0, 0.0), (1.0, 0.0, 0.0)))
+        fit = (_fitted(at, areas), _fitted(at, moments))
+        if not fits or fit != fits[-1][1:]:
+            fits.append((start, *fit))
+    ends = [_centroid(shape, Fraction(h)) for h in (0, 1)]
+    raw = _forms(fits, shape.places[0], Fraction(1), ends[1])
+    low, high = min(ends), max(ends)
+    if low == high:
+        return raw, ()
+    return raw, _forms(fits, shape.places[0] - low, high - low, (ends[1] - low) / (high - low))
+
+
+def _forms(
+    fits: list[tuple[Fraction, Polynomial, Polynomial]], shift: Fraction, span: Fraction, last: Fraction
+) -> tuple[Piece, ...]:
+    """Return (moment / area + shift) / span as pieces, exact at h = 1, where it has the last value."""
+    forms = []
+    for start, area, moment in fits:
+        above = _about(start, [m + shift * a for m, a in zip(moment, area, strict=True)])
+        below = _about(start, [a * span for a in area])
+        unit = below[0]  # above 0, as the area is
+        forms.append(
+            Piece(float(start), tuple(float(c / unit) for c in above), tuple(float(c / unit) for c in below[:3]))
+        )
+    if forms[-1](1.0) != float(last):  # rounded
+        forms.append(Piece(1.0, (float(last), 0.0, 0.0, 0.0), (1.0, 0.0, 0.0)))
     return tuple(forms)
 
 
@@ -127,16 +136,10 @@ def _fitted(at: Sequence[Fraction], values: Sequence[Fraction]) -> Polynomial:
     return tuple(coefficients)
 
 
-def _about(start: Fraction, polynomial: Polynomial) -> Polynomial:
+def _about(start: Fraction, polynomial: Sequence[Fraction]) -> Polynomial:
     """Return the coefficients of the same polynomial in t = h - start."""
     coefficients = list(polynomial)
     for low in range(len(coefficients)):
         for i in range(len(coefficients) - 2, low - 1, -1):
             coefficients[i] += start * coefficients[i + 1]
     return tuple(coefficients)
-
-
-def _floats(start: Fraction, numerator: Polynomial, denominator: Polynomial) -> Piece:
-    above, below = _about(start, numerator), _about(start, denominator)
-    unit = below[0]  # the area at the start, above 0
-    return Piece(float(start), tuple(float(c / unit) for c in above), tuple(float(c / unit) for c in below[:3]))

@@ -186,6 +186,24 @@ def test_scikit_fuzzy_itself_keeps_the_bound(points):
         assert found == pytest.approx(float(exact_centroid(WEIGHT, [1 - Fraction(h), h])), abs=step**2 / 6 + 1e-13)
 
 
+@pytest.mark.parametrize("n", [0, 1, 2, 4097])
+def test_a_sample_of_a_batch_is_to_the_last_bit_what_it_is_alone(n):
+    engine = GridEngine(one_output(TIP, 40))
+    cuts = np.random.default_rng(n).random((3, n))
+    found = engine.centroid_of_many(0, cuts).tolist()
+    assert len(found) == n
+    assert found[-3:] == [engine.centroid(0, column) for column in cuts.T.tolist()[-3:]]
+
+
+def test_a_term_that_hardly_rises():
+    flat = Output("y", (0, 1), (Term("a", Shape(((0, 0), (1, 1e-310)))), Term("b", triangle(0, 0.5, 1))))
+    engine = GridEngine(one_output(flat, 11))
+    cuts = np.array([[1.0, 0.3], [0.7, 0.2]])
+    expected = ScikitEngine(engine.system).centroid_of_many(0, cuts)
+    assert engine.centroid_of_many(0, cuts) == pytest.approx(expected, abs=BAR)
+    assert [engine.centroid(0, column) for column in cuts.T.tolist()] == pytest.approx(expected, abs=BAR)
+
+
 def test_crisp_rows_give_exactly_zero_and_one():
     for points in (3, 10, 101):
         engine = GridEngine(prioritised(points=points))

@@ -1,0 +1,156 @@
+"""Two systems in pyfuzzylite and in simpful; it stands alone, since pyfuzzylite needs a NumPy of its own.
+
+One request in JSON comes on the standard input, and one answer in JSON goes to the standard output:
+``{"library": "simpful", "system": "tipping", "resolution": 100, "inputs": [[6.5, 9.8]], "repeats": 0}``. With repeats
+the answer has the microseconds of an evaluation, for each repeat, with other inputs at each evaluation.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+import time
+from collections.abc import Callable
+from importlib.metadata import version
+from typing import Any
+
+LIBRARIES = ("pyfuzzylite", "simpful")
+
+# ranges, and the points of each term
+_DEGREE = ((0.0, 1.0), {"off": ((0.0, 1.0), (1.0, 0.0)), "on": ((0.0, 0.0), (1.0, 1.0))})
+_WEIGHT = ((0.0, 1.0), {"low": ((0.0, 1.0), (1.0, 0.0)), "high": ((0.0, 0.0), (1.0, 1.0))})
+_MARK = (
+    (0.0, 10.0),
+    {
+        "poor": ((0.0, 1.0), (5.0, 0.0)),
+        "average": ((0.0, 0.0), (5.0, 1.0), (10.0, 0.0)),
+        "good": ((5.0, 0.0), (10.0, 1.0)),
+    },
+)
+_TIP = (
+    (0.0, 25.0),
+    {
+        "low": ((0.0, 1.0), (13.0, 0.0)),
+        "medium": ((0.0, 0.0), (13.0, 1.0), (25.0, 0.0)),
+        "high": ((13.0, 0.0), (25.0, 1.0)),
+    },
+)
+# inputs, outputs, and rules in a form that is made into the text of each library
+SYSTEMS: dict[str, Any] = {
+    "section_vi": (
+        {"obstacle": _DEGREE, "shape": _DEGREE, "depth": _DEGREE},
+        {"alpha_1": _WEIGHT, "alpha_2": _WEIGHT, "alpha_3": _WEIGHT},
+        (
+            (["obstacle is on"], "", "alpha_1 is high"),
+            (["obstacle is off"], "", "alpha_1 is low"),
+            (["obstacle is on"], "", "alpha_2 is low"),
+            (["shape is off"], "", "alpha_2 is low"),
+            (["obstacle is off", "shape is on"], "and", "alpha_2 is high"),
+            (["obstacle is on", "shape is on"], "or", "alpha_3 is low"),
+            (["depth is off"], "", "alpha_3 is low"),
+            (["obstacle is off", "shape is off", "depth is on"], "and", "alpha_3 is high"),
+        ),
+    ),
+    "tipping": (
+        {"quality": _MARK, "service": _MARK},
+        {"tip": _TIP},
+        (
+            (["quality is poor", "service is poor"], "or", "tip is low"),
+            (["service is average"], "", "tip is medium"),
+            (["quality is good", "service is good"], "or", "tip is high"),
+        ),
+    ),
+}
+Evaluate = Callable[[list[float]], list[float]]
+
+
+def pyfuzzylite(system: str, resolution: int) -> tuple[Evaluate, str]:
+    """Return a function of the inputs, and the system's text in the FuzzyLite language."""
+    import fuzzylite
+
+    inputs, outputs, rules = SYSTEMS[system]
+    text = [f"Engine: {system}"]
+    for kind, variables in (("InputVariable", inputs), ("OutputVariable", outputs)):
+        for name, ((low, high), terms) in variables.items():
+            text += [f"{kind}: {name}", "  enabled: true", f"  range: {low} {high}", "  lock-range: false"]
+            if kind == "OutputVariable":
+                text += ["  aggregation: Maximum", f"  defuzzifier: Centroid {resolution}", "  default: nan"]
+                text += ["  lock-previous: false"]
+            for term, points in terms.items():
+                if len(points) == 3:
+                    shape = "Triangle {} {} {}".format(*(x for x, _ in points))
+                else:  # a ramp runs from its foot to its top
+                    shape = "Ramp {} {}".format(*(x for x, _ in sorted(points, key=lambda point: point[1])))
+                text += [f"  term: {term} {shape}"]
+    text += ["RuleBlock:", "  enabled: true", "  conjunction: Minimum", "  disjunction: Maximum"]
+    text += ["  implication: Minimum", "  activation: General"]
+    text += [f"  rule: if {f' {join} '.join(asked)} then {concluded}" for asked, join, concluded in rules]
+    engine = fuzzylite.FllImporter().from_string("\n".join(text))
+
+    def evaluate(values: list[float]) -> list[float]:
+        for variable, value in zip(engine.input_variables, values, strict=True):
+            variable.value = value
+        engine.process()
+        return [float(variable.value) for variable in engine.output_variables]
+
+    return evaluate, "\n".join(text)
+
+
+def simpful(system: str, resolution: int) -> tuple[Evaluate, str]:
+    """Return a function of the inputs, and the system's terms and rules as simpful has them."""
+    from simpful import FuzzySet, FuzzySystem, LinguisticVariable
+
+    inputs, outputs, rules = SYSTEMS[system]
+    made = FuzzySystem(show_banner=False)
+    text = []
+    for name, ((low, high), terms) in {**inputs, **outputs}.items():
+        sets = []
+        for term, points in terms.items():
+            # it wants a degree at both ends of the universe
+            ends = [point for point in ((low, points[0][1]), (high, points[-1][1])) if point not in points]
+            shown = sorted([*points, *ends])
+            sets.append(FuzzySet(points=[list(point) for point in shown], term=term))
+            text.append(f"{name} {term}: {shown}")
+        made.add_linguistic_variable(name, LinguisticVariable(sets, universe_of_discourse=[low, high]))
+    sentences = []
+    for asked, join, concluded in rules:
+        first, *others = (f"({clause.replace(' is ', ' IS ')})" for clause in asked)
+        clauses = first
+        for i, other in enumerate(others):  # it knows connectives of two
+            clauses = f"{f'({clauses})' if i else clauses} {join.upper()} {other}"
+        sentences.append(f"IF {clauses} THEN ({concluded.replace(' is ', ' IS ')})")
+    made.add_rules(sentences)
+
+    def evaluate(values: list[float]) -> list[float]:
+        for name, value in zip(inputs, values, strict=True):
+            made.set_variable(name, value)
+        found = made.Mamdani_inference(subdivisions=resolution)
+        return [float(found[name]) for name in outputs]
+
+    return evaluate, "\n".join([*text, *sentences])
+
+
+def answer(request: dict[str, Any]) -> dict[str, Any]:
+    """Return a library's version, the system's text, the outputs, and the times if there are repeats."""
+    evaluate, text = {"pyfuzzylite": pyfuzzylite, "simpful": simpful}[request["library"]](
+        request["system"], request["resolution"]
+    )
+    outputs = [evaluate(values) for values in request["inputs"]]
+    found = []
+    for _ in range(request["repeats"]):
+        before = time.perf_counter()
+        for values in request["inputs"]:
+            evaluate(values)
+        found.append((time.perf_counter() - before) / len(request["inputs"]) * 1e6)
+    return {
+        "library": request["library"],
+        "version": version(request["library"]),
+        "resolution": request["resolution"],
+        "text": text,
+        "outputs": outputs,
+        "microseconds": found,
+    }
+
+
+if __name__ == "__main__":
+    json.dump(answer(json.load(sys.stdin)), sys.stdout)

@@ -1,0 +1,236 @@
+"""The closed form against the exact centroid, and the proof that there is one."""
+
+import math
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from fuzzy_arbiter import (
+    Arbiter,
+    Criterion,
+    EngineError,
+    Output,
+    Shape,
+    System,
+    Term,
+    Variable,
+    falling,
+    prioritised,
+    rising,
+)
+from fuzzy_arbiter.engines.closed import ClosedEngine
+from fuzzy_arbiter.engines.exact import ExactEngine
+from fuzzy_arbiter.engines.pieces import pieces
+from tests.fuzzy_arbiter import reference
+from tests.fuzzy_arbiter.systems import shapes, systems
+
+EPS = np.finfo(float).eps
+DEGREES = (Variable("a", (0, 1), (Term("off", falling(0, 1)), Term("on", rising(0, 1)))),)
+
+
+def criteria(n):
+    return [Criterion(f"c{i}") for i in range(n)]
+
+
+def test_it_is_the_exact_centroid_on_100_000_inputs():
+    """The joined triangles integrated over their knots in extended precision, without the closed form."""
+    inputs = np.random.default_rng(5).random((100_000, 3))
+    x = inputs.astype(np.longdouble)
+    high = np.stack([x[:, 0], np.minimum(1 - x[:, 0], x[:, 1]), np.minimum(1 - x[:, :2].max(axis=1), x[:, 2])], axis=1)
+    low = 1 - high
+    half, zero = np.full_like(high, 0.5), np.zeros_like(high)
+    y = np.sort(np.stack([zero, high, low, half, zero + 1]), axis=0)
+    f = np.maximum(np.minimum(high, y), np.minimum(low, 1 - y))
+    w = np.diff(y, axis=0)
+    area = (w * (f[:-1] + f[1:]) / 2).sum(axis=0)
+    moment = (w * (y[:-1] * (2 * f[:-1] + f[1:]) + y[1:] * (f[:-1] + 2 * f[1:])) / 6).sum(axis=0)
+    exact = moment / area
+    raw = Arbiter(normalisation="none", engine="closed").batch(inputs)
+    assert np.abs(raw - exact).max() <= 4 * EPS
+    scaled = Arbiter(engine="closed").batch(inputs)
+    assert np.abs(scaled - (3 * exact - 1)).max() <= 4 * EPS
+    swept = Arbiter(normalisation="none", engine="exact").batch(inputs[:10_000])
+    assert np.abs(raw[:10_000] - swept).max() <= 4 * EPS
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.lists(st.fractions(0, 1, max_denominator=64), min_size=1, max_size=5))
+def test_it_is_the_centroid_by_definition_in_rational_numbers(memberships):
+    system = prioritised(criteria(len(memberships)))
+    inputs = [float(m) for m in memberships]
+    exact = [float(w) for w in reference.weights(system, inputs)]
+    assert Arbiter(system=system, engine="closed")(inputs) == pytest.approx(exact, abs=4 * EPS)
+
+
+@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@given(shapes(), shapes(), st.floats(0.0, 1.0))
+def test_any_pair_of_output_terms_has_its_pieces(low, high, h):
+    output = Output("y", (0, 1), (Term("low", low), Term("high", high)))
+    exact = reference.centroid(output, [1 - Fraction(h), Fraction(h)])
+    engine = ClosedEngine(prioritised(criteria(1), weight=output, normalisation="none"))
+    assert engine.weights([h])[0] == pytest.approx(float(exact), abs=16 * EPS)
+    assert engine.weights_of_many(np.array([[h]]))[0] == pytest.approx(engine.weights([h]), abs=EPS)
+
+
+def test_the_number_of_pieces():
+    """One cubic for the full triangles, also for trapezoids that meet there; three for the asymmetric pair."""
+
+    def count(low, high):
+        _, scaled = pieces(Output("y", (0, 1), (Term("low", low), Term("high", high))))
+        return len(scaled)
+
+    assert count(falling(0, 1), rising(0, 1)) == 1
+    assert count(falling(0.3, 0.7), rising(0.3, 0.7)) == 1
+    assert count(falling(0.2, 0.55), rising(0.37, 0.83)) == 3
+
+
+@pytest.mark.parametrize("n", range(1, 13))
+def test_the_forms_that_are_alike_give_the_same_weights(n):
+    inputs = np.random.default_rng(n).random((50, n))
+    expected = Arbiter(criteria(n), engine="exact").batch(inputs)
+    for form in ("hierarchical", "minimal", "conjunctive"):
+        arbiter = Arbiter(criteria(n), form=form)
+        assert arbiter.engine == "closed"
+        assert np.abs(arbiter.batch(inputs) - expected).max() <= 16 * EPS
+
+
+@pytest.mark.parametrize(("n", "form", "count"), [
+    (1, "hierarchical", 2), (3, "hierarchical", 8), (10, "hierarchical", 29),
+    (3, "minimal", 6), (3, "conjunctive", 9), (3, "complete", 24), (5, "complete", 160),
+])  # fmt: skip
+def test_the_number_of_rules(n, form, count):
+    assert len(prioritised(criteria(n), form).rules) == count
+
+
+def test_the_complete_table_agrees_on_crisp_inputs_and_only_there():
+    """Its rules also ask whether the criteria of lower priority are on or off, which a graded one is to neither."""
+    complete, usual = Arbiter(form="complete"), Arbiter()
+    for i in range(8):
+        crisp = [float(i >> k & 1) for k in range(3)]
+        assert complete(crisp) == usual(crisp)
+    engine = ExactEngine(complete.system)
+    for m1, m2, m3 in np.random.default_rng(0).random((200, 3)).tolist():
+        cuts = engine.firing.cuts(engine.firing.strengths([m1, m2, m3]))
+        undecided = [min(max(m2, 1 - m2), max(m3, 1 - m3)), max(m3, 1 - m3), 1.0]
+        highs = [m1, min(1 - m1, m2), min(1 - m1, 1 - m2, m3)]
+        assert [c[1] for c in cuts] == [min(pair) for pair in zip(highs, undecided, strict=True)]
+    assert complete([0.9, 0.5, 0.0])[0] != usual([0.9, 0.5, 0.0])[0]
+
+
+def test_any_clauses_of_complementary_cuts_have_a_closed_form():
+    """Neither a ladder of criteria nor a single clause: y is high if exactly one of a and b is on."""
+    inputs = tuple(Criterion(name).variable for name in "ab")
+    output = Output("y", (0, 1), (Term("low", falling(0.2, 0.9)), Term("high", rising(0.2, 0.9))))
+    rules = (
+        "if a is on and b is off or a is off and b is on then y is high",
+        "if not (a is on and b is not on or a is not on and b is on) then y is low",
+    )
+    system = System(inputs, (output,), rules)
+    arbiter = Arbiter(system=system)
+    assert arbiter.engine == "closed"
+    x = np.random.default_rng(0).random((200, 2))
+    assert np.abs(arbiter.batch(x) - Arbiter(system=system, engine="exact").batch(x)).max() <= 16 * EPS
+    assert np.abs(arbiter.batch(x) - [arbiter(row) for row in x.tolist()]).max() <= EPS
+
+
+def test_criteria_with_memberships_of_their_own():
+    hot = Criterion("temperature", on="hot", off="fine", membership=rising(24.0, 30.0))
+    near = Criterion("wall", on="near", off="far", membership=falling(0.0, 0.5))
+    arbiter = Arbiter([near, hot], outside="clip")
+    assert arbiter.engine == "closed"
+    assert arbiter([2.0, 35.0]) == (0.0, 1.0)
+    assert arbiter([0.0, 35.0]) == (1.0, 0.0)
+    x = np.random.default_rng(0).uniform([0, 24], [0.5, 30], (100, 2))
+    assert np.abs(arbiter.batch(x) - arbiter.with_engine("exact").batch(x)).max() <= 16 * EPS
+
+
+@pytest.mark.parametrize(
+    ("rules", "words"),
+    [
+        (["if a is on then y is high", "if a is off then y is low with 0.5"], "R2 has the weight 0.5, expected 1"),
+        (["if a is on then y is high"], "output 'y' has a term that no rule concludes"),
+        (["if a is on then y is high", "if a is on then y is low"], "the cut of 'low' is not 1 minus that of 'high'"),
+    ],
+)
+def test_what_has_no_closed_form_is_said(rules, words):
+    system = System(DEGREES, (Output("y", (0, 1), (Term("low", falling(0, 1)), Term("high", rising(0, 1)))),), rules)
+    with pytest.raises(EngineError, match=words):
+        Arbiter(system=system, engine="closed")
+    automatic = Arbiter(system=system)
+    assert automatic.engine == "exact"
+    assert words in automatic.why
+
+
+def test_terms_that_are_no_complements_are_not_taken_for_them():
+    gap = Variable("a", (0, 1), (Term("off", falling(0, 0.4)), Term("on", rising(0.6, 1))))
+    output = Output("y", (0, 1), (Term("low", falling(0, 1)), Term("high", rising(0, 1))))
+    assert Arbiter(
+        system=System((gap,), (output,), ("if a is on then y is high", "if a is off then y is low"))
+    ).engine == ("exact")
+    negated = System((gap,), (output,), ("if a is on then y is high", "if a is not on then y is low"))
+    assert Arbiter(system=negated).engine == "closed"
+
+
+@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@given(systems(norms=False), st.data())
+def test_where_it_says_there_is_a_closed_form_it_is_right(system, data):
+    arbiter = Arbiter(system=system)
+    inputs = [data.draw(st.floats(0.0, 1.0)) for _ in system.inputs]
+    if arbiter.engine == "closed":
+        exact = [float(c) for c in reference.centroids(system, inputs)]
+        assert arbiter(inputs) == pytest.approx(exact, abs=16 * EPS)
+
+
+@settings(max_examples=100, deadline=None)
+@given(st.lists(st.floats(0.0, 1.0), min_size=1, max_size=12))
+def test_at_most_one_weight_is_above_one_half(memberships):
+    assert sum(w > 0.5 for w in Arbiter(criteria(len(memberships)))(memberships)) <= 1
+
+
+@settings(max_examples=100, deadline=None)
+@given(st.lists(st.floats(0.0, 1.0), min_size=1, max_size=12), st.data())
+def test_more_of_a_criterion_is_never_less_weight_for_it_nor_more_for_those_below(memberships, data):
+    k = data.draw(st.integers(0, len(memberships) - 1))
+    more = data.draw(st.floats(memberships[k], 1.0))
+    arbiter = Arbiter(criteria(len(memberships)))
+    before, after = arbiter(memberships), arbiter([*memberships[:k], more, *memberships[k + 1 :]])
+    assert after[:k] == before[:k]
+    assert after[k] >= before[k]
+    assert all(b <= a for a, b in zip(before[k + 1 :], after[k + 1 :], strict=True))
+
+
+@settings(max_examples=100, deadline=None)
+@given(st.lists(st.floats(0.0, 1.0), min_size=3, max_size=12), st.randoms())
+def test_the_lowest_weight_does_not_care_for_the_order_of_those_above(memberships, random):
+    *above, last = memberships
+    shuffled = random.sample(above, len(above))
+    arbiter = Arbiter(criteria(len(memberships)))
+    assert arbiter([*above, last])[-1] == arbiter([*shuffled, last])[-1]
+
+
+@given(st.integers(1, 12), st.data())
+def test_crisp_inputs_give_the_floor_to_the_first_that_asks(n, data):
+    asks = data.draw(st.lists(st.booleans(), min_size=n, max_size=n))
+    first = asks.index(True) if True in asks else None
+    assert Arbiter(criteria(n))(list(map(float, asks))) == tuple(float(k == first) for k in range(n))
+
+
+def test_weights_rise_smoothly():
+    """Zero slope at both ends, 3/2 at most."""
+    h = np.linspace(0, 1, 1001)
+    slopes = np.diff(Arbiter(criteria(1)).batch(h[:, None])[:, 0]) / np.diff(h)
+    assert slopes.min() >= 0.0
+    assert math.isclose(slopes.max(), 1.5, rel_tol=1e-5)
+    assert max(slopes[0], slopes[-1]) < 0.01
+
+
+def test_a_shape_with_a_plateau_below_one():
+    low, high = Shape(((0, 0.5), (0.5, 0.5), (1, 0))), Shape(((0, 0), (0.5, 0.25), (1, 1)))
+    output = Output("y", (0, 1), (Term("low", low), Term("high", high)))
+    arbiter = Arbiter(criteria(2), weight=output)
+    for x in np.random.default_rng(1).random((50, 2)).tolist():
+        exact = [float(w) for w in reference.weights(arbiter.system, x)]
+        assert arbiter(x) == pytest.approx(exact, abs=16 * EPS)

@@ -1,0 +1,111 @@
+"""The exact engine against rational arithmetic, for any piecewise-linear system."""
+
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from fuzzy_arbiter import (
+    Arbiter,
+    EngineError,
+    Output,
+    Shape,
+    System,
+    Term,
+    UndefinedOutputError,
+    Variable,
+    falling,
+    rising,
+    triangle,
+)
+from tests.fuzzy_arbiter import reference
+from tests.fuzzy_arbiter.systems import systems
+
+EPS = np.finfo(float).eps
+
+
+@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@given(systems(), st.data())
+def test_it_is_the_exact_centroid_of_any_system(system, data):
+    inputs = [data.draw(st.floats(0.0, 1.0)) for _ in system.inputs]
+    exact = reference.centroids(system, inputs)
+    arbiter = Arbiter(system=system, engine="exact")
+    if None in exact:
+        name = system.outputs[exact.index(None)].name
+        with pytest.raises(UndefinedOutputError, match=f"output '{name}': no rule fires at x0 = "):
+            arbiter(inputs)
+        with pytest.raises(UndefinedOutputError, match="row 0"):
+            arbiter.batch([inputs])
+    else:
+        assert arbiter(inputs) == pytest.approx([float(c) for c in exact], abs=8 * EPS)
+        assert tuple(arbiter.batch([inputs])[0]) == arbiter(inputs)
+
+
+def test_the_tipping_answer():
+    """Of scikit-fuzzy's example, whose exact centroid is 12118694/610275."""
+    poor, middling, good = triangle(0, 0, 5), triangle(0, 5, 10), triangle(5, 10, 10)
+    words = (Term("poor", poor), Term("average", middling), Term("good", good))
+    tip = (Term("low", triangle(0, 0, 13)), Term("medium", triangle(0, 13, 25)), Term("high", triangle(13, 25, 25)))
+    system = System(
+        (Variable("quality", (0, 10), words), Variable("service", (0, 10), words)),
+        (Output("tip", (0, 25), tip),),
+        (
+            "if quality is poor or service is poor then tip is low",
+            "if service is average then tip is medium",
+            "if service is good or quality is good then tip is high",
+        ),
+        normalisation="none",
+    )
+    assert Arbiter(system=system, engine="exact")([6.5, 9.8])[0] == pytest.approx(12118694 / 610275, abs=8 * EPS * 20)
+    assert reference.centroids(system, [Fraction(13, 2), Fraction(49, 5)]) == [Fraction(12118694, 610275)]
+
+
+@pytest.mark.parametrize("implication", ["min", "prod"])
+def test_degrees_next_to_nothing_do_not_underflow(implication):
+    """As both cuts vanish alike, the centroid goes to the middle of the joined supports."""
+    output = Output("y", (0, 1), (Term("low", falling(0, 1)), Term("high", rising(0, 1))))
+    rules = ("if x is on then y is low", "if x is on then y is high")
+    inputs = (Variable("x", (0, 1), (Term("on", rising(0, 1)),)),)
+    arbiter = Arbiter(system=System(inputs, (output,), rules, normalisation="none", implication=implication))
+    assert arbiter.engine == "exact"
+    for x in (5e-324, 1e-310, 1e-121, 1e-119, 1e-30):
+        assert arbiter([x]) == pytest.approx([0.5], abs=4 * EPS)
+        assert arbiter.batch([[x]])[0] == pytest.approx([0.5], abs=4 * EPS)
+
+
+def test_an_output_of_one_centroid_cannot_be_scaled():
+    output = Output("y", (0, 1), (Term("any", triangle(0, 0.5, 1)),))
+    system = System((Variable("x", (0, 1), (Term("on", rising(0, 1)),)),), (output,), ("if x is on then y is any",))
+    with pytest.raises(EngineError, match=r"output 'y': its terms have one centroid, 0\.5"):
+        Arbiter(system=system)
+
+
+def test_a_default_stands_where_no_rule_fires():
+    output = Output("y", (0, 10), (Term("a", falling(0, 5)), Term("b", rising(5, 10))), default=7.0)
+    inputs = (Variable("x", (0, 1), (Term("on", rising(0.5, 1)),)),)
+    rules = ("if x is on then y is b",)
+    raw = Arbiter(system=System(inputs, (output,), rules, normalisation="none"))
+    assert raw([0.25]) == (7.0,)
+    assert raw.batch([[0.25], [1.0]])[:, 0] == pytest.approx([7.0, 25 / 3])
+    scaled = Arbiter(system=System(inputs, (output,), rules))
+    assert scaled([0.25])[0] == pytest.approx((7.0 - 5 / 3) / (25 / 3 - 5 / 3))
+
+
+def test_of_many_rows_the_first_undefined_one_is_named():
+    output = Output("y", (0, 1), (Term("a", falling(0, 1)), Term("b", rising(0, 1))))
+    inputs = (Variable("x", (0, 1), (Term("on", rising(0.5, 1)),)),)
+    arbiter = Arbiter(system=System(inputs, (output,), ("if x is on then y is b",)))
+    with pytest.raises(
+        UndefinedOutputError, match=r"output 'y': no rule fires at row 2, x = 0.25, and it has no default"
+    ):
+        arbiter.batch([[1.0], [0.75], [0.25], [0.1]])
+
+
+def test_shapes_that_jump():
+    """A box clipped at 1/2 is a box: its centroid is the middle."""
+    output = Output("y", (0, 10), (Term("box", Shape(((2, 0), (2, 1), (5, 1), (5, 0)))), Term("b", rising(9, 10))))
+    inputs = (Variable("x", (0, 1), (Term("on", rising(0, 1)),)),)
+    system = System(inputs, (output,), ("if x is on then y is box",), normalisation="none")
+    assert Arbiter(system=system)([0.5]) == pytest.approx([3.5])

@@ -1,0 +1,187 @@
+"""Exported code gives the arbiter's own bits: C, plain Python, and what Numba makes of it."""
+
+import ctypes
+import re
+import subprocess
+import sys
+from dataclasses import replace
+
+import numba
+import numpy as np
+import pytest
+
+from fuzzy_arbiter import (
+    Arbiter,
+    Criterion,
+    EngineError,
+    Output,
+    Shape,
+    System,
+    Term,
+    UndefinedOutputError,
+    Variable,
+    falling,
+    prioritised,
+    rising,
+    trapezoid,
+    triangle,
+)
+from fuzzy_arbiter.export import to_c, to_python
+from plant_fmu.compiler import find_compiler
+
+WIDE = System(
+    (
+        Variable("a", (0, 10), (Term("x", triangle(0, 0, 6)), Term("y", triangle(2, 5, 9)), Term("z", rising(5, 8)))),
+        Variable("b", (-1, 1), (Term("n", falling(-0.5, 0.7)), Term("p", Shape(((0, 0), (0, 1), (0.5, 0.3)))))),
+    ),
+    (
+        Output(
+            "o",
+            (0, 25),
+            (
+                Term("l", triangle(0, 0, 13)),
+                Term("m", trapezoid(0, 13, 13, 25)),
+                Term("h", Shape(((13, 0), (13, 0.4), (20, 1), (25, 0.2)))),
+            ),
+            default=3.0,
+        ),
+        Output("q", (-1, 1), (Term("u", falling(-1, 0)), Term("*/ v\\", rising(0, 1)))),
+    ),
+    (
+        "if a is x or b is n then o is l and q is u",
+        "if a is y and b is not p then o is m with 0.7",
+        "if not (a is z & b is p) | a is y then o is h with 0.3",
+        'if a is z and b is p then q is "*/ v\\"',
+    ),
+    name="3 odd */ systems\\",
+    normalisation="none",
+)
+PAIR = Output("w", (0, 1), (Term("low", falling(0.2, 0.55)), Term("high", rising(0.37, 0.83))))
+SYSTEMS = {
+    "section VI": prioritised(),
+    "raw": prioritised(normalisation="none"),
+    "complete table": prioritised(form="complete"),
+    "rational": prioritised(weight=PAIR, normalisation="sum"),
+    "measured": prioritised([Criterion("d", membership=falling(0.1, 0.7)), Criterion("e")], outside="clip"),
+    "one": prioritised([Criterion("only")], normalisation="max"),
+    "wide": WIDE,
+    "wide, scaled": replace(WIDE, normalisation="range"),
+    "wide, shared": replace(WIDE, normalisation="sum", outside="clip"),
+    "wide, greatest": replace(WIDE, normalisation="max", implication="prod"),
+    "wide, products": replace(WIDE, conjunction="prod", disjunction="probor", implication="prod"),
+}
+
+
+@pytest.fixture(params=SYSTEMS)
+def system(request):
+    return SYSTEMS[request.param]
+
+
+def samples(system):
+    """Random samples, some of them on whole numbers, where the terms have their knots."""
+    rng = np.random.default_rng(0)
+    low, high = np.array([v.universe for v in system.inputs]).T
+    x = rng.uniform(low, high, (150, len(low)))
+    x[:50] = np.where(rng.random((50, len(low))) < 0.5, np.round(x[:50]), x[:50])
+    x[:3] = low, high, (low + high) / 2
+    return x
+
+
+def expected(system):
+    """Weights of the arbiter, or the number of the output that is undefined."""
+    arbiter = Arbiter(system=system)
+    for x in samples(system).tolist():
+        try:
+            yield x, arbiter(x)
+        except UndefinedOutputError as error:
+            name = re.search(r"output '(.*?)'", str(error)).group(1)
+            yield x, [v.name for v in system.outputs].index(name) + 1
+
+
+def bad(system):
+    """Samples that are refused, and by which input."""
+    good = [v.universe[0] for v in system.inputs]
+    for i, variable in enumerate(system.inputs):
+        values = [float("nan")]
+        if system.outside == "refuse":
+            values += [np.nextafter(variable.universe[0], -np.inf), variable.universe[1] + 1, float("inf")]
+        yield from (([*good[:i], value, *good[i + 1 :]], -i - 1) for value in values)
+
+
+def test_c(system, tmp_path):
+    source = tmp_path / "arbiter.c"
+    source.write_text(to_c(system))
+    name = re.search(r"int (\w+)\(", source.read_text()).group(1)
+    library = tmp_path / "arbiter.so"
+    flags = ["-std=c99", "-O2", "-ffp-contract=off", "-Wall", "-Wextra", "-Wpedantic", "-Werror", "-fPIC", "-shared"]
+    subprocess.run([*find_compiler(), *flags, "-o", library, source], check=True)
+    evaluate = getattr(ctypes.CDLL(str(library)), name)
+    inputs = (ctypes.c_double * len(system.inputs))()
+    outputs = (ctypes.c_double * len(system.outputs))()
+    for x, weights in expected(system):
+        inputs[:] = x
+        status = evaluate(inputs, outputs)
+        assert status == (weights if isinstance(weights, int) else 0)
+        assert isinstance(weights, int) or tuple(outputs) == weights
+    for x, status in bad(system):
+        inputs[:] = x
+        assert evaluate(inputs, outputs) == status
+
+
+def test_python(system):
+    module = {}
+    exec(to_python(system), module)
+    for x, weights in expected(system):
+        if isinstance(weights, int):
+            with pytest.raises(ValueError, match=f"output {weights} is undefined"):
+                module["weights"](x)
+        else:
+            assert module["weights"](x) == weights
+    for x, status in bad(system):
+        with pytest.raises(ValueError, match=f"input {-status} is"):
+            module["weights"](x)
+
+
+@pytest.mark.parametrize("name", ["section VI", "rational", pytest.param("wide, shared", marks=pytest.mark.slow)])
+def test_from_a_compiled_loop(name):
+    system = SYSTEMS[name]
+    evaluate = Arbiter(system=system).compiled()
+
+    @numba.njit
+    def loop(rows, results):
+        status = np.zeros(len(rows), np.int64)
+        for i in range(len(rows)):
+            status[i] = evaluate(rows[i], results[i])
+        return status
+
+    x = samples(system)
+    results = np.zeros((len(x), len(system.outputs)))
+    status = loop(x, results)
+    for (_, weights), row, fault in zip(expected(system), results.tolist(), status.tolist(), strict=True):
+        assert fault == (weights if isinstance(weights, int) else 0)
+        assert isinstance(weights, int) or tuple(row) == weights
+    assert all(evaluate(np.array(x), results[0]) == fault for x, fault in bad(system))
+
+
+def test_forty_criteria_in_python():
+    system = prioritised([Criterion(f"c{i}") for i in range(40)])
+    module = {}
+    exec(to_python(system), module)
+    x = np.random.default_rng(0).random(40).tolist()
+    assert module["weights"](x) == Arbiter(system=system)(x)
+
+
+def test_the_python_module_needs_nothing(tmp_path):
+    (tmp_path / "mine.py").write_text(to_python(WIDE))
+    code = (
+        "import sys; n = set(sys.modules); import mine; mine.weights([1.0, 0.5]); print(sorted(set(sys.modules) - n))"
+    )
+    done = subprocess.run([sys.executable, "-I", "-c", f"import sys; sys.path.insert(0, {str(tmp_path)!r}); {code}"],
+                          capture_output=True, text=True, check=True)  # fmt: skip
+    assert done.stdout.strip() == "['__future__', 'mine']"
+
+
+def test_without_numba_it_is_said(monkeypatch):
+    monkeypatch.setitem(sys.modules, "numba", None)
+    with pytest.raises(EngineError, match="Numba is not installed"):
+        Arbiter().compiled()
