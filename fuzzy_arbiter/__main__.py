@@ -115,16 +115,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = _parsed(arguments)
     try:
         status = _run(options)
-        sys.stdout.flush()
+        if sys.stdout is not None:  # closed by whoever started this
+            sys.stdout.flush()
         return status
     except BrokenPipeError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # else the interpreter flushes again at its end
+        _drop_output()
         return NO_READER
     except ArbiterError as error:
         return _fault(str(error))
     except ImportError as error:
         return _fault(f"{error.name} is not installed")
-    except OSError as error:
+    except OSError as error:  # such as a full disk behind the output
+        _drop_output()
         return _fault(f"{error.filename or 'output'}: {error.strerror or error}")
     except KeyboardInterrupt:
         _fault("interrupted")
@@ -148,6 +150,11 @@ def _is_number(word: str) -> bool:
     except ValueError:
         return False
     return True
+
+
+def _drop_output() -> None:
+    """Let what is left of the output go nowhere, else the interpreter fails again to write it at its end."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _fault(what: str) -> int:

@@ -3,20 +3,26 @@
 from __future__ import annotations
 
 import io
+import runpy
 from pathlib import Path
 
-import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 from PIL import Image
 
-from fuzzy_arbiter import Arbiter, Criterion, HysteresisArbiter, falling, pictures, rising
+from fuzzy_arbiter import Arbiter, Criterion, pictures, rising
 
 SMOKE = Criterion("smoke", on="present", off="absent", membership=rising(0.5, 3.0))
 AIR = Criterion("co2", on="stale", off="fresh", membership=rising(800.0, 1400.0))
 ROOM = Criterion("temperature", on="hot", off="mild", membership=rising(24.0, 28.0))
 PLACE = {"smoke": 1.25, "co2": 1280.0, "temperature": 26.0}
+CHATTER = Path(__file__).parents[2] / "examples" / "chatter.py"
+SHOWN = (
+    "crisp",
+    "ramp outside the border, 10 cm",
+    "hysteresis, release 5 cm outside",
+    "the same, and a ramp before it",
+)
 COLOURS = 128  # of a picture; fewer than it has, which halves the file
 
 
@@ -45,34 +51,19 @@ def forms() -> Axes:
     return ax
 
 
-def approach() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return times [s] and measured clearances [m] of somebody who touches a surface twice; the noise is 1 cm."""
-    time = np.arange(0.0, 5.0, 1e-3)
-    clearance = 0.15 + 0.15 * np.cos(2.0 * np.pi * time / 2.5)
-    return time, clearance + np.random.default_rng(1).normal(0.0, 0.01, len(time))
-
-
 def chatter() -> Axes:
-    """Compare a crisp criterion, a ramp, and latches."""
-    time, clearance = approach()
-    samples = np.clip(clearance, 0.0, 0.3)[:, None]
-    sharp = Arbiter([Criterion("clearance", membership=falling(0.0, 1e-9))], outside="clip")
-    soft = Arbiter([Criterion("clearance", membership=falling(0.0, 0.1))], outside="clip")
-    latched = HysteresisArbiter(soft, enter=0.9, release=0.2)
-    figure = Figure(figsize=(8.2, 5.6), layout="constrained")
-    top, *panels = figure.subplots(4, 1, sharex=True, height_ratios=[1.2, 1, 1, 1])
-    top.plot(time, clearance, color=pictures.COLOURS[0], linewidth=0.6)
+    """Draw some of the ways of examples/chatter.py: the obstacle's weight, and how much all weights vary."""
+    example = runpy.run_path(str(CHATTER))
+    time, clearances = example["measured"]()
+    figure = Figure(figsize=(8.2, 6.4), layout="constrained")
+    top, *panels = figure.subplots(len(SHOWN) + 1, 1, sharex=True, height_ratios=[1.2, *(1 for _ in SHOWN)])
+    top.plot(time, clearances[:, 0], color=pictures.COLOURS[0], linewidth=0.6)
     top.axhline(0.0, color="#999999", linewidth=0.8)
-    top.set_ylabel("clearance [m]")
-    weights = {
-        "crisp: the weight is 1 where the clearance is 0 or less": sharp.batch(samples),
-        "ramp of 0.1 m outside": soft.batch(samples),
-        "latches on the ramp: enter at 0.9, release at 0.2": latched.scan(samples, time),
-    }
-    for ax, (name, weight) in zip(panels, weights.items(), strict=True):
-        ax.plot(time, weight[:, 0], color=pictures.COLOURS[1], linewidth=0.8)
-        variation = np.abs(np.diff(weight[:, 0])).sum()
-        ax.set_title(f"{name}; total variation {variation:.0f}", fontsize=10, loc="left")
+    top.set(ylim=(-0.05, 0.25), ylabel="clearance [m]")
+    for ax, name in zip(panels, SHOWN, strict=True):
+        weights = example["ways"]()[name](clearances, time)
+        ax.plot(time, weights[:, 0], color=pictures.COLOURS[1], linewidth=0.8)
+        ax.set_title(f"{name}: total variation {example['variation'](weights):.0f}", fontsize=10, loc="left")
         ax.set(ylim=(-0.05, 1.05), ylabel="weight")
     panels[-1].set(xlim=(0.0, 5.0), xlabel="time [s]")
     return panels[-1]

@@ -11,15 +11,15 @@ from typing import TextIO
 from fuzzy_arbiter.errors import FormatError, InputError
 
 
-def read_text(path: str, stdin: TextIO) -> tuple[str, str]:
+def read_text(path: str, stdin: TextIO | None) -> tuple[str, str]:
     """Return what stands in a file, or comes from standard input.
 
     Parameters
     ----------
     path : str
         The file, or ``-``.
-    stdin : text stream
-        Standard input.
+    stdin : text stream or None
+        Standard input; None if it is closed.
 
     Returns
     -------
@@ -33,7 +33,11 @@ def read_text(path: str, stdin: TextIO) -> tuple[str, str]:
     """
     where = "standard input" if path == "-" else path
     try:
-        return (stdin.read() if path == "-" else Path(path).read_bytes().decode()), where
+        if path != "-":
+            return Path(path).read_bytes().decode(), where
+        if stdin is None:
+            raise InputError(f"{where}: is closed")
+        return stdin.read(), where
     except UnicodeDecodeError:
         raise InputError(f"{where}: not UTF-8 text") from None
     except OSError as error:

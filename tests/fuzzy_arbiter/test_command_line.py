@@ -7,11 +7,13 @@ import os
 import subprocess
 import sys
 import xml.etree.ElementTree as ET
+from dataclasses import replace
 
 import pytest
 
 from fuzzy_arbiter import Arbiter
 from fuzzy_arbiter.__main__ import main
+from fuzzy_arbiter.hierarchy import WEIGHT
 
 GAP = """
 if wind is calm then sail is full
@@ -225,6 +227,11 @@ def test_convert_refuses_whole(refused, tmp_path):
     )
     (tmp_path / "old.json").write_text("old")
     assert "none.json" in refused("convert", "none.json", "old.json")
+    Arbiter(weight=replace(WEIGHT, default=0.5)).save(tmp_path / "default.toml")
+    (tmp_path / "old.fis").write_text("old")
+    assert "fis cannot say the default 0.5" in refused("convert", "default.toml", "old.fis")
+    Arbiter(normalisation="sum").save(tmp_path / "sum.toml")
+    assert "'sum'" in refused("convert", "sum.toml", "old.fis", "--native")
 
 
 PLOTS = [
@@ -304,6 +311,14 @@ def test_a_reader_that_goes_is_no_error(tmp_path):
     done = subprocess.run(command, stdout=writing, stderr=subprocess.PIPE, check=False)
     os.close(writing)
     assert (done.returncode, done.stderr) == (141, b"")
+
+
+@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="needs a device that is always full")
+def test_a_full_disk_costs_one_line():
+    command = [sys.executable, "-m", "fuzzy_arbiter", "show", "section-vi"]
+    with open("/dev/full", "wb") as full:
+        done = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True, check=False)
+    assert (done.returncode, done.stderr) == (2, "fuzzy_arbiter: output: No space left on device\n")
 
 
 def test_help_has_examples_that_are_understood(run):

@@ -104,6 +104,7 @@ def test_what_the_manual_s_code_says_in_comments_is_what_it_gives(tmp_path, monk
             compared += 1
     assert compared >= 15
     assert (tmp_path / "decisions.png").stat().st_size > 1000
+    assert "\n".join(f"    {line}".rstrip() for line in str(names["explanation"]).splitlines()) in MANUAL
 
 
 def _numbers(value):
