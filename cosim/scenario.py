@@ -81,9 +81,9 @@ class LawSetup:
 class ArbiterSetup:
     """How memberships become weights."""
 
-    engine: Literal["closed", "skfuzzy"] = "closed"
+    engine: Literal["closed", "exact", "grid", "skfuzzy"] = "closed"
     ramp: float = 0.2  # m, width over which a membership falls from 1 to 0 outside its region
-    points: int = 101  # of the output universe, for skfuzzy
+    points: int = 101  # of the output universe, for grid and skfuzzy
 
 
 @dataclass(frozen=True)

@@ -32,9 +32,15 @@ def test_imports_run_one_way(path):
 
 
 def test_the_controller_knows_neither_fmi_nor_mavlink_and_the_arbiter_no_vehicle():
-    for package, foreign in (("controller", {"fmpy", "pymavlink"}), ("fuzzy_arbiter", {"numba", "fmpy", "pymavlink"})):
+    for package in ("controller", "fuzzy_arbiter"):
         for path in (ROOT / package).rglob("*.py"):
-            assert not {name.split(".")[0] for name in imports(path)} & foreign
+            assert not {name.split(".")[0] for name in imports(path)} & {"fmpy", "pymavlink"}
+
+
+def test_the_arbiter_takes_what_is_heavy_in_one_file_each():
+    for foreign, where in (("numba", "compiled.py"), ("skfuzzy", "engines/scikit.py"), ("tomli_w", "formats/json_toml.py")):
+        users = {p for p in (ROOT / "fuzzy_arbiter").rglob("*.py") if foreign in {n.split(".")[0] for n in imports(p)}}
+        assert users == {ROOT / "fuzzy_arbiter" / where}
 
 
 @pytest.mark.parametrize("path", FILES, ids=lambda p: str(p.relative_to(ROOT)))
