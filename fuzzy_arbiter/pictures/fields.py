@@ -11,10 +11,10 @@ from fuzzy_arbiter.arbiter import Arbiter
 from fuzzy_arbiter.engines.firing import Array
 from fuzzy_arbiter.errors import DefinitionError
 from fuzzy_arbiter.pictures.style import (
-    COLOURS,
-    HATCHES,
     INK,
+    colour,
     fixed_inputs,
+    hatch,
     new_axes,
     one_of,
     said,
@@ -150,15 +150,14 @@ def decisions(
         ahead = np.ma.masked_where(undefined, known[..., k] - others)
         if ahead.count() == 0 or not ahead.max() > levels[0]:
             continue
-        colour, hatch = COLOURS[k % len(COLOURS)], HATCHES[k % len(HATCHES)]
-        shades = [_mixed(to_rgb(colour), share) for share in np.linspace(0.2, 0.85, _SHADES)]
+        shades = [_mixed(to_rgb(colour(k)), share) for share in np.linspace(0.2, 0.85, _SHADES)]
         ax.contourf(x, y, ahead, levels=levels, colors=shades)
-        hatching = ax.contourf(x, y, ahead, levels=levels[[0, -1]], colors="none", hatches=[hatch])
+        hatching = ax.contourf(x, y, ahead, levels=levels[[0, -1]], colors="none", hatches=[hatch(k)])
         hatching.set(edgecolor=(1.0, 1.0, 1.0, 0.55), linewidth=0.0)
         # two neighbours are ahead of each other by opposite amounts, so that their borders fall on one line
         if ahead.min() < levels[0]:
             ax.contour(x, y, ahead, levels=levels[:1], colors=INK, linewidths=1.1)
-        keys.append(Patch(label=wrapped(output.name, 24), facecolor=shades[-1], edgecolor="white", hatch=hatch))
+        keys.append(Patch(label=wrapped(output.name, 24), facecolor=shades[-1], edgecolor="white", hatch=hatch(k)))
     equal = ~undefined & (ranked[..., -1] - ranked[..., -2] <= levels[0])
     if equal.sum() > 2 * points:  # fewer are the line between two regions
         keys.append(Patch(label="shared", facecolor="white", edgecolor=INK))
@@ -174,11 +173,11 @@ def decisions(
     return ax
 
 
-def _mixed(colour: tuple[float, float, float], share: float) -> str:
+def _mixed(whole: tuple[float, float, float], share: float) -> str:
     """Return some of a colour in white."""
     from matplotlib.colors import to_hex
 
-    red, green, blue = (1.0 - share * (1.0 - part) for part in colour)
+    red, green, blue = (1.0 - share * (1.0 - part) for part in whole)
     return to_hex((red, green, blue))
 
 

@@ -12,7 +12,7 @@ from fuzzy_arbiter.definition import Output, Rule
 from fuzzy_arbiter.engines.firing import Array, Firing, degrees_of_many
 from fuzzy_arbiter.errors import UndefinedOutputError
 from fuzzy_arbiter.pictures.lines import corners
-from fuzzy_arbiter.pictures.style import COLOURS, FAINT, HATCHES, INK, knots_of, new_axes, one_of, said, wrapped
+from fuzzy_arbiter.pictures.style import FAINT, INK, colour, hatch, knots_of, new_axes, one_of, said, wrapped
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -81,15 +81,16 @@ def rules(arbiter: Arbiter, inputs: Sample, output: str | None = None, ax: Axes 
     foot = len(rows) + _TALL - 0.6  # rows are counted downwards
     for row, (_, _, strength, j) in enumerate(rows):
         term = drawn.terms[j]
-        colour, hatch = COLOURS[j % len(COLOURS)], HATCHES[j % len(HATCHES)]
         ax.plot([low, high], [row, row], color=FAINT, linewidth=0.7)
         ends, degrees = corners(term, drawn.universe)
         ax.plot(ends, row - _HEIGHT * np.array(degrees), color=FAINT, linewidth=1.0)
         cut = _cut(degrees_of_many(term.shape, x), strength, scaled)
         if strength > 0.0:
-            ax.fill_between(x, row, row - _HEIGHT * cut, facecolor=colour, alpha=0.45, linewidth=0)
-            ax.fill_between(x, row, row - _HEIGHT * cut, facecolor="none", edgecolor=colour, hatch=hatch, linewidth=0)
-            ax.plot(x, row - _HEIGHT * cut, color=colour, linewidth=1.6)
+            ax.fill_between(x, row, row - _HEIGHT * cut, facecolor=colour(j), alpha=0.45, linewidth=0)
+            ax.fill_between(
+                x, row, row - _HEIGHT * cut, facecolor="none", edgecolor=colour(j), hatch=hatch(j), linewidth=0
+            )
+            ax.plot(x, row - _HEIGHT * cut, color=colour(j), linewidth=1.6)
         decides = strength > 0.0 and strength == cuts[j]
         ax.annotate(
             f"{strength:.3f} {term.name}" + (" •" if decides else ""),

@@ -48,8 +48,40 @@ def new_axes(width: float, height: float, **keywords: Any) -> Axes:
     return ax
 
 
+def colour(i: int) -> str:
+    """Return the colour of the i-th of several things.
+
+    Parameters
+    ----------
+    i : int
+        From 0.
+
+    Returns
+    -------
+    str
+        The same again after six.
+    """
+    return COLOURS[i % len(COLOURS)]
+
+
+def hatch(i: int) -> str:
+    """Return the hatches of the i-th of several areas.
+
+    Parameters
+    ----------
+    i : int
+        From 0.
+
+    Returns
+    -------
+    str
+        Others where the colour comes again.
+    """
+    return HATCHES[(i + i // len(COLOURS)) % len(HATCHES)]
+
+
 def line_style(i: int) -> dict[str, Any]:
-    """Return what makes the i-th line unlike its neighbours, in colour and in grey, and visible below the next.
+    """Return what makes the i-th line unlike the others, in colour and in grey, and visible below the next.
 
     Parameters
     ----------
@@ -59,13 +91,10 @@ def line_style(i: int) -> dict[str, Any]:
     Returns
     -------
     dict
-        Keywords of ``Axes.plot``.
+        Keywords of ``Axes.plot``; other dashes where the colour comes again.
     """
-    return {
-        "color": COLOURS[i % len(COLOURS)],
-        "linestyle": DASHES[i % len(DASHES)],
-        "linewidth": max(1.3, 2.7 - 0.35 * i),
-    }
+    dashes = DASHES[(i + i // len(COLOURS)) % len(DASHES)]
+    return {"color": colour(i), "linestyle": dashes, "linewidth": max(1.3, 2.7 - 0.35 * i)}
 
 
 def tidy(ax: Axes) -> None:

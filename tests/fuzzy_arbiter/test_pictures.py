@@ -23,6 +23,7 @@ from fuzzy_arbiter import (
     trapezoid,
     triangle,
 )
+from fuzzy_arbiter.pictures.style import colour, hatch, line_style
 
 MEASURED = (
     Criterion("distance to the nearest obstacle ahead", membership=falling(0.0, 5.0)),
@@ -154,6 +155,12 @@ def test_terms_are_drawn_corner_by_corner(sail):
     lines = {line.get_label(): line.get_xydata() for line in pictures.terms(sail, "wind").get_lines()}
     assert lines["calm"].tolist() == [[0, 1], [2, 1], [6, 0], [20, 0]]
     assert lines["fresh"].tolist() == [[0, 0], [4, 0], [6, 1], [9, 1], [12, 0], [20, 0]]
+
+
+def test_of_many_terms_no_two_look_alike():
+    lines = {(style["color"], str(style["linestyle"])) for style in map(line_style, range(36))}
+    assert len(lines) == 36
+    assert len({(colour(i), hatch(i)) for i in range(36)}) == 36
 
 
 def test_an_output_s_vertical_edge_stays_vertical(arbiter):
