@@ -1,0 +1,248 @@
+"""Why the weights are what they are: degrees of terms, strengths of rules, cuts of outputs, and what decided."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any
+
+from fuzzy_arbiter.definition import System, variable_names
+from fuzzy_arbiter.table import aligned
+
+if TYPE_CHECKING:
+    from fuzzy_arbiter.arbiter import Arbiter
+
+TIE = 1e-12  # weights that are nearer to each other than this are equal, but for rounding
+WIDTH = 100  # columns of a rule in the text
+
+
+@dataclass(frozen=True, slots=True)
+class InputDegrees:
+    """An input's value, and the degree of each of its terms."""
+
+    name: str
+    value: float
+    degrees: dict[str, float]
+
+
+@dataclass(frozen=True, slots=True)
+class FiredRule:
+    """What one rule did.
+
+    Attributes
+    ----------
+    label : str
+        ``R1`` for the first rule.
+    text : str
+        The rule.
+    strength : float
+        Degree of its condition times its weight.
+    conclusions : dict from str to str
+        For each output that it concludes on, the term.
+    """
+
+    label: str
+    text: str
+    strength: float
+    conclusions: dict[str, str]
+
+    @property
+    def fired(self) -> bool:
+        """Whether the strength is above 0."""
+        return self.strength > 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class OutputDecision:
+    """How one output came to its weight.
+
+    Attributes
+    ----------
+    name : str
+        Name of the output.
+    cuts : dict from str to float
+        For each term, the greatest strength of the rules that conclude it.
+    centroid : float
+        Value in the universe, before it is normalised.
+    weight : float
+        As the arbiter gives it.
+    decided_by : str or None
+        Label of the rule that gives the greatest cut, of several the first; None if no rule fired.
+    runner_up : str or None
+        Label of the strongest rule for another term; None if none fired.
+    margin : float
+        Strength of the one less that of the other; 0 is a tie.
+    default_used : bool
+        Whether no rule fired, so that the centroid is the output's default.
+    """
+
+    name: str
+    cuts: dict[str, float]
+    centroid: float
+    weight: float
+    decided_by: str | None
+    runner_up: str | None
+    margin: float
+    default_used: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Explanation:
+    """Why the weights of one sample are what they are.
+
+    Attributes
+    ----------
+    inputs : tuple of InputDegrees
+        In the system's order.
+    rules : tuple of FiredRule
+        All of them, also those that did not fire.
+    outputs : tuple of OutputDecision
+        In the system's order.
+    winner : str or None
+        The output with the greatest weight; None if that is shared, or all weights are 0.
+    runner_up : str or None
+        The output with the next weight; None without a winner, or if there is no other output.
+    margin : float
+        Greatest weight less the next, or the weight of the only output.
+    tied : tuple of str
+        The outputs that share the greatest weight, if it is not 0; none if there is a winner.
+    """
+
+    inputs: tuple[InputDegrees, ...]
+    rules: tuple[FiredRule, ...]
+    outputs: tuple[OutputDecision, ...]
+    winner: str | None
+    runner_up: str | None
+    margin: float
+    tied: tuple[str, ...]
+
+    @property
+    def weights(self) -> tuple[float, ...]:
+        """The weights, as the arbiter gives them."""
+        return tuple(output.weight for output in self.outputs)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return all of it as JSON knows it.
+
+        Returns
+        -------
+        dict
+            Of texts, numbers, booleans, lists and dicts.
+        """
+        whole = asdict(self)
+        for rule, item in zip(self.rules, whole["rules"], strict=True):
+            item["fired"] = rule.fired
+        return {key: list(item) if isinstance(item, tuple) else item for key, item in whole.items()}
+
+    def __str__(self) -> str:
+        lines = ["inputs"]
+        lines += aligned([(i.name, f"{i.value:.6g}", _pairs(i.degrees)) for i in self.inputs])
+        fired = [rule for rule in self.rules if rule.fired]
+        lines.append(f"rules that fired, {len(fired)} of {len(self.rules)}" if fired else "no rule fired")
+        lines += aligned([(rule.label, f"{rule.strength:.6g}", _short(rule.text)) for rule in fired])
+        lines.append("outputs")
+        lines += aligned([(o.name, f"{o.weight:.6g}", _pairs(o.cuts), _decision(o)) for o in self.outputs])
+        if self.winner is not None:
+            second = f", {self.margin:.6g} above {self.runner_up}" if self.runner_up is not None else ""
+            lines.append(f"winner: {self.winner}{second}")
+        else:
+            lines.append(
+                f"no winner: {', '.join(self.tied)} are equal" if self.tied else "no winner: all weights are 0"
+            )
+        return "\n".join(lines)
+
+
+def explain(arbiter: Arbiter, inputs: Sequence[float]) -> Explanation:
+    """Return why an arbiter's weights for one sample are what they are.
+
+    Parameters
+    ----------
+    arbiter : Arbiter
+        Whose weights they are.
+    inputs : sequence of float
+        One value in its universe for each input.
+
+    Returns
+    -------
+    Explanation
+        As data; its text is for people.
+
+    Raises
+    ------
+    UndefinedOutputError
+        If no rule fires for an output without default.
+    """
+    system = arbiter.system
+    weights = arbiter(inputs)
+    centroids = arbiter._engine.centroids(inputs)
+    firing = arbiter._engine.firing
+    strengths = firing.strengths(inputs)
+    rules = tuple(
+        FiredRule(f"R{i + 1}", str(rule), strength, {c.variable: c.term for c in rule.conclusions})
+        for i, (rule, strength) in enumerate(zip(system.rules, strengths, strict=True))
+    )
+    outputs = tuple(
+        _decided(system, rules, k, cut, centroid, weight)
+        for k, (cut, centroid, weight) in enumerate(zip(firing.cuts(strengths), centroids, weights, strict=True))
+    )
+    degrees = tuple(
+        InputDegrees(v.name, float(x), {t.name: t.shape(x) for t in v.terms})
+        for v, x in zip(system.inputs, inputs, strict=True)
+    )
+    return Explanation(degrees, rules, outputs, *_ranking(variable_names(system.outputs), weights))
+
+
+def _decided(
+    system: System, rules: Sequence[FiredRule], k: int, cuts: Sequence[float], centroid: float, weight: float
+) -> OutputDecision:
+    output = system.outputs[k]
+    on = [rule for rule in rules if rule.fired and output.name in rule.conclusions]
+    first = max(on, key=_strength, default=None)  # of equal ones the first
+    others = [
+        rule for rule in on if first is not None and rule.conclusions[output.name] != first.conclusions[output.name]
+    ]
+    second = max(others, key=_strength, default=None)
+    return OutputDecision(
+        output.name,
+        dict(zip(output.term_names, cuts, strict=True)),
+        centroid,
+        weight,
+        first.label if first is not None else None,
+        second.label if second is not None else None,
+        (first.strength if first is not None else 0.0) - (second.strength if second is not None else 0.0),
+        first is None,
+    )
+
+
+def _strength(rule: FiredRule) -> float:
+    return rule.strength
+
+
+def _ranking(names: Sequence[str], weights: Sequence[float]) -> tuple[str | None, str | None, float, tuple[str, ...]]:
+    """Winner, runner-up, margin, and those who tie."""
+    order = sorted(range(len(names)), key=lambda k: -weights[k])
+    greatest = weights[order[0]]
+    margin = greatest - weights[order[1]] if len(names) > 1 else greatest
+    if all(abs(weight) <= TIE for weight in weights):
+        return None, None, 0.0, ()
+    if len(names) > 1 and margin <= TIE:
+        return None, None, 0.0, tuple(n for n, weight in zip(names, weights, strict=True) if greatest - weight <= TIE)
+    return names[order[0]], names[order[1]] if len(names) > 1 else None, margin, ()
+
+
+def _decision(output: OutputDecision) -> str:
+    if output.decided_by is None:
+        return f"no rule fired: its default {output.centroid:.6g}"
+    if output.runner_up is None:
+        return f"by {output.decided_by} alone"
+    if output.margin == 0.0:
+        return f"by {output.decided_by} and {output.runner_up} alike"
+    return f"by {output.decided_by}, {output.margin:.6g} above {output.runner_up}"
+
+
+def _pairs(degrees: dict[str, float]) -> str:
+    return ", ".join(f"{term} {degree:.6g}" for term, degree in degrees.items())
+
+
+def _short(text: str) -> str:
+    return text if len(text) <= WIDTH else f"{text[: WIDTH // 2 - 1]} … {text[-(WIDTH // 2 - 2) :]}"

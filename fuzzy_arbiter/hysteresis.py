@@ -1,0 +1,324 @@
+"""Weights that do not chatter: latches on the criteria in front of an arbiter."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from numbers import Real
+from typing import NoReturn
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from fuzzy_arbiter.arbiter import Arbiter, Sample
+from fuzzy_arbiter.definition import System, Variable, variable_names
+from fuzzy_arbiter.engines.firing import Array, degrees_of_many
+from fuzzy_arbiter.errors import DefinitionError, InputError
+from fuzzy_arbiter.propositions import Is
+from fuzzy_arbiter.shapes import Shape
+from fuzzy_arbiter.verification.cells import stretches
+from fuzzy_arbiter.verification.questions import Effort, Questions, greatest_term
+from fuzzy_arbiter.verification.search import Goal
+
+Setting = float | Mapping[str, float]
+EFFORT = 100_000_000  # statements to find the row at rest, a part of a second
+
+
+class HysteresisArbiter:
+    """An arbiter of prioritised criteria that remembers which of them ask for attention.
+
+    Each criterion has a latch. It closes as soon as the criterion's degree reaches `enter`, and opens when the degree
+    has come down to `release` and the latch has been closed for `dwell`. While it is closed the criterion counts as
+    fully on, otherwise as fully off, so that the weights are those of a crisp row and change only when a latch does. A
+    noise of the degree that is smaller than `enter` - `release` does not make them chatter.
+
+    It has state: one for each stream of inputs, and not to be shared by threads. The arbiter inside does not change.
+
+    Parameters
+    ----------
+    arbiter : Arbiter
+        Each of its inputs has two complementary terms.
+    enter : float or mapping from input's name to float
+        Degree of the on-term at which the latch closes, above `release`, at most 1.
+    release : float or mapping from input's name to float
+        Degree of the on-term at which it may open, at least 0.
+    dwell : float or mapping from input's name to float
+        How long it stays closed at least [s]. It closes at once always: an obstacle must be heeded.
+    graded : bool
+        Whether a criterion whose latch is open counts with its degree, in the place of fully off. Weights then rise
+        smoothly before `enter`, and follow the noise there; when the latch opens they jump.
+    on : mapping from input's name to str, optional
+        Term of each input that asks for attention. By default the one that is not in the row at rest, which is the only
+        crisp row in which no output is in its greatest term.
+
+    Raises
+    ------
+    DefinitionError
+        If a setting is out of its range, or the inputs are no criteria.
+
+    Examples
+    --------
+    >>> from fuzzy_arbiter import Arbiter
+    >>> steady = HysteresisArbiter(Arbiter(), enter=0.8, release=0.2)
+    >>> [steady([degree, 0.0, 0.0], 0.1 * i)[0] for i, degree in enumerate([0.7, 0.9, 0.3, 0.1])]
+    [0.0, 1.0, 1.0, 0.0]
+    """
+
+    __slots__ = (
+        "_closed",
+        "_dwell",
+        "_enter",
+        "_graded",
+        "_names",
+        "_off_places",
+        "_on",
+        "_on_places",
+        "_release",
+        "_shapes",
+        "_since",
+        "_time",
+        "arbiter",
+    )
+
+    def __init__(
+        self,
+        arbiter: Arbiter,
+        *,
+        enter: Setting,
+        release: Setting,
+        dwell: Setting = 0.0,
+        graded: bool = False,
+        on: Mapping[str, str] | None = None,
+    ) -> None:
+        if not isinstance(arbiter, Arbiter):
+            raise DefinitionError(f"arbiter is {arbiter!r}, expected an Arbiter")
+        if not isinstance(graded, bool):
+            raise DefinitionError(f"graded is {graded!r}, expected True or False")
+        variables = arbiter.system.inputs
+        self.arbiter = arbiter
+        self._names = variable_names(variables)
+        self._enter = _settings("enter", enter, self._names, "a number in (0, 1]", lambda x: 0.0 < x <= 1.0)
+        self._release = _settings("release", release, self._names, "a number in [0, 1)", lambda x: 0.0 <= x < 1.0)
+        self._dwell = _settings("dwell", dwell, self._names, "seconds, at least 0", lambda x: 0.0 <= x < math.inf)
+        for name, upper, lower in zip(self._names, self._enter, self._release, strict=True):
+            if not lower < upper:
+                raise DefinitionError(f"release: {lower:g} came for {name!r}, expected less than enter, {upper:g}")
+        self._graded = graded
+        self._on = terms = _on_terms(arbiter.system, on)
+        self._shapes = [_shape(v, term) for v, term in zip(variables, terms, strict=True)]
+        self._on_places = [_place(v, shape, 1.0) for v, shape in zip(variables, self._shapes, strict=True)]
+        self._off_places = [_place(v, shape, 0.0) for v, shape in zip(variables, self._shapes, strict=True)]
+        self.reset()
+
+    def reset(self) -> None:
+        """Open all latches and forget the time, as before the first sample."""
+        self._closed = [False] * len(self._names)
+        self._since = [0.0] * len(self._names)
+        self._time = -math.inf
+
+    @property
+    def active(self) -> dict[str, bool]:
+        """Whether each criterion's latch is closed, by the input's name."""
+        return dict(zip(self._names, self._closed, strict=True))
+
+    def __call__(self, inputs: Sample, time: float) -> tuple[float, ...]:
+        """Return the weights for the next sample.
+
+        Parameters
+        ----------
+        inputs : sequence of float, or mapping from input's name to float
+            As for an arbiter.
+        time : float
+            When they were measured [s]; it never decreases.
+
+        Returns
+        -------
+        tuple of float
+            One weight for each output.
+
+        Raises
+        ------
+        InputError
+            If the time is not finite or decreases, or an input is missing, unknown, not a number, or outside its
+            universe; the state is then as before.
+        UndefinedOutputError
+            If no rule fires for an output without default; the state is then as before.
+        """
+        now = _checked_time(time, self._time)
+        values = self.arbiter._checked(inputs)
+        degrees = [shape(x) for shape, x in zip(self._shapes, values, strict=True)]
+        closed, since, places = self._next(self._closed, self._since, values, degrees, now)
+        weights = self.arbiter(places)
+        self._closed, self._since, self._time = closed, since, now
+        return weights
+
+    def scan(self, inputs: ArrayLike, times: ArrayLike) -> Array:
+        """Return the weights for samples that follow each other, and those before.
+
+        Parameters
+        ----------
+        inputs : array_like, shape (n, inputs)
+            One sample in each row.
+        times : array_like, shape (n,)
+            When they were measured [s]; they never decrease.
+
+        Returns
+        -------
+        ndarray, shape (n, outputs)
+            Weights, in each row those that a call gives, to rounding.
+
+        Raises
+        ------
+        InputError
+            If a shape is another, a time is not finite or decreases, or a value is not a number or outside its
+            universe; the first such row is named, and the state is as before.
+        UndefinedOutputError
+            If no rule fires for an output without default; the state is then as before.
+        """
+        values = self.arbiter._checked_many(inputs)
+        moments = _checked_times(times, len(values), self._time)
+        degrees = np.column_stack([degrees_of_many(s, values[:, i]) for i, s in enumerate(self._shapes)])
+        closed, since = self._closed, self._since
+        places = np.empty_like(values)
+        for i, (row, degree, now) in enumerate(zip(values.tolist(), degrees.tolist(), moments.tolist(), strict=True)):
+            closed, since, places[i] = self._next(closed, since, row, degree, now)
+        weights = self.arbiter.batch(places)
+        if len(moments):
+            self._closed, self._since, self._time = closed, since, float(moments[-1])
+        return weights
+
+    def batch(self, inputs: ArrayLike) -> NoReturn:
+        """Refuse rows that are independent of each other.
+
+        Parameters
+        ----------
+        inputs : array_like, shape (n, inputs)
+            Any.
+
+        Raises
+        ------
+        InputError
+            Always.
+        """
+        raise InputError("batch: its rows are independent, but latches need an order; expected scan(inputs, times)")
+
+    def _next(
+        self,
+        before: Sequence[bool],
+        since_before: Sequence[float],
+        values: Sequence[float],
+        degrees: Sequence[float],
+        now: float,
+    ) -> tuple[list[bool], list[float], list[float]]:
+        """Latches after one sample, since when they are closed, and what the arbiter is asked."""
+        closed, since, places = list(before), list(since_before), list(values)
+        for i, degree in enumerate(degrees):
+            if degree >= self._enter[i]:
+                if not closed[i]:
+                    closed[i], since[i] = True, now
+            elif closed[i] and degree <= self._release[i] and now - since[i] >= self._dwell[i]:
+                closed[i] = False
+            if closed[i]:
+                places[i] = self._on_places[i]
+            elif not self._graded:
+                places[i] = self._off_places[i]
+        return closed, since, places
+
+    def __repr__(self) -> str:
+        settings = {"enter": self._enter, "release": self._release, "dwell": self._dwell}
+        said = ", ".join(f"{key}={dict(zip(self._names, x, strict=True))!r}" for key, x in settings.items())
+        on = dict(zip(self._names, self._on, strict=True))
+        return f"HysteresisArbiter({self.arbiter!r}, {said}, graded={self._graded}, on={on!r})"
+
+
+def _settings(
+    key: str, came: Setting, names: Sequence[str], expected: str, fits: Callable[[float], bool]
+) -> list[float]:
+    """One setting for each input, from one for all or from a mapping."""
+    if isinstance(came, Mapping):
+        _require_names(key, came, names)
+        each = [came[name] for name in names]
+    else:
+        each = [came] * len(names)
+    for name, x in zip(names, each, strict=True):
+        if not isinstance(x, Real) or isinstance(x, bool) or not fits(float(x)):
+            where = f" for {name!r}" if isinstance(came, Mapping) else ""
+            raise DefinitionError(f"{key}: {x!r} came{where}, expected {expected}")
+    return [float(x) for x in each]
+
+
+def _require_names(key: str, came: Mapping[str, object], names: Sequence[str]) -> None:
+    for name in came:
+        if name not in names:
+            raise DefinitionError(f"{key}: {name!r} is no input, expected {', '.join(names)}")
+    for name in names:
+        if name not in came:
+            raise DefinitionError(f"{key}: nothing came for {name!r}, expected {', '.join(names)}")
+
+
+def _on_terms(system: System, on: Mapping[str, str] | None) -> list[str]:
+    """Return the term of each input that asks for attention."""
+    for v in system.inputs:
+        if len(v.terms) != 2 or stretches(v):
+            raise DefinitionError(
+                f"input {v.name!r}: its terms are no criterion, expected two that sum to 1 everywhere"
+            )
+    if on is not None:
+        if not isinstance(on, Mapping):
+            raise DefinitionError(
+                f"on is {on!r}, expected a term for each of {', '.join(variable_names(system.inputs))}"
+            )
+        _require_names("on", on, variable_names(system.inputs))
+        for v in system.inputs:
+            if on[v.name] not in v.term_names:
+                expected = " or ".join(v.term_names)
+                raise DefinitionError(f"on: {on[v.name]!r} came for {v.name!r}, expected {expected}")
+        return [on[v.name] for v in system.inputs]
+    # at rest no output is in its greatest term; if there is one such row, the criteria are on in the other terms
+    ask = Questions.of_rows(system, Effort(EFFORT, 1))
+    high = tuple(ask.above_half(Is(v.name, greatest_term(v))) for v in system.outputs)
+    (answer,) = ask.ask([Goal(high, 0, 0)], 2)
+    if len(answer.boxes) != 1 or not answer.all_found or len(answer.boxes[0]) < len(system.inputs):
+        raise DefinitionError(
+            "on: the rules do not tell which terms ask for attention, as there is not one single row in which no "
+            "output is high; expected a term for each input"
+        )
+    rest = ask.places(answer.boxes[0])
+    return [next(term for term in v.term_names if term != rest[v.name]) for v in system.inputs]
+
+
+def _shape(variable: Variable, term: str) -> Shape:
+    return next(t.shape for t in variable.terms if t.name == term)
+
+
+def _place(variable: Variable, shape: Shape, degree: float) -> float:
+    """Return a place in the universe where a shape has a degree."""
+    low, high = variable.universe
+    for x in (low, *(x for x, _ in shape.points if low < x < high), high):
+        if shape(x) == degree:
+            return x
+    what = "fully on" if degree else "fully off"
+    raise DefinitionError(f"input {variable.name!r}: it is {what} nowhere in [{low:g}, {high:g}]")
+
+
+def _checked_time(time: float, last: float) -> float:
+    if not isinstance(time, Real) or isinstance(time, bool) or not math.isfinite(time):
+        raise InputError(f"time is {time!r}, expected a finite number of seconds")
+    if time < last:
+        raise InputError(f"time is {time:g} after {last:g}, expected one that never decreases; reset() begins anew")
+    return float(time)
+
+
+def _checked_times(times: ArrayLike, rows: int, last: float) -> Array:
+    try:
+        moments = np.asarray(times, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise InputError(f"times: {error}, expected numbers") from None
+    if moments.shape != (rows,):
+        raise InputError(f"times have the shape {moments.shape}, expected ({rows},), one for each row of the inputs")
+    for row, (before, now) in enumerate(zip([last, *moments.tolist()], moments.tolist(), strict=False)):
+        try:
+            _checked_time(now, before)
+        except InputError as error:
+            raise InputError(f"row {row}: {error}") from None
+    return moments

@@ -1,0 +1,6 @@
+"""What is known about a system from its definition alone: completeness, consistency, exclusivity, gaps."""
+
+from fuzzy_arbiter.verification.checks import verify
+from fuzzy_arbiter.verification.report import Check, Finding, Row, Verification
+
+__all__ = ["Check", "Finding", "Row", "Verification", "verify"]

@@ -1,0 +1,247 @@
+"""The questions about a system, asked of all crisp rows or of all graded inputs, within a common effort."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from fractions import Fraction
+from typing import Literal
+
+import numpy as np
+
+from fuzzy_arbiter.definition import Output, Rule, System
+from fuzzy_arbiter.engines.firing import Firing
+from fuzzy_arbiter.engines.sweep import centroid, outline
+from fuzzy_arbiter.propositions import And, Is, Not, Or, Proposition
+from fuzzy_arbiter.verification.cells import Domain, crisp, graded, rank
+from fuzzy_arbiter.verification.search import Answer, Goal, Group, Search
+
+Reach = Literal["exact", "bound", "samples"]
+HALF = Fraction(1, 2)
+SUPPORT = (Fraction(0), Fraction(1))
+FIRES, FULLY = rank(Fraction(0), SUPPORT), rank(Fraction(1), SUPPORT) - 1  # ranks above which a condition does so
+ANY = 2**30  # groups
+SAMPLES = 4096
+
+
+class Effort:
+    """How many statements searches may evaluate in all; what one leaves over the others may use.
+
+    Parameters
+    ----------
+    limit : int
+        In all.
+    searches : int
+        How many there will be.
+    """
+
+    def __init__(self, limit: int, searches: int) -> None:
+        self.limit = limit
+        self._left = limit
+        self._searches = searches
+
+    def share(self) -> int:
+        """Return what the next search may use."""
+        share = max(0, self._left) // max(1, self._searches)
+        self._searches -= 1
+        return share
+
+    def use(self, statements: int) -> None:
+        """Take off what a search has used."""
+        self._left -= statements
+
+
+def greatest_term(output: Output) -> str:
+    """Return the term of an output that stands for its greatest value.
+
+    Parameters
+    ----------
+    output : Output
+        Any.
+
+    Returns
+    -------
+    str
+        The term whose own centroid is greatest; of several the last.
+    """
+    pieces = outline(output)
+    n = len(output.terms)
+    centroids = [centroid([float(i == j) for i in range(n)], *pieces, False) for j in range(n)]
+    return output.term_names[max(range(n), key=lambda j: (centroids[j], j))]
+
+
+def rules_on(system: System, statement: Is) -> tuple[Rule, ...]:
+    """Return the rules that conclude a statement.
+
+    Parameters
+    ----------
+    system : System
+        Any.
+    statement : Is
+        About an output.
+
+    Returns
+    -------
+    tuple of Rule
+        In their order.
+    """
+    return tuple(rule for rule in system.rules if statement in rule.conclusions)
+
+
+class Questions:
+    """Asks one kind of inputs.
+
+    Parameters
+    ----------
+    system : System
+        Which is asked about.
+    domains : sequence of Domain
+        What the inputs can be.
+    levels : sequence of Fraction
+        By which the domains were made.
+    effort : Effort
+        Common to all questions.
+    """
+
+    def __init__(self, system: System, domains: Sequence[Domain], levels: Sequence[Fraction], effort: Effort) -> None:
+        self._system = system
+        self._domains = {domain.variable: domain for domain in domains}
+        self._levels = levels
+        self._effort = effort
+
+    @classmethod
+    def of_rows(cls, system: System, effort: Effort) -> Questions:
+        """Ask the crisp rows."""
+        return cls(system, [crisp(v, SUPPORT) for v in system.inputs], SUPPORT, effort)
+
+    @classmethod
+    def of_support(cls, system: System, effort: Effort) -> Questions:
+        """Ask all graded inputs what fires at all; that holds for every *and*, *or* and weight."""
+        return cls(system, [graded(v, SUPPORT) for v in system.inputs], SUPPORT, effort)
+
+    @classmethod
+    def of_halves(cls, system: System, effort: Effort) -> Questions:
+        """Ask all graded inputs what fires above 1/2; that holds for ``min`` and ``max`` and every weight."""
+        above = {HALF, *(level for rule in system.rules if (level := HALF / Fraction(rule.weight)) < 1)}
+        levels = tuple(sorted(above | {1 - level for level in above}))
+        return cls(system, [graded(v, levels) for v in system.inputs], levels, effort)
+
+    def firing(self, statement: Is) -> Group:
+        """Return the group of rules that conclude a statement at any strength."""
+        return tuple((rule.condition, FIRES) for rule in rules_on(self._system, statement))
+
+    def fully(self, statement: Is) -> Group:
+        """Return the group of rules that conclude a statement at strength 1."""
+        return tuple((rule.condition, FULLY) for rule in rules_on(self._system, statement) if rule.weight == 1.0)
+
+    def above_half(self, statement: Is) -> Group:
+        """Return the group of rules that conclude a statement above 1/2."""
+        return tuple(
+            (rule.condition, rank(HALF / Fraction(rule.weight), self._levels))
+            for rule in rules_on(self._system, statement)
+            if rule.weight > 0.5
+        )
+
+    def ask(self, goals: Sequence[Goal], wanted: int = 1) -> list[Answer]:
+        """Search for the goals, those that speak of the same inputs together.
+
+        Parameters
+        ----------
+        goals : sequence of Goal
+            What to look for.
+        wanted : int
+            Boxes to find; with more than one for one goal only.
+
+        Returns
+        -------
+        list of Answer
+            For each goal.
+        """
+        together: dict[frozenset[str], list[int]] = {}
+        for i, goal in enumerate(goals):
+            together.setdefault(goal.inputs(), []).append(i)
+        answers: dict[int, Answer] = {}
+        share = Effort(self._effort.share(), len(together))
+        top = 2 * len(self._levels)
+        for members in together.values():
+            search = Search([goals[i] for i in members], self._domains, top)
+            found, used = search.run(share.share(), wanted)
+            share.use(used)
+            self._effort.use(used)
+            answers.update(zip(members, found, strict=True))
+        return [answers[i] for i in range(len(goals))]
+
+    def places(self, box: dict[str, int]) -> dict[str, float | str]:
+        """Return a box as inputs: a number or a term for each one that matters."""
+        return {v.name: self._domains[v.name].places[box[v.name]] for v in self._system.inputs if v.name in box}
+
+    def combinations(self) -> int:
+        """Return how many combinations of patterns there are."""
+        return math.prod(len(domain.places) for domain in self._domains.values())
+
+    def samples(self) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
+        """Return combinations of the patterns' places, all of them or 4096 by a fixed seed."""
+        places = [np.array(self._domains[v.name].places, dtype=np.float64) for v in self._system.inputs]
+        if self.combinations() <= SAMPLES:
+            return np.stack(np.meshgrid(*places, indexing="ij"), axis=-1).reshape(-1, len(places))
+        random = np.random.default_rng(0)
+        return np.column_stack([random.choice(place, SAMPLES) for place in places])
+
+
+def reach(system: System, conditions: Sequence[Proposition]) -> Reach:
+    """Return what the ranks at 1/2 prove for a system's *and* and *or*.
+
+    Parameters
+    ----------
+    system : System
+        Any.
+    conditions : sequence of Proposition
+        Those that matter.
+
+    Returns
+    -------
+    {"exact", "bound", "samples"}
+        All, with ``min`` and ``max``; that what cannot happen with ``min`` cannot with ``prod`` either, which is never
+        above it, if only statements are negated; nothing.
+    """
+    parts = [part for condition in conditions for part in _parts(condition)]
+    if system.disjunction != "max" and any(isinstance(part, Or) for part in parts):
+        return "samples"
+    if system.conjunction == "min" or not any(isinstance(part, And) for part in parts):
+        return "exact"
+    negated = [part.part for part in parts if isinstance(part, Not)]
+    return "bound" if all(isinstance(part, Is) for part in negated) else "samples"
+
+
+def _parts(proposition: Proposition) -> list[Proposition]:
+    parts = proposition.parts if isinstance(proposition, And | Or) else ()
+    parts = (proposition.part,) if isinstance(proposition, Not) else parts
+    return [proposition, *(inner for part in parts for inner in _parts(part))]
+
+
+def sampled(system: System, questions: Questions, statements: Sequence[Is]) -> dict[str, float | str] | None:
+    """Return a sample at which two of some statements are concluded above 1/2.
+
+    Parameters
+    ----------
+    system : System
+        Any.
+    questions : Questions
+        Of halves.
+    statements : sequence of Is
+        About outputs.
+
+    Returns
+    -------
+    dict from str to float, or None
+        Inputs; None if no sample was found.
+    """
+    samples = questions.samples()
+    firing = Firing(system)
+    cuts = firing.cuts_of_many(firing.strengths_of_many(samples))
+    terms = {v.name: (k, v.term_names) for k, v in enumerate(system.outputs)}
+    chosen = [cuts[terms[s.variable][0]][terms[s.variable][1].index(s.term)] for s in statements]
+    rows = np.flatnonzero((np.array(chosen) > 0.5 + 1e-9).sum(axis=0) >= 2)
+    if not len(rows):
+        return None
+    return {v.name: float(x) for v, x in zip(system.inputs, samples[rows[0]], strict=True)}

@@ -1,0 +1,80 @@
+"""Which rules it was, at a place that a search has found."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from fuzzy_arbiter.definition import System
+from fuzzy_arbiter.engines.firing import Firing, number_logic
+from fuzzy_arbiter.propositions import Is
+
+
+def row_strengths(system: System, place: Mapping[str, float | str]) -> list[float]:
+    """Return how strongly each rule fires in a crisp row.
+
+    Parameters
+    ----------
+    system : System
+        Any.
+    place : mapping from str to str
+        Term of each input, or of those that matter.
+
+    Returns
+    -------
+    list of float
+        In the order of the rules.
+    """
+    row = {v.name: place.get(v.name, v.term_names[-1]) for v in system.inputs}
+    logic = number_logic(system.conjunction, system.disjunction)
+    return [
+        rule.weight * logic.degree(rule.condition, lambda s: float(row[s.variable] == s.term)) for rule in system.rules
+    ]
+
+
+def graded_strengths(system: System, place: Mapping[str, float | str]) -> list[float]:
+    """Return how strongly each rule fires for real inputs.
+
+    Parameters
+    ----------
+    system : System
+        Any.
+    place : mapping from str to float
+        Value of each input, or of those that matter.
+
+    Returns
+    -------
+    list of float
+        In the order of the rules.
+    """
+    return Firing(system).strengths([float(place.get(v.name, v.universe[0])) for v in system.inputs])
+
+
+def reasons(system: System, strengths: Sequence[float], statements: Sequence[Is], above: float) -> str:
+    """Return which rules conclude statements strongly, as text.
+
+    Parameters
+    ----------
+    system : System
+        Any.
+    strengths : sequence of float
+        Of each rule.
+    statements : sequence of Is
+        About outputs.
+    above : float
+        Strength that counts: 1, or anything above a lesser one.
+
+    Returns
+    -------
+    str
+        Such as ``alpha_1 is low by R2, alpha_1 is high by R1``.
+    """
+    parts = []
+    for statement in dict.fromkeys(statements):
+        rules = [
+            f"R{i + 1}"
+            for i, (rule, strength) in enumerate(zip(system.rules, strengths, strict=True))
+            if statement in rule.conclusions and (strength > above or strength == above == 1.0)
+        ]
+        if rules:
+            parts.append(f"{statement} by {' '.join(rules)}")
+    return ", ".join(parts)

@@ -1,0 +1,183 @@
+"""What a verification found, as data and as text."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Any, Literal
+
+from fuzzy_arbiter.table import aligned
+from fuzzy_arbiter.verification.cells import Stretch
+
+Severity = Literal["fault", "warning", "note"]
+SHOWN_ROWS = 32
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """Something to know about a system.
+
+    Attributes
+    ----------
+    severity : {"fault", "warning", "note"}
+        It fails or contradicts itself; it may not be what was meant; it is as it should be, and good to know.
+    about : str
+        Name of the check, or ``terms`` or ``rules``.
+    text : str
+        What it is, naming rule, term and place.
+    place : dict from str to float or str, or None
+        Inputs at which it shows: numbers, or for crisp rows terms. An input that is not in it can be anything.
+    """
+
+    severity: Severity
+    about: str
+    text: str
+    place: dict[str, float | str] | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Check:
+    """The answer to one question.
+
+    Attributes
+    ----------
+    name : str
+        ``complete``, ``consistent`` or ``exclusive``, and each of them with ``graded_`` in front.
+    holds : bool or None
+        None if that was not decided.
+    how : str
+        What was looked at, and how far the answer goes.
+    """
+
+    name: str
+    holds: bool | None
+    how: str
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """What the rules say where every input is in one term.
+
+    Attributes
+    ----------
+    terms : tuple of str, length inputs
+        The terms.
+    concluded : tuple of tuple of str, length outputs
+        Terms that each output is in, at any strength.
+    rules : tuple of str
+        Labels of the rules that fire.
+    """
+
+    terms: tuple[str, ...]
+    concluded: tuple[tuple[str, ...], ...]
+    rules: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Verification:
+    """What is known about a system from its definition alone.
+
+    Crisp rows are all combinations of terms, each taken as a label. Graded inputs are all real numbers in the
+    universes; what is said of them holds in real arithmetic.
+
+    Attributes
+    ----------
+    inputs, outputs : tuple of str
+        Names.
+    checks : tuple of Check
+        Answers.
+    findings : tuple of Finding
+        Worst first.
+    row_count : int
+        How many crisp rows there are.
+    rows : tuple of Row
+        All of them, the last term first; none if there are too many.
+    stretches : tuple of Stretch
+        Where the degrees of an input do not sum to 1.
+    """
+
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+    checks: tuple[Check, ...]
+    findings: tuple[Finding, ...]
+    row_count: int
+    rows: tuple[Row, ...]
+    stretches: tuple[Stretch, ...]
+
+    @property
+    def complete(self) -> bool | None:
+        """Whether in each crisp row every output has a rule that fires."""
+        return self._holds("complete")
+
+    @property
+    def consistent(self) -> bool | None:
+        """Whether in no crisp row rules of weight 1 put one output into two terms."""
+        return self._holds("consistent")
+
+    @property
+    def exclusive(self) -> bool | None:
+        """Whether in no crisp row two outputs are above 1/2 in their greatest terms."""
+        return self._holds("exclusive")
+
+    @property
+    def graded_complete(self) -> bool | None:
+        """Whether for all real inputs every output has a rule that fires."""
+        return self._holds("graded_complete")
+
+    @property
+    def graded_consistent(self) -> bool | None:
+        """Whether for no real inputs one output is above 1/2 in two terms."""
+        return self._holds("graded_consistent")
+
+    @property
+    def graded_exclusive(self) -> bool | None:
+        """Whether for no real inputs two outputs are above 1/2 in their greatest terms."""
+        return self._holds("graded_exclusive")
+
+    @property
+    def ok(self) -> bool:
+        """Whether there is no fault, and that was decided."""
+        decided = (self.complete, self.consistent, self.graded_complete)
+        return None not in decided and all(finding.severity != "fault" for finding in self.findings)
+
+    def _holds(self, name: str) -> bool | None:
+        return next(check.holds for check in self.checks if check.name == name)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return all of it as JSON knows it.
+
+        Returns
+        -------
+        dict
+            Of texts, numbers, booleans, lists and dicts.
+        """
+        return {
+            "ok": self.ok,
+            "checks": {check.name: {"holds": check.holds, "how": check.how} for check in self.checks},
+            "findings": [asdict(finding) for finding in self.findings],
+            "row_count": self.row_count,
+            "rows": [
+                {
+                    "inputs": dict(zip(self.inputs, row.terms, strict=True)),
+                    "outputs": {k: list(terms) for k, terms in zip(self.outputs, row.concluded, strict=True)},
+                    "rules": list(row.rules),
+                }
+                for row in self.rows
+            ],
+            "stretches": [asdict(stretch) for stretch in self.stretches],
+        }
+
+    def __str__(self) -> str:
+        lines = [f"{self.row_count} crisp rows"]
+        if 0 < len(self.rows) <= SHOWN_ROWS:
+            table = [(*self.inputs, *self.outputs, "rules that fire")]
+            for row in self.rows:
+                table.append((*row.terms, *("/".join(terms) or "-" for terms in row.concluded), " ".join(row.rules)))
+            lines += aligned(table)
+        answers = {True: "yes", False: "no", None: "not decided"}
+        lines.append("checks")
+        lines += aligned([(check.name.replace("_", " "), answers[check.holds], check.how) for check in self.checks])
+        for severity, title in (("fault", "faults"), ("warning", "warnings"), ("note", "notes")):
+            texts = [finding.text for finding in self.findings if finding.severity == severity]
+            lines += [title, *(f"  {text}" for text in texts)] if texts else []
+        lines.append("ok" if self.ok else "not ok")
+        return "\n".join(lines)

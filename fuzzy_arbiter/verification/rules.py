@@ -1,0 +1,124 @@
+"""What can be told from rules as they are written: what none of them uses, and which of them add nothing."""
+
+from __future__ import annotations
+
+from collections import Counter, defaultdict
+from collections.abc import Iterator
+
+from fuzzy_arbiter.definition import Rule, System
+from fuzzy_arbiter.propositions import And, Is, Not, Or, Proposition
+from fuzzy_arbiter.verification.report import Finding
+
+MAX_COMPARED = 100  # rules with one conclusion that are compared with each other
+
+
+def unused(system: System) -> Iterator[Finding]:
+    """Yield the inputs and terms that no rule uses.
+
+    Parameters
+    ----------
+    system : System
+        Any.
+
+    Yields
+    ------
+    Finding
+        One for each.
+    """
+    stated = {s for rule in system.rules for s in rule.condition.terms()}
+    concluded = {s for rule in system.rules for s in rule.conclusions}
+    for variable in system.inputs:
+        if variable.name not in {s.variable for s in stated}:
+            yield Finding("warning", "terms", f"input {variable.name!r}: no rule asks for it")
+            continue
+        for term in variable.term_names:
+            if Is(variable.name, term) not in stated:
+                yield Finding("note", "terms", f"input {variable.name!r}: no rule asks for its term {term!r}")
+    for output in system.outputs:
+        if output.name not in {s.variable for s in concluded}:
+            yield Finding("warning", "terms", f"output {output.name!r}: no rule concludes on it")
+            continue
+        for term in output.term_names:
+            if Is(output.name, term) not in concluded:
+                yield Finding("note", "terms", f"output {output.name!r}: no rule concludes its term {term!r}")
+
+
+def redundant(system: System) -> Iterator[Finding]:
+    """Yield the rules whose conclusion another rule draws at least as strongly, always.
+
+    Found is what follows from the form of the conditions: ``a and b`` is never above ``a``, nor ``a`` above ``a or b``.
+
+    Parameters
+    ----------
+    system : System
+        Any.
+
+    Yields
+    ------
+    Finding
+        One for each; of two rules that say the same the later.
+    """
+    lattice = system.conjunction == "min" and system.disjunction == "max"
+    by_conclusion: dict[Is, list[tuple[int, Rule]]] = defaultdict(list)
+    for i, rule in enumerate(system.rules):
+        for conclusion in rule.conclusions:
+            by_conclusion[conclusion].append((i, rule))
+    many = [str(conclusion) for conclusion, rules in by_conclusion.items() if len(rules) > MAX_COMPARED]
+    if many:
+        names = ", ".join(many)
+        yield Finding(
+            "note", "rules", f"not compared with each other, being more than {MAX_COMPARED}: rules on {names}"
+        )
+    for conclusion, rules in by_conclusion.items():
+        if len(rules) > MAX_COMPARED:
+            continue
+        for i, rule in rules:
+            for j, other in rules:
+                if i == j or rule.weight > other.weight or not _below(rule.condition, other.condition, lattice):
+                    continue
+                same = other.weight <= rule.weight and _below(other.condition, rule.condition, lattice)
+                if not same or j < i:
+                    what = "says the same as" if same else "adds nothing to"
+                    yield Finding(
+                        "warning", "rules", f"R{i + 1} '{rule}': on {conclusion} it {what} R{j + 1} '{other}'"
+                    )
+                    break
+
+
+def _below(p: Proposition, q: Proposition, lattice: bool) -> bool:
+    """Whether the form of two propositions shows that the first is never above the second."""
+    if p == q:
+        return True
+    if isinstance(p, Not) and isinstance(q, Not):
+        return _below(q.part, p.part, lattice)
+    if not lattice:  # p times p is below p, so that parts count as often as they stand
+        if isinstance(p, And) and not Counter(q.parts if isinstance(q, And) else (q,)) - Counter(p.parts):
+            return True
+        return isinstance(q, Or) and not Counter(p.parts if isinstance(p, Or) else (p,)) - Counter(q.parts)
+    if isinstance(p, Or):
+        return all(_below(part, q, lattice) for part in p.parts)
+    if isinstance(q, And):
+        return all(_below(p, part, lattice) for part in q.parts)
+    if isinstance(p, And) and any(_below(part, q, lattice) for part in p.parts):
+        return True
+    return isinstance(q, Or) and any(_below(p, part, lattice) for part in q.parts)
+
+
+def labels(system: System) -> dict[Proposition, str]:
+    """Return the labels of the rules that have each condition.
+
+    Parameters
+    ----------
+    system : System
+        Any.
+
+    Returns
+    -------
+    dict from Proposition to str
+        Such as ``R1, R4``.
+    """
+    result: dict[Proposition, str] = {}
+    for i, rule in enumerate(system.rules):
+        label = f"R{i + 1}"
+        result[rule.condition] = f"{result[rule.condition]}, {label}" if rule.condition in result else label
+    return result

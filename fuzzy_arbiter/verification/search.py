@@ -1,0 +1,204 @@
+"""An exhaustive search over all combinations of inputs' patterns, which leaves out what bounds refute.
+
+Inputs are settled one after the other. As long as one is open, a statement about it has bounds, the least and the
+greatest rank of its term. *and*, *or* and *not* take bounds to bounds, so a question is often answered for a whole box
+of combinations at once: for prioritised criteria the work grows with a power of their number, not with two to the
+power of it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fuzzy_arbiter.engines.firing import Logic
+from fuzzy_arbiter.propositions import Is, Proposition
+from fuzzy_arbiter.verification.cells import Domain, Ranks
+
+CHUNK = 8192  # combinations that are looked at together
+Bounds = tuple[Ranks, Ranks]
+Group = tuple[tuple[Proposition, int], ...]
+Box = dict[str, int]
+Flags = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, slots=True)
+class Goal:
+    """A combination to look for.
+
+    Attributes
+    ----------
+    groups : tuple of tuple of (Proposition, int)
+        A group fires where any of its propositions has a rank above the number beside it.
+    least, most : int
+        How many groups must fire.
+    """
+
+    groups: tuple[Group, ...]
+    least: int
+    most: int
+
+    def inputs(self) -> frozenset[str]:
+        """Return the names of the inputs that the groups speak of."""
+        return frozenset(s.variable for group in self.groups for condition, _ in group for s in condition.terms())
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """What a search found.
+
+    Attributes
+    ----------
+    boxes : tuple of dict from str to int
+        Pattern of each input that matters; the goal is met whatever the others are.
+    all_found : bool
+        Whether the search went through all combinations, so that there are no more boxes.
+    combinations : int
+        How many there are of the inputs that the goal speaks of.
+    """
+
+    boxes: tuple[Box, ...]
+    all_found: bool
+    combinations: int
+
+
+class Search:
+    """One search for several goals that speak of the same inputs.
+
+    Parameters
+    ----------
+    goals : sequence of Goal
+        What to look for.
+    domains : mapping from str to Domain
+        Of each input.
+    top : int
+        The rank of one minus a degree is this less the degree's rank.
+    """
+
+    def __init__(self, goals: Sequence[Goal], domains: Mapping[str, Domain], top: int) -> None:
+        self._goals = goals
+        self._logic: Logic[Bounds] = Logic(_least, _greatest, lambda a: _not(a, top))
+        groups: dict[Group, int] = {}
+        self._members = [[groups.setdefault(group, len(groups)) for group in goal.groups] for goal in goals]
+        self._groups = len(groups)
+        self._uses: dict[Proposition, list[tuple[int, int]]] = {}  # group and threshold
+        for group, g in groups.items():
+            for condition, threshold in group:
+                self._uses.setdefault(condition, []).append((g, threshold))
+        # the inputs that most statements speak of come first: they refute most
+        statements = [statement for condition in self._uses for statement in condition.terms()]
+        self._cost = max(1, len(statements))
+        stated_ones = set(statements)
+        mentions = Counter(statement.variable for statement in statements)
+        self._order = sorted((name for name in domains if name in mentions), key=lambda name: -mentions[name])
+        self._position = {name: i for i, name in enumerate(self._order)}
+        self._ranks: dict[Is, Ranks] = {}
+        self._bounds: dict[Is, Bounds] = {}
+        self._patterns: list[NDArray[np.intp]] = []  # of each input in order, those that its stated terms tell apart
+        for name in self._order:
+            domain = domains[name]
+            stated = [j for j, term in enumerate(domain.terms) if Is(name, term) in stated_ones]
+            _, first = np.unique(domain.ranks[:, stated], axis=0, return_index=True)
+            self._patterns.append(np.sort(first))
+            for j in stated:
+                ranks = domain.ranks[self._patterns[-1], j]
+                self._ranks[Is(name, domain.terms[j])] = ranks
+                self._bounds[Is(name, domain.terms[j])] = ranks.min(keepdims=True), ranks.max(keepdims=True)
+        self.combinations = math.prod(map(len, self._patterns))
+
+    def run(self, limit: int, wanted: int = 1) -> tuple[list[Answer], int]:
+        """Search.
+
+        Parameters
+        ----------
+        limit : int
+            Most statements to evaluate.
+        wanted : int
+            Boxes to find; with more than one for one goal only.
+
+        Returns
+        -------
+        list of Answer
+            For each goal.
+        int
+            Statements that were evaluated.
+        """
+        found: list[list[Box]] = [[] for _ in self._goals]
+        wanting = list(range(len(self._goals)))
+        stack = [np.zeros((1, 0), dtype=np.int16)]
+        seen = 0
+        while stack and wanting and seen * self._cost < limit:
+            # few at a time in the beginning, so that what is easily found is found soon
+            size = min(CHUNK, max(16, seen // 8), max(1, limit // self._cost))
+            boxes = stack.pop()
+            if len(boxes) > size:
+                stack.append(boxes[size:])
+                boxes = boxes[:size]
+            seen += len(boxes)
+            sure, possible = self._judge(boxes)
+            keep = np.zeros(len(boxes), dtype=np.bool_)
+            for g in wanting:
+                for row in np.flatnonzero(sure[g])[: wanted - len(found[g])]:
+                    found[g].append(self._box(boxes[row]))
+            wanting = [g for g in wanting if len(found[g]) < wanted]
+            for g in wanting:
+                keep |= possible[g] & ~sure[g]
+            boxes = boxes[keep]
+            if len(boxes):
+                patterns = np.arange(len(self._patterns[boxes.shape[1]]), dtype=np.int16)
+                grown = np.repeat(boxes, len(patterns), axis=0)
+                stack.append(np.column_stack((grown, np.tile(patterns, len(boxes)))))
+        done = not stack  # of a goal that has all it wanted, boxes were left out
+        answers = [Answer(tuple(boxes), done and len(boxes) < wanted, self.combinations) for boxes in found]
+        return answers, seen * self._cost
+
+    def _box(self, row: NDArray[np.int16]) -> Box:
+        return {self._order[i]: int(self._patterns[i][p]) for i, p in enumerate(row)}
+
+    def _judge(self, boxes: NDArray[np.int16]) -> tuple[list[Flags], list[Flags]]:
+        """Whether each goal is met in all of a box, and whether it may be in some of it."""
+        n, depth = boxes.shape
+        known: dict[Is, Bounds] = {}
+
+        def of(statement: Is) -> Bounds:
+            if statement not in known:
+                known[statement] = self._bounds[statement]
+                if (i := self._position[statement.variable]) < depth:
+                    degrees = self._ranks[statement][boxes[:, i]]
+                    known[statement] = degrees, degrees
+            return known[statement]
+
+        surely, maybe = np.zeros((2, self._groups, n), dtype=np.bool_)
+        for condition, uses in self._uses.items():
+            lower, upper = self._logic.degree(condition, of)
+            for g, threshold in uses:
+                surely[g] |= lower > threshold
+                maybe[g] |= upper > threshold
+        sure, possible = [], []
+        for goal, members in zip(self._goals, self._members, strict=True):
+            lower_count = surely[members].sum(axis=0)
+            upper_count = maybe[members].sum(axis=0)
+            sure.append((lower_count >= goal.least) & (upper_count <= goal.most))
+            possible.append((upper_count >= goal.least) & (lower_count <= goal.most))
+        return sure, possible
+
+
+# bounds that are one array are known exactly, and need no second evaluation
+def _least(a: Bounds, b: Bounds) -> Bounds:
+    lower = np.minimum(a[0], b[0])
+    return lower, lower if a[0] is a[1] and b[0] is b[1] else np.minimum(a[1], b[1])
+
+
+def _greatest(a: Bounds, b: Bounds) -> Bounds:
+    lower = np.maximum(a[0], b[0])
+    return lower, lower if a[0] is a[1] and b[0] is b[1] else np.maximum(a[1], b[1])
+
+
+def _not(a: Bounds, top: int) -> Bounds:
+    upper = np.int16(top) - a[0]
+    return (upper if a[0] is a[1] else np.int16(top) - a[1]), upper

@@ -1,0 +1,148 @@
+"""Explanations: what fired, how strongly, and what decided."""
+
+import json
+
+import pytest
+
+from fuzzy_arbiter import Arbiter, Criterion, Output, System, Term, UndefinedOutputError, Variable, falling, rising
+from fuzzy_arbiter.engines.firing import Firing
+
+SAMPLES = [(0.0, 0.0, 0.0), (1.0, 1.0, 0.0), (0.3, 0.6, 0.5), (0.5, 0.5, 0.5), (0.25, 1.0, 0.75)]
+
+
+def lamp(rules, default=None, normalisation="range", outputs=1):
+    """Return a system of one input, with a gap between dark and bright, and lamps."""
+    light = Variable("light", (0, 10), (Term("dark", falling(2, 4)), Term("bright", rising(6, 8))))
+    low_high = (Term("low", falling(0, 1)), Term("high", rising(0, 1)))
+    lamps = tuple(Output(f"lamp_{k + 1}", (0, 1), low_high, default) for k in range(outputs))
+    return Arbiter(system=System((light,), lamps, rules, normalisation=normalisation))
+
+
+def test_strengths_and_decisions_by_hand():
+    e = Arbiter().explain({"obstacle": 0.3, "shape": 0.6, "depth": 0.5})
+    assert [i.name for i in e.inputs] == ["obstacle", "shape", "depth"]
+    assert e.inputs[0].value == 0.3
+    assert e.inputs[0].degrees == {"not_exist": 0.7, "exist": 0.3}
+    # R5 is min(.7, .6), R6 max(.3, .6), R8 min(.7, .4, .5)
+    assert [r.strength for r in e.rules] == [0.3, 0.7, 0.3, 0.4, 0.6, 0.6, 0.5, 0.4]
+    assert [r.label for r in e.rules] == [f"R{i}" for i in range(1, 9)]
+    assert e.rules[4].text == "if obstacle is not_exist and shape is complex then alpha_2 is high"
+    assert e.rules[4].conclusions == {"alpha_2": "high"}
+    one, two, three = e.outputs
+    assert one.cuts == {"low": 0.7, "high": 0.3}
+    assert (one.decided_by, one.runner_up, one.margin) == ("R2", "R1", pytest.approx(0.4))
+    assert (two.decided_by, two.runner_up, two.margin) == ("R5", "R4", pytest.approx(0.2))
+    assert (three.decided_by, three.runner_up) == ("R6", "R8")
+    # alpha = smoothstep(h), and before normalising (1 + alpha) / 3
+    for output, h in zip(e.outputs, (0.3, 0.6, 0.4), strict=True):
+        alpha = 3 * h**2 - 2 * h**3
+        assert output.weight == pytest.approx(alpha, abs=1e-15)
+        assert output.centroid == pytest.approx((1 + alpha) / 3, abs=1e-15)
+    assert (e.winner, e.runner_up) == ("alpha_2", "alpha_3")
+    assert e.margin == pytest.approx(0.648 - 0.352)
+
+
+@pytest.mark.parametrize(
+    ("sample", "fired"),
+    [
+        ((1, 1, 0), "R1 R3 R6 R7"),
+        ((1, 0, 1), "R1 R3 R4 R6"),
+        ((0, 1, 1), "R2 R5 R6"),
+        ((0, 0, 1), "R2 R4 R8"),
+        ((0, 0, 0), "R2 R4 R7"),
+    ],
+)
+def test_crisp_samples_fire_the_rules_of_the_truth_table(sample, fired):
+    assert " ".join(r.label for r in Arbiter().explain(sample).rules if r.fired) == fired
+
+
+@pytest.mark.parametrize("sample", SAMPLES)
+@pytest.mark.parametrize("engine", ["auto", "exact"])
+def test_weights_are_those_of_the_arbiter(sample, engine):
+    arbiter = Arbiter(engine=engine)
+    e = arbiter.explain(sample)
+    assert e.weights == arbiter(sample)
+    assert [r.strength for r in e.rules] == Firing(arbiter.system).strengths(sample)
+
+
+def test_no_winner_where_all_are_zero_and_where_two_tie():
+    rest = Arbiter().explain([0, 0, 0])
+    assert (rest.winner, rest.runner_up, rest.margin, rest.tied) == (None, None, 0.0, ())
+    assert "all weights are 0" in str(rest)
+    tie = Arbiter().explain([0.5, 0.5, 0.0])
+    assert (tie.winner, tie.tied) == (None, ("alpha_1", "alpha_2"))
+    assert "alpha_1, alpha_2 are equal" in str(tie)
+    assert tie.outputs[0].margin == 0.0
+    assert "alike" in str(tie)
+
+
+def test_a_single_output_wins_alone():
+    e = lamp(("if light is dark then lamp_1 is high", "if light is bright then lamp_1 is low")).explain([3.0])
+    assert (e.winner, e.runner_up, e.margin) == ("lamp_1", None, e.weights[0])
+    assert e.outputs[0].runner_up is None
+    assert e.outputs[0].margin == 0.5
+    assert "by R1 alone" in str(e)
+
+
+def test_a_rule_for_two_outputs_decides_both():
+    rules = (
+        "if light is dark then lamp_1 is high and lamp_2 is low",
+        "if light is not dark then lamp_1 is low, lamp_2 is low",
+    )
+    e = lamp(rules, outputs=2).explain([2.5])
+    assert e.rules[0].conclusions == {"lamp_1": "high", "lamp_2": "low"}
+    assert [o.decided_by for o in e.outputs] == ["R1", "R1"]
+    assert [o.runner_up for o in e.outputs] == ["R2", None]  # of lamp_2 both rules conclude the same term
+
+
+def test_weights_of_rules_count():
+    e = lamp(("if light is dark then lamp_1 is high with 0.25", "if light is not bright then lamp_1 is low")).explain(
+        [0]
+    )
+    assert [r.strength for r in e.rules] == [0.25, 1.0]
+    assert e.outputs[0].decided_by == "R2"
+    assert e.outputs[0].margin == 0.75
+
+
+def test_a_default_is_said():
+    arbiter = lamp(("if light is dark then lamp_1 is high",), default=0.25, normalisation="none")
+    e = arbiter.explain([5.0])
+    (output,) = e.outputs
+    assert output.default_used
+    assert (output.centroid, output.weight, output.decided_by, output.margin) == (0.25, 0.25, None, 0.0)
+    assert "no rule fired" in str(e)
+    assert "its default 0.25" in str(e)
+    assert not arbiter.explain([1.0]).outputs[0].default_used
+
+
+def test_an_undefined_output_is_an_error():
+    with pytest.raises(UndefinedOutputError, match="lamp_1"):
+        lamp(("if light is dark then lamp_1 is high", "if light is bright then lamp_1 is low")).explain([5.0])
+
+
+def test_text_shows_what_fired_and_nothing_else():
+    text = str(Arbiter().explain([0.0, 0.25, 0.0]))
+    lines = text.splitlines()
+    assert "rules that fired, 5 of 8" in lines
+    assert "R1" not in text
+    assert "  R5  0.25  if obstacle is not_exist and shape is complex then alpha_2 is high" in lines
+    assert lines[-1] == "winner: alpha_2, 0.15625 above alpha_1"
+    assert all(line == line.rstrip() for line in lines)
+    ten = str(Arbiter([Criterion(f"c{i}") for i in range(10)]).explain([0.3] * 10))
+    assert max(map(len, ten.splitlines())) <= 120
+    assert len(ten.splitlines()) <= 10 + 29 + 10 + 4
+
+
+def test_as_dict_is_json():
+    e = Arbiter().explain([0.3, 0.6, 0.5])
+    data = json.loads(json.dumps(e.as_dict()))
+    assert data == e.as_dict()
+    assert data["winner"] == "alpha_2"
+    assert data["rules"][7] == {
+        "label": "R8",
+        "text": "if obstacle is not_exist and shape is simple and depth is not_maintain then alpha_3 is high",
+        "strength": 0.4,
+        "conclusions": {"alpha_3": "high"},
+        "fired": True,
+    }
+    assert data["outputs"][1]["cuts"] == {"low": 0.4, "high": 0.6}

@@ -1,0 +1,298 @@
+"""Hysteresis: latches by hand, scans against calls, and the chatter that it takes away."""
+
+import copy
+import math
+import pickle
+import runpy
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from fuzzy_arbiter import (
+    Arbiter,
+    Criterion,
+    DefinitionError,
+    InputError,
+    Output,
+    Shape,
+    System,
+    Term,
+    UndefinedOutputError,
+    Variable,
+    falling,
+    rising,
+)
+from fuzzy_arbiter.hysteresis import HysteresisArbiter
+
+EXAMPLE = Path(__file__).parents[2] / "examples" / "chatter.py"
+
+
+def steady(**settings):
+    return HysteresisArbiter(Arbiter(), **{"enter": 0.8, "release": 0.2, **settings})
+
+
+def firsts(h, degrees, step=0.125):
+    """First weight for obstacle degrees at equal times."""
+    return [h([degree, 0.0, 0.0], i * step)[0] for i, degree in enumerate(degrees)]
+
+
+def test_a_latch_closes_at_enter_and_opens_at_release():
+    assert firsts(steady(), [0, 0.79, 0.8, 0.5, 0.21, 0.2, 0.5, 0.79, 1, 0]) == [0, 0, 1, 1, 1, 0, 0, 0, 1, 0]
+
+
+def test_weights_are_those_of_crisp_rows():
+    h = steady()
+    assert h([0.1, 0.9, 0.7], 0) == (0, 1, 0)
+    assert h([0.9, 0.9, 0.9], 1) == (1, 0, 0)
+    assert h([0.1, 0.1, 0.5], 2) == (0, 0, 1)
+    assert h([0.1, 0.1, 0.1], 3) == (0, 0, 0)
+
+
+def test_closing_is_never_delayed_and_opening_is_by_dwell():
+    degrees = [0, 1, 0, 0, 0, 0, 1, 0]
+    #  closed at 0.125, it may open 0.375 later, at 0.5
+    assert firsts(steady(dwell=0.375), degrees) == [0, 1, 1, 1, 0, 0, 1, 1]
+    # a degree that stays between the thresholds never opens it
+    assert firsts(steady(dwell=0.25), [1, 0.5, 0.5, 0.5, 0.2]) == [1, 1, 1, 1, 0]
+
+
+def test_graded_counts_with_its_degree_until_it_enters():
+    h = steady(graded=True)
+    core = Arbiter()
+    assert h([0.5, 0.25, 0.0], 0) == core([0.5, 0.25, 0.0])
+    assert h([0.8, 0.25, 0.0], 1) == core([1.0, 0.25, 0.0])
+    assert h([0.3, 0.25, 0.0], 2) == core([1.0, 0.25, 0.0])
+    assert h([0.2, 0.25, 0.0], 3) == core([0.2, 0.25, 0.0])
+
+
+def test_settings_of_each_criterion():
+    names = ("obstacle", "shape", "depth")
+    h = HysteresisArbiter(
+        Arbiter(), enter={"obstacle": 0.5, "shape": 0.9, "depth": 1}, release=dict.fromkeys(names, 0.25), dwell=0.0
+    )
+    h({"obstacle": 0.5, "shape": 0.8, "depth": 0.99}, 0.0)
+    assert h.active == {"obstacle": True, "shape": False, "depth": False}
+    h({"obstacle": 0.25, "shape": 0.9, "depth": 1.0}, 1.0)
+    assert h.active == {"obstacle": False, "shape": True, "depth": True}
+    h.reset()
+    assert h.active == dict.fromkeys(names, False)
+    assert h([0, 0, 0], -5.0) == (0, 0, 0)  # the time begins anew
+
+
+def test_criteria_on_measured_places():
+    near = Criterion("near", on="yes", off="no", membership=falling(1.0, 2.0))  # m
+    deep = Criterion("deep", on="yes", off="no", membership=rising(10.0, 12.0))
+    h = HysteresisArbiter(Arbiter([near, deep], outside="clip"), enter=1.0, release=0.0)
+    assert h([5.0, 0.0], 0) == (0, 0)
+    assert h([0.5, 0.0], 1) == (1, 0)
+    assert h([1.9, 20.0], 2) == (1, 0)
+    assert h([2.0, 11.0], 3) == (0, 1)
+    assert h.active == {"near": False, "deep": True}
+
+
+@pytest.mark.parametrize("form", ["hierarchical", "minimal", "conjunctive", "complete"])
+def test_the_rules_tell_which_terms_are_on(form):
+    criteria = [Criterion("a", on="z", off="b"), Criterion("b", on="c", off="d"), Criterion("c")]
+    h = HysteresisArbiter(Arbiter(criteria, form=form), enter=1, release=0)
+    assert "on={'a': 'z', 'b': 'c', 'c': 'on'}" in repr(h)
+
+
+CROSSED = (falling(0, 1), rising(0, 1))
+
+
+def plain(rules, shapes=CROSSED):
+    terms = tuple(Term(name, shape) for name, shape in zip(("off", "on", "more"), shapes, strict=False))
+    x = Variable("x", (0, 1), terms)
+    y = Output("y", (0, 1), (Term("low", falling(0, 1)), Term("high", rising(0, 1))))
+    return Arbiter(system=System((x,), (y,), rules))
+
+
+def test_terms_can_be_given_where_the_rules_do_not_tell():
+    arbiter = plain(("if x is on or x is off then y is high",))
+    with pytest.raises(DefinitionError, match="on: the rules do not tell"):
+        HysteresisArbiter(arbiter, enter=1, release=0)
+    assert HysteresisArbiter(arbiter, enter=1, release=0, on={"x": "off"})([0.0], 0) == (1,)
+    turned = HysteresisArbiter(Arbiter([Criterion("c")]), enter=1, release=0, on={"c": "off"})
+    turned([0.0], 0.0)
+    assert turned.active == {"c": True}
+
+
+def test_forty_criteria():
+    h = HysteresisArbiter(Arbiter([Criterion(f"c{i}") for i in range(40)]), enter=0.75, release=0.25)
+    assert sum(h([0.8] * 40, 0.0)) == 1
+
+
+@given(
+    st.lists(st.tuples(*[st.sampled_from([0, 0.1, 0.2, 0.5, 0.8, 0.9, 1])] * 3, st.floats(0, 0.2)), max_size=40),
+    st.integers(0, 40),
+    st.sampled_from([0.0, 0.1, 0.3]),
+    st.booleans(),
+)
+def test_a_scan_is_calls_one_after_the_other(rows, cut, dwell, graded):
+    one, other = (steady(dwell=dwell, graded=graded) for _ in range(2))
+    inputs = np.array([row[:3] for row in rows], dtype=float).reshape(-1, 3)
+    times = np.cumsum([row[3] for row in rows])
+    calls = np.array([one(x, t) for x, t in zip(inputs, times, strict=True)]).reshape(-1, 3)
+    parts = [other.scan(inputs[:cut], times[:cut]), other.scan(inputs[cut:], times[cut:])]  # the state goes on
+    np.testing.assert_allclose(np.vstack(parts), calls, atol=1e-15, rtol=0)
+    assert one.active == other.active
+
+
+@given(st.lists(st.floats(0, 1), min_size=1, max_size=60), st.sampled_from([(0.8, 0.2), (1.0, 0.0), (0.5, 0.4)]))
+def test_noise_within_the_band_changes_nothing(noise, band):
+    enter, release = band
+    h = HysteresisArbiter(Arbiter(), enter=enter, release=release)
+    h([enter, 0, 0], 0.0)
+    kept = [release + (enter - release) * max(x, 1e-3) for x in noise]
+    weights = {h([min(x, 1.0), 0, 0], 1.0 + i) for i, x in enumerate(kept)}
+    assert weights == {(1, 0, 0)}
+
+
+def test_the_arbiter_inside_does_not_change():
+    arbiter = Arbiter()
+    before = repr(arbiter)
+    h = HysteresisArbiter(arbiter, enter=0.8, release=0.2)
+    h([1, 0.5, 0.5], 0)
+    assert h.arbiter is arbiter
+    assert repr(arbiter) == before
+    assert arbiter([0.5, 0, 0]) == Arbiter()([0.5, 0, 0])
+
+
+def test_copies_have_a_state_of_their_own():
+    h = steady()
+    h([1, 0, 0], 0)
+    for twin in (copy.deepcopy(h), pickle.loads(pickle.dumps(h))):
+        assert twin.active == h.active
+        twin.reset()
+        assert h.active["obstacle"]
+
+
+def test_batch_is_refused():
+    with pytest.raises(InputError, match=r"batch: .*scan"):
+        steady().batch([[0, 0, 0]])
+
+
+@pytest.mark.parametrize(
+    ("inputs", "time", "match"),
+    [
+        ([math.nan, 0, 0], 2, "obstacle: input is nan"),
+        ([0, 0], 2, "2 inputs came, expected 3"),
+        ([0, 0, 2], 2, "depth: input is 2"),
+        ({"obstacle": 0}, 2, "shape: input is missing"),
+        ([0, 0, 0], 0.5, "time is 0.5 after 1"),
+        ([0, 0, 0], math.nan, "time is nan"),
+        ([0, 0, 0], math.inf, "time is inf"),
+        ([0, 0, 0], "2", "time is '2'"),
+        ([0, 0, 0], None, "time is None"),
+        ([0, 0, 0], True, "time is True"),
+    ],
+)
+def test_bad_samples_leave_the_state(inputs, time, match):
+    h = steady()
+    h([1, 0, 0], 1)
+    with pytest.raises(InputError, match=match):
+        h(inputs, time)
+    assert h.active == {"obstacle": True, "shape": False, "depth": False}
+    assert h([0.5, 0, 0], 1) == (1, 0, 0)  # the same time may come again
+
+
+@pytest.mark.parametrize(
+    ("inputs", "times", "match"),
+    [
+        ([[0, 0, 0], [math.nan, 0, 0]], [2, 3], "row 1: obstacle"),
+        ([[0, 0]], [2], "shape"),
+        ([[0, 0, 0]], [2, 3], r"times have the shape \(2,\), expected \(1,\)"),
+        ([[0, 0, 0]] * 2, [2, 1.5], "row 1: time is 1.5 after 2"),
+        ([[0, 0, 0]], [0.5], "row 0: time is 0.5 after 1"),
+        ([[0, 0, 0]], [math.nan], "row 0: time is nan"),
+        ([[0, 0, 0]], ["x"], "times: "),
+    ],
+)
+def test_bad_scans_leave_the_state(inputs, times, match):
+    h = steady()
+    h([1, 0, 0], 1)
+    with pytest.raises(InputError, match=match):
+        h.scan(inputs, times)
+    assert h.active["obstacle"]
+    assert h([0.5, 0, 0], 1) == (1, 0, 0)
+
+
+def test_an_undefined_output_leaves_the_state():
+    h = HysteresisArbiter(plain(("if x is off then y is low",)), enter=0.5, release=0, on={"x": "on"})
+    for _ in range(2):
+        with pytest.raises(UndefinedOutputError):
+            h([1.0], 0.0)
+        with pytest.raises(UndefinedOutputError):
+            h.scan([[1.0]], [0.0])
+        assert h.active == {"x": False}
+
+
+@pytest.mark.parametrize(
+    ("settings", "match"),
+    [
+        ({"enter": 0.0}, r"enter: 0.0 came, expected a number in \(0, 1\]"),
+        ({"enter": 1.5}, "enter: 1.5 came"),
+        ({"enter": math.nan}, "enter: nan came"),
+        ({"enter": "high"}, "enter: 'high' came"),
+        ({"enter": True}, "enter: True came"),
+        ({"release": -0.1}, r"release: -0.1 came, expected a number in \[0, 1\)"),
+        ({"release": 1.0}, "release: 1.0 came"),
+        ({"release": 0.8}, "release: 0.8 came for 'obstacle', expected less than enter, 0.8"),
+        ({"enter": {"obstacle": 0.9, "shape": 0.9, "depth": 0.1}}, "release: 0.2 came for 'depth'"),
+        ({"dwell": -1}, "dwell: -1 came, expected seconds, at least 0"),
+        ({"dwell": math.inf}, "dwell: inf came"),
+        ({"enter": {"obstacle": 0.9}}, "enter: nothing came for 'shape', expected obstacle, shape, depth"),
+        ({"dwell": {"wind": 1}}, "dwell: 'wind' is no input"),
+        ({"dwell": {"obstacle": 1, "shape": 1, "depth": "long"}}, "dwell: 'long' came for 'depth'"),
+        ({"graded": 1}, "graded is 1, expected True or False"),
+        ({"on": "exist"}, "on is 'exist', expected a term for each of obstacle, shape, depth"),
+        ({"on": {"obstacle": "exist"}}, "on: nothing came for 'shape'"),
+        ({"on": {"obstacle": "exist", "shape": "round", "depth": "maintain"}}, "on: 'round' came for 'shape'"),
+    ],
+)  # fmt: skip
+def test_bad_settings(settings, match):
+    with pytest.raises(DefinitionError, match=match):
+        steady(**settings)
+
+
+@pytest.mark.parametrize(
+    ("shapes", "match"),
+    [
+        ((falling(0, 0.5), rising(0.5, 1)), "input 'x': its terms are no criterion"),
+        ((falling(0, 0.5), Shape(((0, 0), (0.5, 1), (1, 0))), rising(0.5, 1)), "input 'x': its terms are no criterion"),
+        ((Shape(((0, 1), (1, 0.25))), Shape(((0, 0), (1, 0.75)))), "input 'x': it is fully on nowhere"),
+        ((Shape(((0, 0.75), (1, 0))), Shape(((0, 0.25), (1, 1)))), "input 'x': it is fully off nowhere"),
+    ],
+)
+def test_inputs_that_are_no_criteria(shapes, match):
+    with pytest.raises(DefinitionError, match=match):
+        HysteresisArbiter(
+            plain(("if x is on then y is high", "if x is off then y is low"), shapes), enter=0.5, release=0
+        )
+
+
+def test_what_is_no_arbiter():
+    with pytest.raises(DefinitionError, match="expected an Arbiter"):
+        HysteresisArbiter(3, enter=1, release=0)
+
+
+def test_repr_makes_the_same_again():
+    from fuzzy_arbiter import Is, Rule  # noqa: F401  what the text names
+    from fuzzy_arbiter.propositions import And, Not, Or  # noqa: F401
+
+    h = steady(dwell=0.5, graded=True)
+    assert repr(eval(repr(h))) == repr(h)
+
+
+def test_hysteresis_takes_the_chatter_away():
+    rows = runpy.run_path(str(EXAMPLE), run_name="chatter")["table"]()
+    noisy = {name: whole for name, whole, _, _ in rows}
+    crisp, narrow, wide, outside, latched, eased, held = noisy.values()
+    assert crisp > 2 * narrow > 4 * wide > 8 * outside / 2 > 8 * eased
+    assert crisp > 20 * held > 20 * latched
+    assert latched == 4.0  # the two changes that there are
+    assert [switches for *_, switches, _ in rows][4] == 2
+    assert all(quiet <= 4.0 for *_, quiet in rows)

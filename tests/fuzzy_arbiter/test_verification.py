@@ -1,0 +1,508 @@
+"""Verification: truth tables by hand, gaps by exact arithmetic, and verdicts against brute force."""
+
+import itertools
+import json
+import re
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from fuzzy_arbiter import (
+    Arbiter,
+    Criterion,
+    Is,
+    Output,
+    Rule,
+    Shape,
+    System,
+    Term,
+    UndefinedOutputError,
+    Variable,
+    falling,
+    prioritised,
+    rising,
+    trapezoid,
+    triangle,
+)
+from fuzzy_arbiter.propositions import And, Not, Or
+from fuzzy_arbiter.verification import verify
+from fuzzy_arbiter.verification.cells import stretches
+
+LOW_HIGH = (Term("low", falling(0, 1)), Term("high", rising(0, 1)))
+NAMES = ("complete", "consistent", "exclusive", "graded_complete", "graded_consistent", "graded_exclusive")
+
+
+def pair(name):
+    return Criterion(name).variable
+
+
+def output(name, default=None):
+    return Output(name, (0, 1), LOW_HIGH, default)
+
+
+def system(rules, inputs="ab", outputs="y", **settings):
+    return System(tuple(map(pair, inputs)), tuple(map(output, outputs)), tuple(rules), **settings)
+
+
+def verdicts(verification):
+    return tuple(getattr(verification, name) for name in NAMES)
+
+
+def texts(verification, severity):
+    return [f.text for f in verification.findings if f.severity == severity]
+
+
+# section VI
+
+
+def test_section_six():
+    v = Arbiter().verify()
+    assert v.ok
+    assert verdicts(v) == (True,) * 6
+    assert v.row_count == 8
+    assert {row.terms: (*(o[0] for o in row.concluded), " ".join(row.rules)) for row in v.rows} == {
+        ("exist", "complex", "not_maintain"): ("high", "low", "low", "R1 R3 R6"),
+        ("exist", "complex", "maintain"): ("high", "low", "low", "R1 R3 R6 R7"),
+        ("exist", "simple", "not_maintain"): ("high", "low", "low", "R1 R3 R4 R6"),
+        ("exist", "simple", "maintain"): ("high", "low", "low", "R1 R3 R4 R6 R7"),
+        ("not_exist", "complex", "not_maintain"): ("low", "high", "low", "R2 R5 R6"),
+        ("not_exist", "complex", "maintain"): ("low", "high", "low", "R2 R5 R6 R7"),
+        ("not_exist", "simple", "not_maintain"): ("low", "low", "high", "R2 R4 R8"),
+        ("not_exist", "simple", "maintain"): ("low", "low", "low", "R2 R4 R7"),
+    }
+    (rest,) = v.findings
+    assert rest.severity == "note"
+    assert rest.place == {"obstacle": "not_exist", "shape": "simple", "depth": "maintain"}
+    assert rest.text.endswith("at most one is, not exactly one")
+    assert v.stretches == ()
+
+
+def test_the_report_reads_well():
+    lines = str(Arbiter().verify()).splitlines()
+    assert lines[0] == "8 crisp rows"
+    assert lines[1].split() == ["obstacle", "shape", "depth", "alpha_1", "alpha_2", "alpha_3", "rules", "that", "fire"]
+    assert lines[2].split() == ["exist", "complex", "not_maintain", "high", "low", "low", "R1", "R3", "R6"]
+    assert "  graded exclusive   yes  for all real inputs" in lines
+    assert lines[-1] == "ok"
+
+
+def test_as_dict_is_json():
+    v = Arbiter().verify()
+    data = v.as_dict()
+    assert json.loads(json.dumps(data)) == data
+    assert data["ok"] is True
+    assert set(data["checks"]) == set(NAMES)
+    assert data["rows"][7]["outputs"] == {"alpha_1": ["low"], "alpha_2": ["low"], "alpha_3": ["low"]}
+
+
+def test_a_gap_between_independent_terms_is_found():
+    s = prioritised()
+    gap = Variable("obstacle", (0, 1), (Term("not_exist", falling(0, 0.25)), Term("exist", rising(0.5, 1))))
+    s = System((gap, *s.inputs[1:]), s.outputs, s.rules)
+    v = verify(s)
+    assert not v.ok
+    assert verdicts(v) == (True, True, True, False, True, True)
+    fault = v.findings[0]
+    assert fault.severity == "fault"
+    assert fault.text == "output 'alpha_1': no rule fires where obstacle = 0.25; it has no default"
+    with pytest.raises(UndefinedOutputError, match="alpha_1"):
+        Arbiter(system=s)([fault.place["obstacle"], 0.0, 0.0])
+    assert "input 'obstacle': in [0.25, 0.5] no term has a degree above 0" in texts(v, "warning")
+    assert "input 'obstacle': in (0, 1) the degrees sum to less than 1: 0 to 1" in texts(v, "note")
+
+
+def test_with_a_default_a_gap_is_no_fault():
+    v = verify(System((pair("a"),), (output("y", 0.5),), ("if a is on then y is high",)))
+    assert v.ok
+    assert v.complete is False
+    assert v.graded_complete is False
+    assert "output 'y': no rule fires where a is off; it has its default 0.5 there" in texts(v, "warning")
+
+
+# sizes and forms
+
+
+@pytest.mark.parametrize("form", ["hierarchical", "minimal", "conjunctive", "complete"])
+@pytest.mark.parametrize("n", [1, 2, 3, 5])
+def test_all_forms_verify(form, n):
+    v = verify(prioritised([Criterion(f"c{i}") for i in range(n)], form))
+    assert v.ok
+    assert verdicts(v) == (True,) * 6
+    assert texts(v, "warning") == []
+    assert v.row_count == 2**n
+
+
+@pytest.mark.parametrize("n", [12, 40])
+def test_many_criteria_are_decided(n):
+    v = verify(prioritised([Criterion(f"c{i}") for i in range(n)]))
+    assert v.ok
+    assert verdicts(v) == (True,) * 6
+    assert v.rows == ()  # too many
+    assert v.row_count == 2**n
+    (rest,) = v.findings
+    assert rest.place == {f"c{i}": "off" for i in range(n)}
+
+
+def test_the_order_of_inputs_does_not_matter():
+    s = prioritised([Criterion(f"c{i}") for i in range(20)])
+    assert verdicts(verify(System(s.inputs[::-1], s.outputs, s.rules))) == (True,) * 6
+
+
+def test_what_takes_too_long_is_not_decided():
+    v = verify(prioritised(), effort=8)
+    assert verdicts(v) == (None,) * 6
+    assert not v.ok
+    assert any("not decided" in text for text in texts(v, "warning"))
+    assert "exclusive" in str(v)
+    assert "not decided" in str(v)
+    assert "there may be more rows like that, which were not looked for" in texts(v, "note")
+    # samples may refute all the same
+    v = verify(system(["if a is on then y is high", "if a is on then y is low"]), effort=8)
+    assert v.graded_consistent is False
+
+
+# faults
+
+
+def test_contradiction_names_rules_and_place():
+    v = verify(system(["if a is on then y is high", "if b is on then y is low", "if a is off then y is low"]))
+    assert v.consistent is False
+    assert v.graded_consistent is False
+    assert not v.ok
+    (fault,) = texts(v, "fault")
+    assert fault == ("output 'y': rules contradict each other where a is on, b is on: y is low by R2, y is high by R1")
+
+
+def test_a_contradiction_of_weaker_rules_is_no_fault():
+    v = verify(system(["if a is on then y is high", "if b is on then y is low with 0.9", "if a is off then y is low"]))
+    assert v.ok
+    assert v.consistent is True
+    assert v.graded_consistent is False
+    v = verify(system(["if a is on then y is high", "if b is on then y is low with 0.5", "if a is off then y is low"]))
+    assert v.graded_consistent is True
+
+
+@pytest.mark.parametrize(("weight", "exclusive"), [(1, False), (0.75, False), (0.5, True)])
+def test_two_outputs_high_at_once(weight, exclusive):
+    rules = []
+    for name, out in ("ay", "bz"):
+        rules += [f"if {name} is on then {out} is high with {weight}", f"if {name} is off then {out} is low"]
+        rules += [f"if {name} is on then {out} is low with 0.001"]
+    v = verify(system(rules, outputs="yz"))
+    assert (v.exclusive, v.graded_exclusive) == (exclusive, exclusive)
+    assert v.ok
+    if not exclusive:
+        assert "two outputs are high where a is on, b is on: y is high by R1, z is high by R4" in texts(v, "warning")
+        (graded,) = [f for f in v.findings if f.about == "graded_exclusive"]
+        assert min(Arbiter(system=system(rules, outputs="yz"))([graded.place["a"], graded.place["b"]])) > 0.3
+
+
+def test_the_greatest_term_is_told_by_its_centroid():
+    s = system(["if a is on then y is high", "if a is off then y is low"], inputs="a")
+    turned = Output("y", (0, 1), LOW_HIGH[::-1])
+    other = Output("z", (0, 1), LOW_HIGH)
+    rules = (*s.rules, "if a is off then z is high", "if a is on then z is low")
+    assert verdicts(verify(System(s.inputs, (turned, other), rules))) == (True,) * 6
+
+
+# other connectives
+
+
+def test_products_are_bounded_by_the_minimum():
+    s = prioritised()
+    v = verify(System(s.inputs, s.outputs, s.rules, conjunction="prod"))
+    assert verdicts(v) == (True,) * 6
+    (check,) = [check for check in v.checks if check.name == "graded_exclusive"]
+    assert "never above" in check.how
+
+
+def test_what_the_bound_does_not_settle_is_left_open_or_refuted_by_a_sample():
+    s = prioritised()
+    v = verify(System(s.inputs, s.outputs, s.rules, conjunction="prod", disjunction="probor"))
+    assert v.graded_complete is True
+    assert v.graded_exclusive is True  # the rules for high have no or
+    assert v.graded_consistent is None
+    assert v.ok
+    assert "125 samples" not in str(v)
+    assert "graded consistent: not decided" in " ".join(texts(v, "warning"))
+    # not (a and b) with prod is 1 - a b, at a = b = 0.7 above 1/2
+    rules = ["if not (a is on and b is on) then y is high", "if a is on then y is low", "if a is off then y is low"]
+    v = verify(system(rules, conjunction="prod"))
+    assert v.graded_consistent is False
+
+
+def test_the_product_of_positive_degrees_fires():
+    rules = ["if a is on and b is on then y is high", "if a is off or b is off then y is low"]
+    for conjunction, disjunction in itertools.product(("min", "prod"), ("max", "probor")):
+        v = verify(system(rules, conjunction=conjunction, disjunction=disjunction))
+        assert v.graded_complete is True
+    assert verify(system(rules[:1])).graded_complete is False
+
+
+# terms
+
+
+def spans(*shapes, universe=(0, 10)):
+    v = Variable("x", universe, tuple(Term(f"t{i}", shape) for i, shape in enumerate(shapes)))
+    return [(s.kind, s.place, s.least, s.greatest) for s in stretches(v)]
+
+
+def test_partitions_have_no_stretches():
+    assert spans(falling(2, 6), rising(2, 6)) == []
+    assert spans(falling(1, 2), triangle(1, 2, 4), rising(2, 4)) == []
+    assert spans(Shape(((0, 0.1), (3, 0.3), (7, 0.9))), Shape(((0, 0.9), (3, 0.7), (7, 1 - 0.9)))) == []
+    assert spans(falling(0.1, 0.3), trapezoid(0.1, 0.3, 0.7, 0.9), rising(0.7, 0.9)) == []
+
+
+def test_stretches_by_hand():
+    assert spans(falling(0, 2), rising(4, 6)) == [("gap", "[2, 4]", 0, 0), ("below", "(0, 6)", 0, 1)]
+    # 1 - x/8 + (x - 4)/4 in (4, 8): from 1/2 at 4 to 1 at 8, then 1
+    assert spans(falling(0, 8), rising(4, 8)) == [("below", "(0, 8)", 0.5, 1)]
+    assert spans(falling(4, 8), rising(0, 8)) == [("above", "(0, 8)", 1, 1.5)]
+    # a sum that passes 1 in the middle of a straight piece: 3/2 - x/10
+    assert spans(Shape(((0, 1), (10, 0))), Shape(((0, 0.5),))) == [
+        ("below", "(5, 10]", 0.5, 1), ("above", "[0, 5)", 1, 1.5)
+    ]  # fmt: skip
+    # a jump, where both terms have their greater degree
+    assert spans(Shape(((5, 1), (5, 0))), Shape(((5, 0), (5, 1)))) == [("above", "5", 2, 2)]
+    assert spans(trapezoid(0, 0, 3, 3), trapezoid(4, 4, 10, 10)) == [("gap", "(3, 4)", 0, 0), ("below", "(3, 4)", 0, 0)]
+
+
+def test_unused_things_are_named():
+    x = Variable(
+        "x", (0, 2), (Term("small", falling(0, 1)), Term("middle", triangle(0, 1, 2)), Term("big", rising(1, 2)))
+    )
+    s = System((x, pair("a")), (output("y", 0.0), output("z", 0.0)), ("if x is small or x is big then y is low",))
+    v = verify(s)
+    assert "input 'a': no rule asks for it" in texts(v, "warning")
+    assert "output 'z': no rule concludes on it" in texts(v, "warning")
+    assert "output 'z': no rule fires where the inputs are anything; it has its default 0 there" in texts(v, "warning")
+    assert "input 'x': no rule asks for its term 'middle'" in texts(v, "note")
+    assert "output 'y': no rule concludes its term 'high'" in texts(v, "note")
+
+
+def test_rules_that_never_fire():
+    x = Variable("x", (0, 4), (Term("small", falling(1, 2)), Term("big", rising(2, 3)), Term("huge", rising(5, 6))))
+    rules = (
+        "if x is small and x is big then y is high",
+        "if x is huge then y is high",
+        "if x is not huge then y is low",
+    )
+    found = texts(verify(System((x,), (output("y"),), rules)), "warning")
+    assert "R1: never fires, as 'x is small and x is big' holds for no real inputs" in found
+    assert "R2: never fires, as 'x is huge' holds for no real inputs" in found
+
+
+@pytest.mark.parametrize(
+    ("rules", "finding"),
+    [
+        (["if a is on then y is low"] * 2, "R2 .* says the same as R1"),
+        (["if a is on and b is on then y is low", "if b is on and a is on then y is low"], "R2 .* says the same as R1"),
+        (["if a is on and b is on then y is low", "if a is on then y is low"], "R1 .* adds nothing to R2"),
+        (["if a is on or b is on then y is low", "if b is on then y is low"], "R2 .* adds nothing to R1"),
+        (["if a is on then y is low with 0.5", "if a is on then y is low"], "R1 .* adds nothing to R2"),
+        (["if not (a is on or b is on) then y is low", "if not a is on then y is low"], "R1 .* adds nothing to R2"),
+        (["if a is on then y is low", "if a is on and b is on then y is low with 0.5"], "R2 .* adds nothing to R1"),
+        (
+            ["if a is on then y is low and z is low", "if a is on then y is low"],
+            "R2 'if .*: on y is low it says the same",
+        ),
+        (["if a is on then y is low", "if a is on then y is high"], None),
+        (["if a is on and b is on then y is low with 0.5", "if a is on then y is low with 0.4"], None),
+        (["if a is on then y is low", "if b is on then y is low"], None),
+    ],
+)
+@pytest.mark.parametrize("conjunction", ["min", "prod"])
+def test_rules_that_add_nothing(rules, finding, conjunction):
+    found = [
+        f.text for f in verify(system(rules, outputs="yz", conjunction=conjunction)).findings if f.about == "rules"
+    ]
+    if finding is None:
+        assert found == []
+    else:
+        (text,) = found
+        assert re.search(finding, text)
+
+
+def test_a_square_is_not_its_root():
+    rules = ["if a is on then y is low", "if b is on and (a is on and a is on) then y is low"]
+    found = [f.text for f in verify(system(rules, conjunction="prod")).findings if f.about == "rules"]
+    assert len(found) == 1
+    assert found[0].startswith("R2")
+    rules = ["if a is on and a is on then y is low", "if a is on then y is low with 0.5"]
+    assert [f for f in verify(system(rules, conjunction="prod")).findings if f.about == "rules"] == []
+    assert len([f for f in verify(system(rules)).findings if f.about == "rules"]) == 1
+
+
+def test_hundreds_of_rules_with_one_conclusion_are_not_compared():
+    v = verify(prioritised([Criterion(f"c{i}") for i in range(7)], "complete"))
+    (note,) = [f for f in v.findings if f.about == "rules"]
+    assert note.severity == "note"
+    assert note.text.startswith("not compared with each other")
+
+
+# brute force
+
+
+def degree(shape, x):
+    """Degree by the shape's definition, in another way than the package."""
+    points = shape.points
+    at = [y for px, y in points if px == x]
+    if at:
+        return max(at)
+    before, after = [p for p in points if p[0] < x], [p for p in points if p[0] > x]
+    if not before or not after:
+        return (before[-1] if before else after[0])[1]
+    (a, ya), (b, yb) = before[-1], after[0]
+    return ya * (b - x) / (b - a) + yb * (x - a) / (b - a)
+
+
+def held(proposition, of, conjunction="min", disjunction="max"):
+    if isinstance(proposition, Is):
+        return of(proposition)
+    if isinstance(proposition, Not):
+        return 1 - held(proposition.part, of, conjunction, disjunction)
+    parts = [held(part, of, conjunction, disjunction) for part in proposition.parts]
+    if isinstance(proposition, And):
+        return np.minimum.reduce(parts) if conjunction == "min" else np.multiply.reduce(parts)
+    return np.maximum.reduce(parts) if disjunction == "max" else 1 - np.multiply.reduce([1 - p for p in parts])
+
+
+def cuts(s, of, n=1):
+    """Cut of every output term, for n samples."""
+    result = {Is(v.name, t): np.zeros(n) for v in s.outputs for t in v.term_names}
+    for rule in s.rules:
+        strength = held(rule.condition, of, s.conjunction, s.disjunction) * rule.weight
+        for conclusion in rule.conclusions:
+            result[conclusion] = np.maximum(result[conclusion], strength)
+    return result
+
+
+def at(s, places):
+    """Cuts at many places, an array of shape (n, inputs)."""
+    known = {}
+    for i, v in enumerate(s.inputs):
+        values, index = np.unique(places[:, i], return_inverse=True)
+        for term in v.terms:
+            known[Is(v.name, term.name)] = np.array([degree(term.shape, x) for x in values.tolist()])[index]
+    return cuts(s, known.__getitem__, len(places))
+
+
+def faults(s, cut, above):
+    """Undefined outputs, outputs in two terms, and whether two are in their greatest term, for each sample."""
+    undefined = [sum(cut[Is(v.name, t)] for t in v.term_names) == 0 for v in s.outputs]
+    double = [sum(cut[Is(v.name, t)] > above for t in v.term_names) >= 2 for v in s.outputs]
+    high = sum((cut[Is(v.name, "high")] > above).astype(int) for v in s.outputs) >= 2
+    return np.any(undefined, axis=0), np.any(double, axis=0), high
+
+
+quarters = st.integers(0, 4).map(lambda q: q / 4)
+
+
+@st.composite
+def shapes(draw):
+    places = sorted(draw(st.lists(st.integers(0, 4), min_size=1, max_size=4)))
+    places = [x for i, x in enumerate(places) if places[max(0, i - 2) : i] != [x, x]]
+    return Shape(tuple((x, draw(quarters)) for x in places))
+
+
+@st.composite
+def systems(draw, connectives=False):
+    inputs = tuple(
+        Variable(name, (0, 4), tuple(Term(f"t{j}", draw(shapes())) for j in range(draw(st.integers(1, 3)))))
+        for name in "abc"[: draw(st.integers(2, 3))]
+    )
+    outputs = tuple(map(output, "yz"[: draw(st.integers(1, 2))]))
+    statements = st.sampled_from([v[t] for v in inputs for t in v.term_names])
+    conditions = st.recursive(
+        statements,
+        lambda inner: st.one_of(
+            inner.map(Not), st.lists(inner, min_size=2, max_size=3).flatmap(
+                lambda parts: st.sampled_from([And(tuple(parts)), Or(tuple(parts))])
+            )
+        ),
+        max_leaves=5,
+    )  # fmt: skip
+    conclusions = st.sampled_from([o[t] for o in outputs for t in o.term_names])
+    weights = st.sampled_from([1.0, 1.0, 0.75, 0.5])
+    rules = draw(
+        st.lists(st.builds(Rule, conditions, conclusions.map(lambda c: (c,)), weights), min_size=1, max_size=6)
+    )
+    settings = {}
+    if connectives:
+        settings = {"conjunction": draw(st.sampled_from(["min", "prod"]))}
+        settings["disjunction"] = draw(st.sampled_from(["max", "probor"]))
+    return System(inputs, outputs, tuple(rules), **settings)
+
+
+def samples(s):
+    """Knots and places between them in all combinations, and random ones."""
+    grid = np.linspace(0, 4, 17 if len(s.inputs) == 2 else 9)
+    product = np.stack(np.meshgrid(*[grid] * len(s.inputs)), axis=-1).reshape(-1, len(s.inputs))
+    return np.vstack([product, np.random.default_rng(7).uniform(0, 4, (300, len(s.inputs)))])
+
+
+def check_graded(s, v):
+    seen = faults(s, at(s, samples(s)), 0.5 + 1e-12)
+    for name, flags in zip(NAMES[3:], seen, strict=True):
+        holds = getattr(v, name)
+        assert holds is not True or not np.any(flags), name
+        places = [f.place for f in v.findings if f.about == name and f.place is not None]
+        assert (holds is False) == bool(places)
+        for place in places:
+            inputs = np.array([[place.get(i.name, i.universe[0]) for i in s.inputs]])
+            assert np.all(faults(s, at(s, inputs), 0.5)[NAMES[3:].index(name)]), (name, place)
+
+
+@settings(max_examples=150)
+@given(systems())
+def test_verdicts_on_graded_inputs_against_brute_force(s):
+    v = verify(s)
+    assert None not in verdicts(v)
+    check_graded(s, v)
+
+
+@settings(max_examples=80)
+@given(systems(connectives=True))
+def test_verdicts_with_other_connectives_against_brute_force(s):
+    v = verify(s)
+    assert v.graded_complete is not None
+    check_graded(s, v)
+
+
+@settings(max_examples=100)
+@given(systems())
+def test_verdicts_on_crisp_rows_against_all_rows(s):
+    v = verify(s)
+    seen = dict.fromkeys(NAMES[:3], False)
+    rows = list(itertools.product(*(i.term_names for i in s.inputs)))
+    for row in rows:
+        terms = {Is(i.name, t) for i, t in zip(s.inputs, row, strict=True)}
+        cut = cuts(s, lambda statement, terms=terms: np.array([float(statement in terms)]))
+        undefined, _, high = (bool(np.any(x)) for x in faults(s, cut, 0.5))
+        full = bool(np.any(faults(s, cut, 0.999)[1]))
+        for name, found in zip(NAMES[:3], (undefined, full, high), strict=True):
+            seen[name] |= found
+    assert v.row_count == len(rows)
+    assert {name: getattr(v, name) for name in NAMES[:3]} == {name: not found for name, found in seen.items()}
+
+
+@settings(max_examples=100)
+@given(st.lists(shapes(), min_size=1, max_size=3))
+def test_stretches_against_samples(terms):
+    v = Variable("x", (0, 4), tuple(Term(f"t{i}", shape) for i, shape in enumerate(terms)))
+    found = stretches(v)
+    for x in np.linspace(0, 4, 65).tolist():
+        total = sum(degree(t.shape, x) for t in v.terms)
+        inside = {
+            s.kind: s
+            for s in found
+            if s.start < x < s.end or (x == s.start and s.start_in) or (x == s.end and s.end_in)
+        }
+        assert ("below" in inside) == (total < 1 - 1e-12)
+        assert ("above" in inside) == (total > 1 + 1e-12)
+        assert ("gap" in inside) == (total == 0)
+        for stretch in inside.values():
+            assert stretch.least - 1e-12 <= total <= stretch.greatest + 1e-12
