@@ -72,7 +72,7 @@ class Arbiter:
             )
         self._system = system
         self._engine, self._why = choose(system, engine)
-        self._weights = self._engine.evaluator()
+        self._shortcut = self._engine.shortcut()
         self._limits = tuple(v.universe for v in system.inputs)
         self._names = variable_names(system.inputs)
 
@@ -111,7 +111,11 @@ class Arbiter:
         UndefinedOutputError
             If no rule fires for an output without default.
         """
-        return self._weights(self._checked(inputs))
+        if self._shortcut is not None and (type(inputs) is list or type(inputs) is tuple):
+            weights = self._shortcut(inputs)
+            if weights is not None:
+                return weights
+        return self._engine.weights(self._checked(inputs))
 
     def batch(self, inputs: ArrayLike) -> Array:
         """Return the weights for many samples.

@@ -15,14 +15,14 @@ which scaled to [0, 1] is the smoothstep 3 h^2 - 2 h^3.
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import ClassVar
 
 import numpy as np
 
 from fuzzy_arbiter.definition import Output, System
-from fuzzy_arbiter.engines.engine import Engine, shared, shared_of_many
+from fuzzy_arbiter.engines.engine import Engine, Shortcut, shared, shared_of_many
 from fuzzy_arbiter.engines.firing import Array, degrees_of_many
 from fuzzy_arbiter.engines.normal_form import Clause, Literal, high_clauses, ladder
 from fuzzy_arbiter.engines.pieces import Piece, pieces
@@ -120,12 +120,12 @@ class ClosedEngine(Engine):
             result[start : start + BLOCK] = values.T
         return shared_of_many(result, self.system.normalisation)
 
-    def evaluator(self) -> Callable[[Sequence[float]], tuple[float, ...]]:
-        """Return the function that gives the weights for one sample; a short one for the usual kind of system."""
+    def shortcut(self) -> Shortcut | None:
+        """Return a faster way to the weights of prioritised criteria whose degrees are the inputs; as of `Engine`."""
         each_by_itself = self.system.normalisation in ("range", "none")
         if self._plain and each_by_itself and self._cubic is not None and self._cubic[:2] == (0.0, 0.0):
-            return _smooth_ladder(*self._cubic[2:])
-        return self.weights
+            return _smooth_ladder(len(self.system.inputs), *self._cubic[2:])
+        return None
 
     def _highs(self, inputs: Sequence[float]) -> list[float]:
         """Return the cut h of each output's second term."""
@@ -197,17 +197,24 @@ def _one_cubic(forms: Sequence[tuple[Piece, ...]]) -> tuple[float, ...] | None:
     return forms[0][0].numerator
 
 
-def _smooth_ladder(n2: float, n3: float) -> Callable[[Sequence[float]], tuple[float, ...]]:
-    """Return the weights (n2 + n3 h) h^2 of criteria whose degrees are the inputs, in their order."""
+def _smooth_ladder(n: int, n2: float, n3: float) -> Shortcut:
+    """Return what gives the weights (n2 + n3 h) h^2 of n criteria."""
 
-    def weights(degrees: Sequence[float]) -> tuple[float, ...]:
+    def weights(degrees: Sequence[float]) -> tuple[float, ...] | None:
+        if len(degrees) != n:
+            return None
         result = []
         unclaimed = 1.0  # degree to which no criterion of higher priority asks
-        for m in degrees:
-            h = m if m < unclaimed else unclaimed
-            result.append((n2 + n3 * h) * h * h)
-            if 1.0 - m < unclaimed:
-                unclaimed = 1.0 - m
+        try:
+            for m in degrees:
+                if not 0.0 <= m <= 1.0:
+                    return None
+                h = m if m < unclaimed else unclaimed
+                result.append((n2 + n3 * h) * h * h)
+                if 1.0 - m < unclaimed:
+                    unclaimed = 1.0 - m
+        except TypeError:
+            return None
         return tuple(result)
 
     return weights

@@ -14,6 +14,7 @@ from fuzzy_arbiter.definition import Output, System, variable_names
 from fuzzy_arbiter.engines.firing import Array, Firing
 from fuzzy_arbiter.errors import EngineError, UndefinedOutputError
 
+Shortcut = Callable[[Sequence[float]], tuple[float, ...] | None]
 _EACH_BY_ITSELF = ("range", "none")  # normalisations that look at one output at a time
 
 
@@ -184,15 +185,16 @@ class Engine(ABC):
         low, high = np.array(self.scale).T
         return shared_of_many(np.clip((raw - low) / (high - low), 0.0, 1.0), self.system.normalisation)
 
-    def evaluator(self) -> Callable[[Sequence[float]], tuple[float, ...]]:
-        """Return the function that gives the weights for one sample.
+    def shortcut(self) -> Shortcut | None:
+        """Return a faster way to `weights` for samples that are plain, if there is one.
 
         Returns
         -------
-        callable
-            `weights`, or what does the same sooner for this system.
+        callable, or None
+            Takes a list or tuple of anything; gives its weights, or None unless it is a sample with all inputs in their
+            universes.
         """
-        return self.weights
+        return None
 
     def _ends(self, k: int) -> tuple[float, float]:
         """Return the centroids that become 0 and 1: of the least and of the greatest term, each alone and whole."""
