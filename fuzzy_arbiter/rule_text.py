@@ -13,6 +13,7 @@ _TOKEN = re.compile(
         | (?P<word>[^\W\d]\w*) | (?P<sign>[()&|~,]) | (?P<other>\S) )""",
     re.VERBOSE,
 )
+MAX_NESTING = 100  # parentheses and negations within each other; what is deeper is no rule that a person wrote
 _SIGNS = {"&": "and", "|": "or", "~": "not", ",": ","}
 
 
@@ -35,7 +36,7 @@ def parse_rule(text: str) -> Rule:
     Raises
     ------
     DefinitionError
-        If the text is no rule; it is quoted.
+        If the text is no rule, or nests deeper than 100; it is quoted.
     """
     return _Parser(text).rule()
 
@@ -84,9 +85,11 @@ class _Parser:
                 raise self.fault(f"{token!r} cannot stand in a rule")
         self.tokens.append(("end", "the end"))
         self.at = 0
+        self.depth = 0
 
     def fault(self, what: str) -> DefinitionError:
-        return DefinitionError(f"rule {self.text.strip()!r}: {what}")
+        text = self.text.strip()
+        return DefinitionError(f"rule {text if len(text) <= 200 else text[:200] + '...'!r}: {what}")
 
     def accept(self, kind: str) -> bool:
         if self.tokens[self.at][0] != kind:
@@ -140,11 +143,21 @@ class _Parser:
             parts.append(self.statement())
         return And(tuple(parts)) if len(parts) > 1 else parts[0]
 
+    def deeper(self) -> None:
+        self.depth += 1
+        if self.depth > MAX_NESTING:
+            raise self.fault(f"nested deeper than {MAX_NESTING}")
+
     def statement(self) -> Proposition:
         if self.accept("not"):
-            return Not(self.statement())
+            self.deeper()
+            inner: Proposition = Not(self.statement())
+            self.depth -= 1
+            return inner
         if self.accept("("):
+            self.deeper()
             inner = self.disjunction()
+            self.depth -= 1
             self.take(")", "')', 'and' or 'or'")
             return inner
         variable = self.take("name", "an input's name, 'not' or '('")
@@ -152,6 +165,8 @@ class _Parser:
         negations = 0
         while self.accept("not"):
             negations += 1
+            if self.depth + negations > MAX_NESTING:
+                raise self.fault(f"nested deeper than {MAX_NESTING}")
         statement: Proposition = Is(variable, self.take("name", "a term's name"))
         for _ in range(negations):
             statement = Not(statement)

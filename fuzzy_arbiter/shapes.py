@@ -21,8 +21,8 @@ class Shape:
     Attributes
     ----------
     points : tuple of (float, float)
-        Places, which never decrease, and degrees in [0, 1]. Two points of one place make a jump, where the greater
-        degree holds.
+        Places, which never decrease, and degrees in [0, 1]. Two points of one place make a jump, where the shape has
+        the greater of the two degrees.
 
     Raises
     ------
@@ -121,15 +121,20 @@ class Shape:
         Returns
         -------
         Shape
-            The same degrees in the universe, at most one point beyond each of its ends.
+            The same degrees in the universe, at most one point beyond each of its ends; a shape that is the same
+            everywhere in it has its one point at the universe's start.
         """
         points = list(self.points)
         low, high = universe
-        while len(points) > 1 and points[1][0] <= low:
+        # a jump at an end of the universe matters if its outer point is the higher one, whose degree counts there
+        while len(points) > 1 and points[1][0] <= low and not (points[0][0] == low and points[0][1] > points[1][1]):
             del points[0]
-        while len(points) > 1 and points[-2][0] >= high:
+        while (
+            len(points) > 1 and points[-2][0] >= high and not (points[-1][0] == high and points[-1][1] > points[-2][1])
+        ):
             del points[-1]
-        return Shape(tuple(points))
+        inside = Shape(tuple(points))
+        return inside if len(inside.points) > 1 else Shape(((low, inside.points[0][1]),))
 
     def area(self, universe: tuple[float, float]) -> float:
         """Return the integral of the degree over a universe.

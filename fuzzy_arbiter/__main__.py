@@ -1,0 +1,212 @@
+"""Command line: ``python -m fuzzy_arbiter {show,eval,explain,verify,convert,plot,bench} FILE``."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NoReturn
+
+from fuzzy_arbiter.arbiter import Arbiter
+from fuzzy_arbiter.command_line.definitions import BUILT_IN, convert, described, load_system
+from fuzzy_arbiter.command_line.drawing import IMAGES, PICTURES, draw, image
+from fuzzy_arbiter.command_line.files import read_text, require_suffix, write_whole
+from fuzzy_arbiter.command_line.values import evaluated, evaluated_table, sample
+from fuzzy_arbiter.engines import ENGINES
+from fuzzy_arbiter.errors import ArbiterError, InputError
+
+FINDINGS, FAULT, INTERRUPTED, NO_READER = 1, 2, 130, 141
+
+_EPILOG = """FILE is of JSON, TOML, FCL, FIS or FLL, told by its suffix, or the word section-vi: the arbiter of
+obstacle, shape and depth.
+
+examples:
+  python -m fuzzy_arbiter show section-vi
+  python -m fuzzy_arbiter eval section-vi obstacle=0.75 shape=1 depth=0
+  python -m fuzzy_arbiter eval arbiter.toml --csv day.csv --out weights.csv
+  python -m fuzzy_arbiter explain arbiter.toml 0.75 1 0
+  python -m fuzzy_arbiter verify arbiter.fis || echo "see what it found"
+  python -m fuzzy_arbiter convert section-vi arbiter.fis --native
+  python -m fuzzy_arbiter plot section-vi map --input obstacle --input shape --at depth=0.4 --out map.svg
+"""
+
+
+class _Parser(argparse.ArgumentParser):
+    """Says what is wrong in one line, as all other errors."""
+
+    def error(self, message: str) -> NoReturn:
+        verb = self.prog.removeprefix("python -m fuzzy_arbiter").strip()
+        self.exit(FAULT, f"fuzzy_arbiter: {verb + ': ' if verb else ''}{message}; see --help\n")
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = _Parser(
+        prog="python -m fuzzy_arbiter",
+        description="Fuzzy arbiters of prioritised criteria.",
+        epilog=_EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    verbs = parser.add_subparsers(dest="verb", required=True)
+
+    def verb(name: str, what: str, engine: bool = True) -> argparse.ArgumentParser:
+        added = verbs.add_parser(name, help=what, description=f"{what[0].upper()}{what[1:]}.")
+        added.add_argument("file", metavar="FILE", help=f"a definition, or {BUILT_IN}")
+        if engine:
+            added.add_argument("--engine", choices=ENGINES, default="auto", help="default: %(default)s")
+        return added
+
+    verb("show", "variables, terms, rules, norms, and which engine evaluates them")
+
+    values = "name=value for each input, or values in their order"
+    evaluate = verb("eval", "weights for one sample, or for each row of a table")
+    evaluate.add_argument("values", nargs="*", metavar="VALUE", help=values)
+    evaluate.add_argument(
+        "--csv",
+        metavar="FILE",
+        help="table whose first line names the inputs, - for standard input; others are ignored",
+    )
+    evaluate.add_argument("--out", metavar="FILE", help="file to write (default: standard output)")
+    evaluate.add_argument("--json", action="store_true", help="JSON in the place of text")
+
+    why = verb("explain", "which rules fire for a sample, how strongly, and which decide")
+    why.add_argument("values", nargs="*", metavar="VALUE", help=values)
+    why.add_argument("--json", action="store_true", help="JSON in the place of text")
+
+    verify = verb("verify", "whether the rules are complete and consistent; exit status 1 if not", engine=False)
+    verify.add_argument("--json", action="store_true", help="JSON in the place of text")
+
+    other = verb("convert", "write a definition in another format, or as source code", engine=False)
+    other.add_argument(
+        "out", metavar="OUT", help=".json, .toml, .fcl, .fis, .fll, or .c, .py for code that evaluates it"
+    )
+    other.add_argument(
+        "--native", action="store_true", help="make the centroids the weights, for tools that do not normalise"
+    )
+
+    plot = verb("plot", "draw terms, rules at a sample, weights over inputs, or which output is the greatest where")
+    plot.add_argument("kind", choices=PICTURES)
+    plot.add_argument("--input", action="append", default=[], metavar="NAME", help="which; for surface and map two")
+    plot.add_argument("--output", action="append", default=[], metavar="NAME", help="which (default: the first)")
+    plot.add_argument("--at", nargs="+", action="extend", default=[], metavar="NAME=VALUE", help="values of inputs")
+    plot.add_argument("--relief", action="store_true", help="surface in three dimensions")
+    plot.add_argument("--out", required=True, metavar="FILE", help=".png, .svg or .pdf")
+
+    verb("bench", "time every engine on this definition, in a few seconds", engine=False)
+    return parser
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line.
+
+    Parameters
+    ----------
+    arguments : sequence of str, optional
+        Default: those of the process.
+
+    Returns
+    -------
+    int
+        0; 1 if `verify` found something; 2 where the user must mend something; 130 if interrupted; 141 if what was
+        printed has no reader.
+    """
+    options = _parsed(arguments)
+    try:
+        status = _run(options)
+        if sys.stdout is not None:  # closed by whoever started this
+            sys.stdout.flush()
+        return status
+    except BrokenPipeError:
+        _drop_output()
+        return NO_READER
+    except ArbiterError as error:
+        return _fault(str(error))
+    except ImportError as error:
+        return _fault(f"{error.name} is not installed")
+    except OSError as error:  # such as a full disk behind the output
+        _drop_output()
+        return _fault(f"{error.filename or 'output'}: {error.strerror or error}")
+    except KeyboardInterrupt:
+        _fault("interrupted")
+        return INTERRUPTED
+
+
+def _parsed(arguments: Sequence[str] | None) -> argparse.Namespace:
+    """Parse, and let values stand behind options too, and begin with a minus."""
+    parser = _parser()
+    options, rest = parser.parse_known_args(arguments)
+    for word in rest:
+        if not hasattr(options, "values") or (word.startswith("-") and not _is_number(word)):
+            parser.error(f"unknown argument {word!r}")
+        options.values.append(word)
+    return options
+
+
+def _is_number(word: str) -> bool:
+    try:
+        float(word)
+    except ValueError:
+        return False
+    return True
+
+
+def _drop_output() -> None:
+    """Let what is left of the output go nowhere, else the interpreter fails again to write it at its end."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+def _fault(what: str) -> int:
+    print(f"fuzzy_arbiter: {' '.join(what.split())}", file=sys.stderr)
+    return FAULT
+
+
+def _run(options: argparse.Namespace) -> int:
+    if options.verb == "convert":
+        convert(options.file, options.out, options.native)
+        print(options.out)
+        return 0
+    if options.verb == "plot":
+        require_suffix(options.out, IMAGES)
+    system = load_system(options.file)
+    if options.verb == "bench":
+        from fuzzy_arbiter.command_line.bench import bench, table
+
+        print(table(bench(system)))
+        return 0
+    if options.verb == "verify":
+        found = Arbiter(system=system).verify()
+        print(json.dumps(found.as_dict(), indent=2, ensure_ascii=False) if options.json else found)
+        return 0 if found.ok else FINDINGS
+    arbiter = Arbiter(system=system, engine=options.engine)
+    if options.verb == "show":
+        print(described(arbiter))
+    elif options.verb == "explain":
+        explanation = arbiter.explain(sample(options.values, system))
+        print(json.dumps(explanation.as_dict(), indent=2, ensure_ascii=False) if options.json else explanation)
+    elif options.verb == "plot":
+        figure = draw(arbiter, options.kind, options.input, options.output, options.at, options.relief)
+        write_whole(Path(options.out), image(figure, Path(options.out).suffix[1:].lower()))
+        print(options.out)
+    else:
+        _evaluate(arbiter, options)
+    return 0
+
+
+def _evaluate(arbiter: Arbiter, options: argparse.Namespace) -> None:
+    if options.csv is None:
+        text = evaluated(arbiter, sample(options.values, arbiter.system), options.json)
+    elif options.values:
+        raise InputError(f"{options.values[0]!r} came with --csv, expected one of the two")
+    else:
+        table, where = read_text(options.csv, sys.stdin)
+        text = evaluated_table(arbiter, table, where, options.json)
+    if options.out is None:
+        print(text)
+    else:
+        write_whole(Path(options.out), f"{text}\n".encode())
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,148 @@
+"""What a system costs: times of every engine, one sample at a time and many at once."""
+
+from __future__ import annotations
+
+import itertools
+import statistics
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from fuzzy_arbiter.arbiter import Arbiter
+from fuzzy_arbiter.definition import System
+from fuzzy_arbiter.engines import ENGINES
+from fuzzy_arbiter.engines.firing import Array
+from fuzzy_arbiter.errors import ArbiterError, EngineError
+from fuzzy_arbiter.sampling import random_samples
+
+REPEATS = 5
+_SECONDS = 0.06  # of a repeat, about
+_MOST_ROWS = 100_000
+
+
+@dataclass(frozen=True, slots=True)
+class Cost:
+    """What one engine takes for one system.
+
+    Attributes
+    ----------
+    engine : str
+        Its name.
+    call, row : float or None
+        Median time of a call and of a row of a batch [us]; None if the engine cannot evaluate the system.
+    rows : int
+        Rows of the batch.
+    why : str
+        Why there are no times.
+    """
+
+    engine: str
+    call: float | None
+    row: float | None
+    rows: int = 0
+    why: str = ""
+
+
+def bench(system: System) -> list[Cost]:
+    """Return what every engine takes for a system, over random samples that do not come twice in a row.
+
+    Parameters
+    ----------
+    system : System
+        What is evaluated.
+
+    Returns
+    -------
+    list of Cost
+        For each engine.
+
+    Raises
+    ------
+    ArbiterError
+        If no sample was found at which all outputs are defined.
+    """
+    samples = random_samples(system, _MOST_ROWS)
+    if len(samples) == 0:
+        raise ArbiterError("bench: at all random samples some output is undefined")
+    costs = []
+    for name in ENGINES:
+        if name == "auto":
+            continue
+        try:
+            arbiter = Arbiter(system=system, engine=name)
+        except EngineError as error:
+            costs.append(Cost(name, None, None, why=str(error)))
+            continue
+        except ImportError as error:
+            costs.append(Cost(name, None, None, why=f"{error.name} is not installed"))
+            continue
+        row, rows = _median(_batch(arbiter, samples), len(samples))
+        costs.append(Cost(name, _median(_calls(arbiter, samples), _MOST_ROWS)[0], row, rows))
+    return costs
+
+
+def _calls(arbiter: Arbiter, samples: Array) -> Callable[[int], object]:
+    each = itertools.cycle(map(tuple, samples[:-20_001:-1].tolist()))  # not those that batches begin with
+
+    def work(n: int) -> None:
+        for inputs in itertools.islice(each, n):
+            arbiter(inputs)
+
+    return work
+
+
+def _batch(arbiter: Arbiter, samples: Array) -> Callable[[int], object]:
+    start = 0
+
+    def work(n: int) -> None:
+        nonlocal start  # scikit-fuzzy's results are remembered, and other rows cost what they would cost
+        start = start + n if start + 2 * n <= len(samples) else 0
+        arbiter.batch(samples[start : start + n])
+
+    return work
+
+
+def _median(work: Callable[[int], object], most: int) -> tuple[float, int]:
+    """Return the median time of one of n things [us], and the n that takes about a repeat's time."""
+    work(min(4, most))  # what is made at the first call
+    n, spent = 1, 0.0
+    while True:
+        spent = _timed(work, n)
+        if spent > _SECONDS / 4.0 or n >= most:
+            break
+        n = min(most, n * 4)
+    n = max(1, min(most, int(n * _SECONDS / max(spent, 1e-9))))
+    return statistics.median(_timed(work, n) for _ in range(REPEATS)) / n * 1e6, n
+
+
+def _timed(work: Callable[[int], object], n: int) -> float:
+    before = time.perf_counter()
+    work(n)
+    return time.perf_counter() - before
+
+
+def table(costs: list[Cost]) -> str:
+    """Return costs as a table, with ratios to the engine that takes the least.
+
+    Parameters
+    ----------
+    costs : list of Cost
+        As from `bench`.
+
+    Returns
+    -------
+    str
+        Lines, without a last newline.
+    """
+    calls = [cost.call for cost in costs if cost.call is not None]
+    rows = [cost.row for cost in costs if cost.row is not None]
+    lines = [f"{'engine':8} {'call [us]':>12} {'ratio':>9}   {'batch [us a row]':>16} {'ratio':>9} {'rows':>8}"]
+    for cost in costs:
+        if cost.call is None or cost.row is None:
+            lines.append(f"{cost.engine:8} {cost.why}")
+            continue
+        lines.append(
+            f"{cost.engine:8} {cost.call:12.3f} {cost.call / min(calls):9.1f}   "
+            f"{cost.row:16.4f} {cost.row / min(rows):9.1f} {cost.rows:8}"
+        )
+    return "\n".join(lines)

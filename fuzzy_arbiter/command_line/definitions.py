@@ -1,0 +1,111 @@
+"""Definitions: read, described in words, and written in another format."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from fuzzy_arbiter.arbiter import Arbiter
+from fuzzy_arbiter.command_line.files import require_suffix, write_whole
+from fuzzy_arbiter.definition import Output, System, Variable
+from fuzzy_arbiter.hierarchy import prioritised
+
+BUILT_IN = "section-vi"
+EXPORTS = ("c", "py")
+
+
+def load_system(file: str) -> System:
+    """Return the system of a file, or the built-in one.
+
+    Parameters
+    ----------
+    file : str
+        Path, or ``section-vi``.
+
+    Returns
+    -------
+    System
+        As it is defined there.
+
+    Raises
+    ------
+    FormatError, DefinitionError
+        If the file is none.
+    """
+    if file == BUILT_IN:
+        return prioritised()
+    from fuzzy_arbiter.formats import load
+
+    return load(file)
+
+
+def described(arbiter: Arbiter) -> str:
+    """Return a system in words: variables, terms, rules, norms, engine.
+
+    Parameters
+    ----------
+    arbiter : Arbiter
+        What is described.
+
+    Returns
+    -------
+    str
+        Lines.
+    """
+    system = arbiter.system
+    lines = [system.name, ""]
+    for heading, variables in (("inputs", system.inputs), ("outputs", system.outputs)):
+        lines.append(heading)
+        for variable in variables:
+            lines += _described(variable)
+    lines += ["", "rules", *(f"  {line}" for line in str(system).splitlines()), ""]
+    norms = ("conjunction", "disjunction", "implication", "normalisation", "outside", "points")
+    lines += [f"{name:14} {getattr(system, name)}" for name in norms]
+    lines += [f"{'engine':14} {arbiter.engine}: {arbiter.why}"]
+    return "\n".join(lines)
+
+
+def _described(variable: Variable) -> list[str]:
+    low, high = variable.universe
+    default = ""
+    if isinstance(variable, Output):
+        default = ", no default" if variable.default is None else f", default {variable.default!r}"
+    width = max(map(len, variable.term_names))
+    lines = [f"  {variable.name} in [{low!r}, {high!r}]{default}"]
+    for term in variable.terms:
+        points = " ".join(f"({x!r}, {degree!r})" for x, degree in term.shape.points)
+        lines.append(f"    {term.name:{width}}  {points}")
+    return lines
+
+
+def convert(file: str, out: str, native: bool) -> None:
+    """Write a system in another format, or as source code.
+
+    Parameters
+    ----------
+    file : str
+        Path of the system, or ``section-vi``.
+    out : str
+        File to write, whose suffix says how.
+    native : bool
+        Whether its centroids shall be the weights, so that other tools give them without a normalisation.
+
+    Raises
+    ------
+    FormatError
+        If the suffix is unknown, or the file cannot be read or written.
+    UnsupportedError
+        If the format cannot say all of the system; nothing is written then.
+    """
+    from fuzzy_arbiter.formats import FORMATS, natively, save
+
+    suffix = Path(out).suffix[1:].lower()
+    require_suffix(out, (*FORMATS, *EXPORTS))
+    system = load_system(file)
+    if native:
+        system = natively(system)
+    if suffix in EXPORTS:
+        from fuzzy_arbiter.export import to_c, to_python
+
+        write_whole(Path(out), (to_c if suffix == "c" else to_python)(system).encode())
+    else:
+        save(system, out)

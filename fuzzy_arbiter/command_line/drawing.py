@@ -1,0 +1,125 @@
+"""Pictures: which one, of what, and as a file."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+from fuzzy_arbiter.arbiter import Arbiter
+from fuzzy_arbiter.command_line.values import sample
+from fuzzy_arbiter.errors import InputError
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+PICTURES = ("terms", "rules", "profile", "surface", "map")
+IMAGES = ("png", "svg", "pdf")
+
+
+def draw(
+    arbiter: Arbiter,
+    kind: str,
+    inputs: Sequence[str],
+    outputs: Sequence[str],
+    at: Sequence[str],
+    relief: bool,
+) -> Figure:
+    """Return a picture.
+
+    Parameters
+    ----------
+    arbiter : Arbiter
+        What is drawn.
+    kind : {"terms", "rules", "profile", "surface", "map"}
+        Which picture.
+    inputs, outputs : sequence of str
+        Names; where none came, as many of the first as the picture needs, and for terms all.
+    at : sequence of str
+        Values of inputs, as ``name=value``.
+    relief : bool
+        Whether a surface is drawn in three dimensions.
+
+    Returns
+    -------
+    Figure
+        Of the picture alone.
+
+    Raises
+    ------
+    DefinitionError
+        If a name is unknown.
+    InputError
+        If a value is refused, or the number of inputs or outputs does not fit.
+    """
+    from fuzzy_arbiter import pictures
+    from fuzzy_arbiter.pictures.style import new_axes
+
+    system = arbiter.system
+    if kind == "rules":
+        output = _names(kind, "--output", outputs, [v.name for v in system.outputs], 1)[0]
+        return _figure(pictures.rules(arbiter, sample(at, system), output))
+    places: Any = sample(at, system) if at else {}
+    if not isinstance(places, dict):
+        raise InputError(f"--at {at[0]}: expected name=value")
+    if kind == "terms":
+        names = [*inputs, *outputs] or [v.name for v in (*system.inputs, *system.outputs)]
+        return _terms(arbiter, names, places)
+    input_names = [v.name for v in system.inputs]
+    if kind == "profile":
+        return _figure(pictures.profile(arbiter, _names(kind, "--input", inputs, input_names, 1)[0], places))
+    first, second = _names(kind, "--input", inputs, input_names, 2)
+    if kind == "map":
+        return _figure(pictures.decisions(arbiter, (first, second), places))
+    output = _names(kind, "--output", outputs, [v.name for v in system.outputs], 1)[0]
+    ax = new_axes(5.6, 4.6, projection="3d") if relief else None
+    return _figure(pictures.surface(arbiter, output, (first, second), places, ax=ax))
+
+
+def _names(kind: str, option: str, came: Sequence[str], known: Sequence[str], n: int) -> Sequence[str]:
+    chosen = came or known[:n]
+    if len(chosen) != n:
+        raise InputError(f"{kind}: {len(chosen)} of {option}, expected {n} of {', '.join(known)}")
+    return chosen
+
+
+def _terms(arbiter: Arbiter, names: Sequence[str], at: Mapping[str, float]) -> Figure:
+    from matplotlib.figure import Figure
+
+    from fuzzy_arbiter import pictures
+
+    columns = 1 if len(names) <= 2 else 2
+    rows = -(-len(names) // columns)
+    figure = Figure(figsize=(5.6 * columns, 2.6 * rows), layout="constrained")
+    for i, name in enumerate(names):
+        pictures.terms(arbiter, name, at.get(name), ax=figure.add_subplot(rows, columns, i + 1))
+    return figure
+
+
+def _figure(ax: Any) -> Figure:
+    figure: Figure = ax.figure
+    return figure
+
+
+def image(figure: Figure, suffix: str) -> bytes:
+    """Return a figure as a file, the same for the same figure at any time.
+
+    Parameters
+    ----------
+    figure : Figure
+        The picture.
+    suffix : {"png", "svg", "pdf"}
+        Kind of the file.
+
+    Returns
+    -------
+    bytes
+        What stands in it.
+    """
+    import matplotlib as mpl
+
+    undated: dict[str, Any] = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}
+    out = io.BytesIO()
+    with mpl.rc_context({"svg.hashsalt": "fuzzy_arbiter"}):
+        figure.savefig(out, format=suffix, dpi=120, metadata=undated.get(suffix))
+    return out.getvalue()

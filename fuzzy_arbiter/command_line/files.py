@@ -1,0 +1,96 @@
+"""Files: told by their suffix, read whole, written whole or not at all."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TextIO
+
+from fuzzy_arbiter.errors import FormatError, InputError
+
+
+def read_text(path: str, stdin: TextIO | None) -> tuple[str, str]:
+    """Return what stands in a file, or comes from standard input.
+
+    Parameters
+    ----------
+    path : str
+        The file, or ``-``.
+    stdin : text stream or None
+        Standard input; None if it is closed.
+
+    Returns
+    -------
+    text, where : str
+        What was read, and what it is called in errors.
+
+    Raises
+    ------
+    InputError
+        If it cannot be read, or is no text.
+    """
+    where = "standard input" if path == "-" else path
+    try:
+        if path != "-":
+            return Path(path).read_bytes().decode(), where
+        if stdin is None:
+            raise InputError(f"{where}: is closed")
+        return stdin.read(), where
+    except UnicodeDecodeError:
+        raise InputError(f"{where}: not UTF-8 text") from None
+    except OSError as error:
+        raise InputError(f"{where}: {error.strerror or error}") from None
+
+
+def require_suffix(out: str, expected: Sequence[str]) -> None:
+    """Refuse a file of a suffix that says nothing.
+
+    Parameters
+    ----------
+    out : str
+        Path.
+    expected : sequence of str
+        Suffixes, without the dot.
+
+    Raises
+    ------
+    FormatError
+        If it has none of them.
+    """
+    if Path(out).suffix[1:].lower() not in expected:
+        raise FormatError(f"{out}: suffix is {Path(out).suffix!r}, expected .{', .'.join(expected)}")
+
+
+def write_whole(out: Path, data: bytes) -> None:
+    """Write a file that appears whole or not at all, and replaces an older one.
+
+    Parameters
+    ----------
+    out : Path
+        The file.
+    data : bytes
+        What is to be in it.
+
+    Raises
+    ------
+    FormatError
+        If it cannot be written.
+    """
+    scratch = None
+    try:
+        if out.exists() and not out.is_file():  # a device, a pipe: written to, not replaced
+            if out.is_dir():
+                raise FormatError(f"{out}: is a folder, expected a file")
+            out.write_bytes(data)
+            return
+        with tempfile.NamedTemporaryFile(dir=out.parent, prefix=f".{out.name}-", delete=False) as scratch:
+            scratch.write(data)
+        os.chmod(scratch.name, 0o644)
+        os.replace(scratch.name, out)
+    except OSError as error:
+        raise FormatError(f"{out}: {error.strerror or error}") from error
+    finally:
+        if scratch:
+            Path(scratch.name).unlink(missing_ok=True)

@@ -1,0 +1,173 @@
+"""Values: a sample or a table of them in, weights out."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from fuzzy_arbiter.arbiter import Arbiter
+from fuzzy_arbiter.definition import System
+from fuzzy_arbiter.errors import ArbiterError, InputError
+
+
+def sample(words: Sequence[str], system: System) -> list[float] | dict[str, float]:
+    """Return the sample that words of the command line say.
+
+    Parameters
+    ----------
+    words : sequence of str
+        All as ``name=value``, or all values in the order of the inputs.
+    system : System
+        Whose inputs.
+
+    Returns
+    -------
+    list or dict of float
+        As an arbiter takes it.
+
+    Raises
+    ------
+    InputError
+        If a word is neither, or a name came twice.
+    """
+    names = ", ".join(v.name for v in system.inputs)
+    if not words:
+        raise InputError(f"no values came, expected {names}")
+    named = ["=" in word for word in words]
+    if any(named) and not all(named):
+        raise InputError("some values came with a name and some without, expected either")
+    if not any(named):
+        return [number(word, word) for word in words]
+    result: dict[str, float] = {}
+    for word in words:
+        name, _, value = word.rpartition("=")
+        if name in result:
+            raise InputError(f"{name}: came twice, expected once")
+        result[name] = number(value, word)
+    return result
+
+
+def number(text: str, where: str) -> float:
+    """Return the number that a text says.
+
+    Parameters
+    ----------
+    text : str
+        As Python reads it.
+    where : str
+        What stands before it in the error.
+
+    Returns
+    -------
+    float
+        Maybe not finite.
+
+    Raises
+    ------
+    InputError
+        If it is none.
+    """
+    try:
+        return float(text)
+    except ValueError:
+        raise InputError(f"{where}: {text.strip()!r} is not a number") from None
+
+
+def evaluated(arbiter: Arbiter, inputs: Sequence[float] | Mapping[str, float], as_json: bool) -> str:
+    """Return the weights for one sample.
+
+    Parameters
+    ----------
+    arbiter : Arbiter
+        What is asked.
+    inputs : sequence or mapping of float
+        The sample.
+    as_json : bool
+        One object instead of a line for each output.
+
+    Returns
+    -------
+    str
+        Weights, in all digits.
+    """
+    names = [v.name for v in arbiter.system.outputs]
+    weights = dict(zip(names, map(float, arbiter(inputs)), strict=True))
+    if as_json:
+        return json.dumps(weights, ensure_ascii=False)
+    return "\n".join(f"{name} = {weight!r}" for name, weight in weights.items())
+
+
+def evaluated_table(arbiter: Arbiter, text: str, where: str, as_json: bool) -> str:
+    """Return the weights for the rows of a CSV table.
+
+    Parameters
+    ----------
+    arbiter : Arbiter
+        What is asked.
+    text : str
+        The table; its first line names the columns, of which those that are no inputs are passed over.
+    where : str
+        What the table is called in errors.
+    as_json : bool
+        A list of objects instead of a table.
+
+    Returns
+    -------
+    str
+        A column for each output, a row for each row.
+
+    Raises
+    ------
+    InputError
+        If a column is missing or there twice, or a line has a value that the arbiter refuses; the line is named.
+    UndefinedOutputError
+        If an output is undefined; the line is named.
+    """
+    lines, rows = _rows(text, where, [v.name for v in arbiter.system.inputs])
+    names = [v.name for v in arbiter.system.outputs]
+    weights: list[list[float]] = []
+    if rows:
+        try:
+            weights = arbiter.batch(np.array(rows)).tolist()
+        except ArbiterError:
+            for line, row in zip(lines, rows, strict=True):
+                try:
+                    arbiter(row)
+                except ArbiterError as error:
+                    raise type(error)(f"{where}: line {line}: {error}") from None
+            raise
+    if as_json:
+        return json.dumps([dict(zip(names, row, strict=True)) for row in weights], ensure_ascii=False)
+    out = io.StringIO()
+    writer = csv.writer(out, lineterminator="\n")
+    writer.writerow(names)
+    writer.writerows([repr(weight) for weight in row] for row in weights)
+    return out.getvalue().removesuffix("\n")
+
+
+def _rows(text: str, where: str, names: Sequence[str]) -> tuple[list[int], list[list[float]]]:
+    """Return line numbers and values of a table, in the order of the inputs."""
+    reader = csv.reader(io.StringIO(text.removeprefix("\ufeff"), newline=""), skipinitialspace=True)
+    try:
+        header = [name.strip() for name in next(reader, [])]
+        for name in names:
+            if header.count(name) != 1:
+                fault = "stands twice" if name in header else "is missing"
+                raise InputError(f"{where}: column {name!r} {fault} in the first line, expected {', '.join(names)}")
+        columns = [header.index(name) for name in names]
+        lines, rows = [], []
+        for cells in reader:
+            if not any(cell.strip() for cell in cells):
+                continue
+            line = f"{where}: line {reader.line_num}"
+            if len(cells) != len(header):
+                raise InputError(f"{line}: {len(cells)} cells, expected {len(header)}")
+            rows.append([number(cells[i], f"{line}: {name}") for i, name in zip(columns, names, strict=True)])
+            lines.append(reader.line_num)
+    except csv.Error as error:
+        raise InputError(f"{where}: line {reader.line_num}: {error}") from None
+    return lines, rows

@@ -1,0 +1,164 @@
+"""Definitions in files: JSON and TOML of our own, FCL of IEC 61131-7, FIS of MATLAB and Octave, FLL of fuzzylite."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Literal, get_args
+
+from fuzzy_arbiter.definition import System
+from fuzzy_arbiter.errors import ArbiterError, FormatError
+from fuzzy_arbiter.formats import fcl, fis, fll, json_toml
+from fuzzy_arbiter.formats.native import natively
+
+__all__ = ["FORMATS", "FormatName", "load", "natively", "reads", "save", "writes"]
+
+FormatName = Literal["json", "toml", "fcl", "fis", "fll"]
+FORMATS: tuple[str, ...] = get_args(FormatName)
+
+_READ: dict[str, Callable[[str], System]] = {
+    "json": json_toml.read_json,
+    "toml": json_toml.read_toml,
+    "fcl": fcl.read,
+    "fis": fis.read,
+    "fll": fll.read,
+}
+_WRITE: dict[str, Callable[[System], str]] = {
+    "json": json_toml.write_json,
+    "toml": json_toml.write_toml,
+    "fcl": fcl.write,
+    "fis": fis.write,
+    "fll": fll.write,
+}
+
+
+def reads(text: str, format: str) -> System:
+    """Return the system that a text defines.
+
+    Parameters
+    ----------
+    text : str
+        All of a file; a byte order mark and the ends of lines do not matter.
+    format : {"json", "toml", "fcl", "fis", "fll"}
+        What it is written in.
+
+    Returns
+    -------
+    System
+        Nothing that the text says is left out but descriptions.
+
+    Raises
+    ------
+    FormatError
+        If there is no such format, the text is not of it, or it says what this package does not know.
+    DefinitionError
+        If what it defines cannot be.
+    """
+    _require_format(format, f"format is {format!r}")
+    return _READ[format](text.removeprefix("\ufeff").replace("\r\n", "\n").replace("\r", "\n"))
+
+
+def writes(system: System, format: str) -> str:
+    """Return a system as text that reads as the same system again.
+
+    Parameters
+    ----------
+    system : System
+        What is to be said.
+    format : {"json", "toml", "fcl", "fis", "fll"}
+        What it is written in.
+
+    Returns
+    -------
+    str
+        All of a file, every number in full precision.
+
+    Raises
+    ------
+    FormatError
+        If there is no such format.
+    UnsupportedError
+        If the format cannot say all of the system; what it cannot say is named.
+    """
+    _require_format(format, f"format is {format!r}")
+    return _WRITE[format](system)
+
+
+def load(path: str | Path) -> System:
+    """Return the system that a file defines.
+
+    Parameters
+    ----------
+    path : str or Path
+        Of a JSON, TOML, FCL, FIS or FLL file, told by its suffix in any case.
+
+    Returns
+    -------
+    System
+        As of `reads`.
+
+    Raises
+    ------
+    FormatError
+        If the file cannot be read, is not of its format, or says what this package does not know.
+    DefinitionError
+        If what it defines cannot be.
+    """
+    format = _format(path)
+    try:
+        text = Path(path).read_bytes().decode("utf-8")
+    except OSError as error:
+        raise FormatError(f"{path}: {error.strerror or error}") from None
+    except UnicodeDecodeError as error:
+        raise FormatError(f"{path}: byte {error.start} is no UTF-8, expected text in UTF-8") from None
+    try:
+        return reads(text, format)
+    except ArbiterError as error:
+        raise type(error)(f"{path}: {error}") from None
+
+
+def save(system: System, path: str | Path) -> None:
+    """Write a system to a file, which appears whole or not at all.
+
+    Parameters
+    ----------
+    system : System
+        What is to be said.
+    path : str or Path
+        Of a JSON, TOML, FCL, FIS or FLL file, told by its suffix in any case; it replaces an older one.
+
+    Raises
+    ------
+    UnsupportedError
+        If the format cannot say all of the system; nothing is written then.
+    FormatError
+        If the file cannot be written.
+    """
+    data = writes(system, _format(path)).encode("utf-8")
+    out = Path(path)
+    scratch = None
+    try:
+        if out.exists() and not out.is_file():
+            raise FormatError(f"{path}: exists and is no file, expected the name of a new one")
+        with tempfile.NamedTemporaryFile(dir=out.parent, prefix=f".{out.name}-", delete=False) as scratch:
+            scratch.write(data)
+        os.chmod(scratch.name, 0o644)
+        os.replace(scratch.name, out)
+    except OSError as error:
+        raise FormatError(f"{path}: {error.strerror or error}") from None
+    finally:
+        if scratch:
+            Path(scratch.name).unlink(missing_ok=True)
+
+
+def _format(path: str | Path) -> str:
+    format = Path(path).suffix.lower().removeprefix(".")
+    _require_format(format, f"{path}: suffix is {Path(path).suffix!r}")
+    return format
+
+
+def _require_format(format: str, what: str) -> None:
+    if format not in FORMATS:
+        raise FormatError(f"{what}, expected one of {', '.join(FORMATS)}")

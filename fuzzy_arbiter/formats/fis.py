@@ -1,0 +1,134 @@
+"""The text of MATLAB's Fuzzy Logic Toolbox, which Octave's fuzzy-logic-toolkit reads too."""
+
+from __future__ import annotations
+
+import math
+
+from fuzzy_arbiter.definition import Output, System, Term, Variable
+from fuzzy_arbiter.errors import UnsupportedError
+from fuzzy_arbiter.formats.fis_reader import read
+from fuzzy_arbiter.formats.fis_words import SETTINGS
+from fuzzy_arbiter.formats.notation import cannot_say, say_number, say_numbers
+from fuzzy_arbiter.formats.settings import say_settings
+from fuzzy_arbiter.propositions import And, Is, Not, Or, Proposition
+
+__all__ = ["read", "write"]
+
+_SIGNS = "'=:,"  # at which MATLAB's reader cuts its lines
+
+
+def write(system: System) -> str:
+    """Return a system as MATLAB's text.
+
+    Parameters
+    ----------
+    system : System
+        Any that the format can say: terms that are triangles, trapezoids or their halves, at most one connective in a
+        rule, no defaults.
+
+    Returns
+    -------
+    str
+        Text of a file; settings that the format has no words for stand in a comment.
+
+    Raises
+    ------
+    UnsupportedError
+        If the format cannot say a name, a term, a rule or a default; it is quoted.
+    """
+    _require_names(system)
+    lines = [f"% {text}" for text in say_settings(system, SETTINGS)]
+    lines += ["[System]", f"Name='{system.name}'", "Type='mamdani'", "Version=2.0"]
+    lines += [f"NumInputs={len(system.inputs)}", f"NumOutputs={len(system.outputs)}", f"NumRules={len(system.rules)}"]
+    lines += [f"AndMethod='{system.conjunction}'", f"OrMethod='{system.disjunction}'"]
+    lines += [f"ImpMethod='{system.implication}'", "AggMethod='max'", "DefuzzMethod='centroid'", ""]
+    for kind, variables in (("Input", system.inputs), ("Output", system.outputs)):
+        for k, v in enumerate(variables):
+            lines += [f"[{kind}{k + 1}]", *_variable(v), ""]
+    lines += ["[Rules]", *(_rule(system, i) for i in range(len(system.rules)))]
+    return "\n".join([*lines, ""])
+
+
+def _require_names(system: System) -> None:
+    names = [name for v in (*system.inputs, *system.outputs) for name in (v.name, *v.term_names)]
+    for name in (system.name, *names):
+        if any(sign in name for sign in _SIGNS):
+            raise UnsupportedError(f"fis cannot say the name {name!r}: expected none of {' '.join(_SIGNS)}")
+
+
+def _variable(v: Variable) -> list[str]:
+    if isinstance(v, Output) and v.default is not None:
+        raise UnsupportedError(f"fis cannot say the default {v.default!r} of output {v.name!r}")
+    lines = [f"Name='{v.name}'", f"Range=[{say_numbers(v.universe)}]", f"NumMFs={len(v.terms)}"]
+    for j, term in enumerate(v.terms):
+        lines.append(f"MF{j + 1}='{term.name}':{_function(term, v)}")
+    return lines
+
+
+def _function(term: Term, v: Variable) -> str:
+    """Say a term's function and places; half a triangle gets its other foot beyond the range, as Octave wants it."""
+    low, high = v.universe
+    width = high - low
+
+    def below(x: float) -> float:
+        return x - width if x - width < x else math.nextafter(x, -math.inf)
+
+    def above(x: float) -> float:
+        return x + width if x + width > x else math.nextafter(x, math.inf)
+
+    places = [x for x, _ in term.shape.points]
+    match [degree for _, degree in term.shape.points]:
+        case [0.0, 1.0, 0.0] | [0.0, 1.0, 1.0, 0.0]:
+            pass
+        case [0.0, 1.0]:
+            a, b = places
+            places = [a, b, above(b)] if b >= high else [a, b, high, above(high)]
+        case [1.0, 0.0]:
+            a, b = places
+            places = [below(a), a, b] if a <= low else [below(low), low, a, b]
+        case [1.0]:
+            places = [below(low), low, high, above(high)]
+        case [0.0]:
+            places = [high, above(high), above(above(high))]
+        case _:
+            raise UnsupportedError(_no_function(term, v))
+    if not all(map(math.isfinite, places)):
+        raise UnsupportedError(_no_function(term, v))
+    return f"'{'trimf' if len(places) == 3 else 'trapmf'}',[{say_numbers(places)}]"
+
+
+def _no_function(term: Term, v: Variable) -> str:
+    points = " ".join(f"({say_number(x)}, {say_number(degree)})" for x, degree in term.shape.points)
+    return f"fis cannot say the term {term.name!r} of {v.name!r}, {points}: expected a triangle, a trapezoid or a half"
+
+
+def _rule(system: System, i: int) -> str:
+    rule = system.rules[i]
+    condition = rule.condition
+    parts = condition.parts if isinstance(condition, And | Or) else (condition,)
+    row = [0] * len(system.inputs)
+    names = [v.name for v in system.inputs]
+    last = -1
+    for part in parts:
+        statement = _statement(part)
+        if statement is None:
+            raise cannot_say("fis", i, rule, "one connective per rule, and only terms negated")
+        k = names.index(statement.variable)
+        if k <= last:
+            raise cannot_say("fis", i, rule, "each input once, in the order of the inputs")
+        last = k
+        row[k] = (system.inputs[k].term_names.index(statement.term) + 1) * (1 if statement is part else -1)
+    concluded = [0] * len(system.outputs)
+    outputs = [v.name for v in system.outputs]
+    order = [outputs.index(c.variable) for c in rule.conclusions]
+    if order != sorted(order):
+        raise cannot_say("fis", i, rule, "each output in the order of the outputs", "conclusions")
+    for k, conclusion in zip(order, rule.conclusions, strict=True):
+        concluded[k] = system.outputs[k].term_names.index(conclusion.term) + 1
+    numbers = f"{' '.join(map(str, row))}, {' '.join(map(str, concluded))}"
+    return f"{numbers} ({say_number(rule.weight)}) : {2 if isinstance(condition, Or) else 1}"
+
+
+def _statement(part: Proposition) -> Is | None:
+    inner = part.part if isinstance(part, Not) else part
+    return inner if isinstance(inner, Is) else None

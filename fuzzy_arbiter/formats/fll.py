@@ -1,0 +1,85 @@
+"""The FuzzyLite Language, as pyfuzzylite and fuzzylite read and write it."""
+
+from __future__ import annotations
+
+from fuzzy_arbiter.definition import Output, Rule, System, Variable
+from fuzzy_arbiter.errors import UnsupportedError
+from fuzzy_arbiter.formats.fll_reader import read
+from fuzzy_arbiter.formats.fll_terms import RESERVED, say_shape
+from fuzzy_arbiter.formats.fll_words import CONJUNCTIONS, DISJUNCTIONS, SETTINGS
+from fuzzy_arbiter.formats.notation import cannot_say, require_shallow, require_words, say_number, say_numbers
+from fuzzy_arbiter.formats.settings import say_settings
+from fuzzy_arbiter.propositions import And, Is, Not, Or, Proposition
+
+__all__ = ["read", "write"]
+
+
+def write(system: System) -> str:
+    """Return a system in the FuzzyLite Language.
+
+    Parameters
+    ----------
+    system : System
+        Any that the language can say: only single terms are negated.
+
+    Returns
+    -------
+    str
+        Text of a file; the normalisation, for which the language has no word, stands in a comment.
+
+    Raises
+    ------
+    UnsupportedError
+        If the language cannot say a name or a rule; it is quoted.
+    """
+    if "#" in system.name:
+        raise UnsupportedError(f"fll cannot say the name {system.name!r}: what follows # is a comment")
+    require_words(system, "fll", RESERVED)
+    require_shallow(system, "fll")
+    lock = "true" if system.outside == "clip" else "false"
+    lines = [f"# {text}" for text in say_settings(system, SETTINGS)]
+    lines.append(f"Engine: {system.name}")
+    for v in system.inputs:
+        lines += [f"InputVariable: {v.name}", "  enabled: true", f"  range: {say_numbers(v.universe)}"]
+        lines += [f"  lock-range: {lock}", *_terms(v)]
+    for output in system.outputs:
+        lines += [f"OutputVariable: {output.name}", "  enabled: true", f"  range: {say_numbers(output.universe)}"]
+        lines += ["  lock-range: false", "  aggregation: Maximum", f"  defuzzifier: Centroid {system.points}"]
+        lines += [f"  default: {_default(output)}", "  lock-previous: false", *_terms(output)]
+    lines += ["RuleBlock: rules", "  enabled: true"]
+    lines += [f"  conjunction: {_said(CONJUNCTIONS, system.conjunction)}"]
+    lines += [f"  disjunction: {_said(DISJUNCTIONS, system.disjunction)}"]
+    lines += [f"  implication: {_said(CONJUNCTIONS, system.implication)}", "  activation: General"]
+    lines += [f"  rule: {_rule(i, rule)}" for i, rule in enumerate(system.rules)]
+    return "\n".join([*lines, ""])
+
+
+def _said(words: dict[str, str], value: str) -> str:
+    return next(word for word, said in words.items() if said == value)
+
+
+def _terms(v: Variable) -> list[str]:
+    return [f"  term: {term.name} {say_shape(term.shape)}" for term in v.terms]
+
+
+def _default(output: Output) -> str:
+    return "nan" if output.default is None else say_number(output.default)
+
+
+def _rule(i: int, rule: Rule) -> str:
+    conclusions = " and ".join(map(str, rule.conclusions))
+    weight = "" if rule.weight == 1.0 else f" with {say_number(rule.weight)}"
+    return f"if {_condition(rule.condition, i, rule)} then {conclusions}{weight}"
+
+
+def _condition(p: Proposition, i: int, rule: Rule) -> str:
+    if isinstance(p, And | Or):
+        word = " and " if isinstance(p, And) else " or "
+        texts = ((part, _condition(part, i, rule)) for part in p.parts)
+        return word.join(f"({text})" if isinstance(part, And | Or) else text for part, text in texts)
+    negations = 0
+    while isinstance(p, Not):
+        p, negations = p.part, negations + 1
+    if not isinstance(p, Is):
+        raise cannot_say("fll", i, rule, "only terms negated")
+    return f"{p.variable} is {'not ' * negations}{p.term}"

@@ -1,0 +1,100 @@
+"""Range normalisation said in the outputs' universe, for tools that know nothing of it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from fractions import Fraction
+
+from fuzzy_arbiter.definition import Output, System, Term
+from fuzzy_arbiter.errors import UnsupportedError
+from fuzzy_arbiter.shapes import Shape
+
+
+def natively(system: System) -> System:
+    """Return the system whose raw centroids are the weights of a range-normalised one.
+
+    Normalising to the range maps the centroids of an output's least and greatest term, each alone, to 0 and 1. The same
+    map of the output's universe, terms and default gives a system that needs no normalising: low and high triangles on
+    [0, 1] become triangles on [-1, 2]. The ends of the map are exact, the places are rounded once.
+
+    Parameters
+    ----------
+    system : System
+        With the normalisation ``range`` or ``none``.
+
+    Returns
+    -------
+    System
+        With the normalisation ``none``; the same system if it has that.
+
+    Raises
+    ------
+    UnsupportedError
+        If the normalisation is over all outputs, or an output's terms have one centroid and so no range.
+
+    Notes
+    -----
+    Where the engines hold a centroid within [0, 1], because it lies beyond those of the least and the greatest term,
+    the new system has it as it is.
+
+    Examples
+    --------
+    >>> from fuzzy_arbiter import prioritised
+    >>> natively(prioritised()).outputs[0].universe
+    (-1.0, 2.0)
+    """
+    if system.normalisation == "none":
+        return system
+    if system.normalisation != "range":
+        raise UnsupportedError(
+            f"no universe can say the normalisation {system.normalisation!r}, which is over all outputs; "
+            "expected 'range' or 'none'"
+        )
+    return replace(system, outputs=tuple(map(_mapped, system.outputs)), normalisation="none")
+
+
+def range_ends(output: Output) -> tuple[Fraction, Fraction]:
+    """Return the centroids that range normalisation maps to 0 and 1.
+
+    Parameters
+    ----------
+    output : Output
+        Any.
+
+    Returns
+    -------
+    tuple of Fraction
+        Exact centroids of its least and its greatest term, each alone and whole.
+    """
+    centroids = [_centroid(term.shape, output.universe) for term in output.terms]
+    return min(centroids), max(centroids)
+
+
+def _mapped(output: Output) -> Output:
+    low, high = range_ends(output)
+    if low == high:
+        raise UnsupportedError(
+            f"output {output.name!r}: its terms have one centroid, {float(low):g}, which leaves no range to normalise"
+        )
+
+    def place(x: float) -> float:
+        return float((Fraction(x) - low) / (high - low))
+
+    terms = tuple(Term(t.name, Shape(tuple((place(x), y) for x, y in t.shape.points))) for t in output.terms)
+    default = None if output.default is None else min(max(place(output.default), 0.0), 1.0)
+    return Output(output.name, (place(output.universe[0]), place(output.universe[1])), terms, default)
+
+
+def _centroid(shape: Shape, universe: tuple[float, float]) -> Fraction:
+    low, high = map(Fraction, universe)
+    points = [(Fraction(x), Fraction(degree)) for x, degree in shape.points]
+    points = [(min(low, points[0][0]), points[0][1]), *points, (max(high, points[-1][0]), points[-1][1])]
+    area = moment = Fraction(0)
+    for (a, left), (b, right) in zip(points, points[1:], strict=False):
+        start, end = max(a, low), min(b, high)
+        if start < end:
+            slope = (right - left) / (b - a)
+            y0, y1 = left + slope * (start - a), left + slope * (end - a)
+            area += (end - start) * (y0 + y1) / 2
+            moment += (end - start) * (start * (2 * y0 + y1) + end * (y0 + 2 * y1)) / 6
+    return moment / area

@@ -1,0 +1,160 @@
+"""From the values of a JSON or TOML file to a system, with faults that name the key."""
+
+from __future__ import annotations
+
+import difflib
+import math
+from collections.abc import Callable
+from typing import Any, NoReturn
+
+from fuzzy_arbiter.definition import Output, System, Term, Variable
+from fuzzy_arbiter.errors import FormatError
+from fuzzy_arbiter.formats.notation import located
+from fuzzy_arbiter.hierarchy import DEGREE, WEIGHT, Criterion, prioritised
+from fuzzy_arbiter.propositions import is_identifier
+from fuzzy_arbiter.rule_text import parse_rule
+from fuzzy_arbiter.shapes import Shape, falling, rising, trapezoid, triangle
+
+_SETTINGS = ("conjunction", "disjunction", "implication", "normalisation", "outside", "points")
+_LONG = ("name", *_SETTINGS, "inputs", "outputs", "rules")
+_SHORT = ("name", "criteria", "form", "weight", "normalisation", "outside", "points")
+_VARIABLE = ("name", "universe", "terms")
+_CRITERION = ("name", "on", "off", "membership")
+_SHAPES: dict[str, tuple[int, Callable[..., Shape]]] = {
+    "triangle": (3, triangle),
+    "trapezoid": (4, trapezoid),
+    "rising": (2, rising),
+    "falling": (2, falling),
+}
+
+
+def system_of(data: object) -> System:
+    """Return the system that the values of a file define.
+
+    Either ``inputs``, ``outputs`` and ``rules`` are given, with the keys of `System`; or, in short, ``criteria`` in
+    order of priority, with the keys of `prioritised`. Terms are given by their points, or as one of ``triangle``,
+    ``trapezoid``, ``rising`` and ``falling`` with its places.
+
+    Parameters
+    ----------
+    data : object
+        As JSON or TOML reads it.
+
+    Returns
+    -------
+    System
+        With the defaults of `System` for what is not given.
+
+    Raises
+    ------
+    FormatError
+        If a key is unknown or missing, or a value has another type; the key is named.
+    DefinitionError
+        If what they define cannot be.
+    """
+    table = _table(data, "", _SHORT if isinstance(data, dict) and "criteria" in data else _LONG)
+    settings = {key: table[key] for key in ("name", *_SETTINGS) if key in table}
+    for key in settings:
+        if key != "points" and not isinstance(settings[key], str):
+            _refuse(key, settings[key], "text")
+    if "criteria" in table:
+        form = table.get("form", "hierarchical")
+        if not isinstance(form, str):
+            _refuse("form", form, "text")
+        criteria = tuple(_criterion(c, f"criteria[{i}]") for i, c in enumerate(_list(table, "criteria", "")))
+        weight = _variable(table["weight"], "weight", Output) if "weight" in table else WEIGHT
+        return prioritised(criteria, form, weight, **settings)  # type: ignore[arg-type]  # which it checks itself
+    inputs = tuple(_variable(v, f"inputs[{i}]", Variable) for i, v in enumerate(_list(table, "inputs", "")))
+    outputs = tuple(_variable(v, f"outputs[{i}]", Output) for i, v in enumerate(_list(table, "outputs", "")))
+    rules = []
+    for i, text in enumerate(_list(table, "rules", "")):
+        with located(f"rules[{i}]"):
+            rules.append(parse_rule(_string(text, f"rules[{i}]")))
+    return System(inputs, outputs, tuple(rules), **settings)
+
+
+def _variable(data: object, where: str, kind: type[Variable]) -> Any:
+    table = _table(data, where, (*_VARIABLE, "default") if kind is Output else _VARIABLE)
+    name = _string(_needed(table, "name", where), f"{where}.name")
+    bounds = _numbers(_needed(table, "universe", where), 2, f"{where}.universe")
+    terms = []
+    for term, shape in _table(_needed(table, "terms", where), f"{where}.terms").items():
+        terms.append(Term(term, _shape(shape, _path(f"{where}.terms", term))))
+    options = {}
+    if table.get("default") is not None:
+        options["default"] = _number(table["default"], f"{where}.default")
+    with located(where):
+        return kind(name, (bounds[0], bounds[1]), tuple(terms), **options)
+
+
+def _criterion(data: object, where: str) -> Criterion:
+    table = _table(data, where, _CRITERION)
+    _needed(table, "name", where)
+    words = {key: _string(table[key], f"{where}.{key}") for key in ("name", "on", "off") if key in table}
+    membership = _shape(table["membership"], f"{where}.membership") if "membership" in table else DEGREE
+    with located(where):
+        return Criterion(**words, membership=membership)
+
+
+def _shape(data: object, where: str) -> Shape:
+    with located(where):
+        if isinstance(data, list):
+            points = (_numbers(point, 2, f"{where}[{i}]") for i, point in enumerate(data))
+            return Shape(tuple((x, degree) for x, degree in points))
+        if not isinstance(data, dict) or len(data) != 1:
+            _refuse(where, data, f"a list of points, or a table with one of {', '.join(_SHAPES)}")
+        ((kind, places),) = _table(data, where, tuple(_SHAPES)).items()
+        count, make = _SHAPES[kind]
+        return make(*_numbers(places, count, f"{where}.{kind}"))
+
+
+def _table(data: object, where: str, known: tuple[str, ...] = ()) -> dict[str, Any]:
+    """Return a table of known keys; of any if none is known."""
+    if not isinstance(data, dict):
+        _refuse(where or "the file", data, "a table of keys and values")
+    for key in data:
+        if known and key not in known:
+            near = difflib.get_close_matches(key, known, 1)
+            hint = f"; did you mean {near[0]!r}" if near else ""
+            raise FormatError(f"{_path(where, key)}: unknown key, expected one of {', '.join(known)}{hint}")
+    return data
+
+
+def _path(where: str, key: str) -> str:
+    name = key if is_identifier(key) else repr(key)
+    return f"{where}.{name}" if where else name
+
+
+def _needed(table: dict[str, Any], key: str, where: str) -> Any:
+    if key not in table:
+        raise FormatError(f"{_path(where, key)}: key is missing")
+    return table[key]
+
+
+def _list(table: dict[str, Any], key: str, where: str) -> list[Any]:
+    value = _needed(table, key, where)
+    return value if isinstance(value, list) else _refuse(key, value, "a list")
+
+
+def _string(value: object, where: str) -> str:
+    return value if isinstance(value, str) else _refuse(where, value, "text")
+
+
+def _numbers(value: object, count: int, where: str) -> list[float]:
+    if not isinstance(value, list) or len(value) != count:
+        _refuse(where, value, f"a list of {count} numbers")
+    return [_number(x, where) for x in value]
+
+
+def _number(value: object, where: str) -> float:
+    try:
+        x = float(value) if isinstance(value, int | float) and not isinstance(value, bool) else math.nan
+    except OverflowError:
+        x = math.inf
+    return x if math.isfinite(x) else _refuse(where, value, "a finite number")
+
+
+def _refuse(where: str, value: object, expected: str) -> NoReturn:
+    text = repr(value) if not isinstance(value, dict | list) else f"a {'table' if isinstance(value, dict) else 'list'}"
+    text = text if len(text) <= 100 else f"{text[:100]}..."
+    raise FormatError(f"{where}: {text} came, expected {expected}")

@@ -1,0 +1,99 @@
+"""What FCL, FIS and FLL have no words for, in one comment that this package reads back, and others for people."""
+
+from __future__ import annotations
+
+import difflib
+import re
+from collections.abc import Iterable, Sequence
+from typing import Any, get_args
+
+from fuzzy_arbiter.definition import Normalisation, Outside, System
+from fuzzy_arbiter.formats.native import range_ends
+from fuzzy_arbiter.formats.notation import refuse, say_number
+
+MARK = "fuzzy_arbiter:"
+# what a file means that says nothing of it
+PLAIN: dict[str, Any] = {"normalisation": "none", "outside": "refuse", "points": 101}
+_CHOICES = {"normalisation": get_args(Normalisation), "outside": get_args(Outside)}
+
+
+def say_settings(system: System, keys: Sequence[str]) -> list[str]:
+    """Return the texts of the comments that a system needs.
+
+    Parameters
+    ----------
+    system : System
+        What is written.
+    keys : sequence of str
+        Settings that the format has no words for.
+
+    Returns
+    -------
+    list of str
+        First the one that `read_settings` reads, if a setting is not the plain one; then, for people, how the raw
+        centroids that other tools give become weights.
+    """
+    said = [f"{key} = {getattr(system, key)}" for key in keys if getattr(system, key) != PLAIN[key]]
+    texts = [f"{MARK} {', '.join(said)}"] if said else []
+    if system.normalisation == "none":
+        return texts
+    texts.append("other tools give the raw centroid c of each output; the weights are")
+    for output in system.outputs:
+        low, high = range_ends(output)
+        zero, scale = say_number(float(low)), say_number(float(high - low))
+        texts.append(f"  (c - {zero}) / {scale}, held within [0, 1], for {output.name}")
+    if system.normalisation in ("sum", "max"):
+        whole = "sum" if system.normalisation == "sum" else "greatest"
+        texts.append(f"  and then each divided by the {whole} of all, unless that is 0")
+    return texts
+
+
+def read_settings(comments: Iterable[tuple[int, str]], keys: Sequence[str]) -> dict[str, Any]:
+    """Return the settings that the comments of a file say.
+
+    Parameters
+    ----------
+    comments : iterable of (int, str)
+        Line and text of each comment, without the signs that make it one.
+    keys : sequence of str
+        Settings that the format has no words for.
+
+    Returns
+    -------
+    dict
+        A value for each key.
+
+    Raises
+    ------
+    FormatError
+        If a comment that begins as ours, or almost so, says what there is not, or there are two.
+    """
+    settings = {key: PLAIN[key] for key in keys}
+    first: int | None = None
+    for line, text in comments:
+        if not text.strip().startswith(MARK):
+            word = re.match(r"\s*([\w-]*)", text)
+            if word and difflib.SequenceMatcher(None, word[1].lower(), MARK[:-1]).ratio() > 0.8:
+                refuse(line, f"{text.strip()!r} is almost such a comment, expected {MARK!r} or another first word")
+            continue
+        if first is not None:
+            refuse(line, f"{text.strip()!r} is the second such comment after line {first}, expected one")
+        first = line
+        seen: set[str] = set()
+        for part in text.strip().removeprefix(MARK).split(","):
+            key, equals, value = (s.strip() for s in part.partition("="))
+            if key not in settings or not equals or key in seen:
+                refuse(line, f"{part.strip()!r}, expected each once, with = and its value: {', '.join(keys)}")
+            seen.add(key)
+            settings[key] = _value(key, value, line)
+    return settings
+
+
+def _value(key: str, value: str, line: int) -> Any:
+    if key == "points":
+        if not re.fullmatch(r"\d{1,4000}", value, re.ASCII):
+            refuse(line, f"points is {value!r}, expected a whole number, 3 or more")
+        return int(value)
+    if value not in _CHOICES[key]:
+        refuse(line, f"{key} is {value!r}, expected one of {', '.join(_CHOICES[key])}")
+    return value

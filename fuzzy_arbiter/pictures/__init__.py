@@ -1,0 +1,12 @@
+"""Pictures of an arbiter: its terms, what its rules do at a sample, and its weights over its inputs.
+
+Every function draws on the axes that it is given, or on those of a new figure, and returns them; none shows or saves
+anything. Matplotlib is needed only when one is called.
+"""
+
+from fuzzy_arbiter.pictures.fields import decisions, surface
+from fuzzy_arbiter.pictures.firing import rules
+from fuzzy_arbiter.pictures.lines import normalisations, profile, terms
+from fuzzy_arbiter.pictures.style import COLOURS
+
+__all__ = ["COLOURS", "decisions", "normalisations", "profile", "rules", "surface", "terms"]

@@ -1,0 +1,203 @@
+"""Pictures over two inputs: one output as a surface, and which output wins."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from fuzzy_arbiter.arbiter import Arbiter
+from fuzzy_arbiter.engines.firing import Array
+from fuzzy_arbiter.errors import DefinitionError
+from fuzzy_arbiter.pictures.style import (
+    INK,
+    colour,
+    fixed_inputs,
+    hatch,
+    new_axes,
+    one_of,
+    said,
+    weights_at,
+    wrapped,
+)
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+_TIE = 1e-9  # weights closer than this are equal
+_UNDEFINED = "#d9d9d9"
+_SHADES = 5  # of the margin
+
+
+def surface(
+    arbiter: Arbiter,
+    output: str,
+    over: tuple[str, str],
+    at: Mapping[str, float] | None = None,
+    ax: Axes | None = None,
+    points: int = 61,
+) -> Axes:
+    """Draw one output over two inputs: as level lines, or as a relief on axes of three dimensions.
+
+    Parameters
+    ----------
+    arbiter : Arbiter
+        What is drawn.
+    output : str
+        Name of the output.
+    over : (str, str)
+        Names of the inputs along the two axes.
+    at : mapping from str to float, optional
+        Values of the others; default: the middle of each universe. The picture says them.
+    ax : Axes, optional
+        Default: those of a new figure; with ``projection="3d"`` a relief is drawn.
+    points : int
+        Along each axis.
+
+    Returns
+    -------
+    Axes
+        On which it was drawn, blank where an output is undefined.
+
+    Raises
+    ------
+    DefinitionError
+        If there is no such output or input.
+    InputError
+        If a value is not a number in its universe.
+    """
+    k = one_of(arbiter.system.outputs, output, "output")
+    x, y, weights, where = _field(arbiter, over, at, points)
+    z = np.ma.masked_invalid(weights[..., k])
+    relief = ax is not None and ax.name == "3d"
+    ax = new_axes(5.6, 4.4) if ax is None else ax
+    if relief:
+        _relief(ax, x, y, np.where(np.isnan(weights[..., k]), np.nan, weights[..., k]), output)
+    elif z.count() == 0 or z.max() - z.min() < _TIE * max(1.0, abs(z).max()):
+        ax.contourf(x, y, np.ma.getmaskarray(z).astype(float), levels=[-0.5, 0.5], colors=["#eeeeee"])
+        value = "undefined" if z.count() == 0 else f"{output} = {z.max():.4g}"
+        ax.text(0.5, 0.5, f"{value} everywhere", transform=ax.transAxes, ha="center")
+    else:
+        filled = ax.contourf(x, y, z, levels=10, cmap="cividis")
+        levels = np.array(filled.levels)[1:-1:2]
+        pale = levels > (levels[0] + levels[-1]) / 2.0  # there the ground is light
+        lines = ax.contour(x, y, z, levels=levels, colors=np.where(pale, "#222222", "#ffffff").tolist(), linewidths=0.9)
+        ax.clabel(lines, fontsize=8, fmt="%.3g")
+        bar = ax.figure.colorbar(filled, ax=ax, label=output)
+        bar.outline.set_visible(False)
+    ax.set(xlabel=over[0], ylabel=over[1])
+    ax.set_title(wrapped(f"{output}{where}", 60), fontsize=10, loc="left")
+    return ax
+
+
+def decisions(
+    arbiter: Arbiter,
+    over: tuple[str, str],
+    at: Mapping[str, float] | None = None,
+    ax: Axes | None = None,
+    points: int = 101,
+) -> Axes:
+    """Draw over two inputs which output is the greatest, the darker the farther it is above the next.
+
+    Parameters
+    ----------
+    arbiter : Arbiter
+        What is drawn, of two outputs or more.
+    over : (str, str)
+        Names of the inputs along the two axes.
+    at : mapping from str to float, optional
+        Values of the others; default: the middle of each universe. The picture says them.
+    ax : Axes, optional
+        Default: those of a new figure.
+    points : int
+        Along each axis.
+
+    Returns
+    -------
+    Axes
+        On which it was drawn, white where the greatest is shared, grey where an output is undefined.
+
+    Raises
+    ------
+    DefinitionError
+        If there is no such input, or one output only.
+    InputError
+        If a value is not a number in its universe.
+    """
+    from matplotlib.colors import to_rgb
+    from matplotlib.patches import Patch
+
+    outputs = arbiter.system.outputs
+    if len(outputs) < 2:
+        raise DefinitionError(
+            f"decisions: the only output is {outputs[0].name!r}, expected two or more to decide between"
+        )
+    x, y, weights, where = _field(arbiter, over, at, points)
+    ax = new_axes(5.8, 4.4) if ax is None else ax
+    undefined = np.asarray(np.isnan(weights).any(axis=-1))
+    known = np.where(undefined[..., None], 0.0, weights)
+    ranked = np.sort(known, axis=-1)
+    most = max(float((ranked[..., -1] - ranked[..., -2]).max()), _TIE)
+    levels = np.linspace(0.0, most, _SHADES + 1)
+    levels[0] = most * 1e-4  # equal, to what can be drawn
+    levels[-1] *= 1.0 + 1e-9
+    if undefined.any():
+        ax.contourf(x, y, undefined.astype(float), levels=[0.5, 1.5], colors=[_UNDEFINED])
+    keys: list[Patch] = []
+    for k, output in enumerate(outputs):
+        others = np.delete(known, k, axis=-1).max(axis=-1)
+        ahead = np.ma.masked_where(undefined, known[..., k] - others)
+        if ahead.count() == 0 or not ahead.max() > levels[0]:
+            continue
+        shades = [_mixed(to_rgb(colour(k)), share) for share in np.linspace(0.2, 0.85, _SHADES)]
+        ax.contourf(x, y, ahead, levels=levels, colors=shades)
+        hatching = ax.contourf(x, y, ahead, levels=levels[[0, -1]], colors="none", hatches=[hatch(k)])
+        hatching.set(edgecolor=(1.0, 1.0, 1.0, 0.55), linewidth=0.0)
+        # two neighbours are ahead of each other by opposite amounts, so that their borders fall on one line
+        if ahead.min() < levels[0]:
+            ax.contour(x, y, ahead, levels=levels[:1], colors=INK, linewidths=1.1)
+        keys.append(Patch(label=wrapped(output.name, 24), facecolor=shades[-1], edgecolor="white", hatch=hatch(k)))
+    equal = ~undefined & (ranked[..., -1] - ranked[..., -2] <= levels[0])
+    if equal.sum() > 2 * points:  # fewer are the line between two regions
+        keys.append(Patch(label="shared", facecolor="white", edgecolor=INK))
+    if undefined.any():
+        keys.append(Patch(label="undefined", facecolor=_UNDEFINED))
+    ax.legend(
+        handles=keys, loc="upper left", bbox_to_anchor=(1.01, 1.0), frameon=False, fontsize=9, borderaxespad=0.0,
+        title=f"greatest, darkest\nwhere {most:.3g} ahead", title_fontsize=9, alignment="left", handleheight=1.6,
+        labelspacing=0.8,
+    )  # fmt: skip
+    ax.set(xlim=(x[0], x[-1]), ylim=(y[0], y[-1]), xlabel=over[0], ylabel=over[1])
+    ax.set_title(wrapped(f"what decides{where}", 60), fontsize=10, loc="left")
+    return ax
+
+
+def _mixed(whole: tuple[float, float, float], share: float) -> str:
+    """Return some of a colour in white."""
+    from matplotlib.colors import to_hex
+
+    red, green, blue = (1.0 - share * (1.0 - part) for part in whole)
+    return to_hex((red, green, blue))
+
+
+def _field(
+    arbiter: Arbiter, over: tuple[str, str], at: Mapping[str, float] | None, points: int
+) -> tuple[Array, Array, Array, str]:
+    """Places along both axes, the weights over them (rows along the second), and the fixed inputs in words."""
+    if isinstance(over, str) or len(over) != 2:
+        raise DefinitionError(f"over is {over!r}, expected the names of two inputs")
+    fixed = fixed_inputs(arbiter, over, at)
+    inputs = arbiter.system.inputs
+    x, y = (np.linspace(*inputs[one_of(inputs, name, "input")].universe, points) for name in over)
+    across, along = np.meshgrid(x, y)
+    weights = weights_at(arbiter, fixed, {over[0]: across.ravel(), over[1]: along.ravel()})
+    return x, y, weights.reshape(points, points, -1), f"  (at {said(fixed)})" if fixed else ""
+
+
+def _relief(ax: Any, x: Array, y: Array, z: Array, output: str) -> None:
+    across, along = np.meshgrid(x, y)
+    every = max(1, len(x) // 30)
+    ax.plot_surface(across, along, z, rstride=every, cstride=every, cmap="cividis", edgecolor="white", linewidth=0.2)
+    ax.set_zlabel(output)
+    ax.locator_params(nbins=6)

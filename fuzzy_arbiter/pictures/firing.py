@@ -1,0 +1,173 @@
+"""What the rules do at one sample: each rule's strength and clipped term, the joined outline, its centroid."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from fuzzy_arbiter.arbiter import Arbiter, Sample
+from fuzzy_arbiter.definition import Output, Rule
+from fuzzy_arbiter.engines.firing import Array, Firing, degrees_of_many
+from fuzzy_arbiter.errors import UndefinedOutputError
+from fuzzy_arbiter.pictures.lines import corners
+from fuzzy_arbiter.pictures.style import FAINT, INK, colour, hatch, knots_of, new_axes, one_of, said, wrapped
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+MOST_ROWS = 10
+_LETTERS = 50  # of a line of a rule
+_HEIGHT = 0.72  # of a term of degree 1, in rows
+_TALL = 1.6  # how many times higher the outline at the foot is drawn
+
+
+def rules(arbiter: Arbiter, inputs: Sample, output: str | None = None, ax: Axes | None = None) -> Axes:
+    """Draw which rules fire for an output at a sample, and how its value comes about.
+
+    Each row is a rule: its condition, the term that it concludes, clipped (or scaled) at the rule's strength, and that
+    strength, in bold and with a dot where none is greater for the term. At the foot all rows are joined by their
+    maximum, with the centroid. Of many rules those that do not fire are left out, then the weakest.
+
+    Parameters
+    ----------
+    arbiter : Arbiter
+        What is drawn.
+    inputs : sequence of float, or mapping from input's name to float
+        The sample, as for a call.
+    output : str, optional
+        Name of the output; default: the first.
+    ax : Axes, optional
+        Default: those of a new figure, of the height that the rules need.
+
+    Returns
+    -------
+    Axes
+        On which it was drawn.
+
+    Raises
+    ------
+    DefinitionError
+        If there is no such output.
+    InputError
+        If an input is missing, unknown, not a number, or outside its universe.
+    """
+    system = arbiter.system
+    k = one_of(system.outputs, system.outputs[0].name if output is None else output, "output")
+    drawn = system.outputs[k]
+    values = arbiter._checked(inputs)
+    firing = Firing(system)
+    strengths = firing.strengths(values)
+    cuts = firing.cuts(strengths)[k]
+
+    concluding = [
+        (i, rule, strength, drawn.term_names.index(conclusion.term))
+        for i, (rule, strength) in enumerate(zip(system.rules, strengths, strict=True))
+        for conclusion in rule.conclusions
+        if conclusion.variable == drawn.name
+    ]
+    rows = concluding
+    if len(rows) > MOST_ROWS:
+        strongest = sorted((row for row in rows if row[2] > 0.0), key=lambda row: -row[2])[:MOST_ROWS]
+        rows = [row for row in rows if row in strongest]
+    labels = [_label(i, rule) for i, rule, _, _ in rows]
+    lines = sum(label.count("\n") for label in labels)
+    ax = new_axes(7.2, 1.3 + 0.58 * len(rows) + 0.1 * lines + 0.95) if ax is None else ax
+
+    low, high = drawn.universe
+    x = _places(drawn)
+    scaled = system.implication == "prod"
+    foot = len(rows) + _TALL - 0.6  # rows are counted downwards
+    for row, (_, _, strength, j) in enumerate(rows):
+        term = drawn.terms[j]
+        ax.plot([low, high], [row, row], color=FAINT, linewidth=0.7)
+        ends, degrees = corners(term, drawn.universe)
+        ax.plot(ends, row - _HEIGHT * np.array(degrees), color=FAINT, linewidth=1.0)
+        cut = _cut(degrees_of_many(term.shape, x), strength, scaled)
+        if strength > 0.0:
+            ax.fill_between(x, row, row - _HEIGHT * cut, facecolor=colour(j), alpha=0.45, linewidth=0)
+            ax.fill_between(
+                x, row, row - _HEIGHT * cut, facecolor="none", edgecolor=colour(j), hatch=hatch(j), linewidth=0
+            )
+            ax.plot(x, row - _HEIGHT * cut, color=colour(j), linewidth=1.6)
+        decides = strength > 0.0 and strength == cuts[j]
+        ax.annotate(
+            f"{strength:.3f} {term.name}" + (" •" if decides else ""),
+            (1.0, row), xycoords=("axes fraction", "data"), xytext=(8, 4), textcoords="offset points",
+            color=INK if strength > 0.0 else FAINT, fontweight="bold" if decides else "normal",
+            annotation_clip=False, fontsize=9.5,
+        )  # fmt: skip
+
+    joined = np.zeros_like(x)
+    for j, term in enumerate(drawn.terms):
+        joined = np.maximum(joined, _cut(degrees_of_many(term.shape, x), cuts[j], scaled))
+    tall = _TALL * _HEIGHT
+    ax.plot([low, high], [foot, foot], color=INK, linewidth=1.0)
+    ax.fill_between(x, foot, foot - tall * joined, facecolor="#d9d9d9", linewidth=0)
+    ax.plot(x, foot - tall * joined, color=INK, linewidth=1.8)
+    text = _centroid(ax, arbiter, values, k, (foot, tall), any(cuts))
+
+    hidden = len(concluding) - len(rows)
+    joined_label = "joined" + (f"\n({hidden} rules not drawn)" if hidden else "")
+    ax.set_yticks([*(row - 0.12 for row in range(len(rows))), foot - tall / 2.6], [*labels, joined_label])
+    ax.tick_params(axis="y", length=0, pad=8, labelsize=9)
+    ax.set(xlim=(low, high), ylim=(foot + 0.02, -1.0 + 0.15), xlabel=drawn.name)
+    ax.spines[["top", "right", "left"]].set_visible(False)
+    names = (v.name for v in system.inputs)
+    heading = f"{said(dict(zip(names, values, strict=True)))}  →  {text}"
+    ax.set_title(wrapped(heading, 64), fontsize=10, loc="right", pad=8)
+    return ax
+
+
+def _label(i: int, rule: Rule) -> str:
+    """Return a rule's condition in a few lines; the middle of a long one is left out."""
+    weight = "" if rule.weight == 1.0 else f" with {rule.weight:g}"
+    lines = wrapped(f"R{i + 1}: if {rule.condition}{weight}", _LETTERS).split("\n")
+    return "\n".join(lines if len(lines) <= 4 else [*lines[:2], f"{lines[2]} …", lines[-1]])
+
+
+def _cut(degrees: Array, strength: float, scaled: bool) -> Array:
+    return degrees * strength if scaled else np.minimum(degrees, strength)
+
+
+def _places(output: Output) -> Array:
+    """Places close enough for a line, with both sides of every break."""
+    low, high = output.universe
+    knots = np.array(knots_of(output))
+    beside = (high - low) * 1e-9
+    x: Array = np.unique(np.concatenate([np.linspace(low, high, 801), knots, knots - beside, knots + beside]))
+    return x[(low <= x) & (x <= high)]
+
+
+def _centroid(ax: Axes, arbiter: Arbiter, values: Sample, k: int, place: tuple[float, float], fires: bool) -> str:
+    """Draw the centroid at the foot, and return the output's value in words."""
+    output = arbiter.system.outputs[k]
+    foot, tall = place
+    if fires:
+        centre, what = _alone(arbiter, output)(values)[0], "centroid"
+    elif output.default is not None:
+        centre, what = output.default, "default"
+    else:
+        return f"{output.name}: no rule fires"
+    ax.plot([centre, centre], [foot, foot - tall], color=INK, linewidth=1.4, linestyle=(0, (4, 2)))
+    ax.plot(centre, foot, "^", color=INK, markersize=8, clip_on=False, zorder=5)
+    side = -1 if centre > sum(output.universe) / 2.0 else 1  # where there is more room
+    ax.annotate(
+        f"{what} {centre:.4g}", (centre, foot - tall), xytext=(6 * side, -3), textcoords="offset points",
+        ha="right" if side < 0 else "left", va="top", fontsize=9.5, color=INK,
+        bbox={"facecolor": "white", "edgecolor": "none", "pad": 1.0, "alpha": 0.85},
+    )  # fmt: skip
+    try:
+        return f"{output.name} = {arbiter(values)[k]:.4g}"
+    except UndefinedOutputError:
+        return f"{output.name}: another output is undefined"
+
+
+def _alone(arbiter: Arbiter, output: Output) -> Arbiter:
+    """Return an arbiter of this output's centroid, whatever the others do."""
+    system = arbiter.system
+    parts = [(rule, tuple(c for c in rule.conclusions if c.variable == output.name)) for rule in system.rules]
+    rules = tuple(replace(rule, conclusions=conclusions) for rule, conclusions in parts if conclusions)
+    alone = replace(system, outputs=(output,), rules=rules, normalisation="none")
+    return Arbiter(system=alone, engine=arbiter.engine)

@@ -1,0 +1,211 @@
+"""Pictures over one axis: the terms of a variable, and the weights along one input."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from fuzzy_arbiter.arbiter import Arbiter
+from fuzzy_arbiter.definition import Normalisation, Term
+from fuzzy_arbiter.errors import DefinitionError, InputError
+from fuzzy_arbiter.pictures.style import (
+    FAINT,
+    INK,
+    fixed_inputs,
+    knots_of,
+    legend_above,
+    line_style,
+    new_axes,
+    one_of,
+    said,
+    tidy,
+    weights_at,
+)
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+_MEANING: dict[Normalisation, str] = {
+    "none": "the centroids themselves",
+    "range": "each from its least to its greatest",
+    "sum": "then divided by their sum",
+    "max": "then divided by the greatest",
+}
+
+
+def terms(arbiter: Arbiter, variable: str, at: float | None = None, ax: Axes | None = None) -> Axes:
+    """Draw the terms of a variable over its universe.
+
+    Parameters
+    ----------
+    arbiter : Arbiter
+        Whose variable.
+    variable : str
+        Name of an input or an output.
+    at : float, optional
+        A place, at which the terms' degrees are marked.
+    ax : Axes, optional
+        Default: those of a new figure.
+
+    Returns
+    -------
+    Axes
+        On which it was drawn.
+
+    Raises
+    ------
+    DefinitionError
+        If there is no such variable.
+    InputError
+        If the place is outside the universe.
+    """
+    variables = (*arbiter.system.inputs, *arbiter.system.outputs)
+    drawn = variables[one_of(variables, variable, "variable")]
+    low, high = drawn.universe
+    if at is not None and not low <= at <= high:
+        raise InputError(f"{variable}: place is {at!r}, expected a number in [{low:g}, {high:g}]")
+    ax = new_axes(6.0, 2.7) if ax is None else ax
+    for i, term in enumerate(drawn.terms):
+        x, y = corners(term, (low, high))
+        ax.plot(x, y, label=term.name, clip_on=False, **line_style(i))
+        if at is not None:
+            ax.plot(at, term.shape(at), "o", color=line_style(i)["color"], clip_on=False, zorder=4)
+    if at is not None:
+        ax.axvline(at, color=FAINT, linewidth=1.0, zorder=1)
+    ax.set(xlim=(low, high), ylim=(0.0, 1.0), xlabel=variable, ylabel="degree")
+    tidy(ax)
+    legend_above(ax, drawn.term_names)
+    return ax
+
+
+def corners(term: Term, universe: tuple[float, float]) -> tuple[list[float], list[float]]:
+    """Return the corners of a term's line, both ends of a jump among them.
+
+    Parameters
+    ----------
+    term : Term
+        Of a variable.
+    universe : (float, float)
+        Of that variable.
+
+    Returns
+    -------
+    places, degrees : list of float
+        From one end of the universe to the other.
+    """
+    low, high = universe
+    inside = [(x, y) for x, y in term.shape.points if low < x < high]
+    x, y = zip((low, term.shape(low)), *inside, (high, term.shape(high)), strict=True)
+    return list(x), list(y)
+
+
+def profile(
+    arbiter: Arbiter,
+    over: str,
+    at: Mapping[str, float] | None = None,
+    ax: Axes | None = None,
+) -> Axes:
+    """Draw all weights along one input.
+
+    Parameters
+    ----------
+    arbiter : Arbiter
+        What is drawn.
+    over : str
+        Name of the input along which.
+    at : mapping from str to float, optional
+        Values of the others; default: the middle of each universe. The picture says them.
+    ax : Axes, optional
+        Default: those of a new figure.
+
+    Returns
+    -------
+    Axes
+        On which it was drawn; lines have gaps where an output is undefined.
+
+    Raises
+    ------
+    DefinitionError
+        If there is no such input.
+    InputError
+        If a value is not a number in its universe.
+    """
+    system = arbiter.system
+    fixed = fixed_inputs(arbiter, (over,), at)
+    variable = system.inputs[one_of(system.inputs, over, "input")]
+    low, high = variable.universe
+    x = np.union1d(np.linspace(low, high, 301), knots_of(variable))
+    weights = weights_at(arbiter, fixed, {over: x})
+    ax = new_axes(6.0, 3.2) if ax is None else ax
+    for k, output in enumerate(system.outputs):
+        ax.plot(x, weights[:, k], label=output.name, clip_on=False, **line_style(k))
+    ax.set(xlim=(low, high), xlabel=over, ylabel="centroid" if system.normalisation == "none" else "weight")
+    if system.normalisation != "none":
+        ax.set_ylim(0.0, 1.0)
+    tidy(ax)
+    legend_above(ax, [v.name for v in system.outputs], f"at {said(fixed)}" if fixed else "")
+    return ax
+
+
+def normalisations(
+    arbiter: Arbiter,
+    over: str,
+    at: Mapping[str, float] | None = None,
+    axes: Mapping[Normalisation, Axes] | None = None,
+) -> dict[Normalisation, Axes]:
+    """Draw all weights along one input, once under each normalisation.
+
+    Parameters
+    ----------
+    arbiter : Arbiter
+        What is drawn; its own normalisation does not matter.
+    over : str
+        Name of the input along which.
+    at : mapping from str to float, optional
+        Values of the others; default: the middle of each universe.
+    axes : mapping from str to Axes, optional
+        For each normalisation that is to be drawn; default: four of a new figure.
+
+    Returns
+    -------
+    dict of Axes by str
+        On which it was drawn, by normalisation.
+
+    Raises
+    ------
+    DefinitionError
+        If there is no such input, or no such normalisation.
+    InputError
+        If a value is not a number in its universe.
+    """
+    fixed = fixed_inputs(arbiter, (over,), at)
+    new = axes is None
+    if axes is None:
+        from matplotlib.figure import Figure
+
+        figure = Figure(figsize=(8.2, 5.4), layout="constrained")
+        axes = dict(zip(_MEANING, figure.subplots(2, 2, sharex=True).flat, strict=True))
+    for name, ax in axes.items():
+        if name not in _MEANING:
+            raise DefinitionError(f"no normalisation {name!r}, expected one of {', '.join(_MEANING)}")
+        system = replace(arbiter.system, normalisation=name)
+        profile(Arbiter(system=system, engine=arbiter.engine), over, fixed, ax)
+        legend = ax.get_legend()
+        assert legend is not None
+        legend.remove()
+        ax.set_title(f"{name}: {_MEANING[name]}", fontsize=10, loc="left", color=INK)
+        if name == "none" and all(v.universe == (0.0, 1.0) for v in system.outputs):
+            ax.set_ylim(0.0, 1.0)  # as the others
+        if new:
+            ax.label_outer()
+    first = next(iter(axes.values()))
+    handles, labels = first.get_legend_handles_labels()
+    where = f"at {said(fixed)}" if fixed else ""
+    first.figure.legend(
+        handles, labels, loc="outside upper left", ncols=min(len(labels), 6), frameon=False, title=where or None,
+        handlelength=3.2, alignment="left",
+    )  # fmt: skip
+    return dict(axes)

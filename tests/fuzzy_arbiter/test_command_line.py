@@ -1,0 +1,331 @@
+"""The command line: each verb, its exit status, and that bad input costs one line and no file."""
+
+import csv
+import io
+import json
+import os
+import subprocess
+import sys
+import xml.etree.ElementTree as ET
+from dataclasses import replace
+
+import pytest
+
+from fuzzy_arbiter import Arbiter
+from fuzzy_arbiter.__main__ import main
+from fuzzy_arbiter.hierarchy import WEIGHT
+
+GAP = """
+if wind is calm then sail is full
+if wind is strong then sail is none
+"""
+
+
+@pytest.fixture
+def run(capsys, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+
+    def call(*words, stdin=""):
+        monkeypatch.setattr(sys, "stdin", io.StringIO(stdin))
+        try:
+            status = main([str(word) for word in words])
+        except SystemExit as stop:
+            status = stop.code
+        out, err = capsys.readouterr()
+        return status, out, err
+
+    return call
+
+
+@pytest.fixture
+def refused(run, tmp_path):
+    """Run what must be refused: status 2, one line, nothing printed, no file left."""
+
+    def call(*words, stdin=""):
+        before = {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
+        status, out, err = run(*words, stdin=stdin)
+        assert (status, out) == (2, "")
+        assert err.startswith("fuzzy_arbiter: ") and err.count("\n") == 1
+        assert {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()} == before
+        return err.removeprefix("fuzzy_arbiter: ").strip()
+
+    return call
+
+
+@pytest.fixture
+def gap(tmp_path):
+    """A file whose rules leave winds between calm and strong without one."""
+    from fuzzy_arbiter import Output, System, Term, Variable, falling, rising
+
+    wind = Variable("wind", (0, 20), (Term("calm", falling(2, 6)), Term("strong", rising(8, 12))))
+    sail = Output("sail", (0, 1), (Term("none", falling(0, 1)), Term("full", rising(0, 1))))
+    path = tmp_path / "gap.json"
+    Arbiter(system=System((wind,), (sail,), tuple(GAP.split("\n")[1:3]), name="gap")).save(path)
+    return path
+
+
+def test_show_says_all_of_a_definition(run):
+    status, out, _ = run("show", "section-vi")
+    assert status == 0
+    for part in (
+        "obstacle in [0.0, 1.0]",
+        "not_exist  (0.0, 1.0) (1.0, 0.0)",
+        "alpha_3 in [0.0, 1.0], no default",
+        "R6: if obstacle is exist or shape is complex then alpha_3 is low",
+        "conjunction    min",
+        "normalisation  range",
+        "engine         closed: ",
+    ):
+        assert part in out
+    assert "engine         exact: it was asked for" in run("show", "section-vi", "--engine", "exact")[1]
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["0.75", "1", "0"],
+        ["depth=0", "obstacle=0.75", "shape=1"],
+        ["--engine", "closed", "0.75", "1.0", "0"],
+        ["0.75", "--engine", "closed", "1", "0"],
+    ],
+)
+def test_eval_gives_the_weights_in_all_digits(run, words):
+    assert run("eval", "section-vi", *words) == (0, "alpha_1 = 0.84375\nalpha_2 = 0.15625\nalpha_3 = 0.0\n", "")
+
+
+def test_eval_gives_json(run, tmp_path):
+    status, out, _ = run("eval", "section-vi", "--json", "0.1", "0.2", "0.3")
+    assert status == 0
+    assert tuple(json.loads(out).values()) == Arbiter()([0.1, 0.2, 0.3])
+    assert run("eval", "section-vi", "1", "0", "0", "--json", "--out", "w.json")[:2] == (0, "")
+    assert json.loads((tmp_path / "w.json").read_text()) == {"alpha_1": 1.0, "alpha_2": 0.0, "alpha_3": 0.0}
+
+
+TABLE = 'time,"depth", obstacle,shape\n0,0.5,0.25,1\n\n1,1,0,1e-1\n'
+
+
+def test_eval_of_a_table_takes_columns_by_name(run, tmp_path):
+    (tmp_path / "day.csv").write_text("\ufeff" + TABLE)
+    weights = Arbiter().batch([[0.25, 1.0, 0.5], [0.0, 0.1, 1.0]]).tolist()
+    for words, stdin in ((["day.csv"], ""), (["-"], TABLE)):
+        status, out, _ = run("eval", "section-vi", "--csv", *words, stdin=stdin)
+        header, *rows = csv.reader(io.StringIO(out))
+        assert status == 0 and header == ["alpha_1", "alpha_2", "alpha_3"]
+        assert [[float(cell) for cell in row] for row in rows] == weights
+    assert run("eval", "section-vi", "--csv", "day.csv", "--out", "out.csv") == (0, "", "")
+    assert (tmp_path / "out.csv").read_text() == out
+    listed = json.loads(run("eval", "section-vi", "--csv", "day.csv", "--json")[1])
+    assert [list(row.values()) for row in listed] == weights
+    assert run("eval", "section-vi", "--csv", "-", stdin="shape,depth,obstacle\n")[1] == "alpha_1,alpha_2,alpha_3\n"
+
+
+@pytest.mark.parametrize(
+    ("table", "fault"),
+    [
+        ("", "column 'obstacle' is missing in the first line, expected obstacle, shape, depth"),
+        ("obstacle,shape\n1,1\n", "column 'depth' is missing"),
+        ("obstacle,shape,shape,depth\n", "column 'shape' stands twice"),
+        ("obstacle,shape,depth\n0,0,0\n\n0,0,x\n", "line 4: depth: 'x' is not a number"),
+        ("obstacle,shape,depth\n0,0,0\n0,0,2\n", "line 3: depth: input is 2.0, expected a number in [0, 1]"),
+        ("obstacle,shape,depth\n0,0,nan\n", "line 2: depth: input is nan"),
+        ("obstacle,shape,depth\n0,0\n", "line 2: 2 cells, expected 3"),
+        ("obstacle,shape,depth\n0,0,0,0\n", "line 2: 4 cells, expected 3"),
+        ('obstacle,shape,depth\n"0' + "1" * 200_000, "line 2: field larger than field limit"),
+    ],
+)
+def test_a_bad_table_leaves_no_file(refused, table, fault):
+    assert f"standard input: {fault}" in refused("eval", "section-vi", "--csv", "-", "--out", "w.csv", stdin=table)
+
+
+def test_tables_that_cannot_be_read(refused, tmp_path):
+    (tmp_path / "bytes.csv").write_bytes(b"\xff\xfe\x00")
+    assert refused("eval", "section-vi", "--csv", "bytes.csv") == "bytes.csv: not UTF-8 text"
+    assert refused("eval", "section-vi", "--csv", "none.csv") == "none.csv: No such file or directory"
+    (tmp_path / "ok.csv").write_text(TABLE)
+    assert "no/where.csv" in refused("eval", "section-vi", "--csv", "ok.csv", "--out", "no/where.csv")
+    assert "is a folder" in refused("eval", "section-vi", "--csv", "ok.csv", "--out", tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("words", "fault"),
+    [
+        ([], "no values came, expected obstacle, shape, depth"),
+        (["1", "0"], "2 inputs came, expected 3: obstacle, shape, depth"),
+        (["obstacle=1", "0", "0"], "some values came with a name and some without"),
+        (["obstacle=1", "obstacle=1", "shape=0"], "obstacle: came twice"),
+        (["obstacle=1", "speed=1", "shape=0", "depth=0"], "speed: unknown input"),
+        (["obstacle=1", "shape=0"], "depth: input is missing"),
+        (["obstacle=high", "shape=0", "depth=0"], "obstacle=high: 'high' is not a number"),
+        (["0", "0", "-1e-3"], "depth: input is -0.001, expected a number in [0, 1]"),
+        (["0", "0", "0", "--frob"], "unknown argument '--frob'"),
+        (["0", "0", "0", "--csv", "x.csv"], "'0' came with --csv"),
+        (["0", "0", "0", "--engine", "magic"], "argument --engine: invalid choice: 'magic'"),
+    ],
+)
+def test_bad_values_are_refused_in_one_line(refused, words, fault):
+    assert fault in refused("eval", "section-vi", *words)
+
+
+def test_bad_commands_are_refused_in_one_line(refused):
+    assert "the following arguments are required: verb" in refused()
+    assert "invalid choice: 'frob'" in refused("frob", "section-vi")
+    assert "show: the following arguments are required: FILE" in refused("show")
+    assert "unknown argument '1'" in refused("show", "section-vi", "1")
+    assert "none.json" in refused("show", "none.json")
+
+
+def test_a_definition_of_no_format_is_refused_in_one_line(refused, tmp_path):
+    (tmp_path / "bad.json").write_text('{"a": \n\n')
+    assert "bad.json" in refused("verify", "bad.json")
+    (tmp_path / "bad.fcl").write_text("FUNCTION_BLOCK\n\n;")
+    assert "bad.fcl" in refused("show", "bad.fcl")
+
+
+def test_an_undefined_output_is_said(refused, gap):
+    assert "no rule fires" in refused("eval", gap, "7")
+    assert "line 3: output 'sail': no rule fires" in refused("eval", gap, "--csv", "-", stdin="wind\n1\n7\n")
+
+
+def test_explain_says_what_fired(run):
+    status, out, _ = run("explain", "section-vi", "0.75", "1", "0")
+    assert status == 0 and "R5" in out
+    status, out, _ = run("explain", "section-vi", "obstacle=0.75", "shape=1", "depth=0", "--json")
+    assert status == 0 and json.loads(out)
+
+
+def test_verify_tells_by_its_status(run, refused, gap):
+    status, out, _ = run("verify", "section-vi")
+    assert status == 0 and out
+    status, out, _ = run("verify", gap)
+    assert status == 1 and out
+    status, out, _ = run("verify", gap, "--json")
+    assert status == 1 and json.loads(out)
+    assert "none.toml" in refused("verify", "none.toml")
+
+
+@pytest.mark.parametrize("suffix", ["json", "toml", "fcl", "fis", "fll"])
+def test_convert_keeps_the_weights(run, suffix, tmp_path):
+    native = ["--native"] if suffix in ("fcl", "fis", "fll") else []
+    assert run("convert", "section-vi", f"a.{suffix}", *native) == (0, f"a.{suffix}\n", "")
+    status, out, _ = run("eval", f"a.{suffix}", "--json", "0.3", "0.8", "0.1")
+    assert status == 0
+    assert list(json.loads(out).values()) == pytest.approx(Arbiter()([0.3, 0.8, 0.1]), abs=1e-12)
+
+
+@pytest.mark.parametrize("suffix", ["c", "py"])
+def test_convert_writes_code(run, suffix, tmp_path):
+    assert run("convert", "section-vi", f"a.{suffix}")[0] == 0
+    text = (tmp_path / f"a.{suffix}").read_text()
+    if suffix == "py":
+        compile(text, "a.py", "exec")
+    assert "alpha_1" in text
+
+
+def test_convert_refuses_whole(refused, tmp_path):
+    assert "suffix is '.xml', expected .json, .toml, .fcl, .fis, .fll, .c, .py" in refused(
+        "convert", "section-vi", "a.xml"
+    )
+    (tmp_path / "old.json").write_text("old")
+    assert "none.json" in refused("convert", "none.json", "old.json")
+    Arbiter(weight=replace(WEIGHT, default=0.5)).save(tmp_path / "default.toml")
+    (tmp_path / "old.fis").write_text("old")
+    assert "fis cannot say the default 0.5" in refused("convert", "default.toml", "old.fis")
+    Arbiter(normalisation="sum").save(tmp_path / "sum.toml")
+    assert "'sum'" in refused("convert", "sum.toml", "old.fis", "--native")
+
+
+PLOTS = [
+    (["terms"], 6),
+    (["terms", "--input", "obstacle", "--output", "alpha_2", "--at", "obstacle=0.3"], 2),
+    (["rules", "--at", "0.3", "0.8", "0.1", "--output", "alpha_2"], 1),
+    (["profile", "--input", "shape", "--at", "obstacle=0.2", "depth=0.1"], 1),
+    (["surface", "--output", "alpha_2", "--at", "depth=0.5"], 2),
+    (["surface", "--relief"], 1),
+    (["map", "--input", "shape", "--input", "depth", "--at", "obstacle=0.1"], 1),
+]
+
+
+@pytest.mark.parametrize(("words", "panels"), PLOTS, ids=lambda value: value[0] if isinstance(value, list) else "")
+def test_plot_draws_every_kind(run, tmp_path, words, panels):
+    assert run("plot", "section-vi", *words, "--out", "a.svg") == (0, "a.svg\n", "")
+    first = (tmp_path / "a.svg").read_bytes()
+    axes = [g for g in ET.fromstring(first).iter() if g.get("id", "").startswith("axes_")]
+    assert len(axes) == panels
+    run("plot", "section-vi", *words, "--out", "a.svg")
+    assert (tmp_path / "a.svg").read_bytes() == first
+
+
+@pytest.mark.parametrize(("suffix", "magic"), [("png", b"\x89PNG"), ("PDF", b"%PDF")])
+def test_plot_writes_what_the_suffix_says(run, tmp_path, suffix, magic):
+    assert run("plot", "section-vi", "terms", "--input", "depth", "--out", f"a.{suffix}")[0] == 0
+    assert (tmp_path / f"a.{suffix}").read_bytes().startswith(magic)
+
+
+@pytest.mark.parametrize(
+    ("words", "fault"),
+    [
+        (["terms", "--out", "a.gif"], "a.gif: suffix is '.gif', expected .png, .svg, .pdf"),
+        (
+            ["terms", "--input", "speed", "--out", "a.png"],
+            "no variable 'speed', expected one of obstacle, shape, depth",
+        ),
+        (["rules", "--out", "a.png"], "no values came, expected obstacle, shape, depth"),
+        (["map", "--input", "shape", "--out", "a.png"], "map: 1 of --input, expected 2 of obstacle, shape, depth"),
+        (["map", "--at", "0.5", "--out", "a.png"], "--at 0.5: expected name=value"),
+        (["map", "--at", "obstacle=0.5", "--out", "a.png"], "the picture goes over it"),
+        (["surface", "--output", "beta", "--out", "a.png"], "no output 'beta'"),
+        (["terms"], "plot: the following arguments are required: --out"),
+    ],
+)
+def test_plot_refuses_in_one_line(refused, words, fault):
+    assert fault in refused("plot", "section-vi", *words)
+
+
+def test_bench_times_every_engine(run, monkeypatch):
+    from fuzzy_arbiter.command_line import bench
+
+    monkeypatch.setattr(bench, "_SECONDS", 1e-3)
+    monkeypatch.setattr(bench, "_MOST_ROWS", 50)
+    status, out, _ = run("bench", "section-vi")
+    heading, *rows = out.splitlines()
+    assert status == 0 and heading.split()[0] == "engine"
+    assert [row.split()[0] for row in rows] == ["closed", "exact", "grid", "skfuzzy"]
+    for row in rows:
+        _, call, _, batch, _, n = row.split()
+        assert float(call) > 0.0 and float(batch) >= 0.0 and 1 <= int(n) <= 50
+
+
+def test_bench_says_which_engine_cannot(run, monkeypatch, gap):
+    from fuzzy_arbiter.command_line import bench
+
+    monkeypatch.setattr(bench, "_SECONDS", 1e-3)
+    monkeypatch.setattr(bench, "_MOST_ROWS", 50)
+    status, out, _ = run("bench", gap)
+    assert status == 0 and "closed" in out.splitlines()[1] and len(out.splitlines()[1].split()) > 6
+
+
+def test_a_reader_that_goes_is_no_error(tmp_path):
+    command = [sys.executable, "-m", "fuzzy_arbiter", "show", "section-vi"]
+    reading, writing = os.pipe()
+    os.close(reading)
+    done = subprocess.run(command, stdout=writing, stderr=subprocess.PIPE, check=False)
+    os.close(writing)
+    assert (done.returncode, done.stderr) == (141, b"")
+
+
+@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="needs a device that is always full")
+def test_a_full_disk_costs_one_line():
+    command = [sys.executable, "-m", "fuzzy_arbiter", "show", "section-vi"]
+    with open("/dev/full", "wb") as full:
+        done = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True, check=False)
+    assert (done.returncode, done.stderr) == (2, "fuzzy_arbiter: output: No space left on device\n")
+
+
+def test_help_has_examples_that_are_understood(run):
+    status, out, _ = run("--help")
+    examples = [line.split()[3:] for line in out.splitlines() if line.strip().startswith("python -m")]
+    assert status == 0 and len(examples) == 7
+    from fuzzy_arbiter.__main__ import _parsed
+
+    for words in examples:
+        _parsed(words[: words.index("||")] if "||" in words else words)

@@ -1,0 +1,232 @@
+"""The example of a building's ventilation and those of the manual, against values worked out by other means."""
+
+import ast
+import re
+import runpy
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from fuzzy_arbiter import Arbiter, Criterion, Is, Rule, Shape, Term, UnsupportedError, prioritised
+from fuzzy_arbiter.__main__ import main
+from fuzzy_arbiter.hierarchy import FORMS
+from fuzzy_arbiter.propositions import And, Not, Or
+
+ROOT = Path(__file__).parents[2]
+EXAMPLE = ROOT / "examples" / "ventilation.py"
+MANUAL = (ROOT / "docs" / "arbiter.md").read_text()
+
+
+@pytest.fixture(scope="module")
+def ran(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("ventilation")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(folder)
+        return runpy.run_path(str(EXAMPLE)) | {"folder": folder}
+
+
+def smoothstep(h):
+    return 3.0 * h**2 - 2.0 * h**3
+
+
+def test_the_afternoon_belongs_to_the_room(ran):
+    # smoke below 0.5 %/m asks for nothing; air asks to 0.25, the room to 0.75, of which the air leaves all
+    assert ran["weights"] == pytest.approx((0.0, smoothstep(0.25), smoothstep(0.75)), abs=1e-15)
+
+
+def test_the_explanation_tells_of_the_rule_that_gives_the_room_the_floor(ran):
+    assert "temperature is hot" in str(ran["explanation"])
+
+
+def test_the_rules_are_proved(ran):
+    assert ran["verification"].ok
+
+
+def test_the_day_is_that_of_the_priorities(ran):
+    """By the definition of the weights, on numpy alone."""
+    low, high = np.array([[0.5, 800.0, 24.0], [3.0, 1400.0, 28.0]])
+    m = np.clip((ran["day"] - low) / (high - low), 0.0, 1.0)
+    free = np.cumprod(np.ones_like(m), axis=1)
+    free[:, 1:] = np.minimum.accumulate(1.0 - m, axis=1)[:, :-1]
+    np.testing.assert_allclose(ran["day_weights"], smoothstep(np.minimum(free, m)), rtol=0.0, atol=1e-15)
+
+
+def test_the_toast_takes_the_fan_and_gives_it_back(ran):
+    leader, minutes = ran["leader"], ran["minutes"]
+    smoke = minutes[leader == 0]
+    assert smoke.min() == 850 and 855 < smoke.max() < 870
+    assert (leader[: 8 * 60] == -1).all()
+    assert (leader[9 * 60 : 12 * 60] == 1).all()
+
+
+def test_the_picture_and_the_definition_are_there(ran):
+    assert (ran["folder"] / "ventilation.png").read_bytes().startswith(b"\x89PNG")
+    assert "present" in (ran["folder"] / "ventilation.toml").read_text()
+
+
+def test_the_fan_s_speed_is_the_centroid_of_its_rules(ran):
+    """By midpoints of two million strips."""
+    n = 2_000_000
+    y = (np.arange(n) + 0.5) * (100.0 / n)
+    stale, hot = (1250.0 - 800.0) / 600.0, 0.5  # no smoke; 15 degrees outdoors are neither warm nor cold
+    half = np.clip(np.minimum(y - 30.0, 70.0 - y) / 20.0, 0.0, stale)
+    slow = np.clip(np.minimum(y, 40.0 - y) / 20.0, 0.0, min(1.0 - stale, 1.0 - hot))
+    full = np.clip((y - 60.0) / 30.0, 0.0, 0.6 * hot)
+    joined = np.maximum(half, np.maximum(slow, full))
+    assert ran["fan_speed"] == pytest.approx((joined * y).sum() / joined.sum(), abs=1e-6)
+
+
+def test_where_no_rule_fires_the_fan_runs_slowly(ran):
+    hot_and_warm = {"smoke": 0.0, "co2": 500.0, "temperature": 30.0, "outdoors": 35.0}
+    assert ran["speed"](hot_and_warm) == (20.0,)
+
+
+# ---- the manual ----
+
+
+def test_what_the_manual_s_code_says_in_comments_is_what_it_gives(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    names, compared = {}, 0
+    for block in re.findall(r"```python\n(.*?)```", MANUAL, re.S):
+        for statement in ast.parse(block).body:
+            source = "\n".join(block.splitlines()[statement.lineno - 1 : statement.end_lineno])
+            if not isinstance(statement, ast.Expr):
+                exec(source, names)
+                continue
+            found = eval(source, names)
+            try:
+                expected = ast.literal_eval(source.partition("  # ")[2])
+            except (SyntaxError, ValueError):
+                continue
+            assert found == (pytest.approx(expected, abs=1e-12) if _numbers(expected) else expected), source
+            compared += 1
+    assert compared >= 15
+    assert (tmp_path / "decisions.png").stat().st_size > 1000
+    assert "\n".join(f"    {line}".rstrip() for line in str(names["explanation"]).splitlines()) in MANUAL
+
+
+def _numbers(value):
+    parts = value if isinstance(value, tuple | list) else [value]
+    return all(isinstance(part, float) for part in parts)
+
+
+def test_the_manual_s_commands_run(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "day.csv").write_text("obstacle,shape,depth\n0,0.5,1\n")
+    commands = re.search(r"## Command line\n+```\n(.*?)```", MANUAL, re.S).group(1)
+    for line in commands.splitlines():
+        _, _, module, *words = line.split("#")[0].split()
+        assert module == "fuzzy_arbiter"
+        if words[0] != "bench":
+            assert main(words) == 0, line
+    assert {path.name for path in tmp_path.iterdir()} >= {"weights.csv", "arbiter.fis", "arbiter.c", "map.svg"}
+
+
+def test_the_manual_s_pictures_are_those_that_its_script_draws(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    runpy.run_path(str(ROOT / "docs" / "images" / "arbiter.py"), run_name="__main__")
+    drawn = {path.name for path in tmp_path.iterdir()}
+    assert drawn == {path.name for path in (ROOT / "docs" / "images").glob("arbiter-*.png")}
+    assert drawn == set(re.findall(r"\(images/(.*?)\)", MANUAL))
+    assert all((ROOT / "docs" / "images" / name).stat().st_size < 100_000 for name in drawn)
+
+
+def table(heading):
+    """Rows of the first table below a heading, as lists of cells."""
+    part = MANUAL[MANUAL.index(f"\n## {heading}\n") :]
+    rows = re.search(r"((?:\|.*\n)+)", part).group(1).splitlines()
+    return [[cell.strip().strip("`") for cell in row.strip("|").split("|")] for row in rows if "---" not in row]
+
+
+def test_the_forms_have_as_many_rules_as_the_manual_says():
+    for form, _, sizes, _ in table("Four forms of the same rules")[1:]:
+        for n, size in zip((3, 10), sizes.split(","), strict=True):
+            criteria = [Criterion(f"c{i}") for i in range(n)]
+            assert len(prioritised(criteria, form=form).rules) == int(size)
+
+
+@pytest.mark.parametrize("n", [1, 2, 3, 4])
+def test_cuts_of_the_forms_are_those_of_the_manual(n):
+    """Also between crisp inputs; the complete table's are other there, for more than one criterion."""
+    from fuzzy_arbiter.engines.firing import Firing
+
+    m = np.random.default_rng(n).random((500, n))
+    m[:100] = m[:100].round()
+    free = np.column_stack([(1.0 - m[:, :k]).min(axis=1, initial=1.0) for k in range(n)])
+    h = np.minimum(free, m)
+    decided = np.column_stack([np.maximum(m, 1.0 - m)[:, k + 1 :].min(axis=1, initial=1.0) for k in range(n)])
+    cuts = {}
+    for form in FORMS:
+        firing = Firing(prioritised([Criterion(f"c{i}") for i in range(n)], form=form))
+        low, high = np.array(firing.cuts_of_many(firing.strengths_of_many(m))).transpose(1, 2, 0)
+        if form != "complete":
+            np.testing.assert_array_equal(high, h)
+            np.testing.assert_allclose(low, 1.0 - h, rtol=0.0, atol=1e-16)
+        else:
+            np.testing.assert_array_equal(high, np.minimum(h, decided))
+            np.testing.assert_array_equal(high[:100], h[:100])
+            assert n == 1 or (high < h).any()
+        cuts[form] = high
+    assert n == 1 or not np.array_equal(cuts["complete"], cuts["minimal"])
+
+
+def test_the_complete_table_differs_by_a_sixth_at_the_most():
+    criteria = (Criterion("a"), Criterion("b"))
+    grid = np.linspace(0.0, 1.0, 41)
+    inputs = np.column_stack([axis.ravel() for axis in np.meshgrid(grid, grid)])
+    gap = abs(Arbiter(criteria, form="complete").batch(inputs) - Arbiter(criteria).batch(inputs))
+    assert gap.max() == pytest.approx(1.0 / 6.0, abs=1e-12)
+    assert inputs[gap.max(axis=1).argmax()].tolist() == [1.0, 0.5]
+
+
+def test_scikit_fuzzy_is_off_by_no_more_than_the_manual_says():
+    inputs = np.random.default_rng(0).random((5000, 3))
+    inputs[0] = 1e-4, 0.0, 0.0  # the bound is come near to where h is next to 0
+    for points in (3, 11, 101):
+        step = 1.0 / (points - 1)
+        for normalisation, bound in (("none", step**2 / 6.0), ("range", step**2 / 2.0)):
+            gap = [
+                Arbiter(points=points, normalisation=normalisation, engine=engine).batch(inputs)
+                for engine in ("grid", "exact")
+            ]
+            assert 0.3 * bound < abs(gap[0] - gap[1]).max() <= bound + 1e-15
+
+
+def changed(what):
+    """The rules of section VI with one thing that formats may not be able to say."""
+    system = prioritised(normalisation="none")
+    a, b, c = (v.terms[1].name for v in system.inputs)
+    obstacle, shape, depth = Is("obstacle", a), Is("shape", b), Is("depth", c)
+    low = (Is("alpha_1", "low"),)
+    first = system.inputs[0]
+    if what == "weights of rules":
+        return replace(system, rules=(*system.rules, Rule(obstacle, low, 0.5)))
+    if what == "a default":
+        return replace(system, outputs=tuple(replace(v, default=0.5) for v in system.outputs))
+    if what == "*and* with *or* in one rule":
+        return replace(system, rules=(*system.rules, Rule(And((obstacle, Or((shape, depth)))), low)))
+    if what == "*not* of a parenthesis":
+        return replace(system, rules=(*system.rules, Rule(Not(Or((obstacle, shape))), low)))
+    if what == "terms of any points":
+        terms = (*first.terms, Term("odd", Shape(((0.0, 0.2), (0.3, 0.9), (0.6, 0.1)))))
+        return replace(system, inputs=(replace(first, terms=terms), *system.inputs[1:]))
+    if what == "prod with max":
+        return replace(system, conjunction="prod")
+    assert what == "names with spaces"
+    return prioritised([Criterion("a wall", on="near by", off="far off")], normalisation="none")
+
+
+@pytest.mark.parametrize("row", table("Formats")[2:-1], ids=lambda row: row[0])
+def test_formats_can_say_what_the_manual_says(row):
+    from fuzzy_arbiter.formats import reads, writes
+
+    system = changed(row[0])
+    for formats, answer in zip((["json", "toml"], ["fcl"], ["fis"], ["fll"]), row[1:], strict=True):
+        for name in formats:
+            if answer.startswith("yes"):
+                assert reads(writes(system, name), name) == system
+            else:
+                with pytest.raises(UnsupportedError):
+                    writes(system, name)

@@ -1,0 +1,273 @@
+"""Pictures show the numbers that the arbiter gives, and leave everything else alone."""
+
+import subprocess
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+from fuzzy_arbiter import (
+    Arbiter,
+    Criterion,
+    DefinitionError,
+    InputError,
+    Output,
+    System,
+    Term,
+    Variable,
+    falling,
+    pictures,
+    rising,
+    trapezoid,
+    triangle,
+)
+from fuzzy_arbiter.pictures.style import colour, hatch, line_style
+
+MEASURED = (
+    Criterion("distance to the nearest obstacle ahead", membership=falling(0.0, 5.0)),
+    *(Criterion(f"criterion_{i}") for i in range(5)),
+)
+SAIL = System(
+    inputs=(
+        Variable("wind", (0, 20), (Term("calm", falling(2, 6)), Term("fresh", trapezoid(4, 6, 9, 12)))),
+        Variable("waves", (0, 4), (Term("low", falling(1, 2)), Term("high", rising(1, 3)))),
+    ),
+    outputs=(
+        Output("sail", (0, 100), (Term("half", triangle(30, 50, 70)), Term("full", trapezoid(60, 80, 100, 100)))),
+        Output("keel", (0, 50), (Term("up", triangle(0, 20, 40)), Term("down", rising(10, 20)))),
+    ),
+    rules=(
+        "if wind is calm then sail is full and keel is up",
+        "if wind is fresh or waves is high then sail is half and keel is down with 0.7",
+    ),
+)
+
+
+@pytest.fixture(scope="module")
+def arbiter():
+    return Arbiter(engine="exact")
+
+
+@pytest.fixture(scope="module")
+def sail():
+    return Arbiter(system=SAIL, engine="exact")
+
+
+def drawn(ax):
+    ax.figure.draw_without_rendering()
+    return ax
+
+
+def everything(arbiter, ax=None):
+    """One of each picture."""
+    system = arbiter.system
+    first, second = (v.name for v in system.inputs[:2])
+    middle = [sum(v.universe) / 2 for v in system.inputs]
+    yield "terms", lambda ax=None: pictures.terms(arbiter, first, ax=ax)
+    yield "profile", lambda ax=None: pictures.profile(arbiter, first, ax=ax)
+    yield "rules", lambda ax=None: pictures.rules(arbiter, middle, ax=ax)
+    yield (
+        "surface",
+        lambda ax=None: pictures.surface(arbiter, system.outputs[0].name, (first, second), ax=ax, points=11),
+    )
+    yield "decisions", lambda ax=None: pictures.decisions(arbiter, (first, second), ax=ax, points=11)
+
+
+@pytest.mark.parametrize("criteria", [None, MEASURED], ids=["three", "six"])
+def test_every_picture_draws_on_new_axes_or_on_those_given(criteria):
+    arbiter = Arbiter(engine="exact") if criteria is None else Arbiter(criteria, engine="exact")
+    for _, draw in everything(arbiter):
+        assert isinstance(drawn(draw()).figure, Figure)
+        ax = Figure().add_subplot()
+        assert draw(ax) is ax
+    for ax in pictures.normalisations(arbiter, arbiter.system.inputs[0].name).values():
+        drawn(ax)
+
+
+def test_pictures_leave_pyplot_alone(arbiter):
+    import matplotlib.pyplot as plt
+
+    for _, draw in everything(arbiter):
+        draw()
+    assert plt.get_fignums() == []
+
+
+def test_the_package_comes_without_matplotlib():
+    code = (
+        "import sys; sys.modules['matplotlib'] = None\n"
+        "from fuzzy_arbiter import Arbiter, pictures\n"
+        "try: pictures.terms(Arbiter(engine='exact'), 'obstacle')\n"
+        "except ImportError: print('only when it draws')"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "only when it draws"
+
+
+@pytest.mark.parametrize(
+    "draw",
+    [
+        lambda a: pictures.terms(a, "speed"),
+        lambda a: pictures.profile(a, "speed"),
+        lambda a: pictures.profile(a, "obstacle", {"speed": 1.0}),
+        lambda a: pictures.surface(a, "alpha_1", ("obstacle", "speed")),
+        lambda a: pictures.decisions(a, ("speed", "depth")),
+        lambda a: pictures.normalisations(a, "speed"),
+    ],
+)
+def test_unknown_inputs_are_answered_with_the_known(arbiter, draw):
+    with pytest.raises(DefinitionError, match=r"'speed', expected one of obstacle, shape, depth"):
+        draw(arbiter)
+
+
+@pytest.mark.parametrize(
+    "draw",
+    [
+        lambda a: pictures.rules(a, [0, 0, 0], "beta"),
+        lambda a: pictures.surface(a, "beta", ("obstacle", "shape")),
+    ],
+)
+def test_unknown_outputs_are_answered_with_the_known(arbiter, draw):
+    with pytest.raises(DefinitionError, match=r"no output 'beta', expected one of alpha_1, alpha_2, alpha_3"):
+        draw(arbiter)
+
+
+def test_inputs_that_cannot_be_gone_over(arbiter):
+    with pytest.raises(DefinitionError, match="came twice"):
+        pictures.decisions(arbiter, ("obstacle", "obstacle"))
+    with pytest.raises(DefinitionError, match="the picture goes over it"):
+        pictures.surface(arbiter, "alpha_1", ("obstacle", "shape"), {"shape": 0.2})
+    with pytest.raises(DefinitionError, match="names of two inputs"):
+        pictures.surface(arbiter, "alpha_1", ("obstacle",))
+    with pytest.raises(InputError, match=r"depth: input is 2\.0"):
+        pictures.profile(arbiter, "obstacle", {"depth": 2.0})
+    with pytest.raises(InputError, match=r"obstacle: place is 2\.0"):
+        pictures.terms(arbiter, "obstacle", at=2.0)
+    with pytest.raises(DefinitionError, match="no normalisation 'softmax', expected one of none, range, sum, max"):
+        pictures.normalisations(arbiter, "obstacle", axes={"softmax": Figure().add_subplot()})
+    alone = replace(SAIL, outputs=SAIL.outputs[:1], rules=("if wind is calm then sail is full",))
+    with pytest.raises(DefinitionError, match="two or more to decide between"):
+        pictures.decisions(Arbiter(system=alone, engine="exact"), ("wind", "waves"))
+
+
+def test_terms_are_drawn_corner_by_corner(sail):
+    lines = {line.get_label(): line.get_xydata() for line in pictures.terms(sail, "wind").get_lines()}
+    assert lines["calm"].tolist() == [[0, 1], [2, 1], [6, 0], [20, 0]]
+    assert lines["fresh"].tolist() == [[0, 0], [4, 0], [6, 1], [9, 1], [12, 0], [20, 0]]
+
+
+def test_of_many_terms_no_two_look_alike():
+    lines = {(style["color"], str(style["linestyle"])) for style in map(line_style, range(36))}
+    assert len(lines) == 36
+    assert len({(colour(i), hatch(i)) for i in range(36)}) == 36
+
+
+def test_an_output_s_vertical_edge_stays_vertical(arbiter):
+    lines = {line.get_label(): line.get_xydata() for line in pictures.terms(arbiter, "alpha_1").get_lines()}
+    assert lines["low"].tolist() == [[0, 1], [1, 0]]
+
+
+def test_lines_of_a_profile_are_the_arbiter_s_weights(arbiter):
+    ax = pictures.profile(arbiter, "shape", {"obstacle": 0.25, "depth": 1.0})
+    for k, line in enumerate(ax.get_lines()):
+        for x, y in line.get_xydata()[::37]:
+            assert y == pytest.approx(arbiter([0.25, x, 1.0])[k], abs=1e-12)
+
+
+def test_a_profile_has_a_gap_where_an_output_is_undefined(sail):
+    x, y = pictures.profile(sail, "wind", {"waves": 0.5}).get_lines()[0].get_data()
+    assert np.isnan(y[x > 12.0]).all() and np.isfinite(y[x < 12.0]).all()
+
+
+def test_each_normalisation_is_that_of_the_system(arbiter):
+    at = {"shape": 0.8, "depth": 0.3}
+    for name, ax in pictures.normalisations(arbiter, "obstacle", at).items():
+        other = Arbiter(normalisation=name, engine="exact")
+        for k, line in enumerate(ax.get_lines()):
+            for x, y in line.get_xydata()[::53]:
+                assert y == pytest.approx(other({"obstacle": x} | at)[k], abs=1e-12)
+
+
+def texts(ax):
+    return [text.get_text() for text in (*ax.texts, *ax.get_yticklabels(), ax.title, ax._right_title)]
+
+
+def test_rules_are_shown_with_strength_term_and_what_decides(arbiter):
+    ax = pictures.rules(arbiter, [0.3, 0.8, 0.6], "alpha_2")
+    said = texts(ax)
+    assert "R3: if obstacle is exist" in said and "R4: if shape is simple" in said
+    assert "0.300 low •" in said and "0.200 low" in said and "0.700 high •" in said
+    # exactly 1/3 + h^2 - 2/3 h^3 at h = 0.7
+    assert "centroid 0.5947" in said
+    assert any(text.endswith("alpha_2 = 0.784") for text in said)
+
+
+def test_of_many_rules_those_that_do_not_fire_are_left_out():
+    criteria = [Criterion(name) for name in "abcd"]
+    complete = Arbiter(criteria, form="complete", engine="exact")
+    assert [text for text in texts(pictures.rules(complete, [1, 0, 1, 1])) if text.startswith("R")] == [
+        "R17: if a is on and b is off and c is on and d is\non"
+    ]
+    assert len([text for text in texts(pictures.rules(complete, [0.5] * 4)) if text.startswith("R")]) == 10
+    assert any("(6 rules not drawn)" in text for text in texts(pictures.rules(complete, [0.5] * 4)))
+
+
+def test_rules_that_do_not_fire_are_said(sail):
+    said = texts(pictures.rules(sail, [15.0, 0.5], "sail"))
+    assert any(text.endswith("sail: no rule fires") for text in said)
+    with_default = replace(SAIL, outputs=(replace(SAIL.outputs[0], default=50.0), SAIL.outputs[1]))
+    said = texts(pictures.rules(Arbiter(system=with_default, engine="exact"), [15.0, 0.5], "sail"))
+    assert "default 50" in said and any(text.endswith("sail: another output is undefined") for text in said)
+
+
+def test_a_surface_holds_the_weights(arbiter):
+    ax = pictures.surface(arbiter, "alpha_2", ("obstacle", "shape"), {"depth": 0.0}, points=11)
+    filled = ax.collections[0]
+    assert filled.zmax == pytest.approx(arbiter([0.0, 1.0, 0.0])[1]) and filled.zmin == pytest.approx(0.0)
+
+
+def test_on_three_dimensions_a_surface_is_a_relief(arbiter, sail):
+    for shown, output, over in ((arbiter, "alpha_2", ("obstacle", "shape")), (sail, "sail", ("wind", "waves"))):
+        ax = Figure().add_subplot(projection="3d")
+        drawn(pictures.surface(shown, output, over, ax=ax, points=11))
+        assert ax.get_zlabel() == output
+        assert ax.get_zlim()[0] <= 0.0 and ax.get_zlim()[1] >= 0.8
+
+
+def test_a_flat_surface_is_said_in_words(arbiter, sail):
+    ax = pictures.surface(arbiter, "alpha_3", ("shape", "depth"), {"obstacle": 1.0}, points=11)
+    assert "alpha_3 = 0 everywhere" in texts(ax)
+    narrow = replace(SAIL, rules=("if wind is calm and not wind is calm then sail is full and keel is up",))
+    crisp = replace(narrow, inputs=(replace(SAIL.inputs[0], universe=(10, 20)), SAIL.inputs[1]))
+    ax = pictures.surface(Arbiter(system=crisp, engine="exact"), "sail", ("wind", "waves"), points=11)
+    assert "undefined everywhere" in texts(ax)
+
+
+def keys(ax):
+    return [text.get_text() for text in ax.get_legend().get_texts()]
+
+
+def test_decisions_name_the_regions_that_there_are(arbiter, sail):
+    assert keys(pictures.decisions(arbiter, ("obstacle", "shape"), {"depth": 0.4})) == ["alpha_1", "alpha_2", "alpha_3"]
+    assert keys(pictures.decisions(arbiter, ("obstacle", "shape"), {"depth": 0.0})) == ["alpha_1", "alpha_2"]
+    assert keys(pictures.decisions(arbiter, ("shape", "depth"), {"obstacle": 1.0})) == ["alpha_1"]
+    six = Arbiter(MEASURED, engine="exact")
+    at = {f"criterion_{i}": 0.5 for i in range(1, 5)}
+    assert keys(pictures.decisions(six, ("distance to the nearest obstacle ahead", "criterion_0"), at))[-1] == "shared"
+    assert keys(pictures.decisions(sail, ("wind", "waves"))) == ["sail", "keel", "undefined"]
+
+
+def test_a_decision_is_that_of_the_greatest_weight(arbiter):
+    """The border between two regions is where their weights are equal."""
+    ax = pictures.decisions(arbiter, ("obstacle", "shape"), {"depth": 0.4})
+    borders = [c for c in ax.collections if len(c.get_facecolor()) == 0 or not c.get_facecolor().any()]
+    found = 0
+    for border in borders:
+        for path in border.get_paths():
+            for x, y in path.vertices:
+                if 0.02 < x < 0.98 and 0.02 < y < 0.98:
+                    second, first = sorted(arbiter([x, y, 0.4]))[1:]
+                    assert first - second < 0.01
+                    found += 1
+    assert found > 50
