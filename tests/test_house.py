@@ -38,11 +38,7 @@ def test_the_controller_knows_neither_fmi_nor_mavlink_and_the_arbiter_no_vehicle
 
 
 def test_the_arbiter_takes_what_is_heavy_in_one_file_each():
-    for foreign, where in (
-        ("numba", "compiled.py"),
-        ("skfuzzy", "engines/scikit.py"),
-        ("tomli_w", "formats/json_toml.py"),
-    ):
+    for foreign, where in (("numba", "compiled.py"), ("skfuzzy", "engines/scikit.py")):
         users = {p for p in (ROOT / "fuzzy_arbiter").rglob("*.py") if foreign in {n.split(".")[0] for n in imports(p)}}
         assert users == {ROOT / "fuzzy_arbiter" / where}
 

@@ -7,12 +7,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fuzzy_arbiter.arbiter import Arbiter, Sample
+from fuzzy_arbiter.arbiter import Arbiter
 from fuzzy_arbiter.definition import Output, Rule
 from fuzzy_arbiter.engines.firing import Array, Firing, degrees_of_many
 from fuzzy_arbiter.errors import UndefinedOutputError
 from fuzzy_arbiter.pictures.lines import corners
 from fuzzy_arbiter.pictures.style import FAINT, INK, colour, hatch, knots_of, new_axes, one_of, said, wrapped
+from fuzzy_arbiter.samples import Sample
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -56,7 +57,7 @@ def rules(arbiter: Arbiter, inputs: Sample, output: str | None = None, ax: Axes 
     system = arbiter.system
     k = one_of(system.outputs, system.outputs[0].name if output is None else output, "output")
     drawn = system.outputs[k]
-    values = arbiter._checked(inputs)
+    values = arbiter.samples.one(inputs)
     firing = Firing(system)
     strengths = firing.strengths(values)
     cuts = firing.cuts(strengths)[k]
