@@ -109,10 +109,10 @@ def load(path: str | Path) -> System:
     format = _format(path)
     try:
         text = Path(path).read_bytes().decode("utf-8")
-    except OSError as error:
-        raise FormatError(f"{path}: {error.strerror or error}") from None
     except UnicodeDecodeError as error:
         raise FormatError(f"{path}: byte {error.start} is no UTF-8, expected text in UTF-8") from None
+    except (OSError, ValueError) as error:  # the latter for a name with a null in it
+        raise FormatError(f"{path}: {getattr(error, 'strerror', None) or error}") from None
     try:
         return reads(text, format)
     except ArbiterError as error:
@@ -146,8 +146,8 @@ def save(system: System, path: str | Path) -> None:
             scratch.write(data)
         os.chmod(scratch.name, 0o644)
         os.replace(scratch.name, out)
-    except OSError as error:
-        raise FormatError(f"{path}: {error.strerror or error}") from None
+    except (OSError, ValueError) as error:
+        raise FormatError(f"{path}: {getattr(error, 'strerror', None) or error}") from None
     finally:
         if scratch:
             Path(scratch.name).unlink(missing_ok=True)

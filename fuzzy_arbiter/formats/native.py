@@ -6,7 +6,7 @@ from dataclasses import replace
 from fractions import Fraction
 
 from fuzzy_arbiter.definition import Output, System, Term
-from fuzzy_arbiter.errors import UnsupportedError
+from fuzzy_arbiter.errors import DefinitionError, UnsupportedError
 from fuzzy_arbiter.shapes import Shape
 
 
@@ -30,7 +30,8 @@ def natively(system: System) -> System:
     Raises
     ------
     UnsupportedError
-        If the normalisation is over all outputs, or an output's terms have one centroid and so no range.
+        If the normalisation is over all outputs, an output's terms have one centroid and so no range, or floating point
+        has no room for the mapped terms.
 
     Notes
     -----
@@ -80,9 +81,14 @@ def _mapped(output: Output) -> Output:
     def place(x: float) -> float:
         return float((Fraction(x) - low) / (high - low))
 
-    terms = tuple(Term(t.name, Shape(tuple((place(x), y) for x, y in t.shape.points))) for t in output.terms)
-    default = None if output.default is None else min(max(place(output.default), 0.0), 1.0)
-    return Output(output.name, (place(output.universe[0]), place(output.universe[1])), terms, default)
+    try:
+        terms = tuple(Term(t.name, Shape(tuple((place(x), y) for x, y in t.shape.points))) for t in output.terms)
+        default = None if output.default is None else min(max(place(output.default), 0.0), 1.0)
+        return Output(output.name, (place(output.universe[0]), place(output.universe[1])), terms, default)
+    except (OverflowError, DefinitionError):
+        raise UnsupportedError(
+            f"output {output.name!r}: its terms lie too far apart, or too close, to be mapped in floating point"
+        ) from None
 
 
 def _centroid(shape: Shape, universe: tuple[float, float]) -> Fraction:

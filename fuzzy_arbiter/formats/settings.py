@@ -39,8 +39,8 @@ def say_settings(system: System, keys: Sequence[str]) -> list[str]:
         return texts
     texts.append("other tools give the raw centroid c of each output; the weights are")
     for output in system.outputs:
-        low, high = range_ends(output)
-        zero, scale = say_number(float(low)), say_number(float(high - low))
+        low, high = map(float, range_ends(output))
+        zero, scale = say_number(low), say_number(high - low)
         texts.append(f"  (c - {zero}) / {scale}, held within [0, 1], for {output.name}")
     if system.normalisation in ("sum", "max"):
         whole = "sum" if system.normalisation == "sum" else "greatest"

@@ -1,0 +1,185 @@
+"""The Fuzzy Control Language: what others write, and what is refused."""
+
+from dataclasses import replace
+
+import pytest
+
+from fuzzy_arbiter import (
+    DefinitionError,
+    FormatError,
+    Shape,
+    Term,
+    UnsupportedError,
+    Variable,
+    falling,
+    prioritised,
+    rising,
+    triangle,
+)
+from fuzzy_arbiter.formats import reads, writes
+from tests.fuzzy_arbiter.formats.systems import TIPPING
+
+# in the manner of jFuzzyLogic's example: comments of three kinds, no ranges, no OR
+OTHERS = """
+/* a tip
+   for the waiter */
+FUNCTION_BLOCK tipper  // there may be a name
+VAR_INPUT
+    service : REAL;
+    food : real;
+END_VAR
+VAR_OUTPUT tip : REAL; END_VAR
+FUZZIFY service
+    TERM poor := (0, 1) (4, 0) ;
+    TERM good := (1, 0) (4,1), (6,1) (9,0);
+    TERM excellent := (6, 0) (9, 1);
+END_FUZZIFY
+FUZZIFY food
+    TERM rancid := (0, 1) (1, 1) (3,0) ;
+    TERM delicious := (7,0) (9,1);
+END_FUZZIFY
+Defuzzify tip
+    TERM cheap := TRIAN 0 5 10;
+    TERM average := TRAPE 10 15 15 20;
+    TERM generous := (20,0) (25,1) (30,0);
+    METHOD : COG;    (* Center Of Gravity *)
+    DEFAULT := 0;
+END_DEFUZZIFY
+RULEBLOCK No1
+    AND : MIN;
+    ACT : MIN;
+    ACCU : MAX;
+    RULE 1 : IF service IS poor OR food IS rancid THEN tip IS cheap;
+    RULE 2 : IF service IS good THEN tip IS average WITH 0.5;
+    RULE three : IF NOT (service IS NOT excellent OR NOT food IS delicious) THEN tip IS generous;
+END_RULEBLOCK
+END_FUNCTION_BLOCK
+"""
+
+
+def test_a_block_of_others_is_read():
+    system = reads(OTHERS, "fcl")
+    assert system.name == "tipper"
+    assert [v.universe for v in (*system.inputs, *system.outputs)] == [(0, 9), (0, 9), (0, 30)]
+    assert system.inputs[1].terms[0].shape == falling(1, 3)
+    assert system.outputs[0].terms[1].shape == triangle(10, 15, 20)
+    assert system.outputs[0].default == 0.0
+    assert (system.conjunction, system.disjunction, system.implication) == ("min", "max", "min")
+    assert (system.normalisation, system.outside, system.points) == ("none", "refuse", 101)
+    assert str(system.rules[1]) == "if service is good then tip is average with 0.5"
+    assert str(system.rules[2].condition) == "not (service is not excellent or food is not delicious)"
+
+
+def test_several_rule_blocks_of_like_operators_are_one():
+    parts = OTHERS.split("    RULE 2")
+    text = f"{parts[0]}END_RULEBLOCK RULEBLOCK No2 OR : MAX; ACCU : MAX;    RULE 2{parts[1]}"
+    assert reads(text, "fcl").rules == reads(OTHERS, "fcl").rules
+    with pytest.raises(FormatError, match="RULEBLOCK 'No2' has other AND, OR or ACT than that before it"):
+        reads(text.replace("OR : MAX; ACCU", "OR : ASUM; ACCU"), "fcl")
+
+
+@pytest.mark.parametrize(
+    ("operators", "norms"),
+    [
+        ("AND : PROD;", ("prod", "probor", "min")),
+        ("OR : ASUM; ACT : PROD;", ("prod", "probor", "prod")),
+        ("OR : MAX; AND : MIN;", ("min", "max", "min")),
+        ("", ("min", "max", "min")),
+    ],
+)
+def test_an_operator_that_is_not_said_is_the_one_of_its_pair(operators, norms):
+    system = reads(OTHERS.replace("AND : MIN;\n    ACT : MIN;", operators), "fcl")
+    assert (system.conjunction, system.disjunction, system.implication) == norms
+
+
+def test_a_range_of_an_input_stands_at_its_declaration_only_where_its_points_do_not_make_it():
+    assert "RANGE" not in writes(prioritised(), "fcl").split("END_VAR")[0]
+    wide = replace(TIPPING.inputs[0], universe=(-1.5, 10))
+    text = writes(replace(TIPPING, inputs=(wide, TIPPING.inputs[1])), "fcl")
+    assert "  quality : REAL; RANGE := (-1.5 .. 10);\n  service : REAL;\n" in text
+    assert reads(text.replace("RANGE := (-1.5 .. 10);", "", 1), "fcl").inputs[0].universe == (0, 10)
+    moved = text.replace(" RANGE := (-1.5 .. 10);", "", 1)
+    moved = moved.replace("FUZZIFY quality\n", "FUZZIFY quality RANGE := (-1.5..10);\n")
+    assert reads(moved, "fcl") == reads(text, "fcl")
+
+
+def test_numbers_are_those_of_the_standard():
+    tiny = Variable("v", (0, 1e-5), (Term("t", rising(0, 1e-5)),))
+    text = writes(replace(TIPPING, inputs=(tiny,), rules=("if v is t then tip is low",)), "fcl")
+    assert "TERM t := (0, 0) (1.0e-05, 1);" in text
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "fault"),
+    [
+        ("METHOD : COG", "METHOD : COGS", r"line 23: 'COGS' came after ':', expected COG"),
+        ("METHOD : COG;", "", r"line 19: DEFUZZIFY without METHOD, expected METHOD : COG;"),
+        ("ACCU : MAX", "ACCU : BSUM", r"line 29: 'BSUM' came after ':', expected MAX"),
+        ("ACCU : MAX;", "", r"line 26: RULEBLOCK 'No1' without ACCU, expected ACCU : MAX;"),
+        ("AND : MIN", "AND : BDIF", r"line 27: 'BDIF' came after ':', expected MIN or PROD"),
+        ("ACT : MIN;", "OR : ASUM;", r"line 26: AND and OR are no pair of the standard, expected MIN with MAX"),
+        ("AND : MIN;", "AND : MIN; AND : MIN;", r"line 27: AND came twice"),
+        ("TERM poor := (0, 1) (4, 0)", "TERM poor := GAUSS 0 2", r"line 11: 'GAUSS' came after ':=', expected points"),
+        ("TERM poor := (0, 1) (4, 0)", "TERM poor := 4", r"line 11: '4' came after ':=', expected points"),
+        ("(0, 1) (4, 0)", "(0, 1) (low, 0)", r"line 11: 'low' came after '\(', expected a number, a place"),
+        ("(0, 1) (4, 0)", "(0, 1) (-4, 0)", r"line 11: term 'poor': shape: place -4.0 comes after 0.0"),
+        ("(0, 1) (4, 0)", "(0, 1) (4, 2)", r"line 11: term 'poor': shape: point \(4.0, 2.0\)"),
+        ("(0, 1) (4, 0)", "(0, 1) (4e999, 0)", r"line 11: a place is '4e999', expected a finite number"),
+        ("TERM good", "TERM poor", r"line 10: variable 'service': two terms are named 'poor'"),
+        ("FUZZIFY food", "FUZZIFY fod", r"line 15: FUZZIFY 'fod', expected one of service, food"),
+        ("FUZZIFY food", "FUZZIFY service", r"line 15: FUZZIFY 'service' came twice"),
+        ("food : real;", "food, wine : REAL;", r"line 7: 'wine' has no FUZZIFY"),
+        ("food : real;", "food, service : REAL;", r"line 7: 'service' is declared twice"),
+        ("food : real;", "food : INT;", r"line 7: 'INT' came after ':', expected REAL"),
+        ("VAR_OUTPUT", "VAR x : REAL; VAR_OUTPUT", r"line 9: 'VAR' came after 'END_VAR', expected VAR_IN"),
+        ("IF service IS good", "IF service IS god", r"line 31: R2 .*'service' has no term 'god', expected one of exc"),
+        ("IF service IS good", "IF service good", r"line 31: rule .*'good' came after 'service', expected 'is'"),
+        ("IF service IS good", "IF VERY service IS good", r"line 31: rule .*'service' came after 'VERY'"),
+        ("tip IS average", "tip", r"line 31: rule 'IF service IS good THEN tip WITH 0.5': 'WITH' came after 'tip'"),
+        ("WITH 0.5", "WITH 1.5", r"line 31: 'if service .* with 1.5': weight is 1.5"),
+        ("WITH 0.5", "WITH x", r"line 31: rule .*'x' came after 'WITH', expected the rule's weight"),
+        ("average WITH 0.5;", "average", r"line 31: rule .*average RULE three.*': ':' cannot stand in a rule"),
+        ("DEFAULT := 0;", "DEFAULT := nan;", r"line 24: 'nan' came after ':=', expected a number, the default, or NC"),
+        ("(* Center", "(* Center (*", None),
+        ("Gravity *)", "Gravity", r"line 23: the comment that begins here with '\(\*' has no end"),
+        ("ACT : MIN;", "ACT = MIN;", r"line 28: '=' is no sign of FCL"),
+        ("END_FUNCTION_BLOCK\n", "", r"line 34: the end of the file came after 'END_RULEBLOCK', expected VAR_INPUT"),
+        ("END_FUNCTION_BLOCK\n", "END_FUNCTION_BLOCK FUNCTION_BLOCK", r"one function block makes a system"),
+        ("TRIAN 0 5 10;", "TRIAN 40 45 50; RANGE := (0 .. 30);", r"line 19: .*term 'cheap' has no area"),
+    ],
+)  # fmt: skip
+def test_what_is_not_known_is_refused_with_its_line(old, new, fault):
+    assert old in OTHERS
+    if fault is None:
+        assert reads(OTHERS.replace(old, new), "fcl") == reads(OTHERS, "fcl")
+        return
+    with pytest.raises((FormatError, DefinitionError), match=fault):
+        reads(OTHERS.replace(old, new), "fcl")
+
+
+@pytest.mark.parametrize(
+    ("change", "fault"),
+    [
+        ({"name": "not exist"}, "the name 'not exist': expected letters, digits and _, a letter first"),
+        ({"name": "_x"}, "the name '_x': expected letters, digits and _, a letter first"),
+        ({"name": "Range"}, "the name 'Range': it is a word of the language"),
+        ({"conjunction": "prod"}, "the conjunction 'prod' with the disjunction 'max': expected 'min' with 'max'"),
+    ],
+)
+def test_what_it_cannot_say_is_named(change, fault):
+    with pytest.raises(UnsupportedError, match=f"^fcl cannot say {fault}"):
+        writes(replace(TIPPING, **change), "fcl")
+
+
+def test_names_that_differ_in_case_alone_are_one_to_the_standard():
+    twin = Variable("QUALITY", (0, 1), TIPPING.inputs[0].terms)
+    with pytest.raises(UnsupportedError, match="the names 'quality' and 'QUALITY': they differ in case alone"):
+        writes(replace(TIPPING, inputs=(*TIPPING.inputs, twin)), "fcl")
+
+
+def test_jumps_are_points_of_one_place():
+    box = Variable(
+        "quality", (0, 10), (replace(TIPPING.inputs[0].terms[0], shape=Shape(((2, 0), (2, 1), (4, 1), (4, 0)))),)
+    )
+    system = replace(TIPPING, inputs=(box, TIPPING.inputs[1]), rules=TIPPING.rules[:2])
+    assert reads(writes(system, "fcl"), "fcl") == system

@@ -1,0 +1,92 @@
+"""Files: told by their suffix, read with their name in every fault, written whole or not at all."""
+
+import os
+from dataclasses import replace
+
+import pytest
+
+from fuzzy_arbiter import DefinitionError, FormatError, UnsupportedError, prioritised
+from fuzzy_arbiter.formats import FORMATS, load, save
+from tests.fuzzy_arbiter.formats.systems import TIPPING
+
+
+@pytest.mark.parametrize("format", FORMATS)
+def test_the_suffix_tells_the_format_in_any_case(format, tmp_path):
+    for suffix in (format, format.upper()):
+        path = tmp_path / f"a.b.{suffix}"
+        save(TIPPING, path)
+        assert load(path) == load(str(path)) == TIPPING
+
+
+def test_an_older_file_is_replaced_and_no_scratch_is_left(tmp_path):
+    path = tmp_path / "a.json"
+    save(TIPPING, path)
+    save(prioritised(), path)
+    assert load(path) == prioritised()
+    assert os.listdir(tmp_path) == ["a.json"]
+    assert path.stat().st_mode & 0o777 == 0o644
+
+
+def test_what_cannot_be_said_leaves_the_older_file(tmp_path):
+    path = tmp_path / "a.fis"
+    save(TIPPING, path)
+    with pytest.raises(UnsupportedError):
+        save(replace(TIPPING, name="a:b"), path)
+    assert load(path) == TIPPING
+
+
+def test_a_disk_that_fails_leaves_the_older_file(tmp_path, monkeypatch):
+    path = tmp_path / "a.toml"
+    save(TIPPING, path)
+
+    def full(*_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("os.replace", full)
+    with pytest.raises(FormatError, match=r"a\.toml: No space left on device"):
+        save(prioritised(), path)
+    assert load(path) == TIPPING
+    assert os.listdir(tmp_path) == ["a.toml"]
+
+
+@pytest.mark.parametrize("name", ["a.xml", "a", ".json", "a.json.txt"])
+def test_other_suffixes_are_refused(name, tmp_path):
+    for call in (lambda path: save(TIPPING, path), load):
+        with pytest.raises(FormatError, match="expected one of json, toml, fcl, fis, fll"):
+            call(tmp_path / name)
+    assert not os.listdir(tmp_path)
+
+
+def test_places_where_nothing_can_be_read_or_written(tmp_path):
+    (tmp_path / "folder.json").mkdir()
+    for path, fault in (("none/a.json", "No such file"), ("folder.json", "exists and is no file|Is a directory")):
+        for call in (lambda path: save(TIPPING, path), load):
+            with pytest.raises(FormatError, match=fault):
+                call(tmp_path / path)
+
+
+def test_a_name_with_a_null_in_it(tmp_path):
+    for call in (lambda path: save(TIPPING, path), load):
+        with pytest.raises(FormatError, match="null"):
+            call(tmp_path / "a\0b.json")
+
+
+def test_text_that_is_not_utf8(tmp_path):
+    path = tmp_path / "a.fis"
+    path.write_bytes(b"[System]\n% caf\xe9")
+    with pytest.raises(FormatError, match=r"a\.fis: byte 14 is no UTF-8"):
+        load(path)
+
+
+def test_faults_name_the_file(tmp_path):
+    path = tmp_path / "a.fll"
+    save(TIPPING, path)
+    text = path.read_text()
+    path.write_text(text.replace("tip is low", "tip is lo"))
+    with pytest.raises(
+        DefinitionError, match=r"a\.fll: line \d+: R1 .*'tip' has no term 'lo', expected one of high, low"
+    ):
+        load(path)
+    path.write_text("x")
+    with pytest.raises(FormatError, match=r"a\.fll: line 1: 'x', expected a key, a colon and its value"):
+        load(path)

@@ -1,0 +1,185 @@
+"""MATLAB's text: what MATLAB and Octave write, and what is refused."""
+
+from dataclasses import replace
+
+import pytest
+
+from fuzzy_arbiter import (
+    DefinitionError,
+    FormatError,
+    Output,
+    Rule,
+    Shape,
+    Term,
+    UnsupportedError,
+    Variable,
+    falling,
+    prioritised,
+    rising,
+    trapezoid,
+    triangle,
+)
+from fuzzy_arbiter.formats import reads, writes
+from tests.fuzzy_arbiter.formats.systems import TIPPING
+
+OTHERS = """% a tip for the waiter
+
+[System]
+Name='Tip for two'
+Type='mamdani'
+Version=2.0
+NumInputs=2
+NumOutputs=1
+NumRules=3
+AndMethod='algebraic_product'
+OrMethod='probor'
+ImpMethod='prod'
+AggMethod='max'
+DefuzzMethod='centroid'
+
+[Input1]
+Name = 'service'
+Range = [0 10]
+NumMFs=3
+MF1='very poor':'trimf',[-4 0 4]
+MF2='good':'linsmf',[4 6]
+MF3='bad':'linzmf',[ 1, 3 ]
+
+# Octave's comments
+[Input2]
+Name='food'
+Range=[0 10]
+NumMFs=2
+MF1='rancid':'trapmf',[0 0 1 3]
+MF2 = 'delicious' : 'trapmf', [7 9 10 10]
+
+[Output1]
+Name='tip'
+Range=[0 30]
+NumMFs=2
+MF1='cheap':'trimf',[0 5 10]
+MF2='generous':'trimf',[20 25 30]
+
+[Rules]
+1 1, 1 (1) : 2
+-2 0, 1 (0.5) : 1
+2 -1, 2 (1) : 1
+"""
+
+
+def test_a_file_of_others_is_read():
+    system = reads(OTHERS, "fis")
+    assert system.name == "Tip for two"
+    service, food = system.inputs
+    assert [term.shape for term in service.terms] == [falling(0, 4), rising(4, 6), falling(1, 3)]
+    assert [term.shape for term in food.terms] == [falling(1, 3), rising(7, 9)]
+    assert (system.conjunction, system.disjunction, system.implication) == ("prod", "probor", "prod")
+    assert list(map(str, system.rules)) == [
+        'if service is "very poor" or food is rancid then tip is cheap',
+        "if service is not good then tip is cheap with 0.5",
+        "if service is good and food is not rancid then tip is generous",
+    ]
+
+
+def test_halves_of_triangles_get_their_other_foot_beyond_the_range():
+    text = writes(prioritised(), "fis")
+    assert "MF1='low':'trimf',[-1 0 1]\nMF2='high':'trimf',[0 1 2]" in text
+
+
+@pytest.mark.parametrize(
+    "shape",
+    [
+        *(falling(0, 10), falling(2, 5), falling(-3, 4), falling(-3, 14), falling(4, 4), falling(2, 10)),
+        *(rising(0, 10), rising(2, 5), rising(-3, 4), rising(4, 13), rising(4, 4), rising(2, 10), rising(10, 10)),
+        *(triangle(1, 2, 3), triangle(1, 1, 3), triangle(-5, 5, 20), trapezoid(1, 2, 2.5, 3), trapezoid(2, 2, 3, 3)),
+        *(Shape(((3, 1),)), Shape(((3, 0),)), falling(0, 5e-324), rising(10 - 1e-15, 10)),
+    ],
+)
+def test_all_shapes_of_0_and_1_come_back(shape):
+    term = Term("t", shape)
+    system = replace(TIPPING, inputs=(Variable("v", (0, 10), (term,)),), rules=("if v is t then tip is low",))
+    assert reads(writes(system, "fis"), "fis") == system
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "fault"),
+    [
+        ("mamdani", "sugeno", "line 5: Type is 'sugeno', which is not known here; expected mamdani"),
+        ("'probor'", "'sum'", "line 11: OrMethod is 'sum', which is not known here; expected max or probor"),
+        ("AggMethod='max'", "AggMethod='sum'", "line 13: AggMethod is 'sum'"),
+        ("centroid", "bisector", "line 14: DefuzzMethod is 'bisector'.*expected centroid"),
+        ("Type='mamdani'", "Type=mamdani", "line 5: Type is mamdani, expected text in single quotes"),
+        ("Version=2.0", "Reduction='km'", "line 6: Reduction is not known in .System., expected one of Name"),
+        ("NumInputs=2", "NumInputs=3", "line 7: NumInputs is 3, expected 2, since there are 2"),
+        ("NumRules=3\n", "", "line 3: NumRules is missing, expected 3"),
+        ("NumMFs=3", "NumMFs=2", "line 19: NumMFs is 2, expected 3"),
+        ("'linsmf',[4 6]", "'gaussmf',[4 6]", "line 21: term 'good' is 'gaussmf', which is not known.*trimf, trapmf"),
+        ("'linsmf',[4 6]", "'linsmf',[4 6 7]", r"line 21: term 'good' has the places \[4 6 7\], expected 2 for linsmf"),
+        ("'linsmf',[4 6]", "'linsmf',[4 x]", "line 21: place of 'good' is 'x', expected a finite number"),
+        ("'linsmf',[4 6]", "'linsmf',[6 4]", "line 21: term 'good': shape: place 4.0 comes after 6.0"),
+        ("MF2='good'", "MF4='good'", r"line 21: MF4 came in \[Input1\], expected MF2"),
+        ("MF2='good'", "MF1='good'", r"line 21: MF1 came twice in \[Input1\]"),
+        ("MF2='good':", "MF2=good:", "line 21: good:.*, expected a membership function such as"),
+        ("'good'", "'bad'", "line 16: variable 'service': two terms are named 'bad'"),
+        ("Range = [0 10]", "Range = [0 10 20]", r"line 18: Range is \[0 10 20\], expected two numbers in brackets"),
+        ("Range = [0 10]\n", "", r"line 16: \[Input1\] without Range"),
+        ("[Input2]", "[Input3]", r"\[Input3\] came, and no \[Input2\]; expected them numbered from 1"),
+        ("[Input2]", "[Input1]", r"line 25: section '\[Input1\]' came twice"),
+        ("[Input2]", "[Input]", r"line 25: section '\[Input\]', expected"),
+        ("[Input2]", "[Inputs]", r"line 25: '\[Inputs\]', expected a section"),
+        ("[Rules]\n", "", r"line 39: '1 1, 1 \(1\) : 2', expected a key, = and its value"),
+        ("1 1, 1 (1) : 2", "1 1, -1 (1) : 2", "line 40: '1 1, -1 .* concludes that 'tip' is not in a term"),
+        ("1 1, 1 (1) : 2", "1 1, 0 (1) : 2", "line 40: '1 1, 0 .* has no conclusion"),
+        ("1 1, 1 (1) : 2", "0 0, 1 (1) : 2", "line 40: '0 0, 1 .* has no condition"),
+        ("1 1, 1 (1) : 2", "4 1, 1 (1) : 2", "line 40: .*: 4 for 'service', expected a whole number from -3 to 3"),
+        ("1 1, 1 (1) : 2", "1.5 1, 1 (1) : 2", "line 40: .*: 1.5 for 'service', expected a whole number"),
+        ("1 1, 1 (1) : 2", "1 1 1, 1 (1) : 2", "line 40: .* has 3 numbers in '1 1 1', expected 2"),
+        ("1 1, 1 (1) : 2", "1 1, 1 (1) : 3", "line 40: .* ends in '3', expected 1 for and, 2 for or"),
+        ("1 1, 1 (1) : 2", "1 1, 1 (0) : 2", "line 40: .*weight is 0.0, expected above 0"),
+        ("1 1, 1 (1) : 2", "1 1 1 (1) : 2", "line 40: '1 1 1 .*, expected a rule such as"),
+        ("[System]", "[system]", r"line 3: '\[system\]', expected a section such as \[System\]"),
+    ],
+)
+def test_what_is_not_known_is_refused_with_its_line(old, new, fault):
+    assert old in OTHERS
+    with pytest.raises((FormatError, DefinitionError), match=fault):
+        reads(OTHERS.replace(old, new, 1), "fis")
+
+
+def bent():
+    return Output("tip", (0, 1), (Term("low", Shape(((0, 0), (0.5, 0.7), (1, 0)))),))
+
+
+@pytest.mark.parametrize(
+    ("change", "fault"),
+    [
+        ({"name": "it's"}, "the name \"it's\": expected none of ' = : ,"),
+        ({"outputs": (replace(TIPPING.outputs[0], default=0.5),)}, "the default 0.5 of output 'tip'"),
+        (
+            {"outputs": (bent(),), "rules": ("if quality is poor then tip is low",)},
+            r"the term 'low' of 'tip', \(0, 0\) \(0.5, 0.7\) \(1, 0\): expected a triangle, a trapezoid or a half",
+        ),
+        *(
+            ({"rules": (f"if {condition} then tip is low",)}, f"the condition of R1 .*: expected {why}")
+            for condition, why in (
+                ("quality is poor and (service is poor or service is good)", "one connective per rule"),
+                ("not (quality is poor and service is poor)", "one connective per rule, and only terms negated"),
+                ("quality is not not poor", "one connective per rule, and only terms negated"),
+                ("quality is poor or quality is good", "each input once, in the order of the inputs"),
+                ("service is poor or quality is good", "each input once, in the order of the inputs"),
+            )
+        ),
+    ],
+)
+def test_what_it_cannot_say_is_named(change, fault):
+    with pytest.raises(UnsupportedError, match=f"^fis cannot say {fault}"):
+        writes(replace(TIPPING, **change), "fis")
+
+
+def test_conclusions_stand_in_the_order_of_the_outputs():
+    system = prioritised(form="minimal")
+    rule = Rule(system.rules[0].condition, (system.outputs[1]["low"], system.outputs[0]["high"]))
+    with pytest.raises(
+        UnsupportedError, match=r"fis cannot say the conclusions of R1 .*: expected each output in the order"
+    ):
+        writes(replace(system, rules=(rule,)), "fis")

@@ -1,0 +1,189 @@
+"""The FuzzyLite Language: what fuzzylite writes, and what is refused."""
+
+from dataclasses import replace
+
+import pytest
+
+from fuzzy_arbiter import (
+    DefinitionError,
+    FormatError,
+    Output,
+    Shape,
+    Term,
+    UnsupportedError,
+    Variable,
+    falling,
+    prioritised,
+    rising,
+    trapezoid,
+    triangle,
+)
+from fuzzy_arbiter.formats import reads, writes
+from tests.fuzzy_arbiter.formats.systems import TIPPING
+
+OTHERS = """# a tip for the waiter
+Engine: tip for two
+  description: in the manner of fuzzylite
+InputVariable: service
+  enabled: true
+  range: 0.000 10.000
+  lock-range: true
+  term: poor Triangle -inf 0.000 5.000
+  term: good Trapezoid 0.000 5.000 5.000 inf
+  term: box Rectangle 2.000 1.000 0.500
+  term: late Binary 6.000 inf
+  term: drawn Discrete 0.000 0.000 5.000 1.000 10.000 0.500 0.500
+OutputVariable: tip
+  enabled: true
+  range: 0.000 30.000
+  lock-range: true
+  aggregation: Maximum
+  defuzzifier: Centroid
+  default: nan
+  lock-previous: false
+  term: cheap Ramp 20.000 5.000
+  term: generous Ramp 5.000 20.000  # a comment
+RuleBlock:
+  enabled: true
+  conjunction: AlgebraicProduct
+  disjunction: none
+  implication: AlgebraicProduct
+  activation: General
+  rule: if service is poor and service is not drawn then tip is cheap with 0.500
+RuleBlock: more
+  conjunction: AlgebraicProduct
+  implication: AlgebraicProduct
+  activation: General
+  rule: if (service is good) then tip is generous
+"""
+
+
+def test_an_engine_of_others_is_read():
+    system = reads(OTHERS, "fll")
+    assert (system.name, system.outside, system.points) == ("tip for two", "clip", 1000)
+    assert (system.conjunction, system.disjunction, system.implication) == ("prod", "max", "prod")
+    assert [term.shape for term in system.inputs[0].terms] == [
+        falling(0, 5),
+        rising(0, 5),
+        Shape(((1, 0), (1, 0.5), (2, 0.5), (2, 0))),
+        rising(6, 6),
+        Shape(((0, 0), (5, 0.5), (10, 0.25))),
+    ]
+    assert [term.shape for term in system.outputs[0].terms] == [falling(5, 20), rising(5, 20)]
+    assert system.outputs[0].default is None
+    assert list(map(str, system.rules)) == [
+        "if service is poor and service is not drawn then tip is cheap with 0.5",
+        "if service is good then tip is generous",
+    ]
+
+
+def test_points_and_clipping_are_said_in_its_own_words():
+    system = prioritised(outside="clip", points=64)
+    text = writes(system, "fll")
+    assert text.count("lock-range: true") == 3
+    assert text.count("defuzzifier: Centroid 64\n") == 3
+    assert text.splitlines()[0] == "# fuzzy_arbiter: normalisation = range"
+
+
+def test_terms_are_triangles_trapezoids_and_ramps_where_they_can_be():
+    said = {
+        triangle(1, 2, 3): "Triangle 1 2 3",
+        trapezoid(1, 2, 2.5, 3): "Trapezoid 1 2 2.5 3",
+        rising(1, 3): "Ramp 1 3",
+        falling(1, 3): "Ramp 3 1",
+        rising(3, 3): "Discrete 3 0 3 1",
+        Shape(((1, 0.5), (2, 0.25), (3, 1))): "Discrete 1 0.5 2 0.25 3 1",
+        Shape(((0, 0.5),)): "Discrete 0 0.5",
+    }
+    v = Variable("v", (0, 10), tuple(Term(f"t{i}", shape) for i, shape in enumerate(said)))
+    system = replace(TIPPING, inputs=(v,), rules=("if v is t0 then tip is low",))
+    text = writes(system, "fll")
+    for i, words in enumerate(said.values()):
+        assert f"  term: t{i} {words}\n" in text
+    assert reads(text, "fll") == system
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "fault"),
+    [
+        ("enabled: true", "enabled: false", "line 5: enabled of 'service' is false, expected true"),
+        ("range: 0.000 10.000", "range: 0.000 inf", "line 6: range is 'inf', expected a finite number"),
+        ("  range: 0.000 10.000\n", "", "line 4: range of 'service' is missing, expected two numbers"),
+        ("lock-range: true", "lock-range: yes", "line 7: lock-range of 'service' is yes, expected true or false"),
+        ("Triangle -inf 0.000 5.000", "Gaussian 0 1", "line 8: term type 'Gaussian' is not known here, expected"),
+        ("Triangle -inf 0.000 5.000", "Triangle 0 1", "line 8: Triangle has the numbers '0 1', expected 3"),
+        ("Triangle -inf 0.000 5.000", "Triangle 0 1 2 2", "line 8: Triangle has the height 2.0, expected 0 to 1"),
+        ("Triangle -inf 0.000 5.000", "Triangle 0 nan 2", "line 8: Triangle's number is 'nan', expected a"),
+        ("Triangle -inf 0.000 5.000", "Ramp 1 1", "line 8: Ramp begins and ends at 1.0, expected two places"),
+        ("Triangle -inf 0.000 5.000", "Binary 1 2", "line 8: Binary has the direction 2.0, expected inf or -inf"),
+        ("Triangle -inf 0.000 5.000", "Discrete 1 inf", "line 8: term 'poor': shape: point"),
+        ("Triangle -inf 0.000 5.000", "", "line 8: term type '' is not known here"),
+        ("aggregation: Maximum", "aggregation: AlgebraicSum", "line 17: aggregation of 'tip' is AlgebraicSum, expe"),
+        ("  aggregation: Maximum\n", "", "line 13: aggregation of 'tip' is missing, expected Maximum"),
+        ("Centroid", "Bisector", "line 18: defuzzifier of 'tip' is Bisector, expected Centroid and its resolution"),
+        ("Centroid", "WeightedAverage TakagiSugeno", "line 18: defuzzifier of 'tip' is WeightedAverage TakagiSugeno"),
+        ("default: nan", "default: inf", "line 19: default of 'tip' is 'inf', expected a finite number"),
+        ("default: nan", "default: 31", "line 19: default of 'tip' is 31, outside the range that lock"),
+        ("lock-previous: false", "lock-previous: true", "line 20: lock-previous of 'tip' is true, expected false"),
+        ("conjunction: AlgebraicProduct", "conjunction: none", "line 25: conjunction of '' is none, expected Mini"),
+        ("conjunction: AlgebraicProduct", "conjunction: EinsteinProduct", "line 25: conjunction of '' is Ein"),
+        ("  implication: AlgebraicProduct\n", "", "line 23: implication of '' is missing, expected Minimum or Alge"),
+        ("activation: General", "activation: First 1 0.5", "line 28: activation of '' is First 1 0.5, expect"),
+        ("service is good", "service is very good", "line 34: rule .*: the hedge 'very' is not known here"),
+        ("service is good", "service is god", "line 34: R2 .*'service' has no term 'god'"),
+        ("with 0.500", "with 2", "line 29: .*weight is 2.0"),
+        ("description", "descripton", "line 3: 'descripton' is not known in Engine, expected one of description"),
+        ("  activation: General\n", "  activation: General\n  activation: General\n", "line 29: activation came twice"),
+        ("RuleBlock: more", "Engine: more", "line 31: 'conjunction' is not known in Engine"),
+        ("Engine: tip for two\n", "", "line 2: 'description' came, expected Engine first"),
+        ("  enabled: true", "  enabled", "line 5: 'enabled', expected a key, a colon and its value"),
+    ],
+)  # fmt: skip
+def test_what_is_not_known_is_refused_with_its_line(old, new, fault):
+    assert old in OTHERS
+    with pytest.raises((FormatError, DefinitionError), match=fault):
+        reads(OTHERS.replace(old, new, 1), "fll")
+
+
+def test_one_resolution_and_one_locking_serve_all():
+    text = writes(prioritised(), "fll")
+    with pytest.raises(
+        FormatError, match="'alpha_2' has another defuzzifier than 'alpha_1', expected the same for all"
+    ):
+        reads(text.replace("Centroid 101", "Centroid 100", 1), "fll")
+    with pytest.raises(FormatError, match="'shape' has another lock-range than 'obstacle'"):
+        reads(text.replace("lock-range: false", "lock-range: true", 1), "fll")
+
+
+def test_rule_blocks_have_the_same_operators():
+    head, tail = OTHERS.split("RuleBlock: more")
+    with pytest.raises(FormatError, match="line 30: RuleBlock 'more' has other operators than that before it"):
+        reads(head + "RuleBlock: more" + tail.replace("implication: AlgebraicProduct", "implication: Minimum"), "fll")
+
+
+def test_one_engine_makes_a_file():
+    text = writes(prioritised(), "fll")
+    with pytest.raises(FormatError, match="expected one Engine in a FLL file, 2 came"):
+        reads(f"{text}Engine: twin\n", "fll")
+
+
+@pytest.mark.parametrize(
+    ("change", "fault"),
+    [
+        ({"name": "a#b"}, "the name 'a#b': what follows # is a comment"),
+        ({"inputs": (Variable("max", (0, 1), (Term("a", rising(0, 1)),)),), "rules": ("if max is a then tip is low",)},
+         "the name 'max': it is a word of the language"),
+        ({"outputs": (Output("tip", (0, 1), (Term("very", rising(0, 1)),)),),
+          "rules": ("if quality is poor then tip is very",)}, "the name 'very': it is a word of the language"),
+        ({"rules": ("if not (quality is poor or service is poor) then tip is low",)},
+         "the condition of R1 .*: expected only terms negated"),
+    ],
+)  # fmt: skip
+def test_what_it_cannot_say_is_named(change, fault):
+    with pytest.raises(UnsupportedError, match=f"^fll cannot say {fault}"):
+        writes(replace(TIPPING, **change), "fll")
+
+
+def test_names_of_engines_may_be_any_other_text():
+    system = replace(TIPPING, name="a: b, 'c'")
+    assert reads(writes(system, "fll"), "fll") == system

@@ -1,0 +1,243 @@
+"""Our own schema: the long form, the short form of criteria, and faults that name the key."""
+
+import json
+import tomllib
+from dataclasses import replace
+
+import pytest
+
+from fuzzy_arbiter import (
+    Criterion,
+    DefinitionError,
+    FormatError,
+    Output,
+    Shape,
+    System,
+    Term,
+    Variable,
+    falling,
+    prioritised,
+    rising,
+    trapezoid,
+    triangle,
+)
+from fuzzy_arbiter.formats import reads, writes
+from tests.fuzzy_arbiter.formats.systems import TIPPING
+
+LONG = """
+rules = [
+  "if wind is calm then sail is full",
+  'if wind is strong or wind is "too strong" then sail is reefed with 0.5',
+]
+
+[[inputs]]
+name = "wind"
+universe = [0, 20]
+terms = {calm = {falling = [2, 6]}, strong = {trapezoid = [2, 6, 8, 12]}, "too strong" = [[8, 0], [12, 1]]}
+
+[[outputs]]
+name = "sail"
+universe = [0, 1]
+default = 0.5
+[outputs.terms]
+reefed = {triangle = [0, 0.25, 0.5]}
+full = {rising = [0.5, 1]}
+"""
+
+
+def test_terms_may_be_said_in_words():
+    assert reads(LONG, "toml") == System(
+        (
+            Variable(
+                "wind",
+                (0, 20),
+                (
+                    Term("calm", falling(2, 6)),
+                    Term("strong", trapezoid(2, 6, 8, 12)),
+                    Term("too strong", rising(8, 12)),
+                ),
+            ),
+        ),
+        (Output("sail", (0, 1), (Term("reefed", triangle(0, 0.25, 0.5)), Term("full", rising(0.5, 1))), 0.5),),
+        (
+            "if wind is calm then sail is full",
+            'if wind is strong or wind is "too strong" then sail is reefed with 0.5',
+        ),
+    )
+
+
+def test_json_is_the_same_schema():
+    assert reads(json.dumps(tomllib.loads(LONG)), "json") == reads(LONG, "toml")
+
+
+def test_a_default_may_be_null_in_json():
+    data = tomllib.loads(LONG)
+    data["outputs"][0]["default"] = None
+    assert reads(json.dumps(data), "json").outputs[0].default is None
+
+
+SHORT = """
+name = "regions"
+form = "minimal"
+normalisation = "sum"
+outside = "clip"
+points = 55
+criteria = [{name = "obstacle", on = "near", off = "far", membership = {falling = [1, 3]}}, {name = "depth"}]
+weight = {name = "w", universe = [0, 1], terms = {low = {falling = [0.3, 0.7]}, high = [[0.3, 0], [0.7, 1]]}}
+"""
+
+
+def test_criteria_are_the_short_form():
+    criteria = (Criterion("obstacle", "near", "far", falling(1, 3)), Criterion("depth"))
+    weight = Output("w", (0, 1), (Term("low", falling(0.3, 0.7)), Term("high", rising(0.3, 0.7))))
+    assert reads(SHORT, "toml") == prioritised(criteria, "minimal", weight, "sum", "clip", 55, "regions")
+    assert reads('{"criteria": [{"name": "a"}]}', "json") == prioritised([Criterion("a")])
+
+
+def test_points_of_a_term_stand_on_one_line_and_the_text_is_plain_json_and_toml():
+    line = "[[0.0, 1.0], [5.0, 0.0]]"
+    for format, parse, said in (("json", json.loads, f'"poor": {line},'), ("toml", tomllib.loads, f"poor = {line}")):
+        text = writes(TIPPING, format)
+        assert said in [row.strip() for row in text.splitlines()]
+        assert parse(text)["inputs"][0]["terms"]["poor"] == [[0.0, 1.0], [5.0, 0.0]]
+        assert parse(text)["points"] == 101
+
+
+@pytest.mark.parametrize("format", ["json", "toml"])
+def test_any_name_and_shape_can_be_said(format):
+    names = ("not exist", "it's", "a\\b", "is", "é日𝛼", "1.5", "[x]", "#", "if a is b then c is d")
+    terms = tuple(Term(name, Shape(((0, 0.25), (1, 0.5), (1, 0), (3, 0.125 + i / 64)))) for i, name in enumerate(names))
+    system = System(
+        (Variable("\\", (0, 3), terms),),
+        (Output("=", (-1e300, 3), terms, default=-7e-310),),
+        tuple(f'if "\\" is not "{name}" then "=" is "{name}"' for name in names),
+        name="'''",
+    )
+    assert reads(writes(system, format), format) == system
+
+
+def changed(path, value):
+    data = tomllib.loads(LONG)
+    *folders, key = path
+    place = data
+    for folder in folders:
+        place = place[folder]
+    place[key] = value
+    return json.dumps(data)
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "fault"),
+    [
+        (["rule"], [], "^rule: unknown key, expected one of name, .*rules; did you mean 'rules'"),
+        (["not a key"], 1, "^'not a key': unknown key, expected one of name, conjunction"),
+        (["inputs", 0, "unverse"], 1, r"^inputs\[0\].unverse: unknown key, expected one of name, .*did you mean 'univ"),
+        (["inputs", 0, "default"], 1, r"^inputs\[0\].default: unknown key, expected one of name, universe, terms"),
+        (["inputs"], {}, "^inputs: a table came, expected a list"),
+        (["inputs"], [], "^inputs: none came, expected at least one"),
+        (["inputs", 0], 3, r"^inputs\[0\]: 3 came, expected a table of keys and values"),
+        (["inputs", 0, "name"], 3, r"^inputs\[0\].name: 3 came, expected text"),
+        (["inputs", 0, "name"], " x", r"^inputs\[0\]: variable name is ' x', expected printable text"),
+        (["inputs", 0, "universe"], [0], r"^inputs\[0\].universe: a list came, expected a list of 2 numbers"),
+        (["inputs", 0, "universe"], [0, "1"], r"^inputs\[0\].universe: '1' came, expected a finite number"),
+        (["inputs", 0, "universe"], [0, True], r"^inputs\[0\].universe: True came, expected a finite number"),
+        (["inputs", 0, "universe"], [0, 10**400], r"^inputs\[0\].universe: 1000.* came, expected a finite number"),
+        (["inputs", 0, "universe"], [2, 1], r"^inputs\[0\]: variable 'wind': universe is \[2.0, 1.0\]"),
+        (["inputs", 0, "terms"], [], r"^inputs\[0\].terms: a list came, expected a table"),
+        (["inputs", 0, "terms", "calm"], 1, r"^inputs\[0\].terms.calm: 1 came, expected a list of points, or a table"),
+        (["inputs", 0, "terms", "too strong"], [[1, 2]], r"^inputs\[0\].terms.'too strong': shape: point \(1.0, 2.0\)"),
+        (["inputs", 0, "terms", "calm"], [], r"^inputs\[0\].terms.calm: shape: no points came"),
+        (
+            ["inputs", 0, "terms", "calm"],
+            [[0, 1], 2],
+            r"^inputs\[0\].terms.calm: inputs|^inputs\[0\].terms.calm\[1\]: 2",
+        ),
+        (["inputs", 0, "terms", "calm"], {"gauss": [1, 2]}, r"calm.gauss: unknown key, expected one of triangle, trap"),
+        (["inputs", 0, "terms", "calm"], {"triangle": [1, 2]}, r"calm.triangle: a list came, expected a list of 3 num"),
+        (["inputs", 0, "terms", "calm"], {"rising": [2, 1]}, r"^inputs\[0\].terms.calm: shape: place 1.0 comes after"),
+        (["outputs", 0, "default"], "x", r"^outputs\[0\].default: 'x' came, expected a finite number"),
+        (["rules", 1], 5, r"^rules\[1\]: 5 came, expected text"),
+        (
+            ["rules", 1],
+            "if wind is",
+            r"^rules\[1\]: rule 'if wind is': the end came after 'is', expected a term's name",
+        ),
+        (["rules", 1], "if wind is wet then sail is full", r"^R2 'if wind is wet .*'wind' has no term 'wet', expected"),
+        (["conjunction"], "mn", "^conjunction is 'mn', expected one of min, prod"),
+        (["conjunction"], 1, "^conjunction: 1 came, expected text"),
+        (["points"], 2, "^points is 2, expected a whole number, 3 or more"),
+        (["points"], 101.0, "^points is 101.0, expected a whole number"),
+        (["criteria"], [], "^inputs: unknown key, expected one of name, criteria|^rules: unknown key, expected one of"),
+    ],
+)
+def test_faults_name_the_key(path, value, fault):
+    with pytest.raises((FormatError, DefinitionError), match=fault):
+        reads(changed(path, value), "json")
+
+
+@pytest.mark.parametrize(
+    ("text", "fault"),
+    [
+        ('{"criteria": [{}]}', r"^criteria\[0\].name: key is missing"),
+        ('{"criteria": [{"name": "a", "on": 1}]}', r"^criteria\[0\].on: 1 came, expected text"),
+        ('{"criteria": [{"name": "a", "of": "b"}]}', r"^criteria\[0\].of: unknown key.*did you mean 'off'"),
+        ('{"criteria": [{"name": "a", "on": "off"}]}', r"^criteria\[0\]: criterion 'a': both terms are 'off'"),
+        ('{"criteria": [{"name": "a", "membership": [[0, 1]]}]}', r"^criteria\[0\]: criterion 'a': membership is"),
+        ('{"criteria": []}', "^criteria: none came"),
+        ('{"criteria": [{"name": "a"}], "form": "long"}', "^form is 'long', expected one of hierarchical, minimal"),
+        ('{"criteria": [{"name": "a"}], "form": []}', "^form: a list came, expected text"),
+        ('{"criteria": [{"name": "a"}], "weight": {"name": "w"}}', "^weight.universe: key is missing"),
+        ('{"criteria": [{"name": "a"}], "rules": []}', "^rules: unknown key, expected one of name, criteria"),
+    ],
+)
+def test_faults_of_the_short_form_name_the_key(text, fault):
+    with pytest.raises((FormatError, DefinitionError), match=fault):
+        reads(text, "json")
+
+
+@pytest.mark.parametrize(
+    ("text", "fault"),
+    [
+        ("{", "^line 1: Expecting property name .*, expected JSON"),
+        ('{\n"name": 1,\n}', "^line 3: .* at column 1, expected JSON"),
+        ('{"name": "a", "name": "b"}', "^'name' came twice in one object, expected each key once"),
+        ('{"points": NaN}', "^NaN is no JSON, expected a finite number"),
+        ('{"points": -Infinity}', "^-Infinity is no JSON, expected a finite number"),
+        ('{"points": ' + "1" * 5000 + "}", "^expected JSON: Exceeds the limit"),
+        ("[1]", "^the file: a list came, expected a table of keys and values"),
+        ("{}", "^inputs: key is missing"),
+    ],
+)
+def test_text_that_is_no_json(text, fault):
+    with pytest.raises(FormatError, match=fault):
+        reads(text, "json")
+
+
+@pytest.mark.parametrize(
+    ("text", "fault"),
+    [
+        ("name = \n", r"^expected TOML: Invalid value"),
+        ('name = "a"\nname = "b"\n', r"^expected TOML: Cannot overwrite a value .*line 2"),
+        ("points = 2020-01-01", "^points is datetime.date.2020, 1, 1., expected a whole number|inputs: key is missing"),
+        (
+            LONG.replace("universe = [0, 20]", "universe = [0, inf]"),
+            r"^inputs\[0\].universe: inf came, expected a finite",
+        ),
+        (
+            LONG.replace("universe = [0, 20]", "universe = [0, nan]"),
+            r"^inputs\[0\].universe: nan came, expected a finite",
+        ),
+    ],
+)
+def test_text_that_is_no_toml(text, fault):
+    with pytest.raises((FormatError, DefinitionError), match=fault):
+        reads(text, "toml")
+
+
+def test_a_system_is_written_whole():
+    data = json.loads(writes(replace(TIPPING, outside="clip"), "json"))
+    assert list(data) == [
+        *("name", "conjunction", "disjunction", "implication", "normalisation", "outside", "points"),
+        *("inputs", "outputs", "rules"),
+    ]
+    assert tomllib.loads(writes(replace(TIPPING, outside="clip"), "toml")) == data

@@ -1,0 +1,104 @@
+"""Files that we write mean to other tools what they mean to us."""
+
+import json
+from dataclasses import replace
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+from fuzzy_arbiter import Output, Shape, System, Term, Variable, falling, prioritised, rising, trapezoid, triangle
+from fuzzy_arbiter.engines.exact import ExactEngine
+from fuzzy_arbiter.formats import FORMATS, load, natively, writes
+from tests.fuzzy_arbiter.formats.other_tools import DATA, TOOLS
+from tests.fuzzy_arbiter.formats.systems import TIPPING
+
+GOLDEN = json.loads((DATA / "tipping_centroids.json").read_text())
+# of the universe's width: midpoints, trapezoids, and rectangles from the left, of 1000 points
+WITHIN = {"pyfuzzylite": 1e-5, "octave": 1e-5, "jfuzzylogic": 1.01e-3}
+NEEDED = {
+    "pyfuzzylite": "pyfuzzylite is not installed, nor does FUZZY_LIBRARIES_PYTHON name a Python that has it",
+    "octave": "Octave with its fuzzy-logic-toolkit is not installed",
+    "jfuzzylogic": "Java is not installed, or JFUZZYLOGIC_CLASSPATH does not name jFuzzyLogic's classes",
+}
+
+
+def centroids(system, samples):
+    return np.array([ExactEngine(replace(system, normalisation="none")).centroids(sample) for sample in samples])
+
+
+def test_the_tip_of_the_manuals():
+    assert centroids(TIPPING, [[6.5, 9.8]])[0, 0] == pytest.approx(float(Fraction(12118694, 610275)), abs=1e-14)
+
+
+@pytest.mark.parametrize("format", FORMATS)
+def test_committed_files_are_what_is_written_and_read(format):
+    path = DATA / f"tipping.{format}"
+    assert load(path) == TIPPING
+    assert path.read_text() == writes(TIPPING, format)
+
+
+@pytest.mark.parametrize("tool", TOOLS)
+def test_recorded_centroids_of_other_tools(tool):
+    ours = centroids(TIPPING, GOLDEN["samples"])[:, 0]
+    assert np.abs(ours - GOLDEN[tool]).max() <= 25 * WITHIN[tool]
+
+
+grades = (Term("poor", triangle(0, 0, 5)), Term("good", triangle(1e-5, 5, 10)), Term("great", triangle(5, 10, 10)))
+wild = Shape(((0, 0.2), (2, 0.2), (2, 0.8), (5, 0.1), (9, 1)))
+kick = Output("kick", (-1, 1), (Term("no", falling(-0.5, 0.25)), Term("yes", rising(-0.25, 0.9))))
+tip = (Term("low", triangle(0, 5, 10)), Term("high", trapezoid(20, 22, 25, 30)))
+ALL_CAN_SAY = System(
+    (
+        Variable("service", (0, 10), grades),
+        Variable("food", (0, 10.5), (Term("bad", trapezoid(0, 0, 1, 3)), Term("fine", rising(2, 9)))),
+    ),
+    (Output("tip", (0, 30), (*tip, Term("mid", triangle(10, 15, 20)))), kick),
+    (
+        "if service is poor or food is bad then tip is low and kick is yes",
+        "if service is not great then tip is mid with 0.7",
+        "if service is great or food is fine then tip is high and kick is no with 0.25",
+        "if food is not bad then tip is mid and kick is no with 1e-05",
+    ),
+    normalisation="none",
+    points=1000,
+)
+WILD = replace(
+    ALL_CAN_SAY,
+    inputs=(ALL_CAN_SAY.inputs[0], Variable("food", (0, 10), (*ALL_CAN_SAY.inputs[1].terms, Term("odd", wild)))),
+    outputs=(Output("tip", (0, 30), (*tip, Term("mid", Shape(((10, 0), (15, 0.7), (20, 0))))), default=7.5), kick),
+    rules=(
+        "if (service is poor or food is bad) and service is not good then tip is low and kick is yes",
+        "if service is good and (food is odd or service is not not great) then tip is mid with 0.7",
+        "if service is great or food is fine and food is odd then tip is high and kick is no with 0.25",
+        "if food is fine or food is bad or service is poor then kick is yes with 0.5",
+        "if food is not fine then kick is no",
+    ),
+)  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    "system",
+    [
+        ALL_CAN_SAY,
+        replace(ALL_CAN_SAY, implication="prod"),
+        WILD,
+        replace(WILD, conjunction="prod", disjunction="probor"),
+        prioritised(outside="clip", points=1000),
+        natively(prioritised(points=1000)),
+    ],
+    ids=["plain", "scaled", "wild", "product", "prioritised", "natively"],
+)
+@pytest.mark.parametrize("tool", TOOLS)
+def test_other_tools_give_our_centroids(tool, system, tmp_path, request):
+    found, evaluate = TOOLS[tool]
+    if not found():
+        pytest.skip(NEEDED[tool])
+    if tool == "octave" and ("wild" in request.node.name or "product" in request.node.name):
+        pytest.skip("FIS cannot say this system")
+    random = np.random.default_rng(5)
+    low, high = np.array([v.universe for v in system.inputs]).T
+    samples = random.uniform(low, high, (10, len(low))).tolist()
+    theirs = np.array(evaluate(system, samples, tmp_path))
+    width = np.array([v.universe[1] - v.universe[0] for v in system.outputs])
+    assert (np.abs(centroids(system, samples) - theirs) / width).max() <= WITHIN[tool]

@@ -1,0 +1,207 @@
+"""What is written reads as the same system, or is refused by name; no text ends in a traceback."""
+
+from dataclasses import replace
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from fuzzy_arbiter import (
+    ArbiterError,
+    FormatError,
+    Output,
+    Shape,
+    System,
+    Term,
+    UnsupportedError,
+    Variable,
+    prioritised,
+)
+from fuzzy_arbiter.formats import FORMATS, reads, writes
+from fuzzy_arbiter.hierarchy import FORMS
+from fuzzy_arbiter.propositions import Is, Not
+from tests.fuzzy_arbiter.formats.systems import TIPPING, systems
+
+relaxed = settings(max_examples=40, suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large])
+
+
+@pytest.mark.parametrize("format", FORMATS)
+@pytest.mark.parametrize("form", FORMS)
+def test_prioritised_systems_come_back(format, form):
+    for system in (prioritised(form=form), prioritised(form=form, normalisation="sum", outside="clip", points=77)):
+        assert reads(writes(system, format), format) == system
+
+
+@pytest.mark.parametrize("format", FORMATS)
+@relaxed
+@given(systems(plain=True))
+def test_plain_systems_come_back_in_every_format(format, system):
+    assert reads(writes(system, format), format) == system
+
+
+@pytest.mark.parametrize("format", FORMATS)
+@relaxed
+@given(systems())
+def test_any_system_comes_back_or_is_refused_by_name(format, system):
+    fault = _fault(lambda: writes(system, format), UnsupportedError)
+    if fault is None:
+        assert reads(writes(system, format), format) == system
+    else:
+        assert format in ("fcl", "fis", "fll")
+        assert fault.startswith(f"{format} cannot say the ")
+        assert "\n" not in fault
+
+
+def _fault(call, kind):
+    try:
+        call()
+    except kind as error:
+        return str(error)
+    return None
+
+
+def _require_one_line(text, format):
+    fault = _fault(lambda: reads(text, format), ArbiterError) or ""
+    assert "\n" not in fault
+    assert len(fault) < 1000
+
+
+texts = {f: writes(prioritised(outside="clip", points=55), f) for f in FORMATS}
+SIGNS = st.sampled_from("()[]{}\"'%#*:=;,.0123 -eE\nabct_\\/\u00e9\u2028\0")
+
+
+@pytest.mark.parametrize("format", FORMATS)
+@settings(max_examples=100)
+@given(data=st.data())
+def test_no_damaged_text_ends_in_a_traceback(format, data):
+    text = texts[format]
+    for _ in range(data.draw(st.integers(1, 3))):
+        kind = data.draw(st.sampled_from(("cut", "insert", "replace", "drop", "repeat", "swap")))
+        i = data.draw(st.integers(0, len(text)))
+        lines = text.split("\n")
+        j, k = (data.draw(st.integers(0, len(lines) - 1)) for _ in range(2))
+        if kind == "cut":
+            text = text[:i] + text[i + data.draw(st.integers(1, 6)) :]
+        elif kind == "insert":
+            text = text[:i] + data.draw(SIGNS) + text[i:]
+        elif kind == "replace":
+            text = text[:i] + data.draw(SIGNS) + text[i + 1 :]
+        else:
+            lines[k:k] = [lines[j]] if kind != "drop" else []
+            if kind != "repeat":
+                del lines[j]
+            text = "\n".join(lines)
+    _require_one_line(text, format)
+
+
+@pytest.mark.parametrize("format", FORMATS)
+@given(text=st.text(max_size=60))
+@settings(max_examples=60)
+def test_no_other_text_ends_in_a_traceback(format, text):
+    _require_one_line(text, format)
+
+
+DEEP = "(" * 10_000
+MONSTERS = (
+    "",
+    "\ufeff",
+    "\0",
+    DEEP,
+    "[" * 100_000,
+    '{"a":' * 10_000,
+    "a = " + "[" * 100_000,
+    "a." * 5000 + "b = 1",
+    '{"points": ' + "1" * 5000 + "}",
+    "points = " + "1" * 5000,
+    '{"rules": ["if ' + DEEP + '"], "inputs": [], "outputs": []}',
+    f"FUNCTION_BLOCK x RULEBLOCK y ACCU : MAX; RULE 1 : IF {DEEP}; END_RULEBLOCK END_FUNCTION_BLOCK",
+    f"Engine: x\nRuleBlock:\n  rule: if {'not ' * 10_000}",
+    f"[System]\n[Rules]\n{DEEP}",
+)
+
+
+@pytest.mark.parametrize("format", FORMATS)
+@pytest.mark.parametrize("text", MONSTERS)
+def test_monsters_are_refused_in_few_words(format, text):
+    with pytest.raises(ArbiterError) as error:
+        reads(text, format)
+    assert len(str(error.value)) < 500
+
+
+@pytest.mark.parametrize("format", ["json", "toml", "fcl", "fll"])
+def test_a_rule_is_written_only_as_deep_as_it_can_be_read(format):
+    def nested(depth):
+        condition = Is("quality", "poor")
+        for _ in range(depth):
+            condition = Not(condition) if format == "fll" else ~(condition & Is("service", "poor"))
+        return replace(TIPPING, rules=(replace(TIPPING.rules[0], condition=condition),))
+
+    limit = 50
+    system = nested(limit)
+    assert reads(writes(system, format), format) == system
+    with pytest.raises(
+        UnsupportedError, match=f"{format} cannot say the condition of R1 .*: expected nesting to 100 levels"
+    ):
+        writes(nested(limit + 1), format)
+
+
+@pytest.mark.parametrize("format", FORMATS)
+def test_ends_of_lines_and_a_byte_order_mark_do_not_matter(format):
+    system = prioritised(points=33)
+    assert reads("\ufeff" + writes(system, format).replace("\n", "\r\n"), format) == system
+
+
+@pytest.mark.parametrize("format", ["fcl", "fis", "fll"])
+def test_numbers_are_not_rounded(format):
+    x = 0.1 + 0.2
+    v = Variable("v", (-1e-5, x), (Term("t", Shape(((5e-324, 0.0), (x / 3, 1.0), (1e22, 0.0)))),))
+    o = Output("o", (1 / 3, 1e16), (Term("t", Shape(((1 / 3, 0.0), (123456789.123456789, 1.0), (1e16, 0.0)))),))
+    system = System((v,), (o,), ("if v is t then o is t with 1e-05",))
+    assert reads(writes(system, format), format) == system
+
+
+@pytest.mark.parametrize("format", ["fcl", "fis", "fll"])
+def test_settings_stand_in_one_comment_that_is_read_back(format):
+    text = writes(prioritised(), format)
+    assert "fuzzy_arbiter: normalisation = range" in text.splitlines()[0]
+    assert "(c - 0.3333333333333333) / 0.3333333333333333, held within [0, 1], for alpha_1" in text
+    plain = replace(prioritised(), normalisation="none")
+    assert "fuzzy_arbiter" not in writes(plain, format)
+    assert reads(writes(plain, format), format) == plain
+
+
+@pytest.mark.parametrize("format", ["fcl", "fis", "fll"])
+@pytest.mark.parametrize(
+    ("said", "fault"),
+    [
+        (
+            "fuzzy_arbiter: normalisation = ranje",
+            "line 1: normalisation is 'ranje', expected one of range, none, sum, max",
+        ),
+        ("fuzzy_arbiter: scale = range", "line 1: 'scale = range', expected each once, with = and its value: normalis"),
+        ("fuzzy_arbiter: normalisation", "line 1: 'normalisation', expected each once"),
+        (
+            "fuzzy_arbiter: normalisation = sum, normalisation = sum",
+            "line 1: 'normalisation = sum', expected each once",
+        ),
+        ("fuzy_arbiter: normalisation = range", "line 1: .* is almost such a comment, expected 'fuzzy_arbiter:'"),
+        ("fuzzy_arbiter normalisation = range", "line 1: .* is almost such a comment, expected 'fuzzy_arbiter:'"),
+    ],
+)
+def test_settings_that_there_are_not_are_refused(format, said, fault):
+    text = writes(prioritised(), format).replace("fuzzy_arbiter: normalisation = range", said)
+    with pytest.raises(FormatError, match=fault):
+        reads(text, format)
+
+
+@pytest.mark.parametrize("format", ["fcl", "fis", "fll"])
+def test_settings_come_once(format):
+    text = writes(prioritised(), format)
+    with pytest.raises(FormatError, match=r"line 2: .* is the second such comment after line 1, expected one"):
+        reads(f"{text.splitlines()[0]}\n{text}", format)
+
+
+@pytest.mark.parametrize("call", [lambda: reads("", "xml"), lambda: writes(TIPPING, "xml")])
+def test_other_formats_are_refused(call):
+    with pytest.raises(FormatError, match="format is 'xml', expected one of json, toml, fcl, fis, fll"):
+        call()
