@@ -13,10 +13,11 @@ from typing import NoReturn
 from fuzzy_arbiter.arbiter import Arbiter
 from fuzzy_arbiter.command_line.definitions import BUILT_IN, convert, described, load_system
 from fuzzy_arbiter.command_line.drawing import IMAGES, PICTURES, draw, image
-from fuzzy_arbiter.command_line.files import read_text, require_suffix, write_whole
+from fuzzy_arbiter.command_line.files import read_text, require_suffix
 from fuzzy_arbiter.command_line.values import evaluated, evaluated_table, sample
 from fuzzy_arbiter.engines import ENGINES
 from fuzzy_arbiter.errors import ArbiterError, InputError
+from fuzzy_arbiter.files import write_whole
 
 FINDINGS, FAULT, INTERRUPTED, NO_READER = 1, 2, 130, 141
 
@@ -187,7 +188,7 @@ def _run(options: argparse.Namespace) -> int:
         print(json.dumps(explanation.as_dict(), indent=2, ensure_ascii=False) if options.json else explanation)
     elif options.verb == "plot":
         figure = draw(arbiter, options.kind, options.input, options.output, options.at, options.relief)
-        write_whole(Path(options.out), image(figure, Path(options.out).suffix[1:].lower()))
+        write_whole(options.out, image(figure, Path(options.out).suffix[1:].lower()))
         print(options.out)
     else:
         _evaluate(arbiter, options)
@@ -205,7 +206,7 @@ def _evaluate(arbiter: Arbiter, options: argparse.Namespace) -> None:
     if options.out is None:
         print(text)
     else:
-        write_whole(Path(options.out), f"{text}\n".encode())
+        write_whole(options.out, f"{text}\n".encode())
 
 
 if __name__ == "__main__":

@@ -5,8 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 from fuzzy_arbiter.arbiter import Arbiter
-from fuzzy_arbiter.command_line.files import require_suffix, write_whole
+from fuzzy_arbiter.command_line.files import require_suffix
 from fuzzy_arbiter.definition import Output, System, Variable
+from fuzzy_arbiter.files import write_whole
 from fuzzy_arbiter.hierarchy import prioritised
 
 BUILT_IN = "section-vi"
@@ -106,6 +107,6 @@ def convert(file: str, out: str, native: bool) -> None:
     if suffix in EXPORTS:
         from fuzzy_arbiter.export import to_c, to_python
 
-        write_whole(Path(out), (to_c if suffix == "c" else to_python)(system).encode())
+        write_whole(out, (to_c if suffix == "c" else to_python)(system).encode())
     else:
         save(system, out)

@@ -1,9 +1,7 @@
-"""Files: told by their suffix, read whole, written whole or not at all."""
+"""Files: told by their suffix, and read whole."""
 
 from __future__ import annotations
 
-import os
-import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TextIO
@@ -61,36 +59,3 @@ def require_suffix(out: str, expected: Sequence[str]) -> None:
     """
     if Path(out).suffix[1:].lower() not in expected:
         raise FormatError(f"{out}: suffix is {Path(out).suffix!r}, expected .{', .'.join(expected)}")
-
-
-def write_whole(out: Path, data: bytes) -> None:
-    """Write a file that appears whole or not at all, and replaces an older one.
-
-    Parameters
-    ----------
-    out : Path
-        The file.
-    data : bytes
-        What is to be in it.
-
-    Raises
-    ------
-    FormatError
-        If it cannot be written.
-    """
-    scratch = None
-    try:
-        if out.exists() and not out.is_file():  # a device, a pipe: written to, not replaced
-            if out.is_dir():
-                raise FormatError(f"{out}: is a folder, expected a file")
-            out.write_bytes(data)
-            return
-        with tempfile.NamedTemporaryFile(dir=out.parent, prefix=f".{out.name}-", delete=False) as scratch:
-            scratch.write(data)
-        os.chmod(scratch.name, 0o644)
-        os.replace(scratch.name, out)
-    except OSError as error:
-        raise FormatError(f"{out}: {error.strerror or error}") from error
-    finally:
-        if scratch:
-            Path(scratch.name).unlink(missing_ok=True)

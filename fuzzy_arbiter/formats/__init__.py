@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import os
-import tempfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import Literal, get_args
 
 from fuzzy_arbiter.definition import System
 from fuzzy_arbiter.errors import ArbiterError, FormatError
+from fuzzy_arbiter.files import write_whole
 from fuzzy_arbiter.formats import fcl, fis, fll, json_toml
 from fuzzy_arbiter.formats.native import natively
 
@@ -136,21 +135,7 @@ def save(system: System, path: str | Path) -> None:
     FormatError
         If the file cannot be written.
     """
-    data = writes(system, _format(path)).encode("utf-8")
-    out = Path(path)
-    scratch = None
-    try:
-        if out.exists() and not out.is_file():
-            raise FormatError(f"{path}: exists and is no file, expected the name of a new one")
-        with tempfile.NamedTemporaryFile(dir=out.parent, prefix=f".{out.name}-", delete=False) as scratch:
-            scratch.write(data)
-        os.chmod(scratch.name, 0o644)
-        os.replace(scratch.name, out)
-    except (OSError, ValueError) as error:
-        raise FormatError(f"{path}: {getattr(error, 'strerror', None) or error}") from None
-    finally:
-        if scratch:
-            Path(scratch.name).unlink(missing_ok=True)
+    write_whole(path, writes(system, _format(path)).encode("utf-8"))
 
 
 def _format(path: str | Path) -> str:

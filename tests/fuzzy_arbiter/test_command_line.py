@@ -143,7 +143,7 @@ def test_tables_that_cannot_be_read(refused, tmp_path):
     assert refused("eval", "section-vi", "--csv", "none.csv") == "none.csv: No such file or directory"
     (tmp_path / "ok.csv").write_text(TABLE)
     assert "no/where.csv" in refused("eval", "section-vi", "--csv", "ok.csv", "--out", "no/where.csv")
-    assert "is a folder" in refused("eval", "section-vi", "--csv", "ok.csv", "--out", tmp_path)
+    assert "Is a directory" in refused("eval", "section-vi", "--csv", "ok.csv", "--out", tmp_path)
 
 
 @pytest.mark.parametrize(

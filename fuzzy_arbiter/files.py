@@ -1,0 +1,43 @@
+"""Files that appear whole or not at all."""
+
+from __future__ import annotations
+
+import os
+import secrets
+from pathlib import Path
+
+from fuzzy_arbiter.errors import FormatError
+
+
+def write_whole(path: str | Path, data: bytes) -> None:
+    """Write a file that appears whole or not at all, and replaces an older one.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file; where a link stands, what it leads to.
+    data : bytes
+        What is to be in it.
+
+    Raises
+    ------
+    FormatError
+        If it cannot be written.
+    """
+    scratch = None
+    try:
+        out = Path(path).resolve()
+        if out.is_dir():
+            raise FormatError(f"{path}: Is a directory, expected a file")
+        if out.exists() and not out.is_file():  # a device, a pipe: written to, not replaced
+            out.write_bytes(data)
+            return
+        # not by `tempfile`, whose files are for their owner alone
+        with open(out.with_name(f".{out.name}-{secrets.token_hex(4)}"), "xb") as scratch:
+            scratch.write(data)
+        os.replace(scratch.name, out)
+    except (OSError, ValueError) as error:  # the latter of a name with a null in it
+        raise FormatError(f"{path}: {getattr(error, 'strerror', None) or error}") from None
+    finally:
+        if scratch:
+            Path(scratch.name).unlink(missing_ok=True)

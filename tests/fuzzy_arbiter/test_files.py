@@ -1,0 +1,34 @@
+"""Files appear whole or not at all, with the permissions that other files get."""
+
+import os
+import stat
+
+import pytest
+
+from fuzzy_arbiter import FormatError
+from fuzzy_arbiter.files import write_whole
+
+
+def test_a_file_has_the_permissions_that_the_user_gives_new_ones(tmp_path):
+    before = os.umask(0o027)
+    try:
+        write_whole(tmp_path / "a", b"new")
+    finally:
+        os.umask(before)
+    assert (tmp_path / "a").read_bytes() == b"new"
+    assert stat.S_IMODE((tmp_path / "a").stat().st_mode) == 0o640
+
+
+def test_a_link_stays_one(tmp_path):
+    (tmp_path / "a").write_text("old")
+    (tmp_path / "link").symlink_to(tmp_path / "a")
+    write_whole(tmp_path / "link", b"new")
+    assert (tmp_path / "link").is_symlink() and (tmp_path / "a").read_bytes() == b"new"
+
+
+@pytest.mark.parametrize("name", ["none/a", "folder", "null\0", "long" * 100])
+def test_what_cannot_be_written_leaves_nothing(name, tmp_path):
+    (tmp_path / "folder").mkdir()
+    with pytest.raises(FormatError, match=name[:4]):
+        write_whole(tmp_path / name, b"new")
+    assert [path.name for path in tmp_path.iterdir()] == ["folder"]
