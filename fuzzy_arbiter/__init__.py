@@ -15,7 +15,7 @@ from fuzzy_arbiter.hierarchy import SECTION_VI, Criterion, prioritised
 from fuzzy_arbiter.hysteresis import HysteresisArbiter
 from fuzzy_arbiter.membership import ramp
 from fuzzy_arbiter.propositions import Is
-from fuzzy_arbiter.rule_text import parse_proposition, parse_rule
+from fuzzy_arbiter.rule_text import parse_rule
 from fuzzy_arbiter.shapes import Shape, falling, rising, trapezoid, triangle
 
 __all__ = [
@@ -38,7 +38,6 @@ __all__ = [
     "UnsupportedError",
     "Variable",
     "falling",
-    "parse_proposition",
     "parse_rule",
     "prioritised",
     "ramp",

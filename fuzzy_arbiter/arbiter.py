@@ -61,6 +61,8 @@ class Arbiter:
         system: System | None = None,
         engine: str = "auto",
     ) -> None:
+        if isinstance(criteria, System):
+            raise DefinitionError("criteria: a System came, expected Arbiter(system=...)")
         if system is None:
             system = prioritised(criteria, form, weight, normalisation, outside, points)
         elif (criteria, form, weight, normalisation, outside, points) != (*_DEFAULTS,):

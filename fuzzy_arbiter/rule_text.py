@@ -41,30 +41,6 @@ def parse_rule(text: str) -> Rule:
     return _Parser(text).rule()
 
 
-def parse_proposition(text: str) -> Proposition:
-    """Return the proposition that a text says, such as ``a is b or c is not d``.
-
-    Parameters
-    ----------
-    text : str
-        What can stand between *if* and *then*.
-
-    Returns
-    -------
-    Proposition
-        Whose own text reads as the same proposition again.
-
-    Raises
-    ------
-    DefinitionError
-        If the text is no proposition; it is quoted.
-    """
-    parser = _Parser(text)
-    proposition = parser.disjunction()
-    parser.end()
-    return proposition
-
-
 class _Parser:
     """Reads one text by recursive descent."""
 
@@ -104,9 +80,6 @@ class _Parser:
             raise self.fault(f"{token if found == 'end' else repr(token)} came{before}, expected {what}")
         self.at += 1
         return token
-
-    def end(self) -> None:
-        self.take("end", "the end, 'and' or 'or'")
 
     def rule(self) -> Rule:
         self.take("if", "'if'")

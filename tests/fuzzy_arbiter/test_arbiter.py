@@ -137,6 +137,7 @@ def test_inputs_outside_may_be_clipped():
     [
         ({"criteria": []}, "at least one"),
         ({"criteria": [SECTION_VI[0], SECTION_VI[0]]}, "'obstacle'"),
+        ({"criteria": prioritised()}, r"a System came, expected Arbiter\(system="),
         ({"form": "short"}, "hierarchical, minimal, conjunctive, complete"),
         ({"criteria": [Criterion(f"c{i}") for i in range(17)], "form": "complete"}, "at most 16"),
         ({"engine": "fast"}, "auto, closed, exact, grid, skfuzzy"),
