@@ -10,10 +10,10 @@ from dataclasses import dataclass
 
 from fuzzy_arbiter.arbiter import Arbiter
 from fuzzy_arbiter.definition import System
+from fuzzy_arbiter.domain import random_samples
 from fuzzy_arbiter.engines import ENGINES
 from fuzzy_arbiter.engines.firing import Array
 from fuzzy_arbiter.errors import ArbiterError, EngineError
-from fuzzy_arbiter.sampling import random_samples
 
 REPEATS = 5
 _SECONDS = 0.06  # of a repeat, about

@@ -72,7 +72,7 @@ def draw(
     if kind == "map":
         return _figure(pictures.decisions(arbiter, (first, second), places))
     output = _names(kind, "--output", outputs, [v.name for v in system.outputs], 1)[0]
-    ax = new_axes(5.6, 4.6, projection="3d") if relief else None
+    ax = new_axes(6.4, 5.2, projection="3d") if relief else None
     return _figure(pictures.surface(arbiter, output, (first, second), places, ax=ax))
 
 

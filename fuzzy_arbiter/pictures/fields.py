@@ -10,17 +10,8 @@ import numpy as np
 from fuzzy_arbiter.arbiter import Arbiter
 from fuzzy_arbiter.engines.firing import Array
 from fuzzy_arbiter.errors import DefinitionError
-from fuzzy_arbiter.pictures.style import (
-    INK,
-    colour,
-    fixed_inputs,
-    hatch,
-    new_axes,
-    one_of,
-    said,
-    weights_at,
-    wrapped,
-)
+from fuzzy_arbiter.pictures.places import fixed_inputs, one_of, said, weights_at
+from fuzzy_arbiter.pictures.style import INK, colour, hatch, new_axes, room, wrapped
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -73,21 +64,23 @@ def surface(
     relief = ax is not None and ax.name == "3d"
     ax = new_axes(5.6, 4.4) if ax is None else ax
     if relief:
-        _relief(ax, x, y, np.where(np.isnan(weights[..., k]), np.nan, weights[..., k]), output)
+        _relief(ax, x, y, weights[..., k], over, output)
     elif z.count() == 0 or z.max() - z.min() < _TIE * max(1.0, abs(z).max()):
         ax.contourf(x, y, np.ma.getmaskarray(z).astype(float), levels=[-0.5, 0.5], colors=["#eeeeee"])
         value = "undefined" if z.count() == 0 else f"{output} = {z.max():.4g}"
         ax.text(0.5, 0.5, f"{value} everywhere", transform=ax.transAxes, ha="center")
     else:
         filled = ax.contourf(x, y, z, levels=10, cmap="cividis")
-        levels = np.array(filled.levels)[1:-1:2]
+        ticks = np.array(filled.levels)[::2]
+        levels = ticks[1:-1]
         pale = levels > (levels[0] + levels[-1]) / 2.0  # there the ground is light
         lines = ax.contour(x, y, z, levels=levels, colors=np.where(pale, "#222222", "#ffffff").tolist(), linewidths=0.9)
-        ax.clabel(lines, fontsize=8, fmt="%.3g")
-        bar = ax.figure.colorbar(filled, ax=ax, label=output)
+        bar = ax.figure.colorbar(filled, ax=ax, label=output, ticks=ticks)
+        bar.add_lines(lines)  # labels on the lines themselves would lie on each other where the surface is steep
         bar.outline.set_visible(False)
-    ax.set(xlabel=over[0], ylabel=over[1])
-    ax.set_title(wrapped(f"{output}{where}", 60), fontsize=10, loc="left")
+    if not relief:
+        ax.set(xlabel=over[0], ylabel=over[1])
+    ax.set_title(wrapped(f"{output}{where}", room(ax)), fontsize=10, loc="left")
     return ax
 
 
@@ -169,7 +162,7 @@ def decisions(
         labelspacing=0.8,
     )  # fmt: skip
     ax.set(xlim=(x[0], x[-1]), ylim=(y[0], y[-1]), xlabel=over[0], ylabel=over[1])
-    ax.set_title(wrapped(f"what decides{where}", 60), fontsize=10, loc="left")
+    ax.set_title(wrapped(f"what decides{where}", room(ax)), fontsize=10, loc="left")
     return ax
 
 
@@ -195,9 +188,12 @@ def _field(
     return x, y, weights.reshape(points, points, -1), f"  (at {said(fixed)})" if fixed else ""
 
 
-def _relief(ax: Any, x: Array, y: Array, z: Array, output: str) -> None:
+def _relief(ax: Any, x: Array, y: Array, z: Array, over: tuple[str, str], output: str) -> None:
     across, along = np.meshgrid(x, y)
     every = max(1, len(x) // 30)
     ax.plot_surface(across, along, z, rstride=every, cstride=every, cmap="cividis", edgecolor="white", linewidth=0.2)
-    ax.set_zlabel(output)
+    xlabel, ylabel, zlabel = (wrapped(name, 20) for name in (*over, output))
+    ax.set(xlabel=xlabel, ylabel=ylabel, zlabel=zlabel)
+    ax.xaxis.labelpad, ax.yaxis.labelpad = (4.0 + 10.0 * label.count("\n") for label in (xlabel, ylabel))
+    ax.set_box_aspect(None, zoom=0.8)  # the layout knows nothing of labels in three dimensions
     ax.locator_params(nbins=6)

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from fuzzy_arbiter.arbiter import Arbiter
-from fuzzy_arbiter.definition import Output, Rule
+from fuzzy_arbiter.definition import Output, Rule, variable_names
 from fuzzy_arbiter.engines.firing import Array, Firing, degrees_of_many
 from fuzzy_arbiter.errors import UndefinedOutputError
 from fuzzy_arbiter.pictures.lines import corners
-from fuzzy_arbiter.pictures.style import FAINT, INK, colour, hatch, knots_of, new_axes, one_of, said, wrapped
+from fuzzy_arbiter.pictures.places import one_of, places_in, said
+from fuzzy_arbiter.pictures.style import FAINT, INK, colour, hatch, new_axes, wrapped
 from fuzzy_arbiter.samples import Sample
 
 if TYPE_CHECKING:
@@ -63,82 +64,84 @@ def rules(arbiter: Arbiter, inputs: Sample, output: str | None = None, ax: Axes 
     cuts = firing.cuts(strengths)[k]
 
     concluding = [
-        (i, rule, strength, drawn.term_names.index(conclusion.term))
+        _Row(f"R{i + 1}", rule, strength, drawn.term_names.index(conclusion.term))
         for i, (rule, strength) in enumerate(zip(system.rules, strengths, strict=True))
         for conclusion in rule.conclusions
         if conclusion.variable == drawn.name
     ]
     rows = concluding
     if len(rows) > MOST_ROWS:
-        strongest = sorted((row for row in rows if row[2] > 0.0), key=lambda row: -row[2])[:MOST_ROWS]
+        strongest = sorted((row for row in rows if row.strength > 0.0), key=lambda row: -row.strength)[:MOST_ROWS]
         rows = [row for row in rows if row in strongest]
-    labels = [_label(i, rule) for i, rule, _, _ in rows]
+    labels = [row.label() for row in rows]
     lines = sum(label.count("\n") for label in labels)
     ax = new_axes(7.2, 1.3 + 0.58 * len(rows) + 0.1 * lines + 0.95) if ax is None else ax
 
-    low, high = drawn.universe
-    x = _places(drawn)
+    x = places_in(drawn, 801)
     scaled = system.implication == "prod"
-    foot = len(rows) + _TALL - 0.6  # rows are counted downwards
-    for row, (_, _, strength, j) in enumerate(rows):
-        term = drawn.terms[j]
-        ax.plot([low, high], [row, row], color=FAINT, linewidth=0.7)
-        ends, degrees = corners(term, drawn.universe)
-        ax.plot(ends, row - _HEIGHT * np.array(degrees), color=FAINT, linewidth=1.0)
-        cut = _cut(degrees_of_many(term.shape, x), strength, scaled)
-        if strength > 0.0:
-            ax.fill_between(x, row, row - _HEIGHT * cut, facecolor=colour(j), alpha=0.45, linewidth=0)
-            ax.fill_between(
-                x, row, row - _HEIGHT * cut, facecolor="none", edgecolor=colour(j), hatch=hatch(j), linewidth=0
-            )
-            ax.plot(x, row - _HEIGHT * cut, color=colour(j), linewidth=1.6)
-        decides = strength > 0.0 and strength == cuts[j]
-        ax.annotate(
-            f"{strength:.3f} {term.name}" + (" •" if decides else ""),
-            (1.0, row), xycoords=("axes fraction", "data"), xytext=(8, 4), textcoords="offset points",
-            color=INK if strength > 0.0 else FAINT, fontweight="bold" if decides else "normal",
-            annotation_clip=False, fontsize=9.5,
-        )  # fmt: skip
-
-    joined = np.zeros_like(x)
-    for j, term in enumerate(drawn.terms):
-        joined = np.maximum(joined, _cut(degrees_of_many(term.shape, x), cuts[j], scaled))
+    clipped = [_cut(degrees_of_many(term.shape, x), cut, scaled) for term, cut in zip(drawn.terms, cuts, strict=True)]
+    for place, row in enumerate(rows):  # rows are counted downwards
+        shape = drawn.terms[row.term].shape
+        _draw_row(ax, drawn, place, row, (x, _cut(degrees_of_many(shape, x), row.strength, scaled)), cuts[row.term])
+    foot = len(rows) + _TALL - 0.6
     tall = _TALL * _HEIGHT
-    ax.plot([low, high], [foot, foot], color=INK, linewidth=1.0)
+    joined = np.max(clipped, axis=0)
+    ax.plot(drawn.universe, [foot, foot], color=INK, linewidth=1.0)
     ax.fill_between(x, foot, foot - tall * joined, facecolor="#d9d9d9", linewidth=0)
     ax.plot(x, foot - tall * joined, color=INK, linewidth=1.8)
     text = _centroid(ax, arbiter, values, k, (foot, tall), any(cuts))
 
     hidden = len(concluding) - len(rows)
     joined_label = "joined" + (f"\n({hidden} rules not drawn)" if hidden else "")
-    ax.set_yticks([*(row - 0.12 for row in range(len(rows))), foot - tall / 2.6], [*labels, joined_label])
+    ax.set_yticks([*(place - 0.12 for place in range(len(rows))), foot - tall / 2.6], [*labels, joined_label])
     ax.tick_params(axis="y", length=0, pad=8, labelsize=9)
-    ax.set(xlim=(low, high), ylim=(foot + 0.02, -1.0 + 0.15), xlabel=drawn.name)
+    ax.set(xlim=drawn.universe, ylim=(foot + 0.02, -1.0 + 0.15), xlabel=drawn.name)
     ax.spines[["top", "right", "left"]].set_visible(False)
-    names = (v.name for v in system.inputs)
-    heading = f"{said(dict(zip(names, values, strict=True)))}  →  {text}"
+    heading = f"{said(dict(zip(variable_names(system.inputs), values, strict=True)))}  →  {text}"
     ax.set_title(wrapped(heading, 64), fontsize=10, loc="right", pad=8)
     return ax
 
 
-def _label(i: int, rule: Rule) -> str:
-    """Return a rule's condition in a few lines; the middle of a long one is left out."""
-    weight = "" if rule.weight == 1.0 else f" with {rule.weight:g}"
-    lines = wrapped(f"R{i + 1}: if {rule.condition}{weight}", _LETTERS).split("\n")
-    return "\n".join(lines if len(lines) <= 4 else [*lines[:2], f"{lines[2]} …", lines[-1]])
+@dataclass(frozen=True, slots=True)
+class _Row:
+    """A rule that concludes on the output, how strongly it fires, and which of the output's terms it concludes."""
+
+    name: str
+    rule: Rule
+    strength: float
+    term: int
+
+    def label(self) -> str:
+        """Return the condition in a few lines; the middle of a long one is left out."""
+        weight = "" if self.rule.weight == 1.0 else f" with {self.rule.weight:g}"
+        lines = wrapped(f"{self.name}: if {self.rule.condition}{weight}", _LETTERS).split("\n")
+        return "\n".join(lines if len(lines) <= 4 else [*lines[:2], f"{lines[2]} …", lines[-1]])
+
+
+def _draw_row(ax: Axes, drawn: Output, place: int, row: _Row, outline: tuple[Array, Array], cut: float) -> None:
+    """Draw the term of a rule, what is left of it at the rule's strength, and that strength."""
+    term = drawn.terms[row.term]
+    x, degrees = outline
+    fires = row.strength > 0.0
+    decides = fires and row.strength == cut
+    ax.plot(drawn.universe, [place, place], color=FAINT, linewidth=0.7)
+    ends, whole = corners(term, drawn.universe)
+    ax.plot(ends, place - _HEIGHT * np.array(whole), color=FAINT, linewidth=1.0)
+    if fires:
+        top, ink = place - _HEIGHT * degrees, colour(row.term)
+        ax.fill_between(x, place, top, facecolor=ink, alpha=0.45, linewidth=0)
+        ax.fill_between(x, place, top, facecolor="none", edgecolor=ink, hatch=hatch(row.term), linewidth=0)
+        ax.plot(x, top, color=ink, linewidth=1.6)
+    ax.annotate(
+        f"{row.strength:.3f} {term.name}" + (" •" if decides else ""),
+        (1.0, place), xycoords=("axes fraction", "data"), xytext=(8, 4), textcoords="offset points",
+        color=INK if fires else FAINT, fontweight="bold" if decides else "normal",
+        annotation_clip=False, fontsize=9.5,
+    )  # fmt: skip
 
 
 def _cut(degrees: Array, strength: float, scaled: bool) -> Array:
     return degrees * strength if scaled else np.minimum(degrees, strength)
-
-
-def _places(output: Output) -> Array:
-    """Places close enough for a line, with both sides of every break."""
-    low, high = output.universe
-    knots = np.array(knots_of(output))
-    beside = (high - low) * 1e-9
-    x: Array = np.unique(np.concatenate([np.linspace(low, high, 801), knots, knots - beside, knots + beside]))
-    return x[(low <= x) & (x <= high)]
 
 
 def _centroid(ax: Axes, arbiter: Arbiter, values: Sample, k: int, place: tuple[float, float], fires: bool) -> str:

@@ -6,24 +6,11 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from fuzzy_arbiter.arbiter import Arbiter
 from fuzzy_arbiter.definition import Normalisation, Term
 from fuzzy_arbiter.errors import DefinitionError, InputError
-from fuzzy_arbiter.pictures.style import (
-    FAINT,
-    INK,
-    fixed_inputs,
-    knots_of,
-    legend_above,
-    line_style,
-    new_axes,
-    one_of,
-    said,
-    tidy,
-    weights_at,
-)
+from fuzzy_arbiter.pictures.places import fixed_inputs, one_of, places_in, said, weights_at
+from fuzzy_arbiter.pictures.style import FAINT, INK, legend_above, legend_style, line_style, new_axes, room, tidy
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -137,7 +124,7 @@ def profile(
     fixed = fixed_inputs(arbiter, (over,), at)
     variable = system.inputs[one_of(system.inputs, over, "input")]
     low, high = variable.universe
-    x = np.union1d(np.linspace(low, high, 301), knots_of(variable))
+    x = places_in(variable, 301)
     weights = weights_at(arbiter, fixed, {over: x})
     ax = new_axes(6.0, 3.2) if ax is None else ax
     for k, output in enumerate(system.outputs):
@@ -204,8 +191,9 @@ def normalisations(
     first = next(iter(axes.values()))
     handles, labels = first.get_legend_handles_labels()
     where = f"at {said(fixed)}" if fixed else ""
-    first.figure.legend(
-        handles, labels, loc="outside upper left", ncols=min(len(labels), 6), frameon=False, title=where or None,
-        handlelength=3.2, alignment="left",
-    )  # fmt: skip
+    if new:
+        style = legend_style(labels, where, 2 * room(first))
+        first.figure.legend(handles, labels, loc="outside upper left", frameon=False, **style)
+    else:  # outside is what only some layouts know
+        first.legend(loc="best", framealpha=0.8, **legend_style(labels, where, room(first)))
     return dict(axes)

@@ -23,7 +23,7 @@ from fuzzy_arbiter import (
     trapezoid,
     triangle,
 )
-from fuzzy_arbiter.pictures.style import colour, hatch, line_style
+from fuzzy_arbiter.pictures.style import colour, hatch, line_style, wrapped
 
 MEASURED = (
     Criterion("distance to the nearest obstacle ahead", membership=falling(0.0, 5.0)),
@@ -163,6 +163,19 @@ def test_of_many_terms_no_two_look_alike():
     assert len({(colour(i), hatch(i)) for i in range(36)}) == 36
 
 
+def test_a_legend_is_no_wider_than_its_axes(arbiter):
+    levels = Variable("level", (0, 7), tuple(Term(f"step number {i}", triangle(i - 1, i, i + 1)) for i in range(8)))
+    many = replace(SAIL, inputs=(levels, *SAIL.inputs[1:]), rules=("if waves is low then sail is full",))
+    ax = Figure(figsize=(10.0, 6.0)).add_subplot(2, 3, 1)
+    legend = drawn(pictures.terms(Arbiter(system=many, engine="exact"), "level", ax=ax)).get_legend()
+    assert legend.get_window_extent().width < 1.1 * ax.bbox.width
+    axes = Figure(figsize=(8.0, 6.0)).subplots(2, 1)
+    pictures.normalisations(arbiter, "obstacle", axes=dict(zip(("range", "sum"), axes, strict=True)))
+    assert [ax.get_legend() is not None for ax in axes] == [True, False] and not axes[0].figure.legends
+    texts = wrapped("the first = 1, the second = 2, the third = 3", 16).split("\n")
+    assert not any(text.startswith("=") or text.endswith("=") for text in texts)
+
+
 def test_an_output_s_vertical_edge_stays_vertical(arbiter):
     lines = {line.get_label(): line.get_xydata() for line in pictures.terms(arbiter, "alpha_1").get_lines()}
     assert lines["low"].tolist() == [[0, 1], [1, 0]]
@@ -178,6 +191,15 @@ def test_lines_of_a_profile_are_the_arbiter_s_weights(arbiter):
 def test_a_profile_has_a_gap_where_an_output_is_undefined(sail):
     x, y = pictures.profile(sail, "wind", {"waves": 0.5}).get_lines()[0].get_data()
     assert np.isnan(y[x > 12.0]).all() and np.isfinite(y[x < 12.0]).all()
+
+
+def test_a_profile_jumps_where_the_default_begins(sail):
+    outputs = tuple(replace(output, default=0.0) for output in SAIL.outputs)
+    raw = Arbiter(system=replace(SAIL, outputs=outputs, normalisation="none"))
+    ax = pictures.profile(raw, "wind", {"waves": 0.5})
+    x, y = ax.get_lines()[0].get_data()
+    (jump,) = np.flatnonzero(np.abs(np.diff(y)) > 10.0)[-1:]
+    assert x[jump + 1] - x[jump] < 1e-6 and x[jump] == pytest.approx(12.0)
 
 
 def test_each_normalisation_is_that_of_the_system(arbiter):
@@ -232,6 +254,7 @@ def test_on_three_dimensions_a_surface_is_a_relief(arbiter, sail):
         ax = Figure().add_subplot(projection="3d")
         drawn(pictures.surface(shown, output, over, ax=ax, points=11))
         assert ax.get_zlabel() == output
+        assert (ax.get_xlabel(), ax.get_ylabel()) == over
         assert ax.get_zlim()[0] <= 0.0 and ax.get_zlim()[1] >= 0.8
 
 

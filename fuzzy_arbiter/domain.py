@@ -1,4 +1,4 @@
-"""Samples of a system's inputs: at random, and whether all outputs are defined there."""
+"""Where a system's outputs are defined, and random samples of that."""
 
 from __future__ import annotations
 

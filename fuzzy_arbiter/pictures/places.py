@@ -1,0 +1,146 @@
+"""The places that pictures are drawn for, and the weights there."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from fuzzy_arbiter.arbiter import Arbiter
+from fuzzy_arbiter.definition import Variable
+from fuzzy_arbiter.domain import defined
+from fuzzy_arbiter.engines.firing import Array
+from fuzzy_arbiter.errors import DefinitionError
+
+
+def one_of(variables: Sequence[Variable], name: str, kind: str) -> int:
+    """Return the place of the variable of a name.
+
+    Parameters
+    ----------
+    variables : sequence of Variable
+        Inputs or outputs.
+    name : str
+        Its name.
+    kind : str
+        What the variables are, for the error.
+
+    Returns
+    -------
+    int
+        Its index.
+
+    Raises
+    ------
+    DefinitionError
+        If there is none; those that there are, are listed.
+    """
+    names = [v.name for v in variables]
+    if name not in names:
+        raise DefinitionError(f"no {kind} {name!r}, expected one of {', '.join(names)}")
+    return names.index(name)
+
+
+def fixed_inputs(arbiter: Arbiter, over: Sequence[str], at: Mapping[str, float] | None) -> dict[str, float]:
+    """Return the values of the inputs that a picture does not go over.
+
+    Parameters
+    ----------
+    arbiter : Arbiter
+        Whose inputs.
+    over : sequence of str
+        Inputs that the picture goes over.
+    at : mapping from str to float, optional
+        Values of others.
+
+    Returns
+    -------
+    dict of float by str
+        Values of all others, by default the middle of the universe, in the order of the inputs.
+
+    Raises
+    ------
+    DefinitionError
+        If an input does not exist, or is both fixed and gone over.
+    InputError
+        If a value is not a number in its universe.
+    """
+    inputs = arbiter.system.inputs
+    at = dict(at or {})
+    for name in (*over, *at):
+        one_of(inputs, name, "input")
+    for name in over:
+        if name in at:
+            raise DefinitionError(f"{name!r} is at {at[name]!r}, and the picture goes over it; expected one of the two")
+    if len(set(over)) < len(over):
+        raise DefinitionError(f"{over[0]!r} came twice, expected two inputs")
+    middle = {v.name: (v.universe[0] + v.universe[1]) / 2.0 for v in inputs}
+    values = dict(zip(middle, arbiter.samples.one(middle | at), strict=True))
+    return {name: value for name, value in values.items() if name not in over}
+
+
+def weights_at(arbiter: Arbiter, fixed: Mapping[str, float], over: Mapping[str, Array]) -> Array:
+    """Return the weights at many places, NaN where an output is undefined.
+
+    Parameters
+    ----------
+    arbiter : Arbiter
+        What is drawn.
+    fixed : mapping from str to float
+        Inputs of one value.
+    over : mapping from str to ndarray, shape (n,)
+        All other inputs.
+
+    Returns
+    -------
+    ndarray, shape (n, outputs)
+        Weights.
+    """
+    system = arbiter.system
+    n = len(next(iter(over.values())))
+    samples = np.empty((n, len(system.inputs)))
+    for i, variable in enumerate(system.inputs):
+        samples[:, i] = over[variable.name] if variable.name in over else fixed[variable.name]
+    known = defined(system, samples)
+    weights = np.full((n, len(system.outputs)), np.nan)
+    if known.any():
+        weights[known] = arbiter.batch(samples[known])
+    return weights
+
+
+def said(values: Mapping[str, float]) -> str:
+    """Return values as a text.
+
+    Parameters
+    ----------
+    values : mapping from str to float
+        By name.
+
+    Returns
+    -------
+    str
+        As ``a = 1, b = 0.5``.
+    """
+    return ", ".join(f"{name} = {value:.4g}" for name, value in values.items())
+
+
+def places_in(variable: Variable, count: int) -> Array:
+    """Return places close enough for a line, with both sides of every break of the variable's terms.
+
+    Parameters
+    ----------
+    variable : Variable
+        Over whose universe the line is drawn.
+    count : int
+        Of places at equal distances.
+
+    Returns
+    -------
+    ndarray, shape (count or more,)
+        Increasing, from one end of the universe to the other.
+    """
+    low, high = variable.universe
+    knots = np.array([x for term in variable.terms for x, _ in term.shape.points])
+    beside = (high - low) * 1e-9
+    x: Array = np.unique(np.concatenate([np.linspace(low, high, count), knots, knots - beside, knots + beside]))
+    return x[(low <= x) & (x <= high)]
