@@ -31,7 +31,7 @@ examples:
   python -m fuzzy_arbiter explain arbiter.toml 0.75 1 0
   python -m fuzzy_arbiter verify arbiter.fis || echo "see what it found"
   python -m fuzzy_arbiter convert section-vi arbiter.fis --native
-  python -m fuzzy_arbiter plot section-vi map --input obstacle --input shape --at depth=0.4 --out map.svg
+  python -m fuzzy_arbiter plot section-vi decisions --input obstacle --input shape --at depth=0.4 --out who.svg
 """
 
 
@@ -56,7 +56,13 @@ def _parser() -> argparse.ArgumentParser:
         added = verbs.add_parser(name, help=what, description=f"{what[0].upper()}{what[1:]}.")
         added.add_argument("file", metavar="FILE", help=f"a definition, or {BUILT_IN}")
         if engine:
-            added.add_argument("--engine", choices=ENGINES, default="auto", help="default: %(default)s")
+            added.add_argument(
+                "--engine",
+                choices=ENGINES,
+                default="auto",
+                metavar="NAME",
+                help=f"{', '.join(ENGINES)} (default: %(default)s)",
+            )
         return added
 
     verb("show", "variables, terms, rules, norms, and which engine evaluates them")
@@ -88,10 +94,25 @@ def _parser() -> argparse.ArgumentParser:
     )
 
     plot = verb("plot", "draw terms, rules at a sample, weights over inputs, or which output is the greatest where")
-    plot.add_argument("kind", choices=PICTURES)
-    plot.add_argument("--input", action="append", default=[], metavar="NAME", help="which; for surface and map two")
-    plot.add_argument("--output", action="append", default=[], metavar="NAME", help="which (default: the first)")
-    plot.add_argument("--at", nargs="+", action="extend", default=[], metavar="NAME=VALUE", help="values of inputs")
+    plot.add_argument("kind", choices=PICTURES, metavar="PICTURE", help=", ".join(PICTURES))
+    plot.add_argument(
+        "--input",
+        action="append",
+        default=[],
+        metavar="NAME",
+        help="along which; given twice for surface and decisions (default: the first; for terms all)",
+    )
+    plot.add_argument(
+        "--output", action="append", default=[], metavar="NAME", help="of which (default: the first; for terms all)"
+    )
+    plot.add_argument(
+        "--at",
+        nargs="+",
+        action="extend",
+        default=[],
+        metavar="NAME=VALUE",
+        help="the sample of rules, places in terms, else the other inputs (default: the middle of each)",
+    )
     plot.add_argument("--relief", action="store_true", help="surface in three dimensions")
     plot.add_argument("--out", required=True, metavar="FILE", help=".png, .svg or .pdf")
 

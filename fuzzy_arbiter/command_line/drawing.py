@@ -8,12 +8,20 @@ from typing import TYPE_CHECKING, Any
 
 from fuzzy_arbiter.arbiter import Arbiter
 from fuzzy_arbiter.command_line.values import sample
+from fuzzy_arbiter.definition import variable_names
 from fuzzy_arbiter.errors import InputError
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-PICTURES = ("terms", "rules", "profile", "surface", "map")
+# each with the options that it heeds
+PICTURES: dict[str, tuple[str, ...]] = {
+    "terms": ("--input", "--output", "--at"),
+    "rules": ("--output", "--at"),
+    "profile": ("--input", "--at"),
+    "surface": ("--input", "--output", "--at", "--relief"),
+    "decisions": ("--input", "--at"),
+}
 IMAGES = ("png", "svg", "pdf")
 
 
@@ -31,7 +39,7 @@ def draw(
     ----------
     arbiter : Arbiter
         What is drawn.
-    kind : {"terms", "rules", "profile", "surface", "map"}
+    kind : {"terms", "rules", "profile", "surface", "decisions"}
         Which picture.
     inputs, outputs : sequence of str
         Names; where none came, as many of the first as the picture needs, and for terms all.
@@ -50,28 +58,35 @@ def draw(
     DefinitionError
         If a name is unknown.
     InputError
-        If a value is refused, or the number of inputs or outputs does not fit.
+        If a value is refused, the number of inputs or outputs does not fit, or the picture heeds no such option.
     """
     from fuzzy_arbiter import pictures
     from fuzzy_arbiter.pictures.style import new_axes
 
+    came = {"--input": inputs, "--output": outputs, "--at": at, "--relief": relief}
+    for option, value in came.items():
+        if value and option not in PICTURES[kind]:
+            raise InputError(f"{kind}: {option} came, expected none but {', '.join(PICTURES[kind])}")
     system = arbiter.system
+    input_names, output_names = variable_names(system.inputs), variable_names(system.outputs)
     if kind == "rules":
-        output = _names(kind, "--output", outputs, [v.name for v in system.outputs], 1)[0]
+        output = _names(kind, "--output", outputs, output_names, 1)[0]
         return _figure(pictures.rules(arbiter, sample(at, system), output))
     places: Any = sample(at, system) if at else {}
     if not isinstance(places, dict):
         raise InputError(f"--at {at[0]}: expected name=value")
     if kind == "terms":
-        names = [*inputs, *outputs] or [v.name for v in (*system.inputs, *system.outputs)]
+        names = [*inputs, *outputs] or [*input_names, *output_names]
+        for name in places:
+            if name not in names:
+                raise InputError(f"--at {name}: its terms are not drawn, expected one of {', '.join(names)}")
         return _terms(arbiter, names, places)
-    input_names = [v.name for v in system.inputs]
     if kind == "profile":
         return _figure(pictures.profile(arbiter, _names(kind, "--input", inputs, input_names, 1)[0], places))
     first, second = _names(kind, "--input", inputs, input_names, 2)
-    if kind == "map":
+    if kind == "decisions":
         return _figure(pictures.decisions(arbiter, (first, second), places))
-    output = _names(kind, "--output", outputs, [v.name for v in system.outputs], 1)[0]
+    output = _names(kind, "--output", outputs, output_names, 1)[0]
     ax = new_axes(6.4, 5.2, projection="3d") if relief else None
     return _figure(pictures.surface(arbiter, output, (first, second), places, ax=ax))
 

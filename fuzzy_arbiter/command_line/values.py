@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from fuzzy_arbiter.arbiter import Arbiter
-from fuzzy_arbiter.definition import System
+from fuzzy_arbiter.definition import System, variable_names
 from fuzzy_arbiter.errors import ArbiterError, InputError
 
 
@@ -34,9 +34,8 @@ def sample(words: Sequence[str], system: System) -> list[float] | dict[str, floa
     InputError
         If a word is neither, or a name came twice.
     """
-    names = ", ".join(v.name for v in system.inputs)
     if not words:
-        raise InputError(f"no values came, expected {names}")
+        raise InputError(f"no values came, expected {', '.join(variable_names(system.inputs))}")
     named = ["=" in word for word in words]
     if any(named) and not all(named):
         raise InputError("some values came with a name and some without, expected either")
@@ -94,7 +93,7 @@ def evaluated(arbiter: Arbiter, inputs: Sequence[float] | Mapping[str, float], a
     str
         Weights, in all digits.
     """
-    names = [v.name for v in arbiter.system.outputs]
+    names = variable_names(arbiter.system.outputs)
     weights = dict(zip(names, map(float, arbiter(inputs)), strict=True))
     if as_json:
         return json.dumps(weights, ensure_ascii=False)
@@ -127,8 +126,8 @@ def evaluated_table(arbiter: Arbiter, text: str, where: str, as_json: bool) -> s
     UndefinedOutputError
         If an output is undefined; the line is named.
     """
-    lines, rows = _rows(text, where, [v.name for v in arbiter.system.inputs])
-    names = [v.name for v in arbiter.system.outputs]
+    lines, rows = _rows(text, where, variable_names(arbiter.system.inputs))
+    names = variable_names(arbiter.system.outputs)
     weights: list[list[float]] = []
     if rows:
         try:
@@ -157,7 +156,9 @@ def _rows(text: str, where: str, names: Sequence[str]) -> tuple[list[int], list[
         for name in names:
             if header.count(name) != 1:
                 fault = "stands twice" if name in header else "is missing"
-                raise InputError(f"{where}: column {name!r} {fault} in the first line, expected {', '.join(names)}")
+                came = ", ".join(map(repr, header))
+                came = came if len(came) <= 200 else f"{came[:200]} ..."
+                raise InputError(f"{where}: column {name!r} {fault} in the first line, which has {came or 'none'}")
         columns = [header.index(name) for name in names]
         lines, rows = [], []
         for cells in reader:

@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from fuzzy_arbiter.arbiter import Arbiter
-from fuzzy_arbiter.definition import Normalisation, Term
+from fuzzy_arbiter.definition import Normalisation, Term, variable_names
 from fuzzy_arbiter.errors import DefinitionError, InputError
 from fuzzy_arbiter.pictures.places import fixed_inputs, one_of, places_in, said, weights_at
 from fuzzy_arbiter.pictures.style import FAINT, INK, legend_above, legend_style, line_style, new_axes, room, tidy
@@ -133,7 +133,7 @@ def profile(
     if system.normalisation != "none":
         ax.set_ylim(0.0, 1.0)
     tidy(ax)
-    legend_above(ax, [v.name for v in system.outputs], f"at {said(fixed)}" if fixed else "")
+    legend_above(ax, variable_names(system.outputs), f"at {said(fixed)}" if fixed else "")
     return ax
 
 

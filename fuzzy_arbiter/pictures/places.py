@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from fuzzy_arbiter.arbiter import Arbiter
-from fuzzy_arbiter.definition import Variable
+from fuzzy_arbiter.definition import Variable, variable_names
 from fuzzy_arbiter.domain import defined
 from fuzzy_arbiter.engines.firing import Array
 from fuzzy_arbiter.errors import DefinitionError
@@ -35,7 +35,7 @@ def one_of(variables: Sequence[Variable], name: str, kind: str) -> int:
     DefinitionError
         If there is none; those that there are, are listed.
     """
-    names = [v.name for v in variables]
+    names = variable_names(variables)
     if name not in names:
         raise DefinitionError(f"no {kind} {name!r}, expected one of {', '.join(names)}")
     return names.index(name)

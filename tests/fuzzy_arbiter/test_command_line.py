@@ -122,7 +122,8 @@ def test_eval_of_a_table_takes_columns_by_name(run, tmp_path):
 @pytest.mark.parametrize(
     ("table", "fault"),
     [
-        ("", "column 'obstacle' is missing in the first line, expected obstacle, shape, depth"),
+        ("", "column 'obstacle' is missing in the first line, which has none"),
+        ("obstacle;shape\n", "column 'obstacle' is missing in the first line, which has 'obstacle;shape'"),
         ("obstacle,shape\n1,1\n", "column 'depth' is missing"),
         ("obstacle,shape,shape,depth\n", "column 'shape' stands twice"),
         ("obstacle,shape,depth\n0,0,0\n\n0,0,x\n", "line 4: depth: 'x' is not a number"),
@@ -241,7 +242,7 @@ PLOTS = [
     (["profile", "--input", "shape", "--at", "obstacle=0.2", "depth=0.1"], 1),
     (["surface", "--output", "alpha_2", "--at", "depth=0.5"], 2),
     (["surface", "--relief"], 1),
-    (["map", "--input", "shape", "--input", "depth", "--at", "obstacle=0.1"], 1),
+    (["decisions", "--input", "shape", "--input", "depth", "--at", "obstacle=0.1"], 1),
 ]
 
 
@@ -270,10 +271,16 @@ def test_plot_writes_what_the_suffix_says(run, tmp_path, suffix, magic):
             "no variable 'speed', expected one of obstacle, shape, depth",
         ),
         (["rules", "--out", "a.png"], "no values came, expected obstacle, shape, depth"),
-        (["map", "--input", "shape", "--out", "a.png"], "map: 1 of --input, expected 2 of obstacle, shape, depth"),
-        (["map", "--at", "0.5", "--out", "a.png"], "--at 0.5: expected name=value"),
-        (["map", "--at", "obstacle=0.5", "--out", "a.png"], "the picture goes over it"),
+        (
+            ["decisions", "--input", "shape", "--out", "a.png"],
+            "decisions: 1 of --input, expected 2 of obstacle, shape, depth",
+        ),
+        (["decisions", "--at", "0.5", "--out", "a.png"], "--at 0.5: expected name=value"),
+        (["decisions", "--at", "obstacle=0.5", "--out", "a.png"], "the picture goes over it"),
         (["surface", "--output", "beta", "--out", "a.png"], "no output 'beta'"),
+        (["rules", "--input", "depth", "--out", "a.png"], "rules: --input came, expected none but --output, --at"),
+        (["decisions", "--relief", "--out", "a.png"], "decisions: --relief came, expected none but --input, --at"),
+        (["terms", "--at", "speed=1", "--out", "a.png"], "--at speed: its terms are not drawn, expected one of obst"),
         (["terms"], "plot: the following arguments are required: --out"),
     ],
 )
