@@ -13,8 +13,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from fuzzy_arbiter import SECTION_VI, Arbiter, Criterion, falling
-from fuzzy_arbiter.hysteresis import HysteresisArbiter
+from fuzzy_arbiter import SECTION_VI, Arbiter, Criterion, HysteresisArbiter, falling
 
 Array = NDArray[np.float64]
 Decide = Callable[[Array, Array], Array]

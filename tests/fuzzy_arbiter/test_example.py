@@ -11,6 +11,7 @@ import pytest
 
 from fuzzy_arbiter import Arbiter, Criterion, Is, Rule, Shape, Term, UnsupportedError, prioritised
 from fuzzy_arbiter.__main__ import main
+from fuzzy_arbiter.formats import reads, writes
 from fuzzy_arbiter.hierarchy import FORMS
 from fuzzy_arbiter.propositions import And, Not, Or
 
@@ -104,6 +105,11 @@ def test_what_the_manual_s_code_says_in_comments_is_what_it_gives(tmp_path, monk
             compared += 1
     assert compared >= 15
     assert (tmp_path / "decisions.png").stat().st_size > 1000
+    # the definitions of the manual, written by hand
+    of_criteria, of_rules = (reads(text, "toml") for text in re.findall(r"```toml\n(.*?)```", MANUAL, re.S))
+    assert of_criteria == names["arbiter"].system
+    assert of_rules.inputs == names["system"].inputs[:1]
+    assert of_rules.outputs == (replace(names["sail"], default=None),)
     assert "\n".join(f"    {line}".rstrip() for line in str(names["explanation"]).splitlines()) in MANUAL
 
 
@@ -121,7 +127,7 @@ def test_the_manual_s_commands_run(tmp_path, monkeypatch, capsys):
         assert module == "fuzzy_arbiter"
         if words[0] != "bench":
             assert main(words) == 0, line
-    assert {path.name for path in tmp_path.iterdir()} >= {"weights.csv", "arbiter.fis", "arbiter.c", "map.svg"}
+    assert {path.name for path in tmp_path.iterdir()} >= {"weights.csv", "arbiter.fis", "arbiter.c", "who.svg"}
 
 
 def test_the_manual_s_pictures_are_those_that_its_script_draws(tmp_path, monkeypatch):
@@ -220,8 +226,6 @@ def changed(what):
 
 @pytest.mark.parametrize("row", table("Formats")[2:-1], ids=lambda row: row[0])
 def test_formats_can_say_what_the_manual_says(row):
-    from fuzzy_arbiter.formats import reads, writes
-
     system = changed(row[0])
     for formats, answer in zip((["json", "toml"], ["fcl"], ["fis"], ["fll"]), row[1:], strict=True):
         for name in formats:
