@@ -1,4 +1,8 @@
-"""A fuzzy arbiter of prioritised criteria, which decides to what degree each one matters now."""
+"""A fuzzy arbiter of prioritised criteria, which decides to what degree each one matters now.
+
+`Arbiter` loads, saves, decides, explains and verifies. The modules `pictures`, `formats` (files as systems, `natively`)
+and `export` (C and Python code) are there for those who ask for more.
+"""
 
 from fuzzy_arbiter.arbiter import Arbiter
 from fuzzy_arbiter.definition import Output, Rule, System, Term, Variable
