@@ -174,6 +174,13 @@ def test_normalisation():
             assert Arbiter(normalisation=normalisation, engine=engine)([0, 0, 0]) == (0, 0, 0)  # not 0/0
 
 
+def test_without_scikit_fuzzy_it_is_said(monkeypatch):
+    monkeypatch.delitem(sys.modules, "fuzzy_arbiter.engines.scikit", raising=False)
+    monkeypatch.setitem(sys.modules, "skfuzzy", None)
+    with pytest.raises(EngineError, match="skfuzzy is not installed"):
+        Arbiter(engine="skfuzzy")
+
+
 def test_it_says_which_engine_it_took_and_why():
     assert (Arbiter().engine, Arbiter(form="complete").engine) == ("closed", "exact")
     assert "closed form" in Arbiter().why
