@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import os
-import tempfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import Literal, get_args
 
+from fuzzy_arbiter.checks import shown
 from fuzzy_arbiter.definition import System
-from fuzzy_arbiter.errors import ArbiterError, FormatError
+from fuzzy_arbiter.errors import ArbiterError, FormatError, UnsupportedError
+from fuzzy_arbiter.files import write_whole
 from fuzzy_arbiter.formats import fcl, fis, fll, json_toml
 from fuzzy_arbiter.formats.native import natively
 
@@ -57,6 +57,8 @@ def reads(text: str, format: str) -> System:
         If what it defines cannot be.
     """
     _require_format(format, f"format is {format!r}")
+    if not isinstance(text, str):
+        raise FormatError(f"{shown(text)} came, expected text")
     return _READ[format](text.removeprefix("\ufeff").replace("\r\n", "\n").replace("\r", "\n"))
 
 
@@ -83,6 +85,8 @@ def writes(system: System, format: str) -> str:
         If the format cannot say all of the system; what it cannot say is named.
     """
     _require_format(format, f"format is {format!r}")
+    if not isinstance(system, System):
+        raise UnsupportedError(f"{shown(system)} came, expected a System")
     return _WRITE[format](system)
 
 
@@ -136,21 +140,7 @@ def save(system: System, path: str | Path) -> None:
     FormatError
         If the file cannot be written.
     """
-    data = writes(system, _format(path)).encode("utf-8")
-    out = Path(path)
-    scratch = None
-    try:
-        if out.exists() and not out.is_file():
-            raise FormatError(f"{path}: exists and is no file, expected the name of a new one")
-        with tempfile.NamedTemporaryFile(dir=out.parent, prefix=f".{out.name}-", delete=False) as scratch:
-            scratch.write(data)
-        os.chmod(scratch.name, 0o644)
-        os.replace(scratch.name, out)
-    except (OSError, ValueError) as error:
-        raise FormatError(f"{path}: {getattr(error, 'strerror', None) or error}") from None
-    finally:
-        if scratch:
-            Path(scratch.name).unlink(missing_ok=True)
+    write_whole(path, writes(system, _format(path)).encode("utf-8"))
 
 
 def _format(path: str | Path) -> str:
