@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from numbers import Integral, Real
+from numbers import Integral
 from typing import Literal, TypeVar, get_args
 
+from fuzzy_arbiter.checks import all_of, finite, require_name, shown
 from fuzzy_arbiter.errors import DefinitionError
 from fuzzy_arbiter.propositions import Is, Proposition
 from fuzzy_arbiter.shapes import Shape
@@ -18,13 +18,31 @@ Implication = Literal["min", "prod"]
 Normalisation = Literal["range", "none", "sum", "max"]
 Outside = Literal["refuse", "clip"]
 
+MAX_POINTS = 1_000_000_000
+WIDTHS = (
+    1e-100,
+    1e100,
+)  # of an output's universe; moments are products of such widths, which must not over- or underflow
+
 
 @dataclass(frozen=True, slots=True)
 class Term:
-    """A word for a part of a universe, and to what degree each place belongs to it."""
+    """A word for a part of a universe, and to what degree each place belongs to it.
+
+    Raises
+    ------
+    DefinitionError
+        If the shape is none.
+    """
 
     name: str
     shape: Shape
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.shape, Shape):
+            raise DefinitionError(
+                f"term {shown(self.name)}: shape is {shown(self.shape)}, expected such as triangle(0, 1, 2)"
+            )
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,20 +76,22 @@ class Variable:
     terms: tuple[Term, ...]
 
     def __post_init__(self) -> None:
-        _require_name(self.name, "variable")
+        require_name(self.name, "variable")
         what = f"variable {self.name!r}"
-        bounds = tuple(self.universe)
-        if len(bounds) != 2 or not all(isinstance(x, Real) and math.isfinite(x) for x in bounds):
-            raise DefinitionError(f"{what}: universe is {self.universe!r}, expected two finite numbers")
-        low, high = map(float, bounds)
+        bounds = tuple(map(finite, self.universe)) if isinstance(self.universe, Iterable) else ()
+        if len(bounds) != 2 or bounds[0] is None or bounds[1] is None:
+            raise DefinitionError(f"{what}: universe is {shown(self.universe)}, expected two finite numbers")
+        low, high = bounds[0], bounds[1]
         if not low < high:
             raise DefinitionError(f"{what}: universe is [{low}, {high}], expected the first below the second")
+        if finite(high - low) is None:
+            raise DefinitionError(f"{what}: universe is [{low}, {high}], expected a finite width")
         object.__setattr__(self, "universe", (low, high))
-        terms = tuple(self.terms)
+        terms = all_of(Term, self.terms, f"{what}: terms", "a sequence of Term")
         if not terms:
             raise DefinitionError(f"{what}: no terms came, expected at least one")
         for term in terms:
-            _require_name(term.name, f"{what}: term")
+            require_name(term.name, f"{what}: term")
         twice = _repeated(term.name for term in terms)
         if twice is not None:
             raise DefinitionError(f"{what}: two terms are named {twice!r}, expected each name once")
@@ -86,7 +106,9 @@ class Variable:
             If there is no such term.
         """
         if term not in self.term_names:
-            raise DefinitionError(f"{self.name!r} has no term {term!r}, expected one of {', '.join(self.term_names)}")
+            raise DefinitionError(
+                f"{self.name!r} has no term {shown(term)}, expected one of {', '.join(self.term_names)}"
+            )
         return Is(self.name, term)
 
     @property
@@ -107,7 +129,8 @@ class Output(Variable):
     Raises
     ------
     DefinitionError
-        If a term has no area in the universe, so that it has no centroid.
+        If a term has no area in the universe, so that it has no centroid, or the universe is wider than 1e100 or
+        narrower than 1e-100, so that floating point cannot hold its moments.
     """
 
     default: float | None = None
@@ -115,13 +138,17 @@ class Output(Variable):
     def __post_init__(self) -> None:
         # not super(): the decorator makes the class anew for its slots, and the method keeps the old one
         Variable.__post_init__(self)
+        what = f"output {self.name!r}"
+        if not WIDTHS[0] <= self.universe[1] - self.universe[0] <= WIDTHS[1]:
+            raise DefinitionError(f"{what}: universe is [{_span(self)}], expected a width from 1e-100 to 1e+100")
         for term in self.terms:
             if not term.shape.area(self.universe) > 0.0:
-                raise DefinitionError(f"output {self.name!r}: term {term.name!r} has no area in [{_span(self)}]")
+                raise DefinitionError(f"{what}: term {term.name!r} has no area in [{_span(self)}]")
         if self.default is not None:
-            if not (isinstance(self.default, Real) and math.isfinite(self.default)):
-                raise DefinitionError(f"output {self.name!r}: default is {self.default!r}, expected a finite number")
-            object.__setattr__(self, "default", float(self.default))
+            default = finite(self.default)
+            if default is None:
+                raise DefinitionError(f"{what}: default is {shown(self.default)}, expected a finite number")
+            object.__setattr__(self, "default", default)
 
 
 @dataclass(frozen=True, slots=True)
@@ -148,17 +175,18 @@ class Rule:
     weight: float = 1.0
 
     def __post_init__(self) -> None:
-        conclusions = (self.conclusions,) if isinstance(self.conclusions, Is) else tuple(self.conclusions)
-        object.__setattr__(self, "conclusions", conclusions)
         if not isinstance(self.condition, Proposition):
-            raise DefinitionError(f"rule: condition is {self.condition!r}, expected such as variable['term']")
-        if not conclusions or not all(isinstance(c, Is) for c in conclusions):
-            raise DefinitionError(
-                f"rule {str(self.condition)!r}: conclusions are {conclusions!r}, expected output['term']"
-            )
-        if not (isinstance(self.weight, Real) and 0.0 < self.weight <= 1.0):
-            raise DefinitionError(f"{str(self)!r}: weight is {self.weight!r}, expected above 0 and at most 1")
-        object.__setattr__(self, "weight", float(self.weight))
+            raise DefinitionError(f"rule: condition is {shown(self.condition)}, expected such as variable['term']")
+        found = (self.conclusions,) if isinstance(self.conclusions, Is) else self.conclusions
+        conclusions = all_of(Is, found, self.condition, "as conclusions output['term'] or a sequence of such")
+        if not conclusions:
+            raise DefinitionError(f"{self.condition}: no conclusions came, expected output['term']")
+        weight = finite(self.weight)
+        if weight is None or not 0.0 < weight <= 1.0:
+            rule = str(Rule(self.condition, conclusions))
+            raise DefinitionError(f"{rule!r}: weight is {shown(self.weight)}, expected above 0 and at most 1")
+        object.__setattr__(self, "conclusions", conclusions)
+        object.__setattr__(self, "weight", weight)
 
     def __str__(self) -> str:
         conclusions = " and ".join(map(str, self.conclusions))
@@ -192,7 +220,7 @@ class System:
     outside : {"refuse", "clip"}
         What happens to an input outside its universe.
     points : int
-        Points of an output's universe, 3 or more, for those engines and formats that sample it.
+        Points of an output's universe, 3 to 1 000 000 000, for those engines and formats that sample it.
 
     Raises
     ------
@@ -214,16 +242,20 @@ class System:
     def __post_init__(self) -> None:
         from fuzzy_arbiter.rule_text import parse_rule  # it needs the rules that are defined here
 
-        rules: list[Rule | str] = list(self.rules)
-        object.__setattr__(self, "inputs", tuple(self.inputs))
-        object.__setattr__(self, "outputs", tuple(self.outputs))
+        rules: tuple[Rule | str, ...] = all_of((Rule, str), self.rules, "rules", "a sequence of Rule or text")
+        for key, kind in (("inputs", Variable), ("outputs", Output)):
+            found = all_of(kind, getattr(self, key), key, f"a sequence of {kind.__name__}")
+            object.__setattr__(self, key, found)
         object.__setattr__(self, "rules", tuple(parse_rule(r) if isinstance(r, str) else r for r in rules))
-        _require_name(self.name, "system")
+        require_name(self.name, "system")
         for key, choices in _CHOICES.items():
-            if getattr(self, key) not in choices:
-                raise DefinitionError(f"{key} is {getattr(self, key)!r}, expected one of {', '.join(choices)}")
-        if not (isinstance(self.points, Integral) and self.points >= 3):
-            raise DefinitionError(f"points is {self.points!r}, expected a whole number, 3 or more")
+            choice = getattr(self, key)
+            if not isinstance(choice, str) or choice not in choices:
+                raise DefinitionError(f"{key} is {shown(choice)}, expected one of {', '.join(choices)}")
+        if not (isinstance(self.points, Integral) and 3 <= self.points <= MAX_POINTS):
+            raise DefinitionError(
+                f"points is {shown(self.points)}, expected a whole number, 3 or more, to {MAX_POINTS}"
+            )
         object.__setattr__(self, "points", int(self.points))
         for key in ("inputs", "outputs", "rules"):
             if not getattr(self, key):
@@ -254,11 +286,6 @@ _CHOICES = {
     "outside": get_args(Outside),
 }
 _N = TypeVar("_N", bound=str)
-
-
-def _require_name(name: object, what: str) -> None:
-    if not isinstance(name, str) or not name or name != name.strip() or not name.isprintable() or '"' in name:
-        raise DefinitionError(f"{what} name is {name!r}, expected printable text without double quotes or outer spaces")
 
 
 def _require_known(statement: Is, known: dict[str, frozenset[str]], kind: str, where: str) -> None:

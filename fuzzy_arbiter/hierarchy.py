@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal, get_args
 
+from fuzzy_arbiter.checks import all_of, require_name, shown
 from fuzzy_arbiter.definition import Normalisation, Output, Outside, Rule, System, Term, Variable
 from fuzzy_arbiter.errors import DefinitionError
 from fuzzy_arbiter.propositions import And, Is, Or, Proposition
@@ -46,8 +47,14 @@ class Criterion:
     membership: Shape = DEGREE
 
     def __post_init__(self) -> None:
+        for key in ("name", "on", "off"):
+            require_name(getattr(self, key), f"criterion {shown(self.name)}: {key}" if key != "name" else "criterion")
         if self.on == self.off:
             raise DefinitionError(f"criterion {self.name!r}: both terms are {self.on!r}, expected two names")
+        if not isinstance(self.membership, Shape):
+            raise DefinitionError(
+                f"criterion {self.name!r}: membership is {shown(self.membership)}, expected such as rising(0.5, 3)"
+            )
         if len(self.membership.points) < 2 or self.membership.jumps:
             raise DefinitionError(
                 f"criterion {self.name!r}: membership is {self.membership.points}, expected a change without jumps"
@@ -103,11 +110,13 @@ def prioritised(
     DefinitionError
         If there is no criterion, two share a name, or the pattern has not two terms.
     """
-    criteria = tuple(criteria)
+    criteria = all_of(Criterion, criteria, "criteria", "a sequence of Criterion")
     if not criteria:
         raise DefinitionError("criteria: none came, expected at least one")
-    if form not in FORMS:
+    if not isinstance(form, str) or form not in FORMS:
         raise DefinitionError(f"form is {form!r}, expected one of {', '.join(FORMS)}")
+    if not isinstance(weight, Output):
+        raise DefinitionError(f"weight is {shown(weight)}, expected an Output")
     if len(weight.terms) != 2:
         raise DefinitionError(f"weight {weight.name!r}: {len(weight.terms)} terms came, expected two, low and high")
     outputs = tuple(replace(weight, name=f"{weight.name}_{k + 1}") for k in range(len(criteria)))

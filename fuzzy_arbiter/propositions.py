@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
+from fuzzy_arbiter.checks import all_of, shown
 from fuzzy_arbiter.errors import DefinitionError
 
+MAX_NESTING = 100  # parentheses and negations within each other; what is deeper is no rule that a person wrote
 KEYWORDS = ("if", "then", "and", "or", "not", "is", "with")
 _PLAIN = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 
@@ -45,15 +47,22 @@ def quoted(name: str) -> str:
 
 
 class Proposition:
-    """Something that holds to a degree; ``&``, ``|`` and ``~`` combine propositions."""
+    """Something that holds to a degree; ``&``, ``|`` and ``~`` combine propositions.
+
+    Raises
+    ------
+    DefinitionError
+        If it is made of anything but propositions, or its text nests deeper than 100.
+    """
 
     __slots__ = ()
+    nesting: int = 0  # parentheses and negations within each other in the text
 
     def __and__(self, other: Proposition) -> And:
-        return And((self, other)) if isinstance(other, Proposition) else NotImplemented
+        return And((self, other))
 
     def __or__(self, other: Proposition) -> Or:
-        return Or((self, other)) if isinstance(other, Proposition) else NotImplemented
+        return Or((self, other))
 
     def __invert__(self) -> Not:
         return Not(self)
@@ -73,6 +82,10 @@ class Is(Proposition):
     variable: str
     term: str
 
+    def __post_init__(self) -> None:
+        if not (isinstance(self.variable, str) and isinstance(self.term, str)):
+            raise DefinitionError(f"{shown(self.variable)} is {shown(self.term)}: expected the names of both")
+
     def terms(self) -> Iterator[Is]:
         """Yield this statement."""
         yield self
@@ -86,16 +99,16 @@ class _Join(Proposition):
     """Two or more propositions under one connective; nested ones of the same kind are one."""
 
     parts: tuple[Proposition, ...]
+    nesting: int = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         flat: list[Proposition] = []
-        for part in self.parts:
-            if not isinstance(part, Proposition):
-                raise DefinitionError(f"{part!r} is not a proposition, expected such as variable['term']")
+        for part in all_of(Proposition, self.parts, type(self).__name__, "such as variable['term']"):
             flat += part.parts if isinstance(part, _Join) and type(part) is type(self) else [part]
         if len(flat) < 2:
             raise DefinitionError(f"{type(self).__name__} of {len(flat)} propositions, expected two or more")
         object.__setattr__(self, "parts", tuple(flat))
+        _set_nesting(self, max(part.nesting + isinstance(part, _Join) for part in flat))
 
     def terms(self) -> Iterator[Is]:
         """Yield the statements of all parts."""
@@ -127,6 +140,12 @@ class Not(Proposition):
     """The part does not hold."""
 
     part: Proposition
+    nesting: int = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.part, Proposition):
+            raise DefinitionError(f"not: {shown(self.part)} came, expected such as variable['term']")
+        _set_nesting(self, self.part.nesting + (1 if isinstance(self.part, Is) else 2))
 
     def terms(self) -> Iterator[Is]:
         """Yield the statements of the part."""
@@ -136,3 +155,10 @@ class Not(Proposition):
         if isinstance(self.part, Is):
             return f"{quoted(self.part.variable)} is not {quoted(self.part.term)}"
         return f"not ({self.part})"
+
+
+def _set_nesting(proposition: _Join | Not, nesting: int) -> None:
+    # Python's own stack is the limit of whatever goes through a proposition, so that it stays far from it
+    if nesting > MAX_NESTING:
+        raise DefinitionError(f"nested deeper than {MAX_NESTING} parentheses and negations")
+    object.__setattr__(proposition, "nesting", nesting)

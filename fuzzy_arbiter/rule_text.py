@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
+from typing import Any
 
+from fuzzy_arbiter.checks import shown
 from fuzzy_arbiter.definition import Rule
 from fuzzy_arbiter.errors import DefinitionError
-from fuzzy_arbiter.propositions import KEYWORDS, And, Is, Not, Or, Proposition
+from fuzzy_arbiter.propositions import KEYWORDS, MAX_NESTING, And, Is, Not, Or, Proposition
 
 _TOKEN = re.compile(
     r"""\s*(?: (?P<quoted>"[^"]*") | (?P<number>[0-9.]+(?:[eE][+-]?[0-9]+)?(?![A-Za-z_]))
         | (?P<word>[^\W\d]\w*) | (?P<sign>[()&|~,]) | (?P<other>\S) )""",
     re.VERBOSE,
 )
-MAX_NESTING = 100  # parentheses and negations within each other; what is deeper is no rule that a person wrote
 _SIGNS = {"&": "and", "|": "or", "~": "not", ",": ","}
 
 
@@ -45,6 +47,8 @@ class _Parser:
     """Reads one text by recursive descent."""
 
     def __init__(self, text: str) -> None:
+        if not isinstance(text, str):
+            raise DefinitionError(f"rule: {shown(text)} came, expected text")
         self.text = text
         self.tokens: list[tuple[str, str]] = []  # kind (keyword or sign itself, "name", "number", "end") and text
         for match in _TOKEN.finditer(text):
@@ -108,23 +112,29 @@ class _Parser:
         parts = [self.conjunction()]
         while self.accept("or"):
             parts.append(self.conjunction())
-        return Or(tuple(parts)) if len(parts) > 1 else parts[0]
+        return self.made(Or, tuple(parts)) if len(parts) > 1 else parts[0]
 
     def conjunction(self) -> Proposition:
         parts = [self.statement()]
         while self.accept("and"):
             parts.append(self.statement())
-        return And(tuple(parts)) if len(parts) > 1 else parts[0]
+        return self.made(And, tuple(parts)) if len(parts) > 1 else parts[0]
+
+    def made(self, kind: Callable[[Any], Proposition], parts: Any) -> Proposition:
+        try:
+            return kind(parts)
+        except DefinitionError as error:
+            raise self.fault(str(error)) from None
 
     def deeper(self) -> None:
         self.depth += 1
         if self.depth > MAX_NESTING:
-            raise self.fault(f"nested deeper than {MAX_NESTING}")
+            raise self.fault(f"nested deeper than {MAX_NESTING} parentheses and negations")
 
     def statement(self) -> Proposition:
         if self.accept("not"):
             self.deeper()
-            inner: Proposition = Not(self.statement())
+            inner = self.made(Not, self.statement())
             self.depth -= 1
             return inner
         if self.accept("("):
@@ -138,9 +148,7 @@ class _Parser:
         negations = 0
         while self.accept("not"):
             negations += 1
-            if self.depth + negations > MAX_NESTING:
-                raise self.fault(f"nested deeper than {MAX_NESTING}")
         statement: Proposition = Is(variable, self.take("name", "a term's name"))
         for _ in range(negations):
-            statement = Not(statement)
+            statement = self.made(Not, statement)
         return statement

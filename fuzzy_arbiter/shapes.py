@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from bisect import bisect_left
+from collections.abc import Iterator
 from dataclasses import dataclass
 from fractions import Fraction
 
+from fuzzy_arbiter.checks import finite, shown
 from fuzzy_arbiter.errors import DefinitionError
 
 Point = tuple[float, float]
@@ -38,26 +39,35 @@ class Shape:
     points: tuple[Point, ...]
 
     def __post_init__(self) -> None:
-        try:
-            points = [(float(x), float(degree)) for x, degree in self.points]
-        except (TypeError, ValueError):
-            raise DefinitionError(f"shape {self.points!r}: expected pairs of numbers (place, degree)") from None
+        points = list(self._pairs())
         if not points:
             raise DefinitionError("shape: no points came, expected at least one")
-        for x, degree in points:
-            if not (math.isfinite(x) and 0.0 <= degree <= 1.0):
-                raise DefinitionError(f"shape: point ({x}, {degree}), expected a finite place and a degree in [0, 1]")
         for (a, _), (b, _) in zip(points, points[1:], strict=False):
             if b < a:
                 raise DefinitionError(f"shape: place {b} comes after {a}, expected places that never decrease")
         for (a, _), (b, _) in zip(points, points[2:], strict=False):
             if a == b:
                 raise DefinitionError(f"shape: more than two points at {a}, expected at most two, which make a jump")
+        if finite(points[-1][0] - points[0][0]) is None:
+            raise DefinitionError(f"shape: places {points[0][0]} to {points[-1][0]}, expected a finite distance")
         while len(points) > 1 and points[0][1] == points[1][1]:
             del points[0]
         while len(points) > 1 and points[-1][1] == points[-2][1]:
             del points[-1]
         object.__setattr__(self, "points", tuple(points))
+
+    def _pairs(self) -> Iterator[Point]:
+        try:
+            pairs = [(x, degree) for x, degree in self.points]
+        except (TypeError, ValueError):
+            raise DefinitionError(f"shape {shown(self.points)}: expected pairs of numbers (place, degree)") from None
+        for x, degree in pairs:
+            place, height = finite(x), finite(degree)
+            if place is None or height is None or not 0.0 <= height <= 1.0:
+                raise DefinitionError(
+                    f"shape: point ({shown(x)}, {shown(degree)}), expected a finite place and a degree in [0, 1]"
+                )
+            yield place, height
 
     def __call__(self, x: float) -> float:
         """Return the degree at a place.

@@ -5,9 +5,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import reduce
+from functools import partial, reduce
+from itertools import accumulate
 
 from fuzzy_arbiter.definition import System
 from fuzzy_arbiter.engines import choose
@@ -21,6 +22,8 @@ from fuzzy_arbiter.propositions import Is
 from fuzzy_arbiter.shapes import Shape
 
 _JOINS = {"min": "least({}, {})", "max": "greatest({}, {})", "prod": "({} * {})", "probor": "either({}, {})"}
+_DEEPEST = 20  # parentheses within each other; parsers give up at some hundred
+_LONGEST = 16  # branches after each other, likewise
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,13 +130,51 @@ class _Degrees:
         return self._names[key]
 
 
+class _Expressions:
+    """Says operators on degrees; what has become deep gets a name, before the statement that it is for."""
+
+    def __init__(self) -> None:
+        self._names = 0
+        self._waiting: list[Statement] = []
+
+    def said(self, template: str, *degrees: str) -> str:
+        """Return an operator's value."""
+        text = template.format(*degrees)
+        depth = max(accumulate((sign == "(") - (sign == ")") for sign in text))
+        if depth <= _DEEPEST:
+            return text
+        self._names += 1
+        self._waiting.append(Assign(f"t{self._names}", text))
+        return f"t{self._names}"
+
+    def join(self, kind: str, degrees: Iterable[str]) -> str:
+        """Return several degrees joined, the first two first."""
+        return reduce(partial(self.said, _JOINS[kind]), degrees)
+
+    def assign(self, name: str, expression: str, words: str) -> Iterator[Statement]:
+        """Give a name to a value, after what it needs."""
+        yield from self._waiting
+        self._waiting.clear()
+        yield Assign(name, expression, words)
+
+
 def _chosen(name: str, values: Sequence[tuple[str, str]], words: str) -> Iterator[Statement]:
     """Give a name to the first value of which the condition holds."""
     if len(values) == 1:
         yield Assign(name, values[0][1], words)
     else:
         yield Assign(name, "0.0", words)
-        yield Choose(tuple((condition, (Assign(name, value),)) for condition, value in values))
+        yield _first(name, values)
+
+
+def _first(name: str, values: Sequence[tuple[str, str]]) -> Choose:
+    """Give a name to the first value of which the condition holds, by halves where there are many."""
+    if len(values) <= _LONGEST:
+        return Choose(tuple((condition, (Assign(name, value),)) for condition, value in values))
+    half = next(i for i in range(len(values) // 2, len(values)) if " < " in values[i][0])  # rises from one to the next
+    condition, value = values[half]
+    below, above = (*values[:half], ("", value)), values[half + 1 :]
+    return Choose(((condition, (_first(name, below),)), ("", (_first(name, above),))))
 
 
 def _degree(x: str, shape: Shape, universe: tuple[float, float]) -> list[tuple[str, str]]:
@@ -171,7 +212,7 @@ def _line(x: str, a: float, start: float, run: float, rise: float) -> str:
 
 def _closed(engine: ClosedEngine) -> Iterator[Statement]:
     """Work out h of each output, and C(h)."""
-    degrees = _Degrees(engine.system)
+    degrees, logic = _Degrees(engine.system), _Expressions()
     values: list[Statement] = []
     unclaimed = ""
     for k, (output, clauses) in enumerate(zip(engine.system.outputs, engine.clauses, strict=True), 1):
@@ -181,9 +222,8 @@ def _closed(engine: ClosedEngine) -> Iterator[Statement]:
             free = f"least({unclaimed}, 1.0 - {m})" if unclaimed else f"1.0 - {m}"
             unclaimed = f"u{k}"
         else:
-            least = (reduce(_JOINS["min"].format, (_literal(x, degrees) for x in sorted(c))) for c in clauses)
-            high = reduce(_JOINS["max"].format, least)
-        values.append(Assign(f"h{k}", high, str(Is(output.name, output.term_names[1]))))
+            high = logic.join("max", [logic.join("min", [_literal(x, degrees) for x in sorted(c)]) for c in clauses])
+        values += logic.assign(f"h{k}", high, str(Is(output.name, output.term_names[1])))
         if engine.ladder is not None and k < len(engine.clauses):
             values.append(Assign(unclaimed, free, "no criterion so far asks"))
     yield from degrees.statements
@@ -217,15 +257,17 @@ def _horner(coefficients: Sequence[float], t: str) -> str:
 def _swept(engine: Engine) -> Iterator[Statement]:
     """Work out the strength of each rule, the cut of each output's term, and the centroids."""
     system = engine.system
-    degrees = _Degrees(system)
-    logic: Logic[str] = Logic(
-        _JOINS[system.conjunction].format, _JOINS[system.disjunction].format, lambda a: f"(1.0 - {a})"
+    degrees, logic = _Degrees(system), _Expressions()
+    operators: Logic[str] = Logic(
+        partial(logic.said, _JOINS[system.conjunction]),
+        partial(logic.said, _JOINS[system.disjunction]),
+        partial(logic.said, "(1.0 - {})"),
     )
-    rules = []
+    rules: list[Statement] = []
     for i, rule in enumerate(system.rules, 1):
-        degree = logic.degree(rule.condition, degrees.of)
+        degree = operators.degree(rule.condition, degrees.of)
         weighted = degree if rule.weight == 1.0 else f"{degree} * {rule.weight!r}"
-        rules.append(Assign(f"r{i}", weighted, str(rule)))
+        rules += logic.assign(f"r{i}", weighted, str(rule))
     yield from degrees.statements
     yield from rules
     for k, output in enumerate(system.outputs, 1):
@@ -233,7 +275,7 @@ def _swept(engine: Engine) -> Iterator[Statement]:
         for j, term in enumerate(output.term_names, 1):
             fires = [f"r{i}" for i, rule in enumerate(system.rules, 1) if output[term] in rule.conclusions]
             cuts.append(f"c{k}_{j}")
-            yield Assign(cuts[-1], reduce(_JOINS["max"].format, fires) if fires else "0.0", str(output[term]))
+            yield from logic.assign(cuts[-1], logic.join("max", fires or ["0.0"]), str(output[term]))
         default = Return(k) if output.default is None else Assign(f"y{k}", repr(output.default))
         yield Assign(f"y{k}", "0.0", output.name)
         any_fires = " or ".join(f"{cut} > 0.0" for cut in cuts)
@@ -249,7 +291,8 @@ def _shared(system: System) -> Iterator[Statement]:
     if system.normalisation not in ("sum", "max"):
         return
     ys = [f"y{k}" for k in range(1, len(system.outputs) + 1)]
-    whole = " + ".join(ys) if system.normalisation == "sum" else reduce(_JOINS["max"].format, ys)
-    yield Assign("whole", whole)
+    logic = _Expressions()
+    whole = " + ".join(ys) if system.normalisation == "sum" else logic.join("max", ys)
+    yield from logic.assign("whole", whole, "")
     # where all are 0 they stay so
     yield Choose((("whole > 0.0", tuple(Assign(y, f"{y} / whole") for y in ys)),))

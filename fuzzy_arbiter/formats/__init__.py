@@ -6,8 +6,9 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Literal, get_args
 
+from fuzzy_arbiter.checks import shown
 from fuzzy_arbiter.definition import System
-from fuzzy_arbiter.errors import ArbiterError, FormatError
+from fuzzy_arbiter.errors import ArbiterError, FormatError, UnsupportedError
 from fuzzy_arbiter.files import write_whole
 from fuzzy_arbiter.formats import fcl, fis, fll, json_toml
 from fuzzy_arbiter.formats.native import natively
@@ -56,6 +57,8 @@ def reads(text: str, format: str) -> System:
         If what it defines cannot be.
     """
     _require_format(format, f"format is {format!r}")
+    if not isinstance(text, str):
+        raise FormatError(f"{shown(text)} came, expected text")
     return _READ[format](text.removeprefix("\ufeff").replace("\r\n", "\n").replace("\r", "\n"))
 
 
@@ -82,6 +85,8 @@ def writes(system: System, format: str) -> str:
         If the format cannot say all of the system; what it cannot say is named.
     """
     _require_format(format, f"format is {format!r}")
+    if not isinstance(system, System):
+        raise UnsupportedError(f"{shown(system)} came, expected a System")
     return _WRITE[format](system)
 
 

@@ -8,7 +8,7 @@ from fuzzy_arbiter.definition import Rule, System, Variable
 from fuzzy_arbiter.errors import UnsupportedError
 from fuzzy_arbiter.formats.fcl_reader import system_of, universe_of
 from fuzzy_arbiter.formats.fcl_words import CONJUNCTIONS, DISJUNCTIONS, PAIRS, RESERVED, cut
-from fuzzy_arbiter.formats.notation import require_shallow, require_word, require_words, say_number
+from fuzzy_arbiter.formats.notation import require_word, require_words, say_number
 from fuzzy_arbiter.formats.settings import read_settings, say_settings
 from fuzzy_arbiter.shapes import Shape
 
@@ -35,7 +35,6 @@ def write(system: System) -> str:
     """
     require_word(system.name, "fcl", RESERVED)
     require_words(system, "fcl", RESERVED)
-    require_shallow(system, "fcl")
     _require_one_case(system)
     if PAIRS[system.conjunction] != system.disjunction:
         raise UnsupportedError(

@@ -45,6 +45,7 @@ class _Draft:
     default: float | None = None
     terms: list[Term] | None = None
     places: list[float] = field(default_factory=list)
+    accumulates: bool = False
 
 
 @dataclass
@@ -140,7 +141,7 @@ class _Reader:
                 into[token.text] = _Draft(token.line, universe)
 
     def range(self) -> tuple[float, float]:
-        self.take(":=")
+        self.accept(":=")  # which some texts of the standard leave out
         self.take("(")
         low = self.number("the least value")
         self.take("..")
@@ -192,8 +193,10 @@ class _Reader:
                 self.take(":=")
                 draft.default = None if self.accept("NC") else self.number("the default, or NC")
                 self.take(";")
+            elif word == "ACCU":
+                draft.accumulates = bool(self.choice({"MAX": "max"}))
             else:
-                self.choice({"METHOD": {"COG": ""}, "ACCU": {"MAX": ""}}[word])
+                self.choice({"COG": ""})
         if "METHOD" not in seen:
             refuse(draft.line, "DEFUZZIFY without METHOD, expected METHOD : COG;")
 
@@ -244,7 +247,8 @@ class _Reader:
                 refuse(key.line, f"{word} came twice")
             else:
                 said[word] = self.choice(choices[word])
-        if "ACCU" not in said:
+        # some tools say it of each output
+        if "ACCU" not in said and not all(draft.accumulates for draft in self.outputs.values()):
             refuse(first.line, f"RULEBLOCK {first.text!r} without ACCU, expected ACCU : MAX;")
         conjunction = said.get("AND") or next((a for a, b in PAIRS.items() if b == said.get("OR")), "min")
         if said.get("OR", PAIRS[conjunction]) != PAIRS[conjunction]:

@@ -124,7 +124,8 @@ def _head(system: _Section) -> dict[str, str]:
         value = system.string(key)
         if value is not None and value not in known:
             refuse(
-                system.entries[key][0], f"{key} is {value!r}, which is not known here; expected {' or '.join(known)}"
+                system.entries[key][0],
+                f"{key} is {value!r}, which is not known here; expected {' or '.join(filter(None, known))}",
             )
         said[key] = next(iter(known.values())) if value is None else known[value]
     return {"conjunction": said["AndMethod"], "disjunction": said["OrMethod"], "implication": said["ImpMethod"]}
@@ -171,10 +172,11 @@ def _term(line: int, value: str) -> Term:
         refuse(line, f"term {name!r} is {function!r}, which is not known here; expected {', '.join(FUNCTIONS)}")
     count, make = FUNCTIONS[function]
     numbers = _numbers(places, line, f"place of {name!r}")
-    if len(numbers) != count:
+    padding = numbers[count:]
+    if len(numbers) < count or (padding and (count, padding) != (3, [0.0])):  # MATLAB's old files fill all up to four
         refuse(line, f"term {name!r} has the places [{places}], expected {count} for {function}")
     with located(f"line {line}: term {name!r}"):
-        return Term(name, make(*numbers))
+        return Term(name, make(*numbers[:count]))
 
 
 def _numbers(text: str, line: int, what: str) -> list[float]:
@@ -209,9 +211,12 @@ def _indices(text: str, line: int, row: str, variables: Sequence[Variable]) -> l
     parts = text.split()
     if len(parts) != len(variables):
         refuse(line, f"{row!r} has {len(parts)} numbers in {text.strip()!r}, expected {len(variables)}")
+    indices: list[int] = []
     for part, v in zip(parts, variables, strict=True):
-        if not re.fullmatch(r"-?[0-9]{1,9}", part) or abs(int(part)) > len(v.terms):
+        whole = re.fullmatch(r"(-?[0-9]{1,9})(?:\.0*)?", part)  # fuzzylite writes 1.000
+        if not whole or abs(int(whole[1])) > len(v.terms):
             refuse(
                 line, f"{row!r}: {part} for {v.name!r}, expected a whole number from {-len(v.terms)} to {len(v.terms)}"
             )
-    return [int(part) for part in parts]
+        indices.append(int(whole[1]))
+    return indices

@@ -8,11 +8,11 @@ from fuzzy_arbiter.shapes import Shape, falling, rising, trapezoid, triangle
 
 SETTINGS = ("normalisation", "outside", "points")
 
-# what a key may say, and what it means; algebraic_... are Octave's words
+# what a key may say, and what it means; algebraic_... are Octave's words, and fuzzylite leaves empty what no rule needs
 METHODS: dict[str, dict[str, str]] = {
     "Type": {"mamdani": ""},
-    "AndMethod": {"min": "min", "prod": "prod", "algebraic_product": "prod"},
-    "OrMethod": {"max": "max", "probor": "probor", "algebraic_sum": "probor"},
+    "AndMethod": {"min": "min", "prod": "prod", "algebraic_product": "prod", "": "min"},
+    "OrMethod": {"max": "max", "probor": "probor", "algebraic_sum": "probor", "": "max"},
     "ImpMethod": {"min": "min", "prod": "prod", "algebraic_product": "prod"},
     "AggMethod": {"max": ""},
     "DefuzzMethod": {"centroid": ""},

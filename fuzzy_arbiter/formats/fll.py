@@ -7,7 +7,7 @@ from fuzzy_arbiter.errors import UnsupportedError
 from fuzzy_arbiter.formats.fll_reader import read
 from fuzzy_arbiter.formats.fll_terms import RESERVED, say_shape
 from fuzzy_arbiter.formats.fll_words import CONJUNCTIONS, DISJUNCTIONS, SETTINGS
-from fuzzy_arbiter.formats.notation import cannot_say, require_shallow, require_words, say_number, say_numbers
+from fuzzy_arbiter.formats.notation import cannot_say, require_words, say_number, say_numbers
 from fuzzy_arbiter.formats.settings import say_settings
 from fuzzy_arbiter.propositions import And, Is, Not, Or, Proposition
 
@@ -35,7 +35,6 @@ def write(system: System) -> str:
     if "#" in system.name:
         raise UnsupportedError(f"fll cannot say the name {system.name!r}: what follows # is a comment")
     require_words(system, "fll", RESERVED)
-    require_shallow(system, "fll")
     lock = "true" if system.outside == "clip" else "false"
     lines = [f"# {text}" for text in say_settings(system, SETTINGS)]
     lines.append(f"Engine: {system.name}")

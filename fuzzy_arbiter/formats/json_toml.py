@@ -9,7 +9,6 @@ from typing import Any, NoReturn
 
 from fuzzy_arbiter.definition import Output, System, Variable
 from fuzzy_arbiter.errors import FormatError
-from fuzzy_arbiter.formats.notation import require_shallow
 from fuzzy_arbiter.formats.schema import system_of
 from fuzzy_arbiter.shapes import Shape
 
@@ -91,19 +90,13 @@ def write_json(system: System) -> str:
     Parameters
     ----------
     system : System
-        Any with rules nested to 100 levels.
+        Any.
 
     Returns
     -------
     str
         Indented, with the points of a term on one line.
-
-    Raises
-    ------
-    UnsupportedError
-        If a rule nests deeper.
     """
-    require_shallow(system, "json")
     lines = [f"  {_text(key)}: {_text(getattr(system, key))}," for key in _SETTINGS]
     for key, variables in (("inputs", system.inputs), ("outputs", system.outputs)):
         lines += [f'  "{key}": [', ",\n".join(map(_json_variable, variables)), "  ],"]
@@ -125,19 +118,14 @@ def write_toml(system: System) -> str:
     Parameters
     ----------
     system : System
-        Any with rules nested to 100 levels.
+        Any.
 
     Returns
     -------
     str
         With a table for each variable, and the points of a term on one line.
-
-    Raises
-    ------
-    UnsupportedError
-        If a rule nests deeper.
     """
-    require_shallow(system, "toml")
+    # by hand, for tomli_w gives every number in a list a line of its own, and with that a triangle 14
     lines = [f"{key} = {_text(getattr(system, key))}" for key in _SETTINGS]
     lines += ["rules = [", *(f"  {_text(str(rule))}," for rule in system.rules), "]"]
     for key, variables in (("inputs", system.inputs), ("outputs", system.outputs)):

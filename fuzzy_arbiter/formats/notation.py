@@ -10,8 +10,7 @@ from typing import Any, NoReturn
 
 from fuzzy_arbiter.definition import Output, Rule, System, Variable
 from fuzzy_arbiter.errors import DefinitionError, FormatError, UnsupportedError
-from fuzzy_arbiter.propositions import And, Is, Not, Or, Proposition, is_identifier
-from fuzzy_arbiter.rule_text import MAX_NESTING
+from fuzzy_arbiter.propositions import is_identifier
 
 _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
 
@@ -236,36 +235,3 @@ def cannot_say(format: str, i: int, rule: Rule, why: str, what: str = "condition
         To be raised.
     """
     return UnsupportedError(f"{format} cannot say the {what} of R{i + 1} {shortened(str(rule))!r}: expected {why}")
-
-
-def require_shallow(system: System, format: str) -> None:
-    """Refuse a system with rules that nest deeper than the reader of rules goes.
-
-    Parameters
-    ----------
-    system : System
-        What is to be written.
-    format : str
-        Name of the format.
-
-    Raises
-    ------
-    UnsupportedError
-        If a condition nests deeper than 100.
-    """
-    for i, rule in enumerate(system.rules):
-        if _nesting(rule.condition) > MAX_NESTING:
-            raise cannot_say(format, i, rule, f"nesting to {MAX_NESTING} levels")
-
-
-def _nesting(proposition: Proposition) -> int:
-    """Parentheses and negations within each other in the text; by hand, since Python's own stack is the limit here."""
-    deepest, left = 0, [(proposition, 0)]
-    while left:
-        p, depth = left.pop()
-        deepest = max(deepest, depth)
-        if isinstance(p, Not):
-            left.append((p.part, depth + (1 if isinstance(p.part, Is) else 2)))
-        elif isinstance(p, And | Or):
-            left += [(part, depth + isinstance(part, And | Or)) for part in p.parts]
-    return deepest

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import difflib
-import math
 from collections.abc import Callable
 from typing import Any, NoReturn
 
+from fuzzy_arbiter.checks import finite, shown
 from fuzzy_arbiter.definition import Output, System, Term, Variable
 from fuzzy_arbiter.errors import FormatError
 from fuzzy_arbiter.formats.notation import located
@@ -147,14 +147,10 @@ def _numbers(value: object, count: int, where: str) -> list[float]:
 
 
 def _number(value: object, where: str) -> float:
-    try:
-        x = float(value) if isinstance(value, int | float) and not isinstance(value, bool) else math.nan
-    except OverflowError:
-        x = math.inf
-    return x if math.isfinite(x) else _refuse(where, value, "a finite number")
+    x = finite(value)
+    return _refuse(where, value, "a finite number") if x is None else x
 
 
 def _refuse(where: str, value: object, expected: str) -> NoReturn:
-    text = repr(value) if not isinstance(value, dict | list) else f"a {'table' if isinstance(value, dict) else 'list'}"
-    text = text if len(text) <= 100 else f"{text[:100]}..."
+    text = shown(value) if not isinstance(value, dict | list) else f"a {'table' if isinstance(value, dict) else 'list'}"
     raise FormatError(f"{where}: {text} came, expected {expected}")

@@ -53,7 +53,7 @@ WIDE = System(
         "if not (a is z & b is p) | a is y then o is h with 0.3",
         'if a is z and b is p then q is "*/ v\\"',
     ),
-    name="3 odd */ systems\\",
+    name="3 odd */*/ systems ???/\\",
     normalisation="none",
 )
 PAIR = Output("w", (0, 1), (Term("low", falling(0.2, 0.55)), Term("high", rising(0.37, 0.83))))
@@ -68,6 +68,23 @@ SYSTEMS = {
     "wide, scaled": replace(WIDE, normalisation="range"),
     "wide, shared": replace(WIDE, normalisation="sum", outside="clip"),
     "wide, greatest": replace(WIDE, normalisation="max", implication="prod"),
+    "coding: of no file": prioritised([Criterion("é")], name="coding: of no file"),
+    "long": System(
+        tuple(Variable(f"v{i}", (0, 1), (Term("t", rising(0, 1)), Term("u", falling(0, 1)))) for i in range(250)),
+        (Output("o", (0, 1), (Term("l", falling(0, 1)), Term("h", rising(0, 1)))),),
+        (
+            *(f"if v{i} is t then o is l" for i in range(250)),
+            f"if {' and '.join(f'v{i} is not u' for i in range(250))} or v0 is t then o is h",
+        ),
+        conjunction="prod",
+        normalisation="none",
+    ),
+    "many points": System(
+        (Variable("v", (0, 10), (Term("t", Shape(tuple((i / 10, i % 7 / 7) for i in range(100)))),)),),
+        (Output("o", (0, 1), (Term("h", rising(0, 1)),), default=0.0),),
+        ("if v is t then o is h",),
+        normalisation="none",
+    ),
     "wide, products": replace(WIDE, conjunction="prod", disjunction="probor", implication="prod"),
 }
 
@@ -114,6 +131,7 @@ def test_c(system, tmp_path):
     name = re.search(r"int (\w+)\(", source.read_text()).group(1)
     library = tmp_path / "arbiter.so"
     flags = ["-std=c99", "-O2", "-ffp-contract=off", "-Wall", "-Wextra", "-Wpedantic", "-Werror", "-fPIC", "-shared"]
+    flags += ["-Wconversion", "-Wshadow"]
     subprocess.run([*find_compiler(), *flags, "-o", library, source], check=True)
     evaluate = getattr(ctypes.CDLL(str(library)), name)
     inputs = (ctypes.c_double * len(system.inputs))()
@@ -128,9 +146,18 @@ def test_c(system, tmp_path):
         assert evaluate(inputs, outputs) == status
 
 
+def test_systems_of_several_files_go_into_one_program(tmp_path):
+    sources = []
+    for i, system in enumerate((SYSTEMS["one"], WIDE, replace(WIDE, name="日本"))):
+        sources.append(tmp_path / f"{i}.c")
+        sources[-1].write_text(to_c(replace(system, name=f"{system.name}{i}")))
+    flags = ["-std=c99", "-fPIC", "-shared", "-o", tmp_path / "all.so"]
+    subprocess.run([*find_compiler(), *flags, *sources], check=True)
+
+
 def test_python(system):
     module = {}
-    exec(to_python(system), module)
+    exec(compile(to_python(system).encode(), "<arbiter>", "exec"), module)  # from bytes, as of a file
     for x, weights in expected(system):
         if isinstance(weights, int):
             with pytest.raises(ValueError, match=f"output {weights} is undefined"):

@@ -73,7 +73,8 @@ def shapes(draw, plain):
 @st.composite
 def variables(draw, name, names, plain, output=False):
     low, high = sorted(draw(st.lists(places, min_size=2, max_size=2, unique=True)))
-    if not high - low < 1e301 or high - low < 1e-300:
+    width = 1e100 if output else 1e301
+    if not 1 / width < high - low < width:
         low, high = 0.0, 10.0
     terms = []
     for term in draw(st.lists(names, min_size=1, max_size=3, unique_by=str.lower)):

@@ -78,6 +78,17 @@ def test_several_rule_blocks_of_like_operators_are_one():
         reads(text.replace("OR : MAX; ACCU", "OR : ASUM; ACCU"), "fcl")
 
 
+def test_accumulation_may_be_said_of_each_output():
+    moved = OTHERS.replace("ACCU : MAX;", "").replace("METHOD : COG;", "METHOD : COG; ACCU : MAX;")
+    assert moved != OTHERS
+    assert reads(moved, "fcl") == reads(OTHERS, "fcl")
+
+
+def test_a_range_may_be_said_without_the_sign_of_assignment():
+    text = writes(TIPPING, "fcl")
+    assert reads(text.replace("RANGE := (", "RANGE ("), "fcl") == TIPPING
+
+
 @pytest.mark.parametrize(
     ("operators", "norms"),
     [
@@ -136,7 +147,7 @@ def test_numbers_are_those_of_the_standard():
         ("IF service IS good", "IF service good", r"line 31: rule .*'good' came after 'service', expected 'is'"),
         ("IF service IS good", "IF VERY service IS good", r"line 31: rule .*'service' came after 'VERY'"),
         ("tip IS average", "tip", r"line 31: rule 'IF service IS good THEN tip WITH 0.5': 'WITH' came after 'tip'"),
-        ("WITH 0.5", "WITH 1.5", r"line 31: 'if service .* with 1.5': weight is 1.5"),
+        ("WITH 0.5", "WITH 1.5", r"line 31: 'if service .*': weight is 1.5"),
         ("WITH 0.5", "WITH x", r"line 31: rule .*'x' came after 'WITH', expected the rule's weight"),
         ("average WITH 0.5;", "average", r"line 31: rule .*average RULE three.*': ':' cannot stand in a rule"),
         ("DEFAULT := 0;", "DEFAULT := nan;", r"line 24: 'nan' came after ':=', expected a number, the default, or NC"),

@@ -81,6 +81,25 @@ def test_a_file_of_others_is_read():
     ]
 
 
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("1 1, 1 (1) : 2", "1.000 1.000 , 1.000 (1.000) : 2"),  # as fuzzylite writes
+        ("'trimf',[0 5 10]", "'trimf',[0 5 10 0]"),  # as in old files of MATLAB's
+        ("Version=2.0\n", ""),
+    ],
+)
+def test_other_ways_to_say_the_same(old, new):
+    assert old in OTHERS
+    assert reads(OTHERS.replace(old, new), "fis") == reads(OTHERS, "fis")
+
+
+def test_operators_that_are_left_empty_are_min_and_max():
+    text = OTHERS.replace("'algebraic_product'", "''").replace("'probor'", "''")
+    system = reads(text, "fis")
+    assert (system.conjunction, system.disjunction) == ("min", "max")
+
+
 def test_halves_of_triangles_get_their_other_foot_beyond_the_range():
     text = writes(prioritised(), "fis")
     assert "MF1='low':'trimf',[-1 0 1]\nMF2='high':'trimf',[0 1 2]" in text
@@ -115,6 +134,7 @@ def test_all_shapes_of_0_and_1_come_back(shape):
         ("NumMFs=3", "NumMFs=2", "line 19: NumMFs is 2, expected 3"),
         ("'linsmf',[4 6]", "'gaussmf',[4 6]", "line 21: term 'good' is 'gaussmf', which is not known.*trimf, trapmf"),
         ("'linsmf',[4 6]", "'linsmf',[4 6 7]", r"line 21: term 'good' has the places \[4 6 7\], expected 2 for linsmf"),
+        ("'trimf',[0 5 10]", "'trimf',[0 5 10 1]", r"line 36: term 'cheap' has the places \[0 5 10 1\], expected 3"),
         ("'linsmf',[4 6]", "'linsmf',[4 x]", "line 21: place of 'good' is 'x', expected a finite number"),
         ("'linsmf',[4 6]", "'linsmf',[6 4]", "line 21: term 'good': shape: place 4.0 comes after 6.0"),
         ("MF2='good'", "MF4='good'", r"line 21: MF4 came in \[Input1\], expected MF2"),

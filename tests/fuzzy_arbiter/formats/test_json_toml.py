@@ -109,7 +109,7 @@ def test_any_name_and_shape_can_be_said(format):
     terms = tuple(Term(name, Shape(((0, 0.25), (1, 0.5), (1, 0), (3, 0.125 + i / 64)))) for i, name in enumerate(names))
     system = System(
         (Variable("\\", (0, 3), terms),),
-        (Output("=", (-1e300, 3), terms, default=-7e-310),),
+        (Output("=", (-1e99, 3), terms, default=-7e-310),),
         tuple(f'if "\\" is not "{name}" then "=" is "{name}"' for name in names),
         name="'''",
     )

@@ -1,0 +1,140 @@
+"""Definitions: whatever cannot be one is refused in a line that says what came and what was expected."""
+
+import copy
+import pickle
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+from fuzzy_arbiter import (
+    Criterion,
+    DefinitionError,
+    FormatError,
+    Is,
+    Output,
+    Rule,
+    Shape,
+    System,
+    Term,
+    UnsupportedError,
+    Variable,
+    falling,
+    parse_rule,
+    prioritised,
+    rising,
+    triangle,
+)
+from fuzzy_arbiter.formats import reads, writes
+from fuzzy_arbiter.propositions import And, Not, Or
+
+TERMS = (Term("calm", falling(2, 6)), Term("strong", rising(4, 12)))
+wind = Variable("wind", (0, 20), TERMS)
+sail = Output("sail", (0, 1), (Term("reefed", falling(0, 1)), Term("full", rising(0, 1))), default=0.0)
+HUGE = 10**5000
+CALM = wind["calm"]
+
+
+def system(*rules, **others):
+    return System(**{"inputs": (wind,), "outputs": (sail,), "rules": rules, **others})
+
+
+def nested(depth):
+    condition = CALM
+    for i in range(depth):
+        condition = condition & wind["strong"] if i % 2 else condition | wind["strong"]
+    return condition
+
+
+@pytest.mark.parametrize(
+    ("make", "fault"),
+    [
+        (lambda: CALM and wind["strong"], "wind is calm: a proposition is not true or false; combine with &"),
+        (lambda: CALM & "wind is strong", "And: 'wind is strong' came among them, expected such as variable"),
+        (lambda: CALM | None, "Or: None came among them, expected such as"),
+        (lambda: And(None), "And: None came, expected such as"),
+        (lambda: Or(CALM for _ in range(1)), "Or of 1 propositions, expected two or more"),
+        (lambda: Not("x"), "not: 'x' came, expected such as"),
+        (lambda: Is("wind", 3), "'wind' is 3: expected the names of both"),
+        (lambda: nested(200), "nested deeper than 100 parentheses and negations"),
+        (lambda: parse_rule("if " + "not " * 99 + "a is b then c is d"), "rule 'if not .*: nested deeper than 100"),
+        (lambda: parse_rule(None), "rule: None came, expected text"),
+        (lambda: wind[0], "'wind' has no term 0, expected one of calm, strong"),
+        (lambda: Variable("v", None, TERMS), "variable 'v': universe is None, expected two finite numbers"),
+        (lambda: Variable("v", ("0", "1"), TERMS), r"universe is \('0', '1'\), expected two"),
+        (lambda: Variable("v", (False, True), TERMS), r"universe is \(False, True\), expected two"),
+        (lambda: Variable("v", (0, HUGE), TERMS), "universe is a tuple that is too long to show, expected two"),
+        (lambda: Variable("v", np.eye(2), TERMS), r"universe is array\(.*\), expected two"),
+        (lambda: Variable("v", (-1.7e308, 1.7e308), TERMS), "expected a finite width"),
+        (lambda: Variable("v", (0, 1), {"calm": falling(2, 6)}), "terms: 'calm' came among them, expected a seq"),
+        (lambda: Variable("v", (0, 1), TERMS[0]), r"terms: Term\(.*\) came, expected a sequence of Term"),
+        (lambda: Variable("v", (0, 1), "low"), "terms: 'low' came, expected a sequence of Term"),
+        (lambda: Term("low", [(0, 1), (1, 0)]), r"term 'low': shape is \[.*\], expected such as triangle\(0, 1, 2\)"),
+        (lambda: Shape((("0", "1"),)), r"shape: point \('0', '1'\), expected a finite place and a degree in \[0, 1\]"),
+        (lambda: Shape(((HUGE, 1),)), "shape: point .* that is too long to show, 1"),
+        (lambda: Shape(((True, True),)), r"shape: point \(True, True\)"),
+        (lambda: triangle("0", 1, 2), r"shape: point \('0', 0.0\)"),
+        (lambda: rising(-1e308, 1e308), "shape: places -1e.308 to 1e.308, expected a finite distance"),
+        (lambda: Output("o", (0, 1e200), sail.terms), r"output 'o': universe is \[0, 1e.200\], expected a width from"),
+        (lambda: Output("o", (0, 1e-200), sail.terms), "expected a width from 1e-100 to 1e.100"),
+        (lambda: Output("o", (0, 1), sail.terms, True), "output 'o': default is True, expected a finite number"),
+        (lambda: Output("o", (0, 1), sail.terms, HUGE), "default is a int that is too long .*, expected a finite"),
+        (lambda: Rule("wind is calm", sail["full"]), "rule: condition is 'wind is calm', expected such as"),
+        (lambda: Rule(CALM, "sail is full"), r"wind is calm: 'sail is full' came, expected as conclusions output\["),
+        (lambda: Rule(CALM, ~sail["full"]), r"wind is calm: Not\(.*\) came, expected as conclusions"),
+        (lambda: Rule(CALM, ()), "wind is calm: no conclusions came, expected output"),
+        *(
+            (
+                lambda weight=weight: Rule(CALM, sail["full"], weight),
+                "'if wind is calm then sail is full': weight is .*, expected above 0 and at most 1",
+            )
+            for weight in (True, "0.5", None, float("nan"), 0, 1.5, np.array([0.5]), Fraction(1, 10**400))
+        ),
+        (lambda: system(rules="if wind is calm then sail is full"), "rules: 'if wind .*' came, expected a sequence"),
+        (lambda: system(None), "rules: None came among them, expected a sequence of Rule or text"),
+        (lambda: system(inputs=wind), r"inputs: Variable\(.* came, expected a sequence of Variable"),
+        (lambda: system(outputs=(wind,)), r"outputs: Variable\(.* came among them, expected a sequence of Output"),
+        (lambda: system(normalisation=np.array(["sum", "max"])), "normalisation is array.*, expected one of range"),
+        (lambda: system(points=HUGE), "points is a int that is too long to show, expected a whole number, 3 or more"),
+        (lambda: system(points=True), "points is True"),
+        (lambda: prioritised(["a", "b"]), "criteria: 'a' came among them, expected a sequence of Criterion"),
+        (lambda: prioritised(Criterion("a")), r"criteria: Criterion\(.* came, expected a sequence"),
+        (lambda: prioritised(weight="w"), "weight is 'w', expected an Output"),
+        (lambda: prioritised(form=["minimal"]), r"form is \['minimal'\], expected one of hierarchical"),
+        (lambda: Criterion("a", membership=[(0, 0), (1, 1)]), "criterion 'a': membership is .*, expected such as"),
+        (lambda: Criterion(None), "criterion name is None, expected printable text"),
+        (lambda: Criterion("a", on=3), "criterion 'a': on name is 3, expected printable text"),
+    ],
+)
+def test_what_cannot_be_is_refused_in_one_line(make, fault):
+    with pytest.raises(DefinitionError, match=fault) as error:
+        make()
+    assert "\n" not in str(error.value)
+    assert len(str(error.value)) < 500
+
+
+def test_numbers_of_other_libraries_become_floats():
+    places = np.array([[0, 1], [1, 0]])
+    made = Variable("v", np.array([0.0, 1.0]), [Term("a", Shape(places))])
+    places[:] = 7
+    assert made == Variable("v", (0.0, 1.0), (Term("a", falling(0.0, 1.0)),))
+    assert type(Rule(CALM, sail["full"], np.float32(0.25)).weight) is float
+    assert str(Shape(((-0.0, 0), (1, 1)))) == str(Shape(((0.0, 0), (1, 1))))
+
+
+def test_lists_and_generators_do_and_cannot_change_it_later():
+    terms, rules = list(TERMS), [Rule(nested(7), [sail["full"]]), "if wind is not calm then sail is reefed with 0.3"]
+    made = system(inputs=(v for v in [Variable("wind", [0, 20], terms)]), rules=rules)
+    terms.clear()
+    rules.clear()
+    assert made == system(Rule(nested(7), sail["full"]), "if wind is not calm then sail is reefed with 0.3")
+    for other in (eval(repr(made), globals()), pickle.loads(pickle.dumps(made)), copy.deepcopy(made)):
+        assert other == made
+        assert hash(other) == hash(made)
+
+
+def test_only_systems_are_written_and_only_text_is_read():
+    with pytest.raises(UnsupportedError, match="'x' came, expected a System"):
+        writes("x", "json")
+    with pytest.raises(FormatError, match=r"b'{}' came, expected text"):
+        reads(b"{}", "json")
