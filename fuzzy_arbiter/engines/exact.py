@@ -65,7 +65,7 @@ def _centroids(cuts: Array, shape: Outline, scaled: bool) -> Array:
                 np.copyto(ends, lines[1:], where=greatest)
             else:
                 level = degrees >= cut
-                degrees, lines = np.minimum(degrees, cut), np.minimum(lines, cut)
+                degrees = np.minimum(degrees, cut)
                 greatest = degrees > heights
                 np.copyto(starts, np.where(level, cut, lines[:-1]), where=greatest)
                 np.copyto(ends, np.where(level, cut, lines[1:]), where=greatest)

@@ -156,7 +156,7 @@ def envelope(
             if cut > height:
                 height, y0, y1 = cut, cut, cut
         elif degree > height:
-            height, y0, y1 = degree, min(a + rise * x0, cut), min(a + rise * x1, cut)
+            height, y0, y1 = degree, a + rise * x0, a + rise * x1
     return y0, y1
 
 

@@ -13,9 +13,6 @@ static void envelope(const double *cuts, int terms, const double *left, const do
             end *= cut;
         } else if (degree >= cut) {
             degree = start = end = cut;
-        } else {
-            start = start < cut ? start : cut;
-            end = end < cut ? end : cut;
         }
         if (degree > height) {
             height = degree;

@@ -126,6 +126,19 @@ def test_terms_of_very_different_areas(height):
             assert engine.weights([h])[0] == pytest.approx(exact, abs=16 * EPS)
 
 
+@pytest.mark.parametrize("height", [2e-6, 3e-6, 5e-6, 7e-6, 1.1e-5, 1.3e-5])
+def test_no_number_is_taken_for_one_of_the_next_piece(height):
+    """Just below h = 1 the wide foot of low begins to be clipped: C(h) bends by a slope of about 1/height."""
+    low = Shape(((0, 1), (0.01, 1), (0.01, height), (1, height)))
+    high = Shape(((0.7, 0), (0.7, 3 * height), (0.9, 3 * height), (0.9, 0)))
+    output = Output("y", (0, 1), (Term("low", low), Term("high", high)))
+    engine = ClosedEngine(prioritised(criteria(1), weight=output, normalisation="none"))
+    for piece in engine.raw[0][1:]:
+        for h in (piece.start, math.nextafter(piece.start, 0)):
+            exact = float(reference.centroid(output, [1 - Fraction(h), Fraction(h)]))
+            assert engine.weights([h])[0] == pytest.approx(exact, abs=16 * EPS)
+
+
 def test_the_number_of_pieces():
     """One cubic for the full triangles, also for trapezoids that meet there; three for the asymmetric pair."""
 
