@@ -13,6 +13,7 @@ from fuzzy_arbiter.engines.firing import Array
 from fuzzy_arbiter.errors import InputError
 
 Sample = Sequence[float] | Mapping[str, float]
+_NUMBER = (Real, np.bool_)
 
 
 class Samples:
@@ -50,8 +51,8 @@ class Samples:
         try:
             values = inputs if type(inputs) is list or type(inputs) is tuple else self._in_order(inputs)
             for x, (low, high) in zip(values, self._limits, strict=True):
-                if not low <= x <= high:  # NaN too
-                    return self._clipped(values)
+                if type(x) is not float or not low <= x <= high:  # NaN too
+                    return self._converted(values)
         except (TypeError, ValueError):
             raise self._fault(inputs) from None
         return values
@@ -91,10 +92,15 @@ class Samples:
             raise InputError(f"row {row}: {self._names[i]} is {float(values[row, i])!r}, {expected}")
         return np.clip(values, low, high) if self._clips else values
 
-    def _clipped(self, values: Sequence[float]) -> list[float]:
-        if not self._clips or any(x != x for x in values):
-            raise self._fault(values)
-        return [min(max(x, low), high) for x, (low, high) in zip(values, self._limits, strict=True)]
+    def _converted(self, values: Sequence[float]) -> list[float]:
+        """Return values as floats, in their universes: a number of another type would bring its own rounding along."""
+        if not all(isinstance(x, _NUMBER) for x in values):
+            raise TypeError
+        if not all(low <= x <= high for x, (low, high) in zip(values, self._limits, strict=True)):
+            if not self._clips or any(x != x for x in values):
+                raise self._fault(values)
+            values = [min(max(x, low), high) for x, (low, high) in zip(values, self._limits, strict=True)]
+        return list(map(float, values))
 
     def _in_order(self, inputs: Sample) -> list[float]:
         if isinstance(inputs, Mapping):
@@ -120,6 +126,6 @@ class Samples:
         if len(values) != len(self._names):
             return InputError(f"{len(values)} inputs came, expected {len(self._names)}: {', '.join(self._names)}")
         for name, x, (low, high) in zip(self._names, values, self._limits, strict=True):
-            if not isinstance(x, Real) or x != x or (not self._clips and not low <= x <= high):
+            if not isinstance(x, _NUMBER) or x != x or (not self._clips and not low <= x <= high):
                 return InputError(f"{name}: input is {x!r}, expected a number in [{low:g}, {high:g}]")
         return InputError(f"inputs are {inputs!r}, expected {len(self._names)} numbers")

@@ -29,6 +29,7 @@ from fuzzy_arbiter.engines.pieces import Piece, pieces
 from fuzzy_arbiter.errors import EngineError
 from fuzzy_arbiter.hierarchy import DEGREE
 
+SMOOTHSTEP = (0.0, 0.0, 3.0, -2.0)  # which is never outside [0, 1]
 BLOCK = 4096  # samples evaluated at a time, which the processor's caches hold
 
 
@@ -57,6 +58,8 @@ class ClosedEngine(Engine):
         The literals m_1, m_2, .. if the rules are those of prioritised criteria.
     raw, scaled : tuple of tuple of Piece
         C(h) of each output, and the weight it becomes.
+    clips : bool
+        Whether such weights are then clipped to [0, 1]: between h = 0 and 1 a C(h) may lie beyond C(0) and C(1).
 
     Raises
     ------
@@ -78,6 +81,7 @@ class ClosedEngine(Engine):
         self._index = {v.name: i for i, v in enumerate(system.inputs)}
         self._shapes = {(v.name, t.name): t.shape for v in system.inputs for t in v.terms}
         self._cubic = _one_cubic(self.scaled)
+        self.clips = system.normalisation != "none" and self._cubic != SMOOTHSTEP
         # prioritised criteria in the order of the inputs, which are the degrees themselves: nothing to look up
         self._plain = self._cubic is not None and self.ladder is not None and len(self.ladder) == len(system.inputs)
         for step, variable in zip(self.ladder or (), system.inputs, strict=False):
@@ -105,6 +109,8 @@ class ClosedEngine(Engine):
     def weights(self, inputs: Sequence[float]) -> tuple[float, ...]:
         """Return the normalised value of each output for one sample; as of `Engine`."""
         result = [_value(forms, h) for forms, h in zip(self.scaled, self._highs(inputs), strict=True)]
+        if self.clips:
+            result = [min(max(weight, 0.0), 1.0) for weight in result]
         return shared(result, self.system.normalisation)
 
     def weights_of_many(self, inputs: Array) -> Array:
@@ -117,13 +123,15 @@ class ClosedEngine(Engine):
                 values = _horner(self._cubic, highs)
             else:
                 values = np.stack([_values(forms, h) for forms, h in zip(self.scaled, highs, strict=True)])
+            if self.clips:
+                np.clip(values, 0.0, 1.0, out=values)
             result[start : start + BLOCK] = values.T
         return shared_of_many(result, self.system.normalisation)
 
     def shortcut(self) -> Shortcut | None:
         """Return a faster way to the weights of prioritised criteria whose degrees are the inputs; as of `Engine`."""
-        each_by_itself = self.system.normalisation in ("range", "none")
-        if self._plain and each_by_itself and self._cubic is not None and self._cubic[:2] == (0.0, 0.0):
+        whole = self.clips or self.system.normalisation not in ("range", "none")  # more to be done with the weights
+        if self._plain and not whole and self._cubic is not None and self._cubic[:2] == (0.0, 0.0):
             return _smooth_ladder(len(self.system.inputs), *self._cubic[2:])
         return None
 
@@ -205,16 +213,13 @@ def _smooth_ladder(n: int, n2: float, n3: float) -> Shortcut:
             return None
         result = []
         unclaimed = 1.0  # degree to which no criterion of higher priority asks
-        try:
-            for m in degrees:
-                if not 0.0 <= m <= 1.0:
-                    return None
-                h = m if m < unclaimed else unclaimed
-                result.append((n2 + n3 * h) * h * h)
-                if 1.0 - m < unclaimed:
-                    unclaimed = 1.0 - m
-        except TypeError:
-            return None
+        for m in degrees:
+            if (type(m) is not float and type(m) is not int) or not 0.0 <= m <= 1.0:
+                return None
+            h = m if m < unclaimed else unclaimed
+            result.append((n2 + n3 * h) * h * h)
+            if 1.0 - m < unclaimed:
+                unclaimed = 1.0 - m
         return tuple(result)
 
     return weights

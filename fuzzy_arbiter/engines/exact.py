@@ -52,16 +52,29 @@ def _centroids(cuts: Array, shape: Outline, scaled: bool) -> Array:
         others = [(start_at[t], end_at[t], start_at[:t], end_at[:t]) for t in range(1, terms)]
         breaks = [np.zeros((1, n)), np.ones((1, n)), *(_crossings(*pair, n) for pair in (*levels, *others))]
         places = np.sort(np.concatenate(breaks), axis=0)
-        heights = np.zeros_like(places)
+        middles = (places[:-1] + places[1:]) / 2
+        heights, starts, ends = np.zeros((3, *middles.shape))
         for t in range(terms):
-            degrees = a[t] + (b[t] - a[t]) * places
-            np.maximum(heights, degrees * cuts[t] if scaled else np.minimum(degrees, cuts[t]), out=heights)
+            cut, rise = cuts[t], b[t] - a[t]
+            degrees = a[t] + rise * middles
+            lines = a[t] + rise * places
+            if scaled:
+                degrees, lines = degrees * cut, lines * cut
+                greatest = degrees > heights
+                np.copyto(starts, lines[:-1], where=greatest)
+                np.copyto(ends, lines[1:], where=greatest)
+            else:
+                level = degrees >= cut
+                degrees = np.minimum(degrees, cut)
+                greatest = degrees > heights
+                np.copyto(starts, np.where(level, cut, lines[:-1]), where=greatest)
+                np.copyto(ends, np.where(level, cut, lines[1:]), where=greatest)
+            np.maximum(heights, degrees, out=heights)
         x, w = start + places * width, np.diff(places, axis=0) * width
-        for i, width_i in enumerate(w):  # one after another, as for one sample, to the same bits
-            area += width_i * (heights[i] + heights[i + 1]) / 2
-            moment += (
-                width_i * (x[i] * (2 * heights[i] + heights[i + 1]) + x[i + 1] * (heights[i] + 2 * heights[i + 1])) / 6
-            )
+        for i, (width_i, y0, y1) in enumerate(zip(w, starts, ends, strict=True)):
+            # one after another, as for one sample, to the same bits
+            area += width_i * (y0 + y1) / 2
+            moment += width_i * (x[i] * (2 * y0 + y1) + x[i + 1] * (y0 + 2 * y1)) / 6
     return np.asarray(shape.places[0] + moment / area)
 
 
@@ -69,5 +82,5 @@ def _crossings(a: Array, b: Array, c: Array, d: Array, n: int) -> Array:
     """Return where the lines from a to b meet the line from c to d, in shares of the piece; 0 where they do not."""
     a, b, c, d = np.broadcast_arrays(a, b, c, d)
     meet = (a < c) != (b < d)
-    shares = np.divide(c - a, (b - a) - (d - c), out=np.zeros(a.shape), where=meet)
-    return np.asarray(np.clip(np.broadcast_to(shares, (len(a), n)), 0.0, 1.0))
+    shares = np.divide(a - c, (a - c) - (b - d), out=np.zeros(a.shape), where=meet)
+    return np.asarray(np.broadcast_to(shares, (len(a), n)))

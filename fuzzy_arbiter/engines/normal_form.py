@@ -1,8 +1,10 @@
 """Proofs that an output's two terms are cut at h and 1 - h for all inputs, in the algebra of min, max and 1 - x.
 
 A condition is brought to its disjunctive normal form, a set of clauses, each a set of literals, in which no clause
-contains another. With min, max and 1 - x that form is unique, and by De Morgan so is the one of its negation. If the
-negation of all conditions for one term has the clauses of the conditions for the other, then the cuts are h and 1 - h.
+contains another. Conditions with one form have one degree, always, and by De Morgan the form of a negation is found in
+the same way. If the negation of all conditions for one term has the clauses of the conditions for the other, then the
+cuts are h and 1 - h. The converse is not quite so: what follows only from "a and not a" never being above "b or not b"
+is not seen, and such systems are swept.
 """
 
 from __future__ import annotations
@@ -19,7 +21,7 @@ MAX_CLAUSES = 512  # more are given up
 
 
 def complementary(variable: Variable) -> bool:
-    """Return whether a variable has two terms whose degrees are one minus each other, to the last bit.
+    """Return whether a variable has two terms whose degrees are one minus each other, at the knots to the last bit.
 
     Parameters
     ----------
@@ -139,9 +141,11 @@ def _joined(parts: Iterable[frozenset[Clause] | None], any_of: bool) -> frozense
 
 
 def _absorbed(clauses: Iterable[Clause]) -> frozenset[Clause]:
-    """Drop each clause that contains another, which it cannot exceed."""
+    """Drop each clause that contains another, which it cannot exceed; of too many, only some are looked at."""
     kept: list[Clause] = []
     for clause in sorted(set(clauses), key=len):
+        if len(kept) > MAX_CLAUSES:
+            break
         if not any(other <= clause for other in kept):
             kept.append(clause)
     return frozenset(kept)

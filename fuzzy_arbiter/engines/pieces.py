@@ -7,7 +7,8 @@ polynomials are fitted to exact values, in fractions.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
@@ -91,16 +92,35 @@ def _forms(
 ) -> tuple[Piece, ...]:
     """Return (moment / area + shift) / span as pieces, exact at h = 1, where it has the last value."""
     forms = []
-    for start, area, moment in fits:
-        above = _about(start, [m + shift * a for m, a in zip(moment, area, strict=True)])
-        below = _about(start, [a * span for a in area])
-        unit = below[0]  # above 0, as the area is
-        forms.append(
-            Piece(float(start), tuple(float(c / unit) for c in above), tuple(float(c / unit) for c in below[:3]))
-        )
+    ends_of_fits = [*(start for start, _, _ in fits[1:]), Fraction(1)]
+    for (first, area, moment), end in zip(fits, ends_of_fits, strict=True):
+        for start in map(_not_below, _starts(first, end, area)):
+            about = Fraction(start)  # the very number that h is measured from
+            above = _about(about, [m + shift * a for m, a in zip(moment, area, strict=True)])
+            below = _about(about, [a * span for a in area])
+            unit = below[0]  # above 0, as the area is
+            forms.append(Piece(start, tuple(float(c / unit) for c in above), tuple(float(c / unit) for c in below[:3])))
     if forms[-1](1.0) != float(last):  # rounded
         forms.append(Piece(1.0, (float(last), 0.0, 0.0, 0.0), (1.0, 0.0, 0.0)))
     return tuple(forms)
+
+
+def _starts(start: Fraction, end: Fraction, area: Polynomial) -> Iterator[Fraction]:
+    """Yield where to begin anew in a piece: an area that is small beside the first one would be lost to rounding."""
+    yield start
+    middle = (start + end) / 2
+    if 4 * min(_at(middle, area), _at(end, area)) < _at(start, area):
+        yield from _starts(middle, end, area)
+
+
+def _at(h: Fraction, polynomial: Polynomial) -> Fraction:
+    return sum((c * h**i for i, c in enumerate(polynomial)), Fraction(0))
+
+
+def _not_below(start: Fraction) -> float:
+    """Return the least float that is not below a number, so that no float is taken for one of the next piece."""
+    nearest = float(start)
+    return nearest if nearest >= start else math.nextafter(nearest, math.inf)
 
 
 def _centroid(shape: Outline, h: Fraction) -> Fraction:

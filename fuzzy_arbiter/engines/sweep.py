@@ -102,28 +102,32 @@ def area_and_moment(cuts: Numbers, places: Numbers, left: Numbers, right: Number
                 a, b = a * cuts[t], b * cuts[t]
             for u in range(terms):
                 if not scaled and (a < cuts[u]) != (b < cuts[u]):
-                    breaks.append((cuts[u] - a) / (b - a))
+                    breaks.append((a - cuts[u]) / ((a - cuts[u]) - (b - cuts[u])))
                 if u < t:
                     c, d = left[first + u], right[first + u]
                     if scaled:
                         c, d = c * cuts[u], d * cuts[u]
-                    if (a < c) != (b < d):
-                        breaks.append((c - a) / ((b - a) - (d - c)))
+                    if (a < c) != (b < d):  # so that the two differences have not one sign, nor are both 0
+                        breaks.append((a - c) / ((a - c) - (b - d)))
         breaks.sort()
         x0 = zero
-        y0 = envelope(cuts, left, right, first, x0, scaled)
         for x1 in breaks:
-            if x0 < x1 <= one:
-                y1 = envelope(cuts, left, right, first, x1, scaled)
+            if x0 < x1:
+                y0, y1 = envelope(cuts, left, right, first, x0, x1, scaled)
                 w = (x1 - x0) * width
                 area += w * (y0 + y1) / 2
                 moment += w * ((start + x0 * width) * (2 * y0 + y1) + (start + x1 * width) * (y0 + 2 * y1)) / 6
-                x0, y0 = x1, y1
+                x0 = x1
     return area, moment
 
 
-def envelope(cuts: Numbers, left: Numbers, right: Numbers, first: int, share: Any, scaled: bool) -> Any:
-    """Return the height of the envelope in one piece.
+def envelope(
+    cuts: Numbers, left: Numbers, right: Numbers, first: int, x0: Any, x1: Any, scaled: bool
+) -> tuple[Any, Any]:
+    """Return the heights of the envelope at both ends of a part of a piece, in which it is one straight line.
+
+    Which line that is the middle tells. At an end it would be lost to rounding: where a term falls to its low cut its
+    degree is known to no more than the rounding of 1, and may seem far below the cut.
 
     Parameters
     ----------
@@ -131,19 +135,29 @@ def envelope(cuts: Numbers, left: Numbers, right: Numbers, first: int, share: An
         As of `area_and_moment`.
     first : int
         Where the piece's degrees begin.
-    share : float
-        Place in the piece, from 0 to 1.
+    x0, x1 : float
+        Ends of the part, in shares of the piece.
 
     Returns
     -------
-    float
-        Greatest of the clipped (or scaled) degrees.
+    y0, y1 : float
+        Clipped (or scaled) degrees of the term that is the greatest between them.
     """
-    height = cuts[0] * 0
+    middle = (x0 + x1) / 2
+    height = y0 = y1 = cuts[0] * 0
     for t in range(len(cuts)):
-        degree = left[first + t] + (right[first + t] - left[first + t]) * share
-        height = max(height, degree * cuts[t] if scaled else min(degree, cuts[t]))
-    return height
+        a, cut = left[first + t], cuts[t]
+        rise = right[first + t] - a
+        degree = a + rise * middle
+        if scaled:
+            if degree * cut > height:
+                height, y0, y1 = degree * cut, (a + rise * x0) * cut, (a + rise * x1) * cut
+        elif degree >= cut:
+            if cut > height:
+                height, y0, y1 = cut, cut, cut
+        elif degree > height:
+            height, y0, y1 = degree, a + rise * x0, a + rise * x1
+    return y0, y1
 
 
 def centroid(cuts: Numbers, places: Numbers, left: Numbers, right: Numbers, scaled: bool) -> Any:

@@ -232,6 +232,8 @@ def _closed(engine: ClosedEngine) -> Iterator[Statement]:
         ends = [*(f"h{k} < {piece.start!r}" for piece in forms[1:]), ""]
         values_of_h = [_piece(piece, f"h{k}") for piece in forms]
         yield from _chosen(f"y{k}", list(zip(ends, values_of_h, strict=True)), output.name)
+        if engine.clips:
+            yield Assign(f"y{k}", f"least(greatest(y{k}, 0.0), 1.0)")
 
 
 def _literal(literal: tuple[str, str, bool], degrees: _Degrees) -> str:

@@ -1,16 +1,25 @@
 
-/* Height of the envelope at a share of the piece whose degrees begin at left and right. */
-static double envelope(const double *cuts, int terms, const double *left, const double *right, double share, int scaled)
+/* Heights of the envelope at both ends of a part of the piece whose degrees begin at left and right. */
+static void envelope(const double *cuts, int terms, const double *left, const double *right, double x0, double x1,
+                     int scaled, double *y)
 {
-    double height = 0.0;
+    double middle = (x0 + x1) / 2, height = y[0] = y[1] = 0.0;
     for (int t = 0; t < terms; t++) {
-        double degree = left[t] + (right[t] - left[t]) * share;
-        degree = scaled ? degree * cuts[t] : degree < cuts[t] ? degree : cuts[t];
+        double cut = cuts[t], rise = right[t] - left[t], degree = left[t] + rise * middle;
+        double start = left[t] + rise * x0, end = left[t] + rise * x1;
+        if (scaled) {
+            degree *= cut;
+            start *= cut;
+            end *= cut;
+        } else if (degree >= cut) {
+            degree = start = end = cut;
+        }
         if (degree > height) {
             height = degree;
+            y[0] = start;
+            y[1] = end;
         }
     }
-    return height;
 }
 
 /* Puts a place where the envelope may break among those before it, in rising order. */
@@ -48,7 +57,7 @@ static double centroid(const double *given, int terms, int pieces, const double 
             }
             for (int u = 0; u < terms; u++) {
                 if (!scaled && (a < cuts[u]) != (b < cuts[u])) {
-                    insert(breaks, n++, (cuts[u] - a) / (b - a));
+                    insert(breaks, n++, (a - cuts[u]) / ((a - cuts[u]) - (b - cuts[u])));
                 }
                 if (u < t) {
                     double c = left[u], d = right[u];
@@ -57,21 +66,20 @@ static double centroid(const double *given, int terms, int pieces, const double 
                         d *= cuts[u];
                     }
                     if ((a < c) != (b < d)) {
-                        insert(breaks, n++, (c - a) / ((b - a) - (d - c)));
+                        insert(breaks, n++, (a - c) / ((a - c) - (b - d)));
                     }
                 }
             }
         }
-        double x0 = 0.0, y0 = envelope(cuts, terms, left, right, x0, scaled);
+        double x0 = 0.0;
         for (int i = 0; i < n; i++) {
             double x1 = breaks[i];
-            if (x0 < x1 && x1 <= 1.0) {
-                double y1 = envelope(cuts, terms, left, right, x1, scaled);
-                double w = (x1 - x0) * width;
-                area += w * (y0 + y1) / 2;
-                moment += w * ((start + x0 * width) * (2 * y0 + y1) + (start + x1 * width) * (y0 + 2 * y1)) / 6;
+            if (x0 < x1) {
+                double y[2], w = (x1 - x0) * width;
+                envelope(cuts, terms, left, right, x0, x1, scaled, y);
+                area += w * (y[0] + y[1]) / 2;
+                moment += w * ((start + x0 * width) * (2 * y[0] + y[1]) + (start + x1 * width) * (y[0] + 2 * y[1])) / 6;
                 x0 = x1;
-                y0 = y1;
             }
         }
     }

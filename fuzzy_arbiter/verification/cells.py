@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from fuzzy_arbiter.definition import Variable
 from fuzzy_arbiter.shapes import Shape
 
-Ranks = NDArray[np.int16]  # there are as many levels as there are weights of rules
+Ranks = NDArray[np.int32]  # there are up to twice as many levels as there are weights of rules
 Kind = Literal["gap", "below", "above"]
 ROUNDING = Fraction(1, 2**50)  # a sum of degrees that is nearer to 1 than this is 1: decimal degrees are rounded
 
@@ -31,7 +31,7 @@ class Domain:
         Names of its terms.
     places : tuple of float or str
         One for each pattern: a place where it is found, or the term that is taken as a label.
-    ranks : ndarray of int16, shape (patterns, terms)
+    ranks : ndarray of int32, shape (patterns, terms)
         Degrees as ranks, see `rank`.
     """
 
@@ -115,7 +115,7 @@ def crisp(variable: Variable, levels: Sequence[Fraction]) -> Domain:
     """
     names = variable.term_names
     degrees = [[Fraction(a == b) for b in names] for a in reversed(names)]
-    ranks = np.array([[rank(d, levels) for d in row] for row in degrees], dtype=np.int16)
+    ranks = np.array([[rank(d, levels) for d in row] for row in degrees], dtype=np.int32)
     return Domain(variable.name, names, names[::-1], ranks)
 
 
@@ -150,7 +150,7 @@ def graded(variable: Variable, levels: Sequence[Fraction]) -> Domain:
         pattern = tuple(rank(max(of(place, False), of(place, True)), levels) for of in degrees)
         patterns.setdefault(pattern, float(place))
     return Domain(
-        variable.name, variable.term_names, tuple(patterns.values()), np.array(list(patterns), dtype=np.int16)
+        variable.name, variable.term_names, tuple(patterns.values()), np.array(list(patterns), dtype=np.int32)
     )
 
 
@@ -223,13 +223,21 @@ def _exact(variable: Variable) -> list[Degree]:
     for i, term in enumerate(variable.terms):
         of = _limit(term.shape)
         for j, earlier in enumerate(variable.terms[:i]):
-            if not (earlier.shape.jumps or term.shape.jumps) and (
-                earlier.shape.complement() == term.shape or term.shape.complement() == earlier.shape
-            ):
+            if _opposite(earlier.shape, term.shape):
                 of = _complement(result[j])
                 break
         result.append(of)
     return result
+
+
+def _opposite(shape: Shape, other: Shape) -> bool:
+    """Whether shapes are one minus each other but for rounding, and that exactly where one is 0 or 1."""
+    if shape.jumps or other.jumps or len(shape.points) != len(other.points):
+        return False
+    return (shape.complement() == other or other.complement() == shape) and all(
+        {a, b} == {0.0, 1.0} or 0.0 < min(a, b) <= max(a, b) < 1.0
+        for (_, a), (_, b) in zip(shape.points, other.points, strict=True)
+    )
 
 
 def _complement(of: Degree) -> Degree:

@@ -130,7 +130,7 @@ class Search:
         """
         found: list[list[Box]] = [[] for _ in self._goals]
         wanting = list(range(len(self._goals)))
-        stack = [np.zeros((1, 0), dtype=np.int16)]
+        stack = [np.zeros((1, 0), dtype=np.int32)]
         seen = 0
         while stack and wanting and seen * self._cost < limit:
             # few at a time in the beginning, so that what is easily found is found soon
@@ -150,17 +150,17 @@ class Search:
                 keep |= possible[g] & ~sure[g]
             boxes = boxes[keep]
             if len(boxes):
-                patterns = np.arange(len(self._patterns[boxes.shape[1]]), dtype=np.int16)
+                patterns = np.arange(len(self._patterns[boxes.shape[1]]), dtype=np.int32)
                 grown = np.repeat(boxes, len(patterns), axis=0)
                 stack.append(np.column_stack((grown, np.tile(patterns, len(boxes)))))
         done = not stack  # of a goal that has all it wanted, boxes were left out
         answers = [Answer(tuple(boxes), done and len(boxes) < wanted, self.combinations) for boxes in found]
         return answers, seen * self._cost
 
-    def _box(self, row: NDArray[np.int16]) -> Box:
+    def _box(self, row: NDArray[np.int32]) -> Box:
         return {self._order[i]: int(self._patterns[i][p]) for i, p in enumerate(row)}
 
-    def _judge(self, boxes: NDArray[np.int16]) -> tuple[list[Flags], list[Flags]]:
+    def _judge(self, boxes: NDArray[np.int32]) -> tuple[list[Flags], list[Flags]]:
         """Whether each goal is met in all of a box, and whether it may be in some of it."""
         n, depth = boxes.shape
         known: dict[Is, Bounds] = {}
@@ -200,5 +200,5 @@ def _greatest(a: Bounds, b: Bounds) -> Bounds:
 
 
 def _not(a: Bounds, top: int) -> Bounds:
-    upper = np.int16(top) - a[0]
-    return (upper if a[0] is a[1] else np.int16(top) - a[1]), upper
+    upper = np.int32(top) - a[0]
+    return (upper if a[0] is a[1] else np.int32(top) - a[1]), upper

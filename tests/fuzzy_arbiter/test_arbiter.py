@@ -8,6 +8,8 @@ import subprocess
 import sys
 import threading
 import tracemalloc
+from decimal import Decimal
+from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -75,6 +77,16 @@ def test_inputs_may_be_a_sequence_an_array_or_named(inputs):
 
 
 @pytest.mark.parametrize(
+    "value", [np.float32(0.1), np.float16(0.1), np.float64(0.1), Fraction(1, 10), np.True_, True, np.int8(1)]
+)
+def test_numbers_of_other_types_are_worth_their_value_and_round_as_floats(arbiter, value):
+    for inputs in ([value, 0.5, 0.0], {"obstacle": value, "shape": 0.5, "depth": 0.0}):
+        weights = arbiter(inputs)
+        assert weights == arbiter([float(value), 0.5, 0.0])
+        assert all(type(w) is float for w in weights)
+
+
+@pytest.mark.parametrize(
     ("inputs", "words"),
     [
         ([0.1, 0.2], "2 inputs came, expected 3: obstacle, shape, depth"),
@@ -87,6 +99,8 @@ def test_inputs_may_be_a_sequence_an_array_or_named(inputs):
         (["exist", 0.2, 0.3], "obstacle"),
         ([1j, 0.2, 0.3], "obstacle"),
         ([[0.1], 0.2, 0.3], "obstacle"),
+        ([np.array([0.1, 0.2]), 0.2, 0.3], "obstacle"),
+        ([Decimal("0.1"), 0.2, 0.3], "obstacle: input is Decimal"),
         (np.array([[0.1, 0.2, 0.3]]), "1 inputs came"),
         (np.array(0.5), "inputs are"),
         ("abc", "obstacle: input is 'a'"),
@@ -125,6 +139,7 @@ def test_inputs_outside_may_be_clipped():
     arbiter = Arbiter([Criterion("wall", membership=rising(2.0, 4.0))], outside="clip")
     assert arbiter([-7.0]) == (0.0,)
     assert arbiter.batch([[math.inf], [1e9], [-1.0]])[:, 0].tolist() == [1.0, 1.0, 0.0]
+    assert arbiter([10**400]) == arbiter([np.float32(5)]) == (1.0,)
     for bad in (math.nan, "near", None):
         with pytest.raises(InputError, match="wall"):
             arbiter([bad])

@@ -57,12 +57,18 @@ WIDE = System(
     normalisation="none",
 )
 PAIR = Output("w", (0, 1), (Term("low", falling(0.2, 0.55)), Term("high", rising(0.37, 0.83))))
+DIP = Output(
+    "w",
+    (0, 1),
+    (Term("low", Shape(((0, 0.2), (0.5, 0.2), (0.5, 1), (0.6, 1), (0.6, 0)))), Term("high", triangle(0.89, 0.9, 0.91))),
+)
 SYSTEMS = {
     "section VI": prioritised(),
     "raw": prioritised(normalisation="none"),
     "complete table": prioritised(form="complete"),
     "rational": prioritised(weight=PAIR, normalisation="sum"),
     "measured": prioritised([Criterion("d", membership=falling(0.1, 0.7)), Criterion("e")], outside="clip"),
+    "beyond its ends": prioritised(weight=DIP),
     "one": prioritised([Criterion("only")], normalisation="max"),
     "wide": WIDE,
     "wide, scaled": replace(WIDE, normalisation="range"),

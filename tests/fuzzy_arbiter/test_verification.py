@@ -9,7 +9,9 @@ import pytest
 from fuzzy_arbiter import (
     Arbiter,
     Criterion,
+    Is,
     Output,
+    Rule,
     Shape,
     System,
     Term,
@@ -335,3 +337,25 @@ def test_hundreds_of_rules_with_one_conclusion_are_not_compared():
     (note,) = [f for f in v.findings if f.about == "rules"]
     assert note.severity == "note"
     assert note.text.startswith("not compared with each other")
+
+
+@pytest.mark.parametrize("order", [1, -1])
+def test_a_degree_that_one_minus_it_cannot_hold_is_not_lost(order):
+    """Beside 1e-20 the other term has 1: it is no complement there, and its negation is 0."""
+    terms = (Term("seldom", Shape(((0, 1e-20), (1, 1)))), Term("often", falling(0, 1)))[::order]
+
+    def graded(rule):
+        arbiter = Arbiter(system=System((Variable("x", (0, 1), terms),), (output("y"),), (rule,)))
+        return arbiter, arbiter.verify().graded_complete
+
+    assert graded("if x is seldom then y is high")[1] is True
+    arbiter, complete = graded("if x is not often then y is high")
+    assert complete is False
+    with pytest.raises(UndefinedOutputError):
+        arbiter([0.0])
+
+
+def test_thousands_of_different_weights():
+    rules = tuple(Rule(Is("a", "on"), Is("y", "low"), 0.5 + 0.5 * (i + 1) / 8401) for i in range(8400))
+    v = verify(system([*rules, Rule(Is("a", "off"), Is("y", "high"))], "a"))
+    assert (v.graded_complete, v.graded_consistent) == (True, True)

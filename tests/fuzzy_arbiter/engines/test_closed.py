@@ -1,11 +1,12 @@
 """The closed form against the exact centroid, and the proof that there is one."""
 
 import math
+import time
 from fractions import Fraction
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 
 from fuzzy_arbiter import (
@@ -13,6 +14,7 @@ from fuzzy_arbiter import (
     Criterion,
     EngineError,
     Output,
+    Rule,
     Shape,
     System,
     Term,
@@ -20,10 +22,12 @@ from fuzzy_arbiter import (
     falling,
     prioritised,
     rising,
+    triangle,
 )
 from fuzzy_arbiter.engines.closed import ClosedEngine
 from fuzzy_arbiter.engines.exact import ExactEngine
 from fuzzy_arbiter.engines.pieces import pieces
+from fuzzy_arbiter.propositions import And, Is, Or
 from tests.fuzzy_arbiter import reference
 from tests.fuzzy_arbiter.systems import shapes, systems
 
@@ -75,12 +79,72 @@ def test_any_pair_of_output_terms_has_its_pieces(low, high, h):
     assert engine.weights_of_many(np.array([[h]]))[0] == pytest.approx(engine.weights([h]), abs=EPS)
 
 
+@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@given(shapes(), shapes(), st.floats(0.0, 1.0), st.sampled_from(["range", "sum", "max"]))
+def test_weights_of_any_pair_are_those_of_the_exact_engine(low, high, h, normalisation):
+    """Between its ends a C(h) may lie beyond them; weights are in [0, 1] even so."""
+    output = Output("y", (0, 1), (Term("low", low), Term("high", high)))
+    ends = [reference.centroid(output, [Fraction(1 - i), Fraction(i)]) for i in (0, 1)]
+    assume(abs(ends[1] - ends[0]) > Fraction(1, 64))
+    system = prioritised(criteria(2), weight=output, normalisation=normalisation)
+    inputs = [h, 0.25]
+    expected = np.array([float(w) for w in reference.weights(system, inputs)])
+    whole = {"range": 1.0, "sum": expected.sum(), "max": expected.max()}[normalisation]
+    assume(whole == 0.0 or whole > 1e-3)
+    expected = expected / whole if whole else expected
+    arbiter = Arbiter(system=system, engine="closed")
+    assert all(0.0 <= w <= 1.0 for w in arbiter(inputs))
+    assert arbiter(inputs) == pytest.approx(expected, abs=1e-11)
+    assert arbiter.batch([inputs])[0] == pytest.approx(expected, abs=1e-11)
+
+
+def test_a_centroid_beyond_both_ends_is_clipped():
+    """The peak of low is cut off before high has an area worth speaking of, so that C(h) falls at first."""
+    low = Shape(((0, 0.2), (0.5, 0.2), (0.5, 1), (0.6, 1), (0.6, 0)))
+    arbiter = Arbiter(
+        criteria(1), weight=Output("y", (0, 1), (Term("low", low), Term("high", triangle(0.89, 0.9, 0.91))))
+    )
+    assert arbiter.engine == "closed"
+    assert arbiter.centroids([0.7])[0] < arbiter.centroids([0.0])[0] - 0.02
+    assert arbiter([0.7]) == arbiter.with_engine("exact")([0.7]) == (0.0,)
+    assert arbiter.batch([[0.7], [1.0]]).tolist() == [[0.0], [1.0]]
+
+
+@pytest.mark.parametrize("height", [1e-2, 1e-4, 1e-6])
+def test_terms_of_very_different_areas(height):
+    """Where the area is a millionth of what it was, and C(h) a million times as steep."""
+    plateau, low_triangle = Shape(((0, 1),)), Shape(((0.6, 0), (0.7, height), (0.8, 0)))
+    narrow = triangle(0.7 - height, 0.7, 0.7 + height)
+    near = [*(height * x for x in (0.1, 0.5, 0.9, 1.0, 1.1, 3.0)), *np.random.default_rng(0).random(20).tolist()]
+    for low, high in ((plateau, low_triangle), (low_triangle, plateau), (plateau, narrow), (narrow, plateau)):
+        output = Output("y", (0, 1), (Term("low", low), Term("high", high)))
+        raw, _ = pieces(output)
+        engine = ClosedEngine(prioritised(criteria(1), weight=output, normalisation="none"))
+        starts = [x for p in raw for x in (p.start, math.nextafter(p.start, 0), math.nextafter(p.start, 1))]
+        for h in [*near, *(1 - x for x in near), *starts]:
+            exact = float(reference.centroid(output, [1 - Fraction(h), Fraction(h)]))
+            assert engine.weights([h])[0] == pytest.approx(exact, abs=16 * EPS)
+
+
+@pytest.mark.parametrize("height", [2e-6, 3e-6, 5e-6, 7e-6, 1.1e-5, 1.3e-5])
+def test_no_number_is_taken_for_one_of_the_next_piece(height):
+    """Just below h = 1 the wide foot of low begins to be clipped: C(h) bends by a slope of about 1/height."""
+    low = Shape(((0, 1), (0.01, 1), (0.01, height), (1, height)))
+    high = Shape(((0.7, 0), (0.7, 3 * height), (0.9, 3 * height), (0.9, 0)))
+    output = Output("y", (0, 1), (Term("low", low), Term("high", high)))
+    engine = ClosedEngine(prioritised(criteria(1), weight=output, normalisation="none"))
+    for piece in engine.raw[0][1:]:
+        for h in (piece.start, math.nextafter(piece.start, 0)):
+            exact = float(reference.centroid(output, [1 - Fraction(h), Fraction(h)]))
+            assert engine.weights([h])[0] == pytest.approx(exact, abs=16 * EPS)
+
+
 def test_the_number_of_pieces():
     """One cubic for the full triangles, also for trapezoids that meet there; three for the asymmetric pair."""
 
     def count(low, high):
         _, scaled = pieces(Output("y", (0, 1), (Term("low", low), Term("high", high))))
-        return len(scaled)
+        return sum(piece.start < 1.0 for piece in scaled)  # beside them there may be one for h = 1 alone
 
     assert count(falling(0, 1), rising(0, 1)) == 1
     assert count(falling(0.3, 0.7), rising(0.3, 0.7)) == 1
@@ -234,3 +298,23 @@ def test_a_shape_with_a_plateau_below_one():
     for x in np.random.default_rng(1).random((50, 2)).tolist():
         exact = [float(w) for w in reference.weights(arbiter.system, x)]
         assert arbiter(x) == pytest.approx(exact, abs=16 * EPS)
+
+
+def test_a_proof_that_would_be_too_long_is_given_up_soon():
+    """Two disjunctions of 400 clauses each, joined by *and*: 160,000 clauses, none of which is in another."""
+    names = [f"v{i}" for i in range(60)]
+    variables = tuple(Variable(name, (0, 1), (Term("off", falling(0, 1)), Term("on", rising(0, 1)))) for name in names)
+
+    def pairs(names):
+        both = [And((Is(a, "on"), Is(b, "off"))) for a in names for b in names if a != b]
+        return Or(tuple(both[:400]))
+
+    output = Output("y", (0, 1), (Term("low", falling(0, 1)), Term("high", rising(0, 1))))
+    rules = (
+        Rule(And((pairs(names[:30]), pairs(names[30:]))), output["high"]),
+        Rule(Is("v0", "on"), output["low"]),
+    )
+    start = time.perf_counter()
+    arbiter = Arbiter(system=System(variables, (output,), rules))
+    assert time.perf_counter() - start < 30.0  # of minutes
+    assert "more than 512 clauses" in arbiter.why

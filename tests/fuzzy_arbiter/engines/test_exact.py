@@ -20,8 +20,10 @@ from fuzzy_arbiter import (
     rising,
     triangle,
 )
+from fuzzy_arbiter.engines.exact import ExactEngine
+from fuzzy_arbiter.engines.sweep import centroid, outline
 from tests.fuzzy_arbiter import reference
-from tests.fuzzy_arbiter.systems import systems
+from tests.fuzzy_arbiter.systems import shapes, systems
 
 EPS = np.finfo(float).eps
 
@@ -73,6 +75,42 @@ def test_degrees_next_to_nothing_do_not_underflow(implication):
     for x in (5e-324, 1e-310, 1e-121, 1e-119, 1e-30):
         assert arbiter([x]) == pytest.approx([0.5], abs=4 * EPS)
         assert arbiter.batch([[x]])[0] == pytest.approx([0.5], abs=4 * EPS)
+
+
+@settings(max_examples=150, deadline=None)
+@given(st.lists(shapes(), min_size=1, max_size=4), st.data(), st.booleans())
+def test_cuts_of_any_size(terms, data, scaled):
+    """The sweep and its batch at cuts that are next to nothing, alone or beside others."""
+    sizes = st.one_of(st.just(0.0), st.floats(0.0, 1.0), st.floats(-300.0, 0.0).map(lambda x: 10.0**x))
+    cuts = [data.draw(sizes) for _ in terms]
+    cuts[0] = cuts[0] or 1e-17
+    output = Output("y", (0, 1), tuple(Term(f"t{i}", shape) for i, shape in enumerate(terms)))
+    found = centroid(cuts, *outline(output), scaled)
+    assert found == pytest.approx(float(reference.centroid(output, list(map(Fraction, cuts)), scaled)), abs=8 * EPS)
+    rule = "if x is on then y is t0"
+    on = (Variable("x", (0, 1), (Term("on", rising(0, 1)),)),)
+    engine = ExactEngine(System(on, (output,), (rule,), normalisation="none", implication="prod" if scaled else "min"))
+    assert engine.centroid_of_many(0, np.array([cuts, cuts]).T).tolist() == [found, found]
+
+
+@pytest.mark.parametrize("cut", [1e-6, 1e-9, 1e-12, 1e-17, 1e-60, 1e-200, 5e-324])
+def test_a_term_alone_has_its_middle_however_low_it_is_cut(cut):
+    output = Output("y", (0, 1), (Term("mid", triangle(0, 0.5, 1)),))
+    inputs = (Variable("x", (0, 1), (Term("on", rising(0, 1)),)),)
+    arbiter = Arbiter(system=System(inputs, (output,), ("if x is on then y is mid",), normalisation="none"))
+    assert arbiter([cut]) == pytest.approx([0.5], abs=4 * EPS)
+    assert arbiter.batch([[cut]])[0].tolist() == list(arbiter([cut]))
+
+
+def test_lines_whose_slopes_differ_by_less_than_rounding():
+    almost = Shape(((0, 1), (1, 1e-20)))
+    output = Output("y", (0, 1), (Term("a", falling(0, 1)), Term("b", almost), Term("c", rising(0, 1))))
+    inputs = (Variable("x", (0, 1), (Term("on", rising(0, 1)),)),)
+    rules = ("if x is on then y is a", "if x is on then y is b")
+    for implication in ("min", "prod"):
+        arbiter = Arbiter(system=System(inputs, (output,), rules, normalisation="none", implication=implication))
+        assert arbiter([1.0]) == pytest.approx([1 / 3], abs=4 * EPS)
+        assert arbiter.batch([[1.0]])[0].tolist() == list(arbiter([1.0]))
 
 
 def test_an_output_of_one_centroid_cannot_be_scaled():
