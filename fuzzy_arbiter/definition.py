@@ -116,6 +116,12 @@ class Variable:
         """Names of the terms, in their order."""
         return tuple(term.name for term in self.terms)
 
+    @property
+    def knots(self) -> tuple[float, ...]:
+        """Ends of the universe and the places of all points in it, which increase; between two, terms are straight."""
+        low, high = self.universe
+        return (low, *sorted({x for term in self.terms for x, _ in term.shape.points if low < x < high}), high)
+
 
 @dataclass(frozen=True, slots=True)
 class Output(Variable):
@@ -248,7 +254,7 @@ class System:
             object.__setattr__(self, key, found)
         object.__setattr__(self, "rules", tuple(parse_rule(r) if isinstance(r, str) else r for r in rules))
         require_name(self.name, "system")
-        for key, choices in _CHOICES.items():
+        for key, choices in CHOICES.items():
             choice = getattr(self, key)
             if not isinstance(choice, str) or choice not in choices:
                 raise DefinitionError(f"{key} is {shown(choice)}, expected one of {', '.join(choices)}")
@@ -278,7 +284,7 @@ class System:
         return "\n".join(f"R{i + 1}: {rule}" for i, rule in enumerate(self.rules))
 
 
-_CHOICES = {
+CHOICES = {
     "conjunction": get_args(Conjunction),
     "disjunction": get_args(Disjunction),
     "implication": get_args(Implication),

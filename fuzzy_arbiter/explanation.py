@@ -143,6 +143,8 @@ class Explanation:
         lines += aligned([(rule.label, f"{rule.strength:.6g}", _short(rule.text)) for rule in fired])
         lines.append("outputs")
         lines += aligned([(o.name, f"{o.weight:.6g}", _pairs(o.cuts), _decision(o)) for o in self.outputs])
+        if len(self.outputs) == 1:  # that is all there is to say
+            return "\n".join(lines)
         if self.winner is not None:
             second = f", {self.margin:.6g} above {self.runner_up}" if self.runner_up is not None else ""
             lines.append(f"winner: {self.winner}{second}")

@@ -79,7 +79,7 @@ class Samples:
         try:
             values = np.asarray(inputs, dtype=np.float64)
         except (TypeError, ValueError) as error:
-            raise InputError(f"inputs: {error}, expected numbers") from None
+            raise InputError(f"inputs: {error}; expected rows of numbers for {', '.join(self._names)}") from None
         if values.ndim != 2 or values.shape[1] != len(self._names):
             raise InputError(f"inputs have the shape {values.shape}, expected (n, {len(self._names)})")
         low, high = np.array(self._limits).T
@@ -104,12 +104,12 @@ class Samples:
 
     def _in_order(self, inputs: Sample) -> list[float]:
         if isinstance(inputs, Mapping):
+            for name in inputs:  # first, for a misspelt one is missing, too
+                if name not in self._names:
+                    raise InputError(f"{name}: unknown input, expected {', '.join(self._names)}")
             for name in self._names:
                 if name not in inputs:
                     raise InputError(f"{name}: input is missing, expected {', '.join(self._names)}")
-            for name in inputs:
-                if name not in self._names:
-                    raise InputError(f"{name}: unknown input, expected {', '.join(self._names)}")
             return [inputs[name] for name in self._names]
         if isinstance(inputs, np.ndarray):
             return list(inputs.tolist())
@@ -124,7 +124,7 @@ class Samples:
         except TypeError:
             return InputError(f"inputs are {inputs!r}, expected {len(self._names)} numbers")
         if len(values) != len(self._names):
-            return InputError(f"{len(values)} inputs came, expected {len(self._names)}: {', '.join(self._names)}")
+            return InputError(f"inputs: {len(values)} came, expected {len(self._names)}: {', '.join(self._names)}")
         for name, x, (low, high) in zip(self._names, values, self._limits, strict=True):
             if not isinstance(x, _NUMBER) or x != x or (not self._clips and not low <= x <= high):
                 return InputError(f"{name}: input is {x!r}, expected a number in [{low:g}, {high:g}]")

@@ -30,7 +30,7 @@ from fuzzy_arbiter.errors import EngineError
 from fuzzy_arbiter.hierarchy import DEGREE
 
 SMOOTHSTEP = (0.0, 0.0, 3.0, -2.0)  # which is never outside [0, 1]
-BLOCK = 4096  # samples evaluated at a time, which the processor's caches hold
+_BLOCK = 4096  # samples evaluated at a time, which the processor's caches hold
 
 
 class NoClosedFormError(EngineError):
@@ -116,8 +116,8 @@ class ClosedEngine(Engine):
     def weights_of_many(self, inputs: Array) -> Array:
         """Return the normalised value of each output for many samples; as of `Engine`."""
         result = np.empty((len(inputs), len(self.system.outputs)))
-        for start in range(0, len(inputs), BLOCK):
-            block = inputs[start : start + BLOCK]
+        for start in range(0, len(inputs), _BLOCK):
+            block = inputs[start : start + _BLOCK]
             highs = self._highs_of_many(block)
             if self._cubic is not None:
                 values = _horner(self._cubic, highs)
@@ -125,7 +125,7 @@ class ClosedEngine(Engine):
                 values = np.stack([_values(forms, h) for forms, h in zip(self.scaled, highs, strict=True)])
             if self.clips:
                 np.clip(values, 0.0, 1.0, out=values)
-            result[start : start + BLOCK] = values.T
+            result[start : start + _BLOCK] = values.T
         return shared_of_many(result, self.system.normalisation)
 
     def shortcut(self) -> Shortcut | None:

@@ -12,7 +12,7 @@ from fuzzy_arbiter.engines.engine import Engine
 from fuzzy_arbiter.engines.firing import Array
 from fuzzy_arbiter.engines.sweep import LARGER, TINY, Outline, centroid, outline
 
-BLOCK = 1024  # samples evaluated at a time
+_BLOCK = 1024  # samples evaluated at a time
 
 
 class ExactEngine(Engine):
@@ -33,8 +33,8 @@ class ExactEngine(Engine):
         """Return the centroids of an output for many samples, exact to rounding."""
         cuts = np.where(cuts.max(axis=0) < TINY, cuts * LARGER, cuts)
         result = np.empty(cuts.shape[1])
-        for start in range(0, len(result), BLOCK):
-            block = slice(start, start + BLOCK)
+        for start in range(0, len(result), _BLOCK):
+            block = slice(start, start + _BLOCK)
             result[block] = _centroids(cuts[:, block], self._outlines[k], self._scaled)
         return result
 

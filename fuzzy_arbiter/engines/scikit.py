@@ -182,12 +182,9 @@ def _build(system: System, samples: Sequence[tuple[Array, Array]]) -> _ControlSy
 
 def _antecedent(variable: Variable) -> Any:
     """Return an input, sampled at its ends and at the knots of its terms, between which all are straight lines."""
-    low, high = variable.universe
-    knots = {x for term in variable.terms for x, _ in term.shape.points if low < x < high}
-    places = [low, *sorted(knots), high]
-    antecedent = control.Antecedent(np.array(places), variable.name)
+    antecedent = control.Antecedent(np.array(variable.knots), variable.name)
     for term in variable.terms:
-        antecedent[term.name] = np.array([term.shape(x) for x in places])
+        antecedent[term.name] = np.array([term.shape(x) for x in variable.knots])
     return antecedent
 
 

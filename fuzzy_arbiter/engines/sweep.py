@@ -25,7 +25,7 @@ class Outline(NamedTuple):
     Attributes
     ----------
     places : tuple of float, length pieces + 1
-        Ends of the universe and the knots of all terms in it, which increase.
+        Knots of the variable.
     left, right : tuple of float, length pieces * terms
         Degree of each term just right of each piece's start, and just left of its end; those of a piece stand together.
     """
@@ -50,9 +50,7 @@ def outline(variable: Variable, number: Callable[[float], Any] = float) -> Outli
     Outline
         In these numbers.
     """
-    low, high = variable.universe
-    knots = {x for term in variable.terms for x, _ in term.shape.points if low < x < high}
-    places = tuple(map(number, (low, *sorted(knots), high)))
+    places = tuple(map(number, variable.knots))
     shapes = [[(number(x), number(y)) for x, y in term.shape.points] for term in variable.terms]
     left, right = [], []
     for a, b in zip(places, places[1:], strict=False):
@@ -184,3 +182,23 @@ def centroid(cuts: Numbers, places: Numbers, left: Numbers, right: Numbers, scal
     else:
         area, moment = area_and_moment(cuts, places, left, right, scaled)
     return places[0] + moment / area
+
+
+def alone(output: Variable, number: Callable[[float], Any] = float) -> list[Any]:
+    """Return the centroid of each of an output's terms, alone and whole.
+
+    Parameters
+    ----------
+    output : Variable
+        An output.
+    number : callable
+        `float`, or `fractions.Fraction` for exact results.
+
+    Returns
+    -------
+    list of float
+        In the order of the terms.
+    """
+    shape = outline(output, number)
+    n = len(output.terms)
+    return [centroid([number(i == j) for i in range(n)], *shape, False) for j in range(n)]

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from functools import partial, reduce
 from itertools import accumulate
 
+from fuzzy_arbiter.checks import shown
 from fuzzy_arbiter.definition import System
 from fuzzy_arbiter.engines import choose
 from fuzzy_arbiter.engines.closed import ClosedEngine
@@ -17,6 +18,7 @@ from fuzzy_arbiter.engines.engine import Engine
 from fuzzy_arbiter.engines.firing import Logic
 from fuzzy_arbiter.engines.pieces import Piece
 from fuzzy_arbiter.engines.sweep import Outline, outline
+from fuzzy_arbiter.errors import DefinitionError
 from fuzzy_arbiter.hierarchy import DEGREE
 from fuzzy_arbiter.propositions import Is
 from fuzzy_arbiter.shapes import Shape
@@ -93,6 +95,8 @@ def program(system: System) -> Program:
     Program
         With the results of the engine that ``auto`` takes, to the last bit.
     """
+    if not isinstance(system, System):
+        raise DefinitionError(f"system is {shown(system)}, expected a System, such as arbiter.system")
     engine, _ = choose(system, "auto")
     closed = isinstance(engine, ClosedEngine)
     statements = (*_inputs(system), *(_closed(engine) if isinstance(engine, ClosedEngine) else _swept(engine)))

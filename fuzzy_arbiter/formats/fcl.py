@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from fuzzy_arbiter.definition import Rule, System, Variable
+from fuzzy_arbiter.definition import Rule, System, Variable, variable_names
 from fuzzy_arbiter.errors import UnsupportedError
 from fuzzy_arbiter.formats.fcl_reader import system_of, universe_of
 from fuzzy_arbiter.formats.fcl_words import CONJUNCTIONS, DISJUNCTIONS, PAIRS, RESERVED, cut
@@ -86,7 +86,7 @@ def _say_rule(rule: Rule) -> str:
 def _require_one_case(system: System) -> None:
     """Refuse names that the standard, to which the case of letters means nothing, takes for the same."""
     variables = (*system.inputs, *system.outputs)
-    for names in ([v.name for v in variables], *(v.term_names for v in variables)):
+    for names in (variable_names(variables), *(v.term_names for v in variables)):
         known: dict[str, str] = {}
         for name in names:
             other = known.setdefault(name.lower(), name)

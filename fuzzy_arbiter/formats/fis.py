@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from fuzzy_arbiter.definition import Output, System, Term, Variable
+from fuzzy_arbiter.definition import Output, System, Term, Variable, variable_names
 from fuzzy_arbiter.errors import UnsupportedError
 from fuzzy_arbiter.formats.fis_reader import read
 from fuzzy_arbiter.formats.fis_words import SETTINGS
@@ -107,7 +107,7 @@ def _rule(system: System, i: int) -> str:
     condition = rule.condition
     parts = condition.parts if isinstance(condition, And | Or) else (condition,)
     row = [0] * len(system.inputs)
-    names = [v.name for v in system.inputs]
+    names = variable_names(system.inputs)
     last = -1
     for part in parts:
         statement = _statement(part)
@@ -119,7 +119,7 @@ def _rule(system: System, i: int) -> str:
         last = k
         row[k] = (system.inputs[k].term_names.index(statement.term) + 1) * (1 if statement is part else -1)
     concluded = [0] * len(system.outputs)
-    outputs = [v.name for v in system.outputs]
+    outputs = variable_names(system.outputs)
     order = [outputs.index(c.variable) for c in rule.conclusions]
     if order != sorted(order):
         raise cannot_say("fis", i, rule, "each output in the order of the outputs", "conclusions")

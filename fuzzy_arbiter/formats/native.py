@@ -6,6 +6,7 @@ from dataclasses import replace
 from fractions import Fraction
 
 from fuzzy_arbiter.definition import Output, System, Term
+from fuzzy_arbiter.engines.sweep import alone
 from fuzzy_arbiter.errors import DefinitionError, UnsupportedError
 from fuzzy_arbiter.shapes import Shape
 
@@ -67,7 +68,7 @@ def range_ends(output: Output) -> tuple[Fraction, Fraction]:
     tuple of Fraction
         Exact centroids of its least and its greatest term, each alone and whole.
     """
-    centroids = [_centroid(term.shape, output.universe) for term in output.terms]
+    centroids = alone(output, Fraction)
     return min(centroids), max(centroids)
 
 
@@ -89,18 +90,3 @@ def _mapped(output: Output) -> Output:
         raise UnsupportedError(
             f"output {output.name!r}: its terms lie too far apart, or too close, to be mapped in floating point"
         ) from None
-
-
-def _centroid(shape: Shape, universe: tuple[float, float]) -> Fraction:
-    low, high = map(Fraction, universe)
-    points = [(Fraction(x), Fraction(degree)) for x, degree in shape.points]
-    points = [(min(low, points[0][0]), points[0][1]), *points, (max(high, points[-1][0]), points[-1][1])]
-    area = moment = Fraction(0)
-    for (a, left), (b, right) in zip(points, points[1:], strict=False):
-        start, end = max(a, low), min(b, high)
-        if start < end:
-            slope = (right - left) / (b - a)
-            y0, y1 = left + slope * (start - a), left + slope * (end - a)
-            area += (end - start) * (y0 + y1) / 2
-            moment += (end - start) * (start * (2 * y0 + y1) + end * (y0 + 2 * y1)) / 6
-    return moment / area

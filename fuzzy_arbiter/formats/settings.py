@@ -5,16 +5,15 @@ from __future__ import annotations
 import difflib
 import re
 from collections.abc import Iterable, Sequence
-from typing import Any, get_args
+from typing import Any
 
-from fuzzy_arbiter.definition import Normalisation, Outside, System
+from fuzzy_arbiter.definition import CHOICES, System
 from fuzzy_arbiter.formats.native import range_ends
 from fuzzy_arbiter.formats.notation import refuse, say_number
 
 MARK = "fuzzy_arbiter:"
 # what a file means that says nothing of it
 PLAIN: dict[str, Any] = {"normalisation": "none", "outside": "refuse", "points": 101}
-_CHOICES = {"normalisation": get_args(Normalisation), "outside": get_args(Outside)}
 
 
 def say_settings(system: System, keys: Sequence[str]) -> list[str]:
@@ -94,6 +93,6 @@ def _value(key: str, value: str, line: int) -> Any:
         if not re.fullmatch(r"\d{1,4000}", value, re.ASCII):
             refuse(line, f"points is {value!r}, expected a whole number, 3 or more")
         return int(value)
-    if value not in _CHOICES[key]:
-        refuse(line, f"{key} is {value!r}, expected one of {', '.join(_CHOICES[key])}")
+    if value not in CHOICES[key]:
+        refuse(line, f"{key} is {value!r}, expected one of {', '.join(CHOICES[key])}")
     return value

@@ -135,7 +135,7 @@ def graded(variable: Variable, levels: Sequence[Fraction]) -> Domain:
         Every pattern of ranks that there is, once.
     """
     degrees = _exact(variable)
-    places = _knots(variable)
+    places = list(map(Fraction, variable.knots))
     crossings = {
         a + (level - left) * (b - a) / (right - left)
         for a, b in zip(places, places[1:], strict=False)
@@ -168,7 +168,7 @@ def stretches(variable: Variable) -> tuple[Stretch, ...]:
         Gaps first, then the others; each as long as it can be. None if the terms are a Ruspini partition.
     """
     degrees = _exact(variable)
-    places = _knots(variable)
+    places = list(map(Fraction, variable.knots))
 
     def at(place: Fraction) -> Fraction:
         return _snapped(sum((max(of(place, False), of(place, True)) for of in degrees), Fraction(0)))
@@ -259,14 +259,6 @@ def _limit(shape: Shape) -> Degree:
         return left + (right - left) * (place - a) / (b - a)
 
     return of
-
-
-def _knots(variable: Variable) -> list[Fraction]:
-    low, high = variable.universe
-    return sorted(
-        {Fraction(x) for t in variable.terms for x, _ in t.shape.points if low < x < high}
-        | {Fraction(low), Fraction(high)}
-    )
 
 
 def _between(degrees: Sequence[Degree], a: Fraction, b: Fraction, end: bool) -> list[Fraction]:

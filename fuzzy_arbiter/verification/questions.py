@@ -11,7 +11,7 @@ import numpy as np
 
 from fuzzy_arbiter.definition import Output, Rule, System
 from fuzzy_arbiter.engines.firing import Firing
-from fuzzy_arbiter.engines.sweep import centroid, outline
+from fuzzy_arbiter.engines.sweep import alone
 from fuzzy_arbiter.propositions import And, Is, Not, Or, Proposition
 from fuzzy_arbiter.verification.cells import Domain, crisp, graded, rank
 from fuzzy_arbiter.verification.search import Answer, Goal, Group, Search
@@ -64,10 +64,8 @@ def greatest_term(output: Output) -> str:
     str
         The term whose own centroid is greatest; of several the last.
     """
-    pieces = outline(output)
-    n = len(output.terms)
-    centroids = [centroid([float(i == j) for i in range(n)], *pieces, False) for j in range(n)]
-    return output.term_names[max(range(n), key=lambda j: (centroids[j], j))]
+    centroids = alone(output)
+    return output.term_names[max(range(len(centroids)), key=lambda j: (centroids[j], j))]
 
 
 def rules_on(system: System, statement: Is) -> tuple[Rule, ...]:

@@ -89,8 +89,8 @@ def test_numbers_of_other_types_are_worth_their_value_and_round_as_floats(arbite
 @pytest.mark.parametrize(
     ("inputs", "words"),
     [
-        ([0.1, 0.2], "2 inputs came, expected 3: obstacle, shape, depth"),
-        ([0.1, 0.2, 0.3, 0.4], "4 inputs came"),
+        ([0.1, 0.2], "inputs: 2 came, expected 3: obstacle, shape, depth"),
+        ([0.1, 0.2, 0.3, 0.4], "inputs: 4 came"),
         ([0.1, math.nan, 0.3], "shape: input is nan"),
         ([0.1, 0.2, 1.1], r"depth: input is 1.1, expected a number in \[0, 1\]"),
         ([-1e-9, 0.2, 0.3], "obstacle"),
@@ -101,7 +101,7 @@ def test_numbers_of_other_types_are_worth_their_value_and_round_as_floats(arbite
         ([[0.1], 0.2, 0.3], "obstacle"),
         ([np.array([0.1, 0.2]), 0.2, 0.3], "obstacle"),
         ([Decimal("0.1"), 0.2, 0.3], "obstacle: input is Decimal"),
-        (np.array([[0.1, 0.2, 0.3]]), "1 inputs came"),
+        (np.array([[0.1, 0.2, 0.3]]), "inputs: 1 came"),
         (np.array(0.5), "inputs are"),
         ("abc", "obstacle: input is 'a'"),
         (None, "inputs are None"),
@@ -126,8 +126,8 @@ def test_bad_inputs_are_errors(arbiter, inputs, words):
         ([[0.1, 0.2]], r"shape \(1, 2\)"),
         ([[0.1, 0.2, 0.3], [0.1, math.nan, 0.3]], "row 1: shape is nan"),
         ([[0.1, 0.2, 0.3], [0.1, 0.2, 1.5]], r"row 1: depth is 1.5, expected a number in \[0, 1\]"),
-        ([["a", "b", "c"]], "expected numbers"),
-        ([[0.1, 0.2, 0.3], [0.1]], "expected numbers"),
+        ([["a", "b", "c"]], "expected rows of numbers for obstacle"),
+        ([[0.1, 0.2, 0.3], [0.1]], "expected rows of numbers for obstacle"),
     ],
 )
 def test_bad_rows_are_errors(arbiter, inputs, words):

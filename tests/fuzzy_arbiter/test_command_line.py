@@ -151,7 +151,7 @@ def test_tables_that_cannot_be_read(refused, tmp_path):
     ("words", "fault"),
     [
         ([], "no values came, expected obstacle, shape, depth"),
-        (["1", "0"], "2 inputs came, expected 3: obstacle, shape, depth"),
+        (["1", "0"], "inputs: 2 came, expected 3: obstacle, shape, depth"),
         (["obstacle=1", "0", "0"], "some values came with a name and some without"),
         (["obstacle=1", "obstacle=1", "shape=0"], "obstacle: came twice"),
         (["obstacle=1", "speed=1", "shape=0", "depth=0"], "speed: unknown input"),

@@ -179,7 +179,7 @@ def test_batch_is_refused():
     ("inputs", "time", "match"),
     [
         ([math.nan, 0, 0], 2, "obstacle: input is nan"),
-        ([0, 0], 2, "2 inputs came, expected 3"),
+        ([0, 0], 2, "inputs: 2 came, expected 3"),
         ([0, 0, 2], 2, "depth: input is 2"),
         ({"obstacle": 0}, 2, "shape: input is missing"),
         ([0, 0, 0], 0.5, "time is 0.5 after 1"),
