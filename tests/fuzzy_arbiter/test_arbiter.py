@@ -230,7 +230,7 @@ def test_threads_do_not_disturb_each_other(arbiter):
     assert wrong == []
 
 
-@pytest.mark.parametrize("count", [200, pytest.param(10_000, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("count", [50, pytest.param(10_000, marks=pytest.mark.slow)])
 def test_arbiters_leave_nothing_behind(count):
     def build(count):
         for _ in range(count):
@@ -242,7 +242,7 @@ def test_arbiters_leave_nothing_behind(count):
 
     tracemalloc.start()
     try:
-        build(100)
+        build(30)
         objects, memory = in_use()
         build(count)
         more_objects, more_memory = in_use()

@@ -355,6 +355,7 @@ def test_a_degree_that_one_minus_it_cannot_hold_is_not_lost(order):
         arbiter([0.0])
 
 
+@pytest.mark.slow
 def test_thousands_of_different_weights():
     rules = tuple(Rule(Is("a", "on"), Is("y", "low"), 0.5 + 0.5 * (i + 1) / 8401) for i in range(8400))
     v = verify(system([*rules, Rule(Is("a", "off"), Is("y", "high"))], "a"))

@@ -67,6 +67,7 @@ def test_times_come_from_the_default_experiment(odin):
     assert (fmu.stop_time, fmu.step) == (10.0, 0.01)
 
 
+@pytest.mark.slow
 def test_a_validator_that_finds_something_fails(odin, tmp_path, capsys):
     def drop_unit(name, data):
         return data.replace(b'<Unit name="kg.m2">', b'<Unit name="kg.m3">') if name.endswith(".xml") else data
@@ -134,6 +135,7 @@ def test_an_fmu_that_takes_its_importer_down(odin, tmp_path, deed, words):
     assert words in result.note
 
 
+@pytest.mark.slow
 def test_an_fmu_without_a_binary_for_this_machine(odin, tmp_path):
     other = tmp_path / "other.fmu"
     with zipfile.ZipFile(odin) as old, zipfile.ZipFile(other, "w") as new:

@@ -69,6 +69,7 @@ def members(vehicle, fmi):
         return {name: archive.read(name) for name in archive.namelist()}
 
 
+@pytest.mark.slow
 def test_the_fmu_holds_them_and_they_are_the_same_each_time(vehicle, fmi):
     made = contents(vehicle, fmi)
     assert made == contents(vehicle, fmi)

@@ -191,6 +191,7 @@ def test_substeps_are_snapped_to_the_step(make_slave):
 # ---- over hours ----
 
 
+@pytest.mark.slow
 def test_two_hours_keep_energy_and_a_unit_quaternion(make_slave):
     """A tumbling pendulum without damping, in 7.2 million substeps of 1 ms: neither gains nor loses a millionth."""
     slave = make_slave().start(**asymmetric(**START, weight=199.0), substep=0.001)

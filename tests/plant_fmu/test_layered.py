@@ -58,7 +58,9 @@ def gap(fmu, folder, name, **how):
     return np.abs(difference).max()
 
 
-@pytest.mark.parametrize("name", shipped_vehicles())
+@pytest.mark.parametrize(
+    "name", ["odin", *(pytest.param(v, marks=pytest.mark.slow) for v in shipped_vehicles() if v != "odin")]
+)
 def test_the_fmu_gives_the_results_that_it_carries(name, fmi, unpacked):
     fmu = cached_fmu(load_vehicle(name), fmi)
     assert gap(fmu, unpacked(fmu), name, fmi_type="CoSimulation") < 1e-6
@@ -70,6 +72,7 @@ def test_so_does_model_exchange(fmi, unpacked):
     assert gap(fmu, unpacked(fmu), "odin", **how) < 1e-5
 
 
+@pytest.mark.slow
 def test_an_own_vehicle_with_all_that_actuators_can_do(fmi, tmp_path, unpacked):
     like = load_vehicle("bluerov2_heavy")
     n = like.n_thrusters
