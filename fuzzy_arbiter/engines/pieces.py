@@ -134,10 +134,9 @@ def _events(shape: Outline) -> list[Fraction]:
     for i in range(0, len(shape.left), 2):
         (a, c), (b, d) = shape.left[i : i + 2], shape.right[i : i + 2]
         levels |= {Fraction(y) for y in (a, b, c, d)}
-        for gap_left, gap_right in ((a - c, b - d), (a + c - 1, b + d - 1)):  # terms equal; terms one minus each other
-            if gap_left * gap_right < 0:
-                share = gap_left / (gap_left - gap_right)
-                levels |= {Fraction(a + (b - a) * share), Fraction(c + (d - c) * share)}
+        # where the terms are one minus each other only one of the two breakpoints is seen, unless both cuts are 1/2
+        if (a - c) * (b - d) < 0:
+            levels.add(Fraction(a + (b - a) * (a - c) / (a - c - b + d)))
     return sorted({h for level in levels for h in (level, 1 - level)})
 
 

@@ -170,6 +170,15 @@ def test_copies_have_a_state_of_their_own():
         assert h.active["obstacle"]
 
 
+def test_a_scan_goes_on_in_time():
+    h = steady()
+    h.scan([[0.0, 0.0, 0.0]] * 2, [1.0, 2.0])
+    with pytest.raises(InputError, match=r"time is 1\.5 after 2"):
+        h([0.0, 0.0, 0.0], 1.5)
+    with pytest.raises(InputError, match=r"row 0: time is 1\.5 after 2"):
+        h.scan([[0.0, 0.0, 0.0]], [1.5])
+
+
 def test_batch_is_refused():
     with pytest.raises(InputError, match=r"batch: .*scan"):
         steady().batch([[0, 0, 0]])

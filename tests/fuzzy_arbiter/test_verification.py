@@ -3,6 +3,7 @@
 import itertools
 import json
 import re
+from dataclasses import replace
 
 import pytest
 
@@ -360,3 +361,32 @@ def test_thousands_of_different_weights():
     rules = tuple(Rule(Is("a", "on"), Is("y", "low"), 0.5 + 0.5 * (i + 1) / 8401) for i in range(8400))
     v = verify(system([*rules, Rule(Is("a", "off"), Is("y", "high"))], "a"))
     assert (v.graded_complete, v.graded_consistent) == (True, True)
+
+
+def test_a_narrow_overlap_is_found_between_the_places_where_terms_pass_one_half():
+    """Both terms are above 1/2 from 0.6098 to 0.625 only."""
+    x = Variable("x", (0, 1), (Term("a", Shape(((0, 1), (1, 0.2)))), Term("b", Shape(((0, 0), (1, 0.82))))))
+    v = verify(System((x,), (output("y"),), ("if x is a then y is low", "if x is b then y is high")))
+    assert v.graded_consistent is False
+    (place,) = (f.place["x"] for f in v.findings if f.about == "graded_consistent")
+    assert 0.6097 < place < 0.625
+
+
+def test_of_a_negated_product_the_minimum_is_no_bound():
+    """At a = b = 0.6 the one rule fires at 0.64 and the other at 0.6; with the minimum it would be 0.4 and 0.6."""
+    rules = ["if not (a is on and b is on) then y is low", "if not (a is off or b is off) then y is high"]
+    assert verify(system(rules)).graded_consistent is True
+    assert verify(system(rules, conjunction="prod")).graded_consistent is not True
+
+
+def test_weaker_rules_are_no_reason_for_a_contradiction():
+    rules = ["if a is on then y is high", "if a is on then y is low", "if a is on then y is low with 0.9"]
+    (fault,) = (f.text for f in verify(system(rules, "a")).findings if f.about == "consistent")
+    assert fault.endswith("y is low by R2, y is high by R1")
+
+
+@pytest.mark.parametrize("name", ["complete", "consistent", "graded_complete"])
+def test_what_is_not_decided_is_not_ok(name):
+    v = Arbiter().verify()
+    checks = tuple(replace(check, holds=None) if check.name == name else check for check in v.checks)
+    assert not replace(v, checks=checks).ok

@@ -131,6 +131,15 @@ def test_a_default_stands_where_no_rule_fires():
     assert scaled([0.25])[0] == pytest.approx((7.0 - 5 / 3) / (25 / 3 - 5 / 3))
 
 
+@pytest.mark.parametrize(("default", "weight"), [(-5.0, 0.0), (99.0, 1.0)])
+def test_a_default_beyond_the_terms_is_a_weight_even_so(default, weight):
+    output = Output("y", (0, 10), (Term("a", falling(0, 5)), Term("b", rising(5, 10))), default=default)
+    inputs = (Variable("x", (0, 1), (Term("on", rising(0.5, 1)),)),)
+    arbiter = Arbiter(system=System(inputs, (output,), ("if x is on then y is b",)))
+    assert arbiter([0.25]) == (weight,)
+    assert arbiter.batch([[0.25], [1.0]])[:, 0].tolist() == [weight, 1.0]
+
+
 def test_of_many_rows_the_first_undefined_one_is_named():
     output = Output("y", (0, 1), (Term("a", falling(0, 1)), Term("b", rising(0, 1))))
     inputs = (Variable("x", (0, 1), (Term("on", rising(0.5, 1)),)),)
