@@ -168,8 +168,9 @@ def test_ctrl_c_is_heeded_from_the_first_imports(tmp_path, delay):
     time.sleep(delay)
     process.send_signal(signal.SIGINT)
     _, said = process.communicate(timeout=60)
-    assert process.returncode == 130
-    assert "Traceback" not in said
+    # where it comes within an exec() of some import, CPython ends by the signal, which is 130 to a shell, too
+    assert process.returncode in (130, -signal.SIGINT)
+    assert said == "cosim: interrupted\n"
 
 
 @pytest.mark.skipif(os.name != "posix", reason="sends signals")
