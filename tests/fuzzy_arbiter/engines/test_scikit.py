@@ -276,7 +276,7 @@ def test_nothing_of_an_engine_or_of_a_thread_stays():
 
     use(ScikitEngine(system))
     gc.collect()
-    before = sizes(), sum(isinstance(thing, ScikitTerm) for thing in gc.get_objects())
+    before = sizes(), sum(type(thing) is ScikitTerm for thing in gc.get_objects())
     kept = ScikitEngine(system)
     tracemalloc.start()
     for i in range(60):
@@ -290,7 +290,7 @@ def test_nothing_of_an_engine_or_of_a_thread_stays():
     gc.collect()
     growth = tracemalloc.get_traced_memory()[0] - early
     tracemalloc.stop()
-    assert (sizes(), sum(isinstance(thing, ScikitTerm) for thing in gc.get_objects())) == before
+    assert (sizes(), sum(type(thing) is ScikitTerm for thing in gc.get_objects())) == before
     assert growth < 51_000
 
 
