@@ -30,7 +30,7 @@ from fuzzy_arbiter.errors import EngineError
 from fuzzy_arbiter.hierarchy import DEGREE
 
 SMOOTHSTEP = (0.0, 0.0, 3.0, -2.0)  # which is never outside [0, 1]
-_BLOCK = 4096  # samples evaluated at a time, which the processor's caches hold
+_BLOCK = 8192  # samples evaluated at a time; longer arrays leave the caches and are allocated anew each time
 
 
 class NoClosedFormError(EngineError):
@@ -162,14 +162,13 @@ class ClosedEngine(Engine):
             known = {x: self._degrees(x, inputs) for forms in self.clauses for clause in forms for x in clause}
             least = [[np.min([known[x] for x in clause], axis=0) for clause in forms] for forms in self.clauses]
             return np.stack([np.max(clauses, axis=0) for clauses in least])
-        highs = np.empty_like(degrees)
         unclaimed = np.ones(len(inputs))
-        spare = np.empty(len(inputs))
-        for m, h in zip(degrees, highs, strict=True):
-            np.minimum(m, unclaimed, out=h)
-            np.subtract(1.0, m, out=spare)
-            np.minimum(unclaimed, spare, out=unclaimed)
-        return highs
+        rest = np.empty(len(inputs))
+        for m in degrees:  # which become the cuts
+            np.subtract(1.0, m, out=rest)
+            np.minimum(m, unclaimed, out=m)
+            np.minimum(unclaimed, rest, out=unclaimed)
+        return degrees
 
     def _degrees(self, literal: Literal, inputs: Array) -> Array:
         variable, term, affirmed = literal
