@@ -125,6 +125,7 @@ def test_a_reader_that_goes_away_is_no_trouble():
     assert done.stderr == ""
 
 
+@pytest.mark.slow
 def test_verbose_tells_of_us_alone(tmp_path):
     command = [sys.executable, "-m", "cosim", "-v", "run", "paper", "--out", str(tmp_path / "run"), *QUICK]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
@@ -174,7 +175,7 @@ def test_ctrl_c_is_heeded_from_the_first_imports(tmp_path, delay):
 
 
 @pytest.mark.skipif(os.name != "posix", reason="sends signals")
-@pytest.mark.parametrize("sent", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("sent", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.slow)])
 def test_ctrl_c_ends_a_real_run_readably(tmp_path, sent):
     """The process as a user has it: from the start of stepping to a report, no traceback."""
     out = tmp_path / "run"

@@ -121,6 +121,7 @@ def test_other_scenarios_are_not_held_against_the_paper(tmp_path):
     assert "Beside the paper" not in page_of(run_scenario(scenario, tmp_path / "run"))
 
 
+@pytest.mark.slow
 def test_names_from_files_are_escaped(tmp_path):
     scenario = load_scenario("paper", ["time.duration=0.01", 'title="<script>alert(1)</script> & $x"'])
     page = page_of(run_scenario(scenario, tmp_path / "run"))

@@ -78,6 +78,7 @@ def test_a_validator_that_finds_something_fails(odin, tmp_path, capsys):
     assert "failed" in line and "kg.m2" in line
 
 
+@pytest.mark.slow
 def test_an_importer_that_ends_elsewhere_fails(monkeypatch, odin):
     def pretend(importer, fmu, task):
         result = run_importer(FMPY, fmu, task)

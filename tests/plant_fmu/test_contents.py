@@ -59,7 +59,7 @@ class Page(HTMLParser):
             self.rows[-1][-1] += data
 
 
-@pytest.fixture(params=shipped_vehicles())
+@pytest.fixture(params=["odin", *(pytest.param(v, marks=pytest.mark.slow) for v in shipped_vehicles() if v != "odin")])
 def vehicle(request):
     return load_vehicle(request.param)
 

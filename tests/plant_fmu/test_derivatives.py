@@ -63,7 +63,11 @@ def random_values(slave, rng):
     }
 
 
-@pytest.fixture(params=[(i, 3) for i in range(50)] + [(i, 2) for i in range(50, 55)], ids=str)
+FEW = [(i, 3) for i in range(12)] + [(50, 2)]
+MANY = [(i, 3) for i in range(12, 50)] + [(i, 2) for i in range(51, 55)]
+
+
+@pytest.fixture(params=[*FEW, *(pytest.param(p, marks=pytest.mark.slow) for p in MANY)], ids=str)
 def somewhere(request, make_slave):
     seed, fmi = request.param
     rng = np.random.default_rng(seed)

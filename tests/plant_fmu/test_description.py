@@ -18,7 +18,9 @@ from plant_fmu.variables import variables
 ROOT = Path(__file__).parents[2]
 
 
-@pytest.mark.parametrize("name", shipped_vehicles())
+@pytest.mark.parametrize(
+    "name", ["odin", *(pytest.param(v, marks=pytest.mark.slow) for v in shipped_vehicles() if v != "odin")]
+)
 def test_fmpy_finds_no_problem(name, fmi):
     assert validate_fmu(str(cached_fmu(load_vehicle(name), fmi))) == []
 

@@ -28,7 +28,7 @@ START = {
 }
 
 
-@pytest.fixture(params=["odin", "bluerov2_heavy"])
+@pytest.fixture(params=["odin", pytest.param("bluerov2_heavy", marks=pytest.mark.slow)])
 def fmu(request, fmi):
     return read_fmu(cached_fmu(load_vehicle(request.param), fmi))
 

@@ -7,6 +7,7 @@ from fmpy.fmi1 import FMICallException
 SLOW = {"weight": 131.588, "substep": 0.5}
 
 
+@pytest.mark.slow
 def test_a_step_whose_stages_outrun_the_damping_is_refused(make_slave):
     """Ends may rest by chance while the stages between do not: each accepted run stays near the true speed."""
     accepted = 0

@@ -79,7 +79,7 @@ def test_any_pair_of_output_terms_has_its_pieces(low, high, h):
     assert engine.weights_of_many(np.array([[h]]))[0] == pytest.approx(engine.weights([h]), abs=EPS)
 
 
-@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=30, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(shapes(), shapes(), st.floats(0.0, 1.0), st.sampled_from(["range", "sum", "max"]))
 def test_weights_of_any_pair_are_those_of_the_exact_engine(low, high, h, normalisation):
     """Between its ends a C(h) may lie beyond them; weights are in [0, 1] even so."""
@@ -240,7 +240,7 @@ def test_terms_that_are_no_complements_are_not_taken_for_them():
     assert Arbiter(system=negated).engine == "closed"
 
 
-@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=80, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(systems(norms=False), st.data())
 def test_where_it_says_there_is_a_closed_form_it_is_right(system, data):
     arbiter = Arbiter(system=system)
