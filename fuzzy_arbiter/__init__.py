@@ -5,7 +5,7 @@ and `export` (C and Python code) are there for those who ask for more.
 """
 
 from fuzzy_arbiter.arbiter import Arbiter
-from fuzzy_arbiter.definition import Output, Rule, System, Term, Variable
+from fuzzy_arbiter.definition import Output, System, Term, Variable
 from fuzzy_arbiter.errors import (
     ArbiterError,
     DefinitionError,
@@ -19,6 +19,7 @@ from fuzzy_arbiter.hierarchy import SECTION_VI, Criterion, prioritised
 from fuzzy_arbiter.hysteresis import HysteresisArbiter
 from fuzzy_arbiter.membership import ramp
 from fuzzy_arbiter.propositions import Is
+from fuzzy_arbiter.rule import Rule
 from fuzzy_arbiter.rule_text import parse_rule
 from fuzzy_arbiter.shapes import Shape, falling, rising, trapezoid, triangle
 

@@ -182,7 +182,7 @@ class Arbiter:
         """
         from fuzzy_arbiter.explanation import explain
 
-        return explain(self, self._samples.one(inputs))
+        return explain(self._engine, self._samples.one(inputs))
 
     def verify(self) -> Verification:
         """Return whether the rules are complete, consistent and exclusive, and the terms without gaps.

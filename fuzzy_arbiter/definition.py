@@ -9,7 +9,9 @@ from typing import Literal, TypeVar, get_args
 
 from fuzzy_arbiter.checks import all_of, finite, require_name, shown
 from fuzzy_arbiter.errors import DefinitionError
-from fuzzy_arbiter.propositions import Is, Proposition
+from fuzzy_arbiter.propositions import Is
+from fuzzy_arbiter.rule import Rule
+from fuzzy_arbiter.rule_text import parse_rule
 from fuzzy_arbiter.shapes import Shape
 
 Conjunction = Literal["min", "prod"]
@@ -19,10 +21,8 @@ Normalisation = Literal["range", "none", "sum", "max"]
 Outside = Literal["refuse", "clip"]
 
 MAX_POINTS = 1_000_000_000
-WIDTHS = (
-    1e-100,
-    1e100,
-)  # of an output's universe; moments are products of such widths, which must not over- or underflow
+# of an output's universe; moments are products of such widths, which must not over- or underflow
+WIDTHS = (1e-100, 1e100)
 
 
 @dataclass(frozen=True, slots=True)
@@ -158,49 +158,6 @@ class Output(Variable):
 
 
 @dataclass(frozen=True, slots=True)
-class Rule:
-    """If a condition holds, then outputs are in terms, as strongly as it holds times the rule's weight.
-
-    Attributes
-    ----------
-    condition : Proposition
-        On inputs.
-    conclusions : tuple of Is
-        On outputs, at least one.
-    weight : float
-        Above 0, at most 1.
-
-    Raises
-    ------
-    DefinitionError
-        If there is no conclusion, or the weight is outside its range.
-    """
-
-    condition: Proposition
-    conclusions: tuple[Is, ...]
-    weight: float = 1.0
-
-    def __post_init__(self) -> None:
-        if not isinstance(self.condition, Proposition):
-            raise DefinitionError(f"rule: condition is {shown(self.condition)}, expected such as variable['term']")
-        found = (self.conclusions,) if isinstance(self.conclusions, Is) else self.conclusions
-        conclusions = all_of(Is, found, self.condition, "as conclusions output['term'] or a sequence of such")
-        if not conclusions:
-            raise DefinitionError(f"{self.condition}: no conclusions came, expected output['term']")
-        weight = finite(self.weight)
-        if weight is None or not 0.0 < weight <= 1.0:
-            rule = str(Rule(self.condition, conclusions))
-            raise DefinitionError(f"{rule!r}: weight is {shown(self.weight)}, expected above 0 and at most 1")
-        object.__setattr__(self, "conclusions", conclusions)
-        object.__setattr__(self, "weight", weight)
-
-    def __str__(self) -> str:
-        conclusions = " and ".join(map(str, self.conclusions))
-        weight = "" if self.weight == 1.0 else f" with {self.weight!r}"
-        return f"if {self.condition} then {conclusions}{weight}"
-
-
-@dataclass(frozen=True, slots=True)
 class System:
     """A Mamdani system: clipped (or scaled) output terms, joined by their maximum, of which the centroid is taken.
 
@@ -246,8 +203,6 @@ class System:
     points: int = 101
 
     def __post_init__(self) -> None:
-        from fuzzy_arbiter.rule_text import parse_rule  # it needs the rules that are defined here
-
         rules: tuple[Rule | str, ...] = all_of((Rule, str), self.rules, "rules", "a sequence of Rule or text")
         for key, kind in (("inputs", Variable), ("outputs", Output)):
             found = all_of(kind, getattr(self, key), key, f"a sequence of {kind.__name__}")

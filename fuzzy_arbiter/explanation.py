@@ -4,14 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from fuzzy_arbiter.definition import System, variable_names
-from fuzzy_arbiter.engines.firing import Firing
+from fuzzy_arbiter.engines.engine import Engine
 from fuzzy_arbiter.table import aligned
-
-if TYPE_CHECKING:
-    from fuzzy_arbiter.arbiter import Arbiter
 
 TIE = 1e-12  # weights that are nearer to each other than this are equal, but for rounding
 WIDTH = 100  # columns of a rule in the text
@@ -155,13 +152,13 @@ class Explanation:
         return "\n".join(lines)
 
 
-def explain(arbiter: Arbiter, inputs: Sequence[float]) -> Explanation:
-    """Return why an arbiter's weights for one sample are what they are.
+def explain(engine: Engine, inputs: Sequence[float]) -> Explanation:
+    """Return why the weights for one sample are what they are.
 
     Parameters
     ----------
-    arbiter : Arbiter
-        Whose weights they are.
+    engine : Engine
+        Which gives the weights.
     inputs : sequence of float
         One value in its universe for each input.
 
@@ -175,10 +172,8 @@ def explain(arbiter: Arbiter, inputs: Sequence[float]) -> Explanation:
     UndefinedOutputError
         If no rule fires for an output without default.
     """
-    system = arbiter.system
-    weights = arbiter(inputs)
-    centroids = arbiter.centroids(inputs)
-    firing = Firing(system)
+    system, firing = engine.system, engine.firing
+    weights, centroids = engine.weights(inputs), engine.centroids(inputs)
     strengths = firing.strengths(inputs)
     rules = tuple(
         FiredRule(f"R{i + 1}", str(rule), strength, {c.variable: c.term for c in rule.conclusions})

@@ -8,9 +8,10 @@ from dataclasses import dataclass, replace
 from typing import Literal, get_args
 
 from fuzzy_arbiter.checks import all_of, require_name, shown
-from fuzzy_arbiter.definition import Normalisation, Output, Outside, Rule, System, Term, Variable
+from fuzzy_arbiter.definition import Normalisation, Output, Outside, System, Term, Variable
 from fuzzy_arbiter.errors import DefinitionError
 from fuzzy_arbiter.propositions import And, Is, Or, Proposition
+from fuzzy_arbiter.rule import Rule
 from fuzzy_arbiter.shapes import Shape, falling, rising
 
 Form = Literal["hierarchical", "minimal", "conjunctive", "complete"]

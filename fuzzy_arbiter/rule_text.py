@@ -7,9 +7,9 @@ from collections.abc import Callable
 from typing import Any
 
 from fuzzy_arbiter.checks import shown
-from fuzzy_arbiter.definition import Rule
 from fuzzy_arbiter.errors import DefinitionError
 from fuzzy_arbiter.propositions import KEYWORDS, MAX_NESTING, And, Is, Not, Or, Proposition
+from fuzzy_arbiter.rule import Rule
 
 _TOKEN = re.compile(
     r"""\s*(?: (?P<quoted>"[^"]*") | (?P<number>[0-9.]+(?:[eE][+-]?[0-9]+)?(?![A-Za-z_]))

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import re
 
-from fuzzy_arbiter.definition import Rule, System, Variable, variable_names
+from fuzzy_arbiter.definition import System, Variable, variable_names
 from fuzzy_arbiter.errors import UnsupportedError
 from fuzzy_arbiter.formats.fcl_reader import system_of, universe_of
 from fuzzy_arbiter.formats.fcl_words import CONJUNCTIONS, DISJUNCTIONS, PAIRS, RESERVED, cut
 from fuzzy_arbiter.formats.notation import require_word, require_words, say_number
 from fuzzy_arbiter.formats.settings import read_settings, say_settings
+from fuzzy_arbiter.rule import Rule
 from fuzzy_arbiter.shapes import Shape
 
 _SETTINGS = ("normalisation", "outside", "points")

@@ -6,9 +6,10 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, NoReturn
 
-from fuzzy_arbiter.definition import Output, Rule, System, Term, Variable
+from fuzzy_arbiter.definition import Output, System, Term, Variable
 from fuzzy_arbiter.formats.fcl_words import CONJUNCTIONS, DISJUNCTIONS, PAIRS, RESERVED, Token
 from fuzzy_arbiter.formats.notation import assembled, located, read_number, refuse
+from fuzzy_arbiter.rule import Rule
 from fuzzy_arbiter.rule_text import parse_rule
 from fuzzy_arbiter.shapes import Point, Shape, trapezoid, triangle
 

@@ -6,12 +6,13 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from fuzzy_arbiter.definition import Output, Rule, System, Term, Variable
+from fuzzy_arbiter.definition import Output, System, Term, Variable
 from fuzzy_arbiter.errors import FormatError
 from fuzzy_arbiter.formats.fis_words import FUNCTIONS, METHODS, SETTINGS
 from fuzzy_arbiter.formats.notation import assembled, located, read_number, refuse
 from fuzzy_arbiter.formats.settings import read_settings
 from fuzzy_arbiter.propositions import And, Is, Not, Or, Proposition
+from fuzzy_arbiter.rule import Rule
 
 _SECTION = re.compile(r"\[\s*(System|Input|Output|Rules)\s*([1-9][0-9]{0,8})?\s*\]", re.ASCII)
 _ENTRY = re.compile(r"(\w+)\s*=\s*(.*)", re.ASCII)

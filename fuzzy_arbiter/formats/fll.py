@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from fuzzy_arbiter.definition import Output, Rule, System, Variable
+from fuzzy_arbiter.definition import Output, System, Variable
 from fuzzy_arbiter.errors import UnsupportedError
 from fuzzy_arbiter.formats.fll_reader import read
 from fuzzy_arbiter.formats.fll_terms import RESERVED, say_shape
@@ -10,6 +10,7 @@ from fuzzy_arbiter.formats.fll_words import CONJUNCTIONS, DISJUNCTIONS, SETTINGS
 from fuzzy_arbiter.formats.notation import cannot_say, require_words, say_number, say_numbers
 from fuzzy_arbiter.formats.settings import say_settings
 from fuzzy_arbiter.propositions import And, Is, Not, Or, Proposition
+from fuzzy_arbiter.rule import Rule
 
 __all__ = ["read", "write"]
 

@@ -7,13 +7,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from fuzzy_arbiter.definition import Output, Rule, System, Term, Variable
+from fuzzy_arbiter.definition import Output, System, Term, Variable
 from fuzzy_arbiter.errors import FormatError
 from fuzzy_arbiter.formats.fll_terms import HEDGES, read_shape
 from fuzzy_arbiter.formats.fll_words import CONJUNCTIONS, DISJUNCTIONS, KEYS, MANY, RESOLUTION, SETTINGS
 from fuzzy_arbiter.formats.notation import assembled, located, read_number, refuse
 from fuzzy_arbiter.formats.settings import read_settings
 from fuzzy_arbiter.propositions import And, Not, Or, Proposition
+from fuzzy_arbiter.rule import Rule
 from fuzzy_arbiter.rule_text import parse_rule
 
 

@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fuzzy_arbiter.arbiter import Arbiter
-from fuzzy_arbiter.definition import Output, Rule, variable_names
+from fuzzy_arbiter.definition import Output, variable_names
 from fuzzy_arbiter.engines.firing import Array, Firing, degrees_of_many
 from fuzzy_arbiter.errors import UndefinedOutputError
 from fuzzy_arbiter.pictures.lines import corners
 from fuzzy_arbiter.pictures.places import one_of, places_in, said
 from fuzzy_arbiter.pictures.style import FAINT, INK, colour, hatch, new_axes, wrapped
+from fuzzy_arbiter.rule import Rule
 from fuzzy_arbiter.samples import Sample
 
 if TYPE_CHECKING:

@@ -9,10 +9,11 @@ from typing import Literal
 
 import numpy as np
 
-from fuzzy_arbiter.definition import Output, Rule, System
+from fuzzy_arbiter.definition import Output, System
 from fuzzy_arbiter.engines.firing import Firing
 from fuzzy_arbiter.engines.sweep import alone
 from fuzzy_arbiter.propositions import And, Is, Not, Or, Proposition
+from fuzzy_arbiter.rule import Rule
 from fuzzy_arbiter.verification.cells import Domain, crisp, graded, rank
 from fuzzy_arbiter.verification.search import Answer, Goal, Group, Search
 

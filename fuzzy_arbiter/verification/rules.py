@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections import Counter, defaultdict
 from collections.abc import Iterator
 
-from fuzzy_arbiter.definition import Rule, System
+from fuzzy_arbiter.definition import System
 from fuzzy_arbiter.propositions import And, Is, Not, Or, Proposition
+from fuzzy_arbiter.rule import Rule
 from fuzzy_arbiter.verification.report import Finding
 
 MAX_COMPARED = 100  # rules with one conclusion that are compared with each other

@@ -57,7 +57,7 @@ def test_crisp_samples_fire_the_rules_of_the_truth_table(sample, fired):
 
 
 @pytest.mark.parametrize("sample", SAMPLES)
-@pytest.mark.parametrize("engine", ["auto", "exact"])
+@pytest.mark.parametrize("engine", ["auto", "exact", "grid", "skfuzzy"])
 def test_weights_are_those_of_the_arbiter(sample, engine):
     arbiter = Arbiter(engine=engine)
     e = arbiter.explain(sample)

@@ -1,0 +1,52 @@
+"""A rule: a condition, what it concludes, and how much it counts."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from fuzzy_arbiter.checks import all_of, finite, shown
+from fuzzy_arbiter.errors import DefinitionError
+from fuzzy_arbiter.propositions import Is, Proposition
+
+
+@dataclass(frozen=True, slots=True)
+class Rule:
+    """If a condition holds, then outputs are in terms, as strongly as it holds times the rule's weight.
+
+    Attributes
+    ----------
+    condition : Proposition
+        On inputs.
+    conclusions : tuple of Is
+        On outputs, at least one.
+    weight : float
+        Above 0, at most 1.
+
+    Raises
+    ------
+    DefinitionError
+        If there is no conclusion, or the weight is outside its range.
+    """
+
+    condition: Proposition
+    conclusions: tuple[Is, ...]
+    weight: float = 1.0
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.condition, Proposition):
+            raise DefinitionError(f"rule: condition is {shown(self.condition)}, expected such as variable['term']")
+        found = (self.conclusions,) if isinstance(self.conclusions, Is) else self.conclusions
+        conclusions = all_of(Is, found, self.condition, "as conclusions output['term'] or a sequence of such")
+        if not conclusions:
+            raise DefinitionError(f"{self.condition}: no conclusions came, expected output['term']")
+        weight = finite(self.weight)
+        if weight is None or not 0.0 < weight <= 1.0:
+            rule = str(Rule(self.condition, conclusions))
+            raise DefinitionError(f"{rule!r}: weight is {shown(self.weight)}, expected above 0 and at most 1")
+        object.__setattr__(self, "conclusions", conclusions)
+        object.__setattr__(self, "weight", weight)
+
+    def __str__(self) -> str:
+        conclusions = " and ".join(map(str, self.conclusions))
+        weight = "" if self.weight == 1.0 else f" with {self.weight!r}"
+        return f"if {self.condition} then {conclusions}{weight}"
