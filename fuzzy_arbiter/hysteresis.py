@@ -84,10 +84,10 @@ class HysteresisArbiter:
     def __init__(
         self,
         arbiter: Arbiter,
-        *,
         enter: Setting,
         release: Setting,
         dwell: Setting = 0.0,
+        *,
         graded: bool = False,
         on: Mapping[str, str] | None = None,
     ) -> None:
@@ -122,15 +122,15 @@ class HysteresisArbiter:
         """Whether each criterion's latch is closed, by the input's name."""
         return dict(zip(self._names, self._closed, strict=True))
 
-    def __call__(self, inputs: Sample, time: float) -> tuple[float, ...]:
+    def __call__(self, inputs: Sample, time: float | None = None) -> tuple[float, ...]:
         """Return the weights for the next sample.
 
         Parameters
         ----------
         inputs : sequence of float, or mapping from input's name to float
             As for an arbiter.
-        time : float
-            When they were measured [s]; it never decreases.
+        time : float, optional
+            When they were measured [s]; it never decreases. Only a dwell needs it.
 
         Returns
         -------
@@ -140,12 +140,12 @@ class HysteresisArbiter:
         Raises
         ------
         InputError
-            If the time is not finite or decreases, or an input is missing, unknown, not a number, or outside its
-            universe; the state is then as before.
+            If the time is missing and needed, is not finite or decreases, or an input is missing, unknown, not a
+            number, or outside its universe; the state is then as before.
         UndefinedOutputError
             If no rule fires for an output without default; the state is then as before.
         """
-        now = _checked_time(time, self._time)
+        now = self._time if time is None and not any(self._dwell) else _checked_time(time, self._time)
         values = self.arbiter.samples.one(inputs)
         degrees = [shape(x) for shape, x in zip(self._shapes, values, strict=True)]
         closed, since, places = self._next(self._closed, self._since, values, degrees, now)
@@ -153,15 +153,15 @@ class HysteresisArbiter:
         self._closed, self._since, self._time = closed, since, now
         return weights
 
-    def scan(self, inputs: ArrayLike, times: ArrayLike) -> Array:
+    def scan(self, inputs: ArrayLike, times: ArrayLike | None = None) -> Array:
         """Return the weights for samples that follow each other, and those before.
 
         Parameters
         ----------
         inputs : array_like, shape (n, inputs)
             One sample in each row.
-        times : array_like, shape (n,)
-            When they were measured [s]; they never decrease.
+        times : array_like, shape (n,), optional
+            When they were measured [s]; they never decrease. Only a dwell needs them.
 
         Returns
         -------
@@ -177,7 +177,10 @@ class HysteresisArbiter:
             If no rule fires for an output without default; the state is then as before.
         """
         values = self.arbiter.samples.many(inputs)
-        moments = _checked_times(times, len(values), self._time)
+        if times is None and not any(self._dwell):
+            moments = np.full(len(values), self._time)
+        else:
+            moments = _checked_times(times, len(values), self._time)
         degrees = np.column_stack([degrees_of_many(s, values[:, i]) for i, s in enumerate(self._shapes)])
         closed, since = self._closed, self._since
         places = np.empty_like(values)
@@ -217,7 +220,7 @@ class HysteresisArbiter:
             if degree >= self._enter[i]:
                 if not closed[i]:
                     closed[i], since[i] = True, now
-            elif closed[i] and degree <= self._release[i] and now - since[i] >= self._dwell[i]:
+            elif closed[i] and degree <= self._release[i] and (not self._dwell[i] or now - since[i] >= self._dwell[i]):
                 closed[i] = False
             if closed[i]:
                 places[i] = self._on_places[i]
@@ -302,7 +305,9 @@ def _place(variable: Variable, shape: Shape, degree: float) -> float:
     raise DefinitionError(f"input {variable.name!r}: it is {what} nowhere in [{low:g}, {high:g}]")
 
 
-def _checked_time(time: float, last: float) -> float:
+def _checked_time(time: float | None, last: float) -> float:
+    if time is None:
+        raise InputError("time is missing, expected seconds, as there is a dwell")
     if not isinstance(time, Real) or isinstance(time, bool) or not math.isfinite(time):
         raise InputError(f"time is {time!r}, expected a finite number of seconds")
     if time < last:
@@ -310,7 +315,9 @@ def _checked_time(time: float, last: float) -> float:
     return float(time)
 
 
-def _checked_times(times: ArrayLike, rows: int, last: float) -> Array:
+def _checked_times(times: ArrayLike | None, rows: int, last: float) -> Array:
+    if times is None:
+        raise InputError("times are missing, expected seconds for each row, as there is a dwell")
     try:
         moments = np.asarray(times, dtype=np.float64)
     except (TypeError, ValueError) as error:

@@ -195,7 +195,6 @@ def test_batch_is_refused():
         ([0, 0, 0], math.nan, "time is nan"),
         ([0, 0, 0], math.inf, "time is inf"),
         ([0, 0, 0], "2", "time is '2'"),
-        ([0, 0, 0], None, "time is None"),
         ([0, 0, 0], True, "time is True"),
     ],
 )
@@ -305,3 +304,19 @@ def test_hysteresis_takes_the_chatter_away():
     assert latched == 4.0  # the two changes that there are
     assert [switches for *_, switches, _ in rows][4] == 2
     assert all(quiet <= 4.0 for *_, quiet in rows)
+
+
+def test_without_a_dwell_no_time_is_needed():
+    rows = [[m, 0.0, 0.0] for m in (0.7, 0.9, 0.3, 0.1, 0.9, 0.1)]
+    timed = HysteresisArbiter(Arbiter(), 0.8, 0.2)
+    expected = [timed(row, float(i)) for i, row in enumerate(rows)]
+    steady = HysteresisArbiter(Arbiter(), 0.8, 0.2)
+    assert [steady(row) for row in rows] == expected
+    assert steady(rows[1], -5.0) == expected[1]  # the first time that is told
+    steady.reset()
+    assert list(map(tuple, steady.scan(rows))) == expected
+    waiting = HysteresisArbiter(Arbiter(), 0.8, 0.2, 1.0)
+    with pytest.raises(InputError, match="time is missing"):
+        waiting(rows[0])
+    with pytest.raises(InputError, match="times are missing"):
+        waiting.scan(rows)
