@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 from fuzzy_arbiter.definition import Output
-from fuzzy_arbiter.engines.sweep import Outline, area_and_moment, outline
+from fuzzy_arbiter.engines.sweep import Outline, alone, area_and_moment, outline
 
 Polynomial = tuple[Fraction, ...]  # coefficients of t^0, t^1, ..
 
@@ -79,7 +79,7 @@ def pieces(output: Output) -> tuple[tuple[Piece, ...], tuple[Piece, ...]]:
         fit = (_fitted(at, areas), _fitted(at, moments))
         if not fits or fit != fits[-1][1:]:
             fits.append((start, *fit))
-    ends = [_centroid(shape, Fraction(h)) for h in (0, 1)]
+    ends = alone(output, Fraction)  # C(0) is of the first term alone, C(1) of the second
     raw = _forms(fits, shape.places[0], Fraction(1), ends[1])
     low, high = min(ends), max(ends)
     if low == high:
@@ -121,11 +121,6 @@ def _not_below(start: Fraction) -> float:
     """Return the least float that is not below a number, so that no float is taken for one of the next piece."""
     nearest = float(start)
     return nearest if nearest >= start else math.nextafter(nearest, math.inf)
-
-
-def _centroid(shape: Outline, h: Fraction) -> Fraction:
-    area, moment = area_and_moment((1 - h, h), *shape, False)
-    return Fraction(shape.places[0] + moment / area)
 
 
 def _events(shape: Outline) -> list[Fraction]:
