@@ -11,6 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+import fuzzy_arbiter
 from fuzzy_arbiter import (
     Arbiter,
     Criterion,
@@ -23,6 +24,7 @@ from fuzzy_arbiter import (
     UndefinedOutputError,
     Variable,
     falling,
+    propositions,
     rising,
 )
 from fuzzy_arbiter.hysteresis import HysteresisArbiter
@@ -288,11 +290,8 @@ def test_what_is_no_arbiter():
 
 
 def test_repr_makes_the_same_again():
-    from fuzzy_arbiter import Is, Rule  # noqa: F401  what the text names
-    from fuzzy_arbiter.propositions import And, Not, Or  # noqa: F401
-
     h = steady(dwell=0.5, graded=True)
-    assert repr(eval(repr(h))) == repr(h)
+    assert repr(eval(repr(h), {**vars(fuzzy_arbiter), **vars(propositions)})) == repr(h)
 
 
 def test_hysteresis_takes_the_chatter_away():
