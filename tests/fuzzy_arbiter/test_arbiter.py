@@ -126,6 +126,8 @@ def test_bad_inputs_are_errors(arbiter, inputs, words):
         ([[0.1, 0.2]], r"shape \(1, 2\)"),
         ([[0.1, 0.2, 0.3], [0.1, math.nan, 0.3]], "row 1: shape is nan"),
         ([[0.1, 0.2, 0.3], [0.1, 0.2, 1.5]], r"row 1: depth is 1.5, expected a number in \[0, 1\]"),
+        ([[0.1, "0.2", 0.3]], r"values of the type str\d+ came; expected rows of numbers for obstacle"),
+        ([[1j, 0.0, 0.0]], "values of the type complex128 came"),
         ([["a", "b", "c"]], "expected rows of numbers for obstacle"),
         ([[0.1, 0.2, 0.3], [0.1]], "expected rows of numbers for obstacle"),
     ],
