@@ -137,7 +137,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = _parsed(arguments)
     try:
         status = _run(options)
-        if sys.stdout is not None:  # closed by whoever started this
+        if sys.stdout is not None:
             sys.stdout.flush()
         return status
     except BrokenPipeError:
@@ -176,7 +176,8 @@ def _is_number(word: str) -> bool:
 
 def _drop_output() -> None:
     """Let what is left of the output go nowhere, else the interpreter fails again to write it at its end."""
-    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    if sys.stdout is not None:  # closed by whoever started this
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _fault(what: str) -> int:
