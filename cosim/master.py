@@ -14,7 +14,7 @@ from typing import Protocol
 import numpy as np
 
 from controller import Allocation, Law, PrintedLaw, VehicleState
-from controller.regions import Region, pack
+from controller.regions import Region, of_attitude, pack
 from cosim.scenario import CRITERIA, Scenario
 from cosim.signals import Array, Column, Signals
 from fuzzy_arbiter import Arbiter, ramp
@@ -101,6 +101,7 @@ class Master:
         )
         self._values, self._clearances = s.view("goal.value", n + 1), s.view("goal.clearance", n + 1)
         self._gradients: Array = np.zeros((n + 1, 3))
+        self._turnings: Array = np.zeros((n + 1, 3))
         self._memberships = s.view(f"membership.{CRITERIA[0]}", len(CRITERIA))
         self._weights = s.view(f"weight.{CRITERIA[0]}", len(CRITERIA))
         self._weights_of_regions: Array = np.zeros(n)
@@ -155,11 +156,12 @@ class Master:
         self._measured[:] = self._plant_measured
 
     def _evaluate_regions(self) -> None:
-        position = self.state.position
+        position, quaternion = self.state.position, self.state.quaternion
+        values, gradients, turnings, clearances = self._values, self._gradients, self._turnings, self._clearances
         self.goal.move_to(self.signals.row[0])
         self.regions.move_to(self.signals.row[0])
-        self.goal.evaluate(position, self._values[:1], self._gradients[:1], self._clearances[:1])
-        self.regions.evaluate(position, self._values[1:], self._gradients[1:], self._clearances[1:])
+        self.goal.evaluate(position, quaternion, values[:1], gradients[:1], turnings[:1], clearances[:1])
+        self.regions.evaluate(position, quaternion, values[1:], gradients[1:], turnings[1:], clearances[1:])
 
     def _arbitrate(self) -> None:
         """Turn clearances into memberships, of the most pressing region of each criterion, and these into weights."""
@@ -230,8 +232,12 @@ def _columns(scenario: Scenario, plant: Plant) -> list[Column]:
         *_of(plant.flags),
         *(Column(f"{name}.value", shape.unit, f"g of {name}, above 0 where violated") for name, shape in regions),
         *(
-            Column(f"{name}.clearance", "m", f"Distance to the surface of {name}, below 0 where violated")
-            for name, _ in regions
+            Column(
+                f"{name}.clearance",
+                "rad" if of_attitude(shape) else "m",
+                f"{'Angle' if of_attitude(shape) else 'Distance'} to the surface of {name}, below 0 where violated",
+            )
+            for name, shape in regions
         ),
         *(
             Column(f"membership.{name}", "", f"Degree to which criterion {name} asks for attention")
