@@ -52,6 +52,8 @@ def drawings(story: Story) -> Iterator[Drawing]:
     for name, caption, draw in figures:
         if name == "weights-overlap" and not story.summary["intersection_windows"]:
             continue
+        if name == "path-plane" and story.scenario.moving:
+            caption += " Those that moved are faint where they began, full where they ended."
         if name == "thrusters":
             caption = over_time.thruster_caption(story.scenario)
         with mpl.rc_context(STYLE):
