@@ -38,9 +38,11 @@ class Sight(NamedTuple):
 
     values: Array  # (n,)
     gradients: Array  # (n, 3)
+    turnings: Array  # (n, 3)
     clearances: Array  # (n,)
     later_values: Array  # (n,)
     later_gradients: Array  # (n, 3)
+    later_turnings: Array  # (n, 3)
     later_clearances: Array  # (n,)
     row_of: NDArray[np.int64]  # (n,) row of the program, -1 where it has none
 
@@ -48,16 +50,18 @@ class Sight(NamedTuple):
 def sight_of(n: int) -> Sight:
     """Return room for `n` regions."""
     return Sight(
-        np.zeros(n), np.zeros((n, 3)), np.zeros(n), np.zeros(n), np.zeros((n, 3)), np.zeros(n), np.zeros(n, np.int64)
-    )
+        np.zeros(n), np.zeros((n, 3)), np.zeros((n, 3)), np.zeros(n),
+        np.zeros(n), np.zeros((n, 3)), np.zeros((n, 3)), np.zeros(n), np.zeros(n, np.int64),
+    )  # fmt: skip
 
 
 @compiled
-def look(sight: Sight, regions: PackedRegions, position: Array, velocity: Array) -> None:
+def look(sight: Sight, regions: PackedRegions, position: Array, quaternion: Array, velocity: Array) -> None:
     """Evaluate the regions at the estimated position [m] and where its velocity [m/s] leads, shape (3,) each."""
-    evaluate_packed(regions, position, sight.values, sight.gradients, sight.clearances)
+    s = sight
+    evaluate_packed(regions, position, quaternion, s.values, s.gradients, s.turnings, s.clearances)
     later = position + _AHEAD * velocity
-    evaluate_packed(regions, later, sight.later_values, sight.later_gradients, sight.later_clearances)
+    evaluate_packed(regions, later, quaternion, s.later_values, s.later_gradients, s.later_turnings, s.later_clearances)
 
 
 @compiled

@@ -110,9 +110,10 @@ def cost_of(way: Array, count: int, start: Array, regions: PackedRegions, gains:
 def nearest_end(goal: PackedRegions, position: Array, depth: float, end: Array) -> None:
     """Write the point of the goal region nearest to a position, `depth` [m] inside where the region is that deep."""
     end[:] = position
-    value, gradient, clearance = np.empty(1), np.empty((1, 3)), np.empty(1)
+    value, gradient, turning, clearance = np.empty(1), np.empty((1, 3)), np.empty((1, 3)), np.empty(1)
+    level = np.array([1.0, 0.0, 0.0, 0.0])  # a goal is a place: no attitude matters
     for _ in range(4):
-        evaluate_packed(goal, end, value, gradient, clearance)
+        evaluate_packed(goal, end, level, value, gradient, turning, clearance)
         slope = norm(gradient[0])
         lack = depth - clearance[0]
         if lack <= 0.0 or slope <= 0.0:

@@ -123,7 +123,7 @@ def step(
     # wanted wrench
     free, wrench = np.empty(3), np.empty(6)
     model.free_acceleration(dynamics, R, seen.velocity, memory.omega, seen.water, seen.restoring[0], free)
-    look(memory.sight, regions, seen.position, seen.velocity)
+    look(memory.sight, regions, seen.position, memory.quaternion, seen.velocity)
     acceleration -= free
     _force_of(dynamics, R, acceleration, wrench)
     _soft_forces(memory.sight, regions, weights, R, dynamics, wrench)
