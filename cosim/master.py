@@ -15,6 +15,7 @@ import numpy as np
 
 from controller import Allocation, Law, PrintedLaw, RegionValues, VehicleState
 from controller.regions import Region, pack
+from cosim.lyapunov import LyapunovSignals, lyapunov_columns
 from cosim.scenario import CRITERIA, Scenario
 from cosim.signals import Array, Column, Signals
 from fuzzy_arbiter import Arbiter, ramp
@@ -106,6 +107,12 @@ class Master:
         inputs = s.view("thrust[1]", len(self.plant.inputs))
         self._thrusts, self._wrench = inputs[:n_thrusters], inputs[n_thrusters:]
         self._inputs = inputs
+        self._lyapunov: LyapunovSignals | None = None
+        if self.scenario.record.lyapunov:
+            out = s.view("lyapunov.printed", 4)
+            self._lyapunov = LyapunovSignals(
+                self.scenario, self._scene, self.state, self.goal, self.regions, self._alphas, self._estimate, out
+            )
 
     def run(self, observers: Sequence[Observer] = (), rate: float | None = None) -> None:
         """Step from time 0 to the end, once, telling the observers of each step.
@@ -138,6 +145,8 @@ class Master:
             if k % scenario.control_every == 0:
                 self._control()
                 self._actuate()
+            if self._lyapunov is not None:
+                self._lyapunov.write()
             if k < last:
                 self._advance(step)
             for observer in observers:
@@ -237,6 +246,7 @@ def _columns(scenario: Scenario, plant: Plant) -> list[Column]:
         ),
         Column("allocation_saturated", "", "The thrusters' limits cut the wrench that the law asks for"),
         *_of(plant.inputs),
+        *lyapunov_columns(scenario),
     ]
 
 

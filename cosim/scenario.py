@@ -103,6 +103,13 @@ class Actuation:
 
 
 @dataclass(frozen=True)
+class RecordSetup:
+    """What a run records beyond its signals."""
+
+    lyapunov: bool = False  # V of (31) and its rate, with the printed law
+
+
+@dataclass(frozen=True)
 class SecondaryRegion:
     """A region, the criterion it belongs to, and the gain that the arbiter's weight multiplies."""
 
@@ -161,6 +168,7 @@ class _File:
     arbiter: ArbiterSetup = ArbiterSetup()
     limit: Limit = Limit()
     actuation: Actuation = Actuation()
+    record: RecordSetup = RecordSetup()
     regions: tuple[_RegionEntry, ...] = ()
 
 
@@ -182,6 +190,7 @@ class Scenario:
     arbiter: ArbiterSetup
     limit: Limit
     actuation: Actuation
+    record: RecordSetup
     goal: Shape  # the primary region, kept within
     regions: tuple[SecondaryRegion, ...]
     intersection: tuple[int, ...]  # indices of the regions whose overlap the summary reports
@@ -273,6 +282,7 @@ def _check(table: dict[str, Any], name: str) -> Scenario:
         arbiter=file.arbiter,
         limit=file.limit,
         actuation=file.actuation,
+        record=file.record,
         goal=_shape(file.goal, "goal"),
         regions=regions,
         intersection=overlapping,
@@ -303,6 +313,8 @@ def _check_numbers(file: _File) -> None:
     if file.actuation.through == "thrusters":
         none_given = limit == Limit()
         _require(none_given, "limit", "given", "none with actuation.through = 'thrusters': it is of the direct wrench")
+    if file.record.lyapunov:
+        _require(file.law.name == "printed", "record.lyapunov", "true", "false: V of (31) is the printed law's")
 
 
 def _check_regions(entries: tuple[_RegionEntry, ...]) -> tuple[SecondaryRegion, ...]:
