@@ -2,17 +2,21 @@
 
 from controller.allocation import Allocation
 from controller.errors import ControllerError, LawError, RegionError
-from controller.law import Law, PrintedLaw, RegionValues, VehicleState
+from controller.law import CompiledLaw, Diagnostic, Law, VehicleModel, VehicleState
+from controller.laws import LAWS, PrintedLaw
 from controller.printed_law import Gains
 
 __all__ = [
+    "LAWS",
     "Allocation",
+    "CompiledLaw",
     "ControllerError",
+    "Diagnostic",
     "Gains",
     "Law",
     "LawError",
     "PrintedLaw",
     "RegionError",
-    "RegionValues",
+    "VehicleModel",
     "VehicleState",
 ]

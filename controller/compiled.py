@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import hashlib
 from collections.abc import Callable
 from pathlib import Path
@@ -12,12 +13,14 @@ import numba
 F = TypeVar("F", bound=Callable[..., object])
 
 
-def _sources() -> str:
-    folder = Path(__file__).parent
-    return hashlib.sha256(b"".join(path.read_bytes() for path in sorted(folder.rglob("*.py")))).hexdigest()
+_HERE = Path(__file__).parent
 
 
-_SOURCES = _sources()
+@functools.cache
+def _sources(folder: Path) -> str:
+    """Return the mark of all sources of this package and of those in the folder of who compiles with it."""
+    files = sorted({*_HERE.rglob("*.py"), *folder.glob("*.py")})
+    return hashlib.sha256(b"".join(path.read_bytes() for path in files)).hexdigest()
 
 
 def compiled(function: F) -> F:
@@ -42,10 +45,11 @@ def compiled(function: F) -> F:
         jitted = numba.njit(error_model="numpy")(function)
     # Numba takes a cached function for current while its own file is, although what it calls may stand in another one.
     # Stamp it with all sources of the package; should Numba's insides move, rather keep nothing on disk than old code.
+    stamp = _sources(Path(function.__code__.co_filename).parent)
     try:
         cache_file = jitted._cache._cache_file
         cache_file._source_stamp  # noqa: B018 - raises where it is gone
-        cache_file._source_stamp = _SOURCES
+        cache_file._source_stamp = stamp
     except AttributeError:
         jitted = numba.njit(error_model="numpy")(function)
     result: F = jitted

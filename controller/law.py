@@ -1,104 +1,204 @@
-"""Laws as objects: what the controller keeps between steps, behind one interface."""
+"""What every law is given and gives: state, regions and weights in; a body wrench or thruster forces out.
+
+A law's mathematics is one compiled function ``step(state, goal, regions, weights, gains, memory, forces)``. All that it
+keeps between steps stands in its `memory`, a named tuple of arrays, so that the same function serves the readable
+master, which calls `CompiledLaw.step`, and compiled loops, which call the function itself.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, ClassVar, Literal, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from controller import printed_law
 from controller.errors import LawError
-from controller.printed_law import Gains, check_gains
+from controller.regions import PackedRegions
 
 Array = NDArray[np.float64]
+Output = Literal["wrench", "thrusters"]
 
 
-@dataclass(frozen=True, eq=False)
-class VehicleState:
+class VehicleState(NamedTuple):
     """What is measured of the vehicle."""
 
     position: Array  # (3,) m, NED
     quaternion: Array  # (4,) from body to world
-    velocity_body: Array  # (6,) m/s, rad/s
+    velocity_body: Array  # (6,) over ground, m/s, rad/s
+    thruster_health: Array  # (m,) 1 working as far as one is told, 0 known to give nothing
 
 
-@dataclass(frozen=True, eq=False)
-class RegionValues:
-    """What `controller.regions.PackedRegions.evaluate` says of n regions."""
+class VehicleModel(NamedTuple):
+    """What a law may know of a vehicle: neither weight nor buoyancy, nor their centres, nor the current."""
 
-    values: Array  # (n,) g_i
-    gradients: Array  # (n, 3) dg_i/dp, world frame
-    clearances: Array  # (n,) m, negative where violated
+    rigid_mass: Array  # (6, 6) kg, kg m2, with the centre of gravity taken to be the origin
+    added_mass: Array  # (6, 6) kg, kg m, kg m2
+    linear_damping: Array  # (6,) N s/m, N m s/rad
+    quadratic_damping: Array  # (6,) N s2/m2, N m s2/rad2
+    thruster_matrix: Array  # (6, m) body wrench of one newton of each thruster
+    thrust_min: Array  # (m,) N
+    thrust_max: Array  # (m,) N
+
+
+@dataclass(frozen=True)
+class Diagnostic:
+    """One number that a law reports after each step."""
+
+    name: str
+    unit: str
+    description: str
 
 
 class Law(Protocol):
-    """State, regions and weights in; a body wrench out."""
+    """State, regions and weights in; forces out."""
 
-    estimate: Array  # (4,) phi-hat [N, N m]
+    output: ClassVar[Output]
+    diagnostics: tuple[Diagnostic, ...]  # what the numbers of `report` are
 
-    def step(self, state: VehicleState, goal: RegionValues, regions: RegionValues, alphas: Array, tau: Array) -> None:
-        """Write the wrench for the coming control period, shape (6,) [N, N m], into `tau`."""
+    @property
+    def estimate(self) -> Array:
+        """phi-hat (12), shape (4,) [N, N m]."""
+        ...
+
+    @property
+    def report(self) -> Array:
+        """What the last step has to say, shape (len(diagnostics),)."""
+        ...
+
+    def step(
+        self, state: VehicleState, goal: PackedRegions, regions: PackedRegions, weights: Array, forces: Array
+    ) -> None:
+        """Write the wrench, shape (6,) [N, N m], or the thruster forces, shape (m,) [N], of the coming period."""
         ...
 
 
-class PrintedLaw:
-    """The printed law (25)-(29), see `controller.printed_law`.
+class CompiledLaw:
+    """A law made of a compiled function, its gains and its memory.
 
-    Parameters
+    Attributes
     ----------
-    gains : Gains
-        Of the law.
-    desired_quaternion : array_like, shape (4,)
-        Attitude to be kept, from body to world.
-    period : float
-        Control period [s].
-
-    Raises
-    ------
-    LawError
-        If gains, attitude or period cannot be.
+    gains : NamedTuple
+        Numbers that stay.
+    memory : NamedTuple of ndarray
+        What it keeps between steps; has at least ``estimate`` and ``report``.
     """
 
-    def __init__(self, gains: Gains, desired_quaternion: Array, period: float) -> None:
-        if not 0.0 < period < np.inf:
-            raise LawError(f"control period is {period} s, expected a finite number above 0")
-        desired = np.array(desired_quaternion, dtype=float)
-        if desired.shape != (4,) or not abs(np.linalg.norm(desired) - 1.0) < 1e-6:
-            raise LawError(f"desired quaternion is {desired}, expected four numbers of length 1")
-        self.gains = check_gains(gains)
-        self.estimate: Array = np.zeros(4)
-        self._desired = desired
-        self._period = period
+    name: ClassVar[str]
+    output: ClassVar[Output]
+    function: ClassVar[Callable[..., None]]
+    gains_type: ClassVar[type[Any]]  # a NamedTuple of floats with defaults
+    diagnostics: tuple[Diagnostic, ...] = ()
+    gains: Any
+    memory: Any
 
-    def step(self, state: VehicleState, goal: RegionValues, regions: RegionValues, alphas: Array, tau: Array) -> None:
-        """Write the wrench for the coming control period into `tau`, and carry the estimate over it.
+    @classmethod
+    def for_vehicle(
+        cls, vehicle: VehicleModel, gains: Any, desired_quaternion: Array, period: float, n_regions: int
+    ) -> CompiledLaw:
+        """Return the law for a vehicle.
+
+        Parameters
+        ----------
+        vehicle : VehicleModel
+            What it may know of the vehicle.
+        gains : NamedTuple
+            Of `gains_type`.
+        desired_quaternion : array_like, shape (4,)
+            Attitude to be kept, from body to world.
+        period : float
+            Control period [s].
+        n_regions : int
+            How many secondary regions it will be given.
+
+        Returns
+        -------
+        CompiledLaw
+            With a memory of its own.
+
+        Raises
+        ------
+        LawError
+            If gains, attitude or period cannot be.
+        """
+        raise NotImplementedError
+
+    @property
+    def estimate(self) -> Array:
+        """phi-hat (12), shape (4,) [N, N m]."""
+        estimate: Array = self.memory.estimate
+        return estimate
+
+    @property
+    def report(self) -> Array:
+        """What the last step has to say, shape (len(diagnostics),)."""
+        report: Array = self.memory.report
+        return report
+
+    def step(
+        self, state: VehicleState, goal: PackedRegions, regions: PackedRegions, weights: Array, forces: Array
+    ) -> None:
+        """Write the forces of the coming control period, and carry the memory over it.
 
         Parameters
         ----------
         state : VehicleState
             As measured now.
-        goal : RegionValues
-            Of the primary region alone.
-        regions : RegionValues
-            Of the secondary regions.
-        alphas : ndarray, shape (n,)
-            Gain times weight of each secondary region.
-        tau : ndarray, shape (6,)
-            Receives the wrench [N, N m], body frame.
+        goal : PackedRegions
+            The primary region alone.
+        regions : PackedRegions
+            The n secondary regions.
+        weights : ndarray, shape (n,)
+            Of each secondary region, from the arbiter, in [0, 1].
+        forces : ndarray, shape (6,) or (m,)
+            Receives the wrench [N, N m], body frame, or the thruster forces [N], as `output` says.
         """
-        printed_law.step(
-            state.quaternion,
-            state.velocity_body,
-            self._desired,
-            goal.values[0],
-            goal.gradients[0],
-            regions.values,
-            regions.gradients,
-            alphas,
-            self.gains,
-            self._period,
-            self.estimate,
-            tau,
-        )
+        type(self).function(state, goal, regions, weights, self.gains, self.memory, forces)
+
+
+def checked_period(period: float) -> float:
+    """Return a control period [s] if it can be one.
+
+    Parameters
+    ----------
+    period : float
+        [s].
+
+    Returns
+    -------
+    float
+        The same.
+
+    Raises
+    ------
+    LawError
+        If it is not a finite number above 0.
+    """
+    if not 0.0 < period < np.inf:
+        raise LawError(f"control period is {period} s, expected a finite number above 0")
+    return period
+
+
+def checked_quaternion(quaternion: Array) -> Array:
+    """Return a desired attitude as an array of its own, shape (4,).
+
+    Parameters
+    ----------
+    quaternion : array_like, shape (4,)
+        From body to world.
+
+    Returns
+    -------
+    ndarray, shape (4,)
+        The same.
+
+    Raises
+    ------
+    LawError
+        If it is not of length 1.
+    """
+    desired = np.array(quaternion, dtype=float)
+    if desired.shape != (4,) or not abs(np.linalg.norm(desired) - 1.0) < 1e-6:
+        raise LawError(f"desired quaternion is {desired}, expected four numbers of length 1")
+    return desired

@@ -112,7 +112,9 @@ def _avoiding(scenario: Scenario, summary: dict[str, Any]) -> Claim:
     entered = [r for r in scenario.regions if clearances[r.region.name] < 0.0]
     later = [r for r in entered if r.region.name not in summary["violated_at_start"]]
     measured = "; ".join(f"{name}: {c:+.3f} m" for name, c in clearances.items()) + " (negative: violated)."
-    push = max((r.gain * r.region.shape.radius**2 for r in later if isinstance(r.region.shape, Sphere)), default=None)
+    push = max(
+        (r.region.gain * r.region.shape.radius**2 for r in later if isinstance(r.region.shape, Sphere)), default=None
+    )
     if push is not None:
         why = (
             f"A sphere pushes with at most gain × r² = {push:.0f} N; the law asked for up to "

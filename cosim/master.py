@@ -13,7 +13,7 @@ from typing import Protocol
 
 import numpy as np
 
-from controller import Allocation, Law, PrintedLaw, RegionValues, VehicleState
+from controller import Allocation, Law, PrintedLaw, VehicleState
 from controller.regions import Region, pack
 from cosim.lyapunov import LyapunovSignals, lyapunov_columns
 from cosim.scenario import CRITERIA, Scenario
@@ -59,16 +59,21 @@ class Master:
     def __init__(self, scenario: Scenario) -> None:
         self.scenario = scenario
         self.arbiter = Arbiter(engine=scenario.arbiter.engine, points=scenario.arbiter.points)
-        self.law: Law = PrintedLaw(scenario.law.gains, np.array(scenario.law.desired_quaternion), scenario.time.control)
+        self.law: Law = PrintedLaw(
+            scenario.law.gains,
+            np.array(scenario.law.desired_quaternion),
+            scenario.time.control,
+            len(scenario.regions),
+        )
         vehicle = scenario.vehicle
         self.allocation: Allocation | None = None
         if scenario.actuation.through == "thrusters":
             self.allocation = Allocation(
                 vehicle.thruster_matrix, vehicle.thrust_min, vehicle.thrust_max, scenario.actuation.limits
             )
-        self._scene = pack([Region("goal", scenario.goal, "in"), *(secondary.region for secondary in scenario.regions)])
+        self.goal = pack([Region("goal", scenario.goal, "in")])
+        self.regions = pack([secondary.region for secondary in scenario.regions])
         self._criterion_of = [CRITERIA.index(secondary.criterion) for secondary in scenario.regions]
-        self._gains = np.array([secondary.gain for secondary in scenario.regions])
 
         self.plant = Plant(vehicle, scenario.plant.fmi)
         try:
@@ -93,14 +98,13 @@ class Master:
             position=s.view("position.x", 3),
             quaternion=s.view("quaternion.e0", 4),
             velocity_body=s.view("velocity.u", 6),
+            thruster_health=np.ones(n_thrusters),
         )
         self._values, self._clearances = s.view("goal.value", n + 1), s.view("goal.clearance", n + 1)
         self._gradients: Array = np.zeros((n + 1, 3))
-        self.goal = RegionValues(self._values[:1], self._gradients[:1], self._clearances[:1])
-        self.regions = RegionValues(self._values[1:], self._gradients[1:], self._clearances[1:])
         self._memberships = s.view(f"membership.{CRITERIA[0]}", len(CRITERIA))
         self._weights = s.view(f"weight.{CRITERIA[0]}", len(CRITERIA))
-        self._alphas: Array = np.zeros(n)
+        self._weights_of_regions: Array = np.zeros(n)
         self._estimate = s.view("estimate.phi1", 4)
         self._command = s.view("command.X", 6)
         self._allocation_cut = s.view("allocation_saturated", 1)
@@ -160,23 +164,27 @@ class Master:
         self._measured[:] = self._plant_measured
 
     def _evaluate_regions(self) -> None:
-        self._scene.evaluate(self.state.position, self._values, self._gradients, self._clearances)
+        position = self.state.position
+        self.goal.move_to(self.signals.row[0])
+        self.regions.move_to(self.signals.row[0])
+        self.goal.evaluate(position, self._values[:1], self._gradients[:1], self._clearances[:1])
+        self.regions.evaluate(position, self._values[1:], self._gradients[1:], self._clearances[1:])
 
     def _arbitrate(self) -> None:
         """Turn clearances into memberships, of the most pressing region of each criterion, and these into weights."""
         width = self.scenario.arbiter.ramp
         memberships = [0.0] * len(CRITERIA)
-        for criterion, clearance in zip(self._criterion_of, self.regions.clearances.tolist(), strict=True):
+        for criterion, clearance in zip(self._criterion_of, self._clearances[1:].tolist(), strict=True):
             memberships[criterion] = max(memberships[criterion], ramp(clearance, width))
         weights = self.arbiter(memberships)
         self._memberships[:] = memberships
         self._weights[:] = weights
         for i, criterion in enumerate(self._criterion_of):
-            self._alphas[i] = self._gains[i] * weights[criterion]
+            self._weights_of_regions[i] = weights[criterion]
 
     def _control(self) -> None:
         self._estimate[:] = self.law.estimate
-        self.law.step(self.state, self.goal, self.regions, self._alphas, self._command)
+        self.law.step(self.state, self.goal, self.regions, self._weights_of_regions, self._command)
 
     def _actuate(self) -> None:
         if self.allocation is None:

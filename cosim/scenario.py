@@ -111,11 +111,10 @@ class RecordSetup:
 
 @dataclass(frozen=True)
 class SecondaryRegion:
-    """A region, the criterion it belongs to, and the gain that the arbiter's weight multiplies."""
+    """A region and the criterion it belongs to."""
 
     region: Region
     criterion: str  # one of CRITERIA
-    gain: float  # alpha_i of section VII
 
 
 # parameters of the FMU that have a key of their own in a scenario
@@ -152,6 +151,8 @@ class _RegionEntry:
     keep: Literal["in", "out"]
     gain: float
     shape: dict[str, Any]
+    velocity: Vector3 = (0.0, 0.0, 0.0)  # m/s, NED
+    hard: bool = True  # must not be violated, for laws that tell hard regions from soft ones
 
 
 @dataclass(frozen=True)
@@ -326,8 +327,10 @@ def _check_regions(entries: tuple[_RegionEntry, ...]) -> tuple[SecondaryRegion, 
         _require(good, f"{key}.name", repr(entry.name), "at most 40 letters, digits, blanks, - and _, and not goal")
         _require(names.count(entry.name) == 1, f"{key}.name", "used twice", "a name of its own")
         _require(0.0 <= entry.gain < math.inf, f"{key}.gain", entry.gain, "a finite number, 0 or above")
-        region = Region(entry.name, _shape(entry.shape, f"{key}.shape"), entry.keep)
-        regions.append(SecondaryRegion(region, entry.criterion, entry.gain))
+        _require(all(map(math.isfinite, entry.velocity)), f"{key}.velocity", entry.velocity, "finite numbers")
+        shape = _shape(entry.shape, f"{key}.shape")
+        region = Region(entry.name, shape, entry.keep, entry.velocity, entry.gain, entry.hard)
+        regions.append(SecondaryRegion(region, entry.criterion))
     return tuple(regions)
 
 

@@ -2,19 +2,19 @@
 
 import numpy as np
 
-from controller import Gains, PrintedLaw, RegionValues, VehicleState
+from controller import Gains, PrintedLaw, VehicleState
 from controller.regions import Region, Sphere, pack
 from fuzzy_arbiter import Arbiter, ramp
 from plant_fmu import Plant
 
 STEP, DURATION = 0.01, 30.0
 GOAL = Region("goal", Sphere((3.0, 0.0, 2.0), 0.5), keep="in")
-ROCK = Region("rock", Sphere((1.5, 0.2, 1.5), 0.4), keep="out")
+ROCK = Region("rock", Sphere((1.5, 0.2, 1.5), 0.4), keep="out", gain=500.0)
 
-scene = pack([GOAL, ROCK])
-values, gradients, clearances = np.zeros(2), np.zeros((2, 3)), np.zeros(2)
+goal, rocks = pack([GOAL]), pack([ROCK])
+value, gradient, clearance = np.zeros(1), np.zeros((1, 3)), np.zeros(1)
 arbiter = Arbiter()
-law = PrintedLaw(Gains(k_p1=40.0), np.array([1.0, 0.0, 0.0, 0.0]), STEP)
+law = PrintedLaw(Gains(k_p1=40.0), np.array([1.0, 0.0, 0.0, 0.0]), STEP, n_regions=1)
 
 with Plant("odin") as plant:
     plant.set({"position.z": 1.0, "wrench_force_limit": 60.0})
@@ -22,13 +22,14 @@ with Plant("odin") as plant:
     wrench = plant.inputs.values[-6:]  # behind the thrusters
     for _ in range(round(DURATION / STEP)):
         out = plant.outputs.values
-        state = VehicleState(position=out[0:3], quaternion=out[3:7], velocity_body=out[7:13])
-        scene.evaluate(state.position, values, gradients, clearances)
-        weights = arbiter({"obstacle": ramp(clearances[1], 0.2), "shape": 0.0, "depth": 0.0})
-        goal = RegionValues(values[:1], gradients[:1], clearances[:1])
-        rocks = RegionValues(values[1:], gradients[1:], clearances[1:])
-        law.step(state, goal, rocks, np.array([500.0 * weights[0]]), wrench)
+        state = VehicleState(
+            position=out[0:3], quaternion=out[3:7], velocity_body=out[7:13], thruster_health=np.ones(8)
+        )
+        rocks.evaluate(state.position, value, gradient, clearance)
+        weights = arbiter({"obstacle": ramp(clearance[0], 0.2), "shape": 0.0, "depth": 0.0})
+        law.step(state, goal, rocks, np.array([weights[0]]), wrench)
         plant.step(STEP)
     x, y, z = plant.outputs.values[:3]
+    goal.evaluate(plant.outputs.values[:3], value, gradient, clearance)
 
-print(f"at ({x:.2f}, {y:.2f}, {z:.2f}) m after {DURATION:g} s, clearance to the goal region {clearances[0]:+.2f} m")
+print(f"at ({x:.2f}, {y:.2f}, {z:.2f}) m after {DURATION:g} s, clearance to the goal region {clearance[0]:+.2f} m")

@@ -8,7 +8,15 @@ from controller.regions.ellipsoid import Ellipsoid
 from controller.regions.half_space import HalfSpace
 from controller.regions.pipe import Pipe
 from controller.regions.prism import Prism
-from controller.regions.region_set import SHAPES, PackedRegions, Region, clearances_at, evaluate_packed, pack
+from controller.regions.region_set import (
+    SHAPES,
+    PackedRegions,
+    Region,
+    clearance_at,
+    clearances_at,
+    evaluate_packed,
+    pack,
+)
 from controller.regions.shape import Shape
 from controller.regions.sphere import Sphere
 
@@ -26,6 +34,7 @@ __all__ = [
     "Region",
     "Shape",
     "Sphere",
+    "clearance_at",
     "clearances_at",
     "evaluate_packed",
     "pack",

@@ -5,9 +5,10 @@ One sign for the whole project: g <= 0 is satisfied, g > 0 is violated.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +23,7 @@ from controller.regions.ellipsoid import Ellipsoid, ellipsoid
 from controller.regions.half_space import HalfSpace, half_space
 from controller.regions.pipe import Pipe, pipe
 from controller.regions.prism import Prism, prism
-from controller.regions.shape import Array, Evaluation, Shape
+from controller.regions.shape import Array, Evaluation, Shape, Vector3, require, require_finite
 from controller.regions.sphere import Sphere, sphere
 
 SHAPES: dict[str, type[Shape]] = {
@@ -40,25 +41,39 @@ SHAPES: dict[str, type[Shape]] = {
 
 @dataclass(frozen=True)
 class Region:
-    """A shape to be kept within (``"in"``), or kept out of (``"out"``)."""
+    """A shape to be kept within (``"in"``), or kept out of (``"out"``), at rest or on the move.
+
+    A hard region must not be violated; a soft one pushes. Which laws tell them apart is said there.
+    """
 
     name: str
-    shape: Shape
+    shape: Shape  # as it is at time 0
     keep: Literal["in", "out"]
+    velocity: Vector3 = (0.0, 0.0, 0.0)  # m/s, NED
+    gain: float = 1.0  # alpha_i of section VII, in N per unit of g
+    hard: bool = True
 
     def __post_init__(self) -> None:
         if self.keep not in ("in", "out"):
             raise RegionError(f"region {self.name!r}: keep is {self.keep!r}, expected 'in' or 'out'")
+        require_finite(f"region {self.name!r}", velocity=self.velocity)
+        require(0.0 <= self.gain < math.inf, f"region {self.name!r}", "gain", self.gain, "a finite number, 0 or above")
 
 
-@dataclass(frozen=True, eq=False)
-class PackedRegions:
-    """Regions as arrays, which compiled code reads."""
+class PackedRegions(NamedTuple):
+    """Regions as arrays, which compiled code reads.
+
+    Who moves regions writes `shifts` and `velocities`; all else stays.
+    """
 
     kinds: NDArray[np.int64]  # (n,)
     signs: Array  # (n,) +1 kept within, -1 kept out of
     offsets: NDArray[np.int64]  # (n + 1,) into numbers
     numbers: Array  # what each shape's function reads, one behind the other
+    shifts: Array  # (n, 3) m, NED: how far each has moved from where its numbers have it
+    velocities: Array  # (n, 3) m/s, NED
+    gains: Array  # (n,) alpha_i
+    hard: NDArray[np.bool_]  # (n,)
 
     def evaluate(self, position: Array, values: Array, gradients: Array, clearances: Array) -> None:
         """Evaluate every region at a position, into the given arrays.
@@ -74,11 +89,15 @@ class PackedRegions:
         clearances : ndarray, shape (n,)
             Receives the distance to the surface [m]: positive where satisfied, negative where violated.
         """
-        evaluate_packed(position, self.kinds, self.signs, self.offsets, self.numbers, values, gradients, clearances)
+        evaluate_packed(self, position, values, gradients, clearances)
+
+    def move_to(self, time: float) -> None:
+        """Put every region where its velocity has brought it at a time [s]."""
+        np.multiply(self.velocities, time, out=self.shifts)
 
 
 def pack(regions: Sequence[Region]) -> PackedRegions:
-    """Turn regions into arrays.
+    """Turn regions into arrays, as they are at time 0.
 
     Parameters
     ----------
@@ -96,6 +115,10 @@ def pack(regions: Sequence[Region]) -> PackedRegions:
         signs=np.array([1.0 if region.keep == "in" else -1.0 for region in regions]),
         offsets=np.cumsum([0, *(len(numbers) for numbers in packed)], dtype=np.int64),
         numbers=np.array([x for numbers in packed for x in numbers], dtype=float),
+        shifts=np.zeros((len(regions), 3)),
+        velocities=np.array([region.velocity for region in regions], dtype=float).reshape(-1, 3),
+        gains=np.array([region.gain for region in regions], dtype=float),
+        hard=np.array([region.hard for region in regions], dtype=np.bool_),
     )
 
 
@@ -122,27 +145,31 @@ def _evaluate_shape(kind: int, p: Array, q: Array) -> Evaluation:
 
 @compiled
 def evaluate_packed(
-    position: Array,
-    kinds: NDArray[np.int64],
-    signs: Array,
-    offsets: NDArray[np.int64],
-    numbers: Array,
-    values: Array,
-    gradients: Array,
-    clearances: Array,
+    regions: PackedRegions, position: Array, values: Array, gradients: Array, clearances: Array
 ) -> None:
-    """Do what `PackedRegions.evaluate` says, for compiled callers: `kinds` to `numbers` are its fields."""
-    for i in range(kinds.size):
-        g, gx, gy, gz, distance = _evaluate_shape(kinds[i], position, numbers[offsets[i] : offsets[i + 1]])
-        values[i] = signs[i] * g
-        gradients[i, 0] = signs[i] * gx
-        gradients[i, 1] = signs[i] * gy
-        gradients[i, 2] = signs[i] * gz
-        clearances[i] = -signs[i] * distance
+    """Do what `PackedRegions.evaluate` says, for compiled callers."""
+    at = np.empty(3)
+    for i in range(regions.kinds.size):
+        at[:] = position - regions.shifts[i]
+        numbers = regions.numbers[regions.offsets[i] : regions.offsets[i + 1]]
+        g, gx, gy, gz, distance = _evaluate_shape(regions.kinds[i], at, numbers)
+        values[i] = regions.signs[i] * g
+        gradients[i, 0] = regions.signs[i] * gx
+        gradients[i, 1] = regions.signs[i] * gy
+        gradients[i, 2] = regions.signs[i] * gz
+        clearances[i] = -regions.signs[i] * distance
+
+
+@compiled
+def clearance_at(regions: PackedRegions, i: int, position: Array) -> float:
+    """Return the clearance [m] of region `i`, where it is now, at a position, shape (3,) [m, NED]."""
+    numbers = regions.numbers[regions.offsets[i] : regions.offsets[i + 1]]
+    clearance: float = -regions.signs[i] * _evaluate_shape(regions.kinds[i], position - regions.shifts[i], numbers)[4]
+    return clearance
 
 
 def clearances_at(points: Array, region: Region) -> Array:
-    """Return the clearance of a region at many points.
+    """Return the clearance of a region at many points, as it is at time 0.
 
     Parameters
     ----------
@@ -156,13 +183,12 @@ def clearances_at(points: Array, region: Region) -> Array:
     ndarray, shape (m,)
         As `PackedRegions.evaluate` gives it [m].
     """
-    packed = pack([region])
-    return _clearances_at(points, packed.kinds[0], packed.signs[0], packed.numbers)
+    return _clearances_at(pack([region]), points)
 
 
 @compiled
-def _clearances_at(points: Array, kind: int, sign: float, numbers: Array) -> Array:
+def _clearances_at(regions: PackedRegions, points: Array) -> Array:
     result = np.empty(points.shape[0])
     for i in range(points.shape[0]):
-        result[i] = -sign * _evaluate_shape(kind, points[i], numbers)[4]
+        result[i] = clearance_at(regions, 0, points[i])
     return result

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from plant_fmu.build import FMI_VERSIONS, cached_fmu
 from plant_fmu.errors import PlantError
 from plant_fmu.running.channels import DOUBLES
+from plant_fmu.running.native import Native, native_of
 from plant_fmu.running.slave import Slave
 from plant_fmu.running.state import Clock, State, from_bytes, to_bytes
 from plant_fmu.vehicle import Vehicle, load_vehicle
@@ -153,6 +154,30 @@ class Plant(Slave):
             except PlantError as error:
                 raise PlantError(f"derivatives of {', '.join(unknowns)} by {knowns[j]}: {error}") from error
         return found
+
+    def native(self, inputs: Sequence[str], outputs: Sequence[str]) -> Native:
+        """Return the C functions of an initialised FMI 3.0 plant for a compiled loop.
+
+        Such a loop steps the FMU behind this object's back: `time` and the channels stay as they were, so `reset` the
+        plant, or close it, afterwards.
+
+        Parameters
+        ----------
+        inputs, outputs : sequence of str
+            Real scalar variables to be sent and read, in the order of the buffers.
+
+        Returns
+        -------
+        Native
+            Addresses and buffers.
+
+        Raises
+        ------
+        PlantError
+            If the plant is not initialised or of another version, or a variable is no real scalar.
+        """
+        self._require_initialised("cannot be stepped")
+        return native_of(self._instance, tuple(inputs), tuple(outputs))
 
     def _real(self, name: str) -> int:
         """Return the value reference of a variable that has derivatives."""

@@ -1,14 +1,26 @@
 """Compilation: what is cached is never older than any source it was made from."""
 
+from pathlib import Path
+
 import numpy as np
 
 from controller import compiled as module
+from controller import regions
 from controller.compiled import compiled
 from controller.regions import evaluate_packed
 
 
 def test_cached_functions_carry_the_stamp_of_all_sources():
-    assert evaluate_packed._cache._cache_file._source_stamp == module._sources()
+    folder = Path(regions.__file__).parent
+    assert evaluate_packed._cache._cache_file._source_stamp == module._sources(folder)
+
+
+def test_the_stamp_is_of_the_package_and_of_the_callers_folder(tmp_path):
+    (tmp_path / "mine.py").write_text("a = 1")
+    before, elsewhere = module._sources(tmp_path), module._sources(tmp_path / "none")
+    module._sources.cache_clear()
+    (tmp_path / "mine.py").write_text("a = 2")
+    assert len({before, elsewhere, module._sources(tmp_path)}) == 3
 
 
 def test_without_numbas_insides_nothing_is_cached(monkeypatch):

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from controller import Gains, LawError, PrintedLaw, RegionValues, VehicleState
-from controller.printed_law import primary_error, primary_potential, secondary_error, secondary_potential
+from controller import Gains, LawError, PrintedLaw, VehicleState
+from controller.printed_law import primary_error, primary_potential, secondary_error, secondary_potential, step
+from controller.regions import Region, Sphere, pack
 
 GAINS = Gains()
 IDENTITY = np.array([1.0, 0.0, 0.0, 0.0])
@@ -19,8 +20,16 @@ def random_unit():
     return e / np.linalg.norm(e)
 
 
-def regions_at(values, gradients):
-    return RegionValues(np.array(values, float), np.array(gradients, float), np.zeros(len(values)))
+def ask(e, nu, goal, regions, alphas, e_d=None, gains=GAINS, period=0.001, phi=(0.0, 0.0, 0.0, 0.0)):
+    """Return the wrench and the next estimate; goal and regions are pairs of values and gradients."""
+    (f, df), (gs, dgs) = goal, regions
+    estimate, tau = np.array(phi, float), np.empty(6)
+    gs, dgs = np.array(gs, float), np.array(dgs, float).reshape(-1, 3)
+    step(e, nu, e if e_d is None else e_d, f, np.array(df, float), gs, dgs, alphas, gains, period, estimate, tau)
+    return tau, estimate
+
+
+NOTHING = ([], [])
 
 
 def textbook(e, e_d, nu, f, df, gs, dgs, alphas, phi):
@@ -55,13 +64,10 @@ def test_wrench_and_adaptation_are_the_equations():
         e, e_d, nu, phi = random_unit(), random_unit(), rng.normal(size=6), rng.normal(size=4)
         f, df = rng.normal() * 5, rng.normal(size=3)
         gs, dgs, alphas = rng.normal(size=4), rng.normal(size=(4, 3)), rng.uniform(0, 100, 4)
-        law = PrintedLaw(GAINS, e_d, period=0.01)
-        law.estimate[:] = phi
-        tau = np.empty(6)
-        law.step(VehicleState(np.zeros(3), e, nu), regions_at([f], [df]), regions_at(gs, dgs), alphas, tau)
+        tau, estimate = ask(e, nu, (f, df), (gs, dgs), alphas, e_d, period=0.01, phi=phi)
         expected, rate = textbook(e, e_d, nu, f, df, gs, dgs, alphas, phi)
         assert tau == pytest.approx(expected, rel=1e-12, abs=1e-10)
-        assert law.estimate == pytest.approx(phi + 0.01 * rate, rel=1e-12, abs=1e-12)
+        assert estimate == pytest.approx(phi + 0.01 * rate, rel=1e-12, abs=1e-12)
 
 
 def test_force_in_the_world_does_not_depend_on_attitude():
@@ -70,19 +76,14 @@ def test_force_in_the_world_does_not_depend_on_attitude():
     forces = []
     for _ in range(5):
         e = random_unit()
-        law = PrintedLaw(GAINS, e, 0.001)
-        tau = np.empty(6)
-        law.step(VehicleState(np.zeros(3), e, np.zeros(6)), regions_at([f], [df]), regions_at(gs, dgs), alphas, tau)
+        tau, _ = ask(e, np.zeros(6), (f, df), (gs, dgs), alphas)
         forces.append(Rotation.from_quat(np.roll(e, -1)).as_matrix() @ tau[:3])
     assert np.ptp(forces, axis=0) == pytest.approx(np.zeros(3), abs=1e-10)
 
 
 def test_force_at_the_papers_start():
     """26.82 kN: k_p1 f |grad f| with f = 79.75 m2 and |grad f| = 2 sqrt(80) m; SR3 pushes with 0.5 (1.8^2 - 1.5^2)."""
-    law = PrintedLaw(GAINS, IDENTITY, 0.001)
-    tau = np.empty(6)
-    goal = regions_at([79.75], [[-16.0, 0.0, -8.0]])
-    law.step(VehicleState(np.zeros(3), IDENTITY, np.zeros(6)), goal, regions_at([], np.empty((0, 3))), np.empty(0), tau)
+    tau, _ = ask(IDENTITY, np.zeros(6), (79.75, [-16.0, 0.0, -8.0]), NOTHING, np.empty(0))
     assert np.linalg.norm(tau[:3]) == pytest.approx(18.8 * 79.75 * 2 * math.sqrt(80.0), rel=1e-12)
     assert tau[0] > 0.0 and tau[2] > 0.0
 
@@ -106,11 +107,26 @@ def test_a_lost_measurement_is_no_peace():
 def test_k_q_cancels():
     taus = []
     for k_q in (0.1, 100.0, 1e5):
-        law, tau = PrintedLaw(GAINS._replace(k_q=k_q), IDENTITY, 0.01), np.empty(6)
-        regions = regions_at([0.2], [[1.0, 2.0, 3.0]])
-        law.step(VehicleState(np.zeros(3), IDENTITY, np.zeros(6)), regions, regions, np.array([50.0]), tau)
-        taus.append([*tau, *law.estimate])
+        slope = [1.0, 2.0, 3.0]
+        gains = GAINS._replace(k_q=k_q)
+        tau, estimate = ask(
+            IDENTITY, np.zeros(6), (0.2, slope), ([0.2], [slope]), np.array([50.0]), gains=gains, period=0.01
+        )
+        taus.append([*tau, *estimate])
     assert np.ptp(taus, axis=0) == pytest.approx(np.zeros(10), abs=1e-12)
+
+
+def test_the_law_evaluates_its_regions_and_weighs_them():
+    """At a quarter of a metre from the centre of a sphere of one metre to be kept out of: 0.5 * 100 * (1 - 1/16) N."""
+    law, tau = PrintedLaw(GAINS, IDENTITY, 0.001, 1), np.empty(6)
+    goal, rock = (
+        pack([Region("goal", Sphere((0.0, 0.0, 0.0), 1.0), "in")]),
+        pack([Region("rock", Sphere((0.0, 0.25, 0.0), 1.0), "out", gain=100.0)]),
+    )
+    state = VehicleState(np.zeros(3), IDENTITY, np.zeros(6), np.ones(8))
+    law.step(state, goal, rock, np.array([0.5]), tau)
+    assert tau == pytest.approx([0.0, -50.0 * (1.0 - 0.0625), 0.0, 0.0, 0.0, 0.0])
+    assert law.estimate[0] == pytest.approx(0.0) and law.report.shape == (0,)
 
 
 def test_satisfied_regions_push_not():
@@ -125,11 +141,8 @@ def test_a_region_without_gradient_contributes_nothing():
 def test_a_repulsive_sphere_pushes_at_most_gain_times_radius_squared():
     """Inside SR1, at its centre, 100 * 0.25 = 25 N: against 26.8 kN there is no avoidance."""
     depth = 1e-9  # from the centre
-    law = PrintedLaw(GAINS, IDENTITY, 0.001)
-    tau = np.empty(6)
-    sphere = regions_at([0.25 - depth**2], [[-2.0 * depth, 0.0, 0.0]])
-    state = VehicleState(np.zeros(3), IDENTITY, np.zeros(6))
-    law.step(state, regions_at([-1.0], [[0.0, 0.0, 0.0]]), sphere, np.array([100.0]), tau)
+    sphere = ([0.25 - depth**2], [[-2.0 * depth, 0.0, 0.0]])
+    tau, _ = ask(IDENTITY, np.zeros(6), (-1.0, np.zeros(3)), sphere, np.array([100.0]))
     assert tau[:3] == pytest.approx([25.0, 0.0, 0.0])
 
 
@@ -143,7 +156,7 @@ def test_defaults_are_those_of_section_vii():
 )
 def test_gains_that_cannot_be_are_named(change, words):
     with pytest.raises(LawError, match=words):
-        PrintedLaw(GAINS._replace(**change), IDENTITY, 0.001)
+        PrintedLaw(GAINS._replace(**change), IDENTITY, 0.001, 0)
 
 
 @pytest.mark.parametrize(
@@ -157,4 +170,4 @@ def test_gains_that_cannot_be_are_named(change, words):
 )
 def test_set_up_that_cannot_be_is_refused(attitude, period):
     with pytest.raises(LawError):
-        PrintedLaw(GAINS, attitude, period)
+        PrintedLaw(GAINS, attitude, period, 0)

@@ -108,7 +108,7 @@ def test_overrides_reach_every_depth(tmp_path):
     )  # fmt: skip
     assert scenario.law.gains.k_p1 == 3.0
     assert scenario.regions[1].region.shape.radius == 0.25
-    assert scenario.regions[0].gain == 7.0
+    assert scenario.regions[0].region.gain == 7.0
     assert scenario.vehicle.name == "bluerov2_heavy"
     assert scenario.plant.parameters == {"mass": 14.0}
     assert scenario.regions[2].region.shape == Pipe(((0.0, 0.0, 0.0), (1.0, 0.0, 0.0)), 0.3)

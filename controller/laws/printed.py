@@ -1,0 +1,105 @@
+"""The printed law (25)-(29) as a law among others, see `controller.printed_law`."""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar, NamedTuple
+
+import numpy as np
+
+from controller import printed_law
+from controller.compiled import compiled
+from controller.law import Array, CompiledLaw, Output, VehicleModel, VehicleState, checked_period, checked_quaternion
+from controller.printed_law import Gains, check_gains
+from controller.regions import PackedRegions, evaluate_packed
+
+
+class PrintedMemory(NamedTuple):
+    """What the printed law keeps, and where it evaluates regions."""
+
+    desired_quaternion: Array  # (4,)
+    period: Array  # (1,) s
+    estimate: Array  # (4,) phi-hat [N, N m]
+    report: Array  # (0,)
+    goal_value: Array  # (1,)
+    goal_gradient: Array  # (1, 3)
+    goal_clearance: Array  # (1,)
+    values: Array  # (n,)
+    gradients: Array  # (n, 3)
+    clearances: Array  # (n,)
+
+
+@compiled
+def step(
+    state: VehicleState,
+    goal: PackedRegions,
+    regions: PackedRegions,
+    weights: Array,
+    gains: Gains,
+    memory: PrintedMemory,
+    forces: Array,
+) -> None:
+    """Do what `CompiledLaw.step` says, by the printed law."""
+    evaluate_packed(goal, state.position, memory.goal_value, memory.goal_gradient, memory.goal_clearance)
+    evaluate_packed(regions, state.position, memory.values, memory.gradients, memory.clearances)
+    printed_law.step(
+        state.quaternion,
+        state.velocity_body,
+        memory.desired_quaternion,
+        memory.goal_value[0],
+        memory.goal_gradient[0],
+        memory.values,
+        memory.gradients,
+        regions.gains * weights,
+        gains,
+        memory.period[0],
+        memory.estimate,
+        forces,
+    )
+
+
+class PrintedLaw(CompiledLaw):
+    """The law as printed: a wrench without limits.
+
+    Parameters
+    ----------
+    gains : Gains
+        Of the law.
+    desired_quaternion : array_like, shape (4,)
+        Attitude to be kept, from body to world.
+    period : float
+        Control period [s].
+    n_regions : int
+        How many secondary regions it will be given.
+
+    Raises
+    ------
+    LawError
+        If gains, attitude or period cannot be.
+    """
+
+    name: ClassVar[str] = "printed"
+    output: ClassVar[Output] = "wrench"
+    function = staticmethod(step)
+    gains_type = Gains
+
+    @classmethod
+    def for_vehicle(
+        cls, vehicle: VehicleModel, gains: Any, desired_quaternion: Array, period: float, n_regions: int
+    ) -> PrintedLaw:
+        """Return the law; it wants to know nothing of the vehicle."""
+        return cls(gains, desired_quaternion, period, n_regions)
+
+    def __init__(self, gains: Gains, desired_quaternion: Array, period: float, n_regions: int) -> None:
+        self.gains = check_gains(gains)
+        self.memory = PrintedMemory(
+            desired_quaternion=checked_quaternion(desired_quaternion),
+            period=np.array([checked_period(period)]),
+            estimate=np.zeros(4),
+            report=np.zeros(0),
+            goal_value=np.zeros(1),
+            goal_gradient=np.zeros((1, 3)),
+            goal_clearance=np.zeros(1),
+            values=np.zeros(n_regions),
+            gradients=np.zeros((n_regions, 3)),
+            clearances=np.zeros(n_regions),
+        )

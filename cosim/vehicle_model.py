@@ -1,0 +1,35 @@
+"""What a law is told of a vehicle."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from controller import VehicleModel
+from plant_fmu.vehicle import Vehicle
+
+
+def vehicle_model(vehicle: Vehicle) -> VehicleModel:
+    """Return the nominal numbers of a vehicle that a law may know: not weight, buoyancy, nor their centres.
+
+    Parameters
+    ----------
+    vehicle : Vehicle
+        As its file has it.
+
+    Returns
+    -------
+    VehicleModel
+        With the centre of gravity taken to be the origin.
+    """
+    rigid_mass = np.zeros((6, 6))
+    rigid_mass[:3, :3] = vehicle.mass * np.eye(3)
+    rigid_mass[3:, 3:] = vehicle.inertia
+    return VehicleModel(
+        rigid_mass=rigid_mass,
+        added_mass=np.array(vehicle.added_mass, dtype=float),
+        linear_damping=np.array(vehicle.linear_damping, dtype=float),
+        quadratic_damping=np.array(vehicle.quadratic_damping, dtype=float),
+        thruster_matrix=np.ascontiguousarray(vehicle.thruster_matrix, dtype=float),
+        thrust_min=np.array(vehicle.thrust_min, dtype=float),
+        thrust_max=np.array(vehicle.thrust_max, dtype=float),
+    )

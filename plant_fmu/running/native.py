@@ -1,0 +1,78 @@
+"""The C functions of an instance as numbers, for compiled loops that call them without Python."""
+
+from __future__ import annotations
+
+import ctypes
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from plant_fmu.errors import PlantError
+from plant_fmu.running.channels import DOUBLES
+from plant_fmu.running.instance import Instance
+
+
+class Native(NamedTuple):
+    """An FMI 3.0 instance for compiled callers: addresses of C functions, and the buffers that they read and fill.
+
+    It holds while the plant is open, and only one caller may step at a time.
+    """
+
+    instance: int  # first argument of every function
+    set_values: int  # fmi3SetFloat64
+    get_values: int  # fmi3GetFloat64
+    do_step: int  # fmi3DoStep
+    input_references: NDArray[np.uint32]  # (n,)
+    inputs: NDArray[np.float64]  # (n,) sent by set_values
+    output_references: NDArray[np.uint32]  # (m,)
+    outputs: NDArray[np.float64]  # (m,) filled by get_values
+    results: NDArray[np.float64]  # (4,) room for what fmi3DoStep returns by pointer
+
+
+def native_of(instance: Instance, inputs: tuple[str, ...], outputs: tuple[str, ...]) -> Native:
+    """Return the addresses of an instance.
+
+    Parameters
+    ----------
+    instance : Instance
+        Of an FMI 3.0 FMU.
+    inputs, outputs : tuple of str
+        Real scalar variables, in the order of the buffers.
+
+    Returns
+    -------
+    Native
+        With buffers of its own, all zero.
+
+    Raises
+    ------
+    PlantError
+        If the FMU is of another version, or a variable is no real scalar.
+    """
+    if instance.fmi != 3:
+        raise PlantError(f"{instance.path}: FMI {instance.fmi}.0, expected 3.0 for compiled stepping")
+    library: Any = instance.fmu.dll
+
+    def address(name: str) -> int:
+        return ctypes.cast(library[name], ctypes.c_void_p).value or 0
+
+    return Native(
+        instance=ctypes.cast(instance.fmu.component, ctypes.c_void_p).value or 0,
+        set_values=address("fmi3SetFloat64"),
+        get_values=address("fmi3GetFloat64"),
+        do_step=address("fmi3DoStep"),
+        input_references=_references(instance, inputs),
+        inputs=np.zeros(len(inputs)),
+        output_references=_references(instance, outputs),
+        outputs=np.zeros(len(outputs)),
+        results=np.zeros(4),
+    )
+
+
+def _references(instance: Instance, names: tuple[str, ...]) -> NDArray[np.uint32]:
+    for name in names:
+        variable = instance.variables.get(name)
+        if variable is None or variable.type not in DOUBLES or variable.dimensions:
+            raise PlantError(f"FMU variable {name!r} is no real scalar of {instance.path}")
+    return np.array([instance.variables[name].valueReference for name in names], dtype=np.uint32)
