@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from controller import RegionValues, VehicleState
+from controller import VehicleState
 from controller.printed_law import primary_error, secondary_error
 from controller.quaternion import error, rotation_matrix
 from controller.regions import PackedRegions
@@ -48,14 +48,13 @@ class LyapunovSignals:
     ----------
     scenario : Scenario
         Its law is the printed one.
-    scene : PackedRegions
-        The goal, then the secondary regions.
     state : VehicleState
         The true state, read at each `write`.
-    goal, regions : RegionValues
-        What `scene` says of that state.
-    alphas : ndarray, shape (n,)
-        Gain times weight of each secondary region.
+    goal, regions : PackedRegions
+        The goal alone, and the n secondary regions. The theory takes them to be at rest: if they move, the rate is
+        that of the vehicle's own motion.
+    weights : ndarray, shape (n,)
+        Of each secondary region, from the arbiter.
     estimate : ndarray, shape (4,)
         Phi-hat.
     out : ndarray, shape (4,)
@@ -65,52 +64,57 @@ class LyapunovSignals:
     def __init__(
         self,
         scenario: Scenario,
-        scene: PackedRegions,
         state: VehicleState,
-        goal: RegionValues,
-        regions: RegionValues,
-        alphas: Array,
+        goal: PackedRegions,
+        regions: PackedRegions,
+        weights: Array,
         estimate: Array,
         out: Array,
     ) -> None:
         self._model, self._gains = true_model(scenario), scenario.law.gains
         self._desired = np.array(scenario.law.desired_quaternion)
-        self._scene, self._state, self._goal, self._regions = scene, state, goal, regions
-        self._alphas, self._estimate, self._out = alphas, estimate, out
-        n = len(alphas) + 1
-        self._values, self._gradients, self._clearances = np.empty(n), np.empty((n, 3)), np.empty(n)
+        self._state, self._goal, self._regions = state, goal, regions
+        self._weights, self._estimate, self._out = weights, estimate, out
+        n = len(weights)
+        self._of_goal = np.empty(1), np.empty((1, 3)), np.empty(1)
+        self._of_regions = np.empty(n), np.empty((n, 3)), np.empty(n)
 
     def write(self) -> None:
         """Write V in its three forms, and its rate."""
-        model, gains, state, regions = self._model, self._gains, self._state, self._regions
-        velocity, estimate, f = state.velocity_body, self._estimate, self._goal.values[0]
-        betas = self._alphas / gains.k_q
+        model, gains, state, out = self._model, self._gains, self._state, self._out
+        velocity, estimate, betas = state.velocity_body, self._estimate, self._regions.gains * self._weights / gains.k_q
         R, turned = rotation_matrix(state.quaternion), error(self._desired, state.quaternion)
-        e_p = primary_error(f, self._goal.gradients[0])
-        e_s = secondary_error(regions.values, regions.gradients, betas)
+        region_rate = self._region_rate(R @ velocity[:3], betas)
+        e_p, e_s = self._region_errors(state.position, betas)
+        f, (g, g_gradients, clearances) = self._of_goal[0][0], self._of_regions
         y = mapped_error(e_p, e_s, turned[1:], R, gains)
         alone = mapped_error(e_p, np.zeros(3), turned[1:], R, gains)
         value = primary_value(model, gains, f, turned, y, velocity, estimate)
-        self._out[0] = value + printed_secondary(regions.values, regions.gradients, betas, gains)
-        self._out[1] = value + normalised_secondary(regions.values, regions.gradients, regions.clearances, betas, gains)
-        self._out[2] = primary_value(model, gains, f, turned, alone, velocity, estimate)
-        region_rate = self._region_rate(R @ velocity[:3], betas)
+        out[0] = value + printed_secondary(g, g_gradients, betas, gains)
+        out[1] = value + normalised_secondary(g, g_gradients, clearances, betas, gains)
+        out[2] = primary_value(model, gains, f, turned, alone, velocity, estimate)
         y_rate = mapped_error_rate(region_rate, y, turned, R, velocity[3:])
-        self._out[3] = value_rate(model, gains, y, y_rate, velocity)
+        out[3] = value_rate(model, gains, y, y_rate, velocity)
 
     def _region_rate(self, velocity: Array, betas: Array) -> Array:
         """Return d/dt (e_p + (k_q/k_p1) e_s), shape (3,), by central differences along the motion, weights held."""
         speed = float(np.linalg.norm(velocity))
         if not speed > 0.0:
             return 0.0 * velocity
-        ahead, behind = (self._region_error(side * _STEP / speed * velocity, betas) for side in (1.0, -1.0))
-        return (ahead - behind) * (speed / (2.0 * _STEP))
-
-    def _region_error(self, offset: Array, betas: Array) -> Array:
-        self._scene.evaluate(self._state.position + offset, self._values, self._gradients, self._clearances)
-        e_s = secondary_error(self._values[1:], self._gradients[1:], betas)
-        result: Array = primary_error(self._values[0], self._gradients[0]) + e_s * (self._gains.k_q / self._gains.k_p1)
+        ratio = self._gains.k_q / self._gains.k_p1
+        offset = _STEP / speed * velocity
+        (p_ahead, s_ahead), (p_behind, s_behind) = (
+            self._region_errors(self._state.position + side * offset, betas) for side in (1.0, -1.0)
+        )
+        result: Array = (p_ahead - p_behind + ratio * (s_ahead - s_behind)) * (speed / (2.0 * _STEP))
         return result
+
+    def _region_errors(self, position: Array, betas: Array) -> tuple[Array, Array]:
+        """Evaluate goal and regions at a position; return e_p and e_s, shape (3,) each."""
+        self._goal.evaluate(position, *self._of_goal)
+        self._regions.evaluate(position, *self._of_regions)
+        (f, *_), (gradient, *_) = self._of_goal[:2]
+        return primary_error(f, gradient), secondary_error(*self._of_regions[:2], betas)
 
 
 def summarise_lyapunov(record: Record) -> dict[str, Any] | None:

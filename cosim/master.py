@@ -115,7 +115,7 @@ class Master:
         if self.scenario.record.lyapunov:
             out = s.view("lyapunov.printed", 4)
             self._lyapunov = LyapunovSignals(
-                self.scenario, self._scene, self.state, self.goal, self.regions, self._alphas, self._estimate, out
+                self.scenario, self.state, self.goal, self.regions, self._weights_of_regions, self._estimate, out
             )
 
     def run(self, observers: Sequence[Observer] = (), rate: float | None = None) -> None:

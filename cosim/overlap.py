@@ -56,7 +56,8 @@ def common_depth(points: Array, regions: Sequence[Region]) -> Array:
     regions : sequence of Region
         At least one.
     """
-    return np.min([clearances_at(points, region) for region in regions], axis=0)
+    depths: Array = np.min([clearances_at(points, region) for region in regions], axis=0)
+    return depths
 
 
 def search(regions: Sequence[Region], low: Array, high: Array, tolerance: float = TOLERANCE) -> Overlap:
