@@ -24,7 +24,6 @@ Vector3 = tuple[float, float, float]
 TOLERANCE = 0.01  # m, to which the common depth is known
 _MOST_BOXES = 400_000  # in one round of halving
 _CELLS = 1_000_000  # of the grid in which a way is sought
-_ROOM = 3.0  # m, about start and regions, in which a way is sought
 
 
 @dataclass(frozen=True)
@@ -96,6 +95,7 @@ def search(regions: Sequence[Region], low: Array, high: Array, tolerance: float 
         half = 0.5 * half
         offsets = np.array(np.meshgrid(*([-1.0, 1.0],) * 3)).reshape(3, -1).T * half
         centres = (open_boxes[:, None, :] + offsets[None, :, :]).reshape(-1, 3)
+    best_point, best = _polished(regions, best_point, best, low, high)
     x, y, z = (float(c) for c in best_point)
     return Overlap((x, y, z), best, bound)
 
@@ -109,7 +109,7 @@ def _polished(regions: Sequence[Region], point: Array, depth: float, low: Array,
     return (np.asarray(done.x), -float(done.fun)) if -done.fun > depth else (point, depth)
 
 
-def box_about(regions: Sequence[Region], points: Sequence[Vector3], room: float = _ROOM) -> tuple[Array, Array]:
+def box_about(regions: Sequence[Region], points: Sequence[Vector3], room: float) -> tuple[Array, Array]:
     """Return the corners of a box that holds points and the finite bounds of regions, with room about them.
 
     Parameters
