@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from controller.printed_law import Gains, primary_error
-from controller.regions import PackedRegions, Region, Sphere, pack
+from controller.regions import Region, Sphere
 from controller.theory import (
     Fit,
     Model,
@@ -25,8 +25,10 @@ from controller.theory import (
 from controller.theory.conditions import least_of_potential_test
 from controller.theory.model import asymmetry, damping, least_inertia, restoring_defect, skew_defect
 from cosim.finding import Finding, status
-from cosim.scenario import Scenario
+from cosim.region_values import evaluated
+from cosim.scenario import CRITERIA, Scenario
 from cosim.truth import true_model, true_vehicle
+from fuzzy_arbiter import Arbiter, ramp
 
 Array = NDArray[np.float64]
 
@@ -93,6 +95,29 @@ def _damping(model: Model, velocities: Array) -> Finding:
     return Finding("vehicle", "Property 3", "fails", text, advice, numbers)
 
 
+def start_weights(scenario: Scenario) -> Array:
+    """Return the weight of each secondary region at the start, shape (n,), as the master's first step has it.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        Any.
+
+    Raises
+    ------
+    DefinitionError
+        If the arbiter cannot be set up.
+    """
+    arbiter = Arbiter(engine=scenario.arbiter.engine, points=scenario.arbiter.points)
+    clearances = evaluated([r.region for r in scenario.regions], scenario.initial.position)[2]
+    of = [CRITERIA.index(r.criterion) for r in scenario.regions]
+    memberships = [0.0] * len(CRITERIA)
+    for criterion, clearance in zip(of, clearances.tolist(), strict=True):
+        memberships[criterion] = max(memberships[criterion], ramp(clearance, scenario.arbiter.ramp))
+    weights = arbiter(memberships)
+    return np.array([weights[criterion] for criterion in of], dtype=float)
+
+
 def gain_findings(scenario: Scenario, weights: Array) -> Iterator[Finding]:
     """Yield whether (38) and (45) hold at the start of a scenario with the printed law, and where else.
 
@@ -110,7 +135,7 @@ def gain_findings(scenario: Scenario, weights: Array) -> Iterator[Finding]:
     """
     gains: Gains = scenario.law.gains
     model = true_model(scenario)
-    goal = pack([Region("goal", scenario.goal, "in")])
+    goal = Region("goal", scenario.goal, "in")
     start = np.array(scenario.initial.position)
     f, gradient = _value_and_gradient(goal, start)
     slope = float(np.linalg.norm(gradient))
@@ -173,12 +198,10 @@ def _mend_attitude(model: Model, gains: Gains, slope: float) -> str:
 
 def _secondary(model: Model, gains: Gains, weights: Array, scenario: Scenario) -> Finding:
     regions = [secondary.region for secondary in scenario.regions]
-    packed, n = pack(regions), len(regions)
-    values, gradients, clearances = np.empty(n), np.empty((n, 3)), np.empty(n)
-    packed.evaluate(np.array(scenario.initial.position), values, gradients, clearances)
-    active = (values > 0.0) & (packed.gains * weights > 0.0)
-    slopes = np.linalg.norm(gradients[active], axis=1)
-    fit = secondary_fit(model.mass, slopes, (packed.gains * weights)[active] / gains.k_q, gains)
+    values, gradients, _ = evaluated(regions, scenario.initial.position)
+    alphas = np.array([region.gain for region in regions]) * weights
+    active = (values > 0.0) & (alphas > 0.0)
+    fit = secondary_fit(model.mass, np.linalg.norm(gradients[active], axis=1), alphas[active] / gains.k_q, gains)
     names = ", ".join(region.name for region, on in zip(regions, active, strict=True) if on)
     at_start = f"Active at the start: {names} ({_pair(fit)})." if names else "No region is active at the start."
     limits = {}
@@ -198,7 +221,7 @@ def _secondary(model: Model, gains: Gains, weights: Array, scenario: Scenario) -
 def _damped(
     model: Model,
     gains: Gains,
-    goal: PackedRegions,
+    goal: Region,
     start: Array,
     f: float,
     radii: tuple[float, float, float] | None,
@@ -232,13 +255,12 @@ def _damped(
     )  # fmt: skip
 
 
-def _value_and_gradient(goal: PackedRegions, position: Array) -> tuple[float, Array]:
-    value, gradient, clearance = np.empty(1), np.empty((1, 3)), np.empty(1)
-    goal.evaluate(position, value, gradient, clearance)
-    return float(value[0]), gradient[0]
+def _value_and_gradient(goal: Region, position: Array) -> tuple[float, Array]:
+    (value,), (gradient,), _ = evaluated([goal], position)
+    return float(value), gradient
 
 
-def _error(goal: PackedRegions, position: Array) -> Array:
+def _error(goal: Region, position: Array) -> Array:
     return primary_error(*_value_and_gradient(goal, position))
 
 

@@ -8,9 +8,10 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from controller.regions import Region, clearances_at, pack
+from controller.regions import Region
 from cosim.finding import Finding, status
 from cosim.overlap import Overlap, box_about, box_within, search, way_exists
+from cosim.region_values import evaluated
 from cosim.scenario import Scenario
 
 Array = NDArray[np.float64]
@@ -55,15 +56,14 @@ def _box(goal: Region, regions: Sequence[Region], start: tuple[float, float, flo
 
 
 def _clearance(region: Region, point: Sequence[float]) -> float:
-    return float(clearances_at(np.array([point], dtype=float), region)[0])
+    return float(evaluated([region], point)[2][0])
 
 
 def _start(region: Region, start: tuple[float, float, float]) -> Finding:
     clearance = _clearance(region, start)
-    value, gradient, distance = np.empty(1), np.empty((1, 3)), np.empty(1)
-    pack([region]).evaluate(np.array(start), value, gradient, distance)
+    _, (gradient,), _ = evaluated([region], start)
     slope = float(np.linalg.norm(gradient))
-    outside = np.array(start) + (clearance / slope * gradient[0] if slope else 0.0)
+    outside = np.array(start) + (clearance / slope * gradient if slope else 0.0)
     text = f"The start violates {region.name} by {-clearance:.3f} m."
     if not region.hard:
         text += " It is soft: it pushes, and may be violated."

@@ -23,7 +23,7 @@ Vector3 = tuple[float, float, float]
 
 TOLERANCE = 0.01  # m, to which the common depth is known
 _MOST_BOXES = 400_000  # in one round of halving
-_CELLS = 1_000_000  # of the grid in which a way is sought
+_CELLS = 400_000  # of the grid in which a way is sought
 
 
 @dataclass(frozen=True)

@@ -110,11 +110,8 @@ def thrust_margin(vehicle: Vehicle, phi: Array, quaternion: Array, current: Arra
     ThrustMargin
         Over the 26 `DIRECTIONS`.
     """
-    added = Model(
-        np.array(vehicle.added_mass), np.array(vehicle.linear_damping), np.array(vehicle.quadratic_damping), phi
-    )
-    hold = held_wrench(added, quaternion, current)
-    weightless = held_wrench(added._replace(phi=np.zeros(4)), quaternion, current)
+    hold = held_wrench(_added(vehicle, phi), quaternion, current)
+    weightless = held_wrench(_added(vehicle, np.zeros(4)), quaternion, current)
     all_alive = np.ones(vehicle.n_thrusters, dtype=bool)
     thrust = _least(vehicle, quaternion, np.zeros(6), all_alive)
     without = []
@@ -127,8 +124,21 @@ def thrust_margin(vehicle: Vehicle, phi: Array, quaternion: Array, current: Arra
         drag=float(np.linalg.norm(weightless[:3])),
         excess_weight=float(phi[0]),
         thrust=thrust,
-        left=_least(vehicle, quaternion, hold, all_alive),
+        left=least_left(vehicle, phi, quaternion, current),
         left_without=tuple(without),
+    )
+
+
+def least_left(vehicle: Vehicle, phi: Array, quaternion: Array, current: Array) -> Margin | None:
+    """Return `ThrustMargin.left` alone. Arguments as `thrust_margin`."""
+    hold = held_wrench(_added(vehicle, phi), quaternion, current)
+    return _least(vehicle, quaternion, hold, np.ones(vehicle.n_thrusters, dtype=bool))
+
+
+def _added(vehicle: Vehicle, phi: Array) -> Model:
+    """Return what `held_wrench` reads of a vehicle."""
+    return Model(
+        np.array(vehicle.added_mass), np.array(vehicle.linear_damping), np.array(vehicle.quadratic_damping), phi
     )
 
 

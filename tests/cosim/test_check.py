@@ -8,7 +8,10 @@ import re
 import pytest
 
 from cosim.check import check
+from cosim.check_law import gain_findings, start_weights, vehicle_findings
+from cosim.check_regions import region_findings
 from cosim.check_text import check_json, check_text
+from cosim.check_thrust import asked_finding, thrust_findings
 from cosim.cli import main
 from cosim.scenario import load_scenario
 from cosim.scenario_file import shipped_scenarios
@@ -17,13 +20,28 @@ CLOSED = "arbiter.engine=closed"
 MENDED = ("law.gains.sigma_p=0.0004", "law.gains.k_p1=0.05")
 
 
-def findings(*overrides, name="paper"):
-    return {finding.name: finding for finding in check(load_scenario(name, [CLOSED, *overrides])).findings}
+def named(found):
+    return {finding.name: finding for finding in found}
+
+
+def of_law(*overrides):
+    scenario = load_scenario("paper", [CLOSED, *overrides])
+    weights = start_weights(scenario)
+    found = [*vehicle_findings(scenario), *gain_findings(scenario, weights), asked_finding(scenario, weights)]
+    return named(found)
+
+
+def of_regions(*overrides):
+    return named(region_findings(load_scenario("paper", [CLOSED, *overrides])))
+
+
+def of_thrust(*overrides):
+    return named(thrust_findings(load_scenario("paper", [CLOSED, *overrides])))
 
 
 @pytest.fixture(scope="module")
 def paper():
-    return findings()
+    return named(check(load_scenario("paper", [CLOSED])).findings)
 
 
 @pytest.mark.parametrize("name", shipped_scenarios())
@@ -44,10 +62,10 @@ def test_properties_of_the_papers_vehicle(paper):
 
 
 def test_vehicle_of_the_plant_is_looked_at(paper):
-    heavy = findings("plant.parameters.mass=300", "plant.parameters.linear_damping[1]=1")
+    heavy = of_law("plant.parameters.mass=300", "plant.parameters.linear_damping[1]=1")
     assert heavy["(38) 1, 2"].numbers["position_need"] > 1.5 * paper["(38) 1, 2"].numbers["position_need"]
     drag = [f"plant.parameters.linear_damping[{i}]=2" for i in (1, 2, 3)]
-    assert findings(*drag)["Property 3"].status == "holds"
+    assert of_law(*drag)["Property 3"].status == "holds"
 
 
 def test_conditions_of_the_paper(paper):
@@ -80,40 +98,40 @@ def test_asked_force_of_the_paper(paper):
 )
 def test_advice_mends(paper, finding, key):
     value = float(re.search(rf"law\.gains\.{key} to (?:about )?([0-9.e-]+[0-9])", paper[finding].advice)[1])
-    assert findings(f"law.gains.{key}={0.98 * value}")[finding].status == "holds"
-    assert findings(f"law.gains.{key}={1.05 * value}")[finding].status == "fails"
+    assert of_law(f"law.gains.{key}={0.98 * value}")[finding].status == "holds"
+    assert of_law(f"law.gains.{key}={1.05 * value}")[finding].status == "fails"
 
 
 def test_advice_on_attitude():
-    heavy = findings("law.gains.sigma_a=50")
+    heavy = of_law("law.gains.sigma_a=50")
     assert heavy["(38) 1, 2"].numbers["greatest_gradient"] == 0.0
     value = float(re.search(r"sigma_a to ([0-9.]+[0-9])", heavy["(38) 1, 2"].advice)[1])
-    assert findings(f"law.gains.sigma_a={value}", MENDED[0])["(38) 1, 2"].status == "holds"
+    assert of_law(f"law.gains.sigma_a={value}", MENDED[0])["(38) 1, 2"].status == "holds"
 
 
 def test_start_near_the_goal_holds():
-    near = findings("initial.position=[7.4,0,5]")
+    near = of_law("initial.position=[7.4,0,5]")
     assert near["(38) 1, 2"].status == near["(45) 1"].status == "holds"
 
 
 def test_goals_that_are_no_sphere():
     box = "goal={type='box',centre=[8,0,5],size=[1,1,1]}"
-    found = findings(box)
+    found = of_law(box)
     assert found["(38) 1, 2"].status == "holds"  # |df/dp| = 1
     assert found["(45) 1"].status == "holds"
-    plane = findings("goal={type='half_space',point=[60,0,0],normal=[-1,0,0]}", "regions=[]", "intersection=[]")
+    plane = of_regions("goal={type='half_space',point=[60,0,0],normal=[-1,0,0]}", "regions=[]", "intersection=[]")
     assert plane["way"].status == "holds"
 
 
 def test_start_inside_a_hard_region_fails_and_the_advice_leads_out():
-    found = findings("regions.SR1.shape.centre=[0,0,1.2]")["start, SR1"]
+    found = of_regions("regions.SR1.shape.centre=[0,0,1.2]")["start, SR1"]
     assert found.status == "fails" and found.numbers["clearance"] == pytest.approx(-0.3)
     place = re.search(r"\((.*?)\) m", found.advice)[1]
     assert [float(x) for x in place.split(",")] == pytest.approx([0.0, 0.0, 0.7], abs=0.01)
 
 
 def test_covered_goal_fails_and_names_who_covers_it():
-    found = findings("regions.SR2.shape.centre=[8,0,5.1]", "regions.SR2.shape.radius=0.8")
+    found = of_regions("regions.SR2.shape.centre=[8,0,5.1]", "regions.SR2.shape.radius=0.8")
     assert found["goal and regions"].status == "fails"
     assert "SR2 alone" in found["goal and regions"].advice
     # the farthest point of the goal from SR2's centre is 0.6 m away
@@ -125,7 +143,7 @@ def test_covered_goal_fails_and_names_who_covers_it():
 
 
 def test_contradictory_regions_fail():
-    found = findings(
+    found = of_regions(
         "regions.SR1.keep=in",
         "regions.SR2.keep=in",
         "intersection=[]",
@@ -139,11 +157,11 @@ def test_contradictory_regions_fail():
 def test_overlaps_of_regions_to_be_kept_out_of(paper):
     # centres 0.4 m apart, radii 0.5 m
     assert paper["overlaps"].numbers["SR1, SR2"] == pytest.approx(0.3, abs=1e-3)
-    assert "overlaps" not in findings("regions.SR2.shape.centre=[2,0,9]", "regions.SR1.shape.centre=[2,9,9]")
+    assert "overlaps" not in of_regions("regions.SR2.shape.centre=[2,0,9]", "regions.SR1.shape.centre=[2,9,9]")
 
 
 def test_current_that_is_too_strong():
-    found = findings("plant.current=[2.0,0.0,0.0]")["holding still"]
+    found = of_thrust("plant.current=[2.0,0.0,0.0]")["holding still"]
     assert found.status == "fails"
     # 76.4 N against 48 N s2/m2
     speed = float(re.search(r"at most ([0-9.]+) m/s", found.advice)[1])
@@ -151,12 +169,12 @@ def test_current_that_is_too_strong():
 
 
 def test_a_vehicle_that_is_too_heavy_is_not_blamed_on_the_current():
-    found = findings("plant.current=[0.5,0.0,0.0]", "plant.parameters.weight=1400")["holding still"]
+    found = of_thrust("plant.current=[0.5,0.0,0.0]", "plant.parameters.weight=1400")["holding still"]
     assert found.status == "fails" and "Trim" in found.advice
 
 
 def test_thruster_that_cannot_be_missed_is_a_note():
-    found = findings("plant.parameters.weight=1320")["one thruster lost"]
+    found = of_thrust("plant.parameters.weight=1320")["one thruster lost"]
     assert found.status == "note" and "5, 6, 7, 8" in found.text
 
 
@@ -170,7 +188,7 @@ def test_other_laws_are_not_held_to_the_printed_laws_theory():
 
 
 def test_no_regions():
-    found = findings("regions=[]", "intersection=[]")
+    found = of_regions("regions=[]", "intersection=[]")
     assert "goal and regions" not in found and found["way"].status == "holds"
 
 
