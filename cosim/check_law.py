@@ -34,6 +34,7 @@ Array = NDArray[np.float64]
 
 _ROUNDING = 1e-9  # of the greatest element
 _SAMPLES = 50  # velocities and attitudes at which a property is looked at
+_LEVEL = (1.0, 0.0, 0.0, 0.0)  # a goal does not ask for attitude
 _STEP = 1e-4  # m, by which e_p is differentiated
 
 
@@ -109,7 +110,8 @@ def start_weights(scenario: Scenario) -> Array:
         If the arbiter cannot be set up.
     """
     arbiter = Arbiter(engine=scenario.arbiter.engine, points=scenario.arbiter.points)
-    clearances = evaluated([r.region for r in scenario.regions], scenario.initial.position)[2]
+    initial = scenario.initial
+    clearances = evaluated([r.region for r in scenario.regions], initial.position, initial.quaternion)[2]
     of = [CRITERIA.index(r.criterion) for r in scenario.regions]
     memberships = [0.0] * len(CRITERIA)
     for criterion, clearance in zip(of, clearances.tolist(), strict=True):
@@ -135,7 +137,7 @@ def gain_findings(scenario: Scenario, weights: Array) -> Iterator[Finding]:
     """
     gains: Gains = scenario.law.gains
     model = true_model(scenario)
-    goal = Region("goal", scenario.goal, "in")
+    goal = scenario.goal_region
     start = np.array(scenario.initial.position)
     f, gradient = _value_and_gradient(goal, start)
     slope = float(np.linalg.norm(gradient))
@@ -198,7 +200,7 @@ def _mend_attitude(model: Model, gains: Gains, slope: float) -> str:
 
 def _secondary(model: Model, gains: Gains, weights: Array, scenario: Scenario) -> Finding:
     regions = [secondary.region for secondary in scenario.regions]
-    values, gradients, _ = evaluated(regions, scenario.initial.position)
+    values, gradients, _ = evaluated(regions, scenario.initial.position, scenario.initial.quaternion)
     alphas = np.array([region.gain for region in regions]) * weights
     active = (values > 0.0) & (alphas > 0.0)
     fit = secondary_fit(model.mass, np.linalg.norm(gradients[active], axis=1), alphas[active] / gains.k_q, gains)
@@ -256,7 +258,7 @@ def _damped(
 
 
 def _value_and_gradient(goal: Region, position: Array) -> tuple[float, Array]:
-    (value,), (gradient,), _ = evaluated([goal], position)
+    (value,), (gradient,), _ = evaluated([goal], position, _LEVEL)
     return float(value), gradient
 
 

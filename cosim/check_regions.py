@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from controller.regions import Region
+from controller.regions import Region, of_attitude
 from cosim.finding import Finding, status
 from cosim.overlap import Overlap, box_about, box_within, search, way_exists
 from cosim.region_values import evaluated
@@ -33,15 +33,16 @@ def region_findings(scenario: Scenario) -> Iterator[Finding]:
     Finding
         Start; goal with all regions; regions among each other; overlaps to be decided; way.
     """
-    goal = Region("goal", scenario.goal, "in")
+    goal, start = scenario.goal_region, scenario.initial.position
     regions = [secondary.region for secondary in scenario.regions]
-    start = scenario.initial.position
-    low, high = _box(goal, regions, start)
-    moving = " They move: this is how they are at time 0." if any(any(r.velocity) for r in regions) else ""
-    yield from (_start(region, start) for region in regions if _clearance(region, start) < 0.0)
-    yield from _common(goal, regions, low, high, moving)
-    yield from _between(regions, low, high)
-    yield _way(goal, regions, start, low, high)
+    placed = [region for region in regions if not of_attitude(region.shape)]  # the others close no place
+    low, high = _box(goal, placed, start)
+    moving = " Some move: this is how they are at time 0." if scenario.moving else ""
+    violated = [region for region in regions if _clearance(region, scenario) < 0.0]
+    yield from (_start(region, scenario) for region in violated)
+    yield from _common(goal, placed, low, high, moving)
+    yield from _between(placed, low, high)
+    yield _way(goal, [r for r in placed if r not in violated], [r.name for r in violated], start, low, high)
 
 
 def _box(goal: Region, regions: Sequence[Region], start: tuple[float, float, float]) -> tuple[Array, Array]:
@@ -55,22 +56,28 @@ def _box(goal: Region, regions: Sequence[Region], start: tuple[float, float, flo
         room *= 2.0
 
 
-def _clearance(region: Region, point: Sequence[float]) -> float:
-    return float(evaluated([region], point)[2][0])
+def _clearance(region: Region, scenario: Scenario) -> float:
+    return float(evaluated([region], scenario.initial.position, scenario.initial.quaternion)[2][0])
 
 
-def _start(region: Region, start: tuple[float, float, float]) -> Finding:
-    clearance = _clearance(region, start)
-    _, (gradient,), _ = evaluated([region], start)
-    slope = float(np.linalg.norm(gradient))
-    outside = np.array(start) + (clearance / slope * gradient if slope else 0.0)
-    text = f"The start violates {region.name} by {-clearance:.3f} m."
+def _start(region: Region, scenario: Scenario) -> Finding:
+    start = scenario.initial.position
+    _, (gradient,), (clearance,) = evaluated([region], start, scenario.initial.quaternion)
+    turned = of_attitude(region.shape)
+    text = f"The start violates {region.name} by {-clearance:.3f} {'rad' if turned else 'm'}."
+    name, numbers = f"start, {region.name}", {"clearance": float(clearance)}
     if not region.hard:
         text += " It is soft: it pushes, and may be violated."
-        return Finding("regions", f"start, {region.name}", "note", text, numbers={"clearance": clearance})
-    to = f"to about {_point(outside)}" if slope else f"by {-clearance:.3f} m, to any side"
-    advice = f"Move initial.position {to}, or {region.name} away from it."
-    return Finding("regions", f"start, {region.name}", "fails", text, advice, {"clearance": clearance})
+        return Finding("regions", name, "note", text, numbers=numbers)
+    slope = float(np.linalg.norm(gradient))
+    if turned:
+        advice = f"Turn initial.quaternion, and law.desired_quaternion with it, by at least {-clearance:.3f} rad."
+    elif slope > 0.0:
+        to = np.array(start) + clearance / slope * gradient
+        advice = f"Move initial.position to about {_point(to)}, or {region.name} away from it."
+    else:
+        advice = f"Move initial.position by {-clearance:.3f} m, to any side, or {region.name} away from it."
+    return Finding("regions", name, "fails", text, advice, numbers)
 
 
 def _common(goal: Region, regions: Sequence[Region], low: Array, high: Array, moving: str) -> Iterator[Finding]:
@@ -124,10 +131,13 @@ def _between(regions: Sequence[Region], low: Array, high: Array) -> Iterator[Fin
 
 
 def _way(
-    goal: Region, regions: Sequence[Region], start: tuple[float, float, float], low: Array, high: Array
+    goal: Region,
+    kept: Sequence[Region],
+    left_out: Sequence[str],
+    start: tuple[float, float, float],
+    low: Array,
+    high: Array,
 ) -> Finding:
-    kept = [region for region in regions if _clearance(region, start) >= 0.0]
-    left_out = [region.name for region in regions if region not in kept]
     exists, width = way_exists(kept, goal, start, low, high)
     but = f", {', '.join(left_out)} left aside (violated at the start)" if left_out else ""
     if exists:

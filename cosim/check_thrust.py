@@ -11,7 +11,6 @@ from scipy.optimize import brentq
 from controller import printed_law
 from controller.printed_law import primary_error, secondary_error
 from controller.quaternion import error, rotation_matrix
-from controller.regions import Region
 from controller.restoring import regressor
 from cosim.claims import newtons
 from cosim.finding import Finding, status
@@ -108,9 +107,9 @@ def asked_finding(scenario: Scenario, weights: Array) -> Finding:
         Of the body force alone, no moment beside it.
     """
     gains, initial, vehicle = scenario.law.gains, scenario.initial, true_vehicle(scenario)
-    (f,), (slope,), _ = evaluated([Region("goal", scenario.goal, "in")], initial.position)
+    (f,), (slope,), _ = evaluated([scenario.goal_region], initial.position, initial.quaternion)
     regions = [secondary.region for secondary in scenario.regions]
-    values, gradients, _ = evaluated(regions, initial.position)
+    values, gradients, _ = evaluated(regions, initial.position, initial.quaternion)
     betas = np.array([region.gain for region in regions]) * weights / gains.k_q
     quaternion, desired = np.array(initial.quaternion), np.array(scenario.law.desired_quaternion)
     R, turned = rotation_matrix(quaternion), error(desired, quaternion)

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.rcsetup import cycler
 from numpy.typing import NDArray
 
-from controller.regions import Region
+from controller.regions import Region, Visibility, of_attitude
 from cosim.record import Record
 from cosim.scenario import CRITERIA, Scenario
 from cosim.signals import Array
@@ -100,9 +100,81 @@ def regions_of(scenario: Scenario) -> Iterator[tuple[Region, str]]:
     (Region, str)
         The goal first.
     """
-    yield Region("goal", scenario.goal, "in"), GOAL_COLOUR
+    yield scenario.goal_region, GOAL_COLOUR
     for secondary in scenario.regions:
         yield secondary.region, CRITERION_COLOURS[secondary.criterion]
+
+
+@dataclass(frozen=True)
+class Place:
+    """A region in space, where it was at some time."""
+
+    region: Region
+    colour: str
+    shift: Array  # (3,) m, NED, from where the scenario has it
+    faint: bool  # where it came from
+
+
+def places_of(story: Story) -> Iterator[Place]:
+    """Yield where the goal and the regions were at the end, and before it, faint, where those that move began.
+
+    Regions of attitude are at no place and left out.
+
+    Parameters
+    ----------
+    story : Story
+        The run.
+
+    Yields
+    ------
+    Place
+        The goal's first.
+    """
+    for region, colour in regions_of(story.scenario):
+        if of_attitude(region.shape):
+            continue
+        shifts = shifts_of(story, region.name)
+        if region.name in story.scenario.moving:
+            yield Place(region, colour, shifts[0], faint=True)
+        yield Place(region, colour, shifts[-1], faint=False)
+
+
+def features_of(story: Story) -> Iterator[tuple[str, str, Array]]:
+    """Yield name, colour and place [m, NED], shape (3,), of every feature that is to be seen, as it was at the end.
+
+    Parameters
+    ----------
+    story : Story
+        The run.
+
+    Yields
+    ------
+    (str, str, ndarray)
+        In the order of the regions.
+    """
+    for region, colour in regions_of(story.scenario):
+        if isinstance(region.shape, Visibility):
+            yield region.name, colour, np.array(region.shape.feature) + shifts_of(story, region.name)[-1]
+
+
+def shifts_of(story: Story, name: str) -> Array:
+    """Return how far a region was from where the scenario has it at each step, shape (steps, 3) [m, NED].
+
+    Parameters
+    ----------
+    story : Story
+        The run.
+    name : str
+        Of the region.
+
+    Returns
+    -------
+    ndarray, shape (steps, 3)
+        Zeros for one at rest.
+    """
+    if name not in story.scenario.moving:
+        return np.zeros((len(story.record["time"]), 3))
+    return story.record.stack([f"{name}.shift.{axis}" for axis in "xyz"])
 
 
 def overlap_of(story: Story) -> NDArray[np.bool_]:

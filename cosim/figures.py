@@ -58,6 +58,8 @@ def drawings(story: Story) -> Iterator[Drawing]:
     for name, caption, draw in figures:
         if name == "weights-overlap" and not story.summary["intersection_windows"]:
             continue
+        if name == "path-plane" and story.scenario.moving:
+            caption += " Those that moved are faint where they began, full where they ended."
         if name == "lyapunov" and not story.summary["lyapunov"]:
             continue
         if name == "thrusters":

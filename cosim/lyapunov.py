@@ -76,8 +76,8 @@ class LyapunovSignals:
         self._state, self._goal, self._regions = state, goal, regions
         self._weights, self._estimate, self._out = weights, estimate, out
         n = len(weights)
-        self._of_goal = np.empty(1), np.empty((1, 3)), np.empty(1)
-        self._of_regions = np.empty(n), np.empty((n, 3)), np.empty(n)
+        self._of_goal = np.empty(1), np.empty((1, 3)), np.empty((1, 3)), np.empty(1)
+        self._of_regions = np.empty(n), np.empty((n, 3)), np.empty((n, 3)), np.empty(n)
 
     def write(self) -> None:
         """Write V in its three forms, and its rate."""
@@ -86,7 +86,7 @@ class LyapunovSignals:
         R, turned = rotation_matrix(state.quaternion), error(self._desired, state.quaternion)
         region_rate = self._region_rate(R @ velocity[:3], betas)
         e_p, e_s = self._region_errors(state.position, betas)
-        f, (g, g_gradients, clearances) = self._of_goal[0][0], self._of_regions
+        f, (g, g_gradients, _, clearances) = self._of_goal[0][0], self._of_regions
         y = mapped_error(e_p, e_s, turned[1:], R, gains)
         alone = mapped_error(e_p, np.zeros(3), turned[1:], R, gains)
         value = primary_value(model, gains, f, turned, y, velocity, estimate)
@@ -111,8 +111,8 @@ class LyapunovSignals:
 
     def _region_errors(self, position: Array, betas: Array) -> tuple[Array, Array]:
         """Evaluate goal and regions at a position; return e_p and e_s, shape (3,) each."""
-        self._goal.evaluate(position, *self._of_goal)
-        self._regions.evaluate(position, *self._of_regions)
+        self._goal.evaluate(position, self._state.quaternion, *self._of_goal)
+        self._regions.evaluate(position, self._state.quaternion, *self._of_regions)
         (f, *_), (gradient, *_) = self._of_goal[:2]
         return primary_error(f, gradient), secondary_error(*self._of_regions[:2], betas)
 

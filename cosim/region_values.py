@@ -1,4 +1,4 @@
-"""What regions are at one position."""
+"""What regions are at one pose."""
 
 from __future__ import annotations
 
@@ -12,8 +12,10 @@ from controller.regions import Region, pack
 Array = NDArray[np.float64]
 
 
-def evaluated(regions: Sequence[Region], position: Sequence[float] | Array) -> tuple[Array, Array, Array]:
-    """Return what regions are at a position, as they are at time 0.
+def evaluated(
+    regions: Sequence[Region], position: Sequence[float] | Array, quaternion: Sequence[float]
+) -> tuple[Array, Array, Array]:
+    """Return what regions are at a pose, as they are at time 0.
 
     Parameters
     ----------
@@ -21,13 +23,16 @@ def evaluated(regions: Sequence[Region], position: Sequence[float] | Array) -> t
         n of them.
     position : sequence of float
         [m, NED].
+    quaternion : sequence of float
+        From body to world.
 
     Returns
     -------
     tuple of ndarray
-        Values, shape (n,), gradients, shape (n, 3), clearances, shape (n,) [m].
+        Values, shape (n,), gradients, shape (n, 3), clearances, shape (n,) [m], or [rad] for shapes of attitude.
     """
     n = len(regions)
-    result = np.empty(n), np.empty((n, 3)), np.empty(n)
-    pack(regions).evaluate(np.array(position, dtype=float), *result)
-    return result
+    values, gradients, turnings, clearances = np.empty(n), np.empty((n, 3)), np.empty((n, 3)), np.empty(n)
+    pose = np.array(position, dtype=float), np.array(quaternion, dtype=float)
+    pack(regions).evaluate(*pose, values, gradients, turnings, clearances)
+    return values, gradients, clearances

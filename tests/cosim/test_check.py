@@ -1,6 +1,5 @@
 """`cosim check`: every shipped scenario, the paper's figures, and advice that mends what it is given for."""
 
-import dataclasses
 import json
 import math
 import re
@@ -179,12 +178,28 @@ def test_thruster_that_cannot_be_missed_is_a_note():
 
 
 def test_other_laws_are_not_held_to_the_printed_laws_theory():
-    scenario = load_scenario("paper", [CLOSED])
-    other = dataclasses.replace(scenario, law=dataclasses.replace(scenario.law, name="another"))
-    result = check(other)
+    changes = ("law.name=deployable", "law.gains={}", "actuation.through=thrusters")
+    result = check(load_scenario("paper", [CLOSED, *changes]))
     assert result.holds
     (law,) = (finding for finding in result.findings if finding.topic == "law")
-    assert law.status == "note" and "not of this one (another)" in law.text
+    assert law.status == "note" and "not of this one (deployable)" in law.text
+
+
+def test_regions_of_attitude_close_no_place_but_can_be_violated_at_the_start():
+    view = (
+        "{name='view',criterion='shape',keep='in',gain=1,"
+        "shape={type='visibility',feature=[-9,0,1],camera_axis=[1,0,0],half_angle=0.5}}"
+    )
+    found = of_regions(f"regions=[{view}]", "intersection=[]")
+    start = found["start, view"]
+    assert start.status == "fails" and "rad" in start.text and "Turn initial.quaternion" in start.advice
+    assert start.numbers["clearance"] == pytest.approx(0.5 - math.pi)
+    assert "goal and regions" not in found and found["way"].status == "holds"
+
+
+def test_moving_regions_are_taken_as_they_are_first():
+    found = of_regions("regions.SR1.velocity=[0.1,0,0]")
+    assert "at time 0" in found["goal and regions"].text
 
 
 def test_no_regions():

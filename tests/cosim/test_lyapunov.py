@@ -135,6 +135,25 @@ def test_report_without_v_has_no_such_figure(tmp_path):
     assert not (done.folder / "figures" / "lyapunov.svg").exists()
 
 
+LOOKING = (
+    "{name='view',criterion='shape',keep='in',gain=1,"
+    "shape={type='visibility',feature=[9,0,5],camera_axis=[1,0,0],half_angle=0.5}}"
+)
+
+
+@pytest.mark.parametrize(
+    ("overrides", "words"),
+    [
+        (("law.name=deployable", "law.gains={}", "actuation.through=thrusters"), "printed law's"),
+        ((f"regions=[{LOOKING}]", "intersection=[]"), r"knows no attitude in regions \(\['view'\]\)"),
+    ],
+    ids=["another law", "a region of attitude"],
+)
+def test_v_is_refused_where_it_is_not_defined(overrides, words):
+    with pytest.raises(ScenarioError, match=words):
+        load_scenario("paper", [*QUICK, *overrides])
+
+
 def test_key_must_be_true_or_false():
     with pytest.raises(ScenarioError, match=r"record\.lyapunov"):
         load_scenario("paper", ["record.lyapunov=3"])

@@ -37,7 +37,7 @@ rng = np.random.default_rng(7)
 def evaluated(regions, position):
     n = len(regions)
     values, gradients, clearances = np.empty(n), np.empty((n, 3)), np.empty(n)
-    pack(regions).evaluate(np.asarray(position, float), values, gradients, clearances)
+    pack(regions).evaluate(np.asarray(position, float), DESIRED, values, gradients, np.empty((n, 3)), clearances)
     return values, gradients, clearances
 
 
