@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 from controller import Law
 from controller.regions import of_attitude
+from cosim.lyapunov import lyapunov_columns
 from cosim.scenario import CRITERIA, Scenario
 from cosim.signals import Column
 from plant_fmu import Channels, Plant
@@ -61,6 +62,7 @@ def columns_of(scenario: Scenario, plant: Plant, law: Law) -> list[Column]:
         ),
         *_sensed(scenario),
         *(Column(f"law.{d.name}", d.unit, d.description) for d in law.diagnostics),
+        *lyapunov_columns(scenario),
     ]
 
 

@@ -15,6 +15,7 @@ from cosim.drawing import (
     CRITERION_COLOURS,
     CYCLE,
     GOAL_COLOUR,
+    ORANGE,
     RED,
     Story,
     labels_of,
@@ -223,4 +224,30 @@ def estimates(story: Story) -> Figure:
     moment.set_ylabel("φ̂2 … φ̂4 [N m]")
     force.legend()
     moment.legend(ncols=3)
+    return figure
+
+
+def lyapunov(story: Story) -> Figure:
+    """Draw V in its three forms, and its rate."""
+    figure, axes = _zoomed(story, 4.6, 2)
+    forms = {form: story.record[f"lyapunov.{form}"] for form in ("printed", "normalised", "primary")}
+    labels = ("V as printed", "V, potential of the force", "V, primary region alone")
+    for label, V, colour, style in zip(labels, forms.values(), (ORANGE, BLUE, BLACK), ("-", "--", ":"), strict=True):
+        _curves(axes[0], story, {label: V}, color=colour, linestyle=style)
+    rate = story.record["lyapunov.rate"]
+    _curves(axes[1], story, {"dV/dt = −W": rate}, color=BLUE)
+    for row, signal, bad in ((axes[0], forms["normalised"], -1.0), (axes[1], rate, 1.0)):
+        largest, typical = float(np.abs(signal).max()), float(np.percentile(np.abs(signal), 50))
+        for ax in row:
+            if largest > 20.0 * max(typical, 1.0):  # the beginning would flatten all the rest
+                _symlog(ax, largest, max(typical, 1e-3 * largest))
+            else:
+                ax.set_ylim(1.1 * min(0.0, float(signal.min())) - 0.05 * largest, 1.1 * largest)
+            limits = ax.get_ylim()
+            ax.axhspan(0.0, limits[0] if bad < 0.0 else limits[1], color=RED, alpha=0.06, linewidth=0)
+            ax.set_ylim(limits)
+            ax.axhline(0.0, color=BLACK, linewidth=0.8)
+    axes[0, 0].set_ylabel("V [N m]")
+    axes[1, 0].set_ylabel("dV/dt = −W [W]")
+    _legend(figure, axes[0, 0], 3)
     return figure

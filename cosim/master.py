@@ -16,6 +16,7 @@ import numpy as np
 
 from controller import LAWS, Allocation, Law, VehicleState
 from cosim.columns import columns_of
+from cosim.lyapunov import LyapunovSignals
 from cosim.scenario import CRITERIA, Scenario
 from cosim.sensing import Sensor
 from cosim.signals import Array, Signals
@@ -128,6 +129,11 @@ class Master:
         inputs = s.view("thrust[1]", len(self.plant.inputs))
         self._thrusts, self._wrench = inputs[:n_thrusters], inputs[n_thrusters:]
         self._inputs = inputs
+        self._lyapunov: LyapunovSignals | None = None
+        if self.scenario.record.lyapunov:
+            out = s.view("lyapunov.printed", 4)
+            goal, regions, weights = self.surroundings.goal, self.surroundings.regions, self._weights_of_regions
+            self._lyapunov = LyapunovSignals(self.scenario, truth, goal, regions, weights, self._estimate, out)
 
     def run(self, observers: Sequence[Observer] = (), rate: float | None = None) -> None:
         """Step from time 0 to the end, once, telling the observers of each step.
@@ -161,6 +167,8 @@ class Master:
             if k % scenario.control_every == 0:
                 self._control()
                 self._actuate()
+            if self._lyapunov is not None:
+                self._lyapunov.write()
             if k < last:
                 self._advance(step)
             self._boundary = (k + 1) * step

@@ -32,6 +32,7 @@ _UNITS = {
     **{f"estimate_{which}": " [N; N m]" for which in ("final", "true", "lowest", "highest")},
     "max_speed": " [m/s]",
     "effort": " [N s]",
+    "lyapunov": " [N m; s]",
     "wall_time": " [s]",
 }
 

@@ -24,6 +24,7 @@ from cosim.scenario_check import (
     check_law,
     check_numbers,
     check_parameters,
+    check_record,
     check_regions,
     check_time,
     multiple,
@@ -39,6 +40,7 @@ from cosim.scenario_tables import (
     LawSetup,
     Limit,
     PlantSetup,
+    RecordSetup,
     SecondaryRegion,
     Sensing,
     Time,
@@ -74,6 +76,7 @@ class Scenario:
     actuation: Actuation
     sensing: Sensing
     failures: tuple[Failure, ...]
+    record: RecordSetup
     tell_failures: bool  # the law is told of them when they happen
     goal: Shape  # the primary region, kept within, at time 0
     goal_velocity: Vector3  # m/s, NED
@@ -158,6 +161,7 @@ def _check(table: dict[str, Any], name: str) -> Scenario:
     check_parameters(file.plant.parameters, vehicle)
     law = check_law(file.law, file.actuation.through, vehicle, time.control, len(regions))
     check_failures(file.failures, file.actuation.through, vehicle)
+    check_record(file.record, law, regions)
 
     filled = dataclasses.replace(
         file,
@@ -183,6 +187,7 @@ def _check(table: dict[str, Any], name: str) -> Scenario:
         actuation=file.actuation,
         sensing=file.sensing,
         failures=file.failures,
+        record=file.record,
         tell_failures=file.tell_failures,
         goal=goal,
         goal_velocity=goal_velocity,

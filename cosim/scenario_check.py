@@ -18,6 +18,7 @@ from cosim.scenario_tables import (
     LawEntry,
     LawSetup,
     Limit,
+    RecordSetup,
     RegionEntry,
     SecondaryRegion,
     Sensing,
@@ -94,6 +95,15 @@ def check_failures(failures: tuple[Failure, ...], through: str, vehicle: Vehicle
         known = 1 <= failure.thruster <= vehicle.n_thrusters
         _require(known, f"failures.{i}.thruster", failure.thruster, f"1 to {vehicle.n_thrusters}")
         _require(0.0 <= failure.time < math.inf, f"failures.{i}.time", failure.time, "0 s or above")
+
+
+def check_record(record: RecordSetup, law: LawSetup, regions: tuple[SecondaryRegion, ...]) -> None:
+    """Raise `ScenarioError` unless what is recorded is defined for the law and the regions."""
+    if not record.lyapunov:
+        return
+    _require(law.name == "printed", "record.lyapunov", "true", "false: V of (31) is the printed law's")
+    names = [r.region.name for r in regions if of_attitude(r.region.shape)]
+    _require(not names, "record.lyapunov", "true", f"false: the analysis knows no attitude in regions ({names})")
 
 
 def check_goal(table: dict[str, Any]) -> tuple[Shape, Vector3, bool]:

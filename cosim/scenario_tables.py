@@ -89,6 +89,13 @@ class Sensing:
         return not noisy and (self.dead_for == 0.0 or self.dead_from == math.inf)
 
 
+@dataclass(frozen=True)
+class RecordSetup:
+    """What a run records beyond its signals."""
+
+    lyapunov: bool = False  # V of (31) and its rate, with the printed law
+
+
 # ---- as they stand in the file -------------------------------------------------------------------------------------
 
 
@@ -144,6 +151,7 @@ class File:
     actuation: Actuation = Actuation()
     sensing: Sensing = Sensing()
     failures: tuple[Failure, ...] = ()
+    record: RecordSetup = RecordSetup()
     regions: tuple[RegionEntry, ...] = ()
 
 

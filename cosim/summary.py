@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controller.regions import of_attitude
+from cosim.lyapunov import summarise_lyapunov
 from cosim.record import Record
 from cosim.scenario import CRITERIA, Scenario
 from cosim.signals import Array
@@ -106,6 +107,7 @@ def summarise(scenario: Scenario, record: Record, status: str, wall_time: float 
         "estimate_true": scenario.true_restoring_parameters.tolist(),
         "estimate_lowest": [float(record[f"estimate.phi{i}"].min()) for i in range(1, 5)],
         "estimate_highest": [float(record[f"estimate.phi{i}"].max()) for i in range(1, 5)],
+        "lyapunov": summarise_lyapunov(record),
         "steps": len(time) - 1,
         "wall_time": wall_time,
         "real_time_factor": simulated / wall_time if wall_time else None,

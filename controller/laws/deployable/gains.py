@@ -12,11 +12,11 @@ class DeployableGains(NamedTuple):
     """Gains of the deployable law; all are choices of this project, none is from the paper."""
 
     # attraction
-    speed: float = 0.8  # m/s, greatest over ground
-    acceleration: float = 0.2  # m/s2, with which the attraction speeds up and brakes
+    speed: float = 1.2  # m/s, greatest over ground
+    acceleration: float = 0.3  # m/s2, with which the attraction speeds up and brakes
     velocity_bandwidth: float = 1.2  # rad/s, of the loop that follows the wanted velocity
-    position_bandwidth: float = 0.4  # 1/s, of the approach to the end of the way
-    depth: float = 0.2  # m, how far inside the goal region the way ends, where the region is that deep
+    position_bandwidth: float = 0.8  # 1/s, of the approach to the end of the way
+    depth: float = 0.3  # m, how far inside the goal region the way ends, where the region is that deep
     attitude_bandwidth: float = 2.0  # rad/s
     # barriers
     margin: float = 0.03  # m, kept of hard regions beside what the estimate's error asks for

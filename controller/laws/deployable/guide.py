@@ -2,10 +2,10 @@
 
 A potential alone leads into pockets between obstacles. So the law keeps a way of up to a few corners, and each period
 tries one change to it: a corner moved, added or dropped, the end put elsewhere in the goal region. The cheaper way
-stays. The cost is the length, and more where the way passes closer to a hard region than it should, each region taken to
-where it will be when the vehicle comes by. One change a period makes the cost of a step constant; the random numbers are
-the law's own, so that a run repeats bit for bit. The way only says where to go: what keeps the vehicle out of the
-regions are the barriers, whatever the way.
+stays. The cost is the length, and more where the way passes closer to a hard region than it should, each region taken
+to where it will be when the vehicle comes by. One way a period makes the cost of a step bounded; the random numbers are
+the law's own, so that a run repeats bit for bit. The way only says where to go: what keeps the vehicle out of the regions
+are the barriers, whatever the way.
 """
 
 from __future__ import annotations
@@ -18,18 +18,28 @@ from numpy.typing import NDArray
 from controller.compiled import compiled
 from controller.laws.deployable.gains import DeployableGains
 from controller.laws.deployable.linear_algebra import norm
-from controller.regions import PackedRegions, clearance_at, evaluate_packed
+from controller.regions import (
+    PackedRegions,
+    Orientation,
+    Sphere,
+    clearance_of_place,
+    clearance_of_sphere,
+    evaluate_packed,
+)
 
 Array = NDArray[np.float64]
 
 CORNERS = 4  # at most
 _SAMPLES = 64  # evaluations of the regions a way at most
 _STRIDE = (0.08, 0.6)  # m, least and greatest distance between two
+_TRUST = 0.7  # of the clearance beyond the wanted one, that is gone before looking again
 _INSIDE = 40.0  # m of way that a metre within a hard region costs
 _NEAR = 3.0  # m of way that a metre on the surface costs
 _BETTER = 0.03  # m, and
 _BETTER_PART = 0.01  # of its cost, that a new way must save to be taken
 _PASSED = 0.25  # m from a corner, within which it counts as passed
+_SPHERE = Sphere.kind
+_ATTITUDE = Orientation.kind  # shapes from it on close no place
 _ROOM = 2.5  # m beyond start and end in which corners are looked for
 
 
@@ -40,14 +50,24 @@ class Guide(NamedTuple):
     other: Array  # (CORNERS + 1, 3)
     count: NDArray[np.int64]  # (2,) points of way and other, the end included; 0: none yet
     cost: Array  # (1,) of the way
+    far_until: Array  # (n,) room for `cost_of`
+    tried: NDArray[np.int64]  # (1,) whose turn it is: 0 of the way itself, 1 of a changed one
     random: NDArray[np.uint64]  # (1,) state of the generator
 
 
-def guide_of_nothing(seed: int) -> Guide:
-    """Return a guide without a way, whose random numbers follow from a seed."""
+def guide_of_nothing(n_regions: int, seed: int) -> Guide:
+    """Return a guide without a way among `n_regions`, whose random numbers follow from a seed."""
     n = CORNERS + 1
     state = np.array([seed * 2 + 0x9E3779B97F4A7C15], dtype=np.uint64)
-    return Guide(np.zeros((n, 3)), np.zeros((n, 3)), np.zeros(2, dtype=np.int64), np.zeros(1), state)
+    return Guide(
+        np.zeros((n, 3)),
+        np.zeros((n, 3)),
+        np.zeros(2, dtype=np.int64),
+        np.zeros(1),
+        np.zeros(n_regions),
+        np.zeros(1, dtype=np.int64),
+        state,
+    )
 
 
 @compiled
@@ -68,21 +88,37 @@ def _spread(random: NDArray[np.uint64]) -> float:
 
 
 @compiled
-def room_ahead(regions: PackedRegions, point: Array, later: float) -> float:
-    """Return the least clearance [m] of all hard regions at a point, shape (3,), `later` [s] from now."""
-    least, at = np.inf, np.empty(3)
-    for i in range(regions.kinds.size):
-        if regions.hard[i]:
-            for axis in range(3):
-                at[axis] = point[axis] - regions.velocities[i, axis] * later
-            least = min(least, clearance_at(regions, i, at))
-    return least
+def cost_of(
+    way: Array, count: int, start: Array, regions: PackedRegions, far_until: Array, gains: DeployableGains
+) -> float:
+    """Return what a way costs, in metres.
 
+    A clearance changes by no more than the way between: a region found far away is not looked at before it could have
+    come near.
 
-@compiled
-def cost_of(way: Array, count: int, start: Array, regions: PackedRegions, gains: DeployableGains) -> float:
-    """Return what a way costs, in metres."""
-    total, travelled, samples, point = 0.0, 0.0, 0, np.empty(3)
+    Parameters
+    ----------
+    way : ndarray, shape (CORNERS + 1, 3)
+        Points [m, NED].
+    count : int
+        How many of them count.
+    start : ndarray, shape (3,)
+        Where the way begins [m, NED].
+    regions : PackedRegions
+        The n regions.
+    far_until : ndarray, shape (n,)
+        Room for the length of way until which each region is far.
+    gains : DeployableGains
+        Clearance wanted, margin, speed.
+
+    Returns
+    -------
+    float
+        [m].
+    """
+    enough = gains.clearance + _STRIDE[1] / _TRUST  # m, of clearance: more makes no difference
+    far_until[:] = 0.0
+    total, travelled, samples, point, room = 0.0, 0.0, 0, np.empty(3), np.empty(3)
     for leg in range(count):
         begin = start if leg == 0 else way[leg - 1]
         length = np.sqrt((way[leg, 0] - begin[0]) ** 2 + (way[leg, 1] - begin[1]) ** 2 + (way[leg, 2] - begin[2]) ** 2)
@@ -92,10 +128,25 @@ def cost_of(way: Array, count: int, start: Array, regions: PackedRegions, gains:
             if samples == _SAMPLES:
                 return total + _INSIDE * (length - s)  # what was not looked at is not trusted
             samples += 1
-            for axis in range(3):
-                point[axis] = begin[axis] + (way[leg, axis] - begin[axis]) * (s / length)
-            free = room_ahead(regions, point, (travelled + s) / gains.speed)
-            stride = min(max(0.7 * (free - gains.clearance), _STRIDE[0]), _STRIDE[1], length - s + 1e-9)
+            gone = travelled + s
+            free = enough
+            for i in range(regions.kinds.size):
+                if gone >= far_until[i] and regions.hard[i]:
+                    own = 0.0  # m/s, of the region
+                    for axis in range(3):
+                        at = begin[axis] + (way[leg, axis] - begin[axis]) * (s / length)
+                        point[axis] = at - regions.velocities[i, axis] * gone / gains.speed
+                        own += abs(regions.velocities[i, axis])
+                    if regions.kinds[i] == _SPHERE:
+                        clearance = clearance_of_sphere(regions, i, point)
+                    elif regions.kinds[i] < _ATTITUDE:
+                        clearance = clearance_of_place(regions, i, point, room)
+                    else:
+                        clearance = enough
+                    if clearance >= enough:
+                        far_until[i] = gone + (clearance - enough) / (1.0 + own / gains.speed)
+                    free = min(free, clearance)
+            stride = min(max(_TRUST * (free - gains.clearance), _STRIDE[0]), _STRIDE[1], length - s + 1e-9)
             lack = gains.clearance - free
             if lack > 0.0:
                 total += stride * _NEAR * (lack / gains.clearance) ** 2
@@ -127,7 +178,7 @@ def improve(
     guide: Guide, start: Array, goal: PackedRegions, regions: PackedRegions, gains: DeployableGains, period: float
 ) -> None:
     """Keep the way up with vehicle and regions, and try one change to it."""
-    way, other, random = guide.way, guide.other, guide.random
+    way, other = guide.way, guide.other
     if guide.count[0] == 0:
         guide.count[0] = 1
         nearest_end(goal, start, gains.depth, way[0])
@@ -138,11 +189,14 @@ def improve(
         for i in range(guide.count[0] - 1):
             way[i] = way[i + 1]
         guide.count[0] -= 1
-    guide.cost[0] = cost_of(way, guide.count[0], start, regions, gains)
-
-    if not _change(guide, start, goal, gains):
+    # one way a period: the present one and a changed one by turns
+    if guide.tried[0] == 0:
+        guide.tried[0] = 1
+        guide.cost[0] = cost_of(way, guide.count[0], start, regions, guide.far_until, gains)
         return
-    cost = cost_of(other, guide.count[1], start, regions, gains)
+    guide.tried[0] = 0
+    _change(guide, start, goal, gains)
+    cost = cost_of(other, guide.count[1], start, regions, guide.far_until, gains)
     if cost < guide.cost[0] - _BETTER - _BETTER_PART * guide.cost[0]:
         way[:, :] = other
         guide.count[0] = guide.count[1]
@@ -155,8 +209,8 @@ def _distance(a: Array, b: Array) -> float:
 
 
 @compiled
-def _change(guide: Guide, start: Array, goal: PackedRegions, gains: DeployableGains) -> bool:
-    """Write a changed way into `other`; False if this change cannot be."""
+def _change(guide: Guide, start: Array, goal: PackedRegions, gains: DeployableGains) -> None:
+    """Write a changed way into `other`."""
     way, other, random = guide.way, guide.other, guide.random
     other[:, :] = way
     count = guide.count[0]
@@ -199,4 +253,3 @@ def _change(guide: Guide, start: Array, goal: PackedRegions, gains: DeployableGa
             other[0, axis] = low + uniform(random) * (high - low)
         count = 2
     guide.count[1] = count
-    return True

@@ -335,7 +335,7 @@ class DeployableLaw(CompiledLaw):
             observed=estimate_of_nothing(),
             attitude=attitude_of(desired),
             suspicion=suspicion_of(m),
-            guide=guide_of_nothing(_SEED),
+            guide=guide_of_nothing(n_regions, _SEED),
             sight=sight_of(n_regions),
             program=workspace(n_regions, m),
             quaternion=desired.copy(),

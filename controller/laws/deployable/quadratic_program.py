@@ -111,13 +111,13 @@ def solve(work: Workspace, barriers: int, inverse: Array, lower: Array, upper: A
     for i in range(barriers):
         for j in range(m):
             total = 0.0
-            for l in range(m):
-                total += inverse[j, l] * work.rows[i, l]
+            for q in range(m):
+                total += inverse[j, q] * work.rows[i, q]
             work.shaped[i, j] = total
     for j in range(m):
-        for l in range(m):
-            work.shaped[barriers + 2 * j, l] = inverse[j, l]
-            work.shaped[barriers + 2 * j + 1, l] = -inverse[j, l]
+        for q in range(m):
+            work.shaped[barriers + 2 * j, q] = inverse[j, q]
+            work.shaped[barriers + 2 * j + 1, q] = -inverse[j, q]
 
     forces[:] = work.wanted
     count, steps, most = 0, 0, 3 * n
@@ -195,8 +195,8 @@ def _minimum(work: Workspace, count: int) -> bool:
             if a == b:
                 total += work.price[i]
                 whole = total
-            for l in range(b):
-                total -= L[a, l] * L[b, l]
+            for q in range(b):
+                total -= L[a, q] * L[b, q]
             if a == b:
                 if not total > 1e-12 * whole:
                     return False
@@ -205,12 +205,12 @@ def _minimum(work: Workspace, count: int) -> bool:
                 L[a, b] = total / L[b, b]
     for a in range(count):
         total = work.residual[work.passive[a]]
-        for l in range(a):
-            total -= L[a, l] * work.trial[l]
+        for q in range(a):
+            total -= L[a, q] * work.trial[q]
         work.trial[a] = total / L[a, a]
     for a in range(count - 1, -1, -1):
         total = work.trial[a]
-        for l in range(a + 1, count):
-            total -= L[l, a] * work.trial[l]
+        for q in range(a + 1, count):
+            total -= L[q, a] * work.trial[q]
         work.trial[a] = total / L[a, a]
     return True
