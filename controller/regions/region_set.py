@@ -243,6 +243,15 @@ def clearance_of_sphere(regions: PackedRegions, i: int, position: Array) -> floa
     return -regions.signs[i] * (math.sqrt(x * x + y * y + z * z) - regions.numbers[first + 3])
 
 
+@compiled
+def attitude_clearance(regions: PackedRegions, i: int, position: Array, quaternion: Array) -> tuple[float, Array]:
+    """Return the clearance [rad] of region `i`, of attitude, at a pose, and its slope over a turn in body axes, (3,)."""
+    numbers = regions.numbers[regions.offsets[i] : regions.offsets[i + 1]]
+    at, sign = position - regions.shifts[i], regions.signs[i]
+    g, _, _, _, x, y, z = _evaluate_shape_of_attitude(regions.kinds[i], at, quaternion, numbers)
+    return -sign * g, np.array([-sign * x, -sign * y, -sign * z])
+
+
 def clearances_at(points: Array, region: Region) -> Array:
     """Return the clearance of a region at many points, as it is at time 0.
 

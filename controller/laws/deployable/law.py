@@ -24,7 +24,7 @@ from controller.laws.deployable import attitude as attitude_loop
 from controller.laws.deployable import failure, guide, model, observer, quadratic_program
 from controller.laws.deployable.attitude import Attitude, attitude_of
 from controller.laws.deployable.attraction import wanted_acceleration, wanted_velocity
-from controller.laws.deployable.barrier import Sight, look, sight_of, write_rows
+from controller.laws.deployable.barrier import Motion, Sight, look, sight_of, write_rows
 from controller.laws.deployable.braking import least_forces
 from controller.laws.deployable.failure import Suspicion, suspicion_of
 from controller.laws.deployable.gains import DeployableGains, check_gains
@@ -33,11 +33,12 @@ from controller.laws.deployable.model import Dynamics, Thrusters, dynamics_of, t
 from controller.laws.deployable.observer import Estimate, estimate_of_nothing
 from controller.laws.deployable.quadratic_program import Workspace, workspace
 from controller.quaternion import rotation_matrix
-from controller.regions import PackedRegions
+from controller.regions import Orientation, PackedRegions
 
 _SPREADS = 3.0  # standard deviations of the position that the margin adds
 _STALE = 0.15  # s without a valid measurement, after which the vehicle is brought to a stop
 _SEED = 1
+_ATTITUDE = Orientation.kind  # shapes from it on depend on attitude
 
 DIAGNOSTICS = (
     Diagnostic("position.x", "m", "Estimated position, north"),
@@ -121,12 +122,15 @@ def step(
     wanted_acceleration(wanted, seen.velocity, gains, acceleration)
 
     # wanted wrench
-    free, wrench = np.empty(3), np.empty(6)
+    free, wrench, velocity = np.empty(6), np.empty(6), np.empty(6)
     model.free_acceleration(dynamics, R, seen.velocity, memory.omega, seen.water, seen.restoring[0], free)
-    look(memory.sight, regions, seen.position, memory.quaternion, seen.velocity)
-    acceleration -= free
+    attitude_loop.free_turning(memory.attitude, dynamics, memory.quaternion, memory.omega, free[3:])
+    velocity[:3], velocity[3:] = seen.velocity, memory.omega
+    look(memory.sight, regions, seen.position, memory.quaternion, velocity)
+    acceleration -= free[:3]
     _force_of(dynamics, R, acceleration, wrench)
     _soft_forces(memory.sight, regions, weights, R, dynamics, wrench)
+    attitude_loop.aim(memory.attitude, regions, seen.position, gains, period)
     attitude_loop.moment(memory.attitude, dynamics, memory.quaternion, memory.omega, gains, wrench[3:])
     work = memory.program
     for j in range(forces.size):
@@ -135,14 +139,16 @@ def step(
             work.wanted[j] += thrusters.allocator[j, k] * wrench[k]
 
     # barriers
-    push = _push(dynamics, thrusters, R)
-    braking = gains.braking_share * _braking(dynamics, thrusters)
-    margin = gains.margin + _SPREADS * observer.position_spread(seen)
-    mass = dynamics.translational_mass[0]
-    rows = write_rows(
-        work, memory.sight, regions, weights, seen.velocity, free, push, thrusters.lower, thrusters.upper, mass,
-        braking, margin, gains,
-    )  # fmt: skip
+    motion = Motion(
+        velocity,
+        free,
+        _push(dynamics, thrusters, R),
+        dynamics.translational_mass[0],
+        (dynamics.mass[3, 3] + dynamics.mass[4, 4] + dynamics.mass[5, 5]) / 3.0,
+        gains.braking_share * _braking(dynamics, thrusters),
+        _SPREADS * observer.position_spread(seen),
+    )
+    rows = write_rows(work, memory.sight, regions, weights, motion, thrusters.lower, thrusters.upper, gains)
 
     # quadratic program
     steps = quadratic_program.solve(work, rows, thrusters.inverse, thrusters.lower, thrusters.upper, forces)
@@ -214,10 +220,13 @@ def _force_of(dynamics: Dynamics, R: Array, acceleration: Array, out: Array) -> 
 def _soft_forces(
     sight: Sight, regions: PackedRegions, weights: Array, R: Array, dynamics: Dynamics, wrench: Array
 ) -> None:
-    """Add the push of violated soft regions, -alpha_i g_i grad g_i / |grad g_i| (22), each at most what can be braked."""
+    """Add the push of violated soft regions of place (22), -alpha_i g_i grad g_i / |grad g_i|.
+
+    Each at most what the thrusters can always give.
+    """
     most = dynamics.translational_mass[0] * _least(dynamics.braking)
     for i in range(regions.kinds.size):
-        if regions.hard[i] or not sight.values[i] > 0.0:
+        if regions.hard[i] or not sight.values[i] > 0.0 or regions.kinds[i] >= _ATTITUDE:
             continue
         size = np.sqrt(sight.gradients[i, 0] ** 2 + sight.gradients[i, 1] ** 2 + sight.gradients[i, 2] ** 2)
         if not size > 0.0:
@@ -230,16 +239,19 @@ def _soft_forces(
 
 @compiled
 def _push(dynamics: Dynamics, thrusters: Thrusters, R: Array) -> Array:
-    """Return the acceleration of one newton of each thruster, world frame, shape (3, m)."""
+    """Return the acceleration of one newton of each thruster, shape (6, m), as `barrier.Motion` has it."""
     m = thrusters.health.size
-    push = np.zeros((3, m))
+    push = np.zeros((6, m))
     for j in range(m):
-        for i in range(3):
+        for i in range(6):
             body = 0.0
             for k in range(6):
                 body += dynamics.inverse_mass[i, k] * thrusters.matrix[k, j]
-            for axis in range(3):
-                push[axis, j] += R[axis, i] * body
+            if i >= 3:
+                push[i, j] = body
+            else:
+                for axis in range(3):
+                    push[axis, j] += R[axis, i] * body
     return push
 
 
