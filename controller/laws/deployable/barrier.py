@@ -60,7 +60,7 @@ class Motion(NamedTuple):
     mass: float  # kg
     inertia: float  # kg m2, mean
     braking: float  # m/s2 that may be relied on
-    spread: float  # m, standard deviation of the position
+    spread: float  # m, by which the position may be off: of the estimate, and between two steps
 
 
 def sight_of(n: int) -> Sight:

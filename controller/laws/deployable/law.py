@@ -76,6 +76,8 @@ class DeployableMemory(NamedTuple):
     program: Workspace
     quaternion: Array  # (4,) last valid
     omega: Array  # (3,) last valid [rad/s]
+    blindness: Array  # (1,) s since attitude and rates were last valid
+    told: Array  # (m,) health of the thrusters as last told
 
 
 @compiled
@@ -95,22 +97,18 @@ def step(
     _keep_attitude(memory, state)
     R = rotation_matrix(memory.quaternion)
     measured = _observe(memory, state, R, gains)
-    if seen.silence[0] < 0.0 or seen.silence[0] > gains.coast:  # nothing known: drift
+    lost = seen.silence[0] < 0.0 or seen.silence[0] > gains.coast or memory.blindness[0] > gains.coast
+    if lost:  # nothing is known any more: drift
         forces[:] = 0.0
         thrusters.forces[:] = 0.0
         memory.report[15] = seen.silence[0]
         return
 
     # failed thrusters
-    failed = -1
-    for j in range(thrusters.health.size):
-        if state.thruster_health[j] == 0.0 and thrusters.health[j] != 0.0:
-            failed = j
-    if failed < 0:
-        residual = memory.attitude.residual
-        failed = failure.suspect(memory.suspicion, seen, residual, dynamics, thrusters, R, gains, period, measured)
-    if failed >= 0:
-        failure.give_up(memory.suspicion, thrusters, failed)
+    failed = failure.suspect(
+        memory.suspicion, seen, memory.attitude.residual, dynamics, thrusters, R, gains, period, measured
+    )
+    if _heed(memory, state.thruster_health, failed):
         model.share_out(thrusters)
         observer.doubt(seen, 0.01)
 
@@ -146,7 +144,7 @@ def step(
         dynamics.translational_mass[0],
         (dynamics.mass[3, 3] + dynamics.mass[4, 4] + dynamics.mass[5, 5]) / 3.0,
         gains.braking_share * _braking(dynamics, thrusters),
-        _SPREADS * observer.position_spread(seen),
+        _SPREADS * observer.position_spread(seen) + 0.5 * gains.acceleration * period**2,
     )
     rows = write_rows(work, memory.sight, regions, weights, motion, thrusters.lower, thrusters.upper, gains)
 
@@ -154,6 +152,26 @@ def step(
     steps = quadratic_program.solve(work, rows, thrusters.inverse, thrusters.lower, thrusters.upper, forces)
     thrusters.forces[:] = forces
     _report(memory, wanted, rows, steps)
+
+
+@compiled
+def _heed(memory: DeployableMemory, told: Array, failed: int) -> bool:
+    """Take in which thrusters are told to have failed, or to work again, and one found to have failed, -1 for none.
+
+    Returns
+    -------
+    bool
+        Whether the thrusters at hand are others than before.
+    """
+    health, changed = memory.thrusters.health, False
+    if failed >= 0:
+        failure.give_up(memory.suspicion, memory.thrusters, failed)
+        changed = True
+    for j in range(told.size):
+        if told[j] != memory.told[j] or (told[j] == 0.0 and health[j] != 0.0):
+            health[j] = memory.told[j] = told[j]
+            changed = True
+    return changed
 
 
 @compiled
@@ -167,6 +185,9 @@ def _keep_attitude(memory: DeployableMemory, state: VehicleState) -> None:
     if abs(size - 1.0) < 1e-2 and np.isfinite(rates):
         memory.quaternion[:] = state.quaternion / np.sqrt(size)
         memory.omega[:] = state.velocity_body[3:]
+        memory.blindness[0] = 0.0
+    else:
+        memory.blindness[0] += memory.period[0]
 
 
 @compiled
@@ -352,6 +373,8 @@ class DeployableLaw(CompiledLaw):
             program=workspace(n_regions, m),
             quaternion=desired.copy(),
             omega=np.zeros(3),
+            blindness=np.zeros(1),
+            told=np.ones(m),
         )
 
     @classmethod
