@@ -2,6 +2,7 @@
 
 import pytest
 
+from cosim.record import load_record
 from cosim.report import verdict
 from cosim.run import run_scenario
 from cosim.scenario import load_scenario
@@ -36,6 +37,14 @@ def test_the_view_asks_for_something(tmp_path):
     free = load_scenario("pipe-inspection", ["regions.view.shape.half_angle=3.0", "time.duration=15.0"])
     least = run_scenario(free, tmp_path / "run", report=False).summary["min_clearance"]["view"]
     assert 3.0 - least > shipped + 0.1
+
+
+def test_the_failed_thruster_is_found_untold(tmp_path):
+    run = run_scenario(load_scenario("dense-field", ["time.duration=15.0"]), tmp_path / "run", report=False)
+    record = load_record(run.folder)
+    given_up = record["law.failed_thruster"]
+    assert not given_up[record["time"] < 10.0].any()
+    assert set(given_up[record["time"] > 12.0]) == {2.0}
 
 
 def test_the_paper_scene_is_the_papers():
