@@ -27,7 +27,7 @@ Array = NDArray[np.float64]
 
 _ATTITUDE = Orientation.kind  # shapes from it on depend on attitude
 _RETURN = 0.2  # 1/s, at which the held attitude goes back to the preferred one
-_TURN = 2.0  # 1/s, at which it turns to where a region has comfort
+_TURN = 4.0  # 1/s, at which it turns to where a region has comfort
 
 
 class Attitude(NamedTuple):

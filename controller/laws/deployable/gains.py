@@ -21,7 +21,7 @@ class DeployableGains(NamedTuple):
     # attitude asked for by regions
     comfort: float = 0.15  # rad, clearance that a region of attitude has where the held attitude heeds it
     tilt: float = 0.35  # rad, greatest from the vertical that a region may ask for
-    turning_rate: float = 0.4  # rad/s, greatest of the held attitude
+    turning_rate: float = 0.6  # rad/s, greatest of the held attitude
     turning_deceleration: float = 0.5  # rad/s2, relied on by barriers of attitude
     # barriers
     margin: float = 0.03  # m, kept of hard regions beside what the estimate's error asks for
