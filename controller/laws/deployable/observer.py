@@ -49,7 +49,7 @@ def estimate_of_nothing() -> Estimate:
         restoring=np.zeros(1),
         covariance=np.zeros((3, 3, 3)),
         innovation=np.zeros(3),
-        spread=np.zeros(3),
+        spread=np.ones(3),
         gain=np.zeros(3),
         silence=np.array([-1.0]),
         last_measured=np.full(6, np.nan),
