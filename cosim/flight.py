@@ -239,17 +239,13 @@ def flight_of(law: str) -> Callable[..., Score]:
     return _compiled(law, chosen)
 
 
-def plain_flight_of(law: str) -> Callable[..., Score]:
-    """Return the loop of a law as `flight_of` does, left to Python."""
-    return _plain(law, LAWS[law])
-
-
 @functools.cache
 def _compiled(name: str, law: type[CompiledLaw]) -> Callable[..., Score]:
     return compiled(_plain(name, law), *_FOREIGN)
 
 
 def _plain(name: str, law: type[CompiledLaw]) -> Callable[..., Score]:
+    """Return the loop for a law, left to Python."""
     names = globals() | {"_step": law.function, "_is_wrench": law.output == "wrench"}
     copy = types.FunctionType(_fly.__code__, names, f"_fly_{name}")
     copy.__qualname__ = copy.__name__

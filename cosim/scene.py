@@ -14,7 +14,6 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from controller import ControllerError
 from controller.regions import DepthBand, PackedRegions, Region, Sphere, pack
 from controller.regions.shape import GREATEST
 from cosim.errors import ScenarioError
@@ -135,12 +134,12 @@ def plant_values(scene: Scene, vehicle: Vehicle, substep: float) -> dict[str, fl
     buoyancy = vehicle.weight - scene.weight_minus_buoyancy
     if not buoyancy > 0.0:
         raise ScenarioError(
-            f"weight_minus_buoyancy: is {scene.weight_minus_buoyancy}, expected less than the weight of the vehicle "
+            f"weight_minus_buoyancy is {scene.weight_minus_buoyancy}, expected less than the weight of the vehicle "
             f"{vehicle.name}, {vehicle.weight:g} N"
         )
     failure, n = scene.failed_thruster, vehicle.n_thrusters
     if failure and failure.index > n:
-        raise ScenarioError(f"failed_thruster.index: is {failure.index}, expected one of the {n} of {vehicle.name}")
+        raise ScenarioError(f"failed_thruster.index is {failure.index}, expected one of the {n} of {vehicle.name}")
     values = {
         "substep": substep,
         "buoyancy": buoyancy,
@@ -174,28 +173,38 @@ def decode_scene(line: bytes) -> Scene:
         if not isinstance(table, dict):
             raise ScenarioError(f"expected one JSON object, got {type(table).__name__!r}")
         scene = decode(table, Scene)
-        _check(scene)
-        told(scene)
-    except (msgspec.MsgspecError, PlantFmuError, ControllerError, RecursionError, UnicodeDecodeError) as error:
+    except (msgspec.MsgspecError, PlantFmuError, RecursionError, UnicodeDecodeError) as error:
         raise ScenarioError(str(error)) from error
+    _check(scene)
     return scene
 
 
 def _check(scene: Scene) -> None:
-    """Raise an error at the first number that no shape of a region would refuse, but that cannot be."""
-    shallow, deep = scene.depth_band
-    failure = scene.failed_thruster
-    for key, value, good, expected in (
-        ("seed", scene.seed, 0 <= scene.seed < 2**63, "a whole number from 0 to 2^63 - 1"),
-        ("depth_band", scene.depth_band, shallow < deep, "two depths, the shallow one first"),
-        ("start", scene.start, max(map(abs, scene.start)) <= GREATEST, f"numbers up to {GREATEST:g}"),
-        ("noise.position", scene.noise.position, scene.noise.position >= 0.0, "0 or above"),
-        ("noise.velocity", scene.noise.velocity, scene.noise.velocity >= 0.0, "0 or above"),
-        ("failed_thruster.index", failure and failure.index, not failure or failure.index >= 1, "a number from 1"),
-        ("failed_thruster.time", failure and failure.time, not failure or failure.time >= 0.0, "0 or above"),
-    ):
-        if not good:
-            raise ScenarioError(f"{key}: is {value}, expected {expected}")
+    """Raise an error at the first number that cannot be, whatever the vehicle."""
+    failure, noise, (shallow, deep) = scene.failed_thruster, scene.noise, scene.depth_band
+    _require(0 <= scene.seed < 2**63, "seed", scene.seed, "a whole number from 0 to 2^63 - 1")
+    for key in ("start", "current", "depth_band"):
+        _require_moderate(key, getattr(scene, key))
+    _require(shallow < deep, "depth_band", scene.depth_band, "two depths, the shallow one first")
+    for key, ball in (("goal", scene.goal), *((f"obstacles.{i}", o) for i, o in enumerate(scene.obstacles))):
+        _require_moderate(f"{key}.centre", ball.centre)
+        _require(0.0 < ball.radius <= GREATEST, f"{key}.radius", ball.radius, "above 0 m")
+    for i, obstacle in enumerate(scene.obstacles):
+        _require_moderate(f"obstacles.{i}.velocity", obstacle.velocity)
+    for key in ("position", "velocity"):
+        _require(0.0 <= getattr(noise, key) <= GREATEST, f"noise.{key}", getattr(noise, key), "0 or above")
+    if failure:
+        _require(failure.index >= 1, "failed_thruster.index", failure.index, "a number from 1")
+        _require(failure.time >= 0.0, "failed_thruster.time", failure.time, "0 s or above")
+
+
+def _require(good: bool, key: str, came: object, expected: str) -> None:
+    if not good:
+        raise ScenarioError(f"{key} is {came}, expected {expected}")
+
+
+def _require_moderate(key: str, values: tuple[float, ...]) -> None:
+    _require(all(abs(x) <= GREATEST for x in values), key, values, f"numbers up to {GREATEST:g}")
 
 
 def read_scenes(path: Path) -> Iterator[Scene]:
