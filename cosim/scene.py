@@ -186,7 +186,8 @@ def _check(scene: Scene) -> None:
     for key in ("start", "current", "depth_band"):
         _require_moderate(key, getattr(scene, key))
     _require(shallow < deep, "depth_band", scene.depth_band, "two depths, the shallow one first")
-    for key, ball in (("goal", scene.goal), *((f"obstacles.{i}", o) for i, o in enumerate(scene.obstacles))):
+    balls: dict[str, Ball | Obstacle] = {"goal": scene.goal}
+    for key, ball in (balls | {f"obstacles.{i}": o for i, o in enumerate(scene.obstacles)}).items():
         _require_moderate(f"{key}.centre", ball.centre)
         _require(0.0 < ball.radius <= GREATEST, f"{key}.radius", ball.radius, "above 0 m")
     for i, obstacle in enumerate(scene.obstacles):

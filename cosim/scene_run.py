@@ -82,6 +82,7 @@ class SceneFlyer:
         self.gains = LAWS[law].gains_type() if gains is None else gains
         self._vehicle = load_vehicle("odin")
         self._model = vehicle_model(self._vehicle)
+        self._law(0)  # says now what it cannot work with
         self._clock = Clock()
         self._flight = flight_of(law)
         self._plant = Plant(self._vehicle)
@@ -108,7 +109,7 @@ class SceneFlyer:
         """
         c, m = self.conditions, self._vehicle.n_thrusters
         plant, known = self._plant, told(scene)
-        law = self._law(known)
+        law = self._law(known.regions.kinds.size)
         plant.reset()
         plant.set(plant_values(scene, self._vehicle, c.plant_step))
         plant.initialise()
@@ -121,10 +122,8 @@ class SceneFlyer:
         score = self._flight(setup, native, effectiveness, self._allocator(), law.gains, law.memory, rows)
         return score, rows
 
-    def _law(self, known: Told) -> Any:
-        return LAWS[self.law].for_vehicle(
-            self._model, self.gains, np.array(LEVEL), self.conditions.control, known.regions.kinds.size
-        )
+    def _law(self, n_regions: int) -> Any:
+        return LAWS[self.law].for_vehicle(self._model, self.gains, np.array(LEVEL), self.conditions.control, n_regions)
 
     def _setup(self, scene: Scene, known: Told) -> Setup:
         c, failure = self.conditions, scene.failed_thruster
