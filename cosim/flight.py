@@ -93,7 +93,7 @@ def _fly(
     gains: Any,
     memory: Any,
     trace: Array,
-) -> Score:
+) -> tuple[bool, float, float, float, float, float, int]:
     """Fly a scene by the law whose compiled function stands in the place of the global `_step`.
 
     Parameters
@@ -114,8 +114,9 @@ def _fly(
 
     Returns
     -------
-    Score
-        Of the whole flight, or up to where the FMU failed.
+    tuple
+        What `Score` is made of, of the whole flight, or up to where the FMU failed. Were it a named tuple, Numba would
+        call Python to make it, and crash where that raises, as after Ctrl-C in mid-flight.
     """
     m, n = native.inputs.size, setup.regions.kinds.size
     position, quaternion, velocity = np.empty(3), np.empty(4), np.empty(6)
@@ -125,7 +126,7 @@ def _fly(
     state = VehicleState(position, quaternion, velocity, health)
     effort, variation, worst = 0.0, 0.0, 0.0
     if not read(native):
-        return Score(False, np.inf, np.nan, effort, variation, worst, 0)
+        return (False, np.inf, np.nan, effort, variation, worst, 0)
     _move(setup, 0.0)
     least = _least_clearance(setup.regions, native.outputs[:3], np.inf)
     inside_since = 0 if clearance_at(setup.goal, 0, native.outputs[:3]) >= 0.0 else -1  # plant step; -1: outside
@@ -138,7 +139,7 @@ def _fly(
             effectiveness.inputs[:] = 1.0
             effectiveness.inputs[setup.failed] = 0.0
             if not send(effectiveness):
-                return Score(False, np.inf, least, effort, variation, worst, done)
+                return (False, np.inf, least, effort, variation, worst, done)
             if setup.tell:
                 health[setup.failed] = 0.0
         # measure
@@ -170,10 +171,10 @@ def _fly(
             before[j] = native.inputs[j]
         # plant and score
         if not send(native):
-            return Score(False, np.inf, least, effort, variation, worst, done)
+            return (False, np.inf, least, effort, variation, worst, done)
         for _ in range(setup.plant_steps):
             if not (advance(native, done * setup.plant_step, setup.plant_step) and read(native)):
-                return Score(False, np.inf, least, effort, variation, worst, done)
+                return (False, np.inf, least, effort, variation, worst, done)
             done += 1
             _move(setup, done * setup.plant_step)
             true_position = native.outputs[:3]
@@ -186,7 +187,7 @@ def _fly(
                 effort += abs(native.outputs[13 + j]) * setup.plant_step
     reached = inside_since >= 0 and done - inside_since >= setup.settled_steps
     reach_time = inside_since * setup.plant_step if inside_since >= 0 else np.inf
-    return Score(reached, reach_time, least, effort, variation, worst, -1)
+    return (reached, reach_time, least, effort, variation, worst, -1)
 
 
 @compiled
@@ -236,15 +237,16 @@ def flight_of(law: str) -> Callable[..., Score]:
         ``(setup, native, effectiveness, allocator, gains, memory, trace) -> Score``.
     """
     chosen: Any = LAWS[law]
-    return _compiled(law, chosen)
+    loop = _compiled(law, chosen)
+    return lambda *arguments: Score(*loop(*arguments))
 
 
 @functools.cache
-def _compiled(name: str, law: type[CompiledLaw]) -> Callable[..., Score]:
+def _compiled(name: str, law: type[CompiledLaw]) -> Callable[..., tuple[Any, ...]]:
     return compiled(_plain(name, law), *_FOREIGN)
 
 
-def _plain(name: str, law: type[CompiledLaw]) -> Callable[..., Score]:
+def _plain(name: str, law: type[CompiledLaw]) -> Callable[..., tuple[Any, ...]]:
     """Return the loop for a law, left to Python."""
     names = globals() | {"_step": law.function, "_is_wrench": law.output == "wrench"}
     copy = types.FunctionType(_fly.__code__, names, f"_fly_{name}")

@@ -1,4 +1,4 @@
-"""Several laws on the same scenes: campaigns side by side, and each law beside another on the scenes that one completes."""
+"""Several laws on the same scenes: campaigns side by side, and two laws at a time on what one of them completes."""
 
 from __future__ import annotations
 

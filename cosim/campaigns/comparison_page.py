@@ -40,8 +40,8 @@ def page(numbers: dict[str, Any]) -> str:
         "",
         "## On the scenes that a law completes",
         "",
-        "Reached without a violation by the law in the first column; medians of both laws over these scenes. What the other",
-        "law never reaches counts as taking for ever.",
+        "Scenes that the law in the first column reaches without a violation, and medians of both laws over them. What",
+        "the other law never reaches counts as taking for ever.",
         "",
         *_table(
             [

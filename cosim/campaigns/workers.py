@@ -8,9 +8,7 @@ import logging
 import multiprocessing
 import os
 import signal
-import sys
 import threading
-import time
 from collections.abc import Generator, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
@@ -41,7 +39,9 @@ class Task:
         return SceneFlyer(self.law, self.conditions, self.gains)
 
 
-def fly_all(flyer: SceneFlyer, task: Task, batches: Iterable[list[bytes]], workers: int) -> Generator[list[Row]]:
+def fly_all(
+    flyer: SceneFlyer, task: Task, batches: Iterable[list[bytes]], workers: int
+) -> Generator[list[Row], None, None]:
     """Fly batches, and yield the rows of each as it is done, in whatever order that is.
 
     Parameters
@@ -143,7 +143,9 @@ def _fly_in_worker(task: Task, lines: list[bytes]) -> list[Row]:
 @functools.lru_cache(maxsize=1)
 def _flyer(task: Task) -> SceneFlyer:
     """Return this process's flyer of a task: the FMU is loaded once, and reset between scenes."""
-    return task.flyer()
+    flyer = task.flyer()
+    signal.signal(signal.SIGTERM, lambda *_: _end_worker(flyer))
+    return flyer
 
 
 @contextlib.contextmanager
@@ -162,7 +164,6 @@ def _interrupts_held() -> Iterator[None]:
 def _begin_worker() -> None:
     """Leave Ctrl-C to the parent, and end when the parent does, however it ends."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))
     threading.Thread(target=_follow_parent, name="follow-parent", daemon=True).start()
 
 
@@ -170,6 +171,10 @@ def _follow_parent() -> None:
     parent = multiprocessing.parent_process()
     if parent is not None:
         parent.join()
-        while True:  # whatever it is busy with, it ends, and leaves no files
-            os.kill(os.getpid(), signal.SIGTERM)
-            time.sleep(0.5)
+        os.kill(os.getpid(), signal.SIGTERM)
+
+
+def _end_worker(flyer: SceneFlyer) -> None:
+    """End at once, whatever lock another worker took with it when it died, but leave no files."""
+    flyer.close()
+    os._exit(1)

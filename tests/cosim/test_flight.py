@@ -2,6 +2,7 @@
 
 import ctypes
 import math
+import signal
 from dataclasses import replace
 from pathlib import Path
 
@@ -216,6 +217,30 @@ def test_conditions_that_cannot_be(wrong, words):
 def test_an_unknown_law_is_named_with_the_known_ones():
     with pytest.raises(RunError, match=r"law is 'prinetd', expected one of .*printed"):
         SceneFlyer("prinetd")
+
+
+@pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="needs an alarm clock")
+def test_a_signal_in_mid_flight_raises_after_it(flyer):
+    class Alarmed(Exception):  # noqa: N818 -- no error
+        pass
+
+    def ring(*_):
+        raise Alarmed
+
+    def fly_until_it_rings():
+        signal.setitimer(signal.ITIMER_REAL, 0.004)
+        while True:
+            flyer.fly(HARD[0])
+
+    before = signal.signal(signal.SIGALRM, ring)
+    try:
+        for _ in range(5):
+            with pytest.raises(Alarmed):
+                fly_until_it_rings()
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.signal(signal.SIGALRM, before)
+    assert flyer.fly(HARD[0])[0].failed_step == -1
 
 
 # ---- C functions ----
