@@ -182,6 +182,11 @@ def test_a_law_that_asks_for_no_number_ends_the_flight_there_and_not_the_next(lo
     assert trace[49, 0] == pytest.approx(0.98) and not trace[51:].any()
     monkeypatch.setattr(_Loose, "calls", -1000)
     assert loose.fly(PLAIN[1])[0].failed_step == -1
+    monkeypatch.setattr(_Loose, "calls", 50)
+    assert loose.fly(PLAIN[0])[0].failed_step == 0
+    with pytest.raises(PlantError) as refused:
+        loose.fly(replace(PLAIN[0], current=(1e300, 0.0, 0.0)))
+    assert "current" in str(refused.value) and "thrust" not in str(refused.value)  # nothing of what was before
 
 
 @pytest.mark.parametrize(
