@@ -219,6 +219,11 @@ def test_what_was_not_seen_to_be_safe_is_a_violation(score, violation, stopped_a
     assert all(x is None or math.isfinite(x) for x in numbers)
 
 
+def test_there_is_a_reach_time_where_it_was_reached_alone():
+    late, early = (Score(reached, 115.0, 0.1, 1.0, 1.0, 1e-6, -1) for reached in (False, True))
+    assert (row_of(7, late, 0.01).reach_time, row_of(7, early, 0.01).reach_time) == (None, 115.0)
+
+
 def test_the_summary_follows_from_the_rows():
     scores = [
         Score(True, 30.0, 0.2, 100.0, 10.0, 1e-6, -1),
