@@ -64,6 +64,11 @@ def _parser() -> argparse.ArgumentParser:
     show.add_argument("scenario", help="a shipped name, or a TOML file")
     show.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", dest="overrides", help="as for run")
 
+    check = verbs.add_parser("check", help="say before a run what stands against a scenario; exit code 1 if anything")
+    check.add_argument("scenario", help="a shipped name, or a TOML file")
+    check.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", dest="overrides", help="as for run")
+    check.add_argument("--json", action="store_true", help="print it as JSON")
+
     calibrate = verbs.add_parser("calibrate", help="fit the force limit and lag that bring the paper's window about")
     calibrate.add_argument("--scenario", default="paper", help="scenario to fit (default: paper)")
 
@@ -94,7 +99,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns
     -------
     int
-        0; 2 where the user must mend something; 130 after Ctrl-C.
+        0; 1 where a check fails; 2 where the user must mend something; 130 after Ctrl-C.
     """
     options = _parser().parse_args(arguments)
     _log(options.verbose)
@@ -176,6 +181,16 @@ def _show(options: argparse.Namespace) -> int:
     return 0
 
 
+def _check(options: argparse.Namespace) -> int:
+    from cosim.check import check
+    from cosim.check_text import check_json, check_text
+    from cosim.scenario import load_scenario
+
+    found = check(load_scenario(options.scenario, options.overrides))
+    print(check_json(found) if options.json else check_text(found))
+    return 0 if found.holds else 1
+
+
 def _calibrate(options: argparse.Namespace) -> int:
     from cosim.calibration import calibrate
     from cosim.scenario import load_scenario
@@ -191,6 +206,7 @@ _VERBS = {
     "report": _report,
     "list": _list,
     "show": _show,
+    "check": _check,
     "calibrate": _calibrate,
     "campaign": campaigns.campaign,
     "compare": campaigns.compare,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.rcsetup import cycler
 from numpy.typing import NDArray
 
-from controller.regions import Region
+from controller.regions import Region, Visibility, of_attitude
 from cosim.record import Record
 from cosim.scenario import CRITERIA, Scenario
 from cosim.signals import Array
@@ -42,6 +42,8 @@ STYLE: Any = {
 
 DPI = 160  # of figures as PNG
 
+_LEGEND_WIDTH, _LEGEND_MARK = 100, 7  # letters that fit across a figure, that a line or marker is as wide as
+_NAMED = 8  # regions that a legend names one by one
 POINTS = 1500  # of a drawn curve: about what a figure's width resolves
 
 
@@ -112,9 +114,121 @@ def regions_of(scenario: Scenario) -> Iterator[tuple[Region, str]]:
     (Region, str)
         The goal first.
     """
-    yield Region("goal", scenario.goal, "in"), GOAL_COLOUR
+    yield scenario.goal_region, GOAL_COLOUR
     for secondary in scenario.regions:
         yield secondary.region, CRITERION_COLOURS[secondary.criterion]
+
+
+@dataclass(frozen=True)
+class Place:
+    """A region in space, where it was at some time."""
+
+    region: Region
+    colour: str
+    shift: Array  # (3,) m, NED, from where the scenario has it
+    faint: bool  # where it began or ended
+
+
+def places_of(story: Story) -> Iterator[Place]:
+    """Yield where the goal was at the end, and each region when the vehicle had least clearance to it.
+
+    Those that move come before it, faint, where they began and where they ended. Regions of attitude are at no place
+    and left out.
+
+    Parameters
+    ----------
+    story : Story
+        The run.
+
+    Yields
+    ------
+    Place
+        The goal's first.
+    """
+    for region, colour in regions_of(story.scenario):
+        if of_attitude(region.shape):
+            continue
+        shifts = shifts_of(story, region.name)
+        at = -1 if region.name == "goal" else int(np.argmin(story.record[f"{region.name}.clearance"]))
+        if region.name in story.scenario.moving:
+            yield Place(region, colour, shifts[0], faint=True)
+            yield Place(region, colour, shifts[-1], faint=True)
+        yield Place(region, colour, shifts[at], faint=False)
+
+
+def features_of(story: Story) -> Iterator[tuple[str, str, Array]]:
+    """Yield name, colour and place [m, NED], shape (3,), of every feature that is to be seen, as it was at the end.
+
+    Parameters
+    ----------
+    story : Story
+        The run.
+
+    Yields
+    ------
+    (str, str, ndarray)
+        In the order of the regions.
+    """
+    for region, colour in regions_of(story.scenario):
+        if isinstance(region.shape, Visibility):
+            yield region.name, colour, np.array(region.shape.feature) + shifts_of(story, region.name)[-1]
+
+
+def shifts_of(story: Story, name: str) -> Array:
+    """Return how far a region was from where the scenario has it at each step, shape (steps, 3) [m, NED].
+
+    Parameters
+    ----------
+    story : Story
+        The run.
+    name : str
+        Of the region.
+
+    Returns
+    -------
+    ndarray, shape (steps, 3)
+        Zeros for one at rest.
+    """
+    if name not in story.scenario.moving:
+        return np.zeros((len(story.record["time"]), 3))
+    return story.record.stack([f"{name}.shift.{axis}" for axis in "xyz"])
+
+
+def labels_of(regions: Sequence[tuple[Region, str]]) -> dict[str, str]:
+    """Return what a legend calls regions.
+
+    Parameters
+    ----------
+    regions : sequence of (Region, str)
+        With their colours.
+
+    Returns
+    -------
+    dict of str to str
+        By the region's name: its name, or where there are many regions, how many have its colour, at the first of them.
+    """
+    if len(regions) <= _NAMED:
+        return {region.name: region.name for region, _ in regions}
+    by_colour: dict[str, list[str]] = {}
+    for region, colour in regions:
+        by_colour.setdefault(colour, []).append(region.name)
+    return {n[0]: n[0] if len(n) == 1 else f"{len(n)} regions" for n in by_colour.values()}
+
+
+def legend_columns(labels: Iterable[str]) -> int:
+    """Return how many columns a legend may have across a figure, as all are as wide as the longest label.
+
+    Parameters
+    ----------
+    labels : iterable of str
+        At least one.
+
+    Returns
+    -------
+    int
+        At least 1.
+    """
+    return max(1, _LEGEND_WIDTH // (max(map(len, labels)) + _LEGEND_MARK))
 
 
 def overlap_of(story: Story) -> NDArray[np.bool_]:

@@ -48,9 +48,22 @@ def drawings(story: Story) -> Iterator[Drawing]:
         ("forces", "Body force: what the law asks for, and what acts.", over_time.forces),
         ("thrusters", "Thruster forces.", over_time.thrusters),
         ("estimates", "Estimated restoring parameters against the truth (dotted).", over_time.estimates),
+        (
+            "lyapunov",
+            "V of (31), which as printed leaves the frame where a region's gradient vanishes, and −W of (41): dV/dt "
+            "where the law's wrench acts and the water rests. Red: where V is negative, or rises.",
+            over_time.lyapunov,
+        ),
     ]
     for name, caption, draw in figures:
         if name == "weights-overlap" and not story.summary["intersection_windows"]:
+            continue
+        if name == "path-plane" and story.scenario.moving:
+            caption += (
+                " What moved is faint where it began and ended; regions are full where they were when the vehicle had "
+                "least clearance to them."
+            )
+        if name == "lyapunov" and not story.summary["lyapunov"]:
             continue
         if name == "thrusters":
             caption = over_time.thruster_caption(story.scenario)

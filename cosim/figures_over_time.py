@@ -8,8 +8,22 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from controller.regions import Sphere
-from cosim.drawing import BLACK, BLUE, CRITERION_COLOURS, CYCLE, GOAL_COLOUR, RED, Story, regions_of, thin
+from controller.regions import Sphere, of_attitude
+from cosim.drawing import (
+    BLACK,
+    BLUE,
+    CRITERION_COLOURS,
+    CYCLE,
+    GOAL_COLOUR,
+    ORANGE,
+    RED,
+    Story,
+    labels_of,
+    legend_columns,
+    regions_of,
+    shifts_of,
+    thin,
+)
 from cosim.scenario import CRITERIA, Scenario
 from cosim.signals import Array
 
@@ -65,7 +79,7 @@ def position_error(story: Story) -> Figure:
     figure, (ax,) = _axes()
     bounds = np.array(story.scenario.goal.bounds())
     if np.isfinite(bounds).all():
-        centre = bounds.mean(axis=0)
+        centre = bounds.mean(axis=0) + shifts_of(story, "goal")
         error = np.linalg.norm(story.record.stack([f"position.{a}" for a in "xyz"]) - centre, axis=1)
         _curves(ax, story, {"RMS error": error / np.sqrt(3.0)})
         ax.set_ylabel("RMS error [m]")
@@ -122,18 +136,26 @@ def weights(story: Story) -> Figure:
 
 
 def clearance(story: Story) -> Figure:
-    """Draw the clearance to each region and to the goal."""
-    figure, axes = _zoomed(story, 3.0)
+    """Draw the clearance to each region and to the goal: distances, and angles below them where there are any."""
+    regions = list(enumerate(regions_of(story.scenario)))
+    groups = [[(i, of) for i, of in regions if of_attitude(of[0].shape) == angle] for angle in (False, True)]
+    figure, axes = _zoomed(story, 3.0 if not groups[1] else 4.6, 1 if not groups[1] else 2)
     styles = ("-", "--", "-.", ":")
-    for i, (region, colour) in enumerate(regions_of(story.scenario)):
-        signal = story.record[f"{region.name}.clearance"]
-        _curves(axes[0], story, {region.name: signal}, color=colour, linestyle=styles[i % 4])
-    for ax in axes[0]:
-        ax.set_ylim(ax.get_ylim())
-        ax.axhspan(ax.get_ylim()[0], 0.0, color=RED, alpha=0.06, linewidth=0)
-        ax.axhline(0.0, color=BLACK, linewidth=0.8)
-    axes[0, 0].set_ylabel("clearance [m]")
-    _legend(figure, axes[0, 0], 8)
+    labels = labels_of([of for _, of in regions])
+    for row, group, unit in zip(axes, groups, ("m", "°"), strict=False):
+        for i, (region, colour) in group:
+            label = labels.get(region.name, "_")  # which legends leave out
+            signal = story.record[f"{region.name}.clearance"]
+            signal = np.rad2deg(signal) if unit == "°" else signal
+            _curves(row, story, {label: signal}, color=colour, linestyle=styles[i % 4])
+        for ax in row:
+            ax.set_ylim(ax.get_ylim())
+            ax.axhspan(ax.get_ylim()[0], 0.0, color=RED, alpha=0.06, linewidth=0)
+            ax.axhline(0.0, color=BLACK, linewidth=0.8)
+        row[0].set_ylabel(f"clearance [{unit}]")
+    drawn = [dict(zip(*reversed(row[0].get_legend_handles_labels()), strict=True)) for row in axes]
+    handles = {label: handle for of_row in drawn for label, handle in of_row.items()}
+    figure.legend(handles.values(), handles.keys(), loc="outside upper center", ncols=legend_columns(handles))
     return figure
 
 
@@ -202,4 +224,30 @@ def estimates(story: Story) -> Figure:
     moment.set_ylabel("φ̂2 … φ̂4 [N m]")
     force.legend()
     moment.legend(ncols=3)
+    return figure
+
+
+def lyapunov(story: Story) -> Figure:
+    """Draw V in its three forms, and its rate."""
+    figure, axes = _zoomed(story, 4.6, 2)
+    forms = {form: story.record[f"lyapunov.{form}"] for form in ("printed", "normalised", "primary")}
+    labels = ("V as printed", "V, potential of the force", "V, primary region alone")
+    for label, V, colour, style in zip(labels, forms.values(), (ORANGE, BLUE, BLACK), ("-", "--", ":"), strict=True):
+        _curves(axes[0], story, {label: V}, color=colour, linestyle=style)
+    rate = story.record["lyapunov.rate"]
+    _curves(axes[1], story, {"dV/dt = −W": rate}, color=BLUE)
+    for row, signal, bad in ((axes[0], forms["normalised"], -1.0), (axes[1], rate, 1.0)):
+        largest, typical = float(np.abs(signal).max()), float(np.percentile(np.abs(signal), 50))
+        for ax in row:
+            if largest > 20.0 * max(typical, 1.0):  # the beginning would flatten all the rest
+                _symlog(ax, largest, max(typical, 1e-3 * largest))
+            else:
+                ax.set_ylim(1.1 * min(0.0, float(signal.min())) - 0.05 * largest, 1.1 * largest)
+            limits = ax.get_ylim()
+            ax.axhspan(0.0, limits[0] if bad < 0.0 else limits[1], color=RED, alpha=0.06, linewidth=0)
+            ax.set_ylim(limits)
+            ax.axhline(0.0, color=BLACK, linewidth=0.8)
+    axes[0, 0].set_ylabel("V [N m]")
+    axes[1, 0].set_ylabel("dV/dt = −W [W]")
+    _legend(figure, axes[0, 0], 3)
     return figure

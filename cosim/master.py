@@ -6,6 +6,7 @@ copy what they keep, and cannot change it.
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Sequence
 from types import TracebackType
@@ -13,14 +14,19 @@ from typing import Protocol
 
 import numpy as np
 
-from controller import Allocation, Law, PrintedLaw, VehicleState
-from controller.regions import Region, pack
+from controller import LAWS, Allocation, Law, VehicleState
+from cosim.columns import columns_of
+from cosim.lyapunov import LyapunovSignals
 from cosim.scenario import CRITERIA, Scenario
-from cosim.signals import Array, Column, Signals
+from cosim.sensing import Sensor
+from cosim.signals import Array, Signals
+from cosim.surroundings import Surroundings
+from cosim.vehicle_model import vehicle_model
 from fuzzy_arbiter import Arbiter, ramp
-from plant_fmu import Channels, Plant
+from plant_fmu import Plant
 
 _LONGEST_SLEEP = 3600.0  # s
+_ROUNDING = 1e-6  # of a step
 _FIRST_APPLIED = "thruster_force[1]"  # outputs before it are read at the beginning of a step, from it on at the end
 
 
@@ -44,6 +50,8 @@ class Master:
     ----------
     signals : Signals
         The row that each step fills.
+    truth, state : VehicleState
+        The vehicle as it is, and as law and arbiter are told; the same where sensing is exact.
 
     Raises
     ------
@@ -58,27 +66,26 @@ class Master:
     def __init__(self, scenario: Scenario) -> None:
         self.scenario = scenario
         self.arbiter = Arbiter(engine=scenario.arbiter.engine, points=scenario.arbiter.points)
-        self.law: Law = PrintedLaw(
+        vehicle = scenario.vehicle
+        # nominal numbers: what the scenario changes in the plant is not told
+        self.law: Law = LAWS[scenario.law.name].for_vehicle(
+            vehicle_model(vehicle),
             scenario.law.gains,
             np.array(scenario.law.desired_quaternion),
             scenario.time.control,
             len(scenario.regions),
         )
-        vehicle = scenario.vehicle
-        self.allocation: Allocation | None = None
-        if scenario.actuation.through == "thrusters":
-            self.allocation = Allocation(
-                vehicle.thruster_matrix, vehicle.thrust_min, vehicle.thrust_max, scenario.actuation.limits
-            )
-        self.goal = pack([Region("goal", scenario.goal, "in")])
-        self.regions = pack([secondary.region for secondary in scenario.regions])
+        self._health: Array = np.ones(vehicle.n_thrusters)  # as far as the law is told
+        self._allocate_to_the_healthy()
+        self.surroundings = Surroundings(scenario)
+        self._boundary = 0.0  # s, when the next step begins
         self._criterion_of = [CRITERIA.index(secondary.criterion) for secondary in scenario.regions]
 
         self.plant = Plant(vehicle, scenario.plant.fmi)
         try:
             self.plant.set(_start_values(scenario))
             self.plant.initialise()
-            self.signals = Signals(_columns(scenario, self.plant))
+            self.signals = Signals(columns_of(scenario, self.plant, self.law))
             self._bind()
         except BaseException:
             self.plant.close()
@@ -93,23 +100,40 @@ class Master:
         self._measured, self._applied, self._flags = np.split(outputs, [n_measured, n_outputs])
         self._plant_measured, self._plant_applied = np.split(plant.outputs.values, [n_measured])
 
-        self.state = VehicleState(
+        truth = VehicleState(
             position=s.view("position.x", 3),
             quaternion=s.view("quaternion.e0", 4),
             velocity_body=s.view("velocity.u", 6),
-            thruster_health=np.ones(n_thrusters),
+            thruster_health=self._health,
         )
+        self.truth = self.state = truth
+        self._sensor: Sensor | None = None
+        if not self.scenario.sensing.exact:
+            position, velocity = s.view("sensed.x", 3), s.view("sensed.u", 6)
+            self.state = VehicleState(position, np.zeros(4), velocity, self._health)
+            self._sensor = Sensor(self.scenario.sensing, truth, self.state)
+
         self._values, self._clearances = s.view("goal.value", n + 1), s.view("goal.clearance", n + 1)
-        self._gradients: Array = np.zeros((n + 1, 3))
+        # where sensing is exact, what the arbiter sees is what is recorded
+        self._seen: Array = self._clearances if self._sensor is None else np.zeros(n + 1)
+        moving = self.scenario.moving
+        self._shifts = s.view(f"{moving[0]}.shift.x", 3 * len(moving)).reshape(-1, 3) if moving else np.empty((0, 3))
         self._memberships = s.view(f"membership.{CRITERIA[0]}", len(CRITERIA))
         self._weights = s.view(f"weight.{CRITERIA[0]}", len(CRITERIA))
         self._weights_of_regions: Array = np.zeros(n)
         self._estimate = s.view("estimate.phi1", 4)
         self._command = s.view("command.X", 6)
+        n_reports = len(self.law.diagnostics)
+        self._report = s.view(f"law.{self.law.diagnostics[0].name}", n_reports) if n_reports else np.empty(0)
         self._allocation_cut = s.view("allocation_saturated", 1)
         inputs = s.view("thrust[1]", len(self.plant.inputs))
         self._thrusts, self._wrench = inputs[:n_thrusters], inputs[n_thrusters:]
         self._inputs = inputs
+        self._lyapunov: LyapunovSignals | None = None
+        if self.scenario.record.lyapunov:
+            out = s.view("lyapunov.printed", 4)
+            goal, regions, weights = self.surroundings.goal, self.surroundings.regions, self._weights_of_regions
+            self._lyapunov = LyapunovSignals(self.scenario, truth, goal, regions, weights, self._estimate, out)
 
     def run(self, observers: Sequence[Observer] = (), rate: float | None = None) -> None:
         """Step from time 0 to the end, once, telling the observers of each step.
@@ -135,15 +159,19 @@ class Master:
         started = time.perf_counter()
         for k in range(last + 1):
             row[0] = k * step
-            self._measure()
+            self._fail(k)
+            self._measure(k)
             self._evaluate_regions()
             if k % scenario.arbiter_every == 0:
                 self._arbitrate()
             if k % scenario.control_every == 0:
                 self._control()
                 self._actuate()
+            if self._lyapunov is not None:
+                self._lyapunov.write()
             if k < last:
                 self._advance(step)
+            self._boundary = (k + 1) * step
             for observer in observers:
                 observer.observe(k, seen)
             if rate is not None:
@@ -151,21 +179,37 @@ class Master:
 
     # ---- the stages of a step ----
 
-    def _measure(self) -> None:
+    def _fail(self, k: int) -> None:
+        """Let thrusters fail whose time has come, and tell the law if it is to be told."""
+        for failure in self.scenario.failures:
+            if k == math.ceil(failure.time / self.scenario.time.step - _ROUNDING):
+                self.plant.set({f"thrust_effectiveness[{failure.thruster}]": 0.0})
+                if self.scenario.tell_failures:
+                    self._health[failure.thruster - 1] = 0.0
+                    self._allocate_to_the_healthy()
+
+    def _measure(self, k: int) -> None:
         self._measured[:] = self._plant_measured
+        if self._sensor is not None:
+            self._sensor.measure(self.signals.row[0], k % self.scenario.control_every == 0)
 
     def _evaluate_regions(self) -> None:
-        position = self.state.position
-        self.goal.move_to(self.signals.row[0])
-        self.regions.move_to(self.signals.row[0])
-        self.goal.evaluate(position, self._values[:1], self._gradients[:1], self._clearances[:1])
-        self.regions.evaluate(position, self._values[1:], self._gradients[1:], self._clearances[1:])
+        """Evaluate the regions, where they are now, at the pose that is told, and at the true one."""
+        self.surroundings.carry_to(self.signals.row[0], self._shifts)
+        if self._sensor is not None:
+            self.surroundings.evaluate(self.state, self._values, self._seen)
+        self.surroundings.evaluate(self.truth, self._values, self._clearances)
 
     def _arbitrate(self) -> None:
-        """Turn clearances into memberships, of the most pressing region of each criterion, and these into weights."""
+        """Turn clearances into memberships, of the most pressing region of each criterion, and these into weights.
+
+        While the position is lost there is nothing to decide by: the last weights hold.
+        """
+        if not np.isfinite(self.state.position).all():
+            return
         width = self.scenario.arbiter.ramp
         memberships = [0.0] * len(CRITERIA)
-        for criterion, clearance in zip(self._criterion_of, self._clearances[1:].tolist(), strict=True):
+        for criterion, clearance in zip(self._criterion_of, self._seen[1:].tolist(), strict=True):
             memberships[criterion] = max(memberships[criterion], ramp(clearance, width))
         weights = self.arbiter(memberships)
         self._memberships[:] = memberships
@@ -175,19 +219,59 @@ class Master:
 
     def _control(self) -> None:
         self._estimate[:] = self.law.estimate
-        self.law.step(self.state, self.goal, self.regions, self._weights_of_regions, self._command)
+        forces = self._command if self.law.output == "wrench" else self._thrusts
+        goal, regions = self.surroundings.goal, self.surroundings.regions
+        self.law.step(self.state, goal, regions, self._weights_of_regions, forces)
+        self._report[:] = self.law.report
 
     def _actuate(self) -> None:
-        if self.allocation is None:
+        """Bring the law's wrench to the plant, or find the wrench that its thruster forces amount to."""
+        if self.law.output == "thrusters":
+            self._command[:] = self.scenario.vehicle.thruster_matrix @ self._thrusts
+        elif self.allocation is None:
             self._wrench[:] = self._command
         else:
             self._allocation_cut[0] = self.allocation(self._command, self._thrusts)
+
+    def _allocate_to_the_healthy(self) -> None:
+        vehicle, actuation = self.scenario.vehicle, self.scenario.actuation
+        self.allocation: Allocation | None = None
+        if actuation.through == "thrusters":
+            self.allocation = Allocation(
+                vehicle.thruster_matrix,
+                vehicle.thrust_min * self._health,
+                vehicle.thrust_max * self._health,
+                actuation.limits,
+            )
 
     def _advance(self, step: float) -> None:
         self.plant.inputs.values[:] = self._inputs
         self.plant.step(step)
         self._applied[:] = self._plant_applied
         self._flags[:] = self.plant.read_flags()
+
+    # ---- regions moved from outside ----
+
+    def move_region(self, name: str, displacement: Array, velocity: Array) -> None:
+        """Say where a streamed region is from the next step on, and how it goes on from there.
+
+        To be called between steps: before `run`, or by an observer.
+
+        Parameters
+        ----------
+        name : str
+            Of a region, or ``"goal"``, that the scenario calls streamed.
+        displacement : array_like, shape (3,)
+            At the beginning of the next step, from where the scenario has it [m, NED].
+        velocity : array_like, shape (3,)
+            From then on [m/s, NED]; the law is told.
+
+        Raises
+        ------
+        RunError
+            If there is no such region, it is not streamed, or a number is not finite.
+        """
+        self.surroundings.move(name, displacement, velocity, self._boundary)
 
     # ---- the end ----
 
@@ -218,35 +302,3 @@ def _start_values(scenario: Scenario) -> dict[str, float]:
     ):
         values |= {f"{prefix}.{name}": number for name, number in zip(names, numbers, strict=True)}
     return values | plant.parameters
-
-
-def _columns(scenario: Scenario, plant: Plant) -> list[Column]:
-    """Return the columns of a row, in its order."""
-    regions = [("goal", scenario.goal), *((r.region.name, r.region.shape) for r in scenario.regions)]
-    force_units = ("N",) * 3 + ("N.m",) * 3
-    return [
-        Column("time", "s", "Simulated time at the beginning of the step"),
-        *_of(plant.outputs),
-        *_of(plant.flags),
-        *(Column(f"{name}.value", shape.unit, f"g of {name}, above 0 where violated") for name, shape in regions),
-        *(
-            Column(f"{name}.clearance", "m", f"Distance to the surface of {name}, below 0 where violated")
-            for name, _ in regions
-        ),
-        *(
-            Column(f"membership.{name}", "", f"Degree to which criterion {name} asks for attention")
-            for name in CRITERIA
-        ),
-        *(Column(f"weight.{name}", "", f"Weight of the criterion {name} from the arbiter") for name in CRITERIA),
-        *(Column(f"estimate.phi{i + 1}", "N.m" if i else "N", f"Estimate of phi {i + 1} in (12)") for i in range(4)),
-        *(
-            Column(f"command.{name}", unit, "Wrench that the law asks for, body frame")
-            for name, unit in zip("XYZKMN", force_units, strict=True)
-        ),
-        Column("allocation_saturated", "", "The thrusters' limits cut the wrench that the law asks for"),
-        *_of(plant.inputs),
-    ]
-
-
-def _of(channels: Channels) -> list[Column]:
-    return [Column(channel.name, channel.unit, channel.description) for channel in channels.channels]

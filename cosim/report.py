@@ -23,11 +23,13 @@ FIGURES = "figures"
 # of the entries of the summary
 _UNITS = {
     **dict.fromkeys(("simulated_time", "reach_time", "settle_time", "intersection_windows", "saturated_time"), " [s]"),
-    **dict.fromkeys(("final_position", "closest_to_goal", "min_clearance"), " [m]"),
+    **dict.fromkeys(("final_position", "closest_to_goal"), " [m]"),
+    "min_clearance": " [m, or as clearance unit says]",
     **dict.fromkeys(("max_force", "max_force_asked"), " [N]"),
     **{f"estimate_{which}": " [N; N m]" for which in ("final", "true", "lowest", "highest")},
     "max_speed": " [m/s]",
     "effort": " [N s]",
+    "lyapunov": " [N m; s]",
     "wall_time": " [s]",
 }
 
@@ -155,13 +157,11 @@ def verdict(summary: dict[str, Any]) -> str:
         goal = f"The vehicle entered the goal region at {summary['reach_time']:.2f} s but did not settle there"
     else:
         goal = f"The vehicle never entered the goal region; it came within {summary['closest_to_goal']:.2f} m of it"
-    from_start = summary["violated_at_start"]
-    broken = [
-        f"{name} by {-c:.3f} m" + (" (where it starts)" if name in from_start else "")
-        for name, c in summary["min_clearance"].items()
-        if c < 0.0
-    ]
-    kept = f"; it violated {', '.join(broken)}." if broken else "; it kept every region."
+    broken = [_broken(summary, name) for name, c in summary["min_clearance"].items() if c < 0.0]
+    kept = "; it kept every region."
+    if broken:
+        but = "" if summary["hard_violated"] or not summary["hard"] else "kept every hard region but "
+        kept = f"; it {but}violated {', '.join(broken)}."
     force = (
         f" The law asked for up to {newtons(summary['max_force_asked'])}; up to {newtons(summary['max_force'])} acted."
     )
@@ -171,6 +171,15 @@ def verdict(summary: dict[str, Any]) -> str:
         "killed": f" The run was killed; its record ends at {summary['simulated_time']:.3f} s.",
     }.get(summary["status"], f" The run {summary['status']}.")
     return goal + kept + force + ended
+
+
+def _broken(summary: dict[str, Any], name: str) -> str:
+    """Return by how much a region was violated."""
+    remarks = ["soft"] if name not in summary["hard"] else []
+    remarks += ["where it starts"] if name in summary["violated_at_start"] else []
+    depth, unit = -summary["min_clearance"][name], summary["clearance_unit"][name]
+    depth, unit, digits = (math.degrees(depth), "°", 1) if unit == "rad" else (depth, " m", 3)
+    return f"{name} by {depth:.{digits}f}{unit}" + (f" ({', '.join(remarks)})" if remarks else "")
 
 
 def _claims(scenario: Scenario, summary: dict[str, Any]) -> str:

@@ -64,8 +64,20 @@ def read_table(name_or_file: str, seen: tuple[str, ...] = (), beside: Path | Non
         base = table.pop("base")
         if not isinstance(base, str):
             raise ScenarioError(f"{name}: base is {base!r}, expected the name of a scenario")
-        table = _merge(read_table(base, (*seen, name_or_file), folder)[0], table)
+        below = read_table(base, (*seen, name_or_file), folder)[0]
+        law = table.get("law")
+        if isinstance(law, dict) and "name" in law:
+            _name_law(below, law["name"])
+        table = _merge(below, table)
     return table, name
+
+
+def _name_law(table: dict[str, Any], name: object) -> None:
+    """Name the law of a scenario; gains belong to a law, so that those of another one go with its name."""
+    law = table.setdefault("law", {})
+    if isinstance(law, dict) and law.get("name", "printed") != name:
+        law.pop("gains", None)
+        law["name"] = name
 
 
 def _merge(base: dict[str, Any], over: dict[str, Any]) -> dict[str, Any]:
@@ -85,6 +97,7 @@ def override(table: dict[str, Any], text: str) -> None:
         A scenario's.
     text : str
         ``key=value``, with dots between the keys and a TOML value, or a bare word; items of lists go by index or name.
+        Another ``law.name`` drops the gains of the law before.
 
     Raises
     ------
@@ -101,6 +114,8 @@ def override(table: dict[str, Any], text: str) -> None:
     if len(parsed) > 1:
         raise ScenarioError(f"--set {text!r}: expected one key=value")
     value = parsed["value"]
+    if key.strip() == "law.name":
+        _name_law(table, value)
     *path, last = key.strip().split(".")
     at: Any = table
     for part in path:

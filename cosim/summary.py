@@ -7,6 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from controller.regions import of_attitude
+from cosim.lyapunov import summarise_lyapunov
 from cosim.record import Record
 from cosim.scenario import CRITERIA, Scenario
 from cosim.signals import Array
@@ -54,8 +56,9 @@ def summarise(scenario: Scenario, record: Record, status: str, wall_time: float 
     Returns
     -------
     dict
-        Ready for JSON; times in s, lengths in m, forces in N. Clearances are distances to a region's surface, positive
-        where it is respected, negative where it is violated (inside a region that is to be kept out of).
+        Ready for JSON; times in s, lengths in m, forces in N. Clearances are distances to a region's surface where that
+        was then, or angles [rad] for regions of attitude; positive where it is respected, negative where it is violated
+        (inside a region that is to be kept out of).
     """
     time = record["time"]
     inside = record["goal.clearance"] >= 0.0
@@ -85,6 +88,13 @@ def summarise(scenario: Scenario, record: Record, status: str, wall_time: float 
         "intersection": [names[i] for i in scenario.intersection],
         "intersection_windows": spans(np.logical_and.reduce(overlap), time) if overlap else [],
         "min_clearance": {name: float(record[f"{name}.clearance"].min()) for name in names},
+        "clearance_unit": {r.region.name: "rad" if of_attitude(r.region.shape) else "m" for r in scenario.regions},
+        "hard": [r.region.name for r in scenario.regions if r.region.hard],
+        "hard_violated": [
+            r.region.name
+            for r in scenario.regions
+            if r.region.hard and record[f"{r.region.name}.clearance"].min() < 0.0
+        ],
         "violated_at_start": [name for name in names if record[f"{name}.clearance"][0] < 0.0],
         "max_force": float(force.max()) if force.size else 0.0,
         "max_force_asked": float(asked.max()),
@@ -97,6 +107,7 @@ def summarise(scenario: Scenario, record: Record, status: str, wall_time: float 
         "estimate_true": scenario.true_restoring_parameters.tolist(),
         "estimate_lowest": [float(record[f"estimate.phi{i}"].min()) for i in range(1, 5)],
         "estimate_highest": [float(record[f"estimate.phi{i}"].max()) for i in range(1, 5)],
+        "lyapunov": summarise_lyapunov(record),
         "steps": len(time) - 1,
         "wall_time": wall_time,
         "real_time_factor": simulated / wall_time if wall_time else None,

@@ -22,9 +22,11 @@ class PrintedMemory(NamedTuple):
     report: Array  # (0,)
     goal_value: Array  # (1,)
     goal_gradient: Array  # (1, 3)
+    goal_turning: Array  # (1, 3)
     goal_clearance: Array  # (1,)
     values: Array  # (n,)
     gradients: Array  # (n, 3)
+    turnings: Array  # (n, 3)
     clearances: Array  # (n,)
 
 
@@ -39,8 +41,10 @@ def step(
     forces: Array,
 ) -> None:
     """Do what `CompiledLaw.step` says, by the printed law."""
-    evaluate_packed(goal, state.position, memory.goal_value, memory.goal_gradient, memory.goal_clearance)
-    evaluate_packed(regions, state.position, memory.values, memory.gradients, memory.clearances)
+    p, e = state.position, state.quaternion
+    # regions push by force alone (22): what they say of attitude is passed over
+    evaluate_packed(goal, p, e, memory.goal_value, memory.goal_gradient, memory.goal_turning, memory.goal_clearance)
+    evaluate_packed(regions, p, e, memory.values, memory.gradients, memory.turnings, memory.clearances)
     printed_law.step(
         state.quaternion,
         state.velocity_body,
@@ -98,8 +102,10 @@ class PrintedLaw(CompiledLaw):
             report=np.zeros(0),
             goal_value=np.zeros(1),
             goal_gradient=np.zeros((1, 3)),
+            goal_turning=np.zeros((1, 3)),
             goal_clearance=np.zeros(1),
             values=np.zeros(n_regions),
             gradients=np.zeros((n_regions, 3)),
+            turnings=np.zeros((n_regions, 3)),
             clearances=np.zeros(n_regions),
         )

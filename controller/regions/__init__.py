@@ -6,19 +6,25 @@ from controller.regions.cylinder import Cylinder
 from controller.regions.depth_band import DepthBand
 from controller.regions.ellipsoid import Ellipsoid
 from controller.regions.half_space import HalfSpace
+from controller.regions.orientation import Orientation
 from controller.regions.pipe import Pipe
 from controller.regions.prism import Prism
 from controller.regions.region_set import (
     SHAPES,
     PackedRegions,
     Region,
+    attitude_clearance,
     clearance_at,
+    clearance_of_place,
+    clearance_of_sphere,
     clearances_at,
     evaluate_packed,
+    of_attitude,
     pack,
 )
 from controller.regions.shape import Shape
 from controller.regions.sphere import Sphere
+from controller.regions.visibility import Visibility
 
 __all__ = [
     "SHAPES",
@@ -28,14 +34,20 @@ __all__ = [
     "DepthBand",
     "Ellipsoid",
     "HalfSpace",
+    "Orientation",
     "PackedRegions",
     "Pipe",
     "Prism",
     "Region",
     "Shape",
     "Sphere",
+    "Visibility",
+    "attitude_clearance",
     "clearance_at",
+    "clearance_of_place",
+    "clearance_of_sphere",
     "clearances_at",
     "evaluate_packed",
+    "of_attitude",
     "pack",
 ]

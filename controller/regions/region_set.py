@@ -13,7 +13,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from controller.compiled import compiled
+from controller.compiled import compiled, inlined
 from controller.errors import RegionError
 from controller.regions.box import Box, box
 from controller.regions.cone import Cone, cone
@@ -21,10 +21,20 @@ from controller.regions.cylinder import Cylinder, cylinder
 from controller.regions.depth_band import DepthBand, depth_band
 from controller.regions.ellipsoid import Ellipsoid, ellipsoid
 from controller.regions.half_space import HalfSpace, half_space
+from controller.regions.orientation import Orientation, orientation
 from controller.regions.pipe import Pipe, pipe
 from controller.regions.prism import Prism, prism
-from controller.regions.shape import Array, Evaluation, Shape, Vector3, require, require_finite
+from controller.regions.shape import (
+    Array,
+    Evaluation,
+    EvaluationOfAttitude,
+    Shape,
+    Vector3,
+    require,
+    require_finite,
+)
 from controller.regions.sphere import Sphere, sphere
+from controller.regions.visibility import Visibility, visibility
 
 SHAPES: dict[str, type[Shape]] = {
     "sphere": Sphere,
@@ -36,7 +46,11 @@ SHAPES: dict[str, type[Shape]] = {
     "prism": Prism,
     "pipe": Pipe,
     "cone": Cone,
+    "orientation": Orientation,
+    "visibility": Visibility,
 }
+
+_FIRST_OF_ATTITUDE = Orientation.kind  # kinds from it on depend on attitude
 
 
 @dataclass(frozen=True)
@@ -58,6 +72,13 @@ class Region:
             raise RegionError(f"region {self.name!r}: keep is {self.keep!r}, expected 'in' or 'out'")
         require_finite(f"region {self.name!r}", velocity=self.velocity)
         require(0.0 <= self.gain < math.inf, f"region {self.name!r}", "gain", self.gain, "a finite number, 0 or above")
+        at_rest = not isinstance(self.shape, Orientation) or not any(self.velocity)
+        require(at_rest, f"region {self.name!r}", "velocity", self.velocity, "none: an orientation is at no place")
+
+
+def of_attitude(shape: Shape) -> bool:
+    """Return whether a shape depends on attitude, so that its clearance is in rad instead of m."""
+    return shape.kind >= _FIRST_OF_ATTITUDE
 
 
 class PackedRegions(NamedTuple):
@@ -75,21 +96,29 @@ class PackedRegions(NamedTuple):
     gains: Array  # (n,) alpha_i
     hard: NDArray[np.bool_]  # (n,)
 
-    def evaluate(self, position: Array, values: Array, gradients: Array, clearances: Array) -> None:
-        """Evaluate every region at a position, into the given arrays.
+    def evaluate(
+        self, position: Array, quaternion: Array, values: Array, gradients: Array, turnings: Array, clearances: Array
+    ) -> None:
+        """Evaluate every region at a pose, into the given arrays.
 
         Parameters
         ----------
         position : ndarray, shape (3,)
             [m, NED].
+        quaternion : ndarray, shape (4,)
+            Unit quaternion from body to world; shapes of position alone do not look at it.
         values : ndarray, shape (n,)
             Receives g_i, at most 0 where satisfied, in the unit of the shape.
         gradients : ndarray, shape (n, 3)
-            Receives dg_i/dp.
+            Receives dg_i/dp, world frame.
+        turnings : ndarray, shape (n, 3)
+            Receives dg_i/dtheta [1/rad] for a small rotation theta about the body's axes, which takes the quaternion
+            e to e exp(theta / 2); 0 for shapes of position alone.
         clearances : ndarray, shape (n,)
-            Receives the distance to the surface [m]: positive where satisfied, negative where violated.
+            Receives the distance to the surface [m], or the angle [rad] for shapes of attitude: positive where
+            satisfied, negative where violated.
         """
-        evaluate_packed(self, position, values, gradients, clearances)
+        evaluate_packed(self, position, quaternion, values, gradients, turnings, clearances)
 
     def move_to(self, time: float) -> None:
         """Put every region where its velocity has brought it at a time [s]."""
@@ -144,28 +173,83 @@ def _evaluate_shape(kind: int, p: Array, q: Array) -> Evaluation:
 
 
 @compiled
+def _evaluate_shape_of_attitude(kind: int, p: Array, e: Array, q: Array) -> EvaluationOfAttitude:
+    if kind == _FIRST_OF_ATTITUDE:
+        return orientation(p, e, q)
+    return visibility(p, e, q)
+
+
+@compiled
 def evaluate_packed(
-    regions: PackedRegions, position: Array, values: Array, gradients: Array, clearances: Array
+    regions: PackedRegions,
+    position: Array,
+    quaternion: Array,
+    values: Array,
+    gradients: Array,
+    turnings: Array,
+    clearances: Array,
 ) -> None:
     """Do what `PackedRegions.evaluate` says, for compiled callers."""
     at = np.empty(3)
     for i in range(regions.kinds.size):
-        at[:] = position - regions.shifts[i]
+        for j in range(3):
+            at[j] = position[j] - regions.shifts[i, j]
         numbers = regions.numbers[regions.offsets[i] : regions.offsets[i + 1]]
-        g, gx, gy, gz, distance = _evaluate_shape(regions.kinds[i], at, numbers)
-        values[i] = regions.signs[i] * g
-        gradients[i, 0] = regions.signs[i] * gx
-        gradients[i, 1] = regions.signs[i] * gy
-        gradients[i, 2] = regions.signs[i] * gz
-        clearances[i] = -regions.signs[i] * distance
+        kind = regions.kinds[i]
+        tx, ty, tz = 0.0, 0.0, 0.0
+        if kind < _FIRST_OF_ATTITUDE:
+            g, gx, gy, gz, distance = _evaluate_shape(kind, at, numbers)
+        else:
+            g, gx, gy, gz, tx, ty, tz = _evaluate_shape_of_attitude(kind, at, quaternion, numbers)
+            distance = g
+        sign = regions.signs[i]
+        values[i] = sign * g
+        gradients[i, 0] = sign * gx
+        gradients[i, 1] = sign * gy
+        gradients[i, 2] = sign * gz
+        turnings[i, 0] = sign * tx
+        turnings[i, 1] = sign * ty
+        turnings[i, 2] = sign * tz
+        clearances[i] = -sign * distance
+
+
+@inlined
+def clearance_of_place(regions: PackedRegions, i: int, position: Array, room: Array) -> float:
+    """Return what `clearance_at` does, of a region known to be of position alone; `room` has shape (3,)."""
+    for axis in range(3):
+        room[axis] = position[axis] - regions.shifts[i, axis]
+    numbers = regions.numbers[regions.offsets[i] : regions.offsets[i + 1]]
+    return -regions.signs[i] * _evaluate_shape(regions.kinds[i], room, numbers)[4]
 
 
 @compiled
 def clearance_at(regions: PackedRegions, i: int, position: Array) -> float:
-    """Return the clearance [m] of region `i`, where it is now, at a position, shape (3,) [m, NED]."""
+    """Return the clearance [m] of region `i`, where it is now, at a position, shape (3,) [m, NED].
+
+    Infinite for shapes that depend on attitude: they close no place.
+    """
+    if regions.kinds[i] >= _FIRST_OF_ATTITUDE:
+        return math.inf
+    return clearance_of_place(regions, i, position, np.empty(3))
+
+
+@inlined
+def clearance_of_sphere(regions: PackedRegions, i: int, position: Array) -> float:
+    """Return what `clearance_at` does, of a region known to be a sphere, twenty times as fast as for any shape."""
+    first = regions.offsets[i]
+    x = position[0] - regions.shifts[i, 0] - regions.numbers[first]
+    y = position[1] - regions.shifts[i, 1] - regions.numbers[first + 1]
+    z = position[2] - regions.shifts[i, 2] - regions.numbers[first + 2]
+    return -regions.signs[i] * (math.sqrt(x * x + y * y + z * z) - regions.numbers[first + 3])
+
+
+@compiled
+def attitude_clearance(regions: PackedRegions, i: int, position: Array, quaternion: Array) -> tuple[float, Array]:
+    """Return the clearance [rad] of region `i`, of attitude, at a pose, and its slope over a turn in body axes, (3,)."""
     numbers = regions.numbers[regions.offsets[i] : regions.offsets[i + 1]]
-    clearance: float = -regions.signs[i] * _evaluate_shape(regions.kinds[i], position - regions.shifts[i], numbers)[4]
-    return clearance
+    at, sign = position - regions.shifts[i], regions.signs[i]
+    g, _, _, _, x, y, z = _evaluate_shape_of_attitude(regions.kinds[i], at, quaternion, numbers)
+    return -sign * g, np.array([-sign * x, -sign * y, -sign * z])
 
 
 def clearances_at(points: Array, region: Region) -> Array:
@@ -181,7 +265,7 @@ def clearances_at(points: Array, region: Region) -> Array:
     Returns
     -------
     ndarray, shape (m,)
-        As `PackedRegions.evaluate` gives it [m].
+        As `clearance_at` gives it [m].
     """
     return _clearances_at(pack([region]), points)
 

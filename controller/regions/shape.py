@@ -22,15 +22,20 @@ Bounds = tuple[Vector3, Vector3]
 # value of g, its gradient (3 numbers), signed distance [m]
 Evaluation = tuple[float, float, float, float, float]
 
+# value of g [rad], its gradient by position (3 numbers, world), by rotation about the body's axes (3 numbers)
+EvaluationOfAttitude = tuple[float, float, float, float, float, float, float]
+
 UP_TO_ROUNDING = 1e-12
 GREATEST = 1e6  # m; squares and their sums stay far from overflow
 
 
 class Shape(Protocol):
-    """A closed set in the world, given as g(p) <= 0.
+    """A closed set of positions, given as g(p) <= 0, or of poses, given as g(p, e) <= 0.
 
-    The compiled function of each shape takes a position, shape (3,), and the packed numbers, and returns g, its
-    gradient, and the signed distance [m] to the surface, negative inside. The unit of g is the shape's own.
+    The compiled function of a shape takes a position, shape (3,), and the packed numbers, and returns g, its gradient,
+    and the signed distance [m] to the surface, negative inside. The unit of g is the shape's own. That of a shape that
+    depends on attitude takes the quaternion between the two, and returns g [rad] and its derivatives by position and
+    by rotation; -g is its clearance.
     """
 
     kind: ClassVar[int]  # tells the shapes apart in packed arrays

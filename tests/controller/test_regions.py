@@ -20,11 +20,14 @@ from controller.regions import (
     DepthBand,
     Ellipsoid,
     HalfSpace,
+    Orientation,
     Pipe,
     Prism,
     Region,
     Sphere,
+    Visibility,
     clearances_at,
+    of_attitude,
     pack,
 )
 
@@ -41,23 +44,49 @@ EXAMPLES = [
     Prism(((0.0, 0.0), (3.0, 0.0), (3.0, 2.0), (1.0, 0.5), (0.0, 2.0)), 1.0, 3.0),  # not convex
     Pipe(((0.0, 0.0, 0.0), (2.0, 0.0, 0.0), (2.0, 2.0, 1.0)), 0.4),
     Cone((1.0, 1.0, 1.0), (-1.0, 0.0, 0.3), 0.6, 3.0),
+    Orientation(TURNED, 0.8),
+    Visibility((1.0, 2.0, 3.0), (1.0, 0.2, 0.5), 0.9, (0.3, -0.1, 0.2)),
 ]
+IN_SPACE = [shape for shape in EXAMPLES if not of_attitude(shape)]
 each_shape = pytest.mark.parametrize("shape", EXAMPLES, ids=lambda shape: type(shape).__name__)
+each_shape_in_space = pytest.mark.parametrize("shape", IN_SPACE, ids=lambda shape: type(shape).__name__)
 points = st.lists(st.floats(-4.0, 5.0), min_size=3, max_size=3).map(np.array)
+turns = st.lists(st.floats(-1.0, 1.0), min_size=4, max_size=4).map(np.array)
+attitudes = turns.filter(lambda e: np.linalg.norm(e) > 0.1).map(lambda e: e / np.linalg.norm(e))
+LEVEL = np.array([1.0, 0.0, 0.0, 0.0])
+
+
+def evaluated(shape, p, e=LEVEL, keep="in"):
+    """Return g, its derivatives by position and by rotation, and the clearance."""
+    packed = pack([Region("r", shape, keep)])
+    values, gradients, turnings, clearances = np.empty(1), np.empty((1, 3)), np.empty((1, 3)), np.empty(1)
+    packed.evaluate(np.asarray(p, float), np.asarray(e, float), values, gradients, turnings, clearances)
+    return values[0], gradients[0], turnings[0], clearances[0]
 
 
 def at(shape, p, keep="in"):
     """Return g, its gradient and the clearance."""
-    packed = pack([Region("r", shape, keep)])
-    values, gradients, clearances = np.empty(1), np.empty((1, 3)), np.empty(1)
-    packed.evaluate(np.asarray(p, float), values, gradients, clearances)
-    return values[0], gradients[0], clearances[0]
+    g, gradient, _, clearance = evaluated(shape, p, keep=keep)
+    return g, gradient, clearance
 
 
-def contains(shape, p):
+def turned(e, theta):
+    """Return the attitude after a small rotation about the body's axes, by SciPy."""
+    both = Rotation.from_quat(np.roll(e, -1)) * Rotation.from_rotvec(theta)
+    return np.roll(both.as_quat(), 1)
+
+
+def contains(shape, p, e=LEVEL):
     """Membership by the words of each definition; shares no code with the shapes."""
     p = np.asarray(p, float)
+    attitude = Rotation.from_quat(np.roll(e, -1))
     match shape:
+        case Orientation(quaternion, tolerance):
+            return (Rotation.from_quat(np.roll(quaternion, -1)).inv() * attitude).magnitude() <= tolerance
+        case Visibility(feature, camera_axis, half_angle, camera_position):
+            sight = np.array(feature) - (p + attitude.apply(camera_position))
+            cosine = sight @ attitude.apply(camera_axis) / np.linalg.norm(sight) / np.linalg.norm(camera_axis)
+            return math.acos(np.clip(cosine, -1, 1)) <= half_angle
         case Sphere(centre, radius):
             return np.linalg.norm(p - centre) <= radius
         case DepthBand(depth, tolerance):
@@ -96,34 +125,63 @@ def test_all_shapes_are_here():
 
 
 @each_shape
-@given(p=points)
-def test_sign_says_inside_or_outside(shape, p):
-    g, _, clearance = at(shape, p)
+@given(p=points, e=attitudes)
+def test_sign_says_inside_or_outside(shape, p, e):
+    g, _, _, clearance = evaluated(shape, p, e)
     assert g * clearance <= 0.0
     if abs(clearance) > 1e-6:
-        assert (clearance > 0.0) == contains(shape, p)
+        assert (clearance > 0.0) == contains(shape, p, e)
 
 
 @each_shape
-@given(p=points)
-def test_gradient_is_that_of_the_value(shape, p):
+@given(p=points, e=attitudes)
+def test_gradient_and_turning_are_those_of_the_value(shape, p, e):
     h = 1e-6
-    g, gradient, _ = at(shape, p)
-    ahead, behind = (np.array([at(shape, p + s * h * axis)[0] for axis in np.eye(3)]) for s in (1.0, -1.0))
+    g, gradient, turning, _ = evaluated(shape, p, e)
+    derivatives = np.concatenate([gradient, turning])
+    moves = [(p + s * h * axis, e) for s in (1.0, -1.0) for axis in np.eye(3)]
+    rotations = [(p, turned(e, s * h * axis)) for s in (1.0, -1.0) for axis in np.eye(3)]
+    near = [evaluated(shape, *pose)[0] for pose in (*moves[:3], *rotations[:3], *moves[3:], *rotations[3:])]
+    ahead, behind = np.split(np.array(near), 2)
     one_sided = np.array([(ahead - g) / h, (g - behind) / h])
     kink = np.abs(one_sided[0] - one_sided[1]).max()
-    if kink > 1e-3 * max(1.0, np.abs(gradient).max()):
+    if kink > 1e-3 * max(1.0, np.abs(derivatives).max()):
         return  # a ridge, where there is no gradient
-    assert gradient == pytest.approx((ahead - behind) / (2 * h), abs=0.5 * kink + 1e-6)
+    assert derivatives == pytest.approx((ahead - behind) / (2 * h), abs=0.5 * kink + 1e-6)
 
 
 @each_shape
+def test_most_places_and_attitudes_are_no_ridge(shape):
+    """Keep the test above from passing by looking away."""
+    rng = np.random.default_rng(3)
+    h, smooth = 1e-6, 0
+    for _ in range(60):
+        p, e = rng.uniform(-4.0, 5.0, 3), rng.normal(size=4)
+        e /= np.linalg.norm(e)
+        move, turn = rng.normal(size=(2, 3))
+        g, gradient, turning, _ = evaluated(shape, p, e)
+        ahead = evaluated(shape, p + h * move, turned(e, h * turn))[0]
+        slope = gradient @ move + turning @ turn
+        smooth += abs((ahead - g) / h - slope) < 1e-3 * max(1.0, np.abs(gradient).max())
+    assert smooth >= 58
+
+
+@each_shape_in_space
+@given(p=points, e=attitudes)
+def test_shapes_in_space_do_not_look_at_the_attitude(shape, p, e):
+    g, gradient, turning, clearance = evaluated(shape, p, e)
+    level = at(shape, p)
+    assert (g, *gradient, clearance) == (level[0], *level[1], level[2])
+    assert not turning.any()
+
+
+@each_shape_in_space
 @given(p=points, q=points)
 def test_distance_changes_no_faster_than_one_moves(shape, p, q):
     assert abs(at(shape, p)[2] - at(shape, q)[2]) <= np.linalg.norm(p - q) * (1 + 1e-9) + 1e-12
 
 
-@each_shape
+@each_shape_in_space
 def test_distance_is_that_of_the_nearest_point_of_the_surface(shape):
     """Outside by minimising |x - p| over the set, inside by growing a ball until it leaves the set."""
     rng = np.random.default_rng(5)
@@ -150,9 +208,9 @@ def test_distance_is_that_of_the_nearest_point_of_the_surface(shape):
 
 
 @each_shape
-@given(p=points)
-def test_keeping_out_is_the_opposite_of_keeping_in(shape, p):
-    for kept_in, kept_out in zip(at(shape, p, "in"), at(shape, p, "out"), strict=True):
+@given(p=points, e=attitudes)
+def test_keeping_out_is_the_opposite_of_keeping_in(shape, p, e):
+    for kept_in, kept_out in zip(evaluated(shape, p, e, "in"), evaluated(shape, p, e, "out"), strict=True):
         assert np.array_equal(kept_in, -kept_out)
 
 
@@ -225,7 +283,13 @@ def test_paper_regions_have_the_paper_values():
         (lambda: Pipe(((0.0, 0.0, 0.0),), 1.0), "points"),
         (lambda: Pipe(((0.0, 0.0, 0.0), (0.0, 0.0, 0.0)), 1.0), "points"),
         (lambda: Cone((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), 2.0, 1.0), "half_angle"),
+        (lambda: Orientation((0.0, 0.0, 0.0, 0.0), 1.0), "quaternion"),
+        (lambda: Orientation((1.0, 0.0, 0.0, 0.0), 0.0), "tolerance"),
+        (lambda: Visibility((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 1.0), "camera_axis"),
+        (lambda: Visibility((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), 4.0), "half_angle"),
+        (lambda: Visibility((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), 1.0, (math.nan, 0.0, 0.0)), "camera_position"),
         (lambda: Region("r", Sphere((0.0, 0.0, 0.0), 1.0), "off"), "keep"),
+        (lambda: Region("r", Orientation((1.0, 0.0, 0.0, 0.0), 1.0), "in", (0.1, 0.0, 0.0)), "velocity"),
     ],
 )
 def test_regions_that_cannot_be_are_named(make, words):
@@ -233,8 +297,78 @@ def test_regions_that_cannot_be_are_named(make, words):
         make()
 
 
+@pytest.mark.parametrize("angle", [0.0, 1e-9, 0.4, 3.0, math.pi - 1e-9, math.pi])
+def test_orientation_is_the_angle_of_the_turn(angle):
+    """About z alone; either sign of the quaternion is the same attitude, and the ends of the range have no slope."""
+    shape = Orientation((1.0, 0.0, 0.0, 0.0), 0.5)
+    e = np.array([math.cos(angle / 2.0), 0.0, 0.0, math.sin(angle / 2.0)])
+    if angle == math.pi:
+        e[0] = 0.0
+    for attitude in (e, -e):
+        g, gradient, turning, clearance = evaluated(shape, (0.0, 0.0, 0.0), attitude)
+        assert g == pytest.approx(angle - 0.5, abs=1e-12)
+        assert clearance == -g
+        assert not gradient.any()
+        expected = 0.0 if angle in (0.0, math.pi) else 1.0
+        assert turning == pytest.approx([0.0, 0.0, expected], abs=1e-12)
+
+
+def test_visibility_by_hand():
+    """A camera 0.5 m ahead of the origin looks forward; 2 m ahead of it, and 2 m to the right, is 45 degrees off."""
+    shape = Visibility((2.5, 2.0, 0.0), (1.0, 0.0, 0.0), 0.5, (0.5, 0.0, 0.0))
+    g, gradient, turning, _ = evaluated(shape, (0.0, 0.0, 0.0))
+    assert g == pytest.approx(math.pi / 4.0 - 0.5)
+    # a step to the right brings it nearer to the axis by 1 / (sqrt 2 distance); a step forward takes it away
+    assert gradient == pytest.approx([0.25, -0.25, 0.0])
+    # turning right by one radian brings it one radian nearer, but for the way that the camera moves
+    assert turning == pytest.approx([0.0, 0.0, -1.0 - 0.25 * 0.5])
+
+
+@pytest.mark.parametrize(
+    ("feature", "angle"),
+    [((3.0, 0.0, 0.0), 0.0), ((-3.0, 0.0, 0.0), math.pi), ((0.0, 0.0, 0.0), math.pi)],
+    ids=["ahead", "behind", "in the camera"],
+)
+def test_visibility_has_numbers_on_its_axis(feature, angle):
+    g, gradient, turning, _ = evaluated(Visibility(feature, (1.0, 0.0, 0.0), 0.5), (0.0, 0.0, 0.0))
+    assert g == angle - 0.5
+    assert not gradient.any()
+    assert not turning.any()
+
+
+@each_shape
+@given(p=points, e=attitudes, velocity=points)
+def test_a_moving_region_is_where_it_would_be_seen_from_its_own_place(shape, p, e, velocity):
+    if isinstance(shape, Orientation):
+        return  # at no place
+    packed = pack([Region("r", shape, "in", tuple(velocity))])
+    packed.move_to(1.5)
+    values, gradients, turnings, clearances = np.empty(1), np.empty((1, 3)), np.empty((1, 3)), np.empty(1)
+    packed.evaluate(p + 1.5 * velocity, e, values, gradients, turnings, clearances)
+    g, gradient, turning, clearance = evaluated(shape, (p + 1.5 * velocity) - 1.5 * velocity, e)
+    assert (values[0], clearances[0]) == (g, clearance)
+    assert np.array_equal(gradients[0], gradient)
+    assert np.array_equal(turnings[0], turning)
+
+
+@pytest.mark.parametrize("shape", [shape for shape in EXAMPLES if of_attitude(shape)])
+def test_shapes_of_attitude_close_no_place(shape):
+    assert np.all(clearances_at(np.zeros((2, 3)), Region("r", shape, "out")) == math.inf)
+
+
+@pytest.mark.parametrize("shape", [shape for shape in EXAMPLES if of_attitude(shape)])
+def test_a_lost_attitude_never_looks_safe(shape):
+    for keep in ("in", "out"):
+        g, _, _, clearance = evaluated(shape, (0.0, 0.0, 0.0), np.full(4, math.nan), keep)
+        assert math.isnan(g)
+        assert math.isnan(clearance)
+
+
 @each_shape
 def test_a_lost_position_never_looks_safe(shape):
+    if isinstance(shape, Orientation):
+        assert np.isfinite(at(shape, [math.nan] * 3)[0])  # which does not ask where it is
+        return
     sees = 1 if isinstance(shape, DepthBand) else 3  # a band is of depth alone
     for axis in range(3)[-sees:]:
         p = [0.5, 0.5, 0.5]
@@ -245,7 +379,7 @@ def test_a_lost_position_never_looks_safe(shape):
             assert math.isnan(clearance)
 
 
-@each_shape
+@each_shape_in_space
 def test_bounds_hold_the_shape(shape):
     low, high = map(np.array, shape.bounds())
     rng = np.random.default_rng(2)
@@ -259,7 +393,7 @@ def test_bounds_hold_the_shape(shape):
 def test_no_regions_at_all_is_a_scene_too():
     packed = pack([])
     nothing = np.empty(0)
-    packed.evaluate(np.zeros(3), nothing, np.empty((0, 3)), nothing)
+    packed.evaluate(np.zeros(3), LEVEL, nothing, np.empty((0, 3)), np.empty((0, 3)), nothing)
 
 
 @pytest.mark.parametrize("cls", SHAPES.values())

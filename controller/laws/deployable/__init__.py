@@ -1,0 +1,6 @@
+"""The deployable law: keeps the paper's idea and works within real thrusters."""
+
+from controller.laws.deployable.gains import DeployableGains
+from controller.laws.deployable.law import DeployableLaw
+
+__all__ = ["DeployableGains", "DeployableLaw"]

@@ -1,0 +1,56 @@
+"""What deceleration may be relied on, whatever the direction and whichever thruster is lost."""
+
+from __future__ import annotations
+
+import functools
+import itertools
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import linprog
+
+from controller.law import VehicleModel
+
+Array = NDArray[np.float64]
+
+
+def least_forces(vehicle: VehicleModel) -> Array:
+    """Return the greatest force in the worst direction, with each thruster lost and with none.
+
+    Without any moment, over the 26 directions to faces, edges and corners of a cube in body axes.
+
+    Parameters
+    ----------
+    vehicle : VehicleModel
+        With m thrusters.
+
+    Returns
+    -------
+    ndarray, shape (m + 1,)
+        [N]; the last with all thrusters working.
+    """
+    B, lower, upper = vehicle.thruster_matrix, vehicle.thrust_min, vehicle.thrust_max
+    return np.array(_least_forces(B.tobytes(), B.shape[1], lower.tobytes(), upper.tobytes()))
+
+
+@functools.lru_cache(maxsize=16)
+def _least_forces(matrix: bytes, m: int, least: bytes, greatest: bytes) -> tuple[float, ...]:
+    B = np.frombuffer(matrix).reshape(6, m)
+    lower, upper = np.frombuffer(least), np.frombuffer(greatest)
+    directions = [np.array(d) / np.linalg.norm(d) for d in itertools.product((-1, 0, 1), repeat=3) if any(d)]
+    forces = []
+    for lost in range(m + 1):
+        working = np.arange(m) != lost
+        limits = [(lo, up) if works else (0.0, 0.0) for lo, up, works in zip(lower, upper, working, strict=True)]
+        forces.append(min(_greatest_force(B, limits, direction) for direction in directions))
+    return tuple(forces)
+
+
+def _greatest_force(B: Array, limits: list[tuple[float, float]], direction: Array) -> float:
+    """Return the greatest s with B u = [s direction, 0] and u within its limits."""
+    m = B.shape[1]
+    cost = np.zeros(m + 1)
+    cost[m] = -1.0
+    equal = np.hstack([B, np.r_[-direction, np.zeros(3)][:, None]])
+    found = linprog(cost, A_eq=equal, b_eq=np.zeros(6), bounds=[*limits, (0.0, None)])
+    return float(found.x[m]) if found.status == 0 else 0.0

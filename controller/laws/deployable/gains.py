@@ -1,0 +1,82 @@
+"""The numbers of the deployable law that a user may turn, with defaults that suit a vehicle of a metre."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from controller.errors import LawError
+
+
+class DeployableGains(NamedTuple):
+    """Gains of the deployable law; all are choices of this project, none is from the paper."""
+
+    # attraction
+    speed: float = 1.2  # m/s, greatest over ground
+    acceleration: float = 0.3  # m/s2, with which the attraction speeds up and brakes
+    velocity_bandwidth: float = 1.2  # rad/s, of the loop that follows the wanted velocity
+    position_bandwidth: float = 0.8  # 1/s, of the approach to the end of the way
+    depth: float = 0.3  # m, how far inside the goal region the way ends, where the region is that deep
+    attitude_bandwidth: float = 2.0  # rad/s
+    # attitude asked for by regions
+    comfort: float = 0.15  # rad, clearance that a region of attitude has where the held attitude heeds it
+    tilt: float = 0.35  # rad, greatest from the vertical that a region may ask for
+    turning_rate: float = 0.4  # rad/s, greatest of the held attitude
+    turning_deceleration: float = 0.5  # rad/s2, relied on by barriers of attitude
+    # barriers
+    margin: float = 0.03  # m, kept of hard regions beside what the estimate's error asks for
+    braking_share: float = 0.8  # of the deceleration that is left with any one thruster lost, relied on for stopping
+    barrier_slope: float = 1.5  # 1/s, greatest rate at which a barrier may be approached per metre
+    barrier_rate: float = 4.0  # 1/s, at which a barrier's speed limit is enforced
+    # way round
+    clearance: float = 0.25  # m, that the way keeps of hard regions where it can
+    # estimates
+    position_noise: float = 0.02  # m, standard deviation of one measurement
+    velocity_noise: float = 0.01  # m/s
+    restoring_drift: float = 0.3  # N/sqrt(s), how fast W - B may change
+    current_drift: float = 0.01  # m/s/sqrt(s)
+    restoring_bound: float = 50.0  # N, of |W - B|
+    moment_bound: float = 150.0  # N m, of each of the other three of phi
+    current_bound: float = 1.0  # m/s
+    adaptation: float = 0.5  # 1/s, of the moments
+    # lost measurements and thrusters
+    coast: float = 2.0  # s that the law goes on without valid measurements before it lets the vehicle drift
+    failure_threshold: float = 25.0  # log-likelihood ratio at which a thruster is given up; 0: never
+
+
+def check_gains(gains: DeployableGains) -> DeployableGains:
+    """Return the gains if the law can work with them.
+
+    Parameters
+    ----------
+    gains : DeployableGains
+        To be checked.
+
+    Returns
+    -------
+    DeployableGains
+        The same.
+
+    Raises
+    ------
+    LawError
+        If one is negative or not finite, or one that divides is zero.
+    """
+    may_be_zero = (
+        "margin",
+        "comfort",
+        "tilt",
+        "depth",
+        "coast",
+        "failure_threshold",
+        "restoring_drift",
+        "current_drift",
+        "adaptation",
+    )
+    for name, value in gains._asdict().items():
+        least = "0 or above" if name in may_be_zero else "above 0"
+        if not (math.isfinite(value) and (value >= 0.0 if name in may_be_zero else value > 0.0)):
+            raise LawError(f"law.gains.{name} is {value}, expected a finite number {least}")
+    if gains.braking_share > 1.0:
+        raise LawError(f"law.gains.braking_share is {gains.braking_share}, expected at most 1")
+    return gains

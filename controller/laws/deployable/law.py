@@ -1,0 +1,362 @@
+"""The deployable law: one step from measurement to thruster forces, in named stages.
+
+estimate -> failed thrusters -> way round -> bounded attraction -> barriers -> quadratic program.
+"""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar, NamedTuple
+
+import numpy as np
+
+from controller.compiled import compiled
+from controller.law import (
+    Array,
+    CompiledLaw,
+    Diagnostic,
+    Output,
+    VehicleModel,
+    VehicleState,
+    checked_period,
+    checked_quaternion,
+)
+from controller.laws.deployable import attitude as attitude_loop
+from controller.laws.deployable import failure, guide, model, observer, quadratic_program
+from controller.laws.deployable.attitude import Attitude, attitude_of
+from controller.laws.deployable.attraction import wanted_acceleration, wanted_velocity
+from controller.laws.deployable.barrier import Motion, Sight, look, sight_of, write_rows
+from controller.laws.deployable.braking import least_forces
+from controller.laws.deployable.failure import Suspicion, suspicion_of
+from controller.laws.deployable.gains import DeployableGains, check_gains
+from controller.laws.deployable.guide import Guide, guide_of_nothing
+from controller.laws.deployable.model import Dynamics, Thrusters, dynamics_of, thrusters_of
+from controller.laws.deployable.observer import Estimate, estimate_of_nothing
+from controller.laws.deployable.quadratic_program import Workspace, workspace
+from controller.quaternion import rotation_matrix
+from controller.regions import Orientation, PackedRegions
+
+_SPREADS = 3.0  # standard deviations of the position that the margin adds
+_STALE = 0.15  # s without a valid measurement, after which the vehicle is brought to a stop
+_SEED = 1
+_ATTITUDE = Orientation.kind  # shapes from it on depend on attitude
+
+DIAGNOSTICS = (
+    Diagnostic("position.x", "m", "Estimated position, north"),
+    Diagnostic("position.y", "m", "Estimated position, east"),
+    Diagnostic("position.z", "m", "Estimated position, down"),
+    Diagnostic("velocity.x", "m/s", "Estimated velocity over ground, north"),
+    Diagnostic("velocity.y", "m/s", "Estimated velocity over ground, east"),
+    Diagnostic("velocity.z", "m/s", "Estimated velocity over ground, down"),
+    Diagnostic("current.x", "m/s", "Estimated current, north"),
+    Diagnostic("current.y", "m/s", "Estimated current, east"),
+    Diagnostic("wanted_speed", "m/s", "Speed that the attraction wants"),
+    Diagnostic("way_cost", "m", "Length of the way into the goal region, and what it costs to pass close"),
+    Diagnostic("way_corners", "", "Corners of the way"),
+    Diagnostic("barriers", "", "Barriers that hold the thrusters back"),
+    Diagnostic("yielding", "m/s2", "By how much the barrier that yields most yields"),
+    Diagnostic("program_steps", "", "Steps of the quadratic program, negative if it was cut short"),
+    Diagnostic("failed_thruster", "", "Thruster that is given up, from 1; 0 for none"),
+    Diagnostic("silence", "s", "Time since the last measurement that was believed"),
+)
+
+
+class DeployableMemory(NamedTuple):
+    """What the deployable law keeps between steps."""
+
+    period: Array  # (1,) s
+    estimate: Array  # (4,) phi-hat [N, N m]
+    report: Array  # (len(DIAGNOSTICS),)
+    dynamics: Dynamics
+    thrusters: Thrusters
+    observed: Estimate
+    attitude: Attitude
+    suspicion: Suspicion
+    guide: Guide
+    sight: Sight
+    program: Workspace
+    quaternion: Array  # (4,) last valid
+    omega: Array  # (3,) last valid [rad/s]
+
+
+@compiled
+def step(
+    state: VehicleState,
+    goal: PackedRegions,
+    regions: PackedRegions,
+    weights: Array,
+    gains: DeployableGains,
+    memory: DeployableMemory,
+    forces: Array,
+) -> None:
+    """Do what `CompiledLaw.step` says, by the deployable law."""
+    seen, thrusters, dynamics, period = memory.observed, memory.thrusters, memory.dynamics, memory.period[0]
+
+    # estimate
+    _keep_attitude(memory, state)
+    R = rotation_matrix(memory.quaternion)
+    measured = _observe(memory, state, R, gains)
+    if seen.silence[0] < 0.0 or seen.silence[0] > gains.coast:  # nothing known: drift
+        forces[:] = 0.0
+        thrusters.forces[:] = 0.0
+        memory.report[15] = seen.silence[0]
+        return
+
+    # failed thrusters
+    failed = -1
+    for j in range(thrusters.health.size):
+        if state.thruster_health[j] == 0.0 and thrusters.health[j] != 0.0:
+            failed = j
+    if failed < 0:
+        residual = memory.attitude.residual
+        failed = failure.suspect(memory.suspicion, seen, residual, dynamics, thrusters, R, gains, period, measured)
+    if failed >= 0:
+        failure.give_up(memory.suspicion, thrusters, failed)
+        model.share_out(thrusters)
+        observer.doubt(seen, 0.01)
+
+    # way round, bounded attraction
+    wanted, acceleration = np.zeros(3), np.empty(3)
+    guide.improve(memory.guide, seen.position, goal, regions, gains, period)
+    if seen.silence[0] <= _STALE:
+        wanted_velocity(memory.guide, seen.position, goal.velocities[0], gains, wanted)
+    wanted_acceleration(wanted, seen.velocity, gains, acceleration)
+
+    # wanted wrench
+    free, wrench, velocity = np.empty(6), np.empty(6), np.empty(6)
+    model.free_acceleration(dynamics, R, seen.velocity, memory.omega, seen.water, seen.restoring[0], free)
+    attitude_loop.free_turning(memory.attitude, dynamics, memory.quaternion, memory.omega, free[3:])
+    velocity[:3], velocity[3:] = seen.velocity, memory.omega
+    look(memory.sight, regions, seen.position, memory.quaternion, velocity)
+    acceleration -= free[:3]
+    _force_of(dynamics, R, acceleration, wrench)
+    _soft_forces(memory.sight, regions, weights, R, dynamics, wrench)
+    attitude_loop.aim(memory.attitude, regions, seen.position, gains, period)
+    attitude_loop.moment(memory.attitude, dynamics, memory.quaternion, memory.omega, gains, wrench[3:])
+    work = memory.program
+    for j in range(forces.size):
+        work.wanted[j] = 0.0
+        for k in range(6):
+            work.wanted[j] += thrusters.allocator[j, k] * wrench[k]
+
+    # barriers
+    motion = Motion(
+        velocity,
+        free,
+        _push(dynamics, thrusters, R),
+        dynamics.translational_mass[0],
+        (dynamics.mass[3, 3] + dynamics.mass[4, 4] + dynamics.mass[5, 5]) / 3.0,
+        gains.braking_share * _braking(dynamics, thrusters),
+        _SPREADS * observer.position_spread(seen),
+    )
+    rows = write_rows(work, memory.sight, regions, weights, motion, thrusters.lower, thrusters.upper, gains)
+
+    # quadratic program
+    steps = quadratic_program.solve(work, rows, thrusters.inverse, thrusters.lower, thrusters.upper, forces)
+    thrusters.forces[:] = forces
+    _report(memory, wanted, rows, steps)
+
+
+@compiled
+def _keep_attitude(memory: DeployableMemory, state: VehicleState) -> None:
+    """Keep attitude and rates if they can be believed, else those before."""
+    size, rates = 0.0, 0.0
+    for i in range(4):
+        size += state.quaternion[i] ** 2
+    for i in range(3):
+        rates += state.velocity_body[3 + i]
+    if abs(size - 1.0) < 1e-2 and np.isfinite(rates):
+        memory.quaternion[:] = state.quaternion / np.sqrt(size)
+        memory.omega[:] = state.velocity_body[3:]
+
+
+@compiled
+def _observe(memory: DeployableMemory, state: VehicleState, R: Array, gains: DeployableGains) -> bool:
+    """Carry the estimate over the last period and take in the measurement; return whether it was believed."""
+    seen, period = memory.observed, memory.period[0]
+    velocity, good, frozen = np.zeros(3), True, True
+    for i in range(3):
+        for k in range(3):
+            velocity[i] += R[i, k] * state.velocity_body[k]
+    for i in range(3):
+        good = good and np.isfinite(state.position[i]) and np.isfinite(velocity[i])
+        frozen = frozen and state.position[i] == seen.last_measured[i]
+        frozen = frozen and state.velocity_body[i] == seen.last_measured[3 + i]
+    seen.last_measured[:3] = state.position
+    seen.last_measured[3:] = state.velocity_body[:3]
+    if seen.silence[0] < 0.0:
+        if good:
+            observer.begin(seen, state.position, velocity, gains)
+            attitude_loop.adapt(
+                memory.attitude, memory.dynamics, memory.thrusters, memory.quaternion, memory.omega, gains, period
+            )
+        return good
+    observer.predict(seen, memory.dynamics, memory.thrusters, R, memory.omega, gains, period)
+    attitude_loop.adapt(
+        memory.attitude, memory.dynamics, memory.thrusters, memory.quaternion, memory.omega, gains, period
+    )
+    moving = abs(seen.velocity[0]) + abs(seen.velocity[1]) + abs(seen.velocity[2]) > 0.02
+    if not good or (frozen and moving):
+        return False
+    if observer.correct(seen, state.position, velocity, gains):
+        return True
+    if seen.silence[0] > gains.coast:  # it has been saying so for long: believe it
+        observer.begin(seen, state.position, velocity, gains)
+    return False
+
+
+@compiled
+def _force_of(dynamics: Dynamics, R: Array, acceleration: Array, out: Array) -> None:
+    """Write the body force [N] that gives an acceleration, world frame, into out[:3]."""
+    for i in range(3):
+        out[i] = 0.0
+        for k in range(3):
+            along = 0.0
+            for axis in range(3):
+                along += R[axis, k] * acceleration[axis]
+            out[i] += dynamics.mass[i, k] * along
+
+
+@compiled
+def _soft_forces(
+    sight: Sight, regions: PackedRegions, weights: Array, R: Array, dynamics: Dynamics, wrench: Array
+) -> None:
+    """Add the push of violated soft regions of place (22), -alpha_i g_i grad g_i / |grad g_i|.
+
+    Each at most what the thrusters can always give.
+    """
+    most = dynamics.translational_mass[0] * _least(dynamics.braking)
+    for i in range(regions.kinds.size):
+        if regions.hard[i] or not sight.values[i] > 0.0 or regions.kinds[i] >= _ATTITUDE:
+            continue
+        size = np.sqrt(sight.gradients[i, 0] ** 2 + sight.gradients[i, 1] ** 2 + sight.gradients[i, 2] ** 2)
+        if not size > 0.0:
+            continue
+        push = min(regions.gains[i] * weights[i] * sight.values[i], most)
+        for k in range(3):
+            for axis in range(3):
+                wrench[k] -= push * R[axis, k] * sight.gradients[i, axis] / size
+
+
+@compiled
+def _push(dynamics: Dynamics, thrusters: Thrusters, R: Array) -> Array:
+    """Return the acceleration of one newton of each thruster, shape (6, m), as `barrier.Motion` has it."""
+    m = thrusters.health.size
+    push = np.zeros((6, m))
+    for j in range(m):
+        for i in range(6):
+            body = 0.0
+            for k in range(6):
+                body += dynamics.inverse_mass[i, k] * thrusters.matrix[k, j]
+            if i >= 3:
+                push[i, j] = body
+            else:
+                for axis in range(3):
+                    push[axis, j] += R[axis, i] * body
+    return push
+
+
+@compiled
+def _least(values: Array) -> float:
+    least = values[0]
+    for i in range(values.size):
+        least = min(least, values[i])
+    return least
+
+
+@compiled
+def _braking(dynamics: Dynamics, thrusters: Thrusters) -> float:
+    """Return the deceleration [m/s2] of the worst direction, with one thruster lost: the one that is, or any."""
+    for j in range(thrusters.health.size):
+        if thrusters.health[j] == 0.0:
+            return dynamics.braking[j]
+    return _least(dynamics.braking)
+
+
+@compiled
+def _report(memory: DeployableMemory, wanted: Array, rows: int, steps: int) -> None:
+    """Write the diagnostics, in the order of `DIAGNOSTICS`."""
+    seen, report = memory.observed, memory.report
+    memory.estimate[0] = seen.restoring[0]
+    memory.estimate[1:] = memory.attitude.moments
+    report[:3] = seen.position
+    report[3:6] = seen.velocity
+    report[6:8] = seen.water[:2]
+    report[8] = np.sqrt(wanted[0] ** 2 + wanted[1] ** 2 + wanted[2] ** 2)
+    report[9] = memory.guide.cost[0]
+    report[10] = memory.guide.count[0] - 1
+    active, yielding = 0, 0.0
+    for i in range(rows):
+        if memory.program.multipliers[i] > 0.0:
+            active += 1
+            yielding = max(yielding, memory.program.multipliers[i] * memory.program.price[i])
+    report[11] = active
+    report[12] = yielding
+    report[13] = steps
+    report[14] = 0.0
+    for j in range(memory.thrusters.health.size):
+        if memory.thrusters.health[j] == 0.0:
+            report[14] = j + 1
+    report[15] = seen.silence[0]
+
+
+class DeployableLaw(CompiledLaw):
+    """Regions kept, goal reached, within real thrusters.
+
+    Parameters
+    ----------
+    vehicle : VehicleModel
+        Nominal numbers.
+    gains : DeployableGains
+        Of the law.
+    desired_quaternion : array_like, shape (4,)
+        Attitude to be kept, from body to world.
+    period : float
+        Control period [s].
+    n_regions : int
+        How many secondary regions it will be given.
+
+    Raises
+    ------
+    LawError
+        If gains, attitude or period cannot be.
+    """
+
+    name: ClassVar[str] = "deployable"
+    output: ClassVar[Output] = "thrusters"
+    function = staticmethod(step)
+    gains_type = DeployableGains
+    diagnostics = DIAGNOSTICS
+
+    def __init__(
+        self,
+        vehicle: VehicleModel,
+        gains: DeployableGains,
+        desired_quaternion: Array,
+        period: float,
+        n_regions: int,
+    ) -> None:
+        self.gains = check_gains(gains)
+        desired = checked_quaternion(desired_quaternion)
+        m = vehicle.thruster_matrix.shape[1]
+        self.memory = DeployableMemory(
+            period=np.array([checked_period(period)]),
+            estimate=np.zeros(4),
+            report=np.zeros(len(DIAGNOSTICS)),
+            dynamics=dynamics_of(vehicle, least_forces(vehicle)),
+            thrusters=thrusters_of(vehicle),
+            observed=estimate_of_nothing(),
+            attitude=attitude_of(desired),
+            suspicion=suspicion_of(m),
+            guide=guide_of_nothing(n_regions, _SEED),
+            sight=sight_of(n_regions),
+            program=workspace(n_regions, m),
+            quaternion=desired.copy(),
+            omega=np.zeros(3),
+        )
+
+    @classmethod
+    def for_vehicle(
+        cls, vehicle: VehicleModel, gains: Any, desired_quaternion: Array, period: float, n_regions: int
+    ) -> DeployableLaw:
+        """Return the law for a vehicle."""
+        return cls(vehicle, gains, desired_quaternion, period, n_regions)

@@ -1,0 +1,45 @@
+"""Small dense products without allocation: Numba calls BLAS for `@`, which costs more than they do."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from controller.compiled import compiled
+
+Array = NDArray[np.float64]
+
+
+@compiled
+def product(A: Array, x: Array, out: Array) -> None:
+    """Write A x into `out`."""
+    for i in range(A.shape[0]):
+        total = 0.0
+        for j in range(A.shape[1]):
+            total += A[i, j] * x[j]
+        out[i] = total
+
+
+@compiled
+def transposed_product(A: Array, x: Array, out: Array) -> None:
+    """Write A^T x into `out`."""
+    for j in range(A.shape[1]):
+        total = 0.0
+        for i in range(A.shape[0]):
+            total += A[i, j] * x[i]
+        out[j] = total
+
+
+@compiled
+def dot(a: Array, b: Array) -> float:
+    """Return a^T b."""
+    total = 0.0
+    for i in range(a.size):
+        total += a[i] * b[i]
+    return total
+
+
+@compiled
+def norm(a: Array) -> float:
+    """Return |a|."""
+    return np.sqrt(dot(a, a))

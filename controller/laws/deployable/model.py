@@ -1,0 +1,195 @@
+"""The vehicle as the deployable law sees it: how it accelerates, and which thrusters still push."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from controller.compiled import compiled
+from controller.law import VehicleModel
+from controller.laws.deployable.linear_algebra import product
+
+Array = NDArray[np.float64]
+
+_REGULARISATION = 1e-3  # of a thruster's own share in H
+
+
+class Dynamics(NamedTuple):
+    """Constant numbers of the vehicle, derived from its nominal ones."""
+
+    mass: Array  # (6, 6) M, rigid body and added, centre of gravity at the origin
+    inverse_mass: Array  # (6, 6)
+    linear_damping: Array  # (6,) N s/m, N m s/rad
+    quadratic_damping: Array  # (6,) N s2/m2, N m s2/rad2
+    translational_mass: Array  # (1,) kg, mean of the three
+    braking: Array  # (m + 1,) m/s2, worst direction: with thruster j lost, and last with all working
+
+
+class Thrusters(NamedTuple):
+    """What pushes now; a thruster that is given up has a column of zeros and limits of zero."""
+
+    whole: Array  # (6, m) the vehicle's matrix
+    matrix: Array  # (6, m) of those that work
+    lower: Array  # (m,) N
+    upper: Array  # (m,) N
+    least: Array  # (m,) N, limits of the vehicle
+    greatest: Array  # (m,) N
+    inverse: Array  # (m, m) H^-1 with H = B^T Q B + regularisation
+    allocator: Array  # (m, 6) H^-1 B^T Q: wrench to the forces nearest to it
+    metric: Array  # (6,) Q: what an error of the wrench costs, 1/N2, 1/(N m)2
+    health: Array  # (m,) 1 works, 0 given up
+    forces: Array  # (m,) N, commanded in the last period
+
+
+def dynamics_of(vehicle: VehicleModel, braking: Array) -> Dynamics:
+    """Return the constant numbers.
+
+    Parameters
+    ----------
+    vehicle : VehicleModel
+        Nominal numbers.
+    braking : ndarray, shape (m + 1,)
+        Greatest force [N] in the worst direction with each thruster lost, and with none.
+
+    Returns
+    -------
+    Dynamics
+        Arrays of its own.
+    """
+    mass = vehicle.rigid_mass + vehicle.added_mass
+    mean = float(np.trace(mass[:3, :3])) / 3.0
+    return Dynamics(
+        mass=mass,
+        inverse_mass=np.linalg.inv(mass),
+        linear_damping=vehicle.linear_damping.copy(),
+        quadratic_damping=vehicle.quadratic_damping.copy(),
+        translational_mass=np.array([mean]),
+        braking=np.asarray(braking) / mean,
+    )
+
+
+def thrusters_of(vehicle: VehicleModel) -> Thrusters:
+    """Return the thrusters, all working.
+
+    Parameters
+    ----------
+    vehicle : VehicleModel
+        Nominal numbers.
+
+    Returns
+    -------
+    Thrusters
+        Arrays of its own.
+    """
+    B = vehicle.thruster_matrix
+    m = B.shape[1]
+    arm = np.sqrt(np.sum(B[3:] ** 2) / np.sum(B[:3] ** 2))  # m, typical
+    thrusters = Thrusters(
+        whole=B.copy(),
+        matrix=B.copy(),
+        lower=vehicle.thrust_min.copy(),
+        upper=vehicle.thrust_max.copy(),
+        least=vehicle.thrust_min.copy(),
+        greatest=vehicle.thrust_max.copy(),
+        inverse=np.zeros((m, m)),
+        allocator=np.zeros((m, 6)),
+        metric=np.array([1.0] * 3 + [4.0 / arm**2] * 3),
+        health=np.ones(m),
+        forces=np.zeros(m),
+    )
+    share_out(thrusters)
+    return thrusters
+
+
+@compiled
+def share_out(thrusters: Thrusters) -> None:
+    """Bring matrix, limits and inverses up to date with `health`."""
+    m = thrusters.health.size
+    for j in range(m):
+        thrusters.matrix[:, j] = thrusters.whole[:, j] * thrusters.health[j]
+        thrusters.lower[j] = thrusters.least[j] * thrusters.health[j]
+        thrusters.upper[j] = thrusters.greatest[j] * thrusters.health[j]
+    H = np.empty((m, m))
+    for i in range(m):
+        for j in range(m):
+            total = 0.0
+            for k in range(6):
+                total += thrusters.matrix[k, i] * thrusters.metric[k] * thrusters.matrix[k, j]
+            H[i, j] = total
+        own = 0.0
+        for k in range(6):
+            own += thrusters.whole[k, i] * thrusters.metric[k] * thrusters.whole[k, i]
+        H[i, i] += _REGULARISATION * max(own, 1e-12)
+    thrusters.inverse[:, :] = np.linalg.inv(H)
+    for i in range(m):
+        for k in range(6):
+            total = 0.0
+            for j in range(m):
+                total += thrusters.inverse[i, j] * thrusters.matrix[k, j]
+            thrusters.allocator[i, k] = total * thrusters.metric[k]
+
+
+@compiled
+def free_acceleration(
+    dynamics: Dynamics, R: Array, velocity: Array, omega_body: Array, water: Array, restoring: float, out: Array
+) -> None:
+    """Write the acceleration over ground, world frame, shape (3,) [m/s2], that is there without thrust.
+
+    From drag against the water, W - B, and the turning of the body's axes, in which mass and drag are given: (11).
+
+    Parameters
+    ----------
+    dynamics : Dynamics
+        Of the vehicle.
+    R : ndarray, shape (3, 3)
+        From body to world.
+    velocity : ndarray, shape (3,)
+        Over ground [m/s], world frame.
+    omega_body : ndarray, shape (3,)
+        [rad/s].
+    water : ndarray, shape (3,)
+        Velocity of the water [m/s], world frame.
+    restoring : float
+        W - B [N].
+    out : ndarray, shape (3,)
+        Receives the acceleration.
+    """
+    force, relative, momentum = np.zeros(6), np.empty(3), np.empty(3)
+    for i in range(3):
+        relative[i] = 0.0
+        for k in range(3):
+            relative[i] += R[k, i] * (velocity[k] - water[k])
+    for i in range(3):
+        momentum[i] = 0.0
+        for k in range(3):
+            momentum[i] += dynamics.mass[i, k] * relative[k]
+    for i in range(3):
+        drag = (dynamics.linear_damping[i] + dynamics.quadratic_damping[i] * abs(relative[i])) * relative[i]
+        j, k = (i + 1) % 3, (i + 2) % 3
+        # d(M nu_r)/dt + omega x (M nu_r) = force
+        force[i] = restoring * R[2, i] - drag - (omega_body[j] * momentum[k] - omega_body[k] * momentum[j])
+    body = np.empty(6)
+    product(dynamics.inverse_mass, force, body)
+    for i in range(3):  # the body's axes turn: what the relative velocity gains is omega x nu_r
+        j, k = (i + 1) % 3, (i + 2) % 3
+        relative_turning = omega_body[j] * relative[k] - omega_body[k] * relative[j]
+        body[i] += relative_turning
+    for i in range(3):
+        out[i] = 0.0
+        for k in range(3):
+            out[i] += R[i, k] * body[k]
+
+
+@compiled
+def thrust_acceleration(dynamics: Dynamics, thrusters: Thrusters, R: Array, forces: Array, out: Array) -> None:
+    """Write the acceleration that thruster forces [N] give: linear in the world frame, angular in body axes, (6,)."""
+    wrench, body = np.empty(6), np.empty(6)
+    product(thrusters.matrix, forces, wrench)
+    product(dynamics.inverse_mass, wrench, body)
+    for i in range(3):
+        out[i] = 0.0
+        for k in range(3):
+            out[i] += R[i, k] * body[k]
+        out[3 + i] = body[3 + i]

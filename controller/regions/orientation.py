@@ -1,0 +1,49 @@
+"""Orientation: the vehicle's attitude near a given one, as a region of section V. Beyond the paper."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from math import inf
+from typing import ClassVar
+
+from controller.compiled import compiled
+from controller.quaternion import error
+from controller.regions.shape import Array, Bounds, EvaluationOfAttitude, Vector4, require, unit
+
+
+@dataclass(frozen=True)
+class Orientation:
+    """All attitudes within `tolerance` [rad] of the one that `quaternion` (scalar first) says, by the shortest turn.
+
+    g is the angle of that turn less the tolerance [rad]. Its derivative is taken as zero where it has none: at the
+    attitude itself, and half a turn away from it.
+    """
+
+    kind: ClassVar[int] = 9
+    unit: ClassVar[str] = "rad"
+    quaternion: Vector4
+    tolerance: float
+
+    def __post_init__(self) -> None:
+        unit("orientation", "quaternion", self.quaternion)
+        require(0.0 < self.tolerance <= math.pi, "orientation", "tolerance", self.tolerance, "in (0, pi] rad")
+
+    def packed(self) -> tuple[float, ...]:
+        """Return the unit quaternion and the tolerance."""
+        return (*unit("orientation", "quaternion", self.quaternion), self.tolerance)
+
+    def bounds(self) -> Bounds:
+        """Return no bounds: every place is in it."""
+        return (-inf, -inf, -inf), (inf, inf, inf)
+
+
+@compiled
+def orientation(p: Array, e: Array, q: Array) -> EvaluationOfAttitude:
+    """Evaluate a packed `Orientation` at the attitude `e`, wherever that is."""
+    turn = error(q[:4], e)
+    sine = math.sqrt(turn[1] * turn[1] + turn[2] * turn[2] + turn[3] * turn[3])
+    g = 2.0 * math.atan2(sine, turn[0]) - q[4]
+    if sine == 0.0 or turn[0] == 0.0:
+        return g, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    return g, 0.0, 0.0, 0.0, turn[1] / sine, turn[2] / sine, turn[3] / sine

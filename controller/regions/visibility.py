@@ -1,0 +1,87 @@
+"""Visibility: the poses from which a camera of the vehicle sees a feature, as section I asks; no equation there."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from math import inf
+from typing import ClassVar
+
+from controller.compiled import compiled
+from controller.quaternion import rotation_matrix
+from controller.regions.shape import Array, Bounds, EvaluationOfAttitude, Vector3, require, require_finite, unit
+
+
+@dataclass(frozen=True)
+class Visibility:
+    """All poses that have a `feature` [m, NED] within `half_angle` [rad] of the axis of a camera.
+
+    `camera_axis` and `camera_position` [m] are in the body frame. g is the angle between axis and line of sight, less
+    the half angle [rad]. How far it sees is a region of its own, such as a sphere or a `Cone` about the feature.
+    By position, g changes with one over the distance: a feature closer than some tenths of a metre asks for the
+    impossible. A feature in the camera itself counts as behind it.
+    """
+
+    kind: ClassVar[int] = 10
+    unit: ClassVar[str] = "rad"
+    feature: Vector3
+    camera_axis: Vector3
+    half_angle: float
+    camera_position: Vector3 = (0.0, 0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        require_finite("visibility", feature=self.feature, camera_position=self.camera_position)
+        unit("visibility", "camera_axis", self.camera_axis)
+        require(0.0 < self.half_angle < math.pi, "visibility", "half_angle", self.half_angle, "in (0, pi) rad")
+
+    def packed(self) -> tuple[float, ...]:
+        """Return feature, unit axis, position of the camera and half angle."""
+        return (
+            *self.feature,
+            *unit("visibility", "camera_axis", self.camera_axis),
+            *self.camera_position,
+            self.half_angle,
+        )
+
+    def bounds(self) -> Bounds:
+        """Return no bounds: from every place the feature is seen at some attitude."""
+        return (-inf, -inf, -inf), (inf, inf, inf)
+
+
+@compiled
+def visibility(p: Array, e: Array, q: Array) -> EvaluationOfAttitude:
+    """Evaluate a packed `Visibility` at the position `p` and the attitude `e`."""
+    # the feature in the body frame: u from the origin, b from the camera
+    R = rotation_matrix(e)
+    dx, dy, dz = q[0] - p[0], q[1] - p[1], q[2] - p[2]
+    ux, uy, uz = (
+        R[0, 0] * dx + R[1, 0] * dy + R[2, 0] * dz,
+        R[0, 1] * dx + R[1, 1] * dy + R[2, 1] * dz,
+        R[0, 2] * dx + R[1, 2] * dy + R[2, 2] * dz,
+    )
+    bx, by, bz = ux - q[6], uy - q[7], uz - q[8]
+    square = bx * bx + by * by + bz * bz
+    if square == 0.0:
+        return math.pi - q[9], 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+
+    # the angle to the axis a, and how it follows b: ((a . b) b / |b|^2 - a) / |a x b|
+    ax, ay, az = q[3], q[4], q[5]
+    along = ax * bx + ay * by + az * bz
+    cx, cy, cz = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
+    aside = math.sqrt(cx * cx + cy * cy + cz * cz)
+    g = math.atan2(aside, along) - q[9]
+    if aside == 0.0:
+        return g, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    k = along / square
+    sx, sy, sz = (k * bx - ax) / aside, (k * by - ay) / aside, (k * bz - az) / aside
+
+    # db = -R^T dp + u x theta
+    return (
+        g,
+        -(R[0, 0] * sx + R[0, 1] * sy + R[0, 2] * sz),
+        -(R[1, 0] * sx + R[1, 1] * sy + R[1, 2] * sz),
+        -(R[2, 0] * sx + R[2, 1] * sy + R[2, 2] * sz),
+        sy * uz - sz * uy,
+        sz * ux - sx * uz,
+        sx * uy - sy * ux,
+    )

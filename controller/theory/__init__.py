@@ -1,0 +1,45 @@
+"""The stability analysis of the printed law, (30)-(45), as functions that can be asked where it holds."""
+
+from controller.theory.conditions import (
+    Fit,
+    damping_fit,
+    error_jacobian_bound,
+    gain_fits,
+    greatest_gradient,
+    potential_fits,
+    secondary_fit,
+    sphere_radii,
+)
+from controller.theory.lyapunov import (
+    lower_bound,
+    mapped_error,
+    mapped_error_rate,
+    normalised_secondary,
+    primary_value,
+    printed_secondary,
+    unit_gradient_secondary,
+    value_rate,
+)
+from controller.theory.model import Model, coriolis, damping
+
+__all__ = [
+    "Fit",
+    "Model",
+    "coriolis",
+    "damping",
+    "damping_fit",
+    "error_jacobian_bound",
+    "gain_fits",
+    "greatest_gradient",
+    "lower_bound",
+    "mapped_error",
+    "mapped_error_rate",
+    "normalised_secondary",
+    "potential_fits",
+    "primary_value",
+    "printed_secondary",
+    "secondary_fit",
+    "sphere_radii",
+    "unit_gradient_secondary",
+    "value_rate",
+]

@@ -1,0 +1,236 @@
+"""V of (31) and its rate -W of (40), (41).
+
+Throughout y = J^+ e_Ts = [R^T (e_p + (k_q/k_p1) e_s); e_e] with J^+ = blkdiag(R^T, I), and sigma = diag(sigma_p I,
+sigma_a I). The lost dots of (39), (41) and (43) are put back: dy/dt is the sum of both terms with M nu.
+
+The last term of V comes in three forms, since (31) and (33) agree with each other, and with the normalised force of
+(22), only where |dg_i/dp| = 1: `printed_secondary` (31), `unit_gradient_secondary` (33), and `normalised_secondary`,
+the true potential of the force. (40) is an identity for the last one alone, with constant weights, in still water,
+and where the wrench (25) is what acts.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from controller.compiled import compiled
+from controller.printed_law import Gains, violation
+from controller.quaternion import rate, skew
+from controller.theory.model import Model, coriolis, damping
+
+Array = NDArray[np.float64]
+
+
+@compiled
+def mapped_error(e_p: Array, e_s: Array, e_att: Array, R: Array, gains: Gains) -> Array:
+    """Return y = J^+ e_Ts, shape (6,): (28).
+
+    Parameters
+    ----------
+    e_p, e_s : ndarray, shape (3,)
+        Region errors (20), (21), world frame.
+    e_att : ndarray, shape (3,)
+        Vector part of the error quaternion (23).
+    R : ndarray, shape (3, 3)
+        From body to world.
+    gains : Gains
+        Of the law.
+    """
+    y = np.empty(6)
+    y[:3] = R.T @ (e_p + (gains.k_q / gains.k_p1) * e_s)
+    y[3:] = e_att
+    return y
+
+
+@compiled
+def mapped_error_rate(region_rate: Array, y: Array, error_quaternion: Array, R: Array, omega: Array) -> Array:
+    """Return dy/dt, shape (6,): both dotted terms of (39).
+
+    Parameters
+    ----------
+    region_rate : ndarray, shape (3,)
+        d/dt (e_p + (k_q/k_p1) e_s) along the motion, world frame.
+    y : ndarray, shape (6,)
+        `mapped_error`.
+    error_quaternion : ndarray, shape (4,)
+        (23).
+    R : ndarray, shape (3, 3)
+        From body to world.
+    omega : ndarray, shape (3,)
+        Angular velocity [rad/s], body frame.
+    """
+    result = np.empty(6)
+    result[:3] = R.T @ region_rate - skew(omega) @ y[:3]
+    result[3:] = rate(error_quaternion, omega)[1:]  # (24)
+    return result
+
+
+@compiled
+def weighted(y: Array, gains: Gains) -> Array:
+    """Return sigma y, shape (6,)."""
+    result = gains.sigma_p * y
+    result[3:] = gains.sigma_a * y[3:]
+    return result
+
+
+@compiled
+def primary_value(
+    model: Model,
+    gains: Gains,
+    goal_value: float,
+    error_quaternion: Array,
+    y: Array,
+    velocity_body: Array,
+    estimate: Array,
+) -> float:
+    """Return V [N m] without its last sum: (31), (32).
+
+    Parameters
+    ----------
+    model : Model
+        The true vehicle.
+    gains : Gains
+        Of the law.
+    goal_value : float
+        f (13).
+    error_quaternion : ndarray, shape (4,)
+        (23), its scalar part at least 0.
+    y : ndarray, shape (6,)
+        `mapped_error`; with e_s = 0 nothing of the secondary regions is left.
+    velocity_body : ndarray, shape (6,)
+        nu [m/s, rad/s].
+    estimate : ndarray, shape (4,)
+        phi-hat [N, N m].
+    """
+    momentum = model.mass @ velocity_body
+    wrong = model.phi - estimate
+    turned = (1.0 - error_quaternion[0]) ** 2 + np.sum(error_quaternion[1:] ** 2)
+    value: float = (
+        0.5 * np.sum(velocity_body * momentum)
+        + np.sum(weighted(y, gains) * momentum)
+        + 0.5 * gains.gamma * np.sum(wrong * wrong)
+        + (gains.k_p2 + gains.sigma_a * gains.k_v2) * turned
+        + 0.5 * (gains.k_p1 + gains.sigma_p * gains.k_v1) * violation(goal_value) ** 2  # (32)
+    )
+    return value
+
+
+@compiled
+def secondary_gain(gains: Gains) -> float:
+    """Return k_q + sigma_p k_w of (31), with k_w = k_q k_v1 / k_p1."""
+    return gains.k_q * (1.0 + gains.sigma_p * gains.k_v1 / gains.k_p1)
+
+
+@compiled
+def printed_secondary(values: Array, gradients: Array, betas: Array, gains: Gains) -> float:
+    """Return the last sum of (31): of (1/beta_i) |e_si|^2 / |dg_i/dp|^2, with the normalised e_si of (22).
+
+    Parameters
+    ----------
+    values : ndarray, shape (n,)
+        g_i.
+    gradients : ndarray, shape (n, 3)
+        dg_i/dp; a region whose gradient is zero contributes nothing, as in (19).
+    betas : ndarray, shape (n,)
+        alpha_i / k_q; a region of weight 0 contributes nothing.
+    gains : Gains
+        Of the law.
+    """
+    total = 0.0
+    for i in range(values.size):
+        square = gradients[i, 0] ** 2 + gradients[i, 1] ** 2 + gradients[i, 2] ** 2
+        if not values[i] <= 0.0 and square > 0.0:
+            total += betas[i] * values[i] ** 2 / square
+    return 0.5 * secondary_gain(gains) * total
+
+
+@compiled
+def unit_gradient_secondary(values: Array, betas: Array, gains: Gains) -> float:
+    """Return what (33) says the last sum of (31) is; so it is where |dg_i/dp| = 1. Arguments as `printed_secondary`."""
+    total = 0.0
+    for i in range(values.size):
+        total += betas[i] * violation(values[i]) ** 2
+    return 0.5 * secondary_gain(gains) * total
+
+
+@compiled
+def normalised_secondary(values: Array, gradients: Array, clearances: Array, betas: Array, gains: Gains) -> float:
+    """Return the potential of the normalised force (22) in the place of the last sum of (31).
+
+    It is beta_i times the integral of g_i along the normal, from the surface to the vehicle. Where g is at most
+    quadratic in the distance, with g = 0 on the surface, that is d (4 g - |dg/dp| d) / 6 at the distance d: exact for
+    spheres and depth bands, and for all shapes whose g is a distance. The normalised force of an ellipsoid has no
+    potential, because |dg/dp| varies over its level surfaces; for it this is an estimate.
+
+    Parameters
+    ----------
+    values, gradients, betas, gains
+        As `printed_secondary`.
+    clearances : ndarray, shape (n,)
+        Distances to the surfaces [m], negative where violated.
+    """
+    total = 0.0
+    for i in range(values.size):
+        if not values[i] <= 0.0:
+            slope = math.sqrt(gradients[i, 0] ** 2 + gradients[i, 1] ** 2 + gradients[i, 2] ** 2)
+            depth = abs(clearances[i])
+            total += betas[i] * depth * (4.0 * values[i] - slope * depth) / 6.0
+    return secondary_gain(gains) * total
+
+
+@compiled
+def bracket(model: Model, gains: Gains, y: Array, y_rate: Array, velocity_body: Array) -> float:
+    """Return the terms in braces of W [W]: (41), those that (43) bounds. Arguments as `value_rate`."""
+    forces = coriolis(model.mass, velocity_body) @ velocity_body
+    forces += damping(model.linear_damping, model.quadratic_damping, velocity_body) * velocity_body
+    return np.sum(weighted(y, gains) * forces) - np.sum(weighted(y_rate, gains) * (model.mass @ velocity_body))
+
+
+@compiled
+def value_rate(model: Model, gains: Gains, y: Array, y_rate: Array, velocity_body: Array) -> float:
+    """Return dV/dt = -W [W]: (40), (41), read with the weights constant and J_v^+ K_0 e_T = [k_p1 R^T e_p; k_p2 e_e].
+
+    Parameters
+    ----------
+    model : Model
+        The true vehicle, in still water.
+    gains : Gains
+        Of the law.
+    y, y_rate : ndarray, shape (6,)
+        `mapped_error` and `mapped_error_rate`.
+    velocity_body : ndarray, shape (6,)
+        nu [m/s, rad/s].
+    """
+    drag = damping(model.linear_damping, model.quadratic_damping, velocity_body)
+    drag[:3] += gains.k_v1
+    drag[3:] += gains.k_v2
+    pull = weighted(y, gains) * y
+    spent = np.sum(drag * velocity_body**2) + gains.k_p1 * np.sum(pull[:3]) + gains.k_p2 * np.sum(pull[3:])
+    return -(spent + bracket(model, gains, y, y_rate, velocity_body))
+
+
+@compiled
+def lower_bound(
+    model: Model,
+    gains: Gains,
+    goal_value: float,
+    error_quaternion: Array,
+    y: Array,
+    velocity_body: Array,
+    estimate: Array,
+) -> float:
+    """Return what (34) and (37) leave of `primary_value` once the square is completed, with the matrix sigma.
+
+    V is at least a quarter of nu^T M nu, the terms of potential, attitude and estimate, less (sigma y)^T M sigma y; the
+    difference is (nu + 2 sigma y)^T M (nu + 2 sigma y) / 4. Arguments as `primary_value`.
+
+    From there (34) goes on to |e_p|^2 and the |e_si|^2 apart, and so loses the factor k_q/k_p1 of (28) and the
+    product of the two: its last line holds where no secondary region is active.
+    """
+    crossing = weighted(y, gains)
+    still = primary_value(model, gains, goal_value, error_quaternion, y, np.zeros(6), estimate)
+    kinetic = np.sum(velocity_body * (model.mass @ velocity_body))
+    return still + 0.25 * kinetic - np.sum(crossing * (model.mass @ crossing))

@@ -1,0 +1,86 @@
+"""The vehicle as the analysis knows it, (11), (12), and its Properties 1-3."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from controller.compiled import compiled
+from controller.quaternion import down_in_body, skew
+from controller.restoring import parameters, regressor
+
+Array = NDArray[np.float64]
+
+
+class Model(NamedTuple):
+    """Matrices of (11) in still water, about the body origin."""
+
+    mass: Array  # (6, 6) M, rigid body plus added mass
+    linear_damping: Array  # (6,) diagonal of D(0) [N s/m, N m s/rad]
+    quadratic_damping: Array  # (6,) of |nu| in D [N s2/m2, N m s2/rad2]
+    phi: Array  # (4,) true restoring parameters (12) [N, N m]
+
+
+@compiled
+def coriolis(mass: Array, velocity_body: Array) -> Array:
+    """Return C(nu), shape (6, 6), of a constant matrix M in Kirchhoff's form: (11).
+
+    With the momentum [a; b] = M nu it is [0 -S(a); -S(a) -S(b)], so that C nu = [w x a; v x a + w x b].
+    """
+    momentum = mass @ velocity_body
+    C = np.zeros((6, 6))
+    S = skew(momentum[:3])
+    C[:3, 3:] = -S
+    C[3:, :3] = -S
+    C[3:, 3:] = -skew(momentum[3:])
+    return C
+
+
+@compiled
+def damping(linear: Array, quadratic: Array, velocity_body: Array) -> Array:
+    """Return the diagonal of D(nu), shape (6,): (11)."""
+    return linear + quadratic * np.abs(velocity_body)
+
+
+def least_inertia(mass: Array) -> float:
+    """Return the least eigenvalue of the symmetric part of M: above 0 by Property 1."""
+    return float(np.linalg.eigvalsh(0.5 * (mass + mass.T))[0])
+
+
+def asymmetry(matrix: Array) -> float:
+    """Return the greatest element of A - A^T over that of A: 0 where A is symmetric (Properties 1 and 3)."""
+    return float(np.abs(matrix - matrix.T).max() / max(np.abs(matrix).max(), 1e-300))
+
+
+def skew_defect(mass: Array, velocity_body: Array) -> float:
+    """Return how far dM/dt - 2 C(nu) is from skew-symmetric (Property 2), over the greatest element of C.
+
+    In body coordinates M is constant, so that C alone must be skew-symmetric.
+    """
+    C = coriolis(mass, velocity_body)
+    return float(np.abs(C + C.T).max() / max(np.abs(C).max(), 1e-300))
+
+
+def restoring_defect(weight: float, buoyancy: float, r_G: Array, r_B: Array, quaternion: Array) -> float:
+    """Return how far Z phi of (12) is from weight and buoyancy taken at their centres [N, N m].
+
+    Parameters
+    ----------
+    weight, buoyancy : float
+        [N].
+    r_G, r_B : ndarray, shape (3,)
+        Centres of gravity and buoyancy [m], body frame.
+    quaternion : ndarray, shape (4,)
+        From body to world.
+
+    Returns
+    -------
+    float
+        Greatest difference of a component.
+    """
+    k = down_in_body(quaternion)
+    pull, push = weight * k, -buoyancy * k
+    g = -np.concatenate([pull + push, np.cross(r_G, pull) + np.cross(r_B, push)])
+    return float(np.abs(regressor(quaternion) @ parameters(weight, buoyancy, r_G, r_B) - g).max())

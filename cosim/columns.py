@@ -1,0 +1,79 @@
+"""The columns of a run's row, in its order."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from controller import Law
+from controller.regions import of_attitude
+from cosim.lyapunov import lyapunov_columns
+from cosim.scenario import CRITERIA, Scenario
+from cosim.signals import Column
+from plant_fmu import Channels, Plant
+
+_FORCE_UNITS = ("N",) * 3 + ("N.m",) * 3
+
+
+def columns_of(scenario: Scenario, plant: Plant, law: Law) -> list[Column]:
+    """Return the columns of a run.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        What is run.
+    plant : Plant
+        Its outputs, flags and inputs are columns.
+    law : Law
+        Its diagnostics are columns.
+
+    Returns
+    -------
+    list of Column
+        In the order of the row.
+    """
+    regions = [("goal", scenario.goal), *((r.region.name, r.region.shape) for r in scenario.regions)]
+    return [
+        Column("time", "s", "Simulated time at the beginning of the step"),
+        *_of(plant.outputs),
+        *_of(plant.flags),
+        *(Column(f"{name}.value", shape.unit, f"g of {name}, above 0 where violated") for name, shape in regions),
+        *(
+            Column(f"{name}.clearance", "rad", f"Angle left within {name}, below 0 where violated")
+            if of_attitude(shape)
+            else Column(f"{name}.clearance", "m", f"Distance to the surface of {name}, below 0 where violated")
+            for name, shape in regions
+        ),
+        *(
+            Column(f"membership.{name}", "", f"Degree to which criterion {name} asks for attention")
+            for name in CRITERIA
+        ),
+        *(Column(f"weight.{name}", "", f"Weight of the criterion {name} from the arbiter") for name in CRITERIA),
+        *(Column(f"estimate.phi{i + 1}", "N.m" if i else "N", f"Estimate of phi {i + 1} in (12)") for i in range(4)),
+        *(
+            Column(f"command.{name}", unit, "Wrench that the law asks for, body frame")
+            for name, unit in zip("XYZKMN", _FORCE_UNITS, strict=True)
+        ),
+        Column("allocation_saturated", "", "The thrusters' limits cut the wrench that the law asks for"),
+        *_of(plant.inputs),
+        *(
+            Column(f"{name}.shift.{axis}", "m", f"How far {name} has moved {where} from where the scenario has it")
+            for name in scenario.moving
+            for axis, where in zip("xyz", ("north", "east", "down"), strict=True)
+        ),
+        *_sensed(scenario),
+        *(Column(f"law.{d.name}", d.unit, d.description) for d in law.diagnostics),
+        *lyapunov_columns(scenario),
+    ]
+
+
+def _sensed(scenario: Scenario) -> Iterator[Column]:
+    if scenario.sensing.exact:
+        return
+    for axis, where in zip("xyz", ("north", "east", "down"), strict=True):
+        yield Column(f"sensed.{axis}", "m", f"Position {where} that the law is told")
+    for i, name in enumerate("uvwpqr"):
+        yield Column(f"sensed.{name}", "m/s" if i < 3 else "rad/s", f"Velocity {name} that the law is told, body frame")
+
+
+def _of(channels: Channels) -> list[Column]:
+    return [Column(channel.name, channel.unit, channel.description) for channel in channels.channels]

@@ -1,0 +1,179 @@
+"""Whether regions can be satisfied together: a common point, or the certificate that there is none.
+
+The signed distance to a region changes by at most a metre a metre, and so does the greatest of several. A box whose
+centre is further from satisfying all than its half diagonal holds no common point: boxes are halved until a point is
+found, or none is left.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+from scipy.optimize import minimize
+
+from controller.regions import Region, clearances_at
+
+Array = NDArray[np.float64]
+Vector3 = tuple[float, float, float]
+
+TOLERANCE = 0.01  # m, to which the common depth is known
+_MOST_BOXES = 400_000  # in one round of halving
+_CELLS = 400_000  # of the grid in which a way is sought
+
+
+@dataclass(frozen=True)
+class Overlap:
+    """What is known of a common point of some regions."""
+
+    point: Vector3  # m, NED: where the regions are satisfied best
+    depth: float  # m, least clearance there: how far within all of them; negative by how much the worst is violated
+    at_most: float  # m, certified bound of that depth anywhere in the box that was searched
+
+    @property
+    def found(self) -> bool:
+        """Whether the point satisfies all."""
+        return self.depth >= 0.0
+
+    @property
+    def excluded(self) -> bool:
+        """Whether no point of the box does, certainly."""
+        return self.at_most < 0.0
+
+
+def common_depth(points: Array, regions: Sequence[Region]) -> Array:
+    """Return the least clearance over regions, shape (m,) [m]: above 0 inside all that is to be satisfied.
+
+    Parameters
+    ----------
+    points : ndarray, shape (m, 3)
+        [m, NED].
+    regions : sequence of Region
+        At least one.
+    """
+    depths: Array = np.min([clearances_at(points, region) for region in regions], axis=0)
+    return depths
+
+
+def search(regions: Sequence[Region], low: Array, high: Array, tolerance: float = TOLERANCE) -> Overlap:
+    """Find where regions are satisfied best, in a box.
+
+    Parameters
+    ----------
+    regions : sequence of Region
+        At least one.
+    low, high : ndarray, shape (3,)
+        Corners of the box [m, NED], finite.
+    tolerance : float
+        How well the depth shall be known [m]; not so well where too many boxes would be needed.
+
+    Returns
+    -------
+    Overlap
+        With `depth` and `at_most` no further apart than the tolerance, as a rule.
+    """
+    half = 0.5 * (np.asarray(high, dtype=float) - low)
+    centres = (np.asarray(low, dtype=float) + half)[None, :]
+    best_point, best = centres[0], -math.inf
+    bound = math.inf
+    while True:
+        depths = common_depth(centres, regions)
+        at = int(np.argmax(depths))
+        if depths[at] > best:
+            best_point, best = _polished(regions, centres[at], float(depths[at]), low, high)
+        reach = depths + float(np.linalg.norm(half))
+        bound = max(best, min(bound, float(reach.max())))
+        if bound - best <= tolerance:
+            break
+        open_boxes = centres[reach > best + tolerance]
+        if 8 * len(open_boxes) > _MOST_BOXES:
+            break
+        half = 0.5 * half
+        offsets = np.array(np.meshgrid(*([-1.0, 1.0],) * 3)).reshape(3, -1).T * half
+        centres = (open_boxes[:, None, :] + offsets[None, :, :]).reshape(-1, 3)
+    best_point, best = _polished(regions, best_point, best, low, high)
+    x, y, z = (float(c) for c in best_point)
+    return Overlap((x, y, z), best, bound)
+
+
+def _polished(regions: Sequence[Region], point: Array, depth: float, low: Array, high: Array) -> tuple[Array, float]:
+    """Climb from a point to where the least clearance is greater, without gradients: it has edges."""
+    done = minimize(
+        lambda p: -float(common_depth(p[None, :], regions)[0]), point, method="Nelder-Mead",
+        bounds=list(zip(low, high, strict=True)), options={"xatol": 1e-5, "fatol": 1e-6, "maxiter": 300},
+    )  # fmt: skip
+    return (np.asarray(done.x), -float(done.fun)) if -done.fun > depth else (point, depth)
+
+
+def box_about(regions: Sequence[Region], points: Sequence[Vector3], room: float) -> tuple[Array, Array]:
+    """Return the corners of a box that holds points and the finite bounds of regions, with room about them.
+
+    Parameters
+    ----------
+    regions : sequence of Region
+        Any; what has no end is left out.
+    points : sequence of tuple of float
+        At least one [m, NED].
+    room : float
+        [m].
+
+    Returns
+    -------
+    tuple of ndarray
+        Lowest and highest corner, shape (3,) each.
+    """
+    low, high = np.min(points, axis=0), np.max(points, axis=0)
+    for region in regions:
+        lowest, highest = np.array(region.shape.bounds())
+        low = np.minimum(low, np.where(np.isfinite(lowest), lowest, np.inf))
+        high = np.maximum(high, np.where(np.isfinite(highest), highest, -np.inf))
+    return low - room, high + room
+
+
+def box_within(region: Region, low: Array, high: Array) -> tuple[Array, Array]:
+    """Return the box cut to the bounds of a region that is kept within, which must meet it."""
+    lowest, highest = np.array(region.shape.bounds())
+    return np.maximum(low, np.minimum(lowest, high)), np.minimum(high, np.maximum(highest, low))
+
+
+def way_exists(regions: Sequence[Region], goal: Region, start: Vector3, low: Array, high: Array) -> tuple[bool, float]:
+    """Say whether a way from the start to the goal region satisfies the regions all along.
+
+    Cells of a grid are free where the clearance at their centre is at least half their width: then the straight line
+    to a free neighbour's centre is free too. So a way that is found is one; one that is not may be narrower than a
+    cell.
+
+    Parameters
+    ----------
+    regions : sequence of Region
+        To be satisfied on the way.
+    goal : Region
+        Where it shall end.
+    start : tuple of float
+        [m, NED].
+    low, high : ndarray, shape (3,)
+        Corners of the box in which the way is sought.
+
+    Returns
+    -------
+    tuple of bool and float
+        Whether one was found, and the width of a cell [m].
+    """
+    extent = high - low
+    width = float(np.cbrt(np.prod(extent) / _CELLS))
+    counts = np.ceil(extent / width).astype(int)
+    first = np.asarray(start) - np.floor((np.asarray(start) - low) / width) * width  # the start is a centre
+    axes = [first[i] + width * np.arange(counts[i]) for i in range(3)]
+    points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+    free = common_depth(points, regions) >= 0.5 * width if regions else np.ones(len(points), dtype=bool)
+    # the start may be closer to a surface than half a cell: then its own neighbours begin the way
+    begins = np.linalg.norm(points - start, axis=1) < 0.5 * width
+    free |= begins
+    labels, _ = ndimage.label(free.reshape(counts))
+    there = clearances_at(points, goal) >= 0.0
+    reached = np.unique(labels.ravel()[there & free])
+    return bool(np.isin(labels.ravel()[begins], reached[reached > 0]).any()), width

@@ -1,0 +1,38 @@
+"""What regions are at one pose."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from controller.regions import Region, pack
+
+Array = NDArray[np.float64]
+
+
+def evaluated(
+    regions: Sequence[Region], position: Sequence[float] | Array, quaternion: Sequence[float]
+) -> tuple[Array, Array, Array]:
+    """Return what regions are at a pose, as they are at time 0.
+
+    Parameters
+    ----------
+    regions : sequence of Region
+        n of them.
+    position : sequence of float
+        [m, NED].
+    quaternion : sequence of float
+        From body to world.
+
+    Returns
+    -------
+    tuple of ndarray
+        Values, shape (n,), gradients, shape (n, 3), clearances, shape (n,) [m], or [rad] for shapes of attitude.
+    """
+    n = len(regions)
+    values, gradients, turnings, clearances = np.empty(n), np.empty((n, 3)), np.empty((n, 3)), np.empty(n)
+    pose = np.array(position, dtype=float), np.array(quaternion, dtype=float)
+    pack(regions).evaluate(*pose, values, gradients, turnings, clearances)
+    return values, gradients, clearances

@@ -1,0 +1,191 @@
+"""The tables of a scenario: as they stand in its file, and as they are once checked."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+from controller.regions import Region
+from fuzzy_arbiter import SECTION_VI
+
+Vector3 = tuple[float, float, float]
+Vector4 = tuple[float, float, float, float]
+Vector6 = tuple[float, float, float, float, float, float]
+
+CRITERIA = tuple(c.name for c in SECTION_VI)
+
+
+# ---- the same in the file and checked ------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class PlantSetup:
+    """How the plant is run."""
+
+    fmi: Literal[2, 3] = 3
+    current: Vector3 = (0.0, 0.0, 0.0)  # m/s, of the water, world frame
+    substep: float = 0.005  # s, greatest integration step
+    parameters: dict[str, float | bool] = field(default_factory=dict)  # of the FMU, by name, over those of the vehicle
+
+
+@dataclass(frozen=True)
+class Initial:
+    """State of the vehicle at time 0."""
+
+    position: Vector3  # m, NED
+    quaternion: Vector4 = (1.0, 0.0, 0.0, 0.0)  # from body to world, scalar first
+    velocity: Vector6 = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)  # m/s, rad/s, body frame
+
+
+@dataclass(frozen=True)
+class ArbiterSetup:
+    """How memberships become weights."""
+
+    engine: Literal["closed", "exact", "grid", "skfuzzy"] = "closed"
+    ramp: float = 0.2  # m (rad for regions of attitude), width over which a membership falls from 1 to 0 outside
+    points: int = 101  # of the output universe, for grid and skfuzzy
+
+
+@dataclass(frozen=True)
+class Limit:
+    """Of the direct body wrench: first the limit, then the lag."""
+
+    force: float = math.inf  # N, on the norm of the body force; its direction is kept, the moment left alone
+    time_constant: float = 0.0  # s
+
+
+@dataclass(frozen=True)
+class Actuation:
+    """What carries the law's wrench to the body."""
+
+    through: Literal["wrench", "thrusters"] = "wrench"
+    limits: Literal["direction", "per-thruster"] = "direction"  # how thruster forces are brought within limits
+
+
+@dataclass(frozen=True)
+class Failure:
+    """A thruster that gives nothing from some time on."""
+
+    thruster: int  # from 1
+    time: float  # s
+
+
+@dataclass(frozen=True)
+class Sensing:
+    """What law and arbiter are told of position and linear velocity; attitude and body rates they know exactly."""
+
+    position_noise: float = 0.0  # m, standard deviation of each coordinate, white, drawn anew at each control step
+    velocity_noise: float = 0.0  # m/s, the same of each linear velocity
+    seed: int = 0
+    dead_from: float = math.inf  # s, when both are lost
+    dead_for: float = 0.0  # s, for how long
+    frozen: bool = False  # the last values are held in that time; otherwise they are NaN
+
+    @property
+    def exact(self) -> bool:
+        """Whether what is told is the truth."""
+        noisy = self.position_noise > 0.0 or self.velocity_noise > 0.0
+        return not noisy and (self.dead_for == 0.0 or self.dead_from == math.inf)
+
+
+@dataclass(frozen=True)
+class RecordSetup:
+    """What a run records beyond its signals."""
+
+    lyapunov: bool = False  # V of (31) and its rate, with the printed law
+
+
+# ---- as they stand in the file -------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class TimeEntry:
+    """Periods, those that are left out filled in later."""
+
+    duration: float
+    step: float = 0.001
+    control: float | None = None  # default: the step
+    arbiter: float | None = None  # default: the step
+
+
+@dataclass(frozen=True)
+class LawEntry:
+    """Name and gains before anybody knows whether they go together."""
+
+    name: str = "printed"
+    desired_quaternion: Vector4 = (1.0, 0.0, 0.0, 0.0)
+    gains: dict[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class RegionEntry:
+    """A secondary region; the keys of its shape depend on the shape."""
+
+    name: str
+    criterion: Literal["obstacle", "shape", "depth"]
+    keep: Literal["in", "out"]
+    gain: float
+    shape: dict[str, Any]
+    velocity: Vector3 = (0.0, 0.0, 0.0)  # m/s, NED
+    streamed: bool = False  # moved from outside while the run goes on
+    hard: bool = True  # must not be violated, for laws that tell hard regions from soft ones
+
+
+@dataclass(frozen=True)
+class File:
+    """A whole scenario file."""
+
+    vehicle: str
+    time: TimeEntry
+    initial: Initial
+    goal: dict[str, Any]
+    title: str = ""
+    compare: Literal["", "paper"] = ""
+    intersection: tuple[str, ...] = ()
+    tell_failures: bool = False
+    plant: PlantSetup = PlantSetup()
+    law: LawEntry = LawEntry()
+    arbiter: ArbiterSetup = ArbiterSetup()
+    limit: Limit = Limit()
+    actuation: Actuation = Actuation()
+    sensing: Sensing = Sensing()
+    failures: tuple[Failure, ...] = ()
+    record: RecordSetup = RecordSetup()
+    regions: tuple[RegionEntry, ...] = ()
+
+
+# ---- checked -------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Time:
+    """Periods; each is a whole multiple of the step."""
+
+    duration: float  # s
+    step: float  # s, co-simulation step of the plant
+    control: float  # s, period of the law
+    arbiter: float  # s, period of the arbiter
+
+
+@dataclass(frozen=True)
+class LawSetup:
+    """Which law, with which gains."""
+
+    name: str  # one of controller.LAWS
+    desired_quaternion: Vector4  # attitude to be kept, from body to world, scalar first
+    gains: Any  # of that law's gains_type
+
+
+@dataclass(frozen=True)
+class SecondaryRegion:
+    """A region and the criterion it belongs to."""
+
+    region: Region
+    criterion: str  # one of CRITERIA
+    streamed: bool = False  # moved from outside while the run goes on
+
+    @property
+    def moves(self) -> bool:
+        """Whether it may be elsewhere than where the scenario has it."""
+        return self.streamed or any(self.region.velocity)

@@ -1,0 +1,155 @@
+"""What the thrusters give in each direction of the world, and what is left of it in current and against buoyancy."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import linprog
+
+from controller.quaternion import rotation_matrix
+from controller.restoring import regressor
+from controller.theory import Model, coriolis, damping
+from plant_fmu.vehicle import Vehicle
+
+Array = NDArray[np.float64]
+
+# the 26 directions from the middle of a cube to its faces, edges and corners, by name
+_WORDS = (("south", "", "north"), ("west", "", "east"), ("up", "", "down"))
+DIRECTIONS: dict[str, tuple[float, float, float]] = {
+    "-".join(_WORDS[axis][1 + sign] for axis, sign in enumerate(signs) if sign): tuple(
+        (np.array(signs) / np.linalg.norm(signs)).tolist()
+    )
+    for signs in itertools.product((-1, 0, 1), repeat=3)
+    if any(signs)
+}
+
+
+@dataclass(frozen=True)
+class Margin:
+    """Force in one direction, no moment beside it."""
+
+    direction: str  # one of DIRECTIONS
+    force: float  # N
+
+
+@dataclass(frozen=True)
+class ThrustMargin:
+    """What the thrusters of a vehicle at rest can give, the attitude kept."""
+
+    hold: tuple[float, ...]  # (6,) N, N m, body frame: against current, weight and buoyancy
+    drag: float  # N, of the current
+    excess_weight: float  # N, W - B
+    thrust: Margin | None  # least over the directions, with nothing to be held; None if they cannot give nothing
+    left: Margin | None  # least over the directions beside `hold`; None if that alone is out of reach
+    left_without: tuple[Margin | None, ...]  # the same with each thruster lost
+
+
+def greatest_force(vehicle: Vehicle, direction_body: Array, hold: Array, alive: Array) -> float | None:
+    """Return the greatest force in a direction, beside a wrench that is held, by a linear program.
+
+    Parameters
+    ----------
+    vehicle : Vehicle
+        Its thrusters and their limits.
+    direction_body : ndarray, shape (3,)
+        Unit vector, body frame.
+    hold : ndarray, shape (6,)
+        Wrench that the thrusters give all the while [N, N m].
+    alive : ndarray of bool, shape (n,)
+        Which thrusters give force.
+
+    Returns
+    -------
+    float or None
+        [N], no moment beside that of `hold`; None if `hold` is out of reach.
+    """
+    matrix = np.column_stack([vehicle.thruster_matrix, -np.r_[direction_body, 0.0, 0.0, 0.0]])
+    bounds = [*zip(vehicle.thrust_min * alive, vehicle.thrust_max * alive, strict=True), (0.0, None)]
+    done = linprog(np.r_[np.zeros(vehicle.n_thrusters), -1.0], A_eq=matrix, b_eq=hold, bounds=bounds)
+    return float(-done.fun) if done.success else None
+
+
+def held_wrench(model: Model, quaternion: Array, current: Array) -> Array:
+    """Return the wrench that keeps a vehicle at rest in a current, shape (6,) [N, N m], body frame: (11) with nu = 0.
+
+    Parameters
+    ----------
+    model : Model
+        Its `mass` is the added mass alone: what turns a body in a stream (Munk's moment).
+    quaternion : ndarray, shape (4,)
+        Attitude, from body to world.
+    current : ndarray, shape (3,)
+        Velocity of the water [m/s], world frame.
+    """
+    relative = np.zeros(6)
+    relative[:3] = -rotation_matrix(quaternion).T @ current
+    drag = damping(model.linear_damping, model.quadratic_damping, relative) * relative
+    wrench: Array = coriolis(model.mass, relative) @ relative + drag + regressor(quaternion) @ model.phi
+    return wrench
+
+
+def thrust_margin(vehicle: Vehicle, phi: Array, quaternion: Array, current: Array) -> ThrustMargin:
+    """Return what the thrusters can give, and what is left when the vehicle holds still.
+
+    Parameters
+    ----------
+    vehicle : Vehicle
+        The true one.
+    phi : ndarray, shape (4,)
+        Its restoring parameters [N, N m] (12).
+    quaternion : ndarray, shape (4,)
+        Attitude that is kept, from body to world.
+    current : ndarray, shape (3,)
+        Velocity of the water [m/s], world frame.
+
+    Returns
+    -------
+    ThrustMargin
+        Over the 26 `DIRECTIONS`.
+    """
+    hold = held_wrench(_added(vehicle, phi), quaternion, current)
+    weightless = held_wrench(_added(vehicle, np.zeros(4)), quaternion, current)
+    all_alive = np.ones(vehicle.n_thrusters, dtype=bool)
+    thrust = _least(vehicle, quaternion, np.zeros(6), all_alive)
+    without = []
+    for lost in range(vehicle.n_thrusters):
+        alive = all_alive.copy()
+        alive[lost] = False
+        without.append(_least(vehicle, quaternion, hold, alive))
+    return ThrustMargin(
+        hold=tuple(hold.tolist()),
+        drag=float(np.linalg.norm(weightless[:3])),
+        excess_weight=float(phi[0]),
+        thrust=thrust,
+        left=least_left(vehicle, phi, quaternion, current),
+        left_without=tuple(without),
+    )
+
+
+def least_left(vehicle: Vehicle, phi: Array, quaternion: Array, current: Array) -> Margin | None:
+    """Return `ThrustMargin.left` alone. Arguments as `thrust_margin`."""
+    hold = held_wrench(_added(vehicle, phi), quaternion, current)
+    return _least(vehicle, quaternion, hold, np.ones(vehicle.n_thrusters, dtype=bool))
+
+
+def _added(vehicle: Vehicle, phi: Array) -> Model:
+    """Return what `held_wrench` reads of a vehicle."""
+    return Model(
+        np.array(vehicle.added_mass), np.array(vehicle.linear_damping), np.array(vehicle.quadratic_damping), phi
+    )
+
+
+def _least(vehicle: Vehicle, quaternion: Array, hold: Array, alive: Array) -> Margin | None:
+    """Return the direction in which the least force is left, None if `hold` is out of reach."""
+    to_body = rotation_matrix(quaternion).T
+    worst: Margin | None = None
+    for name, direction in DIRECTIONS.items():
+        force = greatest_force(vehicle, to_body @ np.array(direction), hold, alive)
+        if force is None:
+            return None
+        if worst is None or force < worst.force:
+            worst = Margin(name, force)
+    return worst
