@@ -22,7 +22,7 @@ from controller import LAWS, CompiledLaw, VehicleState
 from controller.allocation import allocate
 from controller.compiled import compiled
 from controller.laws import printed
-from controller.regions import PackedRegions, clearance_at
+from controller.regions import PackedRegions, Sphere, clearance_of_place, clearance_of_sphere
 from cosim.native import advance, read, seconds, send
 from fuzzy_arbiter import Arbiter
 from fuzzy_arbiter.membership import ramp
@@ -37,6 +37,7 @@ _weigh = Arbiter().compiled()
 _ramp: Any = numba.njit(ramp)
 _step: Any = printed.step  # of a law, and whether it gives a wrench: `flight_of` puts others in their places
 _is_wrench = True
+_SPHERE = Sphere.kind
 
 
 class Setup(NamedTuple):
@@ -122,14 +123,18 @@ def _fly(
     position, quaternion, velocity = np.empty(3), np.empty(4), np.empty(6)
     health, weights, memberships = np.ones(m), np.zeros(n), np.zeros(3)
     by_criterion, wrench, before = np.zeros(3), np.zeros(6), np.zeros(m)
+    clearances, goal_clearance = np.zeros(n), np.zeros(1)
     room = np.zeros(2, np.int64)
     state = VehicleState(position, quaternion, velocity, health)
     effort, variation, worst = 0.0, 0.0, 0.0
     if not read(native):
         return (False, np.inf, np.nan, effort, variation, worst, 0)
+    true_position = native.outputs[:3]
     _move(setup, 0.0)
-    least = _least_clearance(setup.regions, native.outputs[:3], np.inf)
-    inside_since = 0 if clearance_at(setup.goal, 0, native.outputs[:3]) >= 0.0 else -1  # plant step; -1: outside
+    _clearances(setup.regions, true_position, clearances)
+    _clearances(setup.goal, true_position, goal_clearance)
+    least = _least(clearances, np.inf)
+    inside_since = 0 if goal_clearance[0] >= 0.0 else -1  # plant step; -1: outside
     done = 0  # plant steps
 
     for k in range(setup.controls):
@@ -149,9 +154,10 @@ def _fly(
         velocity[:3] += setup.noise[k, 3:]
         # regions and arbiter
         _move(setup, now)
+        _clearances(setup.regions, position, clearances)
         memberships[:] = 0.0
         for i in range(n):
-            degree = _ramp(clearance_at(setup.regions, i, position), setup.ramp)
+            degree = _ramp(clearances[i], setup.ramp)
             memberships[setup.criteria[i]] = max(memberships[setup.criteria[i]], degree)
         _weigh(memberships, by_criterion)
         for i in range(n):
@@ -177,9 +183,10 @@ def _fly(
                 return (False, np.inf, least, effort, variation, worst, done)
             done += 1
             _move(setup, done * setup.plant_step)
-            true_position = native.outputs[:3]
-            least = _least_clearance(setup.regions, true_position, least)
-            if not clearance_at(setup.goal, 0, true_position) >= 0.0:
+            _clearances(setup.regions, true_position, clearances)
+            _clearances(setup.goal, true_position, goal_clearance)
+            least = _least(clearances, least)
+            if not goal_clearance[0] >= 0.0:
                 inside_since = -1
             elif inside_since < 0:
                 inside_since = done
@@ -200,10 +207,20 @@ def _move(setup: Setup, now: float) -> None:
 
 
 @compiled
-def _least_clearance(regions: PackedRegions, position: Array, least: float) -> float:
-    """Return the least of a clearance and those of all regions at a position [m]; what is no number stays."""
+def _clearances(regions: PackedRegions, position: Array, clearances: Array) -> None:
+    """Write the clearance [m] of each region, none of which depends on attitude, at a position into `clearances`."""
+    room = np.empty(3)
     for i in range(regions.kinds.size):
-        clearance = clearance_at(regions, i, position)
+        if regions.kinds[i] == _SPHERE:
+            clearances[i] = clearance_of_sphere(regions, i, position)
+        else:
+            clearances[i] = clearance_of_place(regions, i, position, room)
+
+
+@compiled
+def _least(clearances: Array, least: float) -> float:
+    """Return the least of numbers and one more; what is no number stays."""
+    for clearance in clearances:
         if clearance < least or np.isnan(clearance):
             least = clearance
     return least

@@ -124,5 +124,5 @@ def _batches(store: SceneStore, seeds: list[int]) -> Iterator[list[bytes]]:
 def _bar(law: str, scenes: int, done: int, progress: bool) -> Any:
     return tqdm(
         total=scenes, initial=done, desc=law, unit="scene", disable=None if progress and sys.stderr else True,
-        smoothing=0.05, bar_format="{desc} {percentage:3.0f}%|{bar}| {n}/{total} [{elapsed}<{remaining}, {rate_fmt}]",
+        bar_format="{desc} {percentage:3.0f}%|{bar}| {n}/{total} [{elapsed}<{remaining}, {rate_fmt}]",
     )  # fmt: skip

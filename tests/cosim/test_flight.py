@@ -40,7 +40,8 @@ class Readable:
         self.known = told(scene)
         n = self.known.regions.kinds.size
         self.law = PrintedLaw(LAWS["printed"].gains_type(), np.array([1.0, 0.0, 0.0, 0.0]), conditions.control, n)
-        self.values, self.gradients, self.clearances = np.zeros(n), np.zeros((n, 3)), np.zeros(n)
+        self.values, self.gradients, self.turnings = np.zeros(n), np.zeros((n, 3)), np.zeros((n, 3))
+        self.clearances = np.zeros(n)
 
     def fly(self):
         scene, c = self.scene, self.conditions
@@ -68,7 +69,9 @@ class Readable:
                 state.velocity_body[:3] += scene.noise.velocity * noise[k, 3:]
                 for regions in (self.known.goal, self.known.regions):
                     regions.move_to(plant.time)
-                self.known.regions.evaluate(state.position, self.values, self.gradients, self.clearances)
+                self.known.regions.evaluate(
+                    state.position, state.quaternion, self.values, self.gradients, self.turnings, self.clearances
+                )
                 memberships = [0.0] * len(CRITERIA)
                 for criterion, clearance in zip(self.known.criteria, self.clearances, strict=True):
                     memberships[criterion] = max(memberships[criterion], ramp(clearance, c.ramp))
