@@ -174,7 +174,7 @@ def decode_scene(line: bytes) -> Scene:
             raise ScenarioError(f"expected one JSON object, got {type(table).__name__!r}")
         scene = decode(table, Scene)
     except (msgspec.MsgspecError, PlantFmuError, RecursionError, UnicodeDecodeError) as error:
-        raise ScenarioError(str(error)) from error
+        raise ScenarioError(str(error).removeprefix("file: ")) from error
     _check(scene)
     return scene
 

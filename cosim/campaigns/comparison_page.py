@@ -13,7 +13,8 @@ _ROWS = (  # where in a law's summary, and how it is called
     (("medians", "thrust_variation"), "median variation of the thrust, N"),
     (("medians", "min_clearance"), "median of the least clearance, m"),
     (("least_clearance",), "least clearance of all, m"),
-    (("worst_step_time",), "longest call of the law, s"),
+    (("medians", "worst_step_time"), "median of the longest call of the law, s"),
+    (("worst_step_time",), "longest call of all, s"),
 )
 
 

@@ -12,7 +12,7 @@ from types import TracebackType
 
 import pyarrow as pa
 
-from cosim.campaigns.plan import Plan, differences
+from cosim.campaigns.plan import Plan, difference
 from cosim.campaigns.results import Results, Row, read_results, table_of, write_whole
 from cosim.errors import RunError
 
@@ -74,10 +74,8 @@ class CampaignFolder:
                 raise RunError(f"{file}: cannot be read: {error}") from error
             if not isinstance(found, dict):
                 raise RunError(f"{file}: holds no campaign")
-            if differing := differences(found, json.loads(json.dumps(table))):
-                raise RunError(
-                    f"{self.path}: holds another campaign ({'; '.join(differing)}), expected a folder of its own"
-                )
+            if differing := difference(found, json.loads(json.dumps(table))):
+                raise RunError(f"{self.path}: holds another campaign ({differing}), expected a folder of its own")
         else:
             write_text(file, json.dumps(table, indent=2) + "\n")
         (self.path / PARTS).mkdir(exist_ok=True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import platform
+from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from functools import cache
 from importlib import metadata
@@ -18,6 +19,7 @@ from cosim.scene_run import Conditions
 
 _SOURCES = (".py", ".c", ".h", ".toml")
 _LIBRARIES = ("subreach", "numba", "llvmlite", "numpy", "pyarrow")
+_NAMED = 3  # differences that a message names
 
 
 @dataclass(frozen=True)
@@ -73,29 +75,32 @@ def code_digest() -> str:
     return digest.hexdigest()
 
 
-def differences(one: dict[str, Any], other: dict[str, Any], prefix: str = "") -> list[str]:
-    """Return in words where two tables differ.
+def difference(one: dict[str, Any], other: dict[str, Any]) -> str:
+    """Return in words where two plans differ.
 
     Parameters
     ----------
     one, other : dict
-        Of a plan, as it stands in a folder, and as it is now.
-    prefix : str
-        Before every key.
+        The tables of a plan, as it stands in a folder, and as it is now.
 
     Returns
     -------
-    list of str
-        Such as ``"law is 'printed', now 'deployable'"``.
+    str
+        Such as ``"gains.k_p1 is 18.8, now 10.0"``, the law alone where it is another; "" where they are equal.
     """
-    found = []
-    for key in one.keys() | other.keys():
+    keys = ["law"] if one.get("law") != other.get("law") else sorted(one.keys() | other.keys())
+    found = list(_differences(one, other, keys))
+    more = f"; and {len(found) - _NAMED} more" if len(found) > _NAMED else ""
+    return "; ".join(found[:_NAMED]) + more
+
+
+def _differences(one: dict[str, Any], other: dict[str, Any], keys: list[str], prefix: str = "") -> Iterator[str]:
+    for key in keys:
         a, b = one.get(key), other.get(key)
         if isinstance(a, dict) and isinstance(b, dict):
-            found += differences(a, b, f"{prefix}{key}.")
+            yield from _differences(a, b, sorted(a.keys() | b.keys()), f"{prefix}{key}.")
         elif a != b:
-            found.append(f"{prefix}{key} is {_short(a)}, now {_short(b)}")
-    return sorted(found)
+            yield f"{prefix}{key} is {_short(a)}, now {_short(b)}"
 
 
 def _short(value: Any) -> str:

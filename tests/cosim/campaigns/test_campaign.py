@@ -15,7 +15,7 @@ from cosim.campaigns import campaign as module
 from cosim.campaigns import run_campaign
 from cosim.campaigns.folder import PARTS, RESULTS, SUMMARY, CampaignFolder
 from cosim.campaigns.law_gains import gains_by_law, gains_from
-from cosim.campaigns.plan import differences, plan_of
+from cosim.campaigns.plan import difference, plan_of
 from cosim.campaigns.results import Results, read_results, row_of, table_of
 from cosim.campaigns.scene_store import SceneStore
 from cosim.campaigns.summary import summarise
@@ -60,6 +60,12 @@ def test_rows_are_what_the_flyer_scores(tmp_path):
             assert (row["min_clearance"], row["effort"]) == (score.min_clearance, score.effort)
             assert row["thrust_variation"] == score.thrust_variation and row["stopped_at"] is None
             assert row["violation"] == (score.min_clearance < 0.0)
+
+
+def test_another_law_is_refused_by_its_name_alone(tmp_path, scenes):
+    run_campaign(scenes, "printed", tmp_path / "out", BRIEF)
+    with pytest.raises(RunError, match=r"another campaign \(law is 'printed', now 'deployable'\)"):
+        run_campaign(scenes, "deployable", tmp_path / "out", BRIEF)
 
 
 def test_what_is_interrupted_goes_on_without_losing_or_repeating(tmp_path, scenes, monkeypatch):
@@ -310,10 +316,13 @@ def test_no_workers_are_refused(tmp_path, scenes):
         run_campaign(scenes, "printed", tmp_path / "out", BRIEF, workers=0)
 
 
-def test_differences_are_said_in_words():
-    assert differences({"a": {"b": 1}, "c": 2}, {"a": {"b": 3}, "d": "x" * 50}) == [
-        "a.b is 1, now 3", "c is 2, now None", "d is None, now 'xxxxxxxxx…"
-    ]  # fmt: skip
+def test_a_difference_is_said_in_words():
+    assert difference({"a": {"b": 1}, "c": 2}, {"a": {"b": 3}, "c": 2, "d": "x" * 50}) == (
+        "a.b is 1, now 3; d is None, now 'xxxxxxxxx…"
+    )
+    assert difference({"law": "x", "c": 2}, {"law": "y", "c": 3}) == "law is 'x', now 'y'"
+    assert difference(dict.fromkeys("abcde", 1), dict.fromkeys("abcde", 2)).endswith("c is 1, now 2; and 2 more")
+    assert difference({"a": {"b": 1}}, {"a": {"b": 1}}) == ""
 
 
 def test_results_of_another_kind_are_refused(tmp_path):
