@@ -16,6 +16,7 @@ from cosim.native import Clock, advance, seconds
 from cosim.scenario import CRITERIA
 from cosim.scene import Ball, Failure, Obstacle, plant_values, read_scenes, told
 from cosim.scene_run import Conditions, SceneFlyer
+from cosim.vehicle_model import vehicle_model
 from fuzzy_arbiter import Arbiter, ramp
 from plant_fmu import Plant, PlantError, load_vehicle
 from plant_fmu.running.native import Native
@@ -32,14 +33,15 @@ def flyer():
 
 
 class Readable:
-    """A flight by the printed law in plain Python, over the FMU's Python interface."""
+    """A flight in plain Python, over the FMU's Python interface."""
 
-    def __init__(self, scene, conditions):
+    def __init__(self, scene, conditions, law="printed"):
         self.scene, self.conditions = scene, conditions
         self.vehicle = load_vehicle("odin")
         self.known = told(scene)
         n = self.known.regions.kinds.size
-        self.law = PrintedLaw(LAWS["printed"].gains_type(), np.array([1.0, 0.0, 0.0, 0.0]), conditions.control, n)
+        gains, level = LAWS[law].gains_type(), np.array([1.0, 0.0, 0.0, 0.0])
+        self.law = LAWS[law].for_vehicle(vehicle_model(self.vehicle), gains, level, conditions.control, n)
         self.values, self.gradients, self.turnings = np.zeros(n), np.zeros((n, 3)), np.zeros((n, 3))
         self.clearances = np.zeros(n)
 
@@ -76,8 +78,11 @@ class Readable:
                 for criterion, clearance in zip(self.known.criteria, self.clearances, strict=True):
                     memberships[criterion] = max(memberships[criterion], ramp(clearance, c.ramp))
                 weights[:] = np.array(arbiter(memberships))[self.known.criteria]
-                self.law.step(state, self.known.goal, self.known.regions, weights, wrench)
-                allocation(wrench, forces)
+                if self.law.output == "wrench":
+                    self.law.step(state, self.known.goal, self.known.regions, weights, wrench)
+                    allocation(wrench, forces)
+                else:
+                    self.law.step(state, self.known.goal, self.known.regions, weights, forces)
                 rows.append(np.concatenate([self.position(plant), state.position, forces]))
                 variation += np.abs(forces - before).sum()
                 before[:] = forces
@@ -106,11 +111,16 @@ def distances(scene, positions, step):
 
 
 @pytest.mark.parametrize("scene", [PLAIN[0], HARD[1]], ids=["plain", "hard"])
-def test_compiled_loop_flies_as_the_readable_one(flyer, scene):
+@pytest.mark.parametrize(
+    "law",
+    ["printed", *(pytest.param(law, marks=pytest.mark.slow) for law in sorted(LAWS) if law != "printed")],
+)
+def test_compiled_loop_flies_as_the_readable_one(law, scene):
     if scene.failed_thruster:
         scene = replace(scene, failed_thruster=Failure(scene.failed_thruster.index, 3.01))
-    score, trace = flyer.fly(scene, trace=True)
-    rows, positions, effort, variation = Readable(scene, SHORT).fly()
+    with SceneFlyer(law, SHORT) as flyer:
+        score, trace = flyer.fly(scene, trace=True)
+    rows, positions, effort, variation = Readable(scene, SHORT, law).fly()
     np.testing.assert_array_equal(trace[:, 1:4], rows[:, :3])  # to the last bit
     np.testing.assert_array_equal(trace[:, 14:17], rows[:, 3:6])
     np.testing.assert_array_equal(trace[:, 19:27], rows[:, 6:])
