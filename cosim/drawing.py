@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -38,6 +40,8 @@ STYLE: Any = {
     "svg.hashsalt": "subreach",
 }
 
+DPI = 160  # of figures as PNG
+
 _LEGEND_WIDTH, _LEGEND_MARK = 100, 7  # letters that fit across a figure, that a line or marker is as wide as
 _NAMED = 8  # regions that a legend names one by one
 POINTS = 1500  # of a drawn curve: about what a figure's width resolves
@@ -59,6 +63,14 @@ class Drawing:
     name: str
     caption: str
     figure: Figure
+
+    def write(self, folder: Path) -> str:
+        """Write it into a folder as SVG and as PNG, and return the SVG."""
+        svg = io.StringIO()
+        self.figure.savefig(svg, format="svg", metadata={"Date": None})
+        (folder / f"{self.name}.svg").write_text(svg.getvalue(), encoding="utf-8")
+        self.figure.savefig(folder / f"{self.name}.png", dpi=DPI)
+        return svg.getvalue()
 
 
 def thin(time: Array, *signals: Array) -> tuple[Array, ...]:
