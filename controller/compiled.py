@@ -74,5 +74,6 @@ def inlined(function: F) -> F:
     callable
         The same, compiled at its first call.
     """
-    result: F = numba.njit(error_model="numpy", inline="always")(function)
+    jitted: Any = numba.njit(error_model="numpy", inline="always")(function)
+    result: F = jitted
     return result

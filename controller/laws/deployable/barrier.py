@@ -12,7 +12,7 @@ linear in the thruster forces u:
 with n the slope of h over the pose, v the velocity against the region, A u what the thrusters add to the acceleration
 and a_free what there is without them. Along psi = 0 this asks for a (1 - (a / kappa) / sqrt(2 a h + (a / kappa)^2)),
 which is less than a: never for more than there is. A region's own motion enters through dh/dt. Clearances of places are
-in m and look at the position alone; those of attitude (what the camera sees, which way the vehicle is turned) are in rad
+in m and look at position alone; those of attitude (what the camera sees, which way the vehicle is turned) are in rad
 and look at both. docs/deployable.md says what this promises and what not.
 """
 

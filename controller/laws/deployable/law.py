@@ -278,7 +278,7 @@ def _push(dynamics: Dynamics, thrusters: Thrusters, R: Array) -> Array:
 
 @compiled
 def _least(values: Array) -> float:
-    least = values[0]
+    least: float = values[0]
     for i in range(values.size):
         least = min(least, values[i])
     return least
@@ -286,11 +286,16 @@ def _least(values: Array) -> float:
 
 @compiled
 def _braking(dynamics: Dynamics, thrusters: Thrusters) -> float:
-    """Return the deceleration [m/s2] of the worst direction, with one thruster lost: the one that is, or any."""
+    """Return the deceleration [m/s2] of the worst direction with one thruster lost: the one that is, or any.
+
+    With more lost, half of that for each; a rule of thumb.
+    """
+    worst, lost = _least(dynamics.braking), 0
     for j in range(thrusters.health.size):
         if thrusters.health[j] == 0.0:
-            return dynamics.braking[j]
-    return _least(dynamics.braking)
+            worst = dynamics.braking[j] if lost == 0 else 0.5 * min(worst, dynamics.braking[j])
+            lost += 1
+    return worst
 
 
 @compiled

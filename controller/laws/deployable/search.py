@@ -1,9 +1,9 @@
 """The way out of pockets: a tree of free straight lines that grows from the end of the way towards the vehicle.
 
 Changing one corner at a time finds no way that needs several at once. So while the way is blocked, a tree in the manner
-of LaValle's RRT (Planning Algorithms, 2006, ch. 5) grows by one node a period at most, from the goal outwards, so that it
-stays good while the vehicle moves. Each node holds on to the farthest of its ancestors that it sees, which keeps ways
-short of corners. When the vehicle sees a new node, the chain of its ancestors is a way.
+of LaValle's RRT (Planning Algorithms, 2006, ch. 5) grows by one node a period at most, from the goal outwards, so that
+it stays good while the vehicle moves. Each node holds on to the farthest of its ancestors that it sees, which saves
+corners. When the vehicle sees a new node, the chain of its ancestors is a way.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ class Tree(NamedTuple):
 
     nodes: Array  # (_NODES, 3) m, NED
     parents: NDArray[np.int64]  # (_NODES,)
-    count: NDArray[np.int64]  # (1,)
+    size: NDArray[np.int64]  # (1,) nodes that there are
 
 
 def tree_of_nothing() -> Tree:
@@ -120,10 +120,10 @@ def grow(
     moved = 0.0
     for axis in range(3):
         moved += (nodes[0, axis] - end[axis]) ** 2
-    if tree.count[0] == 0 or tree.count[0] == _NODES or moved > _MOVED**2:
+    if tree.size[0] == 0 or tree.size[0] == _NODES or moved > _MOVED**2:
         nodes[0] = end
         parents[0] = -1
-        tree.count[0] = 1
+        tree.size[0] = 1
     wanted = gains.margin + 0.4 * gains.clearance
 
     # towards a point anywhere about, or the vehicle; from the nearest node
@@ -132,7 +132,7 @@ def grow(
         low, high = min(start[axis], end[axis]) - _ROOM, max(start[axis], end[axis]) + _ROOM
         target[axis] = start[axis] if draws[3] < 0.2 else low + draws[axis] * (high - low)
     nearest, least = 0, np.inf
-    for i in range(tree.count[0]):
+    for i in range(tree.size[0]):
         square = 0.0
         for axis in range(3):
             square += (nodes[i, axis] - target[axis]) ** 2
@@ -154,10 +154,10 @@ def grow(
         if before < 0 or not is_free(new, nodes[before], regions, wanted):
             break
         parent = before
-    at = tree.count[0]
+    at = tree.size[0]
     nodes[at] = new
     parents[at] = parent
-    tree.count[0] += 1
+    tree.size[0] += 1
 
     # the way, if the vehicle sees the node; it may be closer to a region itself, but no closer on the way
     if not is_free(new, start, regions, min(0.5 * wanted, _room_at(start, regions, target) - _SLACK)):
