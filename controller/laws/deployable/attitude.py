@@ -1,7 +1,8 @@
 """Attitude: held by proportional and rate feedback, with the restoring moments adapted from the body rates.
 
-The rates are measured well, so what the model misses of a moment shows within one period: M omega' = tau - D omega -
-S(k) phi_{2..4} + residual. The residual drives the three moments of phi (12), within their bounds.
+The rates are measured well, so what the model misses of a moment shows within one period: I omega' = tau - D omega -
+S(k) phi_{2..4} - nu_r x (M nu_r) + residual, where the fourth is what added mass makes of motion askew (Munk's moment).
+The residual drives the three moments of phi (12), within their bounds.
 
 The attitude that is held is the preferred one unless a region asks for another: where a region of attitude would have
 less than some comfort there, the held attitude is turned until it has, no more tilted than is allowed, and drifts back
@@ -37,13 +38,14 @@ class Attitude(NamedTuple):
     desired: Array  # (4,) attitude that is held
     moments: Array  # (3,) phi_2..phi_4 [N m]
     last_omega: Array  # (3,) rad/s
+    carried: Array  # (3,) N m, Munk's moment, body axes
     residual: Array  # (3,) N m, moment that the model missed in the last period
     known: Array  # (1,) 1 once last_omega is there
 
 
 def attitude_of(preferred: Array) -> Attitude:
     """Return the loop's memory before the first step, for an attitude to be kept, shape (4,)."""
-    return Attitude(preferred.copy(), preferred.copy(), np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(1))
+    return Attitude(preferred.copy(), preferred.copy(), np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(1))
 
 
 @compiled
@@ -69,7 +71,7 @@ def adapt(
             change = 0.0
             for j in range(3):
                 change += mass[3 + i, 3 + j] * (omega[j] - last[j]) / period
-            attitude.residual[i] = change - (wrench[3 + i] - damping - restoring)
+            attitude.residual[i] = change - (wrench[3 + i] + attitude.carried[i] - damping - restoring)
         for i in range(3):  # phi' = -rate S(k)^T residual
             a, b = (i + 1) % 3, (i + 2) % 3
             drive = k[a] * attitude.residual[b] - k[b] * attitude.residual[a]  # S(k) r = -S(k)^T r
@@ -77,6 +79,21 @@ def adapt(
             phi[i] = min(max(phi[i], -gains.moment_bound), gains.moment_bound)
     attitude.last_omega[:] = omega
     attitude.known[0] = 1.0
+
+
+@compiled
+def carry(attitude: Attitude, dynamics: Dynamics, R: Array, velocity: Array, water: Array) -> None:
+    """Bring Munk's moment up to date with the velocities [m/s] of vehicle and water, shape (3,) each, NED."""
+    relative, momentum = np.zeros(3), np.zeros(3)
+    for i in range(3):
+        for axis in range(3):
+            relative[i] += R[axis, i] * (velocity[axis] - water[axis])
+    for i in range(3):
+        for j in range(3):
+            momentum[i] += dynamics.mass[i, j] * relative[j]
+    for i in range(3):
+        a, b = (i + 1) % 3, (i + 2) % 3
+        attitude.carried[i] = relative[b] * momentum[a] - relative[a] * momentum[b]  # -nu_r x (M nu_r)
 
 
 @compiled
@@ -139,7 +156,7 @@ def free_turning(attitude: Attitude, dynamics: Dynamics, quaternion: Array, omeg
         a, b = (i + 1) % 3, (i + 2) % 3
         damping = (dynamics.linear_damping[3 + i] + dynamics.quadratic_damping[3 + i] * abs(omega[i])) * omega[i]
         restoring = k[a] * attitude.moments[b] - k[b] * attitude.moments[a]
-        moments[i] = -damping - restoring - (omega[a] * momentum[b] - omega[b] * momentum[a])
+        moments[i] = attitude.carried[i] - damping - restoring - (omega[a] * momentum[b] - omega[b] * momentum[a])
     for i in range(3):
         out[i] = 0.0
         for j in range(3):
@@ -158,4 +175,4 @@ def moment(
         a, b = (i + 1) % 3, (i + 2) % 3
         inertia = dynamics.mass[3 + i, 3 + i]
         restoring = k[a] * attitude.moments[b] - k[b] * attitude.moments[a]
-        out[i] = restoring - 2.0 * inertia * w * w * e[1 + i] - 2.0 * inertia * w * omega[i]
+        out[i] = restoring - attitude.carried[i] - 2.0 * inertia * w * w * e[1 + i] - 2.0 * inertia * w * omega[i]

@@ -122,6 +122,7 @@ def step(
     # wanted wrench
     free, wrench, velocity = np.empty(6), np.empty(6), np.empty(6)
     model.free_acceleration(dynamics, R, seen.velocity, memory.omega, seen.water, seen.restoring[0], free)
+    attitude_loop.carry(memory.attitude, dynamics, R, seen.velocity, seen.water)
     attitude_loop.free_turning(memory.attitude, dynamics, memory.quaternion, memory.omega, free[3:])
     velocity[:3], velocity[3:] = seen.velocity, memory.omega
     look(memory.sight, regions, seen.position, memory.quaternion, velocity)
