@@ -32,7 +32,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         "--draws",
         type=int,
         default=baselines.DRAWS,
-        help="of each of two rounds; 0: fly the gains they have (%(default)s)",
+        help="0: fly the gains that they have (default: %(default)s)",
     )
     verb.add_argument("--seed", type=int, default=0, help="of the draws (default: %(default)s)")
     verb.add_argument("--workers", type=int, default=2, help="processes (default: %(default)s)")
@@ -47,6 +47,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
         unknown = set(options.laws) - set(baselines.RANGES)
         if unknown:
             parser.error(f"law is {sorted(unknown)[0]!r}, expected one of {', '.join(baselines.RANGES)}")
+        if options.draws < 0 or options.workers < 1:
+            parser.error("expected 0 or more draws, and 1 or more workers")
         baselines.main(options.laws or baselines.RANGES, options.draws, options.seed, options.workers)
     else:
         benchmark = BENCHMARKS[options.name]

@@ -1,14 +1,14 @@
-"""The search for the gains of the laws for comparison, the same for all of them: random draws, successive halving.
+"""The search for the gains of the laws for comparison, the same for all of them: random draws that race the best.
 
-Gains are drawn log-uniformly from `RANGES`; all others keep the values of their source. All draws fly the first
-scenes, the better quarter of them flies more, and so on; the last ones fly all plain scenes of seeds 10000-10199. Then
-the same once more with draws around the best. Better is: fewer violations, then more reached, then the lower median
-reach time, all over the scenes flown so far.
+Gains are drawn log-uniformly, half of them from `RANGES`, the others around the best so far; those without a range keep
+the values of their source. Each draw flies the plain scenes of seeds 10000-10199, and is given up as soon as it falls
+behind the best over the scenes flown. Better is: fewer violations, then more reached, then the lower median reach time.
 """
 
 from __future__ import annotations
 
 import functools
+import math
 import statistics
 from collections.abc import Iterable
 from concurrent.futures import ProcessPoolExecutor
@@ -24,12 +24,18 @@ from cosim.scene import Scene
 from cosim.scene_run import Conditions, SceneFlyer
 
 FIRST_SEED = 10_000
-STAGES = (5, 20, 60)  # scenes flown by the end of each stage before the last
-STAGE_DURATION = 60.0  # s of a scene in these stages; good gains have long reached it by then
-SCENES = 200  # of the last stage, flown in full
-KEPT = 4  # one in so many goes on to the next stage
-NEAR = 1.5  # draws around the best: within this factor of it, either way
-DRAWS = 150
+SCENES = 200
+DURATION = 60.0  # s of a scene in the search; good gains have long reached the goal by then
+# scenes flown by the end of each heat, and by which factor the median reach time may be above that of the best there
+HEATS = ((2, 1.3), (5, 1.15), (20, 1.08), (60, 1.03), (SCENES, 1.0))
+FIRST_HEAT = 20  # scenes that the first batch flies, before there is a best
+BATCH = 10  # draws that race the same best
+PHASES = (
+    (0.5, math.inf),
+    (0.25, 1.5),
+    (0.25, 1.15),
+)  # share of the draws, and within which factor of the best they are
+DRAWS = 300
 
 _FIELD = {
     "k_p1": (20.0, 600.0),
@@ -88,7 +94,7 @@ def outcome(scores: Iterable[Score]) -> Outcome:
     )
 
 
-def draws(law: str, count: int, rng: np.random.Generator, best: Any = None) -> list[Any]:
+def draws(law: str, count: int, rng: np.random.Generator, best: Any = None, near: float = math.inf) -> list[Any]:
     """Draw gains of a law.
 
     Parameters
@@ -100,7 +106,9 @@ def draws(law: str, count: int, rng: np.random.Generator, best: Any = None) -> l
     rng : Generator
         Whence they come.
     best : NamedTuple, optional
-        To draw around, within the factor `NEAR` and the ranges; default: from the whole ranges.
+        Gains to draw around.
+    near : float
+        Within which factor of `best`, either way, and within the ranges.
 
     Returns
     -------
@@ -113,58 +121,66 @@ def draws(law: str, count: int, rng: np.random.Generator, best: Any = None) -> l
         for name, (low, high) in RANGES[law].items():
             if best is not None:
                 centre = getattr(best, name)
-                low, high = max(low, centre / NEAR), min(high, centre * NEAR)
+                low, high = max(low, centre / near), min(high, centre * near)
             changes[name] = float(f"{np.exp(rng.uniform(np.log(low), np.log(high))):.4g}")
         found.append(gains_type(**changes))
     return found
 
 
 def search(law: str, count: int, seed: int, workers: int) -> Candidate:
-    """Return the best gains of a law, flown over all the scenes.
+    """Return the best gains of a law.
 
     Parameters
     ----------
     law : str
         One of `RANGES`.
     count : int
-        Draws of each of the two rounds.
+        Draws, 1 or more.
     seed : int
         Of the draws.
     workers : int
-        Processes.
+        Processes; they change nothing in what is found.
 
     Returns
     -------
     Candidate
-        The gains, and their scores over all scenes.
+        The gains, and their scores over all scenes, of `DURATION` each.
     """
     rng = np.random.default_rng(seed)
+    (first, _), *batches = _batches(count)
     with ProcessPoolExecutor(workers) as pool:
-        best = _halve(law, [Candidate(gains, ()) for gains in draws(law, count, rng)], pool)
-        around = [Candidate(gains, ()) for gains in draws(law, count, rng, best.gains)]
-        return min(best, _halve(law, around, pool), key=lambda candidate: candidate.outcome.rank)
+        started = pool.map(_fly_on, [(law, Candidate(g, ()), FIRST_HEAT, DURATION) for g in draws(law, first, rng)])
+        front = min(started, key=lambda candidate: candidate.outcome.rank)
+        best = pool.submit(_fly_on, (law, front, SCENES, DURATION)).result()
+        for size, near in batches:
+            flown = pool.map(_race, [(law, g, best.scores) for g in draws(law, size, rng, best.gains, near)])
+            finished = [candidate for candidate in flown if len(candidate.scores) == SCENES]
+            better = min([best, *finished], key=lambda candidate: candidate.outcome.rank)
+            if better is not best:
+                best = better
+                print(f"{law}: {_sentence(best.outcome)}", flush=True)
+    return best
 
 
-def _halve(law: str, candidates: list[Candidate], pool: ProcessPoolExecutor) -> Candidate:
-    for scenes in STAGES:
-        candidates = _sorted(law, candidates, scenes, STAGE_DURATION, pool)
-        candidates = candidates[: -(-len(candidates) // KEPT)]
-    anew = [Candidate(candidate.gains, ()) for candidate in candidates]
-    return _sorted(law, anew, SCENES, Conditions().duration, pool)[0]
+def _batches(count: int) -> list[tuple[int, float]]:
+    """Return the size of each batch, and within which factor of the best its draws are."""
+    found = []
+    for share, near in PHASES:
+        phase = math.ceil(share * count)
+        found += [(min(BATCH, phase - done), near) for done in range(0, phase, BATCH)]
+    return found
 
 
-def _sorted(
-    law: str, candidates: list[Candidate], scenes: int, duration: float, pool: ProcessPoolExecutor
-) -> list[Candidate]:
-    flown = pool.map(_fly_on, [(law, candidate, scenes, duration) for candidate in candidates])
-    ranked = sorted(flown, key=lambda candidate: candidate.outcome.rank)
-    best = ranked[0].outcome
-    print(
-        f"{law}: {len(ranked)} draws over {scenes} scenes of {duration:.0f} s; best: {best.violations} violations, "
-        f"{best.reached} reached, {best.reach_time:.2f} s, {best.effort:.0f} N s",
-        flush=True,
-    )
-    return ranked
+def _race(job: tuple[str, Any, tuple[Score, ...]]) -> Candidate:
+    law, gains, best = job
+    candidate = Candidate(gains, ())
+    for scenes, slack in HEATS:
+        candidate = _fly_on((law, candidate, scenes, DURATION))
+        *mine, time = candidate.outcome.rank
+        *his, his_time = outcome(best[:scenes]).rank
+        if mine > his or (mine == his and time > slack * his_time):
+            break
+    return candidate
 
 
 def _fly_on(job: tuple[str, Candidate, int, float]) -> Candidate:
@@ -185,35 +201,32 @@ def _scene(seed: int) -> Scene:
     return msgspec.convert(scene(seed), Scene)
 
 
-def print_candidate(law: str, candidate: Candidate) -> None:
-    """Print gains and what they came to."""
-    found = candidate.outcome
-    for name in RANGES[law]:
-        print(f"  {name} = {getattr(candidate.gains, name):.4g}")
-    print(
-        f"{law}: {found.violations} violations and {found.reached} reached of {found.scenes} scenes; "
-        f"medians over those reached without violation: {found.reach_time:.2f} s, {found.effort:.0f} N s",
-        flush=True,
+def _sentence(found: Outcome) -> str:
+    return (
+        f"{found.violations} violations and {found.reached} reached of {found.scenes} scenes; "
+        f"medians over those reached without violation: {found.reach_time:.2f} s, {found.effort:.0f} N s"
     )
 
 
 def main(laws: Iterable[str], count: int, seed: int, workers: int) -> None:
-    """Search for the gains of some laws, and print them; with no draws, fly the gains that they have.
+    """Search for the gains of some laws, print them, and fly them in full; with no draws, fly the gains that they have.
 
     Parameters
     ----------
     laws : iterable of str
         Of `RANGES`.
     count : int
-        Draws of each of the two rounds, or 0.
+        Draws, or 0.
     seed : int
         Of the draws.
     workers : int
         Processes.
     """
     for law in laws:
+        gains = LAWS[law].gains_type()
         if count:
-            print_candidate(law, search(law, count, seed, workers))
-        else:
-            defaults = Candidate(LAWS[law].gains_type(), ())
-            print_candidate(law, _fly_on((law, defaults, SCENES, Conditions().duration)))
+            gains = search(law, count, seed, workers).gains
+            for name in RANGES[law]:
+                print(f"  {name} = {getattr(gains, name):.4g}")
+        flown = _fly_on((law, Candidate(gains, ()), SCENES, Conditions().duration))
+        print(f"{law}, in full: {_sentence(flown.outcome)}", flush=True)
