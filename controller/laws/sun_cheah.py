@@ -35,7 +35,7 @@ from controller.restoring import regressor
 
 
 class SunCheahGains(NamedTuple):
-    """Defaults: attitude from section VII, the set point at the centre of a goal of 0.5 m, the rest by search."""
+    """Defaults: by ``python -m benchmarks baselines --draws 300 --seed 0``, where no other source stands beside."""
 
     k_p1: float = 100.0  # N/m
     k_p2: float = 36.0  # N m, section VII
@@ -45,9 +45,9 @@ class SunCheahGains(NamedTuple):
     sigma_a: float = 0.9  # rad/s, of attitude in the adaptation, section VII
     gamma: float = 0.03  # s2/kg, s2/(kg m2): L = I / gamma
     bound: float = 20.0  # N, of the estimate of W - B
-    bound_moment: float = 65.0  # N m, of the other estimates
+    bound_moment: float = 65.0  # N m, of the other estimates: above the righting moments of ODIN-like vehicles
     limit: float = 40.0  # N, greatest pull to the set point
-    inset: float = 0.5  # m, clearance of the set point within the goal region
+    inset: float = 0.5  # m, clearance of the set point within the goal region: the centre of the scenes' goals
     repulsion: float = 500.0  # N/m, of a region of gain 1
     reach: float = 0.4  # m, clearance at which regions begin to push
 
