@@ -24,19 +24,19 @@ from controller.restoring import regressor
 class UnarbitratedGains(NamedTuple):
     """Defaults: by ``python -m benchmarks baselines --draws 300 --seed 0``, where no other source stands beside."""
 
-    k_p1: float = 100.0  # N/m3, on the primary region (16)
+    k_p1: float = 115.8  # N/m3, on the primary region (16)
     k_p2: float = 36.0  # N m, on attitude (26), section VII
-    k_v1: float = 150.0  # N s/m (26)
+    k_v1: float = 175.2  # N s/m (26)
     k_v2: float = 40.0  # N m s/rad (26), section VII
-    sigma_p: float = 0.3  # 1/(m2 s), of position in the adaptation (27)
+    sigma_p: float = 1.607  # 1/(m2 s), of position in the adaptation (27)
     sigma_a: float = 0.9  # rad/s, of attitude in the adaptation (27), section VII
-    gamma: float = 0.03  # s2/kg, s2/(kg m2): Gamma = gamma I (27)
-    bound: float = 20.0  # N, of the estimate of W - B
+    gamma: float = 0.007226  # s2/kg, s2/(kg m2): Gamma = gamma I (27)
+    bound: float = 38.94  # N, of the estimate of W - B
     bound_moment: float = 65.0  # N m, of the other estimates: above the righting moments of ODIN-like vehicles
-    limit: float = 40.0  # N, greatest pull of the primary region
-    margin: float = 0.2  # m2: the pull ends where f of a sphere is -margin
-    repulsion: float = 500.0  # N/m, of a region of gain 1
-    reach: float = 0.4  # m, clearance at which regions begin to push
+    limit: float = 195.3  # N, greatest pull of the primary region
+    margin: float = 0.1355  # m2: the pull ends where f of a sphere is -margin
+    repulsion: float = 284.6  # N/m, of a region of gain 1
+    reach: float = 1.199  # m, clearance at which regions begin to push
 
 
 class UnarbitratedMemory(NamedTuple):
