@@ -84,9 +84,12 @@ def textbook(name, p, e, e_d, nu, theta, gains):
 @pytest.mark.parametrize("name", NAMES)
 def test_wrench_and_adaptation_are_the_equations(name):
     rng, regions, pushed, bounded = np.random.default_rng(5), pack([ROCK, BAND]), 0, 0
+    chosen = {"k_p1": 100.0, "repulsion": 300.0}
+    if name in ADAPTIVE:
+        chosen |= ADAPTING[name] | {"bound": 1e3, "bound_moment": 1e3}
     for _ in range(80):
         e, e_d, nu, p = random_unit(rng), random_unit(rng), rng.normal(size=6), rng.uniform([3, 0, 0], [9, 2, 7])
-        law = law_of(name, (ROCK, BAND), e_d, limit=rng.uniform(10, 1000), reach=rng.uniform(0.1, 1.2), repulsion=300.0)
+        law = law_of(name, (ROCK, BAND), e_d, limit=rng.uniform(10, 1000), reach=rng.uniform(0.1, 1.2), **chosen)
         gains, keeps, tau = law.gains, law.memory.theta if name == "antonelli" else law.estimate, np.empty(6)
         keeps[:] = rng.uniform(-15.0, 15.0, keeps.size)
         theta = keeps.copy()
