@@ -105,11 +105,12 @@ def step(
     for j in range(thrusters.health.size):
         if state.thruster_health[j] == 0.0 and thrusters.health[j] != 0.0:
             failed = j
-    if failed < 0:
+    told = failed >= 0
+    if not told:
         residual = memory.attitude.residual
         failed = failure.suspect(memory.suspicion, seen, residual, dynamics, thrusters, R, gains, period, measured)
     if failed >= 0:
-        failure.give_up(memory.suspicion, thrusters, failed)
+        failure.give_up(memory.suspicion, thrusters, failed, told)
         model.share_out(thrusters)
         observer.doubt(seen, 0.01)
 
