@@ -7,11 +7,12 @@ zero (Page's test; the hypothesis starts anew whenever it is at zero, which is t
 to have happened), and the thruster is given up when its sum passes the threshold, well ahead of every other.
 
 A moment tells only where the thruster's part of it stands out from what the model may miss anyway: an angular
-acceleration, for the centre of gravity is not told, and a tenth of what each thruster is believed to give. So a thruster
-that fails while it pushes little is found when it is used.
+acceleration, more of it in roll and pitch while the vehicle speeds up, for the height of its centre of gravity is not
+told, and a tenth of what each thruster is believed to give. So a thruster that fails while it pushes little is found
+when it is used.
 
-A single failure is the rule: a suspicion takes back the one before, never what was told. Since a thruster that was
-given up wrongly is only left idle, the one that has in truth failed goes on being missed, is found, and takes its place.
+A single failure is the rule: a suspicion takes back the one before, never what was told. A thruster that was given up
+wrongly is only left idle; the one that has in truth failed goes on being missed, is found, and takes its place.
 """
 
 from __future__ import annotations
@@ -158,7 +159,7 @@ def _by_moment(
 ) -> float:
     """Return the log-likelihood ratio of the last residual, and carry what is adapted over the period.
 
-    The adaptation takes S(k) phi-hat after the residual at its rate, in all directions but k, for S(k) S(k) = k k^T - I.
+    The adaptation takes S(k) phi-hat after the residual at its rate, in all directions but k: S(k) S(k) = k k^T - I.
     """
     step, size, along, missing = 0.0, 0.0, 0.0, np.empty(3)
     for j in range(3):

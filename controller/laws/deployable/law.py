@@ -272,7 +272,7 @@ def _report(memory: DeployableMemory, wanted: Array, rows: int, steps: int) -> N
     report[6:8] = seen.water[:2]
     report[8] = np.sqrt(wanted[0] ** 2 + wanted[1] ** 2 + wanted[2] ** 2)
     report[9] = memory.guide.cost[0]
-    report[10] = memory.guide.count[0] - 1
+    report[10] = memory.guide.points[0] - 1
     active, yielding = 0, 0.0
     for i in range(rows):
         if memory.program.multipliers[i] > 0.0:

@@ -169,4 +169,4 @@ def position_spread(estimate: Estimate) -> float:
     worst = 0.0
     for axis in range(3):
         worst = max(worst, estimate.covariance[axis, 0, 0])
-    return np.sqrt(worst)
+    return float(np.sqrt(worst))
