@@ -166,7 +166,7 @@ def cost_of(
 def nearest_end(goal: PackedRegions, position: Array, depth: float, end: Array) -> None:
     """Write the point of the goal region nearest to a position, `depth` [m] inside where the region is that deep.
 
-    It goes up the slope of the clearance, half as far wherever that leads no deeper: in a region that is less deep, to
+    It goes up the slope of the clearance, half as far wherever that leads little deeper: in a region that is less deep, to
     about its middle.
     """
     end[:] = position
@@ -182,7 +182,7 @@ def nearest_end(goal: PackedRegions, position: Array, depth: float, end: Array) 
         for axis in range(3):
             other[axis] = end[axis] - gradient[0, axis] / slope * lack * part
         evaluate_packed(goal, other, level, value, other_gradient, turning, other_clearance)
-        if other_clearance[0] > clearance[0]:
+        if other_clearance[0] > clearance[0] + 0.25 * lack * part:  # the slope is 1
             end[:], gradient[:, :], clearance[0] = other, other_gradient, other_clearance[0]
         else:
             part *= 0.5
