@@ -42,6 +42,7 @@ _PASSED = 0.25  # m from a corner, within which it counts as passed
 _SPHERE = Sphere.kind
 _ATTITUDE = Orientation.kind  # shapes from it on close no place
 _CLIMBS = 12  # towards the inside of the goal region
+_PAYS = 0.05  # m deeper for each metre that a climb must bring; straight up it brings 1
 _DEEP_ENOUGH = 1e-3  # m, by which an end may lie less deep than asked for
 _ROOM = 2.5  # m beyond start and end in which corners are looked for
 
@@ -166,8 +167,8 @@ def cost_of(
 def nearest_end(goal: PackedRegions, position: Array, depth: float, end: Array) -> None:
     """Write the point of the goal region nearest to a position, `depth` [m] inside where the region is that deep.
 
-    It goes up the slope of the clearance, half as far wherever that leads little deeper: in a region that is less deep, to
-    about its middle.
+    It goes up the slope of the clearance, half as far wherever that leads little deeper: in a region that is less deep,
+    to about its middle.
     """
     end[:] = position
     value, gradient, turning, clearance = np.empty(1), np.empty((1, 3)), np.empty((1, 3)), np.empty(1)
@@ -182,8 +183,9 @@ def nearest_end(goal: PackedRegions, position: Array, depth: float, end: Array) 
         for axis in range(3):
             other[axis] = end[axis] - gradient[0, axis] / slope * lack * part
         evaluate_packed(goal, other, level, value, other_gradient, turning, other_clearance)
-        if other_clearance[0] > clearance[0] + 0.25 * lack * part:  # the slope is 1
+        if other_clearance[0] > clearance[0] + _PAYS * lack * part:
             end[:], gradient[:, :], clearance[0] = other, other_gradient, other_clearance[0]
+            part = min(2.0 * part, 1.0)
         else:
             part *= 0.5
 

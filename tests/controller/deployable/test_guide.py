@@ -103,7 +103,7 @@ def test_the_end_lies_within_goals_of_any_shape_and_depth(goal, depth):
     rng, packed, end = np.random.default_rng(6), pack([Region("goal", goal, "in")]), np.empty(3)
     for _ in range(50):
         nearest_end(packed, rng.normal([4.0, 0.0, 2.5], [5.0, 3.0, 2.0]), GAINS.depth, end)
-        assert clearance_at(packed, 0, end) > 0.6 * depth
+        assert clearance_at(packed, 0, end) > 0.5 * depth
 
 
 def test_the_end_of_a_ball_is_the_nearest_point():
