@@ -1,14 +1,14 @@
-"""``python -m benchmarks {step,fmu,fuzzy}``: microseconds a step and ratios, in a table."""
+"""``python -m benchmarks {step,law,fmu,fuzzy}``: microseconds a step and ratios, in a table."""
 
 from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
 
-from benchmarks import fmu, fuzzy, step
+from benchmarks import fmu, fuzzy, law, step
 from benchmarks.timing import print_rows
 
-BENCHMARKS = {"step": step, "fmu": fmu, "fuzzy": fuzzy}
+BENCHMARKS = {"step": step, "law": law, "fmu": fmu, "fuzzy": fuzzy}
 REPEATS = 5
 
 
