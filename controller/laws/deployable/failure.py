@@ -101,17 +101,29 @@ def suspect(
         variance[axis] += (_UNMODELLED * dynamics.mass[3 + axis, 3 + axis]) ** 2
         for i in range(m):
             variance[axis] += (_EFFECTIVENESS * thrusters.matrix[3 + axis, i] * thrusters.forces[i]) ** 2
+    mass, weight = dynamics.translational_mass[0], min(period / _CORRELATED, 1.0)
     best, next_best, at = 0.0, 0.0, -1
     for i in range(m):
         if thrusters.health[i] == 0.0:
             continue
-        step = _by_velocity(suspicion, i, estimate, dynamics, thrusters, R, period, measured)
-        step += _by_moment(suspicion, i, residual, variance, thrusters, R, gains.adaptation * period, measured) * min(
-            period / _CORRELATED, 1.0
+        push, force = thrusters.whole[:, i], thrusters.forces[i]
+        step = _by_velocity(
+            suspicion.lag[i],
+            push,
+            force * period / mass,
+            R,
+            estimate.innovation,
+            estimate.spread,
+            estimate.gain,
+            measured,
         )
+        if measured:
+            step += weight * _by_moment(
+                suspicion.adapted[i], push, force, residual, variance, R, gains.adaptation * period
+            )
         suspicion.ratio[i] += step
         if not suspicion.ratio[i] > 0.0:
-            _start_anew(suspicion, i)
+            suspicion.ratio[i], suspicion.lag[i, :], suspicion.adapted[i, :] = 0.0, 0.0, 0.0
         if suspicion.ratio[i] > best:
             best, next_best, at = suspicion.ratio[i], best, i
         elif suspicion.ratio[i] > next_best:
@@ -123,64 +135,40 @@ def suspect(
 
 @compiled
 def _by_velocity(
-    suspicion: Suspicion,
-    i: int,
-    estimate: Estimate,
-    dynamics: Dynamics,
-    thrusters: Thrusters,
-    R: Array,
-    period: float,
-    measured: bool,
+    lag: Array, push: Array, impulse: float, R: Array, innovation: Array, spread: Array, gain: Array, measured: bool
 ) -> float:
-    """Return the log-likelihood ratio of the last innovation, and carry the lag over the period."""
+    """Return the log-likelihood ratio of the last innovation, and carry a thruster's lag over the period.
+
+    Single arrays are passed: a call that passes named tuples costs more than the work.
+    """
     step = 0.0
     for axis in range(3):
-        push = 0.0
-        for j in range(3):
-            push += R[axis, j] * thrusters.whole[j, i]
-        suspicion.lag[i, axis] -= push * thrusters.forces[i] * period / dynamics.translational_mass[0]
-        if measured and estimate.spread[axis] > 0.0:
-            lag = suspicion.lag[i, axis]
-            step += lag * (2.0 * estimate.innovation[axis] - lag) / (2.0 * estimate.spread[axis] ** 2)
-            suspicion.lag[i, axis] *= 1.0 - estimate.gain[axis]
+        lag[axis] -= (R[axis, 0] * push[0] + R[axis, 1] * push[1] + R[axis, 2] * push[2]) * impulse
+        if measured and spread[axis] > 0.0:
+            step += lag[axis] * (2.0 * innovation[axis] - lag[axis]) / (2.0 * spread[axis] ** 2)
+            lag[axis] *= 1.0 - gain[axis]
     return min(max(step, -_MOST_A_STEP), _MOST_A_STEP)
 
 
 @compiled
 def _by_moment(
-    suspicion: Suspicion,
-    i: int,
-    residual: Array,
-    variance: Array,
-    thrusters: Thrusters,
-    R: Array,
-    adaptation: float,
-    measured: bool,
+    adapted: Array, push: Array, force: float, residual: Array, variance: Array, R: Array, adaptation: float
 ) -> float:
     """Return the log-likelihood ratio of the last residual, and carry what is adapted over the period.
 
     The adaptation takes S(k) phi-hat after the residual at its rate, in all directions but k: S(k) S(k) = k k^T - I.
     """
-    step, size, along, missing = 0.0, 0.0, 0.0, np.empty(3)
+    step, size, along = 0.0, 0.0, 0.0
     for j in range(3):
-        missing[j] = suspicion.adapted[i, j] - thrusters.whole[3 + j, i] * thrusters.forces[i]
-        along += R[2, j] * missing[j]  # k = R^T e3
-        size += missing[j] ** 2 / variance[j]
-        step += missing[j] * (2.0 * residual[j] - missing[j]) / (2.0 * variance[j])
-    if not measured:
-        return 0.0
+        missing = adapted[j] - push[3 + j] * force
+        along += R[2, j] * missing  # k = R^T e3
+        size += missing**2 / variance[j]
+        step += missing * (2.0 * residual[j] - missing) / (2.0 * variance[j])
     for j in range(3):
-        suspicion.adapted[i, j] -= adaptation * (missing[j] - along * R[2, j])
+        adapted[j] -= adaptation * (adapted[j] - push[3 + j] * force - along * R[2, j])
     if not size > _STANDS_OUT**2:
         return 0.0
     return min(max(step, -_MOST_A_STEP), _MOST_A_STEP)
-
-
-@compiled
-def _start_anew(suspicion: Suspicion, i: int) -> None:
-    suspicion.ratio[i] = 0.0
-    suspicion.lag[i, :] = 0.0
-    suspicion.adapted[i, :] = 0.0
 
 
 @compiled
@@ -202,5 +190,6 @@ def give_up(suspicion: Suspicion, thrusters: Thrusters, failed: int, told: bool)
         thrusters.health[suspicion.suspected[0]] = 1.0
     suspicion.suspected[0] = -1 if told else failed
     thrusters.health[failed] = 0.0
-    for i in range(thrusters.health.size):
-        _start_anew(suspicion, i)
+    suspicion.ratio[:] = 0.0
+    suspicion.lag[:, :] = 0.0
+    suspicion.adapted[:, :] = 0.0
