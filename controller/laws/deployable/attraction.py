@@ -24,13 +24,13 @@ def approach_speed(distance: float, deceleration: float, slope: float) -> float:
     if distance <= 0.0:
         return slope * distance
     offset = deceleration / slope
-    return np.sqrt(2.0 * deceleration * distance + offset * offset) - offset
+    return float(np.sqrt(2.0 * deceleration * distance + offset * offset)) - offset
 
 
 @compiled
 def wanted_velocity(guide: Guide, position: Array, goal_velocity: Array, gains: DeployableGains, out: Array) -> None:
     """Write the velocity [m/s], world frame, shape (3,), that follows the way; `position` is where the vehicle is."""
-    count, way = guide.count[0], guide.way
+    count, way = guide.points[0], guide.way
     speed, left, travelled, towards = gains.speed, 0.0, 0.0, np.zeros(3)
     to_go, before = _AHEAD, np.zeros(3)
     for leg in range(count):

@@ -1,10 +1,18 @@
 """Which thruster has failed, from what the vehicle measures.
 
-Each thruster has a hypothesis: it gives nothing. If it holds, the moment that the model misses is -b_i f_i, and the
-velocity falls behind its prediction by what -b_i f_i makes of it within the observer's loop. The log-likelihood ratio
-against "all is well" is summed, never below zero (Page's test; the hypothesis starts anew whenever it is at zero, which is
-the time at which the failure is supposed to have happened), and the thruster is given up when its sum passes the
-threshold, ahead of every other. A single failure is the rule: a second alarm first takes back the earlier one.
+Each thruster has a hypothesis: it gives nothing. If it holds, the moment that the model misses is -b_i f_i, less what
+the restoring moments have since been adapted to explain of it; and the velocity falls behind its prediction by what
+-b_i f_i makes of it within the observer's loop. The log-likelihood ratio against "all is well" is summed, never below
+zero (Page's test; the hypothesis starts anew whenever it is at zero, which is the time at which the failure is supposed
+to have happened), and the thruster is given up when its sum passes the threshold, well ahead of every other.
+
+A moment tells only where the thruster's part of it stands out from what the model may miss anyway: an angular
+acceleration, more of it in roll and pitch while the vehicle speeds up, for the height of its centre of gravity is not
+told, and a tenth of what each thruster is believed to give. So a thruster that fails while it pushes little is found
+when it is used.
+
+A single failure is the rule: a suspicion takes back the one before, never what was told. A thruster that was given up
+wrongly is only left idle; the one that has in truth failed goes on being missed, is found, and takes its place.
 """
 
 from __future__ import annotations
@@ -16,14 +24,18 @@ from numpy.typing import NDArray
 
 from controller.compiled import compiled
 from controller.laws.deployable.gains import DeployableGains
+from controller.laws.deployable.linear_algebra import norm
 from controller.laws.deployable.model import Dynamics, Thrusters
 from controller.laws.deployable.observer import Estimate
 
 Array = NDArray[np.float64]
 
-_MOMENT_SPREAD = 2.0  # N m, of what the model misses of a moment
-_LEAST_MOMENT = 1.5  # N m: a thruster that gives less has nothing to tell by its moment
-_MOST_A_STEP = 3.0  # of the log-likelihood ratio, lest one odd measurement decided
+_UNMODELLED = 0.06  # rad/s2, standard deviation of the angular acceleration that the model misses
+_BELOW = 0.02  # m, standard deviation of how far the centre of gravity lies above or below the origin
+_EFFECTIVENESS = 0.1  # standard deviation of what a working thruster gives, as part of what it is believed to give
+_STANDS_OUT = 2.0  # standard deviations that a thruster's moment must have to tell anything
+_CORRELATED = 0.1  # s, for which what the model misses of a moment stays about the same
+_MOST_A_STEP = 3.0  # of the log-likelihood ratio of either kind, lest one odd measurement decided
 _LEAD = 8.0  # by which the likeliest must be ahead of the next
 
 
@@ -32,12 +44,13 @@ class Suspicion(NamedTuple):
 
     ratio: Array  # (m,) summed log-likelihood ratio
     lag: Array  # (m, 3) m/s, how far velocity falls behind its prediction, NED
-    count: NDArray[np.int64]  # (1,) thrusters given up so far
+    adapted: Array  # (m, 3) N m, body axes: what the restoring moments explain of the failure by now
+    suspected: NDArray[np.int64]  # (1,) the thruster that is given up on suspicion, -1 for none
 
 
 def suspicion_of(m: int) -> Suspicion:
     """Return the hypotheses about `m` thrusters, all at zero."""
-    return Suspicion(np.zeros(m), np.zeros((m, 3)), np.zeros(1, dtype=np.int64))
+    return Suspicion(np.zeros(m), np.zeros((m, 3)), np.zeros((m, 3)), np.full(1, -1))
 
 
 @compiled
@@ -67,11 +80,11 @@ def suspect(
     R : ndarray, shape (3, 3)
         From body to world.
     gains : DeployableGains
-        The threshold.
+        The threshold, and the rate of adaptation.
     period : float
         [s].
     measured : bool
-        Whether there was a valid measurement of the velocity.
+        Whether there was a valid measurement; without, nothing is learnt.
 
     Returns
     -------
@@ -80,36 +93,37 @@ def suspect(
     """
     if gains.failure_threshold <= 0.0:
         return -1
-    m = thrusters.health.size
+    m, variance = thrusters.health.size, np.empty(3)
+    for axis in range(3):
+        variance[axis] = (
+            0.0 if axis == 2 else (_BELOW * dynamics.translational_mass[0] * norm(estimate.acceleration)) ** 2
+        )
+        variance[axis] += (_UNMODELLED * dynamics.mass[3 + axis, 3 + axis]) ** 2
+        for i in range(m):
+            variance[axis] += (_EFFECTIVENESS * thrusters.matrix[3 + axis, i] * thrusters.forces[i]) ** 2
+    mass, weight = dynamics.translational_mass[0], min(period / _CORRELATED, 1.0)
     best, next_best, at = 0.0, 0.0, -1
     for i in range(m):
         if thrusters.health[i] == 0.0:
             continue
-        force = thrusters.forces[i]
-        step = 0.0
-        # moment: |r|^2 - |r - r_i|^2, with r_i = -b_i f_i
-        size = 0.0
-        for j in range(3):
-            size += (thrusters.whole[3 + j, i] * force) ** 2
-        if size > _LEAST_MOMENT**2:
-            for j in range(3):
-                supposed = -thrusters.whole[3 + j, i] * force
-                step += supposed * (2.0 * residual[j] - supposed) / (2.0 * _MOMENT_SPREAD**2)
-        # velocity, through the observer's loop
-        for axis in range(3):
-            lag = 0.0
-            for j in range(3):
-                lag -= R[axis, j] * thrusters.whole[j, i] * force
-            lag *= period / dynamics.translational_mass[0]
-            suspicion.lag[i, axis] += lag
-            if measured:
-                supposed = suspicion.lag[i, axis]
-                step += supposed * (2.0 * estimate.innovation[axis] - supposed) / (2.0 * estimate.spread[axis] ** 2)
-                suspicion.lag[i, axis] *= 1.0 - estimate.gain[axis]
-        suspicion.ratio[i] += min(max(step, -_MOST_A_STEP), _MOST_A_STEP)
-        if suspicion.ratio[i] <= 0.0:
-            suspicion.ratio[i] = 0.0
-            suspicion.lag[i, :] = 0.0
+        push, force = thrusters.whole[:, i], thrusters.forces[i]
+        step = _by_velocity(
+            suspicion.lag[i],
+            push,
+            force * period / mass,
+            R,
+            estimate.innovation,
+            estimate.spread,
+            estimate.gain,
+            measured,
+        )
+        if measured:
+            step += weight * _by_moment(
+                suspicion.adapted[i], push, force, residual, variance, R, gains.adaptation * period
+            )
+        suspicion.ratio[i] += step
+        if not suspicion.ratio[i] > 0.0:
+            suspicion.ratio[i], suspicion.lag[i, :], suspicion.adapted[i, :] = 0.0, 0.0, 0.0
         if suspicion.ratio[i] > best:
             best, next_best, at = suspicion.ratio[i], best, i
         elif suspicion.ratio[i] > next_best:
@@ -120,12 +134,62 @@ def suspect(
 
 
 @compiled
-def give_up(suspicion: Suspicion, thrusters: Thrusters, failed: int) -> None:
-    """Take a thruster out of `health`, and doubt whether the one that was taken out before deserved it."""
-    if suspicion.count[0] == 1:
-        thrusters.health[:] = 1.0
-    else:
-        suspicion.count[0] += 1
+def _by_velocity(
+    lag: Array, push: Array, impulse: float, R: Array, innovation: Array, spread: Array, gain: Array, measured: bool
+) -> float:
+    """Return the log-likelihood ratio of the last innovation, and carry a thruster's lag over the period.
+
+    Single arrays are passed: a call that passes named tuples costs more than the work.
+    """
+    step = 0.0
+    for axis in range(3):
+        lag[axis] -= (R[axis, 0] * push[0] + R[axis, 1] * push[1] + R[axis, 2] * push[2]) * impulse
+        if measured and spread[axis] > 0.0:
+            step += lag[axis] * (2.0 * innovation[axis] - lag[axis]) / (2.0 * spread[axis] ** 2)
+            lag[axis] *= 1.0 - gain[axis]
+    return min(max(step, -_MOST_A_STEP), _MOST_A_STEP)
+
+
+@compiled
+def _by_moment(
+    adapted: Array, push: Array, force: float, residual: Array, variance: Array, R: Array, adaptation: float
+) -> float:
+    """Return the log-likelihood ratio of the last residual, and carry what is adapted over the period.
+
+    The adaptation takes S(k) phi-hat after the residual at its rate, in all directions but k: S(k) S(k) = k k^T - I.
+    """
+    step, size, along = 0.0, 0.0, 0.0
+    for j in range(3):
+        missing = adapted[j] - push[3 + j] * force
+        along += R[2, j] * missing  # k = R^T e3
+        size += missing**2 / variance[j]
+        step += missing * (2.0 * residual[j] - missing) / (2.0 * variance[j])
+    for j in range(3):
+        adapted[j] -= adaptation * (adapted[j] - push[3 + j] * force - along * R[2, j])
+    if not size > _STANDS_OUT**2:
+        return 0.0
+    return min(max(step, -_MOST_A_STEP), _MOST_A_STEP)
+
+
+@compiled
+def give_up(suspicion: Suspicion, thrusters: Thrusters, failed: int, told: bool) -> None:
+    """Take a thruster out of `health`, which is told or suspected; the one suspected before is taken back.
+
+    Parameters
+    ----------
+    suspicion : Suspicion
+        Starts anew.
+    thrusters : Thrusters
+        Whose `health` changes; `model.share_out` is for the caller to do.
+    failed : int
+        From 0.
+    told : bool
+        Whether it is known; it is not taken back then.
+    """
+    if suspicion.suspected[0] >= 0:
+        thrusters.health[suspicion.suspected[0]] = 1.0
+    suspicion.suspected[0] = -1 if told else failed
     thrusters.health[failed] = 0.0
     suspicion.ratio[:] = 0.0
     suspicion.lag[:, :] = 0.0
+    suspicion.adapted[:, :] = 0.0

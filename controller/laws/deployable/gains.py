@@ -41,7 +41,7 @@ class DeployableGains(NamedTuple):
     adaptation: float = 0.5  # 1/s, of the moments
     # lost measurements and thrusters
     coast: float = 2.0  # s that the law goes on without valid measurements before it lets the vehicle drift
-    failure_threshold: float = 25.0  # log-likelihood ratio at which a thruster is given up; 0: never
+    failure_threshold: float = 12.0  # log-likelihood ratio at which a thruster is given up; 0: never
 
 
 def check_gains(gains: DeployableGains) -> DeployableGains:

@@ -3,9 +3,9 @@
 A potential alone leads into pockets between obstacles. So the law keeps a way of up to a few corners, and each period
 tries one change to it: a corner moved, added or dropped, the end put elsewhere in the goal region. The cheaper way
 stays. The cost is the length, and more where the way passes closer to a hard region than it should, each region taken
-to where it will be when the vehicle comes by. One way a period makes the cost of a step bounded; the random numbers are
-the law's own, so that a run repeats bit for bit. The way only says where to go: what keeps the vehicle out of the regions
-are the barriers, whatever the way.
+to where it will be when the vehicle comes by. One way a period makes the cost of a step bounded; the random numbers
+are the law's own, so that a run repeats bit for bit. The way only says where to go: what keeps the vehicle out of the
+regions are the barriers, whatever the way.
 """
 
 from __future__ import annotations
@@ -20,9 +20,10 @@ from controller.laws.deployable.gains import DeployableGains
 from controller.laws.deployable.linear_algebra import norm
 from controller.laws.deployable.search import Tree, grow, tree_of_nothing
 from controller.regions import (
-    PackedRegions,
     Orientation,
+    PackedRegions,
     Sphere,
+    clearance_at,
     clearance_of_place,
     clearance_of_sphere,
     evaluate_packed,
@@ -42,6 +43,9 @@ _BLOCKED = 1.3  # of its length, cost of a way from which on the tree looks for 
 _PASSED = 0.25  # m from a corner, within which it counts as passed
 _SPHERE = Sphere.kind
 _ATTITUDE = Orientation.kind  # shapes from it on close no place
+_CLIMBS = 12  # towards the inside of the goal region
+_PAYS = 0.05  # m deeper for each metre that a climb must bring; straight up it brings 1
+_DEEP_ENOUGH = 1e-3  # m, by which an end may lie less deep than asked for
 _ROOM = 2.5  # m beyond start and end in which corners are looked for
 
 
@@ -50,7 +54,7 @@ class Guide(NamedTuple):
 
     way: Array  # (CORNERS + 1, 3) m, NED: corners, then the end; the end moves with the goal
     other: Array  # (CORNERS + 1, 3)
-    count: NDArray[np.int64]  # (2,) points of way and other, the end included; 0: none yet
+    points: NDArray[np.int64]  # (2,) how many way and other have, the end included; 0: none yet
     cost: Array  # (1,) of the way
     far_until: Array  # (n,) room for `cost_of`
     tree: Tree
@@ -66,7 +70,7 @@ def guide_of_nothing(n_regions: int, seed: int) -> Guide:
     return Guide(
         way=np.zeros((n, 3)),
         other=np.zeros((n, 3)),
-        count=np.zeros(2, dtype=np.int64),
+        points=np.zeros(2, dtype=np.int64),
         cost=np.zeros(1),
         far_until=np.zeros(n_regions),
         tree=tree_of_nothing(),
@@ -132,7 +136,9 @@ def cost_of(
         s = 0.0
         while s < length:
             if samples == _SAMPLES:
-                return total + _INSIDE * (length - s)  # what was not looked at is not trusted
+                for rest in range(leg + 1, count):
+                    total += (1.0 + _INSIDE) * _distance(way[rest - 1], way[rest])
+                return float(total + _INSIDE * (length - s))  # what was not looked at is not trusted
             samples += 1
             gone = travelled + s
             free = enough
@@ -165,18 +171,29 @@ def cost_of(
 
 @compiled
 def nearest_end(goal: PackedRegions, position: Array, depth: float, end: Array) -> None:
-    """Write the point of the goal region nearest to a position, `depth` [m] inside where the region is that deep."""
+    """Write the point of the goal region nearest to a position, `depth` [m] inside where the region is that deep.
+
+    It goes up the slope of the clearance, half as far wherever that leads little deeper: in a region that is less deep,
+    to about its middle.
+    """
     end[:] = position
     value, gradient, turning, clearance = np.empty(1), np.empty((1, 3)), np.empty((1, 3)), np.empty(1)
     level = np.array([1.0, 0.0, 0.0, 0.0])  # a goal is a place: no attitude matters
-    for _ in range(4):
-        evaluate_packed(goal, end, level, value, gradient, turning, clearance)
-        slope = norm(gradient[0])
-        lack = depth - clearance[0]
-        if lack <= 0.0 or slope <= 0.0:
+    other, other_gradient, other_clearance = np.empty(3), np.empty((1, 3)), np.empty(1)
+    evaluate_packed(goal, end, level, value, gradient, turning, clearance)
+    part = 1.0
+    for _ in range(_CLIMBS):
+        slope, lack = norm(gradient[0]), depth - clearance[0]
+        if not (lack > _DEEP_ENOUGH and slope > 0.0):
             return
         for axis in range(3):
-            end[axis] -= gradient[0, axis] / slope * lack
+            other[axis] = end[axis] - gradient[0, axis] / slope * lack * part
+        evaluate_packed(goal, other, level, value, other_gradient, turning, other_clearance)
+        if other_clearance[0] > clearance[0] + _PAYS * lack * part:
+            end[:], gradient[:, :], clearance[0] = other, other_gradient, other_clearance[0]
+            part = min(2.0 * part, 1.0)
+        else:
+            part *= 0.5
 
 
 @compiled
@@ -185,35 +202,38 @@ def improve(
 ) -> None:
     """Keep the way up with vehicle and regions, and try one change to it."""
     way, other = guide.way, guide.other
-    if guide.count[0] == 0:
-        guide.count[0] = 1
+    if guide.points[0] == 0:
+        guide.points[0] = 1
         nearest_end(goal, start, gains.depth, way[0])
     else:
-        for axis in range(3):  # the end moves with the goal
-            way[guide.count[0] - 1, axis] += goal.velocities[0, axis] * period
-    while guide.count[0] > 1 and _distance(way[0], start) < _PASSED:
-        for i in range(guide.count[0] - 1):
+        end = guide.points[0] - 1
+        for axis in range(3):  # the end moves with the goal, and is put back wherever the goal may have gone
+            way[end, axis] += goal.velocities[0, axis] * period
+        if not clearance_at(goal, 0, way[end]) > 0.0:
+            nearest_end(goal, way[end].copy(), gains.depth, way[end])
+    while guide.points[0] > 1 and _distance(way[0], start) < _PASSED:
+        for i in range(guide.points[0] - 1):
             way[i] = way[i + 1]
-        guide.count[0] -= 1
+        guide.points[0] -= 1
     # one way a period: the present one and a changed one by turns
     if guide.tried[0] == 0:
         guide.tried[0] = 1
-        guide.cost[0] = cost_of(way, guide.count[0], start, regions, guide.far_until, gains)
+        guide.cost[0] = cost_of(way, guide.points[0], start, regions, guide.far_until, gains)
         return
     guide.tried[0] = 0
     draws = guide.draws
     for i in range(draws.size):
         draws[i] = uniform(guide.random)
-    if guide.cost[0] > _BLOCKED * _length(way, guide.count[0], start) and draws[4] < 0.7:
-        guide.count[1] = grow(guide.tree, start, way[guide.count[0] - 1], draws, regions, gains, other)
-        if guide.count[1] == 0:
+    if guide.cost[0] > _BLOCKED * _length(way, guide.points[0], start) and draws[4] < 0.7:
+        guide.points[1] = grow(guide.tree, start, way[guide.points[0] - 1], draws, regions, gains, other)
+        if guide.points[1] == 0:
             return
     else:
         _change(guide, start, goal, gains)
-    cost = cost_of(other, guide.count[1], start, regions, guide.far_until, gains)
+    cost = cost_of(other, guide.points[1], start, regions, guide.far_until, gains)
     if cost < guide.cost[0] - _BETTER - _BETTER_PART * guide.cost[0]:
         way[:, :] = other
-        guide.count[0] = guide.count[1]
+        guide.points[0] = guide.points[1]
         guide.cost[0] = cost
 
 
@@ -227,7 +247,7 @@ def _length(way: Array, count: int, start: Array) -> float:
 
 @compiled
 def _distance(a: Array, b: Array) -> float:
-    return np.sqrt((a[0] - b[0]) ** 2 + (a[1] - b[1]) ** 2 + (a[2] - b[2]) ** 2)
+    return float(np.sqrt((a[0] - b[0]) ** 2 + (a[1] - b[1]) ** 2 + (a[2] - b[2]) ** 2))
 
 
 @compiled
@@ -235,7 +255,7 @@ def _change(guide: Guide, start: Array, goal: PackedRegions, gains: DeployableGa
     """Write a changed way into `other`."""
     way, other, random = guide.way, guide.other, guide.random
     other[:, :] = way
-    count = guide.count[0]
+    count = guide.points[0]
     last = count - 1
     choice = uniform(random)
     if choice < 0.1:  # straight to the nearest end
@@ -274,4 +294,4 @@ def _change(guide: Guide, start: Array, goal: PackedRegions, gains: DeployableGa
             high = max(start[axis], way[last, axis]) + _ROOM
             other[0, axis] = low + uniform(random) * (high - low)
         count = 2
-    guide.count[1] = count
+    guide.points[1] = count

@@ -164,14 +164,18 @@ def _heed(memory: DeployableMemory, told: Array, failed: int) -> bool:
     bool
         Whether the thrusters at hand are others than before.
     """
-    health, changed = memory.thrusters.health, False
+    thrusters, changed = memory.thrusters, False
     if failed >= 0:
-        failure.give_up(memory.suspicion, memory.thrusters, failed)
+        failure.give_up(memory.suspicion, thrusters, failed, False)
         changed = True
     for j in range(told.size):
-        if told[j] != memory.told[j] or (told[j] == 0.0 and health[j] != 0.0):
-            health[j] = memory.told[j] = told[j]
+        if told[j] != memory.told[j]:
+            memory.told[j] = told[j]
             changed = True
+            if told[j] == 0.0:
+                failure.give_up(memory.suspicion, thrusters, j, True)
+            else:
+                thrusters.health[j] = 1.0
     return changed
 
 
@@ -310,7 +314,7 @@ def _report(memory: DeployableMemory, wanted: Array, rows: int, steps: int) -> N
     report[6:8] = seen.water[:2]
     report[8] = np.sqrt(wanted[0] ** 2 + wanted[1] ** 2 + wanted[2] ** 2)
     report[9] = memory.guide.cost[0]
-    report[10] = memory.guide.count[0] - 1
+    report[10] = memory.guide.points[0] - 1
     active, yielding = 0, 0.0
     for i in range(rows):
         if memory.program.multipliers[i] > 0.0:

@@ -42,4 +42,4 @@ def dot(a: Array, b: Array) -> float:
 @compiled
 def norm(a: Array) -> float:
     """Return |a|."""
-    return np.sqrt(dot(a, a))
+    return float(np.sqrt(dot(a, a)))

@@ -62,7 +62,7 @@ def dynamics_of(vehicle: VehicleModel, braking: Array) -> Dynamics:
     mean = float(np.trace(mass[:3, :3])) / 3.0
     return Dynamics(
         mass=mass,
-        inverse_mass=np.linalg.inv(mass),
+        inverse_mass=np.linalg.inv(mass).astype(np.float64),
         linear_damping=vehicle.linear_damping.copy(),
         quadratic_damping=vehicle.quadratic_damping.copy(),
         translational_mass=np.array([mean]),

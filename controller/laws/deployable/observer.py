@@ -33,6 +33,7 @@ class Estimate(NamedTuple):
     water: Array  # (3,) m/s, velocity of the water, NED; down is taken to be 0
     restoring: Array  # (1,) N, W - B
     covariance: Array  # (3, 3, 3) of each axis: position, velocity, unknown
+    acceleration: Array  # (3,) m/s2 over ground, NED, predicted for the last period
     innovation: Array  # (3,) m/s, measured less predicted velocity, NED
     spread: Array  # (3,) m/s, standard deviation of the innovation
     gain: Array  # (3,) how much of the innovation the velocity takes
@@ -48,6 +49,7 @@ def estimate_of_nothing() -> Estimate:
         water=np.zeros(3),
         restoring=np.zeros(1),
         covariance=np.zeros((3, 3, 3)),
+        acceleration=np.zeros(3),
         innovation=np.zeros(3),
         spread=np.ones(3),
         gain=np.zeros(3),
@@ -107,6 +109,7 @@ def predict(
         P[1, 0], P[1, 1], P[1, 2] = p01, p11 + _UNMODELLED**2 * T, p12
         P[2, 0], P[2, 1], P[2, 2] = p02, p12, P[2, 2] + drift**2 * T
         acceleration = free[axis] + pushed[axis]
+        estimate.acceleration[axis] = acceleration
         estimate.position[axis] += T * (estimate.velocity[axis] + 0.5 * T * acceleration)
         estimate.velocity[axis] += T * acceleration
     estimate.silence[0] += period
@@ -166,4 +169,4 @@ def position_spread(estimate: Estimate) -> float:
     worst = 0.0
     for axis in range(3):
         worst = max(worst, estimate.covariance[axis, 0, 0])
-    return np.sqrt(worst)
+    return float(np.sqrt(worst))

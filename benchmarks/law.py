@@ -1,0 +1,120 @@
+"""What one compiled control step of each law costs, with few and many obstacles."""
+
+from __future__ import annotations
+
+import time
+import types
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from benchmarks.timing import Row, summary
+from controller import LAWS, VehicleState
+from controller.compiled import compiled
+from controller.regions import DepthBand, PackedRegions, Region, Sphere, pack
+from cosim.native import Clock, seconds
+from cosim.vehicle_model import vehicle_model
+from plant_fmu.vehicle import load_vehicle
+
+STEPS = 2_000
+RATIO = "x print"  # of the median to that of the printed law
+OBSTACLES = (1, 6, 14, 40)
+_PERIOD = 0.02  # s
+_SPEED = 0.6  # m/s
+_step: Any = None  # of a law: `_loop_of` puts it there
+
+
+def _scenery(obstacles: int) -> tuple[PackedRegions, PackedRegions]:
+    """Return goal and regions as in a scored scene: balls across the way, and a depth band."""
+    rng = np.random.default_rng(obstacles)
+    balls = []
+    while len(balls) < obstacles:
+        centre, radius = rng.normal([5.0, 0.0, 3.0], [1.5, 1.5, 1.0]), rng.uniform(0.3, 0.9)
+        if min(np.linalg.norm(centre - [0.0, 0.0, 3.0]), np.linalg.norm(centre - [10.0, 0.0, 3.0])) > radius + 1.2:
+            balls.append(Region(f"obstacle {len(balls) + 1}", Sphere(tuple(centre.tolist()), float(radius)), "out"))
+    band = Region("depth band", DepthBand(3.65, 3.35), "in")
+    return pack([Region("goal", Sphere((10.0, 0.0, 3.0), 0.5), "in")]), pack([*balls, band])
+
+
+def _steps(
+    state: VehicleState,
+    places: Any,
+    velocities: Any,
+    goal: PackedRegions,
+    regions: PackedRegions,
+    weights: Any,
+    gains: Any,
+    memory: Any,
+    forces: Any,
+    clock: Any,
+    times: Any,
+) -> None:
+    """Take a law's steps at places along its way, with velocities as measured there, and write what each took [s]."""
+    room = np.zeros(2, np.int64)
+    for k in range(places.shape[0]):
+        state.position[:] = places[k]
+        state.velocity_body[:3] = velocities[k]
+        before = seconds(clock, room)
+        _step(state, goal, regions, weights, gains, memory, forces)
+        times[k, 0] = seconds(clock, room) - before
+        before = seconds(clock, room)
+        times[k, 1] = seconds(clock, room) - before  # what reading the clock takes
+
+
+def _loop_of(law: str) -> Callable[..., None]:
+    """Return `_steps` compiled for a law: a call from Python costs more than the step."""
+    names = globals() | {"_step": LAWS[law].function}
+    copy = types.FunctionType(_steps.__code__, names, f"_steps_{law}")
+    copy.__qualname__ = copy.__name__
+    return compiled(copy)
+
+
+def _time(law: str, obstacles: int, steps: int, repeats: int) -> list[float]:
+    """Return the microseconds of each step of a flight straight at the obstacles, past them and back again."""
+    vehicle, (goal, regions) = vehicle_model(load_vehicle("odin")), _scenery(obstacles)
+    kind, loop, clock = LAWS[law], _loop_of(law), _process_clock()
+    gains, n, m = kind.gains_type(), regions.kinds.size, vehicle.thruster_matrix.shape[1]
+    forces, level = np.zeros(m if kind.output == "thrusters" else 6), np.array([1.0, 0.0, 0.0, 0.0])
+    state = VehicleState(np.zeros(3), level, np.zeros(6), np.ones(m))
+    rng, times = np.random.default_rng(0), np.zeros((steps, 2))
+    gone = np.arange(steps) * _PERIOD * _SPEED
+    along = np.abs((gone + 8.0) % 16.0 - 8.0)
+    places = np.c_[along, 0.1 * np.sin(along), np.full(steps, 3.0)] + 0.02 * rng.normal(size=(steps, 3))
+    velocities = np.c_[np.where(gone % 16.0 < 8.0, _SPEED, -_SPEED), np.zeros((steps, 2))]
+    velocities += 0.01 * rng.normal(size=(steps, 3))
+    found: list[float] = []
+    for repeat in range(repeats + 1):  # one more goes before, to compile and to warm the caches
+        memory = kind.for_vehicle(vehicle, gains, level, _PERIOD, n).memory
+        loop(state, places, velocities, goal, regions, np.ones(n), gains, memory, forces, clock, times)
+        found += ((times[:, 0] - np.median(times[:, 1])) * 1e6).tolist() if repeat else []
+    return found
+
+
+def _process_clock() -> Any:
+    """Return the numbers of a clock that stands still while others have the processor, where there is one."""
+    clock = Clock().numbers
+    if hasattr(time, "CLOCK_PROCESS_CPUTIME_ID") and clock[1] >= 0:
+        clock[1] = time.CLOCK_PROCESS_CPUTIME_ID
+    return clock
+
+
+def measure(steps: int, repeats: int) -> list[Row]:
+    """Time each step of each law on its own, in process time.
+
+    Parameters
+    ----------
+    steps, repeats : int
+        Steps a repeat, and repeats: each starts the law anew.
+
+    Returns
+    -------
+    list of Row
+        For the table: least, median and most of all steps.
+    """
+    rows = []
+    for obstacles in OBSTACLES:
+        for law in sorted(LAWS, key=lambda name: name != "printed"):
+            timing = summary(_time(law, obstacles, steps, repeats))
+            rows.append(Row(f"{law}, {obstacles} obstacles", timing, f"printed, {obstacles} obstacles"))
+    return rows

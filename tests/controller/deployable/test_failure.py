@@ -1,0 +1,108 @@
+"""Failed thrusters: found, the right one, never a working one, and a wrong suspicion taken back."""
+
+import numpy as np
+import pytest
+
+from controller.laws.deployable import failure
+from controller.laws.deployable.gains import DeployableGains
+from controller.laws.deployable.model import dynamics_of, thrusters_of
+from controller.laws.deployable.observer import estimate_of_nothing
+from tests.controller.deployable.scenery import ODIN, REGIONS, Sea, fly, law_for
+
+NOISE = (0.02, 0.01)
+
+
+def given_up(law):
+    return [int(j) for j in np.flatnonzero(law.memory.thrusters.health == 0.0)]
+
+
+@pytest.mark.parametrize("failed", range(8))
+def test_a_thruster_that_fails_under_way_is_found_and_no_other(failed):
+    law, sea = law_for(REGIONS), Sea(noise=NOISE, seed=failed)
+    fly(law, sea, steps=150)
+    assert given_up(law) == []
+    sea.failed = failed
+    seen = []
+    forces = fly(law, sea, steps=450, first=150, each=lambda t: seen.append(given_up(law)))
+    assert seen[-1] == [failed]
+    assert all(found in ([], [failed]) for found in seen)
+    assert not forces[seen.index([failed]) + 1 :, failed].any()
+
+
+@pytest.mark.parametrize("noise", [(0.0, 0.0), NOISE])
+def test_nothing_is_given_up_where_nothing_fails(noise):
+    law, sea = law_for(REGIONS), Sea(noise=noise, current=(-0.3, 0.2, 0.0), restoring=14.0)
+    fly(law, sea, steps=1500, each=lambda t: not given_up(law) or pytest.fail(f"{t} s: {given_up(law)}"))
+    assert np.all(np.isfinite(law.memory.suspicion.ratio))
+
+
+def test_it_can_be_switched_off():
+    law, sea = law_for(REGIONS, DeployableGains(failure_threshold=0.0)), Sea(failed=2)
+    fly(law, sea, steps=500)
+    assert given_up(law) == []
+
+
+def test_a_suspicion_takes_back_the_one_before_but_not_what_was_told():
+    thrusters, suspicion = thrusters_of(ODIN), failure.suspicion_of(8)
+    for failed, told, expected in ((1, True, [1]), (4, False, [1, 4]), (6, False, [1, 6]), (7, True, [1, 7])):
+        suspicion.ratio[:] = 5.0
+        failure.give_up(suspicion, thrusters, failed, told)
+        assert np.flatnonzero(thrusters.health == 0.0).tolist() == expected
+        assert not suspicion.ratio.any()
+
+
+def test_a_wrong_suspicion_is_corrected():
+    """With a working thruster given up, the one that has in truth failed is found and takes its place."""
+    law, sea = law_for(REGIONS), Sea(noise=NOISE)
+    fly(law, sea, steps=100)
+    failure.give_up(law.memory.suspicion, law.memory.thrusters, 3, False)
+    from controller.laws.deployable.model import share_out
+
+    share_out(law.memory.thrusters)
+    sea.failed = 0
+    fly(law, sea, steps=500, first=100)
+    assert given_up(law) == [0]
+
+
+def test_the_ratio_is_that_of_the_two_densities():
+    """One period, by SciPy: log p(r, e | nothing from thruster i) - log p(r, e | all well)."""
+    from scipy.stats import norm
+
+    rng = np.random.default_rng(2)
+    dynamics, thrusters, gains = dynamics_of(ODIN, np.ones(9)), thrusters_of(ODIN), DeployableGains()
+    compared = 0
+    for _ in range(40):
+        estimate, suspicion = estimate_of_nothing(), failure.suspicion_of(8)
+        thrusters.forces[:] = rng.uniform(-20.0, 20.0, 8)
+        estimate.acceleration[:], estimate.spread[:] = rng.normal(size=3) * 0.05, rng.uniform(0.01, 0.02, 3)
+        estimate.innovation[:], residual = rng.normal(size=3) * 0.02, rng.normal(size=3) * 4.0
+        failure.suspect(suspicion, estimate, residual, dynamics, thrusters, np.eye(3), gains, 0.02, True)
+        given = thrusters.forces * ODIN.thruster_matrix
+        inertia = np.diag(dynamics.mass)[3:]
+        spread = (0.06 * inertia) ** 2 + np.sum((0.1 * given[3:]) ** 2, axis=1)
+        spread[:2] += (0.02 * 187.5 * np.linalg.norm(estimate.acceleration)) ** 2
+        spread = np.sqrt(spread)
+        for i in range(8):
+            lag, missing = -given[:3, i] * 0.02 / 187.5, -given[3:, i]
+            by_velocity = norm.logpdf(estimate.innovation, lag, estimate.spread)
+            by_velocity -= norm.logpdf(estimate.innovation, 0.0, estimate.spread)
+            by_moment = norm.logpdf(residual, missing, spread) - norm.logpdf(residual, 0.0, spread)
+            tells = np.sum((missing / spread) ** 2) > 4.0
+            expected = np.clip(by_velocity.sum(), -3, 3) + 0.2 * tells * np.clip(by_moment.sum(), -3, 3)
+            assert suspicion.ratio[i] == pytest.approx(max(expected, 0.0), rel=1e-9, abs=1e-12)
+            compared += expected > 0.0
+    assert compared > 50
+
+
+def test_without_a_measurement_nothing_is_learnt():
+    thrusters, suspicion, estimate = thrusters_of(ODIN), failure.suspicion_of(8), estimate_of_nothing()
+    thrusters.forces[:] = 20.0
+    residual = -ODIN.thruster_matrix[3:, 2] * 20.0
+    for measured in (False, True):
+        for _ in range(200):
+            found = failure.suspect(
+                suspicion, estimate, residual, dynamics_of(ODIN, np.ones(9)), thrusters, np.eye(3), DeployableGains(),
+                0.02, measured,
+            )  # fmt: skip
+        assert suspicion.ratio.any() == measured
+    assert found == -1  # thrusters 1 and 3 have the same moment, and pushed alike

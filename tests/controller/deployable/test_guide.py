@@ -1,0 +1,240 @@
+"""The way round: its cost against dense sampling, its end, its work, and what it finds."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from controller.laws.deployable import guide as way_round
+from controller.laws.deployable.attraction import approach_speed, wanted_acceleration, wanted_velocity
+from controller.laws.deployable.gains import DeployableGains
+from controller.laws.deployable.guide import CORNERS, cost_of, guide_of_nothing, improve, nearest_end, uniform
+from controller.regions import Box, DepthBand, HalfSpace, Region, Sphere, clearance_at, pack
+
+GAINS = DeployableGains()
+START = np.array([0.0, 0.0, 2.5])
+GOAL = Region("goal", Sphere((9.0, 0.0, 2.5), 0.5), "in")
+NOTHING = pack([])
+
+
+def scene(seed, moving=False):
+    """Return balls across the straight way, and a depth band."""
+    rng = np.random.default_rng(seed)
+    balls = [
+        Region(
+            f"ball {i}",
+            Sphere(tuple(rng.normal([4.5, 0.0, 2.5], [1.5, 1.0, 0.7])), float(rng.uniform(0.3, 0.9))),
+            "out",
+            tuple(rng.uniform(-0.1, 0.1, 3)) if moving else (0.0, 0.0, 0.0),
+        )
+        for i in range(6)
+    ]
+    return pack([*balls, Region("band", DepthBand(3.65, 3.35), "in")])
+
+
+def length_of(way, count, start=START):
+    return sum(np.linalg.norm(b - a) for a, b in zip([start, *way[: count - 1]], way[:count], strict=True))
+
+
+def least_clearance(way, count, regions):
+    """Sample the way each centimetre, with every region where it is by then."""
+    least, travelled = np.inf, 0.0
+    still = regions._replace(shifts=regions.shifts.copy())
+    for a, b in zip([START, *way[: count - 1]], way[:count], strict=True):
+        length = np.linalg.norm(b - a)
+        for s in np.arange(0.0, length, 0.01):
+            still.shifts[:] = regions.shifts + regions.velocities * (travelled + s) / GAINS.speed
+            at = a + (b - a) * s / length
+            least = min(least, *(clearance_at(still, i, at) for i in range(still.kinds.size)))
+        travelled += length
+    return least
+
+
+def random_way(rng):
+    way, count = np.zeros((CORNERS + 1, 3)), int(rng.integers(1, CORNERS + 2))
+    way[: count - 1] = np.sort(rng.normal([4.5, 0.0, 2.5], [2.0, 1.5, 0.8], size=(count - 1, 3)), axis=0)
+    way[count - 1] = (9.0, 0.0, 2.5)
+    return way, count
+
+
+@pytest.mark.parametrize("moving", [False, True])
+def test_a_way_that_costs_no_more_than_its_length_is_clear(moving):
+    """And what is found to pass within a region, to more than the least stride, costs metres more."""
+    rng, far, free, hit = np.random.default_rng(5), np.zeros(7), 0, 0
+    for seed in range(60):
+        regions = scene(seed, moving)
+        way, count = random_way(rng)
+        extra = cost_of(way, count, START, regions, far, GAINS) - length_of(way, count)
+        least = least_clearance(way, count, regions)
+        assert extra >= -1e-9
+        if extra < 1e-9:  # it may come closer than wanted between two looks, but by less than half of the least stride
+            free += 1
+            assert least > GAINS.clearance - 0.05
+        if least < -0.05:
+            hit += 1
+            assert extra > 0.5
+    assert free > 5 and hit > 15
+
+
+def test_what_lies_beyond_the_last_look_is_not_free():
+    """A way of which the looks do not reach the end costs at least all that it passes on from there."""
+    wall = pack([Region("floor", HalfSpace((0.0, 0.0, -1.0), (0.0, 0.0, 2.7)), "in")])
+    way, far = np.zeros((CORNERS + 1, 3)), np.zeros(1)
+    way[0], way[1], way[2] = (20.0, 0.0, 2.5), (20.0, 10.0, 2.5), (0.0, 10.0, 2.5)
+    whole = cost_of(way, 3, START, wall, far, GAINS)
+    assert whole > length_of(way, 3) + 10.0 * 40.0
+    assert whole > cost_of(way, 2, START, wall, far, GAINS) + 20.0
+
+
+@pytest.mark.parametrize(
+    ("goal", "depth"),
+    [
+        (Sphere((9.0, 0.0, 2.5), 0.5), 0.3),
+        (Sphere((9.0, 0.0, 2.5), 0.1), 0.1),
+        (Sphere((9.0, 0.0, 2.5), 0.02), 0.02),
+        (HalfSpace((1.0, 0.0, 0.0), (6.0, 0.0, 0.0)), 0.3),
+        (DepthBand(4.0, 0.15), 0.15),
+        (DepthBand(4.0, 1.0), 0.3),
+        (Box((9.0, 1.0, 3.0), (1.0, 0.4, 0.2)), 0.1),
+    ],
+    ids=lambda x: type(x).__name__ if not isinstance(x, float) else str(x),
+)
+def test_the_end_lies_within_goals_of_any_shape_and_depth(goal, depth):
+    rng, packed, end = np.random.default_rng(6), pack([Region("goal", goal, "in")]), np.empty(3)
+    for _ in range(50):
+        nearest_end(packed, rng.normal([4.0, 0.0, 2.5], [5.0, 3.0, 2.0]), GAINS.depth, end)
+        assert clearance_at(packed, 0, end) > 0.5 * depth
+
+
+def test_the_end_of_a_ball_is_the_nearest_point():
+    end = np.empty(3)
+    nearest_end(pack([GOAL]), START, 0.3, end)
+    assert end == pytest.approx([9.0 - 0.2, 0.0, 2.5], abs=1e-9)
+
+
+def run(regions, steps=400, goal=GOAL, start=START, guide=None, moved=None):
+    guide, packed = guide or guide_of_nothing(regions.kinds.size, 1), pack([goal])
+    for k in range(steps):
+        if moved:
+            moved(k, packed)
+        improve(guide, start, packed, regions, GAINS, 0.02)
+    return guide, packed
+
+
+def test_it_finds_a_way_round_what_lies_across():
+    """Of 20 fields of six balls, straight through which no way is free, within 8 s of the vehicle's waiting."""
+    found = blocked = 0
+    for seed in range(20):
+        regions = scene(seed)
+        straight = np.zeros((CORNERS + 1, 3))
+        straight[0] = (8.8, 0.0, 2.5)
+        if (
+            least_clearance(straight, 1, regions) > 0.0
+            or min(clearance_at(regions, i, p) for i in range(7) for p in (START, straight[0])) < 0.3
+        ):
+            continue
+        blocked += 1
+        guide, goal = run(regions)
+        found += least_clearance(guide.way, guide.points[0], regions) > 0.1
+        assert clearance_at(goal, 0, guide.way[guide.points[0] - 1]) > 0.0
+    assert blocked > 8
+    assert found == blocked
+
+
+def test_a_goal_that_is_partly_covered_is_entered_where_it_is_not():
+    regions = pack([Region("cover", Sphere((8.4, 0.0, 2.5), 0.6), "out")])
+    guide, goal = run(regions, 800)
+    end = guide.way[guide.points[0] - 1]
+    assert clearance_at(goal, 0, end) > 0.0
+    assert clearance_at(regions, 0, end) > GAINS.margin
+    assert least_clearance(guide.way, guide.points[0], regions) > GAINS.margin
+
+
+def test_the_end_goes_with_a_goal_that_moves_even_without_a_velocity():
+    """Given a velocity, and streamed to places that none tells of."""
+    sailing = Region("goal", GOAL.shape, "in", (0.1, -0.2, 0.0))
+
+    def sail(k, packed):
+        packed.move_to(0.02 * k)
+
+    def jump(k, packed):
+        packed.shifts[0] = (0.0, 0.004 * k, 0.0) if k < 200 else (-3.0, 1.0, 0.5)
+
+    for goal, moved in ((sailing, sail), (GOAL, jump)):
+        guide, packed = run(NOTHING, 400, goal, moved=moved)
+        assert clearance_at(packed, 0, guide.way[guide.points[0] - 1]) > 0.05
+
+
+def test_the_same_start_makes_the_same_way_to_the_last_bit():
+    one, other = (run(scene(3, moving=True))[0] for _ in range(2))
+    for a, b in zip((*one.tree, *one), (*other.tree, *other), strict=True):
+        assert isinstance(a, tuple) or np.array_equal(a, b)
+
+
+def test_random_numbers_are_those_of_xorshift64star():
+    state, x, mask = np.array([88172645463325252], dtype=np.uint64), 88172645463325252, 2**64 - 1
+    numbers = []
+    for _ in range(2000):
+        x ^= x >> 12
+        x ^= (x << 25) & mask
+        x ^= x >> 27
+        numbers.append(uniform(state))
+        assert numbers[-1] == (((x * 0x2545F4914F6CDD1D) & mask) >> 11) / 2.0**53
+    assert abs(np.mean(numbers) - 0.5) < 0.03 and 0.0 <= min(numbers) < max(numbers) < 1.0
+
+
+def test_looks_are_bounded(monkeypatch):
+    """In plain Python, a way of any length among any regions is looked at 64 times."""
+    looked = []
+
+    def counting(regions, i, point, room):
+        looked.append(i)
+        return clearance_at(regions, i, point)
+
+    monkeypatch.setitem(way_round.cost_of.py_func.__globals__, "clearance_of_place", counting)
+    regions = pack([Region(f"floor {i}", HalfSpace((0.0, 0.0, -1.0), (0.0, 0.0, 2.55)), "in") for i in range(3)])
+    way = np.zeros((CORNERS + 1, 3))
+    way[:] = [(100.0 * (i + 1), 50.0 * (-1.0) ** i, 2.5) for i in range(CORNERS + 1)]
+    way_round.cost_of.py_func(way, CORNERS + 1, START, regions, np.zeros(3), GAINS)
+    assert len(looked) == 64 * 3
+
+
+@given(st.floats(-1.0, 50.0), st.floats(0.01, 3.0), st.floats(0.1, 5.0))
+def test_the_approach_can_be_braked(distance, deceleration, slope):
+    """v dv/dd is what it asks to brake with: below the deceleration, and v grows with `slope` near 0."""
+    h = 1e-6
+    v = approach_speed(distance, deceleration, slope)
+    dv = (approach_speed(distance + h, deceleration, slope) - approach_speed(distance - h, deceleration, slope)) / (
+        2 * h
+    )
+    if distance > 1e-3:
+        assert 0.0 < v * dv < deceleration * (1.0 + 1e-5)
+        assert v <= slope * distance * (1.0 + 1e-9)
+    elif distance < -1e-3:
+        assert v == slope * distance
+
+
+def test_the_wanted_velocity_is_bounded_and_leads_along_the_way():
+    rng, guide, out = np.random.default_rng(8), guide_of_nothing(0, 1), np.empty(3)
+    for _ in range(300):
+        guide.points[0] = rng.integers(1, CORNERS + 2)
+        guide.way[:] = rng.normal(size=(CORNERS + 1, 3)) * 4.0
+        drift, at = rng.normal(size=3) * 0.1, rng.normal(size=3)
+        wanted_velocity(guide, at, drift, GAINS, out)
+        assert np.linalg.norm(out - drift) <= GAINS.speed * (1.0 + 1e-12)
+        if np.linalg.norm(guide.way[0] - at) > 0.4 and np.linalg.norm(out - drift) > 0.0:
+            along = (guide.way[0] - at) / np.linalg.norm(guide.way[0] - at)
+            assert (out - drift) / np.linalg.norm(out - drift) == pytest.approx(along, abs=1e-9)
+    guide.points[0], guide.way[0] = 1, at
+    wanted_velocity(guide, at, drift, GAINS, out)
+    assert np.array_equal(out, drift)
+
+
+def test_the_wanted_acceleration_is_bounded():
+    rng, out = np.random.default_rng(9), np.empty(3)
+    for scale in (1e-3, 1.0, 1e6):
+        wanted, velocity = rng.normal(size=(2, 3)) * scale
+        wanted_acceleration(wanted, velocity, GAINS, out)
+        free = GAINS.velocity_bandwidth * (wanted - velocity)
+        assert np.linalg.norm(out) == pytest.approx(min(np.linalg.norm(free), GAINS.acceleration))
+        assert out @ free > 0.0

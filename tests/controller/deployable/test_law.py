@@ -1,0 +1,137 @@
+"""The deployable law as a whole: memory, repeatability, what it does with nonsense."""
+
+import copy
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from controller import VehicleState
+from controller.regions import Region, Sphere
+from tests.controller.deployable.scenery import GOAL, REGIONS, Sea, fly, law_for
+
+ROOT = Path(__file__).parents[3]
+NOISE = (0.02, 0.01)
+
+
+def test_the_memory_is_all_that_it_keeps():
+    """A law that is given a copy of another's memory in mid-flight goes on as that one does, to the last bit."""
+    law, sea = law_for(REGIONS), Sea(noise=NOISE)
+    fly(law, sea, steps=150)
+    twin, other_sea = law_for(REGIONS), copy.deepcopy(sea)
+    assert twin.memory is not law.memory
+    twin.memory = copy.deepcopy(law.memory)
+    sea.failed = other_sea.failed = 1
+    ours, theirs = (fly(*pair, steps=300, first=150) for pair in ((law, sea), (twin, other_sea)))
+    assert np.array_equal(ours, theirs)
+    assert np.array_equal(law.report, twin.report)
+    assert ours.any(axis=1).all()
+
+
+def test_two_laws_share_nothing():
+    one, other = law_for(REGIONS), law_for(REGIONS)
+    alone = fly(law_for(REGIONS), Sea(noise=NOISE), steps=60)
+    fly(other, Sea(restoring=12.0, failed=3), steps=60)
+    assert np.array_equal(fly(one, Sea(noise=NOISE), steps=60), alone)
+
+
+def test_the_law_without_its_compiler_is_the_same_to_rounding():
+    """Plain Python in a process of its own; what overflows there is the generator of random numbers, on purpose."""
+    code = (
+        "import numpy as np\n"
+        "from tests.controller.deployable.scenery import *\n"
+        "print(fly(law_for(REGIONS), Sea(noise=(0.02, 0.01)), steps=12).tolist())\n"
+    )
+    environment = os.environ | {"NUMBA_DISABLE_JIT": "1", "PYTHONPATH": str(ROOT), "PYTHONWARNINGS": "ignore"}
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=environment, check=False)
+    assert done.returncode == 0, done.stderr
+    plain = np.array(eval(done.stdout))
+    assert plain == pytest.approx(fly(law_for(REGIONS), Sea(noise=NOISE), steps=12), abs=1e-7)
+    assert plain.any(axis=1).all()
+
+
+def test_it_reaches_the_goal_clear_of_the_regions_and_within_the_limits():
+    law, sea, clear = law_for(REGIONS), Sea(noise=NOISE), []
+
+    def look(t):
+        at = [np.add(r.shape.centre, np.multiply(r.velocity, t)) for r in REGIONS[:2]]
+        clear.extend(np.linalg.norm(sea.position - c) - r.shape.radius for c, r in zip(at, REGIONS, strict=False))
+
+    forces = fly(law, sea, steps=1500, each=look)
+    assert min(clear) > 0.0
+    assert np.abs(forces).max() <= 27.0
+    assert np.linalg.norm(sea.position - GOAL.shape.centre) < 0.5
+    assert np.linalg.norm(sea.velocity) < 0.05
+    assert law.estimate[0] == pytest.approx(sea.restoring, abs=1.0)
+
+
+def dead(which):
+    """Return what a sensor gives that is dead from 3 s to 4 s."""
+    last = []
+
+    def change(t, state):
+        if not 3.0 <= t < 4.0:
+            last[:] = [state]
+            return state
+        if which == "frozen":
+            return last[0]
+        if which == "everything":
+            return VehicleState(*(np.full_like(part, np.nan) for part in state[:3]), state.thruster_health)
+        nothing = np.full_like(getattr(state, which), np.nan)
+        return state._replace(**{which: nothing})
+
+    return change
+
+
+@pytest.mark.parametrize("which", ["position", "quaternion", "velocity_body", "everything", "frozen"])
+def test_a_sensor_that_is_dead_for_a_second_is_borne(which):
+    """Forces stay finite and within limits, nothing is touched, no thruster is given up, the goal is reached."""
+    law, sea, clear = law_for(REGIONS), Sea(noise=NOISE), []
+    ball = REGIONS[0].shape
+
+    def look(t):
+        clear.append(np.linalg.norm(sea.position - ball.centre) - ball.radius)
+        assert law.memory.thrusters.health.all(), t
+
+    forces = fly(law, sea, steps=1500, change=dead(which), each=look)
+    assert np.isfinite(forces).all() and np.abs(forces).max() <= 27.0
+    assert min(clear) > 0.0
+    assert np.linalg.norm(sea.position - GOAL.shape.centre) < 0.5
+
+
+def test_without_any_measurement_it_pushes_nothing():
+    def nothing(t, state):
+        return VehicleState(*(np.full_like(part, np.nan) for part in state[:3]), state.thruster_health)
+
+    assert not fly(law_for(REGIONS), Sea(), steps=50, change=nothing).any()
+
+
+def test_without_regions_it_reaches_the_goal():
+    law, sea = law_for([]), Sea()
+    forces = fly(law, sea, regions=[], steps=1200)
+    assert np.isfinite(forces).all()
+    assert np.linalg.norm(sea.position - GOAL.shape.centre) < 0.5
+
+
+def test_regions_that_contradict_each_other_leave_finite_forces_within_limits():
+    """The vehicle within one ball, and two more closing it in from either side."""
+    walls = [Region(f"{x}", Sphere((x, 0.0, 2.5), 1.2), "out") for x in (-1.0, 0.05, 1.0)]
+    law, sea = law_for(walls), Sea(noise=NOISE)
+    forces = fly(law, sea, regions=walls, steps=400)
+    assert np.isfinite(forces).all() and np.abs(forces).max() <= 27.0
+    assert np.isfinite(law.report).all()
+
+
+def test_two_thrusters_that_are_told_stay_given_up():
+    def told(t, state):
+        health = np.ones(8)
+        health[2] = 0.0 if t > 0.5 else 1.0
+        health[5] = 0.0 if t > 1.0 else 1.0
+        return state._replace(thruster_health=health)
+
+    forces = fly(law_for(REGIONS), Sea(noise=NOISE), steps=300, change=told)
+    assert not forces[60:, 2].any() and not forces[60:, 5].any()
+    assert forces[60:, [0, 1, 3, 4]].any(axis=0).all()

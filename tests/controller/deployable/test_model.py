@@ -1,0 +1,98 @@
+"""The vehicle as the deployable law sees it, against the plant."""
+
+import numpy as np
+import pytest
+from scipy.optimize import minimize
+
+from controller.laws.deployable.braking import least_forces
+from controller.laws.deployable.model import (
+    dynamics_of,
+    free_acceleration,
+    share_out,
+    thrust_acceleration,
+    thrusters_of,
+)
+from controller.quaternion import rotation_matrix
+from cosim.vehicle_model import vehicle_model
+from plant_fmu import Plant
+from plant_fmu.vehicle import load_vehicle
+from tests.controller.deployable.scenery import MODELS
+
+POSE = [*(f"quaternion.e{i}" for i in range(4)), *(f"velocity.{a}" for a in "uvwpqr")]
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_acceleration_is_that_of_the_plant(name):
+    """One FMU step of 0.1 ms at random attitudes, rates and currents, with r_G at the origin as the law takes it."""
+    rng, step = np.random.default_rng(3), 1e-4
+    vehicle, model = load_vehicle(name), MODELS[name]
+    dynamics, thrusters = dynamics_of(model, np.ones(9)), thrusters_of(model)
+    with Plant(vehicle) as plant:
+        for _ in range(8):
+            e, nu = rng.normal(size=4), rng.normal(size=6) * [0.6, 0.6, 0.6, 0.3, 0.3, 0.3]
+            e /= np.linalg.norm(e)
+            current, forces, restoring = rng.normal(size=3) * 0.3, rng.uniform(-9, 9, 8), rng.uniform(-15, 15)
+            plant.reset()
+            values = {"substep": step, "position.z": 20.0, "buoyancy": vehicle.weight - restoring}
+            values |= dict(zip(POSE, (*e, *nu), strict=True)) | {f"r_G.{a}": 0.0 for a in "xyz"}
+            values |= {f"current.{a}": c for a, c in zip("xyz", current, strict=True)}
+            values |= {f"thrust_time_constant[{i + 1}]": 0.0 for i in range(8)}
+            plant.set(values)
+            plant.initialise()
+            for j in range(8):
+                plant[f"thrust[{j + 1}]"] = forces[j]
+            plant.step(step)
+            after = np.array([plant[name] for name in POSE])
+            R, free, pushed = rotation_matrix(e), np.empty(3), np.empty(6)
+            before = R @ nu[:3]
+            there = (rotation_matrix(after[:4]) @ after[4:7] - before) / step
+            free_acceleration(dynamics, R, before, nu[3:], current, restoring, free)
+            thrust_acceleration(dynamics, thrusters, R, forces, pushed)
+            # a step is a difference quotient: it is off by half a step times what the acceleration changes in a second
+            assert free + pushed[:3] == pytest.approx(there, abs=2e-3 * (0.1 + np.abs(there).max()))
+
+
+def test_a_lost_thruster_gives_nothing_and_the_others_give_the_wrench():
+    for model in MODELS.values():
+        thrusters = thrusters_of(model)
+        for lost in range(8):
+            thrusters.health[:] = 1.0
+            thrusters.health[lost] = 0.0
+            share_out(thrusters)
+            assert thrusters.lower[lost] == thrusters.upper[lost] == 0.0
+            wrench = np.array([3.0, -4.0, 2.0, 0.1, -0.2, 0.3])
+            forces = thrusters.allocator @ wrench
+            assert forces[lost] == pytest.approx(0.0, abs=1e-12)
+            assert model.thruster_matrix @ forces == pytest.approx(wrench, abs=0.05)
+
+
+def test_the_least_force_is_that_of_the_worst_direction():
+    """Against a search over all directions for the greatest force that the limits allow without moment: within 2 %."""
+    from scipy.optimize import linprog
+
+    for model in MODELS.values():
+        forces = least_forces(model)
+        for lost in (2, 6, 8):
+            limits = [(0.0, 0.0) if j == lost else (-u, u) for j, u in enumerate(model.thrust_max)]
+
+            def support(angles, limits=limits, B=model.thruster_matrix):
+                """Half the width of the set of forces along a direction: its least is the ball's that it holds."""
+                a, b = angles
+                n = np.array([np.cos(a) * np.cos(b), np.sin(a) * np.cos(b), np.sin(b)])
+                return -linprog(-(n @ B[:3]), A_eq=B[3:], b_eq=np.zeros(3), bounds=limits).fun
+
+            rng = np.random.default_rng(0)
+            starts = [rng.uniform([0.0, -1.5], [6.3, 1.5]) for _ in range(25)]
+            best = min(starts, key=support)
+            least = minimize(support, best, method="Nelder-Mead", options={"maxiter": 60}).fun
+            assert 0.98 * forces[lost] <= least <= 1.001 * forces[lost]
+
+
+def test_nothing_untold_enters_the_model():
+    """Another weight, buoyancy and other centres make the same numbers."""
+    import dataclasses
+
+    vehicle = load_vehicle("odin")
+    other = dataclasses.replace(vehicle, weight=1500.0, buoyancy=1490.0, r_G=(0.1, 0.0, 0.2), r_B=(0.0, 0.1, 0.0))
+    for ours, theirs in zip(vehicle_model(vehicle), vehicle_model(other), strict=True):
+        assert np.array_equal(ours, theirs)

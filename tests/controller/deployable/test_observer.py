@@ -1,0 +1,105 @@
+"""The observer against a Kalman filter in plain matrices."""
+
+import numpy as np
+import pytest
+
+from controller.laws.deployable import observer
+from controller.laws.deployable.gains import DeployableGains
+from controller.laws.deployable.model import dynamics_of, thrusters_of
+from tests.controller.deployable.scenery import ODIN, Sea
+
+GAINS = DeployableGains()
+PERIOD = 0.02
+
+
+def started(position=(0.0, 0.0, 2.0), velocity=(0.0, 0.0, 0.0)):
+    estimate = observer.estimate_of_nothing()
+    observer.begin(estimate, np.array(position), np.array(velocity), GAINS)
+    return estimate, dynamics_of(ODIN, np.ones(9)), thrusters_of(ODIN)
+
+
+def predict(estimate, dynamics, thrusters):
+    observer.predict(estimate, dynamics, thrusters, np.eye(3), np.zeros(3), GAINS, PERIOD)
+
+
+def test_covariance_and_gains_are_those_of_a_kalman_filter():
+    """F P F^T + Q, and a joint update with both measurements, of which ours takes one after the other."""
+    rng = np.random.default_rng(1)
+    estimate, dynamics, thrusters = started(velocity=(0.6, -0.4, 0.1))
+    mass = dynamics.translational_mass[0]
+    linear, quadratic = ODIN.linear_damping[:3].mean(), ODIN.quadratic_damping[:3].mean()
+    H, N = np.eye(3)[:2], np.diag([GAINS.position_noise**2, GAINS.velocity_noise**2])
+    for _ in range(60):
+        P, speed = estimate.covariance.copy(), abs(estimate.velocity - estimate.water)
+        predict(estimate, dynamics, thrusters)
+        before = [estimate.position.copy(), estimate.velocity.copy(), np.r_[estimate.water[:2], estimate.restoring]]
+        expected = np.empty((3, 3, 3))
+        for axis in range(3):
+            slope = (linear + 2.0 * quadratic * max(speed[axis], 0.15)) / mass
+            unknown = slope if axis < 2 else 1.0 / mass
+            F = np.array([[1.0, PERIOD, 0.0], [0.0, 1.0 - slope * PERIOD, unknown * PERIOD], [0.0, 0.0, 1.0]])
+            drift = GAINS.restoring_drift if axis == 2 else GAINS.current_drift
+            expected[axis] = F @ P[axis] @ F.T + np.diag([0.0, 0.03**2, drift**2]) * PERIOD
+        assert estimate.covariance == pytest.approx(expected, rel=1e-10, abs=1e-18)
+        position = estimate.position + 0.02 * rng.normal(size=3)
+        velocity = estimate.velocity + 0.01 * rng.normal(size=3)
+        assert observer.correct(estimate, position, velocity, GAINS)
+        after = np.array([estimate.position, estimate.velocity, np.r_[estimate.water[:2], estimate.restoring]])
+        for axis in range(3):
+            S = H @ expected[axis] @ H.T + N
+            K = expected[axis] @ H.T @ np.linalg.inv(S)
+            x = np.array([b[axis] for b in before])
+            x = x + K @ (np.array([position[axis], velocity[axis]]) - H @ x)
+            assert after[:, axis] == pytest.approx(x, rel=1e-9, abs=1e-12)
+            assert estimate.covariance[axis] == pytest.approx((np.eye(3) - K @ H) @ expected[axis], rel=1e-8, abs=1e-16)
+
+
+def test_current_and_weight_are_found():
+    """To the accuracy that the filter itself states, in noise."""
+    sea = Sea(current=(0.3, -0.2, 0.0), restoring=11.0, noise=(0.02, 0.01))
+    estimate, dynamics, thrusters = started(sea.position)
+    rng = np.random.default_rng(4)
+    for k in range(3000):
+        if k % 50 == 0:
+            thrusters.forces[:] = rng.uniform(-12.0, 12.0, 8)
+            thrusters.forces[5:] = thrusters.forces[4]
+            thrusters.forces[2:4] = -thrusters.forces[:2]
+        sea.step(thrusters.forces, PERIOD)
+        sea.omega[:], sea.quaternion[:] = 0.0, (1.0, 0.0, 0.0, 0.0)
+        predict(estimate, dynamics, thrusters)
+        assert observer.correct(estimate, *noisy(sea), GAINS)
+    spread = np.sqrt(estimate.covariance[:, 2, 2])
+    assert np.all(spread < [0.1, 0.1, 3.0])
+    assert np.all(abs(estimate.water[:2] - sea.current[:2]) < 4.0 * spread[:2])
+    assert abs(estimate.restoring[0] - 11.0) < 4.0 * spread[2]
+
+
+def noisy(sea):
+    return sea.position + 0.02 * sea.rng.normal(size=3), sea.velocity + 0.01 * sea.rng.normal(size=3)
+
+
+def test_unknowns_stay_within_their_bounds():
+    """A vehicle that is held fast while the thrusters push: nothing winds up."""
+    estimate, dynamics, thrusters = started()
+    thrusters.forces[:] = 27.0
+    for _ in range(2000):
+        predict(estimate, dynamics, thrusters)
+        observer.correct(estimate, np.array([0.0, 0.0, 2.0]), np.zeros(3), GAINS)
+        if estimate.silence[0] > GAINS.coast:
+            observer.begin(estimate, np.array([0.0, 0.0, 2.0]), np.zeros(3), GAINS)
+        assert np.all(abs(estimate.water) <= GAINS.current_bound)
+        assert abs(estimate.restoring[0]) <= GAINS.restoring_bound
+
+
+@pytest.mark.parametrize("which", [0, 1])
+def test_a_measurement_that_cannot_be_is_not_believed_and_changes_nothing(which):
+    estimate, dynamics, thrusters = started()
+    predict(estimate, dynamics, thrusters)
+    before = [np.copy(part) for part in estimate]
+    for wrong in (5.0, np.nan, np.inf):
+        measured = [estimate.position.copy(), estimate.velocity.copy()]
+        measured[which][1] += wrong
+        assert not observer.correct(estimate, *measured, GAINS)
+    for part, was in zip(estimate, before, strict=True):
+        assert np.array_equal(part, was, equal_nan=True)
+    assert estimate.silence[0] == pytest.approx(PERIOD)
