@@ -13,7 +13,7 @@ class DeployableGains(NamedTuple):
 
     # attraction
     speed: float = 1.2  # m/s, greatest over ground
-    acceleration: float = 0.3  # m/s2, with which the attraction speeds up and brakes
+    acceleration: float = 0.35  # m/s2, with which the attraction speeds up and brakes
     velocity_bandwidth: float = 1.2  # rad/s, of the loop that follows the wanted velocity
     position_bandwidth: float = 0.8  # 1/s, of the approach to the end of the way
     depth: float = 0.3  # m, how far inside the goal region the way ends, where the region is that deep
