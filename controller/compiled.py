@@ -17,13 +17,13 @@ _HERE = Path(__file__).parent
 
 
 @functools.cache
-def _sources(folder: Path) -> str:
-    """Return the mark of all sources of this package and of those in the folder of who compiles with it."""
-    files = sorted({*_HERE.rglob("*.py"), *folder.glob("*.py")})
+def _sources(folder: Path, *others: Path) -> str:
+    """Return the mark of all sources of this package, of those in the folder of who compiles with it, and of others."""
+    files = sorted({*_HERE.rglob("*.py"), *folder.glob("*.py"), *(f for other in others for f in other.rglob("*.py"))})
     return hashlib.sha256(b"".join(path.read_bytes() for path in files)).hexdigest()
 
 
-def compiled(function: F) -> F:
+def compiled(function: F, *others: Path) -> F:
     """Compile a plain function on float64 arrays with Numba, and keep the result on disk.
 
     Rounding follows IEEE 754 (no fast-math), so that a run repeats bit for bit; dividing by zero gives infinity or NaN
@@ -33,6 +33,9 @@ def compiled(function: F) -> F:
     ----------
     function : callable
         Written in the part of Python and NumPy that Numba compiles.
+    *others : Path
+        Folders of what else it calls or reads: beside this package and the function's own folder, on whose sources
+        what is kept depends in any case.
 
     Returns
     -------
@@ -45,7 +48,7 @@ def compiled(function: F) -> F:
         jitted = numba.njit(error_model="numpy")(function)
     # Numba takes a cached function for current while its own file is, although what it calls may stand in another one.
     # Stamp it with all sources of the package; should Numba's insides move, rather keep nothing on disk than old code.
-    stamp = _sources(Path(function.__code__.co_filename).parent)
+    stamp = _sources(Path(function.__code__.co_filename).parent, *others)
     try:
         cache_file = jitted._cache._cache_file
         cache_file._source_stamp  # noqa: B018 - raises where it is gone
@@ -71,5 +74,6 @@ def inlined(function: F) -> F:
     callable
         The same, compiled at its first call.
     """
-    result: F = numba.njit(error_model="numpy", inline="always")(function)
+    jitted: Any = numba.njit(error_model="numpy", inline="always")(function)
+    result: F = jitted
     return result

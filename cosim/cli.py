@@ -15,12 +15,14 @@ from collections.abc import Sequence
 from importlib import metadata
 from pathlib import Path
 
-INTERRUPTED = 130  # exit code after Ctrl-C
+from cosim.command_line import campaigns
+from cosim.command_line.campaigns import INTERRUPTED
 
 _EPILOG = """examples:
   cosim run paper
   cosim run paper --set arbiter.engine=closed --set regions.SR1.gain=5000 --out runs/strong
   cosim run my-scene.toml --mavlink udpout:127.0.0.1:14550 --rate 1
+  cosim campaign scenes.jsonl --law printed --out campaigns/printed --workers 2
 """
 
 
@@ -33,7 +35,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--version", action="version", version=f"cosim {metadata.version('subreach')}")
     parser.add_argument("-v", "--verbose", action="store_true", help="log what happens inside")
-    verbs = parser.add_subparsers(dest="verb", required=True, metavar="{run,report,list,show,check,calibrate}")
+    verbs = parser.add_subparsers(dest="verb", required=True, metavar="VERB")
 
     run = verbs.add_parser("run", help="run a scenario and write its folder")
     run.add_argument("scenario", help="a shipped name (see cosim list), or a TOML file")
@@ -69,6 +71,8 @@ def _parser() -> argparse.ArgumentParser:
 
     calibrate = verbs.add_parser("calibrate", help="fit the force limit and lag that bring the paper's window about")
     calibrate.add_argument("--scenario", default="paper", help="scenario to fit (default: paper)")
+
+    campaigns.add_verbs(verbs)
     return parser
 
 
@@ -197,4 +201,13 @@ def _calibrate(options: argparse.Namespace) -> int:
     return 0
 
 
-_VERBS = {"run": _run, "report": _report, "list": _list, "show": _show, "check": _check, "calibrate": _calibrate}
+_VERBS = {
+    "run": _run,
+    "report": _report,
+    "list": _list,
+    "show": _show,
+    "check": _check,
+    "calibrate": _calibrate,
+    "campaign": campaigns.campaign,
+    "compare": campaigns.compare,
+}

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import io
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -38,6 +40,10 @@ STYLE: Any = {
     "svg.hashsalt": "subreach",
 }
 
+DPI = 160  # of figures as PNG
+
+_LEGEND_WIDTH, _LEGEND_MARK = 100, 7  # letters that fit across a figure, that a line or marker is as wide as
+_NAMED = 8  # regions that a legend names one by one
 POINTS = 1500  # of a drawn curve: about what a figure's width resolves
 
 
@@ -57,6 +63,14 @@ class Drawing:
     name: str
     caption: str
     figure: Figure
+
+    def write(self, folder: Path) -> str:
+        """Write it into a folder as SVG and as PNG, and return the SVG."""
+        svg = io.StringIO()
+        self.figure.savefig(svg, format="svg", metadata={"Date": None})
+        (folder / f"{self.name}.svg").write_text(svg.getvalue(), encoding="utf-8")
+        self.figure.savefig(folder / f"{self.name}.png", dpi=DPI)
+        return svg.getvalue()
 
 
 def thin(time: Array, *signals: Array) -> tuple[Array, ...]:
@@ -112,13 +126,14 @@ class Place:
     region: Region
     colour: str
     shift: Array  # (3,) m, NED, from where the scenario has it
-    faint: bool  # where it came from
+    faint: bool  # where it began or ended
 
 
 def places_of(story: Story) -> Iterator[Place]:
-    """Yield where the goal and the regions were at the end, and before it, faint, where those that move began.
+    """Yield where the goal was at the end, and each region when the vehicle had least clearance to it.
 
-    Regions of attitude are at no place and left out.
+    Those that move come before it, faint, where they began and where they ended. Regions of attitude are at no place
+    and left out.
 
     Parameters
     ----------
@@ -134,9 +149,11 @@ def places_of(story: Story) -> Iterator[Place]:
         if of_attitude(region.shape):
             continue
         shifts = shifts_of(story, region.name)
+        at = -1 if region.name == "goal" else int(np.argmin(story.record[f"{region.name}.clearance"]))
         if region.name in story.scenario.moving:
             yield Place(region, colour, shifts[0], faint=True)
-        yield Place(region, colour, shifts[-1], faint=False)
+            yield Place(region, colour, shifts[-1], faint=True)
+        yield Place(region, colour, shifts[at], faint=False)
 
 
 def features_of(story: Story) -> Iterator[tuple[str, str, Array]]:
@@ -175,6 +192,43 @@ def shifts_of(story: Story, name: str) -> Array:
     if name not in story.scenario.moving:
         return np.zeros((len(story.record["time"]), 3))
     return story.record.stack([f"{name}.shift.{axis}" for axis in "xyz"])
+
+
+def labels_of(regions: Sequence[tuple[Region, str]]) -> dict[str, str]:
+    """Return what a legend calls regions.
+
+    Parameters
+    ----------
+    regions : sequence of (Region, str)
+        With their colours.
+
+    Returns
+    -------
+    dict of str to str
+        By the region's name: its name, or where there are many regions, how many have its colour, at the first of them.
+    """
+    if len(regions) <= _NAMED:
+        return {region.name: region.name for region, _ in regions}
+    by_colour: dict[str, list[str]] = {}
+    for region, colour in regions:
+        by_colour.setdefault(colour, []).append(region.name)
+    return {n[0]: n[0] if len(n) == 1 else f"{len(n)} regions" for n in by_colour.values()}
+
+
+def legend_columns(labels: Iterable[str]) -> int:
+    """Return how many columns a legend may have across a figure, as all are as wide as the longest label.
+
+    Parameters
+    ----------
+    labels : iterable of str
+        At least one.
+
+    Returns
+    -------
+    int
+        At least 1.
+    """
+    return max(1, _LEGEND_WIDTH // (max(map(len, labels)) + _LEGEND_MARK))
 
 
 def overlap_of(story: Story) -> NDArray[np.bool_]:

@@ -59,7 +59,10 @@ def drawings(story: Story) -> Iterator[Drawing]:
         if name == "weights-overlap" and not story.summary["intersection_windows"]:
             continue
         if name == "path-plane" and story.scenario.moving:
-            caption += " Those that moved are faint where they began, full where they ended."
+            caption += (
+                " What moved is faint where it began and ended; regions are full where they were when the vehicle had "
+                "least clearance to them."
+            )
         if name == "lyapunov" and not story.summary["lyapunov"]:
             continue
         if name == "thrusters":

@@ -9,14 +9,24 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from controller.regions import Region, clearances_at
-from cosim.drawing import BLACK, PATH_COLOUR, POINTS, Place, Story, features_of, overlap_of, places_of
+from cosim.drawing import (
+    BLACK,
+    PATH_COLOUR,
+    POINTS,
+    Place,
+    Story,
+    features_of,
+    labels_of,
+    legend_columns,
+    overlap_of,
+    places_of,
+)
 from cosim.signals import Array
 
 _GRID = 140  # points a side, where outlines of regions are searched
 _SLICES = 41  # along the line of sight
 _TALLEST = 10.0  # inches
-_FAINT = 0.35  # opacity of a region where it came from
-_NAMED = 8  # regions that a legend names one by one
+_FAINT = 0.35  # opacity of a region where it began or ended
 
 
 def path_3d(story: Story) -> Figure:
@@ -53,7 +63,7 @@ def path_3d(story: Story) -> Figure:
     ax.yaxis.set_major_locator(MaxNLocator(4))
     ax.set_box_aspect(wide)
     ax.view_init(elev=20, azim=-70)
-    figure.legend(loc="upper center", ncols=8)
+    figure.legend(loc="upper center", ncols=legend_columns(ax.get_legend_handles_labels()[1]))
     return figure
 
 
@@ -96,25 +106,21 @@ def path_plane(story: Story) -> Figure:
     axes[0].plot([], [], "x", color=BLACK, mew=2, label="start")
     if overlap_of(story).any():
         axes[0].plot([], [], color=BLACK, linewidth=3, label="overlap")
-    figure.legend(loc="outside upper center", ncols=7)
+    figure.legend(loc="outside upper center", ncols=legend_columns(axes[0].get_legend_handles_labels()[1]))
     return figure
 
 
 def _legend_of(story: Story) -> list[tuple[str, str]]:
     """Return a label and its colour for each region in space, or for each colour where there are many."""
-    places = [place for place in places_of(story) if not place.faint]
-    if len(places) <= _NAMED:
-        return [(place.region.name, place.colour) for place in places]
-    names: dict[str, list[str]] = {}
-    for place in places:
-        names.setdefault(place.colour, []).append(place.region.name)
-    return [(n[0] if len(n) == 1 else f"{len(n)} regions", colour) for colour, n in names.items()]
+    regions = [(place.region, place.colour) for place in places_of(story) if not place.faint]
+    labels = labels_of(regions)
+    return [(labels[region.name], colour) for region, colour in regions if region.name in labels]
 
 
 def _extent(story: Story) -> tuple[Array, Array]:
     """Return the corners of a box about the path and the goal, with some room."""
     path = story.record.stack(["position.x", "position.y", "position.z"])
-    all_bounds = [(p.region.name, np.array(p.region.shape.bounds()) + p.shift) for p in places_of(story)]
+    all_bounds = [(p.region.name, np.array(p.region.shape.bounds()) + p.shift) for p in places_of(story) if not p.faint]
     goals = [np.where(np.isfinite(b), b, path[0]) for name, b in all_bounds if name == "goal"]
     points = np.vstack([path, *goals])  # an endless goal needs no room
     low, high = points.min(axis=0), points.max(axis=0)

@@ -18,6 +18,8 @@ from cosim.drawing import (
     ORANGE,
     RED,
     Story,
+    labels_of,
+    legend_columns,
     regions_of,
     shifts_of,
     thin,
@@ -139,11 +141,13 @@ def clearance(story: Story) -> Figure:
     groups = [[(i, of) for i, of in regions if of_attitude(of[0].shape) == angle] for angle in (False, True)]
     figure, axes = _zoomed(story, 3.0 if not groups[1] else 4.6, 1 if not groups[1] else 2)
     styles = ("-", "--", "-.", ":")
+    labels = labels_of([of for _, of in regions])
     for row, group, unit in zip(axes, groups, ("m", "°"), strict=False):
         for i, (region, colour) in group:
+            label = labels.get(region.name, "_")  # which legends leave out
             signal = story.record[f"{region.name}.clearance"]
             signal = np.rad2deg(signal) if unit == "°" else signal
-            _curves(row, story, {region.name: signal}, color=colour, linestyle=styles[i % 4])
+            _curves(row, story, {label: signal}, color=colour, linestyle=styles[i % 4])
         for ax in row:
             ax.set_ylim(ax.get_ylim())
             ax.axhspan(ax.get_ylim()[0], 0.0, color=RED, alpha=0.06, linewidth=0)
@@ -151,7 +155,7 @@ def clearance(story: Story) -> Figure:
         row[0].set_ylabel(f"clearance [{unit}]")
     drawn = [dict(zip(*reversed(row[0].get_legend_handles_labels()), strict=True)) for row in axes]
     handles = {label: handle for of_row in drawn for label, handle in of_row.items()}
-    figure.legend(handles.values(), handles.keys(), loc="outside upper center", ncols=8 if len(handles) <= 8 else 6)
+    figure.legend(handles.values(), handles.keys(), loc="outside upper center", ncols=legend_columns(handles))
     return figure
 
 

@@ -6,19 +6,23 @@ position at every plant step.
 
 from __future__ import annotations
 
+import functools
 import types
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from controller import LAWS, VehicleState
+import fuzzy_arbiter
+import plant_fmu
+from controller import LAWS, CompiledLaw, VehicleState
 from controller.allocation import allocate
 from controller.compiled import compiled
 from controller.laws import printed
-from controller.regions import PackedRegions, clearance_at
+from controller.regions import PackedRegions, Sphere, clearance_of_place, clearance_of_sphere
 from cosim.native import advance, read, seconds, send
 from fuzzy_arbiter import Arbiter
 from fuzzy_arbiter.membership import ramp
@@ -26,10 +30,14 @@ from plant_fmu.running.native import Native
 
 Array = NDArray[np.float64]
 
+# the folders of what the compiled loop is made of beside this one and that of the laws
+_FOREIGN = (Path(fuzzy_arbiter.__file__).parent, Path(plant_fmu.__file__).parent / "running")
+
 _weigh = Arbiter().compiled()
 _ramp: Any = numba.njit(ramp)
 _step: Any = printed.step  # of a law, and whether it gives a wrench: `flight_of` puts others in their places
 _is_wrench = True
+_SPHERE = Sphere.kind
 
 
 class Setup(NamedTuple):
@@ -42,7 +50,7 @@ class Setup(NamedTuple):
     controls: int  # control steps
     plant_steps: int  # plant steps a control step
     plant_step: float  # s
-    settled: float  # s inside the goal region, at the end, that count as having reached it
+    settled_steps: int  # plant steps inside the goal region, at the end, that count as having reached it
     noise: Array  # (controls, 6) what is added to position and linear velocity
     failed: int  # thruster that fails, from 0; -1 for none
     failure_control: int  # control step at which it does
@@ -62,12 +70,12 @@ class Allocator(NamedTuple):
 class Score(NamedTuple):
     """What a flight came to."""
 
-    reached: bool  # inside the goal region for the last `settled` seconds
+    reached: bool  # inside the goal region for the last `settled_steps`
     reach_time: float  # s, since when it was inside without a break; inf if it is outside at the end
-    min_clearance: float  # m, least over all hard regions and plant steps; negative: violated
+    min_clearance: float  # m, least over all regions, the start and all plant steps; negative: violated
     effort: float  # N s, sum over thrusters of the integral of the given force's magnitude
-    thrust_variation: float  # N, sum over thrusters of the changes of the commanded force
-    worst_step: float  # s of the wall clock, the longest control step
+    thrust_variation: float  # N, sum over thrusters of the changes of the commanded force, from 0 on
+    worst_step: float  # s of the wall clock, the longest that law and allocation took
     failed_step: int  # plant step that the FMU refused, -1 for none
 
 
@@ -86,7 +94,7 @@ def _fly(
     gains: Any,
     memory: Any,
     trace: Array,
-) -> Score:
+) -> tuple[bool, float, float, float, float, float, int]:
     """Fly a scene by the law whose compiled function stands in the place of the global `_step`.
 
     Parameters
@@ -107,28 +115,36 @@ def _fly(
 
     Returns
     -------
-    Score
-        Of the whole flight, or up to where the FMU failed.
+    tuple
+        What `Score` is made of, of the whole flight, or up to where the FMU failed. Were it a named tuple, Numba would
+        call Python to make it, and crash where that raises, as after Ctrl-C in mid-flight.
     """
     m, n = native.inputs.size, setup.regions.kinds.size
     position, quaternion, velocity = np.empty(3), np.empty(4), np.empty(6)
     health, weights, memberships = np.ones(m), np.zeros(n), np.zeros(3)
     by_criterion, wrench, before = np.zeros(3), np.zeros(6), np.zeros(m)
+    clearances, goal_clearance = np.zeros(n), np.zeros(1)
     room = np.zeros(2, np.int64)
     state = VehicleState(position, quaternion, velocity, health)
-    last_outside, least, effort, variation, worst = 0.0, np.inf, 0.0, 0.0, 0.0
-    control_period = setup.plant_steps * setup.plant_step
+    effort, variation, worst = 0.0, 0.0, 0.0
     if not read(native):
-        return Score(False, np.inf, np.nan, effort, variation, worst, 0)
+        return (False, np.inf, np.nan, effort, variation, worst, 0)
+    true_position = native.outputs[:3]
+    _move(setup, 0.0)
+    _clearances(setup.regions, true_position, clearances)
+    _clearances(setup.goal, true_position, goal_clearance)
+    least = _least(clearances, np.inf)
+    inside_since = 0 if goal_clearance[0] >= 0.0 else -1  # plant step; -1: outside
+    done = 0  # plant steps
 
     for k in range(setup.controls):
-        now = k * control_period
+        now = done * setup.plant_step
         # what fails
         if k == setup.failure_control and setup.failed >= 0:
             effectiveness.inputs[:] = 1.0
             effectiveness.inputs[setup.failed] = 0.0
             if not send(effectiveness):
-                return Score(False, np.inf, least, effort, variation, worst, k * setup.plant_steps)
+                return (False, np.inf, least, effort, variation, worst, done)
             if setup.tell:
                 health[setup.failed] = 0.0
         # measure
@@ -138,9 +154,10 @@ def _fly(
         velocity[:3] += setup.noise[k, 3:]
         # regions and arbiter
         _move(setup, now)
+        _clearances(setup.regions, position, clearances)
         memberships[:] = 0.0
         for i in range(n):
-            degree = _ramp(clearance_at(setup.regions, i, position), setup.ramp)
+            degree = _ramp(clearances[i], setup.ramp)
             memberships[setup.criteria[i]] = max(memberships[setup.criteria[i]], degree)
         _weigh(memberships, by_criterion)
         for i in range(n):
@@ -160,25 +177,24 @@ def _fly(
             before[j] = native.inputs[j]
         # plant and score
         if not send(native):
-            return Score(False, np.inf, least, effort, variation, worst, k * setup.plant_steps)
-        for i in range(setup.plant_steps):
-            at = now + i * setup.plant_step
-            if not (advance(native, at, setup.plant_step) and read(native)):
-                return Score(False, np.inf, least, effort, variation, worst, k * setup.plant_steps + i)
-            at = now + (i + 1) * setup.plant_step
-            _move(setup, at)
-            true_position = native.outputs[:3]
-            for j in range(n):
-                clearance = clearance_at(setup.regions, j, true_position)
-                least = clearance if clearance < least or np.isnan(clearance) else least
-            if not clearance_at(setup.goal, 0, true_position) >= 0.0:
-                last_outside = at
+            return (False, np.inf, least, effort, variation, worst, done)
+        for _ in range(setup.plant_steps):
+            if not (advance(native, done * setup.plant_step, setup.plant_step) and read(native)):
+                return (False, np.inf, least, effort, variation, worst, done)
+            done += 1
+            _move(setup, done * setup.plant_step)
+            _clearances(setup.regions, true_position, clearances)
+            _clearances(setup.goal, true_position, goal_clearance)
+            least = _least(clearances, least)
+            if not goal_clearance[0] >= 0.0:
+                inside_since = -1
+            elif inside_since < 0:
+                inside_since = done
             for j in range(m):
                 effort += abs(native.outputs[13 + j]) * setup.plant_step
-    duration = setup.controls * control_period
-    inside = last_outside < duration
-    reached = inside and duration - last_outside >= setup.settled
-    return Score(reached, last_outside if inside else np.inf, least, effort, variation, worst, -1)
+    reached = inside_since >= 0 and done - inside_since >= setup.settled_steps
+    reach_time = inside_since * setup.plant_step if inside_since >= 0 else np.inf
+    return (reached, reach_time, least, effort, variation, worst, -1)
 
 
 @compiled
@@ -188,6 +204,26 @@ def _move(setup: Setup, now: float) -> None:
         for i in range(regions.kinds.size):
             for axis in range(3):
                 regions.shifts[i, axis] = regions.velocities[i, axis] * now
+
+
+@compiled
+def _clearances(regions: PackedRegions, position: Array, clearances: Array) -> None:
+    """Write the clearance [m] of each region, none of which depends on attitude, at a position into `clearances`."""
+    room = np.empty(3)
+    for i in range(regions.kinds.size):
+        if regions.kinds[i] == _SPHERE:
+            clearances[i] = clearance_of_sphere(regions, i, position)
+        else:
+            clearances[i] = clearance_of_place(regions, i, position, room)
+
+
+@compiled
+def _least(clearances: Array, least: float) -> float:
+    """Return the least of numbers and one more; what is no number stays."""
+    for clearance in clearances:
+        if clearance < least or np.isnan(clearance):
+            least = clearance
+    return least
 
 
 @compiled
@@ -217,7 +253,19 @@ def flight_of(law: str) -> Callable[..., Score]:
     callable
         ``(setup, native, effectiveness, allocator, gains, memory, trace) -> Score``.
     """
-    names = globals() | {"_step": LAWS[law].function, "_is_wrench": LAWS[law].output == "wrench"}
-    copy = types.FunctionType(_fly.__code__, names, f"_fly_{law}")
+    chosen: Any = LAWS[law]
+    loop = _compiled(law, chosen)
+    return lambda *arguments: Score(*loop(*arguments))
+
+
+@functools.cache
+def _compiled(name: str, law: type[CompiledLaw]) -> Callable[..., tuple[Any, ...]]:
+    return compiled(_plain(name, law), *_FOREIGN)
+
+
+def _plain(name: str, law: type[CompiledLaw]) -> Callable[..., tuple[Any, ...]]:
+    """Return the loop for a law, left to Python."""
+    names = globals() | {"_step": law.function, "_is_wrench": law.output == "wrench"}
+    copy = types.FunctionType(_fly.__code__, names, f"_fly_{name}")
     copy.__qualname__ = copy.__name__
-    return compiled(copy)
+    return copy

@@ -20,6 +20,7 @@ from cosim.lyapunov import LyapunovSignals
 from cosim.scenario import CRITERIA, Scenario
 from cosim.sensing import Sensor
 from cosim.signals import Array, Signals
+from cosim.start_values import start_values
 from cosim.surroundings import Surroundings
 from cosim.vehicle_model import vehicle_model
 from fuzzy_arbiter import Arbiter, ramp
@@ -83,7 +84,7 @@ class Master:
 
         self.plant = Plant(vehicle, scenario.plant.fmi)
         try:
-            self.plant.set(_start_values(scenario))
+            self.plant.set(start_values(scenario))
             self.plant.initialise()
             self.signals = Signals(columns_of(scenario, self.plant, self.law))
             self._bind()
@@ -286,19 +287,3 @@ class Master:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.close()
-
-
-def _start_values(scenario: Scenario) -> dict[str, float]:
-    """Return what the FMU is told before initialisation."""
-    initial, plant, limit = scenario.initial, scenario.plant, scenario.limit
-    values = {"substep": plant.substep, "wrench_time_constant": limit.time_constant}
-    if limit.force < np.inf:
-        values["wrench_force_limit"] = limit.force
-    for prefix, names, numbers in (
-        ("current", "xyz", plant.current),
-        ("position", "xyz", initial.position),
-        ("quaternion", ("e0", "e1", "e2", "e3"), initial.quaternion),
-        ("velocity", "uvwpqr", initial.velocity),
-    ):
-        values |= {f"{prefix}.{name}": number for name, number in zip(names, numbers, strict=True)}
-    return values | plant.parameters

@@ -14,11 +14,13 @@ from llvmlite import ir
 from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
+from numpy.typing import NDArray
 
 from controller.compiled import compiled
 from plant_fmu.running.native import Native
 
 _WARNING = 1  # the highest status that is no failure
+_ENDED = 1  # place among the results of fmi3DoStep of terminateSimulation
 
 _I32, _I64, _F64 = ir.IntType(32), ir.IntType(64), ir.DoubleType()
 
@@ -39,7 +41,11 @@ def _transfer_code(_context: Any, _address: Any, _instance: Any, _references: An
 
 
 def _do_step_code(_context: Any, _address: Any, _instance: Any, _now: Any, _step: Any, _results: Any) -> Any:
-    """Call fmi3DoStep: (instance, now, step, no state before it is restored, four results by pointer)."""
+    """Call fmi3DoStep: (instance, now, step, no state before it is restored, four results by pointer).
+
+    The Boolean goes as a whole int, which every calling convention reads a C bool out of; the results, three of them
+    Booleans of one byte, go to places of eight bytes each.
+    """
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         address, instance, now, step, results = arguments
@@ -54,7 +60,8 @@ def _read_clock_code(_context: Any, _address: Any, _which: Any, _place: Any) -> 
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         address, which, place = arguments
-        status = cgutils.alloca_once(builder, _I32)
+        allocate: Any = cgutils.alloca_once
+        status = allocate(builder, _I32)
         negative = builder.icmp_signed("<", which, ir.Constant(_I64, 0))
         with builder.if_else(negative) as (windows, posix):
             with windows:
@@ -77,7 +84,8 @@ def send(native: Native) -> bool:
     """Send the inputs, and return whether the FMU took them."""
     n = native.inputs.size
     references, values = native.input_references.ctypes.data, native.inputs.ctypes.data
-    return _transfer(native.set_values, native.instance, references, n, values) <= _WARNING
+    status: int = _transfer(native.set_values, native.instance, references, n, values)
+    return status <= _WARNING
 
 
 @compiled
@@ -85,13 +93,15 @@ def read(native: Native) -> bool:
     """Read the outputs, and return whether the FMU gave them."""
     n = native.outputs.size
     references, values = native.output_references.ctypes.data, native.outputs.ctypes.data
-    return _transfer(native.get_values, native.instance, references, n, values) <= _WARNING
+    status: int = _transfer(native.get_values, native.instance, references, n, values)
+    return status <= _WARNING
 
 
 @compiled
 def advance(native: Native, now: float, step: float) -> bool:
-    """Step from `now` [s] by `step` [s], and return whether the FMU did."""
-    return _do_step(native.do_step, native.instance, now, step, native.results.ctypes.data) <= _WARNING
+    """Step from `now` [s] by `step` [s], and return whether the FMU did, and does not ask to end the simulation."""
+    status: int = _do_step(native.do_step, native.instance, now, step, native.results.ctypes.data)
+    return status <= _WARNING and native.results[_ENDED] == 0
 
 
 class Clock:
@@ -117,9 +127,10 @@ class Clock:
 
 
 @compiled
-def seconds(clock: Any, room: Any) -> float:
-    """Return the time [s] of a `Clock`'s numbers; `room`, shape (2,), of int64, is what the C function fills."""
+def seconds(clock: NDArray[np.int64], room: NDArray[np.int64]) -> float:
+    """Return the time [s] of a `Clock`'s numbers; `room`, shape (2,), is what the C function fills."""
     _read_clock(clock[0], clock[1], room.ctypes.data)
+    whole, rest = float(room[0]), float(room[1])
     if clock[1] < 0:
-        return float(room[0]) / clock[2]
-    return float(room[0]) + 1e-9 * room[1]
+        return whole / float(clock[2])
+    return whole + 1e-9 * rest

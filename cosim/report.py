@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import html
-import io
 import math
 import shutil
 import tempfile
@@ -20,8 +19,6 @@ from cosim.scenario import Scenario
 
 REPORT = "report.html"
 FIGURES = "figures"
-
-_DPI = 160
 
 # of the entries of the summary
 _UNITS = {
@@ -218,9 +215,6 @@ def _text(value: Any) -> str:
 
 def _figure(folder: Path, drawing: Drawing) -> str:
     """Write a figure as SVG and PNG, and return it as a piece of HTML."""
-    svg = io.StringIO()
-    drawing.figure.savefig(svg, format="svg", metadata={"Date": None})
-    (folder / f"{drawing.name}.svg").write_text(svg.getvalue(), encoding="utf-8")
-    drawing.figure.savefig(folder / f"{drawing.name}.png", dpi=_DPI)
-    inline = svg.getvalue()[svg.getvalue().index("<svg") :]
+    svg = drawing.write(folder)
+    inline = svg[svg.index("<svg") :]
     return f"<figure>{inline}<figcaption>{html.escape(drawing.caption)}</figcaption></figure>"

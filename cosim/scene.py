@@ -5,7 +5,7 @@ One JSON object a line. What the law is told of a scene is `Told`; `plant_values
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
@@ -14,10 +14,12 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from controller import ControllerError
 from controller.regions import DepthBand, PackedRegions, Region, Sphere, pack
+from controller.regions.shape import GREATEST
 from cosim.errors import ScenarioError
 from cosim.scenario import CRITERIA
+from plant_fmu import PlantFmuError
+from plant_fmu.tables import decode
 from plant_fmu.vehicle import Vehicle
 
 Vector3 = tuple[float, float, float]
@@ -123,8 +125,21 @@ def plant_values(scene: Scene, vehicle: Vehicle, substep: float) -> dict[str, fl
     -------
     dict of str to float
         Parameters and start values of the FMU.
+
+    Raises
+    ------
+    ScenarioError
+        If there would be no buoyancy, or the vehicle has no such thruster.
     """
     buoyancy = vehicle.weight - scene.weight_minus_buoyancy
+    if not buoyancy > 0.0:
+        raise ScenarioError(
+            f"weight_minus_buoyancy is {scene.weight_minus_buoyancy}, expected less than the weight of the vehicle "
+            f"{vehicle.name}, {vehicle.weight:g} N"
+        )
+    failure, n = scene.failed_thruster, vehicle.n_thrusters
+    if failure and failure.index > n:
+        raise ScenarioError(f"failed_thruster.index is {failure.index}, expected one of the {n} of {vehicle.name}")
     values = {
         "substep": substep,
         "buoyancy": buoyancy,
@@ -133,6 +148,64 @@ def plant_values(scene: Scene, vehicle: Vehicle, substep: float) -> dict[str, fl
     values |= {f"thrust_time_constant[{i + 1}]": 0.0 for i in range(vehicle.n_thrusters)}
     values |= {f"current.{axis}": v for axis, v in zip("xyz", scene.current, strict=True)}
     return values | {f"position.{axis}": v for axis, v in zip("xyz", scene.start, strict=True)}
+
+
+def decode_scene(line: bytes) -> Scene:
+    """Return the scene of a line.
+
+    Parameters
+    ----------
+    line : bytes
+        One JSON object.
+
+    Returns
+    -------
+    Scene
+        Whose numbers are finite and can be.
+
+    Raises
+    ------
+    ScenarioError
+        If it is no scene; it names the key.
+    """
+    try:
+        table = msgspec.json.decode(line)
+        if not isinstance(table, dict):
+            raise ScenarioError(f"expected one JSON object, got {type(table).__name__!r}")
+        scene = decode(table, Scene)
+    except (msgspec.MsgspecError, PlantFmuError, RecursionError, UnicodeDecodeError) as error:
+        raise ScenarioError(str(error).removeprefix("file: ")) from error
+    _check(scene)
+    return scene
+
+
+def _check(scene: Scene) -> None:
+    """Raise an error at the first number that cannot be, whatever the vehicle."""
+    failure, noise, (shallow, deep) = scene.failed_thruster, scene.noise, scene.depth_band
+    _require(0 <= scene.seed < 2**63, "seed", scene.seed, "a whole number from 0 to 2^63 - 1")
+    for key in ("start", "current", "depth_band"):
+        _require_moderate(key, getattr(scene, key))
+    _require(shallow < deep, "depth_band", scene.depth_band, "two depths, the shallow one first")
+    balls: dict[str, Ball | Obstacle] = {"goal": scene.goal}
+    for key, ball in (balls | {f"obstacles.{i}": o for i, o in enumerate(scene.obstacles)}).items():
+        _require_moderate(f"{key}.centre", ball.centre)
+        _require(0.0 < ball.radius <= GREATEST, f"{key}.radius", ball.radius, "above 0 m")
+    for i, obstacle in enumerate(scene.obstacles):
+        _require_moderate(f"obstacles.{i}.velocity", obstacle.velocity)
+    for key in ("position", "velocity"):
+        _require(0.0 <= getattr(noise, key) <= GREATEST, f"noise.{key}", getattr(noise, key), "0 or above")
+    if failure:
+        _require(failure.index >= 1, "failed_thruster.index", failure.index, "a number from 1")
+        _require(failure.time >= 0.0, "failed_thruster.time", failure.time, "0 s or above")
+
+
+def _require(good: bool, key: str, came: object, expected: str) -> None:
+    if not good:
+        raise ScenarioError(f"{key} is {came}, expected {expected}")
+
+
+def _require_moderate(key: str, values: tuple[float, ...]) -> None:
+    _require(all(abs(x) <= GREATEST for x in values), key, values, f"numbers up to {GREATEST:g}")
 
 
 def read_scenes(path: Path) -> Iterator[Scene]:
@@ -153,16 +226,36 @@ def read_scenes(path: Path) -> Iterator[Scene]:
     ScenarioError
         If the file cannot be read, or a line is no scene; it names the line and the key.
     """
-    decoder = msgspec.json.Decoder(Scene)
     try:
         with path.open("rb") as lines:
-            for number, line in enumerate(lines, 1):
-                if line.strip():
-                    try:
-                        scene = decoder.decode(line)
-                        told(scene)
-                    except (msgspec.MsgspecError, ControllerError) as error:
-                        raise ScenarioError(f"{path}, line {number}: {error}") from error
-                    yield scene
+            yield from scenes_in(lines, str(path))
     except OSError as error:
         raise ScenarioError(f"{path}: {error.strerror or error}") from error
+
+
+def scenes_in(lines: Iterable[bytes], name: str) -> Iterator[Scene]:
+    """Read scenes from lines.
+
+    Parameters
+    ----------
+    lines : iterable of bytes
+        One JSON object each; blank ones are passed over.
+    name : str
+        Of where they come from, for messages.
+
+    Yields
+    ------
+    Scene
+        In their order.
+
+    Raises
+    ------
+    ScenarioError
+        At a line that is no scene; it names the line and the key.
+    """
+    for number, line in enumerate(lines, 1):
+        if line.strip():
+            try:
+                yield decode_scene(line)
+            except ScenarioError as error:
+                raise ScenarioError(f"{name}, line {number}: {error}") from error

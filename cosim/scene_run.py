@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from types import TracebackType
 from typing import Any
@@ -19,6 +20,7 @@ from plant_fmu import Plant
 from plant_fmu.vehicle import load_vehicle
 
 LEVEL = (1.0, 0.0, 0.0, 0.0)
+_ROUNDING = 1e-9  # of a count of steps
 
 
 @dataclass(frozen=True)
@@ -31,6 +33,23 @@ class Conditions:
     settled: float = 10.0  # s at the end inside the goal region
     ramp: float = 0.2  # m, width of the arbiter's memberships
     tell_failures: bool = False
+
+    def __post_init__(self) -> None:
+        for key in ("duration", "control"):
+            if not 0.0 < getattr(self, key) < math.inf:
+                raise RunError(f"{key} is {getattr(self, key)} s, expected a finite number above 0")
+        if self.plant_steps < 1 or self.controls < 1:
+            raise RunError(f"{self.controls} control steps of {self.plant_steps} plant steps, expected 1 or more")
+
+    @property
+    def controls(self) -> int:
+        """How many control steps a flight has."""
+        return round(self.duration / self.control)
+
+    @property
+    def plant_step(self) -> float:
+        """Length of a plant step [s]."""
+        return self.control / self.plant_steps
 
 
 class SceneFlyer:
@@ -49,6 +68,8 @@ class SceneFlyer:
     ------
     RunError
         If there is no such law.
+    LawError
+        If it cannot work with the gains.
     BuildError, PlantError
         If there is no FMU of the vehicle.
     """
@@ -61,6 +82,7 @@ class SceneFlyer:
         self.gains = LAWS[law].gains_type() if gains is None else gains
         self._vehicle = load_vehicle("odin")
         self._model = vehicle_model(self._vehicle)
+        self._law(0)  # says now what it cannot work with
         self._clock = Clock()
         self._flight = flight_of(law)
         self._plant = Plant(self._vehicle)
@@ -79,12 +101,17 @@ class SceneFlyer:
         -------
         Score, ndarray
             What it came to, and the trace, shape (0, 0) if none is kept.
+
+        Raises
+        ------
+        ScenarioError, PlantError
+            If the plant cannot be as the scene has it. The flyer can go on with another scene.
         """
         c, m = self.conditions, self._vehicle.n_thrusters
         plant, known = self._plant, told(scene)
-        law = self._law(known)
+        law = self._law(known.regions.kinds.size)
         plant.reset()
-        plant.set(plant_values(scene, self._vehicle, c.control / c.plant_steps))
+        plant.set(plant_values(scene, self._vehicle, c.plant_step))
         plant.initialise()
         thrusts = [f"thrust[{i + 1}]" for i in range(m)]
         forces = [f"thruster_force[{i + 1}]" for i in range(m)]
@@ -95,15 +122,12 @@ class SceneFlyer:
         score = self._flight(setup, native, effectiveness, self._allocator(), law.gains, law.memory, rows)
         return score, rows
 
-    def _law(self, known: Told) -> Any:
-        return LAWS[self.law].for_vehicle(
-            self._model, self.gains, np.array(LEVEL), self.conditions.control, known.regions.kinds.size
-        )
+    def _law(self, n_regions: int) -> Any:
+        return LAWS[self.law].for_vehicle(self._model, self.gains, np.array(LEVEL), self.conditions.control, n_regions)
 
     def _setup(self, scene: Scene, known: Told) -> Setup:
         c, failure = self.conditions, scene.failed_thruster
-        controls = round(c.duration / c.control)
-        noise = np.random.default_rng([scene.seed, 1]).standard_normal((controls, 6))
+        noise = np.random.default_rng([scene.seed, 1]).standard_normal((c.controls, 6))
         noise[:, :3] *= scene.noise.position
         noise[:, 3:] *= scene.noise.velocity
         return Setup(
@@ -111,13 +135,13 @@ class SceneFlyer:
             regions=known.regions,
             criteria=known.criteria,
             ramp=c.ramp,
-            controls=controls,
+            controls=c.controls,
             plant_steps=c.plant_steps,
-            plant_step=c.control / c.plant_steps,
-            settled=c.settled,
+            plant_step=c.plant_step,
+            settled_steps=math.ceil(c.settled / c.plant_step - _ROUNDING),
             noise=noise,
             failed=failure.index - 1 if failure else -1,
-            failure_control=int(np.ceil(failure.time / c.control)) if failure else -1,
+            failure_control=math.ceil(min(failure.time, c.duration) / c.control) if failure else -1,
             tell=c.tell_failures,
             clock=self._clock.numbers,
         )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import difflib
+import functools
 import math
 import tomllib
 import types
@@ -119,8 +120,13 @@ def dataclass_of(annotation: Any) -> type | None:
     return None
 
 
+@functools.cache
+def _hints(kind: Any) -> dict[str, Any]:
+    return typing.get_type_hints(kind)
+
+
 def _refuse_unknown(table: dict[str, Any], kind: Any, where: str) -> None:
-    hints = typing.get_type_hints(kind)
+    hints: dict[str, Any] = _hints(kind)
     names = [f.name for f in dataclasses.fields(kind)]
     for key, value in table.items():
         at = f"{where}.{key}" if where else key
@@ -156,7 +162,7 @@ def _mistyped(text: str, at: str, table: Any, kind: Any, where: str) -> TableErr
             value = value[int(part)]
         else:
             value = value[part]
-            annotation = typing.get_type_hints(annotation)[part] if dataclasses.is_dataclass(annotation) else None
+            annotation = _hints(typing.cast(Any, annotation))[part] if dataclasses.is_dataclass(annotation) else None
             annotation = dataclass_of(annotation) or annotation
         path.append(part)
 

@@ -219,7 +219,8 @@ def clearance_of_place(regions: PackedRegions, i: int, position: Array, room: Ar
     for axis in range(3):
         room[axis] = position[axis] - regions.shifts[i, axis]
     numbers = regions.numbers[regions.offsets[i] : regions.offsets[i + 1]]
-    return -regions.signs[i] * _evaluate_shape(regions.kinds[i], room, numbers)[4]
+    clearance: float = -regions.signs[i] * _evaluate_shape(regions.kinds[i], room, numbers)[4]
+    return clearance
 
 
 @compiled
@@ -240,7 +241,17 @@ def clearance_of_sphere(regions: PackedRegions, i: int, position: Array) -> floa
     x = position[0] - regions.shifts[i, 0] - regions.numbers[first]
     y = position[1] - regions.shifts[i, 1] - regions.numbers[first + 1]
     z = position[2] - regions.shifts[i, 2] - regions.numbers[first + 2]
-    return -regions.signs[i] * (math.sqrt(x * x + y * y + z * z) - regions.numbers[first + 3])
+    clearance: float = -regions.signs[i] * (math.sqrt(x * x + y * y + z * z) - regions.numbers[first + 3])
+    return clearance
+
+
+@compiled
+def attitude_clearance(regions: PackedRegions, i: int, position: Array, quaternion: Array) -> tuple[float, Array]:
+    """Return the clearance [rad] of region `i`, of attitude, at a pose, and its slope over a turn in body axes."""
+    numbers = regions.numbers[regions.offsets[i] : regions.offsets[i + 1]]
+    at, sign = position - regions.shifts[i], regions.signs[i]
+    g, _, _, _, x, y, z = _evaluate_shape_of_attitude(regions.kinds[i], at, quaternion, numbers)
+    return -sign * g, np.array([-sign * x, -sign * y, -sign * z])
 
 
 def clearances_at(points: Array, region: Region) -> Array:

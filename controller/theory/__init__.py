@@ -1,5 +1,6 @@
 """The stability analysis of the printed law, (30)-(45), as functions that can be asked where it holds."""
 
+from controller.theory.bounds import decay_bound, norm_bound, square_bound
 from controller.theory.conditions import (
     Fit,
     damping_fit,
@@ -11,6 +12,7 @@ from controller.theory.conditions import (
     sphere_radii,
 )
 from controller.theory.lyapunov import (
+    bracket,
     lower_bound,
     mapped_error,
     mapped_error_rate,
@@ -25,21 +27,25 @@ from controller.theory.model import Model, coriolis, damping
 __all__ = [
     "Fit",
     "Model",
+    "bracket",
     "coriolis",
     "damping",
     "damping_fit",
+    "decay_bound",
     "error_jacobian_bound",
     "gain_fits",
     "greatest_gradient",
     "lower_bound",
     "mapped_error",
     "mapped_error_rate",
+    "norm_bound",
     "normalised_secondary",
     "potential_fits",
     "primary_value",
     "printed_secondary",
     "secondary_fit",
     "sphere_radii",
+    "square_bound",
     "unit_gradient_secondary",
     "value_rate",
 ]

@@ -27,7 +27,7 @@ class Native(NamedTuple):
     inputs: NDArray[np.float64]  # (n,) sent by set_values
     output_references: NDArray[np.uint32]  # (m,)
     outputs: NDArray[np.float64]  # (m,) filled by get_values
-    results: NDArray[np.float64]  # (4,) room for what fmi3DoStep returns by pointer
+    results: NDArray[np.int64]  # (4,) room for what fmi3DoStep returns by pointer, each at the first byte of its place
 
 
 def native_of(instance: Instance, inputs: tuple[str, ...], outputs: tuple[str, ...]) -> Native:
@@ -66,7 +66,7 @@ def native_of(instance: Instance, inputs: tuple[str, ...], outputs: tuple[str, .
         inputs=np.zeros(len(inputs)),
         output_references=_references(instance, outputs),
         outputs=np.zeros(len(outputs)),
-        results=np.zeros(4),
+        results=np.zeros(4, np.int64),
     )
 
 

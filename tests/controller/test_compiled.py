@@ -23,6 +23,17 @@ def test_the_stamp_is_of_the_package_and_of_the_callers_folder(tmp_path):
     assert len({before, elsewhere, module._sources(tmp_path)}) == 3
 
 
+def test_the_stamp_is_of_whatever_else_is_named_too(tmp_path):
+    (tmp_path / "deep").mkdir()
+    (tmp_path / "deep" / "other.py").write_text("a = 1")
+    before, without = module._sources(tmp_path / "none", tmp_path), module._sources(tmp_path / "none")
+    module._sources.cache_clear()
+    (tmp_path / "deep" / "other.py").write_text("a = 2")
+    assert len({before, without, module._sources(tmp_path / "none", tmp_path)}) == 3
+    function = compiled(lambda x: x + 3.0, tmp_path)
+    assert function._cache._cache_file._source_stamp == module._sources(Path(__file__).parent, tmp_path)
+
+
 def test_without_numbas_insides_nothing_is_cached(monkeypatch):
     real = module.numba.njit
     made = []

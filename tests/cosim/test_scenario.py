@@ -25,7 +25,10 @@ def saved(tmp_path, text, name="mine.toml"):
 
 
 def test_shipped_scenarios_load():
-    assert shipped_scenarios() == ["paper", "paper-calibrated", "paper-limited"]
+    assert shipped_scenarios() == [
+        "dense-field", "depth-transit", "docking", "moving-obstacle", "paper", "paper-calibrated", "paper-deployable",
+        "paper-limited", "pipe-inspection",
+    ]  # fmt: skip
     for name in shipped_scenarios():
         assert load_scenario(name).title
 
@@ -41,7 +44,7 @@ def test_minimal_file_gets_defaults(tmp_path):
 
 @pytest.mark.parametrize("name", shipped_scenarios())
 def test_written_scenario_reads_back_the_same(tmp_path, name):
-    first = load_scenario(name, ["time.control=0.002"])
+    first = load_scenario(name, ["time.control=0.04"])
     again = load_scenario(saved(tmp_path, first.toml(), f"{name}.toml"))
     assert again.toml() == first.toml()
     for f in dataclasses.fields(first):
@@ -122,6 +125,20 @@ def test_overrides_reach_every_depth(tmp_path):
         ("law.gains.k_p1=0", ["law.gains.k_p1", "0"]),
         ("law.gains.gamma=nan", ["law.gains.gamma", "nan"]),
         ("law.name=best", ["law.name", "'printed'", "'best'"]),
+        ("law.name=deployable", ["actuation.through", "'thrusters'", "'deployable'"]),
+        ("law.desired_quaternion=[1,1,0,0]", ["law.desired_quaternion", "length 1"]),
+        ("goal.velocity=[0.1,0,nan]", ["goal.velocity", "finite"]),
+        ("goal.velocity=0.1", ["goal.velocity", "list"]),
+        ('goal={type="orientation",quaternion=[1,0,0,0],tolerance=0.1}', ["goal.type", "'orientation'", "in space"]),
+        ("regions.SR1.velocity=[0,0,inf]", ["regions.SR1.velocity", "finite"]),
+        ('regions.SR1.shape={type="visibility",feature=[0,0,0],camera_axis=[1,0,0]}', ["SR1.shape", "half_angle"]),
+        ("failures=[{thruster=3,time=1.0}]", ["failures", "actuation.through = 'wrench'"]),
+        ("sensing.position_noise=-1", ["sensing.position_noise", "0 or above"]),
+        ("sensing.velocity_noise=nan", ["sensing.velocity_noise", "nan"]),
+        ("sensing.dead_for=inf", ["sensing.dead_for", "inf"]),
+        ("sensing.dead_from=-1", ["sensing.dead_from", "0 s"]),
+        ("sensing.seed=-1", ["sensing.seed", "-1"]),
+        ("sensing.noise=1", ["sensing.noise", "unknown key"]),
         ("arbiter.engine=fast", ["arbiter.engine", "'closed'", "'skfuzzy'", "'fast'"]),
         ("arbiter.ramp=-1", ["arbiter.ramp", "-1"]),
         ("arbiter.points=2", ["arbiter.points", "3"]),
@@ -180,6 +197,58 @@ def test_faults_are_named_in_one_line(override, words):
     assert "\n" not in said
     for word in words:
         assert word in said
+
+
+@pytest.mark.parametrize(
+    ("override", "words"),
+    [
+        ("failures.0.thruster=9", "failures.0.thruster is 9, expected 1 to 8"),
+        ("failures.0.thruster=0", "failures.0.thruster is 0, expected 1 to 8"),
+        ("failures.0.time=-1.0", "failures.0.time is -1.0, expected 0 s or above"),
+        ("failures.0.when=3", r"failures.0.when: unknown key"),
+        ("law.gains.k_p1=3", r"law.gains.k_p1: unknown key"),
+        ("law.gains.speed=0", "law.gains.speed is 0.0, expected a finite number above 0"),
+        ("actuation.through=wrench", "'wrench', expected 'thrusters'"),
+    ],
+)
+def test_faults_about_thrusters_and_their_law_are_named(override, words):
+    with pytest.raises(ScenarioError, match=words):
+        load_scenario("dense-field", [override])
+
+
+def test_gains_go_with_the_name_of_their_law(tmp_path):
+    """A base's gains are those of the base's law: naming another one drops them, naming the same one keeps them."""
+    through = "actuation.through=thrusters"
+    other = load_scenario("paper", ["law.gains.k_p1=3", "law.name=deployable", through, "law.gains.speed=0.5"])
+    assert (type(other.law.gains).__name__, other.law.gains.speed) == ("DeployableGains", 0.5)
+    assert load_scenario("paper", ["law.gains.k_p1=3", "law.name=printed"]).law.gains.k_p1 == 3.0
+    assert load_scenario(saved(tmp_path, 'base = "paper"\nlaw = { name = "printed" }\n')).law.gains.k_v1 == 90.0
+    text = 'base = "paper"\nlaw = { name = "deployable" }\nactuation = { through = "thrusters" }\n'
+    assert load_scenario(saved(tmp_path, text)).law.gains == type(other.law.gains)()
+
+
+def test_what_moves_is_named():
+    scenario = load_scenario("paper", ["goal.velocity=[0.1,0,0]", "regions.SR2.streamed=true"])
+    assert scenario.moving == ("goal", "SR2")
+    assert scenario.goal_region.velocity == (0.1, 0.0, 0.0)
+    assert scenario.goal == Sphere((8.0, 0.0, 5.0), 0.5)
+    assert load_scenario("paper").moving == ()
+
+
+@pytest.mark.parametrize(
+    ("keys", "exact"),
+    [
+        ([], True),
+        (["sensing.seed=3"], True),
+        (["sensing.dead_for=1.0"], True),
+        (["sensing.dead_from=1.0"], True),
+        (["sensing.dead_from=1.0", "sensing.dead_for=1.0"], False),
+        (["sensing.position_noise=0.1"], False),
+        (["sensing.velocity_noise=0.1"], False),
+    ],
+)
+def test_sensing_is_exact_unless_something_is_wrong_with_it(keys, exact):
+    assert load_scenario("paper", keys).sensing.exact == exact
 
 
 def test_a_limit_of_the_wrench_says_nothing_of_thrusters():

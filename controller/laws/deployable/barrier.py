@@ -1,17 +1,19 @@
 """Barriers: what the thrusters must do so that no hard region is violated.
 
-Clearance less a margin is h, of relative degree two. Far away its rate may be what braking can still stop,
+The clearance less a margin is h, of relative degree two. Its rate may be what braking can still stop,
 
     dh/dt >= -phi(h),   phi(h) = sqrt(2 a h + (a / kappa)^2) - a / kappa   (h >= 0),   kappa h   (h < 0),
 
-with a the deceleration that may be relied on. psi = dh/dt + phi(h) >= 0 is kept by dpsi/dt >= -rate psi, which is linear
-in the thruster forces u:
+with a the deceleration that may be relied on. psi = dh/dt + phi(h) >= 0 is kept by dpsi/dt >= -rate psi, which is
+linear in the thruster forces u:
 
     n^T A u >= -rate (dh/dt + phi) - phi' dh/dt - n^T a_free - (dn/dt)^T v,
 
-with n the slope of the clearance, A u what the thrusters add to the acceleration and a_free what there is without them.
-Along psi = 0 it asks for a (1 - (a / kappa) / sqrt(2 a h + (a / kappa)^2)) < a: never for more than there is. A region's own
-velocity enters through dh/dt.
+with n the slope of h over the pose, v the velocity against the region, A u what the thrusters add to the acceleration
+and a_free what there is without them. Along psi = 0 this asks for a (1 - (a / kappa) / sqrt(2 a h + (a / kappa)^2)),
+which is less than a: never for more than there is. A region's own motion enters through dh/dt. Clearances of places are
+in m and look at position alone; those of attitude (what the camera sees, which way the vehicle is turned) are in rad
+and look at both. docs/deployable.md says what this promises and what not.
 """
 
 from __future__ import annotations
@@ -25,12 +27,15 @@ from controller.compiled import compiled
 from controller.laws.deployable.attraction import approach_speed
 from controller.laws.deployable.gains import DeployableGains
 from controller.laws.deployable.quadratic_program import Workspace
-from controller.regions import PackedRegions, evaluate_packed
+from controller.quaternion import rate as quaternion_rate
+from controller.regions import Orientation, PackedRegions, evaluate_packed
 
 Array = NDArray[np.float64]
 
+_ATTITUDE = Orientation.kind  # shapes from it on depend on attitude
 _AHEAD = 0.1  # s, over which the turning of a slope is measured
 _FIRM = (3.0, 3.0)  # decades: price of yielding against missing the wanted force, at weight 0, and added at weight 1
+_MARGIN_OF_ATTITUDE = 0.02  # rad
 
 
 class Sight(NamedTuple):
@@ -47,6 +52,18 @@ class Sight(NamedTuple):
     row_of: NDArray[np.int64]  # (n,) row of the program, -1 where it has none
 
 
+class Motion(NamedTuple):
+    """How the vehicle moves and could move; first three of six along world axes, last three about body axes."""
+
+    velocity: Array  # (6,) m/s over ground, rad/s
+    free: Array  # (6,) m/s2, rad/s2: acceleration without thrust
+    push: Array  # (6, m) m/s2, rad/s2: acceleration of one newton of each thruster
+    mass: float  # kg
+    inertia: float  # kg m2, mean
+    braking: float  # m/s2 that may be relied on
+    spread: float  # m, by which the position may be off: of the estimate, and between two steps
+
+
 def sight_of(n: int) -> Sight:
     """Return room for `n` regions."""
     return Sight(
@@ -57,21 +74,29 @@ def sight_of(n: int) -> Sight:
 
 @compiled
 def look(sight: Sight, regions: PackedRegions, position: Array, quaternion: Array, velocity: Array) -> None:
-    """Evaluate the regions at the estimated position [m] and where its velocity [m/s] leads, shape (3,) each."""
+    """Evaluate the regions at a pose, and at the one to which a velocity, shape (6,) as in `Motion`, leads."""
     s = sight
     evaluate_packed(regions, position, quaternion, s.values, s.gradients, s.turnings, s.clearances)
-    later = position + _AHEAD * velocity
-    evaluate_packed(regions, later, quaternion, s.later_values, s.later_gradients, s.later_turnings, s.later_clearances)
+    place = position + _AHEAD * velocity[:3]
+    attitude = quaternion + _AHEAD * quaternion_rate(quaternion, velocity[3:])
+    attitude /= np.sqrt(attitude[0] ** 2 + attitude[1] ** 2 + attitude[2] ** 2 + attitude[3] ** 2)
+    evaluate_packed(regions, place, attitude, s.later_values, s.later_gradients, s.later_turnings, s.later_clearances)
 
 
 @compiled
-def _slope(gradients: Array, i: int, out: Array) -> bool:
-    """Write the slope of the clearance, of length 1; False where the gradient vanishes."""
+def slope_of(gradients: Array, turnings: Array, i: int, of_attitude: bool, out: Array) -> bool:
+    """Write the slope of a clearance over the pose, shape (6,); False where there is none.
+
+    A distance follows the gradient's direction with slope 1, whatever the unit of g; an angle is -g itself.
+    """
     size = np.sqrt(gradients[i, 0] ** 2 + gradients[i, 1] ** 2 + gradients[i, 2] ** 2)
-    if not size > 0.0:
+    turning = np.sqrt(turnings[i, 0] ** 2 + turnings[i, 1] ** 2 + turnings[i, 2] ** 2)
+    if not size + turning > 0.0:
         return False
+    scale = 1.0 if of_attitude else 1.0 / size
     for axis in range(3):
-        out[axis] = -gradients[i, axis] / size
+        out[axis] = -scale * gradients[i, axis]
+        out[3 + axis] = -scale * turnings[i, axis]
     return True
 
 
@@ -81,14 +106,9 @@ def write_rows(
     sight: Sight,
     regions: PackedRegions,
     weights: Array,
-    velocity: Array,
-    free: Array,
-    push: Array,
+    motion: Motion,
     lower: Array,
     upper: Array,
-    mass: float,
-    braking: float,
-    margin: float,
     gains: DeployableGains,
 ) -> int:
     """Write a row for each hard region that the thrusters could violate, and return how many there are.
@@ -103,57 +123,59 @@ def write_rows(
         The n regions.
     weights : ndarray, shape (n,)
         Of the arbiter: a region of greater weight yields later.
-    velocity : ndarray, shape (3,)
-        Over ground [m/s], NED.
-    free : ndarray, shape (3,)
-        Acceleration without thrust [m/s2], NED.
-    push : ndarray, shape (3, m)
-        Acceleration of one newton of each thruster [m/s2], NED.
+    motion : Motion
+        Of the vehicle.
     lower, upper : ndarray, shape (m,)
         Limits [N].
-    mass : float
-        [kg]; puts prices on the scale of forces.
-    braking : float
-        Deceleration that may be relied on [m/s2].
-    margin : float
-        Clearance to be kept [m].
     gains : DeployableGains
-        Slope and rate.
+        Margin, slope and rate.
 
     Returns
     -------
     int
         Rows written.
     """
-    rows, n, later_n = 0, np.empty(3), np.empty(3)
-    m = lower.size
+    rows, n, later_n, relative = 0, np.empty(6), np.empty(6), np.empty(6)
     for i in range(regions.kinds.size):
         sight.row_of[i] = -1
-        if not regions.hard[i] or not _slope(sight.gradients, i, n):
+        of_attitude = regions.kinds[i] >= _ATTITUDE
+        if not regions.hard[i] or not slope_of(sight.gradients, sight.turnings, i, of_attitude, n):
             continue
+        braking, margin = motion.braking, gains.margin + motion.spread
+        if of_attitude:
+            along = np.sqrt(n[0] ** 2 + n[1] ** 2 + n[2] ** 2)  # rad/m
+            braking, margin = gains.turning_deceleration, _MARGIN_OF_ATTITUDE + along * motion.spread
+
+        # h, its rate, and what its second derivative is without thrust
         h = sight.clearances[i] - margin
-        rate, turning, falling = 0.0, 0.0, 0.0
-        turns = _slope(sight.later_gradients, i, later_n)
-        for axis in range(3):
-            relative = velocity[axis] - regions.velocities[i, axis]
-            rate += n[axis] * relative
-            falling += n[axis] * free[axis]
+        rate, falling, turning = 0.0, 0.0, 0.0
+        turns = slope_of(sight.later_gradients, sight.later_turnings, i, of_attitude, later_n)
+        for axis in range(6):
+            relative[axis] = motion.velocity[axis] - (regions.velocities[i, axis] if axis < 3 else 0.0)
+            rate += n[axis] * relative[axis]
+            falling += n[axis] * motion.free[axis]
             if turns:
-                turning += (later_n[axis] - n[axis]) / _AHEAD * relative
+                turning += (later_n[axis] - n[axis]) / _AHEAD * relative[axis]
         allowed = approach_speed(h, braking, gains.barrier_slope)
-        slope = gains.barrier_slope
-        if h > 0.0:
-            slope = braking / (allowed + braking / gains.barrier_slope)
+        slope = gains.barrier_slope if h <= 0.0 else braking / (allowed + braking / gains.barrier_slope)  # phi'
         right = -gains.barrier_rate * (rate + allowed) - slope * rate - falling - turning
+
+        # its row, unless it holds whatever the thrusters do
         least = 0.0
-        for j in range(m):
-            along = n[0] * push[0, j] + n[1] * push[1, j] + n[2] * push[2, j]
+        for j in range(lower.size):
+            along = 0.0
+            for axis in range(6):
+                along += n[axis] * motion.push[axis, j]
             work.rows[rows, j] = along
             least += along * (lower[j] if along > 0.0 else upper[j])
-        if right <= least:  # whatever the thrusters do, it holds
+        if right <= least:
             continue
         work.right[rows] = right
-        work.price[rows] = 10.0 ** (-_FIRM[0] - _FIRM[1] * weights[i]) / mass**2
+        scale = motion.mass**2
+        if of_attitude:
+            turned = n[3] ** 2 + n[4] ** 2 + n[5] ** 2
+            scale = motion.mass**2 * (n[0] ** 2 + n[1] ** 2 + n[2] ** 2) + motion.inertia**2 * turned
+        work.price[rows] = 10.0 ** (-_FIRM[0] - _FIRM[1] * weights[i]) / max(scale, 1e-9)
         sight.row_of[i] = rows
         rows += 1
     return rows

@@ -44,7 +44,7 @@ def least_forces(vehicle: VehicleModel) -> Array:
     negligible = _NEGLIGIBLE * np.abs(np.r_[lower, upper]).max()
     if not forces[-1] > negligible:
         raise LawError(
-            f"{B.shape[1]} thrusters push {max(forces[-1], 0.0):.3g} N in the worst direction without a moment, "
+            f"{B.shape[1]} thrusters push {abs(forces[-1]):.3g} N in the worst direction without a moment, "
             "expected more than 0: the law needs forces in every direction to keep out of regions"
         )
     return np.where(forces > negligible, forces, forces[-1])

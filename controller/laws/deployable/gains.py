@@ -18,6 +18,11 @@ class DeployableGains(NamedTuple):
     position_bandwidth: float = 0.8  # 1/s, of the approach to the end of the way
     depth: float = 0.3  # m, how far inside the goal region the way ends, where the region is that deep
     attitude_bandwidth: float = 2.0  # rad/s
+    # attitude asked for by regions
+    comfort: float = 0.15  # rad, clearance that a region of attitude has where the held attitude heeds it
+    tilt: float = 0.35  # rad, greatest from the vertical that a region may ask for
+    turning_rate: float = 0.6  # rad/s, greatest of the held attitude
+    turning_deceleration: float = 0.5  # rad/s2, relied on by barriers of attitude
     # barriers
     margin: float = 0.03  # m, kept of hard regions beside what the estimate's error asks for
     braking_share: float = 0.8  # of the deceleration that is left with any one thruster lost, relied on for stopping
@@ -57,7 +62,17 @@ def check_gains(gains: DeployableGains) -> DeployableGains:
     LawError
         If one is negative or not finite, or one that divides is zero.
     """
-    may_be_zero = ("margin", "depth", "coast", "failure_threshold", "restoring_drift", "current_drift", "adaptation")
+    may_be_zero = (
+        "margin",
+        "comfort",
+        "tilt",
+        "depth",
+        "coast",
+        "failure_threshold",
+        "restoring_drift",
+        "current_drift",
+        "adaptation",
+    )
     for name, value in gains._asdict().items():
         least = "0 or above" if name in may_be_zero else "above 0"
         if not (math.isfinite(value) and (value >= 0.0 if name in may_be_zero else value > 0.0)):

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from controller.compiled import compiled
 from controller.laws.deployable.gains import DeployableGains
 from controller.laws.deployable.linear_algebra import norm
+from controller.laws.deployable.search import Tree, grow, tree_of_nothing
 from controller.regions import (
     Orientation,
     PackedRegions,
@@ -30,14 +31,15 @@ from controller.regions import (
 
 Array = NDArray[np.float64]
 
-CORNERS = 4  # at most
+CORNERS = 8  # at most
 _SAMPLES = 64  # evaluations of the regions a way at most
 _STRIDE = (0.08, 0.6)  # m, least and greatest distance between two
 _TRUST = 0.7  # of the clearance beyond the wanted one, that is gone before looking again
-_INSIDE = 40.0  # m of way that a metre within a hard region costs
+_INSIDE = 200.0  # m of way that a metre within a hard region costs
 _NEAR = 3.0  # m of way that a metre on the surface costs
 _BETTER = 0.03  # m, and
 _BETTER_PART = 0.01  # of its cost, that a new way must save to be taken
+_BLOCKED = 1.3  # of its length, cost of a way from which on the tree looks for another
 _PASSED = 0.25  # m from a corner, within which it counts as passed
 _SPHERE = Sphere.kind
 _ATTITUDE = Orientation.kind  # shapes from it on close no place
@@ -52,9 +54,11 @@ class Guide(NamedTuple):
 
     way: Array  # (CORNERS + 1, 3) m, NED: corners, then the end; the end moves with the goal
     other: Array  # (CORNERS + 1, 3)
-    points: NDArray[np.int64]  # (2,) how many way and other have and other, the end included; 0: none yet
+    points: NDArray[np.int64]  # (2,) how many way and other have, the end included; 0: none yet
     cost: Array  # (1,) of the way
     far_until: Array  # (n,) room for `cost_of`
+    tree: Tree
+    draws: Array  # (5,) room for random numbers
     tried: NDArray[np.int64]  # (1,) whose turn it is: 0 of the way itself, 1 of a changed one
     random: NDArray[np.uint64]  # (1,) state of the generator
 
@@ -64,13 +68,15 @@ def guide_of_nothing(n_regions: int, seed: int) -> Guide:
     n = CORNERS + 1
     state = np.array([seed * 2 + 0x9E3779B97F4A7C15], dtype=np.uint64)
     return Guide(
-        np.zeros((n, 3)),
-        np.zeros((n, 3)),
-        np.zeros(2, dtype=np.int64),
-        np.zeros(1),
-        np.zeros(n_regions),
-        np.zeros(1, dtype=np.int64),
-        state,
+        way=np.zeros((n, 3)),
+        other=np.zeros((n, 3)),
+        points=np.zeros(2, dtype=np.int64),
+        cost=np.zeros(1),
+        far_until=np.zeros(n_regions),
+        tree=tree_of_nothing(),
+        draws=np.zeros(5),
+        tried=np.zeros(1, dtype=np.int64),
+        random=state,
     )
 
 
@@ -215,12 +221,28 @@ def improve(
         guide.cost[0] = cost_of(way, guide.points[0], start, regions, guide.far_until, gains)
         return
     guide.tried[0] = 0
-    _change(guide, start, goal, gains)
+    draws = guide.draws
+    for i in range(draws.size):
+        draws[i] = uniform(guide.random)
+    if guide.cost[0] > _BLOCKED * _length(way, guide.points[0], start) and draws[4] < 0.7:
+        guide.points[1] = grow(guide.tree, start, way[guide.points[0] - 1], draws, regions, gains, other)
+        if guide.points[1] == 0:
+            return
+    else:
+        _change(guide, start, goal, gains)
     cost = cost_of(other, guide.points[1], start, regions, guide.far_until, gains)
     if cost < guide.cost[0] - _BETTER - _BETTER_PART * guide.cost[0]:
         way[:, :] = other
         guide.points[0] = guide.points[1]
         guide.cost[0] = cost
+
+
+@compiled
+def _length(way: Array, count: int, start: Array) -> float:
+    length = _distance(way[0], start)
+    for i in range(1, count):
+        length += _distance(way[i], way[i - 1])
+    return float(length)
 
 
 @compiled

@@ -24,7 +24,7 @@ from controller.laws.deployable import attitude as attitude_loop
 from controller.laws.deployable import failure, guide, model, observer, quadratic_program
 from controller.laws.deployable.attitude import Attitude, attitude_of
 from controller.laws.deployable.attraction import wanted_acceleration, wanted_velocity
-from controller.laws.deployable.barrier import Sight, look, sight_of, write_rows
+from controller.laws.deployable.barrier import Motion, Sight, look, sight_of, write_rows
 from controller.laws.deployable.braking import least_forces
 from controller.laws.deployable.failure import Suspicion, suspicion_of
 from controller.laws.deployable.gains import DeployableGains, check_gains
@@ -33,11 +33,12 @@ from controller.laws.deployable.model import Dynamics, Thrusters, dynamics_of, t
 from controller.laws.deployable.observer import Estimate, estimate_of_nothing
 from controller.laws.deployable.quadratic_program import Workspace, workspace
 from controller.quaternion import rotation_matrix
-from controller.regions import PackedRegions
+from controller.regions import Orientation, PackedRegions
 
 _SPREADS = 3.0  # standard deviations of the position that the margin adds
 _STALE = 0.15  # s without a valid measurement, after which the vehicle is brought to a stop
 _SEED = 1
+_ATTITUDE = Orientation.kind  # shapes from it on depend on attitude
 
 DIAGNOSTICS = (
     Diagnostic("position.x", "m", "Estimated position, north"),
@@ -75,6 +76,8 @@ class DeployableMemory(NamedTuple):
     program: Workspace
     quaternion: Array  # (4,) last valid
     omega: Array  # (3,) last valid [rad/s]
+    blindness: Array  # (1,) s since attitude and rates were last valid
+    told: Array  # (m,) health of the thrusters as last told
 
 
 @compiled
@@ -94,23 +97,18 @@ def step(
     _keep_attitude(memory, state)
     R = rotation_matrix(memory.quaternion)
     measured = _observe(memory, state, R, gains)
-    if seen.silence[0] < 0.0 or seen.silence[0] > gains.coast:  # nothing known: drift
+    lost = seen.silence[0] < 0.0 or seen.silence[0] > gains.coast or memory.blindness[0] > gains.coast
+    if lost:  # nothing is known any more: drift
         forces[:] = 0.0
         thrusters.forces[:] = 0.0
         memory.report[15] = seen.silence[0]
         return
 
     # failed thrusters
-    failed = -1
-    for j in range(thrusters.health.size):
-        if state.thruster_health[j] == 0.0 and thrusters.health[j] != 0.0:
-            failed = j
-    told = failed >= 0
-    if not told:
-        residual = memory.attitude.residual
-        failed = failure.suspect(memory.suspicion, seen, residual, dynamics, thrusters, R, gains, period, measured)
-    if failed >= 0:
-        failure.give_up(memory.suspicion, thrusters, failed, told)
+    failed = failure.suspect(
+        memory.suspicion, seen, memory.attitude.residual, dynamics, thrusters, R, gains, period, measured
+    )
+    if _heed(memory, state.thruster_health, failed):
         model.share_out(thrusters)
         observer.doubt(seen, 0.01)
 
@@ -122,12 +120,16 @@ def step(
     wanted_acceleration(wanted, seen.velocity, gains, acceleration)
 
     # wanted wrench
-    free, wrench = np.empty(3), np.empty(6)
+    free, wrench, velocity = np.empty(6), np.empty(6), np.empty(6)
     model.free_acceleration(dynamics, R, seen.velocity, memory.omega, seen.water, seen.restoring[0], free)
-    look(memory.sight, regions, seen.position, memory.quaternion, seen.velocity)
-    acceleration -= free
+    attitude_loop.carry(memory.attitude, dynamics, R, seen.velocity, seen.water)
+    attitude_loop.free_turning(memory.attitude, dynamics, memory.quaternion, memory.omega, free[3:])
+    velocity[:3], velocity[3:] = seen.velocity, memory.omega
+    look(memory.sight, regions, seen.position, memory.quaternion, velocity)
+    acceleration -= free[:3]
     _force_of(dynamics, R, acceleration, wrench)
     _soft_forces(memory.sight, regions, weights, R, dynamics, wrench)
+    attitude_loop.aim(memory.attitude, regions, seen.position, gains, period)
     attitude_loop.moment(memory.attitude, dynamics, memory.quaternion, memory.omega, gains, wrench[3:])
     work = memory.program
     for j in range(forces.size):
@@ -136,19 +138,41 @@ def step(
             work.wanted[j] += thrusters.allocator[j, k] * wrench[k]
 
     # barriers
-    push = _push(dynamics, thrusters, R)
-    braking = gains.braking_share * _braking(dynamics, thrusters)
-    margin = gains.margin + _SPREADS * observer.position_spread(seen)
-    mass = dynamics.translational_mass[0]
-    rows = write_rows(
-        work, memory.sight, regions, weights, seen.velocity, free, push, thrusters.lower, thrusters.upper, mass,
-        braking, margin, gains,
-    )  # fmt: skip
+    motion = Motion(
+        velocity,
+        free,
+        _push(dynamics, thrusters, R),
+        dynamics.translational_mass[0],
+        (dynamics.mass[3, 3] + dynamics.mass[4, 4] + dynamics.mass[5, 5]) / 3.0,
+        gains.braking_share * _braking(dynamics, thrusters),
+        _SPREADS * observer.position_spread(seen) + 0.5 * gains.acceleration * period**2,
+    )
+    rows = write_rows(work, memory.sight, regions, weights, motion, thrusters.lower, thrusters.upper, gains)
 
     # quadratic program
     steps = quadratic_program.solve(work, rows, thrusters.inverse, thrusters.lower, thrusters.upper, forces)
     thrusters.forces[:] = forces
     _report(memory, wanted, rows, steps)
+
+
+@compiled
+def _heed(memory: DeployableMemory, told: Array, failed: int) -> bool:
+    """Take in which thrusters are told to have failed, or to work again, and one found to have failed, -1 for none.
+
+    Returns
+    -------
+    bool
+        Whether the thrusters at hand are others than before.
+    """
+    health, changed = memory.thrusters.health, False
+    if failed >= 0:
+        failure.give_up(memory.suspicion, memory.thrusters, failed)
+        changed = True
+    for j in range(told.size):
+        if told[j] != memory.told[j] or (told[j] == 0.0 and health[j] != 0.0):
+            health[j] = memory.told[j] = told[j]
+            changed = True
+    return changed
 
 
 @compiled
@@ -162,6 +186,9 @@ def _keep_attitude(memory: DeployableMemory, state: VehicleState) -> None:
     if abs(size - 1.0) < 1e-2 and np.isfinite(rates):
         memory.quaternion[:] = state.quaternion / np.sqrt(size)
         memory.omega[:] = state.velocity_body[3:]
+        memory.blindness[0] = 0.0
+    else:
+        memory.blindness[0] += memory.period[0]
 
 
 @compiled
@@ -215,10 +242,13 @@ def _force_of(dynamics: Dynamics, R: Array, acceleration: Array, out: Array) -> 
 def _soft_forces(
     sight: Sight, regions: PackedRegions, weights: Array, R: Array, dynamics: Dynamics, wrench: Array
 ) -> None:
-    """Add the push of violated soft regions, -alpha_i g_i grad g_i / |grad g_i| (22), each at most what can be braked."""
+    """Add the push of violated soft regions of place (22), -alpha_i g_i grad g_i / |grad g_i|.
+
+    Each at most what the thrusters can always give.
+    """
     most = dynamics.translational_mass[0] * _least(dynamics.braking)
     for i in range(regions.kinds.size):
-        if regions.hard[i] or not sight.values[i] > 0.0:
+        if regions.hard[i] or not sight.values[i] > 0.0 or regions.kinds[i] >= _ATTITUDE:
             continue
         size = np.sqrt(sight.gradients[i, 0] ** 2 + sight.gradients[i, 1] ** 2 + sight.gradients[i, 2] ** 2)
         if not size > 0.0:
@@ -231,22 +261,25 @@ def _soft_forces(
 
 @compiled
 def _push(dynamics: Dynamics, thrusters: Thrusters, R: Array) -> Array:
-    """Return the acceleration of one newton of each thruster, world frame, shape (3, m)."""
+    """Return the acceleration of one newton of each thruster, shape (6, m), as `barrier.Motion` has it."""
     m = thrusters.health.size
-    push = np.zeros((3, m))
+    push = np.zeros((6, m))
     for j in range(m):
-        for i in range(3):
+        for i in range(6):
             body = 0.0
             for k in range(6):
                 body += dynamics.inverse_mass[i, k] * thrusters.matrix[k, j]
-            for axis in range(3):
-                push[axis, j] += R[axis, i] * body
+            if i >= 3:
+                push[i, j] = body
+            else:
+                for axis in range(3):
+                    push[axis, j] += R[axis, i] * body
     return push
 
 
 @compiled
 def _least(values: Array) -> float:
-    least = values[0]
+    least: float = values[0]
     for i in range(values.size):
         least = min(least, values[i])
     return least
@@ -254,11 +287,16 @@ def _least(values: Array) -> float:
 
 @compiled
 def _braking(dynamics: Dynamics, thrusters: Thrusters) -> float:
-    """Return the deceleration [m/s2] of the worst direction, with one thruster lost: the one that is, or any."""
+    """Return the deceleration [m/s2] of the worst direction with one thruster lost: the one that is, or any.
+
+    With more lost, half of that for each; a rule of thumb.
+    """
+    worst, lost = _least(dynamics.braking), 0
     for j in range(thrusters.health.size):
         if thrusters.health[j] == 0.0:
-            return dynamics.braking[j]
-    return _least(dynamics.braking)
+            worst = dynamics.braking[j] if lost == 0 else 0.5 * min(worst, dynamics.braking[j])
+            lost += 1
+    return worst
 
 
 @compiled
@@ -341,6 +379,8 @@ class DeployableLaw(CompiledLaw):
             program=workspace(n_regions, m),
             quaternion=desired.copy(),
             omega=np.zeros(3),
+            blindness=np.zeros(1),
+            told=np.ones(m),
         )
 
     @classmethod

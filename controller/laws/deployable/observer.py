@@ -51,7 +51,7 @@ def estimate_of_nothing() -> Estimate:
         covariance=np.zeros((3, 3, 3)),
         acceleration=np.zeros(3),
         innovation=np.zeros(3),
-        spread=np.zeros(3),
+        spread=np.ones(3),
         gain=np.zeros(3),
         silence=np.array([-1.0]),
         last_measured=np.full(6, np.nan),

@@ -1,0 +1,243 @@
+"""The search for the gains of the laws for comparison, the same for all of them: random draws that race the best.
+
+Gains are drawn log-uniformly, half of them from `RANGES`, the others around the best so far; those without a range
+keep the values of their source. Each draw flies the plain scenes of seeds 10000-10199, and is given up as soon as it
+falls behind the best over the scenes flown. The laws that adapt begin with what was found for `pd`. Better is: fewer
+violations, then more reached, then the lower median reach time.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+import statistics
+from collections.abc import Iterable
+from concurrent.futures import ProcessPoolExecutor
+from typing import Any, NamedTuple
+
+import msgspec
+import numpy as np
+
+from benchmarks.scenes import scene
+from controller import LAWS
+from controller.laws import PdGains
+from cosim.flight import Score
+from cosim.scene import Scene
+from cosim.scene_run import Conditions, SceneFlyer
+
+FIRST_SEED = 10_000
+SCENES = 200
+DURATION = 60.0  # s of a scene in the search; good gains have long reached the goal by then
+# scenes flown by the end of each heat, and by which factor the median reach time may be above that of the best there
+HEATS = ((2, 1.3), (5, 1.15), (20, 1.08), (60, 1.03), (SCENES, 1.0))
+FIRST_HEAT = 20  # scenes that the first batch flies, before there is a best
+BATCH = 10  # draws that race the same best
+PHASES = (
+    (0.5, math.inf),
+    (0.25, 1.5),
+    (0.25, 1.15),
+)  # share of the draws, and within which factor of the best they are
+DRAWS = 300
+
+_FIELD = {
+    "k_p1": (20.0, 600.0),
+    "k_v1": (10.0, 400.0),
+    "limit": (15.0, 200.0),
+    "repulsion": (50.0, 5000.0),
+    "reach": (0.05, 1.2),
+}
+RANGES: dict[str, dict[str, tuple[float, float]]] = {
+    "pd": _FIELD,
+    "sun_cheah": _FIELD | {"sigma_p": (0.02, 2.0), "gamma": (0.003, 30.0), "bound": (15.0, 40.0)},
+    "unarbitrated": _FIELD
+    | {"margin": (0.02, 0.24), "sigma_p": (0.02, 2.0), "gamma": (0.003, 30.0), "bound": (15.0, 40.0)},
+    "antonelli": _FIELD | {"lambda_p": (0.02, 2.0), "k_theta": (0.003, 30.0), "bound": (15.0, 40.0)},
+}
+# what a law's first batch has from the gains of `pd`, as they stand; the k_p1 of `unarbitrated` has another unit
+FROM_PD: dict[str, tuple[str, ...]] = {
+    "pd": (),
+    "sun_cheah": tuple(_FIELD),
+    "unarbitrated": tuple(name for name in _FIELD if name != "k_p1"),
+    "antonelli": tuple(_FIELD),
+}
+
+
+class Outcome(NamedTuple):
+    """What gains came to over some scenes; `rank` orders outcomes, the least is the best."""
+
+    scenes: int
+    violations: int
+    reached: int
+    reach_time: float  # s, median over scenes reached without violation
+    effort: float  # N s, median over the same
+
+    @property
+    def rank(self) -> tuple[int, int, float]:
+        """The key: violations, then scenes not reached, then the reach time."""
+        return self.violations, self.scenes - self.reached, self.reach_time
+
+
+class Candidate(NamedTuple):
+    """Gains and how they flew so far."""
+
+    gains: Any
+    scores: tuple[Score, ...]
+
+    @property
+    def outcome(self) -> Outcome:
+        """What its scores come to."""
+        return outcome(self.scores)
+
+
+def outcome(scores: Iterable[Score]) -> Outcome:
+    """Return what scores come to; a scene whose plant failed or lost its position is violated."""
+    scores = tuple(scores)
+    clean = [score for score in scores if score.min_clearance >= 0.0 and score.failed_step < 0]
+    arrived = [score for score in clean if score.reached]
+    return Outcome(
+        scenes=len(scores),
+        violations=len(scores) - len(clean),
+        reached=sum(score.reached for score in scores),
+        reach_time=statistics.median(score.reach_time for score in arrived) if arrived else float("inf"),
+        effort=statistics.median(score.effort for score in arrived) if arrived else float("inf"),
+    )
+
+
+def draws(law: str, count: int, rng: np.random.Generator, best: Any = None, near: float = math.inf) -> list[Any]:
+    """Draw gains of a law.
+
+    Parameters
+    ----------
+    law : str
+        One of `RANGES`.
+    count : int
+        How many.
+    rng : Generator
+        Whence they come.
+    best : NamedTuple, optional
+        Gains to draw around.
+    near : float
+        Within which factor of `best`, either way, and within the ranges.
+
+    Returns
+    -------
+    list of NamedTuple
+        Gains of the law, to four figures.
+    """
+    gains_type, found = LAWS[law].gains_type, []
+    for _ in range(count):
+        changes = {}
+        for name, (low, high) in RANGES[law].items():
+            if best is not None:
+                centre = getattr(best, name)
+                low, high = max(low, centre / near), min(high, centre * near)
+            changes[name] = float(f"{np.exp(rng.uniform(np.log(low), np.log(high))):.4g}")
+        found.append(gains_type(**changes))
+    return found
+
+
+def search(law: str, count: int, seed: int, workers: int) -> Candidate:
+    """Return the best gains of a law.
+
+    Parameters
+    ----------
+    law : str
+        One of `RANGES`.
+    count : int
+        Draws, 1 or more.
+    seed : int
+        Of the draws.
+    workers : int
+        Processes; they change nothing in what is found.
+
+    Returns
+    -------
+    Candidate
+        The gains, and their scores over all scenes, of `DURATION` each.
+    """
+    rng = np.random.default_rng(seed)
+    (size, _), *batches = _batches(count)
+    known = {name: getattr(PdGains(), name) for name in FROM_PD[law]}
+    first = [Candidate(g._replace(**known), ()) for g in draws(law, size, rng)]
+    with ProcessPoolExecutor(workers) as pool:
+        started = pool.map(_fly_on, [(law, candidate, FIRST_HEAT, DURATION) for candidate in first])
+        front = min(started, key=lambda candidate: candidate.outcome.rank)
+        best = pool.submit(_fly_on, (law, front, SCENES, DURATION)).result()
+        for size, near in batches:
+            flown = pool.map(_race, [(law, g, best.scores) for g in draws(law, size, rng, best.gains, near)])
+            finished = [candidate for candidate in flown if len(candidate.scores) == SCENES]
+            better = min([best, *finished], key=lambda candidate: candidate.outcome.rank)
+            if better is not best:
+                best = better
+                print(f"{law}: {_sentence(best.outcome)}", flush=True)
+    return best
+
+
+def _batches(count: int) -> list[tuple[int, float]]:
+    """Return the size of each batch, and within which factor of the best its draws are."""
+    found = []
+    for share, near in PHASES:
+        phase = math.ceil(share * count)
+        found += [(min(BATCH, phase - done), near) for done in range(0, phase, BATCH)]
+    return found
+
+
+def _race(job: tuple[str, Any, tuple[Score, ...]]) -> Candidate:
+    law, gains, best = job
+    candidate = Candidate(gains, ())
+    for scenes, slack in HEATS:
+        candidate = _fly_on((law, candidate, scenes, DURATION))
+        *mine, time = candidate.outcome.rank
+        *his, his_time = outcome(best[:scenes]).rank
+        if mine > his or (mine == his and time > slack * his_time):
+            break
+    return candidate
+
+
+def _fly_on(job: tuple[str, Candidate, int, float]) -> Candidate:
+    law, (gains, scores), scenes, duration = job
+    flyer = _flyer(law, duration)
+    flyer.gains = gains
+    more = tuple(flyer.fly(_scene(FIRST_SEED + i))[0] for i in range(len(scores), scenes))
+    return Candidate(gains, scores + more)
+
+
+@functools.cache
+def _flyer(law: str, duration: float) -> SceneFlyer:
+    return SceneFlyer(law, Conditions(duration=duration))
+
+
+@functools.cache
+def _scene(seed: int) -> Scene:
+    return msgspec.convert(scene(seed), Scene)
+
+
+def _sentence(found: Outcome) -> str:
+    return (
+        f"{found.violations} violations and {found.reached} reached of {found.scenes} scenes; "
+        f"medians over those reached without violation: {found.reach_time:.2f} s, {found.effort:.0f} N s"
+    )
+
+
+def main(laws: Iterable[str], count: int, seed: int, workers: int) -> None:
+    """Search for the gains of some laws, print them, and fly them in full; with no draws, fly the gains that they have.
+
+    Parameters
+    ----------
+    laws : iterable of str
+        Of `RANGES`.
+    count : int
+        Draws, or 0.
+    seed : int
+        Of the draws.
+    workers : int
+        Processes.
+    """
+    for law in laws:
+        gains = LAWS[law].gains_type()
+        if count:
+            gains = search(law, count, seed, workers).gains
+            for name in RANGES[law]:
+                print(f"  {name} = {getattr(gains, name):.4g}")
+        flown = _fly_on((law, Candidate(gains, ()), SCENES, Conditions().duration))
+        print(f"{law}, in full: {_sentence(flown.outcome)}", flush=True)

@@ -1,0 +1,49 @@
+"""The inequalities between the lines of the proof: (35), (36) on the secondary error, (44) on W."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from controller.printed_law import Gains
+from controller.theory.model import Model, damping
+
+Array = NDArray[np.float64]
+
+
+def norm_bound(errors: Array) -> float:
+    """Return what |e_s| is at most: (35), the sum of the |e_si|.
+
+    Parameters
+    ----------
+    errors : ndarray, shape (n, 3)
+        e_si of each region.
+    """
+    return float(np.sum(np.linalg.norm(errors, axis=1)))
+
+
+def square_bound(errors: Array) -> float:
+    """Return what |e_s|^2 is at most: (36), n times the sum of the |e_si|^2. Arguments as `norm_bound`."""
+    return float(len(errors) * np.sum(errors**2))
+
+
+def decay_bound(model: Model, gains: Gains, y: Array, velocity_body: Array, sigma_c0: float) -> float:
+    """Return what W of (41) is at least: (44).
+
+    Parameters
+    ----------
+    model : Model
+        The true vehicle.
+    gains : Gains
+        Of the law.
+    y : ndarray, shape (6,)
+        `mapped_error`.
+    velocity_body : ndarray, shape (6,)
+        nu [m/s, rad/s].
+    sigma_c0 : float
+        sigma c_0 of (43) [N s/m, N m s/rad]: `bracket` is at least -sigma_c0 |nu|^2.
+    """
+    least_drag = np.min(damping(model.linear_damping, model.quadratic_damping, velocity_body))
+    least_drag += min(gains.k_v1, gains.k_v2)
+    least_pull = min(gains.sigma_p * gains.k_p1, gains.sigma_a * gains.k_p2)
+    return float((least_drag - sigma_c0) * np.sum(velocity_body**2) + least_pull * np.sum(y**2))

@@ -1,0 +1,162 @@
+"""Several laws on the same scenes: campaigns side by side, and two laws at a time on what one of them completes."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import tempfile
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from controller import LAWS
+from cosim.campaigns.campaign import Campaign, run_campaign
+from cosim.campaigns.comparison_figures import comparison_drawings
+from cosim.campaigns.comparison_page import page
+from cosim.campaigns.folder import write_text
+from cosim.campaigns.law_gains import law_named
+from cosim.campaigns.results import Results
+from cosim.campaigns.scene_store import SceneStore
+from cosim.campaigns.summary import median
+from cosim.errors import RunError
+from cosim.report import FIGURES
+from cosim.scene_run import Conditions
+
+NUMBERS = "compare.json"
+PAGE = "compare.md"
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Where a comparison was written, and what it came to."""
+
+    folder: Path
+    campaigns: dict[str, Campaign]  # by law
+    numbers: dict[str, Any]
+
+
+def compare(
+    scenes: Path,
+    laws: Sequence[str],
+    out: Path,
+    conditions: Conditions | None = None,
+    gains: Mapping[str, Any] | None = None,
+    workers: int = 1,
+    progress: bool = False,
+) -> Comparison:
+    """Fly the same scenes by several laws, and write table, numbers and figures.
+
+    Parameters
+    ----------
+    scenes : Path
+        A file of one JSON object a line, ``-`` for standard input.
+    laws : sequence of str
+        Two or more of those in `controller.LAWS`.
+    out : Path
+        A folder that does not exist, is empty, or holds a comparison of the same scenes; each law has the folder of a
+        campaign in it, which goes on as that of a campaign does.
+    conditions : Conditions, optional
+        How scenes are flown; default: as they are scored.
+    gains : mapping from str to NamedTuple, optional
+        By law; default: its own.
+    workers : int
+        Processes.
+    progress : bool
+        Show a bar for each law, if there is a terminal.
+
+    Returns
+    -------
+    Comparison
+        With a campaign for each law.
+
+    Raises
+    ------
+    RunError
+        If the laws cannot be compared, or the folder holds something else or cannot be written.
+    Exception
+        Whatever `run_campaign` raises.
+    """
+    for law in laws:
+        law_named(law)
+    if len(laws) < 2 or len(set(laws)) < len(laws):
+        raise RunError(f"laws are {', '.join(laws) or 'none'}, expected two or more, each once")
+    _refuse_strangers(out)
+    campaigns = {}
+    with SceneStore(scenes) as store:
+        for law in laws:
+            campaigns[law] = run_campaign(store, law, out / law, conditions, (gains or {}).get(law), workers, progress)
+        numbers = {
+            "scenes": len(store),
+            "scenes_sha256": store.digest,
+            "laws": {law: campaign.summary for law, campaign in campaigns.items()},
+            "pairs": [
+                pair(one, campaigns[one].results, other, campaigns[other].results)
+                for one in laws
+                for other in laws
+                if one != other
+            ],
+        }
+    try:
+        _write_figures(out, {law: campaign.results for law, campaign in campaigns.items()})
+        write_text(out / NUMBERS, json.dumps(numbers, indent=2) + "\n")
+        write_text(out / PAGE, page(numbers))
+    except OSError as error:
+        raise RunError(f"{out}: {error.strerror or error}") from error
+    return Comparison(out, campaigns, numbers)
+
+
+def pair(one: str, results: Results, other: str, others: Results) -> dict[str, Any]:
+    """Compare two laws on the scenes that one of them completes without a violation.
+
+    Parameters
+    ----------
+    one, other : str
+        The laws.
+    results, others : Results
+        Of the same scenes.
+
+    Returns
+    -------
+    dict
+        How many scenes these are, how many of them the other law completes as well, and over all of them the medians of
+        both of reach time [s], where what is never reached counts as taking for ever, and of effort [N s].
+    """
+    at = completed(results)
+    return {
+        "completed_by": one,
+        "scenes": int(at.sum()),
+        "beside": other,
+        "completed_by_both": int((at & completed(others)).sum()),
+        "reach_time": {
+            law: median(rows.number("reach_time", absent=np.inf)[at]) for law, rows in ((one, results), (other, others))
+        },
+        "effort": {law: median(rows.number("effort")[at]) for law, rows in ((one, results), (other, others))},
+    }
+
+
+def completed(results: Results) -> Any:
+    """Return which scenes were reached without a violation, bool, shape (scenes,)."""
+    return results["reached"] & ~results["violation"]
+
+
+def _refuse_strangers(out: Path) -> None:
+    if out.is_dir():
+        known = {NUMBERS, PAGE, FIGURES, f".{NUMBERS}", f".{PAGE}", *LAWS}
+        strange = sorted(p.name for p in out.iterdir() if p.name not in known and not p.name.startswith(f".{FIGURES}"))
+        if strange:
+            raise RunError(f"{out}: holds {strange[0]!r}, expected a new folder or that of a comparison")
+
+
+def _write_figures(out: Path, results: dict[str, Results]) -> None:
+    scratch = Path(tempfile.mkdtemp(prefix=f".{FIGURES}-", dir=out))
+    try:
+        for drawing in comparison_drawings(results):
+            drawing.write(scratch)
+        scratch.chmod(0o755)
+        shutil.rmtree(out / FIGURES, ignore_errors=True)
+        scratch.replace(out / FIGURES)
+    finally:
+        shutil.rmtree(scratch, ignore_errors=True)

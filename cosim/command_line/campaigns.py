@@ -1,0 +1,105 @@
+"""``cosim campaign`` and ``cosim compare``."""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import signal
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+INTERRUPTED = 130  # exit code after Ctrl-C
+
+
+def add_verbs(verbs: Any) -> None:
+    """Add the verbs to the parser.
+
+    Parameters
+    ----------
+    verbs : argparse subparsers
+        Of the command.
+    """
+    campaign = verbs.add_parser("campaign", help="fly many scenes by one law")
+    _add_scenes(campaign)
+    campaign.add_argument("--law", required=True, help="such as printed")
+    campaign.add_argument(
+        "--set", action="append", default=[], metavar="KEY=VALUE", dest="settings",
+        help="set a gain of the law, such as k_p1=10; may be repeated",
+    )  # fmt: skip
+
+    compare = verbs.add_parser("compare", help="fly the same scenes by several laws, and put them side by side")
+    _add_scenes(compare)
+    compare.add_argument("--laws", required=True, metavar="A,B[,C]", help="two or more, with commas between them")
+    compare.add_argument(
+        "--set", action="append", default=[], metavar="LAW.KEY=VALUE", dest="settings",
+        help="set a gain of a law, such as printed.k_p1=10; may be repeated",
+    )  # fmt: skip
+
+
+def _add_scenes(verb: argparse.ArgumentParser) -> None:
+    verb.add_argument("scenes", type=Path, metavar="SCENES.jsonl", help="a scene a line; - for standard input")
+    verb.add_argument(
+        "--out", type=Path, required=True, metavar="DIR",
+        help="a new folder, or one that this command began: it goes on with what is left",
+    )  # fmt: skip
+    verb.add_argument("--workers", type=_workers, default=1, metavar="N", help="processes (default: 1)")
+    verb.add_argument("--tell-failures", action="store_true", help="tell the law which thruster fails, and when")
+
+
+def _workers(text: str) -> int:
+    if not (text.isdecimal() and 1 <= int(text) <= 1024):
+        raise argparse.ArgumentTypeError(f"{text!r}: expected a whole number from 1 to 1024")
+    return int(text)
+
+
+def campaign(options: argparse.Namespace) -> int:
+    """Run ``cosim campaign``."""
+    from cosim.campaigns import run_campaign
+    from cosim.campaigns.law_gains import gains_from
+    from cosim.scene_run import Conditions
+
+    gains = gains_from(options.law, options.settings)
+    conditions = Conditions(tell_failures=options.tell_failures)
+
+    def run() -> None:
+        done = run_campaign(options.scenes, options.law, options.out, conditions, gains, options.workers, progress=True)
+        if not done.flown:
+            print(f"{options.out}: was complete already")
+        s = done.summary
+        print(f"{s['law']}: {s['reached']} of {s['scenes']} scenes reached, {s['violations']} with a violation")
+        print(options.out / "summary.json")
+
+    return _resumable(run, options.out)
+
+
+def compare(options: argparse.Namespace) -> int:
+    """Run ``cosim compare``."""
+    from cosim.campaigns import compare as compare_laws
+    from cosim.campaigns.law_gains import gains_by_law
+    from cosim.scene_run import Conditions
+
+    laws = [law.strip() for law in options.laws.split(",") if law.strip()]
+    gains = gains_by_law(laws, options.settings)
+    conditions = Conditions(tell_failures=options.tell_failures)
+
+    def run() -> None:
+        done = compare_laws(options.scenes, laws, options.out, conditions, gains, options.workers, progress=True)
+        for law, s in done.numbers["laws"].items():
+            print(f"{law}: {s['reached']} of {s['scenes']} scenes reached, {s['violations']} with a violation")
+        print(options.out / "compare.md")
+
+    return _resumable(run, options.out)
+
+
+def _resumable(run: Callable[[], None], out: Path) -> int:
+    """Run, and say after Ctrl-C, or a polite kill, that what is done is kept."""
+    with contextlib.suppress(ValueError):  # which signal raises outside the main thread
+        signal.signal(signal.SIGTERM, signal.default_int_handler)
+    try:
+        run()
+    except KeyboardInterrupt:
+        print(f"cosim: interrupted; what is flown is kept in {out}, and the same command goes on", file=sys.stderr)
+        return INTERRUPTED
+    return 0

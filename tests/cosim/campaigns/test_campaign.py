@@ -1,0 +1,338 @@
+"""Campaigns: a row a scene, none lost and none repeated, whatever comes in between."""
+
+import json
+import math
+import os
+from dataclasses import replace
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+
+from controller import LawError
+from controller.printed_law import Gains
+from cosim.campaigns import campaign as module
+from cosim.campaigns import run_campaign
+from cosim.campaigns.folder import PARTS, RESULTS, SUMMARY, CampaignFolder
+from cosim.campaigns.law_gains import gains_by_law, gains_from
+from cosim.campaigns.plan import difference, plan_of
+from cosim.campaigns.results import Results, read_results, row_of, table_of
+from cosim.campaigns.scene_store import SceneStore
+from cosim.campaigns.summary import summarise
+from cosim.campaigns.workers import fly_batch
+from cosim.errors import RunError, ScenarioError
+from cosim.flight import Score
+from cosim.scene import decode_scene
+from cosim.scene_run import Conditions, SceneFlyer
+from tests.cosim.campaigns.scenes import BRIEF, HARD, PLAIN, many, rows, write
+
+
+@pytest.fixture
+def scenes(tmp_path):
+    return write(tmp_path / "scenes.jsonl", many(20))
+
+
+def test_a_row_a_scene_in_order_of_seed(tmp_path, scenes):
+    done = run_campaign(scenes, "printed", tmp_path / "out", BRIEF)
+    assert done.flown == 20
+    assert sorted(p.name for p in (tmp_path / "out").iterdir()) == [
+        ".lock", "campaign.json", "results.parquet", "summary.json"
+    ]  # fmt: skip
+    table = pq.read_table(tmp_path / "out" / RESULTS)
+    assert table["seed"].to_pylist() == list(range(1000, 1020))
+    units = {f.name: f.metadata[b"unit"].decode() for f in table.schema}
+    assert units == {
+        "seed": "", "reached": "", "violation": "", "min_clearance": "m", "reach_time": "s", "effort": "N.s",
+        "thrust_variation": "N", "worst_step_time": "s", "stopped_at": "s",
+    }  # fmt: skip
+    assert all(f.metadata[b"description"] for f in table.schema)
+
+
+def test_rows_are_what_the_flyer_scores(tmp_path):
+    wide = [scene | {"goal": {"centre": scene["start"], "radius": 40.0}} for scene in HARD]  # they start inside
+    conditions = replace(BRIEF, settled=0.3)
+    found = run_campaign(write(tmp_path / "s.jsonl", wide), "printed", tmp_path / "out", conditions).results
+    with SceneFlyer("printed", conditions) as flyer:
+        for i, scene in enumerate(wide):
+            score, _ = flyer.fly(decode_scene(json.dumps(scene).encode()))
+            row = found.table.to_pylist()[i]
+            assert row["reached"] and row["reach_time"] == score.reach_time == 0.0
+            assert (row["min_clearance"], row["effort"]) == (score.min_clearance, score.effort)
+            assert row["thrust_variation"] == score.thrust_variation and row["stopped_at"] is None
+            assert row["violation"] == (score.min_clearance < 0.0)
+
+
+def test_another_law_is_refused_by_its_name_alone(tmp_path, scenes):
+    run_campaign(scenes, "printed", tmp_path / "out", BRIEF)
+    with pytest.raises(RunError, match=r"another campaign \(law is 'printed', now 'deployable'\)"):
+        run_campaign(scenes, "deployable", tmp_path / "out", BRIEF)
+
+
+def test_what_is_interrupted_goes_on_without_losing_or_repeating(tmp_path, scenes, monkeypatch):
+    whole = run_campaign(scenes, "printed", tmp_path / "whole", BRIEF)
+    flown = []
+
+    def until(stop):
+        def fly(flyer, lines):
+            if len(flown) == stop:
+                raise KeyboardInterrupt
+            flown.append([json.loads(line)["seed"] for line in lines])
+            return fly_batch(flyer, lines)
+
+        return fly
+
+    monkeypatch.setattr(module, "BATCH", 3)
+    for stop in (2, 5):
+        monkeypatch.setattr("cosim.campaigns.workers.fly_batch", until(stop))
+        with pytest.raises(KeyboardInterrupt):
+            run_campaign(scenes, "printed", tmp_path / "out", BRIEF)
+        assert not (tmp_path / "out" / RESULTS).exists()
+    monkeypatch.setattr("cosim.campaigns.workers.fly_batch", until(99))
+    done = run_campaign(scenes, "printed", tmp_path / "out", BRIEF)
+    assert sorted(seed for batch in flown for seed in batch) == list(range(1000, 1020))
+    assert done.flown == 5
+    assert rows(done.results) == rows(whole.results)
+    assert not (tmp_path / "out" / PARTS).exists()
+
+
+@pytest.mark.parametrize("at", ["join", "write_text"])
+def test_killed_at_the_end_nothing_is_flown_again(tmp_path, scenes, monkeypatch, at):
+    with monkeypatch.context() as patch:
+        where = (CampaignFolder, "remove_parts") if at == "join" else (module, "write_text")
+        patch.setattr(*where, lambda *_: (_ for _ in ()).throw(KeyboardInterrupt))
+        with pytest.raises(KeyboardInterrupt):
+            run_campaign(scenes, "printed", tmp_path / "out", BRIEF)
+    done = run_campaign(scenes, "printed", tmp_path / "out", BRIEF)
+    assert done.flown == 0 and done.summary["scenes"] == 20
+    assert (tmp_path / "out" / SUMMARY).exists() and not (tmp_path / "out" / PARTS).exists()
+
+
+def test_a_damaged_part_is_flown_again(tmp_path, scenes, monkeypatch):
+    whole = run_campaign(scenes, "printed", tmp_path / "whole", BRIEF)
+    monkeypatch.setattr(module, "BATCH", 5)
+    with monkeypatch.context() as patch:
+        patch.setattr(CampaignFolder, "join", lambda _: (_ for _ in ()).throw(KeyboardInterrupt))
+        with pytest.raises(KeyboardInterrupt):
+            run_campaign(scenes, "printed", tmp_path / "out", BRIEF)
+    parts = sorted((tmp_path / "out" / PARTS).iterdir())
+    assert len(parts) == 4
+    parts[1].write_bytes(parts[1].read_bytes()[:100])
+    (tmp_path / "out" / PARTS / ".00000009.parquet-1").write_bytes(b"half")
+    done = run_campaign(scenes, "printed", tmp_path / "out", BRIEF)
+    assert done.flown == 5 and rows(done.results) == rows(whole.results)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"gains": Gains(k_p1=10.0)}, r"gains.k_p1 is 18.8, now 10.0"),
+        ({"conditions": replace(BRIEF, tell_failures=True)}, "conditions.tell_failures is False, now True"),
+        ({"scenes": many(19)}, "scenes is 20, now 19"),
+        ({"scenes": [*many(19), PLAIN[0]]}, "scenes_sha256"),
+        ({"code": True}, "code_sha256"),
+    ],
+)
+@pytest.mark.parametrize("complete", [True, False])
+def test_the_folder_of_another_campaign_is_refused(tmp_path, scenes, monkeypatch, change, words, complete):
+    with monkeypatch.context() as patch:
+        if not complete:
+            patch.setattr(CampaignFolder, "join", lambda _: (_ for _ in ()).throw(KeyboardInterrupt))
+        try:
+            run_campaign(scenes, "printed", tmp_path / "out", BRIEF)
+        except KeyboardInterrupt:
+            assert not complete
+    before = {p: p.read_bytes() for p in (tmp_path / "out").rglob("*") if p.is_file()}
+    if "scenes" in change:
+        write(scenes, change["scenes"])
+    if "code" in change:
+        monkeypatch.setattr("cosim.campaigns.plan.code_digest", lambda: "other")
+    with pytest.raises(RunError, match=f"holds another campaign .*{words}"):
+        run_campaign(scenes, "printed", tmp_path / "out", change.get("conditions", BRIEF), change.get("gains"))
+    assert {p: p.read_bytes() for p in (tmp_path / "out").rglob("*") if p.is_file()} == before
+
+
+def test_a_folder_that_holds_something_else_is_refused(tmp_path, scenes):
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "precious").write_text("x")
+    with pytest.raises(RunError, match="holds no campaign"):
+        run_campaign(scenes, "printed", tmp_path / "out", BRIEF)
+    assert [p.name for p in (tmp_path / "out").iterdir()] == ["precious"]
+
+
+@pytest.mark.parametrize("content", ["{", "[]", "\xff"])
+def test_a_damaged_plan_is_refused(tmp_path, scenes, content):
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "campaign.json").write_bytes(content.encode("latin-1"))
+    with pytest.raises(RunError, match=r"campaign\.json"):
+        run_campaign(scenes, "printed", tmp_path / "out", BRIEF)
+
+
+def test_a_folder_in_use_is_refused(tmp_path, scenes):
+    with SceneStore(scenes) as store:
+        plan = plan_of("printed", Gains(), BRIEF, len(store), store.digest)
+    with CampaignFolder(tmp_path / "out", plan):
+        with pytest.raises(RunError, match="another process is at work"):
+            run_campaign(scenes, "printed", tmp_path / "out", BRIEF)
+    assert run_campaign(scenes, "printed", tmp_path / "out", BRIEF).flown == 20
+
+
+def test_a_folder_that_cannot_be_written(tmp_path, scenes):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(RunError, match="file"):
+        run_campaign(scenes, "printed", tmp_path / "file" / "out", BRIEF)
+
+
+def test_a_full_disk_is_one_line_and_what_was_done_is_kept(tmp_path, scenes, monkeypatch):
+    monkeypatch.setattr(module, "BATCH", 5)
+    add = CampaignFolder.add
+
+    def full(folder, rows):
+        if len(list((tmp_path / "out" / PARTS).iterdir())) == 2:
+            raise OSError(28, os.strerror(28))
+        add(folder, rows)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(CampaignFolder, "add", full)
+        with pytest.raises(RunError, match="No space left"):
+            run_campaign(scenes, "printed", tmp_path / "out", BRIEF)
+    assert run_campaign(scenes, "printed", tmp_path / "out", BRIEF).flown == 10
+
+
+def test_what_the_plant_refuses_has_a_row_that_says_so(tmp_path):
+    bad = [PLAIN[0], PLAIN[1] | {"weight_minus_buoyancy": 1e6}, PLAIN[2] | {"righting_moment": 1e300}, PLAIN[3]]
+    done = run_campaign(write(tmp_path / "s.jsonl", bad), "printed", tmp_path / "out", BRIEF)
+    first, *refused, last = done.results.table.to_pylist()
+    assert first["stopped_at"] is None and last["stopped_at"] is None and last["effort"] > 0.0
+    for row in refused:
+        assert not row["reached"] and row["violation"] and row["stopped_at"] == 0.0 and row["effort"] is None
+    assert done.summary["failed"]["stopped"] == done.summary["failed"]["violated"] == [20001, 20002]
+    assert done.summary["violations"] == done.summary["stopped"] == 2
+
+
+@pytest.mark.parametrize(
+    ("score", "violation", "stopped_at"),
+    [
+        (Score(True, 5.0, 0.0, 1.0, 1.0, 1e-6, -1), False, None),
+        (Score(True, 5.0, -1e-9, 1.0, 1.0, 1e-6, -1), True, None),
+        (Score(False, math.inf, math.nan, math.nan, math.inf, 1e-6, -1), True, None),
+        (Score(False, math.inf, 0.5, 1.0, 1.0, 1e-6, 150), True, 1.5),
+    ],
+)
+def test_what_was_not_seen_to_be_safe_is_a_violation(score, violation, stopped_at):
+    row = row_of(7, score, 0.01)
+    assert (row.violation, row.stopped_at) == (violation, stopped_at)
+    numbers = (row.min_clearance, row.reach_time, row.effort, row.thrust_variation)
+    assert all(x is None or math.isfinite(x) for x in numbers)
+
+
+def test_there_is_a_reach_time_where_it_was_reached_alone():
+    late, early = (Score(reached, 115.0, 0.1, 1.0, 1.0, 1e-6, -1) for reached in (False, True))
+    assert (row_of(7, late, 0.01).reach_time, row_of(7, early, 0.01).reach_time) == (None, 115.0)
+
+
+def test_the_summary_follows_from_the_rows():
+    scores = [
+        Score(True, 30.0, 0.2, 100.0, 10.0, 1e-6, -1),
+        Score(True, 50.0, -0.1, 300.0, 30.0, 3e-6, -1),
+        Score(False, math.inf, 0.1, 900.0, 90.0, 2e-6, -1),
+        Score(False, math.inf, 0.4, 5.0, 5.0, 1e-6, 10),
+    ]
+    plan = plan_of("printed", Gains(), Conditions(tell_failures=True), 4, "abc")
+    summary = summarise(plan, Results(table_of([row_of(9 - i, s, 0.01) for i, s in enumerate(scores)])))
+    assert (summary["law"], summary["scenes"], summary["reached"], summary["violations"]) == ("printed", 4, 2, 2)
+    assert summary["medians"] == {
+        "reach_time": 40.0, "effort": 200.0, "thrust_variation": 20.0, "worst_step_time": 2e-6,
+        "min_clearance": pytest.approx(0.05),
+    }  # fmt: skip
+    assert (summary["least_clearance"], summary["worst_step_time"]) == (-0.1, 3e-6)
+    assert summary["failed"] == {"not_reached": [6, 7], "violated": [6, 8], "stopped": [6]}
+    assert summary["tell_failures"] is True and summary["gains"] == Gains()._asdict()
+    assert summary["conditions"]["duration"] == 120.0 and summary["versions"]["numpy"] == np.__version__
+    json.dumps(summary, allow_nan=False)
+
+
+def test_medians_of_nothing_are_none(tmp_path, scenes):
+    assert run_campaign(scenes, "printed", tmp_path / "out", BRIEF).summary["medians"]["reach_time"] is None
+
+
+# ---- scenes and gains ----
+
+
+@pytest.mark.parametrize(
+    ("lines", "words"),
+    [
+        ([*PLAIN, PLAIN[2]], "seed 20002 comes twice"),
+        ([], "holds no scene"),
+        ([PLAIN[0], {}], "line 2"),
+    ],
+)
+def test_scenes_that_cannot_be_flown_are_refused_before_anything_is_written(tmp_path, lines, words):
+    with pytest.raises(ScenarioError, match=words):
+        run_campaign(write(tmp_path / "s.jsonl", lines), "printed", tmp_path / "out", BRIEF)
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_store_gives_back_each_scene_and_knows_blanks_for_nothing(tmp_path):
+    spaced = tmp_path / "spaced.jsonl"
+    spaced.write_text("\n\n".join(json.dumps(scene, indent=None, separators=(" , ", " : ")) for scene in HARD))
+    with SceneStore(spaced) as one, SceneStore(write(tmp_path / "s.jsonl", HARD)) as other:
+        assert one.digest == other.digest and one.seeds == [20000, 20001, 20002, 20003, 20004, 20005]
+        (line,) = one.lines([20003])
+        assert decode_scene(line) == decode_scene(json.dumps(HARD[3]).encode())
+
+
+def test_gains_from_texts():
+    assert gains_from("printed", ["k_p1=10", " gamma = 3e0 "]) == Gains(k_p1=10.0, gamma=3.0)
+    assert gains_by_law(["printed"], ["printed.k_q=2"]) == {"printed": Gains(k_q=2.0)}
+
+
+@pytest.mark.parametrize(
+    ("law", "settings", "words"),
+    [
+        ("prined", [], "law 'prined' is unknown; did you mean 'printed'"),
+        ("printed", ["k_p1"], "expected key=value"),
+        ("printed", ["kp1=3"], "no such gain; did you mean 'k_p1'"),
+        ("printed", ["k_p1=much"], "'much' is no number"),
+    ],
+)
+def test_gains_that_cannot_be(law, settings, words):
+    with pytest.raises(RunError, match=words):
+        gains_from(law, settings)
+
+
+def test_gains_of_a_law_that_is_not_compared():
+    with pytest.raises(RunError, match=r"expected LAW\.KEY=VALUE with one of printed"):
+        gains_by_law(["printed"], ["k_p1=3"])
+
+
+def test_gains_that_the_law_refuses_leave_no_folder(tmp_path, scenes):
+    with pytest.raises(LawError, match="gamma"):
+        run_campaign(scenes, "printed", tmp_path / "out", BRIEF, gains_from("printed", ["gamma=0"]))
+    assert not (tmp_path / "out").exists()
+
+
+def test_no_workers_are_refused(tmp_path, scenes):
+    with pytest.raises(RunError, match="workers is 0"):
+        run_campaign(scenes, "printed", tmp_path / "out", BRIEF, workers=0)
+
+
+def test_a_difference_is_said_in_words():
+    assert difference({"a": {"b": 1}, "c": 2}, {"a": {"b": 3}, "c": 2, "d": "x" * 50}) == (
+        "a.b is 1, now 3; d is None, now 'xxxxxxxxx…"
+    )
+    assert difference({"law": "x", "c": 2}, {"law": "y", "c": 3}) == "law is 'x', now 'y'"
+    assert difference(dict.fromkeys("abcde", 1), dict.fromkeys("abcde", 2)).endswith("c is 1, now 2; and 2 more")
+    assert difference({"a": {"b": 1}}, {"a": {"b": 1}}) == ""
+
+
+def test_results_of_another_kind_are_refused(tmp_path):
+    pq.write_table(pq.read_table(write_other(tmp_path)), tmp_path / "x.parquet")
+    with pytest.raises(RunError, match=r"x\.parquet: cannot be read"):
+        read_results(tmp_path / "x.parquet")
+
+
+def write_other(folder):
+    import pyarrow as pa
+
+    pq.write_table(pa.table({"seed": ["text"]}), folder / "other.parquet")
+    return folder / "other.parquet"

@@ -1,0 +1,75 @@
+"""The page on campaigns says what the code does."""
+
+import dataclasses
+import re
+import typing
+from pathlib import Path
+
+from cosim.campaigns.results import SCHEMA
+from cosim.cli import main
+from cosim.scene import Scene, decode_scene
+from cosim.scene_run import Conditions
+from plant_fmu.tables import dataclass_of
+
+PAGE = (Path(__file__).parents[3] / "docs" / "campaigns.md").read_text()
+
+
+def table_after(heading):
+    """Return the rows of the first table after a heading, as lists of cells."""
+    lines = PAGE[PAGE.index(heading) :].splitlines()
+    first = next(i for i, line in enumerate(lines) if line.startswith("|---"))
+    rows = []
+    for line in lines[first + 1 :]:
+        if not line.startswith("|"):
+            break
+        rows.append([cell.strip() for cell in line.strip("|").split("|")])
+    return rows
+
+
+def test_every_key_of_a_scene_is_documented():
+    words = " ".join(row[0] for row in table_after("## Scenes"))
+    for field in dataclasses.fields(Scene):
+        kind = dataclass_of(typing.get_type_hints(Scene)[field.name])
+        assert f"`{field.name}" in words
+        for inner in dataclasses.fields(kind) if kind else ():
+            assert f".{inner.name}`" in words, (field.name, inner.name)
+
+
+def test_the_example_is_a_scene():
+    scene = decode_scene(re.search(r"```json\n(.*?)```", PAGE, re.S).group(1).encode())
+    assert scene.seed == 7 and scene.failed_thruster is None and scene.noise.position == 0.0
+
+
+def test_every_column_is_documented_with_its_unit():
+    rows = table_after("## How a flight goes")
+    assert [row[0].strip("`") for row in rows] == SCHEMA.names
+    units = [field.metadata[b"unit"].decode().replace(".", " ") for field in SCHEMA]
+    assert [row[1] for row in rows] == units
+
+
+def test_the_conditions_are_those_of_the_score():
+    c = Conditions()
+    text = " ".join(PAGE.split())
+    assert f"{c.duration:g} s; every {c.control} s the law is called" in text
+    assert c.plant_steps == 2 and f"two plant steps of {c.plant_step} s" in text
+    assert f"for the last {c.settled:g} s" in text
+
+
+def test_the_commands_are_understood(tmp_path, capsys):
+    commands = [line.split() for line in PAGE[: PAGE.index("A campaign flies")].splitlines() if "cosim c" in line]
+    assert [words[1] for words in commands] == ["campaign", "compare"]
+    for _, *words in commands:
+        words[1] = str(tmp_path / "none.jsonl")
+        words[words.index("--out") + 1] = str(tmp_path / "out")
+        assert main([word.replace("printed,deployable", "printed,none") for word in words]) == 2
+        assert re.search("No such file|law 'none'", capsys.readouterr().err)
+
+
+def test_the_snippet_runs(tmp_path, monkeypatch):
+    from tests.cosim.campaigns.scenes import PLAIN, write
+
+    write(tmp_path / "scenes.jsonl", PLAIN[:1])
+    monkeypatch.chdir(tmp_path)
+    names = {}
+    exec(re.search(r"```python\n(.*?)```", PAGE, re.S).group(1), names)
+    assert names["trace"].shape == (6000, 27) and names["score"].effort > 0.0

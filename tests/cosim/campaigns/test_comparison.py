@@ -1,0 +1,110 @@
+"""Comparisons: each law on the same scenes, and two at a time on what one completes."""
+
+import json
+import math
+
+import numpy as np
+import pytest
+
+from controller import LAWS, PrintedLaw
+from controller.printed_law import Gains
+from cosim import flight
+from cosim.campaigns import compare
+from cosim.campaigns.comparison import pair
+from cosim.campaigns.comparison_figures import shares_up_to
+from cosim.campaigns.results import Results, row_of, table_of
+from cosim.errors import RunError
+from cosim.flight import Score
+from tests.cosim.campaigns.scenes import BRIEF, HARD, rows, write
+
+
+class Idle(PrintedLaw):
+    """Does nothing, well."""
+
+    name = "idle"
+
+    @staticmethod
+    def function(state, goal, regions, weights, gains, memory, forces):
+        forces[:] = 0.0
+
+
+@pytest.fixture
+def idle(monkeypatch):
+    monkeypatch.setitem(LAWS, "idle", Idle)
+    monkeypatch.setattr(flight, "_compiled", flight._plain)
+
+
+@pytest.fixture
+def scenes(tmp_path):
+    return write(tmp_path / "scenes.jsonl", HARD[:2])
+
+
+def test_laws_stand_side_by_side(tmp_path, scenes, idle):
+    out = tmp_path / "out"
+    done = compare(scenes, ["printed", "idle"], out, BRIEF, {"printed": Gains(k_p1=9.0)})
+    assert sorted(p.name for p in out.iterdir()) == ["compare.json", "compare.md", "figures", "idle", "printed"]
+    assert sorted(p.name for p in (out / "figures").iterdir()) == [
+        f"{name}.{kind}" for name in ("effort", "min-clearance", "reach-time") for kind in ("png", "svg")
+    ]
+    numbers = json.loads((out / "compare.json").read_text())
+    assert numbers == done.numbers and numbers["scenes"] == 2
+    assert numbers["laws"]["printed"]["gains"]["k_p1"] == 9.0
+    assert numbers["laws"]["idle"] == json.loads((out / "idle" / "summary.json").read_text())
+    assert done.campaigns["idle"].results["effort"].tolist() == [0.0, 0.0]
+    text = (out / "compare.md").read_text()
+    assert "|  | printed | idle |" in text and "| reached | 0 | 0 |" in text
+    assert "| printed | 0 | idle | 0 | – | – | – | – |" in text
+
+
+def test_what_is_compared_already_is_not_flown_again_and_more_laws_may_come(tmp_path, scenes, idle, monkeypatch):
+    monkeypatch.setitem(LAWS, "idler", type("Idler", (Idle,), {"name": "idler"}))
+    first = compare(scenes, ["printed", "idle"], tmp_path / "out", BRIEF)
+    done = compare(scenes, ["idle", "idler", "printed"], tmp_path / "out", BRIEF)
+    assert {law: c.flown for law, c in done.campaigns.items()} == {"idle": 0, "idler": 2, "printed": 0}
+    assert rows(done.campaigns["printed"].results) == rows(first.campaigns["printed"].results)
+
+
+@pytest.mark.parametrize(
+    ("laws", "words"),
+    [(["printed"], "expected two or more"), (["printed", "printed"], "each once"), (["printed", "nil"], "'nil'")],
+)
+def test_laws_that_cannot_be_compared(tmp_path, scenes, laws, words):
+    with pytest.raises(RunError, match=words):
+        compare(scenes, laws, tmp_path / "out", BRIEF)
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_folder_that_holds_something_else_is_refused(tmp_path, scenes, idle):
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "precious").write_text("x")
+    with pytest.raises(RunError, match="holds 'precious'"):
+        compare(scenes, ["printed", "idle"], tmp_path / "out", BRIEF)
+    assert [p.name for p in (tmp_path / "out").iterdir()] == ["precious"]
+
+
+def results(*scores):
+    return Results(table_of([row_of(i, score, 0.01) for i, score in enumerate(scores)]))
+
+
+def score(time, clearance, effort):
+    return Score(math.isfinite(time), time, clearance, effort, 1.0, 1e-6, -1)
+
+
+def test_a_pair_is_compared_on_what_one_completes():
+    mine = results(score(30.0, 0.1, 100.0), score(40.0, -0.1, 1.0), score(math.inf, 0.1, 2.0), score(50.0, 0.0, 200.0))
+    other = results(score(60.0, 0.1, 50.0), score(1.0, 0.1, 1.0), score(1.0, 0.1, 1.0), score(math.inf, 0.3, 70.0))
+    assert pair("mine", mine, "other", other) == {
+        "completed_by": "mine", "scenes": 2, "beside": "other", "completed_by_both": 1,
+        "reach_time": {"mine": 40.0, "other": None},  # between 60 s and never
+        "effort": {"mine": 150.0, "other": 60.0},
+    }  # fmt: skip
+    assert pair("other", other, "mine", mine) == {
+        "completed_by": "other", "scenes": 3, "beside": "mine", "completed_by_both": 1,
+        "reach_time": {"other": 1.0, "mine": 40.0}, "effort": {"other": 1.0, "mine": 2.0},
+    }  # fmt: skip
+
+
+def test_shares_count_what_never_comes():
+    values, shares = shares_up_to(np.array([3.0, np.nan, 1.0, np.nan]))
+    assert values.tolist() == [1.0, 3.0] and shares.tolist() == [0.25, 0.5]
+    assert [a.size for a in shares_up_to(np.zeros(0))] == [0, 0]

@@ -1,0 +1,112 @@
+"""The search for the gains of the laws for comparison: its scenes, its draws, its order, and what it found."""
+
+import math
+import re
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from benchmarks import baselines
+from benchmarks.__main__ import main
+from benchmarks.baselines import RANGES, Candidate, Outcome, draws, outcome
+from controller import LAWS
+from cosim.flight import Score
+from cosim.scene import read_scenes
+
+ROOT = Path(__file__).parents[1]
+SCENES = ROOT / "tests" / "data" / "scenes"
+
+
+@pytest.mark.parametrize(("name", "flags"), [("plain", []), ("hard", ["--hard"])])
+def test_scenes_are_those_of_the_reference_to_the_last_digit(name, flags, capsys):
+    main(["scenes", "20000", "6", *flags])
+    assert capsys.readouterr().out == (SCENES / f"{name}.jsonl").read_text()
+
+
+def test_scenes_can_be_read(tmp_path, capsys):
+    main(["scenes", "7", "3", "--hard"])
+    path = tmp_path / "scenes.jsonl"
+    path.write_text(capsys.readouterr().out)
+    assert [scene.seed for scene in read_scenes(path)] == [7, 8, 9]
+
+
+@pytest.mark.parametrize("law", RANGES)
+def test_draws_are_repeated_by_their_seed_and_stay_in_their_ranges(law):
+    first, again = (draws(law, 50, np.random.default_rng(3)) for _ in range(2))
+    near = draws(law, 50, np.random.default_rng(3), first[0], 1.5)
+    assert first == again
+    for name, (low, high) in RANGES[law].items():
+        values, around, best = (
+            [getattr(g, name) for g in first],
+            [getattr(g, name) for g in near],
+            getattr(first[0], name),
+        )
+        assert min(values) >= 0.999 * low and max(values) <= 1.001 * high and len(set(values)) > 40
+        assert max(values) > 2.0 * min(values)
+        assert min(around) >= 0.999 * max(low, best / 1.5) and max(around) <= 1.001 * min(high, best * 1.5)
+    left = set(LAWS[law].gains_type._fields) - set(RANGES[law])
+    assert all(getattr(gains, name) == getattr(LAWS[law].gains_type(), name) for gains in first for name in left)
+
+
+def score(reached=True, reach_time=20.0, min_clearance=0.1, effort=1000.0, failed_step=-1):
+    return Score(reached, reach_time, min_clearance, effort, 1.0, 1e-6, failed_step)
+
+
+def test_medians_are_over_what_was_reached_without_violation():
+    scores = [
+        score(reach_time=10.0, effort=1.0),
+        score(reach_time=30.0, effort=3.0),
+        score(reach_time=1.0, effort=9.0, min_clearance=-0.01),
+        score(reached=False, reach_time=math.inf, effort=9.0),
+        score(reached=False, reach_time=math.inf, min_clearance=math.nan),
+        score(reached=False, reach_time=math.inf, failed_step=7),
+    ]
+    assert outcome(scores) == Outcome(scenes=6, violations=3, reached=3, reach_time=20.0, effort=2.0)
+    assert outcome([score(reached=False)]).reach_time == math.inf
+
+
+def test_violations_count_before_scenes_reached_and_those_before_time():
+    better = [(0, 9, 50.0), (0, 9, 60.0), (0, 8, 10.0), (1, 10, 5.0)]
+    ranks = [Outcome(10, violations, reached, time, 0.0).rank for violations, reached, time in better]
+    assert ranks == sorted(ranks)
+
+
+def test_the_search_finds_the_best_and_gives_up_what_falls_behind(monkeypatch):
+    """On a landscape: violated where the reach is short, fastest where k_p1 is 100."""
+    flights = []
+
+    def fly_on(job):
+        _, (gains, scores), scenes, _ = job
+        flights.extend(range(len(scores), scenes))
+        clearance, time = gains.reach - 0.4, 10.0 + 10.0 * abs(math.log(gains.k_p1 / 100.0))
+        more = tuple(score(reach_time=time + i % 3, min_clearance=clearance) for i in range(len(scores), scenes))
+        return Candidate(gains, scores + more)
+
+    monkeypatch.setattr(baselines, "_fly_on", fly_on)
+    monkeypatch.setattr(baselines, "ProcessPoolExecutor", ThreadPoolExecutor)
+    found = baselines.search("pd", 80, 0, 2)
+    assert found.gains.reach >= 0.4 and len(found.scores) == baselines.SCENES
+    assert found.gains.k_p1 == pytest.approx(100.0, rel=0.05)
+    assert len(flights) < 0.3 * 80 * baselines.SCENES
+    assert baselines.search("pd", 80, 0, 1).gains == found.gains
+
+
+def test_a_law_that_has_no_ranges_is_refused(capsys):
+    with pytest.raises(SystemExit):
+        main(["baselines", "printed"])
+    assert "'printed'" in capsys.readouterr().err
+
+
+@pytest.mark.slow
+def test_the_documents_table_is_what_the_default_gains_come_to(capsys):
+    main(["baselines", "--draws", "0", "--workers", "1"])
+    printed = re.findall(
+        r"^(\w+), in full: (\d+) violations and (\d+) reached .*: ([\d.]+) s, (\d+) N s$", capsys.readouterr().out, re.M
+    )
+    rows = re.findall(
+        r"^\| `(\w+)` \| (\d+) \| (\d+) \| ([\d.]+) \| (\d+) \|", (ROOT / "docs" / "baselines.md").read_text(), re.M
+    )
+    assert len(rows) == len(RANGES)
+    assert sorted(rows) == sorted(printed)
