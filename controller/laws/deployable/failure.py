@@ -144,7 +144,7 @@ def _by_velocity(
     step = 0.0
     for axis in range(3):
         lag[axis] -= (R[axis, 0] * push[0] + R[axis, 1] * push[1] + R[axis, 2] * push[2]) * impulse
-        if measured and spread[axis] > 0.0:
+        if measured:
             step += lag[axis] * (2.0 * innovation[axis] - lag[axis]) / (2.0 * spread[axis] ** 2)
             lag[axis] *= 1.0 - gain[axis]
     return min(max(step, -_MOST_A_STEP), _MOST_A_STEP)
@@ -172,8 +172,8 @@ def _by_moment(
 
 
 @compiled
-def give_up(suspicion: Suspicion, thrusters: Thrusters, failed: int, told: bool) -> None:
-    """Take a thruster out of `health`, which is told or suspected; the one suspected before is taken back.
+def give_up(suspicion: Suspicion, thrusters: Thrusters, failed: int) -> None:
+    """Take a suspected thruster out of `health`, and take back the one that was suspected before it.
 
     Parameters
     ----------
@@ -183,12 +183,10 @@ def give_up(suspicion: Suspicion, thrusters: Thrusters, failed: int, told: bool)
         Whose `health` changes; `model.share_out` is for the caller to do.
     failed : int
         From 0.
-    told : bool
-        Whether it is known; it is not taken back then.
     """
     if suspicion.suspected[0] >= 0:
         thrusters.health[suspicion.suspected[0]] = 1.0
-    suspicion.suspected[0] = -1 if told else failed
+    suspicion.suspected[0] = failed
     thrusters.health[failed] = 0.0
     suspicion.ratio[:] = 0.0
     suspicion.lag[:, :] = 0.0

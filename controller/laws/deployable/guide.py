@@ -242,7 +242,7 @@ def _length(way: Array, count: int, start: Array) -> float:
     length = _distance(way[0], start)
     for i in range(1, count):
         length += _distance(way[i], way[i - 1])
-    return length
+    return float(length)
 
 
 @compiled

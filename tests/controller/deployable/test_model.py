@@ -2,8 +2,9 @@
 
 import numpy as np
 import pytest
-from scipy.optimize import minimize
+from scipy.optimize import linprog, minimize
 
+from controller import LawError
 from controller.laws.deployable.braking import least_forces
 from controller.laws.deployable.model import (
     dynamics_of,
@@ -68,8 +69,6 @@ def test_a_lost_thruster_gives_nothing_and_the_others_give_the_wrench():
 
 def test_the_least_force_is_that_of_the_worst_direction():
     """Against a search over all directions for the greatest force that the limits allow without moment: within 2 %."""
-    from scipy.optimize import linprog
-
     for model in MODELS.values():
         forces = least_forces(model)
         for lost in (2, 6, 8):
@@ -86,6 +85,27 @@ def test_the_least_force_is_that_of_the_worst_direction():
             best = min(starts, key=support)
             least = minimize(support, best, method="Nelder-Mead", options={"maxiter": 60}).fun
             assert 0.98 * forces[lost] <= least <= 1.001 * forces[lost]
+
+
+def with_thrusters(model, keep):
+    matrix = np.ascontiguousarray(model.thruster_matrix[:, keep])
+    return model._replace(thruster_matrix=matrix, thrust_min=model.thrust_min[keep], thrust_max=model.thrust_max[keep])
+
+
+def test_a_vehicle_that_cannot_push_everywhere_is_refused():
+    with pytest.raises(LawError, match=r"6 thrusters push 0 N in the worst direction"):
+        least_forces(with_thrusters(MODELS["bluerov2_heavy"], [0, 1, 2, 3, 4, 6]))
+
+
+def test_with_no_thruster_to_spare_nothing_is_relied_on_after_a_loss():
+    six = with_thrusters(MODELS["odin"], [0, 1, 2, 4, 5, 6])
+    forces = least_forces(
+        six._replace(
+            thruster_matrix=np.vstack([np.eye(3), np.zeros((3, 3))]) @ np.eye(3, 6)
+            + np.vstack([np.zeros((3, 6)), np.eye(3, 6, 3)])
+        )
+    )
+    assert forces == pytest.approx(np.full(7, 27.0))
 
 
 def test_nothing_untold_enters_the_model():
