@@ -164,18 +164,14 @@ def _heed(memory: DeployableMemory, told: Array, failed: int) -> bool:
     bool
         Whether the thrusters at hand are others than before.
     """
-    thrusters, changed = memory.thrusters, False
+    health, changed = memory.thrusters.health, False
     if failed >= 0:
-        failure.give_up(memory.suspicion, thrusters, failed, False)
+        failure.give_up(memory.suspicion, memory.thrusters, failed)
         changed = True
     for j in range(told.size):
-        if told[j] != memory.told[j]:
-            memory.told[j] = told[j]
+        if told[j] != memory.told[j] or (told[j] == 0.0 and health[j] != 0.0):
+            health[j] = memory.told[j] = told[j]
             changed = True
-            if told[j] == 0.0:
-                failure.give_up(memory.suspicion, thrusters, j, True)
-            else:
-                thrusters.health[j] = 1.0
     return changed
 
 
