@@ -3,15 +3,20 @@
     minimise    1/2 (u - u0)^T H (u - u0) + 1/2 sum rho_i s_i^2
     subject to  a_i^T u + s_i >= b_i,   lower <= u <= upper
 
-A barrier may give way by s_i at the price rho_i, so there is always a solution. Its dual has a multiplier for each barrier
-and each limit and asks only that they be >= 0,
+A barrier may give way by s_i at the price rho_i, so there is always a solution, and only one. Its dual has a multiplier
+for each barrier and each limit and asks only that they be >= 0,
 
     minimise    1/2 y^T G y - d^T y,   y >= 0,   G = A H^-1 A^T + diag(1 / rho),   d = b - A u0,
 
-which the active-set method of Lawson and Hanson (Solving Least Squares Problems, 1974, ch. 23) solves in finitely many
-steps, each a Cholesky factor of the few rows that are active. It is written here, and not taken from a library, because
-it must compile into the loop (a call of quadprog costs 7 us of which 1 us is work), allocate nothing and end after
-a stated number of steps.
+which the active-set method of Lawson and Hanson (Solving Least Squares Problems, 1974, ch. 23) solves. It adds the row
+that is violated most, in the measure sqrt(G_ii) of what its multiplier can do, and moves to the minimum over the rows
+it has, dropping those whose multiplier would turn negative on the way. Each such minimum is below the one before, so
+that no set of rows comes twice and the search ends. Rounding could still let it turn in circles: a row that cannot be
+added, since it depends on those that are there or its multiplier would not grow, is set aside until another one has
+moved the forces, and three steps a row end the search in any case.
+
+It is written here, and not taken from a library, because it must compile into the loop (a call of quadprog costs 7 us
+of which 1 us is work), allocate nothing and end after a stated number of steps.
 """
 
 from __future__ import annotations
@@ -25,19 +30,27 @@ from controller.compiled import compiled
 
 Array = NDArray[np.float64]
 
-_TOLERANCE = 1e-9  # of the greatest |d|, below which a row counts as kept
+_TOLERANCE = 1e-11  # of the greatest violation at the start, below which a row counts as kept
+_DEPENDENT = 1e-12  # of a row's own G_ii: where less is left of it beside the other rows, it depends on them
+_STEPS_A_ROW = 3
+_FREE, _PASSIVE, _ASIDE, _NOTHING = 0, 1, 2, 3  # what a row is: may be added, is in, cannot be now, moves no force
 
 
 class Workspace(NamedTuple):
-    """Where a program of up to r barriers and m thrusters is worked out."""
+    """Where a program of up to r barriers and m thrusters is worked out.
 
-    rows: Array  # (r + 2 m, m) a_i, then +-1 rows of the limits
-    right: Array  # (r + 2 m,) b_i
-    price: Array  # (r + 2 m,) 1 / rho_i; 0 for the limits
+    Its rows are the barriers that count, then the lower limits, then the upper ones.
+    """
+
+    rows: Array  # (r, m) a_i
+    right: Array  # (r,) b_i
+    price: Array  # (r,) 1 / rho_i
     shaped: Array  # (r + 2 m, m) H^-1 a_i
+    size: Array  # (r + 2 m,) sqrt(G_ii)
     residual: Array  # (r + 2 m,) d
     multipliers: Array  # (r + 2 m,) y
-    trial: Array  # (r + 2 m,)
+    trial: Array  # (r + 2 m,) multipliers that minimise over the passive rows, in their order
+    standing: NDArray[np.int64]  # (r + 2 m,) what each row is
     passive: NDArray[np.int64]  # (r + 2 m,) rows whose multiplier is free, in order of coming
     factor: Array  # (r + 2 m, r + 2 m) Cholesky factor of G over the passive rows
     wanted: Array  # (m,) u0
@@ -58,13 +71,15 @@ def workspace(barriers: int, thrusters: int) -> Workspace:
     """
     n = barriers + 2 * thrusters
     return Workspace(
-        rows=np.zeros((n, thrusters)),
-        right=np.zeros(n),
-        price=np.zeros(n),
+        rows=np.zeros((barriers, thrusters)),
+        right=np.zeros(barriers),
+        price=np.zeros(barriers),
         shaped=np.zeros((n, thrusters)),
+        size=np.zeros(n),
         residual=np.zeros(n),
         multipliers=np.zeros(n),
         trial=np.zeros(n),
+        standing=np.zeros(n, dtype=np.int64),
         passive=np.zeros(n, dtype=np.int64),
         factor=np.zeros((n, n)),
         wanted=np.zeros(thrusters),
@@ -78,131 +93,182 @@ def solve(work: Workspace, barriers: int, inverse: Array, lower: Array, upper: A
     Parameters
     ----------
     work : Workspace
-        Holds the program; its multipliers hold the solution's afterwards.
+        Holds the program; its multipliers hold the solution's afterwards. A barrier with a number that is not finite
+        is left out, and a force that is not finite is not wanted: both become 0.
     barriers : int
         How many rows count.
     inverse : ndarray, shape (m, m)
         H^-1, symmetric positive definite.
     lower, upper : ndarray, shape (m,)
-        Limits [N].
+        Limits [N], lower <= upper.
     forces : ndarray, shape (m,)
         Receives u [N], within the limits.
 
     Returns
     -------
     int
-        Steps taken; negative if the bound on steps ended the search, with the best forces so far.
+        Steps taken, each a change of the rows that hold: at most 3 (barriers + 2 m). Negative if that ended the search;
+        the forces are then within the limits, but not the best.
     """
-    m = forces.size
-    n = barriers + 2 * m
+    n = barriers + 2 * forces.size
+    tolerance = _TOLERANCE * _begin(work, barriers, inverse, lower, upper)
+    forces[:] = work.wanted
+    count, steps, most = 0, 0, _STEPS_A_ROW * n
+    at = _worst(work, barriers, lower, upper, forces, tolerance)
+    while at >= 0 and steps < most:
+        steps += 1
+        work.passive[count] = at
+        added = _append(work, barriers, count)
+        if added:
+            _minimum(work, count + 1)
+            added = work.trial[count] > 0.0
+        if not added:
+            work.standing[at] = _ASIDE
+            at = _worst(work, barriers, lower, upper, forces, tolerance)
+            continue
+        work.standing[at] = _PASSIVE
+        count += 1
+        drop = _advance(work, count)
+        while drop >= 0 and steps < most:
+            steps += 1
+            count -= 1
+            for k in range(drop, count):
+                work.passive[k] = work.passive[k + 1]
+            for k in range(drop, count):
+                _append(work, barriers, k)
+            _minimum(work, count)
+            drop = _advance(work, count)
+        for j in range(forces.size):
+            total = work.wanted[j]
+            for k in range(count):
+                total += work.shaped[work.passive[k], j] * work.multipliers[work.passive[k]]
+            forces[j] = total
+        for i in range(n):
+            if work.standing[i] == _ASIDE:
+                work.standing[i] = _FREE
+        at = _worst(work, barriers, lower, upper, forces, tolerance)
+    if at < 0:
+        _refine(work, barriers, count, lower, upper, forces)
+    for j in range(forces.size):  # of the last bits; of more if the search was ended
+        forces[j] = min(max(forces[j], lower[j]), upper[j])
+    return steps if at < 0 else -steps
+
+
+@compiled
+def _begin(work: Workspace, barriers: int, inverse: Array, lower: Array, upper: Array) -> float:
+    """Prepare all rows, none of them passive, and return the greatest |d_i| / sqrt(G_ii)."""
+    m, scale = lower.size, 0.0
     for j in range(m):
-        above, below = barriers + 2 * j, barriers + 2 * j + 1
-        work.rows[above, :], work.rows[below, :] = 0.0, 0.0
-        work.rows[above, j], work.right[above], work.price[above] = 1.0, lower[j], 0.0
-        work.rows[below, j], work.right[below], work.price[below] = -1.0, -upper[j], 0.0
-    scale = 0.0
-    for i in range(n):
-        kept = 0.0
-        for j in range(m):
-            kept += work.rows[i, j] * work.wanted[j]
-        work.residual[i] = work.right[i] - kept
-        scale = max(scale, abs(work.residual[i]))
-        work.multipliers[i] = 0.0
+        if not np.isfinite(work.wanted[j]):
+            work.wanted[j] = 0.0
     for i in range(barriers):
+        whole = work.right[i] + work.price[i]
+        for j in range(m):
+            whole += work.rows[i, j]
+        if not np.isfinite(whole):
+            work.rows[i, :], work.right[i], work.price[i] = 0.0, 0.0, 1.0
+        own, kept = 0.0, 0.0
         for j in range(m):
             total = 0.0
             for q in range(m):
                 total += inverse[j, q] * work.rows[i, q]
             work.shaped[i, j] = total
+            own += work.rows[i, j] * total
+            kept += work.rows[i, j] * work.wanted[j]
+        work.residual[i] = work.right[i] - kept
+        work.size[i] = np.sqrt(own + work.price[i])
+        work.multipliers[i], work.standing[i] = 0.0, _FREE
+        if not own > 0.0:
+            work.multipliers[i] = max(work.right[i], 0.0) / work.price[i] if work.price[i] > 0.0 else 0.0
+            work.standing[i] = _NOTHING
+        else:
+            scale = max(scale, abs(work.residual[i]) / work.size[i])
     for j in range(m):
+        low, high = barriers + j, barriers + m + j
         for q in range(m):
-            work.shaped[barriers + 2 * j, q] = inverse[j, q]
-            work.shaped[barriers + 2 * j + 1, q] = -inverse[j, q]
-
-    forces[:] = work.wanted
-    count, steps, most = 0, 0, 3 * n
-    while steps < most:
-        # the row that is violated most, in the measure of its own length
-        worst, at = _TOLERANCE * (1.0 + scale), -1
-        for i in range(n):
-            if work.multipliers[i] <= 0.0:
-                lack = work.right[i]
-                for j in range(m):
-                    lack -= work.rows[i, j] * forces[j]
-                if lack > worst and not _is_passive(work, count, i):
-                    worst, at = lack, i
-        if at < 0:
-            break
-        work.passive[count] = at
-        count += 1
-        # move to the minimum over the passive rows, dropping those whose multiplier would turn negative on the way
-        while True:
-            steps += 1
-            if not _minimum(work, count):
-                count -= 1  # it depends on those before it: leave it
-                work.multipliers[at] = 0.0
-                return -steps if steps else -1
-            reach, drop = 1.0, -1
-            for k in range(count):
-                i = work.passive[k]
-                if work.trial[k] <= 0.0:
-                    part = work.multipliers[i] / (work.multipliers[i] - work.trial[k])
-                    if part < reach or drop < 0:
-                        reach, drop = min(part, reach), k
-            for k in range(count):
-                i = work.passive[k]
-                work.multipliers[i] += reach * (work.trial[k] - work.multipliers[i])
-            if drop < 0:
-                break
-            work.multipliers[work.passive[drop]] = 0.0
-            for k in range(drop, count - 1):
-                work.passive[k] = work.passive[k + 1]
-            count -= 1
-            if steps >= most:
-                break
-        for j in range(m):
-            total = work.wanted[j]
-            for k in range(count):
-                i = work.passive[k]
-                total += work.shaped[i, j] * work.multipliers[i]
-            forces[j] = total
-    for j in range(m):  # of the last bit
-        forces[j] = min(max(forces[j], lower[j]), upper[j])
-    return steps if steps < most else -steps
+            work.shaped[low, q] = inverse[j, q]
+            work.shaped[high, q] = -inverse[j, q]
+        work.residual[low], work.residual[high] = lower[j] - work.wanted[j], work.wanted[j] - upper[j]
+        for i in (low, high):
+            work.size[i] = np.sqrt(inverse[j, j])
+            work.multipliers[i], work.standing[i] = 0.0, _FREE
+            scale = max(scale, abs(work.residual[i]) / work.size[i])
+    return scale
 
 
 @compiled
-def _is_passive(work: Workspace, count: int, row: int) -> bool:
-    for k in range(count):
-        if work.passive[k] == row:
-            return True
+def _worst(work: Workspace, barriers: int, lower: Array, upper: Array, forces: Array, tolerance: float) -> int:
+    """Return the free row that is violated most, -1 if none is by more than the tolerance."""
+    m, worst, at = forces.size, tolerance, -1
+    for i in range(barriers + 2 * m):
+        if work.standing[i] != _FREE:
+            continue
+        if i < barriers:
+            lack = work.right[i]
+            for j in range(m):
+                lack -= work.rows[i, j] * forces[j]
+        elif i < barriers + m:
+            lack = lower[i - barriers] - forces[i - barriers]
+        else:
+            lack = forces[i - barriers - m] - upper[i - barriers - m]
+        if lack > worst * work.size[i]:
+            worst, at = lack / work.size[i], i
+    return at
+
+
+@compiled
+def _refine(work: Workspace, barriers: int, count: int, lower: Array, upper: Array, forces: Array) -> None:
+    """Correct the multipliers and forces of the passive rows by what those forces still lack: rounding."""
+    m = forces.size
+    for a in range(count):
+        i = work.passive[a]
+        if i < barriers:
+            work.residual[i] = work.right[i] - work.price[i] * work.multipliers[i]
+            for j in range(m):
+                work.residual[i] -= work.rows[i, j] * forces[j]
+        elif i < barriers + m:
+            work.residual[i] = lower[i - barriers] - forces[i - barriers]
+        else:
+            work.residual[i] = forces[i - barriers - m] - upper[i - barriers - m]
+    _minimum(work, count)
+    for a in range(count):
+        i = work.passive[a]
+        work.multipliers[i] = max(work.multipliers[i] + work.trial[a], 0.0)
+        for j in range(forces.size):
+            forces[j] += work.shaped[i, j] * work.trial[a]
+
+
+@compiled
+def _append(work: Workspace, barriers: int, a: int) -> bool:
+    """Write row `a` of the Cholesky factor, of the passive row in that place; False if it depends on those before."""
+    m, L, i = work.wanted.size, work.factor, work.passive[a]
+    for b in range(a + 1):
+        k = work.passive[b]
+        total = 0.0
+        if i < barriers:
+            for j in range(m):
+                total += work.rows[i, j] * work.shaped[k, j]
+        elif i < barriers + m:
+            total = work.shaped[k, i - barriers]
+        else:
+            total = -work.shaped[k, i - barriers - m]
+        if a == b and i < barriers:
+            total += work.price[i]
+        for q in range(b):
+            total -= L[a, q] * L[b, q]
+        if b < a:
+            L[a, b] = total / L[b, b]
+        else:
+            least = _DEPENDENT * work.size[i] ** 2
+            L[a, a] = np.sqrt(max(total, least))
+            return bool(total > least)
     return False
 
 
 @compiled
-def _minimum(work: Workspace, count: int) -> bool:
-    """Write the multipliers that minimise over the passive rows into `trial`; False if their rows are dependent."""
-    m = work.wanted.size
+def _minimum(work: Workspace, count: int) -> None:
+    """Write the multipliers that minimise over the passive rows into `trial`."""
     L = work.factor
-    for a in range(count):
-        i = work.passive[a]
-        for b in range(a + 1):
-            k = work.passive[b]
-            total = 0.0
-            for j in range(m):
-                total += work.rows[i, j] * work.shaped[k, j]
-            whole = total
-            if a == b:
-                total += work.price[i]
-                whole = total
-            for q in range(b):
-                total -= L[a, q] * L[b, q]
-            if a == b:
-                if not total > 1e-12 * whole:
-                    return False
-                L[a, a] = np.sqrt(total)
-            else:
-                L[a, b] = total / L[b, b]
     for a in range(count):
         total = work.residual[work.passive[a]]
         for q in range(a):
@@ -213,4 +279,22 @@ def _minimum(work: Workspace, count: int) -> bool:
         for q in range(a + 1, count):
             total -= L[q, a] * work.trial[q]
         work.trial[a] = total / L[a, a]
-    return True
+
+
+@compiled
+def _advance(work: Workspace, count: int) -> int:
+    """Move the multipliers towards `trial` as far as all stay >= 0; return the place of the row that leaves, or -1."""
+    reach, drop = 1.0, -1
+    for k in range(count):
+        if work.trial[k] <= 0.0:
+            now = work.multipliers[work.passive[k]]
+            part = now / (now - work.trial[k]) if now > 0.0 else 0.0
+            if drop < 0 or part < reach:
+                reach, drop = min(part, 1.0), k
+    for k in range(count):
+        i = work.passive[k]
+        work.multipliers[i] = max(work.multipliers[i] + reach * (work.trial[k] - work.multipliers[i]), 0.0)
+    if drop >= 0:
+        work.multipliers[work.passive[drop]] = 0.0
+        work.standing[work.passive[drop]] = _FREE
+    return drop

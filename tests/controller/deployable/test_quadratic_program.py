@@ -1,0 +1,122 @@
+"""The quadratic program against quadprog, and against the conditions that only its solution fulfils."""
+
+import numpy as np
+import pytest
+
+from controller.laws.deployable.model import share_out, thrusters_of
+from controller.laws.deployable.quadratic_program import solve, workspace
+from cosim.vehicle_model import vehicle_model
+from plant_fmu.vehicle import load_vehicle
+
+quadprog = pytest.importorskip("quadprog")
+MODELS = {name: vehicle_model(load_vehicle(name)) for name in ("odin", "bluerov2_heavy")}
+KINDS = ("any", "one", "parallel", "contradictory", "zero", "enclosed", "saturated")
+
+
+def program(rng, kind):
+    """Return a program as the law makes them: thrusters, slopes of clearances times what thrusters push, prices."""
+    model = MODELS[str(rng.choice(list(MODELS)))]
+    thrusters = thrusters_of(model)
+    for lost in rng.choice(8, size=rng.choice([0, 0, 1, 2]), replace=False):
+        thrusters.health[lost] = 0.0
+    share_out(thrusters)
+    mass = model.rigid_mass[0, 0] + model.added_mass[0, 0]
+    count = 1 if kind == "one" else int(rng.integers(2, 15))
+    slopes = rng.normal(size=(count, 3))
+    if kind == "parallel":
+        slopes = slopes[0] * rng.choice([1.0, 1.0 + 1e-13, 2.0], size=(count, 1))
+    elif kind == "contradictory":
+        slopes[1::2] = -slopes[0:-1:2][: slopes[1::2].shape[0]]
+    slopes /= np.linalg.norm(slopes, axis=1)[:, None]
+    if kind == "zero":
+        slopes[::2] = 0.0
+    rows = slopes @ thrusters.matrix[:3] / mass
+    reach = np.abs(rows) @ np.maximum(thrusters.upper, -thrusters.lower)
+    right = reach * rng.uniform(0.2, 3.0, count) if kind == "enclosed" else rng.normal(size=count) * (0.05 + reach)
+    price = 10.0 ** -rng.uniform(3.0, 6.0, count) / mass**2
+    wanted = rng.normal(size=8) * (300.0 if kind == "saturated" else 15.0) * thrusters.health
+    return thrusters, rows, right, price, wanted
+
+
+def ask(thrusters, rows, right, price, wanted):
+    """Return forces, multipliers and steps of our own solver."""
+    count, m = rows.shape
+    work, forces = workspace(count + 2, m), np.full(m, np.nan)
+    work.rows[:count], work.right[:count], work.price[:count], work.wanted[:] = rows, right, price, wanted
+    steps = solve(work, count, thrusters.inverse, thrusters.lower, thrusters.upper, forces)
+    return forces, work.multipliers[: count + 2 * m].copy(), steps
+
+
+def by_quadprog(thrusters, rows, right, price, wanted):
+    """Return its forces; each slack is counted in the measure in which it costs 1."""
+    count, m = rows.shape
+    H = np.linalg.inv(thrusters.inverse)
+    G = np.block([[(H + H.T) / 2.0, np.zeros((m, count))], [np.zeros((count, m)), np.eye(count)]])
+    rooms = np.hstack([np.vstack([np.eye(m), -np.eye(m)]), np.zeros((2 * m, count))])
+    C = np.vstack([np.hstack([rows, np.diag(np.sqrt(price))]), rooms])
+    b = np.r_[right, thrusters.lower, -thrusters.upper]
+    return quadprog.solve_qp(G, np.r_[H @ wanted, np.zeros(count)], C.T, b)[0][:m]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_forces_are_those_of_quadprog(kind):
+    rng = np.random.default_rng(KINDS.index(kind))
+    for _ in range(150):
+        given = program(rng, kind)
+        forces, _, steps = ask(*given)
+        assert steps >= 0
+        assert forces == pytest.approx(by_quadprog(*given), abs=3e-7 * (1.0 + np.abs(given[-1]).max()))
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_solution_fulfils_the_conditions_of_kuhn_and_tucker(kind):
+    """Stationary, within the limits, multipliers >= 0 and only where a row holds; steps within their bound."""
+    rng = np.random.default_rng(100 + KINDS.index(kind))
+    for _ in range(1000):
+        thrusters, rows, right, price, wanted = given = program(rng, kind)
+        forces, y, steps = ask(*given)
+        count, m = rows.shape
+        scale = 1.0 + np.abs(wanted).max()
+        assert 0 <= steps <= 3 * (count + 2 * m)
+        assert np.all(forces >= thrusters.lower) and np.all(forces <= thrusters.upper)
+        assert np.all(y >= 0.0)
+        barriers, low, high = y[:count], y[count : count + m], y[count + m :]
+        pull = rows.T @ barriers + low - high
+        assert forces == pytest.approx(wanted + thrusters.inverse @ pull, abs=1e-6 * scale)
+        lack = right - rows @ forces - price * barriers
+        length = np.sqrt(np.sum(rows @ thrusters.inverse * rows, axis=1) + price)
+        assert np.all(lack <= 1e-6 * scale * length)
+        moved = barriers > 0.0
+        assert lack[moved] == pytest.approx(0.0, abs=1e-6 * scale * length.max())
+        assert forces[low > 0.0] == pytest.approx(thrusters.lower[low > 0.0], abs=1e-6 * scale)
+        assert forces[high > 0.0] == pytest.approx(thrusters.upper[high > 0.0], abs=1e-6 * scale)
+
+
+def test_a_wanted_force_that_hurts_nothing_is_given_to_the_last_bit():
+    thrusters = thrusters_of(MODELS["odin"])
+    wanted = np.linspace(-20.0, 20.0, 8)
+    forces, y, steps = ask(thrusters, np.ones((1, 8)), np.array([-1e3]), np.array([1e-6]), wanted)
+    assert steps == 0 and not y.any()
+    assert np.array_equal(forces, wanted)
+
+
+def test_the_barrier_of_greater_price_yields_less():
+    """Two that contradict each other, and cannot both hold within what the forces cost: s_1 / s_2 = rho_2 / rho_1."""
+    thrusters = thrusters_of(MODELS["odin"])
+    along = thrusters.matrix[0] / 187.5
+    price = np.array([1e-3, 1e-5]) / 187.5**2
+    forces, y, _ = ask(thrusters, np.array([along, -along]), np.array([0.2, 0.2]), price, np.zeros(8))
+    yielding = y[:2] * price
+    assert yielding[0] / yielding[1] == pytest.approx(100.0, rel=0.02)
+    assert yielding == pytest.approx([0.2 - along @ forces, 0.2 + along @ forces], rel=1e-6)
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
+def test_what_is_not_finite_moves_nothing(bad):
+    thrusters = thrusters_of(MODELS["odin"])
+    rows, right, price = np.ones((3, 8)) / 187.5, np.full(3, 0.3), np.full(3, 1e-8)
+    alone, _, _ = ask(thrusters, rows[:1], right[:1], price[:1], np.zeros(8))
+    rows[1, 3], right[2] = bad, bad
+    forces, _, steps = ask(thrusters, rows, right, price, np.r_[bad, np.zeros(7)])
+    assert steps > 0
+    assert np.array_equal(forces, alone)
