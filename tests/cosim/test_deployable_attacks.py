@@ -9,6 +9,8 @@ from hypothesis import strategies as st
 
 from controller import VehicleState
 from controller.laws import DeployableGains, DeployableLaw
+from controller.laws.deployable.barrier import look, sight_of, slope_of, turning_of
+from controller.laws.deployable.faces import face_ahead
 from controller.regions import (
     Box,
     Cone,
@@ -26,6 +28,7 @@ from controller.regions import (
 )
 from cosim.vehicle_model import vehicle_model
 from plant_fmu.vehicle import load_vehicle
+from tests.cosim.test_deployable import fly, reached, within_limits
 
 ODIN = vehicle_model(load_vehicle("odin"))
 LEVEL = np.array([1.0, 0.0, 0.0, 0.0])
@@ -139,3 +142,82 @@ def test_a_lone_false_rate_teaches_no_moment():
         rates = np.array([0.0, 0.0, 0.0, 60.0, -60.0, 60.0]) if k == 30 else np.zeros(6)
         law.step(VehicleState(HERE, LEVEL, rates, np.ones(8)), goal, pack([]), np.zeros(0), forces)
     assert np.abs(law.estimate[1:]).max() < 5.0
+
+
+CAGES = {
+    "box": (Box((3.0, 0.0, 2.0), (8.0, 2.0, 2.0)), (0.0, 0.7, 2.0), (9.0, 3.0, 3.5)),
+    "turned box": (Box((3.0, 0.0, 2.0), (8.0, 2.0, 2.0), (0.96, 0.0, 0.0, 0.28)), (0.0, -1.0, 2.0), (9.0, 3.0, 2.0)),
+    "tunnel": (Cylinder((-1.0, 0.0, 2.0), (9.0, 0.0, 2.0), 0.5), (0.0, 0.1, 2.0), (11.0, 0.3, 2.0)),
+    "prism": (
+        Prism(((-1.0, -1.0), (7.0, -1.0), (7.0, 5.0), (5.0, 5.0), (5.0, 1.0), (-1.0, 1.0)), 1.0, 3.0),
+        (0.0, 0.6, 2.0),
+        (10.0, 0.5, 2.0),
+    ),
+    "cone": (Cone((8.0, 0.0, 2.0), (-1.0, 0.0, 0.0), 0.3, 8.5), (0.0, 0.0, 2.0), (11.0, 0.0, 2.0)),
+    "pipe": (Pipe(((-1.0, 0.0, 2.0), (5.0, 0.0, 2.0), (5.0, 4.0, 2.0)), 0.6), (0.0, 0.2, 2.0), (9.0, 0.0, 2.0)),
+    "depth band": (DepthBand(2.0, 0.3), (0.0, 0.0, 1.8), (1.0, 0.0, 7.0)),
+}
+
+
+@pytest.mark.parametrize("name", CAGES)
+def test_it_stops_before_the_end_of_what_it_shall_stay_within(name):
+    """The goal lies beyond; on the way there the nearest face is one alongside, not the one ahead."""
+    shape, start, goal = CAGES[name]
+    cage = Region("cage", shape, "in")
+    flight = fly([cage], Region("goal", Sphere(goal, 0.4), "in"), start=start, duration=25.0)
+    assert flight.clearance(cage).min() > 0.0 and within_limits(flight)
+
+
+def wall(x, y, z, size):
+    return Region(f"wall {x} {y} {z}", Box((x, y, z), size), "out")
+
+
+@pytest.mark.parametrize("width", [0.6, 0.3])
+def test_a_door_that_is_the_only_way_is_found_and_passed(width):
+    beside, above = 3.0 + width / 2, (0.2, width + 0.01, 6.0)
+    walls = [wall(4.0, side * beside, 2.0, (0.2, 6.0, 8.0)) for side in (-1, 1)]
+    walls += [wall(4.0, 0.0, 2.0 + side * beside, above) for side in (-1, 1)]
+    flight = fly(walls, Region("goal", Sphere((8.0, 1.0, 2.0), 0.5), "in"), start=(0.0, -1.0, 2.0), duration=50.0)
+    assert reached(flight) and within_limits(flight)
+    assert min(flight.clearance(each).min() for each in walls) > 0.0
+
+
+@pytest.mark.parametrize(
+    ("shape", "at", "nearest", "velocity", "distance", "face"),
+    [
+        (Box((0, 0, 0), (8, 2, 2)), (0, 0.9, 0), (0, -1, 0), (1.0, 0.1, 0), 4.0, (-1, 0, 0)),
+        (Box((0, 0, 0), (8, 2, 2)), (3.5, 0.9, 0.2), (0, -1, 0), (0.1, 0, -1.0), 1.2, (0, 0, 1)),
+        (Cylinder((-1, 0, 0), (5, 0, 0), 0.5), (0, 0, 0.4), (0, 0, -1), (0.8, 0, 0.1), 5.0, (-1, 0, 0)),
+        (DepthBand(0, 0.3), (0, 0, -0.2), (0, 0, 1), (0.3, 0, 0.4), 0.5, (0, 0, -1)),
+        (Box((0, 0, 0), (8, 2, 2)), (0, 0.9, 0), (0, -1, 0), (0, 0.1, 0), np.inf, None),
+        (Box((0, 0, 0), (80, 2, 2)), (0, 0.9, 0), (0, -1, 0), (1, 0, 0), np.inf, None),
+    ],
+)
+def test_the_face_ahead_is_found(shape, at, nearest, velocity, distance, face):
+    found, packed = np.empty(3), pack([Region("cage", shape, "in")])
+    plane = face_ahead(packed, 0, np.array(at, float), np.array(nearest, float), np.array(velocity, float), 6.0, found)
+    assert plane == pytest.approx(distance, abs=1e-12)
+    if face is not None:
+        assert found == pytest.approx(np.array(face, float), abs=1e-12)
+
+
+def test_a_slope_turns_by_the_motion_against_the_region():
+    """Side by side with a ball that moves along, nothing turns; against finite differences where it does."""
+    for own in ((0.0, 0.0, 0.0), (0.0, 0.3, 0.0), (0.0, -0.1, 0.05)):
+        packed = pack([Region("ball", Sphere((2.0, 0.0, 2.0), 0.5), "out", velocity=own)])
+        velocity, sight, n, later = np.array([0.05, 0.3, 0.0, 0.0, 0.0, 0.0]), sight_of(1), np.empty(6), np.empty(6)
+        look(sight, packed, HERE, LEVEL, velocity)
+        assert slope_of(sight.gradients, sight.turnings, 0, False, n)
+        assert slope_of(sight.later_gradients, sight.later_turnings, 0, False, later)
+        relative = velocity - np.r_[own, np.zeros(3)]
+        line, step = HERE - [2.0, 0.0, 2.0], 1e-3
+        distances = [np.linalg.norm(line + k * step * relative[:3]) for k in (-1, 0, 1)]
+        truth = (distances[0] - 2.0 * distances[1] + distances[2]) / step**2
+        assert turning_of(Sphere.kind, n, later, relative) == pytest.approx(truth, abs=0.003)
+
+
+def test_no_turn_is_seen_where_another_face_becomes_the_nearest():
+    """In the middle between two walls the slope leaps to the opposite, which is no acceleration."""
+    one, other = np.array([0.0, 1.0, 0.0, 0.0, 0.0, 0.0]), np.array([0.0, -1.0, 0.0, 0.0, 0.0, 0.0])
+    for kind in (Box.kind, DepthBand.kind, Cylinder.kind, Sphere.kind):
+        assert turning_of(kind, one, other, 0.5 * one) == 0.0

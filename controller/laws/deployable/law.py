@@ -26,6 +26,7 @@ from controller.laws.deployable.attitude import attitude_of
 from controller.laws.deployable.attraction import wanted_acceleration, wanted_velocity
 from controller.laws.deployable.barrier import Motion, Sight, look, sight_of, write_rows
 from controller.laws.deployable.braking import least_forces
+from controller.laws.deployable.faces import FACES
 from controller.laws.deployable.failure import suspicion_of
 from controller.laws.deployable.gains import DeployableGains, check_gains
 from controller.laws.deployable.guide import guide_of_nothing
@@ -118,6 +119,7 @@ def step(
 
     # barriers
     motion = Motion(
+        seen.position,
         velocity,
         free,
         _push(dynamics, thrusters, R),
@@ -284,7 +286,7 @@ class DeployableLaw(CompiledLaw):
             suspicion=suspicion_of(m),
             guide=guide_of_nothing(n_regions, _SEED),
             sight=sight_of(n_regions),
-            program=workspace(n_regions, m),
+            program=workspace((1 + FACES) * n_regions, m),
             quaternion=desired.copy(),
             omega=np.zeros(3),
             told=np.ones(m),
