@@ -175,58 +175,39 @@ def write_rows(
         turning = 0.0
         if slope_of(sight.later_gradients, sight.later_turnings, i, of_attitude, later_n):
             turning = turning_of(regions.kinds[i], n, later_n, relative)
-        h = sight.clearances[i] - margin
-        rows += _write_row(work, rows, n, h, turning, price, relative, braking, motion, lower, upper, gains)
+        distance, reach, faces = sight.clearances[i], 0.0, 1
+        if not of_attitude and has_faces(regions.kinds[i]):
+            along_way[:] = relative[:3]
+            speed = np.sqrt(along_way[0] ** 2 + along_way[1] ** 2 + along_way[2] ** 2)
+            reach = margin + speed * (speed / (2.0 * braking) + 1.0 / gains.barrier_slope + 1.0 / gains.barrier_rate)
+            if 0.0 < distance < reach:
+                faces = 1 + FACES
+        for face in range(faces):  # the nearest, and those ahead
+            if face > 0:
+                distance = face_ahead(regions, i, motion.position, n[:3], along_way, reach, later_n[:3])
+                if not distance < np.inf:
+                    break
+                n[:3] = later_n[:3]
+                turning = 0.0  # flat, as far as is known
 
-        # faces ahead, flat as far as is known
-        if of_attitude or not has_faces(regions.kinds[i]):
-            continue
-        along_way[:] = relative[:3]
-        speed = np.sqrt(along_way[0] ** 2 + along_way[1] ** 2 + along_way[2] ** 2)
-        reach = margin + speed * (speed / (2.0 * braking) + 1.0 / gains.barrier_slope + 1.0 / gains.barrier_rate)
-        if not 0.0 < sight.clearances[i] < reach:
-            continue
-        for _ in range(FACES):
-            distance = face_ahead(regions, i, motion.position, n[:3], along_way, reach, later_n[:3])
-            if not distance < np.inf:
-                break
-            n[:3] = later_n[:3]
-            h = distance - margin
-            rows += _write_row(work, rows, n, h, 0.0, price, relative, braking, motion, lower, upper, gains)
+            # h, its rate, and what its second derivative is without thrust
+            h, rate, falling = distance - margin, 0.0, 0.0
+            for axis in range(6):
+                rate += n[axis] * relative[axis]
+                falling += n[axis] * motion.free[axis]
+            allowed = approach_speed(h, braking, gains.barrier_slope)
+            slope = gains.barrier_slope if h <= 0.0 else braking / (allowed + braking / gains.barrier_slope)  # phi'
+            right = -gains.barrier_rate * (rate + allowed) - slope * rate - falling - turning
+
+            # its row, unless it holds whatever the thrusters do
+            least = 0.0
+            for j in range(lower.size):
+                along = 0.0
+                for axis in range(6):
+                    along += n[axis] * motion.push[axis, j]
+                work.rows[rows, j] = along
+                least += along * (lower[j] if along > 0.0 else upper[j])
+            if right > least:
+                work.right[rows], work.price[rows] = right, price
+                rows += 1
     return rows
-
-
-@compiled
-def _write_row(
-    work: Workspace,
-    row: int,
-    n: Array,
-    h: float,
-    turning: float,
-    price: float,
-    relative: Array,
-    braking: float,
-    motion: Motion,
-    lower: Array,
-    upper: Array,
-    gains: DeployableGains,
-) -> int:
-    """Write the row of a barrier `h` of slope `n`, and return 1, or 0 if it holds whatever the thrusters do."""
-    rate, falling = 0.0, 0.0  # of h, and what its second derivative is without thrust
-    for axis in range(6):
-        rate += n[axis] * relative[axis]
-        falling += n[axis] * motion.free[axis]
-    allowed = approach_speed(h, braking, gains.barrier_slope)
-    slope = gains.barrier_slope if h <= 0.0 else braking / (allowed + braking / gains.barrier_slope)  # phi'
-    right = -gains.barrier_rate * (rate + allowed) - slope * rate - falling - turning
-    least = 0.0
-    for j in range(lower.size):
-        along = 0.0
-        for axis in range(6):
-            along += n[axis] * motion.push[axis, j]
-        work.rows[row, j] = along
-        least += along * (lower[j] if along > 0.0 else upper[j])
-    if not right > least:
-        return 0
-    work.right[row], work.price[row] = right, price
-    return 1

@@ -12,8 +12,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from controller.compiled import compiled
-from controller.regions import Ellipsoid, HalfSpace, PackedRegions, Sphere, place_clearance
+from controller.compiled import compiled, inlined
+from controller.regions import Ellipsoid, HalfSpace, PackedRegions, Sphere, clearance_of_place, place_clearance
 
 Array = NDArray[np.float64]
 
@@ -66,30 +66,32 @@ def face_ahead(
     speed = np.sqrt(speed)
     if not speed > 1e-6:
         return np.inf
-    point, within, beyond = np.empty(3), 0.0, 0.0
-    clearance = _clearance_along(regions, i, position, velocity, 0.0, point, face)
+    point, room, within, beyond = np.empty(3), np.empty(3), 0.0, 0.0
+    clearance = _clearance_along(regions, i, position, velocity, 0.0, point, room)
     while clearance > 0.0:
         if beyond >= reach:
             return np.inf
         within, beyond = beyond, min(beyond + max(clearance, reach / _LOOKS), reach)
-        clearance = _clearance_along(regions, i, position, velocity, beyond / speed, point, face)
+        clearance = _clearance_along(regions, i, position, velocity, beyond / speed, point, room)
     for _ in range(_HALVINGS):
         middle = 0.5 * (within + beyond)
-        if _clearance_along(regions, i, position, velocity, middle / speed, point, face) > 0.0:
+        if _clearance_along(regions, i, position, velocity, middle / speed, point, room) > 0.0:
             within = middle
         else:
             beyond = middle
-    distance = _clearance_along(regions, i, position, velocity, within / speed, point, face)
+    for axis in range(3):
+        point[axis] = position[axis] + within / speed * velocity[axis]
+    distance = place_clearance(regions, i, point, face)
     for axis in range(3):
         distance += face[axis] * (position[axis] - point[axis])
     return distance
 
 
-@compiled
+@inlined
 def _clearance_along(
-    regions: PackedRegions, i: int, position: Array, velocity: Array, time: float, point: Array, slope: Array
+    regions: PackedRegions, i: int, position: Array, velocity: Array, time: float, point: Array, room: Array
 ) -> float:
-    """Write where a velocity leads in a time, and the slope of the clearance there; return the clearance."""
+    """Return the clearance where a velocity leads in a time; `point` and `room` have shape (3,)."""
     for axis in range(3):
         point[axis] = position[axis] + time * velocity[axis]
-    return place_clearance(regions, i, point, slope)
+    return clearance_of_place(regions, i, point, room)
