@@ -21,6 +21,7 @@ from controller.regions.region_set import (
     evaluate_packed,
     of_attitude,
     pack,
+    place_clearance,
 )
 from controller.regions.shape import Shape
 from controller.regions.sphere import Sphere
@@ -50,4 +51,5 @@ __all__ = [
     "evaluate_packed",
     "of_attitude",
     "pack",
+    "place_clearance",
 ]

@@ -254,6 +254,18 @@ def attitude_clearance(regions: PackedRegions, i: int, position: Array, quaterni
     return -sign * g, np.array([-sign * x, -sign * y, -sign * z])
 
 
+@compiled
+def place_clearance(regions: PackedRegions, i: int, position: Array, slope: Array) -> float:
+    """Return the clearance [m] of region `i`, of position alone, and write its slope, shape (3,), of length 1 or 0."""
+    numbers = regions.numbers[regions.offsets[i] : regions.offsets[i + 1]]
+    _, x, y, z, distance = _evaluate_shape(regions.kinds[i], position - regions.shifts[i], numbers)
+    size, sign = math.sqrt(x * x + y * y + z * z), regions.signs[i]
+    scale = -sign / size if size > 0.0 else 0.0
+    slope[0], slope[1], slope[2] = scale * x, scale * y, scale * z
+    clearance: float = -sign * distance
+    return clearance
+
+
 def clearances_at(points: Array, region: Region) -> Array:
     """Return the clearance of a region at many points, as it is at time 0.
 

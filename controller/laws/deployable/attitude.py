@@ -39,7 +39,7 @@ class Attitude(NamedTuple):
     moments: Array  # (3,) phi_2..phi_4 [N m]
     last_omega: Array  # (3,) rad/s
     carried: Array  # (3,) N m, Munk's moment, body axes
-    residual: Array  # (3,) N m, moment that the model missed in the last period
+    residual: Array  # (3,) N m, moment that the model missed in the last period, within the bound
     known: Array  # (1,) 1 once last_omega is there
 
 
@@ -71,7 +71,8 @@ def adapt(
             change = 0.0
             for j in range(3):
                 change += mass[3 + i, 3 + j] * (omega[j] - last[j]) / period
-            attitude.residual[i] = change - (wrench[3 + i] + attitude.carried[i] - damping - restoring)
+            missed = change - (wrench[3 + i] + attitude.carried[i] - damping - restoring)
+            attitude.residual[i] = min(max(missed, -gains.moment_bound), gains.moment_bound)
         for i in range(3):  # phi' = -rate S(k)^T residual
             a, b = (i + 1) % 3, (i + 2) % 3
             drive = k[a] * attitude.residual[b] - k[b] * attitude.residual[a]  # S(k) r = -S(k)^T r

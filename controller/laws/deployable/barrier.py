@@ -11,9 +11,10 @@ linear in the thruster forces u:
 
 with n the slope of h over the pose, v the velocity against the region, A u what the thrusters add to the acceleration
 and a_free what there is without them. Along psi = 0 this asks for a (1 - (a / kappa) / sqrt(2 a h + (a / kappa)^2)),
-which is less than a: never for more than there is. A region's own motion enters through dh/dt. Clearances of places are
-in m and look at position alone; those of attitude (what the camera sees, which way the vehicle is turned) are in rad
-and look at both. docs/deployable.md says what this promises and what not.
+which is less than a: never for more than there is. A region's own motion enters through dh/dt. Where a region has
+several faces, those that lie ahead have barriers too: `faces.py`. Clearances of places are in m and look at position
+alone; those of attitude (what the camera sees, which way the vehicle is turned) are in rad and look at both.
+docs/deployable.md says what this promises and what not.
 """
 
 from __future__ import annotations
@@ -25,16 +26,19 @@ from numpy.typing import NDArray
 
 from controller.compiled import compiled
 from controller.laws.deployable.attraction import approach_speed
+from controller.laws.deployable.faces import FACES, face_ahead, has_faces
 from controller.laws.deployable.gains import DeployableGains
 from controller.laws.deployable.quadratic_program import Workspace
 from controller.quaternion import rate as quaternion_rate
-from controller.regions import Orientation, PackedRegions, evaluate_packed
+from controller.regions import Box, DepthBand, HalfSpace, Orientation, PackedRegions, Prism, evaluate_packed
 
 Array = NDArray[np.float64]
 
 _ATTITUDE = Orientation.kind  # shapes from it on depend on attitude
+_FLAT = (Box.kind, Prism.kind, DepthBand.kind, HalfSpace.kind)
 _AHEAD = 0.1  # s, over which the turning of a slope is measured
 _FIRM = (3.0, 3.0)  # decades: price of yielding against missing the wanted force, at weight 0, and added at weight 1
+_LEAP = 0.5  # cosine of the turn of a slope within that time, beyond which it is a leap
 _MARGIN_OF_ATTITUDE = 0.02  # rad
 
 
@@ -49,12 +53,12 @@ class Sight(NamedTuple):
     later_gradients: Array  # (n, 3)
     later_turnings: Array  # (n, 3)
     later_clearances: Array  # (n,)
-    row_of: NDArray[np.int64]  # (n,) row of the program, -1 where it has none
 
 
 class Motion(NamedTuple):
     """How the vehicle moves and could move; first three of six along world axes, last three about body axes."""
 
+    position: Array  # (3,) m, NED
     velocity: Array  # (6,) m/s over ground, rad/s
     free: Array  # (6,) m/s2, rad/s2: acceleration without thrust
     push: Array  # (6, m) m/s2, rad/s2: acceleration of one newton of each thruster
@@ -68,7 +72,7 @@ def sight_of(n: int) -> Sight:
     """Return room for `n` regions."""
     return Sight(
         np.zeros(n), np.zeros((n, 3)), np.zeros((n, 3)), np.zeros(n),
-        np.zeros(n), np.zeros((n, 3)), np.zeros((n, 3)), np.zeros(n), np.zeros(n, np.int64),
+        np.zeros(n), np.zeros((n, 3)), np.zeros((n, 3)), np.zeros(n),
     )  # fmt: skip
 
 
@@ -78,9 +82,13 @@ def look(sight: Sight, regions: PackedRegions, position: Array, quaternion: Arra
     s = sight
     evaluate_packed(regions, position, quaternion, s.values, s.gradients, s.turnings, s.clearances)
     place = position + _AHEAD * velocity[:3]
+    r = regions
+    moved = PackedRegions(
+        r.kinds, r.signs, r.offsets, r.numbers, r.shifts + _AHEAD * r.velocities, r.velocities, r.gains, r.hard
+    )
     attitude = quaternion + _AHEAD * quaternion_rate(quaternion, velocity[3:])
     attitude /= np.sqrt(attitude[0] ** 2 + attitude[1] ** 2 + attitude[2] ** 2 + attitude[3] ** 2)
-    evaluate_packed(regions, place, attitude, s.later_values, s.later_gradients, s.later_turnings, s.later_clearances)
+    evaluate_packed(moved, place, attitude, s.later_values, s.later_gradients, s.later_turnings, s.later_clearances)
 
 
 @compiled
@@ -101,6 +109,22 @@ def slope_of(gradients: Array, turnings: Array, i: int, of_attitude: bool, out: 
 
 
 @compiled
+def turning_of(kind: int, n: Array, later: Array, velocity: Array) -> float:
+    """Return (dn/dt)^T v, from a slope now and later, shape (6,) each, along a velocity against the region.
+
+    The slope of a flat face does not turn, it leaps where another face is as near, which is nothing that the vehicle
+    could follow: with flat faces only turning away counts, as round an edge; with others, no leap back.
+    """
+    turning, alike = 0.0, 0.0
+    for axis in range(6):
+        turning += (later[axis] - n[axis]) / _AHEAD * velocity[axis]
+        alike += later[axis] * n[axis]
+    if turning < 0.0 and kind < _ATTITUDE and (kind in _FLAT or alike < _LEAP):
+        return 0.0
+    return turning
+
+
+@compiled
 def write_rows(
     work: Workspace,
     sight: Sight,
@@ -118,7 +142,7 @@ def write_rows(
     work : Workspace
         Receives rows, right sides and prices.
     sight : Sight
-        From `look`; `row_of` is filled.
+        From `look`.
     regions : PackedRegions
         The n regions.
     weights : ndarray, shape (n,)
@@ -133,49 +157,57 @@ def write_rows(
     Returns
     -------
     int
-        Rows written.
+        Rows written, (1 + FACES) n at most.
     """
-    rows, n, later_n, relative = 0, np.empty(6), np.empty(6), np.empty(6)
+    rows, n, later_n, relative, along_way = 0, np.empty(6), np.empty(6), np.empty(6), np.empty(3)
     for i in range(regions.kinds.size):
-        sight.row_of[i] = -1
         of_attitude = regions.kinds[i] >= _ATTITUDE
         if not regions.hard[i] or not slope_of(sight.gradients, sight.turnings, i, of_attitude, n):
             continue
-        braking, margin = motion.braking, gains.margin + motion.spread
+        braking, margin, scale = motion.braking, gains.margin + motion.spread, motion.mass**2
         if of_attitude:
-            along = np.sqrt(n[0] ** 2 + n[1] ** 2 + n[2] ** 2)  # rad/m
-            braking, margin = gains.turning_deceleration, _MARGIN_OF_ATTITUDE + along * motion.spread
-
-        # h, its rate, and what its second derivative is without thrust
-        h = sight.clearances[i] - margin
-        rate, falling, turning = 0.0, 0.0, 0.0
-        turns = slope_of(sight.later_gradients, sight.later_turnings, i, of_attitude, later_n)
+            along, turned = n[0] ** 2 + n[1] ** 2 + n[2] ** 2, n[3] ** 2 + n[4] ** 2 + n[5] ** 2  # rad2/m2, 1
+            braking, margin = gains.turning_deceleration, _MARGIN_OF_ATTITUDE + np.sqrt(along) * motion.spread
+            scale = motion.mass**2 * along + motion.inertia**2 * turned
+        price = 10.0 ** (-_FIRM[0] - _FIRM[1] * weights[i]) / max(scale, 1e-9)
         for axis in range(6):
             relative[axis] = motion.velocity[axis] - (regions.velocities[i, axis] if axis < 3 else 0.0)
-            rate += n[axis] * relative[axis]
-            falling += n[axis] * motion.free[axis]
-            if turns:
-                turning += (later_n[axis] - n[axis]) / _AHEAD * relative[axis]
-        allowed = approach_speed(h, braking, gains.barrier_slope)
-        slope = gains.barrier_slope if h <= 0.0 else braking / (allowed + braking / gains.barrier_slope)  # phi'
-        right = -gains.barrier_rate * (rate + allowed) - slope * rate - falling - turning
+        turning = 0.0
+        if slope_of(sight.later_gradients, sight.later_turnings, i, of_attitude, later_n):
+            turning = turning_of(regions.kinds[i], n, later_n, relative)
+        distance, reach, faces = sight.clearances[i], 0.0, 1
+        if not of_attitude and has_faces(regions.kinds[i]):
+            along_way[:] = relative[:3]
+            speed = np.sqrt(along_way[0] ** 2 + along_way[1] ** 2 + along_way[2] ** 2)
+            reach = margin + speed * (speed / (2.0 * braking) + 1.0 / gains.barrier_slope + 1.0 / gains.barrier_rate)
+            if 0.0 < distance < reach:
+                faces = 1 + FACES
+        for face in range(faces):  # the nearest, and those ahead
+            if face > 0:
+                distance = face_ahead(regions, i, motion.position, n[:3], along_way, reach, later_n[:3])
+                if not distance < np.inf:
+                    break
+                n[:3] = later_n[:3]
+                turning = 0.0  # flat, as far as is known
 
-        # its row, unless it holds whatever the thrusters do
-        least = 0.0
-        for j in range(lower.size):
-            along = 0.0
+            # h, its rate, and what its second derivative is without thrust
+            h, rate, falling = distance - margin, 0.0, 0.0
             for axis in range(6):
-                along += n[axis] * motion.push[axis, j]
-            work.rows[rows, j] = along
-            least += along * (lower[j] if along > 0.0 else upper[j])
-        if right <= least:
-            continue
-        work.right[rows] = right
-        scale = motion.mass**2
-        if of_attitude:
-            turned = n[3] ** 2 + n[4] ** 2 + n[5] ** 2
-            scale = motion.mass**2 * (n[0] ** 2 + n[1] ** 2 + n[2] ** 2) + motion.inertia**2 * turned
-        work.price[rows] = 10.0 ** (-_FIRM[0] - _FIRM[1] * weights[i]) / max(scale, 1e-9)
-        sight.row_of[i] = rows
-        rows += 1
+                rate += n[axis] * relative[axis]
+                falling += n[axis] * motion.free[axis]
+            allowed = approach_speed(h, braking, gains.barrier_slope)
+            slope = gains.barrier_slope if h <= 0.0 else braking / (allowed + braking / gains.barrier_slope)  # phi'
+            right = -gains.barrier_rate * (rate + allowed) - slope * rate - falling - turning
+
+            # its row, unless it holds whatever the thrusters do
+            least = 0.0
+            for j in range(lower.size):
+                along = 0.0
+                for axis in range(6):
+                    along += n[axis] * motion.push[axis, j]
+                work.rows[rows, j] = along
+                least += along * (lower[j] if along > 0.0 else upper[j])
+            if right > least:
+                work.right[rows], work.price[rows] = right, price
+                rows += 1
     return rows

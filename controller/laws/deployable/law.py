@@ -5,7 +5,7 @@ estimate -> failed thrusters -> way round -> bounded attraction -> barriers -> q
 
 from __future__ import annotations
 
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -21,17 +21,19 @@ from controller.law import (
     checked_quaternion,
 )
 from controller.laws.deployable import attitude as attitude_loop
-from controller.laws.deployable import failure, guide, model, observer, quadratic_program
-from controller.laws.deployable.attitude import Attitude, attitude_of
+from controller.laws.deployable import failure, guide, intake, model, observer, quadratic_program
+from controller.laws.deployable.attitude import attitude_of
 from controller.laws.deployable.attraction import wanted_acceleration, wanted_velocity
 from controller.laws.deployable.barrier import Motion, Sight, look, sight_of, write_rows
 from controller.laws.deployable.braking import least_forces
-from controller.laws.deployable.failure import Suspicion, suspicion_of
+from controller.laws.deployable.faces import FACES
+from controller.laws.deployable.failure import suspicion_of
 from controller.laws.deployable.gains import DeployableGains, check_gains
-from controller.laws.deployable.guide import Guide, guide_of_nothing
+from controller.laws.deployable.guide import guide_of_nothing
+from controller.laws.deployable.memory import DeployableMemory
 from controller.laws.deployable.model import Dynamics, Thrusters, dynamics_of, thrusters_of
-from controller.laws.deployable.observer import Estimate, estimate_of_nothing
-from controller.laws.deployable.quadratic_program import Workspace, workspace
+from controller.laws.deployable.observer import estimate_of_nothing
+from controller.laws.deployable.quadratic_program import workspace
 from controller.quaternion import rotation_matrix
 from controller.regions import Orientation, PackedRegions
 
@@ -60,26 +62,6 @@ DIAGNOSTICS = (
 )
 
 
-class DeployableMemory(NamedTuple):
-    """What the deployable law keeps between steps."""
-
-    period: Array  # (1,) s
-    estimate: Array  # (4,) phi-hat [N, N m]
-    report: Array  # (len(DIAGNOSTICS),)
-    dynamics: Dynamics
-    thrusters: Thrusters
-    observed: Estimate
-    attitude: Attitude
-    suspicion: Suspicion
-    guide: Guide
-    sight: Sight
-    program: Workspace
-    quaternion: Array  # (4,) last valid
-    omega: Array  # (3,) last valid [rad/s]
-    blindness: Array  # (1,) s since attitude and rates were last valid
-    told: Array  # (m,) health of the thrusters as last told
-
-
 @compiled
 def step(
     state: VehicleState,
@@ -92,13 +74,12 @@ def step(
 ) -> None:
     """Do what `CompiledLaw.step` says, by the deployable law."""
     seen, thrusters, dynamics, period = memory.observed, memory.thrusters, memory.dynamics, memory.period[0]
+    weights = intake.believed_weights(weights)
 
     # estimate
-    _keep_attitude(memory, state)
+    measured = intake.take_in_measurement(memory, state, gains)
     R = rotation_matrix(memory.quaternion)
-    measured = _observe(memory, state, R, gains)
-    lost = seen.silence[0] < 0.0 or seen.silence[0] > gains.coast or memory.blindness[0] > gains.coast
-    if lost:  # nothing is known any more: drift
+    if seen.silence[0] < 0.0 or seen.silence[0] > gains.coast:  # nothing is known any more: drift
         forces[:] = 0.0
         thrusters.forces[:] = 0.0
         memory.report[15] = seen.silence[0]
@@ -108,8 +89,7 @@ def step(
     failed = failure.suspect(
         memory.suspicion, seen, memory.attitude.residual, dynamics, thrusters, R, gains, period, measured
     )
-    if _heed(memory, state.thruster_health, failed):
-        model.share_out(thrusters)
+    if intake.take_in_thrusters(memory, state.thruster_health, failed):
         observer.doubt(seen, 0.01)
 
     # way round, bounded attraction
@@ -139,6 +119,7 @@ def step(
 
     # barriers
     motion = Motion(
+        seen.position,
         velocity,
         free,
         _push(dynamics, thrusters, R),
@@ -153,77 +134,6 @@ def step(
     steps = quadratic_program.solve(work, rows, thrusters.inverse, thrusters.lower, thrusters.upper, forces)
     thrusters.forces[:] = forces
     _report(memory, wanted, rows, steps)
-
-
-@compiled
-def _heed(memory: DeployableMemory, told: Array, failed: int) -> bool:
-    """Take in which thrusters are told to have failed, or to work again, and one found to have failed, -1 for none.
-
-    Returns
-    -------
-    bool
-        Whether the thrusters at hand are others than before.
-    """
-    health, changed = memory.thrusters.health, False
-    if failed >= 0:
-        failure.give_up(memory.suspicion, memory.thrusters, failed)
-        changed = True
-    for j in range(told.size):
-        if told[j] != memory.told[j] or (told[j] == 0.0 and health[j] != 0.0):
-            health[j] = memory.told[j] = told[j]
-            changed = True
-    return changed
-
-
-@compiled
-def _keep_attitude(memory: DeployableMemory, state: VehicleState) -> None:
-    """Keep attitude and rates if they can be believed, else those before."""
-    size, rates = 0.0, 0.0
-    for i in range(4):
-        size += state.quaternion[i] ** 2
-    for i in range(3):
-        rates += state.velocity_body[3 + i]
-    if abs(size - 1.0) < 1e-2 and np.isfinite(rates):
-        memory.quaternion[:] = state.quaternion / np.sqrt(size)
-        memory.omega[:] = state.velocity_body[3:]
-        memory.blindness[0] = 0.0
-    else:
-        memory.blindness[0] += memory.period[0]
-
-
-@compiled
-def _observe(memory: DeployableMemory, state: VehicleState, R: Array, gains: DeployableGains) -> bool:
-    """Carry the estimate over the last period and take in the measurement; return whether it was believed."""
-    seen, period = memory.observed, memory.period[0]
-    velocity, good, frozen = np.zeros(3), True, True
-    for i in range(3):
-        for k in range(3):
-            velocity[i] += R[i, k] * state.velocity_body[k]
-    for i in range(3):
-        good = good and np.isfinite(state.position[i]) and np.isfinite(velocity[i])
-        frozen = frozen and state.position[i] == seen.last_measured[i]
-        frozen = frozen and state.velocity_body[i] == seen.last_measured[3 + i]
-    seen.last_measured[:3] = state.position
-    seen.last_measured[3:] = state.velocity_body[:3]
-    if seen.silence[0] < 0.0:
-        if good:
-            observer.begin(seen, state.position, velocity, gains)
-            attitude_loop.adapt(
-                memory.attitude, memory.dynamics, memory.thrusters, memory.quaternion, memory.omega, gains, period
-            )
-        return good
-    observer.predict(seen, memory.dynamics, memory.thrusters, R, memory.omega, gains, period)
-    attitude_loop.adapt(
-        memory.attitude, memory.dynamics, memory.thrusters, memory.quaternion, memory.omega, gains, period
-    )
-    moving = abs(seen.velocity[0]) + abs(seen.velocity[1]) + abs(seen.velocity[2]) > 0.02
-    if not good or (frozen and moving):
-        return False
-    if observer.correct(seen, state.position, velocity, gains):
-        return True
-    if seen.silence[0] > gains.coast:  # it has been saying so for long: believe it
-        observer.begin(seen, state.position, velocity, gains)
-    return False
 
 
 @compiled
@@ -376,10 +286,9 @@ class DeployableLaw(CompiledLaw):
             suspicion=suspicion_of(m),
             guide=guide_of_nothing(n_regions, _SEED),
             sight=sight_of(n_regions),
-            program=workspace(n_regions, m),
+            program=workspace((1 + FACES) * n_regions, m),
             quaternion=desired.copy(),
             omega=np.zeros(3),
-            blindness=np.zeros(1),
             told=np.ones(m),
         )
 

@@ -1,0 +1,144 @@
+"""What the law believes of what it is given: measurements, weights, and which thrusters work.
+
+Whatever comes in, what goes on from here is finite.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from controller.compiled import compiled
+from controller.law import VehicleState
+from controller.laws.deployable import attitude as attitude_loop
+from controller.laws.deployable import failure, model, observer
+from controller.laws.deployable.gains import DeployableGains
+from controller.laws.deployable.memory import DeployableMemory
+from controller.quaternion import rate as quaternion_rate
+from controller.quaternion import rotation_matrix
+
+Array = NDArray[np.float64]
+
+_FARTHEST = 1e6  # m, beyond which no position is one
+_FASTEST = 100.0  # m/s, rad/s
+
+
+@compiled
+def believed_weights(weights: Array) -> Array:
+    """Return the arbiter's weights, each within [0, 1]; what is no number counts as 1, for it may matter."""
+    believed = np.ones(weights.size)
+    for i in range(weights.size):
+        if not np.isnan(weights[i]):
+            believed[i] = min(max(weights[i], 0.0), 1.0)
+    return believed
+
+
+@compiled
+def take_in_thrusters(memory: DeployableMemory, told: Array, failed: int) -> bool:
+    """Take in which thrusters are told to have failed, or to work again, and one found to have failed, -1 for none.
+
+    A thruster is told to have failed by a health of 0 or below; whatever else comes says that it works.
+
+    Returns
+    -------
+    bool
+        Whether the thrusters at hand are others than before.
+    """
+    health, changed = memory.thrusters.health, False
+    if failed >= 0:
+        failure.give_up(memory.suspicion, memory.thrusters, failed)
+        changed = True
+    for j in range(told.size):
+        works = 0.0 if told[j] <= 0.0 else 1.0
+        if works != memory.told[j] or (works == 0.0 and health[j] != 0.0):
+            health[j] = memory.told[j] = works
+            changed = True
+    if changed:
+        model.share_out(memory.thrusters)
+    return changed
+
+
+@compiled
+def take_in_measurement(memory: DeployableMemory, state: VehicleState, gains: DeployableGains) -> bool:
+    """Carry the estimate over the last period and take in the measurement; return whether it was believed."""
+    seen, period = memory.observed, memory.period[0]
+    good = _take_in_attitude(memory, state)
+    R = rotation_matrix(memory.quaternion)
+    velocity, frozen = np.zeros(3), True
+    for i in range(3):
+        for k in range(3):
+            velocity[i] += R[i, k] * state.velocity_body[k]
+    good = good and _can_be(state.position, velocity)
+    for i in range(3):
+        frozen = frozen and state.position[i] == seen.last_measured[i]
+        frozen = frozen and state.velocity_body[i] == seen.last_measured[3 + i]
+    seen.last_measured[:3] = state.position
+    seen.last_measured[3:] = state.velocity_body[:3]
+
+    begun = seen.silence[0] >= 0.0
+    if begun:
+        observer.predict(seen, memory.dynamics, memory.thrusters, R, memory.omega, gains, period)
+        if not _can_be(seen.position, seen.velocity):  # a false measurement led it away
+            _forget(memory)
+            begun = False
+    attitude_loop.adapt(
+        memory.attitude, memory.dynamics, memory.thrusters, memory.quaternion, memory.omega, gains, period
+    )
+    if not begun:
+        if good:
+            observer.begin(seen, state.position, velocity, gains)
+        return good
+    moving = abs(seen.velocity[0]) + abs(seen.velocity[1]) + abs(seen.velocity[2]) > 0.02
+    if not good or (frozen and moving):
+        return False
+    if observer.correct(seen, state.position, velocity, gains):
+        return True
+    if seen.silence[0] > gains.coast:  # it has been saying so for long: believe it
+        observer.begin(seen, state.position, velocity, gains)
+    return False
+
+
+@compiled
+def _take_in_attitude(memory: DeployableMemory, state: VehicleState) -> bool:
+    """Take in attitude and rates if they can be, else carry those before by the model; return whether they can be."""
+    size, fastest = 0.0, 0.0
+    for i in range(4):
+        size += state.quaternion[i] ** 2
+    for i in range(3):
+        fastest += abs(state.velocity_body[3 + i])
+    if abs(size - 1.0) < 1e-2 and fastest < _FASTEST:
+        memory.quaternion[:] = state.quaternion / np.sqrt(size)
+        memory.omega[:] = state.velocity_body[3:]
+        return True
+    turning, pushed, period = np.empty(3), np.empty(6), memory.period[0]
+    attitude_loop.free_turning(memory.attitude, memory.dynamics, memory.quaternion, memory.omega, turning)
+    model.thrust_acceleration(
+        memory.dynamics, memory.thrusters, rotation_matrix(memory.quaternion), memory.thrusters.forces, pushed
+    )
+    for i in range(3):
+        memory.omega[i] += period * (turning[i] + pushed[3 + i])
+        memory.omega[i] = min(max(memory.omega[i], -_FASTEST), _FASTEST)
+    carried = memory.quaternion + period * quaternion_rate(memory.quaternion, memory.omega)
+    memory.quaternion[:] = carried / np.sqrt(np.sum(carried**2))
+    return False
+
+
+@compiled
+def _can_be(position: Array, velocity: Array) -> bool:
+    """Return whether position [m] and velocity [m/s] are numbers that a vehicle can have."""
+    can = True
+    for i in range(3):
+        can = can and abs(position[i]) < _FARTHEST and abs(velocity[i]) < _FASTEST
+    return can
+
+
+@compiled
+def _forget(memory: DeployableMemory) -> None:
+    """Bring the estimate to where it was before the first measurement."""
+    seen = memory.observed
+    seen.position[:], seen.velocity[:], seen.water[:], seen.restoring[0] = 0.0, 0.0, 0.0, 0.0
+    seen.covariance[:, :, :] = 0.0
+    seen.innovation[:], seen.spread[:], seen.gain[:] = 0.0, 1.0, 0.0
+    seen.silence[0] = -1.0
+    memory.suspicion.ratio[:] = 0.0
+    memory.suspicion.lag[:, :] = 0.0

@@ -1,0 +1,37 @@
+"""What the deployable law keeps between steps."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from controller.laws.deployable.attitude import Attitude
+from controller.laws.deployable.barrier import Sight
+from controller.laws.deployable.failure import Suspicion
+from controller.laws.deployable.guide import Guide
+from controller.laws.deployable.model import Dynamics, Thrusters
+from controller.laws.deployable.observer import Estimate
+from controller.laws.deployable.quadratic_program import Workspace
+
+Array = NDArray[np.float64]
+
+
+class DeployableMemory(NamedTuple):
+    """Arrays alone, so that compiled code can take it."""
+
+    period: Array  # (1,) s
+    estimate: Array  # (4,) phi-hat [N, N m]
+    report: Array  # (r,) what the last step has to say
+    dynamics: Dynamics
+    thrusters: Thrusters
+    observed: Estimate
+    attitude: Attitude
+    suspicion: Suspicion
+    guide: Guide
+    sight: Sight
+    program: Workspace
+    quaternion: Array  # (4,) from body to world, as measured or carried by the model
+    omega: Array  # (3,) rad/s, likewise
+    told: Array  # (m,) health of the thrusters as last told
