@@ -221,3 +221,19 @@ def test_no_turn_is_seen_where_another_face_becomes_the_nearest():
     one, other = np.array([0.0, 1.0, 0.0, 0.0, 0.0, 0.0]), np.array([0.0, -1.0, 0.0, 0.0, 0.0, 0.0])
     for kind in (Box.kind, DepthBand.kind, Cylinder.kind, Sphere.kind):
         assert turning_of(kind, one, other, 0.5 * one) == 0.0
+
+
+@pytest.mark.parametrize(
+    "region",
+    [
+        Region("view", Visibility((-4.0, 0.0, 2.0), (1.0, 0.0, 0.0), 0.4), "in"),
+        Region("facing", Orientation((0.0, 0.0, 0.0, 1.0), 0.2), "in"),
+    ],
+    ids=["a feature right behind", "an attitude half a turn away"],
+)
+def test_half_a_turn_away_it_turns_one_way_round(region):
+    """There the slope is zero: nothing would say which way to turn."""
+    flight = fly([region], Region("goal", Sphere((0.0, 0.0, 2.0), 0.5), "in"), duration=20.0)
+    north = 1.0 - 2.0 * (flight.quaternion[:, 2] ** 2 + flight.quaternion[:, 3] ** 2)  # of the body's x axis
+    assert north[0] > 0.99 and north[-1] < -np.cos(0.4)
+    assert np.abs(flight.forces[-100:]).max() < 27.0

@@ -122,9 +122,12 @@ def aim(attitude: Attitude, regions: PackedRegions, position: Array, gains: Depl
             continue
         clearance, slope = attitude_clearance(regions, i, position, attitude.desired)
         size = np.sqrt(slope[0] ** 2 + slope[1] ** 2 + slope[2] ** 2)
-        if clearance < gains.comfort and size > 0.0:
+        if clearance < gains.comfort:
             asked = True
-            turn += _TURN * (gains.comfort - clearance) / size * slope
+            if size > 0.0:
+                turn += _TURN * (gains.comfort - clearance) / size * slope
+            elif clearance < 0.0:  # half a turn away, where every way round is as long: about the vertical
+                turn += _TURN * (gains.comfort - clearance) * down_in_body(attitude.desired)
     if not asked and back[0] > 1.0 - 1e-15:
         return
     size = np.sqrt(turn[0] ** 2 + turn[1] ** 2 + turn[2] ** 2)
