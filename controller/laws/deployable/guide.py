@@ -128,7 +128,8 @@ def cost_of(
     """
     enough = gains.clearance + _STRIDE[1] / _TRUST  # m, of clearance: more makes no difference
     far_until[:] = 0.0
-    total, travelled, samples, point, room = 0.0, 0.0, 0, np.empty(3), np.empty(3)
+    total, travelled, samples = 0.0, 0.0, 0
+    here, point, room = np.empty(3), np.empty(3), np.empty(3)
     for leg in range(count):
         begin = start if leg == 0 else way[leg - 1]
         length = np.sqrt((way[leg, 0] - begin[0]) ** 2 + (way[leg, 1] - begin[1]) ** 2 + (way[leg, 2] - begin[2]) ** 2)
@@ -140,14 +141,15 @@ def cost_of(
                     total += (1.0 + _INSIDE) * _distance(way[rest - 1], way[rest])
                 return float(total + _INSIDE * (length - s))  # what was not looked at is not trusted
             samples += 1
-            gone = travelled + s
-            free = enough
+            gone, free = travelled + s, enough
+            later = gone / gains.speed  # s
+            for axis in range(3):
+                here[axis] = begin[axis] + (way[leg, axis] - begin[axis]) * (s / length)
             for i in range(regions.kinds.size):
                 if gone >= far_until[i] and regions.hard[i]:
                     own = 0.0  # m/s, of the region
                     for axis in range(3):
-                        at = begin[axis] + (way[leg, axis] - begin[axis]) * (s / length)
-                        point[axis] = at - regions.velocities[i, axis] * gone / gains.speed
+                        point[axis] = here[axis] - regions.velocities[i, axis] * later
                         own += abs(regions.velocities[i, axis])
                     if regions.kinds[i] == _SPHERE:
                         clearance = clearance_of_sphere(regions, i, point)

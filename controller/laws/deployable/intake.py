@@ -34,35 +34,41 @@ def believed_weights(weights: Array) -> Array:
 
 
 @compiled
-def take_in_thrusters(memory: DeployableMemory, told: Array, failed: int) -> bool:
-    """Take in which thrusters are told to have failed, or to work again, and one found to have failed, -1 for none.
+def says_more(told: Array, before: Array, health: Array) -> bool:
+    """Return whether what is told of the thrusters differs from what was, or from what is believed of a failed one.
 
     A thruster is told to have failed by a health of 0 or below; whatever else comes says that it works.
-
-    Returns
-    -------
-    bool
-        Whether the thrusters at hand are others than before.
     """
-    health, changed = memory.thrusters.health, False
-    if failed >= 0:
-        failure.give_up(memory.suspicion, memory.thrusters, failed)
-        changed = True
+    more = False
     for j in range(told.size):
         works = 0.0 if told[j] <= 0.0 else 1.0
-        if works != memory.told[j] or (works == 0.0 and health[j] != 0.0):
+        more = more or works != before[j] or (works == 0.0 and health[j] != 0.0)
+    return more
+
+
+@compiled
+def take_in_thrusters(memory: DeployableMemory, told: Array, failed: int) -> None:
+    """Take in which thrusters are told to have failed, or to work again, and one found to have failed, -1 for none."""
+    health = memory.thrusters.health
+    if failed >= 0:
+        failure.give_up(memory.suspicion, memory.thrusters, failed)
+    for j in range(told.size):
+        works = 0.0 if told[j] <= 0.0 else 1.0
+        if works != memory.told[j] or works == 0.0:
             health[j] = memory.told[j] = works
-            changed = True
-    if changed:
-        model.share_out(memory.thrusters)
-    return changed
+    model.share_out(memory.thrusters)
 
 
 @compiled
 def take_in_measurement(memory: DeployableMemory, state: VehicleState, gains: DeployableGains) -> bool:
     """Carry the estimate over the last period and take in the measurement; return whether it was believed."""
     seen, period = memory.observed, memory.period[0]
-    good = _take_in_attitude(memory, state)
+    good = _can_be_turned(state.quaternion, state.velocity_body)
+    if good:
+        memory.quaternion[:] = state.quaternion / np.sqrt(np.sum(state.quaternion**2))
+        memory.omega[:] = state.velocity_body[3:]
+    else:
+        _carry_attitude(memory)
     R = rotation_matrix(memory.quaternion)
     velocity, frozen = np.zeros(3), True
     for i in range(3):
@@ -99,17 +105,19 @@ def take_in_measurement(memory: DeployableMemory, state: VehicleState, gains: De
 
 
 @compiled
-def _take_in_attitude(memory: DeployableMemory, state: VehicleState) -> bool:
-    """Take in attitude and rates if they can be, else carry those before by the model; return whether they can be."""
+def _can_be_turned(quaternion: Array, velocity_body: Array) -> bool:
+    """Return whether attitude and rates are such as a vehicle can have."""
     size, fastest = 0.0, 0.0
     for i in range(4):
-        size += state.quaternion[i] ** 2
+        size += quaternion[i] ** 2
     for i in range(3):
-        fastest += abs(state.velocity_body[3 + i])
-    if abs(size - 1.0) < 1e-2 and fastest < _FASTEST:
-        memory.quaternion[:] = state.quaternion / np.sqrt(size)
-        memory.omega[:] = state.velocity_body[3:]
-        return True
+        fastest += abs(velocity_body[3 + i])
+    return abs(size - 1.0) < 1e-2 and fastest < _FASTEST
+
+
+@compiled
+def _carry_attitude(memory: DeployableMemory) -> None:
+    """Carry attitude and rates over the last period by the model."""
     turning, pushed, period = np.empty(3), np.empty(6), memory.period[0]
     attitude_loop.free_turning(memory.attitude, memory.dynamics, memory.quaternion, memory.omega, turning)
     model.thrust_acceleration(
@@ -120,7 +128,6 @@ def _take_in_attitude(memory: DeployableMemory, state: VehicleState) -> bool:
         memory.omega[i] = min(max(memory.omega[i], -_FASTEST), _FASTEST)
     carried = memory.quaternion + period * quaternion_rate(memory.quaternion, memory.omega)
     memory.quaternion[:] = carried / np.sqrt(np.sum(carried**2))
-    return False
 
 
 @compiled

@@ -32,7 +32,7 @@ from controller.laws.deployable.gains import DeployableGains, check_gains
 from controller.laws.deployable.guide import guide_of_nothing
 from controller.laws.deployable.memory import DeployableMemory
 from controller.laws.deployable.model import Dynamics, Thrusters, dynamics_of, thrusters_of
-from controller.laws.deployable.observer import estimate_of_nothing
+from controller.laws.deployable.observer import Estimate, estimate_of_nothing
 from controller.laws.deployable.quadratic_program import workspace
 from controller.quaternion import rotation_matrix
 from controller.regions import Orientation, PackedRegions
@@ -89,7 +89,8 @@ def step(
     failed = failure.suspect(
         memory.suspicion, seen, memory.attitude.residual, dynamics, thrusters, R, gains, period, measured
     )
-    if intake.take_in_thrusters(memory, state.thruster_health, failed):
+    if failed >= 0 or intake.says_more(state.thruster_health, memory.told, thrusters.health):
+        intake.take_in_thrusters(memory, state.thruster_health, failed)
         observer.doubt(seen, 0.01)
 
     # way round, bounded attraction
@@ -133,7 +134,10 @@ def step(
     # quadratic program
     steps = quadratic_program.solve(work, rows, thrusters.inverse, thrusters.lower, thrusters.upper, forces)
     thrusters.forces[:] = forces
-    _report(memory, wanted, rows, steps)
+    memory.estimate[0] = seen.restoring[0]
+    memory.estimate[1:] = memory.attitude.moments
+    _report(memory.report, seen, memory.guide.cost[0], memory.guide.points[0], thrusters.health, wanted)
+    _report_program(memory.report, work.multipliers, work.price, rows, steps)
 
 
 @compiled
@@ -210,30 +214,30 @@ def _braking(dynamics: Dynamics, thrusters: Thrusters) -> float:
 
 
 @compiled
-def _report(memory: DeployableMemory, wanted: Array, rows: int, steps: int) -> None:
-    """Write the diagnostics, in the order of `DIAGNOSTICS`."""
-    seen, report = memory.observed, memory.report
-    memory.estimate[0] = seen.restoring[0]
-    memory.estimate[1:] = memory.attitude.moments
+def _report(report: Array, seen: Estimate, cost: float, points: int, health: Array, wanted: Array) -> None:
+    """Write what `DIAGNOSTICS` says of estimate, way and thrusters."""
     report[:3] = seen.position
     report[3:6] = seen.velocity
     report[6:8] = seen.water[:2]
     report[8] = np.sqrt(wanted[0] ** 2 + wanted[1] ** 2 + wanted[2] ** 2)
-    report[9] = memory.guide.cost[0]
-    report[10] = memory.guide.points[0] - 1
-    active, yielding = 0, 0.0
-    for i in range(rows):
-        if memory.program.multipliers[i] > 0.0:
-            active += 1
-            yielding = max(yielding, memory.program.multipliers[i] * memory.program.price[i])
-    report[11] = active
-    report[12] = yielding
-    report[13] = steps
+    report[9] = cost
+    report[10] = points - 1
     report[14] = 0.0
-    for j in range(memory.thrusters.health.size):
-        if memory.thrusters.health[j] == 0.0:
+    for j in range(health.size):
+        if health[j] == 0.0:
             report[14] = j + 1
     report[15] = seen.silence[0]
+
+
+@compiled
+def _report_program(report: Array, multipliers: Array, price: Array, rows: int, steps: int) -> None:
+    """Write what `DIAGNOSTICS` says of barriers and quadratic program."""
+    active, yielding = 0, 0.0
+    for i in range(rows):
+        if multipliers[i] > 0.0:
+            active += 1
+            yielding = max(yielding, multipliers[i] * price[i])
+    report[11], report[12], report[13] = active, yielding, steps
 
 
 class DeployableLaw(CompiledLaw):

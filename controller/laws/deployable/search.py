@@ -25,8 +25,8 @@ _NODES = 256  # after which the tree is grown anew
 _REACH = 1.5  # m, that a node is from the one it grows from at most
 _ROOM = 3.0  # m beyond start and end in which nodes are looked for
 _STRIDE = 0.05  # m, least distance between two looks along a line
-_LOOKS = 48  # along a line at most
-_ANCESTORS = 3  # that a new node looks at beyond its own
+_LOOKS = 32  # along a line at most
+_ANCESTORS = 2  # that a new node looks at beyond its own
 _SLACK = 0.005  # m
 _MOVED = 0.3  # m, that the end may move before the tree is grown anew
 
