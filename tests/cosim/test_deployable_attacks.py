@@ -237,3 +237,21 @@ def test_half_a_turn_away_it_turns_one_way_round(region):
     north = 1.0 - 2.0 * (flight.quaternion[:, 2] ** 2 + flight.quaternion[:, 3] ** 2)  # of the body's x axis
     assert north[0] > 0.99 and north[-1] < -np.cos(0.4)
     assert np.abs(flight.forces[-100:]).max() < 27.0
+
+
+def test_smoothing_halves_what_noise_makes_of_the_thrust():
+    rng = np.random.default_rng(8)
+    noise = rng.normal(size=(1000, 2, 3)) * np.array([[0.02], [0.01]])
+
+    def noisy(now, state):
+        k = round(now / PERIOD)
+        velocity = state.velocity_body.copy()
+        velocity[:3] += noise[k, 1]
+        return state._replace(position=state.position + noise[k, 0], velocity_body=velocity)
+
+    variation = []
+    for smoothing in (0.0, DeployableGains().smoothing):
+        flight = fly([], duration=20.0, spoil=noisy, gains=DeployableGains(smoothing=smoothing))
+        assert reached(flight)
+        variation.append(np.abs(np.diff(flight.forces, axis=0)).sum())
+    assert variation[1] < 0.5 * variation[0]

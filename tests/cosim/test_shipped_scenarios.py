@@ -40,11 +40,12 @@ def test_the_view_asks_for_something(tmp_path):
 
 
 def test_the_failed_thruster_is_found_untold(tmp_path):
-    run = run_scenario(load_scenario("dense-field", ["time.duration=15.0"]), tmp_path / "run", report=False)
-    record = load_record(run.folder)
+    """It is found when it is used: at 9 s it pushes, at 10 s it is idle for a while."""
+    scenario = load_scenario("dense-field", ["time.duration=12.0", "failures.0.time=9.0"])
+    record = load_record(run_scenario(scenario, tmp_path / "run", report=False).folder)
     given_up = record["law.failed_thruster"]
-    assert not given_up[record["time"] < 10.0].any()
-    assert set(given_up[record["time"] > 12.0]) == {2.0}
+    assert not given_up[record["time"] < 9.0].any()
+    assert set(given_up[record["time"] > 10.5]) == {2.0}
 
 
 def test_the_paper_scene_is_the_papers():

@@ -15,6 +15,7 @@ class DeployableGains(NamedTuple):
     speed: float = 1.2  # m/s, greatest over ground
     acceleration: float = 0.35  # m/s2, with which the attraction speeds up and brakes
     velocity_bandwidth: float = 1.2  # rad/s, of the loop that follows the wanted velocity
+    smoothing: float = 0.05  # s, over which the wanted acceleration is smoothed, to spare the thrusters noise
     position_bandwidth: float = 0.8  # 1/s, of the approach to the end of the way
     depth: float = 0.3  # m, how far inside the goal region the way ends, where the region is that deep
     attitude_bandwidth: float = 2.0  # rad/s
@@ -63,6 +64,7 @@ def check_gains(gains: DeployableGains) -> DeployableGains:
         If one is negative or not finite, or one that divides is zero.
     """
     may_be_zero = (
+        "smoothing",
         "margin",
         "comfort",
         "tilt",

@@ -107,8 +107,10 @@ def step(
     attitude_loop.free_turning(memory.attitude, dynamics, memory.quaternion, memory.omega, free[3:])
     velocity[:3], velocity[3:] = seen.velocity, memory.omega
     look(memory.sight, regions, seen.position, memory.quaternion, velocity)
-    acceleration -= free[:3]
-    _force_of(dynamics, R, acceleration, wrench)
+    part = period / (period + gains.smoothing)
+    for axis in range(3):
+        memory.pushed[axis] += part * (acceleration[axis] - free[axis] - memory.pushed[axis])
+    _force_of(dynamics, R, memory.pushed, wrench)
     _soft_forces(memory.sight, regions, weights, R, dynamics, wrench)
     attitude_loop.aim(memory.attitude, regions, seen.position, gains, period)
     attitude_loop.moment(memory.attitude, dynamics, memory.quaternion, memory.omega, gains, wrench[3:])
@@ -294,6 +296,7 @@ class DeployableLaw(CompiledLaw):
             quaternion=desired.copy(),
             omega=np.zeros(3),
             told=np.ones(m),
+            pushed=np.zeros(3),
         )
 
     @classmethod

@@ -35,3 +35,4 @@ class DeployableMemory(NamedTuple):
     quaternion: Array  # (4,) from body to world, as measured or carried by the model
     omega: Array  # (3,) rad/s, likewise
     told: Array  # (m,) health of the thrusters as last told
+    pushed: Array  # (3,) m/s2, NED, that the thrusters shall add, smoothed
