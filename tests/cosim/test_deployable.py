@@ -104,6 +104,22 @@ def test_a_frozen_sensor_is_a_dead_one():
     assert flight.report("silence").max() == pytest.approx(1.0, abs=0.05)
 
 
+def test_a_vehicle_that_is_held_still_to_the_bit_is_believed_in_the_end():
+    """Such as one on a hook, while by the model the current carries it away."""
+    held = {}
+
+    def hold(now, state):
+        if now >= 10.0:
+            held.setdefault("state", state._replace(velocity_body=np.zeros(6)))
+            return held["state"]
+        return state
+
+    flight = fly([], duration=16.0, spoil=hold, plant={"current.x": -0.4, "current.y": 0.3})
+    silence = flight.report("silence")
+    assert silence[flight.time > 10.0].max() <= DeployableGains().coast + 0.05
+    assert (silence[flight.time > 13.0] == 0.0).any()
+
+
 def test_without_any_measurement_the_thrusters_rest():
     flight = fly([ROCK], duration=5.0, spoil=lambda t, s: NOWHERE)
     assert not flight.forces.any()
