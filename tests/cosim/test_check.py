@@ -43,7 +43,11 @@ def paper():
     return named(check(load_scenario("paper", [CLOSED])).findings)
 
 
-@pytest.mark.parametrize("name", shipped_scenarios())
+FAST = ("docking", "paper")
+EACH_SCENARIO = [name if name in FAST else pytest.param(name, marks=pytest.mark.slow) for name in shipped_scenarios()]
+
+
+@pytest.mark.parametrize("name", EACH_SCENARIO)
 def test_every_shipped_scenario_can_be_checked(name):
     result = check(load_scenario(name, [CLOSED]))
     assert {finding.topic for finding in result.findings} == {"vehicle", "law", "regions", "thrust"}
