@@ -95,6 +95,7 @@ def test_reproduction_table_holds_the_measured_figures(shipped_run):
         assert rows["greatest speed, m/s"][column] == f"{summary['max_speed']:.2f}"
 
 
+@pytest.mark.slow
 def test_commands_of_the_tour_are_understood(capsys, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     tour = re.search(r"## A short tour\n+```\n(.*?)```", (ROOT / "README.md").read_text(), re.S).group(1)

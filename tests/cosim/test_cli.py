@@ -23,6 +23,7 @@ def test_run_says_what_happened_and_where_to_look(tmp_path, capsys):
     assert said.err == ""  # no bar where there is no terminal
 
 
+@pytest.mark.slow
 def test_run_without_out_makes_a_folder_of_its_own(tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert main(["run", "paper", *QUICK]) == 0
@@ -104,6 +105,7 @@ def test_mavlink_without_pymavlink_is_one_line(tmp_path, capsys, monkeypatch):
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_report_makes_the_report_again(tmp_path, capsys):
     out = tmp_path / "run"
     assert main(["run", "paper", "--out", str(out), "--no-report", *QUICK]) == 0

@@ -159,6 +159,7 @@ CAGES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", CAGES)
 def test_it_stops_before_the_end_of_what_it_shall_stay_within(name):
     """The goal lies beyond; on the way there the nearest face is one alongside, not the one ahead."""
@@ -172,6 +173,7 @@ def wall(x, y, z, size):
     return Region(f"wall {x} {y} {z}", Box((x, y, z), size), "out")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("width", [0.6, 0.3])
 def test_a_door_that_is_the_only_way_is_found_and_passed(width):
     beside, above = 3.0 + width / 2, (0.2, width + 0.01, 6.0)
@@ -239,6 +241,7 @@ def test_half_a_turn_away_it_turns_one_way_round(region):
     assert np.abs(flight.forces[-100:]).max() < 27.0
 
 
+@pytest.mark.slow
 def test_smoothing_halves_what_noise_makes_of_the_thrust():
     rng = np.random.default_rng(8)
     noise = rng.normal(size=(1000, 2, 3)) * np.array([[0.02], [0.01]])

@@ -39,6 +39,7 @@ def defect(kept, form, step):
     return np.abs(np.diff(kept[f"lyapunov.{form}"]) / step - between).max() / np.abs(rate).max()
 
 
+@pytest.mark.slow
 def test_v_of_the_paper_falls_below_zero_without_a_limit():
     """Measured independently of this project: from 86.4e3 to -129.5e3 at 0.124 s, without the secondary terms."""
     kept = run("time.duration=0.2")
@@ -129,6 +130,7 @@ def test_report_draws_v(tmp_path):
     assert "dV/dt" in (done.folder / "report.html").read_text()
 
 
+@pytest.mark.slow
 def test_report_without_v_has_no_such_figure(tmp_path):
     done = run_scenario(load_scenario("paper", [QUICK[0], "time.duration=0.05"]), tmp_path / "run")
     assert done.summary["lyapunov"] is None

@@ -116,6 +116,7 @@ def test_a_failing_step_says_when():
         master.run()
 
 
+@pytest.mark.slow
 def test_many_masters_leave_nothing_behind(tmp_path, monkeypatch):
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
     for _ in range(20):

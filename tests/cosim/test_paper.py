@@ -43,6 +43,7 @@ def test_both_engines_drive_the_same_path(shipped_run):
     assert np.abs(closed.stack(path) - skfuzzy.stack(path)).max() < 1e-6
 
 
+@pytest.mark.slow
 def test_paper_limited_to_108_newtons(shipped_run):
     run = shipped_run("paper-limited", "arbiter.engine=closed")
     summary = run.summary
@@ -92,6 +93,7 @@ def test_a_run_repeats_to_the_last_bit(shipped_run, tmp_path):
         assert np.array_equal(one[name], two[name]), name
 
 
+@pytest.mark.slow
 def test_both_fmi_versions_give_the_same_run(shipped_run):
     short = ("arbiter.engine=closed", "time.duration=3")
     two, three = (load_record(shipped_run("paper-limited", *short, f"plant.fmi={v}").folder) for v in (2, 3))

@@ -74,6 +74,7 @@ def test_every_figure_is_there_as_svg_and_png(shipped_run):
         assert width > 900 and height > 300
 
 
+@pytest.mark.slow
 def test_no_overlap_no_figure_of_it(tmp_path):
     scenario = load_scenario("paper", ["arbiter.engine=closed", "time.duration=0.05"])
     run = run_scenario(scenario, tmp_path / "run")
@@ -81,6 +82,7 @@ def test_no_overlap_no_figure_of_it(tmp_path):
     assert "Never inside SR1 and SR2" in page_of(run)
 
 
+@pytest.mark.slow
 def test_claims_carry_this_runs_numbers(shipped_run):
     for name in ("paper", "paper-limited", "paper-calibrated"):
         scenario = load_scenario(name, ["arbiter.engine=closed"])
@@ -129,6 +131,7 @@ def test_names_from_files_are_escaped(tmp_path):
     assert "&lt;script&gt;alert(1)&lt;/script&gt; &amp; $x" in page
 
 
+@pytest.mark.slow
 def test_a_goal_far_aside_still_fits_the_page(tmp_path):
     overrides = ["arbiter.engine=closed", "time.duration=0.05", "goal.centre=[0,20,5]"]
     run = run_scenario(load_scenario("paper", overrides), tmp_path / "run")

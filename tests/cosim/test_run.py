@@ -93,6 +93,7 @@ def test_a_scenario_that_the_fmu_refuses_leaves_no_folder(tmp_path):
         assert not out.exists()
 
 
+@pytest.mark.slow
 def test_a_failure_midway_leaves_what_was_recorded(tmp_path):
     out = tmp_path / "run"
     scenario = load_scenario("paper", [*SHORT, "law.gains.k_v1=5e5"])  # which no 1 kHz loop can hold: k_v1 h > 2 m
@@ -165,6 +166,7 @@ def test_a_record_keeps_few_signals_in_memory(tmp_path):
         record["nothing"]
 
 
+@pytest.mark.slow
 def test_a_killed_run_can_be_reported(tmp_path):
     import shutil
 
@@ -269,6 +271,7 @@ def test_no_record_is_a_clear_error(tmp_path):
         load_record(tmp_path)
 
 
+@pytest.mark.slow
 def test_own_vehicle_travels_with_the_run(tmp_path):
     from importlib import resources
 

@@ -84,6 +84,7 @@ def test_header_names_each_variable_once():
     assert names == [v.name for v in variables(load_vehicle("odin"))]
 
 
+@pytest.mark.slow
 def test_token_changes_with_the_numbers():
     descriptions = {model_description(load_vehicle(name), 3, "") for name in shipped_vehicles()}
     tokens = {read_model_description(str(cached_fmu(load_vehicle(name), 3))).guid for name in shipped_vehicles()}
