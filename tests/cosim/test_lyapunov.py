@@ -121,6 +121,7 @@ def test_summary_counts_rises():
     }  # fmt: skip
 
 
+@pytest.mark.slow
 def test_report_draws_v(tmp_path):
     scenario = load_scenario("paper", [*QUICK, "time.duration=0.4"])
     done = run_scenario(scenario, tmp_path / "run")

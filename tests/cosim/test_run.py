@@ -106,6 +106,7 @@ def test_a_failure_midway_leaves_what_was_recorded(tmp_path):
     assert (out / "report.html").exists()
 
 
+@pytest.mark.slow
 def test_ctrl_c_leaves_a_readable_run(tmp_path, monkeypatch):
     class Interrupting(Recorder):
         def observe(self, k, row):

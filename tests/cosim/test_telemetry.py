@@ -67,6 +67,7 @@ def of_type(messages, name):
     return [m for m in messages if m.get_type() == name]
 
 
+@pytest.mark.slow
 def test_every_promised_message_comes_at_its_rate(streamed):
     _, messages = streamed
     assert len(of_type(messages, "HEARTBEAT")) >= 2

@@ -97,6 +97,7 @@ def test_an_own_vehicle_with_all_that_actuators_can_do(fmi, tmp_path, unpacked):
     assert gap(tmp_path / "own.fmu", tmp_path, "own", fmi_type="CoSimulation") < 1e-5
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", shipped_vehicles())
 def test_the_files_are_what_the_equations_give(name, tmp_path):
     assert main(["reference", "--vehicle", name, "--out", str(tmp_path)]) == 0

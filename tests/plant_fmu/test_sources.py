@@ -144,6 +144,7 @@ int main(int argc, char **argv)
 """
 
 
+@pytest.mark.slow
 def test_two_vehicles_link_into_one_program(tmp_path):
     """Each under its own names, and each with its own numbers."""
     compiler, tokens, objects, references = find_compiler(), [], [], []

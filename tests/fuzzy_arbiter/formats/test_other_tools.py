@@ -77,6 +77,7 @@ WILD = replace(
 )  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "system",
     [
