@@ -181,6 +181,7 @@ def test_distance_changes_no_faster_than_one_moves(shape, p, q):
     assert abs(at(shape, p)[2] - at(shape, q)[2]) <= np.linalg.norm(p - q) * (1 + 1e-9) + 1e-12
 
 
+@pytest.mark.slow
 @each_shape_in_space
 def test_distance_is_that_of_the_nearest_point_of_the_surface(shape):
     """Outside by minimising |x - p| over the set, inside by growing a ball until it leaves the set."""

@@ -151,6 +151,7 @@ SHAPES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("shape", ["prism", *(pytest.param(s, marks=pytest.mark.slow) for s in SHAPES if s != "prism")])
 def test_every_shape_can_be_drawn_and_be_a_goal(tmp_path, shape):
     overrides = [

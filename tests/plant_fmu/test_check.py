@@ -50,6 +50,7 @@ def refused(path, capsys, *words):
         assert word in captured.err
 
 
+@pytest.mark.slow
 def test_check_passes_and_prints_a_table(fmi, capsys):
     odin = cached_fmu(load_vehicle("odin"), fmi)
     assert main(["check", str(odin), "--stop-time", "0.5", "--set", "wrench.X=5", "--set", "wrench.N=0.1"]) == 0

@@ -24,6 +24,7 @@ def written(tmp_path):
     return write
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", shipped_vehicles())
 def test_it_holds_every_parameter_as_the_fmu_has_it(name, fmi, written):
     described = read_model_description(cached_fmu(load_vehicle(name), fmi)).modelVariables
