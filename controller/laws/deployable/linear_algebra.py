@@ -21,25 +21,9 @@ def product(A: Array, x: Array, out: Array) -> None:
 
 
 @compiled
-def transposed_product(A: Array, x: Array, out: Array) -> None:
-    """Write A^T x into `out`."""
-    for j in range(A.shape[1]):
-        total = 0.0
-        for i in range(A.shape[0]):
-            total += A[i, j] * x[i]
-        out[j] = total
-
-
-@compiled
-def dot(a: Array, b: Array) -> float:
-    """Return a^T b."""
-    total = 0.0
-    for i in range(a.size):
-        total += a[i] * b[i]
-    return total
-
-
-@compiled
 def norm(a: Array) -> float:
     """Return |a|."""
-    return float(np.sqrt(dot(a, a)))
+    total = 0.0
+    for i in range(a.size):
+        total += a[i] * a[i]
+    return float(np.sqrt(total))
