@@ -7,9 +7,10 @@ master, which calls `CompiledLaw.step`, and compiled loops, which call the funct
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Container
 from dataclasses import dataclass
-from typing import Any, ClassVar, Literal, NamedTuple, Protocol
+from typing import Any, ClassVar, Literal, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +20,7 @@ from controller.regions import PackedRegions
 
 Array = NDArray[np.float64]
 Output = Literal["wrench", "thrusters"]
+G = TypeVar("G", bound=tuple[float, ...])
 
 
 class VehicleState(NamedTuple):
@@ -202,3 +204,30 @@ def checked_quaternion(quaternion: Array) -> Array:
     if desired.shape != (4,) or not abs(np.linalg.norm(desired) - 1.0) < 1e-6:
         raise LawError(f"desired quaternion is {desired}, expected four numbers of length 1")
     return desired
+
+
+def checked_gains(gains: G, above_zero: Container[str]) -> G:
+    """Return the gains if a law can work with them.
+
+    Parameters
+    ----------
+    gains : NamedTuple of float
+        To be checked.
+    above_zero : container of str
+        Names of those that must not be 0.
+
+    Returns
+    -------
+    NamedTuple of float
+        The same.
+
+    Raises
+    ------
+    LawError
+        If one is negative or not finite, or one that divides is zero.
+    """
+    for name, value in zip(type(gains)._fields, gains, strict=True):  # type: ignore[attr-defined]
+        positive = name in above_zero
+        if not (math.isfinite(value) and (value > 0.0 if positive else value >= 0.0)):
+            raise LawError(f"law.gains.{name} is {value}, expected a finite number {'above 0' if positive else '>= 0'}")
+    return gains

@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controller.compiled import compiled
-from controller.errors import LawError
 from controller.quaternion import error, rotation_matrix
 from controller.restoring import regressor
 
@@ -31,31 +30,6 @@ class Gains(NamedTuple):
     sigma_p: float = 0.08  # 1/(m2 s), of position in the adaptation (27)
     sigma_a: float = 0.9  # rad/s, of attitude in the adaptation (27)
     gamma: float = 2.0  # s2/kg, s2/(kg m2): Gamma = gamma I (27)
-
-
-def check_gains(gains: Gains) -> Gains:
-    """Return the gains if the law can work with them.
-
-    Parameters
-    ----------
-    gains : Gains
-        To be checked.
-
-    Returns
-    -------
-    Gains
-        The same.
-
-    Raises
-    ------
-    LawError
-        If one is negative or not finite, or one that divides is zero.
-    """
-    for name, value in gains._asdict().items():
-        positive = name in ("k_p1", "k_q", "gamma")
-        if not (math.isfinite(value) and (value > 0.0 if positive else value >= 0.0)):
-            raise LawError(f"law.gains.{name} is {value}, expected a finite number {'above 0' if positive else '>= 0'}")
-    return gains
 
 
 @compiled

@@ -9,20 +9,16 @@ before the vehicle is at its surface, and g is the signed distance to the grown 
 from __future__ import annotations
 
 import math
-from collections.abc import Container
-from typing import NamedTuple, TypeVar
+from typing import NamedTuple
 
 import numpy as np
 
 from controller.compiled import compiled
-from controller.errors import LawError
 from controller.law import Array, VehicleState
 from controller.printed_law import violation
 from controller.regions import Orientation, PackedRegions, evaluate_packed
 
 _ATTITUDE = Orientation.kind  # shapes from it on depend on attitude
-
-G = TypeVar("G", bound=tuple[float, ...])
 
 
 class Field(NamedTuple):
@@ -148,30 +144,3 @@ def keep_within(estimate: Array, first: int, last: int, bound: float) -> None:
     for i in range(first, last):
         if abs(estimate[i]) > bound:
             estimate[i] = math.copysign(bound, estimate[i])
-
-
-def checked_gains(gains: G, above_zero: Container[str]) -> G:
-    """Return the gains if a law can work with them.
-
-    Parameters
-    ----------
-    gains : NamedTuple of float
-        To be checked.
-    above_zero : container of str
-        Names of those that must not be 0.
-
-    Returns
-    -------
-    NamedTuple of float
-        The same.
-
-    Raises
-    ------
-    LawError
-        If one is negative or not finite, or one that divides is zero.
-    """
-    for name, value in zip(type(gains)._fields, gains, strict=True):  # type: ignore[attr-defined]
-        positive = name in above_zero
-        if not (math.isfinite(value) and (value > 0.0 if positive else value >= 0.0)):
-            raise LawError(f"law.gains.{name} is {value}, expected a finite number {'above 0' if positive else '>= 0'}")
-    return gains

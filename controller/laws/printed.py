@@ -8,8 +8,17 @@ import numpy as np
 
 from controller import printed_law
 from controller.compiled import compiled
-from controller.law import Array, CompiledLaw, Output, VehicleModel, VehicleState, checked_period, checked_quaternion
-from controller.printed_law import Gains, check_gains
+from controller.law import (
+    Array,
+    CompiledLaw,
+    Output,
+    VehicleModel,
+    VehicleState,
+    checked_gains,
+    checked_period,
+    checked_quaternion,
+)
+from controller.printed_law import Gains
 from controller.regions import PackedRegions, evaluate_packed
 
 
@@ -94,7 +103,7 @@ class PrintedLaw(CompiledLaw):
         return cls(gains, desired_quaternion, period, n_regions)
 
     def __init__(self, gains: Gains, desired_quaternion: Array, period: float, n_regions: int) -> None:
-        self.gains = check_gains(gains)
+        self.gains = checked_gains(gains, above_zero=("k_p1", "k_q", "gamma"))
         self.memory = PrintedMemory(
             desired_quaternion=checked_quaternion(desired_quaternion),
             period=np.array([checked_period(period)]),

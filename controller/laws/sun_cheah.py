@@ -18,11 +18,19 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 
 from controller.compiled import compiled
-from controller.law import Array, CompiledLaw, Output, VehicleModel, VehicleState, checked_period, checked_quaternion
+from controller.law import (
+    Array,
+    CompiledLaw,
+    Output,
+    VehicleModel,
+    VehicleState,
+    checked_gains,
+    checked_period,
+    checked_quaternion,
+)
 from controller.laws.potential_field import (
     Field,
     add_turned,
-    checked_gains,
     damp,
     evaluate_field,
     field_of,

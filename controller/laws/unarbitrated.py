@@ -13,8 +13,17 @@ import numpy as np
 
 from controller import printed_law
 from controller.compiled import compiled
-from controller.law import Array, CompiledLaw, Output, VehicleModel, VehicleState, checked_period, checked_quaternion
-from controller.laws.potential_field import Field, checked_gains, evaluate_field, field_of, keep_within, shorten
+from controller.law import (
+    Array,
+    CompiledLaw,
+    Output,
+    VehicleModel,
+    VehicleState,
+    checked_gains,
+    checked_period,
+    checked_quaternion,
+)
+from controller.laws.potential_field import Field, evaluate_field, field_of, keep_within, shorten
 from controller.printed_law import Gains, primary_error
 from controller.quaternion import error, rotation_matrix
 from controller.regions import PackedRegions

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 from controller.errors import LawError
+from controller.law import checked_gains
 
 
 class DeployableGains(NamedTuple):
@@ -45,6 +45,20 @@ class DeployableGains(NamedTuple):
     failure_threshold: float = 12.0  # log-likelihood ratio at which a thruster is given up; 0: never
 
 
+_MAY_BE_ZERO = {
+    "smoothing",
+    "margin",
+    "comfort",
+    "tilt",
+    "depth",
+    "coast",
+    "failure_threshold",
+    "restoring_drift",
+    "current_drift",
+    "adaptation",
+}
+
+
 def check_gains(gains: DeployableGains) -> DeployableGains:
     """Return the gains if the law can work with them.
 
@@ -61,24 +75,9 @@ def check_gains(gains: DeployableGains) -> DeployableGains:
     Raises
     ------
     LawError
-        If one is negative or not finite, or one that divides is zero.
+        If one is negative or not finite, one that divides is zero, or a share is above 1.
     """
-    may_be_zero = (
-        "smoothing",
-        "margin",
-        "comfort",
-        "tilt",
-        "depth",
-        "coast",
-        "failure_threshold",
-        "restoring_drift",
-        "current_drift",
-        "adaptation",
-    )
-    for name, value in gains._asdict().items():
-        least = "0 or above" if name in may_be_zero else "above 0"
-        if not (math.isfinite(value) and (value >= 0.0 if name in may_be_zero else value > 0.0)):
-            raise LawError(f"law.gains.{name} is {value}, expected a finite number {least}")
+    checked_gains(gains, above_zero=set(gains._fields) - _MAY_BE_ZERO)
     if gains.braking_share > 1.0:
         raise LawError(f"law.gains.braking_share is {gains.braking_share}, expected at most 1")
     return gains
