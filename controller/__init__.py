@@ -2,7 +2,7 @@
 
 from controller.allocation import Allocation
 from controller.errors import ControllerError, LawError, RegionError
-from controller.law import CompiledLaw, Diagnostic, Law, VehicleModel, VehicleState
+from controller.law import CompiledLaw, Diagnostic, Law, VehicleModel, VehicleState, WrenchLaw
 from controller.laws import LAWS, PrintedLaw
 from controller.printed_law import Gains
 
@@ -19,4 +19,5 @@ __all__ = [
     "RegionError",
     "VehicleModel",
     "VehicleState",
+    "WrenchLaw",
 ]

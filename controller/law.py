@@ -159,6 +159,43 @@ class CompiledLaw:
         type(self).function(state, goal, regions, weights, self.gains, self.memory, forces)
 
 
+class WrenchLaw(CompiledLaw):
+    """A law that gives a wrench, and wants to know nothing of the vehicle.
+
+    Parameters
+    ----------
+    gains : NamedTuple
+        Of `gains_type`.
+    desired_quaternion : array_like, shape (4,)
+        Attitude to be kept, from body to world.
+    period : float
+        Control period [s].
+    n_regions : int
+        How many secondary regions it will be given.
+
+    Raises
+    ------
+    LawError
+        If gains, attitude or period cannot be.
+    """
+
+    output: ClassVar[Output] = "wrench"
+    above_zero: ClassVar[tuple[str, ...]]  # gains that must not be 0
+    memory_of: ClassVar[Callable[..., Any]]  # of attitude (4,), period (1,) and number of regions
+
+    @classmethod
+    def for_vehicle(
+        cls, vehicle: VehicleModel, gains: Any, desired_quaternion: Array, period: float, n_regions: int
+    ) -> WrenchLaw:
+        """Return the law; of the vehicle it uses nothing."""
+        return cls(gains, desired_quaternion, period, n_regions)
+
+    def __init__(self, gains: Any, desired_quaternion: Array, period: float, n_regions: int) -> None:
+        self.gains = checked_gains(gains, self.above_zero)
+        desired, lasting = checked_quaternion(desired_quaternion), np.array([checked_period(period)])
+        self.memory = type(self).memory_of(desired, lasting, n_regions)
+
+
 def checked_period(period: float) -> float:
     """Return a control period [s] if it can be one.
 

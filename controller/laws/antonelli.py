@@ -17,21 +17,12 @@ out of the adaptation.
 
 from __future__ import annotations
 
-from typing import Any, ClassVar, NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
 from controller.compiled import compiled
-from controller.law import (
-    Array,
-    CompiledLaw,
-    Output,
-    VehicleModel,
-    VehicleState,
-    checked_gains,
-    checked_period,
-    checked_quaternion,
-)
+from controller.law import Array, VehicleState, WrenchLaw
 from controller.laws.potential_field import (
     Field,
     add_turned,
@@ -126,46 +117,24 @@ def step(
     memory.estimate[1:] = theta[:3]
 
 
-class AntonelliLaw(CompiledLaw):
-    """Adaptive set-point control with restoring forces and current, with the push of regions.
+def memory_of(desired_quaternion: Array, period: Array, n_regions: int) -> AntonelliMemory:
+    """Return the memory before the first step."""
+    return AntonelliMemory(
+        desired_quaternion=desired_quaternion,
+        period=period,
+        theta=np.zeros(9),
+        estimate=np.zeros(4),
+        report=np.zeros(0),
+        drive=np.zeros(6),
+        field=field_of(n_regions),
+    )
 
-    Parameters
-    ----------
-    gains : AntonelliGains
-        Of the law.
-    desired_quaternion : array_like, shape (4,)
-        Attitude to be kept, from body to world.
-    period : float
-        Control period [s].
-    n_regions : int
-        How many secondary regions it will be given.
 
-    Raises
-    ------
-    LawError
-        If gains, attitude or period cannot be.
-    """
+class AntonelliLaw(WrenchLaw):
+    """Adaptive set-point control with restoring forces and current, with the push of regions."""
 
     name: ClassVar[str] = "antonelli"
-    output: ClassVar[Output] = "wrench"
     function = staticmethod(step)
+    memory_of = staticmethod(memory_of)
     gains_type = AntonelliGains
-
-    @classmethod
-    def for_vehicle(
-        cls, vehicle: VehicleModel, gains: Any, desired_quaternion: Array, period: float, n_regions: int
-    ) -> AntonelliLaw:
-        """Return the law; it wants to know nothing of the vehicle."""
-        return cls(gains, desired_quaternion, period, n_regions)
-
-    def __init__(self, gains: AntonelliGains, desired_quaternion: Array, period: float, n_regions: int) -> None:
-        self.gains = checked_gains(gains, above_zero=("k_p1", "k_theta", "k_theta_moment"))
-        self.memory = AntonelliMemory(
-            desired_quaternion=checked_quaternion(desired_quaternion),
-            period=np.array([checked_period(period)]),
-            theta=np.zeros(9),
-            estimate=np.zeros(4),
-            report=np.zeros(0),
-            drive=np.zeros(6),
-            field=field_of(n_regions),
-        )
+    above_zero = ("k_p1", "k_theta", "k_theta_moment")

@@ -11,21 +11,12 @@ another law.
 
 from __future__ import annotations
 
-from typing import Any, ClassVar, NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
 from controller.compiled import compiled
-from controller.law import (
-    Array,
-    CompiledLaw,
-    Output,
-    VehicleModel,
-    VehicleState,
-    checked_gains,
-    checked_period,
-    checked_quaternion,
-)
+from controller.law import Array, VehicleState, WrenchLaw
 from controller.laws.potential_field import (
     Field,
     add_turned,
@@ -80,44 +71,21 @@ def step(
     add_turned(R, field.push, 1.0, forces)
 
 
-class PdLaw(CompiledLaw):
-    """PD control to a set point, with the push of regions.
+def memory_of(desired_quaternion: Array, period: Array, n_regions: int) -> PdMemory:
+    """Return the memory before the first step."""
+    return PdMemory(
+        desired_quaternion=desired_quaternion,
+        estimate=np.zeros(4),
+        report=np.zeros(0),
+        field=field_of(n_regions),
+    )
 
-    Parameters
-    ----------
-    gains : PdGains
-        Of the law.
-    desired_quaternion : array_like, shape (4,)
-        Attitude to be kept, from body to world.
-    period : float
-        Control period [s].
-    n_regions : int
-        How many secondary regions it will be given.
 
-    Raises
-    ------
-    LawError
-        If gains, attitude or period cannot be.
-    """
+class PdLaw(WrenchLaw):
+    """PD control to a set point, with the push of regions."""
 
     name: ClassVar[str] = "pd"
-    output: ClassVar[Output] = "wrench"
     function = staticmethod(step)
+    memory_of = staticmethod(memory_of)
     gains_type = PdGains
-
-    @classmethod
-    def for_vehicle(
-        cls, vehicle: VehicleModel, gains: Any, desired_quaternion: Array, period: float, n_regions: int
-    ) -> PdLaw:
-        """Return the law; of the vehicle it could use weight and buoyancy alone, which it is not told."""
-        return cls(gains, desired_quaternion, period, n_regions)
-
-    def __init__(self, gains: PdGains, desired_quaternion: Array, period: float, n_regions: int) -> None:
-        checked_period(period)
-        self.gains = checked_gains(gains, above_zero=("k_p1",))
-        self.memory = PdMemory(
-            desired_quaternion=checked_quaternion(desired_quaternion),
-            estimate=np.zeros(4),
-            report=np.zeros(0),
-            field=field_of(n_regions),
-        )
+    above_zero = ("k_p1",)

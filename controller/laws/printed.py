@@ -2,22 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any, ClassVar, NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
 from controller import printed_law
 from controller.compiled import compiled
-from controller.law import (
-    Array,
-    CompiledLaw,
-    Output,
-    VehicleModel,
-    VehicleState,
-    checked_gains,
-    checked_period,
-    checked_quaternion,
-)
+from controller.law import Array, VehicleState, WrenchLaw
 from controller.printed_law import Gains
 from controller.regions import PackedRegions, evaluate_packed
 
@@ -70,51 +61,29 @@ def step(
     )
 
 
-class PrintedLaw(CompiledLaw):
-    """The law as printed: a wrench without limits.
+def memory_of(desired_quaternion: Array, period: Array, n_regions: int) -> PrintedMemory:
+    """Return the memory before the first step."""
+    return PrintedMemory(
+        desired_quaternion=desired_quaternion,
+        period=period,
+        estimate=np.zeros(4),
+        report=np.zeros(0),
+        goal_value=np.zeros(1),
+        goal_gradient=np.zeros((1, 3)),
+        goal_turning=np.zeros((1, 3)),
+        goal_clearance=np.zeros(1),
+        values=np.zeros(n_regions),
+        gradients=np.zeros((n_regions, 3)),
+        turnings=np.zeros((n_regions, 3)),
+        clearances=np.zeros(n_regions),
+    )
 
-    Parameters
-    ----------
-    gains : Gains
-        Of the law.
-    desired_quaternion : array_like, shape (4,)
-        Attitude to be kept, from body to world.
-    period : float
-        Control period [s].
-    n_regions : int
-        How many secondary regions it will be given.
 
-    Raises
-    ------
-    LawError
-        If gains, attitude or period cannot be.
-    """
+class PrintedLaw(WrenchLaw):
+    """The law as printed: a wrench without limits."""
 
     name: ClassVar[str] = "printed"
-    output: ClassVar[Output] = "wrench"
     function = staticmethod(step)
+    memory_of = staticmethod(memory_of)
     gains_type = Gains
-
-    @classmethod
-    def for_vehicle(
-        cls, vehicle: VehicleModel, gains: Any, desired_quaternion: Array, period: float, n_regions: int
-    ) -> PrintedLaw:
-        """Return the law; it wants to know nothing of the vehicle."""
-        return cls(gains, desired_quaternion, period, n_regions)
-
-    def __init__(self, gains: Gains, desired_quaternion: Array, period: float, n_regions: int) -> None:
-        self.gains = checked_gains(gains, above_zero=("k_p1", "k_q", "gamma"))
-        self.memory = PrintedMemory(
-            desired_quaternion=checked_quaternion(desired_quaternion),
-            period=np.array([checked_period(period)]),
-            estimate=np.zeros(4),
-            report=np.zeros(0),
-            goal_value=np.zeros(1),
-            goal_gradient=np.zeros((1, 3)),
-            goal_turning=np.zeros((1, 3)),
-            goal_clearance=np.zeros(1),
-            values=np.zeros(n_regions),
-            gradients=np.zeros((n_regions, 3)),
-            turnings=np.zeros((n_regions, 3)),
-            clearances=np.zeros(n_regions),
-        )
+    above_zero = ("k_p1", "k_q", "gamma")

@@ -13,21 +13,12 @@ regions, which stays out of the adaptation.
 
 from __future__ import annotations
 
-from typing import Any, ClassVar, NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
 from controller.compiled import compiled
-from controller.law import (
-    Array,
-    CompiledLaw,
-    Output,
-    VehicleModel,
-    VehicleState,
-    checked_gains,
-    checked_period,
-    checked_quaternion,
-)
+from controller.law import Array, VehicleState, WrenchLaw
 from controller.laws.potential_field import (
     Field,
     add_turned,
@@ -106,45 +97,23 @@ def step(
     keep_within(estimate, 1, 4, gains.bound_moment)
 
 
-class SunCheahLaw(CompiledLaw):
-    """Adaptive set-point control through the transposed Jacobian, with the push of regions.
+def memory_of(desired_quaternion: Array, period: Array, n_regions: int) -> SunCheahMemory:
+    """Return the memory before the first step."""
+    return SunCheahMemory(
+        desired_quaternion=desired_quaternion,
+        period=period,
+        estimate=np.zeros(4),
+        report=np.zeros(0),
+        drive=np.zeros(6),
+        field=field_of(n_regions),
+    )
 
-    Parameters
-    ----------
-    gains : SunCheahGains
-        Of the law.
-    desired_quaternion : array_like, shape (4,)
-        Attitude to be kept, from body to world.
-    period : float
-        Control period [s].
-    n_regions : int
-        How many secondary regions it will be given.
 
-    Raises
-    ------
-    LawError
-        If gains, attitude or period cannot be.
-    """
+class SunCheahLaw(WrenchLaw):
+    """Adaptive set-point control through the transposed Jacobian, with the push of regions."""
 
     name: ClassVar[str] = "sun_cheah"
-    output: ClassVar[Output] = "wrench"
     function = staticmethod(step)
+    memory_of = staticmethod(memory_of)
     gains_type = SunCheahGains
-
-    @classmethod
-    def for_vehicle(
-        cls, vehicle: VehicleModel, gains: Any, desired_quaternion: Array, period: float, n_regions: int
-    ) -> SunCheahLaw:
-        """Return the law; it wants to know nothing of the vehicle."""
-        return cls(gains, desired_quaternion, period, n_regions)
-
-    def __init__(self, gains: SunCheahGains, desired_quaternion: Array, period: float, n_regions: int) -> None:
-        self.gains = checked_gains(gains, above_zero=("k_p1", "gamma"))
-        self.memory = SunCheahMemory(
-            desired_quaternion=checked_quaternion(desired_quaternion),
-            period=np.array([checked_period(period)]),
-            estimate=np.zeros(4),
-            report=np.zeros(0),
-            drive=np.zeros(6),
-            field=field_of(n_regions),
-        )
+    above_zero = ("k_p1", "gamma")

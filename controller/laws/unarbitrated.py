@@ -7,22 +7,13 @@ else is as printed.
 
 from __future__ import annotations
 
-from typing import Any, ClassVar, NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
 from controller import printed_law
 from controller.compiled import compiled
-from controller.law import (
-    Array,
-    CompiledLaw,
-    Output,
-    VehicleModel,
-    VehicleState,
-    checked_gains,
-    checked_period,
-    checked_quaternion,
-)
+from controller.law import Array, VehicleState, WrenchLaw
 from controller.laws.potential_field import Field, evaluate_field, field_of, keep_within, shorten
 from controller.printed_law import Gains, primary_error
 from controller.quaternion import error, rotation_matrix
@@ -84,44 +75,22 @@ def step(
     keep_within(estimate, 1, 4, gains.bound_moment)
 
 
-class UnarbitratedLaw(CompiledLaw):
-    """The printed law with all weights on, within bounds.
+def memory_of(desired_quaternion: Array, period: Array, n_regions: int) -> UnarbitratedMemory:
+    """Return the memory before the first step."""
+    return UnarbitratedMemory(
+        desired_quaternion=desired_quaternion,
+        period=period,
+        estimate=np.zeros(4),
+        report=np.zeros(0),
+        field=field_of(n_regions),
+    )
 
-    Parameters
-    ----------
-    gains : UnarbitratedGains
-        Of the law.
-    desired_quaternion : array_like, shape (4,)
-        Attitude to be kept, from body to world.
-    period : float
-        Control period [s].
-    n_regions : int
-        How many secondary regions it will be given.
 
-    Raises
-    ------
-    LawError
-        If gains, attitude or period cannot be.
-    """
+class UnarbitratedLaw(WrenchLaw):
+    """The printed law with all weights on, within bounds."""
 
     name: ClassVar[str] = "unarbitrated"
-    output: ClassVar[Output] = "wrench"
     function = staticmethod(step)
+    memory_of = staticmethod(memory_of)
     gains_type = UnarbitratedGains
-
-    @classmethod
-    def for_vehicle(
-        cls, vehicle: VehicleModel, gains: Any, desired_quaternion: Array, period: float, n_regions: int
-    ) -> UnarbitratedLaw:
-        """Return the law; it wants to know nothing of the vehicle."""
-        return cls(gains, desired_quaternion, period, n_regions)
-
-    def __init__(self, gains: UnarbitratedGains, desired_quaternion: Array, period: float, n_regions: int) -> None:
-        self.gains = checked_gains(gains, above_zero=("k_p1", "gamma"))
-        self.memory = UnarbitratedMemory(
-            desired_quaternion=checked_quaternion(desired_quaternion),
-            period=np.array([checked_period(period)]),
-            estimate=np.zeros(4),
-            report=np.zeros(0),
-            field=field_of(n_regions),
-        )
+    above_zero = ("k_p1", "gamma")
