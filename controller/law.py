@@ -126,6 +126,42 @@ class CompiledLaw:
         """
         raise NotImplementedError
 
+    @classmethod
+    def checked(cls, gains: G) -> G:
+        """Return gains if the law can work with them.
+
+        Parameters
+        ----------
+        gains : NamedTuple
+            Of `gains_type`.
+
+        Returns
+        -------
+        NamedTuple
+            The same.
+
+        Raises
+        ------
+        LawError
+            If it cannot.
+        """
+        raise NotImplementedError
+
+    def face(self, quaternion: Array) -> None:
+        """Keep another attitude from the next step on.
+
+        Parameters
+        ----------
+        quaternion : array_like, shape (4,)
+            From body to world.
+
+        Raises
+        ------
+        LawError
+            If it is not of length 1.
+        """
+        self.memory.desired_quaternion[:] = checked_quaternion(quaternion)
+
     @property
     def estimate(self) -> Array:
         """phi-hat (12), shape (4,) [N, N m]."""
@@ -190,8 +226,13 @@ class WrenchLaw(CompiledLaw):
         """Return the law; of the vehicle it uses nothing."""
         return cls(gains, desired_quaternion, period, n_regions)
 
+    @classmethod
+    def checked(cls, gains: G) -> G:
+        """Return gains if the law can work with them."""
+        return checked_gains(gains, cls.above_zero)
+
     def __init__(self, gains: Any, desired_quaternion: Array, period: float, n_regions: int) -> None:
-        self.gains = checked_gains(gains, self.above_zero)
+        self.gains = self.checked(gains)
         desired, lasting = checked_quaternion(desired_quaternion), np.array([checked_period(period)])
         self.memory = type(self).memory_of(desired, lasting, n_regions)
 

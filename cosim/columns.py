@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 from controller import Law
 from controller.regions import of_attitude
+from cosim.helm.orders import MODES
 from cosim.lyapunov import lyapunov_columns
 from cosim.scenario import CRITERIA, Scenario
 from cosim.signals import Column
@@ -61,6 +62,7 @@ def columns_of(scenario: Scenario, plant: Plant, law: Law) -> list[Column]:
             for axis, where in zip("xyz", ("north", "east", "down"), strict=True)
         ),
         *_sensed(scenario),
+        *_ordered(scenario),
         *(Column(f"law.{d.name}", d.unit, d.description) for d in law.diagnostics),
         *lyapunov_columns(scenario),
     ]
@@ -73,6 +75,16 @@ def _sensed(scenario: Scenario) -> Iterator[Column]:
         yield Column(f"sensed.{axis}", "m", f"Position {where} that the law is told")
     for i, name in enumerate("uvwpqr"):
         yield Column(f"sensed.{name}", "m/s" if i < 3 else "rad/s", f"Velocity {name} that the law is told, body frame")
+
+
+def _ordered(scenario: Scenario) -> Iterator[Column]:
+    if not scenario.commands.enabled:
+        return
+    yield Column("helm.armed", "", "The thrusters may work")
+    yield Column("helm.mode", "", f"Who steers: {', '.join(f'{i} {mode}' for i, mode in enumerate(MODES))}")
+    yield Column("helm.item", "", "Item of the mission, from 0; -1 for none")
+    for axis, where in zip("xyz", ("north", "east", "down"), strict=True):
+        yield Column(f"target.{axis}", "m", f"Middle of the target region, {where}")
 
 
 def _of(channels: Channels) -> list[Column]:

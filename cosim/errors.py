@@ -15,3 +15,7 @@ class RunError(CosimError):
 
 class TelemetryError(CosimError):
     """A telemetry link that cannot be opened."""
+
+
+class OrderError(CosimError):
+    """An order to a running vehicle that cannot be followed."""

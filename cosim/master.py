@@ -14,8 +14,14 @@ from typing import Protocol
 
 import numpy as np
 
-from controller import LAWS, Allocation, Law, VehicleState
+from controller import LAWS, CompiledLaw, Law, VehicleState
+from controller.quaternion import from_axis_angle
+from cosim.actuators import Actuators
 from cosim.columns import columns_of
+from cosim.helm.helm import Helm, greatest_wrench
+from cosim.helm.orders import Order
+from cosim.helm.settings import LiveSettings
+from cosim.helm.sources import OrderSource
 from cosim.lyapunov import LyapunovSignals
 from cosim.scenario import CRITERIA, Scenario
 from cosim.sensing import Sensor
@@ -27,7 +33,9 @@ from fuzzy_arbiter import Arbiter, ramp
 from plant_fmu import Plant
 
 _LONGEST_SLEEP = 3600.0  # s
+_ARMING_PERIOD = 0.005  # s of the wall clock, at which orders are looked for while nothing moves
 _ROUNDING = 1e-6  # of a step
+_DOWN: Array = np.array([0.0, 0.0, 1.0])
 _FIRST_APPLIED = "thruster_force[1]"  # outputs before it are read at the beginning of a step, from it on at the end
 
 
@@ -46,6 +54,8 @@ class Master:
     ----------
     scenario : Scenario
         What to run.
+    law : Law, optional
+        What steers; default: the scenario's law.
 
     Attributes
     ----------
@@ -64,25 +74,16 @@ class Master:
         If law or arbiter cannot be set up.
     """
 
-    def __init__(self, scenario: Scenario) -> None:
+    def __init__(self, scenario: Scenario, law: Law | None = None) -> None:
         self.scenario = scenario
         self.arbiter = Arbiter(engine=scenario.arbiter.engine, points=scenario.arbiter.points)
-        vehicle = scenario.vehicle
-        # nominal numbers: what the scenario changes in the plant is not told
-        self.law: Law = LAWS[scenario.law.name].for_vehicle(
-            vehicle_model(vehicle),
-            scenario.law.gains,
-            np.array(scenario.law.desired_quaternion),
-            scenario.time.control,
-            len(scenario.regions),
-        )
-        self._health: Array = np.ones(vehicle.n_thrusters)  # as far as the law is told
-        self._allocate_to_the_healthy()
+        self.law: Law = law or law_of(scenario)
+        self._ramp = scenario.arbiter.ramp
         self.surroundings = Surroundings(scenario)
         self._boundary = 0.0  # s, when the next step begins
         self._criterion_of = [CRITERIA.index(secondary.criterion) for secondary in scenario.regions]
 
-        self.plant = Plant(vehicle, scenario.plant.fmi)
+        self.plant = Plant(scenario.vehicle, scenario.plant.fmi)
         try:
             self.plant.set(start_values(scenario))
             self.plant.initialise()
@@ -94,7 +95,8 @@ class Master:
 
     def _bind(self) -> None:
         """Name the parts of the row, and the buffers beside it."""
-        s, n, n_thrusters = self.signals, len(self.scenario.regions), self.scenario.vehicle.n_thrusters
+        s, n = self.signals, len(self.scenario.regions)
+        self.actuators = Actuators(self.scenario, self.plant, s)
         plant, n_outputs = self.plant, len(self.plant.outputs)
         outputs = s.view("position.x", n_outputs + len(plant.flags))
         n_measured = plant.outputs.names.index(_FIRST_APPLIED)
@@ -105,13 +107,13 @@ class Master:
             position=s.view("position.x", 3),
             quaternion=s.view("quaternion.e0", 4),
             velocity_body=s.view("velocity.u", 6),
-            thruster_health=self._health,
+            thruster_health=self.actuators.health,
         )
         self.truth = self.state = truth
         self._sensor: Sensor | None = None
         if not self.scenario.sensing.exact:
             position, velocity = s.view("sensed.x", 3), s.view("sensed.u", 6)
-            self.state = VehicleState(position, np.zeros(4), velocity, self._health)
+            self.state = VehicleState(position, np.zeros(4), velocity, self.actuators.health)
             self._sensor = Sensor(self.scenario.sensing, truth, self.state)
 
         self._values, self._clearances = s.view("goal.value", n + 1), s.view("goal.clearance", n + 1)
@@ -123,20 +125,22 @@ class Master:
         self._weights = s.view(f"weight.{CRITERIA[0]}", len(CRITERIA))
         self._weights_of_regions: Array = np.zeros(n)
         self._estimate = s.view("estimate.phi1", 4)
-        self._command = s.view("command.X", 6)
         n_reports = len(self.law.diagnostics)
         self._report = s.view(f"law.{self.law.diagnostics[0].name}", n_reports) if n_reports else np.empty(0)
-        self._allocation_cut = s.view("allocation_saturated", 1)
-        inputs = s.view("thrust[1]", len(self.plant.inputs))
-        self._thrusts, self._wrench = inputs[:n_thrusters], inputs[n_thrusters:]
-        self._inputs = inputs
         self._lyapunov: LyapunovSignals | None = None
+        self.helm: Helm | None = None
+        if self.scenario.commands.enabled:
+            vehicle = self.scenario.vehicle
+            reach = greatest_wrench(vehicle.thruster_matrix, vehicle.thrust_min, vehicle.thrust_max)
+            self.helm = Helm(self.scenario, self.surroundings, self.state, reach, s.view("helm.armed", 6))
         if self.scenario.record.lyapunov:
             out = s.view("lyapunov.printed", 4)
             goal, regions, weights = self.surroundings.goal, self.surroundings.regions, self._weights_of_regions
             self._lyapunov = LyapunovSignals(self.scenario, truth, goal, regions, weights, self._estimate, out)
 
-    def run(self, observers: Sequence[Observer] = (), rate: float | None = None) -> None:
+    def run(
+        self, observers: Sequence[Observer] = (), rate: float | None = None, orders: OrderSource | None = None
+    ) -> None:
         """Step from time 0 to the end, once, telling the observers of each step.
 
         The row of step k holds what was measured and decided at its beginning, and the forces that acted at its end.
@@ -147,52 +151,110 @@ class Master:
             Told in this order.
         rate : float, optional
             Simulated seconds a wall-clock second at the most; default: as fast as it goes.
+        orders : OrderSource, optional
+            What is ordered on the way, if the scenario's commands are enabled. Where nothing moves before the vehicle
+            is armed, the first step waits for that order. After an order to reset, the run ends.
 
         Raises
         ------
         PlantError
             If the FMU fails in a step.
         """
-        scenario, row = self.scenario, self.signals.row
-        seen = row.view()
+        step, last = self.scenario.time.step, self.scenario.steps
+        seen = self.signals.row.view()
         seen.flags.writeable = False
-        step, last = scenario.time.step, scenario.steps
+        self._await_arming(orders)
         started = time.perf_counter()
         for k in range(last + 1):
-            row[0] = k * step
-            self._fail(k)
-            self._measure(k)
-            self._evaluate_regions()
-            if k % scenario.arbiter_every == 0:
-                self._arbitrate()
-            if k % scenario.control_every == 0:
-                self._control()
-                self._actuate()
-            if self._lyapunov is not None:
-                self._lyapunov.write()
-            if k < last:
-                self._advance(step)
-            self._boundary = (k + 1) * step
+            self.step(k, orders)
             for observer in observers:
                 observer.observe(k, seen)
+            if self.helm is not None and self.helm.reset:
+                return
             if rate is not None:
                 time.sleep(min(max(0.0, started + (k + 1) * step / rate - time.perf_counter()), _LONGEST_SLEEP))
+
+    def step(self, k: int, orders: OrderSource | None = None) -> None:
+        """Do step `k`: the first is 0, and each is done once, in their order; the last one moves nothing.
+
+        Parameters
+        ----------
+        k : int
+            Which.
+        orders : OrderSource, optional
+            As for `run`.
+
+        Raises
+        ------
+        PlantError
+            If the FMU fails.
+        """
+        scenario, step = self.scenario, self.scenario.time.step
+        self.signals.row[0] = k * step
+        self._fail(k)
+        self._measure(k)
+        if self.helm is not None and orders is not None:
+            self._heed(self.helm, orders.take(k))
+        self._evaluate_regions()
+        if self.helm is not None and self.helm.watch(float(self.signals.row[0]), float(self._seen[0])):
+            self._evaluate_regions()
+        if k % scenario.arbiter_every == 0:
+            self._arbitrate()
+        if k % scenario.control_every == 0:
+            self._control()
+        if self._lyapunov is not None:
+            self._lyapunov.write()
+        if k < scenario.steps:
+            self._advance(step)
+        self._boundary = (k + 1) * step
 
     # ---- the stages of a step ----
 
     def _fail(self, k: int) -> None:
-        """Let thrusters fail whose time has come, and tell the law if it is to be told."""
+        """Let thrusters fail whose time has come."""
         for failure in self.scenario.failures:
             if k == math.ceil(failure.time / self.scenario.time.step - _ROUNDING):
-                self.plant.set({f"thrust_effectiveness[{failure.thruster}]": 0.0})
-                if self.scenario.tell_failures:
-                    self._health[failure.thruster - 1] = 0.0
-                    self._allocate_to_the_healthy()
+                self.actuators.fail(failure.thruster)
 
     def _measure(self, k: int) -> None:
         self._measured[:] = self._plant_measured
         if self._sensor is not None:
             self._sensor.measure(self.signals.row[0], k % self.scenario.control_every == 0)
+
+    def _await_arming(self, orders: OrderSource | None) -> None:
+        """Follow orders at the beginning of step 0 until one arms the vehicle, or none is to come."""
+        helm = self.helm
+        while helm is not None and orders is not None and not (helm.armed or helm.reset or orders.exhausted):
+            self._measure(0)
+            self._heed(helm, orders.take(0))
+            time.sleep(_ARMING_PERIOD)
+
+    def _heed(self, helm: Helm, orders: Sequence[Order]) -> None:
+        """Follow the orders of this step, and take over what was changed."""
+        now = float(self.signals.row[0])
+        for order in orders:
+            helm.follow(order, now)
+        if helm.took_over:
+            self.law = law_of(self.scenario)
+        if isinstance(self.law, CompiledLaw) and (helm.took_over or helm.changed or helm.turned):
+            self.law.gains = helm.settings.gains
+            if helm.heading is not None:
+                self.law.face(from_axis_angle(_DOWN, helm.heading))
+        for key in helm.changed:
+            self._take_over(key, helm.settings)
+        helm.heeded()
+
+    def _take_over(self, key: str, settings: LiveSettings) -> None:
+        """Bring a changed number, other than the law's gains, to where it counts."""
+        region = settings.region_of(key)
+        if region is not None and key.endswith(".gain"):
+            self.surroundings.set_gain(region, settings[key])
+        elif region is not None:
+            self.surroundings.set_shape(region, settings.shapes[region])
+        elif key in settings.of_plant:
+            self.actuators.limit(settings.of_plant[key], settings[key])
+        elif key == "arbiter.ramp":
+            self._ramp = settings[key]
 
     def _evaluate_regions(self) -> None:
         """Evaluate the regions, where they are now, at the pose that is told, and at the true one."""
@@ -208,10 +270,9 @@ class Master:
         """
         if not np.isfinite(self.state.position).all():
             return
-        width = self.scenario.arbiter.ramp
         memberships = [0.0] * len(CRITERIA)
         for criterion, clearance in zip(self._criterion_of, self._seen[1:].tolist(), strict=True):
-            memberships[criterion] = max(memberships[criterion], ramp(clearance, width))
+            memberships[criterion] = max(memberships[criterion], ramp(clearance, self._ramp))
         weights = self.arbiter(memberships)
         self._memberships[:] = memberships
         self._weights[:] = weights
@@ -219,34 +280,25 @@ class Master:
             self._weights_of_regions[i] = weights[criterion]
 
     def _control(self) -> None:
+        """Ask the law, or the sticks, for forces of the coming period, and bring them to the plant's inputs."""
+        actuators = self.actuators
+        if self.helm is not None and not self.helm.law_steers:
+            actuators.command[:] = self.helm.wrench
+            actuators.push()
+            return
         self._estimate[:] = self.law.estimate
-        forces = self._command if self.law.output == "wrench" else self._thrusts
+        by_wrench = self.law.output == "wrench"
+        forces = actuators.command if by_wrench else actuators.thrusts
         goal, regions = self.surroundings.goal, self.surroundings.regions
         self.law.step(self.state, goal, regions, self._weights_of_regions, forces)
         self._report[:] = self.law.report
-
-    def _actuate(self) -> None:
-        """Bring the law's wrench to the plant, or find the wrench that its thruster forces amount to."""
-        if self.law.output == "thrusters":
-            self._command[:] = self.scenario.vehicle.thruster_matrix @ self._thrusts
-        elif self.allocation is None:
-            self._wrench[:] = self._command
+        if by_wrench:
+            actuators.push()
         else:
-            self._allocation_cut[0] = self.allocation(self._command, self._thrusts)
-
-    def _allocate_to_the_healthy(self) -> None:
-        vehicle, actuation = self.scenario.vehicle, self.scenario.actuation
-        self.allocation: Allocation | None = None
-        if actuation.through == "thrusters":
-            self.allocation = Allocation(
-                vehicle.thruster_matrix,
-                vehicle.thrust_min * self._health,
-                vehicle.thrust_max * self._health,
-                actuation.limits,
-            )
+            actuators.push_thrusters()
 
     def _advance(self, step: float) -> None:
-        self.plant.inputs.values[:] = self._inputs
+        self.actuators.send()
         self.plant.step(step)
         self._applied[:] = self._plant_applied
         self._flags[:] = self.plant.read_flags()
@@ -287,3 +339,30 @@ class Master:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.close()
+
+
+def law_of(scenario: Scenario) -> CompiledLaw:
+    """Return a scenario's law, with a memory of its own.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        Which law, with which gains, for which vehicle.
+
+    Returns
+    -------
+    CompiledLaw
+        It knows the vehicle's nominal numbers: what the scenario changes in the plant is not told.
+
+    Raises
+    ------
+    LawError
+        If it cannot be set up.
+    """
+    return LAWS[scenario.law.name].for_vehicle(
+        vehicle_model(scenario.vehicle),
+        scenario.law.gains,
+        np.array(scenario.law.desired_quaternion),
+        scenario.time.control,
+        len(scenario.regions),
+    )

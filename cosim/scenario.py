@@ -18,6 +18,7 @@ from controller.regions import Region, Shape
 from controller.restoring import parameters
 from cosim.errors import ScenarioError
 from cosim.scenario_check import (
+    check_commands,
     check_failures,
     check_goal,
     check_intersection,
@@ -34,6 +35,7 @@ from cosim.scenario_tables import (
     CRITERIA,
     Actuation,
     ArbiterSetup,
+    Commands,
     Failure,
     File,
     Initial,
@@ -77,6 +79,7 @@ class Scenario:
     sensing: Sensing
     failures: tuple[Failure, ...]
     record: RecordSetup
+    commands: Commands
     tell_failures: bool  # the law is told of them when they happen
     goal: Shape  # the primary region, kept within, at time 0
     goal_velocity: Vector3  # m/s, NED
@@ -156,10 +159,11 @@ def _check(table: dict[str, Any], name: str) -> Scenario:
     goal, goal_velocity, goal_streamed = check_goal(file.goal)
     regions = check_regions(file.regions)
     overlapping = check_intersection(file.intersection, regions)
+    seen = check_commands(file.commands, file.record, tuple(r.region.name for r in regions))
     vehicle_file = Path(file.vehicle) if file.vehicle.endswith(".toml") else None
     vehicle = load_vehicle(vehicle_file or file.vehicle)
     check_parameters(file.plant.parameters, vehicle)
-    law = check_law(file.law, file.actuation.through, vehicle, time.control, len(regions))
+    law = check_law(file.law, file.actuation.through, vehicle, time.control, len(regions) + len(seen))
     check_failures(file.failures, file.actuation.through, vehicle)
     check_record(file.record, law, regions)
 
@@ -188,11 +192,12 @@ def _check(table: dict[str, Any], name: str) -> Scenario:
         sensing=file.sensing,
         failures=file.failures,
         record=file.record,
+        commands=file.commands,
         tell_failures=file.tell_failures,
         goal=goal,
         goal_velocity=goal_velocity,
-        goal_streamed=goal_streamed,
-        regions=regions,
+        goal_streamed=goal_streamed or file.commands.enabled,
+        regions=regions + seen,
         intersection=overlapping,
         compare=file.compare,
         table=msgspec.to_builtins(filled),

@@ -10,9 +10,11 @@ from typing import Any
 import numpy as np
 
 from controller import LAWS, RegionError
-from controller.regions import SHAPES, Region, Shape, of_attitude
+from controller.regions import SHAPES, Region, Shape, Sphere, of_attitude
 from cosim.errors import ScenarioError
 from cosim.scenario_tables import (
+    FAR_AWAY,
+    Commands,
     Failure,
     File,
     LawEntry,
@@ -34,6 +36,7 @@ from plant_fmu.vehicle import Vehicle
 ROUNDING = 1e-6  # of one period, within which periods count as multiples
 MAX_STEPS = 100_000_000
 MAX_POINTS = 100_001
+MAX_SEEN = 100  # obstacles that may come in
 REGION_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9 _-]{0,39}")  # a column of the record, a label of figures
 
 # parameters of the FMU that have a key of their own in a scenario
@@ -104,6 +107,29 @@ def check_record(record: RecordSetup, law: LawSetup, regions: tuple[SecondaryReg
     _require(law.name == "printed", "record.lyapunov", "true", "false: V of (31) is the printed law's")
     names = [r.region.name for r in regions if of_attitude(r.region.shape)]
     _require(not names, "record.lyapunov", "true", f"false: the analysis knows no attitude in regions ({names})")
+
+
+def check_commands(commands: Commands, record: RecordSetup, names: tuple[str, ...]) -> tuple[SecondaryRegion, ...]:
+    """Return the regions that stand for obstacles that may come in, none where commands are not enabled."""
+    if not commands.enabled:
+        _require(not commands.await_arm, "commands.await_arm", "true", "false without commands.enabled: nobody arms")
+        return ()
+    _require(not record.lyapunov, "record.lyapunov", "true", "false with commands.enabled: V is of one target")
+    _require(0 <= commands.obstacles <= MAX_SEEN, "commands.obstacles", commands.obstacles, f"0 to {MAX_SEEN}")
+    for key in ("obstacle_radius", "hold_radius"):
+        value = getattr(commands, key)
+        _require(0.0 < value < math.inf, f"commands.{key}", value, "above 0 m")
+    for key, greatest in (("obstacle_gain", math.inf), ("surface_depth", 1e3), ("pilot_gain", 1.0)):
+        value = getattr(commands, key)
+        _require(0.0 <= value <= greatest and value < math.inf, f"commands.{key}", value, f"0 to {greatest:g}")
+    seen = [f"seen {i}" for i in range(1, commands.obstacles + 1)]
+    for name in seen:
+        _require(name not in names, f"regions.{name}.name", "used", "another one: obstacles that come in have it")
+    far = Sphere(FAR_AWAY, commands.obstacle_radius)
+    return tuple(
+        SecondaryRegion(Region(name, far, "out", gain=commands.obstacle_gain), "obstacle", streamed=True, seen=True)
+        for name in seen
+    )
 
 
 def check_goal(table: dict[str, Any]) -> tuple[Shape, Vector3, bool]:

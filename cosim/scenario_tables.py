@@ -15,6 +15,8 @@ Vector6 = tuple[float, float, float, float, float, float]
 
 CRITERIA = tuple(c.name for c in SECTION_VI)
 
+FAR_AWAY: Vector3 = (0.0, 0.0, -1e5)  # m, NED: where obstacles are that have not come
+
 
 # ---- the same in the file and checked ------------------------------------------------------------------------------
 
@@ -90,6 +92,20 @@ class Sensing:
 
 
 @dataclass(frozen=True)
+class Commands:
+    """What the running vehicle takes from outside."""
+
+    enabled: bool = False
+    await_arm: bool = False  # nothing moves before it is armed
+    obstacles: int = 8  # spheres that may come in while it runs
+    obstacle_radius: float = 0.5  # m, of one whose size is not told
+    obstacle_gain: float = 100.0  # N per unit of g
+    hold_radius: float = 0.3  # m, of the sphere that is held in, and surfaced in
+    surface_depth: float = 0.5  # m, of its centre when surfacing
+    pilot_gain: float = 0.5  # part of the greatest wrench that full sticks give
+
+
+@dataclass(frozen=True)
 class RecordSetup:
     """What a run records beyond its signals."""
 
@@ -152,6 +168,7 @@ class File:
     sensing: Sensing = Sensing()
     failures: tuple[Failure, ...] = ()
     record: RecordSetup = RecordSetup()
+    commands: Commands = Commands()
     regions: tuple[RegionEntry, ...] = ()
 
 
@@ -184,6 +201,7 @@ class SecondaryRegion:
     region: Region
     criterion: str  # one of CRITERIA
     streamed: bool = False  # moved from outside while the run goes on
+    seen: bool = False  # stands for an obstacle that may come in while the run goes on
 
     @property
     def moves(self) -> bool:

@@ -2,13 +2,30 @@
 
 from __future__ import annotations
 
+import dataclasses
+import math
+from dataclasses import dataclass
+
 import numpy as np
 
 from controller import VehicleState
-from controller.regions import pack
+from controller.regions import PackedRegions, Shape, Sphere, pack
 from cosim.errors import RunError
 from cosim.scenario import Scenario
+from cosim.scenario_tables import FAR_AWAY, Vector3
 from cosim.signals import Array
+
+_AT_REST = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class _Target:
+    """A region to be reached."""
+
+    packed: PackedRegions  # of this region alone
+    middle: Array  # (3,) m, NED: of its shape as packed
+    origin: Array  # (3,) m, NED: how far it would have been from there at time 0, had it always moved as it does now
+    of_scenario: bool  # of the scenario's shape
 
 
 class Surroundings:
@@ -21,21 +38,29 @@ class Surroundings:
 
     Attributes
     ----------
-    goal, regions : PackedRegions
-        The primary region alone, and the n secondary ones, where they are now.
+    regions : PackedRegions
+        The n secondary ones, where they are now.
     """
 
     def __init__(self, scenario: Scenario) -> None:
         secondary = [region.region for region in scenario.regions]
-        self.goal, self.regions = pack([scenario.goal_region]), pack(secondary)
+        self.regions = pack(secondary)
+        self._goal_region, self._middle = scenario.goal_region, middle_of(scenario.goal)
+        self._target = self._reached = self._new_target(None, self._middle)
         self._names = ["goal", *(region.name for region in secondary)]
         self._streamed = ["goal"] if scenario.goal_streamed else []
-        self._streamed += [region.region.name for region in scenario.regions if region.streamed]
+        self._streamed += [region.region.name for region in scenario.regions if region.streamed and not region.seen]
         self._moving = [self._names.index(name) for name in scenario.moving]
+        self._seen = [i for i, region in enumerate(scenario.regions) if region.seen]
         # m, NED: where each would have been at time 0, had it always moved as it does now
-        self._origins: Array = np.zeros((len(self._names), 3))
+        self._origins: Array = np.zeros((len(secondary), 3))
         self._gradients: Array = np.zeros((len(self._names), 3))
         self._turnings: Array = np.zeros((len(self._names), 3))
+
+    @property
+    def goal(self) -> PackedRegions:
+        """The region to be reached alone, where it is now."""
+        return self._target.packed
 
     def carry_to(self, time: float, shifts: Array) -> None:
         """Put all regions where they are at a time.
@@ -47,11 +72,11 @@ class Surroundings:
         shifts : ndarray, shape (moving regions, 3)
             Receives how far each moving one is from where the scenario has it [m, NED].
         """
-        for packed, origins in ((self.goal, self._origins[:1]), (self.regions, self._origins[1:])):
+        for packed, origins in ((self.goal, self._target.origin), (self.regions, self._origins)):
             packed.move_to(time)
             packed.shifts[:] += origins
         for i, at in enumerate(self._moving):
-            shifts[i] = self.regions.shifts[at - 1] if at else self.goal.shifts[0]
+            shifts[i] = self.regions.shifts[at - 1] if at else self.target - self._middle
 
     def evaluate(self, state: VehicleState, values: Array, clearances: Array) -> None:
         """Evaluate goal and regions at a pose.
@@ -67,6 +92,8 @@ class Surroundings:
         self.goal.evaluate(p, e, values[:1], gradients[:1], turnings[:1], clearances[:1])
         self.regions.evaluate(p, e, values[1:], gradients[1:], turnings[1:], clearances[1:])
 
+    # ---- moved from outside ----
+
     def move(self, name: str, displacement: Array, velocity: Array, time: float) -> None:
         """Say where a streamed region is at a time, and how it goes on from there, as `Master.move_region` says."""
         if name not in self._streamed:
@@ -77,7 +104,119 @@ class Surroundings:
             raise RunError(f"region {name!r}: moved to {to} m at {going} m/s, expected three finite numbers each")
         at = self._names.index(name)
         if at:
-            self.regions.velocities[at - 1] = going
+            self._carry(at - 1, to, going, time)
         else:
-            self.goal.velocities[0] = going
-        self._origins[at] = to - going * time
+            self._reached.packed.velocities[0] = going
+            self._reached.origin[:] = to - going * time
+
+    def _carry(self, i: int, displacement: Array, velocity: Array, time: float) -> None:
+        self.regions.velocities[i] = velocity
+        self._origins[i] = displacement - velocity * time
+
+    def place(self, slot: int, position: Vector3, radius: float, velocity: Vector3, time: float) -> None:
+        """Put an obstacle that came while running somewhere.
+
+        Parameters
+        ----------
+        slot : int
+            Which of them, from 0.
+        position : tuple of float
+            Of its centre [m, NED].
+        radius : float
+            [m].
+        velocity : tuple of float
+            From then on [m/s, NED].
+        time : float
+            [s].
+        """
+        i = self._seen[slot]
+        self._reshape(self.regions, i, Sphere(FAR_AWAY, radius))
+        self._carry(i, np.subtract(position, FAR_AWAY), np.array(velocity), time)
+
+    def forget(self, slot: int) -> None:
+        """Take an obstacle away that came while running; `slot` counts them from 0."""
+        self._carry(self._seen[slot], np.zeros(3), np.zeros(3), 0.0)
+
+    # ---- the target ----
+
+    @property
+    def target(self) -> Array:
+        """Middle of the region to be reached, shape (3,) [m, NED]."""
+        middle: Array = self._target.middle + self.goal.shifts[0]
+        return middle
+
+    def aim(self, position: Vector3, radius: float | None, velocity: Vector3 = _AT_REST, time: float = 0.0) -> None:
+        """Put the region to be reached somewhere.
+
+        Parameters
+        ----------
+        position : tuple of float
+            Of its middle [m, NED].
+        radius : float or None
+            Of a sphere [m]; None for the shape of the scenario's goal.
+        velocity : tuple of float
+            From then on [m/s, NED].
+        time : float
+            [s].
+        """
+        target = self._new_target(radius, position)
+        target.packed.velocities[0] = velocity
+        target.origin[:] -= np.multiply(velocity, time)
+        self._target = target
+
+    def keep_target(self) -> None:
+        """Remember the present target, for `aim_as_before`."""
+        self._reached = self._target
+
+    def aim_as_before(self) -> None:
+        """Go back to the target that was remembered last; the scenario's goal, if none was."""
+        self._target = self._reached
+
+    def _new_target(self, radius: float | None, position: Vector3) -> _Target:
+        """Return a target at rest with its middle at a position, as a sphere or in the shape of the scenario's goal."""
+        if radius is None:
+            origin = np.subtract(position, self._middle)
+            return _Target(pack([self._goal_region]), np.array(self._middle), origin, True)
+        sphere = dataclasses.replace(self._goal_region, shape=Sphere(position, radius))
+        return _Target(pack([sphere]), np.array(position), np.zeros(3), False)
+
+    # ---- changed from outside ----
+
+    def set_gain(self, name: str, gain: float) -> None:
+        """Give a secondary region another gain."""
+        self.regions.gains[self._names.index(name) - 1] = gain
+
+    def set_shape(self, name: str, shape: Shape) -> None:
+        """Give a region, or ``"goal"``, another shape of the same kind and size."""
+        at = self._names.index(name)
+        if at:
+            self._reshape(self.regions, at - 1, shape)
+            return
+        self._goal_region = dataclasses.replace(self._goal_region, shape=shape)
+        for target in (self._reached, self._target):
+            if target.of_scenario:
+                self._reshape(target.packed, 0, shape)
+
+    @staticmethod
+    def _reshape(regions: PackedRegions, i: int, shape: Shape) -> None:
+        regions.numbers[regions.offsets[i] : regions.offsets[i + 1]] = shape.packed()
+
+
+def middle_of(shape: Shape) -> Vector3:
+    """Return the point that moves with a shape, by which targets are placed.
+
+    Parameters
+    ----------
+    shape : Shape
+        In space.
+
+    Returns
+    -------
+    tuple of float
+        The middle of its upright box [m, NED]; along an axis on which it has one end, that end, and 0 where none.
+    """
+    middle = [0.0, 0.0, 0.0]
+    for axis, (low, high) in enumerate(zip(*shape.bounds(), strict=True)):
+        ends = [end for end in (low, high) if math.isfinite(end)]
+        middle[axis] = sum(ends) / len(ends) if ends else 0.0
+    return middle[0], middle[1], middle[2]

@@ -278,7 +278,7 @@ class DeployableLaw(CompiledLaw):
         period: float,
         n_regions: int,
     ) -> None:
-        self.gains = check_gains(gains)
+        self.gains = self.checked(gains)
         desired = checked_quaternion(desired_quaternion)
         m = vehicle.thruster_matrix.shape[1]
         self.memory = DeployableMemory(
@@ -305,3 +305,12 @@ class DeployableLaw(CompiledLaw):
     ) -> DeployableLaw:
         """Return the law for a vehicle."""
         return cls(vehicle, gains, desired_quaternion, period, n_regions)
+
+    @classmethod
+    def checked(cls, gains: Any) -> Any:
+        """Return gains if the law can work with them."""
+        return check_gains(gains)
+
+    def face(self, quaternion: Array) -> None:
+        """Keep another attitude, where no region asks for one, from the next step on."""
+        self.memory.attitude.preferred[:] = checked_quaternion(quaternion)

@@ -1,0 +1,250 @@
+"""The helm of a running vehicle: armed or not, by hand or by the law, and where the target region is."""
+
+from __future__ import annotations
+
+import logging
+import math
+from typing import assert_never
+
+import numpy as np
+
+from controller import VehicleState
+from cosim.errors import OrderError
+from cosim.helm.orders import (
+    MODES,
+    Aim,
+    Arm,
+    Begin,
+    Change,
+    Face,
+    Forget,
+    Item,
+    Mission,
+    Mode,
+    Obstacle,
+    Order,
+    Reset,
+    Steer,
+    Sticks,
+)
+from cosim.helm.settings import LiveSettings
+from cosim.scenario import Scenario
+from cosim.scenario_tables import Vector3
+from cosim.signals import Array
+from cosim.surroundings import Surroundings
+
+__all__ = ["MODES", "Helm", "Mode"]
+
+log = logging.getLogger(__name__)
+
+
+class Helm:
+    """Follows orders, and carries the target region from one item of a mission to the next.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        What is run; its commands are enabled.
+    surroundings : Surroundings
+        Whose target and obstacles are moved.
+    state : VehicleState
+        The vehicle as the law is told.
+    reach : ndarray, shape (6,)
+        Greatest wrench along and about each body axis [N, N m], which full sticks are parts of.
+    out : ndarray, shape (6,)
+        Receives armed, mode, item of the mission (-1 for none), and the target's middle [m, NED].
+
+    Attributes
+    ----------
+    settings : LiveSettings
+        The numbers as they are now.
+    armed : bool
+        Whether the thrusters may work.
+    mode : Mode
+        Who steers, and whither.
+    heading : float or None
+        Heading to be kept [rad], once one is ordered.
+    took_over, turned : bool
+        Whether the law steers from now on and did not before, and whether another heading was ordered, since `heeded`.
+    changed : list of str
+        Settings that were changed since `heeded`.
+    reset : bool
+        Whether the run is to begin again.
+    """
+
+    def __init__(
+        self, scenario: Scenario, surroundings: Surroundings, state: VehicleState, reach: Array, out: Array
+    ) -> None:
+        self.settings = LiveSettings(scenario)
+        self.armed, self.mode = not scenario.commands.await_arm, "reach"
+        self.heading: float | None = None
+        self.took_over = self.turned = self.reset = False
+        self.changed: list[str] = []
+        self._surroundings, self._state, self._reach, self._out = surroundings, state, reach, out
+        self._sticks: Array = np.zeros(6)
+        self._items: tuple[Item, ...] = ()
+        self._item = -1
+        self._inside_since = math.inf  # s, within the region of the present item
+        self._slots: dict[int, int] = {}  # obstacles that came, by their number
+        self._free = list(range(scenario.commands.obstacles))
+
+    @property
+    def law_steers(self) -> bool:
+        """Whether the law says what the thrusters do; otherwise `wrench` does."""
+        return self.armed and self.mode != "manual"
+
+    @property
+    def wrench(self) -> Array:
+        """What the sticks ask for, shape (6,) [N, N m], body frame; nothing unless armed."""
+        gain = self.settings["commands.pilot_gain"] if self.armed else 0.0
+        wrench: Array = gain * self._sticks * self._reach
+        return wrench
+
+    def follow(self, order: Order, time: float) -> None:
+        """Follow an order, at the beginning of a step; what cannot be followed is logged and changes nothing.
+
+        Parameters
+        ----------
+        order : Order
+            Any.
+        time : float
+            Of the step [s].
+        """
+        steered = self.law_steers
+        try:
+            self._follow(order, time)
+        except OrderError as error:
+            log.warning("%s: %s", type(order).__name__.lower(), error)
+        self.took_over |= self.law_steers and not steered
+
+    def _follow(self, order: Order, time: float) -> None:
+        match order:
+            case Arm():
+                self.armed = order.armed
+                self._sticks[:] = 0.0
+            case Steer():
+                self._steer(order.mode)
+            case Aim():
+                self._surroundings.aim(order.position, order.radius, order.velocity, time)
+                self._surroundings.keep_target()
+                self.mode = "reach"
+            case Face():
+                self.heading, self.turned = order.heading, True
+            case Sticks():
+                self._sticks[:] = order.wrench
+            case Obstacle():
+                self._place(order, time)
+            case Forget():
+                if order.number in self._slots:
+                    slot = self._slots.pop(order.number)
+                    self._surroundings.forget(slot)
+                    self._free = sorted([*self._free, slot])
+            case Change():
+                self.settings.change(order.key, order.value)
+                self.changed.append(order.key)
+            case Mission():
+                self._items, self._item = order.items, -1
+                if self.mode == "mission":
+                    self._steer("hold")
+            case Begin():
+                if not 0 <= order.item < len(self._items):
+                    raise OrderError(f"item is {order.item}, expected 0 to {len(self._items) - 1}")
+                self._item = order.item
+                if self.mode == "mission":
+                    self._aim_at_item()
+            case Reset():
+                self.reset = True
+            case _:
+                assert_never(order)
+
+    def heeded(self) -> None:
+        """Note that whoever steps the run has taken over what is new."""
+        self.took_over = self.turned = False
+        self.changed.clear()
+
+    def _steer(self, mode: Mode) -> None:
+        here: Vector3 = (float(self._state.position[0]), float(self._state.position[1]), float(self._state.position[2]))
+        radius = self.settings["commands.hold_radius"]
+        if mode in ("hold", "surface") and not all(map(math.isfinite, here)):
+            raise OrderError(f"mode {mode} needs a position, and none is known")
+        if mode == "mission" and not self._items:
+            raise OrderError("mode mission: there is no mission")
+        self.mode = mode
+        self._sticks[:] = 0.0
+        match mode:
+            case "hold":
+                self._surroundings.aim(here, radius)
+            case "surface":
+                up = (here[0], here[1], self.settings["commands.surface_depth"])
+                self._surroundings.aim(up, radius)
+            case "reach":
+                self._surroundings.aim_as_before()
+            case "mission":
+                self._item = max(self._item, 0)
+                self._aim_at_item()
+
+    def _aim_at_item(self) -> None:
+        item = self._items[self._item]
+        self._surroundings.aim(item.position, item.radius)
+        self._inside_since = math.inf
+
+    def _place(self, order: Obstacle, time: float) -> None:
+        if order.number not in self._slots:
+            if not self._free:
+                raise OrderError(f"no room for obstacle {order.number}: {len(self._slots)} have come already")
+            self._slots[order.number] = self._free.pop(0)
+        self._surroundings.place(self._slots[order.number], order.position, order.radius, order.velocity, time)
+
+    def watch(self, time: float, clearance: float) -> bool:
+        """Write how things stand, and go on with the mission once its region was reached.
+
+        Parameters
+        ----------
+        time : float
+            Of the step [s].
+        clearance : float
+            Of the target region, as the law is told [m]; 0 or above within it.
+
+        Returns
+        -------
+        bool
+            Whether the target is another one now.
+        """
+        went_on = False
+        if self.armed and self.mode == "mission" and 0 <= self._item < len(self._items):
+            self._inside_since = min(self._inside_since, time) if clearance >= 0.0 else math.inf
+            stay = self._items[self._item].stay
+            last = self._item == len(self._items) - 1
+            if not last and stay is not None and time - self._inside_since >= stay:
+                self._item += 1
+                self._aim_at_item()
+                went_on = True
+        self._out[0], self._out[1], self._out[2] = self.armed, MODES.index(self.mode), self._item
+        self._out[3:] = self._surroundings.target
+        return went_on
+
+
+def greatest_wrench(matrix: Array, lower: Array, upper: Array) -> Array:
+    """Return the greatest wrench along and about each axis alone that the least thruster forces give, both ways.
+
+    Parameters
+    ----------
+    matrix : ndarray, shape (6, m)
+        Body wrench of one newton of each thruster.
+    lower, upper : ndarray, shape (m,)
+        Limits of each thruster [N].
+
+    Returns
+    -------
+    ndarray, shape (6,)
+        [N, N m]; 0 about an axis that the thrusters cannot turn.
+    """
+    inverse = np.linalg.pinv(matrix)
+    limit = np.minimum(-lower, upper)
+    result = np.zeros(6)
+    for axis in range(6):
+        share = np.abs(inverse[:, axis])
+        used = share > 1e-9 * max(1e-300, float(np.max(np.abs(inverse))))
+        if np.any(used):
+            result[axis] = float(np.min(limit[used] / share[used]))
+    return result

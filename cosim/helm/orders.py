@@ -1,0 +1,150 @@
+"""Orders: what can be asked of a running vehicle. Each is a value that stands as one line of JSON in a log."""
+
+from __future__ import annotations
+
+import math
+from typing import Literal, get_args
+
+import msgspec
+
+from cosim.errors import OrderError
+from cosim.scenario_tables import Vector3, Vector6
+
+Mode = Literal["manual", "hold", "reach", "mission", "surface"]
+
+MODES: tuple[Mode, ...] = get_args(Mode)  # a mode's index is its number in the record
+
+_FAR = 1e5  # m; beyond it nothing is ordered
+_FAST = 1e2  # m/s
+_LONG = 1e9  # s
+
+
+class _Order(msgspec.Struct, frozen=True, tag_field="order", tag=str.lower, forbid_unknown_fields=True):
+    """What all orders share: the log tells them apart by their name."""
+
+
+class Arm(_Order, frozen=True):
+    """Let the thrusters work, or stop them."""
+
+    armed: bool
+
+
+class Steer(_Order, frozen=True):
+    """Change the mode: by hand, hold the place, reach the target region, follow the mission, or surface."""
+
+    mode: Mode
+
+
+class Aim(_Order, frozen=True):
+    """Move the target region, and reach it.
+
+    With a radius the target is a sphere about `position` [m, NED]; otherwise the scenario's goal region, moved so that
+    its middle is there. It goes on from there at `velocity` [m/s, NED].
+    """
+
+    position: Vector3
+    radius: float | None = None  # m
+    velocity: Vector3 = (0.0, 0.0, 0.0)
+
+
+class Face(_Order, frozen=True):
+    """Keep another attitude: level, with a heading [rad, from north to east]."""
+
+    heading: float
+
+
+class Sticks(_Order, frozen=True):
+    """Push by hand: a part, from -1 to 1, of the greatest wrench along and about each body axis."""
+
+    wrench: Vector6
+
+
+class Obstacle(_Order, frozen=True):
+    """Keep out of a sphere about `position` [m, NED] that travels at `velocity` [m/s, NED].
+
+    What comes with a number that is known already moves that one.
+    """
+
+    number: int
+    position: Vector3
+    radius: float  # m
+    velocity: Vector3 = (0.0, 0.0, 0.0)
+
+
+class Forget(_Order, frozen=True):
+    """Take away an obstacle that came from outside."""
+
+    number: int
+
+
+class Change(_Order, frozen=True):
+    """Change a number of the scenario while it runs; `LiveSettings` says which."""
+
+    key: str
+    value: float
+
+
+class Item(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """One item of a mission: a region to be reached, and for how long to stay within it."""
+
+    position: Vector3  # m, NED
+    radius: float | None = None  # m, of a sphere; None: the scenario's goal region, moved there
+    stay: float | None = 0.0  # s, within the region before the next item; None: for good
+
+
+class Mission(_Order, frozen=True):
+    """Follow these items, one after the other, whenever the mode is that of the mission."""
+
+    items: tuple[Item, ...]
+
+
+class Begin(_Order, frozen=True):
+    """Go on with an item of the mission, from 0."""
+
+    item: int
+
+
+class Reset(_Order, frozen=True):
+    """End this run, and begin it again from time 0."""
+
+
+Order = Arm | Steer | Aim | Face | Sticks | Obstacle | Forget | Change | Mission | Begin | Reset
+
+
+def check_order(order: Order) -> None:
+    """Raise unless the numbers of an order can be.
+
+    Parameters
+    ----------
+    order : Order
+        Any.
+
+    Raises
+    ------
+    OrderError
+        If a number is not finite, absurdly great, or without a meaning.
+    """
+    match order:
+        case Aim() | Obstacle():
+            _check_place(order.position, order.radius)
+            _require(all(abs(v) <= _FAST for v in order.velocity), "velocity", order.velocity, f"up to {_FAST:g} m/s")
+        case Mission():
+            for item in order.items:
+                _check_place(item.position, item.radius)
+                _require(item.stay is None or 0.0 <= item.stay <= _LONG, "stay", item.stay, f"0 to {_LONG:g} s")
+        case Sticks():
+            _require(all(abs(x) <= 1.0 for x in order.wrench), "wrench", order.wrench, "six numbers from -1 to 1")
+        case Face():
+            _require(math.isfinite(order.heading), "heading", order.heading, "a finite angle")
+        case Change():
+            _require(math.isfinite(order.value), order.key, order.value, "a finite number")
+
+
+def _check_place(position: Vector3, radius: float | None) -> None:
+    _require(all(abs(x) <= _FAR for x in position), "position", position, f"finite numbers up to {_FAR:g} m")
+    _require(radius is None or 0.0 < radius <= _FAR, "radius", radius, f"above 0 and up to {_FAR:g} m")
+
+
+def _require(good: bool, key: str, came: object, expected: str) -> None:
+    if not good:
+        raise OrderError(f"{key} is {came}, expected {expected}")

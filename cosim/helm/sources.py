@@ -1,0 +1,147 @@
+"""Where orders come from: a queue that another thread fills, or the log of an earlier run."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Protocol
+
+import msgspec
+
+from cosim.errors import OrderError, RunError
+from cosim.helm.orders import Order, check_order
+
+QUEUED = 256  # orders between two steps; further ones are refused
+
+
+class OrderSource(Protocol):
+    """Gives the orders of each step."""
+
+    def take(self, k: int) -> Sequence[Order]:
+        """Return the orders to be applied at the beginning of step `k`."""
+        ...
+
+    @property
+    def exhausted(self) -> bool:
+        """Whether no order will come any more."""
+        ...
+
+
+class OrderQueue:
+    """Orders from another thread, in the order in which they were given. Bounded: a flood is refused, not kept."""
+
+    exhausted = False
+
+    def __init__(self) -> None:
+        self._orders: deque[Order] = deque()
+
+    def give(self, order: Order) -> bool:
+        """Queue an order for the next step.
+
+        Parameters
+        ----------
+        order : Order
+            To be applied.
+
+        Returns
+        -------
+        bool
+            Whether there was room for it.
+
+        Raises
+        ------
+        OrderError
+            If its numbers cannot be.
+        """
+        check_order(order)
+        if len(self._orders) >= QUEUED:
+            return False
+        self._orders.append(order)
+        return True
+
+    def take(self, k: int) -> Sequence[Order]:
+        """Return what is queued."""
+        taken = []
+        while self._orders:
+            taken.append(self._orders.popleft())
+        return taken
+
+
+class _Entry(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A line of the log."""
+
+    step: int
+    order: Order
+
+
+class RecordedOrders:
+    """The orders of an earlier run, at the steps at which that run took them.
+
+    Parameters
+    ----------
+    file : Path
+        The log.
+
+    Raises
+    ------
+    RunError
+        If it cannot be read, or a line is no order.
+    """
+
+    def __init__(self, file: Path) -> None:
+        try:
+            lines = file.read_bytes().splitlines()
+        except OSError as error:
+            raise RunError(f"{file}: {error.strerror or error}") from error
+        entries = []
+        for number, line in enumerate(lines, 1):
+            try:
+                entries.append(msgspec.json.decode(line, type=_Entry))
+                check_order(entries[-1].order)
+            except (msgspec.DecodeError, OrderError) as error:
+                raise RunError(f"{file}, line {number}: {error}") from error
+        self._entries = deque(sorted(entries, key=lambda entry: entry.step))
+
+    @property
+    def exhausted(self) -> bool:
+        """Whether no order is left."""
+        return not self._entries
+
+    def take(self, k: int) -> Sequence[Order]:
+        """Return the orders of step `k`, and of earlier ones that were not taken."""
+        taken = []
+        while self._entries and self._entries[0].step <= k:
+            taken.append(self._entries.popleft().order)
+        return taken
+
+
+class LoggedOrders:
+    """Another source, of which each order that is taken is written down at once, so that a killed run has its log.
+
+    Parameters
+    ----------
+    source : OrderSource
+        Where the orders come from.
+    file : Path
+        The log; made when the first order is taken.
+    """
+
+    def __init__(self, source: OrderSource, file: Path) -> None:
+        self._source, self._file = source, file
+
+    @property
+    def exhausted(self) -> bool:
+        """Whether no order will come any more."""
+        return self._source.exhausted
+
+    def take(self, k: int) -> Sequence[Order]:
+        """Return the orders of step `k`, once they are written."""
+        orders = self._source.take(k)
+        if orders:
+            self._write(_Entry(k, order) for order in orders)
+        return orders
+
+    def _write(self, entries: Iterable[_Entry]) -> None:
+        with self._file.open("ab") as file:
+            file.write(b"".join(msgspec.json.encode(entry) + b"\n" for entry in entries))

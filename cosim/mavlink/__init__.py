@@ -1,0 +1,1 @@
+"""The running co-simulation as a MAVLink vehicle."""
