@@ -132,14 +132,25 @@ class Master:
         if self.scenario.commands.enabled:
             vehicle = self.scenario.vehicle
             reach = greatest_wrench(vehicle.thruster_matrix, vehicle.thrust_min, vehicle.thrust_max)
-            self.helm = Helm(self.scenario, self.surroundings, self.state, reach, s.view("helm.armed", 6))
+            self.helm = Helm(self.scenario, self.surroundings, self.state, reach, s.view("helm.armed", 7))
         if self.scenario.record.lyapunov:
             out = s.view("lyapunov.printed", 4)
             goal, regions, weights = self.surroundings.goal, self.surroundings.regions, self._weights_of_regions
             self._lyapunov = LyapunovSignals(self.scenario, truth, goal, regions, weights, self._estimate, out)
 
+    @property
+    def row(self) -> Array:
+        """The row of the present step, shape (n,), which cannot be written."""
+        seen = self.signals.row.view()
+        seen.flags.writeable = False
+        return seen
+
     def run(
-        self, observers: Sequence[Observer] = (), rate: float | None = None, orders: OrderSource | None = None
+        self,
+        observers: Sequence[Observer] = (),
+        rate: float | None = None,
+        orders: OrderSource | None = None,
+        awaiting: Observer | None = None,
     ) -> None:
         """Step from time 0 to the end, once, telling the observers of each step.
 
@@ -154,6 +165,8 @@ class Master:
         orders : OrderSource, optional
             What is ordered on the way, if the scenario's commands are enabled. Where nothing moves before the vehicle
             is armed, the first step waits for that order. After an order to reset, the run ends.
+        awaiting : Observer, optional
+            Told how things stand, as of step 0, while arming is awaited.
 
         Raises
         ------
@@ -161,12 +174,11 @@ class Master:
             If the FMU fails in a step.
         """
         step, last = self.scenario.time.step, self.scenario.steps
-        seen = self.signals.row.view()
-        seen.flags.writeable = False
-        self._await_arming(orders)
+        seen = self.row
+        waited = self._await_arming(orders, awaiting)
         started = time.perf_counter()
         for k in range(last + 1):
-            self.step(k, orders)
+            self.step(k, orders if k or not waited else None)
             for observer in observers:
                 observer.observe(k, seen)
             if self.helm is not None and self.helm.reset:
@@ -221,13 +233,28 @@ class Master:
         if self._sensor is not None:
             self._sensor.measure(self.signals.row[0], k % self.scenario.control_every == 0)
 
-    def _await_arming(self, orders: OrderSource | None) -> None:
-        """Follow orders at the beginning of step 0 until one arms the vehicle, or none is to come."""
+    def look(self) -> None:
+        """Fill the row with what stands before the first step: the pose, regions and helm; nothing moves or is drawn."""
+        self._measured[:] = self._plant_measured
+        if self._sensor is not None:
+            self._sensor.tell_truth()
+        self._evaluate_regions()
+        if self.helm is not None:
+            self.helm.watch(0.0, float(self._seen[0]))
+
+    def _await_arming(self, orders: OrderSource | None, awaiting: Observer | None) -> bool:
+        """Follow orders before step 0 until one arms the vehicle, or none is to come; return whether it was awaited."""
         helm = self.helm
-        while helm is not None and orders is not None and not (helm.armed or helm.reset or orders.exhausted):
-            self._measure(0)
+        if helm is None or helm.armed or orders is None:
+            return False
+        while not (helm.armed or orders.exhausted):
+            self.look()
             self._heed(helm, orders.take(0))
+            helm.reset = False  # nothing has begun
+            if awaiting is not None:
+                awaiting.observe(0, self.row)
             time.sleep(_ARMING_PERIOD)
+        return True
 
     def _heed(self, helm: Helm, orders: Sequence[Order]) -> None:
         """Follow the orders of this step, and take over what was changed."""

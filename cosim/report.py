@@ -168,6 +168,7 @@ def verdict(summary: dict[str, Any]) -> str:
     ended = {
         "completed": "",
         "interrupted": f" The run was interrupted at {summary['simulated_time']:.3f} s.",
+        "reset": f" The run was reset at {summary['simulated_time']:.3f} s.",
         "killed": f" The run was killed; its record ends at {summary['simulated_time']:.3f} s.",
     }.get(summary["status"], f" The run {summary['status']}.")
     return goal + kept + force + ended
