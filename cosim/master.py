@@ -234,7 +234,7 @@ class Master:
             self._sensor.measure(self.signals.row[0], k % self.scenario.control_every == 0)
 
     def look(self) -> None:
-        """Fill the row with what stands before the first step: the pose, regions and helm; nothing moves or is drawn."""
+        """Fill the row with how things stand before the first step; nothing moves, and no noise is drawn."""
         self._measured[:] = self._plant_measured
         if self._sensor is not None:
             self._sensor.tell_truth()

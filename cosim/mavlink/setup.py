@@ -20,7 +20,7 @@ class Mavlink:
     """Where a run is to be a MAVLink vehicle, and how."""
 
     endpoints: tuple[Endpoint, ...]
-    options: MavlinkOptions = MavlinkOptions()
+    options: MavlinkOptions
 
     def open(self, scenario: Scenario, columns: Sequence[Column], orders: OrderQueue | None) -> LinkThread:
         """Open all links.
