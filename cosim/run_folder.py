@@ -129,12 +129,18 @@ def conclude(path: Path, scenario: Scenario, status: str, wall_time: float | Non
     record = load_record(path)
     scenario = as_it_came(scenario, record)
     summary = summarise(scenario, record, status, wall_time)
+    if scenario.commands.enabled:
+        summary["orders"] = _lines(path / ORDERS)
     scratch = path / f".{SUMMARY}-{os.getpid()}"
     scratch.write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
     scratch.replace(path / SUMMARY)
     if report:
         write_report(path, scenario, record, summary)
     return summary
+
+
+def _lines(file: Path) -> int:
+    return len(file.read_bytes().splitlines()) if file.exists() else 0
 
 
 def report_again(path: Path) -> dict[str, Any]:
