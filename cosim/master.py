@@ -14,7 +14,7 @@ from typing import Protocol
 
 import numpy as np
 
-from controller import LAWS, CompiledLaw, Law, VehicleState
+from controller import CompiledLaw, Law, VehicleState
 from controller.quaternion import from_axis_angle
 from cosim.actuators import Actuators
 from cosim.columns import columns_of
@@ -22,13 +22,13 @@ from cosim.helm.helm import Helm, greatest_wrench
 from cosim.helm.orders import Order
 from cosim.helm.settings import LiveSettings
 from cosim.helm.sources import OrderSource
+from cosim.law import law_of
 from cosim.lyapunov import LyapunovSignals
 from cosim.scenario import CRITERIA, Scenario
 from cosim.sensing import Sensor
 from cosim.signals import Array, Signals
 from cosim.start_values import start_values
 from cosim.surroundings import Surroundings
-from cosim.vehicle_model import vehicle_model
 from fuzzy_arbiter import Arbiter, ramp
 from plant_fmu import Plant
 
@@ -366,30 +366,3 @@ class Master:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.close()
-
-
-def law_of(scenario: Scenario) -> CompiledLaw:
-    """Return a scenario's law, with a memory of its own.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        Which law, with which gains, for which vehicle.
-
-    Returns
-    -------
-    CompiledLaw
-        It knows the vehicle's nominal numbers: what the scenario changes in the plant is not told.
-
-    Raises
-    ------
-    LawError
-        If it cannot be set up.
-    """
-    return LAWS[scenario.law.name].for_vehicle(
-        vehicle_model(scenario.vehicle),
-        scenario.law.gains,
-        np.array(scenario.law.desired_quaternion),
-        scenario.time.control,
-        len(scenario.regions),
-    )
