@@ -109,6 +109,7 @@ def run_scenario(
             with Master(scenario) as master:
                 if mavlink is not None and link is None:
                     link = mavlink.open(scenario, master.signals.columns, None if recorded else queue)
+                    link.start()
                 folder = claim(out.with_name(f"{out.name}-{attempt}") if out and attempt > 1 else out, scenario)
                 try:
                     source = LoggedOrders(recorded or queue, folder.path / ORDERS)
@@ -151,8 +152,6 @@ def _step(
     try:
         recorder = Recorder(folder.path, master.signals.columns)
         bar = _Progress(master.scenario) if progress and sys.stderr else None
-        if link:
-            link.start()
         observers: list[Observer] = [o for o in (recorder, link, bar) if o is not None]
         started = time.perf_counter()
         master.run(observers, rate, orders, awaiting=link)
