@@ -109,6 +109,8 @@ class Vessel:
         self.loss_timeout, self.loss_action = options.loss_timeout, options.loss_action
         self.frame = LocalFrame(*options.origin)
         self.unix_start_us = time.time_ns() // 1000  # when simulated time was 0
+        vehicle = scenario.vehicle
+        self._limits = tuple(zip((-vehicle.thrust_min).tolist(), vehicle.thrust_max.tolist(), strict=True))
         self._orders = orders if options.commands and live and scenario.commands.enabled else None
         self._said: dict[str, float] = {}
         self._said_lately: deque[float] = deque(maxlen=_TEXTS)
@@ -160,6 +162,14 @@ class Vessel:
     def home_ned(self) -> Vector3:
         """Return where home is [m, NED]."""
         return self.home[0], self.home[1], 0.0
+
+    def thrust_parts(self) -> list[float]:
+        """Return what each thruster gives, as a part of the vehicle's limit on that side, from -1 to 1."""
+        parts = []
+        for force, (backwards, forwards) in zip(self.view.thruster_forces, self._limits, strict=True):
+            limit = forwards if force > 0.0 else backwards
+            parts.append(max(-1.0, min(1.0, force / limit)) if limit > 0.0 else 0.0)
+        return parts
 
     # ---- orders ----
 
