@@ -129,9 +129,9 @@ class Autopilot:
         if self._boot_us is not None and boot < self._boot_us:
             self._restart()
             vessel.look(row)
+        self._moved |= boot != self._boot_us  # the same one comes again while arming is awaited
         self._clock_us += max(0, boot - (boot if self._boot_us is None else self._boot_us))
         self._boot_us = boot
-        self._moved = True
         self._events.watch()
         for service in self._services:
             service.looked()
