@@ -97,6 +97,8 @@ def parameter_nan(subject: Subject) -> Outcome:
     if after is None:
         return failed("nothing afterwards", "the old value")
     came = f"{'an error, ' * error}echo {echo and echo.param_value}, read {after.param_value:g}"
+    if not _same(after.param_value, value.param_value):
+        _set(subject, value, value.param_value)
     answered = error or echo is not None
     return judged(answered and _same(after.param_value, value.param_value), came, f"an answer, {value.param_value:g}")
 

@@ -27,7 +27,7 @@ except ImportError:
     from mavsdk.param import ParamError
 
 PATIENCE = 20.0  # s, for a step
-FAR = 1e-5  # deg, about a metre
+FAR, NEARER = 4e-5, 1e-5  # deg, about 4.4 m and 1.1 m
 
 
 class Vehicle:
