@@ -1,0 +1,208 @@
+"""The vehicle's side of MAVLink: what it says, and what it does about what comes. No sockets, no threads."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+from cosim.helm.sources import OrderQueue
+from cosim.mavlink.events import Events
+from cosim.mavlink.messages import status
+from cosim.mavlink.messages.table import HEARTBEAT
+from cosim.mavlink.options import MavlinkOptions
+from cosim.mavlink.outlet import Outlet
+from cosim.mavlink.services.commands import Commands
+from cosim.mavlink.services.ftp import FileServer
+from cosim.mavlink.services.manual import Manual
+from cosim.mavlink.services.mission import Missions
+from cosim.mavlink.services.modes import Modes
+from cosim.mavlink.services.obstacles import Obstacles
+from cosim.mavlink.services.origin import Origin
+from cosim.mavlink.services.parameters import Parameters
+from cosim.mavlink.services.requests import Requests, banner
+from cosim.mavlink.services.service import Handler, Service
+from cosim.mavlink.services.supervision import Supervision
+from cosim.mavlink.services.targets import Targets
+from cosim.mavlink.services.timing import Timing
+from cosim.mavlink.streams import Streams
+from cosim.mavlink.vessel import COMPONENT_ID, Sender, Vessel
+from cosim.scenario import Scenario
+from cosim.signals import Array, Column
+
+_HEARTBEAT = 1.1  # s of the wall clock without one, until one is sent; longer than the stream's second
+_STILL = 0.5  # s of the wall clock without a snapshot, after which streams go by that clock
+_SECOND = 1_000_000
+
+
+class Autopilot:
+    """The running co-simulation as a MAVLink vehicle.
+
+    Streams go by simulated time, which is the time since boot; the watch over stations goes by the wall clock, and so
+    do the streams while no snapshot comes. Nothing that comes raises. Whoever drives it calls it from one thread.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        What is run.
+    columns : sequence of Column
+        Of the rows that it observes.
+    options : MavlinkOptions
+        As whom it shows itself, and whom it heeds.
+    orders : OrderQueue or None
+        Where orders go; with None, or commands off, it is read-only.
+    live : bool
+        False for a recorded run, which takes no orders.
+
+    Raises
+    ------
+    TelemetryError
+        If pymavlink is not installed.
+    """
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        columns: Sequence[Column],
+        options: MavlinkOptions,
+        orders: OrderQueue | None,
+        live: bool = True,
+    ) -> None:
+        self._vessel = vessel = Vessel(scenario, columns, options, orders, live)
+        self._streams: dict[Outlet, Streams] = {}
+        self._events = Events(vessel)
+        parameters = Parameters(vessel)
+        services: list[Service] = [
+            Requests(vessel, self._streams),
+            Modes(vessel),
+            Targets(vessel, parameters),
+            Obstacles(vessel),
+            Manual(vessel),
+            parameters,
+            Missions(vessel),
+            FileServer(vessel, parameters),
+            Timing(vessel),
+            Origin(vessel),
+            Supervision(vessel),
+        ]
+        self._services = [*services, Commands(vessel, services)]
+        self._handlers: dict[str, Handler] = {}
+        for service in self._services:
+            self._handlers.update(service.messages)
+        self._clock_us = 0  # of the streams: it only goes on
+        self._boot_us: int | None = None  # of the last snapshot
+        self._moved = False  # a snapshot came since the last tick
+        self._moved_at = -math.inf
+        self._beaten_at: dict[Outlet, float] = {}
+        self._ticked: float | None = None
+
+    def attach(self, link: Outlet) -> None:
+        """Begin to stream on a link."""
+        self._vessel.links.append(link)
+        self._streams[link] = Streams(self._vessel, link, self._clock_us)
+        for line in banner(self._vessel):
+            for message in self._vessel.text(line):
+                link.send(message)
+
+    def detach(self, link: Outlet) -> None:
+        """End to stream on a link, and forget it."""
+        if link not in self._streams:
+            return
+        self._vessel.links.remove(link)
+        del self._streams[link]
+        self._beaten_at.pop(link, None)
+        for service in self._services:
+            service.detach(link)
+
+    def observe(self, row: Array) -> None:
+        """Take the next snapshot, and send what is due by simulated time.
+
+        Parameters
+        ----------
+        row : ndarray, shape (n,)
+            Of a step, in the order of the columns; its first number is simulated time [s]. One that is earlier than
+            the one before begins another run.
+        """
+        vessel = self._vessel
+        vessel.look(row)
+        boot = vessel.view.boot_us
+        if self._boot_us is not None and boot < self._boot_us:
+            self._restart()
+            vessel.look(row)
+        self._clock_us += max(0, boot - (boot if self._boot_us is None else self._boot_us))
+        self._boot_us = boot
+        self._moved = True
+        self._events.watch()
+        for service in self._services:
+            service.looked()
+        self._advance()
+
+    def _restart(self) -> None:
+        vessel = self._vessel
+        vessel.restart()
+        self._events.restart()
+        for service in self._services:
+            service.restart()
+        vessel.say("The run begins again", vessel.mavlink.MAV_SEVERITY_NOTICE)
+
+    def _advance(self) -> None:
+        for streams in list(self._streams.values()):
+            streams.advance(self._clock_us)
+
+    def receive(self, link: Outlet, message: Any, now: float) -> None:
+        """Heed a message.
+
+        Parameters
+        ----------
+        link : Outlet
+            That it came on.
+        message : MAVLink_message
+            Decoded, and accepted: its checksum, and its signature where one is asked for, are right.
+        now : float
+            The wall clock, ``time.monotonic()`` [s].
+        """
+        vessel = self._vessel
+        vessel.now = now
+        handler = self._handlers.get(message.get_type())
+        if handler is None or link not in self._streams:
+            return
+        sender = Sender(link, message.get_srcSystem(), message.get_srcComponent())
+        own = vessel.options.system_id, COMPONENT_ID
+        allowed = vessel.options.allowed_systems
+        if (sender.system, sender.component) == own or (allowed is not None and sender.system not in allowed):
+            return
+        system, component = getattr(message, "target_system", 0), getattr(message, "target_component", 0)
+        if system in (0, own[0]) and component in (0, own[1]):
+            handler(sender, message)
+
+    def tick(self, now: float) -> None:
+        """Do what goes by the wall clock; to be called every 20 ms, or more often.
+
+        Parameters
+        ----------
+        now : float
+            ``time.monotonic()`` [s].
+        """
+        vessel = self._vessel
+        vessel.now = now
+        since = 0.0 if self._ticked is None else min(max(now - self._ticked, 0.0), 1.0)
+        self._ticked = now
+        if self._moved:
+            self._moved, self._moved_at = False, now
+        elif now - self._moved_at >= _STILL:
+            self._clock_us += round(since * _SECOND)
+            self._advance()
+        for service in self._services:
+            service.tick()
+        for link, streams in list(self._streams.items()):
+            if streams.beaten or link not in self._beaten_at:
+                streams.beaten = False
+                self._beaten_at[link] = now
+            elif now - self._beaten_at[link] >= _HEARTBEAT:
+                streams.send(HEARTBEAT)
+
+    def close(self, now: float) -> None:
+        """Say goodbye: a last heartbeat, in standby."""
+        vessel = self._vessel
+        vessel.now = now
+        vessel.send(status.beat(vessel, vessel.mavlink.MAV_STATE_STANDBY))

@@ -1,0 +1,103 @@
+"""What is worth a line of text: changes from one snapshot to the next."""
+
+from __future__ import annotations
+
+from controller.regions import of_attitude
+from cosim.mavlink.messages import status
+from cosim.mavlink.profile import MODE_NAMES
+from cosim.mavlink.vessel import Vessel
+from cosim.mavlink.view import View
+
+_MARGIN = 0.01  # m or rad: a region is entered or left once its surface is that far behind
+_RELEASED = 1_000_000  # µs of simulated time without a limit, until the thrusters are said to be free
+_EVERY = 2.0  # s of the wall clock, between two texts of a kind
+
+
+class Events:
+    """Compares snapshots.
+
+    Parameters
+    ----------
+    vessel : Vessel
+        Whose voice is used.
+    """
+
+    def __init__(self, vessel: Vessel) -> None:
+        self._vessel = vessel
+        self.restart()
+
+    def restart(self) -> None:
+        """Forget everything; the next snapshot is the first."""
+        self._before: View | None = None
+        self._fine: list[bool] = []
+        self._saturated = False
+        self._cut_us = 0  # when a limit cut something last
+
+    def watch(self) -> None:
+        """Compare the vessel's snapshot with the one before."""
+        vessel, view = self._vessel, self._vessel.view
+        before = self._before
+        self._before = view
+        if before is None:
+            self._fine = [clearance >= 0.0 for clearance in view.clearances]
+            return
+        self._watch_helm(before, view)
+        self._watch_regions(view)
+        self._watch_limits(view)
+        if view.touches_bottom and not before.touches_bottom:
+            vessel.say("Bottom touched", vessel.mavlink.MAV_SEVERITY_WARNING, "bottom", _EVERY)
+
+    def _watch_helm(self, before: View, view: View) -> None:
+        vessel, m = self._vessel, self._vessel.mavlink
+        if view.armed != before.armed:
+            vessel.say("Armed" if view.armed else "Disarmed", m.MAV_SEVERITY_NOTICE)
+        if view.mode != before.mode:
+            vessel.say(f"Mode: {MODE_NAMES[view.mode]}", m.MAV_SEVERITY_NOTICE)
+        if (view.armed, view.mode) != (before.armed, before.mode):
+            for message in (*status.heartbeat(vessel), *status.current_mode(vessel)):
+                vessel.send(message)
+        if view.mode == "mission" and before.mode == "mission" and view.item == before.item + 1 and before.item >= 0:
+            self._reached_item(before.item)
+
+    def _reached_item(self, item: int) -> None:
+        vessel = self._vessel
+        number = item + int(vessel.profile.home_is_first)
+        vessel.send(vessel.make("MISSION_ITEM_REACHED", number))
+        vessel.say(f"Reached mission item {number}")
+
+    def _watch_regions(self, view: View) -> None:
+        m = self._vessel.mavlink
+        for i, clearance in enumerate(view.clearances):
+            fine = self._fine[i]
+            # once the surface is a margin behind; NaN changes nothing
+            now_fine = not clearance < -_MARGIN if fine else clearance > _MARGIN
+            if now_fine == fine:
+                continue
+            self._fine[i] = now_fine
+            if i == 0:
+                self._tell_of_target(view, now_fine)
+                continue
+            region = self._vessel.scenario.regions[i - 1].region
+            what = "Attitude" if of_attitude(region.shape) else "Region"
+            inside = now_fine == (region.keep == "in")
+            text = f"{what} {region.name} {'entered' if inside else 'left'}"
+            severity = m.MAV_SEVERITY_INFO if now_fine else m.MAV_SEVERITY_WARNING
+            self._vessel.say(text if now_fine else f"{text}: keep {region.keep}", severity, text, _EVERY)
+
+    def _tell_of_target(self, view: View, inside: bool) -> None:
+        vessel = self._vessel
+        last = view.item == len(vessel.plan) - 1 and view.mode == "mission"
+        vessel.say("Target reached" if inside else "Target left", None, f"target {inside}", _EVERY)
+        if inside and last:
+            self._reached_item(view.item)
+
+    def _watch_limits(self, view: View) -> None:
+        vessel = self._vessel
+        if view.saturated:
+            self._cut_us = view.boot_us
+            if not self._saturated:
+                vessel.say("Thrust saturated", vessel.mavlink.MAV_SEVERITY_WARNING, "saturated", _EVERY)
+            self._saturated = True
+        elif self._saturated and view.boot_us - self._cut_us >= _RELEASED:
+            self._saturated = False
+            vessel.say("Thrust no longer saturated", None, "released", _EVERY)

@@ -1,0 +1,126 @@
+"""What law, arbiter and thrusters do. Each function returns the messages of one kind."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+from cosim.mavlink.encode import wrapped
+from cosim.mavlink.messages.pose import degrees
+from cosim.mavlink.vessel import Vessel
+from cosim.scenario import CRITERIA
+
+_CENTRE, _SWING = 1500, 400  # µs of PWM: at rest, and to either end
+_SERVOS, _OUTPUTS = 16, 32
+_POSITION_AND_VELOCITY = 0b110111000000  # type_mask: all but these is ignored
+
+# what a law reports of itself that is worth watching, if it does
+_WATCHED = {
+    "law.yielding": "qp_slack",
+    "law.barriers": "barriers",
+    "law.wanted_speed": "want_speed",
+    "law.silence": "silence",
+    "law.failed_thruster": "failed_thr",
+}
+
+# DEBUG_FLOAT_ARRAY: what an array_id holds
+WEIGHTS, VALUES, CLEARANCES, THRUSTS, REPORTS = 1, 2, 3, 4, 5
+
+
+def nav_controller_output(vessel: Vessel) -> list[Any]:
+    """NAV_CONTROLLER_OUTPUT: bearing and distance of the target's middle; the altitude error is that of its depth."""
+    view = vessel.view
+    north, east, down = (a - b for a, b in zip(view.target, view.position_ned, strict=True))
+    bearing = degrees(math.atan2(east, north))
+    heading = degrees(view.euler[2])
+    roll, pitch = degrees(view.euler[0]), degrees(view.euler[1])
+    values = roll, pitch, heading, bearing, math.hypot(north, east), -down, 0.0, 0.0
+    return [vessel.make("NAV_CONTROLLER_OUTPUT", *values)]
+
+
+def thrust_parts(vessel: Vessel) -> list[float]:
+    """Return what each thruster gives, as a part of its limit on that side, from -1 to 1."""
+    vehicle = vessel.scenario.vehicle
+    parts = []
+    for force, low, high in zip(vessel.view.thruster_forces, vehicle.thrust_min, vehicle.thrust_max, strict=True):
+        limit = high if force > 0.0 else -low
+        parts.append(max(-1.0, min(1.0, force / limit)) if limit > 0.0 else 0.0)
+    return parts
+
+
+def servo_output_raw(vessel: Vessel) -> list[Any]:
+    """SERVO_OUTPUT_RAW: the thrusters' forces as PWM [µs], linear, 0 where there is none; its time wraps."""
+    pulses = [_CENTRE + _SWING * part for part in thrust_parts(vessel)]
+    pulses = (pulses + [0] * _SERVOS)[:_SERVOS]
+    return [vessel.make("SERVO_OUTPUT_RAW", wrapped(vessel.view.boot_us, 1), 0, *pulses)]
+
+
+def actuator_output_status(vessel: Vessel) -> list[Any]:
+    """ACTUATOR_OUTPUT_STATUS: the same as parts from -1 to 1."""
+    parts = thrust_parts(vessel)[:_OUTPUTS]
+    return [vessel.make("ACTUATOR_OUTPUT_STATUS", vessel.view.boot_us, (1 << len(parts)) - 1, parts)]
+
+
+def rc_channels(vessel: Vessel) -> list[Any]:
+    """RC_CHANNELS: the sticks as they were heeded last, in the order of ArduSub: pitch roll up yaw forward lateral."""
+    surge, sway, heave, roll, pitch, yaw = vessel.sticks
+    order = pitch, roll, -heave, yaw, surge, sway
+    pulses = [_CENTRE + _SWING * stick for stick in order] + [0xFFFF] * 12
+    return [vessel.make("RC_CHANNELS", wrapped(vessel.view.boot_us), len(order), *pulses, 0xFF)]
+
+
+def position_target_local_ned(vessel: Vessel) -> list[Any]:
+    """POSITION_TARGET_LOCAL_NED: the middle of the target region."""
+    m, view = vessel.mavlink, vessel.view
+    none = (0.0,) * 8
+    mask = _POSITION_AND_VELOCITY | 0b111000
+    return [
+        vessel.make(
+            "POSITION_TARGET_LOCAL_NED", wrapped(view.boot_us), m.MAV_FRAME_LOCAL_NED, mask, *view.target, *none
+        )
+    ]
+
+
+def named_values(vessel: Vessel) -> list[tuple[str, float]]:
+    """Return the few quantities to be watched, by a name of up to ten characters."""
+    view = vessel.view
+    values = [(f"w_{name}", weight) for name, weight in zip(CRITERIA, view.weights, strict=True)]
+    values += [(f"phi{i}", phi) for i, phi in enumerate(view.estimate, 1)]
+    clearances = view.clearances
+    values.append(("g_goal", view.region_values[0]))
+    values.append(("goal_clear", clearances[0]))
+    nearest = min((c for c in clearances[1:] if not math.isnan(c)), default=math.nan)
+    values.append(("clearance", nearest))  # the least of all regions
+    values.append(("thrust", max(map(abs, thrust_parts(vessel)), default=0.0)))
+    values.append(("force", math.hypot(*view.wrench[:3])))
+    values.append(("saturated", float(view.saturated)))
+    values += [(_WATCHED[name], value) for name, value in view.reports() if name in _WATCHED]
+    return values
+
+
+def named_value_float(vessel: Vessel) -> list[Any]:
+    """NAMED_VALUE_FLOAT: one for each of `named_values`."""
+    time = wrapped(vessel.view.boot_us)
+    return [vessel.make("NAMED_VALUE_FLOAT", time, name, value) for name, value in named_values(vessel)]
+
+
+def debug_float_array(vessel: Vessel) -> list[Any]:
+    """DEBUG_FLOAT_ARRAY: all that law and arbiter say, by array_id.
+
+    1, ``weights``: memberships, then weights, of obstacle, shape and depth. 2, ``values``: g of the goal, then of each
+    region as the scenario has them. 3, ``clearances``: in the same order. 4, ``thrusts``: the force of each thruster
+    [N], then what is asked of each. 5, ``law``: what the law reports of itself, in the order of the run's columns.
+    58 numbers at the most.
+    """
+    view = vessel.view
+    arrays: list[tuple[int, str, Sequence[float]]] = [
+        (WEIGHTS, "weights", [*view.memberships, *view.weights]),
+        (VALUES, "values", view.region_values),
+        (CLEARANCES, "clearances", view.clearances),
+        (THRUSTS, "thrusts", [*view.thruster_forces, *view.thruster_commands]),
+    ]
+    reports = [value for _, value in view.reports()]
+    if reports:
+        arrays.append((REPORTS, "law", reports))
+    return [vessel.make("DEBUG_FLOAT_ARRAY", view.boot_us, name, number, data) for number, name, data in arrays]

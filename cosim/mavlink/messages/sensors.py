@@ -1,0 +1,111 @@
+"""What the vehicle's sensors say. Each function returns the messages of one kind."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from cosim.mavlink.encode import wrapped
+from cosim.mavlink.messages.pose import globe
+from cosim.mavlink.vessel import Vessel
+
+SURFACE_PRESSURE = 1013.25  # hPa
+WATER_DENSITY = 1000.0  # kg/m3, as ArduSub's default has it for fresh water
+GRAVITY = 9.80665  # m/s2
+_PASCAL = 100.0  # in a hPa
+_DEEPEST_BOTTOM = 655.0  # m below the vehicle; beyond it no distance can be told
+_CENTI = 100  # in a unit
+_HIGHRES_FIELDS = 0b111111 | 1 << 9 | 1 << 11  # accelerations, rates, pressure, pressure altitude
+
+
+def pressure_at(depth: float) -> float:
+    """Return the absolute pressure [hPa] at a depth [m]."""
+    return SURFACE_PRESSURE + WATER_DENSITY * GRAVITY * depth / _PASCAL
+
+
+def scaled_pressure(vessel: Vessel) -> list[Any]:
+    """SCALED_PRESSURE: within the hull, that of the surface."""
+    return [vessel.make("SCALED_PRESSURE", wrapped(vessel.view.boot_us), SURFACE_PRESSURE, 0.0, 0)]
+
+
+def scaled_pressure2(vessel: Vessel) -> list[Any]:
+    """SCALED_PRESSURE2: of the water, from the depth sensor, as ArduSub has it."""
+    view = vessel.view
+    pressure = pressure_at(view.depth)
+    return [vessel.make("SCALED_PRESSURE2", wrapped(view.boot_us), pressure, pressure - SURFACE_PRESSURE, 0)]
+
+
+def scaled_imu2(vessel: Vessel) -> list[Any]:
+    """SCALED_IMU2: specific force [mG] and rates [mrad/s]; there is no magnetometer."""
+    view = vessel.view
+    force = [a / GRAVITY * 1e3 for a in view.acceleration]
+    rates = [w * 1e3 for w in view.measured_rates]
+    return [vessel.make("SCALED_IMU2", wrapped(view.boot_us), *force, *rates, 0, 0, 0)]
+
+
+def highres_imu(vessel: Vessel) -> list[Any]:
+    """HIGHRES_IMU, without a magnetometer."""
+    view = vessel.view
+    pressure = pressure_at(view.depth)
+    none = math.nan, math.nan, math.nan
+    values = *view.acceleration, *view.measured_rates, *none, pressure, 0.0, -view.depth, math.nan, _HIGHRES_FIELDS
+    return [vessel.make("HIGHRES_IMU", view.boot_us, *values)]
+
+
+def has_bottom(vessel: Vessel) -> bool:
+    """Return whether there is a bottom near enough to be measured."""
+    return vessel.view.altitude <= _DEEPEST_BOTTOM
+
+
+def distance_sensor(vessel: Vessel) -> list[Any]:
+    """DISTANCE_SENSOR: down to the bottom, where there is one."""
+    if not has_bottom(vessel):
+        return []
+    m, view = vessel.mavlink, vessel.view
+    kind = m.MAV_DISTANCE_SENSOR_ULTRASOUND, 0, m.MAV_SENSOR_ROTATION_PITCH_270, 0xFF
+    reach = 5, _DEEPEST_BOTTOM * _CENTI
+    return [vessel.make("DISTANCE_SENSOR", wrapped(view.boot_us), *reach, view.altitude * _CENTI, *kind)]
+
+
+def rangefinder(vessel: Vessel) -> list[Any]:
+    """RANGEFINDER: the same, for stations that know no other."""
+    return [vessel.make("RANGEFINDER", vessel.view.altitude, 0.0)] if has_bottom(vessel) else []
+
+
+def water_depth(vessel: Vessel) -> list[Any]:
+    """WATER_DEPTH: the height above the bottom, where there is one."""
+    if not has_bottom(vessel):
+        return []
+    view = vessel.view
+    latitude, longitude, millimetres = globe(vessel, view.position_ned)
+    values = 0, 1, latitude, longitude, millimetres / 1e3, *view.euler, view.altitude, 0.0
+    return [vessel.make("WATER_DEPTH", wrapped(view.boot_us), *values)]
+
+
+def battery_status(vessel: Vessel) -> list[Any]:
+    """BATTERY_STATUS: nothing is known of it, for the plant has none."""
+    m = vessel.mavlink
+    kind = 0, m.MAV_BATTERY_FUNCTION_ALL, m.MAV_BATTERY_TYPE_UNKNOWN, 0x7FFF
+    return [vessel.make("BATTERY_STATUS", *kind, [0xFFFF] * 10, -1, -1, -1, -1)]
+
+
+def _position_known(vessel: Vessel) -> bool:
+    return all(map(math.isfinite, vessel.view.position_ned))
+
+
+def estimator_status(vessel: Vessel) -> list[Any]:
+    """ESTIMATOR_STATUS: what is known of the pose; innovations are not."""
+    m = vessel.mavlink
+    flags = m.ESTIMATOR_ATTITUDE | m.ESTIMATOR_VELOCITY_HORIZ | m.ESTIMATOR_VELOCITY_VERT
+    if _position_known(vessel):
+        flags |= m.ESTIMATOR_POS_HORIZ_REL | m.ESTIMATOR_POS_HORIZ_ABS | m.ESTIMATOR_POS_VERT_ABS
+    return [vessel.make("ESTIMATOR_STATUS", vessel.view.boot_us, flags, *[0.0] * 6, math.nan, math.nan)]
+
+
+def ekf_status_report(vessel: Vessel) -> list[Any]:
+    """EKF_STATUS_REPORT, the same as ArduPilot has it."""
+    m = vessel.mavlink
+    flags = m.EKF_ATTITUDE | m.EKF_VELOCITY_HORIZ | m.EKF_VELOCITY_VERT
+    if _position_known(vessel):
+        flags |= m.EKF_POS_HORIZ_REL | m.EKF_POS_HORIZ_ABS | m.EKF_POS_VERT_ABS
+    return [vessel.make("EKF_STATUS_REPORT", flags, *[0.0] * 5)]

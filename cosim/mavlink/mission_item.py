@@ -1,0 +1,21 @@
+"""One item of a mission, as it came."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class MissionItem:
+    """The fields of MISSION_ITEM_INT; a station reads back what it wrote."""
+
+    frame: int
+    command: int
+    autocontinue: int
+    param1: float
+    param2: float
+    param3: float
+    param4: float
+    x: int  # 1e-7 deg, or 1e-4 m
+    y: int
+    z: float  # m

@@ -1,0 +1,1 @@
+"""The micro-services of the protocol, one file each."""

@@ -1,0 +1,199 @@
+"""File transfer: a read-only server with one file, the packed parameters. There is no file system behind it."""
+
+from __future__ import annotations
+
+import re
+import struct
+from collections import OrderedDict
+from dataclasses import dataclass, field
+from typing import Any
+
+from cosim.mavlink.services.packed_parameters import bare_crc32, packed
+from cosim.mavlink.services.parameters import Parameters
+from cosim.mavlink.services.service import Service
+from cosim.mavlink.vessel import Sender, Vessel
+
+_HEADER = struct.Struct("<HBBBBBBI")  # seq, session, opcode, size, req_opcode, burst_complete, padding, offset
+_ROOM = 239  # bytes of data in a payload
+_PAYLOAD = 251
+_FOLDER, _FILE = "@PARAM", "param.pck"
+_CLIENTS = 8  # each with one session; who came first goes when there are more
+_BURST = 16  # packets
+_LONGEST_PATH = 100
+
+_NONE, _TERMINATE, _RESET, _LIST, _OPEN, _READ, _CRC, _BURST_READ = 0, 1, 2, 3, 4, 5, 14, 15
+_WRITING = (6, 7, 8, 9, 10, 11, 12, 13)  # create, write, remove, make and remove folders, open, truncate, rename
+_ACK, _NAK = 128, 129
+_INVALID_SIZE, _INVALID_SESSION, _EOF, _UNKNOWN, _PROTECTED, _NOT_FOUND = 3, 4, 6, 7, 9, 10
+
+
+@dataclass(frozen=True)
+class _Request:
+    """A request, of which all fields are numbers, and data."""
+
+    seq: int
+    session: int
+    opcode: int
+    size: int
+    offset: int
+    data: bytes
+
+
+@dataclass
+class _Client:
+    """What a station has open."""
+
+    session: int
+    content: bytes | None = None
+    last_request: bytes = b""
+    last_replies: list[bytes] = field(default_factory=list)
+
+
+class RefusedError(Exception):
+    """A request that is not met; its number is MAV_FTP_ERR."""
+
+    def __init__(self, error: int) -> None:
+        super().__init__(error)
+        self.error = error
+
+
+class FileServer(Service):
+    """FILE_TRANSFER_PROTOCOL.
+
+    Parameters
+    ----------
+    vessel : Vessel
+        Whom it serves.
+    parameters : Parameters
+        What the file holds.
+    """
+
+    def __init__(self, vessel: Vessel, parameters: Parameters) -> None:
+        super().__init__(vessel)
+        self._parameters = parameters
+        self._clients: OrderedDict[tuple[str, int, int], _Client] = OrderedDict()
+        self.messages = {"FILE_TRANSFER_PROTOCOL": self._request}
+
+    def _request(self, sender: Sender, message: Any) -> None:
+        raw = bytes(message.payload[:_PAYLOAD]).ljust(_PAYLOAD, b"\0")
+        seq, session, opcode, size, _, _, _, offset = _HEADER.unpack_from(raw)
+        if opcode in (_ACK, _NAK):
+            return
+        client = self._client_of(sender)
+        if raw == client.last_request:  # it did not arrive
+            replies = client.last_replies
+        else:
+            request = _Request(seq, session, opcode, size, offset, raw[_HEADER.size : _HEADER.size + size])
+            replies = self._replies(client, request)
+            client.last_request, client.last_replies = raw, replies
+        for reply in replies:
+            to = sender.system, sender.component
+            sender.link.send(self.vessel.make("FILE_TRANSFER_PROTOCOL", 0, *to, reply))
+
+    def _client_of(self, sender: Sender) -> _Client:
+        key = sender.link.name, sender.system, sender.component
+        if key not in self._clients:
+            if len(self._clients) >= _CLIENTS:
+                self._clients.popitem(last=False)
+            taken = {client.session for client in self._clients.values()}
+            self._clients[key] = _Client(next(i for i in range(_CLIENTS) if i not in taken))
+        self._clients.move_to_end(key)
+        return self._clients[key]
+
+    def _replies(self, client: _Client, request: _Request) -> list[bytes]:
+        try:
+            if request.opcode == _BURST_READ:
+                return self._burst(client, request)
+            data = self._answer(client, request)
+        except RefusedError as refused:
+            return [_packet(client, request, 1, _NAK, bytes([refused.error]), request.offset)]
+        return [_packet(client, request, 1, _ACK, data, request.offset)]
+
+    def _answer(self, client: _Client, request: _Request) -> bytes:
+        match request.opcode:
+            case opcode if opcode == _NONE:
+                return b""
+            case opcode if opcode in (_TERMINATE, _RESET):
+                client.content = None
+                return b""
+            case opcode if opcode == _LIST:
+                return self._listing(_path(request), request.offset)
+            case opcode if opcode == _OPEN:
+                client.content = self._content(_path(request))
+                return struct.pack("<I", len(client.content))
+            case opcode if opcode == _READ:
+                return _part(_opened(client, request), request.offset, request.size)
+            case opcode if opcode == _CRC:
+                return struct.pack("<I", bare_crc32(self._content(_path(request))))
+        raise RefusedError(_PROTECTED if request.opcode in _WRITING else _UNKNOWN)
+
+    def _burst(self, client: _Client, request: _Request) -> list[bytes]:
+        try:
+            content = _opened(client, request)
+            parts = [(request.offset, _part(content, request.offset, request.size))]
+        except RefusedError as refused:
+            return [_packet(client, request, 1, _NAK, bytes([refused.error]), request.offset)]
+        while len(parts) < _BURST and parts[-1][0] + len(parts[-1][1]) < len(content):
+            offset = parts[-1][0] + len(parts[-1][1])
+            parts.append((offset, _part(content, offset, request.size)))
+        last = len(parts)
+        return [
+            _packet(client, request, i, _ACK, data, offset, complete=i == last)
+            for i, (offset, data) in enumerate(parts, 1)
+        ]
+
+    # ---- what there is ----
+
+    def _content(self, path: str) -> bytes:
+        name, _, query = path.lstrip("/").partition("?")
+        if name != f"{_FOLDER}/{_FILE}":
+            raise RefusedError(_NOT_FOUND)
+        everything = self._parameters.all()
+        start, count = _number(query, "start", 0), _number(query, "count", len(everything))
+        return packed(everything[start : start + count], len(everything))
+
+    def _listing(self, path: str, offset: int) -> bytes:
+        folder = path.strip("/")
+        if folder == "":
+            entries = [f"D{_FOLDER}"]
+        elif folder == _FOLDER:
+            entries = [f"F{_FILE}\t{len(self._content(f'{_FOLDER}/{_FILE}'))}"]
+        else:
+            raise RefusedError(_NOT_FOUND)
+        if offset >= len(entries):
+            raise RefusedError(_EOF)
+        return b"".join(entry.encode() + b"\0" for entry in entries[offset:])
+
+
+def _path(request: _Request) -> str:
+    path = request.data.split(b"\0", 1)[0]
+    if len(path) > _LONGEST_PATH:
+        raise RefusedError(_NOT_FOUND)
+    return path.decode("ascii", "replace")
+
+
+def _number(query: str, key: str, otherwise: int) -> int:
+    found = re.search(rf"(?:^|[?&]){key}=([0-9]{{1,5}})(?:&|$)", query)
+    return int(found[1]) if found else otherwise
+
+
+def _opened(client: _Client, request: _Request) -> bytes:
+    if client.content is None or request.session != client.session:
+        raise RefusedError(_INVALID_SESSION)
+    return client.content
+
+
+def _part(content: bytes, offset: int, size: int) -> bytes:
+    if size > _ROOM:
+        raise RefusedError(_INVALID_SIZE)
+    if offset >= len(content):
+        raise RefusedError(_EOF)
+    return content[offset : offset + (size or _ROOM)]
+
+
+def _packet(
+    client: _Client, request: _Request, after: int, opcode: int, data: bytes, offset: int, complete: bool = False
+) -> bytes:
+    seq = (request.seq + after) & 0xFFFF
+    header = _HEADER.pack(seq, client.session, opcode, len(data), request.opcode, complete, 0, offset)
+    return (header + data).ljust(_PAYLOAD, b"\0")

@@ -1,0 +1,82 @@
+"""Sticks: MANUAL_CONTROL."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from cosim.helm.orders import Sticks
+from cosim.mavlink.services.service import Service
+from cosim.mavlink.vessel import Sender, Vessel
+from cosim.scenario_tables import Vector6
+
+_FULL = 1000.0
+_INVALID = 0x7FFF
+_TIMEOUT = 3.0  # s of the wall clock
+_PITCH, _ROLL = 1, 2  # enabled_extensions
+_NEUTRAL: Vector6 = (0.0,) * 6
+
+
+class Manual(Service):
+    """Sticks become parts of the greatest wrench, while the mode is manual."""
+
+    def __init__(self, vessel: Vessel) -> None:
+        super().__init__(vessel)
+        self.messages = {"MANUAL_CONTROL": self._manual_control}
+        self._heard: float | None = None
+        self._state = (vessel.armed, vessel.mode)
+
+    def restart(self) -> None:
+        """Let go of the sticks."""
+        self._heard = None
+
+    def looked(self) -> None:
+        """Begin anew with neutral sticks, as the helm does, when another mode is on or the vehicle is armed."""
+        state = self.vessel.armed, self.vessel.mode
+        if state != self._state:
+            self._state, self.vessel.sticks = state, _NEUTRAL
+
+    def tick(self) -> None:
+        """Let go of sticks that nobody holds any more."""
+        vessel = self.vessel
+        if self._heard is None or vessel.now - self._heard < _TIMEOUT:
+            return
+        self._heard = None
+        if vessel.mode_ahead == "manual":
+            self._order(_NEUTRAL)
+            vessel.say("Lost manual control", vessel.mavlink.MAV_SEVERITY_CRITICAL, "sticks", _TIMEOUT)
+
+    def _manual_control(self, sender: Sender, message: Any) -> None:
+        vessel = self.vessel
+        if message.target != vessel.options.system_id:
+            return
+        if not vessel.heeds:
+            vessel.give()
+            return
+        if vessel.mode_ahead != "manual":
+            return
+        if not vessel.operator.may_steer(sender.system, vessel.now):
+            vessel.deny("another station has the vehicle in hand", "operator")
+            return
+        self._heard = vessel.now
+        self._order(self._wrench(message))
+
+    def _order(self, sticks: Vector6) -> None:
+        vessel = self.vessel
+        if sticks != vessel.sticks and vessel.give(Sticks(sticks)) == vessel.mavlink.MAV_RESULT_ACCEPTED:
+            vessel.sticks = sticks
+
+    def _wrench(self, message: Any) -> Vector6:
+        """Return X Y Z K M N from -1 to 1; the vertical stick is up where positive, Z is down."""
+        centre = self.vessel.profile.centred_stick
+        up = 0.0 if message.z == _INVALID else _part((message.z - centre) / (_FULL - centre))
+        roll = _axis(message.t) if message.enabled_extensions & _ROLL else 0.0
+        pitch = _axis(message.s) if message.enabled_extensions & _PITCH else 0.0
+        return _axis(message.x), _axis(message.y), -up + 0.0, roll, pitch, _axis(message.r)
+
+
+def _axis(value: int) -> float:
+    return 0.0 if value == _INVALID else _part(value / _FULL)
+
+
+def _part(value: float) -> float:
+    return max(-1.0, min(1.0, value))

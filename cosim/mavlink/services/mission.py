@@ -1,0 +1,231 @@
+"""Missions: their transfer both ways, and where they are."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Any
+
+from cosim.helm.orders import Begin, Item, Mission, Order, Steer
+from cosim.mavlink.encode import whole
+from cosim.mavlink.mission_item import MissionItem
+from cosim.mavlink.services.mission_items import ItemError, home_item, meant
+from cosim.mavlink.services.service import Call, Service
+from cosim.mavlink.vessel import Sender, Vessel
+
+_MOST = 500  # items
+_RETRY = 1.0  # s of the wall clock
+_RETRIES = 5
+_OF_REGIONS, _ALL = 0, 255  # MAV_MISSION_TYPE
+_KNOWN_TYPES = (0, 1, 2)
+
+
+@dataclass
+class _Upload:
+    """A mission on its way in."""
+
+    sender: Sender
+    count: int
+    asked: float  # s, when the item that is missing was asked for
+    items: list[MissionItem] = field(default_factory=list)
+    retries: int = 0
+
+
+class Missions(Service):
+    """MISSION_*: one mission of regions; fences and rally points are always none.
+
+    In ArduPilot's profile item 0 is home: it is given on download, and not followed when it comes.
+    """
+
+    def __init__(self, vessel: Vessel) -> None:
+        super().__init__(vessel)
+        m = vessel.mavlink
+        self._upload: _Upload | None = None
+        self._first = int(vessel.profile.home_is_first)
+        self.messages = {
+            "MISSION_REQUEST_LIST": self._count,
+            "MISSION_REQUEST": self._item,
+            "MISSION_REQUEST_INT": self._item,
+            "MISSION_COUNT": self._begin_upload,
+            "MISSION_ITEM_INT": self._take_item,
+            "MISSION_ITEM": self._take_item,
+            "MISSION_ACK": self._acknowledged,
+            "MISSION_CLEAR_ALL": self._clear,
+            "MISSION_SET_CURRENT": self._set_current,
+        }
+        self.commands = {m.MAV_CMD_MISSION_START: self._start, m.MAV_CMD_DO_SET_MISSION_CURRENT: self._command_current}
+
+    def restart(self) -> None:
+        """Break off what is under way."""
+        self._upload = None
+
+    def detach(self, link: object) -> None:
+        """Break off what is under way on a link."""
+        if self._upload is not None and self._upload.sender.link is link:
+            self._upload = None
+
+    # ---- out ----
+
+    def _all_items(self) -> tuple[MissionItem, ...]:
+        plan = self.vessel.plan
+        return (home_item(self.vessel), *plan) if plan and self._first else plan
+
+    def _count(self, sender: Sender, message: Any) -> None:
+        kind = message.mission_type
+        if kind not in _KNOWN_TYPES:
+            self._ack(sender, self.vessel.mavlink.MAV_MISSION_UNSUPPORTED, kind)
+            return
+        count = len(self._all_items()) if kind == _OF_REGIONS else 0
+        sender.link.send(self.vessel.make("MISSION_COUNT", sender.system, sender.component, count, kind))
+
+    def _item(self, sender: Sender, message: Any) -> None:
+        vessel, m = self.vessel, self.vessel.mavlink
+        seq, kind = message.seq, message.mission_type
+        items = self._all_items() if kind == _OF_REGIONS else ()
+        if seq >= len(items):
+            self._ack(sender, m.MAV_MISSION_INVALID_SEQUENCE, kind)
+            return
+        item = items[seq]
+        current = int(vessel.mode == "mission" and vessel.view.item + self._first == seq)
+        head = sender.system, sender.component, seq, item.frame, item.command, current, item.autocontinue
+        numbers = item.param1, item.param2, item.param3, item.param4
+        if message.get_type() == "MISSION_REQUEST_INT":
+            reply = vessel.make("MISSION_ITEM_INT", *head, *numbers, item.x, item.y, item.z, kind)
+        else:
+            scale = 1e-4 if item.frame == m.MAV_FRAME_LOCAL_NED else 1e-7
+            reply = vessel.make("MISSION_ITEM", *head, *numbers, item.x * scale, item.y * scale, item.z, kind)
+        sender.link.send(reply)
+
+    def _ack(self, sender: Sender, result: int, kind: int) -> None:
+        sender.link.send(self.vessel.make("MISSION_ACK", sender.system, sender.component, result, kind))
+
+    # ---- in ----
+
+    def _begin_upload(self, sender: Sender, message: Any) -> None:
+        vessel, m, kind = self.vessel, self.vessel.mavlink, message.mission_type
+        under_way = self._upload
+        if not vessel.heeds:
+            vessel.give()
+            self._ack(sender, m.MAV_MISSION_DENIED, kind)
+        elif kind != _OF_REGIONS:
+            self._ack(sender, m.MAV_MISSION_UNSUPPORTED if message.count else m.MAV_MISSION_ACCEPTED, kind)
+        elif under_way is not None and under_way.sender != sender:
+            self._ack(sender, m.MAV_MISSION_DENIED, kind)
+        elif message.count > _MOST:
+            self._ack(sender, m.MAV_MISSION_NO_SPACE, kind)
+        else:
+            self._upload = _Upload(sender, message.count, vessel.now)
+            self._go_on(self._upload)
+
+    def _go_on(self, upload: _Upload) -> None:
+        """Ask for the next item, or finish."""
+        vessel, sender = self.vessel, upload.sender
+        upload.asked = vessel.now
+        if len(upload.items) < upload.count:
+            to = sender.system, sender.component
+            sender.link.send(vessel.make("MISSION_REQUEST_INT", *to, len(upload.items), _OF_REGIONS))
+            return
+        self._upload = None
+        self._ack(sender, self._taken(sender, upload.items[self._first :]), _OF_REGIONS)
+
+    def _take_item(self, sender: Sender, message: Any) -> None:
+        m, upload, kind = self.vessel.mavlink, self._upload, message.mission_type
+        if upload is None or upload.sender != sender or kind != _OF_REGIONS:
+            self._ack(sender, m.MAV_MISSION_DENIED if not self.vessel.heeds else m.MAV_MISSION_ERROR, kind)
+            return
+        if message.seq != len(upload.items):  # one that came before, or too early
+            return
+        item = _as_it_came(message, m.MAV_FRAME_LOCAL_NED)
+        if item is None:
+            self._upload = None
+            self._ack(sender, m.MAV_MISSION_INVALID, kind)
+            return
+        upload.items.append(item)
+        upload.retries = 0
+        self._go_on(upload)
+
+    def _taken(self, sender: Sender, items: list[MissionItem]) -> int:
+        """Order a mission, and return MAV_MISSION_RESULT."""
+        vessel, m = self.vessel, self.vessel.mavlink
+        wanted: list[Item] = []
+        for seq, item in enumerate(items, self._first):
+            try:
+                wanted.append(meant(vessel, item, wanted[-1].position if wanted else vessel.view.position_ned))
+            except ItemError as error:
+                vessel.deny(f"mission item {seq}: {error}", "item")
+                return error.result
+        result = vessel.give(Mission(tuple(wanted)))
+        if result == m.MAV_RESULT_ACCEPTED:
+            vessel.plan = tuple(items)
+            vessel.operator.commanded(sender.system)
+            return int(m.MAV_MISSION_ACCEPTED)
+        return int(m.MAV_MISSION_DENIED if result == m.MAV_RESULT_DENIED else m.MAV_MISSION_ERROR)
+
+    def _acknowledged(self, sender: Sender, message: Any) -> None:
+        """MISSION_ACK: the end of a download, or of an upload that its sender breaks off."""
+        if self._upload is not None and self._upload.sender == sender:
+            self._upload = None
+
+    def tick(self) -> None:
+        """Ask again for an item that does not come, and give up in the end."""
+        upload, vessel = self._upload, self.vessel
+        if upload is None or vessel.now - upload.asked < _RETRY:
+            return
+        if upload.retries < _RETRIES:
+            upload.retries += 1
+            self._go_on(upload)
+        else:
+            self._upload = None
+            self._ack(upload.sender, vessel.mavlink.MAV_MISSION_OPERATION_CANCELLED, _OF_REGIONS)
+
+    def _clear(self, sender: Sender, message: Any) -> None:
+        m, kind = self.vessel.mavlink, message.mission_type
+        if kind not in (*_KNOWN_TYPES, _ALL):
+            self._ack(sender, m.MAV_MISSION_UNSUPPORTED, kind)
+        elif not self.vessel.heeds:
+            self.vessel.give()
+            self._ack(sender, m.MAV_MISSION_DENIED, kind)
+        elif kind in (_OF_REGIONS, _ALL):
+            self._upload = None
+            self._ack(sender, self._taken(sender, []), kind)
+        else:
+            self._ack(sender, m.MAV_MISSION_ACCEPTED, kind)
+
+    # ---- where it is ----
+
+    def _begin(self, sender: Sender, seq: int | None, *more: Order) -> int:
+        vessel, m = self.vessel, self.vessel.mavlink
+        if not vessel.heeds:
+            return vessel.give()
+        item = None if seq is None else max(seq - self._first, 0)
+        if item is None or item >= len(vessel.plan):
+            vessel.deny(f"mission item {seq}: there are {len(self._all_items())}", "item")
+            return int(m.MAV_RESULT_DENIED if vessel.plan else m.MAV_RESULT_FAILED)
+        result = vessel.give(Begin(item), *more)
+        if result == m.MAV_RESULT_ACCEPTED:
+            vessel.operator.commanded(sender.system)
+        return result
+
+    def _set_current(self, sender: Sender, message: Any) -> None:
+        self._begin(sender, message.seq)
+
+    def _command_current(self, call: Call) -> int:
+        seq = call.whole(1)
+        return self._begin(call.sender, seq if seq is None or seq >= 0 else self.vessel.view.item + self._first)
+
+    def _start(self, call: Call) -> int:
+        return self._begin(call.sender, max(call.whole(1) or 0, 0), Steer("mission"))
+
+
+def _as_it_came(message: Any, local: int) -> MissionItem | None:
+    """Return an item, or None if its place is no number."""
+    x, y = message.x, message.y
+    if message.get_type() == "MISSION_ITEM":
+        scale = 1e4 if message.frame == local else 1e7
+        x, y = (whole(v * scale) for v in (x, y))
+        if x is None or y is None or max(abs(x), abs(y)) > 0x7FFFFFFF:
+            return None
+    numbers = message.param1, message.param2, message.param3, message.param4
+    if not math.isfinite(message.z):
+        return None
+    return MissionItem(message.frame, message.command, message.autocontinue, *numbers, x, y, message.z)

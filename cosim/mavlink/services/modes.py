@@ -1,0 +1,123 @@
+"""Arming, modes, pause and restart."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from cosim.helm.orders import Aim, Arm, Mode, Order, Reset, Steer
+from cosim.mavlink.profile import MODE_NAMES, STANDARD_MODES, is_custom
+from cosim.mavlink.services.service import Call, Service
+from cosim.mavlink.vessel import Sender, Vessel
+
+_FORCE = 20190226  # PREFLIGHT_REBOOT_SHUTDOWN, parameter 6
+_MODES_BY_STANDARD: dict[int, Mode] = {number: mode for mode, number in STANDARD_MODES.items() if number}
+
+
+class Modes(Service):
+    """What changes who steers."""
+
+    def __init__(self, vessel: Vessel) -> None:
+        super().__init__(vessel)
+        m = vessel.mavlink
+        self._paused_from: Mode = "reach"
+        self.messages = {"SET_MODE": self._set_mode}
+        self.commands = {
+            m.MAV_CMD_COMPONENT_ARM_DISARM: self._arm,
+            m.MAV_CMD_DO_SET_MODE: self._command_mode,
+            m.MAV_CMD_DO_SET_STANDARD_MODE: self._standard_mode,
+            m.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN: self._reboot,
+            m.MAV_CMD_NAV_LOITER_UNLIM: lambda call: self._steer(call.sender, "hold"),
+            m.MAV_CMD_NAV_LAND: lambda call: self._steer(call.sender, "surface"),
+            m.MAV_CMD_NAV_RETURN_TO_LAUNCH: self._return_home,
+            m.MAV_CMD_OVERRIDE_GOTO: self._goto,
+            m.MAV_CMD_DO_PAUSE_CONTINUE: self._pause,
+        }
+
+    def _give(self, sender: Sender, *orders: Order) -> int:
+        result = self.vessel.give(*orders)
+        if result == self.vessel.mavlink.MAV_RESULT_ACCEPTED:
+            self.vessel.operator.commanded(sender.system)
+        return result
+
+    def _arm(self, call: Call) -> int:
+        wanted = call[1]
+        if wanted not in (0.0, 1.0):
+            return int(self.vessel.mavlink.MAV_RESULT_DENIED)
+        return self._give(call.sender, Arm(wanted == 1.0))
+
+    def _set_mode(self, sender: Sender, message: Any) -> None:
+        if is_custom(message.base_mode):
+            self._mode(sender, self.vessel.profile.mode_of(message.custom_mode), f"{message.custom_mode}")
+        else:
+            self._mode(sender, None, f"of base mode {message.base_mode}")
+
+    def _command_mode(self, call: Call) -> int:
+        base, first, second = call.whole(1), call.whole(2), call.whole(3) or 0
+        if base is None or first is None or not is_custom(base):
+            return self._mode(call.sender, None, "without a number")
+        named = f"{first}" if not second else f"{first}, {second}"
+        return self._mode(call.sender, self.vessel.profile.mode_of_command(first, second), named)
+
+    def _standard_mode(self, call: Call) -> int:
+        number = call.whole(1)
+        return self._mode(call.sender, None if number is None else _MODES_BY_STANDARD.get(number), f"standard {number}")
+
+    def _mode(self, sender: Sender, mode: Mode | None, named: str) -> int:
+        vessel = self.vessel
+        if mode is None:
+            numbers = vessel.profile.numbers
+            known = ", ".join(f"{MODE_NAMES[mode].split()[0].lower()} {number}" for mode, number in numbers.items())
+            vessel.deny(f"no such mode: {named}; profile {vessel.profile.name} has {known}", "mode")
+            return int(vessel.mavlink.MAV_RESULT_FAILED)
+        return self._steer(sender, mode)
+
+    def _steer(self, sender: Sender, mode: Mode) -> int:
+        vessel = self.vessel
+        if mode == "mission" and not vessel.plan and vessel.heeds:
+            vessel.deny("there is no mission", "mission")
+            return int(vessel.mavlink.MAV_RESULT_FAILED)
+        return self._give(sender, Steer(mode))
+
+    def _return_home(self, call: Call) -> int:
+        north, east, _ = self.vessel.home_ned()
+        settings = self.vessel.settings
+        if not self.vessel.heeds:
+            return self.vessel.give()
+        depth, radius = settings["commands.surface_depth"], settings["commands.hold_radius"]
+        return self._give(call.sender, Aim((north, east, depth), radius))
+
+    # ---- pause ----
+
+    def _goto(self, call: Call) -> int:
+        m = self.vessel.mavlink
+        here = call.whole(2) in (None, 0, m.MAV_GOTO_HOLD_AT_CURRENT_POSITION)
+        if call.whole(1) == m.MAV_GOTO_DO_HOLD and here:
+            return self._hold(call.sender)
+        if call.whole(1) == m.MAV_GOTO_DO_CONTINUE:
+            return self._steer(call.sender, self._paused_from)
+        return int(m.MAV_RESULT_UNSUPPORTED)
+
+    def _pause(self, call: Call) -> int:
+        if call[1] == 0.0:
+            return self._hold(call.sender)
+        if call[1] == 1.0:
+            return self._steer(call.sender, self._paused_from)
+        return int(self.vessel.mavlink.MAV_RESULT_DENIED)
+
+    def _hold(self, sender: Sender) -> int:
+        mode = self.vessel.mode_ahead
+        if mode != "hold":
+            self._paused_from = mode
+        return self._steer(sender, "hold")
+
+    # ---- from the beginning ----
+
+    def _reboot(self, call: Call) -> int:
+        m, vessel = self.vessel.mavlink, self.vessel
+        if call[1] != 1.0:
+            return int(m.MAV_RESULT_UNSUPPORTED if math.isfinite(call[1]) else m.MAV_RESULT_DENIED)
+        if vessel.armed and call[6] != _FORCE and vessel.heeds:
+            vessel.deny("armed: disarm before a restart", "restart")
+            return int(m.MAV_RESULT_DENIED)
+        return self._give(call.sender, Reset())

@@ -1,0 +1,94 @@
+"""Obstacles that others see: OBSTACLE_DISTANCE_3D."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+from cosim.helm.orders import Forget, Obstacle
+from cosim.mavlink.services.service import Service
+from cosim.mavlink.vessel import Sender, Vessel
+from cosim.mavlink.view import euler_of
+from cosim.scenario_tables import Vector3
+
+_UNMOVED = 0.05  # m: what moved less makes no order
+_FORGOTTEN = 5.0  # s of the wall clock without a word, after which another may take the place
+_LOCAL_NED, _BODY_FRD, _LOCAL_FRD = 1, 12, 20
+_RADIUS = "commands.obstacle_radius"
+
+
+@dataclass
+class _Known:
+    """An obstacle that was ordered."""
+
+    position: Vector3  # m, NED
+    radius: float  # m
+    heard: float  # s, of the wall clock
+
+
+class Obstacles(Service):
+    """Each becomes a sphere to keep out of, about the point that is told.
+
+    In LOCAL_FRD forward is where the vehicle looked at time 0.
+    """
+
+    def __init__(self, vessel: Vessel) -> None:
+        super().__init__(vessel)
+        self.messages = {"OBSTACLE_DISTANCE_3D": self._obstacle}
+        self._first_yaw = euler_of(vessel.scenario.initial.quaternion)[2]
+        self.restart()
+
+    def restart(self) -> None:
+        """Forget all obstacles."""
+        self._known: dict[int, _Known] = {}
+
+    def _obstacle(self, sender: Sender, message: Any) -> None:
+        vessel = self.vessel
+        if not vessel.heeds:
+            vessel.give()
+            return
+        position = self._position(message.frame, (message.x, message.y, message.z))
+        if position is None:
+            vessel.deny(f"obstacle in frame {message.frame}; it may be 1, 12 or 20", "frame")
+            return
+        if not all(map(math.isfinite, position)):
+            return
+        number, radius = message.obstacle_id, vessel.settings[_RADIUS]
+        known = self._known.get(number)
+        if known is not None and known.radius == radius and math.dist(known.position, position) < _UNMOVED:
+            known.heard = vessel.now
+            return
+        if known is None and not self._has_room():
+            vessel.deny(f"no room for obstacle {number}: {len(self._known)} have come already", "obstacle")
+            return
+        if vessel.give(Obstacle(number, position, radius)) == vessel.mavlink.MAV_RESULT_ACCEPTED:
+            self._known[number] = _Known(position, radius, vessel.now)
+
+    def _position(self, frame: int, point: Vector3) -> Vector3 | None:
+        view = self.vessel.view
+        if frame == _LOCAL_NED:
+            return point
+        if frame == _BODY_FRD:
+            north, east, down = (a + b for a, b in zip(view.position_ned, view.to_world(point), strict=True))
+            return north, east, down
+        if frame == _LOCAL_FRD:
+            sine, cosine = math.sin(self._first_yaw), math.cos(self._first_yaw)
+            ahead, right, down = point
+            return ahead * cosine - right * sine, ahead * sine + right * cosine, down
+        return None
+
+    def _has_room(self) -> bool:
+        """Return whether one more fits, once the one that was silent longest is forgotten if it may be."""
+        vessel = self.vessel
+        if len(self._known) < vessel.scenario.commands.obstacles:
+            return True
+        if not self._known:
+            return False
+        oldest = min(self._known, key=lambda number: self._known[number].heard)
+        if vessel.now - self._known[oldest].heard < _FORGOTTEN:
+            return False
+        if vessel.give(Forget(oldest)) != vessel.mavlink.MAV_RESULT_ACCEPTED:
+            return False
+        del self._known[oldest]
+        return True

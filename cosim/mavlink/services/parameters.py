@@ -1,0 +1,233 @@
+"""Parameters: the live numbers of the scenario, by short names, and a few that stations expect."""
+
+from __future__ import annotations
+
+import math
+import struct
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from cosim.errors import OrderError
+from cosim.helm.orders import Change
+from cosim.mavlink.encode import float32
+from cosim.mavlink.outlet import Outlet
+from cosim.mavlink.services.packed_parameters import hash_check
+from cosim.mavlink.services.parameter_names import parameter_names
+from cosim.mavlink.services.service import Service
+from cosim.mavlink.supervision_settings import ACTIONS, TIMEOUTS
+from cosim.mavlink.vessel import Sender, Vessel
+
+_HASH = "_HASH_CHECK"
+_NO_INDEX = 0xFFFF
+_SLICE = 50  # values in each tick
+_VECTORED_6DOF, _CUSTOM_FRAME = 2.0, 7.0  # ArduSub's FRAME_CONFIG
+
+
+@dataclass(frozen=True)
+class _Own:
+    """A parameter that is no setting of the scenario."""
+
+    read: Callable[[], float]
+    write: Callable[[float], str | None] | None = None  # returns what was expected, if the value cannot be
+
+
+class Parameters(Service):
+    """PARAM_REQUEST_LIST, PARAM_REQUEST_READ and PARAM_SET; all parameters are REAL32.
+
+    The list goes out in slices, one in each tick and once at a time on a link: who asks while it is under way has it go
+    round once more from there.
+    """
+
+    def __init__(self, vessel: Vessel) -> None:
+        super().__init__(vessel)
+        self.messages = {
+            "PARAM_REQUEST_LIST": self._list,
+            "PARAM_REQUEST_READ": self._read,
+            "PARAM_SET": self._set,
+        }
+        self._key_of = {name: key for key, name in parameter_names(s.key for s in vessel.settings).items()}
+        self._own = self._make_own()
+        self.names = sorted({*self._key_of, *self._own})
+        self._index = {name: i for i, name in enumerate(self.names)}
+        self._bursts: dict[Outlet, tuple[int, int]] = {}  # where it is, and how many are left
+        self.restart()
+
+    def _make_own(self) -> dict[str, _Own]:
+        vessel, profile = self.vessel, self.vessel.profile.name
+        own = {
+            "MAV_SYS_ID" if profile == "px4" else "SYSID_THISMAV": _Own(lambda: float(vessel.options.system_id)),
+            "FS_GCS_TIMEOUT": _Own(lambda: vessel.loss_timeout, self._write_timeout),
+            "FS_GCS_ENABLE": _Own(lambda: float(ACTIONS.index(vessel.loss_action)), self._write_action),
+        }
+        if profile == "ardusub":
+            frame = _VECTORED_6DOF if vessel.scenario.vehicle.name == "bluerov2_heavy" else _CUSTOM_FRAME
+            own["FRAME_CONFIG"] = _Own(lambda: frame)
+        return own
+
+    def _write_timeout(self, value: float) -> str | None:
+        least, greatest = TIMEOUTS
+        if not least <= value <= greatest:
+            return f"{least:g} to {greatest:g}"
+        self.vessel.loss_timeout = value
+        return None
+
+    def _write_action(self, value: float) -> str | None:
+        if value not in range(len(ACTIONS)):
+            return ", ".join(f"{i} {action}" for i, action in enumerate(ACTIONS))
+        self.vessel.loss_action = ACTIONS[int(value)]
+        return None
+
+    def restart(self) -> None:
+        """Take the numbers as the vessel's settings have them."""
+        self._values = {setting.key: setting.value for setting in self.vessel.settings}
+
+    def detach(self, link: object) -> None:
+        """Forget a link's list."""
+        self._bursts = {known: burst for known, burst in self._bursts.items() if known is not link}
+
+    # ---- what others use ----
+
+    def value(self, name: str) -> float:
+        """Return a parameter's value, as a float32 can hold it."""
+        own = self._own.get(name)
+        value = self._values[self._key_of[name]] if own is None else own.read()
+        return float32(value)
+
+    def all(self) -> list[tuple[str, float]]:
+        """Return names and values, in the order of the list."""
+        return [(name, self.value(name)) for name in self.names]
+
+    def has(self, key: str) -> bool:
+        """Return whether there is a setting of a key."""
+        return key in self._values
+
+    def change(self, key: str, value: float) -> int:
+        """Order another value of a setting, and return MAV_RESULT; a value that cannot be is denied with the reason."""
+        vessel, before = self.vessel, self._values[key]
+        if not vessel.heeds:
+            return vessel.give()
+        try:
+            vessel.settings.change(key, value)
+        except OrderError as error:
+            vessel.deny(str(error), "value")
+            return int(vessel.mavlink.MAV_RESULT_DENIED)
+        result = vessel.give(Change(key, value))
+        if result != vessel.mavlink.MAV_RESULT_ACCEPTED:
+            vessel.settings.change(key, before)
+            return result
+        self._values[key] = value
+        return result
+
+    # ---- the list ----
+
+    def _list(self, sender: Sender, message: Any) -> None:
+        at, left = self._bursts.get(sender.link, (0, 0))
+        if not left and self.vessel.profile.name == "px4":
+            self._send_hash(sender.link)
+        self._bursts[sender.link] = at, len(self.names)
+        if not left:
+            self._send_slice(sender.link)
+
+    def tick(self) -> None:
+        """Send the next slice of each list that is under way."""
+        for link in list(self._bursts):
+            self._send_slice(link)
+
+    def _send_slice(self, link: Outlet) -> None:
+        at, left = self._bursts[link]
+        for _ in range(min(left, _SLICE)):
+            self._send_value(link, self.names[at])
+            at, left = (at + 1) % len(self.names), left - 1
+        if left:
+            self._bursts[link] = at, left
+        else:
+            del self._bursts[link]
+
+    def _send_value(self, link: Outlet, name: str) -> None:
+        m = self.vessel.mavlink
+        kind = m.MAV_PARAM_TYPE_REAL32, len(self.names), self._index[name]
+        link.send(self.vessel.make("PARAM_VALUE", name, self.value(name), *kind))
+
+    def _send_hash(self, link: Outlet) -> None:
+        m = self.vessel.mavlink
+        (bits,) = struct.unpack("<f", struct.pack("<I", hash_check(dict(self.all()))))
+        link.send(
+            m.MAVLink_param_value_message(_HASH.encode(), bits, m.MAV_PARAM_TYPE_UINT32, len(self.names), _NO_INDEX)
+        )
+
+    # ---- one ----
+
+    def _read(self, sender: Sender, message: Any) -> None:
+        m, index, name = self.vessel.mavlink, message.param_index, message.param_id
+        if index >= 0:
+            name = self.names[index] if index < len(self.names) else ""
+        elif name == _HASH and self.vessel.profile.name == "px4":
+            self._send_hash(sender.link)
+            return
+        if name in self._index:
+            self._send_value(sender.link, name)
+        else:
+            self._refuse(sender, message.param_id, index, m.MAV_PARAM_ERROR_DOES_NOT_EXIST)
+
+    def _refuse(self, sender: Sender, name: str, index: int, error: int) -> None:
+        to = sender.system, sender.component
+        sender.link.send(self.vessel.make("PARAM_ERROR", *to, name, index, error))
+
+    def _set(self, sender: Sender, message: Any) -> None:
+        m, name, value = self.vessel.mavlink, message.param_id, message.param_value
+        if name == _HASH:  # the station has the list already
+            self._bursts.pop(sender.link, None)
+            return
+        if name not in self._index:
+            self._refuse(sender, name, -1, m.MAV_PARAM_ERROR_DOES_NOT_EXIST)
+            return
+        error = self._taken(name, value, message.param_type)
+        if error != m.MAV_PARAM_ERROR_NO_ERROR:
+            self._refuse(sender, name, self._index[name], error)
+        self._send_value(sender.link, name)
+
+    def _taken(self, name: str, value: float, kind: int) -> int:
+        """Take a value, and return MAV_PARAM_ERROR."""
+        m, vessel = self.vessel.mavlink, self.vessel
+        own = self._own.get(name)
+        if own is not None and own.write is None:
+            return int(m.MAV_PARAM_ERROR_READ_ONLY)
+        if not vessel.heeds:
+            vessel.give()
+            return int(m.MAV_PARAM_ERROR_PERMISSION_DENIED)
+        if kind != m.MAV_PARAM_TYPE_REAL32 and vessel.profile.name != "ardusub":  # ArduPilot's stations cast
+            vessel.deny(f"{name} came as type {kind}, expected REAL32 ({m.MAV_PARAM_TYPE_REAL32})", "value")
+            return int(m.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE)
+        if not math.isfinite(value):
+            vessel.deny(f"{name} is {value}, expected a finite number", "value")
+            return int(m.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE)
+        if _as_float32(self.value(name)) == value:
+            return int(m.MAV_PARAM_ERROR_NO_ERROR)
+        value = shortest(value)
+        if own is not None and own.write is not None:
+            expected = own.write(value)
+            if expected is not None:
+                vessel.deny(f"{name} is {value:g}, expected {expected}", "value")
+                return int(m.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE)
+            return int(m.MAV_PARAM_ERROR_NO_ERROR)
+        result = self.change(self._key_of[name], value)
+        if result == m.MAV_RESULT_ACCEPTED:
+            return int(m.MAV_PARAM_ERROR_NO_ERROR)
+        if result == m.MAV_RESULT_DENIED:
+            return int(m.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE)
+        return int(m.MAV_PARAM_ERROR_PERMISSION_DENIED)
+
+
+def _as_float32(value: float) -> float:
+    return float(struct.unpack("<f", struct.pack("<f", value))[0])
+
+
+def shortest(value: float) -> float:
+    """Return the number with the fewest digits that is the same float32: 0.3 for what arrives as 0.30000001192."""
+    same = _as_float32(value)
+    for digits in range(6, 10):
+        candidate = float(f"{value:.{digits}g}")
+        if _as_float32(float32(candidate)) == same:
+            return candidate
+    return value

@@ -1,0 +1,107 @@
+"""Requests for messages: once, or at an interval."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from cosim.mavlink.messages import MESSAGES, status
+from cosim.mavlink.outlet import Outlet
+from cosim.mavlink.services.service import Call, Service
+from cosim.mavlink.streams import Streams
+from cosim.mavlink.vessel import Sender, Vessel
+
+_SECOND = 1_000_000
+_ALL = 0
+_GREATEST_RATE = 100  # Hz
+
+
+class Requests(Service):
+    """Intervals and single messages, by command or by REQUEST_DATA_STREAM.
+
+    Parameters
+    ----------
+    vessel : Vessel
+        Whom it serves.
+    streams : mapping of Outlet to Streams
+        The schedule of each link.
+    """
+
+    def __init__(self, vessel: Vessel, streams: Mapping[Outlet, Streams]) -> None:
+        super().__init__(vessel)
+        self._streams = streams
+        m = vessel.mavlink
+        self.messages = {"REQUEST_DATA_STREAM": self._group}
+        self.commands = {
+            m.MAV_CMD_SET_MESSAGE_INTERVAL: self._set_interval,
+            m.MAV_CMD_GET_MESSAGE_INTERVAL: self._get_interval,
+            m.MAV_CMD_REQUEST_MESSAGE: self._message,
+            m.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES: self._version,
+            m.MAV_CMD_DO_SEND_BANNER: self._banner,
+        }
+
+    def _set_interval(self, call: Call) -> int:
+        m, vessel = self.vessel.mavlink, self.vessel
+        message_id, interval = call.whole(1), call.whole(2)
+        if message_id is None or interval is None:
+            return int(m.MAV_RESULT_DENIED)
+        if message_id not in MESSAGES:
+            return int(m.MAV_RESULT_FAILED)
+        if not self._streams[call.sender.link].set([(message_id, interval)]):
+            vessel.deny("the link would carry too much", "load")
+            return int(m.MAV_RESULT_DENIED)
+        return int(m.MAV_RESULT_ACCEPTED)
+
+    def _get_interval(self, call: Call) -> int:
+        m, vessel, link = self.vessel.mavlink, self.vessel, call.sender.link
+        message_id = call.whole(1)
+        interval = 0 if message_id is None else self._streams[link].interval(message_id)
+        link.send(vessel.make("MESSAGE_INTERVAL", message_id or 0, interval))
+        return int(m.MAV_RESULT_ACCEPTED if interval else m.MAV_RESULT_FAILED)
+
+    def _message(self, call: Call) -> int:
+        """REQUEST_MESSAGE: any of the table; parameter 2 says which of several. As ArduPilot, others fail."""
+        m, vessel, link = self.vessel.mavlink, self.vessel, call.sender.link
+        message_id = call.whole(1)
+        spec = None if message_id is None else MESSAGES.get(message_id)
+        if spec is None and message_id != m.MAVLINK_MSG_ID_MESSAGE_INTERVAL:
+            return int(m.MAV_RESULT_FAILED)
+        which = call.whole(2) or 0
+        if spec is None:
+            link.send(vessel.make("MESSAGE_INTERVAL", which, self._streams[link].interval(which)))
+            return int(m.MAV_RESULT_ACCEPTED)
+        several = spec.build is status.available_modes
+        messages = status.available_modes(vessel, which) if several else spec.build(vessel)
+        for message in messages:
+            link.send(message)
+        return int(m.MAV_RESULT_ACCEPTED if messages else m.MAV_RESULT_FAILED)
+
+    def _version(self, call: Call) -> int:
+        for message in status.autopilot_version(self.vessel):
+            call.sender.link.send(message)
+        return int(self.vessel.mavlink.MAV_RESULT_ACCEPTED)
+
+    def _banner(self, call: Call) -> int:
+        for line in banner(self.vessel):
+            for message in self.vessel.text(line):
+                call.sender.link.send(message)
+        return int(self.vessel.mavlink.MAV_RESULT_ACCEPTED)
+
+    def _group(self, sender: Sender, message: Any) -> None:
+        group, rate = message.req_stream_id, min(message.req_message_rate, _GREATEST_RATE)
+        interval = _SECOND // rate if message.start_stop and rate else -1
+        changes = [(spec.id, interval) for spec in MESSAGES.values() if spec.group and group in (_ALL, spec.group)]
+        if not self._streams[sender.link].set(changes):
+            self.vessel.deny("the link would carry too much", "load")
+
+
+def banner(vessel: Vessel) -> list[str]:
+    """Return who this is, line by line: a simulation, whatever autopilot it shows itself as."""
+    scenario = vessel.scenario
+    lines = [f"subreach co-simulation, profile {vessel.profile.name}", f"Vehicle {scenario.vehicle.name}"]
+    lines.append(f"Scenario {scenario.name}, law {scenario.law.name}")
+    if not vessel.live:
+        lines.append("A recorded run")
+    elif not vessel.heeds:
+        lines.append("Read-only: commands are off")
+    return lines

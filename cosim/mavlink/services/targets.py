@@ -1,0 +1,171 @@
+"""Set-points: where the target region goes."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from cosim.helm.orders import Aim, Face, Order
+from cosim.mavlink.profile import MODE_NAMES
+from cosim.mavlink.services.parameters import Parameters
+from cosim.mavlink.services.service import Call, Service, place_of, unscaled
+from cosim.mavlink.vessel import Sender, Vessel
+from cosim.scenario_tables import Vector3
+
+_X_Y, _Z = 0b011, 0b100  # type_mask: what is ignored
+_VELOCITY, _FORCE, _YAW = 0b111000, 1 << 9, 1 << 10
+_SPEED = "law.gains.speed"
+_LOCAL, _OFFSET, _BODY, _BODY_OFFSET, _BODY_FRD = 1, 7, 8, 9, 12
+
+
+class Targets(Service):
+    """SET_POSITION_TARGET_*, and the commands that move, turn and pace the vehicle.
+
+    Set-points are heeded while the region is to be reached, as ArduSub heeds them in GUIDED alone. One that says what
+    the last one said makes no order.
+
+    Parameters
+    ----------
+    vessel : Vessel
+        Whom it serves.
+    parameters : Parameters
+        Through which the speed is set.
+    """
+
+    def __init__(self, vessel: Vessel, parameters: Parameters) -> None:
+        super().__init__(vessel)
+        self._parameters = parameters
+        m = vessel.mavlink
+        self._last: tuple[object, ...] = ()
+        self.messages = {
+            "SET_POSITION_TARGET_LOCAL_NED": self._local,
+            "SET_POSITION_TARGET_GLOBAL_INT": self._global,
+        }
+        self.commands = {
+            m.MAV_CMD_DO_REPOSITION: self._reposition,
+            m.MAV_CMD_CONDITION_YAW: self._turn,
+            m.MAV_CMD_DO_CHANGE_SPEED: self._speed,
+        }
+
+    def looked(self) -> None:
+        """Forget the last set-point once another mode is on."""
+        if self.vessel.mode_ahead != "reach":
+            self._last = ()
+
+    def restart(self) -> None:
+        """Forget the last set-point."""
+        self._last = ()
+
+    # ---- set-points ----
+
+    def _local(self, sender: Sender, message: Any) -> None:
+        frame = message.coordinate_frame
+        if frame not in (_LOCAL, _OFFSET, _BODY, _BODY_OFFSET, _BODY_FRD):
+            self.vessel.deny(f"set-point in frame {frame}; it may be 1, 7, 8, 9 or 12", "frame")
+            return
+        raw = message.x, message.y, message.z
+        self._set_point(sender, message, frame, self._from_local(frame, raw), raw)
+
+    def _global(self, sender: Sender, message: Any) -> None:
+        frame = message.coordinate_frame
+        place = None
+        if frame != _LOCAL:
+            latitude, longitude = unscaled(frame, message.lat_int, message.lon_int)
+            place = place_of(self.vessel, frame, latitude, longitude, message.alt)
+        if place is None:
+            self.vessel.deny(f"set-point in frame {frame}; it may be 0, 3, 5 or 6", "frame")
+            return
+        self._set_point(sender, message, frame, place, (message.lat_int, message.lon_int, message.alt))
+
+    def _from_local(self, frame: int, raw: Vector3) -> Vector3:
+        """Return a position [m, NED]; the body's frames lie level, and are turned by yaw alone, as ArduPilot's."""
+        if frame == _LOCAL:
+            return raw
+        north, east, down = self._levelled(frame, raw)
+        x, y, z = self.vessel.view.position_ned
+        return x + north, y + east, z + down
+
+    def _levelled(self, frame: int, vector: Vector3) -> Vector3:
+        if frame not in (_BODY, _BODY_OFFSET, _BODY_FRD):
+            return vector
+        yaw = self.vessel.view.heading
+        if math.isnan(yaw):
+            return math.nan, math.nan, vector[2]
+        ahead, right, down = vector
+        sine, cosine = math.sin(yaw), math.cos(yaw)
+        return ahead * cosine - right * sine, ahead * sine + right * cosine, down
+
+    def _set_point(self, sender: Sender, message: Any, frame: int, place: Vector3, raw: Vector3) -> None:
+        vessel, mask = self.vessel, message.type_mask
+        if not self._may(sender):
+            return
+        if mask & _Z or mask & _X_Y not in (0, _X_Y) or mask & _FORCE:
+            vessel.deny(f"set-point with mask {mask}: a position is needed", "mask")
+            return
+        if vessel.mode_ahead != "reach":
+            name = MODE_NAMES[vessel.mode_ahead].lower()
+            vessel.deny(f"set-point while the mode is {name}", "mode of set-point")
+            return
+        going = (0.0, 0.0, 0.0) if mask & _VELOCITY else (message.vx, message.vy, message.vz)
+        yaw = None if mask & _YAW or not math.isfinite(message.yaw) else message.yaw
+        said = (frame, mask, raw, going, yaw)
+        if said == self._last:
+            return
+        position = (*vessel.view.target[:2], place[2]) if mask & _X_Y else place
+        orders: list[Order] = [Aim(position, None, self._levelled(frame, going))]
+        if yaw is not None and self._last[-1:] != (yaw,):
+            turned = frame in (_BODY, _BODY_OFFSET, _BODY_FRD)
+            orders.append(Face(yaw + (vessel.view.euler[2] if turned else 0.0)))
+        if vessel.give(*orders) == vessel.mavlink.MAV_RESULT_ACCEPTED:
+            self._last = said
+
+    def _may(self, sender: Sender) -> bool:
+        vessel = self.vessel
+        if not vessel.heeds:
+            vessel.give()
+            return False
+        if not vessel.operator.may_steer(sender.system, vessel.now):
+            vessel.deny("another station has the vehicle in hand", "operator")
+            return False
+        return True
+
+    # ---- commands ----
+
+    def _reposition(self, call: Call) -> int:
+        m, vessel = self.vessel.mavlink, self.vessel
+        place = place_of(vessel, call.frame, call[5], call[6], call[7])
+        if place is None:
+            vessel.deny(f"frame {call.frame} of a position", "frame")
+            return int(m.MAV_RESULT_UNSUPPORTED)
+        if not self._may(call.sender):
+            return int(m.MAV_RESULT_DENIED)
+        # what is left out stays as it is
+        x, y, z = (a if math.isfinite(a) else b for a, b in zip(place, vessel.view.position_ned, strict=True))
+        orders: list[Order] = [Aim((x, y, z))]
+        if math.isfinite(call[4]):
+            orders.append(Face(call[4]))
+        self._last = ()
+        return vessel.give(*orders)
+
+    def _turn(self, call: Call) -> int:
+        vessel = self.vessel
+        angle = math.radians(call[1])
+        if not math.isfinite(angle) or not math.isfinite(call[4]):
+            return int(vessel.mavlink.MAV_RESULT_DENIED)
+        if call[4] == 1.0:
+            angle = vessel.view.euler[2] + math.copysign(1.0, -1.0 if call[3] < 0.0 else 1.0) * angle
+        if not self._may(call.sender):
+            return int(vessel.mavlink.MAV_RESULT_DENIED)
+        return vessel.give(Face(angle))
+
+    def _speed(self, call: Call) -> int:
+        m, speed = self.vessel.mavlink, call[2]
+        if not self._parameters.has(_SPEED):
+            return int(m.MAV_RESULT_UNSUPPORTED)
+        if speed < 0.0:  # as it is
+            return int(m.MAV_RESULT_ACCEPTED)
+        if not math.isfinite(speed):
+            return int(m.MAV_RESULT_DENIED)
+        if not self._may(call.sender):
+            return int(m.MAV_RESULT_DENIED)
+        return self._parameters.change(_SPEED, speed)

@@ -1,0 +1,28 @@
+"""Clocks: TIMESYNC and PING."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from cosim.mavlink.services.service import Service
+from cosim.mavlink.vessel import Sender, Vessel
+
+_NANO = 1000  # ns in a µs
+
+
+class Timing(Service):
+    """Answers with simulated time, which is the time since boot."""
+
+    def __init__(self, vessel: Vessel) -> None:
+        super().__init__(vessel)
+        self.messages = {"TIMESYNC": self._synchronise, "PING": self._ping}
+
+    def _synchronise(self, sender: Sender, message: Any) -> None:
+        if message.tc1 == 0:
+            boot = self.vessel.view.boot_us * _NANO
+            sender.link.send(self.vessel.make("TIMESYNC", boot, message.ts1))
+
+    def _ping(self, sender: Sender, message: Any) -> None:
+        if message.target_system == 0 and message.target_component == 0:  # a request, not an answer
+            to = sender.system, sender.component
+            sender.link.send(self.vessel.make("PING", message.time_usec, message.seq, *to))
