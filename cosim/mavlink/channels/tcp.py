@@ -117,12 +117,16 @@ class TcpIn:
             elif not client.flush(now):
                 self.trouble["clients closed that took nothing"] += 1
                 self._drop(client)
-        while len(self.clients) < CLIENTS:
+        for _ in range(CLIENTS):
             try:
                 made, _ = self._server.accept()
             except OSError:  # nobody is there, or gone again
                 return
-            self.clients.append(Connection(made))
+            if len(self.clients) < CLIENTS:
+                self.clients.append(Connection(made))
+            else:
+                self.trouble["clients beyond 8 turned away"] += 1
+                made.close()
 
     def close(self) -> None:
         """Close all sockets."""
