@@ -14,7 +14,7 @@ from collections.abc import Sequence
 from importlib import metadata
 from pathlib import Path
 
-from cosim.command_line import campaigns, run
+from cosim.command_line import campaigns, mavlink, run
 from cosim.command_line.campaigns import INTERRUPTED
 
 _EPILOG = """examples:
@@ -56,6 +56,7 @@ def _parser() -> argparse.ArgumentParser:
     calibrate.add_argument("--scenario", default="paper", help="scenario to fit (default: paper)")
 
     campaigns.add_verbs(verbs)
+    mavlink.add_verbs(verbs)
     return parser
 
 
@@ -164,4 +165,7 @@ _VERBS = {
     "calibrate": _calibrate,
     "campaign": campaigns.campaign,
     "compare": campaigns.compare,
+    "listen": mavlink.listen,
+    "stream": mavlink.stream,
+    "mavlink-check": mavlink.mavlink_check,
 }

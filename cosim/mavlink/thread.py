@@ -98,6 +98,11 @@ class LinkThread:
         self.dropped += len(self._queue) == SNAPSHOTS
         self._queue.append(row.copy())
 
+    @property
+    def waiting(self) -> int:
+        """Snapshots that are queued; more than `SNAPSHOTS` never are."""
+        return len(self._queue)
+
     def close(self) -> None:
         """Send what is queued, within a bounded time, say goodbye, end the thread, and warn of what was lost."""
         if self._closing.is_set():
