@@ -15,7 +15,7 @@ from collections.abc import Sequence
 from importlib import metadata
 from pathlib import Path
 
-from cosim.command_line import campaigns
+from cosim.command_line import campaigns, sitl
 from cosim.command_line.campaigns import INTERRUPTED
 
 _EPILOG = """examples:
@@ -73,6 +73,7 @@ def _parser() -> argparse.ArgumentParser:
     calibrate.add_argument("--scenario", default="paper", help="scenario to fit (default: paper)")
 
     campaigns.add_verbs(verbs)
+    sitl.add_verbs(verbs)
     return parser
 
 
@@ -210,4 +211,5 @@ _VERBS = {
     "calibrate": _calibrate,
     "campaign": campaigns.campaign,
     "compare": campaigns.compare,
+    "sitl": sitl.sitl,
 }
