@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -66,12 +67,15 @@ def summarise(scenario: Scenario, record: Record, status: str, wall_time: float 
     settled = bool(visits and inside[-1] and time[-1] - visits[-1][0] >= SETTLED_FOR)
     names = [secondary.region.name for secondary in scenario.regions]
     overlap = [record[f"{names[i]}.clearance"] < 0.0 for i in scenario.intersection]
-    acted = slice(0, scenario.steps)  # the last row of a whole run decides, but acts no more
+    period = (
+        float(time[1] - time[0]) if len(time) > 1 else scenario.time.step
+    )  # of the record, which may be thinned out
+    every = round(period / scenario.time.step)
+    acted = slice(0, math.ceil(scenario.steps / every))  # the last row of a whole run decides, but acts no more
     force = np.linalg.norm(record.stack([f"actuation.{axis}" for axis in "XYZ"]), axis=1)[acted]
     asked = np.linalg.norm(record.stack([f"command.{axis}" for axis in "XYZ"]), axis=1)
     speed = np.linalg.norm(record.stack([f"velocity.{axis}" for axis in "uvw"]), axis=1)
     simulated = float(time[-1])
-    period = float(time[1] - time[0]) if len(time) > 1 else scenario.time.step  # of the record
     weights = record.stack([f"weight.{name}" for name in CRITERIA])
     return {
         "scenario": scenario.name,
