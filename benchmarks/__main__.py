@@ -5,10 +5,10 @@ from __future__ import annotations
 import argparse
 from collections.abc import Sequence
 
-from benchmarks import baselines, fmu, fuzzy, law, scenes, step
+from benchmarks import baselines, fmu, fuzzy, law, scenes, sitl, step
 from benchmarks.timing import print_rows
 
-BENCHMARKS = {"step": step, "law": law, "fmu": fmu, "fuzzy": fuzzy}
+BENCHMARKS = {"step": step, "law": law, "fmu": fmu, "fuzzy": fuzzy, "sitl": sitl}
 REPEATS = 5
 
 
