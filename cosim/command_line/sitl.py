@@ -17,7 +17,7 @@ from cosim.command_line.campaigns import INTERRUPTED
 if TYPE_CHECKING:
     from cosim.run import Run
 
-_JSON_PORT = 9002
+_PORTS = {"ardupilot": 9002, "px4": 4560}
 
 
 def add_verbs(verbs: Any) -> None:
@@ -34,7 +34,11 @@ def add_verbs(verbs: Any) -> None:
     sitl.add_argument(
         "--set", action="append", default=[], metavar="KEY=VALUE", dest="overrides", help="as for run"
     )  # fmt: skip
-    sitl.add_argument("--port", type=_port, default=_JSON_PORT, metavar="N", help="default: %(default)s")
+    sitl.add_argument(
+        "--backend", choices=_PORTS, default="ardupilot",
+        help="ardupilot: its JSON backend, by UDP; px4: its simulator interface, by TCP (default: %(default)s)",
+    )  # fmt: skip
+    sitl.add_argument("--port", type=_port, metavar="N", help="default: 9002, with px4 4560")
     sitl.add_argument("--host", default="127.0.0.1", metavar="ADDRESS", help="to listen on (default: %(default)s)")
     sitl.add_argument("--allow-remote", action="store_true", help="let the address be seen from other machines")
     sitl.add_argument(
@@ -68,10 +72,11 @@ def sitl(options: argparse.Namespace) -> int:
     """Run ``cosim sitl``."""
     from cosim.report import verdict
     from cosim.sitl.flights import FlightOptions, Flights
-    from cosim.sitl.law import law_of_pwm
+    from cosim.sitl.hil import HilServer
+    from cosim.sitl.law import law_of_controls, law_of_pwm
     from cosim.sitl.server import JsonServer
 
-    address = _address(options.host, options.port, options.allow_remote)
+    address = _address(options.host, options.port or _PORTS[options.backend], options.allow_remote)
     # a polite kill leaves a readable run too
     with contextlib.suppress(ValueError):  # which signal raises outside the main thread
         signal.signal(signal.SIGTERM, signal.default_int_handler)
@@ -79,8 +84,13 @@ def sitl(options: argparse.Namespace) -> int:
         options.scenario, tuple(options.overrides), options.vehicle, options.out, options.record_rate,
         not options.no_report,
     )  # fmt: skip
-    server = JsonServer(Flights(chosen, "ardupilot", law_of_pwm), address, options.timeout, _tell)
-    _tell(f"waiting for ArduPilot on UDP {server.address[0]}:{server.address[1]} (--model JSON:{server.address[0]})")
+    server: JsonServer | HilServer
+    if options.backend == "px4":
+        server = HilServer(Flights(chosen, options.backend, law_of_controls), address, options.timeout, _tell)
+        _tell("waiting for PX4 on TCP {}:{}".format(*server.address))
+    else:
+        server = JsonServer(Flights(chosen, options.backend, law_of_pwm), address, options.timeout, _tell)
+        _tell("waiting for ArduPilot on UDP {}:{}".format(*server.address))
     outcome = server.serve()
     c = outcome.counts
     ignored = f"{c.malformed} datagrams malformed, {c.refused} of other senders"

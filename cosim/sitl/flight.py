@@ -87,6 +87,10 @@ class Flight:
         self._master.step(self.steps)
         self._record()
         self.steps += 1
+        return self.motion()
+
+    def motion(self) -> Motion:
+        """Return the vehicle's motion as it is now."""
         return self._reader.read(self.steps * self.scenario.time.step)
 
     def _record(self) -> None:
@@ -108,8 +112,8 @@ class Flight:
         else:  # nothing to read: leave nothing behind
             self._claimed.discard()
 
-    def conclude(self, status: str, report: bool) -> dict[str, Any] | None:
-        """Write the summary of a flight that has ended.
+    def conclude(self, status: str, report: bool) -> dict[str, Any]:
+        """Write the summary of a flight that has ended, and made a step.
 
         Parameters
         ----------
@@ -120,16 +124,14 @@ class Flight:
 
         Returns
         -------
-        dict or None
-            The summary; None if there was no step.
+        dict
+            The summary.
 
         Raises
         ------
         RunError
             If the folder cannot be written.
         """
-        if not self._recorder.rows:
-            return None
         try:
             return conclude(self.folder, self.scenario, status, self._wall_time, report)
         except OSError as error:

@@ -6,14 +6,36 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from cosim.errors import RunError
+from cosim.errors import CosimError, RunError
 from cosim.run import Run
 from cosim.sitl.flight import Flight
 from cosim.sitl.law import AutopilotLaw
 from cosim.sitl.scenario import SCENARIO, scenario_to_fly
-from plant_fmu import Vehicle, cached_fmu
+from plant_fmu import PlantFmuError, Vehicle, cached_fmu
+
+RESTARTED = "ended: the autopilot started again"
 
 _SOME_RATE = 1000  # Hz, with which a scenario is tried before an autopilot comes
+
+
+@dataclass
+class Counts:
+    """Frames of the autopilot, by what became of them."""
+
+    steps: int = 0
+    resent: int = 0  # answered again, without a step
+    lost: int = 0  # that have not come
+    malformed: int = 0
+    refused: int = 0  # of a second sender
+    unsent: int = 0  # answers that the network did not take
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What an autopilot leaves."""
+
+    runs: list[Run]
+    counts: Counts
 
 
 @dataclass(frozen=True)
@@ -81,24 +103,55 @@ class Flights:
         return self.flight
 
     def end(self, status: str) -> None:
-        """End the present run, if there is one, with a summary that says how; its report waits for `conclude`."""
+        """End the present run, if there is one, with a summary that says how; its report waits for the end of all."""
         flight, self.flight = self.flight, None
         if flight is not None:
-            self._ended.append((flight, status))
             flight.end()
-            flight.conclude(status, report=False)
+            if flight.steps:
+                self._ended.append((flight, status))
+                flight.conclude(status, report=False)
 
-    def conclude(self) -> list[Run]:
-        """Write the reports of all runs, unless they are not wanted, and return those that came to a record.
+    def fly(self, work: Callable[[], str], counts: Counts) -> Outcome:
+        """Let a server work until it ends, and conclude what it leaves.
+
+        Parameters
+        ----------
+        work : callable
+            Begins and steps flights; returns how it ended.
+        counts : Counts
+            Of the server.
+
+        Returns
+        -------
+        Outcome
+            The status of its last run says how it ended.
 
         Raises
         ------
         RunError
-            If one cannot be written.
+            If a run cannot be written, or no autopilot came.
+        PlantFmuError, CosimError
+            If a run fails; what was recorded until then is left readable.
+        KeyboardInterrupt
+            If Ctrl-C came before there was a run.
         """
-        runs = []
-        for flight, status in self._ended:
-            summary = flight.conclude(status, self._options.report)
-            if summary is not None:
-                runs.append(Run(flight.folder, summary))
-        return runs
+        failure: Exception | None = None
+        interrupted = False
+        try:
+            status = work()
+        except KeyboardInterrupt:
+            status, interrupted = "interrupted", True
+        except (PlantFmuError, CosimError) as error:
+            status, failure = f"failed: {error}", error
+        self.end(status)
+        runs = self._conclude()
+        if failure:
+            raise failure
+        if not runs:
+            raise KeyboardInterrupt if interrupted else RunError(f"no autopilot came: {status}")
+        return Outcome(runs, counts)
+
+    def _conclude(self) -> list[Run]:
+        """Write the reports of all runs that made a step, unless they are not wanted, and return these runs."""
+        report = self._options.report
+        return [Run(flight.folder, flight.conclude(status, report)) for flight, status in self._ended]

@@ -6,15 +6,12 @@ import logging
 import socket
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
 
-from cosim.errors import CosimError, RunError
-from cosim.run import Run
+from cosim.errors import RunError
 from cosim.sitl import wire
-from cosim.sitl.flights import Flights
+from cosim.sitl.flights import RESTARTED, Counts, Flights, Outcome
 from cosim.sitl.lockstep import Lockstep
 from cosim.sitl.scenario import LOWEST_RATE
-from plant_fmu import PlantFmuError
 
 log = logging.getLogger(__name__)
 
@@ -23,27 +20,6 @@ Sender = tuple[str, int]
 _POLL = 0.25  # s of the wall clock, after which a silent socket is left to look at the clock
 _PRESENT = 1.0  # s of the wall clock, for which a silent autopilot keeps its place against another sender
 _WARNING_PERIOD = 10.0  # s of the wall clock, between two warnings of one kind
-RESTARTED = "ended: the autopilot started again"
-
-
-@dataclass
-class Counts:
-    """Datagrams by what became of them."""
-
-    steps: int = 0
-    resent: int = 0  # answered again, without a step
-    lost: int = 0  # that have not come
-    malformed: int = 0
-    refused: int = 0  # of a second sender
-    unsent: int = 0  # answers that the network did not take
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """What an autopilot leaves."""
-
-    runs: list[Run]
-    counts: Counts
 
 
 class JsonServer:
@@ -113,23 +89,10 @@ class JsonServer:
         KeyboardInterrupt
             If there is no run yet.
         """
-        failure: Exception | None = None
-        interrupted = False
         try:
-            status = self._answer_frames()
-        except KeyboardInterrupt:
-            status, interrupted = "interrupted", True
-        except (PlantFmuError, CosimError) as error:
-            status, failure = f"failed: {error}", error
+            return self._flights.fly(self._answer_frames, self.counts)
         finally:
             self._socket.close()
-        self._flights.end(status)
-        runs = self._flights.conclude()
-        if failure:
-            raise failure
-        if not runs:
-            raise KeyboardInterrupt if interrupted else RunError(f"no autopilot came: {status}")
-        return Outcome(runs, self.counts)
 
     def _answer_frames(self) -> str:
         """Answer frame by frame; return how it ended."""

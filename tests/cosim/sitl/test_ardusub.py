@@ -17,13 +17,23 @@ MANUAL, ALT_HOLD = 19, 2
 DEPTH = 4.0  # m, at which it is told to hold
 WALL = 240.0  # s, after which the test gives up
 
-# what ArduSub is given beside its own defaults: eight thrusters as vectored_6dof, and sticks that rest in the middle
+# what ArduSub is given beside its own defaults: eight thrusters as vectored_6dof, sticks that rest in the middle, a
+# depth sensor in the water of little noise, gains for a vehicle of this size, and sensors that pass for calibrated
 PARAMETERS = """
 FRAME_CONFIG 2
 RC3_TRIM 1500
 RC_OPTIONS 0
 RC_PROTOCOLS 1
-SERVO8_FUNCTION 7
+SIM_BARO_RND 0.02
+BARO_EXT_BUS 1
+PSC_ACCZ_P 2
+PSC_ACCZ_I 4
+PSC_ACCZ_FF 0.75
+PSC_VELZ_P 8
+PSC_POSZ_P 3
+PSC_JERK_Z 8
+PILOT_ACCEL_Z 200
+PILOT_SPEED_UP 200
 INS_ACCOFFS_X 0.001
 INS_ACCOFFS_Y 0.001
 INS_ACCOFFS_Z 0.001

@@ -11,11 +11,11 @@ import pytest
 from cosim.errors import RunError
 from cosim.master import Master
 from cosim.record import load_record
-from cosim.sitl.flights import FlightOptions, Flights
+from cosim.sitl.flights import RESTARTED, FlightOptions, Flights
 from cosim.sitl.law import law_of_pwm
 from cosim.sitl.lockstep import Lockstep
 from cosim.sitl.scenario import scenario_to_fly
-from cosim.sitl.server import RESTARTED, JsonServer
+from cosim.sitl.server import JsonServer
 from plant_fmu import load_vehicle
 from tests.cosim.sitl.stand_in import NEUTRAL, StandIn, frame, heave, newest_line, parse
 
