@@ -5,10 +5,10 @@ from __future__ import annotations
 import argparse
 from collections.abc import Sequence
 
-from benchmarks import baselines, fmu, fuzzy, law, mavlink, scenes, step
+from benchmarks import baselines, fmu, fuzzy, law, mavlink, scenes, sitl, step
 from benchmarks.timing import print_rows
 
-BENCHMARKS = {"step": step, "law": law, "fmu": fmu, "fuzzy": fuzzy, "mavlink": mavlink}
+BENCHMARKS = {"step": step, "law": law, "fmu": fmu, "fuzzy": fuzzy, "mavlink": mavlink, "sitl": sitl}
 REPEATS = 5
 
 

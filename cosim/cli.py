@@ -14,7 +14,7 @@ from collections.abc import Sequence
 from importlib import metadata
 from pathlib import Path
 
-from cosim.command_line import campaigns, mavlink, run
+from cosim.command_line import campaigns, mavlink, run, sitl
 from cosim.command_line.campaigns import INTERRUPTED
 
 _EPILOG = """examples:
@@ -57,6 +57,7 @@ def _parser() -> argparse.ArgumentParser:
 
     campaigns.add_verbs(verbs)
     mavlink.add_verbs(verbs)
+    sitl.add_verbs(verbs)
     return parser
 
 
@@ -168,4 +169,5 @@ _VERBS = {
     "listen": mavlink.listen,
     "stream": mavlink.stream,
     "mavlink-check": mavlink.mavlink_check,
+    "sitl": sitl.sitl,
 }

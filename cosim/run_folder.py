@@ -168,7 +168,8 @@ def report_again(path: Path) -> dict[str, Any]:
     try:
         before = json.loads((path / SUMMARY).read_text(encoding="utf-8"))
         status, wall_time = str(before["status"]), before["wall_time"]
-        scenario = dataclasses.replace(scenario, name=str(before["scenario"]))
+        law = dataclasses.replace(scenario.law, name=str(before["law"]))  # or who flew in its place
+        scenario = dataclasses.replace(scenario, name=str(before["scenario"]), law=law)
     except FileNotFoundError:
         pass
     except (OSError, ValueError, KeyError, TypeError) as error:
