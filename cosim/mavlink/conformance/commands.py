@@ -125,6 +125,7 @@ def set_modes(subject: Subject) -> Outcome:
 def bad_mode(subject: Subject) -> Outcome:
     """Check that a mode that is not there is refused, and changes nothing."""
     client = subject.client
+    client.collect(1.2)  # until a heartbeat shows what was set before
     before = client.last("HEARTBEAT")
     ack = _set_mode(subject, 0xEE, packed=False)
     client.collect(1.2)

@@ -4,6 +4,7 @@ python mavsdk_client.py udpin://127.0.0.1:PORT
 """
 
 import asyncio
+import contextlib
 import json
 import math
 import os
@@ -18,11 +19,13 @@ try:  # MAVSDK 4: in this process
     from mavsdk.asyncio.plugins.offboard import OffboardAsync
     from mavsdk.asyncio.plugins.param import ParamAsync
     from mavsdk.asyncio.plugins.telemetry import TelemetryAsync
+    from mavsdk.plugins.info import InfoError
     from mavsdk.plugins.offboard import PositionNedYaw
     from mavsdk.plugins.param import ParamError
 except ImportError:
     Mavsdk = None
     from mavsdk import System
+    from mavsdk.info import InfoError
     from mavsdk.offboard import PositionNedYaw
     from mavsdk.param import ParamError
 
@@ -80,8 +83,8 @@ async def steps(vehicle, address):
     async def attitude():
         return fields(await first(vehicle.stream("attitude_euler")), "roll_deg", "pitch_deg", "yaw_deg")
 
-    async def mode():
-        return str(await first(vehicle.stream("flight_mode"))).rpartition(".")[2]
+    async def mode(name=None):
+        return (await first(vehicle.stream("flight_mode"), lambda mode: name in (None, mode.name))).name
 
     async def all_params():
         found = await vehicle.param.get_all_params()
@@ -128,22 +131,27 @@ async def steps(vehicle, address):
 
     async def hold():
         await vehicle.action.hold()
-        return await mode()
+        return await mode("HOLD")
 
     async def offboard():
         there = await ned()
         target = PositionNedYaw(there[0] + 0.5, there[1], there[2], 0.0)
         await vehicle.offboard.set_position_ned(target)
         await vehicle.offboard.start()
-        shown = await first(vehicle.stream("flight_mode"), lambda m: "OFFBOARD" in str(m))
+        shown = await mode("OFFBOARD")
         await vehicle.offboard.stop()
-        return str(shown).rpartition(".")[2]
+        return shown
 
     async def missions():
         return len(await vehicle.mission_raw.download_mission())
 
     async def speed():
-        return await vehicle.info.get_speed_factor()
+        """Return how fast the clock goes, which is known after some messages only."""
+        while True:
+            with contextlib.suppress(InfoError):
+                if math.isfinite(factor := await vehicle.info.get_speed_factor()):
+                    return factor
+            await asyncio.sleep(0.2)
 
     yield "position", position()
     yield "ned", ned()
