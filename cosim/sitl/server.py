@@ -100,11 +100,8 @@ class JsonServer:
         while True:
             try:
                 data, sender = receive(wire.LARGEST + 1)
-            except TimeoutError:
+            except OSError:  # nothing in time; or word that an answer before did not arrive, where a system tells that
                 data, sender = b"", None
-            except OSError as error:  # such as a network that went down
-                self._warn("receiving", f"UDP: {error.strerror or error}")
-                continue
             now = time.monotonic()
             if sender is not None and self._heed(data, sender, now):
                 self._heard = now
