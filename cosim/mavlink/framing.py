@@ -171,7 +171,9 @@ class Gate:
             yield from self._judged(frame, header)
 
     def is_intact(self, frame: bytes, header: Header) -> bool:
-        """Return whether the checksum of a frame of a known message is right."""
+        """Return whether the checksum of a frame of a known message is right, and in MAVLink 1 its length can be."""
+        if frame[0] == V1 and header.end - header.payload > self.kinds[header.message].size:
+            return False
         crc = self._crc(frame[1 : header.end])
         crc.accumulate(bytes((self.kinds[header.message].crc_extra,)))
         return bool(crc.crc == frame[header.end] | frame[header.end + 1] << 8)

@@ -83,12 +83,15 @@ class LinkThread:
         self._queue: deque[Array] = deque(maxlen=SNAPSHOTS)
         self._closing = threading.Event()
         self._next_tick = 0.0
+        self._started = time.monotonic()
+        self._waited = 0.0  # s, from the start to the last snapshot before anything moved
         self.dropped = 0
         self.failures: dict[str, int] = Counter()
         self._thread = threading.Thread(target=self._live, name="mavlink", daemon=True)
 
     def start(self) -> None:
         """Begin to send and receive."""
+        self._started = time.monotonic()
         self._thread.start()
 
     def observe(self, k: int, row: Array) -> None:
@@ -164,8 +167,10 @@ class LinkThread:
         """Show the vehicle snapshots until a moment of `time.perf_counter`; return whether some are left."""
         while self._queue:
             row = self._queue.popleft()
+            if not row[0] > 0.0:  # arming is awaited
+                self._waited = time.monotonic() - self._started
             for tlog in self._logs:
-                tlog.simulated = float(row[0])
+                tlog.simulated = self._waited + float(row[0])
             self._guard("observe", self._vehicle.observe, row)
             if time.perf_counter() > until:
                 break

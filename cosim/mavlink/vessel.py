@@ -67,6 +67,8 @@ class Vessel:
         Makes messages.
     view : View
         The latest snapshot.
+    waited_us : int
+        For how long arming is awaited [µs], which counts as time since boot.
     seen : bool
         Whether a snapshot came at all.
     links : list of Outlet
@@ -109,6 +111,8 @@ class Vessel:
         self.loss_timeout, self.loss_action = options.loss_timeout, options.loss_action
         self.frame = LocalFrame(*options.origin)
         self.unix_start_us = time.time_ns() // 1000  # when simulated time was 0
+        vehicle = scenario.vehicle
+        self._limits = tuple(zip((-vehicle.thrust_min).tolist(), vehicle.thrust_max.tolist(), strict=True))
         self._orders = orders if options.commands and live and scenario.commands.enabled else None
         self._said: dict[str, float] = {}
         self._said_lately: deque[float] = deque(maxlen=_TEXTS)
@@ -117,6 +121,7 @@ class Vessel:
 
     def restart(self) -> None:
         """Forget what belongs to a run, as at its beginning."""
+        self.waited_us = 0
         self.view = View(self.layout, self.layout.first_row(self.scenario))
         self.seen = False
         self.settings = LiveSettings(self.scenario)
@@ -153,13 +158,21 @@ class Vessel:
 
     def look(self, row: Array) -> None:
         """Take the next snapshot."""
-        self.view, self.seen = View(self.layout, row), True
+        self.view, self.seen = View(self.layout, row, self.waited_us), True
         if self._wished is not None and self._wished[1] == self.view.mode:
             self._wished = None
 
     def home_ned(self) -> Vector3:
         """Return where home is [m, NED]."""
         return self.home[0], self.home[1], 0.0
+
+    def thrust_parts(self) -> list[float]:
+        """Return what each thruster gives, as a part of the vehicle's limit on that side, from -1 to 1."""
+        parts = []
+        for force, (backwards, forwards) in zip(self.view.thruster_forces, self._limits, strict=True):
+            limit = forwards if force > 0.0 else backwards
+            parts.append(max(-1.0, min(1.0, force / limit)) if limit > 0.0 else 0.0)
+        return parts
 
     # ---- orders ----
 

@@ -39,26 +39,16 @@ def nav_controller_output(vessel: Vessel) -> list[Any]:
     return [vessel.make("NAV_CONTROLLER_OUTPUT", *values)]
 
 
-def thrust_parts(vessel: Vessel) -> list[float]:
-    """Return what each thruster gives, as a part of its limit on that side, from -1 to 1."""
-    vehicle = vessel.scenario.vehicle
-    parts = []
-    for force, low, high in zip(vessel.view.thruster_forces, vehicle.thrust_min, vehicle.thrust_max, strict=True):
-        limit = high if force > 0.0 else -low
-        parts.append(max(-1.0, min(1.0, force / limit)) if limit > 0.0 else 0.0)
-    return parts
-
-
 def servo_output_raw(vessel: Vessel) -> list[Any]:
     """SERVO_OUTPUT_RAW: the thrusters' forces as PWM [µs], linear, 0 where there is none; its time wraps."""
-    pulses = [_CENTRE + _SWING * part for part in thrust_parts(vessel)]
+    pulses = [_CENTRE + _SWING * part for part in vessel.thrust_parts()]
     pulses = (pulses + [0] * _SERVOS)[:_SERVOS]
     return [vessel.make("SERVO_OUTPUT_RAW", wrapped(vessel.view.boot_us, 1), 0, *pulses)]
 
 
 def actuator_output_status(vessel: Vessel) -> list[Any]:
     """ACTUATOR_OUTPUT_STATUS: the same as parts from -1 to 1."""
-    parts = thrust_parts(vessel)[:_OUTPUTS]
+    parts = vessel.thrust_parts()[:_OUTPUTS]
     return [vessel.make("ACTUATOR_OUTPUT_STATUS", vessel.view.boot_us, (1 << len(parts)) - 1, parts)]
 
 
@@ -92,7 +82,7 @@ def named_values(vessel: Vessel) -> list[tuple[str, float]]:
     values.append(("goal_clear", clearances[0]))
     nearest = min((c for c in clearances[1:] if not math.isnan(c)), default=math.nan)
     values.append(("clearance", nearest))  # the least of all regions
-    values.append(("thrust", max(map(abs, thrust_parts(vessel)), default=0.0)))
+    values.append(("thrust", max(map(abs, vessel.thrust_parts()), default=0.0)))
     values.append(("force", math.hypot(*view.wrench[:3])))
     values.append(("saturated", float(view.saturated)))
     values += [(_WATCHED[name], value) for name, value in view.reports() if name in _WATCHED]

@@ -56,18 +56,12 @@ def global_position_int(vessel: Vessel) -> list[Any]:
 
 def vfr_hud(vessel: Vessel) -> list[Any]:
     """VFR_HUD: throttle is the greatest part of its limit that a thruster gives."""
-    view, vehicle = vessel.view, vessel.scenario.vehicle
+    view = vessel.view
     north, east, down = view.velocity_ned
     speed = math.hypot(*view.velocity_body)
-    parts = [
-        abs(force) / max(limit, 1e-9)
-        for force, limit in zip(
-            view.thruster_forces, [max(-a, b) for a, b in zip(vehicle.thrust_min, vehicle.thrust_max, strict=True)],
-            strict=True,
-        )
-    ]  # fmt: skip
     heading = round(degrees(view.heading)) % 360 if math.isfinite(view.heading) else math.nan
-    values = speed, math.hypot(north, east), heading, 100.0 * max(parts, default=0.0), -view.position_ned[2], -down
+    throttle = max(map(abs, vessel.thrust_parts()), default=0.0)
+    values = speed, math.hypot(north, east), heading, 100.0 * throttle, -view.position_ned[2], -down
     return [vessel.make("VFR_HUD", *values)]
 
 

@@ -26,9 +26,9 @@ def meant(vessel: Vessel, item: MissionItem, before: Vector3) -> Item:
     """Return what an item asks for.
 
     NAV_WAYPOINT is a sphere about its place, of its acceptance radius (parameter 2), or for 0 the scenario's goal
-    region moved there; parameter 1 says for how long to stay. NAV_LOITER_TIME and NAV_LOITER_UNLIM are that region, for a time
-    and for good. NAV_LAND is a sphere at the depth of surfacing above its place, or for 0, 0 above the place before;
-    NAV_RETURN_TO_LAUNCH is the same at home. Both are for good.
+    region moved there; parameter 1 says for how long to stay. NAV_LOITER_TIME and NAV_LOITER_UNLIM are that region, for
+    a time and for good. NAV_LAND is a sphere at the depth of surfacing above its place, or for 0, 0 above the place
+    before; NAV_RETURN_TO_LAUNCH is the same at home. Both are for good.
 
     Parameters
     ----------
