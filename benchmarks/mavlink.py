@@ -33,7 +33,8 @@ RATIO = "x first"  # of the median to that of the row that it is compared with
 DATAGRAMS_PER_STEP = 10  # of STEPS, in a flood
 _MESSAGES = 850.0  # /s of the wall clock: seventeen streams at 50 Hz
 _SOURCE = (1, 1)
-_PACE = 1000.0  # steps/s, of the paced runs
+_STRETCHES = 4  # of a repeat
+_PACE = 1000.0  # steps/s, of the paced runs: those of the scenario, in real time
 
 
 class Seventeen:
@@ -119,35 +120,43 @@ def _messages(calls: int, repeats: int) -> list[Row]:
 
 
 def _beside_traffic(steps: int, repeats: int) -> list[Row]:
-    """Time runs at full speed without and with a link, one after the other, so that both see the same noise."""
+    """Time stretches of one run at full speed, in turn without and with a link, so that both see the same noise."""
     alone, beside = [], []
-    with _sink() as port:
-        for _ in range(repeats):
-            alone.append(_run(steps, None))
-            beside.append(_run(steps, port))
+    stretch = max(1, steps // _STRETCHES)
+    with _endless() as master, _sink() as port:
+        k = 0
+        for i in range(2 + 2 * _STRETCHES * repeats):
+            links = LinkThread(Seventeen(), [_link(port)], master.scenario.time.step) if i % 2 else None
+            taken = _stretch(master, range(k, k + stretch), links)
+            k += stretch
+            if i > 1:  # the first of each compiles, and fills the caches
+                (beside if i % 2 else alone).append(taken)
     first, second = "step: no link", f"step: {_MESSAGES:.0f} messages/s"
     lost = statistics.median(b / a - 1.0 for a, b in zip(alone, beside, strict=True))
     return [
         Row(first, summary(alone), first),
         Row(second, summary(beside), first),
-        Row(f"{second}, lost", f"{lost:.2%}, median of pairs; not timed by itself", first),
+        Row(f"{second}, lost", f"{lost:.2%}, the median of {len(alone)} pairs; not timed by itself", first),
     ]
 
 
-def _run(steps: int, port: int | None) -> float:
-    """Return microseconds a step of the paper's scenario, with a link to a port if there is one."""
-    scenario = load_scenario("paper", ["arbiter.engine=closed", f"time.duration={steps / 1000}"])
-    with Master(scenario) as master:
-        links = None
-        if port is not None:
-            links = LinkThread(Seventeen(), [_link(port)], scenario.time.step)
-            links.start()
-        before = time.perf_counter()
-        master.run([] if links is None else [links])
-        taken = time.perf_counter() - before
+def _stretch(master: Master, steps: range, links: LinkThread | None) -> float:
+    """Return microseconds a step, with links if there are some."""
+    if links is not None:
+        links.start()
+    before = time.perf_counter()
+    for k in steps:
+        master.step(k)
         if links is not None:
-            links.close()
-    return taken / scenario.steps * 1e6
+            links.observe(k, master.signals.row)
+    taken = time.perf_counter() - before
+    if links is not None:
+        links.close()
+    return taken / len(steps) * 1e6
+
+
+def _endless() -> Master:
+    return Master(load_scenario("paper", ["arbiter.engine=closed", "time.duration=100000"]))
 
 
 # ---- a step under a flood ----
@@ -158,17 +167,18 @@ def _under_flood(datagrams: int, steps: int, repeats: int) -> list[Row]:
     rows = []
     grown, looked, errors = 0.0, [], 0
     for pace, name in ((_PACE, f"step at {_PACE:.0f}/s"), (None, "step at full speed")):
-        found: dict[str, list[Array]] = {"link": [], "flood": []}
+        found: dict[str, list[Array]] = {"calm": [], "flood elsewhere": [], "flood": []}
         for repeat in range(repeats):
-            for case, count in (("link", 0), ("flood", datagrams)):
+            for case, all_times in found.items():
                 before = _resident()
-                times, link, failures = _flooded(count, steps, pace, repeat)
-                found[case].append(times)
-                if count:
-                    grown = max(grown, _resident() - before) if repeat else grown  # the first one fills caches
-                    looked.append(_came(link.counts) / count)
-                    errors += failures
-        first = f"{name}, link: median"
+                flood = 0 if case == "calm" else datagrams
+                times, link, failures = _flooded(flood, steps, pace, repeat, at_us=case == "flood")
+                all_times.append(times)
+                errors += failures
+                if case == "flood":
+                    grown = max(grown, _resident() - before if repeat else 0.0)  # the first one fills caches
+                    looked.append(_came(link.counts) / datagrams)
+        first = f"{name}, calm: median"
         for case, all_times in found.items():
             for quantile, word in ((0.5, "median"), (0.999, "99.9th percentile")):
                 timing = summary([float(np.quantile(times, quantile)) for times in all_times])
@@ -178,32 +188,37 @@ def _under_flood(datagrams: int, steps: int, repeats: int) -> list[Row]:
     return rows
 
 
-def _flooded(datagrams: int, steps: int, pace: float | None, seed: int) -> tuple[Array, Link, int]:
-    """Step beside a link for as long as a flood of it takes, if there is one, or for so many steps.
+def _flooded(datagrams: int, steps: int, pace: float | None, seed: int, *, at_us: bool) -> tuple[Array, Link, int]:
+    """Step beside a link for as long as a flood takes, if there is one, or for so many steps.
+
+    A flood that is not at us goes to a port that nobody reads: it takes the same time of the machine, none of ours.
 
     Returns
     -------
     (array, Link, int)
         Microseconds of each step from when it was due, the link, and errors in its thread.
     """
-    scenario = load_scenario("paper", ["arbiter.engine=closed", "time.duration=1000"])
     channel = UdpIn("127.0.0.1", 0)
     link = Link("flooded", channel, Gate(Counts(), _SOURCE), _SOURCE)
     times = []
-    with Master(scenario) as master, _attacker(channel.port, datagrams, seed) as under_way:
-        links = LinkThread(Seventeen(), [link], scenario.time.step)
+    with (
+        _endless() as master,
+        _sink() as sink,
+        _attacker(channel.port if at_us else sink, datagrams, seed) as under_way,
+    ):
+        links = LinkThread(Seventeen(), [link], master.scenario.time.step)
         links.start()
         due = time.perf_counter()
-        for k in range(scenario.steps):
-            if pace is not None:
+        for k in range(master.scenario.steps):
+            if pace is None:
+                due = time.perf_counter()
+            else:
                 due = max(due + 1.0 / pace, time.perf_counter())
                 time.sleep(max(0.0, due - time.perf_counter()))
-            else:
-                due = time.perf_counter()
             master.step(k)
             links.observe(k, master.signals.row)
             times.append(time.perf_counter() - due)
-            if not under_way(k, steps):
+            if not goes_on(k, steps):
                 break
         links.close()
     return np.array(times[1:]) * 1e6, link, sum(links.failures.values())
