@@ -18,6 +18,7 @@ from cosim.run_folder import SCENARIO
 from cosim.scenario import load_scenario
 from cosim.signals import Array
 
+_NEEDED = ("position.x", "quaternion.e0", "velocity.u")  # without which there is no vehicle
 _LONGEST_SLEEP = 0.5  # s
 _WAITING = 0.002  # s, for the links to send what is queued
 _MOST_QUEUED = SNAPSHOTS // 2
@@ -63,8 +64,9 @@ def replay(folder: Path, endpoints: Sequence[Endpoint], options: MavlinkOptions,
     if not (folder / SCENARIO).is_file():
         raise RunError(f"{folder}: holds no run ({SCENARIO} is missing)")
     scenario, record = load_scenario(folder / SCENARIO), load_record(folder)
-    if record.columns[0].name != "time":
-        raise RunError(f"{folder}: the record begins with column {record.columns[0].name!r}, expected 'time'")
+    lacking = [name for name in _NEEDED if name not in record.units]
+    if lacking or record.columns[0].name != "time":
+        raise RunError(f"{folder}: the record has no column {(lacking or ['time, as its first one'])[0]}")
     autopilot = Autopilot(scenario, record.columns, options, orders=None, live=False)
     thread = LinkThread(autopilot, open_links(endpoints, options), scenario.time.step)
     every = max(1, round(SNAPSHOT_PERIOD / scenario.time.step))

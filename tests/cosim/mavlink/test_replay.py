@@ -1,0 +1,135 @@
+"""A recorded run on MAVLink links: what comes is what was recorded, none of it is left out, and nothing is heeded."""
+
+import shutil
+import socket
+import struct
+import threading
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+
+from cosim.cli import main
+from cosim.errors import RunError
+from cosim.record import load_record
+
+mavlink = pytest.importorskip("pymavlink.dialects.v20.all", reason="the mavlink extra is not installed")
+
+from cosim.mavlink.conformance import Client  # noqa: E402
+from cosim.mavlink.endpoint import parse_endpoint  # noqa: E402
+from cosim.mavlink.ground import GroundLink  # noqa: E402
+from cosim.mavlink.options import MavlinkOptions  # noqa: E402
+from cosim.mavlink.replay import replay  # noqa: E402
+
+OVERRIDES = ("arbiter.engine=closed", "time.duration=4")
+COMMANDED = (*OVERRIDES, "commands.enabled=true")
+
+
+def frames(log):
+    """Yield stamps and messages of a .tlog."""
+    data, codec, at = log.read_bytes(), mavlink.MAVLink(None), 0
+    while at < len(data):
+        (stamp,) = struct.unpack_from(">Q", data, at)
+        size = data[at + 9] + 12
+        yield stamp, codec.decode(bytearray(data[at + 8 : at + 8 + size]))
+        at += 8 + size
+
+
+@pytest.fixture(scope="module")
+def recorded(shipped_run):
+    return shipped_run("paper-limited", *OVERRIDES).folder
+
+
+@pytest.fixture(scope="module")
+def logged(recorded, tmp_path_factory):
+    log = tmp_path_factory.mktemp("log") / "run.tlog"
+    done = replay(recorded, [parse_endpoint(str(log))], MavlinkOptions(), rate=None)
+    return done, list(frames(log))
+
+
+def test_as_fast_as_it_goes_nothing_is_left_out(logged):
+    done, messages = logged
+    assert done.simulated == pytest.approx(4.0) and done.troubles == []
+    stamps = [m.time_boot_ms for _, m in messages if m.get_type() == "ATTITUDE"]
+    assert stamps == list(range(0, 4001, 100))
+    sequence = [m.get_seq() for _, m in messages]
+    assert sequence == [i % 256 for i in range(len(sequence))]
+
+
+def test_what_comes_is_what_was_recorded(logged, recorded):
+    record = load_record(recorded)
+    time, position = record["time"], record.stack(["position.x", "position.y", "position.z"])
+    came = [m for _, m in logged[1] if m.get_type() == "LOCAL_POSITION_NED"]
+    assert len(came) == 41
+    for message in came:
+        (k,) = np.flatnonzero(np.isclose(time, 1e-3 * message.time_boot_ms))
+        np.testing.assert_allclose([message.x, message.y, message.z], position[k], rtol=1e-6)
+
+
+def test_the_log_replays_as_it_would_have_been_lived(logged):
+    attitudes = [(stamp, m.time_boot_ms) for stamp, m in logged[1] if m.get_type() == "ATTITUDE"]
+    wall = (attitudes[-1][0] - attitudes[0][0]) * 1e-6
+    assert wall == pytest.approx(4.0, abs=0.02)
+
+
+@pytest.mark.slow
+def test_a_run_that_was_commanded_is_streamed_too(shipped_run, tmp_path):
+    log = tmp_path / "run.tlog"
+    folder = shipped_run("paper-limited", *COMMANDED).folder
+    done = replay(folder, [parse_endpoint(str(log))], MavlinkOptions(profile="px4"), rate=None)
+    assert done.troubles == []
+    beats = [m for _, m in frames(log) if m.get_type() == "HEARTBEAT"]
+    assert {b.autopilot for b in beats} == {mavlink.MAV_AUTOPILOT_PX4}
+    assert beats[0].base_mode & mavlink.MAV_MODE_FLAG_SAFETY_ARMED
+
+
+def test_a_killed_run_is_streamed_as_far_as_it_goes(recorded, tmp_path):
+    killed = tmp_path / "killed"
+    (killed / "record.parts").mkdir(parents=True)
+    shutil.copy(recorded / "scenario.toml", killed)
+    shutil.copy(recorded / "record.parquet", killed / "record.parts" / "000000.parquet")
+    done = replay(killed, [parse_endpoint(str(tmp_path / "run.tlog"))], MavlinkOptions(), rate=None)
+    assert done.simulated == pytest.approx(4.0)
+
+
+@pytest.mark.slow
+def test_over_udp_at_the_rate_asked_for_it_answers_and_obeys_nothing(recorded, tmp_path):
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as s:
+        s.bind(("127.0.0.1", 0))
+        port = s.getsockname()[1]
+    done = []
+    with GroundLink(parse_endpoint(f"udpin:127.0.0.1:{port}")) as link:
+        endpoint = parse_endpoint(f"udpout:127.0.0.1:{port}")
+        thread = threading.Thread(target=lambda: done.append(replay(recorded, [endpoint], MavlinkOptions(), 1.0)))
+        thread.start()
+        client = Client(link)
+        assert client.find(10.0) is not None
+        version = client.request(mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION)
+        ack = client.command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, [0, 0, 0, 0, 0, 0, 0])
+        thread.join()
+    assert version is not None and ack.result == mavlink.MAV_RESULT_DENIED
+    assert done[0].wall >= 4.0
+
+
+def test_the_command_writes_a_log_and_says_so(recorded, tmp_path, capsys):
+    log = tmp_path / "run.tlog"
+    assert main(["stream", str(recorded), "--mavlink", str(log), "--rate", "max"]) == 0
+    assert "4.0 s streamed" in capsys.readouterr().out
+    assert log.stat().st_size > 10_000
+
+
+def test_what_is_no_run_is_said_in_a_line(recorded, tmp_path, capsys):
+    assert main(["stream", str(tmp_path), "--mavlink", str(tmp_path / "a.tlog")]) == 2
+    assert "holds no run (scenario.toml is missing)" in capsys.readouterr().err
+    shutil.copy(recorded / "scenario.toml", tmp_path)
+    with pytest.raises(RunError, match="holds no record"):
+        replay(tmp_path, [parse_endpoint(str(tmp_path / "b.tlog"))], MavlinkOptions())
+    assert not list(tmp_path.glob("*.tlog"))
+
+
+def test_a_record_of_something_else_is_refused(recorded, tmp_path):
+    shutil.copy(recorded / "scenario.toml", tmp_path)
+    pq.write_table(pa.table({"time": [0.0, 0.1]}), tmp_path / "record.parquet")
+    with pytest.raises(RunError, match=r"no column position\.x"):
+        replay(tmp_path, [parse_endpoint(str(tmp_path / "b.tlog"))], MavlinkOptions())
