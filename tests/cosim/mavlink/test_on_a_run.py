@@ -96,7 +96,6 @@ def test_by_hand(flight):
     assert flight.last("LOCAL_POSITION_NED").vx > 0.05
 
 
-@pytest.mark.slow
 def test_a_mission_of_regions(flight):
     flight.fly(0.1)
     places = [(0.6, 0.0, 1.0), (1.2, 0.4, 1.2)]
