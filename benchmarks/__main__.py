@@ -5,10 +5,10 @@ from __future__ import annotations
 import argparse
 from collections.abc import Sequence
 
-from benchmarks import baselines, fmu, fuzzy, law, scenes, step
+from benchmarks import baselines, fmu, fuzzy, law, mavlink, scenes, sitl, step
 from benchmarks.timing import print_rows
 
-BENCHMARKS = {"step": step, "law": law, "fmu": fmu, "fuzzy": fuzzy}
+BENCHMARKS = {"step": step, "law": law, "fmu": fmu, "fuzzy": fuzzy, "mavlink": mavlink, "sitl": sitl}
 REPEATS = 5
 
 
@@ -26,6 +26,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
         verb = verbs.add_parser(name, help=(benchmark.__doc__ or "").splitlines()[0])
         verb.add_argument("--steps", type=int, default=benchmark.STEPS, help="a repeat (default: %(default)s)")
         verb.add_argument("--repeats", type=int, default=REPEATS, help="default: %(default)s")
+        if benchmark is mavlink:
+            verb.add_argument("--datagrams", type=int, help="hostile ones a flood (default: ten a step)")
     verb = verbs.add_parser("baselines", help=(baselines.__doc__ or "").splitlines()[0])
     verb.add_argument("laws", nargs="*", metavar="LAW", help=f"of {', '.join(baselines.RANGES)} (default: all)")
     verb.add_argument(
@@ -52,7 +54,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
         baselines.main(options.laws or baselines.RANGES, options.draws, options.seed, options.workers)
     else:
         benchmark = BENCHMARKS[options.name]
-        print_rows(benchmark.measure(options.steps, options.repeats), options.repeats, benchmark.RATIO)
+        more = {"datagrams": options.datagrams} if benchmark is mavlink else {}
+        print_rows(benchmark.measure(options.steps, options.repeats, **more), options.repeats, benchmark.RATIO)
 
 
 if __name__ == "__main__":

@@ -9,19 +9,18 @@ import argparse
 import contextlib
 import logging
 import os
-import signal
 import sys
 from collections.abc import Sequence
 from importlib import metadata
 from pathlib import Path
 
-from cosim.command_line import campaigns
+from cosim.command_line import campaigns, mavlink, run, sitl
 from cosim.command_line.campaigns import INTERRUPTED
 
 _EPILOG = """examples:
   cosim run paper
   cosim run paper --set arbiter.engine=closed --set regions.SR1.gain=5000 --out runs/strong
-  cosim run my-scene.toml --mavlink udpout:127.0.0.1:14550 --rate 1
+  cosim run my-scene.toml --mavlink udpout:127.0.0.1:14550 --profile ardusub --commands
   cosim campaign scenes.jsonl --law printed --out campaigns/printed --workers 2
 """
 
@@ -37,23 +36,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("-v", "--verbose", action="store_true", help="log what happens inside")
     verbs = parser.add_subparsers(dest="verb", required=True, metavar="VERB")
 
-    run = verbs.add_parser("run", help="run a scenario and write its folder")
-    run.add_argument("scenario", help="a shipped name (see cosim list), or a TOML file")
-    run.add_argument("--out", type=Path, metavar="DIR", help="run folder (default: runs/SCENARIO-TIME)")
-    run.add_argument(
-        "--set", action="append", default=[], metavar="KEY=VALUE", dest="overrides",
-        help="change a key of the scenario, such as law.gains.k_p1=10 or regions.SR1.shape.radius=0.7; may be repeated",
-    )  # fmt: skip
-    run.add_argument("--mavlink", metavar="ENDPOINT", help="stream telemetry, such as to udpout:127.0.0.1:14550")
-    run.add_argument("--allow-remote", action="store_true", help="let telemetry leave this machine")
-    run.add_argument(
-        "--rate",
-        type=_rate,
-        default=None,
-        metavar="N|max",
-        help="simulated seconds a second at the most (default: max)",
-    )
-    run.add_argument("--no-report", action="store_true", help="leave out the report and its figures")
+    run.add_verb(verbs)
 
     report = verbs.add_parser("report", help="write summary and report of a run again, or of a killed one")
     report.add_argument("folder", type=Path, metavar="DIR", help="the run folder")
@@ -73,19 +56,9 @@ def _parser() -> argparse.ArgumentParser:
     calibrate.add_argument("--scenario", default="paper", help="scenario to fit (default: paper)")
 
     campaigns.add_verbs(verbs)
+    mavlink.add_verbs(verbs)
+    sitl.add_verbs(verbs)
     return parser
-
-
-def _rate(text: str) -> float | None:
-    if text == "max":
-        return None
-    try:
-        value = float(text)
-    except ValueError:
-        value = 0.0
-    if not 1e-3 <= value <= 1e6:
-        raise argparse.ArgumentTypeError(f"{text!r}: expected a number from 0.001 to 1e6, or max")
-    return value
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -139,23 +112,6 @@ def _log(verbose: bool) -> None:
         logging.getLogger(package).setLevel(logging.DEBUG if verbose else logging.WARNING)
 
 
-def _run(options: argparse.Namespace) -> int:
-    from cosim.report import verdict
-    from cosim.run import run_scenario
-    from cosim.scenario import load_scenario
-    from cosim.telemetry import parse_endpoint
-
-    scenario = load_scenario(options.scenario, options.overrides)
-    mavlink = parse_endpoint(options.mavlink, options.allow_remote) if options.mavlink is not None else None
-    # a polite kill leaves a readable run too
-    with contextlib.suppress(ValueError):  # which signal raises outside the main thread
-        signal.signal(signal.SIGTERM, signal.default_int_handler)
-    run = run_scenario(scenario, options.out, mavlink, options.rate, progress=True, report=not options.no_report)
-    print(verdict(run.summary))
-    print(run.folder / ("summary.json" if options.no_report else "report.html"))
-    return INTERRUPTED if run.summary["status"] == "interrupted" else 0
-
-
 def _report(options: argparse.Namespace) -> int:
     from cosim.report import verdict
     from cosim.run_folder import report_again
@@ -202,7 +158,7 @@ def _calibrate(options: argparse.Namespace) -> int:
 
 
 _VERBS = {
-    "run": _run,
+    "run": run.run,
     "report": _report,
     "list": _list,
     "show": _show,
@@ -210,4 +166,8 @@ _VERBS = {
     "calibrate": _calibrate,
     "campaign": campaigns.campaign,
     "compare": campaigns.compare,
+    "listen": mavlink.listen,
+    "stream": mavlink.stream,
+    "mavlink-check": mavlink.mavlink_check,
+    "sitl": sitl.sitl,
 }

@@ -85,6 +85,7 @@ def _ordered(scenario: Scenario) -> Iterator[Column]:
     yield Column("helm.item", "", "Item of the mission, from 0; -1 for none")
     for axis, where in zip("xyz", ("north", "east", "down"), strict=True):
         yield Column(f"target.{axis}", "m", f"Middle of the target region, {where}")
+    yield Column("target.radius", "m", "Radius of the target region if it is a sphere of its own, 0 if it is the goal")
 
 
 def _of(channels: Channels) -> list[Column]:

@@ -145,12 +145,13 @@ def places_of(story: Story) -> Iterator[Place]:
     Place
         The goal's first.
     """
+    came = {secondary.region.name for secondary in story.scenario.regions if secondary.seen}
     for region, colour in regions_of(story.scenario):
         if of_attitude(region.shape):
             continue
         shifts = shifts_of(story, region.name)
         at = -1 if region.name == "goal" else int(np.argmin(story.record[f"{region.name}.clearance"]))
-        if region.name in story.scenario.moving:
+        if region.name in story.scenario.moving and region.name not in came:
             yield Place(region, colour, shifts[0], faint=True)
             yield Place(region, colour, shifts[-1], faint=True)
         yield Place(region, colour, shifts[at], faint=False)

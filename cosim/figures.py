@@ -45,6 +45,7 @@ def drawings(story: Story) -> Iterator[Drawing]:
         ),
         ("weights", "Memberships and weights over the whole run.", over_time.weights),
         ("clearance", "Clearance to each region, negative where it is violated.", over_time.clearance),
+        ("helm", "Who steered, as it was ordered; grey where disarmed.", over_time.helm),
         ("forces", "Body force: what the law asks for, and what acts.", over_time.forces),
         ("thrusters", "Thruster forces.", over_time.thrusters),
         ("estimates", "Estimated restoring parameters against the truth (dotted).", over_time.estimates),
@@ -63,6 +64,8 @@ def drawings(story: Story) -> Iterator[Drawing]:
                 " What moved is faint where it began and ended; regions are full where they were when the vehicle had "
                 "least clearance to them."
             )
+        if name == "helm" and not story.scenario.commands.enabled:
+            continue
         if name == "lyapunov" and not story.summary["lyapunov"]:
             continue
         if name == "thrusters":

@@ -24,8 +24,12 @@ from cosim.drawing import (
     shifts_of,
     thin,
 )
+from cosim.helm.orders import MODES
 from cosim.scenario import CRITERIA, Scenario
 from cosim.signals import Array
+from cosim.summary import spans
+
+_AWAY = 1e4  # m; regions further off have not come yet
 
 
 def _axes(height: float = 2.6, rows: int = 1) -> tuple[Figure, Any]:
@@ -146,7 +150,7 @@ def clearance(story: Story) -> Figure:
         for i, (region, colour) in group:
             label = labels.get(region.name, "_")  # which legends leave out
             signal = story.record[f"{region.name}.clearance"]
-            signal = np.rad2deg(signal) if unit == "°" else signal
+            signal = np.rad2deg(signal) if unit == "°" else np.where(signal < _AWAY, signal, np.nan)
             _curves(row, story, {label: signal}, color=colour, linestyle=styles[i % 4])
         for ax in row:
             ax.set_ylim(ax.get_ylim())
@@ -156,6 +160,21 @@ def clearance(story: Story) -> Figure:
     drawn = [dict(zip(*reversed(row[0].get_legend_handles_labels()), strict=True)) for row in axes]
     handles = {label: handle for of_row in drawn for label, handle in of_row.items()}
     figure.legend(handles.values(), handles.keys(), loc="outside upper center", ncols=legend_columns(handles))
+    return figure
+
+
+def helm(story: Story) -> Figure:
+    """Draw who steers, and whether the thrusters may work."""
+    figure, (ax,) = _axes(2.0)
+    time, mode = story.record["time"], story.record["helm.mode"]
+    armed = story.record["helm.armed"] > 0.0
+    changes = [0, *(np.flatnonzero(np.diff(mode) != 0.0) + 1).tolist(), len(time) - 1]
+    for first, last in zip(changes, changes[1:], strict=False):
+        row = int(mode[first])
+        ax.broken_barh([(time[first], time[last] - time[first])], (row - 0.4, 0.8), color=CYCLE[row])
+    for start, end in spans(~armed, time):
+        ax.axvspan(start, end, color=BLACK, alpha=0.2, linewidth=0)
+    ax.set(yticks=range(len(MODES)), yticklabels=MODES, ylim=(len(MODES) - 0.4, -0.6), xlim=(0.0, float(time[-1])))
     return figure
 
 

@@ -14,7 +14,7 @@ from typing import Protocol
 
 import numpy as np
 
-from controller import LAWS, CompiledLaw, Law, VehicleState
+from controller import CompiledLaw, Law, VehicleState
 from controller.quaternion import from_axis_angle
 from cosim.actuators import Actuators
 from cosim.columns import columns_of
@@ -22,13 +22,13 @@ from cosim.helm.helm import Helm, greatest_wrench
 from cosim.helm.orders import Order
 from cosim.helm.settings import LiveSettings
 from cosim.helm.sources import OrderSource
+from cosim.law import law_of
 from cosim.lyapunov import LyapunovSignals
 from cosim.scenario import CRITERIA, Scenario
 from cosim.sensing import Sensor
 from cosim.signals import Array, Signals
 from cosim.start_values import start_values
 from cosim.surroundings import Surroundings
-from cosim.vehicle_model import vehicle_model
 from fuzzy_arbiter import Arbiter, ramp
 from plant_fmu import Plant
 
@@ -132,14 +132,25 @@ class Master:
         if self.scenario.commands.enabled:
             vehicle = self.scenario.vehicle
             reach = greatest_wrench(vehicle.thruster_matrix, vehicle.thrust_min, vehicle.thrust_max)
-            self.helm = Helm(self.scenario, self.surroundings, self.state, reach, s.view("helm.armed", 6))
+            self.helm = Helm(self.scenario, self.surroundings, self.state, reach, s.view("helm.armed", 7))
         if self.scenario.record.lyapunov:
             out = s.view("lyapunov.printed", 4)
             goal, regions, weights = self.surroundings.goal, self.surroundings.regions, self._weights_of_regions
             self._lyapunov = LyapunovSignals(self.scenario, truth, goal, regions, weights, self._estimate, out)
 
+    @property
+    def row(self) -> Array:
+        """The row of the present step, shape (n,), which cannot be written."""
+        seen = self.signals.row.view()
+        seen.flags.writeable = False
+        return seen
+
     def run(
-        self, observers: Sequence[Observer] = (), rate: float | None = None, orders: OrderSource | None = None
+        self,
+        observers: Sequence[Observer] = (),
+        rate: float | None = None,
+        orders: OrderSource | None = None,
+        awaiting: Observer | None = None,
     ) -> None:
         """Step from time 0 to the end, once, telling the observers of each step.
 
@@ -154,6 +165,8 @@ class Master:
         orders : OrderSource, optional
             What is ordered on the way, if the scenario's commands are enabled. Where nothing moves before the vehicle
             is armed, the first step waits for that order. After an order to reset, the run ends.
+        awaiting : Observer, optional
+            Told how things stand, as of step 0, while arming is awaited.
 
         Raises
         ------
@@ -161,12 +174,11 @@ class Master:
             If the FMU fails in a step.
         """
         step, last = self.scenario.time.step, self.scenario.steps
-        seen = self.signals.row.view()
-        seen.flags.writeable = False
-        self._await_arming(orders)
+        seen = self.row
+        waited = self._await_arming(orders, awaiting)
         started = time.perf_counter()
         for k in range(last + 1):
-            self.step(k, orders)
+            self.step(k, orders if k or not waited else None)
             for observer in observers:
                 observer.observe(k, seen)
             if self.helm is not None and self.helm.reset:
@@ -221,13 +233,28 @@ class Master:
         if self._sensor is not None:
             self._sensor.measure(self.signals.row[0], k % self.scenario.control_every == 0)
 
-    def _await_arming(self, orders: OrderSource | None) -> None:
-        """Follow orders at the beginning of step 0 until one arms the vehicle, or none is to come."""
+    def look(self) -> None:
+        """Fill the row with how things stand before the first step; nothing moves, and no noise is drawn."""
+        self._measured[:] = self._plant_measured
+        if self._sensor is not None:
+            self._sensor.tell_truth()
+        self._evaluate_regions()
+        if self.helm is not None:
+            self.helm.watch(0.0, float(self._seen[0]))
+
+    def _await_arming(self, orders: OrderSource | None, awaiting: Observer | None) -> bool:
+        """Follow orders before step 0 until one arms the vehicle, or none is to come; return whether it was awaited."""
         helm = self.helm
-        while helm is not None and orders is not None and not (helm.armed or helm.reset or orders.exhausted):
-            self._measure(0)
+        if helm is None or helm.armed or orders is None:
+            return False
+        while not (helm.armed or orders.exhausted):
+            self.look()
             self._heed(helm, orders.take(0))
+            helm.reset = False  # nothing has begun
+            if awaiting is not None:
+                awaiting.observe(0, self.row)
             time.sleep(_ARMING_PERIOD)
+        return True
 
     def _heed(self, helm: Helm, orders: Sequence[Order]) -> None:
         """Follow the orders of this step, and take over what was changed."""
@@ -339,30 +366,3 @@ class Master:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.close()
-
-
-def law_of(scenario: Scenario) -> CompiledLaw:
-    """Return a scenario's law, with a memory of its own.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        Which law, with which gains, for which vehicle.
-
-    Returns
-    -------
-    CompiledLaw
-        It knows the vehicle's nominal numbers: what the scenario changes in the plant is not told.
-
-    Raises
-    ------
-    LawError
-        If it cannot be set up.
-    """
-    return LAWS[scenario.law.name].for_vehicle(
-        vehicle_model(scenario.vehicle),
-        scenario.law.gains,
-        np.array(scenario.law.desired_quaternion),
-        scenario.time.control,
-        len(scenario.regions),
-    )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import shutil
 import time
 from collections import OrderedDict
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +18,7 @@ from cosim.signals import Array, Column
 RECORD = "record.parquet"
 PARTS = "record.parts"  # what a killed run leaves
 _PART_SECONDS = 1.0  # of the wall clock, after which a part is written even if it is small
+_BLOCK = 10_000  # rows that are read at once
 _KEPT = 24  # signals that a record keeps in memory
 
 
@@ -103,6 +104,8 @@ class Record:
 
     Attributes
     ----------
+    columns : tuple of Column
+        In the order of the row.
     units : dict
         Unit of each signal, by name, in the order of the columns.
 
@@ -118,7 +121,8 @@ class Record:
             schema = pq.read_schema(self._files[0])
         except (OSError, pa.ArrowException) as error:
             raise RunError(f"{self._files[0]}: cannot be read: {error}") from error
-        self.units: dict[str, str] = {f.name: (f.metadata or {}).get(b"unit", b"").decode() for f in schema}
+        self.columns = tuple(_column_of(field) for field in schema)
+        self.units: dict[str, str] = {column.name: column.unit for column in self.columns}
         self._kept: OrderedDict[str, Array] = OrderedDict()
 
     def __getitem__(self, name: str) -> Array:
@@ -135,6 +139,22 @@ class Record:
     def stack(self, names: Sequence[str]) -> Array:
         """Return several signals side by side, shape (steps, len(names))."""
         return np.column_stack([self[name] for name in names])
+
+    def blocks(self) -> Iterator[Array]:
+        """Yield all rows in their order, in blocks of shape (n, len(columns)) that fit into memory.
+
+        Raises
+        ------
+        RunError
+            If they cannot be read.
+        """
+        for file in self._files:
+            try:
+                with pq.ParquetFile(file) as parquet:
+                    for batch in parquet.iter_batches(_BLOCK):
+                        yield np.column_stack([column.to_numpy() for column in batch.columns])
+            except (OSError, pa.ArrowException) as error:
+                raise RunError(f"{file}: cannot be read: {error}") from error
 
 
 def load_record(folder: Path) -> Record:
@@ -162,6 +182,11 @@ def load_record(folder: Path) -> Record:
     if not len(record[next(iter(record.units))]):
         raise RunError(f"{folder}: the record of the run is empty")
     return record
+
+
+def _column_of(field: pa.Field) -> Column:
+    about = field.metadata or {}
+    return Column(field.name, about.get(b"unit", b"").decode(), about.get(b"description", b"").decode())
 
 
 def _column(file: Path, name: str) -> Array:

@@ -168,9 +168,12 @@ def verdict(summary: dict[str, Any]) -> str:
     ended = {
         "completed": "",
         "interrupted": f" The run was interrupted at {summary['simulated_time']:.3f} s.",
+        "reset": f" The run was reset at {summary['simulated_time']:.3f} s.",
         "killed": f" The run was killed; its record ends at {summary['simulated_time']:.3f} s.",
     }.get(summary["status"], f" The run {summary['status']}.")
-    return goal + kept + force + ended
+    orders = summary.get("orders", 0)
+    steered = f" It was given {orders} order{'s' if orders > 1 else ''} on the way." if orders else ""
+    return goal + kept + force + steered + ended
 
 
 def _broken(summary: dict[str, Any], name: str) -> str:

@@ -2,22 +2,27 @@
 
 from __future__ import annotations
 
+import itertools
 import sys
 import time
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from tqdm import tqdm
 
 from cosim.errors import RunError
+from cosim.helm import LoggedOrders, OrderQueue, RecordedOrders
 from cosim.master import Master, Observer
 from cosim.record import Recorder
-from cosim.run_folder import RunFolder, claim, conclude
+from cosim.run_folder import ORDERS, RunFolder, claim, conclude
 from cosim.scenario import Scenario
 from cosim.signals import Array
-from cosim.telemetry import Telemetry
 from plant_fmu import PlantError
+
+if TYPE_CHECKING:  # pymavlink is an extra
+    from cosim.mavlink.setup import Mavlink
+    from cosim.mavlink.thread import LinkThread
 
 _PROGRESS_STEPS = 200  # times that the bar moves
 
@@ -52,37 +57,43 @@ class _Progress:
 def run_scenario(
     scenario: Scenario,
     out: Path | None = None,
-    mavlink: tuple[str, int] | None = None,
+    mavlink: Mavlink | None = None,
     rate: float | None = None,
     progress: bool = False,
     report: bool = True,
+    orders: Path | None = None,
 ) -> Run:
     """Run a scenario and write its folder.
+
+    An order to reset ends the run and begins it again, in a folder of its own.
 
     Parameters
     ----------
     scenario : Scenario
         What to run.
     out : Path, optional
-        The run folder; it must not exist, or be empty. Default: a new one below ``runs``.
-    mavlink : (str, int), optional
-        Where to stream telemetry.
+        The run folder; it must not exist, or be empty. Default: a new one below ``runs``. After a reset it is the same
+        name with a number.
+    mavlink : Mavlink, optional
+        Where to be a MAVLink vehicle.
     rate : float, optional
         Simulated seconds a wall-clock second at the most.
     progress : bool
         Show a bar, if there is a terminal.
     report : bool
         Write the report and its figures.
+    orders : Path, optional
+        The log of an earlier run, whose orders are repeated; then none are taken from the link.
 
     Returns
     -------
     Run
-        Its ``status`` is ``"completed"``, or ``"interrupted"`` after Ctrl-C, which leaves a readable run.
+        The last one. Its ``status`` is ``"completed"``, or ``"interrupted"`` after Ctrl-C, which leaves a readable run.
 
     Raises
     ------
     RunError
-        If the folder cannot be written.
+        If the folder cannot be written, or the log of orders cannot be read.
     TelemetryError
         If the link cannot be opened.
     BuildError, LawError, DefinitionError
@@ -90,25 +101,47 @@ def run_scenario(
     PlantError
         If the FMU refuses the scenario, or fails in a step; what was recorded until then is left readable.
     """
-    with Master(scenario) as master:
-        telemetry = Telemetry(mavlink, master.signals, scenario.time.step) if mavlink else None
-        try:
-            folder = claim(out, scenario)
-            try:
-                status, wall_time, failure = _step(master, folder, telemetry, rate, progress)
-                summary = conclude(folder.path, scenario, status, wall_time, report)
-            except OSError as error:
-                raise RunError(f"{folder.path}: {error.strerror or error}") from error
-        finally:
-            if telemetry:
-                telemetry.close()
-    if failure:
-        raise failure
-    return Run(folder.path, summary)
+    recorded = _recorded(scenario, orders)
+    queue = OrderQueue()
+    link: LinkThread | None = None
+    try:
+        for attempt in itertools.count(1):
+            with Master(scenario) as master:
+                if mavlink is not None and link is None:
+                    link = mavlink.open(scenario, master.signals.columns, None if recorded else queue)
+                    link.start()
+                folder = claim(out.with_name(f"{out.name}-{attempt}") if out and attempt > 1 else out, scenario)
+                try:
+                    source = LoggedOrders(recorded or queue, folder.path / ORDERS)
+                    status, wall_time, failure = _step(master, folder, source, link, rate, progress)
+                    summary = conclude(folder.path, scenario, status, wall_time, report)
+                except OSError as error:
+                    raise RunError(f"{folder.path}: {error.strerror or error}") from error
+            if failure:
+                raise failure
+            if status != "reset" or recorded:
+                return Run(folder.path, summary)
+    finally:
+        if link:
+            link.close()
+    raise AssertionError("unreachable")
+
+
+def _recorded(scenario: Scenario, orders: Path | None) -> RecordedOrders | None:
+    if orders is None:
+        return None
+    if not scenario.commands.enabled:
+        raise RunError(f"{orders}: orders are given, expected a scenario with commands.enabled")
+    return RecordedOrders(orders)
 
 
 def _step(
-    master: Master, folder: RunFolder, telemetry: Telemetry | None, rate: float | None, progress: bool
+    master: Master,
+    folder: RunFolder,
+    orders: LoggedOrders,
+    link: LinkThread | None,
+    rate: float | None,
+    progress: bool,
 ) -> tuple[str, float, PlantError | None]:
     """Step through the run and close its record; return how it ended, what it took [s], and why it failed."""
     status = "completed"
@@ -119,11 +152,11 @@ def _step(
     try:
         recorder = Recorder(folder.path, master.signals.columns)
         bar = _Progress(master.scenario) if progress and sys.stderr else None
-        if telemetry:
-            telemetry.start()
-        observers: list[Observer] = [o for o in (recorder, telemetry, bar) if o is not None]
+        observers: list[Observer] = [o for o in (recorder, link, bar) if o is not None]
         started = time.perf_counter()
-        master.run(observers, rate)
+        master.run(observers, rate, orders, awaiting=link)
+        if master.helm is not None and master.helm.reset:
+            status = "reset"
     except KeyboardInterrupt:
         status = "interrupted"
     except PlantError as error:

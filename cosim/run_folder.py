@@ -13,6 +13,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
+from cosim.came import as_it_came
 from cosim.errors import RunError
 from cosim.record import PARTS, load_record
 from cosim.report import write_report
@@ -21,6 +22,7 @@ from cosim.summary import summarise
 
 SCENARIO = "scenario.toml"
 SUMMARY = "summary.json"
+ORDERS = "orders.jsonl"
 
 
 @dataclass(frozen=True)
@@ -32,7 +34,7 @@ class RunFolder:
 
     def discard(self) -> None:
         """Take away all that a run without a record has made. May be called twice."""
-        for name in (SCENARIO, VEHICLE_COPY):
+        for name in (SCENARIO, VEHICLE_COPY, ORDERS):
             (self.path / name).unlink(missing_ok=True)
         shutil.rmtree(self.path / PARTS, ignore_errors=True)
         if self.created:
@@ -125,13 +127,20 @@ def conclude(path: Path, scenario: Scenario, status: str, wall_time: float | Non
         If the record cannot be read.
     """
     record = load_record(path)
+    scenario = as_it_came(scenario, record)
     summary = summarise(scenario, record, status, wall_time)
+    if scenario.commands.enabled:
+        summary["orders"] = _lines(path / ORDERS)
     scratch = path / f".{SUMMARY}-{os.getpid()}"
     scratch.write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
     scratch.replace(path / SUMMARY)
     if report:
         write_report(path, scenario, record, summary)
     return summary
+
+
+def _lines(file: Path) -> int:
+    return len(file.read_bytes().splitlines()) if file.exists() else 0
 
 
 def report_again(path: Path) -> dict[str, Any]:
@@ -159,7 +168,8 @@ def report_again(path: Path) -> dict[str, Any]:
     try:
         before = json.loads((path / SUMMARY).read_text(encoding="utf-8"))
         status, wall_time = str(before["status"]), before["wall_time"]
-        scenario = dataclasses.replace(scenario, name=str(before["scenario"]))
+        law = dataclasses.replace(scenario.law, name=str(before["law"]))  # or who flew in its place
+        scenario = dataclasses.replace(scenario, name=str(before["scenario"]), law=law)
     except FileNotFoundError:
         pass
     except (OSError, ValueError, KeyError, TypeError) as error:

@@ -30,6 +30,12 @@ class Sensor:
         self._deviation: Array = np.repeat([sensing.position_noise, sensing.velocity_noise], 3)
         self._noise: Array = np.zeros(6)
 
+    def tell_truth(self) -> None:
+        """Write the true state, as before the first measurement."""
+        self._told.position[:] = self._truth.position
+        self._told.quaternion[:] = self._truth.quaternion
+        self._told.velocity_body[:] = self._truth.velocity_body
+
     def measure(self, time: float, anew: bool) -> None:
         """Write what is told at a time.
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -66,7 +67,11 @@ def summarise(scenario: Scenario, record: Record, status: str, wall_time: float 
     settled = bool(visits and inside[-1] and time[-1] - visits[-1][0] >= SETTLED_FOR)
     names = [secondary.region.name for secondary in scenario.regions]
     overlap = [record[f"{names[i]}.clearance"] < 0.0 for i in scenario.intersection]
-    acted = slice(0, scenario.steps)  # the last row of a whole run decides, but acts no more
+    period = (
+        float(time[1] - time[0]) if len(time) > 1 else scenario.time.step
+    )  # of the record, which may be thinned out
+    every = round(period / scenario.time.step)
+    acted = slice(0, math.ceil(scenario.steps / every))  # the last row of a whole run decides, but acts no more
     force = np.linalg.norm(record.stack([f"actuation.{axis}" for axis in "XYZ"]), axis=1)[acted]
     asked = np.linalg.norm(record.stack([f"command.{axis}" for axis in "XYZ"]), axis=1)
     speed = np.linalg.norm(record.stack([f"velocity.{axis}" for axis in "uvw"]), axis=1)
@@ -101,22 +106,22 @@ def summarise(scenario: Scenario, record: Record, status: str, wall_time: float 
         "max_speed": float(speed.max()),
         "weights_above_half": int((weights > 0.5).sum(axis=1).max()),
         "weights_sum_max": float(weights.sum(axis=1).max()),
-        "effort": float(force.sum() * scenario.time.step),
-        "saturated_time": _saturated_time(scenario, record, acted),
+        "effort": float(force.sum() * period),
+        "saturated_time": _saturated_time(record, acted, period),
         "estimate_final": [float(record[f"estimate.phi{i}"][-1]) for i in range(1, 5)],
         "estimate_true": scenario.true_restoring_parameters.tolist(),
         "estimate_lowest": [float(record[f"estimate.phi{i}"].min()) for i in range(1, 5)],
         "estimate_highest": [float(record[f"estimate.phi{i}"].max()) for i in range(1, 5)],
         "lyapunov": summarise_lyapunov(record),
-        "steps": len(time) - 1,
+        "steps": round(simulated / scenario.time.step),
         "wall_time": wall_time,
         "real_time_factor": simulated / wall_time if wall_time else None,
     }
 
 
-def _saturated_time(scenario: Scenario, record: Record, acted: slice) -> float:
+def _saturated_time(record: Record, acted: slice, period: float) -> float:
     """How long any actuator was asked for more than it gives [s]."""
     of_all = ("wrench_saturated", "allocation_saturated")
     flags = [name for name in record.units if name.startswith("thrust_saturated[") or name in of_all]
     any_cut = np.logical_or.reduce([record[name][acted] > 0.0 for name in flags])
-    return float(np.count_nonzero(any_cut) * scenario.time.step)
+    return float(np.count_nonzero(any_cut) * period)

@@ -25,7 +25,7 @@ class _Target:
     packed: PackedRegions  # of this region alone
     middle: Array  # (3,) m, NED: of its shape as packed
     origin: Array  # (3,) m, NED: how far it would have been from there at time 0, had it always moved as it does now
-    of_scenario: bool  # of the scenario's shape
+    radius: float  # m, of a sphere; 0 for the shape of the scenario's goal
 
 
 class Surroundings:
@@ -145,6 +145,11 @@ class Surroundings:
         middle: Array = self._target.middle + self.goal.shifts[0]
         return middle
 
+    @property
+    def target_radius(self) -> float:
+        """Radius of the region to be reached [m], 0 if it has the shape of the scenario's goal."""
+        return self._target.radius
+
     def aim(self, position: Vector3, radius: float | None, velocity: Vector3 = _AT_REST, time: float = 0.0) -> None:
         """Put the region to be reached somewhere.
 
@@ -176,9 +181,9 @@ class Surroundings:
         """Return a target at rest with its middle at a position, as a sphere or in the shape of the scenario's goal."""
         if radius is None:
             origin = np.subtract(position, self._middle)
-            return _Target(pack([self._goal_region]), np.array(self._middle), origin, True)
+            return _Target(pack([self._goal_region]), np.array(self._middle), origin, 0.0)
         sphere = dataclasses.replace(self._goal_region, shape=Sphere(position, radius))
-        return _Target(pack([sphere]), np.array(position), np.zeros(3), False)
+        return _Target(pack([sphere]), np.array(position), np.zeros(3), radius)
 
     # ---- changed from outside ----
 
@@ -194,7 +199,7 @@ class Surroundings:
             return
         self._goal_region = dataclasses.replace(self._goal_region, shape=shape)
         for target in (self._reached, self._target):
-            if target.of_scenario:
+            if not target.radius:
                 self._reshape(target.packed, 0, shape)
 
     @staticmethod

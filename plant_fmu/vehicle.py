@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from plant_fmu.autopilot import Autopilot, checked_autopilot
 from plant_fmu.errors import TableError, VehicleError
 from plant_fmu.tables import decode, read_toml
 
@@ -104,6 +105,7 @@ class _File:
     hydrodynamics: Hydrodynamics
     thrusters: Thrusters
     hull: Hull = Hull()
+    autopilot: Autopilot | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,6 +132,7 @@ class Vehicle:
     thrust_dead_band: NDArray[np.float64]  # (n,)
     thrust_curve: NDArray[np.float64]  # (n,)
     hull_radius: float  # m
+    autopilot: Autopilot | None = None  # how one drives the thrusters; a channel and a sign for each
 
     @property
     def n_thrusters(self) -> int:
@@ -248,10 +251,11 @@ def _check(file: _File, where: str) -> Vehicle:
         thrust_dead_band=per_thruster(thrusters.dead_band, "dead_band"),
         thrust_curve=per_thruster(thrusters.curve, "curve"),
         hull_radius=file.hull.radius,
+        autopilot=file.autopilot and checked_autopilot(file.autopilot, n, require),
     )
 
     for key, value in vars(vehicle).items():
-        if not isinstance(value, str):
+        if not isinstance(value, str | Autopilot | None):
             require(bool(np.all(np.isfinite(value))), _KEYS.get(key, key), "not finite", "finite numbers")
             if isinstance(value, np.ndarray):
                 value.setflags(write=False)

@@ -51,8 +51,8 @@ class Helm:
         The vehicle as the law is told.
     reach : ndarray, shape (6,)
         Greatest wrench along and about each body axis [N, N m], which full sticks are parts of.
-    out : ndarray, shape (6,)
-        Receives armed, mode, item of the mission (-1 for none), and the target's middle [m, NED].
+    out : ndarray, shape (7,)
+        Receives armed, mode, item of the mission (-1 for none), and the target's middle [m, NED] and radius [m].
 
     Attributes
     ----------
@@ -220,7 +220,7 @@ class Helm:
                 self._aim_at_item()
                 went_on = True
         self._out[0], self._out[1], self._out[2] = self.armed, MODES.index(self.mode), self._item
-        self._out[3:] = self._surroundings.target
+        self._out[3:6], self._out[6] = self._surroundings.target, self._surroundings.target_radius
         return went_on
 
 

@@ -38,8 +38,9 @@ _SECOND = 1_000_000
 class Autopilot:
     """The running co-simulation as a MAVLink vehicle.
 
-    Streams go by simulated time, which is the time since boot; the watch over stations goes by the wall clock, and so
-    do the streams while no snapshot comes. Nothing that comes raises. Whoever drives it calls it from one thread.
+    Streams go by simulated time, and so does the time since boot, to which only the time is added for which arming was
+    awaited. The watch over stations goes by the wall clock, and so do the streams while simulated time stands still.
+    Nothing that comes raises. Whoever drives it calls it from one thread.
 
     Parameters
     ----------
@@ -90,7 +91,8 @@ class Autopilot:
         for service in self._services:
             self._handlers.update(service.messages)
         self._clock_us = 0  # of the streams: it only goes on
-        self._boot_us: int | None = None  # of the last snapshot
+        self._last_us: int | None = None  # simulated time of the last snapshot
+        self._awaiting = False  # arming, before anything moves
         self._moved = False  # a snapshot came since the last tick
         self._moved_at = -math.inf
         self._beaten_at: dict[Outlet, float] = {}
@@ -125,13 +127,14 @@ class Autopilot:
         """
         vessel = self._vessel
         vessel.look(row)
-        boot = vessel.view.boot_us
-        if self._boot_us is not None and boot < self._boot_us:
+        now = vessel.view.simulated_us
+        if self._last_us is not None and now < self._last_us:
             self._restart()
             vessel.look(row)
-        self._clock_us += max(0, boot - (boot if self._boot_us is None else self._boot_us))
-        self._boot_us = boot
-        self._moved = True
+        self._awaiting = now == self._last_us == 0  # the same snapshot comes again and again
+        self._moved |= now != self._last_us
+        self._clock_us += max(0, now - (now if self._last_us is None else self._last_us))
+        self._last_us = now
         self._events.watch()
         for service in self._services:
             service.looked()
@@ -191,6 +194,8 @@ class Autopilot:
             self._moved, self._moved_at = False, now
         elif now - self._moved_at >= _STILL:
             self._clock_us += round(since * _SECOND)
+            if self._awaiting:
+                vessel.waited_us += round(since * _SECOND)
             self._advance()
         for service in self._services:
             service.tick()

@@ -67,6 +67,8 @@ class Vessel:
         Makes messages.
     view : View
         The latest snapshot.
+    waited_us : int
+        For how long arming is awaited [µs], which counts as time since boot.
     seen : bool
         Whether a snapshot came at all.
     links : list of Outlet
@@ -119,6 +121,7 @@ class Vessel:
 
     def restart(self) -> None:
         """Forget what belongs to a run, as at its beginning."""
+        self.waited_us = 0
         self.view = View(self.layout, self.layout.first_row(self.scenario))
         self.seen = False
         self.settings = LiveSettings(self.scenario)
@@ -155,7 +158,7 @@ class Vessel:
 
     def look(self, row: Array) -> None:
         """Take the next snapshot."""
-        self.view, self.seen = View(self.layout, row), True
+        self.view, self.seen = View(self.layout, row, self.waited_us), True
         if self._wished is not None and self._wished[1] == self.view.mode:
             self._wished = None
 

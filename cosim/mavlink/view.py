@@ -94,10 +94,12 @@ class View:
         Of the row.
     row : ndarray, shape (n,)
         Of a step; copied.
+    waited_us : int
+        For how long arming was awaited before simulated time began [µs].
     """
 
-    def __init__(self, layout: Layout, row: Array) -> None:
-        self._layout, self._row = layout, row.tolist()
+    def __init__(self, layout: Layout, row: Array, waited_us: int = 0) -> None:
+        self._layout, self._row, self._waited_us = layout, row.tolist(), waited_us
 
     def number(self, name: str, otherwise: float = 0.0) -> float:
         """Return a column's value, or something else where the row has no such column."""
@@ -114,6 +116,11 @@ class View:
 
     @cached_property
     def boot_us(self) -> int:
+        """Time since boot [µs]: what was waited, and simulated time, unless that is no number."""
+        return self._waited_us + self.simulated_us
+
+    @cached_property
+    def simulated_us(self) -> int:
         """Simulated time [µs]; 0 if it is no number."""
         time = self._row[0]
         return round(time * _MICRO) if 0.0 <= time <= _LONGEST else 0

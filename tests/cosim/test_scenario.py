@@ -27,7 +27,7 @@ def saved(tmp_path, text, name="mine.toml"):
 def test_shipped_scenarios_load():
     assert shipped_scenarios() == [
         "dense-field", "depth-transit", "docking", "moving-obstacle", "paper", "paper-calibrated", "paper-deployable",
-        "paper-limited", "pipe-inspection",
+        "paper-limited", "pipe-inspection", "sitl",
     ]  # fmt: skip
     for name in shipped_scenarios():
         assert load_scenario(name).title

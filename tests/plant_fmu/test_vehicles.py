@@ -1,10 +1,13 @@
 """The shipped vehicles: what was published, turned here by other means, and what any sound vehicle does."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
 from plant_fmu import VehicleError, load_vehicle, shipped_vehicles
+from plant_fmu.build import neutral_members
 from tests.plant_fmu.test_build import written
 
 VEHICLES = shipped_vehicles()
@@ -60,6 +63,13 @@ def test_rights_itself(name, axis, make_slave):
     rest = np.mean(angles[-200:])
     assert abs(rest) < np.radians(5)
     assert np.ptp(angles[-200:]) < 0.5 * np.ptp(angles[:200])
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_how_an_autopilot_drives_it_changes_no_byte_of_the_fmu(fmi):
+    vehicle = load_vehicle("bluerov2_heavy")
+    assert vehicle.autopilot
+    assert neutral_members(dataclasses.replace(vehicle, autopilot=None), fmi) == neutral_members(vehicle, fmi)
 
 
 def test_wu_is_what_others_quote():

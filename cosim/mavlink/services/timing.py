@@ -11,7 +11,7 @@ _NANO = 1000  # ns in a µs
 
 
 class Timing(Service):
-    """Answers with simulated time, which is the time since boot."""
+    """Answers with the time since boot."""
 
     def __init__(self, vessel: Vessel) -> None:
         super().__init__(vessel)
@@ -19,7 +19,7 @@ class Timing(Service):
 
     def _synchronise(self, sender: Sender, message: Any) -> None:
         if message.tc1 == 0:
-            boot = self.vessel.view.boot_us * _NANO
+            boot = max(1, self.vessel.view.boot_us * _NANO)  # 0 would be a request
             sender.link.send(self.vessel.make("TIMESYNC", boot, message.ts1))
 
     def _ping(self, sender: Sender, message: Any) -> None:

@@ -1,0 +1,247 @@
+"""What MAVLink costs: a message, a step beside ordinary traffic, and a step under a flood of hostile datagrams."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import socket
+import statistics
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from benchmarks.hostile import hostile_datagrams
+from benchmarks.timing import Row, summary, time_calls
+from cosim.master import Master
+from cosim.mavlink.channels.udp import UdpIn, UdpOut
+from cosim.mavlink.dialect import dialect
+from cosim.mavlink.framing import Counts, Gate
+from cosim.mavlink.link import Link, Signer
+from cosim.mavlink.outlet import Outlet
+from cosim.mavlink.signing import SigningClock
+from cosim.mavlink.thread import LinkThread
+from cosim.scenario import load_scenario
+from cosim.signals import Array
+
+STEPS = 20_000
+RATIO = "x first"  # of the median to that of the row that it is compared with
+DATAGRAMS_PER_STEP = 10  # of STEPS, in a flood
+_MESSAGES = 850.0  # /s of the wall clock: seventeen streams at 50 Hz
+_SOURCE = (1, 1)
+_PACE = 1000.0  # steps/s, of the paced runs
+
+
+class Seventeen:
+    """A vehicle that sends 850 messages a second of the wall clock, whatever the run does."""
+
+    def __init__(self) -> None:
+        mavlink = dialect()
+        self._links: list[Outlet] = []
+        self._sent = 0
+        self._began = time.monotonic()
+        self._message: Callable[[int], Any] = lambda ms: mavlink.MAVLink_attitude_message(ms, 0.1, 0.2, 0.3, 0, 0, 0)
+
+    def attach(self, link: Outlet) -> None:
+        """Begin to send on a link."""
+        self._links.append(link)
+
+    def observe(self, row: Array) -> None:
+        """Have nothing to say about a row."""
+
+    def receive(self, link: Outlet, message: Any, now: float) -> None:
+        """Answer, as to a request for a parameter."""
+        link.send(self._message(0))
+
+    def tick(self, now: float) -> None:
+        """Send what is due."""
+        while self._sent < (now - self._began) * _MESSAGES:
+            self._sent += 1
+            for link in self._links:
+                link.send(self._message(self._sent))
+
+    def close(self, now: float) -> None:
+        """End."""
+
+
+def measure(steps: int, repeats: int, datagrams: int | None = None) -> list[Row]:
+    """Time messages, steps beside them, and steps under a flood.
+
+    Parameters
+    ----------
+    steps, repeats : int
+        Steps a repeat, and repeats.
+    datagrams : int, optional
+        Hostile ones a flood; default: ten a step.
+
+    Returns
+    -------
+    list of Row
+        For the table.
+    """
+    count = datagrams or DATAGRAMS_PER_STEP * steps
+    return [*_messages(steps, repeats), *_beside_traffic(steps, repeats), *_under_flood(count, steps, repeats)]
+
+
+# ---- a message ----
+
+
+def _messages(calls: int, repeats: int) -> list[Row]:
+    mavlink = dialect()
+    attitude = mavlink.MAVLink_attitude_message(1, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6)
+    odometry = mavlink.MAVLink_odometry_message(
+        1, 1, 12, 1.5, 2.5, 3.5, [1.0, 0.0, 0.0, 0.1], *[0.5] * 6, [0.25] * 21, [0.75] * 21, 0, 8, 100
+    )
+    first, rows = "message: encode and send ATTITUDE", []
+    with _sink() as port:
+        plain, signed = _link(port), _link(port, Signer(bytes(32), SigningClock(), 0))
+        works: dict[str, Callable[[], object]] = {
+            first: lambda: plain.send(attitude),
+            "message: the same, signed": lambda: signed.send(attitude),
+            "message: encode and send ODOMETRY": lambda: plain.send(odometry),
+        }
+        gate = Gate(Counts(), _SOURCE)
+        frames = {"heeded": attitude.pack(mavlink.MAVLink(None, 255, 190)), "random": next(hostile_datagrams(1, 0))}
+        for name, frame in frames.items():
+            works[f"message: check and decode, {name}"] = lambda frame=frame: list(gate.datagram(frame))
+        for name, work in works.items():
+            rows.append(Row(name, time_calls(work, calls, repeats), first))
+        plain.channel.close()
+        signed.channel.close()
+    return rows
+
+
+# ---- a step beside ordinary traffic ----
+
+
+def _beside_traffic(steps: int, repeats: int) -> list[Row]:
+    """Time runs at full speed without and with a link, one after the other, so that both see the same noise."""
+    alone, beside = [], []
+    with _sink() as port:
+        for _ in range(repeats):
+            alone.append(_run(steps, None))
+            beside.append(_run(steps, port))
+    first, second = "step: no link", f"step: {_MESSAGES:.0f} messages/s"
+    lost = statistics.median(b / a - 1.0 for a, b in zip(alone, beside, strict=True))
+    return [
+        Row(first, summary(alone), first),
+        Row(second, summary(beside), first),
+        Row(f"{second}, lost", f"{lost:.2%}, median of pairs; not timed by itself", first),
+    ]
+
+
+def _run(steps: int, port: int | None) -> float:
+    """Return microseconds a step of the paper's scenario, with a link to a port if there is one."""
+    scenario = load_scenario("paper", ["arbiter.engine=closed", f"time.duration={steps / 1000}"])
+    with Master(scenario) as master:
+        links = None
+        if port is not None:
+            links = LinkThread(Seventeen(), [_link(port)], scenario.time.step)
+            links.start()
+        before = time.perf_counter()
+        master.run([] if links is None else [links])
+        taken = time.perf_counter() - before
+        if links is not None:
+            links.close()
+    return taken / scenario.steps * 1e6
+
+
+# ---- a step under a flood ----
+
+
+def _under_flood(datagrams: int, steps: int, repeats: int) -> list[Row]:
+    """Time each step, from when it was due to when it was done, of paced runs and of runs at full speed."""
+    rows = []
+    grown, looked, errors = 0.0, [], 0
+    for pace, name in ((_PACE, f"step at {_PACE:.0f}/s"), (None, "step at full speed")):
+        found: dict[str, list[Array]] = {"link": [], "flood": []}
+        for repeat in range(repeats):
+            for case, count in (("link", 0), ("flood", datagrams)):
+                before = _resident()
+                times, link, failures = _flooded(count, steps, pace, repeat)
+                found[case].append(times)
+                if count:
+                    grown = max(grown, _resident() - before) if repeat else grown  # the first one fills caches
+                    looked.append(_came(link.counts) / count)
+                    errors += failures
+        first = f"{name}, link: median"
+        for case, all_times in found.items():
+            for quantile, word in ((0.5, "median"), (0.999, "99.9th percentile")):
+                timing = summary([float(np.quantile(times, quantile)) for times in all_times])
+                rows.append(Row(f"{name}, {case}: {word}", timing, first))
+    told = f"{datagrams} datagrams each, {statistics.median(looked):.1%} looked at, {errors} errors, "
+    rows.append(Row("floods", f"{told}{grown / 1e6:+.1f} MB of memory; not timed", first))
+    return rows
+
+
+def _flooded(datagrams: int, steps: int, pace: float | None, seed: int) -> tuple[Array, Link, int]:
+    """Step beside a link for as long as a flood of it takes, if there is one, or for so many steps.
+
+    Returns
+    -------
+    (array, Link, int)
+        Microseconds of each step from when it was due, the link, and errors in its thread.
+    """
+    scenario = load_scenario("paper", ["arbiter.engine=closed", "time.duration=1000"])
+    channel = UdpIn("127.0.0.1", 0)
+    link = Link("flooded", channel, Gate(Counts(), _SOURCE), _SOURCE)
+    times = []
+    with Master(scenario) as master, _attacker(channel.port, datagrams, seed) as under_way:
+        links = LinkThread(Seventeen(), [link], scenario.time.step)
+        links.start()
+        due = time.perf_counter()
+        for k in range(scenario.steps):
+            if pace is not None:
+                due = max(due + 1.0 / pace, time.perf_counter())
+                time.sleep(max(0.0, due - time.perf_counter()))
+            else:
+                due = time.perf_counter()
+            master.step(k)
+            links.observe(k, master.signals.row)
+            times.append(time.perf_counter() - due)
+            if not under_way(k, steps):
+                break
+        links.close()
+    return np.array(times[1:]) * 1e6, link, sum(links.failures.values())
+
+
+@contextlib.contextmanager
+def _attacker(port: int, datagrams: int, seed: int) -> Iterator[Callable[[int, int], bool]]:
+    """Yield whether to go on after a step: while another process floods a port, or, if none does, for so many steps."""
+    if not datagrams:
+        yield lambda k, steps: k < steps
+        return
+    command = [sys.executable, "-m", "benchmarks.hostile", str(port), str(datagrams), str(seed)]
+    with subprocess.Popen(command, cwd=Path(__file__).parents[1], stdout=subprocess.PIPE) as process:
+        assert process.stdout is not None
+        process.stdout.readline()  # it has prepared, and begins
+        yield lambda k, steps: k % 16 > 0 or process.poll() is None
+
+
+def _came(counts: Counts) -> int:
+    return sum(getattr(counts, name) for name in counts.__slots__)
+
+
+def _resident() -> float:
+    """Return the memory of this process [bytes], 0 where the system does not tell."""
+    try:
+        pages = int(Path("/proc/self/statm").read_text().split()[1])
+    except OSError:
+        return 0.0
+    return float(pages * os.sysconf("SC_PAGE_SIZE"))
+
+
+def _link(port: int, signer: Signer | None = None) -> Link:
+    return Link("benchmark", UdpOut("127.0.0.1", port), Gate(Counts(), _SOURCE), _SOURCE, signer=signer)
+
+
+@contextlib.contextmanager
+def _sink() -> Iterator[int]:
+    """Yield a port whose datagrams nobody reads."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sink:
+        sink.bind(("127.0.0.1", 0))
+        yield sink.getsockname()[1]

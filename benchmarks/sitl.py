@@ -1,0 +1,80 @@
+"""What a frame of an autopilot in lockstep costs, over loopback, against a stand-in in a process of its own."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+
+from benchmarks import sitl_pilot
+from benchmarks.sitl_pilot import HEAD, MAGIC, PULSES, RATE, WARMING
+from benchmarks.timing import Row, Timing, summary, time_calls
+from cosim.sitl import wire
+from cosim.sitl.flights import FlightOptions, Flights
+from cosim.sitl.law import law_of_pwm
+from cosim.sitl.server import JsonServer
+
+STEPS = 12_000
+RATIO = "x FMU"  # of the median to that of the plant's step
+
+
+def measure(steps: int, repeats: int) -> list[Row]:
+    """Time the parts of a frame, and whole frames as the stand-in sees them.
+
+    Parameters
+    ----------
+    steps, repeats : int
+        Frames a repeat, and repeats.
+
+    Returns
+    -------
+    list of Row
+        For the table.
+    """
+    rows: list[Row] = []
+
+    def add(name: str, timing: Timing) -> None:
+        rows.append(Row(name, timing, rows[0].name if rows else name))
+
+    with tempfile.TemporaryDirectory() as folder:
+        flights = Flights(FlightOptions(out=Path(folder) / "run", report=False), "ardupilot", law_of_pwm)
+        flight = flights.begin(RATE)
+        packet = HEAD.pack(MAGIC, RATE, 7) + PULSES
+        motion = flight.step()
+        decoded = wire.decode(packet)
+        assert decoded is not None
+        outputs = decoded.pwm
+
+        def add_calls(name: str, work: Callable[[], object]) -> None:
+            add(name, time_calls(work, steps, repeats))
+
+        add_calls("FMU: one step", lambda: flight._master.plant.step(1.0 / RATE))
+        add_calls("packet read", lambda: wire.decode(packet))
+        add_calls("pulses to forces", lambda: flights.law.take(outputs))
+        add_calls("master's step, record at 100 Hz, motion", flight.step)
+        add_calls("answer written", lambda: wire.encode(motion))
+        flights.end("ended: measured")
+    for what, record_rate in (("record at 100 Hz", 100.0), ("every step recorded", float(RATE))):
+        timing = _whole(steps, repeats, record_rate)
+        add(f"whole frame, {what}: {1e6 / timing.median:.0f} frames/s", timing)
+    return rows
+
+
+def _whole(steps: int, repeats: int, record_rate: float) -> Timing:
+    """Time whole flights: the server here, the stand-in in another process, which takes the time."""
+    found = []
+    overrides = (f"time.step={1.0 / RATE!r}", f"time.duration={(WARMING + steps) / RATE!r}")
+    for _ in range(repeats):
+        with tempfile.TemporaryDirectory() as folder:
+            options = FlightOptions(
+                overrides=overrides, out=Path(folder) / "run", record_rate=record_rate, report=False
+            )  # fmt: skip
+            server = JsonServer(Flights(options, "ardupilot", law_of_pwm), ("127.0.0.1", 0), timeout=10.0)
+            command = [sys.executable, sitl_pilot.__file__, str(server.address[1]), str(steps)]
+            with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as pilot:
+                server.serve()
+                printed, _ = pilot.communicate(timeout=60.0)
+            found.append(float(printed) / steps * 1e6)
+    return summary(found)

@@ -1,0 +1,143 @@
+"""Flags of the verbs that are a MAVLink vehicle: where it is seen, as what, and whom it heeds."""
+
+from __future__ import annotations
+
+import argparse
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from cosim.errors import TelemetryError
+from cosim.mavlink.options import LOSS_ACTIONS, PROFILES, MavlinkOptions
+
+if TYPE_CHECKING:
+    from cosim.mavlink.endpoint import Endpoint
+
+_GREATEST_TIMEOUT = 3600.0  # s
+
+
+def add_link_flags(parser: argparse.ArgumentParser, commands: bool = False, required: bool = False) -> None:
+    """Add the flags to a verb.
+
+    Parameters
+    ----------
+    parser : argparse.ArgumentParser
+        Of the verb.
+    commands : bool
+        Whether what the verb runs can be commanded at all.
+    required : bool
+        Whether there must be an endpoint.
+    """
+    usual = MavlinkOptions()
+    parser.add_argument(
+        "--mavlink", action="append", default=[], metavar="ENDPOINT", required=required,
+        help="be a MAVLink vehicle there, such as udpout:127.0.0.1:14550, tcp:127.0.0.1:5760 or a file ending in "
+        ".tlog; may be repeated",
+    )  # fmt: skip
+    parser.add_argument(
+        "--profile", choices=PROFILES, default=usual.profile,
+        help=f"as what the vehicle shows itself (default: {usual.profile})",
+    )  # fmt: skip
+    parser.add_argument("--allow-remote", action="store_true", help="let the link leave this machine")
+    parser.add_argument(
+        "--signing-key", type=Path, metavar="FILE",
+        help="sign with the key in this file, and heed nothing that is not signed with it",
+    )  # fmt: skip
+    parser.add_argument(
+        "--allow-system", type=_systems, metavar="ID[,ID]", help="heed these system ids alone (default: all)"
+    )
+    parser.add_argument(
+        "--system-id", type=_system, default=usual.system_id, metavar="N",
+        help=f"of the vehicle (default: {usual.system_id})",
+    )  # fmt: skip
+    parser.add_argument(
+        "--origin", type=_origin, default=usual.origin, metavar="LAT,LON",
+        help=f"where position 0 is on the globe, in degrees (default: {usual.origin[0]:g},{usual.origin[1]:g}; "
+        "a negative latitude as --origin=-33.9,18.4)",
+    )  # fmt: skip
+    parser.set_defaults(commands=False, await_arm=False, link_loss=None, link_timeout=None)
+    if commands:
+        _add_command_flags(parser, usual)
+
+
+def _add_command_flags(parser: argparse.ArgumentParser, usual: MavlinkOptions) -> None:
+    parser.add_argument("--commands", action="store_true", help="heed commands; without it, the link only shows")
+    parser.add_argument("--await-arm", action="store_true", help="nothing moves before the vehicle is armed")
+    parser.add_argument(
+        "--link-loss", choices=LOSS_ACTIONS,
+        help=f"what to do when the ground station that commands falls silent (default: {usual.loss_action})",
+    )  # fmt: skip
+    parser.add_argument(
+        "--link-timeout", type=_timeout, metavar="S",
+        help=f"seconds of the wall clock that count as silence (default: {usual.loss_timeout:g})",
+    )  # fmt: skip
+
+
+def links_from(options: argparse.Namespace) -> tuple[list[Endpoint], MavlinkOptions]:
+    """Return what the flags say.
+
+    Parameters
+    ----------
+    options : argparse.Namespace
+        Of a verb that has the flags.
+
+    Returns
+    -------
+    list of Endpoint
+        Where the vehicle is to be seen; nothing is opened yet.
+    MavlinkOptions
+        As what, and whom it heeds.
+
+    Raises
+    ------
+    TelemetryError
+        If an endpoint is none, or leaves this machine without leave, the key cannot be read, or a flag stands without
+        the one that it needs.
+    """
+    from cosim.mavlink.endpoint import parse_endpoint
+    from cosim.mavlink.signing import read_key
+
+    for name in ("await_arm", "link_loss", "link_timeout"):
+        if getattr(options, name) and not options.commands:
+            raise TelemetryError(f"--{name.replace('_', '-')}: expected --commands with it")
+    usual = MavlinkOptions()
+    return [parse_endpoint(text, options.allow_remote) for text in options.mavlink], MavlinkOptions(
+        profile=options.profile,
+        commands=options.commands,
+        key=read_key(options.signing_key) if options.signing_key else None,
+        allowed_systems=options.allow_system,
+        system_id=options.system_id,
+        origin=options.origin,
+        loss_action=options.link_loss or usual.loss_action,
+        loss_timeout=options.link_timeout or usual.loss_timeout,
+    )
+
+
+def _system(text: str) -> int:
+    if not (text.isdecimal() and 1 <= int(text) <= 255):
+        raise argparse.ArgumentTypeError(f"{text!r}: expected a whole number from 1 to 255")
+    return int(text)
+
+
+def _systems(text: str) -> frozenset[int]:
+    return frozenset(_system(part.strip()) for part in text.split(","))
+
+
+def _origin(text: str) -> tuple[float, float]:
+    try:
+        latitude, longitude = (float(part) for part in text.split(","))
+    except ValueError:
+        latitude = longitude = math.nan
+    if not (abs(latitude) <= 90.0 and abs(longitude) <= 180.0):
+        raise argparse.ArgumentTypeError(f"{text!r}: expected degrees of latitude and longitude, such as 55.9,-3.3")
+    return latitude, longitude
+
+
+def _timeout(text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = 0.0
+    if not 0.1 <= value <= _GREATEST_TIMEOUT:
+        raise argparse.ArgumentTypeError(f"{text!r}: expected seconds from 0.1 to {_GREATEST_TIMEOUT:g}")
+    return value

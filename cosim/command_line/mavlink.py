@@ -1,0 +1,181 @@
+"""``cosim listen``, ``cosim stream`` and ``cosim mavlink-check``."""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import shutil
+import signal
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from cosim.command_line.link_flags import add_link_flags, links_from
+from cosim.mavlink.options import PROFILES
+
+_REDRAW, _SNAPSHOT = 0.25, 1.0  # s
+_ONCE = 2.0  # s of listening, for one picture
+_WIDE = 160  # characters of a line, where there is no terminal
+_HIDE, _SHOW, _CLEAR, _HOME, _END_OF_LINE, _BELOW = "\x1b[?25l", "\x1b[?25h", "\x1b[2J", "\x1b[H", "\x1b[K", "\x1b[J"
+
+
+def add_verbs(verbs: Any) -> None:
+    """Add the verbs to the parser.
+
+    Parameters
+    ----------
+    verbs : argparse subparsers
+        Of the command.
+    """
+    listen = verbs.add_parser("listen", help="show any vehicle's MAVLink telemetry as a live table")
+    _add_ground(listen, "such as udpin:127.0.0.1:14550 or tcp:127.0.0.1:5760", None)
+    listen.add_argument("--once", action="store_true", help=f"print one picture, after {_ONCE:g} s, and end")
+    listen.add_argument("--seconds", type=_positive, metavar="S", help="end after so many seconds")
+    listen.add_argument("--count", type=_whole, metavar="N", help="end after so many messages")
+
+    stream = verbs.add_parser("stream", help="be a recorded run's vehicle on MAVLink links, or write it as a .tlog")
+    stream.add_argument("folder", type=Path, metavar="RUN", help="the run folder")
+    add_link_flags(stream, required=True)
+    stream.add_argument(
+        "--rate", type=_rate, default=1.0, metavar="N|max", help="simulated seconds a second (default: 1)"
+    )
+
+    check = verbs.add_parser(
+        "mavlink-check", help="check a MAVLink vehicle against what ground stations need; exit code 1 if anything fails"
+    )
+    _add_ground(check, "where the vehicle is, such as udpin:127.0.0.1:14550; default: one of its own", "?")
+    check.add_argument(
+        "--commands", action="store_true",
+        help="also arm it, steer it and change its mission and parameters, all put back afterwards; "
+        "one of its own is always commanded",
+    )  # fmt: skip
+    check.add_argument("--profile", choices=PROFILES, help="of the vehicle of its own (default: generic)")
+    check.add_argument("--json", action="store_true", help="print it as JSON")
+
+
+def _add_ground(verb: argparse.ArgumentParser, where: str, number: str | None) -> None:
+    verb.add_argument("endpoint", metavar="ENDPOINT", nargs=number, help=where)
+    verb.add_argument("--allow-remote", action="store_true", help="let the link leave this machine")
+    verb.add_argument(
+        "--signing-key", type=Path, metavar="FILE", help="sign with the key in this file, and hear nothing else"
+    )
+
+
+def _positive(text: str) -> float:
+    with contextlib.suppress(ValueError):
+        if 0.0 < (value := float(text)) <= 1e9:
+            return value
+    raise argparse.ArgumentTypeError(f"{text!r}: expected a number above 0")
+
+
+def _whole(text: str) -> int:
+    if not (text.isdecimal() and 0 < int(text) <= 10**12):
+        raise argparse.ArgumentTypeError(f"{text!r}: expected a whole number above 0")
+    return int(text)
+
+
+def _rate(text: str) -> float | None:
+    return None if text == "max" else _positive(text)
+
+
+def _ground_link(options: argparse.Namespace) -> Any:
+    from cosim.errors import TelemetryError
+    from cosim.mavlink.endpoint import parse_endpoint
+    from cosim.mavlink.ground import GroundLink
+    from cosim.mavlink.signing import read_key
+
+    endpoint = parse_endpoint(options.endpoint, options.allow_remote)
+    if endpoint.kind == "tlog":
+        raise TelemetryError(f"endpoint {options.endpoint!r}: expected a network or a serial device, not a file")
+    return GroundLink(endpoint, read_key(options.signing_key) if options.signing_key else None)
+
+
+# ---- listen --------------------------------------------------------------------------------------------------------
+
+
+def listen(options: argparse.Namespace) -> int:
+    """Run ``cosim listen``."""
+    from cosim.mavlink.listening import Watch, follow, picture
+
+    watch = Watch()
+    live = sys.stdout.isatty() and not options.once
+    seconds = options.seconds or (_ONCE if options.once else None)
+    period = _REDRAW if live else max(_SNAPSHOT, (seconds or 0.0) + 1.0 if options.once else 0.0)
+    with _ground_link(options) as link, _ending_by_kill(), _screen(live) as show:
+        for now in follow(link, watch, period, seconds, options.count):
+            size = shutil.get_terminal_size((_WIDE, 24))
+            show(picture(link, watch, now, size.columns, size.lines) if live else picture(link, watch, now, _WIDE))
+    return 0 if watch.total else 1
+
+
+@contextlib.contextmanager
+def _screen(live: bool) -> Any:
+    """Give a function that shows lines: in the place of those before on a terminal, else behind them."""
+    if not live:
+        yield _print
+        return
+    sys.stdout.write(_HIDE + _CLEAR)
+    try:
+        yield _redraw
+    finally:
+        sys.stdout.write(_SHOW + "\n")
+        sys.stdout.flush()
+
+
+def _print(lines: Sequence[str]) -> None:
+    print("\n".join(lines), end="\n\n", flush=True)
+
+
+def _redraw(lines: Sequence[str]) -> None:
+    sys.stdout.write(_HOME + f"{_END_OF_LINE}\n".join(lines) + _END_OF_LINE + _BELOW)
+    sys.stdout.flush()
+
+
+@contextlib.contextmanager
+def _ending_by_kill() -> Any:
+    """Let a polite kill end what is done as Ctrl-C does."""
+    with contextlib.suppress(ValueError):  # which signal raises outside the main thread
+        signal.signal(signal.SIGTERM, signal.default_int_handler)
+    yield
+
+
+# ---- stream --------------------------------------------------------------------------------------------------------
+
+
+def stream(options: argparse.Namespace) -> int:
+    """Run ``cosim stream``."""
+    from cosim.mavlink.replay import replay
+
+    endpoints, mavlink = links_from(options)
+    with _ending_by_kill():
+        done = replay(options.folder, endpoints, mavlink, options.rate)
+    print(f"{options.folder}: {done.simulated:.1f} s streamed in {done.wall:.1f} s")
+    for trouble in done.troubles:
+        print(f"cosim: {trouble}", file=sys.stderr)
+    return 0
+
+
+# ---- mavlink-check -------------------------------------------------------------------------------------------------
+
+
+def mavlink_check(options: argparse.Namespace) -> int:
+    """Run ``cosim mavlink-check``."""
+    from cosim.errors import TelemetryError
+    from cosim.mavlink.conformance import as_json, as_text, check_vehicle, summary
+    from cosim.mavlink.conformance.vehicle import own_vehicle
+
+    if options.endpoint is not None and options.profile:
+        raise TelemetryError("--profile: is of the vehicle of its own, and goes without an endpoint")
+    results = []
+    with contextlib.ExitStack() as stack:
+        if options.endpoint is None:
+            link = stack.enter_context(own_vehicle(options.profile or "generic"))
+        else:
+            link = stack.enter_context(_ground_link(options))
+        for result in check_vehicle(link, options.commands or options.endpoint is None):
+            results.append(result)
+            if not options.json:
+                print(as_text(result), flush=True)
+    print(as_json(link.name, results) if options.json else summary(results))
+    return int(any(result.outcome.status == "fail" for result in results))

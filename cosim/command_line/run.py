@@ -1,0 +1,97 @@
+"""``cosim run``."""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import signal
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from cosim.command_line.campaigns import INTERRUPTED
+from cosim.command_line.link_flags import add_link_flags, links_from
+from cosim.errors import TelemetryError
+
+if TYPE_CHECKING:
+    from cosim.mavlink.setup import Mavlink
+
+_MAX = 0.0  # as fast as it goes
+
+
+def add_verb(verbs: Any) -> None:
+    """Add the verb to the parser.
+
+    Parameters
+    ----------
+    verbs : argparse subparsers
+        Of the command.
+    """
+    run = verbs.add_parser("run", help="run a scenario and write its folder")
+    run.add_argument("scenario", help="a shipped name (see cosim list), or a TOML file")
+    run.add_argument("--out", type=Path, metavar="DIR", help="run folder (default: runs/SCENARIO-TIME)")
+    run.add_argument(
+        "--set", action="append", default=[], metavar="KEY=VALUE", dest="overrides",
+        help="change a key of the scenario, such as law.gains.k_p1=10 or regions.SR1.shape.radius=0.7; may be repeated",
+    )  # fmt: skip
+    run.add_argument(
+        "--rate", type=_rate, metavar="N|max",
+        help="simulated seconds a second at the most (default: 1 with --commands, else max)",
+    )  # fmt: skip
+    run.add_argument("--no-report", action="store_true", help="leave out the report and its figures")
+    run.add_argument(
+        "--orders", type=Path, metavar="FILE",
+        help="repeat what an earlier run was ordered: its orders.jsonl, with its scenario.toml",
+    )  # fmt: skip
+    add_link_flags(run, commands=True)
+
+
+def _rate(text: str) -> float:
+    if text == "max":
+        return _MAX
+    try:
+        value = float(text)
+    except ValueError:
+        value = 0.0
+    if not 1e-3 <= value <= 1e6:
+        raise argparse.ArgumentTypeError(f"{text!r}: expected a number from 0.001 to 1e6, or max")
+    return value
+
+
+def run(options: argparse.Namespace) -> int:
+    """Run ``cosim run``."""
+    from cosim.report import verdict
+    from cosim.run import run_scenario
+    from cosim.scenario import load_scenario
+
+    overrides = [*options.overrides]
+    if options.commands:
+        if options.orders is not None:
+            raise TelemetryError("--orders: expected no --commands with it: the orders are those of the log")
+        overrides.append("commands.enabled=true")
+    if options.await_arm:
+        overrides.append("commands.await_arm=true")
+    mavlink = _mavlink(options)
+    scenario = load_scenario(options.scenario, overrides)
+    rate = options.rate if options.rate is not None else 1.0 if options.commands else _MAX
+    # a polite kill leaves a readable run too
+    with contextlib.suppress(ValueError):  # which signal raises outside the main thread
+        signal.signal(signal.SIGTERM, signal.default_int_handler)
+    done = run_scenario(
+        scenario, options.out, mavlink, rate or None, progress=True, report=not options.no_report, orders=options.orders
+    )
+    print(verdict(done.summary))
+    print(done.folder / ("summary.json" if options.no_report else "report.html"))
+    return INTERRUPTED if done.summary["status"] == "interrupted" else 0
+
+
+def _mavlink(options: argparse.Namespace) -> Mavlink | None:
+    """Return what the flags say of the link, None if there is to be none."""
+    if not options.mavlink:
+        for flag in ("commands", "signing_key", "allow_system"):
+            if getattr(options, flag):
+                raise TelemetryError(f"--{flag.replace('_', '-')}: expected --mavlink with it")
+        return None
+    endpoints, link = links_from(options)
+    from cosim.mavlink.setup import Mavlink
+
+    return Mavlink(tuple(endpoints), link)

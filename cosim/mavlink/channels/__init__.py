@@ -1,0 +1,1 @@
+"""What carries frames: one file a kind, behind one protocol."""

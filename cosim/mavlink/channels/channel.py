@@ -1,0 +1,50 @@
+"""What a link needs of whatever carries its frames."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable
+from typing import Protocol
+
+CHUNK = 512  # bytes read of a stream at once: what a hostile peer can make one look at cost stays far below 1 ms
+DATAGRAM = 2048  # bytes of a datagram that are looked at; the greatest frame has 280
+
+
+class Channel(Protocol):
+    """Carries bytes to its peers and from them, without ever waiting, and without raising.
+
+    Nobody is told when something has come: the thread looks every few milliseconds, which costs the stepper less than
+    being interrupted for each packet.
+
+    Attributes
+    ----------
+    datagrams : bool
+        Each `receive` yields a whole packet, else some bytes of a stream.
+    trouble : dict of str to int
+        What went wrong, and how often, in words for the user.
+    """
+
+    datagrams: bool
+    trouble: dict[str, int]
+
+    def receive(self) -> tuple[Hashable, bytes] | None:
+        """Return a peer and bytes of it, None if nothing is there.
+
+        The peer of a stream can be weakly referenced, and one that comes again is another.
+        """
+        ...
+
+    def heard(self, peer: Hashable) -> None:
+        """Hear that what came from `peer` is a frame that is heeded."""
+        ...
+
+    def send(self, frame: bytes) -> bool:
+        """Send a frame to all peers, whole or not at all; return whether all of them can have it."""
+        ...
+
+    def tend(self, now: float) -> None:
+        """Do what is due at monotonic time `now` [s]: write what waits, accept and drop peers, reopen."""
+        ...
+
+    def close(self) -> None:
+        """Give everything back, having written what can be written at once."""
+        ...

@@ -1,0 +1,143 @@
+"""UDP: to one address, or to whoever spoke to ours."""
+
+from __future__ import annotations
+
+import socket
+import time
+from collections import Counter
+from collections.abc import Callable, Hashable
+
+from cosim.errors import TelemetryError
+from cosim.mavlink.channels.channel import DATAGRAM
+
+PEERS = 8
+SILENCE = 10.0  # s, after which a peer is forgotten
+_BUFFER = 1 << 18  # bytes the kernel keeps of what comes; what floods beyond it is lost there, at no cost
+
+_NOT_TAKEN = "datagrams not taken by the kernel"
+
+
+class UdpOut:
+    """One fixed peer; the kernel passes nothing on that another one sends.
+
+    Raises
+    ------
+    TelemetryError
+        If there is no way to it.
+    """
+
+    datagrams = True
+
+    def __init__(self, host: str, port: int) -> None:
+        self.trouble: dict[str, int] = Counter()
+        self._socket = _socket(f"udpout:{host}:{port}", lambda s: s.connect((host, port)))
+
+    def receive(self) -> tuple[Hashable, bytes] | None:
+        """Return a datagram, if one is there."""
+        try:
+            return 0, self._socket.recv(DATAGRAM)
+        except OSError:  # nothing is there, or word that nobody listened to what was sent
+            return None
+
+    def heard(self, peer: Hashable) -> None:
+        """Know the peer already."""
+
+    def send(self, frame: bytes) -> bool:
+        """Send a datagram; that nobody listens is no trouble."""
+        for _ in range(2):
+            try:
+                self._socket.send(frame)
+                return True
+            except ConnectionRefusedError:  # word of an earlier one, in whose place this one was not sent: once more
+                continue
+            except OSError:
+                self.trouble[_NOT_TAKEN] += 1
+                return False
+        return True
+
+    def tend(self, now: float) -> None:
+        """Have nothing to do."""
+
+    def close(self) -> None:
+        """Close the socket."""
+        self._socket.close()
+
+
+class UdpIn:
+    """Whoever sent a heeded frame within the last 10 s is a peer, up to 8 of them.
+
+    Attributes
+    ----------
+    port : int
+        On which it listens.
+
+    Raises
+    ------
+    TelemetryError
+        If the port is taken.
+    """
+
+    datagrams = True
+
+    def __init__(self, host: str, port: int) -> None:
+        self.trouble: dict[str, int] = Counter()
+        self._socket = _socket(f"udpin:{host}:{port}", lambda s: s.bind((host, port)))
+        self.port: int = self._socket.getsockname()[1]
+        self._heard: dict[tuple[str, int], float] = {}  # when, by address
+
+    @property
+    def peers(self) -> list[tuple[str, int]]:
+        """Addresses that are sent to."""
+        return list(self._heard)
+
+    def receive(self) -> tuple[Hashable, bytes] | None:
+        """Return a datagram and its sender, if one is there."""
+        try:
+            data, address = self._socket.recvfrom(DATAGRAM)
+        except OSError:
+            return None
+        return address, data
+
+    def heard(self, peer: Hashable) -> None:
+        """Send to this address from now on, where there is room."""
+        assert isinstance(peer, tuple)
+        if peer in self._heard or len(self._heard) < PEERS:
+            self._heard[peer] = time.monotonic()
+        else:
+            self.trouble["frames of peers beyond 8"] += 1
+
+    def send(self, frame: bytes) -> bool:
+        """Send a datagram to each peer; to none of them is well too."""
+        taken = True
+        for peer in self._heard:
+            try:
+                self._socket.sendto(frame, peer)
+            except OSError:
+                self.trouble[_NOT_TAKEN] += 1
+                taken = False
+        return taken
+
+    def tend(self, now: float) -> None:
+        """Forget who is silent."""
+        for peer in [peer for peer, last in self._heard.items() if now - last > SILENCE]:
+            del self._heard[peer]
+
+    def close(self) -> None:
+        """Close the socket."""
+        self._socket.close()
+
+
+def _socket(name: str, prepare: Callable[[socket.socket], None]) -> socket.socket:
+    """Return a socket that never waits."""
+    try:
+        made = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    except OSError as error:
+        raise TelemetryError(f"{name}: no UDP socket: {error.strerror or error}") from error
+    try:
+        made.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _BUFFER)
+        made.setblocking(False)
+        prepare(made)
+    except OSError as error:
+        made.close()
+        raise TelemetryError(f"{name}: {error.strerror or error}") from error
+    return made

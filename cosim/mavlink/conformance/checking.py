@@ -1,0 +1,92 @@
+"""All checks, one after the other, against whoever is at the other end of a link."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from cosim.errors import TelemetryError
+from cosim.mavlink.conformance import commands, identity, missions, parameters, streams
+from cosim.mavlink.conformance.client import Client
+from cosim.mavlink.conformance.connect import qgc_connect
+from cosim.mavlink.conformance.outcome import Check, Outcome, Subject, failed, judged, skipped
+from cosim.mavlink.ground import GroundLink
+
+LISTENING = 6.0  # s, in which the vehicle is heard before anything is asked of it
+_FINDING = 10.0  # s
+_GONE = 5.0  # s of silence
+
+
+@dataclass(frozen=True)
+class Result:
+    """A check that was done."""
+
+    check: Check
+    outcome: Outcome
+    seconds: float  # that it took
+
+
+def connect_as_qgc(subject: Subject) -> Outcome:
+    """Check that QGroundControl's connecting needs no retry."""
+    connection = qgc_connect(subject.client)
+    took = f"{connection.seconds:.2f} s, {connection.retries} retries"
+    if not connection.good:
+        bad = next((step for step in connection.steps if not step.good), None)
+        return failed(f"{took}; {bad.name if bad else 'no heartbeat'}: {bad.said if bad else ''}", "all steps")
+    slowest = max(connection.steps, key=lambda step: step.seconds)
+    came = f"{took}, {len(connection.steps)} steps, {slowest.name} {slowest.seconds:.2f} s"
+    return judged(connection.retries == 0, came, "no retry")
+
+
+def no_gaps(subject: Subject) -> Outcome:
+    """Check that the numbers of the frames follow each other, over all that was heard."""
+    client = subject.client
+    return judged(client.lost == 0, f"{client.total} messages, {client.lost} missing", "none missing")
+
+
+CHECKS: tuple[Check, ...] = (
+    *identity.CHECKS,
+    *streams.CHECKS,
+    *commands.CHECKS,
+    *parameters.CHECKS,
+    *missions.CHECKS,
+    Check("qgc-connect", ("QGC",), connect_as_qgc),
+    Check("sequence-numbers", ("all",), no_gaps),
+    *identity.LAST,
+)
+
+
+def check_vehicle(link: GroundLink, writes: bool) -> Iterator[Result]:
+    """Check a vehicle, and give each result once it is there.
+
+    Parameters
+    ----------
+    link : GroundLink
+        Where it is.
+    writes : bool
+        Whether it may be armed, steered, and given another mission; it is left as it was found.
+
+    Yields
+    ------
+    Result
+        Of each check, in their order.
+
+    Raises
+    ------
+    TelemetryError
+        If no vehicle is heard within 10 s, or it goes away.
+    """
+    client = Client(link)
+    if client.find(_FINDING) is None:
+        raise TelemetryError(f"{link.name}: no vehicle was heard in {_FINDING:g} s")
+    client.forget()
+    started = time.monotonic()
+    unasked = client.collect(LISTENING)
+    subject = Subject(client, tuple(unasked), time.monotonic() - started, writes)
+    for check in CHECKS:
+        started = time.monotonic()
+        outcome = check.run(subject) if writes or not check.writes else skipped("only with --commands")
+        if time.monotonic() - client.last_heard > _GONE:
+            raise TelemetryError(f"{link.name}: the vehicle has gone, in check {check.name}")
+        yield Result(check, outcome, time.monotonic() - started)

@@ -1,0 +1,186 @@
+"""Commands, modes, and the small services of the clock."""
+
+from __future__ import annotations
+
+import math
+import time
+from typing import Any
+
+from cosim.mavlink.conformance.outcome import Check, Outcome, Subject, failed, judged, passed, skipped
+
+_QUICK = 0.5  # s, MAVSDK's timeout
+_SETTLING = 2.0  # s, for the heartbeat to show what was commanded
+_NO_COMMAND = 65000
+_NO_SYSTEM = 77
+_UNKNOWN_INT = 2**31 - 1  # what an integer coordinate that is not used holds
+_PX4_MAIN, _PX4_SUB = 16, 24  # bits by which main mode and sub-mode are shifted
+_NOT_SELECTABLE = 2  # MAV_MODE_PROPERTY_NOT_USER_SELECTABLE
+
+
+def one_ack(subject: Subject) -> Outcome:
+    """Check that a command has exactly one ack, for who sent it, soon enough for MAVSDK; unused numbers are NaN."""
+    m, client = subject.mavlink, subject.client
+    command = m.MAV_CMD_REQUEST_MESSAGE
+    started = time.monotonic()
+    client.forget()
+    client.send_command(command, [m.MAVLINK_MSG_ID_SYS_STATUS])
+    acks = [h for h in client.collect(0.8) if h.kind == "COMMAND_ACK" and h.message.command == command]
+    if len(acks) != 1:
+        return failed(f"{len(acks)} acks", "one")
+    took, ack = acks[0].time - started, acks[0].message
+    target = ack.target_system, ack.target_component
+    came = f"result {ack.result} after {1e3 * took:.0f} ms for {target}"
+    good = ack.result == m.MAV_RESULT_ACCEPTED and took < _QUICK and target == client.identity
+    return judged(good, came, f"result 0 within {_QUICK:g} s for {client.identity}")
+
+
+def command_int(subject: Subject) -> Outcome:
+    """Check that COMMAND_INT is heeded as COMMAND_LONG is, and has one ack."""
+    m, client = subject.mavlink, subject.client
+    command, wanted = m.MAV_CMD_REQUEST_MESSAGE, m.MAVLINK_MSG_ID_AUTOPILOT_VERSION
+    client.forget()
+    client.send(
+        m.MAVLink_command_int_message(
+            *client.target, m.MAV_FRAME_GLOBAL, command, 0, 0, wanted, math.nan, math.nan, math.nan,
+            _UNKNOWN_INT, _UNKNOWN_INT, math.nan,
+        )
+    )  # fmt: skip
+    heard = client.collect(0.8)
+    acks = [h.message.result for h in heard if h.kind == "COMMAND_ACK" and h.message.command == command]
+    versions = sum(h.kind == "AUTOPILOT_VERSION" for h in heard)
+    return judged(acks == [m.MAV_RESULT_ACCEPTED] and versions == 1, f"acks {acks}, {versions} messages", "one of each")
+
+
+def unsupported(subject: Subject) -> Outcome:
+    """Check that a command that the vehicle does not have is refused as unsupported."""
+    ack = subject.client.command(_NO_COMMAND, [0.0] * 7, 1.0)
+    good = ack is not None and ack.result == subject.mavlink.MAV_RESULT_UNSUPPORTED
+    return judged(good, f"ack {ack and ack.result}", "ack 3 (unsupported)")
+
+
+def wrong_target(subject: Subject) -> Outcome:
+    """Check that what is for another system is passed over in silence."""
+    m, client = subject.mavlink, subject.client
+    client.forget()
+    client.send_command(m.MAV_CMD_REQUEST_MESSAGE, [m.MAVLINK_MSG_ID_AUTOPILOT_VERSION], (_NO_SYSTEM, 1))
+    client.send(m.MAVLink_param_request_read_message(_NO_SYSTEM, 1, b"", 0))
+    client.send(m.MAVLink_mission_request_list_message(_NO_SYSTEM, 1, 0))
+    answers = {"COMMAND_ACK", "AUTOPILOT_VERSION", "PARAM_VALUE", "PARAM_ERROR", "MISSION_COUNT", "MISSION_ACK"}
+    heard = sorted({h.kind for h in client.collect(0.8)} & answers)
+    return judged(not heard, ", ".join(heard) or "silence", "silence")
+
+
+def broadcast(subject: Subject) -> Outcome:
+    """Check that what is for all systems is answered."""
+    m, client = subject.mavlink, subject.client
+    client.forget()
+    client.send_command(m.MAV_CMD_REQUEST_MESSAGE, [m.MAVLINK_MSG_ID_AUTOPILOT_VERSION], (0, 0))
+    version = client.wait(lambda x: x.get_type() == "AUTOPILOT_VERSION", 1.0)
+    return judged(version is not None, "an answer" if version else "nothing", "AUTOPILOT_VERSION")
+
+
+def arm_and_disarm(subject: Subject) -> Outcome:
+    """Check that arming and disarming are accepted, and that the heartbeat shows them."""
+    m, client = subject.mavlink, subject.client
+    bit = m.MAV_MODE_FLAG_SAFETY_ARMED
+    before = client.last("HEARTBEAT")
+    was_armed = bool(before is not None and before.base_mode & bit)
+    said = []
+    for armed in (True, False, *([True] if was_armed else [])):
+        ack = client.command(m.MAV_CMD_COMPONENT_ARM_DISARM, [armed, 0, 0, 0, 0, 0, 0])
+        if ack is not None and ack.result == m.MAV_RESULT_DENIED:
+            return skipped("the vehicle heeds no commands")
+        shown = client.wait(_beat_shows(lambda b, armed=armed: bool(b.base_mode & bit) == armed), _SETTLING)
+        said.append((ack and ack.result, shown is not None))
+    good = all(item == (m.MAV_RESULT_ACCEPTED, True) for item in said)
+    return judged(good, f"ack and shown: {said}", "ack 0, and shown, each time")
+
+
+def set_modes(subject: Subject) -> Outcome:
+    """Check that each mode that a user can select is taken, in the numbers in which the vehicle shows it."""
+    m, client = subject.mavlink, subject.client
+    before = client.last("HEARTBEAT")
+    modes = {h.message.custom_mode: h.message for h in client.recent("AVAILABLE_MODES")}
+    if not modes or before is None:
+        return skipped("no modes are known")
+    packed = any(number > 0xFFFF for number in modes)
+    refused: list[str] = []
+    for number, mode in modes.items():
+        if mode.properties & _NOT_SELECTABLE:
+            continue
+        ack = _set_mode(subject, number, packed)
+        if ack is not None and ack.result == m.MAV_RESULT_DENIED and not refused:
+            return skipped("the vehicle heeds no commands")
+        shown = client.wait(_beat_shows(lambda b, number=number: b.custom_mode == number), _SETTLING)
+        if ack is None or ack.result != m.MAV_RESULT_ACCEPTED or shown is None:
+            text = client.last("STATUSTEXT")
+            refused.append(f"{mode.mode_name} (ack {ack and ack.result}, {'shown' if shown else 'not shown'}")
+            refused[-1] += f", {text.text!r})" if text is not None else ")"
+    _set_mode(subject, before.custom_mode, packed)
+    if len(refused) > 1:  # one, such as that of a mission that is not there, may be out of reach
+        return failed("; ".join(refused), "ack 0, and shown")
+    return passed(f"{len(modes) - len(refused)} of {len(modes)} modes{': not ' * bool(refused)}{''.join(refused)}")
+
+
+def bad_mode(subject: Subject) -> Outcome:
+    """Check that a mode that is not there is refused, and changes nothing."""
+    client = subject.client
+    client.collect(1.2)  # until a heartbeat shows what was set before
+    before = client.last("HEARTBEAT")
+    ack = _set_mode(subject, 0xEE, packed=False)
+    client.collect(1.2)
+    after = client.last("HEARTBEAT")
+    came = f"ack {ack and ack.result}, mode {before and before.custom_mode} then {after and after.custom_mode}"
+    good = ack is not None and ack.result != 0 and before is not None and after.custom_mode == before.custom_mode
+    return judged(good, came, "a refusal, and the mode as it was")
+
+
+def _set_mode(subject: Subject, number: int, packed: bool) -> Any:
+    m = subject.mavlink
+    custom = float(m.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED)
+    first, second = ((number >> _PX4_MAIN) & 0xFF, number >> _PX4_SUB) if packed else (number, 0)
+    return subject.client.command(m.MAV_CMD_DO_SET_MODE, [custom, first, second, 0, 0, 0, 0])
+
+
+def _beat_shows(shows: Any) -> Any:
+    return lambda message: message.get_type() == "HEARTBEAT" and shows(message)
+
+
+def timesync(subject: Subject) -> Outcome:
+    """Check that TIMESYNC is answered with what was sent, and the vehicle's own clock."""
+    m, client = subject.mavlink, subject.client
+    sent = time.monotonic_ns()
+    client.forget()
+    client.send(m.MAVLink_timesync_message(0, sent))
+    reply = client.wait(lambda x: x.get_type() == "TIMESYNC" and x.ts1 == sent, 1.0)
+    if reply is None:
+        return failed("nothing", "TIMESYNC with our time in ts1")
+    return judged(reply.tc1 != 0, f"tc1 {reply.tc1}", "a clock that is not 0")
+
+
+def ping(subject: Subject) -> Outcome:
+    """Check that PING is answered to who sent it."""
+    m, client = subject.mavlink, subject.client
+    if subject.ardupilot:
+        return skipped("ArduPilot answers none")
+    client.forget()
+    client.send(m.MAVLink_ping_message(time.time_ns() // 1000, 4711, 0, 0))
+    reply = client.wait(lambda x: x.get_type() == "PING" and x.seq == 4711, 1.0)
+    if reply is None:
+        return failed("nothing", "PING with our number")
+    target = reply.target_system, reply.target_component
+    return judged(target == client.identity, f"for {target}", f"for {client.identity}")
+
+
+CHECKS = (
+    Check("one-ack", ("MAVSDK", "QGC"), one_ack),
+    Check("command-int", ("MAVSDK",), command_int),
+    Check("unsupported-command", ("all",), unsupported),
+    Check("wrong-target", ("all",), wrong_target),
+    Check("broadcast", ("MAVProxy", "Mission Planner"), broadcast),
+    Check("arm-disarm", ("all",), arm_and_disarm, writes=True),
+    Check("set-modes", ("QGC", "MAVSDK", "MAVProxy"), set_modes, writes=True),
+    Check("bad-mode", ("all",), bad_mode, writes=True),
+    Check("timesync", ("QGC", "MAVSDK"), timesync),
+    Check("ping", ("MAVSDK",), ping),
+)

@@ -1,0 +1,113 @@
+"""A running vehicle in this process, on loopback, for the length of a check."""
+
+from __future__ import annotations
+
+import contextlib
+import threading
+from collections.abc import Iterator, Sequence
+
+from cosim.errors import TelemetryError
+from cosim.helm import OrderQueue
+from cosim.helm.orders import Reset
+from cosim.master import Master
+from cosim.mavlink.autopilot import Autopilot
+from cosim.mavlink.channels.udp import UdpIn
+from cosim.mavlink.endpoint import Endpoint
+from cosim.mavlink.ground import GroundLink
+from cosim.mavlink.link import open_links
+from cosim.mavlink.options import MavlinkOptions, ProfileName
+from cosim.mavlink.thread import LinkThread
+from cosim.scenario import load_scenario
+from cosim.signals import Array
+from plant_fmu import PlantError
+
+_SCENARIO = "paper-limited"
+_OVERRIDES = ("commands.enabled=true", "time.duration=3600")
+_STARTING = 120.0  # s, for what has to be compiled
+_HOST = "127.0.0.1"
+
+
+class _Begun:
+    """Observer that tells when the first step is done."""
+
+    def __init__(self) -> None:
+        self.event = threading.Event()
+
+    def observe(self, k: int, row: Array) -> None:
+        self.event.set()
+
+
+@contextlib.contextmanager
+def running_vehicle(endpoints: Sequence[Endpoint], options: MavlinkOptions, rate: float = 1.0) -> Iterator[LinkThread]:
+    """Run a vehicle in a thread until the context ends.
+
+    Parameters
+    ----------
+    endpoints : sequence of Endpoint
+        Where it is to be seen.
+    options : MavlinkOptions
+        As what.
+    rate : float
+        Simulated seconds a second.
+
+    Yields
+    ------
+    LinkThread
+        Of the vehicle, which moves already.
+
+    Raises
+    ------
+    TelemetryError
+        If a link cannot be opened, or the vehicle does not begin to move.
+    """
+    scenario = load_scenario(_SCENARIO, _OVERRIDES)
+    with Master(scenario) as first:
+        first.step(0)  # compiles what it calls, before the clock of the run begins
+    orders, begun = OrderQueue(), _Begun()
+    with Master(scenario) as master:
+        failures: list[PlantError] = []
+        autopilot = Autopilot(scenario, master.signals.columns, options, orders)
+        links = LinkThread(autopilot, open_links(endpoints, options), scenario.time.step)
+
+        def step() -> None:
+            try:
+                master.run([begun, links], rate, orders)
+            except PlantError as error:
+                failures.append(error)
+
+        stepper = threading.Thread(target=step, name="stepper", daemon=True)
+        stepper.start()
+        try:
+            if not begun.event.wait(_STARTING):
+                raise TelemetryError(f"the vehicle did not begin to move within {_STARTING:g} s")
+            links.start()
+            yield links
+        finally:
+            orders.give(Reset())  # which ends the run
+            stepper.join()
+            links.close()
+        if failures:
+            raise failures[0]
+
+
+@contextlib.contextmanager
+def own_vehicle(profile: ProfileName) -> Iterator[GroundLink]:
+    """Run a vehicle that heeds commands, and give a link to it.
+
+    Parameters
+    ----------
+    profile : str
+        As what it shows itself.
+
+    Yields
+    ------
+    GroundLink
+        Open until the context ends.
+    """
+    ground = Endpoint("udpin", f"own vehicle, profile {profile}", host=_HOST)  # port 0: any that is free
+    with GroundLink(ground) as link:
+        assert isinstance(link.channel, UdpIn)
+        port = link.channel.port
+        vehicle = Endpoint("udpout", f"udpout:{_HOST}:{port}", host=_HOST, port=port)
+        with running_vehicle([vehicle], MavlinkOptions(profile=profile, commands=True)):
+            yield link

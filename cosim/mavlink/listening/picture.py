@@ -1,0 +1,105 @@
+"""The table and what stands above it, as lines of text."""
+
+from __future__ import annotations
+
+import math
+import time
+from typing import Any
+
+from cosim.mavlink.dialect import dialect
+from cosim.mavlink.ground import GroundLink
+from cosim.mavlink.listening.fields import values
+from cosim.mavlink.listening.watch import Watch, printable
+from cosim.mavlink.modes import mode_name
+
+_DEG = 180.0 / math.pi
+_SILENT = 3.5  # s without a heartbeat, after which QGroundControl gives a vehicle up
+_LEAST_WIDTH = 40
+
+
+def picture(link: GroundLink, watch: Watch, now: float, width: int = 120, height: int | None = None) -> list[str]:
+    """Return the lines of a snapshot.
+
+    Parameters
+    ----------
+    link : GroundLink
+        Whose name and bad frames are told.
+    watch : Watch
+        What was heard.
+    now : float
+        Monotonic time [s].
+    width : int
+        Characters of a line at the most.
+    height : int, optional
+        Lines at the most; rows that find no room are counted in the last one.
+
+    Returns
+    -------
+    list of str
+        Without anything that could steer a terminal.
+    """
+    width = max(width, _LEAST_WIDTH)
+    lines = [_link_line(link, watch, now), *_vehicle_lines(watch, now), *_text_lines(watch, now)]
+    rows = [f"{'message':<34} {'from':>7} {'Hz':>7} {'count':>8}  last values"]
+    for key, row in sorted(watch.rows.items()):
+        sender = f"{key.system}:{key.component}"
+        rows.append(f"{key.label:<34.34} {sender:>7} {row.rate(now):>7.1f} {row.count:>8}  {values(row.message)}")
+    if watch.beyond:
+        rows.append(f"{watch.beyond} messages of further kinds")
+    lines += ["", *rows]
+    if height is not None and len(lines) > height:
+        hidden = len(lines) - height + 1
+        lines = [*lines[: max(0, height - 1)], f"{hidden} more rows"]
+    return [line[:width] for line in lines]
+
+
+def _link_line(link: GroundLink, watch: Watch, now: float) -> str:
+    rate = sum(row.rate(now) for row in watch.rows.values())
+    return ", ".join([f"{link.name}: {watch.total} messages", f"{rate:.1f} a second", *link.troubles()])
+
+
+def _vehicle_lines(watch: Watch, now: float) -> list[str]:
+    beat, silence = watch.last("HEARTBEAT"), watch.silence(now)
+    if watch.vehicle is None or beat is None or silence is None:
+        return ["no vehicle was heard"]
+    m = dialect()
+    armed = "ARMED" if beat.base_mode & m.MAV_MODE_FLAG_SAFETY_ARMED else "disarmed"
+    what = f"{_enum('MAV_AUTOPILOT', beat.autopilot)} {_enum('MAV_TYPE', beat.type)}"
+    state = _enum("MAV_STATE", beat.system_status)
+    who = f"vehicle {watch.vehicle[0]}:{watch.vehicle[1]} {what}"
+    lines = [f"{who}, mode {mode_name(beat, watch.modes)}, {armed}, {state}"]
+    if silence > _SILENT:
+        lines[0] += f", SILENT for {silence:.0f} s"
+    where = [part for part in (_position(watch), _attitude(watch), _depth(watch)) if part]
+    return [*lines, ", ".join(where)] if where else lines
+
+
+def _position(watch: Watch) -> str:
+    local, world = watch.last("LOCAL_POSITION_NED"), watch.last("GLOBAL_POSITION_INT")
+    if local is not None:
+        return f"north {local.x:.2f} east {local.y:.2f} down {local.z:.2f} m"
+    return f"latitude {world.lat * 1e-7:.6f} longitude {world.lon * 1e-7:.6f} deg" if world is not None else ""
+
+
+def _attitude(watch: Watch) -> str:
+    a = watch.last("ATTITUDE")
+    return f"roll {a.roll * _DEG:.1f} pitch {a.pitch * _DEG:.1f} yaw {a.yaw * _DEG:.1f} deg" if a is not None else ""
+
+
+def _depth(watch: Watch) -> str:
+    world = watch.last("GLOBAL_POSITION_INT")
+    return f"depth {-1e-3 * world.relative_alt:.2f} m" if world is not None else ""
+
+
+def _text_lines(watch: Watch, now: float) -> list[str]:
+    return [
+        f"{time.strftime('%H:%M:%S', time.localtime(time.time() - (now - then)))} "
+        f"{_enum('MAV_SEVERITY', text.severity)}: {printable(text.text)}"
+        for then, text in watch.texts
+    ]
+
+
+def _enum(name: str, value: int) -> str:
+    """Return the name of a value of an enumeration, without what all of them share."""
+    entries: dict[int, Any] = dialect().enums[name]
+    return entries[value].name.removeprefix(f"{name}_") if value in entries else str(value)

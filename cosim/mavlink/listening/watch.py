@@ -1,0 +1,116 @@
+"""What is known of the vehicles that were heard; it never grows beyond a bound, whatever comes."""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+from cosim.mavlink.dialect import dialect
+from cosim.mavlink.ground import Heard
+
+ROWS = 300  # kinds of messages that have a row
+TEXTS = 5  # that are kept
+_SAMPLES = 40  # of the count
+_SAMPLING = 0.25  # s
+_NAMED = ("NAMED_VALUE_FLOAT", "NAMED_VALUE_INT", "DEBUG_VECT", "DEBUG_FLOAT_ARRAY")
+
+
+class Key(NamedTuple):
+    """Which row a message belongs to."""
+
+    system: int
+    component: int
+    label: str  # the message's name, or NAME:name where many share it
+
+
+@dataclass
+class Row:
+    """Messages of one kind from one sender."""
+
+    message: Any  # the newest
+    last: float  # s, when it came
+    count: int = 0
+    samples: deque[tuple[float, int]] = field(default_factory=lambda: deque(maxlen=_SAMPLES))
+
+    def rate(self, now: float) -> float:
+        """Return how often it came in the last 10 s, or since it came first [Hz]."""
+        then, count = self.samples[0]
+        return (self.count - count) / (now - then) if now > then else 0.0
+
+
+class Watch:
+    """Rows of messages, recent texts, and who the vehicle is.
+
+    Attributes
+    ----------
+    rows : dict of Key to Row
+        At most 300, in the order in which they came first.
+    texts : deque of (float, Any)
+        When recent STATUSTEXT messages came [s], and these.
+    vehicle : (int, int) or None
+        System and component of the autopilot that was heard first.
+    modes : dict of int to str
+        Names of its modes, if it told them.
+    total, beyond : int
+        Messages heard, and those that found no room for a row.
+    """
+
+    def __init__(self) -> None:
+        self.rows: dict[Key, Row] = {}
+        self.texts: deque[tuple[float, Any]] = deque(maxlen=TEXTS)
+        self.vehicle: tuple[int, int] | None = None
+        self.modes: dict[int, str] = {}
+        self.total = self.beyond = 0
+        self._mavlink = dialect()
+        self._sampled = 0.0
+
+    def take(self, heard: Heard) -> None:
+        """Take a message."""
+        self.total += 1
+        label, message = heard.kind, heard.message
+        if label in _NAMED:
+            label = f"{label}:{printable(message.name)}"
+        key = Key(heard.system, heard.component, label)
+        row = self.rows.get(key)
+        if row is None:
+            if len(self.rows) >= ROWS:
+                self.beyond += 1
+                return
+            row = self.rows[key] = Row(message, heard.time)
+            row.samples.append((heard.time, 0 if heard.kind == "STATUSTEXT" else 1))
+        row.message, row.last = message, heard.time
+        row.count += 1
+        if heard.kind == "STATUSTEXT":
+            self.texts.append((heard.time, message))
+        elif heard.kind == "HEARTBEAT" and self.vehicle is None and self._is_autopilot(message):
+            self.vehicle = (heard.system, heard.component)
+        elif heard.kind == "AVAILABLE_MODES" and len(self.modes) < ROWS:
+            self.modes[message.custom_mode] = printable(message.mode_name)
+
+    def sample(self, now: float) -> None:
+        """Note the counts, from which the rates are; at most every quarter of a second."""
+        if now - self._sampled < _SAMPLING:
+            return
+        self._sampled = now
+        for row in self.rows.values():
+            row.samples.append((now, row.count))
+
+    def last(self, kind: str) -> Any:
+        """Return the vehicle's newest message of a kind, or None."""
+        row = self.rows.get(Key(*self.vehicle, kind)) if self.vehicle else None
+        return None if row is None else row.message
+
+    def silence(self, now: float) -> float | None:
+        """Return for how long there was no heartbeat of the vehicle [s], or None if there was none at all."""
+        row = self.rows.get(Key(*self.vehicle, "HEARTBEAT")) if self.vehicle else None
+        return None if row is None else now - row.last
+
+    def _is_autopilot(self, beat: Any) -> bool:
+        m = self._mavlink
+        return bool(beat.type != m.MAV_TYPE_GCS and beat.autopilot != m.MAV_AUTOPILOT_INVALID)
+
+
+def printable(text: object) -> str:
+    """Return what can be shown of a text from outside: nothing in it can steer a terminal."""
+    return "".join(c if c.isprintable() else "?" for c in str(text).rstrip("\0 "))

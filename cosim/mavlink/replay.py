@@ -1,0 +1,99 @@
+"""A recorded run as a MAVLink vehicle: the same autopilot and the same links, fed from the record."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from cosim.errors import RunError
+from cosim.mavlink.autopilot import Autopilot
+from cosim.mavlink.endpoint import Endpoint
+from cosim.mavlink.link import open_links
+from cosim.mavlink.options import MavlinkOptions
+from cosim.mavlink.thread import SNAPSHOT_PERIOD, SNAPSHOTS, LinkThread
+from cosim.record import Record, load_record
+from cosim.run_folder import SCENARIO
+from cosim.scenario import load_scenario
+from cosim.signals import Array
+
+_LONGEST_SLEEP = 0.5  # s
+_WAITING = 0.002  # s, for the links to send what is queued
+_MOST_QUEUED = SNAPSHOTS // 2
+
+
+@dataclass(frozen=True)
+class Replayed:
+    """How streaming a record went."""
+
+    simulated: float  # s
+    wall: float  # s
+    troubles: list[str]  # what was lost or refused, in words
+
+
+def replay(folder: Path, endpoints: Sequence[Endpoint], options: MavlinkOptions, rate: float | None = 1.0) -> Replayed:
+    """Stream a recorded run as if it took place now; nothing can be commanded of it.
+
+    Parameters
+    ----------
+    folder : Path
+        The run folder, of a run that was finished, interrupted or killed.
+    endpoints : sequence of Endpoint
+        Where to.
+    options : MavlinkOptions
+        As what vehicle.
+    rate : float, optional
+        Simulated seconds a second; None: as fast as the links send, and nothing is left out.
+
+    Returns
+    -------
+    Replayed
+        What went out.
+
+    Raises
+    ------
+    RunError
+        If the folder holds no run that can be read.
+    ScenarioError
+        If its scenario is none.
+    TelemetryError
+        If a link cannot be opened.
+    """
+    if not (folder / SCENARIO).is_file():
+        raise RunError(f"{folder}: holds no run ({SCENARIO} is missing)")
+    scenario, record = load_scenario(folder / SCENARIO), load_record(folder)
+    if record.columns[0].name != "time":
+        raise RunError(f"{folder}: the record begins with column {record.columns[0].name!r}, expected 'time'")
+    autopilot = Autopilot(scenario, record.columns, options, orders=None, live=False)
+    thread = LinkThread(autopilot, open_links(endpoints, options), scenario.time.step)
+    every = max(1, round(SNAPSHOT_PERIOD / scenario.time.step))
+    thread.start()
+    started, simulated = time.perf_counter(), 0.0
+    try:
+        for k, row in _rows(record, every):
+            simulated = float(row[0])
+            if rate is not None:
+                _sleep_until(started + simulated / rate)
+            while thread.waiting > _MOST_QUEUED:
+                time.sleep(_WAITING)
+            thread.observe(k, row)
+        while thread.waiting:
+            time.sleep(_WAITING)
+    finally:
+        thread.close()
+    return Replayed(simulated, time.perf_counter() - started, thread.troubles())
+
+
+def _rows(record: Record, every: int) -> Iterator[tuple[int, Array]]:
+    """Yield each row that the links look at, and its step."""
+    first = 0
+    for block in record.blocks():
+        for i in range(-first % every, len(block), every):
+            yield first + i, block[i]
+        first += len(block)
+
+
+def _sleep_until(moment: float) -> None:
+    while (left := moment - time.perf_counter()) > 0.0:
+        time.sleep(min(left, _LONGEST_SLEEP))

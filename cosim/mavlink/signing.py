@@ -1,0 +1,154 @@
+"""Signatures of frames: who does not have the key is not heeded, and nothing counts twice."""
+
+from __future__ import annotations
+
+import hashlib
+import hmac
+import os
+import time
+from enum import Enum
+from pathlib import Path
+from typing import Final
+
+from cosim.errors import TelemetryError
+
+KEY_BYTES = 32
+STREAMS = 64  # of senders, that are kept in mind
+_EPOCH = 1_420_070_400  # s, 2015-01-01 in Unix time, where MAVLink's timestamps begin
+_PER_SECOND = 100_000  # timestamps count 10 us
+_MINUTE = 60 * _PER_SECOND
+_LAST = (1 << 48) - 1
+_SIGNATURE, _STAMP, _HASH = 13, 6, 6  # bytes: all of it, its timestamp, its hash
+
+
+class Refusal(Enum):
+    """Why a frame is refused; the values are names in `Counts`."""
+
+    UNSIGNED = "unsigned"
+    FORGED = "forged"
+    REPLAYED = "replayed"
+    OLD = "old"
+    CROWDED = "crowded"
+
+
+def read_key(path: Path) -> bytes:
+    """Return the signing key that a file holds.
+
+    32 bytes that are no text, or 64 hexadecimal digits, are the key itself. Any other text is a passphrase, and its
+    SHA-256 is the key, as MAVProxy, QGroundControl and Mission Planner do; white space around it does not count.
+
+    Parameters
+    ----------
+    path : Path
+        Of a file that its owner alone can read.
+
+    Returns
+    -------
+    bytes
+        32 of them.
+
+    Raises
+    ------
+    TelemetryError
+        If there is no such file, others can read it, or it holds no key.
+    """
+    try:
+        with path.open("rb") as file:
+            mode = os.fstat(file.fileno()).st_mode
+            content = file.read(4096)
+    except OSError as error:
+        raise TelemetryError(f"key file {str(path)!r}: {error.strerror or error}") from error
+    if os.name == "posix" and mode & 0o077:
+        raise TelemetryError(
+            f"key file {str(path)!r}: mode is {mode & 0o777:o}, expected 600: whoever reads it can command the vehicle"
+        )
+    try:
+        text = content.decode().strip()
+    except UnicodeDecodeError:
+        text = None
+    if text is not None and text.isprintable() and text:
+        return bytes.fromhex(text) if _is_hexadecimal(text) else hashlib.sha256(text.encode()).digest()
+    if len(content) == KEY_BYTES:
+        return content
+    raise TelemetryError(
+        f"key file {str(path)!r}: {len(content)} bytes that are no text, "
+        f"expected {KEY_BYTES} bytes, {2 * KEY_BYTES} hexadecimal digits or a passphrase"
+    )
+
+
+def _is_hexadecimal(text: str) -> bool:
+    return len(text) == 2 * KEY_BYTES and all(c in "0123456789abcdefABCDEF" for c in text)
+
+
+class SigningClock:
+    """Timestamps of all signed frames of this vehicle: each is later than all before, also before a restart.
+
+    They go by the wall clock, and by whoever is ahead of it: to a peer whose clock is ahead ours would look old.
+    """
+
+    def __init__(self) -> None:
+        self._last = 0
+
+    @property
+    def now(self) -> int:
+        """Time [10 us since 2015], that of the latest frame at least."""
+        return max(self._last, int((time.time() - _EPOCH) * _PER_SECOND))
+
+    def next(self) -> int:
+        """Return the timestamp of the next frame."""
+        self._last = min(max(self._last + 1, self.now), _LAST)
+        return self._last
+
+    def heard(self, stamp: int) -> None:
+        """Go no longer behind a timestamp that came with a good signature."""
+        self._last = max(self._last, stamp)
+
+
+class Verifier:
+    """Judges what comes. One for all links, so that nothing heard on one can be repeated on another.
+
+    Parameters
+    ----------
+    key : bytes
+        32 of them.
+    clock : SigningClock
+        Of the vehicle.
+    """
+
+    def __init__(self, key: bytes, clock: SigningClock) -> None:
+        self._key: Final = key
+        self._clock: Final = clock
+        self._latest: dict[tuple[int, int, int], int] = {}  # timestamps, by system, component and link
+
+    def judge(self, frame: bytes, system: int, component: int, signed: bool) -> Refusal | None:
+        """Return why a whole frame of that sender is refused, None if it is not.
+
+        Only a frame with a good signature changes what is known of its sender.
+        """
+        if not signed:
+            return Refusal.UNSIGNED
+        digest = hashlib.sha256(self._key + frame[:-_HASH]).digest()
+        if not hmac.compare_digest(digest[:_HASH], frame[-_HASH:]):
+            return Refusal.FORGED
+        link = frame[-_SIGNATURE]
+        stamp = int.from_bytes(frame[-_HASH - _STAMP : -_HASH], "little")
+        sender = (system, component, link)
+        latest = self._latest.get(sender)
+        if latest is not None and stamp <= latest:
+            return Refusal.REPLAYED
+        oldest = self._clock.now - _MINUTE
+        if latest is None and stamp < oldest:
+            return Refusal.OLD
+        if latest is None and len(self._latest) >= STREAMS and not self._forget(oldest):
+            return Refusal.CROWDED
+        self._latest[sender] = stamp
+        self._clock.heard(stamp)
+        return None
+
+    def _forget(self, oldest: int) -> bool:
+        """Forget the sender that is silent for longest, if a repeated frame of it would be too old anyway."""
+        sender = min(self._latest, key=self._latest.__getitem__)
+        if self._latest[sender] >= oldest:
+            return False
+        del self._latest[sender]
+        return True

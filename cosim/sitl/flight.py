@@ -1,0 +1,138 @@
+"""One run that an autopilot flies: the plant, its record and its folder, stepped from outside."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import Any
+
+from cosim.errors import RunError
+from cosim.master import Master
+from cosim.record import Recorder
+from cosim.run_folder import claim, conclude
+from cosim.scenario import Scenario
+from cosim.sitl.law import AutopilotLaw
+from cosim.sitl.motion import Motion, MotionReader
+
+
+class Flight:
+    """A run from its first frame to its summary.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        What is flown.
+    law : AutopilotLaw
+        The autopilot; nobody else's.
+    out : Path or None
+        The run folder, as for `claim`.
+    record_rate : float
+        Rows a simulated second at the most [Hz].
+
+    Attributes
+    ----------
+    folder : Path
+        The run folder.
+    steps : int
+        That were made.
+
+    Raises
+    ------
+    RunError
+        If the folder cannot be written.
+    PlantError, BuildError, DefinitionError
+        As `Master`.
+    """
+
+    def __init__(self, scenario: Scenario, law: AutopilotLaw, out: Path | None, record_rate: float) -> None:
+        self.scenario = scenario
+        self._master = Master(scenario, law)
+        try:
+            self._claimed = claim(out, scenario)
+            self.folder = self._claimed.path
+            try:
+                self._recorder = Recorder(self.folder, self._master.signals.columns)
+            except BaseException:
+                self._claimed.discard()
+                raise
+        except BaseException:
+            self._master.close()
+            raise
+        self._reader = MotionReader(self._master.plant, "bottom_depth" in scenario.plant.parameters)
+        self._row = self._master.signals.row.view()
+        self._row.flags.writeable = False
+        self._every = max(1, round(1.0 / (record_rate * scenario.time.step)))
+        self._started = time.perf_counter()
+        self._wall_time: float | None = None
+        self.steps = 0
+
+    @property
+    def done(self) -> bool:
+        """Whether the scenario's time is over."""
+        return self.steps >= self.scenario.steps
+
+    def step(self) -> Motion:
+        """Make the next step, with the law as it stands, and record it where it is due.
+
+        Returns
+        -------
+        Motion
+            At the end of the step.
+
+        Raises
+        ------
+        PlantError
+            If the FMU fails.
+        """
+        self._master.step(self.steps)
+        self._record()
+        self.steps += 1
+        return self.motion()
+
+    def motion(self) -> Motion:
+        """Return the vehicle's motion as it is now."""
+        return self._reader.read(self.steps * self.scenario.time.step)
+
+    def _record(self) -> None:
+        """Keep the row of the step that was made last, if it is due."""
+        if self.steps % self._every == 0:
+            self._recorder.observe(self.steps, self._row)
+
+    def end(self) -> None:
+        """Close plant and record. May be called twice."""
+        if self._wall_time is not None:
+            return
+        self._wall_time = time.perf_counter() - self._started
+        if self.done:  # the last row: it moves nothing
+            self._master.step(self.steps)
+            self._record()
+        self._master.close()
+        if self._recorder.rows:
+            self._recorder.close()
+        else:  # nothing to read: leave nothing behind
+            self._claimed.discard()
+
+    def conclude(self, status: str, report: bool) -> dict[str, Any]:
+        """Write the summary of a flight that has ended, and made a step.
+
+        Parameters
+        ----------
+        status : str
+            How it ended.
+        report : bool
+            Write report and figures too.
+
+        Returns
+        -------
+        dict
+            The summary.
+
+        Raises
+        ------
+        RunError
+            If the folder cannot be written.
+        """
+        try:
+            return conclude(self.folder, self.scenario, status, self._wall_time, report)
+        except OSError as error:
+            raise RunError(f"{self.folder}: {error.strerror or error}") from error

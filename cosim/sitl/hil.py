@@ -1,0 +1,201 @@
+"""PX4's simulator interface: a TCP server that sends sensors, and makes a step for each answer."""
+
+from __future__ import annotations
+
+import logging
+import socket
+import time
+from collections.abc import Callable, Iterator
+from typing import Any
+
+from cosim.errors import RunError
+from cosim.mavlink.dialect import dialect
+from cosim.sitl.flight import Flight
+from cosim.sitl.flights import Counts, Flights, Outcome
+from cosim.sitl.hil_messages import at_rest, hil_messages
+from cosim.sitl.motion import Motion
+
+log = logging.getLogger(__name__)
+
+PORT = 4560  # where PX4 looks for its simulator
+LEFT = "ended: the autopilot left"
+RATE = 250  # Hz, frames a simulated second
+SYSTEM_ID, COMPONENT_ID = 254, 25  # of neither a vehicle nor a ground station
+
+_GPS_EVERY, _HEARTBEAT_EVERY = RATE // 10, RATE
+_POLL = 0.25  # s of the wall clock
+_ARMED = 128  # bit of HIL_ACTUATOR_CONTROLS.mode
+_SENT_AT_ONCE = 5.0  # s of the wall clock, within which PX4 must take a frame
+_CHANNELS = 16
+
+
+class _GoneError(Exception):
+    """The autopilot has left."""
+
+
+class _SilentError(Exception):
+    """The autopilot has said nothing for too long."""
+
+
+class HilServer:
+    """Flies the plant in lockstep with a PX4.
+
+    While PX4 starts, which goes by the wall clock, the vehicle is held where it starts, and the run has not begun; it
+    begins with the first actuator controls. From then on each of them makes one step.
+
+    Parameters
+    ----------
+    flights : Flights
+        What is flown.
+    address : (str, int)
+        To bind; port 0 for any that is free.
+    timeout : float, optional
+        Seconds of the wall clock without a word, after which it ends; default: wait for ever.
+    tell : callable, optional
+        Is told in a line what happens, for people.
+    origin : (float, float)
+        Latitude and longitude [deg] of position 0.
+
+    Attributes
+    ----------
+    address : (str, int)
+        That is bound.
+    counts : Counts
+        So far.
+
+    Raises
+    ------
+    RunError
+        If the address cannot be bound.
+    TelemetryError
+        If pymavlink is not installed.
+    """
+
+    def __init__(
+        self,
+        flights: Flights,
+        address: tuple[str, int],
+        timeout: float | None = None,
+        tell: Callable[[str], None] | None = None,
+        origin: tuple[float, float] = (55.9097, -3.3203),
+    ) -> None:
+        self._mavlink = dialect()
+        self._flights, self._timeout, self._tell, self._origin = flights, timeout, tell or log.info, origin
+        self.counts = Counts()
+        self._listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+        try:
+            self._listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            self._listener.bind(address)
+            self._listener.listen(1)
+        except OSError as error:
+            self._listener.close()
+            raise RunError(f"TCP {address[0]}:{address[1]}: {error.strerror or error}") from error
+        self._listener.settimeout(_POLL if timeout is None else min(_POLL, timeout))
+        self.address: tuple[str, int] = self._listener.getsockname()
+        self._heard = time.monotonic()
+
+    def serve(self) -> Outcome:
+        """Fly until the scenario's time is over, PX4 has been silent for too long, or Ctrl-C, as `Flights.fly` says."""
+        try:
+            return self._flights.fly(self._answer, self.counts)
+        finally:
+            self._listener.close()
+
+    def _answer(self) -> str:
+        """Take one connection behind the other; return how it ended."""
+        while True:
+            try:
+                connection, peer = self._accept()
+            except _SilentError:
+                return f"ended: silence for {self._timeout:g} s"
+            with connection:
+                connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+                flight = self._flights.begin(RATE)
+                self._tell(f"{flight.folder}: {peer[0]}:{peer[1]} flies, {RATE} frames a simulated second")
+                try:
+                    self._fly(flight, connection)
+                except _GoneError:
+                    self._flights.end(LEFT)
+                except _SilentError:
+                    return f"ended: silence for {self._timeout:g} s"
+                else:
+                    return "completed"
+
+    def _accept(self) -> tuple[socket.socket, tuple[str, int]]:
+        while True:
+            try:
+                found = self._listener.accept()
+            except TimeoutError:
+                self._look_at_the_clock()
+            else:
+                self._heard = time.monotonic()
+                return found
+
+    def _fly(self, flight: Flight, connection: socket.socket) -> None:
+        """Fly one connection, until the scenario's time is over."""
+        codec = self._mavlink.MAVLink(None, srcSystem=SYSTEM_ID, srcComponent=COMPONENT_ID)
+        codec.robust_parsing = True
+        motion = at_rest(flight.motion())
+        frame = 0  # of PX4's clock, which goes on from its start
+        controls: Iterator[list[float]] = iter(())
+        while not flight.done:
+            self._send(connection, codec, motion, frame)
+            frame += 1
+            while (answer := next(controls, None)) is None:
+                data = self._receive(connection, waits=flight.steps > 0)
+                if data is None:  # it is still starting: the clock must go on for it
+                    break
+                controls = iter(self._controls(codec, data))
+            if answer is not None:
+                self._flights.law.take(answer)
+                motion = flight.step()
+                self.counts.steps += 1
+
+    def _send(self, connection: socket.socket, codec: Any, motion: Motion, frame: int) -> None:
+        m = self._mavlink
+        time_us = (frame + 1) * 1_000_000 // RATE
+        messages = hil_messages(m, motion, time_us, self._origin, frame % _GPS_EVERY == 0)
+        if frame % _HEARTBEAT_EVERY == 0:
+            messages.insert(0, m.MAVLink_heartbeat_message(m.MAV_TYPE_GENERIC, m.MAV_AUTOPILOT_INVALID, 0, 0, 0, 3))
+        data = b""
+        for message in messages:
+            data += message.pack(codec)
+            codec.seq = (codec.seq + 1) % 256
+        connection.settimeout(_SENT_AT_ONCE)
+        try:
+            connection.sendall(data)
+        except OSError as error:  # a part may have gone out: nothing that follows could be read
+            raise _GoneError from error
+
+    def _receive(self, connection: socket.socket, *, waits: bool) -> bytes | None:
+        """Return bytes; None if it need not wait, and a frame's time has passed on the wall clock without any."""
+        connection.settimeout(_POLL if waits else 1.0 / RATE)
+        while True:
+            try:
+                data = connection.recv(4096)
+            except TimeoutError:
+                self._look_at_the_clock()
+                if not waits:
+                    return None
+            except OSError as error:
+                raise _GoneError from error
+            else:
+                if not data:
+                    raise _GoneError
+                self._heard = time.monotonic()
+                return data
+
+    def _controls(self, codec: Any, data: bytes) -> list[list[float]]:
+        """Return the actuator controls in some bytes; those of a vehicle that is not armed ask for nothing."""
+        found = []
+        for message in codec.parse_buffer(data) or ():
+            kind = message.get_type()
+            if kind == "BAD_DATA":
+                self.counts.malformed += 1
+            elif kind == "HIL_ACTUATOR_CONTROLS":
+                found.append(list(message.controls) if message.mode & _ARMED else [0.0] * _CHANNELS)
+        return found
+
+    def _look_at_the_clock(self) -> None:
+        if self._timeout is not None and time.monotonic() - self._heard > self._timeout:
+            raise _SilentError

@@ -1,0 +1,105 @@
+"""The sensors of PX4's simulator interface, as MAVLink messages."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from controller.quaternion import rotation_matrix
+from cosim.sitl.motion import Motion
+
+FIELD_NED = (0.175, -0.012, 0.466)  # gauss, of the Earth, where it is told to be: near Edinburgh
+TEMPERATURE = 15.0  # degrees Celsius
+
+_EARTH_RADIUS = 6_378_137.0  # m
+_ALL_BUT_AIRSPEED = 0x1BFF  # fields of HIL_SENSOR: accelerations, rates, field, pressure, its altitude, temperature
+_GRAVITY = 9.80665  # m/s2
+_INT16, _UINT16 = 32767, 65535
+
+
+def hil_messages(mavlink: Any, motion: Motion, time_us: int, origin: tuple[float, float], gps: bool) -> list[Any]:
+    """Return what PX4 is told of an instant; the last message, HIL_SENSOR, sets its clock.
+
+    Parameters
+    ----------
+    mavlink : module
+        The dialect.
+    motion : Motion
+        Of the vehicle.
+    time_us : int
+        Of PX4's clock [us].
+    origin : (float, float)
+        Latitude and longitude [deg] of position 0, which is at the surface.
+    gps : bool
+        Tell the position too.
+
+    Returns
+    -------
+    list of messages
+        HIL_GPS where it is asked for, HIL_STATE_QUATERNION, HIL_SENSOR.
+    """
+    x, y, z = motion.position_ned
+    latitude, longitude = _place(x, y, origin)
+    altitude_mm = round(-1e3 * z)
+    speeds = [_cut(100.0 * v, _INT16) for v in motion.velocity_ned]  # cm/s
+    messages = []
+    if gps:
+        north, east, _ = motion.velocity_ned
+        course = round(math.degrees(math.atan2(east, north)) * 100.0) % 36000
+        ground_speed = _cut(100.0 * math.hypot(north, east), _UINT16)
+        messages.append(
+            mavlink.MAVLink_hil_gps_message(
+                time_us, 3, latitude, longitude, altitude_mm, 30, 40, ground_speed, *speeds, course, 12
+            )
+        )
+    milli_g = [_cut(1e3 * f / _GRAVITY, _INT16) for f in motion.specific_force]
+    messages.append(
+        mavlink.MAVLink_hil_state_quaternion_message(
+            time_us, motion.quaternion, *motion.gyro, latitude, longitude, altitude_mm, *speeds, 0, 0, *milli_g
+        )
+    )
+    field_body: list[float] = (rotation_matrix(np.array(motion.quaternion)).T @ np.array(FIELD_NED)).tolist()
+    messages.append(
+        mavlink.MAVLink_hil_sensor_message(
+            time_us, *motion.specific_force, *motion.gyro, *field_body,
+            air_pressure(-z), 0.0, -z, TEMPERATURE, _ALL_BUT_AIRSPEED,
+        )
+    )  # fmt: skip
+    return messages
+
+
+def air_pressure(altitude: float) -> float:
+    """Return the pressure [hPa] from which PX4, which knows of no water, finds an altitude [m] again.
+
+    Parameters
+    ----------
+    altitude : float
+        Above the surface; a depth is an altitude below 0.
+
+    Returns
+    -------
+    float
+        Of the standard atmosphere, carried on below sea level.
+    """
+    return float(1013.25 * max(0.0, 1.0 - 0.0065 * altitude / 288.15) ** (_GRAVITY * 0.0289644 / (8.31446 * 0.0065)))
+
+
+def _place(north: float, east: float, origin: tuple[float, float]) -> tuple[int, int]:
+    """Return latitude and longitude [1e-7 deg] of a place near the origin, on a sphere."""
+    latitude, longitude = origin
+    by_north = math.degrees(north / _EARTH_RADIUS)
+    by_east = math.degrees(east / (_EARTH_RADIUS * math.cos(math.radians(latitude))))
+    return round((latitude + by_north) * 1e7), round((longitude + by_east) * 1e7)
+
+
+def _cut(value: float, most: int) -> int:
+    return round(min(max(value, -float(most)), float(most)))
+
+
+def at_rest(motion: Motion) -> Motion:
+    """Return the motion of a vehicle that is held where it is: the IMU feels gravity alone."""
+    fx, fy, fz = (rotation_matrix(np.array(motion.quaternion)).T @ np.array([0.0, 0.0, -_GRAVITY])).tolist()
+    still = (0.0, 0.0, 0.0)
+    return motion._replace(gyro=still, specific_force=(fx, fy, fz), velocity_ned=still)

@@ -1,0 +1,166 @@
+"""The autopilot as a law: what its outputs said last is what the thrusters are asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import ClassVar
+
+import numpy as np
+
+from controller import Diagnostic, VehicleState
+from controller.law import Output
+from controller.regions import PackedRegions
+from cosim.errors import RunError
+from cosim.signals import Array
+from plant_fmu import Vehicle
+from plant_fmu.autopilot import LONGEST, SHORTEST, Autopilot
+
+Curve = Callable[[float], float]  # from what an output says to a part of the greatest force, -1 to 1
+
+
+class AutopilotLaw:
+    """Thruster forces by the last outputs of an autopilot.
+
+    Parameters
+    ----------
+    channels : sequence of int
+        Output of each thruster, from 1; 0 for none.
+    efforts : sequence of callable
+        For each thruster, from what its output says to the part of its greatest force, -1 to 1.
+    vehicle : Vehicle
+        Whose thrusters' limits are the greatest forces.
+    what : str
+        Name of an output in the record, such as ``pwm``.
+    unit : str
+        Of what an output says.
+
+    Attributes
+    ----------
+    lost : int
+        Frames of the autopilot that have not come, so far.
+    """
+
+    output: ClassVar[Output] = "thrusters"
+
+    def __init__(
+        self, channels: Sequence[int], efforts: Sequence[Curve], vehicle: Vehicle, what: str, unit: str
+    ) -> None:
+        limits = zip(vehicle.thrust_min.tolist(), vehicle.thrust_max.tolist(), strict=True)
+        # thruster, its output from 0, effort, and the force of the efforts -1 and 1
+        self._driven = [
+            (i, channel - 1, effort, *limit)
+            for i, (channel, effort, limit) in enumerate(zip(channels, efforts, limits, strict=True))
+            if channel
+        ]
+        self.diagnostics = (
+            *(
+                Diagnostic(f"{what}{at + 1}", unit, f"Output {at + 1} of the autopilot, of thruster {i + 1}")
+                for i, at, *_ in self._driven
+            ),
+            Diagnostic("lost", "", "Frames of the autopilot that have not come, so far"),
+        )
+        self.lost = 0
+        self._estimate: Array = np.zeros(4)
+        self._report: Array = np.zeros(len(self.diagnostics))
+        self._forces: Array = np.zeros(vehicle.n_thrusters)
+
+    def take(self, outputs: Sequence[float]) -> None:
+        """Keep what the autopilot's outputs say, shape (channels,); those beyond the end say 0."""
+        n = len(outputs)
+        for place, (i, at, effort, least, most) in enumerate(self._driven):
+            said = outputs[at] if at < n else 0.0
+            part = effort(said)
+            self._forces[i] = part * most if part >= 0.0 else -part * least
+            self._report[place] = said
+
+    @property
+    def estimate(self) -> Array:
+        """Nothing: an autopilot keeps what it finds out to itself."""
+        return self._estimate
+
+    @property
+    def report(self) -> Array:
+        """What the outputs said, and how many frames are lost, shape (len(diagnostics),)."""
+        self._report[-1] = self.lost
+        return self._report
+
+    def step(
+        self, state: VehicleState, goal: PackedRegions, regions: PackedRegions, weights: Array, forces: Array
+    ) -> None:
+        """Write the thruster forces [N]; state, regions and weights are the autopilot's own affair."""
+        forces[:] = self._forces
+
+
+def law_of_pwm(vehicle: Vehicle) -> AutopilotLaw:
+    """Return the law of an autopilot that gives servo pulses.
+
+    Parameters
+    ----------
+    vehicle : Vehicle
+        Its table ``autopilot`` says which pulse gives which force.
+
+    Returns
+    -------
+    AutopilotLaw
+        Without force until pulses come.
+
+    Raises
+    ------
+    RunError
+        If the vehicle has no such table.
+    """
+    if vehicle.autopilot is None:
+        raise RunError(f"vehicle {vehicle.name!r} has no table [autopilot], expected frame, channels and signs in it")
+    table = vehicle.autopilot
+    signs = table.signs if isinstance(table.signs, tuple) else (table.signs,) * vehicle.n_thrusters
+    efforts = [effort_of_pulse(table, sign) for sign in signs]
+    return AutopilotLaw(table.channels, efforts, vehicle, "pwm", "us")
+
+
+def effort_of_pulse(table: Autopilot, sign: int) -> Curve:
+    """Return the function from a pulse [us] to a part of the greatest force.
+
+    Parameters
+    ----------
+    table : Autopilot
+        Neutral, span, dead band and curve.
+    sign : int
+        -1 where a pulse above neutral makes the force negative.
+
+    Returns
+    -------
+    callable
+        u or u|u|, -1 to 1, with u the distance from neutral in spans; 0 within the dead band, and for what is no pulse.
+    """
+    neutral, span, dead_band, quadratic = (
+        table.pwm_neutral, table.pwm_span, table.pwm_dead_band, table.curve == "quadratic",
+    )  # fmt: skip
+
+    def effort(pulse: float) -> float:
+        if not SHORTEST <= pulse <= LONGEST or abs(pulse - neutral) <= dead_band:
+            return 0.0
+        u = min(max((pulse - neutral) / span, -1.0), 1.0)
+        return sign * u * abs(u) if quadratic else sign * u
+
+    return effort
+
+
+def law_of_controls(vehicle: Vehicle) -> AutopilotLaw:
+    """Return the law of an autopilot that gives controls from -1 to 1, one for each thruster in their order.
+
+    Parameters
+    ----------
+    vehicle : Vehicle
+        1 asks for the greatest force of a thruster, -1 for the most negative one, and between it goes straight.
+
+    Returns
+    -------
+    AutopilotLaw
+        Without force until controls come.
+    """
+    n = vehicle.n_thrusters
+    return AutopilotLaw(range(1, n + 1), [_clipped] * n, vehicle, "control", "")
+
+
+def _clipped(control: float) -> float:
+    return min(max(control, -1.0), 1.0) if control == control else 0.0

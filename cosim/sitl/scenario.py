@@ -1,0 +1,59 @@
+"""The scenario that an autopilot flies: any one, at the autopilot's own step, with the autopilot for its law."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from pathlib import Path
+
+from cosim.errors import RunError
+from cosim.scenario import Scenario, load_scenario
+from cosim.scenario_check import MAX_STEPS
+
+SCENARIO = "sitl"  # that is flown where none is named
+LOWEST_RATE, HIGHEST_RATE = 11, 65535  # Hz: an autopilot's frame is shorter than 0.1 s, and a packet holds 16 bits
+
+
+def scenario_to_fly(
+    name_or_file: str | Path, overrides: Sequence[str], vehicle: str | None, frame_rate: int, autopilot: str
+) -> Scenario:
+    """Load a scenario for an autopilot to fly.
+
+    Parameters
+    ----------
+    name_or_file : str or Path
+        As for `load_scenario`.
+    overrides : sequence of str
+        As for `load_scenario`.
+    vehicle : str or None
+        A shipped vehicle or a TOML file; None for the scenario's.
+    frame_rate : int
+        Of the autopilot [Hz], `LOWEST_RATE` to `HIGHEST_RATE`.
+    autopilot : str
+        What stands for the law in summary and report, such as ``ardupilot``.
+
+    Returns
+    -------
+    Scenario
+        Through thrusters; the step is the autopilot's frame, and the law is asked at each. Duration and the arbiter's
+        period are the nearest multiples of it, the duration no longer than a run can be.
+
+    Raises
+    ------
+    ScenarioError
+        As `load_scenario`.
+    RunError
+        If the scenario asks for what goes with a law of ours alone.
+    """
+    changes = [*overrides, "actuation.through=thrusters"]
+    if vehicle is not None:
+        changes.append(f"vehicle='{vehicle}'")
+    given = load_scenario(name_or_file, changes)
+    for key, asked in (("commands.enabled", given.commands.enabled), ("record.lyapunov", given.record.lyapunov)):
+        if asked:
+            raise RunError(f"{name_or_file}: {key} is true, expected false: here an autopilot steers")
+    step = 1.0 / frame_rate
+    for key, period in (("duration", given.time.duration), ("arbiter", given.time.arbiter), ("control", step)):
+        changes.append(f"time.{key}={min(max(1, round(period * frame_rate)), MAX_STEPS) * step!r}")
+    scenario = load_scenario(name_or_file, [*changes, f"time.step={step!r}"])
+    return dataclasses.replace(scenario, law=dataclasses.replace(scenario.law, name=autopilot))

@@ -1,0 +1,176 @@
+"""ArduPilot's JSON backend: a UDP socket that answers each frame of the autopilot with the plant's next state."""
+
+from __future__ import annotations
+
+import logging
+import socket
+import time
+from collections.abc import Callable
+
+from cosim.errors import RunError
+from cosim.sitl import wire
+from cosim.sitl.flights import RESTARTED, Counts, Flights, Outcome
+from cosim.sitl.lockstep import Lockstep
+from cosim.sitl.scenario import LOWEST_RATE
+
+log = logging.getLogger(__name__)
+
+Sender = tuple[str, int]
+
+_POLL = 0.25  # s of the wall clock, after which a silent socket is left to look at the clock
+_PRESENT = 1.0  # s of the wall clock, for which a silent autopilot keeps its place against another sender
+_WARNING_PERIOD = 10.0  # s of the wall clock, between two warnings of one kind
+
+
+class JsonServer:
+    """Flies the plant in lockstep with an ArduPilot.
+
+    Parameters
+    ----------
+    flights : Flights
+        What is flown.
+    address : (str, int)
+        To bind; port 0 for any that is free.
+    timeout : float, optional
+        Seconds of the wall clock without a frame, after which it ends; default: wait for ever.
+    tell : callable, optional
+        Is told in a line what happens, for people.
+
+    Attributes
+    ----------
+    address : (str, int)
+        That is bound.
+    counts : Counts
+        So far.
+
+    Raises
+    ------
+    RunError
+        If the address cannot be bound.
+    """
+
+    def __init__(
+        self,
+        flights: Flights,
+        address: tuple[str, int],
+        timeout: float | None = None,
+        tell: Callable[[str], None] | None = None,
+    ) -> None:
+        self._flights, self._timeout, self._tell = flights, timeout, tell or log.info
+        self.counts = Counts()
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        try:
+            self._socket.bind(address)
+        except OSError as error:
+            self._socket.close()
+            raise RunError(f"UDP {address[0]}:{address[1]}: {error.strerror or error}") from error
+        self._socket.settimeout(_POLL if timeout is None else min(_POLL, timeout))
+        self.address: tuple[str, int] = self._socket.getsockname()
+        self._lockstep = Lockstep()
+        self._sender: Sender | None = None
+        self._heard = time.monotonic()
+        self._answer = b""
+        self._warned: dict[str, float] = {}
+
+    def serve(self) -> Outcome:
+        """Answer until the scenario's time is over, the autopilot has been silent for too long, or Ctrl-C.
+
+        Returns
+        -------
+        Outcome
+            The status of its last run says how it ended.
+
+        Raises
+        ------
+        RunError
+            If a run cannot be written, or no autopilot came in time.
+        PlantError
+            If the FMU fails; what was recorded until then is left readable.
+        KeyboardInterrupt
+            If there is no run yet.
+        """
+        try:
+            return self._flights.fly(self._answer_frames, self.counts)
+        finally:
+            self._socket.close()
+
+    def _answer_frames(self) -> str:
+        """Answer frame by frame; return how it ended."""
+        receive = self._socket.recvfrom
+        while True:
+            try:
+                data, sender = receive(wire.LARGEST + 1)
+            except OSError:  # nothing in time; or word that an answer before did not arrive, where a system tells that
+                data, sender = b"", None
+            now = time.monotonic()
+            if sender is not None and self._heed(data, sender, now):
+                self._heard = now
+                if self._flights.flight is not None and self._flights.flight.done:
+                    return "completed"
+            elif self._timeout is not None and now - self._heard > self._timeout:
+                return f"ended: silence for {self._timeout:g} s"
+
+    def _heed(self, data: bytes, sender: Sender, now: float) -> bool:
+        """Do what a datagram asks for; return whether it is of the autopilot."""
+        packet = wire.decode(data)
+        if packet is None or packet.frame_rate < LOWEST_RATE:
+            self.counts.malformed += 1
+            what = "no servo packet" if packet is None else f"a servo packet of {packet.frame_rate} frames a second"
+            self._warn("malformed", f"{len(data)} bytes from {sender[0]}:{sender[1]}, {what}: ignored")
+            return False
+        if sender != self._sender and not self._admit(packet, sender, now):
+            return False
+        frame = self._lockstep.judge(packet.frame_count)
+        if frame == "resent":
+            self.counts.resent += 1
+        else:
+            if frame == "gap":
+                self._lose(self._lockstep.missed)
+            elif frame != "next":
+                self._begin(packet.frame_rate)
+            self._step(packet)
+        try:
+            self._socket.sendto(self._answer, sender)
+        except OSError as error:
+            self.counts.unsent += 1
+            self._warn("sending", f"UDP to {sender[0]}:{sender[1]}: {error.strerror or error}")
+        return True
+
+    def _admit(self, packet: wire.ServoPacket, sender: Sender, now: float) -> bool:
+        """Let a new sender in, unless the one before is still there."""
+        if self._sender is not None:
+            there = f"{self._sender[0]}:{self._sender[1]}"
+            if now - self._heard < _PRESENT:
+                self.counts.refused += 1
+                self._warn("refused", f"{sender[0]}:{sender[1]} sends too, beside {there}: refused")
+                return False
+            if self._lockstep.count is None or packet.frame_count != self._lockstep.count + 1:
+                self._lockstep = Lockstep()  # not the same one from another port: whatever its count, it begins anew
+        self._sender = sender
+        return True
+
+    def _begin(self, frame_rate: int) -> None:
+        if self._flights.flight is not None:
+            self._flights.end(RESTARTED)
+        flight = self._flights.begin(frame_rate)
+        sender = f"{self._sender[0]}:{self._sender[1]}" if self._sender else "nobody"
+        self._tell(f"{flight.folder}: {sender} flies, {frame_rate} frames a simulated second")
+
+    def _lose(self, missed: int) -> None:
+        self.counts.lost += missed
+        self._flights.law.lost += missed
+        self._warn("lost", f"{missed} frames of the autopilot have not come: one step is made for all")
+
+    def _step(self, packet: wire.ServoPacket) -> None:
+        flight = self._flights.flight
+        assert flight is not None
+        self._flights.law.take(packet.pwm)
+        self._answer = wire.encode(flight.step())
+        self.counts.steps += 1
+
+    def _warn(self, kind: str, text: str) -> None:
+        """Warn, of each kind now and then."""
+        now = time.monotonic()
+        if now - self._warned.get(kind, -_WARNING_PERIOD) >= _WARNING_PERIOD:
+            self._warned[kind] = now
+            log.warning("%s", text)

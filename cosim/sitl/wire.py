@@ -1,0 +1,79 @@
+"""The wire of ArduPilot's JSON backend: servo packets in, a line of JSON out.
+
+The autopilot reads the line with a search for the bare key words, and takes the number two characters behind the first
+one that it finds: so there is no blank behind a colon, and no key that holds another one's word before it.
+"""
+
+from __future__ import annotations
+
+import math
+import struct
+from dataclasses import dataclass
+
+from cosim.errors import RunError
+from cosim.sitl.motion import Motion
+
+PORT = 9002  # where ArduPilot looks for its plant
+LARGEST = 72  # bytes of a servo packet
+
+_MAGICS = {18458: struct.Struct("<HHI16H"), 29569: struct.Struct("<HHI32H")}
+_MAGIC_OF_LENGTH = {packing.size: (magic, packing) for magic, packing in _MAGICS.items()}
+
+
+@dataclass(frozen=True, slots=True)
+class ServoPacket:
+    """One frame of the autopilot."""
+
+    frame_rate: int  # Hz
+    frame_count: int  # of the frames that the autopilot has taken in since it started
+    pwm: tuple[int, ...]  # us, 16 or 32 servo outputs, 0 for one that gives no pulse
+
+
+def decode(data: bytes) -> ServoPacket | None:
+    """Read a servo packet.
+
+    Parameters
+    ----------
+    data : bytes
+        A datagram.
+
+    Returns
+    -------
+    ServoPacket or None
+        None if it is none.
+    """
+    magic, packing = _MAGIC_OF_LENGTH.get(len(data), (0, None))
+    if packing is None:
+        return None
+    came, frame_rate, frame_count, *pwm = packing.unpack(data)
+    return ServoPacket(frame_rate, frame_count, tuple(pwm)) if came == magic else None
+
+
+def encode(motion: Motion) -> bytes:
+    """Write the plant's state as the autopilot reads it.
+
+    Parameters
+    ----------
+    motion : Motion
+        Of the vehicle.
+
+    Returns
+    -------
+    bytes
+        A line of JSON between two ends of lines; each number reads back to the same bits.
+
+    Raises
+    ------
+    RunError
+        If a number is not finite, which JSON cannot say.
+    """
+    t, (p, q, r), (fx, fy, fz), (x, y, z), (vx, vy, vz), (roll, pitch, yaw), (e0, e1, e2, e3), altitude = motion
+    total = t + p + q + r + fx + fy + fz + x + y + z + vx + vy + vz + roll + pitch + yaw + e0 + e1 + e2 + e3
+    if not math.isfinite(total + (altitude or 0.0)):
+        raise RunError(f"t = {t:g} s: the vehicle's state is not finite: {motion}")
+    below = "" if altitude is None else f',"rng_1":{altitude!r}'
+    return (
+        f'\n{{"timestamp":{t!r},"imu":{{"gyro":[{p!r},{q!r},{r!r}],"accel_body":[{fx!r},{fy!r},{fz!r}]}},'
+        f'"position":[{x!r},{y!r},{z!r}],"velocity":[{vx!r},{vy!r},{vz!r}],'
+        f'"attitude":[{roll!r},{pitch!r},{yaw!r}],"quaternion":[{e0!r},{e1!r},{e2!r},{e3!r}]{below}}}\n'
+    ).encode("ascii")

@@ -1,0 +1,63 @@
+"""How an autopilot's servo outputs drive a vehicle's thrusters; the FMU knows nothing of it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal
+
+MOST_CHANNELS = 32  # of the longer servo packet
+SHORTEST, LONGEST = 800, 2200  # us, of a pulse that a speed controller takes for one
+
+
+@dataclass(frozen=True)
+class Autopilot:
+    """The table ``autopilot`` of a vehicle's file."""
+
+    frame: str  # the autopilot's name for the arrangement of the thrusters, such as vectored_6dof
+    channels: tuple[int, ...] = ()  # servo output of each thruster, from 1; 0 for none. Default: 1, 2, 3 ...
+    signs: int | tuple[int, ...] = 1  # -1 where a pulse above neutral makes a thruster's force negative
+    pwm_neutral: int = 1500  # us
+    pwm_span: int = 400  # us, from neutral to full
+    pwm_dead_band: int = 25  # us, to either side of neutral, that give no force
+    curve: Literal["linear", "quadratic"] = "quadratic"  # of the force, over the part of the span
+
+
+def checked_autopilot(
+    autopilot: Autopilot, n_thrusters: int, require: Callable[[bool, str, object, str], None]
+) -> Autopilot:
+    """Return the table with a channel and a sign for each thruster.
+
+    Parameters
+    ----------
+    autopilot : Autopilot
+        As it stands in the file.
+    n_thrusters : int
+        Of the vehicle.
+    require : callable
+        Raises unless its first argument is true; then come the key, what it is, and what was expected.
+
+    Returns
+    -------
+    Autopilot
+        Complete.
+    """
+    given = autopilot
+    channels = given.channels or tuple(range(1, n_thrusters + 1))
+    signs = given.signs if isinstance(given.signs, tuple) else (given.signs,) * n_thrusters
+    require(bool(given.frame) and given.frame.isprintable(), "autopilot.frame", repr(given.frame), "a name")
+    for key, values in (("channels", channels), ("signs", signs)):
+        require(len(values) == n_thrusters, f"autopilot.{key}", f"{len(values)} numbers", f"{n_thrusters}")
+    good = all(0 <= channel <= MOST_CHANNELS for channel in channels)
+    require(good, "autopilot.channels", channels, f"1 to {MOST_CHANNELS}, or 0 for none")
+    used = [channel for channel in channels if channel]
+    require(len(set(used)) == len(used), "autopilot.channels", channels, "each servo output once")
+    require(all(abs(sign) == 1 for sign in signs), "autopilot.signs", signs, "1 or -1")
+    good = given.pwm_neutral - given.pwm_span >= SHORTEST and given.pwm_neutral + given.pwm_span <= LONGEST
+    came = f"{given.pwm_neutral} and {given.pwm_span} us"
+    require(
+        good and given.pwm_span > 0, "autopilot.pwm_neutral and pwm_span", came, f"pulses of {SHORTEST} to {LONGEST} us"
+    )
+    good = 0 <= given.pwm_dead_band < given.pwm_span
+    require(good, "autopilot.pwm_dead_band", f"{given.pwm_dead_band} us", "0 or above, and less than pwm_span")
+    return Autopilot(given.frame, channels, signs, given.pwm_neutral, given.pwm_span, given.pwm_dead_band, given.curve)

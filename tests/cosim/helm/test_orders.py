@@ -1,0 +1,125 @@
+"""Orders, their queue and their log."""
+
+import math
+
+import msgspec
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from cosim.errors import OrderError, RunError
+from cosim.helm import LoggedOrders, OrderQueue, RecordedOrders
+from cosim.helm.orders import (
+    MODES,
+    Aim,
+    Arm,
+    Begin,
+    Change,
+    Face,
+    Forget,
+    Item,
+    Mission,
+    Obstacle,
+    Reset,
+    Steer,
+    Sticks,
+    check_order,
+)
+from cosim.helm.sources import QUEUED
+
+number = st.floats(-1e4, 1e4)
+place = st.tuples(number, number, number)
+radius = st.floats(1e-3, 1e3)
+ORDERS = st.one_of(
+    st.builds(Arm, st.booleans()),
+    st.builds(Steer, st.sampled_from(MODES)),
+    st.builds(Aim, place, st.none() | radius, st.tuples(*[st.floats(-9, 9)] * 3)),
+    st.builds(Face, number),
+    st.builds(Sticks, st.tuples(*[st.floats(-1, 1)] * 6)),
+    st.builds(Obstacle, st.integers(0, 1 << 16), place, radius),
+    st.builds(Forget, st.integers(0, 1 << 16)),
+    st.builds(Change, st.text(max_size=30), number),
+    st.builds(Mission, st.lists(st.builds(Item, place, st.none() | radius, st.none() | st.floats(0, 99))).map(tuple)),
+    st.builds(Begin, st.integers(0, 99)),
+    st.just(Reset()),
+)
+
+
+@given(st.lists(st.tuples(st.integers(0, 9), ORDERS), max_size=20))
+def test_the_log_gives_back_every_order_at_its_step(tmp_path_factory, given_orders):
+    file = tmp_path_factory.mktemp("log") / "orders.jsonl"
+    queue, by_step = OrderQueue(), {}
+    for k, order in given_orders:
+        by_step.setdefault(k, []).append(order)
+    logged = LoggedOrders(queue, file)
+    for k in range(10):
+        for order in by_step.get(k, []):
+            assert queue.give(order)
+        assert list(logged.take(k)) == by_step.get(k, [])
+    if not given_orders:
+        assert not file.exists()
+        return
+    recorded = RecordedOrders(file)
+    for k in range(10):
+        assert list(recorded.take(k)) == by_step.get(k, [])
+    assert recorded.exhausted
+
+
+def test_a_flood_is_refused_not_kept():
+    queue = OrderQueue()
+    assert all(queue.give(Arm(True)) for _ in range(QUEUED))
+    assert not queue.give(Arm(False))
+    assert len(queue.take(0)) == QUEUED
+    assert queue.give(Arm(False))
+
+
+@pytest.mark.parametrize(
+    "order",
+    [
+        Aim((math.nan, 0.0, 0.0)),
+        Aim((0.0, math.inf, 0.0)),
+        Aim((0.0, 0.0, 0.0), radius=0.0),
+        Aim((0.0, 0.0, 0.0), velocity=(1e3, 0.0, 0.0)),
+        Obstacle(1, (0.0, 0.0, 1e9), 1.0),
+        Obstacle(1, (0.0, 0.0, 0.0), math.nan),
+        Sticks((1.1, 0.0, 0.0, 0.0, 0.0, 0.0)),
+        Sticks((math.nan,) * 6),
+        Face(math.inf),
+        Change("goal.radius", math.nan),
+        Mission((Item((0.0, 0.0, 0.0), stay=-1.0),)),
+        Mission((Item((0.0, 0.0, math.nan)),)),
+    ],
+)
+def test_absurd_numbers_are_refused(order):
+    with pytest.raises(OrderError, match=r"is .*, expected"):
+        check_order(order)
+    with pytest.raises(OrderError):
+        OrderQueue().give(order)
+
+
+@pytest.mark.parametrize(
+    "line",
+    [b"no JSON", b'{"step":1}', b'{"step":1,"order":{"order":"fly"}}', b'{"step":1,"order":{"order":"arm"}}',
+     b'{"step":1,"order":{"order":"face","heading":1,"and":2}}', b'{"step":1,"order":{"order":"face","heading":null}}',
+     b'{"step":1,"order":{"order":"aim","position":[1e9,0,0]}}'],
+)  # fmt: skip
+def test_a_broken_log_names_the_line(tmp_path, line):
+    file = tmp_path / "orders.jsonl"
+    file.write_bytes(b'{"step":0,"order":{"order":"reset"}}\n' + line + b"\n")
+    with pytest.raises(RunError, match="line 2"):
+        RecordedOrders(file)
+
+
+def test_no_log_is_one_line(tmp_path):
+    with pytest.raises(RunError, match="No such file"):
+        RecordedOrders(tmp_path / "none.jsonl")
+
+
+def test_a_line_of_the_log_reads_well(tmp_path):
+    logged = LoggedOrders(queue := OrderQueue(), tmp_path / "log")
+    queue.give(Aim((1.0, 2.0, 3.0), 0.5))
+    logged.take(7)
+    assert msgspec.json.decode((tmp_path / "log").read_bytes()) == {
+        "step": 7,
+        "order": {"order": "aim", "position": [1.0, 2.0, 3.0], "radius": 0.5, "velocity": [0.0, 0.0, 0.0]},
+    }

@@ -1,0 +1,79 @@
+"""Real clients: each in an environment of its own, made once and kept in pytest's cache; and the vehicle they meet."""
+
+from __future__ import annotations
+
+import contextlib
+import fcntl
+import shutil
+import socket
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+INSTALLING = 420.0  # s, for pip or npm
+HERE = Path(__file__).parent
+
+
+@pytest.fixture(scope="session")
+def environment(request):
+    """Return a function that gives the folder of a virtual environment with some packages, or skips."""
+
+    def make(name, *requirements):
+        folder = request.config.cache.mkdir("mavlink-clients") / name
+        with _locked(folder):
+            if not (folder / "made").exists():
+                shutil.rmtree(folder, ignore_errors=True)
+                _install([sys.executable, "-m", "venv", str(folder)])
+                _install([str(folder / "bin" / "python"), "-m", "pip", "install", "-q", *requirements])
+                (folder / "made").touch()
+        return folder
+
+    return make
+
+
+@pytest.fixture(scope="session")
+def node_mavlink(request):
+    """Return a folder in which node finds node-mavlink, or skip."""
+    if not (shutil.which("node") and shutil.which("npm")):
+        pytest.skip("node or npm is not here")
+    folder = request.config.cache.mkdir("mavlink-clients") / "node"
+    with _locked(folder):
+        if not (folder / "made").exists():
+            shutil.rmtree(folder, ignore_errors=True)
+            folder.mkdir()
+            (folder / "package.json").write_text("{}")
+            _install(["npm", "install", "--no-audit", "--no-fund", "node-mavlink@2"], folder)
+            (folder / "made").touch()
+    return folder
+
+
+@contextlib.contextmanager
+def _locked(folder):
+    """Let one process at a time make an environment."""
+    with folder.with_suffix(".lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        yield
+
+
+def _install(command, folder=None):
+    try:
+        subprocess.run(command, check=True, capture_output=True, text=True, timeout=INSTALLING, cwd=folder)
+    except subprocess.TimeoutExpired:
+        pytest.skip(f"{command[0]}: took more than {INSTALLING:g} s")
+    except subprocess.CalledProcessError as error:
+        last = (error.stderr.strip().splitlines() or ["no word of why"])[-1]
+        pytest.skip(f"cannot be installed: {last}")
+
+
+@pytest.fixture(scope="session")
+def udp_port():
+    """Return a function that gives a port of loopback that is free now."""
+
+    def free():
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as s:
+            s.bind(("127.0.0.1", 0))
+            return s.getsockname()[1]
+
+    return free

@@ -1,0 +1,192 @@
+"""Run by the tests in an environment that has MAVSDK, 4 or older: does what a user does, prints a JSON object.
+
+python mavsdk_client.py udpin://127.0.0.1:PORT
+"""
+
+import asyncio
+import contextlib
+import json
+import math
+import os
+import sys
+import time
+
+try:  # MAVSDK 4: in this process
+    from mavsdk.asyncio import ComponentType, Configuration, Mavsdk
+    from mavsdk.asyncio.plugins.action import ActionAsync
+    from mavsdk.asyncio.plugins.info import InfoAsync
+    from mavsdk.asyncio.plugins.mission_raw import MissionRawAsync
+    from mavsdk.asyncio.plugins.offboard import OffboardAsync
+    from mavsdk.asyncio.plugins.param import ParamAsync
+    from mavsdk.asyncio.plugins.telemetry import TelemetryAsync
+    from mavsdk.plugins.info import InfoError
+    from mavsdk.plugins.offboard import PositionNedYaw
+    from mavsdk.plugins.param import ParamError
+except ImportError:
+    Mavsdk = None
+    from mavsdk import System
+    from mavsdk.info import InfoError
+    from mavsdk.offboard import PositionNedYaw
+    from mavsdk.param import ParamError
+
+PATIENCE = 20.0  # s, for a step
+FAR, NEARER = 4e-5, 1e-5  # deg, about 4.4 m and 1.1 m
+
+
+class Vehicle:
+    """What both generations of the API have in common."""
+
+    async def connect(self, address):
+        if Mavsdk is None:
+            self.system = System()
+            await self.system.connect(system_address=address)
+            await first(self.system.core.connection_state(), lambda state: state.is_connected)
+            for name in ("telemetry", "param", "action", "mission_raw", "offboard", "info"):
+                setattr(self, name, getattr(self.system, name))
+            return
+        self.mavsdk = Mavsdk(Configuration.create_with_component_type(ComponentType.GROUND_STATION))
+        await self.mavsdk.add_any_connection(address)
+        system = await self.mavsdk.first_autopilot(PATIENCE)
+        assert system is not None, "no autopilot"
+        self.telemetry, self.param, self.action = TelemetryAsync(system), ParamAsync(system), ActionAsync(system)
+        self.mission_raw, self.offboard, self.info = MissionRawAsync(system), OffboardAsync(system), InfoAsync(system)
+
+    def stream(self, name):
+        return getattr(self.telemetry, name if Mavsdk is None else f"subscribe_{name}")()
+
+
+async def first(stream, wanted=lambda value: True):
+    """Return the first value that is wanted."""
+    async for value in stream:
+        if wanted(value):
+            return value
+    raise AssertionError("the stream ended")
+
+
+def fields(value, *names):
+    return [getattr(value, name) for name in names]
+
+
+async def steps(vehicle, address):
+    """Yield each step's name and what does it."""
+    yield "connect", vehicle.connect(address)
+    yield "health", first(vehicle.stream("health_all_ok"), bool)
+
+    async def position():
+        there = await first(vehicle.stream("position"))
+        return fields(there, "latitude_deg", "longitude_deg", "relative_altitude_m", "absolute_altitude_m")
+
+    async def ned():
+        there = await first(vehicle.stream("position_velocity_ned"))
+        return fields(there.position, "north_m", "east_m", "down_m")
+
+    async def attitude():
+        return fields(await first(vehicle.stream("attitude_euler")), "roll_deg", "pitch_deg", "yaw_deg")
+
+    async def mode(name=None):
+        return (await first(vehicle.stream("flight_mode"), lambda mode: name in (None, mode.name))).name
+
+    async def all_params():
+        found = await vehicle.param.get_all_params()
+        return {p.name: p.value for p in [*found.float_params, *found.int_params]}
+
+    async def change_param():
+        found = await vehicle.param.get_all_params()
+        before = next(p for p in found.float_params if p.value > 1.0)
+        await vehicle.param.set_param_float(before.name, before.value * 1.25)
+        after = await vehicle.param.get_param_float(before.name)
+        await vehicle.param.set_param_float(before.name, before.value)
+        return [before.name, before.value, after, await vehicle.param.get_param_float(before.name)]
+
+    async def refused_param():
+        """Ask for what is out of range."""
+        found = await vehicle.param.get_all_params()
+        before = next(p for p in found.float_params if p.value > 1.0)
+        try:
+            await vehicle.param.set_param_float(before.name, -1e30)
+        except ParamError as error:
+            return [str(error), before.value, await vehicle.param.get_param_float(before.name)]
+        return ["taken", before.value, await vehicle.param.get_param_float(before.name)]
+
+    async def unknown_param():
+        try:
+            return await vehicle.param.get_param_float("NO_SUCH_PARAM")
+        except ParamError as error:
+            return str(error)
+
+    async def arm():
+        await vehicle.action.arm()
+        return await first(vehicle.stream("armed"), bool)
+
+    async def disarm():
+        await vehicle.action.disarm()
+        return await first(vehicle.stream("armed"), lambda armed: not armed)
+
+    async def go_to():
+        there = await first(vehicle.stream("position"))
+        target = there.latitude_deg + FAR, there.longitude_deg
+        await vehicle.action.goto_location(*target, there.absolute_altitude_m, math.nan)
+        closer = await first(vehicle.stream("position"), lambda p: abs(p.latitude_deg - target[0]) < 0.5 * FAR)
+        return [there.latitude_deg, closer.latitude_deg, target[0]]
+
+    async def hold():
+        await vehicle.action.hold()
+        return await mode("HOLD")
+
+    async def offboard():
+        there = await ned()
+        target = PositionNedYaw(there[0] + 0.5, there[1], there[2], 0.0)
+        await vehicle.offboard.set_position_ned(target)
+        await vehicle.offboard.start()
+        shown = await mode("OFFBOARD")
+        await vehicle.offboard.stop()
+        return shown
+
+    async def missions():
+        return len(await vehicle.mission_raw.download_mission())
+
+    async def speed():
+        """Return how fast the clock goes, which is known after some messages only."""
+        while True:
+            with contextlib.suppress(InfoError):
+                if math.isfinite(factor := await vehicle.info.get_speed_factor()):
+                    return factor
+            await asyncio.sleep(0.2)
+
+    yield "position", position()
+    yield "ned", ned()
+    yield "attitude", attitude()
+    yield "mode", mode()
+    yield "params", all_params()
+    yield "change_param", change_param()
+    yield "refused_param", refused_param()
+    yield "unknown_param", unknown_param()
+    yield "missions", missions()
+    yield "speed", speed()
+    yield "arm", arm()
+    yield "go_to", go_to()
+    yield "hold", hold()
+    yield "offboard", offboard()
+    yield "disarm", disarm()
+
+
+async def main(address):
+    """Do all steps; a step that fails does not hinder the next ones."""
+    done = {}
+    async for name, work in steps(Vehicle(), address):
+        began = time.monotonic()
+        try:
+            value = await asyncio.wait_for(work, PATIENCE)
+            done[name] = {"value": value, "seconds": round(time.monotonic() - began, 3)}
+        except Exception as error:  # noqa: BLE001  whatever it is, it is told, and the next step is tried
+            text = f"{type(error).__name__}: {error}"
+            done[name] = {"error": text, "seconds": round(time.monotonic() - began, 3)}
+            if name == "connect":
+                break
+    return done
+
+
+if __name__ == "__main__":
+    sys.stdout.write(json.dumps(asyncio.run(main(sys.argv[1]))))
+    sys.stdout.flush()
+    os._exit(0)  # neither library always lets go of its threads

@@ -1,0 +1,103 @@
+"""MAVProxy, headless, with its commands on standard input, as a pilot types them."""
+
+import os
+import re
+import subprocess
+import threading
+import time
+
+import pytest
+
+pytest.importorskip("pymavlink", reason="the mavlink extra is not installed")
+
+from cosim.mavlink.conformance.vehicle import running_vehicle
+from cosim.mavlink.endpoint import parse_endpoint
+from cosim.mavlink.options import MavlinkOptions
+
+pytestmark = pytest.mark.slow
+
+REQUIREMENTS = ("MAVProxy>=1.8.75", "pymavlink>=2.4.49", "setuptools<81", "future")
+MODULES = "param,wp,fence,mode,arm,cmdlong,link,misc,rc,signing,output,log"
+PATIENCE = 30.0  # s, for what is to be seen
+
+
+class MavProxy:
+    """The process, and all that it has printed."""
+
+    def __init__(self, python, folder, port):
+        self.text, self.began = "", time.monotonic()
+        self.process = subprocess.Popen(
+            [python, "-u", python.parent / "mavproxy.py", f"--master=udpin:127.0.0.1:{port}",
+             f"--state-basedir={folder}", f"--default-modules={MODULES}"],
+            stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, cwd=folder,
+            env={**os.environ, "HOME": str(folder), "MPLBACKEND": "Agg"},
+        )  # fmt: skip
+        self.reader = threading.Thread(target=self.read)
+        self.reader.start()
+
+    def read(self):
+        for line in self.process.stdout:
+            self.text += line
+
+    def type(self, line):
+        self.process.stdin.write(f"{line}\n")
+        self.process.stdin.flush()
+
+    def see(self, pattern, since=0):
+        """Return the match of what is to be printed."""
+        end = time.monotonic() + PATIENCE
+        while time.monotonic() < end:
+            found = re.search(pattern, self.text[since:])
+            if found:
+                return found
+            time.sleep(0.05)
+        raise AssertionError(f"{pattern!r} was not seen in:\n{self.text[-3000:]}")
+
+    def do(self, line, *patterns):
+        """Type a line and return the matches of what is to be printed after it."""
+        since = len(self.text)
+        self.type(line)
+        return [self.see(pattern, since) for pattern in patterns]
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.process.stdin.close()
+        try:
+            self.process.wait(10)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+        self.reader.join()
+        self.process.stdout.close()
+
+
+@pytest.fixture
+def vehicle_port(udp_port):
+    port = udp_port()
+    with running_vehicle(
+        [parse_endpoint(f"udpout:127.0.0.1:{port}")], MavlinkOptions(profile="ardusub", commands=True)
+    ):
+        yield port
+
+
+def test_a_pilot_connects_arms_changes_modes_and_lists_what_there_is(environment, vehicle_port, tmp_path):
+    python = environment("mavproxy", *REQUIREMENTS) / "bin" / "python"
+    with MavProxy(python, tmp_path, vehicle_port) as mavproxy:
+        mavproxy.see(r"Detected vehicle 1:1")
+        received = int(mavproxy.see(r"Received (\d+) parameters").group(1))
+        assert received > 10
+        mavproxy.do("param fetch", rf"Received {received} parameters")
+        assert (tmp_path / "mav.parm").read_text().count("\n") == received
+
+        mavproxy.do("disarm", "DISARMED")
+        mavproxy.do("arm throttle", "COMPONENT_ARM_DISARM: ACCEPTED", r"(?<!DIS)ARMED")
+        for mode in ("POSHOLD", "MANUAL", "SURFACE", "GUIDED"):
+            mavproxy.do(f"mode {mode}", f"Mode {mode}")
+        name, before = re.search(r"^(\S+)\s+([\d.]+)", (tmp_path / "mav.parm").read_text(), re.MULTILINE).groups()
+        mavproxy.do(f"param show {name}", rf"{name}\s+{float(before):.6f}")
+        mavproxy.do("wp list", r"Requesting 0 waypoints|Have 0 waypoints|Saved \d+ waypoints|\d+ waypoints")
+        mavproxy.do("status", r"MAV Errors: 0", r"SYS_STATUS", r"HOME_POSITION")
+        text = mavproxy.text.lower()
+    assert "fence breach" not in text
+    assert "traceback" not in text and "error in" not in text

@@ -1,0 +1,89 @@
+"""MAVSDK, the present generation and the one before, does what its users do with a running vehicle."""
+
+import json
+import subprocess
+
+import pytest
+
+pytest.importorskip("pymavlink", reason="the mavlink extra is not installed")
+
+from cosim.mavlink.conformance.vehicle import running_vehicle
+from cosim.mavlink.endpoint import parse_endpoint
+from cosim.mavlink.options import MavlinkOptions
+from tests.cosim.mavlink.clients.conftest import HERE
+
+pytestmark = pytest.mark.slow
+
+RUNNING = 240.0  # s, for all steps together
+REQUIREMENTS = {"mavsdk-4": "mavsdk>=4,<5", "mavsdk-3": "mavsdk<4"}
+
+
+@pytest.fixture(scope="module", params=["mavsdk-4", "mavsdk-3"])
+def generation(request):
+    return request.param
+
+
+@pytest.fixture(scope="module", params=["px4", "generic"])
+def flown(request, generation, environment, udp_port):
+    """Return what each step gave, and how long it took."""
+    python = environment(generation, REQUIREMENTS[generation]) / "bin" / "python"
+    port = udp_port()
+    options = MavlinkOptions(profile=request.param, commands=True)
+    with running_vehicle([parse_endpoint(f"udpout:127.0.0.1:{port}")], options):
+        done = subprocess.run(
+            [python, "-W", "ignore", HERE / "mavsdk_client.py", f"udpin://127.0.0.1:{port}"],
+            capture_output=True, text=True, timeout=RUNNING,
+        )  # fmt: skip
+    lines = [line for line in done.stdout.splitlines() if line.startswith("{")]
+    assert lines, done.stderr[-2000:]
+    return json.loads(lines[-1])
+
+
+def value(flown, step):
+    assert "error" not in flown[step], flown[step]["error"]
+    return flown[step]["value"]
+
+
+def test_every_step_comes_to_its_end(flown):
+    assert {name: done["error"] for name, done in flown.items() if "error" in done} == {}
+
+
+def test_health_is_all_ok(flown):
+    assert value(flown, "health") is True
+
+
+def test_position_and_attitude_are_those_of_the_run(flown):
+    latitude, longitude, relative, absolute = value(flown, "position")
+    down = value(flown, "ned")[2]
+    assert (latitude, longitude) == pytest.approx(MavlinkOptions().origin, abs=1e-3)
+    assert relative == pytest.approx(-down, abs=0.5) and absolute == pytest.approx(relative, abs=0.1)
+    assert all(abs(angle) <= 180.0 for angle in value(flown, "attitude"))
+
+
+def test_parameters_are_read_changed_and_refused(flown):
+    everything = value(flown, "params")
+    assert len(everything) > 10
+    name, before, after, again = value(flown, "change_param")
+    assert everything[name] == pytest.approx(before) == pytest.approx(again)
+    assert after == pytest.approx(1.25 * before, rel=1e-5)
+    word, before, after = value(flown, "refused_param")
+    assert word != "taken" and after == pytest.approx(before)
+
+
+def test_an_unknown_parameter_is_told_of_at_once(flown):
+    assert "DOES_NOT_EXIST" in value(flown, "unknown_param")
+    assert flown["unknown_param"]["seconds"] < 1.0  # it gives up after 3 s otherwise
+
+
+def test_a_go_to_moves_the_vehicle(flown):
+    before, after, target = value(flown, "go_to")
+    assert abs(after - target) < abs(before - target)
+
+
+def test_hold_and_offboard_are_shown_as_such(flown):
+    assert value(flown, "hold") == "HOLD"
+    assert value(flown, "offboard") == "OFFBOARD"
+
+
+def test_its_clock_goes_as_the_wall_clock_does(flown):
+    assert value(flown, "speed") == pytest.approx(1.0, abs=0.1)

@@ -1,0 +1,96 @@
+"""Where links lead: what is understood, and what is refused in which words."""
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from cosim.errors import TelemetryError
+from cosim.mavlink.endpoint import Endpoint, parse_endpoint
+
+
+@pytest.mark.parametrize(
+    ("text", "kind", "host", "port"),
+    [
+        ("udpout:127.0.0.1:14550", "udpout", "127.0.0.1", 14550),
+        ("udpout:localhost:1", "udpout", "127.0.0.1", 1),
+        ("udpin:127.0.0.2:65535", "udpin", "127.0.0.2", 65535),
+        ("tcpin:127.0.0.1:5760", "tcpin", "127.0.0.1", 5760),
+        ("tcp:127.0.0.1:5760", "tcp", "127.0.0.1", 5760),
+        ("udpin://127.0.0.1:14550", "udpin", "127.0.0.1", 14550),
+        ("udpout://127.0.0.1:14550", "udpout", "127.0.0.1", 14550),
+        ("tcpout://127.0.0.1:5760", "tcp", "127.0.0.1", 5760),
+        ("tcpin://localhost:5760", "tcpin", "127.0.0.1", 5760),
+    ],
+)
+def test_networks(text, kind, host, port):
+    assert parse_endpoint(text) == Endpoint(kind, text, host=host, port=port)
+
+
+@pytest.mark.parametrize(
+    ("text", "path", "baud"),
+    [
+        ("serial:/dev/ttyUSB0", "/dev/ttyUSB0", 57600),
+        ("serial:/dev/ttyUSB0:115200", "/dev/ttyUSB0", 115200),
+        ("serial:///dev/ttyACM0:921600", "/dev/ttyACM0", 921600),
+        ("serial:COM7:57600", "COM7", 57600),
+    ],
+)
+def test_serial_lines_need_no_leave(text, path, baud):
+    assert parse_endpoint(text) == Endpoint("serial", text, path=path, baud=baud)
+
+
+def test_a_log_is_a_new_file(tmp_path):
+    path = tmp_path / "dive.tlog"
+    assert parse_endpoint(str(path)) == Endpoint("tlog", str(path), path=str(path))
+    path.touch()
+    with pytest.raises(TelemetryError, match="the file exists"):
+        parse_endpoint(str(path))
+    with pytest.raises(TelemetryError, match="there is no folder"):
+        parse_endpoint(str(tmp_path / "none" / "dive.tlog"))
+
+
+def test_beyond_this_machine_only_with_leave():
+    for text in ("udpout:192.0.2.1:14550", "udpin://0.0.0.0:14550", "tcpin:0.0.0.0:5760", "tcp:192.0.2.1:5760"):
+        with pytest.raises(TelemetryError, match="beyond this machine; --allow-remote"):
+            parse_endpoint(text)
+        assert parse_endpoint(text, allow_remote=True).text == text
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("", "udpout:, udpin:, tcpin: or tcp:HOST:PORT, serial:"),
+        ("127.0.0.1:14550", "udpout:, udpin:"),
+        ("udp:127.0.0.1:14550", "udpout:, udpin:"),
+        ("http://127.0.0.1:14550", "udpout:, udpin:"),
+        ("udpout:127.0.0.1", "expected udpout:HOST:PORT, such as udpout:127.0.0.1:14550"),
+        ("udpin::14550", "expected udpin:HOST:PORT"),
+        ("udpin://:14550", "expected udpin:HOST:PORT"),
+        ("tcpin:127.0.0.1:0", "expected tcpin:HOST:PORT"),
+        ("tcpin:127.0.0.1:99999", "expected tcpin:HOST:PORT"),
+        ("tcpin:127.0.0.1:65536", "expected tcpin:HOST:PORT"),
+        ("udpout:127.0.0.1:١٢٣", "expected udpout:HOST:PORT"),
+        ("udpout:127.0.0.1:" + "1" * 5000, "expected udpout:HOST:PORT"),
+        ("udpout:a..b:14550", "a..b"),
+        (f"udpout:{'a' * 70}:14550", "aaa"),
+        ("udpout:::1:14550", "is not known"),
+        ("serial:", "expected serial:DEVICE"),
+        ("serial:/dev/ttyUSB0:", "expected serial:DEVICE"),
+        ("serial:/dev/ttyUSB0:fast", "expected serial:DEVICE"),
+        ("serial::57600", "expected serial:DEVICE"),
+    ],
+)
+def test_what_cannot_be_is_refused(text, words):
+    with pytest.raises(TelemetryError, match=words) as caught:
+        parse_endpoint(text)
+    assert repr(text) in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+@given(st.text(max_size=40).map("udpout:".__add__) | st.text(max_size=40) | st.from_regex(r"[a-z]{3,7}:(//)?\d+:\w*"))
+def test_whatever_is_written_is_understood_or_refused(text):
+    try:
+        found = parse_endpoint(text)
+    except TelemetryError:
+        return
+    assert found.text == text

@@ -1,0 +1,204 @@
+"""Frames: found in datagrams and streams, whatever stands between them; every check against pymavlink's own codec."""
+
+import random
+import struct
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from cosim.mavlink.framing import StreamReader, kinds
+from tests.cosim.mavlink.stubs import Station, attitude, heartbeat, mavlink, odometry, open_gate, request_list
+
+
+def any_message(kind):
+    """Return a message of a class with other values than 0 in all of its fields."""
+    values = []
+    for name in kind.fieldnames:
+        array = kind.array_lengths[kind.ordered_fieldnames.index(name)]
+        sort = kind.fieldtypes[kind.fieldnames.index(name)]
+        if sort == "char":
+            values.append(b"x" * max(array, 1))
+        else:
+            values.append([3] * array if array else 3)
+    return kind(*values)
+
+
+def names(frames):
+    return [message.get_type() for _, message in frames]
+
+
+def refusals(counts):
+    return {name: getattr(counts, name) for name in counts.__slots__ if name != "accepted" and getattr(counts, name)}
+
+
+@pytest.mark.parametrize("v1", [False, True])
+def test_each_message_of_the_dialect_passes_when_meant_for_us_and_only_then(v1):
+    station = Station()
+    for number, kind in mavlink.mavlink_map.items():
+        if v1 and number > 255:
+            continue
+        frame = station.pack(any_message(kind), v1)
+        ours, theirs = open_gate(own=(3, 1)), open_gate(own=(4, 1))
+        found = list(ours.datagram(frame))
+        if kind.msgname == "SETUP_SIGNING":
+            assert not found and ours.counts.setup_signing == 1
+            continue
+        assert names(found) == [kind.msgname]
+        assert found[0][0] == frame
+        assert found[0][1].to_dict() == station.parse(frame)[0].to_dict()
+        meant = any(name in kind.fieldnames for name in ("target_system", "target"))
+        assert len(list(theirs.datagram(frame))) == (not meant)
+        assert theirs.counts.foreign == meant
+
+
+def test_what_is_for_everybody_is_for_us_and_so_is_each_component():
+    gate, station = open_gate(), Station()
+    assert names(gate.datagram(station.pack(request_list(0)))) == ["PARAM_REQUEST_LIST"]  # zeros are cut off
+    assert names(gate.datagram(station.pack(mavlink.MAVLink_param_request_list_message(1, 77))))
+    assert names(gate.datagram(station.pack(mavlink.MAVLink_manual_control_message(1, 1, 2, 3, 4, 0))))
+    assert not names(gate.datagram(station.pack(mavlink.MAVLink_manual_control_message(2, 1, 2, 3, 4, 0))))
+    assert refusals(gate.counts) == {"foreign": 1}
+
+
+def test_our_own_frames_and_those_of_systems_that_are_not_allowed_are_refused():
+    gate = open_gate(allowed=frozenset({1, 255}))
+    assert not list(gate.datagram(Station(1, 1).pack(heartbeat())))
+    assert not list(gate.datagram(Station(245, 190).pack(heartbeat())))
+    assert len(list(gate.datagram(Station(1, 191).pack(heartbeat())))) == 1  # a companion of ours
+    assert len(list(gate.datagram(Station(255, 190).pack(heartbeat())))) == 1
+    assert refusals(gate.counts) == {"own": 1, "system": 1}
+
+
+def test_the_key_is_never_changed_from_outside():
+    gate = open_gate()
+    assert not list(gate.datagram(Station().pack(mavlink.MAVLink_setup_signing_message(1, 1, [1] * 32, 5))))
+    assert refusals(gate.counts) == {"setup_signing": 1}
+
+
+def test_an_unknown_message_is_dropped_and_its_neighbours_are_not():
+    station = Station()
+    unknown = bytearray(station.pack(attitude(1)))
+    unknown[7:10] = (0xABCDEF).to_bytes(3, "little")
+    gate = open_gate()
+    data = station.pack(heartbeat()) + unknown + station.pack(attitude(2))
+    assert names(gate.datagram(data)) == ["HEARTBEAT", "ATTITUDE"]
+    assert refusals(gate.counts) == {"unknown": 1}
+    assert gate.counts.refused() == {}  # nothing that a user need hear of
+    gate = open_gate()
+    assert names(StreamReader(gate).read(data)) == ["HEARTBEAT", "ATTITUDE"]
+    assert refusals(gate.counts) == {"unknown": 1}
+
+
+@pytest.mark.parametrize("bad", [b"\xfd\xff\x00", b"\xfe", b"\xfd" * 300, b"\xfe" * 300, b"junk", b"", None])
+def test_a_bad_datagram_costs_none_of_the_next_fifty(bad):
+    station = Station()
+    bad = station.pack(odometry())[:100] if bad is None else bad
+    frames = [station.pack(attitude(i)) for i in range(50)]
+    gate = open_gate()
+    assert not list(gate.datagram(bad))
+    assert [m.time_boot_ms for frame in frames for _, m in gate.datagram(frame)] == list(range(50))
+    reader = StreamReader(open_gate())  # and in one stream, however it is cut
+    data = bad + b"".join(frames)
+    found = [m.time_boot_ms for i in range(0, len(data), 7) for _, m in reader.read(data[i : i + 7])]
+    assert found == list(range(50))
+
+
+def test_a_frame_with_a_wrong_bit_is_refused_and_the_stream_goes_on():
+    station = Station()
+    good = station.pack(odometry())
+    for i in range(len(good) * 8):
+        bad = bytearray(good)
+        bad[i // 8] ^= 1 << i % 8
+        gate = open_gate()
+        assert not list(gate.datagram(bytes(bad)))
+        assert sum(refusals(gate.counts).values()) >= 1
+        reader = StreamReader(open_gate())
+        after = b"".join(station.pack(attitude(t)) for t in range(8))
+        assert names(reader.read(bytes(bad) + after)) == ["ATTITUDE"] * 8
+
+
+def test_a_decoder_that_refuses_a_payload_is_no_trouble():
+    """Flags that nobody knows must not be passed over."""
+    frame = bytearray(Station().pack(heartbeat()))
+    frame[2] = 2
+    crc = mavlink.x25crc(bytes(frame[1:-2]) + bytes([mavlink.MAVLink_heartbeat_message.crc_extra])).crc
+    frame[-2:] = struct.pack("<H", crc)
+    gate = open_gate()
+    assert not list(gate.datagram(bytes(frame)))
+    assert refusals(gate.counts) == {"malformed": 1}
+
+
+def test_a_payload_longer_than_ours_is_of_a_newer_sender_and_read_as_far_as_we_know():
+    payload = struct.pack("<IBBBBB", 7, 12, 0, 0, 4, 3) + b"new"
+    head = bytes([0xFD, len(payload), 0, 0, 0, 255, 190, 0, 0, 0]) + payload
+    crc = mavlink.x25crc(head[1:] + bytes([mavlink.MAVLink_heartbeat_message.crc_extra])).crc
+    ((_, message),) = open_gate().datagram(head + struct.pack("<H", crc))
+    assert message.custom_mode == 7 and message.mavlink_version == 3
+
+
+def test_a_stream_keeps_no_more_than_one_frame():
+    rng = random.Random(1)
+    reader = StreamReader(open_gate())
+    for data in (b"\xfd" * 5000, b"\xfe\xff" * 5000, rng.randbytes(20000), bytes(20000)):
+        for i in range(0, len(data), 97):
+            list(reader.read(data[i : i + 97]))
+            assert len(reader._rest) <= 280
+
+
+def test_a_stream_yields_what_pymavlink_finds_in_it():
+    station, rng = Station(), random.Random(0)
+    sent = [station.pack(any_message(kind)) for kind in mavlink.mavlink_map.values() if kind.msgname != "SETUP_SIGNING"]
+    data = b"".join(sent)
+    reader, found = StreamReader(open_gate(own=None)), []
+    at = 0
+    while at < len(data):
+        size = rng.randrange(1, 400)
+        found += [frame for frame, _ in reader.read(data[at : at + size])]
+        at += size
+    assert found == sent
+    assert [m.get_msgbuf() for m in station.parse(data)] == sent
+
+
+frames = st.sampled_from(
+    [Station().pack(m) for m in (heartbeat(), attitude(5), odometry(), request_list())]
+    + [Station().pack(heartbeat(), v1=True)]
+)
+pieces = st.lists(st.binary(max_size=300) | frames | frames.map(lambda f: f[:-3]) | frames.map(lambda f: f[3:]))
+
+
+@given(pieces, st.integers(1, 600))
+def test_nothing_raises_and_no_frame_comes_of_nothing(parts, chunk):
+    data = b"".join(parts)
+    gate = open_gate()
+    list(gate.datagram(data))
+    reader = StreamReader(open_gate())
+    for i in range(0, len(data), chunk):
+        for frame, _ in reader.read(data[i : i + chunk]):
+            assert frame in data
+
+
+@given(st.sampled_from(sorted(kinds())), st.binary(max_size=255), st.booleans(), st.integers(0, 255))
+def test_nothing_raises_whatever_payload_has_a_right_checksum(number, payload, v1, flags):
+    if v1 and number < 256:
+        head = bytes([0xFE, len(payload), 0, 255, 190, number])
+    else:
+        head = bytes([0xFD, len(payload), flags, 0, 0, 255, 190]) + number.to_bytes(3, "little")
+    body = head + payload
+    crc = mavlink.x25crc(body[1:] + bytes([mavlink.mavlink_map[number].crc_extra])).crc
+    frame = body + struct.pack("<H", crc) + bytes(13 * (flags & 1))
+    list(open_gate().datagram(frame))
+    list(StreamReader(open_gate()).read(frame))
+
+
+def test_offsets_of_targets_are_those_of_the_packed_message():
+    for number, kind in mavlink.mavlink_map.items():
+        at = kinds()[number].target
+        if at is None:
+            continue
+        name = "target" if kind.msgname == "MANUAL_CONTROL" else "target_system"
+        message = any_message(kind)
+        setattr(message, name, 99)
+        payload = np.frombuffer(message.pack(mavlink.MAVLink(None))[10:-2], np.uint8)
+        assert payload[at] == 99, kind.msgname

@@ -1,0 +1,140 @@
+"""Whatever is sent: no error, no memory, no time of the stepper, and good frames in between are heeded."""
+
+import socket
+import time
+import tracemalloc
+
+import numpy as np
+import pytest
+
+from benchmarks.hostile import hostile_datagrams
+from cosim.mavlink import thread
+from cosim.mavlink.channels.udp import PEERS, UdpIn
+from cosim.mavlink.framing import StreamReader
+from cosim.mavlink.link import Link
+from cosim.mavlink.signing import SigningClock, Verifier
+from cosim.mavlink.thread import LinkThread
+from tests.cosim.mavlink.stubs import KEY, SOURCE, Station, StubVehicle, attitude, link_of, open_gate, until
+
+HERE = "127.0.0.1"
+
+
+class Script:
+    """A channel on which certain datagrams come."""
+
+    datagrams = True
+
+    def __init__(self, datagrams):
+        self.coming, self.trouble, self.looked = iter(datagrams), {}, 0
+
+    def receive(self):
+        data = next(self.coming, None)
+        self.looked += data is not None
+        return None if data is None else (0, data)
+
+    def heard(self, peer): ...
+
+    def send(self, frame):
+        return True
+
+    def tend(self, now): ...
+
+    def close(self): ...
+
+
+def interspersed(count, every, station):
+    for i, data in enumerate(hostile_datagrams(count, seed=1)):
+        yield data
+        if i % every == 0:
+            yield station.pack(attitude(i))
+
+
+def attack(count, verifier=None, station=None):
+    gate, station = open_gate(verifier), station or Station()
+    link = Link("test", Script(interspersed(count, 100, station)), gate, SOURCE)
+    good = [m.time_boot_ms for _, m in link.receive(time.perf_counter() + 600) if m.get_type() == "ATTITUDE"]
+    assert good == list(range(0, count, 100))
+    assert link.channel.looked == count + count // 100
+    return gate.counts
+
+
+def test_good_datagrams_between_bad_ones_are_all_heeded():
+    counts = attack(20_000)
+    assert min(counts.malformed, counts.checksum, counts.accepted) > 1000 and counts.unknown > 10
+    assert counts.unsigned == counts.forged == 0
+
+
+def test_with_a_key_the_good_ones_alone_are_heeded():
+    counts = attack(5000, Verifier(KEY, SigningClock()), Station(key=KEY))
+    assert counts.accepted == 50 and counts.unsigned > 900
+
+
+def test_in_a_stream_good_frames_between_bad_ones_are_all_heeded():
+    """Also those behind half a frame, which may be taken for its other half until the checksum tells."""
+    station = Station()
+    data = b"".join(interspersed(5000, 20, station)) + bytes(300)
+    reader = StreamReader(open_gate())
+    found = [m for i in range(0, len(data), 512) for _, m in reader.read(data[i : i + 512])]
+    assert [m.time_boot_ms for m in found if m.get_type() == "ATTITUDE"] == list(range(0, 5000, 20))
+
+
+@pytest.mark.slow
+def test_a_million_hostile_datagrams_leave_nothing_behind():
+    gate = open_gate()
+
+    def receive(count):
+        link = Link("test", Script(hostile_datagrams(count, seed=count)), gate, SOURCE)
+        for _ in link.receive(time.perf_counter() + 600):
+            pass
+        assert link.channel.looked == count
+
+    receive(900_000)
+    tracemalloc.start()  # slow, and it need not watch all of them
+    before = tracemalloc.get_traced_memory()[0]
+    receive(100_000)
+    after = tracemalloc.get_traced_memory()[0]
+    tracemalloc.stop()
+    assert gate.counts.accepted > 190_000
+    assert after - before < 100_000
+
+
+class Answering(StubVehicle):
+    """Answers each request with as much as a careless vehicle would, and keeps none."""
+
+    def receive(self, link, message, now):
+        for i in range(20):
+            link.send(attitude(i))
+
+
+def test_a_flood_takes_a_bounded_slice_of_each_turn():
+    """However much is waiting, a turn ends; the thread then rests for a multiple of what it took."""
+    channel = Script(hostile_datagrams(10**9, seed=3))
+    links = LinkThread(Answering(), [Link("test", channel, open_gate(), SOURCE)], step=0.01)
+    looked = []
+    for _ in range(50):
+        before = channel.looked
+        rest = links._turn()
+        looked.append(channel.looked - before)
+        assert rest >= thread._REST_RECEIVING * thread._RECEIVING / 1.01
+    assert min(looked) >= 1 and np.median(looked) < 1000
+
+
+def test_a_flooded_port_neither_starves_the_stream_nor_another_link():
+    flooded, quiet = UdpIn(HERE, 0), UdpIn(HERE, 0)
+    vehicle = StubVehicle()
+    links = LinkThread(vehicle, [link_of(flooded), link_of(quiet)], step=0.01)
+    links.start()
+    with (
+        socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as bad,
+        socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as good,
+    ):
+        for i, data in enumerate(hostile_datagrams(20_000, seed=4)):
+            bad.sendto(data, (HERE, flooded.port))
+            if i % 100 == 0:
+                links.observe(i // 100, np.array([i * 1e-4]))
+        good.sendto(Station().pack(attitude(77)), (HERE, quiet.port))
+        assert until(lambda: any(m.get_type() == "ATTITUDE" and m.time_boot_ms == 77 for m in vehicle.received))
+        assert until(lambda: len(vehicle.rows) == 200)
+    links.close()
+    assert not links.failures
+    assert len(flooded.peers) <= PEERS

@@ -1,0 +1,255 @@
+"""Listening: what is known of vehicles, how it is shown, and that nothing from outside can outgrow or steer it."""
+
+import os
+import pty
+import re
+import select
+import signal
+import socket
+import subprocess
+import sys
+import time
+
+import pytest
+
+from cosim.cli import main
+
+mavlink = pytest.importorskip("pymavlink.dialects.v20.all", reason="the mavlink extra is not installed")
+
+from cosim.mavlink.endpoint import parse_endpoint  # noqa: E402
+from cosim.mavlink.ground import GroundLink, Heard  # noqa: E402
+from cosim.mavlink.listening import Watch, follow, picture  # noqa: E402
+from cosim.mavlink.listening.fields import values  # noqa: E402
+from cosim.mavlink.listening.watch import ROWS, TEXTS  # noqa: E402
+from cosim.mavlink.modes import mode_name  # noqa: E402
+
+ESCAPE = "\x1b[31mred\x07"
+
+
+def free_port():
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as s:
+        s.bind(("127.0.0.1", 0))
+        return s.getsockname()[1]
+
+
+def heartbeat(autopilot=12, base_mode=0x81, custom_mode=6 << 16, kind=12):
+    return mavlink.MAVLink_heartbeat_message(kind, autopilot, base_mode, custom_mode, 4, 3)
+
+
+def heard(message, at=0.0, system=1, component=1):
+    return Heard(at, system, component, 0, message.get_type(), message)
+
+
+@pytest.fixture
+def link():
+    with GroundLink(parse_endpoint(f"udpin:127.0.0.1:{free_port()}")) as link:
+        yield link
+
+
+class Vehicle:
+    """Sends from a socket of its own, with pymavlink's encoder alone."""
+
+    def __init__(self, port, system=1):
+        self.codec = mavlink.MAVLink(None, srcSystem=system, srcComponent=1)
+        self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self.address = ("127.0.0.1", port)
+
+    def send(self, message, **kwargs):
+        self.socket.sendto(message.pack(self.codec, **kwargs), self.address)
+        self.codec.seq = (self.codec.seq + 1) % 256
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.socket.close()
+
+
+def test_the_picture_shows_vehicle_position_texts_and_rows(link):
+    watch = Watch()
+    for i in range(11):
+        watch.take(heard(mavlink.MAVLink_attitude_message(100 * i, 0.1, -0.2, 0.3, 0, 0, 0), 0.1 * i))
+    watch.take(heard(heartbeat(), 1.0))
+    watch.take(heard(mavlink.MAVLink_local_position_ned_message(0, 1.5, -2.25, 3.0, 0, 0, 0), 1.0))
+    watch.take(heard(mavlink.MAVLink_global_position_int_message(0, 0, 0, 0, -3000, 0, 0, 0, 0), 1.0))
+    watch.take(heard(mavlink.MAVLink_statustext_message(4, b"region SR1 entered"), 1.0))
+    text = "\n".join(picture(link, watch, 1.0))
+    assert "vehicle 1:1 PX4 SUBMARINE, mode OFFBOARD, ARMED, ACTIVE" in text
+    assert "north 1.50 east -2.25 down 3.00 m, roll 5.7 pitch -11.5 yaw 17.2 deg, depth 3.00 m" in text
+    assert "WARNING: region SR1 entered" in text
+    assert re.search(r"ATTITUDE +1:1 +10\.0 +11  roll pitch yaw|ATTITUDE +1:1 +10\.0 +11  5\.7 -11\.5 17\.2 deg", text)
+
+
+def test_rates_follow_what_comes_and_fall_when_it_stops():
+    watch = Watch()
+    for i in range(400):
+        watch.take(heard(mavlink.MAVLink_system_time_message(0, 0), 0.05 * i))
+        watch.sample(0.05 * i)
+    (row,) = watch.rows.values()
+    assert row.rate(20.0) == pytest.approx(20.0, rel=0.05)
+    for i in range(100):
+        watch.sample(20.0 + 0.25 * i)
+    assert row.rate(45.0) == 0.0
+
+
+def test_a_silent_vehicle_is_said_to_be_silent(link):
+    watch = Watch()
+    watch.take(heard(heartbeat(), 1.0))
+    assert "SILENT" not in picture(link, watch, 3.0)[1]
+    assert "SILENT for 9 s" in picture(link, watch, 10.0)[1]
+
+
+def test_ground_stations_are_no_vehicle(link):
+    watch = Watch()
+    watch.take(heard(heartbeat(autopilot=8, kind=6), 1.0, system=255))
+    assert watch.vehicle is None
+    assert "no vehicle was heard" in picture(link, watch, 1.0)
+
+
+def test_a_flood_of_names_and_texts_does_not_grow_without_bound(link):
+    watch = Watch()
+    for i in range(20 * ROWS):
+        watch.take(heard(mavlink.MAVLink_named_value_float_message(0, f"n{i}".encode(), 1.0), 1e-4 * i))
+        watch.take(heard(mavlink.MAVLink_statustext_message(6, b"x"), 1e-4 * i, system=1 + i % 200))
+        watch.sample(1e-4 * i)
+    assert len(watch.rows) == ROWS and len(watch.texts) == TEXTS
+    assert watch.total == 40 * ROWS and watch.beyond > 0
+    lines = picture(link, watch, 1.0, width=80, height=24)
+    assert len(lines) == 24 and max(map(len, lines)) <= 80
+    assert lines[-1].endswith("more rows")
+
+
+@pytest.mark.parametrize(
+    "message",
+    [
+        mavlink.MAVLink_statustext_message(6, ESCAPE.encode()),
+        mavlink.MAVLink_named_value_float_message(0, ESCAPE.encode()[:10], 1.0),
+        mavlink.MAVLink_param_value_message(ESCAPE.encode(), 1.0, 9, 1, 0),
+        mavlink.MAVLink_available_modes_message(1, 1, 0, 6 << 16, 0, ESCAPE.encode()),
+    ],
+)
+def test_nothing_that_comes_can_steer_the_terminal(link, message):
+    decoded = mavlink.MAVLink(None).decode(bytearray(message.pack(mavlink.MAVLink(None, 1, 1))))
+    watch = Watch()
+    watch.take(heard(heartbeat()))
+    watch.take(heard(decoded))
+    assert all(line.isprintable() for line in picture(link, watch, 1.0, width=200))
+
+
+def test_every_message_of_the_dialect_can_be_shown(link):
+    watch, codec = Watch(), mavlink.MAVLink(None)
+    for number, kind in mavlink.mavlink_map.items():
+        head = bytes([0xFD, 1, 0, 0, 0, 1, 1, *number.to_bytes(3, "little")])
+        crc = mavlink.x25crc(head[1:] + b"\1" + bytes([kind.crc_extra])).crc
+        watch.take(heard(codec.decode(bytearray(head + b"\1" + crc.to_bytes(2, "little")))))
+    shown = {line.split()[0] for line in picture(link, watch, 1.0) if "1:1" in line}
+    assert len(watch.rows) == min(ROWS, len(mavlink.mavlink_map)) and len(shown) >= ROWS - 5
+
+
+def test_values_that_are_no_numbers_are_shown():
+    assert "nan" in values(mavlink.MAVLink_attitude_message(0, float("nan"), 0, 0, 0, 0, 0))
+    assert "inf" in values(mavlink.MAVLink_named_value_float_message(0, b"x", float("inf")))
+
+
+@pytest.mark.parametrize(
+    ("autopilot", "number", "told", "name"),
+    [
+        (12, 4 << 16 | 3 << 24, {}, "AUTO.LOITER"),
+        (12, 6 << 16, {}, "OFFBOARD"),
+        (3, 16, {}, "POSHOLD"),
+        (3, 21, {}, "SURFTRAK"),
+        (3, 99, {}, "99"),
+        (0, 7, {}, "7"),
+        (0, 7, {7: "Region reaching"}, "Region reaching"),
+    ],
+)
+def test_modes_have_their_names(autopilot, number, told, name):
+    assert mode_name(heartbeat(autopilot, custom_mode=number), told) == name
+
+
+def test_broken_frames_cost_nothing_and_old_ones_are_heard(link):
+    port = int(link.name.rpartition(":")[2])
+    with Vehicle(port) as vehicle:
+        vehicle.socket.sendto(b"\xfd\xff\x00" + bytes(30), vehicle.address)
+        vehicle.send(heartbeat(), force_mavlink1=True)
+        vehicle.socket.sendto(b"rubbish", vehicle.address)
+        vehicle.send(mavlink.MAVLink_attitude_message(0, 0, 0, 0, 0, 0, 0))
+        found = []
+        while len(found) < 2:
+            found += link.receive(2.0)
+    assert [h.kind for h in found] == ["HEARTBEAT", "ATTITUDE"]
+    assert link.old == 1 and link.counts.malformed == 2
+
+
+def test_following_ends_after_so_many_messages_or_seconds(link):
+    port = int(link.name.rpartition(":")[2])
+    with Vehicle(port) as vehicle:
+        for _ in range(9):
+            vehicle.send(heartbeat())
+        watch = Watch()
+        assert len(list(follow(link, watch, period=60.0, count=5))) == 1
+        assert watch.total == 5
+    assert len(list(follow(link, watch, period=0.05, seconds=0.2))) >= 2
+
+
+def test_the_command_prints_a_picture():
+    port = free_port()
+    with (
+        Vehicle(port) as vehicle,
+        subprocess.Popen(
+            [sys.executable, "-m", "cosim", "listen", f"udpin:127.0.0.1:{port}", "--count", "3"], stdout=subprocess.PIPE
+        ) as process,
+    ):
+        while process.poll() is None:
+            vehicle.send(heartbeat())
+            time.sleep(0.05)
+        text = process.stdout.read().decode()
+    assert process.returncode == 0
+    assert "3 messages" in text and "PX4 SUBMARINE" in text and "\x1b" not in text
+
+
+def test_hearing_nothing_is_a_failure(capsys):
+    assert main(["listen", f"udpin:127.0.0.1:{free_port()}", "--seconds", "0.2"]) == 1
+    assert "no vehicle was heard" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "text"),
+    [
+        (["udpin:10.0.0.1:14550"], "--allow-remote"),
+        (["nonsense"], "endpoint 'nonsense'"),
+        (["new.tlog"], "not a file"),
+        (["tcp:127.0.0.1:1"], "tcp:127.0.0.1:1"),
+    ],
+)
+def test_what_is_no_endpoint_is_said_in_a_line(arguments, text, capsys):
+    assert main(["listen", *arguments]) == 2
+    error = capsys.readouterr().err
+    assert text in error and error.count("\n") == 1
+
+
+@pytest.mark.slow
+def test_on_a_terminal_it_is_drawn_in_place_and_ctrl_c_gives_the_cursor_back():
+    port = free_port()
+    leader, follower = pty.openpty()
+    with Vehicle(port) as vehicle, subprocess.Popen(
+        [sys.executable, "-m", "cosim", "listen", f"udpin:127.0.0.1:{port}"],
+        stdin=follower, stdout=follower, stderr=follower,
+    ) as process:  # fmt: skip
+        os.close(follower)
+        seen = b""
+        while b"SUBMARINE" not in seen:
+            vehicle.send(heartbeat())
+            if select.select([leader], [], [], 0.1)[0]:
+                seen += os.read(leader, 65536)
+        process.send_signal(signal.SIGINT)
+        process.wait(10)
+        while select.select([leader], [], [], 0.2)[0]:
+            try:
+                seen += os.read(leader, 65536)
+            except OSError:
+                break
+    os.close(leader)
+    assert process.returncode == 130
+    assert seen.count(b"\x1b[?25l") == 1 == seen.count(b"\x1b[?25h")
+    assert b"\x1b[H" in seen and b"interrupted" in seen

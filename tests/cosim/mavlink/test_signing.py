@@ -1,0 +1,226 @@
+"""Signatures: ours are taken by pymavlink, its are taken by us, and neither takes what is forged or repeated."""
+
+import hashlib
+import os
+import time
+
+import pytest
+
+from cosim.errors import TelemetryError
+from cosim.mavlink import signing
+from cosim.mavlink.channels.udp import UdpOut
+from cosim.mavlink.link import Link, Signer
+from cosim.mavlink.signing import STREAMS, SigningClock, Verifier, read_key
+from tests.cosim.mavlink.stubs import KEY, SOURCE, Station, attitude, heartbeat, mavlink, open_gate
+
+MINUTE = 60 * 100_000
+
+
+def now():
+    return int((time.time() - 1420070400) * 1e5)  # seconds from 1970 to 2015
+
+
+def gate_and_clock():
+    clock = SigningClock()
+    return open_gate(Verifier(KEY, clock)), clock
+
+
+def accepts(gate, frame):
+    return len(list(gate.datagram(frame))) == 1
+
+
+def refused(gate):
+    c = gate.counts
+    names = ("unsigned", "forged", "replayed", "old", "crowded", "checksum", "malformed")
+    return {name: getattr(c, name) for name in names if getattr(c, name)}
+
+
+class Captured:
+    """A channel that keeps what is sent."""
+
+    datagrams, trouble = True, {}
+
+    def __init__(self):
+        self.frames = []
+
+    def send(self, frame):
+        self.frames.append(frame)
+        return True
+
+
+def signed_link(clock, link=3):
+    return Link("test", Captured(), open_gate(), SOURCE, signer=Signer(KEY, clock, link))
+
+
+def test_pymavlink_takes_what_we_sign_and_nothing_after_a_change():
+    link, station = signed_link(SigningClock()), Station(key=KEY)
+    for i in range(20):
+        assert link.send(attitude(i))
+    assert [m.get_type() for f in link.channel.frames for m in station.parse(f)] == ["ATTITUDE"] * 20
+    assert station.codec.signing.goodsig_count == 20
+    frame = link.channel.frames[-1]
+    assert frame[-13] == 3  # the link
+    assert frame[-6:] == hashlib.sha256(KEY + frame[:-6]).digest()[:6]  # by the specification
+    assert [m.get_type() for m in station.parse(frame)] == ["BAD_DATA"]  # once more
+    other = Station(key=bytes(32))
+    assert [m.get_type() for m in other.parse(frame)] == ["BAD_DATA"]
+
+
+def test_timestamps_rise_on_all_links_and_over_a_restart(monkeypatch):
+    clock = SigningClock()
+    a, b = signed_link(clock, 0), signed_link(clock, 1)
+    before = now()
+    for i in range(100):
+        a.send(attitude(i))
+        b.send(attitude(i))
+    stamps = [int.from_bytes(f[-12:-6], "little") for pair in zip(a.channel.frames, b.channel.frames, strict=True)
+              for f in pair]  # fmt: skip
+    assert all(y > x for x, y in zip(stamps, stamps[1:], strict=False))
+    assert before <= stamps[0] <= now()
+    assert SigningClock().next() > stamps[-1] - 1000  # a new process begins at its wall clock
+    monkeypatch.setattr(signing.time, "time", lambda: 1.6e9)  # the clock is set back while we run
+    a.send(attitude(0))
+    assert int.from_bytes(a.channel.frames[-1][-12:-6], "little") > stamps[-1]
+
+
+def test_what_pymavlink_signs_is_taken_once():
+    gate, _ = gate_and_clock()
+    station = Station(key=KEY)
+    frames = [station.pack(attitude(i)) for i in range(10)]
+    assert all(accepts(gate, frame) for frame in frames)
+    assert not any(accepts(gate, frame) for frame in frames)
+    assert refused(gate) == {"replayed": 10}
+
+
+def test_forged_unsigned_and_version_1_frames_are_refused_and_counted():
+    gate, _ = gate_and_clock()
+    assert not accepts(gate, Station(key=bytes(32)).pack(heartbeat()))
+    good = bytearray(Station(key=KEY).pack(heartbeat()))
+    for i in range(len(good) - 13, len(good)):  # link, timestamp and hash
+        bad = bytearray(good)
+        bad[i] ^= 1
+        assert not accepts(gate, bytes(bad))
+    assert refused(gate) == {"forged": 14}
+    assert not accepts(gate, Station().pack(heartbeat()))
+    assert not accepts(gate, Station().pack(heartbeat(), v1=True))
+    assert refused(gate) == {"forged": 14, "unsigned": 2}
+    assert accepts(gate, bytes(good))
+
+
+def test_a_forged_frame_does_not_silence_the_one_it_pretends_to_be():
+    """A timestamp of the far future counts only with a good signature."""
+    gate, clock = gate_and_clock()
+    station = Station(key=KEY)
+    assert accepts(gate, station.pack(heartbeat()))
+    assert not accepts(gate, Station(key=bytes(32), stamp=(1 << 48) - 2).pack(heartbeat()))
+    assert accepts(gate, station.pack(heartbeat()))
+    assert clock.now < now() + MINUTE
+
+
+def test_a_new_stream_may_be_a_minute_behind_and_an_old_one_goes_its_own_pace():
+    gate, _ = gate_and_clock()
+    assert accepts(gate, Station(key=KEY, link=1, stamp=now() - MINUTE + 100_000).pack(heartbeat()))
+    late = Station(key=KEY, link=2, stamp=now() - MINUTE - 100_000)
+    assert not accepts(gate, late.pack(heartbeat()))
+    assert refused(gate) == {"old": 1}
+
+
+def test_a_sender_whose_clock_is_ahead_takes_our_frames():
+    clock = SigningClock()
+    gate, link = open_gate(Verifier(KEY, clock)), signed_link(clock)
+    station = Station(key=KEY, stamp=now() + 60 * MINUTE)
+    link.send(heartbeat())
+    assert [m.get_type() for m in station.parse(link.channel.frames[-1])] == ["BAD_DATA"]  # an hour behind
+    assert accepts(gate, station.pack(heartbeat()))
+    link.send(heartbeat())
+    assert [m.get_type() for m in station.parse(link.channel.frames[-1])] == ["HEARTBEAT"]
+
+
+def test_a_frame_heard_on_one_link_is_a_repeat_on_another():
+    verifier = Verifier(KEY, SigningClock())
+    frame = Station(key=KEY).pack(heartbeat())
+    assert accepts(open_gate(verifier), frame)
+    assert not accepts(open_gate(verifier), frame)
+
+
+def test_streams_are_bounded_and_forgotten_only_when_a_repeat_would_be_too_old():
+    gate, clock = gate_and_clock()
+    begin = now()
+    first = Station(key=KEY, link=0, stamp=begin).pack(heartbeat())
+    assert accepts(gate, first)
+    for link in range(1, STREAMS):
+        assert accepts(gate, Station(key=KEY, link=link, stamp=begin + 10 * link).pack(heartbeat()))
+    extra = Station(key=KEY, link=200, stamp=begin + 50 * MINUTE).pack(heartbeat())
+    assert not accepts(gate, extra)
+    assert refused(gate) == {"crowded": 1}
+    clock.heard(begin + 2 * MINUTE)  # time goes by
+    assert accepts(gate, extra)
+    assert not accepts(gate, first)
+    assert refused(gate) == {"crowded": 1, "old": 1}
+
+
+def test_without_a_key_signed_frames_are_read_as_any():
+    assert accepts(open_gate(), Station(key=KEY).pack(heartbeat()))
+
+
+def key_file(tmp_path, content, mode=0o600):
+    path = tmp_path / "key"
+    path.write_bytes(content)
+    path.chmod(mode)
+    return path
+
+
+RAW = bytes(range(128, 160))
+
+
+@pytest.mark.parametrize(
+    ("content", "key"),
+    [
+        (RAW, RAW),
+        (KEY.hex().encode(), KEY),
+        (KEY.hex().upper().encode() + b"\n", KEY),
+        (b"correct horse\n", hashlib.sha256(b"correct horse").digest()),
+        ("Öl\r\n".encode(), hashlib.sha256("Öl".encode()).digest()),
+        (b"a" * 32, hashlib.sha256(b"a" * 32).digest()),
+        (bytes(32), bytes(32)),
+    ],
+)
+def test_key_files(tmp_path, content, key):
+    assert read_key(key_file(tmp_path, content)) == key
+
+
+@pytest.mark.parametrize("content", [b"", b" \n", b"\xff" * 31, b"\xff" * 33, b"two\nlines"])
+def test_files_without_a_key_are_refused(tmp_path, content):
+    with pytest.raises(TelemetryError, match="expected 32 bytes, 64 hexadecimal digits or a passphrase"):
+        read_key(key_file(tmp_path, content))
+
+
+def test_keys_that_others_can_read_are_refused(tmp_path):
+    with pytest.raises(TelemetryError, match=r"key file '.*none': No such file"):
+        read_key(tmp_path / "none")
+    if os.name == "posix":
+        with pytest.raises(TelemetryError, match="mode is 644, expected 600"):
+            read_key(key_file(tmp_path, KEY, 0o644))
+
+
+def test_signed_by_hand_once_published():
+    """The golden frame: key of 42s, made from the specification with hashlib and a bitwise checksum alone."""
+    head = bytes([9, 1, 0, 0, 255, 190, 0, 0, 0, 7, 0, 0, 0, 6, 8, 0, 0, 3])  # HEARTBEAT of a ground station
+    crc = 0xFFFF
+    for byte in (*head, 50):  # 50: its CRC_EXTRA
+        t = byte ^ crc & 0xFF
+        t = (t ^ t << 4) & 0xFF
+        crc = crc >> 8 ^ t << 8 ^ t << 3 ^ t >> 4
+        crc &= 0xFFFF
+    body = b"\xfd" + head + crc.to_bytes(2, "little") + b"\x05" + now().to_bytes(6, "little")
+    frame = body + hashlib.sha256(b"*" * 32 + body).digest()[:6]
+    gate = open_gate(Verifier(b"*" * 32, SigningClock()))
+    ((_, message),) = gate.datagram(frame)
+    assert (message.custom_mode, message.type, message.autopilot) == (7, 6, 8)
+
+
+def test_a_signed_link_over_a_socket_is_silent_to_whoever_has_no_key():
+    assert mavlink.MAVLink_heartbeat_message.crc_extra == 50
+    link = Link("test", UdpOut("127.0.0.1", 9), open_gate(), SOURCE, signer=Signer(KEY, SigningClock(), 0))
+    assert link.send(heartbeat())
+    link.channel.close()

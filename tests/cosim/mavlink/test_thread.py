@@ -1,0 +1,327 @@
+"""The thread of all links: what it owes the stepper, the vehicle and each peer."""
+
+import socket
+import threading
+import time
+
+import numpy as np
+import pytest
+from pymavlink import mavutil
+
+from cosim.mavlink import link as link_module
+from cosim.mavlink import thread
+from cosim.mavlink.channels.tcp import TcpIn
+from cosim.mavlink.channels.tlog import Tlog
+from cosim.mavlink.channels.udp import UdpIn
+from cosim.mavlink.endpoint import parse_endpoint
+from cosim.mavlink.link import open_links
+from cosim.mavlink.options import MavlinkOptions
+from cosim.mavlink.thread import LinkThread
+from tests.cosim.mavlink.stubs import (
+    KEY,
+    Station,
+    StubVehicle,
+    attitude,
+    heartbeat,
+    link_of,
+    mavlink,
+    odometry,
+    udp_link,
+    until,
+)
+
+HERE = "127.0.0.1"
+
+
+class Ear:
+    """A ground station's socket."""
+
+    def __init__(self, station=None):
+        self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self.socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1 << 22)
+        self.socket.bind((HERE, 0))
+        self.socket.setblocking(False)
+        self.port = self.socket.getsockname()[1]
+        self.station, self.messages = station or Station(), []
+
+    def hear(self):
+        while True:
+            try:
+                data, self.address = self.socket.recvfrom(1000)
+            except BlockingIOError:
+                return self.messages
+            self.messages += self.station.parse(data)
+
+    def say(self, message):
+        self.socket.sendto(self.station.pack(message), self.address)
+
+    def count(self, name):
+        return sum(m.get_type() == name for m in self.hear())
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.socket.close()
+
+
+def row(t):
+    return np.array([t, 1.0, 2.0])
+
+
+def test_snapshots_come_in_order_every_10_ms_of_the_simulation_and_are_copies():
+    with Ear() as ear:
+        vehicle = StubVehicle()
+        links = LinkThread(vehicle, [udp_link(ear.port)], step=1e-3)
+        links.start()
+        shared = row(0.0)
+        for k in range(1001):
+            shared[0] = k * 1e-3
+            links.observe(k, shared)
+        links.close()
+        assert [r[0] for r in vehicle.rows] == pytest.approx(np.arange(101) * 0.01)
+        assert [m.time_boot_ms for m in ear.hear()[:-1]] == [int(t * 1000) for t in np.arange(1001)[::10] * 1e-3]
+        assert ear.messages[-1].get_type() == "HEARTBEAT" and vehicle.closed
+        sequence = [m.get_seq() for m in ear.messages]
+        assert all((b - a) % 256 == 1 for a, b in zip(sequence, sequence[1:], strict=False))
+
+
+def test_each_row_of_a_coarse_run_is_shown():
+    vehicle = StubVehicle()
+    links = LinkThread(vehicle, [], step=0.05)
+    for k in range(5):
+        links.observe(k, row(k * 0.05))
+    links.start()
+    links.close()
+    assert len(vehicle.rows) == 5
+
+
+def test_an_answer_comes_while_nothing_is_observed_and_ticks_go_on():
+    with Ear() as ear:
+        vehicle = StubVehicle()
+        links = LinkThread(vehicle, [udp_link(ear.port)], step=1e-3)
+        links.start()
+        links.observe(0, row(0.0))
+        assert until(ear.hear)
+        ear.say(heartbeat())
+        assert until(lambda: ear.count("COMMAND_ACK") == 1)
+        assert until(lambda: vehicle.ticks > 20)
+        links.close()
+    assert [m.get_type() for m in vehicle.received] == ["HEARTBEAT"]
+
+
+def test_many_links_at_once_each_with_a_sequence_of_its_own():
+    with Ear() as ear, Ear() as other:
+        server, udp_in = TcpIn(HERE, 0), UdpIn(HERE, 0)
+        links = LinkThread(
+            StubVehicle(), [udp_link(ear.port), link_of(udp_in), link_of(server), udp_link(other.port)], step=0.01
+        )
+        links.start()
+        other.address = (HERE, udp_in.port)
+        other.say(heartbeat())
+        with socket.create_connection((HERE, server.port), 2.0) as client:
+            assert until(lambda: server.clients and udp_in.peers)
+            for k in range(300):
+                links.observe(k, row(k * 0.01))
+            links.close()
+            data = b""
+            while chunk := client.recv(1 << 16):
+                data += chunk
+        tcp_messages = Station().parse(data)
+        assert [m.get_seq() for m in tcp_messages] == [i % 256 for i in range(301)]
+        assert [m.get_seq() for m in ear.hear()] == [i % 256 for i in range(301)]
+        assert other.count("ATTITUDE") == 600 and other.count("COMMAND_ACK") == 1
+
+
+def test_a_log_beside_a_link_has_what_went_out_and_what_was_heeded(tmp_path):
+    path = tmp_path / "dive.tlog"
+    with Ear() as ear:
+        vehicle = StubVehicle()
+        links = LinkThread(vehicle, [udp_link(ear.port), link_of(Tlog(str(path)))], step=0.01)
+        links.start()
+        links.observe(0, row(0.0))
+        assert until(ear.hear)
+        ear.say(heartbeat())
+        assert until(lambda: vehicle.received)
+        for k in range(1, 1001):  # ten seconds in no time
+            links.observe(k, row(k * 0.01))
+        links.close()
+    reader = mavutil.mavlink_connection(str(path), dialect="all")
+    messages = []
+    while (message := reader.recv_msg()) is not None:
+        messages.append(message)
+    reader.close()
+    ours = [m for m in messages if m.get_type() == "ATTITUDE"]
+    assert [m._timestamp - ours[0]._timestamp for m in ours] == pytest.approx(np.arange(1001) * 0.01, abs=1e-4)
+    assert [m.get_srcSystem() for m in messages if m.get_type() == "HEARTBEAT"] == [255, 1]
+    assert all(b._timestamp >= a._timestamp for a, b in zip(messages, messages[1:], strict=False))
+
+
+class Clumsy(StubVehicle):
+    def observe(self, row):
+        super().observe(row)
+        raise ZeroDivisionError("a defect of the vehicle")
+
+    def receive(self, link, message, now):
+        super().receive(link, message, now)
+        raise KeyError(message.get_type())
+
+    def tick(self, now):
+        super().tick(now)
+        raise RuntimeError("tick")
+
+    def attach(self, link):
+        super().attach(link)
+        raise ValueError("attach")
+
+
+def test_an_error_of_the_vehicle_is_told_once_a_kind_and_costs_no_more(caplog):
+    with Ear() as ear:
+        vehicle = Clumsy()
+        links = LinkThread(vehicle, [udp_link(ear.port)], step=0.01)
+        links.start()
+        for k in range(50):
+            links.observe(k, row(k * 0.01))
+        assert until(lambda: len(vehicle.rows) == 50 and ear.count("ATTITUDE") == 50)
+        for _ in range(5):
+            ear.say(heartbeat())
+        assert until(lambda: len(vehicle.received) == 5)
+        links.close()
+    tracebacks = [record.message for record in caplog.records if record.exc_info]
+    assert sorted(tracebacks) == [
+        f"MAVLink: {kind}"
+        for kind in (
+            "KeyError in receive",
+            "RuntimeError in tick",
+            "ValueError in attach",
+            "ZeroDivisionError in observe",
+        )
+    ]
+    assert "50 times ZeroDivisionError in observe; 5 times KeyError in receive" in caplog.text.replace(
+        f"{links.failures['RuntimeError in tick']} times RuntimeError in tick; ", ""
+    )
+
+
+def test_what_cannot_be_encoded_is_counted_and_the_sequence_has_no_gap(caplog):
+    text = mavlink.MAVLink_statustext_message(6, b"")
+    text._text_raw = "letters where bytes belong"
+    with Ear() as ear:
+        link = udp_link(ear.port)
+        for bad in (
+            attitude(-1),  # struct.error
+            attitude(1.5),
+            attitude(2**32),
+            mavlink.MAVLink_attitude_message(1, 1e300, 0, 0, 0, 0, 0),  # OverflowError
+            mavlink.MAVLink_actuator_output_status_message(1, 1, [0.0] * 3),  # IndexError
+            mavlink.MAVLink_attitude_message(1, None, 0, 0, 0, 0, 0),
+            text,  # TypeError
+        ):
+            assert not link.send(bad)
+            assert link.send(attitude(1))
+        link.channel.close()
+        assert [m.get_seq() for m in ear.hear()] == list(range(7))
+    assert link.unencodable == 7
+    assert link.troubles() == ["7 messages that could not be encoded"]
+    assert len(caplog.records) == 3  # one a kind of message
+
+
+def test_a_budget_thins_streams_before_answers(monkeypatch):
+    clock = [100.0]
+    monkeypatch.setattr(link_module.time, "monotonic", lambda: clock[0])
+    with Ear() as ear:
+        link = udp_link(ear.port, budget=10_000.0)
+        sent = [link.send(odometry(1)) for _ in range(100)]  # 24.5 kB at once
+        assert 10 < sent.count(True) < 5000 / 245 and link.dropped == sent.count(False)
+        assert all(link.send(mavlink.MAVLink_command_ack_message(1, 0)) for _ in range(20))
+        assert not all(link.send(mavlink.MAVLink_command_ack_message(1, 0)) for _ in range(100))
+        clock[0] += 0.25
+        assert link.send(odometry(1))
+        link.channel.close()
+        assert link.troubles() == [f"{link.dropped} messages over the budget"]
+        sequence = [m.get_seq() for m in ear.hear()]
+    assert sequence == list(range(len(sequence)))
+
+
+def test_a_stalled_thread_drops_the_oldest_and_says_how_many(caplog):
+    vehicle = StubVehicle()
+    links = LinkThread(vehicle, [], step=0.01)
+    for k in range(5000):
+        links.observe(k, row(k * 0.01))
+    assert links.dropped == 5000 - thread.SNAPSHOTS
+    links.start()
+    links.close()
+    assert vehicle.rows[0][0] == pytest.approx(9.04) and len(vehicle.rows) == thread.SNAPSHOTS
+    assert "904 snapshots dropped" in caplog.text
+
+
+def test_closing_is_bounded_by_time_and_counts_what_was_left(monkeypatch, caplog):
+    monkeypatch.setattr(thread, "_DRAINING", 0.05)
+    vehicle = StubVehicle()
+    vehicle.observe = lambda row: time.sleep(0.02)
+    links = LinkThread(vehicle, [], step=0.01)
+    links.start()
+    for k in range(1000):
+        links.observe(k, row(k * 0.01))
+    links.close()
+    links.close()
+    assert 900 < links.dropped < 1000 and f"{links.dropped} snapshots dropped" in caplog.text
+    assert len(caplog.records) == 1
+    assert "mavlink" not in [t.name for t in threading.enumerate()]
+
+
+def test_links_that_were_never_started_are_closed_too(tmp_path):
+    channel = UdpIn(HERE, 0)
+    LinkThread(StubVehicle(), [link_of(channel)], step=0.01).close()
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as again:
+        again.bind((HERE, channel.port))
+
+
+def test_endpoints_become_links_of_one_signed_vehicle(tmp_path):
+    with Ear(Station(key=KEY)) as ear:
+        texts = [f"udpout:127.0.0.1:{ear.port}", str(tmp_path / "dive.tlog")]
+        links = open_links([parse_endpoint(text) for text in texts], MavlinkOptions(key=KEY, system_id=9))
+        assert [link.name for link in links] == texts
+        vehicle = StubVehicle()
+        running = LinkThread(vehicle, links, step=0.01)
+        running.start()
+        running.observe(0, row(0.0))
+        assert until(lambda: ear.count("ATTITUDE"))
+        assert ear.messages[0].get_srcSystem() == 9
+        assert ear.station.codec.signing.goodsig_count > 0
+        ear.say(heartbeat())
+        ear.socket.sendto(Station().pack(heartbeat()), ear.address)
+        assert until(lambda: links[0].counts.unsigned and vehicle.received)
+        running.close()
+    assert links[0].troubles() == ["1 frames unsigned"]
+    reader = mavutil.mavlink_connection(texts[1], dialect="all")
+    assert reader.recv_msg().get_type() == "ATTITUDE"
+    reader.close()
+
+
+class Loud(StubVehicle):
+    def observe(self, row):
+        for link in self.links:
+            link.send(odometry(round(row[0] * 100) + 1))
+
+
+def test_a_client_that_never_reads_costs_no_other_client_a_frame():
+    server = TcpIn(HERE, 0)
+    link = link_of(server)
+    links = LinkThread(Loud(), [link], step=0.01)
+    links.start()
+    with socket.create_connection((HERE, server.port), 2.0), socket.create_connection((HERE, server.port), 2.0) as good:
+        assert until(lambda: len(server.clients) == 2)
+        station, messages = Station(), []
+        good.settimeout(5.0)
+        for k in range(4000):
+            links.observe(k, row(k * 0.01))
+            while len(messages) + 100 < k:
+                messages += station.parse(good.recv(1 << 16))
+        closing = threading.Thread(target=links.close)
+        closing.start()
+        while chunk := good.recv(1 << 16):
+            messages += station.parse(chunk)
+        closing.join()
+    assert links.dropped == 0
+    assert [m.time_usec for m in messages if m.get_type() == "ODOMETRY"] == list(range(1, 4001))
+    assert any("frames dropped for slow clients" in trouble for trouble in link.troubles())

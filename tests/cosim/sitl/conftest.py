@@ -1,0 +1,49 @@
+"""A server in a thread, for stand-ins to talk to."""
+
+import threading
+
+import pytest
+
+from cosim.sitl.flights import FlightOptions, Flights
+from cosim.sitl.law import law_of_pwm
+from cosim.sitl.server import JsonServer
+
+
+class Served(threading.Thread):
+    """Serves until it ends by itself; `outcome` waits for that."""
+
+    def __init__(self, server):
+        super().__init__(daemon=True)
+        self.server, self.address = server, server.address
+        self._outcome = self._error = None
+
+    def run(self):
+        try:
+            self._outcome = self.server.serve()
+        except BaseException as error:  # noqa: BLE001
+            self._error = error
+
+    def outcome(self):
+        self.join(60.0)
+        assert not self.is_alive()
+        if self._error:
+            raise self._error
+        return self._outcome
+
+
+@pytest.fixture
+def serve(tmp_path):
+    """Return a function that begins to serve; each server has a folder of its own."""
+    begun = []
+
+    def begin(*overrides, vehicle="bluerov2_heavy", timeout=0.5, record_rate=2000.0, **more):
+        out = tmp_path / f"run{len(begun)}"
+        options = FlightOptions("sitl", overrides, vehicle, out, record_rate, report=False, **more)
+        served = Served(JsonServer(Flights(options, "ardupilot", law_of_pwm), ("127.0.0.1", 0), timeout))
+        begun.append(served)
+        served.start()
+        return served
+
+    yield begin
+    for served in begun:
+        served.join(60.0)

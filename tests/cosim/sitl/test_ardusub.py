@@ -1,0 +1,157 @@
+"""A real ArduSub, where there is one on the path: it arms, dives in MANUAL, and holds its depth in ALT_HOLD."""
+
+import contextlib
+import os
+import shutil
+import socket
+import subprocess
+import time
+
+import pytest
+
+from cosim.mavlink.dialect import dialect
+from cosim.record import load_record
+
+ARDUSUB = shutil.which("ardusub")
+MANUAL, ALT_HOLD = 19, 2
+DEPTH = 4.0  # m, at which it is told to hold
+WALL = 240.0  # s, after which the test gives up
+
+# what ArduSub is given beside its own defaults: eight thrusters as vectored_6dof, sticks that rest in the middle, a
+# depth sensor in the water of little noise, gains for a vehicle of this size, and sensors that pass for calibrated
+PARAMETERS = """
+FRAME_CONFIG 2
+RC3_TRIM 1500
+RC_OPTIONS 0
+RC_PROTOCOLS 1
+SIM_BARO_RND 0.02
+BARO_EXT_BUS 1
+PSC_ACCZ_P 2
+PSC_ACCZ_I 4
+PSC_ACCZ_FF 0.75
+PSC_VELZ_P 8
+PSC_POSZ_P 3
+PSC_JERK_Z 8
+PILOT_ACCEL_Z 200
+PILOT_SPEED_UP 200
+INS_ACCOFFS_X 0.001
+INS_ACCOFFS_Y 0.001
+INS_ACCOFFS_Z 0.001
+INS_ACC2OFFS_X 0.001
+INS_ACC2OFFS_Y 0.001
+INS_ACC2OFFS_Z 0.001
+INS_ACCSCAL_X 1.001
+INS_ACCSCAL_Y 1.001
+INS_ACCSCAL_Z 1.001
+INS_ACC2SCAL_X 1.001
+INS_ACC2SCAL_Y 1.001
+INS_ACC2SCAL_Z 1.001
+COMPASS_OFS_X 5
+COMPASS_OFS_Y 13
+COMPASS_OFS_Z -18
+COMPASS_OFS2_X 5
+COMPASS_OFS2_Y 13
+COMPASS_OFS2_Z -18
+COMPASS_OFS3_X 5
+COMPASS_OFS3_Y 13
+COMPASS_OFS3_Z -18
+"""
+
+pytestmark = [pytest.mark.slow, pytest.mark.skipif(ARDUSUB is None, reason="no ardusub on the path")]
+
+
+class Ground:
+    """The least of a ground station, over the autopilot's TCP port."""
+
+    def __init__(self, port, speedup):
+        self.mavlink = dialect()
+        self.codec = self.mavlink.MAVLink(None, srcSystem=255, srcComponent=190)
+        self.codec.robust_parsing = True  # it begins with text
+        self.speedup, self.latest, self.stick, self.sent = speedup, {}, 500, {}
+        self.acks = []
+        self.began = time.monotonic()
+        while True:
+            try:
+                self.socket = socket.create_connection(("127.0.0.1", port), timeout=5.0)
+                break
+            except OSError:
+                assert time.monotonic() - self.began < 30.0
+                time.sleep(0.1)
+        self.socket.settimeout(0.01)
+
+    def send(self, message):
+        self.socket.sendall(message.pack(self.codec))
+        self.codec.seq = (self.codec.seq + 1) % 256
+
+    def every(self, seconds, name, message):
+        """Send once so many simulated seconds, by the wall clock."""
+        now = time.monotonic()
+        if now - self.sent.get(name, 0.0) > seconds / self.speedup:
+            self.sent[name] = now
+            self.send(message)
+
+    def command(self, number, *parameters):
+        m = self.mavlink
+        self.send(m.MAVLink_command_long_message(1, 1, number, 0, *parameters, *[0.0] * (7 - len(parameters))))
+
+    def until(self, done):
+        """Keep in touch until something is so."""
+        m = self.mavlink
+        while not done(self):
+            assert time.monotonic() - self.began < WALL, {k: str(v) for k, v in self.latest.items()}
+            self.every(0.5, "heartbeat", m.MAVLink_heartbeat_message(m.MAV_TYPE_GCS, 8, 0, 0, 4, 3))
+            self.every(0.1, "sticks", m.MAVLink_manual_control_message(1, 0, 0, self.stick, 0, 0))
+            with contextlib.suppress(TimeoutError):
+                for message in self.codec.parse_buffer(self.socket.recv(4096)) or ():
+                    self.latest[message.get_type()] = message
+                    if message.get_type() == "COMMAND_ACK":
+                        self.acks.append((message.command, message.result))
+
+    def of(self, kind, field, default=0):
+        return getattr(self.latest.get(kind), field, default)
+
+    @property
+    def now(self):
+        """Simulated time [s]."""
+        return self.of("ATTITUDE", "time_boot_ms") / 1e3
+
+
+@pytest.mark.parametrize("speedup", [1, 5])
+def test_arms_dives_and_holds_depth_within_5_cm(serve, tmp_path, speedup):
+    served = serve(timeout=10.0, record_rate=100.0)
+    home = tmp_path / "ardusub"
+    home.mkdir()
+    (home / "own.parm").write_text(PARAMETERS)
+    command = [
+        ARDUSUB, "--model", "JSON:127.0.0.1", "--home", "55.9097,-3.3203,0,0", "--speedup", str(speedup),
+        "--sim-port-out", str(served.address[1]), "--defaults", "own.parm", "--serial0", "tcp:0",
+    ]  # fmt: skip
+    process = subprocess.Popen(command, cwd=home, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, env=os.environ)
+    ground = None
+    try:
+        ground = Ground(5760, speedup)
+        ground.until(lambda g: g.now > 25.0)
+        ground.command(176, 1, MANUAL)  # DO_SET_MODE
+        ground.command(400, 1)  # COMPONENT_ARM_DISARM
+        ground.until(lambda g: g.of("HEARTBEAT", "base_mode") & 128)
+        ground.stick = 100
+        ground.until(lambda g: g.of("GLOBAL_POSITION_INT", "relative_alt") < -1000 * DEPTH)
+        ground.stick = 500
+        ground.command(176, 1, ALT_HOLD)
+        ground.until(lambda g: g.of("HEARTBEAT", "custom_mode") == ALT_HOLD)
+        holding = ground.now
+        ground.until(lambda g: g.now > holding + 25.0)
+        assert (400, 0) in ground.acks and ground.acks.count((176, 0)) == 2
+    finally:
+        if ground:
+            ground.socket.close()
+        process.terminate()
+        process.wait(30.0)
+    outcome = served.outcome()
+    (run,) = outcome.runs
+    record = load_record(run.folder)
+    held = record["position.z"][(record["time"] > holding + 10.0) & (record["time"] < holding + 25.0)]
+    assert len(held) >= 1499
+    assert abs(held - held.mean()).max() < 0.05
+    assert abs(held.mean() - DEPTH) < 1.0  # it coasts on after the stick is let go
+    assert outcome.counts.lost == outcome.counts.malformed == 0

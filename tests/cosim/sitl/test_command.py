@@ -1,0 +1,78 @@
+"""``cosim sitl`` as a user has it."""
+
+import os
+import re
+import signal
+import socket
+import subprocess
+import sys
+
+import pytest
+
+from cosim.cli import main
+from cosim.record import load_record
+from cosim.run_folder import report_again
+from tests.cosim.sitl.stand_in import NEUTRAL, StandIn
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--vehicle", "odin"], "cosim: vehicle 'odin' has no table [autopilot], expected"),
+        (["--host", "0.0.0.0"], "can be seen from other machines; --allow-remote lets it"),
+        (["--host", "no such host"], "cosim: --host 'no such host': is not known"),
+        (["--host", "192.0.2.1", "--allow-remote"], "cosim: UDP 192.0.2.1:9002: "),
+        (["--scenario", "sitll"], "did you mean 'sitl'?"),
+        (["--set", "law.nmae=pd"], "law.nmae: unknown key; did you mean 'name'?"),
+    ],
+)  # fmt: skip
+def test_what_must_be_mended_is_one_line(arguments, words, capsys):
+    assert main(["sitl", *arguments]) == 2
+    said = capsys.readouterr().err
+    assert words in said and said.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [["--port", "0"], ["--port", "65536"], ["--timeout", "0"], ["--timeout", "nan"], ["--record-rate", "-1"]],
+)
+def test_numbers_that_cannot_be(arguments, capsys):
+    with pytest.raises(SystemExit):
+        main(["sitl", *arguments])
+    assert "expected a" in capsys.readouterr().err
+
+
+def free_port():
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.bind(("127.0.0.1", 0))
+        return probe.getsockname()[1]
+
+
+@pytest.mark.skipif(os.name != "posix", reason="sends signals")
+@pytest.mark.parametrize("sent", [signal.SIGTERM, pytest.param(signal.SIGINT, marks=pytest.mark.slow)])
+def test_a_signal_ends_it_with_a_readable_run(tmp_path, sent):
+    out = tmp_path / "run"
+    command = [sys.executable, "-m", "cosim", "sitl", "--vehicle", "bluerov2_heavy", "--no-report"]
+    command += ["--port", str(free_port()), "--out", str(out)]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    port = int(re.search(r"UDP 127.0.0.1:(\d+)", process.stderr.readline()).group(1))
+    with StandIn(("127.0.0.1", port)) as pilot:
+        for _ in range(240):
+            pilot.fly(NEUTRAL)
+    process.send_signal(sent)
+    printed, said = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert "240 steps, 0 frames resent, 0 lost" in printed and "was interrupted at 0.190 s" in printed
+    assert "Traceback" not in said
+    assert len(load_record(out)["time"]) == 20  # 100 Hz of 0.2 s
+
+
+@pytest.mark.slow
+def test_a_report_made_again_still_says_who_flew(serve):
+    served = serve("time.duration=0.05")
+    with StandIn(served.address) as pilot:
+        for _ in range(60):
+            pilot.fly(NEUTRAL)
+    (run,) = served.outcome().runs
+    assert report_again(run.folder)["law"] == "ardupilot"
+    assert "; ardupilot law." in (run.folder / "report.html").read_text()

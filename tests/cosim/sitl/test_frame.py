@@ -1,0 +1,135 @@
+"""From pulses to forces: frame, signs, curve, and what gives no force."""
+
+import math
+from importlib import resources
+
+import numpy as np
+import pytest
+
+from cosim.errors import RunError
+from cosim.scenario import load_scenario
+from cosim.sitl.law import law_of_controls, law_of_pwm
+from plant_fmu import TableError, VehicleError, load_vehicle
+
+SHIPPED = resources.files("plant_fmu") / "vehicles"
+
+# ArduSub's frame vectored_6dof: what each motor, above neutral, does forward, right, down, in roll, pitch, yaw
+VECTORED_6DOF = [
+    (-1, 1, 0, 0, 0, 1),
+    (-1, -1, 0, 0, 0, -1),
+    (1, 1, 0, 0, 0, -1),
+    (1, -1, 0, 0, 0, 1),
+    (0, 0, 1, 1, -1, 0),
+    (0, 0, 1, -1, -1, 0),
+    (0, 0, 1, 1, 1, 0),
+    (0, 0, 1, -1, 1, 0),
+]
+BLUEROVS = ["bluerov2_heavy", "bluerov2_heavy_wu"]
+
+
+def forces(law, outputs):
+    given = np.full(8, math.nan)
+    law.take(outputs)
+    law.step(None, None, None, None, given)
+    return given
+
+
+@pytest.mark.parametrize("name", BLUEROVS)
+@pytest.mark.parametrize("motor", range(8))
+def test_each_motor_does_what_ardusub_takes_it_to_do(name, motor):
+    """As the sign of each factor says; roll and pitch of the horizontal motors are left out by ArduSub."""
+    vehicle = load_vehicle(name)
+    pulses = [1500] * 16
+    pulses[motor] = 1900
+    wrench = vehicle.thruster_matrix @ forces(law_of_pwm(vehicle), pulses)
+    for axis, factor in enumerate(VECTORED_6DOF[motor]):
+        if factor:
+            assert np.sign(wrench[axis]) == factor
+        elif axis not in (3, 4):
+            assert wrench[axis] == 0.0
+
+
+@pytest.mark.parametrize(
+    ("pulse", "part"),
+    [
+        (1500, 0.0), (1525, 0.0), (1475, 0.0), (1526, 0.065**2), (1700, 0.25), (1900, 1.0), (1300, -0.25), (1100, -1.0),
+        (2000, 1.0), (1000, -1.0),  # beyond the span: full
+        (0, 0.0), (1, 0.0), (799, 0.0), (2201, 0.0), (65535, 0.0),  # no pulse
+    ],
+)  # fmt: skip
+def test_the_curve(pulse, part):
+    """u|u| of 40 N with u = (pulse - 1500)/400, and a sign of -1."""
+    given = forces(law_of_pwm(load_vehicle("bluerov2_heavy")), [pulse] * 16)
+    assert given == pytest.approx([-40.0 * part] * 8, abs=1e-12)
+
+
+def own(tmp_path, table):
+    text = (SHIPPED / "bluerov2_heavy.toml").read_text().partition("[autopilot]")[0] + table
+    path = tmp_path / "own.toml"
+    path.write_text(text)
+    return path
+
+
+def test_channels_signs_and_curve_of_ones_own(tmp_path):
+    table = '[autopilot]\nframe = "mine"\nchannels = [9, 0, 3, 32, 5, 6, 7, 8]\nsigns = [1, 1, -1, 1, 1, 1, 1, 1]\n'
+    vehicle = load_vehicle(own(tmp_path, table + 'curve = "linear"\npwm_dead_band = 0\n'))
+    law = law_of_pwm(vehicle)
+    assert [d.name for d in law.diagnostics] == ["pwm9", "pwm3", "pwm32", "pwm5", "pwm6", "pwm7", "pwm8", "lost"]
+    pulses = [1500] * 32
+    pulses[8], pulses[2], pulses[31], pulses[1] = 1600, 1600, 1400, 1900
+    assert forces(law, pulses).tolist() == [10.0, 0.0, -10.0, -10.0, 0.0, 0.0, 0.0, 0.0]
+    assert forces(law, pulses[:16])[3] == 0.0  # a packet without that channel
+    assert law.report.tolist() == [1600.0, 1600.0, 0.0, 1500.0, 1500.0, 1500.0, 1500.0, 0.0]
+
+
+@pytest.mark.parametrize(
+    ("line", "words"),
+    [
+        ("channels = [1, 2, 3]", r"autopilot.channels is 3 numbers, expected 8"),
+        ("channels = [1, 1, 3, 4, 5, 6, 7, 8]", "each servo output once"),
+        ("channels = [1, 2, 3, 4, 5, 6, 7, 33]", "1 to 32, or 0 for none"),
+        ("signs = 2", "autopilot.signs is .*, expected 1 or -1"),
+        ("signs = [1, -1]", "autopilot.signs is 2 numbers, expected 8"),
+        ("pwm_span = 0", "pulses of 800 to 2200 us"),
+        ("pwm_neutral = 2000", "autopilot.pwm_neutral and pwm_span is 2000 and 400 us"),
+        ("pwm_dead_band = 400", "autopilot.pwm_dead_band is 400 us"),
+        ("pwm_dead_band = -1", "autopilot.pwm_dead_band is -1 us"),
+    ],
+)
+def test_a_table_that_cannot_be(tmp_path, line, words):
+    with pytest.raises(VehicleError, match=words):
+        load_vehicle(own(tmp_path, f'[autopilot]\nframe = "mine"\n{line}\n'))
+
+
+@pytest.mark.parametrize(
+    ("table", "words"),
+    [
+        ("[autopilot]\nsigns = 1\n", "frame"),
+        ('[autopilot]\nframe = "a"\ncurve = "cubic"\n', "autopilot.curve: expected one of 'linear', 'quadratic'"),
+        ('[autopilot]\nframe = "a"\nsign = 1\n', "autopilot.sign: unknown key; did you mean 'signs'"),
+    ],
+)
+def test_keys_are_checked(tmp_path, table, words):
+    with pytest.raises(TableError, match=words):
+        load_vehicle(own(tmp_path, table))
+
+
+def test_a_vehicle_without_the_table_says_so():
+    with pytest.raises(RunError, match=r"vehicle 'odin' has no table \[autopilot\]"):
+        law_of_pwm(load_vehicle("odin"))
+
+
+def test_controls_ask_for_the_limits_straight():
+    law = law_of_controls(load_vehicle("rexrov"))
+    vehicle = load_vehicle("rexrov")
+    n = vehicle.n_thrusters
+    given = np.zeros(n)
+    law.take([1.0, -1.0, 0.5, math.nan, 3.0, 0.0, 0.0, 0.0])
+    law.step(None, None, None, None, given)
+    expected = [1.0, 1.0, 0.5, 0.0, 1.0, 0.0, 0.0, 0.0][:n]
+    limits = [vehicle.thrust_max[0], vehicle.thrust_min[1], *vehicle.thrust_max[2:]]
+    assert given == pytest.approx(np.multiply(expected, limits))
+
+
+def test_the_scenario_is_shipped_with_a_vehicle_that_has_the_table():
+    assert load_scenario("sitl").vehicle.autopilot.frame == "vectored_6dof"

@@ -1,0 +1,355 @@
+"""Lockstep with a stand-in for ArduPilot: frames exact, repeated, lost, foreign; restarts; and what is left of them."""
+
+import random
+import struct
+import time
+from importlib import resources
+
+import numpy as np
+import pytest
+
+from cosim.errors import RunError
+from cosim.master import Master
+from cosim.record import load_record
+from cosim.sitl.flights import RESTARTED, FlightOptions, Flights
+from cosim.sitl.law import law_of_pwm
+from cosim.sitl.lockstep import Lockstep
+from cosim.sitl.scenario import scenario_to_fly
+from cosim.sitl.server import JsonServer
+from plant_fmu import load_vehicle
+from tests.cosim.sitl.stand_in import NEUTRAL, StandIn, frame, heave, newest_line, parse
+
+DT = 1.0 / 1200
+
+
+def rows(run):
+    record = load_record(run.folder)
+    return record.stack(list(record.units))
+
+
+def pulses(k):
+    """Something else in each frame."""
+    return tuple(1500 + round(300 * np.sin(0.01 * k + i)) for i in range(8))
+
+
+@pytest.mark.parametrize(
+    ("counts", "frames"),
+    [
+        ((0, 1, 2), ["first", "next", "next"]),
+        ((7, 8, 8, 8, 9), ["first", "next", "resent", "resent", "next"]),
+        ((0, 1, 5, 6), ["first", "next", "gap", "next"]),
+        ((10, 11, 0, 1), ["first", "next", "restart", "next"]),
+        ((2**32 - 1, 0), ["first", "restart"]),
+    ],
+)
+def test_what_a_count_means(counts, frames):
+    lockstep = Lockstep()
+    assert [lockstep.judge(count) for count in counts] == frames
+
+
+def test_each_frame_is_a_step_of_the_plant(serve):
+    served = serve("time.duration=0.25")
+    with StandIn(served.address) as pilot:
+        said = [pilot.fly(heave(0.5)) for _ in range(300)]
+    outcome = served.outcome()
+    assert [s["timestamp"] for s in said] == [(k + 1) * DT for k in range(300)]
+    assert (outcome.counts.steps, outcome.counts.lost, outcome.counts.resent) == (300, 0, 0)
+    (run,) = outcome.runs
+    assert (run.summary["status"], run.summary["law"], run.summary["steps"]) == ("completed", "ardupilot", 300)
+    record = load_record(run.folder)
+    assert record["time"].tolist() == [k * DT for k in range(301)]
+    for i, axis in enumerate("xyz"):
+        assert record[f"position.{axis}"][1:].tolist() == [s["position"][i] for s in said]
+    assert record["position.z"][-1] > 0.3
+    assert set(record["law.pwm5"]) == {1700.0} and not record["law.lost"].any()
+    assert set(record["thrust[5]"]) == {-10.0}
+
+
+def test_at_rest_the_imu_feels_gravity_alone_and_the_bottom_is_below(serve):
+    """Neither weight nor buoyancy, both off by as much: nothing but gravity is left to be felt."""
+    served = serve("time.duration=0.01", "plant.parameters.weight=131.588", "initial.position=[1,2,3]")
+    with StandIn(served.address) as pilot:
+        said = [pilot.fly(NEUTRAL) for _ in range(12)]
+    served.outcome()
+    assert said[0]["gyro"] == (0.0, 0.0, 0.0)
+    assert said[0]["accel_body"] == pytest.approx((0.0, 0.0, -9.81), abs=1e-12)
+    assert said[0]["position"] == pytest.approx((1.0, 2.0, 3.0))
+    assert said[0]["quaternion"] == (1.0, 0.0, 0.0, 0.0)
+    assert said[0]["rng_1"] == pytest.approx(27.0)
+
+
+def test_velocity_is_told_north_east_down(serve):
+    """Facing east, and rolled by nothing: forward is east, right is south."""
+    half = 0.5**0.5
+    served = serve(
+        "time.duration=0.01", f"initial.quaternion=[{half},0,0,{half}]", "initial.velocity=[1.0,0.5,0.25,0,0,0]"
+    )
+    with StandIn(served.address) as pilot:
+        said = [pilot.fly(NEUTRAL) for _ in range(12)]
+    served.outcome()
+    assert said[0]["velocity"] == pytest.approx((-0.5, 1.0, 0.25), abs=0.02)
+    assert said[0]["attitude"][2] == pytest.approx(np.pi / 2, abs=1e-3)
+
+
+def test_no_bottom_no_rangefinder(serve, tmp_path):
+    path = tmp_path / "deep.toml"
+    path.write_text(
+        'vehicle = "bluerov2_heavy"\ntime = { duration = 0.01 }\ninitial = { position = [0.0, 0.0, 2.0] }\n'
+        'goal = { type = "sphere", centre = [0.0, 0.0, 2.0], radius = 1.0 }\n'
+    )
+    options = FlightOptions(path, out=tmp_path / "deep", report=False)
+    server = JsonServer(Flights(options, "ardupilot", law_of_pwm), ("127.0.0.1", 0), 0.2)
+    with StandIn(server.address) as pilot:
+        pilot.send(frame(0, NEUTRAL))
+        server.serve()
+        assert "rng_1" not in parse(newest_line(pilot.socket.recv(65000)))
+
+
+def test_the_run_is_that_of_a_master_whose_law_is_the_autopilot(serve):
+    """No step but the master's own: current, failing thruster and arbiter included."""
+    overrides = (
+        "time.duration=0.5", "plant.current=[0.2,-0.1,0.0]", "failures=[{thruster=5,time=0.2}]",
+        "initial.position=[0,0,0.1]",
+    )  # fmt: skip
+    served = serve(*overrides)
+    with StandIn(served.address) as pilot:
+        for k in range(600):
+            pilot.fly(pulses(k))
+    (run,) = served.outcome().runs
+    law = law_of_pwm(load_vehicle("bluerov2_heavy"))
+    with Master(scenario_to_fly("sitl", overrides, None, 1200, "ardupilot"), law) as master:
+        expected = []
+        for k in range(601):
+            law.take(pulses(min(k, 599)))
+            master.step(k)
+            expected.append(master.signals.row.copy())
+    assert np.array_equal(rows(run), np.array(expected))
+    record = load_record(run.folder)
+    assert record["thruster_force[5]"][239] != 0.0 and not record["thruster_force[5]"][240:].any()
+    assert record["weight.depth"].any()
+
+
+def test_a_resent_frame_gets_the_same_answer_and_makes_no_step(serve):
+    served = serve("time.duration=0.1")
+    with StandIn(served.address) as pilot:
+        first = pilot.exchange(NEUTRAL)
+        for pwm in (NEUTRAL, heave(1.0), heave(-1.0)):  # whatever it says now
+            assert pilot.exchange(pwm, count=0) == first
+        for _ in range(119):
+            last = pilot.exchange(NEUTRAL)
+    outcome = served.outcome()
+    assert parse(newest_line(last))["timestamp"] == 120 * DT
+    assert (outcome.counts.steps, outcome.counts.resent) == (120, 3)
+
+
+def test_lost_frames_are_counted_and_one_step_is_made(serve, caplog):
+    served = serve("time.duration=0.1")
+    with StandIn(served.address) as pilot:
+        pilot.fly(NEUTRAL)
+        pilot.count = 5
+        assert pilot.fly(NEUTRAL)["timestamp"] == 2 * DT
+        pilot.count = 8
+        for _ in range(118):
+            pilot.fly(NEUTRAL)
+    outcome = served.outcome()
+    assert (outcome.counts.steps, outcome.counts.lost) == (120, 6)
+    record = load_record(outcome.runs[0].folder)
+    assert record["law.lost"].tolist() == [0.0, 4.0, *[6.0] * 119]
+    assert [r.message for r in caplog.records] == ["4 frames of the autopilot have not come: one step is made for all"]
+
+
+def test_a_restart_begins_a_new_run_with_the_plant_as_at_first(serve):
+    served = serve("time.duration=0.1")
+    with StandIn(served.address) as pilot:
+        before = [pilot.exchange(heave(0.8)) for _ in range(50)]
+        pilot.count = 0
+        after = [pilot.exchange(heave(0.8)) for _ in range(120)]
+    assert after[:50] == before
+    one, two = served.outcome().runs
+    assert (one.summary["status"], two.summary["status"]) == (RESTARTED, "completed")
+    assert two.folder.name == f"{one.folder.name}-2"
+    assert (len(load_record(one.folder)["time"]), len(load_record(two.folder)["time"])) == (50, 121)
+
+
+def test_thirty_two_channels(serve, tmp_path):
+    path = tmp_path / "mine.toml"
+    text = (resources.files("plant_fmu") / "vehicles" / "bluerov2_heavy.toml").read_text()
+    path.write_text(text.replace("signs = -1", "signs = -1\nchannels = [25, 26, 27, 28, 29, 30, 31, 32]"))
+    served = serve("time.duration=0.1", vehicle=str(path))
+    with StandIn(served.address, channels=32) as pilot:
+        for _ in range(120):
+            said = pilot.fly((*[1900] * 24, *heave(0.5)))
+    (run,) = served.outcome().runs
+    assert said["velocity"][2] > 0.05
+    assert abs(said["velocity"][0]) < 1e-3
+    assert set(load_record(run.folder)["law.pwm32"]) == {1700.0}
+
+
+def test_garbage_is_counted_and_does_nothing(serve):
+    good = []
+    for hostile in (False, True):
+        served = serve("time.duration=0.1")
+        draw = random.Random(1)
+        with StandIn(served.address) as pilot:
+            for k in range(120):
+                if hostile:
+                    pilot.send(draw.randbytes(draw.choice([0, 1, 39, 40, 41, 72, 1400])))
+                    pilot.send(struct.pack("<HHI16H", 18458, draw.randrange(11), k, *[1900] * 16))  # too slow to be
+                pilot.fly(pulses(k))
+        outcome = served.outcome()
+        assert (outcome.counts.steps, outcome.counts.malformed) == (120, 240 * hostile)
+        good.append(rows(outcome.runs[0]))
+    assert np.array_equal(*good)
+
+
+def test_a_second_sender_is_refused_while_the_first_is_there(serve):
+    served = serve("time.duration=0.1")
+    with StandIn(served.address) as pilot, StandIn(served.address) as other:
+        for k in range(120):
+            pilot.fly(NEUTRAL)
+            other.send(frame(k, heave(1.0)))
+        outcome = served.outcome()
+        other.socket.setblocking(False)
+        with pytest.raises(BlockingIOError):
+            other.socket.recv(100)
+    assert outcome.counts.steps == 120
+    assert outcome.counts.refused >= 119  # the last may have come too late
+    assert set(load_record(outcome.runs[0].folder)["law.pwm5"]) == {1500.0}
+
+
+def test_an_autopilot_from_another_port_takes_over_from_a_silent_one(serve, monkeypatch):
+    """With the next count it goes on, as one behind a relay does; with any other it is a new one."""
+    monkeypatch.setattr("cosim.sitl.server._PRESENT", 0.05)
+    served = serve("time.duration=0.1")
+    for first, steps in ((0, 10), (10, 10), (15, 120)):
+        time.sleep(0.1)
+        with StandIn(served.address) as pilot:
+            pilot.count = first
+            said = [pilot.fly(NEUTRAL)["timestamp"] for _ in range(steps)]
+            assert said[0] == (DT if first != 10 else 11 * DT)
+    one, two = served.outcome().runs
+    assert (one.summary["status"], one.summary["steps"], two.summary["status"]) == (RESTARTED, 19, "completed")
+
+
+def test_a_rate_that_changes_on_the_way_changes_no_step(serve):
+    served = serve("time.duration=0.1")
+    with StandIn(served.address) as pilot:
+        for k in range(120):
+            pilot.rate = 1200 - k
+            assert pilot.fly(NEUTRAL)["timestamp"] == (k + 1) * DT
+    served.outcome()
+
+
+@pytest.mark.parametrize("rate", [11, 50, 400, 4000])
+def test_the_step_is_that_of_the_first_frame(serve, rate):
+    served = serve("time.duration=0.5")
+    n = round(0.5 * rate)
+    with StandIn(served.address, rate) as pilot:
+        times = [pilot.fly(NEUTRAL)["timestamp"] for _ in range(n)]
+    assert times == [(k + 1) * (1.0 / rate) for k in range(n)]
+    assert served.outcome().runs[0].summary["status"] == "completed"
+
+
+def test_the_record_is_the_same_to_the_bit_however_the_clock_on_the_wall_goes(serve):
+    found = []
+    for hurry in (True, False):
+        served = serve(
+            "time.duration=0.3", "plant.parameters.imu.rate=100", "plant.parameters.imu.acceleration_noise=0.1"
+        )
+        draw = random.Random(3)
+        with StandIn(served.address) as pilot:
+            for k in range(360):
+                if not hurry and draw.random() < 0.05:
+                    time.sleep(draw.random() * 0.005)
+                pilot.fly(pulses(k))
+        found.append(rows(served.outcome().runs[0]))
+    assert np.array_equal(*found)
+
+
+def test_the_record_is_thinned_out_and_the_summary_knows(serve):
+    found = []
+    for rate in (100.0, 1200.0):
+        served = serve("time.duration=0.5", record_rate=rate)
+        with StandIn(served.address) as pilot:
+            for _ in range(600):
+                pilot.fly(heave(0.5))
+        found.append(served.outcome().runs[0])
+    thin, full = found
+    assert len(load_record(thin.folder)["time"]) == 51
+    assert np.array_equal(rows(thin), rows(full)[::12])
+    assert thin.summary["steps"] == full.summary["steps"] == 600
+    assert thin.summary["effort"] == pytest.approx(full.summary["effort"], rel=1e-9)
+    assert full.summary["effort"] == pytest.approx(40.0 * 0.5, rel=1e-6)  # N s
+
+
+def test_silence_ends_the_run_after_the_timeout(serve):
+    served = serve(timeout=0.3)
+    with StandIn(served.address) as pilot:
+        for _ in range(5):
+            pilot.fly(NEUTRAL)
+    (run,) = served.outcome().runs
+    assert (run.summary["status"], run.summary["steps"]) == ("ended: silence for 0.3 s", 4)
+
+
+def test_no_autopilot_no_run(serve):
+    served = serve(timeout=0.2)
+    with pytest.raises(RunError, match=r"no autopilot came: ended: silence for 0.2 s"):
+        served.outcome()
+
+
+def test_a_plant_that_fails_leaves_its_record(serve):
+    served = serve(timeout=5.0)
+    with StandIn(served.address) as pilot:
+        for _ in range(5):
+            pilot.fly(NEUTRAL)
+        served.server._flights.flight._master.plant.close()
+        pilot.send(frame(5, NEUTRAL))
+        with pytest.raises(Exception, match="clos"):
+            served.outcome()
+    assert len(load_record(served.server._flights._ended[0][0].folder)["time"]) == 5
+
+
+def test_a_taken_port_is_told(serve, tmp_path):
+    served = serve()
+    flights = Flights(FlightOptions(), "ardupilot", law_of_pwm)
+    with pytest.raises(RunError, match=rf"UDP 127.0.0.1:{served.address[1]}: Address already in use"):
+        JsonServer(flights, served.address)
+
+
+@pytest.mark.parametrize(
+    ("overrides", "vehicle", "words"),
+    [
+        ((), "odin", "has no table"),
+        ((), "ordin", "is unknown"),
+        (("commands.enabled=true",), None, "commands.enabled is true, expected false: here an autopilot steers"),
+        (("time.duratoin=3",), None, "duratoin"),
+        (("record.lyapunov=true",), None, "record.lyapunov"),
+    ],
+)
+def test_what_cannot_be_flown_is_told_before_anybody_waits(overrides, vehicle, words):
+    with pytest.raises(Exception, match=words):
+        Flights(FlightOptions("sitl", overrides, vehicle), "ardupilot", law_of_pwm)
+
+
+def test_a_folder_in_use_is_told_before_anybody_waits(tmp_path):
+    (tmp_path / "here").touch()
+    with pytest.raises(RunError, match="exists and is not empty"):
+        Flights(FlightOptions(out=tmp_path), "ardupilot", law_of_pwm)
+
+
+def test_a_pilot_holds_depth_within_5_cm(serve):
+    """Down to 4 m by pulses of a PID on the depth that is told, and there to stay: the vehicle is 1 N too heavy."""
+    served = serve("time.duration=40.0", record_rate=100.0)
+    integral, depth, sinking = 0.0, 0.3, 0.0
+    with StandIn(served.address, rate=400) as pilot:
+        for _ in range(16000):
+            error = 4.0 - depth
+            integral = min(max(integral + error / 400, -1.0), 1.0)
+            thrust = min(max(0.8 * error + 0.1 * integral - 0.8 * sinking, -0.6), 0.6)
+            said = pilot.fly(heave(np.copysign(abs(thrust) ** 0.5, thrust)))
+            depth, sinking = said["position"][2], said["velocity"][2]
+    (run,) = served.outcome().runs
+    record = load_record(run.folder)
+    held = record["position.z"][record["time"] > 20.0]
+    assert abs(held - 4.0).max() < 0.05
+    assert run.summary["settled"]

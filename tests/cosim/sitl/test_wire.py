@@ -1,0 +1,114 @@
+"""The bytes on the wire, against bytes by hand and a reader as naive as ArduPilot's."""
+
+import json
+import math
+import struct
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from cosim.errors import RunError
+from cosim.sitl.motion import Motion
+from cosim.sitl.wire import decode, encode
+from tests.cosim.sitl.stand_in import newest_line, parse
+
+AT_REST = Motion(
+    0.25,
+    (0.0, 0.0, 0.0),
+    (0.0, 0.0, -9.81),
+    (1.0, 2.0, 3.0),
+    (0.1, 0.2, 0.3),
+    (0.0, 0.0, 0.5),
+    (1.0, 0.0, 0.0, 0.0),
+    None,
+)
+
+
+def test_sixteen_channels_by_hand():
+    data = bytes.fromhex("1a48 b004 39300000" + "dc05" * 15 + "6c07")
+    packet = decode(data)
+    assert (packet.frame_rate, packet.frame_count) == (1200, 12345)
+    assert packet.pwm == (1500,) * 15 + (1900,)
+
+
+def test_thirty_two_channels_by_hand():
+    data = bytes.fromhex("8173 9001 ffffffff" + "0000" * 31 + "4c04")
+    packet = decode(data)
+    assert (packet.frame_rate, packet.frame_count) == (400, 2**32 - 1)
+    assert packet.pwm == (0,) * 31 + (1100,)
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        b"",
+        b"\x1a\x48",
+        struct.pack("<HHI16H", 18459, 1200, 0, *[1500] * 16),
+        struct.pack("<HHI16H", 29569, 1200, 0, *[1500] * 16),  # the other one's magic
+        struct.pack("<HHI32H", 18458, 1200, 0, *[1500] * 32),
+        struct.pack(">HHI16H", 18458, 1200, 0, *[1500] * 16),  # big end first
+        struct.pack("<HHI16H", 18458, 1200, 0, *[1500] * 16) + b"\0",
+        struct.pack("<HHI16H", 18458, 1200, 0, *[1500] * 16)[:-1],
+    ],
+)
+def test_what_is_no_servo_packet(data):
+    assert decode(data) is None
+
+
+@given(st.binary(max_size=80))
+def test_no_bytes_upset_the_reader(data):
+    packet = decode(data)
+    assert packet is None or len(packet.pwm) in (16, 32)
+
+
+def test_the_line_is_compact_and_ends_on_both_sides():
+    data = encode(AT_REST)
+    assert data == (
+        b'\n{"timestamp":0.25,"imu":{"gyro":[0.0,0.0,0.0],"accel_body":[0.0,0.0,-9.81]},"position":[1.0,2.0,3.0],'
+        b'"velocity":[0.1,0.2,0.3],"attitude":[0.0,0.0,0.5],"quaternion":[1.0,0.0,0.0,0.0]}\n'
+    )
+    assert b" " not in data
+
+
+def test_the_naive_reader_refuses_blanks_behind_colons():
+    """As the autopilot does, so that the test above tests something."""
+    line = json.dumps(json.loads(encode(AT_REST)))
+    with pytest.raises(ValueError, match="imu/gyro"):
+        parse(line)
+
+
+def test_the_naive_reader_takes_the_first_word_that_it_finds():
+    with pytest.raises(ValueError, match="/position"):
+        parse('{"position_of_home":0,' + newest_line(encode(AT_REST))[1:])
+
+
+finite = st.floats(allow_nan=False, allow_infinity=False, min_value=-1e300, max_value=1e300)
+three = st.tuples(finite, finite, finite)
+motions = st.builds(
+    Motion, finite, three, three, three, three, three, st.tuples(finite, finite, finite, finite), st.none() | finite
+)
+
+
+@given(motions)
+def test_every_number_is_read_back_to_the_last_bit(motion):
+    line = newest_line(encode(motion))
+    said, table = parse(line), json.loads(line)
+    names = ("timestamp", "gyro", "accel_body", "position", "velocity", "attitude", "quaternion", "rng_1")
+    for name, value in zip(names, motion, strict=True):
+        if value is None:
+            assert name not in said
+            continue
+        assert repr(said[name]) == repr(value)  # which tells -0.0 from 0.0
+    assert list(table) == [
+        "timestamp", "imu", "position", "velocity", "attitude", "quaternion", *["rng_1"] * (motion.altitude is not None)
+    ]  # fmt: skip
+    assert list(table["imu"]) == ["gyro", "accel_body"]
+
+
+@pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
+@pytest.mark.parametrize("field", ["gyro", "specific_force", "position_ned", "velocity_ned", "altitude"])
+def test_what_is_not_finite_is_never_sent(field, bad):
+    value = bad if field == "altitude" else (0.0, bad, 0.0)
+    with pytest.raises(RunError, match=r"t = 0.25 s: the vehicle's state is not finite"):
+        encode(AT_REST._replace(**{field: value}))
