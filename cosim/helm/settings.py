@@ -14,7 +14,13 @@ from cosim.scenario import Scenario
 from plant_fmu.variables import variables
 
 _GREATEST_RAMP = 1e3  # m
-_OF_COMMANDS = {"obstacle_radius": "m", "hold_radius": "m", "surface_depth": "m", "pilot_gain": ""}
+_LEAST_RADIUS = 1e-2  # m
+_OF_COMMANDS = {  # unit, least, greatest
+    "obstacle_radius": ("m", _LEAST_RADIUS, 1e3),
+    "hold_radius": ("m", _LEAST_RADIUS, 1e3),
+    "surface_depth": ("m", 0.0, 1e3),
+    "pilot_gain": ("", 0.0, 1.0),
+}
 
 
 @dataclass(frozen=True)
@@ -56,8 +62,8 @@ class LiveSettings:
         self._add("arbiter.ramp", "m", scenario.arbiter.ramp, 0.0, _GREATEST_RAMP)
         self._add_limits(scenario)
         if scenario.commands.enabled:
-            for name, unit in _OF_COMMANDS.items():
-                self._add(f"commands.{name}", unit, getattr(scenario.commands, name), 0.0, _GREATEST_RAMP)
+            for name, (unit, least, greatest) in _OF_COMMANDS.items():
+                self._add(f"commands.{name}", unit, getattr(scenario.commands, name), least, greatest)
 
     def _add(self, key: str, unit: str, value: float, least: float, greatest: float) -> None:
         self._numbers[key] = min(max(value, least), greatest)
@@ -75,7 +81,11 @@ class LiveSettings:
         for key, name in keys.items():
             variable = table[name]
             value = float(scenario.plant.parameters.get(name, wrench.get(name, variable.start)))
-            self._add(key, variable.quantity.unit, value, variable.quantity.minimum, variable.quantity.maximum)
+            least, greatest = variable.quantity.minimum, variable.quantity.maximum
+            # a thruster's limits hold 0 between them
+            least = 0.0 if name.startswith("thrust_max") else least
+            greatest = 0.0 if name.startswith("thrust_min") else greatest
+            self._add(key, variable.quantity.unit, value, least, greatest)
         self.of_plant = keys  # the FMU's parameter behind a key
 
     def __iter__(self) -> Iterator[Setting]:

@@ -210,9 +210,13 @@ class Vessel:
             case Arm():
                 self._armed_before = order.armed
             case Steer():
-                self._mode_before, self._wished = order.mode, (self.now, order.mode)
+                self._foresee_mode(order.mode)
             case Aim():
-                self._mode_before, self._wished = "reach", (self.now, "reach")
+                self._foresee_mode("reach")
+
+    def _foresee_mode(self, mode: Mode) -> None:
+        self._wished = None if mode == self.mode else (self.now, mode)
+        self._mode_before = mode
 
     # ---- the voice ----
 

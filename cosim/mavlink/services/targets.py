@@ -7,7 +7,7 @@ from typing import Any
 
 from cosim.helm.orders import Aim, Face, Order
 from cosim.mavlink.profile import MODE_NAMES
-from cosim.mavlink.services.parameters import Parameters
+from cosim.mavlink.services.parameters import Parameters, shortest
 from cosim.mavlink.services.service import Call, Service, place_of, unscaled
 from cosim.mavlink.vessel import Sender, Vessel
 from cosim.scenario_tables import Vector3
@@ -168,4 +168,4 @@ class Targets(Service):
             return int(m.MAV_RESULT_DENIED)
         if not self._may(call.sender):
             return int(m.MAV_RESULT_DENIED)
-        return self._parameters.change(_SPEED, speed)
+        return self._parameters.change(_SPEED, shortest(speed))

@@ -1,0 +1,185 @@
+"""Texts about what happens, and the watch over the station."""
+
+import pytest
+from pymavlink.dialects.v20 import all as mavlink
+
+from cosim.helm.orders import Arm, Steer
+from tests.cosim.mavlink.station import Station
+
+BEAT = mavlink.MAVLink_heartbeat_message(mavlink.MAV_TYPE_GCS, mavlink.MAV_AUTOPILOT_INVALID, 0, 0, 4, 3)
+
+
+@pytest.fixture
+def station():
+    station = Station("ardusub")
+    station.look(0.0)
+    station.wire.clear()
+    return station
+
+
+def clearances(goal=-3.0, first=2.0, band=2.0):
+    return {"goal.clearance": (goal, first, 2.0, band, 1e5, 1e5)}
+
+
+def test_regions_entered_and_left(station):
+    station.look(1.0, **clearances(first=-0.005))  # not far enough in
+    assert station.wire.texts == []
+    station.look(1.1, **clearances(first=-0.02))
+    station.look(1.2, **clearances(first=0.005))  # not far enough out
+    station.look(1.3, **clearances(first=-0.02))
+    station.look(1.4, **clearances(first=0.02))
+    assert station.wire.texts == ["Region SR1 entered: keep out", "Region SR1 left"]
+    assert [m.severity for m in station.wire.of("STATUSTEXT")] == [4, 6]
+
+
+def test_at_an_edge_it_is_not_said_again_and_again(station):
+    for k in range(200):
+        station.now += 0.01
+        station.autopilot.tick(station.now)
+        station.look(1.0 + 0.01 * k, **clearances(first=0.05 * (-1) ** k))
+    assert len(station.wire.texts) <= 4
+
+
+def test_the_target_reached_and_left(station):
+    station.look(1.0, **clearances(goal=0.1))
+    station.look(2.0, **clearances(goal=-0.1))
+    assert station.wire.texts == ["Target reached", "Target left"]
+
+
+def test_saturation(station):
+    station.look(1.0, allocation_saturated=1.0)
+    station.look(1.5)
+    station.look(1.6, **{"thrust_saturated[3]": 1.0})
+    station.look(2.5)
+    station.look(2.7)
+    assert station.wire.texts == ["Thrust saturated", "Thrust no longer saturated"]
+
+
+def test_armed_disarmed_and_the_bottom(station):
+    station.look(1.0, **{"helm.armed": 0.0})
+    station.look(1.1)
+    station.look(1.2, bottom_contact=1.0)
+    assert station.wire.texts == ["Disarmed", "Armed", "Bottom touched"]
+
+
+def test_a_long_text_comes_in_parts(station):
+    vessel = station.autopilot._vessel
+    for length in (50, 51, 100, 101, 150, 500):
+        station.wire.clear()
+        station.now += 10.0
+        station.autopilot.tick(station.now)
+        station.wire.clear()
+        vessel.say("x" * length)
+        parts = station.wire.of("STATUSTEXT")
+        assert "".join(part.text for part in parts) == "x" * min(length, 200)
+        if length > 50:
+            assert len({part.id for part in parts}) == 1 and parts[0].id > 0
+            assert [part.chunk_seq for part in parts] == list(range(len(parts)))
+            assert len(parts[-1].text) < 50  # which ends it
+        else:
+            assert parts[0].id == 0
+
+
+def test_who_says_too_much_is_not_heard(station):
+    for i in range(100):
+        station.autopilot._vessel.say(f"line {i}")
+    assert len(station.wire.texts) == 12
+
+
+# ---- the watch ----
+
+
+def commanding(action, **options):
+    station = Station("ardusub", loss_action=action, **options)
+    station.look(0.0)
+    station.send(BEAT)
+    station.command(400, 1.0)
+    station.ordered()
+    station.wire.clear()
+    return station
+
+
+@pytest.mark.parametrize(
+    ("action", "orders"),
+    [("warn", []), ("hold", [Steer("hold")]), ("surface", [Steer("surface")]), ("disarm", [Arm(False)])],
+)
+def test_a_station_that_falls_silent(action, orders):
+    station = commanding(action)
+    station.wait(4.9)
+    assert station.ordered() == [] and not any("lost" in text for text in station.wire.texts)
+    station.wait(0.3)
+    assert station.ordered() == orders
+    assert any(text.startswith("Link to station 255 lost") for text in station.wire.texts)
+    station.command(512, 0)
+    assert station.wire.of("HEARTBEAT")[-1].system_status == mavlink.MAV_STATE_CRITICAL
+    station.wait(60.5)
+    assert station.ordered() == []
+    assert len([text for text in station.wire.texts if "lost" in text]) == 3  # every 30 s
+    station.send(BEAT)
+    station.wait(0.1)
+    assert "Link to station 255 regained" in station.wire.texts
+    station.command(512, 0)
+    assert station.wire.of("HEARTBEAT")[-1].system_status == mavlink.MAV_STATE_ACTIVE
+
+
+def test_none_is_none():
+    station = commanding("none")
+    station.wait(100.0, 0.5)
+    assert not any("lost" in text for text in station.wire.texts) and station.ordered() == []
+
+
+def test_only_who_commands_is_missed():
+    station = Station("ardusub", loss_action="disarm")
+    station.look(0.0)
+    station.send(BEAT, system=250)  # never commands
+    station.command(400, 1.0)  # never sends a heartbeat
+    station.ordered()
+    station.wait(60.0, 0.5)
+    assert station.ordered() == []
+    station.send(BEAT)
+    station.wait(4.0)
+    station.send(BEAT)
+    station.wait(4.0)
+    assert station.ordered() == []
+    station.wait(2.0)
+    assert station.ordered() == [Arm(False)]
+
+
+def test_simulated_time_does_not_count():
+    station = commanding("disarm")
+    for k in range(1000):
+        station.look(1.0 * k)
+    station.wait(1.0)
+    assert station.ordered() == []
+
+
+def test_time_and_action_are_parameters():
+    station = commanding("warn")
+    for name, value in ((b"FS_GCS_TIMEOUT", 20.0), (b"FS_GCS_ENABLE", 2.0)):
+        station.send(mavlink.MAVLink_param_set_message(1, 1, name, value, 9))
+    station.send(BEAT)
+    station.wait(19.0)
+    assert station.ordered() == []
+    station.wait(2.0)
+    assert station.ordered() == [Arm(False)]
+
+
+def test_an_action_that_finds_the_queue_full_is_tried_again():
+    station = commanding("disarm")
+    while station.orders.give(Arm(True)):
+        pass
+    station.wait(6.0)
+    assert Arm(False) not in station.ordered()
+    station.wait(0.1)
+    assert station.ordered() == [Arm(False)]
+
+
+def test_clocks(station):
+    station.look(2.5)
+    station.wire.clear()
+    (reply,) = station.send(mavlink.MAVLink_timesync_message(0, 987))
+    assert (reply.tc1, reply.ts1) == (2_500_000_000, 987)
+    assert station.send(mavlink.MAVLink_timesync_message(1, 987)) == []
+    (ping,) = station.send(mavlink.MAVLink_ping_message(5, 6, 0, 0))
+    assert (ping.time_usec, ping.seq, ping.target_system, ping.target_component) == (5, 6, 255, 190)
+    assert station.send(mavlink.MAVLink_ping_message(5, 6, 1, 1)) == []

@@ -1,0 +1,228 @@
+"""What the messages say of a snapshot."""
+
+import math
+
+import numpy as np
+import pytest
+from pymavlink.dialects.v20 import all as mavlink
+
+from controller.quaternion import from_axis_angle, multiply, rotation_matrix
+from cosim.mavlink.encode import Encoder, float32, whole, wrapped
+from cosim.mavlink.geodesy import LocalFrame
+from cosim.mavlink.view import euler_of
+from tests.cosim.mavlink.station import Station, scenario
+
+TURN = from_axis_angle(np.array([0.0, 0.0, 1.0]), 2.0)
+EULER = (0.0, 0.0, 2.0)
+
+
+@pytest.fixture
+def station():
+    station = Station("ardusub")
+    station.look(
+        12.5,
+        **{
+            "quaternion.e0": tuple(TURN), "attitude.roll": EULER, "velocity.u": (0.5, -0.2, 0.1, 0.01, 0.02, 0.03),
+            "weight.obstacle": (0.7, 0.2, 0.1), "estimate.phi1": (1.0, 2.0, 3.0, 4.0), "law.yielding": 0.25,
+            "thruster_force[1]": (13.5, -27.0, 0.0, 54.0), "measured.acceleration.x": (0.0, 0.0, -9.80665),
+        },
+    )  # fmt: skip
+    return station
+
+
+def ask(station, message_id):
+    station.wire.clear()
+    station.command(512, message_id)
+    return [m for m in station.wire.got if m.get_type() != "COMMAND_ACK"]
+
+
+def test_pose(station):
+    (attitude,) = ask(station, 30)
+    assert (attitude.time_boot_ms, attitude.yaw, attitude.yawspeed) == (12_500, 2.0, pytest.approx(0.03))
+    (quaternion,) = ask(station, 31)
+    assert (quaternion.q1, quaternion.q4) == (pytest.approx(math.cos(1.0)), pytest.approx(math.sin(1.0)))
+    (local,) = ask(station, 32)
+    north, east, down = rotation_matrix(TURN) @ np.array([0.5, -0.2, 0.1])
+    assert (local.x, local.y, local.z) == (1.0, 2.0, 5.0)
+    assert (local.vx, local.vy, local.vz) == pytest.approx((north, east, down), rel=1e-6)
+    (globe,) = ask(station, 33)
+    assert (globe.relative_alt, globe.alt, globe.hdg) == (-5000, -5000, round(math.degrees(2.0) * 100))
+    assert (globe.vx, globe.vy, globe.vz) == (round(north * 100), round(east * 100), round(down * 100))
+    (hud,) = ask(station, 74)
+    assert (hud.alt, hud.climb, hud.heading, hud.throttle) == (-5.0, pytest.approx(-down), 115, 100)
+    (odometry,) = ask(station, 331)
+    assert (odometry.frame_id, odometry.child_frame_id, odometry.estimator_type) == (1, 12, 8)
+    assert math.isnan(odometry.pose_covariance[0]) and odometry.vx == 0.5
+
+
+def test_depth_as_pressure(station):
+    (outside,), (inside,) = ask(station, 137), ask(station, 29)
+    assert outside.press_abs == pytest.approx(1013.25 + 1000.0 * 9.80665 * 5.0 / 100.0)
+    assert inside.press_abs == pytest.approx(1013.25)
+
+
+def test_thrusters(station):
+    (servo,) = ask(station, 36)
+    assert [servo.servo1_raw, servo.servo2_raw, servo.servo3_raw, servo.servo4_raw] == [1700, 1100, 1500, 1900]
+    assert (servo.servo8_raw, servo.servo9_raw) == (1500, 0)
+    (actuators,) = ask(station, 375)
+    assert actuators.actuator[:4] == [0.5, -1.0, 0.0, 1.0] and actuators.active == 0xFF
+
+
+def test_time_of_servos_wraps():
+    station = Station()
+    station.look(5000.0)
+    (servo,) = ask(station, 36)
+    assert servo.time_usec == 5_000_000_000 % 2**32
+    station.look(5e6)
+    (attitude,) = ask(station, 30)
+    assert attitude.time_boot_ms == 5_000_000_000 % 2**32
+
+
+def test_all_sensors_that_mavsdk_asks_for_are_healthy(station):
+    (status,) = ask(station, 1)
+    for bit in (1, 2, 4, 32, mavlink.MAV_SYS_STATUS_PREARM_CHECK):
+        assert status.onboard_control_sensors_present & status.onboard_control_sensors_enabled & bit
+        assert status.onboard_control_sensors_health & bit
+    assert status.onboard_control_sensors_health & mavlink.MAV_SYS_STATUS_GEOFENCE
+
+
+def test_the_target(station):
+    (target,) = ask(station, 85)
+    assert (target.coordinate_frame, target.x, target.y, target.z) == (1, 8.0, 0.0, 5.0)
+    (nav,) = ask(station, 62)
+    assert nav.wp_dist == round(math.hypot(7.0, 2.0)) and nav.target_bearing == round(math.degrees(math.atan2(-2, 7)))
+
+
+def test_weights_and_estimates_by_name(station):
+    values = {m.name: m.value for m in ask(station, 251)}
+    assert values["w_obstacle"] == pytest.approx(0.7) and values["phi4"] == 4.0 and values["goal_clear"] == -3.0
+    assert values["qp_slack"] == 0.25 and values["clearance"] == 2.0 and values["thrust"] == 1.0
+    assert all(len(name) <= 10 for name in values)
+
+
+def test_arrays(station):
+    arrays = {m.array_id: m for m in ask(station, 350)}
+    assert {i: m.name for i, m in arrays.items()} == {
+        1: "weights",
+        2: "values",
+        3: "clearances",
+        4: "thrusts",
+        5: "law",
+    }
+    assert arrays[1].data[3:6] == pytest.approx([0.7, 0.2, 0.1])
+    assert arrays[3].data[:4] == [-3.0, 2.0, 2.0, 2.0] and arrays[4].data[:2] == [13.5, -27.0]
+
+
+def test_obstacles_as_the_vehicle_sees_them():
+    station = Station()
+    # SR1 of the scenario: a sphere of 0.5 m about (2, 0, 1.8); a seen one about (5, 2, 5) of 1 m
+    there = np.array([5.0, 2.0, 5.0]) - [0.0, 0.0, -1e5]
+    distance = math.dist((1.0, 2.0, 5.0), (2.0, 0.0, 1.8)) - 0.5
+    station.look(1.0, **{
+        "quaternion.e0": tuple(TURN), "attitude.roll": EULER, "seen 1.shift.x": tuple(there),
+        "goal.clearance": (-3.0, distance, 2.0, 2.0, 3.0, 1e5),
+    })  # fmt: skip
+    found = {m.obstacle_id: (m.x, m.y, m.z) for m in ask(station, 11037)}
+    assert set(found) == {1, 4}
+    here, back = np.array([1.0, 2.0, 5.0]), rotation_matrix(TURN).T
+    towards = np.array([2.0, 0.0, 1.8]) - here
+    assert found[1] == pytest.approx(back @ (towards * distance / np.linalg.norm(towards)), abs=1e-5)
+    assert found[4] == pytest.approx(back @ np.array([3.0, 0.0, 0.0]), abs=1e-5)
+
+
+def test_the_bottom_where_there_is_one(station):
+    for message_id in (132, 173, 11038):
+        assert ask(station, message_id) == []
+    station.look(13.0, **{"altitude": 2.5, "measured.altitude": 2.5})
+    assert ask(station, 132)[0].current_distance == 250 and ask(station, 132)[0].orientation == 25
+    assert ask(station, 173)[0].distance == 2.5 and ask(station, 11038)[0].distance == 2.5
+
+
+def test_landed_is_on_the_bottom(station):
+    assert ask(station, 245)[0].landed_state == mavlink.MAV_LANDED_STATE_IN_AIR
+    station.look(13.0, bottom_contact=1.0)
+    assert ask(station, 245)[0].landed_state == mavlink.MAV_LANDED_STATE_ON_GROUND
+
+
+def test_before_the_first_step_the_vehicle_is_where_the_scenario_has_it():
+    station = Station(of=scenario("initial.position=[1.0, 2.0, 3.0]"))
+    (local,) = ask(station, 32)
+    assert (local.x, local.y, local.z) == (1.0, 2.0, 3.0)
+
+
+def test_origin_and_home():
+    station = Station()
+    station.look()
+    replies = station.send(mavlink.MAVLink_set_gps_global_origin_message(1, 470_000_000, 80_000_000, 12_000))
+    assert replies[0].get_type() == "GPS_GLOBAL_ORIGIN"
+    assert (replies[0].latitude, replies[0].longitude, replies[0].altitude) == (470_000_000, 80_000_000, 12_000)
+    (globe,) = ask(station, 33)
+    assert globe.lat == pytest.approx(470_000_000, abs=200) and (globe.alt, globe.relative_alt) == (7000, -5000)
+    assert station.command(179, 1.0) == mavlink.MAV_RESULT_ACCEPTED  # here
+    (home,) = ask(station, 242)
+    assert (home.latitude, home.longitude, home.altitude, home.z) == (globe.lat, globe.lon, 12_000, 0.0)
+    assert station.command(179, 0.0) == mavlink.MAV_RESULT_DENIED  # nowhere
+    station.send(mavlink.MAVLink_set_gps_global_origin_message(1, 2**31 - 1, 0, 0))
+    assert ask(station, 49)[0].latitude == 470_000_000
+
+
+def ecef(latitude, longitude, altitude):
+    """WGS84 in earth-centred coordinates, from the ellipsoid's axes."""
+    a, b = 6378137.0, 6356752.314245
+    lat, lon = math.radians(latitude), math.radians(longitude)
+    n = a * a / math.hypot(a * math.cos(lat), b * math.sin(lat))
+    return np.array([
+        (n + altitude) * math.cos(lat) * math.cos(lon), (n + altitude) * math.cos(lat) * math.sin(lon),
+        (n * b * b / (a * a) + altitude) * math.sin(lat),
+    ])  # fmt: skip
+
+
+@pytest.mark.parametrize("latitude", [-80.0, -33.0, 0.0, 55.9097, 70.0])
+@pytest.mark.parametrize("offset", [(100.0, 0.0, 0.0), (0.0, 100.0, 5.0), (-70.0, 70.0, 30.0)])
+def test_the_local_frame_against_the_ellipsoid(latitude, offset):
+    frame = LocalFrame(latitude, 179.9999)
+    north, east, down = offset
+    here, there = ecef(latitude, 179.9999, 0.0), ecef(*frame.to_global(offset))
+    lat, lon = math.radians(latitude), math.radians(179.9999)
+    axes = np.array([
+        [-math.sin(lat) * math.cos(lon), -math.sin(lat) * math.sin(lon), math.cos(lat)],
+        [-math.sin(lon), math.cos(lon), 0.0],
+        [-math.cos(lat) * math.cos(lon), -math.cos(lat) * math.sin(lon), -math.sin(lat)],
+    ])  # fmt: skip
+    # the plane leaves the ellipsoid by s^2 / 2 R, 0.8 mm at 100 m; meridians draw together a little more near the poles
+    assert axes @ (there - here) == pytest.approx((north, east, down), abs=0.01)
+    assert frame.to_local(*frame.to_global(offset)) == pytest.approx(offset, abs=1e-6)
+
+
+def test_the_local_frame_stays_finite_at_the_pole():
+    assert all(map(math.isfinite, LocalFrame(90.0, 0.0).to_global((1.0, 1.0, 1.0))))
+
+
+# ---- fields ----
+
+
+def test_fields_hold_what_comes():
+    make = Encoder(mavlink)
+    coder = mavlink.MAVLink(None)
+    message = make("GLOBAL_POSITION_INT", -1, math.inf, -math.inf, 1e300, math.nan, 1e9, -1e9, 0.6, math.nan)
+    message.pack(coder)
+    assert (message.time_boot_ms, message.lat, message.lon, message.alt) == (0, 2**31 - 1, -(2**31), 2**31 - 1)
+    assert (message.relative_alt, message.vx, message.vy, message.vz, message.hdg) == (0, 32767, -32768, 1, 65535)
+    make("ATTITUDE", 0, math.inf, 1e300, math.nan, 0, 0, 0).pack(coder)
+    make("BATTERY_STATUS", 0, 0, 0, 0, [1] * 20, 0, 0, 0, 0).pack(coder)
+    make("STATUSTEXT", 6, "größer" * 20, 0, 0).pack(coder)
+    make("ACTUATOR_OUTPUT_STATUS", 0, 0, [1.0]).pack(coder)
+
+
+def test_numbers_of_the_link():
+    assert [whole(x) for x in (1.4, math.nan, math.inf, -2.0, 3)] == [1, None, None, -2, 3]
+    assert float32(math.inf) == float32(1e300) == pytest.approx(3.4028234e38) and float32(-0.5) == -0.5
+    assert wrapped(2**32 * 1000 + 5000) == 5 and wrapped(2**32 + 7, 1) == 7
+
+
+def test_euler_angles_are_those_of_the_plant():
+    for roll, pitch, yaw in ((0.1, 0.2, 0.3), (-2.0, -1.5, 3.0), (0.0, 0.0, -3.1)):
+        parts = [from_axis_angle(np.eye(3)[i], angle) for i, angle in enumerate((roll, pitch, yaw))]
+        whole_turn = multiply(parts[2], multiply(parts[1], parts[0]))
+        assert euler_of(whole_turn.tolist()) == pytest.approx((roll, pitch, yaw), abs=1e-9)

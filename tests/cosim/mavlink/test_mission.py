@@ -1,0 +1,237 @@
+"""Missions of regions: transfer, meaning, and progress."""
+
+import math
+
+import pytest
+from pymavlink.dialects.v20 import all as mavlink
+
+from cosim.helm.orders import Begin, Item, Mission, Steer
+from tests.cosim.mavlink.station import NAN, Station
+
+LOCAL, GLOBAL, RELATIVE, GLOBAL_INT, RELATIVE_INT, TERRAIN = 1, 0, 3, 5, 6, 10
+LATITUDE, LONGITUDE = 559_097_000, -33_203_000  # of the origin
+WAYPOINT, FOREVER, FOR_TIME, HOME, LAND = 16, 17, 19, 20, 21
+
+
+@pytest.fixture(params=["ardusub", "px4", "generic"])
+def station(request):
+    station = Station(request.param)
+    station.look()
+    return station
+
+
+def first(station):
+    return int(station.autopilot._vessel.profile.home_is_first)
+
+
+def item(seq, frame=LOCAL, command=WAYPOINT, numbers=(0.0, 0.0, 0.0, NAN), place=(10_000, 20_000, 3.0), kind=0):
+    return mavlink.MAVLink_mission_item_int_message(1, 1, seq, frame, command, 0, 1, *numbers, *place, kind)
+
+
+def upload(station, *items, **who):
+    """Upload as stations do, with home first where that is the way, and return the result."""
+    items = [{}, *items] if first(station) else list(items)
+    replies = station.send(mavlink.MAVLink_mission_count_message(1, 1, len(items), 0), **who)
+    for seq, fields in enumerate(items):
+        (asked,) = [r for r in replies if r.get_type() == "MISSION_REQUEST_INT"]
+        assert (asked.seq, asked.target_system, asked.target_component) == (seq, who.get("system", 255), 190)
+        replies = station.send(item(seq, **fields), **who)
+    (ack,) = [r for r in replies if r.get_type() == "MISSION_ACK"]
+    return ack.type
+
+
+def test_what_is_written_is_read_back(station):
+    items = [
+        {"numbers": (5.0, 1.5, 7.0, 0.25), "place": (12_345, -54_321, 2.5)},
+        {
+            "command": FOR_TIME,
+            "numbers": (9.0, 0.0, 0.0, NAN),
+            "frame": RELATIVE_INT,
+            "place": (LATITUDE, LONGITUDE, -4.0),
+        },
+        {"command": FOREVER, "frame": GLOBAL, "place": (LATITUDE + 100, LONGITUDE - 100, -2.0)},
+    ]
+    assert upload(station, *items) == mavlink.MAV_MISSION_ACCEPTED
+    (count,) = station.send(mavlink.MAVLink_mission_request_list_message(1, 1, 0))
+    assert (count.count, count.mission_type) == (3 + first(station), 0)
+    for i, fields in enumerate(items):
+        (back,) = station.send(mavlink.MAVLink_mission_request_int_message(1, 1, i + first(station), 0))
+        sent = item(i + first(station), **fields)
+        for name in ("seq", "frame", "command", "autocontinue", "param1", "param2", "param3", "x", "y", "z"):
+            assert getattr(back, name) == getattr(sent, name)
+        assert back.param4 == sent.param4 or (math.isnan(back.param4) and math.isnan(sent.param4))
+        (old,) = station.send(mavlink.MAVLink_mission_request_message(1, 1, i + first(station), 0))
+        scale = 1e4 if back.frame == LOCAL else 1e7
+        assert old.get_type() == "MISSION_ITEM" and old.x * scale == pytest.approx(back.x, rel=1e-6, abs=100)
+
+
+def test_what_the_items_mean(station):
+    upload(
+        station,
+        {"numbers": (5.0, 1.5, 0.0, NAN)},
+        {"numbers": (NAN, 0.0, 0.0, NAN), "frame": RELATIVE_INT, "place": (LATITUDE, LONGITUDE, -4.0)},
+        {
+            "command": FOR_TIME,
+            "numbers": (9.0, 0.0, 0.0, NAN),
+            "frame": GLOBAL_INT,
+            "place": (LATITUDE, LONGITUDE, -2.0),
+        },
+        {"command": FOREVER},
+        {"command": LAND, "place": (0, 0, 0.0)},
+        {"command": LAND, "place": (70_000, 80_000, 0.0)},
+        {"command": HOME, "frame": 2, "place": (0, 0, 0.0)},
+    )
+    (order,) = station.ordered()
+    assert order == Mission(
+        (
+            Item((1.0, 2.0, 3.0), 1.5, 5.0),
+            Item((0.0, 0.0, 4.0), None, 0.0),
+            Item((0.0, 0.0, 2.0), None, 9.0),
+            Item((1.0, 2.0, 3.0), None, None),
+            Item((1.0, 2.0, 0.5), 0.3, None),
+            Item((7.0, 8.0, 0.5), 0.3, None),
+            Item((0.0, 0.0, 0.5), 0.3, None),
+        )
+    )
+
+
+@pytest.mark.parametrize(
+    ("fields", "result"),
+    [
+        ({"command": 22}, mavlink.MAV_MISSION_UNSUPPORTED),
+        ({"frame": TERRAIN}, mavlink.MAV_MISSION_UNSUPPORTED_FRAME),
+        ({"numbers": (-1.0, 0, 0, 0)}, mavlink.MAV_MISSION_INVALID_PARAM1),
+        ({"numbers": (0, -1.0, 0, 0)}, mavlink.MAV_MISSION_INVALID_PARAM2),
+        ({"numbers": (math.inf, 0, 0, 0)}, mavlink.MAV_MISSION_INVALID_PARAM1),
+        ({"frame": RELATIVE_INT, "place": (0, LONGITUDE, -4.0)}, mavlink.MAV_MISSION_INVALID_PARAM5_X),
+        ({"frame": RELATIVE_INT, "place": (LATITUDE, 0, -4.0)}, mavlink.MAV_MISSION_INVALID_PARAM6_Y),
+        ({"place": (0, 0, 1e6)}, mavlink.MAV_MISSION_INVALID_PARAM7),
+        ({"place": (0, 0, NAN)}, mavlink.MAV_MISSION_INVALID),
+    ],
+)
+def test_what_cannot_be_flown_is_refused_whole(station, fields, result):
+    upload(station, {})
+    station.ordered()
+    assert upload(station, {}, fields) == result
+    assert station.ordered() == []
+    (count,) = station.send(mavlink.MAVLink_mission_request_list_message(1, 1, 0))
+    assert count.count == 1 + first(station)  # the mission before is still there
+
+
+def test_the_old_form_of_items_is_taken_too():
+    station = Station("generic")
+    station.look()
+    station.send(mavlink.MAVLink_mission_count_message(1, 1, 1, 0))
+    old = mavlink.MAVLink_mission_item_message(1, 1, 0, LOCAL, WAYPOINT, 0, 1, 0, 2.0, 0, 0, 1.5, -2.5, 4.0, 0)
+    (ack,) = station.send(old)
+    assert ack.type == mavlink.MAV_MISSION_ACCEPTED
+    assert station.ordered() == [Mission((Item((1.5, -2.5, 4.0), 2.0, 0.0),))]
+
+
+def test_home_is_the_first_item_for_ardupilot():
+    station = Station("ardusub")
+    station.look()
+    upload(station, {})
+    (home,) = station.send(mavlink.MAVLink_mission_request_int_message(1, 1, 0, 0))
+    assert (home.command, home.x, home.y, home.z) == (WAYPOINT, LATITUDE, LONGITUDE, 0.0)
+
+
+def test_fences_and_rally_points_are_none(station):
+    for kind in (1, 2):
+        (count,) = station.send(mavlink.MAVLink_mission_request_list_message(1, 1, kind))
+        assert (count.count, count.mission_type) == (0, kind)
+        (ack,) = station.send(mavlink.MAVLink_mission_count_message(1, 1, 2, kind))
+        assert (ack.type, ack.mission_type) == (mavlink.MAV_MISSION_UNSUPPORTED, kind)
+        (ack,) = station.send(mavlink.MAVLink_mission_clear_all_message(1, 1, kind))
+        assert ack.type == mavlink.MAV_MISSION_ACCEPTED
+    (ack,) = station.send(mavlink.MAVLink_mission_request_list_message(1, 1, 9))
+    assert ack.type == mavlink.MAV_MISSION_UNSUPPORTED
+    assert station.ordered() == []
+
+
+def test_an_item_that_does_not_come_is_asked_for_again_and_given_up(station):
+    station.send(mavlink.MAVLink_mission_count_message(1, 1, 3, 0))
+    station.wire.clear()
+    station.wait(4.5, 0.5)
+    assert {r.seq for r in station.wire.of("MISSION_REQUEST_INT")} == {0}
+    station.send(item(0))
+    station.send(item(0))  # twice: once is enough
+    station.wire.clear()
+    station.wait(10.0, 0.5)
+    assert [r.seq for r in station.wire.of("MISSION_REQUEST_INT")] == [1] * 5
+    assert [a.type for a in station.wire.of("MISSION_ACK")] == [mavlink.MAV_MISSION_OPERATION_CANCELLED]
+    assert upload(station, {}) == mavlink.MAV_MISSION_ACCEPTED
+
+
+def test_an_upload_can_be_broken_off(station):
+    station.send(mavlink.MAVLink_mission_count_message(1, 1, 3, 0))
+    station.send(mavlink.MAVLink_mission_ack_message(1, 1, mavlink.MAV_MISSION_OPERATION_CANCELLED, 0))
+    station.wire.clear()
+    station.wait(3.0, 0.5)
+    assert station.wire.of("MISSION_REQUEST_INT") == []
+
+
+def test_two_do_not_upload_at_once(station):
+    station.send(mavlink.MAVLink_mission_count_message(1, 1, 3, 0))
+    (ack,) = station.send(mavlink.MAVLink_mission_count_message(1, 1, 1, 0), system=250)
+    assert (ack.type, ack.target_system) == (mavlink.MAV_MISSION_DENIED, 250)
+
+
+def test_too_long_a_mission(station):
+    (ack,) = station.send(mavlink.MAVLink_mission_count_message(1, 1, 501, 0))
+    assert ack.type == mavlink.MAV_MISSION_NO_SPACE
+
+
+def test_clear(station):
+    upload(station, {})
+    (ack,) = station.send(mavlink.MAVLink_mission_clear_all_message(1, 1, 255))
+    assert ack.type == mavlink.MAV_MISSION_ACCEPTED
+    assert station.ordered()[-1] == Mission(())
+    (count,) = station.send(mavlink.MAVLink_mission_request_list_message(1, 1, 0))
+    assert count.count == 0
+
+
+def test_start_and_set_current(station):
+    upload(station, {}, {}, {})
+    station.ordered()
+    assert station.command(300, 0.0, 0.0) == mavlink.MAV_RESULT_ACCEPTED
+    assert station.command(224, 2.0 + first(station)) == mavlink.MAV_RESULT_ACCEPTED
+    station.send(mavlink.MAVLink_mission_set_current_message(1, 1, 1 + first(station)))
+    assert station.ordered() == [Begin(0), Steer("mission"), Begin(2), Begin(1)]
+    assert station.command(224, 3.0 + first(station)) == mavlink.MAV_RESULT_DENIED
+    assert station.command(224, NAN) == mavlink.MAV_RESULT_DENIED
+
+
+def test_start_without_a_mission(station):
+    assert station.command(300, 0.0) == mavlink.MAV_RESULT_FAILED
+
+
+def test_progress_is_told(station):
+    upload(station, {}, {})
+    seq = first(station)
+
+    def current():
+        return station.wire.of("MISSION_CURRENT")[-1]
+
+    station.command(512, 42)
+    assert (current().seq, current().total, current().mission_state) == (0, 2, mavlink.MISSION_STATE_NOT_STARTED)
+    station.look(1.1, **{"helm.mode": 3.0, "helm.item": 0.0})
+    station.command(512, 42)
+    assert (current().seq, current().mission_state) == (seq, mavlink.MISSION_STATE_ACTIVE)
+    station.look(1.2, **{"helm.mode": 3.0, "helm.item": 1.0})
+    assert [m.seq for m in station.wire.of("MISSION_ITEM_REACHED")] == [seq]
+    station.look(1.3, **{"helm.mode": 3.0, "helm.item": 1.0, "goal.clearance": 0.1})
+    station.command(512, 42)
+    assert current().mission_state == mavlink.MISSION_STATE_COMPLETE
+    assert [m.seq for m in station.wire.of("MISSION_ITEM_REACHED")] == [seq, seq + 1]
+    station.look(1.4, **{"helm.mode": 1.0, "helm.item": 1.0})
+    station.command(512, 42)
+    assert current().mission_state == mavlink.MISSION_STATE_PAUSED
+
+
+def test_read_only():
+    station = Station(commands=False)
+    (ack,) = [
+        r for r in station.send(mavlink.MAVLink_mission_count_message(1, 1, 1, 0)) if r.get_type() == "MISSION_ACK"
+    ]
+    assert ack.type == mavlink.MAV_MISSION_DENIED

@@ -1,0 +1,185 @@
+"""Arming and modes, as each client numbers them."""
+
+import pytest
+from pymavlink.dialects.v20 import all as mavlink
+
+from cosim.helm.orders import Aim, Arm, Reset, Steer
+from cosim.mavlink.profile import PROFILES
+from tests.cosim.mavlink.station import NAN, Station, scenario
+
+ACCEPTED, REJECTED, DENIED, UNSUPPORTED, FAILED = range(5)
+SET_MODE = 176
+
+
+@pytest.fixture(params=["ardusub", "px4", "generic"])
+def station(request):
+    station = Station(request.param)
+    station.look()
+    return station
+
+
+def test_arming(station):
+    assert station.command(400, 1.0) == ACCEPTED
+    assert station.command(400, 0.0, 21196.0) == ACCEPTED
+    assert station.command(400, NAN) == DENIED
+    assert station.command(400, 2.0) == DENIED
+    assert station.ordered() == [Arm(True), Arm(False)]
+
+
+@pytest.mark.parametrize(
+    ("profile", "numbers", "mode"),
+    [
+        ("ardusub", (19,), "manual"),  # as pymavlink's mode_mapping_sub and ArduSub's modes have them
+        ("ardusub", (16,), "hold"),
+        ("ardusub", (4,), "reach"),
+        ("ardusub", (3,), "mission"),
+        ("ardusub", (9,), "surface"),
+        # as MAVSDK and QGC send them to PX4, and MAVSDK to any other autopilot that is not ArduPilot
+        *((p, n, m) for p in ("px4", "generic") for n, m in [
+            ((1, 0), "manual"), ((1, NAN), "manual"), ((4, 3), "hold"), ((6, 0), "reach"), ((4, 4), "mission"),
+            ((4, 6), "surface"),
+        ]),
+    ],
+)  # fmt: skip
+def test_each_profile_has_its_numbers(profile, numbers, mode):
+    station = Station(profile)
+    station.look()
+    upload(station)
+    for base in (1, 129):
+        assert station.command(SET_MODE, base, *numbers) == ACCEPTED
+    assert station.ordered()[-2:] == [Steer(mode), Steer(mode)]
+
+
+@pytest.mark.parametrize("profile", ["px4", "generic"])
+@pytest.mark.parametrize("number", [0, 2, 3, 4, 7, 9, 16, 19, 20, 21])
+def test_a_number_of_ardusub_means_nothing_else(profile, number):
+    station = Station(profile)
+    station.look()
+    assert station.command(SET_MODE, 1, number, 0) == FAILED
+    assert "no such mode" in "".join(station.wire.texts)
+    assert station.ordered() == []
+
+
+@pytest.mark.parametrize("number", [0, 1, 2, 6, 7, 20, 21, 77])
+def test_a_mode_that_is_not_there_is_refused(number):
+    station = Station("ardusub")
+    station.look()
+    assert station.command(SET_MODE, 1, number) == FAILED
+    assert station.ordered() == []
+
+
+def test_a_mode_needs_the_bit_of_custom_modes(station):
+    assert station.command(SET_MODE, 208, 0.0) == FAILED
+    assert station.command(SET_MODE, NAN, 4.0) == FAILED
+    assert station.ordered() == []
+
+
+def test_set_mode_message():
+    for name, number in (("ardusub", 9), ("px4", 4 << 16 | 6 << 24), ("generic", 4 << 16 | 6 << 24)):
+        station = Station(name)
+        station.look()
+        station.send(mavlink.MAVLink_set_mode_message(1, 1, number))
+        station.send(mavlink.MAVLink_set_mode_message(1, 0, number))  # without the bit of custom modes
+        assert station.ordered() == [Steer("surface")]
+
+
+def test_standard_modes(station):
+    upload(station)
+    station.ordered()
+    for number, mode in ((1, "hold"), (6, "mission"), (5, "surface")):
+        assert station.command(262, number) == ACCEPTED
+        assert station.ordered() == [Steer(mode)]
+    for number in (0, 2, 3, 4, 8, NAN):
+        assert station.command(262, number) == FAILED
+    assert station.ordered() == []
+
+
+def test_available_modes_say_what_can_be_set(station):
+    assert station.command(512, 435, 0) == ACCEPTED
+    modes = station.wire.of("AVAILABLE_MODES")
+    assert [(m.number_modes, m.mode_index) for m in modes] == [(5, i) for i in range(1, 6)]
+    profile = PROFILES[station.autopilot._vessel.options.profile]
+    upload(station)
+    station.ordered()
+    for message in modes:
+        if message.mode_name != "Mission of regions":
+            station.send(mavlink.MAVLink_set_mode_message(1, 1, message.custom_mode))
+            (order,) = station.ordered()
+            assert profile.numbers[order.mode] == message.custom_mode
+    assert station.command(512, 435, 6) == FAILED
+    station.wire.clear()
+    station.command(512, 435, 3)
+    (one,) = station.wire.of("AVAILABLE_MODES")
+    assert (one.mode_index, one.mode_name) == (3, "Region reaching")
+
+
+def test_the_mode_shown_is_that_of_the_snapshot(station):
+    numbers = PROFILES[station.autopilot._vessel.options.profile].numbers
+    station.command(262, 1)  # hold
+    station.command(512, 436)
+    mode = station.wire.of("CURRENT_MODE")[-1]
+    assert (mode.custom_mode, mode.intended_custom_mode) == (numbers["reach"], numbers["hold"])
+    station.wire.clear()
+    station.look(1.01, **{"helm.mode": 1.0})
+    assert station.wire.of("CURRENT_MODE")[-1].custom_mode == numbers["hold"]  # at once
+    assert station.wire.of("HEARTBEAT")[-1].custom_mode == numbers["hold"]
+    assert "Mode: Position hold" in station.wire.texts
+
+
+def test_a_mission_is_needed_for_its_mode(station):
+    assert station.command(262, 6) == FAILED
+    assert "Refused: there is no mission" in station.wire.texts
+
+
+def test_pause_and_go_on(station):
+    assert station.command(193, 0.0) == ACCEPTED
+    assert station.command(193, 1.0) == ACCEPTED
+    assert station.command(252, 0.0, 2.0) == ACCEPTED
+    assert station.command(252, 0.0, 2.0) == ACCEPTED
+    assert station.command(252, 1.0) == ACCEPTED
+    assert station.ordered() == [Steer(mode) for mode in ("hold", "reach", "hold", "hold", "reach")]
+    assert station.command(252, 0.0, 3.0) == UNSUPPORTED
+
+
+def test_landing_is_surfacing_and_home_is_at_the_surface(station):
+    assert station.command(21) == ACCEPTED
+    assert station.command(20) == ACCEPTED
+    assert station.ordered() == [Steer("surface"), Aim((0.0, 0.0, 0.5), 0.3)]
+
+
+def test_a_restart_is_refused_while_armed(station):
+    assert station.command(246, 1.0) == DENIED
+    assert station.command(246, 1.0, 0, 0, 0, 0, 20190226.0) == ACCEPTED
+    station.look(2.0, **{"helm.armed": 0.0})
+    assert station.command(246, 1.0) == ACCEPTED
+    assert station.command(246, 3.0) == UNSUPPORTED
+    assert station.ordered() == [Reset(), Reset()]
+
+
+def test_before_there_is_a_snapshot_what_was_ordered_shows():
+    station = Station(of=scenario("commands.await_arm=true"))
+    station.command(262, 1)
+    station.command(512, 0)
+    beat = station.wire.of("HEARTBEAT")[-1]
+    assert (beat.custom_mode, beat.base_mode & 128) == (16, 0)
+
+
+def test_too_many_orders_are_turned_away(station):
+    results = [station.command(400, 1.0) for _ in range(300)]
+    assert results == [ACCEPTED] * 256 + [REJECTED] * 44
+
+
+def test_read_only_refuses():
+    station = Station(commands=False)
+    station.look()
+    assert [station.command(n, 1.0) for n in (400, 20, 21, 246, 179, 300)] == [DENIED] * 6
+    assert station.command(176, 1, 16) == DENIED
+    assert [station.command(n, 30.0, 0.0) for n in (511, 510, 512, 520, 42428, 410)] == [ACCEPTED] * 6
+    assert "Refused: commands are off: start with --commands" in "".join(station.wire.texts)
+
+
+def upload(station):
+    home = int(station.autopilot._vessel.profile.home_is_first)
+    station.send(mavlink.MAVLink_mission_count_message(1, 1, 1 + home, 0))
+    for seq in range(1 + home):
+        station.send(mavlink.MAVLink_mission_item_int_message(1, 1, seq, 1, 16, 0, 1, 0, 0, 0, 0, 10_000, 0, 2.0, 0))

@@ -1,0 +1,128 @@
+"""The vehicle on the link and the run behind it, step by step."""
+
+import numpy as np
+import pytest
+from pymavlink.dialects.v20 import all as mavlink
+
+from cosim.helm import OrderQueue
+from cosim.master import Master
+from cosim.mavlink.autopilot import Autopilot
+from cosim.mavlink.options import MavlinkOptions
+from cosim.scenario import load_scenario
+from tests.cosim.mavlink.station import NAN, Station, Wire
+from tests.cosim.mavlink.test_targets import local, obstacle, sticks
+
+
+class Flight(Station):
+    """A station, and a run whose every tenth row the autopilot gets."""
+
+    def __init__(self, master, **options):
+        self.master, self.k = master, 0
+        self.orders, self.wire, self.now = OrderQueue(), Wire(), 0.0
+        options = MavlinkOptions(**{"profile": "ardusub", "commands": True, **options})
+        self.autopilot = Autopilot(master.scenario, master.signals.columns, options, self.orders)
+        self.autopilot.attach(self.wire)
+
+    def fly(self, seconds):
+        for _ in range(round(seconds / self.master.scenario.time.step)):
+            self.master.step(self.k, self.orders)
+            self.k += 1
+            self.now += self.master.scenario.time.step
+            self.autopilot.observe(self.master.signals.row.copy())
+            self.autopilot.tick(self.now)
+
+    def last(self, name):
+        return self.wire.of(name)[-1]
+
+
+@pytest.fixture
+def flight():
+    overrides = ["commands.enabled=true", "commands.obstacles=2", "time.duration=60.0"]
+    with Master(load_scenario("paper-deployable", overrides)) as master:
+        yield Flight(master)
+
+
+def test_disarm_and_arm(flight):
+    flight.fly(0.5)
+    flight.command(400, 0.0)
+    flight.fly(0.5)
+    assert not flight.last("HEARTBEAT").base_mode & 128 and not flight.master.helm.armed
+    assert np.all(flight.master.signals.view("thrust[1]", 8) == 0.0)
+    flight.command(400, 1.0)
+    flight.fly(0.1)
+    assert flight.last("HEARTBEAT").base_mode & 128
+    assert flight.wire.texts[-2:] == ["Disarmed", "Armed"]
+
+
+def test_a_set_point_is_reached(flight):
+    flight.fly(0.1)
+    flight.send(local(place=(1.5, 0.5, 1.0)))
+    flight.fly(0.1)
+    target = flight.master.surroundings.target
+    assert target.tolist() == [1.5, 0.5, 1.0]
+    flight.fly(15.0)
+    assert "Target reached" in flight.wire.texts
+    position = flight.last("LOCAL_POSITION_NED")
+    assert np.linalg.norm([position.x - 1.5, position.y - 0.5, position.z - 1.0]) < 0.51
+
+
+def test_parameters_take_effect(flight):
+    flight.fly(0.1)
+    for name, value in ((b"LAW_SPEED", 0.7), (b"SR1_RADIUS", 0.4), (b"THR_MAX_1", 20.0), (b"GOAL_RADIUS", 0.8)):
+        flight.send(mavlink.MAVLink_param_set_message(1, 1, name, value, 9))
+    flight.fly(0.1)
+    assert flight.master.law.gains.speed == 0.7
+    settings = flight.master.helm.settings
+    assert settings.shapes["SR1"].radius == 0.4 and settings["plant.parameters.thrust_max[1]"] == 20.0
+    assert [(s.key, s.value) for s in settings] == [(s.key, s.value) for s in flight.autopilot._vessel.settings]
+
+
+def test_an_obstacle_counts(flight):
+    flight.fly(0.1)
+    flight.send(obstacle(place=(4.0, 0.0, 3.0)))
+    flight.fly(0.1)
+    view = flight.autopilot._vessel.view
+    here = np.array(view.position_ned)
+    assert view.clearances[4] == pytest.approx(np.linalg.norm(here - [4.0, 0.0, 3.0]) - 0.5)
+
+
+def test_by_hand(flight):
+    flight.command(176, 1, 19)
+    flight.send(sticks(x=1000))
+    flight.fly(0.2)
+    assert flight.last("HEARTBEAT").custom_mode == 19
+    flight.send(sticks(x=1000))
+    flight.fly(1.5)
+    assert flight.last("LOCAL_POSITION_NED").vx > 0.05
+
+
+def test_a_mission_of_regions(flight):
+    flight.fly(0.1)
+    places = [(0.6, 0.0, 1.0), (1.2, 0.4, 1.2)]
+    flight.send(mavlink.MAVLink_mission_count_message(1, 1, 3, 0))
+    for seq, (north, east, down) in enumerate([(0.0, 0.0, 0.0), *places]):
+        place = round(north * 1e4), round(east * 1e4), down
+        flight.send(mavlink.MAVLink_mission_item_int_message(1, 1, seq, 1, 16, 0, 1, 0.5, 0.3, 0, NAN, *place, 0))
+    assert flight.last("MISSION_ACK").type == mavlink.MAV_MISSION_ACCEPTED
+    assert flight.command(300, 0.0) == mavlink.MAV_RESULT_ACCEPTED
+    flight.fly(25.0)
+    assert [m.seq for m in flight.wire.of("MISSION_ITEM_REACHED")] == [1, 2]
+    assert flight.last("MISSION_CURRENT").mission_state == mavlink.MISSION_STATE_COMPLETE
+    assert flight.last("HEARTBEAT").custom_mode == 3
+
+
+def test_who_listens_changes_nothing():
+    rows = []
+    for listening in (False, True):
+        with Master(load_scenario("paper-deployable", ["time.duration=2.0"])) as master:
+            flight = Flight(master, commands=False)
+            for _ in range(100):
+                if listening:
+                    flight.fly(0.01)
+                    flight.command(400, 0.0)
+                    flight.send(local())
+                else:
+                    master.step(flight.k)
+                    flight.k += 1
+            rows.append(master.signals.row.copy())
+    assert rows[0].tobytes() == rows[1].tobytes()

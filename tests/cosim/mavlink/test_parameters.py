@@ -1,0 +1,236 @@
+"""Parameters: read, set, refused, and as a file."""
+
+import struct
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from pymavlink.dialects.v20 import all as mavlink
+
+from cosim.helm import LiveSettings
+from cosim.helm.orders import Change
+from cosim.mavlink.services.packed_parameters import bare_crc32, hash_check
+from cosim.mavlink.services.parameter_names import parameter_names
+from cosim.mavlink.services.parameters import shortest
+from cosim.scenario import load_scenario
+from cosim.scenario_file import shipped_scenarios
+from tests.cosim.mavlink.station import NAN, Station, Wire, scenario
+
+REAL32, INT32 = 9, 6
+LIST = mavlink.MAVLink_param_request_list_message(1, 1)
+
+
+@pytest.fixture
+def station():
+    station = Station("ardusub")
+    station.look()
+    station.wire.clear()
+    return station
+
+
+def read(station, name, index=-1):
+    return station.send(mavlink.MAVLink_param_request_read_message(1, 1, name.encode(), index))
+
+
+def put(station, name, value, kind=REAL32):
+    return station.send(mavlink.MAVLink_param_set_message(1, 1, name.encode(), value, kind))
+
+
+@pytest.mark.parametrize("name", shipped_scenarios())
+def test_every_setting_has_a_name_of_its_own(name):
+    keys = [setting.key for setting in LiveSettings(load_scenario(name, ["commands.enabled=true"]))]
+    names = parameter_names(keys)
+    assert len(set(names.values())) == len(keys)
+    assert all(0 < len(n) <= 16 and n == n.upper() for n in names.values())
+
+
+def test_names_can_be_read():
+    keys = {
+        "law.gains.k_p1": "LAW_K_P1", "regions.SR1.gain": "SR1_GAIN", "regions.SR1.shape.radius": "SR1_RADIUS",
+        "goal.radius": "GOAL_RADIUS", "arbiter.ramp": "ARB_RAMP", "limit.force": "LIM_FORCE",
+        "plant.parameters.thrust_min[8]": "THR_MIN_8", "law.gains.position_bandwidth": "LAW_POSITION_BW",
+    }  # fmt: skip
+    assert parameter_names(keys) == keys
+
+
+@settings(max_examples=50)
+@given(st.lists(st.text(max_size=25), unique=True, max_size=12))
+def test_names_are_different_whatever_the_keys(keys):
+    names = parameter_names(keys)
+    assert len(set(names.values())) == len(keys) and all(0 < len(n) <= 16 for n in names.values())
+    assert names == parameter_names(keys)
+
+
+def test_the_list_is_whole(station):
+    station.send(LIST)
+    station.wait(0.1)
+    values = station.wire.of("PARAM_VALUE")
+    assert [v.param_index for v in values] == list(range(len(values)))
+    assert {v.param_count for v in values} == {len(values)}
+    assert {v.param_type for v in values} == {REAL32}
+    by_name = {v.param_id: v.param_value for v in values}
+    assert by_name["GOAL_RADIUS"] == 0.5 and by_name["SYSID_THISMAV"] == 1.0 and by_name["FRAME_CONFIG"] == 7.0
+
+
+def test_a_flood_of_requests_makes_one_list(station):
+    for _ in range(1000):
+        station.send(LIST)
+    assert len(station.wire.of("PARAM_VALUE")) == 50
+    station.autopilot.tick(station.now + 0.02)
+    assert len(station.wire.of("PARAM_VALUE")) <= 100
+
+
+def test_who_asks_in_the_middle_gets_all(station):
+    station.send(LIST)
+    count = station.wire.of("PARAM_VALUE")[0].param_count
+    station.wire.clear()
+    station.send(LIST)
+    station.wait(0.2)
+    assert {v.param_index for v in station.wire.of("PARAM_VALUE")} == set(range(count))
+
+
+def test_read_by_name_and_by_index(station):
+    (value,) = read(station, "GOAL_RADIUS")
+    (same,) = read(station, "", value.param_index)
+    assert (value.param_id, value.param_value) == (same.param_id, same.param_value) == ("GOAL_RADIUS", 0.5)
+
+
+@pytest.mark.parametrize(("name", "index"), [("NO_SUCH", -1), ("", 9999), ("GOAL_RADIUS", 32767), ("", -1)])
+def test_what_is_not_there_is_said_to_be_so(station, name, index):
+    (error,) = read(station, name, index)
+    assert (error.get_type(), error.error) == ("PARAM_ERROR", mavlink.MAV_PARAM_ERROR_DOES_NOT_EXIST)
+    assert (error.target_system, error.target_component) == (255, 190)
+
+
+def test_setting_one(station):
+    (value,) = put(station, "GOAL_RADIUS", 0.7)
+    assert value.param_value == pytest.approx(0.7, rel=1e-7)
+    assert station.ordered() == [Change("goal.radius", 0.7)]  # with the digits that were meant
+    assert read(station, "GOAL_RADIUS")[0].param_value == value.param_value
+
+
+def test_the_same_value_makes_no_order(station):
+    station.send(LIST)
+    station.wait(0.1)
+    for value in station.wire.of("PARAM_VALUE"):
+        if value.param_id not in ("SYSID_THISMAV", "FRAME_CONFIG"):
+            (back,) = put(station, value.param_id, value.param_value)
+            assert back.param_value == value.param_value
+    assert station.ordered() == []
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "error"),
+    [
+        ("NO_SUCH", 1.0, mavlink.MAV_PARAM_ERROR_DOES_NOT_EXIST),
+        ("GOAL_RADIUS", -1.0, mavlink.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE),
+        ("GOAL_RADIUS", NAN, mavlink.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE),
+        ("LAW_SPEED", -1.0, mavlink.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE),
+        ("ARB_RAMP", 1e9, mavlink.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE),
+        ("FS_GCS_ENABLE", 2.5, mavlink.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE),
+        ("FS_GCS_TIMEOUT", 0.0, mavlink.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE),
+        ("SYSID_THISMAV", 2.0, mavlink.MAV_PARAM_ERROR_READ_ONLY),
+    ],
+)
+def test_what_cannot_be_is_refused_and_the_old_value_told(station, name, value, error):
+    before = read(station, name)[0]
+    replies = [reply for reply in put(station, name, value) if reply.get_type() != "STATUSTEXT"]
+    assert (replies[0].get_type(), replies[0].error) == ("PARAM_ERROR", error)
+    if before.get_type() == "PARAM_VALUE":
+        assert replies[1].param_value == before.param_value
+    assert station.ordered() == []
+
+
+def test_the_refusal_says_what_is_expected(station):
+    put(station, "ARB_RAMP", 1e9)
+    assert "expected 0 to 1000" in "".join(station.wire.texts)
+
+
+def test_read_only():
+    station = Station(commands=False)
+    error, old = (reply for reply in put(station, "GOAL_RADIUS", 0.7) if reply.get_type() != "STATUSTEXT")
+    assert error.error == mavlink.MAV_PARAM_ERROR_PERMISSION_DENIED and old.param_value == 0.5
+
+
+def test_an_integer_is_cast_for_ardupilot_alone():
+    for profile, taken in (("ardusub", True), ("px4", False), ("generic", False)):
+        station = Station(profile)
+        put(station, "GOAL_RADIUS", 2.0, INT32)
+        assert station.ordered() == ([Change("goal.radius", 2.0)] if taken else [])
+
+
+def test_a_full_queue_leaves_the_value(station):
+    for i in range(300):
+        put(station, "GOAL_RADIUS", 1.0 + i)
+    assert len(station.ordered()) == 256
+    assert read(station, "GOAL_RADIUS")[0].param_value == 256.0
+
+
+def test_speed_is_a_parameter(station):
+    assert station.command(178, 1.0, 0.6) == mavlink.MAV_RESULT_ACCEPTED
+    assert station.command(178, 1.0, -1.0) == mavlink.MAV_RESULT_ACCEPTED  # as it is
+    assert station.command(178, 1.0, NAN) == mavlink.MAV_RESULT_DENIED
+    assert station.ordered() == [Change("law.gains.speed", 0.6)]
+    assert read(station, "LAW_SPEED")[0].param_value == pytest.approx(0.6)
+
+
+def test_speed_is_unknown_to_laws_without_it():
+    station = Station(of=scenario(name="paper"))
+    assert station.command(178, 1.0, 0.6) == mavlink.MAV_RESULT_UNSUPPORTED
+
+
+def crc_by_bits(data):
+    """CRC-32 of IEEE 802.3, reflected, begun with 0 and not inverted: as QGroundControl's table has it."""
+    state = 0
+    for byte in data:
+        state ^= byte
+        for _ in range(8):
+            state = state >> 1 ^ (0xEDB88320 if state & 1 else 0)
+    return state
+
+
+@given(st.binary(max_size=60))
+def test_crc(data):
+    assert bare_crc32(data) == crc_by_bits(data)
+    assert bare_crc32(data[3:], bare_crc32(data[:3])) == crc_by_bits(data)
+
+
+def test_px4_stations_know_a_list_by_its_hash():
+    station = Station("px4")
+    first = station.send(LIST)[0]
+    assert (first.param_id, first.param_index, first.param_type) == (
+        "_HASH_CHECK",
+        65535,
+        mavlink.MAV_PARAM_TYPE_UINT32,
+    )
+    station.wait(0.1)
+    values = station.wire.of("PARAM_VALUE")[1:]
+    by_hand = b"".join(
+        v.param_id.encode() + struct.pack("<f", v.param_value) for v in sorted(values, key=lambda v: v.param_id)
+    )
+    assert struct.unpack("<I", struct.pack("<f", first.param_value))[0] == crc_by_bits(by_hand)
+    station.wire.clear()
+    station.send(LIST)
+    put(station, "_HASH_CHECK", first.param_value, mavlink.MAV_PARAM_TYPE_UINT32)
+    station.wire.clear()
+    station.wait(0.1)
+    assert station.wire.of("PARAM_VALUE") == []
+    assert hash_check({}) == 0
+
+
+@settings(max_examples=200)
+@given(st.floats(width=32, allow_nan=False, allow_infinity=False))
+def test_shortest_is_the_same_float32(value):
+    short = shortest(value)
+    assert struct.pack("<f", short) == struct.pack("<f", value)
+    assert len(repr(abs(short))) <= len(repr(abs(value)))
+
+
+def test_a_link_that_goes_takes_its_list_along(station):
+    other = Wire("other")
+    station.autopilot.attach(other)
+    station.send(LIST, wire=other)
+    station.autopilot.detach(other)
+    other.clear()
+    station.wait(0.1)
+    assert other.got == []

@@ -1,0 +1,139 @@
+"""Messages on request, at an interval, and in groups."""
+
+import math
+
+import pytest
+from pymavlink.dialects.v20 import all as mavlink
+
+from cosim.mavlink.messages import MESSAGES
+from cosim.mavlink.streams import GREATEST_LOAD
+from tests.cosim.mavlink.station import NAN, Station
+
+ACCEPTED, _, DENIED, _, FAILED = range(5)
+SET, GET, ONCE = 511, 510, 512
+ATTITUDE = 30
+
+
+@pytest.fixture
+def station():
+    station = Station("ardusub")
+    station.look(0.0)
+    station.wire.clear()
+    return station
+
+
+def run(station, seconds, step=0.01, **values):
+    start = station.autopilot._vessel.view.boot_us / 1e6
+    station.wire.clear()
+    for k in range(1, round(seconds / step) + 1):
+        station.look(start + step * k, **values)
+    return station.wire.counts()
+
+
+@pytest.mark.parametrize(
+    ("interval", "count"),
+    [(20_000, 500), (15_000, 667), (33_333, 300), (1_000_000, 10), (1, 1000), (9_999, 1000), (-1, 0)],
+)
+def test_an_interval_is_kept_exactly(station, interval, count):
+    assert station.command(SET, ATTITUDE, interval) == ACCEPTED
+    assert run(station, 10.0)["ATTITUDE"] == pytest.approx(count, abs=1 if count else 0)
+
+
+def test_nothing_drifts_when_steps_do_not_fit(station):
+    station.command(SET, ATTITUDE, 25_000)
+    run(station, 60.0, step=0.007)
+    times = [m.time_boot_ms for m in station.wire.of("ATTITUDE")]
+    assert len(times) == pytest.approx(2400, abs=1)
+    assert all(0 <= time % 25 <= 7 for time in times)  # always the first snapshot once it is due
+
+
+def test_steps_that_were_lost_are_not_made_up_for(station):
+    station.look(100.0)
+    assert station.wire.counts()["ATTITUDE"] == 1
+
+
+def test_back_to_the_default(station):
+    station.command(SET, ATTITUDE, 500_000)
+    assert station.command(SET, ATTITUDE, 0) == ACCEPTED
+    assert run(station, 5.0)["ATTITUDE"] == 50
+
+
+def test_the_interval_is_told(station):
+    station.command(SET, ATTITUDE, 50_000)
+    for command in ((GET, ATTITUDE), (ONCE, 244, ATTITUDE)):
+        assert station.command(*command) == ACCEPTED
+        told = station.wire.of("MESSAGE_INTERVAL")[-1]
+        assert (told.message_id, told.interval_us) == (ATTITUDE, 50_000)
+    assert station.command(GET, 331) == ACCEPTED
+    assert station.wire.of("MESSAGE_INTERVAL")[-1].interval_us == -1
+    assert station.command(GET, 9999) == FAILED
+    assert station.wire.of("MESSAGE_INTERVAL")[-1].interval_us == 0
+
+
+@pytest.mark.parametrize(
+    "numbers", [(9999, 100_000), (NAN, 100_000), (ATTITUDE, NAN), (math.inf, 1), (-1, 1), (397, 1)]
+)
+def test_an_interval_for_nothing(station, numbers):
+    assert station.command(SET, *numbers) in (DENIED, FAILED)
+
+
+def test_a_link_carries_so_much_and_no_more(station):
+    results = [station.command(SET, message_id, 1) for message_id in MESSAGES]
+    assert DENIED in results and results[0] == ACCEPTED
+    assert station.autopilot._streams[station.wire].load <= GREATEST_LOAD
+    run(station, 1.0)
+    assert sum(12 + len(m.get_payload()) for m in station.wire.got) <= GREATEST_LOAD
+
+
+@pytest.mark.parametrize("message_id", MESSAGES)
+def test_everything_in_the_table_can_be_asked_for(station, message_id):
+    station.look(1.0, altitude=3.0, measured__altitude=3.0, **{"goal.clearance": (-3.0, 2.0, 2.0, 2.0, 3.0, 3.0)})
+    station.wire.clear()
+    assert station.command(ONCE, message_id) == ACCEPTED
+    names = {m.get_type() for m in station.wire.got} - {"COMMAND_ACK"}
+    assert names == {mavlink.mavlink_map[message_id].msgname}
+
+
+@pytest.mark.parametrize("message_id", [140, 300, 395, 396, 397, 410, 9999, -5, NAN])
+def test_what_is_not_there_fails_at_once(station, message_id):
+    assert station.command(ONCE, message_id) == FAILED
+
+
+def group(number, rate, start=1):
+    return mavlink.MAVLink_request_data_stream_message(1, 1, number, rate, start)
+
+
+def test_groups(station):
+    station.send(group(10, 25))
+    counts = run(station, 4.0)
+    assert counts["ATTITUDE"] == counts["AHRS2"] == 100 and counts["ATTITUDE_QUATERNION"] == 40
+    station.send(group(10, 25, start=0))
+    counts = run(station, 4.0)
+    assert counts["ATTITUDE"] == 0 and counts["ATTITUDE_QUATERNION"] == 40
+
+
+def test_all_groups_at_once_as_mavproxy_asks(station):
+    station.send(group(0, 4))
+    counts = run(station, 10.0)
+    for name in ("ATTITUDE", "VFR_HUD", "GLOBAL_POSITION_INT", "SYS_STATUS", "SERVO_OUTPUT_RAW", "SCALED_IMU2"):
+        assert counts[name] == pytest.approx(40, abs=1)
+    assert counts["HEARTBEAT"] == 10 and counts["HOME_POSITION"] == 10
+    station.send(group(0, 0))
+    assert run(station, 2.0)["ATTITUDE"] == 0
+
+
+def test_seventeen_types_at_fifty_hertz_go_through(station):
+    ids = (1, 2, 24, 29, 30, 31, 32, 33, 36, 62, 74, 85, 137, 147, 242, 245, 178)
+    assert [station.command(SET, i, 20_000) for i in ids] == [ACCEPTED] * 17
+    counts = run(station, 2.0)
+    assert all(counts[mavlink.mavlink_map[i].msgname] == 100 for i in ids)
+
+
+def test_version_and_banner(station):
+    assert station.command(520, 1.0) == ACCEPTED and station.command(42428) == ACCEPTED
+    (version,) = station.wire.of("AUTOPILOT_VERSION")
+    assert version.capabilities & mavlink.MAV_PROTOCOL_CAPABILITY_MISSION_INT
+    assert version.capabilities & mavlink.MAV_PROTOCOL_CAPABILITY_FTP
+    assert not version.capabilities & mavlink.MAV_PROTOCOL_CAPABILITY_MISSION_FENCE
+    assert (version.vendor_id, version.product_id) == (0, 0) and version.uid
+    assert station.wire.texts[0].startswith("subreach co-simulation")

@@ -1,0 +1,243 @@
+"""Set-points, sticks and obstacles."""
+
+import math
+
+import numpy as np
+import pytest
+from pymavlink.dialects.v20 import all as mavlink
+
+from controller.quaternion import from_axis_angle
+from cosim.helm.orders import Aim, Face, Forget, Obstacle, Sticks
+from cosim.mavlink.geodesy import LocalFrame
+from tests.cosim.mavlink.station import NAN, Station
+
+POSITION = 0b110111111000
+WITH_VELOCITY = 0b110111000000
+EAST = {"attitude.yaw": math.pi / 2, "quaternion.e0": (math.sqrt(0.5), 0.0, 0.0, math.sqrt(0.5))}
+REPOSITION, YAW = 192, 115
+
+
+@pytest.fixture
+def station():
+    station = Station("ardusub")
+    station.look()
+    return station
+
+
+def local(frame=1, mask=POSITION, place=(3.0, 4.0, 5.0), speed=(0.0, 0.0, 0.0), yaw=0.0):
+    return mavlink.MAVLink_set_position_target_local_ned_message(0, 1, 1, frame, mask, *place, *speed, 0, 0, 0, yaw, 0)
+
+
+def test_a_set_point_moves_the_target_once(station):
+    for _ in range(20):
+        station.send(local())
+    station.send(local(place=(3.5, 4.0, 5.0)))
+    assert station.ordered() == [Aim((3.0, 4.0, 5.0)), Aim((3.5, 4.0, 5.0))]
+
+
+@pytest.mark.parametrize(
+    ("frame", "position"), [(1, (3, 4, 5)), (7, (4, 6, 10)), (8, (-3, 5, 10)), (9, (-3, 5, 10)), (12, (-3, 5, 10))]
+)
+def test_frames(station, frame, position):
+    station.look(2.0, **EAST)  # at 1, 2, 5
+    station.send(local(frame))
+    (order,) = station.ordered()
+    assert order.position == pytest.approx(position)
+
+
+def test_with_velocity_and_yaw(station):
+    station.send(local(mask=WITH_VELOCITY, speed=(0.1, 0.2, 0.0)))
+    station.send(local(mask=POSITION & ~1024, yaw=1.0, place=(1.0, 1.0, 1.0)))
+    aim, other, face = station.ordered()
+    assert aim.velocity == pytest.approx((0.1, 0.2, 0.0)) and other.position == (1.0, 1.0, 1.0) and face == Face(1.0)
+
+
+def test_depth_alone(station):
+    station.send(local(mask=POSITION | 0b011, place=(NAN, NAN, 2.0)))
+    assert station.ordered() == [Aim((8.0, 0.0, 2.0))]
+
+
+@pytest.mark.parametrize("message", [
+    local(mask=0b110111000111), local(mask=0b111111111100), local(mask=POSITION | 1), local(frame=4), local(frame=20),
+    local(place=(NAN, 0, 0)), local(place=(math.inf, 0, 0)), local(place=(1e6, 0, 0)), local(mask=POSITION | 512),
+    local(mask=WITH_VELOCITY, speed=(NAN, 0, 0)), local(mask=WITH_VELOCITY, speed=(1e4, 0, 0)),
+])  # fmt: skip
+def test_what_is_no_place_is_refused_with_a_word(station, message):
+    for _ in range(5):
+        station.send(message)
+    assert station.ordered() == []
+    assert len([t for t in station.wire.texts if t.startswith("Refused")]) == 1
+
+
+def test_set_points_count_while_the_region_is_to_be_reached(station):
+    station.look(2.0, **{"helm.mode": 1.0})
+    station.send(local())
+    assert station.ordered() == []
+    station.command(176, 1, 4)  # and at once, before a snapshot shows it
+    station.send(local())
+    assert station.ordered()[1:] == [Aim((3.0, 4.0, 5.0))]
+
+
+def test_the_same_set_point_counts_again_after_another_mode(station):
+    station.send(local())
+    station.look(2.0, **{"helm.mode": 1.0})
+    station.look(3.0)
+    station.send(local())
+    assert station.ordered() == [Aim((3.0, 4.0, 5.0))] * 2
+
+
+def globe(frame, place, mask=POSITION):
+    return mavlink.MAVLink_set_position_target_global_int_message(
+        0, 1, 1, frame, mask, *place, 0, 0, 0, 0, 0, 0, 0, 0
+    )  # fmt: skip
+
+
+def where(position):
+    latitude, longitude, altitude = LocalFrame(55.9097, -3.3203).to_global(position)
+    return round(latitude * 1e7), round(longitude * 1e7), altitude
+
+
+@pytest.mark.parametrize("frame", [0, 3, 5, 6])
+def test_set_points_on_the_globe(station, frame):
+    station.send(globe(frame, where((30.0, -20.0, 4.0))))
+    (order,) = station.ordered()
+    assert order.position == pytest.approx((30.0, -20.0, 4.0), abs=0.02)
+
+
+def test_other_frames_on_the_globe(station):
+    for frame in (1, 11):
+        station.send(globe(frame, where((30.0, -20.0, 4.0))))
+    assert station.ordered() == []
+
+
+def test_reposition(station):
+    x, y, z = where((30.0, -20.0, 4.0))
+    assert station.command_int(REPOSITION, 0, (-1.0, 1.0, 0.0, 0.5), x, y, z) == mavlink.MAV_RESULT_ACCEPTED
+    assert station.command(REPOSITION, -1.0, 1.0, 0.0, NAN, x / 1e7, y / 1e7, z) == mavlink.MAV_RESULT_ACCEPTED
+    assert station.command_int(REPOSITION, 1, (-1, 1, 0, NAN), 10_000, 20_000, 3.0) == mavlink.MAV_RESULT_ACCEPTED
+    assert station.command(REPOSITION, -1.0, 1.0) == mavlink.MAV_RESULT_ACCEPTED  # here
+    first, face, second, third, here = station.ordered()
+    assert first.position == pytest.approx((30.0, -20.0, 4.0), abs=0.02) and face == Face(0.5)
+    assert second.position == pytest.approx((30.0, -20.0, 4.0), abs=3.0)  # a float32 of degrees
+    assert third == Aim((1.0, 2.0, 3.0)) and here == Aim((1.0, 2.0, 5.0))
+    assert station.command_int(REPOSITION, 11, (-1, 1, 0, NAN), x, y, z) == mavlink.MAV_RESULT_UNSUPPORTED
+    assert station.command_int(REPOSITION, 0, (-1, 1, 0, NAN), 0, 0, 0.0) == mavlink.MAV_RESULT_DENIED
+
+
+def test_turning(station):
+    station.look(2.0, **EAST)
+    assert station.command(YAW, 30.0, 0.0, 1.0, 0.0) == mavlink.MAV_RESULT_ACCEPTED
+    assert station.command(YAW, 30.0, 0.0, -1.0, 1.0) == mavlink.MAV_RESULT_ACCEPTED
+    assert station.command(YAW, NAN, 0.0, 1.0, 0.0) == mavlink.MAV_RESULT_DENIED
+    absolute, relative = station.ordered()
+    assert absolute.heading == pytest.approx(math.radians(30)) and relative.heading == pytest.approx(math.radians(60))
+
+
+def test_the_first_that_comes_steers_until_it_is_silent(station):
+    station.send(local())
+    station.send(local(place=(9.0, 9.0, 9.0)), system=250)
+    assert station.command(REPOSITION, -1, 1, system=250) == mavlink.MAV_RESULT_DENIED
+    station.now += 3.1
+    station.send(local(place=(9.0, 9.0, 9.0)), system=250)
+    station.send(local(place=(1.0, 9.0, 9.0)))
+    assert station.ordered() == [Aim((3.0, 4.0, 5.0)), Aim((9.0, 9.0, 9.0))]
+
+
+# ---- sticks ----
+
+
+def sticks(x=0, y=0, z=500, r=0, s=0, t=0, extensions=0):
+    return mavlink.MAVLink_manual_control_message(1, x, y, z, r, 0, 0, extensions, s, t)
+
+
+@pytest.mark.parametrize(
+    ("profile", "message", "wrench"),
+    [
+        ("ardusub", sticks(x=1000, y=-500), (1.0, -0.5, 0, 0, 0, 0)),
+        ("ardusub", sticks(z=1000, r=250), (0, 0, -1.0, 0, 0, 0.25)),  # up
+        ("px4", sticks(z=0), (0, 0, 1.0, 0, 0, 0)),
+        ("generic", sticks(z=-1000), (0, 0, 1.0, 0, 0, 0)),
+        ("generic", sticks(z=0, s=500, t=-500, extensions=3), (0, 0, 0, -0.5, 0.5, 0)),
+        ("ardusub", sticks(s=500, t=-500), (0,) * 6),
+        ("ardusub", sticks(x=0x7FFF, y=-0x8000, z=0x7FFF, r=100), (0, -1.0, 0, 0, 0, 0.1)),
+    ],
+)
+def test_sticks(profile, message, wrench):
+    station = Station(profile)
+    station.look(**{"helm.mode": 0.0})
+    station.send(message)
+    station.send(message)  # unchanged
+    orders = station.ordered()
+    assert orders == ([Sticks(wrench)] if any(wrench) else [])
+
+
+def test_sticks_count_in_manual_alone(station):
+    station.send(sticks(x=1000))
+    assert station.ordered() == []
+
+
+def test_sticks_that_nobody_holds_are_let_go(station):
+    station.look(2.0, **{"helm.mode": 0.0})
+    station.send(sticks(x=1000))
+    station.wait(2.9)
+    assert len(station.ordered()) == 1
+    station.wait(0.3)
+    assert station.ordered() == [Sticks((0.0,) * 6)]
+    assert "Lost manual control" in station.wire.texts
+    station.wait(5.0)
+    assert station.ordered() == []
+
+
+def test_sticks_count_anew_once_armed(station):
+    station.look(2.0, **{"helm.mode": 0.0, "helm.armed": 0.0})
+    station.send(sticks(x=1000))
+    station.look(2.1, **{"helm.mode": 0.0})
+    station.send(sticks(x=1000))
+    assert len(station.ordered()) == 2
+
+
+# ---- obstacles ----
+
+
+def obstacle(number=1, frame=1, place=(4.0, 5.0, 6.0)):
+    return mavlink.MAVLink_obstacle_distance_3d_message(0, 0, frame, number, *place, 0.1, 20.0)
+
+
+@pytest.mark.parametrize(("frame", "position"), [(1, (4, 5, 6)), (12, (1 - 5, 2 + 4, 5 + 6)), (20, (4, 5, 6))])
+def test_an_obstacle_that_is_seen_is_kept_out_of(station, frame, position):
+    station.look(2.0, **EAST)
+    station.send(obstacle(frame=frame))
+    station.send(obstacle(frame=frame, place=(4.0, 5.02, 6.0)))  # hardly moved
+    (order,) = station.ordered()
+    assert (order.number, order.radius) == (1, 0.5) and order.position == pytest.approx(position)
+
+
+def test_the_body_frame_leans_with_the_body(station):
+    quaternion = from_axis_angle(np.array([0.0, 1.0, 0.0]), math.pi / 2)  # nose up: ahead is up
+    station.look(2.0, **{"quaternion.e0": tuple(quaternion)})
+    station.send(obstacle(frame=12, place=(2.0, 0.0, 0.0)))
+    assert station.ordered()[0].position == pytest.approx((1.0, 2.0, 3.0))
+
+
+def test_an_obstacle_that_moves_is_moved(station):
+    station.send(obstacle())
+    station.send(obstacle(place=(4.0, 5.5, 6.0)))
+    assert station.ordered() == [Obstacle(1, (4.0, 5.0, 6.0), 0.5), Obstacle(1, (4.0, 5.5, 6.0), 0.5)]
+
+
+def test_only_so_many_and_the_one_not_seen_for_long_goes(station):
+    for number in (1, 2, 3):
+        station.send(obstacle(number))
+    assert [order.number for order in station.ordered()] == [1, 2]
+    assert any("no room for obstacle 3" in text for text in station.wire.texts)
+    station.now += 4.0
+    station.send(obstacle(1))
+    station.now += 2.0
+    station.send(obstacle(3))
+    assert station.ordered() == [Forget(2), Obstacle(3, (4.0, 5.0, 6.0), 0.5)]
+
+
+def test_obstacles_in_other_frames_or_nowhere(station):
+    station.send(obstacle(frame=8))
+    station.send(obstacle(place=(NAN, 0.0, 0.0)))
+    assert station.ordered() == []
