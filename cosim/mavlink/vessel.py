@@ -15,12 +15,13 @@ from cosim.helm.sources import OrderQueue
 from cosim.mavlink.dialect import dialect
 from cosim.mavlink.encode import Encoder
 from cosim.mavlink.geodesy import LocalFrame
+from cosim.mavlink.layout import Layout
 from cosim.mavlink.mission_item import MissionItem
 from cosim.mavlink.operator import Operator
 from cosim.mavlink.options import MavlinkOptions
 from cosim.mavlink.outlet import Outlet
 from cosim.mavlink.profile import PROFILES
-from cosim.mavlink.view import Layout, View
+from cosim.mavlink.view import View
 from cosim.scenario import Scenario
 from cosim.scenario_tables import Vector3, Vector6
 from cosim.signals import Array, Column

@@ -3,86 +3,20 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from functools import cached_property
 
 import numpy as np
 
 from controller.quaternion import rotation_matrix
 from cosim.helm.orders import MODES, Mode
-from cosim.scenario import CRITERIA, Scenario
+from cosim.mavlink.layout import Layout
+from cosim.scenario import CRITERIA
 from cosim.scenario_tables import Vector3
-from cosim.signals import Array, Column
-from cosim.surroundings import middle_of
+from cosim.signals import Array
 
 _MICRO = 1e6
 _LONGEST = 1e12  # s; a time beyond it is none
 _HALF_TURN = 2.0 * math.pi
-
-
-class Layout:
-    """Where in a row the quantities are.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        Of the run.
-    columns : sequence of Column
-        Of its rows.
-    """
-
-    def __init__(self, scenario: Scenario, columns: Sequence[Column]) -> None:
-        self.at = {column.name: i for i, column in enumerate(columns)}
-        self.length = len(columns)
-        self.thrusters = scenario.vehicle.n_thrusters
-        self.regions = tuple(region.region.name for region in scenario.regions)
-        self.reports = tuple(column.name for column in columns if column.name.startswith("law."))
-        self.goal_middle = middle_of(scenario.goal)
-        self.saturations = tuple(
-            i for name, i in self.at.items() if name.endswith("saturated") or name.startswith("thrust_saturated[")
-        )
-
-    def first_row(self, scenario: Scenario) -> Array:
-        """Return the row before the first step: the vehicle as the scenario has it at time 0, and nothing else known.
-
-        Parameters
-        ----------
-        scenario : Scenario
-            Of the run.
-
-        Returns
-        -------
-        ndarray, shape (n,)
-        """
-        row = np.zeros(self.length)
-        initial, commands = scenario.initial, scenario.commands
-        roll, pitch, yaw = euler_of(initial.quaternion)
-        depth = initial.position[2]
-        known = {
-            "attitude.roll": roll,
-            "attitude.pitch": pitch,
-            "attitude.yaw": yaw,
-            "measured.depth": depth,
-            "measured.heading": yaw,
-            "measured.acceleration.z": -9.81,
-            "altitude": _bottom(scenario) - depth,
-            "measured.altitude": _bottom(scenario) - depth,
-            "helm.armed": float(not commands.await_arm),
-            "helm.mode": float(MODES.index("reach")),
-            "helm.item": -1.0,
-        }
-        for first, values in (
-            ("position.x", initial.position),
-            ("quaternion.e0", initial.quaternion),
-            ("velocity.u", initial.velocity),
-            ("target.x", self.goal_middle),
-        ):
-            if first in self.at:
-                row[self.at[first] : self.at[first] + len(values)] = values
-        for name, value in known.items():
-            if name in self.at:
-                row[self.at[name]] = value
-        return row
 
 
 class View:
@@ -291,16 +225,3 @@ class View:
         x, y, z = self._layout.goal_middle
         dx, dy, dz = self.shift("goal")
         return x + dx, y + dy, z + dz
-
-
-def euler_of(quaternion: Sequence[float]) -> Vector3:
-    """Return roll, pitch and yaw [rad] of a unit quaternion from body to world, scalar first."""
-    w, x, y, z = quaternion
-    sine = max(-1.0, min(1.0, 2.0 * (w * y - z * x)))
-    roll = math.atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
-    yaw = math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
-    return roll, math.asin(sine), yaw
-
-
-def _bottom(scenario: Scenario) -> float:
-    return float(scenario.plant.parameters.get("bottom_depth", math.inf))

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from cosim.helm.orders import Forget, Obstacle
+from cosim.mavlink.layout import euler_of
 from cosim.mavlink.services.service import Service
 from cosim.mavlink.vessel import Sender, Vessel
-from cosim.mavlink.view import euler_of
 from cosim.scenario_tables import Vector3
 
 _UNMOVED = 0.05  # m: what moved less makes no order

@@ -81,7 +81,7 @@ class Service:
     def restart(self) -> None:
         """Forget what belongs to a run, as at its beginning."""
 
-    def detach(self, sender_link: object) -> None:
+    def detach(self, link: object) -> None:
         """Forget a link."""
 
 

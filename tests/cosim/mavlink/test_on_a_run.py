@@ -126,3 +126,20 @@ def test_who_listens_changes_nothing():
                     flight.k += 1
             rows.append(master.signals.row.copy())
     assert rows[0].tobytes() == rows[1].tobytes()
+
+
+@pytest.mark.parametrize("value", [0.0, 1e-30, 1e9, -1e9])
+def test_no_parameter_ends_the_run(flight, value):
+    flight.send(mavlink.MAVLink_param_request_list_message(1, 1))
+    flight.wait(0.1)
+    values = {message.param_id: message.param_value for message in flight.wire.of("PARAM_VALUE")}
+    for name, before in values.items():
+        flight.command(176, 1, 16)
+        flight.send(mavlink.MAVLink_param_set_message(1, 1, name.encode(), value, 9))
+        flight.send(obstacle(place=(4.0, 5.0, 6.0)))
+        flight.fly(0.02)
+        flight.send(mavlink.MAVLink_param_set_message(1, 1, name.encode(), before, 9))
+        flight.wire.clear()
+    flight.fly(0.02)
+    settings = flight.master.helm.settings
+    assert [(s.key, s.value) for s in settings] == [(s.key, s.value) for s in flight.autopilot._vessel.settings]
