@@ -105,6 +105,7 @@ def set_modes(subject: Subject) -> Outcome:
         return skipped("no modes are known")
     packed = any(number > 0xFFFF for number in modes)
     refused: list[str] = []
+    ignored = 0
     for number, mode in modes.items():
         if mode.properties & _NOT_SELECTABLE:
             continue
@@ -113,11 +114,12 @@ def set_modes(subject: Subject) -> Outcome:
             return skipped("the vehicle heeds no commands")
         shown = client.wait(_beat_shows(lambda b, number=number: b.custom_mode == number), _SETTLING)
         if ack is None or ack.result != m.MAV_RESULT_ACCEPTED or shown is None:
+            ignored += ack is None or bool(ack.result == m.MAV_RESULT_ACCEPTED)
             text = client.last("STATUSTEXT")
             refused.append(f"{mode.mode_name} (ack {ack and ack.result}, {'shown' if shown else 'not shown'}")
             refused[-1] += f", {text.text!r})" if text is not None else ")"
     _set_mode(subject, before.custom_mode, packed)
-    if len(refused) > 1:  # one, such as that of a mission that is not there, may be out of reach
+    if ignored or len(refused) > 1:  # one, such as that of a mission that is not there, may be refused
         return failed("; ".join(refused), "ack 0, and shown")
     return passed(f"{len(modes) - len(refused)} of {len(modes)} modes{': not ' * bool(refused)}{''.join(refused)}")
 
