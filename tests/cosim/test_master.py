@@ -1,5 +1,7 @@
 """The stepping: order, periods, actuation, and what observers see."""
 
+import time
+
 import numpy as np
 import pytest
 
@@ -125,10 +127,24 @@ def test_many_masters_leave_nothing_behind(tmp_path, monkeypatch):
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
+def test_a_stall_is_not_made_up_for_in_a_rush():
+    walls = []
+
+    class Stalling:
+        def observe(self, k, row):
+            if k == 10:
+                time.sleep(0.6)
+            walls.append(time.perf_counter())
+
+    with Master(load_scenario("paper-limited", ["arbiter.engine=closed", "time.duration=0.5"])) as master:
+        master.run([Stalling()], rate=1.0)
+    # the steps after the stall would otherwise go by at once; a tenth of a second is made up for
+    assert walls[-1] - walls[10] > 0.3
+
+
 def test_rate_paces_by_the_wall_clock():
     """No time is asserted beyond the one that was asked for."""
-    import time
-
     with Master(load_scenario("paper-limited", [*SHORT, "time.duration=0.2"])) as master:
         master.run()  # warm
     with Master(load_scenario("paper-limited", [*SHORT, "time.duration=0.2"])) as master:
