@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from cosim.actuators import cut
+from cosim.actuators import MOST, cut
 from cosim.came import as_it_came
 from cosim.helm import MODES, LoggedOrders, OrderQueue, RecordedOrders
 from cosim.helm.helm import greatest_wrench
@@ -279,12 +279,19 @@ def test_no_target_is_too_far_for_the_run_to_go_on(fly, name, away):
     run = fly({100: [Aim((away, 0.0, 5.0))]}, "time.duration=0.5", name=name)
     asked = np.abs(run.stack(*(f"command.{axis}" for axis in "XYZ"))).max()
     given = np.linalg.norm(run.stack(*(f"wrench.{axis}" for axis in "XYZ")), axis=1)
-    assert asked > 1e8 and given.max() <= 1e6 * 1.8
+    assert asked > 1e8 and given.max() <= MOST * 1.8
     assert run["allocation_saturated"][-1] == 1.0 and run["allocation_saturated"][0] == 0.0
 
 
 def test_a_wrench_that_is_no_number_is_none():
-    wrench = np.array([np.nan, 1.0, np.inf, 2e6, -1e6, 0.0])
+    wrench = np.array([np.nan, 1.0, np.inf, 2 * MOST, -MOST, 0.0])
     assert cut(wrench)
-    assert wrench.tolist() == [0.0, 0.0, 0.0, 1e6, -5e5, 0.0]
+    assert wrench.tolist() == [0.0, 0.0, 0.0, MOST, -MOST / 2, 0.0]
     assert not cut(wrench)
+
+
+@pytest.mark.parametrize(("gain", "value"), [("k_p2", 3e38), ("sigma_a", 3e38), ("gamma", 1e-45)])
+def test_no_gain_ends_a_run_by_the_moment_that_is_asked_for(fly, gain, value):
+    run = fly({10: [Change(f"law.gains.{gain}", value)]}, "time.duration=0.5", name="paper")
+    assert len(run["time"]) == 501
+    assert run["allocation_saturated"].max() == 1.0
