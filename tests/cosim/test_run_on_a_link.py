@@ -47,7 +47,7 @@ class Station:
         parser, last = mavlink.MAVLink(None), 0.0
         while not self.done.is_set():
             with contextlib.suppress(TimeoutError):
-                data, vehicle = self.socket.recvfrom(1024)
+                data, vehicle = self.socket.recvfrom(2048)
                 self.heard += parser.parse_buffer(data)
                 if self.says and time.monotonic() - last > 0.1:
                     last = time.monotonic()
