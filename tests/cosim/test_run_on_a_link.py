@@ -140,3 +140,15 @@ def test_a_link_that_cannot_be_opened_leaves_no_folder(tmp_path):
     with taken, pytest.raises(TelemetryError, match="in use"):
         run_scenario(load_scenario("paper", SHORT), tmp_path / "run", Mavlink((endpoint,), MavlinkOptions()))
     assert not (tmp_path / "run").exists()
+
+
+def test_a_run_that_cannot_begin_leaves_no_log(tmp_path):
+    (tmp_path / "run").mkdir()
+    (tmp_path / "run" / "notes").touch()
+    log = tmp_path / "run.tlog"
+    with pytest.raises(RunError, match="not empty"):
+        run_scenario(
+            load_scenario("paper", SHORT), tmp_path / "run",
+            Mavlink((parse_endpoint(str(log)),), MavlinkOptions()),
+        )  # fmt: skip
+    assert not log.exists()
