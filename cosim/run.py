@@ -115,6 +115,7 @@ def run_scenario(
                 try:
                     source = LoggedOrders(recorded or queue, folder.path / ORDERS)
                     status, wall_time, failure = _step(master, folder, source, link, rate, progress)
+                    queue.end_run()
                     summary = conclude(folder.path, scenario, status, wall_time, report)
                 except OSError as error:
                     raise RunError(f"{folder.path}: {error.strerror or error}") from error

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections import deque
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -29,25 +30,35 @@ class OrderSource(Protocol):
 
 
 class OrderQueue:
-    """Orders from another thread, in the order in which they were given. Bounded: a flood is refused, not kept."""
+    """Orders from another thread, in the order in which they were given. Bounded: a flood is refused, not kept.
+
+    Attributes
+    ----------
+    run : int
+        Which run takes them; the next one after a reset.
+    """
 
     exhausted = False
 
     def __init__(self) -> None:
+        self.run = 0
         self._orders: deque[Order] = deque()
+        self._lock = threading.Lock()
 
-    def give(self, order: Order) -> bool:
+    def give(self, order: Order, run: int | None = None) -> bool:
         """Queue an order for the next step.
 
         Parameters
         ----------
         order : Order
             To be applied.
+        run : int, optional
+            The run that it is meant for; default: whichever takes it.
 
         Returns
         -------
         bool
-            Whether there was room for it.
+            Whether there was room for it, and that run is not over.
 
         Raises
         ------
@@ -55,10 +66,17 @@ class OrderQueue:
             If its numbers cannot be.
         """
         check_order(order)
-        if len(self._orders) >= QUEUED:
-            return False
-        self._orders.append(order)
+        with self._lock:
+            if len(self._orders) >= QUEUED or run not in (None, self.run):
+                return False
+            self._orders.append(order)
         return True
+
+    def end_run(self) -> None:
+        """Forget what is queued, and refuse what still comes for the run that is over."""
+        with self._lock:
+            self.run += 1
+            self._orders.clear()
 
     def take(self, k: int) -> Sequence[Order]:
         """Return what is queued."""

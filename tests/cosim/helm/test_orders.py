@@ -70,6 +70,16 @@ def test_a_flood_is_refused_not_kept():
     assert all(queue.give(Arm(True)) for _ in range(QUEUED))
     assert not queue.give(Arm(False))
     assert len(queue.take(0)) == QUEUED
+
+
+def test_what_was_meant_for_a_run_that_is_over_is_followed_by_no_other():
+    queue = OrderQueue()
+    assert queue.give(Arm(True), run=0)
+    queue.end_run()
+    assert not queue.give(Arm(True), run=0)
+    assert queue.run == 1 and not queue.take(0)
+    assert queue.give(Arm(False), run=1) and queue.give(Arm(True))
+    assert queue.take(0) == [Arm(False), Arm(True)]
     assert queue.give(Arm(False))
 
 
