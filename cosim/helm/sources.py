@@ -96,6 +96,8 @@ class _Entry(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 class RecordedOrders:
     """The orders of an earlier run, at the steps at which that run took them.
 
+    A last line that was cut off, by a kill or a full disk, does not count: that run did not follow it either.
+
     Parameters
     ----------
     file : Path
@@ -109,16 +111,20 @@ class RecordedOrders:
 
     def __init__(self, file: Path) -> None:
         try:
-            lines = file.read_bytes().splitlines()
+            content = file.read_bytes()
         except OSError as error:
             raise RunError(f"{file}: {error.strerror or error}") from error
+        lines, whole = content.splitlines(), content.count(b"\n")
         entries = []
         for number, line in enumerate(lines, 1):
             try:
-                entries.append(msgspec.json.decode(line, type=_Entry))
-                check_order(entries[-1].order)
+                entry = msgspec.json.decode(line, type=_Entry)
+                check_order(entry.order)
             except (msgspec.DecodeError, OrderError) as error:
+                if type(error) is msgspec.DecodeError and number > whole:
+                    break
                 raise RunError(f"{file}, line {number}: {error}") from error
+            entries.append(entry)
         self._entries = deque(sorted(entries, key=lambda entry: entry.step))
 
     @property

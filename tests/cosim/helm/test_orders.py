@@ -120,6 +120,19 @@ def test_a_broken_log_names_the_line(tmp_path, line):
         RecordedOrders(file)
 
 
+@pytest.mark.parametrize("size", [1, 30, 62])
+def test_a_last_line_that_was_cut_off_does_not_count(tmp_path, size):
+    file, line = tmp_path / "orders.jsonl", b'{"step":1,"order":{"order":"aim","position":[1.25,0.0,0.0]}}\n'
+    file.write_bytes(line + line[:size])
+    assert RecordedOrders(file).take(1) == [Aim((1.25, 0.0, 0.0))] * (1 + (size >= len(line) - 1))
+    file.write_bytes(line + line[:30] + b"\n")
+    with pytest.raises(RunError, match="line 2"):
+        RecordedOrders(file)
+    file.write_bytes(line + b'{"step":1,"order":{"order":"aim","position":[1e9,0,0]}}')
+    with pytest.raises(RunError, match="line 2"):
+        RecordedOrders(file)
+
+
 def test_no_log_is_one_line(tmp_path):
     with pytest.raises(RunError, match="No such file"):
         RecordedOrders(tmp_path / "none.jsonl")
