@@ -295,3 +295,10 @@ def test_no_gain_ends_a_run_by_the_moment_that_is_asked_for(fly, gain, value):
     run = fly({10: [Change(f"law.gains.{gain}", value)]}, "time.duration=0.5", name="paper")
     assert len(run["time"]) == 501
     assert run["allocation_saturated"].max() == 1.0
+
+
+def test_a_run_that_is_reset_in_its_first_step_has_a_report(tmp_path):
+    (log := tmp_path / "orders.jsonl").write_bytes(b'{"step":0,"order":{"order":"reset"}}\n')
+    run = run_scenario(load_scenario("harbour", ["commands.enabled=true"]), tmp_path / "run", orders=log)
+    assert run.summary["status"] == "reset" and run.summary["simulated_time"] == 0.0
+    assert (run.folder / "report.html").exists()
