@@ -297,6 +297,7 @@ def test_no_gain_ends_a_run_by_the_moment_that_is_asked_for(fly, gain, value):
     assert run["allocation_saturated"].max() == 1.0
 
 
+@pytest.mark.slow
 def test_a_run_that_is_reset_in_its_first_step_has_a_report(tmp_path):
     (log := tmp_path / "orders.jsonl").write_bytes(b'{"step":0,"order":{"order":"reset"}}\n')
     run = run_scenario(load_scenario("harbour", ["commands.enabled=true"]), tmp_path / "run", orders=log)
