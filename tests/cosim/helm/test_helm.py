@@ -207,6 +207,14 @@ def test_what_cannot_be_followed_is_logged_and_changes_nothing(fly, caplog, orde
     assert np.array_equal(run.rows, plain.rows)
 
 
+def test_no_shape_that_cannot_be_flown_by_is_taken(fly, caplog):
+    """What is too short to have a direction is refused when it is set, not found out in the step."""
+    end = Change("regions.mooring.shape.end.2", 1e-38)
+    run = fly({5: [end]}, "time.duration=0.2", name="depth-transit")
+    assert "expected a point other than start" in caplog.text
+    assert run.master.helm.settings.shapes["mooring"].end[2] > 1.0
+
+
 def test_a_lost_position_cannot_be_held(fly, caplog):
     lost = ["sensing.dead_from=0.1", "sensing.dead_for=1.0"]
     run = fly({20: [Steer("hold")]}, "time.duration=0.5", *lost)
