@@ -47,7 +47,7 @@ class Ear:
     def hear(self):
         while True:
             try:
-                data, self.address = self.socket.recvfrom(1000)
+                data, self.address = self.socket.recvfrom(2048)
             except BlockingIOError:
                 return self.messages
             self.messages += self.station.parse(data)
