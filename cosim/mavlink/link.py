@@ -25,7 +25,7 @@ log = logging.getLogger(__name__)
 COMPONENT_ID = 1  # MAV_COMP_ID_AUTOPILOT1, the only one that ground stations take for a vehicle
 BUDGET = 200_000.0  # bytes/s, of the wall clock, into a network
 _BURST = 0.5  # s of the budget, that can go at once
-_RESERVED = 0.25  # of it, which streams leave to answers
+_RESERVED = 0.25  # of it, which streams and lists leave to answers
 _FIRST = frozenset(
     {
         "HEARTBEAT", "STATUSTEXT", "COMMAND_ACK", "PARAM_VALUE", "PARAM_ERROR", "FILE_TRANSFER_PROTOCOL", "TIMESYNC",
@@ -49,11 +49,20 @@ class Budget:
         self._left = self._most
         self._last = time.monotonic()
 
-    def take(self, size: int, first: bool) -> bool:
-        """Take some, if there are; what does not come first leaves a quarter of the most to what does."""
+    @property
+    def plenty(self) -> bool:
+        """Whether more is there than what is left to answers."""
+        self._refill()
+        return self._left >= _RESERVED * self._most
+
+    def _refill(self) -> None:
         now = time.monotonic()
         self._left = min(self._most, self._left + (now - self._last) * self._rate)
         self._last = now
+
+    def take(self, size: int, first: bool) -> bool:
+        """Take some, if there are; what does not come first leaves a quarter of the most to what does."""
+        self._refill()
         if self._left - size < (0.0 if first else _RESERVED * self._most):
             return False
         self._left -= size
@@ -132,6 +141,10 @@ class Link:
         self._frames: Iterator[tuple[bytes, Any]] = iter(())  # of the bytes that came last
         self._peer: Any = None  # where they came from
         self._told: set[str] = set()  # of messages that could not be encoded
+
+    def has_room(self) -> bool:
+        """Return whether what can wait should go now."""
+        return self._budget is None or self._budget.plenty
 
     def send(self, message: Any) -> bool:
         """Encode, sign where that is asked for, and send a message; return whether it went to all peers."""

@@ -10,6 +10,10 @@ class Outlet(Protocol):
 
     name: str  # such as udpout:127.0.0.1:14550
 
+    def has_room(self) -> bool:
+        """Return whether what can wait should go now."""
+        ...
+
     def send(self, message: Any) -> bool:
         """Encode, sign where that is asked for, and send a message of the dialect; return whether it went out."""
         ...

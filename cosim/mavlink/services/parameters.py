@@ -36,7 +36,8 @@ class Parameters(Service):
     """PARAM_REQUEST_LIST, PARAM_REQUEST_READ and PARAM_SET; all parameters are REAL32.
 
     The list goes out in slices, one in each tick and once at a time on a link: who asks while it is under way has it go
-    round once more from there.
+    round once more from there. It waits where a link has no room, so that on a slow line none is lost, and on any line
+    who asks again and again takes nothing from others.
     """
 
     def __init__(self, vessel: Vessel) -> None:
@@ -137,6 +138,8 @@ class Parameters(Service):
     def _send_slice(self, link: Outlet) -> None:
         at, left = self._bursts[link]
         for _ in range(min(left, _SLICE)):
+            if not link.has_room():
+                break
             self._send_value(link, self.names[at])
             at, left = (at + 1) % len(self.names), left - 1
         if left:

@@ -61,9 +61,13 @@ class Wire:
     def __init__(self, name: str = "wire") -> None:
         self.name = name
         self.got: list[Any] = []
+        self.room = True
         self._coder = mavlink.MAVLink(None, srcSystem=1, srcComponent=1)
         self._decoder = mavlink.MAVLink(None)
         self._decoder.robust_parsing = False
+
+    def has_room(self) -> bool:
+        return self.room
 
     def send(self, message: Any) -> bool:
         self.got += self._decoder.parse_buffer(message.pack(self._coder))

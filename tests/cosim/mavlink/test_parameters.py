@@ -44,6 +44,18 @@ def test_every_setting_has_a_name_of_its_own(name):
     assert all(0 < len(n) <= 16 and n == n.upper() for n in names.values())
 
 
+def test_a_list_waits_for_room_on_its_link(station):
+    """What a slow line has no room for would be lost, and asked for again one by one."""
+    station.wire.room = False
+    station.send(LIST)
+    station.wait(1.0)
+    assert station.wire.counts()["PARAM_VALUE"] == 0
+    station.wire.room = True
+    station.wait(1.0)
+    values = station.wire.of("PARAM_VALUE")
+    assert [v.param_index for v in values] == list(range(values[0].param_count))
+
+
 def test_names_can_be_read():
     keys = {
         "law.gains.k_p1": "LAW_K_P1", "regions.SR1.gain": "SR1_GAIN", "regions.SR1.shape.radius": "SR1_RADIUS",

@@ -234,8 +234,9 @@ def test_a_budget_thins_streams_before_answers(monkeypatch):
         assert 10 < sent.count(True) < 5000 / 245 and link.dropped == sent.count(False)
         assert all(link.send(mavlink.MAVLink_command_ack_message(1, 0)) for _ in range(20))
         assert not all(link.send(mavlink.MAVLink_command_ack_message(1, 0)) for _ in range(100))
+        assert not link.has_room()
         clock[0] += 0.25
-        assert link.send(odometry(1))
+        assert link.has_room() and link.send(odometry(1))
         link.channel.close()
         assert link.troubles() == [f"{link.dropped} messages over the budget"]
         sequence = [m.get_seq() for m in ear.hear()]
