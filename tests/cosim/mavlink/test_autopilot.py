@@ -146,6 +146,7 @@ def test_everything_promised_is_streamed_at_its_rate():
         "SERVO_OUTPUT_RAW": 5.0, "SCALED_PRESSURE": 5.0, "SCALED_PRESSURE2": 5.0, "BATTERY_STATUS": 1.0,
         "HOME_POSITION": 1.0, "GPS_GLOBAL_ORIGIN": 0.2, "GPS_RAW_INT": 1.0, "EXTENDED_SYS_STATE": 1.0,
         "CURRENT_MODE": 0.5, "AVAILABLE_MODES_MONITOR": 0.2, "AHRS2": 10.0, "EKF_STATUS_REPORT": 2.0,
+        "OBSTACLE_DISTANCE": 1.0,
     }  # fmt: skip
     station = Station("ardusub")
     station.look(0.0)
