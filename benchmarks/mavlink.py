@@ -44,6 +44,7 @@ class Seventeen:
         mavlink = dialect()
         self._links: list[Outlet] = []
         self._sent = 0
+        self.busy = 0.0
         self._began = time.monotonic()
         self._message: Callable[[int], Any] = lambda ms: mavlink.MAVLink_attitude_message(ms, 0.1, 0.2, 0.3, 0, 0, 0)
 
@@ -66,7 +67,8 @@ class Seventeen:
                 link.send(self._message(self._sent))
 
     def close(self, now: float) -> None:
-        """End."""
+        """Note how much of a processor the thread took."""
+        self.busy = time.thread_time() / (now - self._began)
 
 
 def measure(steps: int, repeats: int, datagrams: int | None = None) -> list[Row]:
@@ -121,22 +123,25 @@ def _messages(calls: int, repeats: int) -> list[Row]:
 
 def _beside_traffic(steps: int, repeats: int) -> list[Row]:
     """Time stretches of one run at full speed, in turn without and with a link, so that both see the same noise."""
-    alone, beside = [], []
+    alone, beside, busy = [], [], []
     stretch = max(1, steps // _STRETCHES)
     with _endless() as master, _sink() as port:
         k = 0
         for i in range(2 + 2 * _STRETCHES * repeats):
-            links = LinkThread(Seventeen(), [_link(port)], master.scenario.time.step) if i % 2 else None
+            vehicle = Seventeen()
+            links = LinkThread(vehicle, [_link(port)], master.scenario.time.step) if i % 2 else None
             taken = _stretch(master, range(k, k + stretch), links)
             k += stretch
             if i > 1:  # the first of each compiles, and fills the caches
                 (beside if i % 2 else alone).append(taken)
+                busy += [vehicle.busy] if i % 2 else []
     first, second = "step: no link", f"step: {_MESSAGES:.0f} messages/s"
     lost = statistics.median(b / a - 1.0 for a, b in zip(alone, beside, strict=True))
     return [
         Row(first, summary(alone), first),
         Row(second, summary(beside), first),
         Row(f"{second}, lost", f"{lost:.2%}, the median of {len(alone)} pairs; not timed by itself", first),
+        Row(f"{second}, its thread", f"{statistics.median(busy):.2%} of a processor; not timed by itself", first),
     ]
 
 
@@ -204,7 +209,7 @@ def _flooded(datagrams: int, steps: int, pace: float | None, seed: int, *, at_us
     with (
         _endless() as master,
         _sink() as sink,
-        _attacker(channel.port if at_us else sink, datagrams, seed) as under_way,
+        _attacker(channel.port if at_us else sink, datagrams, seed) as goes_on,
     ):
         links = LinkThread(Seventeen(), [link], master.scenario.time.step)
         links.start()

@@ -139,7 +139,9 @@ class LinkThread:
             self._guard("attach", self._vehicle.attach, link)
         while not self._closing.is_set():
             self._closing.wait(self._turn())
-        self._send_queued(time.perf_counter() + _DRAINING)
+        deadline = time.perf_counter() + _DRAINING
+        while self._send_queued(time.perf_counter() + _SENDING) and time.perf_counter() < deadline:
+            self._tend(time.monotonic())
         self.dropped += len(self._queue)
         self._guard("close", self._vehicle.close, time.monotonic())
         self._close_links()
@@ -155,13 +157,16 @@ class LinkThread:
         if now >= self._next_tick:
             self._next_tick = now + _SOON
             self._guard("tick", self._vehicle.tick, now)
-            for link in self._links:
-                self._guard("tend", link.channel.tend, now)
+        self._tend(now)
         sent = time.perf_counter()
         rest = max(_REST_RECEIVING * (received - began), _REST_SENDING * (sent - received))
         if more:
             return rest
         return max(rest, _SOON if now - self._heard < _TALKING else _PERIOD)
+
+    def _tend(self, now: float) -> None:
+        for link in self._links:
+            self._guard("tend", link.channel.tend, now)
 
     def _receive(self, link: Link, until: float) -> None:
         for frame, message in link.receive(until):

@@ -38,11 +38,14 @@ class Channel(Protocol):
         ...
 
     def send(self, frame: bytes) -> bool:
-        """Send a frame to all peers, whole or not at all; return whether all of them can have it."""
+        """Take a frame to be sent to all peers when it is tended; return whether there was room for all of them."""
         ...
 
     def tend(self, now: float) -> None:
-        """Do what is due at monotonic time `now` [s]: write what waits, accept and drop peers, reopen."""
+        """Do what is due at monotonic time `now` [s]: send what was taken, accept and drop peers, reopen.
+
+        Called at the end of each turn of the thread.
+        """
         ...
 
     def close(self) -> None:

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import Final
 
 WAITING = 1 << 16  # bytes
+_MUCH = 1 << 12  # bytes, that need not wait for a flush
 STALL = 5.0  # s without progress, after which the other side is given up
 
 
@@ -33,17 +34,15 @@ class Outgoing:
         self.dropped = 0
 
     def put(self, frame: bytes) -> bool:
-        """Take a frame; return whether there was room.
+        """Take a frame to be written at the next flush, or when there is much; return whether there was room.
 
         Raises
         ------
         OSError
             If the other side has gone.
         """
-        if not self._waiting:
-            taken = self._try(frame)
-            self._waiting += frame[taken:]
-            return True
+        if len(self._waiting) > _MUCH and self._stalled is None:
+            self._write_some()
         if len(self._waiting) + len(frame) > self._limit:
             self.dropped += 1
             return False
@@ -58,16 +57,17 @@ class Outgoing:
         OSError
             If the other side has gone.
         """
-        taken = self._try(bytes(self._waiting)) if self._waiting else 0
-        del self._waiting[:taken]
-        if taken or not self._waiting:
+        if not self._waiting or self._write_some():
             self._stalled = None
         elif self._stalled is None:
             self._stalled = now
         return self._stalled is None or now - self._stalled < STALL
 
-    def _try(self, data: bytes) -> int:
+    def _write_some(self) -> bool:
+        """Write what is taken; return whether anything was."""
         try:
-            return self._write(data)
+            taken = self._write(bytes(self._waiting))
         except (BlockingIOError, InterruptedError):
-            return 0
+            return False
+        del self._waiting[:taken]
+        return taken > 0

@@ -1,4 +1,8 @@
-"""UDP: to one address, or to whoever spoke to ours."""
+"""UDP: to one address, or to whoever spoke to ours.
+
+The frames of a turn of the thread go in one datagram, as autopilots do it: each system call costs the stepper a
+moment, for it hands over the interpreter.
+"""
 
 from __future__ import annotations
 
@@ -15,6 +19,7 @@ SILENCE = 10.0  # s, after which a peer is forgotten
 _BUFFER = 1 << 18  # bytes the kernel keeps of what comes; what floods beyond it is lost there, at no cost
 
 _NOT_TAKEN = "datagrams not taken by the kernel"
+_PACKET = 1400  # bytes of frames in a datagram, below what networks pass on in one piece
 
 
 class UdpOut:
@@ -30,6 +35,7 @@ class UdpOut:
 
     def __init__(self, host: str, port: int) -> None:
         self.trouble: dict[str, int] = Counter()
+        self._packet = b""  # frames that go together
         self._socket = _socket(f"udpout:{host}:{port}", lambda s: s.connect((host, port)))
 
     def receive(self) -> tuple[Hashable, bytes] | None:
@@ -43,24 +49,32 @@ class UdpOut:
         """Know the peer already."""
 
     def send(self, frame: bytes) -> bool:
-        """Send a datagram; that nobody listens is no trouble."""
-        for _ in range(2):
+        """Take a frame for the next datagram; that nobody listens is no trouble."""
+        if len(self._packet) + len(frame) > _PACKET:
+            self._flush()
+        self._packet += frame
+        return True
+
+    def tend(self, now: float) -> None:
+        """Send what was taken."""
+        self._flush()
+
+    def close(self) -> None:
+        """Send what was taken, and close the socket."""
+        self._flush()
+        self._socket.close()
+
+    def _flush(self) -> None:
+        packet, self._packet = self._packet, b""
+        for _ in range(2 if packet else 0):
             try:
-                self._socket.send(frame)
-                return True
+                self._socket.send(packet)
+                return
             except ConnectionRefusedError:  # word of an earlier one, in whose place this one was not sent: once more
                 continue
             except OSError:
                 self.trouble[_NOT_TAKEN] += 1
-                return False
-        return True
-
-    def tend(self, now: float) -> None:
-        """Have nothing to do."""
-
-    def close(self) -> None:
-        """Close the socket."""
-        self._socket.close()
+                return
 
 
 class UdpIn:
@@ -83,6 +97,7 @@ class UdpIn:
         self.trouble: dict[str, int] = Counter()
         self._socket = _socket(f"udpin:{host}:{port}", lambda s: s.bind((host, port)))
         self.port: int = self._socket.getsockname()[1]
+        self._packet = b""
         self._heard: dict[tuple[str, int], float] = {}  # when, by address
 
     @property
@@ -107,24 +122,30 @@ class UdpIn:
             self.trouble["frames of peers beyond 8"] += 1
 
     def send(self, frame: bytes) -> bool:
-        """Send a datagram to each peer; to none of them is well too."""
-        taken = True
-        for peer in self._heard:
-            try:
-                self._socket.sendto(frame, peer)
-            except OSError:
-                self.trouble[_NOT_TAKEN] += 1
-                taken = False
-        return taken
+        """Take a frame for the next datagram to each peer; to none of them is well too."""
+        if len(self._packet) + len(frame) > _PACKET:
+            self._flush()
+        self._packet += frame
+        return True
 
     def tend(self, now: float) -> None:
-        """Forget who is silent."""
+        """Send what was taken, and forget who is silent."""
+        self._flush()
         for peer in [peer for peer, last in self._heard.items() if now - last > SILENCE]:
             del self._heard[peer]
 
     def close(self) -> None:
-        """Close the socket."""
+        """Send what was taken, and close the socket."""
+        self._flush()
         self._socket.close()
+
+    def _flush(self) -> None:
+        packet, self._packet = self._packet, b""
+        for peer in self._heard if packet else ():
+            try:
+                self._socket.sendto(packet, peer)
+            except OSError:
+                self.trouble[_NOT_TAKEN] += 1
 
 
 def _socket(name: str, prepare: Callable[[socket.socket], None]) -> socket.socket:

@@ -93,6 +93,13 @@ def udp_link(port, **options):
     return link_of(UdpOut("127.0.0.1", port), **options)
 
 
+def tended(link, message):
+    """Send a message at once; return whether there was room for it."""
+    sent = link.send(message)
+    link.channel.tend(time.monotonic())
+    return sent
+
+
 def until(condition, seconds=5.0):
     """Wait for a condition; return whether it came true."""
     deadline = time.monotonic() + seconds

@@ -18,7 +18,7 @@ from cosim.mavlink.channels.udp import UdpIn, UdpOut
 from cosim.mavlink.endpoint import Endpoint
 from cosim.mavlink.link import open_links
 from cosim.mavlink.options import MavlinkOptions
-from tests.cosim.mavlink.stubs import Station, attitude, heartbeat, link_of, mavlink, odometry, until
+from tests.cosim.mavlink.stubs import Station, attitude, heartbeat, link_of, mavlink, odometry, tended, until
 
 HERE = "127.0.0.1"
 
@@ -45,7 +45,7 @@ def closed_port():
 def test_udpout_speaks_with_one_peer_alone():
     with udp_socket() as peer, udp_socket() as stranger:
         link = link_of(UdpOut(*peer.getsockname()))
-        link.send(heartbeat())
+        tended(link, heartbeat())
         data, address = peer.recvfrom(1000)
         assert Station().parse(data)[0].get_type() == "HEARTBEAT"
         stranger.sendto(Station().pack(attitude(1)), address)
@@ -58,12 +58,12 @@ def test_nobody_listening_is_survived_and_who_comes_later_hears_the_next_frame()
     port = closed_port()
     link = link_of(UdpOut(HERE, port))
     for _ in range(50):
-        assert link.send(heartbeat())
+        assert tended(link, heartbeat())
         assert not heard(link)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as late:
         late.bind((HERE, port))
         late.settimeout(2.0)
-        link.send(attitude(7))
+        tended(link, attitude(7))
         assert Station().parse(late.recv(1000))[0].time_boot_ms == 7
     link.channel.close()
     assert not link.troubles()
@@ -79,7 +79,7 @@ def test_udpin_sends_to_each_who_spoke_a_heeded_frame():
         bad.sendto(b"\xfd\xff\x00", to)
         bad.sendto(Station(1, 1).pack(heartbeat()), to)  # as if it were we
         assert until(lambda: not heard(link) and len(link.channel.peers) == 2)
-        link.send(attitude(1))
+        tended(link, attitude(1))
         assert good.recv(1000) == other.recv(1000)
         bad.setblocking(False)
         with pytest.raises(BlockingIOError):
@@ -149,7 +149,7 @@ def drained(client):
 def test_a_server_has_many_clients_and_hears_each():
     link = link_of(TcpIn(HERE, 0))
     a, b = connected(link.channel, 2)
-    link.send(attitude(1))
+    tended(link, attitude(1))
     assert a.recv(1000) == b.recv(1000)
     pieces = Station().pack(attitude(5)), Station(254).pack(attitude(6))
     a.sendall(pieces[0][:20])
@@ -179,7 +179,7 @@ def test_a_client_that_resets_while_it_is_sent_to_is_let_go():
     client.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, b"\x01\x00\x00\x00\x00\x00\x00\x00")
     client.close()
     for i in range(20):
-        link.send(attitude(i))
+        tended(link, attitude(i))
     link.channel.tend(time.monotonic())
     link.channel.tend(time.monotonic())
     assert not link.channel.clients
@@ -244,7 +244,7 @@ def test_a_client_that_takes_nothing_is_closed_after_a_while():
 
 
 def test_patience_ends_after_a_while_without_any_progress():
-    out = Outgoing(Taker([0, None, None, None, 2, None, None, None]))
+    out = Outgoing(Taker([None, None, None, 2, None, None, None]))
     out.put(b"frame")
     assert out.flush(10.0)
     assert out.flush(10.0 + stream.STALL - 0.1)
@@ -286,26 +286,28 @@ def test_a_client_of_a_server_comes_back_after_the_server_did(monkeypatch):
     port = server.getsockname()[1]
     link = link_of(TcpOut(HERE, port))
     side, _ = server.accept()
-    link.send(attitude(1))
+    side.settimeout(2.0)
+    tended(link, attitude(1))
     assert frames_of(side.recv(1000))[0].time_boot_ms == 1
     side.sendall(Station().pack(heartbeat()))
     assert until(lambda: heard(link))
     server.close()
     side.close()
 
-    def tended():
+    def lost():
         heard(link)
         link.channel.tend(time.monotonic())
         return link.channel._connection is None
 
-    assert until(tended)
+    assert until(lost)
     assert not link.send(attitude(2))
     for _ in range(5):
-        tended()  # nobody is there
+        lost()  # nobody is there
     with socket.create_server((HERE, port)) as server:
-        assert until(lambda: not tended())
+        assert until(lambda: not lost())
         side, _ = server.accept()
-        link.send(attitude(3))
+        side.settimeout(2.0)
+        tended(link, attitude(3))
         assert frames_of(side.recv(1000))[0].time_boot_ms == 3
         side.close()
     link.channel.close()
@@ -338,7 +340,7 @@ def test_a_serial_line_carries_frames_both_ways_and_every_byte():
     ours, theirs = os.openpty()
     link = link_of(Serial(os.ttyname(theirs), 57600))
     for message in (odometry(0x0D0A1113), attitude(0x03040D1A)):  # bytes that terminals like to eat
-        link.send(message)
+        tended(link, message)
     assert [m.get_type() for m in come_to(ours, 2)] == ["ODOMETRY", "ATTITUDE"]
     every = mavlink.MAVLink_encapsulated_data_message(1, list(range(253)))
     frame = Station().pack(every)
@@ -391,7 +393,7 @@ def test_a_device_that_disappears_is_opened_when_it_is_back(tmp_path, caplog):
     ours, theirs = os.openpty()
     path.symlink_to(os.ttyname(theirs))
     link.channel.tend(now + 4.0)
-    assert link.send(attitude(9))
+    assert tended(link, attitude(9))
     assert come_to(ours, 1)[0].time_boot_ms == 9
     assert [record.message.split(" ", 2)[2] for record in caplog.records] == ["is gone", "is back"]
     link.channel.close()
