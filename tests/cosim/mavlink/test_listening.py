@@ -146,6 +146,11 @@ def test_every_message_of_the_dialect_can_be_shown(link):
     assert len(watch.rows) == min(ROWS, len(mavlink.mavlink_map)) and len(shown) >= ROWS - 5
 
 
+def test_what_is_not_known_is_shown_as_such():
+    status = mavlink.MAVLink_sys_status_message(0, 0, 0, 500, 65535, -1, -1, *[0] * 6)
+    assert values(status) == "load 50.0 %  voltage_battery - V  current_battery - A  battery_remaining - %"
+
+
 def test_values_that_are_no_numbers_are_shown():
     assert "nan" in values(mavlink.MAVLink_attitude_message(0, float("nan"), 0, 0, 0, 0, 0))
     assert "inf" in values(mavlink.MAVLink_named_value_float_message(0, b"x", float("inf")))

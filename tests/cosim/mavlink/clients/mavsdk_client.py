@@ -92,7 +92,7 @@ async def steps(vehicle, address):
 
     async def change_param():
         found = await vehicle.param.get_all_params()
-        before = next(p for p in found.float_params if p.value > 1.0)
+        before = next(p for p in found.float_params if p.name.startswith("LAW_"))
         await vehicle.param.set_param_float(before.name, before.value * 1.25)
         after = await vehicle.param.get_param_float(before.name)
         await vehicle.param.set_param_float(before.name, before.value)
@@ -101,7 +101,7 @@ async def steps(vehicle, address):
     async def refused_param():
         """Ask for what is out of range."""
         found = await vehicle.param.get_all_params()
-        before = next(p for p in found.float_params if p.value > 1.0)
+        before = next(p for p in found.float_params if p.name.startswith("LAW_"))
         try:
             await vehicle.param.set_param_float(before.name, -1e30)
         except ParamError as error:
