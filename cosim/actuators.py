@@ -9,6 +9,8 @@ from cosim.scenario import Scenario
 from cosim.signals import Array, Signals
 from plant_fmu import Plant
 
+MOST = 1e6  # N, N m: more is not asked of the plant in a run that can be sent anywhere, where a law might ask for any
+
 
 class Actuators:
     """Brings a wrench, or thruster forces, to the plant.
@@ -62,6 +64,8 @@ class Actuators:
         """Bring the wrench `command` to the plant's inputs."""
         if self.allocation is None:
             self._wrench[:] = self.command
+            if self._scenario.commands.enabled:
+                self._cut[0] = cut(self._wrench)
         else:
             self._cut[0] = self.allocation(self.command, self.thrusts)
 
@@ -83,3 +87,25 @@ class Actuators:
                 self._limits["thrust_max"] * self.health,
                 actuation.limits,
             )
+
+
+def cut(wrench: Array) -> bool:
+    """Scale a wrench in place until force and moment are at most `MOST`; 0 where they are no numbers.
+
+    Parameters
+    ----------
+    wrench : ndarray, shape (6,)
+        [N, N m].
+
+    Returns
+    -------
+    bool
+        Whether anything was changed.
+    """
+    changed = False
+    for part in (wrench[:3], wrench[3:]):
+        greatest = float(np.max(np.abs(part)))
+        if not greatest <= MOST:
+            part[:] = part * (MOST / greatest) if greatest < np.inf else 0.0
+            changed = True
+    return changed

@@ -56,7 +56,7 @@ def test_help_and_version(capsys, arguments):
         (["run", "paper", "--set", "law.gains.k_p1=1e9"], "wrench"),
         (["run", "paper", "--out", "/dev/null/run"], "/dev/null/run"),
         (["run", "paper", "--mavlink", "udpout:192.0.2.1:14550"], "--allow-remote"),
-        (["run", "paper", "--mavlink", ""], "udpout:HOST:PORT"),
+        (["run", "paper", "--mavlink", ""], "tcp:HOST:PORT"),
         (["calibrate", "--scenario", "paper-limited", "--scenario", "nowhere"], "nowhere"),
         (["show", "paper", "--set", "x=1"], "x: unknown key"),
     ],

@@ -116,7 +116,7 @@ def test_a_restart_is_another_run_on_the_same_link(tmp_path):
     assert 0 < len(first["time"]) < scenario.steps
     boots = [m.time_boot_ms for m in station.of("LOCAL_POSITION_NED")]
     assert sum(b < a for a, b in zip(boots, boots[1:], strict=False)) == 1
-    assert boots[-1] == 1500
+    assert 1400 <= boots[-1] <= 1500
     # the log of the first run repeats it alone
     again = run_scenario(
         load_scenario(tmp_path / "run" / "scenario.toml"), tmp_path / "again", report=False,

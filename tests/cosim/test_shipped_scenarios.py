@@ -8,7 +8,15 @@ from cosim.run import run_scenario
 from cosim.scenario import load_scenario
 from cosim.scenario_file import shipped_scenarios
 
-DEPLOYABLE = ["dense-field", "depth-transit", "docking", "moving-obstacle", "paper-deployable", "pipe-inspection"]
+DEPLOYABLE = [
+    "dense-field",
+    "depth-transit",
+    "docking",
+    "harbour",
+    "moving-obstacle",
+    "paper-deployable",
+    "pipe-inspection",
+]
 
 
 def test_these_are_all_that_are_shipped_with_that_law():

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from cosim.actuators import cut
 from cosim.came import as_it_came
 from cosim.helm import MODES, LoggedOrders, OrderQueue, RecordedOrders
 from cosim.helm.helm import greatest_wrench
@@ -269,3 +270,21 @@ def test_orders_of_a_run_repeat_it_to_the_last_bit(tmp_path):
     assert [r.region.name for r in came.regions if r.seen] == ["seen 1"]
     assert came.regions[-1].region.shape.radius == pytest.approx(0.2, abs=1e-6)
     assert "seen 2" not in first.summary["min_clearance"]
+
+
+@pytest.mark.parametrize("name", ["paper", "paper-limited"])
+@pytest.mark.parametrize("away", [300.0, 1e5])
+def test_no_target_is_too_far_for_the_run_to_go_on(fly, name, away):
+    """The printed law's force grows with the cube of the distance."""
+    run = fly({100: [Aim((away, 0.0, 5.0))]}, "time.duration=0.5", name=name)
+    asked = np.abs(run.stack(*(f"command.{axis}" for axis in "XYZ"))).max()
+    given = np.linalg.norm(run.stack(*(f"wrench.{axis}" for axis in "XYZ")), axis=1)
+    assert asked > 1e8 and given.max() <= 1e6 * 1.8
+    assert run["allocation_saturated"][-1] == 1.0 and run["allocation_saturated"][0] == 0.0
+
+
+def test_a_wrench_that_is_no_number_is_none():
+    wrench = np.array([np.nan, 1.0, np.inf, 2e6, -1e6, 0.0])
+    assert cut(wrench)
+    assert wrench.tolist() == [0.0, 0.0, 0.0, 1e6, -5e5, 0.0]
+    assert not cut(wrench)
