@@ -186,6 +186,19 @@ def test_broken_frames_cost_nothing_and_old_ones_are_heard(link):
     assert link.old == 1 and link.counts.malformed == 2
 
 
+def test_with_a_key_only_what_is_signed_with_it_is_heard():
+    endpoint = parse_endpoint(f"udpin:127.0.0.1:{free_port()}")
+    speaker = parse_endpoint(f"udpout:127.0.0.1:{endpoint.port}")
+    with GroundLink(endpoint, key=bytes(32)) as link:
+        for key in (None, b"\1" * 32, bytes(32)):
+            with GroundLink(speaker, key, identity=(1, 1)) as vehicle:
+                vehicle.beat()
+        found = link.receive(2.0) + link.receive(0.1)
+    assert [h.kind for h in found] == ["HEARTBEAT"]
+    assert (link.counts.unsigned, link.counts.forged, link.counts.accepted) == (1, 1, 1)
+    assert "1 frames forged" in picture(link, Watch(), 0.0)[0]
+
+
 def test_following_ends_after_so_many_messages_or_seconds(link):
     port = int(link.name.rpartition(":")[2])
     with Vehicle(port) as vehicle:

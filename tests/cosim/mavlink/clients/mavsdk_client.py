@@ -30,6 +30,7 @@ except ImportError:
     from mavsdk.param import ParamError
 
 PATIENCE = 20.0  # s, for a step
+SETTLED = 0.05
 FAR, NEARER = 4e-5, 1e-5  # deg, about 4.4 m and 1.1 m
 
 
@@ -146,10 +147,10 @@ async def steps(vehicle, address):
         return len(await vehicle.mission_raw.download_mission())
 
     async def speed():
-        """Return how fast the clock goes, which is known after some messages only."""
+        """Return how fast the clock goes, once the estimate, which takes some messages, has come near to 1."""
         while True:
             with contextlib.suppress(InfoError):
-                if math.isfinite(factor := await vehicle.info.get_speed_factor()):
+                if abs((factor := await vehicle.info.get_speed_factor()) - 1.0) < SETTLED:
                     return factor
             await asyncio.sleep(0.2)
 
