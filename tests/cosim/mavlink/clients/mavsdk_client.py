@@ -20,12 +20,14 @@ try:  # MAVSDK 4: in this process
     from mavsdk.asyncio.plugins.param import ParamAsync
     from mavsdk.asyncio.plugins.telemetry import TelemetryAsync
     from mavsdk.plugins.info import InfoError
+    from mavsdk.plugins.mission_raw import MissionItem
     from mavsdk.plugins.offboard import PositionNedYaw
     from mavsdk.plugins.param import ParamError
 except ImportError:
     Mavsdk = None
     from mavsdk import System
     from mavsdk.info import InfoError
+    from mavsdk.mission_raw import MissionItem
     from mavsdk.offboard import PositionNedYaw
     from mavsdk.param import ParamError
 
@@ -146,6 +148,21 @@ async def steps(vehicle, address):
     async def missions():
         return len(await vehicle.mission_raw.download_mission())
 
+    async def mission():
+        """Upload regions about where it is, read them back, and set out."""
+        there = await first(vehicle.stream("position"))
+        items = [
+            MissionItem(i, 6, 16, int(i == 0), 1, 0.0, 1.0, 0.0, math.nan,
+                        round(1e7 * (there.latitude_deg + i * NEARER)), round(1e7 * there.longitude_deg), -3.0, 0)
+            for i in range(3)
+        ]  # fmt: skip
+        await vehicle.mission_raw.upload_mission(items)
+        back = await vehicle.mission_raw.download_mission()
+        await vehicle.mission_raw.start_mission()
+        shown = await mode("MISSION")
+        await vehicle.mission_raw.clear_mission()
+        return [[fields(item, "command", "x", "y", "z") for item in some] for some in (items, back)] + [shown]
+
     async def speed():
         """Return how fast the clock goes, once the estimate, which takes some messages, has come near to 1."""
         while True:
@@ -166,6 +183,7 @@ async def steps(vehicle, address):
     yield "speed", speed()
     yield "arm", arm()
     yield "go_to", go_to()
+    yield "mission", mission()
     yield "hold", hold()
     yield "offboard", offboard()
     yield "disarm", disarm()

@@ -78,13 +78,20 @@ def test_a_go_to_moves_the_vehicle(flown):
     assert abs(after - target) < abs(before - target)
 
 
+def test_a_mission_of_regions_is_uploaded_read_back_and_begun(flown):
+    items, back, mode = value(flown, "mission")
+    assert len(back) == 3 and mode == "MISSION"
+    for sent, came in zip(items, back, strict=True):
+        assert came[:3] == sent[:3] and came[3] == pytest.approx(sent[3], abs=1e-3)
+
+
 def test_hold_and_offboard_are_shown_as_such(flown):
     assert value(flown, "hold") == "HOLD"
     assert value(flown, "offboard") == "OFFBOARD"
 
 
 def test_what_was_commanded_is_in_the_log_of_the_run(flown):
-    assert {"arm", "steer", "aim", "change"} <= set(flown["orders"])
+    assert {"arm", "steer", "aim", "change", "mission"} <= set(flown["orders"])
 
 
 def test_its_clock_goes_as_the_wall_clock_does(flown):
