@@ -33,7 +33,6 @@ RATIO = "x first"  # of the median to that of the row that it is compared with
 DATAGRAMS_PER_STEP = 10  # of STEPS, in a flood
 _MESSAGES = 850.0  # /s of the wall clock: seventeen streams at 50 Hz
 _SOURCE = (1, 1)
-_STRETCHES = 4  # of a repeat
 _PACE = 1000.0  # steps/s, of the paced runs: those of the scenario, in real time
 
 
@@ -124,14 +123,13 @@ def _messages(calls: int, repeats: int) -> list[Row]:
 def _beside_traffic(steps: int, repeats: int) -> list[Row]:
     """Time stretches of one run at full speed, in turn without and with a link, so that both see the same noise."""
     alone, beside, busy = [], [], []
-    stretch = max(1, steps // _STRETCHES)
     with _endless() as master, _sink() as port:
         k = 0
-        for i in range(2 + 2 * _STRETCHES * repeats):
+        for i in range(2 + 2 * repeats):
             vehicle = Seventeen()
             links = LinkThread(vehicle, [_link(port)], master.scenario.time.step) if i % 2 else None
-            taken = _stretch(master, range(k, k + stretch), links)
-            k += stretch
+            taken = _stretch(master, range(k, k + steps), links)
+            k += steps
             if i > 1:  # the first of each compiles, and fills the caches
                 (beside if i % 2 else alone).append(taken)
                 busy += [vehicle.busy] if i % 2 else []
