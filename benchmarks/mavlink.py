@@ -22,48 +22,64 @@ from cosim.mavlink.channels.udp import UdpIn, UdpOut
 from cosim.mavlink.dialect import dialect
 from cosim.mavlink.framing import Counts, Gate
 from cosim.mavlink.link import Link, Signer
+from cosim.mavlink.messages import MESSAGES
+from cosim.mavlink.options import MavlinkOptions
 from cosim.mavlink.outlet import Outlet
 from cosim.mavlink.signing import SigningClock
 from cosim.mavlink.thread import LinkThread
+from cosim.mavlink.vessel import Vessel
 from cosim.scenario import load_scenario
 from cosim.signals import Array
 
 STEPS = 20_000
 RATIO = "x first"  # of the median to that of the row that it is compared with
 DATAGRAMS_PER_STEP = 10  # of STEPS, in a flood
-_MESSAGES = 850.0  # /s of the wall clock: seventeen streams at 50 Hz
+_SENT = (0, 1, 2, 24, 29, 30, 31, 32, 33, 36, 42, 62, 65, 74, 85, 137, 245)  # ids of messages, one of each a round
+_ROUNDS = 50  # /s of the wall clock
+_MESSAGES = _ROUNDS * len(_SENT)
 _SOURCE = (1, 1)
 _PACE = 1000.0  # steps/s, of the paced runs: those of the scenario, in real time
 
 
 class Seventeen:
-    """A vehicle that sends 850 messages a second of the wall clock, whatever the run does."""
+    """A vehicle that sends seventeen of its messages at 50 Hz of the wall clock, however fast the run goes.
 
-    def __init__(self) -> None:
-        mavlink = dialect()
-        self._links: list[Outlet] = []
-        self._sent = 0
-        self.busy = 0.0
+    Parameters
+    ----------
+    master : Master
+        Of the run that it shows.
+    """
+
+    def __init__(self, master: Master) -> None:
+        self._vessel = Vessel(master.scenario, master.signals.columns, MavlinkOptions(), None)
+        self._row: Array | None = None
+        self._rounds = 0
         self._began = time.monotonic()
-        self._message: Callable[[int], Any] = lambda ms: mavlink.MAVLink_attitude_message(ms, 0.1, 0.2, 0.3, 0, 0, 0)
+        self.busy = 0.0
 
     def attach(self, link: Outlet) -> None:
         """Begin to send on a link."""
-        self._links.append(link)
+        self._vessel.links.append(link)
 
     def observe(self, row: Array) -> None:
-        """Have nothing to say about a row."""
+        """Keep the row, to be shown."""
+        self._row = row
 
     def receive(self, link: Outlet, message: Any, now: float) -> None:
         """Answer, as to a request for a parameter."""
-        link.send(self._message(0))
+        self._send(_SENT[0])
 
     def tick(self, now: float) -> None:
         """Send what is due."""
-        while self._sent < (now - self._began) * _MESSAGES:
-            self._sent += 1
-            for link in self._links:
-                link.send(self._message(self._sent))
+        while self._row is not None and self._rounds < (now - self._began) * _ROUNDS:
+            self._rounds += 1
+            self._vessel.look(self._row)
+            for number in _SENT:
+                self._send(number)
+
+    def _send(self, number: int) -> None:
+        for message in MESSAGES[number].build(self._vessel):
+            self._vessel.send(message)
 
     def close(self, now: float) -> None:
         """Note how much of a processor the thread took."""
@@ -126,14 +142,14 @@ def _beside_traffic(steps: int, repeats: int) -> list[Row]:
     with _endless() as master, _sink() as port:
         k = 0
         for i in range(2 + 2 * repeats):
-            vehicle = Seventeen()
+            vehicle = Seventeen(master)
             links = LinkThread(vehicle, [_link(port)], master.scenario.time.step) if i % 2 else None
             taken = _stretch(master, range(k, k + steps), links)
             k += steps
             if i > 1:  # the first of each compiles, and fills the caches
                 (beside if i % 2 else alone).append(taken)
                 busy += [vehicle.busy] if i % 2 else []
-    first, second = "step: no link", f"step: {_MESSAGES:.0f} messages/s"
+    first, second = "step: no link", f"step: {_MESSAGES} messages/s"
     lost = statistics.median(b / a - 1.0 for a, b in zip(alone, beside, strict=True))
     return [
         Row(first, summary(alone), first),
@@ -209,7 +225,7 @@ def _flooded(datagrams: int, steps: int, pace: float | None, seed: int, *, at_us
         _sink() as sink,
         _attacker(channel.port if at_us else sink, datagrams, seed) as goes_on,
     ):
-        links = LinkThread(Seventeen(), [link], master.scenario.time.step)
+        links = LinkThread(Seventeen(master), [link], master.scenario.time.step)
         links.start()
         due = time.perf_counter()
         for k in range(master.scenario.steps):
