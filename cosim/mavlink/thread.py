@@ -31,6 +31,7 @@ _RECEIVING = 0.2e-3  # s, of a slice, for all links together
 _SENDING = 0.5e-3  # s, of a slice
 _REST_RECEIVING = 19  # times as long as it received it rests: a flood gets a twentieth of the time
 _REST_SENDING = 3  # times as long as it sent
+_LONGEST_REST = 0.05  # s; where a slice took long it was the stepper's, which loads what it calls before its first step
 _DRAINING = 2.0  # s, that closing waits for what is queued
 _CLOSING = 4.0  # s, that closing waits at all
 
@@ -160,6 +161,7 @@ class LinkThread:
         self._tend(now)
         sent = time.perf_counter()
         rest = max(_REST_RECEIVING * (received - began), _REST_SENDING * (sent - received))
+        rest = min(rest, _LONGEST_REST)
         if more:
             return rest
         return max(rest, _SOON if now - self._heard < _TALKING else _PERIOD)
