@@ -83,6 +83,8 @@ class LinkThread:
     def __init__(self, vehicle: Vehicle, links: Sequence[Link], step: float) -> None:
         self._vehicle, self._links = vehicle, list(links)
         self._logs = [link.channel for link in links if isinstance(link.channel, Tlog)]
+        for link in links:
+            link.logs = [other for other in links if other is not link and isinstance(other.channel, Tlog)]
         self._every = max(1, round(SNAPSHOT_PERIOD / step))
         self._queue: deque[Array] = deque(maxlen=SNAPSHOTS)
         self._closing = threading.Event()
