@@ -89,8 +89,8 @@ class LinkThread:
         self._queue: deque[Array] = deque(maxlen=SNAPSHOTS)
         self._closing = threading.Event()
         self._next_tick = 0.0
-        self._started = time.monotonic()
-        self._waited = 0.0  # s, from the start to the last snapshot before anything moved
+        self._first: float | None = None  # s, monotonic, when the first snapshot of time 0 came
+        self._waited = 0.0  # s, from then to the last one: for how long arming was awaited
         self._heard = -math.inf  # s, monotonic, when something was heeded last
         self.dropped = 0
         self.failures: dict[str, int] = Counter()
@@ -98,7 +98,6 @@ class LinkThread:
 
     def start(self) -> None:
         """Begin to send and receive."""
-        self._started = time.monotonic()
         self._thread.start()
 
     def observe(self, k: int, row: Array) -> None:
@@ -183,8 +182,10 @@ class LinkThread:
         """Show the vehicle snapshots until a moment of `time.perf_counter`; return whether some are left."""
         while self._queue:
             row = self._queue.popleft()
-            if not row[0] > 0.0:  # arming is awaited
-                self._waited = time.monotonic() - self._started
+            if not row[0] > 0.0:  # where it comes again, arming is awaited
+                now = time.monotonic()
+                self._first = now if self._first is None else self._first
+                self._waited = now - self._first
             for tlog in self._logs:
                 tlog.simulated = self._waited + float(row[0])
             self._guard("observe", self._vehicle.observe, row)
