@@ -1,4 +1,4 @@
-"""What MAVLink costs: a message, a step beside ordinary traffic, and a step under a flood of hostile datagrams."""
+"""What MAVLink costs: a message, a step beside traffic and under a flood, a connection, a frame of an autopilot."""
 
 from __future__ import annotations
 
@@ -15,15 +15,19 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks import sitl
 from benchmarks.hostile import hostile_datagrams
 from benchmarks.timing import Row, summary, time_calls
 from cosim.master import Master
 from cosim.mavlink.channels.udp import UdpIn, UdpOut
+from cosim.mavlink.conformance.client import Client
+from cosim.mavlink.conformance.connect import qgc_connect
+from cosim.mavlink.conformance.vehicle import own_vehicle
 from cosim.mavlink.dialect import dialect
 from cosim.mavlink.framing import Counts, Gate
 from cosim.mavlink.link import Link, Signer
 from cosim.mavlink.messages import MESSAGES
-from cosim.mavlink.options import MavlinkOptions
+from cosim.mavlink.options import PROFILES, MavlinkOptions
 from cosim.mavlink.outlet import Outlet
 from cosim.mavlink.signing import SigningClock
 from cosim.mavlink.thread import LinkThread
@@ -102,7 +106,13 @@ def measure(steps: int, repeats: int, datagrams: int | None = None) -> list[Row]
         For the table.
     """
     count = datagrams or DATAGRAMS_PER_STEP * steps
-    return [*_messages(steps, repeats), *_beside_traffic(steps, repeats), *_under_flood(count, steps, repeats)]
+    return [
+        *_messages(steps, repeats),
+        *_beside_traffic(steps, repeats),
+        *_connecting(repeats),
+        *_in_lockstep(steps, repeats),
+        *_under_flood(count, steps, repeats),
+    ]
 
 
 # ---- a message ----
@@ -176,6 +186,29 @@ def _stretch(master: Master, steps: range, links: LinkThread | None) -> float:
 
 def _endless() -> Master:
     return Master(load_scenario("paper", ["arbiter.engine=closed", "time.duration=100000"]))
+
+
+# ---- a connection, and a frame of an autopilot ----
+
+
+def _connecting(repeats: int) -> list[Row]:
+    """Connect as QGroundControl does, to a run of each profile that steps in real time."""
+    rows = []
+    for profile in PROFILES:
+        found = []
+        for _ in range(repeats):
+            with own_vehicle(profile) as link:
+                found.append(qgc_connect(Client(link)))
+        seconds = statistics.median(one.seconds for one in found)
+        told = f"{seconds:.3f} s, {max(one.retries for one in found)} retries at the most; median of {repeats}"
+        rows.append(Row(f"QGroundControl connects, {profile}", told, ""))
+    return rows
+
+
+def _in_lockstep(steps: int, repeats: int) -> list[Row]:
+    timing = sitl.lockstep(steps, repeats)
+    name = f"frame of an autopilot: {1e6 / timing.median:.0f}/s"
+    return [Row(name, timing, name)]
 
 
 # ---- a step under a flood ----
