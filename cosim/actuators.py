@@ -9,7 +9,7 @@ from cosim.scenario import Scenario
 from cosim.signals import Array, Signals
 from plant_fmu import Plant
 
-MOST = 1e6  # N, N m: more is not asked of the plant in a run that can be sent anywhere, where a law might ask for any
+MOST = 1e5  # N, N m: more is not asked of the plant in a run that can be sent anywhere, where a law might ask for any
 
 
 class Actuators:

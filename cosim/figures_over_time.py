@@ -174,7 +174,9 @@ def helm(story: Story) -> Figure:
         ax.broken_barh([(time[first], time[last] - time[first])], (row - 0.4, 0.8), color=CYCLE[row])
     for start, end in spans(~armed, time):
         ax.axvspan(start, end, color=BLACK, alpha=0.2, linewidth=0)
-    ax.set(yticks=range(len(MODES)), yticklabels=MODES, ylim=(len(MODES) - 0.4, -0.6), xlim=(0.0, float(time[-1])))
+    ax.set(yticks=range(len(MODES)), yticklabels=MODES, ylim=(len(MODES) - 0.4, -0.6))
+    if time[-1] > 0.0:
+        ax.set_xlim(0.0, float(time[-1]))
     return figure
 
 

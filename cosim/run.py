@@ -109,11 +109,13 @@ def run_scenario(
             with Master(scenario) as master:
                 if mavlink is not None and link is None:
                     link = mavlink.open(scenario, master.signals.columns, None if recorded else queue)
-                    link.start()
                 folder = claim(out.with_name(f"{out.name}-{attempt}") if out and attempt > 1 else out, scenario)
+                if link is not None and attempt == 1:
+                    link.start()
                 try:
                     source = LoggedOrders(recorded or queue, folder.path / ORDERS)
                     status, wall_time, failure = _step(master, folder, source, link, rate, progress)
+                    queue.end_run()
                     summary = conclude(folder.path, scenario, status, wall_time, report)
                 except OSError as error:
                     raise RunError(f"{folder.path}: {error.strerror or error}") from error

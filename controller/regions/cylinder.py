@@ -8,7 +8,18 @@ from typing import ClassVar
 
 from controller.compiled import compiled
 from controller.regions.geometry import product_distance
-from controller.regions.shape import Array, Bounds, Evaluation, Vector3, about, join, require, require_finite, unit
+from controller.regions.shape import (
+    UP_TO_ROUNDING,
+    Array,
+    Bounds,
+    Evaluation,
+    Vector3,
+    about,
+    join,
+    require,
+    require_finite,
+    unit,
+)
 
 
 @dataclass(frozen=True)
@@ -24,7 +35,8 @@ class Cylinder:
     def __post_init__(self) -> None:
         require_finite("cylinder", start=self.start, end=self.end, radius=self.radius)
         require(self.radius > 0.0, "cylinder", "radius", self.radius, "above 0 m")
-        require(math.dist(self.start, self.end) > 0.0, "cylinder", "end", self.end, "a point other than start")
+        apart = math.dist(self.start, self.end) > UP_TO_ROUNDING
+        require(apart, "cylinder", "end", self.end, "a point other than start")
 
     def packed(self) -> tuple[float, ...]:
         """Return the middle, the unit axis, half the length and the radius."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections import deque
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -29,25 +30,35 @@ class OrderSource(Protocol):
 
 
 class OrderQueue:
-    """Orders from another thread, in the order in which they were given. Bounded: a flood is refused, not kept."""
+    """Orders from another thread, in the order in which they were given. Bounded: a flood is refused, not kept.
+
+    Attributes
+    ----------
+    run : int
+        Which run takes them; the next one after a reset.
+    """
 
     exhausted = False
 
     def __init__(self) -> None:
+        self.run = 0
         self._orders: deque[Order] = deque()
+        self._lock = threading.Lock()
 
-    def give(self, order: Order) -> bool:
+    def give(self, order: Order, run: int | None = None) -> bool:
         """Queue an order for the next step.
 
         Parameters
         ----------
         order : Order
             To be applied.
+        run : int, optional
+            The run that it is meant for; default: whichever takes it.
 
         Returns
         -------
         bool
-            Whether there was room for it.
+            Whether there was room for it, and that run is not over.
 
         Raises
         ------
@@ -55,10 +66,17 @@ class OrderQueue:
             If its numbers cannot be.
         """
         check_order(order)
-        if len(self._orders) >= QUEUED:
-            return False
-        self._orders.append(order)
+        with self._lock:
+            if len(self._orders) >= QUEUED or run not in (None, self.run):
+                return False
+            self._orders.append(order)
         return True
+
+    def end_run(self) -> None:
+        """Forget what is queued, and refuse what still comes for the run that is over."""
+        with self._lock:
+            self.run += 1
+            self._orders.clear()
 
     def take(self, k: int) -> Sequence[Order]:
         """Return what is queued."""
@@ -78,6 +96,8 @@ class _Entry(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 class RecordedOrders:
     """The orders of an earlier run, at the steps at which that run took them.
 
+    A last line that was cut off, by a kill or a full disk, does not count: that run did not follow it either.
+
     Parameters
     ----------
     file : Path
@@ -91,16 +111,20 @@ class RecordedOrders:
 
     def __init__(self, file: Path) -> None:
         try:
-            lines = file.read_bytes().splitlines()
+            content = file.read_bytes()
         except OSError as error:
             raise RunError(f"{file}: {error.strerror or error}") from error
+        lines, whole = content.splitlines(), content.count(b"\n")
         entries = []
         for number, line in enumerate(lines, 1):
             try:
-                entries.append(msgspec.json.decode(line, type=_Entry))
-                check_order(entries[-1].order)
+                entry = msgspec.json.decode(line, type=_Entry)
+                check_order(entry.order)
             except (msgspec.DecodeError, OrderError) as error:
+                if type(error) is msgspec.DecodeError and number > whole:
+                    break
                 raise RunError(f"{file}, line {number}: {error}") from error
+            entries.append(entry)
         self._entries = deque(sorted(entries, key=lambda entry: entry.step))
 
     @property

@@ -128,7 +128,7 @@ class Autopilot:
         vessel = self._vessel
         vessel.look(row)
         now = vessel.view.simulated_us
-        if self._last_us is not None and now < self._last_us:
+        if (self._last_us is not None and now < self._last_us) or (now == 0 and vessel.outlived):
             self._restart()
             vessel.look(row)
         self._awaiting = now == self._last_us == 0  # the same snapshot comes again and again

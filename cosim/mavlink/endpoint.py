@@ -94,7 +94,11 @@ def _serial(text: str, rest: str) -> tuple[str, int]:
 
 def _new_file(text: str) -> str:
     path = Path(text)
-    if path.exists():
+    try:
+        exists = path.exists()
+    except OSError as error:  # such as a name that is too long
+        raise TelemetryError(f"endpoint {text!r}: {error.strerror or error}") from error
+    if exists:
         raise TelemetryError(f"endpoint {text!r}: the file exists; a log is never overwritten")
     if not path.parent.is_dir():
         raise TelemetryError(f"endpoint {text!r}: there is no folder {str(path.parent)!r}")

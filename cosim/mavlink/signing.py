@@ -13,6 +13,7 @@ from typing import Final
 from cosim.errors import TelemetryError
 
 KEY_BYTES = 32
+_LONGEST_KEY = 4096  # bytes of its file
 STREAMS = 64  # of senders, that are kept in mind
 _EPOCH = 1_420_070_400  # s, 2015-01-01 in Unix time, where MAVLink's timestamps begin
 _PER_SECOND = 100_000  # timestamps count 10 us
@@ -55,13 +56,15 @@ def read_key(path: Path) -> bytes:
     try:
         with path.open("rb") as file:
             mode = os.fstat(file.fileno()).st_mode
-            content = file.read(4096)
+            content = file.read(_LONGEST_KEY + 1)
     except OSError as error:
         raise TelemetryError(f"key file {str(path)!r}: {error.strerror or error}") from error
     if os.name == "posix" and mode & 0o077:
         raise TelemetryError(
             f"key file {str(path)!r}: mode is {mode & 0o777:o}, expected 600: whoever reads it can command the vehicle"
         )
+    if len(content) > _LONGEST_KEY:
+        raise TelemetryError(f"key file {str(path)!r}: more than {_LONGEST_KEY} bytes, expected a key or a passphrase")
     try:
         text = content.decode().strip()
     except UnicodeDecodeError:

@@ -133,6 +133,7 @@ class Vessel:
         self.home = (0.0, 0.0)
         self.plan: tuple[MissionItem, ...] = ()
         self.sticks: Vector6 = (0.0,) * 6
+        self._run = 0 if self._orders is None else self._orders.run
         self._wished: tuple[float, Mode] | None = None
         self._armed_before = self.view.armed
         self._mode_before: Mode = self.view.mode
@@ -143,6 +144,11 @@ class Vessel:
     def heeds(self) -> bool:
         """Whether it takes orders at all."""
         return self._orders is not None
+
+    @property
+    def outlived(self) -> bool:
+        """Whether the run is over that it knows: it gives orders again once it has seen the next one."""
+        return self._orders is not None and self._orders.run != self._run
 
     @property
     def armed(self) -> bool:
@@ -193,7 +199,7 @@ class Vessel:
         -------
         int
             MAV_RESULT: accepted, denied where there are no orders to be given or the numbers cannot be, or temporarily
-            rejected where the queue is full.
+            rejected where the queue is full or the run is over.
         """
         m = self.mavlink
         if self._orders is None:
@@ -201,8 +207,8 @@ class Vessel:
             return int(m.MAV_RESULT_DENIED)
         for order in orders:
             try:
-                if not self._orders.give(order):
-                    self.deny("too many orders at once", "full")
+                if not self._orders.give(order, self._run):
+                    self.deny("the run is over" if self.outlived else "too many orders at once", "full")
                     return int(m.MAV_RESULT_TEMPORARILY_REJECTED)
             except OrderError as error:
                 self.deny(str(error), "order")

@@ -47,7 +47,7 @@ class Station:
         parser, last = mavlink.MAVLink(None), 0.0
         while not self.done.is_set():
             with contextlib.suppress(TimeoutError):
-                data, vehicle = self.socket.recvfrom(1024)
+                data, vehicle = self.socket.recvfrom(2048)
                 self.heard += parser.parse_buffer(data)
                 if self.says and time.monotonic() - last > 0.1:
                     last = time.monotonic()
@@ -141,3 +141,15 @@ def test_a_link_that_cannot_be_opened_leaves_no_folder(tmp_path):
     with taken, pytest.raises(TelemetryError, match="in use"):
         run_scenario(load_scenario("paper", SHORT), tmp_path / "run", Mavlink((endpoint,), MavlinkOptions()))
     assert not (tmp_path / "run").exists()
+
+
+def test_a_run_that_cannot_begin_leaves_no_log(tmp_path):
+    (tmp_path / "run").mkdir()
+    (tmp_path / "run" / "notes").touch()
+    log = tmp_path / "run.tlog"
+    with pytest.raises(RunError, match="not empty"):
+        run_scenario(
+            load_scenario("paper", SHORT), tmp_path / "run",
+            Mavlink((parse_endpoint(str(log)),), MavlinkOptions()),
+        )  # fmt: skip
+    assert not log.exists()

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import logging
+import os
 import struct
 import time
 from collections import Counter
@@ -19,6 +21,8 @@ _WAITING = 1 << 20  # bytes that wait at the most, for a disk that is full
 
 class Tlog:
     """A new file of frames, each after its time: 8 bytes, big-endian, microseconds since 1970.
+
+    Where none came, as for a run that could not begin, no file is left.
 
     The time is the wall clock at the start plus simulated time, so however fast the run was, it replays as it would
     have been lived.
@@ -43,6 +47,7 @@ class Tlog:
         self._start = time.time_ns() // 1000
         self._stamp = self._start & ~3
         self._waiting = bytearray()
+        self._sent = False
         self._written = time.monotonic()
         try:
             self._file = open(path, "xb", buffering=0)  # noqa: SIM115 - open as long as the link is
@@ -65,6 +70,7 @@ class Tlog:
         stamp = self._start + int(elapsed) if abs(elapsed) < 1e18 else self._stamp  # also where it is no number
         self._stamp = max(stamp & ~3, self._stamp)  # the lowest bits name a link
         self._waiting += struct.pack(">Q", self._stamp) + frame
+        self._sent = True
         if len(self._waiting) > _FLUSHED:
             self._write()
         return True
@@ -81,6 +87,9 @@ class Tlog:
         if self._waiting:
             self.trouble["bytes not logged"] += len(self._waiting)
         self._file.close()
+        if not self._sent:
+            with contextlib.suppress(OSError):  # somebody took it away
+                os.unlink(self._path)
 
     def _write(self) -> None:
         """Write what the disk takes; the rest waits, so no frame is torn should there be room again."""

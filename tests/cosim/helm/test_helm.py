@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from cosim.actuators import cut
+from cosim.actuators import MOST, cut
 from cosim.came import as_it_came
 from cosim.helm import MODES, LoggedOrders, OrderQueue, RecordedOrders
 from cosim.helm.helm import greatest_wrench
@@ -208,6 +208,14 @@ def test_what_cannot_be_followed_is_logged_and_changes_nothing(fly, caplog, orde
     assert np.array_equal(run.rows, plain.rows)
 
 
+def test_no_shape_that_cannot_be_flown_by_is_taken(fly, caplog):
+    """What is too short to have a direction is refused when it is set, not found out in the step."""
+    end = Change("regions.mooring.shape.end.2", 1e-38)
+    run = fly({5: [end]}, "time.duration=0.2", name="depth-transit")
+    assert "expected a point other than start" in caplog.text
+    assert run.master.helm.settings.shapes["mooring"].end[2] > 1.0
+
+
 def test_a_lost_position_cannot_be_held(fly, caplog):
     lost = ["sensing.dead_from=0.1", "sensing.dead_for=1.0"]
     run = fly({20: [Steer("hold")]}, "time.duration=0.5", *lost)
@@ -280,12 +288,27 @@ def test_no_target_is_too_far_for_the_run_to_go_on(fly, name, away):
     run = fly({100: [Aim((away, 0.0, 5.0))]}, "time.duration=0.5", name=name)
     asked = np.abs(run.stack(*(f"command.{axis}" for axis in "XYZ"))).max()
     given = np.linalg.norm(run.stack(*(f"wrench.{axis}" for axis in "XYZ")), axis=1)
-    assert asked > 1e8 and given.max() <= 1e6 * 1.8
+    assert asked > 1e8 and given.max() <= MOST * 1.8
     assert run["allocation_saturated"][-1] == 1.0 and run["allocation_saturated"][0] == 0.0
 
 
 def test_a_wrench_that_is_no_number_is_none():
-    wrench = np.array([np.nan, 1.0, np.inf, 2e6, -1e6, 0.0])
+    wrench = np.array([np.nan, 1.0, np.inf, 2 * MOST, -MOST, 0.0])
     assert cut(wrench)
-    assert wrench.tolist() == [0.0, 0.0, 0.0, 1e6, -5e5, 0.0]
+    assert wrench.tolist() == [0.0, 0.0, 0.0, MOST, -MOST / 2, 0.0]
     assert not cut(wrench)
+
+
+@pytest.mark.parametrize(("gain", "value"), [("k_p2", 3e38), ("sigma_a", 3e38), ("gamma", 1e-45)])
+def test_no_gain_ends_a_run_by_the_moment_that_is_asked_for(fly, gain, value):
+    run = fly({10: [Change(f"law.gains.{gain}", value)]}, "time.duration=0.5", name="paper")
+    assert len(run["time"]) == 501
+    assert run["allocation_saturated"].max() == 1.0
+
+
+@pytest.mark.slow
+def test_a_run_that_is_reset_in_its_first_step_has_a_report(tmp_path):
+    (log := tmp_path / "orders.jsonl").write_bytes(b'{"step":0,"order":{"order":"reset"}}\n')
+    run = run_scenario(load_scenario("harbour", ["commands.enabled=true"]), tmp_path / "run", orders=log)
+    assert run.summary["status"] == "reset" and run.summary["simulated_time"] == 0.0
+    assert (run.folder / "report.html").exists()

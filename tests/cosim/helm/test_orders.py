@@ -70,6 +70,16 @@ def test_a_flood_is_refused_not_kept():
     assert all(queue.give(Arm(True)) for _ in range(QUEUED))
     assert not queue.give(Arm(False))
     assert len(queue.take(0)) == QUEUED
+
+
+def test_what_was_meant_for_a_run_that_is_over_is_followed_by_no_other():
+    queue = OrderQueue()
+    assert queue.give(Arm(True), run=0)
+    queue.end_run()
+    assert not queue.give(Arm(True), run=0)
+    assert queue.run == 1 and not queue.take(0)
+    assert queue.give(Arm(False), run=1) and queue.give(Arm(True))
+    assert queue.take(0) == [Arm(False), Arm(True)]
     assert queue.give(Arm(False))
 
 
@@ -106,6 +116,19 @@ def test_absurd_numbers_are_refused(order):
 def test_a_broken_log_names_the_line(tmp_path, line):
     file = tmp_path / "orders.jsonl"
     file.write_bytes(b'{"step":0,"order":{"order":"reset"}}\n' + line + b"\n")
+    with pytest.raises(RunError, match="line 2"):
+        RecordedOrders(file)
+
+
+@pytest.mark.parametrize("size", [1, 30, 62])
+def test_a_last_line_that_was_cut_off_does_not_count(tmp_path, size):
+    file, line = tmp_path / "orders.jsonl", b'{"step":1,"order":{"order":"aim","position":[1.25,0.0,0.0]}}\n'
+    file.write_bytes(line + line[:size])
+    assert RecordedOrders(file).take(1) == [Aim((1.25, 0.0, 0.0))] * (1 + (size >= len(line) - 1))
+    file.write_bytes(line + line[:30] + b"\n")
+    with pytest.raises(RunError, match="line 2"):
+        RecordedOrders(file)
+    file.write_bytes(line + b'{"step":1,"order":{"order":"aim","position":[1e9,0,0]}}')
     with pytest.raises(RunError, match="line 2"):
         RecordedOrders(file)
 

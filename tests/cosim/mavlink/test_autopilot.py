@@ -284,3 +284,23 @@ def test_a_run_that_begins_again_is_told():
         station.look(0.01 * k)
     assert station.wire.counts()["ATTITUDE"] == 10
     assert AT["time"] == 0
+
+
+@pytest.mark.parametrize("last", [5.0, 0.0])
+def test_nothing_is_heeded_between_one_run_and_the_next(last):
+    """What is accepted is followed by the run that the station sees, not by the one after it."""
+    station, accepted, rejected = Station(), 0, 1
+    station.look(last)
+    radius = mavlink.MAVLink_param_set_message(1, 1, b"SR1_RADIUS", 0.75, 9)
+    assert station.command(400, 1.0) == accepted
+    (before,) = station.send(mavlink.MAVLink_param_request_read_message(1, 1, b"SR1_RADIUS", -1))
+    station.orders.end_run()
+    assert station.command(400, 1.0) == rejected
+    assert "Refused: the run is over" in station.wire.texts
+    assert station.send(radius)[-1].param_value == before.param_value
+    assert station.ordered() == []
+    station.look(0.0)
+    assert "The run begins again" in station.wire.texts
+    assert station.command(400, 1.0) == accepted
+    assert station.send(radius)[-1].param_value == 0.75
+    assert len(station.ordered()) == 2

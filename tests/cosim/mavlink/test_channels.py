@@ -451,6 +451,12 @@ def test_a_log_is_never_overwritten(tmp_path):
     assert path.read_bytes() == b"precious"
 
 
+def test_a_log_that_nothing_was_sent_to_leaves_no_file(tmp_path):
+    path = tmp_path / "dive.tlog"
+    Tlog(str(path)).close()
+    assert not path.exists()
+
+
 class FullDisk:
     """Takes 1000 bytes in pieces, and then no more until it is emptied."""
 

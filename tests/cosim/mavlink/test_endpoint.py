@@ -47,6 +47,8 @@ def test_a_log_is_a_new_file(tmp_path):
         parse_endpoint(str(path))
     with pytest.raises(TelemetryError, match="there is no folder"):
         parse_endpoint(str(tmp_path / "none" / "dive.tlog"))
+    with pytest.raises(TelemetryError, match=r"endpoint 'x+\.tlog': .*too long"):
+        parse_endpoint("x" * 300 + ".tlog")
 
 
 def test_beyond_this_machine_only_with_leave():

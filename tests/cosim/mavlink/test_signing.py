@@ -195,6 +195,12 @@ def test_files_without_a_key_are_refused(tmp_path, content):
         read_key(key_file(tmp_path, content))
 
 
+def test_a_key_file_that_is_too_long_is_refused_rather_than_cut(tmp_path):
+    assert read_key(key_file(tmp_path, b"a" * 4096)) == hashlib.sha256(b"a" * 4096).digest()
+    with pytest.raises(TelemetryError, match="more than 4096 bytes"):
+        read_key(key_file(tmp_path, b"a" * 4097))
+
+
 def test_keys_that_others_can_read_are_refused(tmp_path):
     with pytest.raises(TelemetryError, match=r"key file '.*none': No such file"):
         read_key(tmp_path / "none")
