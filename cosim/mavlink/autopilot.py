@@ -73,14 +73,15 @@ class Autopilot:
         self._streams: dict[Outlet, Streams] = {}
         self._events = Events(vessel)
         parameters = Parameters(vessel)
+        targets = Targets(vessel, parameters)
         services: list[Service] = [
             Requests(vessel, self._streams),
             Modes(vessel),
-            Targets(vessel, parameters),
+            targets,
             Obstacles(vessel),
             Manual(vessel),
             parameters,
-            Missions(vessel),
+            Missions(vessel, targets),
             FileServer(vessel, parameters),
             Timing(vessel),
             Origin(vessel),

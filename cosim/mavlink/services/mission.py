@@ -10,13 +10,15 @@ from cosim.helm.orders import Begin, Item, Mission, Order, Steer
 from cosim.mavlink.encode import whole
 from cosim.mavlink.mission_item import MissionItem
 from cosim.mavlink.services.mission_items import ItemError, home_item, meant
-from cosim.mavlink.services.service import Call, Service
+from cosim.mavlink.services.service import Call, Service, place_of, unscaled
+from cosim.mavlink.services.targets import Targets
 from cosim.mavlink.vessel import Sender, Vessel
 
 _MOST = 500  # items
 _RETRY = 1.0  # s of the wall clock
 _RETRIES = 5
 _OF_REGIONS, _ALL = 0, 255  # MAV_MISSION_TYPE
+_GO_THERE, _CHANGE_DEPTH = 2, 3  # MISSION_ITEM.current, of an item that is no part of a mission
 _KNOWN_TYPES = (0, 1, 2)
 
 
@@ -35,11 +37,19 @@ class Missions(Service):
     """MISSION_*: one mission of regions; fences and rally points are always none.
 
     In ArduPilot's profile item 0 is home: it is given on download, and not followed when it comes.
+
+    Parameters
+    ----------
+    vessel : Vessel
+        Whom it serves.
+    targets : Targets
+        Where items go that are to be followed at once.
     """
 
-    def __init__(self, vessel: Vessel) -> None:
+    def __init__(self, vessel: Vessel, targets: Targets) -> None:
         super().__init__(vessel)
         m = vessel.mavlink
+        self._targets = targets
         self._upload: _Upload | None = None
         self._first = int(vessel.profile.home_is_first)
         self.messages = {
@@ -130,6 +140,9 @@ class Missions(Service):
 
     def _take_item(self, sender: Sender, message: Any) -> None:
         m, upload, kind = self.vessel.mavlink, self._upload, message.mission_type
+        if message.current in (_GO_THERE, _CHANGE_DEPTH) and kind == _OF_REGIONS:
+            self._ack(sender, self._go(sender, message), kind)
+            return
         if upload is None or upload.sender != sender or kind != _OF_REGIONS:
             self._ack(sender, m.MAV_MISSION_DENIED if not self.vessel.heeds else m.MAV_MISSION_ERROR, kind)
             return
@@ -143,6 +156,21 @@ class Missions(Service):
         upload.items.append(item)
         upload.retries = 0
         self._go_on(upload)
+
+    def _go(self, sender: Sender, message: Any) -> int:
+        """Follow an item at once, as QGroundControl has ArduPilot go to a place; return MAV_MISSION_RESULT."""
+        vessel, m = self.vessel, self.vessel.mavlink
+        if message.command != m.MAV_CMD_NAV_WAYPOINT:
+            return int(m.MAV_MISSION_UNSUPPORTED)
+        item = _as_it_came(message, m.MAV_FRAME_LOCAL_NED)
+        x, y = (0.0, 0.0) if item is None else unscaled(item.frame, item.x, item.y)
+        place = None if item is None else place_of(vessel, item.frame, x, y, item.z)
+        if place is None:
+            return int(m.MAV_MISSION_INVALID if item is None else m.MAV_MISSION_UNSUPPORTED_FRAME)
+        if message.current == _CHANGE_DEPTH:
+            place = *vessel.view.target[:2], place[2]
+        accepted = self._targets.go(sender, place) == m.MAV_RESULT_ACCEPTED
+        return int(m.MAV_MISSION_ACCEPTED if accepted else m.MAV_MISSION_DENIED)
 
     def _taken(self, sender: Sender, items: list[MissionItem]) -> int:
         """Order a mission, and return MAV_MISSION_RESULT."""
