@@ -42,6 +42,8 @@ class Profile:
         Where the vertical stick of MANUAL_CONTROL rests.
     home_is_first : bool
         Whether item 0 of a mission is home, as ArduPilot has it.
+    stands_for : tuple of int or None
+        Release of the autopilot whose ways these are; None where it stands for itself.
     """
 
     name: ProfileName
@@ -50,6 +52,7 @@ class Profile:
     packed: bool
     centred_stick: int
     home_is_first: bool
+    stands_for: tuple[int, int, int] | None = None
 
     def mode_of(self, number: int) -> Mode | None:
         """Return the mode with a ``custom_mode``, or None if there is none."""
@@ -96,7 +99,9 @@ _PX4: dict[Mode, int] = {
 }
 
 PROFILES: dict[ProfileName, Profile] = {
-    "ardusub": Profile("ardusub", 3, _ARDUSUB, packed=False, centred_stick=500, home_is_first=True),
-    "px4": Profile("px4", 12, _PX4, packed=True, centred_stick=500, home_is_first=False),
+    "ardusub": Profile(
+        "ardusub", 3, _ARDUSUB, packed=False, centred_stick=500, home_is_first=True, stands_for=(4, 5, 0)
+    ),
+    "px4": Profile("px4", 12, _PX4, packed=True, centred_stick=500, home_is_first=False, stands_for=(1, 15, 0)),
     "generic": Profile("generic", 0, _PX4, packed=True, centred_stick=0, home_is_first=False),
 }
