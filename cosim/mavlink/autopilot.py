@@ -81,7 +81,7 @@ class Autopilot:
             Obstacles(vessel),
             Manual(vessel),
             parameters,
-            Missions(vessel, targets),
+            Missions(vessel, targets, parameters),
             FileServer(vessel, parameters),
             Timing(vessel),
             Origin(vessel),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 import struct
 from collections.abc import Callable
@@ -115,6 +116,12 @@ class Parameters(Service):
             return result
         self._values[key] = value
         return result
+
+    def learn(self, key: str, value: float) -> None:
+        """Note another value of a setting, that a mission brought about."""
+        with contextlib.suppress(OrderError):  # as the helm does, which logs it
+            self.vessel.settings.change(key, value)
+            self._values[key] = value
 
     # ---- the list ----
 
