@@ -208,7 +208,8 @@ class Autopilot:
                 streams.send(HEARTBEAT)
 
     def close(self, now: float) -> None:
-        """Say goodbye: a last heartbeat, in standby."""
+        """Say goodbye: that it ends, and a last heartbeat, in standby."""
         vessel = self._vessel
         vessel.now = now
+        vessel.say(f"The {'run' if vessel.live else 'recording'} has ended", vessel.mavlink.MAV_SEVERITY_NOTICE)
         vessel.send(status.beat(vessel, vessel.mavlink.MAV_STATE_STANDBY))
