@@ -193,7 +193,7 @@ class Autopilot:
         self._ticked = now
         if self._moved:
             self._moved, self._moved_at = False, now
-        elif now - self._moved_at >= _STILL:
+        elif self._last_us is not None and now - self._moved_at >= _STILL:
             self._clock_us += round(since * _SECOND)
             if self._awaiting:
                 vessel.waited_us += round(since * _SECOND)

@@ -21,6 +21,7 @@ from cosim.mavlink.operator import Operator
 from cosim.mavlink.options import MavlinkOptions
 from cosim.mavlink.outlet import Outlet
 from cosim.mavlink.profile import PROFILES
+from cosim.mavlink.proximity import Proximity
 from cosim.mavlink.view import View
 from cosim.scenario import Scenario
 from cosim.scenario_tables import Vector3, Vector6
@@ -76,6 +77,8 @@ class Vessel:
         That are attached.
     settings : LiveSettings
         The numbers as they are once all orders are followed.
+    proximity : Proximity
+        What a scan of the water about it shows.
     frame : LocalFrame
         Where on the globe position 0 is.
     home : tuple of float
@@ -112,6 +115,7 @@ class Vessel:
         self.now = 0.0
         self.failsafe = False
         self.loss_timeout, self.loss_action = options.loss_timeout, options.loss_action
+        self.proximity = Proximity(scenario)
         self.frame = LocalFrame(*options.origin)
         self.unix_start_us = time.time_ns() // 1000  # when simulated time was 0
         vehicle = scenario.vehicle

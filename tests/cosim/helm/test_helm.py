@@ -150,6 +150,7 @@ def test_an_item_to_stay_at_is_not_left_but_on_order(fly):
     assert np.linalg.norm(run.position[1499] - items[0].position) < 0.3
 
 
+@pytest.mark.slow
 def test_another_heading_is_kept(fly):
     run = fly({100: [Face(1.2)]}, SHORT, *OPEN)
     assert run["attitude.yaw"][-1] == pytest.approx(1.2, abs=0.05)

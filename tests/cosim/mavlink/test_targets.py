@@ -160,8 +160,10 @@ def test_a_place_to_go_to_that_cannot_be_is_refused(station):
     assert station.send(guided(2, frame=10))[-1].type == mavlink.MAV_MISSION_UNSUPPORTED_FRAME
     assert station.send(guided(2, command=17))[-1].type == mavlink.MAV_MISSION_UNSUPPORTED
     assert station.send(guided(2, place=(0.0, 0.0, 0.0)))[-1].type == mavlink.MAV_MISSION_DENIED
-    assert station.send(guided(2, place=(55.9, -3.3, NAN)))[-1].type == mavlink.MAV_MISSION_INVALID
+    assert station.send(guided(2, place=(math.inf, -3.3, -4.0)))[-1].type == mavlink.MAV_MISSION_INVALID
     assert station.ordered() == []
+    assert station.send(guided(2, place=(55.9097, -3.3203, NAN)))[-1].type == mavlink.MAV_MISSION_ACCEPTED
+    assert station.ordered()[0].position[2] == 5.0  # as deep as it is
 
 
 def test_turning(station):
