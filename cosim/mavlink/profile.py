@@ -74,6 +74,10 @@ class Profile:
             return self.mode_of(first) if second == 0 else None
         return self.mode_of(_px4(first, second))
 
+    def is_return(self, number: int) -> bool:
+        """Return whether a ``custom_mode`` is PX4's return: no mode here, but an order to surface at home."""
+        return self.packed and number == _RETURN
+
     @staticmethod
     def base_mode(mode: Mode, armed: bool) -> int:
         """Return MAV_MODE_FLAG bits: custom mode always, then who steers, and whether the thrusters may work."""
@@ -89,6 +93,7 @@ def _px4(main: int, sub: int = 0) -> int:
     return main << 16 | sub << 24
 
 
+_RETURN = _px4(4, 5)
 _ARDUSUB: dict[Mode, int] = {"manual": 19, "hold": 16, "reach": 4, "mission": 3, "surface": 9}
 _PX4: dict[Mode, int] = {
     "manual": _px4(1),
