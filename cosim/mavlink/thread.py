@@ -71,6 +71,8 @@ class LinkThread:
         Closed with the thread.
     step : float
         Step of the run [s].
+    ahead : float
+        By how much simulated time may get ahead of the wall clock [s]; logs begin earlier by that.
 
     Attributes
     ----------
@@ -80,9 +82,11 @@ class LinkThread:
         Errors in the vehicle's side, which cost no more than what raised them.
     """
 
-    def __init__(self, vehicle: Vehicle, links: Sequence[Link], step: float) -> None:
+    def __init__(self, vehicle: Vehicle, links: Sequence[Link], step: float, ahead: float = 0.0) -> None:
         self._vehicle, self._links = vehicle, list(links)
         self._logs = [link.channel for link in links if isinstance(link.channel, Tlog)]
+        for tlog in self._logs:
+            tlog.begin_earlier(ahead)
         for link in links:
             link.logs = [other for other in links if other is not link and isinstance(other.channel, Tlog)]
         self._every = max(1, round(SNAPSHOT_PERIOD / step))

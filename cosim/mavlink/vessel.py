@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from cosim.errors import OrderError
-from cosim.helm.orders import Aim, Arm, Mode, Order, Steer
+from cosim.helm.orders import Aim, Arm, Item, Mode, Order, Steer
 from cosim.helm.settings import LiveSettings
 from cosim.helm.sources import OrderQueue
 from cosim.mavlink.dialect import dialect
@@ -91,6 +91,8 @@ class Vessel:
         For how long it may be silent [s], and what is done then.
     plan : tuple of MissionItem
         The mission, without home.
+    course : tuple of Item
+        What its items ask for.
     sticks : tuple of float
         As ordered last, X Y Z K M N, from -1 to 1.
     """
@@ -132,6 +134,7 @@ class Vessel:
         self.settings = LiveSettings(self.scenario)
         self.home = (0.0, 0.0)
         self.plan: tuple[MissionItem, ...] = ()
+        self.course: tuple[Item, ...] = ()
         self.sticks: Vector6 = (0.0,) * 6
         self._run = 0 if self._orders is None else self._orders.run
         self._wished: tuple[float, Mode] | None = None

@@ -223,6 +223,7 @@ def test_its_last_word_is_a_heartbeat_in_standby():
     station.look()
     station.autopilot.close(station.now)
     assert station.wire.got[-1].system_status == mavlink.MAV_STATE_STANDBY
+    assert station.wire.texts[-1] == "The run has ended"
 
 
 def test_what_is_meant_for_others_is_not_heard():
