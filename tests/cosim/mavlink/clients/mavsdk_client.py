@@ -8,6 +8,7 @@ import contextlib
 import json
 import math
 import os
+import socket
 import sys
 import time
 
@@ -41,7 +42,10 @@ class Vehicle:
 
     async def connect(self, address):
         if Mavsdk is None:
-            self.system = System()
+            with socket.socket() as free:  # of several servers at once each needs a port of its own
+                free.bind(("127.0.0.1", 0))
+                port = free.getsockname()[1]
+            self.system = System(port=port)
             await self.system.connect(system_address=address)
             await first(self.system.core.connection_state(), lambda state: state.is_connected)
             for name in ("telemetry", "param", "action", "mission_raw", "offboard", "info"):
