@@ -1,4 +1,4 @@
-"""What MAVLink costs: a message, a step beside ordinary traffic, and a step under a flood of hostile datagrams."""
+"""What MAVLink costs: a message, a step beside traffic and under a flood, a connection, a frame of an autopilot."""
 
 from __future__ import annotations
 
@@ -15,56 +15,75 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks import sitl
 from benchmarks.hostile import hostile_datagrams
 from benchmarks.timing import Row, summary, time_calls
 from cosim.master import Master
 from cosim.mavlink.channels.udp import UdpIn, UdpOut
+from cosim.mavlink.conformance.client import Client
+from cosim.mavlink.conformance.connect import qgc_connect
+from cosim.mavlink.conformance.vehicle import own_vehicle
 from cosim.mavlink.dialect import dialect
 from cosim.mavlink.framing import Counts, Gate
 from cosim.mavlink.link import Link, Signer
+from cosim.mavlink.messages import MESSAGES
+from cosim.mavlink.options import PROFILES, MavlinkOptions
 from cosim.mavlink.outlet import Outlet
 from cosim.mavlink.signing import SigningClock
 from cosim.mavlink.thread import LinkThread
+from cosim.mavlink.vessel import Vessel
 from cosim.scenario import load_scenario
 from cosim.signals import Array
 
 STEPS = 20_000
 RATIO = "x first"  # of the median to that of the row that it is compared with
 DATAGRAMS_PER_STEP = 10  # of STEPS, in a flood
-_MESSAGES = 850.0  # /s of the wall clock: seventeen streams at 50 Hz
+_SENT = (0, 1, 2, 24, 29, 30, 31, 32, 33, 36, 42, 62, 65, 74, 85, 137, 245)  # ids of messages, one of each a round
+_ROUNDS = 50  # /s of the wall clock
+_MESSAGES = _ROUNDS * len(_SENT)
 _SOURCE = (1, 1)
-_STRETCHES = 4  # of a repeat
 _PACE = 1000.0  # steps/s, of the paced runs: those of the scenario, in real time
 
 
 class Seventeen:
-    """A vehicle that sends 850 messages a second of the wall clock, whatever the run does."""
+    """A vehicle that sends seventeen of its messages at 50 Hz of the wall clock, however fast the run goes.
 
-    def __init__(self) -> None:
-        mavlink = dialect()
-        self._links: list[Outlet] = []
-        self._sent = 0
-        self.busy = 0.0
+    Parameters
+    ----------
+    master : Master
+        Of the run that it shows.
+    """
+
+    def __init__(self, master: Master) -> None:
+        self._vessel = Vessel(master.scenario, master.signals.columns, MavlinkOptions(), None)
+        self._row: Array | None = None
+        self._rounds = 0
         self._began = time.monotonic()
-        self._message: Callable[[int], Any] = lambda ms: mavlink.MAVLink_attitude_message(ms, 0.1, 0.2, 0.3, 0, 0, 0)
+        self.busy = 0.0
 
     def attach(self, link: Outlet) -> None:
         """Begin to send on a link."""
-        self._links.append(link)
+        self._vessel.links.append(link)
 
     def observe(self, row: Array) -> None:
-        """Have nothing to say about a row."""
+        """Keep the row, to be shown."""
+        self._row = row
 
     def receive(self, link: Outlet, message: Any, now: float) -> None:
         """Answer, as to a request for a parameter."""
-        link.send(self._message(0))
+        self._send(_SENT[0])
 
     def tick(self, now: float) -> None:
         """Send what is due."""
-        while self._sent < (now - self._began) * _MESSAGES:
-            self._sent += 1
-            for link in self._links:
-                link.send(self._message(self._sent))
+        while self._row is not None and self._rounds < (now - self._began) * _ROUNDS:
+            self._rounds += 1
+            self._vessel.look(self._row)
+            for number in _SENT:
+                self._send(number)
+
+    def _send(self, number: int) -> None:
+        for message in MESSAGES[number].build(self._vessel):
+            self._vessel.send(message)
 
     def close(self, now: float) -> None:
         """Note how much of a processor the thread took."""
@@ -87,7 +106,13 @@ def measure(steps: int, repeats: int, datagrams: int | None = None) -> list[Row]
         For the table.
     """
     count = datagrams or DATAGRAMS_PER_STEP * steps
-    return [*_messages(steps, repeats), *_beside_traffic(steps, repeats), *_under_flood(count, steps, repeats)]
+    return [
+        *_messages(steps, repeats),
+        *_beside_traffic(steps, repeats),
+        *_connecting(repeats),
+        *_in_lockstep(steps, repeats),
+        *_under_flood(count, steps, repeats),
+    ]
 
 
 # ---- a message ----
@@ -124,18 +149,17 @@ def _messages(calls: int, repeats: int) -> list[Row]:
 def _beside_traffic(steps: int, repeats: int) -> list[Row]:
     """Time stretches of one run at full speed, in turn without and with a link, so that both see the same noise."""
     alone, beside, busy = [], [], []
-    stretch = max(1, steps // _STRETCHES)
     with _endless() as master, _sink() as port:
         k = 0
-        for i in range(2 + 2 * _STRETCHES * repeats):
-            vehicle = Seventeen()
+        for i in range(2 + 2 * repeats):
+            vehicle = Seventeen(master)
             links = LinkThread(vehicle, [_link(port)], master.scenario.time.step) if i % 2 else None
-            taken = _stretch(master, range(k, k + stretch), links)
-            k += stretch
+            taken = _stretch(master, range(k, k + steps), links)
+            k += steps
             if i > 1:  # the first of each compiles, and fills the caches
                 (beside if i % 2 else alone).append(taken)
                 busy += [vehicle.busy] if i % 2 else []
-    first, second = "step: no link", f"step: {_MESSAGES:.0f} messages/s"
+    first, second = "step: no link", f"step: {_MESSAGES} messages/s"
     lost = statistics.median(b / a - 1.0 for a, b in zip(alone, beside, strict=True))
     return [
         Row(first, summary(alone), first),
@@ -162,6 +186,29 @@ def _stretch(master: Master, steps: range, links: LinkThread | None) -> float:
 
 def _endless() -> Master:
     return Master(load_scenario("paper", ["arbiter.engine=closed", "time.duration=100000"]))
+
+
+# ---- a connection, and a frame of an autopilot ----
+
+
+def _connecting(repeats: int) -> list[Row]:
+    """Connect as QGroundControl does, to a run of each profile that steps in real time."""
+    rows = []
+    for profile in PROFILES:
+        found = []
+        for _ in range(repeats):
+            with own_vehicle(profile) as link:
+                found.append(qgc_connect(Client(link)))
+        seconds = statistics.median(one.seconds for one in found)
+        told = f"{seconds:.3f} s, {max(one.retries for one in found)} retries at the most; median of {repeats}"
+        rows.append(Row(f"QGroundControl connects, {profile}", told, ""))
+    return rows
+
+
+def _in_lockstep(steps: int, repeats: int) -> list[Row]:
+    timing = sitl.lockstep(steps, repeats)
+    name = f"frame of an autopilot: {1e6 / timing.median:.0f}/s"
+    return [Row(name, timing, name)]
 
 
 # ---- a step under a flood ----
@@ -211,7 +258,7 @@ def _flooded(datagrams: int, steps: int, pace: float | None, seed: int, *, at_us
         _sink() as sink,
         _attacker(channel.port if at_us else sink, datagrams, seed) as goes_on,
     ):
-        links = LinkThread(Seventeen(), [link], master.scenario.time.step)
+        links = LinkThread(Seventeen(master), [link], master.scenario.time.step)
         links.start()
         due = time.perf_counter()
         for k in range(master.scenario.steps):

@@ -57,13 +57,26 @@ def measure(steps: int, repeats: int) -> list[Row]:
         add_calls("answer written", lambda: wire.encode(motion))
         flights.end("ended: measured")
     for what, record_rate in (("record at 100 Hz", 100.0), ("every step recorded", float(RATE))):
-        timing = _whole(steps, repeats, record_rate)
+        timing = lockstep(steps, repeats, record_rate)
         add(f"whole frame, {what}: {1e6 / timing.median:.0f} frames/s", timing)
     return rows
 
 
-def _whole(steps: int, repeats: int, record_rate: float) -> Timing:
-    """Time whole flights: the server here, the stand-in in another process, which takes the time."""
+def lockstep(steps: int, repeats: int, record_rate: float = 100.0) -> Timing:
+    """Time whole flights: the server here, the stand-in in another process, which takes the time.
+
+    Parameters
+    ----------
+    steps, repeats : int
+        Frames a flight, and flights.
+    record_rate : float
+        Rows of the record a simulated second.
+
+    Returns
+    -------
+    Timing
+        Of a frame.
+    """
     found = []
     overrides = (f"time.step={1.0 / RATE!r}", f"time.duration={(WARMING + steps) / RATE!r}")
     for _ in range(repeats):

@@ -212,6 +212,7 @@ class Master:
             self._heed(self.helm, orders.take(k))
         self._evaluate_regions()
         if self.helm is not None and self.helm.watch(float(self.signals.row[0]), float(self._seen[0])):
+            self._heed(self.helm, ())  # what the next item of the mission changes
             self._evaluate_regions()
         if k % scenario.arbiter_every == 0:
             self._arbitrate()

@@ -108,7 +108,7 @@ def run_scenario(
         for attempt in itertools.count(1):
             with Master(scenario) as master:
                 if mavlink is not None and link is None:
-                    link = mavlink.open(scenario, master.signals.columns, None if recorded else queue)
+                    link = mavlink.open(scenario, master.signals.columns, None if recorded else queue, rate)
                 folder = claim(out.with_name(f"{out.name}-{attempt}") if out and attempt > 1 else out, scenario)
                 if link is not None and attempt == 1:
                     link.start()

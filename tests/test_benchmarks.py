@@ -8,8 +8,12 @@ from plant_fmu import cached_fmu, load_vehicle
 from plant_fmu.importers import IMPORTERS, Task, read_fmu, run_importer
 from tests.plant_fmu.conftest import STATES
 
+_LONG = ("law", "mavlink", "sitl")
 
-@pytest.mark.parametrize("name", BENCHMARKS)
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=pytest.mark.slow) if name in _LONG else name for name in BENCHMARKS]
+)
 def test_each_benchmark_prints_a_table(name, capsys):
     main([name, "--steps", "60", "--repeats", "2"])
     _, heading, *rows = capsys.readouterr().out.splitlines()

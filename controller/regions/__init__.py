@@ -9,6 +9,7 @@ from controller.regions.half_space import HalfSpace
 from controller.regions.orientation import Orientation
 from controller.regions.pipe import Pipe
 from controller.regions.prism import Prism
+from controller.regions.rays import ray_distances
 from controller.regions.region_set import (
     SHAPES,
     PackedRegions,
@@ -52,4 +53,5 @@ __all__ = [
     "of_attitude",
     "pack",
     "place_clearance",
+    "ray_distances",
 ]

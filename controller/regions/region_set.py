@@ -152,7 +152,8 @@ def pack(regions: Sequence[Region]) -> PackedRegions:
 
 
 @compiled
-def _evaluate_shape(kind: int, p: Array, q: Array) -> Evaluation:
+def evaluate_shape(kind: int, p: Array, q: Array) -> Evaluation:
+    """Evaluate a packed shape of position alone, told by its kind, at the position `p` [m, NED]."""
     if kind == 0:
         return sphere(p, q)
     if kind == 1:
@@ -198,7 +199,7 @@ def evaluate_packed(
         kind = regions.kinds[i]
         tx, ty, tz = 0.0, 0.0, 0.0
         if kind < _FIRST_OF_ATTITUDE:
-            g, gx, gy, gz, distance = _evaluate_shape(kind, at, numbers)
+            g, gx, gy, gz, distance = evaluate_shape(kind, at, numbers)
         else:
             g, gx, gy, gz, tx, ty, tz = _evaluate_shape_of_attitude(kind, at, quaternion, numbers)
             distance = g
@@ -219,7 +220,7 @@ def clearance_of_place(regions: PackedRegions, i: int, position: Array, room: Ar
     for axis in range(3):
         room[axis] = position[axis] - regions.shifts[i, axis]
     numbers = regions.numbers[regions.offsets[i] : regions.offsets[i + 1]]
-    clearance: float = -regions.signs[i] * _evaluate_shape(regions.kinds[i], room, numbers)[4]
+    clearance: float = -regions.signs[i] * evaluate_shape(regions.kinds[i], room, numbers)[4]
     return clearance
 
 
@@ -258,7 +259,7 @@ def attitude_clearance(regions: PackedRegions, i: int, position: Array, quaterni
 def place_clearance(regions: PackedRegions, i: int, position: Array, slope: Array) -> float:
     """Return the clearance [m] of region `i`, of position alone, and write its slope, shape (3,), of length 1 or 0."""
     numbers = regions.numbers[regions.offsets[i] : regions.offsets[i + 1]]
-    _, x, y, z, distance = _evaluate_shape(regions.kinds[i], position - regions.shifts[i], numbers)
+    _, x, y, z, distance = evaluate_shape(regions.kinds[i], position - regions.shifts[i], numbers)
     size, sign = math.sqrt(x * x + y * y + z * z), regions.signs[i]
     scale = -sign / size if size > 0.0 else 0.0
     slope[0], slope[1], slope[2] = scale * x, scale * y, scale * z

@@ -10,6 +10,7 @@ import numpy as np
 
 from controller import VehicleState
 from cosim.errors import OrderError
+from cosim.helm.course import Course
 from cosim.helm.orders import (
     MODES,
     Aim,
@@ -82,9 +83,7 @@ class Helm:
         self.changed: list[str] = []
         self._surroundings, self._state, self._reach, self._out = surroundings, state, reach, out
         self._sticks: Array = np.zeros(6)
-        self._items: tuple[Item, ...] = ()
-        self._item = -1
-        self._inside_since = math.inf  # s, within the region of the present item
+        self._course = Course()
         self._slots: dict[int, int] = {}  # obstacles that came, by their number
         self._free = list(range(scenario.commands.obstacles))
 
@@ -123,7 +122,7 @@ class Helm:
                 self.armed = order.armed
                 self._sticks[:] = 0.0
             case Steer():
-                self._steer(order.mode)
+                self._steer(order.mode, time)
             case Aim():
                 self._surroundings.aim(order.position, order.radius, order.velocity, time)
                 self._surroundings.keep_target()
@@ -143,15 +142,13 @@ class Helm:
                 self.settings.change(order.key, order.value)
                 self.changed.append(order.key)
             case Mission():
-                self._items, self._item = order.items, -1
+                self._course.take(order.items)
                 if self.mode == "mission":
-                    self._steer("hold")
+                    self._steer("hold", time)
             case Begin():
-                if not 0 <= order.item < len(self._items):
-                    raise OrderError(f"item is {order.item}, expected 0 to {len(self._items) - 1}")
-                self._item = order.item
+                self._course.begin(order.item)
                 if self.mode == "mission":
-                    self._aim_at_item()
+                    self._resume(time)
             case Reset():
                 self.reset = True
             case _:
@@ -162,12 +159,12 @@ class Helm:
         self.took_over = self.turned = False
         self.changed.clear()
 
-    def _steer(self, mode: Mode) -> None:
+    def _steer(self, mode: Mode, time: float) -> None:
         here: Vector3 = (float(self._state.position[0]), float(self._state.position[1]), float(self._state.position[2]))
         radius = self.settings["commands.hold_radius"]
         if mode in ("hold", "surface") and not all(map(math.isfinite, here)):
             raise OrderError(f"mode {mode} needs a position, and none is known")
-        if mode == "mission" and not self._items:
+        if mode == "mission" and not self._course.items:
             raise OrderError("mode mission: there is no mission")
         self.mode = mode
         self._sticks[:] = 0.0
@@ -180,13 +177,24 @@ class Helm:
             case "reach":
                 self._surroundings.aim_as_before()
             case "mission":
-                self._item = max(self._item, 0)
-                self._aim_at_item()
+                self._course.enter(max(self._course.at, 0))
+                self._resume(time)
 
-    def _aim_at_item(self) -> None:
-        item = self._items[self._item]
-        self._surroundings.aim(item.position, item.radius)
-        self._inside_since = math.inf
+    def _resume(self, time: float) -> None:
+        """Go on with the present item of the mission, from wherever the vehicle is."""
+        region, item = self._course.region(), self._course.items[self._course.at]
+        if region is not None and region is not item:
+            self._aim_at(region)
+        self._begin(item, time)
+
+    def _begin(self, item: Item, time: float) -> None:
+        self._aim_at(item)
+        for order in item.orders:
+            self.follow(order, time)
+
+    def _aim_at(self, item: Item) -> None:
+        if item.position is not None:
+            self._surroundings.aim(item.position, item.radius)
 
     def _place(self, order: Obstacle, time: float) -> None:
         if order.number not in self._slots:
@@ -208,20 +216,16 @@ class Helm:
         Returns
         -------
         bool
-            Whether the target is another one now.
+            Whether another item is under way now; what it changed is for `heeded` to note.
         """
-        went_on = False
-        if self.armed and self.mode == "mission" and 0 <= self._item < len(self._items):
-            self._inside_since = min(self._inside_since, time) if clearance >= 0.0 else math.inf
-            stay = self._items[self._item].stay
-            last = self._item == len(self._items) - 1
-            if not last and stay is not None and time - self._inside_since >= stay:
-                self._item += 1
-                self._aim_at_item()
-                went_on = True
-        self._out[0], self._out[1], self._out[2] = self.armed, MODES.index(self.mode), self._item
+        following = None
+        if self.armed and self.mode == "mission":
+            following = self._course.following(time, clearance)
+        if following is not None:
+            self._begin(self._course.enter(following), time)
+        self._out[0], self._out[1], self._out[2] = self.armed, MODES.index(self.mode), self._course.at
         self._out[3:6], self._out[6] = self._surroundings.target, self._surroundings.target_radius
-        return went_on
+        return following is not None
 
 
 def greatest_wrench(matrix: Array, lower: Array, upper: Array) -> Array:

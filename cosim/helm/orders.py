@@ -85,11 +85,17 @@ class Change(_Order, frozen=True):
 
 
 class Item(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """One item of a mission: a region to be reached, and for how long to stay within it."""
+    """One item of a mission: a region to be reached, and for how long to stay within it.
 
-    position: Vector3  # m, NED
+    Without a place there is no region, and what the item orders is done at once; the region before is kept to.
+    """
+
+    position: Vector3 | None  # m, NED
     radius: float | None = None  # m, of a sphere; None: the scenario's goal region, moved there
     stay: float | None = 0.0  # s, within the region before the next item; None: for good
+    orders: tuple[Face | Change, ...] = ()  # followed as the item begins
+    jump: int | None = None  # item that is next instead, from 0
+    times: int | None = None  # as often, each time the mission is begun; None: always
 
 
 class Mission(_Order, frozen=True):
@@ -130,14 +136,23 @@ def check_order(order: Order) -> None:
             _require(all(abs(v) <= _FAST for v in order.velocity), "velocity", order.velocity, f"up to {_FAST:g} m/s")
         case Mission():
             for item in order.items:
-                _check_place(item.position, item.radius)
-                _require(item.stay is None or 0.0 <= item.stay <= _LONG, "stay", item.stay, f"0 to {_LONG:g} s")
+                _check_item(item, len(order.items))
         case Sticks():
             _require(all(abs(x) <= 1.0 for x in order.wrench), "wrench", order.wrench, "six numbers from -1 to 1")
         case Face():
             _require(math.isfinite(order.heading), "heading", order.heading, "a finite angle")
         case Change():
             _require(math.isfinite(order.value), order.key, order.value, "a finite number")
+
+
+def _check_item(item: Item, count: int) -> None:
+    if item.position is not None:
+        _check_place(item.position, item.radius)
+    _require(item.stay is None or 0.0 <= item.stay <= _LONG, "stay", item.stay, f"0 to {_LONG:g} s")
+    _require(item.jump is None or 0 <= item.jump < count, "jump", item.jump, f"0 to {count - 1}")
+    _require(item.times is None or item.times >= 0, "times", item.times, "0 or more")
+    for order in item.orders:
+        check_order(order)
 
 
 def _check_place(position: Vector3, radius: float | None) -> None:

@@ -73,14 +73,15 @@ class Autopilot:
         self._streams: dict[Outlet, Streams] = {}
         self._events = Events(vessel)
         parameters = Parameters(vessel)
+        targets = Targets(vessel, parameters)
         services: list[Service] = [
             Requests(vessel, self._streams),
             Modes(vessel),
-            Targets(vessel, parameters),
+            targets,
             Obstacles(vessel),
             Manual(vessel),
             parameters,
-            Missions(vessel),
+            Missions(vessel, targets, parameters),
             FileServer(vessel, parameters),
             Timing(vessel),
             Origin(vessel),
@@ -192,7 +193,7 @@ class Autopilot:
         self._ticked = now
         if self._moved:
             self._moved, self._moved_at = False, now
-        elif now - self._moved_at >= _STILL:
+        elif self._last_us is not None and now - self._moved_at >= _STILL:
             self._clock_us += round(since * _SECOND)
             if self._awaiting:
                 vessel.waited_us += round(since * _SECOND)
@@ -207,7 +208,8 @@ class Autopilot:
                 streams.send(HEARTBEAT)
 
     def close(self, now: float) -> None:
-        """Say goodbye: a last heartbeat, in standby."""
+        """Say goodbye: that it ends, and a last heartbeat, in standby."""
         vessel = self._vessel
         vessel.now = now
+        vessel.say(f"The {'run' if vessel.live else 'recording'} has ended", vessel.mavlink.MAV_SEVERITY_NOTICE)
         vessel.send(status.beat(vessel, vessel.mavlink.MAV_STATE_STANDBY))

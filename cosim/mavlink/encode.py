@@ -19,6 +19,7 @@ _UNKNOWN: dict[tuple[str, str], int] = {
     ("SYS_STATUS", "battery_remaining"): -1,
     ("BATTERY_STATUS", "temperature"): 0x7FFF,
     ("DISTANCE_SENSOR", "current_distance"): 0xFFFF,
+    ("OBSTACLE_DISTANCE", "distances"): 0xFFFF,
 }
 
 Encode = Callable[[Any], Any]

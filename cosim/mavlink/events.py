@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from controller.regions import of_attitude
+from cosim.helm.course import way
 from cosim.mavlink.messages import status
 from cosim.mavlink.profile import MODE_NAMES
 from cosim.mavlink.vessel import Vessel
@@ -56,11 +57,19 @@ class Events:
         if (view.armed, view.mode) != (before.armed, before.mode):
             for message in (*status.heartbeat(vessel), *status.current_mode(vessel)):
                 vessel.send(message)
-        if view.mode == "mission" and before.mode == "mission" and view.item == before.item + 1 and before.item >= 0:
-            self._reached_item(before.item)
+        if view.mode == before.mode == "mission" and view.item != before.item:
+            self._watch_course(before.item, view.item)
+
+    def _watch_course(self, before: int, now: int) -> None:
+        """Tell of the items that were gone through; those without a place were not reached but done."""
+        passed = way(self._vessel.course, before, now) if before >= 0 else None
+        for item in [before, *passed[:-1]] if passed else []:
+            self._reached_item(item)
 
     def _reached_item(self, item: int) -> None:
         vessel = self._vessel
+        if not 0 <= item < len(vessel.course) or vessel.course[item].position is None:
+            return
         number = item + int(vessel.profile.home_is_first)
         vessel.send(vessel.make("MISSION_ITEM_REACHED", number))
         vessel.say(f"Reached mission item {number}")

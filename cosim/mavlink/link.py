@@ -26,6 +26,11 @@ COMPONENT_ID = 1  # MAV_COMP_ID_AUTOPILOT1, the only one that ground stations ta
 BUDGET = 200_000.0  # bytes/s, of the wall clock, into a network
 _BURST = 0.5  # s of the budget, that can go at once
 _RESERVED = 0.25  # of it, which streams and lists leave to answers
+_ANSWERS = frozenset(  # that go to the link on which they were asked for alone
+    ("AUTOPILOT_VERSION", "AVAILABLE_MODES", "COMMAND_ACK", "FILE_TRANSFER_PROTOCOL", "MESSAGE_INTERVAL",
+     "MISSION_ACK", "MISSION_COUNT", "MISSION_ITEM_INT", "MISSION_REQUEST_INT", "PARAM_ERROR", "PARAM_VALUE", "PING",
+     "TIMESYNC")
+)  # fmt: skip
 _FIRST = frozenset(
     {
         "HEARTBEAT", "STATUSTEXT", "COMMAND_ACK", "PARAM_VALUE", "PARAM_ERROR", "FILE_TRANSFER_PROTOCOL", "TIMESYNC",
@@ -115,6 +120,8 @@ class Link:
 
     Attributes
     ----------
+    logs : list of Link
+        Logs that answers to what came on this link go into too; streams each link has of its own.
     sent, dropped, unencodable : int
         Messages that went to the channel, that the budget had no room for, and that have a value no field can hold.
     """
@@ -131,6 +138,7 @@ class Link:
         self.name: str = name
         self.channel: Final = channel
         self.counts: Final = gate.counts
+        self.logs: list[Link] = []
         self.sent = self.dropped = self.unencodable = 0
         self._gate, self._signer = gate, signer
         self._budget = None if budget is None else Budget(budget)
@@ -163,7 +171,11 @@ class Link:
             return False
         self._codec.seq = (self._codec.seq + 1) % 256
         self.sent += 1
-        return self.channel.send(frame)
+        sent = self.channel.send(frame)
+        if message.get_type() in _ANSWERS:
+            for tlog in self.logs:
+                tlog.send(message)
+        return sent
 
     def receive(self, until: float) -> Iterator[tuple[bytes, Any]]:
         """Yield frames that are heeded, and what they say, until nothing is left or a moment of `time.perf_counter`.

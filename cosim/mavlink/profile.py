@@ -42,6 +42,8 @@ class Profile:
         Where the vertical stick of MANUAL_CONTROL rests.
     home_is_first : bool
         Whether item 0 of a mission is home, as ArduPilot has it.
+    stands_for : tuple of int or None
+        Release of the autopilot whose ways these are; None where it stands for itself.
     """
 
     name: ProfileName
@@ -50,6 +52,7 @@ class Profile:
     packed: bool
     centred_stick: int
     home_is_first: bool
+    stands_for: tuple[int, int, int] | None = None
 
     def mode_of(self, number: int) -> Mode | None:
         """Return the mode with a ``custom_mode``, or None if there is none."""
@@ -71,6 +74,10 @@ class Profile:
             return self.mode_of(first) if second == 0 else None
         return self.mode_of(_px4(first, second))
 
+    def is_return(self, number: int) -> bool:
+        """Return whether a ``custom_mode`` is PX4's return: no mode here, but an order to surface at home."""
+        return self.packed and number == _RETURN
+
     @staticmethod
     def base_mode(mode: Mode, armed: bool) -> int:
         """Return MAV_MODE_FLAG bits: custom mode always, then who steers, and whether the thrusters may work."""
@@ -86,6 +93,7 @@ def _px4(main: int, sub: int = 0) -> int:
     return main << 16 | sub << 24
 
 
+_RETURN = _px4(4, 5)
 _ARDUSUB: dict[Mode, int] = {"manual": 19, "hold": 16, "reach": 4, "mission": 3, "surface": 9}
 _PX4: dict[Mode, int] = {
     "manual": _px4(1),
@@ -96,7 +104,9 @@ _PX4: dict[Mode, int] = {
 }
 
 PROFILES: dict[ProfileName, Profile] = {
-    "ardusub": Profile("ardusub", 3, _ARDUSUB, packed=False, centred_stick=500, home_is_first=True),
-    "px4": Profile("px4", 12, _PX4, packed=True, centred_stick=500, home_is_first=False),
+    "ardusub": Profile(
+        "ardusub", 3, _ARDUSUB, packed=False, centred_stick=500, home_is_first=True, stands_for=(4, 5, 0)
+    ),
+    "px4": Profile("px4", 12, _PX4, packed=True, centred_stick=500, home_is_first=False, stands_for=(1, 15, 0)),
     "generic": Profile("generic", 0, _PX4, packed=True, centred_stick=0, home_is_first=False),
 }

@@ -12,6 +12,7 @@ from cosim.mavlink.autopilot import Autopilot
 from cosim.mavlink.endpoint import Endpoint
 from cosim.mavlink.link import open_links
 from cosim.mavlink.options import MavlinkOptions
+from cosim.mavlink.setup import ahead
 from cosim.mavlink.thread import SNAPSHOT_PERIOD, SNAPSHOTS, LinkThread
 from cosim.record import Record, load_record
 from cosim.run_folder import SCENARIO
@@ -68,7 +69,7 @@ def replay(folder: Path, endpoints: Sequence[Endpoint], options: MavlinkOptions,
     if lacking or record.columns[0].name != "time":
         raise RunError(f"{folder}: the record has no column {(lacking or ['time, as its first one'])[0]}")
     autopilot = Autopilot(scenario, record.columns, options, orders=None, live=False)
-    thread = LinkThread(autopilot, open_links(endpoints, options), scenario.time.step)
+    thread = LinkThread(autopilot, open_links(endpoints, options), scenario.time.step, ahead(scenario, rate))
     every = max(1, round(SNAPSHOT_PERIOD / scenario.time.step))
     thread.start()
     started, simulated = time.perf_counter(), 0.0

@@ -22,7 +22,9 @@ class Mavlink:
     endpoints: tuple[Endpoint, ...]
     options: MavlinkOptions
 
-    def open(self, scenario: Scenario, columns: Sequence[Column], orders: OrderQueue | None) -> LinkThread:
+    def open(
+        self, scenario: Scenario, columns: Sequence[Column], orders: OrderQueue | None, rate: float | None
+    ) -> LinkThread:
         """Open all links.
 
         Parameters
@@ -33,6 +35,8 @@ class Mavlink:
             Of its rows.
         orders : OrderQueue or None
             Where commands go; None heeds none.
+        rate : float or None
+            Simulated seconds a second at the most; None for as many as can be.
 
         Returns
         -------
@@ -45,4 +49,10 @@ class Mavlink:
             If a link cannot be opened.
         """
         autopilot = Autopilot(scenario, columns, self.options, orders if self.options.commands else None)
-        return LinkThread(autopilot, open_links(self.endpoints, self.options), scenario.time.step)
+        links = open_links(self.endpoints, self.options)
+        return LinkThread(autopilot, links, scenario.time.step, ahead(scenario, rate))
+
+
+def ahead(scenario: Scenario, rate: float | None) -> float:
+    """Return by how much simulated time may get ahead of the wall clock [s], at a rate; None for any."""
+    return scenario.time.duration if rate is None or rate > 1.0 else 0.0

@@ -31,6 +31,7 @@ _RECEIVING = 0.2e-3  # s, of a slice, for all links together
 _SENDING = 0.5e-3  # s, of a slice
 _REST_RECEIVING = 19  # times as long as it received it rests: a flood gets a twentieth of the time
 _REST_SENDING = 3  # times as long as it sent
+_LONGEST_REST = 0.05  # s; where a slice took long it was the stepper's, which loads what it calls before its first step
 _DRAINING = 2.0  # s, that closing waits for what is queued
 _CLOSING = 4.0  # s, that closing waits at all
 
@@ -70,6 +71,8 @@ class LinkThread:
         Closed with the thread.
     step : float
         Step of the run [s].
+    ahead : float
+        By how much simulated time may get ahead of the wall clock [s]; logs begin earlier by that.
 
     Attributes
     ----------
@@ -79,15 +82,19 @@ class LinkThread:
         Errors in the vehicle's side, which cost no more than what raised them.
     """
 
-    def __init__(self, vehicle: Vehicle, links: Sequence[Link], step: float) -> None:
+    def __init__(self, vehicle: Vehicle, links: Sequence[Link], step: float, ahead: float = 0.0) -> None:
         self._vehicle, self._links = vehicle, list(links)
         self._logs = [link.channel for link in links if isinstance(link.channel, Tlog)]
+        for tlog in self._logs:
+            tlog.begin_earlier(ahead)
+        for link in links:
+            link.logs = [other for other in links if other is not link and isinstance(other.channel, Tlog)]
         self._every = max(1, round(SNAPSHOT_PERIOD / step))
         self._queue: deque[Array] = deque(maxlen=SNAPSHOTS)
         self._closing = threading.Event()
         self._next_tick = 0.0
-        self._started = time.monotonic()
-        self._waited = 0.0  # s, from the start to the last snapshot before anything moved
+        self._first: float | None = None  # s, monotonic, when the first snapshot of time 0 came
+        self._waited = 0.0  # s, from then to the last one: for how long arming was awaited
         self._heard = -math.inf  # s, monotonic, when something was heeded last
         self.dropped = 0
         self.failures: dict[str, int] = Counter()
@@ -95,7 +102,6 @@ class LinkThread:
 
     def start(self) -> None:
         """Begin to send and receive."""
-        self._started = time.monotonic()
         self._thread.start()
 
     def observe(self, k: int, row: Array) -> None:
@@ -160,6 +166,7 @@ class LinkThread:
         self._tend(now)
         sent = time.perf_counter()
         rest = max(_REST_RECEIVING * (received - began), _REST_SENDING * (sent - received))
+        rest = min(rest, _LONGEST_REST)
         if more:
             return rest
         return max(rest, _SOON if now - self._heard < _TALKING else _PERIOD)
@@ -179,8 +186,10 @@ class LinkThread:
         """Show the vehicle snapshots until a moment of `time.perf_counter`; return whether some are left."""
         while self._queue:
             row = self._queue.popleft()
-            if not row[0] > 0.0:  # arming is awaited
-                self._waited = time.monotonic() - self._started
+            if not row[0] > 0.0:  # where it comes again, arming is awaited
+                now = time.monotonic()
+                self._first = now if self._first is None else self._first
+                self._waited = now - self._first
             for tlog in self._logs:
                 tlog.simulated = self._waited + float(row[0])
             self._guard("observe", self._vehicle.observe, row)

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from cosim.errors import OrderError
-from cosim.helm.orders import Aim, Arm, Mode, Order, Steer
+from cosim.helm.orders import Aim, Arm, Item, Mode, Order, Steer
 from cosim.helm.settings import LiveSettings
 from cosim.helm.sources import OrderQueue
 from cosim.mavlink.dialect import dialect
@@ -21,6 +21,7 @@ from cosim.mavlink.operator import Operator
 from cosim.mavlink.options import MavlinkOptions
 from cosim.mavlink.outlet import Outlet
 from cosim.mavlink.profile import PROFILES
+from cosim.mavlink.proximity import Proximity
 from cosim.mavlink.view import View
 from cosim.scenario import Scenario
 from cosim.scenario_tables import Vector3, Vector6
@@ -76,6 +77,8 @@ class Vessel:
         That are attached.
     settings : LiveSettings
         The numbers as they are once all orders are followed.
+    proximity : Proximity
+        What a scan of the water about it shows.
     frame : LocalFrame
         Where on the globe position 0 is.
     home : tuple of float
@@ -88,6 +91,8 @@ class Vessel:
         For how long it may be silent [s], and what is done then.
     plan : tuple of MissionItem
         The mission, without home.
+    course : tuple of Item
+        What its items ask for.
     sticks : tuple of float
         As ordered last, X Y Z K M N, from -1 to 1.
     """
@@ -110,6 +115,7 @@ class Vessel:
         self.now = 0.0
         self.failsafe = False
         self.loss_timeout, self.loss_action = options.loss_timeout, options.loss_action
+        self.proximity = Proximity(scenario)
         self.frame = LocalFrame(*options.origin)
         self.unix_start_us = time.time_ns() // 1000  # when simulated time was 0
         vehicle = scenario.vehicle
@@ -128,6 +134,7 @@ class Vessel:
         self.settings = LiveSettings(self.scenario)
         self.home = (0.0, 0.0)
         self.plan: tuple[MissionItem, ...] = ()
+        self.course: tuple[Item, ...] = ()
         self.sticks: Vector6 = (0.0,) * 6
         self._run = 0 if self._orders is None else self._orders.run
         self._wished: tuple[float, Mode] | None = None

@@ -49,6 +49,8 @@ class Bound:
     ----------
     instance : Instance
         The FMU's instance; the calls are for its life alone.
+    brief : bool
+        They take microseconds, and keep Python's global lock meanwhile; otherwise each gives it up.
 
     Attributes
     ----------
@@ -64,7 +66,9 @@ class Bound:
         Result of `do_step`: the FMU asks to end the simulation (FMI 3.0).
     """
 
-    def __init__(self, instance: Instance) -> None:
+    def __init__(self, instance: Instance, brief: bool = False) -> None:
+        # a call that gives the lock up wakes every thread that waits for it, mostly to find it taken again
+        self._library = ctypes.PyDLL(None, handle=instance.fmu.dll._handle) if brief else instance.fmu.dll
         scalars = [v for v in instance.variables.values() if not v.dimensions]
         inputs = [v for v in scalars if v.causality == "input" and v.type in DOUBLES]
         outputs = [v for v in scalars if v.causality == "output" and v.type in DOUBLES]
@@ -83,9 +87,9 @@ class Bound:
             names = ("fmi2SetReal", "fmi2GetReal", "fmi2GetBoolean")
         else:
             names = ("fmi3SetFloat64", "fmi3GetFloat64", "fmi3GetBoolean")
-        self.set_inputs = _of_values(instance, names[0], inputs, _doubles(sent))
-        self.get_outputs = _of_values(instance, names[1], outputs, _doubles(read))
-        self.get_flags = _of_values(instance, names[2], flags, flag_buffer)
+        self.set_inputs = self._of_values(instance, names[0], inputs, _doubles(sent))
+        self.get_outputs = self._of_values(instance, names[1], outputs, _doubles(read))
+        self.get_flags = self._of_values(instance, names[2], flags, flag_buffer)
         self.do_step = self._of_step(instance)
 
     def _of_step(self, instance: Instance) -> Call:
@@ -93,20 +97,19 @@ class Bound:
         # an FMU may forget what was before a step, unless its state may be restored
         forgets = "state" not in instance.capabilities
         if instance.fmi == 2:
-            return instance.fmu.dll["fmi2DoStep"], (component, self.now, self.length, ctypes.c_int(forgets))
+            return self._library["fmi2DoStep"], (component, self.now, self.length, ctypes.c_int(forgets))
         event, early, last = ctypes.c_bool(), ctypes.c_bool(), ctypes.c_double()
         results = [ctypes.byref(result) for result in (event, self.ended, early, last)]
-        return instance.fmu.dll["fmi3DoStep"], (component, self.now, self.length, ctypes.c_bool(forgets), *results)
+        return self._library["fmi3DoStep"], (component, self.now, self.length, ctypes.c_bool(forgets), *results)
 
-
-def _of_values(instance: Instance, name: str, variables: list[Any], buffer: Any) -> Call:
-    if not variables:  # some FMUs refuse to be asked for nothing
-        return _nothing, ()
-    n = ctypes.c_size_t(len(variables))
-    references = (ctypes.c_uint * len(variables))(*(v.valueReference for v in variables))
-    arguments: tuple[Any, ...] = (ctypes.c_void_p(instance.fmu.component), references, n, buffer)
-    # a function looked up with [] is an object of its own, without FMPy's conversion of each argument
-    return instance.fmu.dll[name], arguments if instance.fmi == 2 else (*arguments, n)
+    def _of_values(self, instance: Instance, name: str, variables: list[Any], buffer: Any) -> Call:
+        if not variables:  # some FMUs refuse to be asked for nothing
+            return _nothing, ()
+        n = ctypes.c_size_t(len(variables))
+        references = (ctypes.c_uint * len(variables))(*(v.valueReference for v in variables))
+        arguments: tuple[Any, ...] = (ctypes.c_void_p(instance.fmu.component), references, n, buffer)
+        # a function looked up with [] is an object of its own, without FMPy's conversion of each argument
+        return self._library[name], arguments if instance.fmi == 2 else (*arguments, n)
 
 
 def _nothing() -> int:

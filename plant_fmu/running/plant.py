@@ -54,7 +54,8 @@ class Plant(Slave):
     """
 
     def __init__(self, source: str | Path | Vehicle, fmi: int = 3) -> None:
-        super().__init__(_fmu_of(source, fmi))
+        path = _fmu_of(source, fmi)
+        super().__init__(path, brief=str(path) != str(source))  # what is no FMU file is a vehicle, whose FMU is ours
 
     def save(self) -> State:
         """Save the present state: that of the FMU, the time and the inputs.

@@ -29,6 +29,9 @@ class Slave:
     ----------
     path : Path
         The FMU file.
+    brief : bool
+        A step of it takes microseconds. Then it keeps Python's global lock: threads beside it wait no longer for that,
+        and cost it less. Otherwise they run while it steps.
 
     Attributes
     ----------
@@ -47,10 +50,10 @@ class Slave:
         If the FMU cannot be loaded.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, brief: bool = False) -> None:
         self._instance = Instance(path)
         try:
-            self._bound = bound = Bound(self._instance)
+            self._bound = bound = Bound(self._instance, brief)
         except BaseException:
             self._instance.close()
             raise

@@ -177,7 +177,8 @@ def test_ctrl_c_is_heeded_from_the_first_imports(tmp_path, delay):
 
 
 @pytest.mark.skipif(os.name != "posix", reason="sends signals")
-@pytest.mark.parametrize("sent", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("sent", [signal.SIGINT, signal.SIGTERM])
 def test_ctrl_c_ends_a_real_run_readably(tmp_path, sent):
     """The process as a user has it: from the start of stepping to a report, no traceback."""
     out = tmp_path / "run"

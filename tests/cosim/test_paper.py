@@ -5,7 +5,7 @@ import pytest
 
 from cosim.record import load_record
 
-BOTH = pytest.mark.parametrize("engine", ["closed", "skfuzzy"])
+BOTH = pytest.mark.parametrize("engine", ["closed", pytest.param("skfuzzy", marks=pytest.mark.slow)])
 
 
 @BOTH

@@ -49,7 +49,7 @@ def page_of(run):
     return (run.folder / "report.html").read_text()
 
 
-@pytest.mark.parametrize("name", ["paper", "paper-limited"])
+@pytest.mark.parametrize("name", ["paper", pytest.param("paper-limited", marks=pytest.mark.slow)])
 def test_page_is_whole_and_needs_no_network(shipped_run, name):
     page = page_of(shipped_run(name, "arbiter.engine=closed"))
     checker = Checker()

@@ -105,6 +105,7 @@ def test_what_came_over_the_link_repeats_to_the_last_bit(tmp_path):
     assert modes[0] == 2.0 and modes[-1] == 1.0  # reach, then hold
 
 
+@pytest.mark.slow
 def test_a_restart_is_another_run_on_the_same_link(tmp_path):
     scenario = load_scenario("harbour", ["time.duration=1.5", "commands.enabled=true"])
     says = [command(512, 1.0)] * 4  # some tenths of a second

@@ -130,6 +130,7 @@ def test_the_manual_s_commands_run(tmp_path, monkeypatch, capsys):
     assert {path.name for path in tmp_path.iterdir()} >= {"weights.csv", "arbiter.fis", "arbiter.c", "who.svg"}
 
 
+@pytest.mark.slow
 def test_the_manual_s_pictures_are_those_that_its_script_draws(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     runpy.run_path(str(ROOT / "docs" / "images" / "arbiter.py"), run_name="__main__")

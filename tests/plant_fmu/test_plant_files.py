@@ -137,7 +137,7 @@ def test_failing_construction_leaves_nothing(tmp_path, scratch, monkeypatch):
     with pytest.raises(PlantError, match=r"holds no modelDescription.xml"):
         Plant(tmp_path / "empty.fmu")
 
-    def interrupted(instance):
+    def interrupted(instance, brief):
         raise KeyboardInterrupt
 
     monkeypatch.setattr(plant_fmu.running.slave, "Bound", interrupted)

@@ -25,7 +25,7 @@ class Tlog:
     Where none came, as for a run that could not begin, no file is left.
 
     The time is the wall clock at the start plus simulated time, so however fast the run was, it replays as it would
-    have been lived.
+    have been lived. QGroundControl takes a time in the future for one of another byte order; hence `begin_earlier`.
 
     Attributes
     ----------
@@ -53,6 +53,11 @@ class Tlog:
             self._file = open(path, "xb", buffering=0)  # noqa: SIM115 - open as long as the link is
         except OSError as error:
             raise TelemetryError(f"{path}: {error.strerror or error}") from error
+
+    def begin_earlier(self, seconds: float) -> None:
+        """Count from another time than the present one: by so much before it, before anything is sent."""
+        self._start -= int(seconds * 1e6)
+        self._stamp = self._start & ~3
 
     def receive(self) -> tuple[Hashable, bytes] | None:
         """Return nothing: a log is written only."""

@@ -19,7 +19,7 @@ SILENCE = 10.0  # s, after which a peer is forgotten
 _BUFFER = 1 << 18  # bytes the kernel keeps of what comes; what floods beyond it is lost there, at no cost
 
 _NOT_TAKEN = "datagrams not taken by the kernel"
-_PACKET = 1400  # bytes of frames in a datagram, below what networks pass on in one piece
+_PACKET = 1000  # bytes of frames in a datagram: small receivers read no more of one
 
 
 class UdpOut:

@@ -16,6 +16,7 @@ from cosim.mavlink.ground import GroundLink
 LISTENING = 6.0  # s, in which the vehicle is heard before anything is asked of it
 _FINDING = 10.0  # s
 _GONE = 5.0  # s of silence
+_QUICK = 0.5  # s
 
 
 @dataclass(frozen=True)
@@ -90,3 +91,11 @@ def check_vehicle(link: GroundLink, writes: bool) -> Iterator[Result]:
         if time.monotonic() - client.last_heard > _GONE:
             raise TelemetryError(f"{link.name}: the vehicle has gone, in check {check.name}")
         yield Result(check, outcome, time.monotonic() - started)
+    _give_rates_back(subject)
+
+
+def _give_rates_back(subject: Subject) -> None:
+    """Ask for the usual rates of what came unasked, of which connecting as QGroundControl has changed some."""
+    m = subject.mavlink
+    for number in sorted({heard.message.get_msgId() for heard in subject.unasked}):
+        subject.client.command(m.MAV_CMD_SET_MESSAGE_INTERVAL, [number, 0, 0, 0, 0, 0, 0], _QUICK)

@@ -61,8 +61,6 @@ def running_vehicle(endpoints: Sequence[Endpoint], options: MavlinkOptions, rate
         If a link cannot be opened, or the vehicle does not begin to move.
     """
     scenario = load_scenario(_SCENARIO, _OVERRIDES)
-    with Master(scenario) as first:
-        first.step(0)  # compiles what it calls, before the clock of the run begins
     orders, begun = OrderQueue(), _Begun()
     with Master(scenario) as master:
         failures: list[PlantError] = []

@@ -19,10 +19,11 @@ class _Group(NamedTuple):
     factor: float
     digits: int
     unit: str
+    unknown: int | None  # what stands for a value that is not known
 
 
-def _group(names: str, factor: float = 1.0, digits: int = 2, unit: str = "") -> _Group:
-    return _Group(tuple(names.split()), factor, digits, unit)
+def _group(names: str, factor: float = 1.0, digits: int = 2, unit: str = "", unknown: int | None = None) -> _Group:
+    return _Group(tuple(names.split()), factor, digits, unit, unknown)
 
 
 _SHOWN = {
@@ -32,7 +33,7 @@ _SHOWN = {
     "GLOBAL_POSITION_INT": (
         _group("lat lon", 1e-7, 6, "deg"),
         _group("relative_alt", 1e-3, unit="m"),
-        _group("hdg", 1e-2, 1, "deg"),
+        _group("hdg", 1e-2, 1, "deg", 65535),
     ),
     "POSITION_TARGET_LOCAL_NED": (_group("x y z", unit="m"), _group("vx vy vz", unit="m/s")),
     "VFR_HUD": (
@@ -43,9 +44,9 @@ _SHOWN = {
     ),
     "SYS_STATUS": (
         _group("load", 0.1, 1, "%"),
-        _group("voltage_battery", 1e-3, 2, "V"),
-        _group("current_battery", 1e-2, 2, "A"),
-        _group("battery_remaining", digits=0, unit="%"),
+        _group("voltage_battery", 1e-3, 2, "V", 65535),
+        _group("current_battery", 1e-2, 2, "A", -1),
+        _group("battery_remaining", digits=0, unit="%", unknown=-1),
     ),
     "SCALED_PRESSURE": (_group("press_abs", unit="hPa"), _group("temperature", 1e-2, 1, "degC")),
     "SCALED_PRESSURE2": (_group("press_abs", unit="hPa"), _group("temperature", 1e-2, 1, "degC")),
@@ -87,7 +88,8 @@ def values(message: Any) -> str:
 
 
 def _in_unit(message: Any, group: _Group) -> str:
-    numbers = " ".join(f"{getattr(message, name) * group.factor:.{group.digits}f}" for name in group.names)
+    found = [getattr(message, name) for name in group.names]
+    numbers = " ".join("-" if x == group.unknown else f"{x * group.factor:.{group.digits}f}" for x in found)
     if len(group.names) == 1:
         numbers = f"{group.names[0]} {numbers}"
     return f"{numbers} {group.unit}".rstrip()

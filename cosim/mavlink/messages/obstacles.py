@@ -1,35 +1,52 @@
-"""Obstacles near the vehicle, as a proximity sensor would see them."""
+"""Obstacles near the vehicle, as proximity sensors would see them."""
 
 from __future__ import annotations
 
 import math
 from typing import Any
 
-import numpy as np
-
-from controller.regions import Region, of_attitude, pack
 from cosim.mavlink.encode import wrapped
+from cosim.mavlink.proximity import REACH, SECTORS
 from cosim.mavlink.vessel import Vessel
-from cosim.scenario_tables import FAR_AWAY, SecondaryRegion, Vector3
+from cosim.scenario_tables import Vector3
 
 _MOST = 8  # in a message each, the nearest ones
 _FARTHEST = 1000.0  # m
+_CENTIMETRES = 100.0  # in a metre
+_INCREMENT = 360 // SECTORS  # degrees
+
+
+def obstacle_distance(vessel: Vessel) -> list[Any]:
+    """OBSTACLE_DISTANCE: a level scan, sector by sector clockwise from where the vehicle heads.
+
+    A sector's angle is that of its middle. In cm: one more than `max_distance` where there is nothing, 65535 where
+    position, heading or an obstacle's place is no number.
+    """
+    m, view, proximity = vessel.mavlink, vessel.view, vessel.proximity
+    proximity.update(view, vessel.settings)
+    farthest = REACH * _CENTIMETRES
+    nothing = farthest + 1.0
+    distances = [
+        nothing if d == math.inf else d * _CENTIMETRES for d in proximity.scan(view.position_ned, view.heading)
+    ]
+    geometry = _INCREMENT, 0, farthest, float(_INCREMENT), 0.0, m.MAV_FRAME_BODY_FRD
+    return [vessel.make("OBSTACLE_DISTANCE", view.boot_us, m.MAV_DISTANCE_SENSOR_UNKNOWN, distances, *geometry)]
 
 
 def obstacle_distance_3d(vessel: Vessel) -> list[Any]:
     """OBSTACLE_DISTANCE_3D: the nearest point, in the body's axes, of each region that stands for an obstacle.
 
-    `obstacle_id` is the region's number in the scenario, from 1.
+    `obstacle_id` is the region's number in the scenario, from 1. None is known before the first snapshot.
     """
-    m, view = vessel.mavlink, vessel.view
-    near = []
-    for i, (secondary, clearance) in enumerate(zip(vessel.scenario.regions, view.clearances[1:], strict=True), 1):
-        if _is_obstacle(secondary) and abs(clearance) <= _FARTHEST:
-            near.append((clearance, i, secondary))
-    near.sort(key=lambda entry: entry[:2])
+    m, view, proximity = vessel.mavlink, vessel.view, vessel.proximity
+    if not vessel.seen:
+        return []
+    proximity.update(view, vessel.settings)
+    inwards = dict(zip(proximity.ids, proximity.inwards(view.position_ned), strict=True))
+    near = sorted((clearance, i) for i in inwards if abs(clearance := view.clearances[i]) <= _FARTHEST)
     messages = []
-    for clearance, i, secondary in near[:_MOST]:
-        away = nearest_point(vessel, secondary, clearance)
+    for clearance, i in near[:_MOST]:
+        away = _nearest_point(clearance, inwards[i])
         if away is not None and all(map(math.isfinite, away)):
             kind = m.MAV_DISTANCE_SENSOR_UNKNOWN, m.MAV_FRAME_BODY_FRD, i
             values = *view.to_body(away), 0.0, _FARTHEST
@@ -37,42 +54,10 @@ def obstacle_distance_3d(vessel: Vessel) -> list[Any]:
     return messages
 
 
-def _is_obstacle(secondary: SecondaryRegion) -> bool:
-    region = secondary.region
-    return region.keep == "out" and secondary.criterion == "obstacle" and not of_attitude(region.shape)
-
-
-def nearest_point(vessel: Vessel, secondary: SecondaryRegion, clearance: float) -> Vector3 | None:
-    """Return the way from the vehicle to the nearest point of a region's surface [m, NED], or None where unknown.
-
-    Parameters
-    ----------
-    vessel : Vessel
-        Where it is.
-    secondary : SecondaryRegion
-        The region.
-    clearance : float
-        From its surface [m].
-    """
-    view, name = vessel.view, secondary.region.name
-    here, shift = view.position_ned, view.shift(name)
-    if secondary.seen:  # a sphere, whose radius only its clearance tells
-        between = [a + b - c for a, b, c in zip(FAR_AWAY, shift, here, strict=True)]
-    else:
-        between = _inwards(vessel, secondary.region, here, shift)
-    length = math.hypot(*between)
+def _nearest_point(clearance: float, inwards: list[float]) -> Vector3 | None:
+    """Return the way to the nearest point of a surface [m, NED], or None where its direction is unknown."""
+    length = math.hypot(*inwards)
     if not 0.0 < length < math.inf:
         return None
-    north, east, down = (clearance * x / length for x in between)
+    north, east, down = (clearance * x / length for x in inwards)
     return north, east, down
-
-
-def _inwards(vessel: Vessel, region: Region, here: Vector3, shift: Vector3) -> list[float]:
-    """Return the direction in which the clearance falls, NED, of any length."""
-    shape = vessel.settings.shapes.get(region.name, region.shape)
-    packed = pack([Region(region.name, shape, "out")])
-    packed.shifts[0] = shift
-    value, gradient, turning, clearance = np.zeros(1), np.zeros((1, 3)), np.zeros((1, 3)), np.zeros(1)
-    packed.evaluate(np.array(here), np.array(vessel.view.quaternion), value, gradient, turning, clearance)
-    direction: list[float] = gradient[0].tolist()
-    return direction

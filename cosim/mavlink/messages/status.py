@@ -63,12 +63,14 @@ def system_time(vessel: Vessel) -> list[Any]:
 
 
 def extended_sys_state(vessel: Vessel) -> list[Any]:
-    """EXTENDED_SYS_STATE: on the bottom, or under way once armed."""
+    """EXTENDED_SYS_STATE: under way while armed, else as if on the ground.
+
+    QGroundControl offers by it what can be done: while flying neither disarming nor a mission's start, else neither a
+    pause nor a place to go to. The bottom is no ground to it: the heartbeat of an armed vehicle says that it flies.
+    """
     m = vessel.mavlink
-    landed = m.MAV_LANDED_STATE_IN_AIR if vessel.armed else m.MAV_LANDED_STATE_UNDEFINED
-    return [
-        vessel.make("EXTENDED_SYS_STATE", 0, m.MAV_LANDED_STATE_ON_GROUND if vessel.view.touches_bottom else landed)
-    ]
+    landed = m.MAV_LANDED_STATE_IN_AIR if vessel.armed else m.MAV_LANDED_STATE_ON_GROUND
+    return [vessel.make("EXTENDED_SYS_STATE", 0, landed)]
 
 
 def current_mode(vessel: Vessel) -> list[Any]:
@@ -109,16 +111,30 @@ def capabilities(vessel: Vessel) -> int:
 
 
 def autopilot_version(vessel: Vessel) -> list[Any]:
-    """AUTOPILOT_VERSION: this package's version; the unique id follows from vehicle and system id."""
-    version = Version(metadata.version("subreach"))
-    kind = _DEVELOPMENT if version.is_prerelease else _OFFICIAL
-    number = version.major << 24 | version.minor << 16 | version.micro << 8 | kind
+    """AUTOPILOT_VERSION: this package's version as middleware; the unique id follows from vehicle and system id.
+
+    The flight software's is the same, but where the profile stands for another autopilot: that one's then, as a
+    development version. By its number QGroundControl chooses what it shows and what it warns of, and only one that
+    calls itself official is compared with the newest. The custom version is the name, or for PX4, where it is shown as
+    numbers, the package's version again.
+    """
+    version, profile = Version(metadata.version("subreach")), vessel.profile
+    own = version.major, version.minor, version.micro
+    kind = _DEVELOPMENT if profile.stands_for or version.is_prerelease else _OFFICIAL
+    flight = _version_number(profile.stands_for or own, kind)
+    middleware = _version_number(own, _DEVELOPMENT if version.is_prerelease else _OFFICIAL)
+    custom = [*reversed(own), *[0] * 5] if profile.name == "px4" else list(b"subreach")
     identity = f"subreach {vessel.scenario.vehicle.name} {vessel.options.system_id}".encode()
     digest = hashlib.sha256(identity).digest()
     none = (0,) * 8
     uid = int.from_bytes(digest[:8], "little")
-    versions = number, 0, 0, 0, none, none, none
+    versions = flight, middleware, 0, 0, custom, none, none
     return [vessel.make("AUTOPILOT_VERSION", capabilities(vessel), *versions, 0, 0, uid, list(digest[:18]))]
+
+
+def _version_number(version: tuple[int, int, int], kind: int) -> int:
+    major, minor, micro = version
+    return major << 24 | minor << 16 | micro << 8 | kind
 
 
 def mission_current(vessel: Vessel) -> list[Any]:

@@ -63,6 +63,7 @@ _TABLE = (
     Spec(242, pose.home_position, 1.0),
     Spec(245, status.extended_sys_state, 1.0),
     Spec(251, control.named_value_float, 2.0, EXTENDED_STATUS, several=18),
+    Spec(330, obstacles.obstacle_distance, 1.0),
     Spec(331, pose.odometry, 0.0),
     Spec(350, control.debug_float_array, 1.0, several=5),
     Spec(375, control.actuator_output_status, 0.0),

@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, field
 from typing import Any
 
-from cosim.helm.orders import Begin, Item, Mission, Order, Steer
+from cosim.helm.course import way
+from cosim.helm.orders import Begin, Change, Item, Mission, Order, Steer
 from cosim.mavlink.encode import whole
 from cosim.mavlink.mission_item import MissionItem
 from cosim.mavlink.services.mission_items import ItemError, home_item, meant
-from cosim.mavlink.services.service import Call, Service
+from cosim.mavlink.services.parameters import Parameters
+from cosim.mavlink.services.service import Call, Service, place_of, unscaled
+from cosim.mavlink.services.targets import Targets
 from cosim.mavlink.vessel import Sender, Vessel
 
 _MOST = 500  # items
 _RETRY = 1.0  # s of the wall clock
 _RETRIES = 5
 _OF_REGIONS, _ALL = 0, 255  # MAV_MISSION_TYPE
+_GO_THERE, _CHANGE_DEPTH = 2, 3  # MISSION_ITEM.current, of an item that is no part of a mission
 _KNOWN_TYPES = (0, 1, 2)
 
 
@@ -28,6 +31,7 @@ class _Upload:
     count: int
     asked: float  # s, when the item that is missing was asked for
     items: list[MissionItem] = field(default_factory=list)
+    meant: list[Item] = field(default_factory=list)  # without home
     retries: int = 0
 
 
@@ -35,11 +39,22 @@ class Missions(Service):
     """MISSION_*: one mission of regions; fences and rally points are always none.
 
     In ArduPilot's profile item 0 is home: it is given on download, and not followed when it comes.
+
+    Parameters
+    ----------
+    vessel : Vessel
+        Whom it serves.
+    targets : Targets
+        Where items go that are to be followed at once.
+    parameters : Parameters
+        Which learns what a mission changes.
     """
 
-    def __init__(self, vessel: Vessel) -> None:
+    def __init__(self, vessel: Vessel, targets: Targets, parameters: Parameters) -> None:
         super().__init__(vessel)
         m = vessel.mavlink
+        self._targets, self._parameters = targets, parameters
+        self._under_way = -1  # item of the snapshot before
         self._upload: _Upload | None = None
         self._first = int(vessel.profile.home_is_first)
         self.messages = {
@@ -57,7 +72,18 @@ class Missions(Service):
 
     def restart(self) -> None:
         """Break off what is under way."""
-        self._upload = None
+        self._upload, self._under_way = None, -1
+
+    def looked(self) -> None:
+        """Learn what the items have changed that were gone through since the snapshot before."""
+        vessel, before = self.vessel, self._under_way
+        now = self._under_way = vessel.view.item if vessel.mode == "mission" else -1
+        if now == before or not 0 <= now < len(vessel.course):
+            return
+        for item in way(vessel.course, before, now) or [now]:
+            for order in vessel.course[item].orders:
+                if isinstance(order, Change):
+                    self._parameters.learn(order.key, order.value)
 
     def detach(self, link: object) -> None:
         """Break off what is under way on a link."""
@@ -92,8 +118,8 @@ class Missions(Service):
         if message.get_type() == "MISSION_REQUEST_INT":
             reply = vessel.make("MISSION_ITEM_INT", *head, *numbers, item.x, item.y, item.z, kind)
         else:
-            scale = 1e-4 if item.frame == m.MAV_FRAME_LOCAL_NED else 1e-7
-            reply = vessel.make("MISSION_ITEM", *head, *numbers, item.x * scale, item.y * scale, item.z, kind)
+            scale = _scale(item.frame, m)
+            reply = vessel.make("MISSION_ITEM", *head, *numbers, item.x / scale, item.y / scale, item.z, kind)
         sender.link.send(reply)
 
     def _ack(self, sender: Sender, result: int, kind: int) -> None:
@@ -126,37 +152,62 @@ class Missions(Service):
             sender.link.send(vessel.make("MISSION_REQUEST_INT", *to, len(upload.items), _OF_REGIONS))
             return
         self._upload = None
-        self._ack(sender, self._taken(sender, upload.items[self._first :]), _OF_REGIONS)
+        self._ack(sender, self._taken(sender, upload.items[self._first :], upload.meant), _OF_REGIONS)
 
     def _take_item(self, sender: Sender, message: Any) -> None:
         m, upload, kind = self.vessel.mavlink, self._upload, message.mission_type
+        if message.current in (_GO_THERE, _CHANGE_DEPTH) and kind == _OF_REGIONS:
+            self._ack(sender, self._go(sender, message), kind)
+            return
         if upload is None or upload.sender != sender or kind != _OF_REGIONS:
             self._ack(sender, m.MAV_MISSION_DENIED if not self.vessel.heeds else m.MAV_MISSION_ERROR, kind)
             return
         if message.seq != len(upload.items):  # one that came before, or too early
             return
-        item = _as_it_came(message, m.MAV_FRAME_LOCAL_NED)
-        if item is None:
+        result = self._add(upload, message)
+        if result != m.MAV_MISSION_ACCEPTED:  # at once: stations tell which item they sent last
             self._upload = None
-            self._ack(sender, m.MAV_MISSION_INVALID, kind)
+            self._ack(sender, result, kind)
             return
-        upload.items.append(item)
         upload.retries = 0
         self._go_on(upload)
 
-    def _taken(self, sender: Sender, items: list[MissionItem]) -> int:
+    def _add(self, upload: _Upload, message: Any) -> int:
+        """Add an item to an upload, and return MAV_MISSION_RESULT."""
+        vessel, m, first = self.vessel, self.vessel.mavlink, self._first
+        item = _as_it_came(message, m)
+        if item is None:
+            return int(m.MAV_MISSION_INVALID)
+        if message.seq >= first:
+            try:
+                upload.meant.append(meant(vessel, item, upload.meant, upload.count - first))
+            except ItemError as error:
+                vessel.deny(f"mission item {message.seq}: {error}", "item")
+                return error.result
+        upload.items.append(item)
+        return int(m.MAV_MISSION_ACCEPTED)
+
+    def _go(self, sender: Sender, message: Any) -> int:
+        """Follow an item at once, as QGroundControl has ArduPilot go to a place; return MAV_MISSION_RESULT."""
+        vessel, m = self.vessel, self.vessel.mavlink
+        if message.command != m.MAV_CMD_NAV_WAYPOINT:
+            return int(m.MAV_MISSION_UNSUPPORTED)
+        item = _as_it_came(message, m)
+        x, y = (0.0, 0.0) if item is None else unscaled(item.frame, item.x, item.y)
+        place = None if item is None else place_of(vessel, item.frame, x, y, item.z)
+        if place is None:
+            return int(m.MAV_MISSION_INVALID if item is None else m.MAV_MISSION_UNSUPPORTED_FRAME)
+        if message.current == _CHANGE_DEPTH:
+            place = *vessel.view.target[:2], place[2]
+        accepted = self._targets.go(sender, place) == m.MAV_RESULT_ACCEPTED
+        return int(m.MAV_MISSION_ACCEPTED if accepted else m.MAV_MISSION_DENIED)
+
+    def _taken(self, sender: Sender, items: list[MissionItem], course: list[Item]) -> int:
         """Order a mission, and return MAV_MISSION_RESULT."""
         vessel, m = self.vessel, self.vessel.mavlink
-        wanted: list[Item] = []
-        for seq, item in enumerate(items, self._first):
-            try:
-                wanted.append(meant(vessel, item, wanted[-1].position if wanted else vessel.view.position_ned))
-            except ItemError as error:
-                vessel.deny(f"mission item {seq}: {error}", "item")
-                return error.result
-        result = vessel.give(Mission(tuple(wanted)))
+        result = vessel.give(Mission(tuple(course)))
         if result == m.MAV_RESULT_ACCEPTED:
-            vessel.plan = tuple(items)
+            vessel.plan, vessel.course = tuple(items), tuple(course)
             vessel.operator.commanded(sender.system)
             return int(m.MAV_MISSION_ACCEPTED)
         return int(m.MAV_MISSION_DENIED if result == m.MAV_RESULT_DENIED else m.MAV_MISSION_ERROR)
@@ -187,7 +238,7 @@ class Missions(Service):
             self._ack(sender, m.MAV_MISSION_DENIED, kind)
         elif kind in (_OF_REGIONS, _ALL):
             self._upload = None
-            self._ack(sender, self._taken(sender, []), kind)
+            self._ack(sender, self._taken(sender, [], []), kind)
         else:
             self._ack(sender, m.MAV_MISSION_ACCEPTED, kind)
 
@@ -217,15 +268,17 @@ class Missions(Service):
         return self._begin(call.sender, max(call.whole(1) or 0, 0), Steer("mission"))
 
 
-def _as_it_came(message: Any, local: int) -> MissionItem | None:
-    """Return an item, or None if its place is no number."""
+def _scale(frame: int, mavlink: Any) -> float:
+    """Return what stands for a unit of a place in an item's integers."""
+    return {mavlink.MAV_FRAME_LOCAL_NED: 1e4, mavlink.MAV_FRAME_MISSION: 1.0}.get(frame, 1e7)
+
+
+def _as_it_came(message: Any, mavlink: Any) -> MissionItem | None:
+    """Return an item, or None if its place is no number that an item can hold."""
     x, y = message.x, message.y
     if message.get_type() == "MISSION_ITEM":
-        scale = 1e4 if message.frame == local else 1e7
-        x, y = (whole(v * scale) for v in (x, y))
+        x, y = (whole(v * _scale(message.frame, mavlink)) for v in (x, y))
         if x is None or y is None or max(abs(x), abs(y)) > 0x7FFFFFFF:
             return None
     numbers = message.param1, message.param2, message.param3, message.param4
-    if not math.isfinite(message.z):
-        return None
     return MissionItem(message.frame, message.command, message.autocontinue, *numbers, x, y, message.z)

@@ -1,17 +1,24 @@
-"""What an item of a mission means here: a region to be reached, and for how long to stay."""
+"""What an item of a mission means here: a region to be reached, for how long to stay, or something done at once."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
-from cosim.helm.orders import Item
+from cosim.errors import OrderError
+from cosim.helm.orders import Change, Face, Item
+from cosim.mavlink.encode import whole
 from cosim.mavlink.mission_item import MissionItem
+from cosim.mavlink.services.parameters import shortest
 from cosim.mavlink.services.service import place_of, unscaled
 from cosim.mavlink.vessel import Vessel
 from cosim.scenario_tables import Vector3
 
+SPEED = "law.gains.speed"  # key of the setting
+
 _LONGEST_STAY = 1e9  # s
 _LARGEST = 1e5  # m
+_MOST_JUMPS = 32767  # as ArduPilot has it
 
 
 class ItemError(Exception):
@@ -22,13 +29,17 @@ class ItemError(Exception):
         self.result = result
 
 
-def meant(vessel: Vessel, item: MissionItem, before: Vector3) -> Item:
+def meant(vessel: Vessel, item: MissionItem, before: Sequence[Item], count: int) -> Item:
     """Return what an item asks for.
 
     NAV_WAYPOINT is a sphere about its place, of its acceptance radius (parameter 2), or for 0 the scenario's goal
-    region moved there; parameter 1 says for how long to stay. NAV_LOITER_TIME and NAV_LOITER_UNLIM are that region, for
-    a time and for good. NAV_LAND is a sphere at the depth of surfacing above its place, or for 0, 0 above the place
-    before; NAV_RETURN_TO_LAUNCH is the same at home. Both are for good.
+    region moved there; parameter 1 says for how long to stay. NAV_SPLINE_WAYPOINT is the goal region, without its
+    spline. NAV_LOITER_TIME and NAV_LOITER_UNLIM are that region, for a time and for good. NAV_LAND is a sphere at the
+    depth of surfacing above its place, or for 0, 0 above the place before; NAV_RETURN_TO_LAUNCH is the same at home.
+    Both are for good.
+
+    NAV_DELAY and CONDITION_DELAY stay for parameter 1 where the item before is. DO_CHANGE_SPEED is the law's speed, if
+    it has one, CONDITION_YAW a heading, and DO_JUMP another item, as often as it says.
 
     Parameters
     ----------
@@ -36,8 +47,10 @@ def meant(vessel: Vessel, item: MissionItem, before: Vector3) -> Item:
         Where the globe's frame and home are.
     item : MissionItem
         As it came.
-    before : tuple of float
-        Where the item before it is [m, NED].
+    before : sequence of Item
+        What the items before it ask for.
+    count : int
+        Items of the mission.
 
     Raises
     ------
@@ -50,17 +63,67 @@ def meant(vessel: Vessel, item: MissionItem, before: Vector3) -> Item:
     match item.command:
         case m.MAV_CMD_NAV_WAYPOINT:
             return Item(_place(vessel, item), _acceptance(vessel, item), _stay(vessel, item))
-        case m.MAV_CMD_NAV_LOITER_TIME:
+        case m.MAV_CMD_NAV_SPLINE_WAYPOINT | m.MAV_CMD_NAV_LOITER_TIME:
             return Item(_place(vessel, item), None, _stay(vessel, item))
         case m.MAV_CMD_NAV_LOITER_UNLIM:
             return Item(_place(vessel, item), None, None)
         case m.MAV_CMD_NAV_LAND:
-            north, east, _ = before if item.x == item.y == 0 else _place(vessel, item)
+            above = (other.position for other in reversed(before) if other.position is not None)
+            here = item.x == item.y == 0
+            north, east, _ = next(above, vessel.view.position_ned) if here else _place(vessel, item)
             return Item((north, east, surface), radius, None)
         case m.MAV_CMD_NAV_RETURN_TO_LAUNCH:
             north, east, _ = vessel.home_ned()
             return Item((north, east, surface), radius, None)
-    raise ItemError(m.MAV_MISSION_UNSUPPORTED, f"command {item.command} is not known in a mission")
+        case m.MAV_CMD_NAV_DELAY | m.MAV_CMD_CONDITION_DELAY:
+            return Item(None, stay=_stay(vessel, item))
+        case m.MAV_CMD_DO_CHANGE_SPEED:
+            return _another_speed(vessel, item)
+        case m.MAV_CMD_CONDITION_YAW:
+            return _another_heading(vessel, item)
+        case m.MAV_CMD_DO_JUMP:
+            return _jump(vessel, item, count)
+    entry = m.enums["MAV_CMD"].get(item.command)
+    name = f" {entry.name.removeprefix('MAV_CMD_')}" if entry else ""
+    raise ItemError(m.MAV_MISSION_UNSUPPORTED, f"command {item.command}{name} is not known in a mission")
+
+
+def _another_speed(vessel: Vessel, item: MissionItem) -> Item:
+    m, speed = vessel.mavlink, shortest(item.param2)
+    if speed < 0.0:  # as it is
+        return Item(None)
+    before = getattr(vessel.settings.gains, "speed", None)
+    if before is None:
+        raise ItemError(m.MAV_MISSION_UNSUPPORTED, f"law {vessel.scenario.law.name} has no speed")
+    try:
+        vessel.settings.change(SPEED, speed)
+    except OrderError as error:
+        raise ItemError(m.MAV_MISSION_INVALID_PARAM2, str(error)) from error
+    vessel.settings.change(SPEED, before)
+    return Item(None, orders=(Change(SPEED, speed),))
+
+
+def _another_heading(vessel: Vessel, item: MissionItem) -> Item:
+    m = vessel.mavlink
+    if item.param4 != 0.0 and not math.isnan(item.param4):
+        raise ItemError(
+            m.MAV_MISSION_INVALID_PARAM4, "a heading from the present one; parameter 4 may be 0: from north"
+        )
+    if not math.isfinite(item.param1):
+        raise ItemError(m.MAV_MISSION_INVALID_PARAM1, f"a heading of {item.param1:g} deg")
+    return Item(None, orders=(Face(math.radians(item.param1)),))
+
+
+def _jump(vessel: Vessel, item: MissionItem, count: int) -> Item:
+    m, first = vessel.mavlink, int(vessel.profile.home_is_first)
+    to, times = whole(item.param1), whole(item.param2)
+    if to is None or not 0 <= to - first < count:
+        raise ItemError(
+            m.MAV_MISSION_INVALID_PARAM1, f"a jump to item {item.param1:g} of {first} to {count - 1 + first}"
+        )
+    if times is None:
+        raise ItemError(m.MAV_MISSION_INVALID_PARAM2, f"a jump {item.param2:g} times")
+    return Item(None, jump=to - first, times=None if times < 0 else times)
 
 
 def _place(vessel: Vessel, item: MissionItem) -> Vector3:

@@ -29,7 +29,7 @@ class Modes(Service):
             m.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN: self._reboot,
             m.MAV_CMD_NAV_LOITER_UNLIM: lambda call: self._steer(call.sender, "hold"),
             m.MAV_CMD_NAV_LAND: lambda call: self._steer(call.sender, "surface"),
-            m.MAV_CMD_NAV_RETURN_TO_LAUNCH: self._return_home,
+            m.MAV_CMD_NAV_RETURN_TO_LAUNCH: lambda call: self._return_home(call.sender),
             m.MAV_CMD_OVERRIDE_GOTO: self._goto,
             m.MAV_CMD_DO_PAUSE_CONTINUE: self._pause,
         }
@@ -47,7 +47,9 @@ class Modes(Service):
         return self._give(call.sender, Arm(wanted == 1.0))
 
     def _set_mode(self, sender: Sender, message: Any) -> None:
-        if is_custom(message.base_mode):
+        if is_custom(message.base_mode) and self.vessel.profile.is_return(message.custom_mode):
+            self._return_home(sender)
+        elif is_custom(message.base_mode):
             self._mode(sender, self.vessel.profile.mode_of(message.custom_mode), f"{message.custom_mode}")
         else:
             self._mode(sender, None, f"of base mode {message.base_mode}")
@@ -56,6 +58,8 @@ class Modes(Service):
         base, first, second = call.whole(1), call.whole(2), call.whole(3) or 0
         if base is None or first is None or not is_custom(base):
             return self._mode(call.sender, None, "without a number")
+        if self.vessel.profile.is_return(first << 16 | second << 24):  # MAVSDK's return to launch
+            return self._return_home(call.sender)
         named = f"{first}" if not second else f"{first}, {second}"
         return self._mode(call.sender, self.vessel.profile.mode_of_command(first, second), named)
 
@@ -79,13 +83,13 @@ class Modes(Service):
             return int(vessel.mavlink.MAV_RESULT_FAILED)
         return self._give(sender, Steer(mode))
 
-    def _return_home(self, call: Call) -> int:
+    def _return_home(self, sender: Sender) -> int:
         north, east, _ = self.vessel.home_ned()
         settings = self.vessel.settings
         if not self.vessel.heeds:
             return self.vessel.give()
         depth, radius = settings["commands.surface_depth"], settings["commands.hold_radius"]
-        return self._give(call.sender, Aim((north, east, depth), radius))
+        return self._give(sender, Aim((north, east, depth), radius))
 
     # ---- pause ----
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 import struct
 from collections.abc import Callable
@@ -15,13 +16,13 @@ from cosim.mavlink.outlet import Outlet
 from cosim.mavlink.services.packed_parameters import hash_check
 from cosim.mavlink.services.parameter_names import parameter_names
 from cosim.mavlink.services.service import Service
+from cosim.mavlink.services.station_parameters import station_parameters
 from cosim.mavlink.supervision_settings import ACTIONS, TIMEOUTS
 from cosim.mavlink.vessel import Sender, Vessel
 
 _HASH = "_HASH_CHECK"
 _NO_INDEX = 0xFFFF
 _SLICE = 50  # values in each tick
-_VECTORED_6DOF, _CUSTOM_FRAME = 2.0, 7.0  # ArduSub's FRAME_CONFIG
 
 
 @dataclass(frozen=True)
@@ -56,15 +57,12 @@ class Parameters(Service):
 
     def _make_own(self) -> dict[str, _Own]:
         vessel, profile = self.vessel, self.vessel.profile.name
-        own = {
+        own = {name: _Own(read) for name, read in station_parameters(vessel).items()}
+        return own | {
             "MAV_SYS_ID" if profile == "px4" else "SYSID_THISMAV": _Own(lambda: float(vessel.options.system_id)),
             "FS_GCS_TIMEOUT": _Own(lambda: vessel.loss_timeout, self._write_timeout),
             "FS_GCS_ENABLE": _Own(lambda: float(ACTIONS.index(vessel.loss_action)), self._write_action),
         }
-        if profile == "ardusub":
-            frame = _VECTORED_6DOF if vessel.scenario.vehicle.name == "bluerov2_heavy" else _CUSTOM_FRAME
-            own["FRAME_CONFIG"] = _Own(lambda: frame)
-        return own
 
     def _write_timeout(self, value: float) -> str | None:
         least, greatest = TIMEOUTS
@@ -119,6 +117,12 @@ class Parameters(Service):
             return result
         self._values[key] = value
         return result
+
+    def learn(self, key: str, value: float) -> None:
+        """Note another value of a setting, that a mission brought about."""
+        with contextlib.suppress(OrderError):  # as the helm does, which logs it
+            self.vessel.settings.change(key, value)
+            self._values[key] = value
 
     # ---- the list ----
 

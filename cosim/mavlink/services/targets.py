@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from cosim.helm.orders import Aim, Face, Order
+from cosim.helm.orders import Aim, Face, Order, Steer
 from cosim.mavlink.profile import MODE_NAMES
 from cosim.mavlink.services.parameters import Parameters, shortest
 from cosim.mavlink.services.service import Call, Service, place_of, unscaled
@@ -13,16 +13,19 @@ from cosim.mavlink.vessel import Sender, Vessel
 from cosim.scenario_tables import Vector3
 
 _X_Y, _Z = 0b011, 0b100  # type_mask: what is ignored
-_VELOCITY, _FORCE, _YAW = 0b111000, 1 << 9, 1 << 10
+_VELOCITY, _ACCELERATION, _FORCE, _YAW = 0b111000, 0b111 << 6, 1 << 9, 1 << 10
 _SPEED = "law.gains.speed"
 _LOCAL, _OFFSET, _BODY, _BODY_OFFSET, _BODY_FRD = 1, 7, 8, 9, 12
+_FROM_HERE = (_OFFSET, _BODY, _BODY_OFFSET, _BODY_FRD)
+_ANEW = 1.0  # s of silence, after which the same way from here is another one
 
 
 class Targets(Service):
     """SET_POSITION_TARGET_*, and the commands that move, turn and pace the vehicle.
 
     Set-points are heeded while the region is to be reached, as ArduSub heeds them in GUIDED alone. One that says what
-    the last one said makes no order.
+    the last one said makes no order, unless it is a way from here and none came for a second: QGroundControl's change
+    of depth, made twice.
 
     Parameters
     ----------
@@ -37,6 +40,7 @@ class Targets(Service):
         self._parameters = parameters
         m = vessel.mavlink
         self._last: tuple[object, ...] = ()
+        self._last_at = -math.inf
         self.messages = {
             "SET_POSITION_TARGET_LOCAL_NED": self._local,
             "SET_POSITION_TARGET_GLOBAL_INT": self._global,
@@ -60,7 +64,7 @@ class Targets(Service):
 
     def _local(self, sender: Sender, message: Any) -> None:
         frame = message.coordinate_frame
-        if frame not in (_LOCAL, _OFFSET, _BODY, _BODY_OFFSET, _BODY_FRD):
+        if frame not in (_LOCAL, *_FROM_HERE):
             self.vessel.deny(f"set-point in frame {frame}; it may be 1, 7, 8, 9 or 12", "frame")
             return
         raw = message.x, message.y, message.z
@@ -99,7 +103,8 @@ class Targets(Service):
         vessel, mask = self.vessel, message.type_mask
         if not self._may(sender):
             return
-        if mask & _Z or mask & _X_Y not in (0, _X_Y) or mask & _FORCE:
+        forced = mask & _FORCE and mask & _ACCELERATION != _ACCELERATION  # QGroundControl sets all bits but those
+        if mask & _Z or mask & _X_Y not in (0, _X_Y) or forced:
             vessel.deny(f"set-point with mask {mask}: a position is needed", "mask")
             return
         if vessel.mode_ahead != "reach":
@@ -109,7 +114,8 @@ class Targets(Service):
         going = (0.0, 0.0, 0.0) if mask & _VELOCITY else (message.vx, message.vy, message.vz)
         yaw = None if mask & _YAW or not math.isfinite(message.yaw) else message.yaw
         said = (frame, mask, raw, going, yaw)
-        if said == self._last:
+        since, self._last_at = vessel.now - self._last_at, vessel.now
+        if said == self._last and (frame not in _FROM_HERE or since < _ANEW):
             return
         position = (*vessel.view.target[:2], place[2]) if mask & _X_Y else place
         orders: list[Order] = [Aim(position, None, self._levelled(frame, going))]
@@ -137,13 +143,32 @@ class Targets(Service):
         if place is None:
             vessel.deny(f"frame {call.frame} of a position", "frame")
             return int(m.MAV_RESULT_UNSUPPORTED)
-        if not self._may(call.sender):
-            return int(m.MAV_RESULT_DENIED)
-        # what is left out stays as it is
+        return self.go(call.sender, place, call[4])
+
+    def go(self, sender: Sender, place: Vector3, yaw: float = math.nan) -> int:
+        """Move the target region, and reach it; without any place, hold this one: so QGroundControl pauses PX4.
+
+        Parameters
+        ----------
+        sender : Sender
+            Who wants it.
+        place : tuple of float
+            Its middle [m, NED]; what is not finite stays as it is.
+        yaw : float
+            Heading [rad]; NaN for none.
+
+        Returns
+        -------
+        int
+            MAV_RESULT.
+        """
+        vessel = self.vessel
+        if not self._may(sender):
+            return int(vessel.mavlink.MAV_RESULT_DENIED)
         x, y, z = (a if math.isfinite(a) else b for a, b in zip(place, vessel.view.position_ned, strict=True))
-        orders: list[Order] = [Aim((x, y, z))]
-        if math.isfinite(call[4]):
-            orders.append(Face(call[4]))
+        orders: list[Order] = [Aim((x, y, z)) if any(map(math.isfinite, place)) else Steer("hold")]
+        if math.isfinite(yaw):
+            orders.append(Face(yaw))
         self._last = ()
         return vessel.give(*orders)
 

@@ -29,6 +29,7 @@ def test_35_and_36_are_equalities_where_all_errors_are_equal():
     assert square_bound(errors) == pytest.approx(144.0)
 
 
+@pytest.mark.slow
 def test_44_bounds_w_where_43_holds():
     closest = np.inf
     for _ in range(300):

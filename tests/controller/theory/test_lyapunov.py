@@ -112,6 +112,7 @@ def followed(loop, until=0.6, samples=25):
     return np.array([loop.rate(path(t)) for t in times]), np.array(rates).T
 
 
+@pytest.mark.slow
 def test_rate_is_minus_w_where_the_force_has_the_potential():
     expected, (printed, unit_gradient, normalised) = followed(Loop([SPHERE, FLAT], BETAS))
     scale = np.abs(expected).max()

@@ -129,6 +129,20 @@ def test_a_mission_goes_from_region_to_region(fly):
     assert np.linalg.norm(run.position[-1] - items[2].position) < 0.3
 
 
+def test_what_a_mission_does_at_once_counts_from_then_on(fly):
+    slowly = Item(None, orders=(Change("law.gains.speed", 0.2), Face(0.8)))
+    items = (slowly, Item((1.0, 0.0, 3.0), 0.3), Item(None, stay=1.0), Item(None, jump=1, times=1), slowly)
+    run = fly({0: [Mission(items), Steer("mission")], 1200: [Steer("hold")], 1300: [Steer("mission")]}, SHORT, *OPEN)
+    item = run["helm.item"]
+    seen = [1, *item[1:][np.diff(item) != 0].tolist()]
+    assert item[0] == 1 and seen == [1, 2, 3, 1, 2, 3, 4]  # there, a delay, and once again
+    assert run.stack("target.x", "target.y", "target.z")[-1] == pytest.approx(items[1].position)  # after the hold, too
+    assert run["target.x"][1250] != pytest.approx(1.0, abs=1e-3)
+    fastest = np.linalg.norm(run.stack("velocity.u", "velocity.v", "velocity.w"), axis=1).max()
+    assert 0.1 < fastest < 0.3  # 1.2 m/s without
+    assert run["attitude.yaw"][-1] == pytest.approx(0.8, abs=0.05)
+
+
 def test_an_item_to_stay_at_is_not_left_but_on_order(fly):
     items = (Item((1.0, 0.0, 3.0), 0.3, None), Item((0.0, 1.0, 2.0), 0.3))
     run = fly({0: [Mission(items), Steer("mission")], 1500: [Begin(1)]}, SHORT, *OPEN)
@@ -136,6 +150,7 @@ def test_an_item_to_stay_at_is_not_left_but_on_order(fly):
     assert np.linalg.norm(run.position[1499] - items[0].position) < 0.3
 
 
+@pytest.mark.slow
 def test_another_heading_is_kept(fly):
     run = fly({100: [Face(1.2)]}, SHORT, *OPEN)
     assert run["attitude.yaw"][-1] == pytest.approx(1.2, abs=0.05)

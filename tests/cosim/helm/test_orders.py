@@ -30,6 +30,15 @@ from cosim.helm.sources import QUEUED
 number = st.floats(-1e4, 1e4)
 place = st.tuples(number, number, number)
 radius = st.floats(1e-3, 1e3)
+ITEMS = st.builds(
+    Item,
+    st.none() | place,
+    st.none() | radius,
+    st.none() | st.floats(0, 99),
+    st.lists(st.builds(Face, number) | st.builds(Change, st.text(max_size=9), number), max_size=2).map(tuple),
+    st.none() | st.just(0),
+    st.none() | st.integers(0, 9),
+)
 ORDERS = st.one_of(
     st.builds(Arm, st.booleans()),
     st.builds(Steer, st.sampled_from(MODES)),
@@ -39,7 +48,7 @@ ORDERS = st.one_of(
     st.builds(Obstacle, st.integers(0, 1 << 16), place, radius),
     st.builds(Forget, st.integers(0, 1 << 16)),
     st.builds(Change, st.text(max_size=30), number),
-    st.builds(Mission, st.lists(st.builds(Item, place, st.none() | radius, st.none() | st.floats(0, 99))).map(tuple)),
+    st.builds(Mission, st.lists(ITEMS).map(tuple)),
     st.builds(Begin, st.integers(0, 99)),
     st.just(Reset()),
 )
@@ -98,6 +107,9 @@ def test_what_was_meant_for_a_run_that_is_over_is_followed_by_no_other():
         Change("goal.radius", math.nan),
         Mission((Item((0.0, 0.0, 0.0), stay=-1.0),)),
         Mission((Item((0.0, 0.0, math.nan)),)),
+        Mission((Item(None, jump=1),)),
+        Mission((Item(None, jump=0, times=-1),)),
+        Mission((Item(None, orders=(Face(math.nan),)),)),
     ],
 )
 def test_absurd_numbers_are_refused(order):

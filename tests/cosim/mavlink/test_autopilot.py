@@ -146,6 +146,7 @@ def test_everything_promised_is_streamed_at_its_rate():
         "SERVO_OUTPUT_RAW": 5.0, "SCALED_PRESSURE": 5.0, "SCALED_PRESSURE2": 5.0, "BATTERY_STATUS": 1.0,
         "HOME_POSITION": 1.0, "GPS_GLOBAL_ORIGIN": 0.2, "GPS_RAW_INT": 1.0, "EXTENDED_SYS_STATE": 1.0,
         "CURRENT_MODE": 0.5, "AVAILABLE_MODES_MONITOR": 0.2, "AHRS2": 10.0, "EKF_STATUS_REPORT": 2.0,
+        "OBSTACLE_DISTANCE": 1.0,
     }  # fmt: skip
     station = Station("ardusub")
     station.look(0.0)
@@ -171,9 +172,19 @@ def test_a_heartbeat_goes_out_every_second_by_the_wall_clock_too():
 
 def test_streams_go_on_by_the_wall_clock_while_nothing_moves():
     station = Station()
+    station.look(0.0)
     station.wait(4.0)
-    assert station.wire.counts()["ATTITUDE"] == pytest.approx(40, abs=2)
+    assert station.wire.counts()["ATTITUDE"] == pytest.approx(37, abs=4)  # half a second is waited for the next step
     assert {m.time_boot_ms for m in station.wire.of("ATTITUDE")} == {0}
+
+
+def test_before_the_first_snapshot_nothing_is_known_and_nothing_streamed():
+    station = Station()
+    station.wait(4.0)
+    assert set(station.wire.counts()) == {"HEARTBEAT"}
+    station.look(0.0)
+    station.look(0.1)
+    assert [m.time_boot_ms for m in station.wire.of("ATTITUDE")] == [0, 100]
 
 
 @pytest.mark.parametrize("profile", PROFILES)
@@ -212,6 +223,7 @@ def test_its_last_word_is_a_heartbeat_in_standby():
     station.look()
     station.autopilot.close(station.now)
     assert station.wire.got[-1].system_status == mavlink.MAV_STATE_STANDBY
+    assert station.wire.texts[-1] == "The run has ended"
 
 
 def test_what_is_meant_for_others_is_not_heard():

@@ -18,6 +18,8 @@ from cosim.mavlink.channels.udp import UdpIn, UdpOut
 from cosim.mavlink.endpoint import Endpoint
 from cosim.mavlink.link import open_links
 from cosim.mavlink.options import MavlinkOptions
+from cosim.mavlink.setup import ahead
+from cosim.scenario import load_scenario
 from tests.cosim.mavlink.stubs import Station, attitude, heartbeat, link_of, mavlink, odometry, tended, until
 
 HERE = "127.0.0.1"
@@ -441,6 +443,22 @@ def test_a_log_reads_back_with_the_times_of_the_simulation(tmp_path):
     assert before - 0.01 <= stamps[0] <= time.time()
     assert path.stat().st_size % 1 == 0 and path.read_bytes()[8] == 0xFD
     assert not link.troubles()
+
+
+def test_a_log_of_a_run_that_gets_ahead_of_the_clock_has_no_times_in_the_future(tmp_path):
+    path = tmp_path / "fast.tlog"
+    link = link_of(Tlog(str(path)))
+    link.channel.begin_earlier(600.0)
+    for link.channel.simulated in (0.0, 600.0):
+        link.send(attitude(1))
+    link.channel.close()
+    first, last = (m._timestamp for m in logged(path))
+    assert last - first == pytest.approx(600.0, abs=1e-5) and last <= time.time()  # LogReplayLink.cc, _parseTimestamp
+
+
+@pytest.mark.parametrize(("rate", "seconds"), [(None, 12.0), (10.0, 12.0), (1.0, 0.0), (0.5, 0.0)])
+def test_a_run_gets_ahead_where_it_is_faster_than_the_clock(rate, seconds):
+    assert ahead(load_scenario("paper", ["time.duration=12"]), rate) == seconds
 
 
 def test_a_log_is_never_overwritten(tmp_path):

@@ -146,6 +146,11 @@ def test_every_message_of_the_dialect_can_be_shown(link):
     assert len(watch.rows) == min(ROWS, len(mavlink.mavlink_map)) and len(shown) >= ROWS - 5
 
 
+def test_what_is_not_known_is_shown_as_such():
+    status = mavlink.MAVLink_sys_status_message(0, 0, 0, 500, 65535, -1, -1, *[0] * 6)
+    assert values(status) == "load 50.0 %  voltage_battery - V  current_battery - A  battery_remaining - %"
+
+
 def test_values_that_are_no_numbers_are_shown():
     assert "nan" in values(mavlink.MAVLink_attitude_message(0, float("nan"), 0, 0, 0, 0, 0))
     assert "inf" in values(mavlink.MAVLink_named_value_float_message(0, b"x", float("inf")))
@@ -179,6 +184,19 @@ def test_broken_frames_cost_nothing_and_old_ones_are_heard(link):
             found += link.receive(2.0)
     assert [h.kind for h in found] == ["HEARTBEAT", "ATTITUDE"]
     assert link.old == 1 and link.counts.malformed == 2
+
+
+def test_with_a_key_only_what_is_signed_with_it_is_heard():
+    endpoint = parse_endpoint(f"udpin:127.0.0.1:{free_port()}")
+    speaker = parse_endpoint(f"udpout:127.0.0.1:{endpoint.port}")
+    with GroundLink(endpoint, key=bytes(32)) as link:
+        for key in (None, b"\1" * 32, bytes(32)):
+            with GroundLink(speaker, key, identity=(1, 1)) as vehicle:
+                vehicle.beat()
+        found = link.receive(2.0) + link.receive(0.1)
+    assert [h.kind for h in found] == ["HEARTBEAT"]
+    assert (link.counts.unsigned, link.counts.forged, link.counts.accepted) == (1, 1, 1)
+    assert "1 frames forged" in picture(link, Watch(), 0.0)[0]
 
 
 def test_following_ends_after_so_many_messages_or_seconds(link):

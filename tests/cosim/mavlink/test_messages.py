@@ -1,9 +1,11 @@
 """What the messages say of a snapshot."""
 
 import math
+from importlib import metadata
 
 import numpy as np
 import pytest
+from packaging.version import Version
 from pymavlink.dialects.v20 import all as mavlink
 
 from controller.quaternion import from_axis_angle, multiply, rotation_matrix
@@ -14,6 +16,7 @@ from tests.cosim.mavlink.station import Station, scenario
 
 TURN = from_axis_angle(np.array([0.0, 0.0, 1.0]), 2.0)
 EULER = (0.0, 0.0, 2.0)
+OWN = Version(metadata.version("subreach")).release
 
 
 @pytest.fixture
@@ -139,10 +142,27 @@ def test_the_bottom_where_there_is_one(station):
     assert ask(station, 173)[0].distance == 2.5 and ask(station, 11038)[0].distance == 2.5
 
 
-def test_landed_is_on_the_bottom(station):
+def test_what_is_armed_is_under_way_even_on_the_bottom(station):
     assert ask(station, 245)[0].landed_state == mavlink.MAV_LANDED_STATE_IN_AIR
     station.look(13.0, bottom_contact=1.0)
+    assert ask(station, 245)[0].landed_state == mavlink.MAV_LANDED_STATE_IN_AIR
+    station.look(14.0, **{"helm.armed": 0.0})
     assert ask(station, 245)[0].landed_state == mavlink.MAV_LANDED_STATE_ON_GROUND
+
+
+@pytest.mark.parametrize(
+    ("profile", "flight", "custom"),
+    [
+        ("ardusub", 4 << 24 | 5 << 16, b"subreach"),
+        ("px4", 1 << 24 | 15 << 16, bytes([*reversed(OWN), 0, 0, 0, 0, 0])),
+        ("generic", OWN[0] << 24 | OWN[1] << 16 | OWN[2] << 8 | 255, b"subreach"),
+    ],
+)
+def test_the_version_is_that_of_whom_the_profile_stands_for(profile, flight, custom):
+    (version,) = ask(Station(profile), 148)
+    assert version.flight_sw_version == flight  # ends in 255 if official, which QGroundControl compares with the newest
+    assert version.middleware_sw_version == OWN[0] << 24 | OWN[1] << 16 | OWN[2] << 8 | 255
+    assert bytes(version.flight_custom_version) == custom
 
 
 def test_before_the_first_step_the_vehicle_is_where_the_scenario_has_it():

@@ -5,12 +5,13 @@ import math
 import pytest
 from pymavlink.dialects.v20 import all as mavlink
 
-from cosim.helm.orders import Begin, Item, Mission, Steer
-from tests.cosim.mavlink.station import NAN, Station
+from cosim.helm.orders import Begin, Change, Face, Item, Mission, Steer
+from tests.cosim.mavlink.station import NAN, Station, scenario
 
 LOCAL, GLOBAL, RELATIVE, GLOBAL_INT, RELATIVE_INT, TERRAIN = 1, 0, 3, 5, 6, 10
 LATITUDE, LONGITUDE = 559_097_000, -33_203_000  # of the origin
 WAYPOINT, FOREVER, FOR_TIME, HOME, LAND = 16, 17, 19, 20, 21
+SPLINE, DELAY, WAIT, YAW, JUMP, SPEED = 82, 93, 112, 115, 177, 178
 
 
 @pytest.fixture(params=["ardusub", "px4", "generic"])
@@ -29,10 +30,12 @@ def item(seq, frame=LOCAL, command=WAYPOINT, numbers=(0.0, 0.0, 0.0, NAN), place
 
 
 def upload(station, *items, **who):
-    """Upload as stations do, with home first where that is the way, and return the result."""
+    """Upload as stations do, with home first where that is the way, until it is accepted or refused; return which."""
     items = [{}, *items] if first(station) else list(items)
     replies = station.send(mavlink.MAVLink_mission_count_message(1, 1, len(items), 0), **who)
     for seq, fields in enumerate(items):
+        if replies and replies[-1].get_type() == "MISSION_ACK":
+            break
         (asked,) = [r for r in replies if r.get_type() == "MISSION_REQUEST_INT"]
         assert (asked.seq, asked.target_system, asked.target_component) == (seq, who.get("system", 255), 190)
         replies = station.send(item(seq, **fields), **who)
@@ -95,6 +98,67 @@ def test_what_the_items_mean(station):
     )
 
 
+def test_what_is_done_at_once(station):
+    jump = 2.0 + first(station)
+    mission = {"frame": 2, "place": (0, 0, 0.0)}  # MAV_FRAME_MISSION
+    assert not upload(
+        station,
+        {"command": SPEED, "numbers": (1.0, 0.3, -1.0, 0.0), **mission},  # as QGroundControl's settings of a mission
+        {"command": SPEED, "numbers": (1.0, -1.0, -1.0, 0.0), **mission},
+        {"command": SPLINE, "numbers": (4.0, 0.0, 0.0, 0.0)},
+        {"command": DELAY, "numbers": (5.0, -1.0, -1.0, -1.0), **mission},
+        {"command": WAIT, "numbers": (6.0, 0.0, 0.0, 0.0), **mission},
+        {"command": YAW, "numbers": (90.0, 0.0, 1.0, 0.0), **mission},
+        {"command": JUMP, "numbers": (jump, 3.0, 0.0, 0.0), **mission},
+        {"command": JUMP, "numbers": (jump, -1.0, NAN, NAN), "frame": 2, "place": (0, 0, NAN)},
+        {"command": LAND, "place": (0, 0, 0.0)},
+    )
+    (order,) = station.ordered()
+    assert order.items == (
+        Item(None, orders=(Change("law.gains.speed", 0.3),)),
+        Item(None),
+        Item((1.0, 2.0, 3.0), None, 4.0),
+        Item(None, stay=5.0),
+        Item(None, stay=6.0),
+        Item(None, orders=(Face(math.pi / 2),)),
+        Item(None, jump=2, times=3),
+        Item(None, jump=2, times=None),
+        Item((1.0, 2.0, 0.5), 0.3, None),
+    )
+    (back,) = station.send(mavlink.MAVLink_mission_request_message(1, 1, 6 + first(station), 0))
+    assert (back.command, back.frame, back.param1, back.x) == (JUMP, 2, jump, 0.0)
+
+
+def test_a_law_without_a_speed_takes_no_item_for_one():
+    station = Station("px4", of=scenario(name="paper"))
+    station.look()
+    assert upload(station, {"command": SPEED, "numbers": (1, 0.5, -1, 0)}) == mavlink.MAV_MISSION_UNSUPPORTED
+
+
+def test_an_item_is_refused_as_it_comes_and_named(station):
+    items = [{}, {"command": 201}, {}, {}]  # QGroundControl names the item that it sent last
+    station.send(mavlink.MAVLink_mission_count_message(1, 1, 4 + first(station), 0))
+    for seq in range(1 + first(station)):
+        station.send(item(seq))
+    *texts, ack = station.send(item(1 + first(station), **items[1]))
+    assert ack.type == mavlink.MAV_MISSION_UNSUPPORTED
+    text = "".join(part.text for part in texts)
+    assert text == f"Refused: mission item {1 + first(station)}: command 201 DO_SET_ROI is not known in a mission"
+    assert station.send(item(2 + first(station)))[-1].type == mavlink.MAV_MISSION_ERROR  # it is over
+
+
+def test_a_speed_of_a_mission_is_a_parameter_from_then_on(station):
+    upload(station, {}, {"command": SPEED, "numbers": (1, 0.25, -1, 0)}, {})
+    for item in (0.0, 2.0):  # the step of item 1 was not seen
+        station.look(1.0 + item, **{"helm.mode": 3.0, "helm.item": item})
+    (value,) = station.send(mavlink.MAVLink_param_request_read_message(1, 1, b"LAW_SPEED", -1))
+    assert value.param_value == 0.25
+    assert [m.seq for m in station.wire.of("MISSION_ITEM_REACHED")] == [first(station)]  # nor is it told of
+    station.ordered()
+    station.send(mavlink.MAVLink_param_set_message(1, 1, b"LAW_SPEED", 1.0, 9))
+    assert station.ordered() == [Change("law.gains.speed", 1.0)]
+
+
 @pytest.mark.parametrize(
     ("fields", "result"),
     [
@@ -106,7 +170,15 @@ def test_what_the_items_mean(station):
         ({"frame": RELATIVE_INT, "place": (0, LONGITUDE, -4.0)}, mavlink.MAV_MISSION_INVALID_PARAM5_X),
         ({"frame": RELATIVE_INT, "place": (LATITUDE, 0, -4.0)}, mavlink.MAV_MISSION_INVALID_PARAM6_Y),
         ({"place": (0, 0, 1e6)}, mavlink.MAV_MISSION_INVALID_PARAM7),
-        ({"place": (0, 0, NAN)}, mavlink.MAV_MISSION_INVALID),
+        ({"place": (0, 0, NAN)}, mavlink.MAV_MISSION_INVALID_PARAM7),
+        ({"command": SPEED, "numbers": (1, NAN, -1, 0)}, mavlink.MAV_MISSION_INVALID_PARAM2),
+        ({"command": SPEED, "numbers": (1, 0.0, -1, 0)}, mavlink.MAV_MISSION_INVALID_PARAM2),
+        ({"command": YAW, "numbers": (90, 0, 1, 1)}, mavlink.MAV_MISSION_INVALID_PARAM4),
+        ({"command": YAW, "numbers": (NAN, 0, 0, 0)}, mavlink.MAV_MISSION_INVALID_PARAM1),
+        ({"command": DELAY, "numbers": (-1, 0, 0, 0)}, mavlink.MAV_MISSION_INVALID_PARAM1),
+        ({"command": JUMP, "numbers": (9, 1, 0, 0)}, mavlink.MAV_MISSION_INVALID_PARAM1),
+        ({"command": JUMP, "numbers": (-1, 1, 0, 0)}, mavlink.MAV_MISSION_INVALID_PARAM1),
+        ({"command": JUMP, "numbers": (1, NAN, 0, 0)}, mavlink.MAV_MISSION_INVALID_PARAM2),
     ],
 )
 def test_what_cannot_be_flown_is_refused_whole(station, fields, result):

@@ -147,6 +147,16 @@ def test_landing_is_surfacing_and_home_is_at_the_surface(station):
     assert station.ordered() == [Steer("surface"), Aim((0.0, 0.0, 0.5), 0.3)]
 
 
+@pytest.mark.parametrize("profile", ["px4", "generic"])
+def test_px4s_mode_of_return_is_an_order_to_surface_at_home(profile):
+    station = Station(profile)
+    station.look()
+    assert station.command(176, 129, 4, 5) == ACCEPTED
+    station.send(mavlink.MAVLink_set_mode_message(1, 1, 4 << 16 | 5 << 24))
+    assert station.ordered() == [Aim((0.0, 0.0, 0.5), 0.3)] * 2
+    assert station.command(176, 129, -4, -5) == mavlink.MAV_RESULT_FAILED
+
+
 def test_a_restart_is_refused_while_armed(station):
     assert station.command(246, 1.0) == DENIED
     assert station.command(246, 1.0, 0, 0, 0, 0, 20190226.0) == ACCEPTED

@@ -12,6 +12,7 @@ from cosim.helm.orders import Change
 from cosim.mavlink.services.packed_parameters import bare_crc32, hash_check
 from cosim.mavlink.services.parameter_names import parameter_names
 from cosim.mavlink.services.parameters import shortest
+from cosim.mavlink.services.station_parameters import station_parameters
 from cosim.scenario import load_scenario
 from cosim.scenario_file import shipped_scenarios
 from tests.cosim.mavlink.station import NAN, Station, Wire, scenario
@@ -84,6 +85,53 @@ def test_the_list_is_whole(station):
     assert by_name["GOAL_RADIUS"] == 0.5 and by_name["SYSID_THISMAV"] == 1.0 and by_name["FRAME_CONFIG"] == 7.0
 
 
+# what QGroundControl reads as it connects, then for its summary; src/AutoPilotPlugins/APM and PX4 of 2026-05-02
+SUB = [
+    *(f"COMPASS_DEV_ID{i}" for i in ("", 2, 3)), *(f"INS_ACCOFFS_{a}" for a in "XYZ"),
+    *(f"COMPASS_OFS{i}_{a}" for i in ("", 2, 3) for a in "XYZ"), "COMPASS_DEC", "FRAME_CONFIG", "BATT_MONITOR",
+    "FS_EKF_ACTION", "FS_GCS_ENABLE", "FS_GCS_TIMEOUT", "FS_OPTIONS", "FS_LEAK_ENABLE", "FS_PILOT_INPUT",
+    "FS_TEMP_ENABLE", "FS_PRESS_ENABLE", *(f"SERVO{i}_FUNCTION" for i in range(5, 15)),
+]  # fmt: skip
+PX4 = [
+    "SYS_AUTOSTART", "CAL_ACC0_ID", "CAL_GYRO0_ID", *(f"CAL_MAG{i}_ID" for i in range(3)), "COM_RC_IN_MODE",
+    *(f"RC_MAP_{stick}" for stick in ("ROLL", "PITCH", "YAW", "THROTTLE", "FLAPS", "AUX1", "AUX2")), "MAV_SYS_ID",
+    *(f"COM_FLTMODE{i}" for i in range(1, 7)), "RTL_RETURN_ALT", "RTL_DESCEND_ALT", "RTL_LAND_DELAY",
+    "COM_RC_LOSS_T", "COM_LOW_BAT_ACT", "NAV_RCL_ACT", "NAV_DLL_ACT", "COM_DL_LOSS_T",
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("profile", "names"), [("ardusub", SUB), ("px4", PX4)])
+def test_what_qgroundcontrol_looks_for_is_there_and_needs_no_setup(profile, names):
+    station = Station(profile, loss_action="surface")
+    values = {name: read(station, name)[0].param_value for name in names}
+    if profile == "ardusub":  # APMSensorsComponent::setupComplete
+        assert all(values[f"COMPASS_DEV_ID{i}"] == 0 for i in ("", 2, 3))
+        assert any(values[f"INS_ACCOFFS_{axis}"] != 0 for axis in "XYZ")
+        assert read(station, "SERVO8_FUNCTION")[0].param_value == 40  # motor 8, and there is no ninth
+        assert values["SERVO9_FUNCTION"] == 0
+    else:  # AirframeComponent, SensorsComponent and PX4RadioComponent::setupComplete
+        assert values["SYS_AUTOSTART"] != 0 and values["CAL_ACC0_ID"] != 0 and values["CAL_GYRO0_ID"] != 0
+        assert read(station, "SYS_HAS_MAG")[0].param_value == 0 and values["COM_RC_IN_MODE"] == 1
+        assert values["NAV_DLL_ACT"] == 3  # land
+    error, _ = put(station, names[0], 5.0)
+    assert error.error == mavlink.MAV_PARAM_ERROR_READ_ONLY
+
+
+def test_the_frame_is_that_of_the_vehicle():
+    heavy = scenario(name="pipe-inspection")
+    assert heavy.vehicle.name == "bluerov2_heavy"
+    assert read(Station("ardusub", of=heavy), "FRAME_CONFIG")[0].param_value == 2.0  # vectored_6dof
+    assert read(Station("px4", of=heavy), "SYS_AUTOSTART")[0].param_value == 60002.0
+
+
+@pytest.mark.parametrize("name", shipped_scenarios())
+def test_no_setting_is_hidden_by_a_name_that_stations_look_for(name):
+    keys = [setting.key for setting in LiveSettings(scenario(name=name))]
+    taken = set(parameter_names(keys).values())
+    for profile in ("ardusub", "px4"):
+        assert not taken & set(station_parameters(Station(profile).autopilot._vessel))
+
+
 def test_a_flood_of_requests_makes_one_list(station):
     for _ in range(1000):
         station.send(LIST)
@@ -125,9 +173,9 @@ def test_the_same_value_makes_no_order(station):
     station.send(LIST)
     station.wait(0.1)
     for value in station.wire.of("PARAM_VALUE"):
-        if value.param_id not in ("SYSID_THISMAV", "FRAME_CONFIG"):
-            (back,) = put(station, value.param_id, value.param_value)
-            assert back.param_value == value.param_value
+        *errors, back = put(station, value.param_id, value.param_value)
+        assert back.param_value == value.param_value
+        assert [error.error for error in errors] in ([], [mavlink.MAV_PARAM_ERROR_READ_ONLY])
     assert station.ordered() == []
 
 

@@ -7,7 +7,7 @@ import pytest
 from pymavlink.dialects.v20 import all as mavlink
 
 from controller.quaternion import from_axis_angle
-from cosim.helm.orders import Aim, Face, Forget, Obstacle, Sticks
+from cosim.helm.orders import Aim, Face, Forget, Obstacle, Steer, Sticks
 from cosim.mavlink.geodesy import LocalFrame
 from tests.cosim.mavlink.station import NAN, Station
 
@@ -59,7 +59,7 @@ def test_depth_alone(station):
 
 @pytest.mark.parametrize("message", [
     local(mask=0b110111000111), local(mask=0b111111111100), local(mask=POSITION | 1), local(frame=4), local(frame=20),
-    local(place=(NAN, 0, 0)), local(place=(math.inf, 0, 0)), local(place=(1e6, 0, 0)), local(mask=POSITION | 512),
+    local(place=(NAN, 0, 0)), local(place=(math.inf, 0, 0)), local(place=(1e6, 0, 0)), local(mask=0b111000111000),
     local(mask=WITH_VELOCITY, speed=(NAN, 0, 0)), local(mask=WITH_VELOCITY, speed=(1e4, 0, 0)),
 ])  # fmt: skip
 def test_what_is_no_place_is_refused_with_a_word(station, message):
@@ -115,13 +115,55 @@ def test_reposition(station):
     assert station.command_int(REPOSITION, 0, (-1.0, 1.0, 0.0, 0.5), x, y, z) == mavlink.MAV_RESULT_ACCEPTED
     assert station.command(REPOSITION, -1.0, 1.0, 0.0, NAN, x / 1e7, y / 1e7, z) == mavlink.MAV_RESULT_ACCEPTED
     assert station.command_int(REPOSITION, 1, (-1, 1, 0, NAN), 10_000, 20_000, 3.0) == mavlink.MAV_RESULT_ACCEPTED
-    assert station.command(REPOSITION, -1.0, 1.0) == mavlink.MAV_RESULT_ACCEPTED  # here
-    first, face, second, third, here = station.ordered()
+    first, face, second, third = station.ordered()
     assert first.position == pytest.approx((30.0, -20.0, 4.0), abs=0.02) and face == Face(0.5)
     assert second.position == pytest.approx((30.0, -20.0, 4.0), abs=3.0)  # a float32 of degrees
-    assert third == Aim((1.0, 2.0, 3.0)) and here == Aim((1.0, 2.0, 5.0))
+    assert third == Aim((1.0, 2.0, 3.0))
     assert station.command_int(REPOSITION, 11, (-1, 1, 0, NAN), x, y, z) == mavlink.MAV_RESULT_UNSUPPORTED
     assert station.command_int(REPOSITION, 0, (-1, 1, 0, NAN), 0, 0, 0.0) == mavlink.MAV_RESULT_DENIED
+
+
+def test_reposition_without_a_place_holds_this_one(station):
+    assert station.command(REPOSITION, -1.0, 1.0, 0.0) == mavlink.MAV_RESULT_ACCEPTED  # QGroundControl's pause for PX4
+    assert station.command(REPOSITION, -1.0, 1.0, 0.0, 0.5) == mavlink.MAV_RESULT_ACCEPTED
+    assert station.command(REPOSITION, -1.0, 1.0, 0.0, NAN, NAN, NAN, -2.0) == mavlink.MAV_RESULT_ACCEPTED
+    assert station.ordered() == [Steer("hold"), Steer("hold"), Face(0.5), Aim((1.0, 2.0, 2.0))]
+
+
+def test_another_depth_as_qgroundcontrol_asks_ardupilot_for_it(station):
+    deeper = local(frame=7, mask=0xFFF8, place=(0.0, 0.0, 1.5))  # APMFirmwarePlugin::guidedModeChangeAltitude
+    station.send(deeper)
+    station.wait(0.5)
+    station.send(deeper)  # of a stream: the same order
+    station.wait(2.0)
+    station.look(2.0, **{"position.z": 6.5})
+    station.send(deeper)  # again, after a while
+    assert station.ordered() == [Aim((1.0, 2.0, 6.5)), Aim((1.0, 2.0, 8.0))]
+
+
+def guided(current, frame=3, place=(55.9098, -3.3202, -4.0), command=16):
+    """Return what QGroundControl sends ArduPilot for "go to location", a float32 of degrees."""
+    return mavlink.MAVLink_mission_item_message(1, 1, 0, frame, command, current, 1, 0, 0, 0, 0, *place)
+
+
+def test_go_to_location_as_qgroundcontrol_asks_ardupilot_for_it(station):
+    (ack,) = station.send(guided(2))
+    assert (ack.get_type(), ack.type) == ("MISSION_ACK", mavlink.MAV_MISSION_ACCEPTED)
+    (order,) = station.ordered()
+    expected = LocalFrame(55.9097, -3.3203).to_local(55.9098, -3.3202, 0.0)
+    assert order.position == pytest.approx((*expected[:2], 4.0), abs=0.5)
+    assert station.send(guided(3))[-1].type == mavlink.MAV_MISSION_ACCEPTED
+    assert station.ordered() == [Aim((8.0, 0.0, 4.0))]  # the target's depth alone
+
+
+def test_a_place_to_go_to_that_cannot_be_is_refused(station):
+    assert station.send(guided(2, frame=10))[-1].type == mavlink.MAV_MISSION_UNSUPPORTED_FRAME
+    assert station.send(guided(2, command=17))[-1].type == mavlink.MAV_MISSION_UNSUPPORTED
+    assert station.send(guided(2, place=(0.0, 0.0, 0.0)))[-1].type == mavlink.MAV_MISSION_DENIED
+    assert station.send(guided(2, place=(math.inf, -3.3, -4.0)))[-1].type == mavlink.MAV_MISSION_INVALID
+    assert station.ordered() == []
+    assert station.send(guided(2, place=(55.9097, -3.3203, NAN)))[-1].type == mavlink.MAV_MISSION_ACCEPTED
+    assert station.ordered()[0].position[2] == 5.0  # as deep as it is
 
 
 def test_turning(station):

@@ -118,6 +118,7 @@ def down(u):
     return (0.0,) * 4 + (-u,) * 4
 
 
+@pytest.mark.slow
 def test_it_is_held_until_controls_come_and_then_each_is_a_step(serve_px4):
     served = serve_px4("time.duration=0.4")
     with Px4(served.address) as px4:
@@ -201,6 +202,7 @@ def test_one_that_leaves_and_comes_again_begins_a_new_run(serve_px4):
     assert two.folder.name == f"{one.folder.name}-2"
 
 
+@pytest.mark.slow
 def test_garbage_between_the_frames_does_nothing(serve_px4):
     found = []
     for rubbish in (b"", b"\x00not mavlink\xff", packed(93, 1, 1, *[1.0] * 16, ARMED)[:-1] + b"\0"):

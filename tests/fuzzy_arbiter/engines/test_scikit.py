@@ -267,6 +267,7 @@ def test_threads_do_not_disturb_each_other():
     assert found.tolist() == expected.tolist()
 
 
+@pytest.mark.slow
 def test_nothing_of_an_engine_or_of_a_thread_stays():
     """scikit-fuzzy keeps each system that was ever run, 51 KB of it, in dictionaries of its classes."""
     system = prioritised(points=11)

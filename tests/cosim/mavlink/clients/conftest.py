@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import contextlib
 import fcntl
+import json
 import shutil
+import signal
 import socket
 import subprocess
 import sys
@@ -13,6 +15,8 @@ from pathlib import Path
 import pytest
 
 INSTALLING = 420.0  # s, for pip or npm
+ENDING = 60.0  # s, for a run to write what it has
+INTERRUPTED = 130
 HERE = Path(__file__).parent
 
 
@@ -65,6 +69,29 @@ def _install(command, folder=None):
     except subprocess.CalledProcessError as error:
         last = (error.stderr.strip().splitlines() or ["no word of why"])[-1]
         pytest.skip(f"cannot be installed: {last}")
+
+
+@contextlib.contextmanager
+def cosim_run(folder, profile, *endpoints):
+    """Run the command as a user does, until the context ends by Ctrl-C; it is armed and heeds commands."""
+    links = [word for endpoint in endpoints for word in ("--mavlink", endpoint)]
+    process = subprocess.Popen(
+        [sys.executable, "-m", "cosim", "run", "paper-limited", "--set", "time.duration=3600", "--commands",
+         "--profile", profile, "--rate", "1", "--no-report", "--out", str(folder), *links],
+        stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+    )  # fmt: skip
+    try:
+        yield process
+    finally:
+        process.send_signal(signal.SIGINT)
+        said, _ = process.communicate(timeout=ENDING)
+    assert process.returncode == INTERRUPTED, said
+    assert "Traceback" not in said and "times" not in said, said
+
+
+def orders_of(folder):
+    """Return the names of the orders that a run took, in their order."""
+    return [json.loads(line)["order"]["order"] for line in (folder / "orders.jsonl").read_text().splitlines()]
 
 
 @pytest.fixture(scope="session")

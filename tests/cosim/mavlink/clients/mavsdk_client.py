@@ -8,6 +8,7 @@ import contextlib
 import json
 import math
 import os
+import socket
 import sys
 import time
 
@@ -20,16 +21,19 @@ try:  # MAVSDK 4: in this process
     from mavsdk.asyncio.plugins.param import ParamAsync
     from mavsdk.asyncio.plugins.telemetry import TelemetryAsync
     from mavsdk.plugins.info import InfoError
+    from mavsdk.plugins.mission_raw import MissionItem
     from mavsdk.plugins.offboard import PositionNedYaw
     from mavsdk.plugins.param import ParamError
 except ImportError:
     Mavsdk = None
     from mavsdk import System
     from mavsdk.info import InfoError
+    from mavsdk.mission_raw import MissionItem
     from mavsdk.offboard import PositionNedYaw
     from mavsdk.param import ParamError
 
 PATIENCE = 20.0  # s, for a step
+SETTLED = 0.05
 FAR, NEARER = 4e-5, 1e-5  # deg, about 4.4 m and 1.1 m
 
 
@@ -38,7 +42,10 @@ class Vehicle:
 
     async def connect(self, address):
         if Mavsdk is None:
-            self.system = System()
+            with socket.socket() as free:  # of several servers at once each needs a port of its own
+                free.bind(("127.0.0.1", 0))
+                port = free.getsockname()[1]
+            self.system = System(port=port)
             await self.system.connect(system_address=address)
             await first(self.system.core.connection_state(), lambda state: state.is_connected)
             for name in ("telemetry", "param", "action", "mission_raw", "offboard", "info"):
@@ -92,7 +99,7 @@ async def steps(vehicle, address):
 
     async def change_param():
         found = await vehicle.param.get_all_params()
-        before = next(p for p in found.float_params if p.value > 1.0)
+        before = next(p for p in found.float_params if p.name.startswith("LAW_"))
         await vehicle.param.set_param_float(before.name, before.value * 1.25)
         after = await vehicle.param.get_param_float(before.name)
         await vehicle.param.set_param_float(before.name, before.value)
@@ -101,7 +108,7 @@ async def steps(vehicle, address):
     async def refused_param():
         """Ask for what is out of range."""
         found = await vehicle.param.get_all_params()
-        before = next(p for p in found.float_params if p.value > 1.0)
+        before = next(p for p in found.float_params if p.name.startswith("LAW_"))
         try:
             await vehicle.param.set_param_float(before.name, -1e30)
         except ParamError as error:
@@ -145,11 +152,26 @@ async def steps(vehicle, address):
     async def missions():
         return len(await vehicle.mission_raw.download_mission())
 
+    async def mission():
+        """Upload regions about where it is, read them back, and set out."""
+        there = await first(vehicle.stream("position"))
+        items = [
+            MissionItem(i, 6, 16, int(i == 0), 1, 0.0, 1.0, 0.0, math.nan,
+                        round(1e7 * (there.latitude_deg + i * NEARER)), round(1e7 * there.longitude_deg), -3.0, 0)
+            for i in range(3)
+        ]  # fmt: skip
+        await vehicle.mission_raw.upload_mission(items)
+        back = await vehicle.mission_raw.download_mission()
+        await vehicle.mission_raw.start_mission()
+        shown = await mode("MISSION")
+        await vehicle.mission_raw.clear_mission()
+        return [[fields(item, "command", "x", "y", "z") for item in some] for some in (items, back)] + [shown]
+
     async def speed():
-        """Return how fast the clock goes, which is known after some messages only."""
+        """Return how fast the clock goes, once the estimate, which takes some messages, has come near to 1."""
         while True:
             with contextlib.suppress(InfoError):
-                if math.isfinite(factor := await vehicle.info.get_speed_factor()):
+                if abs((factor := await vehicle.info.get_speed_factor()) - 1.0) < SETTLED:
                     return factor
             await asyncio.sleep(0.2)
 
@@ -165,6 +187,7 @@ async def steps(vehicle, address):
     yield "speed", speed()
     yield "arm", arm()
     yield "go_to", go_to()
+    yield "mission", mission()
     yield "hold", hold()
     yield "offboard", offboard()
     yield "disarm", disarm()

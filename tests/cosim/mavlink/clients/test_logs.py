@@ -22,9 +22,12 @@ pytestmark = pytest.mark.slow
 
 READING = 120.0  # s
 LISTENING = 8.0  # s
-STREAMED = {"HEARTBEAT", "ATTITUDE", "NAMED_VALUE_FLOAT", "DEBUG_FLOAT_ARRAY", "STATUSTEXT", "COMMAND_LONG"}
-ANSWERED = {"PARAM_VALUE", "COMMAND_ACK", "AUTOPILOT_VERSION", "AVAILABLE_MODES", "MISSION_COUNT", "ATTITUDE"}
-LOGS = [pytest.param(0, STREAMED, id="log of the vehicle"), pytest.param(1, ANSWERED, id="log of the station")]
+SENT = {"HEARTBEAT", "ATTITUDE", "NAMED_VALUE_FLOAT", "DEBUG_FLOAT_ARRAY", "STATUSTEXT", "PARAM_VALUE", "COMMAND_ACK",
+        "AUTOPILOT_VERSION", "AVAILABLE_MODES", "MISSION_COUNT"}  # fmt: skip
+LOGS = [
+    pytest.param(0, SENT | {"COMMAND_LONG", "PARAM_REQUEST_LIST"}, id="log of the vehicle"),
+    pytest.param(1, SENT, id="log of the station"),
+]
 TOOLS = ("pymavlink>=2.4.49", "setuptools<81", "fastcrc", "matplotlib")
 
 

@@ -10,9 +10,7 @@ import pytest
 
 pytest.importorskip("pymavlink", reason="the mavlink extra is not installed")
 
-from cosim.mavlink.conformance.vehicle import running_vehicle
-from cosim.mavlink.endpoint import parse_endpoint
-from cosim.mavlink.options import MavlinkOptions
+from tests.cosim.mavlink.clients.conftest import cosim_run, orders_of
 
 pytestmark = pytest.mark.slow
 
@@ -72,18 +70,9 @@ class MavProxy:
         self.process.stdout.close()
 
 
-@pytest.fixture
-def vehicle_port(udp_port):
-    port = udp_port()
-    with running_vehicle(
-        [parse_endpoint(f"udpout:127.0.0.1:{port}")], MavlinkOptions(profile="ardusub", commands=True)
-    ):
-        yield port
-
-
-def test_a_pilot_connects_arms_changes_modes_and_lists_what_there_is(environment, vehicle_port, tmp_path):
-    python = environment("mavproxy", *REQUIREMENTS) / "bin" / "python"
-    with MavProxy(python, tmp_path, vehicle_port) as mavproxy:
+def test_a_pilot_connects_arms_changes_modes_and_lists_what_there_is(environment, udp_port, tmp_path):
+    python, port, folder = environment("mavproxy", *REQUIREMENTS) / "bin" / "python", udp_port(), tmp_path / "run"
+    with cosim_run(folder, "ardusub", f"udpout:127.0.0.1:{port}"), MavProxy(python, tmp_path, port) as mavproxy:
         mavproxy.see(r"Detected vehicle 1:1")
         received = int(mavproxy.see(r"Received (\d+) parameters").group(1))
         assert received > 10
@@ -101,3 +90,4 @@ def test_a_pilot_connects_arms_changes_modes_and_lists_what_there_is(environment
         text = mavproxy.text.lower()
     assert "fence breach" not in text
     assert "traceback" not in text and "error in" not in text
+    assert orders_of(folder)[:2] == ["arm", "arm"] and orders_of(folder).count("steer") == 4

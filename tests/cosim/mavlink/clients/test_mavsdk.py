@@ -7,10 +7,8 @@ import pytest
 
 pytest.importorskip("pymavlink", reason="the mavlink extra is not installed")
 
-from cosim.mavlink.conformance.vehicle import running_vehicle
-from cosim.mavlink.endpoint import parse_endpoint
 from cosim.mavlink.options import MavlinkOptions
-from tests.cosim.mavlink.clients.conftest import HERE
+from tests.cosim.mavlink.clients.conftest import HERE, cosim_run, orders_of
 
 pytestmark = pytest.mark.slow
 
@@ -24,19 +22,19 @@ def generation(request):
 
 
 @pytest.fixture(scope="module", params=["px4", "generic"])
-def flown(request, generation, environment, udp_port):
-    """Return what each step gave, and how long it took."""
+def flown(request, generation, environment, udp_port, tmp_path_factory):
+    """Return what each step gave, how long it took, and under `orders` what the run was ordered."""
     python = environment(generation, REQUIREMENTS[generation]) / "bin" / "python"
     port = udp_port()
-    options = MavlinkOptions(profile=request.param, commands=True)
-    with running_vehicle([parse_endpoint(f"udpout:127.0.0.1:{port}")], options):
+    folder = tmp_path_factory.mktemp("flown") / "run"
+    with cosim_run(folder, request.param, f"udpout:127.0.0.1:{port}"):
         done = subprocess.run(
             [python, "-W", "ignore", HERE / "mavsdk_client.py", f"udpin://127.0.0.1:{port}"],
             capture_output=True, text=True, timeout=RUNNING,
         )  # fmt: skip
     lines = [line for line in done.stdout.splitlines() if line.startswith("{")]
     assert lines, done.stderr[-2000:]
-    return json.loads(lines[-1])
+    return json.loads(lines[-1]) | {"orders": orders_of(folder)}
 
 
 def value(flown, step):
@@ -45,7 +43,7 @@ def value(flown, step):
 
 
 def test_every_step_comes_to_its_end(flown):
-    assert {name: done["error"] for name, done in flown.items() if "error" in done} == {}
+    assert {name: done["error"] for name, done in flown.items() if "error" in done and name != "orders"} == {}
 
 
 def test_health_is_all_ok(flown):
@@ -80,9 +78,20 @@ def test_a_go_to_moves_the_vehicle(flown):
     assert abs(after - target) < abs(before - target)
 
 
+def test_a_mission_of_regions_is_uploaded_read_back_and_begun(flown):
+    items, back, mode = value(flown, "mission")
+    assert len(back) == 3 and mode == "MISSION"
+    for sent, came in zip(items, back, strict=True):
+        assert came[:3] == sent[:3] and came[3] == pytest.approx(sent[3], abs=1e-3)
+
+
 def test_hold_and_offboard_are_shown_as_such(flown):
     assert value(flown, "hold") == "HOLD"
     assert value(flown, "offboard") == "OFFBOARD"
+
+
+def test_what_was_commanded_is_in_the_log_of_the_run(flown):
+    assert {"arm", "steer", "aim", "change", "mission"} <= set(flown["orders"])
 
 
 def test_its_clock_goes_as_the_wall_clock_does(flown):
