@@ -18,6 +18,7 @@ _SIGNATURE = 13  # bytes
 _CRC = 2  # bytes
 _SETUP_SIGNING = 256
 _V2_HEADER = struct.Struct("<BBBxxBBHB")  # marker, length, flags, system, component, id in two parts
+_V2_WHOLE = struct.Struct("<BBBBBBBHB")  # the same with what is skipped there: further flags and sequence number
 _V1_HEADER = struct.Struct("<BBxBBB")  # marker, length, system, component, id
 _HEADERS = {b"\xfd": _V2_HEADER.size, b"\xfe": _V1_HEADER.size}
 _MARKER = re.compile(rb"[\xfd\xfe]")
@@ -111,6 +112,51 @@ def header_at(data: bytes, at: int) -> Header | None:
         end = _V1_HEADER.size + length
         return Header(end + _CRC, _V1_HEADER.size, end, False, system, component, message)
     return None
+
+
+class Framer:
+    """Makes frames of messages, unsigned, as pymavlink makes them, in less than half the time.
+
+    Parameters
+    ----------
+    source : (int, int)
+        System and component that sends them.
+
+    Attributes
+    ----------
+    seq : int
+        Of the next frame, 0 to 255.
+    """
+
+    def __init__(self, source: tuple[int, int]) -> None:
+        self._source = source
+        self._crc = dialect().x25crc
+        self._message = 0
+        self.seq = 0
+
+    def frame(self, message: Any) -> bytes:
+        """Return a message as a frame.
+
+        Raises
+        ------
+        struct.error, OverflowError, IndexError, TypeError, ValueError
+            If a field cannot hold its value.
+        """
+        self._message = message.get_msgId()  # its `id` may be a field
+        message._pack = self._framed  # which the message's own `pack` calls with its payload
+        try:
+            framed: bytes = message.pack(None)
+        finally:
+            del message._pack  # another link may sign it
+        return framed
+
+    def _framed(self, codec: None, crc_extra: int, payload: bytes, force_mavlink1: bool = False) -> bytes:
+        payload = payload.rstrip(b"\0") or payload[:1]  # zeros at the end are not sent
+        system, component = self._source
+        number = self._message & 0xFFFF, self._message >> 16
+        body = _V2_WHOLE.pack(V2, len(payload), 0, 0, self.seq, system, component, *number) + payload
+        crc: int = self._crc(body[1:] + bytes((crc_extra,))).crc
+        return body + crc.to_bytes(_CRC, "little")
 
 
 class Gate:

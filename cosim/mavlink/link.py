@@ -16,7 +16,7 @@ from cosim.mavlink.channels.tlog import Tlog
 from cosim.mavlink.channels.udp import UdpIn, UdpOut
 from cosim.mavlink.dialect import dialect
 from cosim.mavlink.endpoint import Endpoint
-from cosim.mavlink.framing import Counts, Gate, StreamReader
+from cosim.mavlink.framing import Counts, Framer, Gate, StreamReader
 from cosim.mavlink.options import MavlinkOptions
 from cosim.mavlink.signing import SigningClock, Verifier
 
@@ -142,6 +142,7 @@ class Link:
         self.sent = self.dropped = self.unencodable = 0
         self._gate, self._signer = gate, signer
         self._budget = None if budget is None else Budget(budget)
+        self._framer = Framer(source)
         self._codec = dialect().MAVLink(None, *source)
         if signer is not None:
             signer.set_up(self._codec.signing)
@@ -156,10 +157,8 @@ class Link:
 
     def send(self, message: Any) -> bool:
         """Encode, sign where that is asked for, and send a message; return whether it went to all peers."""
-        if self._signer is not None:
-            self._signer.stamp(self._codec.signing)
         try:
-            frame: bytes = message.pack(self._codec)
+            frame = self._framer.frame(message) if self._signer is None else self._signed(message, self._signer)
         except _UNENCODABLE as error:
             self.unencodable += 1
             if message.get_type() not in self._told:
@@ -169,13 +168,19 @@ class Link:
         if self._budget is not None and not self._budget.take(len(frame), message.get_type() in _FIRST):
             self.dropped += 1
             return False
-        self._codec.seq = (self._codec.seq + 1) % 256
+        self._framer.seq = (self._framer.seq + 1) % 256
         self.sent += 1
         sent = self.channel.send(frame)
         if message.get_type() in _ANSWERS:
             for tlog in self.logs:
                 tlog.send(message)
         return sent
+
+    def _signed(self, message: Any, signer: Signer) -> bytes:
+        signer.stamp(self._codec.signing)
+        self._codec.seq = self._framer.seq
+        frame: bytes = message.pack(self._codec)
+        return frame
 
     def receive(self, until: float) -> Iterator[tuple[bytes, Any]]:
         """Yield frames that are heeded, and what they say, until nothing is left or a moment of `time.perf_counter`.

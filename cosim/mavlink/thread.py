@@ -24,7 +24,9 @@ log = logging.getLogger(__name__)
 
 SNAPSHOT_PERIOD = 0.01  # s, simulated: the fastest that a stream can be
 SNAPSHOTS = 4096  # that wait at the most; when the thread falls behind, the oldest go
-_PERIOD = 0.01  # s, after which it looks again where there was nothing to do: each look costs the stepper 0.1 ms
+_PERIOD = 0.02  # s, after which it looks again where there was nothing to do: each look costs the stepper 0.1 ms
+_RUSHING = 0.05  # s, the same in a run that is much faster than real time, whose stepper never pauses
+_MANY = 10  # snapshots at one look that tell of such a run
 _SOON = 0.004  # s, the same while somebody speaks, who may wait for an answer
 _TALKING = 0.1  # s, for which somebody is taken to speak after what was heeded last
 _RECEIVING = 0.2e-3  # s, of a slice, for all links together
@@ -144,7 +146,7 @@ class LinkThread:
         for link in self._links:
             self._guard("attach", self._vehicle.attach, link)
         while not self._closing.is_set():
-            self._closing.wait(self._turn())
+            time.sleep(self._turn())  # and not on an event: that gives the interpreter up several times
         deadline = time.perf_counter() + _DRAINING
         while self._send_queued(time.perf_counter() + _SENDING) and time.perf_counter() < deadline:
             self._tend(time.monotonic())
@@ -158,6 +160,7 @@ class LinkThread:
         for link in self._links:
             self._guard("receive", self._receive, link, time.perf_counter() + _RECEIVING / len(self._links))
         received = time.perf_counter()
+        waiting = len(self._queue)
         more = self._send_queued(received + _SENDING)
         now = time.monotonic()
         if now >= self._next_tick:
@@ -169,7 +172,9 @@ class LinkThread:
         rest = min(rest, _LONGEST_REST)
         if more:
             return rest
-        return max(rest, _SOON if now - self._heard < _TALKING else _PERIOD)
+        if now - self._heard < _TALKING:
+            return max(rest, _SOON)
+        return max(rest, _RUSHING if waiting > _MANY else _PERIOD)
 
     def _tend(self, now: float) -> None:
         for link in self._links:

@@ -5,9 +5,6 @@ from __future__ import annotations
 import math
 from functools import cached_property
 
-import numpy as np
-
-from controller.quaternion import rotation_matrix
 from cosim.helm.orders import MODES, Mode
 from cosim.mavlink.layout import Layout
 from cosim.scenario import CRITERIA
@@ -87,15 +84,20 @@ class View:
         return self._three("velocity.p")
 
     @cached_property
-    def _rotation(self) -> list[list[float]]:
-        rows: list[list[float]] = rotation_matrix(np.array(self.quaternion)).tolist()
-        return rows
+    def _rotation(self) -> tuple[Vector3, Vector3, Vector3]:
+        """R from body to world, (3): plain numbers, since arrays of nine take longer."""
+        e0, e1, e2, e3 = self.quaternion
+        return (
+            (1.0 - 2.0 * (e2 * e2 + e3 * e3), 2.0 * (e1 * e2 - e0 * e3), 2.0 * (e1 * e3 + e0 * e2)),
+            (2.0 * (e1 * e2 + e0 * e3), 1.0 - 2.0 * (e1 * e1 + e3 * e3), 2.0 * (e2 * e3 - e0 * e1)),
+            (2.0 * (e1 * e3 - e0 * e2), 2.0 * (e2 * e3 + e0 * e1), 1.0 - 2.0 * (e1 * e1 + e2 * e2)),
+        )
 
     def to_world(self, vector_body: Vector3) -> Vector3:
         """Turn a vector from the body's axes into the world's, NED."""
+        (a, b, c), (d, e, f), (g, h, i) = self._rotation
         x, y, z = vector_body
-        north, east, down = (r[0] * x + r[1] * y + r[2] * z for r in self._rotation)
-        return north, east, down
+        return a * x + b * y + c * z, d * x + e * y + f * z, g * x + h * y + i * z
 
     def to_body(self, vector_ned: Vector3) -> Vector3:
         """Turn a vector from the world's axes, NED, into the body's."""
