@@ -43,7 +43,7 @@ def test_frames_are_those_of_pymavlink(value):
 def nothing_like(value):
     if isinstance(value, list):
         return [0] * len(value)
-    return b"" if isinstance(value, str) else 0
+    return b"\0" if isinstance(value, str) else 0
 
 
 def names(frames):
