@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 
 from controller.quaternion import rotation_matrix
+from cosim.mavlink.geodesy import LocalFrame
 from cosim.sitl.motion import Motion
 
 FIELD_NED = (0.175, -0.012, 0.466)  # gauss, of the Earth, where it is told to be: near Edinburgh
 TEMPERATURE = 15.0  # degrees Celsius
 
-_EARTH_RADIUS = 6_378_137.0  # m
 _ALL_BUT_AIRSPEED = 0x1BFF  # fields of HIL_SENSOR: accelerations, rates, field, pressure, its altitude, temperature
 _GRAVITY = 9.80665  # m/s2
 _INT16, _UINT16 = 32767, 65535
@@ -40,9 +40,9 @@ def hil_messages(mavlink: Any, motion: Motion, time_us: int, origin: tuple[float
     list of messages
         HIL_GPS where it is asked for, HIL_STATE_QUATERNION, HIL_SENSOR.
     """
-    x, y, z = motion.position_ned
-    latitude, longitude = _place(x, y, origin)
-    altitude_mm = round(-1e3 * z)
+    latitude, longitude = (round(1e7 * angle) for angle in LocalFrame(*origin).to_global(motion.position_ned)[:2])
+    up = -motion.position_ned[2]
+    altitude_mm = round(1e3 * up)
     speeds = [_cut(100.0 * v, _INT16) for v in motion.velocity_ned]  # cm/s
     messages = []
     if gps:
@@ -64,7 +64,7 @@ def hil_messages(mavlink: Any, motion: Motion, time_us: int, origin: tuple[float
     messages.append(
         mavlink.MAVLink_hil_sensor_message(
             time_us, *motion.specific_force, *motion.gyro, *field_body,
-            air_pressure(-z), 0.0, -z, TEMPERATURE, _ALL_BUT_AIRSPEED,
+            air_pressure(up), 0.0, up, TEMPERATURE, _ALL_BUT_AIRSPEED,
         )
     )  # fmt: skip
     return messages
@@ -84,14 +84,6 @@ def air_pressure(altitude: float) -> float:
         Of the standard atmosphere, carried on below sea level.
     """
     return float(1013.25 * max(0.0, 1.0 - 0.0065 * altitude / 288.15) ** (_GRAVITY * 0.0289644 / (8.31446 * 0.0065)))
-
-
-def _place(north: float, east: float, origin: tuple[float, float]) -> tuple[int, int]:
-    """Return latitude and longitude [1e-7 deg] of a place near the origin, on a sphere."""
-    latitude, longitude = origin
-    by_north = math.degrees(north / _EARTH_RADIUS)
-    by_east = math.degrees(east / (_EARTH_RADIUS * math.cos(math.radians(latitude))))
-    return round((latitude + by_north) * 1e7), round((longitude + by_east) * 1e7)
 
 
 def _cut(value: float, most: int) -> int:
