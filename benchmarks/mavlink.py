@@ -200,7 +200,7 @@ def _connecting(repeats: int) -> list[Row]:
             with own_vehicle(profile) as link:
                 found.append(qgc_connect(Client(link)))
         seconds = statistics.median(one.seconds for one in found)
-        told = f"{seconds:.3f} s, {max(one.retries for one in found)} retries at the most; median of {repeats}"
+        told = f"{seconds:.3f} s, the median; at the most {max(one.retries for one in found)} retries; not timed a step"
         rows.append(Row(f"QGroundControl connects, {profile}", told, ""))
     return rows
 

@@ -60,9 +60,11 @@ def bad_upload(subject: Subject) -> Outcome:
     """Check that an item that cannot be is refused, and the mission stays as it was."""
     m, client = subject.mavlink, subject.client
     before, text, _ = fetch_mission(client, m.MAV_MISSION_TYPE_MISSION)
-    item = _item(subject, 0, 0, 0, float("nan"))
-    item.command = 65000
-    result = upload(subject, [item])
+    here = client.last("GLOBAL_POSITION_INT")
+    latitude, longitude = (0, 0) if here is None else (here.lat, here.lon)
+    first, bad = (_item(subject, i, latitude, longitude, z) for i, z in enumerate((_DEPTHS[0], float("nan"))))
+    bad.command = 65000  # and not the first item, which may stand for home
+    result = upload(subject, [first, bad])
     if result == m.MAV_MISSION_DENIED:
         return skipped("the vehicle heeds no commands")
     after, _, _ = fetch_mission(client, m.MAV_MISSION_TYPE_MISSION)
