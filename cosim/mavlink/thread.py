@@ -23,10 +23,10 @@ from cosim.signals import Array
 log = logging.getLogger(__name__)
 
 SNAPSHOT_PERIOD = 0.01  # s, simulated: the fastest that a stream can be
-SNAPSHOTS = 4096  # that wait at the most; when the thread falls behind, the oldest go
+SNAPSHOTS = 8192  # that wait at the most; when the thread falls behind, the oldest go
 _PERIOD = 0.02  # s, after which it looks again where there was nothing to do: each look costs the stepper 0.1 ms
-_RUSHING = 0.05  # s, the same in a run that is much faster than real time, whose stepper never pauses
-_MANY = 10  # snapshots at one look that tell of such a run
+_RUSHING = 0.2  # s, the same in a run that is so much faster than real time that its stepper can hardly ever pause
+_MANY = 2500  # snapshots a second of the wall clock that tell of such a run: 25 times real time
 _SOON = 0.004  # s, the same while somebody speaks, who may wait for an answer
 _TALKING = 0.1  # s, for which somebody is taken to speak after what was heeded last
 _RECEIVING = 0.2e-3  # s, of a slice, for all links together
@@ -97,6 +97,8 @@ class LinkThread:
         self._next_tick = 0.0
         self._first: float | None = None  # s, monotonic, when the first snapshot of time 0 came
         self._waited = 0.0  # s, from then to the last one: for how long arming was awaited
+        self._looked = time.perf_counter()  # s, when nothing was left to do before
+        self._shown = 0  # snapshots since then
         self._heard = -math.inf  # s, monotonic, when something was heeded last
         self.dropped = 0
         self.failures: dict[str, int] = Counter()
@@ -160,7 +162,6 @@ class LinkThread:
         for link in self._links:
             self._guard("receive", self._receive, link, time.perf_counter() + _RECEIVING / len(self._links))
         received = time.perf_counter()
-        waiting = len(self._queue)
         more = self._send_queued(received + _SENDING)
         now = time.monotonic()
         if now >= self._next_tick:
@@ -174,7 +175,9 @@ class LinkThread:
             return rest
         if now - self._heard < _TALKING:
             return max(rest, _SOON)
-        return max(rest, _RUSHING if waiting > _MANY else _PERIOD)
+        rushing = self._shown > _MANY * (began - self._looked)
+        self._shown, self._looked = 0, began
+        return max(rest, _RUSHING if rushing else _PERIOD)
 
     def _tend(self, now: float) -> None:
         for link in self._links:
@@ -191,6 +194,7 @@ class LinkThread:
         """Show the vehicle snapshots until a moment of `time.perf_counter`; return whether some are left."""
         while self._queue:
             row = self._queue.popleft()
+            self._shown += 1
             if not row[0] > 0.0:  # where it comes again, arming is awaited
                 now = time.monotonic()
                 self._first = now if self._first is None else self._first
