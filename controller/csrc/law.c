@@ -92,7 +92,8 @@ void law_step(const Real quaternion[4], const Real velocity[6], const Real desir
     }
     /* -Z^T drive: k . force part, and S(k) of the moment part */
     Real along = k[0] * drive[0] + k[1] * drive[1] + k[2] * drive[2];
-    Real turn[3] = {k[1] * drive[5] - k[2] * drive[4], k[2] * drive[3] - k[0] * drive[5], k[0] * drive[4] - k[1] * drive[3]};
+    Real turn[3] = {k[1] * drive[5] - k[2] * drive[4], k[2] * drive[3] - k[0] * drive[5],
+                    k[0] * drive[4] - k[1] * drive[3]};
     estimate[0] = estimate[0] + period * (along / gains->gamma);
     for (int j = 0; j < 3; j++)
         estimate[1 + j] = estimate[1 + j] + period * (turn[j] / gains->gamma);

@@ -138,8 +138,8 @@ static Evaluation cylinder(const Real p[3], const Real q[])
 
 enum { MOST_STEPS = 200 }; /* more than the root below ever takes */
 
-/* Distance from a point of the first octant to the surface: Newton's method from the left of the root of a function that
- * falls and is convex, so that it only grows, see controller/regions/ellipsoid.py. */
+/* Distance from a point of the first octant to the surface: Newton's method from the left of the root of a function
+ * that falls and is convex, so that it only grows, see controller/regions/ellipsoid.py. */
 static Real surface_distance(const Real point[3], const Real axes[3])
 {
     Real least = real_fmin(real_fmin(axes[0], axes[1]), axes[2]);
@@ -375,6 +375,7 @@ void regions_evaluate(const Regions *regions, const Real position[3], const Real
 Real regions_ramp(Real clearance, Real width)
 {
     Mask smooth = width > 0.0;
-    Real between = choose(smooth, 1.0 - clearance / choose(smooth, width, splat(1.0)), clearance); /* NaN alone comes here */
+    Real fallen = clearance / choose(smooth, width, splat(1.0));
+    Real between = choose(smooth, 1.0 - fallen, clearance); /* NaN alone comes to the latter */
     return choose(clearance <= 0.0, splat(1.0), choose(clearance >= width, splat(0.0), between));
 }

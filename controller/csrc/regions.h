@@ -31,13 +31,13 @@ typedef struct {
     const Real (*shifts)[3];  /* m, NED: how far each has moved from where its numbers have it */
 } Regions;
 
-/* Evaluates every region at a pose: value g_i, at most 0 where satisfied, in the unit of the shape; its gradient dg_i/dp,
- * world frame; the clearance to its surface, in metres, in radians for shapes of attitude, negative where violated. */
+/* Evaluates every region at a pose: value g_i, at most 0 where satisfied, in the unit of the shape; its gradient
+ * dg_i/dp, world frame; the clearance to its surface [m, rad for shapes of attitude], negative where violated. */
 void regions_evaluate(const Regions *regions, const Real position[3], const Real quaternion[4], Real value[],
                       Real gradient[][3], Real clearance[]);
 
-/* To what degree a region matters, given the clearance: 1 where it is violated, falling to 0 at `width` outside; NaN for
- * a clearance that is NaN. */
+/* To what degree a region matters, given the clearance: 1 where it is violated, falling to 0 at `width` outside; NaN
+ * for a clearance that is NaN. */
 Real regions_ramp(Real clearance, Real width);
 
 #endif

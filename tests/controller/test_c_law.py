@@ -256,7 +256,8 @@ def test_the_law_is_that_of_python(library):
     wrench = np.empty((m, 6))
     library.try_law(
         m, n, address(quaternions), address(velocities), address(desired), address(goal), address(values),
-        address(gradients), address(alphas), address(gains), ctypes.c_double(period), address(estimate), address(wrench),
+        address(gradients), address(alphas), address(gains), ctypes.c_double(period), address(estimate),
+        address(wrench),
     )  # fmt: skip
     np.testing.assert_allclose(wrench, expected, rtol=1e-12, atol=1e-11)
     np.testing.assert_allclose(estimate, expected_estimate, rtol=1e-12, atol=1e-12)
