@@ -109,8 +109,8 @@ def _guarded(options: argparse.Namespace) -> int:
 
 def _log(verbose: bool) -> None:
     logging.basicConfig(level=logging.WARNING, format="%(name)s: %(message)s")
-    for package in ("fuzzy_arbiter", "plant_fmu", "controller", "cosim"):
-        logging.getLogger(package).setLevel(logging.DEBUG if verbose else logging.WARNING)
+    for name in ("fuzzy_arbiter", "plant_fmu", "controller", "cosim"):
+        logging.getLogger(name).setLevel(logging.DEBUG if verbose else logging.WARNING)
 
 
 def _report(options: argparse.Namespace) -> int:

@@ -18,17 +18,17 @@ from plant_fmu.platforms import NATIVE
 from plant_fmu.variables import AXES, FORCES, VELOCITIES
 
 _EXACT = ("closed", "exact")  # engines whose weights are those of the closed form
-_MOTION = (
+MOTION = (
     *(f"position.{axis}" for axis in AXES),
     *(f"quaternion.e{i}" for i in range(4)),
     *(f"velocity.{name}" for name in VELOCITIES),
 )
-_WRENCH = tuple(f"wrench.{name}" for name in FORCES)
+WRENCH = tuple(f"wrench.{name}" for name in FORCES)
 _MEMBERSHIPS = tuple(f"membership.{name}" for name in CRITERIA)
 _WEIGHTS = tuple(f"weight.{name}" for name in CRITERIA)
 _WIRES = (
-    Wire("plant", "controller", _MOTION),
-    Wire("controller", "plant", _WRENCH),
+    Wire("plant", "controller", MOTION),
+    Wire("controller", "plant", WRENCH),
     Wire("controller", "arbiter", _MEMBERSHIPS),
     Wire("arbiter", "controller", _WEIGHTS),
 )
@@ -69,8 +69,8 @@ def package_system(scenario: Scenario, out: Path, fmi: int = 2, platforms: str =
     controller, arbiter = controller_component(scenario), arbiter_component(scenario)
     outputs = tuple(v.name for v in controller.variables if v.role == "output")
     parts = (
-        Part("plant", "resources/plant.fmu", plant_component(scenario), (*_MOTION, *_WRENCH)),
-        Part("controller", "resources/controller.fmu", controller, (*_MOTION, *_WEIGHTS, *outputs)),
+        Part("plant", "resources/plant.fmu", plant_component(scenario), (*MOTION, *WRENCH)),
+        Part("controller", "resources/controller.fmu", controller, (*MOTION, *_WEIGHTS, *outputs)),
         Part("arbiter", "resources/arbiter.fmu", arbiter, (*_MEMBERSHIPS, *_WEIGHTS)),
     )
     time = scenario.time
