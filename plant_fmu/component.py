@@ -21,8 +21,8 @@ STEP = 0.01  # s
 class Component:
     """One FMU to be built: its variables, its C code behind the common wrappers, and what it holds beside them.
 
-    Its C files bring a header ``model.h`` and the definition of ``COMPONENT``, as ``csrc/wrapper/component.h`` says. With
-    states among its variables it is for co-simulation and model exchange, without for co-simulation alone.
+    Its C files bring a header ``model.h`` and the definition of ``COMPONENT``, as ``csrc/wrapper/component.h`` says.
+    With states among its variables it is for co-simulation and model exchange, without for co-simulation alone.
     """
 
     name: str  # model identifier, and the beginning of its names in C

@@ -190,6 +190,8 @@ def _add_structure(parent: ET.Element, rows: list[Variable], fmi: int, number: d
         ("InitialUnknowns", "InitialUnknown", [v for v in rows if v.role in ("output", "derivative")], False),
     )
     for section, tag, unknowns, instant in sections:
+        if not unknowns:
+            continue
         under = ET.SubElement(parent, section) if fmi == 2 else parent
         for v in unknowns:
             depends = (v.name,) if v.role == "state" else v.depends

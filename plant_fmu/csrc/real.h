@@ -23,6 +23,7 @@ static inline Mask mask_not(Mask which) { return !which; }
 static inline int any(Mask which) { return which; }
 static inline int all(Mask which) { return which; }
 static inline int mask_lane(Mask which, int i) { return (void)i, which; }
+static inline void set_mask_lane(Mask *which, int i, int yes) { (void)i, *which = yes != 0; }
 
 static inline Real real_sqrt(Real x) { return sqrt(x); }
 static inline Real real_fabs(Real x) { return fabs(x); }
@@ -61,6 +62,7 @@ static inline int any(Mask which)
 
 static inline int all(Mask which) { return !any(~which); }
 static inline int mask_lane(Mask which, int i) { return which[i] != 0; }
+static inline void set_mask_lane(Mask *which, int i, int yes) { (*which)[i] = yes ? -1 : 0; }
 
 static inline Real real_fabs(Real x) { return (Real)((Mask)x & 0x7fffffffffffffffLL); }
 static inline Real real_fmax(Real x, Real y) { return choose(x > y, x, y); }
