@@ -68,7 +68,9 @@ def lanes_library(vehicle: Vehicle, contract: bool = False) -> ctypes.CDLL:
     compiler = find_compiler()
     flags = (*_NARROW, *_tuned(compiler), *(("-ffp-contract=fast",) if contract else ()))
     files = _files(vehicle)
-    made_from = hashlib.sha256(repr((native_platform().name, compiler, FLAGS, flags, _machine(compiler, flags))).encode())
+    made_from = hashlib.sha256(
+        repr((native_platform().name, compiler, FLAGS, flags, _machine(compiler, flags))).encode()
+    )
     for name, text in sorted(files.items()):
         made_from.update(f"\n{name} {len(text)}\n".encode() + text)
     name = f"{vehicle.name}-{made_from.hexdigest()[:16]}{native_platform().suffix}"

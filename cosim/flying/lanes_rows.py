@@ -19,7 +19,17 @@ Array = NDArray[np.float64]
 
 _PARAMETERS = "plant.parameters."
 # of what may vary: all that a row holds; and the seed, since nothing in a lane is random
-_VARIED = ("initial.", "goal.", "regions.", "law.", "limit.", "plant.current.", _PARAMETERS, "arbiter.ramp", "sensing.seed")
+_VARIED = (
+    "initial.",
+    "goal.",
+    "regions.",
+    "law.",
+    "limit.",
+    "plant.current.",
+    _PARAMETERS,
+    "arbiter.ramp",
+    "sensing.seed",
+)
 # parameters that let clocks run in the plant
 _CLOCKED = ("depth_sensor.rate", "dvl.rate", "imu.rate", "compass.rate", "usbl.rate", "current_variation.")
 # numbers that are not checked each by itself: of a unit quaternion, and of shapes whose points must not meet

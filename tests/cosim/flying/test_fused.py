@@ -134,7 +134,12 @@ def test_a_batch_flies_each_row_as_it_would_alone_and_names_what_is_refused():
 
 
 def test_a_plant_that_refuses_a_step_ends_the_flight_there():
-    given = [*BRISK, "plant.substep=0.01", "plant.parameters.quadratic_damping[1]=1e9", "initial.velocity=[1,0,0,0,0,0]"]
+    given = [
+        *BRISK,
+        "plant.substep=0.01",
+        "plant.parameters.quadratic_damping[1]=1e9",
+        "initial.velocity=[1,0,0,0,0,0]",
+    ]
     scenario = scenario_of("printed", *given)
     with FusedFlyer(Variation(scenario, [])) as flyer:
         (outcome,) = flyer.fly(np.zeros((1, 0)), np.zeros(1, int)).outcomes
