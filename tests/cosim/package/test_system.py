@@ -2,6 +2,8 @@
 
 import importlib.util
 import io
+import re
+import shlex
 import subprocess
 import sys
 import zipfile
@@ -44,6 +46,18 @@ def test_fmpy_flies_it_as_we_do(packed):
     ours = jacobi(scenario)
     assert np.linalg.norm(ours[-1, :3] - ours[0, :3]) > 0.5
     compared(ours, run_in_fmpy(packed, scenario.steps, scenario.time.step))
+
+
+@pytest.mark.slow
+def test_the_page_on_it_does_what_it_says(tmp_path, monkeypatch, capsys):
+    text = (ROOT / "docs" / "ssp.md").read_text()
+    command, code = re.search(r"```\ncosim (.*?)```", text, re.S)[1], re.search(r"```python\n(.*?)```", text, re.S)[1]
+    monkeypatch.chdir(tmp_path)
+    assert main(shlex.split(command.replace("\\\n", " "))) == 0
+    names = {}
+    exec(code, names)
+    assert len(names["result"]) == 3000
+    assert names["result"]["plant.position.z"][-1] == pytest.approx(6.2665, abs=1e-3)
 
 
 @pytest.mark.slow
