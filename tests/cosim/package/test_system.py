@@ -7,6 +7,7 @@ import shlex
 import subprocess
 import sys
 import zipfile
+from importlib import resources
 from pathlib import Path
 
 import fmpy.ssp
@@ -144,6 +145,17 @@ def test_the_scenario_within_makes_the_same_file(packed, tmp_path):
         inner = tmp_path / "all-shapes.toml"
         inner.write_bytes(archive.read("documentation/scenario.toml"))
     assert package_system(load_scenario(inner), tmp_path / "again.ssp").read_bytes() == packed.read_bytes()
+
+
+def test_a_vehicle_of_ones_own_goes_with_it(packed, tmp_path):
+    shipped = resources.files("plant_fmu") / "vehicles" / "odin.toml"
+    (tmp_path / "mine.toml").write_text(shipped.read_text().replace('name = "odin"', 'name = "mine"'))
+    scenario = load_scenario(ALL_SHAPES, [f"vehicle='{tmp_path / 'mine.toml'}'"])
+    with zipfile.ZipFile(package_system(scenario, tmp_path / "mine.ssp")) as archive:
+        archive.extractall(tmp_path / "out")
+    assert str(tmp_path) not in (tmp_path / "out" / "documentation" / "scenario.toml").read_text()
+    again = load_scenario(tmp_path / "out" / "documentation" / "scenario.toml")
+    assert again.vehicle.name == scenario.vehicle.name
 
 
 # ---- what it cannot be ----
