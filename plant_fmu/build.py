@@ -8,6 +8,7 @@ import functools
 import hashlib
 import logging
 import os
+import pickle
 import shutil
 import tempfile
 import zipfile
@@ -99,10 +100,7 @@ def cached_fmu(vehicle: Vehicle, fmi: int) -> Path:
         As `build_fmu`.
     """
     require_version(fmi)
-    made_from = hashlib.sha256(" ".join((native_platform().name, *FLAGS, fmpy.__version__)).encode())
-    for name, data in sorted(neutral_members(vehicle, fmi).items()):
-        made_from.update(f"\n{name} {len(data)}\n".encode() + data)
-    digest = made_from.hexdigest()[:16]
+    digest = _digest(pickle.dumps(vehicle), fmi)[:16]
     path = Path(platformdirs.user_cache_dir("subreach")) / "fmu" / f"{vehicle.name}-fmi{fmi}-{digest}.fmu"
     if zipfile.is_zipfile(path):  # one that was damaged is built anew
         return path
@@ -117,6 +115,18 @@ def cached_fmu(vehicle: Vehicle, fmi: int) -> Path:
         if path.exists():
             return path
     return build_fmu(vehicle, fmi, path)
+
+
+@functools.lru_cache(maxsize=64)
+def _digest(pickled: bytes, fmi: int) -> str:
+    """Return what names an FMU of this machine by all that it is made from.
+
+    To write all of that down takes longer than to load an FMU, so a process does it once for each vehicle.
+    """
+    made_from = hashlib.sha256(" ".join((native_platform().name, *FLAGS, fmpy.__version__)).encode())
+    for name, data in sorted(neutral_members(pickle.loads(pickled), fmi).items()):
+        made_from.update(f"\n{name} {len(data)}\n".encode() + data)
+    return made_from.hexdigest()
 
 
 @functools.cache
