@@ -15,7 +15,7 @@ from cosim.mavlink.services.parameters import shortest
 from cosim.mavlink.services.station_parameters import station_parameters
 from cosim.scenario import load_scenario
 from cosim.scenario_file import shipped_scenarios
-from tests.cosim.mavlink.station import NAN, Station, Wire, scenario
+from tests.cosim.mavlink.station import NAN, Station, scenario
 from tests.examples import examples
 
 REAL32, INT32 = 9, 6
@@ -285,13 +285,3 @@ def test_shortest_is_the_same_float32(value):
     short = shortest(value)
     assert struct.pack("<f", short) == struct.pack("<f", value)
     assert len(repr(abs(short))) <= len(repr(abs(value)))
-
-
-def test_a_link_that_goes_takes_its_list_along(station):
-    other = Wire("other")
-    station.autopilot.attach(other)
-    station.send(LIST, wire=other)
-    station.autopilot.detach(other)
-    other.clear()
-    station.wait(0.1)
-    assert other.got == []
