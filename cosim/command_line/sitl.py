@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import argparse
 import contextlib
-import ipaddress
 import math
 import signal
-import socket
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from cosim.address import resolved
 from cosim.command_line.campaigns import INTERRUPTED
 from cosim.sitl.ports import PORTS
 
@@ -113,9 +112,9 @@ def _address(host: str, port: int, allow_remote: bool) -> tuple[str, int]:
     from cosim.errors import RunError
 
     try:
-        found = str(socket.getaddrinfo(host, port, socket.AF_INET, socket.SOCK_DGRAM)[0][4][0])
-    except (OSError, UnicodeError) as error:
+        found, here = resolved(host)
+    except OSError as error:
         raise RunError(f"--host {host!r}: is not known: {error}") from error
-    if not allow_remote and not ipaddress.ip_address(found).is_loopback:
+    if not (allow_remote or here):
         raise RunError(f"--host {host!r}: {found} can be seen from other machines; --allow-remote lets it")
     return found, port
