@@ -24,14 +24,14 @@ REQUIRED = {
 
 
 def test_folder_holds_what_is_promised(shipped_run):
-    folder = shipped_run("paper", "arbiter.engine=closed").folder
+    folder = shipped_run("paper", *SHORT, report=True).folder
     names = sorted(p.name for p in folder.iterdir())
     assert names == ["figures", "record.parquet", "report.html", "scenario.toml", "summary.json"]
     assert json.loads((folder / "summary.json").read_text()).keys() >= REQUIRED
 
 
 def test_record_has_every_signal_with_its_unit(shipped_run):
-    folder = shipped_run("paper", "arbiter.engine=closed").folder
+    folder = shipped_run("paper", *SHORT, report=True).folder
     schema = pq.read_schema(folder / "record.parquet")
     units = {f.name: f.metadata[b"unit"].decode() for f in schema}
     assert all(f.metadata[b"description"] for f in schema)
@@ -48,7 +48,7 @@ def test_record_has_every_signal_with_its_unit(shipped_run):
 
 
 def test_summary_follows_from_the_record(shipped_run):
-    run = shipped_run("paper-limited", "arbiter.engine=closed")
+    run = shipped_run("paper-limited", "arbiter.engine=closed", "time.duration=5")  # past both spheres
     record, summary = load_record(run.folder), run.summary
     force = np.sqrt(sum(record[f"actuation.{a}"] ** 2 for a in "XYZ"))[:-1]
     assert summary["effort"] == pytest.approx(np.sum(force) * 0.001, rel=1e-12)

@@ -175,7 +175,9 @@ def test_python(system):
             module["weights"](x)
 
 
-@pytest.mark.parametrize("name", ["section VI", "rational", pytest.param("wide, shared", marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    "name", ["section VI", *(pytest.param(name, marks=pytest.mark.slow) for name in ("rational", "wide, shared"))]
+)
 def test_from_a_compiled_loop(name):
     system = SYSTEMS[name]
     evaluate = Arbiter(system=system).compiled()

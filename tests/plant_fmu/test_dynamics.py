@@ -202,6 +202,7 @@ def test_two_hours_keep_energy_and_a_unit_quaternion(make_slave):
     assert energy(slave.get(*STATES), 199.0) == pytest.approx(before, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_an_hour_balances_work_and_loss(make_slave):
     """Kinetic and potential energy change by what actuators put in and damping takes out."""
     damping = {f"{kind}_damping[{i}]": 4.0 + i for kind in ("linear", "quadratic") for i in range(1, 7)}

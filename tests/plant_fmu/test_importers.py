@@ -53,7 +53,7 @@ def difference(ours, theirs):
     return max(abs(ours.values[name] - theirs.values[name]) for name in ours.values)
 
 
-@pytest.mark.parametrize("name", ["FMPy validation", "fmu-manipulation-toolbox"])
+@pytest.mark.parametrize("name", ["FMPy validation", pytest.param("fmu-manipulation-toolbox", marks=pytest.mark.slow)])
 def test_validators_find_nothing(name, fmu):
     assert "no problems" in answer(name, fmu).note
 

@@ -16,7 +16,7 @@ ACCELERATIONS = tuple(f"der(velocity.{a})" for a in "uvwpqr")
 
 
 def test_a_restored_run_goes_on_to_the_last_bit(make_plant, fmi):
-    plant = make_plant("rexrov", fmi, **{"imu.rate": 50.0, "imu.acceleration_noise": 0.1, "seed": 3})
+    plant = make_plant("odin", fmi, **{"imu.rate": 50.0, "imu.acceleration_noise": 0.1, "seed": 3})
     drive(plant)
     plant["thrust[1]"] = 77.0
     state = plant.save()

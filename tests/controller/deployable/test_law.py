@@ -38,6 +38,7 @@ def test_two_laws_share_nothing():
     assert np.array_equal(fly(one, Sea(noise=NOISE), steps=60), alone)
 
 
+@pytest.mark.slow
 def test_the_law_without_its_compiler_is_the_same_to_rounding():
     """Plain Python in a process of its own; what overflows there is the generator of random numbers, on purpose."""
     code = (
