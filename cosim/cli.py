@@ -14,7 +14,7 @@ from collections.abc import Sequence
 from importlib import metadata
 from pathlib import Path
 
-from cosim.command_line import campaigns, mavlink, run, sitl
+from cosim.command_line import campaigns, mavlink, package, run, sitl
 from cosim.command_line.campaigns import INTERRUPTED
 
 _EPILOG = """examples:
@@ -55,6 +55,7 @@ def _parser() -> argparse.ArgumentParser:
     calibrate = verbs.add_parser("calibrate", help="fit the force limit and lag that bring the paper's window about")
     calibrate.add_argument("--scenario", default="paper", help="scenario to fit (default: paper)")
 
+    package.add_verb(verbs)
     campaigns.add_verbs(verbs)
     mavlink.add_verbs(verbs)
     sitl.add_verbs(verbs)
@@ -108,8 +109,8 @@ def _guarded(options: argparse.Namespace) -> int:
 
 def _log(verbose: bool) -> None:
     logging.basicConfig(level=logging.WARNING, format="%(name)s: %(message)s")
-    for package in ("fuzzy_arbiter", "plant_fmu", "controller", "cosim"):
-        logging.getLogger(package).setLevel(logging.DEBUG if verbose else logging.WARNING)
+    for name in ("fuzzy_arbiter", "plant_fmu", "controller", "cosim"):
+        logging.getLogger(name).setLevel(logging.DEBUG if verbose else logging.WARNING)
 
 
 def _report(options: argparse.Namespace) -> int:
@@ -164,6 +165,7 @@ _VERBS = {
     "show": _show,
     "check": _check,
     "calibrate": _calibrate,
+    "package": package.package,
     "campaign": campaigns.campaign,
     "compare": campaigns.compare,
     "listen": mavlink.listen,

@@ -143,13 +143,33 @@ def load_scenario(name_or_file: str | Path, overrides: Sequence[str] = ()) -> Sc
         table, name = read_table(text)
         for change in overrides:
             override(table, change)
-        return _check(table, name)
+        return checked_scenario(table, name)
     except (PlantFmuError, ControllerError, ScenarioError) as error:
         raise ScenarioError(f"{text}: {error}") from error
 
 
-def _check(table: dict[str, Any], name: str) -> Scenario:
-    """Turn the file's table into a scenario, and name the first key that cannot be right."""
+def checked_scenario(table: dict[str, Any], name: str, vehicle: Vehicle | None = None) -> Scenario:
+    """Turn the table of a scenario's file into a scenario.
+
+    Parameters
+    ----------
+    table : dict
+        As in the file; its ``plant.parameters`` are joined to flat keys in place.
+    name : str
+        The scenario's.
+    vehicle : Vehicle, optional
+        What its ``vehicle`` names, if that is loaded already.
+
+    Returns
+    -------
+    Scenario
+        The checked scenario.
+
+    Raises
+    ------
+    ScenarioError, PlantFmuError, ControllerError
+        At the first key that cannot be right.
+    """
     plant = table.get("plant")
     if isinstance(plant, dict) and isinstance(plant.get("parameters"), dict):
         plant["parameters"] = flat(plant["parameters"])
@@ -161,7 +181,7 @@ def _check(table: dict[str, Any], name: str) -> Scenario:
     overlapping = check_intersection(file.intersection, regions)
     seen = check_commands(file.commands, file.record, tuple(r.region.name for r in regions))
     vehicle_file = Path(file.vehicle) if file.vehicle.endswith(".toml") else None
-    vehicle = load_vehicle(vehicle_file or file.vehicle)
+    vehicle = vehicle or load_vehicle(vehicle_file or file.vehicle)
     check_parameters(file.plant.parameters, vehicle)
     law = check_law(file.law, file.actuation.through, vehicle, time.control, len(regions) + len(seen))
     check_failures(file.failures, file.actuation.through, vehicle)

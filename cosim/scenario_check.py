@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 import re
 from dataclasses import dataclass
@@ -171,12 +172,19 @@ def check_intersection(wanted: tuple[str, ...], regions: tuple[SecondaryRegion, 
 
 def check_parameters(given: dict[str, float | bool], vehicle: Vehicle) -> None:
     """Raise `ScenarioError` unless the FMU has these parameters, and the scenario no key for them."""
-    names = [v.name for v in variables(vehicle) if v.role == "parameter"]
-    known = [name for name in names if name.partition(".")[0] not in _OWN_KEYS]
+    known = known_parameters(vehicle)
     for name in given:
-        own = _OWN_KEYS.get(name.partition(".")[0])
-        tip = f"set {own} instead" if own else hint(name, known)
-        _require(name in known, f"plant.parameters.{name}", "no parameter of the FMU", f"one; {tip}")
+        if name not in known:
+            own = _OWN_KEYS.get(name.partition(".")[0])
+            tip = f"set {own} instead" if own else hint(name, known)
+            raise ScenarioError(f"plant.parameters.{name} is no parameter of the FMU, expected one; {tip}")
+
+
+@functools.lru_cache(maxsize=8)
+def known_parameters(vehicle: Vehicle) -> dict[str, float]:
+    """Return the start values of the FMU's parameters that a scenario has no key of its own for, by name."""
+    parameters = [v for v in variables(vehicle) if v.role == "parameter"]
+    return {v.name: v.start for v in parameters if v.name.partition(".")[0] not in _OWN_KEYS}
 
 
 def check_time(entry: TimeEntry) -> Time:

@@ -80,7 +80,12 @@ def cross_compiler(platform: Platform) -> list[str]:
 
 
 def compile_library(
-    compiler: Sequence[str], platform: Platform, sources: Sequence[Path], includes: Sequence[Path], library: Path
+    compiler: Sequence[str],
+    platform: Platform,
+    sources: Sequence[Path],
+    includes: Sequence[Path],
+    library: Path,
+    flags: Sequence[str] = (),
 ) -> None:
     """Compile C files into one shared library without any dependency but the C library.
 
@@ -96,6 +101,8 @@ def compile_library(
         Folders of headers.
     library : Path
         What to write.
+    flags : sequence of str, optional
+        After `FLAGS`.
 
     Raises
     ------
@@ -108,7 +115,7 @@ def compile_library(
         # linker knows no -s, and ziglang's, told to drop them, leaves some numbers of a table to chance.
         link = [f"-Wl,-install_name,@rpath/{library.name}"]
     command = [
-        *compiler, *FLAGS, *_WARNINGS, *link,
+        *compiler, *FLAGS, *_WARNINGS, *flags, *link,
         *(f"-I{folder}" for folder in includes),
         *map(str, sources), "-o", str(library), "-lm",
     ]  # fmt: skip

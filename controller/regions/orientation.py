@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from math import inf
 from typing import ClassVar
 
-from controller.compiled import compiled
+from controller.compiled import lean
 from controller.quaternion import error
 from controller.regions.shape import Array, Bounds, EvaluationOfAttitude, Vector4, require, unit
 
@@ -38,7 +38,7 @@ class Orientation:
         return (-inf, -inf, -inf), (inf, inf, inf)
 
 
-@compiled
+@lean
 def orientation(p: Array, e: Array, q: Array) -> EvaluationOfAttitude:
     """Evaluate a packed `Orientation` at the attitude `e`, wherever that is."""
     turn = error(q[:4], e)

@@ -13,7 +13,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from cosim.errors import RunError
-from cosim.flight import Score
+from cosim.scene_run import Score
 from cosim.signals import Array
 
 

@@ -203,9 +203,10 @@ static void derivative_tangent(const Model *m, const Model *seed, const double r
         dwrench[3 + i] += left[i] + right[i];
     }
 
-    double contact[3], dcontact[3];
-    if (environment_contact(&m->plant, x[2], rate, contact)) {
-        double dM[6][6];
+    const double sunk = environment_sunk(p, x[2]);
+    if (sunk > 0.0) {
+        double contact[3], dcontact[3], dM[6][6];
+        environment_contact(&m->plant, sunk, rate, contact);
         mass_matrix_tangent(p, dp, dM);
         environment_contact_tangent(&m->plant, dp, (const double(*)[6])dM, x[2], dx[2], rate, drate, dcontact);
         for (int i = 0; i < 3; i++)

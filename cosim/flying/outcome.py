@@ -1,0 +1,63 @@
+"""What a flight comes to, in one row of numbers; each is defined as in the summary of a recorded run."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+# of each field: its type, its unit, what it is
+FIELDS: dict[str, tuple[type, str, str]] = {
+    "reached": (np.bool_, "", "Was inside the goal region at some step"),
+    "reach_time": (np.float64, "s", "When it first was; nan: never"),
+    "settled": (np.bool_, "", "Was inside for the last ten seconds"),
+    "settle_time": (np.float64, "s", "When it came in for the last time; nan: never"),
+    "violated": (np.bool_, "", "Violated a hard region at some step"),
+    "min_clearance": (np.float64, "m", "Least clearance of any hard region of place; inf: there is none"),
+    "closest_to_goal": (np.float64, "m", "Least distance to the goal region, below 0 inside"),
+    "effort": (np.float64, "N.s", "Integral of the magnitude of the force on the body"),
+    "max_force": (np.float64, "N", "Greatest force on the body"),
+    "max_speed": (np.float64, "m/s", "Greatest speed over ground"),
+    "final_x": (np.float64, "m", "Position at the end, north"),
+    "final_y": (np.float64, "m", "Position at the end, east"),
+    "final_z": (np.float64, "m", "Position at the end, down"),
+    "phi1": (np.float64, "N", "Estimate of phi 1 in (12) at the end"),
+    "phi2": (np.float64, "N.m", "Estimate of phi 2 in (12) at the end"),
+    "phi3": (np.float64, "N.m", "Estimate of phi 3 in (12) at the end"),
+    "phi4": (np.float64, "N.m", "Estimate of phi 4 in (12) at the end"),
+    "stopped_at": (np.float64, "s", "When the plant refused to go on; nan: it did not"),
+}
+
+OUTCOME = np.dtype([(name, kind) for name, (kind, _, _) in FIELDS.items()])
+
+Outcomes = NDArray[Any]  # of OUTCOME
+
+
+@dataclass(frozen=True)
+class Flown:
+    """A batch of flights."""
+
+    outcomes: Outcomes  # (rows,)
+    refused: dict[int, str] = field(default_factory=dict)  # row in the batch → why scenario or plant refused it
+
+
+def nothing(rows: int) -> Outcomes:
+    """Return the outcomes of flights that have not taken place: false, and no numbers.
+
+    Parameters
+    ----------
+    rows : int
+        How many.
+
+    Returns
+    -------
+    ndarray of OUTCOME, shape (rows,)
+        To be filled.
+    """
+    outcomes = np.zeros(rows, OUTCOME)
+    for name, (kind, _, _) in FIELDS.items():
+        if kind is np.float64:
+            outcomes[name] = np.nan
+    return outcomes
