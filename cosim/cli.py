@@ -14,7 +14,7 @@ from collections.abc import Sequence
 from importlib import metadata
 from pathlib import Path
 
-from cosim.command_line import campaigns, mavlink, run, sitl
+from cosim.command_line import campaigns, mavlink, run, sitl, sweep
 from cosim.command_line.campaigns import INTERRUPTED
 
 _EPILOG = """examples:
@@ -22,6 +22,7 @@ _EPILOG = """examples:
   cosim run paper --set arbiter.engine=closed --set regions.SR1.gain=5000 --out runs/strong
   cosim run my-scene.toml --mavlink udpout:127.0.0.1:14550 --profile ardusub --commands
   cosim campaign scenes.jsonl --law printed --out campaigns/printed --workers 2
+  cosim sweep paper --vary initial.position.1=-2:2 --samples 1000 --out sweeps/start --workers 2
 """
 
 
@@ -56,6 +57,7 @@ def _parser() -> argparse.ArgumentParser:
     calibrate.add_argument("--scenario", default="paper", help="scenario to fit (default: paper)")
 
     campaigns.add_verbs(verbs)
+    sweep.add_verbs(verbs)
     mavlink.add_verbs(verbs)
     sitl.add_verbs(verbs)
     return parser
@@ -166,6 +168,8 @@ _VERBS = {
     "calibrate": _calibrate,
     "campaign": campaigns.campaign,
     "compare": campaigns.compare,
+    "sweep": sweep.sweep,
+    "rerun": sweep.rerun,
     "listen": mavlink.listen,
     "stream": mavlink.stream,
     "mavlink-check": mavlink.mavlink_check,

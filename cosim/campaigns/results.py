@@ -7,7 +7,9 @@ from typing import Any
 
 import numpy as np
 import pyarrow as pa
+import pyarrow.compute as pc
 import pyarrow.parquet as pq
+from numpy.typing import NDArray
 
 from cosim.campaigns.parts import check_schema
 from cosim.errors import RunError
@@ -52,6 +54,16 @@ class Results:
         """Return a column of numbers, shape (rows,), with `absent` where there is none."""
         column: Array = self[name].astype(float)
         return np.where(np.isnan(column), absent, column)
+
+    def fact(self, name: str) -> NDArray[np.bool_]:
+        """Return a column of facts, shape (rows,); what is not known is no fact."""
+        facts: NDArray[np.bool_] = pc.fill_null(self._read(columns=[name])[name], False).to_numpy()
+        return facts
+
+    def absent(self, name: str) -> NDArray[np.bool_]:
+        """Return where a column has nothing, shape (rows,)."""
+        absent: NDArray[np.bool_] = pc.is_null(self._read(columns=[name])[name]).to_numpy()
+        return absent
 
     def row(self, key: int) -> dict[str, Any] | None:
         """Return the row of a key, None if there is none."""
