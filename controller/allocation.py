@@ -87,6 +87,11 @@ class Allocation:
     limits : {"direction", "per-thruster"}
         How forces beyond the limits are brought within.
 
+    Attributes
+    ----------
+    arguments : tuple
+        What `allocate` is given first: inverse, lower and upper limits, whether direction is kept.
+
     Raises
     ------
     LawError
@@ -106,10 +111,8 @@ class Allocation:
         if limits not in ("direction", "per-thruster"):
             raise LawError(f"limits is {limits!r}, expected 'direction' or 'per-thruster'")
         alive = (lower != 0.0) | (upper != 0.0)
-        self._inverse = np.ascontiguousarray(np.linalg.pinv(np.where(alive, matrix, 0.0)))
-        self._lower = np.array(lower, dtype=float)
-        self._upper = np.array(upper, dtype=float)
-        self._direction = limits == "direction"
+        inverse = np.ascontiguousarray(np.linalg.pinv(np.where(alive, matrix, 0.0)))
+        self.arguments = inverse, np.array(lower, dtype=float), np.array(upper, dtype=float), limits == "direction"
 
     def __call__(self, tau: Array, forces: Array) -> bool:
         """Write the thruster forces for a wrench into `forces`.
@@ -126,4 +129,4 @@ class Allocation:
         bool
             Whether the limits cut the wrench.
         """
-        return bool(allocate(self._inverse, self._lower, self._upper, self._direction, tau, forces))
+        return bool(allocate(*self.arguments, tau, forces))

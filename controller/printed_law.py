@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controller.compiled import compiled
-from controller.quaternion import error, rotation_matrix
-from controller.restoring import regressor
+from controller.quaternion import Vector3, error_parts, rotation_rows
 
 Array = NDArray[np.float64]
+Rows = tuple[Vector3, Vector3, Vector3]
 
 
 class Gains(NamedTuple):
@@ -63,6 +63,21 @@ def primary_error(value: float, gradient: Array) -> Array:
 
 
 @compiled
+def secondary_parts(values: Array, gradients: Array, alphas: Array, k_q: float) -> Vector3:
+    """Return e_s as `secondary_error` does, of alphas, shape (n,), of which beta_i = alpha_i / k_q."""
+    x, y, z = 0.0, 0.0, 0.0
+    for i in range(values.size):
+        if not values[i] <= 0.0:
+            norm = math.sqrt(gradients[i, 0] ** 2 + gradients[i, 1] ** 2 + gradients[i, 2] ** 2)
+            if not norm <= 0.0:
+                length = alphas[i] / k_q * values[i] / norm
+                x += length * gradients[i, 0]
+                y += length * gradients[i, 1]
+                z += length * gradients[i, 2]
+    return x, y, z
+
+
+@compiled
 def secondary_error(values: Array, gradients: Array, betas: Array) -> Array:
     """Return e_s, shape (3,): (21), (22); k_q times it is (19).
 
@@ -75,53 +90,81 @@ def secondary_error(values: Array, gradients: Array, betas: Array) -> Array:
     betas : ndarray, shape (n,)
         alpha_i / k_q.
     """
-    total = np.zeros(3)
-    for i in range(values.size):
-        if not values[i] <= 0.0:
-            norm = math.sqrt(gradients[i, 0] ** 2 + gradients[i, 1] ** 2 + gradients[i, 2] ** 2)
-            if not norm <= 0.0:
-                total += (betas[i] * values[i] / norm) * gradients[i]
-    return total
+    e_s = np.empty(3)
+    e_s[0], e_s[1], e_s[2] = secondary_parts(values, gradients, betas, 1.0)
+    return e_s
 
 
 @compiled
-def wrench(
-    e_p: Array, e_s: Array, e_att: Array, R: Array, Z: Array, velocity_body: Array, estimate: Array, gains: Gains
-) -> Array:
-    """Return tau, shape (6,) [N, N m]: (25) with (26), (29).
+def in_body(R: Rows, x: Vector3) -> Vector3:
+    """Return R^T x, a world vector seen from the body."""
+    return (
+        R[0][0] * x[0] + R[1][0] * x[1] + R[2][0] * x[2],
+        R[0][1] * x[0] + R[1][1] * x[1] + R[2][1] * x[2],
+        R[0][2] * x[0] + R[1][2] * x[1] + R[2][2] * x[2],
+    )
+
+
+@compiled
+def apply(
+    e_p: Vector3,
+    e_s: Vector3,
+    e_att: Vector3,
+    R: Rows,
+    velocity_body: Array,
+    gains: Gains,
+    period: float,
+    estimate: Array,
+    tau: Array,
+) -> None:
+    """Write tau: (25) with (26), (29); then carry the estimate over a period: (27) with (28).
 
     Parameters
     ----------
-    e_p, e_s : ndarray, shape (3,)
+    e_p, e_s : three numbers
         Region errors (20), (21), world frame.
-    e_att : ndarray, shape (3,)
+    e_att : three numbers
         Vector part of the error quaternion (23).
-    R : ndarray, shape (3, 3)
+    R : three rows
         From body to world.
-    Z : ndarray, shape (6, 4)
-        Regressor (12).
     velocity_body : ndarray, shape (6,)
         nu [m/s, rad/s].
-    estimate : ndarray, shape (4,)
-        phi-hat [N, N m].
     gains : Gains
         K_0 = diag(k_p1 R^T, k_p2 I), K_s = [k_q R^T; 0], K_v = diag(k_v1 I, k_v2 I) (26).
+    period : float
+        For how long the wrench is held [s]; (27) is integrated over it by Euler's rule.
+    estimate : ndarray, shape (4,)
+        phi-hat [N, N m], updated in place after it was used.
+    tau : ndarray, shape (6,)
+        Receives the wrench [N, N m], body frame.
     """
-    tau = Z @ estimate
-    tau[:3] -= R.T @ (gains.k_p1 * e_p + gains.k_q * e_s) + gains.k_v1 * velocity_body[:3]
-    tau[3:] -= gains.k_p2 * e_att + gains.k_v2 * velocity_body[3:]
-    return tau
+    k_p1, k_q, nu = gains.k_p1, gains.k_q, velocity_body
+    # (12): Z = [-k 0; 0 S(k)] with k = R^T e3, the last row of R
+    k = R[2]
+    supported = turned_by(k, estimate[1], estimate[2], estimate[3])
+    pushed = in_body(R, (k_p1 * e_p[0] + k_q * e_s[0], k_p1 * e_p[1] + k_q * e_s[1], k_p1 * e_p[2] + k_q * e_s[2]))
+    for i in range(3):  # (25): Z phi-hat - K_0 e - K_s e_s - K_v nu
+        tau[i] = -k[i] * estimate[0] - pushed[i] - gains.k_v1 * nu[i]
+        tau[3 + i] = supported[i] - gains.k_p2 * e_att[i] - gains.k_v2 * nu[3 + i]
+
+    # (27): -Gamma^-1 Z^T (nu + sigma J_e), of which Z^T = [-k^T 0; 0 -S(k)]
+    ratio = k_q / k_p1
+    off = in_body(R, (e_p[0] + ratio * e_s[0], e_p[1] + ratio * e_s[1], e_p[2] + ratio * e_s[2]))
+    sinking = 0.0
+    for i in range(3):
+        sinking += k[i] * (nu[i] + gains.sigma_p * off[i])
+    turning = turned_by(
+        k, nu[3] + gains.sigma_a * e_att[0], nu[4] + gains.sigma_a * e_att[1], nu[5] + gains.sigma_a * e_att[2]
+    )
+    estimate[0] += period / gains.gamma * sinking
+    for i in range(3):
+        estimate[1 + i] += period / gains.gamma * turning[i]
 
 
 @compiled
-def estimate_rate(
-    e_p: Array, e_s: Array, e_att: Array, R: Array, Z: Array, velocity_body: Array, gains: Gains
-) -> Array:
-    """Return d(phi-hat)/dt, shape (4,) [N/s, N m/s]: (27) with (28); arguments as `wrench`."""
-    drive = velocity_body.copy()
-    drive[:3] += gains.sigma_p * (R.T @ (e_p + (gains.k_q / gains.k_p1) * e_s))
-    drive[3:] += gains.sigma_a * e_att
-    return -(Z.T @ drive) / gains.gamma
+def turned_by(k: Vector3, x: float, y: float, z: float) -> Vector3:
+    """Return S(k) [x y z]^T = k x [x y z]^T: (4)."""
+    return k[1] * z - k[2] * y, k[2] * x - k[0] * z, k[0] * y - k[1] * x
 
 
 @compiled
@@ -164,10 +207,8 @@ def step(
     tau : ndarray, shape (6,)
         Receives the wrench [N, N m], body frame.
     """
-    R = rotation_matrix(quaternion)
-    Z = regressor(quaternion)
-    e_p = primary_error(goal_value, goal_gradient)
-    e_s = secondary_error(values, gradients, alphas / gains.k_q)
-    e_att = error(desired_quaternion, quaternion)[1:]
-    tau[:] = wrench(e_p, e_s, e_att, R, Z, velocity_body, estimate, gains)
-    estimate += period * estimate_rate(e_p, e_s, e_att, R, Z, velocity_body, gains)
+    f = violation(goal_value)
+    e_p = (f * goal_gradient[0], f * goal_gradient[1], f * goal_gradient[2])
+    e_s = secondary_parts(values, gradients, alphas, gains.k_q)
+    e_att = error_parts(desired_quaternion, quaternion)[1:]
+    apply(e_p, e_s, e_att, rotation_rows(quaternion), velocity_body, gains, period, estimate, tau)

@@ -1,6 +1,7 @@
 """Unit quaternions, scalar first, rotating body vectors into the world: equations (1)-(9), (23), (24).
 
-All functions take and return float64 arrays. The sign of the last term of (3) is that which (6), (7) and (10) need: the
+Functions take and return float64 arrays; those of parts and rows return tuples, which compiled code keeps in registers,
+where an array costs it a place in memory. The sign of the last term of (3) is that which (6), (7) and (10) need: the
 printed matrix is the transpose.
 """
 
@@ -12,6 +13,8 @@ from numpy.typing import NDArray
 from controller.compiled import compiled
 
 Array = NDArray[np.float64]
+Vector3 = tuple[float, float, float]
+Vector4 = tuple[float, float, float, float]
 
 
 @compiled
@@ -30,16 +33,24 @@ def skew(a: Array) -> Array:
 
 
 @compiled
+def rotation_rows(e: Array) -> tuple[Vector3, Vector3, Vector3]:
+    """Return the rows of R, from body to world, of a unit quaternion: (3)."""
+    e0, e1, e2, e3 = e[0], e[1], e[2], e[3]
+    return (
+        (1.0 - 2.0 * (e2 * e2 + e3 * e3), 2.0 * (e1 * e2 - e0 * e3), 2.0 * (e1 * e3 + e0 * e2)),
+        (2.0 * (e1 * e2 + e0 * e3), 1.0 - 2.0 * (e1 * e1 + e3 * e3), 2.0 * (e2 * e3 - e0 * e1)),
+        (2.0 * (e1 * e3 - e0 * e2), 2.0 * (e2 * e3 + e0 * e1), 1.0 - 2.0 * (e1 * e1 + e2 * e2)),
+    )
+
+
+@compiled
 def rotation_matrix(e: Array) -> Array:
     """Return R, shape (3, 3), from body to world, of a unit quaternion: (3)."""
-    e0, e1, e2, e3 = e
-    return np.array(
-        [
-            [1.0 - 2.0 * (e2 * e2 + e3 * e3), 2.0 * (e1 * e2 - e0 * e3), 2.0 * (e1 * e3 + e0 * e2)],
-            [2.0 * (e1 * e2 + e0 * e3), 1.0 - 2.0 * (e1 * e1 + e3 * e3), 2.0 * (e2 * e3 - e0 * e1)],
-            [2.0 * (e1 * e3 - e0 * e2), 2.0 * (e2 * e3 + e0 * e1), 1.0 - 2.0 * (e1 * e1 + e2 * e2)],
-        ]
-    )
+    rows = rotation_rows(e)
+    R = np.empty((3, 3))
+    for i in range(3):
+        R[i, 0], R[i, 1], R[i, 2] = rows[i]
+    return R
 
 
 @compiled
@@ -75,14 +86,26 @@ def multiply(a: Array, b: Array) -> Array:
 
 
 @compiled
+def error_parts(desired: Array, actual: Array) -> Vector4:
+    """Return the parts of desired^-1 * actual, the error of the shortest rotation (scalar part >= 0): (23)."""
+    d0, d1, d2, d3 = desired[0], desired[1], desired[2], desired[3]
+    a0, a1, a2, a3 = actual[0], actual[1], actual[2], actual[3]
+    e0 = d0 * a0 + d1 * a1 + d2 * a2 + d3 * a3
+    e1 = d0 * a1 - d1 * a0 - d2 * a3 + d3 * a2
+    e2 = d0 * a2 + d1 * a3 - d2 * a0 - d3 * a1
+    e3 = d0 * a3 - d1 * a2 + d2 * a1 - d3 * a0
+    return (-e0, -e1, -e2, -e3) if e0 < 0.0 else (e0, e1, e2, e3)
+
+
+@compiled
 def error(desired: Array, actual: Array) -> Array:
     """Return the error quaternion desired^-1 * actual, shape (4,), of the shortest rotation (scalar part >= 0): (23).
 
     In body coordinates, so that it moves with the body rates as (24) says.
     """
-    inverse = np.array([desired[0], -desired[1], -desired[2], -desired[3]])
-    e = multiply(inverse, actual)
-    return -e if e[0] < 0.0 else e
+    e = np.empty(4)
+    e[0], e[1], e[2], e[3] = error_parts(desired, actual)
+    return e
 
 
 @compiled

@@ -10,8 +10,7 @@ from scipy.optimize import brentq
 
 from controller import printed_law
 from controller.printed_law import primary_error, secondary_error
-from controller.quaternion import error, rotation_matrix
-from controller.restoring import regressor
+from controller.quaternion import error_parts, rotation_rows
 from cosim.claims import newtons
 from cosim.finding import Finding, status
 from cosim.region_values import evaluated
@@ -112,10 +111,11 @@ def asked_finding(scenario: Scenario, weights: Array) -> Finding:
     values, gradients, _ = evaluated(regions, initial.position, initial.quaternion)
     betas = np.array([region.gain for region in regions]) * weights / gains.k_q
     quaternion, desired = np.array(initial.quaternion), np.array(scenario.law.desired_quaternion)
-    R, turned = rotation_matrix(quaternion), error(desired, quaternion)
+    R, turned = rotation_rows(quaternion), error_parts(desired, quaternion)
     e_p, e_s = primary_error(float(f), slope), secondary_error(values, gradients, betas)
-    velocity, Z = np.array(initial.velocity), regressor(quaternion)
-    force = printed_law.wrench(e_p, e_s, turned[1:], R, Z, velocity, np.zeros(4), gains)[:3]
+    tau, velocity = np.empty(6), np.array(initial.velocity)
+    printed_law.apply(tuple(e_p), tuple(e_s), turned[1:], R, velocity, gains, 0.0, np.zeros(4), tau)
+    force = tau[:3]
     asked = float(np.linalg.norm(force))
     if not asked > 0.0:
         text = "The law asks for no force at the start."

@@ -1,12 +1,13 @@
-"""The fused loop: a scene from start to end in compiled code, stepping the FMU through its C functions.
+"""The fused loop: a flight from start to end in compiled code, stepping the FMU through its C functions.
 
-The stages are those of `cosim.master`: measure, regions, arbiter, law, allocation, FMU; then the score, on the true
-position at every plant step.
+The stages are those of `cosim.master`, by the same functions: measure, regions, arbiter, law, allocation, FMU; then the
+marks that the flight gets, of the true motion at every plant step.
 """
 
 from __future__ import annotations
 
 import functools
+import math
 import types
 from collections.abc import Callable
 from pathlib import Path
@@ -22,7 +23,14 @@ from controller import LAWS, CompiledLaw, VehicleState
 from controller.allocation import allocate
 from controller.compiled import compiled
 from controller.laws import printed
-from controller.regions import PackedRegions, Sphere, clearance_of_place, clearance_of_sphere
+from controller.regions import (
+    Orientation,
+    PackedRegions,
+    Sphere,
+    attitude_clearance,
+    clearance_of_place,
+    clearance_of_sphere,
+)
 from cosim.native import advance, read, seconds, send
 from fuzzy_arbiter import Arbiter
 from fuzzy_arbiter.membership import ramp
@@ -37,7 +45,7 @@ _weigh = Arbiter().compiled()
 _ramp: Any = numba.njit(ramp)
 _step: Any = printed.step  # of a law, and whether it gives a wrench: `flight_of` puts others in their places
 _is_wrench = True
-_SPHERE = Sphere.kind
+_SPHERE, _ATTITUDE = Sphere.kind, Orientation.kind
 
 
 class Setup(NamedTuple):
@@ -47,36 +55,48 @@ class Setup(NamedTuple):
     regions: PackedRegions
     criteria: NDArray[np.int64]  # (n,) of each region
     ramp: float  # m, width of the memberships
-    controls: int  # control steps
-    plant_steps: int  # plant steps a control step
-    plant_step: float  # s
-    settled_steps: int  # plant steps inside the goal region, at the end, that count as having reached it
-    noise: Array  # (controls, 6) what is added to position and linear velocity
-    failed: int  # thruster that fails, from 0; -1 for none
-    failure_control: int  # control step at which it does
+    step: float  # s, of the plant
+    steps: int  # of the plant
+    control_every: int  # plant steps
+    arbiter_every: int  # plant steps
+    moving: bool  # whether any region moves
+    exact: bool  # what is measured is the truth
+    noise: Array  # (control steps, 6) added to position and linear velocity, anew at each of them; (0, 6) if exact
+    dead_from: float  # s, when position and linear velocity are lost
+    dead_until: float  # s
+    frozen: bool  # their last values are held in that time; otherwise they are NaN
+    failed: NDArray[np.int64]  # (f,) thrusters that fail, from 0, in the order of their failures
+    failure_steps: NDArray[np.int64]  # (f,) plant steps before which they do
     tell: bool  # whether the law is told
-    clock: NDArray[np.int64]  # of `native.Clock`
+    thrusters: int  # that carry the wrench; 0: it acts on the body directly
+    clock: NDArray[np.int64]  # of `native.Clock`; (0,) if the law is not to be timed
 
 
 class Allocator(NamedTuple):
-    """Arguments of `controller.allocation.allocate`."""
+    """Arguments of `controller.allocation.allocate`, one stage after another as thrusters are told to have failed."""
 
-    inverse: Array  # (m, 6)
-    lower: Array  # (m,)
-    upper: Array  # (m,)
+    inverse: Array  # (stages, m, 6)
+    lower: Array  # (stages, m)
+    upper: Array  # (stages, m)
     direction: bool
 
 
-class Score(NamedTuple):
-    """What a flight came to."""
+class Marks(NamedTuple):
+    """What a flight came to. Steps are those of the plant; -1: there was none."""
 
-    reached: bool  # inside the goal region for the last `settled_steps`
-    reach_time: float  # s, since when it was inside without a break; inf if it is outside at the end
-    min_clearance: float  # m, least over all regions, the start and all plant steps; negative: violated
-    effort: float  # N s, sum over thrusters of the integral of the given force's magnitude
-    thrust_variation: float  # N, sum over thrusters of the changes of the commanded force, from 0 on
+    first_inside: float  # step at which it was inside the goal region first
+    last_entered: float  # step since when it was inside the last time
+    inside: bool  # it still was at the end
+    least_clearance: float  # m, of all hard regions of place; negative: violated; inf: there is none
+    least_angle: float  # rad, the same of hard regions of attitude
+    goal_clearance: float  # m, greatest
+    effort: float  # N s, integral of the magnitude of the force on the body
+    thrust_effort: float  # N s, sum over thrusters of the integral of the given force's magnitude
+    thrust_variation: float  # N, sum of the changes of what is commanded, from 0 on
+    max_force: float  # N, on the body
+    max_speed: float  # m/s, over ground
     worst_step: float  # s of the wall clock, the longest that law and allocation took
-    failed_step: int  # plant step that the FMU refused, -1 for none
+    failed_step: float  # that the FMU refused
 
 
 OUTPUTS = (
@@ -93,108 +113,163 @@ def _fly(
     allocator: Allocator,
     gains: Any,
     memory: Any,
+    estimate: Array,
     trace: Array,
-) -> tuple[bool, float, float, float, float, float, int]:
-    """Fly a scene by the law whose compiled function stands in the place of the global `_step`.
+) -> tuple[float, ...]:
+    """Fly by the law whose compiled function stands in the place of the global `_step`.
 
     Parameters
     ----------
     setup : Setup
-        The scene.
+        What is flown.
     native : Native
-        The plant: inputs are the thrust commands, outputs `OUTPUTS` and then the thrusters' forces.
+        The plant: inputs are the thrust commands, or the wrench; outputs `OUTPUTS`, then the thrusters' forces if they
+        are used, then the force on the body, its three components.
     effectiveness : Native
-        The same plant: inputs are the thrusters' effectivenesses.
+        The same plant: inputs are the thrusters' effectivenesses, as they are before anything fails.
     allocator : Allocator
-        For a wrench.
+        For a wrench that thrusters carry.
     gains, memory : NamedTuple
         The law's.
-    trace : ndarray, shape (controls, 19 + m + r) or (0, 0)
+    estimate : ndarray, shape (4,)
+        Receives the estimate that the last decision rests on.
+    trace : ndarray, shape (control steps, 20 + i + r) or (0, 0)
         Receives a row for each control step: time, true position, quaternion and velocity, position as measured, the
-        weights of obstacle and depth, m forces commanded, the law's r reports.
+        weights of the three criteria, the i inputs, the law's r reports.
 
     Returns
     -------
     tuple
-        What `Score` is made of, of the whole flight, or up to where the FMU failed. Were it a named tuple, Numba would
+        What `Marks` is made of, of the whole flight, or up to where the FMU failed. Were it a named tuple, Numba would
         call Python to make it, and crash where that raises, as after Ctrl-C in mid-flight.
     """
-    m, n = native.inputs.size, setup.regions.kinds.size
+    m, n = setup.thrusters, setup.regions.kinds.size
     position, quaternion, velocity = np.empty(3), np.empty(4), np.empty(6)
-    health, weights, memberships = np.ones(m), np.zeros(n), np.zeros(3)
-    by_criterion, wrench, before = np.zeros(3), np.zeros(6), np.zeros(m)
-    clearances, goal_clearance = np.zeros(n), np.zeros(1)
+    health, weights, memberships = np.ones(effectiveness.inputs.size), np.zeros(n), np.zeros(3)
+    by_criterion, wrench, before = np.zeros(3), np.zeros(6), np.zeros(native.inputs.size)
+    clearances, seen, goal_clearance = np.zeros(n), np.zeros(n), np.zeros(1)
     room = np.zeros(2, np.int64)
     state = VehicleState(position, quaternion, velocity, health)
-    effort, variation, worst = 0.0, 0.0, 0.0
+    first_inside, last_entered, inside = -1, -1, False
+    least, least_angle, most = np.inf, np.inf, -np.inf
+    effort, thrust_effort, variation = 0.0, 0.0, 0.0
+    max_force, max_speed, worst, refused = 0.0, 0.0, 0.0, -1
+    failures, told = 0, 0
+    true_position, true_quaternion = native.outputs[:3], native.outputs[3:7]
+    timed = setup.clock.size > 0
     if not read(native):
-        return (False, np.inf, np.nan, effort, variation, worst, 0)
-    true_position = native.outputs[:3]
-    _move(setup, 0.0)
-    _clearances(setup.regions, true_position, clearances)
-    _clearances(setup.goal, true_position, goal_clearance)
-    least = _least(clearances, np.inf)
-    inside_since = 0 if goal_clearance[0] >= 0.0 else -1  # plant step; -1: outside
-    done = 0  # plant steps
+        refused = 0
 
-    for k in range(setup.controls):
-        now = done * setup.plant_step
+    for k in range(setup.steps + 1):
+        if refused >= 0:
+            break
+        now = k * setup.step
         # what fails
-        if k == setup.failure_control and setup.failed >= 0:
-            effectiveness.inputs[:] = 1.0
-            effectiveness.inputs[setup.failed] = 0.0
-            if not send(effectiveness):
-                return (False, np.inf, least, effort, variation, worst, done)
+        while failures < setup.failed.size and k == setup.failure_steps[failures]:
+            effectiveness.inputs[setup.failed[failures]] = 0.0
             if setup.tell:
-                health[setup.failed] = 0.0
+                health[setup.failed[failures]] = 0.0
+                told = min(told + 1, allocator.lower.shape[0] - 1)
+            failures += 1
+            if not send(effectiveness):
+                refused = k
+        # marks
+        if setup.moving or k == 0:
+            _move(setup, now)
+        _clearances(setup.regions, true_position, true_quaternion, clearances)
+        _clearances(setup.goal, true_position, true_quaternion, goal_clearance)
+        for i in range(n):
+            if setup.regions.hard[i]:
+                if setup.regions.kinds[i] < _ATTITUDE:
+                    least = _least(clearances[i], least)
+                else:
+                    least_angle = _least(clearances[i], least_angle)
+        most = max(most, goal_clearance[0])
+        if goal_clearance[0] >= 0.0 and not inside:
+            last_entered = k
+            if first_inside < 0:
+                first_inside = k
+        inside = goal_clearance[0] >= 0.0
+        u, v, w = native.outputs[7], native.outputs[8], native.outputs[9]
+        max_speed = max(max_speed, math.sqrt(u * u + v * v + w * w))
+        controls = k % setup.control_every == 0
+        if controls:
+            estimate[:] = memory.estimate
+        if k == setup.steps or refused >= 0:
+            break
         # measure
-        position[:] = native.outputs[:3] + setup.noise[k, :3]
-        quaternion[:] = native.outputs[3:7]
-        velocity[:] = native.outputs[7:13]
-        velocity[:3] += setup.noise[k, 3:]
-        # regions and arbiter
-        _move(setup, now)
-        _clearances(setup.regions, position, clearances)
-        memberships[:] = 0.0
-        for i in range(n):
-            degree = _ramp(clearances[i], setup.ramp)
-            memberships[setup.criteria[i]] = max(memberships[setup.criteria[i]], degree)
-        _weigh(memberships, by_criterion)
-        for i in range(n):
-            weights[i] = by_criterion[setup.criteria[i]]
-        # law and allocation
-        started = seconds(setup.clock, room)
-        if _is_wrench:
-            _step(state, setup.goal, setup.regions, weights, gains, memory, wrench)
-            allocate(allocator.inverse, allocator.lower, allocator.upper, allocator.direction, wrench, native.inputs)
+        arbitrates = k % setup.arbiter_every == 0
+        if setup.exact:
+            if controls or arbitrates:
+                position[:] = true_position
+                quaternion[:] = true_quaternion
+                velocity[:] = native.outputs[7:13]
         else:
-            _step(state, setup.goal, setup.regions, weights, gains, memory, native.inputs)
-        worst = max(worst, seconds(setup.clock, room) - started)
-        if trace.shape[0]:
-            _trace(trace[k], now, native, position, by_criterion, memory.report)
+            _measure(setup, k, now, native.outputs, state)
+        # regions and arbiter: while the position is lost there is nothing to decide by, and the last weights hold
+        if arbitrates and np.isfinite(position).all():
+            if setup.exact:
+                seen[:] = clearances
+            else:
+                _clearances(setup.regions, position, quaternion, seen)
+            memberships[:] = 0.0
+            for i in range(n):
+                degree = _ramp(seen[i], setup.ramp)
+                memberships[setup.criteria[i]] = max(memberships[setup.criteria[i]], degree)
+            _weigh(memberships, by_criterion)
+            for i in range(n):
+                weights[i] = by_criterion[setup.criteria[i]]
+        # law and allocation
+        if controls:
+            started = seconds(setup.clock, room) if timed else 0.0
+            if m == 0 or not _is_wrench:
+                _step(state, setup.goal, setup.regions, weights, gains, memory, native.inputs)
+            else:
+                _step(state, setup.goal, setup.regions, weights, gains, memory, wrench)
+                lower, upper = allocator.lower[told], allocator.upper[told]
+                allocate(allocator.inverse[told], lower, upper, allocator.direction, wrench, native.inputs)
+            if timed:
+                worst = max(worst, seconds(setup.clock, room) - started)
+            if trace.shape[0]:
+                _trace(trace[k // setup.control_every], now, native, position, by_criterion, memory.report)
+            for j in range(native.inputs.size):
+                variation += abs(native.inputs[j] - before[j])
+                before[j] = native.inputs[j]
+            if not send(native):
+                refused = k
+                break
+        # plant
+        if not (advance(native, now, setup.step) and read(native)):
+            refused = k
+            break
         for j in range(m):
-            variation += abs(native.inputs[j] - before[j])
-            before[j] = native.inputs[j]
-        # plant and score
-        if not send(native):
-            return (False, np.inf, least, effort, variation, worst, done)
-        for _ in range(setup.plant_steps):
-            if not (advance(native, done * setup.plant_step, setup.plant_step) and read(native)):
-                return (False, np.inf, least, effort, variation, worst, done)
-            done += 1
-            _move(setup, done * setup.plant_step)
-            _clearances(setup.regions, true_position, clearances)
-            _clearances(setup.goal, true_position, goal_clearance)
-            least = _least(clearances, least)
-            if not goal_clearance[0] >= 0.0:
-                inside_since = -1
-            elif inside_since < 0:
-                inside_since = done
-            for j in range(m):
-                effort += abs(native.outputs[13 + j]) * setup.plant_step
-    reached = inside_since >= 0 and done - inside_since >= setup.settled_steps
-    reach_time = inside_since * setup.plant_step if inside_since >= 0 else np.inf
-    return (reached, reach_time, least, effort, variation, worst, -1)
+            thrust_effort += abs(native.outputs[13 + j]) * setup.step
+        x, y, z = native.outputs[13 + m], native.outputs[14 + m], native.outputs[15 + m]
+        force = math.sqrt(x * x + y * y + z * z)
+        effort += force * setup.step
+        max_force = max(max_force, force)
+    return (
+        first_inside, last_entered, inside, least, least_angle, most, effort, thrust_effort, variation,
+        max_force, max_speed, worst, refused,
+    )  # fmt: skip
+
+
+@compiled
+def _measure(setup: Setup, k: int, now: float, truth: Array, state: VehicleState) -> None:
+    """Write what is told at plant step `k` as `sensing.Sensor` does."""
+    state.quaternion[:] = truth[3:7]
+    state.velocity_body[3:] = truth[10:13]
+    if setup.dead_from <= now < setup.dead_until:
+        if not setup.frozen:
+            state.position[:] = np.nan
+            state.velocity_body[:3] = np.nan
+        elif now == 0.0:  # nothing was measured before
+            state.position[:] = truth[:3]
+            state.velocity_body[:3] = truth[7:10]
+        return
+    noise = setup.noise[k // setup.control_every]
+    state.position[:] = truth[:3] + noise[:3]
+    state.velocity_body[:3] = truth[7:10] + noise[3:]
 
 
 @compiled
@@ -207,23 +282,33 @@ def _move(setup: Setup, now: float) -> None:
 
 
 @compiled
-def _clearances(regions: PackedRegions, position: Array, clearances: Array) -> None:
-    """Write the clearance [m] of each region, none of which depends on attitude, at a position into `clearances`."""
-    room = np.empty(3)
+def _clearances(regions: PackedRegions, position: Array, quaternion: Array, clearances: Array) -> None:
+    """Write the clearance of each region, [m] or [rad], at a pose into `clearances`."""
+    others = False
     for i in range(regions.kinds.size):
         if regions.kinds[i] == _SPHERE:
             clearances[i] = clearance_of_sphere(regions, i, position)
         else:
+            others = True
+    if others:
+        _clearances_of_others(regions, position, quaternion, clearances)
+
+
+@compiled
+def _clearances_of_others(regions: PackedRegions, position: Array, quaternion: Array, clearances: Array) -> None:
+    """Write the clearance of each region but spheres, of which there are most."""
+    room = np.empty(3)
+    for i in range(regions.kinds.size):
+        if regions.kinds[i] >= _ATTITUDE:
+            clearances[i] = attitude_clearance(regions, i, position, quaternion)[0]
+        elif regions.kinds[i] != _SPHERE:
             clearances[i] = clearance_of_place(regions, i, position, room)
 
 
 @compiled
-def _least(clearances: Array, least: float) -> float:
-    """Return the least of numbers and one more; what is no number stays."""
-    for clearance in clearances:
-        if clearance < least or np.isnan(clearance):
-            least = clearance
-    return least
+def _least(clearance: float, least: float) -> float:
+    """Return the lesser of two numbers; what is no number stays."""
+    return clearance if clearance < least or np.isnan(clearance) else least
 
 
 @compiled
@@ -232,12 +317,12 @@ def _trace(row: Array, now: float, native: Native, position: Array, weights: Arr
     row[0] = now
     row[1:14] = native.outputs[:13]
     row[14:17] = position
-    row[17], row[18] = weights[0], weights[2]
-    row[19 : 19 + m] = native.inputs
-    row[19 + m :] = report
+    row[17:20] = weights
+    row[20 : 20 + m] = native.inputs
+    row[20 + m :] = report
 
 
-def flight_of(law: str) -> Callable[..., Score]:
+def flight_of(law: str) -> Callable[..., Marks]:
     """Return the loop of `_fly` compiled for a law.
 
     Numba keeps nothing on disk of a function that is given another one, or closes over it. So each law has a copy of
@@ -251,11 +336,11 @@ def flight_of(law: str) -> Callable[..., Score]:
     Returns
     -------
     callable
-        ``(setup, native, effectiveness, allocator, gains, memory, trace) -> Score``.
+        ``(setup, native, effectiveness, allocator, gains, memory, estimate, trace) -> Marks``.
     """
     chosen: Any = LAWS[law]
     loop = _compiled(law, chosen)
-    return lambda *arguments: Score(*loop(*arguments))
+    return lambda *arguments: Marks(*loop(*arguments))
 
 
 @functools.cache

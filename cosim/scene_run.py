@@ -5,14 +5,14 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from types import TracebackType
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from controller import LAWS
 from cosim.errors import RunError
-from cosim.flight import OUTPUTS, Allocator, Score, Setup, flight_of
+from cosim.flight import OUTPUTS, Allocator, Marks, Setup, flight_of
 from cosim.native import Clock
 from cosim.scene import Scene, Told, plant_values, told
 from cosim.vehicle_model import vehicle_model
@@ -50,6 +50,18 @@ class Conditions:
     def plant_step(self) -> float:
         """Length of a plant step [s]."""
         return self.control / self.plant_steps
+
+
+class Score(NamedTuple):
+    """What the flight of a scene came to."""
+
+    reached: bool  # inside the goal region for the last `Conditions.settled` seconds
+    reach_time: float  # s, since when it was inside without a break; inf if it is outside at the end
+    min_clearance: float  # m, least over all regions, the start and all plant steps; negative: violated
+    effort: float  # N s, sum over thrusters of the integral of the given force's magnitude
+    thrust_variation: float  # N, sum over thrusters of the changes of the commanded force, from 0 on
+    worst_step: float  # s of the wall clock, the longest that law and allocation took
+    failed_step: int  # plant step that the FMU refused, -1 for none
 
 
 class SceneFlyer:
@@ -115,12 +127,26 @@ class SceneFlyer:
         plant.initialise()
         thrusts = [f"thrust[{i + 1}]" for i in range(m)]
         forces = [f"thruster_force[{i + 1}]" for i in range(m)]
-        native = plant.native(thrusts, (*OUTPUTS, *forces))
+        native = plant.native(thrusts, (*OUTPUTS, *forces, *(f"actuation.{axis}" for axis in "XYZ")))
         effectiveness = plant.native([f"thrust_effectiveness[{i + 1}]" for i in range(m)], ())
+        effectiveness.inputs[:] = 1.0
         setup = self._setup(scene, known)
-        rows = np.zeros((setup.controls, 19 + m + law.report.size) if trace else (0, 0))
-        score = self._flight(setup, native, effectiveness, self._allocator(), law.gains, law.memory, rows)
-        return score, rows
+        rows = np.zeros((c.controls, 20 + m + law.report.size) if trace else (0, 0))
+        estimate = np.zeros(4)
+        marks = self._flight(setup, native, effectiveness, self._allocator(), law.gains, law.memory, estimate, rows)
+        return self._score(marks, setup), rows
+
+    def _score(self, marks: Marks, setup: Setup) -> Score:
+        inside, since = marks.inside and marks.failed_step < 0, marks.last_entered
+        return Score(
+            reached=inside and setup.steps - since >= math.ceil(self.conditions.settled / setup.step - _ROUNDING),
+            reach_time=since * setup.step if inside else math.inf,
+            min_clearance=marks.least_clearance,
+            effort=marks.thrust_effort,
+            thrust_variation=marks.thrust_variation,
+            worst_step=marks.worst_step,
+            failed_step=int(marks.failed_step),
+        )
 
     def _law(self, n_regions: int) -> Any:
         return LAWS[self.law].for_vehicle(self._model, self.gains, np.array(LEVEL), self.conditions.control, n_regions)
@@ -130,25 +156,33 @@ class SceneFlyer:
         noise = np.random.default_rng([scene.seed, 1]).standard_normal((c.controls, 6))
         noise[:, :3] *= scene.noise.position
         noise[:, 3:] *= scene.noise.velocity
+        fails_at = math.ceil(min(failure.time, c.duration) / c.control) * c.plant_steps if failure else 0
         return Setup(
             goal=known.goal,
             regions=known.regions,
             criteria=known.criteria,
             ramp=c.ramp,
-            controls=c.controls,
-            plant_steps=c.plant_steps,
-            plant_step=c.plant_step,
-            settled_steps=math.ceil(c.settled / c.plant_step - _ROUNDING),
+            step=c.plant_step,
+            steps=c.controls * c.plant_steps,
+            control_every=c.plant_steps,
+            arbiter_every=c.plant_steps,
+            moving=any(any(obstacle.velocity) for obstacle in scene.obstacles),
+            exact=not (scene.noise.position or scene.noise.velocity),
             noise=noise,
-            failed=failure.index - 1 if failure else -1,
-            failure_control=math.ceil(min(failure.time, c.duration) / c.control) if failure else -1,
+            dead_from=math.inf,
+            dead_until=math.inf,
+            frozen=False,
+            failed=np.array([failure.index - 1] if failure else [], np.int64),
+            failure_steps=np.array([fails_at] if failure else [], np.int64),
             tell=c.tell_failures,
+            thrusters=self._vehicle.n_thrusters,
             clock=self._clock.numbers,
         )
 
     def _allocator(self) -> Allocator:
         v = self._vehicle
-        return Allocator(np.ascontiguousarray(np.linalg.pinv(v.thruster_matrix)), v.thrust_min, v.thrust_max, True)
+        inverse = np.ascontiguousarray(np.linalg.pinv(v.thruster_matrix))
+        return Allocator(inverse[None], v.thrust_min[None], v.thrust_max[None], True)
 
     def close(self) -> None:
         """Free the plant. May be called twice."""

@@ -16,9 +16,8 @@ from controller.compiled import compiled
 from controller.law import Array, VehicleState, WrenchLaw
 from controller.laws.potential_field import Field, evaluate_field, field_of, keep_within, shorten
 from controller.printed_law import Gains, primary_error
-from controller.quaternion import error, rotation_matrix
+from controller.quaternion import error_parts, rotation_rows
 from controller.regions import PackedRegions
-from controller.restoring import regressor
 
 
 class UnarbitratedGains(NamedTuple):
@@ -60,17 +59,17 @@ def step(
     forces: Array,
 ) -> None:
     """Do what `CompiledLaw.step` says; all regions push in full, whatever their weights."""
-    R, Z = rotation_matrix(state.quaternion), regressor(state.quaternion)
-    field, estimate, velocity = memory.field, memory.estimate, state.velocity_body
+    field, estimate = memory.field, memory.estimate
     k_q = 1.0  # cancels
     g = Gains(gains.k_p1, gains.k_p2, k_q, gains.k_v1, gains.k_v2, gains.sigma_p, gains.sigma_a, gains.gamma)
     evaluate_field(state, goal, regions, gains.repulsion, gains.reach, field)
     field.error[:] = primary_error(field.goal_value[0] + gains.margin, field.goal_gradient[0])  # (20)
     shorten(field.error, gains.limit / gains.k_p1)
-    e_s = -field.push / k_q  # (21), (22)
-    e_att = error(memory.desired_quaternion, state.quaternion)[1:]  # (23)
-    forces[:] = printed_law.wrench(field.error, e_s, e_att, R, Z, velocity, estimate, g)  # (25)
-    estimate += memory.period[0] * printed_law.estimate_rate(field.error, e_s, e_att, R, Z, velocity, g)  # (27)
+    e_p = (field.error[0], field.error[1], field.error[2])
+    e_s = (-field.push[0] / k_q, -field.push[1] / k_q, -field.push[2] / k_q)  # (21), (22)
+    e_att = error_parts(memory.desired_quaternion, state.quaternion)[1:]  # (23)
+    R = rotation_rows(state.quaternion)
+    printed_law.apply(e_p, e_s, e_att, R, state.velocity_body, g, memory.period[0], estimate, forces)  # (25), (27)
     keep_within(estimate, 0, 1, gains.bound)
     keep_within(estimate, 1, 4, gains.bound_moment)
 

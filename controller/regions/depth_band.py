@@ -33,7 +33,12 @@ class DepthBand:
 
 
 @compiled
+def band_about(z: float, tolerance: float) -> Evaluation:
+    """Evaluate a band of a tolerance at a depth told from its middle [m]."""
+    return z * z - tolerance * tolerance, 0.0, 0.0, 2.0 * z, abs(z) - tolerance
+
+
+@compiled
 def depth_band(p: Array, q: Array) -> Evaluation:
     """Evaluate a packed `DepthBand` at the position `p`."""
-    z = p[2] - q[0]
-    return z * z - q[1] * q[1], 0.0, 0.0, 2.0 * z, abs(z) - q[1]
+    return band_about(p[2] - q[0], q[1])

@@ -33,8 +33,13 @@ class Sphere:
 
 
 @compiled
+def sphere_about(x: float, y: float, z: float, radius: float) -> Evaluation:
+    """Evaluate a sphere of a radius at a place told from its centre [m]."""
+    square = x * x + y * y + z * z
+    return square - radius * radius, 2.0 * x, 2.0 * y, 2.0 * z, math.sqrt(square) - radius
+
+
+@compiled
 def sphere(p: Array, q: Array) -> Evaluation:
     """Evaluate a packed `Sphere` at the position `p`."""
-    x, y, z = p[0] - q[0], p[1] - q[1], p[2] - q[2]
-    square = x * x + y * y + z * z
-    return square - q[3] * q[3], 2.0 * x, 2.0 * y, 2.0 * z, math.sqrt(square) - q[3]
+    return sphere_about(p[0] - q[0], p[1] - q[1], p[2] - q[2], q[3])

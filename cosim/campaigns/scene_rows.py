@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import pyarrow as pa
 
-from cosim.flight import Score
+from cosim.scene_run import Score
 
 
 class Row(NamedTuple):

@@ -123,7 +123,7 @@ def test_compiled_loop_flies_as_the_readable_one(law, scene):
     rows, positions, effort, variation = Readable(scene, SHORT, law).fly()
     np.testing.assert_array_equal(trace[:, 1:4], rows[:, :3])  # to the last bit
     np.testing.assert_array_equal(trace[:, 14:17], rows[:, 3:6])
-    np.testing.assert_array_equal(trace[:, 19:27], rows[:, 6:])
+    np.testing.assert_array_equal(trace[:, 20:28], rows[:, 6:])
     assert score.effort == pytest.approx(effort, rel=1e-12)
     assert score.thrust_variation == pytest.approx(variation, rel=1e-12)
     assert score.min_clearance == pytest.approx(distances(scene, positions, 0.01).min(), abs=1e-12)

@@ -24,9 +24,8 @@ from cosim.campaigns.scenes import SceneTask, SceneWork
 from cosim.campaigns.summary import summarise
 from cosim.campaigns.worker import fly
 from cosim.errors import RunError, ScenarioError
-from cosim.flight import Score
 from cosim.scene import decode_scene
-from cosim.scene_run import Conditions, SceneFlyer
+from cosim.scene_run import Conditions, SceneFlyer, Score
 from tests.cosim.campaigns.scenes import BRIEF, HARD, PLAIN, batches_of, many, results_of, rows, write
 
 

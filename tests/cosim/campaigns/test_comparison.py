@@ -14,7 +14,7 @@ from cosim.campaigns.comparison import pair
 from cosim.campaigns.comparison_figures import shares_up_to
 from cosim.campaigns.scene_rows import row_of
 from cosim.errors import RunError
-from cosim.flight import Score
+from cosim.scene_run import Score
 from tests.cosim.campaigns.scenes import BRIEF, HARD, results_of, rows, write
 
 
