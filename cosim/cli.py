@@ -14,7 +14,7 @@ from collections.abc import Sequence
 from importlib import metadata
 from pathlib import Path
 
-from cosim.command_line import campaigns, mavlink, package, run, sitl
+from cosim.command_line import campaigns, mavlink, package, run, sitl, sweep
 from cosim.command_line.campaigns import INTERRUPTED
 
 _EPILOG = """examples:
@@ -22,6 +22,7 @@ _EPILOG = """examples:
   cosim run paper --set arbiter.engine=closed --set regions.SR1.gain=5000 --out runs/strong
   cosim run my-scene.toml --mavlink udpout:127.0.0.1:14550 --profile ardusub --commands
   cosim campaign scenes.jsonl --law printed --out campaigns/printed --workers 2
+  cosim sweep paper --vary initial.position.1=-2:2 --samples 1000 --out sweeps/start --workers 2
 """
 
 
@@ -57,6 +58,7 @@ def _parser() -> argparse.ArgumentParser:
 
     package.add_verb(verbs)
     campaigns.add_verbs(verbs)
+    sweep.add_verbs(verbs)
     mavlink.add_verbs(verbs)
     sitl.add_verbs(verbs)
     return parser
@@ -168,6 +170,8 @@ _VERBS = {
     "package": package.package,
     "campaign": campaigns.campaign,
     "compare": campaigns.compare,
+    "sweep": sweep.sweep,
+    "rerun": sweep.rerun,
     "listen": mavlink.listen,
     "stream": mavlink.stream,
     "mavlink-check": mavlink.mavlink_check,
