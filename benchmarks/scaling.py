@@ -10,7 +10,7 @@ from itertools import pairwise
 
 from benchmarks.contest import Entry, entered
 from benchmarks.contests.closed_loop import CHANGES, RUN, SCENARIO, flights
-from benchmarks.contests.sweeps import sweep
+from benchmarks.contests.sweeps import CREWS, sweep
 from benchmarks.law import LawSteps
 from benchmarks.machine import pinned
 from benchmarks.table import Row, Table
@@ -23,7 +23,7 @@ REPEATS = 5
 OBSTACLES = (1, 3, 10, 30, 100)
 HORIZONS = (10.0, 30.0, 100.0, 300.0)  # s
 VEHICLES = (1, 8, 64, 512)
-ROWS = 20_000  # of a sweep, for each worker
+ROWS = {"fused": 2_000, "lanes": 20_000}  # of a sweep
 LAWS = ("printed", "deployable")
 
 
@@ -124,9 +124,11 @@ def vehicles() -> Iterator[Curve]:
 
 def workers() -> Iterator[Curve]:
     """Yield what a sweep takes with one and two workers, as processes and in Dask."""
-    for crew in ("processes", "Dask"):
-        entries: dict[float, Entry] = {n: sweep(crew, int(n)) for n in (1, 2)}
-        yield Curve(f"A run of {RUN:g} s in a sweep, {crew}", "workers", entries, count=ROWS, pinned=False)
+    for engine, rows in ROWS.items():
+        for crew in CREWS:
+            entries: dict[float, Entry] = {n: sweep(crew, int(n), engine) for n in (1, 2)}
+            title = f"A run of {RUN:g} s in a sweep of {rows}, {_named(engine)}, {crew}"
+            yield Curve(title, "workers", entries, count=rows, pinned=False)
 
 
 SUBJECTS: dict[str, Callable[[], Iterator[Curve]]] = {
