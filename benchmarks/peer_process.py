@@ -54,7 +54,7 @@ class PeerProcess:
 
 @contextlib.contextmanager
 def peer(
-    environment: Environment, package: str, module: str, function: str, setup: dict[str, Any], *, pinned: bool = True
+    environment: Environment, package: str, module: str, function: str, setup: dict[str, Any]
 ) -> Iterator[PeerProcess]:
     """Start a peer, and end it afterwards.
 
@@ -68,8 +68,6 @@ def peer(
         In `benchmarks.peers`.
     setup : dict
         Plain values for the function.
-    pinned : bool
-        Whether it stays on the processors that we are on; else it may use all.
 
     Raises
     ------
@@ -87,8 +85,6 @@ def peer(
                 [python, str(_SERVE), module, function],
                 stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=errors, text=True, env=apart, cwd=scratch,
             )  # fmt: skip
-        if not pinned and hasattr(os, "sched_setaffinity"):
-            os.sched_setaffinity(process.pid, range(os.cpu_count() or 1))
         with process:
             try:
                 contestant = PeerProcess(process, said)

@@ -25,9 +25,7 @@ def _opened(setup: dict[str, Any]) -> Any:
 
 
 def _step(simulation: Any, count: int) -> None:
-    before = simulation.time()
-    simulation.step(count)
-    if not simulation.time() > before:
+    if not simulation.step(count) > 0.0:  # which returns the time
         raise RuntimeError(EcosLib.get_last_error())
 
 
