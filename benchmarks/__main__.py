@@ -5,13 +5,28 @@ from __future__ import annotations
 import argparse
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
-from benchmarks import baselines, everything, fmu, fuzzy, law, mavlink, peer_environment, scaling, scenes, sitl, step
+from benchmarks import (
+    baselines,
+    everything,
+    fmu,
+    fuzzy,
+    law,
+    mavlink,
+    page,
+    peer_environment,
+    scaling,
+    scenes,
+    sitl,
+    step,
+)
 from benchmarks.machine import description
 from benchmarks.peer_environment import Environment
 from benchmarks.table import Table, as_json, print_tables, write_json
 
 BENCHMARKS = {"step": step, "law": law, "fmu": fmu, "fuzzy": fuzzy, "mavlink": mavlink, "sitl": sitl}
+TABLES = {"all": everything, "scaling": scaling}
 REPEATS = 5
 BUDGET = 0.2  # s
 
@@ -26,15 +41,16 @@ def _parser() -> argparse.ArgumentParser:
         verb.add_argument("--json", type=Path, metavar="FILE", help="write the figures there too")
         return verb
 
-    verb = add("all", everything.__doc__, everything.REPEATS)
-    verb.add_argument("subjects", nargs="*", metavar="SUBJECT", help=f"of {', '.join(everything.SUBJECTS)}")
-    verb.add_argument("--budget", type=float, default=BUDGET, metavar="S", help="of a repeat (default: %(default)s)")
-    verb.add_argument(
-        "--peers-python", metavar="PYTHON", help="that has the peers (default: environments of their own)"
-    )
-    verb = add("scaling", scaling.__doc__, scaling.REPEATS)
-    verb.add_argument("subjects", nargs="*", metavar="SUBJECT", help=f"of {', '.join(scaling.SUBJECTS)}")
-    verb.add_argument("--budget", type=float, default=BUDGET, metavar="S", help="of a repeat (default: %(default)s)")
+    for name, chosen in TABLES.items():
+        verb = add(name, chosen.__doc__, chosen.REPEATS)
+        verb.add_argument("subjects", nargs="*", metavar="SUBJECT", help=f"of {', '.join(chosen.SUBJECTS)}")
+        verb.add_argument(
+            "--budget", type=float, default=BUDGET, metavar="S", help="of a repeat (default: %(default)s)"
+        )
+        if name == "all":
+            verb.add_argument("--peers-python", metavar="PYTHON", help="that has the peers (default: one of their own)")
+    verb = verbs.add_parser("page", help=(page.__doc__ or "").splitlines()[0])
+    verb.add_argument("files", nargs="*", type=Path, metavar="FILE", help="what --json wrote (default: measure now)")
     verbs.add_parser("peers", help="install the peers, and try those again that could not be")
     for name, benchmark in BENCHMARKS.items():
         verb = add(name, benchmark.__doc__)
@@ -77,30 +93,40 @@ def main(arguments: Sequence[str] | None = None) -> None:
         case "peers":
             for peer, version in peer_environment.install(again=True).items():
                 print(f"{peer:24} {version}")
+        case "page":
+            _page(parser, options.files)
         case _:
-            _tables(parser, options)
+            figures = _figures(parser, options)
+            if options.json is not None:
+                write_json(options.json, figures)
 
 
-def _tables(parser: argparse.ArgumentParser, options: argparse.Namespace) -> None:
-    """Take times, and print them."""
+def _figures(parser: argparse.ArgumentParser, options: argparse.Namespace) -> dict[str, Any]:
+    """Take times, print them, and return them as plain values."""
     if options.repeats < 1:
         parser.error("expected 1 or more repeats")
-    if options.name in BENCHMARKS:
-        benchmark, ratio = BENCHMARKS[options.name], BENCHMARKS[options.name].RATIO
-        machine = description(options.repeats)
-        more = {"datagrams": options.datagrams} if benchmark is mavlink else {}
-        tables = [Table("", tuple(benchmark.measure(options.steps, options.repeats, **more)))]
-    else:
-        chosen = everything if options.name == "all" else scaling
+    machine = description(options.repeats)
+    if options.name in TABLES:
+        chosen = TABLES[options.name]
         if unknown := set(options.subjects) - set(chosen.SUBJECTS):
             parser.error(f"subject is {sorted(unknown)[0]!r}, expected one of {', '.join(chosen.SUBJECTS)}")
-        subjects, ratio = options.subjects or list(chosen.SUBJECTS), chosen.RATIO
-        where = [Environment(options.peers_python)] if chosen is everything else []
-        machine = description(options.repeats)
-        tables = chosen.measure(*where, options.budget, options.repeats, subjects)
-    print_tables(tables, ratio, machine)
-    if options.json is not None:
-        write_json(options.json, as_json(tables, ratio, machine))
+        where = {"environment": Environment(options.peers_python)} if chosen is everything else {}
+        tables = chosen.measure(options.subjects or list(chosen.SUBJECTS), options.budget, options.repeats, **where)
+    else:
+        chosen = BENCHMARKS[options.name]
+        more = {"datagrams": options.datagrams} if chosen is mavlink else {}
+        tables = [Table("", tuple(chosen.measure(options.steps, options.repeats, **more)))]
+    print_tables(tables, chosen.RATIO, machine)
+    return as_json(options.name, tables, chosen.RATIO, machine)
+
+
+def _page(parser: argparse.ArgumentParser, files: Sequence[Path]) -> None:
+    try:
+        known = [page.read_figures(file) for file in files]
+        figures = known or [_figures(parser, parser.parse_args([name])) for name in TABLES]
+        page.PAGE.write_text(page.rewrite(page.PAGE.read_text(encoding="utf-8"), figures), encoding="utf-8")
+    except page.PageError as error:
+        parser.error(str(error))
 
 
 def _baselines(parser: argparse.ArgumentParser, options: argparse.Namespace) -> None:

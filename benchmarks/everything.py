@@ -22,19 +22,19 @@ SUBJECTS: dict[str, Callable[[Environment], Iterator[Contest]]] = {
 }
 
 
-def measure(environment: Environment, budget: float, repeats: int, subjects: list[str]) -> list[Table]:
+def measure(subjects: list[str], budget: float, repeats: int, environment: Environment) -> list[Table]:
     """Hold the contests, all on one processor.
 
     Parameters
     ----------
-    environment : Environment
-        Where the peers are.
+    subjects : list of str
+        Of `SUBJECTS`.
     budget : float
         Of a repeat of each contestant [s].
     repeats : int
         How often each has its turn.
-    subjects : list of str
-        Of `SUBJECTS`.
+    environment : Environment
+        Where the peers are.
 
     Returns
     -------

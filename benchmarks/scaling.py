@@ -70,17 +70,17 @@ class Curve:
         return (f"grows with {self.of} to the power of {growth(sizes, costs):.2f}; from one size to the next: {local}",)
 
 
-def measure(budget: float, repeats: int, subjects: list[str]) -> list[Table]:
+def measure(subjects: list[str], budget: float, repeats: int) -> list[Table]:
     """Time the curves of some subjects.
 
     Parameters
     ----------
+    subjects : list of str
+        Of `SUBJECTS`.
     budget : float
         Of a repeat of each size [s].
     repeats : int
         How often each has its turn.
-    subjects : list of str
-        Of `SUBJECTS`.
 
     Returns
     -------

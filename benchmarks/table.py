@@ -70,10 +70,11 @@ def compared(timings: dict[str, Timing | str], base: str | None = None) -> list[
 def figure(seconds: float) -> str:
     """Return a time with its unit, to three figures."""
     scale, unit = next((u for u in _UNITS if seconds >= 0.9995 * u[0]), _UNITS[-1])
-    return f"{_three(seconds / scale)} {unit}"
+    return f"{rounded(seconds / scale)} {unit}"
 
 
-def _three(x: float) -> str:
+def rounded(x: float) -> str:
+    """Return a number to about three figures."""
     return f"{x:.0f}" if x >= 99.95 else f"{x:.1f}" if x >= 9.995 else f"{x:.2f}" if x >= 0.0995 else f"{x:.2g}"
 
 
@@ -93,8 +94,8 @@ def cells(row: Row) -> tuple[str, ...]:
     tuple of str
         "" where there is nothing to say.
     """
-    ratio = f"{_three(row.ratio)}x" if row.ratio is not None else ""
-    between = "–".join(map(_three, row.range)) if row.range is not None else ""
+    ratio = f"{rounded(row.ratio)}x" if row.ratio is not None else ""
+    between = "–".join(map(rounded, row.range)) if row.range is not None else ""
     against = row.base if row.base != row.name else ""
     theirs = _times(row.base_timing) if row.duel else ("", "")
     return (ratio, between, *_times(row.timing), row.name, against, *theirs)
@@ -159,9 +160,10 @@ def _line(texts: Sequence[str], widths: Sequence[int]) -> str:
     return "  ".join(shown).rstrip()
 
 
-def as_json(tables: Sequence[Table], ratio: str, machine: Sequence[str]) -> dict[str, Any]:
-    """Return tables as plain values, with all samples [s]."""
+def as_json(verb: str, tables: Sequence[Table], ratio: str, machine: Sequence[str]) -> dict[str, Any]:
+    """Return the tables of a verb as plain values, with all samples [s]."""
     return {
+        "verb": verb,
         "machine": list(machine),
         "ratio": ratio,
         "tables": [
@@ -172,6 +174,7 @@ def as_json(tables: Sequence[Table], ratio: str, machine: Sequence[str]) -> dict
                     {
                         "name": row.name,
                         "against": row.base,
+                        "duel": row.duel,
                         "ratio": row.ratio,
                         "range": row.range,
                         "seconds": _samples(row.timing),

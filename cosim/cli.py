@@ -11,7 +11,6 @@ import logging
 import os
 import sys
 from collections.abc import Sequence
-from importlib import metadata
 from pathlib import Path
 
 from cosim.command_line import campaigns, mavlink, package, run, sitl, sweep
@@ -26,6 +25,16 @@ _EPILOG = """examples:
 """
 
 
+class _Version(argparse.Action):
+    """Prints the version; finding it takes longer than all else that help needs."""
+
+    def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
+        from importlib import metadata
+
+        print(f"cosim {metadata.version('subreach')}")
+        parser.exit()
+
+
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="cosim",
@@ -33,7 +42,7 @@ def _parser() -> argparse.ArgumentParser:
         epilog=_EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("--version", action="version", version=f"cosim {metadata.version('subreach')}")
+    parser.add_argument("--version", action=_Version, nargs=0, help="show program's version number and exit")
     parser.add_argument("-v", "--verbose", action="store_true", help="log what happens inside")
     verbs = parser.add_subparsers(dest="verb", required=True, metavar="VERB")
 
