@@ -111,8 +111,9 @@ def header(component: Component, token: str) -> str:
     rows, name, guard = component.variables, component.name, component.header.upper().replace(".", "_")
     files = _files("csrc/wrapper") | dict(component.sources)
     shared = external_names(data for file, data in files.items() if file.endswith(".h"))
-    first = {role: next((i for i, v in enumerate(rows) if v.role == role), 0) for role in ("state", "derivative")}
-    constants = {**component.constants, "FIRST_STATE": first["state"], "FIRST_DERIVATIVE": first["derivative"]}
+    roles = ("state", "derivative", "input")
+    first = {f"FIRST_{role.upper()}": next((i for i, v in enumerate(rows) if v.role == role), 0) for role in roles}
+    constants = {**component.constants, **first}
     lines = [
         f"/* {name}: generated from the table of variables. */",
         f"#ifndef {guard}",

@@ -30,7 +30,7 @@ _MARKS = (
 _SAME = ("effort", "max_force", "max_speed", *(f"final_{axis}" for axis in "xyz"), *(f"phi{i}" for i in range(1, 5)))
 
 
-class _Batch(ctypes.Structure):
+class Batch(ctypes.Structure):
     """Of csrc/lanes.h."""
 
     _fields_ = (
@@ -70,8 +70,8 @@ class LanesFlyer:
         library: Any = lanes_library(variation.base.vehicle)
         self.lanes: int = library.lanes_count()
         self._fly: Any = library.lanes_fly
-        self._fly.argtypes, self._fly.restype = [ctypes.POINTER(_Batch)], ctypes.c_int
-        self._batch, self._kept = _Batch(), dict[str, NDArray[Any]]()
+        self._fly.argtypes, self._fly.restype = [ctypes.POINTER(Batch)], ctypes.c_int
+        self._batch, self._kept = Batch(), dict[str, NDArray[Any]]()
         self._describe()
 
     def _describe(self) -> None:
@@ -119,7 +119,9 @@ class LanesFlyer:
             What came of each row.
         """
         outcomes = nothing(len(seeds))
-        rows, refused = self._rows.fill(np.asarray(values, dtype=float).reshape(len(seeds), -1), seeds)
+        rows, refused = self._rows.fill(
+            np.asarray(values, dtype=float).reshape(len(seeds), len(self.variation.keys)), seeds
+        )
         flown = np.array([at for at in range(len(seeds)) if at not in refused], np.intp)
         marks, reasons = self._fly_rows(np.ascontiguousarray(rows[flown]))
         good = np.array([not reason for reason in reasons], np.bool_)

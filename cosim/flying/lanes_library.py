@@ -40,20 +40,21 @@ _WIDTH = """#ifdef __AVX512F__
 #endif
 """
 _OF_PLANT = ("plant.c", "actuators.c", "environment.c")  # what a step of it needs
-_OF_CONTROLLER = ("law.c", "regions.c")
 
 
 @functools.cache
-def lanes_library(vehicle: Vehicle, contract: bool = False) -> ctypes.CDLL:
+def lanes_library(vehicle: Vehicle, flags: tuple[str, ...] = (), beside: Path | None = None) -> ctypes.CDLL:
     """Return the library of a vehicle, compiled first where it is not in the cache.
 
     Parameters
     ----------
     vehicle : Vehicle
         The vehicle.
-    contract : bool
-        Whether the compiler may join a product and a sum into one operation, which rounds once: for measurements, as it
-        gives up the bits that lanes have in common with the FMU.
+    flags : tuple of str, optional
+        For the compiler, after its own: to measure what they change. Those that let it round otherwise, such as
+        ``-ffp-contract=fast``, give up the bits that lanes have in common with the FMU.
+    beside : Path, optional
+        One more C file for the lanes.
 
     Returns
     -------
@@ -63,12 +64,14 @@ def lanes_library(vehicle: Vehicle, contract: bool = False) -> ctypes.CDLL:
     Raises
     ------
     BuildError
-        If there is no C compiler, it fails, or there is no place to write.
+        If there is no C compiler, or it fails.
     """
     compiler = find_compiler()
-    flags = (*_NARROW, *_tuned(compiler), *(("-ffp-contract=fast",) if contract else ()))
-    files = _files(vehicle)
-    made_from = hashlib.sha256(repr((native_platform().name, compiler, FLAGS, flags, _machine(compiler, flags))).encode())
+    flags = (*_NARROW, *_tuned(compiler), *flags)
+    files = _files(vehicle, beside)
+    made_from = hashlib.sha256(
+        repr((native_platform().name, compiler, FLAGS, flags, _machine(compiler, flags))).encode()
+    )
     for name, text in sorted(files.items()):
         made_from.update(f"\n{name} {len(text)}\n".encode() + text)
     name = f"{vehicle.name}-{made_from.hexdigest()[:16]}{native_platform().suffix}"
@@ -81,8 +84,7 @@ def lanes_library(vehicle: Vehicle, contract: bool = False) -> ctypes.CDLL:
         for file, text in files.items():
             (folder / file).parent.mkdir(exist_ok=True)
             (folder / file).write_bytes(text)
-        sources = sorted(folder / file for file in files if file.count("/") == 0)
-        sources += sorted(folder / file for file in files if file.startswith("one/") and file.endswith(".c"))
+        sources = [folder / file for file in sorted(files) if file.endswith(".c") and not file.startswith("many/")]
         built = folder / name
         compile_library(compiler, native_platform(), sources, [], built, flags)
         return ctypes.CDLL(str(_kept(built, path)))
@@ -103,19 +105,21 @@ def _kept(built: Path, path: Path) -> Path:
     return path
 
 
-def _files(vehicle: Vehicle) -> dict[str, bytes]:
+def _files(vehicle: Vehicle, beside: Path | None = None) -> dict[str, bytes]:
     """Return the C files: of one vehicle in ``one/``, of several in ``many/``, and what compiles the latter."""
     component = of_vehicle(vehicle)
-    sources, own = c_sources(component, 3), _own("cosim/csrc")
+    sources, own = c_sources(component, 3), _own("cosim/flying/csrc")
     del sources[_FMI]
     one = {**sources, component.header: header(component, _TOKEN).encode(), "start.c": own["start.c"]}
     one |= {"lanes.h": own["lanes.h"], "arbiter.c": to_c(Arbiter().system).encode()}
     lanes = replace(component, name=f"{vehicle.name}_lanes")  # the names that its functions begin with
     many = {name: text for name, text in sources.items() if name.endswith(".h") or name in _OF_PLANT}
-    many |= _own("controller/csrc") | {"lanes.h": own["lanes.h"], "lanes.c": own["lanes.c"]}
+    many |= _own("controller/csrc") | {name: text for name, text in own.items() if name != "start.c"}
     many |= {component.header: header(lanes, _TOKEN).encode(), "width.h": _WIDTH.encode()}
+    if beside is not None:
+        many[beside.name] = beside.read_bytes()
     files = {f"one/{name}": text for name, text in one.items()} | {f"many/{name}": text for name, text in many.items()}
-    for name in (*_OF_PLANT, *_OF_CONTROLLER, "lanes.c"):
+    for name in (name for name in many if name.endswith(".c")):
         files[f"many_{name}"] = f'#include "many/width.h"\n#include "many/{name}"\n'.encode()
     return files
 

@@ -19,13 +19,23 @@ Array = NDArray[np.float64]
 
 _PARAMETERS = "plant.parameters."
 # of what may vary: all that a row holds; and the seed, since nothing in a lane is random
-_VARIED = ("initial.", "goal.", "regions.", "law.", "limit.", "plant.current.", _PARAMETERS, "arbiter.ramp", "sensing.seed")
+_VARIED = (
+    "initial.",
+    "goal.",
+    "regions.",
+    "law.",
+    "limit.",
+    "plant.current.",
+    _PARAMETERS,
+    "arbiter.ramp",
+    "sensing.seed",
+)
 # parameters that let clocks run in the plant
 _CLOCKED = ("depth_sensor.rate", "dvl.rate", "imu.rate", "compass.rate", "usbl.rate", "current_variation.")
 # numbers that are not checked each by itself: of a unit quaternion, and of shapes whose points must not meet
 _JOINT = ("initial.quaternion.", "law.desired_quaternion.")
 _JOINT_SHAPES = (Pipe, Prism)
-_SEED = "seed"  # of the plant
+_SEEDS = (0, 2**31 - 1)  # that the plant takes
 
 
 class Rows:
@@ -47,8 +57,8 @@ class Rows:
     regions : tuple of Region
         The goal and the others, as the base has them.
     base : ndarray, shape (width,)
-        The row of the base: start values, desired attitude, gains of the law, ramp, gains of the regions, numbers of the
-        shapes (the goal's first), velocities of the regions (the goal's first).
+        The row of the base: start values, desired attitude, gains of the law, ramp, gains of the regions, numbers of
+        the shapes (the goal's first), velocities of the regions (the goal's first).
 
     Raises
     ------
@@ -64,12 +74,11 @@ class Rows:
         self._references = {v.name: (i, v) for i, v in enumerate(variables(base.vehicle))}
         names = dict.fromkeys((*start_values(base), "wrench_force_limit"))
         names |= dict.fromkeys(k.removeprefix(_PARAMETERS) for k in variation.keys if k.startswith(_PARAMETERS))
-        names[_SEED] = None
         rows = [self._references[name][1] for name in names]
         self.reals = tuple(v for v in rows if v.type == "real")
         self.integers = tuple(v for v in rows if v.type != "real")
         for v in self.integers:
-            if f"{_PARAMETERS}{v.name}" in variation.keys and v.name != _SEED:
+            if f"{_PARAMETERS}{v.name}" in variation.keys:
                 raise RunError(f"lanes cannot vary '{_PARAMETERS}{v.name}', which is no real number")
         self.regions = regions_of(base)
         self.base = self.row(base)
@@ -123,6 +132,8 @@ class Rows:
                 rows[at] = self.row(self.variation.scenario(values[at].tolist(), int(seeds[at])))
             except ScenarioError as error:
                 refused[at] = str(error)
+        for at in np.flatnonzero((seeds < _SEEDS[0]) | (seeds > _SEEDS[1])).tolist():
+            refused.setdefault(at, f"seed is {seeds[at]}, expected a whole number from {_SEEDS[0]} to {_SEEDS[1]}")
         return rows, refused
 
     # ---- which rows need no check of their own ----
@@ -137,8 +148,8 @@ class Rows:
                 beyond = extreme < self._ranges[i, 0] if side == 0 else extreme > self._ranges[i, 1]
                 if beyond and self._takes(i, float(extreme)):
                     self._ranges[i, side] = extreme
-        inside: NDArray[np.bool_] = ((columns >= self._ranges[:, 0]) & (columns <= self._ranges[:, 1])).all(axis=1)
-        return inside
+        within = (columns >= self._ranges[:, 0]) & (columns <= self._ranges[:, 1])
+        return np.asarray(within.all(axis=1), np.bool_)
 
     def _takes(self, i: int, value: float) -> bool:
         """Return whether the scenario takes a number, all others being those of the base."""
@@ -154,7 +165,7 @@ class Rows:
         return [float(self.variation.number(key)) for key in self.variation.keys]
 
     def _slot(self, i: int) -> int:
-        """Return where in a row the number of a key stands as it is, -1 where it does not or is not checked by itself."""
+        """Return where in a row the number of a key stands as it is; -1: it does not, or is not checked by itself."""
         key = self.variation.keys[i]
         if key.startswith(_JOINT) or self._is_joint(key):
             return -1
@@ -208,13 +219,12 @@ def require_lanes(scenario: Scenario) -> None:
 def _require_variable(key: str, clocked: tuple[str, ...]) -> None:
     if not key.startswith(_VARIED) or key.removeprefix(_PARAMETERS).startswith(clocked):
         raise RunError(
-            f"lanes cannot vary {key!r}, expected a number of the initial state, goal, regions, law, limit, arbiter.ramp, "
-            f"or of the plant without samples and without a current that varies; the fused loop can"
+            f"lanes cannot vary {key!r}, expected a number of the start, goal, regions, law, limit, arbiter.ramp, "
+            f"or of the plant but for samples and the current's variation; the fused loop can"
         )
 
 
 def _others(value: float) -> Iterator[float]:
     """Yield numbers that differ from one, of which a check may take some."""
-    if math.isinf(value):
-        yield from (1.0, 100.0)
-    yield from (value * 1.0078125, value * 0.9921875, value + 0.5, value - 0.5)
+    tried = (1.0, 100.0) if math.isinf(value) else (value * 1.0078125, value * 0.9921875, value + 0.5, value - 0.5)
+    yield from (other for other in tried if other != value)

@@ -84,7 +84,7 @@ static double mobility(const Derived *d, int first, int last, int *row)
 
 const char *plant_prepare(Plant *plant)
 {
-    Parameters *p = &plant->parameters;
+    const Parameters *p = &plant->parameters;
     Derived *d = &plant->derived;
     double L[6][6];
 
@@ -96,9 +96,7 @@ const char *plant_prepare(Plant *plant)
     if (!cholesky(L))
         return "mass matrix with added mass is not positive definite (Property 1)";
 
-    for (int i = 0; i < 6; i++)
-        for (int j = 0; j < i; j++)
-            p->added_mass[i][j] = p->added_mass[j][i];
+    symmetric6(p->added_mass, d->added_mass);
     for (int j = 0; j < 6; j++) {
         double column[6] = {0.0};
         column[j] = 1.0;

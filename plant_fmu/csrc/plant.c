@@ -46,6 +46,7 @@ static void ride_current(const Plant *plant, const Drift *drift, double time, co
                          const Real R[3][3], const Real velocity_world[3], Real nu_r[6], Real momentum[6], Real wrench[6])
 {
     const Parameters *p = &plant->parameters;
+    const Real(*added_mass)[6] = plant->derived.added_mass;
     const Real zero = splat(0.0);
     Real water[3], water_rate[3], nu_c[6], nu_c_rate[6], turning[3], added[6], lost[6], moment[3];
 
@@ -60,12 +61,12 @@ static void ride_current(const Plant *plant, const Drift *drift, double time, co
         nu_c_rate[i] -= turning[i];
         nu_c[3 + i] = nu_c_rate[3 + i] = zero;
     }
-    multiply6(p->added_mass, nu_c, lost);
-    multiply6(p->added_mass, nu_r, added);
+    multiply6(added_mass, nu_c, lost);
+    multiply6(added_mass, nu_r, added);
     cross(nu_c, added, moment);
     for (int i = 0; i < 3; i++)
         wrench[3 + i] += moment[i];
-    multiply6(p->added_mass, nu_c_rate, added);
+    multiply6(added_mass, nu_c_rate, added);
     for (int i = 0; i < 6; i++) {
         momentum[i] -= lost[i];
         wrench[i] += added[i];

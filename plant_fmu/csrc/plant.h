@@ -48,7 +48,7 @@ typedef struct {
     Real inertia[6];                         /* kg m2, about the body origin: elements xx yy zz xy xz yz */
     Real r_G[3], r_B[3];                     /* m, centres of gravity and of buoyancy */
     Real weight, buoyancy;                   /* N */
-    Real added_mass[6][6];                   /* the upper triangle is given; plant_prepare mirrors it */
+    Real added_mass[6][6];                   /* of which the upper triangle is given */
     Real linear_damping[6];                  /* N s/m, N m s/rad */
     Real quadratic_damping[6];               /* N s2/m2, N m s2/rad2 */
 
@@ -83,6 +83,7 @@ typedef struct {
 } Parameters;
 
 typedef struct { /* constants that follow from the parameters */
+    Real added_mass[6][6];         /* M_A, whole */
     Real mass_matrix[6][6];        /* M_RB + M_A */
     Real mass_inverse[6][6];
     Real contact_mass;             /* kg, at most what a force on the origin moves, in any direction */

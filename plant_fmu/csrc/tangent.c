@@ -170,14 +170,14 @@ static void derivative_tangent(const Model *m, const Model *seed, const double r
     subtract_coriolis_tangent(a, da, nu, dnu, dwrench);
 
     symmetric6(dp->added_mass, dadded_mass);
-    multiply6(p->added_mass, nu_r, added);
-    multiply6(p->added_mass, dnu_r, dadded);
+    multiply6(m->plant.derived.added_mass, nu_r, added);
+    multiply6(m->plant.derived.added_mass, dnu_r, dadded);
     multiply6((const double(*)[6])dadded_mass, nu_r, term);
     for (int i = 0; i < 6; i++)
         dadded[i] += term[i];
     subtract_coriolis_tangent(added, dadded, nu_r, dnu_r, dwrench);
 
-    multiply6(p->added_mass, dnu_c_rate, term);
+    multiply6(m->plant.derived.added_mass, dnu_c_rate, term);
     for (int i = 0; i < 6; i++)
         dwrench[i] += term[i];
     multiply6((const double(*)[6])dadded_mass, nu_c_rate, term);

@@ -2,9 +2,12 @@
 
 import importlib.util
 import io
+import re
+import shlex
 import subprocess
 import sys
 import zipfile
+from importlib import resources
 from pathlib import Path
 
 import fmpy.ssp
@@ -44,6 +47,18 @@ def test_fmpy_flies_it_as_we_do(packed):
     ours = jacobi(scenario)
     assert np.linalg.norm(ours[-1, :3] - ours[0, :3]) > 0.5
     compared(ours, run_in_fmpy(packed, scenario.steps, scenario.time.step))
+
+
+@pytest.mark.slow
+def test_the_page_on_it_does_what_it_says(tmp_path, monkeypatch, capsys):
+    text = (ROOT / "docs" / "ssp.md").read_text()
+    command, code = re.search(r"```\ncosim (.*?)```", text, re.S)[1], re.search(r"```python\n(.*?)```", text, re.S)[1]
+    monkeypatch.chdir(tmp_path)
+    assert main(shlex.split(command.replace("\\\n", " "))) == 0
+    names = {}
+    exec(code, names)
+    assert len(names["result"]) == 3000
+    assert names["result"]["plant.position.z"][-1] == pytest.approx(6.2665, abs=1e-3)
 
 
 @pytest.mark.slow
@@ -130,6 +145,17 @@ def test_the_scenario_within_makes_the_same_file(packed, tmp_path):
         inner = tmp_path / "all-shapes.toml"
         inner.write_bytes(archive.read("documentation/scenario.toml"))
     assert package_system(load_scenario(inner), tmp_path / "again.ssp").read_bytes() == packed.read_bytes()
+
+
+def test_a_vehicle_of_ones_own_goes_with_it(packed, tmp_path):
+    shipped = resources.files("plant_fmu") / "vehicles" / "odin.toml"
+    (tmp_path / "mine.toml").write_text(shipped.read_text().replace('name = "odin"', 'name = "mine"'))
+    scenario = load_scenario(ALL_SHAPES, [f"vehicle='{tmp_path / 'mine.toml'}'"])
+    with zipfile.ZipFile(package_system(scenario, tmp_path / "mine.ssp")) as archive:
+        archive.extractall(tmp_path / "out")
+    assert str(tmp_path) not in (tmp_path / "out" / "documentation" / "scenario.toml").read_text()
+    again = load_scenario(tmp_path / "out" / "documentation" / "scenario.toml")
+    assert again.vehicle.name == scenario.vehicle.name
 
 
 # ---- what it cannot be ----

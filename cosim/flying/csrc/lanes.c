@@ -6,15 +6,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "instance.h"
 #include "law.h"
 #include "regions.h"
-
-#define AT(member) offsetof(Model, member)
-
-static const Variable PLACES[] = {COMPONENT_VARIABLES}; /* as in the FMU, and where they are in a Model of lanes */
-
-enum { N_PLACES = sizeof PLACES / sizeof PLACES[0], N_DERIVED = offsetof(Derived, lags) / sizeof(Real) };
+#include "vehicles.h"
 
 int arbiter_evaluate(const double inputs[3], double outputs[3]); /* generated */
 
@@ -82,22 +76,9 @@ static void lay_out(Fleet *f, const Batch *b, Real *block)
 static void seat(Fleet *f, int i, const Start *start, const double *row)
 {
     const Batch *b = f->batch;
-    Real *derived = (Real *)&f->model.plant.derived, *gains = (Real *)&f->gains;
+    Real *gains = (Real *)&f->gains;
 
-    for (int j = 0; j < N_PLACES; j++) {
-        char *place = (char *)&f->model + PLACES[j].offset;
-        if (PLACES[j].role != PARAMETER && PLACES[j].role != STATE)
-            continue;
-        if (PLACES[j].type == TYPE_REAL)
-            set_lane((Real *)place, i, start->values[j]);
-        else if (PLACES[j].type == TYPE_BOOLEAN)
-            set_mask_lane((Mask *)place, i, start->values[j] != 0.0);
-    }
-    for (int j = 0; j < N_DERIVED; j++)
-        set_lane(&derived[j], i, start->derived[j]);
-    f->model.plant.derived.lags |= start->lags;
-    f->model.plant.derived.water_moves |= start->water_moves;
-
+    vehicles_seat(&f->model, i, start);
     row += b->n_reals + b->n_integers;
     for (int j = 0; j < 4; j++)
         set_lane(&f->desired[j], i, *row++);
@@ -215,89 +196,56 @@ static void allocate(const Batch *b, const Real wrench[6], Real forces[N_THRUSTE
         forces[i] = real_fmin(real_fmax(scale * forces[i], splat(b->lower[i])), splat(b->upper[i]));
 }
 
-/* Whether the plant takes a number for one of its variables. */
-static Mask within(const Variable *variable, Real x)
-{
-    return (x >= variable->min) & (x <= variable->max);
-}
-
 static void stop(Fleet *f, Mask goes_on, int k)
 {
     f->marks.stopped = choose(f->flying & mask_not(goes_on), splat(k), f->marks.stopped);
     f->flying &= goes_on;
 }
 
-static void control(Fleet *f, int k, int first_input)
+static void control(Fleet *f, int k)
 {
     const Batch *b = f->batch;
     const Real *rigid = f->model.state.rigid;
     Inputs *inputs = &f->model.inputs;
     Real wrench[6];
-    Mask taken = f->flying, thrust_cut[N_THRUSTERS], wrench_cut;
+    Mask thrust_cut[N_THRUSTERS], wrench_cut;
 
     for (int j = 1; j < b->n_regions; j++)
         f->alphas[j] = f->region_gains[j] * f->weights[b->criteria[j]];
     law_step(rigid + 3, rigid + 7, f->desired, f->values[0], f->gradients[0], b->n_regions - 1, f->values + 1,
              (const Real(*)[3])(f->gradients + 1), f->alphas + 1, &f->gains, splat(b->period), f->estimate, wrench);
-    if (b->thrusters) {
+    if (b->thrusters)
         allocate(b, wrench, inputs->thrust);
-        for (int j = 0; j < N_THRUSTERS; j++)
-            taken &= within(&PLACES[first_input + j], inputs->thrust[j]);
-    } else {
+    else
         memcpy(inputs->wrench, wrench, sizeof wrench);
-        for (int j = 0; j < 6; j++)
-            taken &= within(&PLACES[first_input + N_THRUSTERS + j], wrench[j]);
-    }
-    stop(f, taken, k);
+    stop(f, vehicles_take(inputs), k);
     actuators_target(&f->model.plant.parameters, inputs, &f->target, thrust_cut, &wrench_cut);
 }
 
 static void advance(Fleet *f, int k, double *time)
 {
-    static const Drift STILL;
     const Batch *b = f->batch;
     const double end = k * b->step + b->step;
-    const State before = f->model.state;
-    State *state = &f->model.state;
-    double h;
-    Mask taken = plant_advance(&f->model.plant, &STILL, *time, end, b->substep, &f->target, state, &h);
+    const Actuators *actuators = &f->model.state.actuators;
+    Real given[6];
 
-    for (int j = 0; j < N_RIGID; j++)
-        taken &= within(&PLACES[FIRST_STATE + j], state->rigid[j]);
-    stop(f, taken, k);
-    if (!all(f->flying)) { /* who does not fly stays where it was */
-        const Real *was = (const Real *)&before;
-        Real *is = (Real *)state;
-        for (int j = 0; j < N_STATES; j++)
-            is[j] = choose(f->flying, is[j], was[j]);
-    }
+    stop(f, vehicles_advance(&f->model, &f->target, *time, end, b->substep, f->flying), k);
     *time = end;
 
-    Real given[6], force;
     if (b->thrusters)
-        actuators_wrench(&f->model.plant.parameters, &state->actuators, given);
+        actuators_wrench(&f->model.plant.parameters, actuators, given);
     else
-        memcpy(given, state->actuators.wrench, sizeof given);
-    force = real_sqrt(given[0] * given[0] + given[1] * given[1] + given[2] * given[2]);
+        memcpy(given, actuators->wrench, sizeof given);
+    const Real force = real_sqrt(given[0] * given[0] + given[1] * given[1] + given[2] * given[2]);
     f->marks.effort = choose(f->flying, f->marks.effort + force * b->step, f->marks.effort);
     f->marks.max_force = choose(f->flying, real_fmax(force, f->marks.max_force), f->marks.max_force);
 }
 
 /* ---- flights ----------------------------------------------------------------------------------------------- */
 
-static int first_input(void)
-{
-    int j = 0;
-
-    while (PLACES[j].role != INPUT)
-        j++;
-    return j;
-}
-
 static void fly(Fleet *f)
 {
     const Batch *b = f->batch;
-    const int input = first_input();
     double time = 0.0;
 
     begin(f);
@@ -313,7 +261,7 @@ static void fly(Fleet *f)
         if (k % b->arbiter_every == 0)
             arbitrate(f);
         if (controls)
-            control(f, k, input);
+            control(f, k);
         advance(f, k, &time);
     }
 }
@@ -346,7 +294,7 @@ static int board(Fleet *f, Starter *starter, int *next, int seated[N_LANES])
     int n = 0;
     Start start;
 
-    f->model.plant.derived.lags = f->model.plant.derived.water_moves = 0;
+    vehicles_leave(&f->model);
     for (; n < N_LANES && *next < b->n_rows; ++*next) {
         const double *row = b->rows + (size_t)*next * (size_t)b->width;
         if (!starter_prepare(starter, b, row, &start, b->refusals + (size_t)*next * REFUSAL))
