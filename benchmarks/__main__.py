@@ -111,6 +111,7 @@ def _figures(parser: argparse.ArgumentParser, options: argparse.Namespace) -> di
         if unknown := set(options.subjects) - set(chosen.SUBJECTS):
             parser.error(f"subject is {sorted(unknown)[0]!r}, expected one of {', '.join(chosen.SUBJECTS)}")
         where = {"environment": Environment(options.peers_python)} if chosen is everything else {}
+        machine += [f"peers: {environment.told()}" for environment in where.values()]
         tables = chosen.measure(options.subjects or list(chosen.SUBJECTS), options.budget, options.repeats, **where)
     else:
         chosen = BENCHMARKS[options.name]

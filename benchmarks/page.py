@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import textwrap
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,7 @@ from benchmarks.timing import Timing
 
 PAGE = Path(__file__).parents[1] / "docs" / "performance.md"
 PARTS = ("all", "scaling")
+_WIDTH = 120
 _PART = "<!-- figures: {} -->\n{}<!-- end of figures -->"
 
 
@@ -62,7 +64,7 @@ def read_figures(path: Path) -> dict[str, Any]:
 
 
 def _lines(figures: dict[str, Any]) -> Iterator[str]:
-    yield f"{'; '.join(figures['machine'])}. The ratio says {figures['ratio']}."
+    yield from textwrap.wrap(f"{'; '.join(figures['machine'])}. The ratio says {figures['ratio']}.", _WIDTH)
     for table in figures["tables"]:
         yield ""
         yield f"**{table['title']}**"

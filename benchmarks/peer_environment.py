@@ -152,3 +152,8 @@ class Environment:
         if name not in self._state:
             self._state[name] = _version(self._python or sys.executable, name)
         return self._state[name]
+
+    def told(self) -> str:
+        """Return the versions of the peers that are there."""
+        found = {name: self.version(name) for name in PEERS}
+        return ", ".join(f"{name} {version}" for name, version in found.items() if not version.startswith("not"))

@@ -1,12 +1,13 @@
 """The benchmarks run, and what they compare is one plant. No test asserts a time."""
 
 import json
+import subprocess
 import sys
 
 import numpy as np
 import pytest
 
-from benchmarks import peer_environment
+from benchmarks import page, peer_environment
 from benchmarks.__main__ import BENCHMARKS, main
 from benchmarks.contest import Contest
 from benchmarks.contests.plant import STEP, THRUST, WRENCH
@@ -15,7 +16,7 @@ from benchmarks.peer_environment import Environment
 from benchmarks.peer_process import peer
 from benchmarks.peers import numba_body, numpy_body
 from benchmarks.scaling import Curve
-from benchmarks.table import Row, Table, figure, print_tables
+from benchmarks.table import Row, Table, as_json, figure, print_tables, write_json
 from benchmarks.timing import NotMeasuredError, Own, Timing, count_for, growth, take_turns
 from benchmarks.vehicle_numbers import vehicle_numbers
 from plant_fmu import Plant, cached_fmu, load_vehicle
@@ -197,3 +198,61 @@ def test_the_numpy_plant_is_the_same_plant(tmp_path):
     for name in STATES:
         assert ours.values[name] != 0.0
         assert theirs.values[name] == pytest.approx(ours.values[name], abs=1e-12)
+
+
+# ---- the page ----
+
+
+def test_the_page_takes_new_figures_and_keeps_the_rest(tmp_path):
+    duel = Row("ours", Timing((1e-6, 2e-6)), "a|b", Timing((4e-6, 4e-6)), duel=True)
+    missing = Row("ours", Timing((1e-6,)), "nobody", "not installed", duel=True)
+    plain = Row("3 obstacles", Timing((2.0,)), "1 obstacles", Timing((1.0,)))
+    tables = {"all": [Table("a step", (duel, missing))], "scaling": [Table("a run", (plain,), ("grows",))]}
+    figures = []
+    for verb, of_verb in tables.items():
+        write_json(tmp_path / verb, as_json(verb, of_verb, "theirs to ours", ["a machine", "calm"]))
+        figures.append(page.read_figures(tmp_path / verb))
+    old = page.PAGE.read_text()
+    new = page.rewrite(old, figures)
+    assert "a machine; calm. The ratio says theirs to ours." in new
+    assert "| 2.67 | 2.00–4.00 | ours | 1.50 µs | a/b | 4.00 µs |" in new
+    assert "|  |  | ours | 1.00 µs | nobody (not installed) | – |" in new
+    assert "| 2.00 | 2.00 s | 2.00 s–2.00 s | 3 obstacles |\n\nIt grows.\n" in new
+    assert page.rewrite(new, figures) == new
+    assert new.startswith(old[: old.index("<!-- figures")])
+    assert new.endswith(old[old.rindex("<!-- end of figures") :])
+    assert page.rewrite(new, figures[:1]) == new  # each part by itself
+
+
+def test_what_is_no_figures_is_refused(tmp_path):
+    (tmp_path / "a").write_text('{"verb": "step", "tables": []}')
+    for path, why in ((tmp_path / "a", "figures of 'step'"), (tmp_path / "b", "no figures")):
+        with pytest.raises(page.PageError, match=why):
+            page.read_figures(path)
+    with pytest.raises(page.PageError, match="marks of the part 'all'"):
+        page.rewrite("no marks", [{"verb": "all"}])
+
+
+def test_peers_are_installed_one_by_one_and_a_failure_is_kept(monkeypatch, fmu_cache):
+    asked = []
+
+    def run(command, **_):
+        asked.append(command[-1] if "install" in command else command)
+        failed = "mujoco" in command
+        return subprocess.CompletedProcess(command, int(failed), "1.2\n", "ERROR: no such thing\nERROR: no mujoco")
+
+    monkeypatch.setattr(peer_environment.subprocess, "run", run)
+    monkeypatch.setattr(peer_environment.venv, "create", lambda *_, **__: None)
+    monkeypatch.setattr(peer_environment, "FOLDER", "peers-of-a-test")
+    state = peer_environment.install()
+    assert state["mujoco"] == "not installed: no mujoco"
+    assert {version for name, version in state.items() if name != "mujoco"} == {"1.2"}
+    asked.clear()
+    assert peer_environment.install() == state
+    assert asked == []
+    peer_environment.install(again=True)
+    assert asked == ["mujoco"]
+    environment = Environment()
+    assert environment.python("fmpy").startswith(str(fmu_cache))
+    with pytest.raises(NotMeasuredError, match="no mujoco"):
+        environment.python("mujoco")
