@@ -60,6 +60,7 @@ def test_summary_follows_from_the_record(shipped_run):
     assert summary["saturated_time"] == pytest.approx(np.count_nonzero(force > 107.999) * 0.001, abs=0.01)
 
 
+@pytest.mark.slow
 def test_settled_means_inside_for_the_last_ten_seconds(shipped_run):
     early = shipped_run("paper", "arbiter.engine=closed", "time.duration=20").summary
     assert early["reached"] and early["settle_time"] == pytest.approx(13.87, abs=0.1) and not early["settled"]

@@ -164,6 +164,7 @@ def test_ziglang_builds_where_there_is_no_cc(tmp_path, monkeypatch):
     assert build_fmu(load_vehicle("odin"), 3, tmp_path / "x.fmu").exists()
 
 
+@pytest.mark.slow
 def test_own_vehicle_with_six_thrusters_and_full_added_mass(tmp_path, make_slave):
     rows = "\n".join(f"    [{', '.join('1.0' if i == j else '0.1' for j in range(6))}]," for i in range(6))
     path = written(

@@ -87,7 +87,14 @@ def dead(which):
     return change
 
 
-@pytest.mark.parametrize("which", ["position", "quaternion", "velocity_body", "everything", "frozen"])
+@pytest.mark.parametrize(
+    "which",
+    [
+        *(pytest.param(w, marks=pytest.mark.slow) for w in ("position", "quaternion", "velocity_body")),
+        "everything",
+        "frozen",
+    ],
+)
 def test_a_sensor_that_is_dead_for_a_second_is_borne(which):
     """Forces stay finite and within limits, nothing is touched, no thruster is given up, the goal is reached."""
     law, sea, clear = law_for(REGIONS), Sea(noise=NOISE), []
