@@ -11,10 +11,9 @@ import logging
 import os
 import sys
 from collections.abc import Sequence
-from importlib import metadata
 from pathlib import Path
 
-from cosim.command_line import campaigns, mavlink, package, run, sitl
+from cosim.command_line import campaigns, mavlink, package, run, sitl, sweep
 from cosim.command_line.campaigns import INTERRUPTED
 
 _EPILOG = """examples:
@@ -22,7 +21,18 @@ _EPILOG = """examples:
   cosim run paper --set arbiter.engine=closed --set regions.SR1.gain=5000 --out runs/strong
   cosim run my-scene.toml --mavlink udpout:127.0.0.1:14550 --profile ardusub --commands
   cosim campaign scenes.jsonl --law printed --out campaigns/printed --workers 2
+  cosim sweep paper --vary initial.position.1=-2:2 --samples 1000 --out sweeps/start --workers 2
 """
+
+
+class _Version(argparse.Action):
+    """Prints the version; finding it takes longer than all else that help needs."""
+
+    def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
+        from importlib import metadata
+
+        print(f"cosim {metadata.version('subreach')}")
+        parser.exit()
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -32,7 +42,7 @@ def _parser() -> argparse.ArgumentParser:
         epilog=_EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("--version", action="version", version=f"cosim {metadata.version('subreach')}")
+    parser.add_argument("--version", action=_Version, nargs=0, help="show program's version number and exit")
     parser.add_argument("-v", "--verbose", action="store_true", help="log what happens inside")
     verbs = parser.add_subparsers(dest="verb", required=True, metavar="VERB")
 
@@ -57,6 +67,7 @@ def _parser() -> argparse.ArgumentParser:
 
     package.add_verb(verbs)
     campaigns.add_verbs(verbs)
+    sweep.add_verbs(verbs)
     mavlink.add_verbs(verbs)
     sitl.add_verbs(verbs)
     return parser
@@ -168,6 +179,8 @@ _VERBS = {
     "package": package.package,
     "campaign": campaigns.campaign,
     "compare": campaigns.compare,
+    "sweep": sweep.sweep,
+    "rerun": sweep.rerun,
     "listen": mavlink.listen,
     "stream": mavlink.stream,
     "mavlink-check": mavlink.mavlink_check,

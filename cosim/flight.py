@@ -40,7 +40,7 @@ Array = NDArray[np.float64]
 # the folders of what the compiled loop is made of beside this one and that of the laws
 _FOREIGN = (Path(fuzzy_arbiter.__file__).parent, Path(plant_fmu.__file__).parent / "running")
 
-_weigh: Any = numba.njit(**{"_nrt": False})(Arbiter().compiled().py_func)
+_weigh: Any = numba.njit(_nrt=False)(Arbiter().compiled().py_func)  # type: ignore[call-overload]
 _ramp: Any = numba.njit(ramp)
 _step: Any = printed.step  # of a law, and whether it gives a wrench: `flight_of` puts others in their places
 _is_wrench = True

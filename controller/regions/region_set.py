@@ -332,12 +332,15 @@ def clearances_at(points: Array, region: Region) -> Array:
     ndarray, shape (m,)
         As `clearance_at` gives it [m].
     """
-    return _clearances_at(pack([region]), points)
+    clearances = np.empty(len(points))
+    _clearances_at(pack([region]), np.ascontiguousarray(points, dtype=float), np.empty(3), clearances)
+    return clearances
 
 
-@compiled
-def _clearances_at(regions: PackedRegions, points: Array) -> Array:
-    result = np.empty(points.shape[0])
+@lean
+def _clearances_at(regions: PackedRegions, points: Array, room: Array, clearances: Array) -> None:
     for i in range(points.shape[0]):
-        result[i] = clearance_at(regions, 0, points[i])
-    return result
+        if regions.kinds[0] < _FIRST_OF_ATTITUDE:
+            clearances[i] = clearance_of_place(regions, 0, points[i], room)
+        else:
+            clearances[i] = math.inf

@@ -3,27 +3,20 @@
 from __future__ import annotations
 
 import contextlib
-import itertools
 import json
-import sys
-from collections.abc import Iterator
+from concurrent.futures import Executor
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from tqdm import tqdm
-
-from cosim.campaigns.folder import SUMMARY, CampaignFolder, write_text
+from cosim.campaigns.folder import SUMMARY, write_text
 from cosim.campaigns.law_gains import gains_from
-from cosim.campaigns.plan import plan_of
 from cosim.campaigns.results import Results
+from cosim.campaigns.runner import carry_out
 from cosim.campaigns.scene_store import SceneStore
+from cosim.campaigns.scenes import SceneTask, SceneWork
 from cosim.campaigns.summary import summarise
-from cosim.campaigns.workers import Task, fly_all
-from cosim.errors import RunError
 from cosim.scene_run import Conditions
-
-BATCH = 8  # scenes: some tenths of a second of work, which is what a kill can cost
 
 
 @dataclass(frozen=True)
@@ -43,6 +36,7 @@ def run_campaign(
     conditions: Conditions | None = None,
     gains: Any = None,
     workers: int = 1,
+    executor: Executor | None = None,
     progress: bool = False,
 ) -> Campaign:
     """Fly every scene of a file by a law, or those that are left, and write results and summary.
@@ -62,6 +56,8 @@ def run_campaign(
         Of the law; default: its own.
     workers : int
         Processes. Rows are the same for any number, but for `worst_step_time`.
+    executor : concurrent.futures.Executor, optional
+        That flies the scenes, in the place of processes of our own.
     progress : bool
         Show a bar, if there is a terminal.
 
@@ -75,7 +71,8 @@ def run_campaign(
     ScenarioError
         If the scenes cannot be read, or a seed comes twice.
     RunError
-        If there is no such law, the folder holds something else, or cannot be written, or a worker dies.
+        If there is no such law, the folder holds something else or cannot be written, or processes die whatever they
+        fly.
     LawError
         If the law cannot work with the gains.
     BuildError, PlantError
@@ -83,46 +80,15 @@ def run_campaign(
     KeyboardInterrupt
         After Ctrl-C; what is done is kept.
     """
-    if workers < 1:
-        raise RunError(f"workers is {workers}, expected 1 or more")
-    task = Task(law, gains_from(law) if gains is None else gains, conditions or Conditions())
+    task = SceneTask(law, gains_from(law) if gains is None else gains, conditions or Conditions())
     with contextlib.ExitStack() as stack:
         store = scenes if isinstance(scenes, SceneStore) else stack.enter_context(SceneStore(scenes))
-        flyer = stack.enter_context(task.flyer())
-        plan = plan_of(law, task.gains, task.conditions, len(store), store.digest)
-        folder = stack.enter_context(CampaignFolder(out, plan))
-        try:
-            flown = 0
-            if folder.complete:
-                folder.remove_parts()
-                results = folder.results()
-            else:
-                done = folder.load_parts()
-                left = [seed for seed in store.seeds if seed not in done]
-                with (
-                    _bar(law, len(store), len(done), progress) as bar,
-                    contextlib.closing(fly_all(flyer, task, _batches(store, left), workers)) as flights,
-                ):
-                    for rows in flights:
-                        folder.add(rows)
-                        flown += len(rows)
-                        bar.update(len(rows))
-                results = folder.join()
-            summary = summarise(plan, results)
+        work = SceneWork(store, task)
+        summary: dict[str, Any] = {}
+
+        def conclude(results: Results) -> None:
+            summary.update(summarise(work.flown, results))
             write_text(out / SUMMARY, json.dumps(summary, indent=2) + "\n")
-        except OSError as error:
-            raise RunError(f"{out}: {error.strerror or error}") from error
-    return Campaign(out, results, summary, flown)
 
-
-def _batches(store: SceneStore, seeds: list[int]) -> Iterator[list[bytes]]:
-    remaining = iter(seeds)
-    while batch := list(itertools.islice(remaining, BATCH)):
-        yield store.lines(batch)
-
-
-def _bar(law: str, scenes: int, done: int, progress: bool) -> Any:
-    return tqdm(
-        total=scenes, initial=done, desc=law, unit="scene", disable=None if progress and sys.stderr else True,
-        bar_format="{desc} {percentage:3.0f}%|{bar}| {n}/{total} [{elapsed}<{remaining}, {rate_fmt}]",
-    )  # fmt: skip
+        done = carry_out(work, out, workers, executor, progress, conclude)
+    return Campaign(out, done.results, summary, done.flown)

@@ -87,7 +87,9 @@ def compare(
     campaigns = {}
     with SceneStore(scenes) as store:
         for law in laws:
-            campaigns[law] = run_campaign(store, law, out / law, conditions, (gains or {}).get(law), workers, progress)
+            campaigns[law] = run_campaign(
+                store, law, out / law, conditions, (gains or {}).get(law), workers, progress=progress
+            )
         numbers = {
             "scenes": len(store),
             "scenes_sha256": store.digest,

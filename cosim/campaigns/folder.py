@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 import json
-import logging
 import os
-import shutil
 import sys
 from pathlib import Path
 from types import TracebackType
+from typing import Any
 
-import pyarrow as pa
-
-from cosim.campaigns.plan import Plan, difference
-from cosim.campaigns.results import Results, Row, read_results, table_of, write_whole
+from cosim.campaigns.parts import Parts
+from cosim.campaigns.plan import difference
+from cosim.campaigns.results import Results
+from cosim.campaigns.work import Rows, Work
 from cosim.errors import RunError
-
-log = logging.getLogger(__name__)
 
 PLAN = "campaign.json"
 RESULTS = "results.parquet"
@@ -35,7 +32,7 @@ class CampaignFolder:
     ----------
     path : Path
         A folder that does not exist, is empty, or holds the same campaign.
-    plan : Plan
+    work : Work
         What the campaign is.
 
     Raises
@@ -44,8 +41,8 @@ class CampaignFolder:
         If the folder holds something else, is in use by another process, or cannot be written.
     """
 
-    def __init__(self, path: Path, plan: Plan) -> None:
-        self.path = path
+    def __init__(self, path: Path, work: Work) -> None:
+        self.path, self._schema = path, work.schema
         try:
             path.mkdir(parents=True, exist_ok=True)
             self._refuse_strangers()
@@ -53,7 +50,8 @@ class CampaignFolder:
         except OSError as error:
             raise RunError(f"{path}: {error.strerror or error}") from error
         try:
-            self._claim(plan)
+            self._claim(work)
+            self._parts = Parts(path / PARTS, work.schema)
         except OSError as error:
             self.close()
             raise RunError(f"{path}: {error.strerror or error}") from error
@@ -65,22 +63,16 @@ class CampaignFolder:
         if not (self.path / PLAN).exists() and any(p.name not in (LOCK, f".{PLAN}") for p in self.path.iterdir()):
             raise RunError(f"{self.path}: exists and holds no campaign, expected a new folder or that of a campaign")
 
-    def _claim(self, plan: Plan) -> None:
-        file, table = self.path / PLAN, plan.table()
+    def _claim(self, work: Work) -> None:
+        file, plan = self.path / PLAN, dict(work.plan)
         if file.exists():
-            try:
-                found = json.loads(file.read_text(encoding="utf-8"))
-            except ValueError as error:
-                raise RunError(f"{file}: cannot be read: {error}") from error
-            if not isinstance(found, dict):
-                raise RunError(f"{file}: holds no campaign")
-            if differing := difference(found, json.loads(json.dumps(table))):
+            if differing := difference(read_plan(self.path), json.loads(json.dumps(plan))):
                 raise RunError(f"{self.path}: holds another campaign ({differing}), expected a folder of its own")
         else:
-            write_text(file, json.dumps(table, indent=2) + "\n")
-        (self.path / PARTS).mkdir(exist_ok=True)
-        for scratch in (self.path / PARTS).glob(".*"):  # of a part that was being written
-            scratch.unlink()
+            write_text(file, json.dumps(plan, indent=2, allow_nan=False) + "\n")
+        for name, content in work.files.items():
+            if not (self.path / name).exists():
+                write_bytes(self.path / name, content)
 
     @property
     def complete(self) -> bool:
@@ -95,39 +87,24 @@ class CampaignFolder:
         RunError
             If they cannot be read.
         """
-        return read_results(self.path / RESULTS)
-
-    def load_parts(self) -> set[int]:
-        """Take stock of the parts, and return the seeds whose rows they hold."""
-        seeds: set[int] = set()
-        self._next = 0
-        for file in self._parts():
-            self._next = int(file.stem) + 1
-            try:
-                seeds.update(read_results(file).table["seed"].to_pylist())
-            except RunError as error:
-                log.warning("%s; its scenes are flown again", error)
-                file.unlink()
-        return seeds
-
-    def add(self, rows: list[Row]) -> None:
-        """Write a part, once `load_parts` has found which are there."""
-        write_whole(self.path / PARTS / f"{self._next:08}.parquet", table_of(rows))
-        self._next += 1
-
-    def join(self) -> Results:
-        """Join the parts to one file in order of seed, and return the rows."""
-        results = Results(pa.concat_tables(read_results(file).table for file in self._parts()))
-        results.write(self.path / RESULTS)
-        self.remove_parts()
-        return results
-
-    def _parts(self) -> list[Path]:
-        return sorted((self.path / PARTS).glob("*.parquet"))
+        return Results(self.path / RESULTS, self._schema)
 
     def remove_parts(self) -> None:
         """Remove what is joined."""
-        shutil.rmtree(self.path / PARTS, ignore_errors=True)
+        self._parts.remove()
+
+    def keys(self) -> Rows:
+        """Return the keys of the rows that parts hold, shape (n,)."""
+        return self._parts.keys()
+
+    def add(self, table: Any) -> None:
+        """Write the rows of a batch, in order of key."""
+        self._parts.add(table)
+
+    def join(self) -> Results:
+        """Join the parts to one file in order of key, and return it."""
+        self._parts.join(self.path / RESULTS)
+        return self.results()
 
     def close(self) -> None:
         """Let others have the folder. May be called twice."""
@@ -142,6 +119,35 @@ class CampaignFolder:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.close()
+
+
+def read_plan(path: Path) -> dict[str, Any]:
+    """Return the plan of the campaign that a folder holds.
+
+    Parameters
+    ----------
+    path : Path
+        The folder.
+
+    Returns
+    -------
+    dict
+        As it was written.
+
+    Raises
+    ------
+    RunError
+        If it holds none that can be read.
+    """
+    try:
+        plan = json.loads((path / PLAN).read_text(encoding="utf-8"))
+    except FileNotFoundError as error:
+        raise RunError(f"{path}: holds no campaign ({PLAN} is missing)") from error
+    except (OSError, ValueError) as error:
+        raise RunError(f"{path / PLAN}: cannot be read: {error}") from error
+    if not isinstance(plan, dict):
+        raise RunError(f"{path / PLAN}: holds no campaign")
+    return plan
 
 
 def write_text(path: Path, text: str) -> None:
@@ -159,9 +165,30 @@ def write_text(path: Path, text: str) -> None:
     OSError
         If it cannot be written.
     """
+    write_bytes(path, text.encode())
+
+
+def write_bytes(path: Path, content: bytes) -> None:
+    """Write a file, whole or not at all.
+
+    Parameters
+    ----------
+    path : Path
+        The file; what was there is replaced.
+    content : bytes
+        All of it.
+
+    Raises
+    ------
+    OSError
+        If it cannot be written; nothing is left then.
+    """
     scratch = path.with_name(f".{path.name}")
-    scratch.write_text(text, encoding="utf-8")
-    scratch.replace(path)
+    try:
+        scratch.write_bytes(content)
+        scratch.replace(path)
+    finally:
+        scratch.unlink(missing_ok=True)
 
 
 def _lock(path: Path) -> int | None:

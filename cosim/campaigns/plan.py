@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import platform
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from functools import cache
 from importlib import metadata
@@ -18,13 +18,14 @@ import plant_fmu
 from cosim.scene_run import Conditions
 
 _SOURCES = (".py", ".c", ".h", ".toml")
-_LIBRARIES = ("subreach", "numba", "llvmlite", "numpy", "pyarrow")
+_LIBRARIES = ("subreach", "numba", "llvmlite", "numpy", "pyarrow", "scipy")
+SCENES, SWEEP = "scenes", "sweep"  # kinds of campaigns
 _NAMED = 3  # differences that a message names
 
 
 @dataclass(frozen=True)
 class Plan:
-    """What every row of a campaign rests on."""
+    """What every row of a campaign of scenes rests on."""
 
     law: str
     gains: dict[str, float]
@@ -36,7 +37,7 @@ class Plan:
 
     def table(self) -> dict[str, Any]:
         """Return it as a table for JSON."""
-        return asdict(self)
+        return {"kind": SCENES} | asdict(self)
 
 
 def plan_of(law: str, gains: Any, conditions: Conditions, scenes: int, digest: str) -> Plan:
@@ -60,8 +61,12 @@ def plan_of(law: str, gains: Any, conditions: Conditions, scenes: int, digest: s
     Plan
         Any two that are equal give the same rows on the same machine.
     """
-    versions = {"python": platform.python_version()} | {name: metadata.version(name) for name in _LIBRARIES}
-    return Plan(law, gains._asdict(), conditions, scenes, digest, code_digest(), versions)
+    return Plan(law, gains._asdict(), conditions, scenes, digest, code_digest(), versions())
+
+
+def versions() -> dict[str, str]:
+    """Return the versions of what rows depend on."""
+    return {"python": platform.python_version()} | {name: metadata.version(name) for name in _LIBRARIES}
 
 
 @cache
@@ -86,17 +91,20 @@ def difference(one: dict[str, Any], other: dict[str, Any]) -> str:
     Returns
     -------
     str
-        Such as ``"gains.k_p1 is 18.8, now 10.0"``, the law alone where it is another; "" where they are equal.
+        Such as ``"gains.k_p1 is 18.8, now 10.0"``, kind or law alone where they are others; "" where they are equal.
     """
-    keys = ["law"] if one.get("law") != other.get("law") else sorted(one.keys() | other.keys())
+    alone = next((key for key in ("kind", "law") if one.get(key) != other.get(key)), None)
+    keys = [alone] if alone else sorted(one.keys() | other.keys())
     found = list(_differences(one, other, keys))
     more = f"; and {len(found) - _NAMED} more" if len(found) > _NAMED else ""
     return "; ".join(found[:_NAMED]) + more
 
 
-def _differences(one: dict[str, Any], other: dict[str, Any], keys: list[str], prefix: str = "") -> Iterator[str]:
+def _differences(one: dict[Any, Any], other: dict[Any, Any], keys: Sequence[Any], prefix: str = "") -> Iterator[str]:
     for key in keys:
         a, b = one.get(key), other.get(key)
+        if isinstance(a, list) and isinstance(b, list) and len(a) == len(b):
+            a, b = dict(enumerate(a)), dict(enumerate(b))
         if isinstance(a, dict) and isinstance(b, dict):
             yield from _differences(a, b, sorted(a.keys() | b.keys()), f"{prefix}{key}.")
         elif a != b:

@@ -44,11 +44,12 @@ def _add_scenes(verb: argparse.ArgumentParser) -> None:
         "--out", type=Path, required=True, metavar="DIR",
         help="a new folder, or one that this command began: it goes on with what is left",
     )  # fmt: skip
-    verb.add_argument("--workers", type=_workers, default=1, metavar="N", help="processes (default: 1)")
+    verb.add_argument("--workers", type=workers, default=1, metavar="N", help="processes (default: 1)")
     verb.add_argument("--tell-failures", action="store_true", help="tell the law which thruster fails, and when")
 
 
-def _workers(text: str) -> int:
+def workers(text: str) -> int:
+    """Return a number of workers from its text."""
     if not (text.isdecimal() and 1 <= int(text) <= 1024):
         raise argparse.ArgumentTypeError(f"{text!r}: expected a whole number from 1 to 1024")
     return int(text)
@@ -71,7 +72,7 @@ def campaign(options: argparse.Namespace) -> int:
         print(f"{s['law']}: {s['reached']} of {s['scenes']} scenes reached, {s['violations']} with a violation")
         print(options.out / "summary.json")
 
-    return _resumable(run, options.out)
+    return resumable(run, options.out)
 
 
 def compare(options: argparse.Namespace) -> int:
@@ -90,11 +91,24 @@ def compare(options: argparse.Namespace) -> int:
             print(f"{law}: {s['reached']} of {s['scenes']} scenes reached, {s['violations']} with a violation")
         print(options.out / "compare.md")
 
-    return _resumable(run, options.out)
+    return resumable(run, options.out)
 
 
-def _resumable(run: Callable[[], None], out: Path) -> int:
-    """Run, and say after Ctrl-C, or a polite kill, that what is done is kept."""
+def resumable(run: Callable[[], None], out: Path) -> int:
+    """Run, and say after Ctrl-C, or a polite kill, that what is done is kept.
+
+    Parameters
+    ----------
+    run : callable
+        What can be gone on with.
+    out : Path
+        Where what is done is kept.
+
+    Returns
+    -------
+    int
+        Exit code.
+    """
     with contextlib.suppress(ValueError):  # which signal raises outside the main thread
         signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:

@@ -38,7 +38,8 @@ class FusedFlyer:
     Raises
     ------
     RunError
-        If the scenario has what the loop does not: commands from outside, another arbiter than the closed one, FMI 2.0.
+        If the scenario has what the loop does not: commands from outside, another arbiter than the closed one, the
+        order of Jacobi, FMI 2.0.
     BuildError, PlantError
         If there is no FMU of the vehicle.
     """
@@ -48,6 +49,7 @@ class FusedFlyer:
         base = variation.base
         for key, came, expected in (
             ("arbiter.engine", base.arbiter.engine, "closed"),
+            ("master.order", base.master.order, "gauss-seidel"),
             ("plant.fmi", base.plant.fmi, 3),
             ("commands.enabled", base.commands.enabled, False),
         ):

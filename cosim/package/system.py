@@ -9,7 +9,7 @@ from cosim.errors import RunError
 from cosim.package.arbiter import arbiter_component
 from cosim.package.controller import controller_component
 from cosim.package.structure import Part, Wire, structure
-from cosim.scenario import CRITERIA, Scenario
+from cosim.scenario import CRITERIA, VEHICLE_COPY, Scenario
 from cosim.start_values import start_values
 from plant_fmu import build_fmu, cached_fmu
 from plant_fmu.archive import require_place, write_archive
@@ -77,8 +77,7 @@ def package_system(scenario: Scenario, out: Path, fmi: int = 2, platforms: str =
     members = {part.source: _fmu(part.component, fmi, platforms) for part in parts}
     described = structure(scenario.name, scenario.title, parts, _WIRES, time.duration, time.step)
     members["SystemStructure.ssd"] = described.encode()
-    members["documentation/scenario.toml"] = scenario.toml().encode()
-    write_archive(out, members)
+    write_archive(out, members | _origin(scenario))
     return out
 
 
@@ -97,6 +96,16 @@ def plant_component(scenario: Scenario) -> Component:
     """
     start = {name: float(value) for name, value in start_values(scenario).items()}
     return of_vehicle(scenario.vehicle, start, scenario.time.duration, scenario.time.step)
+
+
+def _origin(scenario: Scenario) -> dict[str, bytes]:
+    """Return the files from which the system can be made again."""
+    if scenario.vehicle_file is None:
+        return {"documentation/scenario.toml": scenario.toml().encode()}
+    return {
+        "documentation/scenario.toml": scenario.toml(VEHICLE_COPY).encode(),
+        f"documentation/{VEHICLE_COPY}": scenario.vehicle_file.read_bytes(),
+    }
 
 
 def _fmu(component: Component, fmi: int, platforms: str) -> bytes:

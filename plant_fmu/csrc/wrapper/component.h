@@ -1,7 +1,7 @@
 /* What a component offers to the FMI wrappers: everything else in this folder is the same for all of them.
  *
  * A component brings a header model.h and a file that defines COMPONENT. The header defines
- *     Model     all that an instance is, as plain data: with it an FMU state is a copy; has the members time and stop_time,
+ *     Model     all that an instance is, as plain data, which FMU states copy; has the members time and stop_time,
  *     N_STATES  how many continuous states there are, which stand side by side in it, as their derivatives do,
  * and includes the generated table of variables: COMPONENT_VARIABLES, FIRST_STATE, FIRST_DERIVATIVE,
  * INSTANTIATION_TOKEN, and the prefixes of names. */
@@ -34,7 +34,7 @@ typedef struct {
     /* Whether a restored model can be, beyond its variables being in their ranges. */
     bool (*possible)(const Model *model);
 
-    /* Of model exchange; all NULL where there are no states: then co-simulation alone is offered, and no derivatives. */
+    /* Of model exchange; all NULL where there are no states: then co-simulation alone is offered, no derivatives. */
 
     /* Puts states that follow the inputs at once to where these are. Returns whether any changed. */
     int (*settle)(Model *model);

@@ -3,6 +3,10 @@
 import json
 from pathlib import Path
 
+from cosim.campaigns import batches
+from cosim.campaigns.parts import write_whole
+from cosim.campaigns.results import Results
+from cosim.campaigns.scene_rows import SCHEMA, table_of
 from cosim.scene_run import Conditions
 
 DATA = Path(__file__).parents[2] / "data" / "scenes"
@@ -25,3 +29,15 @@ def write(path, scenes):
 def rows(results):
     """Return rows without what the wall clock says."""
     return [{k: v for k, v in row.items() if k != "worst_step_time"} for row in results.table.to_pylist()]
+
+
+def results_of(path, rows):
+    """Write rows to a file, and return them as results."""
+    write_whole(path, [table_of(rows)], SCHEMA)
+    return Results(path, SCHEMA)
+
+
+def batches_of(monkeypatch, n):
+    """Have every batch hold `n` rows, whatever time they take."""
+    for name, value in {"FIRST": n, "GREATEST": n, "TARGET": 1e9, "LEAST": 1e9}.items():
+        monkeypatch.setattr(batches, name, value)

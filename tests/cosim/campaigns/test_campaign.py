@@ -6,6 +6,7 @@ import os
 from dataclasses import replace
 
 import numpy as np
+import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
@@ -16,15 +17,16 @@ from cosim.campaigns import run_campaign
 from cosim.campaigns.folder import PARTS, RESULTS, SUMMARY, CampaignFolder
 from cosim.campaigns.law_gains import gains_by_law, gains_from
 from cosim.campaigns.plan import difference, plan_of
-from cosim.campaigns.results import Results, read_results, row_of, table_of
+from cosim.campaigns.results import Results
+from cosim.campaigns.scene_rows import SCHEMA, row_of
 from cosim.campaigns.scene_store import SceneStore
+from cosim.campaigns.scenes import SceneTask, SceneWork
 from cosim.campaigns.summary import summarise
-from cosim.campaigns.workers import fly_batch
+from cosim.campaigns.worker import fly
 from cosim.errors import RunError, ScenarioError
-from cosim.flight import Score
 from cosim.scene import decode_scene
-from cosim.scene_run import Conditions, SceneFlyer
-from tests.cosim.campaigns.scenes import BRIEF, HARD, PLAIN, many, rows, write
+from cosim.scene_run import Conditions, SceneFlyer, Score
+from tests.cosim.campaigns.scenes import BRIEF, HARD, PLAIN, batches_of, many, results_of, rows, write
 
 
 @pytest.fixture
@@ -43,7 +45,7 @@ def test_a_row_a_scene_in_order_of_seed(tmp_path, scenes):
     units = {f.name: f.metadata[b"unit"].decode() for f in table.schema}
     assert units == {
         "seed": "", "reached": "", "violation": "", "min_clearance": "m", "reach_time": "s", "effort": "N.s",
-        "thrust_variation": "N", "worst_step_time": "s", "stopped_at": "s",
+        "thrust_variation": "N", "worst_step_time": "s", "stopped_at": "s", "refused": "", "scene": "",
     }  # fmt: skip
     assert all(f.metadata[b"description"] for f in table.schema)
 
@@ -73,21 +75,21 @@ def test_what_is_interrupted_goes_on_without_losing_or_repeating(tmp_path, scene
     flown = []
 
     def until(stop):
-        def fly(flyer, lines):
+        def counted(task, lines):
             if len(flown) == stop:
                 raise KeyboardInterrupt
             flown.append([json.loads(line)["seed"] for line in lines])
-            return fly_batch(flyer, lines)
+            return fly(task, lines)
 
-        return fly
+        return counted
 
-    monkeypatch.setattr(module, "BATCH", 3)
+    batches_of(monkeypatch, 3)
     for stop in (2, 5):
-        monkeypatch.setattr("cosim.campaigns.workers.fly_batch", until(stop))
+        monkeypatch.setattr("cosim.campaigns.crews.fly", until(stop))
         with pytest.raises(KeyboardInterrupt):
             run_campaign(scenes, "printed", tmp_path / "out", BRIEF)
         assert not (tmp_path / "out" / RESULTS).exists()
-    monkeypatch.setattr("cosim.campaigns.workers.fly_batch", until(99))
+    monkeypatch.setattr("cosim.campaigns.crews.fly", until(99))
     done = run_campaign(scenes, "printed", tmp_path / "out", BRIEF)
     assert sorted(seed for batch in flown for seed in batch) == list(range(1000, 1020))
     assert done.flown == 5
@@ -109,7 +111,7 @@ def test_killed_at_the_end_nothing_is_flown_again(tmp_path, scenes, monkeypatch,
 
 def test_a_damaged_part_is_flown_again(tmp_path, scenes, monkeypatch):
     whole = run_campaign(scenes, "printed", tmp_path / "whole", BRIEF)
-    monkeypatch.setattr(module, "BATCH", 5)
+    batches_of(monkeypatch, 5)
     with monkeypatch.context() as patch:
         patch.setattr(CampaignFolder, "join", lambda _: (_ for _ in ()).throw(KeyboardInterrupt))
         with pytest.raises(KeyboardInterrupt):
@@ -117,7 +119,7 @@ def test_a_damaged_part_is_flown_again(tmp_path, scenes, monkeypatch):
     parts = sorted((tmp_path / "out" / PARTS).iterdir())
     assert len(parts) == 4
     parts[1].write_bytes(parts[1].read_bytes()[:100])
-    (tmp_path / "out" / PARTS / ".00000009.parquet-1").write_bytes(b"half")
+    (tmp_path / "out" / PARTS / ".00000009-00000009.parquet-1").write_bytes(b"half")
     done = run_campaign(scenes, "printed", tmp_path / "out", BRIEF)
     assert done.flown == 5 and rows(done.results) == rows(whole.results)
 
@@ -132,7 +134,7 @@ def test_a_damaged_part_is_flown_again(tmp_path, scenes, monkeypatch):
         ({"code": True}, "code_sha256"),
     ],
 )
-@pytest.mark.parametrize("complete", [True, False])
+@pytest.mark.parametrize("complete", [False, pytest.param(True, marks=pytest.mark.slow)])
 def test_the_folder_of_another_campaign_is_refused(tmp_path, scenes, monkeypatch, change, words, complete):
     with monkeypatch.context() as patch:
         if not complete:
@@ -169,8 +171,8 @@ def test_a_damaged_plan_is_refused(tmp_path, scenes, content):
 
 def test_a_folder_in_use_is_refused(tmp_path, scenes):
     with SceneStore(scenes) as store:
-        plan = plan_of("printed", Gains(), BRIEF, len(store), store.digest)
-    with CampaignFolder(tmp_path / "out", plan):
+        work = SceneWork(store, SceneTask("printed", Gains(), BRIEF))
+    with CampaignFolder(tmp_path / "out", work):
         with pytest.raises(RunError, match="another process is at work"):
             run_campaign(scenes, "printed", tmp_path / "out", BRIEF)
     assert run_campaign(scenes, "printed", tmp_path / "out", BRIEF).flown == 20
@@ -183,13 +185,13 @@ def test_a_folder_that_cannot_be_written(tmp_path, scenes):
 
 
 def test_a_full_disk_is_one_line_and_what_was_done_is_kept(tmp_path, scenes, monkeypatch):
-    monkeypatch.setattr(module, "BATCH", 5)
+    batches_of(monkeypatch, 5)
     add = CampaignFolder.add
 
-    def full(folder, rows):
+    def full(folder, table):
         if len(list((tmp_path / "out" / PARTS).iterdir())) == 2:
             raise OSError(28, os.strerror(28))
-        add(folder, rows)
+        add(folder, table)
 
     with monkeypatch.context() as patch:
         patch.setattr(CampaignFolder, "add", full)
@@ -205,6 +207,8 @@ def test_what_the_plant_refuses_has_a_row_that_says_so(tmp_path):
     assert first["stopped_at"] is None and last["stopped_at"] is None and last["effort"] > 0.0
     for row in refused:
         assert not row["reached"] and row["violation"] and row["stopped_at"] == 0.0 and row["effort"] is None
+    assert "weight_minus_buoyancy is 1000000.0" in refused[0]["refused"] and first["refused"] is None
+    assert decode_scene(last["scene"].encode()) == decode_scene(json.dumps(PLAIN[3]).encode())
     assert done.summary["failed"]["stopped"] == done.summary["failed"]["violated"] == [20001, 20002]
     assert done.summary["violations"] == done.summary["stopped"] == 2
 
@@ -230,7 +234,7 @@ def test_there_is_a_reach_time_where_it_was_reached_alone():
     assert (row_of(7, late, 0.01).reach_time, row_of(7, early, 0.01).reach_time) == (None, 115.0)
 
 
-def test_the_summary_follows_from_the_rows():
+def test_the_summary_follows_from_the_rows(tmp_path):
     scores = [
         Score(True, 30.0, 0.2, 100.0, 10.0, 1e-6, -1),
         Score(True, 50.0, -0.1, 300.0, 30.0, 3e-6, -1),
@@ -238,7 +242,8 @@ def test_the_summary_follows_from_the_rows():
         Score(False, math.inf, 0.4, 5.0, 5.0, 1e-6, 10),
     ]
     plan = plan_of("printed", Gains(), Conditions(tell_failures=True), 4, "abc")
-    summary = summarise(plan, Results(table_of([row_of(9 - i, s, 0.01) for i, s in enumerate(scores)])))
+    found = results_of(tmp_path / "rows.parquet", [row_of(9 - i, s, 0.01) for i, s in enumerate(scores)][::-1])
+    summary = summarise(plan, found)
     assert (summary["law"], summary["scenes"], summary["reached"], summary["violations"]) == ("printed", 4, 2, 2)
     assert summary["medians"] == {
         "reach_time": 40.0, "effort": 200.0, "thrust_variation": 20.0, "worst_step_time": 2e-6,
@@ -323,16 +328,15 @@ def test_a_difference_is_said_in_words():
     assert difference({"law": "x", "c": 2}, {"law": "y", "c": 3}) == "law is 'x', now 'y'"
     assert difference(dict.fromkeys("abcde", 1), dict.fromkeys("abcde", 2)).endswith("c is 1, now 2; and 2 more")
     assert difference({"a": {"b": 1}}, {"a": {"b": 1}}) == ""
+    assert difference({"a": [1, {"b": 2}]}, {"a": [1, {"b": 3}]}) == "a.1.b is 2, now 3"
+    assert difference({"a": [1, 2]}, {"a": [1]}) == "a is [1, 2], now [1]"
+    assert difference({"kind": "scenes", "law": "x"}, {"kind": "sweep"}) == "kind is 'scenes', now 'sweep'"
 
 
 def test_results_of_another_kind_are_refused(tmp_path):
-    pq.write_table(pq.read_table(write_other(tmp_path)), tmp_path / "x.parquet")
-    with pytest.raises(RunError, match=r"x\.parquet: cannot be read"):
-        read_results(tmp_path / "x.parquet")
-
-
-def write_other(folder):
-    import pyarrow as pa
-
-    pq.write_table(pa.table({"seed": ["text"]}), folder / "other.parquet")
-    return folder / "other.parquet"
+    pq.write_table(pa.table({"seed": ["text"]}), tmp_path / "x.parquet")
+    with pytest.raises(RunError, match=r"x\.parquet: cannot be read: has the columns seed, expected seed, reached"):
+        Results(tmp_path / "x.parquet", SCHEMA)
+    (tmp_path / "y.parquet").write_bytes(b"none")
+    with pytest.raises(RunError, match=r"y\.parquet: cannot be read"):
+        Results(tmp_path / "y.parquet")

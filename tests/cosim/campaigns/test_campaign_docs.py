@@ -5,7 +5,7 @@ import re
 import typing
 from pathlib import Path
 
-from cosim.campaigns.results import SCHEMA
+from cosim.campaigns.scene_rows import SCHEMA
 from cosim.cli import main
 from cosim.scene import Scene, decode_scene
 from cosim.scene_run import Conditions

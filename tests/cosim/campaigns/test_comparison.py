@@ -12,10 +12,10 @@ from cosim import flight
 from cosim.campaigns import compare
 from cosim.campaigns.comparison import pair
 from cosim.campaigns.comparison_figures import shares_up_to
-from cosim.campaigns.results import Results, row_of, table_of
+from cosim.campaigns.scene_rows import row_of
 from cosim.errors import RunError
-from cosim.flight import Score
-from tests.cosim.campaigns.scenes import BRIEF, HARD, rows, write
+from cosim.scene_run import Score
+from tests.cosim.campaigns.scenes import BRIEF, HARD, results_of, rows, write
 
 
 class Idle(PrintedLaw):
@@ -56,6 +56,7 @@ def test_laws_stand_side_by_side(tmp_path, scenes, idle):
     assert "| printed | 0 | idle | 0 | – | – | – | – |" in text
 
 
+@pytest.mark.slow
 def test_what_is_compared_already_is_not_flown_again_and_more_laws_may_come(tmp_path, scenes, idle, monkeypatch):
     monkeypatch.setitem(LAWS, "idler", type("Idler", (Idle,), {"name": "idler"}))
     first = compare(scenes, ["printed", "idle"], tmp_path / "out", BRIEF)
@@ -82,17 +83,25 @@ def test_a_folder_that_holds_something_else_is_refused(tmp_path, scenes, idle):
     assert [p.name for p in (tmp_path / "out").iterdir()] == ["precious"]
 
 
-def results(*scores):
-    return Results(table_of([row_of(i, score, 0.01) for i, score in enumerate(scores)]))
+@pytest.fixture
+def results(tmp_path):
+    def of(name, *scores):
+        return results_of(tmp_path / name, [row_of(i, score, 0.01) for i, score in enumerate(scores)])
+
+    return of
 
 
 def score(time, clearance, effort):
     return Score(math.isfinite(time), time, clearance, effort, 1.0, 1e-6, -1)
 
 
-def test_a_pair_is_compared_on_what_one_completes():
-    mine = results(score(30.0, 0.1, 100.0), score(40.0, -0.1, 1.0), score(math.inf, 0.1, 2.0), score(50.0, 0.0, 200.0))
-    other = results(score(60.0, 0.1, 50.0), score(1.0, 0.1, 1.0), score(1.0, 0.1, 1.0), score(math.inf, 0.3, 70.0))
+def test_a_pair_is_compared_on_what_one_completes(results):
+    mine = results(
+        "mine", score(30.0, 0.1, 100.0), score(40.0, -0.1, 1.0), score(math.inf, 0.1, 2.0), score(50.0, 0.0, 200.0)
+    )
+    other = results(
+        "other", score(60.0, 0.1, 50.0), score(1.0, 0.1, 1.0), score(1.0, 0.1, 1.0), score(math.inf, 0.3, 70.0)
+    )
     assert pair("mine", mine, "other", other) == {
         "completed_by": "mine", "scenes": 2, "beside": "other", "completed_by_both": 1,
         "reach_time": {"mine": 40.0, "other": None},  # between 60 s and never

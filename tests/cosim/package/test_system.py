@@ -2,9 +2,12 @@
 
 import importlib.util
 import io
+import re
+import shlex
 import subprocess
 import sys
 import zipfile
+from importlib import resources
 from pathlib import Path
 
 import fmpy.ssp
@@ -15,10 +18,11 @@ from lxml import etree
 
 from cosim.cli import main
 from cosim.errors import RunError
+from cosim.master import Master
 from cosim.package import package_system
+from cosim.package.system import MOTION
 from cosim.scenario import load_scenario
 from plant_fmu.running.slave import Slave
-from tests.cosim.package.jacobi import jacobi
 from tests.cosim.package.masters import fmpy as run_in_fmpy
 
 ROOT = Path(__file__).parents[3]
@@ -34,6 +38,24 @@ def packed(tmp_path_factory):
     return package_system(load_scenario(ALL_SHAPES), tmp_path_factory.mktemp("ssp") / "all.ssp")
 
 
+class Motion:
+    """Position, quaternion and velocity before each step and after the last."""
+
+    def __init__(self, signals):
+        self.at, self.rows = [signals.index(name) for name in MOTION], []
+
+    def observe(self, k, row):
+        self.rows.append(row[self.at])
+
+
+def jacobi(name, settings=()):
+    """Fly a scenario in our own master in Jacobi's order."""
+    with Master(load_scenario(name, [*settings, "master.order=jacobi"])) as master:
+        motion = Motion(master.signals)
+        master.run([motion])
+    return np.array(motion.rows)
+
+
 def compared(ours, theirs):
     np.testing.assert_allclose(theirs, ours[1:], rtol=0.0, atol=1e-10)
 
@@ -41,9 +63,21 @@ def compared(ours, theirs):
 def test_fmpy_flies_it_as_we_do(packed):
     """With every shape, regions and goal on the move, a current, a lag, and three periods."""
     scenario = load_scenario(ALL_SHAPES)
-    ours = jacobi(scenario)
+    ours = jacobi(ALL_SHAPES)
     assert np.linalg.norm(ours[-1, :3] - ours[0, :3]) > 0.5
     compared(ours, run_in_fmpy(packed, scenario.steps, scenario.time.step))
+
+
+@pytest.mark.slow
+def test_the_page_on_it_does_what_it_says(tmp_path, monkeypatch, capsys):
+    text = (ROOT / "docs" / "ssp.md").read_text()
+    command, code = re.search(r"```\ncosim (.*?)```", text, re.S)[1], re.search(r"```python\n(.*?)```", text, re.S)[1]
+    monkeypatch.chdir(tmp_path)
+    assert main(shlex.split(command.replace("\\\n", " "))) == 0
+    names = {}
+    exec(code, names)
+    assert len(names["result"]) == 3000
+    assert names["result"]["plant.position.z"][-1] == pytest.approx(6.2665, abs=1e-3)
 
 
 @pytest.mark.slow
@@ -56,12 +90,13 @@ def test_masters_fly_the_paper_as_we_do(master, name, fmi, tmp_path):
         pytest.skip("takes FMI 2.0 alone in a system")
     if master in COMES_IN and importlib.util.find_spec(COMES_IN[master]) is None:
         pytest.skip(f"{COMES_IN[master]} is not installed")
-    scenario = load_scenario(name, [*TEN_MS, "time.duration=30.0"])
+    settings = [*TEN_MS, "time.duration=30.0"]
+    scenario = load_scenario(name, settings)
     path, out = package_system(scenario, tmp_path / "s.ssp", fmi), tmp_path / "rows.npy"
     command = [sys.executable, "-m", "tests.cosim.package.masters", master, path, "3000", "0.01", out]
     done = subprocess.run([*map(str, command)], cwd=ROOT, capture_output=True, text=True)
     assert done.returncode == 0, done.stdout[-300:] + done.stderr[-300:]
-    compared(jacobi(scenario), np.load(out))
+    compared(jacobi(name, settings), np.load(out))
 
 
 # ---- the file ----
@@ -130,6 +165,17 @@ def test_the_scenario_within_makes_the_same_file(packed, tmp_path):
         inner = tmp_path / "all-shapes.toml"
         inner.write_bytes(archive.read("documentation/scenario.toml"))
     assert package_system(load_scenario(inner), tmp_path / "again.ssp").read_bytes() == packed.read_bytes()
+
+
+def test_a_vehicle_of_ones_own_goes_with_it(packed, tmp_path):
+    shipped = resources.files("plant_fmu") / "vehicles" / "odin.toml"
+    (tmp_path / "mine.toml").write_text(shipped.read_text().replace('name = "odin"', 'name = "mine"'))
+    scenario = load_scenario(ALL_SHAPES, [f"vehicle='{tmp_path / 'mine.toml'}'"])
+    with zipfile.ZipFile(package_system(scenario, tmp_path / "mine.ssp")) as archive:
+        archive.extractall(tmp_path / "out")
+    assert str(tmp_path) not in (tmp_path / "out" / "documentation" / "scenario.toml").read_text()
+    again = load_scenario(tmp_path / "out" / "documentation" / "scenario.toml")
+    assert again.vehicle.name == scenario.vehicle.name
 
 
 # ---- what it cannot be ----

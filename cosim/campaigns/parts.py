@@ -1,0 +1,251 @@
+"""Rows on disk while a campaign goes on: a part a batch, and parts merged before they become many."""
+
+from __future__ import annotations
+
+import itertools
+import logging
+import os
+import shutil
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from cosim.campaigns.work import Rows
+from cosim.errors import RunError
+
+log = logging.getLogger(__name__)
+
+MERGED = 64  # parts of about one size that become one
+_CHUNK = 8192  # rows read at once of a part
+_GROUP = 65536  # rows in a group of what is written
+
+
+class Parts:
+    """Parquet files of one schema in a folder, each there whole or not at all.
+
+    A part is named for the batches in it, ``00000003-00000003``; those merged from it, ``00000000-00000063``. Who is
+    killed between the merged one and the removal of what is in it leaves both, which the names tell.
+
+    Parameters
+    ----------
+    folder : Path
+        Is made.
+    schema : pyarrow.Schema
+        Its first column is the key of a row.
+    """
+
+    def __init__(self, folder: Path, schema: Any) -> None:
+        self._folder, self._schema = folder, schema
+        folder.mkdir(exist_ok=True)
+        for scratch in folder.glob(".*"):  # of a part that was being written
+            scratch.unlink()
+        self._files: list[Path] = []
+        for file in sorted(folder.glob("*.parquet"), key=lambda file: (_span(file)[0], -_span(file)[1])):
+            if self._files and _span(file)[1] <= _span(self._files[-1])[1]:
+                file.unlink()
+            else:
+                self._files.append(file)
+        self._next = _span(self._files[-1])[1] + 1 if self._files else 0
+
+    def keys(self) -> Rows:
+        """Return the keys of all rows, shape (n,); parts that cannot be read are removed."""
+        found = []
+        for file in tuple(self._files):
+            try:
+                found.append(_keys(file, self._schema))
+            except RunError as error:
+                log.warning("%s; its rows are flown again", error)
+                file.unlink()
+                self._files.remove(file)
+        return np.concatenate([np.empty(0, dtype=np.int64), *found])
+
+    def add(self, table: Any) -> None:
+        """Write a part.
+
+        Parameters
+        ----------
+        table : pyarrow.Table
+            The rows of a batch, in order of key.
+
+        Raises
+        ------
+        OSError
+            If it cannot be written; nothing is left of it then.
+        """
+        file = self._folder / f"{self._next:08}-{self._next:08}.parquet"
+        write_whole(file, [table], self._schema)
+        self._files.append(file)
+        self._next += 1
+        level = 0
+        while len(alike := self._last_of(level)) >= MERGED:
+            self._merge(alike)
+            level += 1
+
+    def _last_of(self, level: int) -> list[Path]:
+        """Return the files at the end that were merged so often."""
+        return list(itertools.takewhile(lambda file: _level(file) == level, reversed(self._files)))[::-1]
+
+    def _merge(self, files: list[Path]) -> None:
+        merged = self._folder / f"{_span(files[0])[0]:08}-{_span(files[-1])[1]:08}.parquet"
+        write_whole(merged, in_order(files, self._schema), self._schema)
+        self._files[-len(files) :] = [merged]
+        for file in files:
+            file.unlink()
+
+    def join(self, path: Path) -> None:
+        """Write all rows to one file in order of key.
+
+        Parameters
+        ----------
+        path : Path
+            The file.
+
+        Raises
+        ------
+        OSError
+            If it cannot be written.
+        """
+        write_whole(path, in_order(self._files, self._schema), self._schema)
+
+    def remove(self) -> None:
+        """Remove the folder."""
+        shutil.rmtree(self._folder, ignore_errors=True)
+
+
+def _span(file: Path) -> tuple[int, int]:
+    first, _, last = file.stem.partition("-")
+    return int(first), int(last)
+
+
+def _level(file: Path) -> int:
+    """Return how often a part was merged."""
+    first, last = _span(file)
+    level, batches = 0, last - first + 1
+    while batches >= MERGED:
+        level, batches = level + 1, batches // MERGED
+    return level
+
+
+def _keys(file: Path, schema: Any) -> Any:
+    try:
+        check_schema(file, schema)
+        return pq.read_table(file, columns=[schema.names[0]])[0].to_numpy()
+    except (OSError, pa.ArrowException) as error:
+        raise RunError(f"{file}: cannot be read: {' '.join(str(error).split())}") from error
+
+
+def check_schema(file: Path, schema: Any) -> None:
+    """Raise a RunError if a Parquet file has other columns."""
+    found = pq.read_schema(file)
+    if not found.equals(schema):
+        raise RunError(
+            f"{file}: cannot be read: has the columns {', '.join(found.names)}, expected {', '.join(schema.names)}"
+        )
+
+
+def write_whole(path: Path, tables: Any, schema: Any) -> None:
+    """Write tables to one Parquet file, whole or not at all.
+
+    Parameters
+    ----------
+    path : Path
+        The file; what was there is replaced.
+    tables : iterable of pyarrow.Table
+        Of the schema.
+    schema : pyarrow.Schema
+        Of the file.
+
+    Raises
+    ------
+    OSError
+        If it cannot be written; nothing is left then.
+    """
+    scratch = path.with_name(f".{path.name}-{os.getpid()}")
+    try:
+        with pq.ParquetWriter(scratch, schema, compression="zstd") as writer:
+            for table in _grouped(tables):
+                writer.write_table(table)
+        scratch.replace(path)
+    finally:
+        scratch.unlink(missing_ok=True)
+
+
+def _grouped(tables: Any) -> Iterator[Any]:
+    """Yield what comes in small tables in greater ones."""
+    waiting: list[Any] = []
+    rows = 0
+    for table in tables:
+        waiting.append(table)
+        rows += len(table)
+        if rows >= _GROUP:
+            yield pa.concat_tables(waiting)
+            waiting, rows = [], 0
+    if waiting:
+        yield pa.concat_tables(waiting)
+
+
+def in_order(files: Sequence[Path], schema: Any) -> Iterator[Any]:
+    """Yield the rows of files, each in order of key, in order of key; no more of them are read than overlap.
+
+    Parameters
+    ----------
+    files : sequence of Path
+        Parquet files.
+    schema : pyarrow.Schema
+        Its first column is the key.
+
+    Yields
+    ------
+    pyarrow.Table
+        Some rows, all after those before.
+    """
+    key = schema.names[0]
+    closed = sorted(((_least(file), file) for file in files), reverse=True)
+    open_files: list[_Reader] = []
+    while closed or open_files:
+        if not open_files:
+            open_files.append(_Reader(closed.pop()[1], schema))
+        # rows up to the bound are all at hand: nothing that is not read yet lies below
+        bound = min(reader.last for reader in open_files)
+        while closed and closed[-1][0] <= bound:
+            open_files.append(_Reader(closed.pop()[1], schema))
+            bound = min(bound, open_files[-1].last)
+        yield pa.concat_tables([reader.up_to(bound) for reader in open_files]).sort_by(key)
+        open_files = [reader for reader in open_files if reader.more]
+
+
+def _least(file: Path) -> int:
+    with pq.ParquetFile(file) as parquet:
+        return int(parquet.metadata.row_group(0).column(0).statistics.min)
+
+
+class _Reader:
+    """A file that is read chunk by chunk."""
+
+    def __init__(self, file: Path, schema: Any) -> None:
+        self._file = pq.ParquetFile(file)
+        self._schema = schema
+        self._chunks = self._file.iter_batches(_CHUNK)
+        self._load()
+
+    def _load(self) -> None:
+        chunk = next(self._chunks, None)
+        self.more = chunk is not None
+        if chunk is None:
+            self._file.close()
+        else:
+            self._table = pa.Table.from_batches([chunk]).cast(self._schema)
+            self._keys = chunk[0].to_numpy()
+            self.last = int(self._keys[-1])
+
+    def up_to(self, bound: int) -> Any:
+        """Return the rows at hand up to a key, and have others at hand if none are left."""
+        n = int(np.searchsorted(self._keys, bound, side="right"))
+        rows, self._table, self._keys = self._table.slice(0, n), self._table.slice(n), self._keys[n:]
+        if not len(self._keys):
+            self._load()
+        return rows

@@ -1,0 +1,143 @@
+"""From the work of a campaign to the joined rows in its folder: fly what is not flown yet, and join."""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+import sys
+from collections.abc import Callable, Iterator
+from concurrent.futures import Executor
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow.compute as pc
+from tqdm import tqdm
+
+from cosim.campaigns.batches import Batches
+from cosim.campaigns.crews import Crew, Here, Lent, Processes
+from cosim.campaigns.dispatch import fly_all
+from cosim.campaigns.folder import CampaignFolder
+from cosim.campaigns.results import Results
+from cosim.campaigns.work import Work
+from cosim.campaigns.worker import flyer_held
+from cosim.errors import RunError
+
+log = logging.getLogger(__name__)
+
+_TOLD = 3  # refused rows that are told of one by one
+
+
+@dataclass(frozen=True)
+class Done:
+    """What there is of a campaign when all rows are."""
+
+    results: Results
+    flown: int  # rows, by this call; the rest had been flown before
+
+
+def carry_out(
+    work: Work,
+    out: Path,
+    workers: int = 1,
+    executor: Executor | None = None,
+    progress: bool = False,
+    conclude: Callable[[Results], None] = lambda results: None,
+) -> Done:
+    """Fly the rows of a campaign that are left, and join them all to one file.
+
+    Parameters
+    ----------
+    work : Work
+        What is flown.
+    out : Path
+        A folder that does not exist, is empty, or holds the same campaign, as a whole or as a part.
+    workers : int
+        Processes, 1 for this one alone; or how much the executor does at the same time.
+    executor : concurrent.futures.Executor, optional
+        That flies it, in the place of processes of our own.
+    progress : bool
+        Show a bar, if there is a terminal.
+    conclude : callable
+        Writes what follows from the results, while the folder is still ours.
+
+    Returns
+    -------
+    Done
+        With a row for each of the work.
+
+    Raises
+    ------
+    RunError
+        If the folder holds something else or cannot be written, or processes die whatever they fly.
+    Exception
+        What the task raises if it cannot be flown at all.
+    KeyboardInterrupt
+        After Ctrl-C; what is done is kept.
+    """
+    if workers < 1:
+        raise RunError(f"workers is {workers}, expected 1 or more")
+    with flyer_held(work.task), CampaignFolder(out, work) as folder:
+        flown = 0
+        try:
+            if folder.complete:
+                folder.remove_parts()
+                results = folder.results()
+            else:
+                for table in _flown(work, folder, workers, executor, progress):
+                    folder.add(table)
+                    flown += len(table)
+                results = folder.join()
+                folder.remove_parts()
+            conclude(results)
+        except OSError as error:
+            raise RunError(
+                f"{out}: {error.strerror or error}; what is flown is kept, and can be gone on from"
+            ) from error
+    return Done(results, flown)
+
+
+def _flown(
+    work: Work, folder: CampaignFolder, workers: int, executor: Executor | None, progress: bool
+) -> Iterator[Any]:
+    """Yield the rows that are not in the folder yet, and say how it goes."""
+    left = np.ones(len(work), dtype=bool)
+    left[work.rows_of(folder.keys())] = False
+    batches, n, refused = Batches(np.flatnonzero(left)), int(left.sum()), 0
+    with (
+        contextlib.closing(_crew(workers, executor) if n else Here()) as crew,
+        _bar(work, len(work) - n, progress) as bar,
+        contextlib.closing(fly_all(work, batches, crew)) as tables,
+    ):
+        for table in tables:
+            yield table
+            bar.update(len(table))
+            refused = _tell(table, refused)
+    if refused > _TOLD:
+        log.warning("%d %ss were refused; why is in their column 'refused'", refused, work.unit)
+
+
+def _crew(workers: int, executor: Executor | None) -> Crew:
+    if executor is not None:
+        from cosim.campaigns.cluster import Cluster, is_cluster
+
+        return Cluster(executor) if is_cluster(executor) else Lent(executor, workers)
+    return Processes(workers) if workers > 1 else Here()
+
+
+def _tell(table: Any, before: int) -> int:
+    """Tell of the first rows that were refused, and return how many there are now."""
+    rows = table.filter(pc.is_valid(table["refused"]))
+    for row in rows.slice(0, max(0, _TOLD - before)).to_pylist():
+        key = table.schema.names[0]
+        log.warning("%s %d: refused: %s", key, row[key], row["refused"])
+    return before + len(rows)
+
+
+def _bar(work: Work, done: int, progress: bool) -> Any:
+    return tqdm(
+        total=len(work), initial=done, desc=work.name, unit=work.unit,
+        disable=None if progress and sys.stderr else True,
+        bar_format="{desc} {percentage:3.0f}%|{bar}| {n}/{total} [{elapsed}<{remaining}, {rate_fmt}]",
+    )  # fmt: skip

@@ -1,0 +1,89 @@
+"""A sweep from its scenario to its folder: many rows, each with numbers of its own."""
+
+from __future__ import annotations
+
+import json
+from concurrent.futures import Executor
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from cosim.campaigns.design import Design
+from cosim.campaigns.folder import SUMMARY, write_text
+from cosim.campaigns.results import Results
+from cosim.campaigns.runner import carry_out
+from cosim.campaigns.sweep_page import sweep_page
+from cosim.campaigns.sweep_rows import SweepWork
+from cosim.campaigns.sweep_summary import summarise_sweep
+from cosim.scenario import Scenario
+
+PAGE = "summary.md"
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """Where a sweep was written, and what it came to."""
+
+    folder: Path
+    results: Results
+    summary: dict[str, Any]
+    flown: int  # rows, by this call; the rest had been flown before
+
+
+def run_sweep(
+    scenario: Scenario,
+    design: Design,
+    out: Path,
+    engine: str = "fused",
+    workers: int = 1,
+    executor: Executor | None = None,
+    progress: bool = False,
+) -> Sweep:
+    """Fly a scenario with every row of a design, or with those that are left, and write results and summary.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        What stays.
+    design : Design
+        What varies.
+    out : Path
+        A folder that does not exist, is empty, or holds the same sweep: as a whole, which writes its summary again,
+        or as a part, which goes on.
+    engine : str
+        ``"fused"``, the compiled loop around the FMU; or ``"lanes"``, several vehicles side by side without one.
+    workers : int
+        Processes; rows are the same for any number. Of an executor: how much it does at the same time.
+    executor : concurrent.futures.Executor, optional
+        That flies the rows, in the place of processes of our own, such as ``Client(...).get_executor()`` of Dask. It
+        is not closed. Threads take turns.
+    progress : bool
+        Show a bar, if there is a terminal.
+
+    Returns
+    -------
+    Sweep
+        With every row.
+
+    Raises
+    ------
+    ScenarioError
+        If a key is unknown, or what it names is no number.
+    RunError
+        If the engine cannot fly the scenario, the folder holds something else or cannot be written, or processes die
+        whatever they fly.
+    BuildError, PlantError
+        If there is no FMU of the vehicle.
+    KeyboardInterrupt
+        After Ctrl-C; what is done is kept.
+    """
+    work = SweepWork(scenario, design, engine)
+    summary: dict[str, Any] = {}
+
+    def conclude(results: Results) -> None:
+        summary.update(summarise_sweep(work, results, out))
+        write_text(out / SUMMARY, json.dumps(summary, indent=2, allow_nan=False) + "\n")
+        write_text(out / PAGE, sweep_page(summary))
+
+    done = carry_out(work, out, workers, executor, progress, conclude)
+    return Sweep(out, done.results, summary, done.flown)

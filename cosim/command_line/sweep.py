@@ -1,0 +1,118 @@
+"""``cosim sweep`` and ``cosim rerun``."""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import os
+import signal
+import sys
+from pathlib import Path
+from typing import Any
+
+from cosim.command_line.campaigns import INTERRUPTED, resumable, workers
+from cosim.errors import RunError
+
+_EPILOG = """examples:
+  cosim sweep paper --vary initial.position.1=-2:2 regions.SR1.gain=500:5000:log --samples 1000 --out sweeps/start
+  cosim sweep paper --vary law.gains.k_p1=10:30:5 law.gains.k_q=5,10,20 --design grid --workers 2 --out sweeps/gains
+  cosim rerun sweeps/start 17 --out runs/worst
+"""
+
+
+def add_verbs(verbs: Any) -> None:
+    """Add the verbs to the parser.
+
+    Parameters
+    ----------
+    verbs : argparse subparsers
+        Of the command.
+    """
+    sweep = verbs.add_parser(
+        "sweep", help="fly a scenario many times, with numbers of it varied",
+        epilog=_EPILOG, formatter_class=argparse.RawDescriptionHelpFormatter,
+    )  # fmt: skip
+    sweep.add_argument("scenario", help="a shipped name (see cosim list), or a TOML file")
+    sweep.add_argument(
+        "--vary", nargs="+", action="extend", required=True, metavar="KEY=LOW:HIGH[:N][:log]",
+        help="a key of the scenario and its range, with the number of points on a grid; or KEY=A,B,C",
+    )  # fmt: skip
+    sweep.add_argument("--samples", type=int, metavar="N", help="rows, unless the design is a grid")
+    sweep.add_argument(
+        "--design", default="random", metavar="grid|random|sobol|lhs", help="how rows are spread (default: random)"
+    )
+    sweep.add_argument("--seed", type=int, default=0, metavar="S", help="of the design and the rows (default: 0)")
+    sweep.add_argument(
+        "--out", type=Path, required=True, metavar="DIR",
+        help="a new folder, or one that this command began: it goes on with what is left",
+    )  # fmt: skip
+    sweep.add_argument(
+        "--engine", default="fused", metavar="fused|lanes",
+        help="fused: the compiled loop around the FMU (default); lanes: several vehicles side by side, without one",
+    )  # fmt: skip
+    sweep.add_argument("--workers", type=workers, metavar="N", help="processes (default: 1; with --dask: one a core)")
+    where = sweep.add_mutually_exclusive_group()
+    where.add_argument("--dask", action="store_true", help="a Dask cluster of its own on this machine")
+    where.add_argument("--scheduler", metavar="tcp://HOST:PORT", help="a Dask cluster that exists")
+    sweep.add_argument(
+        "--set", action="append", default=[], metavar="KEY=VALUE", dest="overrides",
+        help="change a key of the scenario in all rows; may be repeated",
+    )  # fmt: skip
+
+    rerun = verbs.add_parser("rerun", help="repeat a row of a campaign, to the last bit and with full record")
+    rerun.add_argument("folder", type=Path, metavar="DIR", help="the folder of a sweep or campaign")
+    rerun.add_argument("row", type=int, metavar="ROW", help="number of the row; of a campaign, the seed of the scene")
+    rerun.add_argument("--out", type=Path, metavar="RUN", help="run folder (default: runs/SCENARIO-row-ROW-TIME)")
+
+
+def sweep(options: argparse.Namespace) -> int:
+    """Run ``cosim sweep``."""
+    from cosim.campaigns.design import Design, vary_from
+    from cosim.campaigns.sweep import PAGE, run_sweep
+    from cosim.campaigns.sweep_page import sweep_lines
+    from cosim.scenario import load_scenario
+
+    if options.scheduler and options.workers:
+        raise RunError("--workers: expected none with --scheduler: the cluster has as many as it has")
+    scenario = load_scenario(options.scenario, options.overrides)
+    design = Design(vary_from(options.vary), options.design, options.samples, options.seed)
+
+    def run() -> None:
+        with contextlib.ExitStack() as stack:
+            executor = None
+            if options.dask or options.scheduler:
+                from cosim.campaigns.cluster import cluster_executor
+
+                n = options.workers or os.cpu_count() or 1
+                executor = stack.enter_context(cluster_executor(options.scheduler, n))
+            n = options.workers or 1
+            done = run_sweep(scenario, design, options.out, options.engine, n, executor, progress=True)
+        if not done.flown:
+            print(f"{options.out}: was complete already")
+        for line in sweep_lines(done.summary):
+            print(line)
+        print(options.out / PAGE)
+
+    return resumable(run, options.out)
+
+
+def rerun(options: argparse.Namespace) -> int:
+    """Run ``cosim rerun``."""
+    from cosim.campaigns.rerun import rerun as rerun_row
+    from cosim.report import verdict
+
+    with contextlib.suppress(ValueError):  # which signal raises outside the main thread
+        signal.signal(signal.SIGTERM, signal.default_int_handler)
+    done = rerun_row(options.folder, options.row, options.out, progress=True)
+    if done.other_code:
+        print("cosim: the code is not that which flew the row", file=sys.stderr)
+    for name, (before, now) in done.differing.items():
+        print(f"cosim: row {done.key}: {name} was {before!r}, is {now!r} now", file=sys.stderr)
+    if not done.differing:
+        print(f"row {done.key}: flown again, identical to the last bit")
+    if done.run is not None:
+        print(verdict(done.run.summary))
+        print(done.run.folder / "report.html")
+        if done.run.summary["status"] == "interrupted":
+            return INTERRUPTED
+    return 1 if done.differing else 0

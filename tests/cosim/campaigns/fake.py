@@ -1,0 +1,101 @@
+"""An engine that flies nothing, in a known way: what campaigns do around engines is tested with it."""
+
+import os
+import signal
+import time
+
+import numpy as np
+import pytest
+
+from cosim.campaigns import Design, sweep_rows, vary_from
+from cosim.flying.outcome import FIELDS, Flown, nothing
+from cosim.scenario import load_scenario
+
+KEYS = ("initial.position.1", "regions.SR1.gain", "law.gains.k_p1")
+VARY = ("initial.position.1=-2:2", "regions.SR1.gain=500:5000:log", "law.gains.k_p1=10:30")
+
+
+class Fake:
+    """Outcomes that follow from values and seed of each row alone; rows beyond `refused_above` are refused."""
+
+    row_time = 0.0  # s
+    refused_above = np.inf  # of the first value
+
+    def __init__(self, variation):
+        self.variation = variation
+
+    def fly(self, values, seeds):
+        outcomes, refused = nothing(len(seeds)), {}
+        for i, row in enumerate(values):
+            if self.row_time:
+                time.sleep(self.row_time)
+            self.meet(row)
+            if row[0] > self.refused_above:
+                refused[i] = f"{self.variation.keys[0]} is {row[0]}, expected less"
+        x = np.where(values[:, 0] > self.refused_above, np.nan, values[:, 0])
+        for name, (kind, _, _) in FIELDS.items():
+            outcomes[name] = x > 0.0 if kind is np.bool_ else x * 0.1 + np.sum(values, axis=1) + seeds * 1e-9
+        outcomes["min_clearance"] = np.where(seeds % 5 == 0, np.inf, x)
+        outcomes["stopped_at"] = np.nan
+        outcomes["reach_time"] = np.where(x > 0.0, x * 3.0, np.nan)
+        return Flown(outcomes, refused)
+
+    def meet(self, row):
+        """Do what a row of these values does to a process."""
+
+    def close(self):
+        pass
+
+
+class Slow(Fake):
+    row_time = 0.01
+
+
+class Choosy(Fake):
+    refused_above = 1.5
+
+
+class Poisoned(Fake):
+    """A row whose first value is between 1 and 1.02 kills the process."""
+
+    def meet(self, row):
+        if 1.0 < row[0] < 1.02:
+            os.kill(os.getpid(), signal.SIGKILL)
+
+
+class Deadly(Fake):
+    def meet(self, row):
+        os.kill(os.getpid(), signal.SIGKILL)
+
+
+class Unfit(Fake):
+    def __init__(self, variation):
+        from cosim.errors import RunError
+
+        raise RunError("the engine cannot fly this")
+
+
+ENGINES = {
+    kind.__name__.lower(): f"tests.cosim.campaigns.fake:{kind.__name__}"
+    for kind in (Fake, Slow, Choosy, Poisoned, Deadly, Unfit)
+}
+
+
+@pytest.fixture
+def fakes(monkeypatch):
+    """Let sweeps have the engines of this file."""
+    for name, where in ENGINES.items():
+        monkeypatch.setitem(sweep_rows.ENGINES, name, where)
+
+
+def design(n=50, kind="random", seed=3, vary=VARY):
+    return Design(vary_from(vary), kind, n, seed)
+
+
+def paper():
+    return load_scenario("paper")
+
+
+def flown(results):
+    """Return all rows."""
+    return results.table.to_pylist()

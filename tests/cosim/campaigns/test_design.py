@@ -1,0 +1,164 @@
+"""Designs, held against scipy's and numpy's own."""
+
+import itertools
+import json
+import warnings
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.stats import qmc
+
+from cosim.campaigns.design import KINDS, MOST, Design, Vary, design_of, vary_from
+from cosim.errors import RunError
+
+TWO = vary_from(["a=-2:2", "b=1:1000:log"])
+
+
+def all_rows(design):
+    return np.arange(design.rows)
+
+
+def test_sobol_is_that_of_scipy():
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        shares = qmc.Sobol(2, scramble=True, seed=np.random.default_rng(7)).random(100)
+    found = Design(TWO, "sobol", 100, 7)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        values = found.values(all_rows(found))
+    assert values[:, 0] == pytest.approx(qmc.scale(shares[:, :1], -2.0, 2.0)[:, 0], rel=1e-12)
+    assert np.log10(values[:, 1]) == pytest.approx(3.0 * shares[:, 1], rel=1e-9)
+
+
+def test_a_latin_hypercube_is_that_of_scipy_and_has_one_row_in_each_layer():
+    shares = qmc.LatinHypercube(2, seed=np.random.default_rng(7)).random(50)
+    found = Design(TWO, "lhs", 50, 7)
+    values = found.values(all_rows(found))
+    assert values[:, 0] == pytest.approx(4.0 * shares[:, 0] - 2.0)
+    layers = np.floor((values[:, 0] + 2.0) / 4.0 * 50)
+    assert sorted(layers.tolist()) == list(range(50))
+
+
+def test_random_is_that_of_numpy():
+    shares = np.random.default_rng(7).random((40, 2))
+    found = Design(TWO, "random", 40, 7)
+    assert found.values(all_rows(found))[:, 0] == pytest.approx(4.0 * shares[:, 0] - 2.0)
+
+
+def test_a_grid_is_every_value_with_every_other():
+    found = Design(vary_from(["a=-1:1:3", "b=1:100:3:log", "c=5,2"]), "grid")
+    expected = np.array(list(itertools.product([-1.0, 0.0, 1.0], [1.0, 10.0, 100.0], [5.0, 2.0])))
+    values = found.values(all_rows(found))
+    assert values == pytest.approx(expected) and found.rows == 18
+    assert set(values[:, 0]) == {-1.0, 0.0, 1.0} and values[:, 1].max() == 100.0 and values[:, 1].min() == 1.0
+
+
+def test_lists_are_drawn_from_evenly():
+    found = Design(vary_from(["a=1,2,4", "b=0:1"]), "lhs", 300, 1)
+    assert np.unique(found.values(all_rows(found))[:, 0], return_counts=True)[1].tolist() == [100, 100, 100]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@given(st.sets(st.integers(0, 59), min_size=1), st.integers(0, 2**63 - 1))
+def test_a_row_does_not_depend_on_what_else_is_asked_for(kind, rows, seed):
+    vary = vary_from(
+        ["a=-2:2:4", "b=1:1000:5:log", "c=1,2,3"] if kind == "grid" else ["a=-2:2", "b=1:9:log", "c=1,2,3"]
+    )
+    found = Design(vary, kind, None if kind == "grid" else 60, seed)
+    asked = np.array(sorted(rows))
+    assert np.array_equal(found.values(asked), found.values(all_rows(found))[asked])
+    assert np.array_equal(found.seeds(asked), found.seeds(all_rows(found))[asked])
+
+
+@pytest.mark.parametrize("kind", ["random", "sobol", "lhs"])
+def test_values_stay_in_their_ranges_and_other_seeds_give_others(kind):
+    one, other = (Design(TWO, kind, 1000, seed) for seed in (1, 2))
+    values = one.values(all_rows(one))
+    assert np.all((values >= [-2.0, 1.0]) & (values <= [2.0, 1000.0]))
+    assert not np.any(values == other.values(all_rows(other)))
+
+
+def test_every_row_has_a_seed_of_its_own_that_fmi_can_hold():
+    found = Design(TWO, "random", MOST, 5)
+    seeds = found.seeds(np.arange(1_000_000))
+    assert len(np.unique(seeds)) == 1_000_000 and seeds.min() >= 0 and seeds.max() < 2**31
+    last = found.seeds(np.array([MOST - 1]))
+    assert 0 <= last[0] < 2**31
+    assert np.mean(seeds == Design(TWO, "random", MOST, 6).seeds(np.arange(1_000_000))) < 1e-3
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("k=-1:2", Vary("k", -1.0, 2.0)),
+        (" a.0.b = 1e-3 : 2 : 7 : log ", Vary("a.0.b", 1e-3, 2.0, 7, True)),
+        ("k=1:2:log", Vary("k", 1.0, 2.0, None, True)),
+        ("k=3", Vary("k", values=(3.0,))),
+        ("k=3,-1,2", Vary("k", values=(3.0, -1.0, 2.0))),
+    ],
+)
+def test_what_varies_is_read(text, expected):
+    assert repr(vary_from([text])) == repr((expected,))
+
+
+@pytest.mark.parametrize(
+    ("texts", "words"),
+    [
+        (["k"], "expected key=low:high"),
+        (["=1:2"], "expected key=low:high"),
+        (["k="], "expected key=low:high"),
+        (["k=2:1"], "k goes from 2 to 1, expected the lower end first"),
+        (["k=1:1"], "the lower end first"),
+        (["k=nan:1"], "'nan' is no finite number"),
+        (["k=1:inf"], "'inf' is no finite number"),
+        (["k=1,nan"], "'nan' is no finite number"),
+        (["k=a:1"], "'a' is no finite number"),
+        (["k=1:2:1"], "'1' points, expected a whole number from 2"),
+        (["k=1:2:x"], "'x' points"),
+        (["k=1:2:3:4"], "either with :log"),
+        (["k=0:2:log"], "logarithmic scale, expected above 0"),
+        (["k=1:2", "k=2:3"], "k varies twice"),
+    ],
+)
+def test_what_cannot_vary_is_refused(texts, words):
+    with pytest.raises(RunError, match=words):
+        vary_from(texts)
+
+
+@pytest.mark.parametrize(
+    ("vary", "kind", "samples", "seed", "words"),
+    [
+        (["a=1:2"], "grid", None, 0, "a: a grid needs to know how many points, expected a=1:2:N"),
+        (["a=1:2:3"], "grid", 5, 0, "expected none given"),
+        (["a=1:2"], "sobol", None, 0, "samples is missing"),
+        (["a=1:2"], "random", 0, 0, "samples is 0"),
+        (["a=1:2"], "random", -1, 0, "samples is -1"),
+        (["a=1:2:4"], "lhs", 10, 0, "4 points are given"),
+        (["a=1:2"], "square", 10, 0, "design is 'square', expected one of grid, random, sobol, lhs"),
+        (["a=1:2"], "random", 10, -1, "seed is -1"),
+        (["a=1:2"], "random", MOST + 1, 0, "10000001 rows, expected up to 10000000"),
+        (["a=1:2:4000", "b=1:2:4000"], "grid", None, 0, "16000000 rows"),
+        ([], "random", 10, 0, "nothing varies"),
+    ],
+)
+def test_designs_that_cannot_be(vary, kind, samples, seed, words):
+    with pytest.raises(RunError, match=words):
+        Design(vary_from(vary), kind, samples, seed)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_design_comes_back_from_the_plan(kind):
+    grid = kind == "grid"
+    vary = vary_from(["a=-2:2:4", "b=1:9:3:log", "c=1,2,3"] if grid else ["a=-2:2", "b=1:9:log", "c=1,2,3"])
+    design = Design(vary, kind, None if grid else 30, 4)
+    again = design_of(json.loads(json.dumps(design.table())))
+    assert again.rows == design.rows
+    assert np.array_equal(again.values(all_rows(design)), design.values(all_rows(design)))
+
+
+@pytest.mark.parametrize("table", [{}, {"vary": 3}, {"vary": {"a": {}}, "design": "lhs", "samples": 3, "seed": 1}])
+def test_a_design_that_cannot_be_read(table):
+    with pytest.raises(RunError, match="cannot be read"):
+        design_of(table)

@@ -1,0 +1,160 @@
+"""Batches shared out: what dies is flown again, taken apart, and laid to the row that is to blame."""
+
+from concurrent.futures import Future
+
+import numpy as np
+import pytest
+
+from cosim.campaigns import batches as module
+from cosim.campaigns.batches import Batch, Batches
+from cosim.campaigns.crews import FATAL, Death
+from cosim.campaigns.dispatch import fly_all
+from cosim.errors import RunError
+
+
+class Work:
+    """Rows that are their own tables."""
+
+    task = None
+
+    def batch(self, rows):
+        return rows.tolist()
+
+    def refused(self, row, reason):
+        assert "died" in reason
+        return [-row]
+
+
+class Crew:
+    """Flies in order of submission; dies of some rows."""
+
+    def __init__(self, poison=(), width=4, certain=True):
+        self.poison, self.width, self.certain = set(poison), width, certain
+        self.deaths, self.sent = [], []
+        self.most = 0
+        self.under_way = []
+
+    def submit(self, task, batch):
+        flight = Future()
+        flight.rows = batch
+        flight.set_result(None)
+        self.under_way.append(flight)
+        self.sent.append(batch)
+        self.most = max(self.most, len(self.under_way))
+        return flight
+
+    def settle(self, flight):
+        self.under_way.remove(flight)
+        if self.poison & set(flight.rows):
+            self.deaths.append(flight.rows)
+            if not self.certain:  # everything that was under way is under suspicion
+                for other in self.under_way:
+                    other.suspect = True
+            return Death(1, self.certain)
+        if getattr(flight, "suspect", False):
+            return Death(1, certain=False)
+        return flight.rows, 0.01 * len(flight.rows)
+
+    def close(self):
+        pass
+
+
+def flown(crew, n=200):
+    return sorted(row for table in fly_all(Work(), Batches(np.arange(n)), crew) for row in table)
+
+
+def test_every_row_comes_home_once():
+    crew = Crew()
+    assert flown(crew) == list(range(200))
+    assert crew.sent[0] == [0] and crew.most == 4
+    assert sum(len(batch) for batch in crew.sent) == 200
+
+
+@pytest.mark.parametrize("certain", [True, False])
+@pytest.mark.parametrize("poison", [{77}, {60, 61, 150}, {1}, {199}, {0}])
+def test_rows_that_kill_are_found_and_refused_and_no_others(poison, certain):
+    crew = Crew(poison, certain=certain)
+    found = flown(crew)
+    zero = {0} & poison  # refused as -0
+    assert found == sorted([-p for p in poison] + [row for row in range(200) if row not in poison])
+    for row in poison - zero:
+        assert any(batch == [row] for batch in crew.deaths)
+    assert len(crew.deaths) <= len(poison) * (FATAL + 8) * (1 if certain else 2)
+
+
+def test_what_is_not_certain_to_kill_is_flown_while_nothing_else_is():
+    crew = Crew({77}, certain=False)
+    alone = []
+    submit = crew.submit
+
+    def watched(task, batch):
+        if 77 in batch and crew.deaths:
+            alone.append(not crew.under_way)
+        return submit(task, batch)
+
+    crew.submit = watched
+    flown(crew)
+    assert alone and all(alone)
+
+
+def test_a_death_by_chance_costs_nobody_a_row():
+    class Unlucky(Crew):
+        def settle(self, flight):
+            if len(self.sent) in (5, 6) and not self.deaths:
+                self.under_way.remove(flight)
+                self.deaths.append(flight.rows)
+                return Death(1)
+            return super().settle(flight)
+
+    assert flown(Unlucky()) == list(range(200))
+
+
+def test_where_everything_dies_no_row_is_blamed():
+    with pytest.raises(RunError, match="processes died one after the other, whatever they flew"):
+        flown(Crew(range(200)))
+    with pytest.raises(RunError, match="every process died, whatever it flew"):
+        flown(Crew(range(3)), 3)
+
+
+# ---- batches ----
+
+
+def test_batches_follow_the_time_that_a_row_takes():
+    batches = Batches(np.arange(100_000))
+    sizes = []
+    for _ in range(12):
+        batch = batches.take(4)
+        sizes.append(len(batch.rows))
+        batches.measured(len(batch.rows), 0.001 * len(batch.rows))
+    assert sizes[0] == 1 and sizes[-1] == 240  # a quarter of a second, in sixteens
+    assert all(after <= 4 * before for before, after in zip(sizes, sizes[1:], strict=False))
+
+
+def test_rows_that_take_long_go_one_by_one():
+    batches = Batches(np.arange(50))
+    for _ in range(50):
+        batch = batches.take(4)
+        assert len(batch.rows) == 1
+        batches.measured(1, 3.0)
+    assert batches.take(4) is None
+
+
+def test_towards_the_end_batches_are_shared_out_evenly_but_not_too_small():
+    batches = Batches(np.arange(1000))
+    batches.measured(1000, 1.0)  # 1 ms each
+    batches.measured(1000, 1.0)
+    sizes = []
+    while (batch := batches.take(4)) is not None:
+        sizes.append(len(batch.rows))
+    assert sum(sizes) == 1000 and sizes[0] == 112 and min(sizes[:-1]) >= 48  # 50 ms, but for sixteens
+    assert sizes == sorted(sizes, reverse=True)
+
+
+def test_halves_have_all_rows(monkeypatch):
+    one, other = Batch(np.arange(7), 1, True).halves(2)
+    assert one.rows.tolist() + other.rows.tolist() == list(range(7))
+    assert one.strikes == other.strikes == 2 and one.alone and other.alone
+
+
+def test_the_first_batches_take_no_longer_than_a_row(monkeypatch):
+    assert module.FIRST == 1 and len(Batches(np.arange(9)).take(4).rows) == 1

@@ -1,0 +1,345 @@
+"""Sweeps around engines whose outcomes are known: a row each, whoever flies it, whatever comes in between."""
+
+import json
+import os
+import subprocess
+import sys
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from multiprocessing import get_context
+from pathlib import Path
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+from scipy.stats import norm
+
+from cosim.campaigns import run_sweep
+from cosim.campaigns.design import design_of
+from cosim.campaigns.folder import PARTS, RESULTS, CampaignFolder
+from cosim.campaigns.sweep_rows import schema_of
+from cosim.cli import main
+from cosim.errors import RunError, ScenarioError
+from cosim.flying.outcome import FIELDS
+from cosim.scenario import load_scenario
+from tests.cosim.campaigns.fake import KEYS, VARY, Fake, design, fakes, flown, paper
+from tests.cosim.campaigns.scenes import batches_of
+
+ROOT = Path(__file__).parents[3]
+WORDS = ["sweep", "paper", "--vary", *VARY, "--samples", "50", "--seed", "3"]
+
+__all__ = ["fakes"]
+
+
+def expected(n=50):
+    """Return the rows that the fake makes of the design."""
+    d = design(n)
+    rows = np.arange(n)
+    values, seeds = d.values(rows), d.seeds(rows)
+    outcomes = Fake(None).fly(values, seeds).outcomes
+    found = []
+    for i in range(n):
+        row = {"row": i} | dict(zip(KEYS, values[i].tolist(), strict=True)) | {"seed": int(seeds[i])}
+        row |= {name: outcomes[name][i].item() for name in FIELDS}
+        found.append({k: None if v != v else v for k, v in row.items()} | {"refused": None})
+    return found
+
+
+def test_a_row_for_each_of_the_design_in_order(tmp_path, fakes):
+    done = run_sweep(paper(), design(), tmp_path / "out", "fake")
+    assert done.flown == 50 and flown(done.results) == expected()
+    assert sorted(p.name for p in (tmp_path / "out").iterdir()) == [
+        ".lock", "campaign.json", "results.parquet", "scenario.toml", "summary.json", "summary.md"
+    ]  # fmt: skip
+    schema = pq.read_schema(tmp_path / "out" / RESULTS)
+    assert schema.equals(schema_of(KEYS))
+    units = {f.name: f.metadata[b"unit"].decode() for f in schema}
+    assert units["reach_time"] == "s" and units["effort"] == "N.s" and all(f.metadata[b"description"] for f in schema)
+
+
+def test_the_folder_tells_the_whole_sweep(tmp_path, fakes):
+    run_sweep(load_scenario("paper", ["limit.force=900"]), design(), tmp_path / "out", "fake")
+    plan = json.loads((tmp_path / "out" / "campaign.json").read_text())
+    assert plan["kind"] == "sweep" and plan["engine"] == "fake" and plan["scenario"]["limit"]["force"] == 900.0
+    again = design_of(plan)
+    assert np.array_equal(again.values(np.arange(50)), design().values(np.arange(50)))
+    assert load_scenario(tmp_path / "out" / "scenario.toml").limit.force == 900.0
+
+
+def test_a_vehicle_file_goes_with_the_sweep_wherever_it_came_from(tmp_path, fakes, monkeypatch):
+    from importlib import resources
+
+    for place in ("one", "two"):
+        (tmp_path / place).mkdir()
+        text = (resources.files("plant_fmu") / "vehicles" / "odin.toml").read_text()
+        (tmp_path / place / "mine.toml").write_text(text)
+        (tmp_path / place / "s.toml").write_text('base = "paper"\nvehicle = "mine.toml"\n')
+    run_sweep(load_scenario(tmp_path / "one" / "s.toml"), design(), tmp_path / "out", "fake")
+    assert (tmp_path / "out" / "vehicle.toml").read_text() == text
+    assert run_sweep(load_scenario(tmp_path / "two" / "s.toml"), design(), tmp_path / "out", "fake").flown == 0
+    (tmp_path / "two" / "mine.toml").write_text(text + "\n# another\n")
+    with pytest.raises(RunError, match="vehicle_sha256"):
+        run_sweep(load_scenario(tmp_path / "two" / "s.toml"), design(), tmp_path / "out", "fake")
+
+
+@pytest.mark.slow
+def test_two_processes_and_executors_give_the_same_rows(tmp_path, fakes):
+    run_sweep(paper(), design(), tmp_path / "two", "fake", workers=2)
+    with ThreadPoolExecutor(3) as threads:
+        run_sweep(paper(), design(), tmp_path / "threads", "fake", workers=3, executor=threads)
+    with ProcessPoolExecutor(2, mp_context=get_context("spawn")) as pool:
+        run_sweep(paper(), design(), tmp_path / "pool", "fake", workers=2, executor=pool)
+        assert pool.submit(int, "1").result() == 1  # it is not closed
+    for name in ("two", "threads", "pool"):
+        assert pq.read_table(tmp_path / name / RESULTS).to_pylist() == expected(), name
+
+
+def test_threads_take_turns(tmp_path, fakes, monkeypatch):
+    inside, fly = [], Fake.fly
+
+    def watched(self, values, seeds):
+        inside.append(1)
+        assert len(inside) == 1
+        try:
+            return fly(self, values, seeds)
+        finally:
+            inside.pop()
+
+    monkeypatch.setattr(Fake, "fly", watched)
+    batches_of(monkeypatch, 1)
+    with ThreadPoolExecutor(4) as threads:
+        assert run_sweep(paper(), design(), tmp_path / "out", "fake", workers=4, executor=threads).flown == 50
+
+
+def test_an_executor_that_is_closed_is_one_line(tmp_path, fakes):
+    with ThreadPoolExecutor(1) as threads:
+        pass
+    with pytest.raises(RunError, match=r"the executor takes no more work .* what is flown is kept"):
+        run_sweep(paper(), design(), tmp_path / "out", "fake", executor=threads)
+    assert run_sweep(paper(), design(), tmp_path / "out", "fake").flown == 50
+
+
+def test_what_is_interrupted_goes_on_without_losing_or_repeating(tmp_path, fakes, monkeypatch):
+    batches_of(monkeypatch, 7)
+    add, left = CampaignFolder.add, [2]
+
+    def until(folder, table):
+        if not left[0]:
+            raise KeyboardInterrupt
+        left[0] -= 1
+        add(folder, table)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(CampaignFolder, "add", until)
+        with pytest.raises(KeyboardInterrupt):
+            run_sweep(paper(), design(), tmp_path / "out", "fake")
+    assert len(list((tmp_path / "out" / PARTS).iterdir())) == 2
+    done = run_sweep(paper(), design(), tmp_path / "out", "fake")
+    assert done.flown == 50 - 14 and flown(done.results) == expected()
+    assert not (tmp_path / "out" / PARTS).exists()
+
+
+def test_a_row_that_is_refused_is_a_row_and_says_why(tmp_path, fakes, caplog):
+    done = run_sweep(paper(), design(), tmp_path / "out", "choosy")
+    rows = flown(done.results)
+    refused = [row for row in rows if row["refused"]]
+    assert 3 < len(refused) == done.summary["refused"] and len(rows) == 50
+    for row, other in zip(rows, expected(), strict=True):
+        if row["refused"]:
+            assert row[KEYS[0]] > 1.5 and f"is {row[KEYS[0]]}, expected less" in row["refused"]
+            assert row["seed"] == other["seed"] and all(row[name] is None for name in FIELDS)
+        else:
+            assert row == other
+    assert len([r for r in caplog.records if ": refused: " in r.message]) == 3
+    assert f"{len(refused)} rows were refused" in caplog.text
+    assert done.summary["reached"]["rows"] == sum(row["reached"] is True for row in rows)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"n": 51}, "samples is 50, now 51"),
+        ({"kind": "lhs"}, "design is 'random', now 'lhs'"),
+        ({"seed": 4}, "seed is 3, now 4"),
+        ({"vary": (*VARY[:2], "law.gains.k_p1=10:31")}, r"vary.law.gains.k_p1.high is 30.0, now 31.0"),
+        ({"engine": "slow"}, "engine is 'fake', now 'slow'"),
+        ({"overrides": ["initial.position.2=3"]}, r"scenario.initial.position.2 is \d.*, now 3"),
+    ],
+)
+def test_the_folder_of_another_sweep_is_refused(tmp_path, fakes, change, words):
+    run_sweep(paper(), design(), tmp_path / "out", "fake")
+    engine, overrides = change.pop("engine", "fake"), change.pop("overrides", [])
+    with pytest.raises(RunError, match=f"holds another campaign .*{words}"):
+        run_sweep(load_scenario("paper", overrides), design(**change), tmp_path / "out", engine)
+
+
+def test_an_engine_that_cannot_fly_it_leaves_no_folder(tmp_path, fakes):
+    with pytest.raises(RunError, match="cannot fly this"):
+        run_sweep(paper(), design(), tmp_path / "out", "unfit")
+    with pytest.raises(ScenarioError, match=r"law\.gains\.k_p9"):
+        run_sweep(paper(), design(vary=["law.gains.k_p9=1:2"]), tmp_path / "out", "fake")
+    assert not (tmp_path / "out").exists()
+
+
+# ---- the summary ----
+
+
+def test_the_summary_follows_from_the_rows(tmp_path, fakes):
+    done = run_sweep(paper(), design(200), tmp_path / "out", "fake")
+    s, rows = done.summary, flown(done.results)
+    assert json.loads((tmp_path / "out" / "summary.json").read_text()) == s
+    reached = sum(row["reached"] for row in rows)
+    z = norm.ppf(0.975)
+    share = reached / 200  # whoever is as likely as this or less by the score test is outside
+    low, high = np.sort(np.roots([1 + z**2 / 200, -2 * share - z**2 / 200, share**2]))
+    assert s["reached"] == {"rows": reached, "share": share, "low": pytest.approx(low), "high": pytest.approx(high)}
+    times = [row["reach_time"] for row in rows if row["reach_time"] is not None]
+    assert s["quantiles"]["reach_time"]["0.5"] == pytest.approx(np.median(times))
+    finite = [row["min_clearance"] for row in rows if np.isfinite(row["min_clearance"])]
+    assert s["quantiles"]["min_clearance"]["0.05"] == pytest.approx(np.quantile(finite, 0.05))
+    correlations = s["rank_correlations"]
+    assert correlations[KEYS[0]]["reach_time"]["rho"] == pytest.approx(1.0)  # it is three times the value
+    assert correlations[KEYS[0]]["stopped_at"] is None
+    assert abs(correlations[KEYS[2]]["reach_time"]["rho"]) < 0.3
+    ranks = [np.argsort(np.argsort([row[k] for row in rows])) for k in (KEYS[1], "effort")]
+    assert correlations[KEYS[1]]["effort"]["rho"] == pytest.approx(np.corrcoef(*ranks)[0, 1])
+
+
+def test_the_worst_rows_come_with_the_command_that_repeats_them(tmp_path, fakes):
+    done = run_sweep(paper(), design(), tmp_path / "out dir", "fake")
+    worst = [w for w in done.summary["worst"] if w["why"] == "least clearance"]
+    finite = [row for row in expected() if np.isfinite(row["min_clearance"])]
+    assert [w["row"] for w in worst] == [row["row"] for row in sorted(finite, key=lambda row: row["min_clearance"])[:5]]
+    assert worst[0]["command"] == f"cosim rerun '{tmp_path / 'out dir'}' {worst[0]['row']}"
+    page = (tmp_path / "out dir" / "summary.md").read_text()
+    assert worst[0]["command"] in page and "| `law.gains.k_p1` | 10 to 30 |" in page and "+1.00" in page
+
+
+def test_the_summary_of_a_single_row_and_of_none_flown(tmp_path, fakes):
+    one = run_sweep(paper(), design(1), tmp_path / "one", "fake").summary
+    assert one["rank_correlations"][KEYS[0]]["effort"] is None and one["rows"] == 1
+    none = run_sweep(paper(), design(3, vary=["initial.position.1=1.6:2"]), tmp_path / "none", "choosy").summary
+    assert none["reached"] == {"rows": 0, "share": None, "low": None, "high": None} and none["refused"] == 3
+    assert none["worst"] == [] and none["quantiles"]["effort"]["0.5"] is None
+
+
+# ---- the command ----
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--vary", "law.gains.k_p9=1:2", "--samples", "3"], "did you mean 'k_p"),
+        (["--vary", "law.name=1:2", "--samples", "3"], "law.name"),
+        (["--vary", "law.gains.k_p1=2:1", "--samples", "3"], "the lower end first"),
+        (["--vary", "law.gains.k_p1=1:2", "--design", "grid"], "how many points"),
+        (["--vary", "law.gains.k_p1=1:2"], "samples is missing"),
+        (["--vary", "law.gains.k_p1=nan:2", "--samples", "3"], "no finite number"),
+        (["--vary", "law.gains.k_p1=1:2", "--samples", "10000001"], "expected up to 10000000"),
+        (["--vary", "law.gains.k_p1=1:2", "--samples", "3", "--design", "sobl"], "expected one of grid"),
+        (["--vary", "law.gains.k_p1=1:2", "--samples", "3", "--engine", "fuse"], "did you mean 'fused'"),
+        (
+            ["--vary", "law.gains.k_p1=1:2", "--samples", "3", "--scheduler", "x", "--workers", "2"],
+            "expected none with",
+        ),
+    ],
+)
+def test_what_the_user_must_mend_is_one_line(tmp_path, capsys, words, said):
+    assert main(["sweep", "paper", "--out", str(tmp_path / "out"), *words]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith("cosim: ") and said in line
+    assert not (tmp_path / "out").exists()
+
+
+def test_the_command_tells_what_came_of_it(tmp_path, fakes, capsys):
+    out = tmp_path / "out"
+    assert main([*WORDS, "--engine", "fake", "--out", str(out)]) == 0
+    said = capsys.readouterr().out.splitlines()
+    assert said[0] == "paper: 50 of 50 rows flown, 0 refused, 0 stopped early"
+    assert said[1].startswith("reached") and said[-1] == str(out / "summary.md")
+    assert main([*WORDS, "--engine", "fake", "--out", str(out)]) == 0
+    assert "was complete already" in capsys.readouterr().out
+    assert main([*WORDS, "--engine", "fake", "--out", str(out), "--set", "limit.force=800"]) == 2
+    assert "scenario.limit.force is" in capsys.readouterr().err
+    (tmp_path / "other").mkdir()
+    (tmp_path / "other" / "precious").write_text("")
+    assert main([*WORDS, "--engine", "fake", "--out", str(tmp_path / "other")]) == 2
+    assert "holds no campaign" in capsys.readouterr().err
+
+
+# ---- a full disk ----
+
+_FULL = """
+import resource, sys
+from pathlib import Path
+from cosim.campaigns import batches, run_sweep, sweep_rows
+from cosim.errors import RunError
+from tests.cosim.campaigns.fake import ENGINES, design, paper
+sweep_rows.ENGINES.update(ENGINES)
+batches.FIRST = batches.GREATEST = int(sys.argv[2])
+if len(sys.argv) > 3:
+    resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[3]), -1))
+try:
+    print(run_sweep(paper(), design(3000), Path(sys.argv[1]), "fake").flown)
+except RunError as error:
+    print(f"refused: {error}")
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="limits the size of files")
+def test_a_full_disk_is_one_line_and_the_folder_can_be_gone_on_from(tmp_path):
+    def run(*words):
+        environment = os.environ | {"PYTHONPATH": str(ROOT)}
+        words = [sys.executable, "-c", _FULL, str(tmp_path / "out"), *map(str, words)]
+        done = subprocess.run(words, env=environment, cwd=ROOT, capture_output=True, text=True, check=True)
+        return done.stdout, done.stderr
+
+    said, complaints = run(16, 40_000)  # a merge is larger than that
+    assert said.startswith("refused: ") and "File too large" in said and "kept" in said and complaints == ""
+    kept = sorted(p.name for p in (tmp_path / "out" / PARTS).iterdir())
+    assert len(kept) == 64 and not any(name.startswith(".") for name in kept)
+    assert run(16) == (f"{3000 - 64 * 16}\n", "")
+    assert flown_rows(tmp_path / "out") == expected(3000)
+
+
+def flown_rows(folder):
+    return pq.read_table(folder / RESULTS).to_pylist()
+
+
+# ---- memory ----
+
+_MEMORY = """
+import sys
+from pathlib import Path
+from cosim.campaigns import batches, parts, run_sweep, sweep_rows
+from tests.cosim.campaigns.fake import ENGINES, design, paper
+sweep_rows.ENGINES.update(ENGINES)
+batches.FIRST = batches.GREATEST = 48
+
+def resident():
+    pages = int(Path("/proc/self/statm").read_text().split()[1])
+    return pages * 4096 / 2**20
+
+marks, most = {}, 0
+add = parts.Parts.add
+def watched(self, table):
+    global most
+    add(self, table)
+    watched.rows += len(table)
+    most = max(most, len(self._files))
+    marks[watched.rows // 10_000] = resident()
+watched.rows = 0
+parts.Parts.add = watched
+done = run_sweep(paper(), design(100_000), Path(sys.argv[1]), "fake")
+print(len(done.results), most, marks[2], marks[9], resident())
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform != "linux", reason="looks into /proc")
+def test_a_hundred_thousand_rows_need_no_more_memory_than_ten_thousand(tmp_path):
+    environment = os.environ | {"PYTHONPATH": str(ROOT)}
+    words = [sys.executable, "-c", _MEMORY, str(tmp_path / "out")]
+    done = subprocess.run(words, env=environment, cwd=ROOT, capture_output=True, text=True, check=True)
+    rows, parts, early, late, end = map(float, done.stdout.split())
+    assert rows == 100_000 and parts < 200
+    assert late - early < 24.0 and end - early < 120.0  # MiB; the summary reads columns
