@@ -206,6 +206,7 @@ def require_lanes(scenario: Scenario) -> None:
     for key, came, expected in (
         ("law.name", s.law.name, "printed"),
         ("arbiter.engine", s.arbiter.engine, "closed"),
+        ("master.order", s.master.order, "gauss-seidel"),
         ("commands.enabled", s.commands.enabled, False),
         ("sensing", "noisy" if not s.sensing.exact else "exact", "exact"),
         ("failures", len(s.failures), 0),
