@@ -1,6 +1,7 @@
 # make run    the paper's scenario, from nothing to a report
 # make test   all fast tests
 # make lint   formatter, linter and type checker
+# make bench  what things cost, against peers in an environment of their own
 PYTHON ?= python3
 VENV ?= .venv
 BIN := $(VENV)/bin
@@ -23,9 +24,8 @@ lint: $(VENV)/ready
 	$(BIN)/mypy
 
 bench: $(VENV)/ready
-	$(BIN)/python -m benchmarks step
-	$(BIN)/python -m benchmarks fmu
-	$(BIN)/python -m benchmarks fuzzy
+	$(BIN)/python -m benchmarks all
+	$(BIN)/python -m benchmarks scaling
 
 $(VENV)/ready: pyproject.toml
 	$(PYTHON) -c 'import sys; sys.exit(None if sys.version_info >= (3, 11) else "Python 3.11 or later is needed")'

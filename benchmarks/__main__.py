@@ -4,30 +4,60 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
 
-from benchmarks import baselines, fmu, fuzzy, law, mavlink, scenes, sitl, step
-from benchmarks.timing import print_rows
+from benchmarks import (
+    baselines,
+    everything,
+    fmu,
+    fuzzy,
+    law,
+    mavlink,
+    page,
+    peer_environment,
+    scaling,
+    scenes,
+    sitl,
+    step,
+)
+from benchmarks.machine import description
+from benchmarks.peer_environment import Environment
+from benchmarks.table import Table, as_json, print_tables, write_json
 
 BENCHMARKS = {"step": step, "law": law, "fmu": fmu, "fuzzy": fuzzy, "mavlink": mavlink, "sitl": sitl}
+TABLES = {"all": everything, "scaling": scaling}
 REPEATS = 5
+BUDGET = 0.2  # s
 
 
-def main(arguments: Sequence[str] | None = None) -> None:
-    """Run what is named on the command line.
-
-    Parameters
-    ----------
-    arguments : sequence of str, optional
-        Default: those of the process.
-    """
+def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="python -m benchmarks")
     verbs = parser.add_subparsers(dest="name", required=True)
+
+    def add(name: str, help: str | None, repeats: int = REPEATS) -> argparse.ArgumentParser:
+        verb = verbs.add_parser(name, help=(help or "").splitlines()[0])
+        verb.add_argument("--repeats", type=int, default=repeats, help="default: %(default)s")
+        verb.add_argument("--json", type=Path, metavar="FILE", help="write the figures there too")
+        return verb
+
+    for name, chosen in TABLES.items():
+        verb = add(name, chosen.__doc__, chosen.REPEATS)
+        verb.add_argument("subjects", nargs="*", metavar="SUBJECT", help=f"of {', '.join(chosen.SUBJECTS)}")
+        verb.add_argument(
+            "--budget", type=float, default=BUDGET, metavar="S", help="of a repeat (default: %(default)s)"
+        )
+        if name == "all":
+            verb.add_argument("--peers-python", metavar="PYTHON", help="that has the peers (default: one of their own)")
+    verb = verbs.add_parser("page", help=(page.__doc__ or "").splitlines()[0])
+    verb.add_argument("files", nargs="*", type=Path, metavar="FILE", help="what --json wrote (default: measure now)")
+    verbs.add_parser("peers", help="install the peers, and try those again that could not be")
     for name, benchmark in BENCHMARKS.items():
-        verb = verbs.add_parser(name, help=(benchmark.__doc__ or "").splitlines()[0])
+        verb = add(name, benchmark.__doc__)
         verb.add_argument("--steps", type=int, default=benchmark.STEPS, help="a repeat (default: %(default)s)")
-        verb.add_argument("--repeats", type=int, default=REPEATS, help="default: %(default)s")
         if benchmark is mavlink:
             verb.add_argument("--datagrams", type=int, help="hostile ones a flood (default: ten a step)")
+
     verb = verbs.add_parser("baselines", help=(baselines.__doc__ or "").splitlines()[0])
     verb.add_argument("laws", nargs="*", metavar="LAW", help=f"of {', '.join(baselines.RANGES)} (default: all)")
     verb.add_argument(
@@ -42,20 +72,71 @@ def main(arguments: Sequence[str] | None = None) -> None:
     verb.add_argument("first", type=int, help="seed")
     verb.add_argument("count", type=int, help="of seeds")
     verb.add_argument("--hard", action="store_true")
+    return parser
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run what is named on the command line.
+
+    Parameters
+    ----------
+    arguments : sequence of str, optional
+        Default: those of the process.
+    """
+    parser = _parser()
     options = parser.parse_args(arguments)
-    if options.name == "scenes":
-        scenes.print_scenes(options.first, options.count, options.hard)
-    elif options.name == "baselines":
-        unknown = set(options.laws) - set(baselines.RANGES)
-        if unknown:
-            parser.error(f"law is {sorted(unknown)[0]!r}, expected one of {', '.join(baselines.RANGES)}")
-        if options.draws < 0 or options.workers < 1:
-            parser.error("expected 0 or more draws, and 1 or more workers")
-        baselines.main(options.laws or baselines.RANGES, options.draws, options.seed, options.workers)
+    match options.name:
+        case "scenes":
+            scenes.print_scenes(options.first, options.count, options.hard)
+        case "baselines":
+            _baselines(parser, options)
+        case "peers":
+            for peer, version in peer_environment.install(again=True).items():
+                print(f"{peer:24} {version}")
+        case "page":
+            _page(parser, options.files)
+        case _:
+            figures = _figures(parser, options)
+            if options.json is not None:
+                write_json(options.json, figures)
+
+
+def _figures(parser: argparse.ArgumentParser, options: argparse.Namespace) -> dict[str, Any]:
+    """Take times, print them, and return them as plain values."""
+    if options.repeats < 1:
+        parser.error("expected 1 or more repeats")
+    machine = description(options.repeats)
+    if options.name in TABLES:
+        chosen = TABLES[options.name]
+        if unknown := set(options.subjects) - set(chosen.SUBJECTS):
+            parser.error(f"subject is {sorted(unknown)[0]!r}, expected one of {', '.join(chosen.SUBJECTS)}")
+        where = {"environment": Environment(options.peers_python)} if chosen is everything else {}
+        machine += [f"peers: {environment.told()}" for environment in where.values()]
+        tables = chosen.measure(options.subjects or list(chosen.SUBJECTS), options.budget, options.repeats, **where)
     else:
-        benchmark = BENCHMARKS[options.name]
-        more = {"datagrams": options.datagrams} if benchmark is mavlink else {}
-        print_rows(benchmark.measure(options.steps, options.repeats, **more), options.repeats, benchmark.RATIO)
+        chosen = BENCHMARKS[options.name]
+        more = {"datagrams": options.datagrams} if chosen is mavlink else {}
+        tables = [Table("", tuple(chosen.measure(options.steps, options.repeats, **more)))]
+    print_tables(tables, chosen.RATIO, machine)
+    return as_json(options.name, tables, chosen.RATIO, machine)
+
+
+def _page(parser: argparse.ArgumentParser, files: Sequence[Path]) -> None:
+    try:
+        known = [page.read_figures(file) for file in files]
+        figures = known or [_figures(parser, parser.parse_args([name])) for name in TABLES]
+        page.PAGE.write_text(page.rewrite(page.PAGE.read_text(encoding="utf-8"), figures), encoding="utf-8")
+    except page.PageError as error:
+        parser.error(str(error))
+
+
+def _baselines(parser: argparse.ArgumentParser, options: argparse.Namespace) -> None:
+    unknown = set(options.laws) - set(baselines.RANGES)
+    if unknown:
+        parser.error(f"law is {sorted(unknown)[0]!r}, expected one of {', '.join(baselines.RANGES)}")
+    if options.draws < 0 or options.workers < 1:
+        parser.error("expected 0 or more draws, and 1 or more workers")
+    baselines.main(options.laws or baselines.RANGES, options.draws, options.seed, options.workers)
 
 
 if __name__ == "__main__":

@@ -21,9 +21,8 @@ import numpy as np
 from benchmarks.scenes import scene
 from controller import LAWS
 from controller.laws import PdGains
-from cosim.flight import Score
 from cosim.scene import Scene
-from cosim.scene_run import Conditions, SceneFlyer
+from cosim.scene_run import Conditions, SceneFlyer, Score
 
 FIRST_SEED = 10_000
 SCENES = 200

@@ -14,16 +14,20 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from skfuzzy import control, trimf
 
-from benchmarks.fuzzy_libraries import LIBRARIES
-from benchmarks.timing import Row, Timing, summary, time_batches, time_calls
+from benchmarks.peer_environment import Environment, installed_python
+from benchmarks.peer_process import peer
+from benchmarks.peers import skfuzzy_rules
+from benchmarks.peers.fuzzy_libraries import LIBRARIES
+from benchmarks.table import Row, compared
+from benchmarks.timing import Own, Timing, time_batches, time_calls, timed
 from fuzzy_arbiter import SECTION_VI, Arbiter, Criterion
 
 STEPS = 20_000
-RATIO = "x stock"  # of the median to that of scikit-fuzzy as its examples use it
+RATIO = "how many times as long as scikit-fuzzy as its examples use it"
 POINTS = 101
-# a Python that has pyfuzzylite or simpful, if this one has not; pyfuzzylite wants a NumPy before 2
+# a Python that has pyfuzzylite or simpful, if neither this one nor the peers' environment has; pyfuzzylite wants a
+# NumPy before 2
 OTHER_PYTHON = "FUZZY_LIBRARIES_PYTHON"
 _MODULES = {"pyfuzzylite": "fuzzylite", "simpful": "simpful"}
 _ROWS = 5  # of a batch, for each step
@@ -43,14 +47,10 @@ def measure(steps: int, repeats: int) -> list[Row]:
     list of Row
         For the table.
     """
-    rows: list[Row] = []
-    few = max(1, steps // _SLOWER)
-
-    def add(name: str, timing: Timing | str) -> None:
-        rows.append(Row(name, timing, rows[0].name if rows else name))
-
-    add(f"scikit-fuzzy, stock, {POINTS} points", _stock(few, repeats))
-    add("scikit-fuzzy, stock, arrays", _stock_arrays(max(2, few), repeats))
+    timings: dict[str, Timing | str] = {}
+    add, few = timings.__setitem__, max(1, steps // _SLOWER)
+    add(f"scikit-fuzzy, stock, {POINTS} points", _stock(skfuzzy_rules.calls, few, repeats))
+    add("scikit-fuzzy, stock, arrays", _stock(skfuzzy_rules.arrays, max(2, few), repeats))
     for library in LIBRARIES:
         add(f"{library}, resolution 100", _other(library, few, repeats))
     for engine in ("auto", "closed", "exact", "grid", "skfuzzy"):
@@ -65,13 +65,15 @@ def measure(steps: int, repeats: int) -> list[Row]:
         work = _batch(Arbiter(engine=engine), batch)
         add(f"batch of {len(batch)}: {engine}", time_batches(work, len(batch), repeats))
     add("building: 40 criteria", time_calls(lambda: Arbiter(criteria), max(1, few // 10), repeats))
-    return rows
+    return compared(timings)
 
 
 def interpreter(library: str) -> str | None:
-    """Return a Python that has a library: this one, or the one that an environment variable names."""
+    """Return a Python that has a library: this one, one of the peers', or that which an environment variable names."""
     if importlib.util.find_spec(_MODULES[library]) is not None:
         return sys.executable
+    if (python := installed_python(library)) is not None:
+        return python
     other = os.environ.get(OTHER_PYTHON)
     if other is None:
         return None
@@ -80,8 +82,8 @@ def interpreter(library: str) -> str | None:
 
 
 def ask(python: str, **request: Any) -> dict[str, Any]:
-    """Return what `benchmarks.fuzzy_libraries` answers in another process."""
-    script = Path(__file__).with_name("fuzzy_libraries.py")
+    """Return what `benchmarks.peers.fuzzy_libraries` answers in another process."""
+    script = Path(__file__).parent / "peers" / "fuzzy_libraries.py"
     done = subprocess.run([python, str(script)], input=json.dumps(request), capture_output=True, text=True, check=True)
     answer: dict[str, Any] = json.loads(done.stdout)
     return answer
@@ -90,10 +92,16 @@ def ask(python: str, **request: Any) -> dict[str, Any]:
 def _other(library: str, evaluations: int, repeats: int) -> Timing | str:
     python = interpreter(library)
     if python is None:
-        return f"not timed: {library} is not installed"
-    inputs = np.random.default_rng(0).random((evaluations, len(SECTION_VI))).tolist()
-    answer = ask(python, library=library, system="section_vi", resolution=100, inputs=inputs, repeats=repeats)
-    return summary(answer["microseconds"])
+        return f"{library} is not installed"
+    setup = {"library": library, "system": "section_vi", "resolution": 100}
+    with peer(Environment(python), library, "fuzzy_libraries", "evaluations", setup) as contestant:
+        return timed(contestant, evaluations, repeats)
+
+
+def _stock(function: Callable[[dict[str, Any]], Callable[[int], object]], count: int, repeats: int) -> Timing:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DeprecationWarning)
+        return timed(Own(function({"points": POINTS})), count, repeats)
 
 
 def _calls(arbiter: Arbiter, calls: int, repeats: int) -> Timing:
@@ -107,7 +115,7 @@ def _batch(arbiter: Arbiter, inputs: np.ndarray[Any, np.dtype[np.float64]]) -> C
 
 def _compiled(arbiter: Arbiter, calls: int, repeats: int) -> Timing | str:
     if not hasattr(arbiter, "compiled"):
-        return "not timed: this arbiter has no compiled function"
+        return "this arbiter has no compiled function"
     work = arbiter.compiled()
     inputs = itertools.cycle([np.array(row) for row in itertools.islice(_inputs(len(SECTION_VI)), 1000)])
     outputs = np.empty(len(SECTION_VI))
@@ -116,54 +124,3 @@ def _compiled(arbiter: Arbiter, calls: int, repeats: int) -> Timing | str:
 
 def _inputs(n: int) -> itertools.cycle[list[float]]:
     return itertools.cycle(np.random.default_rng(0).random((10_000, n)).tolist())
-
-
-def _stock(calls: int, repeats: int) -> Timing:
-    simulation, names = _simulation()
-    inputs = _inputs(len(names))
-
-    def work() -> None:
-        for name, x in zip(names, next(inputs), strict=True):
-            simulation.input[name] = x
-        simulation.compute()
-
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", DeprecationWarning)
-        return time_calls(work, calls, repeats)
-
-
-def _stock_arrays(rows: int, repeats: int) -> Timing:
-    simulation, names = _simulation()
-    columns = np.random.default_rng(0).random((len(names), rows))
-
-    def work() -> None:
-        for name, column in zip(names, columns, strict=True):
-            simulation.input[name] = column
-        simulation.compute()
-
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", DeprecationWarning)
-        return time_batches(work, rows, repeats)
-
-
-def _simulation() -> tuple[Any, tuple[str, ...]]:
-    """Build the paper's rules as scikit-fuzzy's examples build theirs."""
-    universe = np.linspace(0.0, 1.0, POINTS)
-    names = ("obstacle", "shape", "depth")
-    inputs = [control.Antecedent(universe, name) for name in names]
-    outputs = [control.Consequent(universe, f"alpha_{i + 1}") for i in range(len(names))]
-    for variable in (*inputs, *outputs):
-        variable["low"] = trimf(universe, [0.0, 0.0, 1.0])
-        variable["high"] = trimf(universe, [0.0, 1.0, 1.0])
-    obstacle, shape, depth = inputs
-    rules = [
-        control.Rule(obstacle["high"], outputs[0]["high"]),
-        control.Rule(obstacle["low"], outputs[0]["low"]),
-        control.Rule(obstacle["high"], outputs[1]["low"]),
-        control.Rule(shape["low"], outputs[1]["low"]),
-        control.Rule(obstacle["low"] & shape["high"], outputs[1]["high"]),
-        control.Rule(obstacle["high"] | shape["high"], outputs[2]["low"]),
-        control.Rule(depth["low"], outputs[2]["low"]),
-        control.Rule(obstacle["low"] & shape["low"] & depth["high"], outputs[2]["high"]),
-    ]
-    return control.ControlSystemSimulation(control.ControlSystem(rules)), names

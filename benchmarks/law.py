@@ -8,8 +8,10 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from benchmarks.timing import Row, summary
+from benchmarks.table import Row, compared
+from benchmarks.timing import Timing
 from controller import LAWS, VehicleState
 from controller.compiled import compiled
 from controller.regions import DepthBand, PackedRegions, Region, Sphere, pack
@@ -18,7 +20,7 @@ from cosim.vehicle_model import vehicle_model
 from plant_fmu.vehicle import load_vehicle
 
 STEPS = 2_000
-RATIO = "x print"  # of the median to that of the printed law
+RATIO = "how many times as long as the printed law"
 OBSTACLES = (1, 6, 14, 40)
 _PERIOD = 0.02  # s
 _SPEED = 0.6  # m/s
@@ -70,25 +72,42 @@ def _loop_of(law: str) -> Callable[..., None]:
     return compiled(copy)
 
 
-def _time(law: str, obstacles: int, steps: int, repeats: int) -> list[float]:
-    """Return the microseconds of each step of a flight straight at the obstacles, past them and back again."""
-    vehicle, (goal, regions) = vehicle_model(load_vehicle("odin")), _scenery(obstacles)
-    kind, loop, clock = LAWS[law], _loop_of(law), _process_clock()
-    gains, n, m = kind.gains_type(), regions.kinds.size, vehicle.thruster_matrix.shape[1]
-    forces, level = np.zeros(m if kind.output == "thrusters" else 6), np.array([1.0, 0.0, 0.0, 0.0])
-    state = VehicleState(np.zeros(3), level, np.zeros(6), np.ones(m))
-    rng, times = np.random.default_rng(0), np.zeros((steps, 2))
-    gone = np.arange(steps) * _PERIOD * _SPEED
-    along = np.abs((gone + 8.0) % 16.0 - 8.0)
-    places = np.c_[along, 0.1 * np.sin(along), np.full(steps, 3.0)] + 0.02 * rng.normal(size=(steps, 3))
-    velocities = np.c_[np.where(gone % 16.0 < 8.0, _SPEED, -_SPEED), np.zeros((steps, 2))]
-    velocities += 0.01 * rng.normal(size=(steps, 3))
-    found: list[float] = []
-    for repeat in range(repeats + 1):  # one more goes before, to compile and to warm the caches
+class LawSteps:
+    """A contestant: steps of a law on a flight straight at the obstacles, past them and back again, in process time.
+
+    Parameters
+    ----------
+    law : str
+        One of those in `controller.LAWS`.
+    obstacles : int
+        How many stand in the way.
+    """
+
+    def __init__(self, law: str, obstacles: int) -> None:
+        self._vehicle, self._scenery = vehicle_model(load_vehicle("odin")), _scenery(obstacles)
+        self._kind, self._loop, self._clock = LAWS[law], _loop_of(law), _process_clock()
+        self.each(1)  # compiles
+
+    def seconds(self, count: int) -> float:
+        """Take `count` steps, and return the sum of what each took [s]."""
+        return float(self.each(count).sum())
+
+    def each(self, count: int) -> NDArray[np.float64]:
+        """Take `count` steps from a new start, and return what each took [s]."""
+        vehicle, (goal, regions), kind = self._vehicle, self._scenery, self._kind
+        gains, n, m = kind.gains_type(), regions.kinds.size, vehicle.thruster_matrix.shape[1]
+        forces, level = np.zeros(m if kind.output == "thrusters" else 6), np.array([1.0, 0.0, 0.0, 0.0])
+        state = VehicleState(np.zeros(3), level, np.zeros(6), np.ones(m))
+        rng, times = np.random.default_rng(0), np.zeros((count, 2))
+        gone = np.arange(count) * _PERIOD * _SPEED
+        along = np.abs((gone + 8.0) % 16.0 - 8.0)
+        places = np.c_[along, 0.1 * np.sin(along), np.full(count, 3.0)] + 0.02 * rng.normal(size=(count, 3))
+        velocities = np.c_[np.where(gone % 16.0 < 8.0, _SPEED, -_SPEED), np.zeros((count, 2))]
+        velocities += 0.01 * rng.normal(size=(count, 3))
         memory = kind.for_vehicle(vehicle, gains, level, _PERIOD, n).memory
-        loop(state, places, velocities, goal, regions, np.ones(n), gains, memory, forces, clock, times)
-        found += ((times[:, 0] - np.median(times[:, 1])) * 1e6).tolist() if repeat else []
-    return found
+        self._loop(state, places, velocities, goal, regions, np.ones(n), gains, memory, forces, self._clock, times)
+        taken: NDArray[np.float64] = times[:, 0] - np.median(times[:, 1])
+        return taken
 
 
 def _process_clock() -> Any:
@@ -114,7 +133,10 @@ def measure(steps: int, repeats: int) -> list[Row]:
     """
     rows = []
     for obstacles in OBSTACLES:
+        timings: dict[str, Timing | str] = {}
         for law in sorted(LAWS, key=lambda name: name != "printed"):
-            timing = summary(_time(law, obstacles, steps, repeats))
-            rows.append(Row(f"{law}, {obstacles} obstacles", timing, f"printed, {obstacles} obstacles"))
+            contestant = LawSteps(law, obstacles)
+            found = [contestant.each(steps) for _ in range(repeats + 1)][1:]  # the first warms the caches
+            timings[f"{law}, {obstacles} obstacles"] = Timing(tuple(np.concatenate(found).tolist()))
+        rows += compared(timings)
     return rows

@@ -17,7 +17,8 @@ import numpy as np
 
 from benchmarks import sitl
 from benchmarks.hostile import hostile_datagrams
-from benchmarks.timing import Row, summary, time_calls
+from benchmarks.table import Row, compared
+from benchmarks.timing import Timing, time_calls
 from cosim.master import Master
 from cosim.mavlink.channels.udp import UdpIn, UdpOut
 from cosim.mavlink.conformance.client import Client
@@ -36,7 +37,7 @@ from cosim.scenario import load_scenario
 from cosim.signals import Array
 
 STEPS = 20_000
-RATIO = "x first"  # of the median to that of the row that it is compared with
+RATIO = "how many times as long as what it is compared with"
 DATAGRAMS_PER_STEP = 10  # of STEPS, in a flood
 _SENT = (0, 1, 2, 24, 29, 30, 31, 32, 33, 36, 42, 62, 65, 74, 85, 137, 245)  # ids of messages, one of each a round
 _ROUNDS = 50  # /s of the wall clock
@@ -124,11 +125,11 @@ def _messages(calls: int, repeats: int) -> list[Row]:
     odometry = mavlink.MAVLink_odometry_message(
         1, 1, 12, 1.5, 2.5, 3.5, [1.0, 0.0, 0.0, 0.1], *[0.5] * 6, [0.25] * 21, [0.75] * 21, 0, 8, 100
     )
-    first, rows = "message: encode and send ATTITUDE", []
+    timings: dict[str, Timing | str] = {}
     with _sink() as port:
         plain, signed = _link(port), _link(port, Signer(bytes(32), SigningClock(), 0))
         works: dict[str, Callable[[], object]] = {
-            first: lambda: plain.send(attitude),
+            "message: encode and send ATTITUDE": lambda: plain.send(attitude),
             "message: the same, signed": lambda: signed.send(attitude),
             "message: encode and send ODOMETRY": lambda: plain.send(odometry),
         }
@@ -137,10 +138,10 @@ def _messages(calls: int, repeats: int) -> list[Row]:
         for name, frame in frames.items():
             works[f"message: check and decode, {name}"] = lambda frame=frame: list(gate.datagram(frame))
         for name, work in works.items():
-            rows.append(Row(name, time_calls(work, calls, repeats), first))
+            timings[name] = time_calls(work, calls, repeats)
         plain.channel.close()
         signed.channel.close()
-    return rows
+    return compared(timings)
 
 
 # ---- a step beside ordinary traffic ----
@@ -162,15 +163,14 @@ def _beside_traffic(steps: int, repeats: int) -> list[Row]:
     first, second = "step: no link", f"step: {_MESSAGES} messages/s"
     lost = statistics.median(b / a - 1.0 for a, b in zip(alone, beside, strict=True))
     return [
-        Row(first, summary(alone), first),
-        Row(second, summary(beside), first),
-        Row(f"{second}, lost", f"{lost:.2%}, the median of {len(alone)} pairs; not timed by itself", first),
-        Row(f"{second}, its thread", f"{statistics.median(busy):.2%} of a processor; not timed by itself", first),
+        *compared({first: Timing(tuple(alone)), second: Timing(tuple(beside))}),
+        Row(f"{second}, lost", f"{lost:.2%}, the median of {len(alone)} pairs"),
+        Row(f"{second}, its thread", f"{statistics.median(busy):.2%} of a processor"),
     ]
 
 
 def _stretch(master: Master, steps: range, links: LinkThread | None) -> float:
-    """Return microseconds a step, with links if there are some."""
+    """Return seconds a step, with links if there are some."""
     if links is not None:
         links.start()
     before = time.perf_counter()
@@ -181,7 +181,7 @@ def _stretch(master: Master, steps: range, links: LinkThread | None) -> float:
     taken = time.perf_counter() - before
     if links is not None:
         links.close()
-    return taken / len(steps) * 1e6
+    return taken / len(steps)
 
 
 def _endless() -> Master:
@@ -199,16 +199,14 @@ def _connecting(repeats: int) -> list[Row]:
         for _ in range(repeats):
             with own_vehicle(profile) as link:
                 found.append(qgc_connect(Client(link)))
-        seconds = statistics.median(one.seconds for one in found)
-        told = f"{seconds:.3f} s, the median; at the most {max(one.retries for one in found)} retries; not timed a step"
-        rows.append(Row(f"QGroundControl connects, {profile}", told, ""))
+        told = f"QGroundControl connects, {profile}, with {max(one.retries for one in found)} retries at the most"
+        rows.append(Row(told, Timing(tuple(one.seconds for one in found))))
     return rows
 
 
 def _in_lockstep(steps: int, repeats: int) -> list[Row]:
     timing = sitl.lockstep(steps, repeats)
-    name = f"frame of an autopilot: {1e6 / timing.median:.0f}/s"
-    return [Row(name, timing, name)]
+    return [Row(f"frame of an autopilot: {1 / timing.median:.0f}/s", timing)]
 
 
 # ---- a step under a flood ----
@@ -216,7 +214,7 @@ def _in_lockstep(steps: int, repeats: int) -> list[Row]:
 
 def _under_flood(datagrams: int, steps: int, repeats: int) -> list[Row]:
     """Time each step, from when it was due to when it was done, of paced runs and of runs at full speed."""
-    rows = []
+    rows: list[Row] = []
     grown, looked, errors = 0.0, [], 0
     for pace, name in ((_PACE, f"step at {_PACE:.0f}/s"), (None, "step at full speed")):
         found: dict[str, list[Array]] = {"calm": [], "flood elsewhere": [], "flood": []}
@@ -230,13 +228,14 @@ def _under_flood(datagrams: int, steps: int, repeats: int) -> list[Row]:
                 if case == "flood":
                     grown = max(grown, _resident() - before if repeat else 0.0)  # the first one fills caches
                     looked.append(_came(link.counts) / datagrams)
-        first = f"{name}, calm: median"
+        timings: dict[str, Timing | str] = {}
         for case, all_times in found.items():
             for quantile, word in ((0.5, "median"), (0.999, "99.9th percentile")):
-                timing = summary([float(np.quantile(times, quantile)) for times in all_times])
-                rows.append(Row(f"{name}, {case}: {word}", timing, first))
+                of_each = tuple(float(np.quantile(times, quantile)) for times in all_times)
+                timings[f"{name}, {case}: {word}"] = Timing(of_each)
+        rows += compared(timings)
     told = f"{datagrams} datagrams each, {statistics.median(looked):.1%} looked at, {errors} errors, "
-    rows.append(Row("floods", f"{told}{grown / 1e6:+.1f} MB of memory; not timed", first))
+    rows.append(Row("floods", f"{told}{grown / 1e6:+.1f} MB of memory"))
     return rows
 
 
@@ -248,7 +247,7 @@ def _flooded(datagrams: int, steps: int, pace: float | None, seed: int, *, at_us
     Returns
     -------
     (array, Link, int)
-        Microseconds of each step from when it was due, the link, and errors in its thread.
+        Seconds of each step from when it was due, the link, and errors in its thread.
     """
     channel = UdpIn("127.0.0.1", 0)
     link = Link("flooded", channel, Gate(Counts(), _SOURCE), _SOURCE)
@@ -273,7 +272,7 @@ def _flooded(datagrams: int, steps: int, pace: float | None, seed: int, *, at_us
             if not goes_on(k, steps):
                 break
         links.close()
-    return np.array(times[1:]) * 1e6, link, sum(links.failures.values())
+    return np.array(times[1:]), link, sum(links.failures.values())
 
 
 @contextlib.contextmanager

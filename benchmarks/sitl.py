@@ -10,14 +10,15 @@ from pathlib import Path
 
 from benchmarks import sitl_pilot
 from benchmarks.sitl_pilot import HEAD, MAGIC, PULSES, RATE, WARMING
-from benchmarks.timing import Row, Timing, summary, time_calls
+from benchmarks.table import Row, compared
+from benchmarks.timing import Timing, time_calls
 from cosim.sitl import wire
 from cosim.sitl.flights import FlightOptions, Flights
 from cosim.sitl.law import law_of_pwm
 from cosim.sitl.server import JsonServer
 
 STEPS = 12_000
-RATIO = "x FMU"  # of the median to that of the plant's step
+RATIO = "how many times as long as the plant's step"
 
 
 def measure(steps: int, repeats: int) -> list[Row]:
@@ -33,11 +34,7 @@ def measure(steps: int, repeats: int) -> list[Row]:
     list of Row
         For the table.
     """
-    rows: list[Row] = []
-
-    def add(name: str, timing: Timing) -> None:
-        rows.append(Row(name, timing, rows[0].name if rows else name))
-
+    timings: dict[str, Timing | str] = {}
     with tempfile.TemporaryDirectory() as folder:
         flights = Flights(FlightOptions(out=Path(folder) / "run", report=False), "ardupilot", law_of_pwm)
         flight = flights.begin(RATE)
@@ -48,7 +45,7 @@ def measure(steps: int, repeats: int) -> list[Row]:
         outputs = decoded.pwm
 
         def add_calls(name: str, work: Callable[[], object]) -> None:
-            add(name, time_calls(work, steps, repeats))
+            timings[name] = time_calls(work, steps, repeats)
 
         add_calls("FMU: one step", lambda: flight._master.plant.step(1.0 / RATE))
         add_calls("packet read", lambda: wire.decode(packet))
@@ -58,8 +55,8 @@ def measure(steps: int, repeats: int) -> list[Row]:
         flights.end("ended: measured")
     for what, record_rate in (("record at 100 Hz", 100.0), ("every step recorded", float(RATE))):
         timing = lockstep(steps, repeats, record_rate)
-        add(f"whole frame, {what}: {1e6 / timing.median:.0f} frames/s", timing)
-    return rows
+        timings[f"whole frame, {what}: {1 / timing.median:.0f} frames/s"] = timing
+    return compared(timings)
 
 
 def lockstep(steps: int, repeats: int, record_rate: float = 100.0) -> Timing:
@@ -89,5 +86,5 @@ def lockstep(steps: int, repeats: int, record_rate: float = 100.0) -> Timing:
             with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as pilot:
                 server.serve()
                 printed, _ = pilot.communicate(timeout=60.0)
-            found.append(float(printed) / steps * 1e6)
-    return summary(found)
+            found.append(float(printed) / steps)
+    return Timing(tuple(found))

@@ -9,13 +9,14 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.timing import Row, Timing, summary, time_calls
+from benchmarks.table import Row, compared
+from benchmarks.timing import Timing, time_calls
 from cosim.master import Master
 from cosim.record import Recorder
 from cosim.scenario import load_scenario
 
 STEPS = 20_000
-RATIO = "x FMU"  # of the median to that of the plant's step
+RATIO = "how many times as long as the plant's step"
 _SLOWER = 50  # how many times fewer calls of what takes that much longer
 
 
@@ -32,14 +33,11 @@ def measure(steps: int, repeats: int) -> list[Row]:
     list of Row
         For the table.
     """
-    rows: list[Row] = []
+    timings: dict[str, Timing | str] = {}
     rng = np.random.default_rng(0)
 
-    def add(name: str, timing: Timing) -> None:
-        rows.append(Row(name, timing, rows[0].name if rows else name))
-
     def add_calls(name: str, work: Callable[[], object], calls: int = steps) -> None:
-        add(name, time_calls(work, calls, repeats))
+        timings[name] = time_calls(work, calls, repeats)
 
     with Master(load_scenario("paper", ["arbiter.engine=closed"])) as master:
         fmu = f"FMU: set {len(master.plant.inputs)}, step, get {len(master.plant.outputs)}"
@@ -58,10 +56,10 @@ def measure(steps: int, repeats: int) -> list[Row]:
 
         add_calls("arbiter, scikit-fuzzy, inputs as before", master._arbitrate)
         add_calls("arbiter, scikit-fuzzy, new inputs", new_inputs, max(1, steps // _SLOWER))
-    add("whole step, closed form, no record", _whole("closed", steps, repeats, record=False))
-    add("whole step, closed form, with record", _whole("closed", steps, repeats, record=True))
-    add("whole step, scikit-fuzzy, with record", _whole("skfuzzy", steps, repeats, record=True))
-    return rows
+    timings["whole step, closed form, no record"] = _whole("closed", steps, repeats, record=False)
+    timings["whole step, closed form, with record"] = _whole("closed", steps, repeats, record=True)
+    timings["whole step, scikit-fuzzy, with record"] = _whole("skfuzzy", steps, repeats, record=True)
+    return compared(timings)
 
 
 def _whole(engine: str, steps: int, repeats: int, *, record: bool) -> Timing:
@@ -75,5 +73,5 @@ def _whole(engine: str, steps: int, repeats: int, *, record: bool) -> Timing:
             master.run(observers)
             for recorder in observers:
                 recorder.close()
-            found.append((time.perf_counter() - before) / scenario.steps * 1e6)
-    return summary(found)
+            found.append((time.perf_counter() - before) / scenario.steps)
+    return Timing(tuple(found))

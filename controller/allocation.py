@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from controller.compiled import compiled
+from controller.compiled import lean
 from controller.errors import LawError
 
 Array = NDArray[np.float64]
@@ -15,13 +15,25 @@ Array = NDArray[np.float64]
 _ROUNDING = 1e-12  # of the greatest force: what is smaller asks for nothing
 
 
-@compiled
+@lean
+def _greatest(forces: Array) -> float:
+    """Return the greatest magnitude [N]; NaN if there is one."""
+    greatest = 0.0
+    for force in forces:
+        if not abs(force) <= greatest:
+            greatest = abs(force)
+            if np.isnan(greatest):
+                break
+    return greatest
+
+
+@lean
 def clip_each(forces: Array, lower: Array, upper: Array) -> bool:
     """Cut thruster forces [N], shape (n,), in place, each at its own limits, and return whether any was beyond them.
 
     The wrench may turn.
     """
-    cut, negligible = False, _ROUNDING * np.max(np.abs(forces))
+    cut, negligible = False, _ROUNDING * _greatest(forces)
     for i in range(forces.size):
         within = min(max(forces[i], lower[i]), upper[i])
         cut = cut or abs(within - forces[i]) > negligible
@@ -29,24 +41,25 @@ def clip_each(forces: Array, lower: Array, upper: Array) -> bool:
     return cut
 
 
-@compiled
+@lean
 def keep_direction(forces: Array, lower: Array, upper: Array) -> bool:
     """Scale thruster forces [N], shape (n,), in place until all are within limits, and return whether any was beyond.
 
     The wrench keeps its direction.
     """
-    scale, negligible = 1.0, _ROUNDING * np.max(np.abs(forces))
+    scale, negligible = 1.0, _ROUNDING * _greatest(forces)
     for i in range(forces.size):
         if forces[i] > upper[i] and forces[i] > negligible:
             scale = min(scale, upper[i] / forces[i])
         elif forces[i] < lower[i] and forces[i] < -negligible:
             scale = min(scale, lower[i] / forces[i])
-    forces *= scale
+    for i in range(forces.size):
+        forces[i] *= scale
     clip_each(forces, lower, upper)  # of the last bit
     return scale < 1.0
 
 
-@compiled
+@lean
 def allocate(inverse: Array, lower: Array, upper: Array, direction: bool, tau: Array, forces: Array) -> bool:
     """Write the least-squares thruster forces for a wrench, within limits, into `forces`.
 
@@ -68,7 +81,10 @@ def allocate(inverse: Array, lower: Array, upper: Array, direction: bool, tau: A
     bool
         Whether the limits cut the wrench.
     """
-    forces[:] = inverse @ tau
+    for i in range(forces.size):
+        forces[i] = 0.0
+        for j in range(6):
+            forces[i] += inverse[i, j] * tau[j]
     return keep_direction(forces, lower, upper) if direction else clip_each(forces, lower, upper)
 
 

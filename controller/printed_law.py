@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from controller.compiled import compiled
+from controller.compiled import compiled, lean
 from controller.quaternion import Vector3, error_parts, rotation_rows
 
 Array = NDArray[np.float64]
@@ -32,7 +32,7 @@ class Gains(NamedTuple):
     gamma: float = 2.0  # s2/kg, s2/(kg m2): Gamma = gamma I (27)
 
 
-@compiled
+@lean
 def violation(value: float) -> float:
     """Return max(0, g), as in (16), (17), (20) and (22); NaN stays NaN, lest a lost measurement looked like safety."""
     return 0.0 if value <= 0.0 else value
@@ -62,7 +62,7 @@ def primary_error(value: float, gradient: Array) -> Array:
     return violation(value) * gradient
 
 
-@compiled
+@lean
 def secondary_parts(values: Array, gradients: Array, alphas: Array, k_q: float) -> Vector3:
     """Return e_s as `secondary_error` does, of alphas, shape (n,), of which beta_i = alpha_i / k_q."""
     x, y, z = 0.0, 0.0, 0.0
@@ -95,7 +95,7 @@ def secondary_error(values: Array, gradients: Array, betas: Array) -> Array:
     return e_s
 
 
-@compiled
+@lean
 def in_body(R: Rows, x: Vector3) -> Vector3:
     """Return R^T x, a world vector seen from the body."""
     return (
@@ -105,7 +105,7 @@ def in_body(R: Rows, x: Vector3) -> Vector3:
     )
 
 
-@compiled
+@lean
 def apply(
     e_p: Vector3,
     e_s: Vector3,
@@ -161,13 +161,13 @@ def apply(
         estimate[1 + i] += period / gains.gamma * turning[i]
 
 
-@compiled
+@lean
 def turned_by(k: Vector3, x: float, y: float, z: float) -> Vector3:
     """Return S(k) [x y z]^T = k x [x y z]^T: (4)."""
     return k[1] * z - k[2] * y, k[2] * x - k[0] * z, k[0] * y - k[1] * x
 
 
-@compiled
+@lean
 def step(
     quaternion: Array,
     velocity_body: Array,

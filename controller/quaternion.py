@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from controller.compiled import compiled
+from controller.compiled import compiled, lean
 
 Array = NDArray[np.float64]
 Vector3 = tuple[float, float, float]
@@ -32,7 +32,7 @@ def skew(a: Array) -> Array:
     return np.array([[0.0, -a[2], a[1]], [a[2], 0.0, -a[0]], [-a[1], a[0], 0.0]])
 
 
-@compiled
+@lean
 def rotation_rows(e: Array) -> tuple[Vector3, Vector3, Vector3]:
     """Return the rows of R, from body to world, of a unit quaternion: (3)."""
     e0, e1, e2, e3 = e[0], e[1], e[2], e[3]
@@ -85,7 +85,7 @@ def multiply(a: Array, b: Array) -> Array:
     )
 
 
-@compiled
+@lean
 def error_parts(desired: Array, actual: Array) -> Vector4:
     """Return the parts of desired^-1 * actual, the error of the shortest rotation (scalar part >= 0): (23)."""
     d0, d1, d2, d3 = desired[0], desired[1], desired[2], desired[3]

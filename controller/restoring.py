@@ -29,5 +29,6 @@ def parameters(weight: float, buoyancy: float, r_G: Array, r_B: Array) -> Array:
     """Return phi, shape (4,) [N, N m], from W [N], B [N] and the centres [m], each of shape (3,): (12)."""
     phi = np.empty(4)
     phi[0] = weight - buoyancy
-    phi[1:] = r_G * weight - r_B * buoyancy
+    for i in range(3):
+        phi[1 + i] = r_G[i] * weight - r_B[i] * buoyancy
     return phi

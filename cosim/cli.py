@@ -11,10 +11,9 @@ import logging
 import os
 import sys
 from collections.abc import Sequence
-from importlib import metadata
 from pathlib import Path
 
-from cosim.command_line import campaigns, mavlink, run, sitl, sweep
+from cosim.command_line import campaigns, mavlink, package, run, sitl, sweep
 from cosim.command_line.campaigns import INTERRUPTED
 
 _EPILOG = """examples:
@@ -26,6 +25,16 @@ _EPILOG = """examples:
 """
 
 
+class _Version(argparse.Action):
+    """Prints the version; finding it takes longer than all else that help needs."""
+
+    def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
+        from importlib import metadata
+
+        print(f"cosim {metadata.version('subreach')}")
+        parser.exit()
+
+
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="cosim",
@@ -33,7 +42,7 @@ def _parser() -> argparse.ArgumentParser:
         epilog=_EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("--version", action="version", version=f"cosim {metadata.version('subreach')}")
+    parser.add_argument("--version", action=_Version, nargs=0, help="show program's version number and exit")
     parser.add_argument("-v", "--verbose", action="store_true", help="log what happens inside")
     verbs = parser.add_subparsers(dest="verb", required=True, metavar="VERB")
 
@@ -56,6 +65,7 @@ def _parser() -> argparse.ArgumentParser:
     calibrate = verbs.add_parser("calibrate", help="fit the force limit and lag that bring the paper's window about")
     calibrate.add_argument("--scenario", default="paper", help="scenario to fit (default: paper)")
 
+    package.add_verb(verbs)
     campaigns.add_verbs(verbs)
     sweep.add_verbs(verbs)
     mavlink.add_verbs(verbs)
@@ -110,8 +120,8 @@ def _guarded(options: argparse.Namespace) -> int:
 
 def _log(verbose: bool) -> None:
     logging.basicConfig(level=logging.WARNING, format="%(name)s: %(message)s")
-    for package in ("fuzzy_arbiter", "plant_fmu", "controller", "cosim"):
-        logging.getLogger(package).setLevel(logging.DEBUG if verbose else logging.WARNING)
+    for name in ("fuzzy_arbiter", "plant_fmu", "controller", "cosim"):
+        logging.getLogger(name).setLevel(logging.DEBUG if verbose else logging.WARNING)
 
 
 def _report(options: argparse.Namespace) -> int:
@@ -166,6 +176,7 @@ _VERBS = {
     "show": _show,
     "check": _check,
     "calibrate": _calibrate,
+    "package": package.package,
     "campaign": campaigns.campaign,
     "compare": campaigns.compare,
     "sweep": sweep.sweep,

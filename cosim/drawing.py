@@ -69,6 +69,7 @@ class Drawing:
         svg = io.StringIO()
         self.figure.savefig(svg, format="svg", metadata={"Date": None})
         (folder / f"{self.name}.svg").write_text(svg.getvalue(), encoding="utf-8")
+        self.figure.set_layout_engine("none")  # laid out once is enough, and takes as long as a drawing
         self.figure.savefig(folder / f"{self.name}.png", dpi=DPI)
         return svg.getvalue()
 

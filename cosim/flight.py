@@ -21,14 +21,13 @@ import fuzzy_arbiter
 import plant_fmu
 from controller import LAWS, CompiledLaw, VehicleState
 from controller.allocation import allocate
-from controller.compiled import compiled
+from controller.compiled import compiled, lean
 from controller.laws import printed
 from controller.regions import (
     Orientation,
     PackedRegions,
     Sphere,
-    attitude_clearance,
-    clearance_of_place,
+    clearance_of_pose,
     clearance_of_sphere,
 )
 from cosim.native import advance, read, seconds, send
@@ -41,7 +40,7 @@ Array = NDArray[np.float64]
 # the folders of what the compiled loop is made of beside this one and that of the laws
 _FOREIGN = (Path(fuzzy_arbiter.__file__).parent, Path(plant_fmu.__file__).parent / "running")
 
-_weigh = Arbiter().compiled()
+_weigh: Any = numba.njit(_nrt=False)(Arbiter().compiled().py_func)  # type: ignore[call-overload]
 _ramp: Any = numba.njit(ramp)
 _step: Any = printed.step  # of a law, and whether it gives a wrench: `flight_of` puts others in their places
 _is_wrench = True
@@ -81,6 +80,43 @@ class Allocator(NamedTuple):
     direction: bool
 
 
+class Room(NamedTuple):
+    """Where a flight is computed."""
+
+    state: VehicleState  # as it is told
+    memberships: Array  # (3,)
+    by_criterion: Array  # (3,) weights
+    weights: Array  # (n,)
+    clearances: Array  # (n,) true ones
+    seen: Array  # (n,) those that the arbiter is told
+    goal_clearance: Array  # (1,)
+    wrench: Array  # (6,) N, N m, body frame
+    before: Array  # (i,) inputs of the step before
+    at: Array  # (3,)
+    ticks: NDArray[np.int64]  # (2,)
+
+
+def room_for(regions: int, inputs: int, thrusters: int) -> Room:
+    """Return room for a flight.
+
+    Parameters
+    ----------
+    regions, inputs, thrusters : int
+        How many there are.
+
+    Returns
+    -------
+    Room
+        All zero, all thrusters healthy.
+    """
+    n = regions
+    state = VehicleState(np.zeros(3), np.zeros(4), np.zeros(6), np.ones(thrusters))
+    of_regions = np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(1)
+    return Room(
+        state, np.zeros(3), np.zeros(3), *of_regions, np.zeros(6), np.zeros(inputs), np.zeros(3), np.zeros(2, np.int64)
+    )
+
+
 class Marks(NamedTuple):
     """What a flight came to. Steps are those of the plant; -1: there was none."""
 
@@ -113,6 +149,7 @@ def _fly(
     allocator: Allocator,
     gains: Any,
     memory: Any,
+    room: Room,
     estimate: Array,
     trace: Array,
 ) -> tuple[float, ...]:
@@ -131,6 +168,8 @@ def _fly(
         For a wrench that thrusters carry.
     gains, memory : NamedTuple
         The law's.
+    room : Room
+        Of `room_for`, anew for each flight.
     estimate : ndarray, shape (4,)
         Receives the estimate that the last decision rests on.
     trace : ndarray, shape (control steps, 20 + i + r) or (0, 0)
@@ -143,19 +182,15 @@ def _fly(
         What `Marks` is made of, of the whole flight, or up to where the FMU failed. Were it a named tuple, Numba would
         call Python to make it, and crash where that raises, as after Ctrl-C in mid-flight.
     """
-    m, n = setup.thrusters, setup.regions.kinds.size
-    position, quaternion, velocity = np.empty(3), np.empty(4), np.empty(6)
-    health, weights, memberships = np.ones(effectiveness.inputs.size), np.zeros(n), np.zeros(3)
-    by_criterion, wrench, before = np.zeros(3), np.zeros(6), np.zeros(native.inputs.size)
-    clearances, seen, goal_clearance = np.zeros(n), np.zeros(n), np.zeros(1)
-    room = np.zeros(2, np.int64)
-    state = VehicleState(position, quaternion, velocity, health)
+    m, n, inputs = setup.thrusters, setup.regions.kinds.size, native.inputs
+    state, weights, clearances, seen = room.state, room.weights, room.clearances, room.seen
+    memberships, by_criterion, goal_clearance = room.memberships, room.by_criterion, room.goal_clearance
+    position, quaternion = native.outputs[:3], native.outputs[3:7]
     first_inside, last_entered, inside = -1, -1, False
     least, least_angle, most = np.inf, np.inf, -np.inf
     effort, thrust_effort, variation = 0.0, 0.0, 0.0
     max_force, max_speed, worst, refused = 0.0, 0.0, 0.0, -1
     failures, told = 0, 0
-    true_position, true_quaternion = native.outputs[:3], native.outputs[3:7]
     timed = setup.clock.size > 0
     if not read(native):
         refused = 0
@@ -168,7 +203,7 @@ def _fly(
         while failures < setup.failed.size and k == setup.failure_steps[failures]:
             effectiveness.inputs[setup.failed[failures]] = 0.0
             if setup.tell:
-                health[setup.failed[failures]] = 0.0
+                state.thruster_health[setup.failed[failures]] = 0.0
                 told = min(told + 1, allocator.lower.shape[0] - 1)
             failures += 1
             if not send(effectiveness):
@@ -176,8 +211,8 @@ def _fly(
         # marks
         if setup.moving or k == 0:
             _move(setup, now)
-        _clearances(setup.regions, true_position, true_quaternion, clearances)
-        _clearances(setup.goal, true_position, true_quaternion, goal_clearance)
+        _clearances(setup.regions, position, quaternion, clearances, room.at)
+        _clearances(setup.goal, position, quaternion, goal_clearance, room.at)
         for i in range(n):
             if setup.regions.hard[i]:
                 if setup.regions.kinds[i] < _ATTITUDE:
@@ -194,47 +229,44 @@ def _fly(
         max_speed = max(max_speed, math.sqrt(u * u + v * v + w * w))
         controls = k % setup.control_every == 0
         if controls:
-            estimate[:] = memory.estimate
+            for i in range(4):
+                estimate[i] = memory.estimate[i]
         if k == setup.steps or refused >= 0:
             break
         # measure
         arbitrates = k % setup.arbiter_every == 0
-        if setup.exact:
-            if controls or arbitrates:
-                position[:] = true_position
-                quaternion[:] = true_quaternion
-                velocity[:] = native.outputs[7:13]
-        else:
+        if not setup.exact or controls or arbitrates:
             _measure(setup, k, now, native.outputs, state)
         # regions and arbiter: while the position is lost there is nothing to decide by, and the last weights hold
-        if arbitrates and np.isfinite(position).all():
-            if setup.exact:
-                seen[:] = clearances
-            else:
-                _clearances(setup.regions, position, quaternion, seen)
-            memberships[:] = 0.0
+        if arbitrates and _is_finite(state.position):
+            told_clearances = clearances
+            if not setup.exact:
+                _clearances(setup.regions, state.position, state.quaternion, seen, room.at)
+                told_clearances = seen
+            for i in range(3):
+                memberships[i] = 0.0
             for i in range(n):
-                degree = _ramp(seen[i], setup.ramp)
+                degree = _ramp(told_clearances[i], setup.ramp)
                 memberships[setup.criteria[i]] = max(memberships[setup.criteria[i]], degree)
             _weigh(memberships, by_criterion)
             for i in range(n):
                 weights[i] = by_criterion[setup.criteria[i]]
         # law and allocation
         if controls:
-            started = seconds(setup.clock, room) if timed else 0.0
+            started = seconds(setup.clock, room.ticks) if timed else 0.0
             if m == 0 or not _is_wrench:
-                _step(state, setup.goal, setup.regions, weights, gains, memory, native.inputs)
+                _step(state, setup.goal, setup.regions, weights, gains, memory, inputs)
             else:
-                _step(state, setup.goal, setup.regions, weights, gains, memory, wrench)
+                _step(state, setup.goal, setup.regions, weights, gains, memory, room.wrench)
                 lower, upper = allocator.lower[told], allocator.upper[told]
-                allocate(allocator.inverse[told], lower, upper, allocator.direction, wrench, native.inputs)
+                allocate(allocator.inverse[told], lower, upper, allocator.direction, room.wrench, inputs)
             if timed:
-                worst = max(worst, seconds(setup.clock, room) - started)
+                worst = max(worst, seconds(setup.clock, room.ticks) - started)
             if trace.shape[0]:
-                _trace(trace[k // setup.control_every], now, native, position, by_criterion, memory.report)
-            for j in range(native.inputs.size):
-                variation += abs(native.inputs[j] - before[j])
-                before[j] = native.inputs[j]
+                _trace(trace[k // setup.control_every], now, native, state.position, by_criterion, memory.report)
+            for j in range(inputs.size):
+                variation += abs(inputs[j] - room.before[j])
+                room.before[j] = inputs[j]
             if not send(native):
                 refused = k
                 break
@@ -254,25 +286,32 @@ def _fly(
     )  # fmt: skip
 
 
-@compiled
+@lean
 def _measure(setup: Setup, k: int, now: float, truth: Array, state: VehicleState) -> None:
     """Write what is told at plant step `k` as `sensing.Sensor` does."""
-    state.quaternion[:] = truth[3:7]
-    state.velocity_body[3:] = truth[10:13]
-    if setup.dead_from <= now < setup.dead_until:
-        if not setup.frozen:
-            state.position[:] = np.nan
-            state.velocity_body[:3] = np.nan
-        elif now == 0.0:  # nothing was measured before
-            state.position[:] = truth[:3]
-            state.velocity_body[:3] = truth[7:10]
+    for i in range(4):
+        state.quaternion[i] = truth[3 + i]
+    for i in range(3):
+        state.velocity_body[3 + i] = truth[10 + i]
+    lost = setup.dead_from <= now < setup.dead_until
+    if lost and setup.frozen and now > 0.0:
         return
-    noise = setup.noise[k // setup.control_every]
-    state.position[:] = truth[:3] + noise[:3]
-    state.velocity_body[:3] = truth[7:10] + noise[3:]
+    control = k // setup.control_every
+    for i in range(3):
+        state.position[i], state.velocity_body[i] = truth[i], truth[7 + i]
+        if lost and not setup.frozen:
+            state.position[i] = state.velocity_body[i] = np.nan
+        elif not (lost or setup.exact):
+            state.position[i] += setup.noise[control, i]
+            state.velocity_body[i] += setup.noise[control, 3 + i]
 
 
-@compiled
+@lean
+def _is_finite(position: Array) -> bool:
+    return math.isfinite(position[0]) and math.isfinite(position[1]) and math.isfinite(position[2])
+
+
+@lean
 def _move(setup: Setup, now: float) -> None:
     """Put all regions where they are at a time [s]."""
     for regions in (setup.goal, setup.regions):
@@ -281,31 +320,17 @@ def _move(setup: Setup, now: float) -> None:
                 regions.shifts[i, axis] = regions.velocities[i, axis] * now
 
 
-@compiled
-def _clearances(regions: PackedRegions, position: Array, quaternion: Array, clearances: Array) -> None:
+@lean
+def _clearances(regions: PackedRegions, position: Array, quaternion: Array, clearances: Array, room: Array) -> None:
     """Write the clearance of each region, [m] or [rad], at a pose into `clearances`."""
-    others = False
     for i in range(regions.kinds.size):
         if regions.kinds[i] == _SPHERE:
             clearances[i] = clearance_of_sphere(regions, i, position)
         else:
-            others = True
-    if others:
-        _clearances_of_others(regions, position, quaternion, clearances)
+            clearances[i] = clearance_of_pose(regions, i, position, quaternion, room)
 
 
-@compiled
-def _clearances_of_others(regions: PackedRegions, position: Array, quaternion: Array, clearances: Array) -> None:
-    """Write the clearance of each region but spheres, of which there are most."""
-    room = np.empty(3)
-    for i in range(regions.kinds.size):
-        if regions.kinds[i] >= _ATTITUDE:
-            clearances[i] = attitude_clearance(regions, i, position, quaternion)[0]
-        elif regions.kinds[i] != _SPHERE:
-            clearances[i] = clearance_of_place(regions, i, position, room)
-
-
-@compiled
+@lean
 def _least(clearance: float, least: float) -> float:
     """Return the lesser of two numbers; what is no number stays."""
     return clearance if clearance < least or np.isnan(clearance) else least
@@ -336,7 +361,7 @@ def flight_of(law: str) -> Callable[..., Marks]:
     Returns
     -------
     callable
-        ``(setup, native, effectiveness, allocator, gains, memory, estimate, trace) -> Marks``.
+        ``(setup, native, effectiveness, allocator, gains, memory, room, estimate, trace) -> Marks``.
     """
     chosen: Any = LAWS[law]
     loop = _compiled(law, chosen)
@@ -345,7 +370,7 @@ def flight_of(law: str) -> Callable[..., Marks]:
 
 @functools.cache
 def _compiled(name: str, law: type[CompiledLaw]) -> Callable[..., tuple[Any, ...]]:
-    return compiled(_plain(name, law), *_FOREIGN)
+    return lean(_plain(name, law), *_FOREIGN)
 
 
 def _plain(name: str, law: type[CompiledLaw]) -> Callable[..., tuple[Any, ...]]:

@@ -18,9 +18,8 @@ from controller import CompiledLaw, Law, VehicleState
 from controller.quaternion import from_axis_angle
 from cosim.actuators import Actuators
 from cosim.columns import columns_of
-from cosim.helm.helm import Helm, greatest_wrench
+from cosim.helm.helm import Helm
 from cosim.helm.orders import Order
-from cosim.helm.settings import LiveSettings
 from cosim.helm.sources import OrderSource
 from cosim.law import law_of
 from cosim.lyapunov import LyapunovSignals
@@ -80,6 +79,8 @@ class Master:
         self.arbiter = Arbiter(engine=scenario.arbiter.engine, points=scenario.arbiter.points)
         self.law: Law = law or law_of(scenario)
         self._ramp = scenario.arbiter.ramp
+        self._jacobi = scenario.master.order == "jacobi"
+        self._failures = bool(scenario.failures)
         self.surroundings = Surroundings(scenario)
         self._boundary = 0.0  # s, when the next step begins
         self._criterion_of = [CRITERIA.index(secondary.criterion) for secondary in scenario.regions]
@@ -131,9 +132,7 @@ class Master:
         self._lyapunov: LyapunovSignals | None = None
         self.helm: Helm | None = None
         if self.scenario.commands.enabled:
-            vehicle = self.scenario.vehicle
-            reach = greatest_wrench(vehicle.thruster_matrix, vehicle.thrust_min, vehicle.thrust_max)
-            self.helm = Helm(self.scenario, self.surroundings, self.state, reach, s.view("helm.armed", 7))
+            self.helm = Helm(self.scenario, self.surroundings, self.actuators, self.state, s.view("helm.armed", 7))
         if self.scenario.record.lyapunov:
             out = s.view("lyapunov.printed", 4)
             goal, regions, weights = self.surroundings.goal, self.surroundings.regions, self._weights_of_regions
@@ -204,9 +203,12 @@ class Master:
         PlantError
             If the FMU fails.
         """
-        scenario, step = self.scenario, self.scenario.time.step
+        scenario, step, jacobi = self.scenario, self.scenario.time.step, self._jacobi
         self.signals.row[0] = k * step
-        self._fail(k)
+        if self._failures:
+            self._fail(k)
+        if jacobi and k:
+            self._exchange(k - 1)
         self._measure(k)
         if self.helm is not None and orders is not None:
             self._heed(self.helm, orders.take(k))
@@ -214,13 +216,17 @@ class Master:
         if self.helm is not None and self.helm.watch(float(self.signals.row[0]), float(self._seen[0])):
             self._heed(self.helm, ())  # what the next item of the mission changes
             self._evaluate_regions()
-        if k % scenario.arbiter_every == 0:
+        if jacobi:
+            self.actuators.send()  # what was asked for in the step before
+        elif k % scenario.arbiter_every == 0:
             self._arbitrate()
         if k % scenario.control_every == 0:
             self._control()
         if self._lyapunov is not None:
             self._lyapunov.write()
         if k < scenario.steps:
+            if not jacobi:
+                self.actuators.send()
             self._advance(step)
         self._boundary = (k + 1) * step
 
@@ -271,21 +277,9 @@ class Master:
             self.law.gains = helm.settings.gains
             if helm.heading is not None:
                 self.law.face(from_axis_angle(_DOWN, helm.heading))
-        for key in helm.changed:
-            self._take_over(key, helm.settings)
+        if helm.changed:
+            self._ramp = helm.settings["arbiter.ramp"]
         helm.heeded()
-
-    def _take_over(self, key: str, settings: LiveSettings) -> None:
-        """Bring a changed number, other than the law's gains, to where it counts."""
-        region = settings.region_of(key)
-        if region is not None and key.endswith(".gain"):
-            self.surroundings.set_gain(region, settings[key])
-        elif region is not None:
-            self.surroundings.set_shape(region, settings.shapes[region])
-        elif key in settings.of_plant:
-            self.actuators.limit(settings.of_plant[key], settings[key])
-        elif key == "arbiter.ramp":
-            self._ramp = settings[key]
 
     def _evaluate_regions(self) -> None:
         """Evaluate the regions, where they are now, at the pose that is told, and at the true one."""
@@ -295,17 +289,37 @@ class Master:
         self.surroundings.evaluate(self.truth, self._values, self._clearances)
 
     def _arbitrate(self) -> None:
-        """Turn clearances into memberships, of the most pressing region of each criterion, and these into weights.
+        """Turn clearances into memberships, and these into weights.
 
         While the position is lost there is nothing to decide by: the last weights hold.
         """
-        if not np.isfinite(self.state.position).all():
-            return
+        memberships = self._press()
+        if memberships is not None:
+            self._memberships[:] = memberships
+            self._weigh(memberships)
+
+    def _exchange(self, before: int) -> None:
+        """Hand on what regions and arbiter made, in the step `before`, of what stood at its beginning (Jacobi)."""
+        if before % self.scenario.arbiter_every == 0:
+            self._weigh(self._memberships.tolist())
+        memberships = self._press()
+        if memberships is not None:
+            self._memberships[:] = memberships
+
+    def _press(self) -> list[float] | None:
+        """Return the membership of each criterion, that of its most pressing region; None if the position is lost."""
+        north, east, down = self.state.position.tolist()
+        if not (math.isfinite(north) and math.isfinite(east) and math.isfinite(down)):
+            return None
         memberships = [0.0] * len(CRITERIA)
         for criterion, clearance in zip(self._criterion_of, self._seen[1:].tolist(), strict=True):
-            memberships[criterion] = max(memberships[criterion], ramp(clearance, self._ramp))
+            degree = ramp(clearance, self._ramp)
+            if degree > memberships[criterion]:
+                memberships[criterion] = degree
+        return memberships
+
+    def _weigh(self, memberships: list[float]) -> None:
         weights = self.arbiter(memberships)
-        self._memberships[:] = memberships
         self._weights[:] = weights
         for i, criterion in enumerate(self._criterion_of):
             self._weights_of_regions[i] = weights[criterion]
@@ -329,7 +343,6 @@ class Master:
             actuators.push_thrusters()
 
     def _advance(self, step: float) -> None:
-        self.actuators.send()
         self.plant.step(step)
         self._applied[:] = self._plant_applied
         self._flags[:] = self.plant.read_flags()

@@ -16,7 +16,7 @@ from numba.core import cgutils
 from numba.extending import intrinsic
 from numpy.typing import NDArray
 
-from controller.compiled import compiled
+from controller.compiled import lean
 from plant_fmu.running.native import Native
 
 _WARNING = 1  # the highest status that is no failure
@@ -79,7 +79,7 @@ _do_step: Any = intrinsic(_do_step_code)
 _read_clock: Any = intrinsic(_read_clock_code)
 
 
-@compiled
+@lean
 def send(native: Native) -> bool:
     """Send the inputs, and return whether the FMU took them."""
     n = native.inputs.size
@@ -88,7 +88,7 @@ def send(native: Native) -> bool:
     return status <= _WARNING
 
 
-@compiled
+@lean
 def read(native: Native) -> bool:
     """Read the outputs, and return whether the FMU gave them."""
     n = native.outputs.size
@@ -97,7 +97,7 @@ def read(native: Native) -> bool:
     return status <= _WARNING
 
 
-@compiled
+@lean
 def advance(native: Native, now: float, step: float) -> bool:
     """Step from `now` [s] by `step` [s], and return whether the FMU did, and does not ask to end the simulation."""
     status: int = _do_step(native.do_step, native.instance, now, step, native.results.ctypes.data)
@@ -126,7 +126,7 @@ class Clock:
         self.numbers = np.array([address, which, ticks], dtype=np.int64)
 
 
-@compiled
+@lean
 def seconds(clock: NDArray[np.int64], room: NDArray[np.int64]) -> float:
     """Return the time [s] of a `Clock`'s numbers; `room`, shape (2,), is what the C function fills."""
     _read_clock(clock[0], clock[1], room.ctypes.data)

@@ -8,14 +8,15 @@ import shutil
 import tempfile
 from pathlib import Path
 from string import Template
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from controller.regions import SHAPES
 from cosim.claims import newtons, paper_claims
-from cosim.drawing import Drawing, Story
-from cosim.figures import drawings
 from cosim.record import Record
 from cosim.scenario import Scenario
+
+if TYPE_CHECKING:  # Matplotlib takes as long to import as all else together
+    from cosim.drawing import Drawing
 
 REPORT = "report.html"
 FIGURES = "figures"
@@ -89,6 +90,9 @@ def write_report(folder: Path, scenario: Scenario, record: Record, summary: dict
     Path
         The HTML file.
     """
+    from cosim.drawing import Story
+    from cosim.figures import drawings
+
     figures = Path(tempfile.mkdtemp(prefix=f".{FIGURES}-", dir=folder))
     try:
         shown = [_figure(figures, drawing) for drawing in drawings(Story(scenario, record, summary))]

@@ -41,6 +41,7 @@ from cosim.scenario_tables import (
     Initial,
     LawSetup,
     Limit,
+    MasterSetup,
     PlantSetup,
     RecordSetup,
     SecondaryRegion,
@@ -78,6 +79,7 @@ class Scenario:
     actuation: Actuation
     sensing: Sensing
     failures: tuple[Failure, ...]
+    master: MasterSetup
     record: RecordSetup
     commands: Commands
     tell_failures: bool  # the law is told of them when they happen
@@ -211,6 +213,7 @@ def checked_scenario(table: dict[str, Any], name: str, vehicle: Vehicle | None =
         actuation=file.actuation,
         sensing=file.sensing,
         failures=file.failures,
+        master=file.master,
         record=file.record,
         commands=file.commands,
         tell_failures=file.tell_failures,

@@ -106,6 +106,14 @@ class Commands:
 
 
 @dataclass(frozen=True)
+class MasterSetup:
+    """In which order a step calls its parts."""
+
+    # gauss-seidel: each sees what the one before gave in this step; jacobi: what all had given at the step's beginning
+    order: Literal["gauss-seidel", "jacobi"] = "gauss-seidel"
+
+
+@dataclass(frozen=True)
 class RecordSetup:
     """What a run records beyond its signals."""
 
@@ -167,6 +175,7 @@ class File:
     actuation: Actuation = Actuation()
     sensing: Sensing = Sensing()
     failures: tuple[Failure, ...] = ()
+    master: MasterSetup = MasterSetup()
     record: RecordSetup = RecordSetup()
     commands: Commands = Commands()
     regions: tuple[RegionEntry, ...] = ()

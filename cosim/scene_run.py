@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from controller import LAWS
 from cosim.errors import RunError
-from cosim.flight import OUTPUTS, Allocator, Marks, Setup, flight_of
+from cosim.flight import OUTPUTS, Allocator, Marks, Setup, flight_of, room_for
 from cosim.native import Clock
 from cosim.scene import Scene, Told, plant_values, told
 from cosim.vehicle_model import vehicle_model
@@ -132,8 +132,8 @@ class SceneFlyer:
         effectiveness.inputs[:] = 1.0
         setup = self._setup(scene, known)
         rows = np.zeros((c.controls, 20 + m + law.report.size) if trace else (0, 0))
-        estimate = np.zeros(4)
-        marks = self._flight(setup, native, effectiveness, self._allocator(), law.gains, law.memory, estimate, rows)
+        room, estimate, allocator = room_for(known.regions.kinds.size, m, m), np.zeros(4), self._allocator()
+        marks = self._flight(setup, native, effectiveness, allocator, law.gains, law.memory, room, estimate, rows)
         return self._score(marks, setup), rows
 
     def _score(self, marks: Marks, setup: Setup) -> Score:

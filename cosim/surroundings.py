@@ -9,7 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from controller import VehicleState
-from controller.regions import PackedRegions, Shape, Sphere, pack
+from controller.compiled import lean
+from controller.regions import PackedRegions, Shape, Sphere, evaluate_packed, pack
 from cosim.errors import RunError
 from cosim.scenario import Scenario
 from cosim.scenario_tables import FAR_AWAY, Vector3
@@ -51,6 +52,8 @@ class Surroundings:
         self._streamed = ["goal"] if scenario.goal_streamed else []
         self._streamed += [region.region.name for region in scenario.regions if region.streamed and not region.seen]
         self._moving = [self._names.index(name) for name in scenario.moving]
+        # nothing ever moves: all stays where the packed numbers have it
+        self._still = not scenario.moving
         self._seen = [i for i, region in enumerate(scenario.regions) if region.seen]
         # m, NED: where each would have been at time 0, had it always moved as it does now
         self._origins: Array = np.zeros((len(secondary), 3))
@@ -72,6 +75,8 @@ class Surroundings:
         shifts : ndarray, shape (moving regions, 3)
             Receives how far each moving one is from where the scenario has it [m, NED].
         """
+        if self._still:
+            return
         for packed, origins in ((self.goal, self._target.origin), (self.regions, self._origins)):
             packed.move_to(time)
             packed.shifts[:] += origins
@@ -88,9 +93,8 @@ class Surroundings:
         values, clearances : ndarray, shape (n + 1,)
             Receive g and clearance, the goal's first.
         """
-        p, e, gradients, turnings = state.position, state.quaternion, self._gradients, self._turnings
-        self.goal.evaluate(p, e, values[:1], gradients[:1], turnings[:1], clearances[:1])
-        self.regions.evaluate(p, e, values[1:], gradients[1:], turnings[1:], clearances[1:])
+        p, e = state.position, state.quaternion
+        _evaluate(self.goal, self.regions, p, e, values, self._gradients, self._turnings, clearances)
 
     # ---- moved from outside ----
 
@@ -205,6 +209,22 @@ class Surroundings:
     @staticmethod
     def _reshape(regions: PackedRegions, i: int, shape: Shape) -> None:
         regions.numbers[regions.offsets[i] : regions.offsets[i + 1]] = shape.packed()
+
+
+@lean
+def _evaluate(
+    goal: PackedRegions,
+    regions: PackedRegions,
+    position: Array,
+    quaternion: Array,
+    values: Array,
+    gradients: Array,
+    turnings: Array,
+    clearances: Array,
+) -> None:
+    """Evaluate the goal into the first places, and the regions into those behind, in one call."""
+    evaluate_packed(goal, position, quaternion, values[:1], gradients[:1], turnings[:1], clearances[:1])
+    evaluate_packed(regions, position, quaternion, values[1:], gradients[1:], turnings[1:], clearances[1:])
 
 
 def middle_of(shape: Shape) -> Vector3:

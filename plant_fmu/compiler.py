@@ -9,7 +9,9 @@ import shlex
 import shutil
 import subprocess
 import sys
+import tempfile
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 from plant_fmu.errors import BuildError
@@ -80,7 +82,12 @@ def cross_compiler(platform: Platform) -> list[str]:
 
 
 def compile_library(
-    compiler: Sequence[str], platform: Platform, sources: Sequence[Path], includes: Sequence[Path], library: Path
+    compiler: Sequence[str],
+    platform: Platform,
+    sources: Sequence[Path],
+    includes: Sequence[Path],
+    library: Path,
+    flags: Sequence[str] = (),
 ) -> None:
     """Compile C files into one shared library without any dependency but the C library.
 
@@ -96,6 +103,8 @@ def compile_library(
         Folders of headers.
     library : Path
         What to write.
+    flags : sequence of str, optional
+        After `FLAGS`.
 
     Raises
     ------
@@ -107,22 +116,30 @@ def compile_library(
         # Named, for the linker else writes the place of the build into the library. Names of functions stay: Apple's
         # linker knows no -s, and ziglang's, told to drop them, leaves some numbers of a table to chance.
         link = [f"-Wl,-install_name,@rpath/{library.name}"]
-    command = [
-        *compiler, *FLAGS, *_WARNINGS, *link,
-        *(f"-I{folder}" for folder in includes),
-        *map(str, sources), "-o", str(library), "-lm",
-    ]  # fmt: skip
+    options = [*FLAGS, *_WARNINGS, *flags, *(f"-I{folder}" for folder in includes)]
+    with tempfile.TemporaryDirectory(prefix="plant_fmu-") as scratch:
+        objects = [Path(scratch) / f"{source.stem}.o" for source in sources]
+        with ThreadPoolExecutor(os.cpu_count()) as pool:  # a process each: they take turns if there is but one core
+            commands = [
+                [*compiler, *options, "-c", str(source), "-o", str(made)]
+                for source, made in zip(sources, objects, strict=True)
+            ]
+            list(pool.map(_run, commands))
+        _run([*compiler, *FLAGS, *link, *map(str, objects), "-o", str(library), "-lm"])
+    if not library.is_file():
+        raise BuildError(f"C compiler {shlex.join(compiler)} failed: it wrote no library, and no word")
+
+
+def _run(command: Sequence[str]) -> None:
+    """Run a compiler; raise its first complaint if it fails."""
     log.debug("%s", shlex.join(command))
     try:
         done = subprocess.run(command, capture_output=True, text=True, check=False)
     except OSError as error:
-        raise BuildError(f"C compiler {compiler[0]}: {error.strerror or error}") from error
-    if done.returncode != 0 or not library.is_file():
-        said = (
-            [line for line in done.stderr.splitlines() if "error" in line]
-            or done.stderr.splitlines()
-            or ["it wrote no library, and no word"]
-        )
-        raise BuildError(f"C compiler {shlex.join(compiler)} failed: {said[0].strip()}")
+        raise BuildError(f"C compiler {command[0]}: {error.strerror or error}") from error
+    if done.returncode != 0:
+        lines = done.stderr.splitlines()
+        said = [line for line in lines if "error" in line] or lines or ["it wrote nothing, and no word"]
+        raise BuildError(f"C compiler {command[0]} failed: {said[0].strip()}")
     for line in done.stderr.splitlines():
         log.debug("%s", line)

@@ -1,4 +1,4 @@
-"""Files made from the table of variables: modelDescription.xml (FMI 2.0 and 3.0), the C header, the docs page."""
+"""Files made from the table of variables: modelDescription.xml (FMI 2.0 and 3.0), the docs page."""
 
 from __future__ import annotations
 
@@ -7,14 +7,13 @@ import math
 from importlib import metadata
 from xml.etree import ElementTree as ET
 
+from plant_fmu.component import Component
 from plant_fmu.markup import xml_text
 from plant_fmu.quantities import UNITS
-from plant_fmu.sources import compiled_files, external_names
+from plant_fmu.sources import c_sources, compiled_files, header
 from plant_fmu.variables import Variable, variables
 from plant_fmu.vehicle import Vehicle
 
-DEFAULT_STOP_TIME = 10.0  # s
-DEFAULT_STEP = 0.01  # s
 DEFAULT_TOLERANCE = 1e-6  # relative
 
 _CAUSALITY = {"time": "independent", "state": "output", "input": "input", "output": "output", "derivative": "local",
@@ -38,6 +37,7 @@ _INTERFACES = {  # by FMI version
         "providesAdjointDerivatives": "true",
     },
 }
+_NEEDS_STATES = ("providesDirectionalDerivative", "providesDirectionalDerivatives", "providesAdjointDerivatives")
 _LOG_CATEGORIES = {
     "logEvents": "Initialisation, and samples in model exchange",
     "logStatusWarning": "Values that were mended",
@@ -52,80 +52,33 @@ def _number(value: float) -> str:
     return repr(float(value))
 
 
-def header(vehicle: Vehicle, token: str) -> str:
-    """Return ``vehicle.h``, which holds all that the C code knows of one vehicle.
-
-    Parameters
-    ----------
-    vehicle : Vehicle
-        The vehicle.
-    token : str
-        The FMU's guid (FMI 2.0) or instantiation token (FMI 3.0).
-
-    Returns
-    -------
-    str
-        C99 text.
-    """
-    rows = variables(vehicle)
-    names = [f"#define {name} {vehicle.name}_{name}" for name in external_names()]
-    first_state = next(i for i, v in enumerate(rows) if v.role == "state")
-    lines = [
-        f"/* {vehicle.name}: generated from plant_fmu's table of variables. */",
-        "#ifndef VEHICLE_H",
-        "#define VEHICLE_H",
-        "",
-        f'#define INSTANTIATION_TOKEN "{token}"',
-        "",
-        "/* Names of this vehicle's own, so that several link into one program; a shared library overrides those",
-        " * of FMI, which importers look up as they stand in the standard. */",
-        f"#define FMI2_FUNCTION_PREFIX {vehicle.name}_",
-        f"#define FMI3_FUNCTION_PREFIX {vehicle.name}_",
-        *names,
-        "",
-        f"enum {{ N_THRUSTERS = {vehicle.n_thrusters}, FIRST_STATE = {first_state} }};",
-        "",
-    ]
-    lines.append("#define VEHICLE_VARIABLES \\")
-    for v in rows:
-        role = "OUTPUT" if v.role == "derivative" else v.role.upper()
-        numbers = (v.start, v.quantity.minimum, v.quantity.maximum, v.nominal)
-        values = ", ".join(_number(x) for x in numbers)
-        lines.append(f'    {{"{v.name}", TYPE_{v.type.upper()}, {role}, AT({v.member}), {values}}}, \\')
-    lines[-1] = lines[-1].removesuffix(" \\")
-    lines.append("")
-    return "\n".join([*lines, "#endif", ""])
-
-
-def token(vehicle: Vehicle, fmi: int, sources: bytes) -> str:
+def token(component: Component, fmi: int) -> str:
     """Return the token that ties a description to the binary made with it.
 
     Parameters
     ----------
-    vehicle : Vehicle
-        The vehicle.
+    component : Component
+        What the FMU is of.
     fmi : int
         2 or 3.
-    sources : bytes
-        The C sources.
 
     Returns
     -------
     str
         Changes whenever the description or the sources do.
     """
-    text = model_description(vehicle, fmi, "") + header(vehicle, "")
-    digest = hashlib.sha256(text.encode() + sources).hexdigest()
+    text = model_description(component, fmi, "") + header(component, "")
+    digest = hashlib.sha256(text.encode() + b"".join(c_sources(component, fmi).values())).hexdigest()
     return "{" + "-".join((digest[:8], digest[8:12], digest[12:16], digest[16:20], digest[20:32])) + "}"
 
 
-def model_description(vehicle: Vehicle, fmi: int, token: str) -> str:
+def model_description(component: Component, fmi: int, token: str) -> str:
     """Return ``modelDescription.xml``.
 
     Parameters
     ----------
-    vehicle : Vehicle
-        The vehicle.
+    component : Component
+        What the FMU is of.
     fmi : int
         2 for FMI 2.0, 3 for FMI 3.0.
     token : str
@@ -140,9 +93,9 @@ def model_description(vehicle: Vehicle, fmi: int, token: str) -> str:
         "fmiModelDescription",
         {
             "fmiVersion": f"{fmi}.0",
-            "modelName": vehicle.name,
+            "modelName": component.name,
             "guid" if fmi == 2 else "instantiationToken": token,
-            "description": f"Underwater vehicle, six degrees of freedom: {vehicle.title}",
+            "description": component.description,
             "author": "subreach authors",
             "version": metadata.version("subreach"),
             "copyright": "subreach authors",
@@ -153,19 +106,21 @@ def model_description(vehicle: Vehicle, fmi: int, token: str) -> str:
     )
     if fmi == 2:
         root.set("numberOfEventIndicators", "0")
-    for interface in ("ModelExchange", "CoSimulation"):
-        element = ET.SubElement(root, interface, _INTERFACES[fmi], modelIdentifier=vehicle.name)
+    for interface in ("ModelExchange", "CoSimulation") if component.has_states else ("CoSimulation",):
+        offers = {k: v for k, v in _INTERFACES[fmi].items() if component.has_states or k not in _NEEDS_STATES}
+        element = ET.SubElement(root, interface, offers, modelIdentifier=component.name)
         if interface == "CoSimulation":
             element.set("canHandleVariableCommunicationStepSize", "true")
         elif fmi == 2:
             element.set("completedIntegratorStepNotNeeded", "true")
         if fmi == 2:  # FMI 3.0 lists them in sources/buildDescription.xml
             files = ET.SubElement(element, "SourceFiles")
-            for name in compiled_files(fmi):
+            for name in compiled_files(component, fmi):
                 ET.SubElement(files, "File", name=name)
 
     units = ET.SubElement(root, "UnitDefinitions")
-    for name, exponents in UNITS.items():
+    used = {v.quantity.unit for v in component.variables}
+    for name, exponents in ((name, exponents) for name, exponents in UNITS.items() if name in used):
         unit = ET.SubElement(units, "Unit", name=name)
         ET.SubElement(unit, "BaseUnit", {key: str(power) for key, power in exponents.items()})
         if name == "rad":
@@ -176,12 +131,12 @@ def model_description(vehicle: Vehicle, fmi: int, token: str) -> str:
         ET.SubElement(log, "Category", name=category, description=what)
     ET.SubElement(
         root, "DefaultExperiment",
-        startTime="0.0", stopTime=_number(DEFAULT_STOP_TIME), tolerance=_number(DEFAULT_TOLERANCE),
-        stepSize=_number(DEFAULT_STEP),
+        startTime="0.0", stopTime=_number(component.stop_time), tolerance=_number(DEFAULT_TOLERANCE),
+        stepSize=_number(component.step),
     )  # fmt: skip
 
     # FMI 2.0 needs no variable for the time, and some importers stumble over one
-    rows = [(vr, v) for vr, v in enumerate(variables(vehicle)) if fmi == 3 or v.role != "time"]
+    rows = [(vr, v) for vr, v in enumerate(component.variables) if fmi == 3 or v.role != "time"]
     # FMI 2.0 names variables by their position in the list, FMI 3.0 by value reference
     number = {v.name: str(i + 1 if fmi == 2 else vr) for i, (vr, v) in enumerate(rows)}
     model_variables = ET.SubElement(root, "ModelVariables")
@@ -235,6 +190,8 @@ def _add_structure(parent: ET.Element, rows: list[Variable], fmi: int, number: d
         ("InitialUnknowns", "InitialUnknown", [v for v in rows if v.role in ("output", "derivative")], False),
     )
     for section, tag, unknowns, instant in sections:
+        if not unknowns:
+            continue
         under = ET.SubElement(parent, section) if fmi == 2 else parent
         for v in unknowns:
             depends = (v.name,) if v.role == "state" else v.depends

@@ -1,12 +1,17 @@
-"""The C sources of the plant, and the list of them that goes into an FMU."""
+"""The C sources of FMUs: the plant's, the wrappers' that are common to all, and what is generated beside them."""
 
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 from importlib import resources
+from typing import TYPE_CHECKING
 from xml.etree import ElementTree as ET
 
 from plant_fmu.markup import xml_text
+
+if TYPE_CHECKING:
+    from plant_fmu.component import Component
 
 # a function is named after its file, at the beginning of a line; data are declared extern
 _DECLARED = re.compile(
@@ -16,11 +21,24 @@ _DECLARED = re.compile(
 _OTHER_WRAPPER = {2: "fmi3.c", 3: "fmi2.c"}
 
 
-def c_sources(fmi: int) -> dict[str, bytes]:
-    """Return the C files of one FMI version, without the generated ``vehicle.h`` and the headers of FMI.
+def plant_sources() -> dict[str, bytes]:
+    """Return the C files of the plant, without the wrappers and the generated ``vehicle.h``.
+
+    Returns
+    -------
+    dict of str to bytes
+        Contents by name.
+    """
+    return _files("csrc")
+
+
+def c_sources(component: Component, fmi: int) -> dict[str, bytes]:
+    """Return the C files of a component's FMU, without the generated header and those of FMI.
 
     Parameters
     ----------
+    component : Component
+        The component.
     fmi : int
         2 or 3.
 
@@ -29,33 +47,41 @@ def c_sources(fmi: int) -> dict[str, bytes]:
     dict of str to bytes
         Contents by name, in alphabetical order.
     """
-    folder = resources.files("plant_fmu") / "csrc"
-    files = sorted((file for file in folder.iterdir()), key=lambda file: file.name)
-    return {
-        file.name: file.read_bytes()
-        for file in files
-        if file.name.endswith((".c", ".h")) and file.name != _OTHER_WRAPPER[fmi]
-    }
+    wrapper = _files("csrc/wrapper")
+    del wrapper[_OTHER_WRAPPER[fmi]]
+    return dict(sorted({**wrapper, **component.sources}.items()))
 
 
-def external_names() -> list[str]:
-    """Return the names that the C files share with each other, which the linker sees.
+def _files(folder: str) -> dict[str, bytes]:
+    """Return the C files and headers of a folder of this package, by name."""
+    found = resources.files("plant_fmu").joinpath(*folder.split("/"))
+    return {file.name: file.read_bytes() for file in found.iterdir() if file.name.endswith((".c", ".h"))}
+
+
+def external_names(headers: Iterable[bytes]) -> list[str]:
+    """Return the names that C files share with each other, which the linker sees.
+
+    Parameters
+    ----------
+    headers : iterable of bytes
+        The headers that declare them.
 
     Returns
     -------
     list of str
-        Functions and data that the headers declare, in alphabetical order.
+        Functions and data, in alphabetical order.
     """
-    folder = resources.files("plant_fmu") / "csrc"
-    headers = (file.read_text(encoding="utf-8") for file in folder.iterdir() if file.name.endswith(".h"))
-    return sorted({name for text in headers for groups in _DECLARED.findall(text) for name in groups if name})
+    texts = (header.decode() for header in headers)
+    return sorted({name for text in texts for groups in _DECLARED.findall(text) for name in groups if name})
 
 
-def compiled_files(fmi: int) -> list[str]:
+def compiled_files(component: Component, fmi: int) -> list[str]:
     """Return the names of those C files that a compiler is given, the rest being headers.
 
     Parameters
     ----------
+    component : Component
+        The component.
     fmi : int
         2 or 3.
 
@@ -64,16 +90,63 @@ def compiled_files(fmi: int) -> list[str]:
     list of str
         Names relative to the FMU's folder ``sources``.
     """
-    return [name for name in c_sources(fmi) if name.endswith(".c")]
+    return [name for name in c_sources(component, fmi) if name.endswith(".c")]
 
 
-def build_description(model_identifier: str) -> str:
+def header(component: Component, token: str) -> str:
+    """Return the generated header, which holds the table of variables for the C code.
+
+    Parameters
+    ----------
+    component : Component
+        The component.
+    token : str
+        The FMU's guid (FMI 2.0) or instantiation token (FMI 3.0).
+
+    Returns
+    -------
+    str
+        C99 text.
+    """
+    rows, name, guard = component.variables, component.name, component.header.upper().replace(".", "_")
+    files = _files("csrc/wrapper") | dict(component.sources)
+    shared = external_names(data for file, data in files.items() if file.endswith(".h"))
+    roles = ("state", "derivative", "input")
+    first = {f"FIRST_{role.upper()}": next((i for i, v in enumerate(rows) if v.role == role), 0) for role in roles}
+    constants = {**component.constants, **first}
+    lines = [
+        f"/* {name}: generated from the table of variables. */",
+        f"#ifndef {guard}",
+        f"#define {guard}",
+        "",
+        f'#define INSTANTIATION_TOKEN "{token}"',
+        "",
+        "/* Names of this component's own, so that several link into one program; a shared library overrides those",
+        " * of FMI, which importers look up as they stand in the standard. */",
+        f"#define FMI2_FUNCTION_PREFIX {name}_",
+        f"#define FMI3_FUNCTION_PREFIX {name}_",
+        *(f"#define {shared_name} {name}_{shared_name}" for shared_name in shared),
+        "",
+        f"enum {{ {', '.join(f'{key} = {value}' for key, value in constants.items())} }};",
+        "",
+        "#define COMPONENT_VARIABLES \\",
+    ]
+    for v in rows:
+        role = "OUTPUT" if v.role == "derivative" else v.role.upper()
+        numbers = (v.start, v.quantity.minimum, v.quantity.maximum, v.nominal)
+        values = ", ".join(repr(float(x)) for x in numbers)
+        lines.append(f'    {{"{v.name}", TYPE_{v.type.upper()}, {role}, AT({v.member}), {values}}}, \\')
+    lines[-1] = lines[-1].removesuffix(" \\")
+    return "\n".join([*lines, "", "#endif", ""])
+
+
+def build_description(component: Component) -> str:
     """Return FMI 3.0's ``sources/buildDescription.xml``.
 
     Parameters
     ----------
-    model_identifier : str
-        As in ``modelDescription.xml``.
+    component : Component
+        The component.
 
     Returns
     -------
@@ -82,9 +155,9 @@ def build_description(model_identifier: str) -> str:
     """
     root = ET.Element("fmiBuildDescription", fmiVersion="3.0")
     for platform in (None, "x86-windows", "x86_64-windows", "aarch64-windows"):
-        configuration = ET.SubElement(root, "BuildConfiguration", modelIdentifier=model_identifier)
+        configuration = ET.SubElement(root, "BuildConfiguration", modelIdentifier=component.name)
         files = ET.SubElement(configuration, "SourceFileSet", language="C99")
-        for name in compiled_files(3):
+        for name in compiled_files(component, 3):
             ET.SubElement(files, "SourceFile", name=name)
         ET.SubElement(
             files, "PreprocessorDefinition", name="FMI3_OVERRIDE_FUNCTION_PREFIX", value="", optional="true",

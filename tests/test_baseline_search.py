@@ -12,8 +12,8 @@ from benchmarks import baselines
 from benchmarks.__main__ import main
 from benchmarks.baselines import RANGES, Candidate, Outcome, draws, outcome
 from controller import LAWS
-from cosim.scene_run import Score
 from cosim.scene import read_scenes
+from cosim.scene_run import Score
 
 ROOT = Path(__file__).parents[1]
 SCENES = ROOT / "tests" / "data" / "scenes"

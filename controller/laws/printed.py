@@ -7,7 +7,7 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 
 from controller import printed_law
-from controller.compiled import compiled
+from controller.compiled import lean
 from controller.law import Array, VehicleState, WrenchLaw
 from controller.printed_law import Gains
 from controller.regions import PackedRegions, evaluate_packed
@@ -28,9 +28,10 @@ class PrintedMemory(NamedTuple):
     gradients: Array  # (n, 3)
     turnings: Array  # (n, 3)
     clearances: Array  # (n,)
+    alphas: Array  # (n,) gains of the regions times their weights
 
 
-@compiled
+@lean
 def step(
     state: VehicleState,
     goal: PackedRegions,
@@ -45,6 +46,8 @@ def step(
     # regions push by force alone (22): what they say of attitude is passed over
     evaluate_packed(goal, p, e, memory.goal_value, memory.goal_gradient, memory.goal_turning, memory.goal_clearance)
     evaluate_packed(regions, p, e, memory.values, memory.gradients, memory.turnings, memory.clearances)
+    for i in range(weights.size):
+        memory.alphas[i] = regions.gains[i] * weights[i]
     printed_law.step(
         state.quaternion,
         state.velocity_body,
@@ -53,7 +56,7 @@ def step(
         memory.goal_gradient[0],
         memory.values,
         memory.gradients,
-        regions.gains * weights,
+        memory.alphas,
         gains,
         memory.period[0],
         memory.estimate,
@@ -76,6 +79,7 @@ def memory_of(desired_quaternion: Array, period: Array, n_regions: int) -> Print
         gradients=np.zeros((n_regions, 3)),
         turnings=np.zeros((n_regions, 3)),
         clearances=np.zeros(n_regions),
+        alphas=np.zeros(n_regions),
     )
 
 

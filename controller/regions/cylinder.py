@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import ClassVar
 
-from controller.compiled import compiled
+from controller.compiled import lean
 from controller.regions.geometry import product_distance
 from controller.regions.shape import (
     UP_TO_ROUNDING,
@@ -51,7 +51,7 @@ class Cylinder:
         return join(discs)
 
 
-@compiled
+@lean
 def cylinder(p: Array, q: Array) -> Evaluation:
     """Evaluate a packed `Cylinder` at the position `p`."""
     x, y, z = p[0] - q[0], p[1] - q[1], p[2] - q[2]

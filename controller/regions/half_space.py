@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from math import inf
 from typing import ClassVar
 
-from controller.compiled import compiled
+from controller.compiled import lean
 from controller.regions.shape import Array, Bounds, Evaluation, Vector3, require_finite, unit
 
 
@@ -32,7 +32,7 @@ class HalfSpace:
         return (-inf, -inf, -inf), (inf, inf, inf)
 
 
-@compiled
+@lean
 def half_space(p: Array, q: Array) -> Evaluation:
     """Evaluate a packed `HalfSpace` at the position `p`."""
     g = q[3] * (p[0] - q[0]) + q[4] * (p[1] - q[1]) + q[5] * (p[2] - q[2])

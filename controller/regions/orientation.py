@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from math import inf
 from typing import ClassVar
 
-from controller.compiled import compiled
-from controller.quaternion import error
+from controller.compiled import lean
+from controller.quaternion import error_parts
 from controller.regions.shape import Array, Bounds, EvaluationOfAttitude, Vector4, require, unit
 
 
@@ -38,10 +38,10 @@ class Orientation:
         return (-inf, -inf, -inf), (inf, inf, inf)
 
 
-@compiled
+@lean
 def orientation(p: Array, e: Array, q: Array) -> EvaluationOfAttitude:
     """Evaluate a packed `Orientation` at the attitude `e`, wherever that is."""
-    turn = error(q[:4], e)
+    turn = error_parts(q[:4], e)
     sine = math.sqrt(turn[1] * turn[1] + turn[2] * turn[2] + turn[3] * turn[3])
     g = 2.0 * math.atan2(sine, turn[0]) - q[4]
     if sine == 0.0 or turn[0] == 0.0:

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import ClassVar
 
-from controller.compiled import compiled
+from controller.compiled import lean
 from controller.regions.geometry import clamp
 from controller.regions.shape import Array, Bounds, Evaluation, Vector3, ball_bounds, join, require, require_finite
 
@@ -41,7 +41,7 @@ class Pipe:
         return join([ball_bounds(point, self.radius) for point in self.points])
 
 
-@compiled
+@lean
 def pipe(p: Array, q: Array) -> Evaluation:
     """Evaluate a packed `Pipe` at the position `p`."""
     nearest = math.inf

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import ClassVar
 
-from controller.compiled import compiled
+from controller.compiled import lean
 from controller.regions.geometry import clamp, product_distance
 from controller.regions.shape import Array, Bounds, Evaluation, Vector2, require, require_finite
 
@@ -79,7 +79,7 @@ def _touches_itself(corners: tuple[Vector2, ...]) -> bool:
     return False
 
 
-@compiled
+@lean
 def prism(p: Array, q: Array) -> Evaluation:
     """Evaluate a packed `Prism` at the position `p`."""
     n = (q.size - 2) // 2

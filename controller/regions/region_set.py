@@ -13,7 +13,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from controller.compiled import compiled, inlined
+from controller.compiled import compiled, inlined, lean
 from controller.errors import RegionError
 from controller.regions.box import Box, box
 from controller.regions.cone import Cone, cone
@@ -152,7 +152,7 @@ def pack(regions: Sequence[Region]) -> PackedRegions:
     )
 
 
-@compiled
+@lean
 def evaluate_shape(kind: int, p: Array, q: Array) -> Evaluation:
     """Evaluate a packed shape of position alone, told by its kind, at the position `p` [m, NED]."""
     if kind == 0:
@@ -174,14 +174,14 @@ def evaluate_shape(kind: int, p: Array, q: Array) -> Evaluation:
     return cone(p, q)
 
 
-@compiled
+@lean
 def _evaluate_shape_of_attitude(kind: int, p: Array, e: Array, q: Array) -> EvaluationOfAttitude:
     if kind == _FIRST_OF_ATTITUDE:
         return orientation(p, e, q)
     return visibility(p, e, q)
 
 
-@compiled
+@lean
 def evaluate_packed(
     regions: PackedRegions,
     position: Array,
@@ -196,15 +196,11 @@ def evaluate_packed(
         _evaluate_others(regions, position, quaternion, values, gradients, turnings, clearances)
 
 
-@compiled
+@lean
 def _evaluate_plain(
     regions: PackedRegions, position: Array, values: Array, gradients: Array, turnings: Array, clearances: Array
 ) -> bool:
-    """Evaluate spheres and bands of depth; return whether there are others.
-
-    By numbers alone, and in a loop of their own: were there but a call in it that passes arrays, taken or not, it would
-    count references at every turn, and take twenty times as long.
-    """
+    """Evaluate spheres and bands of depth, by numbers alone; return whether there are others."""
     others = False
     for i in range(regions.kinds.size):
         x = position[0] - regions.shifts[i, 0]
@@ -225,7 +221,7 @@ def _evaluate_plain(
     return others
 
 
-@compiled
+@lean
 def _evaluate_others(
     regions: PackedRegions,
     position: Array,
@@ -236,11 +232,11 @@ def _evaluate_others(
     clearances: Array,
 ) -> None:
     """Evaluate all shapes but spheres and bands of depth."""
-    at = np.empty(3)
     for i in range(regions.kinds.size):
         kind = regions.kinds[i]
-        if kind == _SPHERE or kind == _DEPTH_BAND:
+        if kind in (_SPHERE, _DEPTH_BAND):
             continue
+        at = gradients[i]  # until the gradient comes
         for j in range(3):
             at[j] = position[j] - regions.shifts[i, j]
         numbers = regions.numbers[regions.offsets[i] : regions.offsets[i + 1]]
@@ -275,6 +271,18 @@ def clearance_at(regions: PackedRegions, i: int, position: Array) -> float:
     if regions.kinds[i] >= _FIRST_OF_ATTITUDE:
         return math.inf
     return clearance_of_place(regions, i, position, np.empty(3))
+
+
+@lean
+def clearance_of_pose(regions: PackedRegions, i: int, position: Array, quaternion: Array, room: Array) -> float:
+    """Return the clearance of region `i`, of any kind, [m] or [rad], at a pose; `room` has shape (3,)."""
+    if regions.kinds[i] < _FIRST_OF_ATTITUDE:
+        return clearance_of_place(regions, i, position, room)
+    for axis in range(3):
+        room[axis] = position[axis] - regions.shifts[i, axis]
+    numbers = regions.numbers[regions.offsets[i] : regions.offsets[i + 1]]
+    clearance: float = -regions.signs[i] * _evaluate_shape_of_attitude(regions.kinds[i], room, quaternion, numbers)[0]
+    return clearance
 
 
 @inlined
@@ -324,12 +332,15 @@ def clearances_at(points: Array, region: Region) -> Array:
     ndarray, shape (m,)
         As `clearance_at` gives it [m].
     """
-    return _clearances_at(pack([region]), points)
+    clearances = np.empty(len(points))
+    _clearances_at(pack([region]), np.ascontiguousarray(points, dtype=float), np.empty(3), clearances)
+    return clearances
 
 
-@compiled
-def _clearances_at(regions: PackedRegions, points: Array) -> Array:
-    result = np.empty(points.shape[0])
+@lean
+def _clearances_at(regions: PackedRegions, points: Array, room: Array, clearances: Array) -> None:
     for i in range(points.shape[0]):
-        result[i] = clearance_at(regions, 0, points[i])
-    return result
+        if regions.kinds[0] < _FIRST_OF_ATTITUDE:
+            clearances[i] = clearance_of_place(regions, 0, points[i], room)
+        else:
+            clearances[i] = math.inf

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from math import inf
 from typing import ClassVar
 
-from controller.compiled import compiled
-from controller.quaternion import rotation_matrix
+from controller.compiled import lean
+from controller.quaternion import rotation_rows
 from controller.regions.shape import Array, Bounds, EvaluationOfAttitude, Vector3, require, require_finite, unit
 
 
@@ -48,16 +48,16 @@ class Visibility:
         return (-inf, -inf, -inf), (inf, inf, inf)
 
 
-@compiled
+@lean
 def visibility(p: Array, e: Array, q: Array) -> EvaluationOfAttitude:
     """Evaluate a packed `Visibility` at the position `p` and the attitude `e`."""
     # the feature in the body frame: u from the origin, b from the camera
-    R = rotation_matrix(e)
+    R = rotation_rows(e)
     dx, dy, dz = q[0] - p[0], q[1] - p[1], q[2] - p[2]
     ux, uy, uz = (
-        R[0, 0] * dx + R[1, 0] * dy + R[2, 0] * dz,
-        R[0, 1] * dx + R[1, 1] * dy + R[2, 1] * dz,
-        R[0, 2] * dx + R[1, 2] * dy + R[2, 2] * dz,
+        R[0][0] * dx + R[1][0] * dy + R[2][0] * dz,
+        R[0][1] * dx + R[1][1] * dy + R[2][1] * dz,
+        R[0][2] * dx + R[1][2] * dy + R[2][2] * dz,
     )
     bx, by, bz = ux - q[6], uy - q[7], uz - q[8]
     square = bx * bx + by * by + bz * bz
@@ -78,9 +78,9 @@ def visibility(p: Array, e: Array, q: Array) -> EvaluationOfAttitude:
     # db = -R^T dp + u x theta
     return (
         g,
-        -(R[0, 0] * sx + R[0, 1] * sy + R[0, 2] * sz),
-        -(R[1, 0] * sx + R[1, 1] * sy + R[1, 2] * sz),
-        -(R[2, 0] * sx + R[2, 1] * sy + R[2, 2] * sz),
+        -(R[0][0] * sx + R[0][1] * sy + R[0][2] * sz),
+        -(R[1][0] * sx + R[1][1] * sy + R[1][2] * sz),
+        -(R[2][0] * sx + R[2][1] * sy + R[2][2] * sz),
         sy * uz - sz * uy,
         sz * ux - sx * uz,
         sx * uy - sy * ux,

@@ -1,4 +1,4 @@
-"""Flights by the fused loop: the vehicle's own FMU, stepped in compiled code by the functions of the readable master."""
+"""Flights by the fused loop: the vehicle's own FMU, stepped in compiled code by the functions of the master."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from controller import Allocation
 from controller.regions import pack
 from cosim.errors import RunError, ScenarioError
-from cosim.flight import OUTPUTS, Allocator, Array, Marks, Setup, flight_of
+from cosim.flight import OUTPUTS, Allocator, Array, Marks, Setup, flight_of, room_for
 from cosim.flying.outcome import OUTCOME, Flown, nothing
 from cosim.flying.variation import Variation
 from cosim.law import law_of
@@ -24,6 +24,7 @@ from plant_fmu.running.native import Native
 
 _ROUNDING = 1e-6  # of a step, as in the master
 _NO_CLOCK = np.empty(0, np.int64)
+_NONE = Allocator(np.zeros((1, 0, 6)), np.zeros((1, 0)), np.zeros((1, 0)), False)
 
 
 class FusedFlyer:
@@ -37,7 +38,8 @@ class FusedFlyer:
     Raises
     ------
     RunError
-        If the scenario has what the loop does not: commands from outside, another arbiter than the closed one, FMI 2.0.
+        If the scenario has what the loop does not: commands from outside, another arbiter than the closed one, the
+        order of Jacobi, FMI 2.0.
     BuildError, PlantError
         If there is no FMU of the vehicle.
     """
@@ -47,6 +49,7 @@ class FusedFlyer:
         base = variation.base
         for key, came, expected in (
             ("arbiter.engine", base.arbiter.engine, "closed"),
+            ("master.order", base.master.order, "gauss-seidel"),
             ("plant.fmi", base.plant.fmi, 3),
             ("commands.enabled", base.commands.enabled, False),
         ):
@@ -115,10 +118,11 @@ class FusedFlyer:
         effectiveness = plant.native(names, ())
         effectiveness.inputs[:] = [plant[name] for name in names] if scenario.failures else 1.0
         setup = _setup(scenario, n if through else 0)
-        allocator, estimate = _allocator(scenario, setup), np.zeros(4)
+        allocator, estimate = _allocator(scenario, setup) if through else _NONE, np.zeros(4)
         decisions = -(-scenario.steps // scenario.control_every)
         rows = np.zeros((decisions, 20 + len(inputs) + law.report.size) if trace else (0, 0))
-        marks = self._flight(setup, native, effectiveness, allocator, law.gains, law.memory, estimate, rows)
+        room = room_for(len(scenario.regions), len(inputs), n)
+        marks = self._flight(setup, native, effectiveness, allocator, law.gains, law.memory, room, estimate, rows)
         return _outcome(marks, setup, native, estimate), rows
 
     def close(self) -> None:

@@ -9,6 +9,7 @@ from typing import assert_never
 import numpy as np
 
 from controller import VehicleState
+from cosim.actuators import Actuators
 from cosim.errors import OrderError
 from cosim.helm.course import Course
 from cosim.helm.orders import (
@@ -48,10 +49,10 @@ class Helm:
         What is run; its commands are enabled.
     surroundings : Surroundings
         Whose target and obstacles are moved.
+    actuators : Actuators
+        Whose limits are changed.
     state : VehicleState
         The vehicle as the law is told.
-    reach : ndarray, shape (6,)
-        Greatest wrench along and about each body axis [N, N m], which full sticks are parts of.
     out : ndarray, shape (7,)
         Receives armed, mode, item of the mission (-1 for none), and the target's middle [m, NED] and radius [m].
 
@@ -65,23 +66,29 @@ class Helm:
         Who steers, and whither.
     heading : float or None
         Heading to be kept [rad], once one is ordered.
-    took_over, turned : bool
-        Whether the law steers from now on and did not before, and whether another heading was ordered, since `heeded`.
-    changed : list of str
-        Settings that were changed since `heeded`.
+    took_over, turned, changed : bool
+        Whether the law steers from now on and did not before, another heading was ordered, and settings were changed,
+        since `heeded`.
     reset : bool
         Whether the run is to begin again.
     """
 
     def __init__(
-        self, scenario: Scenario, surroundings: Surroundings, state: VehicleState, reach: Array, out: Array
+        self,
+        scenario: Scenario,
+        surroundings: Surroundings,
+        actuators: Actuators,
+        state: VehicleState,
+        out: Array,
     ) -> None:
         self.settings = LiveSettings(scenario)
         self.armed, self.mode = not scenario.commands.await_arm, "reach"
         self.heading: float | None = None
-        self.took_over = self.turned = self.reset = False
-        self.changed: list[str] = []
-        self._surroundings, self._state, self._reach, self._out = surroundings, state, reach, out
+        self.took_over = self.turned = self.changed = self.reset = False
+        self._surroundings, self._actuators, self._state, self._out = surroundings, actuators, state, out
+        vehicle = scenario.vehicle
+        # greatest wrench along and about each axis, which full sticks are parts of
+        self._reach = greatest_wrench(vehicle.thruster_matrix, vehicle.thrust_min, vehicle.thrust_max)
         self._sticks: Array = np.zeros(6)
         self._course = Course()
         self._slots: dict[int, int] = {}  # obstacles that came, by their number
@@ -140,7 +147,8 @@ class Helm:
                     self._free = sorted([*self._free, slot])
             case Change():
                 self.settings.change(order.key, order.value)
-                self.changed.append(order.key)
+                self.changed = True
+                self._apply(order.key)
             case Mission():
                 self._course.take(order.items)
                 if self.mode == "mission":
@@ -156,8 +164,17 @@ class Helm:
 
     def heeded(self) -> None:
         """Note that whoever steps the run has taken over what is new."""
-        self.took_over = self.turned = False
-        self.changed.clear()
+        self.took_over = self.turned = self.changed = False
+
+    def _apply(self, key: str) -> None:
+        """Bring a changed setting to regions and actuators; the law's gains and the arbiter's ramp the master takes."""
+        settings, region = self.settings, self.settings.region_of(key)
+        if region is not None and key.endswith(".gain"):
+            self._surroundings.set_gain(region, settings[key])
+        elif region is not None:
+            self._surroundings.set_shape(region, settings.shapes[region])
+        elif key in settings.of_plant:
+            self._actuators.limit(settings.of_plant[key], settings[key])
 
     def _steer(self, mode: Mode, time: float) -> None:
         here: Vector3 = (float(self._state.position[0]), float(self._state.position[1]), float(self._state.position[2]))

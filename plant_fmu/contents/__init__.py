@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from importlib import resources
 from string import Template
 
@@ -9,11 +10,12 @@ from plant_fmu.contents.layered import FOLDER, layered_files
 from plant_fmu.contents.licenses import licenses
 from plant_fmu.contents.page import page, text
 from plant_fmu.contents.terminals import terminals_and_icons
+from plant_fmu.variables import Variable
 from plant_fmu.vehicle import Vehicle
 
 
-def contents(vehicle: Vehicle, fmi: int) -> dict[str, bytes]:
-    """Return the members of an FMU that are neither description nor binary nor source.
+def contents(vehicle: Vehicle, fmi: int, rows: Sequence[Variable] | None = None) -> dict[str, bytes]:
+    """Return the members of a vehicle's FMU that are neither description nor binary nor source.
 
     Parameters
     ----------
@@ -21,6 +23,8 @@ def contents(vehicle: Vehicle, fmi: int) -> dict[str, bytes]:
         The vehicle.
     fmi : int
         2 or 3.
+    rows : sequence of Variable, optional
+        Its variables, where they start at other values than the vehicle's own.
 
     Returns
     -------
@@ -34,12 +38,12 @@ def contents(vehicle: Vehicle, fmi: int) -> dict[str, bytes]:
     VehicleError
         If a number of the vehicle is beyond the range of its parameter.
     """
-    references = layered_files(vehicle)
+    references = layered_files(vehicle, rows)
     guide = text("fmi-ls-ref.txt")
     if f"{vehicle.name}_out.csv" in references:
         guide += text("fmi-ls-ref-results.txt")
     texts = {
-        "documentation/index.html": page(vehicle, fmi),
+        "documentation/index.html": page(vehicle, fmi, rows),
         "documentation/fmi-ls-ref.txt": Template(guide).substitute(name=vehicle.name),
         **{f"documentation/licenses/{name}": licence for name, licence in licenses(fmi).items()},
         **{f"{FOLDER}/{name}": file for name, file in references.items()},

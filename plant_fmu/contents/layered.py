@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from importlib import resources
 from xml.etree import ElementTree as ET
 
@@ -10,7 +11,7 @@ import numpy as np
 from plant_fmu.contents.parameter_set import parameter_set, ssv
 from plant_fmu.contents.reference import COLUMNS, CURRENT, START, Reference
 from plant_fmu.markup import xml_text
-from plant_fmu.variables import variables
+from plant_fmu.variables import Variable, variables
 from plant_fmu.vehicle import Vehicle, load_vehicle, shipped_vehicles
 
 FOLDER = "extra/org.fmi-standard.fmi-ls-ref"
@@ -27,13 +28,15 @@ _START = "Start of the reference manoeuvre, and its current"
 _DIGITS = 11  # significant: more than the plant's own integration holds
 
 
-def layered_files(vehicle: Vehicle) -> dict[str, str]:
+def layered_files(vehicle: Vehicle, rows: Sequence[Variable] | None = None) -> dict[str, str]:
     """Return the files of ``extra/org.fmi-standard.fmi-ls-ref``, by name.
 
     Parameters
     ----------
     vehicle : Vehicle
         The vehicle.
+    rows : sequence of Variable, optional
+        Of its FMU, where they start at other values than the vehicle's own.
 
     Returns
     -------
@@ -43,8 +46,8 @@ def layered_files(vehicle: Vehicle) -> dict[str, str]:
     """
     name = vehicle.name
     related = [(f"{name}.ssv", _SSV, "parameter", f"Parameters of {vehicle.title}")]
-    files = {f"{name}.ssv": ssv(vehicle)}
-    if _is_shipped(vehicle):
+    files = {f"{name}.ssv": ssv(vehicle, rows)}
+    if rows is None and _is_shipped(vehicle):
         # computed once and kept: the last digits of an integration depend on the machine, those of an FMU must not
         folder = resources.files("plant_fmu.contents") / "references"
         results = [

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from html import escape
 from importlib import metadata, resources
 from string import Template
@@ -22,7 +23,7 @@ _ROLES = {
 }
 
 
-def page(vehicle: Vehicle, fmi: int) -> str:
+def page(vehicle: Vehicle, fmi: int, rows: Sequence[Variable] | None = None) -> str:
     """Return the documentation of a vehicle's FMU.
 
     Parameters
@@ -31,15 +32,14 @@ def page(vehicle: Vehicle, fmi: int) -> str:
         The vehicle.
     fmi : int
         2 or 3.
+    rows : sequence of Variable, optional
+        Of its FMU, where they start at other values than the vehicle's own.
 
     Returns
     -------
     str
         An HTML page: the equations from ``pages/index.html`` in the package, and tables of the variables.
     """
-    rows = [v for v in variables(vehicle) if v.role != "time"]
-    roles = list(dict.fromkeys([*_ROLES, *(v.role for v in rows)]))
-    sections = [(role, [v for v in rows if v.role == role]) for role in roles]
     return Template(text("index.html")).substitute(
         name=escape(vehicle.name),
         title=escape(vehicle.title),
@@ -48,7 +48,7 @@ def page(vehicle: Vehicle, fmi: int) -> str:
         version=escape(metadata.version("subreach")),
         icon=text("icon.svg"),
         glance="\n".join(_glance(vehicle)),
-        variables="\n".join(line for role, members in sections if members for line in _table(role, members)),
+        variables=tables(variables(vehicle) if rows is None else rows),
     )
 
 
@@ -66,6 +66,25 @@ def text(name: str) -> str:
         What is in it.
     """
     return (resources.files("plant_fmu.contents") / "pages" / name).read_text(encoding="utf-8")
+
+
+def tables(rows: Sequence[Variable]) -> str:
+    """Return tables of variables, one for each role.
+
+    Parameters
+    ----------
+    rows : sequence of Variable
+        Of an FMU.
+
+    Returns
+    -------
+    str
+        HTML.
+    """
+    shown = [v for v in rows if v.role != "time"]
+    roles = list(dict.fromkeys([*_ROLES, *(v.role for v in shown)]))
+    sections = [(role, [v for v in shown if v.role == role]) for role in roles]
+    return "\n".join(line for role, members in sections if members for line in _table(role, members))
 
 
 def _glance(vehicle: Vehicle) -> list[str]:

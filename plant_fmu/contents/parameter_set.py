@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from importlib import metadata
 from xml.etree import ElementTree as ET
 
@@ -17,13 +17,15 @@ _NAMESPACES = {
 }
 
 
-def ssv(vehicle: Vehicle) -> str:
+def ssv(vehicle: Vehicle, rows: Sequence[Variable] | None = None) -> str:
     """Return the parameter set of a vehicle: every parameter of its FMU, with the vehicle's value.
 
     Parameters
     ----------
     vehicle : Vehicle
         The vehicle.
+    rows : sequence of Variable, optional
+        Of its FMU, where they start at other values than the vehicle's own.
 
     Returns
     -------
@@ -35,7 +37,7 @@ def ssv(vehicle: Vehicle) -> str:
     VehicleError
         If a number of the vehicle is beyond the range of its parameter.
     """
-    values = [(v, v.start) for v in variables(vehicle) if v.role == "parameter"]
+    values = [(v, v.start) for v in (variables(vehicle) if rows is None else rows) if v.role == "parameter"]
     return parameter_set(vehicle.name, f"{vehicle.title}. {vehicle.source}", values)
 
 

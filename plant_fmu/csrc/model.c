@@ -28,6 +28,18 @@ static void hold_current(Model *m)
     drift->since = m->time;
 }
 
+static double next_tick_of(const Clock *clock)
+{
+    return clock->period > 0.0 ? clock->since + clock->ticks * clock->period : INFINITY;
+}
+
+static void note_next_tick(Held *held)
+{
+    held->next_tick = INFINITY;
+    for (int i = 0; i < N_CLOCKS; i++)
+        held->next_tick = fmin(held->next_tick, next_tick_of(&held->clocks[i]));
+}
+
 const char *model_prepare(Model *m)
 {
     const Parameters *p = &m->plant.parameters;
@@ -53,21 +65,13 @@ const char *model_prepare(Model *m)
     for (int i = 0; i < 3; i++)
         if (p->current_variation[i] == 0.0)
             drift->value[i] = drift->slope[i] = drift->deviation[i] = 0.0;
+    note_next_tick(&m->held);
     return NULL;
-}
-
-static double next_tick_of(const Clock *clock)
-{
-    return clock->period > 0.0 ? clock->since + clock->ticks * clock->period : INFINITY;
 }
 
 double model_next_tick(const Model *m)
 {
-    double next = INFINITY;
-
-    for (int i = 0; i < N_CLOCKS; i++)
-        next = fmin(next, next_tick_of(&m->held.clocks[i]));
-    return next;
+    return m->held.next_tick;
 }
 
 /* The current's variation from one knot of a first-order Gauss-Markov process to the next (exact at the knots). */
@@ -97,6 +101,8 @@ int model_tick(Model *m)
 {
     int ticked = 0, measured = 0;
 
+    if (m->held.next_tick == INFINITY) /* no clock runs */
+        return 0;
     for (int i = N_CLOCKS - 1; i >= 0; i--) { /* the current before the sensors, which may feel it */
         Clock *clock = &m->held.clocks[i];
         /* importers add up their time, and so may come a little early */
@@ -121,6 +127,7 @@ int model_tick(Model *m)
             sensors_sample(&m->plant.parameters, i, count, ideal, m->held.samples);
         }
     }
+    note_next_tick(&m->held);
     return ticked;
 }
 
@@ -133,26 +140,39 @@ int model_holds(const Model *m, int channel)
     return clock->period > 0.0 && clock->samples > 0.0;
 }
 
+/* Roll, pitch, yaw (zyx) of a quaternion. */
+static void euler_angles(const double e[4], double euler[3])
+{
+    double R[3][3];
+
+    plant_rotation(e, R);
+    const double cosine = hypot(R[2][1], R[2][2]);
+    const int upright = cosine > UPRIGHT; /* else roll and yaw are one, and all is called yaw */
+
+    euler[0] = upright ? atan2(R[2][1], R[2][2]) : 0.0;
+    euler[1] = atan2(-R[2][0], cosine);
+    euler[2] = upright ? atan2(R[1][0], R[0][0]) : atan2(-R[0][1], R[1][1]);
+}
+
 void model_evaluate(Model *m)
 {
     const Parameters *p = &m->plant.parameters;
     Outputs *o = &m->outputs;
     Actuators target, now;
-    double contact[3];
 
     actuators_target(p, &m->inputs, &target, o->flags.thrust_cut, &o->flags.wrench_cut);
-    actuators_after(p, &m->state.actuators, &target, 0.0, &now);
+    actuators_settle(&m->plant, &m->state.actuators, &target, &now);
     actuators_wrench(p, &now, o->wrench);
     for (int i = 0; i < N_THRUSTERS; i++)
         o->thrust[i] = p->thrust_effectiveness[i] * now.thrust[i];
 
     plant_derivative(&m->plant, &m->held.drift, m->time, m->state.rigid, o->wrench, o->rate.rigid);
-    actuators_rate(p, &m->state.actuators, &target, &o->rate.actuators);
+    actuators_rate(&m->plant, &m->state.actuators, &target, &o->rate.actuators);
 
-    plant_euler(m->state.rigid + 3, o->euler);
+    euler_angles(m->state.rigid + 3, o->euler);
     environment_current(p, &m->held.drift, m->time, m->state.rigid[2], o->water);
     o->altitude = p->bottom_depth - m->state.rigid[2];
-    o->flags.bottom_touched = environment_contact(&m->plant, m->state.rigid[2], o->rate.rigid, contact);
+    o->flags.bottom_touched = environment_sunk(p, m->state.rigid[2]) > 0.0;
 
     sensors_measure(p, m->state.rigid, o->rate.rigid, o->euler[2], o->altitude, o->measured);
     for (int i = 0; i < N_MEASURED; i++)
@@ -164,10 +184,10 @@ int model_settle(Model *m)
 {
     const Actuators before = m->state.actuators;
     Actuators target;
-    int thrust_cut[N_THRUSTERS], wrench_cut;
+    Mask thrust_cut[N_THRUSTERS], wrench_cut;
 
     actuators_target(&m->plant.parameters, &m->inputs, &target, thrust_cut, &wrench_cut);
-    actuators_after(&m->plant.parameters, &before, &target, 0.0, &m->state.actuators);
+    actuators_settle(&m->plant, &before, &target, &m->state.actuators);
     return memcmp(&before, &m->state.actuators, sizeof before) != 0;
 }
 
@@ -176,24 +196,17 @@ int model_settle(Model *m)
 int model_advance(Model *m, double end, double *failed)
 {
     const double hair = 1e-9 * (end - m->time); /* no segment is shorter */
-    int thrust_cut[N_THRUSTERS], wrench_cut;
+    Mask thrust_cut[N_THRUSTERS], wrench_cut;
     Actuators target;
 
     model_tick(m);
     actuators_target(&m->plant.parameters, &m->inputs, &target, thrust_cut, &wrench_cut);
     while (m->time < end) {
-        const double tick = model_next_tick(m), until = tick < end - hair ? tick : end;
-        const double start = m->time;
-        const double rounding = 1e-9 + 1e-15 * fabs(end) / m->plant.parameters.substep;
-        const int n = (int)fmax(1.0, ceil((until - start) / m->plant.parameters.substep - rounding));
-        const double h = (until - start) / n;
+        const double tick = m->held.next_tick, until = tick < end - hair ? tick : end;
 
-        *failed = h;
-        if (!plant_follows(&m->plant, &m->held.drift, start, h, m->state.rigid))
+        if (!plant_advance(&m->plant, &m->held.drift, m->time, until, m->plant.parameters.substep, &target, &m->state,
+                           failed))
             return 0;
-        for (int i = 0; i < n; i++)
-            if (!plant_step(&m->plant, &m->held.drift, start + i * h, &target, h, &m->state))
-                return 0;
         m->time = until;
         model_tick(m);
     }

@@ -4,6 +4,8 @@
 
 #include "plant.h"
 
+#define UPRIGHT 1e-12 /* cosine of pitch below which roll and yaw are one */
+
 enum { CURRENT_CLOCK = N_SENSORS, N_CLOCKS }; /* one for each sensor, one for the current's variation */
 
 typedef struct {
@@ -15,13 +17,14 @@ typedef struct {
 
 typedef struct { /* what changes at ticks alone */
     Clock clocks[N_CLOCKS];
+    double next_tick; /* s, of any clock; INFINITY if none runs */
     double samples[N_MEASURED];
     Drift drift;
 } Held;
 
 typedef struct {
-    int thrust_cut[N_THRUSTERS]; /* a command was beyond its limits */
-    int wrench_cut;
+    Mask thrust_cut[N_THRUSTERS]; /* a command was beyond its limits */
+    Mask wrench_cut;
     int bottom_touched;
 } Flags;
 

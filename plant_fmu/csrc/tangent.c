@@ -170,14 +170,14 @@ static void derivative_tangent(const Model *m, const Model *seed, const double r
     subtract_coriolis_tangent(a, da, nu, dnu, dwrench);
 
     symmetric6(dp->added_mass, dadded_mass);
-    multiply6(p->added_mass, nu_r, added);
-    multiply6(p->added_mass, dnu_r, dadded);
+    multiply6(m->plant.derived.added_mass, nu_r, added);
+    multiply6(m->plant.derived.added_mass, dnu_r, dadded);
     multiply6((const double(*)[6])dadded_mass, nu_r, term);
     for (int i = 0; i < 6; i++)
         dadded[i] += term[i];
     subtract_coriolis_tangent(added, dadded, nu_r, dnu_r, dwrench);
 
-    multiply6(p->added_mass, dnu_c_rate, term);
+    multiply6(m->plant.derived.added_mass, dnu_c_rate, term);
     for (int i = 0; i < 6; i++)
         dwrench[i] += term[i];
     multiply6((const double(*)[6])dadded_mass, nu_c_rate, term);
@@ -203,9 +203,10 @@ static void derivative_tangent(const Model *m, const Model *seed, const double r
         dwrench[3 + i] += left[i] + right[i];
     }
 
-    double contact[3], dcontact[3];
-    if (environment_contact(&m->plant, x[2], rate, contact)) {
-        double dM[6][6];
+    const double sunk = environment_sunk(p, x[2]);
+    if (sunk > 0.0) {
+        double contact[3], dcontact[3], dM[6][6];
+        environment_contact(&m->plant, sunk, rate, contact);
         mass_matrix_tangent(p, dp, dM);
         environment_contact_tangent(&m->plant, dp, (const double(*)[6])dM, x[2], dx[2], rate, drate, dcontact);
         for (int i = 0; i < 3; i++)

@@ -1,9 +1,14 @@
 """Compilation: what is cached is never older than any source it was made from."""
 
+import importlib
+import pkgutil
 from pathlib import Path
 
 import numpy as np
+from numba.core.dispatcher import Dispatcher
 
+import controller
+import cosim
 from controller import compiled as module
 from controller import regions
 from controller.compiled import compiled
@@ -36,6 +41,7 @@ def test_the_stamp_is_of_whatever_else_is_named_too(tmp_path):
 
 def test_without_numbas_insides_nothing_is_cached(monkeypatch):
     real = module.numba.njit
+    real(lambda x: x)(1.0)  # what Numba compiles of its own it loads now
     made = []
 
     def njit(**options):
@@ -67,3 +73,27 @@ def test_without_a_place_to_keep_it_nothing_is_cached(monkeypatch):
 
 def test_division_by_zero_gives_what_numpy_gives():
     assert np.isinf(compiled(lambda x: 1.0 / x)(0.0))
+
+
+def lean_functions():
+    """All functions of the project that count no references."""
+    found = {}
+    for package in (controller, cosim):
+        for info in pkgutil.walk_packages(package.__path__, f"{package.__name__}."):
+            if info.name.endswith("__main__"):
+                continue
+            for value in vars(importlib.import_module(info.name)).values():
+                if isinstance(value, Dispatcher) and value.targetoptions.get("_nrt") is False:
+                    found[f"{value.py_func.__module__}.{value.py_func.__qualname__}"] = value
+    return found
+
+
+def test_what_counts_no_references_calls_nothing_that_returns_an_array():
+    """Its result would never be freed."""
+    functions = lean_functions()
+    assert "controller.regions.visibility.visibility" in functions and "cosim.native.read" in functions
+    for name, function in functions.items():
+        python = function.py_func
+        for called in (python.__globals__.get(word) for word in python.__code__.co_names):
+            if isinstance(called, Dispatcher):
+                assert "Array" not in str(called.py_func.__annotations__.get("return")), (name, called)

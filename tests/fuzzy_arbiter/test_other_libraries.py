@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from benchmarks.fuzzy import OTHER_PYTHON, ask, interpreter
-from benchmarks.fuzzy_libraries import LIBRARIES
+from benchmarks.peers.fuzzy_libraries import LIBRARIES
 from fuzzy_arbiter import Arbiter, prioritised
 from fuzzy_arbiter.engines.scikit import ScikitEngine
 from tests.fuzzy_arbiter.engines.test_grid import exact_centroid
@@ -52,7 +52,7 @@ def test_the_tables_are_what_the_libraries_give(library, system):
     if python is None:
         pytest.skip(f"{library} is not installed, and {OTHER_PYTHON} names no Python that has it")
     kept = table(library, system)
-    answer = ask(python, library=library, system=system, resolution=100, inputs=kept["inputs"], repeats=0)
+    answer = ask(python, library=library, system=system, resolution=100, inputs=kept["inputs"])
     assert answer["text"].splitlines() == kept["text"]
     assert np.abs(np.subtract(answer["outputs"], kept["outputs"]["100"])).max() <= 1e-12
 

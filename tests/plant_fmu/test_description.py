@@ -11,8 +11,10 @@ from fmpy import read_model_description
 from fmpy.validation import validate_fmu
 
 from plant_fmu import cached_fmu, load_vehicle, shipped_vehicles
-from plant_fmu.description import documentation, header, model_description
+from plant_fmu.component import of_vehicle
+from plant_fmu.description import documentation, model_description
 from plant_fmu.quantities import UNITS
+from plant_fmu.sources import header
 from plant_fmu.variables import variables
 
 ROOT = Path(__file__).parents[2]
@@ -37,6 +39,7 @@ def test_every_variable_has_what_a_user_needs():
             assert v.nominal > 0.0
 
 
+@pytest.mark.parametrize("fmi", [pytest.param(2, marks=pytest.mark.slow), 3], ids=["fmi2", "fmi3"])
 def test_the_fmu_starts_with_what_the_description_says(make_slave, fmi):
     """The XML's start values are compiled into the binary too: a tool that sets none must get the same."""
     slave = make_slave("bluerov2_heavy", fmi)
@@ -79,14 +82,14 @@ def test_dependencies_name_what_an_output_follows_from(fmi):
 
 
 def test_header_names_each_variable_once():
-    text = header(load_vehicle("odin"), "{token}")
+    text = header(of_vehicle(load_vehicle("odin")), "{token}")
     names = re.findall(r'\{"([^"]+)"', text)
     assert names == [v.name for v in variables(load_vehicle("odin"))]
 
 
 @pytest.mark.slow
 def test_token_changes_with_the_numbers():
-    descriptions = {model_description(load_vehicle(name), 3, "") for name in shipped_vehicles()}
+    descriptions = {model_description(of_vehicle(load_vehicle(name)), 3, "") for name in shipped_vehicles()}
     tokens = {read_model_description(str(cached_fmu(load_vehicle(name), 3))).guid for name in shipped_vehicles()}
     assert len(descriptions) == len(tokens) == len(shipped_vehicles())
 
@@ -97,7 +100,7 @@ def test_docs_page_is_up_to_date():
 
 def test_odin_is_labelled_as_unsourced():
     assert "unsourced" in load_vehicle("odin").title
-    assert "unsourced" in model_description(load_vehicle("odin"), 3, "")
+    assert "unsourced" in model_description(of_vehicle(load_vehicle("odin")), 3, "")
 
 
 def test_no_python_inside(fmi, tmp_path):

@@ -1,4 +1,4 @@
-/* One instance of the plant behind an FMI wrapper: variables by value reference, modes, checks, messages.
+/* One instance of a component behind an FMI wrapper: variables by value reference, modes, checks, messages.
  * Neutral to the FMI version; fmi2.c and fmi3.c translate to and from it. */
 #ifndef INSTANCE_H
 #define INSTANCE_H
@@ -6,13 +6,11 @@
 #include <stdbool.h>
 #include <stddef.h>
 
-#include "model.h"
+#include "component.h" /* names the functions, and holds the model */
 
 enum { MAX_MESSAGE = 512 }; /* bytes of a logged message */
 
 #define MAX_TIME 1e9 /* s */
-
-typedef enum { STATUS_OK, STATUS_WARNING, STATUS_DISCARD, STATUS_ERROR, STATUS_FATAL } Status; /* as in FMI */
 
 typedef enum { CO_SIMULATION, MODEL_EXCHANGE } Interface;
 
@@ -38,14 +36,13 @@ typedef struct {
     double start, min, max, nominal;
 } Variable;
 
-typedef struct Instance Instance;
 typedef void LogCallback(const Instance *instance, Status status, const char *category, const char *message);
 
 struct Instance {
     Model model;
     Interface kind;
     Mode mode;
-    bool unprepared;      /* parameters changed since model_prepare */
+    bool unprepared;      /* parameters changed since the component was prepared */
     bool outdated;        /* outputs are older than the state, the inputs or the parameters */
     unsigned categories;  /* of LogCategories, that are wanted */
     char *name;
@@ -75,6 +72,9 @@ Status instance_update(Instance *instance);
 
 /* Brings constants and clocks up to the parameters. */
 Status instance_prepare(Instance *instance);
+
+/* Whether initialisation has not ended. */
+bool instance_starting(const Instance *instance);
 
 /* Logs an error in printf's manner, unless errors were switched off, and returns STATUS_ERROR, so that a check is one
  * line. */

@@ -7,6 +7,8 @@
 static Status prepare(Instance *instance, const unsigned unknowns[], size_t n_unknowns, const unsigned knowns[],
                       size_t n_knowns)
 {
+    if (!COMPONENT.tangent)
+        return instance_unsupported(instance, "derivatives");
     if (instance_require(instance, ~(unsigned)MODE_INSTANTIATED, "derivatives") != STATUS_OK)
         return STATUS_ERROR;
     for (size_t i = 0; i < n_unknowns; i++) {
@@ -38,7 +40,7 @@ Status instance_directional_derivative(Instance *instance, const unsigned unknow
     memset(&direction, 0, sizeof direction);
     for (size_t i = 0; i < n_knowns; i++)
         *variable_real(&direction, &VARIABLES[knowns[i]]) += seed[i];
-    model_tangent(&instance->model, &direction, starting(instance), &tangent);
+    COMPONENT.tangent(&instance->model, &direction, starting(instance), &tangent);
     for (size_t i = 0; i < n_unknowns; i++)
         sensitivity[i] = *variable_real(&tangent, &VARIABLES[unknowns[i]]);
     return STATUS_OK;
@@ -57,7 +59,7 @@ Status instance_adjoint_derivative(Instance *instance, const unsigned unknowns[]
     for (size_t i = 0; i < n_knowns; i++) {
         double *at = variable_real(&direction, &VARIABLES[knowns[i]]);
         *at = 1.0;
-        model_tangent(&instance->model, &direction, starting(instance), &tangent);
+        COMPONENT.tangent(&instance->model, &direction, starting(instance), &tangent);
         *at = 0.0;
         sensitivity[i] = 0.0;
         for (size_t j = 0; j < n_unknowns; j++)

@@ -66,8 +66,8 @@ fmi3Instance fmi3InstantiateScheduledExecution(fmi3String instanceName, fmi3Stri
 {
     (void)instanceName, (void)instantiationToken, (void)resourcePath, (void)visible, (void)loggingOn;
     (void)clockUpdate, (void)lockPreemption, (void)unlockPreemption;
-    return refuse_instance(instanceEnvironment, logMessage,
-                       "this FMU offers co-simulation and model exchange, not scheduled execution");
+    const char *both = "this FMU offers co-simulation and model exchange, not scheduled execution";
+    return refuse_instance(instanceEnvironment, logMessage, COMPONENT.settle ? both : "this FMU offers co-simulation alone");
 }
 
 void fmi3FreeInstance(fmi3Instance instance)

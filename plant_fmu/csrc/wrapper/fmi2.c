@@ -176,7 +176,7 @@ fmi2Status fmi2GetBooleanStatus(fmi2Component c, const fmi2StatusKind s, fmi2Boo
 {
     if (s != fmi2Terminated)
         return (fmi2Status)instance_unsupported(c, "fmi2GetBooleanStatus of this kind");
-    *value = fmi2False; /* the plant never ends a simulation */
+    *value = fmi2False; /* no component ends a simulation */
     return fmi2OK;
 }
 

@@ -7,7 +7,7 @@
 
 #define AT(member) offsetof(Model, member)
 
-const Variable VARIABLES[] = {VEHICLE_VARIABLES};
+const Variable VARIABLES[] = {COMPONENT_VARIABLES};
 const unsigned N_VARIABLES = sizeof VARIABLES / sizeof VARIABLES[0];
 
 static const char *const TYPE_NAMES[] = {"real", "Integer", "Boolean"};
@@ -150,7 +150,7 @@ const Variable *variables_stray(const Model *model)
 
 const Variable *variables_stray_state(const Model *model)
 {
-    for (unsigned i = 0; i < N_STATES; i++)
+    for (int i = 0; i < (int)N_STATES; i++)
         if (strays(model, &VARIABLES[FIRST_STATE + i]))
             return &VARIABLES[FIRST_STATE + i];
     return NULL;

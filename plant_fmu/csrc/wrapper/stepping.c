@@ -4,8 +4,6 @@
 
 #include "instance.h"
 
-static const double MAX_SUBSTEPS = 1e6; /* in one step */
-
 /* ---- co-simulation ----------------------------------------------------------------------------------------- */
 
 /* Whether a step from `time` fits the experiment. Masters add up their time: they are allowed their rounding. */
@@ -17,7 +15,7 @@ static Status check_step(const Instance *instance, double time, double step)
     if (!isfinite(step) || step <= 0.0 || m->time + step == m->time)
         return instance_refuse(instance, "step size is %g s, expected a positive number", step);
     if (!(fabs(time - m->time) <= rounding))
-        return instance_refuse(instance, "step from t = %.12g s, but the plant is at %.12g s", time, m->time);
+        return instance_refuse(instance, "step from t = %.12g s, but %s is at %.12g s", time, COMPONENT.name, m->time);
     if (!(time + step > m->time))
         return instance_refuse(instance, "step of %g s from t = %.12g s does not advance", step, time);
     if (time + step > m->stop_time + rounding)
@@ -26,49 +24,25 @@ static Status check_step(const Instance *instance, double time, double step)
 
     if (time + step > MAX_TIME)
         return instance_refuse(instance, "step to t = %.12g s is beyond %g s", time + step, MAX_TIME);
-
-    double substeps = step / m->plant.parameters.substep;
-    for (int i = 0; i < N_CLOCKS; i++)
-        if (m->held.clocks[i].period > 0.0)
-            substeps += step / m->held.clocks[i].period;
-    if (substeps > MAX_SUBSTEPS)
-        return instance_refuse(instance, "step of %g s needs %.3g substeps (parameter substep and rates of sensors), %g at the most",
-                               step, substeps, MAX_SUBSTEPS);
-    return STATUS_OK;
+    return COMPONENT.fits(instance, step);
 }
 
 Status instance_step(Instance *instance, double time, double step)
 {
-    Model *m = &instance->model;
-
     if (instance_require(instance, MODE_STEPPING, "stepping") != STATUS_OK || instance_prepare(instance) != STATUS_OK ||
         check_step(instance, time, step) != STATUS_OK)
         return STATUS_ERROR;
-
-    const double before = m->time;
-    const State state = m->state;
-    const Held held = m->held;
-    double failed = 0.0;
-    const Variable *stray = NULL;
-
     instance->outdated = true;
-    if (model_advance(m, time + step, &failed) && !(stray = variables_stray_state(m)))
-        return STATUS_OK;
-
-    const double value = stray ? *variable_real(m, stray) : 0.0;
-    m->time = before;
-    m->state = state;
-    m->held = held;
-    if (stray)
-        return instance_refuse(instance, "step from t = %.9g s not taken: %s becomes %.9g, outside [%.9g, %.9g]", time,
-                               stray->name, value, stray->min, stray->max);
-    return instance_refuse(instance,
-                           "step from t = %.9g s not taken: integration steps of %g s are too long for this motion, its "
-                           "forces or its damping (parameter substep)",
-                           time, failed);
+    return COMPONENT.advance(instance, time + step);
 }
 
 /* ---- model exchange ---------------------------------------------------------------------------------------- */
+
+/* Where the states stand, or their derivatives, one behind the other. */
+static double *states_at(Model *model, int first)
+{
+    return variable_real(model, &VARIABLES[first]);
+}
 
 static Status require_count(const Instance *instance, size_t n, const char *action)
 {
@@ -82,7 +56,7 @@ Status instance_enter_event_mode(Instance *instance, unsigned from)
     if (instance_require(instance, from, "entering event mode") != STATUS_OK ||
         instance_prepare(instance) != STATUS_OK)
         return STATUS_ERROR;
-    model_settle(&instance->model);
+    COMPONENT.settle(&instance->model);
     instance->mode = MODE_EVENT;
     instance->outdated = true;
     return STATUS_OK;
@@ -104,10 +78,10 @@ Status instance_update_discrete(Instance *instance, bool *states_changed, double
     if (instance_require(instance, MODE_EVENT, "updating discrete states") != STATUS_OK ||
         instance_prepare(instance) != STATUS_OK)
         return STATUS_ERROR;
-    *states_changed = model_settle(m) != 0;
-    if (model_tick(m))
+    *states_changed = COMPONENT.settle(m) != 0;
+    if (COMPONENT.tick(m))
         instance_tell(instance, LOG_EVENTS, "sampled at t = %.9g s", m->time);
-    *next_event_time = model_next_tick(m);
+    *next_event_time = COMPONENT.next_tick(m);
     instance->outdated = true;
     return STATUS_OK;
 }
@@ -126,16 +100,17 @@ Status instance_set_time(Instance *instance, double time)
 Status instance_set_states(Instance *instance, const double states[], size_t n)
 {
     Model *m = &instance->model;
-    const State before = m->state;
+    double before[N_STATES + 1]; /* C has no arrays of none */
 
     if (instance_require(instance, MODE_CONTINUOUS, "setting continuous states") != STATUS_OK ||
         require_count(instance, n, "setting continuous states") != STATUS_OK)
         return STATUS_ERROR;
-    memcpy(&m->state, states, sizeof m->state);
+    memcpy(before, states_at(m, FIRST_STATE), N_STATES * sizeof(double));
+    memcpy(states_at(m, FIRST_STATE), states, N_STATES * sizeof(double));
     const Variable *stray = variables_stray_state(m);
     if (stray) { /* an integrator may try again with a shorter step */
         const double value = *variable_real(m, stray);
-        m->state = before;
+        memcpy(states_at(m, FIRST_STATE), before, N_STATES * sizeof(double));
         return instance_tell(instance, LOG_DISCARDS, "%s = %.9g discarded: outside [%.9g, %.9g]", stray->name, value,
                              stray->min, stray->max);
     }
@@ -147,7 +122,7 @@ Status instance_get_states(Instance *instance, double states[], size_t n)
 {
     if (require_count(instance, n, "getting continuous states") != STATUS_OK)
         return STATUS_ERROR;
-    memcpy(states, &instance->model.state, sizeof(State));
+    memcpy(states, states_at(&instance->model, FIRST_STATE), N_STATES * sizeof(double));
     return STATUS_OK;
 }
 
@@ -157,7 +132,7 @@ Status instance_get_derivatives(Instance *instance, double derivatives[], size_t
                          "getting derivatives") != STATUS_OK ||
         require_count(instance, n, "getting derivatives") != STATUS_OK || instance_update(instance) != STATUS_OK)
         return STATUS_ERROR;
-    memcpy(derivatives, &instance->model.outputs.rate, sizeof(State));
+    memcpy(derivatives, states_at(&instance->model, FIRST_DERIVATIVE), N_STATES * sizeof(double));
     return STATUS_OK;
 }
 

@@ -125,6 +125,11 @@ Instance *instance_create(const char *name, const char *token, Interface kind, b
         instance_free(instance);
         return NULL;
     }
+    if (kind == MODEL_EXCHANGE && !COMPONENT.settle) {
+        instance_refuse(instance, "this FMU offers co-simulation alone");
+        instance_free(instance);
+        return NULL;
+    }
     instance_reset(instance);
     return instance;
 }
@@ -149,47 +154,17 @@ Status instance_reset(Instance *instance)
 
 /* ---- parameters and outputs -------------------------------------------------------------------------------- */
 
-/* Tells which parameters contradict each other. */
-static Status check_parameters(const Instance *instance)
-{
-    static const struct {
-        const char *noise;
-        int deviation, sensor;
-    } PAIRS[] = {
-        {"depth_sensor.noise", DEPTH_NOISE, DEPTH_SENSOR}, {"dvl.velocity_noise", VELOCITY_NOISE, DVL},
-        {"dvl.altitude_noise", ALTITUDE_NOISE, DVL},       {"imu.acceleration_noise", ACCELERATION_NOISE, IMU},
-        {"imu.angular_velocity_noise", ANGULAR_VELOCITY_NOISE, IMU}, {"compass.noise", HEADING_NOISE, COMPASS},
-        {"usbl.noise", POSITION_NOISE, USBL},
-    };
-    const Parameters *p = &instance->model.plant.parameters;
-
-    for (int i = 0; i < N_THRUSTERS; i++)
-        if (p->thrust_min[i] > p->thrust_max[i])
-            return instance_refuse(instance, "thrust_min[%d] = %.9g is above thrust_max[%d] = %.9g", i + 1,
-                                   p->thrust_min[i], i + 1, p->thrust_max[i]);
-    for (int i = 0; i < N_NOISES; i++)
-        if (p->noise[PAIRS[i].deviation] > 0.0 && !(p->sensor_rate[PAIRS[i].sensor] > 0.0))
-            return instance_refuse(instance, "%s = %.9g needs the sensor's rate to be above 0, so that there are samples",
-                                   PAIRS[i].noise, p->noise[PAIRS[i].deviation]);
-    if (p->free_surface && !(p->hull_radius >= 1e-3))
-        return instance_refuse(instance, "free_surface needs hull_radius to be 1 mm or more, so that buoyancy can fade");
-    return STATUS_OK;
-}
-
 Status instance_prepare(Instance *instance)
 {
     if (!instance->unprepared)
         return STATUS_OK;
-    if (check_parameters(instance) != STATUS_OK)
+    if (COMPONENT.prepare(instance) != STATUS_OK)
         return STATUS_ERROR;
-    const char *fault = model_prepare(&instance->model);
-    if (fault)
-        return instance_refuse(instance, "%s", fault);
     instance->unprepared = false;
     return STATUS_OK;
 }
 
-static bool before_start(const Instance *instance)
+bool instance_starting(const Instance *instance)
 {
     return instance->mode == MODE_INSTANTIATED || instance->mode == MODE_INITIALISING;
 }
@@ -198,20 +173,13 @@ Status instance_update(Instance *instance)
 {
     if (!instance->outdated)
         return STATUS_OK;
-    Model *m = &instance->model;
-    const Flags flags = m->outputs.flags;
-
-    if (before_start(instance)) { /* the first samples and the first current are those that will be */
-        memset(&m->held, 0, sizeof m->held);
+    if (instance_starting(instance)) { /* what is sampled first is what will be */
+        COMPONENT.rewind(&instance->model);
         instance->unprepared = true;
     }
     if (instance_prepare(instance) != STATUS_OK)
         return STATUS_ERROR;
-    if (before_start(instance))
-        model_tick(m);
-    model_evaluate(m);
-    if (instance->mode == MODE_CONTINUOUS) /* discrete variables change at events alone */
-        m->outputs.flags = flags;
+    COMPONENT.evaluate(instance);
     instance->outdated = false;
     return STATUS_OK;
 }
@@ -241,28 +209,15 @@ Status instance_enter_initialisation(Instance *instance)
 
 Status instance_exit_initialisation(Instance *instance)
 {
-    Model *m = &instance->model;
-    const double *e = m->state.rigid + 3;
-
     if (instance_require(instance, MODE_INITIALISING, "leaving initialisation") != STATUS_OK)
         return STATUS_ERROR;
-    memset(&m->held, 0, sizeof m->held); /* the clocks start now */
+    COMPONENT.rewind(&instance->model); /* the clocks start now */
     instance->unprepared = true;
-    if (instance_prepare(instance) != STATUS_OK)
+    if (instance_prepare(instance) != STATUS_OK || COMPONENT.begin(instance) != STATUS_OK)
         return STATUS_ERROR;
-    const double norm = sqrt(e[0] * e[0] + e[1] * e[1] + e[2] * e[2] + e[3] * e[3]);
-    if (!plant_normalise(m->state.rigid))
-        return instance_refuse(instance, "quaternion.e0 to e3 have length 0, expected a direction");
-    if (fabs(norm - 1.0) > 1e-3)
-        instance_tell(instance, LOG_WARNINGS, "quaternion of length %.9g made a unit quaternion", norm);
-    const double deep = m->state.rigid[2] + m->plant.parameters.hull_radius - m->plant.parameters.bottom_depth;
-    if (deep > 0.0)
-        instance_tell(instance, LOG_WARNINGS, "the hull begins %.9g m deep in the bottom", deep);
-    model_settle(m);
-    model_tick(m);
     instance->mode = instance->kind == CO_SIMULATION ? MODE_STEPPING : MODE_EVENT;
     instance->outdated = true;
-    instance_tell(instance, LOG_EVENTS, "initialised at t = %.9g s", m->time);
+    instance_tell(instance, LOG_EVENTS, "initialised at t = %.9g s", instance->model.time);
     return STATUS_OK;
 }
 

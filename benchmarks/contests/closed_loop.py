@@ -1,0 +1,180 @@
+"""The closed loop of the paper's scenario at 100 Hz, printed law, closed form: a step of it, and whole runs."""
+
+from __future__ import annotations
+
+import importlib
+import math
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from benchmarks.contest import Contest, Entry
+from benchmarks.peer_environment import Environment
+from benchmarks.peer_process import peer
+from benchmarks.timing import Contestant, NotMeasuredError, Own
+from cosim.master import Master
+from cosim.record import Recorder
+from cosim.scenario import load_scenario
+
+SCENARIO = "paper"
+STEP = 0.01  # s, in which law, arbiter and plant take one step each
+CHANGES = (
+    "arbiter.engine=closed", "law.name=printed", f"plant.substep={STEP}",
+    *(f"time.{key}={STEP}" for key in ("step", "control", "arbiter")),
+)  # fmt: skip
+RUN = 30.0  # s
+BATCH = 64  # flights at once
+_FLYERS = {"fused": "FusedFlyer", "lanes": "LanesFlyer"}
+# distribution, and module of `benchmarks.peers`
+_MASTERS = {
+    "FMPy, simulate_ssp": ("fmpy", "fmpy_system"),
+    "Ecos": ("ecospy", "ecos_system"),
+    "libcosim": ("libcosimpy", "libcosim_system"),
+}
+
+
+def contests(environment: Environment) -> Iterator[Contest]:
+    """Yield the contests of the closed loop."""
+    with tempfile.TemporaryDirectory(prefix="benchmark-") as folder:
+        package = _Package(Path(folder) / "paper.ssp")
+        peers = {name: _system(environment, package, *where, "steps") for name, where in _MASTERS.items()}
+        yield Contest(
+            "A step of the closed loop: plant, regions, arbiter, law",
+            {
+                "master, no record": _master(record=False),
+                "master, every step recorded": _master(record=True),
+                "fused loop": flights("fused", per_run=False),
+                "lanes": flights("lanes", per_run=False),
+            },
+            peers,
+        )
+        yield Contest(
+            f"A run of {RUN:g} s of it, from loading or resetting to the outcome",
+            {"fused loop": flights("fused"), "lanes": flights("lanes")},
+            {f"{name}, loaded anew": _system(environment, package, *where, "runs") for name, where in _MASTERS.items()},
+        )
+
+
+class _Package:
+    """The scenario as a system structure for other masters, made when it is first asked for."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._made = False
+
+    def __call__(self) -> Path:
+        if not self._made:
+            sets = [word for change in CHANGES for word in ("--set", change)]
+            command = [
+                sys.executable,
+                "-m",
+                "cosim",
+                "package",
+                SCENARIO,
+                *sets,
+                "--to",
+                "ssp",
+                "--out",
+                str(self._path),
+            ]
+            done = subprocess.run(command, capture_output=True, text=True, check=False)
+            if done.returncode:
+                raise NotMeasuredError(f"cosim package: {' '.join(done.stderr.split())[-200:]}")
+            self._made = True
+        return self._path
+
+
+def _system(environment: Environment, package: _Package, distribution: str, module: str, function: str) -> Entry:
+    def entry(stack: ExitStack) -> Contestant:
+        setup = {"ssp": str(package()), "step": STEP, "duration": RUN}
+        return stack.enter_context(peer(environment, distribution, module, function, setup))
+
+    return entry
+
+
+def _master(*, record: bool) -> Entry:
+    def entry(stack: ExitStack) -> Contestant:
+        master = stack.enter_context(Master(load_scenario(SCENARIO, [*CHANGES, "time.duration=1e6"])))
+        folder = stack.enter_context(tempfile.TemporaryDirectory(prefix="benchmark-"))
+        recorder = Recorder(Path(folder), master.signals.columns) if record else None
+        if recorder is not None:
+            stack.callback(recorder.close)
+        done = 0
+
+        def work(count: int) -> None:
+            nonlocal done
+            for k in range(done, done + count):
+                master.step(k)
+                if recorder is not None:
+                    recorder.observe(k, master.signals.row)
+            done += count
+
+        return Own(work)
+
+    return entry
+
+
+def flights(
+    engine: str, *, per_run: bool = True, changes: Sequence[str] = (), batch: int = BATCH, whole: bool = False
+) -> Entry:
+    """Return the entry of an engine that flies the scenario from many starts.
+
+    Parameters
+    ----------
+    engine : str
+        ``"fused"`` or ``"lanes"``.
+    per_run : bool
+        Whether an item is a run, rather than a step.
+    changes : sequence of str
+        Of the scenario, after `CHANGES`.
+    batch : int
+        Runs that are flown at once, at least.
+    whole : bool
+        Whether an item is a batch.
+    """
+
+    def entry(stack: ExitStack) -> Contestant:
+        try:
+            kind = getattr(importlib.import_module(f"cosim.flying.{engine}"), _FLYERS[engine])
+            from cosim.flying.variation import Variation
+        except (ImportError, AttributeError) as error:
+            raise NotMeasuredError(f"not there: {error}") from error
+        scenario = load_scenario(SCENARIO, [*CHANGES, f"time.duration={RUN}", *changes])
+        flyer = stack.enter_context(kind(Variation(scenario, ["initial.position.0"])))
+        return _Flights(flyer, batch, 1.0 / batch if whole else 1.0 if per_run else float(scenario.steps))
+
+    return entry
+
+
+class _Flights:
+    """Flights of an engine, each from a start of its own; items are counted pro rata.
+
+    Parameters
+    ----------
+    flyer : FusedFlyer or LanesFlyer
+        What flies.
+    batch : int
+        How many it flies at once, at least.
+    items : float
+        In a flight.
+    """
+
+    def __init__(self, flyer: Any, batch: int, items: float) -> None:
+        self._flyer, self._batch, self._items = flyer, batch, items
+
+    def seconds(self, count: int) -> float:
+        """Fly at least so many items, and return what `count` of them take [s]."""
+        batches = math.ceil(count / self._items / self._batch)
+        seeds = np.arange(self._batch)
+        starts = np.random.default_rng(0).uniform(-0.2, 0.2, (batches, self._batch, 1))
+        before = time.perf_counter()
+        for some in starts:
+            self._flyer.fly(some, seeds)
+        return (time.perf_counter() - before) * count / (batches * self._batch * self._items)

@@ -1,0 +1,72 @@
+"""Sweeps of the closed loop by several workers, processes or a Dask cluster, which are there and have compiled."""
+
+from __future__ import annotations
+
+import itertools
+import multiprocessing
+import tempfile
+import time
+from concurrent.futures import Executor, ProcessPoolExecutor
+from contextlib import ExitStack
+from pathlib import Path
+
+from benchmarks.contest import Entry
+from benchmarks.contests.closed_loop import CHANGES, RUN, SCENARIO
+from benchmarks.timing import Contestant
+from cosim.scenario import load_scenario
+
+CREWS = ("processes", "Dask")
+_VARIED = ("initial.position.0=-0.2:0.2",)
+_WARMING = 64  # rows
+
+
+def sweep(crew: str, workers: int, engine: str) -> Entry:
+    """Return the entry of a sweep, whose items are runs; from the call to the summary, its folder included.
+
+    Parameters
+    ----------
+    crew : str
+        Of `CREWS`.
+    workers : int
+        How many.
+    engine : str
+        ``"fused"`` or ``"lanes"``.
+    """
+
+    def entry(stack: ExitStack) -> Contestant:
+        contestant = _Sweep(stack.enter_context(_executor(crew, workers)), workers, engine, stack)
+        for _ in range(2):  # each worker has its part
+            contestant.seconds(_WARMING * workers)
+        return contestant
+
+    return entry
+
+
+def _executor(crew: str, workers: int) -> Executor:
+    if crew == "processes":
+        return ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn"))
+    from cosim.campaigns.cluster import cluster_executor
+
+    executor: Executor = cluster_executor(None, workers)
+    return executor
+
+
+class _Sweep:
+    """Sweeps, each into a folder of its own."""
+
+    def __init__(self, executor: Executor, workers: int, engine: str, stack: ExitStack) -> None:
+        self._executor, self._workers, self._engine = executor, workers, engine
+        self._scenario = load_scenario(SCENARIO, [*CHANGES, f"time.duration={RUN}"])
+        self._folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="benchmark-")))
+        self._numbers = itertools.count()
+
+    def seconds(self, count: int) -> float:
+        """Fly `count` rows, and return what that took [s]."""
+        from cosim.campaigns.design import Design, vary_from
+        from cosim.campaigns.sweep import run_sweep
+
+        design = Design(vary_from(_VARIED), "random", count, 0)
+        before = time.perf_counter()
+        out = self._folder / str(next(self._numbers))
+        run_sweep(self._scenario, design, out, self._engine, self._workers, self._executor)
+        return time.perf_counter() - before

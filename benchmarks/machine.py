@@ -1,0 +1,66 @@
+"""The machine that figures are of, and how calm it is."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import platform
+from collections.abc import Iterator
+from importlib import metadata
+from pathlib import Path
+
+CALM = 0.6  # load average above which figures are not to be trusted
+_PACKAGES = ("numpy", "numba", "fmpy", "scikit-fuzzy", "pymavlink")
+
+
+def processor() -> str:
+    """Return the processor's name, as far as the system tells, and how many of them there are."""
+    name = platform.processor() or platform.machine()
+    with contextlib.suppress(OSError):
+        lines = Path("/proc/cpuinfo").read_text().splitlines()
+        told = dict(line.split(":", 1) for line in lines if ":" in line)
+        found = {key.strip(): value.strip() for key, value in told.items()}
+        name = found.get("model name", name)
+        if "cpu family" in found:
+            name += f" (family {found['cpu family']}, model {found['model']})"
+    return f"{name}, {os.cpu_count()} processors"
+
+
+def load() -> float:
+    """Return the load average over the last minute, nan where the system does not tell."""
+    try:
+        return os.getloadavg()[0]
+    except (AttributeError, OSError):
+        return float("nan")
+
+
+def versions() -> str:
+    """Return the versions of Python, and of what ours is made with."""
+    found = [f"Python {platform.python_version()}"]
+    for package in _PACKAGES:
+        with contextlib.suppress(metadata.PackageNotFoundError):
+            found.append(f"{package} {metadata.version(package)}")
+    return ", ".join(found)
+
+
+def description(repeats: int) -> list[str]:
+    """Return what stands above a table, a line each."""
+    now = load()
+    lines = [processor(), versions(), f"{repeats} repeats; load {now:.2f} before"]
+    if now > CALM:
+        lines.append(f"warning: the load is above {CALM}: others are at work here, so trust none of these figures")
+    return lines
+
+
+@contextlib.contextmanager
+def pinned() -> Iterator[None]:
+    """Keep this process, and those that it starts, on one processor meanwhile, where the system can."""
+    if not hasattr(os, "sched_setaffinity"):
+        yield
+        return
+    before = os.sched_getaffinity(0)
+    os.sched_setaffinity(0, {max(before)})
+    try:
+        yield
+    finally:
+        os.sched_setaffinity(0, before)

@@ -1,0 +1,159 @@
+"""The environment of the peers: virtual ones of their own, beside the product's, made once."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import venv
+from dataclasses import dataclass
+from pathlib import Path
+
+import platformdirs
+
+from benchmarks.timing import NotMeasuredError
+
+FOLDER = "benchmark-peers"
+_INSTALLED = "installed.json"
+_TIMEOUT = 900.0  # s
+
+
+@dataclass(frozen=True)
+class Peer:
+    """What has to be installed for a peer.
+
+    Attributes
+    ----------
+    name : str
+        Of the distribution on PyPI.
+    more : tuple of str
+        What else it needs, and does not say so.
+    environment : str
+        The virtual environment that it is in; most share one.
+    """
+
+    name: str
+    more: tuple[str, ...] = ()
+    environment: str = "shared"
+
+
+_TBB = ("tbb>=2021.13",) if sys.platform == "linux" else ()
+PEERS = {
+    peer.name: peer
+    for peer in (
+        Peer("numpy"),
+        Peer("numba"),
+        Peer("fmpy"),
+        Peer("ecospy", _TBB),
+        Peer("libcosimpy"),
+        Peer("mujoco"),
+        Peer("scikit-fuzzy", ("networkx", "packaging", "scipy")),
+        Peer("simpful"),
+        Peer("pyfuzzylite", ("numpy<2",), "old-numpy"),
+        Peer("pymavlink"),
+        Peer("PythonVehicleSimulator"),
+    )
+}
+
+
+def folder() -> Path:
+    """Return where the environments are."""
+    return Path(platformdirs.user_cache_dir("subreach")) / FOLDER
+
+
+def install(again: bool = False) -> dict[str, str]:
+    """Install each peer that was not tried before, one by one.
+
+    Parameters
+    ----------
+    again : bool
+        Whether to try those again that could not be installed.
+
+    Returns
+    -------
+    dict from str to str
+        Of each peer its version, or, after "not installed: ", why it has none.
+    """
+    state = _state()
+    for peer in PEERS.values():
+        if peer.name in state and not (again and state[peer.name].startswith("not installed")):
+            continue
+        print(f"installing {peer.name} for the benchmarks", file=sys.stderr, flush=True)
+        state[peer.name] = _installed(peer)
+        folder().mkdir(parents=True, exist_ok=True)
+        (folder() / _INSTALLED).write_text(json.dumps(state, indent=1), encoding="utf-8")
+    return state
+
+
+def installed_python(name: str) -> str | None:
+    """Return the Python of an environment that has a peer already, None if there is none."""
+    version = _state().get(name, "not installed")
+    return None if version.startswith("not installed") else str(_python_in(folder() / PEERS[name].environment))
+
+
+def _state() -> dict[str, str]:
+    try:
+        state: dict[str, str] = json.loads((folder() / _INSTALLED).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return {}
+    return state
+
+
+def _installed(peer: Peer) -> str:
+    python = _python_in(folder() / peer.environment)
+    try:
+        if not python.exists():
+            venv.create(python.parents[1], with_pip=True)
+        pip = [str(python), "-m", "pip", "--disable-pip-version-check", "--quiet", "--no-input"]
+        done = subprocess.run(
+            [*pip, "install", peer.name, *peer.more], capture_output=True, text=True, timeout=_TIMEOUT, check=False
+        )
+    except (OSError, subprocess.SubprocessError) as error:
+        return f"not installed: {error}"
+    if done.returncode:
+        last = [line for line in done.stderr.splitlines() if line.startswith("ERROR")] or ["pip failed"]
+        return f"not installed: {last[-1].removeprefix('ERROR: ')}"
+    return _version(str(python), peer.name)
+
+
+def _python_in(environment: Path) -> Path:
+    return environment / ("Scripts/python.exe" if os.name == "nt" else "bin/python")
+
+
+def _version(python: str, name: str) -> str:
+    code = f"from importlib import metadata; print(metadata.version({name!r}))"
+    done = subprocess.run([python, "-c", code], capture_output=True, text=True, check=False)
+    return done.stdout.strip() if done.returncode == 0 else f"not installed: {name} is not in {python}"
+
+
+class Environment:
+    """Where peers are found.
+
+    Parameters
+    ----------
+    python : str, optional
+        A Python that has them, or some of them; default: the benchmarks' own environments, made where they are not.
+    """
+
+    def __init__(self, python: str | None = None) -> None:
+        self._python = python
+        self._state = {} if python else install()
+
+    def python(self, name: str) -> str:
+        """Return the Python that has a peer; NotMeasuredError says why there is none."""
+        version = self.version(name)
+        if version.startswith("not installed"):
+            raise NotMeasuredError(version)
+        return self._python or str(_python_in(folder() / PEERS[name].environment))
+
+    def version(self, name: str) -> str:
+        """Return the version of a peer, or why it has none."""
+        if name not in self._state:
+            self._state[name] = _version(self._python or sys.executable, name)
+        return self._state[name]
+
+    def told(self) -> str:
+        """Return the versions of the peers that are there."""
+        found = {name: self.version(name) for name in PEERS}
+        return ", ".join(f"{name} {version}" for name, version in found.items() if not version.startswith("not"))

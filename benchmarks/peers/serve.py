@@ -1,0 +1,37 @@
+"""A peer as a process: ``python serve.py MODULE FUNCTION``, with its setup in JSON as the first line of the input.
+
+Each further line is a number of items to do; each answer a line of JSON: what they took [s], or why they were not done.
+"""
+
+from __future__ import annotations
+
+import importlib
+import json
+import os
+import sys
+import time
+
+
+def main(module: str, function: str) -> None:
+    """Serve until the input ends."""
+    answers = os.fdopen(os.dup(1), "w")
+    os.dup2(2, 1)  # what libraries print is no answer
+
+    def answer(**values: object) -> None:
+        print(json.dumps(values), file=answers, flush=True)
+
+    try:
+        work = getattr(importlib.import_module(module), function)(json.loads(sys.stdin.readline()))
+        answer(seconds=0.0)
+        for line in sys.stdin:
+            count = int(line)
+            before = time.perf_counter()
+            told = work(count)
+            taken = time.perf_counter() - before
+            answer(seconds=told if isinstance(told, float) else taken)
+    except Exception as error:  # noqa: BLE001 -- whatever a peer cannot do is an answer
+        answer(error=f"{type(error).__name__}: {error}")
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:3])

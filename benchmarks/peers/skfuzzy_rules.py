@@ -1,0 +1,61 @@
+"""The paper's rules in scikit-fuzzy, as its examples build theirs."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from skfuzzy import control, trimf
+
+NAMES = ("obstacle", "shape", "depth")
+
+
+def simulation(points: int) -> Any:
+    """Return a simulation of the rules over universes of so many points."""
+    universe = np.linspace(0.0, 1.0, points)
+    inputs = [control.Antecedent(universe, name) for name in NAMES]
+    outputs = [control.Consequent(universe, f"alpha_{i + 1}") for i in range(len(NAMES))]
+    for variable in (*inputs, *outputs):
+        variable["low"] = trimf(universe, [0.0, 0.0, 1.0])
+        variable["high"] = trimf(universe, [0.0, 1.0, 1.0])
+    obstacle, shape, depth = inputs
+    rules = [
+        control.Rule(obstacle["high"], outputs[0]["high"]),
+        control.Rule(obstacle["low"], outputs[0]["low"]),
+        control.Rule(obstacle["high"], outputs[1]["low"]),
+        control.Rule(shape["low"], outputs[1]["low"]),
+        control.Rule(obstacle["low"] & shape["high"], outputs[1]["high"]),
+        control.Rule(obstacle["high"] | shape["high"], outputs[2]["low"]),
+        control.Rule(depth["low"], outputs[2]["low"]),
+        control.Rule(obstacle["low"] & shape["low"] & depth["high"], outputs[2]["high"]),
+    ]
+    return control.ControlSystemSimulation(control.ControlSystem(rules))
+
+
+def calls(setup: dict[str, Any]) -> Callable[[int], object]:
+    """Return a function that computes so often, with other inputs each time: it keeps what it has computed once."""
+    warnings.simplefilter("ignore", DeprecationWarning)
+    system, rng = simulation(setup["points"]), np.random.default_rng(0)
+
+    def work(count: int) -> None:
+        for values in rng.random((count, len(NAMES))).tolist():
+            for name, x in zip(NAMES, values, strict=True):
+                system.input[name] = x
+            system.compute()
+
+    return work
+
+
+def arrays(setup: dict[str, Any]) -> Callable[[int], object]:
+    """Return a function that computes so many rows at once."""
+    warnings.simplefilter("ignore", DeprecationWarning)
+    system, rng = simulation(setup["points"]), np.random.default_rng(0)
+
+    def work(count: int) -> None:
+        for name, column in zip(NAMES, rng.random((len(NAMES), max(2, count))), strict=True):
+            system.input[name] = column
+        system.compute()
+
+    return work

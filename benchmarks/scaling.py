@@ -1,0 +1,167 @@
+"""How cost grows with obstacles, horizon, vehicles and workers."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import ExitStack, nullcontext
+from dataclasses import dataclass
+from itertools import pairwise
+
+from benchmarks.contest import Entry, entered
+from benchmarks.contests.closed_loop import CHANGES, RUN, SCENARIO, flights
+from benchmarks.contests.sweeps import CREWS, sweep
+from benchmarks.law import LawSteps
+from benchmarks.machine import pinned
+from benchmarks.table import Row, Table
+from benchmarks.timing import Contestant, Own, Timing, growth, take_turns
+from cosim.master import Master
+from cosim.scenario import load_scenario
+
+RATIO = "how many times as long as the first of its table"
+REPEATS = 5
+OBSTACLES = (1, 3, 10, 30, 100)
+HORIZONS = (10.0, 30.0, 100.0, 300.0)  # s
+VEHICLES = (1, 8, 64, 512)
+ROWS = {"fused": 2_000, "lanes": 20_000}  # of a sweep
+LAWS = ("printed", "deployable")
+
+
+@dataclass(frozen=True)
+class Curve:
+    """Costs over sizes.
+
+    Attributes
+    ----------
+    title : str
+        What an item is.
+    of : str
+        What grows.
+    entries : mapping from float to Entry
+        By size.
+    count : int, optional
+        Items a repeat, where the items are long.
+    pinned : bool
+        Whether all stays on one processor.
+    """
+
+    title: str
+    of: str
+    entries: Mapping[float, Entry]
+    count: int | None = None
+    pinned: bool = True
+
+    def measure(self, budget: float, repeats: int) -> Table:
+        """Time all sizes in turn; the law of growth stands below."""
+        with pinned() if self.pinned else nullcontext(), ExitStack() as stack:
+            contestants = [entered(entry, stack) for entry in self.entries.values()]
+            found = take_turns(contestants, budget, repeats, self.count)
+        names = [f"{size:g} {self.of}" for size in self.entries]
+        rows = tuple(Row(name, timing, names[0], found[0]) for name, timing in zip(names, found, strict=True))
+        return Table(self.title, rows, self._laws(found))
+
+    def _laws(self, found: list[Timing | str]) -> tuple[str, ...]:
+        sizes = [size for size, one in zip(self.entries, found, strict=True) if isinstance(one, Timing)]
+        costs = [one.median for one in found if isinstance(one, Timing)]
+        if len(sizes) < 2:
+            return ()
+        parts = [growth(pair, cost) for pair, cost in zip(pairwise(sizes), pairwise(costs), strict=True)]
+        local = ", ".join(f"{part:.2f}" for part in parts)
+        return (f"grows with {self.of} to the power of {growth(sizes, costs):.2f}; from one size to the next: {local}",)
+
+
+def measure(subjects: list[str], budget: float, repeats: int) -> list[Table]:
+    """Time the curves of some subjects.
+
+    Parameters
+    ----------
+    subjects : list of str
+        Of `SUBJECTS`.
+    budget : float
+        Of a repeat of each size [s].
+    repeats : int
+        How often each has its turn.
+
+    Returns
+    -------
+    list of Table
+        One for each curve.
+    """
+    tables = []
+    for subject in subjects:
+        for curve in SUBJECTS[subject]():
+            print(curve.title, file=sys.stderr, flush=True)
+            tables.append(curve.measure(budget, repeats))
+    return tables
+
+
+def obstacles() -> Iterator[Curve]:
+    """Yield the growth of a law's step, and of a step of the fused loop, with obstacles."""
+    for law in LAWS:
+        entries: dict[float, Entry] = {n: lambda _, law=law, n=n: LawSteps(law, int(n)) for n in OBSTACLES}
+        yield Curve(f"A step of the law {law!r}", "obstacles", entries)
+    for engine in ("fused", "lanes"):
+        entries = {n: flights(engine, per_run=False, changes=_with_obstacles(int(n))) for n in OBSTACLES}
+        yield Curve(f"A step of the closed loop, {_named(engine)}", "obstacles", entries)
+
+
+def horizon() -> Iterator[Curve]:
+    """Yield the growth of a run with the simulated time."""
+    yield Curve("A run, master without record", "s of simulated time", {t: _run(t) for t in HORIZONS}, count=1)
+    for engine in ("fused", "lanes"):
+        entries: dict[float, Entry] = {
+            t: flights(engine, per_run=True, changes=(f"time.duration={t}",)) for t in HORIZONS
+        }
+        yield Curve(f"A run, {_named(engine)}", "s of simulated time", entries)
+
+
+def vehicles() -> Iterator[Curve]:
+    """Yield the growth of a batch with the vehicles in it."""
+    for engine in ("fused", "lanes"):
+        entries: dict[float, Entry] = {n: flights(engine, per_run=True, batch=int(n), whole=True) for n in VEHICLES}
+        yield Curve(f"A batch of runs of {RUN:g} s, {_named(engine)}", "vehicles", entries)
+
+
+def workers() -> Iterator[Curve]:
+    """Yield what a sweep takes with one and two workers, as processes and in Dask."""
+    for engine, rows in ROWS.items():
+        for crew in CREWS:
+            entries: dict[float, Entry] = {n: sweep(crew, int(n), engine) for n in (1, 2)}
+            title = f"A run of {RUN:g} s in a sweep of {rows}, {_named(engine)}, {crew}"
+            yield Curve(title, "workers", entries, count=rows, pinned=False)
+
+
+SUBJECTS: dict[str, Callable[[], Iterator[Curve]]] = {
+    "obstacles": obstacles,
+    "horizon": horizon,
+    "vehicles": vehicles,
+    "workers": workers,
+}
+
+
+def _named(engine: str) -> str:
+    return {"fused": "fused loop", "lanes": "lanes"}[engine]
+
+
+def _with_obstacles(n: int) -> tuple[str, ...]:
+    """Return the changes that put so many balls of the criterion "obstacle" beside the way, in place of the regions."""
+    balls = []
+    for i in range(n):
+        centre = [8.0 * (i + 1) / (n + 1), 3.0 if i % 2 else -3.0, 3.0]
+        shape = f'{{type = "sphere", centre = {centre}, radius = 0.5}}'
+        balls.append(f'{{name = "O{i}", criterion = "obstacle", keep = "out", gain = 100.0, shape = {shape}}}')
+    return (f"regions=[{', '.join(balls)}]", "intersection=[]")
+
+
+def _run(duration: float) -> Entry:
+    def entry(_: ExitStack) -> Contestant:
+        scenario = load_scenario(SCENARIO, [*CHANGES, f"time.duration={duration}"])
+
+        def work(count: int) -> None:
+            for _ in range(count):
+                with Master(scenario) as master:
+                    master.run()
+
+        return Own(work)
+
+    return entry

@@ -1,0 +1,200 @@
+"""Printing times in one table, ratios first, and writing them as JSON."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from benchmarks.timing import Timing
+
+_UNITS = ((1.0, "s"), (1e-3, "ms"), (1e-6, "µs"), (1e-9, "ns"))
+
+
+@dataclass(frozen=True)
+class Row:
+    """A line of a table: what was timed, or why it was not, and what it is compared with.
+
+    Attributes
+    ----------
+    name, timing : str, Timing or str
+        What was timed; a word where it was not.
+    base, base_timing : str, Timing or str, optional
+        What it is compared with; none: there is no ratio.
+    duel : bool
+        Whether the base is a peer that took turns with it. Then the ratio says how many times as long the peer takes,
+        and each repeat has one of its own, so that they have a range. Else it says how many times as long as the base
+        this one takes.
+    """
+
+    name: str
+    timing: Timing | str
+    base: str = ""
+    base_timing: Timing | str = ""
+    duel: bool = False
+
+    @property
+    def ratio(self) -> float | None:
+        """Of the medians."""
+        if isinstance(self.timing, str) or isinstance(self.base_timing, str):
+            return None
+        ratio = self.timing.median / self.base_timing.median
+        return 1.0 / ratio if self.duel else ratio
+
+    @property
+    def range(self) -> tuple[float, float] | None:
+        """The least and the greatest ratio of one repeat."""
+        if not self.duel or isinstance(self.timing, str) or isinstance(self.base_timing, str):
+            return None
+        ratios = [b / a for a, b in zip(self.timing.samples, self.base_timing.samples, strict=True)]
+        return min(ratios), max(ratios)
+
+
+@dataclass(frozen=True)
+class Table:
+    """Rows under a heading."""
+
+    title: str  # what an item is
+    rows: tuple[Row, ...]
+    notes: tuple[str, ...] = ()  # below it
+
+
+def compared(timings: dict[str, Timing | str], base: str | None = None) -> list[Row]:
+    """Return rows that are compared with one among them, by default the first."""
+    base = base or next(iter(timings))
+    return [Row(name, timing, base, timings[base]) for name, timing in timings.items()]
+
+
+def figure(seconds: float) -> str:
+    """Return a time with its unit, to three figures."""
+    scale, unit = next((u for u in _UNITS if seconds >= 0.9995 * u[0]), _UNITS[-1])
+    return f"{rounded(seconds / scale)} {unit}"
+
+
+def rounded(x: float) -> str:
+    """Return a number to about three figures."""
+    return f"{x:.0f}" if x >= 99.95 else f"{x:.1f}" if x >= 9.995 else f"{x:.2f}" if x >= 0.0995 else f"{x:.2g}"
+
+
+_HEADINGS = ("ratio", "range", "median", "least–most", "what", "against", "its median", "its least–most")
+
+
+def cells(row: Row) -> tuple[str, ...]:
+    """Return a row as text, a cell for each of the headings; the times of the base stand in a row of its own already.
+
+    Parameters
+    ----------
+    row : Row
+        Any.
+
+    Returns
+    -------
+    tuple of str
+        "" where there is nothing to say.
+    """
+    ratio = f"{rounded(row.ratio)}x" if row.ratio is not None else ""
+    between = "–".join(map(rounded, row.range)) if row.range is not None else ""
+    against = row.base if row.base != row.name else ""
+    theirs = _times(row.base_timing) if row.duel else ("", "")
+    return (ratio, between, *_times(row.timing), row.name, against, *theirs)
+
+
+def _times(timing: Timing | str) -> tuple[str, str]:
+    if isinstance(timing, str):
+        return "–", ""
+    return figure(timing.median), f"{figure(timing.least)}–{figure(timing.most)}"
+
+
+def words(row: Row) -> str:
+    """Return why a row has no figures, if it has none."""
+    timings = (row.timing, row.base_timing) if row.duel else (row.timing,)
+    return "; ".join(word for word in timings if isinstance(word, str))
+
+
+def print_tables(tables: Sequence[Table], ratio: str, machine: Sequence[str]) -> None:
+    """Print tables in the same columns, below what machine they are of.
+
+    Parameters
+    ----------
+    tables : sequence of Table
+        One below the other, in the same columns.
+    ratio : str
+        What the ratio says.
+    machine : sequence of str
+        From `machine.description`, before the first time was taken.
+    """
+    for line in machine:
+        print(line)
+    print(f"ratio: {ratio}")
+    found = [_shown(table) for table in tables]
+    columns = list(zip(_HEADINGS, *(row for rows in found for row in rows), strict=True))
+    widths = [max(map(len, column)) if any(column[1:]) else 0 for column in columns]
+    print(_line(_HEADINGS, widths))
+    for table, rows in zip(tables, found, strict=True):
+        if table.title:
+            print(f"-- {table.title}")
+        for row, shown in zip(table.rows, rows, strict=True):
+            print(_line(shown, widths) + (f" {words(row)}" if words(row) else ""))
+        for note in table.notes:
+            print(note)
+
+
+def _shown(table: Table) -> list[tuple[str, ...]]:
+    """Return the cells of a table; one base for all is not repeated."""
+    found = [cells(row) for row in table.rows]
+    if len({row.base for row in table.rows if row.base}) > 1 or any(row.duel for row in table.rows):
+        return found
+    against = _HEADINGS.index("against")
+    return [(*row[:against], "", *row[against + 1 :]) for row in found]
+
+
+def _line(texts: Sequence[str], widths: Sequence[int]) -> str:
+    named = _HEADINGS.index("what"), _HEADINGS.index("against")
+    shown = [
+        f"{text:{'<' if i in named else '>'}{width}}"
+        for i, (text, width) in enumerate(zip(texts, widths, strict=True))
+        if width
+    ]
+    return "  ".join(shown).rstrip()
+
+
+def as_json(verb: str, tables: Sequence[Table], ratio: str, machine: Sequence[str]) -> dict[str, Any]:
+    """Return the tables of a verb as plain values, with all samples [s]."""
+    return {
+        "verb": verb,
+        "machine": list(machine),
+        "ratio": ratio,
+        "tables": [
+            {
+                "title": table.title,
+                "notes": list(table.notes),
+                "rows": [
+                    {
+                        "name": row.name,
+                        "against": row.base,
+                        "duel": row.duel,
+                        "ratio": row.ratio,
+                        "range": row.range,
+                        "seconds": _samples(row.timing),
+                        "seconds_against": _samples(row.base_timing),
+                        "note": words(row),
+                    }
+                    for row in table.rows
+                ],
+            }
+            for table in tables
+        ],
+    }
+
+
+def _samples(timing: Timing | str) -> list[float]:
+    return [] if isinstance(timing, str) else list(timing.samples)
+
+
+def write_json(path: Path, values: dict[str, Any]) -> None:
+    """Write values as JSON, whole or not at all."""
+    scratch = path.with_name(f".{path.name}")
+    scratch.write_text(json.dumps(values, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+    scratch.replace(path)

@@ -1,0 +1,42 @@
+"""C sources that become part of an FMU."""
+
+from __future__ import annotations
+
+from importlib import resources
+
+_NAMED = b'#include "variables.h" /* names the functions */\n'
+
+
+def c_files(package: str, folder: str) -> dict[str, bytes]:
+    """Return the C files and headers of a folder.
+
+    Parameters
+    ----------
+    package : str
+        Such as ``"controller"``.
+    folder : str
+        In it.
+
+    Returns
+    -------
+    dict of str to bytes
+        By name.
+    """
+    found = resources.files(package).joinpath(*folder.split("/"))
+    return {file.name: file.read_bytes() for file in found.iterdir() if file.name.endswith((".c", ".h"))}
+
+
+def under_own_names(files: dict[str, bytes]) -> dict[str, bytes]:
+    """Return C files so that what they define bears the names of their FMU, and several FMUs link into one program.
+
+    Parameters
+    ----------
+    files : dict of str to bytes
+        By name; such as do not know of FMUs.
+
+    Returns
+    -------
+    dict of str to bytes
+        The same, C files with the generated header before all else.
+    """
+    return {name: _NAMED + code if name.endswith(".c") else code for name, code in files.items()}

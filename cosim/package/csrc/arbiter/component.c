@@ -1,0 +1,69 @@
+/* The fuzzy arbiter as a component behind the FMI wrappers. The weights are worked out in a step, from the memberships at
+ * its beginning; before the first they are 0. */
+#include <math.h>
+#include <string.h>
+
+#include "instance.h"
+#include "rules.h" /* generated from the arbiter's definition */
+
+static void rewind_ticks(Model *m)
+{
+    memset(&m->ticks, 0, sizeof m->ticks);
+}
+
+static Status prepare(Instance *instance)
+{
+    Model *m = &instance->model;
+
+    ticks_begin(&m->ticks, m->period, m->time);
+    return STATUS_OK;
+}
+
+static Status begin(Instance *instance)
+{
+    return (void)instance, STATUS_OK;
+}
+
+static void evaluate(Instance *instance)
+{
+    (void)instance;
+}
+
+static Status fits(const Instance *instance, double step)
+{
+    const Ticks *ticks = &instance->model.ticks;
+
+    if (ticks_left_out(ticks, step))
+        return instance_refuse(instance, "step of %g s is longer than time.arbiter = %g s", step, ticks->period);
+    return STATUS_OK;
+}
+
+static Status advance(Instance *instance, double end)
+{
+    Model *m = &instance->model;
+    double weights[N_CRITERIA];
+    const Ticks ticks = m->ticks;
+
+    if (ticks_due(&m->ticks, m->time)) {
+        if (EVALUATE_RULES(m->memberships, weights) != 0) {
+            m->ticks = ticks;
+            return instance_refuse(instance, "step from t = %.9g s not taken: no weights follow from these memberships",
+                                   m->time);
+        }
+        memcpy(m->weights, weights, sizeof m->weights);
+    }
+    m->time = end;
+    return STATUS_OK;
+}
+
+static bool possible(const Model *m)
+{
+    for (int i = 0; i < N_CRITERIA; i++)
+        if (!isfinite(m->weights[i]))
+            return false;
+    return ticks_possible(&m->ticks);
+}
+
+const Component COMPONENT = {
+    "the arbiter", rewind_ticks, prepare, begin, evaluate, fits, advance, possible, NULL, NULL, NULL, NULL,
+};

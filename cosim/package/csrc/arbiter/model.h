@@ -1,0 +1,20 @@
+/* The arbiter: memberships in, weights out, once a period. */
+#ifndef MODEL_H
+#define MODEL_H
+
+#include "variables.h" /* generated: how many criteria there are, and the table of variables */
+
+#include "ticks.h"
+
+enum { N_STATES = 0 };
+
+typedef struct {
+    double period; /* s */
+    double memberships[N_CRITERIA];
+    Ticks ticks;
+    double weights[N_CRITERIA];
+    double time;
+    double stop_time; /* INFINITY if there is none */
+} Model; /* plain data: all that an FMU state holds */
+
+#endif

@@ -1,0 +1,107 @@
+"""The description of a system of FMUs in the format of SSP 1.0: ``SystemStructure.ssd``."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from importlib import metadata
+from xml.etree import ElementTree as ET
+
+from plant_fmu.component import Component
+from plant_fmu.markup import xml_text
+from plant_fmu.quantities import UNITS
+from plant_fmu.variables import Variable
+
+_NAMESPACES = {
+    "xmlns:ssd": "http://ssp-standard.org/SSP1/SystemStructureDescription",
+    "xmlns:ssc": "http://ssp-standard.org/SSP1/SystemStructureCommon",
+    # up here: libcosim takes an attribute of the element below for an algorithm
+    "xmlns:osp": "http://opensimulationplatform.com/SSP/OSPAnnotations",
+}
+
+
+@dataclass(frozen=True)
+class Part:
+    """One FMU of the system."""
+
+    name: str
+    source: str  # of the FMU, in the archive
+    component: Component
+    connectors: tuple[str, ...]  # names of the inputs and outputs that are shown
+
+
+@dataclass(frozen=True)
+class Wire:
+    """Outputs of one part that go to inputs of another, of the same names."""
+
+    start: str
+    end: str
+    names: tuple[str, ...]
+
+
+def structure(
+    name: str, description: str, parts: Sequence[Part], wires: Sequence[Wire], stop_time: float, step: float
+) -> str:
+    """Return ``SystemStructure.ssd``.
+
+    Parameters
+    ----------
+    name, description : str
+        Of the system.
+    parts : sequence of Part
+        In the order in which masters that care for it step them.
+    wires : sequence of Wire
+        Between them.
+    stop_time, step : float
+        [s]; SSP 1.0 has no place for the step, so that it stands in an annotation of the Open Simulation Platform's.
+
+    Returns
+    -------
+    str
+        XML text, the same for the same system.
+    """
+    version = metadata.version("subreach")
+    root = ET.Element(
+        "ssd:SystemStructureDescription", _NAMESPACES, version="1.0", name=name, description=description,
+        license="BSD-3-Clause", generationTool=f"subreach {version}",
+    )  # fmt: skip
+    system = ET.SubElement(root, "ssd:System", name="root")
+    elements = ET.SubElement(system, "ssd:Elements")
+    units: set[str] = set()
+    for part in parts:
+        shown = [v for v in part.component.variables if v.name in part.connectors]
+        units |= {v.quantity.unit for v in shown}
+        _add_part(elements, part, shown)
+    connections = ET.SubElement(system, "ssd:Connections")
+    for wire in wires:
+        for signal in wire.names:
+            ET.SubElement(
+                connections, "ssd:Connection",
+                startElement=wire.start, startConnector=signal, endElement=wire.end, endConnector=signal,
+            )  # fmt: skip
+
+    defined = ET.SubElement(root, "ssd:Units")
+    for unit, exponents in UNITS.items():
+        if unit in units:
+            base = {key: str(power) for key, power in exponents.items()}
+            ET.SubElement(ET.SubElement(defined, "ssc:Unit", name=unit), "ssc:BaseUnit", base)
+    experiment = ET.SubElement(root, "ssd:DefaultExperiment", startTime="0.0", stopTime=repr(float(stop_time)))
+    annotation = ET.SubElement(
+        ET.SubElement(experiment, "ssd:Annotations"), "ssc:Annotation", type="com.opensimulationplatform"
+    )
+    algorithm = ET.SubElement(annotation, "osp:Algorithm")
+    ET.SubElement(algorithm, "osp:FixedStepAlgorithm", baseStepSize=repr(float(step)))
+    return xml_text(root)
+
+
+def _add_part(parent: ET.Element, part: Part, shown: Sequence[Variable]) -> None:
+    element = ET.SubElement(
+        parent, "ssd:Component",
+        name=part.name, type="application/x-fmu-sharedlibrary", source=part.source, implementation="CoSimulation",
+        description=part.component.description,
+    )  # fmt: skip
+    connectors = ET.SubElement(element, "ssd:Connectors")
+    for v in shown:
+        kind = "input" if v.role == "input" else "output"
+        connector = ET.SubElement(connectors, "ssd:Connector", name=v.name, kind=kind, description=v.description)
+        ET.SubElement(connector, "ssc:Real", {"unit": v.quantity.unit} if v.quantity.unit else {})

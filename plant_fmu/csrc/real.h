@@ -1,0 +1,120 @@
+/* The number of the mathematics: a double or, compiled with -DLANES=n, n doubles side by side, one for each of n vehicles.
+ *
+ * What is written with Real serves both. Arithmetic and comparisons are C's own and go lane by lane; a literal may stand
+ * next to a Real in them (2.0 * x), but is no Real itself: splat(2.0) is. A comparison gives a Mask. Masks are joined by &
+ * and |, inverted by mask_not, and decide by choose, which works out both sides: in place of if, ?:, && and ||. Lanes do
+ * not know of each other, so each gets the bits that it would get alone. */
+#ifndef REAL_H
+#define REAL_H
+
+#include <math.h>
+
+#ifndef LANES
+
+typedef double Real;
+typedef int Mask;
+
+static inline Real splat(double number) { return number; }
+static inline double lane(Real x, int i) { return (void)i, x; }
+static inline void set_lane(Real *x, int i, double number) { (void)i, *x = number; }
+
+static inline Real choose(Mask which, Real yes, Real no) { return which ? yes : no; }
+static inline Mask mask_not(Mask which) { return !which; }
+static inline int any(Mask which) { return which; }
+static inline int all(Mask which) { return which; }
+static inline int mask_lane(Mask which, int i) { return (void)i, which; }
+static inline void set_mask_lane(Mask *which, int i, int yes) { (void)i, *which = yes != 0; }
+
+static inline Real real_sqrt(Real x) { return sqrt(x); }
+static inline Real real_fabs(Real x) { return fabs(x); }
+static inline Real real_fmax(Real x, Real y) { return x > y ? x : y; } /* y where either is no number */
+static inline Real real_fmin(Real x, Real y) { return x < y ? x : y; }
+static inline Real real_copysign(Real x, Real sign) { return copysign(x, sign); }
+
+#define REAL_FUNCTION(name) static inline Real real_##name(Real x) { return name(x); }
+
+#else /* vectors as GCC and Clang know them */
+
+enum { N_LANES = LANES };
+
+typedef double Real __attribute__((vector_size(8 * LANES)));
+typedef long long Mask __attribute__((vector_size(8 * LANES)));
+
+static inline Real splat(double number) { return number - (Real){0.0}; } /* the bits of -0.0, too */
+static inline double lane(Real x, int i) { return x[i]; }
+static inline void set_lane(Real *x, int i, double number) { (*x)[i] = number; }
+
+static inline Real choose(Mask which, Real yes, Real no)
+{
+    return (Real)(((Mask)yes & which) | ((Mask)no & ~which));
+}
+
+static inline Mask mask_not(Mask which) { return ~which; }
+
+static inline int any(Mask which)
+{
+    long long joined = 0;
+
+    for (int i = 0; i < LANES; i++)
+        joined |= which[i];
+    return joined != 0;
+}
+
+static inline int all(Mask which) { return !any(~which); }
+static inline int mask_lane(Mask which, int i) { return which[i] != 0; }
+static inline void set_mask_lane(Mask *which, int i, int yes) { (*which)[i] = yes ? -1 : 0; }
+
+static inline Real real_fabs(Real x) { return (Real)((Mask)x & 0x7fffffffffffffffLL); }
+static inline Real real_fmax(Real x, Real y) { return choose(x > y, x, y); }
+static inline Real real_fmin(Real x, Real y) { return choose(x < y, x, y); }
+
+static inline Real real_copysign(Real x, Real sign)
+{
+    return (Real)(((Mask)x & 0x7fffffffffffffffLL) | ((Mask)sign & ~0x7fffffffffffffffLL));
+}
+
+/* C's function, lane by lane */
+#define REAL_FUNCTION(name)                                                                                            \
+    static inline Real real_##name(Real x)                                                                             \
+    {                                                                                                                  \
+        for (int i = 0; i < LANES; i++)                                                                                \
+            x[i] = name(x[i]);                                                                                         \
+        return x;                                                                                                      \
+    }
+
+REAL_FUNCTION(sqrt)
+
+#endif
+
+REAL_FUNCTION(exp)
+REAL_FUNCTION(expm1)
+REAL_FUNCTION(log)
+REAL_FUNCTION(tanh)
+REAL_FUNCTION(sin)
+REAL_FUNCTION(cos)
+
+static inline Real real_pow(Real x, Real y)
+{
+#ifdef LANES
+    for (int i = 0; i < LANES; i++)
+        x[i] = pow(x[i], y[i]);
+    return x;
+#else
+    return pow(x, y);
+#endif
+}
+
+static inline Real real_hypot(Real x, Real y)
+{
+#ifdef LANES
+    for (int i = 0; i < LANES; i++)
+        x[i] = hypot(x[i], y[i]);
+    return x;
+#else
+    return hypot(x, y);
+#endif
+}
+
+#undef REAL_FUNCTION
+
+#endif
