@@ -223,5 +223,5 @@ def checked_scenario(table: dict[str, Any], name: str, vehicle: Vehicle | None =
         regions=regions + seen,
         intersection=overlapping,
         compare=file.compare,
-        table=msgspec.to_builtins(filled),
+        table=msgspec.to_builtins(dataclasses.asdict(filled)),
     )

@@ -274,3 +274,9 @@ def test_broken_files_are_refused(tmp_path, content):
     path.write_bytes(content)
     with pytest.raises(ScenarioError, match=r"broken\.toml"):
         load_scenario(path)
+
+
+def test_a_table_that_is_given_in_part_is_filled_in_too():
+    table = load_scenario("paper", ["sensing.position_noise=0.02"]).table
+    assert table["sensing"].keys() == load_scenario("paper").table["sensing"].keys()
+    assert table["sensing"]["position_noise"] == 0.02 and table["sensing"]["seed"] == 0
