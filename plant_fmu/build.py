@@ -97,11 +97,7 @@ def cached_fmu(what: Vehicle | Component, fmi: int) -> Path:
         As `build_fmu`.
     """
     require_version(fmi)
-    made_from = hashlib.sha256(" ".join((native_platform().name, *FLAGS, fmpy.__version__)).encode())
-    component = _component(what)
-    for name, data in sorted(neutral_members(component, fmi).items()):
-        made_from.update(f"\n{name} {len(data)}\n".encode() + data)
-    digest = made_from.hexdigest()[:16]
+    component, digest = _component(what), _digest(what, fmi)[:16]
     path = Path(platformdirs.user_cache_dir("subreach")) / "fmu" / f"{component.name}-fmi{fmi}-{digest}.fmu"
     if zipfile.is_zipfile(path):  # one that was damaged is built anew
         return path
@@ -116,6 +112,18 @@ def cached_fmu(what: Vehicle | Component, fmi: int) -> Path:
         if path.exists():
             return path
     return build_fmu(component, fmi, path)
+
+
+@functools.lru_cache(maxsize=64)
+def _digest(what: Vehicle | Component, fmi: int) -> str:
+    """Return what names an FMU of this machine by all that it is made from.
+
+    To write all of that down takes longer than to load an FMU, so a process does it once for each vehicle.
+    """
+    made_from = hashlib.sha256(" ".join((native_platform().name, *FLAGS, fmpy.__version__)).encode())
+    for name, data in sorted(neutral_members(what, fmi).items()):
+        made_from.update(f"\n{name} {len(data)}\n".encode() + data)
+    return made_from.hexdigest()
 
 
 @functools.cache

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import re
 from dataclasses import dataclass
 from importlib import resources
@@ -179,8 +180,14 @@ def load_vehicle(name_or_file: str | Path) -> Vehicle:
     if text not in shipped_vehicles():
         known = ", ".join(shipped_vehicles())
         raise VehicleError(f"vehicle {text!r} is unknown; expected one of {known}, or a file ending in .toml")
-    with resources.as_file(_folder() / f"{text}.toml") as shipped:
-        return _decode(shipped, text)
+    return _shipped(text)
+
+
+@functools.cache
+def _shipped(name: str) -> Vehicle:
+    """Return a shipped vehicle, which nobody changes: its arrays cannot be written."""
+    with resources.as_file(_folder() / f"{name}.toml") as file:
+        return _decode(file, name)
 
 
 def _decode(path: Path, where: str) -> Vehicle:

@@ -2,20 +2,27 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import pytest
 from hypothesis import settings
 
+from tests.examples import FAST, FULL
+
 # no test asserts a time: the first example of many compiles what it calls
-settings.register_profile("subreach", deadline=None, derandomize=True)
-settings.load_profile("subreach")
+settings.register_profile("full", deadline=None, derandomize=True, max_examples=FULL)
+settings.register_profile("fast", settings.get_profile("full"), max_examples=FAST)
 
 DATA = Path(__file__).parent / "data"
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--slow", action="store_true", help="also run the tests marked slow")
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    settings.load_profile("full" if config.getoption("--slow") else "fast")
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
@@ -27,26 +34,27 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
 @pytest.fixture(autouse=True, scope="session")
 def fmu_cache(tmp_path_factory):
-    """Build FMUs afresh in each session, whatever the user's cache holds."""
+    """Build FMUs afresh in each session, once for all its workers, whatever the user's cache holds."""
+    base = tmp_path_factory.getbasetemp()
+    folder = (base.parent if os.environ.get("PYTEST_XDIST_WORKER") else base) / "cache"
+    folder.mkdir(exist_ok=True)
     with pytest.MonkeyPatch.context() as patch:
-        folder = tmp_path_factory.mktemp("cache")
         patch.setattr("platformdirs.user_cache_dir", lambda *_, **__: str(folder))
         yield folder
 
 
 @pytest.fixture(scope="session")
 def shipped_run(tmp_path_factory):
-    """Return a function that runs a shipped scenario once a session; those that are changed get no report."""
+    """Return a function that runs a shipped scenario once a session, with a report where one is asked for."""
     from cosim.run import run_scenario
     from cosim.scenario import load_scenario
 
     done = {}
 
-    def run(name, *overrides):
-        if (name, overrides) not in done:
+    def run(name, *overrides, report=False):
+        if (name, overrides, report) not in done:
             folder = tmp_path_factory.mktemp("runs") / name
-            report = overrides == ("arbiter.engine=closed",)
-            done[name, overrides] = run_scenario(load_scenario(name, overrides), folder, report=report)
-        return done[name, overrides]
+            done[name, overrides, report] = run_scenario(load_scenario(name, overrides), folder, report=report)
+        return done[name, overrides, report]
 
     return run

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import logging
 import sys
 import time
 from collections.abc import Iterator
@@ -11,12 +12,14 @@ from typing import Any
 
 from cosim.campaigns.crews import Death, Flight, interrupts_held
 from cosim.campaigns.work import Task
-from cosim.campaigns.worker import fly
+from cosim.campaigns.worker import fly, release
 from cosim.errors import RunError
 
 _QUEUED = 2  # batches a thread of a worker, so that none waits for work
 _LOOK = 5.0  # s between looks at how many workers there are: they may come and go
 _PATIENCE = 30.0  # s for a scheduler to answer, and for the first worker
+_PATIENCE_WITH_WORKERS = 2.0  # s for one to end the batch that it is at
+_SETTLING = 1.0  # s that a new worker is left in peace: one that dies at once is not replaced again
 
 
 def is_cluster(executor: Executor) -> bool:
@@ -39,18 +42,23 @@ class Cluster:
 
         self._executor, self._client = executor, executor._client
         self._killed: Any = distributed.KilledWorker
-        self._width, self._looked = 1, -_LOOK
+        self._workers = self._looked = self._seen = 0.0
+        self._bereft = False
+        self._local = isinstance(self._client.cluster, distributed.LocalCluster)
+        self._look()
+        self._most = self._workers
 
     @property
     def width(self) -> int:
         """How many batches may be under way."""
         if time.monotonic() - self._looked >= _LOOK:
-            self._width = max(1, _QUEUED * sum(self._client.nthreads().values()))
-            self._looked = time.monotonic()
-        return self._width
+            self._look()
+        return max(1, _QUEUED * int(self._workers))
 
     def submit(self, task: Task, batch: Any) -> Flight:
-        """Have a batch flown."""
+        """Have a batch flown; after a death, once there are as many workers as before."""
+        if self._bereft:
+            self._recover()
         try:
             flight: Flight = self._executor.submit(fly, task, batch)
         except (RuntimeError, OSError) as error:
@@ -62,17 +70,65 @@ class Cluster:
         try:
             return flight.result()
         except self._killed as error:
+            self._bereft = True
             return Death(error.allowed_failures + 1, certain=False)
         except (CancelledError, OSError) as error:
             raise _lost(error) from error
 
+    def check(self) -> None:
+        """Look whether there are workers."""
+        self._look()
+        if time.monotonic() - self._seen > _PATIENCE:
+            raise RunError(f"the cluster has had no workers for {_PATIENCE:g} s; what is flown is kept")
+
+    def _look(self) -> None:
+        try:
+            self._workers = sum(self._client.nthreads().values())
+        except (OSError, RuntimeError, TimeoutError) as error:
+            raise _lost(error) from error
+        self._looked = time.monotonic()
+        if self._workers:
+            self._seen = self._looked
+
+    def _recover(self) -> None:
+        """Wait for workers in the place of those that died; those that do not come by themselves are sent for."""
+        if not self._wait(_PATIENCE / 3.0) and self._local:
+            with interrupts_held():
+                self._client.cluster.scale(0)
+                self._client.cluster.scale(int(self._most))
+            self._wait(_PATIENCE)
+        time.sleep(_SETTLING)
+        self._bereft, self._most = False, max(1.0, self._workers)
+        self.check()
+
+    def _wait(self, patience: float) -> bool:
+        until = time.monotonic() + patience
+        while self._workers < self._most and time.monotonic() < until:
+            time.sleep(_SETTLING / 10.0)
+            self._look()
+        return self._workers >= self._most
+
     def close(self) -> None:
-        """Leave the cluster to whom it belongs."""
+        """Leave the cluster to whom it belongs, its workers without what they held for us."""
+        with contextlib.suppress(Exception):  # whoever is gone holds nothing
+            self._client.run(release, _PATIENCE_WITH_WORKERS)
 
 
 def _lost(error: BaseException) -> RunError:
     said = " ".join(str(error).split()) or type(error).__name__
     return RunError(f"the cluster is lost ({said}); what is flown is kept")
+
+
+@contextlib.contextmanager
+def _quiet(name: str) -> Iterator[None]:
+    """Leave out what a library logs: what it means for the campaign, we say."""
+    logger = logging.getLogger(name)
+    before = logger.level
+    logger.setLevel(logging.CRITICAL)
+    try:
+        yield
+    finally:
+        logger.setLevel(before)
 
 
 @contextlib.contextmanager
@@ -103,14 +159,16 @@ def cluster_executor(scheduler: str | None, workers: int) -> Iterator[Executor]:
         raise RunError("Dask is not installed; expected: pip install 'subreach[dask]'") from error
     untyped: Any = distributed
     with contextlib.ExitStack() as stack:
+        stack.enter_context(_quiet("distributed"))
         try:
             if scheduler is None:
                 # we count deaths ourselves, and know how to lay them to a row
                 stack.enter_context(dask.config.set({"distributed.scheduler.allowed-failures": 0}))
                 with interrupts_held():
                     cluster = untyped.LocalCluster(
-                        n_workers=workers, threads_per_worker=1, processes=True, dashboard_address=None
-                    )
+                        n_workers=workers, threads_per_worker=1, processes=True, silence_logs=logging.CRITICAL,
+                        scheduler_kwargs={"dashboard": False, "dashboard_address": "127.0.0.1:0"},
+                    )  # fmt: skip
                 stack.enter_context(cluster)
                 client = untyped.Client(cluster)
             else:

@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass, field
+from multiprocessing import resource_tracker
 from typing import Any, Protocol
 
 from cosim.campaigns.work import Task
@@ -42,6 +43,9 @@ class Crew(Protocol):
     def settle(self, flight: Flight) -> tuple[Any, float] | Death:
         """Return what came of a batch that is done; raise what cannot be mended."""
 
+    def check(self) -> None:
+        """Raise an error if nothing that is under way will ever come home."""
+
     def close(self) -> None:
         """Send everybody home; what is under way is lost."""
 
@@ -60,6 +64,9 @@ class Here:
     def settle(self, flight: Flight) -> tuple[Any, float] | Death:
         """Return what came of it."""
         return flight.result()
+
+    def check(self) -> None:
+        """Wait for nobody."""
 
     def close(self) -> None:
         """Nobody to send home."""
@@ -123,6 +130,9 @@ class Processes:
         finally:
             hand.under_way.remove(flight)
 
+    def check(self) -> None:
+        """Be sure to hear of every death."""
+
     def _replace(self, hand: _Hand) -> _Hand:
         new = _Hand(_pool())
         self._hands[self._hands.index(hand)] = new
@@ -166,6 +176,9 @@ class Lent:
         except (BrokenExecutor, CancelledError) as error:
             raise _broken(error) from error
 
+    def check(self) -> None:
+        """Believe the executor."""
+
     def close(self) -> None:
         """Leave the executor to whom it belongs."""
 
@@ -189,6 +202,7 @@ def interrupts_held() -> Iterator[None]:
     if not hasattr(signal, "pthread_sigmask"):
         yield
         return
+    resource_tracker.ensure_running()  # which would let Ctrl-C through again when it is started
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield

@@ -15,6 +15,7 @@ from cosim.errors import RunError
 log = logging.getLogger(__name__)
 
 KILLED = "the process that flew it died each time (killed, or out of memory)"
+_LOOK = 5.0  # s between looks at the crew, where nothing comes home
 _DEATHS = 30  # in a row, with nothing that came home between them: it is not the rows
 
 
@@ -62,7 +63,10 @@ def fly_all(work: Work, batches: Batches, crew: Crew) -> Generator[Any, None, No
         send()
         if not under_way:
             break
-        for flight in wait(under_way, return_when=FIRST_COMPLETED).done:
+        done = wait(under_way, _LOOK, FIRST_COMPLETED).done
+        if not done:
+            crew.check()
+        for flight in done:
             batch, came = under_way.pop(flight), crew.settle(flight)
             if not isinstance(came, Death):
                 home, deaths = home + 1, 0

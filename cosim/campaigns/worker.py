@@ -60,6 +60,21 @@ def fly(task: Task, batch: Any) -> tuple[Any, float]:
         return table, time.perf_counter() - started
 
 
+def release(patience: float) -> None:
+    """Free the flyer of this process.
+
+    Parameters
+    ----------
+    patience : float
+        How long to wait for the batch that is being flown [s]; after that the flyer stays.
+    """
+    if _held.lock.acquire(timeout=patience):
+        try:
+            _held.free()
+        finally:
+            _held.lock.release()
+
+
 @contextlib.contextmanager
 def flyer_held(task: Task) -> Iterator[None]:
     """Hold a flyer in this process: it says what it cannot do, and what has to be built once is built."""

@@ -4,20 +4,18 @@ from __future__ import annotations
 
 import argparse
 import contextlib
-import ipaddress
 import math
 import signal
-import socket
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from cosim.address import resolved
 from cosim.command_line.campaigns import INTERRUPTED
+from cosim.sitl.ports import PORTS
 
 if TYPE_CHECKING:
     from cosim.run import Run
-
-_PORTS = {"ardupilot": 9002, "px4": 4560}
 
 
 def add_verbs(verbs: Any) -> None:
@@ -35,10 +33,10 @@ def add_verbs(verbs: Any) -> None:
         "--set", action="append", default=[], metavar="KEY=VALUE", dest="overrides", help="as for run"
     )  # fmt: skip
     sitl.add_argument(
-        "--backend", choices=_PORTS, default="ardupilot",
+        "--backend", choices=PORTS, default="ardupilot",
         help="ardupilot: its JSON backend, by UDP; px4: its simulator interface, by TCP (default: %(default)s)",
     )  # fmt: skip
-    sitl.add_argument("--port", type=_port, metavar="N", help="default: 9002, with px4 4560")
+    sitl.add_argument("--port", type=_port, metavar="N", help=f"default: {PORTS['ardupilot']}, with px4 {PORTS['px4']}")
     sitl.add_argument("--host", default="127.0.0.1", metavar="ADDRESS", help="to listen on (default: %(default)s)")
     sitl.add_argument("--allow-remote", action="store_true", help="let the address be seen from other machines")
     sitl.add_argument(
@@ -76,7 +74,7 @@ def sitl(options: argparse.Namespace) -> int:
     from cosim.sitl.law import law_of_controls, law_of_pwm
     from cosim.sitl.server import JsonServer
 
-    address = _address(options.host, options.port or _PORTS[options.backend], options.allow_remote)
+    address = _address(options.host, options.port or PORTS[options.backend], options.allow_remote)
     # a polite kill leaves a readable run too
     with contextlib.suppress(ValueError):  # which signal raises outside the main thread
         signal.signal(signal.SIGTERM, signal.default_int_handler)
@@ -114,9 +112,9 @@ def _address(host: str, port: int, allow_remote: bool) -> tuple[str, int]:
     from cosim.errors import RunError
 
     try:
-        found = str(socket.getaddrinfo(host, port, socket.AF_INET, socket.SOCK_DGRAM)[0][4][0])
-    except (OSError, UnicodeError) as error:
+        found, here = resolved(host)
+    except OSError as error:
         raise RunError(f"--host {host!r}: is not known: {error}") from error
-    if not allow_remote and not ipaddress.ip_address(found).is_loopback:
+    if not (allow_remote or here):
         raise RunError(f"--host {host!r}: {found} can be seen from other machines; --allow-remote lets it")
     return found, port

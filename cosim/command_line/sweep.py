@@ -14,8 +14,9 @@ from cosim.command_line.campaigns import INTERRUPTED, resumable, workers
 from cosim.errors import RunError
 
 _EPILOG = """examples:
-  cosim sweep paper --vary initial.position.1=-2:2 regions.SR1.gain=500:5000:log --samples 1000 --out sweeps/start
-  cosim sweep paper --vary law.gains.k_p1=10:30:5 law.gains.k_q=5,10,20 --design grid --workers 2 --out sweeps/gains
+  cosim sweep moving-obstacle --vary initial.position.1=-2:2 law.gains.k_p1=1:100:log --samples 1000 --out sweeps/start
+  cosim sweep paper --set arbiter.engine=closed --vary law.gains.k_p1=10:30:5 law.gains.k_q=5,10,20 --design grid \\
+      --workers 2 --out sweeps/gains
   cosim rerun sweeps/start 17 --out runs/worst
 """
 

@@ -76,9 +76,8 @@ def lanes_library(vehicle: Vehicle, flags: tuple[str, ...] = (), beside: Path | 
         made_from.update(f"\n{name} {len(text)}\n".encode() + text)
     name = f"{vehicle.name}-{made_from.hexdigest()[:16]}{native_platform().suffix}"
     path = Path(platformdirs.user_cache_dir("subreach")) / "lanes" / name
-    if path.is_file():
-        with contextlib.suppress(OSError):  # one that was damaged is built anew
-            return ctypes.CDLL(str(path))
+    if _is_whole(path):
+        return ctypes.CDLL(str(path))
     with tempfile.TemporaryDirectory(prefix="lanes-", ignore_cleanup_errors=True) as scratch:
         folder = Path(scratch)
         for file, text in files.items():
@@ -90,13 +89,27 @@ def lanes_library(vehicle: Vehicle, flags: tuple[str, ...] = (), beside: Path | 
         return ctypes.CDLL(str(_kept(built, path)))
 
 
+def _is_whole(path: Path) -> bool:
+    """Return whether a library in the cache is what was written there: loading half of one can end the process."""
+    try:
+        return _checksum(path).read_text() == hashlib.sha256(path.read_bytes()).hexdigest()
+    except OSError:
+        return False
+
+
+def _checksum(path: Path) -> Path:
+    return path.with_name(f"{path.name}.sha256")
+
+
 def _kept(built: Path, path: Path) -> Path:
     """Move a library to its place in the cache, whole or not at all; where there is no place, leave it where it is."""
     beside = path.with_name(f"{path.name}.{os.getpid()}")
+    library = built.read_bytes()
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        beside.write_bytes(built.read_bytes())
-        beside.replace(path)
+        for place, data in ((path, library), (_checksum(path), hashlib.sha256(library).hexdigest().encode())):
+            beside.write_bytes(data)
+            beside.replace(place)
     except OSError as error:
         log.warning("cache %s: %s; built for this process alone", path.parent, error.strerror or error)
         with contextlib.suppress(OSError):

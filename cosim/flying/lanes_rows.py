@@ -167,7 +167,8 @@ class Rows:
     def _slot(self, i: int) -> int:
         """Return where in a row the number of a key stands as it is; -1: it does not, or is not checked by itself."""
         key = self.variation.keys[i]
-        if key.startswith(_JOINT) or self._is_joint(key):
+        whole = not isinstance(self.variation.number(key), float)  # fractions are refused, which no range says
+        if whole or key.startswith(_JOINT) or self._is_joint(key):
             return -1
         values = self._base_values()
         for changed in _others(values[i]):
@@ -205,6 +206,7 @@ def require_lanes(scenario: Scenario) -> None:
     for key, came, expected in (
         ("law.name", s.law.name, "printed"),
         ("arbiter.engine", s.arbiter.engine, "closed"),
+        ("master.order", s.master.order, "gauss-seidel"),
         ("commands.enabled", s.commands.enabled, False),
         ("sensing", "noisy" if not s.sensing.exact else "exact", "exact"),
         ("failures", len(s.failures), 0),

@@ -107,16 +107,6 @@ class Autopilot:
             for message in self._vessel.text(line):
                 link.send(message)
 
-    def detach(self, link: Outlet) -> None:
-        """End to stream on a link, and forget it."""
-        if link not in self._streams:
-            return
-        self._vessel.links.remove(link)
-        del self._streams[link]
-        self._beaten_at.pop(link, None)
-        for service in self._services:
-            service.detach(link)
-
     def observe(self, row: Array) -> None:
         """Take the next snapshot, and send what is due by simulated time.
 

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import ipaddress
-import socket
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
+from cosim.address import resolved
 from cosim.errors import TelemetryError
 
 Kind = Literal["udpout", "udpin", "tcpin", "tcp", "serial", "tlog"]
@@ -75,10 +74,10 @@ def parse_endpoint(text: str, allow_remote: bool = False) -> Endpoint:
 def _address(text: str, host: str, allow_remote: bool) -> str:
     """Return the IPv4 address of a host, which is this machine unless others are allowed."""
     try:
-        address = str(socket.getaddrinfo(host, None, socket.AF_INET)[0][4][0])
-    except (OSError, UnicodeError) as error:
+        address, here = resolved(host)
+    except OSError as error:
         raise TelemetryError(f"endpoint {text!r}: host {host!r} is not known: {error}") from error
-    if not allow_remote and not ipaddress.ip_address(address).is_loopback:
+    if not (allow_remote or here):
         raise TelemetryError(f"endpoint {text!r}: {address} is beyond this machine; --allow-remote lets it through")
     return address
 

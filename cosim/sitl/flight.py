@@ -59,8 +59,6 @@ class Flight:
             self._master.close()
             raise
         self._reader = MotionReader(self._master.plant, "bottom_depth" in scenario.plant.parameters)
-        self._row = self._master.signals.row.view()
-        self._row.flags.writeable = False
         self._every = max(1, round(1.0 / (record_rate * scenario.time.step)))
         self._started = time.perf_counter()
         self._wall_time: float | None = None
@@ -96,7 +94,7 @@ class Flight:
     def _record(self) -> None:
         """Keep the row of the step that was made last, if it is due."""
         if self.steps % self._every == 0:
-            self._recorder.observe(self.steps, self._row)
+            self._recorder.observe(self.steps, self._master.row)
 
     def end(self) -> None:
         """Close plant and record. May be called twice."""

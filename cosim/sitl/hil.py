@@ -10,6 +10,7 @@ from typing import Any
 
 from cosim.errors import RunError
 from cosim.mavlink.dialect import dialect
+from cosim.mavlink.options import ORIGIN
 from cosim.sitl.flight import Flight
 from cosim.sitl.flights import Counts, Flights, Outcome
 from cosim.sitl.hil_messages import at_rest, hil_messages
@@ -17,7 +18,6 @@ from cosim.sitl.motion import Motion
 
 log = logging.getLogger(__name__)
 
-PORT = 4560  # where PX4 looks for its simulator
 LEFT = "ended: the autopilot left"
 RATE = 250  # Hz, frames a simulated second
 SYSTEM_ID, COMPONENT_ID = 254, 25  # of neither a vehicle nor a ground station
@@ -77,7 +77,7 @@ class HilServer:
         address: tuple[str, int],
         timeout: float | None = None,
         tell: Callable[[str], None] | None = None,
-        origin: tuple[float, float] = (55.9097, -3.3203),
+        origin: tuple[float, float] = ORIGIN,
     ) -> None:
         self._mavlink = dialect()
         self._flights, self._timeout, self._tell, self._origin = flights, timeout, tell or log.info, origin

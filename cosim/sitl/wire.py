@@ -13,7 +13,6 @@ from dataclasses import dataclass
 from cosim.errors import RunError
 from cosim.sitl.motion import Motion
 
-PORT = 9002  # where ArduPilot looks for its plant
 LARGEST = 72  # bytes of a servo packet
 
 _MAGICS = {18458: struct.Struct("<HHI16H"), 29569: struct.Struct("<HHI32H")}

@@ -43,8 +43,9 @@ def paper():
     return named(check(load_scenario("paper", [CLOSED])).findings)
 
 
-FAST = ("docking", "paper")
-EACH_SCENARIO = [name if name in FAST else pytest.param(name, marks=pytest.mark.slow) for name in shipped_scenarios()]
+EACH_SCENARIO = [
+    name if name == "paper" else pytest.param(name, marks=pytest.mark.slow) for name in shipped_scenarios()
+]
 
 
 @pytest.mark.parametrize("name", EACH_SCENARIO)

@@ -14,11 +14,16 @@ from cosim.cli import main
 QUICK = ["--set", "arbiter.engine=closed", "--set", "time.duration=0.02"]
 
 
-def test_run_says_what_happened_and_where_to_look(tmp_path, capsys):
+@pytest.mark.parametrize(
+    ("flags", "look"),
+    [(["--no-report"], "summary.json"), pytest.param([], "report.html", marks=pytest.mark.slow)],
+    ids=["without a report", "with one"],
+)
+def test_run_says_what_happened_and_where_to_look(tmp_path, capsys, flags, look):
     out = tmp_path / "run"
-    assert main(["run", "paper", "--out", str(out), *QUICK]) == 0
+    assert main(["run", "paper", "--out", str(out), *flags, *QUICK]) == 0
     said = capsys.readouterr()
-    assert said.out.splitlines()[-1] == str(out / "report.html")
+    assert said.out.splitlines()[-1] == str(out / look)
     assert "never entered the goal region" in said.out
     assert said.err == ""  # no bar where there is no terminal
 
@@ -121,6 +126,7 @@ def test_help_needs_nothing_heavy():
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "set()\n"
 
 
+@pytest.mark.slow
 def test_a_reader_that_goes_away_is_no_trouble():
     command = f"{sys.executable} -m cosim show paper | true"
     done = subprocess.run(command, shell=True, capture_output=True, text=True, check=False)
@@ -152,7 +158,7 @@ sys.exit(main({arguments!r}))
 
 
 @pytest.mark.skipif(not Path("/proc/self/maps").exists(), reason="looks into /proc")
-@pytest.mark.parametrize("delay", [0.0, 0.3, 0.8])
+@pytest.mark.parametrize("delay", [0.3, *(pytest.param(delay, marks=pytest.mark.slow) for delay in (0.0, 0.8))])
 def test_ctrl_c_is_heeded_from_the_first_imports(tmp_path, delay):
     command = [
         sys.executable,

@@ -29,6 +29,7 @@ from controller.regions import (
 from cosim.vehicle_model import vehicle_model
 from plant_fmu.vehicle import load_vehicle
 from tests.cosim.test_deployable import fly, reached, within_limits
+from tests.examples import examples
 
 ODIN = vehicle_model(load_vehicle("odin"))
 LEVEL = np.array([1.0, 0.0, 0.0, 0.0])
@@ -89,7 +90,7 @@ class Spoilt(NamedTuple):
 spoilt = st.builds(Spoilt, st.integers(0, 4), st.integers(0, 99), st.sampled_from(NUMBERS))
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=examples(60), deadline=None)
 @given(
     shapes=st.lists(st.tuples(st.sampled_from(SHAPES), st.booleans(), st.booleans()), max_size=6),
     goal=st.tuples(st.sampled_from(PLACES), st.booleans()),

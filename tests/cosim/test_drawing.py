@@ -52,7 +52,8 @@ def test_what_moved_is_drawn_where_it_began_where_it_ended_and_where_it_mattered
     assert nearest.shift == pytest.approx(centre[at] - nearest.region.shape.centre)
 
 
-@pytest.mark.parametrize("name", ["inspection", pytest.param("drifting", marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["inspection", "drifting"])
 def test_every_figure_can_be_drawn(request, name):
     story = request.getfixturevalue(name)
     figures = {drawing.name: drawing for drawing in drawings(story)}

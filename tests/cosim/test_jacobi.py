@@ -1,16 +1,15 @@
 """The order of a step: Jacobi's is that of masters that exchange all values at once."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
-from controller import VehicleState
-from controller.regions import pack
-from cosim.law import law_of
 from cosim.master import Master
 from cosim.scenario import CRITERIA, load_scenario
-from cosim.start_values import start_values
-from fuzzy_arbiter import Arbiter, ramp
-from plant_fmu import Plant
+from tests.cosim.package.jacobi import jacobi as by_parts
+
+ALL_SHAPES = Path(__file__).parent / "package" / "all-shapes.toml"
 
 SHORT = [
     'arbiter.engine="closed"', "time.duration=6.0", "time.step=0.01", "time.control=0.02", "time.arbiter=0.03",
@@ -33,62 +32,15 @@ def rows_of(scenario):
         return np.array(rows.rows), master.signals
 
 
-class Part:
-    """What a master of other parts sees: outputs that were made in the step before, of inputs at its beginning."""
-
-    def __init__(self, size):
-        self.outputs = np.zeros(size)
-        self.coming = np.zeros(size)
-
-    def exchange(self):
-        self.outputs[:] = self.coming
-
-
-def jacobi_by_parts(scenario):
-    """The definition: three parts, and nothing handed on but at the end of a step."""
-    arbiter, law = Arbiter(), law_of(scenario)
-    goal, regions = pack([scenario.goal_region]), pack([r.region for r in scenario.regions])
-    of = [CRITERIA.index(r.criterion) for r in scenario.regions]
-    n = len(of)
-    wrench, asked, weights = Part(6), Part(len(CRITERIA)), Part(len(CRITERIA))
-    values, gradients, turnings, clearances = np.zeros(n), np.zeros((n, 3)), np.zeros((n, 3)), np.zeros(n)
-    positions, seen_weights = [], []
-    with Plant(scenario.vehicle) as plant:
-        plant.set(start_values(scenario))
-        plant.initialise()
-        for k in range(scenario.steps + 1):
-            position = np.array([plant[f"position.{axis}"] for axis in "xyz"])
-            attitude = np.array([plant[f"quaternion.e{i}"] for i in range(4)])
-            velocity = np.array([plant[f"velocity.{axis}"] for axis in "uvwpqr"])
-            positions.append(position)
-            seen_weights.append(weights.outputs.copy())
-            state = VehicleState(position, attitude, velocity, np.ones(8))
-            regions.evaluate(position, attitude, values, gradients, turnings, clearances)
-            asked.coming[:] = 0.0
-            for criterion, clearance in zip(of, clearances, strict=True):
-                asked.coming[criterion] = max(asked.coming[criterion], ramp(clearance, scenario.arbiter.ramp))
-            if k % scenario.arbiter_every == 0:
-                weights.coming[:] = arbiter(asked.outputs.tolist())
-            if k % scenario.control_every == 0:
-                law.step(state, goal, regions, weights.outputs[of], wrench.coming)
-            if k < scenario.steps:
-                for axis, value in zip("XYZKMN", wrench.outputs, strict=True):
-                    plant[f"wrench.{axis}"] = value
-                plant.step(scenario.time.step)
-            for part in (wrench, asked, weights):
-                part.exchange()
-    return np.array(positions), np.array(seen_weights)
-
-
-def test_jacobi_is_three_parts_that_exchange_at_the_end_of_each_step():
-    scenario = load_scenario("paper", [*SHORT, 'master.order="jacobi"'])
-    rows, signals = rows_of(scenario)
-    positions, weights = jacobi_by_parts(scenario)
+@pytest.mark.parametrize("scenario", [("paper", SHORT), (ALL_SHAPES, [])], ids=["paper", "all shapes"])
+def test_jacobi_is_three_parts_that_exchange_at_the_end_of_each_step(scenario):
+    name, settings = scenario
+    loaded = load_scenario(name, [*settings, "master.order=jacobi"])
+    rows, signals = rows_of(loaded)
     at = signals.index("position.x")
-    np.testing.assert_array_equal(rows[:, at : at + 3], positions)
+    np.testing.assert_array_equal(rows[:, at : at + 13], by_parts(loaded))
     at = signals.index(f"weight.{CRITERIA[0]}")
-    np.testing.assert_array_equal(rows[:, at : at + 3], weights)
-    assert weights.max() > 0.5
+    assert rows[:, at : at + 3].max() > 0.5
 
 
 def test_the_orders_come_together_as_the_step_gets_shorter():

@@ -62,6 +62,7 @@ def test_first_value_is_that_of_the_start():
     assert kept["lyapunov.rate"][0] == pytest.approx(-0.08 * 18.8 * (f * 2.0) ** 2 * 80.0, rel=1e-12)
 
 
+@pytest.mark.slow
 def test_rate_is_that_of_v_up_to_the_sampling():
     """Held control is the only difference: it shrinks with the step."""
     coarse = defect(run("time.duration=1.0", *ALONE), "normalised", 1e-3)

@@ -28,15 +28,19 @@ def test_paper_without_a_limit(shipped_run, engine):
 
 
 def test_shipped_paper_runs_scikit_fuzzy(shipped_run):
-    assert shipped_run("paper", "arbiter.engine=skfuzzy").summary["arbiter"] == "skfuzzy"
+    assert shipped_run("paper", "arbiter.engine=skfuzzy", "time.duration=5").summary["arbiter"] == "skfuzzy"
     from cosim.scenario import load_scenario
 
     assert load_scenario("paper").arbiter.engine == "skfuzzy"
 
 
-def test_both_engines_drive_the_same_path(shipped_run):
+@pytest.mark.parametrize("duration", [5, pytest.param(60, marks=pytest.mark.slow)])
+def test_both_engines_drive_the_same_path(shipped_run, duration):
     """Their weights differ by at most the square of the grid's step over 2; the path hardly notices."""
-    closed, skfuzzy = (load_record(shipped_run("paper", f"arbiter.engine={e}").folder) for e in ("closed", "skfuzzy"))
+    closed, skfuzzy = (
+        load_record(shipped_run("paper", f"arbiter.engine={e}", f"time.duration={duration}").folder)
+        for e in ("closed", "skfuzzy")
+    )
     names = [f"weight.{name}" for name in ("obstacle", "shape", "depth")]
     assert np.abs(closed.stack(names) - skfuzzy.stack(names)).max() < 1e-4
     path = [f"position.{axis}" for axis in "xyz"]
@@ -63,7 +67,9 @@ def test_paper_limited_to_108_newtons(shipped_run):
 
 
 @pytest.mark.parametrize(
-    ("limit", "window", "speed"), [(76.4, (3.24, 3.92), 1.4), (100.0, (2.82, 3.42), 1.6)], ids=["76.4 N", "100 N"]
+    ("limit", "window", "speed"),
+    [pytest.param(76.4, (3.24, 3.92), 1.4, marks=pytest.mark.slow), (100.0, (2.82, 3.42), 1.6)],
+    ids=["76.4 N", "100 N"],
 )
 def test_other_limits(shipped_run, limit, window, speed):
     summary = shipped_run("paper-limited", "arbiter.engine=closed", "time.duration=20", f"limit.force={limit}").summary

@@ -25,6 +25,7 @@ FIGURES = [
     "weights",
 ]
 VOID = {"meta", "br", "img"}
+SHORT = ("arbiter.engine=closed", "time.duration=0.3")  # long enough to be inside SR1 and SR2
 
 
 class Checker(HTMLParser):
@@ -49,9 +50,16 @@ def page_of(run):
     return (run.folder / "report.html").read_text()
 
 
-@pytest.mark.parametrize("name", ["paper", pytest.param("paper-limited", marks=pytest.mark.slow)])
-def test_page_is_whole_and_needs_no_network(shipped_run, name):
-    page = page_of(shipped_run(name, "arbiter.engine=closed"))
+@pytest.mark.parametrize(
+    ("name", "overrides"),
+    [
+        ("paper", SHORT),
+        pytest.param("paper", SHORT[:1], marks=pytest.mark.slow),
+        pytest.param("paper-limited", SHORT[:1], marks=pytest.mark.slow),
+    ],
+)
+def test_page_is_whole_and_needs_no_network(shipped_run, name, overrides):
+    page = page_of(shipped_run(name, *overrides, report=True))
     checker = Checker()
     checker.feed(page)
     assert checker.open == []
@@ -62,7 +70,7 @@ def test_page_is_whole_and_needs_no_network(shipped_run, name):
 
 
 def test_every_figure_is_there_as_svg_and_png(shipped_run):
-    run = shipped_run("paper", "arbiter.engine=closed")
+    run = shipped_run("paper", *SHORT, report=True)
     names = sorted([*FIGURES, "weights-overlap"])
     assert sorted(p.stem for p in run.folder.glob("figures/*.svg")) == names
     assert page_of(run).count("<figure>") == len(names)
@@ -98,6 +106,7 @@ def test_claims_carry_this_runs_numbers(shipped_run):
         assert ("Winds up" in adapting.why) == (name != "paper")
 
 
+@pytest.mark.slow
 def test_claims_know_of_thrusters(tmp_path):
     overrides = ["arbiter.engine=closed", "time.duration=20", "actuation.through=thrusters"]
     scenario = load_scenario("paper", overrides)

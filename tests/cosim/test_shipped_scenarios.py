@@ -17,13 +17,14 @@ DEPLOYABLE = [
     "paper-deployable",
     "pipe-inspection",
 ]
+LONG = ("dense-field", "harbour", "paper-deployable")
 
 
 def test_these_are_all_that_are_shipped_with_that_law():
     assert [name for name in shipped_scenarios() if load_scenario(name).law.name == "deployable"] == DEPLOYABLE
 
 
-@pytest.mark.parametrize("name", DEPLOYABLE)
+@pytest.mark.parametrize("name", [pytest.param(n, marks=pytest.mark.slow) if n in LONG else n for n in DEPLOYABLE])
 def test_goal_is_reached_and_every_hard_region_kept(tmp_path, name):
     """As shipped, but for the report: every plant step counts."""
     scenario = load_scenario(name)

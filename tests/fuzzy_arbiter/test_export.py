@@ -131,6 +131,11 @@ def bad(system):
         yield from (([*good[:i], value, *good[i + 1 :]], -i - 1) for value in values)
 
 
+@pytest.mark.parametrize(
+    "system",
+    [pytest.param(name, marks=pytest.mark.slow) if name == "long" else name for name in SYSTEMS],
+    indirect=True,
+)
 def test_c(system, tmp_path):
     source = tmp_path / "arbiter.c"
     source.write_text(to_c(system))
@@ -175,7 +180,9 @@ def test_python(system):
             module["weights"](x)
 
 
-@pytest.mark.parametrize("name", ["section VI", "rational", pytest.param("wide, shared", marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    "name", ["section VI", *(pytest.param(name, marks=pytest.mark.slow) for name in ("rational", "wide, shared"))]
+)
 def test_from_a_compiled_loop(name):
     system = SYSTEMS[name]
     evaluate = Arbiter(system=system).compiled()

@@ -75,7 +75,7 @@ def everything(arbiter, ax=None):
     yield "decisions", lambda ax=None: pictures.decisions(arbiter, (first, second), ax=ax, points=11)
 
 
-@pytest.mark.parametrize("criteria", [None, MEASURED], ids=["three", "six"])
+@pytest.mark.parametrize("criteria", [None, pytest.param(MEASURED, marks=pytest.mark.slow)], ids=["three", "six"])
 def test_every_picture_draws_on_new_axes_or_on_those_given(criteria):
     arbiter = Arbiter(engine="exact") if criteria is None else Arbiter(criteria, engine="exact")
     for _, draw in everything(arbiter):

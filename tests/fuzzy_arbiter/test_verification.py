@@ -131,7 +131,7 @@ def test_all_forms_verify(form, n):
     assert v.row_count == 2**n
 
 
-@pytest.mark.parametrize("n", [12, 40])
+@pytest.mark.parametrize("n", [12, pytest.param(40, marks=pytest.mark.slow)])
 def test_many_criteria_are_decided(n):
     v = verify(prioritised([Criterion(f"c{i}") for i in range(n)]))
     assert v.ok

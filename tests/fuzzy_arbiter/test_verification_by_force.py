@@ -10,6 +10,7 @@ from fuzzy_arbiter import Is, Output, Rule, Shape, System, Term, Variable, falli
 from fuzzy_arbiter.propositions import And, Not, Or
 from fuzzy_arbiter.verification import verify
 from fuzzy_arbiter.verification.cells import stretches
+from tests.examples import examples
 
 NAMES = ("complete", "consistent", "exclusive", "graded_complete", "graded_consistent", "graded_exclusive")
 
@@ -132,7 +133,7 @@ def check_graded(s, v):
             assert np.all(faults(s, at(s, inputs), 0.5)[NAMES[3:].index(name)]), (name, place)
 
 
-@settings(max_examples=150)
+@settings(max_examples=examples(150))
 @given(systems())
 def test_verdicts_on_graded_inputs_against_brute_force(s):
     v = verify(s)
@@ -140,7 +141,7 @@ def test_verdicts_on_graded_inputs_against_brute_force(s):
     check_graded(s, v)
 
 
-@settings(max_examples=80)
+@settings(max_examples=examples(80))
 @given(systems(connectives=True))
 def test_verdicts_with_other_connectives_against_brute_force(s):
     v = verify(s)
@@ -148,7 +149,7 @@ def test_verdicts_with_other_connectives_against_brute_force(s):
     check_graded(s, v)
 
 
-@settings(max_examples=100)
+@settings(max_examples=examples(100))
 @given(systems())
 def test_verdicts_on_crisp_rows_against_all_rows(s):
     v = verify(s)
@@ -165,7 +166,7 @@ def test_verdicts_on_crisp_rows_against_all_rows(s):
     assert {name: getattr(v, name) for name in NAMES[:3]} == {name: not found for name, found in seen.items()}
 
 
-@settings(max_examples=100)
+@settings(max_examples=examples(100))
 @given(st.lists(shapes(), min_size=1, max_size=3))
 def test_stretches_against_samples(terms):
     v = Variable("x", (0, 4), tuple(Term(f"t{i}", shape) for i, shape in enumerate(terms)))

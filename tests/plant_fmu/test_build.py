@@ -155,6 +155,7 @@ def test_unwritable_place_is_one_line(tmp_path, capsys):
     assert capsys.readouterr().err.count("\n") == 1
 
 
+@pytest.mark.slow
 def test_ziglang_builds_where_there_is_no_cc(tmp_path, monkeypatch):
     pytest.importorskip("ziglang", reason="the build extra is not installed")
     monkeypatch.setenv("PATH", str(tmp_path))
@@ -163,6 +164,7 @@ def test_ziglang_builds_where_there_is_no_cc(tmp_path, monkeypatch):
     assert build_fmu(load_vehicle("odin"), 3, tmp_path / "x.fmu").exists()
 
 
+@pytest.mark.slow
 def test_own_vehicle_with_six_thrusters_and_full_added_mass(tmp_path, make_slave):
     rows = "\n".join(f"    [{', '.join('1.0' if i == j else '0.1' for j in range(6))}]," for i in range(6))
     path = written(
@@ -180,6 +182,7 @@ def test_own_vehicle_with_six_thrusters_and_full_added_mass(tmp_path, make_slave
     slave.close()
 
 
+@pytest.mark.slow
 def test_environment_is_left_alone(tmp_path):
     before = dict(os.environ), os.getcwd()
     build_fmu(load_vehicle("odin"), 2, tmp_path / "x.fmu")
@@ -199,9 +202,11 @@ def test_a_place_that_cannot_be_written_is_said_before_the_work(tmp_path, monkey
 
 
 def test_a_damaged_file_in_the_cache_is_built_anew(tmp_path, monkeypatch):
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    path = cached_fmu(load_vehicle("odin"), 3)
-    whole = path.read_bytes()
+    good = cached_fmu(load_vehicle("odin"), 3)
+    whole = good.read_bytes()
+    monkeypatch.setattr("platformdirs.user_cache_dir", lambda *_, **__: str(tmp_path))
+    path = tmp_path / "fmu" / good.name
+    path.parent.mkdir()
     path.write_bytes(whole[: len(whole) // 2])
     assert cached_fmu(load_vehicle("odin"), 3) == path
     assert path.read_bytes() == whole

@@ -117,7 +117,7 @@ def test_an_importer_that_cannot_be_loaded_is_no_fault_of_the_fmu(odin):
     ("deed", "words"),
     [
         ("abort();", "crashed (signal 6"),
-        ("for (;;) { }", "not done after 1 s"),
+        pytest.param("for (;;) { }", "not done after 1 s", marks=pytest.mark.slow),
         ("exit(0);", "ended without an answer"),
     ],
 )

@@ -39,6 +39,7 @@ def test_every_variable_has_what_a_user_needs():
             assert v.nominal > 0.0
 
 
+@pytest.mark.parametrize("fmi", [pytest.param(2, marks=pytest.mark.slow), 3], ids=["fmi2", "fmi3"])
 def test_the_fmu_starts_with_what_the_description_says(make_slave, fmi):
     """The XML's start values are compiled into the binary too: a tool that sets none must get the same."""
     slave = make_slave("bluerov2_heavy", fmi)

@@ -40,6 +40,7 @@ def mass_matrices():
 START = dict(zip(STATES[3:], (0.6, 0.5, -0.4, 0.48, 0.7, -0.3, 0.4, 0.5, -0.6, 0.3), strict=True))
 
 
+@pytest.mark.parametrize("fmi", [pytest.param(2, marks=pytest.mark.slow), 3], ids=["fmi2", "fmi3"])
 def test_follows_fossens_matrix_equation_with_nothing_symmetric(make_slave, fmi):
     """A direct transcription with C(nu) from the parametrisation theorem (Fossen 2011, 3.46), integrated by SciPy."""
     M_RB, M_A = mass_matrices()
@@ -202,6 +203,7 @@ def test_two_hours_keep_energy_and_a_unit_quaternion(make_slave):
     assert energy(slave.get(*STATES), 199.0) == pytest.approx(before, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_an_hour_balances_work_and_loss(make_slave):
     """Kinetic and potential energy change by what actuators put in and damping takes out."""
     damping = {f"{kind}_damping[{i}]": 4.0 + i for kind in ("linear", "quadratic") for i in range(1, 7)}

@@ -53,7 +53,7 @@ def difference(ours, theirs):
     return max(abs(ours.values[name] - theirs.values[name]) for name in ours.values)
 
 
-@pytest.mark.parametrize("name", ["FMPy validation", "fmu-manipulation-toolbox"])
+@pytest.mark.parametrize("name", ["FMPy validation", pytest.param("fmu-manipulation-toolbox", marks=pytest.mark.slow)])
 def test_validators_find_nothing(name, fmu):
     assert "no problems" in answer(name, fmu).note
 
@@ -78,6 +78,7 @@ def test_state_is_saved_and_restored_to_the_bit(fmu):
     assert difference(answer("FMPy", fmu), answer("FMPy FMU state", fmu)) == 0.0
 
 
+@pytest.mark.parametrize("fmi", [pytest.param(2, marks=pytest.mark.slow), 3], ids=["fmi2", "fmi3"])
 @pytest.mark.parametrize("name", ["FMPy CVode", "CasADi"])
 def test_model_exchange_ends_where_co_simulation_does(name, fmu):
     assert difference(answer("FMPy", fmu), answer(name, fmu)) < 1e-7

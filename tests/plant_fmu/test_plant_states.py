@@ -16,7 +16,7 @@ ACCELERATIONS = tuple(f"der(velocity.{a})" for a in "uvwpqr")
 
 
 def test_a_restored_run_goes_on_to_the_last_bit(make_plant, fmi):
-    plant = make_plant("rexrov", fmi, **{"imu.rate": 50.0, "imu.acceleration_noise": 0.1, "seed": 3})
+    plant = make_plant("odin", fmi, **{"imu.rate": 50.0, "imu.acceleration_noise": 0.1, "seed": 3})
     drive(plant)
     plant["thrust[1]"] = 77.0
     state = plant.save()
@@ -65,7 +65,7 @@ def test_bytes_that_are_no_state_are_refused(make_plant):
     ):
         with pytest.raises(PlantError, match=words):
             plant.deserialise(wrong)
-    for foreign in (make_plant("odin", 2), make_plant("rexrov")):
+    for foreign in (make_plant("odin", 2), make_plant("bluerov2_heavy")):
         with pytest.raises(PlantError, match="of another FMU"):
             plant.deserialise(foreign.serialise(foreign.save()))
 
@@ -101,7 +101,7 @@ def test_states_that_nobody_holds_are_freed(make_plant, monkeypatch):
 # ---- derivatives ----
 
 
-@pytest.mark.parametrize("name", ["odin", "rexrov"])
+@pytest.mark.parametrize("name", ["odin", pytest.param("rexrov", marks=pytest.mark.slow)])
 def test_accelerations_by_wrench_are_the_inverse_of_the_mass_matrix(make_plant, name, fmi):
     plant, vehicle = make_plant(name, fmi), load_vehicle(name)
     np.testing.assert_allclose(

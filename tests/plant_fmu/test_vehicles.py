@@ -49,7 +49,7 @@ def test_numbers_are_sound(name):
 
 
 @pytest.mark.parametrize("axis", ["roll", "pitch"])
-@pytest.mark.parametrize("name", VEHICLES)
+@pytest.mark.parametrize("name", ["odin", *(pytest.param(v, marks=pytest.mark.slow) for v in VEHICLES if v != "odin")])
 def test_rights_itself(name, axis, make_slave):
     """Turned by 60 degrees and let go, a vehicle comes back, and its swings die out."""
     e0, e = Rotation.from_euler("x", 60, degrees=True).as_quat()[[3, 0]]

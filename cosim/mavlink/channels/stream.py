@@ -1,9 +1,12 @@
-"""What waits to be written to a stream: whole frames, and not too many of them."""
+"""Streams of bytes: whole frames wait to be written, and not too many of them; what was lost is opened anew."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections import Counter
+from collections.abc import Callable, Hashable
 from typing import Final
+
+from cosim.mavlink.channels.channel import CHUNK
 
 WAITING = 1 << 16  # bytes
 _MUCH = 1 << 12  # bytes, that need not wait for a flush
@@ -71,3 +74,112 @@ class Outgoing:
             return False
         del self._waiting[:taken]
         return taken > 0
+
+
+class Stream:
+    """An open stream, with the frames that wait for it.
+
+    Parameters
+    ----------
+    read, write, close : callable
+        Of the operating system: takes how many bytes to read at most, what to write, and nothing.
+    limit : int
+        Bytes that may wait.
+
+    Attributes
+    ----------
+    outgoing : Outgoing
+        The frames that wait.
+    open : bool
+        Whether the other side was there when it was last spoken to.
+    """
+
+    def __init__(
+        self,
+        read: Callable[[int], bytes],
+        write: Callable[[bytes], int],
+        close: Callable[[], None],
+        limit: int = WAITING,
+    ) -> None:
+        self._read, self._close = read, close
+        self.outgoing = Outgoing(write, limit)
+        self.open = True
+
+    def read(self) -> bytes | None:
+        """Return what has come, None if nothing has; `open` tells whether more can come."""
+        try:
+            data = self._read(CHUNK)
+        except (BlockingIOError, InterruptedError):
+            return None
+        except OSError:
+            data = b""
+        self.open = bool(data)
+        return data or None
+
+    def put(self, frame: bytes) -> bool:
+        """Take a frame for the other side; return whether there was room."""
+        try:
+            return self.outgoing.put(frame)
+        except OSError:
+            self.open = False
+            return False
+
+    def flush(self, now: float) -> bool:
+        """Write what waits; return whether the other side takes something now and then."""
+        try:
+            return self.outgoing.flush(now)
+        except OSError:
+            self.open = False
+            return True
+
+    def close(self) -> None:
+        """Give it back."""
+        self.open = False
+        self._close()
+
+
+class OneStream:
+    """A channel to one peer, by a stream that is opened anew when it was lost.
+
+    Parameters
+    ----------
+    stream : Stream
+        The first one.
+    gone, slow : str
+        Who was not there, or took too little, when frames were dropped.
+    """
+
+    datagrams = False
+
+    def __init__(self, stream: Stream, gone: str, slow: str) -> None:
+        self.trouble: dict[str, int] = Counter()
+        self._stream: Stream | None = stream
+        self._gone, self._slow = gone, slow
+
+    def receive(self) -> tuple[Hashable, bytes] | None:
+        """Return bytes of the other side."""
+        stream = self._stream
+        data = None if stream is None else stream.read()
+        return None if data is None else (stream, data)
+
+    def heard(self, peer: Hashable) -> None:
+        """Know the peer already."""
+
+    def send(self, frame: bytes) -> bool:
+        """Send to the other side, if it is there."""
+        if self._stream is None:
+            self.trouble[f"frames dropped while there was no {self._gone}"] += 1
+            return False
+        return self._stream.put(frame)
+
+    def close(self) -> None:
+        """Close the stream, having written what can be written at once."""
+        if self._stream is not None:
+            self._stream.flush(0.0)
+            self._lose(self._stream)
+
+    def _lose(self, stream: Stream) -> None:
+        if stream.outgoing.dropped:
+            self.trouble[f"frames dropped {self._slow}"] += stream.outgoing.dropped
+        stream.close()
+        self._stream = None

@@ -10,8 +10,7 @@ from collections import Counter
 from collections.abc import Hashable
 
 from cosim.errors import TelemetryError
-from cosim.mavlink.channels.channel import CHUNK
-from cosim.mavlink.channels.stream import WAITING, Outgoing
+from cosim.mavlink.channels.stream import WAITING, OneStream, Stream
 
 CLIENTS = 8
 _CONNECTING = 3.0  # s, that opening waits for the other side
@@ -19,48 +18,12 @@ _AGAIN = 2.0  # s, between two attempts later on
 _UNDER_WAY = (errno.EINPROGRESS, errno.EALREADY, errno.EWOULDBLOCK)
 
 
-class Connection:
-    """One TCP connection, with the frames that wait for it."""
-
-    def __init__(self, made: socket.socket) -> None:
-        made.setblocking(False)
-        with contextlib.suppress(OSError):  # a client may have gone already
-            made.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-        self._socket = made
-        self.outgoing = Outgoing(made.send)
-        self.open = True
-
-    def read(self) -> bytes | None:
-        """Return what has come, None if nothing has; `open` tells whether more can come."""
-        try:
-            data = self._socket.recv(CHUNK)
-        except (BlockingIOError, InterruptedError):
-            return None
-        except OSError:
-            data = b""
-        self.open = bool(data)
-        return data or None
-
-    def put(self, frame: bytes) -> bool:
-        """Take a frame for the other side; return whether there was room."""
-        try:
-            return self.outgoing.put(frame)
-        except OSError:
-            self.open = False
-            return False
-
-    def flush(self, now: float) -> bool:
-        """Write what waits; return whether the other side takes something now and then."""
-        try:
-            return self.outgoing.flush(now)
-        except OSError:
-            self.open = False
-            return True
-
-    def close(self) -> None:
-        """Close the socket."""
-        self.open = False
-        self._socket.close()
+def stream_of(made: socket.socket) -> Stream:
+    """Return a connection as a stream, which owns it from now on."""
+    made.setblocking(False)
+    with contextlib.suppress(OSError):  # a client may have gone already
+        made.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+    return Stream(made.recv, made.send, made.close)
 
 
 class TcpIn:
@@ -88,7 +51,7 @@ class TcpIn:
         self._server.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, WAITING)  # its clients have it from it
         self._server.setblocking(False)
         self.port: int = self._server.getsockname()[1]
-        self.clients: list[Connection] = []
+        self.clients: list[Stream] = []
         self._next = 0  # of the clients, to be read: they take turns
 
     def receive(self) -> tuple[Hashable, bytes] | None:
@@ -123,7 +86,7 @@ class TcpIn:
             except OSError:  # nobody is there, or gone again
                 return
             if len(self.clients) < CLIENTS:
-                self.clients.append(Connection(made))
+                self.clients.append(stream_of(made))
             else:
                 self.trouble["clients beyond 8 turned away"] += 1
                 made.close()
@@ -135,14 +98,14 @@ class TcpIn:
             self._drop(client)
         self._server.close()
 
-    def _drop(self, client: Connection) -> None:
+    def _drop(self, client: Stream) -> None:
         if client.outgoing.dropped:
             self.trouble["frames dropped for slow clients"] += client.outgoing.dropped
         client.close()
         self.clients.remove(client)
 
 
-class TcpOut:
+class TcpOut(OneStream):
     """A client; when the connection is lost, it tries again every 2 s.
 
     Raises
@@ -151,55 +114,29 @@ class TcpOut:
         If nobody answers at first.
     """
 
-    datagrams = False
-
     def __init__(self, host: str, port: int) -> None:
-        self.trouble: dict[str, int] = Counter()
         self._address = (host, port)
         self._attempt: socket.socket | None = None
         self._last = time.monotonic()
         try:
-            self._connection: Connection | None = Connection(socket.create_connection((host, port), _CONNECTING))
+            made = socket.create_connection((host, port), _CONNECTING)
         except OSError as error:
             raise TelemetryError(f"tcp:{host}:{port}: {error.strerror or error}") from error
-
-    def receive(self) -> tuple[Hashable, bytes] | None:
-        """Return bytes of the other side."""
-        connection = self._connection
-        data = None if connection is None else connection.read()
-        return None if data is None else (connection, data)
-
-    def heard(self, peer: Hashable) -> None:
-        """Know the peer already."""
-
-    def send(self, frame: bytes) -> bool:
-        """Send to the other side, if it is there."""
-        if self._connection is None:
-            self.trouble["frames dropped while there was no server"] += 1
-            return False
-        return self._connection.put(frame)
+        super().__init__(stream_of(made), gone="server", slow="for a slow server")
 
     def tend(self, now: float) -> None:
         """Write what waits, or connect anew."""
-        connection = self._connection
+        connection = self._stream
         if connection is None:
             self._connect(now)
         elif not (connection.flush(now) and connection.open):
             self._lose(connection)
 
     def close(self) -> None:
-        """Close the socket."""
-        if self._connection is not None:
-            self._connection.flush(0.0)
-            self._lose(self._connection)
+        """Close the connection, and what was to become one."""
+        super().close()
         if self._attempt is not None:
             self._attempt.close()
-
-    def _lose(self, connection: Connection) -> None:
-        if connection.outgoing.dropped:
-            self.trouble["frames dropped for a slow server"] += connection.outgoing.dropped
-        connection.close()
-        self._connection = None
 
     def _connect(self, now: float) -> None:
         """Begin an attempt, or see what became of it."""
@@ -215,6 +152,6 @@ class TcpOut:
         self._attempt = None
         # to a port of this machine where nobody listens, a socket can connect to itself
         if code in (0, errno.EISCONN) and attempt.getsockname() != self._address:
-            self._connection = Connection(attempt)
+            self._stream = stream_of(attempt)
         else:
             attempt.close()

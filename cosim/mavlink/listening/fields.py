@@ -89,7 +89,7 @@ def values(message: Any) -> str:
 
 def _in_unit(message: Any, group: _Group) -> str:
     found = [getattr(message, name) for name in group.names]
-    numbers = " ".join("-" if x == group.unknown else f"{x * group.factor:.{group.digits}f}" for x in found)
+    numbers = " ".join("-" if x == group.unknown else f"{x * group.factor:z.{group.digits}f}" for x in found)
     if len(group.names) == 1:
         numbers = f"{group.names[0]} {numbers}"
     return f"{numbers} {group.unit}".rstrip()
@@ -97,7 +97,7 @@ def _in_unit(message: Any, group: _Group) -> str:
 
 def _plain(value: Any) -> str:
     if isinstance(value, float):
-        return f"{value:.4g}"
+        return f"{value:z.4g}"
     if isinstance(value, list | tuple):
         more = " ..." if len(value) > _OF_ARRAY else ""
         return f"[{' '.join(_plain(x) for x in value[:_OF_ARRAY])}{more}]"

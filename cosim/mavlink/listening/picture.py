@@ -77,18 +77,18 @@ def _vehicle_lines(watch: Watch, now: float) -> list[str]:
 def _position(watch: Watch) -> str:
     local, world = watch.last("LOCAL_POSITION_NED"), watch.last("GLOBAL_POSITION_INT")
     if local is not None:
-        return f"north {local.x:.2f} east {local.y:.2f} down {local.z:.2f} m"
-    return f"latitude {world.lat * 1e-7:.6f} longitude {world.lon * 1e-7:.6f} deg" if world is not None else ""
+        return f"north {local.x:z.2f} east {local.y:z.2f} down {local.z:z.2f} m"
+    return f"latitude {world.lat * 1e-7:z.6f} longitude {world.lon * 1e-7:z.6f} deg" if world is not None else ""
 
 
 def _attitude(watch: Watch) -> str:
     a = watch.last("ATTITUDE")
-    return f"roll {a.roll * _DEG:.1f} pitch {a.pitch * _DEG:.1f} yaw {a.yaw * _DEG:.1f} deg" if a is not None else ""
+    return f"roll {a.roll * _DEG:z.1f} pitch {a.pitch * _DEG:z.1f} yaw {a.yaw * _DEG:z.1f} deg" if a is not None else ""
 
 
 def _depth(watch: Watch) -> str:
     world = watch.last("GLOBAL_POSITION_INT")
-    return f"depth {-1e-3 * world.relative_alt:.2f} m" if world is not None else ""
+    return f"depth {-1e-3 * world.relative_alt:z.2f} m" if world is not None else ""
 
 
 def _text_lines(watch: Watch, now: float) -> list[str]:

@@ -85,11 +85,6 @@ class Missions(Service):
                 if isinstance(order, Change):
                     self._parameters.learn(order.key, order.value)
 
-    def detach(self, link: object) -> None:
-        """Break off what is under way on a link."""
-        if self._upload is not None and self._upload.sender.link is link:
-            self._upload = None
-
     # ---- out ----
 
     def _all_items(self) -> tuple[MissionItem, ...]:

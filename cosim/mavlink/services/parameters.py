@@ -81,10 +81,6 @@ class Parameters(Service):
         """Take the numbers as the vessel's settings have them."""
         self._values = {setting.key: setting.value for setting in self.vessel.settings}
 
-    def detach(self, link: object) -> None:
-        """Forget a link's list."""
-        self._bursts = {known: burst for known, burst in self._bursts.items() if known is not link}
-
     # ---- what others use ----
 
     def value(self, name: str) -> float:

@@ -81,9 +81,6 @@ class Service:
     def restart(self) -> None:
         """Forget what belongs to a run, as at its beginning."""
 
-    def detach(self, link: object) -> None:
-        """Forget a link."""
-
 
 def place_of(vessel: Vessel, frame: int, x: float, y: float, z: float) -> Vector3 | None:
     """Return a place that a station names as a position [m, NED]; NaN where it is not finite.

@@ -7,6 +7,7 @@ from typing import Any
 
 from cosim.helm.orders import Aim, Face, Order, Steer
 from cosim.mavlink.profile import MODE_NAMES
+from cosim.mavlink.services.mission_items import SPEED
 from cosim.mavlink.services.parameters import Parameters, shortest
 from cosim.mavlink.services.service import Call, Service, place_of, unscaled
 from cosim.mavlink.vessel import Sender, Vessel
@@ -14,7 +15,6 @@ from cosim.scenario_tables import Vector3
 
 _X_Y, _Z = 0b011, 0b100  # type_mask: what is ignored
 _VELOCITY, _ACCELERATION, _FORCE, _YAW = 0b111000, 0b111 << 6, 1 << 9, 1 << 10
-_SPEED = "law.gains.speed"
 _LOCAL, _OFFSET, _BODY, _BODY_OFFSET, _BODY_FRD = 1, 7, 8, 9, 12
 _FROM_HERE = (_OFFSET, _BODY, _BODY_OFFSET, _BODY_FRD)
 _ANEW = 1.0  # s of silence, after which the same way from here is another one
@@ -185,7 +185,7 @@ class Targets(Service):
 
     def _speed(self, call: Call) -> int:
         m, speed = self.vessel.mavlink, call[2]
-        if not self._parameters.has(_SPEED):
+        if not self._parameters.has(SPEED):
             return int(m.MAV_RESULT_UNSUPPORTED)
         if speed < 0.0:  # as it is
             return int(m.MAV_RESULT_ACCEPTED)
@@ -193,4 +193,4 @@ class Targets(Service):
             return int(m.MAV_RESULT_DENIED)
         if not self._may(call.sender):
             return int(m.MAV_RESULT_DENIED)
-        return self._parameters.change(_SPEED, shortest(speed))
+        return self._parameters.change(SPEED, shortest(speed))

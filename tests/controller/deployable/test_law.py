@@ -38,6 +38,7 @@ def test_two_laws_share_nothing():
     assert np.array_equal(fly(one, Sea(noise=NOISE), steps=60), alone)
 
 
+@pytest.mark.slow
 def test_the_law_without_its_compiler_is_the_same_to_rounding():
     """Plain Python in a process of its own; what overflows there is the generator of random numbers, on purpose."""
     code = (
@@ -86,7 +87,14 @@ def dead(which):
     return change
 
 
-@pytest.mark.parametrize("which", ["position", "quaternion", "velocity_body", "everything", "frozen"])
+@pytest.mark.parametrize(
+    "which",
+    [
+        *(pytest.param(w, marks=pytest.mark.slow) for w in ("position", "quaternion", "velocity_body")),
+        "everything",
+        "frozen",
+    ],
+)
 def test_a_sensor_that_is_dead_for_a_second_is_borne(which):
     """Forces stay finite and within limits, nothing is touched, no thruster is given up, the goal is reached."""
     law, sea, clear = law_for(REGIONS), Sea(noise=NOISE), []

@@ -67,6 +67,7 @@ def test_a_lost_thruster_gives_nothing_and_the_others_give_the_wrench():
             assert model.thruster_matrix @ forces == pytest.approx(wrench, abs=0.05)
 
 
+@pytest.mark.slow
 def test_the_least_force_is_that_of_the_worst_direction():
     """Against a search over all directions for the greatest force that the limits allow without moment: within 2 %."""
     for model in MODELS.values():

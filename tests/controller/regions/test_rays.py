@@ -25,6 +25,7 @@ from controller.regions import (
     ray_distances,
 )
 from controller.regions.rays import TOUCHING
+from tests.examples import examples
 
 NORTH, EAST, DOWN = np.eye(3)
 FARTHEST = 30.0
@@ -125,7 +126,7 @@ def test_upright_cylinder(bearing):
 
 
 @each_shape
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=examples(60), deadline=None)
 @given(origins, directions)
 def test_a_ray_ends_where_walking_along_it_ends(shape, origin, way):
     (region,) = regions = out(shape)

@@ -56,10 +56,10 @@ class Choosy(Fake):
 
 
 class Poisoned(Fake):
-    """A row whose first value is between 1 and 1.02 kills the process."""
+    """A row whose first value is between 1 and 1.04 kills the process."""
 
     def meet(self, row):
-        if 1.0 < row[0] < 1.02:
+        if 1.0 < row[0] < 1.04:
             os.kill(os.getpid(), signal.SIGKILL)
 
 

@@ -134,7 +134,7 @@ def test_a_damaged_part_is_flown_again(tmp_path, scenes, monkeypatch):
         ({"code": True}, "code_sha256"),
     ],
 )
-@pytest.mark.parametrize("complete", [True, False])
+@pytest.mark.parametrize("complete", [False, pytest.param(True, marks=pytest.mark.slow)])
 def test_the_folder_of_another_campaign_is_refused(tmp_path, scenes, monkeypatch, change, words, complete):
     with monkeypatch.context() as patch:
         if not complete:

@@ -56,6 +56,7 @@ def test_laws_stand_side_by_side(tmp_path, scenes, idle):
     assert "| printed | 0 | idle | 0 | – | – | – | – |" in text
 
 
+@pytest.mark.slow
 def test_what_is_compared_already_is_not_flown_again_and_more_laws_may_come(tmp_path, scenes, idle, monkeypatch):
     monkeypatch.setitem(LAWS, "idler", type("Idler", (Idle,), {"name": "idler"}))
     first = compare(scenes, ["printed", "idle"], tmp_path / "out", BRIEF)

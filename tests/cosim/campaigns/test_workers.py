@@ -1,22 +1,18 @@
 """Campaigns in processes of their own: the same rows, and whatever ends a process leaves what is done."""
 
-import contextlib
 import os
 import signal
-import subprocess
-import sys
-import time
-from pathlib import Path
 
 import pytest
 
 from cosim.campaigns import run_campaign
-from cosim.campaigns.folder import PARTS, RESULTS
+from cosim.campaigns.folder import RESULTS
 from cosim.campaigns.results import Results
 from cosim.cli import main
+from tests.cosim.campaigns.command import command, needs_posix
 from tests.cosim.campaigns.scenes import HARD, many, rows, write
 
-ROOT = Path(__file__).parents[3]
+__all__ = ["command"]
 
 
 @pytest.mark.slow
@@ -27,91 +23,19 @@ def test_two_workers_give_the_same_rows_as_one(tmp_path):
     assert rows(one.results) == rows(two.results) and len(rows(one.results)) == 24
 
 
-class Command:
-    """``cosim campaign`` in a session of its own."""
-
-    def __init__(self, folder, scenes, *words, workers=2):
-        self.out, self.temporary = folder / "out", folder / "temporary"
-        self.temporary.mkdir(exist_ok=True)
-        words = ["campaign", str(scenes), "--law", "printed", "--out", str(self.out), "--workers", str(workers), *words]
-        self.process = subprocess.Popen(
-            [sys.executable, "-m", "cosim", *words],
-            cwd=folder,
-            env=os.environ | {"PYTHONPATH": str(ROOT), "TMPDIR": str(self.temporary), "XDG_CACHE_HOME": str(folder)},
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            text=True,
-            start_new_session=True,
-        )
-
-    def end(self):
-        """Leave nothing running."""
-        with contextlib.suppress(ProcessLookupError):
-            os.killpg(self.process.pid, signal.SIGKILL)
-        self.process.communicate()
-
-    def wait_for_parts(self, n):
-        """Wait until so many parts are written."""
-        parts = self.out / PARTS
-        deadline = time.monotonic() + 120.0
-        while not parts.exists() or len(list(parts.glob("*.parquet"))) < n:
-            assert self.process.poll() is None, self.process.communicate()[1]
-            assert time.monotonic() < deadline
-            time.sleep(0.01)
-
-    def seeds(self):
-        return [s for part in (self.out / PARTS).glob("*.parquet") for s in Results(part)["seed"].tolist()]
-
-    def gone(self):
-        """Return whether all processes of the session end by themselves, soon."""
-        deadline = time.monotonic() + 20.0
-        while self.members() and time.monotonic() < deadline:
-            time.sleep(0.02)
-        return not self.members()
-
-    def members(self):
-        """Return the processes of the session that still live."""
-        found = []
-        for entry in Path("/proc").iterdir():
-            if entry.name.isdecimal():
-                try:
-                    fields = (entry / "stat").read_text().rpartition(")")[2].split()
-                except OSError:
-                    continue
-                if int(fields[3]) == self.process.pid and fields[0] != "Z":
-                    found.append(int(entry.name))
-        return found
-
-
-@pytest.fixture
-def command(tmp_path):
-    """Return a function that starts a command."""
-    with contextlib.ExitStack() as stack:
-
-        def start(*words, **options):
-            started = Command(tmp_path, *words, **options)
-            stack.callback(started.end)
-            return started
-
-        yield start
-
-
-needs_posix = pytest.mark.skipif(sys.platform != "linux", reason="looks into /proc")
-
-
 @needs_posix
 @pytest.mark.slow
 def test_a_killed_campaign_goes_on_by_the_same_command(tmp_path, command):
     scenes = write(tmp_path / "s.jsonl", many(120))
-    killed = command(scenes)
+    killed = command("campaign", scenes, "--law", "printed", "--workers", 2)
     killed.wait_for_parts(3)
     os.kill(killed.process.pid, signal.SIGKILL)
     killed.process.communicate(timeout=60)  # which its workers, who follow, hold open
     assert killed.gone()
-    before = killed.seeds()
+    before = killed.keys()
     assert len(before) >= 3 and len(set(before)) == len(before)
 
-    again = command(scenes)
+    again = command("campaign", scenes, "--law", "printed", "--workers", 2)
     said, complaints = again.process.communicate(timeout=120)
     assert (again.process.returncode, complaints) == (0, "")
     assert "of 120 scenes reached" in said
@@ -128,7 +52,7 @@ def test_a_killed_campaign_goes_on_by_the_same_command(tmp_path, command):
 @pytest.mark.parametrize("workers", [1, 2])
 def test_ctrl_c_keeps_what_is_done(tmp_path, command, workers):
     scenes = write(tmp_path / "s.jsonl", many(200))
-    interrupted = command(scenes, workers=workers)
+    interrupted = command("campaign", scenes, "--law", "printed", "--workers", workers)
     interrupted.wait_for_parts(2)
     os.killpg(interrupted.process.pid, signal.SIGINT)  # as a terminal does
     said, complaints = interrupted.process.communicate(timeout=60)
@@ -137,7 +61,7 @@ def test_ctrl_c_keeps_what_is_done(tmp_path, command, workers):
         complaints == f"cosim: interrupted; what is flown is kept in {interrupted.out}, and the same command goes on\n"
     )
     assert said == "" and interrupted.gone()
-    assert len(interrupted.seeds()) >= 2
+    assert len(interrupted.keys()) >= 2
     assert not list(interrupted.temporary.iterdir())
 
 
@@ -145,10 +69,9 @@ def test_ctrl_c_keeps_what_is_done(tmp_path, command, workers):
 @pytest.mark.slow
 def test_a_worker_that_is_killed_is_replaced(tmp_path, command):
     scenes = write(tmp_path / "s.jsonl", many(120))
-    bereft = command(scenes)
+    bereft = command("campaign", scenes, "--law", "printed", "--workers", 2)
     bereft.wait_for_parts(3)
-    workers = [p for p in bereft.members() if b"spawn_main" in Path(f"/proc/{p}/cmdline").read_bytes()]
-    os.kill(workers[0], signal.SIGKILL)
+    os.kill(bereft.workers()[0], signal.SIGKILL)
     _, complaints = bereft.process.communicate(timeout=120)
     assert bereft.process.returncode == 0 and bereft.gone()
     assert "rows are flown again" in complaints

@@ -79,6 +79,7 @@ def test_holding_keeps_the_place_of_the_order(fly):
     assert MODES[int(run["helm.mode"][-1])] == "hold"
 
 
+@pytest.mark.slow
 def test_back_to_reaching_is_back_to_the_target_that_was(fly):
     run = fly({100: [Steer("hold")], 300: [Steer("reach")]}, "time.duration=60")
     straight = fly({}, "time.duration=60")
@@ -276,12 +277,12 @@ def test_an_empty_log_does_not_wait_for_ever(fly, tmp_path):
 
 def test_orders_of_a_run_repeat_it_to_the_last_bit(tmp_path):
     """Through the run folder: a scenario and a log are all that is needed."""
-    scenario = load_scenario("pipe-inspection", ["commands.enabled=true", "time.duration=6"])
+    scenario = load_scenario("pipe-inspection", ["commands.enabled=true", "time.duration=1.8"])
     log = tmp_path / "orders.jsonl"
     logged = LoggedOrders(queue := OrderQueue(), log)
     for k, order in enumerate([Aim((2.0, 1.0, 3.5), 0.3), Obstacle(3, (1.0, 0.5, 3.2), 0.2), Face(0.4), Steer("hold")]):
         queue.give(order)
-        logged.take(100 * k)
+        logged.take(50 * k)
     first = run_scenario(scenario, tmp_path / "first", report=False, orders=log)
     again = load_scenario(first.folder / "scenario.toml")
     second = run_scenario(again, tmp_path / "second", report=False, orders=first.folder / "orders.jsonl")

@@ -299,7 +299,7 @@ def test_a_client_of_a_server_comes_back_after_the_server_did(monkeypatch):
     def lost():
         heard(link)
         link.channel.tend(time.monotonic())
-        return link.channel._connection is None
+        return link.channel._stream is None
 
     assert until(lost)
     assert not link.send(attitude(2))
@@ -388,10 +388,10 @@ def test_a_device_that_disappears_is_opened_when_it_is_back(tmp_path, caplog):
     os.close(ours)
     path.unlink()
     now = time.monotonic()
-    assert until(lambda: heard(link) or link.channel.tend(now) or link.channel._line is None)
+    assert until(lambda: heard(link) or link.channel.tend(now) or link.channel._stream is None)
     assert not link.send(heartbeat())
     link.channel.tend(now + 2.0)
-    assert link.channel._line is None
+    assert link.channel._stream is None
     ours, theirs = os.openpty()
     path.symlink_to(os.ttyname(theirs))
     link.channel.tend(now + 4.0)

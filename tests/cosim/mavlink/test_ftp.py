@@ -11,6 +11,7 @@ from pymavlink.mavftp_op import FTP_OP
 
 from tests.cosim.mavlink.station import Station
 from tests.cosim.mavlink.test_parameters import LIST, crc_by_bits
+from tests.examples import examples
 
 TERMINATE, RESET, LISTING, OPEN, READ, CREATE, WRITE, CRC, BURST = 1, 2, 3, 4, 5, 6, 7, 14, 15
 ACK, NAK = 128, 129
@@ -147,7 +148,7 @@ def test_stations_do_not_share_a_session(client):
         assert client.ask(OPEN, FILE, system=system)[0].opcode == ACK
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=examples(200), deadline=None)
 @given(st.binary(max_size=251))
 def test_any_payload_is_answered_at_most_with_a_burst(payload):
     assert len(Client(ANY).send(payload)) <= 16

@@ -151,6 +151,18 @@ def test_what_is_not_known_is_shown_as_such():
     assert values(status) == "load 50.0 %  voltage_battery - V  current_battery - A  battery_remaining - %"
 
 
+def test_what_rounds_to_nothing_has_no_sign(link):
+    watch = Watch()
+    attitude = mavlink.MAVLink_attitude_message(0, -1e-5, 0.0, -1e-5, -1e-5, -0.0, 0.0)
+    place = mavlink.MAVLink_local_position_ned_message(0, -1e-3, -0.0, -1e-3, 0.0, 0.0, -1e-9)
+    world = mavlink.MAVLink_global_position_int_message(0, 0, 0, 0, 1, 0, 0, 0, 0)
+    for message in (heartbeat(), attitude, place, world):
+        watch.take(heard(message))
+    shown = "\n".join(picture(link, watch, 1.0))
+    assert "roll 0.0 pitch 0.0 yaw 0.0 deg" in shown and "depth 0.00 m" in shown
+    assert not re.search(r"-0\.0+\b", shown)
+
+
 def test_values_that_are_no_numbers_are_shown():
     assert "nan" in values(mavlink.MAVLink_attitude_message(0, float("nan"), 0, 0, 0, 0, 0))
     assert "inf" in values(mavlink.MAVLink_named_value_float_message(0, b"x", float("inf")))

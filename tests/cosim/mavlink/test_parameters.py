@@ -15,7 +15,8 @@ from cosim.mavlink.services.parameters import shortest
 from cosim.mavlink.services.station_parameters import station_parameters
 from cosim.scenario import load_scenario
 from cosim.scenario_file import shipped_scenarios
-from tests.cosim.mavlink.station import NAN, Station, Wire, scenario
+from tests.cosim.mavlink.station import NAN, Station, scenario
+from tests.examples import examples
 
 REAL32, INT32 = 9, 6
 LIST = mavlink.MAVLink_param_request_list_message(1, 1)
@@ -66,7 +67,7 @@ def test_names_can_be_read():
     assert parameter_names(keys) == keys
 
 
-@settings(max_examples=50)
+@settings(max_examples=examples(50))
 @given(st.lists(st.text(max_size=25), unique=True, max_size=12))
 def test_names_are_different_whatever_the_keys(keys):
     names = parameter_names(keys)
@@ -278,19 +279,9 @@ def test_px4_stations_know_a_list_by_its_hash():
     assert hash_check({}) == 0
 
 
-@settings(max_examples=200)
+@settings(max_examples=examples(200))
 @given(st.floats(width=32, allow_nan=False, allow_infinity=False))
 def test_shortest_is_the_same_float32(value):
     short = shortest(value)
     assert struct.pack("<f", short) == struct.pack("<f", value)
     assert len(repr(abs(short))) <= len(repr(abs(value)))
-
-
-def test_a_link_that_goes_takes_its_list_along(station):
-    other = Wire("other")
-    station.autopilot.attach(other)
-    station.send(LIST, wire=other)
-    station.autopilot.detach(other)
-    other.clear()
-    station.wait(0.1)
-    assert other.got == []

@@ -158,6 +158,7 @@ def test_what_is_not_armed_gives_no_force(serve_px4):
     assert not load_record(run.folder)["thrust[5]"].any()
 
 
+@pytest.mark.slow
 def test_a_pilot_holds_depth_by_the_barometer(serve_px4):
     """PX4 finds the depth from an air pressure; the loop is closed over the pressure on the wire."""
     served = serve_px4("time.duration=20.0")

@@ -337,6 +337,7 @@ def test_a_folder_in_use_is_told_before_anybody_waits(tmp_path):
         Flights(FlightOptions(out=tmp_path), "ardupilot", law_of_pwm)
 
 
+@pytest.mark.slow
 def test_a_pilot_holds_depth_within_5_cm(serve):
     """Down to 4 m by pulses of a PID on the depth that is told, and there to stay: the vehicle is 1 N too heavy."""
     served = serve("time.duration=40.0", record_rate=100.0)

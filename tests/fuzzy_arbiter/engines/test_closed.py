@@ -28,6 +28,7 @@ from fuzzy_arbiter.engines.closed import ClosedEngine
 from fuzzy_arbiter.engines.exact import ExactEngine
 from fuzzy_arbiter.engines.pieces import pieces
 from fuzzy_arbiter.propositions import And, Is, Or
+from tests.examples import examples
 from tests.fuzzy_arbiter import reference
 from tests.fuzzy_arbiter.systems import shapes, systems
 
@@ -60,7 +61,7 @@ def test_it_is_the_exact_centroid_on_100_000_inputs():
     assert np.abs(raw[:10_000] - swept).max() <= 4 * EPS
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=examples(60), deadline=None)
 @given(st.lists(st.fractions(0, 1, max_denominator=64), min_size=1, max_size=5))
 def test_it_is_the_centroid_by_definition_in_rational_numbers(memberships):
     system = prioritised(criteria(len(memberships)))
@@ -69,7 +70,7 @@ def test_it_is_the_centroid_by_definition_in_rational_numbers(memberships):
     assert Arbiter(system=system, engine="closed")(inputs) == pytest.approx(exact, abs=4 * EPS)
 
 
-@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=examples(60), deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(shapes(), shapes(), st.floats(0.0, 1.0))
 def test_any_pair_of_output_terms_has_its_pieces(low, high, h):
     output = Output("y", (0, 1), (Term("low", low), Term("high", high)))
@@ -79,7 +80,7 @@ def test_any_pair_of_output_terms_has_its_pieces(low, high, h):
     assert engine.weights_of_many(np.array([[h]]))[0] == pytest.approx(engine.weights([h]), abs=EPS)
 
 
-@settings(max_examples=30, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=examples(30), deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(shapes(), shapes(), st.floats(0.0, 1.0), st.sampled_from(["range", "sum", "max"]))
 def test_weights_of_any_pair_are_those_of_the_exact_engine(low, high, h, normalisation):
     """Between its ends a C(h) may lie beyond them; weights are in [0, 1] even so."""
@@ -240,7 +241,7 @@ def test_terms_that_are_no_complements_are_not_taken_for_them():
     assert Arbiter(system=negated).engine == "closed"
 
 
-@settings(max_examples=80, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=examples(80), deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(systems(norms=False), st.data())
 def test_where_it_says_there_is_a_closed_form_it_is_right(system, data):
     arbiter = Arbiter(system=system)
@@ -250,13 +251,13 @@ def test_where_it_says_there_is_a_closed_form_it_is_right(system, data):
         assert arbiter(inputs) == pytest.approx(exact, abs=16 * EPS)
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=examples(100), deadline=None)
 @given(st.lists(st.floats(0.0, 1.0), min_size=1, max_size=12))
 def test_at_most_one_weight_is_above_one_half(memberships):
     assert sum(w > 0.5 for w in Arbiter(criteria(len(memberships)))(memberships)) <= 1
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=examples(100), deadline=None)
 @given(st.lists(st.floats(0.0, 1.0), min_size=1, max_size=12), st.data())
 def test_more_of_a_criterion_is_never_less_weight_for_it_nor_more_for_those_below(memberships, data):
     k = data.draw(st.integers(0, len(memberships) - 1))
@@ -268,7 +269,7 @@ def test_more_of_a_criterion_is_never_less_weight_for_it_nor_more_for_those_belo
     assert all(b <= a for a, b in zip(before[k + 1 :], after[k + 1 :], strict=True))
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=examples(100), deadline=None)
 @given(st.lists(st.floats(0.0, 1.0), min_size=3, max_size=12), st.randoms())
 def test_the_lowest_weight_does_not_care_for_the_order_of_those_above(memberships, random):
     *above, last = memberships
@@ -302,6 +303,7 @@ def test_a_shape_with_a_plateau_below_one():
         assert arbiter(x) == pytest.approx(exact, abs=16 * EPS)
 
 
+@pytest.mark.slow
 def test_a_proof_that_would_be_too_long_is_given_up_soon():
     """Two disjunctions of 400 clauses each, joined by *and*: 160,000 clauses, none of which is in another."""
     names = [f"v{i}" for i in range(60)]

@@ -22,13 +22,14 @@ from fuzzy_arbiter import (
 )
 from fuzzy_arbiter.engines.exact import ExactEngine
 from fuzzy_arbiter.engines.sweep import centroid, outline
+from tests.examples import examples
 from tests.fuzzy_arbiter import reference
 from tests.fuzzy_arbiter.systems import shapes, systems
 
 EPS = np.finfo(float).eps
 
 
-@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=examples(150), deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(systems(), st.data())
 def test_it_is_the_exact_centroid_of_any_system(system, data):
     inputs = [data.draw(st.floats(0.0, 1.0)) for _ in system.inputs]
@@ -77,7 +78,7 @@ def test_degrees_next_to_nothing_do_not_underflow(implication):
         assert arbiter.batch([[x]])[0] == pytest.approx([0.5], abs=4 * EPS)
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=examples(150), deadline=None)
 @given(st.lists(shapes(), min_size=1, max_size=4), st.data(), st.booleans())
 def test_cuts_of_any_size(terms, data, scaled):
     """The sweep and its batch at cuts that are next to nothing, alone or beside others."""

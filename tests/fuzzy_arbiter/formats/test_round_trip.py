@@ -21,9 +21,10 @@ from fuzzy_arbiter import (
 from fuzzy_arbiter.formats import FORMATS, reads, writes
 from fuzzy_arbiter.hierarchy import FORMS
 from fuzzy_arbiter.propositions import Is, Not
+from tests.examples import examples
 from tests.fuzzy_arbiter.formats.systems import TIPPING, systems
 
-relaxed = settings(max_examples=40, suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large])
+relaxed = settings(max_examples=examples(40), suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large])
 
 
 @pytest.mark.parametrize("format", FORMATS)
@@ -72,7 +73,7 @@ SIGNS = st.sampled_from("()[]{}\"'%#*:=;,.0123 -eE\nabct_\\/\u00e9\u2028\0")
 
 
 @pytest.mark.parametrize("format", FORMATS)
-@settings(max_examples=100)
+@settings(max_examples=examples(100))
 @given(data=st.data())
 def test_no_damaged_text_ends_in_a_traceback(format, data):
     text = texts[format]
@@ -97,7 +98,7 @@ def test_no_damaged_text_ends_in_a_traceback(format, data):
 
 @pytest.mark.parametrize("format", FORMATS)
 @given(text=st.text(max_size=60))
-@settings(max_examples=60)
+@settings(max_examples=examples(60))
 def test_no_other_text_ends_in_a_traceback(format, text):
     _require_one_line(text, format)
 

@@ -1,0 +1,100 @@
+"""Campaigns as commands in sessions of their own, which tests may kill."""
+
+import contextlib
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from cosim.campaigns.folder import PARTS
+from cosim.campaigns.results import Results
+
+ROOT = Path(__file__).parents[3]
+needs_posix = pytest.mark.skipif(sys.platform != "linux", reason="looks into /proc")
+
+_MAIN = """
+import sys
+from cosim.campaigns import sweep_rows
+from cosim.cli import main
+from tests.cosim.campaigns.fake import ENGINES
+sweep_rows.ENGINES.update(ENGINES)
+sys.exit(main(sys.argv[1:]))
+"""
+
+
+class Command:
+    """A ``cosim`` command with ``--out`` in a session of its own, to which the engines of `fake` are known."""
+
+    def __init__(self, folder, *words):
+        self.out, self.temporary = folder / "out", folder / "temporary"
+        self.temporary.mkdir(exist_ok=True)
+        self.process = subprocess.Popen(
+            [sys.executable, "-c", _MAIN, *map(str, words), "--out", str(self.out)],
+            cwd=folder,
+            env=os.environ | {"PYTHONPATH": str(ROOT), "TMPDIR": str(self.temporary), "XDG_CACHE_HOME": str(folder)},
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            start_new_session=True,
+        )
+
+    def end(self):
+        """Leave nothing running."""
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(self.process.pid, signal.SIGKILL)
+        self.process.communicate()
+
+    def wait_for_parts(self, n):
+        """Wait until so many parts are written."""
+        parts = self.out / PARTS
+        deadline = time.monotonic() + 120.0
+        while not parts.exists() or len(list(parts.glob("*.parquet"))) < n:
+            assert self.process.poll() is None, self.process.communicate()[1]
+            assert time.monotonic() < deadline
+            time.sleep(0.01)
+
+    def keys(self):
+        """Return the keys of the rows that parts hold."""
+        parts = [Results(part) for part in (self.out / PARTS).glob("*.parquet")]
+        return [key for part in parts for key in part[part.schema.names[0]].tolist()]
+
+    def workers(self):
+        """Return the processes that fly."""
+        return [p for p in self.members() if b"spawn_main" in Path(f"/proc/{p}/cmdline").read_bytes()]
+
+    def gone(self):
+        """Return whether all processes of the session end by themselves, soon."""
+        deadline = time.monotonic() + 20.0
+        while self.members() and time.monotonic() < deadline:
+            time.sleep(0.02)
+        return not self.members()
+
+    def members(self):
+        """Return the processes of the session that still live."""
+        found = []
+        for entry in Path("/proc").iterdir():
+            if entry.name.isdecimal():
+                try:
+                    fields = (entry / "stat").read_text().rpartition(")")[2].split()
+                except OSError:
+                    continue
+                if int(fields[3]) == self.process.pid and fields[0] != "Z":
+                    found.append(int(entry.name))
+        return found
+
+
+@pytest.fixture
+def command(tmp_path):
+    """Return a function that starts a command."""
+    with contextlib.ExitStack() as stack:
+
+        def start(*words):
+            started = Command(tmp_path, *words)
+            stack.callback(started.end)
+            return started
+
+        yield start

@@ -1,0 +1,135 @@
+"""A row again: by the engine that flew it, and by the readable master."""
+
+import json
+import math
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+
+from cosim.campaigns import Design, run_campaign, run_sweep, vary_from
+from cosim.campaigns.dispatch import KILLED
+from cosim.campaigns.folder import RESULTS
+from cosim.campaigns.rerun import rerun
+from cosim.cli import main
+from cosim.errors import RunError
+from cosim.scenario import load_scenario
+from tests.cosim.campaigns.scenes import BRIEF, PLAIN, write
+
+VARY = ["initial.position.1=-2:2", "regions.SR1.gain=500:5000:log", "plant.parameters.weight=1150:1280"]
+BRIEFLY = ["arbiter.engine=closed", "time.duration=0.3", "sensing.position_noise=0.02"]
+
+
+def changed(folder, column, row, value):
+    """Change one number of the results."""
+    table = pq.read_table(folder / RESULTS)
+    values = table[column].to_pylist()
+    values[row] = value
+    i = table.schema.get_field_index(column)
+    pq.write_table(
+        table.set_column(i, table.schema.field(i), pa.array(values, table.schema.field(i).type)), folder / RESULTS
+    )
+
+
+@pytest.fixture(scope="module")
+def swept(tmp_path_factory):
+    """Return the folder of a sweep by the fused loop."""
+    out = tmp_path_factory.mktemp("swept") / "out"
+    run_sweep(load_scenario("paper", BRIEFLY), Design(vary_from(VARY), "sobol", 6, 5), out)
+    return out
+
+
+@pytest.fixture
+def folder(swept, tmp_path):
+    """Return a copy of it."""
+    import shutil
+
+    return shutil.copytree(swept, tmp_path / "swept")
+
+
+def test_a_row_of_a_sweep_comes_again_to_the_last_bit_and_as_a_run(folder, tmp_path, capsys):
+    assert main(["rerun", str(folder), "4", "--out", str(tmp_path / "run")]) == 0
+    said = capsys.readouterr().out.splitlines()
+    assert said[0] == "row 4: flown again, identical to the last bit"
+    assert said[-1] == str(tmp_path / "run" / "report.html")
+    row = pq.read_table(folder / RESULTS).to_pylist()[4]
+    scenario = load_scenario(tmp_path / "run" / "scenario.toml")
+    assert scenario.initial.position[1] == row["initial.position.1"] and scenario.sensing.seed == row["seed"]
+    assert scenario.plant.parameters["weight"] == row["plant.parameters.weight"]
+    assert {r.region.name: r for r in scenario.regions}["SR1"].region.gain == row["regions.SR1.gain"]
+    record = pq.read_table(tmp_path / "run" / "record.parquet")
+    for axis in "xyz":
+        assert record[f"position.{axis}"][-1].as_py() == pytest.approx(row[f"final_{axis}"], abs=1e-9)
+
+
+def test_one_bit_of_difference_is_found_and_an_error(folder, tmp_path, capsys):
+    before = pq.read_table(folder / RESULTS)["effort"][2].as_py()
+    changed(folder, "effort", 2, math.nextafter(before, math.inf))
+    assert main(["rerun", str(folder), "2", "--out", str(tmp_path / "run")]) == 1
+    said = capsys.readouterr()
+    assert f"row 2: effort was {math.nextafter(before, math.inf)!r}, is {before!r} now" in said.err
+    assert "identical" not in said.out
+
+
+def test_other_values_than_those_of_the_design_are_found(folder, tmp_path):
+    changed(folder, "initial.position.1", 3, 0.25)
+    assert list(rerun(folder, 3, tmp_path / "run").differing) == ["initial.position.1"]
+
+
+def test_other_code_is_said(folder, tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr("cosim.campaigns.rerun.code_digest", lambda: "other")
+    assert main(["rerun", str(folder), "0", "--out", str(tmp_path / "run")]) == 0
+    assert "the code is not that which flew the row" in capsys.readouterr().err
+
+
+def test_a_row_that_was_refused_is_refused_again_and_makes_no_run(tmp_path, capsys):
+    design = Design(vary_from(["limit.time_constant=-1,0.1"]), "grid")
+    run_sweep(load_scenario("paper", BRIEFLY), design, tmp_path / "out")
+    rows = pq.read_table(tmp_path / "out" / RESULTS).to_pylist()
+    assert "limit.time_constant is -1" in rows[0]["refused"] and rows[1]["refused"] is None
+    assert main(["rerun", str(tmp_path / "out"), "0", "--out", str(tmp_path / "run")]) == 0
+    assert "identical to the last bit" in capsys.readouterr().out and not (tmp_path / "run").exists()
+
+
+@pytest.mark.parametrize("row", ["-1", "6", "99999999999999"])
+def test_rows_that_there_are_none_of(folder, capsys, row):
+    assert main(["rerun", str(folder), row]) == 2
+    assert f"has no row {row}, expected one from 0 to 5" in capsys.readouterr().err
+
+
+def test_a_row_that_kills_is_not_flown_again(folder):
+    changed(folder, "refused", 1, KILLED)
+    with pytest.raises(RunError, match="row 1 is not flown again"):
+        rerun(folder, 1)
+
+
+def test_folders_that_hold_nothing_to_repeat(folder, tmp_path):
+    with pytest.raises(RunError, match=r"holds no campaign \(campaign\.json is missing\)"):
+        rerun(tmp_path, 0)
+    plan = json.loads((folder / "campaign.json").read_text())
+    for change, words in (
+        ({"kind": "other"}, "of another version"),
+        ({"vary": None}, "design of the campaign cannot be read"),
+        ({"engine": "none"}, "engine 'none' is unknown"),
+    ):
+        (folder / "campaign.json").write_text(json.dumps(plan | change))
+        with pytest.raises(RunError, match=words):
+            rerun(folder, 0)
+    (folder / "campaign.json").write_text(json.dumps(plan))
+    (folder / RESULTS).unlink()
+    with pytest.raises(RunError, match="is not complete"):
+        rerun(folder, 0)
+
+
+def test_a_scene_comes_again_to_the_last_bit(tmp_path, capsys):
+    out = tmp_path / "out"
+    run_campaign(
+        write(tmp_path / "s.jsonl", [*PLAIN[:2], PLAIN[2] | {"weight_minus_buoyancy": 1e6}]), "printed", out, BRIEF
+    )
+    for seed in (20000, 20001, 20002):
+        assert main(["rerun", str(out), str(seed), "--out", str(tmp_path / str(seed))]) == 0
+        assert capsys.readouterr().out.startswith(f"row {seed}: flown again, identical to the last bit\n")
+    changed(out, "effort", 1, 1.0)
+    assert list(rerun(out, 20001, tmp_path / "again").differing) == ["effort"]
+    with pytest.raises(RunError, match="has no row 7, expected one from 20000 to 20002"):
+        rerun(out, 7)

@@ -1,0 +1,140 @@
+"""Sweeps in processes of their own and on Dask: whatever dies, no row is lost and none comes twice."""
+
+import os
+import signal
+
+import pyarrow.parquet as pq
+import pytest
+
+from cosim.campaigns import run_sweep
+from cosim.campaigns.dispatch import KILLED
+from cosim.campaigns.folder import RESULTS
+from cosim.cli import main
+from cosim.errors import RunError
+from cosim.flying.outcome import FIELDS
+from tests.cosim.campaigns.command import command, needs_posix
+from tests.cosim.campaigns.fake import KEYS, VARY, design, fakes, paper
+from tests.cosim.campaigns.test_sweep import expected
+
+__all__ = ["command", "fakes"]
+
+N = 1500
+SLOW = ["sweep", "paper", "--vary", *VARY, "--samples", N, "--seed", 3, "--engine", "slow"]
+
+
+def rows_of(folder):
+    return pq.read_table(folder / RESULTS).to_pylist()
+
+
+@needs_posix
+@pytest.mark.slow
+@pytest.mark.parametrize("workers", [1, 2])
+def test_a_sweep_that_is_killed_goes_on_by_the_same_command(command, workers):
+    words = [*SLOW, "--workers", workers]
+    killed = command(*words)
+    killed.wait_for_parts(4)
+    os.kill(killed.process.pid, signal.SIGKILL)
+    killed.process.communicate(timeout=60)  # which its workers, who follow, hold open
+    assert killed.gone()
+    before = killed.keys()
+    assert 4 <= len(before) < N and len(set(before)) == len(before)
+    again = command(*words)
+    said, complaints = again.process.communicate(timeout=240)
+    assert (again.process.returncode, complaints) == (0, "")
+    assert f"{N} of {N} rows flown" in said and rows_of(again.out) == expected(N)
+
+
+@needs_posix
+@pytest.mark.slow
+def test_workers_that_are_killed_are_replaced(command):
+    bereft = command(*SLOW, "--workers", 2)
+    for parts in (3, 6, 9):
+        bereft.wait_for_parts(parts)
+        os.kill(bereft.workers()[0], signal.SIGKILL)
+    _, complaints = bereft.process.communicate(timeout=240)
+    assert bereft.process.returncode == 0 and bereft.gone()
+    assert complaints.count("flown again") >= 1
+    assert rows_of(bereft.out) == expected(N)
+
+
+@needs_posix
+@pytest.mark.slow
+@pytest.mark.parametrize("words", [("--workers", 1), ("--workers", 2), ("--workers", 2, "--dask")])
+def test_ctrl_c_keeps_what_is_done(command, words):
+    interrupted = command(*SLOW, *words)
+    interrupted.wait_for_parts(3)
+    os.killpg(interrupted.process.pid, signal.SIGINT)  # as a terminal does
+    said, complaints = interrupted.process.communicate(timeout=60)
+    assert interrupted.process.returncode == 130
+    kept = f"what is flown is kept in {interrupted.out}, and the same command goes on"
+    assert complaints == f"cosim: interrupted; {kept}\n" and said == ""
+    assert interrupted.gone() and len(interrupted.keys()) >= 3
+
+
+def check_poisoned(folder):
+    found, poisoned = rows_of(folder), []
+    for row, other in zip(found, expected(400), strict=True):
+        if 1.0 < row[KEYS[0]] < 1.04:
+            poisoned.append(row["row"])
+            assert row["refused"] == KILLED and all(row[name] is None for name in FIELDS)
+        else:
+            assert row == other
+    assert poisoned
+
+
+@pytest.mark.slow
+def test_rows_that_kill_workers_are_refused_and_all_others_flown(tmp_path, fakes, caplog):
+    done = run_sweep(paper(), design(400), tmp_path / "out", "poisoned", workers=2)
+    check_poisoned(tmp_path / "out")
+    assert done.summary["refused"] > 0 and f"refused: {KILLED}" in caplog.text
+
+
+@pytest.mark.slow
+def test_where_every_worker_dies_no_row_is_blamed(tmp_path, fakes):
+    with pytest.raises(RunError, match="every process died, whatever it flew"):
+        run_sweep(paper(), design(3), tmp_path / "out", "deadly", workers=2)
+    assert not (tmp_path / "out" / RESULTS).exists()
+
+
+# ---- Dask ----
+
+
+@pytest.fixture(scope="module")
+def cluster():
+    pytest.importorskip("distributed")
+    from cosim.campaigns.cluster import cluster_executor
+
+    with cluster_executor(None, 2) as executor:
+        yield executor
+
+
+@pytest.mark.slow
+def test_dask_gives_the_same_rows(tmp_path, fakes, cluster, capfd):
+    run_sweep(paper(), design(), tmp_path / "one", "fake", executor=cluster)
+    assert rows_of(tmp_path / "one") == expected()
+    words = ["sweep", "paper", "--vary", *VARY, "--samples", "50", "--seed", "3", "--engine", "fake"]
+    address = cluster._client.scheduler.address
+    capfd.readouterr()
+    assert main([*words, "--scheduler", address, "--out", str(tmp_path / "two")]) == 0
+    assert rows_of(tmp_path / "two") == expected()
+    said = capfd.readouterr()
+    assert "50 of 50 rows flown" in said.out and said.err == ""
+
+
+@pytest.mark.slow
+def test_rows_that_kill_workers_of_dask_are_refused_and_all_others_flown(tmp_path, fakes, cluster):
+    run_sweep(paper(), design(400), tmp_path / "out", "poisoned", executor=cluster)
+    check_poisoned(tmp_path / "out")
+
+
+@pytest.mark.slow
+def test_a_scheduler_that_is_not_there_is_one_line(tmp_path, capsys, monkeypatch):
+    pytest.importorskip("distributed")
+    monkeypatch.setattr("cosim.campaigns.cluster._PATIENCE", 0.5)
+    words = ["sweep", "docking", "--vary", "law.gains.k_p1=1:2", "--samples", "3", "--out", str(tmp_path / "out")]
+    assert main([*words, "--scheduler", "tcp://127.0.0.1:9"]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith("cosim: the cluster tcp://127.0.0.1:9 cannot be used: ")
+    assert main([*words, "--scheduler", "nonsense://x"]) == 2
+    assert "cannot be used" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
