@@ -121,11 +121,13 @@ class Master:
         self._values, self._clearances = s.view("goal.value", n + 1), s.view("goal.clearance", n + 1)
         # where sensing is exact, what the arbiter sees is what is recorded
         self._seen: Array = self._clearances if self._sensor is None else np.zeros(n + 1)
+        self._seen_of_regions = self._seen[1:]
         moving = self.scenario.moving
         self._shifts = s.view(f"{moving[0]}.shift.x", 3 * len(moving)).reshape(-1, 3) if moving else np.empty((0, 3))
         self._memberships = s.view(f"membership.{CRITERIA[0]}", len(CRITERIA))
         self._weights = s.view(f"weight.{CRITERIA[0]}", len(CRITERIA))
         self._weights_of_regions: Array = np.zeros(n)
+        self._asked: list[float] | None = None  # memberships that the weights are of
         self._estimate = s.view("estimate.phi1", 4)
         n_reports = len(self.law.diagnostics)
         self._report = s.view(f"law.{self.law.diagnostics[0].name}", n_reports) if n_reports else np.empty(0)
@@ -294,7 +296,9 @@ class Master:
         While the position is lost there is nothing to decide by: the last weights hold.
         """
         memberships = self._press()
-        if memberships is not None:
+        # what asks as it did in the step before is weighed as then, and stands in the row still
+        if memberships is not None and memberships != self._asked:
+            self._asked = memberships
             self._memberships[:] = memberships
             self._weigh(memberships)
 
@@ -308,14 +312,12 @@ class Master:
 
     def _press(self) -> list[float] | None:
         """Return the membership of each criterion, that of its most pressing region; None if the position is lost."""
-        north, east, down = self.state.position.tolist()
-        if not (math.isfinite(north) and math.isfinite(east) and math.isfinite(down)):
+        if self._sensor is not None and not np.isfinite(self.state.position).all():
             return None
         memberships = [0.0] * len(CRITERIA)
-        for criterion, clearance in zip(self._criterion_of, self._seen[1:].tolist(), strict=True):
-            degree = ramp(clearance, self._ramp)
-            if degree > memberships[criterion]:
-                memberships[criterion] = degree
+        for criterion, clearance in zip(self._criterion_of, self._seen_of_regions.tolist(), strict=True):
+            if clearance <= self._ramp:  # else 0
+                memberships[criterion] = max(memberships[criterion], ramp(clearance, self._ramp))
         return memberships
 
     def _weigh(self, memberships: list[float]) -> None:
@@ -332,11 +334,11 @@ class Master:
             actuators.push()
             return
         self._estimate[:] = self.law.estimate
-        by_wrench = self.law.output == "wrench"
+        law, by_wrench = self.law, self.law.output == "wrench"
         forces = actuators.command if by_wrench else actuators.thrusts
-        goal, regions = self.surroundings.goal, self.surroundings.regions
-        self.law.step(self.state, goal, regions, self._weights_of_regions, forces)
-        self._report[:] = self.law.report
+        law.step(self.state, self.surroundings.goal, self.surroundings.regions, self._weights_of_regions, forces)
+        if self._report.size:
+            self._report[:] = self.law.report
         if by_wrench:
             actuators.push()
         else:

@@ -52,8 +52,8 @@ class Surroundings:
         self._streamed = ["goal"] if scenario.goal_streamed else []
         self._streamed += [region.region.name for region in scenario.regions if region.streamed and not region.seen]
         self._moving = [self._names.index(name) for name in scenario.moving]
-        # nothing ever moves: all stays where the packed numbers have it
-        self._still = not scenario.moving
+        # if nothing ever moves, all are evaluated at once where they are; else each part where it has been carried
+        self._still = None if scenario.moving else pack([self._goal_region, *secondary])
         self._seen = [i for i, region in enumerate(scenario.regions) if region.seen]
         # m, NED: where each would have been at time 0, had it always moved as it does now
         self._origins: Array = np.zeros((len(secondary), 3))
@@ -75,7 +75,7 @@ class Surroundings:
         shifts : ndarray, shape (moving regions, 3)
             Receives how far each moving one is from where the scenario has it [m, NED].
         """
-        if self._still:
+        if self._still is not None:
             return
         for packed, origins in ((self.goal, self._target.origin), (self.regions, self._origins)):
             packed.move_to(time)
@@ -93,8 +93,11 @@ class Surroundings:
         values, clearances : ndarray, shape (n + 1,)
             Receive g and clearance, the goal's first.
         """
-        p, e = state.position, state.quaternion
-        _evaluate(self.goal, self.regions, p, e, values, self._gradients, self._turnings, clearances)
+        p, e, gradients, turnings = state.position, state.quaternion, self._gradients, self._turnings
+        if self._still is not None:
+            evaluate_packed(self._still, p, e, values, gradients, turnings, clearances)
+        else:
+            _evaluate(self.goal, self.regions, p, e, values, gradients, turnings, clearances)
 
     # ---- moved from outside ----
 
