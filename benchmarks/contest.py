@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from contextlib import ExitStack
+from contextlib import ExitStack, nullcontext
 from dataclasses import dataclass, field
 
+from benchmarks.machine import pinned
 from benchmarks.table import Row, Table
 from benchmarks.timing import Contestant, NotMeasuredError, Timing, take_turns
 
@@ -26,6 +27,8 @@ class Contest:
         Which of ours stands against which peer, "" for none; default: each against each.
     count, repeats : int, optional
         Items a repeat, and the most repeats, where the items are long.
+    pinned : bool
+        Whether all stay on one processor; not where an item is the work of several processes.
     """
 
     title: str
@@ -34,10 +37,11 @@ class Contest:
     pairs: tuple[tuple[str, str], ...] = ()
     count: int | None = None
     repeats: int | None = None
+    pinned: bool = True
 
     def measure(self, budget: float, repeats: int) -> Table:
         """Time all, and return a row for each pair: how many times as long as ours a peer takes."""
-        with ExitStack() as stack:
+        with pinned() if self.pinned else nullcontext(), ExitStack() as stack:
             contestants = {name: entered(entry, stack) for name, entry in (self.ours | self.peers).items()}
             few = min(repeats, self.repeats or repeats)
             timings = dict(zip(contestants, take_turns([*contestants.values()], budget, few, self.count), strict=True))

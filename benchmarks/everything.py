@@ -7,7 +7,6 @@ from collections.abc import Callable, Iterator
 
 from benchmarks.contest import Contest
 from benchmarks.contests import closed_loop, deciding, link, plant, starting
-from benchmarks.machine import pinned
 from benchmarks.peer_environment import Environment
 from benchmarks.table import Table
 
@@ -23,7 +22,7 @@ SUBJECTS: dict[str, Callable[[Environment], Iterator[Contest]]] = {
 
 
 def measure(subjects: list[str], budget: float, repeats: int, environment: Environment) -> list[Table]:
-    """Hold the contests, all on one processor.
+    """Hold the contests.
 
     Parameters
     ----------
@@ -42,9 +41,8 @@ def measure(subjects: list[str], budget: float, repeats: int, environment: Envir
         One for each contest.
     """
     tables = []
-    with pinned():
-        for subject in subjects:
-            for contest in SUBJECTS[subject](environment):
-                print(contest.title, file=sys.stderr, flush=True)
-                tables.append(contest.measure(budget, repeats))
+    for subject in subjects:
+        for contest in SUBJECTS[subject](environment):
+            print(contest.title, file=sys.stderr, flush=True)
+            tables.append(contest.measure(budget, repeats))
     return tables

@@ -70,9 +70,9 @@ def _lines(figures: dict[str, Any]) -> Iterator[str]:
         yield f"**{table['title']}**"
         yield ""
         yield from _duels(table["rows"]) if any(row["duel"] for row in table["rows"]) else _plain(table["rows"])
-        for note in table["notes"]:
+        if table["notes"]:
             yield ""
-            yield f"It {note}."
+            yield f"Growth: {'; '.join(table['notes'])}."
 
 
 def _duels(rows: list[dict[str, Any]]) -> Iterator[str]:

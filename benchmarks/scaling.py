@@ -13,8 +13,8 @@ from benchmarks.contests.closed_loop import CHANGES, RUN, SCENARIO, flights
 from benchmarks.contests.sweeps import CREWS, sweep
 from benchmarks.law import LawSteps
 from benchmarks.machine import pinned
-from benchmarks.table import Row, Table
-from benchmarks.timing import Contestant, Own, Timing, growth, take_turns
+from benchmarks.table import Row, Table, figure
+from benchmarks.timing import Contestant, Own, Timing, growth, straight, take_turns
 from cosim.master import Master
 from cosim.scenario import load_scenario
 
@@ -36,7 +36,7 @@ class Curve:
     title : str
         What an item is.
     of : str
-        What grows.
+        What there are more and more of; one of them.
     entries : mapping from float to Entry
         By size.
     count : int, optional
@@ -56,18 +56,22 @@ class Curve:
         with pinned() if self.pinned else nullcontext(), ExitStack() as stack:
             contestants = [entered(entry, stack) for entry in self.entries.values()]
             found = take_turns(contestants, budget, repeats, self.count)
-        names = [f"{size:g} {self.of}" for size in self.entries]
+        names = [f"{size:g} {self.of}{'s' if size != 1 else ''}" for size in self.entries]
         rows = tuple(Row(name, timing, names[0], found[0]) for name, timing in zip(names, found, strict=True))
         return Table(self.title, rows, self._laws(found))
 
     def _laws(self, found: list[Timing | str]) -> tuple[str, ...]:
+        """Return what the costs follow: a power of the sizes, and, where they rise, a fixed part and one for each."""
         sizes = [size for size, one in zip(self.entries, found, strict=True) if isinstance(one, Timing)]
         costs = [one.median for one in found if isinstance(one, Timing)]
         if len(sizes) < 2:
             return ()
         parts = [growth(pair, cost) for pair, cost in zip(pairwise(sizes), pairwise(costs), strict=True)]
-        local = ", ".join(f"{part:.2f}" for part in parts)
-        return (f"grows with {self.of} to the power of {growth(sizes, costs):.2f}; from one size to the next: {local}",)
+        power = f"exponent {growth(sizes, costs):.2f}; from one size to the next {', '.join(f'{x:.2f}' for x in parts)}"
+        if len(sizes) < 3:
+            return (power,)
+        fixed, each, off = straight(sizes, costs)
+        return (power, f"about {figure(fixed)} and {figure(each)} for each {self.of}, to {100 * off:.0f} %")
 
 
 def measure(subjects: list[str], budget: float, repeats: int) -> list[Table]:
@@ -99,27 +103,27 @@ def obstacles() -> Iterator[Curve]:
     """Yield the growth of a law's step, and of a step of the fused loop, with obstacles."""
     for law in LAWS:
         entries: dict[float, Entry] = {n: lambda _, law=law, n=n: LawSteps(law, int(n)) for n in OBSTACLES}
-        yield Curve(f"A step of the law {law!r}", "obstacles", entries)
+        yield Curve(f"A step of the law {law!r}", "obstacle", entries)
     for engine in ("fused", "lanes"):
         entries = {n: flights(engine, per_run=False, changes=_with_obstacles(int(n))) for n in OBSTACLES}
-        yield Curve(f"A step of the closed loop, {_named(engine)}", "obstacles", entries)
+        yield Curve(f"A step of the closed loop, {_named(engine)}", "obstacle", entries)
 
 
 def horizon() -> Iterator[Curve]:
     """Yield the growth of a run with the simulated time."""
-    yield Curve("A run, master without record", "s of simulated time", {t: _run(t) for t in HORIZONS}, count=1)
+    yield Curve("A run, master without record", "second", {t: _run(t) for t in HORIZONS}, count=1)
     for engine in ("fused", "lanes"):
         entries: dict[float, Entry] = {
             t: flights(engine, per_run=True, changes=(f"time.duration={t}",)) for t in HORIZONS
         }
-        yield Curve(f"A run, {_named(engine)}", "s of simulated time", entries)
+        yield Curve(f"A run, {_named(engine)}", "second", entries)
 
 
 def vehicles() -> Iterator[Curve]:
     """Yield the growth of a batch with the vehicles in it."""
     for engine in ("fused", "lanes"):
         entries: dict[float, Entry] = {n: flights(engine, per_run=True, batch=int(n), whole=True) for n in VEHICLES}
-        yield Curve(f"A batch of runs of {RUN:g} s, {_named(engine)}", "vehicles", entries)
+        yield Curve(f"A batch of runs of {RUN:g} s, {_named(engine)}", "vehicle", entries)
 
 
 def workers() -> Iterator[Curve]:
@@ -128,7 +132,7 @@ def workers() -> Iterator[Curve]:
         for crew in CREWS:
             entries: dict[float, Entry] = {n: sweep(crew, int(n), engine) for n in (1, 2)}
             title = f"A run of {RUN:g} s in a sweep of {rows}, {_named(engine)}, {crew}"
-            yield Curve(title, "workers", entries, count=rows, pinned=False)
+            yield Curve(title, "worker", entries, count=rows, pinned=False)
 
 
 SUBJECTS: dict[str, Callable[[], Iterator[Curve]]] = {

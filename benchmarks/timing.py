@@ -143,3 +143,13 @@ def growth(sizes: Sequence[float], costs: Sequence[float]) -> float:
 
     slope, _ = np.polyfit(np.log(sizes), np.log(costs), 1)
     return float(slope)
+
+
+def straight(sizes: Sequence[float], costs: Sequence[float]) -> tuple[float, float, float]:
+    """Return a and b of cost = a + b size, neither below 0, by least squares of relative errors, and the greatest."""
+    import numpy as np
+    from scipy.optimize import nnls
+
+    per_cost = np.c_[np.ones(len(sizes)), np.asarray(sizes, dtype=float)] / np.array(costs)[:, None]
+    (fixed, each), _ = nnls(per_cost, np.ones(len(costs)))
+    return float(fixed), float(each), float(np.abs(per_cost @ (fixed, each) - 1.0).max())

@@ -17,7 +17,7 @@ from benchmarks.peer_process import peer
 from benchmarks.peers import numba_body, numpy_body
 from benchmarks.scaling import Curve
 from benchmarks.table import Row, Table, as_json, figure, print_tables, write_json
-from benchmarks.timing import NotMeasuredError, Own, Timing, count_for, growth, take_turns
+from benchmarks.timing import NotMeasuredError, Own, Timing, count_for, growth, straight, take_turns
 from benchmarks.vehicle_numbers import vehicle_numbers
 from plant_fmu import Plant, cached_fmu, load_vehicle
 from plant_fmu.importers import IMPORTERS, Task, read_fmu, run_importer
@@ -70,7 +70,7 @@ def test_all_is_one_table_of_ratios(here, subject, capsys, tmp_path):
 @pytest.mark.slow
 def test_growth_is_told_below_each_curve(capsys):
     main(["scaling", "horizon", "obstacles", "--budget", "1e-4", "--repeats", "1"])
-    assert capsys.readouterr().out.count("to the power of") >= 3
+    assert capsys.readouterr().out.count("exponent") >= 6
 
 
 def test_a_row_of_a_duel_says_how_many_times_as_long_the_peer_takes(capsys):
@@ -142,7 +142,16 @@ def test_the_exponent_of_a_growth_is_found():
     assert growth([1, 10, 100], [3.0, 3e2, 3e4]) == pytest.approx(2.0)
     log = []
     curve = Curve("a step", "things", {n: lambda _, n=n: Told("a", log, n**1.5) for n in (1, 4, 16)}, count=1)
-    assert "power of 1.50; from one size to the next: 1.50, 1.50" in curve.measure(0.0, 2).notes[0]
+    assert curve.measure(0.0, 2).notes[0] == "exponent 1.50; from one size to the next 1.50, 1.50"
+
+
+def test_a_straight_growth_has_a_fixed_part_and_one_for_each():
+    assert straight([1, 10, 100], [5e-6 + 2e-7 * n for n in (1, 10, 100)]) == pytest.approx(
+        (5e-6, 2e-7, 0.0), abs=1e-12
+    )
+    fixed, each, off = straight([1, 2, 4], [1.0, 2.0, 8.0])
+    assert fixed == 0.0
+    assert 0.1 < off < 1.0 < each
 
 
 # ---- the peers ----
@@ -217,7 +226,7 @@ def test_the_page_takes_new_figures_and_keeps_the_rest(tmp_path):
     assert "a machine; calm. The ratio says theirs to ours." in new
     assert "| 2.67 | 2.00–4.00 | ours | 1.50 µs | a/b | 4.00 µs |" in new
     assert "|  |  | ours | 1.00 µs | nobody (not installed) | – |" in new
-    assert "| 2.00 | 2.00 s | 2.00 s–2.00 s | 3 obstacles |\n\nIt grows.\n" in new
+    assert "| 2.00 | 2.00 s | 2.00 s–2.00 s | 3 obstacles |\n\nGrowth: grows.\n" in new
     assert page.rewrite(new, figures) == new
     assert new.startswith(old[: old.index("<!-- figures")])
     assert new.endswith(old[old.rindex("<!-- end of figures") :])

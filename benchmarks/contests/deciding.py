@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-import itertools
+import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
+from typing import Any
 
 import numpy as np
 
@@ -12,13 +13,12 @@ from benchmarks.contest import Contest, Entry
 from benchmarks.law import LawSteps
 from benchmarks.peer_environment import Environment
 from benchmarks.peer_process import peer
-from benchmarks.timing import Contestant, Own, each
+from benchmarks.timing import Contestant, Own
 from fuzzy_arbiter import SECTION_VI, Arbiter
 
 POINTS = 101
 LAWS = ("printed", "deployable")
 OBSTACLES = 6
-_INPUTS = 1000
 
 
 def contests(environment: Environment) -> Iterator[Contest]:
@@ -61,28 +61,41 @@ def contests(environment: Environment) -> Iterator[Contest]:
     )
 
 
-def _calls(engine: str) -> Entry:
-    def entry(_: ExitStack) -> Contestant:
-        arbiter, inputs = Arbiter(engine=engine), _inputs()
-        return Own(each(lambda: arbiter(next(inputs))))
+class _Decisions:
+    """Decisions with inputs that are new each time: some engines keep what they have computed once.
 
-    return entry
+    Parameters
+    ----------
+    decide : callable
+        Takes the inputs.
+    made : callable
+        Of a row of inputs, what `decide` takes.
+    """
+
+    def __init__(self, decide: Callable[[Any], object], made: Callable[[list[float]], Any] = list) -> None:
+        self._decide, self._made, self._rng = decide, made, np.random.default_rng(0)
+
+    def seconds(self, count: int) -> float:
+        """Decide so often, and return what that took [s]."""
+        decide, inputs = self._decide, [self._made(row) for row in self._rng.random((count, len(SECTION_VI))).tolist()]
+        before = time.perf_counter()
+        for row in inputs:
+            decide(row)
+        return time.perf_counter() - before
+
+
+def _calls(engine: str) -> Entry:
+    return lambda _: _Decisions(Arbiter(engine=engine))
 
 
 def _compiled(_: ExitStack) -> Contestant:
-    decide = Arbiter(engine="closed").compiled()
-    inputs = itertools.cycle([np.array(row) for row in itertools.islice(_inputs(), _INPUTS)])
-    outputs = np.empty(len(SECTION_VI))
-    return Own(each(lambda: decide(next(inputs), outputs)))
+    decide, outputs = Arbiter(engine="closed").compiled(), np.empty(len(SECTION_VI))
+    return _Decisions(lambda inputs: decide(inputs, outputs), np.array)
 
 
 def _batch(_: ExitStack) -> Contestant:
     arbiter, rng = Arbiter(engine="closed"), np.random.default_rng(0)
     return Own(lambda count: arbiter.batch(rng.random((count, len(SECTION_VI)))))
-
-
-def _inputs() -> itertools.cycle[list[float]]:
-    return itertools.cycle(np.random.default_rng(0).random((_INPUTS, len(SECTION_VI))).tolist())
 
 
 def _library(environment: Environment, library: str) -> Callable[[ExitStack], Contestant]:

@@ -32,6 +32,7 @@ def contests(environment: Environment) -> Iterator[Contest]:
         {"cosim sitl, record at 100 Hz": lambda _: _Lockstep()},
         count=FRAMES,
         repeats=3,
+        pinned=False,
     )
 
 

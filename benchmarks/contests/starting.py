@@ -26,12 +26,14 @@ def contests(environment: Environment) -> Iterator[Contest]:
         {"cosim --help": lambda stack: Own(each(_Command(stack, ["-m", "cosim", "--help"])))},
         {"fmpy --help": lambda _: Own(each(_plain([environment.python("fmpy"), "-m", "fmpy", "--help"])))},
         count=1,
+        pinned=False,
     )
     yield Contest(
         "cosim run paper --set arbiter.engine=closed: FMU, compilation, 60 000 steps, record, report",
         {"the first time, caches empty": _first, "the second time": _second},
         count=1,
         repeats=3,
+        pinned=False,
     )
 
 

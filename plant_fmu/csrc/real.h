@@ -31,7 +31,7 @@ static inline Real real_fmax(Real x, Real y) { return x > y ? x : y; } /* y wher
 static inline Real real_fmin(Real x, Real y) { return x < y ? x : y; }
 static inline Real real_copysign(Real x, Real sign) { return copysign(x, sign); }
 
-#define REAL_FUNCTION(name) static inline Real real_##name(Real x) { return name(x); }
+static inline Real real_expm1(Real x) { return expm1(x); }
 
 #else /* vectors as GCC and Clang know them */
 
@@ -73,48 +73,20 @@ static inline Real real_copysign(Real x, Real sign)
     return (Real)(((Mask)x & 0x7fffffffffffffffLL) | ((Mask)sign & ~0x7fffffffffffffffLL));
 }
 
-/* C's function, lane by lane */
-#define REAL_FUNCTION(name)                                                                                            \
-    static inline Real real_##name(Real x)                                                                             \
-    {                                                                                                                  \
-        for (int i = 0; i < LANES; i++)                                                                                \
-            x[i] = name(x[i]);                                                                                         \
-        return x;                                                                                                      \
-    }
-
-REAL_FUNCTION(sqrt)
-
-#endif
-
-REAL_FUNCTION(exp)
-REAL_FUNCTION(expm1)
-REAL_FUNCTION(log)
-REAL_FUNCTION(tanh)
-REAL_FUNCTION(sin)
-REAL_FUNCTION(cos)
-
-static inline Real real_pow(Real x, Real y)
+static inline Real real_sqrt(Real x)
 {
-#ifdef LANES
     for (int i = 0; i < LANES; i++)
-        x[i] = pow(x[i], y[i]);
+        x[i] = sqrt(x[i]);
     return x;
-#else
-    return pow(x, y);
-#endif
 }
 
-static inline Real real_hypot(Real x, Real y)
+static inline Real real_expm1(Real x)
 {
-#ifdef LANES
     for (int i = 0; i < LANES; i++)
-        x[i] = hypot(x[i], y[i]);
+        x[i] = expm1(x[i]);
     return x;
-#else
-    return hypot(x, y);
-#endif
 }
 
-#undef REAL_FUNCTION
+#endif
 
 #endif

@@ -166,15 +166,17 @@ def test_a_number_that_is_whole_in_the_scenario_stays_whole():
     [
         ("law.name=pd", "law.name"),
         ("arbiter.engine=exact", "arbiter.engine"),
+        ("master.order=jacobi", "master.order"),
         ("sensing.position_noise=0.1", "sensing"),
         ("commands.enabled=true", "commands.enabled"),
+        ("failures=[{thruster=1, time=1.0}] limit.force=inf actuation.through=thrusters", "failures"),
         ("plant.parameters.current_variation.x=0.1", "plant.parameters.current_variation.x"),
         ("plant.parameters.dvl.rate=5.0", "plant.parameters.dvl.rate"),
     ],
 )
 def test_scenarios_that_lanes_cannot_fly_are_refused_by_key(override, named):
     with pytest.raises(RunError, match=named.replace(".", r"\.")):
-        LanesFlyer(variation((), override))
+        LanesFlyer(variation((), *override.replace(", ", ",").split()))
 
 
 @pytest.mark.parametrize(
