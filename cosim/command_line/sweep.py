@@ -14,7 +14,7 @@ from cosim.command_line.campaigns import INTERRUPTED, resumable, workers
 from cosim.errors import RunError
 
 _EPILOG = """examples:
-  cosim sweep moving-obstacle --vary initial.position.1=-2:2 law.gains.k_p1=1:100:log --samples 1000 --out sweeps/start
+  cosim sweep docking --vary initial.position.1=-2:2 law.gains.speed=0.3:1.5:log --samples 1000 --out sweeps/start
   cosim sweep paper --set arbiter.engine=closed --vary law.gains.k_p1=10:30:5 law.gains.k_q=5,10,20 --design grid \\
       --workers 2 --out sweeps/gains
   cosim rerun sweeps/start 17 --out runs/worst

@@ -5,8 +5,14 @@ import re
 import typing
 from pathlib import Path
 
+from cosim.campaigns import vary_from
+from cosim.campaigns.design import KINDS
 from cosim.campaigns.scene_rows import SCHEMA
 from cosim.cli import main
+from cosim.flying.fused import FusedFlyer
+from cosim.flying.outcome import FIELDS
+from cosim.flying.variation import Variation
+from cosim.scenario import load_scenario
 from cosim.scene import Scene, decode_scene
 from cosim.scene_run import Conditions
 from plant_fmu.tables import dataclass_of
@@ -56,13 +62,35 @@ def test_the_conditions_are_those_of_the_score():
 
 
 def test_the_commands_are_understood(tmp_path, capsys):
-    commands = [line.split() for line in PAGE[: PAGE.index("A campaign flies")].splitlines() if "cosim c" in line]
-    assert [words[1] for words in commands] == ["campaign", "compare"]
+    commands = [line.split() for line in PAGE[: PAGE.index("A campaign flies")].splitlines() if "cosim " in line]
+    assert [words[1] for words in commands] == ["campaign", "compare", "sweep", "rerun"]
     for _, *words in commands:
         words[1] = str(tmp_path / "none.jsonl")
         words[words.index("--out") + 1] = str(tmp_path / "out")
         assert main([word.replace("printed,deployable", "printed,none") for word in words]) == 2
-        assert re.search("No such file|law 'none'", capsys.readouterr().err)
+        assert re.search("No such file|law 'none'|scenario .* is unknown|holds no campaign", capsys.readouterr().err)
+
+
+def test_the_keys_of_the_sweep_are_there():
+    words = next(line.split() for line in PAGE.splitlines() if line.startswith("cosim sweep"))
+    keys = [vary.key for vary in vary_from(words[4 : words.index("--samples")])]
+    assert len(keys) == 2
+    FusedFlyer(Variation(load_scenario(words[2]), keys)).close()
+
+
+def test_every_outcome_of_a_sweep_is_documented_with_its_unit():
+    rows = table_after("A row has its number")
+    assert [row[0].strip("`") for row in rows] == list(FIELDS)
+    assert [row[1] for row in rows] == [unit.replace(".", " ") for _, unit, _ in FIELDS.values()]
+
+
+def test_designs_and_ranges_are_documented():
+    rows = table_after("| `--design` |")
+    assert [row[0].strip("`") for row in rows] == list(KINDS)
+    numbers = {"key": "k", "low": "1", "high": "2", "points": "3", "a": "1", "b": "2", "c": "3"}
+    for texts, *_ in table_after("`--vary` names numeric keys"):
+        for text in re.findall("`(.*?)`", texts):
+            vary_from([re.sub(r"[a-z]+", lambda word: numbers.get(word.group(), word.group()), text)])
 
 
 def test_the_snippet_runs(tmp_path, monkeypatch):
@@ -71,5 +99,8 @@ def test_the_snippet_runs(tmp_path, monkeypatch):
     write(tmp_path / "scenes.jsonl", PLAIN[:1])
     monkeypatch.chdir(tmp_path)
     names = {}
-    exec(re.search(r"```python\n(.*?)```", PAGE, re.S).group(1), names)
-    assert names["trace"].shape == (6000, 27) and names["score"].effort > 0.0
+    sweep, scene = re.findall(r"```python\n(.*?)```", PAGE, re.S)
+    exec(scene, names)
+    assert names["trace"].shape == (6000, 28) and names["score"].effort > 0.0
+    exec(sweep, names)
+    assert len(names["sweep"].results) == 8
