@@ -84,8 +84,8 @@ def check_poisoned(folder, n):
 
 @pytest.mark.slow
 def test_rows_that_kill_workers_are_refused_and_all_others_flown(tmp_path, fakes, caplog):
-    done = run_sweep(paper(), design(400), tmp_path / "out", "poisoned", workers=2)
-    check_poisoned(tmp_path / "out", 400)
+    done = run_sweep(paper(), design(120), tmp_path / "out", "poisoned", workers=2)
+    check_poisoned(tmp_path / "out", 120)
     assert done.summary["refused"] > 0 and f"refused: {KILLED}" in caplog.text
 
 
