@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import ExitStack, nullcontext
+from contextlib import ExitStack
 from dataclasses import dataclass
 from itertools import pairwise
 
 from benchmarks.contest import Entry, entered
 from benchmarks.contests.closed_loop import CHANGES, RUN, SCENARIO, flights
-from benchmarks.contests.sweeps import CREWS, sweep
+from benchmarks.contests.sweeps import sweep
 from benchmarks.law import LawSteps
 from benchmarks.machine import pinned
-from benchmarks.table import Row, Table, figure
+from benchmarks.table import Row, Table, compared, figure
 from benchmarks.timing import Contestant, Own, Timing, growth, straight, take_turns
 from cosim.master import Master
 from cosim.scenario import load_scenario
@@ -23,8 +23,9 @@ REPEATS = 5
 OBSTACLES = (1, 3, 10, 30, 100)
 HORIZONS = (10.0, 30.0, 100.0, 300.0)  # s
 VEHICLES = (1, 8, 64, 512)
-ROWS = {"fused": 2_000, "lanes": 20_000}  # of a sweep
+ROWS = {"fused": 1_000, "lanes": 10_000}  # of a sweep
 LAWS = ("printed", "deployable")
+_SWEEPS = 3  # repeats at most
 
 
 @dataclass(frozen=True)
@@ -41,24 +42,24 @@ class Curve:
         By size.
     count : int, optional
         Items a repeat, where the items are long.
-    pinned : bool
-        Whether all stays on one processor.
     """
 
     title: str
     of: str
     entries: Mapping[float, Entry]
     count: int | None = None
-    pinned: bool = True
 
     def measure(self, budget: float, repeats: int) -> Table:
-        """Time all sizes in turn; the law of growth stands below."""
-        with pinned() if self.pinned else nullcontext(), ExitStack() as stack:
+        """Time all sizes in turn, on one processor; the law of growth stands below."""
+        with pinned(), ExitStack() as stack:
             contestants = [entered(entry, stack) for entry in self.entries.values()]
             found = take_turns(contestants, budget, repeats, self.count)
-        names = [f"{size:g} {self.of}{'s' if size != 1 else ''}" for size in self.entries]
+        names = [self._name(size) for size in self.entries]
         rows = tuple(Row(name, timing, names[0], found[0]) for name, timing in zip(names, found, strict=True))
         return Table(self.title, rows, self._laws(found))
+
+    def _name(self, size: float) -> str:
+        return f"{size:g} {self.of}{'s' if size != 1 else ''}"
 
     def _laws(self, found: list[Timing | str]) -> tuple[str, ...]:
         """Return what the costs follow: a power of the sizes, and, where they rise, a fixed part and one for each."""
@@ -72,6 +73,34 @@ class Curve:
             return (power,)
         fixed, each, off = straight(sizes, costs)
         return (power, f"about {figure(fixed)} and {figure(each)} for each {self.of}, to {100 * off:.0f} %")
+
+
+@dataclass(frozen=True)
+class Crews:
+    """Costs of one sweep by several crews.
+
+    Attributes
+    ----------
+    title : str
+        What an item is.
+    entries : mapping from str to Entry
+        By crew, that of one worker first.
+    rows : int
+        Of the sweep.
+    """
+
+    title: str
+    entries: Mapping[str, Entry]
+    rows: int
+
+    def measure(self, budget: float, repeats: int) -> Table:
+        """Time all crews in turn, on all processors; how much faster they are than the first stands below."""
+        with ExitStack() as stack:
+            contestants = [entered(entry, stack) for entry in self.entries.values()]
+            found = take_turns(contestants, budget, min(repeats, _SWEEPS), self.rows)
+        first, *others = compared(dict(zip(self.entries, found, strict=True)))
+        told = tuple(f"{row.name}: {1.0 / row.ratio:.2f} times as fast as {first.name}" for row in others if row.ratio)
+        return Table(self.title, (first, *others), told)
 
 
 def measure(subjects: list[str], budget: float, repeats: int) -> list[Table]:
@@ -126,16 +155,22 @@ def vehicles() -> Iterator[Curve]:
         yield Curve(f"A batch of runs of {RUN:g} s, {_named(engine)}", "vehicle", entries)
 
 
-def workers() -> Iterator[Curve]:
-    """Yield what a sweep takes with one and two workers, as processes and in Dask."""
+def workers() -> Iterator[Crews]:
+    """Yield what a sweep takes with one and two workers, processes or in Dask."""
     for engine, rows in ROWS.items():
-        for crew in CREWS:
-            entries: dict[float, Entry] = {n: sweep(crew, int(n), engine) for n in (1, 2)}
-            title = f"A run of {RUN:g} s in a sweep of {rows}, {_named(engine)}, {crew}"
-            yield Curve(title, "worker", entries, count=rows, pinned=False)
+        entries = {
+            f"{n} {worker}": sweep(crew, n, engine)
+            for crew, n, worker in (
+                ("processes", 1, "process"),
+                ("processes", 2, "processes"),
+                ("Dask", 1, "in Dask"),
+                ("Dask", 2, "in Dask"),
+            )
+        }
+        yield Crews(f"A run of {RUN:g} s in a sweep of {rows}, {_named(engine)}", entries, rows)
 
 
-SUBJECTS: dict[str, Callable[[], Iterator[Curve]]] = {
+SUBJECTS: dict[str, Callable[[], Iterator[Curve] | Iterator[Crews]]] = {
     "obstacles": obstacles,
     "horizon": horizon,
     "vehicles": vehicles,

@@ -15,7 +15,6 @@ from benchmarks.contests.closed_loop import CHANGES, RUN, SCENARIO
 from benchmarks.timing import Contestant
 from cosim.scenario import load_scenario
 
-CREWS = ("processes", "Dask")
 _VARIED = ("initial.position.0=-0.2:0.2",)
 _WARMING = 64  # rows
 
@@ -26,7 +25,7 @@ def sweep(crew: str, workers: int, engine: str) -> Entry:
     Parameters
     ----------
     crew : str
-        Of `CREWS`.
+        ``"processes"`` or ``"Dask"``.
     workers : int
         How many.
     engine : str
