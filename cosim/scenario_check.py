@@ -140,6 +140,7 @@ def check_goal(table: dict[str, Any]) -> tuple[Shape, Vector3, bool]:
     _require(not of_attitude(shape), "goal.type", repr(table["type"]), "a shape in space")
     motion = decode({key: table[key] for key in beside if key in table}, _Motion, "goal")
     _require(all(map(math.isfinite, motion.velocity)), "goal.velocity", motion.velocity, "finite numbers")
+    Region("goal", shape, "in", motion.velocity)  # says now what it cannot be
     return shape, motion.velocity, motion.streamed
 
 

@@ -128,6 +128,7 @@ def test_overrides_reach_every_depth(tmp_path):
         ("law.name=deployable", ["actuation.through", "'thrusters'", "'deployable'"]),
         ("law.desired_quaternion=[1,1,0,0]", ["law.desired_quaternion", "length 1"]),
         ("goal.velocity=[0.1,0,nan]", ["goal.velocity", "finite"]),
+        ("goal.velocity=[0.1,0,1e9]", ["goal", "velocity", "1e+06"]),
         ("goal.velocity=0.1", ["goal.velocity", "list"]),
         ('goal={type="orientation",quaternion=[1,0,0,0],tolerance=0.1}', ["goal.type", "'orientation'", "in space"]),
         ("regions.SR1.velocity=[0,0,inf]", ["regions.SR1.velocity", "finite"]),
