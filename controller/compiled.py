@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import functools
 import hashlib
+import logging
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar
 
 import numba
 
-F = TypeVar("F", bound=Callable[..., object])
+log = logging.getLogger(__name__)
 
+F = TypeVar("F", bound=Callable[..., object])
 
 _HERE = Path(__file__).parent
 
@@ -82,10 +84,23 @@ def _kept_on_disk(function: F, others: tuple[Path, ...], *, counting: bool) -> F
         cache_file = jitted._cache._cache_file
         cache_file._source_stamp  # noqa: B018 - raises where it is gone
         cache_file._source_stamp = stamp
+        jitted._cache.save_overload = _if_there_is_room(jitted._cache.save_overload)
     except AttributeError:
         jitted = numba.njit(**options)(function)
     result: F = jitted
     return result
+
+
+def _if_there_is_room(save: Callable[..., None]) -> Callable[..., None]:
+    """Return what keeps code on disk, for which a full disk is no reason not to run it."""
+
+    def kept(*arguments: Any) -> None:
+        try:
+            save(*arguments)
+        except OSError as error:
+            log.warning("Numba's cache: %s; compiled for this process alone", error.strerror or error)
+
+    return kept
 
 
 def inlined(function: F) -> F:

@@ -1,5 +1,6 @@
 """Compilation: what is cached is never older than any source it was made from."""
 
+import errno
 import importlib
 import pkgutil
 from pathlib import Path
@@ -37,6 +38,16 @@ def test_the_stamp_is_of_whatever_else_is_named_too(tmp_path):
     assert len({before, without, module._sources(tmp_path / "none", tmp_path)}) == 3
     function = compiled(lambda x: x + 3.0, tmp_path)
     assert function._cache._cache_file._source_stamp == module._sources(Path(__file__).parent, tmp_path)
+
+
+def test_a_full_disk_keeps_nothing_and_the_function_runs(monkeypatch, caplog):
+    def full(*_):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    function = compiled(lambda x: x + 4.0)
+    monkeypatch.setattr(function._cache._cache_file, "save", full)
+    assert function(1.0) == 5.0
+    assert "No space left" in caplog.text
 
 
 def test_without_numbas_insides_nothing_is_cached(monkeypatch):

@@ -135,7 +135,8 @@ static void mark(Fleet *f, int k)
     for (int j = 1; j < f->batch->n_regions; j++)
         if (f->batch->hard[j]) {
             Real *least = f->batch->kinds[j] < SHAPE_ORIENTATION ? &m->least_clearance : &m->least_angle;
-            *least = choose(f->flying & (f->clearances[j] < *least), f->clearances[j], *least);
+            const Mask less = (f->clearances[j] < *least) | (f->clearances[j] != f->clearances[j]); /* NaN stays, too */
+            *least = choose(f->flying & less, f->clearances[j], *least);
         }
     m->goal_clearance = choose(f->flying, real_fmax(f->clearances[0], m->goal_clearance), m->goal_clearance);
     m->first_inside = choose(entered & (m->first_inside < 0.0), splat(k), m->first_inside);
@@ -192,8 +193,10 @@ static void allocate(const Batch *b, const Real wrench[6], Real forces[N_THRUSTE
             const Real bound = choose(above, splat(b->upper[i]), splat(b->lower[i]));
             scale = choose(above | below, real_fmin(bound / f, scale), scale);
         }
-    for (int i = 0; i < N_THRUSTERS; i++)
-        forces[i] = real_fmin(real_fmax(scale * forces[i], splat(b->lower[i])), splat(b->upper[i]));
+    for (int i = 0; i < N_THRUSTERS; i++) { /* what is no number is no limit: the plant shall refuse it */
+        const Real lower = splat(b->lower[i]), upper = splat(b->upper[i]), f = scale * forces[i];
+        forces[i] = choose(f < lower, lower, choose(f > upper, upper, f));
+    }
 }
 
 static void stop(Fleet *f, Mask goes_on, int k)

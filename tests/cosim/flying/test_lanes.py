@@ -120,6 +120,19 @@ def test_a_lane_that_the_guard_stops_stands_still_while_the_others_go_on():
     assert 1.0 > flown["stopped_at"][2] > flown["stopped_at"][9] > 0.0
 
 
+def test_thrusters_refuse_what_is_no_number_as_the_fmu_does():
+    of = variation(("law.gains.k_p1",), "limit.force=inf", "actuation.through=thrusters", "time.duration=0.1")
+    flown = compare(of, np.array([[18.8], [1e308], [20.0]]), np.arange(3)).outcomes
+    np.testing.assert_array_equal(flown["stopped_at"], [math.nan, 0.0, math.nan])
+
+
+def test_a_clearance_that_is_no_number_is_told_as_such():
+    flat = 'shape={type="ellipsoid", centre=[0.0,0,0], semi_axes=[5e-324,1.0,1.0]}'
+    region = f'{{name="it", criterion="obstacle", keep="out", gain=80.0, {flat}}}'
+    of = variation((), f"regions=[{region}]", "initial.position=[0,0,0.5]", "time.duration=0.1")
+    assert np.isnan(compare(of, np.zeros((1, 0)), np.arange(1)).outcomes["min_clearance"]).all()
+
+
 # ---- what is refused ----
 
 
