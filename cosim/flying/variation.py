@@ -141,8 +141,8 @@ class Variation:
 
 
 def _as(like: float | int, value: float, key: str) -> float | int:
-    """Return a value as a whole number where the key holds one."""
-    if isinstance(like, float):
+    """Return a value as a whole number where the key holds one; a shape's numbers never are, however they are written."""
+    if isinstance(like, float) or key.startswith("goal.") or ".shape." in key:
         return value
     if not (math.isfinite(value) and value == round(value)):
         raise ScenarioError(f"{key} is {value}, expected a whole number")

@@ -81,3 +81,9 @@ def test_each_key_comes_once(paper):
 def test_a_value_that_cannot_be_is_named(paper, key, value, words):
     with pytest.raises(ScenarioError, match=words):
         Variation(paper, [key]).scenario([value], 0)
+
+
+def test_a_shape_written_in_whole_numbers_takes_fractions(paper):
+    whole = load_scenario("paper-limited", ["goal.radius=1", "regions.SR1.shape.centre=[2, 0, 2]"])
+    made = Variation(whole, ["goal.radius", "regions.SR1.shape.centre.1"]).scenario([0.5, 0.25], 0)
+    assert made.goal.radius == 0.5 and made.regions[0].region.shape.centre == (2.0, 0.25, 2.0)
