@@ -141,7 +141,7 @@ class Variation:
 
 
 def _as(like: float | int, value: float, key: str) -> float | int:
-    """Return a value as a whole number where the key holds one; a shape's numbers never are, however they are written."""
+    """Return a value as a whole number where the key holds one; numbers of shapes may be written so, but are none."""
     if isinstance(like, float) or key.startswith("goal.") or ".shape." in key:
         return value
     if not (math.isfinite(value) and value == round(value)):
