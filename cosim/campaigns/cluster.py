@@ -17,7 +17,8 @@ from cosim.errors import RunError
 
 _QUEUED = 2  # batches a thread of a worker, so that none waits for work
 _LOOK = 5.0  # s between looks at how many workers there are: they may come and go
-_PATIENCE = 30.0  # s for a scheduler to answer, and for the first worker
+_PATIENCE = 30.0  # s for the first worker, and without any
+_PATIENCE_WITH_SCHEDULER = 10.0  # s for it to answer
 _PATIENCE_WITH_WORKERS = 2.0  # s for one to end the batch that it is at
 _SETTLING = 1.0  # s that a new worker is left in peace: one that dies at once is not replaced again
 
@@ -172,7 +173,7 @@ def cluster_executor(scheduler: str | None, workers: int) -> Iterator[Executor]:
                 stack.enter_context(cluster)
                 client = untyped.Client(cluster)
             else:
-                client = untyped.Client(scheduler, timeout=_PATIENCE)
+                client = untyped.Client(scheduler, timeout=_PATIENCE_WITH_SCHEDULER)
             stack.enter_context(client)
             client.wait_for_workers(1, timeout=_PATIENCE)
         except (OSError, ValueError, TimeoutError) as error:

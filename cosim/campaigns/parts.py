@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import logging
 import os
+import re
 import shutil
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -22,6 +23,7 @@ log = logging.getLogger(__name__)
 MERGED = 64  # parts of about one size that become one
 _CHUNK = 8192  # rows read at once of a part
 _GROUP = 65536  # rows in a group of what is written
+_NAME = re.compile(r"[0-9]{8,}-[0-9]{8,}\.parquet")
 
 
 class Parts:
@@ -44,7 +46,8 @@ class Parts:
         for scratch in folder.glob(".*"):  # of a part that was being written
             scratch.unlink()
         self._files: list[Path] = []
-        for file in sorted(folder.glob("*.parquet"), key=lambda file: (_span(file)[0], -_span(file)[1])):
+        parts = [file for file in folder.glob("*.parquet") if _NAME.fullmatch(file.name)]  # others are not ours
+        for file in sorted(parts, key=lambda file: (_span(file)[0], -_span(file)[1])):
             if self._files and _span(file)[1] <= _span(self._files[-1])[1]:
                 file.unlink()
             else:
@@ -52,16 +55,32 @@ class Parts:
         self._next = _span(self._files[-1])[1] + 1 if self._files else 0
 
     def keys(self) -> Rows:
-        """Return the keys of all rows, shape (n,); parts that cannot be read are removed."""
-        found = []
+        """Return the keys of all rows, shape (n,).
+
+        Parts that cannot be read, or that hold a row of another part, are removed.
+        """
+        found: list[Rows] = []
         for file in tuple(self._files):
             try:
                 found.append(_keys(file, self._schema))
             except RunError as error:
                 log.warning("%s; its rows are flown again", error)
-                file.unlink()
-                self._files.remove(file)
-        return np.concatenate([np.empty(0, dtype=np.int64), *found])
+                self._drop(file)
+        keys = np.concatenate([np.empty(0, dtype=np.int64), *found])
+        if len(np.unique(keys)) == len(keys):
+            return keys
+        keys = keys[:0]
+        for file, of in zip(tuple(self._files), found, strict=True):
+            if np.isin(of, keys).any():
+                log.warning("%s: holds rows that another part holds; it is removed", file)
+                self._drop(file)
+            else:
+                keys = np.concatenate([keys, of])
+        return keys
+
+    def _drop(self, file: Path) -> None:
+        file.unlink()
+        self._files.remove(file)
 
     def add(self, table: Any) -> None:
         """Write a part.

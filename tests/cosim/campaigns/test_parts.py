@@ -66,6 +66,28 @@ def test_who_is_killed_while_parts_merge_leaves_no_row_twice(tmp_path, monkeypat
     assert joined(again, tmp_path)["row"].to_pylist() == [*range(36), 40]
 
 
+def test_a_copy_of_a_part_brings_no_row_twice(tmp_path):
+    found, _ = opened(tmp_path)
+    for rows in ([0, 1], [2, 3], [4, 5]):
+        found.add(table(rows))
+    part = next((tmp_path / "parts").glob("00000001-*"))
+    (tmp_path / "parts" / "00000007-00000007.parquet").write_bytes(part.read_bytes())
+    found, keys = opened(tmp_path)
+    assert sorted(keys) == list(range(6))
+    assert joined(found, tmp_path)["row"].to_pylist() == list(range(6))
+
+
+def test_files_that_are_no_parts_are_left_alone(tmp_path):
+    found, _ = opened(tmp_path)
+    found.add(table([0, 1]))
+    strangers = [tmp_path / "parts" / name for name in ("notes.parquet", "1-2-3.parquet", "copy of 00000000.parquet")]
+    for stranger in strangers:
+        stranger.write_text("no part")
+    found, keys = opened(tmp_path)
+    assert keys == [0, 1] and joined(found, tmp_path)["row"].to_pylist() == [0, 1]
+    assert all(stranger.exists() for stranger in strangers)
+
+
 def test_a_merge_for_which_there_is_no_room_loses_nothing(tmp_path, monkeypatch):
     monkeypatch.setattr(parts, "MERGED", 3)
     found, _ = opened(tmp_path)
