@@ -52,7 +52,7 @@ PEERS = {
         Peer("simpful"),
         Peer("pyfuzzylite", ("numpy<2",), "old-numpy"),
         Peer("pymavlink"),
-        Peer("PythonVehicleSimulator"),
+        Peer("python-vehicle-simulator"),
     )
 }
 
