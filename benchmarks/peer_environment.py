@@ -52,7 +52,7 @@ PEERS = {
         Peer("simpful"),
         Peer("pyfuzzylite", ("numpy<2",), "old-numpy"),
         Peer("pymavlink"),
-        Peer("PythonVehicleSimulator"),
+        Peer("python-vehicle-simulator"),
     )
 }
 
@@ -75,7 +75,7 @@ def install(again: bool = False) -> dict[str, str]:
     dict from str to str
         Of each peer its version, or, after "not installed: ", why it has none.
     """
-    state = _state()
+    state = {name: version for name, version in _state().items() if name in PEERS}
     for peer in PEERS.values():
         if peer.name in state and not (again and state[peer.name].startswith("not installed")):
             continue

@@ -33,7 +33,7 @@ def contests(environment: Environment) -> Iterator[Contest]:
             "NumPy, 6 DOF": _body(environment, "numpy", "numpy_body", "steps"),
             "Numba, 6 DOF": _body(environment, "numba", "numba_body", "steps"),
             "MuJoCo, free body in a fluid": _body(environment, "mujoco", "mujoco_body", "steps"),
-            "PythonVehicleSimulator": _body(environment, "PythonVehicleSimulator", "vehicle_simulator", "steps"),
+            "PythonVehicleSimulator": _body(environment, "python-vehicle-simulator", "vehicle_simulator", "steps"),
         },
         (
             ("Plant.step, FMI 3", "FMPy, FMU3Slave in a loop"),
