@@ -122,14 +122,19 @@ def _lost(error: BaseException) -> RunError:
 
 @contextlib.contextmanager
 def _quiet(name: str) -> Iterator[None]:
-    """Leave out what a library logs: what it means for the campaign, we say."""
-    logger = logging.getLogger(name)
-    before = logger.level
-    logger.setLevel(logging.CRITICAL)
+    """Leave out what a library logs: what it means for the campaign, we say.
+
+    Its loggers have levels of their own, that of the library over them does not reach down.
+    """
+    names = [name, *(other for other in logging.root.manager.loggerDict if other.startswith(f"{name}."))]
+    before = {logger: logger.level for logger in map(logging.getLogger, names)}
+    for logger in before:
+        logger.setLevel(logging.CRITICAL + 1)
     try:
         yield
     finally:
-        logger.setLevel(before)
+        for logger, level in before.items():
+            logger.setLevel(level)
 
 
 @contextlib.contextmanager

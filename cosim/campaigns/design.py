@@ -57,6 +57,11 @@ class Vary:
             return np.array(self.values)[places]
         return self.at(places / max(1, self.steps - 1))
 
+    @property
+    def whole(self) -> bool:
+        """Whether all of its values are whole numbers; those of a range are not, but on a grid."""
+        return bool(self.steps) and bool(np.all(np.mod(self.on_grid(np.arange(self.steps)), 1.0) == 0.0))
+
     def table(self) -> dict[str, Any]:
         """Return it as a table for JSON."""
         if self.values:

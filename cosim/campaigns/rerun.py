@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import json
 import math
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,7 +15,7 @@ from cosim.campaigns.design import design_of
 from cosim.campaigns.dispatch import KILLED
 from cosim.campaigns.folder import RESULTS, read_plan
 from cosim.campaigns.law_gains import law_named
-from cosim.campaigns.plan import SCENES, SWEEP, code_digest
+from cosim.campaigns.plan import SCENES, SWEEP, code_digest, difference
 from cosim.campaigns.results import Results
 from cosim.campaigns.scenes import SceneTask
 from cosim.campaigns.sweep_rows import SweepWork
@@ -22,7 +23,7 @@ from cosim.campaigns.work import Task
 from cosim.errors import RunError
 from cosim.run import Run, run_scenario
 from cosim.run_folder import SCENARIO
-from cosim.scenario import Scenario, load_scenario
+from cosim.scenario import VEHICLE_COPY, Scenario, load_scenario
 from cosim.scene_run import Conditions
 
 _OF_THE_CLOCK = ("worst_step_time",)  # columns that no repetition gives again
@@ -101,6 +102,12 @@ def _results(folder: Path) -> Results:
 def _of_sweep(folder: Path, plan: dict[str, Any], stored: dict[str, Any]) -> tuple[Task, Any, Scenario | None]:
     """Return how a row of a sweep is flown, its batch, and the scenario that it stands for."""
     work = SweepWork(load_scenario(folder / SCENARIO), design_of(plan), plan["engine"])
+    if differing := difference(
+        {"scenario": plan["scenario"]}, {"scenario": json.loads(json.dumps(work.plan["scenario"]))}
+    ):
+        raise RunError(f"{folder / SCENARIO}: is not that of the campaign ({differing})")
+    if plan["vehicle_sha256"] != work.plan["vehicle_sha256"]:
+        raise RunError(f"{folder / VEHICLE_COPY}: is not that of the campaign")
     row = stored["row"]
     batch = work.batch(np.array([row]))
     if stored["refused"] is not None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import logging
+import multiprocessing
 import sys
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor
@@ -70,12 +71,18 @@ def carry_out(
     Raises
     ------
     RunError
-        If the folder holds something else or cannot be written, or processes die whatever they fly.
+        If the folder holds something else or cannot be written, processes die whatever they fly, or a script calls this
+        unguarded, so that its processes would.
     Exception
         What the task raises if it cannot be flown at all.
     KeyboardInterrupt
         After Ctrl-C; what is done is kept.
     """
+    if getattr(multiprocessing.current_process(), "_inheriting", False):  # what multiprocessing itself asks
+        raise RunError(
+            "a process that starts reads the script again, and came to this call; "
+            "expected it below: if __name__ == '__main__':"
+        )
     if workers < 1:
         raise RunError(f"workers is {workers}, expected 1 or more")
     with flyer_held(work.task), CampaignFolder(out, work) as folder:

@@ -54,8 +54,10 @@ def sweep_page(summary: dict[str, Any]) -> str:
 def _page(s: dict[str, Any]) -> Iterator[str]:
     yield f"# {s['name']}: a sweep of {s['rows']} rows"
     yield ""
-    yield f"Design {s['design']}, seed {s['seed']}, engine {s['engine']}. {s['flown']} rows were flown, {s['refused']} "
+    yield f"Design {s['design']}, seed {s['seed']}, engine {s['engine']}. {s['flown']} rows were flown, {s['refused']}"
     yield f"refused; {s['stopped']} flights stopped early. Intervals are at 95 %, by Wilson."
+    if s["reasons"]:
+        yield from _table(["refused row", "why"], [[row, why.replace("|", "\\|")] for row, why in s["reasons"].items()])
     yield from _table(["key", "values"], [[f"`{key}`", _range(vary)] for key, vary in s["vary"].items()])
     yield from _table(["rows that", "share"], [[fact, _rate(s[fact])] for fact in FACTS])
     names = [f"{float(q):.0%}".replace("%", " %") for q in next(iter(s["quantiles"].values()))]

@@ -162,7 +162,7 @@ class SweepWork:
     ScenarioError
         If a key is unknown, or what it names is no number.
     RunError
-        If there is no such engine.
+        If there is no such engine, or a key that is a whole number has values that are none.
     """
 
     unit = "row"
@@ -172,6 +172,11 @@ class SweepWork:
             raise RunError(f"engine {engine!r} is unknown; {hint(engine, ENGINES)}")
         keys = tuple(vary.key for vary in design.vary)
         self.variation = Variation(scenario, keys)
+        for vary in design.vary:
+            if isinstance(self.variation.number(vary.key), int) and not vary.whole:
+                raise RunError(
+                    f"{vary.key} is a whole number, expected {vary.key}=A,B,C, or a grid that meets no others"
+                )
         self.name, self.design = scenario.name, design
         self.task = SweepTask(pickle.dumps(self.variation), ENGINES[engine])
         self.schema = schema_of(keys)

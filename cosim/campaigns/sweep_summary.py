@@ -22,6 +22,7 @@ FACTS = ("reached", "settled", "violated")  # whose rates are told
 SPREADS = ("reach_time", "min_clearance", "effort")  # whose quantiles are told
 _CONFIDENCE = 0.95
 _WORST = 5  # rows of each kind
+_REASONS = 5  # why rows were refused
 
 
 def summarise_sweep(work: SweepWork, results: Results, folder: Path) -> dict[str, Any]:
@@ -39,9 +40,9 @@ def summarise_sweep(work: SweepWork, results: Results, folder: Path) -> dict[str
     Returns
     -------
     dict
-        Ready for JSON: counts; rates with 95 % intervals by Wilson, of the rows that were flown; quantiles (None where
-        there is nothing); the worst rows; rank correlations by Spearman of every key with every outcome, None where
-        either is constant; and the plan. Units as in the columns of the results.
+        Ready for JSON: counts, and why the first rows were refused; rates with 95 % intervals by Wilson, of the rows
+        that were flown; quantiles (None where there is nothing); the worst rows; rank correlations by Spearman of
+        every key with every outcome, None where either is constant; and the plan. Units as in the columns of the results.
     """
     flown = results.absent("refused")
     return {
@@ -49,6 +50,7 @@ def summarise_sweep(work: SweepWork, results: Results, folder: Path) -> dict[str
         "rows": len(results),
         "flown": int(flown.sum()),
         "refused": int((~flown).sum()),
+        "reasons": _reasons(results, flown),
         "stopped": int(np.isfinite(results.number("stopped_at")).sum()),
         **{name: _rate(results.fact(name)[flown]) for name in FACTS},
         "quantiles": {name: quantiles(results.number(name)) for name in SPREADS},
@@ -56,6 +58,12 @@ def summarise_sweep(work: SweepWork, results: Results, folder: Path) -> dict[str
         "rank_correlations": _correlations(work, results, flown),
         **{key: value for key, value in work.plan.items() if key != "name"},
     }
+
+
+def _reasons(results: Results, flown: Facts) -> dict[str, str]:
+    """Return why the first rows were refused, by their number."""
+    first = np.flatnonzero(~flown)[:_REASONS]
+    return {str(row): str(why) for row, why in zip(results["row"][first], results["refused"][first], strict=True)}
 
 
 def _rate(happened: Facts) -> dict[str, Any]:

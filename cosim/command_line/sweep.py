@@ -14,7 +14,7 @@ from cosim.command_line.campaigns import INTERRUPTED, resumable, workers
 from cosim.errors import RunError
 
 _EPILOG = """examples:
-  cosim sweep docking --vary initial.position.1=-2:2 law.gains.speed=0.3:1.5:log --samples 1000 --out sweeps/start
+  cosim sweep docking --vary initial.position.1=-4:-2 law.gains.speed=0.3:1.5:log --samples 1000 --out sweeps/start
   cosim sweep paper --set arbiter.engine=closed --vary law.gains.k_p1=10:30:5 law.gains.k_q=5,10,20 --design grid \\
       --workers 2 --out sweeps/gains
   cosim rerun sweeps/start 17 --out runs/worst
@@ -33,7 +33,7 @@ def add_verbs(verbs: Any) -> None:
         "sweep", help="fly a scenario many times, with numbers of it varied",
         epilog=_EPILOG, formatter_class=argparse.RawDescriptionHelpFormatter,
     )  # fmt: skip
-    sweep.add_argument("scenario", help="a shipped name (see cosim list), or a TOML file")
+    sweep.add_argument("scenario", help="a shipped name (see cosim list), or a TOML file; it stands before --vary")
     sweep.add_argument(
         "--vary", nargs="+", action="extend", required=True, metavar="KEY=LOW:HIGH[:N][:log]",
         help="a key of the scenario and its range, with the number of points on a grid; or KEY=A,B,C",
@@ -75,8 +75,11 @@ def sweep(options: argparse.Namespace) -> int:
 
     if options.scheduler and options.workers:
         raise RunError("--workers: expected none with --scheduler: the cluster has as many as it has")
-    scenario = load_scenario(options.scenario, options.overrides)
     design = Design(vary_from(options.vary), options.design, options.samples, options.seed)
+    both = {vary.key for vary in design.vary} & {text.partition("=")[0].strip() for text in options.overrides}
+    if both:
+        raise RunError(f"{min(both)} is set and varies, expected either")
+    scenario = load_scenario(options.scenario, options.overrides)
 
     def run() -> None:
         with contextlib.ExitStack() as stack:

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 # of each field: its type, its unit, what it is
 FIELDS: dict[str, tuple[type, str, str]] = {
     "reached": (np.bool_, "", "Was inside the goal region at some step"),
-    "reach_time": (np.float64, "s", "When it first was; nan: never"),
+    "reach_time": (np.float64, "s", "When it first was; none: never"),
     "settled": (np.bool_, "", "Was inside for the last ten seconds"),
-    "settle_time": (np.float64, "s", "When it came in for the last time; nan: never"),
+    "settle_time": (np.float64, "s", "When it came in for the last time; none: never"),
     "violated": (np.bool_, "", "Violated a hard region at some step"),
     "min_clearance": (np.float64, "m", "Least clearance of any hard region of place; inf: there is none"),
     "closest_to_goal": (np.float64, "m", "Least distance to the goal region, below 0 inside"),
@@ -27,7 +27,7 @@ FIELDS: dict[str, tuple[type, str, str]] = {
     "phi2": (np.float64, "N.m", "Estimate of phi 2 in (12) at the end"),
     "phi3": (np.float64, "N.m", "Estimate of phi 3 in (12) at the end"),
     "phi4": (np.float64, "N.m", "Estimate of phi 4 in (12) at the end"),
-    "stopped_at": (np.float64, "s", "When the plant refused to go on; nan: it did not"),
+    "stopped_at": (np.float64, "s", "When the plant refused to go on; none: it did not"),
 }
 
 OUTCOME = np.dtype([(name, kind) for name, (kind, _, _) in FIELDS.items()])

@@ -121,6 +121,17 @@ def test_folders_that_hold_nothing_to_repeat(folder, tmp_path):
         rerun(folder, 0)
 
 
+def test_a_scenario_that_was_changed_is_not_flown(folder):
+    file = folder / "scenario.toml"
+    text = file.read_text()
+    assert text.count("duration = 0.3") == 1
+    file.write_text(text.replace("duration = 0.3", "duration = 0.4"))
+    with pytest.raises(
+        RunError, match=r"scenario\.toml: is not that of the campaign .*time\.duration is 0\.3, now 0\.4"
+    ):
+        rerun(folder, 0)
+
+
 def test_a_scene_comes_again_to_the_last_bit(tmp_path, capsys):
     out = tmp_path / "out"
     run_campaign(

@@ -5,7 +5,7 @@ import os
 import subprocess
 import sys
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
-from multiprocessing import get_context
+from multiprocessing import current_process, get_context
 from pathlib import Path
 
 import numpy as np
@@ -172,6 +172,13 @@ def test_the_folder_of_another_sweep_is_refused(tmp_path, fakes, change, words):
         run_sweep(load_scenario("paper", overrides), design(**change), tmp_path / "out", engine)
 
 
+def test_a_script_that_its_own_processes_run_again_is_told_what_it_lacks(tmp_path, fakes, monkeypatch):
+    monkeypatch.setattr(current_process(), "_inheriting", True, raising=False)  # as while a spawned process starts
+    with pytest.raises(RunError, match="__main__"):
+        run_sweep(paper(), design(), tmp_path / "out", "fake")
+    assert not (tmp_path / "out").exists()
+
+
 def test_an_engine_that_cannot_fly_it_leaves_no_folder(tmp_path, fakes):
     with pytest.raises(RunError, match="cannot fly this"):
         run_sweep(paper(), design(), tmp_path / "out", "unfit")
@@ -200,6 +207,7 @@ def test_the_summary_follows_from_the_rows(tmp_path, fakes):
     assert correlations[KEYS[0]]["reach_time"]["rho"] == pytest.approx(1.0)  # it is three times the value
     assert correlations[KEYS[0]]["stopped_at"] is None
     assert abs(correlations[KEYS[2]]["reach_time"]["rho"]) < 0.3
+    assert "nan" not in str([field.metadata for field in done.results.schema])  # the file has null there
     ranks = [np.argsort(np.argsort([row[k] for row in rows])) for k in (KEYS[1], "effort")]
     assert correlations[KEYS[1]]["effort"]["rho"] == pytest.approx(np.corrcoef(*ranks)[0, 1])
 
@@ -220,6 +228,9 @@ def test_the_summary_of_a_single_row_and_of_none_flown(tmp_path, fakes):
     none = run_sweep(paper(), design(3, vary=["initial.position.1=1.6:2"]), tmp_path / "none", "choosy").summary
     assert none["reached"] == {"rows": 0, "share": None, "low": None, "high": None} and none["refused"] == 3
     assert none["worst"] == [] and none["quantiles"]["effort"]["0.5"] is None
+    assert list(none["reasons"]) == ["0", "1", "2"] and not one["reasons"]
+    page = (tmp_path / "none" / "summary.md").read_text()
+    assert all(f"| {row} | {why} |" in page and "expected less" in why for row, why in none["reasons"].items())
 
 
 # ---- the command ----
@@ -233,6 +244,10 @@ def test_the_summary_of_a_single_row_and_of_none_flown(tmp_path, fakes):
         (["--vary", "law.gains.k_p1=2:1", "--samples", "3"], "the lower end first"),
         (["--vary", "law.gains.k_p1=1:2", "--design", "grid"], "how many points"),
         (["--vary", "law.gains.k_p1=1:2"], "samples is missing"),
+        (["--vary", "law.gains.k_p1=1:2", "--samples", "3", "--set", "law.gains.k_p1=3"], "k_p1 is set and varies"),
+        (["--vary", "sensing.seed=1:9", "--samples", "3"], "sensing.seed=A,B,C"),
+        (["--vary", "sensing.seed=1,2.5", "--samples", "3"], "sensing.seed is a whole number"),
+        (["--vary", "sensing.seed=1:9:4", "--design", "grid"], "sensing.seed is a whole number"),
         (["--vary", "law.gains.k_p1=nan:2", "--samples", "3"], "no finite number"),
         (["--vary", "law.gains.k_p1=1:2", "--samples", "10000001"], "expected up to 10000000"),
         (["--vary", "law.gains.k_p1=1:2", "--samples", "3", "--design", "sobl"], "expected one of grid"),

@@ -1,5 +1,6 @@
 """Sweeps in processes of their own and on Dask: whatever dies, no row is lost and none comes twice."""
 
+import logging
 import os
 import signal
 
@@ -7,6 +8,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from cosim.campaigns import run_sweep
+from cosim.campaigns.cluster import _quiet
 from cosim.campaigns.dispatch import KILLED
 from cosim.campaigns.folder import RESULTS
 from cosim.cli import main
@@ -138,3 +140,13 @@ def test_a_scheduler_that_is_not_there_is_one_line(tmp_path, capsys, monkeypatch
     assert main([*words, "--scheduler", "nonsense://x"]) == 2
     assert "cannot be used" in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
+
+
+def test_what_the_parts_of_a_library_log_is_left_out_for_as_long_as_it_is_used(caplog):
+    client = logging.getLogger("library.client")
+    client.setLevel(logging.WARNING)
+    with _quiet("library"):
+        client.error("lost")
+    assert not caplog.records
+    client.error("lost again")
+    assert [record.message for record in caplog.records] == ["lost again"]
