@@ -161,5 +161,5 @@ def test_what_the_loop_cannot_do_is_refused(change, words):
 
 
 def test_the_version_of_the_fmu_cannot_vary_for_one_is_loaded_for_all_rows():
-    with pytest.raises(RunError, match="plant.fmi varies, expected 3"):
+    with pytest.raises(RunError, match=r"plant\.fmi varies, expected 3"):
         FusedFlyer(Variation(load_scenario("paper", [CLOSED]), ["plant.fmi"]))
