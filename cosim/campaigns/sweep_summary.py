@@ -42,7 +42,8 @@ def summarise_sweep(work: SweepWork, results: Results, folder: Path) -> dict[str
     dict
         Ready for JSON: counts, and why the first rows were refused; rates with 95 % intervals by Wilson, of the rows
         that were flown; quantiles (None where there is nothing); the worst rows; rank correlations by Spearman of
-        every key with every outcome, None where either is constant; and the plan. Units as in the columns of the results.
+        every key with every outcome, None where either is constant; and the plan.
+        Units as in the columns of the results.
     """
     flown = results.absent("refused")
     return {

@@ -54,7 +54,10 @@ class FusedFlyer:
             ("commands.enabled", base.commands.enabled, False),
         ):
             if came != expected:
-                raise RunError(f"{key} is {came!r}, expected {expected!r} for flights without a record")
+                way = f", such as by --set {key}={expected}" if isinstance(expected, str) else ""
+                raise RunError(f"{key} is {came!r}, expected {expected!r} for flights without a record{way}")
+            if key in variation.keys:
+                raise RunError(f"{key} varies, expected {expected!r} for flights without a record")
         self._flight = flight_of(base.law.name)
         self._plant = Plant(base.vehicle)
 

@@ -149,7 +149,7 @@ def test_a_plant_that_refuses_a_step_ends_the_flight_there():
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ('arbiter.engine="grid"', "arbiter.engine is 'grid', expected 'closed'"),
+        ('arbiter.engine="grid"', "arbiter.engine is 'grid', expected 'closed' .*--set arbiter.engine=closed"),
         ("plant.fmi=2", "plant.fmi is 2, expected 3"),
         ('master.order="jacobi"', "master.order is 'jacobi'"),
         ("commands.enabled=true", "commands.enabled is True"),
@@ -158,3 +158,8 @@ def test_a_plant_that_refuses_a_step_ends_the_flight_there():
 def test_what_the_loop_cannot_do_is_refused(change, words):
     with pytest.raises(RunError, match=words):
         FusedFlyer(Variation(load_scenario("paper", [CLOSED, change]), []))
+
+
+def test_the_version_of_the_fmu_cannot_vary_for_one_is_loaded_for_all_rows():
+    with pytest.raises(RunError, match=r"plant\.fmi varies, expected 3"):
+        FusedFlyer(Variation(load_scenario("paper", [CLOSED]), ["plant.fmi"]))
