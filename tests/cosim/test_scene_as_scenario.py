@@ -70,6 +70,6 @@ def test_master_and_compiled_loop_fly_the_same_way(tmp_path, law, tell):
     assert np.ptp(path, axis=0)[0] > 1.0
     assert trace[:, 1:4] == pytest.approx(path[:-1:2], abs=1e-9)
     assert trace[:, 14:17] == pytest.approx(told[:-1:2], abs=1e-9)
-    assert trace[:, 19:27] == pytest.approx(thrusts[:-1:2], abs=1e-6)
+    assert trace[:, 20:28] == pytest.approx(thrusts[:-1:2], abs=1e-6)
     clearances = np.column_stack([kept[f"{r.region.name}.clearance"] for r in master.scenario.regions])
     assert score.min_clearance == pytest.approx(clearances[1:].min(), abs=1e-9)

@@ -168,10 +168,10 @@ def test_numbers_that_have_no_place_of_their_own_are_flown_too():
     assert set(compare(of, values, seeds).refused) == {4, 5}
 
 
-def test_a_number_that_is_whole_in_the_scenario_stays_whole():
-    of = variation(("goal.centre.0",), "goal.centre=[128, 0.0, 5.0]", "time.duration=0.1")
-    values = np.array([[129.0], [126.0], [127.5], [128.0]])
-    assert set(compare(of, values, np.arange(4)).refused) == {2}
+def test_a_whole_number_stays_whole_and_a_shape_written_in_whole_numbers_takes_fractions():
+    of = variation(("goal.centre.0", "sensing.seed"), "goal.centre=[128, 0.0, 5.0]", "time.duration=0.1")
+    values = np.array([[129.0, 1.0], [126.0, 2.5], [127.5, 3.0], [128.0, 4.0]])
+    assert set(compare(of, values, np.arange(4)).refused) == {1}
 
 
 @pytest.mark.parametrize(
