@@ -108,7 +108,7 @@ def test_commands_of_the_tour_are_understood(capsys, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     tour = re.search(r"## A short tour\n+```\n(.*?)```", (ROOT / "README.md").read_text(), re.S).group(1)
     commands = [line.split("#")[0].split() for line in tour.splitlines() if line.startswith("cosim")]
-    assert len(commands) == 11
+    assert {words[1] for words in commands} >= {"run", "check", "campaign", "sweep", "package", "sitl"}
     nobody_comes = {"listen": (["--seconds", "0.1"], 1), "sitl": (["--timeout", "0.1"], 2)}
     scenes = (ROOT / "tests" / "data" / "scenes" / "plain.jsonl").read_text().splitlines()
     (tmp_path / "scenes.jsonl").write_text(scenes[0])
