@@ -125,7 +125,7 @@ def _log(verbose: bool) -> None:
 
 
 def _report(options: argparse.Namespace) -> int:
-    from cosim.report import verdict
+    from cosim.report_words import verdict
     from cosim.run_folder import report_again
 
     print(verdict(report_again(options.folder)))

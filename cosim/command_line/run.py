@@ -59,7 +59,7 @@ def _rate(text: str) -> float:
 
 def run(options: argparse.Namespace) -> int:
     """Run ``cosim run``."""
-    from cosim.report import verdict
+    from cosim.report_words import verdict
     from cosim.run import run_scenario
     from cosim.scenario import load_scenario
 

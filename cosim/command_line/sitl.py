@@ -68,7 +68,7 @@ def _positive(text: str) -> float:
 
 def sitl(options: argparse.Namespace) -> int:
     """Run ``cosim sitl``."""
-    from cosim.report import verdict
+    from cosim.report_words import verdict
     from cosim.sitl.flights import FlightOptions, Flights
     from cosim.sitl.hil import HilServer
     from cosim.sitl.law import law_of_controls, law_of_pwm

@@ -103,7 +103,7 @@ def sweep(options: argparse.Namespace) -> int:
 def rerun(options: argparse.Namespace) -> int:
     """Run ``cosim rerun``."""
     from cosim.campaigns.rerun import rerun as rerun_row
-    from cosim.report import verdict
+    from cosim.report_words import verdict
 
     with contextlib.suppress(ValueError):  # which signal raises outside the main thread
         signal.signal(signal.SIGTERM, signal.default_int_handler)

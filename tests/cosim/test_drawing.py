@@ -7,7 +7,7 @@ from controller.regions import Sphere
 from cosim.drawing import Story, features_of, labels_of, legend_columns, places_of, shifts_of
 from cosim.figures import drawings
 from cosim.record import load_record
-from cosim.report import verdict
+from cosim.report_words import verdict
 from cosim.run import run_scenario
 from cosim.scenario import load_scenario
 

@@ -3,7 +3,7 @@
 import pytest
 
 from cosim.record import load_record
-from cosim.report import verdict
+from cosim.report_words import verdict
 from cosim.run import run_scenario
 from cosim.scenario import load_scenario
 from cosim.scenario_file import shipped_scenarios

@@ -1,0 +1,149 @@
+// The runs of the page: numbers as they were recorded, and what they are at any time.
+
+/** One run: its header, and a Float64Array for each signal. */
+class Run {
+  /** @param {object} header as cosim/replay/header.py makes it  @param {Float64Array[]} columns one for each signal */
+  constructor(header, columns) {
+    this.header = header;
+    this.rows = columns.length ? columns[0].length : 0;
+    this._at = new Map(header.signals.map((signal, i) => [signal.name, i]));
+    this._columns = columns;
+    this._room = this.rows;
+  }
+
+  /** The times of all rows [s], rising. */
+  get time() {
+    return this.column("time");
+  }
+
+  /** First and last time [s]. */
+  get start() {
+    return this.rows ? this.time[0] : 0;
+  }
+
+  get end() {
+    return this.rows ? this.time[this.rows - 1] : 0;
+  }
+
+  has(name) {
+    return this._at.has(name);
+  }
+
+  /** The numbers of a signal, one for each row; null where there is no such signal. */
+  column(name) {
+    const at = this._at.get(name);
+    return at === undefined ? null : this._columns[at].subarray(0, this.rows);
+  }
+
+  unit(name) {
+    return this.header.signals[this._at.get(name)].unit;
+  }
+
+  /** Index of the last row at or before a time; 0 before the first. */
+  row(t) {
+    const at = this._at.get("time");
+    const time = this._columns[at];
+    let low = 0;
+    let high = this.rows;
+    while (high - low > 1) {
+      const middle = (low + high) >> 1;
+      if (time[middle] <= t) low = middle;
+      else high = middle;
+    }
+    return low;
+  }
+
+  /** A signal at a time, as of the last row before it: for what switches. */
+  held(name, t) {
+    const column = this.column(name);
+    return column ? column[this.row(t)] : NaN;
+  }
+
+  /** A signal at a time, on a line between the rows around it: for what moves. */
+  at(name, t) {
+    const column = this.column(name);
+    if (!column || !this.rows) return NaN;
+    const [i, part] = this._between(t);
+    return part > 0 ? column[i] + part * (column[i + 1] - column[i]) : column[i];
+  }
+
+  /** Where the vehicle is at a time: position [m, NED], and quaternion from body to world, scalar first. */
+  pose(t) {
+    const [i, part] = this._between(t);
+    const position = ["x", "y", "z"].map((axis) => this.at(`position.${axis}`, t));
+    const columns = ["e0", "e1", "e2", "e3"].map((e) => this.column(`quaternion.${e}`));
+    let quaternion = columns.map((column) => column[i]);
+    if (part > 0) {
+      const next = columns.map((column) => column[i + 1]);
+      const sign = quaternion.reduce((sum, x, k) => sum + x * next[k], 0) < 0 ? -1 : 1;
+      quaternion = quaternion.map((x, k) => x + part * (sign * next[k] - x));
+      const norm = Math.hypot(...quaternion);
+      quaternion = quaternion.map((x) => x / norm);
+    }
+    return { position, quaternion };
+  }
+
+  /** How far a region is from where its shape has it at a time [m, NED]. */
+  shift(region, t) {
+    const name = this.header.regions[region].name;
+    if (!this.has(`${name}.shift.x`)) return [0, 0, 0];
+    return ["x", "y", "z"].map((axis) => this.at(`${name}.shift.${axis}`, t));
+  }
+
+  /** The shape of a region at a time: what was changed on the way stands in header.changes, in the order of time. */
+  shape(region, t) {
+    let shape = this.header.regions[region].shape;
+    for (const change of this.header.changes ?? []) {
+      if (change.region === region && change.time <= t) shape = change.shape;
+    }
+    return shape;
+  }
+
+  /** Index of the region that the arbiter gives way to at a time; 0 is the goal. */
+  active(t) {
+    const index = this.held("active", t);
+    return Number.isFinite(index) ? index : 0;
+  }
+
+  /** Append one row, as it comes from a live run. */
+  append(row) {
+    if (this.rows === this._room) {
+      this._room = Math.max(1024, 2 * this._room);
+      this._columns = this._columns.map((column) => {
+        const wider = new Float64Array(this._room);
+        wider.set(column.subarray(0, this.rows));
+        return wider;
+      });
+    }
+    for (let i = 0; i < row.length; i++) this._columns[i][this.rows] = row[i];
+    this.rows += 1;
+  }
+
+  _between(t) {
+    const i = this.row(t);
+    if (i + 1 >= this.rows) return [i, 0];
+    const time = this.column("time");
+    return [i, Math.min(1, Math.max(0, (t - time[i]) / (time[i + 1] - time[i])))];
+  }
+}
+
+/** Unpack the numbers of a run: base64, raw deflate, byte planes, columns. */
+async function unpacked(header) {
+  const packed = Uint8Array.from(atob(header.data), (letter) => letter.charCodeAt(0));
+  const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("deflate-raw"));
+  const planes = new Uint8Array(await new Response(stream).arrayBuffer());
+  const count = planes.length / 8;
+  const bytes = new Uint8Array(planes.length);
+  for (let plane = 0; plane < 8; plane++) {
+    for (let i = 0; i < count; i++) bytes[8 * i + plane] = planes[plane * count + i];
+  }
+  const numbers = new Float64Array(bytes.buffer); // little-endian, as all machines with browsers are
+  const columns = header.signals.map((_, i) => numbers.subarray(i * header.rows, (i + 1) * header.rows));
+  return new Run(header, columns);
+}
+
+/** All runs of the page. */
+async function loadRuns() {
+  const headers = JSON.parse(document.getElementById("runs").textContent);
+  return Promise.all(headers.map(unpacked));
+}

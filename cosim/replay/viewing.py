@@ -1,0 +1,81 @@
+"""From the rows of a run to those that a view gets: what it draws, and what it says of the arbiter's reasons."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from cosim.replay.activity import active_regions
+from cosim.scenario import CRITERIA, Scenario
+from cosim.signals import Array, Column
+from fuzzy_arbiter import Arbiter
+
+_DRAWN = (  # beginnings of the names of what a view draws
+    "time", "position.", "quaternion.", "velocity.", "attitude.", "membership.", "weight.", "estimate.", "command.",
+    "thruster_force[", "actuation.", "helm.", "target.", "wrench_saturated", "allocation_saturated",
+)  # fmt: skip
+_DRAWN_OF_REGIONS = (".clearance", ".shift.x", ".shift.y", ".shift.z")
+
+
+class Viewing:
+    """Picks what a view draws from rows of a run, and adds which region is active and how strongly each rule fires.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        What is run.
+    columns : sequence of Column
+        Of its rows.
+
+    Attributes
+    ----------
+    columns : tuple of Column
+        Of a view's rows: picked ones in their order, then ``active``, then ``rule.R1`` and so on.
+    """
+
+    def __init__(self, scenario: Scenario, columns: Sequence[Column]) -> None:
+        names = [column.name for column in columns]
+        self.picked = [i for i, name in enumerate(names) if _drawn(name)]
+        self._criteria = [secondary.criterion for secondary in scenario.regions]
+        drawn = [names[i] for i in self.picked]
+        self._memberships = [drawn.index(f"membership.{name}") for name in CRITERIA]
+        self._weights = [drawn.index(f"weight.{name}") for name in CRITERIA]
+        self._clearances = [drawn.index(f"{secondary.region.name}.clearance") for secondary in scenario.regions]
+        self._arbiter = Arbiter(engine="closed")
+        self._strengths: dict[tuple[float, ...], list[float]] = {}
+        rules = self._arbiter.system.rules
+        self.columns = (
+            *(columns[i] for i in self.picked),
+            Column("active", "", "Region that the arbiter gives way to: 0 the goal, then the regions in their order"),
+            *(Column(f"rule.R{i + 1}", "", f"Strength of: {rule}") for i, rule in enumerate(rules)),
+        )
+
+    def extended(self, picked: Array) -> Array:
+        """Return rows of a view.
+
+        Parameters
+        ----------
+        picked : ndarray, shape (rows, picked columns)
+            Of the columns `picked`.
+
+        Returns
+        -------
+        ndarray, shape (rows, columns)
+            With activity and strengths; NaN where a membership is no number.
+        """
+        memberships = picked[:, self._memberships]
+        active = active_regions(self._criteria, memberships, picked[:, self._weights], picked[:, self._clearances])
+        strengths = [self._rules_at(tuple(sample)) for sample in memberships.tolist()]
+        return np.column_stack([picked, active, np.array(strengths).reshape(len(picked), -1)])
+
+    def _rules_at(self, memberships: tuple[float, ...]) -> list[float]:
+        if memberships not in self._strengths:
+            if not all(0.0 <= x <= 1.0 for x in memberships):
+                return [np.nan] * len(self._arbiter.system.rules)
+            self._strengths[memberships] = [rule.strength for rule in self._arbiter.explain(memberships).rules]
+        return self._strengths[memberships]
+
+
+def _drawn(name: str) -> bool:
+    return name.startswith(_DRAWN) or name.endswith(_DRAWN_OF_REGIONS)

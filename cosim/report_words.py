@@ -1,0 +1,82 @@
+"""What a run was asked and what happened, in sentences."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from controller.regions import SHAPES
+from cosim.claims import newtons
+from cosim.scenario import Scenario
+
+
+def asked(scenario: Scenario) -> str:
+    """Return what the vehicle was asked to do, in a sentence.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        What is run.
+
+    Returns
+    -------
+    str
+        Plain text.
+    """
+    start = ", ".join(f"{x:g}" for x in scenario.initial.position)
+    regions = [
+        f"{'within' if r.region.keep == 'in' else 'out of'} {r.region.name} ({r.criterion})" for r in scenario.regions
+    ]
+    respecting = f", keeping {', '.join(regions)}" if regions else ""
+    kind = next(name for name, shape in SHAPES.items() if isinstance(scenario.goal, shape)).replace("_", " ")
+    centre = [sum(pair) / 2.0 for pair in zip(*scenario.goal.bounds(), strict=True)]
+    at = f" about ({', '.join(f'{x:g}' for x in centre)}) m" if all(map(math.isfinite, centre)) else ""
+    return f"From ({start}) m into the goal region, a {kind}{at}{respecting}; {scenario.law.name} law."
+
+
+def verdict(summary: dict[str, Any]) -> str:
+    """Return what happened, in a sentence or two.
+
+    Parameters
+    ----------
+    summary : dict
+        What the run came to.
+
+    Returns
+    -------
+    str
+        Plain text.
+    """
+    if summary["settled"]:
+        entered, settled = summary["reach_time"], summary["settle_time"]
+        goal = f"The vehicle entered the goal region at {entered:.2f} s and was in for good from {settled:.2f} s"
+    elif summary["reached"]:
+        goal = f"The vehicle entered the goal region at {summary['reach_time']:.2f} s but did not settle there"
+    else:
+        goal = f"The vehicle never entered the goal region; it came within {summary['closest_to_goal']:.2f} m of it"
+    broken = [_broken(summary, name) for name, c in summary["min_clearance"].items() if c < 0.0]
+    kept = "; it kept every region."
+    if broken:
+        but = "" if summary["hard_violated"] or not summary["hard"] else "kept every hard region but "
+        kept = f"; it {but}violated {', '.join(broken)}."
+    force = (
+        f" The law asked for up to {newtons(summary['max_force_asked'])}; up to {newtons(summary['max_force'])} acted."
+    )
+    ended = {
+        "completed": "",
+        "interrupted": f" The run was interrupted at {summary['simulated_time']:.3f} s.",
+        "reset": f" The run was reset at {summary['simulated_time']:.3f} s.",
+        "killed": f" The run was killed; its record ends at {summary['simulated_time']:.3f} s.",
+    }.get(summary["status"], f" The run {summary['status']}.")
+    orders = summary.get("orders", 0)
+    steered = f" It was given {orders} order{'s' if orders > 1 else ''} on the way." if orders else ""
+    return goal + kept + force + steered + ended
+
+
+def _broken(summary: dict[str, Any], name: str) -> str:
+    """Return by how much a region was violated."""
+    remarks = ["soft"] if name not in summary["hard"] else []
+    remarks += ["where it starts"] if name in summary["violated_at_start"] else []
+    depth, unit = -summary["min_clearance"][name], summary["clearance_unit"][name]
+    depth, unit, digits = (math.degrees(depth), "°", 1) if unit == "rad" else (depth, " m", 3)
+    return f"{name} by {depth:.{digits}f}{unit}" + (f" ({', '.join(remarks)})" if remarks else "")
