@@ -80,7 +80,11 @@ class Recorder:
     def _flush(self) -> None:
         if not self._filled:
             return
-        columns = [pa.array(column) for column in np.ascontiguousarray(self._block[: self._filled].T)]
+        # not pa.array: that imports pandas where it is installed, for nothing
+        columns = [
+            pa.Array.from_buffers(pa.float64(), self._filled, [None, pa.py_buffer(column)])
+            for column in np.ascontiguousarray(self._block[: self._filled].T)
+        ]
         part = self._folder / PARTS / f"{self._parts:06}.parquet"
         scratch = part.with_suffix(".tmp")
         pq.write_table(pa.Table.from_arrays(columns, schema=self._schema), scratch, **_WRITING)
