@@ -9,10 +9,18 @@ from __future__ import annotations
 
 from typing import Any
 
+import numba
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
+
+# what a function that is called by address may be given: whole numbers, and where arrays begin
+INTEGER: Any = types.int64
+INTEGERS: Any = types.CPointer(types.int64)  # type: ignore[no-untyped-call]
+NUMBERS: Any = types.CPointer(types.float64)  # type: ignore[no-untyped-call]
+
+array_at: Any = numba.carray  # type: ignore[attr-defined]
 
 _I64 = ir.IntType(64)
 
@@ -25,7 +33,7 @@ def address_of(function: Any, arguments: tuple[Any, ...]) -> int:
     function : callable
         As `compiled` or `lean` give it; alive as long as the address is used.
     arguments : tuple of Numba types
-        Each an int64 or a pointer.
+        Each `INTEGER`, `INTEGERS` or `NUMBERS`; of the last two `array_at` makes arrays.
 
     Returns
     -------

@@ -11,11 +11,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Literal, NamedTuple
 
-import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
-from controller.by_address import address_of, call_at
+from controller.by_address import INTEGER, INTEGERS, NUMBERS, address_of, array_at, call_at
 from controller.compiled import compiled, inlined, lean
 from controller.errors import RegionError
 from controller.regions.box import Box, box
@@ -134,7 +133,7 @@ class PackedRegions(NamedTuple):
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle what holds in another process too: addresses do not."""
-        return _unpickled, tuple(self)[:-1]
+        return _unpickled, (tuple(self)[:-1],)
 
     def move_to(self, time: float) -> None:
         """Put every region where its velocity has brought it at a time [s]."""
@@ -169,8 +168,9 @@ def pack(regions: Sequence[Region]) -> PackedRegions:
     )
 
 
-def _unpickled(kinds: NDArray[np.int64], *arrays: Any) -> PackedRegions:
-    return PackedRegions(kinds, *arrays, _others_of(kinds))
+def _unpickled(arrays: tuple[Any, ...]) -> PackedRegions:
+    fields: tuple[Any, ...] = (*arrays, _others_of(arrays[0]))
+    return PackedRegions(*fields)
 
 
 def _others_of(kinds: NDArray[np.int64]) -> int:
@@ -280,11 +280,11 @@ def _evaluate_others(
     clearances_at: Any,
 ) -> int:
     """Evaluate all shapes but spheres and bands of depth, of arrays of `evaluate_packed` at these addresses."""
-    kinds, signs, offsets = nb.carray(kinds_at, n), nb.carray(signs_at, n), nb.carray(offsets_at, n + 1)
-    all_numbers, shifts = nb.carray(numbers_at, n_numbers), nb.carray(shifts_at, (n, 3))
-    position, quaternion = nb.carray(position_at, 3), nb.carray(quaternion_at, 4)
-    values, clearances = nb.carray(values_at, n), nb.carray(clearances_at, n)
-    gradients, turnings = nb.carray(gradients_at, (n, 3)), nb.carray(turnings_at, (n, 3))
+    kinds, signs, offsets = array_at(kinds_at, n), array_at(signs_at, n), array_at(offsets_at, n + 1)
+    all_numbers, shifts = array_at(numbers_at, n_numbers), array_at(shifts_at, (n, 3))
+    position, quaternion = array_at(position_at, 3), array_at(quaternion_at, 4)
+    values, clearances = array_at(values_at, n), array_at(clearances_at, n)
+    gradients, turnings = array_at(gradients_at, (n, 3)), array_at(turnings_at, (n, 3))
     for i in range(n):
         kind = kinds[i]
         if kind in (_SPHERE, _DEPTH_BAND):
@@ -308,8 +308,7 @@ def _evaluate_others(
 
 @functools.cache
 def _address_of_others() -> int:
-    whole, integers, numbers = nb.types.int64, nb.types.CPointer(nb.types.int64), nb.types.CPointer(nb.types.float64)
-    arguments = (whole, integers, numbers, integers, whole, *[numbers] * 8)
+    arguments = (INTEGER, INTEGERS, NUMBERS, INTEGERS, INTEGER, *[NUMBERS] * 8)
     return address_of(_evaluate_others, arguments)
 
 
