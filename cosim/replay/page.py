@@ -12,7 +12,11 @@ from typing import Any
 
 REPLAY = "replay.html"
 
-_SCRIPTS = ("data.js", "camera.js", "solids.js", "scene.js", "charts.js", "words.js", "player.js", "live.js", "main.js")
+_SCENE = (
+    "palette.js", "vectors.js", "camera.js", "solids.js", "pipes.js", "planes.js", "painter.js", "sights.js",
+    "vehicle.js", "trail.js", "bounds.js", "order.js", "labels.js", "floor.js", "controls.js", "scene.js",
+)  # fmt: skip
+_SCRIPTS = ("data.js", *_SCENE, "charts.js", "words.js", "player.js", "live.js", "main.js")
 
 
 def replay_page(runs: Sequence[dict[str, Any]], title: str) -> str:
