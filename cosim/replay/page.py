@@ -15,7 +15,7 @@ REPLAY = "replay.html"
 _SCENE = (
     "palette.js", "vectors.js", "camera.js", "solids.js", "pipes.js", "planes.js", "painter.js", "sights.js",
     "hull.js", "vehicle.js", "forces.js", "trail.js", "shadows.js", "bounds.js", "order.js",
-    "labels.js", "floor.js", "controls.js", "scene.js",
+    "regions.js", "labels.js", "floor.js", "controls.js", "scene.js",
 )  # fmt: skip
 _SCRIPTS = ("data.js", *_SCENE, "charts.js", "words.js", "player.js", "live.js", "main.js")
 

@@ -15,7 +15,7 @@ class Labels {
     this.height = height;
     this._words = [];
     this._taken = [];
-    this.placed = []; // {key, x, y, width, height} of the words that were drawn
+    this.placed = []; // {of: whose, x, y, width, height} of the words that were drawn
   }
 
   /** Keep words out of a part of the picture. */
@@ -51,7 +51,7 @@ class Labels {
         if (!this._free(x, y, width, height)) continue;
         this._taken.push([x - 2, y - 1, x + width + 2, y + height + 1]);
         this._sides.set(word.key, side);
-        this.placed.push({ key: word.key, x, y, width, height });
+        this.placed.push({ of: word.of ?? null, x, y, width, height });
         this._write(word, font, x, y, width, height);
         break;
       }

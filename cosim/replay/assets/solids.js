@@ -12,7 +12,7 @@ const SHARP = Math.cos((31 * Math.PI) / 180); // faces that meet at more are see
  * @property {number[][]} edges [point, point, face, face, 1 if sharp]
  * @property {number[]} patches number of the round or flat surface that each face belongs to
  * @property {number[][]} lines of points on a round surface, drawn to tell its form
- * @property {number[]} centre, {number} radius of a ball about it
+ * @property {number[]} centre, {number} radius of a ball about it  @property {number} top its least depth [m]
  * @property {number[][]|null} spine the line in its middle, where it is long  @property {object|null} ellipsoid {centre, axes} where it is one: three half axes as vectors
  * @property {number[][][]} shadows polygons, north and east, that it is seen as from above
  * @property {function(number[], number[]): boolean} hides whether it comes between an eye and a point, or holds the point
@@ -29,6 +29,7 @@ function solidOf(points, faces, lines = []) {
   const high = [0, 1, 2].map((axis) => Math.max(...points.map((p) => p[axis])));
   solid.centre = Vec.scale(Vec.add(low, high), 0.5);
   solid.radius = Math.max(...points.map((p) => Vec.norm(Vec.sub(p, solid.centre))));
+  solid.top = low[2];
   solid.hides = (eye, p) => crossesFaces(solid, eye, p);
   solid.shadows = faces.length ? [outlineFromAbove(points)] : [];
   return solid;
@@ -121,6 +122,7 @@ function ellipsoidOf(centre, axes) {
   const solid = solidOf(points, [], lines);
   solid.centre = [...centre];
   solid.radius = Math.max(...axes.map(Vec.norm));
+  solid.top = centre[2] - Math.hypot(...axes.map((axis) => axis[2]));
   solid.ellipsoid = { centre: solid.centre, axes };
   solid.shadows = [ellipseFromAbove(centre, axes)];
   const inverse = axes.map((axis) => Vec.scale(axis, 1 / Vec.dot(axis, axis))); // rows: into the unit ball
