@@ -1,6 +1,6 @@
 // The scene: vehicles, their ways and their regions at a time, as a camera sees them.
 
-const LEAST_HULL = 15; // pixels of radius below which the vehicle is drawn larger than it is
+const LEAST_HULL = 15; // pixels of radius below which the vehicle is drawn larger than it is; less in a small picture
 
 /** A 3D scene of some runs on a canvas. */
 class Scene {
@@ -225,7 +225,7 @@ class Scene {
   _vehicle(pose, index) {
     const { vehicle } = this.runs[index].header;
     const pixels = vehicle.radius * this.camera.scaleAt(pose.position);
-    const magnified = pixels > 0 ? Math.max(1, LEAST_HULL / pixels) : 1;
+    const magnified = pixels > 0 ? Math.max(1, Math.min(LEAST_HULL, 0.028 * Math.min(this.camera.width, this.camera.height)) / pixels) : 1;
     const size = vehicle.radius * magnified;
     const placed = { position: pose.position, R: Vec.matrix(pose.quaternion) };
     const things = [...hullAt(vehicle, placed, size, this.camera.eye, this.theme), ...bodyAxes(placed, size)];
