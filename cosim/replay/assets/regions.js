@@ -108,17 +108,15 @@ function nameRegions(labels, camera, entries, colours) {
 }
 
 /** Ask for the names of vehicles, where there are several. */
-function nameVehicles(labels, camera, runs, vehicles, colours) {
+function nameVehicles(labels, camera, marks, vehicles, colours) {
   vehicles.forEach((vehicle, i) => {
     if (!vehicle) return;
     const [x, y, depth] = camera.project(vehicle.pose.position);
     if (depth < camera.near) return;
-    const { name } = runs[i].header;
-    const alike = runs.filter((run) => run.header.name === name).length > 1;
+    const { name, colour } = marks[i];
     labels.add({
       key: `vehicle ${i}`, x, y, gap: 1.5 * vehicle.size * camera.scaleAt(vehicle.pose.position),
-      text: alike ? `${name} (${i + 1})` : name,
-      colour: colours.ink, edge: runColour(i), bold: true, chip: colours.chip, rank: 0.5,
+      text: name, colour: colours.ink, edge: colour, bold: true, chip: colours.chip, rank: 0.5,
       sides: ["below", "right", "left", "above"],
     });
   });

@@ -4,8 +4,11 @@ const LEAST_HULL = 15; // pixels of radius below which the vehicle is drawn larg
 
 /** A 3D scene of some runs on a canvas. */
 class Scene {
-  /** @param {HTMLCanvasElement} canvas  @param {Run[]} runs  @param {"light"|"dark"} theme */
-  constructor(canvas, runs, theme) {
+  /**
+   * @param {HTMLCanvasElement} canvas  @param {Run[]} runs  @param {"light"|"dark"} theme
+   * @param {{name: string, colour: string}[]|null} marks as for setRuns()
+   */
+  constructor(canvas, runs, theme, marks = null) {
     this.canvas = canvas;
     this.context = canvas.getContext("2d", { alpha: false });
     this.labels = new Labels(this.context);
@@ -15,7 +18,7 @@ class Scene {
     this.camera = new Camera();
     controlCamera(canvas, () => this.camera);
     this.resize();
-    this.setRuns(runs);
+    this.setRuns(runs, marks);
   }
 
   /** The camera; scenes that stand side by side may have one together. */
@@ -37,9 +40,15 @@ class Scene {
     this._later();
   }
 
-  /** Show other runs, all of them in the picture. */
-  setRuns(runs) {
+  /**
+   * Show other runs, all of them in the picture.
+   * @param {Run[]} runs
+   * @param {{name: string, colour: string}[]|null} marks of each run, where it is one of several, though not all are
+   * in this scene; without them one run's way has the colours of who was active
+   */
+  setRuns(runs, marks = null) {
     this.runs = runs;
+    this._runMarks = marks ?? (runs.length > 1 ? runs.map(({ header }, i) => ({ name: header.name, colour: runColour(i) })) : null);
     this._trails = runs.map((run) => new Trail(run));
     this._forces = runs.map((run) => new Forces(run));
     this._regions = new Regions(runs);
@@ -154,7 +163,7 @@ class Scene {
     paintCompass(painter, this.labels, colours);
     paintScale(painter, this.labels, colours, Math.max(1, ...vehicles.map((vehicle) => vehicle?.magnified ?? 1)));
     if (labels) nameRegions(this.labels, camera, regions, colours);
-    if (labels && this.runs.length > 1) nameVehicles(this.labels, camera, this.runs, vehicles, colours);
+    if (labels && this._runMarks) nameVehicles(this.labels, camera, this._runMarks, vehicles, colours);
     this.labels.draw();
     this._note(t, poses, regions);
   }
@@ -191,7 +200,10 @@ class Scene {
       const { position } = run.pose(run.end);
       return Vec.finite(position) && position.some((x, k) => x < this.bounds[0][k] || x > this.bounds[1][k]);
     });
-    if (left) this._measure();
+    if (!left) return;
+    const { fitted } = this.camera;
+    this._measure();
+    if (fitted) this._quiet(() => this.camera.fit());
   }
 
   _follow(pose) {
@@ -240,7 +252,7 @@ class Scene {
 
   /** Of one run the way tells who was active; several runs have each their own colour. */
   _wayColour(index, past, active, colours) {
-    if (this.runs.length > 1) return runColour(index);
+    if (this._runMarks) return this._runMarks[index].colour;
     const { regions } = this.runs[index].header;
     return past ? fullColour(regions[Number.isFinite(active) ? active : 0]) : colours.future;
   }
