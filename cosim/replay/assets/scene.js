@@ -140,7 +140,7 @@ class Scene {
       this._trails.forEach((way, i) => {
         const chunks = this._way(way, i, t, colours);
         paintWayBelow(painter, chunks, floor, colours);
-        things.push(...chunks, ...this._marks(way, i, t, colours));
+        things.push(...chunks, ...this._marks(way, i, t, vehicles[i], colours));
       });
     }
     for (const vehicle of vehicles) if (vehicle) paintPlumb(painter, vehicle, floor, colours);
@@ -257,7 +257,7 @@ class Scene {
     return past ? fullColour(regions[Number.isFinite(active) ? active : 0]) : colours.future;
   }
 
-  _marks(way, index, t, colours) {
+  _marks(way, index, t, vehicle, colours) {
     const { camera } = this;
     const active = way.run.column("active");
     const spacing = roundStep((110 * camera.distance) / camera.focal);
@@ -265,6 +265,7 @@ class Scene {
       const [[x, y, near], [u, v, depth]] = [camera.project(from), camera.project(middle)];
       const length = Math.hypot(u - x, v - y);
       if (Math.min(near, depth) < camera.near || !(length > 1)) return [];
+      if (vehicle && Vec.norm(Vec.sub(middle, vehicle.pose.position)) < 1.5 * vehicle.size) return []; // not on the hull
       const past = time <= t;
       const onTop = Vec.along(middle, Vec.sub(camera.eye, middle), 0.02); // of the line that it marks
       const colour = this._wayColour(index, past, active?.[row], colours);
