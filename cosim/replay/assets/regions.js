@@ -101,7 +101,7 @@ function nameRegions(labels, camera, entries, colours) {
       key, x, y, gap: 6, of: entry.of, size: camera.width < 480 && !active ? 10 : 12,
       text: active ? `▶ ${entry.region.name}` : entry.region.name,
       colour: active ? colours.ink : colours.soft, edge: entry.colour, bold: active, chip: colours.chip,
-      rank: active ? 0 : entry.of.region === 0 ? 1 : 10 + 1e-3 * depth,
+      rank: active ? 0 : entry.of.region === 0 ? 1 : 10 + 1e-3 * depth, far: active || entry.of.region === 0,
       sides: ["above", "right", "left", "below"],
     });
   }
@@ -124,7 +124,7 @@ function nameVehicles(labels, camera, marks, vehicles, colours) {
     const { name, colour } = marks[i];
     labels.add({
       key: `vehicle ${i}`, x, y, gap: 1.5 * vehicle.size * camera.scaleAt(vehicle.pose.position),
-      text: name, colour: colours.ink, edge: colour, bold: true, chip: colours.chip, rank: 0.5,
+      text: name, colour: colours.ink, edge: colour, bold: true, chip: colours.chip, rank: 0.5, far: true,
       sides: ["below", "right", "left", "above"],
     });
   });
