@@ -46,16 +46,16 @@ class Labels {
       const width = this._width(word.text, font) + (word.chip ? 10 : 2);
       const height = (word.size ?? 12) + (word.chip ? 7 : 2);
       const before = known.get(word.key);
-      const spots = (word.far ? [0, 24, 48, 80] : [0]).flatMap((off) => word.sides.map((side) => [side, word.gap + off]));
-      if (before && spots.some(([side, gap]) => side === before[0] && gap === before[1])) spots.unshift(before);
-      for (const [side, gap] of spots) {
-        const [x, y] = this._corner(side, gap, word, width, height);
+      const spots = (word.far ? [0, 24, 48, 80] : [0]).flatMap((off) => word.sides.map((side) => [side, off]));
+      if (before && spots.some(([side, off]) => side === before[0] && off === before[1])) spots.unshift(before);
+      for (const [side, off] of spots) {
+        const [x, y] = this._corner(side, word.gap + off, word, width, height);
         const pad = word.pad ?? 0;
         if (!this._free(x - pad, y, width + 2 * pad, height)) continue;
         this._taken.push([x - 2, y - 1, x + width + 2, y + height + 1]);
-        this._sides.set(word.key, [side, gap]);
+        this._sides.set(word.key, [side, off]);
         this.placed.push({ of: word.of ?? null, x, y, width, height });
-        if (gap > word.gap) this._lead(word, x, y, width, height);
+        if (off) this._lead(word, x, y, width, height);
         this._write(word, font, x, y, width, height);
         break;
       }
