@@ -51,14 +51,15 @@ function paintForces(painter, pose, forces, size, real, theme) {
     if (a[2] > camera.near && b[2] > camera.near) arrows.push([a, b]);
   }
   context.lineCap = "round";
-  for (const [colour, width] of [[colours.halo, 5], [colours.thrust, 2.4]]) {
+  const fine = Math.min(1, Math.max(0.6, (size * camera.scaleAt(pose.position)) / 30)); // small vehicles have fine arrows
+  for (const [colour, width] of [[colours.halo, 5 * fine], [colours.thrust, 2.4 * fine]]) {
     context.beginPath();
     for (const [a, b] of arrows) {
       context.moveTo(a[0], a[1]);
       context.lineTo(b[0], b[1]);
       const length = Math.hypot(b[0] - a[0], b[1] - a[1]);
       if (length < 3) continue;
-      const head = Math.min(7, 0.6 * length);
+      const head = Math.min(7 * fine, 0.6 * length);
       const [ux, uy] = [(b[0] - a[0]) / length, (b[1] - a[1]) / length];
       context.moveTo(b[0] - head * (ux + 0.6 * uy), b[1] - head * (uy - 0.6 * ux));
       context.lineTo(b[0], b[1]);

@@ -41,6 +41,7 @@ class Labels {
     context.textBaseline = "middle";
     context.textAlign = "left";
     this._words.sort((a, b) => a.rank - b.rank);
+    const written = [];
     for (const word of this._words) {
       const font = `${word.bold ? "600 " : ""}${word.size ?? 12}px system-ui, sans-serif`;
       const width = this._width(word.text, font) + (word.chip ? 10 : 2);
@@ -56,10 +57,11 @@ class Labels {
         this._sides.set(word.key, [side, off]);
         this.placed.push({ of: word.of ?? null, x, y, width, height });
         if (off) this._lead(word, x, y, width, height);
-        this._write(word, font, x, y, width, height);
+        written.push([word, font, x, y, width, height]);
         break;
       }
     }
+    for (const placed of written) this._write(...placed); // over all lines
   }
 
   /** A line from a word that stands far off to what it names. */
