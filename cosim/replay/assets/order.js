@@ -41,19 +41,26 @@ function remoteness({ solid, middle }, eye) {
   return Vec.dot(off, off) - radius * radius;
 }
 
-/** Whether an entry comes between the eye and a point, or holds it. */
-function hiddenBy(entry, eye, p) {
-  if (entry.sheet) return throughSheet(entry.sheet, eye, p);
-  if (!entry.style.filled) return false;
-  return entry.solid.hides(Vec.sub(eye, entry.shift), Vec.sub(p, entry.shift));
+/** What tells of an entry whether it comes between the eye and a point, or holds it; null where it is clear. */
+function hiderOf({ solid, sheet, shift, style }, eye) {
+  if (sheet) return throughSheet(sheet, eye);
+  if (!style.filled) return null;
+  const [sx, sy, sz] = shift;
+  const hides = solid.from(Vec.sub(eye, shift));
+  return (x, y, z) => hides(x - sx, y - sy, z - sz);
 }
 
-function throughSheet({ corners, normal }, eye, p) {
-  const before = Vec.dot(normal, Vec.sub(eye, corners[0]));
-  const after = Vec.dot(normal, Vec.sub(p, corners[0]));
-  if (before > 0 === after > 0) return false;
-  const at = Vec.along(eye, Vec.sub(p, eye), before / (before - after));
-  return holds(corners.flat(), corners.map((_, i) => i), at, normal);
+function throughSheet({ corners, normal }, eye) {
+  const [nx, ny, nz] = normal;
+  const offset = Vec.dot(normal, corners[0]);
+  const before = Vec.dot(normal, eye) - offset;
+  const [points, face] = [corners.flat(), corners.map((_, i) => i)];
+  return (x, y, z) => {
+    const after = nx * x + ny * y + nz * z - offset;
+    if (before > 0 === after > 0) return false;
+    const at = Vec.along(eye, [x - eye[0], y - eye[1], z - eye[2]], before / (before - after));
+    return holds(points, face, at, normal);
+  };
 }
 
 /**
@@ -62,11 +69,12 @@ function throughSheet({ corners, normal }, eye, p) {
  */
 function placedAmong(entries, things, eye) {
   const lists = Array.from({ length: entries.length + 1 }, () => []);
+  const hiders = entries.map((entry) => hiderOf(entry, eye));
   for (const thing of things) {
+    const [x, y, z] = thing.middle;
     let k = 0;
-    while (k < entries.length && !hiddenBy(entries[k], eye, thing.middle)) k++;
-    const [x, y, z] = [thing.middle[0] - eye[0], thing.middle[1] - eye[1], thing.middle[2] - eye[2]];
-    thing.off = x * x + y * y + z * z;
+    while (k < entries.length && !hiders[k]?.(x, y, z)) k++;
+    thing.off = (x - eye[0]) ** 2 + (y - eye[1]) ** 2 + (z - eye[2]) ** 2;
     lists[k].push(thing);
   }
   for (const list of lists) list.sort((a, b) => b.off - a.off);

@@ -45,6 +45,7 @@ class Trail {
       const turns = !chunk || chunk.past !== past || chunk.active !== who;
       if (!turns && !last && step < FINEST) return;
       if (chunk) {
+        if (straight(chunk.points, px, py)) chunk.points.length -= 2;
         chunk.points.push(px, py);
         length += step;
       }
@@ -107,6 +108,15 @@ class Trail {
     this._marks = { spacing, rows: run.rows, list };
     return list;
   }
+}
+
+/** Whether the last point of a line is as good as on the way from the one before it to another. */
+function straight(points, x, y) {
+  const n = points.length;
+  if (n < 4) return false;
+  const [u, v] = [x - points[n - 4], y - points[n - 3]];
+  const [p, q] = [points[n - 2] - points[n - 4], points[n - 1] - points[n - 3]];
+  return u * p + v * q > 0 && Math.abs(u * q - v * p) < 0.25 * Math.hypot(u, v);
 }
 
 /** Whether a line of pixels may touch the picture. */
