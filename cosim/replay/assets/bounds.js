@@ -24,7 +24,7 @@ function placesOf(run) {
     const { centre, radius } = surfaceOf(shape);
     for (const t of [run.start, run.end]) {
       const at = Vec.add(centre, run.shift(0, t));
-      if (Vec.finite(at)) for (const k of [-1, 1]) for (let i = 0; i < 3; i++) kept.push(at.map((x, j) => x + (i === j ? k * radius : 0)));
+      if (Vec.finite(at)) kept.push(at.map((x) => x - radius), at.map((x) => x + radius));
     }
   }
   return kept;
@@ -58,7 +58,8 @@ function reachOf(shape, shift, way, limits, room) {
     if (!isThere(Vec.add(solid.centre, shift))) return [];
     const box = boxOfSolid(solid, shift);
     if (box[0].some((x, k) => x > limits[1][k]) || box[1].some((x, k) => x < limits[0][k])) return [];
-    return box.map((corner) => corner.map((x, k) => (inLimits(x, k) ? x : Math.min(way[1][k], Math.max(way[0][k], x)))));
+    const within = (x, k) => (inLimits(x, k) ? x : Math.min(way[1][k], Math.max(way[0][k], x)));
+    return box.map((corner) => corner.map(within));
   }
   if (!PLANES[shape.kind]) return [];
   const middle = Vec.scale(Vec.add(...way), 0.5);

@@ -9,7 +9,7 @@ class Forces {
     this._most = 0; // N, the greatest force on the body
   }
 
-  /** @returns {{name: string, at: number[], force: number[]}[]} body frame; a force of length 1 is the greatest there is */
+  /** @returns {{at: number[], force: number[]}[]} body frame; a force of length 1 is the greatest there is */
   at(t) {
     this._look();
     const { run } = this;
@@ -28,7 +28,8 @@ class Forces {
   _look() {
     const { run } = this;
     if (this._looked === run.rows) return;
-    const thrusters = run.header.vehicle.thrusters.map((_, i) => run.column(`thruster_force[${i + 1}]`)).filter(Boolean);
+    const names = run.header.vehicle.thrusters.map((_, i) => `thruster_force[${i + 1}]`);
+    const thrusters = names.map((name) => run.column(name)).filter(Boolean);
     const body = ["X", "Y", "Z"].map((axis) => run.column(`actuation.${axis}`));
     for (let k = this._looked; k < run.rows; k++) {
       this._thrusters ||= thrusters.some((force) => Math.abs(force[k]) > 0);
@@ -51,7 +52,8 @@ function paintForces(painter, pose, forces, size, real, theme) {
     if (a[2] > camera.near && b[2] > camera.near) arrows.push([a, b]);
   }
   context.lineCap = "round";
-  const fine = Math.min(1, Math.max(0.6, (size * camera.scaleAt(pose.position)) / 30)); // small vehicles have fine arrows
+  // small vehicles have fine arrows
+  const fine = Math.min(1, Math.max(0.6, (size * camera.scaleAt(pose.position)) / 30));
   for (const [colour, width] of [[colours.halo, 5 * fine], [colours.thrust, 2.4 * fine]]) {
     context.beginPath();
     for (const [a, b] of arrows) {

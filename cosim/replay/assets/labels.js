@@ -18,6 +18,12 @@ class Labels {
     this.placed = []; // {of: whose, x, y, width, height} of the words that were drawn
   }
 
+  /** Whose name is at some pixels; null if there is none. */
+  nameAt(x, y) {
+    const inside = (box) => x >= box.x && x <= box.x + box.width && y >= box.y && y <= box.y + box.height;
+    return this.placed.find((box) => box.of && inside(box))?.of ?? null;
+  }
+
   /** Keep words out of a part of the picture. */
   block(x, y, width, height) {
     this._taken.push([x, y, x + width, y + height]);
@@ -26,8 +32,8 @@ class Labels {
   /**
    * Ask for a word.
    * @param {object} word {key, text, x, y, colour, rank: lower is more important, gap: pixels from the point, bold,
-   * chip: colour behind it or null, pad: pixels that are free beside it, far: whether it may stand
-   * farther off, on a line of the colour edge, sides: of "above below right left here" in the order in which they are tried}
+   * chip: colour behind it or null, pad: pixels that are free beside it, far: whether it may stand farther off, on a
+   * line of the colour edge, sides: of "above below right left here" in the order in which they are tried}
    */
   add(word) {
     this._words.push(word);

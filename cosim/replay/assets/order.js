@@ -24,7 +24,7 @@ function nearestOnChain(chain, p) {
 /** The entries from the farthest to the nearest. Sheets part the others: what is beyond a sheet comes before it. */
 function farthestFirst(entries, eye) {
   const sheets = entries.filter((entry) => entry.sheet);
-  if (!sheets.length) return entries.map((entry) => [remoteness(entry, eye), entry]).sort((a, b) => b[0] - a[0]).map(([, entry]) => entry);
+  if (!sheets.length) return [...entries].sort((a, b) => remoteness(b, eye) - remoteness(a, eye));
   const sheet = sheets[0];
   const side = (p) => Vec.dot(Vec.sub(p, sheet.sheet.corners[0]), sheet.sheet.normal) > 0;
   const others = entries.filter((entry) => entry !== sheet);
@@ -34,7 +34,7 @@ function farthestFirst(entries, eye) {
   return [...farthestFirst(beyond, eye), sheet, ...farthestFirst(before, eye)];
 }
 
-/** Of balls that do not touch, the one with less of this never hides behind another: it is their power about the eye. */
+/** Of balls that do not touch, one with less of this is never behind another: it is their power about the eye. */
 function remoteness({ solid, middle }, eye) {
   const off = Vec.sub(middle, eye);
   const radius = solid.ellipsoid ? solid.radius : 0;
@@ -65,7 +65,8 @@ function throughSheet({ corners, normal }, eye) {
 
 /**
  * Thin things, put before the first entry, in the order of drawing, that hides them; the last list is before all.
- * @param {Entry[]} entries farthest first  @param {{middle: number[]}[]} things  @returns {object[][]} farthest first each
+ * @param {Entry[]} entries farthest first  @param {{middle: number[]}[]} things
+ * @returns {object[][]} farthest first each
  */
 function placedAmong(entries, things, eye) {
   const lists = Array.from({ length: entries.length + 1 }, () => []);

@@ -54,8 +54,8 @@ function pipeOf({ points, radius }) {
     const discs = [points[i], p].map((centre) => ring(centre, [1, 0, 0], [0, 1, 0], radius));
     return outlineFromAbove(discs.flat());
   });
-  solid.from = (eye) => (x, y, z) =>
-    nearSight(solid, eye, x, y, z) && points.some((a, i) => i > 0 && segmentsWithin(points[i - 1], a, [x, y, z], eye, radius));
+  const meets = (eye, p) => points.some((a, i) => i > 0 && segmentsWithin(points[i - 1], a, p, eye, radius));
+  solid.from = (eye) => (x, y, z) => nearSight(solid, eye, x, y, z) && meets(eye, [x, y, z]);
   return solid;
 }
 

@@ -48,7 +48,8 @@ class Scene {
    */
   setRuns(runs, marks = null) {
     this.runs = runs;
-    this._runMarks = marks ?? (runs.length > 1 ? runs.map(({ header }, i) => ({ name: header.name, colour: runColour(i) })) : null);
+    const own = runs.map(({ header }, i) => ({ name: header.name, colour: runColour(i) }));
+    this._runMarks = marks ?? (runs.length > 1 ? own : null);
     this._trails = runs.map((run) => new Trail(run));
     this._forces = runs.map((run) => new Forces(run));
     this._regions = new Regions(runs);
@@ -91,8 +92,8 @@ class Scene {
 
   /** The region at some pixels, its name included: {run, region}, or null. */
   pick(x, y) {
-    const named = this.labels.placed.find((box) => box.of && x >= box.x && x <= box.x + box.width && y >= box.y && y <= box.y + box.height);
-    if (named) return named.of;
+    const named = this.labels.nameAt(x, y);
+    if (named) return named;
     this._fitsPicture();
     const { eye } = this.camera;
     const far = Vec.along(eye, this.camera.ray(x, y), 1e5);
@@ -144,7 +145,9 @@ class Scene {
     }
     for (const vehicle of vehicles) if (vehicle) paintPlumb(painter, vehicle, floor, colours);
     // a sight begins at the vehicle, and is just behind it
-    for (const entry of this._sights) things.push({ ...entry, middle: Vec.along(entry.sight.apex, camera.forward, entry.size) });
+    for (const entry of this._sights) {
+      things.push({ ...entry, middle: Vec.along(entry.sight.apex, camera.forward, entry.size) });
+    }
     const lists = placedAmong(this._entries, things, camera.eye);
     this._entries.forEach((entry, k) => {
       if (entry.solid) paintBack(painter, entry.solid, entry.shift, entry.style);
@@ -208,10 +211,8 @@ class Scene {
 
   _follow(pose) {
     if (pose) {
-      const moved = this._followed ? Vec.sub(pose.position, this._followed) : Vec.sub(pose.position, this.camera.target);
-      if (Vec.norm(moved) > 0) {
-        this._quiet(() => this.camera.aim(Vec.add(this.camera.target, moved)));
-      }
+      const moved = Vec.sub(pose.position, this._followed ?? this.camera.target);
+      if (Vec.norm(moved) > 0) this._quiet(() => this.camera.aim(Vec.add(this.camera.target, moved)));
     }
     this._followed = pose ? pose.position : null;
   }
@@ -243,7 +244,8 @@ class Scene {
   _vehicle(pose, index) {
     const { vehicle } = this.runs[index].header;
     const pixels = vehicle.radius * this.camera.scaleAt(pose.position);
-    const magnified = pixels > 0 ? Math.max(1, Math.min(LEAST_HULL, 0.028 * Math.min(this.camera.width, this.camera.height)) / pixels) : 1;
+    const least = Math.min(LEAST_HULL, 0.028 * Math.min(this.camera.width, this.camera.height));
+    const magnified = pixels > 0 ? Math.max(1, least / pixels) : 1;
     const size = vehicle.radius * magnified;
     const placed = { position: pose.position, R: Vec.matrix(pose.quaternion) };
     const things = [...hullAt(vehicle, placed, size, this.camera.eye, this.theme), ...bodyAxes(placed, size)];
@@ -271,7 +273,8 @@ class Scene {
       const [[x, y, near], [u, v, depth]] = [camera.project(from), camera.project(middle)];
       const length = Math.hypot(u - x, v - y);
       if (Math.min(near, depth) < camera.near || !(length > 1)) return [];
-      if (vehicle && Vec.norm(Vec.sub(middle, vehicle.pose.position)) < 1.5 * vehicle.size) return []; // not on the hull
+      const onHull = vehicle && Vec.norm(Vec.sub(middle, vehicle.pose.position)) < 1.5 * vehicle.size;
+      if (onHull) return [];
       const past = time <= t;
       const onTop = Vec.along(middle, Vec.sub(camera.eye, middle), 0.02); // of the line that it marks
       const colour = this._wayColour(index, past, active?.[row], colours);
@@ -298,7 +301,8 @@ class Scene {
         continue;
       }
       context.beginPath();
-      for (; k < things.length && things[k].points && things[k].colour === thing.colour && things[k].past === thing.past; k++) {
+      const goesOn = (next) => next?.points && next.colour === thing.colour && next.past === thing.past;
+      for (; goesOn(things[k]); k++) {
         const { points } = things[k];
         context.moveTo(points[0], points[1]);
         for (let i = 2; i < points.length; i += 2) context.lineTo(points[i], points[i + 1]);

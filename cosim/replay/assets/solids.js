@@ -12,10 +12,11 @@ const SHARP = Math.cos((31 * Math.PI) / 180); // faces that turn more from each 
  * @property {number[][]} edges [point, point, face, face, 1 if sharp]
  * @property {number[][]} lines of points on an ellipsoid, drawn to tell its form
  * @property {number[]} centre, {number} radius of a ball about it  @property {number} top its least depth [m]
- * @property {number[][]|null} spine the line in its middle, where it is long  @property {object|null} ellipsoid {centre, axes} where it is one: three half axes as vectors
+ * @property {number[][]|null} spine the line in its middle, where it is long
+ * @property {object|null} ellipsoid {centre, axes} where it is one: three half axes as vectors
  * @property {number[][][]} shadows polygons, north and east, that it is seen as from above
- * @property {function(number[]): function(number, number, number): boolean} from tells of an eye whether the solid comes
- *   between it and a point, or holds the point; asked for each piece of a way in each frame, so it makes no arrays
+ * @property {function(number[]): function(number, number, number): boolean} from tells of an eye whether the solid is
+ * between it and a point, or holds the point; asked for each piece of a way in each frame, so it makes no arrays
  */
 
 /** The surface that some points and faces make. */
@@ -54,8 +55,7 @@ function edgesOf(faces, normals) {
       if (!known) edges.set(key, [a, b, i, i, 1]);
       else {
         const j = known[2];
-        const bend =
-          normals[3 * i] * normals[3 * j] + normals[3 * i + 1] * normals[3 * j + 1] + normals[3 * i + 2] * normals[3 * j + 2];
+        const bend = [0, 1, 2].reduce((sum, axis) => sum + normals[3 * i + axis] * normals[3 * j + axis], 0);
         known[3] = i;
         known[4] = bend < SHARP ? 1 : 0;
       }

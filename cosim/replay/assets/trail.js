@@ -51,7 +51,8 @@ class Trail {
       }
       if (turns || length > CHUNK) {
         const before = chunk;
-        chunk = { points: before ? before.points.slice(-2) : [px, py], middle: [x, y, z], next: null, past, active: who };
+        const points = before ? before.points.slice(-2) : [px, py];
+        chunk = { points, middle: [x, y, z], next: null, past, active: who };
         if (before) before.next = chunk;
         chunks.push(chunk);
         length = 0;
@@ -116,7 +117,7 @@ function straight(points, x, y) {
   if (n < 4) return false;
   const [u, v] = [x - points[n - 4], y - points[n - 3]];
   const [p, q] = [points[n - 2] - points[n - 4], points[n - 1] - points[n - 3]];
-  return u * p + v * q > 0 && Math.abs(u * q - v * p) < 0.25 * Math.hypot(u, v);
+  return (u - p) * p + (v - q) * q > 0 && Math.abs(u * q - v * p) < 0.25 * Math.hypot(u, v);
 }
 
 /** Whether a line of pixels may touch the picture. */
