@@ -12,7 +12,12 @@ from typing import Any
 
 REPLAY = "replay.html"
 
-_SCRIPTS = ("data.js", "camera.js", "solids.js", "scene.js", "charts.js", "words.js", "player.js", "live.js", "main.js")
+SCENE_SCRIPTS = (
+    "palette.js", "vectors.js", "camera.js", "solids.js", "pipes.js", "planes.js", "painter.js", "sights.js",
+    "hull.js", "vehicle.js", "forces.js", "trail.js", "shadows.js", "bounds.js", "order.js",
+    "regions.js", "labels.js", "floor.js", "controls.js", "scene.js",
+)  # fmt: skip
+_SCRIPTS = ("data.js", *SCENE_SCRIPTS, "charts.js", "words.js", "player.js", "live.js", "main.js")
 
 
 def replay_page(runs: Sequence[dict[str, Any]], title: str) -> str:

@@ -1,0 +1,83 @@
+// Who is drawn after whom: planes part the scene, bounded surfaces go by distance, thin things by what hides them.
+
+/**
+ * Something that can hide others: a surface or a sheet of a region.
+ * @typedef {object} Entry
+ * @property {Solid|null} solid  @property {Sheet|null} sheet  @property {number[]} shift [m, NED]
+ * @property {object} style  @property {number[]} middle where it is, for its order
+ */
+
+/** The point of a chain of points that is nearest to another point. */
+function nearestOnChain(chain, p) {
+  let nearest = chain[0];
+  let least = Infinity;
+  for (let i = 1; i < chain.length; i++) {
+    const way = Vec.sub(chain[i], chain[i - 1]);
+    const part = Vec.dot(Vec.sub(p, chain[i - 1]), way) / Vec.dot(way, way);
+    const q = Vec.along(chain[i - 1], way, Math.min(1, Math.max(0, part)));
+    const off = Vec.norm(Vec.sub(q, p));
+    if (off < least) [nearest, least] = [q, off];
+  }
+  return nearest;
+}
+
+/** The entries from the farthest to the nearest. Sheets part the others: what is beyond a sheet comes before it. */
+function farthestFirst(entries, eye) {
+  const sheets = entries.filter((entry) => entry.sheet);
+  if (!sheets.length) return [...entries].sort((a, b) => remoteness(b, eye) - remoteness(a, eye));
+  const sheet = sheets[0];
+  const side = (p) => Vec.dot(Vec.sub(p, sheet.sheet.corners[0]), sheet.sheet.normal) > 0;
+  const others = entries.filter((entry) => entry !== sheet);
+  const eyeSide = side(eye);
+  const beyond = others.filter((entry) => side(entry.middle) !== eyeSide);
+  const before = others.filter((entry) => side(entry.middle) === eyeSide);
+  return [...farthestFirst(beyond, eye), sheet, ...farthestFirst(before, eye)];
+}
+
+/** Of balls that do not touch, one with less of this is never behind another: it is their power about the eye. */
+function remoteness({ solid, middle }, eye) {
+  const off = Vec.sub(middle, eye);
+  const radius = solid.ellipsoid ? solid.radius : 0;
+  return Vec.dot(off, off) - radius * radius;
+}
+
+/** What tells of an entry whether it comes between the eye and a point, or holds it; null where it is clear. */
+function hiderOf({ solid, sheet, shift, style }, eye) {
+  if (sheet) return throughSheet(sheet, eye);
+  if (!style.filled) return null;
+  const [sx, sy, sz] = shift;
+  const hides = solid.from(Vec.sub(eye, shift));
+  return (x, y, z) => hides(x - sx, y - sy, z - sz);
+}
+
+function throughSheet({ corners, normal }, eye) {
+  const [nx, ny, nz] = normal;
+  const offset = Vec.dot(normal, corners[0]);
+  const before = Vec.dot(normal, eye) - offset;
+  const [points, face] = [corners.flat(), corners.map((_, i) => i)];
+  return (x, y, z) => {
+    const after = nx * x + ny * y + nz * z - offset;
+    if (before > 0 === after > 0) return false;
+    const at = Vec.along(eye, [x - eye[0], y - eye[1], z - eye[2]], before / (before - after));
+    return holds(points, face, at, normal);
+  };
+}
+
+/**
+ * Thin things, put before the first entry, in the order of drawing, that hides them; the last list is before all.
+ * @param {Entry[]} entries farthest first  @param {{middle: number[]}[]} things
+ * @returns {object[][]} farthest first each
+ */
+function placedAmong(entries, things, eye) {
+  const lists = Array.from({ length: entries.length + 1 }, () => []);
+  const hiders = entries.map((entry) => hiderOf(entry, eye));
+  for (const thing of things) {
+    const [x, y, z] = thing.middle;
+    let k = 0;
+    while (k < entries.length && !hiders[k]?.(x, y, z)) k++;
+    thing.off = (x - eye[0]) ** 2 + (y - eye[1]) ** 2 + (z - eye[2]) ** 2;
+    lists[k].push(thing);
+  }
+  for (const list of lists) list.sort((a, b) => b.off - a.off);
+  return lists;
+}
