@@ -12,7 +12,12 @@ from typing import Any
 
 REPLAY = "replay.html"
 
-_SCRIPTS = ("data.js", "camera.js", "solids.js", "scene.js", "charts.js", "words.js", "player.js", "live.js", "main.js")
+_SCRIPTS = (
+    "data.js", "palette.js", "camera.js", "solids.js", "scene.js",
+    "words.js", "curves.js", "axes.js", "plot.js", "charts.js", "board.js",
+    "player.js", "timeline.js", "panel.js", "stage.js", "head.js", "keys.js", "page.js", "live.js", "main.js",
+)  # fmt: skip
+_STYLES = ("style.css", "panel.css", "layout.css")
 
 
 def replay_page(runs: Sequence[dict[str, Any]], title: str) -> str:
@@ -31,12 +36,14 @@ def replay_page(runs: Sequence[dict[str, Any]], title: str) -> str:
         HTML.
     """
     assets = resources.files("cosim.replay") / "assets"
-    script = "\n".join((assets / name).read_text(encoding="utf-8") for name in _SCRIPTS)
+    style, script = (
+        "\n".join((assets / name).read_text(encoding="utf-8") for name in names) for names in (_STYLES, _SCRIPTS)
+    )
     # "</" would end the element it stands in
     data = json.dumps(list(runs), separators=(",", ":"), allow_nan=False, ensure_ascii=False).replace("</", "<\\/")
     return Template((assets / "page.html").read_text(encoding="utf-8")).substitute(
         title=html.escape(title),
-        style=(assets / "style.css").read_text(encoding="utf-8"),
+        style=style,
         runs=data,
         script=script,
     )
