@@ -1,4 +1,4 @@
-// The scenes of the page: all runs in one, or side by side with one camera, and the hands that move it.
+// The scenes of the page: all runs in one, or side by side with one camera.
 
 /** Holds one canvas for each scene; the first canvas stays for as long as the page does. */
 class Stage {
@@ -27,6 +27,7 @@ class Stage {
 
   /** @param {Run[]} runs of the page  @param {boolean[]} shown which of them are */
   setRuns(runs, shown) {
+    const same = runs === this.runs;
     this.runs = runs;
     this.shown = shown;
     const names = runNames(runs);
@@ -34,7 +35,8 @@ class Stage {
     const groups = this.side && seen.length > 1 ? seen.map((one) => [one]) : [seen];
     while (this.views.length > groups.length) this.views.pop().element.remove();
     while (this.views.length < groups.length) this.views.push(this._view(this._another()));
-    this.holder.dataset.views = String(groups.length);
+    const content = [];
+    const looks = this.scene && same ? { azimuth: this.scene.camera.azimuth, elevation: this.scene.camera.elevation } : {};
     groups.forEach((group, i) => {
       const view = this.views[i];
       view.indices = group.map(({ index }) => index);
@@ -50,10 +52,15 @@ class Stage {
       if (!some.length) view.scene = null;
       else if (view.scene) view.scene.setRuns(some);
       else view.scene = new Scene(view.canvas, some, this.theme);
+      if (!view.scene) return;
+      content.push(...view.scene.camera.content);
       if (i > 0) view.scene.camera = this.scene.camera;
     });
     this.canvas.hidden = !this.scene;
     this.resize();
+    if (!this.scene) return;
+    Object.assign(this.scene.camera, { content, ...looks }); // one camera sees what any of the scenes has
+    this.scene.camera.fit();
   }
 
   setSide(on) {
@@ -80,7 +87,6 @@ class Stage {
   camera(method, ...values) {
     if (!this.scene) return;
     this.scene.camera[method](...values);
-    this.changed();
   }
 
   /** The run and the region under a point of a canvas: names to show, or null. */
@@ -102,79 +108,37 @@ class Stage {
 
   _view(made) {
     const view = { element: made, canvas: made.querySelector("canvas"), caption: made.querySelector(".caption"), scene: null, indices: [] };
-    handleScene(this, view);
+    tellPointed(this, view);
     return view;
   }
 }
 
-/**
- * Pointer on a scene: drag turns; with Shift or the right button it moves; the wheel, or two fingers, comes nearer.
- *
- * Who must have a press for itself listens on the canvas with capture, and stops it there.
- */
-function handleScene(stage, view) {
+/** A pointer that rests on a region is told its name; the scene itself lets pointers move the camera. */
+function tellPointed(stage, view) {
   const { canvas } = view;
-  const held = new Map(); // pointers that are down, and where
   const tip = document.getElementById("pointed");
-  let hovering = 0;
-  const place = (event) => {
-    const box = canvas.getBoundingClientRect();
-    return { x: event.clientX - box.left, y: event.clientY - box.top };
-  };
-  const spread = () => {
-    const [a, b] = [...held.values()];
-    return { x: (a.x + b.x) / 2, y: (a.y + b.y) / 2, size: Math.max(1, Math.hypot(a.x - b.x, a.y - b.y)) };
-  };
-  const point = ({ x, y }) => {
+  let next = 0;
+  const tell = (x, y) => {
     const found = stage.under(view, x, y);
     tip.hidden = !found;
-    canvas.classList.toggle("over", Boolean(found));
     if (!found) return;
     const region = found.run.header.regions[found.region];
     setText(tip, `${region.name}: ${regionWords(region)}`);
-    const box = canvas.getBoundingClientRect();
+    const inner = canvas.getBoundingClientRect();
     const outer = tip.offsetParent.getBoundingClientRect();
-    const left = Math.min(x + box.left - outer.left + 14, outer.width - tip.offsetWidth - 6);
-    tip.style.transform = `translate(${Math.max(6, left)}px, ${y + box.top - outer.top + 14}px)`;
+    const left = Math.min(x + inner.left - outer.left + 14, outer.width - tip.offsetWidth - 6);
+    const top = Math.min(y + inner.top - outer.top + 16, outer.height - tip.offsetHeight - 6);
+    tip.style.transform = `translate(${Math.max(6, left)}px, ${top}px)`;
   };
-  canvas.addEventListener("pointerdown", (event) => {
-    canvas.setPointerCapture(event.pointerId);
-    held.set(event.pointerId, place(event));
+  const away = () => {
+    cancelAnimationFrame(next);
     tip.hidden = true;
-  });
+  };
   canvas.addEventListener("pointermove", (event) => {
-    const now = place(event);
-    const before = held.get(event.pointerId);
-    if (!before) {
-      cancelAnimationFrame(hovering);
-      hovering = requestAnimationFrame(() => point(now));
-      return;
-    }
-    if (held.size === 2) {
-      const was = spread();
-      held.set(event.pointerId, now);
-      const is = spread();
-      stage.camera("zoom", is.size / was.size);
-      stage.camera("pan", is.x - was.x, is.y - was.y);
-      return;
-    }
-    held.set(event.pointerId, now);
-    const moves = event.shiftKey || event.buttons & 6; // right or middle button
-    stage.camera(moves ? "pan" : "orbit", now.x - before.x, now.y - before.y);
+    cancelAnimationFrame(next);
+    if (event.buttons) tip.hidden = true;
+    else next = requestAnimationFrame(() => tell(event.offsetX, event.offsetY));
   });
-  for (const end of ["pointerup", "pointercancel"]) canvas.addEventListener(end, (event) => held.delete(event.pointerId));
-  canvas.addEventListener("pointerleave", () => {
-    cancelAnimationFrame(hovering);
-    tip.hidden = true;
-  });
-  canvas.addEventListener("contextmenu", (event) => event.preventDefault());
-  canvas.addEventListener("dblclick", () => stage.camera("fit"));
-  canvas.addEventListener(
-    "wheel",
-    (event) => {
-      event.preventDefault();
-      stage.camera("zoom", Math.exp(-Math.sign(event.deltaY) * Math.min(0.25, Math.abs(event.deltaY) / 500)));
-    },
-    { passive: false },
-  );
+  canvas.addEventListener("pointerleave", away);
+  canvas.addEventListener("pointerdown", away);
 }
