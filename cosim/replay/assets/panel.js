@@ -59,9 +59,9 @@ class Panel {
     const { run } = this;
     const t = this.player.t;
     const active = activeWords(run, t);
-    this.mark.className = `mark ${active.region.criterion ?? "goal"}`;
+    this.mark.className = `mark ${active.region ? active.region.criterion ?? "goal" : "unknown"}`;
     setText(this.who, active.name);
-    setText(this.what, regionWords(active.region));
+    setText(this.what, active.region ? regionWords(active.region) : "");
     setText(this.why, active.sentence);
     const over = t > run.end && this.player.duration > 0;
     this.over.hidden = !over;

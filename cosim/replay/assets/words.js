@@ -46,6 +46,11 @@ function drawable(run) {
   return run.rows > 0 && NEEDED.every((name) => run.has(name));
 }
 
+/** Whether a run tells when its rows are: without that nothing of it can be shown. */
+function timed(run) {
+  return run.has("time") && Number.isFinite(run.start) && Number.isFinite(run.end);
+}
+
 /** What a region asks: "obstacle · keep out · hard". */
 function regionWords(region) {
   const keep = region.keep === "in" ? "keep inside" : "keep out";
@@ -64,7 +69,7 @@ function clearanceWords(clearance, region) {
 /** Who is active at a time, and why: index, name, and a sentence. */
 function activeWords(run, t) {
   const index = run.active(t);
-  const region = run.header.regions[index] ?? run.header.regions[0];
+  const region = run.header.regions[index];
   const clearance = run.at(`${region.name}.clearance`, t);
   const asked = clearanceWords(clearance, region);
   let sentence = `Nothing presses: the goal region alone steers, ${asked}.`;
@@ -75,8 +80,10 @@ function activeWords(run, t) {
   } else if (clearance >= 0) {
     sentence = `The vehicle is in the goal region, ${asked}.`;
   }
-  if (!run.rows || Number.isNaN(run.held("active", t))) sentence = "The record does not say which region is active here.";
-  return { index: region === run.header.regions[0] ? 0 : index, name: region.name, region, sentence };
+  if (!run.rows || Number.isNaN(run.held("active", t))) {
+    return { index: -1, name: "not recorded", region: null, sentence: "The record does not say which region is active here." };
+  }
+  return { index, name: region.name, region, sentence };
 }
 
 /** The rules of the arbiter and how strongly each fires at a time. */
@@ -135,7 +142,10 @@ function troubles(run) {
   if (status && status !== "completed") said.push(UNFINISHED[status] ?? `This run did not complete: it ${status}.`);
   const missing = NEEDED.filter((name) => !run.has(name));
   if (missing.length) said.push(`The record has no ${missing.join(", ")}: the scene cannot be drawn.`);
-  if (!run.rows) said.push("The record has no row yet.");
+  const kinds = ["clearance", "membership.", "weight.", "command.", "actuation.", "estimate.", "active", "rule."];
+  const absent = kinds.filter((kind) => !run.header.signals.some(({ name }) => name.includes(kind)));
+  if (absent.length) said.push(`The record has no signals named ${absent.join(", ")}: what rests on them is left out.`);
+  if (!run.rows) said.push("The record has no row.");
   if (run.rows === 1) said.push("The record has one row only: there is nothing to play.");
   const holes = run.header.signals.filter(({ name }) => run.column(name).includes(NaN)).map(({ name }) => name);
   if (holes.length) {
