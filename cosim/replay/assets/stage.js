@@ -80,7 +80,8 @@ class Stage {
   }
 
   draw(t, follow) {
-    for (const scene of this.scenes) scene.draw(t, { follow, trail: true, labels: this.labels });
+    // one camera can follow one vehicle only
+    this.scenes.forEach((scene, i) => scene.draw(t, { follow: follow && i === 0, trail: true, labels: this.labels }));
   }
 
   /** Call a method of the one camera. */

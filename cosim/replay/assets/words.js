@@ -1,4 +1,5 @@
-// What the numbers at the cursor say, in words. Nothing here touches the page.
+// What the numbers at the cursor say, in words: those of the last row before it, never one that is not in the record.
+// Nothing here touches the page.
 
 const NEEDED = ["time", ...["x", "y", "z"].map((a) => `position.${a}`), ...[0, 1, 2, 3].map((e) => `quaternion.e${e}`)];
 const DEGREES = 180 / Math.PI;
@@ -70,7 +71,7 @@ function clearanceWords(clearance, region) {
 function activeWords(run, t) {
   const index = run.active(t);
   const region = run.header.regions[index];
-  const clearance = run.at(`${region.name}.clearance`, t);
+  const clearance = run.held(`${region.name}.clearance`, t);
   const asked = clearanceWords(clearance, region);
   let sentence = `Nothing presses: the goal region alone steers, ${asked}.`;
   if (region.criterion) {
@@ -96,7 +97,7 @@ function distancesAt(run, t) {
   const rows = run.header.regions.map((region, index) => ({
     index,
     region,
-    clearance: run.at(`${region.name}.clearance`, t),
+    clearance: run.held(`${region.name}.clearance`, t),
   }));
   const press = (row) => (row.index === 0 ? -Infinity : Number.isNaN(row.clearance) ? Infinity : row.clearance);
   return rows.sort((a, b) => press(a) - press(b) || a.index - b.index);
@@ -111,7 +112,7 @@ function sizes(run, names) {
 
 /** Numbers of the vehicle at a time: [name, text] in the order of the panel. */
 function numbersAt(run, t) {
-  const of = (name) => run.at(name, t);
+  const of = (name) => run.held(name, t);
   const size = (names) => Math.hypot(...names.map(of));
   const limited = ["wrench_saturated", "allocation_saturated"].some((name) => run.held(name, t) > 0);
   return [
