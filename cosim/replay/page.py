@@ -17,11 +17,11 @@ SCENE_SCRIPTS = (
     "hull.js", "vehicle.js", "forces.js", "trail.js", "shadows.js", "bounds.js", "order.js",
     "regions.js", "labels.js", "floor.js", "controls.js", "scene.js",
 )  # fmt: skip
-_PLAYER_SCRIPTS = (
+_PLAYER = (
     "player.js", "words.js", "curves.js", "axes.js", "plot.js", "charts.js", "board.js", "timeline.js", "panel.js",
     "stage.js", "head.js", "keys.js", "page.js",
 )  # fmt: skip
-_SCRIPTS = ("data.js", *SCENE_SCRIPTS, *_PLAYER_SCRIPTS, "live.js", "main.js")
+_SCRIPTS = ("data.js", *SCENE_SCRIPTS, *_PLAYER, "live.js", "main.js")
 _STYLES = ("style.css", "panel.css", "layout.css")
 
 
