@@ -22,7 +22,7 @@ _PLAYER = (
     "stage.js", "head.js", "keys.js", "page.js",
 )  # fmt: skip
 _SCRIPTS = ("data.js", *SCENE_SCRIPTS, *_PLAYER, "live.js", "main.js")
-_STYLES = ("style.css", "panel.css", "layout.css")
+_STYLES = ("style.css", "stage.css", "charts.css", "panel.css", "transport.css", "layout.css")
 
 
 _MARK = '<script type="application/json" id="runs">'  # where the data of a page begins
