@@ -23,6 +23,7 @@ from cosim.helm.orders import (
     Item,
     Mission,
     Mode,
+    Move,
     Obstacle,
     Order,
     Reset,
@@ -145,6 +146,8 @@ class Helm:
                     slot = self._slots.pop(order.number)
                     self._surroundings.forget(slot)
                     self._free = sorted([*self._free, slot])
+            case Move():
+                self._surroundings.displace(order.region, order.by)
             case Change():
                 self.settings.change(order.key, order.value)
                 self.changed = True
