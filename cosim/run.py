@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import sys
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,12 +16,15 @@ from cosim.errors import RunError
 from cosim.helm import LoggedOrders, OrderQueue, RecordedOrders
 from cosim.master import Master, Observer
 from cosim.record import Recorder
+from cosim.report_words import verdict
 from cosim.run_folder import ORDERS, RunFolder, claim, conclude
 from cosim.scenario import Scenario
 from cosim.signals import Array
 from plant_fmu import PlantError
 
-if TYPE_CHECKING:  # pymavlink is an extra
+if TYPE_CHECKING:  # pymavlink and websockets are extras
+    from cosim.live.address import LiveAddress
+    from cosim.live.view import LiveView
     from cosim.mavlink.setup import Mavlink
     from cosim.mavlink.thread import LinkThread
 
@@ -33,6 +37,17 @@ class Run:
 
     folder: Path
     summary: dict[str, Any]
+
+
+@dataclass(frozen=True)
+class _Together:
+    """Observer that stands for several."""
+
+    observers: Sequence[Observer]
+
+    def observe(self, k: int, row: Array) -> None:
+        for observer in self.observers:
+            observer.observe(k, row)
 
 
 class _Progress:
@@ -62,6 +77,7 @@ def run_scenario(
     progress: bool = False,
     report: bool = True,
     orders: Path | None = None,
+    live: LiveAddress | None = None,
 ) -> Run:
     """Run a scenario and write its folder.
 
@@ -83,7 +99,9 @@ def run_scenario(
     report : bool
         Write the report and its figures.
     orders : Path, optional
-        The log of an earlier run, whose orders are repeated; then none are taken from the link.
+        The log of an earlier run, whose orders are repeated; then none are taken from the link or from viewers.
+    live : LiveAddress, optional
+        Where to show the run, and take orders if the scenario's commands are enabled, while it goes on.
 
     Returns
     -------
@@ -95,7 +113,7 @@ def run_scenario(
     RunError
         If the folder cannot be written, or the log of orders cannot be read.
     TelemetryError
-        If the link cannot be opened.
+        If the link, or the address of the live view, cannot be opened.
     BuildError, LawError, DefinitionError
         If plant, law or arbiter cannot be set up.
     PlantError
@@ -104,6 +122,7 @@ def run_scenario(
     recorded = _recorded(scenario, orders)
     queue = OrderQueue()
     link: LinkThread | None = None
+    view = _live_view(live) if live else None
     try:
         for attempt in itertools.count(1):
             with Master(scenario) as master:
@@ -112,11 +131,17 @@ def run_scenario(
                 folder = claim(out.with_name(f"{out.name}-{attempt}") if out and attempt > 1 else out, scenario)
                 if link is not None and attempt == 1:
                     link.start()
+                if view is not None:
+                    view.begin(scenario, master.signals.columns, _desk(scenario, recorded, queue))
                 try:
-                    source = LoggedOrders(recorded or queue, folder.path / ORDERS)
-                    status, wall_time, failure = _step(master, folder, source, link, rate, progress)
+                    source = LoggedOrders(recorded or queue, folder.path / ORDERS, view.heed if view else None)
+                    status, wall_time, failure = _step(master, folder, source, link, view, rate, progress)
                     queue.end_run()
+                    if view is not None and report:
+                        view.say("The run is over; its report is being written")
                     summary = conclude(folder.path, scenario, status, wall_time, report)
+                    if view is not None:
+                        view.end(status, verdict(summary))
                 except OSError as error:
                     raise RunError(f"{folder.path}: {error.strerror or error}") from error
             if failure:
@@ -126,7 +151,24 @@ def run_scenario(
     finally:
         if link:
             link.close()
+        if view:
+            view.close()
     raise AssertionError("unreachable")
+
+
+def _live_view(address: LiveAddress) -> LiveView:
+    from cosim.live.view import LiveView
+
+    view = LiveView(address)
+    print(f"cosim: live view: {view.url}", file=sys.stderr)
+    return view
+
+
+def _desk(scenario: Scenario, recorded: RecordedOrders | None, queue: OrderQueue) -> OrderQueue | str:
+    """Return where viewers' orders go, or why there are none."""
+    if recorded:
+        return "this run repeats the orders of a log and takes no others"
+    return queue if scenario.commands.enabled else "commands are off: start with --commands"
 
 
 def _recorded(scenario: Scenario, orders: Path | None) -> RecordedOrders | None:
@@ -142,6 +184,7 @@ def _step(
     folder: RunFolder,
     orders: LoggedOrders,
     link: LinkThread | None,
+    view: LiveView | None,
     rate: float | None,
     progress: bool,
 ) -> tuple[str, float, PlantError | None]:
@@ -154,9 +197,10 @@ def _step(
     try:
         recorder = Recorder(folder.path, master.signals.columns)
         bar = _Progress(master.scenario) if progress and sys.stderr else None
-        observers: list[Observer] = [o for o in (recorder, link, bar) if o is not None]
+        watching = [o for o in (link, view) if o is not None]
+        observers: list[Observer] = [recorder, *watching, *([bar] if bar else [])]
         started = time.perf_counter()
-        master.run(observers, rate, orders, awaiting=link)
+        master.run(observers, rate, orders, awaiting=_Together(watching))
         if master.helm is not None and master.helm.reset:
             status = "reset"
     except KeyboardInterrupt:
