@@ -23,7 +23,6 @@ from cosim.signals import Array
 from plant_fmu import PlantError
 
 if TYPE_CHECKING:  # pymavlink and websockets are extras
-    from cosim.live.address import LiveAddress
     from cosim.live.view import LiveView
     from cosim.mavlink.setup import Mavlink
     from cosim.mavlink.thread import LinkThread
@@ -77,7 +76,7 @@ def run_scenario(
     progress: bool = False,
     report: bool = True,
     orders: Path | None = None,
-    live: LiveAddress | None = None,
+    live: LiveView | None = None,
 ) -> Run:
     """Run a scenario and write its folder.
 
@@ -100,8 +99,8 @@ def run_scenario(
         Write the report and its figures.
     orders : Path, optional
         The log of an earlier run, whose orders are repeated; then none are taken from the link or from viewers.
-    live : LiveAddress, optional
-        Where to show the run, and take orders if the scenario's commands are enabled, while it goes on.
+    live : LiveView, optional
+        Shows the run while it goes on, and takes orders if the scenario's commands are enabled.
 
     Returns
     -------
@@ -113,7 +112,7 @@ def run_scenario(
     RunError
         If the folder cannot be written, or the log of orders cannot be read.
     TelemetryError
-        If the link, or the address of the live view, cannot be opened.
+        If the link, or the address of the live live, cannot be opened.
     BuildError, LawError, DefinitionError
         If plant, law or arbiter cannot be set up.
     PlantError
@@ -122,7 +121,6 @@ def run_scenario(
     recorded = _recorded(scenario, orders)
     queue = OrderQueue()
     link: LinkThread | None = None
-    view = _live_view(live) if live else None
     try:
         for attempt in itertools.count(1):
             with Master(scenario) as master:
@@ -131,17 +129,17 @@ def run_scenario(
                 folder = claim(out.with_name(f"{out.name}-{attempt}") if out and attempt > 1 else out, scenario)
                 if link is not None and attempt == 1:
                     link.start()
-                if view is not None:
-                    view.begin(scenario, master.signals.columns, _desk(scenario, recorded, queue))
+                if live is not None:
+                    live.begin(scenario, master.signals.columns, _desk(scenario, recorded, queue))
                 try:
-                    source = LoggedOrders(recorded or queue, folder.path / ORDERS, view.heed if view else None)
-                    status, wall_time, failure = _step(master, folder, source, link, view, rate, progress)
+                    source = LoggedOrders(recorded or queue, folder.path / ORDERS, live.heed if live else None)
+                    status, wall_time, failure = _step(master, folder, source, link, live, rate, progress)
                     queue.end_run()
-                    if view is not None and report:
-                        view.say("The run is over; its report is being written")
+                    if live is not None and report:
+                        live.say("The run is over; its report is being written")
                     summary = conclude(folder.path, scenario, status, wall_time, report)
-                    if view is not None:
-                        view.end(status, verdict(summary))
+                    if live is not None:
+                        live.end(status, verdict(summary))
                 except OSError as error:
                     raise RunError(f"{folder.path}: {error.strerror or error}") from error
             if failure:
@@ -151,17 +149,7 @@ def run_scenario(
     finally:
         if link:
             link.close()
-        if view:
-            view.close()
     raise AssertionError("unreachable")
-
-
-def _live_view(address: LiveAddress) -> LiveView:
-    from cosim.live.view import LiveView
-
-    view = LiveView(address)
-    print(f"cosim: live view: {view.url}", file=sys.stderr)
-    return view
 
 
 def _desk(scenario: Scenario, recorded: RecordedOrders | None, queue: OrderQueue) -> OrderQueue | str:
@@ -184,7 +172,7 @@ def _step(
     folder: RunFolder,
     orders: LoggedOrders,
     link: LinkThread | None,
-    view: LiveView | None,
+    live: LiveView | None,
     rate: float | None,
     progress: bool,
 ) -> tuple[str, float, PlantError | None]:
@@ -197,7 +185,7 @@ def _step(
     try:
         recorder = Recorder(folder.path, master.signals.columns)
         bar = _Progress(master.scenario) if progress and sys.stderr else None
-        watching = [o for o in (link, view) if o is not None]
+        watching = [o for o in (link, live) if o is not None]
         observers: list[Observer] = [recorder, *watching, *([bar] if bar else [])]
         started = time.perf_counter()
         master.run(observers, rate, orders, awaiting=_Together(watching))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import contextlib
 import signal
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -76,17 +77,24 @@ def run(options: argparse.Namespace) -> int:
         overrides.append("commands.enabled=true")
     if options.await_arm:
         overrides.append("commands.await_arm=true")
-    live = None if options.live is None else parse_live(options.live, options.allow_remote)
+    address = None if options.live is None else parse_live(options.live, options.allow_remote)
     mavlink = _mavlink(options)
     scenario = load_scenario(options.scenario, overrides)
-    rate = options.rate if options.rate is not None else 1.0 if options.commands or live else _MAX
+    rate = options.rate if options.rate is not None else 1.0 if options.commands or address else _MAX
     # a polite kill leaves a readable run too
     with contextlib.suppress(ValueError):  # which signal raises outside the main thread
         signal.signal(signal.SIGTERM, signal.default_int_handler)
-    done = run_scenario(
-        scenario, options.out, mavlink, rate or None, progress=True, report=not options.no_report,
-        orders=options.orders, live=live,
-    )  # fmt: skip
+    with contextlib.ExitStack() as stack:
+        live = None
+        if address is not None:
+            from cosim.live.view import LiveView
+
+            live = stack.enter_context(LiveView(address))
+            print(f"cosim: the run is shown at {live.url}", file=sys.stderr)
+        done = run_scenario(
+            scenario, options.out, mavlink, rate or None, progress=True, report=not options.no_report,
+            orders=options.orders, live=live,
+        )  # fmt: skip
     print(verdict(done.summary))
     print(done.folder / ("summary.json" if options.no_report else "report.html"))
     return INTERRUPTED if done.summary["status"] == "interrupted" else 0

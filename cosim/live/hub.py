@@ -77,10 +77,8 @@ class Hub:
         self._header["changes"] = []
         self._step = scenario.time.step
         self._regions = ["goal", *(secondary.region.name for secondary in scenario.regions)]
-        self._slots, self._came = (
-            Slots(scenario.commands.obstacles),
-            [s.region.name for s in scenario.regions if s.seen],
-        )
+        self._slots = Slots(scenario.commands.obstacles)
+        self._came = [secondary.region.name for secondary in scenario.regions if secondary.seen]  # by slot
         self._history = History(len(self._viewing.columns))
         self._texts, self._dropped, self._last = [], 0, None
         self.desk = Desk(scenario, queue, self._has_come)

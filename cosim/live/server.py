@@ -131,7 +131,8 @@ class _Viewers:
         except ConnectionClosed:
             log.debug("a viewer has gone")
         except Exception as error:  # broad: whatever one viewer brings about, the others go on
-            self._note(error)
+            if self._is_new(error):
+                log.exception("a viewer was lost")
         finally:
             telling.cancel()
             self.cursors.remove(cursor)
@@ -146,7 +147,8 @@ class _Viewers:
         except ConnectionClosed:
             log.debug("a viewer has gone")
         except Exception as error:  # broad: as above
-            self._note(error)
+            if self._is_new(error):
+                log.exception("a viewer was lost")
             await connection.close(1011)
 
     async def _heed(self, connection: ServerConnection) -> None:
@@ -167,9 +169,7 @@ class _Viewers:
             if why is not None:
                 await connection.send(text_of("said", kind="refused", text=why, time=None))
 
-    def _note(self, error: Exception) -> None:
-        """Tell an error once a kind."""
-        kind = type(error).__name__
-        if not self._failures[kind]:
-            log.warning("a viewer was lost: %s", kind, exc_info=error)
-        self._failures[kind] += 1
+    def _is_new(self, error: Exception) -> bool:
+        """Return whether it is the first of its kind: the others are not told."""
+        self._failures[type(error).__name__] += 1
+        return self._failures[type(error).__name__] == 1

@@ -7,7 +7,8 @@ import logging
 import threading
 import time
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from types import TracebackType
 from typing import Any
 
 import numpy as np
@@ -89,7 +90,8 @@ class LiveView:
             logging.getLogger("cosim").addHandler(self._warnings)
         elif self._thread.is_alive():
             begun = threading.Event()
-            self._call(lambda: (hub.begin(self._run, scenario, columns, queue), begun.set()))
+            self._call(hub.begin, self._run, scenario, columns, queue)
+            self._call(begun.set)
             begun.wait(_CLOSING)
         self._picked, self._due, self._last = np.array(hub.picked), 0.0, scenario.steps
 
@@ -102,15 +104,16 @@ class LiveView:
 
     def heed(self, k: int, orders: Sequence[Order]) -> None:
         """Tell of orders that step `k` follows."""
-        self._call(lambda: self._hub.heed(k, orders))
+        self._call(self._hub.heed, k, orders)
 
     def say(self, text: str, kind: str = "info") -> None:
         """Tell all viewers something."""
-        self._call(lambda: self._hub.say(text, kind))
+        self._call(self._hub.say, text, kind)
 
     def end(self, status: str, verdict: str) -> None:
         """Tell how the run ended."""
-        self._call(lambda: (self._take_rows(), self._hub.end(status, verdict)))
+        self._call(self._take_rows)
+        self._call(self._hub.end, status, verdict)
 
     def close(self) -> None:
         """Let viewers have what they were not told yet, for a bounded time, and end. May be called twice."""
@@ -123,12 +126,20 @@ class LiveView:
             self._thread.join(_CLOSING)
         self._socket.close()
 
+    def __enter__(self) -> LiveView:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
     # ---- in the thread ----
 
-    def _call(self, work: Any) -> None:
-        """Let the thread do something; without it, nothing."""
+    def _call(self, work: Callable[..., object], *arguments: Any) -> None:
+        """Let the thread do something."""
         try:
-            self._loop.call_soon_threadsafe(work)
+            self._loop.call_soon_threadsafe(work, *arguments)
         except RuntimeError:  # the thread has failed, which was logged
             log.debug("nobody is served any more")
 
