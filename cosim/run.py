@@ -112,7 +112,7 @@ def run_scenario(
     RunError
         If the folder cannot be written, or the log of orders cannot be read.
     TelemetryError
-        If the link, or the address of the live live, cannot be opened.
+        If the link cannot be opened.
     BuildError, LawError, DefinitionError
         If plant, law or arbiter cannot be set up.
     PlantError

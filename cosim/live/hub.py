@@ -10,17 +10,19 @@ import numpy as np
 
 from controller.regions import Shape, Sphere
 from cosim.errors import OrderError
-from cosim.helm.orders import Change, Forget, Obstacle, Order
+from cosim.helm.orders import Change, Forget, Obstacle, Order, Sticks
 from cosim.helm.slots import Slots
 from cosim.helm.sources import OrderQueue
 from cosim.live.history import History
-from cosim.live.messages import bytes_of, text_of, words_of
+from cosim.live.messages import bytes_of, text_of
 from cosim.live.orders import Desk
 from cosim.replay.header import header_of, shape_of
+from cosim.replay.order_words import order_words
 from cosim.replay.viewing import Viewing
 from cosim.scenario import Scenario
 from cosim.scenario_tables import FAR_AWAY
 from cosim.signals import Array, Column
+from cosim.surroundings import middle_of
 
 log = logging.getLogger(__name__)
 
@@ -76,6 +78,7 @@ class Hub:
         self._header = header_of(scenario, self._viewing.columns, isinstance(queue, OrderQueue))
         self._header["changes"] = []
         self._step = scenario.time.step
+        self._middle, self._target_radius = middle_of(scenario.goal), 0.0
         self._regions = ["goal", *(secondary.region.name for secondary in scenario.regions)]
         self._slots = Slots(scenario.commands.obstacles)
         self._came = [secondary.region.name for secondary in scenario.regions if secondary.seen]  # by slot
@@ -101,38 +104,45 @@ class Hub:
             if self._last is None or not np.array_equal(row, self._last, equal_nan=True):
                 self._history.add(row)
                 self._last = row
+                if "target.radius" in self._names and row[self._names["target.radius"]] != self._target_radius:
+                    self._target_radius = float(row[self._names["target.radius"]])
+                    self._change("goal", float(row[0]))
 
     def heed(self, k: int, orders: Sequence[Order]) -> None:
-        """Tell of the orders that step `k` follows, and of the shapes that they change."""
+        """Tell of the orders that step `k` follows, and of the regions that they change."""
         time = k * self._step
         for order in orders:
-            words = words_of(order)
-            if words is not None:
-                self.say(words, "order", time)
+            if not isinstance(order, Sticks):  # which come all the time
+                self.say(order_words(order), "order", time)
             try:
-                found = self._changed(order)
+                self._follow(order, time)
             except OrderError as error:
                 log.debug("%s", error)  # which the helm tells
-                continue
-            if found is not None:
-                region, shape = found
-                change = {"time": time, "region": self._regions.index(region), "shape": shape_of(shape)}
-                self._header["changes"].append(change)
 
-    def _changed(self, order: Order) -> tuple[str, Shape] | None:
-        """Return which region has another shape by an order, and which."""
+    def _follow(self, order: Order, time: float) -> None:
         assert self.desk is not None
         self.desk.follow(order)
         match order:
             case Change():
-                settings = self.desk.settings
-                region = None if order.key.endswith(".gain") else settings.region_of(order.key)
-                return (region, settings.shapes[region]) if region is not None else None
+                region = self.desk.settings.region_of(order.key)
+                if region is not None:
+                    self._change(region, time)
             case Obstacle():
-                return self._came[self._slots.take(order.number)], Sphere(FAR_AWAY, order.radius)
+                name = self._came[self._slots.take(order.number)]
+                self._change(name, time, Sphere(FAR_AWAY, order.radius))
             case Forget():
                 self._slots.leave(order.number)
-        return None
+
+    def _change(self, name: str, time: float, shape: Shape | None = None) -> None:
+        """Note another shape or gain of a region; default: as the settings have it."""
+        assert self.desk is not None
+        settings, index = self.desk.settings, self._regions.index(name)
+        if name == "goal" and self._target_radius > 0.0:
+            shape = Sphere(self._middle, self._target_radius)
+        gain = self._header["regions"][index]["gain"] if shape or not index else settings[f"regions.{name}.gain"]
+        self._header["changes"].append(
+            {"time": time, "region": index, "shape": shape_of(shape or settings.shapes[name]), "gain": gain}
+        )
 
     def say(self, text: str, kind: str = "info", time: float | None = None) -> None:
         """Tell all viewers something; `kind` is info, order or warning."""
