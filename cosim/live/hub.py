@@ -130,6 +130,7 @@ class Hub:
             case Obstacle():
                 name = self._came[self._slots.take(order.number)]
                 self._change(name, time, Sphere(FAR_AWAY, order.radius))
+                self._header["changes"][-1]["number"] = order.number  # by which it is moved and forgotten
             case Forget():
                 self._slots.leave(order.number)
 
