@@ -21,7 +21,7 @@ class BarRow {
     this.fill.style.transform = `scaleX(${whole.toFixed(4)})`;
     if (this.value.textContent !== text) this.value.textContent = text;
     this.element.classList.toggle("on", part > 0);
-    this.tick.hidden = !Number.isFinite(mark ?? NaN);
+    this.tick.hidden = !(mark > 0);
     if (!this.tick.hidden) this.tick.style.left = `${(100 * Math.min(1, Math.max(0, mark))).toFixed(1)}%`;
   }
 }

@@ -23,7 +23,7 @@ function quantity(x, unit, digits = 3) {
   if (unit === "rad") return `${figure(x * DEGREES, 1)}°`;
   if (unit === "rad/s") return `${figure(x * DEGREES, 1)}°/s`;
   if (Math.abs(x) >= 10000 && /^N/.test(unit)) return `${figure(x / 1000, 1)} k${unit.replace(".", "\u00b7")}`;
-  return unit ? `${figure(x, digits)} ${unit.replace(".", "\u00b7")}` : figure(x, digits);
+  return unit ? `${figure(x, digits)} ${unit.replace(".", "\u00b7")}` : figure(x, 2);
 }
 
 /** Seconds as a clock reads them: 12.34 s, or 3:07.5 from the second minute on. */
