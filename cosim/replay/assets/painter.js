@@ -68,7 +68,7 @@ function styleOf(keep, active, colour) {
   return {
     colour,
     filled: keep === "out",
-    alpha: active ? 0.5 : 0.3,
+    alpha: active ? 0.5 : 0.24,
     width: active ? 2.6 : 1.2,
     dash: keep === "in" ? (active ? [9, 5] : [6, 5]) : null,
     hidden: active ? 0.5 : 0.28, // opacity of edges on the far side

@@ -56,6 +56,10 @@ function pipeOf({ points, radius }) {
   }
   const solid = solidOf(...welded(surface, faces, lines));
   solid.spine = points;
+  solid.shadows = points.slice(1).map((p, i) => {
+    const discs = [points[i], p].map((centre) => ring(centre, [1, 0, 0], [0, 1, 0], radius));
+    return outlineFromAbove(discs.flat());
+  });
   solid.hides = (eye, p) => points.some((a, i) => i > 0 && segmentsWithin(points[i - 1], a, p, eye, radius));
   return solid;
 }

@@ -1,6 +1,6 @@
 // The scene: vehicles, their ways and their regions at a time, as a camera sees them.
 
-const LEAST_HULL = 12; // pixels of radius below which the vehicle is drawn larger than it is
+const LEAST_HULL = 15; // pixels of radius below which the vehicle is drawn larger than it is
 
 /** A 3D scene of some runs on a canvas. */
 class Scene {
@@ -103,6 +103,8 @@ class Scene {
    */
   draw(t, options = {}) {
     this._last = [t, options];
+    if (this._waiting) cancelAnimationFrame(this._waiting); // this is the frame that was asked for
+    this._waiting = 0;
     const { trail = true, labels = true } = options;
     this._fitsPicture();
     this._grow();
@@ -121,13 +123,21 @@ class Scene {
     paintSurface(painter, this.bounds, colours);
     paintFloor(painter, this.labels, this.bounds, colours, labels);
     paintRuler(painter, this.labels, this.bounds, colours, labels);
-    this._paintShadows(poses, colours);
-
     const vehicles = poses.map((pose, i) => pose && this._vehicle(pose, i));
-    const things = vehicles.flatMap((vehicle) => (vehicle ? vehicle.faces : []));
-    if (trail) this._trails.forEach((way, i) => things.push(...this._way(way, i, t, colours)));
+    const floor = this.bounds[1][2];
+    paintShadows(painter, this._entries, this.bounds, colours);
+    const things = vehicles.flatMap((vehicle) => (vehicle ? vehicle.things : []));
+    if (trail) {
+      this._trails.forEach((way, i) => {
+        const chunks = this._way(way, i, t, colours);
+        paintWayBelow(painter, chunks, floor, colours);
+        things.push(...chunks, ...this._marks(way, i, t, colours));
+      });
+    }
+    for (const vehicle of vehicles) if (vehicle) paintPlumb(painter, vehicle, floor, colours);
+    // a sight begins at the vehicle, and is just behind it
+    for (const entry of this._sights) things.push({ ...entry, middle: Vec.along(entry.sight.apex, camera.forward, entry.size) });
     const lists = placedAmong(this._entries, things, camera.eye);
-    for (const { sight, style } of this._sights) paintSight(painter, sight, style);
     this._entries.forEach((entry, k) => {
       if (entry.solid) paintBack(painter, entry.solid, entry.shift, entry.style);
       this._paintThings(lists[k], colours);
@@ -135,7 +145,11 @@ class Scene {
       else paintSheet(painter, entry.sheet, entry.style);
     });
     this._paintThings(lists[this._entries.length], colours);
-    vehicles.forEach((vehicle, i) => vehicle && this._paintOnVehicle(vehicle, i, t));
+    vehicles.forEach((vehicle, i) => {
+      if (!vehicle) return;
+      const { radius } = this.runs[i].header.vehicle;
+      paintForces(painter, vehicle.pose, this._forces[i].at(t), vehicle.size, radius, this.theme);
+    });
 
     paintCompass(painter, this.labels, colours);
     paintScale(painter, this.labels, colours, Math.max(1, ...vehicles.map((vehicle) => vehicle?.magnified ?? 1)));
@@ -254,7 +268,7 @@ class Scene {
       return this._sheets.get(key).map((sheet) => ({ sheet, middle: Vec.scale(Vec.add(...sheet.corners.slice(0, 2)), 0.5) }));
     }
     if (!pose) return [];
-    return [{ sight: SIGHTS[shape.kind](shape, pose, shift, pose.size) }];
+    return [{ sight: SIGHTS[shape.kind](shape, pose, shift, pose.size), size: pose.size }];
   }
 
   _vehicle(pose, index) {
@@ -263,17 +277,33 @@ class Scene {
     const magnified = pixels > 0 ? Math.max(1, LEAST_HULL / pixels) : 1;
     const size = vehicle.radius * magnified;
     const placed = { position: pose.position, R: Vec.matrix(pose.quaternion) };
-    return { pose: placed, size, magnified, faces: hullAt(placed, size, this.camera.eye, this.theme) };
+    const things = [...hullAt(vehicle, placed, size, this.camera.eye, this.theme), ...bodyAxes(placed, size)];
+    return { pose: placed, size, magnified, things };
   }
 
   _way(way, index, t, colours) {
-    const { run } = way;
-    const several = this.runs.length > 1;
-    const [xs, ys, zs] = ["x", "y", "z"].map((axis) => run.column(`position.${axis}`));
-    return way.chunks(this.camera, t).map(({ points, row, past, active }) => {
-      const region = run.header.regions[Number.isFinite(active) ? active : 0];
-      const colour = several ? runColour(index) : fullColour(region);
-      return { points, middle: [xs[row], ys[row], zs[row]], colour: past || several ? colour : colours.future, past };
+    const chunks = way.chunks(this.camera, t);
+    for (const chunk of chunks) chunk.colour = this._wayColour(index, chunk.past, chunk.active, colours);
+    return chunks;
+  }
+
+  /** Of one run the way tells who was active; several runs have each their own colour. */
+  _wayColour(index, past, active, colours) {
+    if (this.runs.length > 1) return runColour(index);
+    const { regions } = this.runs[index].header;
+    return past ? fullColour(regions[Number.isFinite(active) ? active : 0]) : colours.future;
+  }
+
+  _marks(way, index, t, colours) {
+    const { camera } = this;
+    const active = way.run.column("active");
+    const spacing = roundStep((110 * camera.distance) / camera.focal);
+    return way.marks(spacing).flatMap(({ row, time, from, middle }) => {
+      const [[x, y, near], [u, v, depth]] = [camera.project(from), camera.project(middle)];
+      const length = Math.hypot(u - x, v - y);
+      if (Math.min(near, depth) < camera.near || !(length > 1)) return [];
+      const past = time <= t;
+      return [{ mark: [u, v, (u - x) / length, (v - y) / length], middle, past, colour: this._wayColour(index, past, active?.[row], colours) }];
     });
   }
 
@@ -282,12 +312,17 @@ class Scene {
     const { context, painter } = this;
     for (let k = 0; k < things.length; ) {
       const thing = things[k];
-      if (thing.corners) {
-        painter.begin();
-        painter.polygon(thing.corners);
-        painter.fill(thing.colour);
-        painter.stroke(thing.colour, 0.7);
+      if (!thing.points) {
         k += 1;
+        if (thing.sight) paintSight(painter, thing.sight, thing.style);
+        else if (thing.line) paintBodyAxis(painter, thing, colours.ink);
+        else if (thing.mark) paintMark(painter, thing, colours);
+        else {
+          painter.begin();
+          painter.polygon(thing.corners);
+          painter.fill(thing.colour);
+          painter.stroke(thing.colour, 0.7); // closes the seams between faces
+        }
         continue;
       }
       context.beginPath();
@@ -299,39 +334,6 @@ class Scene {
       if (thing.past) painter.stroke(colours.halo, 6);
       painter.stroke(thing.colour, thing.past ? 3 : 1.4, thing.past ? 1 : 0.7);
     }
-  }
-
-  _paintOnVehicle({ pose, size }, index, t) {
-    const { painter } = this;
-    const { vehicle } = this.runs[index].header;
-    paintThrusters(painter, pose, vehicle.thrusters, size, vehicle.radius, SCENE_THEMES[this.theme].hull.tube);
-    paintBodyAxes(painter, pose, size, this.theme);
-    paintForces(painter, pose, this._forces[index].at(t), size, vehicle.radius, this.theme);
-  }
-
-  _paintShadows(poses, colours) {
-    const { painter, context, camera } = this;
-    const floor = this.bounds[1][2];
-    painter.begin();
-    for (const { solid, shift, style } of this._entries) {
-      if (!solid || !style.filled) continue;
-      solid.shadow ??= outlineFromAbove(solid.points);
-      painter.polygon(solid.shadow.map(([n, e]) => [n + shift[0], e + shift[1], floor]));
-    }
-    painter.fill(colours.shadow);
-    for (const pose of poses) {
-      if (!pose) continue;
-      const [n, e] = pose.position;
-      painter.begin();
-      painter.segment(pose.position, [n, e, floor]);
-      painter.stroke(colours.soft, 1, 0.9, [3, 3]);
-      const rim = rimOf([n, e, floor], [0, 0, 1], 0.5 * Math.PI, Math.max(pose.size, 5 / camera.scaleAt([n, e, floor])));
-      painter.begin();
-      painter.polygon(rim);
-      painter.fill(colours.shadow);
-      painter.stroke(colours.soft, 1, 0.6);
-    }
-    context.globalAlpha = 1;
   }
 
   _nameRegions(entries, colours) {

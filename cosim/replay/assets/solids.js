@@ -14,6 +14,7 @@ const SHARP = Math.cos((31 * Math.PI) / 180); // faces that meet at more are see
  * @property {number[][]} lines of points on a round surface, drawn to tell its form
  * @property {number[]} centre, {number} radius of a ball about it
  * @property {number[][]|null} spine the line in its middle, where it is long  @property {object|null} ellipsoid {centre, axes} where it is one: three half axes as vectors
+ * @property {number[][][]} shadows polygons, north and east, that it is seen as from above
  * @property {function(number[], number[]): boolean} hides whether it comes between an eye and a point, or holds the point
  */
 
@@ -29,6 +30,7 @@ function solidOf(points, faces, lines = []) {
   solid.centre = Vec.scale(Vec.add(low, high), 0.5);
   solid.radius = Math.max(...points.map((p) => Vec.norm(Vec.sub(p, solid.centre))));
   solid.hides = (eye, p) => crossesFaces(solid, eye, p);
+  solid.shadows = faces.length ? [outlineFromAbove(points)] : [];
   return solid;
 }
 
@@ -120,6 +122,7 @@ function ellipsoidOf(centre, axes) {
   solid.centre = [...centre];
   solid.radius = Math.max(...axes.map(Vec.norm));
   solid.ellipsoid = { centre: solid.centre, axes };
+  solid.shadows = [ellipseFromAbove(centre, axes)];
   const inverse = axes.map((axis) => Vec.scale(axis, 1 / Vec.dot(axis, axis))); // rows: into the unit ball
   solid.hides = (eye, p) => {
     let [aa, ab, bb] = [0, 0, 0];
@@ -179,7 +182,9 @@ function prismOf(shape) {
   const corners = area > 0 ? shape.corners : [...shape.corners].reverse();
   const points = [shape.top, shape.bottom].flatMap((depth) => corners.map(([x, y]) => [x, y, depth]));
   const around = corners.map((_, i) => i);
-  return solidOf(points, [...bandFaces(0, n, n), [...around].reverse(), around.map((i) => n + i)]);
+  const solid = solidOf(points, [...bandFaces(0, n, n), [...around].reverse(), around.map((i) => n + i)]);
+  solid.shadows = [corners];
+  return solid;
 }
 
 /** A cone that ends in a part of a ball. */
