@@ -83,12 +83,12 @@ class Ghost {
     const { points } = surfaceOf(shape);
     const seen = [];
     for (let i = 0; i < points.length; i += 3) seen.push(scene.project([points[i] + shift[0], points[i + 1] + shift[1], points[i + 2] + shift[2]]));
-    return hullOf(seen.filter(([x, y]) => Number.isFinite(x) && Number.isFinite(y)));
+    return convexRing(seen.filter(([x, y]) => Number.isFinite(x) && Number.isFinite(y)));
   }
 }
 
 /** The convex hull of points in a plane, after Andrew. */
-function hullOf(points) {
+function convexRing(points) {
   const sorted = [...points].sort((a, b) => a[0] - b[0] || a[1] - b[1]);
   const half = (list) => {
     const chain = [];
