@@ -24,18 +24,18 @@ class Bars:
         """Return a bar from 0 to 1; NaN is empty."""
         width = max(1, width)
         filled = 0 if math.isnan(part) else round(min(1.0, max(0.0, part)) * width)
-        return Text(self._full * filled, style=style).append(self._empty * (width - filled), style="dim")
+        return Text().append(self._full * filled, style=style).append(self._empty * (width - filled), style="dim")
 
     def signed(self, part: float, width: int, style: str) -> Text:
         """Return a bar from -1 to 1 with 0 in its middle; beyond it ends in an arrow."""
         half = max(1, (width - 1) // 2)
         filled = 0 if math.isnan(part) else min(half, math.ceil(abs(part) * half))
         run = self._full * filled
-        left, right = Text(self._empty * half, style="dim"), Text(self._empty * half, style="dim")
+        left, right = (Text().append(self._empty * half, style="dim") for _ in range(2))
         if part < 0.0:
             run = self._less + run[1:] if part < -1.0 else run
-            left = Text(self._empty * (half - filled), style="dim").append(run, style=style)
+            left = Text().append(self._empty * (half - filled), style="dim").append(run, style=style)
         elif filled:
             run = run[:-1] + self._more if part > 1.0 else run
-            right = Text(run, style=style).append(self._empty * (half - filled), style="dim")
+            right = Text().append(run, style=style).append(self._empty * (half - filled), style="dim")
         return left.append(self._zero, style="").append_text(right)

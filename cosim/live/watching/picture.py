@@ -139,10 +139,10 @@ def _distances(look: Look, width: int, bars: Bars, room: int | None) -> list[Tex
     shown = found if room is None or len(found) < room else found[: max(1, room - 2)]
     for _, _, clearance, i, region in shown:
         style = _STYLES[region["criterion"]]
-        name = plain(region["name"])[:10]
+        name = plain(region["name"])[:9]
         mark = ">" if i == active else " "
-        line = Text(f"{mark}{name:<10} ", style="bold" if i == active else "")
-        line.append_text(bars.signed(clearance / scale, width - 24, style))
+        line = Text(f"{mark}{name:<9} ", style="bold" if i == active else "")
+        line.append_text(bars.signed(clearance / scale, width - 26, style))
         lines.append(line.append_text(_clearance(clearance, region)))
     if len(found) > len(shown):
         lines.append(Text(f"{len(found) - len(shown)} farther regions", style="dim"))
@@ -152,14 +152,14 @@ def _distances(look: Look, width: int, bars: Bars, room: int | None) -> list[Tex
 def _clearance(clearance: float, region: dict[str, object]) -> Text:
     degrees = region["unit"] == "rad"
     value = math.degrees(clearance) if degrees else clearance
-    number = f" {value:+z8.2f}{'°' if degrees else 'm'}"
+    number = f" {value:+z7.2f}{'°' if degrees else 'm'}"
     if math.isnan(clearance):
         return Text(" no number")
     if clearance >= 0.0:
         return Text(number)
     if region["criterion"] is None:
-        return Text(number).append(" TO")
-    return Text(number, style="bold reverse").append(" !!")
+        return Text(f"{number} to go")
+    return Text().append(number + " !", style="bold reverse")
 
 
 def _state(look: Look) -> list[Text]:
