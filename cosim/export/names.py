@@ -29,7 +29,7 @@ def legal(names: Iterable[str], longest: int = 63) -> list[str]:
     made: dict[str, None] = {}
     for name in names:
         plain = re.sub(r"[^0-9A-Za-z]+", "_", name).strip("_")[:longest]
-        stem = plain if plain[:1].isalpha() else f"x{plain}"[:longest]
+        stem = plain if plain[:1].isalpha() else f"n{plain}"[:longest]
         candidate, n = stem, 2
         while candidate in made:
             suffix = f"_{n}"
