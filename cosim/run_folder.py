@@ -1,4 +1,4 @@
-"""Run folders: claimed by one run, concluded with summary and report, or left as if nothing had been."""
+"""Run folders: claimed by one run, concluded with summary, report and replay, or left as if nothing had been."""
 
 from __future__ import annotations
 
@@ -15,6 +15,8 @@ from typing import Any
 from cosim.errors import RunError
 from cosim.record import PARTS
 from cosim.replay.folder import ORDERS, SCENARIO, SUMMARY, FlownRun, flown_run, load_run
+from cosim.replay.pages import write_replay
+from cosim.replay.trace import plain
 from cosim.report import write_report
 from cosim.scenario import VEHICLE_COPY, Scenario
 
@@ -97,7 +99,7 @@ def _new_folder(parent: Path, name: str) -> Path:
 
 
 def conclude(path: Path, scenario: Scenario, status: str, wall_time: float | None, report: bool) -> dict[str, Any]:
-    """Write summary and report of a run from its record.
+    """Write summary, report and replay of a run from its record.
 
     Parameters
     ----------
@@ -110,7 +112,7 @@ def conclude(path: Path, scenario: Scenario, status: str, wall_time: float | Non
     wall_time : float or None
         What the stepping took [s].
     report : bool
-        Write the report and its figures too.
+        Write the report with its figures and the replay too.
 
     Returns
     -------
@@ -128,7 +130,7 @@ def conclude(path: Path, scenario: Scenario, status: str, wall_time: float | Non
 
 
 def report_again(path: Path) -> dict[str, Any]:
-    """Write summary and report of a run that is done, was interrupted, or was killed.
+    """Write summary, report and replay of a run that is done, was interrupted, or was killed.
 
     Parameters
     ----------
@@ -157,7 +159,8 @@ def report_again(path: Path) -> dict[str, Any]:
 
 def _write(run: FlownRun, report: bool) -> None:
     scratch = run.path / f".{SUMMARY}-{os.getpid()}"
-    scratch.write_text(json.dumps(run.summary, indent=2) + "\n", encoding="utf-8")
+    scratch.write_text(json.dumps(plain(run.summary), indent=2, allow_nan=False) + "\n", encoding="utf-8")
     scratch.replace(run.path / SUMMARY)
     if report:
         write_report(run.path, run.scenario, run.record, run.summary)
+        write_replay(run)

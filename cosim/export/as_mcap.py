@@ -6,6 +6,7 @@ Times are those of the simulation, in nanoseconds from 0, so that runs lie over 
 from __future__ import annotations
 
 import json
+from collections import deque
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -23,6 +24,8 @@ from cosim.export.excerpt import Excerpt
 from cosim.export.names import grouped, legal
 from cosim.export.protobuf_table import numbers_messages, numbers_schema
 from cosim.export.scene import POSITION, QUATERNION, Scene
+from cosim.replay.events import events_of
+from cosim.replay.folder import FlownRun
 from cosim.signals import Array
 
 PACKAGE = "subreach"  # of the schemas of signals
@@ -63,7 +66,7 @@ def _attach(writer: Writer, excerpt: Excerpt) -> None:
 
 def _write_messages(writer: Writer, excerpt: Excerpt) -> None:
     scene, tables = Scene(excerpt), _tables(writer, excerpt)
-    drawing = _Drawing(writer, scene)
+    drawing = _Drawing(writer, excerpt.run, scene)
     drawing.begin()
     for block in excerpt.blocks():
         times = np.rint(block[:, 0] * 1e9).astype(np.int64).tolist()
@@ -73,6 +76,7 @@ def _write_messages(writer: Writer, excerpt: Excerpt) -> None:
             for (channel, _), message in zip(tables, row, strict=True):
                 writer.add_message(channel, time, message, time)
             draw(i, time)
+    drawing.end()
 
 
 def _tables(writer: Writer, excerpt: Excerpt) -> list[tuple[int, list[int]]]:
@@ -91,7 +95,7 @@ def _tables(writer: Writer, excerpt: Excerpt) -> list[tuple[int, list[int]]]:
 class _Drawing:
     """Writes the scene as it changes."""
 
-    def __init__(self, writer: Writer, scene: Scene) -> None:
+    def __init__(self, writer: Writer, run: FlownRun, scene: Scene) -> None:
         self._writer, self._scene = writer, scene
         self._channels: dict[str, int] = {}
         for topic, kind in (
@@ -103,7 +107,9 @@ class _Drawing:
             ("/log", Log),
         ):
             self._channels[topic] = writer.register_channel(topic, "protobuf", register_schema(writer, kind))
+        self._solids = [*scene.solids]
         self._drawn: int | None = None  # the region that was drawn as active
+        self._changes, self._events = deque(scene.changes), deque(events_of(run, scene.log))
 
     def begin(self) -> None:
         """Write what stays."""
@@ -125,11 +131,28 @@ class _Drawing:
                 shifts = {frame: rows[i] for frame, rows in moved.items()}
                 self._send("/tf", time, foxglove.frames(at, positions[i], quaternions[i], shifts))
                 self._send("/vehicle/pose", time, foxglove.pose(at, positions[i], quaternions[i]))
-            if active[i] != self._drawn:
+            if self._changed(time) or active[i] != self._drawn:
                 self._drawn = active[i]
-                self._send("/scene", time, foxglove.regions(scene, at, active[i]))
+                self._send("/scene", time, foxglove.regions(self._solids, at, active[i]))
+            while self._events and self._events[0].time * 1e9 <= time:
+                event = self._events.popleft()
+                self._send("/log", time, foxglove.said(at, event))
 
         return draw
+
+    def _changed(self, time: int) -> bool:
+        """Let the changes come that are due, and return whether any is."""
+        due = False
+        while self._changes and self._changes[0][0] * 1e9 <= time:
+            _, i, self._solids[i] = self._changes.popleft()
+            due = True
+        return due
+
+    def end(self) -> None:
+        """Write the events behind the last exported step, which may be short of that of the run."""
+        for event in self._events:
+            time = round(event.time * 1e9)
+            self._send("/log", time, foxglove.said(foxglove.moment(time), event))
 
     def _send(self, topic: str, time: int, message: Any) -> None:
         self._writer.add_message(self._channels[topic], time, message.SerializeToString(), time)

@@ -14,7 +14,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 from numpy.typing import NDArray
 
-from controller.regions import Box, Cylinder, Ellipsoid, Sphere
+from controller.regions import Box, Ellipsoid, Sphere
 from cosim.export.excerpt import Excerpt
 from cosim.export.names import grouped
 from cosim.export.scene import (
@@ -30,10 +30,11 @@ from cosim.export.scene import (
     Solid,
 )
 from cosim.export.surfaces import edges_of
+from cosim.replay.events import events_of
 from cosim.signals import Array
 
 TIMELINE = "sim_time"  # s
-SIGNALS, WORLD = "signals", "world"
+SIGNALS, WORLD, EVENTS = "signals", "world", "events"
 _FRAMES = {NED: f"{WORLD}/regions", PLACE: f"{WORLD}/place", BODY: f"{WORLD}/place/body"}
 _CHARTS = ("clearance", "weight", "command", "thruster_force", "estimate")  # groups that are shown at first
 _FAINT, _BRIGHT = 110, 255  # of the line of a region that is not, and is, active
@@ -66,6 +67,7 @@ def write(excerpt: Excerpt, path: Path) -> list[Path]:
         sender.send_signals()
         sender.send_vehicle()
         sender.send_regions()
+        sender.send_events()
     finally:
         recording.flush()
         recording.disconnect()
@@ -79,7 +81,10 @@ def _layout(excerpt: Excerpt) -> rrb.Blueprint:
         rrb.TimeSeriesView(origin=rr.new_entity_path([SIGNALS, name]), name=name) for name in _CHARTS if name in groups
     ]
     scene = rrb.Spatial3DView(origin=WORLD, name="scene")
-    texts = rrb.Tabs(*(rrb.TextDocumentView(origin=name, name=name) for name in ("summary", "scenario")))
+    texts = rrb.Tabs(
+        rrb.TextLogView(origin=EVENTS, name=EVENTS),
+        *(rrb.TextDocumentView(origin=name, name=name) for name in ("summary", "scenario")),
+    )
     return rrb.Blueprint(rrb.Horizontal(scene, rrb.Vertical(*charts, texts), column_shares=[3, 2]))
 
 
@@ -142,20 +147,42 @@ class _Sender:
         scene = self._scene
         active = np.array([i for block in self._excerpt.blocks() for i in scene.active(block)])
         for i, solid in enumerate(scene.solids):
-            path = f"{_FRAMES[solid.frame]}/{rr.escape_entity_path_part(solid.name)}"
-            drawn = _drawn(solid)
-            self._stay(path, drawn)
+            place = f"{_FRAMES[solid.frame]}/{rr.escape_entity_path_part(solid.name)}"
             if solid.moves:
                 names = [f"{solid.name}.shift.{axis}" for axis in "xyz"]
                 shifts = np.column_stack([self._excerpt.signal(name) for name in names])
-                self._send(path, rr.Transform3D.columns(translation=shifts))
-            self._send_activity(path, type(drawn), solid, active == i)
+                self._send(place, rr.Transform3D.columns(translation=shifts))
+            shapes = [(float(self._time[0]), solid), *((time, new) for time, j, new in scene.changes if j == i)]
+            for path, kind in self._send_shapes(place, shapes).items():
+                self._send_activity(path, kind, solid, active == i)
+
+    def _send_shapes(self, place: str, shapes: list[tuple[float, Solid]]) -> dict[str, Any]:
+        """Send what a region is, and from when; return its kinds of drawing by their paths."""
+        kinds: dict[str, Any] = {}
+        before = None
+        for time, solid in shapes:
+            drawn = _drawn(solid)
+            path = f"{place}/{type(drawn).__name__}"
+            kinds[path] = type(drawn)
+            self._recording.set_time(TIMELINE, duration=time)
+            if before not in (None, path):  # a region of another kind stands there now
+                self._recording.log(before, rr.Clear(recursive=False))
+            self._recording.log(path, drawn)
+            before = path
+        return kinds
+
+    def send_events(self) -> None:
+        """Send what happened, in words."""
+        for event in events_of(self._excerpt.run, self._scene.log):
+            level = "WARN" if event.kind in ("violation", "failure", "saturation") else "INFO"
+            self._recording.set_time(TIMELINE, duration=event.time)
+            self._recording.log(EVENTS, rr.TextLog(event.text, level=level))
 
     def _send_activity(self, path: str, kind: Any, solid: Solid, active: NDArray[np.bool_]) -> None:
         changes = np.flatnonzero(np.diff(active, prepend=not active[0]))
         colours = [(*solid.colour, _BRIGHT if active[row] else _FAINT) for row in changes]
         widths = rr.Radius.ui_points([_THICK if active[row] else _THIN for row in changes])
-        width = "radii" if kind in (rr.Boxes3D, rr.LineStrips3D) else "line_radii"
+        width = "line_radii" if kind is rr.Ellipsoids3D else "radii"
         self._send(path, kind.columns(colors=colours, **{width: widths}), changes)
 
     def _send(self, path: str, columns: Any, rows: Any = slice(None)) -> None:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
 from foxglove_schemas_protobuf.LinePrimitive_pb2 import LinePrimitive
+from foxglove_schemas_protobuf.Log_pb2 import Log
 from foxglove_schemas_protobuf.PoseInFrame_pb2 import PoseInFrame
 from foxglove_schemas_protobuf.SceneEntity_pb2 import SceneEntity
 from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
@@ -16,6 +17,7 @@ from google.protobuf.timestamp_pb2 import Timestamp
 
 from controller.regions import Box, Cylinder, Ellipsoid, Sphere, of_attitude
 from cosim.export.scene import BODY, HULL_COLOUR, NED, OPAQUE, PLACE, THRUST_COLOUR, TRAIL_COLOUR, Scene, Solid
+from cosim.replay.events import Event
 from cosim.signals import Array
 
 MAP = "map"  # z upwards, as Foxglove draws
@@ -76,13 +78,13 @@ def pose(time: Timestamp, position: Sequence[float], quaternion: Sequence[float]
     return message
 
 
-def regions(scene: Scene, time: Timestamp, active: int) -> SceneUpdate:
+def regions(solids: Sequence[Solid], time: Timestamp, active: int) -> SceneUpdate:
     """Return all regions, the active one less transparent.
 
     Parameters
     ----------
-    scene : Scene
-        Of the run.
+    solids : sequence of Solid
+        As they are then.
     time : Timestamp
         Simulated.
     active : int
@@ -94,7 +96,7 @@ def regions(scene: Scene, time: Timestamp, active: int) -> SceneUpdate:
         All of them, since a viewer that jumps in time sees the last message alone.
     """
     message = SceneUpdate()
-    for i, solid in enumerate(scene.solids):
+    for i, solid in enumerate(solids):
         entity = message.entities.add(timestamp=time, frame_id=frame_of(solid), id=solid.name, frame_locked=True)
         entity.metadata.add(key="active", value=str(i == active).lower())
         _draw(entity, solid, i == active)
@@ -128,6 +130,12 @@ def vehicle(scene: Scene) -> SceneUpdate:
     for point in scene.trail().tolist():
         _set_vector(line.points.add(), point)
     return message
+
+
+def said(time: Timestamp, event: Event) -> Log:
+    """Return an event in words."""
+    level = Log.WARNING if event.kind in ("violation", "failure", "saturation") else Log.INFO
+    return Log(timestamp=time, level=level, message=event.text, name=event.kind)
 
 
 def _draw(entity: SceneEntity, solid: Solid, active: bool) -> None:

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from controller.quaternion import rotation_matrix
-from controller.regions import Orientation, Shape, Visibility, of_attitude
+from controller.regions import SHAPES, Orientation, Shape, Visibility, of_attitude
 from controller.regions.shape import Bounds
 from cosim.export.excerpt import Excerpt
 from cosim.export.surfaces import Mesh, sector, surface_of
 from cosim.replay.activity import active_regions
 from cosim.replay.header import header_of
+from cosim.replay.steering import changes_of, log_of
 from cosim.scenario import CRITERIA
 from cosim.signals import Array
 
@@ -61,7 +63,11 @@ class Scene:
     Attributes
     ----------
     solids : tuple of Solid
-        The goal, then the regions in their order.
+        The goal, then the regions in their order, as they are at first.
+    changes : tuple of (float, int, Solid)
+        When [s] which of them becomes what.
+    log : sequence of (int, Order)
+        What the run was ordered.
     hull_radius : float
         [m].
     thrusters : tuple of Thruster
@@ -79,20 +85,12 @@ class Scene:
             Thruster(np.array(t["position"]), np.array(t["direction"]), max(abs(t["min"]), abs(t["max"])))
             for t in vehicle["thrusters"]
         )
-        regions = [(scenario.goal_region, None), *((r.region, r.criterion) for r in scenario.regions)]
-        limits = self._limits([region.shape for region, _ in regions])
-        self.solids = tuple(
-            Solid(
-                region.name,
-                f"{region.name}: keep {region.keep}",
-                _COLOURS[criterion],
-                region.shape,
-                self._mesh(region.shape, limits),
-                {Orientation: PLACE, Visibility: BODY}.get(type(region.shape), NED),
-                region.name in scenario.moving,
-            )
-            for region, criterion in regions
-        )
+        self.log = log_of(excerpt.run)
+        begun = [excerpt.run.planned.goal, *(r.region.shape for r in scenario.regions)]
+        later = [(c["time"], c["region"], _shape(c["shape"])) for c in changes_of(excerpt.run, self.log)]
+        limits = self._limits([*begun, *(shape for _, _, shape in later)])
+        self.solids = tuple(self._solid(i, shape, limits) for i, shape in enumerate(begun))
+        self.changes = tuple((time, i, self._solid(i, shape, limits)) for time, i, shape in later)
         self._criteria = [secondary.criterion for secondary in scenario.regions]
         self._memberships = self.places([f"membership.{name}" for name in CRITERIA])
         self._weights = self.places([f"weight.{name}" for name in CRITERIA])
@@ -120,6 +118,20 @@ class Scene:
         way = np.column_stack([self._record[name][rows] for name in POSITION])
         return way[np.isfinite(way).all(axis=1)]
 
+    def _solid(self, index: int, shape: Shape, limits: Bounds) -> Solid:
+        scenario = self._excerpt.run.scenario
+        secondary = scenario.regions[index - 1] if index else None
+        region = secondary.region if secondary else scenario.goal_region
+        return Solid(
+            region.name,
+            f"{region.name}: keep {region.keep}",
+            _COLOURS[secondary.criterion if secondary else None],
+            shape,
+            self._mesh(shape, limits),
+            {Orientation: PLACE, Visibility: BODY}.get(type(shape), NED),
+            region.name in scenario.moving,
+        )
+
     def _limits(self, shapes: list[Shape]) -> Bounds:
         """Return the corners of an upright box about the way and all regions that end somewhere."""
         way = self.trail()
@@ -139,3 +151,8 @@ class Scene:
         # the vehicle's bow must be within it
         e = np.array(shape.quaternion) / np.linalg.norm(shape.quaternion)
         return sector((0.0, 0.0, 0.0), rotation_matrix(e)[:, 0].tolist(), shape.tolerance, reach)
+
+
+def _shape(numbers: dict[str, Any]) -> Shape:
+    """Return the shape that its numbers say."""
+    return SHAPES[numbers["kind"]](**{key: value for key, value in numbers.items() if key != "kind"})

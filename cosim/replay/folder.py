@@ -26,7 +26,8 @@ class FlownRun:
     """A run that is over."""
 
     path: Path  # its folder
-    scenario: Scenario  # as it was flown: by the law that did, with the obstacles that came
+    planned: Scenario  # as its file has it, by the law that flew it
+    scenario: Scenario  # as it came: with those obstacles that did, and with the target of the end
     record: Record
     summary: dict[str, Any]
 
@@ -96,13 +97,13 @@ def flown_run(path: Path, scenario: Scenario, status: str, wall_time: float | No
         time = record["time"]
         if not (np.isfinite(time).all() and (np.diff(time) > 0.0).all()):
             raise RunError(f"{path}: the times of the record do not rise from row to row")
-        scenario = as_it_came(scenario, record)
-        summary = summarise(scenario, record, status, wall_time)
+        came = as_it_came(scenario, record)
+        summary = summarise(came, record, status, wall_time)
     except KeyError as error:
         raise RunError(f"{path}: the record has no column {error}, which its scenario calls for") from error
     if scenario.commands.enabled:
         summary["orders"] = _lines(path / ORDERS)
-    return FlownRun(path, scenario, record, summary)
+    return FlownRun(path, scenario, came, record, summary)
 
 
 def _lines(file: Path) -> int:

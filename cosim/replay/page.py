@@ -15,6 +15,9 @@ REPLAY = "replay.html"
 _SCRIPTS = ("data.js", "camera.js", "solids.js", "scene.js", "charts.js", "words.js", "player.js", "live.js", "main.js")
 
 
+_MARK = '<script type="application/json" id="runs">'  # where the data of a page begins
+
+
 def replay_page(runs: Sequence[dict[str, Any]], title: str) -> str:
     """Return the page of some runs.
 
@@ -60,5 +63,13 @@ def write_page(path: Path, runs: Sequence[dict[str, Any]], title: str) -> Path:
         The file.
     """
     scratch = path.with_name(f".{path.name}")
-    scratch.write_text(replay_page(runs, title), encoding="utf-8")
-    return scratch.replace(path)
+    try:
+        scratch.write_text(replay_page(runs, title), encoding="utf-8")
+        return scratch.replace(path)
+    finally:
+        scratch.unlink(missing_ok=True)
+
+
+def is_page(path: Path) -> bool:
+    """Return whether a file is a page of this kind."""
+    return _MARK in path.read_text(encoding="utf-8", errors="replace")
