@@ -119,7 +119,7 @@ class _Drawing:
     def of(self, block: Array) -> Callable[[int, int], None]:
         """Return what writes the scene of a row of a block, at a time [ns]."""
         scene = self._scene
-        known = np.isfinite(block[:, scene.places(POSITION + QUATERNION)]).all(axis=1).tolist()
+        known = [bool(np.isfinite(row).all()) for row in block[:, scene.places(POSITION + QUATERNION)]]
         positions = block[:, scene.places(POSITION)].tolist()
         quaternions = block[:, scene.places(QUATERNION)].tolist()
         moved = {foxglove.frame_of(s): block[:, scene.shifts(s)].tolist() for s in scene.solids if s.moves}

@@ -21,6 +21,7 @@ from cosim.export.scene import (
     BODY,
     HULL_COLOUR,
     NED,
+    OPAQUE,
     PLACE,
     POSITION,
     QUATERNION,
@@ -29,16 +30,14 @@ from cosim.export.scene import (
     Scene,
     Solid,
 )
-from cosim.export.surfaces import edges_of
 from cosim.replay.events import events_of
-from cosim.signals import Array
 
 TIMELINE = "sim_time"  # s
 SIGNALS, WORLD, EVENTS = "signals", "world", "events"
 _FRAMES = {NED: f"{WORLD}/regions", PLACE: f"{WORLD}/place", BODY: f"{WORLD}/place/body"}
 _CHARTS = ("clearance", "weight", "command", "thruster_force", "estimate")  # groups that are shown at first
 _FAINT, _BRIGHT = 110, 255  # of the line of a region that is not, and is, active
-_THIN, _THICK = 1.0, 2.5  # pixels of that line
+_THIN, _THICK = 1.0, 2.5  # pixels of that line, which Rerun has as radii below 0
 _ARROWS = 20.0  # Hz
 _ARROW = 4.0  # radii of the hull that an arrow of the greatest thrust is long
 
@@ -76,16 +75,16 @@ def write(excerpt: Excerpt, path: Path) -> list[Path]:
 
 def _layout(excerpt: Excerpt) -> rrb.Blueprint:
     """Return how the recording is shown at first: the scene, and charts beside it."""
-    groups = grouped(excerpt.columns)
-    charts = [
-        rrb.TimeSeriesView(origin=rr.new_entity_path([SIGNALS, name]), name=name) for name in _CHARTS if name in groups
-    ]
-    scene = rrb.Spatial3DView(origin=WORLD, name="scene")
+    there = [name for name in _CHARTS if name in grouped(excerpt.columns)]
+    charts = [rrb.TimeSeriesView(origin=rr.new_entity_path([SIGNALS, name]), name=name) for name in there]
     texts = rrb.Tabs(
         rrb.TextLogView(origin=EVENTS, name=EVENTS),
         *(rrb.TextDocumentView(origin=name, name=name) for name in ("summary", "scenario")),
     )
-    return rrb.Blueprint(rrb.Horizontal(scene, rrb.Vertical(*charts, texts), column_shares=[3, 2]))
+    # the first two always, the others behind each other
+    column = rrb.Vertical(*charts[:2], *([rrb.Tabs(*charts[2:])] if charts[2:] else []), texts)
+    scene = rrb.Spatial3DView(origin=WORLD, name="scene")
+    return rrb.Blueprint(rrb.Horizontal(scene, column, column_shares=[3, 2]), collapse_panels=True)
 
 
 class _Sender:
@@ -123,7 +122,7 @@ class _Sender:
         self._send(_FRAMES[BODY], rr.Transform3D.columns(quaternion=e[known][:, [1, 2, 3, 0]]), known)
         hull = rr.Ellipsoids3D(half_sizes=[[scene.hull_radius] * 3], colors=[HULL_COLOUR])
         self._stay(f"{_FRAMES[BODY]}/hull", hull)
-        self._stay(f"{WORLD}/way", rr.LineStrips3D([scene.trail()], colors=[TRAIL_COLOUR]))
+        self._stay(f"{WORLD}/way", rr.LineStrips3D([scene.trail()], colors=[TRAIL_COLOUR], radii=[-_THIN]))
         self._send_thrusts()
 
     def _send_thrusts(self) -> None:
@@ -180,10 +179,8 @@ class _Sender:
 
     def _send_activity(self, path: str, kind: Any, solid: Solid, active: NDArray[np.bool_]) -> None:
         changes = np.flatnonzero(np.diff(active, prepend=not active[0]))
-        colours = [(*solid.colour, _BRIGHT if active[row] else _FAINT) for row in changes]
-        widths = rr.Radius.ui_points([_THICK if active[row] else _THIN for row in changes])
-        width = "line_radii" if kind is rr.Ellipsoids3D else "radii"
-        self._send(path, kind.columns(colors=colours, **{width: widths}), changes)
+        look = kind.columns(**_look(kind, solid.colour, active[changes]))
+        self._send(path, look, changes)
 
     def _send(self, path: str, columns: Any, rows: Any = slice(None)) -> None:
         time = rr.TimeColumn(TIMELINE, duration=self._time[rows])
@@ -207,8 +204,18 @@ def _drawn(solid: Solid) -> Any:
         return rr.Boxes3D.from_fields(
             half_sizes=half, centers=[shape.centre], quaternions=[_turn(shape.quaternion)], **label
         )
-    edges: Array = solid.mesh.vertices[edges_of(solid.mesh)]
-    return rr.LineStrips3D.from_fields(strips=edges, **label)
+    return rr.Mesh3D(vertex_positions=solid.mesh.vertices, triangle_indices=solid.mesh.triangles)
+
+
+def _look(kind: Any, colour: tuple[int, int, int], active: NDArray[np.bool_]) -> dict[str, Any]:
+    """Return what tells a region that is active from one that is not, for each of some changes."""
+    if kind is rr.Mesh3D:
+        return {"albedo_factor": [(*colour, round(255 * OPAQUE[bool(now)])) for now in active]}
+    width = "line_radii" if kind is rr.Ellipsoids3D else "radii"
+    return {
+        "colors": [(*colour, _BRIGHT if now else _FAINT) for now in active],
+        width: [-(_THICK if now else _THIN) for now in active],
+    }
 
 
 def _turn(quaternion: tuple[float, ...]) -> Any:

@@ -115,7 +115,7 @@ class Scene:
         """Return the way that the vehicle took, as few enough points for a line, shape (n, 3) [m, NED]."""
         n = len(self._excerpt.rows)
         rows = self._excerpt.rows[np.unique(np.linspace(0, n - 1, min(n, _TRAIL)).astype(int))]
-        way = np.column_stack([self._record[name][rows] for name in POSITION])
+        way: Array = np.column_stack([self._record[name][rows] for name in POSITION])
         return way[np.isfinite(way).all(axis=1)]
 
     def _solid(self, index: int, shape: Shape, limits: Bounds) -> Solid:

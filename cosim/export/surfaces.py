@@ -118,21 +118,6 @@ def sector(apex: Sequence[float], axis: Sequence[float], half_angle: float, reac
     return _lathe(rings, origin, origin + reach * along)
 
 
-def edges_of(mesh: Mesh) -> NDArray[np.intp]:
-    """Return the edges of a mesh that a drawing of lines needs, shape (k, 2): not those within a flat part."""
-    corners = mesh.vertices[mesh.triangles]
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
-    beside: dict[tuple[int, int], list[int]] = {}
-    for i, triangle in enumerate(mesh.triangles.tolist()):
-        for a, b in zip(triangle, [*triangle[1:], triangle[0]], strict=True):
-            beside.setdefault((min(a, b), max(a, b)), []).append(i)
-    bent = [
-        edge for edge, sides in beside.items() if len(sides) != 2 or normals[sides[0]] @ normals[sides[1]] < 1.0 - 1e-9
-    ]
-    return np.array(bent, dtype=np.intp).reshape(-1, 2)
-
-
 # ---- the shapes ----------------------------------------------------------------------------------------------------
 
 

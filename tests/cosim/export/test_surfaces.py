@@ -22,7 +22,7 @@ from controller.regions import (
     Sphere,
     clearances_at,
 )
-from cosim.export.surfaces import edges_of, sector, surface_of
+from cosim.export.surfaces import sector, surface_of
 
 LIMITS = ((-4.0, -3.0, 0.0), (4.0, 5.0, 6.0))
 TURNED = (0.9, 0.1, -0.3, 0.2)
@@ -131,8 +131,3 @@ def test_a_sector_of_more_than_half_a_turn_is_closed_too():
 def test_shapes_of_attitude_have_no_surface():
     with pytest.raises(TypeError, match="Orientation"):
         surface_of(Orientation((1.0, 0.0, 0.0, 0.0), 0.5), LIMITS)
-
-
-def test_lines_are_drawn_at_corners_and_not_across_flat_faces():
-    assert len(edges_of(surface_of(Box((0.0, 0.0, 0.0), (1.0, 1.0, 1.0)), LIMITS))) == 12
-    assert len(edges_of(surface_of(Prism(STAR, 1.0, 3.0), LIMITS))) == 3 * len(STAR)
