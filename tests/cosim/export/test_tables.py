@@ -84,7 +84,7 @@ def test_more_than_a_mat_file_holds_is_refused(run, tmp_path, monkeypatch):
     from cosim.export import as_mat
 
     monkeypatch.setattr(as_mat, "_GREATEST", 1000)
-    with pytest.raises(ExportError, match="expected 0.0 at most"):
+    with pytest.raises(ExportError, match=r"expected 0\.0 at most"):
         export_run(run, "mat", tmp_path / "out.mat")
     assert not list(tmp_path.iterdir())
 
