@@ -47,12 +47,14 @@ def test_a_thruster_that_only_turns_the_body_has_no_line():
 def extents(figure):
     """Return the boxes of all texts but the numbers at the axes."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.text import Text
 
     canvas = FigureCanvasAgg(figure)
     canvas.draw()
-    ticks = {text for ax in figure.axes for text in (*ax.get_xticklabels(), *ax.get_yticklabels())}
-    texts = [text for text in figure.findobj(Text) if text.get_text().strip() and text not in ticks]
+    texts = [*figure.texts, *(text for legend in figure.legends for text in legend.get_texts())]
+    for ax in figure.axes:
+        texts += [*ax.texts, ax.title, ax.xaxis.label, ax.yaxis.label]
+    texts = [text for text in texts if text.get_text().strip()]
+    assert len(texts) > 10
     return {f"{text.get_text()} {i}": text.get_window_extent(canvas.get_renderer()) for i, text in enumerate(texts)}
 
 
