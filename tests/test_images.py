@@ -49,11 +49,11 @@ def test_pictures_are_those_that_their_script_draws(maker, draw):
             assert fresh.size == kept.size
 
 
+@pytest.mark.slow
 def test_the_paths_of_the_readme_are_figures_of_runs(draw, monkeypatch):
-    """The runs take a minute; here two short ones stand for them."""
-    from cosim import run, scenario
+    # short runs stand for them, which take a minute
+    from cosim import scenario
 
     whole = scenario.load_scenario
     monkeypatch.setattr(scenario, "load_scenario", lambda name, over: whole(name, [*over, "time.duration=0.5"]))
-    assert callable(run.run_scenario)
     assert draw("paths").keys() == {"path-plane.png", "path-deployable.png"}
