@@ -12,15 +12,16 @@ from typing import Any
 
 REPLAY = "replay.html"
 
-_SCENE = (
+SCENE_SCRIPTS = (
     "palette.js", "vectors.js", "camera.js", "solids.js", "pipes.js", "planes.js", "painter.js", "sights.js",
-    "vehicle.js", "trail.js", "bounds.js", "order.js", "labels.js", "floor.js", "controls.js", "scene.js",
+    "hull.js", "vehicle.js", "forces.js", "trail.js", "shadows.js", "bounds.js", "order.js",
+    "regions.js", "labels.js", "floor.js", "controls.js", "scene.js",
 )  # fmt: skip
 _PLAYER = (
     "player.js", "words.js", "curves.js", "axes.js", "plot.js", "charts.js", "board.js", "timeline.js", "panel.js",
     "stage.js", "head.js", "keys.js", "page.js",
 )  # fmt: skip
-_SCRIPTS = ("data.js", *_SCENE, *_PLAYER, "live.js", "main.js")
+_SCRIPTS = ("data.js", *SCENE_SCRIPTS, *_PLAYER, "live.js", "main.js")
 _STYLES = ("style.css", "panel.css", "layout.css")
 
 

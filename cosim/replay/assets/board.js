@@ -80,9 +80,10 @@ class Board {
 
   /** Move the cursor: every frame. */
   point() {
-    const { t, playing } = this.player;
-    if (playing && this.window && (t > this.window[1] || t < this.window[0])) {
-      this._show(t, this.window[1] - this.window[0]);
+    const { t, playing, live } = this.player;
+    if ((playing || live) && this.window && (t > this.window[1] || t < this.window[0])) {
+      const length = this.window[1] - this.window[0];
+      this._show(live ? t - length : t, length); // a page on; of a live run always the last seconds
     }
     const now = performance.now();
     const tell = !playing || now - this._told > 90; // nobody reads faster
@@ -101,6 +102,7 @@ class Board {
       chart.stale = true;
       chart.paint(onPaper ? this.player.t : null);
       chart.point(this.player.t);
+      chart.tell(this.player.t, this.selected);
     }
   }
 

@@ -103,7 +103,7 @@ function fillHelp(dialog, keys) {
     const list = element("dl");
     for (const { keys: told, text } of keys.filter((key) => key.group === group)) {
       const name = element("dt");
-      for (const part of told.split(" ")) name.append(element("kbd", "", part.replace(/,$/, "")), " ");
+      for (const part of told.split(" ")) name.append(element("kbd", "", part.length > 1 ? part.replace(",", "") : part), " ");
       list.append(name, element("dd", "", text));
     }
     section.append(element("h3", "", group), list);
