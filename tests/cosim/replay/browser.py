@@ -15,7 +15,7 @@ _QUIET = (
     "--disable-background-networking", "--disable-component-update", "--disable-sync", "--hide-scrollbars",
     "--window-size=1280,900", "--force-color-profile=srgb",
 )  # fmt: skip
-_PATIENCE = 60.0  # s
+_PATIENCE = 30.0  # s
 _TWO_PICTURES = "const done = arguments[0]; requestAnimationFrame(() => requestAnimationFrame(() => done(true)));"
 
 
@@ -74,8 +74,15 @@ class Browser:
         self.js(
             "const bar = document.querySelector('input[type=range]#scrubber'); bar.value = arguments[0];"
             "bar.dispatchEvent(new Event('input', { bubbles: true }));",
-            repr(time),
+            repr(float(time)),
         )
+        self.settle()
+
+    def land(self, time):
+        """Scrub to a time, and then to its last bit: a range input keeps some fifteen digits."""
+        self.scrub(time)
+        assert abs(self.t - time) < 1e-9
+        self.js("window.subreach.player.seek(arguments[0])", float(time))
         self.settle()
 
     @property

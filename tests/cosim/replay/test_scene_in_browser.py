@@ -39,7 +39,7 @@ def test_scrubbing_moves_the_vehicle_to_the_recorded_pose(browser, shown, dockin
     browser.open(page.file)
     for row in np.linspace(0, len(page.steps) - 1, 7).astype(int):
         step = page.steps[row]
-        browser.scrub(record["time"][step])
+        browser.land(record["time"][step])
         assert browser.drawn["time"] == record["time"][step]
         place, attitude = pose(record, step)
         assert browser.drawn["runs"][0]["position"] == place
@@ -52,7 +52,7 @@ def test_between_rows_the_vehicle_is_between_their_poses(browser, shown, docking
     for row, part in ((40, 0.25), (300, 0.5), (700, 0.9)):
         (p, e), (q, f) = (pose(record, page.steps[row + i]) for i in (0, 1))
         t, u = (record["time"][page.steps[row + i]] for i in (0, 1))
-        browser.scrub(t + part * (u - t))
+        browser.land(t + part * (u - t))
         drawn = browser.drawn["runs"][0]
         assert drawn["position"] == pytest.approx((1 - part) * np.array(p) + part * np.array(q), abs=1e-9)
         mixed = (1 - part) * np.array(e) + part * np.array(f)
@@ -80,7 +80,7 @@ def test_the_active_region_s_colour_is_that_of_the_record_at_ten_instants(name, 
     for row in instants:
         step = page.steps[row]
         expected = active_of(page.header, signals, step)
-        browser.scrub(record["time"][step])
+        browser.land(record["time"][step])
         drawn = browser.drawn["runs"][0]
         assert drawn["active"] == expected
         for i, region in enumerate(page.header["regions"]):
