@@ -12,8 +12,17 @@ from typing import Any
 
 REPLAY = "replay.html"
 
-_SCRIPTS = ("data.js", "camera.js", "solids.js", "scene.js", "charts.js", "words.js", "player.js", "live.js", "main.js")
-
+SCENE_SCRIPTS = (
+    "palette.js", "vectors.js", "camera.js", "solids.js", "pipes.js", "planes.js", "painter.js", "sights.js",
+    "hull.js", "vehicle.js", "forces.js", "trail.js", "shadows.js", "bounds.js", "order.js",
+    "regions.js", "labels.js", "floor.js", "controls.js", "scene.js",
+)  # fmt: skip
+_PLAYER = (
+    "player.js", "words.js", "curves.js", "axes.js", "plot.js", "charts.js", "board.js", "timeline.js", "panel.js",
+    "stage.js", "head.js", "keys.js", "page.js",
+)  # fmt: skip
+_SCRIPTS = ("data.js", *SCENE_SCRIPTS, *_PLAYER, "live.js", "main.js")
+_STYLES = ("style.css", "panel.css", "layout.css")
 
 _MARK = '<script type="application/json" id="runs">'  # where the data of a page begins
 
@@ -34,12 +43,14 @@ def replay_page(runs: Sequence[dict[str, Any]], title: str) -> str:
         HTML.
     """
     assets = resources.files("cosim.replay") / "assets"
-    script = "\n".join((assets / name).read_text(encoding="utf-8") for name in _SCRIPTS)
-    # "</" would end the element it stands in
-    data = json.dumps(list(runs), separators=(",", ":"), allow_nan=False, ensure_ascii=False).replace("</", "<\\/")
+    style, script = (
+        "\n".join((assets / name).read_text(encoding="utf-8") for name in names) for names in (_STYLES, _SCRIPTS)
+    )
+    # "</script" would end the element that it stands in, and "<!--" with "<script" would keep it from ending
+    data = json.dumps(list(runs), separators=(",", ":"), allow_nan=False, ensure_ascii=False).replace("<", "\\u003c")
     return Template((assets / "page.html").read_text(encoding="utf-8")).substitute(
         title=html.escape(title),
-        style=(assets / "style.css").read_text(encoding="utf-8"),
+        style=style,
         runs=data,
         script=script,
     )

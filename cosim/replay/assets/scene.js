@@ -1,1 +1,323 @@
-// scene
+// The scene: vehicles, their ways and their regions at a time, as a camera sees them.
+
+const LEAST_HULL = 15; // pixels of radius below which the vehicle is drawn larger than it is; less in a small picture
+
+/** A 3D scene of some runs on a canvas. */
+class Scene {
+  /**
+   * @param {HTMLCanvasElement} canvas  @param {Run[]} runs  @param {"light"|"dark"} theme
+   * @param {{name: string, colour: string}[]|null} marks as for setRuns()
+   */
+  constructor(canvas, runs, theme, marks = null) {
+    this.canvas = canvas;
+    this.context = canvas.getContext("2d", { alpha: false });
+    this.labels = new Labels(this.context);
+    this.theme = theme;
+    this._last = null; // time and options of the last frame
+    this._redraw = () => this._later();
+    this.camera = new Camera();
+    controlCamera(canvas, () => this.camera);
+    this.resize();
+    this.setRuns(runs, marks);
+  }
+
+  /** The camera; scenes that stand side by side may have one together. */
+  get camera() {
+    return this._camera;
+  }
+
+  set camera(camera) {
+    this._camera?.listeners.delete(this._redraw);
+    this._camera = camera;
+    camera.listeners.add(this._redraw);
+    this.painter = new Painter(this.context, camera);
+  }
+
+  /** @param {"light"|"dark"} theme */
+  setTheme(theme) {
+    this.theme = theme;
+    this._sky = null;
+    this._later();
+  }
+
+  /**
+   * Show other runs, all of them in the picture.
+   * @param {Run[]} runs
+   * @param {{name: string, colour: string}[]|null} marks of each run, where it is one of several, though not all are
+   * in this scene; without them one run's way has the colours of who was active
+   */
+  setRuns(runs, marks = null) {
+    this.runs = runs;
+    this._runMarks = marks ?? (runs.length > 1 ? runs.map(({ header }, i) => ({ name: header.name, colour: runColour(i) })) : null);
+    this._trails = runs.map((run) => new Trail(run));
+    this._forces = runs.map((run) => new Forces(run));
+    this._regions = new Regions(runs);
+    this._drawn = { time: 0, runs: [] };
+    this._followed = null;
+    this._measure();
+    this.camera.look("iso");
+  }
+
+  /** Take the size that the page gives to the canvas. */
+  resize() {
+    const { clientWidth, clientHeight } = this.canvas;
+    this._ratio = Math.min(2, window.devicePixelRatio || 1);
+    this.canvas.width = Math.max(1, Math.round(clientWidth * this._ratio));
+    this.canvas.height = Math.max(1, Math.round(clientHeight * this._ratio));
+    this._sky = null;
+    this._fitsPicture();
+    this._later();
+  }
+
+  /** What the last frame showed: time, and of each run pose, active region and the colour of each region. */
+  get drawn() {
+    return this._drawn;
+  }
+
+  /** Where a position [m, NED] is in the canvas [CSS pixels]. */
+  project(position) {
+    this._fitsPicture();
+    return this.camera.project(position).slice(0, 2);
+  }
+
+  /** North and east of the point at a depth that is seen at some pixels; null where there is none. */
+  placeOnPlane(x, y, depth) {
+    this._fitsPicture();
+    const { eye } = this.camera;
+    const ray = this.camera.ray(x, y);
+    const length = (depth - eye[2]) / ray[2];
+    return length > 0 && Number.isFinite(length) ? [eye[0] + length * ray[0], eye[1] + length * ray[1]] : null;
+  }
+
+  /** The region at some pixels, its name included: {run, region}, or null. */
+  pick(x, y) {
+    const named = this.labels.placed.find((box) => box.of && x >= box.x && x <= box.x + box.width && y >= box.y && y <= box.y + box.height);
+    if (named) return named.of;
+    this._fitsPicture();
+    const { eye } = this.camera;
+    const far = Vec.along(eye, this.camera.ray(x, y), 1e5);
+    for (const { feature, of } of this._sights ?? []) {
+      const [u, v] = feature ? this.camera.project(feature) : [Infinity, Infinity];
+      if (Math.hypot(u - x, v - y) < 14) return of;
+    }
+    for (const { solid, shift, of } of [...(this._entries ?? [])].reverse()) {
+      if (solid && solid.hides(Vec.sub(eye, shift), Vec.sub(far, shift))) return of;
+    }
+    return null;
+  }
+
+  /**
+   * Draw the scene at a time.
+   * @param {number} t [s]  @param {{follow: boolean, trail: boolean, labels: boolean}} options
+   */
+  draw(t, options = {}) {
+    this._last = [t, options];
+    if (this._waiting) cancelAnimationFrame(this._waiting); // this is the frame that was asked for
+    this._waiting = 0;
+    const { trail = true, labels = true } = options;
+    this._fitsPicture();
+    this._grow();
+    const poses = this.runs.map((run) => poseOf(run, t));
+    this._follow(options.follow ? poses.find(Boolean) : null);
+    const { context, painter, camera } = this;
+    const colours = SCENE_THEMES[this.theme];
+    context.setTransform(this._ratio, 0, 0, this._ratio, 0, 0);
+    context.lineJoin = "round";
+    this._paintSky(colours);
+    this.labels.begin(camera.width, camera.height);
+
+    const regions = this._regions.at(t, poses, camera.target, this.theme);
+    this._entries = farthestFirst(regions.filter((entry) => entry.solid || entry.sheet), camera.eye);
+    this._sights = regions.filter((entry) => entry.sight).map((entry) => ({ ...entry, feature: entry.sight.feature }));
+    paintSurface(painter, this.bounds, colours);
+    paintFloor(painter, this.labels, this.bounds, colours, labels);
+    paintRuler(painter, this.labels, this.bounds, colours, labels);
+    const vehicles = poses.map((pose, i) => pose && this._vehicle(pose, i));
+    const floor = this.bounds[1][2];
+    paintShadows(painter, this._entries, this.bounds, colours);
+    const things = vehicles.flatMap((vehicle) => (vehicle ? vehicle.things : []));
+    if (trail) {
+      this._trails.forEach((way, i) => {
+        const chunks = this._way(way, i, t, colours);
+        paintWayBelow(painter, chunks, floor, colours);
+        things.push(...chunks, ...this._marks(way, i, t, vehicles[i], colours));
+      });
+    }
+    for (const vehicle of vehicles) if (vehicle) paintPlumb(painter, vehicle, floor, colours);
+    // a sight begins at the vehicle, and is just behind it
+    for (const entry of this._sights) things.push({ ...entry, middle: Vec.along(entry.sight.apex, camera.forward, entry.size) });
+    const lists = placedAmong(this._entries, things, camera.eye);
+    this._entries.forEach((entry, k) => {
+      if (entry.solid) paintBack(painter, entry.solid, entry.shift, entry.style);
+      this._paintThings(lists[k], colours);
+      if (entry.solid) paintFront(painter, entry.solid, entry.shift, entry.style);
+      else paintSheet(painter, entry.sheet, entry.style);
+    });
+    this._paintThings(lists[this._entries.length], colours);
+    vehicles.forEach((vehicle, i) => {
+      if (!vehicle) return;
+      const { radius } = this.runs[i].header.vehicle;
+      paintForces(painter, vehicle.pose, this._forces[i].at(t), vehicle.size, radius, this.theme);
+    });
+
+    paintCompass(painter, this.labels, colours);
+    paintScale(painter, this.labels, colours, Math.max(1, ...vehicles.map((vehicle) => vehicle?.magnified ?? 1)));
+    if (labels) nameRegions(this.labels, camera, regions, colours);
+    if (labels && this._runMarks) nameVehicles(this.labels, camera, this._runMarks, vehicles, colours);
+    this.labels.draw();
+    this._note(t, poses, regions);
+  }
+
+  _later() {
+    if (!this._last || this._waiting) return;
+    this._waiting = requestAnimationFrame(() => {
+      this._waiting = 0;
+      this.draw(...this._last);
+    });
+  }
+
+  _fitsPicture() {
+    this.camera.resize(this.canvas.width / this._ratio, this.canvas.height / this._ratio);
+  }
+
+  _measure() {
+    const { content, bounds } = extentOf(this.runs);
+    this.bounds = bounds;
+    this._rows = this.runs.map((run) => run.rows);
+    this._regions.bounds = bounds;
+    this.camera.content = content;
+    const lead = this.runs.find((run) => run.rows);
+    if (!lead) return;
+    const [a, b] = [lead.pose(lead.start).position, lead.pose(lead.end).position];
+    const way = Vec.sub(b, a);
+    if (Vec.finite(way)) this.camera.bearing = Math.atan2(way[1], way[0]);
+  }
+
+  /** A live run may leave the bounds. */
+  _grow() {
+    const left = this.runs.some((run, i) => {
+      if (run.rows === this._rows[i]) return false;
+      const { position } = run.pose(run.end);
+      return Vec.finite(position) && position.some((x, k) => x < this.bounds[0][k] || x > this.bounds[1][k]);
+    });
+    if (!left) return;
+    const { fitted } = this.camera;
+    this._measure();
+    if (fitted) this._quiet(() => this.camera.fit());
+  }
+
+  _follow(pose) {
+    if (pose) {
+      const moved = this._followed ? Vec.sub(pose.position, this._followed) : Vec.sub(pose.position, this.camera.target);
+      if (Vec.norm(moved) > 0) {
+        this._quiet(() => this.camera.aim(Vec.add(this.camera.target, moved)));
+      }
+    }
+    this._followed = pose ? pose.position : null;
+  }
+
+  /** Move the camera within a frame, without asking for another. */
+  _quiet(move) {
+    this.camera.listeners.delete(this._redraw);
+    move();
+    this.camera.listeners.add(this._redraw);
+  }
+
+  _paintSky(colours) {
+    const { context, camera } = this;
+    if (!this._sky) {
+      this._sky = context.createLinearGradient(0, 0, 0, camera.height);
+      this._sky.addColorStop(0, colours.skyTop);
+      this._sky.addColorStop(1, colours.skyBottom);
+    }
+    context.fillStyle = this._sky;
+    context.fillRect(0, 0, camera.width, camera.height);
+  }
+
+  _vehicle(pose, index) {
+    const { vehicle } = this.runs[index].header;
+    const pixels = vehicle.radius * this.camera.scaleAt(pose.position);
+    const magnified = pixels > 0 ? Math.max(1, Math.min(LEAST_HULL, 0.028 * Math.min(this.camera.width, this.camera.height)) / pixels) : 1;
+    const size = vehicle.radius * magnified;
+    const placed = { position: pose.position, R: Vec.matrix(pose.quaternion) };
+    const things = [...hullAt(vehicle, placed, size, this.camera.eye, this.theme), ...bodyAxes(placed, size)];
+    return { pose: placed, size, magnified, things };
+  }
+
+  _way(way, index, t, colours) {
+    const chunks = way.chunks(this.camera, t);
+    for (const chunk of chunks) chunk.colour = this._wayColour(index, chunk.past, chunk.active, colours);
+    return chunks;
+  }
+
+  /** Of one run the way tells who was active; several runs have each their own colour. */
+  _wayColour(index, past, active, colours) {
+    if (this._runMarks) return this._runMarks[index].colour;
+    const { regions } = this.runs[index].header;
+    return past ? fullColour(regions[Number.isFinite(active) ? active : 0]) : colours.future;
+  }
+
+  _marks(way, index, t, vehicle, colours) {
+    const { camera } = this;
+    const active = way.run.column("active");
+    const spacing = roundStep((110 * camera.distance) / camera.focal);
+    return way.marks(spacing).flatMap(({ row, time, from, middle }) => {
+      const [[x, y, near], [u, v, depth]] = [camera.project(from), camera.project(middle)];
+      const length = Math.hypot(u - x, v - y);
+      if (Math.min(near, depth) < camera.near || !(length > 1)) return [];
+      if (vehicle && Vec.norm(Vec.sub(middle, vehicle.pose.position)) < 1.5 * vehicle.size) return []; // not on the hull
+      const past = time <= t;
+      const onTop = Vec.along(middle, Vec.sub(camera.eye, middle), 0.02); // of the line that it marks
+      const colour = this._wayColour(index, past, active?.[row], colours);
+      return [{ mark: [u, v, (u - x) / length, (v - y) / length], middle: onTop, past, colour }];
+    });
+  }
+
+  /** Thin things of one list: faces one by one, neighbouring lines of one colour in one stroke. */
+  _paintThings(things, colours) {
+    const { context, painter } = this;
+    for (let k = 0; k < things.length; ) {
+      const thing = things[k];
+      if (!thing.points) {
+        k += 1;
+        if (thing.sight) paintSight(painter, thing.sight, thing.style);
+        else if (thing.line) paintBodyAxis(painter, thing, colours.ink);
+        else if (thing.mark) paintMark(painter, thing, colours);
+        else {
+          painter.begin();
+          painter.polygon(thing.corners);
+          painter.fill(thing.colour);
+          painter.stroke(thing.colour, 0.7); // closes the seams between faces
+        }
+        continue;
+      }
+      context.beginPath();
+      for (; k < things.length && things[k].points && things[k].colour === thing.colour && things[k].past === thing.past; k++) {
+        const { points } = things[k];
+        context.moveTo(points[0], points[1]);
+        for (let i = 2; i < points.length; i += 2) context.lineTo(points[i], points[i + 1]);
+      }
+      if (thing.past) painter.stroke(colours.halo, 6);
+      painter.stroke(thing.colour, thing.past ? 3 : 1.4, thing.past ? 1 : 0.7);
+    }
+  }
+
+  _note(t, poses, entries) {
+    const runs = this.runs.map((run, r) => {
+      const colours = run.header.regions.map((region, i) => {
+        const entry = entries.find(({ owners }) => owners.some(([a, b]) => a === r && b === i));
+        return entry ? entry.colour : null;
+      });
+      const { position = null, quaternion = null } = poses[r] ?? {};
+      return { position, quaternion, active: run.active(t), colours };
+    });
+    this._drawn = { time: t, runs };
+  }
+}
+
+/** The pose of a run's vehicle with its radius; null where it is no number, or where there are no rows. */
+function poseOf(run, t) {
+  if (!run.rows) return null;
+  const pose = run.pose(t);
+  return Vec.finite(pose.position) && Vec.finite(pose.quaternion) ? { ...pose, size: run.header.vehicle.radius } : null;
+}
