@@ -82,9 +82,10 @@ def _write_messages(writer: Writer, excerpt: Excerpt) -> None:
 def _tables(writer: Writer, excerpt: Excerpt) -> list[tuple[int, list[int]]]:
     """Return a channel for each group of signals, and where in a row of the record they are."""
     tables = []
-    for group, members in grouped(excerpt.columns).items():
+    groups = grouped(excerpt.columns)
+    for name, members in zip(legal(groups), groups.values(), strict=True):
         columns = [excerpt.columns[i] for i in members.values()]
-        fields, (name,) = legal(members), legal([group])
+        fields = legal(members)
         schema = writer.register_schema(f"{PACKAGE}.{name}", "protobuf", numbers_schema(PACKAGE, name, fields))
         said = {f: f"{c.name} [{c.unit or '-'}]: {c.description}" for f, c in zip(fields, columns, strict=True)}
         channel = writer.register_channel(f"/signals/{name}", "protobuf", schema, metadata=said)

@@ -166,7 +166,7 @@ class _Sender:
             self._recording.set_time(TIMELINE, duration=time)
             if before not in (None, path):  # a region of another kind stands there now
                 self._recording.log(before, rr.Clear(recursive=False))
-            self._recording.log(path, drawn)
+            self._recording.log(path, drawn, strict=True)
             before = path
         return kinds
 
@@ -184,10 +184,10 @@ class _Sender:
 
     def _send(self, path: str, columns: Any, rows: Any = slice(None)) -> None:
         time = rr.TimeColumn(TIMELINE, duration=self._time[rows])
-        self._recording.send_columns(path, indexes=[time], columns=columns)
+        self._recording.send_columns(path, indexes=[time], columns=columns, strict=True)
 
     def _stay(self, path: str, what: Any) -> None:
-        self._recording.log(path, what, static=True)
+        self._recording.log(path, what, static=True, strict=True)
 
 
 def _drawn(solid: Solid) -> Any:

@@ -17,19 +17,18 @@ from cosim.export.excerpt import excerpt_of
 class Format:
     """A format of other tools; `cosim.export.as_NAME` writes it."""
 
-    tools: str  # that read it
     extra: str = ""  # of this distribution, that brings what writing it needs
     beside: str = ""  # ending of a second file, in the place of the suffix
     whole: bool = False  # it has signals and rates of its own, and takes no choice of them
 
 
 FORMATS = {
-    "csv": Format("pandas, spreadsheets", beside=".units.csv"),
-    "npz": Format("NumPy"),
-    "mat": Format("MATLAB, Octave, SciPy"),
-    "mcap": Format("Foxglove, PlotJuggler", extra="mcap"),
-    "rrd": Format("Rerun", extra="rerun"),
-    "tlog": Format("QGroundControl, MAVProxy, pymavlink", extra="mavlink", whole=True),
+    "csv": Format(beside=".units.csv"),
+    "npz": Format(),
+    "mat": Format(),
+    "mcap": Format(extra="mcap"),
+    "rrd": Format(extra="rerun"),
+    "tlog": Format(extra="mavlink", whole=True),
 }
 
 

@@ -30,7 +30,7 @@ _SIGHT = 5.0  # radii of the hull that a shape of attitude is drawn long
 _TRAIL = 2000  # points
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Solid:
     """A region as it is drawn."""
 
@@ -43,7 +43,7 @@ class Solid:
     moves: bool  # by the columns of its shift
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Thruster:
     """An arrow of a vehicle, in its body."""
 
@@ -88,7 +88,10 @@ class Scene:
         self.log = log_of(excerpt.run)
         begun = [excerpt.run.planned.goal, *(r.region.shape for r in scenario.regions)]
         later = [(c["time"], c["region"], _shape(c["shape"])) for c in changes_of(excerpt.run, self.log)]
-        limits = self._limits([*begun, *(shape for _, _, shape in later)])
+        # an obstacle that may come has its numbers from where it waits, far away
+        waiting = {i + 1 for i, secondary in enumerate(scenario.regions) if secondary.seen}
+        all_shapes = [*enumerate(begun), *((i, shape) for _, i, shape in later)]
+        limits = self._limits([shape for i, shape in all_shapes if i not in waiting])
         self.solids = tuple(self._solid(i, shape, limits) for i, shape in enumerate(begun))
         self.changes = tuple((time, i, self._solid(i, shape, limits)) for time, i, shape in later)
         self._criteria = [secondary.criterion for secondary in scenario.regions]

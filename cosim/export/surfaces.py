@@ -34,7 +34,7 @@ _TIMES_SPLIT = 2  # of each triangle of the icosahedron that becomes a ball
 _GOLDEN = (1.0 + math.sqrt(5.0)) / 2.0
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Mesh:
     """Triangles abc whose normals (b - a) x (c - a) point outward."""
 

@@ -2,14 +2,18 @@
 
 import re
 
+import msgspec
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
 from cosim.export import export_run
 from cosim.export.names import legal
+from cosim.helm.orders import Aim, Change, Obstacle
 from cosim.record import load_record
 from cosim.replay.folder import load_run
+from cosim.run import run_scenario
+from cosim.scenario import load_scenario
 
 mcap_reader = pytest.importorskip("mcap.reader")
 decoder = pytest.importorskip("mcap_protobuf.decoder")
@@ -209,3 +213,50 @@ def test_chosen_signals_leave_the_scene_whole(run, tmp_path):
     )
     assert WELL_KNOWN.keys() <= read.messages.keys()
     assert read.messages["/log"][-1][1].message == "End of the run"
+
+
+@pytest.fixture(scope="module")
+def steered(tmp_path_factory):
+    """The folder of a run to which an obstacle comes, and grows, and whose target becomes another."""
+    orders = {
+        20: Obstacle(7, (5.0, 0.0, 2.0), 0.4),
+        40: Aim((4.0, -1.0, 2.0), 0.6),
+        60: Obstacle(7, (5.0, 0.3, 2.0), 0.8),
+        70: Change("regions.ship.shape.semi_axes.0", 3.5),
+    }
+    folder = tmp_path_factory.mktemp("steered")
+    log = folder / "log.jsonl"
+    log.write_bytes(b"".join(msgspec.json.encode({"step": k, "order": o}) + b"\n" for k, o in orders.items()))
+    scenario = load_scenario("harbour", ["commands.enabled=true", "time.duration=1"])
+    return run_scenario(scenario, folder / "run", report=False, orders=log).folder
+
+
+def test_spheres_as_they_are_drawn_give_the_recorded_clearances(steered, tmp_path):
+    """Through orders that bring them, move them and change their size."""
+    (path,) = export_run(steered, "mcap", tmp_path / "out.mcap")
+    read, record = Read(path), load_record(steered)
+    scenes, sizes = dict(read.messages["/scene"]), set()
+    scene = scenes[0]
+    for k, (at, frames) in enumerate(read.messages["/tf"]):
+        scene = scenes.get(at, scene)
+        shifts = {t.child_frame_id: vector(t.translation) for t in frames.transforms}
+        for entity in scene.entities:
+            for ball in entity.spheres:
+                if set(vector(ball.size)) == {ball.size.x}:
+                    centre = vector(ball.pose.position) + shifts.get(entity.frame_id, 0.0)
+                    gap = np.linalg.norm(shifts["place"] - centre) - ball.size.x / 2.0
+                    sign = -1.0 if entity.id == "goal" else 1.0
+                    clearance = record[f"{entity.id}.clearance"][k]
+                    # while an obstacle waits, it is a hundred kilometres up
+                    assert sign * gap == pytest.approx(clearance, abs=1e-6 if clearance < 1e3 else 10.0)
+                    sizes.add((entity.id, round(ball.size.x, 6)))
+    assert {size for name, size in sizes if name != "goal"} >= {0.8, 1.6}
+    assert ("goal", 1.2) in sizes
+
+
+def test_an_obstacle_that_waits_far_away_does_not_widen_the_scene(steered, tmp_path):
+    (path,) = export_run(steered, "mcap", tmp_path / "out.mcap")
+    _, scene = Read(path).messages["/scene"][0]
+    planes = [vector(p) for e in scene.entities for drawn in e.triangles for p in drawn.points]
+    assert planes
+    assert np.abs(planes).max() < 200.0
