@@ -190,7 +190,9 @@ class Panel {
       const item = element("li");
       const button = element("button", `event ${kind}`);
       button.type = "button";
-      button.append(element("span", "at", clock(time)), element("span", "text", text));
+      const mark = element("span", `mark-at ${kind}`);
+      mark.setAttribute("aria-hidden", "true");
+      button.append(mark, element("span", "at", clock(time)), element("span", "text", text));
       button.addEventListener("click", () => this.player.seek(time));
       item.append(button);
       list.append(item);

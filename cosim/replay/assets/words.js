@@ -148,10 +148,12 @@ function troubles(run) {
   if (absent.length) said.push(`The record has no signals named ${absent.join(", ")}: what rests on them is left out.`);
   if (!run.rows) said.push("The record has no row.");
   if (run.rows === 1) said.push("The record has one row only: there is nothing to play.");
-  const holes = run.header.signals.filter(({ name }) => run.column(name).includes(NaN)).map(({ name }) => name);
+  const { gaps = {} } = run.header; // of the whole record, which may have more rows than the page
+  const holes = run.header.signals.map(({ name }) => name).filter((name) => gaps[name] || run.column(name).includes(NaN));
   if (holes.length) {
+    const told = holes.slice(0, 4).map((name) => (gaps[name] ? `${name} (${gaps[name]} steps)` : name));
     const more = holes.length > 4 ? ` and ${holes.length - 4} more` : "";
-    said.push(`No number at some times in ${holes.slice(0, 4).join(", ")}${more}: gaps in the curves are gaps in the record.`);
+    said.push(`No number at some times in ${told.join(", ")}${more}: gaps in the curves are gaps in the record.`);
   }
   return said;
 }
