@@ -114,9 +114,13 @@ def rerun(options: argparse.Namespace) -> int:
         print(f"cosim: row {done.key}: {name} was {before!r}, is {now!r} now", file=sys.stderr)
     if not done.differing:
         print(f"row {done.key}: flown again, identical to the last bit")
+    for name, (before, now) in done.apart.items():
+        print(f"cosim: row {done.key}, step by step: {name} was {before!r}, is {now!r} now", file=sys.stderr)
+    if done.stopped is not None:
+        print(f"row {done.key}: step by step too the plant stops: {done.stopped}")
     if done.run is not None:
         print(verdict(done.run.summary))
         print(done.run.folder / "report.html")
         if done.run.summary["status"] == "interrupted":
             return INTERRUPTED
-    return 1 if done.differing else 0
+    return 1 if done.differing or done.apart else 0
