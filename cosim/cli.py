@@ -13,7 +13,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from cosim.command_line import campaigns, mavlink, package, run, sitl, sweep
+from cosim.command_line import campaigns, mavlink, package, replay, run, sitl, sweep
 from cosim.command_line.campaigns import INTERRUPTED
 
 _EPILOG = """examples:
@@ -48,8 +48,10 @@ def _parser() -> argparse.ArgumentParser:
 
     run.add_verb(verbs)
 
-    report = verbs.add_parser("report", help="write summary and report of a run again, or of a killed one")
+    report = verbs.add_parser("report", help="write summary, report and replay of a run again, or of a killed one")
     report.add_argument("folder", type=Path, metavar="DIR", help="the run folder")
+
+    replay.add_verb(verbs)
 
     verbs.add_parser("list", help="list the shipped scenarios")
 
@@ -125,11 +127,13 @@ def _log(verbose: bool) -> None:
 
 
 def _report(options: argparse.Namespace) -> int:
+    from cosim.replay.page import REPLAY
     from cosim.report_words import verdict
     from cosim.run_folder import report_again
 
     print(verdict(report_again(options.folder)))
     print(options.folder / "report.html")
+    print(options.folder / REPLAY)
     return 0
 
 
@@ -172,6 +176,7 @@ def _calibrate(options: argparse.Namespace) -> int:
 _VERBS = {
     "run": run.run,
     "report": _report,
+    "replay": replay.replay,
     "list": _list,
     "show": _show,
     "check": _check,

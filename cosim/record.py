@@ -140,8 +140,13 @@ class Record:
         """Return several signals side by side, shape (steps, len(names))."""
         return np.column_stack([self[name] for name in names])
 
-    def blocks(self) -> Iterator[Array]:
-        """Yield all rows in their order, in blocks of shape (n, len(columns)) that fit into memory.
+    def blocks(self, names: Sequence[str] | None = None) -> Iterator[Array]:
+        """Yield all rows in their order, in blocks of shape (n, len(names)) that fit into memory.
+
+        Parameters
+        ----------
+        names : sequence of str, optional
+            Which signals; default: all, in the order of the columns.
 
         Raises
         ------
@@ -151,8 +156,9 @@ class Record:
         for file in self._files:
             try:
                 with pq.ParquetFile(file) as parquet:
-                    for batch in parquet.iter_batches(_BLOCK):
-                        yield np.column_stack([column.to_numpy() for column in batch.columns])
+                    for batch in parquet.iter_batches(_BLOCK, columns=names):
+                        columns = batch.columns if names is None else [batch.column(name) for name in names]
+                        yield np.column_stack([column.to_numpy() for column in columns])
             except (OSError, pa.ArrowException) as error:
                 raise RunError(f"{file}: cannot be read: {error}") from error
 

@@ -1,9 +1,8 @@
-"""Run folders: claimed by one run, concluded with summary and report, or left as if nothing had been."""
+"""Run folders: claimed by one run, concluded with summary, report and replay, or left as if nothing had been."""
 
 from __future__ import annotations
 
 import contextlib
-import dataclasses
 import itertools
 import json
 import os
@@ -13,16 +12,15 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
-from cosim.came import as_it_came
 from cosim.errors import RunError
-from cosim.record import PARTS, load_record
+from cosim.record import PARTS
+from cosim.replay.folder import ORDERS, SCENARIO, SUMMARY, FlownRun, flown_run, load_run
+from cosim.replay.pages import write_replay
+from cosim.replay.trace import plain
 from cosim.report import write_report
-from cosim.scenario import VEHICLE_COPY, Scenario, load_scenario
-from cosim.summary import summarise
+from cosim.scenario import VEHICLE_COPY, Scenario
 
-SCENARIO = "scenario.toml"
-SUMMARY = "summary.json"
-ORDERS = "orders.jsonl"
+__all__ = ["ORDERS", "SCENARIO", "RunFolder", "claim", "conclude", "report_again"]
 
 
 @dataclass(frozen=True)
@@ -101,7 +99,7 @@ def _new_folder(parent: Path, name: str) -> Path:
 
 
 def conclude(path: Path, scenario: Scenario, status: str, wall_time: float | None, report: bool) -> dict[str, Any]:
-    """Write summary and report of a run from its record.
+    """Write summary, report and replay of a run from its record.
 
     Parameters
     ----------
@@ -114,7 +112,7 @@ def conclude(path: Path, scenario: Scenario, status: str, wall_time: float | Non
     wall_time : float or None
         What the stepping took [s].
     report : bool
-        Write the report and its figures too.
+        Write the report with its figures and the replay too.
 
     Returns
     -------
@@ -126,25 +124,13 @@ def conclude(path: Path, scenario: Scenario, status: str, wall_time: float | Non
     RunError
         If the record cannot be read.
     """
-    record = load_record(path)
-    scenario = as_it_came(scenario, record)
-    summary = summarise(scenario, record, status, wall_time)
-    if scenario.commands.enabled:
-        summary["orders"] = _lines(path / ORDERS)
-    scratch = path / f".{SUMMARY}-{os.getpid()}"
-    scratch.write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
-    scratch.replace(path / SUMMARY)
-    if report:
-        write_report(path, scenario, record, summary)
-    return summary
-
-
-def _lines(file: Path) -> int:
-    return len(file.read_bytes().splitlines()) if file.exists() else 0
+    run = flown_run(path, scenario, status, wall_time)
+    _write(run, report)
+    return run.summary
 
 
 def report_again(path: Path) -> dict[str, Any]:
-    """Write summary and report of a run that is done, was interrupted, or was killed.
+    """Write summary, report and replay of a run that is done, was interrupted, or was killed.
 
     Parameters
     ----------
@@ -160,21 +146,21 @@ def report_again(path: Path) -> dict[str, Any]:
     ------
     RunError
         If the folder holds no run that can be read, or cannot be written.
+    ScenarioError
+        If its scenario is none.
     """
-    if not (path / SCENARIO).is_file():
-        raise RunError(f"{path}: holds no run ({SCENARIO} is missing)")
-    scenario = load_scenario(path / SCENARIO)
-    status, wall_time = "killed", None
+    run = load_run(path)
     try:
-        before = json.loads((path / SUMMARY).read_text(encoding="utf-8"))
-        status, wall_time = str(before["status"]), before["wall_time"]
-        law = dataclasses.replace(scenario.law, name=str(before["law"]))  # or who flew in its place
-        scenario = dataclasses.replace(scenario, name=str(before["scenario"]), law=law)
-    except FileNotFoundError:
-        pass
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        raise RunError(f"{path / SUMMARY}: cannot be read: {error}") from error
-    try:
-        return conclude(path, scenario, status, wall_time, report=True)
+        _write(run, report=True)
     except OSError as error:
         raise RunError(f"{path}: {error.strerror or error}") from error
+    return run.summary
+
+
+def _write(run: FlownRun, report: bool) -> None:
+    scratch = run.path / f".{SUMMARY}-{os.getpid()}"
+    scratch.write_text(json.dumps(plain(run.summary), indent=2, allow_nan=False) + "\n", encoding="utf-8")
+    scratch.replace(run.path / SUMMARY)
+    if report:
+        write_report(run.path, run.scenario, run.record, run.summary)
+        write_replay(run)

@@ -77,6 +77,8 @@ def summarise(scenario: Scenario, record: Record, status: str, wall_time: float 
     speed = np.linalg.norm(record.stack([f"velocity.{axis}" for axis in "uvw"]), axis=1)
     simulated = float(time[-1])
     weights = record.stack([f"weight.{name}" for name in CRITERIA])
+    # extremes are of the numbers that there are: fmin and fmax pass over what is none
+    least = {name: float(np.fmin.reduce(record[f"{name}.clearance"])) for name in names}
     return {
         "scenario": scenario.name,
         "law": scenario.law.name,
@@ -89,29 +91,25 @@ def summarise(scenario: Scenario, record: Record, status: str, wall_time: float 
         "settled": settled,
         "settle_time": visits[-1][0] if visits else None,
         "final_position": [float(record[f"position.{axis}"][-1]) for axis in "xyz"],
-        "closest_to_goal": float(-record["goal.clearance"].max()),
+        "closest_to_goal": float(-np.fmax.reduce(record["goal.clearance"])),
         "intersection": [names[i] for i in scenario.intersection],
         "intersection_windows": spans(np.logical_and.reduce(overlap), time) if overlap else [],
-        "min_clearance": {name: float(record[f"{name}.clearance"].min()) for name in names},
+        "min_clearance": least,
         "clearance_unit": {r.region.name: "rad" if of_attitude(r.region.shape) else "m" for r in scenario.regions},
         "hard": [r.region.name for r in scenario.regions if r.region.hard],
-        "hard_violated": [
-            r.region.name
-            for r in scenario.regions
-            if r.region.hard and record[f"{r.region.name}.clearance"].min() < 0.0
-        ],
+        "hard_violated": [r.region.name for r in scenario.regions if r.region.hard and least[r.region.name] < 0.0],
         "violated_at_start": [name for name in names if record[f"{name}.clearance"][0] < 0.0],
-        "max_force": float(force.max()) if force.size else 0.0,
-        "max_force_asked": float(asked.max()),
-        "max_speed": float(speed.max()),
+        "max_force": float(np.fmax.reduce(force)) if force.size else 0.0,
+        "max_force_asked": float(np.fmax.reduce(asked)),
+        "max_speed": float(np.fmax.reduce(speed)),
         "weights_above_half": int((weights > 0.5).sum(axis=1).max()),
-        "weights_sum_max": float(weights.sum(axis=1).max()),
+        "weights_sum_max": float(np.fmax.reduce(weights.sum(axis=1))),
         "effort": float(force.sum() * period),
         "saturated_time": _saturated_time(record, acted, period),
         "estimate_final": [float(record[f"estimate.phi{i}"][-1]) for i in range(1, 5)],
         "estimate_true": scenario.true_restoring_parameters.tolist(),
-        "estimate_lowest": [float(record[f"estimate.phi{i}"].min()) for i in range(1, 5)],
-        "estimate_highest": [float(record[f"estimate.phi{i}"].max()) for i in range(1, 5)],
+        "estimate_lowest": [float(np.fmin.reduce(record[f"estimate.phi{i}"])) for i in range(1, 5)],
+        "estimate_highest": [float(np.fmax.reduce(record[f"estimate.phi{i}"])) for i in range(1, 5)],
         "lyapunov": summarise_lyapunov(record),
         "steps": round(simulated / scenario.time.step),
         "wall_time": wall_time,

@@ -37,7 +37,7 @@ def add_verb(verbs: Any) -> None:
         "--rate", type=_rate, metavar="N|max",
         help="simulated seconds a second at the most (default: 1 with --commands, else max)",
     )  # fmt: skip
-    run.add_argument("--no-report", action="store_true", help="leave out the report and its figures")
+    run.add_argument("--no-report", action="store_true", help="leave out the report, its figures and the replay")
     run.add_argument(
         "--orders", type=Path, metavar="FILE",
         help="repeat what an earlier run was ordered: its orders.jsonl, with its scenario.toml",
@@ -59,6 +59,7 @@ def _rate(text: str) -> float:
 
 def run(options: argparse.Namespace) -> int:
     """Run ``cosim run``."""
+    from cosim.replay.page import REPLAY
     from cosim.report_words import verdict
     from cosim.run import run_scenario
     from cosim.scenario import load_scenario
@@ -81,6 +82,8 @@ def run(options: argparse.Namespace) -> int:
     )
     print(verdict(done.summary))
     print(done.folder / ("summary.json" if options.no_report else "report.html"))
+    if not options.no_report:
+        print(done.folder / REPLAY)
     return INTERRUPTED if done.summary["status"] == "interrupted" else 0
 
 

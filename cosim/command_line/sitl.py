@@ -47,7 +47,7 @@ def add_verbs(verbs: Any) -> None:
         help="rows of the record a simulated second at the most (default: 100)",
     )  # fmt: skip
     sitl.add_argument("--out", type=Path, metavar="DIR", help="run folder (default: runs/SCENARIO-TIME)")
-    sitl.add_argument("--no-report", action="store_true", help="leave out the report and its figures")
+    sitl.add_argument("--no-report", action="store_true", help="leave out the report, its figures and the replay")
 
 
 def _port(text: str) -> int:
@@ -68,6 +68,7 @@ def _positive(text: str) -> float:
 
 def sitl(options: argparse.Namespace) -> int:
     """Run ``cosim sitl``."""
+    from cosim.replay.page import REPLAY
     from cosim.report_words import verdict
     from cosim.sitl.flights import FlightOptions, Flights
     from cosim.sitl.hil import HilServer
@@ -96,6 +97,8 @@ def sitl(options: argparse.Namespace) -> int:
     for run in outcome.runs:
         print(verdict(run.summary))
         print(run.folder / ("summary.json" if options.no_report else "report.html"))
+        if not options.no_report:
+            print(run.folder / REPLAY)
     return _code(outcome.runs)
 
 

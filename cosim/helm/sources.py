@@ -93,8 +93,8 @@ class _Entry(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     order: Order
 
 
-class RecordedOrders:
-    """The orders of an earlier run, at the steps at which that run took them.
+def read_log(file: Path) -> list[tuple[int, Order]]:
+    """Return the orders of an earlier run, each with the step that took it, in their order.
 
     A last line that was cut off, by a kill or a full disk, does not count: that run did not follow it either.
 
@@ -103,6 +103,42 @@ class RecordedOrders:
     file : Path
         The log.
 
+    Returns
+    -------
+    list of (int, Order)
+        As they were followed.
+
+    Raises
+    ------
+    RunError
+        If it cannot be read, or a line is no order.
+    """
+    try:
+        content = file.read_bytes()
+    except OSError as error:
+        raise RunError(f"{file}: {error.strerror or error}") from error
+    lines, whole = content.splitlines(), content.count(b"\n")
+    entries = []
+    for number, line in enumerate(lines, 1):
+        try:
+            entry = msgspec.json.decode(line, type=_Entry)
+            check_order(entry.order)
+        except (msgspec.DecodeError, OrderError) as error:
+            if type(error) is msgspec.DecodeError and number > whole:
+                break
+            raise RunError(f"{file}, line {number}: {error}") from error
+        entries.append((entry.step, entry.order))
+    return sorted(entries, key=lambda entry: entry[0])
+
+
+class RecordedOrders:
+    """The orders of an earlier run, at the steps at which that run took them.
+
+    Parameters
+    ----------
+    file : Path
+        The log, as for `read_log`.
+
     Raises
     ------
     RunError
@@ -110,22 +146,7 @@ class RecordedOrders:
     """
 
     def __init__(self, file: Path) -> None:
-        try:
-            content = file.read_bytes()
-        except OSError as error:
-            raise RunError(f"{file}: {error.strerror or error}") from error
-        lines, whole = content.splitlines(), content.count(b"\n")
-        entries = []
-        for number, line in enumerate(lines, 1):
-            try:
-                entry = msgspec.json.decode(line, type=_Entry)
-                check_order(entry.order)
-            except (msgspec.DecodeError, OrderError) as error:
-                if type(error) is msgspec.DecodeError and number > whole:
-                    break
-                raise RunError(f"{file}, line {number}: {error}") from error
-            entries.append(entry)
-        self._entries = deque(sorted(entries, key=lambda entry: entry.step))
+        self._entries = deque(read_log(file))
 
     @property
     def exhausted(self) -> bool:
@@ -135,8 +156,8 @@ class RecordedOrders:
     def take(self, k: int) -> Sequence[Order]:
         """Return the orders of step `k`, and of earlier ones that were not taken."""
         taken = []
-        while self._entries and self._entries[0].step <= k:
-            taken.append(self._entries.popleft().order)
+        while self._entries and self._entries[0][0] <= k:
+            taken.append(self._entries.popleft()[1])
         return taken
 
 

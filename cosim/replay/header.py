@@ -78,6 +78,7 @@ def _region(scenario: Scenario, index: int) -> dict[str, Any]:
         "hard": region.hard,
         "gain": region.gain,
         "moves": region.name in scenario.moving,
+        "comes": bool(secondary and secondary.seen),  # is there only while it is shifted
         "unit": "rad" if of_attitude(region.shape) else "m",  # of its clearance
         "shape": shape_of(region.shape),
     }

@@ -12,7 +12,19 @@ from typing import Any
 
 REPLAY = "replay.html"
 
-_SCRIPTS = ("data.js", "camera.js", "solids.js", "scene.js", "charts.js", "words.js", "player.js", "live.js", "main.js")
+_SCENE = (
+    "palette.js", "vectors.js", "camera.js", "solids.js", "pipes.js", "planes.js", "painter.js", "sights.js",
+    "vehicle.js", "trail.js", "bounds.js", "order.js", "labels.js", "floor.js", "controls.js", "scene.js",
+)  # fmt: skip
+_PLAYER = (
+    "player.js", "words.js", "curves.js", "axes.js", "plot.js", "charts.js", "board.js", "timeline.js", "panel.js",
+    "stage.js", "head.js", "keys.js", "page.js",
+)  # fmt: skip
+_SCRIPTS = ("data.js", *_SCENE, *_PLAYER, "live.js", "main.js")
+_STYLES = ("style.css", "panel.css", "layout.css")
+
+
+_MARK = '<script type="application/json" id="runs">'  # where the data of a page begins
 
 
 def replay_page(runs: Sequence[dict[str, Any]], title: str) -> str:
@@ -31,12 +43,14 @@ def replay_page(runs: Sequence[dict[str, Any]], title: str) -> str:
         HTML.
     """
     assets = resources.files("cosim.replay") / "assets"
-    script = "\n".join((assets / name).read_text(encoding="utf-8") for name in _SCRIPTS)
+    style, script = (
+        "\n".join((assets / name).read_text(encoding="utf-8") for name in names) for names in (_STYLES, _SCRIPTS)
+    )
     # "</" would end the element it stands in
     data = json.dumps(list(runs), separators=(",", ":"), allow_nan=False, ensure_ascii=False).replace("</", "<\\/")
     return Template((assets / "page.html").read_text(encoding="utf-8")).substitute(
         title=html.escape(title),
-        style=(assets / "style.css").read_text(encoding="utf-8"),
+        style=style,
         runs=data,
         script=script,
     )
@@ -60,5 +74,13 @@ def write_page(path: Path, runs: Sequence[dict[str, Any]], title: str) -> Path:
         The file.
     """
     scratch = path.with_name(f".{path.name}")
-    scratch.write_text(replay_page(runs, title), encoding="utf-8")
-    return scratch.replace(path)
+    try:
+        scratch.write_text(replay_page(runs, title), encoding="utf-8")
+        return scratch.replace(path)
+    finally:
+        scratch.unlink(missing_ok=True)
+
+
+def is_page(path: Path) -> bool:
+    """Return whether a file is a page of this kind."""
+    return _MARK in path.read_text(encoding="utf-8", errors="replace")

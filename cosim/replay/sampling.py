@@ -13,7 +13,9 @@ _MOST_BYTES = 6_000_000
 _PARTS = 100  # of the run, from each of which the extremes are kept
 
 
-def sampled_rows(time: Array, columns: int, telling: Array) -> NDArray[np.intp]:
+def sampled_rows(
+    time: Array, columns: int, telling: Array, moments: NDArray[np.intp] | None = None
+) -> NDArray[np.intp]:
     """Return the rows that a page has: evenly spaced ones, and the extremes between them of what tells the story.
 
     Parameters
@@ -24,6 +26,8 @@ def sampled_rows(time: Array, columns: int, telling: Array) -> NDArray[np.intp]:
         That the page has of each row.
     telling : ndarray, shape (steps, m)
         Signals whose extremes are kept.
+    moments : ndarray of int, optional
+        Steps at which something happened: they are kept, and the ones before them.
 
     Returns
     -------
@@ -35,6 +39,8 @@ def sampled_rows(time: Array, columns: int, telling: Array) -> NDArray[np.intp]:
     budget = min(_BYTES + _BYTES_A_MINUTE * max(0.0, minutes - 1.0), _MOST_BYTES)
     even = min(n, max(2, int(budget / (8 * columns))))
     keep = {int(i) for i in np.linspace(0, n - 1, even)}
+    if moments is not None:
+        keep |= {int(i) for i in np.concatenate([moments, moments - 1]) if 0 <= i < n}
     if even < n:
         for part in np.array_split(np.arange(n), min(_PARTS, even)):
             for signal in telling[part].T:

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import base64
+import dataclasses
+import math
 import zlib
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,11 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cosim.record import Record
+from cosim.replay.events import events_of
+from cosim.replay.folder import FlownRun
 from cosim.replay.header import header_of
 from cosim.replay.sampling import sampled_rows
+from cosim.replay.steering import changes_of, log_of
 from cosim.replay.viewing import Viewing
 from cosim.report_words import verdict
-from cosim.scenario import Scenario
 from cosim.signals import Array
 
 
@@ -45,38 +50,81 @@ class Trace:
         return {**self.header, "rows": len(self.rows), "data": base64.b64encode(packed).decode()}
 
 
-def trace_of(scenario: Scenario, record: Record, summary: dict[str, Any]) -> Trace:
+def trace_of(run: FlownRun) -> Trace:
     """Return what a page shows of a run.
 
     Parameters
     ----------
-    scenario : Scenario
-        What was run.
-    record : Record
-        What it left.
-    summary : dict
-        What it came to.
+    run : FlownRun
+        Any.
 
     Returns
     -------
     Trace
         Of few enough rows for a page.
+
+    Raises
+    ------
+    RunError
+        If its log of orders cannot be read.
     """
+    scenario, record, summary = run.scenario, run.record, run.summary
     viewing = Viewing(scenario, record.columns)
+    log = log_of(run)
+    changes, events = changes_of(run, log), events_of(run, log)
+    time = record["time"]
+    told = [t for event in events for t in (event.time, event.until) if t is not None]
+    moments = np.searchsorted(time, [*(change["time"] for change in changes), *told])
+    steps = sampled_rows(time, len(viewing.columns), _telling(run), moments)
     names = [record.columns[i].name for i in viewing.picked]
-    steps = sampled_rows(record["time"], len(viewing.columns), _telling(scenario, record))
-    picked = np.column_stack([record[name][steps] for name in names])
-    header = header_of(scenario, viewing.columns) | {
+    picked, missing = _read(record, names, steps)
+    # the goal's shape at the start: what it came to stands in the changes
+    begun = dataclasses.replace(scenario, goal=run.planned.goal)
+    header = header_of(begun, viewing.columns) | {
         "verdict": verdict(summary),
         "status": summary["status"],
         "summary": {key: summary[key] for key in ("min_clearance", "reach_time", "settle_time")},
+        "changes": changes,
+        "events": [dataclasses.asdict(event) for event in events],
+        "gaps": {name: int(count) for name, count in zip(names, missing, strict=True) if count},
     }
-    return Trace(header, viewing.extended(picked), steps)
+    return Trace(plain(header), viewing.extended(picked), steps)
 
 
-def _telling(scenario: Scenario, record: Record) -> Array:
+def plain(value: Any) -> Any:
+    """Return a value with None for each number that is none, since JSON has no other word for it.
+
+    Parameters
+    ----------
+    value : Any
+        Of texts, numbers, booleans, lists, tuples and dicts.
+
+    Returns
+    -------
+    Any
+        The same, tuples as lists.
+    """
+    if isinstance(value, dict):
+        return {key: plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [plain(item) for item in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def _read(record: Record, names: Sequence[str], steps: NDArray[np.intp]) -> tuple[Array, NDArray[np.intp]]:
+    """Read some rows of some signals; return them, and how many numbers of each signal are missing in all rows."""
+    rows, missing, first = [], np.zeros(len(names), np.intp), 0
+    for block in record.blocks(names):
+        within = steps[(steps >= first) & (steps < first + len(block))] - first
+        rows.append(block[within])
+        missing += np.isnan(block).sum(axis=0)
+        first += len(block)
+    return np.concatenate(rows), missing
+
+
+def _telling(run: FlownRun) -> Array:
     """Return the signals whose extremes a page must not miss, shape (steps, m)."""
-    clearances = [record[f"{secondary.region.name}.clearance"] for secondary in scenario.regions]
-    least = [np.minimum.reduce(clearances)] if clearances else []
-    force = np.linalg.norm(record.stack([f"command.{axis}" for axis in "XYZ"]), axis=1)
-    return np.column_stack([record["goal.clearance"], force, *least])
+    clearances = [run.record[f"{secondary.region.name}.clearance"] for secondary in run.scenario.regions]
+    least = [np.fmin.reduce(clearances)] if clearances else []
+    force = np.linalg.norm(run.record.stack([f"command.{axis}" for axis in "XYZ"]), axis=1)
+    return np.column_stack([run.record["goal.clearance"], force, *least])

@@ -10,6 +10,7 @@ from cosim.replay.activity import active_regions
 from cosim.scenario import CRITERIA, Scenario
 from cosim.signals import Array, Column
 from fuzzy_arbiter import Arbiter
+from fuzzy_arbiter.engines.firing import Firing
 
 _DRAWN = (  # beginnings of the names of what a view draws
     "time", "position.", "quaternion.", "velocity.", "attitude.", "membership.", "weight.", "estimate.", "command.",
@@ -42,9 +43,8 @@ class Viewing:
         self._memberships = [drawn.index(f"membership.{name}") for name in CRITERIA]
         self._weights = [drawn.index(f"weight.{name}") for name in CRITERIA]
         self._clearances = [drawn.index(f"{secondary.region.name}.clearance") for secondary in scenario.regions]
-        self._arbiter = Arbiter(engine="closed")
-        self._strengths: dict[tuple[float, ...], list[float]] = {}
-        rules = self._arbiter.system.rules
+        system = Arbiter(engine="closed").system
+        self._firing, rules = Firing(system), system.rules
         self.columns = (
             *(columns[i] for i in self.picked),
             Column("active", "", "Region that the arbiter gives way to: 0 the goal, then the regions in their order"),
@@ -66,15 +66,11 @@ class Viewing:
         """
         memberships = picked[:, self._memberships]
         active = active_regions(self._criteria, memberships, picked[:, self._weights], picked[:, self._clearances])
-        strengths = [self._rules_at(tuple(sample)) for sample in memberships.tolist()]
-        return np.column_stack([picked, active, np.array(strengths).reshape(len(picked), -1)])
-
-    def _rules_at(self, memberships: tuple[float, ...]) -> list[float]:
-        if memberships not in self._strengths:
-            if not all(0.0 <= x <= 1.0 for x in memberships):
-                return [np.nan] * len(self._arbiter.system.rules)
-            self._strengths[memberships] = [rule.strength for rule in self._arbiter.explain(memberships).rules]
-        return self._strengths[memberships]
+        numbers = ((memberships >= 0.0) & (memberships <= 1.0)).all(axis=1)
+        strengths = np.full((len(picked), len(self.columns) - len(self.picked) - 1), np.nan)
+        if numbers.any():
+            strengths[numbers] = np.column_stack(self._firing.strengths_of_many(memberships[numbers]))
+        return np.column_stack([picked, active, strengths])
 
 
 def _drawn(name: str) -> bool:

@@ -1,1 +1,163 @@
-// camera
+// The camera: where it looks from, and where a point of the world is seen. World is north, east, down; down is downwards.
+
+const HALF_VIEW = (24 * Math.PI) / 180; // rad, half of the angle of view across the picture's diagonal
+const STEEPEST = Math.PI / 2;
+
+/** A perspective camera that goes around a target. Several scenes may share one. */
+class Camera {
+  constructor() {
+    this.target = [0, 0, 0]; // m, NED
+    this.azimuth = 2.2; // rad, bearing of the eye from the target
+    this.elevation = 0.5; // rad, of the eye above the target
+    this.distance = 10; // m
+    this.content = []; // points that fit() brings into the picture
+    this.bearing = 0; // rad, towards which the content goes
+    this.listeners = new Set(); // called when the view changes
+    this.width = 1;
+    this.height = 1;
+    this._update();
+  }
+
+  /** Say how large the picture is [CSS pixels]. */
+  resize(width, height) {
+    if (this.width === width && this.height === height) return;
+    this.width = Math.max(1, width);
+    this.height = Math.max(1, height);
+    this._update();
+  }
+
+  /** Go around the target, as a hand that drags the scene by so many CSS pixels. */
+  orbit(dx, dy) {
+    this.azimuth += 0.008 * dx;
+    this.elevation = Math.min(STEEPEST, Math.max(-STEEPEST, this.elevation + 0.008 * dy));
+    this._changed();
+  }
+
+  /** Move so that the scene at the target goes along by so many CSS pixels. */
+  pan(dx, dy) {
+    const metres = this.distance / this.focal;
+    this.target = Vec.along(Vec.along(this.target, this.right, -dx * metres), this.up, dy * metres);
+    this._changed();
+  }
+
+  /** Come nearer by a factor; below 1 farther. */
+  zoom(factor) {
+    this.distance = Math.min(1e6, Math.max(0.2, this.distance / factor));
+    this._changed();
+  }
+
+  /** Put the target elsewhere, the direction of view kept. */
+  aim(target) {
+    this.target = [...target];
+    this._changed();
+  }
+
+  /**
+   * Look from a known side, at all that there is.
+   * @param {"iso"|"top"|"side"|"front"} name top: north is up; side: from east, north to the right; front: towards
+   * north, east to the right
+   */
+  look(name) {
+    // aslant, so that the way goes from left to right
+    const quarter = (Math.PI / 2) * Math.round(this.bearing / (Math.PI / 2));
+    const views = {
+      iso: [quarter + 2.2, 0.46],
+      top: [Math.PI, STEEPEST],
+      side: [Math.PI / 2, 0],
+      front: [Math.PI, 0],
+    };
+    [this.azimuth, this.elevation] = views[name];
+    this.fit();
+  }
+
+  /** Bring the content into the picture, the direction of view kept. */
+  fit() {
+    this._update();
+    if (this.content.length) {
+      const room = [this.width, this.height].map((size) => (0.5 * size - Math.min(56, 0.11 * size)) / this.focal);
+      const [d1, right] = this._fitted(this.right, room[0]);
+      const [d2, up] = this._fitted(this.up, room[1]);
+      const ahead = Vec.dot(this.target, this.forward);
+      this.target = Vec.along(Vec.along(Vec.scale(this.forward, ahead), this.right, right), this.up, up);
+      this.distance = Math.max(d1, d2, 0.5);
+      // the target goes to the content's middle, so that the camera turns about that
+      const depths = this.content.map((p) => Vec.dot(Vec.sub(p, this.target), this.forward));
+      const middle = 0.5 * (Math.min(...depths) + Math.max(...depths));
+      this.target = Vec.along(this.target, this.forward, middle);
+      this.distance += middle;
+    }
+    this._changed();
+  }
+
+  /** Pixels and depth [m] of a point: [x, y, depth]; meaningless unless depth is above `near`. */
+  project(p) {
+    const [x, y, z] = [p[0] - this.eye[0], p[1] - this.eye[1], p[2] - this.eye[2]];
+    const depth = x * this.forward[0] + y * this.forward[1] + z * this.forward[2];
+    const k = this.focal / depth;
+    return [
+      0.5 * this.width + k * (x * this.right[0] + y * this.right[1] + z * this.right[2]),
+      0.5 * this.height - k * (x * this.up[0] + y * this.up[1] + z * this.up[2]),
+      depth,
+    ];
+  }
+
+  /** The same for many points, three numbers each, that are shifted first; into `out`. */
+  projectAll(points, count, shift, out) {
+    const [r, u, f] = [this.right, this.up, this.forward];
+    const [ex, ey, ez] = Vec.sub(this.eye, shift);
+    const [r0, r1, r2, u0, u1, u2, f0, f1, f2] = [...r, ...u, ...f];
+    const [cx, cy, focal] = [0.5 * this.width, 0.5 * this.height, this.focal];
+    for (let i = 0; i < 3 * count; i += 3) {
+      const x = points[i] - ex;
+      const y = points[i + 1] - ey;
+      const z = points[i + 2] - ez;
+      const depth = x * f0 + y * f1 + z * f2;
+      const k = focal / depth;
+      out[i] = cx + k * (x * r0 + y * r1 + z * r2);
+      out[i + 1] = cy - k * (x * u0 + y * u1 + z * u2);
+      out[i + 2] = depth;
+    }
+  }
+
+  /** The unit vector from the eye through a pixel. */
+  ray(x, y) {
+    const right = (x - 0.5 * this.width) / this.focal;
+    const up = (0.5 * this.height - y) / this.focal;
+    return Vec.unit(Vec.along(Vec.along(this.forward, this.right, right), this.up, up));
+  }
+
+  /** Pixels of a metre at a point. */
+  scaleAt(p) {
+    return this.focal / Vec.dot(Vec.sub(p, this.eye), this.forward);
+  }
+
+  /** How far off, and how far to the side, all content is in the picture: closed, as each side bounds both linearly. */
+  _fitted(side, tangent) {
+    let most = -Infinity;
+    let least = Infinity;
+    for (const p of this.content) {
+      const across = Vec.dot(p, side);
+      const ahead = tangent * Vec.dot(Vec.sub(p, this.target), this.forward);
+      most = Math.max(most, across - ahead);
+      least = Math.min(least, across + ahead);
+    }
+    return [(most - least) / (2 * tangent), 0.5 * (most + least)];
+  }
+
+  _changed() {
+    this._update();
+    for (const listener of this.listeners) listener();
+  }
+
+  _update() {
+    const [ca, sa, ce, se] = [
+      Math.cos(this.azimuth), Math.sin(this.azimuth), Math.cos(this.elevation), Math.sin(this.elevation),
+    ];
+    this.forward = [-ce * ca, -ce * sa, se];
+    this.right = [sa, -ca, 0];
+    this.up = Vec.cross(this.right, this.forward);
+    this.eye = Vec.along(this.target, this.forward, -this.distance);
+    this.focal = (0.5 * Math.hypot(this.width, this.height)) / Math.tan(HALF_VIEW);
+    this.near = Math.min(0.1, 0.02 * this.distance);
+  }
+}

@@ -85,9 +85,17 @@ class Run {
 
   /** How far a region is from where its shape has it at a time [m, NED]. */
   shift(region, t) {
-    const name = this.header.regions[region].name;
+    const { name, comes } = this.header.regions[region];
     if (!this.has(`${name}.shift.x`)) return [0, 0, 0];
-    return ["x", "y", "z"].map((axis) => this.at(`${name}.shift.${axis}`, t));
+    const names = ["x", "y", "z"].map((axis) => `${name}.shift.${axis}`);
+    // what comes and goes is not on the way from nowhere
+    const leaps = comes && !(this.there(region, t) && this._isThere(region, Math.min(this.row(t) + 1, this.rows - 1)));
+    return names.map((signal) => (leaps ? this.held(signal, t) : this.at(signal, t)));
+  }
+
+  /** Whether a region is there at a time: obstacles that were told of while the run went on come and go. */
+  there(region, t) {
+    return this._isThere(region, this.row(t));
   }
 
   /** The shape of a region at a time: what was changed on the way stands in header.changes, in the order of time. */
@@ -117,6 +125,11 @@ class Run {
     }
     for (let i = 0; i < row.length; i++) this._columns[i][this.rows] = row[i];
     this.rows += 1;
+  }
+
+  _isThere(region, row) {
+    const { name, comes } = this.header.regions[region];
+    return !comes || ["x", "y", "z"].some((axis) => this.column(`${name}.shift.${axis}`)[row] !== 0);
   }
 
   _between(t) {

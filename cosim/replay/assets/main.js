@@ -1,1 +1,64 @@
-// main
+// The beginning: read the runs of the page and show them; without runs, ask the page's own host for a live one.
+
+const NO_RUN =
+  "This page holds no run. A run folder has its replay.html; “cosim replay RUN” writes one, of several runs as well.";
+const OLD_BROWSER =
+  "This browser cannot unpack the numbers of the run: it has no DecompressionStream. Any browser since 2023 has it.";
+
+/** The runs of the page, or null when that was said in their place. */
+async function runsOfPage(page) {
+  if (JSON.parse(document.getElementById("runs").textContent).length && typeof DecompressionStream === "undefined") {
+    page.nothing(OLD_BROWSER);
+    page.say(OLD_BROWSER, "error");
+    return null;
+  }
+  try {
+    return await loadRuns();
+  } catch (error) {
+    const text = `The numbers of this page cannot be read: ${error.message}. The file may be damaged; write it again.`;
+    page.nothing(text);
+    page.say(text, "error");
+    return null;
+  }
+}
+
+/** Begin. */
+async function main() {
+  const page = new Page();
+  /**
+   * What scripts and tests have of the page:
+   * - ready: true once the runs are shown, or it is said why there are none
+   * - runs: Run[]; player: Player (t, playing, speed, follow, live, play(), pause(), seek(t), stepRows(n), setSpeed(x))
+   * - scene: the first Scene (drawn, camera, pick), null while nothing can be drawn; scenes: all, side by side
+   * - charts: Chart[]; each has series() -> [{run (index in runs), name, label, time, values}], the arrays that are
+   *   drawn, paint(), setWindow(from, to), spec.key
+   * - show(runs): other runs in place of these; paint(): paint now, not with the next frame of the screen
+   * - page: the Page, as startLive() gets it (theme, setTheme, setSide, showRun, select, refresh, say)
+   */
+  window.subreach = {
+    ready: false,
+    page,
+    player: page.player,
+    get runs() {
+      return page.runs;
+    },
+    get scene() {
+      return page.scene();
+    },
+    get scenes() {
+      return page.stage.scenes;
+    },
+    get charts() {
+      return page.board.charts;
+    },
+    show: (runs) => page.show(runs),
+    paint: () => page.paint(),
+  };
+  const runs = await runsOfPage(page);
+  if (runs?.length) await page.show(runs);
+  else if (runs && location.protocol.startsWith("http")) await startLive(page);
+  else if (runs) page.nothing(NO_RUN);
+  window.subreach.ready = true;
+}
+
+main();

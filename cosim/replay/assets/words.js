@@ -1,1 +1,163 @@
-// words
+// What the numbers at the cursor say, in words. Nothing here touches the page.
+
+const NEEDED = ["time", ...["x", "y", "z"].map((a) => `position.${a}`), ...[0, 1, 2, 3].map((e) => `quaternion.e${e}`)];
+const DEGREES = 180 / Math.PI;
+const UNFINISHED = {
+  killed: "This run did not complete: it was killed. What follows ends with the last rows that were saved.",
+  interrupted: "This run did not complete: it was interrupted.",
+  reset: "This run did not complete: it was reset on the way.",
+};
+
+/** A number with three digits that count, at most `digits` after the point, and a true minus sign. */
+function figure(x, digits = 3) {
+  if (!Number.isFinite(x)) return "–";
+  const size = Math.abs(x);
+  const after = size >= 100 ? 0 : size >= 10 ? Math.min(1, digits) : size >= 1 ? Math.min(2, digits) : digits;
+  const text = size.toFixed(after);
+  return (x < 0 && Number(text) !== 0 ? "\u2212" : "") + text;
+}
+
+/** A quantity with its unit: kilo where it is large, degrees for radians. */
+function quantity(x, unit, digits = 3) {
+  if (!Number.isFinite(x)) return "no number";
+  if (unit === "rad") return `${figure(x * DEGREES, 1)}°`;
+  if (unit === "rad/s") return `${figure(x * DEGREES, 1)}°/s`;
+  if (Math.abs(x) >= 10000 && /^N/.test(unit)) return `${figure(x / 1000, 1)} k${unit.replace(".", "\u00b7")}`;
+  return unit ? `${figure(x, digits)} ${unit.replace(".", "\u00b7")}` : figure(x, digits);
+}
+
+/** Seconds as a clock reads them: 12.34 s, or 3:07.5 from the second minute on. */
+function clock(t, digits = 2) {
+  if (t < 100) return `${t.toFixed(digits)} s`;
+  const tenths = Math.round(t * 10);
+  return `${Math.floor(tenths / 600)}:${((tenths % 600) / 10).toFixed(1).padStart(4, "0")}`;
+}
+
+/** Names of runs that differ, for a page with several. */
+function runNames(runs) {
+  const names = runs.map((run) => run.header.name || run.header.title || "run");
+  const all = new Set(names);
+  if (all.size === names.length) return names;
+  return names.map((name, i) => (names.indexOf(name) === names.lastIndexOf(name) ? name : `${name} (${i + 1})`));
+}
+
+/** Whether a run has what it takes to be drawn in the scene. */
+function drawable(run) {
+  return run.rows > 0 && NEEDED.every((name) => run.has(name));
+}
+
+/** What a region asks: "obstacle · keep out · hard". */
+function regionWords(region) {
+  const keep = region.keep === "in" ? "keep inside" : "keep out";
+  const criterion = region.criterion ? `${region.criterion} · ${keep} · ${region.hard ? "hard" : "soft"}` : "goal · get inside";
+  return region.moves ? `${criterion} · moves` : criterion;
+}
+
+/** A clearance in words: "1.20 m clear", "violated by 0.03 m"; of the goal "2.00 m to go", "inside by 0.10 m". */
+function clearanceWords(clearance, region) {
+  if (!Number.isFinite(clearance)) return "no number";
+  const size = quantity(Math.abs(clearance), region.unit);
+  if (!region.criterion) return clearance < 0 ? `${size} to go` : `inside by ${size}`;
+  return clearance < 0 ? `violated by ${size}` : `${size} clear`;
+}
+
+/** Who is active at a time, and why: index, name, and a sentence. */
+function activeWords(run, t) {
+  const index = run.active(t);
+  const region = run.header.regions[index] ?? run.header.regions[0];
+  const clearance = run.at(`${region.name}.clearance`, t);
+  const asked = clearanceWords(clearance, region);
+  let sentence = `Nothing presses: the goal region alone steers, ${asked}.`;
+  if (region.criterion) {
+    const weight = run.held(`weight.${region.criterion}`, t);
+    const share = Number.isFinite(weight) ? ` with weight ${figure(weight, 2)}` : "";
+    sentence = `The criterion ${region.criterion} leads${share}; ${region.name} presses most: ${asked}.`;
+  } else if (clearance >= 0) {
+    sentence = `The vehicle is in the goal region, ${asked}.`;
+  }
+  if (!run.rows || Number.isNaN(run.held("active", t))) sentence = "The record does not say which region is active here.";
+  return { index: region === run.header.regions[0] ? 0 : index, name: region.name, region, sentence };
+}
+
+/** The rules of the arbiter and how strongly each fires at a time. */
+function firedRules(run, t) {
+  return run.header.rules.map((rule) => ({ ...rule, strength: run.held(`rule.${rule.label}`, t) }));
+}
+
+/** Regions with their clearances at a time, the most pressing first, the goal before all. */
+function distancesAt(run, t) {
+  const rows = run.header.regions.map((region, index) => ({
+    index,
+    region,
+    clearance: run.at(`${region.name}.clearance`, t),
+  }));
+  const press = (row) => (row.index === 0 ? -Infinity : Number.isNaN(row.clearance) ? Infinity : row.clearance);
+  return rows.sort((a, b) => press(a) - press(b) || a.index - b.index);
+}
+
+/** The size of a vector of three signals, one number for each row; null where one is missing. */
+function sizes(run, names) {
+  const [x, y, z] = names.map((name) => run.column(name));
+  if (!x || !y || !z) return null;
+  return Float64Array.from(x, (_, i) => Math.sqrt(x[i] * x[i] + y[i] * y[i] + z[i] * z[i]));
+}
+
+/** Numbers of the vehicle at a time: [name, text] in the order of the panel. */
+function numbersAt(run, t) {
+  const of = (name) => run.at(name, t);
+  const size = (names) => Math.hypot(...names.map(of));
+  const limited = ["wrench_saturated", "allocation_saturated"].some((name) => run.held(name, t) > 0);
+  return [
+    ["North, east", `${quantity(of("position.x"), "m")}, ${quantity(of("position.y"), "m")}`],
+    ["Depth", quantity(of("position.z"), "m")],
+    ["Speed over ground", quantity(size(["velocity.u", "velocity.v", "velocity.w"]), "m/s")],
+    ["Heading", quantity(of("attitude.yaw"), "rad")],
+    ["Roll, pitch", `${quantity(of("attitude.roll"), "rad")}, ${quantity(of("attitude.pitch"), "rad")}`],
+    ["Force asked", quantity(size(["command.X", "command.Y", "command.Z"]), "N")],
+    ["Force that acts", quantity(size(["actuation.X", "actuation.Y", "actuation.Z"]), "N")],
+    ["Limits", limited ? "cut what is asked" : "not reached"],
+  ];
+}
+
+/** Whether a run did all it was asked: "good", "bad" (a hard region violated, or never settled), or "fair". */
+function outcome(run) {
+  const { summary, regions } = run.header;
+  if (!summary) return "fair";
+  const broken = regions.filter((region) => summary.min_clearance?.[region.name] < 0);
+  if (broken.some((region) => region.hard) || summary.settle_time === null) return "bad";
+  return broken.length ? "fair" : "good";
+}
+
+/** What a reader must know before trusting a run's page: sentences, none for a run that is whole. */
+function troubles(run) {
+  const { status } = run.header;
+  const said = [];
+  if (status && status !== "completed") said.push(UNFINISHED[status] ?? `This run did not complete: it ${status}.`);
+  const missing = NEEDED.filter((name) => !run.has(name));
+  if (missing.length) said.push(`The record has no ${missing.join(", ")}: the scene cannot be drawn.`);
+  if (!run.rows) said.push("The record has no row yet.");
+  if (run.rows === 1) said.push("The record has one row only: there is nothing to play.");
+  const holes = run.header.signals.filter(({ name }) => run.column(name).includes(NaN)).map(({ name }) => name);
+  if (holes.length) {
+    const more = holes.length > 4 ? ` and ${holes.length - 4} more` : "";
+    said.push(`No number at some times in ${holes.slice(0, 4).join(", ")}${more}: gaps in the curves are gaps in the record.`);
+  }
+  return said;
+}
+
+/** Stretches of time in which a signal is below 0: [[from, to], ...]. */
+function below(run, name) {
+  const column = run.column(name);
+  const stretches = [];
+  if (!column) return stretches;
+  let from = -1;
+  for (let i = 0; i <= run.rows; i++) {
+    const under = i < run.rows && column[i] < 0;
+    if (under && from < 0) from = i;
+    if (!under && from >= 0) {
+      stretches.push([run.time[from], run.time[Math.min(i, run.rows - 1)]]);
+      from = -1;
+    }
+  }
+  return stretches;
+}

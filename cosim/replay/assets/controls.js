@@ -1,0 +1,49 @@
+// The hand on the scene: drag to orbit, with the right button or shift to pan, wheel or two fingers to zoom.
+
+/**
+ * Let pointers and wheel move a camera. Who wants a pointer for something else, such as dragging a region, listens on
+ * the canvas in the capturing phase and calls preventDefault() on its pointerdown.
+ * @param {HTMLCanvasElement} canvas  @param {function(): Camera} camera the one of this moment
+ */
+function controlCamera(canvas, camera) {
+  const held = new Map(); // pointers that are down, and where
+  canvas.style.touchAction = "none"; // else a finger would scroll the page too
+  const place = (event) => [event.offsetX, event.offsetY];
+
+  canvas.addEventListener("pointerdown", (event) => {
+    if (event.defaultPrevented) return;
+    canvas.setPointerCapture(event.pointerId);
+    held.set(event.pointerId, place(event));
+  });
+  canvas.addEventListener("pointermove", (event) => {
+    if (!held.has(event.pointerId)) return;
+    const before = [...held.values()];
+    const [x, y] = held.get(event.pointerId);
+    held.set(event.pointerId, place(event));
+    const [dx, dy] = [event.offsetX - x, event.offsetY - y];
+    if (held.size === 1) {
+      if (event.shiftKey || event.buttons & 6) camera().pan(dx, dy);
+      else camera().orbit(dx, dy);
+    } else if (held.size === 2) {
+      const after = [...held.values()];
+      const apart = ([a, b]) => Math.max(1, Math.hypot(a[0] - b[0], a[1] - b[1]));
+      camera().pan(0.5 * dx, 0.5 * dy);
+      camera().zoom(apart(after) / apart(before));
+    }
+  });
+  const release = (event) => held.delete(event.pointerId);
+  canvas.addEventListener("pointerup", release);
+  canvas.addEventListener("pointercancel", release);
+  canvas.addEventListener("lostpointercapture", release);
+  canvas.addEventListener("contextmenu", (event) => event.preventDefault());
+  canvas.addEventListener("dblclick", () => camera().fit());
+  canvas.addEventListener(
+    "wheel",
+    (event) => {
+      event.preventDefault();
+      const lines = event.deltaMode === 1 ? 30 : 1; // some wheels tell lines instead of pixels
+      camera().zoom(Math.exp(-0.0016 * Math.max(-300, Math.min(300, lines * event.deltaY))));
+    },
+    { passive: false },
+  );
+}

@@ -1,0 +1,141 @@
+// Which curves the charts have: signals of the runs with their names, colours and dashes.
+
+// Okabe and Ito's colours, darker on white and lighter on black where a line would else be faint.
+const HUES = {
+  light: {
+    vermillion: "#d55e00", orange: "#b07800", sky: "#2b87bd", green: "#008a65",
+    blue: "#0060a8", purple: "#b3558c", ink: "#1b2733", grey: "#9aa5b0",
+  },
+  dark: {
+    vermillion: "#ff7a33", orange: "#f0b030", sky: "#6cc4f2", green: "#1fc79a",
+    blue: "#8fa8ff", purple: "#e79ac8", ink: "#e8eef4", grey: "#5b6a78",
+  },
+};
+const OF_CRITERION = { obstacle: "vermillion", shape: "orange", depth: "sky" };
+const IN_TURN = ["blue", "vermillion", "green", "purple"];
+const OF_RUN = ["blue", "vermillion", "green", "purple", "orange", "sky"];
+const DASHES = [[], [7, 4], [2, 3], [10, 3, 2, 3], [14, 4], [4, 2, 1, 2, 1, 2]];
+const SHADES = [0, 0.5, 0.25, 0.65]; // how far to ink regions of one criterion go, in turn
+const NAMED = 6; // regions that the chart of distances tells by name
+
+/** The dash of a run, where a page has several. */
+function runDash(index) {
+  return DASHES[index % DASHES.length];
+}
+
+/** The CSS colour of a hue in a theme, moved by `shade` towards the ink. */
+function hueColour(hue, theme, shade = 0) {
+  const base = HUES[theme][hue];
+  if (!shade) return base;
+  const [from, to] = [base, HUES[theme].ink].map((hex) => [1, 3, 5].map((i) => parseInt(hex.slice(i, i + 2), 16)));
+  return `rgb(${from.map((x, i) => Math.round(x + shade * (to[i] - x))).join(" ")})`;
+}
+
+/** A signal of a chart: the same of every run. */
+function signal(name, label, hue, more = {}) {
+  return { name, label, hue, shade: 0, dash: [], faint: false, context: false, values: (run) => run.column(name), ...more };
+}
+
+/** Signals with names from a list, coloured in turn; from the fifth on darker and dashed. */
+function inTurn(names, labels) {
+  const again = { dash: [6, 3], shade: 0.45 };
+  return names.map((name, i) => signal(name, labels[i], IN_TURN[i % 4], i < 4 ? {} : again));
+}
+
+/** Signals derived from others, kept until rows are added. */
+function derived(compute) {
+  const kept = new WeakMap();
+  return (run) => {
+    const before = kept.get(run);
+    if (before && before.rows === run.rows) return before.values;
+    const values = compute(run);
+    kept.set(run, { rows: run.rows, values });
+    return values;
+  };
+}
+
+/** Clearances of the regions with one unit: the nearest by name, the others thin and grey. */
+function clearances(runs, unit) {
+  const found = new Map();
+  for (const run of runs) {
+    for (const region of run.header.regions) {
+      const column = region.unit === unit && run.column(`${region.name}.clearance`);
+      if (!column) continue;
+      const before = found.get(region.name) ?? { region, least: Infinity };
+      found.set(region.name, { region, least: column.reduce((a, b) => (b < a ? b : a), before.least) });
+    }
+  }
+  const near = [...found.values()].filter(({ region }) => region.criterion).sort((a, b) => a.least - b.least);
+  const named = new Set(near.slice(0, NAMED).map(({ region }) => region.name));
+  const seen = {};
+  return [...found.values()].map(({ region }) => {
+    const faint = Boolean(region.criterion) && !named.has(region.name);
+    const nth = faint ? 0 : (seen[region.criterion] = (seen[region.criterion] ?? -1) + 1);
+    return signal(`${region.name}.clearance`, region.name, faint ? "grey" : OF_CRITERION[region.criterion] ?? "green", {
+      shade: faint ? 0 : SHADES[nth % SHADES.length],
+      dash: faint ? [] : DASHES[nth % DASHES.length],
+      faint,
+    });
+  });
+}
+
+/** Estimates with what is true beside them, dashed. */
+function estimates(indices) {
+  return indices.flatMap((i) => {
+    const hue = IN_TURN[i % IN_TURN.length];
+    const truth = derived((run) => {
+      const value = run.header.truth?.estimate?.[i];
+      return value === undefined ? null : new Float64Array(run.rows).fill(value);
+    });
+    return [
+      signal(`estimate.phi${i + 1}`, `φ${i + 1}`, hue),
+      signal(`truth.phi${i + 1}`, `true φ${i + 1}`, hue, { dash: [3, 3], context: true, values: truth }),
+    ];
+  });
+}
+
+/**
+ * The charts of some runs, without those for which no run has a signal.
+ *
+ * @returns {object[]} with key, title, unit, signals (name, label, hue, shade, dash, faint, context, values(run)), and
+ *   where they hold zero (below it is violated), fixed ([least, most]), down (the axis points down), tall
+ */
+function chartsOf(runs) {
+  const criteria = (kind) => Object.entries(OF_CRITERION).map(([name, hue]) => signal(`${kind}.${name}`, name, hue));
+  const axes = (kind, letters, words = letters) => inTurn([...letters].map((a) => `${kind}.${a}`), [...words]);
+  const size = (kind) => derived((run) => sizes(run, ["X", "Y", "Z"].map((axis) => `${kind}.${axis}`)));
+  const thrusters = Math.max(0, ...runs.map((run) => run.header.vehicle?.thrusters?.length ?? 0));
+  const numbers = Array.from({ length: thrusters }, (_, i) => i + 1);
+  return [
+    { key: "distances", title: "Distance to each region", unit: "m", zero: true, tall: true, signals: clearances(runs, "m") },
+    { key: "angles", title: "Angle to each region of attitude", unit: "rad", zero: true, signals: clearances(runs, "rad") },
+    { key: "weights", title: "Weights of the arbiter", unit: "", fixed: [0, 1], signals: criteria("weight") },
+    { key: "memberships", title: "Attention that each criterion asks", unit: "", fixed: [0, 1], signals: criteria("membership") },
+    {
+      key: "forces", title: "Force, size", unit: "N",
+      signals: [
+        signal("command.size", "asked", "vermillion", { values: size("command") }),
+        signal("actuation.size", "acts", "blue", { dash: [6, 3], values: size("actuation") }),
+      ],
+    },
+    { key: "asked", title: "Force asked, body frame", unit: "N", signals: axes("command", "XYZ") },
+    { key: "acting", title: "Force that acts, body frame", unit: "N", signals: axes("actuation", "XYZ") },
+    { key: "moments", title: "Moment asked, body frame", unit: "N.m", signals: axes("command", "KMN") },
+    { key: "turning", title: "Moment that acts, body frame", unit: "N.m", signals: axes("actuation", "KMN") },
+    {
+      key: "thrusters", title: "Force of each thruster", unit: "N",
+      signals: inTurn(numbers.map((i) => `thruster_force[${i}]`), numbers.map((i) => `thruster ${i}`)),
+    },
+    { key: "estimate", title: "Estimate of φ1, weight less buoyancy", unit: "N", signals: estimates([0]) },
+    { key: "levers", title: "Estimates of φ2 to φ4, levers of weight", unit: "N.m", signals: estimates([1, 2, 3]) },
+    { key: "depth", title: "Depth", unit: "m", down: true, signals: [signal("position.z", "depth", "blue")] },
+    { key: "speed", title: "Velocity over ground, body frame", unit: "m/s", signals: axes("velocity", "uvw") },
+    {
+      key: "attitude", title: "Attitude", unit: "rad",
+      signals: inTurn(["attitude.roll", "attitude.pitch", "attitude.yaw"], ["roll", "pitch", "yaw"]),
+    },
+  ].filter((spec) => {
+    spec.signals = spec.signals.filter((one) => runs.some((run) => one.values(run)));
+    return spec.signals.length;
+  });
+}

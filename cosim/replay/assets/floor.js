@@ -1,0 +1,169 @@
+// What tells places and sizes: a grid under the scene, a ruler of depth, shadows, north, and a scale.
+
+/** 1, 2 or 5 times a power of ten, at least so great. */
+function roundStep(least) {
+  const power = 10 ** Math.floor(Math.log10(least));
+  return power * [1, 2, 5, 10].find((k) => k * power >= least * (1 - 1e-9));
+}
+
+/** A number of metres, with the digits that a step asks for. */
+function metres(x, step) {
+  const text = x.toFixed(Math.max(0, -Math.floor(Math.log10(step) + 1e-9)));
+  return Number(text) === 0 ? "0" : text;
+}
+
+/** The multiples of a step within two bounds. */
+function multiples(low, high, step) {
+  const from = Math.ceil(low / step - 1e-6);
+  const to = Math.floor(high / step + 1e-6);
+  return Array.from({ length: Math.max(0, to - from + 1) }, (_, i) => (from + i) * step);
+}
+
+/** How far apart lines are: wide enough to be read where the camera looks, not too many for the bounds. */
+function gridStep(camera, [low, high]) {
+  const readable = (64 * camera.distance) / camera.focal;
+  const extent = Math.max(high[0] - low[0], high[1] - low[1]);
+  return roundStep(Math.max(readable, extent / 60));
+}
+
+/** The grid on the bounds' floor, with metres along the sides that are towards the eye. */
+function paintFloor(painter, labels, bounds, colours, named) {
+  const { camera } = painter;
+  const [[n0, e0], [n1, e1, floor]] = bounds;
+  const step = gridStep(camera, bounds);
+  const [norths, easts] = [multiples(n0, n1, step), multiples(e0, e1, step)];
+  painter.begin();
+  painter.polygon([[n0, e0, floor], [n1, e0, floor], [n1, e1, floor], [n0, e1, floor]]);
+  painter.fill(colours.floor);
+  painter.begin();
+  for (const n of norths) painter.segment([n, e0, floor], [n, e1, floor]);
+  for (const e of easts) painter.segment([n0, e, floor], [n1, e, floor]);
+  painter.stroke(colours.grid, 1);
+  painter.begin();
+  painter.line([[n0, e0, floor], [n1, e0, floor], [n1, e1, floor], [n0, e1, floor], [n0, e0, floor]]);
+  painter.stroke(colours.gridMajor, 1.2);
+  if (!named) return;
+  // the side on which a label is nearer to the eye
+  const nearer = (a, b) => {
+    const [p, q] = [camera.project(a), camera.project(b)];
+    return Math.abs(p[1] - q[1]) > 1 ? p[1] > q[1] : p[2] < q[2];
+  };
+  const middle = [0.5 * (n0 + n1), 0.5 * (e0 + e1)];
+  const east = nearer([middle[0], e1, floor], [middle[0], e0, floor]) ? [e1, 1] : [e0, -1];
+  const north = nearer([n1, middle[1], floor], [n0, middle[1], floor]) ? [n1, 1] : [n0, -1];
+  const name = (key, at, outward, text, rank) => {
+    const p = camera.project(at);
+    const q = camera.project(Vec.add(at, outward));
+    if (p[2] < camera.near || q[2] < camera.near) return;
+    const length = Math.hypot(q[0] - p[0], q[1] - p[1]) || 1;
+    const off = rank > 40 ? 13 : 32;
+    const x = p[0] + (off * (q[0] - p[0])) / length;
+    const y = p[1] + (off * (q[1] - p[1])) / length + (length < 2 ? off : 0);
+    labels.add({ key, text, x, y, colour: colours.soft, size: 11, rank, gap: 0, sides: ["here"] });
+  };
+  const out = 0.02 * camera.distance;
+  name("north", [middle[0], east[0], floor], [0, out * east[1], 0], "north [m]", 40);
+  name("east", [north[0], middle[1], floor], [out * north[1], 0, 0], "east [m]", 40);
+  for (const n of norths) name(`n${n}`, [n, east[0], floor], [0, out * east[1], 0], metres(n, step), 60);
+  for (const e of easts) name(`e${e}`, [north[0], e, floor], [out * north[1], 0, 0], metres(e, step), 60);
+}
+
+/** A ruler of depth on the upright edge of the bounds that is farthest to the left. */
+function paintRuler(painter, labels, bounds, colours, named) {
+  const { camera } = painter;
+  const [low, high] = bounds;
+  const corners = [low, high].flatMap(([n]) => [low, high].map(([, e]) => [n, e]));
+  const feet = corners.map(([n, e]) => [n, e, camera.project([n, e, high[2]])]).filter((foot) => foot[2][2] > camera.near);
+  if (!feet.length) return;
+  const [n, e, foot] = feet.reduce((a, b) => (b[2][0] < a[2][0] ? b : a));
+  const head = camera.project([n, e, low[2]]);
+  const pixels = Math.hypot(head[0] - foot[0], head[1] - foot[1]);
+  if (head[2] < camera.near || pixels < 40) return;
+  const step = roundStep(((high[2] - low[2]) * 34) / pixels);
+  painter.begin();
+  painter.segment([n, e, low[2]], [n, e, high[2]]);
+  painter.stroke(colours.gridMajor, 1.2);
+  painter.context.beginPath();
+  for (const depth of multiples(low[2], high[2], step)) {
+    const [x, y] = camera.project([n, e, depth]);
+    painter.context.moveTo(x, y);
+    painter.context.lineTo(x - 5, y);
+    const word = { colour: colours.soft, size: 11, x, y, gap: 9, sides: ["left"] };
+    if (named) labels.add({ ...word, key: `d${depth}`, text: metres(depth, step), rank: 50 });
+  }
+  painter.stroke(colours.gridMajor, 1.2);
+  const title = { key: "depth", text: "depth [m]", colour: colours.soft, size: 11, rank: 40 };
+  if (named) labels.add({ ...title, x: head[0], y: head[1], gap: 9, sides: ["above"] });
+}
+
+/** Where the water ends, if the bounds reach up to it. */
+function paintSurface(painter, bounds, colours) {
+  const [[n0, e0, top], [n1, e1]] = bounds;
+  if (top > 0) return;
+  painter.begin();
+  painter.line([[n0, e0, 0], [n1, e0, 0], [n1, e1, 0], [n0, e1, 0], [n0, e0, 0]]);
+  painter.stroke(colours.gridMajor, 1, 0.9, [2, 4]);
+}
+
+/** The outline of points seen from above, north and east in turn: their convex hull, after Andrew. */
+function outlineFromAbove(points) {
+  const flat = [];
+  for (let i = 0; i < points.length; i += 3) flat.push([points[i], points[i + 1]]);
+  flat.sort((a, b) => a[0] - b[0] || a[1] - b[1]);
+  const left = (a, b, c) => (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]) > 1e-12;
+  const half = (sorted) => {
+    const chain = [];
+    for (const p of sorted) {
+      while (chain.length > 1 && !left(chain[chain.length - 2], chain[chain.length - 1], p)) chain.pop();
+      chain.push(p);
+    }
+    return chain.slice(0, -1);
+  };
+  return [...half(flat), ...half([...flat].reverse())];
+}
+
+/** North, east and down in a corner, and how long a metre is where the camera looks. */
+function paintCompass(painter, labels, colours) {
+  const { context, camera } = painter;
+  const [x, y, size] = [46, camera.height - 46, 26];
+  const axes = [["N", [1, 0, 0]], ["E", [0, 1, 0]], ["D", [0, 0, 1]]];
+  context.lineCap = "round";
+  context.textAlign = "center";
+  context.textBaseline = "middle";
+  for (const [name, axis] of axes.sort((a, b) => Vec.dot(b[1], camera.forward) - Vec.dot(a[1], camera.forward))) {
+    const [dx, dy] = [size * Vec.dot(axis, camera.right), -size * Vec.dot(axis, camera.up)];
+    context.beginPath();
+    context.moveTo(x, y);
+    context.lineTo(x + dx, y + dy);
+    painter.stroke(name === "N" ? colours.ink : colours.soft, name === "N" ? 2.6 : 1.8);
+    const length = Math.hypot(dx, dy);
+    if (length < 8) continue;
+    context.fillStyle = name === "N" ? colours.ink : colours.soft;
+    context.font = "600 11px system-ui, sans-serif";
+    context.fillText(name, x + (dx * (length + 9)) / length, y + (dy * (length + 9)) / length);
+  }
+  context.lineCap = "butt";
+  labels.block(x - 40, y - 40, 80, 80);
+}
+
+/** A length of the world at the target, and what else the picture's scale says. */
+function paintScale(painter, labels, colours, magnified) {
+  const { context, camera } = painter;
+  const pixels = camera.focal / camera.distance;
+  const length = roundStep(60 / pixels) > 110 / pixels ? roundStep(30 / pixels) : roundStep(60 / pixels);
+  const [x, y] = [camera.width - 16 - length * pixels, camera.height - 18];
+  context.beginPath();
+  context.moveTo(x, y - 4);
+  context.lineTo(x, y);
+  context.lineTo(x + length * pixels, y);
+  context.lineTo(x + length * pixels, y - 4);
+  painter.stroke(colours.ink, 1.5);
+  const text = `${length < 1000 ? length : length / 1000} ${length < 1000 ? "m" : "km"}`;
+  const size = magnified > 1.05 ? ` · vehicle ×${magnified.toPrecision(2)}` : "";
+  context.font = "11px system-ui, sans-serif";
+  context.textAlign = "right";
+  context.textBaseline = "bottom";
+  context.fillStyle = colours.ink;
+  context.fillText(text + size, camera.width - 16, y - 6);
+  labels.block(Math.min(x, camera.width - 150) - 6, y - 22, 180, 40);
+}

@@ -1,0 +1,54 @@
+// The head of the page: what was asked, what happened, what a reader must know before; and the line between the halves.
+
+/** Tell the head of the selected run, and of the troubles of all. */
+function tellHead(runs, selected) {
+  const title = document.getElementById("title");
+  const run = runs[selected];
+  const names = runNames(runs);
+  title.textContent = run ? run.header.title || names[selected] : document.title;
+  const asked = document.getElementById("asked");
+  asked.replaceChildren();
+  const verdict = document.getElementById("verdict");
+  verdict.textContent = "";
+  if (run) {
+    const text = `${runs.length > 1 ? `${names[selected]}: ` : ""}${run.header.asked ?? ""}`;
+    asked.append(text.length > 260 ? folded(text) : text);
+    verdict.className = run.header.verdict ? outcome(run) : "";
+    verdict.textContent = run.header.verdict ?? "";
+  }
+  const said = runs.flatMap((one, i) => troubles(one).map((text) => (runs.length > 1 ? `${names[i]}: ${text}` : text)));
+  document.getElementById("troubles").replaceChildren(...said.map((text) => element("li", "", text)));
+}
+
+/** A long text, of which the beginning is seen until it is opened. */
+function folded(text) {
+  const details = element("details");
+  const cut = text.lastIndexOf(",", 200) + 1 || 200;
+  const summary = element("summary", "", text.slice(0, cut));
+  summary.append(element("span", "more", " … more"));
+  details.append(summary, element("span", "", text.slice(cut)));
+  return details;
+}
+
+/** The line between scene and charts is dragged, or moved by the arrow keys. */
+function listenToSplitter() {
+  const splitter = document.getElementById("splitter");
+  const main = document.getElementById("main");
+  const set = (percent) => {
+    const part = Math.min(85, Math.max(20, percent));
+    main.style.setProperty("--scene", `${part}%`);
+    splitter.setAttribute("aria-valuenow", String(Math.round(part)));
+  };
+  splitter.addEventListener("pointerdown", (event) => splitter.setPointerCapture(event.pointerId));
+  splitter.addEventListener("pointermove", (event) => {
+    if (!splitter.hasPointerCapture(event.pointerId)) return;
+    const box = main.getBoundingClientRect();
+    set((100 * (event.clientY - box.top)) / box.height);
+  });
+  splitter.addEventListener("keydown", (event) => {
+    const by = { ArrowUp: -4, ArrowDown: 4 }[event.key];
+    if (!by || event.altKey) return;
+    event.preventDefault();
+    set(Number(splitter.getAttribute("aria-valuenow")) + by);
+  });
+}

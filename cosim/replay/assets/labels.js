@@ -1,0 +1,101 @@
+// Words in the scene that do not lie upon each other: the important ones first, the rest where there is room.
+
+/** Places words and draws them. */
+class Labels {
+  constructor(context) {
+    this.context = context;
+    this._widths = new Map();
+    this._sides = new Map(); // where each word stood in the last frame, so that it does not jump
+    this.begin(0, 0);
+  }
+
+  /** Forget the words of the last frame. */
+  begin(width, height) {
+    this.width = width;
+    this.height = height;
+    this._words = [];
+    this._taken = [];
+    this.placed = []; // {key, x, y, width, height} of the words that were drawn
+  }
+
+  /** Keep words out of a part of the picture. */
+  block(x, y, width, height) {
+    this._taken.push([x, y, x + width, y + height]);
+  }
+
+  /**
+   * Ask for a word.
+   * @param {object} word {key, text, x, y, colour, rank: lower is more important, gap: pixels from the point, bold,
+   * chip: colour behind it or null, sides: of "above below right left here" in the order in which they are tried}
+   */
+  add(word) {
+    this._words.push(word);
+  }
+
+  /** Draw all words for which there is room. */
+  draw() {
+    const { context } = this;
+    const known = this._sides;
+    this._sides = new Map();
+    context.textBaseline = "middle";
+    context.textAlign = "left";
+    this._words.sort((a, b) => a.rank - b.rank);
+    for (const word of this._words) {
+      const font = `${word.bold ? "600 " : ""}${word.size ?? 12}px system-ui, sans-serif`;
+      const width = this._width(word.text, font) + (word.chip ? 10 : 2);
+      const height = (word.size ?? 12) + (word.chip ? 7 : 2);
+      const before = known.get(word.key);
+      const sides = before && word.sides.includes(before) ? [before, ...word.sides] : word.sides;
+      for (const side of sides) {
+        const [x, y] = this._corner(side, word, width, height);
+        if (!this._free(x, y, width, height)) continue;
+        this._taken.push([x - 2, y - 1, x + width + 2, y + height + 1]);
+        this._sides.set(word.key, side);
+        this.placed.push({ key: word.key, x, y, width, height });
+        this._write(word, font, x, y, width, height);
+        break;
+      }
+    }
+  }
+
+  _write(word, font, x, y, width, height) {
+    const { context } = this;
+    context.font = font;
+    if (word.chip) {
+      context.fillStyle = word.chip;
+      context.beginPath();
+      context.roundRect(x, y, width, height, 4);
+      context.fill();
+      if (word.bold) {
+        context.strokeStyle = word.edge;
+        context.lineWidth = 1.5;
+        context.stroke();
+      }
+    }
+    context.fillStyle = word.colour;
+    context.fillText(word.text, x + (word.chip ? 5 : 1), y + 0.5 * height + 0.5);
+  }
+
+  _corner(side, { x, y, gap }, width, height) {
+    if (side === "above") return [x - 0.5 * width, y - gap - height];
+    if (side === "below") return [x - 0.5 * width, y + gap];
+    if (side === "right") return [x + gap, y - 0.5 * height];
+    if (side === "left") return [x - gap - width, y - 0.5 * height];
+    return [x - 0.5 * width, y - 0.5 * height];
+  }
+
+  _free(x, y, width, height) {
+    if (x < 2 || y < 2 || x + width > this.width - 2 || y + height > this.height - 2) return false;
+    return !this._taken.some((box) => x < box[2] && x + width > box[0] && y < box[3] && y + height > box[1]);
+  }
+
+  _width(text, font) {
+    const key = `${font}|${text}`;
+    if (!this._widths.has(key)) {
+      if (this._widths.size > 2000) this._widths.clear();
+      this.context.font = font;
+      this._widths.set(key, this.context.measureText(text).width);
+    }
+    return this._widths.get(key);
+  }
+}

@@ -1,0 +1,228 @@
+// The page: what is shown of which runs, and what every part of it is told when something changes.
+
+/** Ties player, stage, board, panel and timeline together. startLive() gets this object. */
+class Page {
+  constructor() {
+    this.runs = [];
+    this.shown = [];
+    this.selected = 0;
+    this.dark = matchMedia("(prefers-color-scheme: dark)");
+    this.theme = this.dark.matches ? "dark" : "light";
+    document.documentElement.dataset.theme = this.theme;
+    this.player = new Player();
+    this.stage = new Stage(this.theme, () => this.later());
+    this.board = new Board(this.player, this.theme);
+    this.panel = new Panel(this.player, { select: (index) => this.select(index), show: (index, on) => this.showRun(index, on) });
+    this.timeline = new Timeline(this.player);
+    this.canvas = this.stage.canvas; // of the first scene; it stays the same
+    this._next = 0;
+    this._slow = 0;
+    this._listen();
+  }
+
+  /** The scene of the first canvas; null while no run can be drawn. */
+  scene() {
+    return this.stage.scene;
+  }
+
+  /** The run that panel and scrubber tell of. */
+  get run() {
+    return this.runs[this.selected];
+  }
+
+  /** Show some runs in place of those before. */
+  async show(runs) {
+    this.runs = runs;
+    this.shown = runs.map(() => true);
+    this.selected = 0;
+    this.player.setRuns(runs);
+    this.stage.side &&= runs.length > 1;
+    document.getElementById("side").hidden = runs.length < 2;
+    this._laid();
+    this.board.window = null;
+    this.board.setRuns(runs, this.shown, this.selected);
+    this.paint();
+  }
+
+  /** Rows were appended to the runs, or events to their headers. */
+  refresh() {
+    if (!this.stage.scene && this.runs.some(drawable)) this._laid();
+    this.player.grown();
+    this.board.grown();
+    if (this._slow) return;
+    this._slow = setTimeout(() => {
+      this._slow = 0;
+      this.timeline.grown();
+      if ((this.run?.header.events?.length ?? 0) !== this.panel.events?.length) this._select();
+    }, 400);
+  }
+
+  /** Put a line into the status bar; an empty text takes it away. `kind`: "info", "good", "warning" or "error". */
+  say(text, kind = "info") {
+    const status = document.getElementById("status");
+    status.className = kind;
+    setText(status, text);
+  }
+
+  /** Say in place of the scene why there is none. */
+  nothing(text) {
+    const empty = document.getElementById("empty");
+    empty.hidden = !text;
+    setText(empty, text);
+  }
+
+  /** Let panel and scrubber tell of another run. */
+  select(index) {
+    if (!this.runs[index]) return;
+    this.selected = index;
+    this._select();
+    this.board.setRuns(this.runs, this.shown, index);
+    this.later();
+  }
+
+  /** Show a run, or hide it. */
+  showRun(index, on) {
+    this.shown[index] = on;
+    this._laid();
+    this.board.setRuns(this.runs, this.shown, this.selected);
+  }
+
+  /** Each run in a scene of its own, or all in one. */
+  setSide(on) {
+    if (this.runs.length < 2) return;
+    this.stage.setSide(on);
+    this._pressed("side", on);
+  }
+
+  setLabels(on) {
+    this.stage.labels = on;
+    this._pressed("labels", on);
+    this.later();
+  }
+
+  setTheme(theme) {
+    this.theme = theme;
+    document.documentElement.dataset.theme = theme;
+    this.stage.setTheme(theme);
+    this.board.setTheme(theme);
+    this.timeline.setRun(this.run, theme);
+    this.panel.setRuns(this.runs, this.shown, this.selected);
+  }
+
+  help() {
+    document.getElementById("help").showModal();
+  }
+
+  /** To the next event of the selected run (1), or to the one before (-1). */
+  event(by) {
+    const times = this.run ? marksOf(this.run).map(({ time }) => time).sort((a, b) => a - b) : [];
+    const { t } = this.player;
+    const to = by > 0 ? times.find((time) => time > t + 1e-9) : times.findLast((time) => time < t - 1e-9);
+    if (to !== undefined) this.player.seek(to);
+  }
+
+  /** Paint with the next picture of the screen. */
+  later() {
+    this._next ||= requestAnimationFrame(() => this.paint());
+  }
+
+  /** Paint now. */
+  paint() {
+    cancelAnimationFrame(this._next);
+    this._next = 0;
+    const { player } = this;
+    this.stage.draw(player.t, player.follow);
+    this.board.point();
+    this.panel.tell();
+    this.timeline.point();
+    this._buttons();
+    clearTimeout(this._quiet);
+    if (!player.playing && !player.live) this._quiet = setTimeout(() => this._speak(), 900);
+  }
+
+  _laid() {
+    this.stage.setRuns(this.runs, this.shown);
+    const reasons = this.runs.length && !this.stage.scene;
+    const hidden = this.runs.some((run, i) => drawable(run) && !this.shown[i]);
+    this.nothing(reasons ? (hidden ? "Every run is hidden." : "There is nothing to draw: no run has a row with a pose.") : "");
+    this._select();
+  }
+
+  _select() {
+    tellHead(this.runs, this.selected);
+    this.timeline.setRun(this.run, this.theme);
+    this.panel.setRuns(this.runs, this.shown, this.selected);
+  }
+
+  _speak() {
+    if (!this.run?.rows) return;
+    const { t } = this.player;
+    setText(document.getElementById("spoken"), `${clock(t)}. ${activeWords(this.run, t).sentence}`);
+  }
+
+  _pressed(id, on) {
+    document.getElementById(id).setAttribute("aria-pressed", String(on));
+  }
+
+  _buttons() {
+    const { player } = this;
+    const play = document.getElementById("play");
+    const runs = player.playing || player.live;
+    if (play.getAttribute("aria-label") !== (runs ? "Pause" : "Play")) {
+      play.setAttribute("aria-label", runs ? "Pause" : "Play");
+      play.querySelector("use").setAttribute("href", runs ? "#i-pause" : "#i-play");
+    }
+    const speed = document.getElementById("speed");
+    if (Number(speed.value) !== player.speed) speed.value = String(player.speed);
+    this._pressed("follow", player.follow);
+    this._pressed("live", player.live);
+    document.getElementById("live").hidden = !player.growing;
+  }
+
+  _listen() {
+    const { player } = this;
+    const press = (id, fn) => document.getElementById(id).addEventListener("click", fn);
+    player.onChange(() => this.later());
+    press("play", () => player.toggle());
+    press("to-start", () => player.seek(player.start));
+    press("row-back", () => player.stepRows(-1, this.run));
+    press("row-on", () => player.stepRows(1, this.run));
+    press("follow", () => player.setFollow(!player.follow));
+    press("labels", () => this.setLabels(!this.stage.labels));
+    press("side", () => this.setSide(!this.stage.side));
+    press("theme", () => this.setTheme(this.theme === "dark" ? "light" : "dark"));
+    press("help-open", () => this.help());
+    press("fit", () => this.stage.camera("fit"));
+    press("live", () => {
+      player.live = !player.live;
+    });
+    for (const button of document.querySelectorAll("[data-look]")) {
+      button.addEventListener("click", () => this.stage.camera("look", button.dataset.look));
+    }
+    const speed = document.getElementById("speed");
+    speed.append(...SPEEDS.map((x) => new Option(`${x}×`, String(x), x === 1, x === 1)));
+    speed.addEventListener("change", () => player.setSpeed(Number(speed.value)));
+    this.dark.addEventListener("change", () => this.setTheme(this.dark.matches ? "dark" : "light"));
+    listenToSplitter();
+    this._print();
+    const keys = keysOf(this);
+    listenToKeys(this, keys);
+    fillHelp(document.getElementById("help"), keys);
+  }
+
+  /** Paper is white, and shows all charts. */
+  _print() {
+    let before = null;
+    addEventListener("beforeprint", () => {
+      before = this.theme;
+      this.setTheme("light");
+      this.paint();
+      this.board.paintAll(true);
+    });
+    addEventListener("afterprint", () => {
+      if (before) this.setTheme(before);
+      this.board.paintAll(false);
+      this.later();
+    });
+  }
+}

@@ -1,0 +1,231 @@
+// Strokes and fills of what the camera sees: surfaces, sheets, balls; each kind of region has its drawer here.
+
+/** Draws into a 2D context what a camera sees. */
+class Painter {
+  constructor(context, camera) {
+    this.context = context;
+    this.camera = camera;
+    this._seen = new Float64Array(3072); // pixels and depths of the points of one surface
+    this._front = new Uint8Array(1024); // which of its faces look at the eye
+  }
+
+  /** Begin a path to which segment() and polygon() add. */
+  begin() {
+    this.context.beginPath();
+  }
+
+  /** Add a line between two points of the world, as far as it is in front of the camera. */
+  segment(a, b) {
+    const { near } = this.camera;
+    let p = this.camera.project(a);
+    let q = this.camera.project(b);
+    if (p[2] < near && q[2] < near) return;
+    if (p[2] < near) p = this.camera.project(Vec.along(a, Vec.sub(b, a), (near - p[2]) / (q[2] - p[2])));
+    else if (q[2] < near) q = this.camera.project(Vec.along(b, Vec.sub(a, b), (near - q[2]) / (p[2] - q[2])));
+    this.context.moveTo(p[0], p[1]);
+    this.context.lineTo(q[0], q[1]);
+  }
+
+  /** Add a line through points of the world. */
+  line(points) {
+    for (let i = 1; i < points.length; i++) this.segment(points[i - 1], points[i]);
+  }
+
+  /** Add a closed polygon of the world, cut where it is behind the camera. */
+  polygon(corners) {
+    const { camera } = this;
+    const ahead = (p) => Vec.dot(Vec.sub(p, camera.eye), camera.forward) - camera.near;
+    const cut = corners.every((p) => ahead(p) >= 0) ? corners : cutPolygon(corners, ahead);
+    cut.forEach((p, i) => {
+      const [x, y] = camera.project(p);
+      if (i) this.context.lineTo(x, y);
+      else this.context.moveTo(x, y);
+    });
+    if (cut.length) this.context.closePath();
+  }
+
+  stroke(colour, width, alpha = 1, dash = null) {
+    const { context } = this;
+    context.globalAlpha = alpha;
+    context.strokeStyle = colour;
+    context.lineWidth = width;
+    if (dash) context.setLineDash(dash);
+    context.stroke();
+    if (dash) context.setLineDash([]);
+    context.globalAlpha = 1;
+  }
+
+  fill(colour, alpha = 1) {
+    this.context.globalAlpha = alpha;
+    this.context.fillStyle = colour;
+    this.context.fill();
+    this.context.globalAlpha = 1;
+  }
+}
+
+/** How a region is drawn: by what it is for, and by whether the arbiter gives way to it. */
+function styleOf(keep, active, colour) {
+  return {
+    colour,
+    filled: keep === "out",
+    alpha: active ? 0.5 : 0.3,
+    width: active ? 2.6 : 1.2,
+    dash: keep === "in" ? (active ? [9, 5] : [6, 5]) : null,
+    hidden: active ? 0.5 : 0.28, // opacity of edges on the far side
+  };
+}
+
+/** The far side of a surface: what lies in it is drawn over this. */
+function paintBack(painter, solid, shift, style) {
+  if (solid.ellipsoid) paintCircles(painter, solid, shift, style, false);
+  else paintEdges(painter, solid, shift, style, false);
+}
+
+/** The near side of a surface. */
+function paintFront(painter, solid, shift, style) {
+  if (solid.ellipsoid) {
+    const outline = outlineOf(painter.camera, solid.ellipsoid, shift);
+    if (outline) paintBall(painter, outline, style);
+    paintCircles(painter, solid, shift, style, true);
+    return;
+  }
+  if (style.filled) paintFaces(painter, solid, shift, style);
+  paintEdges(painter, solid, shift, style, true);
+}
+
+/** The ellipse that an ellipsoid is seen as: centre and a 2 by 2 matrix from the unit circle; null where it is none. */
+function outlineOf(camera, { centre, axes }, shift) {
+  const c = Vec.sub(Vec.add(centre, shift), camera.eye);
+  const rows = [camera.right, Vec.scale(camera.up, -1), camera.forward];
+  const C = rows.map((row) => Vec.dot(row, c));
+  const A = rows.map((row) => axes.map((axis) => Vec.dot(row, axis)));
+  // lines n through the eye touch it where n' G n = 0
+  const G = (i, j) => Vec.dot(A[i], A[j]) - C[i] * C[j];
+  const scale = -G(2, 2);
+  if (C[2] <= 0 || scale <= 0 || C[2] - Vec.norm(A[2]) < camera.near) return null;
+  const f = camera.focal;
+  const [x, y] = [-G(0, 2) / scale, -G(1, 2) / scale];
+  const [xx, xy, yy] = [G(0, 0) / scale + x * x, G(0, 1) / scale + x * y, G(1, 1) / scale + y * y];
+  // the root of a symmetric matrix
+  const s = Math.sqrt(Math.max(0, xx * yy - xy * xy));
+  const t = Math.sqrt(xx + yy + 2 * s);
+  if (!(t > 0)) return null;
+  return {
+    x: 0.5 * camera.width + f * x,
+    y: 0.5 * camera.height + f * y,
+    xx: (f * (xx + s)) / t,
+    xy: (f * xy) / t,
+    yy: (f * (yy + s)) / t,
+  };
+}
+
+/** Fill and outline of an ellipse; the fill is brighter where light from above falls. */
+function paintBall(painter, outline, style) {
+  const { context, camera } = painter;
+  context.beginPath();
+  context.save();
+  context.transform(outline.xx, outline.xy, outline.xy, outline.yy, outline.x, outline.y);
+  context.arc(0, 0, 1, 0, 2 * Math.PI);
+  if (style.filled) {
+    const [lx, ly] = [0.25 * camera.right[2] - 0.22, -0.62 * Math.abs(camera.up[2])];
+    const light = context.createRadialGradient(lx, ly, 0, 0, 0, 1);
+    light.addColorStop(0, mixedColour(style.colour, "#ffffff", 0.55));
+    light.addColorStop(0.55, style.colour);
+    light.addColorStop(1, mixedColour(style.colour, "#000000", 0.22));
+    context.globalAlpha = style.alpha + 0.15;
+    context.fillStyle = light;
+    context.fill();
+    context.globalAlpha = 1;
+  }
+  context.restore();
+  painter.stroke(style.colour, style.width, 1, style.dash);
+}
+
+/** Great circles of an ellipsoid, on the near or on the far side. */
+function paintCircles(painter, solid, shift, style, near) {
+  const { context, camera } = painter;
+  const { points } = solid;
+  const n = points.length / 3;
+  const seen = painter._seen;
+  camera.projectAll(points, n, shift, seen);
+  const [ex, ey, ez] = Vec.sub(Vec.sub(camera.eye, shift), solid.centre);
+  const inverse = solid.ellipsoid.axes.map((axis) => Vec.scale(axis, 1 / Vec.dot(axis, axis)));
+  // the near side is where (p - c)' M (e - c) > 1, with M of the ellipsoid
+  const e = inverse.map((row) => row[0] * ex + row[1] * ey + row[2] * ez);
+  const m = [0, 1, 2].map((i) => inverse.reduce((sum, row, k) => sum + row[i] * e[k], 0));
+  const [cx, cy, cz] = solid.centre;
+  context.beginPath();
+  for (const line of solid.lines) {
+    let drawing = false;
+    for (const i of line) {
+      const k = 3 * i;
+      const before = m[0] * (points[k] - cx) + m[1] * (points[k + 1] - cy) + m[2] * (points[k + 2] - cz) > 1;
+      if (before === near && seen[k + 2] > camera.near) {
+        if (drawing) context.lineTo(seen[k], seen[k + 1]);
+        else context.moveTo(seen[k], seen[k + 1]);
+        drawing = true;
+      } else drawing = false;
+    }
+  }
+  painter.stroke(style.colour, 0.8, near ? 0.55 : style.hidden * 0.7);
+}
+
+/** Which faces look at the eye. */
+function facing(painter, solid, shift) {
+  const { faces, normals, points } = solid;
+  if (painter._front.length < faces.length) painter._front = new Uint8Array(2 * faces.length);
+  const [ex, ey, ez] = Vec.sub(painter.camera.eye, shift);
+  for (let i = 0; i < faces.length; i++) {
+    const v = 3 * faces[i][0];
+    const towards =
+      normals[3 * i] * (ex - points[v]) + normals[3 * i + 1] * (ey - points[v + 1]) + normals[3 * i + 2] * (ez - points[v + 2]);
+    painter._front[i] = towards > 0 ? 1 : 0;
+  }
+  return painter._front;
+}
+
+const LIGHT_SIDE = 0.35; // faces whose normal rises more are lit, those whose normal falls more are in shade
+
+/** The faces that are seen, each surface in one path so that no seam shows; lit from above in three steps. */
+function paintFaces(painter, solid, shift, style) {
+  const front = facing(painter, solid, shift);
+  const { faces, normals } = solid;
+  const corners = (face) =>
+    face.map((i) => [solid.points[3 * i] + shift[0], solid.points[3 * i + 1] + shift[1], solid.points[3 * i + 2] + shift[2]]);
+  const paint = (chosen, colour, alpha) => {
+    painter.begin();
+    let any = false;
+    for (let i = 0; i < faces.length; i++) {
+      if (!front[i] || !chosen(i)) continue;
+      painter.polygon(corners(faces[i]));
+      any = true;
+    }
+    if (any) painter.fill(colour, alpha);
+  };
+  paint(() => true, style.colour, style.alpha);
+  paint((i) => normals[3 * i + 2] < -LIGHT_SIDE, "#ffffff", 0.2);
+  paint((i) => normals[3 * i + 2] > LIGHT_SIDE, "#000000", 0.16);
+}
+
+/** Sharp edges, outlines of round surfaces and lines on them, on the near or on the far side. */
+function paintEdges(painter, solid, shift, style, near) {
+  const front = facing(painter, solid, shift);
+  const at = (i) => [solid.points[3 * i] + shift[0], solid.points[3 * i + 1] + shift[1], solid.points[3 * i + 2] + shift[2]];
+  painter.begin();
+  for (const [a, b, f, g, sharp] of solid.edges) {
+    const seen = front[f] || front[g];
+    if (sharp ? Boolean(seen) === near : near && front[f] !== front[g]) painter.segment(at(a), at(b));
+  }
+  painter.stroke(style.colour, near ? style.width : 1, near ? 1 : style.hidden, style.dash);
+}
+
+/** Parts of planes: nearly clear, with a rim and hatching on the side that is forbidden. */
+function paintSheet(painter, sheet, style) {
+  painter.begin();
+  painter.polygon(sheet.corners);
+  painter.fill(style.colour, style.filled ? 0.6 * style.alpha : 0.25 * style.alpha);
+  painter.stroke(style.colour, style.width, 0.9, style.dash);
+  painter.begin();
+  for (const [a, b] of sheet.hatch) painter.segment(a, b);
+  painter.stroke(style.colour, 1, 2 * style.hidden > 1 ? 1 : 2 * style.hidden);
+}

@@ -1,0 +1,75 @@
+// Colours: of Okabe and Ito, whom colour-blind readers can follow, on paper and in the dark.
+
+const CRITERION_COLOURS = { obstacle: "#D55E00", shape: "#E69F00", depth: "#56B4E9" };
+const GOAL_COLOUR = "#009E73";
+
+/** Of the trails of several runs; each run also has its own dashes where lines lie upon each other. */
+const RUN_COLOURS = ["#0072B2", "#CC79A7", "#009E73", "#E69F00", "#D55E00", "#56B4E9"];
+
+/** What the scene needs beside the colours of regions. */
+const SCENE_THEMES = {
+  light: {
+    skyTop: "#f7fbfd",
+    skyBottom: "#d9e8f1",
+    ink: "#1d2b36",
+    soft: "#5b6f7e",
+    grid: "rgba(40, 75, 100, 0.16)",
+    gridMajor: "rgba(40, 75, 100, 0.34)",
+    floor: "rgba(255, 255, 255, 0.45)",
+    shadow: "rgba(20, 45, 65, 0.13)",
+    halo: "rgba(247, 251, 253, 0.85)",
+    chip: "rgba(255, 255, 255, 0.82)",
+    future: "rgba(29, 43, 54, 0.30)",
+    muted: "#93a1ab",
+    thrust: "#A6407A",
+    hull: { float: "#E8C81F", frame: "#33424d", tube: "#8fa1ad", dome: "#bfe3f2", skid: "#4a5a66" },
+  },
+  dark: {
+    skyTop: "#12212d",
+    skyBottom: "#070e14",
+    ink: "#e6eef4",
+    soft: "#93a8b7",
+    grid: "rgba(150, 195, 225, 0.13)",
+    gridMajor: "rgba(150, 195, 225, 0.30)",
+    floor: "rgba(90, 140, 170, 0.05)",
+    shadow: "rgba(0, 0, 0, 0.38)",
+    halo: "rgba(7, 14, 20, 0.75)",
+    chip: "rgba(14, 25, 34, 0.82)",
+    future: "rgba(230, 238, 244, 0.28)",
+    muted: "#6f808c",
+    thrust: "#F29AC8",
+    hull: { float: "#F0DC4E", frame: "#5b6b77", tube: "#a5b6c1", dome: "#c9ecfa", skid: "#71828e" },
+  },
+};
+
+/** The three numbers of "#rrggbb". */
+function channelsOf(colour) {
+  const number = parseInt(colour.slice(1), 16);
+  return [(number >> 16) & 255, (number >> 8) & 255, number & 255];
+}
+
+/** A colour between two, "#rrggbb" both. */
+function mixedColour(from, to, part) {
+  const [a, b] = [channelsOf(from), channelsOf(to)];
+  const hex = a.map((x, i) => Math.round(x + part * (b[i] - x)).toString(16).padStart(2, "0"));
+  return `#${hex.join("")}`;
+}
+
+/** The full colour of a region: that of its criterion; the goal has its own. */
+function fullColour(region) {
+  return region.criterion ? CRITERION_COLOURS[region.criterion] : GOAL_COLOUR;
+}
+
+/**
+ * The colour of a region: in full where the arbiter gives way to it, muted in the same hue otherwise.
+ * @param {object} region of the header  @param {boolean} active  @param {"light"|"dark"} theme
+ */
+function regionColour(region, active, theme) {
+  const full = fullColour(region);
+  return active ? full : mixedColour(full, SCENE_THEMES[theme].muted, 0.6);
+}
+
+/** The colour of a run's trail where several are shown. */
+function runColour(index) {
+  return RUN_COLOURS[index % RUN_COLOURS.length];
+}

@@ -1,0 +1,217 @@
+// The side panel: what matters now, in words and bars.
+
+/** A row with a bar: built once, then only told new numbers. */
+class BarRow {
+  constructor(label, hue) {
+    this.element = element("li", "bar-row");
+    this.name = element("span", "name", label);
+    this.value = element("span", "value");
+    this.fill = element("span", "fill");
+    if (hue) this.fill.style.setProperty("--hue", `var(--${hue})`);
+    const track = element("span", "track");
+    this.tick = element("span", "tick");
+    this.tick.hidden = true;
+    track.append(this.fill, this.tick);
+    this.element.append(this.name, this.value, track);
+  }
+
+  /** @param {number} part between 0 and 1  @param {?number} mark another part, as a tick */
+  tell(part, text, mark = null) {
+    const whole = Number.isFinite(part) ? Math.min(1, Math.max(0, part)) : 0;
+    this.fill.style.transform = `scaleX(${whole.toFixed(4)})`;
+    if (this.value.textContent !== text) this.value.textContent = text;
+    this.element.classList.toggle("on", part > 0);
+    this.tick.hidden = !Number.isFinite(mark ?? NaN);
+    if (!this.tick.hidden) this.tick.style.left = `${(100 * Math.min(1, Math.max(0, mark))).toFixed(1)}%`;
+  }
+}
+
+/** The panel of the selected run. */
+class Panel {
+  /** @param {Player} player  @param {object} on with select(index) and show(index, whether) */
+  constructor(player, on) {
+    this.player = player;
+    this.on = on;
+    this.holder = document.getElementById("panel");
+    this._told = 0;
+  }
+
+  setRuns(runs, shown, selected) {
+    this.runs = runs;
+    this.run = runs[selected];
+    this.holder.replaceChildren();
+    if (runs.length > 1) this._runs(shown, selected);
+    if (!this.run) return;
+    this._now();
+    this._weights();
+    this._rules();
+    this._distances();
+    this._numbers();
+    this._events();
+    this.tell(true);
+  }
+
+  /** Tell the panel what the cursor is at; some times a second while it moves. */
+  tell(atOnce = false) {
+    const now = performance.now();
+    if (!this.run || (!atOnce && this.player.playing && now - this._told < 90)) return;
+    this._told = now;
+    const { run } = this;
+    const t = this.player.t;
+    const active = activeWords(run, t);
+    this.mark.className = `mark ${active.region.criterion ?? "goal"}`;
+    setText(this.who, active.name);
+    setText(this.what, regionWords(active.region));
+    setText(this.why, active.sentence);
+    const over = t > run.end && this.player.duration > 0;
+    this.over.hidden = !over;
+    if (over) setText(this.over, `This run ended at ${clock(run.end)}; it stays as it was then.`);
+    for (const [name, row] of this.weights) {
+      const [weight, asks] = ["weight", "membership"].map((kind) => run.held(`${kind}.${name}`, t));
+      row.tell(weight, `${figure(weight, 2)} (asks ${figure(asks, 2)})`, asks);
+    }
+    const rules = firedRules(run, t);
+    rules.forEach(({ strength }, i) => this.rules[i].tell(strength, figure(strength, 2)));
+    setText(this.ruled, `${rules.filter(({ strength }) => strength > 0).length} of ${rules.length} fire`);
+    this._sort(distancesAt(run, t), active.index);
+    numbersAt(run, t).forEach(([, text], i) => setText(this.numbers[i], text));
+    this._passed(t);
+  }
+
+  _section(title, className) {
+    const section = element("section", className);
+    const heading = element("h2", "", title);
+    section.append(heading);
+    this.holder.append(section);
+    return { section, heading };
+  }
+
+  _runs(shown, selected) {
+    const { section } = this._section("Runs", "runs");
+    const list = element("ul");
+    runNames(this.runs).forEach((name, index) => {
+      const item = element("li", index === selected ? "selected" : "");
+      const box = element("input");
+      box.type = "checkbox";
+      box.checked = shown[index];
+      box.setAttribute("aria-label", `Show ${name}`);
+      box.addEventListener("change", () => this.on.show(index, box.checked));
+      const choose = element("button", "choose");
+      choose.type = "button";
+      choose.setAttribute("aria-pressed", String(index === selected));
+      choose.title = `Tell of ${name} in this panel`;
+      choose.append(swatch(runColour(index), runDash(index)), name);
+      choose.addEventListener("click", () => this.on.select(index));
+      item.append(box, choose);
+      list.append(item);
+    });
+    section.append(list);
+  }
+
+  _now() {
+    const { section } = this._section("What matters now", "now");
+    const line = element("p", "who");
+    this.mark = element("span", "mark goal");
+    this.mark.setAttribute("aria-hidden", "true");
+    this.who = element("strong");
+    this.what = element("span", "what");
+    this.why = element("p", "why");
+    this.over = element("p", "over");
+    line.append(this.mark, this.who, this.what);
+    section.append(line, this.why, this.over);
+  }
+
+  _weights() {
+    const { section, heading } = this._section("Weights", "weights");
+    heading.append(element("span", "note", "bar: weight, tick: attention asked"));
+    this.weights = Object.entries(OF_CRITERION).map(([name, hue]) => [name, new BarRow(name, hue)]);
+    section.append(listOf(this.weights.map(([, row]) => row.element)));
+  }
+
+  _rules() {
+    const { section, heading } = this._section("Rules", "rules");
+    this.ruled = element("span", "note");
+    heading.append(this.ruled);
+    this.rules = this.run.header.rules.map((rule) => {
+      const row = new BarRow(rule.words, "ink");
+      row.element.title = rule.text;
+      return row;
+    });
+    section.append(listOf(this.rules.map((row) => row.element)));
+  }
+
+  _distances() {
+    const { section, heading } = this._section("Distances", "distances");
+    heading.append(element("span", "note", "most pressing first"));
+    this.distances = this.run.header.regions.map((region) => {
+      const item = element("li");
+      const mark = element("span", `mark ${region.criterion ?? "goal"}`);
+      const name = element("span", "name", region.name);
+      const value = element("span", "value");
+      name.title = regionWords(region);
+      item.append(mark, name, value);
+      return { item, value, name };
+    });
+    this.order = listOf(this.distances.map(({ item }) => item));
+    section.append(this.order);
+  }
+
+  _sort(rows, active) {
+    rows.forEach(({ index, region, clearance }, place) => {
+      const { item, value } = this.distances[index];
+      const against = clearance < 0 && region.criterion;
+      item.className = `${against ? "violated" : ""} ${index === active ? "active" : ""}`;
+      const sign = clearance > 0 ? "+" : "";
+      const word = against ? "✕ violated " : clearance < 0 ? "to go " : index === 0 && clearance >= 0 ? "✓ inside " : "";
+      setText(value, `${word}${Number.isFinite(clearance) ? sign + quantity(clearance, region.unit) : "no number"}`);
+      if (this.order.children[place] !== item) this.order.insertBefore(item, this.order.children[place] ?? null);
+    });
+  }
+
+  _numbers() {
+    const { section } = this._section("Vehicle", "numbers");
+    const list = element("dl");
+    this.numbers = numbersAt(this.run, this.player.t).map(([name]) => {
+      const value = element("dd");
+      list.append(element("dt", "", name), value);
+      return value;
+    });
+    section.append(list);
+  }
+
+  _events() {
+    this.events = [];
+    const { events } = this.run.header;
+    if (!events?.length) return;
+    const { section, heading } = this._section("Events", "events");
+    heading.append(element("span", "note", String(events.length)));
+    const list = element("ol");
+    for (const { time, kind, text } of events) {
+      const item = element("li");
+      const button = element("button", `event ${kind}`);
+      button.type = "button";
+      button.append(element("span", "at", clock(time)), element("span", "text", text));
+      button.addEventListener("click", () => this.player.seek(time));
+      item.append(button);
+      list.append(item);
+      this.events.push({ time, item });
+    }
+    section.append(list);
+  }
+
+  _passed(t) {
+    for (const { time, item } of this.events) item.classList.toggle("passed", time <= t);
+  }
+}
+
+/** Change a text only where it is another: a reader that speaks, and the layout, hear of nothing else. */
+function setText(node, text) {
+  if (node.textContent !== text) node.textContent = text;
+}
+
+/** A list of items. */
+function listOf(items) {
+  const list = element("ul");
+  list.append(...items);
+  return list;
+}

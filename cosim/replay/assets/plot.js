@@ -1,0 +1,129 @@
+// The still part of a chart: grid, axes, the zone of violation, curves. The cursor lies over it as its own element.
+
+const MARGIN = { left: 50, right: 10, top: 8, bottom: 20 };
+const FONT = "11px system-ui, sans-serif";
+
+/** Colours of the page as a canvas needs them, of the theme that is on. */
+function pageColours() {
+  const style = getComputedStyle(document.documentElement);
+  const of = (name) => style.getPropertyValue(name).trim();
+  return { ink: of("--ink"), muted: of("--muted"), grid: of("--grid"), zone: of("--zone"), bad: of("--bad") };
+}
+
+/** Where the plot is in its canvas [CSS pixels], and what stands where. */
+class Frame {
+  constructor(width, height, window, range, down) {
+    Object.assign(this, { width, height, window, range });
+    this.left = MARGIN.left;
+    this.right = width - MARGIN.right;
+    this.top = MARGIN.top;
+    this.bottom = height - MARGIN.bottom;
+    const [from, to] = window;
+    const across = (this.right - this.left) / Math.max(to - from, 1e-9);
+    this.x = (t) => this.left + (t - from) * across;
+    this.time = (x) => from + (Math.min(this.right, Math.max(this.left, x)) - this.left) / across;
+    const [low, high] = range ?? [0, 1];
+    const up = (this.bottom - this.top) / (high - low);
+    this.y = down ? (value) => this.top + (value - low) * up : (value) => this.bottom - (value - low) * up;
+  }
+}
+
+/** Paint all but the cursor. */
+function paintPlot(context, frame, spec, curves, theme) {
+  const colours = pageColours();
+  context.clearRect(0, 0, frame.width, frame.height);
+  context.font = FONT;
+  context.lineJoin = "round";
+  if (!frame.range) {
+    context.fillStyle = colours.muted;
+    context.textAlign = "center";
+    context.fillText("no numbers in this window", (frame.left + frame.right) / 2, (frame.top + frame.bottom) / 2);
+    return;
+  }
+  if (spec.zero) paintZone(context, frame, colours);
+  paintAxes(context, frame, spec, colours);
+  context.save();
+  context.beginPath();
+  context.rect(frame.left, frame.top - 1, frame.right - frame.left, frame.bottom - frame.top + 2);
+  context.clip();
+  for (const curve of [...curves].sort((a, b) => b.signal.faint - a.signal.faint)) {
+    context.strokeStyle = hueColour(curve.signal.hue, theme, curve.signal.shade);
+    context.lineWidth = curve.signal.faint ? 0.8 : 1.6;
+    context.globalAlpha = curve.signal.faint ? 0.75 : 1;
+    context.setLineDash(curve.dash);
+    traceCurve(context, curve, frame.window, frame.x, frame.y);
+    context.stroke();
+  }
+  context.restore();
+  paintBeyond(context, frame, spec, curves, theme);
+}
+
+/** Below zero a region is violated. */
+function paintZone(context, frame, colours) {
+  const zero = Math.min(frame.bottom, Math.max(frame.top, frame.y(0)));
+  context.fillStyle = colours.zone;
+  context.fillRect(frame.left, zero, frame.right - frame.left, frame.bottom - zero);
+  if (frame.bottom - zero < 16) return;
+  context.fillStyle = colours.bad;
+  context.textAlign = "right";
+  context.textBaseline = "bottom";
+  context.fillText("below 0: violated (goal: outside)", frame.right - 4, frame.bottom - 3);
+}
+
+function paintAxes(context, frame, spec, colours) {
+  const scale = spec.unit === "rad" ? DEGREES : 1;
+  const [low, high] = frame.range;
+  const heights = ticks(low * scale, high * scale, Math.max(2, (frame.bottom - frame.top) / 26));
+  const across = ticks(...frame.window, Math.max(2, (frame.right - frame.left) / 70));
+  context.lineWidth = 1;
+  context.strokeStyle = colours.grid;
+  context.fillStyle = colours.muted;
+  context.textAlign = "right";
+  context.textBaseline = "middle";
+  context.beginPath();
+  const words = tickTexts(heights);
+  heights.forEach((value, i) => {
+    const y = Math.round(frame.y(value / scale)) + 0.5;
+    context.moveTo(frame.left, y);
+    context.lineTo(frame.right, y);
+    context.fillText(words[i], frame.left - 6, y);
+  });
+  for (const t of across) {
+    const x = Math.round(frame.x(t)) + 0.5;
+    context.moveTo(x, frame.top);
+    context.lineTo(x, frame.bottom);
+  }
+  context.stroke();
+  context.textBaseline = "top";
+  const times = tickTexts(across);
+  across.forEach((t, i) => {
+    const last = i === across.length - 1;
+    const text = last ? `${times[i]} s` : times[i];
+    const half = context.measureText(text).width / 2;
+    context.textAlign = "center";
+    context.fillText(text, Math.min(frame.x(t), frame.width - half - 1), frame.bottom + 5);
+  });
+  if (low < 0 && high > 0) {
+    context.strokeStyle = colours.muted;
+    context.beginPath();
+    const y = Math.round(frame.y(0)) + 0.5;
+    context.moveTo(frame.left, y);
+    context.lineTo(frame.right, y);
+    context.stroke();
+  }
+}
+
+/** What is true may lie far beyond the curves: then a line of text at the edge tells where. */
+function paintBeyond(context, frame, spec, curves, theme) {
+  let line = 0;
+  for (const { signal: of, values } of curves.filter((curve) => curve.signal.context && curve.values.length)) {
+    const [low, high] = frame.range;
+    if (values[0] >= low && values[0] <= high) continue;
+    context.fillStyle = hueColour(of.hue, theme, of.shade);
+    context.textAlign = "right";
+    context.textBaseline = "top";
+    const arrow = values[0] > high ? "↑" : "↓";
+    context.fillText(`${of.label} is at ${quantity(values[0], spec.unit)} ${arrow}`, frame.right - 4, frame.top + 2 + 14 * line);
+    line += 1;
+  }
+}

@@ -1,0 +1,79 @@
+// Regions of attitude: a sector of headings about the one that is wanted, and the cone in which a camera sees.
+
+const SIGHT_RINGS = 36;
+
+/** The circle of directions at an angle from a unit axis, at a distance from an apex. */
+function rimOf(apex, axis, angle, length) {
+  const [first, second] = Vec.aside(axis);
+  const centre = Vec.along(apex, axis, length * Math.cos(angle));
+  const radius = length * Math.sin(angle);
+  return Array.from({ length: SIGHT_RINGS }, (_, i) => {
+    const turn = (2 * Math.PI * i) / SIGHT_RINGS;
+    return Vec.along(Vec.along(centre, first, radius * Math.cos(turn)), second, radius * Math.sin(turn));
+  });
+}
+
+/**
+ * What is drawn of a region of attitude.
+ * @typedef {object} Sight
+ * @property {number[]} apex, {number[]} axis of the cone  @property {number[][]} rim of it, on g = 0
+ * @property {number[][][]} lines  @property {number[]|null} feature that is to be seen  @property {number[]} anchor of its name
+ */
+
+/** How each kind of shape of attitude is drawn at a pose, from its fields, so large [m]. */
+const SIGHTS = {
+  /** Where the nose may point: within the tolerance of the wanted heading. The nose's own line tells where it does. */
+  orientation(shape, { position, quaternion }, shift, size) {
+    const axis = Vec.turned(Vec.matrix(shape.quaternion), [1, 0, 0]);
+    const nose = Vec.turned(Vec.matrix(quaternion), [1, 0, 0]);
+    const length = 5 * size;
+    const rim = rimOf(position, axis, shape.tolerance, length);
+    const wanted = Vec.along(position, axis, length);
+    const lines = [[position, wanted], [position, Vec.along(position, nose, 1.06 * length)]];
+    return { apex: position, axis, rim, lines, feature: null, anchor: wanted };
+  },
+
+  /** What the camera sees, as far as the feature is, and the line of sight to it. */
+  visibility(shape, { position, quaternion }, shift, size) {
+    const R = Vec.matrix(quaternion);
+    const apex = Vec.add(position, Vec.turned(R, shape.camera_position));
+    const axis = Vec.turned(R, Vec.unit(shape.camera_axis));
+    const feature = Vec.add(shape.feature, shift);
+    const length = Math.max(3 * size, Vec.norm(Vec.sub(feature, apex)));
+    const rim = rimOf(apex, axis, shape.half_angle, length);
+    return { apex, axis, rim, lines: [[apex, feature]], feature, anchor: feature };
+  },
+};
+
+/** Draw a region of attitude: a clear cone with its rim, the lines in it, and the feature as a cross in a circle. */
+function paintSight(painter, sight, style) {
+  const { context, camera } = painter;
+  painter.begin();
+  painter.polygon(sight.rim);
+  painter.fill(style.colour, 0.4 * style.alpha);
+  // the flanks as far as the outline of the cone goes: the triangles of all rim points make it up
+  painter.begin();
+  for (let i = 0; i < SIGHT_RINGS; i++) painter.polygon([sight.apex, sight.rim[i], sight.rim[(i + 1) % SIGHT_RINGS]]);
+  painter.fill(style.colour, 0.25 * style.alpha);
+  painter.begin();
+  painter.line([...sight.rim, sight.rim[0]]);
+  for (let i = 0; i < SIGHT_RINGS; i += SIGHT_RINGS / 4) painter.segment(sight.apex, sight.rim[i]);
+  painter.stroke(style.colour, style.width, 0.9, style.dash);
+  painter.begin();
+  for (const line of sight.lines) painter.line(line);
+  painter.stroke(style.colour, style.width, 0.8);
+  if (!sight.feature) return;
+  const [x, y, depth] = camera.project(sight.feature);
+  if (depth < camera.near) return;
+  const r = style.width > 2 ? 9 : 7;
+  context.beginPath();
+  context.arc(x, y, r, 0, 2 * Math.PI);
+  for (const [u, v] of [[1, 0], [-1, 0], [0, 1], [0, -1]]) {
+    context.moveTo(x + 0.4 * r * u, y + 0.4 * r * v);
+    context.lineTo(x + 1.5 * r * u, y + 1.5 * r * v);
+  }
+  painter.stroke(style.colour, Math.max(1.8, style.width));
+}
+
+/** The kinds of shape that can be drawn. */
+const DRAWN_SHAPES = [...Object.keys(SOLIDS), ...Object.keys(PLANES), ...Object.keys(SIGHTS)];

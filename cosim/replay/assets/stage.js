@@ -1,0 +1,144 @@
+// The scenes of the page: all runs in one, or side by side with one camera.
+
+/** Holds one canvas for each scene; the first canvas stays for as long as the page does. */
+class Stage {
+  /** @param {string} theme  @param {function} changed called when a picture is stale */
+  constructor(theme, changed) {
+    this.theme = theme;
+    this.changed = changed;
+    this.side = false;
+    this.labels = true;
+    this.holder = document.getElementById("views");
+    const first = this.holder.querySelector(".view");
+    this.views = [this._view(first)];
+    this.canvas = this.views[0].canvas;
+    this._sizes = new ResizeObserver(() => this.resize());
+    this._sizes.observe(this.holder);
+  }
+
+  /** The scene of the first canvas; null while there is nothing to draw. */
+  get scene() {
+    return this.views[0].scene;
+  }
+
+  get scenes() {
+    return this.views.map((view) => view.scene).filter(Boolean);
+  }
+
+  /** @param {Run[]} runs of the page  @param {boolean[]} shown which of them are */
+  setRuns(runs, shown) {
+    const same = runs === this.runs;
+    this.runs = runs;
+    this.shown = shown;
+    const names = runNames(runs);
+    const seen = runs.map((run, index) => ({ run, index })).filter(({ run, index }) => shown[index] && drawable(run));
+    const groups = this.side && seen.length > 1 ? seen.map((one) => [one]) : [seen];
+    while (this.views.length > groups.length) this.views.pop().element.remove();
+    while (this.views.length < groups.length) this.views.push(this._view(this._another()));
+    const content = [];
+    const looks = this.scene && same ? { azimuth: this.scene.camera.azimuth, elevation: this.scene.camera.elevation } : {};
+    groups.forEach((group, i) => {
+      const view = this.views[i];
+      view.indices = group.map(({ index }) => index);
+      const some = group.map(({ run }) => run);
+      view.caption.replaceChildren();
+      if (runs.length > 1) {
+        for (const { index } of group) {
+          const name = element("span", "run-name");
+          name.append(swatch(runColour(index), runDash(index)), names[index]);
+          view.caption.append(name);
+        }
+      }
+      if (!some.length) view.scene = null;
+      else if (view.scene) view.scene.setRuns(some);
+      else view.scene = new Scene(view.canvas, some, this.theme);
+      if (!view.scene) return;
+      content.push(...view.scene.camera.content);
+      if (i > 0) view.scene.camera = this.scene.camera;
+    });
+    this.canvas.hidden = !this.scene;
+    this.resize();
+    if (!this.scene) return;
+    Object.assign(this.scene.camera, { content, ...looks }); // one camera sees what any of the scenes has
+    this.scene.camera.fit();
+  }
+
+  setSide(on) {
+    this.side = on;
+    this.setRuns(this.runs, this.shown);
+  }
+
+  setTheme(theme) {
+    this.theme = theme;
+    for (const scene of this.scenes) scene.setTheme(theme);
+    this.changed();
+  }
+
+  resize() {
+    for (const scene of this.scenes) scene.resize();
+    this.changed();
+  }
+
+  draw(t, follow) {
+    for (const scene of this.scenes) scene.draw(t, { follow, trail: true, labels: this.labels });
+  }
+
+  /** Call a method of the one camera. */
+  camera(method, ...values) {
+    if (!this.scene) return;
+    this.scene.camera[method](...values);
+  }
+
+  /** The run and the region under a point of a canvas: names to show, or null. */
+  under(view, x, y) {
+    const found = view.scene?.pick(x, y);
+    return found ? { run: this.runs[view.indices[found.run]], region: found.region } : null;
+  }
+
+  _another() {
+    const made = element("div", "view");
+    const canvas = element("canvas");
+    canvas.tabIndex = 0;
+    canvas.setAttribute("role", "img");
+    canvas.setAttribute("aria-label", "Another run in three dimensions");
+    made.append(canvas, element("p", "caption"));
+    this.holder.append(made);
+    return made;
+  }
+
+  _view(made) {
+    const view = { element: made, canvas: made.querySelector("canvas"), caption: made.querySelector(".caption"), scene: null, indices: [] };
+    tellPointed(this, view);
+    return view;
+  }
+}
+
+/** A pointer that rests on a region is told its name; the scene itself lets pointers move the camera. */
+function tellPointed(stage, view) {
+  const { canvas } = view;
+  const tip = document.getElementById("pointed");
+  let next = 0;
+  const tell = (x, y) => {
+    const found = stage.under(view, x, y);
+    tip.hidden = !found;
+    if (!found) return;
+    const region = found.run.header.regions[found.region];
+    setText(tip, `${region.name}: ${regionWords(region)}`);
+    const inner = canvas.getBoundingClientRect();
+    const outer = tip.offsetParent.getBoundingClientRect();
+    const left = Math.min(x + inner.left - outer.left + 14, outer.width - tip.offsetWidth - 6);
+    const top = Math.min(y + inner.top - outer.top + 16, outer.height - tip.offsetHeight - 6);
+    tip.style.transform = `translate(${Math.max(6, left)}px, ${top}px)`;
+  };
+  const away = () => {
+    cancelAnimationFrame(next);
+    tip.hidden = true;
+  };
+  canvas.addEventListener("pointermove", (event) => {
+    cancelAnimationFrame(next);
+    if (event.buttons) tip.hidden = true;
+    else next = requestAnimationFrame(() => tell(event.offsetX, event.offsetY));
+  });
+  canvas.addEventListener("pointerleave", away);
+  canvas.addEventListener("pointerdown", away);
+}

@@ -1,0 +1,105 @@
+// The scrubber: a ribbon that tells who was active when, marks of what happened, and the cursor.
+
+const REACHED = "goal reached";
+
+/** Events of a run as marks of the scrubber: of its header, else of what the summary tells. */
+function marksOf(run) {
+  const { events, summary } = run.header;
+  if (events) return events;
+  const marks = [];
+  if (Number.isFinite(summary?.reach_time)) marks.push({ time: summary.reach_time, kind: "goal", text: REACHED });
+  return marks;
+}
+
+/** The scrubber of the selected run. */
+class Timeline {
+  constructor(player) {
+    this.player = player;
+    this.input = document.getElementById("scrubber");
+    this.canvas = document.getElementById("ribbon");
+    this.marks = document.getElementById("marks");
+    this.clock = document.getElementById("clock");
+    this.input.addEventListener("input", () => player.seek(Number(this.input.value)));
+    new ResizeObserver(() => this.paint()).observe(this.canvas);
+  }
+
+  setRun(run, theme) {
+    this.run = run;
+    this.theme = theme;
+    this.grown();
+  }
+
+  /** Rows were appended, or there is another run. */
+  grown() {
+    const { start, end } = this.player;
+    this.input.min = start;
+    this.input.max = Math.max(end, start + 1e-9);
+    this._marks();
+    this.paint();
+    this.point();
+  }
+
+  /** Move the cursor. */
+  point() {
+    const { t, start, end, playing, live } = this.player;
+    this.input.value = t;
+    setText(this.clock, `${clock(t)} / ${clock(end, 1)}`);
+    // told to who reads with the ears only when the cursor rests
+    if (!playing && !live) this.input.setAttribute("aria-valuetext", this.run ? `${clock(t)}, ${activeWords(this.run, t).name} active` : clock(t));
+    const part = end > start ? (t - start) / (end - start) : 0;
+    this.input.parentElement.style.setProperty("--part", part.toFixed(5));
+  }
+
+  /** The ribbon: the active region's colour, full height; violations as notches below. */
+  paint() {
+    const { clientWidth: width, clientHeight: height } = this.canvas;
+    if (!width || !height) return;
+    const dots = window.devicePixelRatio || 1;
+    this.canvas.width = Math.round(width * dots);
+    this.canvas.height = Math.round(height * dots);
+    const context = this.canvas.getContext("2d");
+    context.scale(dots, dots);
+    const { start, end } = this.player;
+    const x = (t) => ((t - start) / Math.max(end - start, 1e-9)) * width;
+    context.fillStyle = pageColours().grid;
+    context.fillRect(0, 0, width, height);
+    const active = this.run?.column("active");
+    if (!active || this.run.rows < 2) return;
+    const { time, rows, header } = this.run;
+    let from = 0;
+    for (let i = 1; i <= rows; i++) {
+      if (i < rows && active[i] === active[from]) continue;
+      const region = header.regions[active[from]];
+      if (region) {
+        context.fillStyle = hueColour(OF_CRITERION[region.criterion] ?? "green", this.theme);
+        context.globalAlpha = region.criterion ? 1 : 0.45;
+        const left = x(time[from]);
+        context.fillRect(left, 0, Math.max(1, x(time[Math.min(i, rows - 1)]) - left), height);
+      }
+      from = i;
+    }
+    context.globalAlpha = 1;
+    context.fillStyle = pageColours().ink;
+    for (const region of header.regions.filter((one) => one.criterion)) {
+      for (const [first, last] of below(this.run, `${region.name}.clearance`)) {
+        context.fillRect(x(first), height - 4, Math.max(2, x(last) - x(first)), 4);
+      }
+    }
+  }
+
+  _marks() {
+    const { start, end } = this.player;
+    const marks = this.run ? marksOf(this.run) : [];
+    const key = JSON.stringify([start, end, marks]);
+    if (key === this._key) return;
+    this._key = key;
+    this.marks.replaceChildren(
+      ...marks.slice(0, 200).map(({ time, kind, text }) => {
+        const mark = element("span", `mark-at ${kind}`);
+        mark.style.left = `${(100 * (time - start)) / Math.max(end - start, 1e-9)}%`;
+        mark.title = `${clock(time)}: ${text}`;
+        return mark;
+      }),
+    );
+  }
+}

@@ -1,0 +1,115 @@
+// The way of a vehicle, thinned to what a screen can show, in chunks that can be behind things one by one.
+
+const FINEST = 2.2; // pixels between points of the line
+const CHUNK = 26; // pixels of line that are behind a thing or before it together
+
+/** The way of one run. */
+class Trail {
+  constructor(run) {
+    this.run = run;
+    this._way = new Float64Array(0); // m, length of way at each row
+    this._known = 0;
+  }
+
+  /**
+   * The way as it is seen.
+   * @param {Camera} camera  @param {number} t that parts past from future  @param {number[]} floor depth of the shadow
+   * @returns {{points: number[], row: number, past: boolean, active: number}[]} chunks; points are pixels, x and y in turn
+   */
+  chunks(camera, t) {
+    const { run } = this;
+    const chunks = [];
+    if (!run.rows) return chunks;
+    const [xs, ys, zs] = ["x", "y", "z"].map((axis) => run.column(`position.${axis}`));
+    const active = run.column("active");
+    const now = run.row(t);
+    const [e, r, u, f] = [camera.eye, camera.right, camera.up, camera.forward];
+    const { near, focal, width, height } = camera;
+    let chunk = null;
+    let length = 0;
+    let [lastX, lastY] = [0, 0];
+    const add = (x, y, z, i, past, last) => {
+      const [dx, dy, dz] = [x - e[0], y - e[1], z - e[2]];
+      const depth = dx * f[0] + dy * f[1] + dz * f[2];
+      if (!(depth > near)) {
+        chunk = null; // behind the camera, or no number
+        return;
+      }
+      const k = focal / depth;
+      const px = 0.5 * width + k * (dx * r[0] + dy * r[1] + dz * r[2]);
+      const py = 0.5 * height - k * (dx * u[0] + dy * u[1] + dz * u[2]);
+      const step = chunk ? Math.abs(px - lastX) + Math.abs(py - lastY) : 0;
+      const who = active ? active[i] : 0;
+      const turns = !chunk || chunk.past !== past || chunk.active !== who;
+      if (!turns && !last && step < FINEST) return;
+      if (chunk) {
+        chunk.points.push(px, py);
+        length += step;
+      }
+      if (turns || length > CHUNK) {
+        chunk = { points: chunk && chunk.past === past ? chunk.points.slice(-2) : [px, py], row: i, past, active: who };
+        chunks.push(chunk);
+        length = 0;
+      }
+      [lastX, lastY] = [px, py];
+    };
+    for (let i = 0; i <= now; i++) add(xs[i], ys[i], zs[i], i, true, i === 0);
+    const here = run.pose(t).position;
+    if (t >= run.start) add(...here, now, true, true);
+    chunk = null;
+    add(...here, now, false, true);
+    for (let i = now + 1; i < run.rows; i++) add(xs[i], ys[i], zs[i], i, false, i === run.rows - 1);
+    return chunks.filter((c) => c.points.length > 2 && inPicture(c.points, width, height));
+  }
+
+  /** The length of way at each row [m], small moves to and fro left out. */
+  way() {
+    const { run } = this;
+    if (this._way.length < run.rows) {
+      const longer = new Float64Array(2 * run.rows);
+      longer.set(this._way.subarray(0, this._known));
+      this._way = longer;
+    }
+    const [xs, ys, zs] = ["x", "y", "z"].map((axis) => run.column(`position.${axis}`));
+    const least = 0.5 * run.header.vehicle.radius;
+    for (let i = this._known; i < run.rows; i++) {
+      if (i === 0) this._from = [xs[0], ys[0], zs[0]];
+      const moved = Math.hypot(xs[i] - this._from[0], ys[i] - this._from[1], zs[i] - this._from[2]);
+      this._way[i] = i ? this._way[i - 1] : 0;
+      if (!(moved < least) && i) {
+        this._way[i] += Number.isFinite(moved) ? moved : 0;
+        this._from = [xs[i], ys[i], zs[i]];
+      }
+    }
+    this._known = run.rows;
+    return this._way;
+  }
+
+  /** Where marks of direction stand, so far apart [m]: [{row, from, to}] places on the way. */
+  marks(spacing) {
+    const way = this.way();
+    const { run } = this;
+    const [xs, ys, zs] = ["x", "y", "z"].map((axis) => run.column(`position.${axis}`));
+    const marks = [];
+    for (let i = 1; i < run.rows; i++) {
+      if (Math.floor(way[i] / spacing) <= Math.floor(way[i - 1] / spacing)) continue;
+      const at = [xs[i], ys[i], zs[i]];
+      let k = i; // far enough back to have a direction
+      while (k > 0 && Math.hypot(at[0] - xs[k], at[1] - ys[k], at[2] - zs[k]) < 0.05 * spacing) k--;
+      marks.push({ row: i, from: [xs[k], ys[k], zs[k]], to: at });
+    }
+    return marks;
+  }
+}
+
+/** Whether a line of pixels may touch the picture. */
+function inPicture(points, width, height) {
+  let [left, right, top, bottom] = [true, true, true, true];
+  for (let i = 0; i < points.length; i += 2) {
+    left &&= points[i] < -20;
+    right &&= points[i] > width + 20;
+    top &&= points[i + 1] < -20;
+    bottom &&= points[i + 1] > height + 20;
+  }
+  return !(left || right || top || bottom);
+}

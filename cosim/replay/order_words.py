@@ -1,0 +1,113 @@
+"""Orders in plain words, few enough to be read."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import assert_never
+
+from cosim.helm.orders import (
+    Aim,
+    Arm,
+    Begin,
+    Change,
+    Face,
+    Forget,
+    Mission,
+    Obstacle,
+    Order,
+    Reset,
+    Steer,
+    Sticks,
+)
+from cosim.scenario_tables import Vector3
+
+_TOLD = 3  # orders of one moment that are told each
+_MODES = {
+    "manual": "Steered by hand",
+    "hold": "Holds its place",
+    "reach": "Heads for the target",
+    "mission": "Follows the mission",
+    "surface": "Surfaces",
+}
+
+
+def ordered_events(log: Sequence[tuple[int, Order]], step: float, most: int) -> list[tuple[float, str]]:
+    """Return when orders were given, and which.
+
+    Parameters
+    ----------
+    log : sequence of (int, Order)
+        Steps, and orders that were taken at them.
+    step : float
+        [s].
+    most : int
+        Moments; orders that follow each other closely are told together where there are more.
+
+    Returns
+    -------
+    list of (float, str)
+        Times [s] of the first order of each moment, and words for all of its.
+    """
+    moments: list[tuple[int, int, list[str]]] = []  # first and last step, words
+    for k, order in log:
+        if moments and moments[-1][1] == k:
+            moments[-1][2].append(order_words(order))
+        else:
+            moments.append((k, k, [order_words(order)]))
+    while len(moments) > most:
+        i = min(range(1, len(moments)), key=lambda i: moments[i][0] - moments[i - 1][1])
+        (first, _, before), (_, last, words) = moments[i - 1], moments[i]
+        moments[i - 1 : i + 1] = [(first, last, before + words)]
+    return [(first * step, _joined(words)) for first, _, words in moments]
+
+
+def _joined(words: Sequence[str]) -> str:
+    kinds = list(dict.fromkeys(words))  # sticks say the same many times
+    more = f"; {len(kinds) - _TOLD} more orders" if len(kinds) > _TOLD else ""
+    return "Ordered: " + "; ".join(kinds[:_TOLD]) + more
+
+
+def order_words(order: Order) -> str:
+    """Return what an order asks for.
+
+    Parameters
+    ----------
+    order : Order
+        Any.
+
+    Returns
+    -------
+    str
+        Such as ``Target at (7, 0, 4) m``.
+    """
+    match order:
+        case Arm():
+            return "Armed" if order.armed else "Disarmed"
+        case Steer():
+            return _MODES[order.mode]
+        case Aim():
+            size = "" if order.radius is None else f", radius {order.radius:.3g} m"
+            return f"Target at {_place(order.position)}{size}"
+        case Face():
+            return f"Heading {math.degrees(order.heading) % 360.0:.0f}°"
+        case Sticks():
+            return "Sticks moved"
+        case Obstacle():
+            return f"Obstacle {order.number} at {_place(order.position)}, radius {order.radius:.3g} m"
+        case Forget():
+            return f"Obstacle {order.number} gone"
+        case Change():
+            return f"{order.key} is {order.value:.6g}"
+        case Mission():
+            return f"Mission of {len(order.items)} items"
+        case Begin():
+            return f"Mission goes on with item {order.item}"
+        case Reset():
+            return "Reset"
+        case _:
+            assert_never(order)
+
+
+def _place(position: Vector3) -> str:
+    return "(" + ", ".join(f"{x:.3g}" for x in position) + ") m"

@@ -1,0 +1,90 @@
+"""The pages of runs in their folders, and of several runs in one file."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from cosim.errors import RunError
+from cosim.replay.folder import FlownRun, load_run
+from cosim.replay.page import REPLAY, is_page, write_page
+from cosim.replay.trace import trace_of
+
+
+def write_replay(run: FlownRun, out: Path | None = None, title: str | None = None) -> Path:
+    """Write the page of one run.
+
+    Parameters
+    ----------
+    run : FlownRun
+        Any.
+    out : Path, optional
+        The file; default: ``replay.html`` in the run folder.
+    title : str, optional
+        Of the page; default: the scenario's.
+
+    Returns
+    -------
+    Path
+        The file.
+
+    Raises
+    ------
+    RunError
+        If its log of orders cannot be read.
+    """
+    return write_page(out or run.path / REPLAY, [trace_of(run).as_json()], title or run.scenario.title)
+
+
+def replay(folders: Sequence[Path], out: Path | None = None, title: str | None = None) -> Path:
+    """Write the page of runs that are done, were interrupted, or were killed.
+
+    Parameters
+    ----------
+    folders : sequence of Path
+        Run folders.
+    out : Path, optional
+        The file; default: ``replay.html``, in the folder of a single run, or in the current one.
+    title : str, optional
+        Of the page; default: that of the scenario, or of the first one and the names of all runs.
+
+    Returns
+    -------
+    Path
+        The file.
+
+    Raises
+    ------
+    RunError
+        If a folder holds no run that can be read, or is named twice, or the file is something else, or cannot be
+        written.
+    ScenarioError
+        If the scenario of a run is none.
+    """
+    names = _names(folders)
+    file = out or (folders[0] / REPLAY if len(folders) == 1 else Path(REPLAY))
+    try:
+        if file.exists() and not is_page(file):
+            raise RunError(f"{file}: exists and is no replay; expected a new file")
+        if len(folders) == 1:
+            return write_replay(load_run(folders[0]), file, title)
+        traces, titles = [], []
+        for folder, name in zip(folders, names, strict=True):
+            run = load_run(folder)
+            traces.append(trace_of(run).as_json() | {"name": name})
+            titles.append(run.scenario.title)
+        return write_page(file, traces, title or f"{titles[0]}: {', '.join(names)}")
+    except OSError as error:
+        raise RunError(f"{file}: {error.strerror or error}") from error
+
+
+def _names(folders: Sequence[Path]) -> list[str]:
+    """Return the shortest ends of the folders' paths that tell them apart."""
+    paths = [folder.resolve() for folder in folders]
+    for i, path in enumerate(paths):
+        if path in paths[:i]:
+            raise RunError(f"{folders[i]}: is given twice, expected each run once")
+    depth = 1
+    while len({path.parts[-depth:] for path in paths}) < len(paths):
+        depth += 1
+    return [Path(*path.parts[-depth:]).as_posix() for path in paths]
