@@ -8,7 +8,7 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 
-from cosim.campaigns.figures import legend_above
+from cosim.campaigns.figures import WIDTH, legend_above
 from cosim.campaigns.results import Results
 from cosim.drawing import BLACK, BLUE, GREEN, ORANGE, RED, STYLE
 
@@ -36,7 +36,7 @@ def side_by_side(one: str, results: Results, other: str, others: Results, column
     some = np.unique(np.linspace(0, len(results) - 1, min(len(results), _MOST)).astype(int))
     mine, theirs = (rows["reached"] & ~rows["violation"] for rows in (results, others))
     with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(6.8, 3.7), layout="constrained")
+        figure = Figure(figsize=(WIDTH, 3.4), layout="constrained")
         panels = figure.subplots(1, len(columns), squeeze=False)[0]
         for axes, (name, label) in zip(panels, columns, strict=True):
             x, y = results.number(name), others.number(name)

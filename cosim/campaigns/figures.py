@@ -16,7 +16,7 @@ from cosim.campaigns.statistics import Facts, bins, rate
 from cosim.drawing import BLACK, BLUE, CYCLE, GREEN, ORANGE, RED, STYLE, Drawing, legend_columns
 from cosim.signals import Array
 
-_WIDTH = 6.8  # in
+WIDTH = 5.6  # in, of a figure: readable on a phone too
 _ACROSS = 2  # panels
 _MOST_KEYS = 8  # that are drawn
 _POINTS = 700  # of a panel
@@ -59,7 +59,7 @@ def forest(lines: Sequence[Rated]) -> Figure:
     """
     heads = len({line.fact for line in lines if line.group})
     with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(_WIDTH, 0.75 + 0.27 * (len(lines) + heads)), layout="constrained")
+        figure = Figure(figsize=(WIDTH, 0.75 + 0.27 * (len(lines) + heads)), layout="constrained")
         axes = figure.add_subplot()
         y, ticks, labels, before = 0.0, [], [], None
         for line in lines:
@@ -224,7 +224,7 @@ def scatter(keys: Sequence[Key], values: Array, label: str, reached: Facts, viol
 def _panels(count: int, height: float) -> tuple[Figure, list[Axes]]:
     """Return a figure with so many panels."""
     down = -(-count // _ACROSS)
-    figure = Figure(figsize=(_WIDTH, 0.35 + height * down), layout="constrained")
+    figure = Figure(figsize=(WIDTH, 0.35 + height * down), layout="constrained")
     axes = figure.subplots(down, min(count, _ACROSS), squeeze=False).ravel()
     for unused in axes[count:]:
         unused.set_visible(False)
@@ -240,7 +240,9 @@ def _whole(axes: Axes, key: Key) -> None:
 def legend_above(figure: Figure, axes: Axes) -> None:
     """Put the legend of one of its panels above a figure, in as many columns as there is room for."""
     handles, labels = axes.get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper center", ncols=min(4, legend_columns(labels)))
+    figure.legend(
+        handles, labels, loc="outside upper center", ncols=min(len(labels), max(1, round(0.8 * legend_columns(labels))))
+    )
 
 
 def _thinned(x: Array, shares: Array) -> tuple[Array, Array]:

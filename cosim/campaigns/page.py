@@ -41,7 +41,7 @@ thead th { border-bottom: 2px solid var(--ink); vertical-align: bottom; }
 tbody th { font-weight: normal; } td { font-variant-numeric: tabular-nums; }
 code, pre { font-size: .85em; background: var(--block); } code { padding: .1em .3em; overflow-wrap: anywhere; }
 pre { padding: .8rem; overflow-x: auto; }
-@media (max-width: 40rem) { figure .wide svg { width: 36rem; } }
+td code { white-space: nowrap; }
 </style>
 </head>
 <body>
@@ -171,7 +171,7 @@ def _figure(drawing: Drawing, folder: Path) -> Html:
     svg = drawing.write(folder)
     caption = html.escape(drawing.caption)
     inline = svg[svg.index("<svg") :].replace("<svg", f'<svg role="img" aria-label="{caption}"', 1)
-    return Html(f'<figure><div class="wide">{inline}</div><figcaption>{caption}</figcaption></figure>')
+    return Html(f"<figure>{inline}<figcaption>{caption}</figcaption></figure>")
 
 
 def _escaped(text: str) -> str:

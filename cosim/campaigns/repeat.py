@@ -24,7 +24,7 @@ from cosim.campaigns.sweep_rows import SweepWork
 from cosim.campaigns.work import Task
 from cosim.errors import RunError
 from cosim.record import Record
-from cosim.run_folder import SCENARIO
+from cosim.replay.folder import SCENARIO
 from cosim.scenario import VEHICLE_COPY, Scenario, load_scenario
 from cosim.scene import decode_scene
 from cosim.scene_run import Conditions

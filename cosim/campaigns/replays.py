@@ -10,11 +10,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from cosim.campaigns.folder import SUMMARY, write_text
+from cosim.campaigns.folder import write_text
 from cosim.campaigns.page import Html, link
 from cosim.campaigns.repeat import Repeat, repeat_of
 from cosim.errors import CosimError
-from cosim.record import load_record
+from cosim.replay.folder import load_run
 from cosim.replay.page import REPLAY, write_page
 from cosim.replay.trace import trace_of
 from cosim.run import run_scenario
@@ -76,7 +76,7 @@ def replay_of(out: Path, key: int, folders: Sequence[Path], title: str) -> Repla
             for folder in folders:
                 name = f"{folder.name}: " if len(folders) > 1 else ""
                 trace, remark = _flown(repeat_of(folder, key), scratch / "run")
-                traces += [trace] if trace else []
+                traces += [trace | ({"name": folder.name} if name else {})] if trace else []
                 remarks += [name + remark] if remark else []
             if traces:
                 write_page(scratch / REPLAY, traces, title)
@@ -100,16 +100,14 @@ def _flown(repeat: Repeat, folder: Path) -> tuple[dict[str, Any] | None, str]:
             run_scenario(repeat.scenario, folder, report=False)
         except PlantError as error:
             remark = f"the plant stops: {error}"
-        summary, record = json.loads((folder / SUMMARY).read_text(encoding="utf-8")), load_record(folder)
-        if summary["status"] == "interrupted":
+        run = load_run(folder)
+        if run.summary["status"] == "interrupted":
             raise KeyboardInterrupt
-        if summary["status"] == "completed":
-            apart = repeat.apart(repeat.outcome(repeat.scenario, record, summary))
-        trace = trace_of(repeat.scenario, record, summary).as_json()
-    except FileNotFoundError:  # it stopped before the first row
-        return None, f"cannot be shown: {remark}"
+        if run.summary["status"] == "completed":
+            apart = repeat.apart(repeat.outcome(repeat.scenario, run.record, run.summary))
+        trace = trace_of(run).as_json()
     except CosimError as error:
-        return None, f"cannot be shown: {error}"
+        return None, f"cannot be shown: {remark or error}"
     finally:
         shutil.rmtree(folder, ignore_errors=True)
     told = ", ".join(f"{name} {_said(now)} in the place of {_said(before)}" for name, (before, now) in apart.items())

@@ -27,7 +27,7 @@ from cosim.campaigns.sweep_summary import FACTS
 from cosim.campaigns.worst import LISTED, Worst, worst_rows
 from cosim.errors import RunError
 from cosim.flying.outcome import FIELDS
-from cosim.run_folder import SCENARIO
+from cosim.replay.folder import SCENARIO
 
 if TYPE_CHECKING:
     from cosim.drawing import Drawing
