@@ -145,7 +145,8 @@ def _drawings(results: Results, kinds: SceneKinds, summary: dict[str, Any]) -> I
     if keys:
         facts = rates_of(results)
         caption = "Outcomes by what the scenes are like, in parts of the range with about as many scenes each."
-        yield Drawing("depends", caption, binned_rates(keys, {name: facts[name] for name in _DRAWN}))
+        if any(0 < facts[name].sum() < len(results) for name in _DRAWN):
+            yield Drawing("depends", caption, binned_rates(keys, {name: facts[name] for name in _DRAWN}))
         caption = "Least clearance of each scene; below 0 a region is violated."
         drawn = scatter(
             keys, results.number("min_clearance"), "least clearance [m]", facts["reached"], facts["violation"]
@@ -181,9 +182,9 @@ def _page(
         page.add(figures.get("distributions", Html("")))
         quantiles_table(page, groups)
         page.paragraph("Quantiles over the scenes that were reached, of the least clearance over all.", faint=True)
-        if "depends" in figures:
+        if "clearances" in figures:
             page.heading("What it depends on")
-            page.add(figures["depends"])
+            page.add(figures.get("depends", Html("")))
             page.add(figures["clearances"])
         several = kinds.kinds.tolist() if s["kinds"] else []
         worst_section(page, folder, "scene", worst, shown, dict(zip(results["seed"].tolist(), several, strict=False)))

@@ -55,6 +55,8 @@ def side_by_side(one: str, results: Results, other: str, others: Results, column
                 (f"only {other}", theirs & ~mine, ORANGE, "^"),
                 ("neither", ~mine & ~theirs, RED, "x"),
             ):
+                if not of.any():
+                    continue
                 at = some[of[some]]
                 axes.plot(x[at], y[at], mark, color=colour, markersize=3.5, alpha=0.7, label=f"{what} ({of.sum()})")
             axes.plot([low, high], [low, high], color=BLACK, linewidth=0.8)

@@ -9,7 +9,7 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator, PercentFormatter
+from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter, PercentFormatter
 
 from cosim.campaigns.sections import LABELS
 from cosim.campaigns.statistics import Facts, bins, rate
@@ -175,8 +175,8 @@ def binned_rates(keys: Sequence[Key], facts: Mapping[str, Facts]) -> Figure:
                     [part.middle for part in parts], shares, yerr=(shares - low, high - shares), label=fact,
                     color=FACT_COLOURS[fact], marker=_MARKS[fact], markersize=4, linewidth=1.0, elinewidth=1.6,
                 )  # fmt: skip
-            _whole(axes, key)
-            axes.set(xlabel=key.label, ylim=(-0.03, 1.03), xscale="log" if key.log else "linear")
+            _across(axes, key)
+            axes.set(ylim=(-0.03, 1.03))
             axes.yaxis.set_major_formatter(PercentFormatter(1.0))
         legend_above(figure, panels[0])
         return figure
@@ -212,11 +212,11 @@ def scatter(keys: Sequence[Key], values: Array, label: str, reached: Facts, viol
                 ("not reached, nothing violated", ~reached & ~violated, ORANGE, "^"),
                 ("violated", violated, RED, "x"),
             ):
-                at = some[of[some]]
-                axes.plot(key.values[at], values[at], mark, color=colour, markersize=3.5, alpha=0.7, label=what)
+                if (at := some[of[some]]).size:
+                    axes.plot(key.values[at], values[at], mark, color=colour, markersize=3.5, alpha=0.7, label=what)
             axes.axhline(0.0, color=BLACK, linewidth=0.8)
-            _whole(axes, key)
-            axes.set(xlabel=key.label, ylabel=label, xscale="log" if key.log else "linear")
+            _across(axes, key)
+            axes.set(ylabel=label)
         legend_above(figure, panels[0])
         return figure
 
@@ -231,18 +231,22 @@ def _panels(count: int, height: float) -> tuple[Figure, list[Axes]]:
     return figure, list(axes[:count])
 
 
-def _whole(axes: Axes, key: Key) -> None:
-    """Have no fractions on the axis of a key that is a whole number."""
-    if np.array_equal(key.values, np.round(key.values)):
+def _across(axes: Axes, key: Key) -> None:
+    """Label the axis of a key: few ticks where it is logarithmic, no fractions where it is a whole number."""
+    axes.set(xlabel=key.label, xscale="log" if key.log else "linear")
+    if key.log:
+        axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        axes.xaxis.set_major_formatter(FuncFormatter(lambda x, _: f"{x:g}"))
+        axes.xaxis.set_minor_formatter(NullFormatter())
+    elif np.array_equal(key.values, np.round(key.values)):
         axes.xaxis.set_major_locator(MaxNLocator(integer=True))
 
 
 def legend_above(figure: Figure, axes: Axes) -> None:
     """Put the legend of one of its panels above a figure, in as many columns as there is room for."""
     handles, labels = axes.get_legend_handles_labels()
-    figure.legend(
-        handles, labels, loc="outside upper center", ncols=min(len(labels), max(1, round(0.8 * legend_columns(labels))))
-    )
+    columns = int(legend_columns(labels) * WIDTH / 6.4)  # as wide as figures of runs, of which it speaks
+    figure.legend(handles, labels, loc="outside upper center", ncols=max(1, min(columns, len(labels))))
 
 
 def _thinned(x: Array, shares: Array) -> tuple[Array, Array]:

@@ -18,6 +18,7 @@ LABELS = {  # of columns: what they are called, with unit
     "effort": "effort [N s]",
     "thrust_variation": "thrust variation [N]",
     "max_force": "greatest force [N]",
+    "max_speed": "greatest speed [m/s]",
 }
 _WORDS = {"violation": "violated a region", "violated": "violated a hard region"}
 

@@ -120,7 +120,8 @@ def _drawings(results: Results, s: dict[str, Any]) -> Iterator[Drawing]:
         caption = (
             "Outcomes by what varies, in parts of the range with about as many rows each; what matters most first."
         )
-        yield Drawing("depends", caption, binned_rates(keys, {"reached": reached, "violated": violated}))
+        if any(0 < fact.sum() < len(fact) for fact in (reached, violated)):
+            yield Drawing("depends", caption, binned_rates(keys, {"reached": reached, "violated": violated}))
         for name in ("min_clearance", "reach_time"):
             column = results.number(name)[flown]
             if _any(column):

@@ -16,7 +16,7 @@ from cosim.flying.outcome import FIELDS
 from cosim.signals import Array
 
 FACTS = ("reached", "settled", "violated")  # whose rates are told
-SPREADS = ("reach_time", "settle_time", "min_clearance", "effort", "max_force")  # whose quantiles are told
+SPREADS = ("reach_time", "settle_time", "min_clearance", "effort", "max_force", "max_speed")  # whose quantiles are told
 _REASONS = 5  # why rows were refused
 
 
