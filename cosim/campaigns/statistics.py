@@ -1,4 +1,7 @@
-"""Numbers that pages and summaries have in common: rates with intervals, quantiles, bins, paired differences."""
+"""Numbers that pages and summaries have in common: rates with intervals, quantiles, bins, paired differences.
+
+SciPy's statistics take as long to import as all else that a worker needs, and no worker needs them.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +10,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import binomtest, quantile_test
 
 from cosim.signals import Array
 
@@ -34,6 +36,8 @@ def rate(happened: Facts) -> dict[str, Any]:
     n, k = len(happened), int(happened.sum())
     if not n:
         return {"rows": 0, "share": None, "low": None, "high": None}
+    from scipy.stats import binomtest
+
     interval = binomtest(k, n).proportion_ci(CONFIDENCE, method="wilson")
     return {"rows": k, "share": k / n, "low": float(interval.low), "high": float(interval.high)}
 
@@ -105,6 +109,8 @@ def paired(one: Facts, other: Facts) -> dict[str, Any]:
         one alone completes fall out at least as unevenly if the laws were equal (McNemar's exact test; None where there
         are none).
     """
+    from scipy.stats import binomtest
+
     only_one, only_other = int((one & ~other).sum()), int((other & ~one).sum())
     uneven = only_one + only_other
     return {
@@ -132,6 +138,8 @@ def median_difference(differences: Array) -> dict[str, Any]:
     n = len(differences)
     if not n:
         return {"pairs": 0, "median": None, "low": None, "high": None}
+    from scipy.stats import quantile_test
+
     interval = quantile_test(differences, q=0.0, p=0.5).confidence_interval(CONFIDENCE)
     low, high = (float(x) if np.isfinite(x) else None for x in (interval.low, interval.high))
     return {"pairs": n, "median": float(np.median(differences)), "low": low, "high": high}

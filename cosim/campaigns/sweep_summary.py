@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.stats import spearmanr
 
 from cosim.campaigns.results import Results
 from cosim.campaigns.statistics import Facts, quantiles, rate
@@ -79,5 +78,7 @@ def _correlations(work: SweepWork, results: Results, flown: Facts) -> dict[str, 
 def _rank_correlation(one: Array, other: Array) -> dict[str, float] | None:
     if len(one) < 3 or np.all(one == one[0]) or np.all(other == other[0]):
         return None
+    from scipy.stats import spearmanr  # as in `cosim.campaigns.statistics`
+
     result = spearmanr(one, other)
     return {"rho": float(result.statistic), "p": float(result.pvalue)}
