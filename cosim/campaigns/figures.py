@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
-import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -13,7 +12,7 @@ from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormat
 
 from cosim.campaigns.sections import LABELS
 from cosim.campaigns.statistics import Facts, bins, rate
-from cosim.drawing import BLACK, BLUE, CYCLE, GREEN, ORANGE, RED, STYLE, Drawing, legend_columns
+from cosim.drawing import BLACK, BLUE, CYCLE, GREEN, ORANGE, RED, Drawing, legend_columns
 from cosim.signals import Array
 
 WIDTH = 5.6  # in, of a figure: readable on a phone too
@@ -58,26 +57,25 @@ def forest(lines: Sequence[Rated]) -> Figure:
         Shares from 0 to 100 %.
     """
     heads = len({line.fact for line in lines if line.group})
-    with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(WIDTH, 0.75 + 0.27 * (len(lines) + heads)), layout="constrained")
-        axes = figure.add_subplot()
-        y, ticks, labels, before = 0.0, [], [], None
-        for line in lines:
-            if line.group and line.fact != before:
-                ticks.append(y)
-                labels.append(f"$\\bf{{{line.fact}}}$")
-                y += 1.0
-            before = line.fact
+    figure = Figure(figsize=(WIDTH, 0.75 + 0.27 * (len(lines) + heads)), layout="constrained")
+    axes = figure.add_subplot()
+    y, ticks, labels, before = 0.0, [], [], None
+    for line in lines:
+        if line.group and line.fact != before:
             ticks.append(y)
-            labels.append(f"{line.group or line.fact}  ({line.rate['rows']} of {line.rows})")
-            _interval(axes, line, y)
+            labels.append(f"$\\bf{{{line.fact}}}$")
             y += 1.0
-        axes.set(xlim=(-0.02, 1.02), ylim=(y - 0.4, -0.6), xlabel="share of all, 95 % interval by Wilson")
-        axes.set_yticks(ticks, labels)
-        axes.tick_params(axis="y", length=0)
-        axes.xaxis.set_major_formatter(PercentFormatter(1.0))
-        axes.grid(visible=False, axis="y")
-        return figure
+        before = line.fact
+        ticks.append(y)
+        labels.append(f"{line.group or line.fact}  ({line.rate['rows']} of {line.rows})")
+        _interval(axes, line, y)
+        y += 1.0
+    axes.set(xlim=(-0.02, 1.02), ylim=(y - 0.4, -0.6), xlabel="share of all, 95 % interval by Wilson")
+    axes.set_yticks(ticks, labels)
+    axes.tick_params(axis="y", length=0)
+    axes.xaxis.set_major_formatter(PercentFormatter(1.0))
+    axes.grid(visible=False, axis="y")
+    return figure
 
 
 def _interval(axes: Axes, line: Rated, y: float) -> None:
@@ -113,23 +111,22 @@ def distributions(columns: Mapping[str, Mapping[str, Array]], told: str) -> Iter
     there = {name: of for name, of in columns.items() if any(np.isfinite(values).any() for values in of.values())}
     if not there:
         return
-    with mpl.rc_context(STYLE):
-        figure, panels = _panels(len(there), 2.3)
-        for axes, (column, groups) in zip(panels, there.items(), strict=True):
-            for i, (name, values) in enumerate(groups.items()):
-                x, shares = _thinned(*shares_up_to(values))
-                colour, dash = CYCLE[i % len(CYCLE)], _DASHES[i % len(_DASHES)]
-                axes.step(x, shares, where="post", color=colour, linestyle=dash, label=name)
-                if x.size and shares[-1] >= 0.5:
-                    axes.plot(x[np.searchsorted(shares, 0.5)], 0.5, "o", color=colour, markersize=5)
-            if column == "min_clearance":
-                axes.axvline(0.0, color=BLACK, linewidth=0.8)
-            axes.set(xlabel=LABELS[column], ylim=(0.0, 1.02))
-            axes.yaxis.set_major_formatter(PercentFormatter(1.0))
-        if len(groups) > 1:
-            legend_above(figure, panels[0])
-        caption = "Share that comes to at most so much; the dot is the median. Left of 0 a region is violated."
-        yield Drawing("distributions", f"{caption} {told}".rstrip(), figure)
+    figure, panels = _panels(len(there), 2.3)
+    for axes, (column, groups) in zip(panels, there.items(), strict=True):
+        for i, (name, values) in enumerate(groups.items()):
+            x, shares = _thinned(*shares_up_to(values))
+            colour, dash = CYCLE[i % len(CYCLE)], _DASHES[i % len(_DASHES)]
+            axes.step(x, shares, where="post", color=colour, linestyle=dash, label=name)
+            if x.size and shares[-1] >= 0.5:
+                axes.plot(x[np.searchsorted(shares, 0.5)], 0.5, "o", color=colour, markersize=5)
+        if column == "min_clearance":
+            axes.axvline(0.0, color=BLACK, linewidth=0.8)
+        axes.set(xlabel=LABELS[column], ylim=(0.0, 1.02))
+        axes.yaxis.set_major_formatter(PercentFormatter(1.0))
+    if len(groups) > 1:
+        legend_above(figure, panels[0])
+    caption = "Share that comes to at most so much; the dot is the median. Left of 0 a region is violated."
+    yield Drawing("distributions", f"{caption} {told}".rstrip(), figure)
 
 
 def shares_up_to(values: Array) -> tuple[Array, Array]:
@@ -164,22 +161,21 @@ def binned_rates(keys: Sequence[Key], facts: Mapping[str, Facts]) -> Figure:
     Figure
         A panel for each key.
     """
-    with mpl.rc_context(STYLE):
-        figure, panels = _panels(min(len(keys), _MOST_KEYS), 2.1)
-        for axes, key in zip(panels, keys, strict=False):
-            parts = list(bins(key.values))
-            for fact, happened in facts.items():
-                rates = [rate(happened[part.rows]) for part in parts]
-                shares, low, high = (np.array([r[name] for r in rates]) for name in ("share", "low", "high"))
-                axes.errorbar(
-                    [part.middle for part in parts], shares, yerr=(shares - low, high - shares), label=fact,
-                    color=FACT_COLOURS[fact], marker=_MARKS[fact], markersize=4, linewidth=1.0, elinewidth=1.6,
-                )  # fmt: skip
-            _across(axes, key)
-            axes.set(ylim=(-0.03, 1.03))
-            axes.yaxis.set_major_formatter(PercentFormatter(1.0))
-        legend_above(figure, panels[0])
-        return figure
+    figure, panels = _panels(min(len(keys), _MOST_KEYS), 2.1)
+    for axes, key in zip(panels, keys, strict=False):
+        parts = list(bins(key.values))
+        for fact, happened in facts.items():
+            rates = [rate(happened[part.rows]) for part in parts]
+            shares, low, high = (np.array([r[name] for r in rates]) for name in ("share", "low", "high"))
+            axes.errorbar(
+                [part.middle for part in parts], shares, yerr=(shares - low, high - shares), label=fact,
+                color=FACT_COLOURS[fact], marker=_MARKS[fact], markersize=4, linewidth=1.0, elinewidth=1.6,
+            )  # fmt: skip
+        _across(axes, key)
+        axes.set(ylim=(-0.03, 1.03))
+        axes.yaxis.set_major_formatter(PercentFormatter(1.0))
+    legend_above(figure, panels[0])
+    return figure
 
 
 def scatter(keys: Sequence[Key], values: Array, label: str, reached: Facts, violated: Facts) -> Figure:
@@ -204,21 +200,20 @@ def scatter(keys: Sequence[Key], values: Array, label: str, reached: Facts, viol
     some = np.flatnonzero(np.isfinite(values))
     if len(some) > _POINTS:
         some = some[np.unique(np.linspace(0, len(some) - 1, _POINTS).astype(int))]
-    with mpl.rc_context(STYLE):
-        figure, panels = _panels(min(len(keys), _MOST_KEYS), 2.1)
-        for axes, key in zip(panels, keys, strict=False):
-            for what, of, colour, mark in (
-                ("reached, nothing violated", reached & ~violated, GREEN, "o"),
-                ("not reached, nothing violated", ~reached & ~violated, ORANGE, "^"),
-                ("violated", violated, RED, "x"),
-            ):
-                if (at := some[of[some]]).size:
-                    axes.plot(key.values[at], values[at], mark, color=colour, markersize=3.5, alpha=0.7, label=what)
-            axes.axhline(0.0, color=BLACK, linewidth=0.8)
-            _across(axes, key)
-            axes.set(ylabel=label)
-        legend_above(figure, panels[0])
-        return figure
+    figure, panels = _panels(min(len(keys), _MOST_KEYS), 2.1)
+    for axes, key in zip(panels, keys, strict=False):
+        for what, of, colour, mark in (
+            ("reached, nothing violated", reached & ~violated, GREEN, "o"),
+            ("not reached, nothing violated", ~reached & ~violated, ORANGE, "^"),
+            ("violated", violated, RED, "x"),
+        ):
+            if (at := some[of[some]]).size:
+                axes.plot(key.values[at], values[at], mark, color=colour, markersize=3.5, alpha=0.7, label=what)
+        axes.axhline(0.0, color=BLACK, linewidth=0.8)
+        _across(axes, key)
+        axes.set(ylabel=label)
+    legend_above(figure, panels[0])
+    return figure
 
 
 def _panels(count: int, height: float) -> tuple[Figure, list[Axes]]:

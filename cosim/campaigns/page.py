@@ -155,9 +155,14 @@ def write_figures(folder: Path, drawings: Iterable[Drawing]) -> dict[str, Html]:
     OSError
         If they cannot be written; what was there stays then.
     """
+    import matplotlib as mpl
+
+    from cosim.drawing import STYLE
+
     scratch = Path(tempfile.mkdtemp(prefix=f".{FIGURES}-", dir=folder))
     try:
-        shown = {drawing.name: _figure(drawing, scratch) for drawing in drawings}
+        with mpl.rc_context(STYLE):  # while they are made, and while they are written
+            shown = {drawing.name: _figure(drawing, scratch) for drawing in drawings}
         scratch.chmod(0o755)
         shutil.rmtree(folder / FIGURES, ignore_errors=True)
         if shown:
