@@ -120,7 +120,7 @@ def test_the_page_is_the_same_from_two_processes(tmp_path, monkeypatch):
     for name, workers in (("one", 1), ("two", 2)):
         (tmp_path / name).mkdir()
         monkeypatch.chdir(tmp_path / name)
-        write(tmp_path / name / "s.jsonl", [*PLAIN, *HARD])
+        write(tmp_path / name / "s.jsonl", [*PLAIN[:3], *HARD[3:]])
         words = ["--law", "printed", "--out", "out", "--workers", str(workers), "--replays", "1"]
         assert main(["campaign", "s.jsonl", *words]) == 0
         pages.append(without_wall((tmp_path / name / "out" / "campaign.html").read_text()))
