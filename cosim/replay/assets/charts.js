@@ -88,6 +88,7 @@ class Chart {
     this.frame = new Frame(width, height, this.window, rangeOf(this.curves, this.window, this.spec.zero), this.spec.down);
     if (this.spec.fixed) this.frame = new Frame(width, height, this.window, [-0.03, 1.06], false);
     paintPlot(context, this.frame, this.spec, this.curves, this.theme);
+    context.fillStyle = hueColour("ink", this.theme);
     if (cursor !== null) context.fillRect(this.frame.x(cursor) - 0.75, this.frame.top, 1.5, this.frame.bottom - this.frame.top);
     this.stale = false;
   }

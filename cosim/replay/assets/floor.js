@@ -9,7 +9,7 @@ function roundStep(least) {
 /** A number of metres, with the digits that a step asks for. */
 function metres(x, step) {
   const text = x.toFixed(Math.max(0, -Math.floor(Math.log10(step) + 1e-9)));
-  return Number(text) === 0 ? "0" : text;
+  return Number(text) === 0 ? "0" : text.replace("-", "−");
 }
 
 /** The multiples of a step within two bounds. */
@@ -59,7 +59,7 @@ function paintFloor(painter, labels, bounds, colours, named) {
     const off = rank > 40 ? 13 : 32;
     const x = p[0] + (off * (q[0] - p[0])) / length;
     const y = p[1] + (off * (q[1] - p[1])) / length + (length < 2 ? off : 0);
-    labels.add({ key, text, x, y, colour: colours.soft, size: 11, rank, gap: 0, sides: ["here"] });
+    labels.add({ key, text, x, y, colour: colours.soft, size: 11, rank, gap: 0, pad: 7, sides: ["here"] });
   };
   const out = 0.02 * camera.distance;
   name("north", [middle[0], east[0], floor], [0, out * east[1], 0], "north [m]", 40);
@@ -103,23 +103,6 @@ function paintSurface(painter, bounds, colours) {
   painter.begin();
   painter.line([[n0, e0, 0], [n1, e0, 0], [n1, e1, 0], [n0, e1, 0], [n0, e0, 0]]);
   painter.stroke(colours.gridMajor, 1, 0.9, [2, 4]);
-}
-
-/** The outline of points seen from above, north and east in turn: their convex hull, after Andrew. */
-function outlineFromAbove(points) {
-  const flat = [];
-  for (let i = 0; i < points.length; i += 3) flat.push([points[i], points[i + 1]]);
-  flat.sort((a, b) => a[0] - b[0] || a[1] - b[1]);
-  const left = (a, b, c) => (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]) > 1e-12;
-  const half = (sorted) => {
-    const chain = [];
-    for (const p of sorted) {
-      while (chain.length > 1 && !left(chain[chain.length - 2], chain[chain.length - 1], p)) chain.pop();
-      chain.push(p);
-    }
-    return chain.slice(0, -1);
-  };
-  return [...half(flat), ...half([...flat].reverse())];
 }
 
 /** North, east and down in a corner, and how long a metre is where the camera looks. */

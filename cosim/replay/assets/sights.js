@@ -50,11 +50,11 @@ function paintSight(painter, sight, style) {
   const { context, camera } = painter;
   painter.begin();
   painter.polygon(sight.rim);
-  painter.fill(style.colour, 0.4 * style.alpha);
+  painter.fill(style.colour, 0.25 * style.alpha);
   // the flanks as far as the outline of the cone goes: the triangles of all rim points make it up
   painter.begin();
   for (let i = 0; i < SIGHT_RINGS; i++) painter.polygon([sight.apex, sight.rim[i], sight.rim[(i + 1) % SIGHT_RINGS]]);
-  painter.fill(style.colour, 0.25 * style.alpha);
+  painter.fill(style.colour, 0.16 * style.alpha);
   painter.begin();
   painter.line([...sight.rim, sight.rim[0]]);
   for (let i = 0; i < SIGHT_RINGS; i += SIGHT_RINGS / 4) painter.segment(sight.apex, sight.rim[i]);
