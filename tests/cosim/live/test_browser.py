@@ -85,6 +85,6 @@ def test_the_target_is_dragged_with_the_mouse(browser, live, tmp_path):
     done = running.end()
     log = [json.loads(line)["order"] for line in (done.folder / "orders.jsonl").read_text().splitlines()]
     assert [order["order"] for order in log] == ["arm", "aim", "move", "steer"]
-    assert log[1]["position"] == after
+    assert log[1]["position"] == pytest.approx(after, abs=1e-12)
     target = load_record(done.folder).stack([f"target.{axis}" for axis in "xyz"])
     assert (target == after).all(axis=1).any()
