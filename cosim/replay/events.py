@@ -29,6 +29,7 @@ class Event:
     time: float  # s
     kind: str  # order, goal, violation, active, failure, saturation or end
     text: str
+    until: float | None = None  # s, of what lasts
 
 
 @dataclass(frozen=True)
@@ -78,10 +79,9 @@ def _violations(run: FlownRun) -> Iterator[Event]:
         for span in _few(_spans(clearance < 0.0), time, most):
             depth = -float(np.nanmin(clearance[span.first : span.end]))
             by = f"{math.degrees(depth):.1f}°" if of_attitude(secondary.region.shape) else f"{depth:.3f} m"
-            until = f"until {time[span.end]:.3f} s" if span.end < len(time) else "to the end"
             soft = "" if secondary.region.hard else " (soft)"
-            text = f"Violates {secondary.region.name}{soft} {until}, by up to {by}"
-            yield Event(float(time[span.first]), "violation", text)
+            text = f"Violates {secondary.region.name}{soft} {_lasting(span, time)}, by up to {by}"
+            yield Event(float(time[span.first]), "violation", text, _until(span, time))
 
 
 def _active(run: FlownRun) -> Iterator[Event]:
@@ -115,8 +115,8 @@ def _saturation(run: FlownRun) -> Iterator[Event]:
     record, time = run.record, run.record["time"]
     cut = (record["wrench_saturated"] > 0.0) | (record["allocation_saturated"] > 0.0)
     for span in _few(_spans(cut), time, _MOST // 2):
-        until = f"until {time[span.end]:.3f} s" if span.end < len(time) else "to the end"
-        yield Event(float(time[span.first]), "saturation", f"More force is asked for than there is, {until}")
+        text = f"More force is asked for than there is, {_lasting(span, time)}"
+        yield Event(float(time[span.first]), "saturation", text, _until(span, time))
 
 
 def _end(run: FlownRun) -> Event:
@@ -133,6 +133,14 @@ def _end(run: FlownRun) -> Event:
 def _spans(flags: NDArray[np.bool_]) -> list[_Span]:
     edges = np.diff(flags.astype(np.int8), prepend=0, append=0)
     return [_Span(a, b) for a, b in zip(*(np.flatnonzero(edges == x).tolist() for x in (1, -1)), strict=True)]
+
+
+def _until(span: _Span, time: Array) -> float:
+    return float(time[min(span.end, len(time) - 1)])
+
+
+def _lasting(span: _Span, time: Array) -> str:
+    return f"until {time[span.end]:.3f} s" if span.end < len(time) else "to the end"
 
 
 def _few(spans: list[_Span], time: Array, most: int) -> list[_Span]:

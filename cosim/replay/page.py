@@ -12,18 +12,18 @@ from typing import Any
 
 REPLAY = "replay.html"
 
-_SCENE = (
+SCENE_SCRIPTS = (
     "palette.js", "vectors.js", "camera.js", "solids.js", "pipes.js", "planes.js", "painter.js", "sights.js",
     "hull.js", "vehicle.js", "forces.js", "trail.js", "shadows.js", "bounds.js", "order.js",
-    "labels.js", "floor.js", "controls.js", "scene.js",
+    "regions.js", "labels.js", "floor.js", "controls.js", "scene.js",
 )  # fmt: skip
 _PLAYER = (
     "player.js", "words.js", "curves.js", "axes.js", "plot.js", "charts.js", "board.js", "timeline.js", "panel.js",
     "stage.js", "head.js", "keys.js", "page.js",
 )  # fmt: skip
 _LIVE = ("things.js", "ghost.js", "dragging.js", "helm.js", "live.js")
-_SCRIPTS = ("data.js", *_SCENE, *_PLAYER, *_LIVE, "main.js")
-_STYLES = ("style.css", "panel.css", "layout.css", "live.css")
+_SCRIPTS = ("data.js", *SCENE_SCRIPTS, *_PLAYER, *_LIVE, "main.js")
+_STYLES = ("style.css", "stage.css", "charts.css", "panel.css", "transport.css", "layout.css", "live.css")
 
 
 _MARK = '<script type="application/json" id="runs">'  # where the data of a page begins

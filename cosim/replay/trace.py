@@ -73,7 +73,8 @@ def trace_of(run: FlownRun) -> Trace:
     log = log_of(run)
     changes, events = changes_of(run, log), events_of(run, log)
     time = record["time"]
-    moments = np.searchsorted(time, [*(change["time"] for change in changes), *(event.time for event in events)])
+    told = [t for event in events for t in (event.time, event.until) if t is not None]
+    moments = np.searchsorted(time, [*(change["time"] for change in changes), *told])
     steps = sampled_rows(time, len(viewing.columns), _telling(run), moments)
     names = [record.columns[i].name for i in viewing.picked]
     picked, missing = _read(record, names, steps)

@@ -26,7 +26,7 @@ REQUIRED = {
 def test_folder_holds_what_is_promised(shipped_run):
     folder = shipped_run("paper", *SHORT, report=True).folder
     names = sorted(p.name for p in folder.iterdir())
-    assert names == ["figures", "record.parquet", "report.html", "scenario.toml", "summary.json"]
+    assert names == ["figures", "record.parquet", "replay.html", "report.html", "scenario.toml", "summary.json"]
     assert json.loads((folder / "summary.json").read_text()).keys() >= REQUIRED
 
 

@@ -147,6 +147,6 @@ function chartsOf(runs) {
     },
   ].filter((spec) => {
     spec.signals = spec.signals.filter((one) => runs.some((run) => one.values(run)));
-    return spec.signals.length;
+    return spec.signals.some((one) => !one.context);
   });
 }

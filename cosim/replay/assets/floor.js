@@ -59,7 +59,7 @@ function paintFloor(painter, labels, bounds, colours, named) {
     const off = rank > 40 ? 13 : 32;
     const x = p[0] + (off * (q[0] - p[0])) / length;
     const y = p[1] + (off * (q[1] - p[1])) / length + (length < 2 ? off : 0);
-    labels.add({ key, text, x, y, colour: colours.soft, size: 11, rank, gap: 0, sides: ["here"] });
+    labels.add({ key, text, x, y, colour: colours.soft, size: 11, rank, gap: 0, pad: 7, sides: ["here"] });
   };
   const out = 0.02 * camera.distance;
   name("north", [middle[0], east[0], floor], [0, out * east[1], 0], "north [m]", 40);

@@ -15,7 +15,7 @@ class Labels {
     this.height = height;
     this._words = [];
     this._taken = [];
-    this.placed = []; // {key, x, y, width, height} of the words that were drawn
+    this.placed = []; // {of: whose, x, y, width, height} of the words that were drawn
   }
 
   /** Keep words out of a part of the picture. */
@@ -26,7 +26,7 @@ class Labels {
   /**
    * Ask for a word.
    * @param {object} word {key, text, x, y, colour, rank: lower is more important, gap: pixels from the point, bold,
-   * chip: colour behind it or null, sides: of "above below right left here" in the order in which they are tried}
+   * chip: colour behind it or null, pad: pixels that are free beside it, sides: of "above below right left here" in the order in which they are tried}
    */
   add(word) {
     this._words.push(word);
@@ -48,10 +48,11 @@ class Labels {
       const sides = before && word.sides.includes(before) ? [before, ...word.sides] : word.sides;
       for (const side of sides) {
         const [x, y] = this._corner(side, word, width, height);
-        if (!this._free(x, y, width, height)) continue;
+        const pad = word.pad ?? 0;
+        if (!this._free(x - pad, y, width + 2 * pad, height)) continue;
         this._taken.push([x - 2, y - 1, x + width + 2, y + height + 1]);
         this._sides.set(word.key, side);
-        this.placed.push({ key: word.key, x, y, width, height });
+        this.placed.push({ of: word.of ?? null, x, y, width, height });
         this._write(word, font, x, y, width, height);
         break;
       }

@@ -3,8 +3,8 @@
 const CRITERION_COLOURS = { obstacle: "#D55E00", shape: "#E69F00", depth: "#56B4E9" };
 const GOAL_COLOUR = "#009E73";
 
-/** Of the trails of several runs; each run also has its own dashes where lines lie upon each other. */
-const RUN_COLOURS = ["#0072B2", "#CC79A7", "#009E73", "#E69F00", "#D55E00", "#56B4E9"];
+/** Of the ways of several runs: first those that no criterion has. */
+const RUN_COLOURS = ["#0072B2", "#CC79A7", "#9A7B00", "#7C8A94", "#009E73", "#E69F00", "#D55E00", "#56B4E9"];
 
 /** What the scene needs beside the colours of regions. */
 const SCENE_THEMES = {

@@ -1,11 +1,14 @@
 // The scene: vehicles, their ways and their regions at a time, as a camera sees them.
 
-const LEAST_HULL = 15; // pixels of radius below which the vehicle is drawn larger than it is
+const LEAST_HULL = 15; // pixels of radius below which the vehicle is drawn larger than it is; less in a small picture
 
 /** A 3D scene of some runs on a canvas. */
 class Scene {
-  /** @param {HTMLCanvasElement} canvas  @param {Run[]} runs  @param {"light"|"dark"} theme */
-  constructor(canvas, runs, theme) {
+  /**
+   * @param {HTMLCanvasElement} canvas  @param {Run[]} runs  @param {"light"|"dark"} theme
+   * @param {{name: string, colour: string}[]|null} marks as for setRuns()
+   */
+  constructor(canvas, runs, theme, marks = null) {
     this.canvas = canvas;
     this.context = canvas.getContext("2d", { alpha: false });
     this.labels = new Labels(this.context);
@@ -15,7 +18,7 @@ class Scene {
     this.camera = new Camera();
     controlCamera(canvas, () => this.camera);
     this.resize();
-    this.setRuns(runs);
+    this.setRuns(runs, marks);
   }
 
   /** The camera; scenes that stand side by side may have one together. */
@@ -37,12 +40,18 @@ class Scene {
     this._later();
   }
 
-  /** Show other runs, all of them in the picture. */
-  setRuns(runs) {
+  /**
+   * Show other runs, all of them in the picture.
+   * @param {Run[]} runs
+   * @param {{name: string, colour: string}[]|null} marks of each run, where it is one of several, though not all are
+   * in this scene; without them one run's way has the colours of who was active
+   */
+  setRuns(runs, marks = null) {
     this.runs = runs;
+    this._runMarks = marks ?? (runs.length > 1 ? runs.map(({ header }, i) => ({ name: header.name, colour: runColour(i) })) : null);
     this._trails = runs.map((run) => new Trail(run));
     this._forces = runs.map((run) => new Forces(run));
-    this._sheets = new Map();
+    this._regions = new Regions(runs);
     this._drawn = { time: 0, runs: [] };
     this._followed = null;
     this._measure();
@@ -117,7 +126,7 @@ class Scene {
     this._paintSky(colours);
     this.labels.begin(camera.width, camera.height);
 
-    const regions = this._regionsAt(t, poses);
+    const regions = this._regions.at(t, poses, camera.target, this.theme);
     this._entries = farthestFirst(regions.filter((entry) => entry.solid || entry.sheet), camera.eye);
     this._sights = regions.filter((entry) => entry.sight).map((entry) => ({ ...entry, feature: entry.sight.feature }));
     paintSurface(painter, this.bounds, colours);
@@ -131,7 +140,7 @@ class Scene {
       this._trails.forEach((way, i) => {
         const chunks = this._way(way, i, t, colours);
         paintWayBelow(painter, chunks, floor, colours);
-        things.push(...chunks, ...this._marks(way, i, t, colours));
+        things.push(...chunks, ...this._marks(way, i, t, vehicles[i], colours));
       });
     }
     for (const vehicle of vehicles) if (vehicle) paintPlumb(painter, vehicle, floor, colours);
@@ -153,8 +162,8 @@ class Scene {
 
     paintCompass(painter, this.labels, colours);
     paintScale(painter, this.labels, colours, Math.max(1, ...vehicles.map((vehicle) => vehicle?.magnified ?? 1)));
-    if (labels) this._nameRegions(regions, colours);
-    if (labels && this.runs.length > 1) this._nameVehicles(vehicles, colours);
+    if (labels) nameRegions(this.labels, camera, regions, colours);
+    if (labels && this._runMarks) nameVehicles(this.labels, camera, this._runMarks, vehicles, colours);
     this.labels.draw();
     this._note(t, poses, regions);
   }
@@ -175,7 +184,7 @@ class Scene {
     const { content, bounds } = extentOf(this.runs);
     this.bounds = bounds;
     this._rows = this.runs.map((run) => run.rows);
-    this._sheets.clear();
+    this._regions.bounds = bounds;
     this.camera.content = content;
     const lead = this.runs.find((run) => run.rows);
     if (!lead) return;
@@ -191,7 +200,10 @@ class Scene {
       const { position } = run.pose(run.end);
       return Vec.finite(position) && position.some((x, k) => x < this.bounds[0][k] || x > this.bounds[1][k]);
     });
-    if (left) this._measure();
+    if (!left) return;
+    const { fitted } = this.camera;
+    this._measure();
+    if (fitted) this._quiet(() => this.camera.fit());
   }
 
   _follow(pose) {
@@ -222,59 +234,10 @@ class Scene {
     context.fillRect(0, 0, camera.width, camera.height);
   }
 
-  /** What there is of each region at a time, one entry for each surface, sheet or sight. */
-  _regionsAt(t, poses) {
-    const entries = [];
-    this.runs.forEach((run, r) => {
-      const active = run.active(t);
-      run.header.regions.forEach((region, i) => {
-        const [shape, shift] = [run.shape(i, t), run.rows ? run.shift(i, t) : [0, 0, 0]];
-        const same = entries.find((entry) => entry.of.run !== r && sameRegion(entry, region, shape, shift));
-        if (same) {
-          same.owners.push([r, i]);
-          if (active === i && !same.active) this._dress(same, true);
-          return;
-        }
-        const all = this._entriesOf(shape, shift, region, poses[r]);
-        for (const entry of all) {
-          Object.assign(entry, { of: { run: r, region: i }, region, shape, shift, owners: [[r, i]] });
-          this._dress(entry, active === i);
-          entries.push(entry);
-        }
-      });
-    });
-    return entries;
-  }
-
-  _dress(entry, active) {
-    entry.active = active;
-    entry.colour = regionColour(entry.region, active, this.theme);
-    entry.style = styleOf(entry.region.keep, active, entry.colour);
-  }
-
-  _entriesOf(shape, shift, region, pose) {
-    if (SOLIDS[shape.kind]) {
-      const solid = surfaceOf(shape);
-      if (!isThere(Vec.add(solid.centre, shift))) return [];
-      const middle = Vec.add(solid.spine ? nearestOnChain(solid.spine, Vec.sub(this.camera.target, shift)) : solid.centre, shift);
-      return [{ solid, middle }];
-    }
-    if (PLANES[shape.kind]) {
-      const key = JSON.stringify([shape, region.keep, shift]);
-      if (!this._sheets.has(key)) {
-        if (this._sheets.size > 200) this._sheets.clear();
-        this._sheets.set(key, sheetsOf(shape, region.keep, shift, this.bounds));
-      }
-      return this._sheets.get(key).map((sheet) => ({ sheet, middle: Vec.scale(Vec.add(...sheet.corners.slice(0, 2)), 0.5) }));
-    }
-    if (!pose) return [];
-    return [{ sight: SIGHTS[shape.kind](shape, pose, shift, pose.size), size: pose.size }];
-  }
-
   _vehicle(pose, index) {
     const { vehicle } = this.runs[index].header;
     const pixels = vehicle.radius * this.camera.scaleAt(pose.position);
-    const magnified = pixels > 0 ? Math.max(1, LEAST_HULL / pixels) : 1;
+    const magnified = pixels > 0 ? Math.max(1, Math.min(LEAST_HULL, 0.028 * Math.min(this.camera.width, this.camera.height)) / pixels) : 1;
     const size = vehicle.radius * magnified;
     const placed = { position: pose.position, R: Vec.matrix(pose.quaternion) };
     const things = [...hullAt(vehicle, placed, size, this.camera.eye, this.theme), ...bodyAxes(placed, size)];
@@ -289,12 +252,12 @@ class Scene {
 
   /** Of one run the way tells who was active; several runs have each their own colour. */
   _wayColour(index, past, active, colours) {
-    if (this.runs.length > 1) return runColour(index);
+    if (this._runMarks) return this._runMarks[index].colour;
     const { regions } = this.runs[index].header;
     return past ? fullColour(regions[Number.isFinite(active) ? active : 0]) : colours.future;
   }
 
-  _marks(way, index, t, colours) {
+  _marks(way, index, t, vehicle, colours) {
     const { camera } = this;
     const active = way.run.column("active");
     const spacing = roundStep((110 * camera.distance) / camera.focal);
@@ -302,8 +265,11 @@ class Scene {
       const [[x, y, near], [u, v, depth]] = [camera.project(from), camera.project(middle)];
       const length = Math.hypot(u - x, v - y);
       if (Math.min(near, depth) < camera.near || !(length > 1)) return [];
+      if (vehicle && Vec.norm(Vec.sub(middle, vehicle.pose.position)) < 1.5 * vehicle.size) return []; // not on the hull
       const past = time <= t;
-      return [{ mark: [u, v, (u - x) / length, (v - y) / length], middle, past, colour: this._wayColour(index, past, active?.[row], colours) }];
+      const onTop = Vec.along(middle, Vec.sub(camera.eye, middle), 0.02); // of the line that it marks
+      const colour = this._wayColour(index, past, active?.[row], colours);
+      return [{ mark: [u, v, (u - x) / length, (v - y) / length], middle: onTop, past, colour }];
     });
   }
 
@@ -336,39 +302,6 @@ class Scene {
     }
   }
 
-  _nameRegions(entries, colours) {
-    const { camera, labels } = this;
-    const named = new Set();
-    for (const entry of entries) {
-      const { run, region } = entry.of;
-      const key = `${run}:${region}`;
-      if (named.has(key)) continue;
-      const [x, y, depth] = camera.project(anchorOf(entry, camera));
-      if (!(depth > camera.near) || x < 0 || y < 0 || x > camera.width || y > camera.height) continue;
-      named.add(key);
-      labels.add({
-        key, text: entry.active ? `▶ ${entry.region.name}` : entry.region.name, x, y,
-        colour: entry.active ? colours.ink : colours.soft, edge: entry.colour, bold: entry.active, chip: colours.chip,
-        rank: entry.active ? 0 : region === 0 ? 1 : 10 + depth * 1e-3, gap: 6, sides: ["above", "right", "left", "below"], of: entry.of,
-      });
-    }
-  }
-
-  _nameVehicles(vehicles, colours) {
-    vehicles.forEach((vehicle, i) => {
-      if (!vehicle) return;
-      const [x, y, depth] = this.camera.project(vehicle.pose.position);
-      if (depth < this.camera.near) return;
-      const { name } = this.runs[i].header;
-      const alike = this.runs.filter((run) => run.header.name === name).length > 1;
-      const gap = 1.5 * vehicle.size * this.camera.scaleAt(vehicle.pose.position);
-      this.labels.add({
-        key: `vehicle ${i}`, text: alike ? `${name} (${i + 1})` : name, x, y, colour: colours.ink, edge: runColour(i), bold: true,
-        chip: colours.chip, rank: 0.5, gap, sides: ["below", "right", "left", "above"],
-      });
-    });
-  }
-
   _note(t, poses, entries) {
     const runs = this.runs.map((run, r) => {
       const colours = run.header.regions.map((region, i) => {
@@ -387,21 +320,4 @@ function poseOf(run, t) {
   if (!run.rows) return null;
   const pose = run.pose(t);
   return Vec.finite(pose.position) && Vec.finite(pose.quaternion) ? { ...pose, size: run.header.vehicle.radius } : null;
-}
-
-/** Whether an entry of another run shows this region already: of the same name, shape and place. */
-function sameRegion(entry, region, shape, shift) {
-  return (
-    !entry.sight && entry.region.name === region.name && entry.region.keep === region.keep &&
-    entry.shift.every((x, i) => Math.abs(x - shift[i]) < 1e-3) && JSON.stringify(entry.shape) === JSON.stringify(shape)
-  );
-}
-
-/** Where the name of an entry stands. */
-function anchorOf({ solid, sheet, sight, shift, middle }, camera) {
-  if (sight) return sight.anchor;
-  if (sheet) return sheet.corners.reduce((a, b) => (camera.project(b)[0] > camera.project(a)[0] ? b : a));
-  let top = Infinity;
-  for (let i = 2; i < solid.points.length; i += 3) top = Math.min(top, solid.points[i]);
-  return solid.spine ? middle : [middle[0], middle[1], top + shift[2]];
 }

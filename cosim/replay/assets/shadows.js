@@ -64,12 +64,12 @@ function paintPlumb(painter, { pose, size }, floor, colours) {
   painter.stroke(colours.soft, 1, 0.6);
 }
 
-/** The shadow of a way, through the beginnings of its chunks. */
+/** The shadow of the way so far, through the beginnings of its chunks. */
 function paintWayBelow(painter, chunks, floor, colours) {
   painter.begin();
   chunks.forEach(({ middle }, i) => {
     const before = i && chunks[i - 1];
-    if (before && before.next === chunks[i]) painter.segment([before.middle[0], before.middle[1], floor], [middle[0], middle[1], floor]);
+    if (before && before.past && before.next === chunks[i]) painter.segment([before.middle[0], before.middle[1], floor], [middle[0], middle[1], floor]);
   });
   painter.stroke(colours.shadow, 2.5);
 }

@@ -1,7 +1,7 @@
 // Regions of space that end somewhere, as surfaces: points on g = 0, faces between them, and where they hide things.
 
 const AROUND = 32; // faces around what is round
-const SHARP = Math.cos((31 * Math.PI) / 180); // faces that meet at more are seen as an edge
+const SHARP = Math.cos((31 * Math.PI) / 180); // faces that turn more from each other are seen as an edge
 
 /**
  * A surface of flat faces. Faces that meet bluntly belong to one round surface.
@@ -10,9 +10,8 @@ const SHARP = Math.cos((31 * Math.PI) / 180); // faces that meet at more are see
  * @property {number[][]} faces indices of points, anticlockwise as seen from outside
  * @property {Float64Array} normals outward, three numbers for each face
  * @property {number[][]} edges [point, point, face, face, 1 if sharp]
- * @property {number[]} patches number of the round or flat surface that each face belongs to
- * @property {number[][]} lines of points on a round surface, drawn to tell its form
- * @property {number[]} centre, {number} radius of a ball about it
+ * @property {number[][]} lines of points on an ellipsoid, drawn to tell its form
+ * @property {number[]} centre, {number} radius of a ball about it  @property {number} top its least depth [m]
  * @property {number[][]|null} spine the line in its middle, where it is long  @property {object|null} ellipsoid {centre, axes} where it is one: three half axes as vectors
  * @property {number[][][]} shadows polygons, north and east, that it is seen as from above
  * @property {function(number[], number[]): boolean} hides whether it comes between an eye and a point, or holds the point
@@ -24,11 +23,11 @@ function solidOf(points, faces, lines = []) {
   solid.normals = new Float64Array(3 * faces.length);
   faces.forEach((face, i) => solid.normals.set(normalOf(face.map((k) => points[k])), 3 * i));
   solid.edges = edgesOf(faces, solid.normals);
-  solid.patches = patchesOf(faces.length, solid.edges);
   const low = [0, 1, 2].map((axis) => Math.min(...points.map((p) => p[axis])));
   const high = [0, 1, 2].map((axis) => Math.max(...points.map((p) => p[axis])));
   solid.centre = Vec.scale(Vec.add(low, high), 0.5);
   solid.radius = Math.max(...points.map((p) => Vec.norm(Vec.sub(p, solid.centre))));
+  solid.top = low[2];
   solid.hides = (eye, p) => crossesFaces(solid, eye, p);
   solid.shadows = faces.length ? [outlineFromAbove(points)] : [];
   return solid;
@@ -62,17 +61,6 @@ function edgesOf(faces, normals) {
     });
   });
   return [...edges.values()];
-}
-
-/** Number the surfaces: faces are of one where a way leads between them over blunt edges. */
-function patchesOf(count, edges) {
-  const root = Array.from({ length: count }, (_, i) => i);
-  const find = (i) => {
-    while (root[i] !== i) i = root[i];
-    return i;
-  };
-  for (const [, , f, g, sharp] of edges) if (!sharp) root[find(f)] = find(g);
-  return root.map((_, i) => find(i));
 }
 
 /** Whether a line from an eye to a point goes in through a face: then the point is inside the solid or behind it. */
@@ -121,6 +109,7 @@ function ellipsoidOf(centre, axes) {
   const solid = solidOf(points, [], lines);
   solid.centre = [...centre];
   solid.radius = Math.max(...axes.map(Vec.norm));
+  solid.top = centre[2] - Math.hypot(...axes.map((axis) => axis[2]));
   solid.ellipsoid = { centre: solid.centre, axes };
   solid.shadows = [ellipseFromAbove(centre, axes)];
   const inverse = axes.map((axis) => Vec.scale(axis, 1 / Vec.dot(axis, axis))); // rows: into the unit ball

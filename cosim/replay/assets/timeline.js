@@ -98,6 +98,7 @@ class Timeline {
         const mark = element("span", `mark-at ${kind}`);
         mark.style.left = `${(100 * (time - start)) / Math.max(end - start, 1e-9)}%`;
         mark.title = `${clock(time)}: ${text}`;
+        mark.addEventListener("click", () => this.player.seek(time)); // the keyboard has keys and the list for it
         return mark;
       }),
     );

@@ -1,0 +1,159 @@
+"""What happened, at the times at which it did."""
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+
+from cosim.helm.orders import Aim, Arm, Begin, Change, Face, Forget, Item, Mission, Obstacle, Reset, Steer, Sticks
+from cosim.replay.events import events_of
+from cosim.replay.folder import load_run
+from cosim.replay.order_words import order_words, ordered_events
+from cosim.signals import Column
+from tests.cosim.replay.conftest import CLOSED
+
+
+class Made:
+    """A record made of given signals, the others zero."""
+
+    def __init__(self, time, **signals):
+        self._signals = {"time": np.array(time), **{k.replace("__", "."): np.array(v) for k, v in signals.items()}}
+        self.columns = tuple(Column(name, "", "") for name in self._signals)
+
+    def __getitem__(self, name):
+        return self._signals.get(name, np.zeros(len(self._signals["time"])))
+
+    def stack(self, names):
+        return np.column_stack([self[name] for name in names])
+
+
+@pytest.fixture(scope="module")
+def paper(shipped_run):
+    return load_run(shipped_run("paper", CLOSED).folder)
+
+
+def made(paper, time, status="completed", failures=(), **signals):
+    scenario = dataclasses.replace(paper.scenario, failures=failures)
+    for name in ("SR1", "SR2", "SR3"):
+        signals.setdefault(f"{name}__clearance", np.ones(len(time)))
+    summary = paper.summary | {"status": status}
+    return dataclasses.replace(paper, scenario=scenario, record=Made(time, **signals), summary=summary)
+
+
+def told(run, kind, log=()):
+    return [(event.time, event.text) for event in events_of(run, log) if event.kind == kind]
+
+
+def test_the_paper_s_run_is_told_in_order(paper):
+    events = events_of(paper, ())
+    assert [event.time for event in events] == sorted(event.time for event in events)
+    assert len(events) < 40
+    time, record = paper.record["time"], paper.record
+    assert [t for t, _ in told(paper, "goal")][0] == paper.summary["reach_time"]
+    assert [t for t, _ in told(paper, "goal")][-1] == paper.summary["settle_time"]
+    first = int(np.argmax(record["SR1.clearance"] < 0.0))
+    last = first + int(np.argmax(record["SR1.clearance"][first:] >= 0.0))
+    depth = -record["SR1.clearance"].min()
+    assert (time[first], f"Violates SR1 until {time[last]:.3f} s, by up to {depth:.3f} m") in told(paper, "violation")
+    assert told(paper, "active")[1] == (0.169, "Gives way to SR1 (obstacle)")
+    assert (events[-1].time, events[-1].kind, events[-1].text) == (time[-1], "end", "End of the run")
+
+
+def test_a_goal_is_entered_and_left_across_gaps(paper):
+    inside = [1.0, -1.0, np.nan, 1.0, np.nan, 1.0, -1.0, np.nan]
+    run = made(paper, np.arange(8) * 0.5, goal__clearance=inside)
+    assert told(run, "goal") == [
+        (0.0, "Starts in the goal region"),
+        (0.5, "Leaves the goal region"),
+        (1.5, "Enters the goal region"),
+        (3.0, "Leaves the goal region"),
+    ]
+
+
+def test_a_violation_that_lasts_says_so(paper):
+    run = made(paper, [0.0, 1.0, 2.0, 3.0], SR3__clearance=[1.0, -0.25, -0.5, -0.125])
+    assert told(run, "violation") == [(1.0, "Violates SR3 (soft) to the end, by up to 0.500 m")]
+
+
+def test_chatter_is_told_in_few_words(paper):
+    n = 20_000
+    odd = np.arange(n) % 2
+    signals = {f"{name}__clearance": odd - 0.5 for name in ("SR1", "SR2", "SR3", "goal")}
+    run = made(
+        paper, np.arange(n) * 0.01, **signals, membership__obstacle=odd * 1.0, weight__obstacle=odd * 1.0,
+        wrench_saturated=odd * 1.0,
+    )  # fmt: skip
+    log = [(k, Change("arbiter.ramp", 0.1 + k)) for k in range(0, n, 2)]
+    events = events_of(run, log)
+    assert len(events) <= 60
+    assert told(run, "saturation")[0][0] == 0.01
+    assert told(run, "violation")[0][0] == 0.0
+    assert told(run, "active") == [(run.record["time"][-1], "Gives way to SR1 (obstacle)")]
+
+
+def test_a_brief_look_back_is_no_change_but_a_brief_visit_on_the_way_is(paper):
+    time = np.arange(0.0, 4.0, 0.05)
+    who = np.zeros(len(time), int)
+    who[20:40], who[25], who[40], who[41:] = 1, 0, 2, 3  # SR1, for a step the goal, SR1, for a step SR2, SR3
+    weights = {f"weight__{name}": (who == i + 1) * 1.0 for i, name in enumerate(("obstacle", "shape", "depth"))}
+    members = {name.replace("weight", "membership"): values for name, values in weights.items()}
+    run = made(paper, time, **weights, **members)
+    assert told(run, "active") == [
+        (1.0, "Gives way to SR1 (obstacle)"),
+        (2.0, "Gives way to SR2 (shape)"),
+        (time[41], "Gives way to SR3 (depth)"),
+    ]
+
+
+def test_a_failure_is_told_if_the_run_came_so_far(paper):
+    from cosim.scenario_tables import Failure
+
+    run = made(paper, [0.0, 1.0, 2.0], failures=(Failure(3, 1.5), Failure(1, 2.5)))
+    assert told(run, "failure") == [(1.5, "Thruster 3 fails")]
+
+
+@pytest.mark.parametrize(
+    ("status", "text"),
+    [
+        ("interrupted", "The run was interrupted"),
+        ("killed", "The run was killed: its record ends here"),
+        ("reset", "The run was reset"),
+        ("failed: t = 1", "The run failed: t = 1"),
+    ],
+)
+def test_the_end_says_how(paper, status, text):
+    assert told(made(paper, [0.0, 1.0], status=status), "end") == [(1.0, text)]
+
+
+@pytest.mark.parametrize(
+    ("order", "words"),
+    [
+        (Arm(True), "Armed"),
+        (Arm(False), "Disarmed"),
+        (Steer("hold"), "Holds its place"),
+        (Aim((7.0, 0.0, 4.5)), "Target at (7, 0, 4.5) m"),
+        (Aim((7.0, 0.0, 4.5), 0.3), "Target at (7, 0, 4.5) m, radius 0.3 m"),
+        (Face(-math.pi / 2), "Heading 270°"),
+        (Sticks((0.0,) * 6), "Sticks moved"),
+        (Obstacle(4, (1.0, 2.0, 3.0), 0.5), "Obstacle 4 at (1, 2, 3) m, radius 0.5 m"),
+        (Forget(4), "Obstacle 4 gone"),
+        (Change("law.gains.k_p1", 1500.0), "law.gains.k_p1 is 1500"),
+        (Mission((Item(None),) * 3), "Mission of 3 items"),
+        (Begin(2), "Mission goes on with item 2"),
+        (Reset(), "Reset"),
+    ],
+)
+def test_each_order_has_its_words(order, words):
+    assert order_words(order) == words
+
+
+def test_orders_of_a_moment_are_told_together():
+    log = [(0, Arm(True)), (0, Steer("hold")), *((k, Sticks((0.1,) * 6)) for k in range(100, 300)), (900, Reset())]
+    assert ordered_events(log, 0.01, 3) == [
+        (0.0, "Ordered: Armed; Holds its place"),
+        (1.0, "Ordered: Sticks moved"),
+        (9.0, "Ordered: Reset"),
+    ]
+    many = [(0, Change(f"key.{i}", 1.0)) for i in range(9)]
+    assert ordered_events(many, 0.01, 3) == [(0.0, "Ordered: key.0 is 1; key.1 is 1; key.2 is 1; 6 more orders")]

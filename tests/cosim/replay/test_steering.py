@@ -1,0 +1,113 @@
+"""What orders made of goal and regions stands in the page: it gives the recorded clearances again."""
+
+import msgspec
+import numpy as np
+import pytest
+
+from controller.regions import SHAPES, Region, clearances_at
+from cosim.errors import RunError
+from cosim.helm.orders import Aim, Begin, Change, Forget, Item, Mission, Obstacle, Steer
+from cosim.replay.folder import load_run
+from cosim.replay.trace import trace_of
+from cosim.run import run_scenario
+from cosim.scenario import load_scenario
+
+RADIUS = "regions.pile 1.shape.radius"
+ITEMS = (
+    Item((2.0, 0.0, 2.0), 50.0),
+    Item(None, orders=(Change(RADIUS, 0.5), Change("regions.ship.gain", 55.0))),
+    Item(None, orders=(Change("goal.radius", 0.9),)),
+    Item((3.0, -1.0, 2.0), stay=None, orders=(Change("regions.quay.shape.point.1", 6.0),)),
+)
+ORDERS = {
+    20: [Change("goal.radius", 0.75), Change("goal.radius", -1.0), Change("law.gains.speed", 0.3)],
+    40: [Aim((4.0, -1.0, 2.0), 0.6)],
+    60: [Obstacle(7, (5.0, 0.0, 2.0), 0.4), Obstacle(9, (-3.0, 0.0, 2.0), 0.3)],
+    90: [Change("regions.ship.shape.semi_axes.0", 3.5)],
+    120: [Obstacle(7, (5.0, 0.2, 2.0), 0.4, (0.1, 0.0, 0.0))],
+    140: [Obstacle(7, (5.0, 0.3, 2.0), 0.8)],
+    160: [Forget(7)],
+    180: [Aim((4.0, 0.0, 2.0)), Change("goal.centre.0", 12.5)],
+    200: [Mission(ITEMS), Steer("mission")],
+    260: [Change(RADIUS, 0.7), Begin(1)],
+}
+
+
+@pytest.fixture(scope="module")
+def steered(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("steered")
+    log = folder / "log.jsonl"
+    lines = [{"step": k, "order": order} for k, orders in ORDERS.items() for order in orders]
+    log.write_bytes(b"".join(msgspec.json.encode(line) + b"\n" for line in lines))
+    scenario = load_scenario("harbour", ["commands.enabled=true", "time.duration=4"])
+    return load_run(run_scenario(scenario, folder / "run", report=False, orders=log).folder)
+
+
+def shape_at(header, index, time):
+    found = header["regions"][index]["shape"]
+    for change in header["changes"]:
+        if change["region"] == index and change["time"] <= time:
+            found = change["shape"]
+    fields = {key: _tuples(value) for key, value in found.items() if key != "kind"}
+    return SHAPES[found["kind"]](**fields)
+
+
+def _tuples(value):
+    return tuple(map(_tuples, value)) if isinstance(value, list) else value
+
+
+def test_the_page_s_shapes_give_every_recorded_clearance_again(steered):
+    header, record = trace_of(steered).header, steered.record
+    time = record["time"]
+    positions = record.stack([f"position.{axis}" for axis in "xyz"])
+    assert [region["name"] for region in header["regions"]][-2:] == ["seen 1", "seen 2"]
+    checked = 0
+    for index, region in enumerate(header["regions"]):
+        name, points = region["name"], positions
+        if f"{name}.shift.x" in record.units:
+            points = positions - record.stack([f"{name}.shift.{axis}" for axis in "xyz"])
+        times = sorted({0.0, *(c["time"] for c in header["changes"] if c["region"] == index)})
+        for begin, end in zip(times, [*times[1:], np.inf], strict=True):
+            rows = (time >= begin) & (time < end)
+            if region["comes"]:
+                rows &= record.stack([f"{name}.shift.{axis}" for axis in "xyz"]).any(axis=1)
+            shape = Region(name, shape_at(header, index, begin), region["keep"])
+            found = clearances_at(points[rows], shape)
+            assert found == pytest.approx(record[f"{name}.clearance"][rows], abs=1e-9), (name, begin)
+            checked += int(rows.sum())
+    assert checked > 401 * len(header["regions"]) - 800  # all rows of all, but obstacles that had not come
+
+
+def test_changes_are_few_and_at_their_steps(steered):
+    changes = trace_of(steered).header["changes"]
+    names = [region["name"] for region in trace_of(steered).header["regions"]]
+    told = [(round(c["time"] * 100), names[c["region"]]) for c in changes]
+    assert told == [
+        (20, "goal"), (40, "goal"), (60, "seen 1"), (60, "seen 2"), (90, "ship"), (140, "seen 1"), (180, "goal"),
+        (200, "goal"), (200, "ship"), (200, "pile 1"), (201, "goal"), (202, "goal"), (202, "quay"),  # item by item
+        (260, "goal"), (260, "ship"), (260, "pile 1"), (261, "goal"), (261, "quay"),
+    ]  # fmt: skip
+
+
+def test_gains_are_those_of_the_orders(steered):
+    header = trace_of(steered).header
+    ship = [region["name"] for region in header["regions"]].index("ship")
+    assert header["regions"][ship]["gain"] == 100.0
+    assert [c["gain"] for c in header["changes"] if c["region"] == ship] == [100.0, 55.0, 55.0]
+
+
+def test_orders_are_told(steered):
+    texts = [event["text"] for event in trace_of(steered).header["events"] if event["kind"] == "order"]
+    assert texts[1] == "Ordered: Target at (4, -1, 2) m, radius 0.6 m"
+    assert any("Mission of 4 items; Follows the mission" in text for text in texts)
+
+
+def test_a_run_that_was_not_steered_has_no_changes(docking):
+    assert trace_of(docking).header["changes"] == []
+
+
+def test_a_log_that_is_none_is_one_line(steered, copy_of):
+    folder = copy_of(steered)
+    (folder / "orders.jsonl").write_text('{"step": 1}\n{"step": 2}\n')
+    with pytest.raises(RunError, match=r"orders\.jsonl, line 1: .*order"):
+        trace_of(load_run(folder))

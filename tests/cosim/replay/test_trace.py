@@ -1,0 +1,145 @@
+"""The rows of a page are rows of the record, few, and those that tell the story."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from cosim.replay.activity import active_regions
+from cosim.replay.folder import load_run
+from cosim.replay.sampling import sampled_rows
+from cosim.replay.trace import plain, trace_of
+from cosim.replay.viewing import Viewing
+from cosim.scenario import CRITERIA
+from fuzzy_arbiter import Arbiter
+from tests.cosim.replay.conftest import CLOSED
+from tests.cosim.replay.decoding import active_of
+
+
+def test_rows_are_those_of_the_record_to_the_last_bit(docking):
+    trace = trace_of(docking)
+    names = [signal["name"] for signal in trace.header["signals"]]
+    recorded = [name for name in names if name in docking.record.units]
+    assert set(names) - set(recorded) == {"active", *(f"rule.R{i}" for i in range(1, 9))}
+    for name in recorded:
+        assert trace.rows[:, names.index(name)].tobytes() == docking.record[name][trace.steps].tobytes(), name
+    assert {s["name"]: s["unit"] for s in trace.header["signals"]}.items() >= {
+        (name, docking.record.units[name]) for name in recorded
+    }
+
+
+def test_first_last_and_extreme_rows_are_kept(docking):
+    trace, record = trace_of(docking), docking.record
+    assert trace.steps[0] == 0 and trace.steps[-1] == len(record["time"]) - 1
+    assert (np.diff(trace.steps) > 0).all()
+    least = np.min([record[f"{r.region.name}.clearance"] for r in docking.scenario.regions], axis=0)
+    force = np.linalg.norm(record.stack([f"command.{axis}" for axis in "XYZ"]), axis=1)
+    for signal in (least, force, record["goal.clearance"]):
+        assert {int(np.argmin(signal)), int(np.argmax(signal))} <= set(trace.steps.tolist())
+
+
+@given(st.integers(1, 3000), st.integers(1, 400), st.data())
+def test_sampling_keeps_to_its_budget_and_loses_no_spike(n, columns, data):
+    time = np.arange(n) * 1.0
+    telling = np.zeros((n, 2))
+    spike = data.draw(st.integers(0, n - 1))
+    telling[spike, 1] = -1.0
+    moment = data.draw(st.integers(0, n - 1))
+    steps = sampled_rows(time, columns, telling, np.array([moment]))
+    assert steps[0] == 0 and steps[-1] == n - 1 and (np.diff(steps) > 0).all()
+    assert {spike, moment, max(moment - 1, 0)} <= set(steps.tolist())
+    assert len(steps) <= 480_000 / (8 * columns) + 150_000 * n / 60 / (8 * columns) + 402
+
+
+def test_who_is_active_agrees_with_a_reading_row_by_row(docking):
+    trace = trace_of(docking)
+    names = [signal["name"] for signal in trace.header["signals"]]
+    columns = {name: column.tolist() for name, column in zip(names, trace.rows.T, strict=True)}
+    expected = [active_of(trace.header, columns, row) for row in range(len(trace.rows))]
+    assert columns["active"] == expected
+    assert set(columns["active"]) == {1.0, 2.0}  # the heading, and a wall
+
+
+def test_nothing_is_active_where_nothing_asks_or_is_known():
+    nan, zero = np.nan, np.zeros((1, 3))
+    one = np.array([[1.0, 0.0, 0.0]])
+    assert active_regions(["obstacle"], zero, zero, np.array([[-1.0]])).tolist() == [0.0]
+    assert active_regions([], one, one, np.empty((1, 0))).tolist() == [0.0]
+    assert active_regions(["depth"], one, one, np.array([[-1.0]])).tolist() == [0.0]
+    assert active_regions(["obstacle", "obstacle"], one, one, np.array([[nan, 3.0]])).tolist() == [2.0]
+    assert active_regions(["obstacle"], one, one, np.array([[nan]])).tolist() == [0.0]
+    assert active_regions(["obstacle"], one * nan, one * nan, np.array([[1.0]])).tolist() == [0.0]
+
+
+def test_rule_strengths_are_minima_and_maxima_of_degrees(docking):
+    viewing = Viewing(docking.scenario, docking.record.columns)
+    names = [docking.record.columns[i].name for i in viewing.picked]
+    samples = np.random.default_rng(7).uniform(size=(50, 3))
+    samples[:4] = [[0, 0, 0], [1, 1, 1], [0, 1, 1], [0, 0, 1]]
+    rows = np.zeros((50, len(names)))
+    rows[:, [names.index(f"membership.{name}") for name in CRITERIA]] = samples
+    strengths = viewing.extended(rows)[:, -8:]
+    arbiter = Arbiter(engine="closed")
+    for (o, s, d), got in zip(samples.tolist(), strengths.tolist(), strict=True):
+        by_hand = [o, 1 - o, o, 1 - s, min(1 - o, s), max(o, s), 1 - d, min(1 - o, 1 - s, d)]
+        assert got == pytest.approx(by_hand, abs=1e-15)
+        assert got == [rule.strength for rule in arbiter.explain((o, s, d)).rules]
+
+
+def test_a_row_without_memberships_has_no_strengths(docking):
+    viewing = Viewing(docking.scenario, docking.record.columns)
+    rows = np.zeros((2, len(viewing.picked)))
+    rows[0] = np.nan
+    extended = viewing.extended(rows)
+    assert np.isnan(extended[0, -8:]).all() and np.isfinite(extended[1]).all()
+
+
+def test_one_row_is_seen_alone_as_among_others(docking):
+    trace = trace_of(docking)
+    viewing = Viewing(docking.scenario, docking.record.columns)
+    n = len(viewing.picked)
+    alone = np.concatenate([viewing.extended(row[None, :n]) for row in trace.rows[::97]])
+    assert alone.tobytes() == trace.rows[::97].tobytes()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "overrides"),
+    [
+        ("paper", ["law.name=antonelli"]),
+        ("paper", ["law.name=pd", "time.duration=0.5"]),
+        ("paper", ["regions=[]"]),
+        ("paper", ["goal.velocity=[0.1,0,0]"]),
+        ("harbour", ["time.duration=2"]),
+        ("sitl", ["time.duration=1"]),
+    ],
+)
+def test_runs_of_all_kinds_have_a_trace(name, overrides, shipped_run):
+    duration = [] if any("duration" in o for o in overrides) else ["time.duration=0.3"]
+    run = load_run(shipped_run(name, *overrides, *duration).folder)
+    trace = trace_of(run)
+    assert len(trace.header["regions"]) == len(run.scenario.regions) + 1
+    assert trace.rows.shape == (len(trace.steps), len(trace.header["signals"]))
+    assert trace.header["law"] == run.scenario.law.name
+    assert trace.header["events"][-1]["text"] == "End of the run"
+
+
+def test_what_is_no_number_becomes_none():
+    mixed = {"a": (1.0, float("nan")), "b": [float("-inf"), {"c": True}], "d": "nan", "e": None, "f": 7}
+    assert plain(mixed) == {"a": [1.0, None], "b": [None, {"c": True}], "d": "nan", "e": None, "f": 7}
+
+
+def test_a_trace_is_of_the_run_as_it_came(docking):
+    slower = dataclasses.replace(docking.scenario, title="elsewhere")
+    assert trace_of(dataclasses.replace(docking, scenario=slower)).header["title"] == "elsewhere"
+
+
+def test_the_paper_is_seen_at_its_own_instants(shipped_run):
+    """The overlap of the paper's regions lasts 48 ms of 60 s: it is in the page to the step."""
+    run = load_run(shipped_run("paper", CLOSED).folder)
+    trace = trace_of(run)
+    first, last = run.summary["intersection_windows"][0]
+    time = [signal["name"] for signal in trace.header["signals"]].index("time")
+    assert {first, last} <= set(trace.rows[:, time].tolist())
