@@ -73,7 +73,8 @@ function paintRuler(painter, labels, bounds, colours, named) {
   const { camera } = painter;
   const [low, high] = bounds;
   const corners = [low, high].flatMap(([n]) => [low, high].map(([, e]) => [n, e]));
-  const feet = corners.map(([n, e]) => [n, e, camera.project([n, e, high[2]])]).filter((foot) => foot[2][2] > camera.near);
+  const seen = corners.map(([n, e]) => [n, e, camera.project([n, e, high[2]])]);
+  const feet = seen.filter((foot) => foot[2][2] > camera.near);
   if (!feet.length) return;
   const [n, e, foot] = feet.reduce((a, b) => (b[2][0] < a[2][0] ? b : a));
   const head = camera.project([n, e, low[2]]);

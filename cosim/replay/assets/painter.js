@@ -23,8 +23,8 @@ class Painter {
     const [ex, ey, ez] = Vec.sub(camera.eye, shift);
     for (let i = 0; i < faces.length; i++) {
       const [k, v] = [3 * i, 3 * faces[i][0]];
-      const towards = normals[k] * (ex - points[v]) + normals[k + 1] * (ey - points[v + 1]) + normals[k + 2] * (ez - points[v + 2]);
-      front[i] = towards > 0 ? 1 : 0;
+      const [x, y, z] = [ex - points[v], ey - points[v + 1], ez - points[v + 2]];
+      front[i] = normals[k] * x + normals[k + 1] * y + normals[k + 2] * z > 0 ? 1 : 0;
     }
   }
 

@@ -17,7 +17,8 @@ function rimOf(apex, axis, angle, length) {
  * What is drawn of a region of attitude.
  * @typedef {object} Sight
  * @property {number[]} apex, {number[]} axis of the cone  @property {number[][]} rim of it, on g = 0
- * @property {number[][][]} lines  @property {number[]|null} feature that is to be seen  @property {number[]} anchor of its name
+ * @property {number[][][]} lines  @property {number[]|null} feature that is to be seen
+ * @property {number[]} anchor of its name
  */
 
 /** How each kind of shape of attitude is drawn at a pose, from its fields, so large [m]. */
