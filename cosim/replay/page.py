@@ -25,7 +25,6 @@ _LIVE = ("things.js", "ghost.js", "dragging.js", "helm.js", "live.js")
 _SCRIPTS = ("data.js", *SCENE_SCRIPTS, *_PLAYER, *_LIVE, "main.js")
 _STYLES = ("style.css", "stage.css", "charts.css", "panel.css", "transport.css", "layout.css", "live.css")
 
-
 _MARK = '<script type="application/json" id="runs">'  # where the data of a page begins
 
 
@@ -48,8 +47,8 @@ def replay_page(runs: Sequence[dict[str, Any]], title: str) -> str:
     style, script = (
         "\n".join((assets / name).read_text(encoding="utf-8") for name in names) for names in (_STYLES, _SCRIPTS)
     )
-    # "</" would end the element it stands in
-    data = json.dumps(list(runs), separators=(",", ":"), allow_nan=False, ensure_ascii=False).replace("</", "<\\/")
+    # "</script" would end the element that it stands in, and "<!--" with "<script" would keep it from ending
+    data = json.dumps(list(runs), separators=(",", ":"), allow_nan=False, ensure_ascii=False).replace("<", "\\u003c")
     return Template((assets / "page.html").read_text(encoding="utf-8")).substitute(
         title=html.escape(title),
         style=style,

@@ -14,7 +14,6 @@ from cosim.replay.trace import plain, trace_of
 from cosim.replay.viewing import Viewing
 from cosim.scenario import CRITERIA
 from fuzzy_arbiter import Arbiter
-from tests.cosim.replay.conftest import CLOSED
 from tests.cosim.replay.decoding import active_of
 
 
@@ -136,10 +135,9 @@ def test_a_trace_is_of_the_run_as_it_came(docking):
     assert trace_of(dataclasses.replace(docking, scenario=slower)).header["title"] == "elsewhere"
 
 
-def test_the_paper_is_seen_at_its_own_instants(shipped_run):
+def test_the_paper_is_seen_at_its_own_instants(paper):
     """The overlap of the paper's regions lasts 48 ms of 60 s: it is in the page to the step."""
-    run = load_run(shipped_run("paper", CLOSED).folder)
-    trace = trace_of(run)
-    first, last = run.summary["intersection_windows"][0]
+    trace = trace_of(paper)
+    first, last = paper.summary["intersection_windows"][0]
     time = [signal["name"] for signal in trace.header["signals"]].index("time")
     assert {first, last} <= set(trace.rows[:, time].tolist())
