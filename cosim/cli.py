@@ -13,7 +13,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from cosim.command_line import campaigns, mavlink, package, replay, run, sitl, sweep
+from cosim.command_line import campaigns, mavlink, package, replay, run, sitl, sweep, watch
 from cosim.command_line.campaigns import INTERRUPTED
 
 _EPILOG = """examples:
@@ -47,6 +47,7 @@ def _parser() -> argparse.ArgumentParser:
     verbs = parser.add_subparsers(dest="verb", required=True, metavar="VERB")
 
     run.add_verb(verbs)
+    watch.add_verb(verbs)
 
     report = verbs.add_parser("report", help="write summary, report and replay of a run again, or of a killed one")
     report.add_argument("folder", type=Path, metavar="DIR", help="the run folder")
@@ -175,6 +176,7 @@ def _calibrate(options: argparse.Namespace) -> int:
 
 _VERBS = {
     "run": run.run,
+    "watch": watch.watch,
     "report": _report,
     "replay": replay.replay,
     "list": _list,

@@ -14,6 +14,7 @@ from cosim.helm.orders import (
     Face,
     Forget,
     Mission,
+    Move,
     Obstacle,
     Order,
     Reset,
@@ -97,6 +98,8 @@ def order_words(order: Order) -> str:
             return f"Obstacle {order.number} at {_place(order.position)}, radius {order.radius:.3g} m"
         case Forget():
             return f"Obstacle {order.number} gone"
+        case Move():
+            return f"{order.region} moved by {_place(order.by)}"
         case Change():
             return f"{order.key} is {order.value:.6g}"
         case Mission():

@@ -21,8 +21,9 @@ _PLAYER = (
     "player.js", "words.js", "curves.js", "axes.js", "plot.js", "charts.js", "board.js", "timeline.js", "panel.js",
     "stage.js", "head.js", "keys.js", "page.js",
 )  # fmt: skip
-_SCRIPTS = ("data.js", *SCENE_SCRIPTS, *_PLAYER, "live.js", "main.js")
-_STYLES = ("style.css", "panel.css", "layout.css")
+_LIVE = ("things.js", "ghost.js", "dragging.js", "helm.js", "live.js")
+_SCRIPTS = ("data.js", *SCENE_SCRIPTS, *_PLAYER, *_LIVE, "main.js")
+_STYLES = ("style.css", "stage.css", "charts.css", "panel.css", "transport.css", "layout.css", "live.css")
 
 _MARK = '<script type="application/json" id="runs">'  # where the data of a page begins
 

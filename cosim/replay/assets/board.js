@@ -94,7 +94,7 @@ class Board {
     for (const chart of this.charts) {
       if (!chart.near || chart.element.hidden) continue;
       chart.paint();
-      chart.point(t);
+      chart.point(live && !this.window ? Math.min(t, chart.window[1]) : t); // the newest rows are not drawn yet
       if (tell && !this._hovering) chart.tell(t, this.selected);
     }
   }

@@ -53,6 +53,15 @@ function derived(compute) {
   };
 }
 
+/** Clearances of an obstacle that comes and goes: no number while it is not there. */
+function whileThere(name) {
+  return derived((run) => {
+    const values = run.column(`${name}.clearance`);
+    const shifts = ["x", "y", "z"].map((axis) => run.column(`${name}.shift.${axis}`));
+    return values && values.map((value, row) => (shifts.some((shift) => shift[row] !== 0) ? value : NaN));
+  });
+}
+
 /** Clearances of the regions with one unit: the nearest by name, the others thin and grey. */
 function clearances(runs, unit) {
   const found = new Map();
@@ -75,6 +84,7 @@ function clearances(runs, unit) {
       shade: faint ? 0 : TOWARDS_INK[nth % TOWARDS_INK.length],
       dash: faint ? [] : DASHES[told++ % DASHES.length],
       faint,
+      ...(region.comes ? { values: whileThere(region.name) } : {}),
     });
   });
 }

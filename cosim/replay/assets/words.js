@@ -146,7 +146,7 @@ function troubles(run) {
   const kinds = ["clearance", "membership.", "weight.", "command.", "actuation.", "estimate.", "active", "rule."];
   const absent = kinds.filter((kind) => !run.header.signals.some(({ name }) => name.includes(kind)));
   if (absent.length) said.push(`The record has no signals named ${absent.join(", ")}: what rests on them is left out.`);
-  if (!run.rows) said.push("The record has no row.");
+  if (!run.rows && status) said.push("The record has no row."); // a live run has none at first, and no status
   if (run.rows === 1) said.push("The record has one row only: there is nothing to play.");
   const { gaps = {} } = run.header; // of the whole record, which may have more rows than the page
   const holes = run.header.signals.map(({ name }) => name).filter((name) => gaps[name] || run.column(name).includes(NaN));
