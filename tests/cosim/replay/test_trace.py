@@ -109,7 +109,7 @@ def test_one_row_is_seen_alone_as_among_others(docking):
     [
         ("paper", ["law.name=antonelli"]),
         ("paper", ["law.name=pd", "time.duration=0.5"]),
-        ("paper", ["regions=[]"]),
+        ("paper", ["intersection=[]", "regions=[]"]),
         ("paper", ["goal.velocity=[0.1,0,0]"]),
         ("harbour", ["time.duration=2"]),
         ("sitl", ["time.duration=1"]),
