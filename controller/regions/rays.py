@@ -8,10 +8,11 @@ import numpy as np
 
 from controller.compiled import compiled
 from controller.regions.ellipsoid import Ellipsoid
+from controller.regions.kinds import evaluate_shape
 from controller.regions.orientation import Orientation
 from controller.regions.pipe import Pipe
 from controller.regions.prism import Prism
-from controller.regions.region_set import PackedRegions, evaluate_shape
+from controller.regions.region_set import PackedRegions
 from controller.regions.shape import Array, Evaluation
 
 TOUCHING = 1e-4  # m; so near a surface a ray has met it

@@ -5,7 +5,6 @@ One sign for the whole project: g <= 0 is satisfied, g > 0 is violated.
 
 from __future__ import annotations
 
-import functools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,29 +13,29 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from controller.by_address import INTEGER, INTEGERS, NUMBERS, address_of, array_at, call_at
+from controller.by_address import call_at
 from controller.compiled import compiled, inlined, lean
 from controller.errors import RegionError
-from controller.regions.box import Box, box
-from controller.regions.cone import Cone, cone
-from controller.regions.cylinder import Cylinder, cylinder
-from controller.regions.depth_band import DepthBand, band_about, depth_band
-from controller.regions.ellipsoid import Ellipsoid, ellipsoid
-from controller.regions.half_space import HalfSpace, half_space
-from controller.regions.orientation import Orientation, orientation
-from controller.regions.pipe import Pipe, pipe
-from controller.regions.prism import Prism, prism
-from controller.regions.shape import (
-    Array,
-    Evaluation,
-    EvaluationOfAttitude,
-    Shape,
-    Vector3,
-    require,
-    require_finite,
+from controller.regions.box import Box
+from controller.regions.cone import Cone
+from controller.regions.cylinder import Cylinder
+from controller.regions.depth_band import DepthBand, band_about
+from controller.regions.ellipsoid import Ellipsoid
+from controller.regions.half_space import HalfSpace
+from controller.regions.kinds import (
+    DEPTH_BAND,
+    FIRST_OF_ATTITUDE,
+    SPHERE,
+    evaluate_shape,
+    evaluate_shape_of_attitude,
+    others_of,
 )
-from controller.regions.sphere import Sphere, sphere, sphere_about
-from controller.regions.visibility import Visibility, visibility
+from controller.regions.orientation import Orientation
+from controller.regions.pipe import Pipe
+from controller.regions.prism import Prism
+from controller.regions.shape import Array, Shape, Vector3, require, require_finite
+from controller.regions.sphere import Sphere, sphere_about
+from controller.regions.visibility import Visibility
 
 SHAPES: dict[str, type[Shape]] = {
     "sphere": Sphere,
@@ -51,9 +50,6 @@ SHAPES: dict[str, type[Shape]] = {
     "orientation": Orientation,
     "visibility": Visibility,
 }
-
-_SPHERE, _DEPTH_BAND = Sphere.kind, DepthBand.kind
-_FIRST_OF_ATTITUDE = Orientation.kind  # kinds from it on depend on attitude
 
 
 @dataclass(frozen=True)
@@ -81,7 +77,7 @@ class Region:
 
 def of_attitude(shape: Shape) -> bool:
     """Return whether a shape depends on attitude, so that its clearance is in rad instead of m."""
-    return shape.kind >= _FIRST_OF_ATTITUDE
+    return shape.kind >= FIRST_OF_ATTITUDE
 
 
 class PackedRegions(NamedTuple):
@@ -164,46 +160,13 @@ def pack(regions: Sequence[Region]) -> PackedRegions:
         velocities=np.array([region.velocity for region in regions], dtype=float).reshape(-1, 3),
         gains=np.array([region.gain for region in regions], dtype=float),
         hard=np.array([region.hard for region in regions], dtype=np.bool_),
-        others=_others_of(kinds),
+        others=others_of(kinds),
     )
 
 
 def _unpickled(arrays: tuple[Any, ...]) -> PackedRegions:
-    fields: tuple[Any, ...] = (*arrays, _others_of(arrays[0]))
+    fields: tuple[Any, ...] = (*arrays, others_of(arrays[0]))
     return PackedRegions(*fields)
-
-
-def _others_of(kinds: NDArray[np.int64]) -> int:
-    return 0 if np.isin(kinds, (_SPHERE, _DEPTH_BAND)).all() else _address_of_others()
-
-
-@lean
-def evaluate_shape(kind: int, p: Array, q: Array) -> Evaluation:
-    """Evaluate a packed shape of position alone, told by its kind, at the position `p` [m, NED]."""
-    if kind == 0:
-        return sphere(p, q)
-    if kind == 1:
-        return depth_band(p, q)
-    if kind == 2:
-        return half_space(p, q)
-    if kind == 3:
-        return box(p, q)
-    if kind == 4:
-        return cylinder(p, q)
-    if kind == 5:
-        return ellipsoid(p, q)
-    if kind == 6:
-        return prism(p, q)
-    if kind == 7:
-        return pipe(p, q)
-    return cone(p, q)
-
-
-@lean
-def _evaluate_shape_of_attitude(kind: int, p: Array, e: Array, q: Array) -> EvaluationOfAttitude:
-    if kind == _FIRST_OF_ATTITUDE:
-        return orientation(p, e, q)
-    return visibility(p, e, q)
 
 
 @lean
@@ -249,9 +212,9 @@ def _evaluate_plain(
         y = position[1] - regions.shifts[i, 1]
         z = position[2] - regions.shifts[i, 2]
         kind, q, first = regions.kinds[i], regions.numbers, regions.offsets[i]
-        if kind == _SPHERE:
+        if kind == SPHERE:
             g, gx, gy, gz, distance = sphere_about(x - q[first], y - q[first + 1], z - q[first + 2], q[first + 3])
-        elif kind == _DEPTH_BAND:
+        elif kind == DEPTH_BAND:
             g, gx, gy, gz, distance = band_about(z - q[first], q[first + 1])
         else:
             others = True
@@ -261,55 +224,6 @@ def _evaluate_plain(
         gradients[i, 0], gradients[i, 1], gradients[i, 2] = sign * gx, sign * gy, sign * gz
         turnings[i, 0], turnings[i, 1], turnings[i, 2] = 0.0, 0.0, 0.0
     return others
-
-
-@compiled
-def _evaluate_others(
-    n: int,
-    kinds_at: Any,
-    signs_at: Any,
-    offsets_at: Any,
-    n_numbers: int,
-    numbers_at: Any,
-    shifts_at: Any,
-    position_at: Any,
-    quaternion_at: Any,
-    values_at: Any,
-    gradients_at: Any,
-    turnings_at: Any,
-    clearances_at: Any,
-) -> int:
-    """Evaluate all shapes but spheres and bands of depth, of arrays of `evaluate_packed` at these addresses."""
-    kinds, signs, offsets = array_at(kinds_at, n), array_at(signs_at, n), array_at(offsets_at, n + 1)
-    all_numbers, shifts = array_at(numbers_at, n_numbers), array_at(shifts_at, (n, 3))
-    position, quaternion = array_at(position_at, 3), array_at(quaternion_at, 4)
-    values, clearances = array_at(values_at, n), array_at(clearances_at, n)
-    gradients, turnings = array_at(gradients_at, (n, 3)), array_at(turnings_at, (n, 3))
-    for i in range(n):
-        kind = kinds[i]
-        if kind in (_SPHERE, _DEPTH_BAND):
-            continue
-        at = gradients[i]  # until the gradient comes
-        for j in range(3):
-            at[j] = position[j] - shifts[i, j]
-        numbers = all_numbers[offsets[i] : offsets[i + 1]]
-        tx, ty, tz = 0.0, 0.0, 0.0
-        if kind < _FIRST_OF_ATTITUDE:
-            g, gx, gy, gz, distance = evaluate_shape(kind, at, numbers)
-        else:
-            g, gx, gy, gz, tx, ty, tz = _evaluate_shape_of_attitude(kind, at, quaternion, numbers)
-            distance = g
-        sign = signs[i]
-        values[i], clearances[i] = sign * g, -sign * distance
-        gradients[i, 0], gradients[i, 1], gradients[i, 2] = sign * gx, sign * gy, sign * gz
-        turnings[i, 0], turnings[i, 1], turnings[i, 2] = sign * tx, sign * ty, sign * tz
-    return n
-
-
-@functools.cache
-def _address_of_others() -> int:
-    arguments = (INTEGER, INTEGERS, NUMBERS, INTEGERS, INTEGER, *[NUMBERS] * 8)
-    return address_of(_evaluate_others, arguments)
 
 
 @inlined
@@ -328,7 +242,7 @@ def clearance_at(regions: PackedRegions, i: int, position: Array) -> float:
 
     Infinite for shapes that depend on attitude: they close no place.
     """
-    if regions.kinds[i] >= _FIRST_OF_ATTITUDE:
+    if regions.kinds[i] >= FIRST_OF_ATTITUDE:
         return math.inf
     return clearance_of_place(regions, i, position, np.empty(3))
 
@@ -336,12 +250,12 @@ def clearance_at(regions: PackedRegions, i: int, position: Array) -> float:
 @lean
 def clearance_of_pose(regions: PackedRegions, i: int, position: Array, quaternion: Array, room: Array) -> float:
     """Return the clearance of region `i`, of any kind, [m] or [rad], at a pose; `room` has shape (3,)."""
-    if regions.kinds[i] < _FIRST_OF_ATTITUDE:
+    if regions.kinds[i] < FIRST_OF_ATTITUDE:
         return clearance_of_place(regions, i, position, room)
     for axis in range(3):
         room[axis] = position[axis] - regions.shifts[i, axis]
     numbers = regions.numbers[regions.offsets[i] : regions.offsets[i + 1]]
-    clearance: float = -regions.signs[i] * _evaluate_shape_of_attitude(regions.kinds[i], room, quaternion, numbers)[0]
+    clearance: float = -regions.signs[i] * evaluate_shape_of_attitude(regions.kinds[i], room, quaternion, numbers)[0]
     return clearance
 
 
@@ -361,7 +275,7 @@ def attitude_clearance(regions: PackedRegions, i: int, position: Array, quaterni
     """Return the clearance [rad] of region `i`, of attitude, at a pose, and its slope over a turn in body axes."""
     numbers = regions.numbers[regions.offsets[i] : regions.offsets[i + 1]]
     at, sign = position - regions.shifts[i], regions.signs[i]
-    g, _, _, _, x, y, z = _evaluate_shape_of_attitude(regions.kinds[i], at, quaternion, numbers)
+    g, _, _, _, x, y, z = evaluate_shape_of_attitude(regions.kinds[i], at, quaternion, numbers)
     return -sign * g, np.array([-sign * x, -sign * y, -sign * z])
 
 
@@ -400,7 +314,7 @@ def clearances_at(points: Array, region: Region) -> Array:
 @lean
 def _clearances_at(regions: PackedRegions, points: Array, room: Array, clearances: Array) -> None:
     for i in range(points.shape[0]):
-        if regions.kinds[0] < _FIRST_OF_ATTITUDE:
+        if regions.kinds[0] < FIRST_OF_ATTITUDE:
             clearances[i] = clearance_of_place(regions, 0, points[i], room)
         else:
             clearances[i] = math.inf
