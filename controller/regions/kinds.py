@@ -51,6 +51,7 @@ def evaluate_shape(kind: int, p: Array, q: Array) -> Evaluation:
 
 @lean
 def evaluate_shape_of_attitude(kind: int, p: Array, e: Array, q: Array) -> EvaluationOfAttitude:
+    """Evaluate a packed shape of attitude, told by its kind, at the position `p` [m, NED] and the attitude `e`."""
     if kind == FIRST_OF_ATTITUDE:
         return orientation(p, e, q)
     return visibility(p, e, q)
