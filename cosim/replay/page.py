@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import html
 import json
+import re
 from collections.abc import Sequence
 from importlib import resources
 from pathlib import Path
@@ -25,6 +26,10 @@ _LIVE = ("things.js", "ghost.js", "dragging.js", "helm.js", "live.js")
 _SCRIPTS = ("data.js", *SCENE_SCRIPTS, *_PLAYER, *_LIVE, "main.js")
 _STYLES = ("style.css", "stage.css", "charts.css", "panel.css", "transport.css", "layout.css", "live.css")
 
+_COMMENT = re.compile(
+    r"^[ ]*(?:/\*.*?\*/|//[^\n]*)?\n", re.DOTALL | re.MULTILINE
+)  # on lines of its own, or an empty line
+
 _MARK = '<script type="application/json" id="runs">'  # where the data of a page begins
 
 
@@ -45,7 +50,8 @@ def replay_page(runs: Sequence[dict[str, Any]], title: str) -> str:
     """
     assets = resources.files("cosim.replay") / "assets"
     style, script = (
-        "\n".join((assets / name).read_text(encoding="utf-8") for name in names) for names in (_STYLES, _SCRIPTS)
+        "".join(_COMMENT.sub("", (assets / name).read_text(encoding="utf-8")) for name in names)
+        for names in (_STYLES, _SCRIPTS)
     )
     # "</script" would end the element that it stands in, and "<!--" with "<script" would keep it from ending
     data = json.dumps(list(runs), separators=(",", ":"), allow_nan=False, ensure_ascii=False).replace("<", "\\u003c")

@@ -10,7 +10,8 @@ from cosim.signals import Array
 _BYTES = 480_000  # of numbers, for the first minute
 _BYTES_A_MINUTE = 150_000  # for each further one
 _MOST_BYTES = 6_000_000
-_PARTS = 100  # of the run, from each of which the extremes are kept
+_PARTS = 100  # of the run at the most, from each of which the extremes are kept
+_OF_EXTREMES = 0.5  # share of the rows that they may take
 
 
 def sampled_rows(
@@ -37,13 +38,14 @@ def sampled_rows(
     n = len(time)
     minutes = float(time[-1] - time[0]) / 60.0 if n > 1 else 0.0
     budget = min(_BYTES + _BYTES_A_MINUTE * max(0.0, minutes - 1.0), _MOST_BYTES)
-    even = min(n, max(2, int(budget / (8 * columns))))
-    keep = {int(i) for i in np.linspace(0, n - 1, even)}
-    if moments is not None:
-        keep |= {int(i) for i in np.concatenate([moments, moments - 1]) if 0 <= i < n}
-    if even < n:
-        for part in np.array_split(np.arange(n), min(_PARTS, even)):
-            for signal in telling[part].T:
-                if np.isfinite(signal).any():
-                    keep |= {int(part[np.nanargmin(signal)]), int(part[np.nanargmax(signal)])}
+    most = max(2, int(budget / (8 * columns)))
+    if n <= most:
+        return np.arange(n)
+    keep = {int(i) for i in np.concatenate([moments, moments - 1]) if 0 <= i < n} if moments is not None else set()
+    parts = int(np.clip(_OF_EXTREMES * most / (2 * max(1, telling.shape[1])), 1, _PARTS))
+    for part in np.array_split(np.arange(n), parts):
+        for signal in telling[part].T:
+            if np.isfinite(signal).any():
+                keep |= {int(part[np.nanargmin(signal)]), int(part[np.nanargmax(signal)])}
+    keep |= {int(i) for i in np.linspace(0, n - 1, max(2, most - len(keep)))}
     return np.array(sorted(keep), dtype=np.intp)

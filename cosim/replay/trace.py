@@ -125,6 +125,5 @@ def _read(record: Record, names: Sequence[str], steps: NDArray[np.intp]) -> tupl
 def _telling(run: FlownRun) -> Array:
     """Return the signals whose extremes a page must not miss, shape (steps, m)."""
     clearances = [run.record[f"{secondary.region.name}.clearance"] for secondary in run.scenario.regions]
-    least = [np.fmin.reduce(clearances)] if clearances else []
     force = np.linalg.norm(run.record.stack([f"command.{axis}" for axis in "XYZ"]), axis=1)
-    return np.column_stack([run.record["goal.clearance"], force, *least])
+    return np.column_stack([run.record["goal.clearance"], force, *clearances])
