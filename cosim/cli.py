@@ -13,7 +13,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from cosim.command_line import campaigns, mavlink, package, replay, run, sitl, sweep, watch
+from cosim.command_line import campaigns, export, mavlink, package, replay, run, sitl, sweep, watch
 from cosim.command_line.campaigns import INTERRUPTED
 
 _EPILOG = """examples:
@@ -68,6 +68,7 @@ def _parser() -> argparse.ArgumentParser:
     calibrate = verbs.add_parser("calibrate", help="fit the force limit and lag that bring the paper's window about")
     calibrate.add_argument("--scenario", default="paper", help="scenario to fit (default: paper)")
 
+    export.add_verb(verbs)
     package.add_verb(verbs)
     campaigns.add_verbs(verbs)
     sweep.add_verbs(verbs)
@@ -183,6 +184,7 @@ _VERBS = {
     "show": _show,
     "check": _check,
     "calibrate": _calibrate,
+    "export": export.export,
     "package": package.package,
     "campaign": campaigns.campaign,
     "compare": campaigns.compare,

@@ -31,7 +31,7 @@ _LOOKING = 1.0 / 30.0  # s, after which rows are looked for while somebody watch
 _IDLING = 0.25  # s, the same while nobody does
 _ORDERS = 20  # a second that a viewer may give in the long run
 _AT_ONCE = 40  # and in a burst
-_PATIENCE = 200  # messages beyond that, after which a viewer is shut out
+_PATIENCE = 60  # messages beyond that, after which a viewer is shut out
 _SILENCE = 20.0  # s, after which a viewer that answers nothing is gone
 _FAREWELL = 2.0  # s, that closing waits for viewers who were not told all yet
 

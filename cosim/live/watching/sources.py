@@ -26,6 +26,7 @@ from cosim.signals import Array
 
 _FRAME = 0.1  # s of the wall clock, between pictures
 _FAST = 200  # pictures of a run that is played back as fast as it goes
+_ROWS = 10_000  # of a finished run
 _FRESH = 5.0  # s; parts of a record that are older are not written any more
 _ANSWER = 5.0  # s, that a live view may take to answer
 _GREATEST = 1 << 26  # bytes of a message
@@ -90,24 +91,25 @@ def _newest(found: Iterator[Look]) -> Iterator[Look]:
 def _finished(path: Path, rate: float | None, once: bool) -> Iterator[Look]:
     run = load_run(path)
     viewing = Viewing(run.scenario, run.record.columns)
-    names = [run.record.columns[i].name for i in viewing.picked]
-    times, ended = run.record["time"], (str(run.summary["status"]), verdict(run.summary))
+    record, steps = run.record, len(run.record["time"])
+    # no picture needs more rows than these, and all of a long run would not fit into memory
+    rows = np.arange(steps - 1, -1, -max(1, steps // _ROWS))[::-1] if not once else np.array([steps - 1])
+    picked = np.column_stack([record[record.columns[i].name][rows] for i in viewing.picked])
+    times, ended = picked[:, 0], (str(run.summary["status"]), verdict(run.summary))
     header = header_of(run.scenario, viewing.columns)
 
     def at(k: int, note: str, end: tuple[str, str] | None = None) -> Look:
-        row = viewing.extended(np.array([[run.record[name][k] for name in names]]))[0]
-        return Look(header, row, note, end)
+        return Look(header, viewing.extended(picked[k : k + 1])[0], note, end)
 
-    if not once:
-        began, k = time.monotonic(), 0
-        note = "replay" if rate is None else f"replay, {rate:g} times real time"
-        while k < len(times) - 1:
-            yield at(k, note)
-            if rate is None:
-                k += max(1, len(times) // _FAST)
-            else:
-                time.sleep(_FRAME)
-                k = int(np.searchsorted(times, times[0] + rate * (time.monotonic() - began), side="right")) - 1
+    began, k = time.monotonic(), 0
+    note = "replay" if rate is None else f"replay, {rate:g} times real time"
+    while k < len(times) - 1:
+        yield at(k, note)
+        if rate is None:
+            k += max(1, len(times) // _FAST)
+        else:
+            time.sleep(_FRAME)
+            k = int(np.searchsorted(times, times[0] + rate * (time.monotonic() - began), side="right")) - 1
     yield at(len(times) - 1, "replay", ended)
 
 
@@ -152,10 +154,10 @@ def _endpoint(what: str) -> tuple[str, int]:
     text = f"ws://127.0.0.1:{what}" if what.isdecimal() else what
     try:
         parts = urlsplit(text)
-        host, port = parts.hostname, parts.port
+        scheme, host, port = parts.scheme, parts.hostname, parts.port
     except ValueError:
-        host = port = None
-    if parts.scheme not in ("ws", "http") or not host or not port:
+        scheme, host, port = "", None, None
+    if scheme not in ("ws", "http") or not host or not port:
         raise TelemetryError(f"{what!r}: expected a run folder, PORT, or ws://HOST:PORT")
     return host, port
 

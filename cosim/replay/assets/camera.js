@@ -1,4 +1,4 @@
-// The camera: where it looks from, and where a point of the world is seen. World is north, east, down; down is downwards.
+// The camera: where it looks from, and where a point of the world (north, east, down) is seen. Down is downwards.
 
 const HALF_VIEW = (24 * Math.PI) / 180; // rad, half of the angle of view across the picture's diagonal
 const STEEPEST = Math.PI / 2;

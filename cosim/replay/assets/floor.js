@@ -73,7 +73,8 @@ function paintRuler(painter, labels, bounds, colours, named) {
   const { camera } = painter;
   const [low, high] = bounds;
   const corners = [low, high].flatMap(([n]) => [low, high].map(([, e]) => [n, e]));
-  const feet = corners.map(([n, e]) => [n, e, camera.project([n, e, high[2]])]).filter((foot) => foot[2][2] > camera.near);
+  const seen = corners.map(([n, e]) => [n, e, camera.project([n, e, high[2]])]);
+  const feet = seen.filter((foot) => foot[2][2] > camera.near);
   if (!feet.length) return;
   const [n, e, foot] = feet.reduce((a, b) => (b[2][0] < a[2][0] ? b : a));
   const head = camera.project([n, e, low[2]]);
@@ -110,20 +111,24 @@ function paintCompass(painter, labels, colours) {
   const { context, camera } = painter;
   const [x, y, size] = [46, camera.height - 46, 26];
   const axes = [["N", [1, 0, 0]], ["E", [0, 1, 0]], ["D", [0, 0, 1]]];
+  const placed = [];
   context.lineCap = "round";
   context.textAlign = "center";
   context.textBaseline = "middle";
-  for (const [name, axis] of axes.sort((a, b) => Vec.dot(b[1], camera.forward) - Vec.dot(a[1], camera.forward))) {
+  context.font = "600 11px system-ui, sans-serif";
+  for (const [name, axis] of axes) {
     const [dx, dy] = [size * Vec.dot(axis, camera.right), -size * Vec.dot(axis, camera.up)];
+    const colour = name === "N" ? colours.ink : colours.soft;
     context.beginPath();
     context.moveTo(x, y);
     context.lineTo(x + dx, y + dy);
-    painter.stroke(name === "N" ? colours.ink : colours.soft, name === "N" ? 2.6 : 1.8);
+    painter.stroke(colour, name === "N" ? 2.6 : 1.8);
     const length = Math.hypot(dx, dy);
-    if (length < 8) continue;
-    context.fillStyle = name === "N" ? colours.ink : colours.soft;
-    context.font = "600 11px system-ui, sans-serif";
-    context.fillText(name, x + (dx * (length + 9)) / length, y + (dy * (length + 9)) / length);
+    const [u, v] = [x + (dx * (length + 9)) / length, y + (dy * (length + 9)) / length];
+    if (length < 8 || placed.some(([p, q]) => Math.hypot(p - u, q - v) < 13)) continue;
+    placed.push([u, v]);
+    context.fillStyle = colour;
+    context.fillText(name, u, v);
   }
   context.lineCap = "butt";
   labels.block(x - 40, y - 40, 80, 80);

@@ -9,7 +9,7 @@ class Forces {
     this._most = 0; // N, the greatest force on the body
   }
 
-  /** @returns {{name: string, at: number[], force: number[]}[]} body frame; a force of length 1 is the greatest there is */
+  /** @returns {{at: number[], force: number[]}[]} body frame; a force of length 1 is the greatest there is */
   at(t) {
     this._look();
     const { run } = this;
@@ -28,7 +28,8 @@ class Forces {
   _look() {
     const { run } = this;
     if (this._looked === run.rows) return;
-    const thrusters = run.header.vehicle.thrusters.map((_, i) => run.column(`thruster_force[${i + 1}]`)).filter(Boolean);
+    const names = run.header.vehicle.thrusters.map((_, i) => `thruster_force[${i + 1}]`);
+    const thrusters = names.map((name) => run.column(name)).filter(Boolean);
     const body = ["X", "Y", "Z"].map((axis) => run.column(`actuation.${axis}`));
     for (let k = this._looked; k < run.rows; k++) {
       this._thrusters ||= thrusters.some((force) => Math.abs(force[k]) > 0);
@@ -51,14 +52,16 @@ function paintForces(painter, pose, forces, size, real, theme) {
     if (a[2] > camera.near && b[2] > camera.near) arrows.push([a, b]);
   }
   context.lineCap = "round";
-  for (const [colour, width] of [[colours.halo, 5], [colours.thrust, 2.4]]) {
+  // small vehicles have fine arrows
+  const fine = Math.min(1, Math.max(0.6, (size * camera.scaleAt(pose.position)) / 30));
+  for (const [colour, width] of [[colours.halo, 5 * fine], [colours.thrust, 2.4 * fine]]) {
     context.beginPath();
     for (const [a, b] of arrows) {
       context.moveTo(a[0], a[1]);
       context.lineTo(b[0], b[1]);
       const length = Math.hypot(b[0] - a[0], b[1] - a[1]);
       if (length < 3) continue;
-      const head = Math.min(7, 0.6 * length);
+      const head = Math.min(7 * fine, 0.6 * length);
       const [ux, uy] = [(b[0] - a[0]) / length, (b[1] - a[1]) / length];
       context.moveTo(b[0] - head * (ux + 0.6 * uy), b[1] - head * (uy - 0.6 * ux));
       context.lineTo(b[0], b[1]);

@@ -59,7 +59,8 @@ class Ghost {
     const text = `N ${north.toFixed(2)}  E ${east.toFixed(2)}  D ${down.toFixed(2)} m`;
     context.font = "600 12px system-ui, sans-serif";
     const wide = context.measureText(text).width + 12;
-    const left = Math.max(4, Math.min(width - wide - 4, x + 12));
+    // towards the middle, away from what stands at the edges
+    const left = Math.max(4, x > width / 2 ? x - wide - 12 : x + 12);
     const top = Math.max(4, y - 30);
     context.fillStyle = ink;
     context.beginPath();

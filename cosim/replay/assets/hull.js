@@ -19,7 +19,8 @@ function hullPart(colour, points, polygons) {
 /** A body between rings of as many points, closed at its ends. */
 function hullTube(colour, rings) {
   const n = rings[0].length;
-  const faces = [Array.from({ length: n }, (_, i) => n - 1 - i), Array.from({ length: n }, (_, i) => (rings.length - 1) * n + i)];
+  const around = Array.from({ length: n }, (_, i) => i);
+  const faces = [[...around].reverse(), around.map((i) => (rings.length - 1) * n + i)];
   for (let k = 1; k < rings.length; k++) faces.push(...bandFaces((k - 1) * n, k * n, n));
   return hullPart(colour, rings.flat(), faces);
 }

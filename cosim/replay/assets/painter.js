@@ -23,8 +23,8 @@ class Painter {
     const [ex, ey, ez] = Vec.sub(camera.eye, shift);
     for (let i = 0; i < faces.length; i++) {
       const [k, v] = [3 * i, 3 * faces[i][0]];
-      const towards = normals[k] * (ex - points[v]) + normals[k + 1] * (ey - points[v + 1]) + normals[k + 2] * (ez - points[v + 2]);
-      front[i] = towards > 0 ? 1 : 0;
+      const [x, y, z] = [ex - points[v], ey - points[v + 1], ez - points[v + 2]];
+      front[i] = normals[k] * x + normals[k + 1] * y + normals[k + 2] * z > 0 ? 1 : 0;
     }
   }
 
@@ -85,6 +85,13 @@ class Painter {
       else this.context.moveTo(x, y);
     });
     if (cut.length) this.context.closePath();
+  }
+
+  /** Add a line through points of the surface that was looked at, by their indices. */
+  chain(line) {
+    const { seen, context } = this;
+    context.moveTo(seen[3 * line[0]], seen[3 * line[0] + 1]);
+    for (let j = 1; j < line.length; j++) context.lineTo(seen[3 * line[j]], seen[3 * line[j] + 1]);
   }
 
   stroke(colour, width, alpha = 1, dash = null) {
@@ -236,19 +243,39 @@ function paintFaces(painter, solid, shift, style) {
     if (any) painter.fill(colour, alpha);
   };
   paint(-2, 2, style.colour, style.alpha);
-  paint(-2, -LIGHT_SIDE, "#ffffff", 0.2);
+  paint(-2, -LIGHT_SIDE, mixedColour(style.colour, "#ffffff", 0.6), 0.22);
   paint(LIGHT_SIDE, 2, "#000000", 0.16);
+}
+
+/** Edges as lines through the points that they share, so that dashes go on from one to the next. */
+function linesOf(edges) {
+  const at = new Map(); // of each point, the edges that are not yet in a line
+  for (const edge of edges) for (const k of [edge[0], edge[1]]) at.set(k, (at.get(k) ?? new Set()).add(edge));
+  const lines = [];
+  for (const edge of edges) {
+    if (!at.get(edge[0]).has(edge)) continue;
+    const line = [edge[0]];
+    for (let next = edge; next; next = at.get(line[line.length - 1]).values().next().value) {
+      at.get(next[0]).delete(next);
+      at.get(next[1]).delete(next);
+      line.push(next[0] === line[line.length - 1] ? next[1] : next[0]);
+    }
+    lines.push(line);
+  }
+  return lines;
 }
 
 /** Sharp edges, outlines of round surfaces and lines on them, on the near or on the far side. */
 function paintEdges(painter, solid, shift, style, near) {
   painter.look(solid, shift);
   const { front } = painter;
-  painter.begin();
-  for (const [a, b, f, g, sharp] of solid.edges) {
+  const drawn = solid.edges.filter(([, , f, g, sharp]) => {
     const seen = front[f] || front[g];
-    if (sharp ? Boolean(seen) === near : near && front[f] !== front[g]) painter.edge(solid, shift, a, b);
-  }
+    return sharp ? Boolean(seen) === near : near && front[f] !== front[g];
+  });
+  painter.begin();
+  if (style.dash && painter.whole) for (const line of linesOf(drawn)) painter.chain(line);
+  else for (const [a, b] of drawn) painter.edge(solid, shift, a, b);
   painter.stroke(style.colour, near ? style.width : 1, near ? 1 : style.hidden, style.dash);
 }
 

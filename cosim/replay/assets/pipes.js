@@ -54,7 +54,8 @@ function pipeOf({ points, radius }) {
     const discs = [points[i], p].map((centre) => ring(centre, [1, 0, 0], [0, 1, 0], radius));
     return outlineFromAbove(discs.flat());
   });
-  solid.hides = (eye, p) => points.some((a, i) => i > 0 && segmentsWithin(points[i - 1], a, p, eye, radius));
+  const meets = (eye, p) => points.some((a, i) => i > 0 && segmentsWithin(points[i - 1], a, p, eye, radius));
+  solid.from = (eye) => (x, y, z) => nearSight(solid, eye, x, y, z) && meets(eye, [x, y, z]);
   return solid;
 }
 

@@ -98,13 +98,21 @@ function nameRegions(labels, camera, entries, colours) {
     named.add(key);
     const { active } = entry;
     labels.add({
-      key, x, y, gap: 6, of: entry.of,
+      key, x, y, gap: 6, of: entry.of, size: camera.width < 480 && !active ? 10 : 12,
       text: active ? `▶ ${entry.region.name}` : entry.region.name,
       colour: active ? colours.ink : colours.soft, edge: entry.colour, bold: active, chip: colours.chip,
-      rank: active ? 0 : entry.of.region === 0 ? 1 : 10 + 1e-3 * depth,
+      rank: active ? 0 : entry.of.region === 0 ? 1 : 10 + 1e-3 * depth, far: active || entry.of.region === 0,
       sides: ["above", "right", "left", "below"],
     });
   }
+}
+
+/** Keep names off a vehicle, unless it fills the picture. */
+function blockVehicle(labels, camera, { pose, size }) {
+  const [x, y, depth] = camera.project(pose.position);
+  if (depth < camera.near) return;
+  const half = Math.min(70, 1.3 * size * camera.scaleAt(pose.position));
+  labels.block(x - half, y - half, 2 * half, 2 * half);
 }
 
 /** Ask for the names of vehicles, where there are several. */
@@ -116,7 +124,7 @@ function nameVehicles(labels, camera, marks, vehicles, colours) {
     const { name, colour } = marks[i];
     labels.add({
       key: `vehicle ${i}`, x, y, gap: 1.5 * vehicle.size * camera.scaleAt(vehicle.pose.position),
-      text: name, colour: colours.ink, edge: colour, bold: true, chip: colours.chip, rank: 0.5,
+      text: name, colour: colours.ink, edge: colour, bold: true, chip: colours.chip, rank: 0.5, far: true,
       sides: ["below", "right", "left", "above"],
     });
   });

@@ -48,7 +48,8 @@ class Scene {
    */
   setRuns(runs, marks = null) {
     this.runs = runs;
-    this._runMarks = marks ?? (runs.length > 1 ? runs.map(({ header }, i) => ({ name: header.name, colour: runColour(i) })) : null);
+    const own = runs.map(({ header }, i) => ({ name: header.name, colour: runColour(i) }));
+    this._runMarks = marks ?? (runs.length > 1 ? own : null);
     this._trails = runs.map((run) => new Trail(run));
     this._forces = runs.map((run) => new Forces(run));
     this._regions = new Regions(runs);
@@ -91,8 +92,8 @@ class Scene {
 
   /** The region at some pixels, its name included: {run, region}, or null. */
   pick(x, y) {
-    const named = this.labels.placed.find((box) => box.of && x >= box.x && x <= box.x + box.width && y >= box.y && y <= box.y + box.height);
-    if (named) return named.of;
+    const named = this.labels.nameAt(x, y);
+    if (named) return named;
     this._fitsPicture();
     const { eye } = this.camera;
     const far = Vec.along(eye, this.camera.ray(x, y), 1e5);
@@ -101,7 +102,7 @@ class Scene {
       if (Math.hypot(u - x, v - y) < 14) return of;
     }
     for (const { solid, shift, of } of [...(this._entries ?? [])].reverse()) {
-      if (solid && solid.hides(Vec.sub(eye, shift), Vec.sub(far, shift))) return of;
+      if (solid?.from(Vec.sub(eye, shift))(...Vec.sub(far, shift))) return of;
     }
     return null;
   }
@@ -121,8 +122,7 @@ class Scene {
     this._follow(options.follow ? poses.find(Boolean) : null);
     const { context, painter, camera } = this;
     const colours = SCENE_THEMES[this.theme];
-    context.setTransform(this._ratio, 0, 0, this._ratio, 0, 0);
-    context.lineJoin = "round";
+    context.lineJoin = "bevel"; // round ones cost as much as the lines
     this._paintSky(colours);
     this.labels.begin(camera.width, camera.height);
 
@@ -145,7 +145,9 @@ class Scene {
     }
     for (const vehicle of vehicles) if (vehicle) paintPlumb(painter, vehicle, floor, colours);
     // a sight begins at the vehicle, and is just behind it
-    for (const entry of this._sights) things.push({ ...entry, middle: Vec.along(entry.sight.apex, camera.forward, entry.size) });
+    for (const entry of this._sights) {
+      things.push({ ...entry, middle: Vec.along(entry.sight.apex, camera.forward, entry.size) });
+    }
     const lists = placedAmong(this._entries, things, camera.eye);
     this._entries.forEach((entry, k) => {
       if (entry.solid) paintBack(painter, entry.solid, entry.shift, entry.style);
@@ -162,6 +164,7 @@ class Scene {
 
     paintCompass(painter, this.labels, colours);
     paintScale(painter, this.labels, colours, Math.max(1, ...vehicles.map((vehicle) => vehicle?.magnified ?? 1)));
+    for (const vehicle of vehicles) if (vehicle) blockVehicle(this.labels, camera, vehicle);
     if (labels) nameRegions(this.labels, camera, regions, colours);
     if (labels && this._runMarks) nameVehicles(this.labels, camera, this._runMarks, vehicles, colours);
     this.labels.draw();
@@ -208,10 +211,8 @@ class Scene {
 
   _follow(pose) {
     if (pose) {
-      const moved = this._followed ? Vec.sub(pose.position, this._followed) : Vec.sub(pose.position, this.camera.target);
-      if (Vec.norm(moved) > 0) {
-        this._quiet(() => this.camera.aim(Vec.add(this.camera.target, moved)));
-      }
+      const moved = Vec.sub(pose.position, this._followed ?? this.camera.target);
+      if (Vec.norm(moved) > 0) this._quiet(() => this.camera.aim(Vec.add(this.camera.target, moved)));
     }
     this._followed = pose ? pose.position : null;
   }
@@ -223,21 +224,28 @@ class Scene {
     this.camera.listeners.add(this._redraw);
   }
 
+  /** The background: a gradient that is made once, since to copy it is several times as fast as to make it. */
   _paintSky(colours) {
-    const { context, camera } = this;
+    const { context, canvas } = this;
     if (!this._sky) {
-      this._sky = context.createLinearGradient(0, 0, 0, camera.height);
-      this._sky.addColorStop(0, colours.skyTop);
-      this._sky.addColorStop(1, colours.skyBottom);
+      this._sky = new OffscreenCanvas(canvas.width, canvas.height);
+      const sky = this._sky.getContext("2d", { alpha: false });
+      const gradient = sky.createLinearGradient(0, 0, 0, canvas.height);
+      gradient.addColorStop(0, colours.skyTop);
+      gradient.addColorStop(1, colours.skyBottom);
+      sky.fillStyle = gradient;
+      sky.fillRect(0, 0, canvas.width, canvas.height);
     }
-    context.fillStyle = this._sky;
-    context.fillRect(0, 0, camera.width, camera.height);
+    context.setTransform(1, 0, 0, 1, 0, 0);
+    context.drawImage(this._sky, 0, 0);
+    context.setTransform(this._ratio, 0, 0, this._ratio, 0, 0);
   }
 
   _vehicle(pose, index) {
     const { vehicle } = this.runs[index].header;
     const pixels = vehicle.radius * this.camera.scaleAt(pose.position);
-    const magnified = pixels > 0 ? Math.max(1, Math.min(LEAST_HULL, 0.028 * Math.min(this.camera.width, this.camera.height)) / pixels) : 1;
+    const least = Math.min(LEAST_HULL, 0.028 * Math.min(this.camera.width, this.camera.height));
+    const magnified = pixels > 0 ? Math.max(1, least / pixels) : 1;
     const size = vehicle.radius * magnified;
     const placed = { position: pose.position, R: Vec.matrix(pose.quaternion) };
     const things = [...hullAt(vehicle, placed, size, this.camera.eye, this.theme), ...bodyAxes(placed, size)];
@@ -265,7 +273,8 @@ class Scene {
       const [[x, y, near], [u, v, depth]] = [camera.project(from), camera.project(middle)];
       const length = Math.hypot(u - x, v - y);
       if (Math.min(near, depth) < camera.near || !(length > 1)) return [];
-      if (vehicle && Vec.norm(Vec.sub(middle, vehicle.pose.position)) < 1.5 * vehicle.size) return []; // not on the hull
+      const onHull = vehicle && Vec.norm(Vec.sub(middle, vehicle.pose.position)) < 1.5 * vehicle.size;
+      if (onHull) return [];
       const past = time <= t;
       const onTop = Vec.along(middle, Vec.sub(camera.eye, middle), 0.02); // of the line that it marks
       const colour = this._wayColour(index, past, active?.[row], colours);
@@ -292,13 +301,14 @@ class Scene {
         continue;
       }
       context.beginPath();
-      for (; k < things.length && things[k].points && things[k].colour === thing.colour && things[k].past === thing.past; k++) {
+      const goesOn = (next) => next?.points && next.colour === thing.colour && next.past === thing.past;
+      for (; goesOn(things[k]); k++) {
         const { points } = things[k];
         context.moveTo(points[0], points[1]);
         for (let i = 2; i < points.length; i += 2) context.lineTo(points[i], points[i + 1]);
       }
       if (thing.past) painter.stroke(colours.halo, 6);
-      painter.stroke(thing.colour, thing.past ? 3 : 1.4, thing.past ? 1 : 0.7);
+      painter.stroke(thing.colour, thing.past ? 3 : 1);
     }
   }
 

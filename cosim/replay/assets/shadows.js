@@ -67,9 +67,8 @@ function paintPlumb(painter, { pose, size }, floor, colours) {
 /** The shadow of the way so far, through the beginnings of its chunks. */
 function paintWayBelow(painter, chunks, floor, colours) {
   painter.begin();
-  chunks.forEach(({ middle }, i) => {
-    const before = i && chunks[i - 1];
-    if (before && before.past && before.next === chunks[i]) painter.segment([before.middle[0], before.middle[1], floor], [middle[0], middle[1], floor]);
-  });
+  for (const { middle, past, next } of chunks) {
+    if (past && next) painter.segment([middle[0], middle[1], floor], [next.middle[0], next.middle[1], floor]);
+  }
   painter.stroke(colours.shadow, 2.5);
 }

@@ -12,9 +12,11 @@ const SHARP = Math.cos((31 * Math.PI) / 180); // faces that turn more from each 
  * @property {number[][]} edges [point, point, face, face, 1 if sharp]
  * @property {number[][]} lines of points on an ellipsoid, drawn to tell its form
  * @property {number[]} centre, {number} radius of a ball about it  @property {number} top its least depth [m]
- * @property {number[][]|null} spine the line in its middle, where it is long  @property {object|null} ellipsoid {centre, axes} where it is one: three half axes as vectors
+ * @property {number[][]|null} spine the line in its middle, where it is long
+ * @property {object|null} ellipsoid {centre, axes} where it is one: three half axes as vectors
  * @property {number[][][]} shadows polygons, north and east, that it is seen as from above
- * @property {function(number[], number[]): boolean} hides whether it comes between an eye and a point, or holds the point
+ * @property {function(number[]): function(number, number, number): boolean} from tells of an eye whether the solid is
+ * between it and a point, or holds the point; asked for each piece of a way in each frame, so it makes no arrays
  */
 
 /** The surface that some points and faces make. */
@@ -28,7 +30,7 @@ function solidOf(points, faces, lines = []) {
   solid.centre = Vec.scale(Vec.add(low, high), 0.5);
   solid.radius = Math.max(...points.map((p) => Vec.norm(Vec.sub(p, solid.centre))));
   solid.top = low[2];
-  solid.hides = (eye, p) => crossesFaces(solid, eye, p);
+  solid.from = (eye) => (x, y, z) => nearSight(solid, eye, x, y, z) && crossesFaces(solid, eye, [x, y, z]);
   solid.shadows = faces.length ? [outlineFromAbove(points)] : [];
   return solid;
 }
@@ -53,14 +55,22 @@ function edgesOf(faces, normals) {
       if (!known) edges.set(key, [a, b, i, i, 1]);
       else {
         const j = known[2];
-        const bend =
-          normals[3 * i] * normals[3 * j] + normals[3 * i + 1] * normals[3 * j + 1] + normals[3 * i + 2] * normals[3 * j + 2];
+        const bend = [0, 1, 2].reduce((sum, axis) => sum + normals[3 * i + axis] * normals[3 * j + axis], 0);
         known[3] = i;
         known[4] = bend < SHARP ? 1 : 0;
       }
     });
   });
   return [...edges.values()];
+}
+
+/** Whether a line from an eye to a point goes through the ball about a solid. */
+function nearSight({ centre, radius }, eye, x, y, z) {
+  const [bx, by, bz] = [eye[0] - x, eye[1] - y, eye[2] - z];
+  const [px, py, pz] = [x - centre[0], y - centre[1], z - centre[2]];
+  const length = bx * bx + by * by + bz * bz;
+  const part = Math.min(1, Math.max(0, -(px * bx + py * by + pz * bz) / length));
+  return (px + part * bx) ** 2 + (py + part * by) ** 2 + (pz + part * bz) ** 2 < radius * radius;
 }
 
 /** Whether a line from an eye to a point goes in through a face: then the point is inside the solid or behind it. */
@@ -113,15 +123,23 @@ function ellipsoidOf(centre, axes) {
   solid.ellipsoid = { centre: solid.centre, axes };
   solid.shadows = [ellipseFromAbove(centre, axes)];
   const inverse = axes.map((axis) => Vec.scale(axis, 1 / Vec.dot(axis, axis))); // rows: into the unit ball
-  solid.hides = (eye, p) => {
-    let [aa, ab, bb] = [0, 0, 0];
-    for (const row of inverse) {
-      const a = Vec.dot(row, Vec.sub(p, centre));
-      const b = Vec.dot(row, Vec.sub(eye, p));
-      [aa, ab, bb] = [aa + a * a, ab + a * b, bb + b * b];
-    }
-    if (aa < 1) return true;
-    return ab < 0 && -ab < bb && aa - (ab * ab) / bb < 1; // nearest to the centre on the way to the eye
+  solid.from = (eye) => {
+    // all in the space where it is the unit ball
+    const [[m0, m1, m2], [m3, m4, m5], [m6, m7, m8]] = inverse;
+    const [cx, cy, cz] = centre;
+    const [ex, ey, ez] = inverse.map((row) => Vec.dot(row, Vec.sub(eye, centre)));
+    return (x, y, z) => {
+      const [dx, dy, dz] = [x - cx, y - cy, z - cz];
+      const px = m0 * dx + m1 * dy + m2 * dz;
+      const py = m3 * dx + m4 * dy + m5 * dz;
+      const pz = m6 * dx + m7 * dy + m8 * dz;
+      const square = px * px + py * py + pz * pz;
+      if (square < 1) return true;
+      const [bx, by, bz] = [ex - px, ey - py, ez - pz];
+      const along = px * bx + py * by + pz * bz;
+      const length = bx * bx + by * by + bz * bz;
+      return along < 0 && -along < length && square - (along * along) / length < 1; // nearest on the way to the eye
+    };
   };
   return solid;
 }

@@ -45,12 +45,14 @@ class Trail {
       const turns = !chunk || chunk.past !== past || chunk.active !== who;
       if (!turns && !last && step < FINEST) return;
       if (chunk) {
+        if (straight(chunk.points, px, py)) chunk.points.length -= 2;
         chunk.points.push(px, py);
         length += step;
       }
       if (turns || length > CHUNK) {
         const before = chunk;
-        chunk = { points: before ? before.points.slice(-2) : [px, py], middle: [x, y, z], next: null, past, active: who };
+        const points = before ? before.points.slice(-2) : [px, py];
+        chunk = { points, middle: [x, y, z], next: null, past, active: who };
         if (before) before.next = chunk;
         chunks.push(chunk);
         length = 0;
@@ -107,6 +109,15 @@ class Trail {
     this._marks = { spacing, rows: run.rows, list };
     return list;
   }
+}
+
+/** Whether the last point of a line is as good as on the way from the one before it to another. */
+function straight(points, x, y) {
+  const n = points.length;
+  if (n < 4) return false;
+  const [u, v] = [x - points[n - 4], y - points[n - 3]];
+  const [p, q] = [points[n - 2] - points[n - 4], points[n - 1] - points[n - 3]];
+  return (u - p) * p + (v - q) * q > 0 && Math.abs(u * q - v * p) < 0.25 * Math.hypot(u, v);
 }
 
 /** Whether a line of pixels may touch the picture. */

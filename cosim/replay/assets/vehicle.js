@@ -8,8 +8,8 @@ function shaded(colour, light) {
   const key = `${colour} ${step}`;
   if (!SHADES.has(key)) {
     const part = step / 7;
-    const lit = part < 0.6 ? mixedColour(colour, "#0a141b", 1.1 * (0.6 - part)) : mixedColour(colour, "#ffffff", 0.5 * (part - 0.6));
-    SHADES.set(key, lit);
+    const [to, most] = part < 0.6 ? ["#0a141b", 1.1] : ["#ffffff", 0.5];
+    SHADES.set(key, mixedColour(colour, to, most * Math.abs(part - 0.6)));
   }
   return SHADES.get(key);
 }
@@ -18,7 +18,8 @@ function shaded(colour, light) {
 function hullAt(vehicle, { position, R }, size, eye, theme) {
   const seen = [];
   const view = Vec.scale(Vec.sub(eye, position), 1 / size);
-  const [x, y, z] = [0, 1, 2].map((i) => R[i] * view[0] + R[3 + i] * view[1] + R[6 + i] * view[2]); // the eye, body axes
+  // the eye, body axes
+  const [x, y, z] = [0, 1, 2].map((i) => R[i] * view[0] + R[3 + i] * view[1] + R[6 + i] * view[2]);
   for (const { colour, corners, middle, normal } of hullOf(vehicle)) {
     if (normal[0] * (x - middle[0]) + normal[1] * (y - middle[1]) + normal[2] * (z - middle[2]) <= 0) continue;
     const turned = Vec.turned(R, normal);

@@ -23,8 +23,8 @@ WAIT = 20.0  # s, that nothing should take
 class Viewer:
     """A viewer that is no browser; it keeps what it is told."""
 
-    def __init__(self, url, **options):
-        self._connecting = connect(url.replace("http", "ws") + "ws", max_size=None, **options)
+    def __init__(self, url):
+        self._connecting = connect(url.replace("http", "ws") + "ws", max_size=None, open_timeout=60.0)
         self.texts, self.headers, self.rows = [], [], []
 
     def __enter__(self):

@@ -124,7 +124,7 @@ def test_a_point_is_hidden_where_the_line_from_the_eye_meets_the_shape(name):
     hidden = run(
         """
         const solid = SOLIDS[shape.kind](shape);
-        return eyes.map((eye, i) => solid.hides(eye, points[i]));
+        return eyes.map((eye, i) => solid.from(eye)(...points[i]));
         """,
         shape=shape_of(shape),
         eyes=eyes.tolist(),
