@@ -52,6 +52,7 @@ class Recorder:
         (folder / PARTS).mkdir()
         self._whole: pq.ParquetWriter | None = None  # what the record will be, begun with its first rows
         self._gathered: list[pa.Table] = []  # written as parts, but not yet into the whole
+        self._torn = False  # writing was interrupted: what the whole has is not known, what the parts have is
 
     def observe(self, k: int, row: Array) -> None:
         """Keep the row of step `k`."""
@@ -63,12 +64,29 @@ class Recorder:
 
     def close(self) -> None:
         """Write what is left, and put the whole in the place of its parts."""
+        torn = self._torn
         self._flush()
+        if torn:
+            self._begin_anew()
         self._write_gathered()
         if self._whole is not None:
             self._whole.close()
         (self._folder / PARTS / _WHOLE).replace(self._folder / RECORD)
         shutil.rmtree(self._folder / PARTS)
+
+    def _begin_anew(self) -> None:
+        """Put the parts together once more."""
+        if self._whole is not None:
+            self._whole.close()
+        self._whole, self._gathered = None, []
+        for part in _part_files(self._folder):
+            with pq.ParquetFile(part) as parquet:
+                self._gathered.append(parquet.read())
+            self._write_if_enough()
+
+    def _write_if_enough(self) -> None:
+        if sum(gathered.num_rows for gathered in self._gathered) >= len(self._block):
+            self._write_gathered()
 
     def _write_gathered(self) -> None:
         if self._gathered:
@@ -80,6 +98,7 @@ class Recorder:
     def _flush(self) -> None:
         if not self._filled:
             return
+        self._torn = True
         # not pa.array: that imports pandas where it is installed, for nothing
         columns = [
             pa.Array.from_buffers(pa.float64(), self._filled, [None, pa.py_buffer(column)])
@@ -93,9 +112,9 @@ class Recorder:
         # only now: an interrupted write is done again, into the same part
         self._parts, self._filled = self._parts + 1, 0
         self._gathered.append(table)
-        if sum(gathered.num_rows for gathered in self._gathered) >= len(self._block):
-            self._write_gathered()
+        self._write_if_enough()
         self._flushed = time.monotonic()
+        self._torn = False
 
 
 # measured: bytes of a float64 column compress best when they are split by place, and dictionaries only cost

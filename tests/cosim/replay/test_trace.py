@@ -49,7 +49,7 @@ def test_sampling_keeps_to_its_budget_and_loses_no_spike(n, columns, data):
     steps = sampled_rows(time, columns, telling, np.array([moment]))
     assert steps[0] == 0 and steps[-1] == n - 1 and (np.diff(steps) > 0).all()
     assert {spike, moment, max(moment - 1, 0)} <= set(steps.tolist())
-    assert len(steps) <= 480_000 / (8 * columns) + 150_000 * n / 60 / (8 * columns) + 402
+    assert len(steps) <= 400_000 / (8 * columns) + 150_000 * n / 60 / (8 * columns) + 402
 
 
 def test_who_is_active_agrees_with_a_reading_row_by_row(docking):
