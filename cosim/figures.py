@@ -5,70 +5,89 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 
 import matplotlib as mpl
-from matplotlib.figure import Figure
+from matplotlib.figure import FigureBase
 
 from cosim import figures_in_space as in_space
+from cosim import figures_of_forces as of_forces
 from cosim import figures_over_time as over_time
-from cosim.drawing import STYLE, Drawing, Story
+from cosim.drawing import Drawing, Story
+from cosim.figures_layout import FIGURE_STYLE, Sheet, own_sheet
 
 
-def drawings(story: Story) -> Iterator[Drawing]:
+def drawings(story: Story, sheet: Callable[[str], Sheet] = lambda caption: own_sheet) -> Iterator[Drawing]:
     """Yield every figure that the run has something to show for.
 
     Parameters
     ----------
     story : Story
         Scenario, record and summary.
+    sheet : callable
+        Gives, for a caption, what gives the place of a figure that stands above it; by default each has its own.
 
     Yields
     ------
     Drawing
         In the order of the report.
     """
-    figures: list[tuple[str, str, Callable[[Story], Figure]]] = [
-        ("path-3d", "Path in space (after Fig. 5a). X marks the start, I the overlap of regions.", in_space.path_3d),
-        (
-            "path-plane",
-            "Path from the side and above (after Fig. 5b); regions as silhouettes, dashed to be kept within.",
-            in_space.path_plane,
-        ),
-        (
-            "position-error",
-            "RMS position error |p − p_d|/√3 (after Fig. 6; the quantity is assumed).",
-            over_time.position_error,
-        ),
-        ("attitude", "Attitude (after Fig. 7).", over_time.attitude),
-        (
+    for name, caption, draw in _figures(story):
+        with mpl.rc_context(FIGURE_STYLE):
+            yield Drawing(name, caption, draw(story, sheet(caption)))
+
+
+def _figures(story: Story) -> Iterator[tuple[str, str, Callable[[Story, Sheet], FigureBase]]]:
+    """Yield name, caption, and what draws it."""
+    moved = ""
+    if story.scenario.moving:
+        moved = (
+            " What moved is faint where it began and ended; regions are full where they were when the vehicle had "
+            "least clearance to them."
+        )
+    if in_space.targets_of(story):
+        moved += " Diamonds: the targets before the last one, numbered as they were ordered."
+    way = "; the path is in a criterion's colour while the arbiter gives way to a region of it"
+    yield (
+        "path-3d",
+        f"Path in space (after Fig. 5a), seen from the south-east{way}. Grey: its shadow on the deepest plane.",
+        in_space.path_3d,
+    )
+    yield (
+        "path-plane",
+        f"Path from the side and from above (after Fig. 5b), with outlines of the regions: full to be kept out of, "
+        f"dashed to be kept within{way}.{moved}",
+        in_space.path_plane,
+    )
+    yield (
+        "position-error",
+        "Position error: distance from the middle of the goal over √3 (after Fig. 6; the quantity is assumed).",
+        over_time.position_error,
+    )
+    yield "attitude", "Attitude (after Fig. 7): Euler angles from NED to the body frame.", over_time.attitude
+    if story.summary["intersection_windows"]:
+        yield (
             "weights-overlap",
             "Normalised weights around each overlap of regions (after Fig. 8; assumed).",
             over_time.weights_overlap,
-        ),
-        ("weights", "Memberships and weights over the whole run.", over_time.weights),
-        ("clearance", "Clearance to each region, negative where it is violated.", over_time.clearance),
-        ("helm", "Who steered, as it was ordered; grey where disarmed.", over_time.helm),
-        ("forces", "Body force: what the law asks for, and what acts.", over_time.forces),
-        ("thrusters", "Thruster forces.", over_time.thrusters),
-        ("estimates", "Estimated restoring parameters against the truth (dotted).", over_time.estimates),
-        (
+        )
+    yield "weights", f"Memberships and weights of the criteria.{_zoom(story)}", over_time.weights
+    yield (
+        "clearance",
+        "Clearance to the goal and to each region; red: below 0 it is violated, or the goal not reached."
+        f"{_zoom(story)}",
+        over_time.clearance,
+    )
+    if story.scenario.commands.enabled:
+        yield "helm", "Who steered, as it was ordered; grey where disarmed.", over_time.helm
+    yield "forces", "Body force: what the law asks for, and what acts, in the body frame.", of_forces.forces
+    yield "thrusters", of_forces.thruster_caption(story.scenario), of_forces.thrusters
+    yield "estimates", "Estimated restoring parameters against the truth (dotted).", of_forces.estimates
+    if story.summary["lyapunov"]:
+        yield (
             "lyapunov",
             "V of (31), which as printed leaves the frame where a region's gradient vanishes, and −W of (41): dV/dt "
             "where the law's wrench acts and the water rests. Red: where V is negative, or rises.",
             over_time.lyapunov,
-        ),
-    ]
-    for name, caption, draw in figures:
-        if name == "weights-overlap" and not story.summary["intersection_windows"]:
-            continue
-        if name == "path-plane" and story.scenario.moving:
-            caption += (
-                " What moved is faint where it began and ended; regions are full where they were when the vehicle had "
-                "least clearance to them."
-            )
-        if name == "helm" and not story.scenario.commands.enabled:
-            continue
-        if name == "lyapunov" and not story.summary["lyapunov"]:
-            continue
-        if name == "thrusters":
-            caption = over_time.thruster_caption(story.scenario)
-        with mpl.rc_context(STYLE):
-            yield Drawing(name, caption, draw(story))
+        )
+
+
+def _zoom(story: Story) -> str:
+    return " Left, where there are two: the time of the first overlap (grey)." if over_time.zooms(story) else ""
