@@ -13,7 +13,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from cosim.command_line import campaigns, mavlink, package, replay, run, sitl, sweep
+from cosim.command_line import campaigns, mavlink, package, replay, report, run, sitl, sweep
 from cosim.command_line.campaigns import INTERRUPTED
 
 _EPILOG = """examples:
@@ -126,17 +126,6 @@ def _log(verbose: bool) -> None:
         logging.getLogger(name).setLevel(logging.DEBUG if verbose else logging.WARNING)
 
 
-def _report(options: argparse.Namespace) -> int:
-    from cosim.replay.page import REPLAY
-    from cosim.report_words import verdict
-    from cosim.run_folder import report_again
-
-    print(verdict(report_again(options.folder)))
-    print(options.folder / "report.html")
-    print(options.folder / REPLAY)
-    return 0
-
-
 def _list(options: argparse.Namespace) -> int:
     from cosim.scenario import load_scenario
     from cosim.scenario_file import shipped_scenarios
@@ -175,7 +164,7 @@ def _calibrate(options: argparse.Namespace) -> int:
 
 _VERBS = {
     "run": run.run,
-    "report": _report,
+    "report": report.report,
     "replay": replay.replay,
     "list": _list,
     "show": _show,

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from matplotlib.figure import FigureBase
+from matplotlib.figure import Figure
 from matplotlib.rcsetup import cycler
 from numpy.typing import NDArray
 
@@ -61,15 +61,15 @@ class Drawing:
 
     name: str
     caption: str
-    figure: FigureBase
+    figure: Figure
 
     def write(self, folder: Path, png: bool = False) -> str:
         """Write it into a folder as SVG, and as PNG if that is asked for; return the SVG."""
         svg = io.StringIO()
-        self.figure.figure.savefig(svg, format="svg", metadata={"Date": None})
+        self.figure.savefig(svg, format="svg", metadata={"Date": None})
         (folder / f"{self.name}.svg").write_text(svg.getvalue(), encoding="utf-8")
         if png:
-            self.figure.figure.savefig(folder / f"{self.name}.png", dpi=DPI)
+            self.figure.savefig(folder / f"{self.name}.png", dpi=DPI)
         return svg.getvalue()
 
 

@@ -3,26 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from typing import Protocol
 
 import matplotlib as mpl
-from matplotlib.figure import FigureBase
 
 from cosim import figures_in_space as in_space
 from cosim import figures_of_forces as of_forces
 from cosim import figures_over_time as over_time
 from cosim.drawing import Drawing, Story
-from cosim.figures_layout import FIGURE_STYLE, Sheet, own_sheet
+from cosim.figures_layout import FIGURE_STYLE, F, Sheet, own_sheet
 
 
-def drawings(story: Story, sheet: Callable[[str], Sheet] = lambda caption: own_sheet) -> Iterator[Drawing]:
+def drawings(story: Story) -> Iterator[Drawing]:
     """Yield every figure that the run has something to show for.
 
     Parameters
     ----------
     story : Story
         Scenario, record and summary.
-    sheet : callable
-        Gives, for a caption, what gives the place of a figure that stands above it; by default each has its own.
 
     Yields
     ------
@@ -31,10 +29,29 @@ def drawings(story: Story, sheet: Callable[[str], Sheet] = lambda caption: own_s
     """
     for name, caption, draw in _figures(story):
         with mpl.rc_context(FIGURE_STYLE):
-            yield Drawing(name, caption, draw(story, sheet(caption)))
+            yield Drawing(name, caption, draw(story, own_sheet))
 
 
-def _figures(story: Story) -> Iterator[tuple[str, str, Callable[[Story, Sheet], FigureBase]]]:
+def draw_all(story: Story, sheet_for: Callable[[str], Sheet[F]]) -> None:
+    """Draw the same figures on sheets that are given.
+
+    Parameters
+    ----------
+    story : Story
+        Scenario, record and summary.
+    sheet_for : callable
+        Gives the sheet of a figure for its caption.
+    """
+    for _, caption, draw in _figures(story):
+        with mpl.rc_context(FIGURE_STYLE):
+            draw(story, sheet_for(caption))
+
+
+class _Draw(Protocol):
+    def __call__(self, story: Story, sheet: Sheet[F]) -> F: ...
+
+
+def _figures(story: Story) -> Iterator[tuple[str, str, _Draw]]:
     """Yield name, caption, and what draws it."""
     moved = ""
     if story.scenario.moving:
@@ -77,9 +94,18 @@ def _figures(story: Story) -> Iterator[tuple[str, str, Callable[[Story, Sheet], 
     )
     if story.scenario.commands.enabled:
         yield "helm", "Who steered, as it was ordered; grey where disarmed.", over_time.helm
-    yield "forces", "Body force: what the law asks for, and what acts, in the body frame.", of_forces.forces
+    yield (
+        "forces",
+        "Force on the body: its norm, as the law asks for it and as it acts, and what acts forward (X), to starboard (Y) "
+        "and down (Z).",
+        of_forces.forces,
+    )
     yield "thrusters", of_forces.thruster_caption(story.scenario), of_forces.thrusters
-    yield "estimates", "Estimated restoring parameters against the truth (dotted).", of_forces.estimates
+    yield (
+        "estimates",
+        "Estimates φ̂ of (12), weight less buoyancy and its levers about the body's axes, against the truth (dotted).",
+        of_forces.estimates,
+    )
     if story.summary["lyapunov"]:
         yield (
             "lyapunov",

@@ -9,6 +9,7 @@ from matplotlib.ticker import MaxNLocator
 
 from cosim.figures_labels import Labels
 from cosim.figures_layout import written
+from cosim.figures_solids import Piece, outlines
 from cosim.signals import Array
 
 _HEADING, _DOWN = np.deg2rad(-62.0), np.deg2rad(22.0)  # in which the viewer looks, and how steeply
@@ -28,17 +29,17 @@ class Box:
     ----------
     view : ndarray, shape (2, 3)
         The directions [NED] that point right and up in the picture.
-    corners : ndarray, shape (8, 3)
-        [m, NED].
+    outline : ndarray, shape (n, 2)
+        Of the box in the picture, closed.
     """
 
     def __init__(self, low: Array, high: Array) -> None:
         self._low, self._high = low, high
         ahead, right = [np.cos(_HEADING), np.sin(_HEADING)], [-np.sin(_HEADING), np.cos(_HEADING)]
         self.view = np.array([[*right, 0.0], [*(np.sin(_DOWN) * np.array(ahead)), -np.cos(_DOWN)]])
-        self.corners = np.array([[(low, high)[i >> k & 1][k] for k in range(3)] for i in range(8)])
-        flat = self.corners @ self.view.T
-        self._least, self._most = flat.min(axis=0), flat.max(axis=0)
+        corners = np.array([[(low, high)[i >> k & 1][k] for k in range(3)] for i in range(8)])
+        self.outline = outlines([Piece(corners)], self.view)[0]
+        self._least, self._most = self.outline.min(axis=0), self.outline.max(axis=0)
         self._scale = 1.0  # inches a metre
 
     def height_for(self, width: float, most: float) -> float:
@@ -62,7 +63,7 @@ class Box:
         self._axis(ax, 0, near, np.array([0.35, -1.0]), "north, NED x [m]")
         self._axis(ax, 1, west, np.array([-0.5, -1.0]), "east, NED y [m]")
         self._axis(ax, 2, west, np.array([-1.0, 0.0]), "depth, NED z [m]")
-        return Labels(ax, scale, self._least, self._most)
+        return Labels(ax, scale, self.outline)
 
     def _ticks(self, axis: int) -> Array:
         shown = np.zeros(3)
@@ -99,15 +100,15 @@ class Box:
             point[axis] = tick
             end = self.view @ point
             ax.plot(*np.column_stack([end, end + 0.04 * aside]), color="#555555", linewidth=0.6)
-            ax.text(
-                *(end + 0.07 * aside), written(tick), fontsize=8, ha=horizontal, va="center" if axis == 2 else "top"
-            )
+            x, y = end + 0.07 * aside
+            ax.text(x, y, written(tick), fontsize=8, ha=horizontal, va="center" if axis == 2 else "top")
         ends = np.array([corner, corner])
         ends[:, axis] = self._low[axis], self._high[axis]
         flat = ends @ self.view.T
         run = flat[1] - flat[0] if axis < 2 else flat[0] - flat[1]
         angle = np.rad2deg(np.arctan2(run[1], run[0]))
+        x, y = flat.mean(axis=0) + 0.42 * aside
         ax.text(
-            *(flat.mean(axis=0) + 0.42 * aside), name, fontsize=8, rotation=angle, rotation_mode="anchor",
+            x, y, name, fontsize=8, rotation=angle, rotation_mode="anchor",
             ha="center", va="center",
         )  # fmt: skip

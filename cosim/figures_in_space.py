@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
-from matplotlib.figure import FigureBase
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, PathPatch
 from matplotlib.path import Path
@@ -25,8 +24,20 @@ from cosim.drawing import (
 )
 from cosim.figures_box import Box
 from cosim.figures_labels import Labels
-from cosim.figures_layout import BOTTOM, LEFT, LEGEND_ROW, RIGHT, TOP, WIDTH, Sheet, legend, legend_rows, plain_numbers
-from cosim.figures_solids import Piece, edges_of, outlines, pieces_of, rim
+from cosim.figures_layout import (
+    BOTTOM,
+    LEFT,
+    LEGEND_ROW,
+    RIGHT,
+    TOP,
+    WIDTH,
+    F,
+    Sheet,
+    legend,
+    legend_rows,
+    plain_numbers,
+)
+from cosim.figures_solids import edges_of, outlines, pieces_of, rim
 from cosim.replay.activity import active_regions
 from cosim.scenario import CRITERIA
 from cosim.signals import Array
@@ -41,7 +52,7 @@ _TARGETS = 12  # that are drawn on the way at the most
 _POSITION = ("position.x", "position.y", "position.z")
 
 
-def path_3d(story: Story, sheet: Sheet) -> FigureBase:
+def path_3d(story: Story, sheet: Sheet[F]) -> F:
     """Draw the path, regions and goal in space, as seen from the south-east and above."""
     low, high = _extent(story)
     wide = np.maximum(high - low, 0.4 * (high - low).max())  # a flat path still gets a box with some depth
@@ -54,7 +65,7 @@ def path_3d(story: Story, sheet: Sheet) -> FigureBase:
     figure = sheet(height + top)
     ax = figure.add_axes((0.1 / WIDTH, 0.0, 1.0 - 0.2 / WIDTH, height / (height + top)))
     labels = box.draw(ax)
-    clip = Path(outlines([Piece(box.corners)], box.view)[0])
+    clip = Path(box.outline)
     few = len(story.scenario.regions) <= _NAMED  # of more, no one could tell which name is whose
     for place in places_of(story):
         seen = _region(ax, place, low, high, box.view, clip)
@@ -72,7 +83,7 @@ def path_3d(story: Story, sheet: Sheet) -> FigureBase:
     return figure
 
 
-def path_plane(story: Story, sheet: Sheet) -> FigureBase:
+def path_plane(story: Story, sheet: Sheet[F]) -> F:
     """Draw the path and the outlines of the regions from the side and from above."""
     low, high = _extent(story)
     side, above, along = high[2] - low[2], high[1] - low[1], high[0] - low[0]
@@ -100,7 +111,7 @@ def path_plane(story: Story, sheet: Sheet) -> FigureBase:
         ax.tick_params(labelbottom=axis == 1, length=3)
         ax.set_ylabel("depth, NED z [m]" if axis == 2 else "east, NED y [m]")
         ax.yaxis.set_label_coords((0.17 - LEFT) / across, 0.5)
-        labels = Labels(ax, scale, view @ low, view @ high)
+        labels = Labels(ax, scale, _frame(view @ low, view @ high))
         for place in places_of(story):
             seen = _region(ax, place, low, high, view)
             if seen and not place.faint:
@@ -118,10 +129,10 @@ def path_plane(story: Story, sheet: Sheet) -> FigureBase:
 
 
 def _region(ax: Axes, place: Place, low: Array, high: Array, view: Array, clip: Path | None = None) -> list[Array]:
-    """Draw the outline of a region as it is seen, as a solid where it is clipped; return that of each piece in sight."""
+    """Draw a region as it is seen, with edges where it is clipped; return the outline of each piece in sight."""
     pieces = pieces_of(place.region.shape, low - place.shift, high - place.shift)
     seen = [outline + view @ place.shift for outline in outlines(pieces, view)]
-    if not seen:
+    if not seen or (clip is None and len(seen) == 1 and _fills(seen[0], view @ low, view @ high)):
         return []
     alpha = _FAINT if place.faint else 1.0
     whole = Path.make_compound_path(*(Path(outline, closed=True) for outline in seen))
@@ -137,6 +148,16 @@ def _region(ax: Axes, place: Place, low: Array, high: Array, view: Array, clip: 
         for artist in drawn:
             artist.set_clip_path(clip, ax.transData)
     return seen
+
+
+def _frame(low: Array, high: Array) -> Array:
+    """Return the corners of a picture, closed."""
+    return np.array([low, [high[0], low[1]], high, [low[0], high[1]], low])
+
+
+def _fills(outline: Array, low: Array, high: Array) -> bool:
+    """Return whether the rectangle of an outline leaves nothing of a picture free: it would tell nothing."""
+    return bool((outline.min(axis=0) <= low + 1e-9).all() and (outline.max(axis=0) >= high - 1e-9).all())
 
 
 def _path(ax: Axes, story: Story, view: Array) -> None:
@@ -168,7 +189,9 @@ def _targets(ax: Axes, story: Story, view: Array) -> None:
                 color=GOAL_COLOUR, alpha=0.6, linewidth=0.9, linestyle="--",
             )  # fmt: skip
         ax.plot(*centre, "D", color=GOAL_COLOUR, alpha=0.6, markersize=3)
-        ax.annotate(str(i + 1), centre, (3, 3), textcoords="offset points", fontsize=7, color=GOAL_COLOUR)
+        ax.annotate(
+            str(i + 1), (centre[0], centre[1]), (3, 3), textcoords="offset points", fontsize=7, color=GOAL_COLOUR
+        )
 
 
 def targets_of(story: Story) -> list[tuple[Array, float]]:
@@ -209,7 +232,8 @@ def _gives_way(story: Story) -> Array:
         )
     )
     active = active_regions(criteria, memberships, weights, clearances).astype(int)
-    return np.array([-1, *map(CRITERIA.index, criteria)])[active]
+    given_way: Array = np.array([-1, *map(CRITERIA.index, criteria)])[active]
+    return given_way
 
 
 def path_of(story: Story) -> Array:

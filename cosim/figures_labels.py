@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.path import Path
 
 from cosim.figures_layout import short
 from cosim.signals import Array
@@ -13,6 +14,7 @@ _MARK = 0.06  # inches, from the middle of a mark to its edge
 _MOST = 0.7  # of the picture; what is larger both ways fills it
 _SIZE = 7
 _COLOUR = "#333333"
+_CORNERS = np.array([[i, j] for i in (-1.0, 1.0) for j in (-1.0, 1.0)])
 
 
 class Labels:
@@ -24,12 +26,12 @@ class Labels:
         With its limits set.
     scale : float
         [inch/m], the same along both axes.
-    low, high : ndarray, shape (2,)
-        Corners of what names may cover [m, in the picture].
+    frame : ndarray, shape (n, 2)
+        Convex outline of what names may cover [m, in the picture].
     """
 
-    def __init__(self, ax: Axes, scale: float, low: Array, high: Array) -> None:
-        self._ax, self._scale, self._low, self._high = ax, scale, low, high
+    def __init__(self, ax: Axes, scale: float, frame: Array) -> None:
+        self._ax, self._scale, self._frame = ax, scale, frame
         self._offered: list[tuple[str, Array, Array]] = []
 
     def offer(self, name: str, outline: Array) -> None:
@@ -38,23 +40,23 @@ class Labels:
         self._offered.append((short(name), outline.min(axis=0) - room, outline.max(axis=0) + room))
 
     def put(self, path: Array) -> None:
-        """Place the names that find room, in the order they were offered, clear of a path of shape (n, 2)."""
-        floor, ceiling = self._low, self._high
+        """Place the names that find room, of small things first, clear of a path of shape (n, 2)."""
+        floor, ceiling, frame = self._frame.min(axis=0), self._frame.max(axis=0), Path(self._frame)
         taken: list[tuple[Array, Array]] = []
-        for name, low, high in self._offered:
+        for name, low, high in sorted(self._offered, key=lambda offered: float(np.prod(offered[2] - offered[1]))):
             size = np.array([_LETTER * len(name), _HIGH]) / self._scale
             low, high = np.maximum(low, floor), np.minimum(high, ceiling)
             wide = bool((high - low > _MOST * (ceiling - floor)).all())
             for middle in _candidates(low, high, size, wide):
                 least, most = middle - size / 2.0, middle + size / 2.0
-                if (least < floor).any() or (most > ceiling).any():
+                if not frame.contains_points(middle + size / 2.0 * _CORNERS).all():
                     continue
                 if any((least < b).all() and (most > a).all() for a, b in taken):
                     continue
                 if ((path > least) & (path < most)).all(axis=1).any():
                     continue
                 taken.append((least, most))
-                self._ax.text(*middle, name, fontsize=_SIZE, color=_COLOUR, ha="center", va="center")
+                self._ax.text(middle[0], middle[1], name, fontsize=_SIZE, color=_COLOUR, ha="center", va="center")
                 break
 
 
@@ -62,9 +64,9 @@ def _candidates(low: Array, high: Array, size: Array, wide: bool) -> list[Array]
     """Return middles for a name, best first: within, then beside; of what fills the picture, in its corners alone."""
     middle, half = (low + high) / 2.0, size / 2.0
     inner, outer = (high - low) / 2.0 - 1.1 * half, (high - low) / 2.0 + 1.2 * half
-    corners = [middle + inner * [i, j] for i in (1, -1) for j in (1, -1)]
+    corners = list(middle + inner * _CORNERS[::-1])
     if wide:
-        return corners
+        return [*corners, *(middle + 0.6 * (corner - middle) for corner in corners)]
     beside = [middle + outer * side for side in ([0, 1], [0, -1], [1, 0], [-1, 0])]
     if (inner < 0.0).any():
         return beside

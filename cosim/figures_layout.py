@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure, FigureBase
+from matplotlib.figure import Figure, SubFigure
 from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, MaxNLocator, NullLocator
 
 from cosim.drawing import STYLE
@@ -25,7 +25,8 @@ _LETTERS, _MARK = 104, 7  # letters across a figure in a legend's size, that a l
 # names come from users: their $ and _ are no mathematics
 FIGURE_STYLE: Any = STYLE | {"text.parse_math": False, "xtick.labelsize": 8, "ytick.labelsize": 8}
 
-Sheet = Callable[[float], FigureBase]  # a place for a figure of so many inches height, `WIDTH` wide
+F = TypeVar("F", bound=Figure | SubFigure)
+Sheet = Callable[[float], F]  # gives a place for a figure of so many inches height, `WIDTH` wide
 
 _SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
@@ -36,13 +37,13 @@ def own_sheet(height: float) -> Figure:
 
 
 def panels(
-    sheet: Sheet,
+    sheet: Sheet[F],
     heights: Sequence[float],
     widths: Sequence[float] = (1.0,),
     labels: Sequence[str] = (),
     titles: float = 0.0,
     sharey: bool = True,
-) -> tuple[FigureBase, Any]:
+) -> tuple[F, Any]:
     """Return a figure and its axes, those of a column on one x axis.
 
     Parameters
@@ -161,17 +162,21 @@ def short(name: str) -> str:
     return name if len(name) <= _LONGEST else name[: _LONGEST - 1].rstrip() + "…"
 
 
-def _rows_of(labels: Sequence[str]) -> list[list[str]]:
-    """Return labels in rows that fit across a figure."""
+def _rows_of(labels: Sequence[str], across: float = _LETTERS) -> list[list[str]]:
+    """Return labels in rows that fit across a figure, about as long as each other."""
     rows: list[list[str]] = []
-    room = 0
+    room = 0.0
     for label in labels:
         letters = len(short(label)) + _MARK
         if letters > room:
             rows.append([])
-            room = _LETTERS
+            room = across
         rows[-1].append(label)
         room -= letters
+    even = 1.1 * sum(len(short(label)) + _MARK for label in labels) / max(1, len(rows))
+    if len(rows) > 1 and even < across:
+        evened = _rows_of(labels, even)
+        return evened if len(evened) == len(rows) else rows
     return rows
 
 
@@ -180,9 +185,9 @@ def legend_rows(labels: Sequence[str]) -> int:
     return len(_rows_of(labels))
 
 
-def legend(figure: FigureBase, entries: Mapping[str, Artist]) -> None:
+def legend(figure: F, entries: Mapping[str, Artist]) -> None:
     """Put a legend above all axes, with names as they are: Matplotlib would leave out those that begin with _."""
-    height = figure.bbox.height / figure.figure.dpi
+    height = figure.bbox.height / figure.dpi
     for i, row in enumerate(_rows_of(list(entries))):
         made = figure.legend(
             [entries[label] for label in row], ["x"] * len(row), ncols=len(row), loc="upper center", fontsize=8,

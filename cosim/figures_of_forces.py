@@ -4,27 +4,25 @@ from __future__ import annotations
 
 import numpy as np
 from matplotlib.artist import Artist
-from matplotlib.figure import FigureBase
 
 from cosim.drawing import BLACK, BLUE, CYCLE, GREEN, RED, Story
-from cosim.figures_layout import Sheet, legend, limits_of, log_axis, symlog_axis
+from cosim.figures_layout import F, Sheet, legend, limits_of, log_axis, symlog_axis
 from cosim.figures_over_time import DASHES, curve, over_time
 from cosim.scenario import Scenario
 from cosim.signals import Array
 
 _FLOOR = 1e-2  # N; less is drawn as that on a logarithmic axis
-_COMPONENTS = dict(zip("XYZ", ("forward", "starboard", "down"), strict=True))
 _ESTIMATES = ("W − B", "x_G W − x_B B", "y_G W − y_B B", "z_G W − z_B B")
 
 
-def forces(story: Story, sheet: Sheet) -> FigureBase:
+def forces(story: Story, sheet: Sheet[F]) -> F:
     """Draw the norm of the body force on a logarithmic axis, and its components."""
     acting = story.record.stack([f"actuation.{a}" for a in "XYZ"])
     norms = {
         "acting": np.linalg.norm(acting, axis=1),
         "asked for": np.linalg.norm(story.record.stack([f"command.{a}" for a in "XYZ"]), axis=1),
     }
-    names = [f"{axis} {where}, acting" for axis, where in _COMPONENTS.items()]
+    names = [f"{axis}, acting" for axis in "XYZ"]
     labels = [f"norm, {which}" for which in norms] + names
     figure, (norm, parts) = over_time(story, sheet, [1.7, 1.7], labels)
     entries: dict[str, Artist] = {}
@@ -55,7 +53,7 @@ def thruster_caption(scenario: Scenario) -> str:
     )
 
 
-def thrusters(story: Story, sheet: Sheet) -> FigureBase:
+def thrusters(story: Story, sheet: Sheet[F]) -> F:
     """Draw the force of each thruster, or what it would have to give."""
     vehicle = story.scenario.vehicle
     if story.scenario.actuation.through == "thrusters":
@@ -83,10 +81,10 @@ def thrusters(story: Story, sheet: Sheet) -> FigureBase:
     return figure
 
 
-def estimates(story: Story, sheet: Sheet) -> FigureBase:
+def estimates(story: Story, sheet: Sheet[F]) -> F:
     """Draw the estimates against the truth."""
     truth = story.scenario.true_restoring_parameters
-    labels = [f"φ̂{i + 1} of {name}" for i, name in enumerate(_ESTIMATES)]
+    labels = list(_ESTIMATES)
     figure, (force, moment) = over_time(story, sheet, [1.6, 1.6], [*labels, "truth"])
     entries: dict[str, Artist] = {}
     shown: dict[bool, list[Array]] = {True: [], False: []}

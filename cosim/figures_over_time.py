@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
-from matplotlib.figure import FigureBase
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
@@ -27,7 +26,7 @@ from cosim.drawing import (
     shifts_of,
     thin,
 )
-from cosim.figures_layout import Sheet, legend, limits_of, panels, symlog_axis
+from cosim.figures_layout import F, Sheet, legend, limits_of, panels, symlog_axis
 from cosim.helm.orders import MODES
 from cosim.scenario import CRITERIA
 from cosim.signals import Array
@@ -47,7 +46,7 @@ def zooms(story: Story) -> bool:
     return bool(windows) and 0.0 < _WIDER * windows[0][1] <= 0.4 * story.summary["simulated_time"]
 
 
-def _zoomed(story: Story, sheet: Sheet, heights: Sequence[float], labels: Sequence[str]) -> tuple[FigureBase, Any]:
+def _zoomed(story: Story, sheet: Sheet[F], heights: Sequence[float], labels: Sequence[str]) -> tuple[F, Any]:
     """Return axes for the whole run, shape (rows, 1), or (rows, 2) with the time of the overlap on the left."""
     if not zooms(story):
         figure, axes = over_time(story, sheet, heights, labels)
@@ -64,7 +63,7 @@ def _zoomed(story: Story, sheet: Sheet, heights: Sequence[float], labels: Sequen
     return figure, axes
 
 
-def over_time(story: Story, sheet: Sheet, heights: Sequence[float], labels: Sequence[str]) -> tuple[FigureBase, Any]:
+def over_time(story: Story, sheet: Sheet[F], heights: Sequence[float], labels: Sequence[str]) -> tuple[F, Any]:
     """Return axes over the whole run, shape (rows,)."""
     figure, axes = panels(sheet, heights, labels=labels)
     axes[0, 0].set_xlim(0.0, story.summary["simulated_time"] or story.scenario.time.step)
@@ -77,15 +76,15 @@ def curve(axes: Any, story: Story, signal: Array, **style: Any) -> Line2D:
     time = story.record["time"]
     for ax in np.atleast_1d(axes):
         seen = slice(0, int(np.searchsorted(time, ax.get_xlim()[1], side="right")) + 1)
-        (line,) = ax.plot(*thin(time[seen], signal[seen]), **style)
-    return line
+        lines: list[Line2D] = ax.plot(*thin(time[seen], signal[seen]), **style)
+    return lines[0]
 
 
 def _zero_line(ax: Axes) -> None:
     ax.axhline(0.0, color=BLACK, linewidth=0.8)
 
 
-def position_error(story: Story, sheet: Sheet) -> FigureBase:
+def position_error(story: Story, sheet: Sheet[F]) -> F:
     """Draw the RMS error to the goal's centre, or the distance to the goal where it has none."""
     bounds = np.array(story.scenario.goal.bounds())
     if np.isfinite(bounds).all():
@@ -106,7 +105,7 @@ def position_error(story: Story, sheet: Sheet) -> FigureBase:
     return figure
 
 
-def attitude(story: Story, sheet: Sheet) -> FigureBase:
+def attitude(story: Story, sheet: Sheet[F]) -> F:
     """Draw roll, pitch and yaw."""
     angles = {name: np.rad2deg(story.record[f"attitude.{name}"]) for name in ("roll", "pitch", "yaw")}
     figure, (ax,) = over_time(story, sheet, [2.0], list(angles))
@@ -117,7 +116,7 @@ def attitude(story: Story, sheet: Sheet) -> FigureBase:
     return figure
 
 
-def weights_overlap(story: Story, sheet: Sheet) -> FigureBase:
+def weights_overlap(story: Story, sheet: Sheet[F]) -> F:
     """Draw the weights around each window in which the regions overlap, at most the first three."""
     windows = story.summary["intersection_windows"][:3]
     labels = [f"α{i + 1} {name}" for i, name in enumerate(CRITERIA)]
@@ -141,7 +140,7 @@ def weights_overlap(story: Story, sheet: Sheet) -> FigureBase:
     return figure
 
 
-def weights(story: Story, sheet: Sheet) -> FigureBase:
+def weights(story: Story, sheet: Sheet[F]) -> F:
     """Draw memberships and weights of each criterion."""
     labels = ["weight, in its criterion's colour", "membership"]
     figure, axes = _zoomed(story, sheet, [0.95] * len(CRITERIA), labels)
@@ -156,7 +155,7 @@ def weights(story: Story, sheet: Sheet) -> FigureBase:
     return figure
 
 
-def clearance(story: Story, sheet: Sheet) -> FigureBase:
+def clearance(story: Story, sheet: Sheet[F]) -> F:
     """Draw the clearance to each region and to the goal: distances, and angles below them where there are any."""
     regions = list(regions_of(story.scenario))
     of_places = [of for of in regions if not of_attitude(of[0].shape)]
@@ -199,7 +198,7 @@ def _named(story: Story, names: list[str]) -> set[str]:
     return {names[0], *sorted(names[1:], key=lambda name: np.nan_to_num(least[name], nan=np.inf))[:_NEAREST]}
 
 
-def helm(story: Story, sheet: Sheet) -> FigureBase:
+def helm(story: Story, sheet: Sheet[F]) -> F:
     """Draw who steers, and whether the thrusters may work."""
     figure, (ax,) = over_time(story, sheet, [1.3], [])
     time, mode = story.record["time"], story.record["helm.mode"]
@@ -216,7 +215,7 @@ def helm(story: Story, sheet: Sheet) -> FigureBase:
     return figure
 
 
-def lyapunov(story: Story, sheet: Sheet) -> FigureBase:
+def lyapunov(story: Story, sheet: Sheet[F]) -> F:
     """Draw V in its three forms, and its rate."""
     forms = {form: story.record[f"lyapunov.{form}"] for form in ("printed", "normalised", "primary")}
     labels = ("V as printed", "V, potential of the force", "V, primary region alone")
