@@ -96,14 +96,14 @@ def _figures(story: Story) -> Iterator[tuple[str, str, _Draw]]:
         yield "helm", "Who steered, as it was ordered; grey where disarmed.", over_time.helm
     yield (
         "forces",
-        "Force on the body: its norm, as the law asks for it and as it acts, and what acts forward (X), to starboard (Y) "
-        "and down (Z).",
+        "Force on the body: its norm, as the law asks for it and as it acts; and what acts forward (X), to starboard "
+        "(Y) and down (Z).",
         of_forces.forces,
     )
     yield "thrusters", of_forces.thruster_caption(story.scenario), of_forces.thrusters
     yield (
         "estimates",
-        "Estimates φ̂ of (12), weight less buoyancy and its levers about the body's axes, against the truth (dotted).",
+        "Estimates of φ in (12), weight less buoyancy and its levers along the body axes, against the truth (dotted).",
         of_forces.estimates,
     )
     if story.summary["lyapunov"]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import dataclass
 
 import numpy as np
@@ -37,7 +38,7 @@ class Contents:
     regions: Table | None
     numbers: tuple[Table, ...]
     setting: Table
-    scenario: str  # the file
+    scenario: str  # the file, with what stands in lists of numbers in one line
     repeat: tuple[str, ...]  # commands
     repeats: str  # what they do
     files: tuple[tuple[str, str], ...]  # in the run folder, and what each is
@@ -66,10 +67,19 @@ def contents_of(run: FlownRun) -> Contents:
         regions=_regions(run),
         numbers=tuple(table for table in (_goal(run), _effort(run), _estimates(run), _lyapunov(run)) if table),
         setting=_setting(run),
-        scenario=run.scenario.toml(),
+        scenario=_compact(run.scenario.toml()),
         repeat=commands,
         repeats=repeats,
         files=_files(run),
+    )
+
+
+def _compact(toml: str) -> str:
+    """Return a file of TOML with lists of numbers, or of names without brackets, in one line each."""
+    return re.sub(
+        r"\[\n((?:\s+[^\[\]{}\n]+,\n)+)\s*\]",
+        lambda found: "[" + " ".join(line.strip() for line in found[1].splitlines()).rstrip(",") + "]",
+        toml,
     )
 
 
@@ -104,7 +114,7 @@ def _regions(run: FlownRun) -> Table | None:
         if math.isfinite(least):
             when = f"{time[np.argmin(np.where(np.isnan(signal), np.inf, signal))]:.2f}"
         degrees = run.summary["clearance_unit"][region.name] == "rad"
-        shown = f"{number(math.degrees(least), 3)}°" if degrees else f"{number(least, 3)} m"
+        shown = f"{number(math.degrees(least), 4)}°" if degrees else f"{number(least, 4)} m"
         violated = sum(end - start for start, end in spans(signal < 0.0, time))
         rows.append(
             (
@@ -206,8 +216,8 @@ def _setting(run: FlownRun) -> Table:
         ("law, and what it acts through", f"{s.law.name}; {through}"),
         ("arbiter", f"{s.arbiter.engine}; memberships fall to 0 over {s.arbiter.ramp:g} m (rad for attitude)"),
         ("planned for [s], in steps of [s]", f"{s.time.duration:g}, {s.time.step:g}"),
-        ("start: north, east, down [m]", ", ".join(f"{x:g}" for x in s.initial.position)),
-        ("current: north, east, down [m/s]", ", ".join(f"{x:g}" for x in s.plant.current)),
+        ("start: north, east, down [m]", ", ".join(number(x, 6) for x in s.initial.position)),
+        ("current: north, east, down [m/s]", ", ".join(number(x, 6) for x in s.plant.current)),
         ("what the law is told", "the true state" if s.sensing.exact else "what sensors measure"),
     ]
     if math.isfinite(s.limit.force) or s.limit.time_constant > 0.0:

@@ -75,8 +75,6 @@ def _table(table: Table, name: str) -> str:
 
 def _figure(index: int, name: str, caption: str, svg: str) -> str:
     inline = svg[svg.index("<svg") :].replace("<svg ", f'<svg role="img" aria-label="Figure {index}: {name}" ', 1)
-    # Matplotlib calls the same things the same in every figure
-    return (
-        f'<figure id="{name}"><div>{inline}</div><figcaption><b>Figure {index}.</b> {html.escape(caption)} '
-        f'(<a href="figures/{name}.svg">SVG</a>)</figcaption></figure>'
-    )
+    words = f"<b>Figure {index}.</b> {html.escape(caption)}"
+    link = f'<a href="figures/{name}.svg">SVG</a>'
+    return f'<figure id="{name}"><div tabindex="0">{inline}</div><figcaption>{words} ({link})</figcaption></figure>'

@@ -55,7 +55,6 @@ def pages_of(run: FlownRun, contents: Contents, about: str) -> list[Figure]:
             document.text(remark, 9.5, BOLD, after=6.0)
         if contents.claims:
             document.table(contents.claims)
-        document.heading("Figures", room=3.0)
         draw_all(Story(run.scenario, run.record, run.summary), document.sheet_for)
         for table in (contents.regions, *contents.numbers, contents.setting):
             if table:
@@ -64,7 +63,7 @@ def pages_of(run: FlownRun, contents: Contents, about: str) -> list[Figure]:
         document.lines(contents.repeat)
         document.headed("Frames", _FRAMES)
         document.heading("The scenario's file")
-        document.lines(contents.scenario.splitlines())
+        document.columns(contents.scenario.splitlines())
         return document.numbered(contents.title)
 
 
@@ -139,6 +138,22 @@ class _Document:
         for line in lines:
             self.text(line, 7.5, MONO)
         self._y += 6.0 * _POINT
+
+    def columns(self, lines: Sequence[str]) -> None:
+        """Set lines in letters of one width, in two columns a page."""
+        size, wide = 7.0, WIDTH / 2.0 - 0.1
+        broken = [part for line in lines for part in wrapped(line, wide, size, MONO)]
+        leading = 1.3 * size * _POINT
+        while broken:
+            fit = max(1, int((_END - self._y) / leading))
+            deep = min(fit, -(-len(broken) // 2))
+            for i, part in enumerate(broken[: 2 * deep]):
+                x = _LEFT + (i // deep) * WIDTH / 2.0
+                self._put(x, self._y + (i % deep + 1) * leading, part, size, MONO, "black")
+            self._y += deep * leading
+            broken = broken[2 * deep :]
+            if broken:
+                self._turn()
 
     def table(self, table: Table) -> None:
         """Set a table under its title; its head stands again on every page."""
