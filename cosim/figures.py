@@ -62,17 +62,18 @@ def _figures(story: Story) -> Iterator[tuple[str, str, _Draw]]:
     if in_space.targets_of(story):
         moved += " Diamonds: the targets before the last one, numbered as they were ordered."
     way = "; the path is in a criterion's colour while the arbiter gives way to a region of it"
-    yield (
-        "path-3d",
-        f"Path in space (after Fig. 5a), seen from the south-east{way}. Grey: its shadow on the deepest plane.",
-        in_space.path_3d,
-    )
-    yield (
-        "path-plane",
-        f"Path from the side and from above (after Fig. 5b), with outlines of the regions: full to be kept out of, "
-        f"dashed to be kept within{way}.{moved}",
-        in_space.path_plane,
-    )
+    if in_space.is_known(story):
+        yield (
+            "path-3d",
+            f"Path in space (after Fig. 5a), seen from the south-east{way}. Grey: its shadow on the deepest plane.",
+            in_space.path_3d,
+        )
+        yield (
+            "path-plane",
+            f"Path from the side and from above (after Fig. 5b), with outlines of the regions: full to be kept out of, "
+            f"dashed to be kept within{way}.{moved}",
+            in_space.path_plane,
+        )
     yield (
         "position-error",
         "Position error: distance from the middle of the goal over √3 (after Fig. 6; the quantity is assumed).",

@@ -52,6 +52,11 @@ _TARGETS = 12  # that are drawn on the way at the most
 _POSITION = ("position.x", "position.y", "position.z")
 
 
+def is_known(story: Story) -> bool:
+    """Return whether the record has any place of the vehicle that is a number."""
+    return bool(np.isfinite(story.record.stack(_POSITION)).all(axis=1).any())
+
+
 def path_3d(story: Story, sheet: Sheet[F]) -> F:
     """Draw the path, regions and goal in space, as seen from the south-east and above."""
     low, high = _extent(story)

@@ -101,15 +101,16 @@ def written(value: float, _: object = None) -> str:
     return f"{value:.6g}".replace("-", "−") if value else "0"
 
 
-def log_axis(ax: Axes) -> None:
-    """Make the y axis logarithmic, with powers of ten written as such."""
+def log_axis(ax: Axes, signals: Sequence[Array]) -> None:
+    """Make the y axis logarithmic, with powers of ten written as such, to show all of some signals above 0."""
     ax.set_yscale("log")
     ax.yaxis.set_major_locator(LogLocator(numticks=6))
     ax.yaxis.set_minor_locator(NullLocator())
     ax.yaxis.set_major_formatter(FuncFormatter(_power))
-    low, high = np.log10(ax.get_ylim())
+    low, high = limits_of([np.log10(signal) for signal in signals])
     if np.floor(high) - np.ceil(low) < 1.0:  # else hardly a power of ten would be in sight
-        ax.set_ylim(10.0 ** np.floor(low), 10.0 ** max(np.ceil(high), np.floor(low) + 1.0))
+        low, high = np.floor(low), max(np.ceil(high), np.floor(low) + 1.0)
+    ax.set_ylim(10.0**low, 10.0**high)
 
 
 def symlog_axis(ax: Axes, largest: float, linear: float) -> None:

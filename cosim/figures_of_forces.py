@@ -19,16 +19,16 @@ def forces(story: Story, sheet: Sheet[F]) -> F:
     """Draw the norm of the body force on a logarithmic axis, and its components."""
     acting = story.record.stack([f"actuation.{a}" for a in "XYZ"])
     norms = {
-        "acting": np.linalg.norm(acting, axis=1),
-        "asked for": np.linalg.norm(story.record.stack([f"command.{a}" for a in "XYZ"]), axis=1),
+        "acting": np.maximum(np.linalg.norm(acting, axis=1), _FLOOR),
+        "asked for": np.maximum(np.linalg.norm(story.record.stack([f"command.{a}" for a in "XYZ"]), axis=1), _FLOOR),
     }
     names = [f"{axis}, acting" for axis in "XYZ"]
     labels = [f"norm, {which}" for which in norms] + names
     figure, (norm, parts) = over_time(story, sheet, [1.7, 1.7], labels)
     entries: dict[str, Artist] = {}
     for label, force, colour, dashes in zip(labels, norms.values(), (BLACK, RED), DASHES, strict=False):
-        entries[label] = curve(norm, story, np.maximum(force, _FLOOR), color=colour, linestyle=dashes)
-    log_axis(norm)
+        entries[label] = curve(norm, story, force, color=colour, linestyle=dashes)
+    log_axis(norm, list(norms.values()))
     norm.set_ylabel("force, norm [N]")
     for i, (name, colour, dashes) in enumerate(zip(names, (BLUE, RED, GREEN), DASHES, strict=False)):
         entries[name] = curve(parts, story, acting[:, i], color=colour, linestyle=dashes)

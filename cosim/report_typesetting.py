@@ -4,8 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cache
+from typing import TYPE_CHECKING
 
 from matplotlib.font_manager import FontProperties, findfont, get_font
+from matplotlib.ft2font import FT2Font
+
+if TYPE_CHECKING:
+    from matplotlib.ft2font import GlyphIndexType
 
 _LARGE = 1000.0  # pt, at which letters are measured: hinting, which rounds to points, hardly counts
 
@@ -18,11 +23,12 @@ class Face:
     weight: str = "normal"
 
 
+_UNKNOWN = "\ufffd"
 PLAIN, BOLD, MONO = Face("DejaVu Serif"), Face("DejaVu Serif", "bold"), Face("DejaVu Sans Mono")
 
 
 def wrapped(text: str, width: float, size: float, face: Face) -> list[str]:
-    """Return a text in lines.
+    """Return a text in lines, with a sign for every letter that the font lacks.
 
     Parameters
     ----------
@@ -40,6 +46,7 @@ def wrapped(text: str, width: float, size: float, face: Face) -> list[str]:
     list of str
         At least one. Words that are wider than a line are broken.
     """
+    text = "".join(letter if _index(letter, face) else _UNKNOWN for letter in text)
     indent = text[: len(text) - len(text.lstrip())]
     lines, line = [], indent
     for word in text.split():
@@ -64,6 +71,15 @@ def _width(text: str, size: float, face: Face) -> float:
 @cache
 def _letter(letter: str, face: Face) -> float:
     """Return how wide a letter is, in sizes of the font."""
-    font = get_font(findfont(FontProperties(family=face.family, weight=face.weight)))
+    font = _font(face)
     font.set_size(_LARGE, 72.0)
-    return float(font.load_glyph(font.get_char_index(ord(letter))).linearHoriAdvance) / 65536.0 / _LARGE
+    return float(font.load_glyph(_index(letter, face)).linearHoriAdvance) / 65536.0 / _LARGE
+
+
+@cache
+def _index(letter: str, face: Face) -> GlyphIndexType:
+    return _font(face).get_char_index(ord(letter))
+
+
+def _font(face: Face) -> FT2Font:
+    return get_font(findfont(FontProperties(family=face.family, weight=face.weight)))
