@@ -11,7 +11,6 @@ import logging
 import os
 import sys
 from collections.abc import Sequence
-from pathlib import Path
 
 from cosim.command_line import campaigns, mavlink, package, replay, report, run, sitl, sweep
 from cosim.command_line.campaigns import INTERRUPTED
@@ -48,8 +47,7 @@ def _parser() -> argparse.ArgumentParser:
 
     run.add_verb(verbs)
 
-    report = verbs.add_parser("report", help="write summary, report and replay of a run again, or of a killed one")
-    report.add_argument("folder", type=Path, metavar="DIR", help="the run folder")
+    report.add_verb(verbs)
 
     replay.add_verb(verbs)
 

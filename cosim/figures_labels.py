@@ -32,24 +32,25 @@ class Labels:
 
     def __init__(self, ax: Axes, scale: float, frame: Array) -> None:
         self._ax, self._scale, self._frame = ax, scale, frame
-        self._offered: list[tuple[str, Array, Array]] = []
+        self._offered: list[tuple[str, Array, Array, Path]] = []
 
     def offer(self, name: str, outline: Array) -> None:
         """Ask for a name at what has an outline, or is a mark at a point; shape (n, 2) [m, in the picture]."""
         room = _MARK / self._scale if len(outline) == 1 else 0.0
-        self._offered.append((short(name), outline.min(axis=0) - room, outline.max(axis=0) + room))
+        self._offered.append((short(name), outline.min(axis=0) - room, outline.max(axis=0) + room, Path(outline)))
 
     def put(self, path: Array) -> None:
         """Place the names that find room, of small things first, clear of a path of shape (n, 2)."""
         floor, ceiling, frame = self._frame.min(axis=0), self._frame.max(axis=0), Path(self._frame)
         taken: list[tuple[Array, Array]] = []
-        for name, low, high in sorted(self._offered, key=lambda offered: float(np.prod(offered[2] - offered[1]))):
+        for name, low, high, outline in sorted(self._offered, key=lambda of: float(np.prod(of[2] - of[1]))):
             size = np.array([_LETTER * len(name), _HIGH]) / self._scale
             low, high = np.maximum(low, floor), np.minimum(high, ceiling)
             wide = bool((high - low > _MOST * (ceiling - floor)).all())
             for middle in _candidates(low, high, size, wide):
                 least, most = middle - size / 2.0, middle + size / 2.0
-                if not frame.contains_points(middle + size / 2.0 * _CORNERS).all():
+                corners = middle + size / 2.0 * _CORNERS
+                if not frame.contains_points(corners).all() or (wide and not outline.contains_points(corners).all()):
                     continue
                 if any((least < b).all() and (most > a).all() for a, b in taken):
                     continue

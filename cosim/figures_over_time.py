@@ -74,9 +74,10 @@ def over_time(story: Story, sheet: Sheet[F], heights: Sequence[float], labels: S
 def curve(axes: Any, story: Story, signal: Array, **style: Any) -> Line2D:
     """Draw a signal into one axes, or into several that show different spans of time; return a line of it."""
     time = story.record["time"]
+    marker = "o" if len(time) == 1 else ""
     for ax in np.atleast_1d(axes):
         seen = slice(0, int(np.searchsorted(time, ax.get_xlim()[1], side="right")) + 1)
-        lines: list[Line2D] = ax.plot(*thin(time[seen], signal[seen]), **style)
+        lines: list[Line2D] = ax.plot(*thin(time[seen], signal[seen]), marker=marker, markersize=4, **style)
     return lines[0]
 
 

@@ -55,6 +55,7 @@ def pages_of(run: FlownRun, contents: Contents, about: str) -> list[Figure]:
             document.text(remark, 9.5, BOLD, after=6.0)
         if contents.claims:
             document.table(contents.claims)
+        document.space(12.0)
         draw_all(Story(run.scenario, run.record, run.summary), document.sheet_for)
         for table in (contents.regions, *contents.numbers, contents.setting):
             if table:
@@ -120,12 +121,16 @@ class _Document:
             self._need(_LEADING * size * _POINT)
             self._y += _LEADING * size * _POINT
             self._put(_LEFT, self._y, line, size, face, colour)
-        self._y += after * _POINT
+        self.space(after)
+
+    def space(self, points: float) -> None:
+        """Leave some room."""
+        self._y += points * _POINT
 
     def heading(self, title: str, room: float = 0.8) -> None:
         """Set a heading that stays with `room` inches of what follows."""
         self._need(room)
-        self._y += 10.0 * _POINT if self._y > _TOP else 0.0
+        self.space(10.0 if self._y > _TOP else 0.0)
         self.text(title, 12.0, BOLD, after=3.0)
 
     def headed(self, title: str, text: str) -> None:
@@ -137,7 +142,7 @@ class _Document:
         """Set lines as they are, in letters of one width."""
         for line in lines:
             self.text(line, 7.5, MONO)
-        self._y += 6.0 * _POINT
+        self.space(6.0)
 
     def columns(self, lines: Sequence[str]) -> None:
         """Set lines in letters of one width, in two columns a page."""
@@ -168,7 +173,7 @@ class _Document:
                 if table.head:
                     self._row(table.head, widths, size, BOLD, 0.9)
             self._row(row, widths, size, PLAIN, 0.3)
-        self._y += 4.0 * _POINT
+        self.space(4.0)
 
     @staticmethod
     def _height(row: Sequence[str], widths: Sequence[float], size: float, face: Face) -> float:
@@ -209,7 +214,7 @@ class _Document:
             for line in below:
                 self._y += _LEADING * 9.0 * _POINT
                 self._put(_LEFT, self._y, line, 9.0, PLAIN, _SOFT)
-            self._y += 16.0 * _POINT
+            self.space(16.0)
             return figure
 
         return sheet
