@@ -12,6 +12,7 @@ from cosim import figures_of_forces as of_forces
 from cosim import figures_over_time as over_time
 from cosim.drawing import Drawing, Story
 from cosim.figures_layout import FIGURE_STYLE, F, Sheet, own_sheet
+from cosim.figures_way import is_known, targets_of
 
 
 def drawings(story: Story) -> Iterator[Drawing]:
@@ -59,10 +60,10 @@ def _figures(story: Story) -> Iterator[tuple[str, str, _Draw]]:
             " What moved is faint where it began and ended; regions are full where they were when the vehicle had "
             "least clearance to them."
         )
-    if in_space.targets_of(story):
+    if targets_of(story):
         moved += " Diamonds: the targets before the last one, numbered as they were ordered."
     way = "; the path is in a criterion's colour while the arbiter gives way to a region of it"
-    if in_space.is_known(story):
+    if is_known(story):
         yield (
             "path-3d",
             f"Path in space (after Fig. 5a), seen from the south-east{way}. Grey: its shadow on the deepest plane.",

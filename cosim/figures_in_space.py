@@ -8,18 +8,15 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, PathPatch
 from matplotlib.path import Path
-from numpy.typing import NDArray
 
 from cosim.drawing import (
     BLACK,
     CRITERION_COLOURS,
     GOAL_COLOUR,
     PATH_COLOUR,
-    POINTS,
     Place,
     Story,
     features_of,
-    overlap_of,
     places_of,
 )
 from cosim.figures_box import Box
@@ -38,7 +35,7 @@ from cosim.figures_layout import (
     plain_numbers,
 )
 from cosim.figures_solids import edges_of, outlines, pieces_of, rim
-from cosim.replay.activity import active_regions
+from cosim.figures_way import Way, way_of
 from cosim.scenario import CRITERIA
 from cosim.signals import Array
 
@@ -48,22 +45,16 @@ _TALLEST = 7.6  # inches, of both planes together
 _FAINT = 0.35  # opacity of a region where it began or ended
 _GAP = 0.34  # inches between the planes
 _NAMED = 8  # regions whose names stand in the picture in space
-_TARGETS = 12  # that are drawn on the way at the most
-_POSITION = ("position.x", "position.y", "position.z")
-
-
-def is_known(story: Story) -> bool:
-    """Return whether the record has any place of the vehicle that is a number."""
-    return bool(np.isfinite(story.record.stack(_POSITION)).all(axis=1).any())
 
 
 def path_3d(story: Story, sheet: Sheet[F]) -> F:
     """Draw the path, regions and goal in space, as seen from the south-east and above."""
-    low, high = _extent(story)
+    way = way_of(story)
+    low, high = _extent(story, way)
     wide = np.maximum(high - low, 0.4 * (high - low).max())  # a flat path still gets a box with some depth
     middle = (low + high) / 2.0
     low, high = middle - wide / 2.0, middle + wide / 2.0
-    entries = _entries(story)
+    entries = _entries(story, way)
     top = TOP + LEGEND_ROW * legend_rows(list(entries))
     box = Box(low, high)
     height = box.height_for(WIDTH - 0.2, 4.4)
@@ -79,20 +70,20 @@ def path_3d(story: Story, sheet: Sheet[F]) -> F:
     for name, colour, feature in features_of(story):
         ax.plot(*(box.view @ feature), "*", color=colour, markersize=9)
         labels.offer(name, (box.view @ feature)[None])
-    floor = path_of(story)
-    floor[:, 2] = high[2]
+    floor = np.column_stack([way.points[:, :2], np.full(len(way.points), high[2])])
     ax.plot(*(floor @ box.view.T).T, color=BLACK, linewidth=0.8, alpha=0.25)
-    _path(ax, story, box.view)
-    labels.put(path_of(story) @ box.view.T)
+    _path(ax, way, box.view)
+    labels.put(way.points @ box.view.T)
     legend(figure, entries)
     return figure
 
 
 def path_plane(story: Story, sheet: Sheet[F]) -> F:
     """Draw the path and the outlines of the regions from the side and from above."""
-    low, high = _extent(story)
+    way = way_of(story)
+    low, high = _extent(story, way)
     side, above, along = high[2] - low[2], high[1] - low[1], high[0] - low[0]
-    entries = _entries(story)
+    entries = _entries(story, way)
     top = TOP + LEGEND_ROW * legend_rows(list(entries)) + 0.16
     across = WIDTH - LEFT - RIGHT
     scale = min(across / along, _TALLEST / (side + above))  # inches a metre
@@ -124,9 +115,9 @@ def path_plane(story: Story, sheet: Sheet[F]) -> F:
         for name, colour, feature in features_of(story):
             ax.plot(*(view @ feature), "*", color=colour, markersize=9)
             labels.offer(name, (view @ feature)[None])
-        _targets(ax, story, view)
-        _path(ax, story, view)
-        labels.put(path_of(story) @ view.T)
+        _targets(ax, way, view)
+        _path(ax, way, view)
+        labels.put(way.points @ view.T)
     ax.set_xlabel("north, NED x [m]")
     ax.xaxis.set_label_coords(0.5, (0.17 - BOTTOM) / (scale * (high - low)[1]))
     legend(figure, entries)
@@ -165,27 +156,24 @@ def _fills(outline: Array, low: Array, high: Array) -> bool:
     return bool((outline.min(axis=0) <= low + 1e-9).all() and (outline.max(axis=0) >= high - 1e-9).all())
 
 
-def _path(ax: Axes, story: Story, view: Array) -> None:
+def _path(ax: Axes, way: Way, view: Array) -> None:
     """Draw where the vehicle went, in the colour of a criterion while the arbiter gives way to a region of it."""
-    path, criteria = path_of(story), _gives_way(story)
-    flat = path @ view.T
+    flat = way.points @ view.T
     ax.plot(*flat.T, color=PATH_COLOUR, linewidth=1.6)
     for i, name in enumerate(CRITERIA):
-        there = criteria == i
+        there = way.given_way == i
         if there.any():
             there[:-1] |= there[1:]  # up to where the next piece begins
             ax.plot(*np.where(there[:, None], flat, np.nan).T, color=CRITERION_COLOURS[name], linewidth=2.4)
-    overlap = overlap_of(story)
-    if overlap.any():
-        inside = story.record.stack(_POSITION)[overlap]
-        ax.plot(*(_thinned(inside)[0] @ view.T).T, color=BLACK, linewidth=3)
+    if way.overlap.any():
+        ax.plot(*np.where(way.overlap[:, None], flat, np.nan).T, color=BLACK, linewidth=3)
     ax.plot(*flat[0], "x", color=BLACK, mew=2, markersize=7)
     ax.plot(*flat[-1], "o", color=BLACK, markersize=4)
 
 
-def _targets(ax: Axes, story: Story, view: Array) -> None:
+def _targets(ax: Axes, way: Way, view: Array) -> None:
     """Draw the targets that were ordered before the last one, faint, with their number in the order they came."""
-    for i, (middle, radius) in enumerate(targets_of(story)):
+    for i, (middle, radius) in enumerate(way.targets):
         centre = view @ middle
         if radius > 0.0:
             turn = np.linspace(0.0, 2.0 * np.pi, 49)
@@ -199,77 +187,20 @@ def _targets(ax: Axes, story: Story, view: Array) -> None:
         )
 
 
-def targets_of(story: Story) -> list[tuple[Array, float]]:
-    """Return where the target region was ordered to before the last order: middle [m, NED] and radius [m].
-
-    Parameters
-    ----------
-    story : Story
-        The run.
-
-    Returns
-    -------
-    list of (ndarray of shape (3,), float)
-        The radius is 0 where the target was the scenario's goal. A target that moves on its own gives few of them.
-    """
-    if not story.scenario.commands.enabled:
-        return []
-    targets = story.record.stack([*(f"target.{axis}" for axis in "xyz"), "target.radius"])
-    targets = targets[np.isfinite(targets).all(axis=1)]
-    changes = np.flatnonzero((np.diff(targets, axis=0) != 0.0).any(axis=1))  # the last row of each
-    kept = changes[np.unique(np.linspace(0, len(changes) - 1, min(len(changes), _TARGETS)).round().astype(int))]
-    return [(targets[i, :3], float(targets[i, 3])) for i in kept]
-
-
-def _gives_way(story: Story) -> Array:
-    """Return at each point of `path_of` the criterion that the arbiter gives way to, -1 for the goal."""
-    at = _thinned(story.record.stack(_POSITION))[1]
-    regions = story.scenario.regions
-    if not regions:
-        return np.full(len(at), -1)
-    criteria = [secondary.criterion for secondary in regions]
-    memberships, weights, clearances = (
-        np.column_stack([story.record[name][at] for name in names])
-        for names in (
-            [f"membership.{name}" for name in CRITERIA],
-            [f"weight.{name}" for name in CRITERIA],
-            [f"{secondary.region.name}.clearance" for secondary in regions],
-        )
-    )
-    active = active_regions(criteria, memberships, weights, clearances).astype(int)
-    given_way: Array = np.array([-1, *map(CRITERIA.index, criteria)])[active]
-    return given_way
-
-
-def path_of(story: Story) -> Array:
-    """Return about as many points [m, NED] of the path as a figure resolves, shape (n, 3), evenly along its length."""
-    return _thinned(story.record.stack(_POSITION))[0]
-
-
-def _thinned(path: Array) -> tuple[Array, NDArray[np.intp]]:
-    """Return some points of a path, evenly along its length, and which they are."""
-    known = np.flatnonzero(np.isfinite(path).all(axis=1))
-    length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(path[known], axis=0), axis=1))])
-    wanted = np.searchsorted(length, np.linspace(0.0, length[-1], POINTS))
-    at = known[np.unique(np.minimum(wanted, len(known) - 1))]
-    return path[at], at
-
-
-def _entries(story: Story) -> dict[str, Artist]:
+def _entries(story: Story, way: Way) -> dict[str, Artist]:
     """Return what the legend of a picture in space tells, only of what there is."""
-    way = set(_gives_way(story).tolist())
     shown = {secondary.criterion for secondary in story.scenario.regions}
     entries: dict[str, Artist] = {"goal": Patch(color=GOAL_COLOUR, alpha=0.4)}
     entries |= {name: Patch(color=CRITERION_COLOURS[name], alpha=0.4) for name in CRITERIA if name in shown}
     entries["path"] = Line2D([], [], color=PATH_COLOUR, linewidth=1.6)
     for i, name in enumerate(CRITERIA):
-        if i in way:
+        if (way.given_way == i).any():
             entries[f"gives way to {name}"] = Line2D([], [], color=CRITERION_COLOURS[name], linewidth=2.4)
-    if overlap_of(story).any():
+    if way.overlap.any():
         entries["in the overlap"] = Line2D([], [], color=BLACK, linewidth=3)
     entries["start"] = Line2D([], [], color=BLACK, linestyle="", marker="x", mew=2)
     entries["end"] = Line2D([], [], color=BLACK, linestyle="", marker="o", markersize=4)
-    if targets_of(story):
+    if way.targets:
         entries["earlier targets"] = Line2D([], [], color=GOAL_COLOUR, linestyle="", marker="D", markersize=3)
     return entries
 
@@ -281,9 +212,9 @@ def _with_gaps(lines: list[Array]) -> Array:
     return joined
 
 
-def _extent(story: Story) -> tuple[Array, Array]:
+def _extent(story: Story, way: Way) -> tuple[Array, Array]:
     """Return the corners of a box about the path and the goal, with some room."""
-    path = path_of(story)
+    path = way.points
     places = list(places_of(story))
     all_bounds = [np.array(place.region.shape.bounds()) + place.shift for place in places]
     goals = [
@@ -291,7 +222,7 @@ def _extent(story: Story) -> tuple[Array, Array]:
         for place, bounds in zip(places, all_bounds, strict=True)
         if place.region.name == "goal" and not place.faint
     ]
-    targets = [np.array([middle - radius, middle + radius]) for middle, radius in targets_of(story)]
+    targets = [np.array([middle - radius, middle + radius]) for middle, radius in way.targets]
     points = np.vstack([path, *goals, *targets])  # an endless goal needs no room
     low, high = points.min(axis=0), points.max(axis=0)
     near = 0.5 * (high - low).max()
