@@ -225,8 +225,9 @@ def _extent(story: Story, way: Way) -> tuple[Array, Array]:
     targets = [np.array([middle - radius, middle + radius]) for middle, radius in way.targets]
     points = np.vstack([path, *goals, *targets])  # an endless goal needs no room
     low, high = points.min(axis=0), points.max(axis=0)
-    near = 0.5 * (high - low).max()
-    for bounds in all_bounds:  # with the regions that are not far away
+    size = (high - low).max()
+    for place, bounds in zip(places, all_bounds, strict=True):  # with the regions that are not far away
+        near = (0.1 if place.faint else 0.5) * size
         if np.isfinite(bounds).all() and (bounds[1] >= low - near).all() and (bounds[0] <= high + near).all():
             points = np.vstack([points, np.clip(bounds, low - near, high + near)])
     points = np.vstack([points, *(feature[None] for _, _, feature in features_of(story))])
