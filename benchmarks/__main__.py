@@ -20,12 +20,13 @@ from benchmarks import (
     scenes,
     sitl,
     step,
+    view,
 )
 from benchmarks.machine import description
 from benchmarks.peer_environment import Environment
 from benchmarks.table import Table, as_json, print_tables, write_json
 
-BENCHMARKS = {"step": step, "law": law, "fmu": fmu, "fuzzy": fuzzy, "mavlink": mavlink, "sitl": sitl}
+BENCHMARKS = {"step": step, "law": law, "fmu": fmu, "fuzzy": fuzzy, "mavlink": mavlink, "sitl": sitl, "view": view}
 TABLES = {"all": everything, "scaling": scaling}
 REPEATS = 5
 BUDGET = 0.2  # s

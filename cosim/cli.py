@@ -12,7 +12,7 @@ import os
 import sys
 from collections.abc import Sequence
 
-from cosim.command_line import campaigns, mavlink, package, replay, report, run, sitl, sweep
+from cosim.command_line import campaigns, export, mavlink, package, replay, report, run, sitl, sweep, watch
 from cosim.command_line.campaigns import INTERRUPTED
 
 _EPILOG = """examples:
@@ -46,6 +46,7 @@ def _parser() -> argparse.ArgumentParser:
     verbs = parser.add_subparsers(dest="verb", required=True, metavar="VERB")
 
     run.add_verb(verbs)
+    watch.add_verb(verbs)
 
     report.add_verb(verbs)
 
@@ -65,6 +66,7 @@ def _parser() -> argparse.ArgumentParser:
     calibrate = verbs.add_parser("calibrate", help="fit the force limit and lag that bring the paper's window about")
     calibrate.add_argument("--scenario", default="paper", help="scenario to fit (default: paper)")
 
+    export.add_verb(verbs)
     package.add_verb(verbs)
     campaigns.add_verbs(verbs)
     sweep.add_verbs(verbs)
@@ -162,12 +164,14 @@ def _calibrate(options: argparse.Namespace) -> int:
 
 _VERBS = {
     "run": run.run,
+    "watch": watch.watch,
     "report": report.report,
     "replay": replay.replay,
     "list": _list,
     "show": _show,
     "check": _check,
     "calibrate": _calibrate,
+    "export": export.export,
     "package": package.package,
     "campaign": campaigns.campaign,
     "compare": campaigns.compare,

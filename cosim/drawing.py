@@ -152,7 +152,7 @@ def places_of(story: Story) -> Iterator[Place]:
         clearance = story.record[f"{region.name}.clearance"]
         # NaN is not the least
         at = -1 if region.name == "goal" else int(np.argmin(np.where(np.isnan(clearance), np.inf, clearance)))
-        if region.name in story.scenario.moving and region.name not in came:
+        if shifts.any() and region.name not in came:
             yield Place(region, colour, shifts[0], faint=True)
             yield Place(region, colour, shifts[-1], faint=True)
         yield Place(region, colour, shifts[at], faint=False)
@@ -191,7 +191,7 @@ def shifts_of(story: Story, name: str) -> Array:
     ndarray, shape (steps, 3)
         Zeros for one at rest.
     """
-    if name not in story.scenario.moving:
+    if f"{name}.shift.x" not in story.record.units:
         return np.zeros((len(story.record["time"]), 3))
     return story.record.stack([f"{name}.shift.{axis}" for axis in "xyz"])
 

@@ -19,3 +19,7 @@ class TelemetryError(CosimError):
 
 class OrderError(CosimError):
     """An order to a running vehicle that cannot be followed."""
+
+
+class ExportError(CosimError):
+    """A run that cannot be written in another format."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import sys
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,12 +16,14 @@ from cosim.errors import RunError
 from cosim.helm import LoggedOrders, OrderQueue, RecordedOrders
 from cosim.master import Master, Observer
 from cosim.record import Recorder
+from cosim.report_words import verdict
 from cosim.run_folder import ORDERS, RunFolder, claim, conclude
 from cosim.scenario import Scenario
 from cosim.signals import Array
 from plant_fmu import PlantError
 
-if TYPE_CHECKING:  # pymavlink is an extra
+if TYPE_CHECKING:  # pymavlink and websockets are extras
+    from cosim.live.view import LiveView
     from cosim.mavlink.setup import Mavlink
     from cosim.mavlink.thread import LinkThread
 
@@ -33,6 +36,17 @@ class Run:
 
     folder: Path
     summary: dict[str, Any]
+
+
+@dataclass(frozen=True)
+class _Together:
+    """Observer that stands for several."""
+
+    observers: Sequence[Observer]
+
+    def observe(self, k: int, row: Array) -> None:
+        for observer in self.observers:
+            observer.observe(k, row)
 
 
 class _Progress:
@@ -62,6 +76,7 @@ def run_scenario(
     progress: bool = False,
     report: bool = True,
     orders: Path | None = None,
+    live: LiveView | None = None,
 ) -> Run:
     """Run a scenario and write its folder.
 
@@ -83,7 +98,9 @@ def run_scenario(
     report : bool
         Write the report and its figures.
     orders : Path, optional
-        The log of an earlier run, whose orders are repeated; then none are taken from the link.
+        The log of an earlier run, whose orders are repeated; then none are taken from the link or from viewers.
+    live : LiveView, optional
+        Shows the run while it goes on, and takes orders if the scenario's commands are enabled.
 
     Returns
     -------
@@ -112,11 +129,17 @@ def run_scenario(
                 folder = claim(out.with_name(f"{out.name}-{attempt}") if out and attempt > 1 else out, scenario)
                 if link is not None and attempt == 1:
                     link.start()
+                if live is not None:
+                    live.begin(scenario, master.signals.columns, _desk(scenario, recorded, queue))
                 try:
-                    source = LoggedOrders(recorded or queue, folder.path / ORDERS)
-                    status, wall_time, failure = _step(master, folder, source, link, rate, progress)
+                    source = LoggedOrders(recorded or queue, folder.path / ORDERS, live.heed if live else None)
+                    status, wall_time, failure = _step(master, folder, source, link, live, rate, progress)
                     queue.end_run()
+                    if live is not None and report:
+                        live.say("The run is over; its report is being written")
                     summary = conclude(folder.path, scenario, status, wall_time, report)
+                    if live is not None:
+                        live.end(status, verdict(summary))
                 except OSError as error:
                     raise RunError(f"{folder.path}: {error.strerror or error}") from error
             if failure:
@@ -127,6 +150,13 @@ def run_scenario(
         if link:
             link.close()
     raise AssertionError("unreachable")
+
+
+def _desk(scenario: Scenario, recorded: RecordedOrders | None, queue: OrderQueue) -> OrderQueue | str:
+    """Return where viewers' orders go, or why there are none."""
+    if recorded:
+        return "this run repeats the orders of a log and takes no others"
+    return queue if scenario.commands.enabled else "commands are off: start with --commands"
 
 
 def _recorded(scenario: Scenario, orders: Path | None) -> RecordedOrders | None:
@@ -142,6 +172,7 @@ def _step(
     folder: RunFolder,
     orders: LoggedOrders,
     link: LinkThread | None,
+    live: LiveView | None,
     rate: float | None,
     progress: bool,
 ) -> tuple[str, float, PlantError | None]:
@@ -154,9 +185,10 @@ def _step(
     try:
         recorder = Recorder(folder.path, master.signals.columns)
         bar = _Progress(master.scenario) if progress and sys.stderr else None
-        observers: list[Observer] = [o for o in (recorder, link, bar) if o is not None]
+        watching = [o for o in (link, live) if o is not None]
+        observers: list[Observer] = [recorder, *watching, *([bar] if bar else [])]
         started = time.perf_counter()
-        master.run(observers, rate, orders, awaiting=link)
+        master.run(observers, rate, orders, awaiting=_Together(watching))
         if master.helm is not None and master.helm.reset:
             status = "reset"
     except KeyboardInterrupt:

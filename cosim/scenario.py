@@ -14,7 +14,7 @@ import tomli_w
 from numpy.typing import NDArray
 
 from controller import ControllerError
-from controller.regions import Region, Shape
+from controller.regions import Orientation, Region, Shape
 from controller.restoring import parameters
 from cosim.errors import ScenarioError
 from cosim.scenario_check import (
@@ -104,7 +104,9 @@ class Scenario:
     def moving(self) -> tuple[str, ...]:
         """Names of the regions, goal included, that may be elsewhere than where the scenario has them."""
         goal = ("goal",) if self.goal_streamed or any(self.goal_velocity) else ()
-        return (*goal, *(secondary.region.name for secondary in self.regions if secondary.moves))
+        ordered = self.commands.enabled  # to be anywhere, what is at a place at all
+        regions = [s for s in self.regions if s.moves or (ordered and not isinstance(s.region.shape, Orientation))]
+        return (*goal, *(secondary.region.name for secondary in regions))
 
     @property
     def true_restoring_parameters(self) -> NDArray[np.float64]:

@@ -95,18 +95,34 @@ def told(scene: Scene) -> Told:
     Told
         Arrays of its own.
     """
-    shallow, deep = scene.depth_band
-    regions = [
-        Region(f"obstacle {i + 1}", Sphere(o.centre, o.radius), "out", o.velocity)
-        for i, o in enumerate(scene.obstacles)
-    ]
-    band = Region("depth band", DepthBand((shallow + deep) / 2.0, (deep - shallow) / 2.0), "in")
-    obstacle, depth = CRITERIA.index("obstacle"), CRITERIA.index("depth")
+    regions, criteria = zip(*scene_regions(scene), strict=True)
     return Told(
         goal=pack([Region("goal", Sphere(scene.goal.centre, scene.goal.radius), "in")]),
-        regions=pack([*regions, band]),
-        criteria=np.array([obstacle] * len(regions) + [depth], dtype=np.int64),
+        regions=pack(regions),
+        criteria=np.array([CRITERIA.index(criterion) for criterion in criteria], dtype=np.int64),
     )
+
+
+def scene_regions(scene: Scene) -> list[tuple[Region, str]]:
+    """Return the regions of a scene beside its goal, each with its criterion.
+
+    Parameters
+    ----------
+    scene : Scene
+        Any.
+
+    Returns
+    -------
+    list of (Region, str)
+        The obstacles in their order, then the depth band.
+    """
+    obstacles = [
+        (Region(f"obstacle {i + 1}", Sphere(o.centre, o.radius), "out", o.velocity), "obstacle")
+        for i, o in enumerate(scene.obstacles)
+    ]
+    shallow, deep = scene.depth_band
+    band = Region("depth band", DepthBand((shallow + deep) / 2.0, (deep - shallow) / 2.0), "in")
+    return [*obstacles, (band, "depth")]
 
 
 def plant_values(scene: Scene, vehicle: Vehicle, substep: float) -> dict[str, float]:

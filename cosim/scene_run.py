@@ -19,6 +19,7 @@ from cosim.vehicle_model import vehicle_model
 from plant_fmu import Plant
 from plant_fmu.vehicle import load_vehicle
 
+VEHICLE = "odin"
 LEVEL = (1.0, 0.0, 0.0, 0.0)
 _ROUNDING = 1e-9  # of a count of steps
 
@@ -92,7 +93,7 @@ class SceneFlyer:
         self.law = law
         self.conditions = conditions or Conditions()
         self.gains = LAWS[law].gains_type() if gains is None else gains
-        self._vehicle = load_vehicle("odin")
+        self._vehicle = load_vehicle(VEHICLE)
         self._model = vehicle_model(self._vehicle)
         self._law(0)  # says now what it cannot work with
         self._clock = Clock()

@@ -11,7 +11,7 @@ import numpy as np
 from controller import VehicleState
 from controller.compiled import lean
 from controller.regions import PackedRegions, Shape, Sphere, evaluate_packed, pack
-from cosim.errors import RunError
+from cosim.errors import OrderError, RunError
 from cosim.scenario import Scenario
 from cosim.scenario_tables import FAR_AWAY, Vector3
 from cosim.signals import Array
@@ -143,6 +143,22 @@ class Surroundings:
     def forget(self, slot: int) -> None:
         """Take an obstacle away that came while running; `slot` counts them from 0."""
         self._carry(self._seen[slot], np.zeros(3), np.zeros(3), 0.0)
+
+    def displace(self, name: str, by: Vector3) -> None:
+        """Move a region, also of an obstacle that came, by so much [m, NED] from where it is.
+
+        Raises
+        ------
+        OrderError
+            If there is no such region, it is at no place, or it is an obstacle that has not come.
+        """
+        movable = [self._names[at] for at in self._moving if at]
+        if name not in movable:
+            raise OrderError(f"region is {name!r}, expected one of {', '.join(movable) or 'none'}")
+        i = self._names.index(name) - 1
+        if i in self._seen and not self._origins[i].any():
+            raise OrderError(f"region is {name!r}: no such obstacle has come")
+        self._origins[i] += by
 
     # ---- the target ----
 

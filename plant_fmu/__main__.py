@@ -1,4 +1,4 @@
-"""Command line: ``python -m plant_fmu {build,check,list,docs,ssv,reference}``."""
+"""Command line: ``python -m plant_fmu {build,check,list,docs,plot,ssv,reference}``."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from plant_fmu.contents.parameter_set import ssv
 from plant_fmu.contents.reference import reference
 from plant_fmu.description import documentation
 from plant_fmu.errors import PlantFmuError
+from plant_fmu.pictures import IMAGES, PICTURES, image
 from plant_fmu.platforms import ALL, NATIVE, PLATFORMS
 from plant_fmu.vehicle import load_vehicle, shipped_vehicles
 
@@ -47,6 +48,11 @@ def _parser() -> argparse.ArgumentParser:
     docs = verbs.add_parser("docs", help="print the page of an FMU's variables, in Markdown")
     docs.add_argument("--vehicle", required=True, help="a shipped name, or a TOML file")
 
+    plot = verbs.add_parser("plot", help="draw the thrusters of a vehicle, or the variables of its FMU")
+    plot.add_argument("vehicle", metavar="VEHICLE", help="a shipped name, or a TOML file")
+    plot.add_argument("picture", choices=tuple(PICTURES), metavar="PICTURE", help=", ".join(PICTURES))
+    plot.add_argument("--out", type=_picture_file, required=True, metavar="FILE", help=".png, .svg or .pdf")
+
     numbers = verbs.add_parser("ssv", help="write the parameters of a vehicle as an SSP parameter set")
     numbers.add_argument("--vehicle", required=True, help="a shipped name, or a TOML file")
     numbers.add_argument("--out", type=Path, help="file to write (default: NAME.ssv here)")
@@ -60,6 +66,12 @@ def _parser() -> argparse.ArgumentParser:
 def _write(out: Path, text: str) -> Path:
     write_whole(out, text.encode())
     return out
+
+
+def _picture_file(text: str) -> Path:
+    if Path(text).suffix[1:].lower() not in IMAGES:
+        raise argparse.ArgumentTypeError(f"{text!r}: expected a name that ends in .{', .'.join(IMAGES)}")
+    return Path(text)
 
 
 def _assignment(text: str) -> tuple[str, float]:
@@ -108,6 +120,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 print(f"{name:{max(map(len, names))}}  {load_vehicle(name).title}")
         elif options.verb == "docs":
             print(documentation(load_vehicle(options.vehicle)), end="")
+        elif options.verb == "plot":
+            figure = PICTURES[options.picture](load_vehicle(options.vehicle))
+            write_whole(options.out, image(figure, options.out.suffix[1:].lower()))
+            print(options.out)
         elif options.verb == "ssv":
             vehicle = load_vehicle(options.vehicle)
             print(_write(options.out or Path(f"{vehicle.name}.ssv"), ssv(vehicle)))

@@ -23,7 +23,7 @@ from plant_fmu import Plant, cached_fmu, load_vehicle
 from plant_fmu.importers import IMPORTERS, Task, read_fmu, run_importer
 from tests.plant_fmu.conftest import STATES
 
-_LONG = ("fmu", "law", "mavlink", "sitl")
+_LONG = ("fmu", "law", "mavlink", "sitl", "view")
 
 
 @pytest.fixture

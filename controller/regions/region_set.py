@@ -5,14 +5,16 @@ One sign for the whole project: g <= 0 is satisfied, g > 0 is violated.
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from controller.by_address import INTEGER, INTEGERS, NUMBERS, address_of, array_at, call_at
 from controller.compiled import compiled, inlined, lean
 from controller.errors import RegionError
 from controller.regions.box import Box, box
@@ -96,6 +98,7 @@ class PackedRegions(NamedTuple):
     velocities: Array  # (n, 3) m/s, NED
     gains: Array  # (n,) alpha_i
     hard: NDArray[np.bool_]  # (n,)
+    others: int  # address of what evaluates shapes but spheres and bands of depth; 0 where there are none
 
     def evaluate(
         self, position: Array, quaternion: Array, values: Array, gradients: Array, turnings: Array, clearances: Array
@@ -118,8 +121,19 @@ class PackedRegions(NamedTuple):
         clearances : ndarray, shape (n,)
             Receives the distance to the surface [m], or the angle [rad] for shapes of attitude: positive where
             satisfied, negative where violated.
+
+        Raises
+        ------
+        RegionError
+            If an array is not contiguous.
         """
+        for array in (position, quaternion, values, gradients, turnings, clearances):
+            require(array.flags.c_contiguous, "evaluate", "array", "a strided one", "contiguous ones")
         evaluate_packed(self, position, quaternion, values, gradients, turnings, clearances)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickle what holds in another process too: addresses do not."""
+        return _unpickled, (tuple(self)[:-1],)
 
     def move_to(self, time: float) -> None:
         """Put every region where its velocity has brought it at a time [s]."""
@@ -140,8 +154,9 @@ def pack(regions: Sequence[Region]) -> PackedRegions:
         In the same order.
     """
     packed = [region.shape.packed() for region in regions]
+    kinds = np.array([region.shape.kind for region in regions], dtype=np.int64)
     return PackedRegions(
-        kinds=np.array([region.shape.kind for region in regions], dtype=np.int64),
+        kinds=kinds,
         signs=np.array([1.0 if region.keep == "in" else -1.0 for region in regions]),
         offsets=np.cumsum([0, *(len(numbers) for numbers in packed)], dtype=np.int64),
         numbers=np.array([x for numbers in packed for x in numbers], dtype=float),
@@ -149,7 +164,17 @@ def pack(regions: Sequence[Region]) -> PackedRegions:
         velocities=np.array([region.velocity for region in regions], dtype=float).reshape(-1, 3),
         gains=np.array([region.gain for region in regions], dtype=float),
         hard=np.array([region.hard for region in regions], dtype=np.bool_),
+        others=_others_of(kinds),
     )
+
+
+def _unpickled(arrays: tuple[Any, ...]) -> PackedRegions:
+    fields: tuple[Any, ...] = (*arrays, _others_of(arrays[0]))
+    return PackedRegions(*fields)
+
+
+def _others_of(kinds: NDArray[np.int64]) -> int:
+    return 0 if np.isin(kinds, (_SPHERE, _DEPTH_BAND)).all() else _address_of_others()
 
 
 @lean
@@ -193,7 +218,24 @@ def evaluate_packed(
 ) -> None:
     """Do what `PackedRegions.evaluate` says, for compiled callers."""
     if _evaluate_plain(regions, position, values, gradients, turnings, clearances):
-        _evaluate_others(regions, position, quaternion, values, gradients, turnings, clearances)
+        call_at(
+            regions.others,
+            (
+                regions.kinds.size,
+                regions.kinds.ctypes.data,
+                regions.signs.ctypes.data,
+                regions.offsets.ctypes.data,
+                regions.numbers.size,
+                regions.numbers.ctypes.data,
+                regions.shifts.ctypes.data,
+                position.ctypes.data,
+                quaternion.ctypes.data,
+                values.ctypes.data,
+                gradients.ctypes.data,
+                turnings.ctypes.data,
+                clearances.ctypes.data,
+            ),
+        )
 
 
 @lean
@@ -221,35 +263,53 @@ def _evaluate_plain(
     return others
 
 
-@lean
+@compiled
 def _evaluate_others(
-    regions: PackedRegions,
-    position: Array,
-    quaternion: Array,
-    values: Array,
-    gradients: Array,
-    turnings: Array,
-    clearances: Array,
-) -> None:
-    """Evaluate all shapes but spheres and bands of depth."""
-    for i in range(regions.kinds.size):
-        kind = regions.kinds[i]
+    n: int,
+    kinds_at: Any,
+    signs_at: Any,
+    offsets_at: Any,
+    n_numbers: int,
+    numbers_at: Any,
+    shifts_at: Any,
+    position_at: Any,
+    quaternion_at: Any,
+    values_at: Any,
+    gradients_at: Any,
+    turnings_at: Any,
+    clearances_at: Any,
+) -> int:
+    """Evaluate all shapes but spheres and bands of depth, of arrays of `evaluate_packed` at these addresses."""
+    kinds, signs, offsets = array_at(kinds_at, n), array_at(signs_at, n), array_at(offsets_at, n + 1)
+    all_numbers, shifts = array_at(numbers_at, n_numbers), array_at(shifts_at, (n, 3))
+    position, quaternion = array_at(position_at, 3), array_at(quaternion_at, 4)
+    values, clearances = array_at(values_at, n), array_at(clearances_at, n)
+    gradients, turnings = array_at(gradients_at, (n, 3)), array_at(turnings_at, (n, 3))
+    for i in range(n):
+        kind = kinds[i]
         if kind in (_SPHERE, _DEPTH_BAND):
             continue
         at = gradients[i]  # until the gradient comes
         for j in range(3):
-            at[j] = position[j] - regions.shifts[i, j]
-        numbers = regions.numbers[regions.offsets[i] : regions.offsets[i + 1]]
+            at[j] = position[j] - shifts[i, j]
+        numbers = all_numbers[offsets[i] : offsets[i + 1]]
         tx, ty, tz = 0.0, 0.0, 0.0
         if kind < _FIRST_OF_ATTITUDE:
             g, gx, gy, gz, distance = evaluate_shape(kind, at, numbers)
         else:
             g, gx, gy, gz, tx, ty, tz = _evaluate_shape_of_attitude(kind, at, quaternion, numbers)
             distance = g
-        sign = regions.signs[i]
+        sign = signs[i]
         values[i], clearances[i] = sign * g, -sign * distance
         gradients[i, 0], gradients[i, 1], gradients[i, 2] = sign * gx, sign * gy, sign * gz
         turnings[i, 0], turnings[i, 1], turnings[i, 2] = sign * tx, sign * ty, sign * tz
+    return n
+
+
+@functools.cache
+def _address_of_others() -> int:
+    arguments = (INTEGER, INTEGERS, NUMBERS, INTEGERS, INTEGER, *[NUMBERS] * 8)
+    return address_of(_evaluate_others, arguments)
 
 
 @inlined

@@ -87,7 +87,7 @@ def run_campaign(
         summary: dict[str, Any] = {}
 
         def conclude(results: Results) -> None:
-            summary.update(summarise(work.flown, results))
+            summary.update(summarise(work.flown, results, out))
             write_text(out / SUMMARY, json.dumps(summary, indent=2) + "\n")
 
         done = carry_out(work, out, workers, executor, progress, conclude)

@@ -20,6 +20,14 @@ _LOOK = 5.0  # s between looks at how many workers there are: they may come and 
 _PATIENCE = 30.0  # s for the first worker, and without any
 _PATIENCE_WITH_SCHEDULER = 10.0  # s for it to answer
 _PATIENCE_WITH_WORKERS = 2.0  # s for one to end the batch that it is at
+# of a cluster of ours: how its processes watch themselves, many times a second, takes a tenth of two cores
+_CALM: dict[str, Any] = {
+    "distributed.worker.profile.enabled": False,
+    "distributed.worker.memory.monitor-interval": "1s",
+    "distributed.admin.system-monitor.interval": "5s",
+    "distributed.admin.tick.interval": "1s",
+    "distributed.scheduler.allowed-failures": 0,  # we count deaths ourselves, and know how to lay them to a row
+}
 _SETTLING = 1.0  # s that a new worker is left in peace: one that dies at once is not replaced again
 
 
@@ -168,8 +176,7 @@ def cluster_executor(scheduler: str | None, workers: int) -> Iterator[Executor]:
         stack.enter_context(_quiet("distributed"))
         try:
             if scheduler is None:
-                # we count deaths ourselves, and know how to lay them to a row
-                stack.enter_context(dask.config.set({"distributed.scheduler.allowed-failures": 0}))
+                stack.enter_context(dask.config.set(_CALM))
                 with interrupts_held():
                     cluster = untyped.LocalCluster(
                         n_workers=workers, threads_per_worker=1, processes=True, silence_logs=logging.CRITICAL,

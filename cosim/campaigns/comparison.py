@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
 import json
-import shutil
-import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,19 +13,17 @@ import numpy as np
 
 from controller import LAWS
 from cosim.campaigns.campaign import Campaign, run_campaign
-from cosim.campaigns.comparison_figures import comparison_drawings
-from cosim.campaigns.comparison_page import page
+from cosim.campaigns.comparison_page import NUMBERS, PAGE
 from cosim.campaigns.folder import write_text
 from cosim.campaigns.law_gains import law_named
+from cosim.campaigns.replays import WORST
 from cosim.campaigns.results import Results
 from cosim.campaigns.scene_store import SceneStore
+from cosim.campaigns.statistics import median_difference, paired
 from cosim.campaigns.summary import median
 from cosim.errors import RunError
 from cosim.report import FIGURES
 from cosim.scene_run import Conditions
-
-NUMBERS = "compare.json"
-PAGE = "compare.md"
 
 
 @dataclass(frozen=True)
@@ -47,7 +44,7 @@ def compare(
     workers: int = 1,
     progress: bool = False,
 ) -> Comparison:
-    """Fly the same scenes by several laws, and write table, numbers and figures.
+    """Fly the same scenes by several laws, and write the numbers side by side.
 
     Parameters
     ----------
@@ -100,11 +97,13 @@ def compare(
                 for other in laws
                 if one != other
             ],
+            "paired": [
+                difference(one, campaigns[one].results, other, campaigns[other].results)
+                for one, other in itertools.combinations(laws, 2)
+            ],
         }
     try:
-        _write_figures(out, {law: campaign.results for law, campaign in campaigns.items()})
         write_text(out / NUMBERS, json.dumps(numbers, indent=2) + "\n")
-        write_text(out / PAGE, page(numbers))
     except OSError as error:
         raise RunError(f"{out}: {error.strerror or error}") from error
     return Comparison(out, campaigns, numbers)
@@ -139,6 +138,34 @@ def pair(one: str, results: Results, other: str, others: Results) -> dict[str, A
     }
 
 
+def difference(one: str, results: Results, other: str, others: Results) -> dict[str, Any]:
+    """Compare two laws scene by scene.
+
+    Parameters
+    ----------
+    one, other : str
+        The laws.
+    results, others : Results
+        Of the same scenes.
+
+    Returns
+    -------
+    dict
+        What `paired` says of the scenes that they complete, and over those that both do the median of the first one's
+        reach time [s] and effort [N s] less the other's.
+    """
+    mine, theirs = completed(results), completed(others)
+    both = mine & theirs
+    return {
+        "laws": [one, other],
+        **paired(mine, theirs),
+        "differences": {
+            name: median_difference((results.number(name) - others.number(name))[both])
+            for name in ("reach_time", "effort")
+        },
+    }
+
+
 def completed(results: Results) -> Any:
     """Return which scenes were reached without a violation, bool, shape (scenes,)."""
     return results["reached"] & ~results["violation"]
@@ -146,19 +173,7 @@ def completed(results: Results) -> Any:
 
 def _refuse_strangers(out: Path) -> None:
     if out.is_dir():
-        known = {NUMBERS, PAGE, FIGURES, f".{NUMBERS}", f".{PAGE}", *LAWS}
+        known = {NUMBERS, PAGE, FIGURES, WORST, f".{NUMBERS}", f".{PAGE}", *LAWS}
         strange = sorted(p.name for p in out.iterdir() if p.name not in known and not p.name.startswith(f".{FIGURES}"))
         if strange:
             raise RunError(f"{out}: holds {strange[0]!r}, expected a new folder or that of a comparison")
-
-
-def _write_figures(out: Path, results: dict[str, Results]) -> None:
-    scratch = Path(tempfile.mkdtemp(prefix=f".{FIGURES}-", dir=out))
-    try:
-        for drawing in comparison_drawings(results):
-            drawing.write(scratch)
-        scratch.chmod(0o755)
-        shutil.rmtree(out / FIGURES, ignore_errors=True)
-        scratch.replace(out / FIGURES)
-    finally:
-        shutil.rmtree(scratch, ignore_errors=True)

@@ -11,7 +11,6 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import qmc
 
 from cosim.campaigns.work import Rows
 from cosim.errors import RunError
@@ -172,6 +171,8 @@ class Design:
             bits.advance(first * keys)
             shares = np.random.Generator(bits).random((n, keys))
         else:
+            from scipy.stats import qmc  # here, for no worker needs it
+
             sobol = qmc.Sobol(keys, scramble=True, seed=self._generator())
             with warnings.catch_warnings():  # that it is no power of two: any number of rows may be asked for
                 warnings.simplefilter("ignore", UserWarning)
@@ -182,6 +183,8 @@ class Design:
 
     @cached_property
     def _hypercube(self) -> NDArray[np.float64]:
+        from scipy.stats import qmc
+
         shares: NDArray[np.float64] = qmc.LatinHypercube(len(self.vary), seed=self._generator()).random(self.rows)
         return shares
 

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -121,6 +123,33 @@ class CampaignFolder:
         self.close()
 
 
+@contextlib.contextmanager
+def held(path: Path) -> Iterator[None]:
+    """Keep other processes out of the folder of a campaign while something is written into it.
+
+    Parameters
+    ----------
+    path : Path
+        The folder.
+
+    Raises
+    ------
+    RunError
+        If another process is at work in it, or it cannot be written.
+    """
+    try:
+        lock = _lock(path / LOCK)
+    except OSError as error:
+        raise RunError(f"{path}: {error.strerror or error}") from error
+    try:
+        yield
+    except OSError as error:
+        raise RunError(f"{path}: {error.strerror or error}") from error
+    finally:
+        if lock is not None:
+            os.close(lock)
+
+
 def read_plan(path: Path) -> dict[str, Any]:
     """Return the plan of the campaign that a folder holds.
 
@@ -148,6 +177,33 @@ def read_plan(path: Path) -> dict[str, Any]:
     if not isinstance(plan, dict):
         raise RunError(f"{path / PLAN}: holds no campaign")
     return plan
+
+
+def read_json(path: Path) -> dict[str, Any]:
+    """Return a table that was written as JSON.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+
+    Returns
+    -------
+    dict
+        As it was written.
+
+    Raises
+    ------
+    RunError
+        If it is not there, or holds something else.
+    """
+    try:
+        table = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise RunError(f"{path}: cannot be read: {error}") from error
+    if not isinstance(table, dict):
+        raise RunError(f"{path}: cannot be read: it holds no table")
+    return table
 
 
 def write_text(path: Path, text: str) -> None:

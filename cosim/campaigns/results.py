@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,8 @@ from numpy.typing import NDArray
 from cosim.campaigns.parts import check_schema
 from cosim.errors import RunError
 from cosim.signals import Array
+
+_PIECE = 1000  # rows
 
 
 class Results:
@@ -64,6 +67,15 @@ class Results:
         """Return where a column has nothing, shape (rows,)."""
         absent: NDArray[np.bool_] = pc.is_null(self._read(columns=[name])[name]).to_numpy()
         return absent
+
+    def pieces(self, name: str) -> Iterator[list[Any]]:
+        """Yield a column some rows at a time, in their order."""
+        try:
+            with pq.ParquetFile(self.path) as file:
+                for batch in file.iter_batches(_PIECE, columns=[name]):
+                    yield batch.column(0).to_pylist()
+        except (OSError, pa.ArrowException) as error:
+            raise RunError(f"{self.path}: cannot be read: {' '.join(str(error).split())}") from error
 
     def row(self, key: int) -> dict[str, Any] | None:
         """Return the row of a key, None if there is none."""

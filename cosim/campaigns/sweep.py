@@ -12,12 +12,9 @@ from cosim.campaigns.design import Design
 from cosim.campaigns.folder import SUMMARY, write_text
 from cosim.campaigns.results import Results
 from cosim.campaigns.runner import carry_out
-from cosim.campaigns.sweep_page import sweep_page
 from cosim.campaigns.sweep_rows import SweepWork
 from cosim.campaigns.sweep_summary import summarise_sweep
 from cosim.scenario import Scenario
-
-PAGE = "summary.md"
 
 
 @dataclass(frozen=True)
@@ -83,7 +80,6 @@ def run_sweep(
     def conclude(results: Results) -> None:
         summary.update(summarise_sweep(work, results, out))
         write_text(out / SUMMARY, json.dumps(summary, indent=2, allow_nan=False) + "\n")
-        write_text(out / PAGE, sweep_page(summary))
 
     done = carry_out(work, out, workers, executor, progress, conclude)
     return Sweep(out, done.results, summary, done.flown)

@@ -1,14 +1,78 @@
-"""The summary of a sweep as text: a page of Markdown, and the lines that the command prints."""
+"""The page that a sweep ends with, and the lines that the command prints."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import Any
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
+from cosim.campaigns.folder import PLAN, RESULTS, SUMMARY, held, read_json, write_text
+from cosim.campaigns.page import Html, Page, code, interval, number, write_figures
+from cosim.campaigns.plan import SWEEP
+from cosim.campaigns.repeat import complete_results
+from cosim.campaigns.replays import Replay, replay_of
+from cosim.campaigns.results import Results
+from cosim.campaigns.sections import (
+    LABELS,
+    Group,
+    basis,
+    quantiles_table,
+    rates_table,
+    refused_section,
+    worst_section,
+)
 from cosim.campaigns.sweep_summary import FACTS
+from cosim.campaigns.worst import LISTED, Worst, worst_rows
+from cosim.errors import RunError
 from cosim.flying.outcome import FIELDS
+from cosim.replay.folder import SCENARIO
 
+if TYPE_CHECKING:
+    from cosim.drawing import Drawing
+
+PAGE = "sweep.html"
 _TOLD = 0.1  # rank correlations that are worth a place in the table
+
+
+def write_sweep_page(folder: Path, replays: int) -> Path:
+    """Write ``sweep.html`` and its figures, and replays of the worst rows.
+
+    Parameters
+    ----------
+    folder : Path
+        Of a sweep that is complete.
+    replays : int
+        Worst rows that are flown again step by step, each with a page of its own.
+
+    Returns
+    -------
+    Path
+        The page.
+
+    Raises
+    ------
+    RunError
+        If the folder holds no such sweep, or cannot be written.
+    KeyboardInterrupt
+        After Ctrl-C; the page is there, without the replays.
+    """
+    results, summary = complete_results(folder), read_json(folder / SUMMARY)
+    if summary.get("kind") != SWEEP:
+        raise RunError(f"{folder}: holds no sweep")
+    with held(folder):
+        worst = worst_rows(results, max(LISTED, replays))
+        figures = write_figures(folder, _drawings(results, summary) if worst else [])
+
+        def write(shown: Mapping[int, Replay]) -> None:
+            write_text(folder / PAGE, _page(folder, summary, worst, figures, shown).html())
+
+        write({})
+        of = f"of the sweep of {summary['name']}"
+        if shown := {w.key: replay_of(folder, w.key, [folder], f"Row {w.key} {of}") for w in worst[:replays]}:
+            write(shown)
+    return folder / PAGE
 
 
 def sweep_lines(summary: dict[str, Any]) -> Iterator[str]:
@@ -27,7 +91,7 @@ def sweep_lines(summary: dict[str, Any]) -> Iterator[str]:
     s = summary
     yield f"{s['name']}: {s['flown']} of {s['rows']} rows flown, {s['refused']} refused, {s['stopped']} stopped early"
     for fact in FACTS:
-        yield f"{fact:15} {_rate(s[fact])}"
+        yield f"{fact:15} {s[fact]['rows']}: {interval(s[fact])}"
     for name, found in s["quantiles"].items():
         if found["0.5"] is not None:
             yield f"{name:15} {found['0.5']:.4g} {FIELDS[name][1]} ({found['0.05']:.4g} to {found['0.95']:.4g})"
@@ -35,59 +99,115 @@ def sweep_lines(summary: dict[str, Any]) -> Iterator[str]:
         yield f"worst: {worst['command']}"
 
 
-def sweep_page(summary: dict[str, Any]) -> str:
-    """Return the page of a sweep.
+def _drawings(results: Results, s: dict[str, Any]) -> Iterator[Drawing]:
+    from cosim.campaigns.figures import Key, Rated, binned_rates, distributions, forest, scatter
+    from cosim.drawing import Drawing
 
-    Parameters
-    ----------
-    summary : dict
-        Of `summarise_sweep`.
+    flown = results.absent("refused")
+    lines = [Rated(fact, "", s["flown"], s[fact]) for fact in FACTS]
+    yield Drawing("rates", "How many rows reached the goal, settled there, and violated a hard region.", forest(lines))
 
-    Returns
-    -------
-    str
-        Markdown.
-    """
-    return "\n".join(_page(summary)) + "\n"
+    columns = {name: {"": results.number(name)[flown]} for name in s["quantiles"]}
+    yield from distributions(columns, "What never comes leaves a curve below 100 %.")
 
-
-def _page(s: dict[str, Any]) -> Iterator[str]:
-    yield f"# {s['name']}: a sweep of {s['rows']} rows"
-    yield ""
-    yield f"Design {s['design']}, seed {s['seed']}, engine {s['engine']}. {s['flown']} rows were flown, {s['refused']}"
-    yield f"refused; {s['stopped']} flights stopped early. Intervals are at 95 %, by Wilson."
-    if s["reasons"]:
-        yield from _table(["refused row", "why"], [[row, why.replace("|", "\\|")] for row, why in s["reasons"].items()])
-    yield from _table(["key", "values"], [[f"`{key}`", _range(vary)] for key, vary in s["vary"].items()])
-    yield from _table(["rows that", "share"], [[fact, _rate(s[fact])] for fact in FACTS])
-    names = [f"{float(q):.0%}".replace("%", " %") for q in next(iter(s["quantiles"].values()))]
-    spread = [[f"{name} [{FIELDS[name][1]}]", *map(_number, q.values())] for name, q in s["quantiles"].items()]
-    yield from _table(["quantiles", *names], spread)
-    yield ""
-    yield "## The worst rows"
-    rows = [[str(w["row"]), f"{w['why']}, {_told(w)}", f"`{w['command']}`"] for w in s["worst"]]
-    yield from _table(["row", "why", "to repeat it"], rows)
-    yield ""
-    yield "## Which key matters for what"
-    yield ""
-    yield f"Rank correlations by Spearman; those below {_TOLD} are left out here, all are in `summary.json`."
-    outcomes = [name for name in FIELDS if any(_strong(of[name]) for of in s["rank_correlations"].values())]
-    table = [
-        [f"`{key}`", *(f"{of[name]['rho']:+.2f}" if _strong(of[name]) else "" for name in outcomes)]
-        for key, of in s["rank_correlations"].items()
+    keys = [
+        Key(name, column, bool(s["vary"][name].get("log")))
+        for name in _by_weight(s)
+        if np.ptp(column := results.number(name)[flown]) > 0.0
     ]
-    yield from _table(["key", *outcomes], table if outcomes else [])
+    if keys:
+        reached, violated = results.fact("reached")[flown], results.fact("violated")[flown]
+        caption = (
+            "Outcomes by what varies, in parts of the range with about as many rows each; what matters most first."
+        )
+        if any(0 < fact.sum() < len(fact) for fact in (reached, violated)):
+            yield Drawing("depends", caption, binned_rates(keys, {"reached": reached, "violated": violated}))
+        for name in ("min_clearance", "reach_time"):
+            column = results.number(name)[flown]
+            if _any(column):
+                caption = f"{LABELS[name].partition(' [')[0].capitalize()} of each row by what varies."
+                drawn = scatter(keys, column, LABELS[name], reached, violated)
+                yield Drawing(f"by-{name}".replace("_", "-"), caption, drawn)
 
 
-def _table(head: list[str], rows: list[list[str]]) -> Iterator[str]:
-    yield ""
-    if not rows:
-        yield "None."
+def _any(values: Any) -> bool:
+    return bool(np.isfinite(values).any())
+
+
+def _by_weight(s: dict[str, Any]) -> list[str]:
+    """Return the keys, those first that outcomes depend on most."""
+    outcomes = ("reached", "violated", "min_clearance", "reach_time")
+
+    def weight(key: str) -> float:
+        return max(abs(of["rho"]) if (of := s["rank_correlations"][key][name]) else 0.0 for name in outcomes)
+
+    return sorted(s["vary"], key=lambda key: -weight(key))
+
+
+def _page(
+    folder: Path, s: dict[str, Any], worst: Sequence[Worst], figures: Mapping[str, Html], shown: Mapping[int, Replay]
+) -> Page:
+    page = Page(f"{s['name']}: a sweep of {s['rows']} row{'s' if s['rows'] > 1 else ''}")
+    page.verdict(_verdict(s))
+    page.table(["what varies", "values"], [[code(key), _range(vary)] for key, vary in s["vary"].items()])
+    page.paragraph(f"Design {s['design']}, seed {s['seed']}, engine {s['engine']}.", faint=True)
+    if worst:
+        group = Group("all", s["flown"], {fact: s[fact] for fact in FACTS}, s["quantiles"])
+        page.heading("How often")
+        page.add(figures["rates"])
+        rates_table(page, "rows flown", [group], FACTS)
+        page.paragraph("Of the rows that were flown; intervals are at 95 %, by Wilson.", faint=True)
+        page.heading("How much")
+        page.add(figures.get("distributions", Html("")))
+        quantiles_table(page, [group])
+        page.heading("Which key matters for what")
+        for name in ("depends", "by-min-clearance", "by-reach-time"):
+            page.add(figures.get(name, Html("")))
+        _correlations(page, s)
+        worst_section(page, folder, "row", worst, shown, {})
+    refused_section(page, "row", s["refused"], s["reasons"])
+    page.heading("What it rests on")
+    page.paragraph(
+        Html(
+            f"Every row is in {code(RESULTS)}, every number of this page in {code(SUMMARY)}. What stays is in "
+            f"{code(SCENARIO)}, what varies and how in {code(PLAN)}."
+        )
+    )
+    basis(page, s)
+    return page
+
+
+def _verdict(s: dict[str, Any]) -> str:
+    if not s["flown"]:
+        return f"None of the {s['rows']} rows could be flown."
+    text = (
+        f"Of {s['flown']} rows that were flown, {s['reached']['rows']} reached the goal, {interval(s['reached'])}, and "
+    )
+    text += f"{s['violated']['rows']} violated a hard region, {interval(s['violated'])}."
+    if s["stopped"]:
+        text += f" {s['stopped']} were stopped early by the plant."
+    return text + (f" {s['refused']} were refused." if s["refused"] else "")
+
+
+def _correlations(page: Page, s: dict[str, Any]) -> None:
+    outcomes = [name for name in FIELDS if any(_strong(of[name]) for of in s["rank_correlations"].values())]
+    if not outcomes:
+        page.paragraph("No outcome goes up or down with a key alone.")
         return
-    yield f"| {' | '.join(head)} |"
-    yield f"|{'---|' * len(head)}"
-    for row in rows:
-        yield f"| {' | '.join(row)} |"
+    page.table(
+        ["", *s["rank_correlations"]],
+        [
+            [
+                name,
+                *(f"{of[name]['rho']:+.2f}" if _strong(of[name]) else "" for of in s["rank_correlations"].values()),
+            ]
+            for name in outcomes
+        ],
+    )
+    told = (
+        f"Rank correlations by Spearman; those within {number(_TOLD)} of 0 are left out here, all are in summary.json."
+    )
+    page.paragraph(told, faint=True)
 
 
 def _range(vary: dict[str, Any]) -> str:
@@ -95,21 +215,6 @@ def _range(vary: dict[str, Any]) -> str:
         return ", ".join(f"{x:g}" for x in vary["values"])
     points = f", {vary['points']} points" if "points" in vary else ""
     return f"{vary['low']:g} to {vary['high']:g}{points}{', logarithmic' if vary['log'] else ''}"
-
-
-def _rate(rate: dict[str, Any]) -> str:
-    if rate["share"] is None:
-        return "–"
-    return f"{rate['rows']}: {100 * rate['share']:.1f} % ({100 * rate['low']:.1f} to {100 * rate['high']:.1f})"
-
-
-def _told(worst: dict[str, Any]) -> str:
-    name, value = next((name, value) for name, value in worst.items() if name in FIELDS)
-    return f"`{name}` {value:.4g} {FIELDS[name][1]}"
-
-
-def _number(x: float | None) -> str:
-    return "–" if x is None else f"{x:.4g}"
 
 
 def _strong(correlation: dict[str, float] | None) -> bool:

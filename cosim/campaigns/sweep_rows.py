@@ -22,7 +22,7 @@ from cosim.campaigns.work import Rows
 from cosim.errors import RunError
 from cosim.flying.outcome import FIELDS, Flown, nothing
 from cosim.flying.variation import Variation
-from cosim.run_folder import SCENARIO
+from cosim.replay.folder import SCENARIO
 from cosim.scenario import VEHICLE_COPY, Scenario
 from plant_fmu.tables import hint
 

@@ -2,26 +2,20 @@
 
 from __future__ import annotations
 
-import shlex
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy.stats import binomtest, spearmanr
 
 from cosim.campaigns.results import Results
+from cosim.campaigns.statistics import Facts, quantiles, rate
 from cosim.campaigns.sweep_rows import SweepWork
+from cosim.campaigns.worst import worst_table
 from cosim.flying.outcome import FIELDS
 from cosim.signals import Array
 
-Facts = NDArray[np.bool_]
-
-QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
 FACTS = ("reached", "settled", "violated")  # whose rates are told
-SPREADS = ("reach_time", "min_clearance", "effort")  # whose quantiles are told
-_CONFIDENCE = 0.95
-_WORST = 5  # rows of each kind
+SPREADS = ("reach_time", "settle_time", "min_clearance", "effort", "max_force", "max_speed")  # whose quantiles are told
 _REASONS = 5  # why rows were refused
 
 
@@ -53,9 +47,9 @@ def summarise_sweep(work: SweepWork, results: Results, folder: Path) -> dict[str
         "refused": int((~flown).sum()),
         "reasons": _reasons(results, flown),
         "stopped": int(np.isfinite(results.number("stopped_at")).sum()),
-        **{name: _rate(results.fact(name)[flown]) for name in FACTS},
+        **{name: rate(results.fact(name)[flown]) for name in FACTS},
         "quantiles": {name: quantiles(results.number(name)) for name in SPREADS},
-        "worst": _worst(results, flown, folder),
+        "worst": worst_table(results, folder),
         "rank_correlations": _correlations(work, results, flown),
         **{key: value for key, value in work.plan.items() if key != "name"},
     }
@@ -65,50 +59,6 @@ def _reasons(results: Results, flown: Facts) -> dict[str, str]:
     """Return why the first rows were refused, by their number."""
     first = np.flatnonzero(~flown)[:_REASONS]
     return {str(row): str(why) for row, why in zip(results["row"][first], results["refused"][first], strict=True)}
-
-
-def _rate(happened: Facts) -> dict[str, Any]:
-    """Return how many, which share of all, and the 95 % interval of it by Wilson."""
-    n, k = len(happened), int(happened.sum())
-    if not n:
-        return {"rows": 0, "share": None, "low": None, "high": None}
-    interval = binomtest(k, n).proportion_ci(_CONFIDENCE, method="wilson")
-    return {"rows": k, "share": k / n, "low": float(interval.low), "high": float(interval.high)}
-
-
-def quantiles(values: Array) -> dict[str, float | None]:
-    """Return quantiles of numbers that there are and that are finite.
-
-    Parameters
-    ----------
-    values : ndarray, shape (n,)
-        NaN where there is none.
-
-    Returns
-    -------
-    dict of str to float or None
-        By the quantile, such as ``"0.5"``.
-    """
-    values = values[np.isfinite(values)]
-    found = np.quantile(values, QUANTILES) if values.size else [None] * len(QUANTILES)
-    return {str(q): None if x is None else float(x) for q, x in zip(QUANTILES, found, strict=True)}
-
-
-def _worst(results: Results, flown: Facts, folder: Path) -> list[dict[str, Any]]:
-    """Return the rows that most deserve a look, each with why, and the command that repeats it."""
-    rows, found = results["row"], []
-    clearance, distance, stopped = (results.number(n) for n in ("min_clearance", "closest_to_goal", "stopped_at"))
-    for why, column, order, which in (
-        ("stopped early", "stopped_at", stopped, np.isfinite(stopped)),
-        ("least clearance", "min_clearance", clearance, np.isfinite(clearance)),
-        ("farthest from the goal", "closest_to_goal", -distance, np.isfinite(distance) & (distance > 0.0)),
-    ):
-        candidates = np.flatnonzero(which & flown)
-        for i in candidates[np.argsort(order[candidates], kind="stable")][:_WORST]:
-            value = float(abs(order[i]) if column == "closest_to_goal" else order[i])
-            command = f"cosim rerun {shlex.quote(str(folder))} {rows[i]}"
-            found.append({"row": int(rows[i]), "why": why, column: value, "command": command})
-    return found
 
 
 def _correlations(work: SweepWork, results: Results, flown: Facts) -> dict[str, dict[str, Any]]:
@@ -128,5 +78,7 @@ def _correlations(work: SweepWork, results: Results, flown: Facts) -> dict[str, 
 def _rank_correlation(one: Array, other: Array) -> dict[str, float] | None:
     if len(one) < 3 or np.all(one == one[0]) or np.all(other == other[0]):
         return None
+    from scipy.stats import spearmanr  # as in `cosim.campaigns.statistics`
+
     result = spearmanr(one, other)
     return {"rho": float(result.statistic), "p": float(result.pvalue)}

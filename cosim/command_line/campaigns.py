@@ -45,7 +45,22 @@ def _add_scenes(verb: argparse.ArgumentParser) -> None:
         help="a new folder, or one that this command began: it goes on with what is left",
     )  # fmt: skip
     verb.add_argument("--workers", type=workers, default=1, metavar="N", help="processes (default: 1)")
+    add_replays(verb)
     verb.add_argument("--tell-failures", action="store_true", help="tell the law which thruster fails, and when")
+
+
+def add_replays(verb: argparse.ArgumentParser) -> None:
+    """Add the flag that says how many of the worst are shown."""
+    verb.add_argument(
+        "--replays", type=_replays, default=3, metavar="N",
+        help="the worst that are flown again to be seen in the browser (default: 3; of each law that is compared)",
+    )  # fmt: skip
+
+
+def _replays(text: str) -> int:
+    if not (text.isdecimal() and int(text) <= 1000):
+        raise argparse.ArgumentTypeError(f"{text!r}: expected a whole number from 0 to 1000")
+    return int(text)
 
 
 def workers(text: str) -> int:
@@ -58,6 +73,7 @@ def workers(text: str) -> int:
 def campaign(options: argparse.Namespace) -> int:
     """Run ``cosim campaign``."""
     from cosim.campaigns import run_campaign
+    from cosim.campaigns.campaign_page import campaign_lines, write_campaign_page
     from cosim.campaigns.law_gains import gains_from
     from cosim.scene_run import Conditions
 
@@ -68,9 +84,9 @@ def campaign(options: argparse.Namespace) -> int:
         done = run_campaign(options.scenes, options.law, options.out, conditions, gains, options.workers, progress=True)
         if not done.flown:
             print(f"{options.out}: was complete already")
-        s = done.summary
-        print(f"{s['law']}: {s['reached']} of {s['scenes']} scenes reached, {s['violations']} with a violation")
-        print(options.out / "summary.json")
+        for line in campaign_lines(done.summary):
+            print(line)
+        print(write_campaign_page(options.out, options.replays))
 
     return resumable(run, options.out)
 
@@ -78,6 +94,7 @@ def campaign(options: argparse.Namespace) -> int:
 def compare(options: argparse.Namespace) -> int:
     """Run ``cosim compare``."""
     from cosim.campaigns import compare as compare_laws
+    from cosim.campaigns.comparison_page import write_comparison_page
     from cosim.campaigns.law_gains import gains_by_law
     from cosim.scene_run import Conditions
 
@@ -89,7 +106,7 @@ def compare(options: argparse.Namespace) -> int:
         done = compare_laws(options.scenes, laws, options.out, conditions, gains, options.workers, progress=True)
         for law, s in done.numbers["laws"].items():
             print(f"{law}: {s['reached']} of {s['scenes']} scenes reached, {s['violations']} with a violation")
-        print(options.out / "compare.md")
+        print(write_comparison_page(options.out, options.replays))
 
     return resumable(run, options.out)
 

@@ -5,12 +5,14 @@ from __future__ import annotations
 import argparse
 import contextlib
 import signal
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from cosim.command_line.campaigns import INTERRUPTED
 from cosim.command_line.link_flags import add_link_flags, links_from
 from cosim.errors import TelemetryError
+from cosim.live.address import HOST, PORT, parse_live
 
 if TYPE_CHECKING:
     from cosim.mavlink.setup import Mavlink
@@ -35,12 +37,17 @@ def add_verb(verbs: Any) -> None:
     )  # fmt: skip
     run.add_argument(
         "--rate", type=_rate, metavar="N|max",
-        help="simulated seconds a second at the most (default: 1 with --commands, else max)",
+        help="simulated seconds a second at the most (default: 1 with --commands or --live, else max)",
     )  # fmt: skip
     run.add_argument("--no-report", action="store_true", help="leave out the report, its figures and the replay")
     run.add_argument(
         "--orders", type=Path, metavar="FILE",
         help="repeat what an earlier run was ordered: its orders.jsonl, with its scenario.toml",
+    )  # fmt: skip
+    run.add_argument(
+        "--live", nargs="?", const="", metavar="[HOST:]PORT",
+        help="show the run in browsers while it goes on, and take their orders with --commands "
+        f"(default: {HOST}:{PORT}, or another port if that is taken)",
     )  # fmt: skip
     add_link_flags(run, commands=True)
 
@@ -71,15 +78,24 @@ def run(options: argparse.Namespace) -> int:
         overrides.append("commands.enabled=true")
     if options.await_arm:
         overrides.append("commands.await_arm=true")
+    address = None if options.live is None else parse_live(options.live, options.allow_remote)
     mavlink = _mavlink(options)
     scenario = load_scenario(options.scenario, overrides)
-    rate = options.rate if options.rate is not None else 1.0 if options.commands else _MAX
+    rate = options.rate if options.rate is not None else 1.0 if options.commands or address else _MAX
     # a polite kill leaves a readable run too
     with contextlib.suppress(ValueError):  # which signal raises outside the main thread
         signal.signal(signal.SIGTERM, signal.default_int_handler)
-    done = run_scenario(
-        scenario, options.out, mavlink, rate or None, progress=True, report=not options.no_report, orders=options.orders
-    )
+    with contextlib.ExitStack() as stack:
+        live = None
+        if address is not None:
+            from cosim.live.view import LiveView
+
+            live = stack.enter_context(LiveView(address))
+            print(f"cosim: the run is shown at {live.url}", file=sys.stderr)
+        done = run_scenario(
+            scenario, options.out, mavlink, rate or None, progress=True, report=not options.no_report,
+            orders=options.orders, live=live,
+        )  # fmt: skip
     print(verdict(done.summary))
     print(done.folder / ("summary.json" if options.no_report else "report.html"))
     if not options.no_report:
@@ -90,11 +106,14 @@ def run(options: argparse.Namespace) -> int:
 def _mavlink(options: argparse.Namespace) -> Mavlink | None:
     """Return what the flags say of the link, None if there is to be none."""
     if not options.mavlink:
-        for flag in ("commands", "signing_key", "allow_system"):
+        for flag in ("signing_key", "allow_system"):
             if getattr(options, flag):
                 raise TelemetryError(f"--{flag.replace('_', '-')}: expected --mavlink with it")
-        return None
+        if options.commands and options.live is None:
+            raise TelemetryError("--commands: expected --mavlink or --live with it")
     endpoints, link = links_from(options)
+    if not endpoints:
+        return None
     from cosim.mavlink.setup import Mavlink
 
     return Mavlink(tuple(endpoints), link)

@@ -10,7 +10,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from cosim.command_line.campaigns import INTERRUPTED, resumable, workers
+from cosim.command_line.campaigns import INTERRUPTED, add_replays, resumable, workers
 from cosim.errors import RunError
 
 _EPILOG = """examples:
@@ -55,6 +55,7 @@ def add_verbs(verbs: Any) -> None:
     where = sweep.add_mutually_exclusive_group()
     where.add_argument("--dask", action="store_true", help="a Dask cluster of its own on this machine")
     where.add_argument("--scheduler", metavar="tcp://HOST:PORT", help="a Dask cluster that exists")
+    add_replays(sweep)
     sweep.add_argument(
         "--set", action="append", default=[], metavar="KEY=VALUE", dest="overrides",
         help="change a key of the scenario in all rows; may be repeated",
@@ -69,8 +70,8 @@ def add_verbs(verbs: Any) -> None:
 def sweep(options: argparse.Namespace) -> int:
     """Run ``cosim sweep``."""
     from cosim.campaigns.design import Design, vary_from
-    from cosim.campaigns.sweep import PAGE, run_sweep
-    from cosim.campaigns.sweep_page import sweep_lines
+    from cosim.campaigns.sweep import run_sweep
+    from cosim.campaigns.sweep_page import sweep_lines, write_sweep_page
     from cosim.scenario import load_scenario
 
     if options.scheduler and options.workers:
@@ -95,7 +96,7 @@ def sweep(options: argparse.Namespace) -> int:
             print(f"{options.out}: was complete already")
         for line in sweep_lines(done.summary):
             print(line)
-        print(options.out / PAGE)
+        print(write_sweep_page(options.out, options.replays))
 
     return resumable(run, options.out)
 
@@ -114,9 +115,13 @@ def rerun(options: argparse.Namespace) -> int:
         print(f"cosim: row {done.key}: {name} was {before!r}, is {now!r} now", file=sys.stderr)
     if not done.differing:
         print(f"row {done.key}: flown again, identical to the last bit")
+    for name, (before, now) in done.apart.items():
+        print(f"cosim: row {done.key}, step by step: {name} was {before!r}, is {now!r} now", file=sys.stderr)
+    if done.stopped is not None:
+        print(f"row {done.key}: step by step too the plant stops: {done.stopped}")
     if done.run is not None:
         print(verdict(done.run.summary))
         print(done.run.folder / "report.html")
         if done.run.summary["status"] == "interrupted":
             return INTERRUPTED
-    return 1 if done.differing else 0
+    return 1 if done.differing or done.apart else 0

@@ -23,6 +23,7 @@ from cosim.helm.orders import (
     Item,
     Mission,
     Mode,
+    Move,
     Obstacle,
     Order,
     Reset,
@@ -30,6 +31,7 @@ from cosim.helm.orders import (
     Sticks,
 )
 from cosim.helm.settings import LiveSettings
+from cosim.helm.slots import Slots
 from cosim.scenario import Scenario
 from cosim.scenario_tables import Vector3
 from cosim.signals import Array
@@ -91,8 +93,7 @@ class Helm:
         self._reach = greatest_wrench(vehicle.thruster_matrix, vehicle.thrust_min, vehicle.thrust_max)
         self._sticks: Array = np.zeros(6)
         self._course = Course()
-        self._slots: dict[int, int] = {}  # obstacles that came, by their number
-        self._free = list(range(scenario.commands.obstacles))
+        self._slots = Slots(scenario.commands.obstacles)
 
     @property
     def law_steers(self) -> bool:
@@ -139,12 +140,14 @@ class Helm:
             case Sticks():
                 self._sticks[:] = order.wrench
             case Obstacle():
-                self._place(order, time)
+                slot = self._slots.take(order.number)
+                self._surroundings.place(slot, order.position, order.radius, order.velocity, time)
             case Forget():
-                if order.number in self._slots:
-                    slot = self._slots.pop(order.number)
-                    self._surroundings.forget(slot)
-                    self._free = sorted([*self._free, slot])
+                left = self._slots.leave(order.number)
+                if left is not None:
+                    self._surroundings.forget(left)
+            case Move():
+                self._surroundings.displace(order.region, order.by)
             case Change():
                 self.settings.change(order.key, order.value)
                 self.changed = True
@@ -212,13 +215,6 @@ class Helm:
     def _aim_at(self, item: Item) -> None:
         if item.position is not None:
             self._surroundings.aim(item.position, item.radius)
-
-    def _place(self, order: Obstacle, time: float) -> None:
-        if order.number not in self._slots:
-            if not self._free:
-                raise OrderError(f"no room for obstacle {order.number}: {len(self._slots)} have come already")
-            self._slots[order.number] = self._free.pop(0)
-        self._surroundings.place(self._slots[order.number], order.position, order.radius, order.velocity, time)
 
     def watch(self, time: float, clearance: float) -> bool:
         """Write how things stand, and go on with the mission once its region was reached.

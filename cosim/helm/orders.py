@@ -77,6 +77,13 @@ class Forget(_Order, frozen=True):
     number: int
 
 
+class Move(_Order, frozen=True):
+    """Move a region by so much [m, NED], in the shape it has; one that travels goes on from there."""
+
+    region: str
+    by: Vector3
+
+
 class Change(_Order, frozen=True):
     """Change a number of the scenario while it runs; `LiveSettings` says which."""
 
@@ -114,7 +121,7 @@ class Reset(_Order, frozen=True):
     """End this run, and begin it again from time 0."""
 
 
-Order = Arm | Steer | Aim | Face | Sticks | Obstacle | Forget | Change | Mission | Begin | Reset
+Order = Arm | Steer | Aim | Face | Sticks | Obstacle | Forget | Move | Change | Mission | Begin | Reset
 
 
 def check_order(order: Order) -> None:
@@ -134,6 +141,8 @@ def check_order(order: Order) -> None:
         case Aim() | Obstacle():
             _check_place(order.position, order.radius)
             _require(all(abs(v) <= _FAST for v in order.velocity), "velocity", order.velocity, f"up to {_FAST:g} m/s")
+        case Move():
+            _require(all(abs(x) <= _FAR for x in order.by), "by", order.by, f"finite numbers up to {_FAR:g} m")
         case Mission():
             for item in order.items:
                 _check_item(item, len(order.items))

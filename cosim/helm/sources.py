@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections import deque
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Protocol
 
@@ -170,10 +170,14 @@ class LoggedOrders:
         Where the orders come from.
     file : Path
         The log; made when the first order is taken.
+    tell : callable, optional
+        Told of each step that takes orders, and of these, once they are written.
     """
 
-    def __init__(self, source: OrderSource, file: Path) -> None:
-        self._source, self._file = source, file
+    def __init__(
+        self, source: OrderSource, file: Path, tell: Callable[[int, Sequence[Order]], None] | None = None
+    ) -> None:
+        self._source, self._file, self._tell = source, file, tell
 
     @property
     def exhausted(self) -> bool:
@@ -185,6 +189,8 @@ class LoggedOrders:
         orders = self._source.take(k)
         if orders:
             self._write(_Entry(k, order) for order in orders)
+            if self._tell is not None:
+                self._tell(k, orders)
         return orders
 
     def _write(self, entries: Iterable[_Entry]) -> None:

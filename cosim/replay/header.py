@@ -14,6 +14,7 @@ from cosim.scenario import Scenario
 from cosim.signals import Column
 from fuzzy_arbiter import Arbiter, System
 from plant_fmu import Vehicle
+from plant_fmu.thruster_lines import thruster_lines
 
 VERSION = 1  # of the format
 _SEA_WATER = 1026.0 * 9.81  # N/m3; only for the size of a hull that no vehicle's file tells
@@ -99,17 +100,14 @@ def _vehicle(vehicle: Vehicle) -> dict[str, Any]:
     """
     radius = vehicle.hull_radius or (0.75 * vehicle.buoyancy / (_SEA_WATER * np.pi)) ** (1.0 / 3.0)
     thrusters = []
-    for i, (column, least, most) in enumerate(
-        zip(vehicle.thruster_matrix.T, vehicle.thrust_min, vehicle.thrust_max, strict=True)
+    for i, (line, least, most) in enumerate(
+        zip(thruster_lines(vehicle), vehicle.thrust_min, vehicle.thrust_max, strict=True)
     ):
-        force, moment = column[:3], column[3:]
-        square = float(force @ force)
-        at = np.cross(force, moment) / square if square > 0.0 else np.zeros(3)
         thrusters.append(
             {
                 "name": str(i + 1),
-                "position": [float(x) for x in at],
-                "direction": [float(x) for x in force],
+                "position": [float(x) for x in line.nearest],
+                "direction": [float(x) for x in line.force],
                 "min": float(least),
                 "max": float(most),
             }

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from bisect import bisect_right
 from collections.abc import Sequence
 from typing import assert_never
 
@@ -14,6 +15,7 @@ from cosim.helm.orders import (
     Face,
     Forget,
     Mission,
+    Move,
     Obstacle,
     Order,
     Reset,
@@ -49,17 +51,15 @@ def ordered_events(log: Sequence[tuple[int, Order]], step: float, most: int) -> 
     list of (float, str)
         Times [s] of the first order of each moment, and words for all of its.
     """
-    moments: list[tuple[int, int, list[str]]] = []  # first and last step, words
+    steps = sorted({k for k, _ in log})
+    gaps = [later - earlier for earlier, later in zip(steps, steps[1:], strict=False)]
+    # orders that are no farther apart than this are of one moment
+    apart = sorted(gaps)[len(steps) - most - 1] if len(steps) > most else 0
+    begins = [k for k, gap in zip(steps, [apart + 1, *gaps], strict=False) if gap > apart]
+    words: dict[int, list[str]] = {k: [] for k in begins}
     for k, order in log:
-        if moments and moments[-1][1] == k:
-            moments[-1][2].append(order_words(order))
-        else:
-            moments.append((k, k, [order_words(order)]))
-    while len(moments) > most:
-        i = min(range(1, len(moments)), key=lambda i: moments[i][0] - moments[i - 1][1])
-        (first, _, before), (_, last, words) = moments[i - 1], moments[i]
-        moments[i - 1 : i + 1] = [(first, last, before + words)]
-    return [(first * step, _joined(words)) for first, _, words in moments]
+        words[begins[bisect_right(begins, k) - 1]].append(order_words(order))
+    return [(k * step, _joined(of_moment)) for k, of_moment in words.items()]
 
 
 def _joined(words: Sequence[str]) -> str:
@@ -97,6 +97,8 @@ def order_words(order: Order) -> str:
             return f"Obstacle {order.number} at {_place(order.position)}, radius {order.radius:.3g} m"
         case Forget():
             return f"Obstacle {order.number} gone"
+        case Move():
+            return f"{order.region} moved by {_place(order.by)}"
         case Change():
             return f"{order.key} is {order.value:.6g}"
         case Mission():

@@ -12,17 +12,18 @@ from typing import Any
 
 REPLAY = "replay.html"
 
-_SCENE = (
+SCENE_SCRIPTS = (
     "palette.js", "vectors.js", "camera.js", "solids.js", "pipes.js", "planes.js", "painter.js", "sights.js",
-    "vehicle.js", "trail.js", "bounds.js", "order.js", "labels.js", "floor.js", "controls.js", "scene.js",
+    "hull.js", "vehicle.js", "forces.js", "trail.js", "shadows.js", "bounds.js", "order.js",
+    "regions.js", "labels.js", "floor.js", "controls.js", "scene.js",
 )  # fmt: skip
 _PLAYER = (
     "player.js", "words.js", "curves.js", "axes.js", "plot.js", "charts.js", "board.js", "timeline.js", "panel.js",
     "stage.js", "head.js", "keys.js", "page.js",
 )  # fmt: skip
-_SCRIPTS = ("data.js", *_SCENE, *_PLAYER, "live.js", "main.js")
-_STYLES = ("style.css", "panel.css", "layout.css")
-
+_LIVE = ("things.js", "ghost.js", "dragging.js", "helm.js", "live.js")
+_SCRIPTS = ("data.js", *SCENE_SCRIPTS, *_PLAYER, *_LIVE, "main.js")
+_STYLES = ("style.css", "stage.css", "charts.css", "panel.css", "transport.css", "layout.css", "live.css")
 
 _MARK = '<script type="application/json" id="runs">'  # where the data of a page begins
 
@@ -46,8 +47,8 @@ def replay_page(runs: Sequence[dict[str, Any]], title: str) -> str:
     style, script = (
         "\n".join((assets / name).read_text(encoding="utf-8") for name in names) for names in (_STYLES, _SCRIPTS)
     )
-    # "</" would end the element it stands in
-    data = json.dumps(list(runs), separators=(",", ":"), allow_nan=False, ensure_ascii=False).replace("</", "<\\/")
+    # "</script" would end the element that it stands in, and "<!--" with "<script" would keep it from ending
+    data = json.dumps(list(runs), separators=(",", ":"), allow_nan=False, ensure_ascii=False).replace("<", "\\u003c")
     return Template((assets / "page.html").read_text(encoding="utf-8")).substitute(
         title=html.escape(title),
         style=style,

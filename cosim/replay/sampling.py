@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from cosim.signals import Array
 
-_BYTES = 480_000  # of numbers, for the first minute
+_BYTES = 400_000  # of numbers, for the first minute
 _BYTES_A_MINUTE = 150_000  # for each further one
 _MOST_BYTES = 6_000_000
 _PARTS = 100  # of the run, from each of which the extremes are kept

@@ -1,14 +1,13 @@
-"""Draws the pictures of docs/arbiter.md into the folder in which it is run: ``cd docs/images && python arbiter.py``."""
+"""Draws the pictures of docs/arbiter.md into the folder in which it is run."""
 
 from __future__ import annotations
 
-import io
 import runpy
 from pathlib import Path
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from PIL import Image
+from small import write
 
 from fuzzy_arbiter import Arbiter, Criterion, pictures, rising
 
@@ -23,11 +22,13 @@ SHOWN = (
     "hysteresis, release 5 cm outside",
     "the same, and a ramp before it",
 )
-COLOURS = 128  # of a picture; fewer than it has, which halves the file
 
 
 def main() -> None:
     """Draw all of them."""
+    paper = Arbiter()
+    save(paper_terms(paper), "paper-terms")
+    save(paper_surfaces(paper), "paper-surface")
     building = Arbiter([SMOKE, AIR, ROOM])
     save(pictures.terms(building, "co2", at=1280.0), "terms")
     save(pictures.rules(building, PLACE, "alpha_2"), "rules")
@@ -37,6 +38,24 @@ def main() -> None:
     save(next(iter(pictures.normalisations(building, "smoke", at).values())), "normalisations")
     save(forms(), "forms")
     save(chatter(), "chatter")
+
+
+def paper_terms(paper: Arbiter) -> Axes:
+    """Draw the terms of the paper's inputs, and of one of its three like outputs."""
+    figure = Figure(figsize=(9.6, 4.6), layout="constrained")
+    for ax, name in zip(figure.subplots(2, 2).flat, ("obstacle", "shape", "depth", "alpha_1"), strict=True):
+        pictures.terms(paper, name, ax=ax)
+    return ax
+
+
+def paper_surfaces(paper: Arbiter) -> Axes:
+    """Draw the control surface of each of the paper's weights, over the two inputs that it varies most with."""
+    figure = Figure(figsize=(12.4, 3.9), layout="constrained")
+    over = {"alpha_1": ("obstacle", "shape"), "alpha_2": ("obstacle", "shape"), "alpha_3": ("shape", "depth")}
+    fixed = {"alpha_1": {"depth": 0.0}, "alpha_2": {"depth": 0.0}, "alpha_3": {"obstacle": 0.0}}
+    for ax, output in zip(figure.subplots(1, 3), over, strict=True):
+        pictures.surface(paper, output, over[output], fixed[output], ax=ax)
+    return ax
 
 
 def forms() -> Axes:
@@ -70,12 +89,5 @@ def chatter() -> Axes:
 
 
 def save(ax: Axes, name: str) -> None:
-    """Write the figure of some axes, with few colours."""
-    out = io.BytesIO()
-    ax.figure.savefig(out, format="png", dpi=100)
-    image = Image.open(out).convert("RGB").quantize(COLOURS, dither=Image.Dither.NONE)
-    image.save(Path(f"arbiter-{name}.png"), optimize=True)
-
-
-if __name__ == "__main__":
-    main()
+    """Write the figure of some axes."""
+    write(ax.figure, Path(f"arbiter-{name}.png"))

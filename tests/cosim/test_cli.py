@@ -16,14 +16,14 @@ QUICK = ["--set", "arbiter.engine=closed", "--set", "time.duration=0.02"]
 
 @pytest.mark.parametrize(
     ("flags", "look"),
-    [(["--no-report"], "summary.json"), pytest.param([], "report.html", marks=pytest.mark.slow)],
+    [(["--no-report"], ["summary.json"]), pytest.param([], ["report.html", "replay.html"], marks=pytest.mark.slow)],
     ids=["without a report", "with one"],
 )
 def test_run_says_what_happened_and_where_to_look(tmp_path, capsys, flags, look):
     out = tmp_path / "run"
     assert main(["run", "paper", "--out", str(out), *flags, *QUICK]) == 0
     said = capsys.readouterr()
-    assert said.out.splitlines()[-1] == str(out / look)
+    assert said.out.splitlines()[-len(look) :] == [str(out / name) for name in look]
     assert "never entered the goal region" in said.out
     assert said.err == ""  # no bar where there is no terminal
 

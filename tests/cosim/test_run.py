@@ -2,6 +2,7 @@
 
 import contextlib
 import json
+from pathlib import Path
 
 import numpy as np
 import pyarrow.parquet as pq
@@ -144,6 +145,33 @@ def test_a_record_keeps_every_bit(tmp_path):
         recorder.observe(k, row)
     recorder.close()
     assert load_record(tmp_path).stack(["time", "x"]).tobytes() == rows.tobytes()
+    assert [p.name for p in tmp_path.iterdir()] == ["record.parquet"]
+
+
+@pytest.mark.parametrize("when", ["before", "after"])
+@pytest.mark.parametrize("where", ["pq.write_table", "pq.ParquetWriter.write_table", "Path.replace"])
+def test_an_interruption_while_a_part_is_written_loses_and_doubles_nothing(tmp_path, monkeypatch, where, when):
+    recorder = Recorder(tmp_path, COLUMNS, rows_per_part=10)
+    name, _, method = where.rpartition(".")
+    owner = {"pq": pq, "pq.ParquetWriter": pq.ParquetWriter, "Path": Path}[name]
+    real, calls = getattr(owner, method), []
+
+    def interrupted(*arguments, **keywords):
+        calls.append(method)
+        if len(calls) == 2 and when == "before":
+            raise KeyboardInterrupt
+        done = real(*arguments, **keywords)
+        if len(calls) == 2:
+            raise KeyboardInterrupt
+        return done
+
+    monkeypatch.setattr(owner, method, interrupted)
+    with contextlib.suppress(KeyboardInterrupt):
+        for k in range(100):
+            recorder.observe(k, np.array([k, 2.0 * k]))
+    assert 10 <= recorder.rows < 100
+    recorder.close()
+    assert load_record(tmp_path)["time"].tolist() == list(range(recorder.rows))
     assert [p.name for p in tmp_path.iterdir()] == ["record.parquet"]
 
 

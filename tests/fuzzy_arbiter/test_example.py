@@ -130,16 +130,6 @@ def test_the_manual_s_commands_run(tmp_path, monkeypatch, capsys):
     assert {path.name for path in tmp_path.iterdir()} >= {"weights.csv", "arbiter.fis", "arbiter.c", "who.svg"}
 
 
-@pytest.mark.slow
-def test_the_manual_s_pictures_are_those_that_its_script_draws(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    runpy.run_path(str(ROOT / "docs" / "images" / "arbiter.py"), run_name="__main__")
-    drawn = {path.name for path in tmp_path.iterdir()}
-    assert drawn == {path.name for path in (ROOT / "docs" / "images").glob("arbiter-*.png")}
-    assert drawn == set(re.findall(r"\(images/(.*?)\)", MANUAL))
-    assert all((ROOT / "docs" / "images" / name).stat().st_size < 100_000 for name in drawn)
-
-
 def table(heading):
     """Rows of the first table below a heading, as lists of cells."""
     part = MANUAL[MANUAL.index(f"\n## {heading}\n") :]

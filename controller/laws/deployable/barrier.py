@@ -83,9 +83,8 @@ def look(sight: Sight, regions: PackedRegions, position: Array, quaternion: Arra
     evaluate_packed(regions, position, quaternion, s.values, s.gradients, s.turnings, s.clearances)
     place = position + _AHEAD * velocity[:3]
     r = regions
-    moved = PackedRegions(
-        r.kinds, r.signs, r.offsets, r.numbers, r.shifts + _AHEAD * r.velocities, r.velocities, r.gains, r.hard
-    )
+    shifts = r.shifts + _AHEAD * r.velocities
+    moved = PackedRegions(r.kinds, r.signs, r.offsets, r.numbers, shifts, r.velocities, r.gains, r.hard, r.others)
     attitude = quaternion + _AHEAD * quaternion_rate(quaternion, velocity[3:])
     attitude /= np.sqrt(attitude[0] ** 2 + attitude[1] ** 2 + attitude[2] ** 2 + attitude[3] ** 2)
     evaluate_packed(moved, place, attitude, s.later_values, s.later_gradients, s.later_turnings, s.later_clearances)

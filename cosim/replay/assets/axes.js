@@ -56,7 +56,7 @@ function rangeOf(curves, window, zero) {
     if (least >= low - 2 * room && most <= high + 2 * room) [low, high] = [Math.min(low, least), Math.max(high, most)];
   }
   if (zero) [low, high] = [Math.min(low, 0), Math.max(high, 0)];
-  const pad = high - low > 1e-9 ? 0.06 * (high - low) : Math.max(0.5 * Math.abs(high), 1e-3);
+  const pad = high - low > 1e-9 ? 0.06 * (high - low) : 0.5 * Math.abs(high) || 1;
   return [low - pad, high + pad];
 }
 

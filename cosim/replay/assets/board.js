@@ -23,11 +23,12 @@ class Board {
 
   /** @param {Run[]} runs of the page  @param {boolean[]} shown which of them are  @param {number} selected whose values are told */
   setRuns(runs, shown, selected) {
-    const keys = JSON.stringify(chartsOf(runs).map((spec) => [spec.key, spec.signals.map((of) => of.name)]));
-    this.runs = runs;
-    this.selected = selected;
-    if (keys !== this._keys) this._rebuild(runs);
+    const specs = chartsOf(runs);
+    const keys = JSON.stringify(specs.map((spec) => [spec.key, spec.signals.map((of) => [of.name, of.faint])]));
+    Object.assign(this, { runs, shown, selected });
+    if (keys !== this._keys) this._rebuild(specs);
     this._keys = keys;
+    this._asked = performance.now();
     const names = runNames(runs);
     const some = runs.map((run, index) => ({ run, index, name: names[index] })).filter(({ index }) => shown[index]);
     for (const chart of this.charts) chart.setRuns(some, runs.length > 1);
@@ -45,6 +46,8 @@ class Board {
     if (this._pending) return;
     this._pending = setTimeout(() => {
       this._pending = 0;
+      // other regions may have become the nearest ones
+      if (performance.now() - this._asked > 3000) this.setRuns(this.runs, this.shown, this.selected);
       for (const chart of this.charts) chart.grown();
       this._frame();
     }, 125);
@@ -80,9 +83,10 @@ class Board {
 
   /** Move the cursor: every frame. */
   point() {
-    const { t, playing } = this.player;
-    if (playing && this.window && (t > this.window[1] || t < this.window[0])) {
-      this._show(t, this.window[1] - this.window[0]);
+    const { t, playing, live } = this.player;
+    if ((playing || live) && this.window && (t > this.window[1] || t < this.window[0])) {
+      const length = this.window[1] - this.window[0];
+      this._show(live ? t - length : t, length); // a page on; of a live run always the last seconds
     }
     const now = performance.now();
     const tell = !playing || now - this._told > 90; // nobody reads faster
@@ -90,7 +94,7 @@ class Board {
     for (const chart of this.charts) {
       if (!chart.near || chart.element.hidden) continue;
       chart.paint();
-      chart.point(t);
+      chart.point(live && !this.window ? Math.min(t, chart.window[1]) : t); // the newest rows are not drawn yet
       if (tell && !this._hovering) chart.tell(t, this.selected);
     }
   }
@@ -101,6 +105,7 @@ class Board {
       chart.stale = true;
       chart.paint(onPaper ? this.player.t : null);
       chart.point(this.player.t);
+      chart.tell(this.player.t, this.selected);
     }
   }
 
@@ -124,7 +129,7 @@ class Board {
     this._next = requestAnimationFrame(() => this.point());
   }
 
-  _rebuild(runs) {
+  _rebuild(specs) {
     this._watcher.disconnect();
     this._sizes.disconnect();
     const on = {
@@ -136,7 +141,7 @@ class Board {
       whole: () => this.whole(),
       changed: () => this._later(),
     };
-    this.charts = chartsOf(runs).map((spec) => new Chart(spec, this.theme, on));
+    this.charts = specs.map((spec) => new Chart(spec, this.theme, on));
     this.holder.replaceChildren(...this.charts.map((chart) => chart.element));
     this._choices();
     for (const chart of this.charts) {

@@ -24,7 +24,7 @@ function placesOf(run) {
     const { centre, radius } = surfaceOf(shape);
     for (const t of [run.start, run.end]) {
       const at = Vec.add(centre, run.shift(0, t));
-      if (Vec.finite(at)) for (const k of [-1, 1]) for (let i = 0; i < 3; i++) kept.push(at.map((x, j) => x + (i === j ? k * radius : 0)));
+      if (Vec.finite(at)) kept.push(at.map((x) => x - radius), at.map((x) => x + radius));
     }
   }
   return kept;
@@ -35,9 +35,41 @@ function boxAbout(points) {
   return [Math.min, Math.max].map((most) => [0, 1, 2].map((i) => points.reduce((x, p) => most(x, p[i]), points[0][i])));
 }
 
+/** The upright box about a surface that is shifted. */
+function boxOfSolid({ points }, shift) {
+  const box = [new Array(3).fill(Infinity), new Array(3).fill(-Infinity)];
+  for (let k = 0; k < points.length; k++) {
+    const x = points[k] + shift[k % 3];
+    box[0][k % 3] = Math.min(box[0][k % 3], x);
+    box[1][k % 3] = Math.max(box[1][k % 3], x);
+  }
+  return box;
+}
+
+/**
+ * What of a region belongs into the picture: points. A bounded one counts where it is near the way, along the axes on
+ * which it does not go beyond: a pipeline of a kilometre shall not make a vehicle a dot. Of a plane it is the point
+ * that is nearest to the way's middle.
+ */
+function reachOf(shape, shift, way, limits, room) {
+  const inLimits = (x, k) => x >= limits[0][k] && x <= limits[1][k];
+  if (SOLIDS[shape.kind]) {
+    const solid = surfaceOf(shape);
+    if (!isThere(Vec.add(solid.centre, shift))) return [];
+    const box = boxOfSolid(solid, shift);
+    if (box[0].some((x, k) => x > limits[1][k]) || box[1].some((x, k) => x < limits[0][k])) return [];
+    const within = (x, k) => (inLimits(x, k) ? x : Math.min(way[1][k], Math.max(way[0][k], x)));
+    return box.map((corner) => corner.map(within));
+  }
+  if (!PLANES[shape.kind]) return [];
+  const middle = Vec.scale(Vec.add(...way), 0.5);
+  return PLANES[shape.kind](shape)
+    .map(({ point, normal }) => Vec.along(middle, normal, Vec.dot(Vec.sub(Vec.add(point, shift), middle), normal)))
+    .filter((p) => p.every((x, k) => x >= limits[0][k] - room && x <= limits[1][k] + room));
+}
+
 /**
  * The points that a camera shall have in its picture, and the box in which the scene is drawn.
- * Regions count as far as they are near the way: a pipeline of a kilometre shall not make a vehicle a dot.
  * @param {Run[]} runs  @returns {{content: number[][], bounds: [number[], number[]]}}
  */
 function extentOf(runs) {
@@ -45,41 +77,23 @@ function extentOf(runs) {
   if (!places.length) places.push([-1, -1, 0], [1, 1, 2]);
   const radius = Math.max(0.1, ...runs.map((run) => run.header.vehicle.radius));
   const [low, high] = boxAbout(places);
-  const room = Math.max(6 * radius, 0.35 * Math.hypot(...Vec.sub(high, low)));
+  const room = Math.max(6 * radius, 0.35 * Vec.norm(Vec.sub(high, low)));
   const limits = [low.map((x) => x - room), high.map((x) => x + room)];
-  const content = [low.map((x) => x - 2 * radius), high.map((x) => x + 2 * radius)];
-  const within = (p) => p.map((x, i) => Math.min(limits[1][i], Math.max(limits[0][i], x)));
+  const way = [low.map((x) => x - 2 * radius), high.map((x) => x + 2 * radius)];
+  const content = [...way];
   for (const run of runs) {
-    run.header.regions.forEach((region, i) => {
+    run.header.regions.forEach((_, i) => {
       for (const t of [run.start, 0.5 * (run.start + run.end), run.end]) {
-        const [shape, shift] = [run.shape(i, t), run.rows ? run.shift(i, t) : [0, 0, 0]];
-        if (SOLIDS[shape.kind]) {
-          const { points, centre } = surfaceOf(shape);
-          if (!isThere(Vec.add(centre, shift))) continue;
-          const corners = [[], []];
-          for (let axis = 0; axis < 3; axis++) {
-            for (let k = axis; k < points.length; k += 3) {
-              corners[0][axis] = Math.min(corners[0][axis] ?? Infinity, points[k] + shift[axis]);
-              corners[1][axis] = Math.max(corners[1][axis] ?? -Infinity, points[k] + shift[axis]);
-            }
-          }
-          if (corners[0].every((x, k) => x < limits[1][k]) && corners[1].every((x, k) => x > limits[0][k])) content.push(...corners.map(within));
-        } else if (PLANES[shape.kind]) {
-          // the point of the plane that is nearest to the middle, so that the plane is in the picture
-          const middle = Vec.scale(Vec.add(low, high), 0.5);
-          for (const { point, normal } of PLANES[shape.kind](shape)) {
-            const off = Vec.dot(Vec.sub(Vec.add(point, shift), middle), normal);
-            const nearest = Vec.along(middle, normal, off);
-            if (nearest.every((x, k) => x >= limits[0][k] - room && x <= limits[1][k] + room)) content.push(nearest);
-          }
-        }
+        content.push(...reachOf(run.shape(i, t), run.rows ? run.shift(i, t) : [0, 0, 0], way, limits, room));
       }
     });
   }
-  const [a, b] = boxAbout(content);
-  const step = roundStep(Math.max(b[0] - a[0], b[1] - a[1]) / 20);
-  const outward = (x, i, sign) => (i < 2 ? step * (sign > 0 ? Math.ceil(x / step) : Math.floor(x / step)) : x);
-  const bounds = [a.map((x, i) => outward(x, i, -1)), b.map((x, i) => outward(x, i, 1))];
+  const bounds = boxAbout(content.filter(Vec.finite));
+  const step = roundStep(Math.max(bounds[1][0] - bounds[0][0], bounds[1][1] - bounds[0][1]) / 20);
+  for (const axis of [0, 1]) {
+    bounds[0][axis] = step * Math.floor(bounds[0][axis] / step);
+    bounds[1][axis] = step * Math.ceil(bounds[1][axis] / step);
+  }
   // the water's surface tells most where it is near
   const height = bounds[1][2] - bounds[0][2];
   if (bounds[0][2] > 0 && bounds[0][2] < 0.6 * height) bounds[0][2] = 0;

@@ -1,4 +1,4 @@
-// The camera: where it looks from, and where a point of the world is seen. World is north, east, down; down is downwards.
+// The camera: where it looks from, and where a point of the world (north, east, down) is seen. Down is downwards.
 
 const HALF_VIEW = (24 * Math.PI) / 180; // rad, half of the angle of view across the picture's diagonal
 const STEEPEST = Math.PI / 2;
@@ -13,6 +13,7 @@ class Camera {
     this.content = []; // points that fit() brings into the picture
     this.bearing = 0; // rad, towards which the content goes
     this.listeners = new Set(); // called when the view changes
+    this.fitted = true; // nothing has moved it since all content was brought into the picture
     this.width = 1;
     this.height = 1;
     this._update();
@@ -23,7 +24,8 @@ class Camera {
     if (this.width === width && this.height === height) return;
     this.width = Math.max(1, width);
     this.height = Math.max(1, height);
-    this._update();
+    if (this.fitted) this.fit();
+    else this._update();
   }
 
   /** Go around the target, as a hand that drags the scene by so many CSS pixels. */
@@ -87,6 +89,7 @@ class Camera {
       this.distance += middle;
     }
     this._changed();
+    this.fitted = true;
   }
 
   /** Pixels and depth [m] of a point: [x, y, depth]; meaningless unless depth is above `near`. */
@@ -145,6 +148,7 @@ class Camera {
   }
 
   _changed() {
+    this.fitted = false;
     this._update();
     for (const listener of this.listeners) listener();
   }

@@ -88,6 +88,7 @@ class Chart {
     this.frame = new Frame(width, height, this.window, rangeOf(this.curves, this.window, this.spec.zero), this.spec.down);
     if (this.spec.fixed) this.frame = new Frame(width, height, this.window, [-0.03, 1.06], false);
     paintPlot(context, this.frame, this.spec, this.curves, this.theme);
+    context.fillStyle = hueColour("ink", this.theme);
     if (cursor !== null) context.fillRect(this.frame.x(cursor) - 0.75, this.frame.top, 1.5, this.frame.bottom - this.frame.top);
     this.stale = false;
   }
@@ -101,7 +102,7 @@ class Chart {
   tell(t, index) {
     for (const { of, value } of this._entries) {
       const curve = this.curves.find((one) => one.signal === of && one.index === index);
-      const text = curve ? quantity(curve.values[curve.run.row(t)] ?? NaN, this.spec.unit) : "";
+      const text = curve ? quantity(valueAt(curve, t), this.spec.unit) : "";
       if (value.textContent !== text) value.textContent = text;
     }
   }
@@ -126,8 +127,9 @@ class Chart {
 
   _nearest(t, y) {
     let best = { gap: 26, text: "" };
-    for (const { index, run, signal: of, values } of this.curves) {
-      const value = values[run.row(t)];
+    for (const curve of this.curves) {
+      const { index, signal: of } = curve;
+      const value = valueAt(curve, t);
       const gap = Math.abs(this.frame.y(value) - y) + (of.faint ? 4 : 0);
       if (!(gap < best.gap)) continue;
       const whose = this._several ? `${this._names[index]}: ` : "";
@@ -197,6 +199,11 @@ class Chart {
     this.element.append(caption, this.plot);
     handlePlot(this);
   }
+}
+
+/** The number of a curve at a time; a run that grows may have rows that are not drawn yet. */
+function valueAt({ run, values }, t) {
+  return values.length ? values[Math.min(run.row(t), values.length - 1)] : NaN;
 }
 
 /** Pointer on a plot: drag seeks, Shift and drag picks a window, Ctrl or Shift and wheel zooms, double click is all. */

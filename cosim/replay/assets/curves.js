@@ -3,7 +3,7 @@
 // Okabe and Ito's colours, darker on white and lighter on black where a line would else be faint.
 const HUES = {
   light: {
-    vermillion: "#d55e00", orange: "#b07800", sky: "#2b87bd", green: "#008a65",
+    vermillion: "#d55e00", orange: "#c98800", sky: "#2b87bd", green: "#008a65",
     blue: "#0060a8", purple: "#b3558c", ink: "#1b2733", grey: "#9aa5b0",
   },
   dark: {
@@ -13,9 +13,8 @@ const HUES = {
 };
 const OF_CRITERION = { obstacle: "vermillion", shape: "orange", depth: "sky" };
 const IN_TURN = ["blue", "vermillion", "green", "purple"];
-const OF_RUN = ["blue", "vermillion", "green", "purple", "orange", "sky"];
 const DASHES = [[], [7, 4], [2, 3], [10, 3, 2, 3], [14, 4], [4, 2, 1, 2, 1, 2]];
-const SHADES = [0, 0.5, 0.25, 0.65]; // how far to ink regions of one criterion go, in turn
+const TOWARDS_INK = [0, 0.5, 0.25, 0.65]; // how far to ink regions of one criterion go, in turn
 const NAMED = 6; // regions that the chart of distances tells by name
 
 /** The dash of a run, where a page has several. */
@@ -54,6 +53,15 @@ function derived(compute) {
   };
 }
 
+/** Clearances of an obstacle that comes and goes: no number while it is not there. */
+function whileThere(name) {
+  return derived((run) => {
+    const values = run.column(`${name}.clearance`);
+    const shifts = ["x", "y", "z"].map((axis) => run.column(`${name}.shift.${axis}`));
+    return values && values.map((value, row) => (shifts.some((shift) => shift[row] !== 0) ? value : NaN));
+  });
+}
+
 /** Clearances of the regions with one unit: the nearest by name, the others thin and grey. */
 function clearances(runs, unit) {
   const found = new Map();
@@ -68,13 +76,15 @@ function clearances(runs, unit) {
   const near = [...found.values()].filter(({ region }) => region.criterion).sort((a, b) => a.least - b.least);
   const named = new Set(near.slice(0, NAMED).map(({ region }) => region.name));
   const seen = {};
+  let told = 0;
   return [...found.values()].map(({ region }) => {
     const faint = Boolean(region.criterion) && !named.has(region.name);
     const nth = faint ? 0 : (seen[region.criterion] = (seen[region.criterion] ?? -1) + 1);
     return signal(`${region.name}.clearance`, region.name, faint ? "grey" : OF_CRITERION[region.criterion] ?? "green", {
-      shade: faint ? 0 : SHADES[nth % SHADES.length],
-      dash: faint ? [] : DASHES[nth % DASHES.length],
+      shade: faint ? 0 : TOWARDS_INK[nth % TOWARDS_INK.length],
+      dash: faint ? [] : DASHES[told++ % DASHES.length],
       faint,
+      ...(region.comes ? { values: whileThere(region.name) } : {}),
     });
   });
 }
@@ -101,7 +111,8 @@ function estimates(indices) {
  *   where they hold zero (below it is violated), fixed ([least, most]), down (the axis points down), tall
  */
 function chartsOf(runs) {
-  const criteria = (kind) => Object.entries(OF_CRITERION).map(([name, hue]) => signal(`${kind}.${name}`, name, hue));
+  const criteria = (kind) =>
+    Object.entries(OF_CRITERION).map(([name, hue], i) => signal(`${kind}.${name}`, name, hue, { dash: DASHES[i] }));
   const axes = (kind, letters, words = letters) => inTurn([...letters].map((a) => `${kind}.${a}`), [...words]);
   const size = (kind) => derived((run) => sizes(run, ["X", "Y", "Z"].map((axis) => `${kind}.${axis}`)));
   const thrusters = Math.max(0, ...runs.map((run) => run.header.vehicle?.thrusters?.length ?? 0));
@@ -136,6 +147,6 @@ function chartsOf(runs) {
     },
   ].filter((spec) => {
     spec.signals = spec.signals.filter((one) => runs.some((run) => one.values(run)));
-    return spec.signals.length;
+    return spec.signals.some((one) => !one.context);
   });
 }

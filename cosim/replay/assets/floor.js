@@ -9,7 +9,7 @@ function roundStep(least) {
 /** A number of metres, with the digits that a step asks for. */
 function metres(x, step) {
   const text = x.toFixed(Math.max(0, -Math.floor(Math.log10(step) + 1e-9)));
-  return Number(text) === 0 ? "0" : text;
+  return Number(text) === 0 ? "0" : text.replace("-", "−");
 }
 
 /** The multiples of a step within two bounds. */
@@ -59,7 +59,7 @@ function paintFloor(painter, labels, bounds, colours, named) {
     const off = rank > 40 ? 13 : 32;
     const x = p[0] + (off * (q[0] - p[0])) / length;
     const y = p[1] + (off * (q[1] - p[1])) / length + (length < 2 ? off : 0);
-    labels.add({ key, text, x, y, colour: colours.soft, size: 11, rank, gap: 0, sides: ["here"] });
+    labels.add({ key, text, x, y, colour: colours.soft, size: 11, rank, gap: 0, pad: 7, sides: ["here"] });
   };
   const out = 0.02 * camera.distance;
   name("north", [middle[0], east[0], floor], [0, out * east[1], 0], "north [m]", 40);
@@ -73,7 +73,8 @@ function paintRuler(painter, labels, bounds, colours, named) {
   const { camera } = painter;
   const [low, high] = bounds;
   const corners = [low, high].flatMap(([n]) => [low, high].map(([, e]) => [n, e]));
-  const feet = corners.map(([n, e]) => [n, e, camera.project([n, e, high[2]])]).filter((foot) => foot[2][2] > camera.near);
+  const seen = corners.map(([n, e]) => [n, e, camera.project([n, e, high[2]])]);
+  const feet = seen.filter((foot) => foot[2][2] > camera.near);
   if (!feet.length) return;
   const [n, e, foot] = feet.reduce((a, b) => (b[2][0] < a[2][0] ? b : a));
   const head = camera.project([n, e, low[2]]);
@@ -105,42 +106,29 @@ function paintSurface(painter, bounds, colours) {
   painter.stroke(colours.gridMajor, 1, 0.9, [2, 4]);
 }
 
-/** The outline of points seen from above, north and east in turn: their convex hull, after Andrew. */
-function outlineFromAbove(points) {
-  const flat = [];
-  for (let i = 0; i < points.length; i += 3) flat.push([points[i], points[i + 1]]);
-  flat.sort((a, b) => a[0] - b[0] || a[1] - b[1]);
-  const left = (a, b, c) => (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]) > 1e-12;
-  const half = (sorted) => {
-    const chain = [];
-    for (const p of sorted) {
-      while (chain.length > 1 && !left(chain[chain.length - 2], chain[chain.length - 1], p)) chain.pop();
-      chain.push(p);
-    }
-    return chain.slice(0, -1);
-  };
-  return [...half(flat), ...half([...flat].reverse())];
-}
-
 /** North, east and down in a corner, and how long a metre is where the camera looks. */
 function paintCompass(painter, labels, colours) {
   const { context, camera } = painter;
   const [x, y, size] = [46, camera.height - 46, 26];
   const axes = [["N", [1, 0, 0]], ["E", [0, 1, 0]], ["D", [0, 0, 1]]];
+  const placed = [];
   context.lineCap = "round";
   context.textAlign = "center";
   context.textBaseline = "middle";
-  for (const [name, axis] of axes.sort((a, b) => Vec.dot(b[1], camera.forward) - Vec.dot(a[1], camera.forward))) {
+  context.font = "600 11px system-ui, sans-serif";
+  for (const [name, axis] of axes) {
     const [dx, dy] = [size * Vec.dot(axis, camera.right), -size * Vec.dot(axis, camera.up)];
+    const colour = name === "N" ? colours.ink : colours.soft;
     context.beginPath();
     context.moveTo(x, y);
     context.lineTo(x + dx, y + dy);
-    painter.stroke(name === "N" ? colours.ink : colours.soft, name === "N" ? 2.6 : 1.8);
+    painter.stroke(colour, name === "N" ? 2.6 : 1.8);
     const length = Math.hypot(dx, dy);
-    if (length < 8) continue;
-    context.fillStyle = name === "N" ? colours.ink : colours.soft;
-    context.font = "600 11px system-ui, sans-serif";
-    context.fillText(name, x + (dx * (length + 9)) / length, y + (dy * (length + 9)) / length);
+    const [u, v] = [x + (dx * (length + 9)) / length, y + (dy * (length + 9)) / length];
+    if (length < 8 || placed.some(([p, q]) => Math.hypot(p - u, q - v) < 13)) continue;
+    placed.push([u, v]);
+    context.fillStyle = colour;
+    context.fillText(name, u, v);
   }
   context.lineCap = "butt";
   labels.block(x - 40, y - 40, 80, 80);

@@ -5,14 +5,15 @@ function tellHead(runs, selected) {
   const title = document.getElementById("title");
   const run = runs[selected];
   const names = runNames(runs);
-  title.textContent = run ? run.header.title || names[selected] : document.title;
+  const name = runs.length > 1 ? `${names[selected]}: ` : "";
+  title.textContent = run ? name + (run.header.title || names[selected]) : document.title;
   const asked = document.getElementById("asked");
   asked.replaceChildren();
   const verdict = document.getElementById("verdict");
   verdict.textContent = "";
   if (run) {
-    const text = `${runs.length > 1 ? `${names[selected]}: ` : ""}${run.header.asked ?? ""}`;
-    asked.append(text.length > 260 ? folded(text) : text);
+    const text = run.header.asked ?? "";
+    asked.append(text.length > 170 ? folded(text) : text);
     verdict.className = run.header.verdict ? outcome(run) : "";
     verdict.textContent = run.header.verdict ?? "";
   }
@@ -23,7 +24,7 @@ function tellHead(runs, selected) {
 /** A long text, of which the beginning is seen until it is opened. */
 function folded(text) {
   const details = element("details");
-  const cut = text.lastIndexOf(",", 200) + 1 || 200;
+  const cut = text.lastIndexOf(",", 130) + 1 || 130;
   const summary = element("summary", "", text.slice(0, cut));
   summary.append(element("span", "more", " … more"));
   details.append(summary, element("span", "", text.slice(cut)));

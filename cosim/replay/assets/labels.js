@@ -15,7 +15,13 @@ class Labels {
     this.height = height;
     this._words = [];
     this._taken = [];
-    this.placed = []; // {key, x, y, width, height} of the words that were drawn
+    this.placed = []; // {of: whose, x, y, width, height} of the words that were drawn
+  }
+
+  /** Whose name is at some pixels; null if there is none. */
+  nameAt(x, y) {
+    const inside = (box) => x >= box.x && x <= box.x + box.width && y >= box.y && y <= box.y + box.height;
+    return this.placed.find((box) => box.of && inside(box))?.of ?? null;
   }
 
   /** Keep words out of a part of the picture. */
@@ -26,7 +32,8 @@ class Labels {
   /**
    * Ask for a word.
    * @param {object} word {key, text, x, y, colour, rank: lower is more important, gap: pixels from the point, bold,
-   * chip: colour behind it or null, sides: of "above below right left here" in the order in which they are tried}
+   * chip: colour behind it or null, pad: pixels that are free beside it, far: whether it may stand farther off, on a
+   * line of the colour edge, sides: of "above below right left here" in the order in which they are tried}
    */
   add(word) {
     this._words.push(word);
@@ -40,22 +47,38 @@ class Labels {
     context.textBaseline = "middle";
     context.textAlign = "left";
     this._words.sort((a, b) => a.rank - b.rank);
+    const written = [];
     for (const word of this._words) {
       const font = `${word.bold ? "600 " : ""}${word.size ?? 12}px system-ui, sans-serif`;
       const width = this._width(word.text, font) + (word.chip ? 10 : 2);
       const height = (word.size ?? 12) + (word.chip ? 7 : 2);
       const before = known.get(word.key);
-      const sides = before && word.sides.includes(before) ? [before, ...word.sides] : word.sides;
-      for (const side of sides) {
-        const [x, y] = this._corner(side, word, width, height);
-        if (!this._free(x, y, width, height)) continue;
+      const spots = (word.far ? [0, 24, 48, 80] : [0]).flatMap((off) => word.sides.map((side) => [side, off]));
+      if (before && spots.some(([side, off]) => side === before[0] && off === before[1])) spots.unshift(before);
+      for (const [side, off] of spots) {
+        const [x, y] = this._corner(side, word.gap + off, word, width, height);
+        const pad = word.pad ?? 0;
+        if (!this._free(x - pad, y, width + 2 * pad, height)) continue;
         this._taken.push([x - 2, y - 1, x + width + 2, y + height + 1]);
-        this._sides.set(word.key, side);
-        this.placed.push({ key: word.key, x, y, width, height });
-        this._write(word, font, x, y, width, height);
+        this._sides.set(word.key, [side, off]);
+        this.placed.push({ of: word.of ?? null, x, y, width, height });
+        if (off) this._lead(word, x, y, width, height);
+        written.push([word, font, x, y, width, height]);
         break;
       }
     }
+    for (const placed of written) this._write(...placed); // over all lines
+  }
+
+  /** A line from a word that stands far off to what it names. */
+  _lead(word, x, y, width, height) {
+    const { context } = this;
+    context.beginPath();
+    context.moveTo(word.x, word.y);
+    context.lineTo(Math.min(x + width, Math.max(x, word.x)), Math.min(y + height, Math.max(y, word.y)));
+    context.strokeStyle = word.edge;
+    context.lineWidth = 1;
+    context.stroke();
   }
 
   _write(word, font, x, y, width, height) {
@@ -76,7 +99,7 @@ class Labels {
     context.fillText(word.text, x + (word.chip ? 5 : 1), y + 0.5 * height + 0.5);
   }
 
-  _corner(side, { x, y, gap }, width, height) {
+  _corner(side, gap, { x, y }, width, height) {
     if (side === "above") return [x - 0.5 * width, y - gap - height];
     if (side === "below") return [x - 0.5 * width, y + gap];
     if (side === "right") return [x + gap, y - 0.5 * height];

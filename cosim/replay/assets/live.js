@@ -1,1 +1,127 @@
-// live
+// A run that goes on: its rows come over a WebSocket from the page's own host, and orders go back.
+
+const RETRY = [500, 5000]; // ms, after which a lost connection is tried again: at first, and at the most
+
+/** The connection of the page to a run that goes on. */
+class LiveLink {
+  /** @param {Page} page */
+  constructor(page) {
+    this.page = page;
+    this.run = null;
+    this.over = false; // whether the run has ended
+    this.helm = new HelmPanel(this);
+    this.dragging = new Dragging(this);
+    this._wait = RETRY[0];
+    this._next = 0;
+  }
+
+  /** Whether orders can be given now. */
+  get heeded() {
+    return Boolean(this.run?.header.commands) && !this.over && this._socket?.readyState === WebSocket.OPEN;
+  }
+
+  /** Connect; resolves when the first message came, or nobody answered. */
+  connect() {
+    return new Promise((settled) => {
+      const socket = new WebSocket(`${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/ws`);
+      this._socket = socket;
+      socket.binaryType = "arraybuffer";
+      socket.onopen = () => {
+        this._wait = RETRY[0];
+      };
+      socket.onmessage = ({ data }) => {
+        if (typeof data === "string") this._told(JSON.parse(data));
+        else this._rows(new Float64Array(data));
+        settled();
+      };
+      socket.onclose = () => {
+        settled();
+        this._lost();
+      };
+    });
+  }
+
+  /** Order something of the run, as its log of orders has it; whether it could be sent. */
+  order(order) {
+    if (!this.heeded) {
+      this.page.say(this.over ? "The run has ended: nothing can be ordered any more." : "Nothing can be ordered: the connection is lost, or commands are off.", "warning");
+      return false;
+    }
+    this._socket.send(JSON.stringify(order));
+    return true;
+  }
+
+  _told(message) {
+    const does = {
+      header: () => this._begin(message.run),
+      changes: () => this.run.header.changes.push(...message.changes),
+      said: () => this._said(message),
+      end: () => this._end(message),
+    };
+    does[message.type]?.();
+    this._later();
+  }
+
+  _begin(header) {
+    const again = this.run !== null;
+    header.events ??= [];
+    this.run = new Run(header, header.signals.map(() => new Float64Array(0)));
+    this.over = false;
+    document.title = `Live: ${header.title}`;
+    this.page.show([this.run]);
+    this.page.player.live = true;
+    this.page.say(again ? "The run begins again." : "");
+    this.helm.setRun(this.run);
+  }
+
+  _rows(numbers) {
+    const width = this.run.header.signals.length;
+    for (let i = 0; i < numbers.length; i += width) this.run.append(numbers.subarray(i, i + width));
+    this._later();
+  }
+
+  _said({ kind, text, time }) {
+    if (kind === "order") this.run.header.events.push({ time, kind, text: `Ordered: ${text}` });
+    else this.page.say(kind === "refused" ? `Refused: ${text}` : text, kind === "info" ? "info" : "warning");
+  }
+
+  _end({ status, verdict }) {
+    Object.assign(this.run.header, { status, verdict });
+    this.over = true;
+    const { player } = this.page;
+    this.page.refresh();
+    player.pause();
+    player.growing = false;
+    this.page.select(0); // which tells the verdict
+    this.page.say(`The run has ended (${status}). This page replays what it has received.`, "good");
+    this.helm.tell();
+  }
+
+  _lost() {
+    this.dragging.cancel();
+    this.helm.tell();
+    if (this.over) return;
+    this.page.say(this.run ? "The connection is lost; trying again …" : "No run answers here; trying again …", "warning");
+    if (!this.run) this.page.nothing("Waiting for a run.");
+    setTimeout(() => this.connect(), this._wait);
+    this._wait = Math.min(RETRY[1], 2 * this._wait);
+  }
+
+  /** Let the page show what came, once for each picture of the screen. */
+  _later() {
+    this._next ||= requestAnimationFrame(() => {
+      this._next = 0;
+      this.page.refresh();
+      this.helm.tell();
+      this.dragging.draw();
+    });
+  }
+}
+
+/** Show the run of the page's own host while it goes on. */
+async function startLive(page) {
+  page.nothing("Waiting for a run.");
+  const link = new LiveLink(page);
+  await link.connect();
+  return link;
+}

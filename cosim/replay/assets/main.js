@@ -15,7 +15,7 @@ async function runsOfPage(page) {
   try {
     return await loadRuns();
   } catch (error) {
-    const text = `The numbers of this page cannot be read: ${error.message}. The file may be damaged; write it again.`;
+    const text = `The numbers of this page are damaged and cannot be read; write the page again. (${error.message})`;
     page.nothing(text);
     page.say(text, "error");
     return null;

@@ -24,7 +24,7 @@ function nearestOnChain(chain, p) {
 /** The entries from the farthest to the nearest. Sheets part the others: what is beyond a sheet comes before it. */
 function farthestFirst(entries, eye) {
   const sheets = entries.filter((entry) => entry.sheet);
-  if (!sheets.length) return entries.map((entry) => [remoteness(entry, eye), entry]).sort((a, b) => b[0] - a[0]).map(([, entry]) => entry);
+  if (!sheets.length) return [...entries].sort((a, b) => remoteness(b, eye) - remoteness(a, eye));
   const sheet = sheets[0];
   const side = (p) => Vec.dot(Vec.sub(p, sheet.sheet.corners[0]), sheet.sheet.normal) > 0;
   const others = entries.filter((entry) => entry !== sheet);
@@ -34,39 +34,48 @@ function farthestFirst(entries, eye) {
   return [...farthestFirst(beyond, eye), sheet, ...farthestFirst(before, eye)];
 }
 
-/** Of balls that do not touch, the one with less of this never hides behind another: it is their power about the eye. */
+/** Of balls that do not touch, one with less of this is never behind another: it is their power about the eye. */
 function remoteness({ solid, middle }, eye) {
   const off = Vec.sub(middle, eye);
   const radius = solid.ellipsoid ? solid.radius : 0;
   return Vec.dot(off, off) - radius * radius;
 }
 
-/** Whether an entry comes between the eye and a point, or holds it. */
-function hiddenBy(entry, eye, p) {
-  if (entry.sheet) return throughSheet(entry.sheet, eye, p);
-  if (!entry.style.filled) return false;
-  return entry.solid.hides(Vec.sub(eye, entry.shift), Vec.sub(p, entry.shift));
+/** What tells of an entry whether it comes between the eye and a point, or holds it; null where it is clear. */
+function hiderOf({ solid, sheet, shift, style }, eye) {
+  if (sheet) return throughSheet(sheet, eye);
+  if (!style.filled) return null;
+  const [sx, sy, sz] = shift;
+  const hides = solid.from(Vec.sub(eye, shift));
+  return (x, y, z) => hides(x - sx, y - sy, z - sz);
 }
 
-function throughSheet({ corners, normal }, eye, p) {
-  const before = Vec.dot(normal, Vec.sub(eye, corners[0]));
-  const after = Vec.dot(normal, Vec.sub(p, corners[0]));
-  if (before > 0 === after > 0) return false;
-  const at = Vec.along(eye, Vec.sub(p, eye), before / (before - after));
-  return holds(corners.flat(), corners.map((_, i) => i), at, normal);
+function throughSheet({ corners, normal }, eye) {
+  const [nx, ny, nz] = normal;
+  const offset = Vec.dot(normal, corners[0]);
+  const before = Vec.dot(normal, eye) - offset;
+  const [points, face] = [corners.flat(), corners.map((_, i) => i)];
+  return (x, y, z) => {
+    const after = nx * x + ny * y + nz * z - offset;
+    if (before > 0 === after > 0) return false;
+    const at = Vec.along(eye, [x - eye[0], y - eye[1], z - eye[2]], before / (before - after));
+    return holds(points, face, at, normal);
+  };
 }
 
 /**
  * Thin things, put before the first entry, in the order of drawing, that hides them; the last list is before all.
- * @param {Entry[]} entries farthest first  @param {{middle: number[]}[]} things  @returns {object[][]} farthest first each
+ * @param {Entry[]} entries farthest first  @param {{middle: number[]}[]} things
+ * @returns {object[][]} farthest first each
  */
 function placedAmong(entries, things, eye) {
   const lists = Array.from({ length: entries.length + 1 }, () => []);
+  const hiders = entries.map((entry) => hiderOf(entry, eye));
   for (const thing of things) {
+    const [x, y, z] = thing.middle;
     let k = 0;
-    while (k < entries.length && !hiddenBy(entries[k], eye, thing.middle)) k++;
-    const [x, y, z] = [thing.middle[0] - eye[0], thing.middle[1] - eye[1], thing.middle[2] - eye[2]];
-    thing.off = x * x + y * y + z * z;
+    while (k < entries.length && !hiders[k]?.(x, y, z)) k++;
+    thing.off = (x - eye[0]) ** 2 + (y - eye[1]) ** 2 + (z - eye[2]) ** 2;
     lists[k].push(thing);
   }
   for (const list of lists) list.sort((a, b) => b.off - a.off);

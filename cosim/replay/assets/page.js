@@ -31,7 +31,12 @@ class Page {
   }
 
   /** Show some runs in place of those before. */
-  async show(runs) {
+  async show(all) {
+    const runs = all.filter(timed);
+    if (runs.length < all.length) {
+      const names = runNames(all).filter((_, i) => !timed(all[i]));
+      this.say(`Left out, as the record has no times: ${names.join(", ")}.`, "error");
+    }
     this.runs = runs;
     this.shown = runs.map(() => true);
     this.selected = 0;
@@ -141,10 +146,13 @@ class Page {
   }
 
   _laid() {
+    document.body.classList.toggle("bare", !this.runs.length);
     this.stage.setRuns(this.runs, this.shown);
-    const reasons = this.runs.length && !this.stage.scene;
-    const hidden = this.runs.some((run, i) => drawable(run) && !this.shown[i]);
-    this.nothing(reasons ? (hidden ? "Every run is hidden." : "There is nothing to draw: no run has a row with a pose.") : "");
+    let reason = "There is nothing to draw: no run has a row with a pose.";
+    if (this.stage.scene) reason = "";
+    else if (this.runs.some((run, i) => drawable(run) && !this.shown[i])) reason = "Every run is hidden.";
+    else if (this.runs.some((run) => !run.rows && !run.header.status)) reason = "Waiting for the first row of the run.";
+    this.nothing(reason);
     this._select();
   }
 

@@ -5,8 +5,51 @@ class Painter {
   constructor(context, camera) {
     this.context = context;
     this.camera = camera;
-    this._seen = new Float64Array(3072); // pixels and depths of the points of one surface
-    this._front = new Uint8Array(1024); // which of its faces look at the eye
+    this.seen = new Float64Array(3072); // pixels and depths of the points of the surface that is looked at
+    this.front = new Uint8Array(1024); // which of its faces look at the eye
+    this.whole = true; // whether all of it is before the camera
+  }
+
+  /** Look at a surface: where its points are seen, and which faces look at the eye. */
+  look(solid, shift) {
+    const { faces, normals, points } = solid;
+    const { camera } = this;
+    if (this.seen.length < points.length) this.seen = new Float64Array(2 * points.length);
+    if (this.front.length < faces.length) this.front = new Uint8Array(2 * faces.length);
+    const { seen, front } = this;
+    camera.projectAll(points, points.length / 3, shift, seen);
+    this.whole = true;
+    for (let i = 2; i < points.length; i += 3) this.whole &&= seen[i] > camera.near;
+    const [ex, ey, ez] = Vec.sub(camera.eye, shift);
+    for (let i = 0; i < faces.length; i++) {
+      const [k, v] = [3 * i, 3 * faces[i][0]];
+      const [x, y, z] = [ex - points[v], ey - points[v + 1], ez - points[v + 2]];
+      front[i] = normals[k] * x + normals[k + 1] * y + normals[k + 2] * z > 0 ? 1 : 0;
+    }
+  }
+
+  /** Add a face of the surface that was looked at. */
+  face(solid, shift, i) {
+    const face = solid.faces[i];
+    if (!this.whole) {
+      this.polygon(face.map((k) => pointOf(solid, shift, k)));
+      return;
+    }
+    const { seen, context } = this;
+    context.moveTo(seen[3 * face[0]], seen[3 * face[0] + 1]);
+    for (let j = 1; j < face.length; j++) context.lineTo(seen[3 * face[j]], seen[3 * face[j] + 1]);
+    context.closePath();
+  }
+
+  /** Add an edge of the surface that was looked at. */
+  edge(solid, shift, a, b) {
+    if (!this.whole) {
+      this.segment(pointOf(solid, shift, a), pointOf(solid, shift, b));
+      return;
+    }
+    const { seen, context } = this;
+    context.moveTo(seen[3 * a], seen[3 * a + 1]);
+    context.lineTo(seen[3 * b], seen[3 * b + 1]);
   }
 
   /** Begin a path to which segment() and polygon() add. */
@@ -44,6 +87,13 @@ class Painter {
     if (cut.length) this.context.closePath();
   }
 
+  /** Add a line through points of the surface that was looked at, by their indices. */
+  chain(line) {
+    const { seen, context } = this;
+    context.moveTo(seen[3 * line[0]], seen[3 * line[0] + 1]);
+    for (let j = 1; j < line.length; j++) context.lineTo(seen[3 * line[j]], seen[3 * line[j] + 1]);
+  }
+
   stroke(colour, width, alpha = 1, dash = null) {
     const { context } = this;
     context.globalAlpha = alpha;
@@ -68,7 +118,7 @@ function styleOf(keep, active, colour) {
   return {
     colour,
     filled: keep === "out",
-    alpha: active ? 0.5 : 0.3,
+    alpha: active ? 0.5 : 0.24,
     width: active ? 2.6 : 1.2,
     dash: keep === "in" ? (active ? [9, 5] : [6, 5]) : null,
     hidden: active ? 0.5 : 0.28, // opacity of edges on the far side
@@ -145,9 +195,8 @@ function paintBall(painter, outline, style) {
 function paintCircles(painter, solid, shift, style, near) {
   const { context, camera } = painter;
   const { points } = solid;
-  const n = points.length / 3;
-  const seen = painter._seen;
-  camera.projectAll(points, n, shift, seen);
+  painter.look(solid, shift);
+  const { seen } = painter;
   const [ex, ey, ez] = Vec.sub(Vec.sub(camera.eye, shift), solid.centre);
   const inverse = solid.ellipsoid.axes.map((axis) => Vec.scale(axis, 1 / Vec.dot(axis, axis)));
   // the near side is where (p - c)' M (e - c) > 1, with M of the ellipsoid
@@ -170,52 +219,63 @@ function paintCircles(painter, solid, shift, style, near) {
   painter.stroke(style.colour, 0.8, near ? 0.55 : style.hidden * 0.7);
 }
 
-/** Which faces look at the eye. */
-function facing(painter, solid, shift) {
-  const { faces, normals, points } = solid;
-  if (painter._front.length < faces.length) painter._front = new Uint8Array(2 * faces.length);
-  const [ex, ey, ez] = Vec.sub(painter.camera.eye, shift);
-  for (let i = 0; i < faces.length; i++) {
-    const v = 3 * faces[i][0];
-    const towards =
-      normals[3 * i] * (ex - points[v]) + normals[3 * i + 1] * (ey - points[v + 1]) + normals[3 * i + 2] * (ez - points[v + 2]);
-    painter._front[i] = towards > 0 ? 1 : 0;
-  }
-  return painter._front;
+/** A point of a surface that is shifted. */
+function pointOf({ points }, shift, k) {
+  return [points[3 * k] + shift[0], points[3 * k + 1] + shift[1], points[3 * k + 2] + shift[2]];
 }
 
 const LIGHT_SIDE = 0.35; // faces whose normal rises more are lit, those whose normal falls more are in shade
 
-/** The faces that are seen, each surface in one path so that no seam shows; lit from above in three steps. */
+/** The faces that are seen, in one path so that no seam shows; lit from above in three steps. */
 function paintFaces(painter, solid, shift, style) {
-  const front = facing(painter, solid, shift);
+  painter.look(solid, shift);
+  const { front } = painter;
   const { faces, normals } = solid;
-  const corners = (face) =>
-    face.map((i) => [solid.points[3 * i] + shift[0], solid.points[3 * i + 1] + shift[1], solid.points[3 * i + 2] + shift[2]]);
-  const paint = (chosen, colour, alpha) => {
+  const paint = (least, most, colour, alpha) => {
     painter.begin();
     let any = false;
     for (let i = 0; i < faces.length; i++) {
-      if (!front[i] || !chosen(i)) continue;
-      painter.polygon(corners(faces[i]));
+      const down = normals[3 * i + 2];
+      if (!front[i] || down < least || down > most) continue;
+      painter.face(solid, shift, i);
       any = true;
     }
     if (any) painter.fill(colour, alpha);
   };
-  paint(() => true, style.colour, style.alpha);
-  paint((i) => normals[3 * i + 2] < -LIGHT_SIDE, "#ffffff", 0.2);
-  paint((i) => normals[3 * i + 2] > LIGHT_SIDE, "#000000", 0.16);
+  paint(-2, 2, style.colour, style.alpha);
+  paint(-2, -LIGHT_SIDE, mixedColour(style.colour, "#ffffff", 0.6), 0.22);
+  paint(LIGHT_SIDE, 2, "#000000", 0.16);
+}
+
+/** Edges as lines through the points that they share, so that dashes go on from one to the next. */
+function linesOf(edges) {
+  const at = new Map(); // of each point, the edges that are not yet in a line
+  for (const edge of edges) for (const k of [edge[0], edge[1]]) at.set(k, (at.get(k) ?? new Set()).add(edge));
+  const lines = [];
+  for (const edge of edges) {
+    if (!at.get(edge[0]).has(edge)) continue;
+    const line = [edge[0]];
+    for (let next = edge; next; next = at.get(line[line.length - 1]).values().next().value) {
+      at.get(next[0]).delete(next);
+      at.get(next[1]).delete(next);
+      line.push(next[0] === line[line.length - 1] ? next[1] : next[0]);
+    }
+    lines.push(line);
+  }
+  return lines;
 }
 
 /** Sharp edges, outlines of round surfaces and lines on them, on the near or on the far side. */
 function paintEdges(painter, solid, shift, style, near) {
-  const front = facing(painter, solid, shift);
-  const at = (i) => [solid.points[3 * i] + shift[0], solid.points[3 * i + 1] + shift[1], solid.points[3 * i + 2] + shift[2]];
-  painter.begin();
-  for (const [a, b, f, g, sharp] of solid.edges) {
+  painter.look(solid, shift);
+  const { front } = painter;
+  const drawn = solid.edges.filter(([, , f, g, sharp]) => {
     const seen = front[f] || front[g];
-    if (sharp ? Boolean(seen) === near : near && front[f] !== front[g]) painter.segment(at(a), at(b));
-  }
+    return sharp ? Boolean(seen) === near : near && front[f] !== front[g];
+  });
+  painter.begin();
+  if (style.dash && painter.whole) for (const line of linesOf(drawn)) painter.chain(line);
+  else for (const [a, b] of drawn) painter.edge(solid, shift, a, b);
   painter.stroke(style.colour, near ? style.width : 1, near ? 1 : style.hidden, style.dash);
 }
 

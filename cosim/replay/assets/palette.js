@@ -3,8 +3,8 @@
 const CRITERION_COLOURS = { obstacle: "#D55E00", shape: "#E69F00", depth: "#56B4E9" };
 const GOAL_COLOUR = "#009E73";
 
-/** Of the trails of several runs; each run also has its own dashes where lines lie upon each other. */
-const RUN_COLOURS = ["#0072B2", "#CC79A7", "#009E73", "#E69F00", "#D55E00", "#56B4E9"];
+/** Of the ways of several runs: first those that no criterion has. */
+const RUN_COLOURS = ["#0072B2", "#CC79A7", "#9A7B00", "#7C8A94", "#009E73", "#E69F00", "#D55E00", "#56B4E9"];
 
 /** What the scene needs beside the colours of regions. */
 const SCENE_THEMES = {
@@ -19,10 +19,10 @@ const SCENE_THEMES = {
     shadow: "rgba(20, 45, 65, 0.13)",
     halo: "rgba(247, 251, 253, 0.85)",
     chip: "rgba(255, 255, 255, 0.82)",
-    future: "rgba(29, 43, 54, 0.30)",
-    muted: "#93a1ab",
+    future: "rgba(29, 43, 54, 0.46)",
+    muted: "#a9b4bc",
     thrust: "#A6407A",
-    hull: { float: "#E8C81F", frame: "#33424d", tube: "#8fa1ad", dome: "#bfe3f2", skid: "#4a5a66" },
+    hull: { float: "#E8C81F", frame: "#33424d", tube: "#8fa1ad", dome: "#a5dcf3", skid: "#4a5a66", duct: "#51626e" },
   },
   dark: {
     skyTop: "#12212d",
@@ -35,10 +35,10 @@ const SCENE_THEMES = {
     shadow: "rgba(0, 0, 0, 0.38)",
     halo: "rgba(7, 14, 20, 0.75)",
     chip: "rgba(14, 25, 34, 0.82)",
-    future: "rgba(230, 238, 244, 0.28)",
+    future: "rgba(230, 238, 244, 0.42)",
     muted: "#6f808c",
     thrust: "#F29AC8",
-    hull: { float: "#F0DC4E", frame: "#5b6b77", tube: "#a5b6c1", dome: "#c9ecfa", skid: "#71828e" },
+    hull: { float: "#F0DC4E", frame: "#5b6b77", tube: "#a5b6c1", dome: "#b5e6fa", skid: "#71828e", duct: "#7d8f9b" },
   },
 };
 
@@ -66,7 +66,7 @@ function fullColour(region) {
  */
 function regionColour(region, active, theme) {
   const full = fullColour(region);
-  return active ? full : mixedColour(full, SCENE_THEMES[theme].muted, 0.6);
+  return active ? full : mixedColour(full, SCENE_THEMES[theme].muted, 0.45);
 }
 
 /** The colour of a run's trail where several are shown. */

@@ -21,7 +21,7 @@ class BarRow {
     this.fill.style.transform = `scaleX(${whole.toFixed(4)})`;
     if (this.value.textContent !== text) this.value.textContent = text;
     this.element.classList.toggle("on", part > 0);
-    this.tick.hidden = !Number.isFinite(mark ?? NaN);
+    this.tick.hidden = !(mark > 0);
     if (!this.tick.hidden) this.tick.style.left = `${(100 * Math.min(1, Math.max(0, mark))).toFixed(1)}%`;
   }
 }
@@ -59,9 +59,9 @@ class Panel {
     const { run } = this;
     const t = this.player.t;
     const active = activeWords(run, t);
-    this.mark.className = `mark ${active.region.criterion ?? "goal"}`;
+    this.mark.className = `mark ${active.region ? active.region.criterion ?? "goal" : "unknown"}`;
     setText(this.who, active.name);
-    setText(this.what, regionWords(active.region));
+    setText(this.what, active.region ? regionWords(active.region) : "");
     setText(this.why, active.sentence);
     const over = t > run.end && this.player.duration > 0;
     this.over.hidden = !over;
@@ -190,7 +190,9 @@ class Panel {
       const item = element("li");
       const button = element("button", `event ${kind}`);
       button.type = "button";
-      button.append(element("span", "at", clock(time)), element("span", "text", text));
+      const mark = element("span", `mark-at ${kind}`);
+      mark.setAttribute("aria-hidden", "true");
+      button.append(mark, element("span", "at", clock(time)), element("span", "text", text));
       button.addEventListener("click", () => this.player.seek(time));
       item.append(button);
       list.append(item);

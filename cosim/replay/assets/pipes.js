@@ -8,7 +8,6 @@ function pipeOf({ points, radius }) {
   const pieces = points.slice(1).map((p, i) => Vec.unit(Vec.sub(p, points[i])));
   let [first, second] = Vec.aside(pieces[0]);
   const rings = [];
-  const lines = [];
   // from the pole to the first tube
   for (let k = 1; k <= CAP_RINGS; k++) {
     const angle = (0.5 * Math.PI * k) / CAP_RINGS;
@@ -49,19 +48,19 @@ function pipeOf({ points, radius }) {
   for (let k = 1; k < rings.length; k++) faces.push(...bandFaces(1 + (k - 1) * AROUND, 1 + k * AROUND, AROUND));
   const last = 1 + (rings.length - 1) * AROUND;
   for (let i = 0; i < AROUND; i++) faces.push([last + i, last + ((i + 1) % AROUND), surface.length - 1]);
-  // a ring where a tube begins and ends tells that it is round
-  for (const k of [CAP_RINGS - 1, rings.length - CAP_RINGS]) {
-    const at = 1 + k * AROUND;
-    lines.push([...Array.from({ length: AROUND }, (_, i) => at + i), at]);
-  }
-  const solid = solidOf(...welded(surface, faces, lines));
+  const solid = solidOf(...welded(surface, faces));
   solid.spine = points;
-  solid.hides = (eye, p) => points.some((a, i) => i > 0 && segmentsWithin(points[i - 1], a, p, eye, radius));
+  solid.shadows = points.slice(1).map((p, i) => {
+    const discs = [points[i], p].map((centre) => ring(centre, [1, 0, 0], [0, 1, 0], radius));
+    return outlineFromAbove(discs.flat());
+  });
+  const meets = (eye, p) => points.some((a, i) => i > 0 && segmentsWithin(points[i - 1], a, p, eye, radius));
+  solid.from = (eye) => (x, y, z) => nearSight(solid, eye, x, y, z) && meets(eye, [x, y, z]);
   return solid;
 }
 
 /** The same surface with one point where several were: rings of a bend meet on its tight side. */
-function welded(points, faces, lines) {
+function welded(points, faces) {
   const known = new Map();
   const kept = [];
   const index = points.map((p) => {
@@ -76,7 +75,7 @@ function welded(points, faces, lines) {
     const own = face.map((i) => index[i]);
     return own.filter((k, i) => k !== own[(i + 1) % own.length]);
   });
-  return [kept, thinned.filter((face) => face.length > 2), lines.map((line) => line.map((i) => index[i]))];
+  return [kept, thinned.filter((face) => face.length > 2)];
 }
 
 /** A vector turned about a unit axis by an angle [rad], after Rodrigues. */

@@ -129,13 +129,14 @@ class Player {
     // a tab that slept does not jump
     this.t = Math.min(this.end, this.t + Math.min(0.25, Math.max(0, now - this._last) / 1000) * this.speed);
     this._last = now;
-    if (this.t >= this.end) {
+    const over = this.t >= this.end;
+    if (over) {
       this.playing = false;
       this._live = this.growing;
-    } else {
-      requestAnimationFrame((next) => this._advance(next));
     }
+    // first the picture of now is asked for, then the next step: the other way round every second frame has no picture
     this._tell();
+    if (!over) requestAnimationFrame((next) => this._advance(next));
   }
 
   _tell() {

@@ -7,7 +7,7 @@ const FONT = "11px system-ui, sans-serif";
 function pageColours() {
   const style = getComputedStyle(document.documentElement);
   const of = (name) => style.getPropertyValue(name).trim();
-  return { ink: of("--ink"), muted: of("--muted"), grid: of("--grid"), zone: of("--zone"), bad: of("--bad") };
+  return { ink: of("--ink"), muted: of("--muted"), grid: of("--grid"), zone: of("--zone"), bad: of("--bad"), card: of("--card") };
 }
 
 /** Where the plot is in its canvas [CSS pixels], and what stands where. */
@@ -55,7 +55,8 @@ function paintPlot(context, frame, spec, curves, theme) {
     context.stroke();
   }
   context.restore();
-  paintBeyond(context, frame, spec, curves, theme);
+  if (spec.zero) nameZone(context, frame, colours);
+  paintBeyond(context, frame, spec, curves, theme, colours.card);
 }
 
 /** Below zero a region is violated. */
@@ -63,11 +64,23 @@ function paintZone(context, frame, colours) {
   const zero = Math.min(frame.bottom, Math.max(frame.top, frame.y(0)));
   context.fillStyle = colours.zone;
   context.fillRect(frame.left, zero, frame.right - frame.left, frame.bottom - zero);
-  if (frame.bottom - zero < 16) return;
-  context.fillStyle = colours.bad;
+}
+
+/** What the zone is, above the curves, so that it can be read. */
+function nameZone(context, frame, colours) {
+  if (frame.bottom - frame.y(0) < 16) return;
   context.textAlign = "right";
   context.textBaseline = "bottom";
-  context.fillText("below 0: violated (goal: outside)", frame.right - 4, frame.bottom - 3);
+  paintText(context, "below 0: violated (goal: outside)", frame.right - 4, frame.bottom - 3, colours.bad, colours.card);
+}
+
+/** A text that lies over curves. */
+function paintText(context, text, x, y, colour, ground) {
+  context.lineWidth = 4;
+  context.strokeStyle = ground;
+  context.strokeText(text, x, y);
+  context.fillStyle = colour;
+  context.fillText(text, x, y);
 }
 
 function paintAxes(context, frame, spec, colours) {
@@ -114,16 +127,15 @@ function paintAxes(context, frame, spec, colours) {
 }
 
 /** What is true may lie far beyond the curves: then a line of text at the edge tells where. */
-function paintBeyond(context, frame, spec, curves, theme) {
+function paintBeyond(context, frame, spec, curves, theme, ground) {
   let line = 0;
   for (const { signal: of, values } of curves.filter((curve) => curve.signal.context && curve.values.length)) {
     const [low, high] = frame.range;
     if (values[0] >= low && values[0] <= high) continue;
-    context.fillStyle = hueColour(of.hue, theme, of.shade);
     context.textAlign = "right";
     context.textBaseline = "top";
-    const arrow = values[0] > high ? "↑" : "↓";
-    context.fillText(`${of.label} is at ${quantity(values[0], spec.unit)} ${arrow}`, frame.right - 4, frame.top + 2 + 14 * line);
+    const text = `${of.label} is at ${quantity(values[0], spec.unit)} ${values[0] > high ? "↑" : "↓"}`;
+    paintText(context, text, frame.right - 4, frame.top + 2 + 14 * line, hueColour(of.hue, theme, of.shade), ground);
     line += 1;
   }
 }

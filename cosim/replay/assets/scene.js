@@ -1,11 +1,14 @@
 // The scene: vehicles, their ways and their regions at a time, as a camera sees them.
 
-const LEAST_HULL = 12; // pixels of radius below which the vehicle is drawn larger than it is
+const LEAST_HULL = 15; // pixels of radius below which the vehicle is drawn larger than it is; less in a small picture
 
 /** A 3D scene of some runs on a canvas. */
 class Scene {
-  /** @param {HTMLCanvasElement} canvas  @param {Run[]} runs  @param {"light"|"dark"} theme */
-  constructor(canvas, runs, theme) {
+  /**
+   * @param {HTMLCanvasElement} canvas  @param {Run[]} runs  @param {"light"|"dark"} theme
+   * @param {{name: string, colour: string}[]|null} marks as for setRuns()
+   */
+  constructor(canvas, runs, theme, marks = null) {
     this.canvas = canvas;
     this.context = canvas.getContext("2d", { alpha: false });
     this.labels = new Labels(this.context);
@@ -15,7 +18,7 @@ class Scene {
     this.camera = new Camera();
     controlCamera(canvas, () => this.camera);
     this.resize();
-    this.setRuns(runs);
+    this.setRuns(runs, marks);
   }
 
   /** The camera; scenes that stand side by side may have one together. */
@@ -37,12 +40,19 @@ class Scene {
     this._later();
   }
 
-  /** Show other runs, all of them in the picture. */
-  setRuns(runs) {
+  /**
+   * Show other runs, all of them in the picture.
+   * @param {Run[]} runs
+   * @param {{name: string, colour: string}[]|null} marks of each run, where it is one of several, though not all are
+   * in this scene; without them one run's way has the colours of who was active
+   */
+  setRuns(runs, marks = null) {
     this.runs = runs;
+    const own = runs.map(({ header }, i) => ({ name: header.name, colour: runColour(i) }));
+    this._runMarks = marks ?? (runs.length > 1 ? own : null);
     this._trails = runs.map((run) => new Trail(run));
     this._forces = runs.map((run) => new Forces(run));
-    this._sheets = new Map();
+    this._regions = new Regions(runs);
     this._drawn = { time: 0, runs: [] };
     this._followed = null;
     this._measure();
@@ -82,8 +92,8 @@ class Scene {
 
   /** The region at some pixels, its name included: {run, region}, or null. */
   pick(x, y) {
-    const named = this.labels.placed.find((box) => box.of && x >= box.x && x <= box.x + box.width && y >= box.y && y <= box.y + box.height);
-    if (named) return named.of;
+    const named = this.labels.nameAt(x, y);
+    if (named) return named;
     this._fitsPicture();
     const { eye } = this.camera;
     const far = Vec.along(eye, this.camera.ray(x, y), 1e5);
@@ -92,7 +102,7 @@ class Scene {
       if (Math.hypot(u - x, v - y) < 14) return of;
     }
     for (const { solid, shift, of } of [...(this._entries ?? [])].reverse()) {
-      if (solid && solid.hides(Vec.sub(eye, shift), Vec.sub(far, shift))) return of;
+      if (solid?.from(Vec.sub(eye, shift))(...Vec.sub(far, shift))) return of;
     }
     return null;
   }
@@ -103,6 +113,8 @@ class Scene {
    */
   draw(t, options = {}) {
     this._last = [t, options];
+    if (this._waiting) cancelAnimationFrame(this._waiting); // this is the frame that was asked for
+    this._waiting = 0;
     const { trail = true, labels = true } = options;
     this._fitsPicture();
     this._grow();
@@ -110,24 +122,33 @@ class Scene {
     this._follow(options.follow ? poses.find(Boolean) : null);
     const { context, painter, camera } = this;
     const colours = SCENE_THEMES[this.theme];
-    context.setTransform(this._ratio, 0, 0, this._ratio, 0, 0);
-    context.lineJoin = "round";
+    context.lineJoin = "bevel"; // round ones cost as much as the lines
     this._paintSky(colours);
     this.labels.begin(camera.width, camera.height);
 
-    const regions = this._regionsAt(t, poses);
+    const regions = this._regions.at(t, poses, camera.target, this.theme);
     this._entries = farthestFirst(regions.filter((entry) => entry.solid || entry.sheet), camera.eye);
     this._sights = regions.filter((entry) => entry.sight).map((entry) => ({ ...entry, feature: entry.sight.feature }));
     paintSurface(painter, this.bounds, colours);
     paintFloor(painter, this.labels, this.bounds, colours, labels);
     paintRuler(painter, this.labels, this.bounds, colours, labels);
-    this._paintShadows(poses, colours);
-
     const vehicles = poses.map((pose, i) => pose && this._vehicle(pose, i));
-    const things = vehicles.flatMap((vehicle) => (vehicle ? vehicle.faces : []));
-    if (trail) this._trails.forEach((way, i) => things.push(...this._way(way, i, t, colours)));
+    const floor = this.bounds[1][2];
+    paintShadows(painter, this._entries, this.bounds, colours);
+    const things = vehicles.flatMap((vehicle) => (vehicle ? vehicle.things : []));
+    if (trail) {
+      this._trails.forEach((way, i) => {
+        const chunks = this._way(way, i, t, colours);
+        paintWayBelow(painter, chunks, floor, colours);
+        things.push(...chunks, ...this._marks(way, i, t, vehicles[i], colours));
+      });
+    }
+    for (const vehicle of vehicles) if (vehicle) paintPlumb(painter, vehicle, floor, colours);
+    // a sight begins at the vehicle, and is just behind it
+    for (const entry of this._sights) {
+      things.push({ ...entry, middle: Vec.along(entry.sight.apex, camera.forward, entry.size) });
+    }
     const lists = placedAmong(this._entries, things, camera.eye);
-    for (const { sight, style } of this._sights) paintSight(painter, sight, style);
     this._entries.forEach((entry, k) => {
       if (entry.solid) paintBack(painter, entry.solid, entry.shift, entry.style);
       this._paintThings(lists[k], colours);
@@ -135,12 +156,17 @@ class Scene {
       else paintSheet(painter, entry.sheet, entry.style);
     });
     this._paintThings(lists[this._entries.length], colours);
-    vehicles.forEach((vehicle, i) => vehicle && this._paintOnVehicle(vehicle, i, t));
+    vehicles.forEach((vehicle, i) => {
+      if (!vehicle) return;
+      const { radius } = this.runs[i].header.vehicle;
+      paintForces(painter, vehicle.pose, this._forces[i].at(t), vehicle.size, radius, this.theme);
+    });
 
     paintCompass(painter, this.labels, colours);
     paintScale(painter, this.labels, colours, Math.max(1, ...vehicles.map((vehicle) => vehicle?.magnified ?? 1)));
-    if (labels) this._nameRegions(regions, colours);
-    if (labels && this.runs.length > 1) this._nameVehicles(vehicles, colours);
+    for (const vehicle of vehicles) if (vehicle) blockVehicle(this.labels, camera, vehicle);
+    if (labels) nameRegions(this.labels, camera, regions, colours);
+    if (labels && this._runMarks) nameVehicles(this.labels, camera, this._runMarks, vehicles, colours);
     this.labels.draw();
     this._note(t, poses, regions);
   }
@@ -161,7 +187,7 @@ class Scene {
     const { content, bounds } = extentOf(this.runs);
     this.bounds = bounds;
     this._rows = this.runs.map((run) => run.rows);
-    this._sheets.clear();
+    this._regions.bounds = bounds;
     this.camera.content = content;
     const lead = this.runs.find((run) => run.rows);
     if (!lead) return;
@@ -177,15 +203,16 @@ class Scene {
       const { position } = run.pose(run.end);
       return Vec.finite(position) && position.some((x, k) => x < this.bounds[0][k] || x > this.bounds[1][k]);
     });
-    if (left) this._measure();
+    if (!left) return;
+    const { fitted } = this.camera;
+    this._measure();
+    if (fitted) this._quiet(() => this.camera.fit());
   }
 
   _follow(pose) {
     if (pose) {
-      const moved = this._followed ? Vec.sub(pose.position, this._followed) : Vec.sub(pose.position, this.camera.target);
-      if (Vec.norm(moved) > 0) {
-        this._quiet(() => this.camera.aim(Vec.add(this.camera.target, moved)));
-      }
+      const moved = Vec.sub(pose.position, this._followed ?? this.camera.target);
+      if (Vec.norm(moved) > 0) this._quiet(() => this.camera.aim(Vec.add(this.camera.target, moved)));
     }
     this._followed = pose ? pose.position : null;
   }
@@ -197,83 +224,61 @@ class Scene {
     this.camera.listeners.add(this._redraw);
   }
 
+  /** The background: a gradient that is made once, since to copy it is several times as fast as to make it. */
   _paintSky(colours) {
-    const { context, camera } = this;
+    const { context, canvas } = this;
     if (!this._sky) {
-      this._sky = context.createLinearGradient(0, 0, 0, camera.height);
-      this._sky.addColorStop(0, colours.skyTop);
-      this._sky.addColorStop(1, colours.skyBottom);
+      this._sky = new OffscreenCanvas(canvas.width, canvas.height);
+      const sky = this._sky.getContext("2d", { alpha: false });
+      const gradient = sky.createLinearGradient(0, 0, 0, canvas.height);
+      gradient.addColorStop(0, colours.skyTop);
+      gradient.addColorStop(1, colours.skyBottom);
+      sky.fillStyle = gradient;
+      sky.fillRect(0, 0, canvas.width, canvas.height);
     }
-    context.fillStyle = this._sky;
-    context.fillRect(0, 0, camera.width, camera.height);
-  }
-
-  /** What there is of each region at a time, one entry for each surface, sheet or sight. */
-  _regionsAt(t, poses) {
-    const entries = [];
-    this.runs.forEach((run, r) => {
-      const active = run.active(t);
-      run.header.regions.forEach((region, i) => {
-        const [shape, shift] = [run.shape(i, t), run.rows ? run.shift(i, t) : [0, 0, 0]];
-        const same = entries.find((entry) => entry.of.run !== r && sameRegion(entry, region, shape, shift));
-        if (same) {
-          same.owners.push([r, i]);
-          if (active === i && !same.active) this._dress(same, true);
-          return;
-        }
-        const all = this._entriesOf(shape, shift, region, poses[r]);
-        for (const entry of all) {
-          Object.assign(entry, { of: { run: r, region: i }, region, shape, shift, owners: [[r, i]] });
-          this._dress(entry, active === i);
-          entries.push(entry);
-        }
-      });
-    });
-    return entries;
-  }
-
-  _dress(entry, active) {
-    entry.active = active;
-    entry.colour = regionColour(entry.region, active, this.theme);
-    entry.style = styleOf(entry.region.keep, active, entry.colour);
-  }
-
-  _entriesOf(shape, shift, region, pose) {
-    if (SOLIDS[shape.kind]) {
-      const solid = surfaceOf(shape);
-      if (!isThere(Vec.add(solid.centre, shift))) return [];
-      const middle = Vec.add(solid.spine ? nearestOnChain(solid.spine, Vec.sub(this.camera.target, shift)) : solid.centre, shift);
-      return [{ solid, middle }];
-    }
-    if (PLANES[shape.kind]) {
-      const key = JSON.stringify([shape, region.keep, shift]);
-      if (!this._sheets.has(key)) {
-        if (this._sheets.size > 200) this._sheets.clear();
-        this._sheets.set(key, sheetsOf(shape, region.keep, shift, this.bounds));
-      }
-      return this._sheets.get(key).map((sheet) => ({ sheet, middle: Vec.scale(Vec.add(...sheet.corners.slice(0, 2)), 0.5) }));
-    }
-    if (!pose) return [];
-    return [{ sight: SIGHTS[shape.kind](shape, pose, shift, pose.size) }];
+    context.setTransform(1, 0, 0, 1, 0, 0);
+    context.drawImage(this._sky, 0, 0);
+    context.setTransform(this._ratio, 0, 0, this._ratio, 0, 0);
   }
 
   _vehicle(pose, index) {
     const { vehicle } = this.runs[index].header;
     const pixels = vehicle.radius * this.camera.scaleAt(pose.position);
-    const magnified = pixels > 0 ? Math.max(1, LEAST_HULL / pixels) : 1;
+    const least = Math.min(LEAST_HULL, 0.028 * Math.min(this.camera.width, this.camera.height));
+    const magnified = pixels > 0 ? Math.max(1, least / pixels) : 1;
     const size = vehicle.radius * magnified;
     const placed = { position: pose.position, R: Vec.matrix(pose.quaternion) };
-    return { pose: placed, size, magnified, faces: hullAt(placed, size, this.camera.eye, this.theme) };
+    const things = [...hullAt(vehicle, placed, size, this.camera.eye, this.theme), ...bodyAxes(placed, size)];
+    return { pose: placed, size, magnified, things };
   }
 
   _way(way, index, t, colours) {
-    const { run } = way;
-    const several = this.runs.length > 1;
-    const [xs, ys, zs] = ["x", "y", "z"].map((axis) => run.column(`position.${axis}`));
-    return way.chunks(this.camera, t).map(({ points, row, past, active }) => {
-      const region = run.header.regions[Number.isFinite(active) ? active : 0];
-      const colour = several ? runColour(index) : fullColour(region);
-      return { points, middle: [xs[row], ys[row], zs[row]], colour: past || several ? colour : colours.future, past };
+    const chunks = way.chunks(this.camera, t);
+    for (const chunk of chunks) chunk.colour = this._wayColour(index, chunk.past, chunk.active, colours);
+    return chunks;
+  }
+
+  /** Of one run the way tells who was active; several runs have each their own colour. */
+  _wayColour(index, past, active, colours) {
+    if (this._runMarks) return this._runMarks[index].colour;
+    const { regions } = this.runs[index].header;
+    return past ? fullColour(regions[Number.isFinite(active) ? active : 0]) : colours.future;
+  }
+
+  _marks(way, index, t, vehicle, colours) {
+    const { camera } = this;
+    const active = way.run.column("active");
+    const spacing = roundStep((110 * camera.distance) / camera.focal);
+    return way.marks(spacing).flatMap(({ row, time, from, middle }) => {
+      const [[x, y, near], [u, v, depth]] = [camera.project(from), camera.project(middle)];
+      const length = Math.hypot(u - x, v - y);
+      if (Math.min(near, depth) < camera.near || !(length > 1)) return [];
+      const onHull = vehicle && Vec.norm(Vec.sub(middle, vehicle.pose.position)) < 1.5 * vehicle.size;
+      if (onHull) return [];
+      const past = time <= t;
+      const onTop = Vec.along(middle, Vec.sub(camera.eye, middle), 0.02); // of the line that it marks
+      const colour = this._wayColour(index, past, active?.[row], colours);
+      return [{ mark: [u, v, (u - x) / length, (v - y) / length], middle: onTop, past, colour }];
     });
   }
 
@@ -282,89 +287,29 @@ class Scene {
     const { context, painter } = this;
     for (let k = 0; k < things.length; ) {
       const thing = things[k];
-      if (thing.corners) {
-        painter.begin();
-        painter.polygon(thing.corners);
-        painter.fill(thing.colour);
-        painter.stroke(thing.colour, 0.7);
+      if (!thing.points) {
         k += 1;
+        if (thing.sight) paintSight(painter, thing.sight, thing.style);
+        else if (thing.line) paintBodyAxis(painter, thing, colours.ink);
+        else if (thing.mark) paintMark(painter, thing, colours);
+        else {
+          painter.begin();
+          painter.polygon(thing.corners);
+          painter.fill(thing.colour);
+          painter.stroke(thing.colour, 0.7); // closes the seams between faces
+        }
         continue;
       }
       context.beginPath();
-      for (; k < things.length && things[k].points && things[k].colour === thing.colour && things[k].past === thing.past; k++) {
+      const goesOn = (next) => next?.points && next.colour === thing.colour && next.past === thing.past;
+      for (; goesOn(things[k]); k++) {
         const { points } = things[k];
         context.moveTo(points[0], points[1]);
         for (let i = 2; i < points.length; i += 2) context.lineTo(points[i], points[i + 1]);
       }
       if (thing.past) painter.stroke(colours.halo, 6);
-      painter.stroke(thing.colour, thing.past ? 3 : 1.4, thing.past ? 1 : 0.7);
+      painter.stroke(thing.colour, thing.past ? 3 : 1);
     }
-  }
-
-  _paintOnVehicle({ pose, size }, index, t) {
-    const { painter } = this;
-    const { vehicle } = this.runs[index].header;
-    paintThrusters(painter, pose, vehicle.thrusters, size, vehicle.radius, SCENE_THEMES[this.theme].hull.tube);
-    paintBodyAxes(painter, pose, size, this.theme);
-    paintForces(painter, pose, this._forces[index].at(t), size, vehicle.radius, this.theme);
-  }
-
-  _paintShadows(poses, colours) {
-    const { painter, context, camera } = this;
-    const floor = this.bounds[1][2];
-    painter.begin();
-    for (const { solid, shift, style } of this._entries) {
-      if (!solid || !style.filled) continue;
-      solid.shadow ??= outlineFromAbove(solid.points);
-      painter.polygon(solid.shadow.map(([n, e]) => [n + shift[0], e + shift[1], floor]));
-    }
-    painter.fill(colours.shadow);
-    for (const pose of poses) {
-      if (!pose) continue;
-      const [n, e] = pose.position;
-      painter.begin();
-      painter.segment(pose.position, [n, e, floor]);
-      painter.stroke(colours.soft, 1, 0.9, [3, 3]);
-      const rim = rimOf([n, e, floor], [0, 0, 1], 0.5 * Math.PI, Math.max(pose.size, 5 / camera.scaleAt([n, e, floor])));
-      painter.begin();
-      painter.polygon(rim);
-      painter.fill(colours.shadow);
-      painter.stroke(colours.soft, 1, 0.6);
-    }
-    context.globalAlpha = 1;
-  }
-
-  _nameRegions(entries, colours) {
-    const { camera, labels } = this;
-    const named = new Set();
-    for (const entry of entries) {
-      const { run, region } = entry.of;
-      const key = `${run}:${region}`;
-      if (named.has(key)) continue;
-      const [x, y, depth] = camera.project(anchorOf(entry, camera));
-      if (!(depth > camera.near) || x < 0 || y < 0 || x > camera.width || y > camera.height) continue;
-      named.add(key);
-      labels.add({
-        key, text: entry.active ? `▶ ${entry.region.name}` : entry.region.name, x, y,
-        colour: entry.active ? colours.ink : colours.soft, edge: entry.colour, bold: entry.active, chip: colours.chip,
-        rank: entry.active ? 0 : region === 0 ? 1 : 10 + depth * 1e-3, gap: 6, sides: ["above", "right", "left", "below"], of: entry.of,
-      });
-    }
-  }
-
-  _nameVehicles(vehicles, colours) {
-    vehicles.forEach((vehicle, i) => {
-      if (!vehicle) return;
-      const [x, y, depth] = this.camera.project(vehicle.pose.position);
-      if (depth < this.camera.near) return;
-      const { name } = this.runs[i].header;
-      const alike = this.runs.filter((run) => run.header.name === name).length > 1;
-      const gap = 1.5 * vehicle.size * this.camera.scaleAt(vehicle.pose.position);
-      this.labels.add({
-        key: `vehicle ${i}`, text: alike ? `${name} (${i + 1})` : name, x, y, colour: colours.ink, edge: runColour(i), bold: true,
-        chip: colours.chip, rank: 0.5, gap, sides: ["below", "right", "left", "above"],
-      });
-    });
   }
 
   _note(t, poses, entries) {
@@ -385,21 +330,4 @@ function poseOf(run, t) {
   if (!run.rows) return null;
   const pose = run.pose(t);
   return Vec.finite(pose.position) && Vec.finite(pose.quaternion) ? { ...pose, size: run.header.vehicle.radius } : null;
-}
-
-/** Whether an entry of another run shows this region already: of the same name, shape and place. */
-function sameRegion(entry, region, shape, shift) {
-  return (
-    !entry.sight && entry.region.name === region.name && entry.region.keep === region.keep &&
-    entry.shift.every((x, i) => Math.abs(x - shift[i]) < 1e-3) && JSON.stringify(entry.shape) === JSON.stringify(shape)
-  );
-}
-
-/** Where the name of an entry stands. */
-function anchorOf({ solid, sheet, sight, shift, middle }, camera) {
-  if (sight) return sight.anchor;
-  if (sheet) return sheet.corners.reduce((a, b) => (camera.project(b)[0] > camera.project(a)[0] ? b : a));
-  let top = Infinity;
-  for (let i = 2; i < solid.points.length; i += 3) top = Math.min(top, solid.points[i]);
-  return solid.spine ? middle : [middle[0], middle[1], top + shift[2]];
 }

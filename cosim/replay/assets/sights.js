@@ -17,7 +17,8 @@ function rimOf(apex, axis, angle, length) {
  * What is drawn of a region of attitude.
  * @typedef {object} Sight
  * @property {number[]} apex, {number[]} axis of the cone  @property {number[][]} rim of it, on g = 0
- * @property {number[][][]} lines  @property {number[]|null} feature that is to be seen  @property {number[]} anchor of its name
+ * @property {number[][][]} lines  @property {number[]|null} feature that is to be seen
+ * @property {number[]} anchor of its name
  */
 
 /** How each kind of shape of attitude is drawn at a pose, from its fields, so large [m]. */
@@ -50,13 +51,13 @@ function paintSight(painter, sight, style) {
   const { context, camera } = painter;
   painter.begin();
   painter.polygon(sight.rim);
-  painter.fill(style.colour, 0.4 * style.alpha);
+  painter.fill(style.colour, 0.25 * style.alpha);
   // the flanks as far as the outline of the cone goes: the triangles of all rim points make it up
   painter.begin();
   for (let i = 0; i < SIGHT_RINGS; i++) painter.polygon([sight.apex, sight.rim[i], sight.rim[(i + 1) % SIGHT_RINGS]]);
-  painter.fill(style.colour, 0.25 * style.alpha);
+  painter.fill(style.colour, 0.16 * style.alpha);
   painter.begin();
-  painter.line([...sight.rim, sight.rim[0]]);
+  painter.polygon(sight.rim);
   for (let i = 0; i < SIGHT_RINGS; i += SIGHT_RINGS / 4) painter.segment(sight.apex, sight.rim[i]);
   painter.stroke(style.colour, style.width, 0.9, style.dash);
   painter.begin();

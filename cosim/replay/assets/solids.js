@@ -1,7 +1,7 @@
 // Regions of space that end somewhere, as surfaces: points on g = 0, faces between them, and where they hide things.
 
 const AROUND = 32; // faces around what is round
-const SHARP = Math.cos((31 * Math.PI) / 180); // faces that meet at more are seen as an edge
+const SHARP = Math.cos((31 * Math.PI) / 180); // faces that turn more from each other are seen as an edge
 
 /**
  * A surface of flat faces. Faces that meet bluntly belong to one round surface.
@@ -10,11 +10,13 @@ const SHARP = Math.cos((31 * Math.PI) / 180); // faces that meet at more are see
  * @property {number[][]} faces indices of points, anticlockwise as seen from outside
  * @property {Float64Array} normals outward, three numbers for each face
  * @property {number[][]} edges [point, point, face, face, 1 if sharp]
- * @property {number[]} patches number of the round or flat surface that each face belongs to
- * @property {number[][]} lines of points on a round surface, drawn to tell its form
- * @property {number[]} centre, {number} radius of a ball about it
- * @property {number[][]|null} spine the line in its middle, where it is long  @property {object|null} ellipsoid {centre, axes} where it is one: three half axes as vectors
- * @property {function(number[], number[]): boolean} hides whether it comes between an eye and a point, or holds the point
+ * @property {number[][]} lines of points on an ellipsoid, drawn to tell its form
+ * @property {number[]} centre, {number} radius of a ball about it  @property {number} top its least depth [m]
+ * @property {number[][]|null} spine the line in its middle, where it is long
+ * @property {object|null} ellipsoid {centre, axes} where it is one: three half axes as vectors
+ * @property {number[][][]} shadows polygons, north and east, that it is seen as from above
+ * @property {function(number[]): function(number, number, number): boolean} from tells of an eye whether the solid is
+ * between it and a point, or holds the point; asked for each piece of a way in each frame, so it makes no arrays
  */
 
 /** The surface that some points and faces make. */
@@ -23,12 +25,13 @@ function solidOf(points, faces, lines = []) {
   solid.normals = new Float64Array(3 * faces.length);
   faces.forEach((face, i) => solid.normals.set(normalOf(face.map((k) => points[k])), 3 * i));
   solid.edges = edgesOf(faces, solid.normals);
-  solid.patches = patchesOf(faces.length, solid.edges);
   const low = [0, 1, 2].map((axis) => Math.min(...points.map((p) => p[axis])));
   const high = [0, 1, 2].map((axis) => Math.max(...points.map((p) => p[axis])));
   solid.centre = Vec.scale(Vec.add(low, high), 0.5);
   solid.radius = Math.max(...points.map((p) => Vec.norm(Vec.sub(p, solid.centre))));
-  solid.hides = (eye, p) => crossesFaces(solid, eye, p);
+  solid.top = low[2];
+  solid.from = (eye) => (x, y, z) => nearSight(solid, eye, x, y, z) && crossesFaces(solid, eye, [x, y, z]);
+  solid.shadows = faces.length ? [outlineFromAbove(points)] : [];
   return solid;
 }
 
@@ -52,8 +55,7 @@ function edgesOf(faces, normals) {
       if (!known) edges.set(key, [a, b, i, i, 1]);
       else {
         const j = known[2];
-        const bend =
-          normals[3 * i] * normals[3 * j] + normals[3 * i + 1] * normals[3 * j + 1] + normals[3 * i + 2] * normals[3 * j + 2];
+        const bend = [0, 1, 2].reduce((sum, axis) => sum + normals[3 * i + axis] * normals[3 * j + axis], 0);
         known[3] = i;
         known[4] = bend < SHARP ? 1 : 0;
       }
@@ -62,15 +64,13 @@ function edgesOf(faces, normals) {
   return [...edges.values()];
 }
 
-/** Number the surfaces: faces are of one where a way leads between them over blunt edges. */
-function patchesOf(count, edges) {
-  const root = Array.from({ length: count }, (_, i) => i);
-  const find = (i) => {
-    while (root[i] !== i) i = root[i];
-    return i;
-  };
-  for (const [, , f, g, sharp] of edges) if (!sharp) root[find(f)] = find(g);
-  return root.map((_, i) => find(i));
+/** Whether a line from an eye to a point goes through the ball about a solid. */
+function nearSight({ centre, radius }, eye, x, y, z) {
+  const [bx, by, bz] = [eye[0] - x, eye[1] - y, eye[2] - z];
+  const [px, py, pz] = [x - centre[0], y - centre[1], z - centre[2]];
+  const length = bx * bx + by * by + bz * bz;
+  const part = Math.min(1, Math.max(0, -(px * bx + py * by + pz * bz) / length));
+  return (px + part * bx) ** 2 + (py + part * by) ** 2 + (pz + part * bz) ** 2 < radius * radius;
 }
 
 /** Whether a line from an eye to a point goes in through a face: then the point is inside the solid or behind it. */
@@ -119,17 +119,27 @@ function ellipsoidOf(centre, axes) {
   const solid = solidOf(points, [], lines);
   solid.centre = [...centre];
   solid.radius = Math.max(...axes.map(Vec.norm));
+  solid.top = centre[2] - Math.hypot(...axes.map((axis) => axis[2]));
   solid.ellipsoid = { centre: solid.centre, axes };
+  solid.shadows = [ellipseFromAbove(centre, axes)];
   const inverse = axes.map((axis) => Vec.scale(axis, 1 / Vec.dot(axis, axis))); // rows: into the unit ball
-  solid.hides = (eye, p) => {
-    let [aa, ab, bb] = [0, 0, 0];
-    for (const row of inverse) {
-      const a = Vec.dot(row, Vec.sub(p, centre));
-      const b = Vec.dot(row, Vec.sub(eye, p));
-      [aa, ab, bb] = [aa + a * a, ab + a * b, bb + b * b];
-    }
-    if (aa < 1) return true;
-    return ab < 0 && -ab < bb && aa - (ab * ab) / bb < 1; // nearest to the centre on the way to the eye
+  solid.from = (eye) => {
+    // all in the space where it is the unit ball
+    const [[m0, m1, m2], [m3, m4, m5], [m6, m7, m8]] = inverse;
+    const [cx, cy, cz] = centre;
+    const [ex, ey, ez] = inverse.map((row) => Vec.dot(row, Vec.sub(eye, centre)));
+    return (x, y, z) => {
+      const [dx, dy, dz] = [x - cx, y - cy, z - cz];
+      const px = m0 * dx + m1 * dy + m2 * dz;
+      const py = m3 * dx + m4 * dy + m5 * dz;
+      const pz = m6 * dx + m7 * dy + m8 * dz;
+      const square = px * px + py * py + pz * pz;
+      if (square < 1) return true;
+      const [bx, by, bz] = [ex - px, ey - py, ez - pz];
+      const along = px * bx + py * by + pz * bz;
+      const length = bx * bx + by * by + bz * bz;
+      return along < 0 && -along < length && square - (along * along) / length < 1; // nearest on the way to the eye
+    };
   };
   return solid;
 }
@@ -179,7 +189,9 @@ function prismOf(shape) {
   const corners = area > 0 ? shape.corners : [...shape.corners].reverse();
   const points = [shape.top, shape.bottom].flatMap((depth) => corners.map(([x, y]) => [x, y, depth]));
   const around = corners.map((_, i) => i);
-  return solidOf(points, [...bandFaces(0, n, n), [...around].reverse(), around.map((i) => n + i)]);
+  const solid = solidOf(points, [...bandFaces(0, n, n), [...around].reverse(), around.map((i) => n + i)]);
+  solid.shadows = [corners];
+  return solid;
 }
 
 /** A cone that ends in a part of a ball. */

@@ -18,11 +18,11 @@ class Stage {
 
   /** The scene of the first canvas; null while there is nothing to draw. */
   get scene() {
-    return this.views[0].scene;
+    return this.views[0].blank ? null : this.views[0].scene;
   }
 
   get scenes() {
-    return this.views.map((view) => view.scene).filter(Boolean);
+    return this.views.filter((view) => !view.blank).map((view) => view.scene);
   }
 
   /** @param {Run[]} runs of the page  @param {boolean[]} shown which of them are */
@@ -32,7 +32,8 @@ class Stage {
     this.shown = shown;
     const names = runNames(runs);
     const seen = runs.map((run, index) => ({ run, index })).filter(({ run, index }) => shown[index] && drawable(run));
-    const groups = this.side && seen.length > 1 ? seen.map((one) => [one]) : [seen];
+    const apart = this.side && seen.length > 1;
+    const groups = apart ? seen.map((one) => [one]) : [seen];
     while (this.views.length > groups.length) this.views.pop().element.remove();
     while (this.views.length < groups.length) this.views.push(this._view(this._another()));
     const content = [];
@@ -49,10 +50,12 @@ class Stage {
           view.caption.append(name);
         }
       }
-      if (!some.length) view.scene = null;
-      else if (view.scene) view.scene.setRuns(some);
-      else view.scene = new Scene(view.canvas, some, this.theme);
-      if (!view.scene) return;
+      // a run that has a scene for itself shows on its way who was active
+      const marks = runs.length > 1 && !apart ? group.map(({ index }) => ({ name: names[index], colour: runColour(index) })) : null;
+      view.blank = !some.length;
+      if (view.blank) return;
+      if (view.scene) view.scene.setRuns(some, marks);
+      else view.scene = new Scene(view.canvas, some, this.theme, marks);
       content.push(...view.scene.camera.content);
       if (i > 0) view.scene.camera = this.scene.camera;
     });
@@ -80,7 +83,8 @@ class Stage {
   }
 
   draw(t, follow) {
-    for (const scene of this.scenes) scene.draw(t, { follow, trail: true, labels: this.labels });
+    // one camera can follow one vehicle only
+    this.scenes.forEach((scene, i) => scene.draw(t, { follow: follow && i === 0, trail: true, labels: this.labels }));
   }
 
   /** Call a method of the one camera. */
@@ -91,7 +95,7 @@ class Stage {
 
   /** The run and the region under a point of a canvas: names to show, or null. */
   under(view, x, y) {
-    const found = view.scene?.pick(x, y);
+    const found = view.blank ? null : view.scene.pick(x, y);
     return found ? { run: this.runs[view.indices[found.run]], region: found.region } : null;
   }
 
@@ -107,7 +111,7 @@ class Stage {
   }
 
   _view(made) {
-    const view = { element: made, canvas: made.querySelector("canvas"), caption: made.querySelector(".caption"), scene: null, indices: [] };
+    const view = { element: made, canvas: made.querySelector("canvas"), caption: made.querySelector(".caption"), scene: null, blank: true, indices: [] };
     tellPointed(this, view);
     return view;
   }

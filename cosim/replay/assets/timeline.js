@@ -71,7 +71,7 @@ class Timeline {
       if (i < rows && active[i] === active[from]) continue;
       const region = header.regions[active[from]];
       if (region) {
-        context.fillStyle = hueColour(OF_CRITERION[region.criterion] ?? "green", this.theme);
+        context.fillStyle = fullColour(region);
         context.globalAlpha = region.criterion ? 1 : 0.45;
         const left = x(time[from]);
         context.fillRect(left, 0, Math.max(1, x(time[Math.min(i, rows - 1)]) - left), height);
@@ -98,6 +98,7 @@ class Timeline {
         const mark = element("span", `mark-at ${kind}`);
         mark.style.left = `${(100 * (time - start)) / Math.max(end - start, 1e-9)}%`;
         mark.title = `${clock(time)}: ${text}`;
+        mark.addEventListener("click", () => this.player.seek(time)); // the keyboard has keys and the list for it
         return mark;
       }),
     );

@@ -9,12 +9,14 @@ class Trail {
     this.run = run;
     this._way = new Float64Array(0); // m, length of way at each row
     this._known = 0;
+    this._marks = null;
   }
 
   /**
    * The way as it is seen.
-   * @param {Camera} camera  @param {number} t that parts past from future  @param {number[]} floor depth of the shadow
-   * @returns {{points: number[], row: number, past: boolean, active: number}[]} chunks; points are pixels, x and y in turn
+   * @param {Camera} camera  @param {number} t that parts past from future
+   * @returns {{points: number[], middle: number[], next: object, past: boolean, active: number}[]} chunks; points are
+   * pixels, x and y in turn; next is the chunk that goes on from it, if there is one
    */
   chunks(camera, t) {
     const { run } = this;
@@ -43,11 +45,15 @@ class Trail {
       const turns = !chunk || chunk.past !== past || chunk.active !== who;
       if (!turns && !last && step < FINEST) return;
       if (chunk) {
+        if (straight(chunk.points, px, py)) chunk.points.length -= 2;
         chunk.points.push(px, py);
         length += step;
       }
       if (turns || length > CHUNK) {
-        chunk = { points: chunk && chunk.past === past ? chunk.points.slice(-2) : [px, py], row: i, past, active: who };
+        const before = chunk;
+        const points = before ? before.points.slice(-2) : [px, py];
+        chunk = { points, middle: [x, y, z], next: null, past, active: who };
+        if (before) before.next = chunk;
         chunks.push(chunk);
         length = 0;
       }
@@ -85,21 +91,33 @@ class Trail {
     return this._way;
   }
 
-  /** Where marks of direction stand, so far apart [m]: [{row, from, to}] places on the way. */
+  /** Where marks of direction stand, so far apart [m]: [{time, from, middle}], two places on the way each. */
   marks(spacing) {
-    const way = this.way();
     const { run } = this;
+    if (this._marks?.spacing === spacing && this._marks.rows === run.rows) return this._marks.list;
+    const way = this.way();
+    const { time } = run;
     const [xs, ys, zs] = ["x", "y", "z"].map((axis) => run.column(`position.${axis}`));
-    const marks = [];
+    const list = [];
     for (let i = 1; i < run.rows; i++) {
       if (Math.floor(way[i] / spacing) <= Math.floor(way[i - 1] / spacing)) continue;
-      const at = [xs[i], ys[i], zs[i]];
+      const middle = [xs[i], ys[i], zs[i]];
       let k = i; // far enough back to have a direction
-      while (k > 0 && Math.hypot(at[0] - xs[k], at[1] - ys[k], at[2] - zs[k]) < 0.05 * spacing) k--;
-      marks.push({ row: i, from: [xs[k], ys[k], zs[k]], to: at });
+      while (k > 0 && Math.hypot(middle[0] - xs[k], middle[1] - ys[k], middle[2] - zs[k]) < 0.05 * spacing) k--;
+      list.push({ row: i, time: time[i], from: [xs[k], ys[k], zs[k]], middle });
     }
-    return marks;
+    this._marks = { spacing, rows: run.rows, list };
+    return list;
   }
+}
+
+/** Whether the last point of a line is as good as on the way from the one before it to another. */
+function straight(points, x, y) {
+  const n = points.length;
+  if (n < 4) return false;
+  const [u, v] = [x - points[n - 4], y - points[n - 3]];
+  const [p, q] = [points[n - 2] - points[n - 4], points[n - 1] - points[n - 3]];
+  return (u - p) * p + (v - q) * q > 0 && Math.abs(u * q - v * p) < 0.25 * Math.hypot(u, v);
 }
 
 /** Whether a line of pixels may touch the picture. */
@@ -112,4 +130,17 @@ function inPicture(points, width, height) {
     bottom &&= points[i + 1] > height + 20;
   }
   return !(left || right || top || bottom);
+}
+
+/** A mark of direction: a small arrow head on the way. */
+function paintMark(painter, { mark: [x, y, u, v], colour, past }, colours) {
+  const { context } = painter;
+  const size = past ? 6.5 : 4.5;
+  context.beginPath();
+  context.moveTo(x + size * u, y + size * v);
+  context.lineTo(x - size * (0.7 * u + 0.75 * v), y - size * (0.7 * v - 0.75 * u));
+  context.lineTo(x - size * (0.7 * u - 0.75 * v), y - size * (0.7 * v + 0.75 * u));
+  context.closePath();
+  if (past) painter.stroke(colours.halo, 2.5);
+  painter.fill(colour);
 }

@@ -1,4 +1,5 @@
-// What the numbers at the cursor say, in words. Nothing here touches the page.
+// What the numbers at the cursor say, in words: those of the last row before it, never one that is not in the record.
+// Nothing here touches the page.
 
 const NEEDED = ["time", ...["x", "y", "z"].map((a) => `position.${a}`), ...[0, 1, 2, 3].map((e) => `quaternion.e${e}`)];
 const DEGREES = 180 / Math.PI;
@@ -23,7 +24,7 @@ function quantity(x, unit, digits = 3) {
   if (unit === "rad") return `${figure(x * DEGREES, 1)}°`;
   if (unit === "rad/s") return `${figure(x * DEGREES, 1)}°/s`;
   if (Math.abs(x) >= 10000 && /^N/.test(unit)) return `${figure(x / 1000, 1)} k${unit.replace(".", "\u00b7")}`;
-  return unit ? `${figure(x, digits)} ${unit.replace(".", "\u00b7")}` : figure(x, digits);
+  return unit ? `${figure(x, digits)} ${unit.replace(".", "\u00b7")}` : figure(x, 2);
 }
 
 /** Seconds as a clock reads them: 12.34 s, or 3:07.5 from the second minute on. */
@@ -46,6 +47,11 @@ function drawable(run) {
   return run.rows > 0 && NEEDED.every((name) => run.has(name));
 }
 
+/** Whether a run tells when its rows are: without that nothing of it can be shown. */
+function timed(run) {
+  return run.has("time") && Number.isFinite(run.start) && Number.isFinite(run.end);
+}
+
 /** What a region asks: "obstacle · keep out · hard". */
 function regionWords(region) {
   const keep = region.keep === "in" ? "keep inside" : "keep out";
@@ -64,8 +70,8 @@ function clearanceWords(clearance, region) {
 /** Who is active at a time, and why: index, name, and a sentence. */
 function activeWords(run, t) {
   const index = run.active(t);
-  const region = run.header.regions[index] ?? run.header.regions[0];
-  const clearance = run.at(`${region.name}.clearance`, t);
+  const region = run.header.regions[index];
+  const clearance = run.held(`${region.name}.clearance`, t);
   const asked = clearanceWords(clearance, region);
   let sentence = `Nothing presses: the goal region alone steers, ${asked}.`;
   if (region.criterion) {
@@ -75,8 +81,10 @@ function activeWords(run, t) {
   } else if (clearance >= 0) {
     sentence = `The vehicle is in the goal region, ${asked}.`;
   }
-  if (!run.rows || Number.isNaN(run.held("active", t))) sentence = "The record does not say which region is active here.";
-  return { index: region === run.header.regions[0] ? 0 : index, name: region.name, region, sentence };
+  if (!run.rows || Number.isNaN(run.held("active", t))) {
+    return { index: -1, name: "not recorded", region: null, sentence: "The record does not say which region is active here." };
+  }
+  return { index, name: region.name, region, sentence };
 }
 
 /** The rules of the arbiter and how strongly each fires at a time. */
@@ -89,7 +97,7 @@ function distancesAt(run, t) {
   const rows = run.header.regions.map((region, index) => ({
     index,
     region,
-    clearance: run.at(`${region.name}.clearance`, t),
+    clearance: run.held(`${region.name}.clearance`, t),
   }));
   const press = (row) => (row.index === 0 ? -Infinity : Number.isNaN(row.clearance) ? Infinity : row.clearance);
   return rows.sort((a, b) => press(a) - press(b) || a.index - b.index);
@@ -104,7 +112,7 @@ function sizes(run, names) {
 
 /** Numbers of the vehicle at a time: [name, text] in the order of the panel. */
 function numbersAt(run, t) {
-  const of = (name) => run.at(name, t);
+  const of = (name) => run.held(name, t);
   const size = (names) => Math.hypot(...names.map(of));
   const limited = ["wrench_saturated", "allocation_saturated"].some((name) => run.held(name, t) > 0);
   return [
@@ -135,12 +143,17 @@ function troubles(run) {
   if (status && status !== "completed") said.push(UNFINISHED[status] ?? `This run did not complete: it ${status}.`);
   const missing = NEEDED.filter((name) => !run.has(name));
   if (missing.length) said.push(`The record has no ${missing.join(", ")}: the scene cannot be drawn.`);
-  if (!run.rows) said.push("The record has no row yet.");
+  const kinds = ["clearance", "membership.", "weight.", "command.", "actuation.", "estimate.", "active", "rule."];
+  const absent = kinds.filter((kind) => !run.header.signals.some(({ name }) => name.includes(kind)));
+  if (absent.length) said.push(`The record has no signals named ${absent.join(", ")}: what rests on them is left out.`);
+  if (!run.rows && status) said.push("The record has no row."); // a live run has none at first, and no status
   if (run.rows === 1) said.push("The record has one row only: there is nothing to play.");
-  const holes = run.header.signals.filter(({ name }) => run.column(name).includes(NaN)).map(({ name }) => name);
+  const { gaps = {} } = run.header; // of the whole record, which may have more rows than the page
+  const holes = run.header.signals.map(({ name }) => name).filter((name) => gaps[name] || run.column(name).includes(NaN));
   if (holes.length) {
+    const told = holes.slice(0, 4).map((name) => (gaps[name] ? `${name} (${gaps[name]} steps)` : name));
     const more = holes.length > 4 ? ` and ${holes.length - 4} more` : "";
-    said.push(`No number at some times in ${holes.slice(0, 4).join(", ")}${more}: gaps in the curves are gaps in the record.`);
+    said.push(`No number at some times in ${told.join(", ")}${more}: gaps in the curves are gaps in the record.`);
   }
   return said;
 }

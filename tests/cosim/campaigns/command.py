@@ -29,13 +29,13 @@ sys.exit(main(sys.argv[1:]))
 class Command:
     """A ``cosim`` command with ``--out`` in a session of its own, to which the engines of `fake` are known."""
 
-    def __init__(self, folder, *words):
+    def __init__(self, folder, cache, *words):
         self.out, self.temporary = folder / "out", folder / "temporary"
         self.temporary.mkdir(exist_ok=True)
         self.process = subprocess.Popen(
-            [sys.executable, "-c", _MAIN, *map(str, words), "--out", str(self.out)],
+            [sys.executable, "-c", _MAIN, *map(str, words), "--replays", "0", "--out", str(self.out)],
             cwd=folder,
-            env=os.environ | {"PYTHONPATH": str(ROOT), "TMPDIR": str(self.temporary), "XDG_CACHE_HOME": str(folder)},
+            env=os.environ | {"PYTHONPATH": str(ROOT), "TMPDIR": str(self.temporary), "XDG_CACHE_HOME": str(cache)},
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             text=True,
@@ -87,13 +87,19 @@ class Command:
         return found
 
 
+@pytest.fixture(scope="module")
+def command_cache(tmp_path_factory):
+    """Return where the commands of a module keep the FMU that the first of them builds."""
+    return tmp_path_factory.mktemp("command-cache")
+
+
 @pytest.fixture
-def command(tmp_path):
+def command(tmp_path, command_cache):
     """Return a function that starts a command."""
     with contextlib.ExitStack() as stack:
 
         def start(*words):
-            started = Command(tmp_path, *words)
+            started = Command(tmp_path, command_cache, *words)
             stack.callback(started.end)
             return started
 

@@ -242,8 +242,10 @@ def test_the_summary_follows_from_the_rows(tmp_path):
         Score(False, math.inf, 0.4, 5.0, 5.0, 1e-6, 10),
     ]
     plan = plan_of("printed", Gains(), Conditions(tell_failures=True), 4, "abc")
-    found = results_of(tmp_path / "rows.parquet", [row_of(9 - i, s, 0.01) for i, s in enumerate(scores)][::-1])
-    summary = summarise(plan, found)
+    lines = [json.dumps(scene) for scene in (*PLAIN[:2], *HARD[:2])]
+    told = [row_of(9 - i, s, 0.01, line) for i, (s, line) in enumerate(zip(scores, lines, strict=True))]
+    found = results_of(tmp_path / "rows.parquet", told[::-1])
+    summary = summarise(plan, found, tmp_path)
     assert (summary["law"], summary["scenes"], summary["reached"], summary["violations"]) == ("printed", 4, 2, 2)
     assert summary["medians"] == {
         "reach_time": 40.0, "effort": 200.0, "thrust_variation": 20.0, "worst_step_time": 2e-6,
@@ -251,6 +253,14 @@ def test_the_summary_follows_from_the_rows(tmp_path):
     }  # fmt: skip
     assert (summary["least_clearance"], summary["worst_step_time"]) == (-0.1, 3e-6)
     assert summary["failed"] == {"not_reached": [6, 7], "violated": [6, 8], "stopped": [6]}
+    assert [w["row"] for w in summary["worst"]] == [8, 6, 7, 9]  # 6 was stopped; 7 was never reached
+    assert summary["rates"]["completed"]["rows"] == 1 and summary["rates"]["violation"]["share"] == 0.5
+    kinds = summary["kinds"]
+    assert {name: (of["scenes"], of["rates"]["reached"]["rows"]) for name, of in kinds.items()} == {
+        "plain": (2, 2), "drift, noise, failure": (2, 0)
+    }  # fmt: skip
+    assert kinds["plain"]["quantiles"]["reach_time"]["0.5"] == 40.0
+    assert summary["quantiles"]["min_clearance"]["0.5"] == pytest.approx(0.15)
     assert summary["tell_failures"] is True and summary["gains"] == Gains()._asdict()
     assert summary["conditions"]["duration"] == 120.0 and summary["versions"]["numpy"] == np.__version__
     json.dumps(summary, allow_nan=False)

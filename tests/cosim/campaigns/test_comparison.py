@@ -3,15 +3,13 @@
 import json
 import math
 
-import numpy as np
 import pytest
 
 from controller import LAWS, PrintedLaw
 from controller.printed_law import Gains
 from cosim import flight
 from cosim.campaigns import compare
-from cosim.campaigns.comparison import pair
-from cosim.campaigns.comparison_figures import shares_up_to
+from cosim.campaigns.comparison import difference, pair
 from cosim.campaigns.scene_rows import row_of
 from cosim.errors import RunError
 from cosim.scene_run import Score
@@ -42,18 +40,14 @@ def scenes(tmp_path):
 def test_laws_stand_side_by_side(tmp_path, scenes, idle):
     out = tmp_path / "out"
     done = compare(scenes, ["printed", "idle"], out, BRIEF, {"printed": Gains(k_p1=9.0)})
-    assert sorted(p.name for p in out.iterdir()) == ["compare.json", "compare.md", "figures", "idle", "printed"]
-    assert sorted(p.name for p in (out / "figures").iterdir()) == [
-        f"{name}.svg" for name in ("effort", "min-clearance", "reach-time")
-    ]
+    assert sorted(p.name for p in out.iterdir()) == ["compare.json", "idle", "printed"]
     numbers = json.loads((out / "compare.json").read_text())
     assert numbers == done.numbers and numbers["scenes"] == 2
     assert numbers["laws"]["printed"]["gains"]["k_p1"] == 9.0
     assert numbers["laws"]["idle"] == json.loads((out / "idle" / "summary.json").read_text())
     assert done.campaigns["idle"].results["effort"].tolist() == [0.0, 0.0]
-    text = (out / "compare.md").read_text()
-    assert "|  | printed | idle |" in text and "| reached | 0 | 0 |" in text
-    assert "| printed | 0 | idle | 0 | – | – | – | – |" in text
+    (paired,) = numbers["paired"]
+    assert paired["laws"] == ["printed", "idle"] and paired["neither"] == 2 and paired["p"] is None
 
 
 @pytest.mark.slow
@@ -113,7 +107,9 @@ def test_a_pair_is_compared_on_what_one_completes(results):
     }  # fmt: skip
 
 
-def test_shares_count_what_never_comes():
-    values, shares = shares_up_to(np.array([3.0, np.nan, 1.0, np.nan]))
-    assert values.tolist() == [1.0, 3.0] and shares.tolist() == [0.25, 0.5]
-    assert [a.size for a in shares_up_to(np.zeros(0))] == [0, 0]
+def test_a_difference_is_that_of_the_scenes_that_both_complete(results):
+    mine = results("mine", *(score(time, 0.1, 10.0 * time) for time in (3.0, 5.0, 9.0, math.inf)))
+    other = results("other", *(score(time, 0.1, 10.0 * time) for time in (1.0, 4.0, math.inf, 2.0)))
+    found = difference("mine", mine, "other", other)
+    assert [found[name] for name in ("both", "only_one", "only_other", "neither")] == [2, 1, 1, 0]
+    assert found["differences"]["reach_time"]["median"] == 1.5 and found["differences"]["effort"]["median"] == 15.0

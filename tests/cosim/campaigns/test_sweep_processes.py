@@ -14,13 +14,14 @@ from cosim.campaigns.folder import RESULTS
 from cosim.cli import main
 from cosim.errors import RunError
 from cosim.flying.outcome import FIELDS
-from tests.cosim.campaigns.command import command, needs_posix
+from tests.cosim.campaigns.command import command, command_cache, needs_posix
 from tests.cosim.campaigns.fake import KEYS, VARY, design, fakes, paper
+from tests.cosim.campaigns.scenes import batches_of
 from tests.cosim.campaigns.test_sweep import expected
 
-__all__ = ["command", "fakes"]
+__all__ = ["command", "command_cache", "fakes"]
 
-N = 1500
+N = 500  # of 10 ms each: parts enough to come in between, whatever the machine does
 SLOW = ["sweep", "paper", "--vary", *VARY, "--samples", N, "--seed", 3, "--engine", "slow"]
 
 
@@ -50,7 +51,7 @@ def test_a_sweep_that_is_killed_goes_on_by_the_same_command(command, workers):
 @pytest.mark.slow
 def test_workers_that_are_killed_are_replaced(command):
     bereft = command(*SLOW, "--workers", 2)
-    for parts in (3, 6, 9):
+    for parts in (3, 6):
         bereft.wait_for_parts(parts)
         os.kill(bereft.workers()[0], signal.SIGKILL)
     _, complaints = bereft.process.communicate(timeout=240)
@@ -85,16 +86,17 @@ def check_poisoned(folder, n):
 
 
 @pytest.mark.slow
-def test_rows_that_kill_workers_are_refused_and_all_others_flown(tmp_path, fakes, caplog):
-    done = run_sweep(paper(), design(120), tmp_path / "out", "poisoned", workers=2)
-    check_poisoned(tmp_path / "out", 120)
+def test_rows_that_kill_workers_are_refused_and_all_others_flown(tmp_path, fakes, caplog, monkeypatch):
+    batches_of(monkeypatch, 4)  # each halving costs processes
+    done = run_sweep(paper(), design(60), tmp_path / "out", "poisoned", workers=2)
+    check_poisoned(tmp_path / "out", 60)
     assert done.summary["refused"] > 0 and f"refused: {KILLED}" in caplog.text
 
 
 @pytest.mark.slow
 def test_where_every_worker_dies_no_row_is_blamed(tmp_path, fakes):
     with pytest.raises(RunError, match="every process died, whatever it flew"):
-        run_sweep(paper(), design(3), tmp_path / "out", "deadly", workers=2)
+        run_sweep(paper(), design(1), tmp_path / "out", "deadly", workers=2)
     assert not (tmp_path / "out" / RESULTS).exists()
 
 
@@ -117,14 +119,15 @@ def test_dask_gives_the_same_rows(tmp_path, fakes, cluster, capfd):
     words = ["sweep", "paper", "--vary", *VARY, "--samples", "50", "--seed", "3", "--engine", "fake"]
     address = cluster._client.scheduler.address
     capfd.readouterr()
-    assert main([*words, "--scheduler", address, "--out", str(tmp_path / "two")]) == 0
+    assert main([*words, "--scheduler", address, "--replays", "0", "--out", str(tmp_path / "two")]) == 0
     assert rows_of(tmp_path / "two") == expected()
     said = capfd.readouterr()
     assert "50 of 50 rows flown" in said.out and said.err == ""
 
 
 @pytest.mark.slow
-def test_rows_that_kill_workers_of_dask_are_refused_and_all_others_flown(tmp_path, fakes, cluster):
+def test_rows_that_kill_workers_of_dask_are_refused_and_all_others_flown(tmp_path, fakes, cluster, monkeypatch):
+    batches_of(monkeypatch, 4)
     run_sweep(paper(), design(60), tmp_path / "out", "poisoned", executor=cluster)
     check_poisoned(tmp_path / "out", 60)
 

@@ -16,6 +16,7 @@ from cosim.helm.orders import (
     Forget,
     Item,
     Mission,
+    Move,
     Obstacle,
     Reset,
     Steer,
@@ -177,6 +178,39 @@ def test_obstacles_beyond_the_room_are_refused_and_known_ones_move(fly, caplog):
     run = fly({0: far, 5: [Obstacle(1, (60.0, 0.0, 3.0), 0.5)]}, "time.duration=0.1", "commands.obstacles=2", *OPEN)
     assert "no room for obstacle 2" in caplog.text
     assert run["seen 2.shift.x"][4:6].tolist() == [50.0, 60.0]
+
+
+def test_moved_regions_keep_their_shape_and_the_record_has_where_they_are(fly):
+    travels = Obstacle(4, (30.0, 0.0, 3.0), 0.5, velocity=(1.0, 0.0, 0.0))
+    away, back = (0.0, 3.0, -1.0), (0.0, -3.0, 1.0)
+    script = {0: [travels], 10: [Move("pipe", away), Move("seen 1", away), Steer("hold")], 20: [Move("pipe", back)]}
+    run, plain = fly(script, "time.duration=0.3"), fly({0: [Steer("hold")]}, "time.duration=0.3")
+    shifts = run.stack(*(f"pipe.shift.{axis}" for axis in "xyz"))
+    assert not shifts[:10].any() and not shifts[20:].any()
+    assert shifts[10:20].tolist() == [list(away)] * 10
+    # the pipe is as far from the vehicle as it would be from one that had moved the other way
+    room = fly({}, "time.duration=0.01", "initial.position=" + str((run.position[10] - away).tolist()))
+    assert run["pipe.clearance"][10] == pytest.approx(room["pipe.clearance"][0], abs=1e-12)
+    assert run["pipe.clearance"][9] == pytest.approx(plain["pipe.clearance"][9], abs=0.01)
+    # the obstacle goes on as it went
+    north = run["seen 1.shift.x"]
+    assert np.diff(north) == pytest.approx(np.full(len(north) - 1, 0.01), abs=1e-9)
+    assert run["seen 1.shift.y"][[9, 10, 30]].tolist() == [0.0, 3.0, 3.0]
+
+
+@pytest.mark.parametrize(
+    ("region", "why"),
+    [
+        ("ships", "expected one of view, pipe"),
+        ("goal", "expected one of view"),
+        ("seen 2", "no such obstacle has come"),
+    ],
+)
+def test_what_is_not_there_is_not_moved(fly, caplog, region, why):
+    run = fly({1: [Move(region, (1.0, 1.0, 1.0))]}, "time.duration=0.05")
+    assert why in caplog.text
+    moved = [f"{name}.shift.{axis}" for name in ("pipe", "seen 1", "seen 2") for axis in "xyz"]
+    assert not run.stack(*moved).any()
 
 
 def test_numbers_change_while_it_runs(fly):

@@ -1,17 +1,33 @@
-"""Runs to be seen again: a minute in a dock, the paper's, and one that is steered by orders."""
+"""Runs to be seen again, their pages, and a browser."""
 
+import importlib.util
+import json
 import shutil
 
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 
 from cosim.replay.folder import load_run
+from cosim.replay.page import write_page
+from cosim.replay.pages import replay
+from cosim.replay.trace import trace_of
+from tests.cosim.replay.browser import CHROMEDRIVER, CHROMIUM, Browser
+from tests.cosim.replay.decoding import read_page
 
 CLOSED = "arbiter.engine=closed"
+GAPS = ("position.x", "quaternion.e0", "heading.clearance", "membership.obstacle", "weight.shape", "command.X")
 
 
 @pytest.fixture(scope="session")
 def docking(shipped_run):
     return load_run(shipped_run("docking", CLOSED).folder)
+
+
+@pytest.fixture(scope="session")
+def paper(shipped_run):
+    return load_run(shipped_run("paper", CLOSED).folder)
 
 
 @pytest.fixture(scope="session")
@@ -24,3 +40,74 @@ def copy_of(tmp_path_factory):
         return folder
 
     return copy
+
+
+class Shown:
+    """A run, the file of its page, and what an independent reader finds in it."""
+
+    def __init__(self, run, file):
+        self.run, self.file = run, file
+        _, ((self.header, self.columns),) = read_page(file.read_text())
+        at = {t: k for k, t in enumerate(run.record["time"].tolist())}
+        self.steps = [at[t] for t in self.columns["time"]]  # of the record, by row of the page
+
+    def recorded(self, name):
+        """Return a signal of the record at the rows of the page."""
+        return self.run.record[name][self.steps].tolist()
+
+
+@pytest.fixture(scope="session")
+def shown(tmp_path_factory):
+    """Return a function that writes the page of a run, once."""
+    pages = {}
+
+    def page_of(run):
+        if run.path not in pages:
+            file = tmp_path_factory.mktemp("pages") / "replay.html"
+            pages[run.path] = Shown(run, write_page(file, [trace_of(run).as_json()], run.scenario.title))
+        return pages[run.path]
+
+    return page_of
+
+
+@pytest.fixture(scope="session")
+def both(docking, paper, tmp_path_factory):
+    """Return the page of two runs."""
+    return replay([docking.path, paper.path], tmp_path_factory.mktemp("both") / "replay.html")
+
+
+@pytest.fixture(scope="session")
+def browser(tmp_path_factory):
+    """Return the one browser of the session."""
+    if not (CHROMIUM and CHROMEDRIVER and importlib.util.find_spec("selenium")):
+        pytest.skip("no browser: chromium, chromedriver and selenium are needed (apt install chromium chromium-driver)")
+    chromium = Browser(tmp_path_factory.mktemp("profile"))
+    yield chromium
+    chromium.close()
+
+
+@pytest.fixture(scope="session")
+def spoil():
+    """Return a function that makes a run folder one of a run that was not whole."""
+
+    def spoil_folder(folder, kind):
+        table = pq.read_table(folder / "record.parquet")
+        if kind in ("killed", "one row"):
+            (folder / "summary.json").unlink()
+            (folder / "record.parts").mkdir()
+            pq.write_table(table.slice(0, 1 if kind == "one row" else 900), folder / "record.parts" / "000000.parquet")
+            (folder / "record.parquet").unlink()
+        elif kind == "interrupted":
+            summary = json.loads((folder / "summary.json").read_text())
+            (folder / "summary.json").write_text(json.dumps(summary | {"status": "interrupted"}))
+            pq.write_table(table.slice(0, 900), folder / "record.parquet")
+        else:
+            for name in GAPS:
+                column = table[name].to_numpy().copy()
+                column[300:420] = np.nan
+                at = table.schema.get_field_index(name)
+                table = table.set_column(at, table.schema.field(at), pa.array(column))
+            pq.write_table(table, folder / "record.parquet")
+        return folder
+
+    return spoil_folder

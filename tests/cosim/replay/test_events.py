@@ -8,10 +8,8 @@ import pytest
 
 from cosim.helm.orders import Aim, Arm, Begin, Change, Face, Forget, Item, Mission, Obstacle, Reset, Steer, Sticks
 from cosim.replay.events import events_of
-from cosim.replay.folder import load_run
 from cosim.replay.order_words import order_words, ordered_events
 from cosim.signals import Column
-from tests.cosim.replay.conftest import CLOSED
 
 
 class Made:
@@ -26,11 +24,6 @@ class Made:
 
     def stack(self, names):
         return np.column_stack([self[name] for name in names])
-
-
-@pytest.fixture(scope="module")
-def paper(shipped_run):
-    return load_run(shipped_run("paper", CLOSED).folder)
 
 
 def made(paper, time, status="completed", failures=(), **signals):
@@ -50,7 +43,7 @@ def test_the_paper_s_run_is_told_in_order(paper):
     assert [event.time for event in events] == sorted(event.time for event in events)
     assert len(events) < 40
     time, record = paper.record["time"], paper.record
-    assert [t for t, _ in told(paper, "goal")][0] == paper.summary["reach_time"]
+    assert next(t for t, _ in told(paper, "goal")) == paper.summary["reach_time"]
     assert [t for t, _ in told(paper, "goal")][-1] == paper.summary["settle_time"]
     first = int(np.argmax(record["SR1.clearance"] < 0.0))
     last = first + int(np.argmax(record["SR1.clearance"][first:] >= 0.0))

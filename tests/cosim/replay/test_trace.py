@@ -14,7 +14,6 @@ from cosim.replay.trace import plain, trace_of
 from cosim.replay.viewing import Viewing
 from cosim.scenario import CRITERIA
 from fuzzy_arbiter import Arbiter
-from tests.cosim.replay.conftest import CLOSED
 from tests.cosim.replay.decoding import active_of
 
 
@@ -50,7 +49,7 @@ def test_sampling_keeps_to_its_budget_and_loses_no_spike(n, columns, data):
     steps = sampled_rows(time, columns, telling, np.array([moment]))
     assert steps[0] == 0 and steps[-1] == n - 1 and (np.diff(steps) > 0).all()
     assert {spike, moment, max(moment - 1, 0)} <= set(steps.tolist())
-    assert len(steps) <= 480_000 / (8 * columns) + 150_000 * n / 60 / (8 * columns) + 402
+    assert len(steps) <= 400_000 / (8 * columns) + 150_000 * n / 60 / (8 * columns) + 402
 
 
 def test_who_is_active_agrees_with_a_reading_row_by_row(docking):
@@ -110,7 +109,7 @@ def test_one_row_is_seen_alone_as_among_others(docking):
     [
         ("paper", ["law.name=antonelli"]),
         ("paper", ["law.name=pd", "time.duration=0.5"]),
-        ("paper", ["regions=[]"]),
+        ("paper", ["intersection=[]", "regions=[]"]),
         ("paper", ["goal.velocity=[0.1,0,0]"]),
         ("harbour", ["time.duration=2"]),
         ("sitl", ["time.duration=1"]),
@@ -136,10 +135,9 @@ def test_a_trace_is_of_the_run_as_it_came(docking):
     assert trace_of(dataclasses.replace(docking, scenario=slower)).header["title"] == "elsewhere"
 
 
-def test_the_paper_is_seen_at_its_own_instants(shipped_run):
+def test_the_paper_is_seen_at_its_own_instants(paper):
     """The overlap of the paper's regions lasts 48 ms of 60 s: it is in the page to the step."""
-    run = load_run(shipped_run("paper", CLOSED).folder)
-    trace = trace_of(run)
-    first, last = run.summary["intersection_windows"][0]
+    trace = trace_of(paper)
+    first, last = paper.summary["intersection_windows"][0]
     time = [signal["name"] for signal in trace.header["signals"]].index("time")
     assert {first, last} <= set(trace.rows[:, time].tolist())

@@ -1,0 +1,161 @@
+"""What the page of a run costs to write and to open, and how smoothly it plays in a browser without a graphics card."""
+
+from __future__ import annotations
+
+import contextlib
+import importlib.util
+import shutil
+import tempfile
+import time
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+from benchmarks.table import Row
+from benchmarks.timing import Timing
+from cosim.replay.folder import load_run
+from cosim.replay.pages import write_replay
+from cosim.run import run_scenario
+from cosim.scenario import load_scenario
+
+STEPS = 120_000
+RATIO = "how many times as long as a frame may take at 30 frames a second"
+
+_SCENARIO = "pipe-inspection"  # which moves to the end, a region with it
+_STEP = 0.01  # s
+_OTHERS = (3_000, 6_000)  # steps: half a minute and a minute
+_SPEEDS = (1.0, 5.0, 20.0)
+_SIZE = (1280, 800)  # CSS pixels
+_SMOOTH = Timing((1.0 / 30.0,))
+_PATIENCE = 120.0  # s
+_NO_BROWSER = "needs chromium, chromedriver and selenium"
+
+# what is painted while the page plays: when [ms], and what each part of it took
+_PLAY = """
+const [speed, seconds, done] = arguments;
+const { page, player } = window.subreach;
+const parts = { frame: [page, "paint"], scene: [page.stage, "draw"], charts: [page.board, "point"] };
+const taken = { at: [], frame: [], scene: [], charts: [] };
+for (const [name, [owner, method]] of Object.entries(parts)) {
+  owner[method] = (...values) => {
+    const before = performance.now();
+    Object.getPrototypeOf(owner)[method].apply(owner, values);
+    taken[name].push(performance.now() - before);
+    if (name === "frame") taken.at.push(before);
+  };
+}
+player.seek(0);
+player.setFollow(true);
+player.setSpeed(speed);
+player.play();
+setTimeout(() => {
+  player.pause();
+  for (const [owner, method] of Object.values(parts)) delete owner[method];
+  done(taken);
+}, 1000 * (seconds + 0.5));
+"""
+
+
+def measure(steps: int, repeats: int) -> list[Row]:
+    """Time pages of a short, a middling and a long run, and play the long one.
+
+    Parameters
+    ----------
+    steps : int
+        Of the long run.
+    repeats : int
+        Times that a page is written and opened, and seconds that it plays at each speed.
+
+    Returns
+    -------
+    list of Row
+        For the table.
+    """
+    with tempfile.TemporaryDirectory() as folder, _browser(Path(folder)) as browser:
+        rows = []
+        for count in (*_OTHERS, steps):
+            page, written = _page(Path(folder) / f"run-{count}", count, repeats)
+            what = f"page of {count * _STEP:g} s, {page.stat().st_size / 1e6:.2f} MB"
+            rows.append(Row(f"{what}: written", written))
+            rows.append(Row(f"{what}: opened", _opened(browser, page, repeats) if browser else _NO_BROWSER))
+        for speed in _SPEEDS:
+            rows += _played(browser, speed, repeats)
+    return rows
+
+
+def _page(folder: Path, steps: int, repeats: int) -> tuple[Path, Timing]:
+    scenario = load_scenario(_SCENARIO, ["arbiter.engine=closed", f"time.duration={steps * _STEP!r}"])
+    run = load_run(run_scenario(scenario, folder, report=False).folder)
+    times = []
+    for _ in range(repeats):
+        before = time.perf_counter()
+        page = write_replay(run)
+        times.append(time.perf_counter() - before)
+    return page, Timing(tuple(times))
+
+
+@contextlib.contextmanager
+def _browser(folder: Path) -> Iterator[Any]:
+    """Give a Chromium that renders in software, None where there is none."""
+    chromium, chromedriver = shutil.which("chromium"), shutil.which("chromedriver")
+    if not (chromium and chromedriver and importlib.util.find_spec("selenium")):
+        yield None
+        return
+    from selenium import webdriver
+    from selenium.webdriver.chrome.service import Service
+
+    options = webdriver.ChromeOptions()
+    options.binary_location = chromium
+    for flag in (
+        "headless=new", "no-sandbox", "disable-gpu", "disable-dev-shm-usage", "disable-background-networking",
+        "no-first-run", f"user-data-dir={folder / 'profile'}",
+    ):  # fmt: skip
+        options.add_argument(f"--{flag}")
+    driver = webdriver.Chrome(options, Service(chromedriver))
+    try:
+        driver.set_page_load_timeout(_PATIENCE)
+        driver.set_script_timeout(_PATIENCE)
+        metrics = {"width": _SIZE[0], "height": _SIZE[1], "deviceScaleFactor": 1, "mobile": False}
+        driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", metrics)
+        yield driver
+    finally:
+        driver.quit()
+
+
+def _opened(browser: Any, page: Path, repeats: int) -> Timing:
+    """Time a page from its address to the first picture."""
+    from selenium.webdriver.support.ui import WebDriverWait
+
+    times = []
+    for _ in range(repeats):
+        browser.get("about:blank")
+        before = time.perf_counter()
+        browser.get(page.absolute().as_uri())
+        ready = WebDriverWait(browser, _PATIENCE, poll_frequency=0.01)
+        ready.until(lambda driver: driver.execute_script("return window.subreach?.ready === true"))
+        times.append(time.perf_counter() - before)
+    return Timing(tuple(times))
+
+
+def _played(browser: Any, speed: float, seconds: int) -> list[Row]:
+    """Play the page that is open; a sample is a second, least and most are its best and its worst one."""
+    name = f"played at {speed:g}x"
+    if not browser:
+        return [Row(name, _NO_BROWSER)]
+    taken = browser.execute_async_script(_PLAY, speed, seconds)
+    begin = taken["at"][0]
+    of_second = [[i for i, at in enumerate(taken["at"]) if s <= (at - begin) / 1e3 < s + 1] for s in range(seconds)]
+    counts = sorted(len(frames) for frames in of_second)
+    if not counts[0]:
+        return [Row(name, "a second went by without a frame")]
+    told = f"{name}: {counts[len(counts) // 2]} frames/s, in the worst second {counts[0]}"
+    rows = [Row(told, Timing(tuple(1.0 / count for count in counts)), "frame at 30/s", _SMOOTH)]
+    for part in ("frame", "scene", "charts"):
+        means = [_mean([taken[part][i] for i in frames if i < len(taken[part])]) / 1e3 for frames in of_second]
+        what = "all of a frame" if part == "frame" else f"of that, {part}"
+        rows.append(Row(f"{name}: {what}", Timing(tuple(means)), "frame at 30/s", _SMOOTH))
+    return rows
+
+
+def _mean(values: Sequence[float]) -> float:
+    return sum(values) / max(1, len(values))

@@ -1,0 +1,39 @@
+"""CSV: one table of numbers that read back to the last bit, and a second one of the units."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+
+from cosim.export.excerpt import Excerpt
+
+
+def write(excerpt: Excerpt, path: Path) -> list[Path]:
+    """Write the tables.
+
+    The header has the names alone, so that a column is found by the name that it has everywhere else.
+
+    Parameters
+    ----------
+    excerpt : Excerpt
+        What is written.
+    path : Path
+        The file.
+
+    Returns
+    -------
+    list of Path
+        It, and the table of units beside it.
+    """
+    picked = list(excerpt.picked)
+    with path.open("w", encoding="utf-8", newline="") as file:
+        csv.writer(file, lineterminator="\n").writerow(column.name for column in excerpt.columns)
+        for block in excerpt.blocks():
+            # repr is the shortest text that reads back to the same bits, and has a point, so that 1.0 stays no integer
+            file.writelines(f"{','.join(map(repr, row))}\n" for row in block[:, picked].tolist())
+    units = path.with_suffix(".units.csv")
+    with units.open("w", encoding="utf-8", newline="") as file:
+        table = csv.writer(file, lineterminator="\n")
+        table.writerow(("name", "unit", "description"))
+        table.writerows((column.name, column.unit, column.description) for column in excerpt.columns)
+    return [path, units]

@@ -1,0 +1,159 @@
+"""MCAP, in Protobuf: every signal for PlotJuggler and Foxglove, and the scene in Foxglove's own messages.
+
+Times are those of the simulation, in nanoseconds from 0, so that runs lie over each other.
+"""
+
+from __future__ import annotations
+
+import json
+from collections import deque
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
+from foxglove_schemas_protobuf.Log_pb2 import Log
+from foxglove_schemas_protobuf.PoseInFrame_pb2 import PoseInFrame
+from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
+from mcap.writer import Writer
+from mcap_protobuf.schema import register_schema
+
+from cosim.export import foxglove_scene as foxglove
+from cosim.export.excerpt import Excerpt
+from cosim.export.names import grouped, legal
+from cosim.export.protobuf_table import numbers_messages, numbers_schema
+from cosim.export.scene import POSITION, QUATERNION, Scene
+from cosim.replay.events import events_of
+from cosim.replay.folder import FlownRun
+from cosim.signals import Array
+
+PACKAGE = "subreach"  # of the schemas of signals
+_CHUNK = 4 * 2**20  # bytes
+
+
+def write(excerpt: Excerpt, path: Path) -> list[Path]:
+    """Write the file.
+
+    Parameters
+    ----------
+    excerpt : Excerpt
+        What is written; the scene is there whatever its signals are.
+    path : Path
+        The file.
+
+    Returns
+    -------
+    list of Path
+        It alone.
+    """
+    with path.open("wb") as file:
+        writer = Writer(file, chunk_size=_CHUNK)
+        writer.start(library="subreach")
+        _attach(writer, excerpt)
+        _write_messages(writer, excerpt)
+        writer.finish()
+    return [path]
+
+
+def _attach(writer: Writer, excerpt: Excerpt) -> None:
+    for name, kind, text in (
+        ("scenario.toml", "application/toml", excerpt.scenario_text),
+        ("summary.json", "application/json", json.dumps(excerpt.run.summary, indent=2)),
+    ):
+        writer.add_attachment(create_time=0, log_time=0, name=name, media_type=kind, data=text.encode())
+
+
+def _write_messages(writer: Writer, excerpt: Excerpt) -> None:
+    scene, tables = Scene(excerpt), _tables(writer, excerpt)
+    drawing = _Drawing(writer, excerpt.run, scene)
+    drawing.begin()
+    for block in excerpt.blocks():
+        times = np.rint(block[:, 0] * 1e9).astype(np.int64).tolist()
+        messages = zip(*(numbers_messages(block[:, picked]) for _, picked in tables), strict=True)
+        draw = drawing.of(block)
+        for i, (time, row) in enumerate(zip(times, messages, strict=True)):
+            for (channel, _), message in zip(tables, row, strict=True):
+                writer.add_message(channel, time, message, time)
+            draw(i, time)
+    drawing.end()
+
+
+def _tables(writer: Writer, excerpt: Excerpt) -> list[tuple[int, list[int]]]:
+    """Return a channel for each group of signals, and where in a row of the record they are."""
+    tables = []
+    groups = grouped(excerpt.columns)
+    for name, members in zip(legal(groups), groups.values(), strict=True):
+        columns = [excerpt.columns[i] for i in members.values()]
+        fields = legal(members)
+        schema = writer.register_schema(f"{PACKAGE}.{name}", "protobuf", numbers_schema(PACKAGE, name, fields))
+        said = {f: f"{c.name} [{c.unit or '-'}]: {c.description}" for f, c in zip(fields, columns, strict=True)}
+        channel = writer.register_channel(f"/signals/{name}", "protobuf", schema, metadata=said)
+        tables.append((channel, [excerpt.picked[i] for i in members.values()]))
+    return tables
+
+
+class _Drawing:
+    """Writes the scene as it changes."""
+
+    def __init__(self, writer: Writer, run: FlownRun, scene: Scene) -> None:
+        self._writer, self._scene = writer, scene
+        self._channels: dict[str, int] = {}
+        for topic, kind in (
+            ("/tf_static", FrameTransforms),
+            ("/tf", FrameTransforms),
+            ("/vehicle/pose", PoseInFrame),
+            ("/vehicle/model", SceneUpdate),
+            ("/scene", SceneUpdate),
+            ("/log", Log),
+        ):
+            self._channels[topic] = writer.register_channel(topic, "protobuf", register_schema(writer, kind))
+        self._solids = [*scene.solids]
+        self._drawn: int | None = None  # the region that was drawn as active
+        self._changes, self._events = deque(scene.changes), deque(events_of(run, scene.log))
+
+    def begin(self) -> None:
+        """Write what stays."""
+        self._send("/tf_static", 0, foxglove.upright())
+        self._send("/vehicle/model", 0, foxglove.vehicle(self._scene))
+
+    def of(self, block: Array) -> Callable[[int, int], None]:
+        """Return what writes the scene of a row of a block, at a time [ns]."""
+        scene = self._scene
+        known = [bool(np.isfinite(row).all()) for row in block[:, scene.places(POSITION + QUATERNION)]]
+        positions = block[:, scene.places(POSITION)].tolist()
+        quaternions = block[:, scene.places(QUATERNION)].tolist()
+        moved = {foxglove.frame_of(s): block[:, scene.shifts(s)].tolist() for s in scene.solids if s.moves}
+        active = scene.active(block)
+
+        def draw(i: int, time: int) -> None:
+            at = foxglove.moment(time)
+            if known[i]:  # else the vehicle stays where it was seen last
+                shifts = {frame: rows[i] for frame, rows in moved.items()}
+                self._send("/tf", time, foxglove.frames(at, positions[i], quaternions[i], shifts))
+                self._send("/vehicle/pose", time, foxglove.pose(at, positions[i], quaternions[i]))
+            if self._changed(time) or active[i] != self._drawn:
+                self._drawn = active[i]
+                self._send("/scene", time, foxglove.regions(self._solids, at, active[i]))
+            while self._events and self._events[0].time * 1e9 <= time:
+                event = self._events.popleft()
+                self._send("/log", time, foxglove.said(at, event))
+
+        return draw
+
+    def _changed(self, time: int) -> bool:
+        """Let the changes come that are due, and return whether any is."""
+        due = False
+        while self._changes and self._changes[0][0] * 1e9 <= time:
+            _, i, self._solids[i] = self._changes.popleft()
+            due = True
+        return due
+
+    def end(self) -> None:
+        """Write the events behind the last exported step, which may be short of that of the run."""
+        for event in self._events:
+            time = round(event.time * 1e9)
+            self._send("/log", time, foxglove.said(foxglove.moment(time), event))
+
+    def _send(self, topic: str, time: int, message: Any) -> None:
+        self._writer.add_message(self._channels[topic], time, message.SerializeToString(), time)

@@ -1,0 +1,223 @@
+"""RRD, Rerun's recordings: every signal as a series over simulated time, and the scene in three dimensions.
+
+Series are of doubles; what is drawn in space is of single precision, since Rerun has no other.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import rerun as rr
+import rerun.blueprint as rrb
+from numpy.typing import NDArray
+
+from controller.regions import Box, Ellipsoid, Sphere
+from cosim.export.excerpt import Excerpt
+from cosim.export.names import grouped
+from cosim.export.scene import (
+    BODY,
+    HULL_COLOUR,
+    NED,
+    OPAQUE,
+    PLACE,
+    POSITION,
+    QUATERNION,
+    THRUST_COLOUR,
+    TRAIL_COLOUR,
+    Scene,
+    Solid,
+)
+from cosim.replay.events import events_of
+
+TIMELINE = "sim_time"  # s
+SIGNALS, WORLD, EVENTS = "signals", "world", "events"
+_FRAMES = {NED: f"{WORLD}/regions", PLACE: f"{WORLD}/place", BODY: f"{WORLD}/place/body"}
+_CHARTS = ("clearance", "weight", "command", "thruster_force", "estimate")  # groups that are shown at first
+_FAINT, _BRIGHT = 110, 255  # of the line of a region that is not, and is, active
+_THIN, _THICK = 1.0, 2.5  # pixels of that line, which Rerun has as radii below 0
+_ARROWS = 20.0  # Hz
+_ARROW = 4.0  # radii of the hull that an arrow of the greatest thrust is long
+
+
+def write(excerpt: Excerpt, path: Path) -> list[Path]:
+    """Write the file.
+
+    Parameters
+    ----------
+    excerpt : Excerpt
+        What is written; the scene is there whatever its signals are.
+    path : Path
+        The file.
+
+    Returns
+    -------
+    list of Path
+        It alone.
+    """
+    recording = rr.RecordingStream("subreach")
+    recording.save(path, default_blueprint=_layout(excerpt))
+    try:
+        recording.send_recording_name(excerpt.run.path.resolve().name)
+        sender = _Sender(recording, excerpt)
+        sender.send_texts()
+        sender.send_signals()
+        sender.send_vehicle()
+        sender.send_regions()
+        sender.send_events()
+    finally:
+        recording.flush()
+        recording.disconnect()
+    return [path]
+
+
+def _layout(excerpt: Excerpt) -> rrb.Blueprint:
+    """Return how the recording is shown at first: the scene, and charts beside it."""
+    there = [name for name in _CHARTS if name in grouped(excerpt.columns)]
+    charts = [rrb.TimeSeriesView(origin=rr.new_entity_path([SIGNALS, name]), name=name) for name in there]
+    texts = rrb.Tabs(
+        rrb.TextLogView(origin=EVENTS, name=EVENTS),
+        *(rrb.TextDocumentView(origin=name, name=name) for name in ("summary", "scenario")),
+    )
+    # the first two always, the others behind each other
+    column = rrb.Vertical(*charts[:2], *([rrb.Tabs(*charts[2:])] if charts[2:] else []), texts)
+    scene = rrb.Spatial3DView(origin=WORLD, name="scene")
+    return rrb.Blueprint(rrb.Horizontal(scene, column, column_shares=[3, 2]), collapse_panels=True)
+
+
+class _Sender:
+    """Sends a run, a column at a time."""
+
+    def __init__(self, recording: rr.RecordingStream, excerpt: Excerpt) -> None:
+        self._recording, self._excerpt, self._scene = recording, excerpt, Scene(excerpt)
+        self._time = excerpt.signal("time")
+
+    def send_texts(self) -> None:
+        """Send scenario and summary."""
+        for name, kind, text in (
+            ("scenario", "toml", self._excerpt.scenario_text),
+            ("summary", "json", json.dumps(self._excerpt.run.summary, indent=2)),
+        ):
+            self._stay(name, rr.TextDocument(f"```{kind}\n{text}\n```", media_type=rr.MediaType.MARKDOWN))
+
+    def send_signals(self) -> None:
+        """Send every signal as a series."""
+        for group, members in grouped(self._excerpt.columns).items():
+            for name, i in members.items():
+                column = self._excerpt.columns[i]
+                path = rr.new_entity_path([SIGNALS, group, name])
+                self._stay(path, rr.SeriesLines(names=f"{column.name} [{column.unit or '-'}]"))
+                self._send(path, rr.Scalars.columns(scalars=self._excerpt.signal(column.name)))
+
+    def send_vehicle(self) -> None:
+        """Send pose, hull, thrusts and the whole way."""
+        scene, excerpt = self._scene, self._excerpt
+        self._stay(WORLD, rr.ViewCoordinates.FRD)  # north, east, down
+        position = np.column_stack([excerpt.signal(name) for name in POSITION])
+        e = np.column_stack([excerpt.signal(name) for name in QUATERNION])
+        known = np.flatnonzero(np.isfinite(position).all(axis=1) & np.isfinite(e).all(axis=1))
+        self._send(_FRAMES[PLACE], rr.Transform3D.columns(translation=position[known]), known)
+        self._send(_FRAMES[BODY], rr.Transform3D.columns(quaternion=e[known][:, [1, 2, 3, 0]]), known)
+        hull = rr.Ellipsoids3D(half_sizes=[[scene.hull_radius] * 3], colors=[HULL_COLOUR])
+        self._stay(f"{_FRAMES[BODY]}/hull", hull)
+        self._stay(f"{WORLD}/way", rr.LineStrips3D([scene.trail()], colors=[TRAIL_COLOUR], radii=[-_THIN]))
+        self._send_thrusts()
+
+    def _send_thrusts(self) -> None:
+        scene, names = self._scene, [column.name for column in self._excerpt.run.record.columns]
+        forces = [f"thruster_force[{i + 1}]" for i in range(len(scene.thrusters))]
+        greatest = max((thruster.most for thruster in scene.thrusters), default=0.0)
+        if not greatest > 0.0 or not set(forces) <= set(names):
+            return
+        ticks = np.floor((self._time - self._time[0]) * _ARROWS)
+        rows = np.flatnonzero(np.diff(ticks, prepend=-1.0) > 0.0)
+        force = np.nan_to_num(np.column_stack([self._excerpt.signal(name)[rows] for name in forces]))
+        directions = np.array([thruster.direction for thruster in scene.thrusters])
+        vectors = force[:, :, None] * directions * (_ARROW * scene.hull_radius / greatest)
+        path, n = f"{_FRAMES[BODY]}/thrusts", len(forces)
+        places = [thruster.position for thruster in scene.thrusters]
+        self._stay(path, rr.Arrows3D.from_fields(origins=places, colors=[THRUST_COLOUR]))
+        self._send(path, rr.Arrows3D.columns(vectors=vectors.reshape(-1, 3)).partition([n] * len(rows)), rows)
+
+    def send_regions(self) -> None:
+        """Send regions as lines, brighter and thicker while they are active."""
+        scene = self._scene
+        active = np.array([i for block in self._excerpt.blocks() for i in scene.active(block)])
+        for i, solid in enumerate(scene.solids):
+            place = f"{_FRAMES[solid.frame]}/{rr.escape_entity_path_part(solid.name)}"
+            if solid.moves:
+                names = [f"{solid.name}.shift.{axis}" for axis in "xyz"]
+                shifts = np.column_stack([self._excerpt.signal(name) for name in names])
+                self._send(place, rr.Transform3D.columns(translation=shifts))
+            shapes = [(float(self._time[0]), solid), *((time, new) for time, j, new in scene.changes if j == i)]
+            for path, kind in self._send_shapes(place, shapes).items():
+                self._send_activity(path, kind, solid, active == i)
+
+    def _send_shapes(self, place: str, shapes: list[tuple[float, Solid]]) -> dict[str, Any]:
+        """Send what a region is, and from when; return its kinds of drawing by their paths."""
+        kinds: dict[str, Any] = {}
+        before = None
+        for time, solid in shapes:
+            drawn = _drawn(solid)
+            path = f"{place}/{type(drawn).__name__}"
+            kinds[path] = type(drawn)
+            self._recording.set_time(TIMELINE, duration=time)
+            if before not in (None, path):  # a region of another kind stands there now
+                self._recording.log(before, rr.Clear(recursive=False))
+            self._recording.log(path, drawn, strict=True)
+            before = path
+        return kinds
+
+    def send_events(self) -> None:
+        """Send what happened, in words."""
+        for event in events_of(self._excerpt.run, self._scene.log):
+            level = "WARN" if event.kind in ("violation", "failure", "saturation") else "INFO"
+            self._recording.set_time(TIMELINE, duration=event.time)
+            self._recording.log(EVENTS, rr.TextLog(event.text, level=level))
+
+    def _send_activity(self, path: str, kind: Any, solid: Solid, active: NDArray[np.bool_]) -> None:
+        changes = np.flatnonzero(np.diff(active, prepend=not active[0]))
+        look = kind.columns(**_look(kind, solid.colour, active[changes]))
+        self._send(path, look, changes)
+
+    def _send(self, path: str, columns: Any, rows: Any = slice(None)) -> None:
+        time = rr.TimeColumn(TIMELINE, duration=self._time[rows])
+        self._recording.send_columns(path, indexes=[time], columns=columns, strict=True)
+
+    def _stay(self, path: str, what: Any) -> None:
+        self._recording.log(path, what, static=True, strict=True)
+
+
+def _drawn(solid: Solid) -> Any:
+    """Return a region as Rerun draws it; what changes with activity is sent over time."""
+    shape, label = solid.shape, {"labels": [solid.label]}
+    if isinstance(shape, Sphere):
+        return rr.Ellipsoids3D.from_fields(half_sizes=[[shape.radius] * 3], centers=[shape.centre], **label)
+    if isinstance(shape, Ellipsoid):
+        return rr.Ellipsoids3D.from_fields(
+            half_sizes=[shape.semi_axes], centers=[shape.centre], quaternions=[_turn(shape.quaternion)], **label
+        )
+    if isinstance(shape, Box):
+        half = [[size / 2.0 for size in shape.size]]
+        return rr.Boxes3D.from_fields(
+            half_sizes=half, centers=[shape.centre], quaternions=[_turn(shape.quaternion)], **label
+        )
+    return rr.Mesh3D(vertex_positions=solid.mesh.vertices, triangle_indices=solid.mesh.triangles)
+
+
+def _look(kind: Any, colour: tuple[int, int, int], active: NDArray[np.bool_]) -> dict[str, Any]:
+    """Return what tells a region that is active from one that is not, for each of some changes."""
+    if kind is rr.Mesh3D:
+        return {"albedo_factor": [(*colour, round(255 * OPAQUE[bool(now)])) for now in active]}
+    width = "line_radii" if kind is rr.Ellipsoids3D else "radii"
+    return {
+        "colors": [(*colour, _BRIGHT if now else _FAINT) for now in active],
+        width: [-(_THICK if now else _THIN) for now in active],
+    }
+
+
+def _turn(quaternion: tuple[float, ...]) -> Any:
+    e = np.array(quaternion) / np.linalg.norm(quaternion)
+    return rr.Quaternion(xyzw=e[[1, 2, 3, 0]])

@@ -1,0 +1,226 @@
+"""The scene of a run in Foxglove's messages: frames, pose, and regions as entities."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
+from foxglove_schemas_protobuf.LinePrimitive_pb2 import LinePrimitive
+from foxglove_schemas_protobuf.Log_pb2 import Log
+from foxglove_schemas_protobuf.PoseInFrame_pb2 import PoseInFrame
+from foxglove_schemas_protobuf.SceneEntity_pb2 import SceneEntity
+from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
+from google.protobuf.timestamp_pb2 import Timestamp
+
+from controller.regions import Box, Cylinder, Ellipsoid, Sphere, of_attitude
+from cosim.export.scene import BODY, HULL_COLOUR, NED, OPAQUE, PLACE, THRUST_COLOUR, TRAIL_COLOUR, Scene, Solid
+from cosim.replay.events import Event
+from cosim.signals import Array
+
+MAP = "map"  # z upwards, as Foxglove draws
+_HALF_TURN = (0.0, math.sqrt(0.5), math.sqrt(0.5), 0.0)  # about north-east: (north, east, down) to (east, north, up)
+_LETTERS = 14.0  # pixels
+_LINE = 2.0  # pixels
+_ARROW = 2.0  # radii of the hull that an arrow of the greatest thrust is long
+
+
+def moment(nanoseconds: int) -> Timestamp:
+    """Return a time."""
+    return Timestamp(seconds=nanoseconds // 10**9, nanos=nanoseconds % 10**9)
+
+
+def upright() -> FrameTransforms:
+    """Return the transform that shows the world upright, at time 0."""
+    message = FrameTransforms()
+    _add_transform(message, moment(0), MAP, NED, (0.0, 0.0, 0.0), _HALF_TURN)
+    return message
+
+
+def frame_of(solid: Solid) -> str:
+    """Return the frame that a region's numbers are in; one that moves has a frame of its own."""
+    return f"region {solid.name}" if solid.moves else solid.frame
+
+
+def frames(
+    time: Timestamp, position: Sequence[float], quaternion: Sequence[float], moved: dict[str, Sequence[float]]
+) -> FrameTransforms:
+    """Return where the vehicle, and what moves, is.
+
+    Parameters
+    ----------
+    time : Timestamp
+        Simulated.
+    position, quaternion : sequence of float
+        Of the vehicle [m, NED].
+    moved : dict
+        By frame: how far it has moved [m, NED].
+
+    Returns
+    -------
+    FrameTransforms
+        All of them, since a viewer that jumps in time sees the last message alone.
+    """
+    message = FrameTransforms()
+    _add_transform(message, time, NED, PLACE, position, (1.0, 0.0, 0.0, 0.0))
+    _add_transform(message, time, PLACE, BODY, (0.0, 0.0, 0.0), quaternion)
+    for frame, shift in moved.items():
+        _add_transform(message, time, NED, frame, shift, (1.0, 0.0, 0.0, 0.0))
+    return message
+
+
+def pose(time: Timestamp, position: Sequence[float], quaternion: Sequence[float]) -> PoseInFrame:
+    """Return the pose of the vehicle [m, NED]."""
+    message = PoseInFrame(timestamp=time, frame_id=NED)
+    _set_pose(message.pose, position, quaternion)
+    return message
+
+
+def regions(solids: Sequence[Solid], time: Timestamp, active: int) -> SceneUpdate:
+    """Return all regions, the active one less transparent.
+
+    Parameters
+    ----------
+    solids : sequence of Solid
+        As they are then.
+    time : Timestamp
+        Simulated.
+    active : int
+        Which of them the arbiter gives way to.
+
+    Returns
+    -------
+    SceneUpdate
+        All of them, since a viewer that jumps in time sees the last message alone.
+    """
+    message = SceneUpdate()
+    for i, solid in enumerate(solids):
+        entity = message.entities.add(timestamp=time, frame_id=frame_of(solid), id=solid.name, frame_locked=True)
+        entity.metadata.add(key="active", value=str(i == active).lower())
+        _draw(entity, solid, i == active)
+        text = entity.texts.add(billboard=True, font_size=_LETTERS, scale_invariant=True)
+        text.text = f"{solid.label} (active)" if i == active else solid.label
+        _set_pose(text.pose, _label_place(solid).tolist(), (1.0, 0.0, 0.0, 0.0))
+        _set_colour(text.color, solid.colour, 1.0)
+    return message
+
+
+def vehicle(scene: Scene) -> SceneUpdate:
+    """Return the hull and its thrusters' lines of action, in the body, and the whole way as a line."""
+    message = SceneUpdate()
+    entity = message.entities.add(frame_id=BODY, id="vehicle", frame_locked=True)
+    ball = entity.spheres.add()
+    _set_pose(ball.pose, (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0))
+    _set_vector(ball.size, [2.0 * scene.hull_radius] * 3)
+    _set_colour(ball.color, HULL_COLOUR, 0.6)
+    greatest = max((thruster.most for thruster in scene.thrusters), default=1.0) or 1.0
+    for thruster in scene.thrusters:
+        length = _ARROW * scene.hull_radius * thruster.most / greatest
+        if length > 0.0 and np.linalg.norm(thruster.direction) > 0.0:
+            arrow = entity.arrows.add(shaft_length=0.7 * length, head_length=0.3 * length)
+            arrow.shaft_diameter, arrow.head_diameter = 0.05 * length, 0.15 * length
+            _set_pose(arrow.pose, thruster.position.tolist(), _turn_from_x(thruster.direction))
+            _set_colour(arrow.color, THRUST_COLOUR, 1.0)
+    trail = message.entities.add(frame_id=NED, id="way", frame_locked=True)
+    line = trail.lines.add(type=LinePrimitive.LINE_STRIP, thickness=_LINE, scale_invariant=True)
+    _set_pose(line.pose, (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0))
+    _set_colour(line.color, TRAIL_COLOUR, 0.8)
+    for point in scene.trail().tolist():
+        _set_vector(line.points.add(), point)
+    return message
+
+
+def said(time: Timestamp, event: Event) -> Log:
+    """Return an event in words."""
+    level = Log.WARNING if event.kind in ("violation", "failure", "saturation") else Log.INFO
+    return Log(timestamp=time, level=level, message=event.text, name=event.kind)
+
+
+def _draw(entity: SceneEntity, solid: Solid, active: bool) -> None:
+    shape, opaque = solid.shape, OPAQUE[active]
+    at_rest = (1.0, 0.0, 0.0, 0.0)
+    if isinstance(shape, Sphere):
+        drawn = entity.spheres.add()
+        _set_pose(drawn.pose, shape.centre, at_rest)
+        _set_vector(drawn.size, [2.0 * shape.radius] * 3)
+    elif isinstance(shape, Ellipsoid):
+        drawn = entity.spheres.add()
+        _set_pose(drawn.pose, shape.centre, _unit(shape.quaternion))
+        _set_vector(drawn.size, [2.0 * a for a in shape.semi_axes])
+    elif isinstance(shape, Box):
+        drawn = entity.cubes.add()
+        _set_pose(drawn.pose, shape.centre, _unit(shape.quaternion))
+        _set_vector(drawn.size, shape.size)
+    elif isinstance(shape, Cylinder):
+        drawn = entity.cylinders.add(bottom_scale=1.0, top_scale=1.0)
+        start, end = np.array(shape.start), np.array(shape.end)
+        _set_pose(drawn.pose, ((start + end) / 2.0).tolist(), _turn_from_z(end - start))
+        _set_vector(drawn.size, [2.0 * shape.radius, 2.0 * shape.radius, float(np.linalg.norm(end - start))])
+    else:
+        drawn = entity.triangles.add()
+        _set_pose(drawn.pose, (0.0, 0.0, 0.0), at_rest)
+        for point in solid.mesh.vertices.tolist():
+            _set_vector(drawn.points.add(), point)
+        drawn.indices.extend(solid.mesh.triangles.ravel().tolist())
+    _set_colour(drawn.color, solid.colour, opaque)
+
+
+def _label_place(solid: Solid) -> Array:
+    """Return a place above a region, or at the end of the axis of one of attitude."""
+    vertices = solid.mesh.vertices
+    if of_attitude(solid.shape):
+        return np.asarray(vertices[-1])
+    top = vertices.mean(axis=0)
+    top[2] = vertices[:, 2].min()
+    return np.asarray(top)
+
+
+def _add_transform(
+    message: FrameTransforms, time: Timestamp, parent: str, child: str, by: Sequence[float], turn: Sequence[float]
+) -> None:
+    transform = message.transforms.add(timestamp=time, parent_frame_id=parent, child_frame_id=child)
+    _set_vector(transform.translation, by)
+    _set_quaternion(transform.rotation, turn)
+
+
+def _set_pose(message: Any, position: Sequence[float], quaternion: Sequence[float]) -> None:
+    _set_vector(message.position, position)
+    _set_quaternion(message.orientation, quaternion)
+
+
+def _set_vector(message: Any, vector: Sequence[float]) -> None:
+    message.x, message.y, message.z = vector
+
+
+def _set_quaternion(message: Any, e: Sequence[float]) -> None:
+    message.w, message.x, message.y, message.z = e
+
+
+def _set_colour(message: Any, colour: tuple[int, int, int], opaque: float) -> None:
+    message.r, message.g, message.b = (part / 255.0 for part in colour)
+    message.a = opaque
+
+
+def _unit(quaternion: Sequence[float]) -> list[float]:
+    e = np.array(quaternion)
+    return [float(part) for part in e / np.linalg.norm(e)]
+
+
+def _turn_from_x(direction: Array) -> list[float]:
+    return _shortest_turn(np.array([1.0, 0.0, 0.0]), direction)
+
+
+def _turn_from_z(direction: Array) -> list[float]:
+    return _shortest_turn(np.array([0.0, 0.0, 1.0]), direction)
+
+
+def _shortest_turn(start: Array, direction: Array) -> list[float]:
+    """Return the quaternion of the shortest turn of a unit vector into a direction."""
+    end = direction / np.linalg.norm(direction)
+    halfway = start + end
+    if np.linalg.norm(halfway) < 1e-9:  # half a turn, about anything across
+        return [0.0, *np.roll(start, 1).tolist()]
+    halfway /= np.linalg.norm(halfway)
+    return [float(start @ halfway), *np.cross(start, halfway).tolist()]

@@ -1,0 +1,73 @@
+"""Names of signals as other formats allow them."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Sequence
+
+from cosim.signals import Column
+
+_OF_REGIONS = ("value", "clearance", "shift.x", "shift.y", "shift.z")
+_ELEMENT = re.compile(r"(.+)\[(\d+)\]")
+
+
+def legal(names: Iterable[str], longest: int = 63) -> list[str]:
+    """Return names of ASCII letters, digits and underscores that begin with a letter, no two of them alike.
+
+    Parameters
+    ----------
+    names : iterable of str
+        Any, such as ``thrust[1]``.
+    longest : int
+        Most letters of a name; 63 is what MATLAB allows.
+
+    Returns
+    -------
+    list of str
+        As like the names as they can be, such as ``thrust_1``.
+    """
+    made: dict[str, None] = {}
+    for name in names:
+        plain = re.sub(r"[^0-9A-Za-z]+", "_", name).strip("_")[:longest]
+        stem = plain if plain[:1].isalpha() else f"n{plain}"[:longest]
+        candidate, n = stem, 2
+        while candidate in made:
+            suffix = f"_{n}"
+            candidate, n = f"{stem[: longest - len(suffix)]}{suffix}", n + 1
+        made[candidate] = None
+    return list(made)
+
+
+def grouped(columns: Sequence[Column]) -> dict[str, dict[str, int]]:
+    """Return which signals belong together.
+
+    ``position.x`` is ``x`` of the group ``position``, ``thrust[1]`` is ``1`` of ``thrust``, and the clearance of the
+    region A is ``A`` of ``clearance``; those that stand alone are in the group ``step``.
+
+    Parameters
+    ----------
+    columns : sequence of Column
+        In any order.
+
+    Returns
+    -------
+    dict
+        By group, then by the name within it: the place of the column.
+    """
+    groups: dict[str, dict[str, int]] = {}
+    for i, column in enumerate(columns):
+        group, name = _group(column.name)
+        groups.setdefault(group, {})[name] = i
+    return groups
+
+
+def _group(name: str) -> tuple[str, str]:
+    for ending in _OF_REGIONS:
+        if name.endswith(f".{ending}"):
+            group, _, axis = ending.partition(".")
+            region = name.removesuffix(f".{ending}")
+            return group, f"{region} {axis}" if axis else region
+    if element := _ELEMENT.fullmatch(name):
+        return element[1], element[2]
+    group, _, rest = name.partition(".")
+    return (group, rest) if rest else ("step", name)

@@ -1,0 +1,70 @@
+"""Rows of numbers as Protobuf messages, many at a time."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+from google.protobuf.descriptor_pb2 import FieldDescriptorProto, FileDescriptorProto, FileDescriptorSet
+
+from cosim.signals import Array
+
+_FIXED_64 = 1  # wire type of a double
+
+
+def numbers_schema(package: str, message: str, fields: Sequence[str]) -> bytes:
+    """Return the schema of a message of doubles, as a serialised ``FileDescriptorSet``.
+
+    Parameters
+    ----------
+    package, message : str
+        Its name is the two with a dot between them.
+    fields : sequence of str
+        Numbered from 1.
+
+    Returns
+    -------
+    bytes
+        As MCAP has it for messages of Protobuf.
+    """
+    file = FileDescriptorProto(name=f"{package}/{message}.proto", package=package, syntax="proto3")
+    described = file.message_type.add(name=message)
+    for i, name in enumerate(fields):
+        described.field.add(
+            name=name,
+            number=i + 1,
+            type=FieldDescriptorProto.TYPE_DOUBLE,
+            label=FieldDescriptorProto.LABEL_OPTIONAL,
+        )
+    return bytes(FileDescriptorSet(file=[file]).SerializeToString())
+
+
+def numbers_messages(rows: Array) -> Iterator[bytes]:
+    """Yield each row as a message of `numbers_schema`.
+
+    A field is its key and the eight bytes of its number, so that all rows are laid out as one array.
+
+    Parameters
+    ----------
+    rows : ndarray, shape (n, fields)
+        Numbers, NaN included.
+    """
+    parts: list[tuple[str, object]] = []
+    keys = [_varint((i + 1) << 3 | _FIXED_64) for i in range(rows.shape[1])]
+    for i, key in enumerate(keys):
+        parts += [(f"key{i}", f"V{len(key)}"), (f"value{i}", "<f8")]
+    laid = np.empty(len(rows), dtype=parts)
+    for i, key in enumerate(keys):
+        laid[f"key{i}"] = np.void(key)
+        laid[f"value{i}"] = rows[:, i]
+    size, whole = laid.itemsize, laid.tobytes()
+    for first in range(0, size * len(rows), size) if size else ():
+        yield whole[first : first + size]
+
+
+def _varint(number: int) -> bytes:
+    out = bytearray()
+    while number > 0x7F:
+        out.append(number & 0x7F | 0x80)
+        number >>= 7
+    return bytes([*out, number])

@@ -1,0 +1,161 @@
+"""What a viewer in three dimensions draws of a run: regions in their colours, the vehicle, and the way it took."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from controller.quaternion import rotation_matrix
+from controller.regions import SHAPES, Orientation, Shape, Visibility, of_attitude
+from controller.regions.shape import Bounds
+from cosim.export.excerpt import Excerpt
+from cosim.export.surfaces import Mesh, sector, surface_of
+from cosim.replay.activity import active_regions
+from cosim.replay.header import header_of
+from cosim.replay.steering import changes_of, log_of
+from cosim.scenario import CRITERIA
+from cosim.signals import Array
+
+NED, PLACE, BODY = "ned", "place", "body"  # the world; the vehicle's place, not turned; the vehicle
+POSITION = ("position.x", "position.y", "position.z")
+QUATERNION = ("quaternion.e0", "quaternion.e1", "quaternion.e2", "quaternion.e3")
+# Okabe and Ito's, which colour-blind people can tell apart
+_COLOURS = {"obstacle": (213, 94, 0), "shape": (230, 159, 0), "depth": (86, 180, 233), None: (0, 158, 115)}
+HULL_COLOUR, TRAIL_COLOUR, THRUST_COLOUR = (240, 228, 66), (140, 140, 140), (204, 121, 167)
+OPAQUE = {False: 0.25, True: 0.75}  # of a region that is not, and is, active
+_MARGIN = 1.0  # m, about all that is seen
+_SIGHT = 5.0  # radii of the hull that a shape of attitude is drawn long
+_TRAIL = 2000  # points
+
+
+@dataclass(frozen=True, eq=False)
+class Solid:
+    """A region as it is drawn."""
+
+    name: str
+    label: str  # what is asked of it, too
+    colour: tuple[int, int, int]
+    shape: Shape
+    mesh: Mesh
+    frame: str  # that its numbers are in
+    moves: bool  # by the columns of its shift
+
+
+@dataclass(frozen=True, eq=False)
+class Thruster:
+    """An arrow of a vehicle, in its body."""
+
+    position: Array  # (3,) m
+    direction: Array  # (3,) of one newton
+    most: float  # N
+
+
+class Scene:
+    """What is drawn of a run.
+
+    Parameters
+    ----------
+    excerpt : Excerpt
+        Of the run.
+
+    Attributes
+    ----------
+    solids : tuple of Solid
+        The goal, then the regions in their order, as they are at first.
+    changes : tuple of (float, int, Solid)
+        When [s] which of them becomes what.
+    log : sequence of (int, Order)
+        What the run was ordered.
+    hull_radius : float
+        [m].
+    thrusters : tuple of Thruster
+        In their order.
+    """
+
+    def __init__(self, excerpt: Excerpt) -> None:
+        self._excerpt = excerpt
+        self._record, scenario = excerpt.run.record, excerpt.run.scenario
+        names = [column.name for column in self._record.columns]
+        self._at = {name: i for i, name in enumerate(names)}
+        vehicle = header_of(scenario, self._record.columns)["vehicle"]
+        self.hull_radius: float = vehicle["radius"]
+        self.thrusters = tuple(
+            Thruster(np.array(t["position"]), np.array(t["direction"]), max(abs(t["min"]), abs(t["max"])))
+            for t in vehicle["thrusters"]
+        )
+        self.log = log_of(excerpt.run)
+        begun = [excerpt.run.planned.goal, *(r.region.shape for r in scenario.regions)]
+        later = [(c["time"], c["region"], _shape(c["shape"])) for c in changes_of(excerpt.run, self.log)]
+        # an obstacle that may come has its numbers from where it waits, far away
+        waiting = {i + 1 for i, secondary in enumerate(scenario.regions) if secondary.seen}
+        all_shapes = [*enumerate(begun), *((i, shape) for _, i, shape in later)]
+        limits = self._limits([shape for i, shape in all_shapes if i not in waiting])
+        self.solids = tuple(self._solid(i, shape, limits) for i, shape in enumerate(begun))
+        self.changes = tuple((time, i, self._solid(i, shape, limits)) for time, i, shape in later)
+        self._criteria = [secondary.criterion for secondary in scenario.regions]
+        self._memberships = self.places([f"membership.{name}" for name in CRITERIA])
+        self._weights = self.places([f"weight.{name}" for name in CRITERIA])
+        self._clearances = self.places([f"{solid.name}.clearance" for solid in self.solids[1:]])
+
+    def places(self, names: list[str] | tuple[str, ...]) -> list[int]:
+        """Return where signals are in a row of the record."""
+        return [self._at[name] for name in names]
+
+    def active(self, rows: Array) -> list[int]:
+        """Return which of the solids the arbiter gives way to at each row of the record."""
+        active = active_regions(
+            self._criteria, rows[:, self._memberships], rows[:, self._weights], rows[:, self._clearances]
+        )
+        return [int(i) for i in active]
+
+    def shifts(self, solid: Solid) -> list[int]:
+        """Return where the shift of a solid that moves is in a row of the record."""
+        return self.places([f"{solid.name}.shift.{axis}" for axis in "xyz"])
+
+    def trail(self) -> Array:
+        """Return the way that the vehicle took, as few enough points for a line, shape (n, 3) [m, NED]."""
+        n = len(self._excerpt.rows)
+        rows = self._excerpt.rows[np.unique(np.linspace(0, n - 1, min(n, _TRAIL)).astype(int))]
+        way: Array = np.column_stack([self._record[name][rows] for name in POSITION])
+        return way[np.isfinite(way).all(axis=1)]
+
+    def _solid(self, index: int, shape: Shape, limits: Bounds) -> Solid:
+        scenario = self._excerpt.run.scenario
+        secondary = scenario.regions[index - 1] if index else None
+        region = secondary.region if secondary else scenario.goal_region
+        return Solid(
+            region.name,
+            f"{region.name}: keep {region.keep}",
+            _COLOURS[secondary.criterion if secondary else None],
+            shape,
+            self._mesh(shape, limits),
+            {Orientation: PLACE, Visibility: BODY}.get(type(shape), NED),
+            region.name in scenario.moving,
+        )
+
+    def _limits(self, shapes: list[Shape]) -> Bounds:
+        """Return the corners of an upright box about the way and all regions that end somewhere."""
+        way = self.trail()
+        points = [way.min(axis=0), way.max(axis=0)] if len(way) else [np.zeros(3)]
+        bounds = [corner for shape in shapes for corner in shape.bounds()]
+        points += [np.array(corner) for corner in bounds if np.isfinite(corner).all()]
+        low, high = np.min(points, axis=0) - _MARGIN, np.max(points, axis=0) + _MARGIN
+        return tuple(low.tolist()), tuple(high.tolist())
+
+    def _mesh(self, shape: Shape, limits: Bounds) -> Mesh:
+        if not of_attitude(shape):
+            return surface_of(shape, limits)
+        reach = _SIGHT * self.hull_radius
+        if isinstance(shape, Visibility):
+            return sector(shape.camera_position, shape.camera_axis, shape.half_angle, reach)
+        assert isinstance(shape, Orientation)
+        # the vehicle's bow must be within it
+        e = np.array(shape.quaternion) / np.linalg.norm(shape.quaternion)
+        return sector((0.0, 0.0, 0.0), rotation_matrix(e)[:, 0].tolist(), shape.tolerance, reach)
+
+
+def _shape(numbers: dict[str, Any]) -> Shape:
+    """Return the shape that its numbers say."""
+    return SHAPES[numbers["kind"]](**{key: value for key, value in numbers.items() if key != "kind"})

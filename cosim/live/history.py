@@ -1,0 +1,86 @@
+"""What a live run was so far: every row that is new, and enough of the old ones for who comes late."""
+
+from __future__ import annotations
+
+from collections import deque
+
+import numpy as np
+
+from cosim.signals import Array
+
+_BYTES = 8_000_000  # of old rows
+_NEW = 256  # rows of which none is left out
+
+
+class History:
+    """Rows of a run, of which the old ones are thinned so that they never take more than a bounded room.
+
+    Parameters
+    ----------
+    columns : int
+        Of a row.
+    most : int, optional
+        Old rows that are kept; default: what a few megabytes hold.
+
+    Attributes
+    ----------
+    count : int
+        Rows that ever came; a row's number is the count when it came.
+    """
+
+    def __init__(self, columns: int, most: int | None = None) -> None:
+        most = most or max(2, _BYTES // (8 * columns))
+        self.count = 0
+        self._columns = columns
+        self._old: Array = np.empty((most, columns))
+        self._numbers = np.zeros(most, dtype=np.int64)
+        self._kept = 0
+        self._stride = 1  # of the rows that become old ones, every so many stay
+        self._new: deque[Array] = deque()
+
+    def add(self, row: Array) -> None:
+        """Take the next row, shape (columns,)."""
+        self._new.append(row)
+        self.count += 1
+        if len(self._new) > _NEW:
+            self._age(self._new.popleft(), self.count - _NEW)
+
+    def _age(self, row: Array, number: int) -> None:
+        if (number - 1) % self._stride:
+            return
+        if self._kept == len(self._old):
+            kept = (self._kept + 1) // 2
+            self._old[:kept], self._numbers[:kept] = self._old[::2].copy(), self._numbers[::2].copy()
+            self._kept = kept
+            self._stride *= 2
+            if (number - 1) % self._stride:
+                return
+        self._old[self._kept], self._numbers[self._kept] = row, number
+        self._kept += 1
+
+    def since(self, number: int, most: int) -> tuple[Array, int]:
+        """Return what came behind a row.
+
+        Parameters
+        ----------
+        number : int
+            Of that row; 0 for all.
+        most : int
+            Rows at once; ask again for those behind.
+
+        Returns
+        -------
+        ndarray, shape (rows, columns)
+            In their order.
+        int
+            Number of the last one, or `number` if there is none.
+        """
+        first_new = self.count - len(self._new)  # rows up to this number are old
+        if number < first_new:
+            at = int(np.searchsorted(self._numbers[: self._kept], number, side="right"))
+            end = min(self._kept, at + most)
+            if end > at:
+                return self._old[at:end].copy(), int(self._numbers[end - 1])
+            number = first_new
+        rows = [self._new[i] for i in range(number - first_new, min(len(self._new), number - first_new + most))]
+        return np.array(rows).reshape(len(rows), self._columns), number + len(rows)

@@ -1,0 +1,175 @@
+"""The observer that shows a run to viewers, and the thread in which they are served."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Sequence
+from types import TracebackType
+from typing import Any
+
+import numpy as np
+
+from cosim.errors import TelemetryError
+from cosim.helm.orders import Order
+from cosim.helm.sources import OrderQueue
+from cosim.live.address import LiveAddress, bound
+from cosim.live.hub import Hub
+from cosim.scenario import Scenario
+from cosim.signals import Array, Column
+
+log = logging.getLogger(__name__)
+
+PERIOD = 1.0 / 30.0  # s of the wall clock, between rows that are shown
+_WAITING = 256  # rows that wait for the thread at the most; when it falls behind, the oldest go
+_CLOSING = 3.0  # s
+
+
+class LiveView:
+    """Observer that copies some rows for viewers, who are served in a thread of its own.
+
+    Nothing that viewers do reaches the stepper but their orders, through the queue; nothing that goes wrong here does.
+
+    Parameters
+    ----------
+    address : LiveAddress
+        Where to serve.
+
+    Attributes
+    ----------
+    url : str
+        Of the page.
+
+    Raises
+    ------
+    TelemetryError
+        If websockets is not installed, or the address cannot be opened.
+    """
+
+    def __init__(self, address: LiveAddress) -> None:
+        try:
+            from cosim.live.server import serve
+        except ImportError as error:
+            raise TelemetryError("--live needs websockets; pip install 'subreach[live]'") from error
+        self._socket = bound(address)
+        port = self._socket.getsockname()[1]
+        self.url = f"http://{address.host}:{port}/"
+        self._hub = Hub()
+        self._rows: deque[tuple[int, Array]] = deque(maxlen=_WAITING)
+        self._run, self._picked, self._due, self._last = -1, np.zeros(0, dtype=np.intp), 0.0, 0
+        self._loop = asyncio.new_event_loop()
+        self._closing = threading.Event()
+        self._started = False
+        self._serve = serve(self._socket, address, self._hub, self._take_rows, self._closing)
+        self._thread = threading.Thread(target=self._live, name="live view", daemon=True)
+        self._warnings = _Warnings(self)
+
+    # ---- called by whoever runs the run ----
+
+    def begin(self, scenario: Scenario, columns: Sequence[Column], queue: OrderQueue | str) -> None:
+        """Show another run from now on.
+
+        Parameters
+        ----------
+        scenario : Scenario
+            What is run.
+        columns : sequence of Column
+            Of its rows.
+        queue : OrderQueue or str
+            Where orders go, or why there are none.
+        """
+        self._run += 1
+        hub = self._hub
+        if not self._started:
+            hub.begin(self._run, scenario, columns, queue)
+            self._started = True
+            self._thread.start()
+            logging.getLogger("cosim").addHandler(self._warnings)
+        elif self._thread.is_alive():
+            begun = threading.Event()
+            self._call(hub.begin, self._run, scenario, columns, queue)
+            self._call(begun.set)
+            begun.wait(_CLOSING)
+        self._picked, self._due, self._last = np.array(hub.picked), 0.0, scenario.steps
+
+    def observe(self, k: int, row: Array) -> None:
+        """Copy what is shown of the row of step `k`, where one is due."""
+        now = time.perf_counter()
+        if now >= self._due or k == self._last:
+            self._due = now + PERIOD
+            self._rows.append((self._run, row[self._picked]))
+
+    def heed(self, k: int, orders: Sequence[Order]) -> None:
+        """Tell of orders that step `k` follows."""
+        self._call(self._hub.heed, k, orders)
+
+    def say(self, text: str, kind: str = "info") -> None:
+        """Tell all viewers something."""
+        self._call(self._hub.say, text, kind)
+
+    def end(self, status: str, verdict: str) -> None:
+        """Tell how the run ended."""
+        self._call(self._take_rows)
+        self._call(self._hub.end, status, verdict)
+
+    def close(self) -> None:
+        """Let viewers have what they were not told yet, for a bounded time, and end. May be called twice."""
+        logging.getLogger("cosim").removeHandler(self._warnings)
+        if not self._started:
+            self._serve.close()
+            self._loop.close()
+        elif self._thread.is_alive():
+            self._closing.set()
+            self._thread.join(_CLOSING)
+        self._socket.close()
+
+    def __enter__(self) -> LiveView:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    # ---- in the thread ----
+
+    def _call(self, work: Callable[..., object], *arguments: Any) -> None:
+        """Let the thread do something."""
+        try:
+            self._loop.call_soon_threadsafe(work, *arguments)
+        except RuntimeError:  # the thread has failed, which was logged
+            log.debug("nobody is served any more")
+
+    def _live(self) -> None:
+        asyncio.set_event_loop(self._loop)
+        try:
+            self._loop.run_until_complete(self._serve)
+        except Exception:  # broad: whatever ends the view, the run goes on
+            log.exception("the live view has ended, the run goes on")
+        finally:
+            self._loop.close()
+
+    def _take_rows(self) -> None:
+        """Hand the hub what the stepper has copied."""
+        rows = []
+        while self._rows:
+            run, row = self._rows.popleft()
+            if run == self._hub.run:
+                rows.append(row)
+        if rows:
+            self._hub.show(rows)
+
+
+class _Warnings(logging.Handler):
+    """Shows viewers what the terminal is warned of, such as an order that could not be followed."""
+
+    def __init__(self, view: LiveView) -> None:
+        super().__init__(logging.WARNING)
+        self._view = view
+
+    def emit(self, record: logging.LogRecord) -> None:
+        if not record.name.startswith("cosim.live"):
+            self._view.say(record.getMessage(), "warning")

@@ -1,0 +1,203 @@
+"""Where the pictures of a run come from: its folder, finished or still being written, or a live view."""
+
+from __future__ import annotations
+
+import json
+import math
+import socket
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+from urllib.parse import urlsplit
+
+import numpy as np
+
+from cosim.errors import RunError, TelemetryError
+from cosim.live.messages import rows_of
+from cosim.record import PARTS, RECORD, Record
+from cosim.replay.folder import SCENARIO, SUMMARY, load_run
+from cosim.replay.header import header_of
+from cosim.replay.viewing import Viewing
+from cosim.report_words import verdict
+from cosim.scenario import load_scenario
+from cosim.signals import Array
+
+_FRAME = 0.1  # s of the wall clock, between pictures
+_FAST = 200  # pictures of a run that is played back as fast as it goes
+_ROWS = 10_000  # of a finished run
+_FRESH = 5.0  # s; parts of a record that are older are not written any more
+_ANSWER = 5.0  # s, that a live view may take to answer
+_GREATEST = 1 << 26  # bytes of a message
+
+
+@dataclass(frozen=True)
+class Look:
+    """A run at a moment."""
+
+    header: dict[str, Any]
+    row: Array | None  # (columns,), None before the first
+    note: str  # how it is looked at
+    ended: tuple[str, str] | None = None  # status and verdict, once it is over
+
+    def __getitem__(self, name: str) -> float:
+        """Return a signal; NaN where there is none."""
+        names = [signal["name"] for signal in self.header["signals"]]
+        return float(self.row[names.index(name)]) if self.row is not None and name in names else math.nan
+
+
+def looks(what: str, rate: float | None = 1.0, once: bool = False) -> Iterator[Look]:
+    """Look at a run until it is over.
+
+    Parameters
+    ----------
+    what : str
+        A run folder; or the port, or the address (``ws://HOST:PORT``), of a live view.
+    rate : float or None
+        Simulated seconds a second when a finished run is played back; None for as fast as it goes.
+    once : bool
+        Look once, at the newest there is.
+
+    Yields
+    ------
+    Look
+        Several a second.
+
+    Raises
+    ------
+    RunError, ScenarioError
+        If the folder holds no run that can be read.
+    TelemetryError
+        If nobody answers at the address, or the connection is lost.
+    """
+    if what.isdecimal() or "://" in what:
+        found = _live(_endpoint(what))
+        return _newest(found) if once else found
+    path = Path(what)
+    if _is_written(path):
+        found = _growing(path)
+        return _newest(found) if once else found
+    return _finished(path, rate, once)
+
+
+def _newest(found: Iterator[Look]) -> Iterator[Look]:
+    yield next(look for look in found if look.row is not None)
+
+
+# ---- folders -------------------------------------------------------------------------------------------------------
+
+
+def _finished(path: Path, rate: float | None, once: bool) -> Iterator[Look]:
+    run = load_run(path)
+    viewing = Viewing(run.scenario, run.record.columns)
+    record, steps = run.record, len(run.record["time"])
+    # no picture needs more rows than these, and all of a long run would not fit into memory
+    rows = np.arange(steps - 1, -1, -max(1, steps // _ROWS))[::-1] if not once else np.array([steps - 1])
+    picked = np.column_stack([record[record.columns[i].name][rows] for i in viewing.picked])
+    times, ended = picked[:, 0], (str(run.summary["status"]), verdict(run.summary))
+    header = header_of(run.scenario, viewing.columns)
+
+    def at(k: int, note: str, end: tuple[str, str] | None = None) -> Look:
+        return Look(header, viewing.extended(picked[k : k + 1])[0], note, end)
+
+    began, k = time.monotonic(), 0
+    note = "replay" if rate is None else f"replay, {rate:g} times real time"
+    while k < len(times) - 1:
+        yield at(k, note)
+        if rate is None:
+            k += max(1, len(times) // _FAST)
+        else:
+            time.sleep(_FRAME)
+            k = int(np.searchsorted(times, times[0] + rate * (time.monotonic() - began), side="right")) - 1
+    yield at(len(times) - 1, "replay", ended)
+
+
+def _is_written(path: Path) -> bool:
+    """Return whether a run goes on in a folder."""
+    parts = path / PARTS
+    if (path / RECORD).exists() or (path / SUMMARY).exists() or not parts.is_dir():
+        return False
+    files = list(parts.glob("*.parquet"))
+    return not files or time.time() - max(file.stat().st_mtime for file in files) < _FRESH
+
+
+def _growing(path: Path) -> Iterator[Look]:
+    scenario = load_scenario(path / SCENARIO)
+    viewing: Viewing | None = None
+    header: dict[str, Any] = header_of(scenario, ())
+    row: Array | None = None
+    known, since = "", time.monotonic()
+    while not (path / SUMMARY).exists():
+        newest = max((file.name for file in (path / PARTS).glob("*.parquet")), default="")
+        if newest > known:
+            try:
+                record = Record([path / PARTS / newest])
+                viewing = viewing or Viewing(scenario, record.columns)
+                header = header_of(scenario, viewing.columns)
+                *_, block = record.blocks()
+            except (RunError, OSError):  # the run ends: its parts have just been joined
+                continue
+            known, since = newest, time.monotonic()
+            row = viewing.extended(block[-1:, viewing.picked])[0]
+        silent = time.monotonic() - since
+        wait = f"no new rows for {silent:.0f} s: waiting, writing its report, or killed"
+        yield Look(header, row, "being recorded" if silent < _FRESH else wait)
+        time.sleep(_FRAME)
+    yield from _finished(path, None, once=True)
+
+
+# ---- live ----------------------------------------------------------------------------------------------------------
+
+
+def _endpoint(what: str) -> tuple[str, int]:
+    text = f"ws://127.0.0.1:{what}" if what.isdecimal() else what
+    try:
+        parts = urlsplit(text)
+        scheme, host, port = parts.scheme, parts.hostname, parts.port
+    except ValueError:
+        scheme, host, port = "", None, None
+    if scheme not in ("ws", "http") or not host or not port:
+        raise TelemetryError(f"{what!r}: expected a run folder, PORT, or ws://HOST:PORT")
+    return host, port
+
+
+def _live(endpoint: tuple[str, int]) -> Iterator[Look]:
+    try:
+        from websockets.exceptions import WebSocketException
+        from websockets.sync.client import connect
+    except ImportError as error:
+        raise TelemetryError("a live view needs websockets; pip install 'subreach[live]'") from error
+    url = f"ws://{endpoint[0]}:{endpoint[1]}/ws"
+    header: dict[str, Any] | None = None
+    try:
+        # with a socket of its own no proxy comes in between
+        reached = socket.create_connection(endpoint, timeout=_ANSWER)
+        with connect(url, sock=reached, open_timeout=_ANSWER, max_size=_GREATEST, compression=None) as connection:
+            row: Array | None = None
+            shown = -math.inf
+            for message in connection:
+                if isinstance(message, bytes):
+                    if header is not None:
+                        row = rows_of(message, len(header["signals"]))[-1]
+                else:
+                    told = json.loads(message)
+                    if told["type"] == "header":
+                        header, row = told["run"], None
+                    elif told["type"] == "end" and header is not None:
+                        yield Look(header, row, f"live at {url}", (told["status"], told["verdict"]))
+                        if told["status"] != "reset":
+                            return
+                if header is not None and time.monotonic() - shown >= _FRAME:
+                    shown = time.monotonic()
+                    yield Look(header, row, f"live at {url}")
+    except (OSError, WebSocketException) as error:
+        raise TelemetryError(f"{url}: {_reason(error)}") from error
+    except (ValueError, KeyError, TypeError) as error:
+        raise TelemetryError(f"{url}: is no live view of a run ({error})") from error
+    raise TelemetryError(f"{url}: the connection has ended before the run")
+
+
+def _reason(error: Exception) -> str:
+    text = getattr(error, "strerror", None) or str(error)
+    return f"cannot be watched: {text}"

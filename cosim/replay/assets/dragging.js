@@ -1,0 +1,134 @@
+// Target and regions of a live run, dragged in the scene.
+
+const BEGINS = 4; // pixels, below which a press is a click
+const EDGE_ON = 0.12; // sine of the angle below which a level plane is seen too much from its side to be dragged on
+const FARTHEST = 500; // m, that a region is dragged at once
+const SETTLES = 250; // ms, for which the ghost stays after its region was let go
+
+/** Lets a pointer drag regions, and draws where they will be. */
+class Dragging {
+  /** @param {LiveLink} link */
+  constructor(link) {
+    this.link = link;
+    this.canvas = link.page.canvas;
+    this.ghost = new Ghost(this.canvas);
+    this.held = null;
+    const { canvas } = this;
+    // before the camera's own listeners, which leave alone what is taken
+    canvas.addEventListener("pointerdown", (event) => this._take(event), true);
+    canvas.addEventListener("pointermove", (event) => this._move(event));
+    canvas.addEventListener("pointerup", (event) => this._drop(event));
+    canvas.addEventListener("pointercancel", () => this.cancel());
+    addEventListener("keydown", (event) => {
+      if (event.key === "Escape") this.cancel();
+    });
+  }
+
+  /** Let go without an order. */
+  cancel() {
+    this.held = null;
+    this.ghost.clear();
+  }
+
+  /** Draw the ghost again, as the camera may have moved. */
+  draw() {
+    if (this.held?.moved) this.ghost.draw(this.link.page.scene(), this.held);
+  }
+
+  /** The region under a point that may be dragged, or null. */
+  _under(x, y) {
+    const { link } = this;
+    const scene = link.page.scene();
+    if (!link.heeded || !scene) return null;
+    const found = scene.pick(x, y);
+    if (!found || !canMove(link.run, found.region) || isFlat(link.run, found.region)) return null;
+    // the walls of what is to be kept within are all around; its name alone is a handle
+    const { keep } = link.run.header.regions[found.region];
+    const over = (box) => x >= box.x && x <= box.x + box.width && y >= box.y && y <= box.y + box.height;
+    const named = scene.labels.placed.some((box) => box.key === `${found.run}:${found.region}` && over(box));
+    return found.region === 0 || keep === "out" || named ? found.region : null;
+  }
+
+  _take(event) {
+    if (event.button !== 0 || !event.isPrimary || event.altKey || event.ctrlKey) return;
+    const { offsetX: x, offsetY: y } = event;
+    const region = this._under(x, y);
+    if (region === null) return;
+    const { run, page } = this.link;
+    if (!page.player.live) {
+      page.say("What is in the past cannot be moved: go to the end (End) to drag regions.", "info");
+      return;
+    }
+    event.preventDefault();
+    this.canvas.focus();
+    this.canvas.setPointerCapture(event.pointerId);
+    const from = placeOf(run, region, run.end);
+    this.held = { run, region, from, to: from, x, y, last: [x, y], upright: null, moved: false };
+  }
+
+  _move(event) {
+    const { held } = this;
+    const { offsetX: x, offsetY: y } = event;
+    if (!held) {
+      if (!event.buttons) this._hint(x, y);
+      return;
+    }
+    held.moved ||= Math.hypot(x - held.x, y - held.y) >= BEGINS;
+    if (!held.moved) return;
+    held.to = this._dragged(held, x, y, event.shiftKey);
+    held.last = [x, y];
+    this.canvas.style.cursor = "grabbing";
+    this.draw();
+  }
+
+  /** Where the thing goes: along a level plane, or up and down; from the side, along the plane that faces the eye. */
+  _dragged(held, x, y, up) {
+    const scene = this.link.page.scene();
+    const edgeOn = Math.abs(scene.camera.forward[2]) < EDGE_ON;
+    let by = [0, 0, 0];
+    if (up || edgeOn) {
+      const [a, b] = [held.last, [x, y]].map(([u, v]) => onUprightPlane(scene.camera, u, v, held.to));
+      if (a && b) by = Vec.sub(b, a);
+      if (up) by = [0, 0, by[2]];
+    } else {
+      const [a, b] = [held.last, [x, y]].map(([u, v]) => scene.placeOnPlane(u, v, held.to[2]));
+      if (a && b) by = [b[0] - a[0], b[1] - a[1], 0];
+    }
+    const to = Vec.add(held.to, by);
+    return Vec.norm(Vec.sub(to, held.from)) <= FARTHEST ? to : held.to;
+  }
+
+  _drop(event) {
+    const { held, link } = this;
+    if (!held) return;
+    this.held = null;
+    this.canvas.releasePointerCapture(event.pointerId);
+    this.canvas.style.cursor = "";
+    if (held.moved && held.run === link.run) {
+      const round = held.to.map((x, i) => (x === held.from[i] ? x : Number(x.toFixed(3))));
+      link.order(orderToMove(link.run, held.region, held.from, round, link.run.end));
+    }
+    setTimeout(() => {
+      if (!this.held) this.ghost.clear();
+    }, SETTLES);
+  }
+
+  /** Tell by the cursor that something can be taken; not more often than needed, as looking takes a while. */
+  _hint(x, y) {
+    this._at = [x, y];
+    this._looking ||= setTimeout(() => {
+      this._looking = 0;
+      if (!this.held) this.canvas.style.cursor = this._under(...this._at) === null ? "" : "grab";
+    }, 80);
+  }
+}
+
+/** The point that is seen at some pixels on the upright plane through a point that faces the eye; null where none is. */
+function onUprightPlane(camera, x, y, through) {
+  const level = [camera.forward[0], camera.forward[1], 0];
+  if (Vec.norm(level) < 1e-3) return null; // from straight above no upright plane is seen
+  const normal = Vec.unit(level);
+  const ray = camera.ray(x, y);
+  const length = Vec.dot(Vec.sub(through, camera.eye), normal) / Vec.dot(ray, normal);
+  return length > 0 && Number.isFinite(length) ? Vec.along(camera.eye, ray, length) : null;
+}

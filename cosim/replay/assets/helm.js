@@ -1,0 +1,176 @@
+// The helm of a live run: buttons, and the places of target and regions as numbers, for who has no mouse.
+
+const MODE_NAMES = ["manual", "hold", "reach", "mission", "surface"];
+const SURE = 4000; // ms, for which a button that was pressed once waits to be pressed again
+const NEW_OBSTACLES = 1001; // their numbers begin here, away from those that sensors give
+
+/** Buttons and numbers beside the scene. */
+class HelmPanel {
+  /** @param {LiveLink} link */
+  constructor(link) {
+    this.link = link;
+    this.holder = element("details", "helm");
+    this.holder.id = "helm";
+    this.holder.open = matchMedia("(min-width: 960px)").matches;
+    this.holder.hidden = true;
+    this.state = element("span", "note");
+    const summary = element("summary", "", "Steer ");
+    summary.append(this.state);
+    this.body = element("div", "helm-body");
+    this.holder.append(summary, this.body);
+    document.getElementById("stage").append(this.holder);
+    this._rows = [];
+  }
+
+  /** Take the run of the link. */
+  setRun(run) {
+    this.run = run;
+    this.holder.hidden = false;
+    this._rows = [];
+    this.body.replaceChildren();
+    if (!run.header.commands) {
+      this.body.append(element("p", "", "Watching only. Start the run with --commands to steer it from here."));
+    } else {
+      this.body.append(this._buttons(), this._list(), this._adding());
+    }
+    this.tell();
+  }
+
+  /** Show how things stand. */
+  tell() {
+    const { run, link } = this;
+    if (!run) return;
+    const mode = run.rows && run.has("helm.mode") ? MODE_NAMES[run.held("helm.mode", run.end)] : null;
+    const armed = run.has("helm.armed") ? run.held("helm.armed", run.end) > 0 : true;
+    let state = "watching";
+    if (link.over) state = "the run has ended";
+    else if (run.header.commands) state = link.heeded ? `${armed ? "armed" : "disarmed"}, ${mode ?? "waiting"}` : "no connection";
+    setText(this.state, state);
+    this.body.inert = Boolean(run.header.commands) && !link.heeded;
+    for (const button of this.body.querySelectorAll("[data-mode]")) button.setAttribute("aria-pressed", String(button.dataset.mode === mode));
+    for (const button of this.body.querySelectorAll("[data-armed]")) button.setAttribute("aria-pressed", String(button.dataset.armed === String(armed)));
+    for (const row of this._rows) this._place(row);
+  }
+
+  _buttons() {
+    const group = element("div", "helm-buttons");
+    group.setAttribute("role", "group");
+    group.setAttribute("aria-label", "Orders");
+    const add = (text, title, order, data = {}) => {
+      const button = element("button", "", text);
+      button.type = "button";
+      button.title = title;
+      Object.assign(button.dataset, data);
+      button.addEventListener("click", () => this.link.order(order));
+      group.append(button);
+    };
+    add("Arm", "Let the thrusters work", { order: "arm", armed: true }, { armed: "true" });
+    add("Disarm", "Stop the thrusters", { order: "arm", armed: false }, { armed: "false" });
+    add("Reach", "Go to the target region", { order: "steer", mode: "reach" }, { mode: "reach" });
+    add("Hold", "Stay here", { order: "steer", mode: "hold" }, { mode: "hold" });
+    add("Surface", "Come up", { order: "steer", mode: "surface" }, { mode: "surface" });
+    group.append(this._reset());
+    return group;
+  }
+
+  /** To begin again is asked for twice. */
+  _reset() {
+    const button = element("button", "", "Reset");
+    button.type = "button";
+    button.title = "End this run, and begin it again";
+    let sure = 0;
+    button.addEventListener("click", () => {
+      if (sure) this.link.order({ order: "reset" });
+      clearTimeout(sure);
+      setText(button, sure ? "Reset" : "Really reset?");
+      sure = sure ? 0 : setTimeout(() => {
+        sure = 0;
+        setText(button, "Reset");
+      }, SURE);
+    });
+    return button;
+  }
+
+  _list() {
+    const list = element("div", "helm-list");
+    list.append(element("p", "hint", "Drag target and regions in the scene (Shift: up and down), or give numbers in metres: north, east, down."));
+    this.run.header.regions.forEach((region, index) => {
+      if (canMove(this.run, index)) list.append(this._row(region, index));
+    });
+    return list;
+  }
+
+  _row(region, index) {
+    const set = element("fieldset");
+    const name = index === 0 ? "target" : region.name;
+    const legend = element("legend", "", name);
+    set.append(legend);
+    const fields = ["N", "E", "D"].map((letter, axis) => {
+      const label = element("label", "", letter);
+      const field = element("input");
+      Object.assign(field, { type: "number", step: "0.1" });
+      field.setAttribute("aria-label", `${name}, ${["north", "east", "down"][axis]} in metres`);
+      field.disabled = axis < 2 && isFlat(this.run, index);
+      field.addEventListener("change", () => this._moved(row));
+      label.append(field);
+      set.append(label);
+      return field;
+    });
+    const row = { index, set, fields };
+    if (region.comes) {
+      const gone = element("button", "gone", "Remove");
+      gone.type = "button";
+      gone.addEventListener("click", () => this._forget(index));
+      set.append(gone);
+    }
+    this._rows.push(row);
+    return set;
+  }
+
+  /** Write where a thing is, unless its user writes. */
+  _place({ index, set, fields }) {
+    const place = placeOf(this.run, index, this.run.end);
+    set.hidden = !place;
+    if (!place || set.contains(document.activeElement)) return;
+    fields.forEach((field, axis) => {
+      const text = field.disabled ? "" : String(Number(place[axis].toFixed(2)));
+      if (field.value !== text) field.value = text;
+    });
+  }
+
+  _moved({ index, fields }) {
+    const { run } = this;
+    const from = placeOf(run, index, run.end);
+    if (!from) return;
+    const to = fields.map((field, axis) => {
+      const written = field.valueAsNumber;
+      // what stands there rounded is left as it is
+      return !Number.isFinite(written) || Math.abs(written - from[axis]) <= 0.005 ? from[axis] : written;
+    });
+    if (Vec.norm(Vec.sub(to, from)) > 0) this.link.order(orderToMove(run, index, from, to, run.end));
+  }
+
+  /** A new obstacle stands ahead of the vehicle, from where it may be dragged. */
+  _adding() {
+    const button = element("button", "", "New obstacle");
+    button.type = "button";
+    button.title = "A sphere to keep out of, ahead of the vehicle";
+    button.addEventListener("click", () => {
+      const { run } = this;
+      if (!run.rows) return;
+      const { position, quaternion } = run.pose(run.end);
+      const radius = Number(Math.max(0.3, run.header.vehicle.radius).toFixed(2));
+      const ahead = Vec.turned(Vec.matrix(quaternion), [1, 0, 0]);
+      const way = Vec.unit([ahead[0], ahead[1], 0]);
+      const place = Vec.along(position, way, 4 * radius + run.header.vehicle.radius);
+      const known = run.header.changes.map((change) => change.number ?? 0);
+      this.link.order({ order: "obstacle", number: Math.max(NEW_OBSTACLES - 1, ...known) + 1, position: place, radius });
+    });
+    return button;
+  }
+
+  _forget(index) {
+    const came = this.run.header.changes.findLast((change) => change.region === index && change.number !== undefined);
+    if (came) this.link.order({ order: "forget", number: came.number });
+  }
+}

@@ -1,0 +1,131 @@
+// The regions of some runs at a time: which surfaces, sheets and sights there are, and how each is dressed.
+
+/** Tells what there is to draw of regions; equal ones of several runs are drawn once. */
+class Regions {
+  /** @param {Run[]} runs */
+  constructor(runs) {
+    this.runs = runs;
+    this._sheets = new Map();
+  }
+
+  /** The box that sheets are cut to. */
+  set bounds(bounds) {
+    this._bounds = bounds;
+    this._sheets.clear();
+  }
+
+  /**
+   * One entry for each surface, sheet or sight.
+   * @param {number} t  @param {object[]} poses of the vehicles, null where there is none
+   * @param {number[]} target of the camera  @param {"light"|"dark"} theme
+   */
+  at(t, poses, target, theme) {
+    const entries = [];
+    this.runs.forEach((run, r) => {
+      const active = run.active(t);
+      run.header.regions.forEach((region, i) => {
+        const [shape, shift] = [run.shape(i, t), run.rows ? run.shift(i, t) : [0, 0, 0]];
+        const same = entries.filter((entry) => entry.of.run !== r && sameRegion(entry, region, shape, shift));
+        for (const entry of same) {
+          entry.owners.push([r, i]);
+          if (active === i && !entry.active) dressEntry(entry, true, theme);
+        }
+        if (same.length) return;
+        for (const entry of this._of(shape, shift, region, poses[r], target)) {
+          Object.assign(entry, { of: { run: r, region: i }, region, shape, shift, owners: [[r, i]] });
+          dressEntry(entry, active === i, theme);
+          entries.push(entry);
+        }
+      });
+    });
+    return entries;
+  }
+
+  _of(shape, shift, region, pose, target) {
+    if (SOLIDS[shape.kind]) {
+      const solid = surfaceOf(shape);
+      if (!isThere(Vec.add(solid.centre, shift))) return [];
+      const middle = solid.spine ? nearestOnChain(solid.spine, Vec.sub(target, shift)) : solid.centre;
+      return [{ solid, middle: Vec.add(middle, shift) }];
+    }
+    if (PLANES[shape.kind]) {
+      const key = JSON.stringify([shape, region.keep, shift]);
+      if (!this._sheets.has(key)) {
+        if (this._sheets.size > 200) this._sheets.clear(); // of regions that move
+        this._sheets.set(key, sheetsOf(shape, region.keep, shift, this._bounds));
+      }
+      return this._sheets.get(key).map((sheet) => ({ sheet, middle: middleOf(sheet.corners) }));
+    }
+    return pose ? [{ sight: SIGHTS[shape.kind](shape, pose, shift, pose.size), size: pose.size }] : [];
+  }
+}
+
+/** The mean of some points. */
+function middleOf(points) {
+  return points.reduce((sum, p) => Vec.along(sum, p, 1 / points.length), [0, 0, 0]);
+}
+
+/** Colour and style of an entry, by whether the arbiter gives way to its region. */
+function dressEntry(entry, active, theme) {
+  entry.active = active;
+  entry.colour = regionColour(entry.region, active, theme);
+  entry.style = styleOf(entry.region.keep, active, entry.colour);
+}
+
+/** Whether an entry of another run shows this region already: of the same name, shape and place. */
+function sameRegion(entry, region, shape, shift) {
+  return (
+    !entry.sight && entry.region.name === region.name && entry.region.keep === region.keep &&
+    entry.shift.every((x, i) => Math.abs(x - shift[i]) < 1e-3) && JSON.stringify(entry.shape) === JSON.stringify(shape)
+  );
+}
+
+/** Where the name of an entry stands. */
+function anchorOf({ solid, sheet, sight, shift, middle }, camera) {
+  if (sight) return sight.anchor;
+  if (sheet) return sheet.corners.reduce((a, b) => (camera.project(b)[0] > camera.project(a)[0] ? b : a));
+  return solid.spine ? middle : [middle[0], middle[1], solid.top + shift[2]];
+}
+
+/** Ask for the names of regions, the active one marked. */
+function nameRegions(labels, camera, entries, colours) {
+  const named = new Set();
+  for (const entry of entries) {
+    const key = `${entry.of.run}:${entry.of.region}`;
+    if (named.has(key)) continue;
+    const [x, y, depth] = camera.project(anchorOf(entry, camera));
+    if (!(depth > camera.near) || x < 0 || y < 0 || x > camera.width || y > camera.height) continue;
+    named.add(key);
+    const { active } = entry;
+    labels.add({
+      key, x, y, gap: 6, of: entry.of, size: camera.width < 480 && !active ? 10 : 12,
+      text: active ? `▶ ${entry.region.name}` : entry.region.name,
+      colour: active ? colours.ink : colours.soft, edge: entry.colour, bold: active, chip: colours.chip,
+      rank: active ? 0 : entry.of.region === 0 ? 1 : 10 + 1e-3 * depth, far: active || entry.of.region === 0,
+      sides: ["above", "right", "left", "below"],
+    });
+  }
+}
+
+/** Keep names off a vehicle, unless it fills the picture. */
+function blockVehicle(labels, camera, { pose, size }) {
+  const [x, y, depth] = camera.project(pose.position);
+  if (depth < camera.near) return;
+  const half = Math.min(70, 1.3 * size * camera.scaleAt(pose.position));
+  labels.block(x - half, y - half, 2 * half, 2 * half);
+}
+
+/** Ask for the names of vehicles, where there are several. */
+function nameVehicles(labels, camera, marks, vehicles, colours) {
+  vehicles.forEach((vehicle, i) => {
+    if (!vehicle) return;
+    const [x, y, depth] = camera.project(vehicle.pose.position);
+    if (depth < camera.near) return;
+    const { name, colour } = marks[i];
+    labels.add({
+      key: `vehicle ${i}`, x, y, gap: 1.5 * vehicle.size * camera.scaleAt(vehicle.pose.position),
+      text: name, colour: colours.ink, edge: colour, bold: true, chip: colours.chip, rank: 0.5, far: true,
+      sides: ["below", "right", "left", "above"],
+    });
+  });
+}

@@ -1,0 +1,35 @@
+"""Figures as files."""
+
+from __future__ import annotations
+
+import io
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+IMAGES = ("png", "svg", "pdf")
+
+
+def image(figure: Figure, suffix: str) -> bytes:
+    """Return a figure as a file, the same for the same figure at any time.
+
+    Parameters
+    ----------
+    figure : Figure
+        The picture.
+    suffix : {"png", "svg", "pdf"}
+        Kind of the file.
+
+    Returns
+    -------
+    bytes
+        What stands in it.
+    """
+    import matplotlib as mpl
+
+    undated: dict[str, Any] = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}
+    out = io.BytesIO()
+    with mpl.rc_context({"svg.hashsalt": "plant_fmu"}):
+        figure.savefig(out, format=suffix, dpi=120, metadata=undated.get(suffix))
+    return out.getvalue()

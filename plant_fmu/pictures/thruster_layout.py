@@ -1,0 +1,177 @@
+"""Where the thrusters push, seen from above, from starboard and from behind."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from plant_fmu.thruster_lines import ThrusterLine, thruster_lines
+from plant_fmu.vehicle import Vehicle
+
+Array = NDArray[np.float64]
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+
+@dataclass(frozen=True)
+class _View:
+    """One way to look at the body; body axes are told by their places in x, y, z."""
+
+    title: str
+    across: int  # to the right
+    upright: int
+    down: bool  # the upright axis points downwards
+    eye: tuple[float, float, float]  # from the body towards who looks
+
+
+@dataclass(frozen=True, eq=False)
+class _Push:
+    """Thrusters of one place and one direction in a view."""
+
+    place: Array  # (2,) m
+    arrow: Array  # (2,) m
+    towards: float  # 1 towards who looks, -1 away, 0 across
+    numbers: str
+
+    def along(self) -> Array:
+        """Return points of the arrow."""
+        return np.asarray(self.place + np.linspace(0.0, 1.0, 9)[:, None] * self.arrow)
+
+
+_VIEWS = (
+    _View("from above", 1, 0, False, (0.0, 0.0, -1.0)),
+    _View("from starboard", 0, 2, True, (0.0, 1.0, 0.0)),
+    _View("from behind", 1, 2, True, (-1.0, 0.0, 0.0)),
+)
+_AXES = ("x forward", "y to starboard", "z down")
+_PUSH, _HULL, _WEIGHT, _LIFT = "#0072b2", "#999999", "#d55e00", "#009e73"
+_FLAT = 0.2  # part of a unit force in the plane of a view, below which it is drawn as a dot or a cross
+_SAME = 1e-3  # of the vehicle's reach; what is nearer together is one place
+_ROOM, _ARROW, _BESIDE, _LETTER = 1.7, 0.42, 0.17, 0.06  # of that reach: half a view, an arrow, to a number, a letter
+_AROUND = 16  # places about an end of an arrow where its numbers may stand
+_NOTE = (
+    "An arrow is the force of a positive command; a dot comes towards you, a cross goes away. A vehicle's file has the "
+    "thrusters' wrenches alone:\neach stands at the point of its line of action that is nearest to the body origin."
+)
+
+
+def thrusters(vehicle: Vehicle) -> Figure:
+    """Return a picture of the thrusters' forces.
+
+    Parameters
+    ----------
+    vehicle : Vehicle
+        Any.
+
+    Returns
+    -------
+    Figure
+        Three views in metres, body frame.
+    """
+    from matplotlib.figure import Figure
+
+    lines = thruster_lines(vehicle)
+    reach = max([0.05, vehicle.hull_radius, *(float(np.abs(line.nearest).max()) for line in lines)])
+    figure = Figure(figsize=(12.0, 5.2), layout="constrained")
+    figure.suptitle(f"{vehicle.title}: {vehicle.n_thrusters} thrusters", fontsize=12, x=0.02, ha="left")
+    for ax, view in zip(figure.subplots(1, len(_VIEWS)), _VIEWS, strict=True):
+        _draw_view(ax, view, vehicle, lines, reach)
+    handles, labels = figure.axes[0].get_legend_handles_labels()
+    figure.legend(handles, labels, fontsize=8, frameon=False, ncols=2, loc="outside upper right")
+    turning = [str(i + 1) for i, line in enumerate(lines) if not line.force.any()]
+    only = f"\nThrusters that only turn the body are left out: {', '.join(turning)}." if turning else ""
+    figure.supxlabel(_NOTE + only, fontsize=8, color="#555555")
+    return figure
+
+
+def _draw_view(ax: Axes, view: _View, vehicle: Vehicle, lines: list[ThrusterLine], reach: float) -> None:
+    from matplotlib.patches import Circle
+
+    plane = [view.across, view.upright]
+    if vehicle.hull_radius > 0.0:
+        ax.add_patch(Circle((0.0, 0.0), vehicle.hull_radius, fill=False, edgecolor=_HULL, linestyle=":"))
+    for point, colour, marker, label in (
+        (vehicle.r_G, _WEIGHT, "v", "centre of gravity"),
+        (vehicle.r_B, _LIFT, "^", "centre of buoyancy"),
+    ):
+        ax.plot(*point[plane], marker, color=colour, markersize=5, fillstyle="none", label=label)
+    pushes = [
+        _Push(np.array(place), np.array(way[:2]) * _ARROW * reach, way[2], ", ".join(str(i + 1) for i in numbers))
+        for place, members in _places(lines, plane, reach).items()
+        for way, numbers in _ways(lines, members, view).items()
+    ]
+    for push in pushes:
+        _draw_push(ax, push)
+    taken = np.vstack([np.zeros((0, 2)), *(push.along() for push in pushes)])
+    for push in pushes:
+        width = _LETTER * reach * np.array([len(push.numbers) / 2.0, 0.0])
+        at = _free_place(push, width, taken, _BESIDE * reach)
+        ax.text(
+            float(at[0]),
+            float(at[1]),
+            push.numbers,
+            color=_PUSH,
+            ha="center",
+            va="center",
+            fontsize=10,
+            fontweight="bold",
+        )
+        taken = np.vstack([taken, at, at - width, at + width])
+    limit = _ROOM * reach
+    ax.set(xlim=(-limit, limit), ylim=(limit, -limit) if view.down else (-limit, limit), aspect="equal")
+    ax.set_title(view.title, fontsize=10)
+    ax.set_xlabel(f"{_AXES[view.across]} [m]", fontsize=9)
+    ax.set_ylabel(f"{_AXES[view.upright]} [m]", fontsize=9)
+    ax.tick_params(labelsize=8)
+    ax.grid(color="#e4e4e4", linewidth=0.6)
+    ax.set_axisbelow(True)
+
+
+def _places(lines: list[ThrusterLine], plane: list[int], reach: float) -> dict[tuple[float, float], list[int]]:
+    """Return which thrusters stand at each place of a view, those one behind the other together."""
+    places: dict[tuple[float, float], list[int]] = {}
+    for i, line in enumerate(lines):
+        if not line.force.any():
+            continue
+        x, y = (float(part) for part in line.nearest[plane])
+        near = (place for place in places if abs(place[0] - x) + abs(place[1] - y) < _SAME * reach)
+        places.setdefault(next(near, (x, y)), []).append(i)
+    return places
+
+
+def _ways(lines: list[ThrusterLine], members: list[int], view: _View) -> dict[tuple[float, float, float], list[int]]:
+    """Return which of some thrusters push which way: in the plane of a view, or towards who looks (1) or away (-1)."""
+    ways: dict[tuple[float, float, float], list[int]] = {}
+    for i in members:
+        force = lines[i].force / np.linalg.norm(lines[i].force)
+        x, y = (round(float(part), 3) for part in force[[view.across, view.upright]])
+        way = (x, y, 0.0) if np.hypot(x, y) >= _FLAT else (0.0, 0.0, float(np.sign(force @ np.array(view.eye))))
+        ways.setdefault(way, []).append(i)
+    return ways
+
+
+def _draw_push(ax: Axes, push: _Push) -> None:
+    place = (float(push.place[0]), float(push.place[1]))
+    if push.towards:
+        ax.plot(*place, "o", color=_PUSH, markersize=13, fillstyle="none", markeredgewidth=1.5)
+        ax.plot(*place, "." if push.towards > 0.0 else "x", color=_PUSH, markersize=8)
+    else:
+        arrow = {"arrowstyle": "-|>", "color": _PUSH, "linewidth": 1.6, "shrinkA": 0.0, "shrinkB": 0.0}
+        end = push.place + push.arrow
+        ax.annotate("", xy=(float(end[0]), float(end[1])), xytext=place, arrowprops=arrow)
+        ax.plot(*place, "o", color=_PUSH, markersize=4)
+
+
+def _free_place(push: _Push, width: Array, taken: Array, beside: float) -> Array:
+    """Return the place for a push's numbers that is farthest from all that is drawn."""
+    angles = np.linspace(0.0, 2.0 * np.pi, _AROUND, endpoint=False)
+    around = beside * np.column_stack([np.cos(angles), np.sin(angles)])
+    candidates = np.vstack([push.place + around, push.place + push.arrow + around])
+    texts = np.stack([candidates - width, candidates, candidates + width], axis=1)
+    gaps = np.linalg.norm(texts[:, :, None] - taken, axis=3).min(axis=(1, 2))
+    return np.asarray(candidates[int(np.argmax(np.round(gaps, 9)))])

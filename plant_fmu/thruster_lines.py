@@ -1,0 +1,39 @@
+"""Where thrusters push, as far as their wrenches tell."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from plant_fmu.vehicle import Vehicle
+
+
+@dataclass(frozen=True, eq=False)
+class ThrusterLine:
+    """The line along which a thruster pushes; how far along it the thruster sits, no wrench tells."""
+
+    force: NDArray[np.float64]  # (3,) of one newton, body frame; 0 for a thruster that only turns the body
+    nearest: NDArray[np.float64]  # (3,) m, its point nearest to the body origin
+
+
+def thruster_lines(vehicle: Vehicle) -> list[ThrusterLine]:
+    """Return the line of action of each thruster.
+
+    Parameters
+    ----------
+    vehicle : Vehicle
+        Of any number of thrusters.
+
+    Returns
+    -------
+    list of ThrusterLine
+        In the order of the columns of the thruster matrix.
+    """
+    lines = []
+    for column in vehicle.thruster_matrix.T:
+        force, moment = column[:3].copy(), column[3:]
+        square = float(force @ force)
+        lines.append(ThrusterLine(force, np.cross(force, moment) / square if square > 0.0 else np.zeros(3)))
+    return lines

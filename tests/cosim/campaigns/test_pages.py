@@ -1,0 +1,250 @@
+"""The pages of campaigns, sweeps and comparisons: whole, self-contained, the same again, with the worst to be seen."""
+
+import json
+import re
+from html.parser import HTMLParser
+from xml.etree import ElementTree as ET
+
+import numpy as np
+import pytest
+
+from cosim.campaigns import compare, run_campaign, run_sweep
+from cosim.campaigns.campaign_page import write_campaign_page
+from cosim.campaigns.comparison_page import write_comparison_page
+from cosim.campaigns.figures import shares_up_to
+from cosim.campaigns.page import Page, number
+from cosim.campaigns.sweep_page import write_sweep_page
+from cosim.cli import main
+from cosim.errors import RunError
+from cosim.scene_run import Conditions
+from tests.cosim.campaigns.fake import design, fakes, paper
+from tests.cosim.campaigns.scenes import BRIEF, HARD, PLAIN, write
+from tests.cosim.campaigns.test_comparison import idle
+
+__all__ = ["fakes", "idle"]
+
+REFUSED = PLAIN[2] | {"seed": 7, "weight_minus_buoyancy": 1e6}
+
+
+class Checker(HTMLParser):
+    """Collects what a page asks for, and whether its tags close."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.open, self.asked, self.rows = [], [], []
+        self.feed(text)
+        assert self.open == []
+
+    def handle_starttag(self, tag, attributes):
+        if tag != "meta":
+            self.open.append(tag)
+        if tag == "tr":
+            self.rows.append([])
+        elif tag in ("td", "th"):
+            self.rows[-1].append("")
+        self.asked += [v for k, v in attributes if k in ("src", "href", "xlink:href") and not v.startswith("#")]
+
+    def handle_startendtag(self, tag, attributes):
+        pass
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+    def handle_data(self, data):
+        if self.open and {"td", "th"} & set(self.open):
+            self.rows[-1][-1] += data
+
+
+def check(page):
+    """Return a page that needs nothing but the files beside it."""
+    checker = Checker(page.read_text())
+    assert all((page.parent / link).exists() for link in checker.asked), checker.asked
+    for svg in (page.parent / "figures").glob("*.svg"):
+        ET.parse(svg)
+    return checker
+
+
+def without_wall(text):
+    return re.sub('<span class="wall">.*?</span>', "", text)
+
+
+def runs_of(replay):
+    data = re.search(r'<script type="application/json" id="runs">(.*?)</script>', replay.read_text(), re.S)
+    return json.loads(data.group(1))
+
+
+@pytest.fixture(scope="module")
+def flown(tmp_path_factory):
+    """Return the folder of a campaign of two kinds of scenes and a refused one, with its page and a replay."""
+    folder = tmp_path_factory.mktemp("flown")
+    run_campaign(write(folder / "s.jsonl", [*PLAIN[:4], *HARD[4:], REFUSED]), "printed", folder / "out", BRIEF)
+    write_campaign_page(folder / "out", 1)
+    return folder / "out"
+
+
+def test_the_page_of_a_campaign_is_whole_and_says_what_the_summary_says(flown):
+    checker = check(flown / "campaign.html")
+    s = json.loads((flown / "summary.json").read_text())
+    worst = s["worst"][0]
+    assert checker.asked == [f"worst/{worst['row']}/replay.html"]
+    rate = s["rates"]["violation"]
+    told = f"{100 * rate['share']:.1f}\N{NO-BREAK SPACE}% ({100 * rate['low']:.1f} to {100 * rate['high']:.1f})"
+    assert next(row for row in checker.rows if row[0] == "all")[-1] == told
+    assert {row[0] for row in checker.rows} >= {"plain", "drift, noise, failure"}
+    assert ["7", s["reasons"]["7"]] in checker.rows and "weight_minus_buoyancy" in s["reasons"]["7"]
+    assert [w["row"] for w in s["worst"]] == [
+        int(row[0]) for row in checker.rows if len(row) == 5 and "cosim" in row[4]
+    ]
+    names = {p.stem for p in (flown / "figures").iterdir()}
+    assert names == {"rates", "distributions", "depends", "clearances"}
+
+
+def test_a_replay_shows_the_flight_of_the_row(flown):
+    key = json.loads((flown / "summary.json").read_text())["worst"][0]["row"]
+    (run,) = runs_of(flown / "worst" / str(key) / "replay.html")
+    assert run["name"] == f"printed-scene-{key}" and run["duration"] == BRIEF.duration
+    assert run["status"] == "completed"
+
+
+def test_the_page_is_the_same_again_and_flies_no_replay_again(flown, monkeypatch):
+    before = (flown / "campaign.html").read_bytes()
+    monkeypatch.setattr("cosim.campaigns.replays.run_scenario", None)
+    write_campaign_page(flown, 1)
+    assert (flown / "campaign.html").read_bytes() == before
+    assert not [p.name for p in flown.rglob(".*") if p.name != ".lock"]
+
+
+@pytest.mark.slow
+def test_the_page_is_the_same_from_two_processes(tmp_path, monkeypatch):
+    pages = []
+    for name, workers in (("one", 1), ("two", 2)):
+        (tmp_path / name).mkdir()
+        monkeypatch.chdir(tmp_path / name)
+        write(tmp_path / name / "s.jsonl", [*PLAIN[:3], *HARD[3:]])
+        words = ["--law", "printed", "--out", "out", "--workers", str(workers), "--replays", "1"]
+        assert main(["campaign", "s.jsonl", *words]) == 0
+        pages.append(without_wall((tmp_path / name / "out" / "campaign.html").read_text()))
+    assert pages[0] == pages[1] and "replay" in pages[0]
+
+
+def test_ctrl_c_while_replays_are_flown_leaves_the_page_without_them(tmp_path, monkeypatch):
+    out = tmp_path / "out"
+    run_campaign(write(tmp_path / "s.jsonl", PLAIN[:2]), "printed", out, BRIEF)
+    with monkeypatch.context() as patch:
+        patch.setattr("cosim.run.Master.run", lambda *_, **__: (_ for _ in ()).throw(KeyboardInterrupt))
+        with pytest.raises(KeyboardInterrupt):
+            write_campaign_page(out, 2)
+    assert check(out / "campaign.html").asked == [] and list((out / "worst").iterdir()) == []
+    write_campaign_page(out, 2)
+    assert len(check(out / "campaign.html").asked) == 2
+
+
+def test_a_flight_that_comes_out_otherwise_is_said_beside_its_replay(tmp_path, monkeypatch):
+    from cosim.campaigns.repeat import Repeat
+
+    out = tmp_path / "out"
+    run_campaign(write(tmp_path / "s.jsonl", PLAIN[:1]), "printed", out, BRIEF)
+    monkeypatch.setattr(Repeat, "apart", lambda self, came: {"min_clearance": (0.5, came["min_clearance"])})
+    write_campaign_page(out, 1)
+    assert "it came out otherwise: min_clearance" in (out / "campaign.html").read_text()
+
+
+@pytest.mark.parametrize("scenes", [[REFUSED], PLAIN[:1]], ids=["none that could be flown", "one"])
+def test_few_scenes_have_a_page_too(tmp_path, scenes):
+    run_campaign(write(tmp_path / "s.jsonl", scenes), "printed", tmp_path / "out", BRIEF)
+    text = write_campaign_page(tmp_path / "out", 0).read_text()
+    check(tmp_path / "out" / "campaign.html")
+    assert ("None of the 1 scenes could be flown" in text) == (scenes[0] is REFUSED)
+    assert (tmp_path / "out" / "figures").exists() == (scenes[0] is not REFUSED)
+
+
+def test_a_flight_that_the_plant_stops_can_be_seen_until_then(tmp_path):
+    out = tmp_path / "out"
+    done = run_campaign(write(tmp_path / "s.jsonl", [PLAIN[0] | {"righting_moment": -5e4}]), "printed", out, BRIEF)
+    (row,) = done.results.table.to_pylist()
+    assert row["stopped_at"] > 0.0
+    write_campaign_page(out, 1)
+    cell = next(r for r in check(out / "campaign.html").rows if len(r) == 4 and r[0] == "20000")
+    assert cell[1] == f"stopped at {row['stopped_at']:.2f} s" and cell[2].startswith("replay; the plant stops: ")
+    (run,) = runs_of(out / "worst" / "20000" / "replay.html")
+    assert run["status"].startswith("failed")
+
+
+def test_what_is_no_complete_campaign_has_no_page(tmp_path, fakes):
+    with pytest.raises(RunError, match="is not complete"):
+        write_campaign_page(tmp_path, 0)
+    run_sweep(paper(), design(3), tmp_path / "out", "fake")
+    with pytest.raises(RunError, match="holds no campaign of scenes"):
+        write_campaign_page(tmp_path / "out", 0)
+    (tmp_path / "out" / "summary.json").write_text("[")
+    with pytest.raises(RunError, match=r"summary\.json: cannot be read"):
+        write_sweep_page(tmp_path / "out", 0)
+
+
+def test_the_page_of_a_sweep(tmp_path, fakes):
+    run_sweep(paper(), design(40), tmp_path / "out", "choosy")
+    checker = check(write_sweep_page(tmp_path / "out", 0))
+    assert ["law.gains.k_p1", "10 to 30"] in checker.rows and [
+        "regions.SR1.gain",
+        "500 to 5000, logarithmic",
+    ] in checker.rows
+    assert any("+1.00" in row for row in checker.rows if row[0] == "reach_time")
+    assert sum("expected less" in row[-1] for row in checker.rows) == 5
+    names = {p.stem for p in (tmp_path / "out" / "figures").iterdir()}
+    assert names == {"rates", "distributions", "depends", "by-min-clearance", "by-reach-time"}
+    run_sweep(paper(), design(3, vary=["initial.position.1=1.6:2"]), tmp_path / "none", "choosy")
+    assert "None of the 3 rows could be flown" in write_sweep_page(tmp_path / "none", 1).read_text()
+
+
+def test_the_page_of_a_comparison_has_all_laws_in_each_replay(tmp_path, idle):
+    out = tmp_path / "out"
+    compare(write(tmp_path / "s.jsonl", [*HARD[:2], REFUSED]), ["printed", "idle"], out, BRIEF)
+    checker = check(write_comparison_page(out, 1))
+    assert checker.asked and "p:" in (out / "compare.html").read_text()
+    runs = runs_of(out / checker.asked[0])
+    assert [run["name"] for run in runs] == ["printed", "idle"]
+    assert {p.stem for p in (out / "figures").iterdir()} == {"rates", "distributions", "scenes-printed-idle"}
+    compare(tmp_path / "s.jsonl", ["printed", "idle"], out, BRIEF)  # a folder with a page is no stranger
+    with pytest.raises(RunError, match=r"compare\.json: cannot be read"):
+        write_comparison_page(tmp_path, 1)
+
+
+def test_how_many_replays_is_a_number(capsys):
+    for text in ("-1", "all", "1e9"):
+        with pytest.raises(SystemExit):
+            main(["campaign", "s.jsonl", "--law", "printed", "--out", "o", "--replays", text])
+        assert "from 0 to 1000" in capsys.readouterr().err
+
+
+def test_text_of_a_page_is_escaped():
+    page = Page("<a>")
+    page.paragraph("1 < 2 & 3")
+    page.table(["<th>"], [["<b>"]])
+    text = page.html()
+    assert "&lt;a&gt;" in text and "1 &lt; 2 &amp; 3" in text and "&lt;b&gt;" in text and "<b>" not in text
+
+
+@pytest.mark.parametrize(
+    ("x", "text"), [(None, "–"), (-0.12345, "−0.1235"), (34064.2, "34064"), (12.0, "12"), (1.5e12, "1.5e+12")]
+)
+def test_numbers_of_tables(x, text):
+    assert number(x) == text
+
+
+def test_shares_count_what_never_comes():
+    values, shares = shares_up_to(np.array([3.0, np.nan, 1.0, np.nan]))
+    assert values.tolist() == [1.0, 3.0] and shares.tolist() == [0.25, 0.5]
+    assert [a.size for a in shares_up_to(np.zeros(0))] == [0, 0]
+
+
+def test_a_scene_of_a_campaign_becomes_a_run(tmp_path, capsys):
+    conditions = Conditions(duration=3.0, settled=1.0)
+    inside = HARD[0] | {"goal": {"centre": HARD[0]["start"], "radius": 40.0}}
+    out = tmp_path / "out"
+    run_campaign(write(tmp_path / "s.jsonl", [inside]), "printed", out, conditions)
+    assert main(["rerun", str(out), "20000", "--out", str(tmp_path / "run")]) == 0
+    said = capsys.readouterr()
+    assert said.out.startswith("row 20000: flown again, identical to the last bit\n") and said.err == ""
+    assert {"record.parquet", "report.html", "replay.html", "scenario.toml"} <= {
+        p.name for p in (tmp_path / "run").iterdir()
+    }

@@ -1,0 +1,42 @@
+"""Runs of little cost: real ones for a second, and one that was killed and has gaps."""
+
+import shutil
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+
+GAP = slice(40, 60)  # rows without a pose
+
+
+@pytest.fixture(scope="session")
+def run(shipped_run):
+    """The folder of a run of a vehicle with walls, a heading to keep and noise."""
+    return shipped_run("docking", "time.duration=1", "arbiter.engine=closed").folder
+
+
+@pytest.fixture(scope="session")
+def moving_run(shipped_run):
+    """The folder of a run whose regions move."""
+    return shipped_run("moving-obstacle", "time.duration=1", "arbiter.engine=closed").folder
+
+
+@pytest.fixture(scope="session")
+def killed(run, tmp_path_factory):
+    """The folder of a run that was killed; some of its rows have no pose, one number is below zero by no amount."""
+    folder = tmp_path_factory.mktemp("killed") / "killed"
+    (folder / "record.parts").mkdir(parents=True)
+    shutil.copy(run / "scenario.toml", folder)
+    table = pq.read_table(run / "record.parquet")
+    for name in table.schema.names:
+        if name.startswith(("position", "quaternion")):
+            values = table[name].to_numpy().copy()
+            values[GAP] = np.nan
+            at = table.schema.get_field_index(name)
+            table = table.set_column(at, table.schema.field(at), pa.array(values))
+    at = table.schema.get_field_index("bottom_contact")
+    table = table.set_column(at, table.schema.field(at), pa.array(np.full(len(table), -0.0)))
+    pq.write_table(table.slice(0, 70), folder / "record.parts" / "000000.parquet")
+    pq.write_table(table.slice(70), folder / "record.parts" / "000001.parquet")
+    return folder

@@ -1,0 +1,149 @@
+"""What of a run is exported, into which files, and what is refused."""
+
+import builtins
+import importlib
+
+import numpy as np
+import pytest
+
+from cosim.cli import main
+from cosim.errors import ExportError, RunError
+from cosim.export import FORMATS, export_run
+from cosim.export.excerpt import excerpt_of
+from cosim.record import load_record
+
+
+def test_every_step_and_signal_is_taken_unless_told_otherwise(run):
+    excerpt, record = excerpt_of(run), load_record(run)
+    assert excerpt.columns == record.columns
+    assert np.array_equal(np.concatenate([*excerpt.blocks()]), record.stack([*record.units]), equal_nan=True)
+
+
+@pytest.mark.parametrize("every", [1, 7, 101, 1000])
+def test_one_step_of_so_many_is_that(run, every):
+    record = load_record(run)
+    excerpt = excerpt_of(run, every=every)
+    assert np.array_equal(np.concatenate([*excerpt.blocks()])[:, 0], record["time"][::every])
+    assert np.array_equal(excerpt.signal("velocity.u"), record["velocity.u"][::every])
+
+
+@pytest.mark.parametrize(("rate", "rows"), [(10.0, 11), (30.0, 31), (100.0, 101), (1e6, 101)])
+def test_a_rate_gives_so_many_steps_a_second_and_never_more_than_there_are(run, rate, rows):
+    time = excerpt_of(run, rate=rate).signal("time")
+    assert len(time) == rows
+    assert time[0] == 0.0
+    assert np.abs(np.diff(time) - 1.0 / min(rate, 100.0)).max() < 0.0101
+
+
+def test_patterns_pick_signals_and_the_time_is_always_there(run):
+    names = [column.name for column in excerpt_of(run, ["*.clearance", "thrust[[]1]", "thrust[2]"]).columns]
+    assert names[0] == "time"
+    assert {"goal.clearance", "thrust[1]", "thrust[2]"} < set(names)
+    assert all(name == "time" or name.endswith(".clearance") or name.startswith("thrust[") for name in names)
+
+
+def test_a_pattern_that_fits_nothing_is_named_with_names_near_it(run):
+    with pytest.raises(ExportError, match=r"--signals postion\.x: fits no signal .* position\.x"):
+        excerpt_of(run, ["postion.x"])
+
+
+def test_the_command_names_the_file_after_the_run(run, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main(["export", str(run), "--to", "csv", "--every", "10", "--signals", "position.*"]) == 0
+    assert capsys.readouterr().out.split() == ["docking.csv", "docking.units.csv"]
+    assert (tmp_path / "docking.csv").read_text().splitlines()[0] == "time,position.x,position.y,position.z"
+    assert len((tmp_path / "docking.csv").read_text().splitlines()) == 12
+
+
+@pytest.mark.parametrize("there", ["out.csv", "out.units.csv"])
+def test_a_file_is_replaced_only_by_force(run, tmp_path, there, capsys):
+    (tmp_path / there).write_text("mine")
+    out = str(tmp_path / "out.csv")
+    assert main(["export", str(run), "--to", "csv", "--out", out]) == 2
+    assert f"{there}: exists; expected a new file, or --force to replace it" in capsys.readouterr().err
+    assert (tmp_path / there).read_text() == "mine"
+    assert [path.name for path in tmp_path.iterdir()] == [there]
+    assert main(["export", str(run), "--to", "csv", "--out", out, "--force"]) == 0
+    assert (tmp_path / there).read_text() != "mine"
+
+
+def test_a_folder_is_never_replaced(run, tmp_path):
+    with pytest.raises(ExportError, match="exists"):
+        export_run(run, "npz", tmp_path, force=True)
+
+
+def test_a_writer_that_fails_leaves_what_was_there(run, tmp_path, monkeypatch):
+    from cosim.export import as_csv
+
+    out = tmp_path / "out.csv"
+    out.write_text("mine")
+
+    def full(excerpt, path):
+        path.write_text("half")
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(as_csv, "write", full)
+    with pytest.raises(RunError, match="No space left"):
+        export_run(run, "csv", out, force=True)
+    assert out.read_text() == "mine"
+    assert [path.name for path in tmp_path.iterdir()] == ["out.csv"]
+
+
+def test_an_unknown_format_is_refused_with_those_that_there_are(run, capsys):
+    assert main(["export", str(run), "--to", "xlsx"]) == 2
+    assert capsys.readouterr().err == f"cosim: --to xlsx: expected one of {', '.join(FORMATS)}\n"
+
+
+@pytest.mark.parametrize(("to", "lacking", "extra"), [("mcap", "mcap", "mcap"), ("rrd", "rerun", "rerun")])
+def test_what_is_not_installed_is_named(run, tmp_path, monkeypatch, to, lacking, extra):
+    plain = builtins.__import__
+
+    def without(name, *rest, **keywords):
+        if name.partition(".")[0] == lacking:
+            raise ModuleNotFoundError(f"No module named {name!r}", name=name)
+        return plain(name, *rest, **keywords)
+
+    monkeypatch.delitem(importlib.sys.modules, f"cosim.export.as_{to}", raising=False)
+    monkeypatch.setattr(builtins, "__import__", without)
+    with pytest.raises(ExportError, match=rf"pip install 'subreach\[{extra}\]'"):
+        export_run(run, to, tmp_path / "out")
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("choice", [{"signals": ["time"]}, {"every": 2}, {"rate": 5.0}])
+def test_a_tlog_takes_no_choice_of_signals_or_steps(run, tmp_path, choice):
+    with pytest.raises(ExportError, match="expected no --signals, --every or --rate"):
+        export_run(run, "tlog", tmp_path / "out.tlog", **choice)
+
+
+@pytest.mark.parametrize("flags", [["--every", "0"], ["--rate", "nan"], ["--every", "2", "--rate", "5"]])
+def test_numbers_that_cannot_be_are_refused(run, flags, capsys):
+    with pytest.raises(SystemExit):
+        main(["export", str(run), "--to", "csv", *flags])
+    assert "argument --" in capsys.readouterr().err
+
+
+def test_a_folder_without_a_run_is_refused(tmp_path, capsys):
+    assert main(["export", str(tmp_path), "--to", "csv"]) == 2
+    assert "holds no run" in capsys.readouterr().err
+
+
+def test_a_tlog_is_the_vehicle_as_pymavlink_sees_it(run, tmp_path):
+    mavutil = pytest.importorskip("pymavlink.mavutil")
+    (path,) = export_run(run, "tlog", tmp_path / "out.tlog")
+    record, log = load_record(run), mavutil.mavlink_connection(str(path))
+    depths = {}
+    while (message := log.recv_match(type="LOCAL_POSITION_NED")) is not None:
+        depths[message.time_boot_ms] = message.z
+    assert len(depths) > 5
+    for milliseconds, depth in depths.items():
+        row = int(np.argmin(np.abs(record["time"] - milliseconds / 1e3)))
+        assert depth == pytest.approx(record["position.z"][row], abs=1e-5)
+
+
+def test_blocks_of_a_long_record_stay_small(run, monkeypatch):
+    """A record is read in its blocks: no more rows are in memory than one of them has."""
+    monkeypatch.setattr("cosim.record._BLOCK", 13)
+    sizes = [len(block) for block in excerpt_of(run, every=2).blocks()]
+    assert sum(sizes) == 51
+    assert max(sizes) <= 7

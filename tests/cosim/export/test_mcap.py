@@ -1,0 +1,262 @@
+"""MCAP, read back by its own library: signals to the last bit, and a scene that stands upright."""
+
+import re
+
+import msgspec
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from cosim.export import export_run
+from cosim.export.names import legal
+from cosim.helm.orders import Aim, Change, Obstacle
+from cosim.record import load_record
+from cosim.replay.folder import load_run
+from cosim.run import run_scenario
+from cosim.scenario import load_scenario
+
+mcap_reader = pytest.importorskip("mcap.reader")
+decoder = pytest.importorskip("mcap_protobuf.decoder")
+
+WELL_KNOWN = {
+    "/tf": "foxglove.FrameTransforms",
+    "/tf_static": "foxglove.FrameTransforms",
+    "/vehicle/pose": "foxglove.PoseInFrame",
+    "/vehicle/model": "foxglove.SceneUpdate",
+    "/scene": "foxglove.SceneUpdate",
+    "/log": "foxglove.Log",
+}
+
+
+class Read:
+    """All of a file."""
+
+    def __init__(self, path):
+        self.messages = {}
+        with path.open("rb") as file:
+            reader = mcap_reader.make_reader(file, decoder_factories=[decoder.DecoderFactory()])
+            self.summary = reader.get_summary()
+            self.attached = {a.name: a.data.decode() for a in reader.iter_attachments()}
+            for schema, channel, message, decoded in reader.iter_decoded_messages():
+                assert (schema.encoding, channel.message_encoding) == ("protobuf", "protobuf")
+                self.messages.setdefault(channel.topic, []).append((message.log_time, decoded))
+
+    def signal(self, group, field):
+        return np.array([getattr(decoded, field) for _, decoded in self.messages[f"/signals/{group}"]])
+
+
+@pytest.fixture(scope="module")
+def read(run, tmp_path_factory):
+    (path,) = export_run(run, "mcap", tmp_path_factory.mktemp("mcap") / "out.mcap")
+    return Read(path)
+
+
+@pytest.fixture(scope="module")
+def read_killed(killed, tmp_path_factory):
+    (path,) = export_run(killed, "mcap", tmp_path_factory.mktemp("mcap") / "out.mcap")
+    return Read(path)
+
+
+def said(read):
+    """Return where each signal of the record is, as the channels say: group and field by name."""
+    return {
+        re.match(r"(.+?) \[[^]]*]: ", text)[1]: (channel.topic.removeprefix("/signals/"), field)
+        for channel in read.summary.channels.values()
+        if channel.topic.startswith("/signals/")
+        for field, text in channel.metadata.items()
+    }
+
+
+@pytest.mark.parametrize("which", ["run", "killed"])
+def test_every_signal_is_there_to_the_last_bit(which, request):
+    read = request.getfixturevalue("read" if which == "run" else "read_killed")
+    record, where = load_record(request.getfixturevalue(which)), said(read)
+    assert where.keys() == record.units.keys()
+    for name, (group, field) in where.items():
+        got, expected = read.signal(group, field), record[name]
+        known = ~np.isnan(expected)
+        assert np.array_equal(np.isnan(got), ~known), name
+        assert np.array_equal(got[known].view(np.uint64), expected[known].view(np.uint64)), name
+
+
+def test_units_stand_in_the_channels(read, run):
+    (position,) = (c for c in read.summary.channels.values() if c.topic == "/signals/position")
+    assert position.metadata["x"].startswith("position.x [m]: ")
+
+
+def test_times_are_simulated_nanoseconds_in_order(read, run):
+    time = load_record(run)["time"]
+    logged = [at for at, _ in read.messages["/signals/position"]]
+    assert logged == [round(t * 1e9) for t in time]
+    assert read.summary.statistics.message_start_time == 0
+    assert [at for at, _ in read.messages["/tf"]] == logged
+
+
+def test_signals_have_no_field_that_plotjuggler_takes_for_a_time_stamp(read):
+    """It reads a field of this name as a number of its own clock, whatever it is."""
+    for channel in read.summary.channels.values():
+        if channel.topic.startswith("/signals/"):
+            assert "timestamp" not in channel.metadata
+
+
+def test_the_scene_is_in_messages_that_foxglove_knows(read):
+    schemas = read.summary.schemas
+    topics = {c.topic: schemas[c.schema_id].name for c in read.summary.channels.values()}
+    assert {topic: name for topic, name in topics.items() if not topic.startswith("/signals/")} == WELL_KNOWN
+    assert read.messages.keys() == topics.keys()
+
+
+def turn(message):
+    return Rotation.from_quat([message.x, message.y, message.z, message.w])
+
+
+def vector(message):
+    return np.array([message.x, message.y, message.z])
+
+
+def test_the_world_is_shown_with_down_downwards_and_north_ahead(read):
+    ((at, static),) = read.messages["/tf_static"]
+    (upright,) = static.transforms
+    assert (at, upright.parent_frame_id, upright.child_frame_id) == (0, "map", "ned")
+    north, east, down = np.eye(3)
+    assert turn(upright.rotation).apply([north, east, down]) == pytest.approx(
+        np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
+    )
+
+
+def test_frames_lead_from_the_world_to_the_vehicle(read, run):
+    record = load_record(run)
+    for k in (0, 50, 100):
+        _, message = read.messages["/tf"][k]
+        place, body = message.transforms
+        assert (place.parent_frame_id, place.child_frame_id) == ("ned", "place")
+        assert (body.parent_frame_id, body.child_frame_id) == ("place", "body")
+        assert vector(place.translation).tolist() == [record[f"position.{axis}"][k] for axis in "xyz"]
+        e = [record[f"quaternion.e{i}"][k] for i in range(4)]
+        assert [body.rotation.w, *vector(body.rotation)] == e
+        _, pose = read.messages["/vehicle/pose"][k]
+        assert pose.frame_id == "ned"
+        assert vector(pose.pose.position).tolist() == vector(place.translation).tolist()
+
+
+def test_the_vehicle_stays_where_it_was_while_its_pose_is_unknown(read_killed, killed):
+    record = load_record(killed)
+    unknown = {round(t * 1e9) for t in record["time"][np.isnan(record["position.x"])]}
+    assert len(unknown) == 20
+    assert not unknown & {at for at, _ in read_killed.messages["/tf"]}
+    assert len(read_killed.messages["/tf"]) == len(record["time"]) - 20
+
+
+def test_every_message_of_the_scene_has_all_regions_and_one_is_active(read, run):
+    flown = load_run(run)
+    names = ["goal", *(secondary.region.name for secondary in flown.scenario.regions)]
+    assert len(read.messages["/scene"]) >= 1
+    for _, message in read.messages["/scene"]:
+        assert [entity.id for entity in message.entities] == names
+        active = [entity for entity in message.entities if entity.metadata[0].value == "true"]
+        assert len(active) == 1
+        assert active[0].texts[0].text.endswith("(active)")
+
+
+def test_the_active_region_is_the_one_that_the_log_names(read):
+    first = next(decoded for _, decoded in read.messages["/log"] if decoded.name == "active")
+    _, scene = read.messages["/scene"][0]
+    (active,) = (entity.id for entity in scene.entities if entity.metadata[0].value == "true")
+    assert active in first.message
+
+
+def test_shapes_are_what_foxglove_draws_as_such(read):
+    _, scene = read.messages["/scene"][0]
+    drawn = {entity.id: entity for entity in scene.entities}
+    assert vector(drawn["goal"].spheres[0].size).tolist() == [0.6, 0.6, 0.6]
+    assert vector(drawn["port wall"].cubes[0].size) == pytest.approx([2.7, 0.7, 2.4])
+    assert vector(drawn["port wall"].cubes[0].pose.position) == pytest.approx([7.05, -0.85, 4.0])
+    heading = drawn["heading"]
+    assert heading.frame_id == "place"
+    assert len(heading.triangles[0].indices) % 3 == 0
+    assert max(heading.triangles[0].indices) < len(heading.triangles[0].points)
+
+
+def test_regions_that_move_have_frames_of_their_own(moving_run, tmp_path):
+    (path,) = export_run(moving_run, "mcap", tmp_path / "out.mcap")
+    read, record = Read(path), load_record(moving_run)
+    _, message = read.messages["/tf"][-1]
+    moved = {t.child_frame_id: vector(t.translation) for t in message.transforms}
+    shift = [record[f"crossing buoy.shift.{axis}"][-1] for axis in "xyz"]
+    assert np.linalg.norm(shift) > 0.0
+    assert moved["region crossing buoy"].tolist() == shift
+    _, scene = read.messages["/scene"][0]
+    assert {e.id: e.frame_id for e in scene.entities}["crossing buoy"] == "region crossing buoy"
+
+
+def test_what_an_order_changes_is_drawn_from_then_on(run, tmp_path, monkeypatch):
+    change = {"time": 0.5, "region": 0, "shape": {"kind": "sphere", "centre": (7.0, 0.0, 4.0), "radius": 0.9}}
+    monkeypatch.setattr("cosim.export.scene.changes_of", lambda *_: [change])
+    (path,) = export_run(run, "mcap", tmp_path / "out.mcap")
+    sizes = {at: m.entities[0].spheres[0].size.x for at, m in Read(path).messages["/scene"]}
+    assert {size for at, size in sizes.items() if at < 500_000_000} == {0.6}
+    assert sizes[500_000_000] == 1.8
+
+
+def test_scenario_and_summary_are_attached(read, run):
+    assert read.attached["scenario.toml"] == (run / "scenario.toml").read_text()
+    assert '"status": "completed"' in read.attached["summary.json"]
+
+
+def test_chosen_signals_leave_the_scene_whole(run, tmp_path):
+    (path,) = export_run(run, "mcap", tmp_path / "out.mcap", signals=["*.clearance"], every=10)
+    read = Read(path)
+    assert [t for t in read.messages if t.startswith("/signals/")] == ["/signals/step", "/signals/clearance"]
+    assert (
+        read.signal("clearance", legal(["port wall"])[0]).tolist()
+        == load_record(run)["port wall.clearance"][::10].tolist()
+    )
+    assert WELL_KNOWN.keys() <= read.messages.keys()
+    assert read.messages["/log"][-1][1].message == "End of the run"
+
+
+@pytest.fixture(scope="module")
+def steered(tmp_path_factory):
+    """The folder of a run to which an obstacle comes, and grows, and whose target becomes another."""
+    orders = {
+        20: Obstacle(7, (5.0, 0.0, 2.0), 0.4),
+        40: Aim((4.0, -1.0, 2.0), 0.6),
+        60: Obstacle(7, (5.0, 0.3, 2.0), 0.8),
+        70: Change("regions.ship.shape.semi_axes.0", 3.5),
+    }
+    folder = tmp_path_factory.mktemp("steered")
+    log = folder / "log.jsonl"
+    log.write_bytes(b"".join(msgspec.json.encode({"step": k, "order": o}) + b"\n" for k, o in orders.items()))
+    scenario = load_scenario("harbour", ["commands.enabled=true", "time.duration=1"])
+    return run_scenario(scenario, folder / "run", report=False, orders=log).folder
+
+
+def test_spheres_as_they_are_drawn_give_the_recorded_clearances(steered, tmp_path):
+    """Through orders that bring them, move them and change their size."""
+    (path,) = export_run(steered, "mcap", tmp_path / "out.mcap")
+    read, record = Read(path), load_record(steered)
+    scenes, sizes = dict(read.messages["/scene"]), set()
+    scene = scenes[0]
+    for k, (at, frames) in enumerate(read.messages["/tf"]):
+        scene = scenes.get(at, scene)
+        shifts = {t.child_frame_id: vector(t.translation) for t in frames.transforms}
+        for entity in scene.entities:
+            for ball in entity.spheres:
+                if set(vector(ball.size)) == {ball.size.x}:
+                    centre = vector(ball.pose.position) + shifts.get(entity.frame_id, 0.0)
+                    gap = np.linalg.norm(shifts["place"] - centre) - ball.size.x / 2.0
+                    sign = -1.0 if entity.id == "goal" else 1.0
+                    clearance = record[f"{entity.id}.clearance"][k]
+                    # while an obstacle waits, it is a hundred kilometres up
+                    assert sign * gap == pytest.approx(clearance, abs=1e-6 if clearance < 1e3 else 10.0)
+                    sizes.add((entity.id, round(ball.size.x, 6)))
+    assert {size for name, size in sizes if name != "goal"} >= {0.8, 1.6}
+    assert ("goal", 1.2) in sizes
+
+
+def test_an_obstacle_that_waits_far_away_does_not_widen_the_scene(steered, tmp_path):
+    (path,) = export_run(steered, "mcap", tmp_path / "out.mcap")
+    _, scene = Read(path).messages["/scene"][0]
+    planes = [vector(p) for e in scene.entities for drawn in e.triangles for p in drawn.points]
+    assert planes
+    assert np.abs(planes).max() < 200.0

@@ -1,0 +1,133 @@
+"""Surfaces as triangles: on the shape, closed, facing outward, of nearly the shape's volume."""
+
+import math
+from collections import Counter
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from controller.regions import (
+    Box,
+    Cone,
+    Cylinder,
+    DepthBand,
+    Ellipsoid,
+    HalfSpace,
+    Orientation,
+    Pipe,
+    Prism,
+    Region,
+    Sphere,
+    clearances_at,
+)
+from cosim.export.surfaces import sector, surface_of
+
+LIMITS = ((-4.0, -3.0, 0.0), (4.0, 5.0, 6.0))
+TURNED = (0.9, 0.1, -0.3, 0.2)
+BENT = ((0.0, 0.0, 1.0), (2.0, 0.0, 1.0), (2.0, 2.0, 1.0), (2.5, 3.0, 3.0))
+STAR = ((0.0, 0.0), (2.0, 0.5), (3.0, 2.0), (1.5, 1.0), (1.0, 3.0), (0.8, 1.0))
+
+
+def area(corners):
+    x, y = np.array(corners).T
+    return abs(float(x @ np.roll(y, -1) - y @ np.roll(x, -1))) / 2.0
+
+
+FAN = math.tau / 3.0 * (1.0 - math.cos(0.6))
+# each with its volume, where a formula has it
+SOLIDS = {
+    "sphere": (Sphere((2.0, 0.0, 1.8), 0.5), math.pi / 6.0),
+    "ellipsoid": (Ellipsoid((1.0, 2.0, 3.0), (0.5, 1.0, 2.0), TURNED), 4.0 / 3.0 * math.pi),
+    "box": (Box((1.0, 2.0, 3.0), (0.5, 1.0, 2.0), TURNED), 1.0),
+    "cylinder": (Cylinder((0.0, 0.0, 1.0), (1.0, 2.0, 3.0), 0.4), math.pi * 0.4**2 * 3.0),
+    "prism": (Prism(STAR, 1.0, 3.0), 2.0 * area(STAR)),
+    "prism the other way around": (Prism(STAR[::-1], 1.0, 3.0), 2.0 * area(STAR)),
+    "cone": (Cone((0.0, 0.0, 2.0), (1.0, 0.0, -0.2), 0.6, 2.0), FAN * 2.0**3),
+    "half a ball": (Cone((0.0, 0.0, 2.0), (0.0, 1.0, 0.0), math.pi / 2.0, 2.0), math.tau / 3.0 * 2.0**3),
+    "straight pipe": (Pipe(((0.0, 0.0, 1.0), (3.0, 0.0, 1.0)), 0.5), math.pi * 0.5**2 * 3.0 + math.pi / 6.0),
+    "bent pipe": (Pipe(BENT, 0.3), None),
+}
+
+
+def signed_volume(mesh):
+    a, b, c = (mesh.vertices[mesh.triangles[:, k]] for k in range(3))
+    return float(np.einsum("ij,ij->", a, np.cross(b, c)) / 6.0)
+
+
+def distances(shape, mesh):
+    return np.abs(clearances_at(mesh.vertices, Region("shape", shape, "in")))
+
+
+@pytest.mark.parametrize("name", SOLIDS)
+def test_every_corner_is_on_the_surface(name):
+    shape, _ = SOLIDS[name]
+    assert distances(shape, surface_of(shape, LIMITS)).max() < 1e-9
+
+
+@pytest.mark.parametrize("name", SOLIDS)
+def test_solids_are_closed_and_face_outward(name):
+    mesh = surface_of(SOLIDS[name][0], LIMITS)
+    ways = Counter((a, b) for t in mesh.triangles.tolist() for a, b in zip(t, [*t[1:], t[0]], strict=True))
+    assert set(ways.values()) == {1}  # each edge once in each direction
+    assert all((b, a) in ways for a, b in ways)
+    assert signed_volume(mesh) > 0.0
+
+
+@pytest.mark.parametrize("name", [name for name, (_, volume) in SOLIDS.items() if volume])
+def test_solids_have_nearly_the_volume_of_the_formula(name):
+    shape, volume = SOLIDS[name]
+    flat = isinstance(shape, Box | Prism)
+    assert signed_volume(surface_of(shape, LIMITS)) == pytest.approx(volume, rel=1e-12 if flat else 0.05)
+
+
+def test_a_bent_pipe_has_nearly_the_volume_that_random_points_say():
+    pipe = SOLIDS["bent pipe"][0]
+    low, high = np.array(pipe.bounds())
+    points = np.random.default_rng(1).uniform(low, high, (40_000, 3))
+    inside = (clearances_at(points, Region("pipe", pipe, "in")) > 0.0).mean() * np.prod(high - low)
+    assert signed_volume(surface_of(pipe, LIMITS)) == pytest.approx(inside, rel=0.06)
+
+
+@pytest.mark.parametrize(
+    "shape", [DepthBand(2.5, 1.0), HalfSpace((0.0, 1.0, 2.0), (1.0, 1.0, 0.2))], ids=lambda s: type(s).__name__
+)
+def test_planes_are_patches_as_large_as_what_is_seen(shape):
+    mesh = surface_of(shape, LIMITS)
+    assert distances(shape, mesh).max() < 1e-9
+    a, b, c = (mesh.vertices[mesh.triangles[:, k]] for k in range(3))
+    normals = np.cross(b - a, c - a)
+    assert np.linalg.norm(normals, axis=1).min() >= (np.ptp(LIMITS, axis=0) ** 2).sum() * 0.99
+    outside = (a + b + c) / 3.0 + 1e-3 * normals / np.linalg.norm(normals, axis=1, keepdims=True)
+    assert (clearances_at(outside, Region("shape", shape, "in")) < 0.0).all()
+
+
+coordinate = st.floats(-3.0, 3.0)
+
+
+@given(st.lists(st.tuples(coordinate, coordinate, coordinate), min_size=2, max_size=5), st.floats(0.05, 1.0))
+def test_pipes_of_any_bends_have_their_corners_on_the_surface(points, radius):
+    points = tuple(tuple(round(x, 2) for x in point) for point in points)
+    if any(math.dist(a, b) < 0.1 for a, b in zip(points, points[1:], strict=False)):
+        return
+    pipe = Pipe(points, radius)
+    assert distances(pipe, surface_of(pipe, LIMITS)).max() < 1e-6
+
+
+@given(st.lists(st.floats(0.3, 3.0), min_size=3, max_size=9))
+def test_star_shaped_polygons_are_cut_into_triangles_that_fill_them(radii):
+    angles = np.linspace(0.0, math.tau, len(radii), endpoint=False)
+    corners = tuple((r * math.cos(a), r * math.sin(a)) for r, a in zip(radii, angles, strict=True))
+    mesh = surface_of(Prism(corners, 0.0, 2.0), LIMITS)
+    assert signed_volume(mesh) == pytest.approx(2.0 * area(corners), rel=1e-9)
+
+
+def test_a_sector_of_more_than_half_a_turn_is_closed_too():
+    mesh = sector((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), 2.5, 1.0)
+    assert signed_volume(mesh) == pytest.approx(math.tau / 3.0 * (1.0 - math.cos(2.5)), rel=0.05)
+
+
+def test_shapes_of_attitude_have_no_surface():
+    with pytest.raises(TypeError, match="Orientation"):
+        surface_of(Orientation((1.0, 0.0, 0.0, 0.0), 0.5), LIMITS)

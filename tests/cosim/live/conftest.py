@@ -1,0 +1,108 @@
+"""Runs that are shown while they go on, and viewers."""
+
+import contextlib
+import json
+import threading
+
+import numpy as np
+import pytest
+
+pytest.importorskip("websockets", reason="the live extra is not installed")
+
+from websockets.sync.client import connect
+
+from cosim.live.address import parse_live
+from cosim.live.view import LiveView
+from cosim.run import run_scenario
+from cosim.scenario import load_scenario
+
+ARM = {"order": "arm", "armed": True}
+WAIT = 20.0  # s, that nothing should take
+
+
+class Viewer:
+    """A viewer that is no browser; it keeps what it is told."""
+
+    def __init__(self, url):
+        self._connecting = connect(url.replace("http", "ws") + "ws", max_size=None, open_timeout=60.0)
+        self.texts, self.headers, self.rows = [], [], []
+
+    def __enter__(self):
+        self.socket = self._connecting.__enter__()
+        return self
+
+    def __exit__(self, *error):
+        self._connecting.__exit__(*error)
+
+    def order(self, **order):
+        self.socket.send(json.dumps(order))
+
+    def hear(self):
+        """Take one message; return its kind."""
+        message = self.socket.recv(timeout=WAIT)
+        if isinstance(message, bytes):
+            self.rows += list(np.frombuffer(message, "<f8").reshape(-1, len(self.headers[-1]["signals"])))
+            return "rows"
+        told = json.loads(message)
+        if told["type"] == "header":
+            self.headers.append(told["run"])
+            self.rows = []
+        self.texts.append(told)
+        return told["type"]
+
+    def until(self, kind):
+        while self.hear() != kind:
+            pass
+        return self.texts[-1] if self.texts else None
+
+    def told(self, kind):
+        return [text for text in self.texts if text["type"] == kind]
+
+    def said(self, kind):
+        return [text["text"] for text in self.told("said") if text["kind"] == kind]
+
+    def column(self, name):
+        names = [signal["name"] for signal in self.headers[-1]["signals"]]
+        return np.array(self.rows)[:, names.index(name)]
+
+
+class Running:
+    """A run in a thread of its own."""
+
+    def __init__(self, view, folder):
+        self.view, self.url, self.folder, self.done = view, view.url, folder, None
+
+    def start(self, scenario, **options):
+        def go():
+            self.done = run_scenario(scenario, self.folder, report=False, live=self.view, **options)
+
+        self.thread = threading.Thread(target=go)
+        self.thread.start()
+
+    def end(self):
+        self.thread.join(WAIT)
+        assert not self.thread.is_alive()
+        return self.done
+
+    def viewer(self):
+        return Viewer(self.url)
+
+
+@pytest.fixture
+def live(tmp_path):
+    """Return a function that starts a run; with commands it waits until it is armed."""
+    with contextlib.ExitStack() as stack:
+
+        def start(name="harbour", *overrides, commands=False, await_arm=True, **options):
+            more = ["commands.enabled=true", f"commands.await_arm={str(await_arm).lower()}"] if commands else []
+            view = stack.enter_context(LiveView(parse_live("0")))
+            running = Running(view, tmp_path / "live")
+            running.start(load_scenario(name, ["time.duration=2", *more, *overrides]), **options)
+            stack.callback(running.thread.join, WAIT)
+            return running
+
+        yield start
+
+
+def same(a, b):
+    return list(a.units) == list(b.units) and all(np.array_equal(a[name], b[name], equal_nan=True) for name in a.units)

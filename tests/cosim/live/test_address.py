@@ -1,0 +1,78 @@
+"""Where a live view is served, and who may come there."""
+
+import socket
+
+import pytest
+
+from cosim.errors import TelemetryError
+from cosim.live.address import LiveAddress, bound, parse_live, stranger
+
+
+def test_an_address_is_a_port_or_a_host_with_one():
+    assert parse_live("") == LiveAddress("127.0.0.1", "127.0.0.1", 8765, insisted=False, loopback=True)
+    assert parse_live("9000").port == 9000 and parse_live("9000").insisted
+    assert parse_live("localhost:0").ip == "127.0.0.1"
+    assert not parse_live("0.0.0.0:9000", allow_remote=True).loopback
+
+
+@pytest.mark.parametrize(
+    "text", ["harbour", "127.0.0.1", "127.0.0.1:", ":70000", "70000", "-1", "no.such.host.invalid:1"]
+)
+def test_what_is_no_address_is_told(text):
+    with pytest.raises(TelemetryError, match=r"--live .*expected HOST:PORT or PORT"):
+        parse_live(text)
+
+
+def test_other_machines_come_only_with_leave():
+    with pytest.raises(TelemetryError, match="--allow-remote"):
+        parse_live("0.0.0.0:9000")
+
+
+HERE = LiveAddress("127.0.0.1", "127.0.0.1", 8765)
+
+
+@pytest.mark.parametrize(
+    ("host", "origin"),
+    [
+        ("127.0.0.1:8765", None),
+        ("localhost:8765", "http://localhost:8765"),
+        ("[::1]:8765", "http://[::1]:8765"),
+        ("127.0.0.1:9999", "http://127.0.0.1:9999"),  # through a tunnel
+    ],
+)
+def test_pages_of_ours_and_programs_may_come(host, origin):
+    assert stranger(HERE, host, origin) is None
+
+
+@pytest.mark.parametrize(
+    ("host", "origin"),
+    [
+        ("127.0.0.1:8765", "https://evil.example"),
+        ("127.0.0.1:8765", "http://127.0.0.1:8000"),  # another server of this machine
+        ("127.0.0.1:8765", "http://127.0.0.1:8765.evil.example"),
+        ("127.0.0.1:8765", "null"),  # a file, or a sandboxed frame
+        ("evil.example:8765", "http://evil.example:8765"),  # a name that its owner lets point here
+        ("127.0.0.1.evil.example:8765", None),
+        ("", None),
+        (None, None),
+        ("[", None),
+    ],
+)
+def test_pages_of_other_sites_may_not(host, origin):
+    assert stranger(HERE, host, origin)
+
+
+def test_a_page_for_other_machines_is_reached_by_number_or_known_names_alone():
+    there = LiveAddress("0.0.0.0", "0.0.0.0", 8765, loopback=False)
+    assert stranger(there, "192.0.2.7:8765", "http://192.0.2.7:8765") is None
+    assert stranger(there, f"{socket.gethostname()}:8765", None) is None
+    assert stranger(there, "evil.example:8765", None)
+
+
+def test_a_taken_port_is_an_error_only_where_it_was_asked_for():
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        port = taken.getsockname()[1]
+        with pytest.raises(TelemetryError, match=f"127.0.0.1:{port} cannot be opened"):
+            bound(LiveAddress(port=port, insisted=True))
+        with bound(LiveAddress(port=port)) as other:
+            assert other.getsockname()[1] != port

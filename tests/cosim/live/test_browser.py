@@ -1,0 +1,90 @@
+"""The live page in a real browser: the vehicle moves, and what is dragged arrives in the run."""
+
+import json
+import shutil
+import time
+
+import pytest
+
+from cosim.record import load_record
+from tests.cosim.live.conftest import WAIT
+
+webdriver = pytest.importorskip("selenium.webdriver", reason="selenium is not installed")
+CHROMIUM, DRIVER = shutil.which("chromium"), shutil.which("chromedriver")
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(not (CHROMIUM and DRIVER), reason="chromium and chromedriver are not installed"),
+]
+
+TARGET = 'const r = subreach.runs[0]; return ["x", "y", "z"].map((a) => r.held(`target.${a}`, r.end));'
+HELD = "const r = subreach.runs[0]; return subreach.scene.project([arguments[0], arguments[1], arguments[2]]);"
+
+
+@pytest.fixture
+def browser(tmp_path):
+    options = webdriver.ChromeOptions()
+    options.binary_location = CHROMIUM
+    flags = "--headless=new --no-sandbox --disable-gpu --disable-quic --no-first-run --disable-background-networking"
+    for flag in (*flags.split(), "--disable-component-update", "--disable-sync", "--window-size=1200,850"):
+        options.add_argument(flag)
+    options.add_argument(f"--user-data-dir={tmp_path / 'profile'}")
+    options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
+    driver = webdriver.Chrome(options=options, service=webdriver.ChromeService(DRIVER))
+    yield driver
+    driver.quit()
+
+
+def until(found):
+    deadline = time.monotonic() + WAIT
+    while not (value := found()):
+        assert time.monotonic() < deadline
+        time.sleep(0.05)
+    return value
+
+
+def test_the_target_is_dragged_with_the_mouse(browser, live, tmp_path):
+    running = live("harbour", "time.duration=12", commands=True, rate=1.0)  # waits for the button
+    until(lambda: running.view._run >= 0)
+    browser.get(running.url)
+    until(
+        lambda: browser.execute_script(
+            "return window.subreach?.ready && subreach.runs[0]?.rows > 0 && !!subreach.scene"
+        )
+    )
+    where = "return subreach.scene.drawn.runs[0].position"
+    first = until(lambda: browser.execute_script(where))
+    browser.execute_script("document.querySelector('#helm [data-armed=true]').click()")
+    until(lambda: abs(browser.execute_script(where)[0] - first[0]) > 0.05)
+    browser.execute_script('subreach.scene.camera.look("top"); subreach.paint()')
+
+    before = browser.execute_script(TARGET)
+    x, y = browser.execute_script(HELD, *before)
+    canvas = browser.find_element("id", "scene")
+    size = canvas.size
+    at = int(x - size["width"] / 2), int(y - size["height"] / 2)
+    hand = webdriver.ActionChains(browser).move_to_element_with_offset(canvas, *at)
+    hand.click_and_hold().move_by_offset(-20, 30).move_by_offset(-20, 30).perform()
+    browser.save_screenshot(str(tmp_path / "dragging.png"))
+    webdriver.ActionChains(browser).release().perform()
+    after = until(lambda: (now := browser.execute_script(TARGET)) != before and now)
+    assert after[2] == before[2]
+    # it is where the pointer let go of it
+    assert browser.execute_script(HELD, *after) == pytest.approx([x - 40, y + 60], abs=3)
+
+    # without a mouse: a number beside the scene
+    field = browser.find_element("css selector", '#helm input[aria-label="ship, east in metres"]')
+    browser.execute_script("arguments[0].scrollIntoView()", field)
+    field.send_keys("\ue009" + "a" + "\ue009", "7", "\ue007")  # Control A, 7, Enter
+    ship = "const r = subreach.runs[0]; return r.held('ship.shift.y', r.end)"
+    until(lambda: browser.execute_script(ship) == 3.0)
+
+    browser.execute_script("document.querySelector('#helm [data-mode=hold]').click()")
+    until(lambda: browser.execute_script("return document.querySelector('#helm summary').textContent.includes('hold')"))
+    until(lambda: browser.execute_script("return Boolean(subreach.runs[0].header.verdict)"))
+    assert browser.get_log("browser") == []
+    done = running.end()
+    log = [json.loads(line)["order"] for line in (done.folder / "orders.jsonl").read_text().splitlines()]
+    assert [order["order"] for order in log] == ["arm", "aim", "move", "steer"]
+    assert log[1]["position"] == pytest.approx(after, abs=1e-12)
+    target = load_record(done.folder).stack([f"target.{axis}" for axis in "xyz"])
+    assert (target == after).all(axis=1).any()

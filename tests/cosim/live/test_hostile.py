@@ -1,0 +1,135 @@
+"""Pages of other sites, floods and garbage: none of it orders anything, or hurts the run."""
+
+import contextlib
+import socket
+import urllib.error
+import urllib.request
+
+import pytest
+from websockets.exceptions import ConnectionClosed, InvalidStatus
+from websockets.sync.client import connect
+
+from cosim.live.orders import LONGEST
+from cosim.record import load_record
+from cosim.run import run_scenario
+from cosim.scenario import load_scenario
+from tests.cosim.live.conftest import ARM, WAIT, same
+
+
+def ask(url, **headers):
+    opener = urllib.request.build_opener(urllib.request.ProxyHandler({}))
+    return opener.open(urllib.request.Request(url, headers=headers), timeout=WAIT)
+
+
+def refused(url, status, **headers):
+    with pytest.raises(urllib.error.HTTPError) as caught:
+        ask(url, **headers)
+    caught.value.close()
+    assert caught.value.code == status
+
+
+def closed_with(client):
+    try:
+        while True:
+            client.recv(timeout=WAIT)
+    except ConnectionClosed as error:
+        return error.rcvd.code
+
+
+def test_the_page_is_served_alone_and_to_our_own_pages(live):
+    running = live(commands=True)
+    with ask(running.url) as page:
+        text = page.read().decode()
+        assert page.headers["Content-Type"] == "text/html; charset=utf-8"
+        assert "frame-ancestors 'none'" in page.headers["Content-Security-Policy"]
+    assert '<script type="application/json" id="runs">[]</script>' in text
+    refused(running.url + "etc/passwd", 404)
+    refused(running.url, 403, Host="evil.example")
+    refused(running.url, 403, Origin="http://evil.example")
+    for headers in ({"Origin": "http://evil.example"}, {"Origin": "null"}):
+        with pytest.raises(InvalidStatus) as caught:
+            connect(running.url.replace("http", "ws") + "ws", additional_headers=headers)
+        assert caught.value.response.status_code == 403
+    with running.viewer() as viewer:
+        viewer.order(**ARM)
+        viewer.until("end")
+
+
+def test_nothing_that_comes_hurts_the_run(live, tmp_path, caplog):
+    running = live(commands=True)
+    host, port = running.url.removeprefix("http://").strip("/").split(":")
+    place = (host, int(port))
+    url = running.url.replace("http", "ws") + "ws"
+    for garbage in (
+        b"\x00\xff" * 5000,
+        b"GET / HTTP/1.1\r\n\r\n",
+        b"POST /ws HTTP/1.1\r\nHost: a\r\n\r\n",
+        b"\r\n" * 999,
+    ):
+        with socket.create_connection(place, timeout=WAIT) as stranger, contextlib.suppress(OSError):
+            stranger.sendall(garbage)
+            stranger.recv(100)
+    with connect(url) as client:  # more than a message may have
+        with contextlib.suppress(ConnectionClosed):
+            client.send("x" * (LONGEST + 1))
+        assert closed_with(client) == 1009
+    with connect(url) as client:  # frames that are no frames
+        client.socket.sendall(b"\xff" * 1000)
+        assert closed_with(client) == 1002
+    with running.viewer() as viewer:
+        viewer.until("header")
+        for bad in (
+            b"\x00" * 100,
+            "",
+            "null",
+            "[]",
+            "{",
+            '{"order":1}',
+            '"arm"',
+            "[" * 5000,
+            '{"order":"arm","armed":1e999}',
+        ):
+            viewer.socket.send(bad)
+        for _ in range(9):
+            viewer.until("said")
+        assert len(viewer.said("refused")) == 9
+    with connect(url) as left:  # who goes without a word
+        left.socket.shutdown(socket.SHUT_RDWR)
+    with running.viewer() as viewer:
+        viewer.order(**ARM)
+        viewer.until("end")
+    assert "Traceback" not in caplog.text
+    done = running.end()
+    assert done.summary["orders"] == 1
+    alone = run_scenario(
+        load_scenario(done.folder / "scenario.toml"), tmp_path / "alone", report=False,
+        orders=done.folder / "orders.jsonl",
+    )  # fmt: skip
+    assert same(load_record(done.folder), load_record(alone.folder))
+
+
+@pytest.mark.slow
+def test_a_flood_is_slowed_down_and_shut_out(live):
+    running = live(commands=True)
+    with connect(running.url.replace("http", "ws") + "ws") as flood:
+        with contextlib.suppress(ConnectionClosed):
+            for _ in range(5000):
+                flood.send('{"order":"steer","mode":"reach"}')
+        assert closed_with(flood) == 1008
+    with running.viewer() as viewer:
+        viewer.order(**ARM)
+        viewer.until("end")
+    assert running.end().summary["orders"] < 500
+
+
+def test_more_viewers_than_there_is_room_for_are_sent_away(live):
+    running = live(commands=True)
+    with contextlib.ExitStack() as stack:
+        viewers = [stack.enter_context(running.viewer()) for _ in range(16)]
+        for viewer in viewers:
+            viewer.until("header")
+        with pytest.raises(InvalidStatus) as caught, running.viewer():
+            pass
+        assert caught.value.response.status_code == 503
+        viewers[0].order(**ARM)
+        viewers[0].until("end")

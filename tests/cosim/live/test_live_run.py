@@ -1,0 +1,113 @@
+"""A run that is shown while it goes on: viewers see the record, and the record does not know of them."""
+
+import logging
+import socket
+import sys
+
+import numpy as np
+import pytest
+
+from cosim.errors import TelemetryError
+from cosim.live.address import LiveAddress
+from cosim.live.hub import Hub
+from cosim.live.view import LiveView
+from cosim.record import load_record
+from cosim.report_words import verdict
+from cosim.run import run_scenario
+from cosim.scenario import load_scenario
+from tests.cosim.live.conftest import ARM, same
+
+
+def test_viewers_see_rows_of_the_record_to_the_last_bit(live):
+    running = live(rate=2.0)
+    with running.viewer() as viewer:
+        end = viewer.until("end")
+    done = running.end()
+    record = load_record(done.folder)
+    steps = np.round(viewer.column("time") / 0.01).astype(int)
+    assert steps[-1] == len(record["time"]) - 1 and (np.diff(steps) > 0).all() and len(steps) > 3
+    for signal in viewer.headers[0]["signals"]:
+        if signal["name"] in record.units:
+            assert np.array_equal(viewer.column(signal["name"]), record[signal["name"]][steps]), signal["name"]
+    assert end == {"type": "end", "status": "completed", "verdict": verdict(done.summary)}
+
+
+def test_the_record_is_the_same_whoever_watches(live, tmp_path):
+    alone = run_scenario(load_scenario("harbour", ["time.duration=2"]), tmp_path / "alone", report=False)
+    running = live(rate=4.0)
+    with running.viewer() as one, running.viewer() as other:
+        one.until("end")
+        other.until("end")
+    assert same(load_record(alone.folder), load_record(running.end().folder))
+    assert np.array_equal(one.column("time")[-5:], other.column("time")[-5:])
+
+
+def test_who_comes_late_gets_what_was(live):
+    running = live(rate=2.0)
+    with running.viewer() as early:
+        while not early.rows or early.column("time")[-1] < 0.5:
+            early.hear()
+        with running.viewer() as late:
+            late.until("rows")
+            assert late.column("time")[0] == 0.0
+            late.until("end")
+        early.until("end")
+    assert np.array_equal(early.column("time"), late.column("time"))
+
+
+def test_a_viewer_that_takes_nothing_holds_nobody_up(live, tmp_path):
+    running = live(rate=2.0)
+    host, port = running.url.removeprefix("http://").strip("/").split(":")
+    with socket.create_connection((host, int(port))) as lazy:
+        lazy.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+        ask = f"GET /ws HTTP/1.1\r\nHost: {host}:{port}\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
+        lazy.sendall(
+            (ask + "Sec-WebSocket-Key: MDEyMzQ1Njc4OWFiY2RlZg==\r\nSec-WebSocket-Version: 13\r\n\r\n").encode()
+        )
+        with running.viewer() as viewer:
+            viewer.until("end")
+        assert running.end().summary["status"] == "completed"
+        assert viewer.column("time")[-1] == 2.0
+
+
+def test_a_reset_begins_another_run_for_the_viewers(live):
+    running = live(commands=True, await_arm=False, rate=2.0)
+    with running.viewer() as viewer:
+        while not viewer.rows or viewer.column("time")[-1] < 0.2:
+            viewer.hear()
+        viewer.order(order="reset")
+        assert viewer.until("end")["status"] == "reset"
+        viewer.until("header")
+        viewer.until("rows")
+        assert viewer.column("time")[0] == 0.0
+        viewer.order(order="steer", mode="hold")
+        assert viewer.until("end")["status"] == "completed"
+    assert "Holds its place" in viewer.said("order")
+    assert running.end().folder.name == "live-2"
+
+
+def test_what_breaks_in_the_view_is_logged_and_the_run_goes_on(live, monkeypatch, caplog):
+    def broken(*_):
+        raise ZeroDivisionError("made up")
+
+    monkeypatch.setattr(Hub, "show", broken)
+    running = live(rate=4.0)
+    assert running.end().summary["status"] == "completed"
+    assert "the run goes on" in caplog.text and "made up" in caplog.text
+
+
+def test_what_the_helm_refuses_later_is_told_too(live, caplog):
+    running = live("harbour", "commands.obstacles=1", commands=True)
+    with running.viewer() as viewer, caplog.at_level(logging.WARNING):
+        viewer.until("header")
+        for number in (1, 2):
+            viewer.order(order="obstacle", number=number, position=[1.0, 50.0, 3.0], radius=0.5)
+        viewer.order(**ARM)
+        viewer.until("end")
+    assert any("no room for obstacle 2" in text for text in viewer.said("warning"))
+
+
+def test_without_the_library_one_line_says_what_to_install(monkeypatch):
+    monkeypatch.setitem(sys.modules, "cosim.live.server", None)
+    with pytest.raises(TelemetryError, match=r"pip install 'subreach\[live\]'"):
+        LiveView(LiveAddress(port=0))

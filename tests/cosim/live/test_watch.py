@@ -1,0 +1,147 @@
+"""A run in the terminal."""
+
+import io
+import re
+import shutil
+import sys
+import threading
+
+import numpy as np
+import pytest
+
+pytest.importorskip("rich", reason="the live extra is not installed")
+
+from rich.console import Console
+
+from cosim.cli import main
+from cosim.errors import TelemetryError
+from cosim.live.watching import Look, looks, picture
+from cosim.record import PARTS, RECORD, Recorder, load_record
+from cosim.replay.folder import SCENARIO
+from tests.cosim.live.conftest import ARM
+
+PAPER = "arbiter.engine=closed"
+
+
+@pytest.fixture(scope="module")
+def paper(shipped_run):
+    return shipped_run("paper", PAPER, "time.duration=6")
+
+
+def drawn(look, width, height, **options):
+    console = Console(file=io.StringIO(), width=width, height=height, **options)
+    console.print(picture(look, width, height, console.options.ascii_only))
+    return console.file.getvalue()
+
+
+def test_without_a_terminal_one_picture_tells_how_it_ended(paper, capsys):
+    assert main(["watch", str(paper.folder)]) == 0
+    out = capsys.readouterr().out
+    assert "\x1b" not in out
+    assert out.count("Weights of the arbiter") == 1
+    record = load_record(paper.folder)
+    for name in ("goal", "SR1", "SR2", "SR3"):
+        shown = float(re.search(rf"{name} .*?([+-]\d+\.\d\d)m", out).group(1))
+        assert shown == pytest.approx(record[f"{name}.clearance"][-1], abs=0.006)
+    assert "completed: The vehicle entered the goal region" in out
+
+
+@pytest.mark.parametrize("size", [(80, 24), (100, 24), (200, 50)])
+def test_every_picture_of_a_run_fits_its_terminal(paper, size):
+    frames = list(looks(str(paper.folder), rate=None))
+    assert 150 < len(frames) <= 250
+    for frame in (*frames[::20], frames[-1]):
+        lines = drawn(frame, *size).rstrip("\n").split("\n")
+        assert len(lines) <= size[1] and max(map(len, lines)) <= size[0]
+
+
+def test_what_is_violated_is_told_by_sign_and_word_without_colour(paper):
+    record = load_record(paper.folder)
+    k = int(np.argmin(record["SR1.clearance"]))
+    frames = list(looks(str(paper.folder), rate=None))
+    frame = min(frames, key=lambda look: abs(look["time"] - record["time"][k]))
+    text = drawn(frame, 80, 24)
+    assert re.search(r"SR1 .*-\d\.\d\dm !", text)
+    assert re.search(r"VIOLATED: .*SR1", text)
+    assert "Rules that fire" in text and "obstacle exist → α1 high" in text
+    assert "Gives way to" in text
+
+
+def test_a_terminal_of_plain_letters_gets_plain_bars(paper):
+    *_, last = looks(str(paper.folder), rate=None)
+    file = io.TextIOWrapper(io.BytesIO(), encoding="ascii", errors="replace")
+    console = Console(file=file, width=80)
+    assert console.options.ascii_only
+    console.print(picture(last, 80, 24, console.options.ascii_only))
+    file.flush()
+    assert "#" in file.buffer.getvalue().decode() and "?????" not in file.buffer.getvalue().decode()
+
+
+def test_colours_go_where_they_are_not_wanted(paper, monkeypatch):
+    *_, last = looks(str(paper.folder), rate=None)
+    assert "\x1b[3" in drawn(last, 80, 24, force_terminal=True, color_system="standard")
+    monkeypatch.setenv("NO_COLOR", "1")
+    assert "\x1b[3" not in drawn(last, 80, 24, force_terminal=True)
+
+
+def test_names_cannot_steer_the_terminal(paper):
+    *_, last = looks(str(paper.folder), rate=None)
+    header = last.header | {"title": "a\x1b[2Jb\x07"}
+    assert "\x1b" not in drawn(Look(header, last.row, "\x1b]0;x\x07"), 80, 24)
+
+
+def test_a_run_that_is_being_written_is_followed_to_its_end(paper, tmp_path):
+    folder = tmp_path / "run"
+    folder.mkdir()
+    shutil.copy(paper.folder / SCENARIO, folder)
+    record = load_record(paper.folder)
+    rows = np.concatenate(list(record.blocks()))
+    recorder = Recorder(folder, record.columns, rows_per_part=1000)
+    frames = looks(str(folder))
+    assert next(frames).row is None
+    for k in range(2001):
+        recorder.observe(k, rows[k])
+    frame = next(frames)
+    assert (frame["time"], frame.note) == (1.999, "being recorded")
+    assert [look["time"] for look in looks(str(folder), once=True)] == [1.999]
+    for k in range(2001, len(rows)):
+        recorder.observe(k, rows[k])
+    recorder.close()
+    assert (folder / RECORD).exists() and not (folder / PARTS).exists()
+    shutil.copy(paper.folder / "summary.json", folder)
+    *_, last = frames
+    assert last["time"] == 6.0 and last.ended[0] == "completed"
+
+
+def test_a_live_run_is_watched_to_its_end(live):
+    running = live(commands=True, rate=4.0)
+    with running.viewer() as viewer:
+        viewer.until("header")
+        seen = []
+        watching = threading.Thread(target=lambda: seen.extend(looks(running.url.replace("http", "ws"))))
+        watching.start()
+        viewer.order(**ARM)
+        viewer.until("end")
+        watching.join(20.0)
+    assert seen[-1].ended == ("completed", viewer.told("end")[0]["verdict"])
+    assert seen[-1]["time"] == 2.0 and len(seen) > 2
+
+
+@pytest.mark.parametrize("what", ["ws://127.0.0.1:1", "1", "ftp://127.0.0.1:21", "ws://[", "ws://127.0.0.1"])
+def test_where_nothing_is_one_line_says_so(what, capsys):
+    assert main(["watch", what]) == 2
+    error = capsys.readouterr().err
+    assert error.count("\n") == 1 and "cosim: " in error
+
+
+def test_without_the_library_one_line_says_what_to_install(monkeypatch, capsys):
+    monkeypatch.setitem(sys.modules, "rich.console", None)
+    assert main(["watch", "runs/any"]) == 2
+    assert "pip install 'subreach[live]'" in capsys.readouterr().err
+
+
+def test_no_run_is_told():
+    with pytest.raises(Exception, match="holds no run"):
+        next(looks("no/such/folder"))
+    with pytest.raises(TelemetryError, match="cannot be watched"):
+        next(looks("1"))

@@ -1,0 +1,175 @@
+"""Runs that are not whole give a clear page, and what is no run a clear error."""
+
+import json
+import os
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+
+from cosim.cli import main
+from cosim.errors import CosimError, RunError
+from cosim.replay.folder import load_run
+from cosim.replay.pages import write_replay
+from cosim.run_folder import conclude
+from tests.cosim.replay.conftest import GAPS
+from tests.cosim.replay.decoding import read_page
+
+NO_ROOT = pytest.mark.skipif(hasattr(os, "geteuid") and os.geteuid() == 0, reason="root may write everywhere")
+
+
+@pytest.mark.parametrize(
+    ("kind", "status", "rows", "last"),
+    [
+        ("killed", "killed", 900, "The run was killed: its record ends here"),
+        ("one row", "killed", 1, "The run was killed: its record ends here"),
+        ("interrupted", "interrupted", 900, "The run was interrupted"),
+        ("gaps", "completed", 6001, "End of the run"),
+    ],
+)
+def test_a_run_that_is_not_whole_has_a_page_that_says_so(kind, status, rows, last, docking, copy_of, spoil):
+    run = load_run(spoil(copy_of(docking), kind))
+    assert run.summary["status"] == status and len(run.record["time"]) == rows
+    _, [(header, columns)] = read_page(write_replay(run).read_text())
+    assert header["status"] == status
+    assert header["events"][-1]["text"] == last
+    assert columns["time"][-1] == run.record["time"][-1]
+    assert header["gaps"] == (dict.fromkeys(GAPS, 120) if kind == "gaps" else {})
+
+
+def test_gaps_stay_gaps_and_extremes_are_of_what_is_there(docking, copy_of, spoil):
+    run = load_run(spoil(copy_of(docking), "gaps"))
+    _, [(header, columns)] = read_page(write_replay(run).read_text())
+    gap = [2.995 < t < 4.195 for t in columns["time"]]
+    for name in GAPS:
+        assert np.isnan(columns[name]).tolist() == gap, name
+    assert np.isnan(columns["rule.R1"]).tolist() == gap
+    assert header["summary"]["min_clearance"]["heading"] == np.nanmin(run.record["heading.clearance"])
+
+
+def test_the_summary_of_a_record_with_gaps_is_json(docking, copy_of, spoil):
+    folder = spoil(copy_of(docking), "gaps")
+    table = pq.read_table(folder / "record.parquet")
+    at = table.schema.get_field_index("roof.clearance")
+    nothing = np.full(len(table), np.nan)
+    pq.write_table(table.set_column(at, table.schema.field(at), [nothing]), folder / "record.parquet")
+    run = load_run(folder)
+    conclude(folder, run.planned, "completed", None, report=False)
+    assert "NaN" not in (folder / "summary.json").read_text()
+    assert json.loads((folder / "summary.json").read_text())["min_clearance"]["roof"] is None
+    _, [(header, _)] = read_page(write_replay(run).read_text())
+    assert header["summary"]["min_clearance"]["roof"] is None
+    assert header["gaps"]["roof.clearance"] == 6001
+
+
+def _no_record(folder):
+    (folder / "record.parquet").unlink()
+
+
+def _empty(folder):
+    pq.write_table(pq.read_table(folder / "record.parquet").slice(0, 0), folder / "record.parquet")
+
+
+def _cut(folder):
+    file = folder / "record.parquet"
+    file.write_bytes(file.read_bytes()[:5000])
+
+
+def _other_columns(folder):
+    pq.write_table(pq.read_table(folder / "record.parquet").drop_columns("weight.shape"), folder / "record.parquet")
+
+
+def _backwards(folder):
+    table = pq.read_table(folder / "record.parquet")
+    pq.write_table(table.take(list(range(len(table)))[::-1]), folder / "record.parquet")
+
+
+def _no_summary(folder):
+    (folder / "summary.json").write_text("{")
+
+
+def _no_scenario(folder):
+    (folder / "scenario.toml").unlink()
+
+
+def _bad_scenario(folder):
+    (folder / "scenario.toml").write_text("vehicle = 7\n")
+
+
+@pytest.mark.parametrize(
+    ("spoilt", "text"),
+    [
+        (_no_record, "holds no record of a run"),
+        (_empty, "the record of the run is empty"),
+        (_cut, "record.parquet: cannot be read"),
+        (_other_columns, "the record has no column 'weight.shape'"),
+        (_backwards, "the times of the record do not rise"),
+        (_no_summary, "summary.json: cannot be read"),
+        (_no_scenario, "holds no run (scenario.toml is missing)"),
+        (_bad_scenario, "scenario.toml: "),
+    ],
+)
+def test_what_is_no_run_is_one_clear_line_and_leaves_the_page_alone(spoilt, text, docking, copy_of, capsys):
+    folder = copy_of(docking)
+    spoilt(folder)
+    before = sorted(folder.rglob("*"))
+    with pytest.raises(CosimError):
+        load_run(folder)
+    assert main(["replay", str(folder)]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert text in line and str(folder) in line
+    assert sorted(folder.rglob("*")) == before
+
+
+def test_a_run_has_its_page_unless_no_report_is_wanted(tmp_path, capsys):
+    quick = ["--set", "arbiter.engine=closed", "--set", "time.duration=0.05"]
+    assert main(["run", "docking", "--out", str(tmp_path / "with"), *quick]) == 0
+    assert capsys.readouterr().out.splitlines()[-1] == str(tmp_path / "with" / "replay.html")
+    assert (tmp_path / "with" / "replay.html").exists()
+    assert main(["run", "docking", "--out", str(tmp_path / "without"), "--no-report", *quick]) == 0
+    assert not (tmp_path / "without" / "replay.html").exists()
+    assert "replay" not in capsys.readouterr().out
+
+
+def test_replay_writes_one_run_s_page_into_its_folder(docking, copy_of, capsys):
+    folder = copy_of(docking)
+    (folder / "replay.html").unlink(missing_ok=True)
+    for _ in range(2):
+        assert main(["replay", str(folder)]) == 0
+        assert capsys.readouterr().out.strip() == str(folder / "replay.html")
+    reader, [(header, _)] = read_page((folder / "replay.html").read_text())
+    assert reader.title == docking.scenario.title and header["name"] == "docking"
+    assert not list(folder.glob(".*"))
+
+
+def test_several_runs_come_here_under_names_that_tell_them_apart(docking, copy_of, tmp_path, monkeypatch, capsys):
+    here, there, other = copy_of(docking, "a/run"), copy_of(docking, "b/run"), copy_of(docking, "c")
+    monkeypatch.chdir(tmp_path)
+    assert main(["replay", str(here), str(there), str(other), "--title", "Three <dockings>"]) == 0
+    assert capsys.readouterr().out.strip() == "replay.html"
+    reader, runs = read_page((tmp_path / "replay.html").read_text())
+    assert [header["name"] for header, _ in runs] == ["a/run", "b/run", f"{other.parent.name}/c"]
+    assert reader.title == "Three <dockings>"
+
+
+def test_another_file_is_not_written_over(docking, tmp_path, capsys):
+    file = tmp_path / "thesis.html"
+    file.write_text("years of work")
+    assert main(["replay", str(docking.path), "--out", str(file)]) == 2
+    assert capsys.readouterr().err == f"cosim: {file}: exists and is no replay; expected a new file\n"
+    assert file.read_text() == "years of work"
+    assert main(["replay", str(docking.path), str(docking.path), "--out", str(tmp_path / "x.html")]) == 2
+    assert "is given twice" in capsys.readouterr().err
+    for out in (tmp_path, tmp_path / "nowhere" / "x.html", file / "x.html"):
+        assert main(["replay", str(docking.path), "--out", str(out)]) == 2
+        assert capsys.readouterr().err.count("\n") == 1
+    assert [p.name for p in tmp_path.iterdir()] == ["thesis.html"]
+
+
+@NO_ROOT
+def test_a_place_that_cannot_be_written_is_one_line(docking, tmp_path):
+    from cosim.replay.pages import replay
+
+    tmp_path.chmod(0o500)
+    with pytest.raises(RunError, match="Permission denied"):
+        replay([docking.path], tmp_path / "x.html")

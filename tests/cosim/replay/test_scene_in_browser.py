@@ -1,0 +1,136 @@
+"""The scene in a real browser: it opens from disk alone, and shows the pose and the colours of the record."""
+
+import numpy as np
+import pytest
+
+from tests.cosim.replay.decoding import active_of
+
+FULL = {"obstacle": "#d55e00", "shape": "#e69f00", "depth": "#56b4e9", None: "#009e73"}
+AXES = [f"position.{axis}" for axis in "xyz"]
+QUATERNION = [f"quaternion.e{i}" for i in range(4)]
+
+
+def pose(record, step):
+    return [record[name][step] for name in AXES], [record[name][step] for name in QUATERNION]
+
+
+def test_a_page_opens_from_disk_and_asks_for_nothing(browser, shown, docking):
+    browser.open(shown(docking).file)
+    browser.press("?")
+    browser.js("document.querySelector('dialog[open]').close()")
+    browser.js("const p = window.subreach.player; p.setSpeed(20); p.play()")
+    browser.settle()
+    asked, complaints = browser.logs()
+    assert [url for url in asked if not url.startswith(("file:", "data:", "blob:"))] == []
+    assert sum(url.startswith("file:") for url in asked) == 1
+    assert complaints == []
+    assert browser.js("return performance.getEntriesByType('resource').map((r) => r.name)") == []
+
+
+def test_the_page_says_what_was_asked_and_what_happened(browser, shown, docking):
+    browser.open(shown(docking).file)
+    text = browser.js("return document.body.innerText")
+    assert docking.scenario.title in text
+    assert "The vehicle entered the goal region at" in text
+
+
+def test_scrubbing_moves_the_vehicle_to_the_recorded_pose(browser, shown, docking):
+    page, record = shown(docking), docking.record
+    browser.open(page.file)
+    for row in np.linspace(0, len(page.steps) - 1, 7).astype(int):
+        step = page.steps[row]
+        browser.land(record["time"][step])
+        assert browser.drawn["time"] == record["time"][step]
+        place, attitude = pose(record, step)
+        assert browser.drawn["runs"][0]["position"] == place
+        assert browser.drawn["runs"][0]["quaternion"] == attitude
+
+
+def test_between_rows_the_vehicle_is_between_their_poses(browser, shown, docking):
+    page, record = shown(docking), docking.record
+    browser.open(page.file)
+    for row, part in ((40, 0.25), (300, 0.5), (700, 0.9)):
+        (p, e), (q, f) = (pose(record, page.steps[row + i]) for i in (0, 1))
+        t, u = (record["time"][page.steps[row + i]] for i in (0, 1))
+        browser.land(t + part * (u - t))
+        drawn = browser.drawn["runs"][0]
+        assert drawn["position"] == pytest.approx((1 - part) * np.array(p) + part * np.array(q), abs=1e-9)
+        mixed = (1 - part) * np.array(e) + part * np.array(f)
+        assert drawn["quaternion"] == pytest.approx(mixed / np.linalg.norm(mixed), abs=1e-9)
+
+
+def ten_instants(page):
+    """Return rows of the page, spread over all who are active in it."""
+    who = [active_of(page.header, page.columns, row) for row in range(len(page.steps))]
+    rows = [who.index(index) for index in sorted(set(who))]
+    more = [row for row in range(len(who)) if row and who[row] != who[row - 1]]
+    spread = np.linspace(0, len(who) - 1, 12).astype(int).tolist()
+    return sorted(dict.fromkeys([*rows, *more[:4], *spread]))[:10] if len(rows) < 10 else rows[:10]
+
+
+@pytest.mark.parametrize("name", ["paper", "docking"])
+def test_the_active_region_s_colour_is_that_of_the_record_at_ten_instants(name, browser, shown, request):
+    page = shown(request.getfixturevalue(name))
+    record = page.run.record
+    browser.open(page.file)
+    instants, seen = ten_instants(page), set()
+    assert len(instants) == 10
+    signals = {column: record[column] for column in record.units if column.startswith(("weight.", "membership."))}
+    signals |= {column: record[column] for column in record.units if column.endswith(".clearance")}
+    for row in instants:
+        step = page.steps[row]
+        expected = active_of(page.header, signals, step)
+        browser.land(record["time"][step])
+        drawn = browser.drawn["runs"][0]
+        assert drawn["active"] == expected
+        for i, region in enumerate(page.header["regions"]):
+            is_full = drawn["colours"][i].lower() == FULL[region["criterion"]]
+            assert is_full == (i == expected), (record["time"][step], region["name"], drawn["colours"][i])
+        seen.add(expected)
+    assert len(seen) == {"paper": 4, "docking": 2}[name]
+
+
+def test_the_picture_changes_with_the_time_and_with_who_is_active(browser, shown, paper):
+    browser.open(shown(paper).file)
+
+    def picture():
+        return browser.js("return document.querySelector('canvas').toDataURL()")
+
+    browser.scrub(0.1)
+    before = picture()
+    browser.scrub(0.2)
+    assert picture() != before
+    browser.scrub(0.1)
+    assert picture() == before
+
+
+def test_three_instants_are_kept_as_pictures(browser, shown, docking):
+    browser.open(shown(docking).file)
+    files = set()
+    for part, name in ((0.0, "start"), (0.08, "on-the-way"), (1.0, "end")):
+        browser.scrub(part * docking.record["time"][-1])
+        files.add(browser.shoot(f"docking-{name}").read_bytes())
+    assert len(files) == 3
+
+
+def test_a_drag_turns_the_scene_and_the_wheel_comes_nearer(browser, shown, docking):
+    from selenium.webdriver.common.action_chains import ActionChains
+    from selenium.webdriver.common.actions.wheel_input import ScrollOrigin
+    from selenium.webdriver.common.by import By
+
+    browser.open(shown(docking).file)
+    canvas = browser.driver.find_element(By.CSS_SELECTOR, "canvas")
+
+    def seen():
+        goal, ship = [7.1, 0.0, 4.0], [6.8, -3.0, 3.0]
+        return np.array([browser.js("return window.subreach.scene.project(arguments[0])", p) for p in (goal, ship)])
+
+    before = seen()
+    ActionChains(browser.driver).drag_and_drop_by_offset(canvas, 120, 30).perform()
+    browser.settle()
+    turned = seen()
+    assert np.abs(turned - before).max() > 10.0
+    ActionChains(browser.driver).scroll_from_origin(ScrollOrigin.from_element(canvas), 0, -400).perform()
+    browser.settle()
+    near = seen()
+    assert np.linalg.norm(near[1] - near[0]) > 1.05 * np.linalg.norm(turned[1] - turned[0])

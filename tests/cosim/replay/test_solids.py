@@ -1,0 +1,278 @@
+"""The scene's geometry: surfaces, planes, sights and the camera, run by node and held against the shapes themselves."""
+
+import json
+import shutil
+import subprocess
+from importlib import resources
+
+import numpy as np
+import pytest
+
+from controller.regions import (
+    SHAPES,
+    Box,
+    Cone,
+    Cylinder,
+    DepthBand,
+    Ellipsoid,
+    HalfSpace,
+    Orientation,
+    Pipe,
+    Prism,
+    Region,
+    Sphere,
+    Visibility,
+    attitude_clearance,
+    clearances_at,
+    pack,
+)
+from cosim.replay.header import shape_of
+from cosim.replay.page import SCENE_SCRIPTS
+
+NODE = shutil.which("node")
+pytestmark = pytest.mark.skipif(NODE is None, reason="node, which runs the scene's scripts, is not installed")
+
+TURN = (0.8, 0.3, -0.2, 0.5)
+BOUNDED = {
+    "sphere": Sphere((1.0, -2.0, 3.0), 1.5),
+    "ellipsoid": Ellipsoid((4.0, 1.0, 2.0), (2.0, 0.5, 1.0), TURN),
+    "box": Box((-1.0, 2.0, 4.0), (1.0, 2.0, 3.0), TURN),
+    "cylinder": Cylinder((0.0, 0.0, 1.0), (2.0, -1.0, 4.0), 0.7),
+    "prism": Prism(((0.0, 0.0), (4.0, 0.0), (4.0, 3.0), (2.0, 1.0), (0.0, 3.0)), 1.0, 3.0),
+    "prism the other way round": Prism(((0.0, 3.0), (2.0, 1.0), (4.0, 3.0), (4.0, 0.0), (0.0, 0.0)), 1.0, 3.0),
+    "cone": Cone((1.0, 1.0, 5.0), (-1.0, 0.5, -0.7), 0.5, 3.0),
+    "cone as wide as half a ball": Cone((1.0, 1.0, 5.0), (0.0, 0.0, -1.0), np.pi / 2.0, 2.0),
+    "straight pipe": Pipe(((0.0, 0.0, 2.0), (3.0, 0.0, 2.0), (5.0, 0.0, 2.0)), 0.4),
+    "bent pipe": Pipe(((0.0, 0.0, 2.0), (3.0, 0.0, 2.5), (4.0, 3.0, 2.0), (4.0, 3.0, 5.0), (1.0, 3.0, 7.0)), 0.4),
+}
+POSITION, QUATERNION = np.array([1.0, 2.0, 3.0]), np.array([0.9, 0.1, -0.2, 0.3]) / np.sqrt(0.95)
+
+
+def run(code, **given):
+    """Return what JavaScript that knows the scene's scripts returns of some values."""
+    assets = resources.files("cosim.replay") / "assets"
+    scripts = "\n".join((assets / name).read_text(encoding="utf-8") for name in SCENE_SCRIPTS)
+    values = "".join(f"const {name} = {json.dumps(value)};\n" for name, value in given.items())
+    program = f'"use strict";\n{scripts}\n{values}console.log(JSON.stringify((() => {{ {code} }})()));'
+    done = subprocess.run([NODE, "-"], input=program, capture_output=True, text=True, timeout=60, check=False)
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout)
+
+
+@pytest.fixture(scope="module")
+def surfaces():
+    """Points, faces, outward normals, and edges, of each bounded shape."""
+    shapes = {name: shape_of(shape) for name, shape in BOUNDED.items()}
+    return run(
+        """
+        return Object.fromEntries(Object.entries(shapes).map(([name, shape]) => {
+          const solid = SOLIDS[shape.kind](shape);
+          const { points, faces, normals, edges } = solid;
+          return [name, { points: [...points], faces, normals: [...normals], edges }];
+        }));
+        """,
+        shapes=shapes,
+    )
+
+
+def outside(shape, points):
+    """Return the signed distance of points to a shape [m], positive outside."""
+    return clearances_at(np.atleast_2d(points), Region("it", shape, "out"))
+
+
+def test_every_shape_of_a_region_has_a_drawer():
+    assert set(run("return DRAWN_SHAPES;")) == set(SHAPES)
+
+
+@pytest.mark.parametrize("name", BOUNDED)
+def test_the_points_of_a_surface_are_on_it(surfaces, name):
+    points = np.reshape(surfaces[name]["points"], (-1, 3))
+    assert len(points) >= 8
+    np.testing.assert_allclose(outside(BOUNDED[name], points), 0.0, atol=1e-9)
+
+
+@pytest.mark.parametrize("name", [name for name, shape in BOUNDED.items() if not isinstance(shape, Sphere | Ellipsoid)])
+def test_a_surface_is_closed_and_its_normals_point_out_of_it(surfaces, name):
+    surface = surfaces[name]
+    points, normals = np.reshape(surface["points"], (-1, 3)), np.reshape(surface["normals"], (-1, 3))
+    assert all(edge[2] != edge[3] for edge in surface["edges"])
+    np.testing.assert_allclose(np.linalg.norm(normals, axis=1), 1.0)
+    # the volume by Gauss's theorem, from fans of triangles, against random points in a box about the shape
+    volume = 0.0
+    for face in surface["faces"]:
+        a = points[face[0]]
+        for i in range(1, len(face) - 1):
+            volume += a @ np.cross(points[face[i]], points[face[i + 1]]) / 6.0
+    low, high = points.min(axis=0), points.max(axis=0)
+    inside = outside(BOUNDED[name], np.random.default_rng(1).uniform(low, high, (40_000, 3))) < 0.0
+    assert volume == pytest.approx(inside.mean() * np.prod(high - low), rel=0.04)
+
+
+@pytest.mark.parametrize("name", BOUNDED)
+def test_a_point_is_hidden_where_the_line_from_the_eye_meets_the_shape(name):
+    rng = np.random.default_rng(2)
+    shape = BOUNDED[name]
+    low, high = (np.array(corner) - 1.0 + 2.0 * i for i, corner in enumerate(shape.bounds()))
+    eyes, points = rng.uniform(low - 6.0, high + 6.0, (300, 3)), rng.uniform(low, high, (300, 3))
+    least = np.array(
+        [
+            outside(shape, a + np.linspace(0.0, 1.0, 400)[:, None] * (b - a)).min()
+            for a, b in zip(eyes, points, strict=True)
+        ]
+    )
+    clear = (np.abs(least) > 0.03) & (outside(shape, eyes) > 0.0)  # flat faces cut some mm off what is round
+    hidden = run(
+        """
+        const solid = SOLIDS[shape.kind](shape);
+        return eyes.map((eye, i) => solid.from(eye)(...points[i]));
+        """,
+        shape=shape_of(shape),
+        eyes=eyes.tolist(),
+        points=points.tolist(),
+    )
+    assert clear.sum() > 100
+    assert 10 < (least[clear] < 0.0).sum() < clear.sum() - 10
+    assert (np.array(hidden) == (least < 0.0))[clear].all()
+
+
+@pytest.mark.parametrize(
+    "shape",
+    [DepthBand(3.0, 1.0), HalfSpace((1.0, 2.0, 3.0), (0.3, -1.0, 0.4)), HalfSpace((0.0, 0.0, 4.0), (0.0, 0.0, 1.0))],
+)
+@pytest.mark.parametrize("keep", ["in", "out"])
+def test_a_sheet_is_in_its_plane_and_in_the_bounds_and_its_hatching_on_the_forbidden_side(shape, keep):
+    low, high = [-3.0, -4.0, 0.0], [5.0, 4.0, 6.0]
+    sheets = run(
+        "return sheetsOf(shape, keep, [0, 0, 0], [low, high]);", shape=shape_of(shape), keep=keep, low=low, high=high
+    )
+    assert len(sheets) == (2 if isinstance(shape, DepthBand) else 1)
+    for sheet in sheets:
+        corners, hatch = np.array(sheet["corners"]), np.array(sheet["hatch"])
+        np.testing.assert_allclose(outside(shape, corners), 0.0, atol=1e-9)
+        assert (corners >= np.array(low) - 1e-9).all() and (corners <= np.array(high) + 1e-9).all()
+        region = Region("it", shape, keep)
+        assert (clearances_at(np.ascontiguousarray(hatch[:, 1]), region) < 0.0).all()
+
+
+@pytest.mark.parametrize("tolerance", [0.3, 1.8])
+def test_the_rim_of_a_sector_of_headings_is_where_the_attitude_is_at_its_tolerance(tolerance):
+    shape = Orientation((0.9, 0.1, 0.2, -0.4), tolerance)
+    sight = run(
+        "return SIGHTS.orientation(shape, { position, quaternion }, [0, 0, 0], 0.3);",
+        shape=shape_of(shape),
+        position=POSITION.tolist(),
+        quaternion=QUATERNION.tolist(),
+    )
+    regions = pack([Region("it", shape, "in")])
+    wanted = np.array(shape.quaternion) / np.linalg.norm(shape.quaternion)
+    for point in np.array(sight["rim"]):
+        way = (point - POSITION) / np.linalg.norm(point - POSITION)
+        turned = multiplied(shortest_turn(np.array(sight["axis"]), way), wanted)
+        assert attitude_clearance(regions, 0, POSITION, turned)[0] == pytest.approx(0.0, abs=1e-9)
+
+
+@pytest.mark.parametrize("half_angle", [0.5, 2.0])
+def test_a_feature_on_the_rim_of_a_view_is_at_the_edge_of_the_picture(half_angle):
+    shape = Visibility((6.0, 3.0, 4.0), (1.0, 0.3, 0.2), half_angle, (0.2, -0.1, 0.1))
+    sight = run(
+        "return SIGHTS.visibility(shape, { position, quaternion }, [0, 0, 0], 0.3);",
+        shape=shape_of(shape),
+        position=POSITION.tolist(),
+        quaternion=QUATERNION.tolist(),
+    )
+    for point in sight["rim"]:
+        seen = Visibility(tuple(point), shape.camera_axis, half_angle, shape.camera_position)
+        clearance, _ = attitude_clearance(pack([Region("it", seen, "in")]), 0, POSITION, QUATERNION)
+        assert clearance == pytest.approx(0.0, abs=1e-9)
+
+
+def test_a_pixel_s_ray_goes_through_the_point_that_is_seen_there():
+    rng = np.random.default_rng(3)
+    points = rng.uniform(-5.0, 5.0, (100, 3))
+    seen = run(
+        """
+        return points.map((p, i) => {
+          const camera = new Camera();
+          camera.resize(1200, 800);
+          camera.aim([0.1 * i, 1, 2]);
+          camera.orbit(13 * i, 7 * (i % 30));
+          camera.zoom(0.3);
+          const [x, y, depth] = camera.project(p);
+          const all = new Float64Array(3);
+          camera.projectAll(p.map((c, k) => c - k), 1, [0, 1, 2], all);
+          return { eye: camera.eye, forward: camera.forward, ray: camera.ray(x, y), at: [x, y, depth], all: [...all] };
+        });
+        """,
+        points=points.tolist(),
+    )
+    for p, view in zip(points, seen, strict=True):
+        way = p - view["eye"]
+        assert view["at"][2] == pytest.approx(way @ view["forward"]) and view["at"][2] > 0.0
+        np.testing.assert_allclose(view["ray"], way / np.linalg.norm(way), atol=1e-9)
+        np.testing.assert_allclose(view["all"], view["at"], rtol=1e-9)
+
+
+def test_down_is_downwards_north_is_up_from_above_and_to_the_right_from_the_side():
+    views = run(
+        """
+        const camera = new Camera();
+        camera.resize(900, 600);
+        camera.content = [[-2, -1, 0], [3, 4, 5]];
+        const seen = (p) => camera.project(p).slice(0, 2);
+        return Object.fromEntries(["iso", "top", "side", "front"].map((name) => {
+          camera.look(name);
+          const m = [0.5, 1.5, 2.5];
+          const [o, n, e, d] = [m, [1, 0, 0], [0, 1, 0], [0, 0, 1]].map((p, i) => seen(i ? Vec.add(m, p) : p));
+          return [name, { o, n, e, d, all: camera.content.map(seen) }];
+        }));
+        """
+    )
+    for name, view in views.items():
+        o, n, e, d = (np.array(view[key]) for key in "oned")
+        if name == "top":
+            assert n[1] < o[1] - 10.0 and e[0] > o[0] + 10.0
+        else:
+            assert d[1] > o[1] + 10.0
+        if name == "side":
+            assert n[0] > o[0] + 10.0
+        if name == "front":
+            assert e[0] > o[0] + 10.0
+        # and all content is in the picture, which is filled one way
+        seen = np.array(view["all"])
+        assert (seen > 0.0).all() and (seen < [900.0, 600.0]).all()
+        assert (np.ptp(seen, axis=0) > [600.0, 400.0]).any()
+
+
+@pytest.mark.parametrize("name", ["sphere", "ellipsoid"])
+def test_lines_of_sight_along_the_outline_of_a_ball_touch_it(name):
+    outline = run(
+        """
+        const camera = new Camera();
+        camera.resize(800, 600);
+        camera.aim([2, 0, 3]);
+        const solid = SOLIDS[shape.kind](shape);
+        const to = outlineOf(camera, solid.ellipsoid, [0, 0, 0]);
+        const rays = Array.from({ length: 24 }, (_, i) => {
+          const [u, v] = [Math.cos((Math.PI * i) / 12), Math.sin((Math.PI * i) / 12)];
+          return camera.ray(to.x + to.xx * u + to.xy * v, to.y + to.xy * u + to.yy * v);
+        });
+        return { eye: camera.eye, rays };
+        """,
+        shape=shape_of(BOUNDED[name]),
+    )
+    for ray in outline["rays"]:
+        along = np.linspace(0.0, 20.0, 20_001)[:, None]
+        assert outside(BOUNDED[name], np.array(outline["eye"]) + along * np.array(ray)).min() == pytest.approx(
+            0.0, abs=1e-5
+        )
+
+
+def shortest_turn(a, b):
+    """Return the quaternion of the shortest turn of one unit vector to another."""
+    half = np.append(1.0 + a @ b, np.cross(a, b))
+    return half / np.linalg.norm(half)
+
+
+def multiplied(p, q):
+    """Return the product of two quaternions, scalar first."""
+    return np.append(p[0] * q[0] - p[1:] @ q[1:], p[0] * q[1:] + q[0] * p[1:] + np.cross(p[1:], q[1:]))

@@ -1,0 +1,59 @@
+"""The pictures of the documents: each is drawn by a maker, and each maker runs."""
+
+import re
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+IMAGES = ROOT / "docs" / "images"
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+
+
+@pytest.fixture
+def draw(tmp_path, monkeypatch):
+    """Return a function that runs a maker and returns the pictures that it left."""
+
+    def run(maker):
+        monkeypatch.chdir(tmp_path)
+        monkeypatch.syspath_prepend(IMAGES)
+        for name in ("small", maker):
+            monkeypatch.delitem(sys.modules, name, raising=False)
+        __import__(maker)
+        sys.modules[maker].main()
+        return {path.name: path for path in tmp_path.iterdir()}
+
+    return run
+
+
+def shown():
+    """Return the pictures that the pages show."""
+    return {name for page in PAGES for name in re.findall(r"\((?:docs/)?images/(.*?)\)", page.read_text())}
+
+
+def test_every_picture_that_is_shown_is_there_and_every_one_there_is_shown():
+    assert shown() == {path.name for path in IMAGES.glob("*.png")}
+
+
+@pytest.mark.parametrize("maker", [pytest.param("arbiter", marks=pytest.mark.slow), "fmu"])
+def test_pictures_are_those_that_their_script_draws(maker, draw):
+    from PIL import Image
+
+    drawn = draw(maker)
+    by_examples = {"fmu-reference.png"}
+    assert drawn.keys() == {path.name for path in IMAGES.glob(f"{maker}-*.png")} - by_examples
+    for name, path in drawn.items():
+        assert path.stat().st_size < 120_000
+        with Image.open(path) as fresh, Image.open(IMAGES / name) as kept:
+            assert fresh.size == kept.size
+
+
+@pytest.mark.slow
+def test_the_paths_of_the_readme_are_figures_of_runs(draw, monkeypatch):
+    # short runs stand for them, which take a minute
+    from cosim import scenario
+
+    whole = scenario.load_scenario
+    monkeypatch.setattr(scenario, "load_scenario", lambda name, over: whole(name, [*over, "time.duration=0.5"]))
+    assert draw("paths").keys() == {"path-plane.png", "path-deployable.png"}
