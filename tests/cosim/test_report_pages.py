@@ -93,7 +93,7 @@ def size_of(png):
     return struct.unpack(">II", data[16:24])
 
 
-def test_the_same_run_gives_the_same_pdf(folder, tmp_path):
+def test_the_same_run_gives_the_same_pdf(folder):
     first = (folder / "report.pdf").read_bytes()
     write_report(load_run(folder), ["pdf"])
     assert (folder / "report.pdf").read_bytes() == first
