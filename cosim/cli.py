@@ -11,9 +11,8 @@ import logging
 import os
 import sys
 from collections.abc import Sequence
-from pathlib import Path
 
-from cosim.command_line import campaigns, export, mavlink, package, replay, run, sitl, sweep, watch
+from cosim.command_line import campaigns, export, mavlink, package, replay, report, run, sitl, sweep, watch
 from cosim.command_line.campaigns import INTERRUPTED
 
 _EPILOG = """examples:
@@ -49,8 +48,7 @@ def _parser() -> argparse.ArgumentParser:
     run.add_verb(verbs)
     watch.add_verb(verbs)
 
-    report = verbs.add_parser("report", help="write summary, report and replay of a run again, or of a killed one")
-    report.add_argument("folder", type=Path, metavar="DIR", help="the run folder")
+    report.add_verb(verbs)
 
     replay.add_verb(verbs)
 
@@ -128,17 +126,6 @@ def _log(verbose: bool) -> None:
         logging.getLogger(name).setLevel(logging.DEBUG if verbose else logging.WARNING)
 
 
-def _report(options: argparse.Namespace) -> int:
-    from cosim.replay.page import REPLAY
-    from cosim.report_words import verdict
-    from cosim.run_folder import report_again
-
-    print(verdict(report_again(options.folder)))
-    print(options.folder / "report.html")
-    print(options.folder / REPLAY)
-    return 0
-
-
 def _list(options: argparse.Namespace) -> int:
     from cosim.scenario import load_scenario
     from cosim.scenario_file import shipped_scenarios
@@ -178,7 +165,7 @@ def _calibrate(options: argparse.Namespace) -> int:
 _VERBS = {
     "run": run.run,
     "watch": watch.watch,
-    "report": _report,
+    "report": report.report,
     "replay": replay.replay,
     "list": _list,
     "show": _show,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -43,8 +43,7 @@ STYLE: Any = {
 DPI = 160  # of figures as PNG
 
 _LEGEND_WIDTH, _LEGEND_MARK = 100, 7  # letters that fit across a figure, that a line or marker is as wide as
-_NAMED = 8  # regions that a legend names one by one
-POINTS = 1500  # of a drawn curve: about what a figure's width resolves
+POINTS = 1000  # of a drawn curve: about what a figure's width resolves
 
 
 @dataclass(frozen=True)
@@ -64,42 +63,41 @@ class Drawing:
     caption: str
     figure: Figure
 
-    def write(self, folder: Path) -> str:
-        """Write it into a folder as SVG and as PNG, and return the SVG."""
+    def write(self, folder: Path, png: bool = False) -> str:
+        """Write it into a folder as SVG, and as PNG if that is asked for; return the SVG."""
         svg = io.StringIO()
         self.figure.savefig(svg, format="svg", metadata={"Date": None})
         (folder / f"{self.name}.svg").write_text(svg.getvalue(), encoding="utf-8")
-        self.figure.set_layout_engine("none")  # laid out once is enough, and takes as long as a drawing
-        self.figure.savefig(folder / f"{self.name}.png", dpi=DPI)
+        if png:
+            self.figure.savefig(folder / f"{self.name}.png", dpi=DPI)
         return svg.getvalue()
 
 
-def thin(time: Array, *signals: Array) -> tuple[Array, ...]:
-    """Return time and signals with few enough points to draw, of each part of the time the least and the greatest.
+def thin(time: Array, signal: Array) -> tuple[Array, Array]:
+    """Return a signal with few enough points to draw, of each part of the time the least and the greatest.
 
     Parameters
     ----------
     time : ndarray, shape (n,)
         [s].
-    *signals : ndarray, shape (n,)
-        On that time.
+    signal : ndarray, shape (n,)
+        On that time; a gap of NaN stays one.
 
     Returns
     -------
-    tuple of ndarray
-        Time and signals, all of one length; extremes of every signal are kept.
+    ndarray, ndarray
+        Time and signal; extremes are kept.
     """
     n = len(time)
     if n <= 2 * POINTS:
-        return (time, *signals)
-    part = int(np.ceil(n / (POINTS / max(1, len(signals)))))
-    keep = {0, n - 1}
-    for start in range(0, n, part):
-        for signal in signals:
-            piece = signal[start : start + part]
-            keep |= {start + int(np.argmin(piece)), start + int(np.argmax(piece))}
-    index = np.array(sorted(keep))
-    return (time[index], *(signal[index] for signal in signals))
+        return time, signal
+    part = -(-n // (POINTS // 2))
+    whole = n // part * part
+    least = np.where(np.isnan(signal), np.inf, signal)[:whole].reshape(-1, part).argmin(axis=1)
+    most = np.where(np.isnan(signal), -np.inf, signal)[:whole].reshape(-1, part).argmax(axis=1)
+    starts = np.arange(0, whole, part)
+    index = np.unique(np.concatenate([[0], starts + least, starts + most, np.arange(whole, n)]))
+    return time[index], signal[index]
 
 
 def regions_of(scenario: Scenario) -> Iterator[tuple[Region, str]]:
@@ -151,7 +149,9 @@ def places_of(story: Story) -> Iterator[Place]:
         if of_attitude(region.shape):
             continue
         shifts = shifts_of(story, region.name)
-        at = -1 if region.name == "goal" else int(np.argmin(story.record[f"{region.name}.clearance"]))
+        clearance = story.record[f"{region.name}.clearance"]
+        # NaN is not the least
+        at = -1 if region.name == "goal" else int(np.argmin(np.where(np.isnan(clearance), np.inf, clearance)))
         if shifts.any() and region.name not in came:
             yield Place(region, colour, shifts[0], faint=True)
             yield Place(region, colour, shifts[-1], faint=True)
@@ -194,27 +194,6 @@ def shifts_of(story: Story, name: str) -> Array:
     if f"{name}.shift.x" not in story.record.units:
         return np.zeros((len(story.record["time"]), 3))
     return story.record.stack([f"{name}.shift.{axis}" for axis in "xyz"])
-
-
-def labels_of(regions: Sequence[tuple[Region, str]]) -> dict[str, str]:
-    """Return what a legend calls regions.
-
-    Parameters
-    ----------
-    regions : sequence of (Region, str)
-        With their colours.
-
-    Returns
-    -------
-    dict of str to str
-        By the region's name: its name, or where there are many regions, how many have its colour, at the first of them.
-    """
-    if len(regions) <= _NAMED:
-        return {region.name: region.name for region, _ in regions}
-    by_colour: dict[str, list[str]] = {}
-    for region, colour in regions:
-        by_colour.setdefault(colour, []).append(region.name)
-    return {n[0]: n[0] if len(n) == 1 else f"{len(n)} regions" for n in by_colour.values()}
 
 
 def legend_columns(labels: Iterable[str]) -> int:

@@ -2,166 +2,235 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch, PathPatch
+from matplotlib.path import Path
 
-from controller.regions import Region, clearances_at
 from cosim.drawing import (
     BLACK,
+    CRITERION_COLOURS,
+    GOAL_COLOUR,
     PATH_COLOUR,
-    POINTS,
     Place,
     Story,
     features_of,
-    labels_of,
-    legend_columns,
-    overlap_of,
     places_of,
 )
+from cosim.figures_box import Box
+from cosim.figures_labels import Labels
+from cosim.figures_layout import (
+    BOTTOM,
+    LEFT,
+    LEGEND_ROW,
+    RIGHT,
+    TOP,
+    WIDTH,
+    F,
+    Sheet,
+    legend,
+    legend_rows,
+    plain_numbers,
+)
+from cosim.figures_solids import edges_of, outlines, pieces_of, rim
+from cosim.figures_way import Way, way_of
+from cosim.scenario import CRITERIA
 from cosim.signals import Array
 
-_GRID = 140  # points a side, where outlines of regions are searched
-_SLICES = 41  # along the line of sight
-_TALLEST = 10.0  # inches
+SIDE = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])  # north and depth, as one looks west
+ABOVE = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])  # north and east
+_TALLEST = 7.6  # inches, of both planes together
 _FAINT = 0.35  # opacity of a region where it began or ended
+_GAP = 0.34  # inches between the planes
+_NAMED = 8  # regions whose names stand in the picture in space
 
 
-def path_3d(story: Story) -> Figure:
-    """Draw the path, regions and goal in space."""
-    record = story.record
-    figure = Figure(figsize=(6.8, 4.6))
-    ax: Any = figure.add_axes((0.0, 0.07, 1.0, 0.86), projection="3d")
-    low, high = _extent(story)
+def path_3d(story: Story, sheet: Sheet[F]) -> F:
+    """Draw the path, regions and goal in space, as seen from the south-east and above."""
+    way = way_of(story)
+    low, high = _extent(story, way)
     wide = np.maximum(high - low, 0.4 * (high - low).max())  # a flat path still gets a box with some depth
     middle = (low + high) / 2.0
     low, high = middle - wide / 2.0, middle + wide / 2.0
-    rng = np.random.default_rng(0)
+    entries = _entries(story, way)
+    top = TOP + LEGEND_ROW * legend_rows(list(entries))
+    box = Box(low, high)
+    height = box.height_for(WIDTH - 0.2, 4.4)
+    figure = sheet(height + top)
+    ax = figure.add_axes((0.1 / WIDTH, 0.0, 1.0 - 0.2 / WIDTH, height / (height + top)))
+    labels = box.draw(ax)
+    clip = Path(box.outline)
+    few = len(story.scenario.regions) <= _NAMED  # of more, no one could tell which name is whose
     for place in places_of(story):
-        points = _surface_points(place, low, high, rng)
-        if points.size:
-            alpha = _FAINT if place.faint else 0.45
-            ax.scatter(*points.T, s=3.0, color=place.colour, alpha=alpha, linewidths=0, rasterized=True)
+        seen = _region(ax, place, low, high, box.view, clip)
+        if seen and not place.faint and few:
+            labels.offer(place.region.name, np.vstack(seen))
     for name, colour, feature in features_of(story):
-        ax.plot(*feature[:, None], "*", color=colour, markersize=9, label=name)
-    for label, colour in _legend_of(story):
-        ax.plot([], [], [], "o", color=colour, label=label)
-    path = record.stack(["position.x", "position.y", "position.z"])
-    ax.plot(*_thin_path(path).T, color=PATH_COLOUR, label="path")
-    ax.plot(*path[0][:, None], marker="x", color=BLACK, markersize=8, mew=2, linestyle="none", label="X start")
-    overlap = overlap_of(story)
-    if overlap.any():
-        inside = path[overlap]
-        ax.plot(*inside.T, color=BLACK, linewidth=3, label="I overlap")
-        ax.text(*(inside[len(inside) // 2] + [0.0, 0.0, -0.12 * wide[2]]), "I", fontweight="bold", ha="center")
-    ax.set(xlabel="north x [m]", ylabel="east y [m]", zlabel="depth z [m]")
-    ax.set_xlim(low[0], high[0])
-    ax.set_ylim(low[1], high[1])
-    ax.set_zlim(high[2], low[2])
-    ax.yaxis.set_major_locator(MaxNLocator(4))
-    ax.set_box_aspect(wide)
-    ax.view_init(elev=20, azim=-70)
-    figure.legend(loc="upper center", ncols=legend_columns(ax.get_legend_handles_labels()[1]))
+        ax.plot(*(box.view @ feature), "*", color=colour, markersize=9)
+        labels.offer(name, (box.view @ feature)[None])
+    floor = np.column_stack([way.points[:, :2], np.full(len(way.points), high[2])])
+    ax.plot(*(floor @ box.view.T).T, color=BLACK, linewidth=0.8, alpha=0.25)
+    _path(ax, way, box.view)
+    labels.put(way.points @ box.view.T)
+    legend(figure, entries)
     return figure
 
 
-def path_plane(story: Story) -> Figure:
-    """Draw the path and the silhouettes of the regions in the vertical and the horizontal plane."""
-    record = story.record
-    low, high = _extent(story)
-    side, top = high[2] - low[2], high[1] - low[1]
-    height = min(2.0 + 6.0 * (side + top) / (high[0] - low[0]), _TALLEST)
-    figure = Figure(figsize=(6.8, height), layout="constrained")
-    axes = figure.subplots(2, 1, sharex=True, height_ratios=[side, top])
-    for ax, vertical, other, label in zip(axes, (2, 1), (1, 2), ("depth z [m]", "east y [m]"), strict=True):
-        u, v = np.linspace(low[0], high[0], _GRID), np.linspace(low[vertical], high[vertical], _GRID)
-        for place in places_of(story):
-            inside = _silhouette(place, u, v, vertical, np.linspace(low[other], high[other], _SLICES))
-            if inside.max() > 0.0 > inside.min():
-                alpha, colours = (_FAINT if place.faint else 1.0), [place.colour]
-                ax.contourf(u, v, inside, levels=[0.0, np.inf], colors=colours, alpha=0.15 * alpha)
-                dashes = "solid" if place.region.keep == "out" else "dashed"
-                ax.contour(u, v, inside, levels=[0.0], colors=colours, linewidths=1.2, linestyles=dashes, alpha=alpha)
-        for _, colour, feature in features_of(story):
-            ax.plot(feature[0], feature[vertical], "*", color=colour, markersize=9)
-        ax.plot(*_thin_path(record.stack(["position.x", f"position.{'xyz'[vertical]}"])).T, color=PATH_COLOUR)
-        ax.plot(record["position.x"][0], record[f"position.{'xyz'[vertical]}"][0], "x", color=BLACK, mew=2)
-        ax.set_ylabel(label)
+def path_plane(story: Story, sheet: Sheet[F]) -> F:
+    """Draw the path and the outlines of the regions from the side and from above."""
+    way = way_of(story)
+    low, high = _extent(story, way)
+    side, above, along = high[2] - low[2], high[1] - low[1], high[0] - low[0]
+    entries = _entries(story, way)
+    top = TOP + LEGEND_ROW * legend_rows(list(entries)) + 0.16
+    across = WIDTH - LEFT - RIGHT
+    scale = min(across / along, _TALLEST / (side + above))  # inches a metre
+    # a narrow picture is drawn with more of the water beside it, not with a gap
+    room = (across / scale - along) / 2.0
+    low, high = low - np.array([room, 0.0, 0.0]), high + np.array([room, 0.0, 0.0])
+    total = top + scale * (side + above) + _GAP + BOTTOM
+    figure = sheet(total)
+    y = total - top
+    for view, axis, title in ((SIDE, 2, "from the side, looking west"), (ABOVE, 1, "from above")):
+        height = scale * (high - low)[axis]
+        y -= height
+        ax = figure.add_axes((LEFT / WIDTH, y / total, across / WIDTH, height / total))
+        y -= _GAP
+        plain_numbers(ax)
         ax.set_xlim(low[0], high[0])
-        ax.set_ylim(low[vertical], high[vertical])
-        ax.set_aspect("equal")
-        overlap = overlap_of(story)
-        if overlap.any():
-            x, w = record["position.x"][overlap], record[f"position.{'xyz'[vertical]}"][overlap]
-            ax.plot(x, w, color=BLACK, linewidth=3)
-    axes[0].invert_yaxis()
-    axes[1].set_xlabel("north x [m]")
-    for label, colour in _legend_of(story):
-        axes[0].plot([], [], "s", color=colour, alpha=0.5, label=label)
-    for name, colour, _ in features_of(story):
-        axes[0].plot([], [], "*", color=colour, markersize=9, label=name)
-    axes[0].plot([], [], color=PATH_COLOUR, label="path")
-    axes[0].plot([], [], "x", color=BLACK, mew=2, label="start")
-    if overlap_of(story).any():
-        axes[0].plot([], [], color=BLACK, linewidth=3, label="overlap")
-    figure.legend(loc="outside upper center", ncols=legend_columns(axes[0].get_legend_handles_labels()[1]))
+        ax.set_ylim(
+            high[axis], low[axis]
+        )  # depth points down; and so does east, seen from above, with north to the right
+        ax.set_title(title, fontsize=8, loc="left", pad=3)
+        ax.tick_params(labelbottom=axis == 1, length=3)
+        ax.set_ylabel("depth, NED z [m]" if axis == 2 else "east, NED y [m]")
+        ax.yaxis.set_label_coords((0.17 - LEFT) / across, 0.5)
+        labels = Labels(ax, scale, _frame(view @ low, view @ high))
+        for place in places_of(story):
+            seen = _region(ax, place, low, high, view)
+            if seen and not place.faint:
+                labels.offer(place.region.name, np.vstack(seen))
+        for name, colour, feature in features_of(story):
+            ax.plot(*(view @ feature), "*", color=colour, markersize=9)
+            labels.offer(name, (view @ feature)[None])
+        _targets(ax, way, view)
+        _path(ax, way, view)
+        labels.put(way.points @ view.T)
+    ax.set_xlabel("north, NED x [m]")
+    ax.xaxis.set_label_coords(0.5, (0.17 - BOTTOM) / (scale * (high - low)[1]))
+    legend(figure, entries)
     return figure
 
 
-def _legend_of(story: Story) -> list[tuple[str, str]]:
-    """Return a label and its colour for each region in space, or for each colour where there are many."""
-    regions = [(place.region, place.colour) for place in places_of(story) if not place.faint]
-    labels = labels_of(regions)
-    return [(labels[region.name], colour) for region, colour in regions if region.name in labels]
+def _region(ax: Axes, place: Place, low: Array, high: Array, view: Array, clip: Path | None = None) -> list[Array]:
+    """Draw a region as it is seen, with edges where it is clipped; return the outline of each piece in sight."""
+    pieces = pieces_of(place.region.shape, low - place.shift, high - place.shift)
+    seen = [outline + view @ place.shift for outline in outlines(pieces, view)]
+    if not seen or (clip is None and len(seen) == 1 and _fills(seen[0], view @ low, view @ high)):
+        return []
+    alpha = _FAINT if place.faint else 1.0
+    whole = Path.make_compound_path(*(Path(outline, closed=True) for outline in seen))
+    fill = PathPatch(whole, color=place.colour, alpha=(0.15 if clip is None else 0.08) * alpha, linewidth=0)
+    rims = [rim(outline, [other for other in seen if other is not outline]) for outline in seen]
+    dashes = "-" if place.region.keep == "out" else "--"
+    drawn: list[Artist] = [ax.add_patch(fill)]
+    drawn += ax.plot(*_with_gaps(rims), color=place.colour, linewidth=1.1, linestyle=dashes, alpha=alpha)
+    if clip is not None:
+        edges = edges_of(place.region.shape, low - place.shift, high - place.shift)
+        lines = [(line + place.shift) @ view.T for line in edges]
+        drawn += ax.plot(*_with_gaps(lines), color=place.colour, linewidth=0.5, alpha=0.7 * alpha)
+        for artist in drawn:
+            artist.set_clip_path(clip, ax.transData)
+    return seen
 
 
-def _extent(story: Story) -> tuple[Array, Array]:
+def _frame(low: Array, high: Array) -> Array:
+    """Return the corners of a picture, closed."""
+    return np.array([low, [high[0], low[1]], high, [low[0], high[1]], low])
+
+
+def _fills(outline: Array, low: Array, high: Array) -> bool:
+    """Return whether the rectangle of an outline leaves nothing of a picture free: it would tell nothing."""
+    return bool((outline.min(axis=0) <= low + 1e-9).all() and (outline.max(axis=0) >= high - 1e-9).all())
+
+
+def _path(ax: Axes, way: Way, view: Array) -> None:
+    """Draw where the vehicle went, in the colour of a criterion while the arbiter gives way to a region of it."""
+    flat = way.points @ view.T
+    ax.plot(*flat.T, color=PATH_COLOUR, linewidth=1.6)
+    for i, name in enumerate(CRITERIA):
+        there = way.given_way == i
+        if there.any():
+            there[:-1] |= there[1:]  # up to where the next piece begins
+            ax.plot(*np.where(there[:, None], flat, np.nan).T, color=CRITERION_COLOURS[name], linewidth=2.4)
+    if way.overlap.any():
+        ax.plot(*np.where(way.overlap[:, None], flat, np.nan).T, color=BLACK, linewidth=3)
+    ax.plot(*flat[0], "x", color=BLACK, mew=2, markersize=7)
+    ax.plot(*flat[-1], "o", color=BLACK, markersize=4)
+
+
+def _targets(ax: Axes, way: Way, view: Array) -> None:
+    """Draw the targets that were ordered before the last one, faint, with their number in the order they came."""
+    for i, (middle, radius) in enumerate(way.targets):
+        centre = view @ middle
+        if radius > 0.0:
+            turn = np.linspace(0.0, 2.0 * np.pi, 49)
+            ax.plot(
+                *(centre[:, None] + radius * np.array([np.cos(turn), np.sin(turn)])),
+                color=GOAL_COLOUR, alpha=0.6, linewidth=0.9, linestyle="--",
+            )  # fmt: skip
+        ax.plot(*centre, "D", color=GOAL_COLOUR, alpha=0.6, markersize=3)
+        ax.annotate(
+            str(i + 1), (centre[0], centre[1]), (3, 3), textcoords="offset points", fontsize=7, color=GOAL_COLOUR
+        )
+
+
+def _entries(story: Story, way: Way) -> dict[str, Artist]:
+    """Return what the legend of a picture in space tells, only of what there is."""
+    shown = {secondary.criterion for secondary in story.scenario.regions}
+    entries: dict[str, Artist] = {"goal": Patch(color=GOAL_COLOUR, alpha=0.4)}
+    entries |= {name: Patch(color=CRITERION_COLOURS[name], alpha=0.4) for name in CRITERIA if name in shown}
+    entries["path"] = Line2D([], [], color=PATH_COLOUR, linewidth=1.6)
+    for i, name in enumerate(CRITERIA):
+        if (way.given_way == i).any():
+            entries[f"gives way to {name}"] = Line2D([], [], color=CRITERION_COLOURS[name], linewidth=2.4)
+    if way.overlap.any():
+        entries["in the overlap"] = Line2D([], [], color=BLACK, linewidth=3)
+    entries["start"] = Line2D([], [], color=BLACK, linestyle="", marker="x", mew=2)
+    entries["end"] = Line2D([], [], color=BLACK, linestyle="", marker="o", markersize=4)
+    if way.targets:
+        entries["earlier targets"] = Line2D([], [], color=GOAL_COLOUR, linestyle="", marker="D", markersize=3)
+    return entries
+
+
+def _with_gaps(lines: list[Array]) -> Array:
+    """Return lines as one, with NaN between them, shape (2, n)."""
+    gap = np.full((1, 2), np.nan)
+    joined: Array = np.vstack([part for line in lines for part in (line, gap)]).T
+    return joined
+
+
+def _extent(story: Story, way: Way) -> tuple[Array, Array]:
     """Return the corners of a box about the path and the goal, with some room."""
-    path = story.record.stack(["position.x", "position.y", "position.z"])
-    all_bounds = [(p.region.name, np.array(p.region.shape.bounds()) + p.shift) for p in places_of(story) if not p.faint]
-    goals = [np.where(np.isfinite(b), b, path[0]) for name, b in all_bounds if name == "goal"]
-    points = np.vstack([path, *goals])  # an endless goal needs no room
+    path = way.points
+    places = list(places_of(story))
+    all_bounds = [np.array(place.region.shape.bounds()) + place.shift for place in places]
+    goals = [
+        np.where(np.isfinite(bounds), bounds, path[0])
+        for place, bounds in zip(places, all_bounds, strict=True)
+        if place.region.name == "goal" and not place.faint
+    ]
+    targets = [np.array([middle - radius, middle + radius]) for middle, radius in way.targets]
+    points = np.vstack([path, *goals, *targets])  # an endless goal needs no room
     low, high = points.min(axis=0), points.max(axis=0)
-    near = 0.5 * (high - low).max()
-    for _, bounds in all_bounds:  # with the regions that are not far away
+    size = (high - low).max()
+    for place, bounds in zip(places, all_bounds, strict=True):  # with the regions that are not far away
+        near = (0.1 if place.faint else 0.5) * size
         if np.isfinite(bounds).all() and (bounds[1] >= low - near).all() and (bounds[0] <= high + near).all():
             points = np.vstack([points, np.clip(bounds, low - near, high + near)])
     points = np.vstack([points, *(feature[None] for _, _, feature in features_of(story))])
     low, high = points.min(axis=0), points.max(axis=0)
     room = np.maximum(0.06 * (high - low).max(), (1.2 - (high - low)) / 2.0)
     return low - room, high + room
-
-
-def _silhouette(place: Place, u: Array, v: Array, vertical: int, across: Array) -> Array:
-    """Return how deep each line of sight goes into the shape, shape (len(v), len(u)); below 0 it misses."""
-    other = 3 - vertical
-    points = np.empty((len(across), len(v), len(u), 3))
-    points[..., 0] = u
-    points[..., vertical] = v[:, None]
-    points[..., other] = across[:, None, None]
-    kept_in = Region(place.region.name, place.region.shape, "in")
-    inside = clearances_at(points.reshape(-1, 3) - place.shift, kept_in)
-    return np.asarray(inside.reshape(points.shape[:-1]).max(axis=0))
-
-
-def _surface_points(place: Place, low: Array, high: Array, rng: np.random.Generator, n: int = 20000) -> Array:
-    """Return points near the region's surface within the box, at most some hundreds."""
-    lowest, highest = (np.array(corner) + place.shift for corner in place.region.shape.bounds())
-    low, high = np.maximum(low, lowest - 0.1), np.minimum(high, highest + 0.1)
-    if (low >= high).any():
-        return np.empty((0, 3))
-    points = rng.uniform(low, high, (n, 3))
-    distance = np.abs(clearances_at(points - place.shift, place.region))
-    nearest = np.argsort(distance)[:700]
-    found: Array = points[nearest[distance[nearest] < 0.02 * (high - low).max()]]
-    return found
-
-
-def _thin_path(path: Array) -> Array:
-    """Return about as many points of a path as a figure resolves, evenly spaced along its length."""
-    length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))])
-    wanted = np.searchsorted(length, np.linspace(0.0, length[-1], POINTS))
-    thinned: Array = path[np.unique(np.minimum(wanted, len(path) - 1))]
-    return thinned

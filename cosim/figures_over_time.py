@@ -1,12 +1,15 @@
-"""What the vehicle did and why: errors, weights, clearances, forces and estimates over time."""
+"""What the vehicle did and why: errors, attitude, weights, clearances, and who steered, over time."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.ticker import MaxNLocator
 
 from controller.regions import Sphere, of_attitude
 from cosim.drawing import (
@@ -15,260 +18,226 @@ from cosim.drawing import (
     CRITERION_COLOURS,
     CYCLE,
     GOAL_COLOUR,
+    GREEN,
     ORANGE,
     RED,
     Story,
-    labels_of,
-    legend_columns,
     regions_of,
     shifts_of,
     thin,
 )
+from cosim.figures_layout import F, Sheet, legend, limits_of, panels, symlog_axis
 from cosim.helm.orders import MODES
-from cosim.scenario import CRITERIA, Scenario
+from cosim.scenario import CRITERIA
 from cosim.signals import Array
 from cosim.summary import spans
 
 _AWAY = 1e4  # m; regions further off have not come yet
+_NAMED = 8  # regions that a legend names one by one
+_NEAREST = 5  # of more, besides the goal
+DASHES = ("-", "--", "-.", ":")
+_WIDER = 1.6  # than up to the end of the overlap
+_TIME = "time [s]"
 
 
-def _axes(height: float = 2.6, rows: int = 1) -> tuple[Figure, Any]:
-    figure = Figure(figsize=(6.8, height), layout="constrained")
-    axes = figure.subplots(rows, 1, sharex=True, squeeze=False)[:, 0]
-    axes[-1].set_xlabel("time [s]")
-    return figure, axes
-
-
-def _zoomed(story: Story, height: float, rows: int = 1) -> tuple[Figure, Any]:
-    """Return axes for the whole run, shape (rows, 1), or (rows, 2) with the time of the overlap on the left."""
+def zooms(story: Story) -> bool:
+    """Return whether the first overlap is so early that figures over the whole run would not show it."""
     windows = story.summary["intersection_windows"]
-    until = 1.6 * windows[0][1] if windows else np.inf
-    if until > 0.4 * story.summary["simulated_time"]:
-        figure, axes = _axes(height, rows)
+    return bool(windows) and 0.0 < _WIDER * windows[0][1] <= 0.4 * story.summary["simulated_time"]
+
+
+def _zoomed(story: Story, sheet: Sheet[F], heights: Sequence[float], labels: Sequence[str]) -> tuple[F, Any]:
+    """Return axes for the whole run, shape (rows, 1), or (rows, 2) with the time of the overlap on the left."""
+    if not zooms(story):
+        figure, axes = over_time(story, sheet, heights, labels)
         return figure, axes[:, None]
-    figure = Figure(figsize=(6.8, height), layout="constrained")
-    axes = figure.subplots(rows, 2, sharex="col", sharey="row", squeeze=False, width_ratios=[2, 3])
+    figure, axes = panels(sheet, heights, (2.0, 3.0), labels)
+    start, end = story.summary["intersection_windows"][0]
     for ax in axes[:, 0]:
-        ax.set_xlim(0.0, until)
-        ax.axvspan(*windows[0], color=BLACK, alpha=0.08)
+        ax.axvspan(start, end, color=BLACK, alpha=0.08, linewidth=0)
+    axes[0, 0].set_xlim(0.0, _WIDER * end)
+    axes[0, 0].xaxis.set_major_locator(MaxNLocator(4, steps=[1, 2, 5, 10]))
+    axes[0, 1].set_xlim(0.0, story.summary["simulated_time"])
     for ax in axes[-1]:
-        ax.set_xlabel("time [s]")
+        ax.set_xlabel(_TIME)
     return figure, axes
 
 
-def _curves(axes: Any, story: Story, signals: dict[str, Array], **style: Any) -> None:
-    """Draw signals into one axes, or into several that show different spans of time."""
+def over_time(story: Story, sheet: Sheet[F], heights: Sequence[float], labels: Sequence[str]) -> tuple[F, Any]:
+    """Return axes over the whole run, shape (rows,)."""
+    figure, axes = panels(sheet, heights, labels=labels)
+    axes[0, 0].set_xlim(0.0, story.summary["simulated_time"] or story.scenario.time.step)
+    axes[-1, 0].set_xlabel(_TIME)
+    return figure, axes[:, 0]
+
+
+def curve(axes: Any, story: Story, signal: Array, **style: Any) -> Line2D:
+    """Draw a signal into one axes, or into several that show different spans of time; return a line of it."""
+    time = story.record["time"]
+    marker = "o" if len(time) == 1 else ""
     for ax in np.atleast_1d(axes):
-        seen = story.record["time"] <= (ax.get_xlim()[1] if not ax.get_autoscalex_on() else np.inf)
-        time, *thinned = thin(story.record["time"][seen], *(signal[seen] for signal in signals.values()))
-        for label, signal in zip(signals, thinned, strict=True):
-            ax.plot(time, signal, label=label, **style)
+        seen = slice(0, int(np.searchsorted(time, ax.get_xlim()[1], side="right")) + 1)
+        lines: list[Line2D] = ax.plot(*thin(time[seen], signal[seen]), marker=marker, markersize=4, **style)
+    return lines[0]
 
 
-def _legend(figure: Figure, ax: Axes, ncols: int) -> None:
-    figure.legend(*ax.get_legend_handles_labels(), loc="outside upper center", ncols=ncols)
+def _zero_line(ax: Axes) -> None:
+    ax.axhline(0.0, color=BLACK, linewidth=0.8)
 
 
-def _symlog(ax: Axes, largest: float, linear: float) -> None:
-    """Make an axis linear to about `linear` and logarithmic beyond."""
-    threshold = 10.0 ** np.ceil(np.log10(max(linear, 1.0)))
-    decades = 10.0 ** np.arange(np.log10(threshold), np.ceil(np.log10(largest)) + 1.0)
-    ax.set_yscale("symlog", linthresh=threshold)
-    ax.set_yticks([*-decades[::-1], 0.0, *decades])
-    ax.set_ylim(-1.5 * largest, 1.5 * largest)
-
-
-def position_error(story: Story) -> Figure:
+def position_error(story: Story, sheet: Sheet[F]) -> F:
     """Draw the RMS error to the goal's centre, or the distance to the goal where it has none."""
-    figure, (ax,) = _axes()
     bounds = np.array(story.scenario.goal.bounds())
     if np.isfinite(bounds).all():
         centre = bounds.mean(axis=0) + shifts_of(story, "goal")
-        error = np.linalg.norm(story.record.stack([f"position.{a}" for a in "xyz"]) - centre, axis=1)
-        _curves(ax, story, {"RMS error": error / np.sqrt(3.0)})
-        ax.set_ylabel("RMS error [m]")
+        path = story.record.stack([f"position.{a}" for a in "xyz"])
+        what, error = "RMS error", np.linalg.norm(path - centre, axis=1) / np.sqrt(3.0)
     else:
-        _curves(ax, story, {"distance to the goal": np.maximum(0.0, -story.record["goal.clearance"])})
-        ax.set_ylabel("distance [m]")
-    if isinstance(story.scenario.goal, Sphere):
-        tolerance = story.scenario.goal.radius / np.sqrt(3.0)
-        ax.axhline(tolerance, color=GOAL_COLOUR, linestyle="--", label="tolerance r_v/√3")
-    ax.set_ylim(bottom=0.0)
-    ax.legend()
+        what, error = "distance to the goal", np.maximum(0.0, -story.record["goal.clearance"])
+    sphere = story.scenario.goal if isinstance(story.scenario.goal, Sphere) else None
+    labels = [what, "tolerance r_v/√3"] if sphere else [what]
+    figure, (ax,) = over_time(story, sheet, [2.0], labels)
+    lines = [curve(ax, story, error)]
+    ax.set_ylabel(f"{what} [m]")
+    if sphere:
+        lines.append(ax.axhline(sphere.radius / np.sqrt(3.0), color=GOAL_COLOUR, linestyle="--"))
+    ax.set_ylim(0.0, limits_of([error, np.array([sphere.radius if sphere else 0.0])])[1])
+    legend(figure, dict(zip(labels, lines, strict=True)))
     return figure
 
 
-def attitude(story: Story) -> Figure:
+def attitude(story: Story, sheet: Sheet[F]) -> F:
     """Draw roll, pitch and yaw."""
-    figure, (ax,) = _axes()
-    _curves(ax, story, {name: np.rad2deg(story.record[f"attitude.{name}"]) for name in ("roll", "pitch", "yaw")})
-    ax.set_ylabel("Euler angle [°]")
-    ax.legend(ncols=3)
+    angles = {name: np.rad2deg(story.record[f"attitude.{name}"]) for name in ("roll", "pitch", "yaw")}
+    figure, (ax,) = over_time(story, sheet, [2.0], list(angles))
+    styles = zip(angles.items(), (BLUE, RED, GREEN), DASHES, strict=False)
+    legend(figure, {n: curve(ax, story, angle, color=c, linestyle=s) for (n, angle), c, s in styles})
+    ax.set_ylim(*limits_of(list(angles.values()), least=2.0))
+    ax.set_ylabel("Euler angles, NED to body [°]", fontsize=8)
     return figure
 
 
-def weights_overlap(story: Story) -> Figure:
+def weights_overlap(story: Story, sheet: Sheet[F]) -> F:
     """Draw the weights around each window in which the regions overlap, at most the first three."""
     windows = story.summary["intersection_windows"][:3]
-    figure = Figure(figsize=(6.8, 2.8), layout="constrained")
-    axes = figure.subplots(1, len(windows), sharey=True, squeeze=False)[0]
+    labels = [f"α{i + 1} {name}" for i, name in enumerate(CRITERIA)]
+    figure, axes = panels(sheet, [2.0], [1.0] * len(windows), [*labels, "overlap"], titles=0.2)
     time = story.record["time"]
-    for ax, (start, end) in zip(axes, windows, strict=True):
+    for ax, (start, end) in zip(axes[0], windows, strict=True):
         room = max(0.5 * (end - start), 5 * story.scenario.time.step)
         shown = (time >= start - room) & (time <= end + room)
-        for i, name in enumerate(CRITERIA):
-            weight = story.record[f"weight.{name}"][shown]
-            ax.plot(time[shown], weight, color=CRITERION_COLOURS[name], label=f"α{i + 1} {name}")
-        ax.axvspan(start, end, color=BLACK, alpha=0.08, label="overlap")
-        ax.set_title(f"{start:.3f} s to {end:.3f} s", fontsize=9)
-        ax.set_xlabel("time [s]")
-    axes[0].set_ylabel("normalised weight [–]")
-    axes[0].set_ylim(-0.05, 1.05)
-    _legend(figure, axes[0], 4)
+        entries: dict[str, Artist] = {}
+        for label, name, dashes in zip(labels, CRITERIA, DASHES, strict=False):
+            curve = thin(time[shown], story.record[f"weight.{name}"][shown])
+            (entries[label],) = ax.plot(*curve, color=CRITERION_COLOURS[name], linestyle=dashes)
+        entries["overlap"] = ax.axvspan(start, end, color=BLACK, alpha=0.08, linewidth=0)
+        ax.set_title(f"{start:.3f} s to {end:.3f} s", fontsize=8, pad=3)
+        ax.set_xlim(float(time[shown][0]), float(time[shown][-1]) + 1e-9)
+        ax.xaxis.set_major_locator(MaxNLocator(8 // len(windows), steps=[1, 2, 5, 10]))
+        ax.set_xlabel(_TIME)
+    axes[0, 0].set_ylabel("normalised weight [–]")
+    axes[0, 0].set_ylim(-0.05, 1.05)
+    legend(figure, entries)
     return figure
 
 
-def weights(story: Story) -> Figure:
+def weights(story: Story, sheet: Sheet[F]) -> F:
     """Draw memberships and weights of each criterion."""
-    figure, axes = _zoomed(story, 4.2, len(CRITERIA))
+    labels = ["weight, in its criterion's colour", "membership"]
+    figure, axes = _zoomed(story, sheet, [0.95] * len(CRITERIA), labels)
     for i, (row, name) in enumerate(zip(axes, CRITERIA, strict=True)):
-        _curves(row, story, {"weight": story.record[f"weight.{name}"]}, color=CRITERION_COLOURS[name])
-        _curves(row, story, {"membership": story.record[f"membership.{name}"]}, color=BLACK, linestyle=":")
-        row[0].set(ylabel=f"α{i + 1} {name}", ylim=(-0.05, 1.05))
-    _legend(figure, axes[0, 0], 2)
+        lines = [
+            curve(row, story, story.record[f"weight.{name}"], color=CRITERION_COLOURS[name], linewidth=1.8),
+            curve(row, story, story.record[f"membership.{name}"], color=BLACK, linestyle=":", linewidth=1.0),
+        ]
+        row[0].set(ylim=(-0.06, 1.06), yticks=(0.0, 0.5, 1.0))
+        row[0].set_ylabel(f"α{i + 1} {name} [–]", fontsize=7.5)
+    legend(figure, dict(zip(labels, lines, strict=True)))
     return figure
 
 
-def clearance(story: Story) -> Figure:
+def clearance(story: Story, sheet: Sheet[F]) -> F:
     """Draw the clearance to each region and to the goal: distances, and angles below them where there are any."""
-    regions = list(enumerate(regions_of(story.scenario)))
-    groups = [[(i, of) for i, of in regions if of_attitude(of[0].shape) == angle] for angle in (False, True)]
-    figure, axes = _zoomed(story, 3.0 if not groups[1] else 4.6, 1 if not groups[1] else 2)
-    styles = ("-", "--", "-.", ":")
-    labels = labels_of([of for _, of in regions])
-    for row, group, unit in zip(axes, groups, ("m", "°"), strict=False):
-        for i, (region, colour) in group:
-            label = labels.get(region.name, "_")  # which legends leave out
+    regions = list(regions_of(story.scenario))
+    of_places = [of for of in regions if not of_attitude(of[0].shape)]
+    of_angles = [of for of in regions if of_attitude(of[0].shape)]
+    named = _named(story, [region.name for region, _ in regions])
+    others = len(regions) - len(named)
+    labels = [region.name for region, _ in (*of_places, *of_angles) if region.name in named]
+    rest = [f"{others} others"] if others else []
+    figure, axes = _zoomed(story, sheet, [2.5, 1.5] if of_angles else [2.5], [*labels, *rest])
+    entries: dict[str, Artist] = {}
+    order = [region.name for region, _ in regions if region.name in named]
+    for row, group, unit in zip(axes, (of_places, of_angles), ("m", "°"), strict=False):
+        signals = []
+        for region, colour in sorted(group, key=lambda of: of[0].name in named):  # the others behind
             signal = story.record[f"{region.name}.clearance"]
-            signal = np.rad2deg(signal) if unit == "°" else np.where(signal < _AWAY, signal, np.nan)
-            _curves(row, story, {label: signal}, color=colour, linestyle=styles[i % 4])
+            signal = np.rad2deg(signal) if unit == "°" else np.where(np.abs(signal) < _AWAY, signal, np.nan)
+            signals.append(signal)
+            if region.name in named:
+                i = order.index(region.name)
+                dashes, width = DASHES[i % len(DASHES)], 1.3 if i < len(DASHES) else 0.8
+                entries[region.name] = curve(row, story, signal, color=colour, linestyle=dashes, linewidth=width)
+            else:
+                entries[rest[0]] = curve(row, story, signal, color=colour, alpha=0.3, linewidth=0.6)
+        low, high = limits_of(signals)
+        low = min(low, -0.08 * (high - min(low, 0.0)))  # below 0 is always in sight
+        row[0].set_ylim(low, max(high, -0.2 * low))
         for ax in row:
-            ax.set_ylim(ax.get_ylim())
-            ax.axhspan(ax.get_ylim()[0], 0.0, color=RED, alpha=0.06, linewidth=0)
-            ax.axhline(0.0, color=BLACK, linewidth=0.8)
+            ax.axhspan(low, 0.0, color=RED, alpha=0.06, linewidth=0)
+            _zero_line(ax)
         row[0].set_ylabel(f"clearance [{unit}]")
-    drawn = [dict(zip(*reversed(row[0].get_legend_handles_labels()), strict=True)) for row in axes]
-    handles = {label: handle for of_row in drawn for label, handle in of_row.items()}
-    figure.legend(handles.values(), handles.keys(), loc="outside upper center", ncols=legend_columns(handles))
+    legend(figure, {label: entries[label] for label in (*labels, *rest)})
     return figure
 
 
-def helm(story: Story) -> Figure:
+def _named(story: Story, names: list[str]) -> set[str]:
+    """Return which of the goal and the regions a legend names: all, or of many those that came nearest."""
+    if len(names) <= _NAMED:
+        return set(names)
+    least = story.summary["min_clearance"]
+    return {names[0], *sorted(names[1:], key=lambda name: np.nan_to_num(least[name], nan=np.inf))[:_NEAREST]}
+
+
+def helm(story: Story, sheet: Sheet[F]) -> F:
     """Draw who steers, and whether the thrusters may work."""
-    figure, (ax,) = _axes(2.0)
+    figure, (ax,) = over_time(story, sheet, [1.3], [])
     time, mode = story.record["time"], story.record["helm.mode"]
     armed = story.record["helm.armed"] > 0.0
     changes = [0, *(np.flatnonzero(np.diff(mode) != 0.0) + 1).tolist(), len(time) - 1]
     for first, last in zip(changes, changes[1:], strict=False):
-        row = int(mode[first])
-        ax.broken_barh([(time[first], time[last] - time[first])], (row - 0.4, 0.8), color=CYCLE[row])
+        if np.isfinite(mode[first]):
+            row = int(mode[first])
+            ax.broken_barh([(time[first], time[last] - time[first])], (row - 0.4, 0.8), color=CYCLE[row])
     for start, end in spans(~armed, time):
         ax.axvspan(start, end, color=BLACK, alpha=0.2, linewidth=0)
-    ax.set(yticks=range(len(MODES)), yticklabels=MODES, ylim=(len(MODES) - 0.4, -0.6))
-    if time[-1] > 0.0:
-        ax.set_xlim(0.0, float(time[-1]))
+    ax.set(ylim=(len(MODES) - 0.4, -0.6), ylabel="mode [–]")
+    ax.set_yticks(range(len(MODES)), labels=MODES)
     return figure
 
 
-def forces(story: Story) -> Figure:
-    """Draw the norm of the body force on a logarithmic axis, and its components."""
-    figure, (norm, parts) = _axes(4.6, 2)
-    asked = np.linalg.norm(story.record.stack([f"command.{a}" for a in "XYZ"]), axis=1)
-    acting = np.linalg.norm(story.record.stack([f"actuation.{a}" for a in "XYZ"]), axis=1)
-    floor = 1e-2
-    _curves(norm, story, {"acting": np.maximum(acting, floor)}, color=BLUE)
-    _curves(norm, story, {"asked for": np.maximum(asked, floor)}, color=RED, linestyle="--")
-    norm.set(yscale="log", ylabel="‖F‖ [N]")
-    norm.legend(ncols=2)
-    _curves(parts, story, {f"{a} acting": story.record[f"actuation.{a}"] for a in "XYZ"})
-    largest, typical = float(acting.max()), float(np.percentile(acting, 90))
-    if largest > 20.0 * max(typical, 1.0):  # a spike would flatten all the rest
-        _symlog(parts, largest, typical)
-    parts.set_ylabel("force [N]")
-    parts.legend(ncols=3)
-    return figure
-
-
-def thruster_caption(scenario: Scenario) -> str:
-    """Return what the thruster figure shows."""
-    if scenario.actuation.through == "thrusters":
-        return "Force of each thruster, and its limits (dashed)."
-    return (
-        "What the acting body wrench would ask of each thruster (pseudo-inverse), and what a thruster gives (dashed): "
-        "in this scenario the wrench acts on the body directly, not through the thrusters."
-    )
-
-
-def thrusters(story: Story) -> Figure:
-    """Draw the force of each thruster, or what it would have to give."""
-    vehicle = story.scenario.vehicle
-    if story.scenario.actuation.through == "thrusters":
-        force = story.record.stack([f"thruster_force[{i + 1}]" for i in range(vehicle.n_thrusters)])
-    else:
-        wrench = story.record.stack([f"actuation.{a}" for a in "XYZKMN"])
-        force = wrench @ np.linalg.pinv(vehicle.thruster_matrix).T
-    figure, (ax,) = _axes(3.0)
-    for i in range(vehicle.n_thrusters):
-        style = "-" if i < len(CYCLE) // 2 else "--"
-        _curves(ax, story, {str(i + 1): force[:, i]}, color=CYCLE[i % len(CYCLE)], linestyle=style, linewidth=1.0)
-    lowest, highest = float(vehicle.thrust_min.min()), float(vehicle.thrust_max.max())
-    for bound in (lowest, highest):
-        ax.axhline(bound, color=BLACK, linestyle="--", linewidth=0.8)
-    if np.abs(force).max() > 5.0 * max(highest, -lowest):
-        _symlog(ax, float(np.abs(force).max()), max(highest, -lowest))
-    ax.set_ylabel("thrust [N]")
-    _legend(figure, ax, 8)
-    return figure
-
-
-def estimates(story: Story) -> Figure:
-    """Draw the estimates against the truth."""
-    figure, (force, moment) = _axes(4.2, 2)
-    truth = story.scenario.true_restoring_parameters
-    labels = ("W − B", "x_G W − x_B B", "y_G W − y_B B", "z_G W − z_B B")
-    styles = ("-", "-", "--", "-")
-    for i, label in enumerate(labels):
-        ax, colour = (force, BLUE) if i == 0 else (moment, CYCLE[i])
-        _curves(ax, story, {label: story.record[f"estimate.phi{i + 1}"]}, color=colour, linestyle=styles[i])
-        ax.axhline(truth[i], color=colour, linestyle=":", linewidth=1.0)
-    force.set_ylabel("φ̂1 [N]")
-    moment.set_ylabel("φ̂2 … φ̂4 [N m]")
-    force.legend()
-    moment.legend(ncols=3)
-    return figure
-
-
-def lyapunov(story: Story) -> Figure:
+def lyapunov(story: Story, sheet: Sheet[F]) -> F:
     """Draw V in its three forms, and its rate."""
-    figure, axes = _zoomed(story, 4.6, 2)
     forms = {form: story.record[f"lyapunov.{form}"] for form in ("printed", "normalised", "primary")}
     labels = ("V as printed", "V, potential of the force", "V, primary region alone")
-    for label, V, colour, style in zip(labels, forms.values(), (ORANGE, BLUE, BLACK), ("-", "--", ":"), strict=True):
-        _curves(axes[0], story, {label: V}, color=colour, linestyle=style)
+    figure, axes = _zoomed(story, sheet, [1.8, 1.8], labels)
+    styles = zip(forms.values(), (ORANGE, BLUE, BLACK), DASHES, strict=False)
+    lines = [curve(axes[0], story, V, color=colour, linestyle=style) for V, colour, style in styles]
     rate = story.record["lyapunov.rate"]
-    _curves(axes[1], story, {"dV/dt = −W": rate}, color=BLUE)
+    curve(axes[1], story, rate, color=BLUE)
     for row, signal, bad in ((axes[0], forms["normalised"], -1.0), (axes[1], rate, 1.0)):
-        largest, typical = float(np.abs(signal).max()), float(np.percentile(np.abs(signal), 50))
+        size = np.abs(signal[np.isfinite(signal)])
+        largest, typical = (float(size.max()), float(np.percentile(size, 50))) if size.size else (0.0, 0.0)
+        if largest > 20.0 * max(typical, 1.0):  # the beginning would flatten all the rest
+            symlog_axis(row[0], largest, max(typical, 1e-3 * largest))
+        else:
+            row[0].set_ylim(*limits_of([signal, np.zeros(1)]))
+        limits = row[0].get_ylim()
         for ax in row:
-            if largest > 20.0 * max(typical, 1.0):  # the beginning would flatten all the rest
-                _symlog(ax, largest, max(typical, 1e-3 * largest))
-            else:
-                ax.set_ylim(1.1 * min(0.0, float(signal.min())) - 0.05 * largest, 1.1 * largest)
-            limits = ax.get_ylim()
             ax.axhspan(0.0, limits[0] if bad < 0.0 else limits[1], color=RED, alpha=0.06, linewidth=0)
-            ax.set_ylim(limits)
-            ax.axhline(0.0, color=BLACK, linewidth=0.8)
+            _zero_line(ax)
+        row[0].set_ylim(limits)
     axes[0, 0].set_ylabel("V [N m]")
     axes[1, 0].set_ylabel("dV/dt = −W [W]")
-    _legend(figure, axes[0, 0], 3)
+    legend(figure, dict(zip(labels, lines, strict=True)))
     return figure

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from controller.regions import SHAPES
+from controller.regions import SHAPES, Shape
 from cosim.claims import newtons
 from cosim.scenario import Scenario
 
@@ -28,10 +28,48 @@ def asked(scenario: Scenario) -> str:
         f"{'within' if r.region.keep == 'in' else 'out of'} {r.region.name} ({r.criterion})" for r in scenario.regions
     ]
     respecting = f", keeping {', '.join(regions)}" if regions else ""
-    kind = next(name for name, shape in SHAPES.items() if isinstance(scenario.goal, shape)).replace("_", " ")
+    kind = kind_of(scenario.goal)
     centre = [sum(pair) / 2.0 for pair in zip(*scenario.goal.bounds(), strict=True)]
     at = f" about ({', '.join(f'{x:g}' for x in centre)}) m" if all(map(math.isfinite, centre)) else ""
     return f"From ({start}) m into the goal region, a {kind}{at}{respecting}; {scenario.law.name} law."
+
+
+def kind_of(shape: Shape) -> str:
+    """Return what a shape is called, such as ``depth band``.
+
+    Parameters
+    ----------
+    shape : Shape
+        Any.
+
+    Returns
+    -------
+    str
+        In lower case.
+    """
+    return next(name for name, of in SHAPES.items() if isinstance(shape, of)).replace("_", " ")
+
+
+def number(value: float, digits: int) -> str:
+    """Return a number as it is read.
+
+    Parameters
+    ----------
+    value : float
+        Any.
+    digits : int
+        That count.
+
+    Returns
+    -------
+    str
+        With a true minus sign; ``no number`` where it is none.
+    """
+    if not math.isfinite(value):
+        return "no number"
+    if abs(value) >= 10.0**digits:
+        return f"{value:,.0f}".replace(",", " ").replace("-", "−")
+    return f"{value:.{digits}g}".replace("-", "−")
 
 
 def verdict(summary: dict[str, Any]) -> str:
@@ -53,7 +91,9 @@ def verdict(summary: dict[str, Any]) -> str:
     elif summary["reached"]:
         goal = f"The vehicle entered the goal region at {summary['reach_time']:.2f} s but did not settle there"
     else:
-        goal = f"The vehicle never entered the goal region; it came within {summary['closest_to_goal']:.2f} m of it"
+        near = summary["closest_to_goal"]
+        how_near = f"it came within {near:.2f} m of it" if math.isfinite(near) else "how near it came is not recorded"
+        goal = f"The vehicle never entered the goal region; {how_near}"
     broken = [_broken(summary, name) for name, c in summary["min_clearance"].items() if c < 0.0]
     kept = "; it kept every region."
     if broken:

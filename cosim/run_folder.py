@@ -7,6 +7,7 @@ import itertools
 import json
 import os
 import shutil
+from collections.abc import Collection
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
@@ -125,22 +126,24 @@ def conclude(path: Path, scenario: Scenario, status: str, wall_time: float | Non
         If the record cannot be read.
     """
     run = flown_run(path, scenario, status, wall_time)
-    _write(run, report)
+    _write(run, ("html",) if report else ())
     return run.summary
 
 
-def report_again(path: Path) -> dict[str, Any]:
-    """Write summary, report and replay of a run that is done, was interrupted, or was killed.
+def report_again(path: Path, formats: Collection[str] = ("html",)) -> tuple[dict[str, Any], list[Path]]:
+    """Write summary and report of a run that is done, was interrupted, or was killed.
 
     Parameters
     ----------
     path : Path
         The run folder.
+    formats : collection of str
+        What to write the report as, as in `write_report`; with ``html`` the replay comes too.
 
     Returns
     -------
-    dict
-        The summary.
+    dict, list of Path
+        The summary, and the files of the report.
 
     Raises
     ------
@@ -151,16 +154,16 @@ def report_again(path: Path) -> dict[str, Any]:
     """
     run = load_run(path)
     try:
-        _write(run, report=True)
+        return run.summary, _write(run, formats)
     except OSError as error:
         raise RunError(f"{path}: {error.strerror or error}") from error
-    return run.summary
 
 
-def _write(run: FlownRun, report: bool) -> None:
+def _write(run: FlownRun, formats: Collection[str]) -> list[Path]:
     scratch = run.path / f".{SUMMARY}-{os.getpid()}"
     scratch.write_text(json.dumps(plain(run.summary), indent=2, allow_nan=False) + "\n", encoding="utf-8")
     scratch.replace(run.path / SUMMARY)
-    if report:
-        write_report(run.path, run.scenario, run.record, run.summary)
+    files = write_report(run, formats) if formats else []
+    if "html" in formats:
         write_replay(run)
+    return files

@@ -1,11 +1,15 @@
 """Regions in pictures: where those that move were, and those that are at no place left out."""
 
+import re
+
 import numpy as np
 import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.text import Text
 
-from controller.regions import Sphere
-from cosim.drawing import Story, features_of, labels_of, legend_columns, places_of, shifts_of
+from cosim.drawing import Story, features_of, legend_columns, places_of, shifts_of
 from cosim.figures import drawings
+from cosim.figures_box import Box
 from cosim.record import load_record
 from cosim.report_words import verdict
 from cosim.run import run_scenario
@@ -67,6 +71,71 @@ def test_every_figure_can_be_drawn(request, name):
     assert drawn == pytest.approx(np.linalg.norm(path - centre, axis=1) / np.sqrt(3.0))
 
 
+LABELLED = re.compile(r"\[(m|s|N|N m|W|°|–)\]$")
+
+
+@pytest.mark.parametrize("name", ["inspection", "drifting"])
+def test_every_axis_of_every_figure_has_a_name_and_a_unit(request, name):
+    for drawing in drawings(request.getfixturevalue(name)):
+        for ax in drawing.figure.axes:
+            if drawing.name == "path-3d":  # draws its own axes
+                names = [text.get_text() for text in ax.texts if LABELLED.search(text.get_text())]
+                assert names == ["north, NED x [m]", "east, NED y [m]", "depth, NED z [m]"]
+                continue
+            for axis in (ax.xaxis, ax.yaxis):
+                sides = axis.get_tick_params()
+                if sides.get("labelleft") or sides.get("labelbottom"):
+                    assert LABELLED.search(axis.get_label_text()), (drawing.name, axis.get_label_text())
+
+
+@pytest.mark.parametrize("name", ["inspection", "drifting"])
+def test_nothing_is_cut_off_and_no_names_overlap(request, name):
+    for drawing in drawings(request.getfixturevalue(name)):
+        figure = drawing.figure
+        renderer = FigureCanvasAgg(figure).get_renderer()
+        figure.draw(renderer)
+        boxes = [
+            (text.get_text(), text.get_window_extent(renderer))
+            for text in figure.findobj(Text)
+            if text.get_visible() and text.get_text().strip() and shown(text) and not text.get_rotation() % 90.0
+        ]  # what is slanted fills little of its box
+        assert len(boxes) > 8
+        for i, (words, box) in enumerate(boxes):
+            assert box.x0 >= 0 and box.y0 >= 0, (drawing.name, words)
+            assert box.x1 <= figure.bbox.x1 and box.y1 <= figure.bbox.y1, (drawing.name, words)
+            for other, beside in boxes[:i]:
+                assert not (box.shrunk(0.9, 0.8).overlaps(beside.shrunk(0.9, 0.8))), (drawing.name, words, other)
+
+
+def shown(text):
+    """Ticks have labels on both sides, of which most are hidden, and beyond the axis too."""
+    for ax in text.figure.axes:
+        for axis in (ax.xaxis, ax.yaxis):
+            for tick in axis.get_major_ticks():
+                if text in (tick.label1, tick.label2):
+                    low, high = sorted(axis.get_view_interval())
+                    return low <= tick.get_loc() <= high
+    return True
+
+
+def test_a_view_from_above_has_east_to_the_right_of_north(drifting):
+    (figure,) = (drawing.figure for drawing in drawings(drifting) if drawing.name == "path-plane")
+    side, above = figure.axes
+    north = above.transData.transform([[0.0, 0.0], [1.0, 0.0]])
+    east = above.transData.transform([[0.0, 0.0], [0.0, 1.0]])
+    assert np.cross(np.append(north[1] - north[0], 0.0), np.append(east[1] - east[0], 0.0))[2] < 0.0
+    down = side.transData.transform([[0.0, 0.0], [0.0, 1.0]])
+    assert down[1, 1] < down[0, 1]
+
+
+def test_the_view_in_space_keeps_right_right():
+    right, up = Box(np.zeros(3), np.ones(3)).view
+    towards = np.cross(right, up)  # the viewer
+    assert np.linalg.det(np.array([right, up, towards])) == pytest.approx(1.0)
+    assert towards[2] < 0.0 < towards[1]  # above, and in the east
+    assert up[2] < 0.0
+
+
 def test_verdict_gives_angles_in_degrees(inspection):
     least = np.rad2deg(inspection.record["view.clearance"].min())
     assert least < -1.0
@@ -75,16 +144,6 @@ def test_verdict_gives_angles_in_degrees(inspection):
     )
     assert inspection.summary["clearance_unit"] == {"view": "rad", "pipe": "m", "sea bed": "m"}
     assert inspection.summary["hard"] == ["pipe", "sea bed"]
-
-
-def test_many_regions_share_a_label():
-    from controller.regions import Region
-
-    def named(n):
-        return [(Region(f"r{i}", Sphere((0.0, 0.0, 0.0), 1.0), "out"), "blue" if i else "green") for i in range(n)]
-
-    assert labels_of(named(3)) == {"r0": "r0", "r1": "r1", "r2": "r2"}
-    assert labels_of(named(12)) == {"r0": "r0", "r1": "11 regions"}
 
 
 @pytest.mark.parametrize(("longest", "columns"), [(1, 12), (13, 5), (93, 1), (200, 1)])

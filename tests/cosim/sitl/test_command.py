@@ -74,5 +74,5 @@ def test_a_report_made_again_still_says_who_flew(serve):
         for _ in range(60):
             pilot.fly(NEUTRAL)
     (run,) = served.outcome().runs
-    assert report_again(run.folder)["law"] == "ardupilot"
+    assert report_again(run.folder)[0]["law"] == "ardupilot"
     assert "; ardupilot law." in (run.folder / "report.html").read_text()

@@ -1,0 +1,57 @@
+"""``cosim report``."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+from typing import Any
+
+_FORMATS = ("html", "pdf", "png")
+
+
+def add_verb(verbs: Any) -> None:
+    """Add the verb to the parser.
+
+    Parameters
+    ----------
+    verbs : argparse subparsers
+        Of the command.
+    """
+    report = verbs.add_parser("report", help="write summary and report of runs again, or of killed ones")
+    report.add_argument("folders", type=Path, nargs="+", metavar="RUN", help="a run folder")
+    report.add_argument(
+        "--format", type=_formats, action="append", default=[], metavar="html|pdf|png", dest="formats",
+        help="html: a page with its figures, and the replay (default); pdf: a document; png: pictures of its pages and "
+        "figures; several with commas between them",
+    )  # fmt: skip
+
+
+def _formats(text: str) -> list[str]:
+    formats = [part.strip() for part in text.split(",")]
+    for name in formats:
+        if name not in _FORMATS:
+            raise argparse.ArgumentTypeError(f"{name!r}: expected {', '.join(_FORMATS)}")
+    return formats
+
+
+def report(options: argparse.Namespace) -> int:
+    """Run ``cosim report``: one bad folder does not keep the others from theirs."""
+    from controller import ControllerError
+    from cosim.errors import CosimError
+    from cosim.report_words import verdict
+    from cosim.run_folder import report_again
+    from plant_fmu import PlantFmuError
+
+    formats = [name for group in options.formats for name in group] or ["html"]
+    bad = 0
+    for folder in options.folders:
+        try:
+            summary, files = report_again(folder, formats)
+        except (CosimError, ControllerError, PlantFmuError) as error:
+            print(f"cosim: {error}", file=sys.stderr)
+            bad += 1
+            continue
+        print(verdict(summary))
+        print(files[0])
+    return 2 if bad else 0
