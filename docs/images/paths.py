@@ -7,6 +7,7 @@ import tempfile
 from pathlib import Path
 
 from cosim.run import run_scenario
+from cosim.run_folder import report_again
 from cosim.scenario import load_scenario
 
 PATHS = {"path-plane.png": "paper", "path-deployable.png": "paper-deployable"}
@@ -16,5 +17,7 @@ def main() -> None:
     """Draw both."""
     with tempfile.TemporaryDirectory() as scratch:
         for picture, name in PATHS.items():
-            folder = run_scenario(load_scenario(name, ["arbiter.engine=closed"]), Path(scratch) / name).folder
+            scenario = load_scenario(name, ["arbiter.engine=closed"])
+            folder = run_scenario(scenario, Path(scratch) / name, report=False).folder
+            report_again(folder, ("png",))
             shutil.copyfile(folder / "figures" / "path-plane.png", picture)
