@@ -6,6 +6,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.cosim.replay.browser import CHROMEDRIVER, CHROMIUM
+
 ROOT = Path(__file__).parents[1]
 IMAGES = ROOT / "docs" / "images"
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
@@ -57,3 +59,14 @@ def test_the_paths_of_the_readme_are_figures_of_runs(draw, monkeypatch):
     whole = scenario.load_scenario
     monkeypatch.setattr(scenario, "load_scenario", lambda name, over: whole(name, [*over, "time.duration=0.5"]))
     assert draw("paths").keys() == {"path-plane.png", "path-deployable.png"}
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(CHROMIUM is None or CHROMEDRIVER is None, reason="chromium and chromedriver are not installed")
+def test_the_page_of_the_readme_is_that_of_a_run(draw):
+    from PIL import Image
+
+    drawn = draw("pages")
+    assert drawn.keys() == {"replay-docking.png"}
+    with Image.open(drawn["replay-docking.png"]) as fresh, Image.open(IMAGES / "replay-docking.png") as kept:
+        assert fresh.size == kept.size

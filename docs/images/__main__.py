@@ -11,6 +11,7 @@ from pathlib import Path
 
 import arbiter
 import fmu
+import pages
 import paths
 
 HERE = Path(__file__).parent
@@ -25,7 +26,7 @@ def reference() -> None:
         shutil.copyfile(Path(scratch) / "fmu-reference.png", "fmu-reference.png")
 
 
-MAKERS = {"arbiter": arbiter.main, "fmu": fmu.main, "paths": paths.main, "reference": reference}
+MAKERS = {"arbiter": arbiter.main, "fmu": fmu.main, "pages": pages.main, "paths": paths.main, "reference": reference}
 
 if __name__ == "__main__":
     with contextlib.chdir(HERE):
