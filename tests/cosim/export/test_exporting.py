@@ -135,6 +135,7 @@ def test_a_tlog_is_the_vehicle_as_pymavlink_sees_it(run, tmp_path):
     depths = {}
     while (message := log.recv_match(type="LOCAL_POSITION_NED")) is not None:
         depths[message.time_boot_ms] = message.z
+    log.close()
     assert len(depths) > 5
     for milliseconds, depth in depths.items():
         row = int(np.argmin(np.abs(record["time"] - milliseconds / 1e3)))
