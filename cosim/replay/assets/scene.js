@@ -165,7 +165,7 @@ class Scene {
     paintCompass(painter, this.labels, colours);
     paintScale(painter, this.labels, colours, Math.max(1, ...vehicles.map((vehicle) => vehicle?.magnified ?? 1)));
     for (const vehicle of vehicles) if (vehicle) blockVehicle(this.labels, camera, vehicle);
-    if (labels) nameRegions(this.labels, camera, regions, colours);
+    if (labels) nameRegions(this.labels, camera, regions, colours, this.runs, t);
     if (labels && this._runMarks) nameVehicles(this.labels, camera, this._runMarks, vehicles, colours);
     this.labels.draw();
     this._note(t, poses, regions);
