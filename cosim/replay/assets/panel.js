@@ -159,6 +159,7 @@ class Panel {
   _sort(rows, active) {
     rows.forEach(({ index, region, clearance }, place) => {
       const { item, value } = this.distances[index];
+      item.hidden = !this.run.there(index, this.player.t); // an obstacle that comes and goes
       const against = clearance < 0 && region.criterion;
       item.className = `${against ? "violated" : ""} ${index === active ? "active" : ""}`;
       const mark = against ? "✕ " : clearance >= 0 && !region.criterion ? "✓ " : "";
