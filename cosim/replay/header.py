@@ -48,6 +48,7 @@ def header_of(scenario: Scenario, columns: Sequence[Column], commands: bool = Fa
         "duration": scenario.time.duration,
         "ramp": scenario.arbiter.ramp,
         "commands": commands,
+        "through": scenario.actuation.through,
         "vehicle": _vehicle(scenario.vehicle),
         "regions": [_region(scenario, i) for i in range(len(scenario.regions) + 1)],
         "rules": rules_of(system),

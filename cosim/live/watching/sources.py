@@ -199,5 +199,7 @@ def _live(endpoint: tuple[str, int]) -> Iterator[Look]:
 
 
 def _reason(error: Exception) -> str:
+    if isinstance(error, ConnectionRefusedError):
+        return "cannot be watched: nothing answers there; is a run with --live going on, and is this its port?"
     text = getattr(error, "strerror", None) or str(error)
     return f"cannot be watched: {text}"

@@ -115,7 +115,8 @@ function chartsOf(runs) {
     Object.entries(OF_CRITERION).map(([name, hue], i) => signal(`${kind}.${name}`, name, hue, { dash: DASHES[i] }));
   const axes = (kind, letters, words = letters) => inTurn([...letters].map((a) => `${kind}.${a}`), [...words]);
   const size = (kind) => derived((run) => sizes(run, ["X", "Y", "Z"].map((axis) => `${kind}.${axis}`)));
-  const thrusters = Math.max(0, ...runs.map((run) => run.header.vehicle?.thrusters?.length ?? 0));
+  const driven = runs.filter((run) => run.header.through === "thrusters"); // the others would be level at 0
+  const thrusters = Math.max(0, ...driven.map((run) => run.header.vehicle?.thrusters?.length ?? 0));
   const numbers = Array.from({ length: thrusters }, (_, i) => i + 1);
   return [
     { key: "distances", title: "Distance to each region", unit: "m", zero: true, tall: true, signals: clearances(runs, "m") },

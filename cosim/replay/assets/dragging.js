@@ -44,8 +44,7 @@ class Dragging {
     if (!found || !canMove(link.run, found.region) || isFlat(link.run, found.region)) return null;
     // the walls of what is to be kept within are all around; its name alone is a handle
     const { keep } = link.run.header.regions[found.region];
-    const over = (box) => x >= box.x && x <= box.x + box.width && y >= box.y && y <= box.y + box.height;
-    const named = scene.labels.placed.some((box) => box.key === `${found.run}:${found.region}` && over(box));
+    const named = scene.labels.nameAt(x, y) !== null; // a name is picked before what is behind it
     return found.region === 0 || keep === "out" || named ? found.region : null;
   }
 

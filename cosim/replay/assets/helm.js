@@ -18,7 +18,14 @@ class HelmPanel {
     summary.append(this.state);
     this.body = element("div", "helm-body");
     this.holder.append(summary, this.body);
+    const { stage } = link.page;
     document.getElementById("stage").append(this.holder);
+    // names in the scene stay out from behind it; it hangs at the right
+    new ResizeObserver(() => {
+      const { offsetTop, offsetHeight, offsetWidth } = this.holder;
+      stage.covered = { top: offsetTop, width: offsetWidth + 8, height: offsetHeight };
+      stage.changed();
+    }).observe(this.holder);
     this._rows = [];
   }
 
@@ -29,6 +36,7 @@ class HelmPanel {
     this._rows = [];
     this.body.replaceChildren();
     if (!run.header.commands) {
+      this.holder.open = false; // it would hide a part of the scene and offer nothing
       this.body.append(element("p", "", "Watching only. Start the run with --commands to steer it from here."));
     } else {
       this.body.append(this._buttons(), this._list(), this._adding());

@@ -124,7 +124,7 @@ class Panel {
   _weights() {
     const { section, heading } = this._section("Weights", "weights");
     heading.append(element("span", "note", "bar: weight, tick: attention asked"));
-    this.weights = Object.entries(OF_CRITERION).map(([name, hue]) => [name, new BarRow(name, hue)]);
+    this.weights = Object.entries(OF_CRITERION).map(([name, hue], i) => [name, new BarRow(`${name} α${i + 1}`, hue)]);
     section.append(listOf(this.weights.map(([, row]) => row.element)));
   }
 
@@ -159,11 +159,11 @@ class Panel {
   _sort(rows, active) {
     rows.forEach(({ index, region, clearance }, place) => {
       const { item, value } = this.distances[index];
+      item.hidden = !this.run.there(index, this.player.t); // an obstacle that comes and goes
       const against = clearance < 0 && region.criterion;
       item.className = `${against ? "violated" : ""} ${index === active ? "active" : ""}`;
-      const sign = clearance > 0 ? "+" : "";
-      const word = against ? "✕ violated " : clearance < 0 ? "to go " : index === 0 && clearance >= 0 ? "✓ inside " : "";
-      setText(value, `${word}${Number.isFinite(clearance) ? sign + quantity(clearance, region.unit) : "no number"}`);
+      const mark = against ? "✕ " : clearance >= 0 && !region.criterion ? "✓ " : "";
+      setText(value, mark + clearanceWords(clearance, region));
       if (this.order.children[place] !== item) this.order.insertBefore(item, this.order.children[place] ?? null);
     });
   }

@@ -1,5 +1,7 @@
 // The regions of some runs at a time: which surfaces, sheets and sights there are, and how each is dressed.
 
+const NAMED_IN_SCENE = 6; // regions to be kept out of that have names, the nearest of each scene
+
 /** Tells what there is to draw of regions; equal ones of several runs are drawn once. */
 class Regions {
   /** @param {Run[]} runs */
@@ -87,9 +89,23 @@ function anchorOf({ solid, sheet, sight, shift, middle }, camera) {
   return solid.spine ? middle : [middle[0], middle[1], solid.top + shift[2]];
 }
 
-/** Ask for the names of regions, the active one marked. */
-function nameRegions(labels, camera, entries, colours) {
+/** Regions to be kept out of, by entry, the nearest to the vehicle first; those to be kept within are not among them. */
+function nearestFirst(entries, runs, t) {
+  const gap = ({ of, region }) => {
+    const clearance = runs[of.run].held(`${region.name}.clearance`, t);
+    return Number.isNaN(clearance) ? Infinity : clearance;
+  };
+  return entries
+    .filter(({ region }) => region.criterion && region.keep === "out")
+    .map((entry) => [gap(entry), entry])
+    .sort(([a], [b]) => (a < b ? -1 : a > b ? 1 : 0))
+    .map(([, entry]) => entry);
+}
+
+/** Ask for the names of regions, the active one marked; of many to be kept out of, those of the nearest. */
+function nameRegions(labels, camera, entries, colours, runs, t) {
   const named = new Set();
+  const near = new Map(nearestFirst(entries, runs, t).map((entry, place) => [entry, place]));
   for (const entry of entries) {
     const key = `${entry.of.run}:${entry.of.region}`;
     if (named.has(key)) continue;
@@ -97,11 +113,13 @@ function nameRegions(labels, camera, entries, colours) {
     if (!(depth > camera.near) || x < 0 || y < 0 || x > camera.width || y > camera.height) continue;
     named.add(key);
     const { active } = entry;
+    const place = near.get(entry) ?? 0;
+    if (place >= NAMED_IN_SCENE && !active) continue;
     labels.add({
       key, x, y, gap: 6, of: entry.of, size: camera.width < 480 && !active ? 10 : 12,
       text: active ? `▶ ${entry.region.name}` : entry.region.name,
       colour: active ? colours.ink : colours.soft, edge: entry.colour, bold: active, chip: colours.chip,
-      rank: active ? 0 : entry.of.region === 0 ? 1 : 10 + 1e-3 * depth, far: active || entry.of.region === 0,
+      rank: active ? 0 : entry.of.region === 0 ? 1 : 10 + place, far: active || entry.of.region === 0,
       sides: ["above", "right", "left", "below"],
     });
   }

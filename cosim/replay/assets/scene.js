@@ -109,7 +109,7 @@ class Scene {
 
   /**
    * Draw the scene at a time.
-   * @param {number} t [s]  @param {{follow: boolean, trail: boolean, labels: boolean}} options
+   * @param {number} t [s]  @param {{follow: boolean, trail: boolean, labels: boolean, covered: ?object}} options
    */
   draw(t, options = {}) {
     this._last = [t, options];
@@ -125,6 +125,8 @@ class Scene {
     context.lineJoin = "bevel"; // round ones cost as much as the lines
     this._paintSky(colours);
     this.labels.begin(camera.width, camera.height);
+    const { covered } = options;
+    if (covered) this.labels.block(camera.width - covered.width, covered.top, covered.width, covered.height);
 
     const regions = this._regions.at(t, poses, camera.target, this.theme);
     this._entries = farthestFirst(regions.filter((entry) => entry.solid || entry.sheet), camera.eye);
@@ -165,7 +167,7 @@ class Scene {
     paintCompass(painter, this.labels, colours);
     paintScale(painter, this.labels, colours, Math.max(1, ...vehicles.map((vehicle) => vehicle?.magnified ?? 1)));
     for (const vehicle of vehicles) if (vehicle) blockVehicle(this.labels, camera, vehicle);
-    if (labels) nameRegions(this.labels, camera, regions, colours);
+    if (labels) nameRegions(this.labels, camera, regions, colours, this.runs, t);
     if (labels && this._runMarks) nameVehicles(this.labels, camera, this._runMarks, vehicles, colours);
     this.labels.draw();
     this._note(t, poses, regions);

@@ -8,6 +8,7 @@ class Stage {
     this.changed = changed;
     this.side = false;
     this.labels = true;
+    this.covered = null; // {top, width, height} of what hangs over the scene, at its right [px]
     this.holder = document.getElementById("views");
     const first = this.holder.querySelector(".view");
     this.views = [this._view(first)];
@@ -84,7 +85,8 @@ class Stage {
 
   draw(t, follow) {
     // one camera can follow one vehicle only
-    this.scenes.forEach((scene, i) => scene.draw(t, { follow: follow && i === 0, trail: true, labels: this.labels }));
+    const { labels, covered } = this;
+    this.scenes.forEach((scene, i) => scene.draw(t, { follow: follow && i === 0, trail: true, labels, covered }));
   }
 
   /** Call a method of the one camera. */

@@ -88,3 +88,25 @@ def test_the_target_is_dragged_with_the_mouse(browser, live, tmp_path):
     assert log[1]["position"] == pytest.approx(after, abs=1e-12)
     target = load_record(done.folder).stack([f"target.{axis}" for axis in "xyz"])
     assert (target == after).all(axis=1).any()
+
+
+def test_a_region_to_be_kept_within_is_dragged_by_its_name(browser, live):
+    running = live("harbour", "time.duration=12", "regions.ship.keep=in", commands=True, rate=1.0)
+    until(lambda: running.view._run >= 0)
+    browser.get(running.url)
+    until(
+        lambda: browser.execute_script(
+            "return window.subreach?.ready && subreach.runs[0]?.rows > 0 && !!subreach.scene"
+        )
+    )
+    name = "return subreach.scene.labels.placed.find((box) => box.of?.region === 1)"
+    box = until(lambda: browser.execute_script(name))
+    canvas = browser.find_element("id", "scene")
+    x, y = (
+        box["x"] + box["width"] / 2 - canvas.size["width"] / 2,
+        box["y"] + box["height"] / 2 - canvas.size["height"] / 2,
+    )
+    hand = webdriver.ActionChains(browser).move_to_element_with_offset(canvas, int(x), int(y))
+    hand.click_and_hold().move_by_offset(-20, 30).move_by_offset(-20, 30).release().perform()
+    moved = "return subreach.runs[0].held('ship.shift.x', subreach.runs[0].end)"
+    until(lambda: browser.execute_script(moved) not in (None, 0))

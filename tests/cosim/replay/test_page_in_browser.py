@@ -161,3 +161,40 @@ def test_a_page_without_a_run_says_so(browser, tmp_path):
     browser.open(write_page(tmp_path / "replay.html", [], "nothing"))
     assert "holds no run" in browser.js("return document.body.innerText")
     assert browser.logs()[1] == []
+
+
+def test_the_panel_tells_distances_in_words_without_signs(browser, shown, docking):
+    page = shown(docking)
+    browser.open(page.file)
+    rows = """return Object.fromEntries([...document.querySelectorAll("#panel .distances li")].map(
+        (item) => [item.querySelector(".name").textContent, item.querySelector(".value").textContent]))"""
+    for end, word in (("0", " to go"), ("subreach.player.duration", "✓ inside by ")):
+        browser.js(f"subreach.player.seek({end})")
+        wait_until(browser, f"document.querySelector('#panel .distances').textContent.includes('{word}')")
+        told = browser.js(rows)
+        row = 0 if end == "0" else -1
+        assert float(told["goal"].replace(word, "").removesuffix(" m")) == pytest.approx(
+            abs(page.columns["goal.clearance"][row]), rel=0.01
+        )
+        assert told["roof"].endswith(" m clear")
+
+
+def test_of_many_regions_none_but_the_six_nearest_have_names(browser, shown, shipped_run):
+    page = shown(load_run(shipped_run("dense-field", "time.duration=1", "arbiter.engine=closed").folder))
+    browser.open(page.file)
+    browser.js("subreach.player.seek(subreach.player.duration)")
+    wait_until(browser, "subreach.scene.labels.placed.length > 0")
+    named = set(
+        browser.js("""
+            const { scene, runs } = subreach;
+            const named = scene.labels.placed.filter((box) => box.of);
+            return named.map((box) => runs[0].header.regions[box.of.region].name)""")
+    )
+    rocks = sorted(
+        (name.removesuffix(".clearance") for name in page.columns if name.startswith("rock") and ".clearance" in name),
+        key=lambda name: page.columns[f"{name}.clearance"][-1],
+    )
+    assert len(rocks) == 24
+    assert {"goal", "water column"} <= named
+    assert named & set(rocks)
+    assert named & set(rocks) <= set(rocks[:6])
