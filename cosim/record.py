@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import shutil
 import time
 from collections import OrderedDict
@@ -52,6 +53,7 @@ class Recorder:
         (folder / PARTS).mkdir()
         self._whole: pq.ParquetWriter | None = None  # what the record will be, begun with its first rows
         self._gathered: list[pa.Table] = []  # written as parts, but not yet into the whole
+        self._sound = True  # the whole has what it should have; not so once a write was cut off
 
     def observe(self, k: int, row: Array) -> None:
         """Keep the row of step `k`."""
@@ -64,11 +66,28 @@ class Recorder:
     def close(self) -> None:
         """Write what is left, and put the whole in the place of its parts."""
         self._flush()
+        if not self._sound:
+            self._begin_anew()
         self._write_gathered()
         if self._whole is not None:
             self._whole.close()
         (self._folder / PARTS / _WHOLE).replace(self._folder / RECORD)
         shutil.rmtree(self._folder / PARTS)
+
+    def _begin_anew(self) -> None:
+        """Write the whole from its parts: Ctrl-C or a full disk may have come in the middle of it."""
+        if self._whole is not None:
+            with contextlib.suppress(OSError, pa.ArrowException):
+                self._whole.close()
+            self._whole = None
+        self._gathered = []
+        for part in _part_files(self._folder):
+            self._gather(pq.read_table(part, schema=self._schema))
+
+    def _gather(self, table: pa.Table) -> None:
+        self._gathered.append(table)
+        if sum(gathered.num_rows for gathered in self._gathered) >= len(self._block):
+            self._write_gathered()
 
     def _write_gathered(self) -> None:
         if self._gathered:
@@ -80,6 +99,7 @@ class Recorder:
     def _flush(self) -> None:
         if not self._filled:
             return
+        sound, self._sound = self._sound, False
         # not pa.array: that imports pandas where it is installed, for nothing
         columns = [
             pa.Array.from_buffers(pa.float64(), self._filled, [None, pa.py_buffer(column)])
@@ -92,9 +112,9 @@ class Recorder:
         scratch.replace(part)
         # only now: an interrupted write is done again, into the same part
         self._parts, self._filled = self._parts + 1, 0
-        self._gathered.append(table)
-        if sum(gathered.num_rows for gathered in self._gathered) >= len(self._block):
-            self._write_gathered()
+        if sound:
+            self._gather(table)
+        self._sound = sound
         self._flushed = time.monotonic()
 
 
