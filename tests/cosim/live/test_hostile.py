@@ -147,6 +147,10 @@ def test_connections_beyond_the_most_are_cut_off_so_that_the_run_keeps_files_to_
         for late in idle[CONNECTIONS:]:
             with contextlib.suppress(ConnectionResetError):
                 assert late.recv(1) == b""
+        for early in idle[:CONNECTIONS]:
+            early.setblocking(False)
+            with pytest.raises(BlockingIOError):
+                early.recv(1)
     with running.viewer() as viewer:
         viewer.order(**ARM)
         viewer.until("end")
