@@ -2,6 +2,7 @@
 
 import builtins
 import importlib
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -147,3 +148,19 @@ def test_blocks_of_a_long_record_stay_small(run, monkeypatch):
     sizes = [len(block) for block in excerpt_of(run, every=2).blocks()]
     assert sum(sizes) == 51
     assert max(sizes) <= 7
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="this system has no full disk to try")
+@pytest.mark.parametrize("to", ["csv", "npz", "mat", "mcap", "rrd", "tlog"])
+def test_a_full_disk_is_told_and_leaves_nothing(run, tmp_path, monkeypatch, to):
+    writer = importlib.import_module(f"cosim.export.as_{to}")
+    write = writer.write
+
+    def on_full_disk(excerpt, path):
+        path.symlink_to("/dev/full")
+        return write(excerpt, path)
+
+    monkeypatch.setattr(writer, "write", on_full_disk)
+    with pytest.raises((ExportError, RunError), match=r"space|not all was written|cannot be written"):
+        export_run(run, to, tmp_path / f"out.{to}")
+    assert not list(tmp_path.iterdir())

@@ -167,5 +167,5 @@ def test_parts_that_are_no_record_are_named_in_one_line(paper, tmp_path, garbage
         part.write_bytes(b"garbage")
     else:
         pq.write_table(pa.table({"a": [1.0]}), part)
-    with pytest.raises(RunError, match="cannot be read|not of its scenario"):
+    with pytest.raises(RunError, match=r"cannot be read|not of its scenario"):
         next(iter(looks(str(tmp_path))))
