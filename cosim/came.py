@@ -38,15 +38,16 @@ def as_it_came(scenario: Scenario, record: Record) -> Scenario:
 
 
 def _came(secondary: SecondaryRegion, record: Record) -> SecondaryRegion | None:
-    """Return a region at its size, None for an obstacle that never came."""
+    """Return a region at its size, None for an obstacle that never came, or of which no row tells the size."""
     if not secondary.seen:
         return secondary
     name = secondary.region.name
     shifts = record.stack([f"{name}.shift.{axis}" for axis in "xyz"])
     there = np.flatnonzero(shifts.any(axis=1))
-    if not there.size:
+    positions = record.stack([f"position.{axis}" for axis in "xyz"])[there]
+    radii = np.linalg.norm(positions - shifts[there] - FAR_AWAY, axis=1) - record[f"{name}.clearance"][there]
+    known = radii[np.isfinite(radii)]  # not where the pose is none
+    if not known.size:
         return None
-    last = there[-1]
-    position = record.stack([f"position.{axis}" for axis in "xyz"])[last]
-    radius = float(np.linalg.norm(position - shifts[last] - FAR_AWAY) - record[f"{name}.clearance"][last])
+    radius = float(known[-1])
     return dataclasses.replace(secondary, region=dataclasses.replace(secondary.region, shape=Sphere(FAR_AWAY, radius)))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import shutil
 import time
 from collections import OrderedDict
@@ -52,7 +53,7 @@ class Recorder:
         (folder / PARTS).mkdir()
         self._whole: pq.ParquetWriter | None = None  # what the record will be, begun with its first rows
         self._gathered: list[pa.Table] = []  # written as parts, but not yet into the whole
-        self._torn = False  # writing was interrupted: what the whole has is not known, what the parts have is
+        self._sound = True  # the whole has what it should have; not so once a write was cut off
 
     def observe(self, k: int, row: Array) -> None:
         """Keep the row of step `k`."""
@@ -64,9 +65,8 @@ class Recorder:
 
     def close(self) -> None:
         """Write what is left, and put the whole in the place of its parts."""
-        torn = self._torn
         self._flush()
-        if torn:
+        if not self._sound:
             self._begin_anew()
         self._write_gathered()
         if self._whole is not None:
@@ -75,16 +75,18 @@ class Recorder:
         shutil.rmtree(self._folder / PARTS)
 
     def _begin_anew(self) -> None:
-        """Put the parts together once more."""
+        """Write the whole from its parts: Ctrl-C or a full disk may have come in the middle of it."""
         if self._whole is not None:
-            self._whole.close()
-        self._whole, self._gathered = None, []
+            with contextlib.suppress(OSError, pa.ArrowException):
+                self._whole.close()
+            self._whole = None
+        self._gathered = []
         for part in _part_files(self._folder):
             with pq.ParquetFile(part) as parquet:
-                self._gathered.append(parquet.read())
-            self._write_if_enough()
+                self._gather(parquet.read())
 
-    def _write_if_enough(self) -> None:
+    def _gather(self, table: pa.Table) -> None:
+        self._gathered.append(table)
         if sum(gathered.num_rows for gathered in self._gathered) >= len(self._block):
             self._write_gathered()
 
@@ -98,7 +100,7 @@ class Recorder:
     def _flush(self) -> None:
         if not self._filled:
             return
-        self._torn = True
+        sound, self._sound = self._sound, False
         # not pa.array: that imports pandas where it is installed, for nothing
         columns = [
             pa.Array.from_buffers(pa.float64(), self._filled, [None, pa.py_buffer(column)])
@@ -111,10 +113,10 @@ class Recorder:
         scratch.replace(part)
         # only now: an interrupted write is done again, into the same part
         self._parts, self._filled = self._parts + 1, 0
-        self._gathered.append(table)
-        self._write_if_enough()
+        if sound:
+            self._gather(table)
+        self._sound = sound
         self._flushed = time.monotonic()
-        self._torn = False
 
 
 # measured: bytes of a float64 column compress best when they are split by place, and dictionaries only cost

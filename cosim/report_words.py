@@ -87,7 +87,8 @@ def verdict(summary: dict[str, Any]) -> str:
     """
     if summary["settled"]:
         entered, settled = summary["reach_time"], summary["settle_time"]
-        goal = f"The vehicle entered the goal region at {entered:.2f} s and was in for good from {settled:.2f} s"
+        stayed = "and stayed" if settled == entered else f"and was in for good from {settled:.2f} s"
+        goal = f"The vehicle entered the goal region at {entered:.2f} s {stayed}"
     elif summary["reached"]:
         goal = f"The vehicle entered the goal region at {summary['reach_time']:.2f} s but did not settle there"
     else:
@@ -99,9 +100,8 @@ def verdict(summary: dict[str, Any]) -> str:
     if broken:
         but = "" if summary["hard_violated"] or not summary["hard"] else "kept every hard region but "
         kept = f"; it {but}violated {', '.join(broken)}."
-    force = (
-        f" The law asked for up to {newtons(summary['max_force_asked'])}; up to {newtons(summary['max_force'])} acted."
-    )
+    wanted, acted = newtons(summary["max_force_asked"]), newtons(summary["max_force"])
+    force = f" The law asked for up to {wanted}" + ("." if wanted == acted else f"; up to {acted} acted.")
     ended = {
         "completed": "",
         "interrupted": f" The run was interrupted at {summary['simulated_time']:.3f} s.",

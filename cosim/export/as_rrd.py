@@ -15,6 +15,7 @@ import rerun.blueprint as rrb
 from numpy.typing import NDArray
 
 from controller.regions import Box, Ellipsoid, Sphere
+from cosim.errors import ExportError
 from cosim.export.excerpt import Excerpt
 from cosim.export.names import grouped
 from cosim.export.scene import (
@@ -56,10 +57,15 @@ def write(excerpt: Excerpt, path: Path) -> list[Path]:
     -------
     list of Path
         It alone.
+
+    Raises
+    ------
+    ExportError
+        If it cannot be written.
     """
     recording = rr.RecordingStream("subreach")
-    recording.save(path, default_blueprint=_layout(excerpt))
     try:
+        recording.save(path, default_blueprint=_layout(excerpt))
         recording.send_recording_name(excerpt.run.path.resolve().name)
         sender = _Sender(recording, excerpt)
         sender.send_texts()
@@ -67,8 +73,10 @@ def write(excerpt: Excerpt, path: Path) -> list[Path]:
         sender.send_vehicle()
         sender.send_regions()
         sender.send_events()
-    finally:
         recording.flush()
+    except RuntimeError as error:  # as Rerun tells of a disk that is full
+        raise ExportError(f"--to rrd: {path.name} cannot be written: {error}") from error
+    finally:
         recording.disconnect()
     return [path]
 

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import logging
 from pathlib import Path
 
+from cosim.errors import ExportError
 from cosim.export.excerpt import Excerpt
 from cosim.mavlink.endpoint import Endpoint
 from cosim.mavlink.options import MavlinkOptions
 from cosim.mavlink.replay import replay
-
-_log = logging.getLogger(__name__)
 
 
 def write(excerpt: Excerpt, path: Path) -> list[Path]:
@@ -27,8 +25,13 @@ def write(excerpt: Excerpt, path: Path) -> list[Path]:
     -------
     list of Path
         It alone.
+
+    Raises
+    ------
+    ExportError
+        If anything of the run could not be written.
     """
     done = replay(excerpt.run.path, [Endpoint("tlog", path.name, path=str(path))], MavlinkOptions(), rate=None)
-    for trouble in done.troubles:
-        _log.warning("%s", trouble)
+    if done.troubles:
+        raise ExportError(f"--to tlog: not all was written: {'; '.join(done.troubles)}")
     return [path]

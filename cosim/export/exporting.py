@@ -11,6 +11,8 @@ from typing import Any
 
 from cosim.errors import ExportError, RunError
 from cosim.export.excerpt import excerpt_of
+from cosim.record import RECORD
+from cosim.replay.folder import ORDERS, SCENARIO, SUMMARY
 
 
 @dataclass(frozen=True)
@@ -30,6 +32,8 @@ FORMATS = {
     "rrd": Format(extra="rerun"),
     "tlog": Format(extra="mavlink", whole=True),
 }
+
+_OF_RUNS = frozenset({RECORD, SCENARIO, SUMMARY, ORDERS})
 
 
 def export_run(
@@ -72,7 +76,7 @@ def export_run(
         If the folder holds no run that can be read.
     ExportError
         If the format is unknown, cannot hold what was asked for or needs what is not installed, a pattern fits no
-        signal, or a file is in the way.
+        signal, or a file is in the way or of the run itself.
     """
     if to not in FORMATS:
         raise ExportError(f"--to {to}: expected one of {', '.join(FORMATS)}")
@@ -84,6 +88,8 @@ def export_run(
     for file in files:
         if file.exists() and (file.is_dir() or not force):
             raise ExportError(f"{file}: exists; expected a new file, or --force to replace it")
+        if file.name in _OF_RUNS and file.parent.resolve() == folder.resolve():
+            raise ExportError(f"{file}: is of the run itself, expected another file")
     writer = _writer(to, form)
     excerpt = excerpt_of(folder, signals, every, rate)
     try:

@@ -27,6 +27,7 @@ log = logging.getLogger(__name__)
 
 PATH = "/ws"
 VIEWERS = 16  # at once
+CONNECTIONS = 4 * VIEWERS  # at once; further ones would take the files away that the run writes
 _LOOKING = 1.0 / 30.0  # s, after which rows are looked for while somebody watches
 _IDLING = 0.25  # s, the same while nobody does
 _ORDERS = 20  # a second that a viewer may give in the long run
@@ -71,7 +72,7 @@ async def serve(
     async with serve_websockets(
         viewers.show, sock=listening, process_request=viewers.answer, compression=None, max_size=LONGEST, max_queue=4,
         open_timeout=5.0, ping_interval=_SILENCE, ping_timeout=_SILENCE, close_timeout=1.0, server_header=None,
-        logger=quiet,
+        logger=quiet, create_connection=_few(CONNECTIONS),
     ):  # fmt: skip
         while not closing.is_set():
             take_rows()
@@ -82,6 +83,24 @@ async def serve(
         while viewers.behind and time.monotonic() < until:
             viewers.wake()
             await asyncio.sleep(_LOOKING)
+
+
+def _few(most: int) -> type[ServerConnection]:
+    """Return connections of whom no more than so many are open at once: who comes then is cut off."""
+    made: set[ServerConnection] = set()
+
+    class Connection(ServerConnection):
+        def connection_made(self, transport: asyncio.BaseTransport) -> None:
+            super().connection_made(transport)
+            made.add(self)
+            if len(made) > most:
+                self.transport.abort()
+
+        def connection_lost(self, exc: Exception | None) -> None:
+            made.discard(self)
+            super().connection_lost(exc)
+
+    return Connection
 
 
 class _Viewers:

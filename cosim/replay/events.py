@@ -55,7 +55,9 @@ def events_of(run: FlownRun, log: Log) -> list[Event]:
     list of Event
         The last one is the end of the run.
     """
-    step = run.scenario.time.step
+    step, rows = run.scenario.time.step, len(run.record["time"])
+    # a killed run has logged orders of rows that it did not save; a reset comes behind the last row
+    log = [(min(k, rows - 1), order) for k, order in log if k <= rows]
     orders = [Event(time, "order", text) for time, text in ordered_events(log, step, _MOST)]
     found = [*orders, *_goal(run), *_violations(run), *_active(run), *_failures(run), *_saturation(run)]
     return [*sorted(found, key=lambda event: event.time), _end(run)]

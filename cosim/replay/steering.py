@@ -115,8 +115,10 @@ class _Changes:
                 self._at, begun = order.item - 1, True
             elif isinstance(order, Steer) and order.mode == "mission":
                 self._at, begun = max(self._at, 0) - 1, True
+        if not self._in_mission[row]:
+            return
         now = int(self._item[row])
-        if not self._in_mission[row] or not 0 <= now < len(self._items) or (now == self._at and not begun):
+        if not 0 <= now < len(self._items) or (now == self._at and not begun):
             return
         for item in way(self._items, self._at, now) or [now]:
             yield from self._items[item].orders
@@ -148,6 +150,8 @@ def _sizes(run: FlownRun, index: int, secondary: SecondaryRegion) -> Iterator[di
     there = np.flatnonzero(shifts.any(axis=1))
     positions = record.stack([f"position.{axis}" for axis in "xyz"])[there]
     radii = np.linalg.norm(positions - shifts[there] - FAR_AWAY, axis=1) - record[f"{name}.clearance"][there]
+    known = np.isfinite(radii)  # not where the pose is none
+    there, radii = there[known], radii[known]
     fresh = np.abs(np.diff(radii, prepend=-np.inf)) > _SAME
     for row, radius in zip(there[fresh], radii[fresh], strict=True):
         shape = Sphere(FAR_AWAY, max(float(radius), _SAME))

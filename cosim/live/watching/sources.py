@@ -40,6 +40,7 @@ class Look:
     row: Array | None  # (columns,), None before the first
     note: str  # how it is looked at
     ended: tuple[str, str] | None = None  # status and verdict, once it is over
+    silent: bool = False  # nothing new has come for long
 
     def __getitem__(self, name: str) -> float:
         """Return a signal; NaN where there is none."""
@@ -82,7 +83,7 @@ def looks(what: str, rate: float | None = 1.0, once: bool = False) -> Iterator[L
 
 
 def _newest(found: Iterator[Look]) -> Iterator[Look]:
-    yield next(look for look in found if look.row is not None)
+    yield next(look for look in found if look.row is not None or look.ended or look.silent)
 
 
 # ---- folders -------------------------------------------------------------------------------------------------------
@@ -119,7 +120,10 @@ def _is_written(path: Path) -> bool:
     if (path / RECORD).exists() or (path / SUMMARY).exists() or not parts.is_dir():
         return False
     files = list(parts.glob("*.parquet"))
-    return not files or time.time() - max(file.stat().st_mtime for file in files) < _FRESH
+    try:
+        return not files or time.time() - max(file.stat().st_mtime for file in files) < _FRESH
+    except FileNotFoundError:  # the run ends: its parts have just been joined
+        return False
 
 
 def _growing(path: Path) -> Iterator[Look]:
@@ -136,13 +140,18 @@ def _growing(path: Path) -> Iterator[Look]:
                 viewing = viewing or Viewing(scenario, record.columns)
                 header = header_of(scenario, viewing.columns)
                 *_, block = record.blocks()
-            except (RunError, OSError):  # the run ends: its parts have just been joined
-                continue
+            except RunError:
+                if (path / PARTS / newest).exists():
+                    raise
+                continue  # the run ends: its parts have just been joined
+            except ValueError as error:
+                raise RunError(f"{path}: the record is not of its scenario: {error}") from error
             known, since = newest, time.monotonic()
             row = viewing.extended(block[-1:, viewing.picked])[0]
         silent = time.monotonic() - since
         wait = f"no new rows for {silent:.0f} s: waiting, writing its report, or killed"
-        yield Look(header, row, "being recorded" if silent < _FRESH else wait)
+        fresh = silent < _FRESH
+        yield Look(header, row, "being recorded" if fresh else wait, silent=not fresh)
         time.sleep(_FRAME)
     yield from _finished(path, None, once=True)
 

@@ -2,6 +2,7 @@
 
 import builtins
 import importlib
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -148,3 +149,35 @@ def test_blocks_of_a_long_record_stay_small(run, monkeypatch):
     sizes = [len(block) for block in excerpt_of(run, every=2).blocks()]
     assert sum(sizes) == 51
     assert max(sizes) <= 7
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="this system has no full disk to try")
+@pytest.mark.parametrize("to", ["csv", "npz", "mat", "mcap", "rrd"])
+def test_a_full_disk_is_told_and_leaves_nothing(run, tmp_path, monkeypatch, to):
+    writer = importlib.import_module(f"cosim.export.as_{to}")
+    write = writer.write
+
+    def on_full_disk(excerpt, path):
+        path.symlink_to("/dev/full")
+        return write(excerpt, path)
+
+    monkeypatch.setattr(writer, "write", on_full_disk)
+    with pytest.raises((ExportError, RunError), match=r"space|cannot be written"):
+        export_run(run, to, tmp_path / f"out.{to}")
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_tlog_that_lacks_something_is_none(run, tmp_path, monkeypatch):
+    monkeypatch.setattr("cosim.mavlink.channels.tlog.Tlog.send", lambda channel, _: channel.trouble.update(lost=1))
+    with pytest.raises(ExportError, match="not all was written"):
+        export_run(run, "tlog", tmp_path / "out.tlog")
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_run_is_never_replaced_by_what_is_made_of_it(run, tmp_path):
+    before = (run / "record.parquet").read_bytes()
+    (tmp_path / "link").symlink_to(run)
+    for folder in (run, tmp_path / "link"):
+        with pytest.raises(ExportError, match="is of the run"):
+            export_run(folder, "npz", run / "record.parquet", force=True)
+    assert (run / "record.parquet").read_bytes() == before

@@ -10,6 +10,7 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
 from cosim.live.orders import LONGEST
+from cosim.live.server import CONNECTIONS
 from cosim.record import load_record
 from cosim.run import run_scenario
 from cosim.scenario import load_scenario
@@ -133,3 +134,24 @@ def test_more_viewers_than_there_is_room_for_are_sent_away(live):
         assert caught.value.response.status_code == 503
         viewers[0].order(**ARM)
         viewers[0].until("end")
+
+
+def test_connections_beyond_the_most_are_cut_off_so_that_the_run_keeps_files_to_write(live):
+    running = live(commands=True)
+    host, port = running.url.removeprefix("http://").strip("/").split(":")
+    with contextlib.ExitStack() as stack:
+        idle = [
+            stack.enter_context(socket.create_connection((host, int(port)), timeout=WAIT))
+            for _ in range(2 * CONNECTIONS)
+        ]
+        for late in idle[CONNECTIONS:]:
+            with contextlib.suppress(ConnectionResetError):
+                assert late.recv(1) == b""
+        for early in idle[:CONNECTIONS]:
+            early.setblocking(False)
+            with pytest.raises(BlockingIOError):
+                early.recv(1)
+    with running.viewer() as viewer:
+        viewer.order(**ARM)
+        viewer.until("end")
+    assert running.end().summary["status"] == "completed"

@@ -7,6 +7,8 @@ import sys
 import threading
 
 import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 
 pytest.importorskip("rich", reason="the live extra is not installed")
@@ -14,7 +16,7 @@ pytest.importorskip("rich", reason="the live extra is not installed")
 from rich.console import Console
 
 from cosim.cli import main
-from cosim.errors import TelemetryError
+from cosim.errors import RunError, TelemetryError
 from cosim.live.watching import Look, looks, picture
 from cosim.record import PARTS, RECORD, Recorder, load_record
 from cosim.replay.folder import SCENARIO
@@ -145,3 +147,25 @@ def test_no_run_is_told():
         next(looks("no/such/folder"))
     with pytest.raises(TelemetryError, match="cannot be watched"):
         next(looks("1"))
+
+
+def test_a_run_that_was_killed_before_its_first_rows_keeps_nobody_waiting(paper, tmp_path, monkeypatch):
+    monkeypatch.setattr("cosim.live.watching.sources._FRESH", 0.0)
+    (tmp_path / PARTS).mkdir()
+    shutil.copy(paper.folder / SCENARIO, tmp_path)
+    (look,) = looks(str(tmp_path), once=True)
+    assert look.row is None
+    assert "no new rows" in look.note
+
+
+@pytest.mark.parametrize("garbage", ["no parquet", "another table"])
+def test_parts_that_are_no_record_are_named_in_one_line(paper, tmp_path, garbage):
+    (tmp_path / PARTS).mkdir()
+    shutil.copy(paper.folder / SCENARIO, tmp_path)
+    part = tmp_path / PARTS / "000000.parquet"
+    if garbage == "no parquet":
+        part.write_bytes(b"garbage")
+    else:
+        pq.write_table(pa.table({"a": [1.0]}), part)
+    with pytest.raises(RunError, match=r"cannot be read|not of its scenario"):
+        next(iter(looks(str(tmp_path))))

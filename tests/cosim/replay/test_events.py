@@ -150,3 +150,10 @@ def test_orders_of_a_moment_are_told_together():
     ]
     many = [(0, Change(f"key.{i}", 1.0)) for i in range(9)]
     assert ordered_events(many, 0.01, 3) == [(0.0, "Ordered: key.0 is 1; key.1 is 1; key.2 is 1; 6 more orders")]
+
+
+def test_orders_of_rows_that_a_kill_took_are_not_told_and_the_end_is_last(paper):
+    run = made(paper, [0.0, 0.001, 0.002], status="killed")
+    log = [(1, Arm(True)), (3, Reset()), (900, Arm(False))]
+    assert told(run, "order", log) == [(0.001, "Ordered: Armed"), (0.002, "Ordered: Reset")]
+    assert events_of(run, log)[-1].kind == "end"

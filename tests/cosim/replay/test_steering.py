@@ -2,11 +2,14 @@
 
 import msgspec
 import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 
 from controller.regions import SHAPES, Region, clearances_at
 from cosim.errors import RunError
 from cosim.helm.orders import Aim, Begin, Change, Forget, Item, Mission, Obstacle, Steer
+from cosim.record import RECORD
 from cosim.replay.folder import load_run
 from cosim.replay.trace import trace_of
 from cosim.run import run_scenario
@@ -111,3 +114,21 @@ def test_a_log_that_is_none_is_one_line(steered, copy_of):
     (folder / "orders.jsonl").write_text('{"step": 1}\n{"step": 2}\n')
     with pytest.raises(RunError, match=r"orders\.jsonl, line 1: .*order"):
         trace_of(load_run(folder))
+
+
+@pytest.mark.parametrize(("first", "end"), [(50, 70), (50, 401)])
+def test_obstacles_that_came_while_the_pose_was_unknown_have_their_size_once_it_is_known(steered, copy_of, first, end):
+    folder = copy_of(steered)
+    table = pq.read_table(folder / RECORD)
+    for name in ("position.x", "seen 2.clearance"):
+        values = table[name].to_numpy().copy()
+        values[first:end] = np.nan
+        at = table.schema.get_field_index(name)
+        table = table.set_column(at, table.schema.field(at), pa.array(values))
+    pq.write_table(table, folder / RECORD)
+    header = trace_of(load_run(folder)).header
+    names = [region["name"] for region in header["regions"]]
+    if end < table.num_rows:
+        assert shape_at(header, names.index("seen 2"), 2.0).radius == pytest.approx(0.3)
+    else:
+        assert "seen 2" not in names
