@@ -77,7 +77,7 @@ class Batches:
         """Have a batch flown again, next."""
         self._back.append(batch)
 
-    def measured(self, rows: int, seconds: float) -> None:
-        """Take note of how long a batch took."""
+    def measured(self, rows: int, seconds: float, stretch: float = 1.0) -> None:
+        """Take note of how long a batch took, and make the next ones so many times as long as usual."""
         self._row_time = max(seconds, 1e-9) / rows
-        self._size = int(np.clip(TARGET / self._row_time, 1, min(GROWTH * max(rows, self._size), GREATEST)))
+        self._size = int(np.clip(stretch * TARGET / self._row_time, 1, min(GROWTH * max(rows, self._size), GREATEST)))

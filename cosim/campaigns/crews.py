@@ -34,6 +34,10 @@ class Crew(Protocol):
     """Flies batches somewhere."""
 
     @property
+    def stretch(self) -> float:
+        """How many times as long as usual a batch shall take."""
+
+    @property
     def width(self) -> int:
         """How many batches may be under way."""
 
@@ -54,6 +58,7 @@ class Here:
     """Nobody but this process: a batch is flown when it is submitted."""
 
     width = 1
+    stretch = 1.0
 
     def submit(self, task: Task, batch: Any) -> Flight:
         """Fly a batch."""
@@ -94,6 +99,8 @@ class Processes:
     n : int
         How many.
     """
+
+    stretch = 1.0
 
     def __init__(self, n: int) -> None:
         self._hands = [_Hand(_pool()) for _ in range(n)]
@@ -157,6 +164,8 @@ class Lent:
     workers : int
         How many batches it flies at the same time.
     """
+
+    stretch = 1.0
 
     def __init__(self, executor: Executor, workers: int) -> None:
         self._executor = executor

@@ -19,6 +19,8 @@ from cosim.report import write_report
 from cosim.report_typesetting import BOLD, MONO, PLAIN, wrapped
 from cosim.report_words import asked, verdict
 
+pytestmark = pytest.mark.slow
+
 SHORT = ("arbiter.engine=closed", "time.duration=0.3")
 A4 = (595.276, 841.89)  # pt
 

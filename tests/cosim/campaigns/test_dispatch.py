@@ -28,6 +28,8 @@ class Work:
 class Crew:
     """Flies in order of submission; dies of some rows."""
 
+    stretch = 1.0
+
     def __init__(self, poison=(), width=4, certain=True):
         self.poison, self.width, self.certain = set(poison), width, certain
         self.deaths, self.sent = [], []

@@ -5,6 +5,8 @@ import base64
 import numpy as np
 import pytest
 
+pytestmark = pytest.mark.slow
+
 _SERIES = """
 const packed = (x) => {
   const bytes = new Uint8Array(new Float64Array(x).buffer);

@@ -9,6 +9,8 @@ from cosim.replay.page import write_page
 from cosim.replay.trace import trace_of
 from tests.cosim.replay.test_page import HOSTILE
 
+pytestmark = pytest.mark.slow
+
 _FOCUS = """
 const at = document.activeElement;
 const style = getComputedStyle(at);

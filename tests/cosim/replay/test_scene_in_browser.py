@@ -5,6 +5,8 @@ import pytest
 
 from tests.cosim.replay.decoding import active_of
 
+pytestmark = pytest.mark.slow
+
 FULL = {"obstacle": "#d55e00", "shape": "#e69f00", "depth": "#56b4e9", None: "#009e73"}
 AXES = [f"position.{axis}" for axis in "xyz"]
 QUATERNION = [f"quaternion.e{i}" for i in range(4)]
