@@ -10,7 +10,7 @@ import numpy as np
 from controller.regions import Pipe, Region, clearances_at
 from cosim.signals import Array
 
-_MOST_STEPS = 500  # along a ray that leaves at a narrow angle
+_MOST_STEPS = 20_000  # along a ray that runs beside a straight stretch, just inside its surface
 _ROUNDING = 1e-12  # of the radius
 _BEND = math.radians(15.0)  # between rings about a corner
 _STRAIGHT = 1e-9  # of a turn that is none
@@ -82,10 +82,12 @@ def _left(pipe: Pipe, origins: Array, directions: Array) -> Array:
     """Return where rays from inside leave the pipe: the distance to the surface is never more than is left to go."""
     region = Region("pipe", pipe, "in")
     gone = np.zeros(len(origins))
+    inside = np.arange(len(origins))
     for _ in range(_MOST_STEPS):
-        left = clearances_at(origins + gone[:, None] * directions, region)
-        if (left <= _ROUNDING * pipe.radius).all():
+        left = clearances_at(origins[inside] + gone[inside, None] * directions[inside], region)
+        inside, left = inside[left > _ROUNDING * pipe.radius], left[left > _ROUNDING * pipe.radius]
+        if not inside.size:
             break
-        gone += np.maximum(left, 0.0)
+        gone[inside] += left
     surface: Array = origins + gone[:, None] * directions
     return surface
