@@ -13,7 +13,7 @@ from typing import Any
 
 from benchmarks.table import Row
 from benchmarks.timing import Timing
-from cosim.replay.folder import load_run
+from cosim.flown_run import load_run
 from cosim.replay.pages import write_replay
 from cosim.run import run_scenario
 from cosim.scenario import load_scenario

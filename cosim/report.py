@@ -7,7 +7,7 @@ import tempfile
 from collections.abc import Collection
 from pathlib import Path
 
-from cosim.replay.folder import FlownRun
+from cosim.flown_run import FlownRun
 from cosim.report_contents import contents_of
 
 REPORT = "report.html"

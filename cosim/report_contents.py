@@ -10,8 +10,8 @@ import numpy as np
 
 from controller.laws import LAWS
 from cosim.claims import paper_claims
+from cosim.flown_run import ORDERS, SCENARIO, SUMMARY, FlownRun
 from cosim.record import PARTS, RECORD
-from cosim.replay.folder import ORDERS, SCENARIO, SUMMARY, FlownRun
 from cosim.report_words import asked, kind_of, number, verdict
 from cosim.summary import spans
 

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure, SubFigure
 from cosim.drawing import Story
 from cosim.figures import draw_all
 from cosim.figures_layout import FIGURE_STYLE, WIDTH, Sheet
-from cosim.replay.folder import FlownRun
+from cosim.flown_run import FlownRun
 from cosim.report_contents import Contents, Table
 from cosim.report_typesetting import BOLD, MONO, PLAIN, Face, wrapped
 

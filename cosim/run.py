@@ -13,11 +13,12 @@ from typing import TYPE_CHECKING, Any
 from tqdm import tqdm
 
 from cosim.errors import RunError
+from cosim.flown_run import ORDERS
 from cosim.helm import LoggedOrders, OrderQueue, RecordedOrders
 from cosim.master import Master, Observer
 from cosim.record import Recorder
 from cosim.report_words import verdict
-from cosim.run_folder import ORDERS, RunFolder, claim, conclude
+from cosim.run_folder import RunFolder, claim, conclude
 from cosim.scenario import Scenario
 from cosim.signals import Array
 from plant_fmu import PlantError

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import itertools
-import json
 import os
 import shutil
 from collections.abc import Collection
@@ -14,14 +13,12 @@ from pathlib import Path
 from typing import Any
 
 from cosim.errors import RunError
+from cosim.flown_run import ORDERS, SCENARIO, SUMMARY, FlownRun, flown_run, load_run
+from cosim.plain_json import json_text
 from cosim.record import PARTS
-from cosim.replay.folder import ORDERS, SCENARIO, SUMMARY, FlownRun, flown_run, load_run
 from cosim.replay.pages import write_replay
-from cosim.replay.trace import plain
 from cosim.report import write_report
 from cosim.scenario import VEHICLE_COPY, Scenario
-
-__all__ = ["ORDERS", "SCENARIO", "RunFolder", "claim", "conclude", "report_again"]
 
 
 @dataclass(frozen=True)
@@ -161,7 +158,7 @@ def report_again(path: Path, formats: Collection[str] = ("html",)) -> tuple[dict
 
 def _write(run: FlownRun, formats: Collection[str]) -> list[Path]:
     scratch = run.path / f".{SUMMARY}-{os.getpid()}"
-    scratch.write_text(json.dumps(plain(run.summary), indent=2, allow_nan=False) + "\n", encoding="utf-8")
+    scratch.write_text(json_text(run.summary), encoding="utf-8")
     scratch.replace(run.path / SUMMARY)
     files = write_report(run, formats) if formats else []
     if "html" in formats:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import json
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,6 +15,7 @@ from cosim.campaigns.runner import carry_out
 from cosim.campaigns.scene_store import SceneStore
 from cosim.campaigns.scenes import SceneTask, SceneWork
 from cosim.campaigns.summary import summarise
+from cosim.plain_json import json_text
 from cosim.scene_run import Conditions
 
 
@@ -88,7 +88,7 @@ def run_campaign(
 
         def conclude(results: Results) -> None:
             summary.update(summarise(work.flown, results, out))
-            write_text(out / SUMMARY, json.dumps(summary, indent=2) + "\n")
+            write_text(out / SUMMARY, json_text(summary))
 
         done = carry_out(work, out, workers, executor, progress, conclude)
     return Campaign(out, done.results, summary, done.flown)

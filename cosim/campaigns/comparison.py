@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,6 +21,7 @@ from cosim.campaigns.scene_store import SceneStore
 from cosim.campaigns.statistics import median_difference, paired
 from cosim.campaigns.summary import median
 from cosim.errors import RunError
+from cosim.plain_json import json_text
 from cosim.report import FIGURES
 from cosim.scene_run import Conditions
 
@@ -103,7 +103,7 @@ def compare(
             ],
         }
     try:
-        write_text(out / NUMBERS, json.dumps(numbers, indent=2) + "\n")
+        write_text(out / NUMBERS, json_text(numbers))
     except OSError as error:
         raise RunError(f"{out}: {error.strerror or error}") from error
     return Comparison(out, campaigns, numbers)

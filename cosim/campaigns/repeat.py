@@ -23,8 +23,8 @@ from cosim.campaigns.scenes import SceneTask
 from cosim.campaigns.sweep_rows import SweepWork
 from cosim.campaigns.work import Task
 from cosim.errors import RunError
+from cosim.flown_run import SCENARIO
 from cosim.record import Record
-from cosim.replay.folder import SCENARIO
 from cosim.scenario import VEHICLE_COPY, Scenario, load_scenario
 from cosim.scene import decode_scene
 from cosim.scene_run import Conditions

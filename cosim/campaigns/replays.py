@@ -14,7 +14,8 @@ from cosim.campaigns.folder import write_text
 from cosim.campaigns.page import Html, link
 from cosim.campaigns.repeat import Repeat, repeat_of
 from cosim.errors import CosimError
-from cosim.replay.folder import load_run
+from cosim.flown_run import load_run
+from cosim.plain_json import json_text
 from cosim.replay.page import REPLAY, write_page
 from cosim.replay.trace import trace_of
 from cosim.run import run_scenario
@@ -80,7 +81,7 @@ def replay_of(out: Path, key: int, folders: Sequence[Path], title: str) -> Repla
                 remarks += [name + remark] if remark else []
             if traces:
                 write_page(scratch / REPLAY, traces, title)
-            write_text(scratch / _FLOWN, json.dumps({"remarks": remarks}, indent=2) + "\n")
+            write_text(scratch / _FLOWN, json_text({"remarks": remarks}))
             scratch.chmod(0o755)
             shutil.rmtree(place, ignore_errors=True)
             scratch.replace(place)

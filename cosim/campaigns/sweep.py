@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,6 +13,7 @@ from cosim.campaigns.results import Results
 from cosim.campaigns.runner import carry_out
 from cosim.campaigns.sweep_rows import SweepWork
 from cosim.campaigns.sweep_summary import summarise_sweep
+from cosim.plain_json import json_text
 from cosim.scenario import Scenario
 
 
@@ -79,7 +79,7 @@ def run_sweep(
 
     def conclude(results: Results) -> None:
         summary.update(summarise_sweep(work, results, out))
-        write_text(out / SUMMARY, json.dumps(summary, indent=2, allow_nan=False) + "\n")
+        write_text(out / SUMMARY, json_text(summary))
 
     done = carry_out(work, out, workers, executor, progress, conclude)
     return Sweep(out, done.results, summary, done.flown)

@@ -26,8 +26,8 @@ from cosim.campaigns.sections import (
 from cosim.campaigns.sweep_summary import FACTS
 from cosim.campaigns.worst import LISTED, Worst, worst_rows
 from cosim.errors import RunError
+from cosim.flown_run import SCENARIO
 from cosim.flying.outcome import FIELDS
-from cosim.replay.folder import SCENARIO
 
 if TYPE_CHECKING:
     from cosim.drawing import Drawing

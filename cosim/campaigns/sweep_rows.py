@@ -20,9 +20,9 @@ from cosim.campaigns.design import Design
 from cosim.campaigns.plan import SWEEP, code_digest, versions
 from cosim.campaigns.work import Rows
 from cosim.errors import RunError
+from cosim.flown_run import SCENARIO
 from cosim.flying.outcome import FIELDS, Flown, nothing
 from cosim.flying.variation import Variation
-from cosim.replay.folder import SCENARIO
 from cosim.scenario import VEHICLE_COPY, Scenario
 from plant_fmu.tables import hint
 

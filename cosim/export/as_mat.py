@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
@@ -55,7 +54,7 @@ def write(excerpt: Excerpt, path: Path) -> list[Path]:
             "units": _cells(column.unit for column in columns),
             "descriptions": _cells(column.description for column in columns),
             "scenario": excerpt.scenario_text,
-            "summary": json.dumps(excerpt.run.summary),
+            "summary": excerpt.summary_text,
         },
         appendmat=False,
         long_field_names=True,

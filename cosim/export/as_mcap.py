@@ -5,7 +5,6 @@ Times are those of the simulation, in nanoseconds from 0, so that runs lie over 
 
 from __future__ import annotations
 
-import json
 from collections import deque
 from collections.abc import Callable
 from pathlib import Path
@@ -24,8 +23,8 @@ from cosim.export.excerpt import Excerpt
 from cosim.export.names import grouped, legal
 from cosim.export.protobuf_table import numbers_messages, numbers_schema
 from cosim.export.scene import POSITION, QUATERNION, Scene
+from cosim.flown_run import FlownRun
 from cosim.replay.events import events_of
-from cosim.replay.folder import FlownRun
 from cosim.signals import Array
 
 PACKAGE = "subreach"  # of the schemas of signals
@@ -59,7 +58,7 @@ def write(excerpt: Excerpt, path: Path) -> list[Path]:
 def _attach(writer: Writer, excerpt: Excerpt) -> None:
     for name, kind, text in (
         ("scenario.toml", "application/toml", excerpt.scenario_text),
-        ("summary.json", "application/json", json.dumps(excerpt.run.summary, indent=2)),
+        ("summary.json", "application/json", excerpt.summary_text),
     ):
         writer.add_attachment(create_time=0, log_time=0, name=name, media_type=kind, data=text.encode())
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import zipfile
 from collections.abc import Iterator
 from pathlib import Path
@@ -42,6 +41,6 @@ def _arrays(excerpt: Excerpt) -> Iterator[tuple[str, NDArray[Any]]]:
     yield "units", np.array([column.unit for column in excerpt.columns])
     yield "descriptions", np.array([column.description for column in excerpt.columns])
     yield "scenario", np.array(excerpt.scenario_text)
-    yield "summary", np.array(json.dumps(excerpt.run.summary))
+    yield "summary", np.array(excerpt.summary_text)
     for column in excerpt.columns:
         yield column.name, excerpt.signal(column.name)

@@ -5,7 +5,6 @@ Series are of doubles; what is drawn in space is of single precision, since Reru
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
@@ -106,7 +105,7 @@ class _Sender:
         """Send scenario and summary."""
         for name, kind, text in (
             ("scenario", "toml", self._excerpt.scenario_text),
-            ("summary", "json", json.dumps(self._excerpt.run.summary, indent=2)),
+            ("summary", "json", self._excerpt.summary_text),
         ):
             self._stay(name, rr.TextDocument(f"```{kind}\n{text}\n```", media_type=rr.MediaType.MARKDOWN))
 

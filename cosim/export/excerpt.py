@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cosim.errors import ExportError
-from cosim.replay.folder import SCENARIO, FlownRun, load_run
+from cosim.flown_run import SCENARIO, FlownRun, load_run
+from cosim.plain_json import json_text
 from cosim.signals import Array, Column
 
 _ROUNDING = 1e-6  # of a period; a time that is short of a tick by no more has reached it
@@ -35,6 +36,11 @@ class Excerpt:
     def scenario_text(self) -> str:
         """The scenario as it stands in the run folder."""
         return (self.run.path / SCENARIO).read_text(encoding="utf-8")
+
+    @property
+    def summary_text(self) -> str:
+        """The summary as JSON, null where a number is none."""
+        return json_text(self.run.summary)
 
     def signal(self, name: str) -> Array:
         """Return any signal of the record at the exported steps."""

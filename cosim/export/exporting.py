@@ -11,8 +11,8 @@ from typing import Any
 
 from cosim.errors import ExportError, RunError
 from cosim.export.excerpt import excerpt_of
+from cosim.flown_run import ORDERS, SCENARIO, SUMMARY
 from cosim.record import RECORD
-from cosim.replay.folder import ORDERS, SCENARIO, SUMMARY
 
 
 @dataclass(frozen=True)

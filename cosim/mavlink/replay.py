@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from cosim.errors import RunError
+from cosim.flown_run import SCENARIO
 from cosim.mavlink.autopilot import Autopilot
 from cosim.mavlink.endpoint import Endpoint
 from cosim.mavlink.link import open_links
@@ -15,7 +16,6 @@ from cosim.mavlink.options import MavlinkOptions
 from cosim.mavlink.setup import ahead
 from cosim.mavlink.thread import SNAPSHOT_PERIOD, SNAPSHOTS, LinkThread
 from cosim.record import Record, load_record
-from cosim.run_folder import SCENARIO
 from cosim.scenario import load_scenario
 from cosim.signals import Array
 

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controller.regions import of_attitude
+from cosim.flown_run import FlownRun
 from cosim.replay.activity import active_regions
-from cosim.replay.folder import FlownRun
 from cosim.replay.order_words import ordered_events
 from cosim.replay.steering import Log
 from cosim.scenario import CRITERIA

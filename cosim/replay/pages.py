@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from cosim.errors import RunError
-from cosim.replay.folder import FlownRun, load_run
+from cosim.flown_run import FlownRun, load_run
 from cosim.replay.page import REPLAY, is_page, write_page
 from cosim.replay.trace import trace_of
 

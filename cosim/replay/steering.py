@@ -11,11 +11,11 @@ import numpy as np
 
 from controller.regions import Shape, Sphere
 from cosim.errors import OrderError
+from cosim.flown_run import ORDERS, FlownRun
 from cosim.helm.course import way
 from cosim.helm.orders import MODES, Begin, Change, Item, Mission, Order, Steer
 from cosim.helm.settings import LiveSettings
 from cosim.helm.sources import read_log
-from cosim.replay.folder import ORDERS, FlownRun
 from cosim.replay.header import shape_of
 from cosim.scenario_tables import FAR_AWAY, SecondaryRegion
 from cosim.surroundings import middle_of

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import base64
 import dataclasses
-import math
 import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,9 +12,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from cosim.flown_run import FlownRun
+from cosim.plain_json import plain
 from cosim.record import Record
 from cosim.replay.events import events_of
-from cosim.replay.folder import FlownRun
 from cosim.replay.header import header_of
 from cosim.replay.sampling import sampled_rows
 from cosim.replay.steering import changes_of, log_of
@@ -89,26 +89,6 @@ def trace_of(run: FlownRun) -> Trace:
         "gaps": {name: int(count) for name, count in zip(names, missing, strict=True) if count},
     }
     return Trace(plain(header), viewing.extended(picked), steps)
-
-
-def plain(value: Any) -> Any:
-    """Return a value with None for each number that is none, since JSON has no other word for it.
-
-    Parameters
-    ----------
-    value : Any
-        Of texts, numbers, booleans, lists, tuples and dicts.
-
-    Returns
-    -------
-    Any
-        The same, tuples as lists.
-    """
-    if isinstance(value, dict):
-        return {key: plain(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [plain(item) for item in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def _read(record: Record, names: Sequence[str], steps: NDArray[np.intp]) -> tuple[Array, NDArray[np.intp]]:

@@ -10,7 +10,7 @@ import pytest
 
 from cosim.claims import paper_claims
 from cosim.drawing import thin
-from cosim.replay.folder import load_run
+from cosim.flown_run import load_run
 from cosim.report_contents import contents_of
 from cosim.run import run_scenario
 from cosim.scenario import load_scenario

@@ -13,8 +13,8 @@ from cosim import run_folder
 from cosim.claims import paper_claims
 from cosim.cli import main
 from cosim.figures_layout import WIDTH
+from cosim.flown_run import load_run
 from cosim.record import RECORD
-from cosim.replay.folder import load_run
 from cosim.report import write_report
 from cosim.report_typesetting import BOLD, MONO, PLAIN, wrapped
 from cosim.report_words import asked, verdict

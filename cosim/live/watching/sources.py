@@ -15,9 +15,9 @@ from urllib.parse import urlsplit
 import numpy as np
 
 from cosim.errors import RunError, TelemetryError
+from cosim.flown_run import SCENARIO, SUMMARY, load_run
 from cosim.live.messages import rows_of
 from cosim.record import PARTS, RECORD, Record
-from cosim.replay.folder import SCENARIO, SUMMARY, load_run
 from cosim.replay.header import header_of
 from cosim.replay.viewing import Viewing
 from cosim.report_words import verdict

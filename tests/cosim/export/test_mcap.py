@@ -9,9 +9,9 @@ from scipy.spatial.transform import Rotation
 
 from cosim.export import export_run
 from cosim.export.names import legal
+from cosim.flown_run import load_run
 from cosim.helm.orders import Aim, Change, Obstacle
 from cosim.record import load_record
-from cosim.replay.folder import load_run
 from cosim.run import run_scenario
 from cosim.scenario import load_scenario
 

@@ -17,9 +17,9 @@ from rich.console import Console
 
 from cosim.cli import main
 from cosim.errors import RunError, TelemetryError
+from cosim.flown_run import SCENARIO
 from cosim.live.watching import Look, looks, picture
 from cosim.record import PARTS, RECORD, Recorder, load_record
-from cosim.replay.folder import SCENARIO
 from tests.cosim.live.conftest import ARM
 
 PAPER = "arbiter.engine=closed"

@@ -9,7 +9,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from cosim.replay.folder import load_run
+from cosim.flown_run import load_run
 from cosim.replay.page import write_page
 from cosim.replay.pages import replay
 from cosim.replay.trace import trace_of

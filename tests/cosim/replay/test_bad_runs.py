@@ -9,7 +9,7 @@ import pytest
 
 from cosim.cli import main
 from cosim.errors import CosimError, RunError
-from cosim.replay.folder import load_run
+from cosim.flown_run import load_run
 from cosim.replay.pages import write_replay
 from cosim.run_folder import conclude
 from tests.cosim.replay.conftest import GAPS

@@ -8,7 +8,7 @@ import subprocess
 
 import pytest
 
-from cosim.replay.folder import load_run
+from cosim.flown_run import load_run
 from cosim.replay.page import is_page, replay_page, write_page
 from cosim.replay.trace import trace_of
 from tests.cosim.replay.conftest import CLOSED

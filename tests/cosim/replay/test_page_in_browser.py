@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from cosim.replay.folder import load_run
+from cosim.flown_run import load_run
 from cosim.replay.page import write_page
 from cosim.replay.trace import trace_of
 from tests.cosim.replay.test_page import HOSTILE

@@ -8,9 +8,9 @@ import pytest
 
 from controller.regions import SHAPES, Region, clearances_at
 from cosim.errors import RunError
+from cosim.flown_run import load_run
 from cosim.helm.orders import Aim, Begin, Change, Forget, Item, Mission, Obstacle, Steer
 from cosim.record import RECORD
-from cosim.replay.folder import load_run
 from cosim.replay.trace import trace_of
 from cosim.run import run_scenario
 from cosim.scenario import load_scenario

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from cosim.flown_run import load_run
 from cosim.replay.activity import active_regions
-from cosim.replay.folder import load_run
 from cosim.replay.sampling import sampled_rows
 from cosim.replay.trace import plain, trace_of
 from cosim.replay.viewing import Viewing
