@@ -60,7 +60,7 @@ def _rays(points: Array, ways: Array, around: int) -> Iterator[tuple[Array, Arra
         turn = math.atan2(float(np.linalg.norm(np.cross(way, on))), float(way @ on))
         if turn > _STRAIGHT:
             axis = np.cross(way, on)
-            axis = axis / np.linalg.norm(axis) if turn < math.pi - _STRAIGHT else u
+            axis = axis / np.linalg.norm(axis) if turn < math.pi - _STRAIGHT else out[0]
             outer = np.cross(way, axis)  # away from where the pipe turns to
             k, o = (out @ axis)[:, None], (out @ outer)[:, None]
             # outside, rings fan out about the corner; inside, where they would cross, all stay in the plane between

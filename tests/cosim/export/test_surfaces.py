@@ -108,6 +108,7 @@ coordinate = st.floats(-3.0, 3.0)
 
 @given(st.lists(st.tuples(coordinate, coordinate, coordinate), min_size=2, max_size=5), st.floats(0.05, 1.0))
 @example([(0.0, 0.0, 3.0), (0.0, 0.0, 0.0), (0.0, 0.125, 0.0)], 0.125)  # a ray along 3 m, 5 mm inside the surface
+@example([(0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (0.0, 0.0, 0.0), (1.0, 0.0, 0.0)], 1.0)  # the way back, after a bend
 def test_pipes_of_any_bends_have_their_corners_on_the_surface(points, radius):
     points = tuple(tuple(round(x, 2) for x in point) for point in points)
     if any(math.dist(a, b) < 0.1 for a, b in zip(points, points[1:], strict=False)):
