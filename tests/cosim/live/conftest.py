@@ -15,6 +15,7 @@ from cosim.live.address import parse_live
 from cosim.live.view import LiveView
 from cosim.run import run_scenario
 from cosim.scenario import load_scenario
+from tests.threads import ended
 
 ARM = {"order": "arm", "armed": True}
 WAIT = 20.0  # s, that nothing should take
@@ -74,14 +75,14 @@ class Running:
 
     def start(self, scenario, **options):
         def go():
-            self.done = run_scenario(scenario, self.folder, report=False, live=self.view, **options)
+            with contextlib.suppress(SystemExit):  # of a run that is not wanted any more
+                self.done = run_scenario(scenario, self.folder, report=False, live=self.view, **options)
 
-        self.thread = threading.Thread(target=go)
+        self.thread = threading.Thread(target=go, daemon=True)
         self.thread.start()
 
     def end(self):
-        self.thread.join(WAIT)
-        assert not self.thread.is_alive()
+        assert ended(self.thread, WAIT)
         return self.done
 
     def viewer(self):
@@ -98,7 +99,7 @@ def live(tmp_path):
             view = stack.enter_context(LiveView(parse_live("0")))
             running = Running(view, tmp_path / "live")
             running.start(load_scenario(name, ["time.duration=2", *more, *overrides]), **options)
-            stack.callback(running.thread.join, WAIT)
+            stack.callback(ended, running.thread, 1.0)  # some tests have seen enough before the end
             return running
 
         yield start

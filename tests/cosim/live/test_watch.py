@@ -21,6 +21,7 @@ from cosim.flown_run import SCENARIO
 from cosim.live.watching import Look, looks, picture
 from cosim.record import PARTS, RECORD, Recorder, load_record
 from tests.cosim.live.conftest import ARM
+from tests.threads import ended
 
 PAPER = "arbiter.engine=closed"
 
@@ -120,11 +121,11 @@ def test_a_live_run_is_watched_to_its_end(live):
     with running.viewer() as viewer:
         viewer.until("header")
         seen = []
-        watching = threading.Thread(target=lambda: seen.extend(looks(running.url.replace("http", "ws"))))
+        watching = threading.Thread(target=lambda: seen.extend(looks(running.url.replace("http", "ws"))), daemon=True)
         watching.start()
         viewer.order(**ARM)
         viewer.until("end")
-        watching.join(20.0)
+        assert ended(watching)
     assert seen[-1].ended == ("completed", viewer.told("end")[0]["verdict"])
     assert seen[-1]["time"] == 2.0 and len(seen) > 2
 

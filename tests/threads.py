@@ -1,0 +1,13 @@
+"""Threads of tests: none may outlive its test, however that ends, since it would hold up the whole session."""
+
+import ctypes
+
+
+def ended(thread, seconds=20.0):
+    """Wait for a thread and tell whether it ended by itself; interrupt one that does not."""
+    thread.join(seconds)
+    if not thread.is_alive():
+        return True
+    ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(thread.ident), ctypes.py_object(SystemExit))
+    thread.join(seconds)
+    return False
