@@ -8,6 +8,11 @@ def ended(thread, seconds=20.0):
     thread.join(seconds)
     if not thread.is_alive():
         return True
-    ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(thread.ident), ctypes.py_object(SystemExit))
+    interrupt(thread, SystemExit)
     thread.join(seconds)
     return False
+
+
+def interrupt(thread, error=KeyboardInterrupt):
+    """Raise an error in a thread, as Ctrl-C does in the main one."""
+    ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(thread.ident), ctypes.py_object(error))

@@ -8,6 +8,7 @@ import pytest
 
 from cosim.record import load_record
 from tests.cosim.live.conftest import WAIT
+from tests.threads import interrupt
 
 webdriver = pytest.importorskip("selenium.webdriver", reason="selenium is not installed")
 CHROMIUM, DRIVER = shutil.which("chromium"), shutil.which("chromedriver")
@@ -43,7 +44,7 @@ def until(found):
 
 
 def test_the_target_is_dragged_with_the_mouse(browser, live, tmp_path):
-    running = live("harbour", "time.duration=12", commands=True, rate=1.0)  # waits for the button
+    running = live("harbour", "time.duration=600", commands=True, rate=1.0)  # waits for the button
     until(lambda: running.view._run >= 0)
     browser.get(running.url)
     until(
@@ -68,8 +69,9 @@ def test_the_target_is_dragged_with_the_mouse(browser, live, tmp_path):
     webdriver.ActionChains(browser).release().perform()
     after = until(lambda: (now := browser.execute_script(TARGET)) != before and now)
     assert after[2] == before[2]
-    # it is where the pointer let go of it
-    assert browser.execute_script(HELD, *after) == pytest.approx([x - 40, y + 60], abs=3)
+    # it has gone as far as the pointer, whatever else of the page has moved since
+    x, y = browser.execute_script(HELD, *before)
+    assert browser.execute_script(HELD, *after) == pytest.approx([x - 40, y + 60], abs=5)
 
     # without a mouse: a number beside the scene
     field = browser.find_element("css selector", '#helm input[aria-label="ship, east in metres"]')
@@ -80,6 +82,7 @@ def test_the_target_is_dragged_with_the_mouse(browser, live, tmp_path):
 
     browser.execute_script("document.querySelector('#helm [data-mode=hold]').click()")
     until(lambda: browser.execute_script("return document.querySelector('#helm summary').textContent.includes('hold')"))
+    interrupt(running.thread)
     until(lambda: browser.execute_script("return Boolean(subreach.runs[0].header.verdict)"))
     assert browser.get_log("browser") == []
     done = running.end()
