@@ -3,6 +3,7 @@
 import os
 import shlex
 import subprocess
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -52,9 +53,13 @@ def commands(block: Block) -> list[Command]:
     return found
 
 
-def run_commands(block: Block) -> str:
-    """Run the commands of a block in the present folder and return what they printed."""
-    return "".join(_run(block, command) for command in commands(block))
+def run_commands(block: Block, prepare: Callable[[list[str]], object] = lambda words: None) -> str:
+    """Run the commands of a block in the present folder, each after `prepare`, and return what they printed."""
+    printed = ""
+    for command in commands(block):
+        prepare(command.words)
+        printed += _run(block, command)
+    return printed
 
 
 def check_commands(block: Block) -> None:

@@ -7,9 +7,10 @@
 ``exits: STATUS``                           of its commands, or with ``"PREFIX"`` of those that begin so; otherwise 0
 ``given: PATH as NAME``                     a file of the repository is copied into the folder before
 ``file: NAME``                              the block is written into the folder
-``setup sh`` or ``setup python``, lines     done before the block
+``setup sh`` or ``setup python``, lines     done before the block, or with a ``"PREFIX"`` before the first command so
 ``scenario``, ``vehicle``, ``arbiter``      what a block of TOML is; with ``onto: NAME`` it is merged onto a shipped one
 ``compile with: FLAGS``                     of a block of C
+``alone``                                   the block of Python runs in a process of its own, with names of its own
 ``slow``                                    the page runs with --slow alone
 ==========================================  =======================================================================
 """
@@ -24,8 +25,8 @@ _PREFIXED = re.compile(r'(page run with|run with|not run|exits)(?: "([^"]+)")?: 
 _GIVEN = re.compile(r"given: (\S+) as (\S+)")
 _NAMED = re.compile(r"(file|compile with): (\S.*)")
 _KIND = re.compile(r"(scenario|vehicle|arbiter)(?: onto: (\S+))?")
-_SETUP = re.compile(r"setup (sh|python)\n(.*)", re.S)
-_WORDS = re.compile(r"(page run|run with|not run|exits|given|file:|compile with|scenario|vehicle|arbiter|setup|slow)\b")
+_SETUP = re.compile(r'setup (sh|python)(?: "([^"]+)")?\n(.*)', re.S)
+_WORDS = re.compile(r"(page run|run with|not run|exits|given|file:|compile with|scenario|vehicle|arbiter|setup|alone|slow)\b")
 
 
 class PageError(AssertionError):
@@ -40,11 +41,12 @@ class Directives:
     run_with: list[tuple[str, str]] = field(default_factory=list)
     exits: list[tuple[str, str]] = field(default_factory=list)
     given: list[tuple[str, str]] = field(default_factory=list)
-    setups: list[tuple[str, str]] = field(default_factory=list)
+    setups: list[tuple[str, str, str]] = field(default_factory=list)
     kind: str = ""
     onto: str = ""
     file: str = ""
     compile_with: str = ""
+    alone: bool = False
     slow: bool = False
 
     @classmethod
@@ -75,9 +77,9 @@ class Directives:
         elif match := _KIND.fullmatch(text):
             self.kind, self.onto = match[1], match[2] or ""
         elif match := _SETUP.fullmatch(text):
-            self.setups.append((match[1], match[2]))
-        elif text == "slow":
-            self.slow = True
+            self.setups.append((match[2] or "", match[1], match[3]))
+        elif text in ("slow", "alone"):
+            setattr(self, text, True)
         else:
             raise PageError(f"{where}: unknown directive {text.splitlines()[0] if text else ''!r}")
 

@@ -3,12 +3,15 @@
 import ast
 import contextlib
 import io
+import subprocess
+import sys
 import tokenize
 from typing import Any
 
 from tests.docs.comparing import looks_like_a_result, same_printed, same_value, shown_result
 from tests.docs.directives import PageError
 
+TIMEOUT = 120  # s
 _CHECK, _MARK = "__check_result__", "__mark_output__"
 
 
@@ -39,6 +42,16 @@ def run_python(where: str, text: str, names: dict[str, Any]) -> str:
     with contextlib.redirect_stdout(output):
         exec(compile(tree, page, "exec"), names)
     return output.getvalue()
+
+
+def run_alone(where: str, text: str) -> str:
+    """Run a block in a process of its own, for libraries that do not bear each other, and return what it printed."""
+    if any(shown_result(comment) is not None for comment in _comments(text).values()):
+        raise PageError(f"{where}: nobody checks results in comments of a block that runs alone; print them")
+    done = subprocess.run([sys.executable, "-c", text], capture_output=True, text=True, timeout=TIMEOUT, check=False)
+    if done.returncode:
+        raise PageError(f"{where}: {done.stderr}")
+    return done.stdout
 
 
 def _with_checks(where: str, text: str, line: int) -> ast.Module:
