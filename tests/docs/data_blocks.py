@@ -11,7 +11,10 @@ from xml.etree import ElementTree
 
 import tomli_w
 
+from cosim.helm import OrderQueue
+from cosim.live.orders import Desk
 from cosim.scenario import load_scenario
+from cosim.scene import decode_scene
 from fuzzy_arbiter.formats import load
 from plant_fmu import load_vehicle
 from tests.docs.directives import PageError
@@ -37,7 +40,9 @@ def check_data(block: Block) -> None:
     """Check a block that is no program; a PageError says what is wrong."""
     check = _CHECKS.get(block.language)
     if check is None:
-        raise PageError(f"{block.where}: nobody checks blocks of {block.language!r}; say why not: <!-- not run: ... -->")
+        raise PageError(
+            f"{block.where}: nobody checks blocks of {block.language!r}; say why not: <!-- not run: ... -->"
+        )
     try:
         check(block)
     except PageError:
@@ -47,7 +52,7 @@ def check_data(block: Block) -> None:
 
 
 def _check_toml(block: Block) -> None:
-    if not block.directives.kind:
+    if block.directives.kind not in _LOADERS:
         raise PageError(f"{block.where}: expected one of <!-- {' -->, <!-- '.join(_LOADERS)} --> above a block of TOML")
     file = Path(block.directives.file or "block.toml")
     before = file.read_bytes() if file.exists() else None
@@ -60,11 +65,21 @@ def _check_toml(block: Block) -> None:
 
 
 def _check_json(block: Block) -> None:
+    lines = list(filter(None, block.text.splitlines()))
     try:
         json.loads(block.text)
     except json.JSONDecodeError:
-        for line in filter(None, block.text.splitlines()):
+        for line in lines:
             json.loads(line)
+    if block.directives.kind == "scenes":
+        for line in lines:
+            decode_scene(line.encode())
+    if block.directives.orders_of:
+        scenario = load_scenario(block.directives.orders_of, ["commands.enabled=true"])
+        desk = Desk(scenario, OrderQueue(), lambda name: True)
+        for line in lines:
+            if why := desk.take(line):
+                raise PageError(f"{block.where}: {line} is refused: {why}")
 
 
 def _check_c(block: Block) -> None:

@@ -9,6 +9,8 @@
 ``file: NAME``                              the block is written into the folder
 ``setup sh`` or ``setup python``, lines     done before the block, or with a ``"PREFIX"`` before the first command so
 ``scenario``, ``vehicle``, ``arbiter``      what a block of TOML is; with ``onto: NAME`` it is merged onto a shipped one
+``scenes``                                  of a block of JSON: each line is a scene of a campaign
+``orders of: SCENARIO``                     of a block of JSON: each line is an order that a run of it takes
 ``compile with: FLAGS``                     of a block of C
 ``alone``                                   the block of Python runs in a process of its own, with names of its own
 ``slow``                                    the page runs with --slow alone
@@ -24,9 +26,13 @@ REASONS = ("needs ", "takes ", "changes ", "formula", "drawing", "template ", "e
 _PREFIXED = re.compile(r'(page run with|run with|not run|exits)(?: "([^"]+)")?: (\S.*)')
 _GIVEN = re.compile(r"given: (\S+) as (\S+)")
 _NAMED = re.compile(r"(file|compile with): (\S.*)")
-_KIND = re.compile(r"(scenario|vehicle|arbiter)(?: onto: (\S+))?")
+_KIND = re.compile(r"(scenario|vehicle|arbiter|scenes)(?: onto: (\S+))?")
+_ORDERS = re.compile(r"orders of: (\S+)")
 _SETUP = re.compile(r'setup (sh|python)(?: "([^"]+)")?\n(.*)', re.S)
-_WORDS = re.compile(r"(page run|run with|not run|exits|given|file:|compile with|scenario|vehicle|arbiter|setup|alone|slow)\b")
+_WORDS = re.compile(
+    r"(page run|run with|not run|exits|given|file:|setup|scenario|vehicle|arbiter|scenes|orders of|compile with|alone"
+    r"|slow)\b"
+)
 
 
 class PageError(AssertionError):
@@ -45,6 +51,7 @@ class Directives:
     kind: str = ""
     onto: str = ""
     file: str = ""
+    orders_of: str = ""
     compile_with: str = ""
     alone: bool = False
     slow: bool = False
@@ -76,6 +83,8 @@ class Directives:
             setattr(self, {"file": "file", "compile with": "compile_with"}[match[1]], match[2])
         elif match := _KIND.fullmatch(text):
             self.kind, self.onto = match[1], match[2] or ""
+        elif match := _ORDERS.fullmatch(text):
+            self.orders_of = match[1]
         elif match := _SETUP.fullmatch(text):
             self.setups.append((match[2] or "", match[1], match[3]))
         elif text in ("slow", "alone"):

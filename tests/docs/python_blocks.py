@@ -117,5 +117,3 @@ class _Checks(ast.NodeTransformer):
 def _call(function: str, node: ast.stmt, *arguments: ast.expr) -> ast.stmt:
     call = ast.Expr(ast.Call(ast.Name(function, ast.Load()), list(arguments), []))
     return ast.copy_location(call, node)
-
-

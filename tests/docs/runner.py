@@ -98,6 +98,8 @@ class _PageRun:
 
 def _compare(block: Block, printed: str) -> None:
     if not printed:
-        raise PageError(f"{block.where}: the output of no block; say why: <!-- not run: formula --> or drawing, template")
+        raise PageError(
+            f"{block.where}: the output of no block; say why: <!-- not run: formula --> or drawing, template"
+        )
     if not same_output(block.text, printed):
         raise PageError(f"{block.where}: shows\n{block.text}\nprinted was\n{printed}")

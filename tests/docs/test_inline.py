@@ -42,7 +42,11 @@ def test_verbs_and_flags_in_the_text_exist(page):
 
 @pytest.mark.parametrize("page", PAGES, ids=page_name)
 def test_flags_that_stand_alone_are_of_some_program(page):
-    named = [(line, word.partition("=")[0]) for line, text in inline_code(page) for word in re.findall(r"(?<!\S)--[a-z][\w=-]*", text)]
+    named = [
+        (line, word.partition("=")[0])
+        for line, text in inline_code(page)
+        for word in re.findall(r"(?<!\S)--[a-z][\w=-]*", text)
+    ]
     assert not [(line, flag) for line, flag in named if flag not in OURS | FOREIGN]
 
 

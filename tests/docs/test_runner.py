@@ -36,9 +36,12 @@ RIGHT = {
     "words": fence("python", "1 / 3  # a third"),
     "what is assigned": fence("python", "x = [1, 0.5]  # [1, 0.5]"),
     "a result inside a function": fence("python", "for x in (1, 1):\n    x + 1  # 2"),
-    "what is printed": fence("python", "print(1, 2.5)  # '1 2.50'") + fence("python", "print([1])") + fence("text", "[1]"),
+    "what is printed": fence("python", "print(1, 2.5)  # '1 2.50'")
+    + fence("python", "print([1])")
+    + fence("text", "[1]"),
     "names that stay": fence("python", "x = 1") + "words\n" + fence("python", "x  # 1"),
-    "output of a command": fence("sh", "python -m plant_fmu list") + fence("text", "bluerov2_heavy ...\n...\nrexrov ..."),
+    "output of a command": fence("sh", "python -m plant_fmu list")
+    + fence("text", "bluerov2_heavy ...\n...\nrexrov ..."),
     "output of a setup": fence("text", "5", "setup python\nprint(5)\n"),
     "a status": fence("sh", "cosim show nothing", "exits: 2"),
     "a file": fence("toml", "[hull]\nradius = 0.5", "vehicle onto: odin", "file: mine.toml")
@@ -49,6 +52,7 @@ RIGHT = {
     "a scenario": fence("toml", "[time]\nduration = 5.0", "scenario onto: docking"),
     "an arbiter": fence("toml", 'criteria = [{ name = "a" }, { name = "b" }]', "arbiter"),
     "lines of JSON": fence("json", '{"a": 1}\n{"a": 2}'),
+    "orders": fence("json", '{"order": "arm", "armed": true}\n{"order": "reset"}', "orders of: harbour"),
     "XML": fence("xml", "<a><b/></a>"),
     "C": fence("c", "#include <math.h>\ndouble half(double x) { return x / 2; }"),
     "a file of the repository": fence("sh", "cat plain.jsonl", "given: tests/data/scenes/plain.jsonl as plain.jsonl")
@@ -57,13 +61,19 @@ RIGHT = {
     "one line that is not run": fence("sh", "ardusub\nls", 'not run "ardusub": needs ArduPilot'),
     "what pip and make do": fence("sh", "pip install '.[mavlink,live]'\nmake run"),
     "a line that goes on": fence("sh", "python -m fuzzy_arbiter eval \\\n  section-vi 1 0 0"),
-    "a place to go": fence("sh", "mkdir there\ncd there\npython -m plant_fmu plot odin thrusters --out a.svg\nls a.svg"),
-    "a hidden flag": fence("sh", "python -m plant_fmu build --vehicle odin", 'run with "python -m plant_fmu build": --out a.fmu')
+    "a place to go": fence(
+        "sh", "mkdir there\ncd there\npython -m plant_fmu plot odin thrusters --out a.svg\nls a.svg"
+    ),
+    "a hidden flag": fence(
+        "sh", "python -m plant_fmu build --vehicle odin", 'run with "python -m plant_fmu build": --out a.fmu'
+    )
     + fence("sh", "ls a.fmu"),
-    "a setup for one command": fence("sh", "mkdir a\nls a", 'setup sh "ls"\ncp ../page.md a/\n') + fence("text", "page.md"),
+    "a setup for one command": fence("sh", "mkdir a\nls a", 'setup sh "ls"\ncp ../page.md a/\n')
+    + fence("text", "page.md"),
     "a block alone": fence("python", "print(__name__)", "alone") + fence("text", "__main__"),
     "a comment of another kind": "<!-- figures: all -->\n\nwords\n",
-    "a port that is taken": fence("python", "print(14550)", "setup python\nassert 14550 != 4000 * 3 + 2550\n") + fence("text", "14550"),
+    "a port that is taken": fence("python", "print(14550)", "setup python\nassert 14550 != 4000 * 3 + 2550\n")
+    + fence("text", "14550"),
 }
 
 WRONG = {
@@ -91,7 +101,10 @@ WRONG = {
     "a target of nobody": (fence("sh", "make sail"), "no target sail"),
     "wrong output": (fence("python", "print(1)") + fence("text", "2"), "printed was"),
     "output of nobody": (fence("text", "2"), "output of no block"),
-    "output of a block that is not run": (fence("sh", "ardusub", "not run: needs it") + fence("text", "2"), "of no block"),
+    "output of a block that is not run": (
+        fence("sh", "ardusub", "not run: needs it") + fence("text", "2"),
+        "of no block",
+    ),
     "no language": (fence("", "x"), "without a language"),
     "an indented block": ("words\n\n    cosim run paper\n", "indented"),
     "an unknown language": (fence("cobol", "x"), "nobody checks blocks of 'cobol'"),
@@ -106,6 +119,8 @@ WRONG = {
     "a key of nobody": (fence("toml", "[time]\nduratoin = 1.0", "scenario onto: paper"), "duratoin"),
     "a vehicle that cannot be": (fence("toml", "[hull]\nradius = -1.0", "vehicle onto: odin"), "radius"),
     "JSON that is none": (fence("json", '{"a": 1'), "page.md:3"),
+    "an order of nobody": (fence("json", '{"order": "fly"}', "orders of: harbour"), "is refused"),
+    "a scene that is none": (fence("json", '{"seed": 1}', "scenes"), "start"),
     "XML that is none": (fence("xml", "<a>"), "no element|unclosed"),
     "C that is none": (fence("c", "int f( { }"), "error"),
     "a setup for no command": (fence("sh", "ls", 'setup sh "cosim"\nls\n'), "no command begins with 'cosim'"),
