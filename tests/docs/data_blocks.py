@@ -17,6 +17,7 @@ from cosim.scenario import load_scenario
 from cosim.scene import decode_scene
 from fuzzy_arbiter.formats import load
 from plant_fmu import load_vehicle
+from plant_fmu.compiler import find_compiler
 from tests.docs.directives import PageError
 from tests.docs.pages import Block
 
@@ -84,7 +85,7 @@ def _check_json(block: Block) -> None:
 
 def _check_c(block: Block) -> None:
     flags = shlex.split(block.directives.compile_with)
-    command = ["cc", "-std=c11", "-Wall", "-Werror", "-fsyntax-only", *flags, "-x", "c", "-"]
+    command = [*find_compiler(), "-std=c11", "-Wall", "-Werror", "-fsyntax-only", *flags, "-x", "c", "-"]
     done = subprocess.run(command, input=block.text, capture_output=True, text=True, timeout=60, check=False)
     if done.returncode:
         raise PageError(f"{block.where}: {done.stderr}")

@@ -6,7 +6,7 @@ import shlex
 import pytest
 
 from tests.docs.pages import all_pages, blocks, inline_code, page_name
-from tests.docs.programs import MODULES, flags, wrong_flags
+from tests.docs.programs import MODULES, flags, parses, program, wrong_flags
 
 PAGES = all_pages()
 # flags of other programs that the pages speak of
@@ -48,6 +48,15 @@ def test_flags_that_stand_alone_are_of_some_program(page):
         for word in re.findall(r"(?<!\S)--[a-z][\w=-]*", text)
     ]
     assert not [(line, flag) for line, flag in named if flag not in OURS | FOREIGN]
+
+
+@pytest.mark.parametrize("name", MODULES)
+def test_examples_of_the_help_are_understood(name):
+    examples = (MODULES[name]._parser().epilog or "").partition("examples:")[2]
+    assert examples.count("\n") > 2 or name in ("plant_fmu", "benchmarks"), "examples of a program that has some"
+    for line in filter(None, map(str.strip, examples.splitlines())):
+        ours = program(words(line.partition("||")[0]))
+        assert ours is not None and parses(*ours) == "", line
 
 
 def test_a_verb_or_a_flag_that_does_not_exist_is_found():
