@@ -71,8 +71,14 @@ def check_commands(block: Block) -> None:
 
 def not_run(block: Block) -> list[tuple[str, str]]:
     """Return reason and command of what a block of commands does not run."""
-    pairs = [(command, of_command(block.directives.not_run, command.words)) for command in commands(block)]
-    return [(reasons[0], " ".join(command.words)) for command, reasons in pairs if reasons]
+    found = []
+    for command in commands(block):
+        reasons = of_command(block.directives.not_run, command.words)
+        if _checked_foreign(block.where, command.words):
+            reasons.append("changes the machine; its extras or targets are looked up")
+        if reasons:
+            found.append((reasons[0], " ".join(command.words)))
+    return found
 
 
 def _check_unrun(block: Block, command: Command, reason: str) -> None:

@@ -148,10 +148,12 @@ def test_a_page_says_what_it_does_not_run(tmp_path):
     page.write_text(
         fence("sh", "ardusub --model JSON\nls", 'not run "ardusub": needs ArduPilot')
         + fence("matlab", "load('a.mat')", "not run: needs MATLAB")
+        + fence("sh", "make run")
     )
     assert entries(page) == [
         "page.md | needs ArduPilot | ardusub --model JSON",
         "page.md | needs MATLAB | matlab: load('a.mat')",
+        "page.md | changes the machine; its extras or targets are looked up | make run",
     ]
 
 
