@@ -6,7 +6,7 @@ import shlex
 import pytest
 
 from tests.docs.pages import all_pages, blocks, inline_code, page_name
-from tests.docs.programs import MODULES, flags, parses, program, wrong_flags
+from tests.docs.programs import MODULES, check_foreign, flags, parses, program, wrong_flags
 
 PAGES = all_pages()
 # flags of other programs that the pages speak of
@@ -48,6 +48,13 @@ def test_flags_that_stand_alone_are_of_some_program(page):
         for word in re.findall(r"(?<!\S)--[a-z][\w=-]*", text)
     ]
     assert not [(line, flag) for line, flag in named if flag not in OURS | FOREIGN]
+
+
+@pytest.mark.parametrize("page", PAGES, ids=page_name)
+def test_extras_and_targets_in_the_text_exist(page):
+    for _, text in inline_code(page):
+        if text.strip():
+            check_foreign(words(text))
 
 
 @pytest.mark.parametrize("name", MODULES)

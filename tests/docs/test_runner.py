@@ -59,7 +59,7 @@ RIGHT = {
     + fence("text", '{"seed":...'),
     "what is not run": fence("sh", "sim_vehicle.py -v ArduSub", "not run: needs ArduPilot"),
     "one line that is not run": fence("sh", "ardusub\nls", 'not run "ardusub": needs ArduPilot'),
-    "what pip and make do": fence("sh", "pip install '.[mavlink,live]'\nmake run"),
+    "what pip and make do": fence("sh", "pip install '.[mavlink,dev]'\nmake run"),
     "a line that goes on": fence("sh", "python -m fuzzy_arbiter eval \\\n  section-vi 1 0 0"),
     "a place to go": fence(
         "sh", "mkdir there\ncd there\npython -m plant_fmu plot odin thrusters --out a.svg\nls a.svg"
