@@ -1,14 +1,12 @@
 """What the documents say is what the code does."""
 
 import re
-import shutil
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 
-from cosim.cli import main
 from cosim.scenario import load_scenario
 from cosim.scenario_file import shipped_scenarios
 
@@ -34,35 +32,6 @@ def test_examples_run(example, tmp_path):
     done = subprocess.run([sys.executable, example], cwd=tmp_path, capture_output=True, text=True, check=True)
     assert done.stdout
     assert done.stderr == ""
-
-
-def test_readme_shows_what_the_arbiter_says():
-    code = re.search(r"```python\n(.*?)```", (ROOT / "README.md").read_text(), re.S).group(1)
-    *setup, last = code.strip().splitlines()
-    call, _, comment = last.partition("#")
-    names = {}
-    exec("\n".join(setup), names)
-    assert eval(call, names) == eval(comment[comment.index("(") :])
-
-
-def test_docs_fmu_snippet_runs(tmp_path, monkeypatch):
-    from plant_fmu import cached_fmu, load_vehicle
-
-    code = re.search(r"```python\n(.*?)```", (ROOT / "docs" / "fmu.md").read_text(), re.S).group(1)
-    monkeypatch.chdir(tmp_path)
-    shutil.copy(cached_fmu(load_vehicle("odin"), 3), tmp_path / "odin.fmu")
-    names = {}
-    exec(code, names)
-    assert names["result"]["position.x"][-1] > 1.0
-
-
-def test_docs_fmu_plant_runs():
-    *_, code = re.findall(r"```python\n(.*?)```", (ROOT / "docs" / "fmu.md").read_text(), re.S)
-    names = {}
-    exec(code, names)
-    assert names["speed"] > 0.1 and not names["cut"]
-    assert names["B"].shape == (2, 14) and (names["B"][0, :2] > 0).all()
-    assert names["plant"].time == 1.0
 
 
 def test_readme_names_the_shipped_scenarios():
@@ -101,21 +70,3 @@ def test_reproduction_table_holds_the_measured_figures(shipped_run):
         clearances = ", ".join(f"{summary['min_clearance'][r]:.3f}".replace("-", "−") for r in ("SR1", "SR2"))
         assert rows["clearance to SR1, SR2, m"][column] == clearances
         assert rows["greatest speed, m/s"][column] == f"{summary['max_speed']:.2f}"
-
-
-@pytest.mark.slow
-def test_commands_of_the_tour_are_understood(capsys, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    tour = re.search(r"## A short tour\n+```\n(.*?)```", (ROOT / "README.md").read_text(), re.S).group(1)
-    commands = [line.split("#")[0].split() for line in tour.splitlines() if line.startswith("cosim")]
-    assert {words[1] for words in commands} >= {"run", "check", "campaign", "sweep", "package", "sitl"}
-    nobody_comes = {"listen": (["--seconds", "0.1"], 1), "sitl": (["--timeout", "0.1"], 2)}
-    scenes = (ROOT / "tests" / "data" / "scenes" / "plain.jsonl").read_text().splitlines()
-    (tmp_path / "scenes.jsonl").write_text(scenes[0])
-    for _, *words in commands:
-        words = words[: words.index(">")] if ">" in words else words
-        if words[0] == "run":
-            words = [w for w in words if w not in ("--rate", "1")] + ["--set", "time.duration=0.01", "--no-report"]
-            words += ["--set", "arbiter.engine=closed"]
-        brief, code = nobody_comes.get(words[0], ([], 0))
-        assert main([*words, *brief]) == code

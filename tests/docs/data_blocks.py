@@ -1,0 +1,107 @@
+"""Blocks of data and of other languages: parsed, loaded by the real loaders, compiled."""
+
+import json
+import shlex
+import subprocess
+import tomllib
+from collections.abc import Callable, Mapping
+from importlib import resources
+from pathlib import Path
+from xml.etree import ElementTree
+
+import tomli_w
+
+from cosim.helm import OrderQueue
+from cosim.live.orders import Desk
+from cosim.scenario import load_scenario
+from cosim.scene import decode_scene
+from fuzzy_arbiter.formats import load
+from plant_fmu import load_vehicle
+from plant_fmu.compiler import find_compiler
+from tests.docs.directives import PageError
+from tests.docs.pages import Block
+
+_LOADERS: dict[str, Callable[[str], object]] = {"scenario": load_scenario, "vehicle": load_vehicle, "arbiter": load}
+
+
+def whole(block: Block) -> str:
+    """Return the text that a block stands for: a fragment is merged onto the shipped file it belongs to."""
+    directives = block.directives
+    if not directives.onto:
+        return block.text
+    if directives.kind == "scenario":
+        return f'base = "{directives.onto}"\n{block.text}'
+    if directives.kind == "vehicle":
+        shipped = resources.files("plant_fmu") / "vehicles" / f"{directives.onto}.toml"
+        return tomli_w.dumps(_merged(tomllib.loads(shipped.read_text()), tomllib.loads(block.text)))
+    raise PageError(f"{block.where}: nothing to merge an arbiter onto")
+
+
+def check_data(block: Block) -> None:
+    """Check a block that is no program; a PageError says what is wrong."""
+    check = _CHECKS.get(block.language)
+    if check is None:
+        raise PageError(
+            f"{block.where}: nobody checks blocks of {block.language!r}; say why not: <!-- not run: ... -->"
+        )
+    try:
+        check(block)
+    except PageError:
+        raise
+    except Exception as error:
+        raise PageError(f"{block.where}: {error}") from error
+
+
+def _check_toml(block: Block) -> None:
+    if block.directives.kind not in _LOADERS:
+        raise PageError(f"{block.where}: expected one of <!-- {' -->, <!-- '.join(_LOADERS)} --> above a block of TOML")
+    file = Path(block.directives.file or "block.toml")
+    before = file.read_bytes() if file.exists() else None
+    file.write_text(whole(block), encoding="utf-8")
+    _LOADERS[block.directives.kind](str(file))
+    if before is not None:
+        file.write_bytes(before)
+    elif not block.directives.file:
+        file.unlink()
+
+
+def _check_json(block: Block) -> None:
+    lines = list(filter(None, block.text.splitlines()))
+    try:
+        json.loads(block.text)
+    except json.JSONDecodeError:
+        for line in lines:
+            json.loads(line)
+    if block.directives.kind == "scenes":
+        for line in lines:
+            decode_scene(line.encode())
+    if block.directives.orders_of:
+        scenario = load_scenario(block.directives.orders_of, ["commands.enabled=true"])
+        desk = Desk(scenario, OrderQueue(), lambda name: True)
+        for line in lines:
+            if why := desk.take(line):
+                raise PageError(f"{block.where}: {line} is refused: {why}")
+
+
+def _check_c(block: Block) -> None:
+    flags = shlex.split(block.directives.compile_with)
+    command = [*find_compiler(), "-std=c11", "-Wall", "-Werror", "-fsyntax-only", *flags, "-x", "c", "-"]
+    done = subprocess.run(command, input=block.text, capture_output=True, text=True, timeout=60, check=False)
+    if done.returncode:
+        raise PageError(f"{block.where}: {done.stderr}")
+
+
+def _merged(base: Mapping[str, object], over: Mapping[str, object]) -> dict[str, object]:
+    result = dict(base)
+    for key, value in over.items():
+        below = result.get(key)
+        result[key] = _merged(below, value) if isinstance(value, dict) and isinstance(below, dict) else value
+    return result
+
+
+_CHECKS: dict[str, Callable[[Block], object]] = {
+    "toml": _check_toml,
+    "json": _check_json,
+    "xml": lambda block: ElementTree.fromstring(block.text),
+    "c": _check_c,
+}

@@ -1,0 +1,108 @@
+"""What HTML comments above a block say of it; a reader of the page does not see them.
+
+==========================================  =======================================================================
+``not run: REASON``                         of a block, or with ``"PREFIX"`` after ``run`` of the lines that begin so
+``run with: ARGUMENTS``                     appended to its commands, or with ``"PREFIX"`` to those that begin so
+``page run with "PREFIX": ARGUMENTS``       the same for all blocks from there on
+``exits: STATUS``                           of its commands, or with ``"PREFIX"`` of those that begin so; otherwise 0
+``given: PATH as NAME``                     a file of the repository is copied into the folder before
+``file: NAME``                              the block is written into the folder
+``setup sh`` or ``setup python``, lines     done before the block, or with a ``"PREFIX"`` before the first command so
+``scenario``, ``vehicle``, ``arbiter``      what a block of TOML is; with ``onto: NAME`` it is merged onto a shipped one
+``scenes``                                  of a block of JSON: each line is a scene of a campaign
+``orders of: SCENARIO``                     of a block of JSON: each line is an order that a run of it takes
+``compile with: FLAGS``                     of a block of C
+``alone``                                   the block of Python runs in a process of its own, with names of its own
+``slow``                                    the page runs with --slow alone
+==========================================  =======================================================================
+"""
+
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from typing import Self
+
+REASONS = ("needs ", "takes ", "changes ", "formula", "drawing", "template ", "excerpt ")
+_PREFIXED = re.compile(r'(page run with|run with|not run|exits)(?: "([^"]+)")?: (\S.*)')
+_GIVEN = re.compile(r"given: (\S+) as (\S+)")
+_NAMED = re.compile(r"(file|compile with): (\S.*)")
+_KIND = re.compile(r"(scenario|vehicle|arbiter|scenes)(?: onto: (\S+))?")
+_ORDERS = re.compile(r"orders of: (\S+)")
+_SETUP = re.compile(r'setup (sh|python)(?: "([^"]+)")?\n(.*)', re.S)
+_WORDS = re.compile(
+    r"(page run|run with|not run|exits|given|file:|setup|scenario|vehicle|arbiter|scenes|orders of|compile with|alone"
+    r"|slow)\b"
+)
+
+
+class PageError(AssertionError):
+    """A page says what is not so, or what the runner cannot check."""
+
+
+@dataclass
+class Directives:
+    """What is said of a block; in pairs a prefix comes first, "" for all commands."""
+
+    not_run: list[tuple[str, str]] = field(default_factory=list)
+    run_with: list[tuple[str, str]] = field(default_factory=list)
+    exits: list[tuple[str, str]] = field(default_factory=list)
+    given: list[tuple[str, str]] = field(default_factory=list)
+    setups: list[tuple[str, str, str]] = field(default_factory=list)
+    kind: str = ""
+    onto: str = ""
+    file: str = ""
+    orders_of: str = ""
+    compile_with: str = ""
+    alone: bool = False
+    slow: bool = False
+
+    @classmethod
+    def read(cls, where: str, comments: Iterable[str], everywhere: Iterable[str] = ()) -> Self:
+        """Return what comments say; one of an unknown form is a PageError."""
+        found = cls()
+        for text in (*everywhere, *comments):
+            found._add(where, text)
+        return found
+
+    @property
+    def skipped(self) -> str:
+        """Why the whole block is not run; empty if it is."""
+        return next((reason for prefix, reason in self.not_run if not prefix), "")
+
+    def _add(self, where: str, text: str) -> None:
+        if match := _PREFIXED.fullmatch(text):
+            verb, prefix, value = match[1], match[2] or "", match[3]
+            if verb == "not run" and not value.startswith(REASONS):
+                raise PageError(f"{where}: not run for an unknown reason {value!r}, expected one of {REASONS}")
+            if verb == "exits" and not value.isdigit():
+                raise PageError(f"{where}: exits {value!r}, expected a number")
+            {"not run": self.not_run, "exits": self.exits}.get(verb, self.run_with).append((prefix, value))
+        elif match := _GIVEN.fullmatch(text):
+            self.given.append((match[1], match[2]))
+        elif match := _NAMED.fullmatch(text):
+            setattr(self, {"file": "file", "compile with": "compile_with"}[match[1]], match[2])
+        elif match := _KIND.fullmatch(text):
+            self.kind, self.onto = match[1], match[2] or ""
+        elif match := _ORDERS.fullmatch(text):
+            self.orders_of = match[1]
+        elif match := _SETUP.fullmatch(text):
+            self.setups.append((match[2] or "", match[1], match[3]))
+        elif text in ("slow", "alone"):
+            setattr(self, text, True)
+        else:
+            raise PageError(f"{where}: unknown directive {text.splitlines()[0] if text else ''!r}")
+
+
+def page_wide(text: str) -> bool:
+    """Return whether a comment speaks of all blocks that follow."""
+    return text.startswith("page run with ")
+
+
+def looks_like_one(text: str) -> bool:
+    """Return whether a comment begins as a directive does."""
+    return _WORDS.match(text) is not None
+
+
+def of_command(pairs: Iterable[tuple[str, str]], words: list[str]) -> list[str]:
+    """Return the values whose prefix, word by word, begins the command."""
+    return [value for prefix, value in pairs if words[: len(prefix.split())] == prefix.split()]

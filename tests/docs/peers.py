@@ -1,0 +1,90 @@
+"""Who comes when a command of the documents waits for somebody."""
+
+import contextlib
+import socket
+import threading
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+from benchmarks.sitl_pilot import HEAD, MAGIC, PULSES, RATE
+from cosim.errors import TelemetryError
+from cosim.live.address import parse_live
+from cosim.live.view import LiveView
+from cosim.mavlink.conformance.client import Client
+from cosim.mavlink.endpoint import parse_endpoint
+from cosim.mavlink.ground import GroundLink
+from cosim.run import run_scenario
+from cosim.scenario import load_scenario
+
+_ARM = 400  # MAV_CMD_COMPONENT_ARM_DISARM
+_PAUSE = 0.05  # s
+
+
+@contextlib.contextmanager
+def _beside(work: Callable[[], object]) -> Iterator[None]:
+    """Do something in a thread until the context ends; its failure is raised then."""
+    failures: list[Exception] = []
+
+    def guarded() -> None:
+        try:
+            work()
+        except Exception as error:  # noqa: BLE001
+            failures.append(error)
+
+    thread = threading.Thread(target=guarded, daemon=True)
+    thread.start()
+    yield
+    thread.join(60.0)
+    if failures:
+        raise failures[0]
+
+
+@contextlib.contextmanager
+def arming(endpoint: str) -> Iterator[None]:
+    """Be a ground station that arms the vehicle at an endpoint as soon as there is one."""
+    ended = threading.Event()
+
+    def arm() -> None:
+        while not ended.is_set():
+            with contextlib.suppress(TelemetryError), GroundLink(parse_endpoint(endpoint, False), None) as link:
+                client = Client(link)
+                if client.find(1.0) is not None and (answer := client.command(_ARM, (1.0,))) and answer.result == 0:
+                    return
+            ended.wait(_PAUSE)
+
+    with _beside(arm):
+        yield
+        ended.set()
+
+
+@contextlib.contextmanager
+def flying(port: int) -> Iterator[None]:
+    """Be an ArduPilot that flies the plant behind a port, from when that listens until the context ends."""
+    ended = threading.Event()
+
+    def fly() -> None:
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as link:
+            link.connect(("127.0.0.1", port))
+            link.settimeout(0.2)
+            count = 0
+            while not ended.is_set():
+                try:
+                    link.send(HEAD.pack(MAGIC, RATE, count) + PULSES)
+                    link.recv(65000)
+                    count += 1
+                except (ConnectionRefusedError, TimeoutError):  # before it listens, and after it ends
+                    time.sleep(_PAUSE)
+
+    with _beside(fly):
+        yield
+        ended.set()
+
+
+@contextlib.contextmanager
+def shown(port: int, scenario: str, folder: str) -> Iterator[None]:
+    """Run a second of a scenario that viewers can see at a port."""
+    loaded = load_scenario(scenario, ["time.duration=1"])
+    with LiveView(parse_live(str(port))) as view:
+        with _beside(lambda: run_scenario(loaded, Path(folder), rate=1.0, report=False, live=view)):
+            yield

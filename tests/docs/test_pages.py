@@ -1,0 +1,42 @@
+"""Every block and command of every page is run, or checked as far as it goes with a reason that stands in the page."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from tests.docs.ledger import LEDGER, entries
+from tests.docs.pages import all_pages, blocks, page_name
+from tests.docs.runner import check_unrun, run_blocks
+
+PAGES = all_pages()
+
+
+def _marks(page: Path) -> list[pytest.MarkDecorator]:
+    try:
+        return [pytest.mark.slow] if any(block.directives.slow for block in blocks(page)) else []
+    except AssertionError:  # the page's test says it
+        return []
+
+
+@pytest.mark.parametrize("page", [pytest.param(page, marks=_marks(page), id=page_name(page)) for page in PAGES])
+def test_blocks_run_and_show_what_they_give(page, tmp_path):
+    run_blocks(blocks(page), tmp_path)
+
+
+@pytest.mark.parametrize("page", PAGES, ids=page_name)
+def test_blocks_are_understood_and_those_not_run_say_why(page):
+    for block in blocks(page):
+        check_unrun(block)
+
+
+def test_all_that_is_not_run_stands_in_the_ledger():
+    found = [entry for page in PAGES for entry in entries(page)]
+    assert found == LEDGER.read_text(encoding="utf-8").splitlines(), "python -m tests.docs.ledger writes it anew"
+
+
+def test_no_block_is_overlooked():
+    """A line that begins with a fence opens or closes a block, and every page of the documents is among the pages."""
+    assert {"README.md", "docs/arbiter.md", "docs/fmu-variables.md"} <= set(map(page_name, PAGES))
+    for page in PAGES:
+        assert 2 * len(blocks(page)) == len(re.findall(r"^[ >]*(?:```|~~~)", page.read_text(), re.M)), page
