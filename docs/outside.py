@@ -50,7 +50,9 @@ def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Fil
     uri = page.file.src_uri
     here = docs / uri
     if uri.startswith(f"{FOLDER}/"):
-        here = root / uri.removeprefix(f"{FOLDER}/").removesuffix("" if (root / uri[len(FOLDER) + 1 :]).is_file() else ".md")
+        here = root / uri.removeprefix(f"{FOLDER}/").removesuffix(
+            "" if (root / uri[len(FOLDER) + 1 :]).is_file() else ".md"
+        )
 
     def led(match: re.Match[str]) -> str:
         path = _resolved(match[1], here)

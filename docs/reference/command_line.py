@@ -14,11 +14,11 @@ PAGE = Path(__file__).with_name("command-line.md")
 
 _HEAD = """# Command line
 
-Every verb and its flags, written from the parsers themselves: `python docs/reference/command_line.py`. Each verb says the
-same with `--help`. Flags in brackets may be left out; what ends with `...` may be repeated.
+Every verb and its flags, written from the parsers themselves: `python docs/reference/command_line.py`. Each verb says
+the same with `--help`. Flags in brackets may be left out; what ends with `...` may be repeated.
 
-Exit codes: 0; 1 where a check fails; 2 where the user must mend something, said in one line on standard error; 130 after
-Ctrl-C.
+Exit codes: 0; 1 where a check fails; 2 where the user must mend something, said in one line on standard error; 130
+after Ctrl-C.
 """
 
 
@@ -29,7 +29,10 @@ def page() -> str:
         parts += [f"## {parser.prog}", parser.description or "", _table(parser)]
         if parser.epilog:
             notes, _, examples = parser.epilog.partition("examples:\n")
-            parts += [notes.strip(), "```text\n" + "\n".join(x.strip() for x in examples.strip().splitlines()) + "\n```"]
+            parts += [
+                notes.strip(),
+                "```text\n" + "\n".join(x.strip() for x in examples.strip().splitlines()) + "\n```",
+            ]
         for name, verb, what in verbs(parser):
             said = (verb.description or what).strip().rstrip(".")
             parts += [f"### {parser.prog} {name}", f"{said[0].upper()}{said[1:]}.", _usage(verb), _table(verb)]
@@ -59,7 +62,7 @@ def _usage(parser: argparse.ArgumentParser) -> str:
         words.append(word if action.required else f"[{word}]")
     lines = [words[0]]
     for word in words[1:]:
-        if len(lines[-1]) + len(word) > 110:
+        if len(lines[-1]) + len(word) > 88:
             lines.append("   ")
         lines[-1] += f" {word}"
     return "```text\n" + "\n".join(lines) + "\n```"
