@@ -129,13 +129,13 @@ def test_the_command_line_page_has_every_verb_and_flag_of_the_help(command, caps
 
 def test_theory_has_every_equation_once():
     blocks = re.findall(r"```text\n(.*?)```", THEORY, re.S)
-    numbers = [int(n) for block in blocks for n in re.findall(r" \((\d+)\)$", block, re.M)]
+    numbers = [int(n) for block in blocks for n in re.findall(r"^\((\d+)\) ", block, re.M)]
     assert numbers == list(range(1, 53))
 
 
 def test_every_block_of_numbered_equations_says_where_it_is_computed():
     for block, after in re.findall(r"```text\n(.*?)```\n\n(.*?)(?=\n\n)", THEORY, re.S):
-        if re.search(r" \(\d+\)$", block, re.M):
+        if re.search(r"^\(\d+\) ", block, re.M):
             assert after.startswith("Code: `"), block
 
 

@@ -1,7 +1,8 @@
-"""Makes pages of files outside docs/ that pages link to, such as examples, so that their links lead somewhere.
+"""Lets links that are good on disk be good on the site: to files outside docs/, and by the names of pages.
 
-A hook of MkDocs (`hooks` in mkdocs.yml). A Markdown file becomes a page as it is, any other one with its text as code;
-links are written anew to lead there. On disk, and wherever the repository is looked at, they lead to the file itself.
+A hook of MkDocs (`hooks` in mkdocs.yml). A file outside docs/ that a page links to, such as an example, becomes a page:
+Markdown as it is, any other file with its text as code. A link whose words are a file's name, as in
+`[theory.md](theory.md)`, has the title of that page in their place.
 """
 
 from __future__ import annotations
@@ -17,7 +18,8 @@ from mkdocs.structure.pages import Page
 ALWAYS = ("CHANGELOG.md",)  # are in the navigation
 FOLDER = "outside"
 
-_LINK = re.compile(r"(?<=\]\()(?!\w+:|#)([^)#\s]+)(?=[#)])")
+_LINK = re.compile(r"\[([^\[\]]*)\]\((?!\w+:|#)([^)#\s]+)(?=[#)])")
+_TITLE = re.compile(r"^# (.*)$", re.M)
 _LANGUAGES = {".py": "python", ".c": "c", ".h": "c", ".toml": "toml", ".html": "html", ".json": "json"}
 
 
@@ -45,20 +47,21 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
 
 
 def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Files) -> str:
-    """Let links to files outside lead to their pages."""
+    """Let links to files outside lead to their pages, and bear the titles of pages."""
     root, docs = _places(config)
     uri = page.file.src_uri
     here = docs / uri
     if uri.startswith(f"{FOLDER}/"):
-        here = root / uri.removeprefix(f"{FOLDER}/").removesuffix(
-            "" if (root / uri[len(FOLDER) + 1 :]).is_file() else ".md"
-        )
+        here = root / uri.removeprefix(f"{FOLDER}/")
 
     def led(match: re.Match[str]) -> str:
-        path = _resolved(match[1], here)
-        target = str(path.relative_to(docs)) if path.is_relative_to(docs) else _page(path, root)
-        found = files.get_file_from_path(target)
-        return os.path.relpath(target, os.path.dirname(uri)) if found else match[0]
+        words, target = match.groups()
+        path = _resolved(target, here)
+        file = files.get_file_from_path(str(path.relative_to(docs)) if path.is_relative_to(docs) else _page(path, root))
+        if file is None:
+            return match[0]
+        title = _TITLE.search(file.content_string) if words == path.name and path.suffix == ".md" else None
+        return f"[{title[1] if title else words}]({os.path.relpath(file.src_uri, os.path.dirname(uri))}"
 
     return _LINK.sub(led, markdown)
 
@@ -72,7 +75,7 @@ def _resolved(target: str, page: Path) -> Path:
 
 
 def _targets(text: str, page: Path) -> list[Path]:
-    return [_resolved(target, page) for target in _LINK.findall(text)]
+    return [_resolved(target, page) for _, target in _LINK.findall(text)]
 
 
 def _page(path: Path, root: Path) -> str:
