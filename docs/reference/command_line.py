@@ -15,11 +15,16 @@ PAGE = Path(__file__).with_name("command-line.md")
 _HEAD = """# Command line
 
 Every verb and its flags, written from the parsers themselves: `python docs/reference/command_line.py`. Each verb says
-the same with `--help`. Flags in brackets may be left out; what ends with `...` may be repeated.
+the same with `--help`. Words without dashes are required unless they stand in brackets, flags are not unless they say
+so; `...` stands for several.
 
 Exit codes: 0; 1 where a check fails; 2 where the user must mend something, said in one line on standard error; 130
 after Ctrl-C.
 """
+_EXAMPLES = """<!-- not run: excerpt of the help, whose examples a test parses -->
+```text
+{}
+```"""
 
 
 def page() -> str:
@@ -29,13 +34,10 @@ def page() -> str:
         parts += [f"## {parser.prog}", parser.description or "", _table(parser)]
         if parser.epilog:
             notes, _, examples = parser.epilog.partition("examples:\n")
-            parts += [
-                notes.strip(),
-                "```text\n" + "\n".join(x.strip() for x in examples.strip().splitlines()) + "\n```",
-            ]
+            parts += [notes.strip(), _EXAMPLES.format("\n".join(map(str.strip, examples.strip().splitlines())))]
         for name, verb, what in verbs(parser):
             said = (verb.description or what).strip().rstrip(".")
-            parts += [f"### {parser.prog} {name}", f"{said[0].upper()}{said[1:]}.", _usage(verb), _table(verb)]
+            parts += [f"### {parser.prog} {name}", f"{said[0].upper()}{said[1:]}.", _table(verb)]
     return "\n\n".join(part.strip("\n") for part in parts if part) + "\n"
 
 
@@ -54,20 +56,6 @@ def _own(parser: argparse.ArgumentParser) -> list[argparse.Action]:
     return [a for a in parser._actions if not isinstance(a, left_out) and a.help is not argparse.SUPPRESS]
 
 
-def _usage(parser: argparse.ArgumentParser) -> str:
-    words = [parser.prog]
-    for action in sorted(_own(parser), key=lambda a: bool(a.option_strings)):
-        word = _called(action, -1)
-        word += " ..." if isinstance(action, argparse._AppendAction) else ""
-        words.append(word if action.required else f"[{word}]")
-    lines = [words[0]]
-    for word in words[1:]:
-        if len(lines[-1]) + len(word) > 88:
-            lines.append("   ")
-        lines[-1] += f" {word}"
-    return "```text\n" + "\n".join(lines) + "\n```"
-
-
 def _called(action: argparse.Action, which: int) -> str:
     """Return an argument as it is written, an option by its `which`-th name."""
     value = action.metavar if isinstance(action.metavar, str) else None
@@ -77,7 +65,9 @@ def _called(action: argparse.Action, which: int) -> str:
         value = action.dest if not action.option_strings else action.dest.upper()
     if action.nargs in ("*", "+"):
         value += " ..."
-    if action.nargs == "?" and action.option_strings:
+    if action.nargs == "*":
+        value = f"[{value}]"
+    if action.nargs == "?":
         value = f"[{value}]"
     if not action.option_strings:
         return value
@@ -90,6 +80,7 @@ def _table(parser: argparse.ArgumentParser) -> str:
         names = range(len(action.option_strings)) if action.option_strings else [0]
         called = ", ".join(f"`{_called(action, which)}`" for which in names)
         said = (action.help or "") % {**vars(action), "prog": parser.prog}
+        said += "; required" if action.option_strings and action.required else ""
         rows.append(f"| {_cell(called)} | {_cell(said)} |")
     return "\n".join(["| argument | meaning |", "|---|---|", *rows]) if rows else ""
 
