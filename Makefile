@@ -1,16 +1,17 @@
 # make run    the paper's scenario, from nothing to a report
 # make test   all fast tests
 # make lint   formatter, linter and type checker
+# make docs   the documents as a site, in build/site
 # make bench  what things cost, against peers in an environment of their own
 PYTHON ?= python3
 VENV ?= .venv
 BIN := $(VENV)/bin
 comma := ,
 # without a C compiler the ziglang package is one
-EXTRAS := mavlink,importers,dev$(if $(shell command -v cc),,$(comma)build)
+EXTRAS := mavlink,importers,dev,docs$(if $(shell command -v cc),,$(comma)build)
 PYTEST_FLAGS ?=
 
-.PHONY: run test lint bench clean
+.PHONY: run test lint docs bench clean
 
 run: $(VENV)/ready
 	$(BIN)/cosim run paper
@@ -22,6 +23,9 @@ lint: $(VENV)/ready
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
 	$(BIN)/mypy
+
+docs: $(VENV)/ready
+	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict
 
 bench: $(VENV)/ready
 	$(BIN)/python -m benchmarks all
