@@ -1,6 +1,9 @@
 # make run    the paper's scenario, from nothing to a report
 # make test   all fast tests
 # make lint   formatter, linter and type checker
+# make dist   source distribution and wheel, in dist/
+# make packaging  what is shipped: its contents, and a run from the wheel in an empty environment; LOWEST=1: with the
+#             lowest versions of what it needs
 # make bench  what things cost, against peers in an environment of their own
 PYTHON ?= python3
 VENV ?= .venv
@@ -10,7 +13,7 @@ comma := ,
 EXTRAS := mavlink,importers,dev$(if $(shell command -v cc),,$(comma)build)
 PYTEST_FLAGS ?=
 
-.PHONY: run test lint bench clean
+.PHONY: run test lint bench dist packaging clean
 
 run: $(VENV)/ready
 	$(BIN)/cosim run paper
@@ -26,6 +29,20 @@ lint: $(VENV)/ready
 bench: $(VENV)/ready
 	$(BIN)/python -m benchmarks all
 	$(BIN)/python -m benchmarks scaling
+
+dist: $(VENV)/ready
+	rm -rf dist
+	$(BIN)/python -m build --outdir dist
+	$(PYTHON) -m venv build/twine
+	build/twine/bin/python -m pip install --quiet --disable-pip-version-check twine
+	build/twine/bin/twine check --strict dist/*
+
+packaging: $(VENV)/ready
+ifdef LOWEST
+	$(BIN)/python -m tests.packaging.lowest build/lowest
+else
+	$(BIN)/python -m pytest -q --slow tests/packaging
+endif
 
 $(VENV)/ready: pyproject.toml
 	$(PYTHON) -c 'import sys; sys.exit(None if sys.version_info >= (3, 11) else "Python 3.11 or later is needed")'

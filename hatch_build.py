@@ -19,9 +19,13 @@ from hatchling.build import *  # noqa: F403 the functions of PEP 517
 from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 
 _NEEDED = ("fmpy", "msgspec", "numpy", "platformdirs")  # of the dependencies, by what writes the libraries
-_COMPILE = (
-    "import pathlib, sys; from plant_fmu.prebuilt import write_prebuilt; write_prebuilt(pathlib.Path(sys.argv[1]))"
-)
+_COMPILE = """
+import pathlib, sys
+from plant_fmu.prebuilt import shipped_structures, write_prebuilt
+for structure in shipped_structures():
+    for fmi in (2, 3):
+        write_prebuilt(structure, fmi, pathlib.Path(sys.argv[1]))
+"""
 
 
 class PrebuiltLibraries(BuildHookInterface):  # type: ignore[type-arg]

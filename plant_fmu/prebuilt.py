@@ -30,7 +30,7 @@ from plant_fmu.vehicle import Vehicle, load_vehicle, shipped_vehicles
 FOLDER = Path(__file__).parent / "prebuilt"  # in a wheel; a checkout has none
 NAME = "prebuilt"  # which their functions begin with
 
-_TOKEN = "{" + "-".join("0" * n for n in (8, 4, 4, 4, 12)) + "}"
+STAND_IN = "{" + "-".join("0" * n for n in (8, 4, 4, 4, 12)) + "}"  # for a token
 _GIVEN = ("state", "input", "parameter")  # what has a start value
 _ROW = struct.Struct("<4d")  # of the table: start, min, max, nominal; every platform is little-endian
 
@@ -64,7 +64,7 @@ def prebuilt_libraries(
     if not FOLDER.is_dir() or not all(platform.name in PLATFORMS and _has_libc(platform) for platform in platforms):
         return None
     general = general_component(component)
-    path = FOLDER / _file_name(general, fmi)
+    path = FOLDER / file_name(general, fmi)
     if not path.is_file():
         return None
     try:
@@ -75,36 +75,46 @@ def prebuilt_libraries(
     return [(platform, _numbered(library, general, component, token)) for platform, library in found]
 
 
-def write_prebuilt(folder: Path) -> list[Path]:
-    """Compile the libraries that come with the package, by the compiler of the ziglang package.
-
-    They serve the shipped vehicles and any other with as many thrusters, or with six.
-
-    Parameters
-    ----------
-    folder : Path
-        Where the files go.
+def shipped_structures() -> list[Component]:
+    """Return what libraries of the package are compiled from: for the shipped vehicles, and for six thrusters.
 
     Returns
     -------
-    list of Path
-        The files: one for each number of thrusters and version of FMI, with the libraries of all platforms.
+    list of Component
+        One for each number of thrusters.
+    """
+    vehicles = [load_vehicle(name) for name in shipped_vehicles()]
+    structures = [general_component(of_vehicle(v)) for v in (*vehicles, _with_thrusters(vehicles[0], 6))]
+    return list({structure.constants["N_THRUSTERS"]: structure for structure in structures}.values())
+
+
+def write_prebuilt(structure: Component, fmi: int, folder: Path) -> Path:
+    """Compile libraries that come with the package, by the compiler of the ziglang package.
+
+    Parameters
+    ----------
+    structure : Component
+        One of `shipped_structures`.
+    fmi : int
+        2 or 3.
+    folder : Path
+        Where the file goes.
+
+    Returns
+    -------
+    Path
+        The file, with the libraries of all platforms.
 
     Raises
     ------
     BuildError
-        If there is no such compiler, or it fails, or a file cannot be written.
+        If there is no such compiler, or it fails, or the file cannot be written.
     """
-    vehicles = [load_vehicle(name) for name in shipped_vehicles()]
-    components = [of_vehicle(vehicle) for vehicle in (*vehicles, _with_thrusters(vehicles[0], 6))]
-    written = []
-    for fmi in (2, 3):
-        for name, general in {_file_name(g, fmi): g for g in map(general_component, components)}.items():
-            compilers = [(platform, cross_compiler(platform)) for platform in PLATFORMS.values()]
-            libraries = compiled_libraries(general, _TOKEN, fmi, compilers)
-            write_archive(folder / name, {_member(platform): library for platform, library in libraries})
-            written.append(folder / name)
-    return written
+    compilers = [(platform, cross_compiler(platform)) for platform in PLATFORMS.values()]
+    libraries = compiled_libraries(structure, STAND_IN, fmi, compilers)
+    out = folder / file_name(structure, fmi)
+    write_archive(out, {_member(platform): library for platform, library in libraries})
+    return out
 
 
 def _with_thrusters(vehicle: Vehicle, n: int) -> Vehicle:
@@ -134,8 +144,22 @@ def _stand_in(i: int) -> float:
     return math.ldexp(1.0 + i / 2**20, -1000)  # of the size 1e-301: no quantity is as small
 
 
-def _file_name(general: Component, fmi: int) -> str:
-    return f"fmi{fmi}-{made_from(general, _TOKEN, fmi)[:32]}.zip"
+def file_name(general: Component, fmi: int) -> str:
+    """Return the name of the file with prebuilt libraries.
+
+    Parameters
+    ----------
+    general : Component
+        From `general_component`.
+    fmi : int
+        2 or 3.
+
+    Returns
+    -------
+    str
+        It tells all that the libraries are compiled from.
+    """
+    return f"fmi{fmi}-{made_from(general, STAND_IN, fmi)[:32]}.zip"
 
 
 def _member(platform: Platform) -> str:
@@ -154,7 +178,7 @@ def _has_libc(platform: Platform) -> bool:
 
 def _numbered(library: bytes, general: Component, component: Component, token: str) -> bytes:
     """Return a library with a component's numbers and token in place of the stand-ins."""
-    changes = [(_TOKEN.encode() + b"\0", token.encode() + b"\0")]
+    changes = [(STAND_IN.encode() + b"\0", token.encode() + b"\0")]
     for there, here in zip(general.variables, component.variables, strict=True):
         if there.role in _GIVEN:
             changes.append((_row(there), _row(here)))
