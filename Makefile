@@ -2,8 +2,8 @@
 # make test   all fast tests
 # make lint   formatter, linter and type checker
 # make dist   source distribution and wheel, in dist/
-# make packaging  what is shipped: its contents, and a run from the wheel in an empty environment; LOWEST=1: with the
-#             lowest versions of what it needs
+# make packaging  what is shipped: its contents, and runs from the wheel in an empty environment
+# make lowest     tests with the lowest versions of all that is needed, on Python 3.11
 # make bench  what things cost, against peers in an environment of their own
 PYTHON ?= python3
 VENV ?= .venv
@@ -13,7 +13,7 @@ comma := ,
 EXTRAS := mavlink,importers,dev$(if $(shell command -v cc),,$(comma)build)
 PYTEST_FLAGS ?=
 
-.PHONY: run test lint bench dist packaging clean
+.PHONY: run test lint bench dist packaging lowest clean
 
 run: $(VENV)/ready
 	$(BIN)/cosim run paper
@@ -38,11 +38,21 @@ dist: $(VENV)/ready
 	build/twine/bin/twine check --strict dist/*
 
 packaging: $(VENV)/ready
-ifdef LOWEST
-	$(BIN)/python -m tests.packaging.lowest build/lowest
-else
 	$(BIN)/python -m pytest -q --slow tests/packaging
-endif
+
+LOWEST := build/lowest
+LOWEST_TESTS := tests/controller tests/fuzzy_arbiter tests/plant_fmu tests/cosim
+
+lowest:
+	$(PYTHON) -m venv $(LOWEST)/uv
+	$(LOWEST)/uv/bin/python -m pip install --quiet --disable-pip-version-check uv
+	$(LOWEST)/uv/bin/uv pip compile --quiet --resolution lowest-direct --python-version 3.11 --extra campaign --extra mavlink \
+		--extra mcap --extra view --output-file $(LOWEST)/requirements.txt pyproject.toml
+	$(LOWEST)/uv/bin/uv venv --quiet --clear --python 3.11 $(LOWEST)/env
+	VIRTUAL_ENV=$(LOWEST)/env $(LOWEST)/uv/bin/uv pip install --quiet --requirement $(LOWEST)/requirements.txt \
+		hypothesis pypdf pytest pytest-timeout
+	VIRTUAL_ENV=$(LOWEST)/env $(LOWEST)/uv/bin/uv pip install --quiet --no-deps --editable .
+	$(LOWEST)/env/bin/python -m pytest -q $(LOWEST_TESTS) $(PYTEST_FLAGS)
 
 $(VENV)/ready: pyproject.toml
 	$(PYTHON) -c 'import sys; sys.exit(None if sys.version_info >= (3, 11) else "Python 3.11 or later is needed")'
