@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import re
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
@@ -15,6 +16,7 @@ from plant_fmu.platforms import Platform
 from plant_fmu.sources import c_sources, compiled_files, header
 
 FMI_HEADERS = Path(fmpy.__file__).parent / "c-code"
+_COMMENT = re.compile(r"/\*.*?\*/", re.DOTALL)
 
 
 def compiled_libraries(
@@ -75,7 +77,9 @@ def made_from(component: Component, token: str, fmi: int) -> str:
         Hexadecimal.
     """
     files = {**c_sources(component, fmi), component.header: header(component, token).encode()}
-    files |= {f"fmi/{file.name}": file.read_bytes() for file in FMI_HEADERS.glob(f"fmi{fmi}*.h")}
+    for file in FMI_HEADERS.glob(f"fmi{fmi}*.h"):
+        declared = _COMMENT.sub(" ", file.read_text(encoding="utf-8"))  # without what differs between releases of FMPy
+        files[f"fmi/{file.name}"] = " ".join(declared.split()).encode()
     return digest(files, *FLAGS)
 
 
