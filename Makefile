@@ -52,7 +52,7 @@ lowest:
 	VIRTUAL_ENV=$(LOWEST)/env $(LOWEST)/uv/bin/uv pip install --quiet --requirement $(LOWEST)/requirements.txt \
 		hypothesis pypdf pytest pytest-timeout
 	VIRTUAL_ENV=$(LOWEST)/env $(LOWEST)/uv/bin/uv pip install --quiet --no-deps --editable .
-	$(LOWEST)/env/bin/python -m pytest -q $(LOWEST_TESTS) $(PYTEST_FLAGS)
+	$(LOWEST)/env/bin/python -m pytest -q -o filterwarnings= $(LOWEST_TESTS) $(PYTEST_FLAGS) # old versions warn
 
 $(VENV)/ready: pyproject.toml
 	$(PYTHON) -c 'import sys; sys.exit(None if sys.version_info >= (3, 11) else "Python 3.11 or later is needed")'
