@@ -2,16 +2,19 @@
 # make test   all fast tests
 # make lint   formatter, linter and type checker
 # make docs   the documents as a site, in build/site
+# make dist   source distribution and wheel, in dist/
+# make packaging  what is shipped: its contents, and runs from the wheel in an empty environment
+# make lowest     tests with the lowest versions of all that is needed, on Python 3.11
 # make bench  what things cost, against peers in an environment of their own
 PYTHON ?= python3
 VENV ?= .venv
 BIN := $(VENV)/bin
 comma := ,
 # without a C compiler the ziglang package is one
-EXTRAS := mavlink,importers,dev,docs$(if $(shell command -v cc),,$(comma)build)
+EXTRAS := mavlink,importers,dev$(if $(shell command -v cc),,$(comma)build)
 PYTEST_FLAGS ?=
 
-.PHONY: run test lint docs bench clean
+.PHONY: run test lint docs bench dist packaging lowest clean
 
 run: $(VENV)/ready
 	$(BIN)/cosim run paper
@@ -25,11 +28,36 @@ lint: $(VENV)/ready
 	$(BIN)/mypy
 
 docs: $(VENV)/ready
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[docs]'
 	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict
 
 bench: $(VENV)/ready
 	$(BIN)/python -m benchmarks all
 	$(BIN)/python -m benchmarks scaling
+
+dist: $(VENV)/ready
+	rm -rf dist
+	$(BIN)/python -m build --outdir dist
+	$(PYTHON) -m venv build/twine
+	build/twine/bin/python -m pip install --quiet --disable-pip-version-check twine
+	build/twine/bin/twine check --strict dist/*
+
+packaging: $(VENV)/ready
+	$(BIN)/python -m pytest -q --slow tests/packaging
+
+LOWEST := build/lowest
+LOWEST_TESTS := tests/controller tests/fuzzy_arbiter tests/plant_fmu tests/cosim
+
+lowest:
+	$(PYTHON) -m venv $(LOWEST)/uv
+	$(LOWEST)/uv/bin/python -m pip install --quiet --disable-pip-version-check uv
+	$(LOWEST)/uv/bin/uv pip compile --quiet --resolution lowest-direct --python-version 3.11 --extra campaign --extra mavlink \
+		--extra mcap --extra view --output-file $(LOWEST)/requirements.txt pyproject.toml
+	$(LOWEST)/uv/bin/uv venv --quiet --clear --python 3.11 $(LOWEST)/env
+	VIRTUAL_ENV=$(LOWEST)/env $(LOWEST)/uv/bin/uv pip install --quiet --requirement $(LOWEST)/requirements.txt \
+		hypothesis pypdf pytest pytest-timeout
+	VIRTUAL_ENV=$(LOWEST)/env $(LOWEST)/uv/bin/uv pip install --quiet --no-deps --editable .
+	$(LOWEST)/env/bin/python -m pytest -q -o filterwarnings= $(LOWEST_TESTS) $(PYTEST_FLAGS) # old versions warn
 
 $(VENV)/ready: pyproject.toml
 	$(PYTHON) -c 'import sys; sys.exit(None if sys.version_info >= (3, 11) else "Python 3.11 or later is needed")'

@@ -5,7 +5,6 @@ from __future__ import annotations
 import atexit
 import errno
 import functools
-import hashlib
 import logging
 import os
 import shutil
@@ -17,20 +16,20 @@ import fmpy
 import platformdirs
 
 from plant_fmu.archive import require_place, write_archive
-from plant_fmu.compiler import FLAGS, compile_library, cross_compiler, find_compiler
+from plant_fmu.compiler import FLAGS, cross_compiler, find_compiler
 from plant_fmu.component import Component, of_vehicle
 from plant_fmu.description import model_description, token
 from plant_fmu.errors import BuildError
+from plant_fmu.libraries import compiled_libraries, digest
 from plant_fmu.platforms import NATIVE, Platform, cross_platforms, native_platform
-from plant_fmu.sources import build_description, c_sources, compiled_files, header
+from plant_fmu.prebuilt import prebuilt_libraries
+from plant_fmu.sources import build_description, c_sources, header
 from plant_fmu.universal import universal_library
 from plant_fmu.vehicle import Vehicle
 
 log = logging.getLogger(__name__)
 
 FMI_VERSIONS = (2, 3)
-
-_FMI_HEADERS = Path(fmpy.__file__).parent / "c-code"
 
 
 def require_version(fmi: int) -> None:
@@ -51,8 +50,9 @@ def build_fmu(what: Vehicle | Component, fmi: int, out: Path, platforms: str = N
     out : Path
         The file to write; it appears whole or not at all.
     platforms : str
-        ``native`` for this machine, by whatever compiler is here; ``all``, or FMI 3.0's names with commas between them,
-        such as ``x86_64-linux,x86_64-windows``, by the compiler of the ziglang package.
+        ``native`` for this machine; ``all``, or FMI 3.0's names with commas between them, such as
+        ``x86_64-linux,x86_64-windows``. Libraries that come with the package are taken where they fit. Else they are
+        compiled, for this machine by whatever compiler is here, for others by that of the ziglang package.
 
     Returns
     -------
@@ -66,12 +66,16 @@ def build_fmu(what: Vehicle | Component, fmi: int, out: Path, platforms: str = N
     """
     require_version(fmi)
     out = Path(out)
-    if platforms == NATIVE:
-        compilers = [(native_platform(), find_compiler())]
-    else:
-        compilers = [(platform, cross_compiler(platform)) for platform in cross_platforms(platforms)]
-    require_place(out)
-    write_archive(out, _members(_component(what), fmi, compilers))
+    component = _component(what)
+    native = platforms == NATIVE
+    chosen = [native_platform()] if native else cross_platforms(platforms)
+    key = token(component, fmi)
+    libraries = prebuilt_libraries(component, key, fmi, chosen)
+    if libraries is None:
+        compilers = [(platform, find_compiler() if native else cross_compiler(platform)) for platform in chosen]
+        require_place(out)
+        libraries = compiled_libraries(component, key, fmi, compilers)
+    write_archive(out, neutral_members(component, fmi) | _binaries(component, fmi, libraries))
     return out
 
 
@@ -97,11 +101,12 @@ def cached_fmu(what: Vehicle | Component, fmi: int) -> Path:
         As `build_fmu`.
     """
     require_version(fmi)
-    component, digest = _component(what), _digest(what, fmi)[:16]
-    path = Path(platformdirs.user_cache_dir("subreach")) / "fmu" / f"{component.name}-fmi{fmi}-{digest}.fmu"
+    component, key = _component(what), _digest(what, fmi)[:16]
+    path = Path(platformdirs.user_cache_dir("subreach")) / "fmu" / f"{component.name}-fmi{fmi}-{key}.fmu"
     if zipfile.is_zipfile(path):  # one that was damaged is built anew
         return path
-    find_compiler()  # so that a missing compiler is said before anything is written
+    if prebuilt_libraries(component, token(component, fmi), fmi, [native_platform()]) is None:
+        find_compiler()  # so that a missing compiler is said before anything is written
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         if not os.access(path.parent, os.W_OK):
@@ -120,10 +125,7 @@ def _digest(what: Vehicle | Component, fmi: int) -> str:
 
     To write all of that down takes longer than to load an FMU, so a process does it once for each vehicle.
     """
-    made_from = hashlib.sha256(" ".join((native_platform().name, *FLAGS, fmpy.__version__)).encode())
-    for name, data in sorted(neutral_members(what, fmi).items()):
-        made_from.update(f"\n{name} {len(data)}\n".encode() + data)
-    return made_from.hexdigest()
+    return digest(neutral_members(what, fmi), native_platform().name, *FLAGS, fmpy.__version__)
 
 
 @functools.cache
@@ -152,23 +154,11 @@ def neutral_members(what: Vehicle | Component, fmi: int) -> dict[str, bytes]:
     }
 
 
-def _members(component: Component, fmi: int, compilers: list[tuple[Platform, list[str]]]) -> dict[str, bytes]:
-    """Return all that goes into an FMU, its sources compiled for each platform, by name in the archive."""
-    members = neutral_members(component, fmi)
-    libraries: dict[str, list[bytes]] = {}
-    with tempfile.TemporaryDirectory(prefix="plant_fmu-") as scratch:
-        folder = Path(scratch)
-        for member, data in members.items():
-            if member.startswith("sources/"):
-                (folder / Path(member).name).write_bytes(data)
-        files = [folder / file for file in compiled_files(component, fmi)]
-        for platform, compiler in compilers:
-            library = folder / platform.name / f"{component.name}{platform.suffix}"
-            library.parent.mkdir()
-            compile_library(compiler, platform, files, [folder, _FMI_HEADERS], library)
-            for place in platform.fmi2_names if fmi == 2 else (platform.name,):
-                libraries.setdefault(f"binaries/{place}/{library.name}", []).append(library.read_bytes())
+def _binaries(component: Component, fmi: int, libraries: list[tuple[Platform, bytes]]) -> dict[str, bytes]:
+    """Return the libraries by name in the archive."""
+    places: dict[str, list[bytes]] = {}
+    for platform, library in libraries:
+        for place in platform.fmi2_names if fmi == 2 else (platform.name,):
+            places.setdefault(f"binaries/{place}/{component.name}{platform.suffix}", []).append(library)
     # FMI 2.0 has one place for the libraries of both Macs
-    return members | {
-        place: found[0] if len(found) == 1 else universal_library(found) for place, found in libraries.items()
-    }
+    return {place: found[0] if len(found) == 1 else universal_library(found) for place, found in places.items()}

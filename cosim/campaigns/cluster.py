@@ -173,7 +173,7 @@ def cluster_executor(scheduler: str | None, workers: int) -> Iterator[Executor]:
         import dask
         import distributed
     except ImportError as error:
-        raise RunError("Dask is not installed; expected: pip install 'subreach[dask]'") from error
+        raise RunError("Dask is not installed; expected: pip install 'subreach[campaign]'") from error
     untyped: Any = distributed
     with contextlib.ExitStack() as stack:
         stack.enter_context(_quiet("distributed"))

@@ -48,7 +48,7 @@ def watch(options: argparse.Namespace) -> int:
         from rich.console import Console
         from rich.live import Live
     except ImportError as error:
-        raise TelemetryError("cosim watch needs rich; pip install 'subreach[live]'") from error
+        raise TelemetryError("cosim watch needs rich; pip install 'subreach[view]'") from error
     from cosim.live.watching import looks, picture
 
     with contextlib.suppress(ValueError):  # which signal raises outside the main thread

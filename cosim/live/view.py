@@ -53,7 +53,7 @@ class LiveView:
         try:
             from cosim.live.server import serve
         except ImportError as error:
-            raise TelemetryError("--live needs websockets; pip install 'subreach[live]'") from error
+            raise TelemetryError("--live needs websockets; pip install 'subreach[view]'") from error
         self._socket = bound(address)
         port = self._socket.getsockname()[1]
         self.url = f"http://{address.host}:{port}/"

@@ -176,7 +176,7 @@ def _live(endpoint: tuple[str, int]) -> Iterator[Look]:
         from websockets.exceptions import WebSocketException
         from websockets.sync.client import connect
     except ImportError as error:
-        raise TelemetryError("a live view needs websockets; pip install 'subreach[live]'") from error
+        raise TelemetryError("a live view needs websockets; pip install 'subreach[view]'") from error
     url = f"ws://{endpoint[0]}:{endpoint[1]}/ws"
     header: dict[str, Any] | None = None
     try:

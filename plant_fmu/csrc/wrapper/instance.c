@@ -119,9 +119,8 @@ Instance *instance_create(const char *name, const char *token, Interface kind, b
     instance->log = log;
     instance->environment = environment;
     instance->logger = logger;
-    if (!token || strcmp(token, INSTANTIATION_TOKEN) != 0) {
-        instance_refuse(instance, "instantiation token is \"%s\", expected \"%s\"", token ? token : "",
-                        INSTANTIATION_TOKEN);
+    if (!token || strcmp(token, TOKEN) != 0) {
+        instance_refuse(instance, "instantiation token is \"%s\", expected \"%s\"", token ? token : "", TOKEN);
         instance_free(instance);
         return NULL;
     }

@@ -92,6 +92,7 @@ Status instance_unsupported(const Instance *instance, const char *function);
 
 extern const Variable VARIABLES[]; /* by value reference */
 extern const unsigned N_VARIABLES;
+extern const char TOKEN[]; /* INSTANTIATION_TOKEN, in the same file: no other has anything of one vehicle alone */
 
 /* Where the model keeps a variable. */
 double *variable_real(Model *model, const Variable *variable);

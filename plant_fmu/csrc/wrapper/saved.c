@@ -41,7 +41,7 @@ static Status check_block(const Instance *instance, const Saved *saved)
     if (!saved)
         return instance_refuse(instance, "FMU state is NULL, expected one that was got from this FMU");
     if (saved->zero != 0 || saved->magic != MAGIC || saved->size != sizeof *saved ||
-        saved->origin != hash(INSTANTIATION_TOKEN, strlen(INSTANTIATION_TOKEN)))
+        saved->origin != hash(TOKEN, strlen(TOKEN)))
         return instance_refuse(instance, "FMU state is not one of this FMU");
     return STATUS_OK;
 }
@@ -58,7 +58,7 @@ Status instance_save(Instance *instance, Saved **saved)
     Saved *s = *saved;
     s->magic = MAGIC;
     s->size = sizeof *s;
-    s->origin = hash(INSTANTIATION_TOKEN, strlen(INSTANTIATION_TOKEN));
+    s->origin = hash(TOKEN, strlen(TOKEN));
     s->kind = (int32_t)instance->kind;
     s->mode = (int32_t)instance->mode;
     s->unprepared = instance->unprepared;

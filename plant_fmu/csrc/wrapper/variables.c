@@ -9,6 +9,7 @@
 
 const Variable VARIABLES[] = {COMPONENT_VARIABLES};
 const unsigned N_VARIABLES = sizeof VARIABLES / sizeof VARIABLES[0];
+const char TOKEN[] = INSTANTIATION_TOKEN;
 
 static const char *const TYPE_NAMES[] = {"real", "Integer", "Boolean"};
 

@@ -7,7 +7,7 @@ import threading
 import numpy as np
 import pytest
 
-pytest.importorskip("websockets", reason="the live extra is not installed")
+pytest.importorskip("websockets", reason="the view extra is not installed")
 
 from websockets.sync.client import connect
 

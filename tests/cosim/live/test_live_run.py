@@ -109,5 +109,5 @@ def test_what_the_helm_refuses_later_is_told_too(live, caplog):
 
 def test_without_the_library_one_line_says_what_to_install(monkeypatch):
     monkeypatch.setitem(sys.modules, "cosim.live.server", None)
-    with pytest.raises(TelemetryError, match=r"pip install 'subreach\[live\]'"):
+    with pytest.raises(TelemetryError, match=r"pip install 'subreach\[view\]'"):
         LiveView(LiveAddress(port=0))

@@ -11,7 +11,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-pytest.importorskip("rich", reason="the live extra is not installed")
+pytest.importorskip("rich", reason="the view extra is not installed")
 
 from rich.console import Console
 
@@ -140,7 +140,7 @@ def test_where_nothing_is_one_line_says_so(what, capsys):
 def test_without_the_library_one_line_says_what_to_install(monkeypatch, capsys):
     monkeypatch.setitem(sys.modules, "rich.console", None)
     assert main(["watch", "runs/any"]) == 2
-    assert "pip install 'subreach[live]'" in capsys.readouterr().err
+    assert "pip install 'subreach[view]'" in capsys.readouterr().err
 
 
 def test_no_run_is_told():

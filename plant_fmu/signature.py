@@ -1,0 +1,61 @@
+"""The signature of a library for macOS, made anew after bytes of the library have changed.
+
+Macs with ARM processors load no library without one. The linker's own is "ad hoc": it names nobody and holds a hash of
+each page, as Apple's ``cs_blobs.h`` says.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import struct
+
+from plant_fmu.errors import BuildError
+
+_MACH_O_64 = b"\xcf\xfa\xed\xfe"  # little-endian
+_HEADER = 32  # bytes
+_CODE_SIGNATURE = 0x1D  # load command
+_DIRECTORY = 0xFADE0C02  # magic of what lists the hashes; all of the signature is big-endian
+_SHA256 = (32, 2)  # bytes of a hash, and its kind
+
+
+def signed_anew(library: bytes) -> bytes:
+    """Return a library whose signature fits its bytes.
+
+    Parameters
+    ----------
+    library : bytes
+        Of any platform; those that carry no signature come back as they are.
+
+    Returns
+    -------
+    bytes
+        As long as `library`.
+
+    Raises
+    ------
+    BuildError
+        If the signature is of another kind than a linker's.
+    """
+    if not library.startswith(_MACH_O_64):
+        return library
+    at = _HEADER
+    for _ in range(struct.unpack_from("<I", library, 16)[0]):
+        command, size = struct.unpack_from("<2I", library, at)
+        if command == _CODE_SIGNATURE:
+            return _signed(library, struct.unpack_from("<I", library, at + 8)[0])
+        at += size
+    return library
+
+
+def _signed(library: bytes, signature: int) -> bytes:
+    directory = signature + struct.unpack_from(">I", library, signature + 16)[0]
+    magic, *_, hashes, _, _, slots, limit = struct.unpack_from(">9I", library, directory)
+    size, kind, _, page = struct.unpack_from(">4B", library, directory + 36)
+    if magic != _DIRECTORY or (size, kind) != _SHA256 or limit != signature:
+        raise BuildError("a library for macOS has a signature of an unknown kind, expected a linker's with SHA-256")
+    signed = bytearray(library)
+    for i in range(slots):
+        of_page = library[i << page : min((i + 1) << page, limit)]
+        place = directory + hashes + size * i
+        signed[place : place + size] = hashlib.sha256(of_page).digest()
+    return bytes(signed)

@@ -1,0 +1,103 @@
+"""What is shipped, built once from a clean copy of the tracked files, and installed once in an empty environment."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+import time
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.fixture(scope="session")
+def tracked() -> list[str]:
+    """Names of the files of a clean clone."""
+    if shutil.which("git") is None or not (ROOT / ".git").exists():
+        pytest.skip("this is no git checkout: there is no telling what belongs to it")
+    listed = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, check=True, capture_output=True, text=True).stdout
+    return [name for name in listed.split("\0") if (ROOT / name).is_file()]
+
+
+@pytest.fixture(scope="session")
+def once(tmp_path_factory) -> Callable[[str, Callable[[Path], None]], Path]:
+    """Return a function that makes a folder once for all workers of a session."""
+    base = tmp_path_factory.getbasetemp()
+    shared = base.parent if os.environ.get("PYTEST_XDIST_WORKER") else base
+
+    def made(name: str, make: Callable[[Path], None]) -> Path:
+        folder, ready, failed = shared / name, shared / f"{name}.ready", shared / f"{name}.failed"
+        try:
+            folder.mkdir()
+        except FileExistsError:
+            while not ready.exists():  # a hang ends with the time limit of a test
+                assert not failed.exists(), f"{name}: failed in another worker"
+                time.sleep(0.2)
+            return folder
+        try:
+            make(folder)
+        except BaseException:
+            failed.touch()
+            raise
+        ready.touch()
+        return folder
+
+    return made
+
+
+def run(*command: object, **more: object) -> str:
+    """Run a command; on failure, show what it said."""
+    done = subprocess.run([str(word) for word in command], capture_output=True, text=True, check=False, **more)
+    assert done.returncode == 0, f"{command}: {done.returncode}\n{done.stdout}\n{done.stderr}"
+    return done.stdout
+
+
+@pytest.fixture(scope="session")
+def dist(tracked, once) -> Path:
+    """Return a folder with the source distribution and the wheel that is built from it."""
+    pytest.importorskip("ziglang", reason="the build extra is not installed: nothing compiles for all platforms")
+
+    def build(folder: Path) -> None:
+        copy = folder / "copy"
+        for name in tracked:
+            (copy / name).parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy(ROOT / name, copy / name)
+        clean = {key: value for key, value in os.environ.items() if key != "PYTHONPATH"}
+        run(sys.executable, "-m", "build", "--no-isolation", "--outdir", folder, copy, env=clean)
+        assert sorted(path.relative_to(copy).as_posix() for path in copy.rglob("*.zip")) == [], "left in the checkout"
+
+    return once("dist", build)
+
+
+@pytest.fixture(scope="session")
+def wheel(dist) -> Path:
+    """Return the wheel."""
+    (path,) = dist.glob("*.whl")
+    return path
+
+
+@pytest.fixture(scope="session")
+def unpacked(wheel, tmp_path_factory) -> Path:
+    """Return the content of the wheel."""
+    folder = tmp_path_factory.mktemp("wheel")
+    with zipfile.ZipFile(wheel) as archive:
+        archive.extractall(folder)
+    return folder
+
+
+@pytest.fixture(scope="session")
+def installed(wheel, once) -> Path:
+    """Return an environment with the wheel and what it asks for, and nothing else."""
+
+    def install(folder: Path) -> None:
+        run(sys.executable, "-m", "venv", folder / "env")
+        python = next((folder / "env").glob("*/python*"))
+        run(python, "-m", "pip", "install", "--quiet", "--disable-pip-version-check", wheel)
+
+    return next((once("installed", install) / "env").glob("*/python*"))

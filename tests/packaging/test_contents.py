@@ -1,0 +1,113 @@
+"""What is in the wheel and in the source distribution, and what is not."""
+
+import tarfile
+import tomllib
+import zipfile
+from email import message_from_string
+from pathlib import PurePosixPath
+
+import fmpy
+import pytest
+from fmpy.validation import validate_fmu
+
+from plant_fmu import build_fmu, cached_fmu, load_vehicle, prebuilt, shipped_vehicles
+from plant_fmu.platforms import PLATFORMS
+from tests.packaging.conftest import ROOT
+from tests.plant_fmu.test_sources import trajectory
+
+pytestmark = pytest.mark.slow
+PACKAGES = ("controller", "cosim", "fuzzy_arbiter", "plant_fmu")
+BESIDE = ("CHANGELOG.md", "CITATION.cff", "CONTRIBUTING.md", "LICENSE", "README.md", "hatch_build.py", "pyproject.toml")
+MOST = 4e6  # bytes
+
+
+@pytest.fixture(scope="session")
+def project():
+    return tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+
+
+def expected_libraries():
+    structures = prebuilt.shipped_structures()
+    assert [structure.constants["N_THRUSTERS"] for structure in structures] == [8, 6]
+    return {prebuilt.file_name(structure, fmi) for structure in structures for fmi in (2, 3)}
+
+
+def of_packages(tracked):
+    return {name for name in tracked if PurePosixPath(name).parts[0] in PACKAGES}
+
+
+def test_the_wheel_holds_the_packages_and_nothing_else(wheel, unpacked, tracked, project):
+    info = f"subreach-{project['version']}.dist-info"
+    names = {path.relative_to(unpacked).as_posix() for path in unpacked.rglob("*") if path.is_file()}
+    own = {name for name in names if not name.startswith(info)}
+    libraries = {f"plant_fmu/prebuilt/{name}" for name in expected_libraries()}
+    assert own == of_packages(tracked) | {"plant_fmu/LICENSE"} | libraries
+    assert {f"{package}/py.typed" for package in PACKAGES} <= own
+    assert all((unpacked / name).read_bytes() == (ROOT / name).read_bytes() for name in of_packages(tracked))
+    assert (unpacked / "plant_fmu/LICENSE").read_bytes() == (ROOT / "LICENSE").read_bytes()
+    assert (unpacked / info / "licenses/LICENSE").read_bytes() == (ROOT / "LICENSE").read_bytes()
+    assert (unpacked / info / "entry_points.txt").read_text().split() == [
+        "[console_scripts]",
+        "cosim",
+        "=",
+        "cosim.cli:main",
+    ]
+    assert wheel.name == f"subreach-{project['version']}-py3-none-any.whl"
+    assert wheel.stat().st_size < MOST
+
+
+def test_the_source_distribution_holds_what_a_wheel_is_built_from(dist, tracked):
+    (path,) = dist.glob("*.tar.gz")
+    with tarfile.open(path) as archive:
+        names = {member.name.partition("/")[2] for member in archive.getmembers() if member.isfile()}
+    libraries = {f"plant_fmu/prebuilt/{name}" for name in expected_libraries()}
+    assert names - {"PKG-INFO", ".gitignore"} == of_packages(tracked) | set(BESIDE) | libraries
+    assert path.stat().st_size < MOST
+
+
+def test_what_the_index_is_told(unpacked, project):
+    (path,) = unpacked.glob("*.dist-info/METADATA")
+    told = message_from_string(path.read_text())
+    assert (told["Name"], told["Version"]) == ("subreach", project["version"])
+    assert told["License-Expression"] == "BSD-3-Clause"
+    assert told["Requires-Python"] == ">=3.11"
+    classifiers = told.get_all("Classifier")
+    assert {f"Programming Language :: Python :: 3.{minor}" for minor in (11, 12, 13)} <= set(classifiers)
+    assert told.get_all("Project-URL") is None  # there is none yet
+    assert set(told.get_all("Provides-Extra")) == set(project["optional-dependencies"])
+
+
+def test_each_dependency_has_a_lower_bound(project):
+    extras = [text for texts in project["optional-dependencies"].values() for text in texts]
+    for text in (*project["dependencies"], *extras):
+        assert ">=" in text or text.startswith("subreach["), text
+    wanted = {"build", "campaign", "importers", "mavlink", "mcap", "rerun", "view"}
+    (everything,) = project["optional-dependencies"]["all"]
+    assert set(everything.removeprefix("subreach[").removesuffix("]").split(",")) == wanted
+
+
+def test_libraries_are_there_for_every_platform(unpacked):
+    for path in (unpacked / "plant_fmu" / "prebuilt").iterdir():
+        with zipfile.ZipFile(path) as archive:
+            assert sorted(archive.namelist()) == sorted(f"{p.name}{p.suffix}" for p in PLATFORMS.values())
+
+
+@pytest.mark.parametrize("vehicle", shipped_vehicles())
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_fmus_are_made_of_it_without_a_compiler(unpacked, tmp_path, monkeypatch, vehicle, fmi):
+    """They are valid, and fly as those that this machine's compiler makes."""
+    compiled = cached_fmu(load_vehicle(vehicle), fmi)
+    monkeypatch.setattr(prebuilt, "FOLDER", unpacked / "plant_fmu" / "prebuilt")
+    monkeypatch.setenv("CC", "no-such-compiler")
+    for platforms in ("native", "all"):
+        path = build_fmu(load_vehicle(vehicle), fmi, tmp_path / f"{platforms}.fmu", platforms)
+        assert validate_fmu(str(path)) == []
+        assert trajectory(path) == pytest.approx(trajectory(compiled), rel=1e-10, abs=1e-10)
+    described = fmpy.read_model_description(str(path))
+    assert described.modelName == vehicle
+
+
+def test_libraries_are_what_is_built_now(unpacked, tmp_path):
+    """Byte for byte, in another place."""
+    path = prebuilt.write_prebuilt(prebuilt.shipped_structures()[0], 3, tmp_path)
+    assert path.read_bytes() == (unpacked / "plant_fmu" / "prebuilt" / path.name).read_bytes()

@@ -1,0 +1,65 @@
+"""The wheel in an empty environment, away from the checkout, on a machine without a compiler."""
+
+import json
+import os
+
+import pytest
+
+from tests.packaging.conftest import run
+
+pytestmark = pytest.mark.slow
+
+
+@pytest.fixture
+def bare(installed, tmp_path):
+    """Return what runs a command where nothing but the environment's own programs is found."""
+    env = {"PATH": str(installed.parent), "HOME": str(tmp_path), "XDG_CACHE_HOME": str(tmp_path / "cache")}
+    env |= {key: os.environ[key] for key in ("SYSTEMROOT", "TEMP") if key in os.environ}  # Windows
+    return lambda *words: run(installed.parent / words[0], *words[1:], cwd=tmp_path, env=env)
+
+
+def test_there_is_no_compiler(bare):
+    code = "import shutil, importlib.util as u; print(shutil.which('cc'), shutil.which('gcc'), u.find_spec('ziglang'))"
+    assert bare("python", "-c", code).split() == ["None", "None", "None"]
+
+
+def test_nothing_is_missing(bare):
+    assert "No broken requirements found" in bare("python", "-m", "pip", "check")
+
+
+def test_the_paper_runs_to_a_report(bare, tmp_path):
+    bare("cosim", "run", "paper", "--set", "time.duration=0.5", "--out", "run")
+    assert json.loads((tmp_path / "run" / "summary.json").read_text())
+    assert all(
+        (tmp_path / "run" / name).stat().st_size > 1000 for name in ("report.html", "replay.html", "record.parquet")
+    )
+
+
+@pytest.mark.parametrize("fmi", ["2", "3"])
+def test_fmus_are_written_and_load_in_fmpy(bare, fmi):
+    bare(
+        "python", "-m", "plant_fmu", "build", "--vehicle", "odin", "--fmi", fmi, "--platforms", "all", "--out", "x.fmu"
+    )
+    simulated = "fmpy.simulate_fmu('x.fmu', stop_time=0.1, start_values={'wrench.X': 50.0})"
+    assert 0.0 < float(bare("python", "-c", f"import fmpy; print({simulated}['position.x'][-1])")) < 1.0
+
+
+@pytest.mark.parametrize(
+    ("words", "extra"),
+    [
+        ("run paper --set time.duration=0.1 --mavlink udpout:127.0.0.1:14550", "mavlink"),
+        ("run paper --set time.duration=0.1 --live", "view"),
+        ("watch 8765", "view"),
+        ("sweep paper --vary initial.position.1=-1:1 --samples 2 --dask --out sweep", "campaign"),
+    ],
+)
+def test_what_needs_an_extra_names_it(bare, words, extra):
+    with pytest.raises(AssertionError) as failed:
+        bare("cosim", *words.split())
+    assert f"pip install 'subreach[{extra}]'" in str(failed.value)
+    assert "Traceback" not in str(failed.value)
+
+
+def test_what_needs_a_compiler_names_the_extra(bare):
+    with pytest.raises(AssertionError, match=r"pip install 'subreach\[build\]'"):
+        bare("cosim", "package", "paper-limited", "--set", "arbiter.engine=closed", "--out", "x.ssp")

@@ -1,0 +1,208 @@
+"""Libraries that come compiled: what is made of them is what a compiler makes, and what does not fit is left alone."""
+
+import dataclasses
+import hashlib
+import struct
+import zipfile
+
+import pytest
+
+from plant_fmu import BuildError, build_fmu, cached_fmu, load_vehicle, prebuilt, shipped_vehicles
+from plant_fmu.compiler import cross_compiler, find_compiler
+from plant_fmu.component import of_vehicle
+from plant_fmu.description import token
+from plant_fmu.libraries import compiled_libraries
+from plant_fmu.platforms import cross_platforms, native_platform
+from plant_fmu.signature import signed_anew
+from tests.plant_fmu.conftest import STATES, Slave
+
+HERE = native_platform()
+# as the compiler names nothing in it: on Linux the names of functions are not in a library
+IN_FULL = pytest.mark.skipif(HERE.system != "linux", reason="libraries of other systems hold the vehicle's name")
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A folder as in a wheel, with this machine's libraries alone, of eight thrusters."""
+    folder = tmp_path_factory.mktemp("prebuilt")
+    general = prebuilt.general_component(of_vehicle(load_vehicle("rexrov")))
+    for fmi in (2, 3):
+        ((_, library),) = compiled_libraries(general, prebuilt.STAND_IN, fmi, [(HERE, find_compiler())])
+        with zipfile.ZipFile(folder / prebuilt.file_name(general, fmi), "w") as archive:
+            archive.writestr(f"{HERE.name}{HERE.suffix}", library)
+    return folder
+
+
+@pytest.fixture
+def no_compiler(folder, monkeypatch):
+    """A package with prebuilt libraries on a machine without a compiler."""
+    monkeypatch.setattr(prebuilt, "FOLDER", folder)
+    monkeypatch.setenv("CC", "no-such-compiler")
+
+
+def binary(path):
+    with zipfile.ZipFile(path) as archive:
+        (name,) = {archive.read(name) for name in archive.namelist() if name.startswith("binaries/")}
+        return name
+
+
+@pytest.mark.parametrize("vehicle", shipped_vehicles())
+def test_the_plant_is_that_of_a_compiler(vehicle, fmi, no_compiler, tmp_path):
+    compiled, path = cached_fmu(load_vehicle(vehicle), fmi), build_fmu(load_vehicle(vehicle), fmi, tmp_path / "x.fmu")
+    answers = []
+    for file in (compiled, path):
+        slave = Slave(file).start(**{"velocity.p": 0.3})
+        slave.set_values({"thrust[2]": 20.0})
+        slave.step(1.0)
+        parameters = [v.name for v in slave.description.modelVariables if v.causality == "parameter"]
+        answers.append(slave.get(*STATES, *(name for name in parameters if name not in ("seed", "free_surface"))))
+        slave.close()
+    assert len(answers[0]) > 150 and max(map(abs, answers[0])) > 1.0
+    assert answers[0] == answers[1]
+
+
+@IN_FULL
+def test_the_library_is_that_of_a_compiler_to_the_byte(fmi, no_compiler, tmp_path):
+    """Compiled from the vehicle's own numbers, beside stand-ins that were written over."""
+    for vehicle in map(load_vehicle, ("odin", "bluerov2_heavy")):
+        assert binary(build_fmu(vehicle, fmi, tmp_path / "x.fmu")) == binary(cached_fmu(vehicle, fmi))
+
+
+def test_numbers_of_an_own_vehicle_go_in(no_compiler, tmp_path):
+    own = dataclasses.replace(load_vehicle("odin"), name="own", mass=130.25)
+    slave = Slave(build_fmu(own, 3, tmp_path / "own.fmu")).start()
+    assert slave.get("mass") == [130.25]
+    slave.close()
+
+
+def test_another_number_of_thrusters_needs_the_compiler(no_compiler, tmp_path):
+    odin = load_vehicle("odin")
+    given = {name: value[..., :5] for name, value in vars(odin).items() if name.startswith("thrust")}
+    own = dataclasses.replace(odin, name="own", autopilot=None, **given)
+    with pytest.raises(BuildError, match="no C compiler"):
+        build_fmu(own, 3, tmp_path / "own.fmu")
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("change", ["source", "flag", "header"])
+def test_libraries_of_other_sources_are_not_taken(no_compiler, tmp_path, monkeypatch, change):
+    from plant_fmu import libraries, sources
+
+    if change == "source":
+        files = sources._files
+        changed = lambda place: {name: data + b"\n" * (name == "instance.c") for name, data in files(place).items()}  # noqa: E731
+        monkeypatch.setattr(sources, "_files", changed)
+    elif change == "flag":
+        monkeypatch.setattr(libraries, "FLAGS", (*libraries.FLAGS, "-Os"))
+    else:
+        (tmp_path / "fmi3Functions.h").write_text("other")
+        monkeypatch.setattr(libraries, "FMI_HEADERS", tmp_path)
+    with pytest.raises(BuildError, match="no C compiler"):
+        build_fmu(load_vehicle("odin"), 3, tmp_path / "x.fmu")
+
+
+def test_platforms_that_are_not_there_are_compiled(folder, monkeypatch):
+    monkeypatch.setattr(prebuilt, "FOLDER", folder)
+    odin = of_vehicle(load_vehicle("odin"))
+    key = token(odin, 3)
+    assert prebuilt.prebuilt_libraries(odin, key, 3, [HERE])
+    other = dataclasses.replace(HERE, name="riscv64-linux")
+    assert prebuilt.prebuilt_libraries(odin, key, 3, [HERE, other]) is None
+
+
+@pytest.mark.skipif(HERE.system != "linux", reason="about the C libraries of Linux")
+def test_linux_without_glibc_needs_the_compiler(no_compiler, tmp_path, monkeypatch):
+    def confstr(name):
+        raise ValueError("unrecognized configuration name")  # as musl has it
+
+    monkeypatch.setattr("os.confstr", confstr)
+    with pytest.raises(BuildError, match="no C compiler"):
+        build_fmu(load_vehicle("odin"), 3, tmp_path / "x.fmu")
+
+
+@pytest.mark.parametrize("damage", ["half", "empty", "another table"])
+def test_damaged_libraries_are_named(folder, tmp_path, monkeypatch, damage):
+    monkeypatch.setattr(prebuilt, "FOLDER", tmp_path)
+    for file in folder.iterdir():
+        data = file.read_bytes()
+        (tmp_path / file.name).write_bytes(data[: len(data) // 2] if damage == "half" else data)
+        if damage != "half":
+            with zipfile.ZipFile(tmp_path / file.name, "w") as archive:
+                if damage == "another table":
+                    archive.writestr(f"{HERE.name}{HERE.suffix}", b"no table")
+    with pytest.raises(BuildError, match=r"damaged|has not the table") as refused:
+        build_fmu(load_vehicle("odin"), 3, tmp_path / "x.fmu")
+    assert str(tmp_path) in str(refused.value) or damage == "another table"
+    assert not (tmp_path / "x.fmu").exists()
+
+
+def test_no_two_vehicles_have_one_token(no_compiler, tmp_path):
+    """What was written in is what the binary compares with."""
+    first, second = (build_fmu(load_vehicle(name), 3, tmp_path / f"{name}.fmu") for name in ("odin", "rexrov"))
+    slave = Slave(first)
+    assert slave.description.guid.encode() in binary(first)
+    assert slave.description.guid.encode() not in binary(second)
+
+
+def test_libraries_without_a_signature_stay_as_they_are():
+    assert signed_anew(b"\x7fELF and more") == b"\x7fELF and more"
+
+
+@pytest.mark.slow
+def test_all_platforms_as_their_linkers_make_them(tmp_path, monkeypatch):
+    """Even the signature of a Mac's: the linker wrote the one, `signed_anew` the other. But for marks of identity."""
+    pytest.importorskip("ziglang", reason="the build extra is not installed: no binaries for other platforms")
+    compilers = [(platform, cross_compiler(platform)) for platform in cross_platforms("all")]
+    odin = of_vehicle(load_vehicle("odin"))
+    general, key = prebuilt.general_component(odin), token(odin, 3)
+    with zipfile.ZipFile(prebuilt.write_prebuilt(general, 3, tmp_path)) as archive:
+        stand_ins = [archive.read(f"{platform.name}{platform.suffix}") for platform, _ in compilers]
+    monkeypatch.setattr(prebuilt, "FOLDER", tmp_path)
+    written = prebuilt.prebuilt_libraries(odin, key, 3, cross_platforms("all"))
+    compiled = compiled_libraries(dataclasses.replace(odin, name=prebuilt.NAME), key, 3, compilers)
+    assert [platform.name for platform, data in compiled] == [platform.name for platform, data in written]
+    for (platform, theirs), (_, ours), before in zip(compiled, written, stand_ins, strict=True):
+        assert not differing(ours, theirs) - identity(platform, ours), platform.name
+        assert differing(ours, before) - identity(platform, ours), platform.name
+        if platform.name == "aarch64-darwin":
+            ((place, page),) = pages(ours)[:1]
+            assert ours[place:][:32] == hashlib.sha256(ours[:page]).digest()
+
+
+def differing(one, other):
+    assert len(one) == len(other)
+    return {i for i, (x, y) in enumerate(zip(one, other, strict=True)) if x != y}
+
+
+def identity(platform, library):
+    """Return the places of what a linker draws from a whole library, to tell builds apart in a debugger."""
+    if platform.system == "windows":  # its "time stamp", in the header and in the directory of debug information
+        stamp = library[struct.unpack_from("<I", library, 60)[0] + 8 :][:4]
+        return {i + j for i in range(len(library)) if library.startswith(stamp, i) for j in range(4)}
+    found = set()
+    if platform.system == "darwin":  # LC_UUID, and with a signature the hash of the page that it is on
+        for command, at, size in commands(library):
+            if command == 0x1B:
+                found |= set(range(at + 8, at + size))
+        for place, _ in pages(library)[:1]:
+            found |= set(range(place, place + 32))
+    return found
+
+
+def commands(library):
+    at = 32
+    for _ in range(struct.unpack_from("<I", library, 16)[0]):
+        command, size = struct.unpack_from("<2I", library, at)
+        yield command, at, size
+        at += size
+
+
+def pages(library):
+    """Return where the hash of each page of a signed Mach-O is, and the size of a page."""
+    for command, at, _ in commands(library):
+        if command == 0x1D:
+            (signature,) = struct.unpack_from("<I", library, at + 8)
+            directory = signature + struct.unpack_from(">I", library, signature + 16)[0]
+            hashes, slots = (struct.unpack_from(">I", library, directory + place)[0] for place in (16, 28))
+            return [(directory + hashes + 32 * i, 1 << library[directory + 39]) for i in range(slots)]
+    return []
