@@ -5,6 +5,7 @@ import importlib
 import importlib.util
 import re
 
+import griffe
 import pytest
 
 from tests.house import public
@@ -31,3 +32,12 @@ def test_the_reference_shows_what_is_public():
     shown = {name for page in REFERENCE.glob("*.md") for name in re.findall(r"^::: ([\w.]+)", page.read_text(), re.M)}
     behind = {public.target(name).path for name in shown}
     assert behind == {public.target(name).path for name in public.names()}
+
+
+def test_nothing_public_takes_keywords_that_nobody_knows():
+    """So Python itself refuses an unknown one."""
+    for name in public.names():
+        what = public.target(name)
+        for function in [what, *public.members(what)] if what.is_class else [what] if what.is_function else []:
+            if function.is_function or function.is_class:
+                assert all(p.kind is not griffe.ParameterKind.var_keyword for p in function.parameters), function.path
