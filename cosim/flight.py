@@ -142,7 +142,7 @@ OUTPUTS = (
 )
 
 
-def _fly(
+def _fly(  # noqa: C901 - one loop, as a whole
     setup: Setup,
     native: Native,
     effectiveness: Native,
