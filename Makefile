@@ -1,6 +1,7 @@
 # make run    the paper's scenario, from nothing to a report
 # make test   all fast tests
 # make lint   formatter, linter and type checker
+# make coverage  how much of the code the tests go through, against floors
 # make bench  what things cost, against peers in an environment of their own
 PYTHON ?= python3
 VENV ?= .venv
@@ -10,7 +11,7 @@ comma := ,
 EXTRAS := mavlink,importers,dev$(if $(shell command -v cc),,$(comma)build)
 PYTEST_FLAGS ?=
 
-.PHONY: run test lint bench clean
+.PHONY: run test lint coverage bench clean
 
 run: $(VENV)/ready
 	$(BIN)/cosim run paper
@@ -22,6 +23,9 @@ lint: $(VENV)/ready
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
 	$(BIN)/mypy
+
+coverage: $(VENV)/ready
+	$(BIN)/python -m tests.house.coverage
 
 bench: $(VENV)/ready
 	$(BIN)/python -m benchmarks all
