@@ -1,6 +1,7 @@
 # make run    the paper's scenario, from nothing to a report
 # make test   all fast tests
 # make lint   formatter, linter and type checker
+# make coverage  how much of the code the tests go through, against floors
 # make docs   the documents as a site, in build/site
 # make dist   source distribution and wheel, in dist/
 # make packaging  what is shipped: its contents, and runs from the wheel in an empty environment
@@ -14,7 +15,7 @@ comma := ,
 EXTRAS := mavlink,importers,dev$(if $(shell command -v cc),,$(comma)build)
 PYTEST_FLAGS ?=
 
-.PHONY: run test lint docs bench dist packaging lowest clean
+.PHONY: run test lint coverage docs bench dist packaging lowest clean
 
 run: $(VENV)/ready
 	$(BIN)/cosim run paper
@@ -26,6 +27,9 @@ lint: $(VENV)/ready
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
 	$(BIN)/mypy
+
+coverage: $(VENV)/ready
+	$(BIN)/python -m tests.house.coverage
 
 docs: $(VENV)/ready
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[docs]'

@@ -72,7 +72,10 @@ class Law(Protocol):
     def step(
         self, state: VehicleState, goal: PackedRegions, regions: PackedRegions, weights: Array, forces: Array
     ) -> None:
-        """Write the wrench, shape (6,) [N, N m], or the thruster forces, shape (m,) [N], of the coming period."""
+        """Write the wrench, shape (6,) [N, N m], or the thruster forces, shape (m,) [N], of the coming period.
+
+        Of `state`, `goal`, `regions`, `weights` and `forces` see `CompiledLaw.step`.
+        """
         ...
 
 
@@ -223,7 +226,7 @@ class WrenchLaw(CompiledLaw):
     def for_vehicle(
         cls, vehicle: VehicleModel, gains: Any, desired_quaternion: Array, period: float, n_regions: int
     ) -> WrenchLaw:
-        """Return the law; of the vehicle it uses nothing."""
+        """Return the law, as `CompiledLaw.for_vehicle`; of the vehicle it uses nothing."""
         return cls(gains, desired_quaternion, period, n_regions)
 
     @classmethod
@@ -248,7 +251,7 @@ def checked_period(period: float) -> float:
     Returns
     -------
     float
-        The same.
+        The same [s].
 
     Raises
     ------

@@ -34,19 +34,22 @@ class Gains(NamedTuple):
 
 @lean
 def violation(value: float) -> float:
-    """Return max(0, g), as in (16), (17), (20) and (22); NaN stays NaN, lest a lost measurement looked like safety."""
+    """Return max(0, g) of a `value` g, as in (16), (17), (20) and (22).
+
+    NaN stays NaN, lest a lost measurement looked like safety.
+    """
     return 0.0 if value <= 0.0 else value
 
 
 @compiled
 def primary_potential(value: float, k_p1: float) -> float:
-    """Return P_p [N m]: (16), of f."""
+    """Return P_p [N m]: (16), of f, the `value` of the goal, and `k_p1`."""
     return 0.5 * k_p1 * violation(value) ** 2
 
 
 @compiled
 def secondary_potential(values: Array, alphas: Array) -> float:
-    """Return P_s: (17), of the g_i and alpha_i, each of shape (n,).
+    """Return P_s: (17), of the g_i, `values`, and the alpha_i, `alphas`, each of shape (n,).
 
     The law follows its gradient only where |dg_i/dp| = 1: (19) normalises each gradient.
     """
@@ -58,7 +61,7 @@ def secondary_potential(values: Array, alphas: Array) -> float:
 
 @compiled
 def primary_error(value: float, gradient: Array) -> Array:
-    """Return e_p, shape (3,): (20), of f and its gradient; k_p1 times it is the gradient (18) of the potential."""
+    """Return e_p, shape (3,): (20), of f, `value`, and its `gradient`; k_p1 times it is (18), the potential's."""
     return violation(value) * gradient
 
 

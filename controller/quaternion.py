@@ -34,7 +34,7 @@ def skew(a: Array) -> Array:
 
 @lean
 def rotation_rows(e: Array) -> tuple[Vector3, Vector3, Vector3]:
-    """Return the rows of R, from body to world, of a unit quaternion: (3)."""
+    """Return the rows of R, from body to world, of a unit quaternion `e`: (3)."""
     e0, e1, e2, e3 = e[0], e[1], e[2], e[3]
     return (
         (1.0 - 2.0 * (e2 * e2 + e3 * e3), 2.0 * (e1 * e2 - e0 * e3), 2.0 * (e1 * e3 + e0 * e2)),
@@ -45,7 +45,7 @@ def rotation_rows(e: Array) -> tuple[Vector3, Vector3, Vector3]:
 
 @compiled
 def rotation_matrix(e: Array) -> Array:
-    """Return R, shape (3, 3), from body to world, of a unit quaternion: (3)."""
+    """Return R, shape (3, 3), from body to world, of a unit quaternion `e`: (3)."""
     rows = rotation_rows(e)
     R = np.empty((3, 3))
     for i in range(3):
@@ -62,7 +62,7 @@ def kinematic_matrix(e: Array) -> Array:
 
 @compiled
 def rate(e: Array, omega: Array) -> Array:
-    """Return de/dt, shape (4,), at the body angular velocity `omega` [rad/s]: (6), (24)."""
+    """Return de/dt, shape (4,), of `e` at the body angular velocity `omega` [rad/s]: (6), (24)."""
     return 0.5 * kinematic_matrix(e) @ omega
 
 
@@ -110,6 +110,6 @@ def error(desired: Array, actual: Array) -> Array:
 
 @compiled
 def down_in_body(e: Array) -> Array:
-    """Return k = R^T e3, shape (3,): the direction of gravity seen from the body, for (12)."""
+    """Return k = R^T e3, shape (3,), at the attitude `e`: the direction of gravity seen from the body, for (12)."""
     e0, e1, e2, e3 = e
     return np.array([2.0 * (e1 * e3 - e0 * e2), 2.0 * (e2 * e3 + e0 * e1), 1.0 - 2.0 * (e1 * e1 + e2 * e2)])

@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 
 @compiled
 def regressor(e: Array) -> Array:
-    """Return Z(eta), shape (6, 4), of a unit quaternion: (12), Z = [-k 0; 0 S(k)] with k = R^T e3."""
+    """Return Z(eta), shape (6, 4), of a unit quaternion `e`: (12), Z = [-k 0; 0 S(k)] with k = R^T e3."""
     k = down_in_body(e)
     Z = np.zeros((6, 4))
     Z[:3, 0] = -k
@@ -26,7 +26,7 @@ def regressor(e: Array) -> Array:
 
 @compiled
 def parameters(weight: float, buoyancy: float, r_G: Array, r_B: Array) -> Array:
-    """Return phi, shape (4,) [N, N m], from W [N], B [N] and the centres [m], each of shape (3,): (12)."""
+    """Return phi (12), shape (4,) [N, N m], from `weight` and `buoyancy` [N], their centres `r_G` and `r_B` [m]."""
     phi = np.empty(4)
     phi[0] = weight - buoyancy
     for i in range(3):

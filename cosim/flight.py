@@ -89,7 +89,7 @@ class Room(NamedTuple):
     weights: Array  # (n,)
     clearances: Array  # (n,) true ones
     seen: Array  # (n,) those that the arbiter is told
-    goal_clearance: Array  # (1,)
+    goal_clearance: Array  # (1,) m or rad
     wrench: Array  # (6,) N, N m, body frame
     before: Array  # (i,) inputs of the step before
     at: Array  # (3,)
@@ -142,7 +142,7 @@ OUTPUTS = (
 )
 
 
-def _fly(
+def _fly(  # noqa: C901 - one loop, as a whole
     setup: Setup,
     native: Native,
     effectiveness: Native,

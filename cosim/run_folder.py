@@ -61,7 +61,7 @@ def claim(out: Path | None, scenario: Scenario) -> RunFolder:
     where = out or Path("runs")
     try:
         if out is None:
-            path, created = _new_folder(where, f"{scenario.name}-{datetime.now():%Y%m%d-%H%M%S}"), True
+            path, created = _new_folder(where, f"{scenario.name}-{datetime.now().astimezone():%Y%m%d-%H%M%S}"), True
         else:
             path, created = out, not out.exists()
             path.mkdir(parents=True, exist_ok=True)

@@ -162,7 +162,10 @@ def check_regions(entries: tuple[RegionEntry, ...]) -> tuple[SecondaryRegion, ..
 
 
 def check_intersection(wanted: tuple[str, ...], regions: tuple[SecondaryRegion, ...]) -> tuple[int, ...]:
-    """Return the indices of the regions whose overlap is reported: those that are named, else all to be kept out of."""
+    """Return the indices of the regions whose overlap is reported: those that are named, else all to be kept out of.
+
+    A ScenarioError if one is not there.
+    """
     kept_out = {r.region.name: i for i, r in enumerate(regions) if r.region.keep == "out"}
     _require(len(set(wanted)) == len(wanted), "intersection", f"{list(wanted)}", "each name once")
     for name in wanted:
@@ -197,7 +200,7 @@ def check_time(entry: TimeEntry) -> Time:
 
 
 def check_law(entry: LawEntry, through: str, vehicle: Vehicle, period: float, n_regions: int) -> LawSetup:
-    """Return the law's name and gains, once the law itself has taken them."""
+    """Return the law's name and gains, once the law itself has taken them and its period [s]; else a ScenarioError."""
     if entry.name not in LAWS:
         known = ", ".join(map(repr, sorted(LAWS)))
         raise ScenarioError(f"law.name is {entry.name!r}, expected one of {known}")
@@ -213,7 +216,7 @@ def check_law(entry: LawEntry, through: str, vehicle: Vehicle, period: float, n_
 
 
 def multiple(key: str, period: float, step: float) -> int:
-    """Return how many steps a period takes; it must be a whole number."""
+    """Return how many steps [s] a period [s] takes; it must be a whole number."""
     ratio = period / step if period / step < MAX_STEPS + 1 else math.inf
     _require(ratio < math.inf, key, f"{period} s, {period / step:.3g} steps", f"at most {MAX_STEPS} steps")
     n = round(ratio)

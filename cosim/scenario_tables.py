@@ -127,10 +127,10 @@ class RecordSetup:
 class TimeEntry:
     """Periods, those that are left out filled in later."""
 
-    duration: float
-    step: float = 0.001
-    control: float | None = None  # default: the step
-    arbiter: float | None = None  # default: the step
+    duration: float  # s
+    step: float = 0.001  # s
+    control: float | None = None  # s, default: the step
+    arbiter: float | None = None  # s, default: the step
 
 
 @dataclass(frozen=True)

@@ -42,11 +42,14 @@ class Signals:
         self._at = {column.name: i for i, column in enumerate(self.columns)}
 
     def index(self, name: str) -> int:
-        """Return where a column is in the row."""
+        """Return where the column `name` is in the row."""
         return self._at[name]
 
     def view(self, first: str, n: int) -> Array:
-        """Return the `n` signals from the column `first` on, shape (n,), as a view into the row."""
+        """Return the `n` signals from the column `first` on, shape (n,), as a view into the row.
+
+        An IndexError if there are not so many.
+        """
         at = self._at[first]
         if at + n > len(self.row):
             raise IndexError(f"{n} signals from {first!r} on: the row ends after {len(self.row) - at}")

@@ -102,7 +102,10 @@ class Surroundings:
     # ---- moved from outside ----
 
     def move(self, name: str, displacement: Array, velocity: Array, time: float) -> None:
-        """Say where a streamed region is at a time, and how it goes on from there, as `Master.move_region` says."""
+        """Say where a streamed region is at a time, and how it goes on from there, as `Master.move_region` says.
+
+        A RunError if it is none that can be moved, or a number is not finite.
+        """
         if name not in self._streamed:
             known = ", ".join(self._streamed) or "none"
             raise RunError(f"region {name!r} cannot be moved, expected a streamed one: {known}")

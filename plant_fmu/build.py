@@ -33,7 +33,7 @@ FMI_VERSIONS = (2, 3)
 
 
 def require_version(fmi: int) -> None:
-    """Refuse what is no version of FMI that an FMU can be built for."""
+    """Refuse, with a BuildError, what is no version of FMI that an FMU can be built for."""
     if type(fmi) is not int or fmi not in FMI_VERSIONS:
         raise BuildError(f"FMI version is {fmi!r}, expected 2 or 3")
 

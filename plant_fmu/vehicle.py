@@ -122,16 +122,16 @@ class Vehicle:
     r_B: NDArray[np.float64]  # (3,) m
     weight: float  # N
     buoyancy: float  # N
-    added_mass: NDArray[np.float64]  # (6, 6)
-    linear_damping: NDArray[np.float64]  # (6,)
-    quadratic_damping: NDArray[np.float64]  # (6,)
+    added_mass: NDArray[np.float64]  # (6, 6) kg, kg m, kg m2
+    linear_damping: NDArray[np.float64]  # (6,) N s/m, N m s/rad
+    quadratic_damping: NDArray[np.float64]  # (6,) N s2/m2, N m s2/rad2
     thruster_matrix: NDArray[np.float64]  # (6, n) body wrench of one newton of each thruster
     thrust_min: NDArray[np.float64]  # (n,) N
     thrust_max: NDArray[np.float64]  # (n,) N
     thrust_time_constant: NDArray[np.float64]  # (n,) s
     thrust_rate_limit: NDArray[np.float64]  # (n,) N/s, 0 for none
-    thrust_dead_band: NDArray[np.float64]  # (n,)
-    thrust_curve: NDArray[np.float64]  # (n,)
+    thrust_dead_band: NDArray[np.float64]  # (n,) [-]
+    thrust_curve: NDArray[np.float64]  # (n,) [-]
     hull_radius: float  # m
     autopilot: Autopilot | None = None  # how one drives the thrusters; a channel and a sign for each
 
@@ -142,7 +142,7 @@ class Vehicle:
 
     @property
     def mass_matrix(self) -> NDArray[np.float64]:
-        """M of (11), shape (6, 6): rigid body plus added mass, about the body origin."""
+        """M of (11), shape (6, 6) [kg, kg m, kg m2]: rigid body plus added mass, about the body origin."""
         S = np.cross(np.eye(3), self.r_G)  # S(r_G), (4)
         rigid = np.block([[self.mass * np.eye(3), -self.mass * S], [self.mass * S, self.inertia]])
         return np.asarray(rigid + self.added_mass)

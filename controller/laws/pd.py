@@ -72,7 +72,7 @@ def step(
 
 
 def memory_of(desired_quaternion: Array, period: Array, n_regions: int) -> PdMemory:
-    """Return the memory before the first step."""
+    """Return the memory before the first step; `period` [s] has shape (1,)."""
     return PdMemory(
         desired_quaternion=desired_quaternion,
         estimate=np.zeros(4),

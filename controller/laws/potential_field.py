@@ -83,7 +83,7 @@ def evaluate_field(
 
 @compiled
 def along(gradient: Array, length: float, total: Array) -> None:
-    """Add a vector of some length along a gradient, shape (3,), to `total`; nothing if the gradient is zero."""
+    """Add a vector of a length [N] along a gradient, shape (3,), to `total`; nothing if the gradient is zero."""
     norm = math.sqrt(gradient[0] ** 2 + gradient[1] ** 2 + gradient[2] ** 2)
     if not norm <= 0.0:
         for axis in range(3):
@@ -122,14 +122,14 @@ def shorten(vector: Array, most: float) -> None:
 
 @compiled
 def add_turned(R: Array, force: Array, factor: float, wrench: Array) -> None:
-    """Add `factor` times R^T `force`, a force of the world, shape (3,), to a body wrench, shape (6,)."""
+    """Add `factor` times R^T `force`, a force of the world [N], shape (3,), to a body wrench, shape (6,) [N, N m]."""
     for i in range(3):
         wrench[i] += factor * (R[0, i] * force[0] + R[1, i] * force[1] + R[2, i] * force[2])
 
 
 @compiled
 def damp(velocity_body: Array, attitude_error: Array, k_p2: float, k_v1: float, k_v2: float, wrench: Array) -> None:
-    """Write the part of (25) that every law has, shape (6,): -K_v nu, and -k_p2 times the attitude error (26)."""
+    """Write the part of (25) that every law has, (6,) [N, N m]: -K_v nu, and -k_p2 times the attitude error (26)."""
     for i in range(3):
         wrench[i] = -k_v1 * velocity_body[i]
         wrench[3 + i] = -k_p2 * attitude_error[i] - k_v2 * velocity_body[3 + i]

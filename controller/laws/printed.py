@@ -23,7 +23,7 @@ class PrintedMemory(NamedTuple):
     goal_value: Array  # (1,)
     goal_gradient: Array  # (1, 3)
     goal_turning: Array  # (1, 3)
-    goal_clearance: Array  # (1,)
+    goal_clearance: Array  # (1,) m or rad
     values: Array  # (n,)
     gradients: Array  # (n, 3)
     turnings: Array  # (n, 3)
@@ -65,7 +65,7 @@ def step(
 
 
 def memory_of(desired_quaternion: Array, period: Array, n_regions: int) -> PrintedMemory:
-    """Return the memory before the first step."""
+    """Return the memory before the first step; `period` [s] has shape (1,)."""
     return PrintedMemory(
         desired_quaternion=desired_quaternion,
         period=period,

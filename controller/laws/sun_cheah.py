@@ -98,7 +98,7 @@ def step(
 
 
 def memory_of(desired_quaternion: Array, period: Array, n_regions: int) -> SunCheahMemory:
-    """Return the memory before the first step."""
+    """Return the memory before the first step; `period` [s] has shape (1,)."""
     return SunCheahMemory(
         desired_quaternion=desired_quaternion,
         period=period,

@@ -22,8 +22,8 @@ class Cone:
     unit: ClassVar[str] = "m"
     feature: Vector3
     axis: Vector3
-    half_angle: float
-    range: float
+    half_angle: float  # rad
+    range: float  # m
 
     def __post_init__(self) -> None:
         require_finite("cone", feature=self.feature, half_angle=self.half_angle, range=self.range)

@@ -30,7 +30,7 @@ class Cylinder:
     unit: ClassVar[str] = "m"
     start: Vector3
     end: Vector3
-    radius: float
+    radius: float  # m
 
     def __post_init__(self) -> None:
         require_finite("cylinder", start=self.start, end=self.end, radius=self.radius)

@@ -16,7 +16,7 @@ class DepthBand:
 
     kind: ClassVar[int] = 1
     unit: ClassVar[str] = "m2"
-    depth: float
+    depth: float  # m
     tolerance: float
 
     def __post_init__(self) -> None:

@@ -21,7 +21,7 @@ class Pipe:
     kind: ClassVar[int] = 7
     unit: ClassVar[str] = "m"
     points: tuple[Vector3, ...]
-    radius: float
+    radius: float  # m
 
     def __post_init__(self) -> None:
         for point in self.points:

@@ -179,7 +179,7 @@ def evaluate_packed(
     turnings: Array,
     clearances: Array,
 ) -> None:
-    """Do what `PackedRegions.evaluate` says, for compiled callers."""
+    """Do what `PackedRegions.evaluate` says, with these `regions`, for compiled callers."""
     if _evaluate_plain(regions, position, values, gradients, turnings, clearances):
         call_at(
             regions.others,
@@ -238,7 +238,7 @@ def clearance_of_place(regions: PackedRegions, i: int, position: Array, room: Ar
 
 @compiled
 def clearance_at(regions: PackedRegions, i: int, position: Array) -> float:
-    """Return the clearance [m] of region `i`, where it is now, at a position, shape (3,) [m, NED].
+    """Return the clearance [m] of one of the `regions`, `i`, where it is now, at a position, shape (3,) [m, NED].
 
     Infinite for shapes that depend on attitude: they close no place.
     """
@@ -249,7 +249,10 @@ def clearance_at(regions: PackedRegions, i: int, position: Array) -> float:
 
 @lean
 def clearance_of_pose(regions: PackedRegions, i: int, position: Array, quaternion: Array, room: Array) -> float:
-    """Return the clearance of region `i`, of any kind, [m] or [rad], at a pose; `room` has shape (3,)."""
+    """Return the clearance of one of the `regions`, `i`, of any kind, [m] or [rad], at a pose; `room` has shape (3,).
+
+    The pose is a `position` [m, NED] and a unit `quaternion`.
+    """
     if regions.kinds[i] < FIRST_OF_ATTITUDE:
         return clearance_of_place(regions, i, position, room)
     for axis in range(3):
@@ -272,7 +275,10 @@ def clearance_of_sphere(regions: PackedRegions, i: int, position: Array) -> floa
 
 @compiled
 def attitude_clearance(regions: PackedRegions, i: int, position: Array, quaternion: Array) -> tuple[float, Array]:
-    """Return the clearance [rad] of region `i`, of attitude, at a pose, and its slope over a turn in body axes."""
+    """Return the clearance [rad] of one of the `regions`, `i`, of attitude, and its slope over a turn in body axes.
+
+    The pose is a `position` [m, NED] and a unit `quaternion`.
+    """
     numbers = regions.numbers[regions.offsets[i] : regions.offsets[i + 1]]
     at, sign = position - regions.shifts[i], regions.signs[i]
     g, _, _, _, x, y, z = evaluate_shape_of_attitude(regions.kinds[i], at, quaternion, numbers)
@@ -281,7 +287,10 @@ def attitude_clearance(regions: PackedRegions, i: int, position: Array, quaterni
 
 @compiled
 def place_clearance(regions: PackedRegions, i: int, position: Array, slope: Array) -> float:
-    """Return the clearance [m] of region `i`, of position alone, and write its slope, shape (3,), of length 1 or 0."""
+    """Return the clearance [m] of one of the `regions`, `i`, of position alone.
+
+    Its `slope` at the `position`, shape (3,), of length 1 or 0, is written.
+    """
     numbers = regions.numbers[regions.offsets[i] : regions.offsets[i + 1]]
     _, x, y, z, distance = evaluate_shape(regions.kinds[i], position - regions.shifts[i], numbers)
     size, sign = math.sqrt(x * x + y * y + z * z), regions.signs[i]

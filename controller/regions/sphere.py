@@ -17,7 +17,7 @@ class Sphere:
     kind: ClassVar[int] = 0
     unit: ClassVar[str] = "m2"
     centre: Vector3
-    radius: float
+    radius: float  # m
 
     def __post_init__(self) -> None:
         require_finite("sphere", centre=self.centre, radius=self.radius)

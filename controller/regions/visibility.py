@@ -26,8 +26,8 @@ class Visibility:
     unit: ClassVar[str] = "rad"
     feature: Vector3
     camera_axis: Vector3
-    half_angle: float
-    camera_position: Vector3 = (0.0, 0.0, 0.0)
+    half_angle: float  # rad
+    camera_position: Vector3 = (0.0, 0.0, 0.0)  # m, body axes
 
     def __post_init__(self) -> None:
         require_finite("visibility", feature=self.feature, camera_position=self.camera_position)

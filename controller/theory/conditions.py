@@ -48,7 +48,7 @@ def least_of_potential_test(mass: Array, gradient_norm: float, gains: Gains) -> 
     Parameters
     ----------
     mass : ndarray, shape (6, 6)
-        M.
+        M, in SI units.
     gradient_norm : float
         |df/dp|, above 0.
     gains : Gains
@@ -60,6 +60,8 @@ def least_of_potential_test(mass: Array, gradient_norm: float, gains: Gains) -> 
 
 def potential_fits(mass: Array, gradient_norm: float, gains: Gains) -> tuple[Fit, Fit]:
     """Return (38), first and second condition, with the scalar lambda_m as printed.
+
+    Arguments as `least_of_potential_test`.
 
     The second takes the mass in kilograms for an inertia: lambda_m is 187.7 for ODIN, whose inertia is 8 kg m2. The
     matrix test `least_of_potential_test` does not.
@@ -75,7 +77,7 @@ def secondary_fit(mass: Array, gradient_norms: Array, betas: Array, gains: Gains
     Parameters
     ----------
     mass : ndarray, shape (6, 6)
-        M.
+        M, in SI units.
     gradient_norms : ndarray, shape (n,)
         |dg_i/dp| of the active regions.
     betas : ndarray, shape (n,)
@@ -94,6 +96,8 @@ def secondary_fit(mass: Array, gradient_norms: Array, betas: Array, gains: Gains
 def greatest_gradient(mass: Array, gains: Gains) -> float:
     """Return the |df/dp| below which the matrix test of (38) holds; 0 if it holds nowhere, inf if everywhere.
 
+    Arguments as `least_of_potential_test`.
+
     By the Schur complement: the translation's part of sigma M sigma, and what the coupling to the rotation adds to it.
     """
     sigma = np.diag([gains.sigma_p] * 3 + [gains.sigma_a] * 3)
@@ -107,7 +111,7 @@ def greatest_gradient(mass: Array, gains: Gains) -> float:
 
 
 def error_jacobian_bound(jacobian: Array) -> float:
-    """Return the greatest eigenvalue of the symmetric part of de_p/dp, shape (3, 3): how fast e_p moves with p.
+    """Return the greatest eigenvalue of the symmetric part of de_p/dp, `jacobian`, (3, 3): how fast e_p moves with p.
 
     For a sphere it is |df/dp|^2 + 2 f where f > 0.
     """
@@ -126,9 +130,9 @@ def damping_fit(
     Parameters
     ----------
     mass : ndarray, shape (6, 6)
-        M.
+        M, in SI units.
     linear_damping : ndarray, shape (6,)
-        Diagonal of D at rest, which is its least.
+        Diagonal of D at rest, which is its least [N s/m, N m s/rad].
     jacobian_bound : float
         `error_jacobian_bound`.
     gains : Gains
@@ -143,7 +147,10 @@ def damping_fit(
 
 
 def gain_fits(gains: Gains) -> tuple[Fit, Fit]:
-    """Return (45), second and third condition, with J_v read as blkdiag(R, I), which leaves diag(k_p1 I, k_p2 I)."""
+    """Return (45), second and third condition, of `gains`, with J_v read as blkdiag(R, I).
+
+    That leaves diag(k_p1 I, k_p2 I).
+    """
     least = min(gains.k_p1, gains.k_p2)
     return Fit(least, 0.0), Fit(gains.k_q, least)
 
@@ -154,9 +161,9 @@ def sphere_radii(mass: Array, linear_damping: Array, radius: float, gains: Gains
     Parameters
     ----------
     mass : ndarray, shape (6, 6)
-        M.
+        M, in SI units.
     linear_damping : ndarray, shape (6,)
-        Diagonal of D at rest.
+        Diagonal of D at rest [N s/m, N m s/rad].
     radius : float
         Of the goal region [m].
     gains : Gains

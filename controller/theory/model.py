@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 class Model(NamedTuple):
     """Matrices of (11) in still water, about the body origin."""
 
-    mass: Array  # (6, 6) M, rigid body plus added mass
+    mass: Array  # (6, 6) kg, kg m, kg m2: M, rigid body plus added mass
     linear_damping: Array  # (6,) diagonal of D(0) [N s/m, N m s/rad]
     quadratic_damping: Array  # (6,) of |nu| in D [N s2/m2, N m s2/rad2]
     phi: Array  # (4,) true restoring parameters (12) [N, N m]
@@ -25,7 +25,9 @@ class Model(NamedTuple):
 
 @compiled
 def coriolis(mass: Array, velocity_body: Array) -> Array:
-    """Return C(nu), shape (6, 6), of a constant matrix M in Kirchhoff's form: (11).
+    """Return C(nu), shape (6, 6), of `mass`, a constant matrix M, and nu, `velocity_body`, in Kirchhoff's form: (11).
+
+    All in SI units, so [kg/s] and the like.
 
     With the momentum [a; b] = M nu it is [0 -S(a); -S(a) -S(b)], so that C nu = [w x a; v x a + w x b].
     """
@@ -40,12 +42,15 @@ def coriolis(mass: Array, velocity_body: Array) -> Array:
 
 @compiled
 def damping(linear: Array, quadratic: Array, velocity_body: Array) -> Array:
-    """Return the diagonal of D(nu), shape (6,): (11)."""
+    """Return the diagonal of D(nu), shape (6,) [N s/m, N m s/rad]: (11), of nu, `velocity_body`, in SI units.
+
+    `linear` is what it is at rest, and `quadratic` how it grows with |nu|.
+    """
     return linear + quadratic * np.abs(velocity_body)
 
 
 def least_inertia(mass: Array) -> float:
-    """Return the least eigenvalue of the symmetric part of M: above 0 by Property 1."""
+    """Return the least eigenvalue of the symmetric part of M, in SI units: above 0 by Property 1."""
     return float(np.linalg.eigvalsh(0.5 * (mass + mass.T))[0])
 
 
@@ -55,7 +60,9 @@ def asymmetry(matrix: Array) -> float:
 
 
 def skew_defect(mass: Array, velocity_body: Array) -> float:
-    """Return how far dM/dt - 2 C(nu) is from skew-symmetric (Property 2), over the greatest element of C.
+    """Return how far dM/dt - 2 C(nu) is from skew-symmetric (Property 2), over the greatest element of C [-].
+
+    `mass` and `velocity_body` as for `coriolis`.
 
     In body coordinates M is constant, so that C alone must be skew-symmetric.
     """

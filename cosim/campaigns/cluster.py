@@ -88,7 +88,7 @@ class Cluster:
             raise _lost(error) from error
 
     def check(self) -> None:
-        """Look whether there are workers."""
+        """Look whether there are workers; a RunError if not."""
         self._look()
         if time.monotonic() - self._seen > _PATIENCE:
             raise RunError(f"the cluster has had no workers for {_PATIENCE:g} s; what is flown is kept")

@@ -34,7 +34,7 @@ class Vary:
     values: tuple[float, ...] = ()  # a list, in the place of a range
 
     def at(self, share: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the values at shares of the range or list, from 0 up to 1; the ends of a range are met exactly."""
+        """Return the values at each `share` of the range or list, from 0 up to 1; the ends are met exactly."""
         if self.values:
             places = np.minimum(np.floor(share * len(self.values)).astype(np.int64), len(self.values) - 1)
             return np.array(self.values)[places]

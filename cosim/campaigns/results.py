@@ -69,7 +69,7 @@ class Results:
         return absent
 
     def pieces(self, name: str) -> Iterator[list[Any]]:
-        """Yield a column some rows at a time, in their order."""
+        """Yield a column some rows at a time, in their order; a RunError if it is not there."""
         try:
             with pq.ParquetFile(self.path) as file:
                 for batch in file.iter_batches(_PIECE, columns=[name]):

@@ -42,21 +42,21 @@ class Aim(_Order, frozen=True):
     its middle is there. It goes on from there at `velocity` [m/s, NED].
     """
 
-    position: Vector3
+    position: Vector3  # m, NED
     radius: float | None = None  # m
-    velocity: Vector3 = (0.0, 0.0, 0.0)
+    velocity: Vector3 = (0.0, 0.0, 0.0)  # m/s, NED
 
 
 class Face(_Order, frozen=True):
     """Keep another attitude: level, with a heading [rad, from north to east]."""
 
-    heading: float
+    heading: float  # rad
 
 
 class Sticks(_Order, frozen=True):
     """Push by hand: a part, from -1 to 1, of the greatest wrench along and about each body axis."""
 
-    wrench: Vector6
+    wrench: Vector6  # parts, [-]
 
 
 class Obstacle(_Order, frozen=True):
@@ -66,9 +66,9 @@ class Obstacle(_Order, frozen=True):
     """
 
     number: int
-    position: Vector3
+    position: Vector3  # m, NED
     radius: float  # m
-    velocity: Vector3 = (0.0, 0.0, 0.0)
+    velocity: Vector3 = (0.0, 0.0, 0.0)  # m/s, NED
 
 
 class Forget(_Order, frozen=True):

@@ -158,7 +158,7 @@ class LiveSettings:
         self.shapes[name] = dataclasses.replace(shape, **{field: new})  # type: ignore[type-var]
 
     def region_of(self, key: str) -> str | None:
-        """Return the region, or ``"goal"``, that a setting belongs to; None if it belongs to none."""
+        """Return the region, or ``"goal"``, that the setting `key` belongs to; None if it belongs to none."""
         if key.startswith("regions.") and key.endswith(".gain") and key in self._numbers:
             return key.removeprefix("regions.").removesuffix(".gain")
         try:

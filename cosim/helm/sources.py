@@ -79,7 +79,7 @@ class OrderQueue:
             self._orders.clear()
 
     def take(self, k: int) -> Sequence[Order]:
-        """Return what is queued."""
+        """Return what is queued, whatever the step `k`."""
         taken = []
         while self._orders:
             taken.append(self._orders.popleft())

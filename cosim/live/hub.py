@@ -146,7 +146,7 @@ class Hub:
         )
 
     def say(self, text: str, kind: str = "info", time: float | None = None) -> None:
-        """Tell all viewers something; `kind` is info, order or warning."""
+        """Tell all viewers something; `kind` is info, order or warning, `time` simulated [s]."""
         self._tell(text_of("said", kind=kind, text=text, time=time))
 
     def end(self, status: str, verdict: str) -> None:

@@ -107,11 +107,11 @@ class LiveView:
         self._call(self._hub.heed, k, orders)
 
     def say(self, text: str, kind: str = "info") -> None:
-        """Tell all viewers something."""
+        """Tell all viewers a `text`; its `kind` is info, order or warning."""
         self._call(self._hub.say, text, kind)
 
     def end(self, status: str, verdict: str) -> None:
-        """Tell how the run ended."""
+        """Tell how the run ended: its `status` and the `verdict` on it."""
         self._call(self._take_rows)
         self._call(self._hub.end, status, verdict)
 

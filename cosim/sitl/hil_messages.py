@@ -76,7 +76,7 @@ def air_pressure(altitude: float) -> float:
     Parameters
     ----------
     altitude : float
-        Above the surface; a depth is an altitude below 0.
+        Above the surface [m]; a depth is an altitude below 0.
 
     Returns
     -------

@@ -94,6 +94,11 @@ def program(system: System) -> Program:
     -------
     Program
         With the results of the engine that ``auto`` takes, to the last bit.
+
+    Raises
+    ------
+    DefinitionError
+        If it is no system.
     """
     if not isinstance(system, System):
         raise DefinitionError(f"system is {shown(system)}, expected a System, such as arbiter.system")

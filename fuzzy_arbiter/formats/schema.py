@@ -54,9 +54,9 @@ def system_of(data: object) -> System:
     """
     table = _table(data, "", _SHORT if isinstance(data, dict) and "criteria" in data else _LONG)
     settings = {key: table[key] for key in ("name", *_SETTINGS) if key in table}
-    for key in settings:
-        if key != "points" and not isinstance(settings[key], str):
-            _refuse(key, settings[key], "text")
+    for key, value in settings.items():
+        if key != "points" and not isinstance(value, str):
+            _refuse(key, value, "text")
     if "criteria" in table:
         form = table.get("form", "hierarchical")
         if not isinstance(form, str):

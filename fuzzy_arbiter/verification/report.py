@@ -170,8 +170,10 @@ class Verification:
         lines = [f"{self.row_count} crisp rows"]
         if 0 < len(self.rows) <= SHOWN_ROWS:
             table = [(*self.inputs, *self.outputs, "rules that fire")]
-            for row in self.rows:
-                table.append((*row.terms, *("/".join(terms) or "-" for terms in row.concluded), " ".join(row.rules)))
+            table += [
+                (*row.terms, *("/".join(terms) or "-" for terms in row.concluded), " ".join(row.rules))
+                for row in self.rows
+            ]
             lines += aligned(table)
         answers = {True: "yes", False: "no", None: "not decided"}
         lines.append("checks")

@@ -18,7 +18,10 @@ _MAX_STEPS = 10**6
 
 
 def run(fmu: FmuFile, task: Task, folder: Path) -> Answer:
-    """Simulate to the stop time; take the Jacobian of the states' derivatives at the start."""
+    """Simulate to the stop time; take the Jacobian of the states' derivatives at the start.
+
+    An ImporterError names a state without a start value.
+    """
     model = casadi.DaeBuilder("fmu", str(fmpy.extract(fmu.path, folder)), {})
     outputs = [v.name for v in fmu.of("output")]
     model.set_all("y", outputs)  # without the Boolean ones, which CasADi would read as numbers

@@ -29,7 +29,10 @@ from ecospy import EcosLib, EcosSimulation, EcosSimulationStructure  # noqa: E40
 
 
 def run(fmu: FmuFile, task: Task, folder: Path) -> Answer:
-    """Simulate to the stop time."""
+    """Simulate to the stop time.
+
+    An ImporterError tells what Ecos refuses, in its own words.
+    """
     EcosLib.set_log_level("err")
     with EcosSimulationStructure() as structure:
         structure.add_model("fmu", str(fmu.path))

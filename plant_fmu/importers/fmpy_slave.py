@@ -30,7 +30,7 @@ class FmpySlave:
         self.instance = instantiate_fmu(str(folder), description, "CoSimulation")
 
     def initialise(self, start: Mapping[str, float], stop_time: float) -> None:
-        """Pass through initialisation at time 0 with start values."""
+        """Pass through initialisation at time 0 with start values, `stop_time` [s] announced."""
         if self._fmu.fmi == 2:
             self.instance.setupExperiment(startTime=0.0, stopTime=stop_time)
             self._set(start)

@@ -12,7 +12,10 @@ from plant_fmu.importers.task import Answer, Task
 
 
 def run(fmu: FmuFile, task: Task, folder: Path) -> Answer:
-    """Validate an FMU; see `plant_fmu.importers.registry` for when."""
+    """Validate an FMU; see `plant_fmu.importers.registry` for when.
+
+    An ImporterError names the first problem that is found.
+    """
     problems = validate_fmu(str(fmu.path))
     if problems:
         raise ImporterError(f"problems found: {len(problems)}; first: {problems[0]}")

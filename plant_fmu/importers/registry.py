@@ -32,7 +32,7 @@ class Importer:
         return [package for package, r in needed.items() if not (v := _installed(r)) or v not in r.specifier]
 
     def objection(self, fmu: FmuFile) -> str:
-        """Return why this importer has nothing to do with an FMU, or ``""``."""
+        """Return why this importer has nothing to do with an FMU, `fmu`, or ``""``."""
         if not self.interface:
             return self.inapplicable(fmu)
         if self.interface not in fmu.interfaces:

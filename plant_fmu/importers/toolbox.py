@@ -25,7 +25,10 @@ class _Complaints(logging.Handler):
 
 
 def run(fmu: FmuFile, task: Task, folder: Path) -> Answer:
-    """Apply every check the toolbox has to an FMU."""
+    """Apply every check the toolbox has to an FMU.
+
+    An ImporterError names the first problem that is found.
+    """
     complaints = _Complaints()
     logging.getLogger("fmu_manipulation_toolbox").addHandler(complaints)
     checks = [check() for check in get_checkers()]

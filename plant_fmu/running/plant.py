@@ -114,7 +114,7 @@ class Plant(Slave):
         return to_bytes(state, self._instance)
 
     def deserialise(self, data: bytes) -> State:
-        """Return the state that `serialise` made bytes of.
+        """Return the state that `serialise` made the bytes `data` of.
 
         Raises
         ------

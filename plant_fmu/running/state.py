@@ -64,7 +64,7 @@ class State:
         raise PlantError("a state cannot be copied or pickled, expected plant.serialise(state)")
 
     def handle(self, instance: Instance) -> Any:
-        """Return the FMU's handle.
+        """Return the FMU's handle, for its own `instance`.
 
         Raises
         ------
@@ -78,7 +78,7 @@ class State:
         return self._handle
 
     def free(self, instance: Instance) -> None:
-        """Free it now; a second time does nothing."""
+        """Free it now, in its own `instance`; a second time does nothing."""
         if self._end.alive:
             self.handle(instance)
             self._end.detach()

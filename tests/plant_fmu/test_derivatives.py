@@ -48,7 +48,7 @@ def random_values(slave, rng):
         draw(prefix, lambda: 25.0 * rng.normal())
     for prefix in ("thrust_dead_band", "thrust_curve", "thrust_effectiveness"):
         draw(prefix, lambda: rng.uniform(0.02, 0.6))
-    draw("thruster_matrix", lambda: rng.normal())
+    draw("thruster_matrix", rng.normal)
     draw("thrust_min", lambda: rng.uniform(-40.0, -10.0))
     draw("thrust_max", lambda: rng.uniform(10.0, 40.0))
     draw("thrust_time_constant", lambda: rng.choice([0.0, rng.uniform(0.1, 0.4)]))

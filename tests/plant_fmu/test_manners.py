@@ -151,7 +151,7 @@ def test_a_wrong_token_makes_no_instance(make_slave, fmi):
 
 def test_what_is_not_offered_is_logged(make_slave):
     slave = make_slave(fmi=3).start()
-    refused(slave, lambda: slave.fmu.enterConfigurationMode(), "fmi3EnterConfigurationMode", "not offered")
+    refused(slave, slave.fmu.enterConfigurationMode, "fmi3EnterConfigurationMode", "not offered")
 
 
 def test_reset_brings_the_start_back(make_slave, fmi):

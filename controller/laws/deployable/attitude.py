@@ -58,7 +58,10 @@ def adapt(
     gains: DeployableGains,
     period: float,
 ) -> None:
-    """Compare the rates with what the last forces should have made of them, and learn the restoring moments."""
+    """Compare the rates with what the last forces should have made of them, and learn the restoring moments.
+
+    `omega` is in [rad/s], body axes, and the period in [s].
+    """
     if attitude.known[0] > 0.0:
         wrench = np.empty(6)
         product(thrusters.matrix, thrusters.forces, wrench)

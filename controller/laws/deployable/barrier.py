@@ -78,7 +78,7 @@ def sight_of(n: int) -> Sight:
 
 @compiled
 def look(sight: Sight, regions: PackedRegions, position: Array, quaternion: Array, velocity: Array) -> None:
-    """Evaluate the regions at a pose, and at the one to which a velocity, shape (6,) as in `Motion`, leads."""
+    """Evaluate the regions at a pose [m, NED], and at the one to which a velocity leads, shape (6,) as in `Motion`."""
     s = sight
     evaluate_packed(regions, position, quaternion, s.values, s.gradients, s.turnings, s.clearances)
     place = position + _AHEAD * velocity[:3]
@@ -109,7 +109,7 @@ def slope_of(gradients: Array, turnings: Array, i: int, of_attitude: bool, out: 
 
 @compiled
 def turning_of(kind: int, n: Array, later: Array, velocity: Array) -> float:
-    """Return (dn/dt)^T v, from a slope now and later, shape (6,) each, along a velocity against the region.
+    """Return (dn/dt)^T v, from a slope now and later, (6,) each, along a velocity [m/s, rad/s] against the region.
 
     The slope of a flat face does not turn, it leaps where another face is as near, which is nothing that the vehicle
     could follow: with flat faces only turning away counts, as round an edge; with others, no leap back.

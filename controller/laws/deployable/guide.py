@@ -202,7 +202,7 @@ def nearest_end(goal: PackedRegions, position: Array, depth: float, end: Array) 
 def improve(
     guide: Guide, start: Array, goal: PackedRegions, regions: PackedRegions, gains: DeployableGains, period: float
 ) -> None:
-    """Keep the way up with vehicle and regions, and try one change to it."""
+    """Keep the way up with vehicle and regions, and try one change to it; once a period [s]."""
     way, other = guide.way, guide.other
     if guide.points[0] == 0:
         guide.points[0] = 1

@@ -303,7 +303,7 @@ class DeployableLaw(CompiledLaw):
     def for_vehicle(
         cls, vehicle: VehicleModel, gains: Any, desired_quaternion: Array, period: float, n_regions: int
     ) -> DeployableLaw:
-        """Return the law for a vehicle."""
+        """Return the law for a vehicle, as `CompiledLaw.for_vehicle`."""
         return cls(vehicle, gains, desired_quaternion, period, n_regions)
 
     @classmethod
@@ -312,5 +312,5 @@ class DeployableLaw(CompiledLaw):
         return check_gains(gains)
 
     def face(self, quaternion: Array) -> None:
-        """Keep another attitude, where no region asks for one, from the next step on."""
+        """Keep another attitude, a unit `quaternion`, where no region asks for one, from the next step on."""
         self.memory.attitude.preferred[:] = checked_quaternion(quaternion)

@@ -19,8 +19,8 @@ _REGULARISATION = 1e-3  # of a thruster's own share in H
 class Dynamics(NamedTuple):
     """Constant numbers of the vehicle, derived from its nominal ones."""
 
-    mass: Array  # (6, 6) M, rigid body and added, centre of gravity at the origin
-    inverse_mass: Array  # (6, 6)
+    mass: Array  # (6, 6) kg, kg m, kg m2: M, rigid body and added, centre of gravity at the origin
+    inverse_mass: Array  # (6, 6) SI
     linear_damping: Array  # (6,) N s/m, N m s/rad
     quadratic_damping: Array  # (6,) N s2/m2, N m s2/rad2
     translational_mass: Array  # (1,) kg, mean of the three

@@ -60,7 +60,10 @@ def estimate_of_nothing() -> Estimate:
 
 @compiled
 def begin(estimate: Estimate, position: Array, velocity: Array, gains: DeployableGains) -> None:
-    """Start from a first measurement, or anew after losing the vehicle; what is known of water and weight stays."""
+    """Start from a first measurement [m, m/s, NED], or anew after losing the vehicle.
+
+    What is known of water and weight stays.
+    """
     estimate.position[:] = position
     estimate.velocity[:] = velocity
     first = estimate.silence[0] < 0.0

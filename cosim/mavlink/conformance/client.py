@@ -63,7 +63,7 @@ class Client:
     # ---- hearing ----
 
     def pump(self, timeout: float = 0.0) -> None:
-        """Take what has come from the vehicle, waiting for the first of it; keep our heartbeat going."""
+        """Take what has come from the vehicle, waiting up to `timeout` [s] for it; keep our heartbeat going."""
         now = time.monotonic()
         if now >= self._next_beat:
             self._next_beat = now + _BEAT
@@ -87,7 +87,7 @@ class Client:
         return self.vehicle is not None and (heard.system, heard.component) == self.vehicle[:2]
 
     def collect(self, seconds: float) -> list[Heard]:
-        """Return what no wait has looked at, and all that comes in this time [s of the wall clock]."""
+        """Return what no wait has looked at, and all that comes in so many `seconds` of the wall clock."""
         end = time.monotonic() + seconds
         while (left := end - time.monotonic()) > 0.0:
             self.pump(left)
@@ -114,7 +114,7 @@ class Client:
             self.pump(left)
 
     def find(self, timeout: float) -> Vehicle | None:
-        """Return the vehicle, once it was heard."""
+        """Return the vehicle, once it was heard; None if it was not within `timeout` [s]."""
         end = time.monotonic() + timeout
         while self.vehicle is None and (left := end - time.monotonic()) > 0.0:
             self.pump(left)
@@ -147,18 +147,24 @@ class Client:
     def send_command(
         self, command: int, parameters: Sequence[float] = (), target: tuple[int, int] | None = None
     ) -> None:
-        """Send a COMMAND_LONG; parameters that are left out are NaN, as MAVSDK sends them."""
+        """Send a COMMAND_LONG, `command`, to the vehicle or another `target`.
+
+        Of the `parameters` those that are left out are NaN, as MAVSDK sends them.
+        """
         padded = [*parameters, *[math.nan] * (7 - len(parameters))]
         self.send(self.mavlink.MAVLink_command_long_message(*(target or self.target), command, 0, *padded))
 
     def command(self, command: int, parameters: Sequence[float] = (), timeout: float = 2.0) -> Any:
-        """Send a COMMAND_LONG and return its COMMAND_ACK, or None."""
+        """Send a COMMAND_LONG, `command` with `parameters`, and return its COMMAND_ACK; None after `timeout` [s]."""
         self.forget()
         self.send_command(command, parameters)
         return self.wait(lambda m: m.get_type() == "COMMAND_ACK" and m.command == command, timeout)
 
     def request(self, message_id: int, timeout: float = 2.0, index: float = 0.0) -> Any:
-        """Ask for one message by MAV_CMD_REQUEST_MESSAGE and return it, or None; the ack may come before or after."""
+        """Ask for the message `message_id` by MAV_CMD_REQUEST_MESSAGE, `index` its second number, and return it.
+
+        None after `timeout` [s]; the ack may come before or after.
+        """
         self.forget()
         self.send_command(self.mavlink.MAV_CMD_REQUEST_MESSAGE, [message_id, index, 0, 0, 0, 0, 0])
         return self.wait(lambda m: m.get_msgId() == message_id, timeout)

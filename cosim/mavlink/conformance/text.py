@@ -20,7 +20,7 @@ def as_text(result: Result) -> str:
 
 
 def summary(results: Sequence[Result]) -> str:
-    """Return how many passed, failed and were skipped."""
+    """Return how many of the `results` passed, failed and were skipped."""
     counts = Counter(result.outcome.status for result in results)
     took = sum(result.seconds for result in results)
     return f"{counts['pass']} passed, {counts['fail']} failed, {counts['skip']} skipped, {took:.1f} s"

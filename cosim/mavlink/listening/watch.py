@@ -66,7 +66,7 @@ class Watch:
         self._sampled = 0.0
 
     def take(self, heard: Heard) -> None:
-        """Take a message."""
+        """Take a message that was `heard`."""
         self.total += 1
         label, message = heard.kind, heard.message
         if label in _NAMED:
@@ -89,7 +89,7 @@ class Watch:
             self.modes[message.custom_mode] = printable(message.mode_name)
 
     def sample(self, now: float) -> None:
-        """Note the counts, from which the rates are; at most every quarter of a second."""
+        """Note the counts at a time `now` [s], from which the rates are; at most every quarter of a second."""
         if now - self._sampled < _SAMPLING:
             return
         self._sampled = now
@@ -102,7 +102,7 @@ class Watch:
         return None if row is None else row.message
 
     def silence(self, now: float) -> float | None:
-        """Return for how long there was no heartbeat of the vehicle [s], or None if there was none at all."""
+        """Return for how long [s], at a time `now`, there was no heartbeat of the vehicle; None if there never was."""
         row = self.rows.get(Key(*self.vehicle, "HEARTBEAT")) if self.vehicle else None
         return None if row is None else now - row.last
 

@@ -28,7 +28,7 @@ class Spec:
     several: int = 1  # messages at once, about
 
     def default_rate(self, profile: ProfileName) -> float:
-        """Return the rate [Hz] at which it is streamed unasked."""
+        """Return the rate [Hz] at which a `profile` streams it unasked."""
         return self.rate if profile in self.profiles else 0.0
 
 

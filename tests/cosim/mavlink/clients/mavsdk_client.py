@@ -74,7 +74,7 @@ def fields(value, *names):
     return [getattr(value, name) for name in names]
 
 
-async def steps(vehicle, address):
+async def steps(vehicle, address):  # noqa: C901 - one step after the other
     """Yield each step's name and what does it."""
     yield "connect", vehicle.connect(address)
     yield "health", first(vehicle.stream("health_all_ok"), bool)
