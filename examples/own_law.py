@@ -17,7 +17,7 @@ from cosim.scenario import load_scenario
 
 PULL, PUSH, REACH = 60.0, 180.0, 0.8  # N a metre from the goal, N on a region's surface, m from which it pushes
 BRAKE, UPRIGHT, CALM = 70.0, 40.0, 20.0  # N s/m, N m, N m s/rad
-SETTINGS = ["time.duration=60.0", "time.step=0.01", "time.control=0.01", "time.arbiter=0.01", "arbiter.ramp=0.8"]
+SETTINGS = ["time.step=0.01", "time.control=0.01", "time.arbiter=0.01", "arbiter.ramp=0.8", "arbiter.engine=closed"]
 
 
 def direction(vector: np.ndarray) -> np.ndarray:

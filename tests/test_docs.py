@@ -2,8 +2,6 @@
 
 import re
 import shutil
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -20,20 +18,6 @@ PAGES = [ROOT / "README.md", ROOT / "CHANGELOG.md", *sorted((ROOT / "docs").glob
 def test_links_lead_somewhere(page):
     for target in re.findall(r"\]\(([^)#]+)\)", page.read_text()):
         assert target.startswith("http") or (page.parent / target).exists(), target
-
-
-@pytest.mark.parametrize(
-    "example",
-    [
-        pytest.param(path, marks=[pytest.mark.slow] if path.name == "fmu_reference.py" else [])
-        for path in sorted((ROOT / "examples").glob("*.py"))
-    ],
-    ids=lambda p: p.name,
-)
-def test_examples_run(example, tmp_path):
-    done = subprocess.run([sys.executable, example], cwd=tmp_path, capture_output=True, text=True, check=True)
-    assert done.stdout
-    assert done.stderr == ""
 
 
 def test_readme_shows_what_the_arbiter_says():
