@@ -75,6 +75,7 @@ print(run.summary["reached"], run.summary["min_clearance"]["ring"] > 0.0, throug
 def test_the_torus_of_the_page_flies(tmp_path):
     for package in ("fuzzy_arbiter", "plant_fmu", "controller", "cosim"):
         shutil.copytree(ROOT / package, tmp_path / package, ignore=shutil.ignore_patterns("__pycache__"))
+    shutil.copy(ROOT / "LICENSE", tmp_path)  # FMUs carry it
     regions = tmp_path / "controller" / "regions"
     (code,) = re.findall(r"<!-- file: torus\.py -->\n```python\n(.*?)```", PAGE, re.DOTALL)
     (regions / "torus.py").write_text(code)
