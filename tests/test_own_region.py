@@ -30,7 +30,7 @@ SCENARIO = """
 vehicle = "odin"
 
 [time]
-duration = 20.0
+duration = 30.0
 step = 0.01
 
 [initial]
@@ -55,13 +55,19 @@ shape = { type = "torus", centre = [2.0, 0.3, 2.0], axis = [1.0, 0.0, 0.0], radi
 FLY = """
 from pathlib import Path
 import numpy as np
+from controller import FunctionLaw
 from cosim.check import check
 from cosim.record import load_record
 from cosim.run import run_scenario
 from cosim.scenario import load_scenario
 
+def steer(state, goal, regions, weights):
+    # level all the while, so that the axes of the body are those of the world
+    force = -20.0 * np.clip(goal.gradients[0], -1.0, 1.0) - 100.0 * weights[0] * regions.gradients[0]
+    return np.concatenate([force - 60.0 * state.velocity_body[:3], np.zeros(3)])
+
 scenario = load_scenario("ring.toml")
-run = run_scenario(scenario, Path("run"), report=False)
+run = run_scenario(scenario, Path("run"), report=False, law=FunctionLaw(steer))
 record = load_record(run.folder)
 p = record.stack([f"position.{axis}" for axis in "xyz"]) - [2.0, 0.3, 2.0]
 apart = np.hypot(np.hypot(p[:, 1], p[:, 2]) - 1.0, p[:, 0]) - 0.2
