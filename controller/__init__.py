@@ -2,6 +2,7 @@
 
 from controller.allocation import Allocation
 from controller.errors import ControllerError, LawError, RegionError
+from controller.function_law import FunctionLaw, RegionsSeen
 from controller.law import CompiledLaw, Diagnostic, Law, VehicleModel, VehicleState, WrenchLaw
 from controller.laws import LAWS, PrintedLaw
 from controller.printed_law import Gains
@@ -12,11 +13,13 @@ __all__ = [
     "CompiledLaw",
     "ControllerError",
     "Diagnostic",
+    "FunctionLaw",
     "Gains",
     "Law",
     "LawError",
     "PrintedLaw",
     "RegionError",
+    "RegionsSeen",
     "VehicleModel",
     "VehicleState",
     "WrenchLaw",

@@ -56,8 +56,12 @@ class Diagnostic:
 class Law(Protocol):
     """State, regions and weights in; forces out."""
 
-    output: ClassVar[Output]
     diagnostics: tuple[Diagnostic, ...]  # what the numbers of `report` are
+
+    @property
+    def output(self) -> Output:
+        """What `step` writes."""
+        ...
 
     @property
     def estimate(self) -> Array:

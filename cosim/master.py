@@ -77,7 +77,7 @@ class Master:
     def __init__(self, scenario: Scenario, law: Law | None = None) -> None:
         self.scenario = scenario
         self.arbiter = Arbiter(engine=scenario.arbiter.engine, points=scenario.arbiter.points)
-        self.law: Law = law or law_of(scenario)
+        self.law: Law = law_of(scenario) if law is None else law
         self._ramp = scenario.arbiter.ramp
         self._jacobi = scenario.master.order == "jacobi"
         self._failures = bool(scenario.failures)

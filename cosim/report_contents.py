@@ -232,6 +232,9 @@ def _setting(run: FlownRun) -> Table:
 def _repeating(run: FlownRun) -> tuple[tuple[str, ...], str]:
     """Return the commands that repeat a run, and what they do."""
     again = ("cosim report . --format html,pdf", "cosim replay .")
+    if run.scenario.law.own:
+        whose = f"The law that flew this run, {run.scenario.law.name}, is its user's own and in no file here"
+        return again, f"{whose}: the run is repeated from where the law is, and can be shown again from here."
     if run.scenario.law.name not in LAWS:
         return again, "An autopilot outside flew this run: it cannot be repeated from here, but be shown again."
     orders = f" --orders {ORDERS}" if (run.path / ORDERS).exists() else ""

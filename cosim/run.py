@@ -12,9 +12,11 @@ from typing import TYPE_CHECKING, Any
 
 from tqdm import tqdm
 
+from controller import Law, LawError
 from cosim.errors import RunError
 from cosim.flown_run import ORDERS
 from cosim.helm import LoggedOrders, OrderQueue, RecordedOrders
+from cosim.law import flown_by
 from cosim.master import Master, Observer
 from cosim.record import Recorder
 from cosim.report_words import verdict
@@ -78,6 +80,7 @@ def run_scenario(
     report: bool = True,
     orders: Path | None = None,
     live: LiveView | None = None,
+    law: Law | None = None,
 ) -> Run:
     """Run a scenario and write its folder.
 
@@ -102,6 +105,9 @@ def run_scenario(
         The log of an earlier run, whose orders are repeated; then none are taken from the link or from viewers.
     live : LiveView, optional
         Shows the run while it goes on, and takes orders if the scenario's commands are enabled.
+    law : Law, optional
+        One's own, such as a `FunctionLaw`, in the place of the scenario's. The run folder says where it is from, and
+        cannot hold it: the run is repeated from where the law is.
 
     Returns
     -------
@@ -114,17 +120,23 @@ def run_scenario(
         If the folder cannot be written, or the log of orders cannot be read.
     TelemetryError
         If the link cannot be opened.
+    ScenarioError
+        If the scenario asks for what a law of one's own has not.
     BuildError, LawError, DefinitionError
         If plant, law or arbiter cannot be set up.
+    LawError
+        If a law of one's own returns no forces; what was recorded until then is left readable.
     PlantError
         If the FMU refuses the scenario, or fails in a step; what was recorded until then is left readable.
     """
+    if law is not None:
+        scenario = flown_by(law, scenario)
     recorded = _recorded(scenario, orders)
     queue = OrderQueue()
     link: LinkThread | None = None
     try:
         for attempt in itertools.count(1):
-            with Master(scenario) as master:
+            with Master(scenario, law) as master:
                 if mavlink is not None and link is None:
                     link = mavlink.open(scenario, master.signals.columns, None if recorded else queue, rate)
                 folder = claim(out.with_name(f"{out.name}-{attempt}") if out and attempt > 1 else out, scenario)
@@ -176,10 +188,10 @@ def _step(
     live: LiveView | None,
     rate: float | None,
     progress: bool,
-) -> tuple[str, float, PlantError | None]:
+) -> tuple[str, float, PlantError | LawError | None]:
     """Step through the run and close its record; return how it ended, what it took [s], and why it failed."""
     status = "completed"
-    failure: PlantError | None = None
+    failure: PlantError | LawError | None = None
     recorder: Recorder | None = None
     bar: _Progress | None = None
     started = time.perf_counter()
@@ -194,7 +206,7 @@ def _step(
             status = "reset"
     except KeyboardInterrupt:
         status = "interrupted"
-    except PlantError as error:
+    except (PlantError, LawError) as error:
         status, failure = f"failed: {error}", error
     finally:
         wall_time = time.perf_counter() - started

@@ -183,7 +183,7 @@ def checked_scenario(table: dict[str, Any], name: str, vehicle: Vehicle | None =
     goal, goal_velocity, goal_streamed = check_goal(file.goal)
     regions = check_regions(file.regions)
     overlapping = check_intersection(file.intersection, regions)
-    seen = check_commands(file.commands, file.record, tuple(r.region.name for r in regions))
+    seen = check_commands(file.commands, file.record, file.law.name, tuple(r.region.name for r in regions))
     vehicle_file = Path(file.vehicle) if file.vehicle.endswith(".toml") else None
     vehicle = vehicle or load_vehicle(vehicle_file or file.vehicle)
     check_parameters(file.plant.parameters, vehicle)

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from controller import LAWS, RegionError
+from controller.law import checked_quaternion
 from controller.regions import SHAPES, Region, Shape, Sphere, of_attitude
 from cosim.errors import ScenarioError
 from cosim.scenario_tables import (
@@ -21,6 +22,7 @@ from cosim.scenario_tables import (
     LawEntry,
     LawSetup,
     Limit,
+    NoGains,
     RecordSetup,
     RegionEntry,
     SecondaryRegion,
@@ -28,6 +30,7 @@ from cosim.scenario_tables import (
     Time,
     TimeEntry,
     Vector3,
+    is_own,
 )
 from cosim.vehicle_model import vehicle_model
 from plant_fmu.tables import decode, hint
@@ -110,12 +113,15 @@ def check_record(record: RecordSetup, law: LawSetup, regions: tuple[SecondaryReg
     _require(not names, "record.lyapunov", "true", f"false: the analysis knows no attitude in regions ({names})")
 
 
-def check_commands(commands: Commands, record: RecordSetup, names: tuple[str, ...]) -> tuple[SecondaryRegion, ...]:
+def check_commands(
+    commands: Commands, record: RecordSetup, law: str, names: tuple[str, ...]
+) -> tuple[SecondaryRegion, ...]:
     """Return the regions that stand for obstacles that may come in, none where commands are not enabled."""
     if not commands.enabled:
         _require(not commands.await_arm, "commands.await_arm", "true", "false without commands.enabled: nobody arms")
         return ()
     _require(not record.lyapunov, "record.lyapunov", "true", "false with commands.enabled: V is of one target")
+    _require(not is_own(law), "commands.enabled", "true", f"false: nothing of {law} can be ordered from outside")
     _require(0 <= commands.obstacles <= MAX_SEEN, "commands.obstacles", commands.obstacles, f"0 to {MAX_SEEN}")
     for key in ("obstacle_radius", "hold_radius"):
         value = getattr(commands, key)
@@ -200,7 +206,12 @@ def check_time(entry: TimeEntry) -> Time:
 
 
 def check_law(entry: LawEntry, through: str, vehicle: Vehicle, period: float, n_regions: int) -> LawSetup:
-    """Return the law's name and gains, once the law itself has taken them and its period [s]; else a ScenarioError."""
+    """Return the law's name and gains, once the law itself has taken them and its period [s]; of one's own the name is all."""
+    if is_own(entry.name):
+        if entry.gains:
+            raise ScenarioError(f"law.gains has {next(iter(entry.gains))!r}, expected nothing with a law of one's own")
+        checked_quaternion(np.array(entry.desired_quaternion))
+        return LawSetup(entry.name, entry.desired_quaternion, NoGains())
     if entry.name not in LAWS:
         known = ", ".join(map(repr, sorted(LAWS)))
         raise ScenarioError(f"law.name is {entry.name!r}, expected one of {known}")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 from controller.regions import Region
 from fuzzy_arbiter import SECTION_VI
@@ -181,6 +181,11 @@ class File:
     regions: tuple[RegionEntry, ...] = ()
 
 
+def is_own(law: str) -> bool:
+    """Return whether this is the name of a law of one's own: where it is from, such as ``mine.py:steer``."""
+    return ":" in law
+
+
 # ---- checked -------------------------------------------------------------------------------------------------------
 
 
@@ -194,13 +199,22 @@ class Time:
     arbiter: float  # s, period of the arbiter
 
 
+class NoGains(NamedTuple):
+    """What a scenario can say of the gains of a law of one's own."""
+
+
 @dataclass(frozen=True)
 class LawSetup:
     """Which law, with which gains."""
 
-    name: str  # one of controller.LAWS
+    name: str  # one of controller.LAWS; with a colon: where a law of one's own is from, such as mine.py:steer
     desired_quaternion: Vector4  # attitude to be kept, from body to world, scalar first
-    gains: Any  # of that law's gains_type
+    gains: Any  # of that law's gains_type; none for a law of one's own
+
+    @property
+    def own(self) -> bool:
+        """Whether it is a law of one's own, which no file can hold."""
+        return is_own(self.name)
 
 
 @dataclass(frozen=True)

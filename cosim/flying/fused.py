@@ -14,7 +14,7 @@ from cosim.errors import RunError, ScenarioError
 from cosim.flight import OUTPUTS, Allocator, Array, Marks, Setup, flight_of, room_for
 from cosim.flying.outcome import OUTCOME, Flown, nothing
 from cosim.flying.variation import Variation
-from cosim.law import law_of
+from cosim.law import law_of, require_shipped
 from cosim.scenario import CRITERIA, Scenario
 from cosim.sensing import STREAM
 from cosim.start_values import start_values
@@ -58,6 +58,7 @@ class FusedFlyer:
                 raise RunError(f"{key} is {came!r}, expected {expected!r} for flights without a record{way}")
             if key in variation.keys:
                 raise RunError(f"{key} varies, expected {expected!r} for flights without a record")
+        require_shipped(base)
         self._flight = flight_of(base.law.name)
         self._plant = Plant(base.vehicle)
 

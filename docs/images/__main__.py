@@ -13,6 +13,7 @@ import arbiter
 import fmu
 import pages
 import paths
+import tutorial
 
 HERE = Path(__file__).parent
 
@@ -26,7 +27,14 @@ def reference() -> None:
         shutil.copyfile(Path(scratch) / "fmu-reference.png", "fmu-reference.png")
 
 
-MAKERS = {"arbiter": arbiter.main, "fmu": fmu.main, "pages": pages.main, "paths": paths.main, "reference": reference}
+MAKERS = {
+    "arbiter": arbiter.main,
+    "fmu": fmu.main,
+    "pages": pages.main,
+    "paths": paths.main,
+    "reference": reference,
+    "tutorial": tutorial.main,
+}
 
 if __name__ == "__main__":
     with contextlib.chdir(HERE):

@@ -1,0 +1,130 @@
+"""A law of one's own as a plain function: what is measured and how the regions stand in, forces out."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import NamedTuple, get_args
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from controller.errors import LawError
+from controller.law import Array, Diagnostic, Output, VehicleState
+from controller.regions import PackedRegions
+
+
+class RegionsSeen(NamedTuple):
+    """Regions as they stand at the pose that the law is told; row i is of region i, in the order of the scenario."""
+
+    values: Array  # (n,) g, above 0 where violated, in the unit of the shape
+    gradients: Array  # (n, 3) dg/dp, world frame
+    turnings: Array  # (n, 3) dg/dtheta [1/rad], for a small rotation about the body's axes
+    clearances: Array  # (n,) to the surface, m (rad for shapes of attitude), below 0 where violated
+    velocities: Array  # (n, 3) m/s, NED
+    gains: Array  # (n,) alpha_i
+    hard: NDArray[np.bool_]  # (n,) must not be violated
+
+
+LawFunction = Callable[[VehicleState, RegionsSeen, RegionsSeen, Array], ArrayLike]
+
+
+class FunctionLaw:
+    """A law that is a function of one's own; `Law` is the protocol that it fulfils.
+
+    Parameters
+    ----------
+    function : callable
+        ``function(state, goal, regions, weights)``, called once every control period. `goal` holds one row, `regions`
+        one for each secondary region, `weights`, shape (n,), what the arbiter gives each of these in [0, 1]. All are
+        copies. It returns the forces of the coming period. What it keeps between calls is its own affair: an object
+        with a method ``__call__`` will do.
+    output : {"wrench", "thrusters"}
+        What it returns: a wrench, shape (6,) [N, N m], body frame, or the thruster forces, shape (m,) [N].
+
+    Attributes
+    ----------
+    name : str
+        Where the function is from, such as ``my_laws:steer``.
+
+    Raises
+    ------
+    LawError
+        If `function` cannot be called, or `output` is neither of the two.
+    """
+
+    diagnostics: tuple[Diagnostic, ...] = ()
+
+    def __init__(self, function: LawFunction, output: Output = "wrench") -> None:
+        if not callable(function):
+            raise LawError(f"law is {function!r}, expected a function of state, goal, regions and weights")
+        if output not in get_args(Output):
+            raise LawError(f"output of a law is {output!r}, expected one of {', '.join(map(repr, get_args(Output)))}")
+        self.output: Output = output
+        self.name = qualified_name(function)
+        self._function = function
+
+    @property
+    def estimate(self) -> Array:
+        """Nothing, shape (4,): what a function estimates it keeps to itself."""
+        return np.zeros(4)
+
+    @property
+    def report(self) -> Array:
+        """Nothing, shape (0,)."""
+        return np.zeros(0)
+
+    def step(
+        self, state: VehicleState, goal: PackedRegions, regions: PackedRegions, weights: Array, forces: Array
+    ) -> None:
+        """Ask the function, and write what it returns.
+
+        Parameters
+        ----------
+        state, goal, regions, weights, forces
+            As of `Law.step`.
+
+        Raises
+        ------
+        LawError
+            If it returns anything but finite numbers of the right shape.
+        """
+        told = VehicleState(*(part.copy() for part in state))
+        came = self._function(told, _seen(goal, told), _seen(regions, told), weights.copy())
+        try:
+            numbers = np.asarray(came, dtype=float)
+        except (TypeError, ValueError):
+            numbers = np.empty(0)
+        if numbers.shape != forces.shape or not np.isfinite(numbers).all():
+            unit = "N and N m" if self.output == "wrench" else "N"
+            raise LawError(f"law {self.name} returned {came!r}, expected {forces.size} finite numbers [{unit}]")
+        forces[:] = numbers
+
+
+def qualified_name(law: object) -> str:
+    """Return where a function, or an object's class, is from.
+
+    Parameters
+    ----------
+    law : object
+        A function, or any object.
+
+    Returns
+    -------
+    str
+        Such as ``my_laws:steer``, or ``my_laws.py:steer`` if that file is the script that runs.
+    """
+    named = law if hasattr(law, "__qualname__") else type(law)
+    module, name = str(named.__module__), str(named.__qualname__)
+    script = getattr(sys.modules.get(module), "__file__", None) if module == "__main__" else None
+    return f"{Path(script).name if script else module}:{name}"
+
+
+def _seen(regions: PackedRegions, state: VehicleState) -> RegionsSeen:
+    n = regions.kinds.size
+    values, gradients, turnings, clearances = np.zeros(n), np.zeros((n, 3)), np.zeros((n, 3)), np.zeros(n)
+    regions.evaluate(state.position, state.quaternion, values, gradients, turnings, clearances)
+    return RegionsSeen(
+        values, gradients, turnings, clearances, regions.velocities.copy(), regions.gains.copy(), regions.hard.copy()
+    )

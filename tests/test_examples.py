@@ -1,0 +1,63 @@
+"""Each example runs from an empty folder, says something, and stays as short as it claims to be."""
+
+import ast
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+EXAMPLES = sorted((Path(__file__).parents[1] / "examples").glob("*.py"))
+SLOW = {"fmu_reference.py"}
+WRITES = {
+    "fmu_alone.py": ["bluerov2.fmu"],
+    "fmu_reference.py": ["bluerov2_heavy.fmu", "fmu-reference.png"],
+    "own_law.py": ["runs/own-law/report.html", "runs/own-law/replay.html", "runs/own-law/summary.json"],
+    "own_vehicle.py": ["frame.toml", "frame.fmu", "pool.toml", "runs/frame/record.parquet"],
+    "telemetry.py": ["runs/streamed/record.parquet"],
+    "ventilation.py": ["ventilation.png", "ventilation.toml"],
+}
+SAYS = {
+    "fmu_alone.py": "14 inputs",
+    "master.py": "clearance to the goal region +",
+    "own_law.py": "law own_law.py:steer: in the goal after",
+    "own_vehicle.py": "for good: True",
+    "telemetry.py": "last seen at",
+}
+PACKAGES = ("controller", "cosim", "fuzzy_arbiter", "plant_fmu")
+
+
+@pytest.mark.parametrize(
+    "example",
+    [pytest.param(path, marks=[pytest.mark.slow] if path.name in SLOW else []) for path in EXAMPLES],
+    ids=lambda p: p.name,
+)
+def test_runs_and_writes_what_it_says(example, tmp_path):
+    if example.name == "telemetry.py":
+        pytest.importorskip("pymavlink")
+    done = subprocess.run([sys.executable, example], cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert done.stderr == ""
+    assert SAYS.get(example.name, "") in done.stdout and done.stdout
+    assert [file for file in WRITES.get(example.name, []) if not (tmp_path / file).is_file()] == []
+
+
+@pytest.mark.parametrize("example", EXAMPLES, ids=lambda p: p.name)
+def test_opens_with_what_it_teaches(example):
+    assert len((ast.get_docstring(ast.parse(example.read_text())) or "").split()) > 10
+
+
+def test_the_master_fits_on_a_page():
+    assert len((EXAMPLES[0].parent / "master.py").read_text().splitlines()) <= 40
+
+
+def test_a_stream_takes_twenty_lines():
+    code = ast.parse((EXAMPLES[0].parent / "telemetry.py").read_text()).body[1:]  # behind the docstring
+    assert sum(statement.end_lineno - statement.lineno + 1 for statement in code) <= 20
+
+
+def test_the_fmu_alone_imports_nothing_of_ours():
+    tree = ast.parse((EXAMPLES[0].parent / "fmu_alone.py").read_text())
+    imported = [alias.name for node in ast.walk(tree) if isinstance(node, ast.Import) for alias in node.names]
+    imported += [node.module for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)]
+    assert imported and not [name for name in imported if name.startswith(PACKAGES)]
