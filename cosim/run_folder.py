@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import itertools
 import json
-import os
 import shutil
 from collections.abc import Collection
 from dataclasses import dataclass
@@ -14,12 +13,13 @@ from pathlib import Path
 from typing import Any
 
 from cosim.errors import RunError
-from cosim.record import PARTS
+from cosim.record import PARTS, require_utf8
 from cosim.replay.folder import ORDERS, SCENARIO, SUMMARY, FlownRun, flown_run, load_run
 from cosim.replay.pages import write_replay
 from cosim.replay.trace import plain
 from cosim.report import write_report
 from cosim.scenario import VEHICLE_COPY, Scenario
+from cosim.whole_file import write_whole
 
 __all__ = ["ORDERS", "SCENARIO", "RunFolder", "claim", "conclude", "report_again"]
 
@@ -62,6 +62,7 @@ def claim(out: Path | None, scenario: Scenario) -> RunFolder:
         If the folder is in use, or cannot be written.
     """
     where = out or Path("runs")
+    require_utf8(where.absolute())
     try:
         if out is None:
             path, created = _new_folder(where, f"{scenario.name}-{datetime.now():%Y%m%d-%H%M%S}"), True
@@ -160,9 +161,7 @@ def report_again(path: Path, formats: Collection[str] = ("html",)) -> tuple[dict
 
 
 def _write(run: FlownRun, formats: Collection[str]) -> list[Path]:
-    scratch = run.path / f".{SUMMARY}-{os.getpid()}"
-    scratch.write_text(json.dumps(plain(run.summary), indent=2, allow_nan=False) + "\n", encoding="utf-8")
-    scratch.replace(run.path / SUMMARY)
+    write_whole(run.path / SUMMARY, json.dumps(plain(run.summary), indent=2, allow_nan=False) + "\n")
     files = write_report(run, formats) if formats else []
     if "html" in formats:
         write_replay(run)

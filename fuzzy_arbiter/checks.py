@@ -11,6 +11,8 @@ from fuzzy_arbiter.errors import DefinitionError
 
 _T = TypeVar("_T")
 
+MAX_NAME = 200  # characters
+
 
 def finite(value: object) -> float | None:
     """Return a number as a float.
@@ -78,8 +80,10 @@ def require_name(name: object, what: str) -> None:
     Raises
     ------
     DefinitionError
-        Unless it is printable text without double quotes or outer spaces.
+        Unless it is printable text, not absurdly long, without double quotes or outer spaces.
     """
+    if isinstance(name, str) and len(name) > MAX_NAME:
+        raise DefinitionError(f"{what} name is {shown(name)}, expected at most {MAX_NAME} characters")
     if not isinstance(name, str) or not name or name != name.strip() or not name.isprintable() or '"' in name:
         raise DefinitionError(
             f"{what} name is {shown(name)}, expected printable text without double quotes or outer spaces"

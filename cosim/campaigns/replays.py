@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from cosim.campaigns.folder import write_text
 from cosim.campaigns.page import Html, link
 from cosim.campaigns.repeat import Repeat, repeat_of
 from cosim.errors import CosimError
@@ -18,6 +17,7 @@ from cosim.replay.folder import load_run
 from cosim.replay.page import REPLAY, write_page
 from cosim.replay.trace import trace_of
 from cosim.run import run_scenario
+from cosim.whole_file import write_whole
 from plant_fmu import PlantError
 
 WORST = "worst"  # folder of the replays
@@ -80,7 +80,7 @@ def replay_of(out: Path, key: int, folders: Sequence[Path], title: str) -> Repla
                 remarks += [name + remark] if remark else []
             if traces:
                 write_page(scratch / REPLAY, traces, title)
-            write_text(scratch / _FLOWN, json.dumps({"remarks": remarks}, indent=2) + "\n")
+            write_whole(scratch / _FLOWN, json.dumps({"remarks": remarks}, indent=2) + "\n")
             scratch.chmod(0o755)
             shutil.rmtree(place, ignore_errors=True)
             scratch.replace(place)
