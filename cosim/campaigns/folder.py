@@ -173,7 +173,7 @@ def read_plan(path: Path) -> dict[str, Any]:
         plan = json.loads((path / PLAN).read_text(encoding="utf-8"))
     except FileNotFoundError as error:
         raise RunError(f"{path}: holds no campaign ({PLAN} is missing)") from error
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, RecursionError) as error:
         raise RunError(f"{path / PLAN}: cannot be read: {error}") from error
     if not isinstance(plan, dict):
         raise RunError(f"{path / PLAN}: holds no campaign")
@@ -200,7 +200,7 @@ def read_json(path: Path) -> dict[str, Any]:
     """
     try:
         table = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, RecursionError) as error:
         raise RunError(f"{path}: cannot be read: {error}") from error
     if not isinstance(table, dict):
         raise RunError(f"{path}: cannot be read: it holds no table")

@@ -10,9 +10,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from cosim.campaigns.folder import read_json
 from cosim.campaigns.page import Html, link
 from cosim.campaigns.repeat import Repeat, repeat_of
-from cosim.errors import CosimError
+from cosim.errors import CosimError, RunError
 from cosim.replay.folder import load_run
 from cosim.replay.page import REPLAY, write_page
 from cosim.replay.trace import trace_of
@@ -86,8 +87,10 @@ def replay_of(out: Path, key: int, folders: Sequence[Path], title: str) -> Repla
             scratch.replace(place)
         finally:
             shutil.rmtree(scratch, ignore_errors=True)
-    remarks = json.loads((place / _FLOWN).read_text(encoding="utf-8"))["remarks"]
-    return Replay(f"{WORST}/{key}/{REPLAY}" if (place / REPLAY).exists() else None, tuple(remarks))
+    said = read_json(place / _FLOWN).get("remarks")
+    if not (isinstance(said, list) and all(isinstance(remark, str) for remark in said)):
+        raise RunError(f"{place / _FLOWN}: cannot be read: remarks are missing")
+    return Replay(f"{WORST}/{key}/{REPLAY}" if (place / REPLAY).exists() else None, tuple(said))
 
 
 def _flown(repeat: Repeat, folder: Path) -> tuple[dict[str, Any] | None, str]:

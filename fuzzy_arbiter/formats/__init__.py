@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Literal, get_args
 
-from fuzzy_arbiter.checks import shown
+from fuzzy_arbiter.checks import brief, shown
 from fuzzy_arbiter.definition import System
 from fuzzy_arbiter.errors import ArbiterError, FormatError, UnsupportedError
 from fuzzy_arbiter.files import write_whole
@@ -125,7 +125,7 @@ def load(path: str | Path) -> System:
     try:
         return reads(text, format)
     except ArbiterError as error:
-        raise type(error)(f"{path}: {error}") from None
+        raise type(error)(f"{path}: {brief(error)}") from None
 
 
 def save(system: System, path: str | Path) -> None:
