@@ -189,7 +189,7 @@ class Record:
             with _opened(file) as parquet:
                 for batch in parquet.iter_batches(_BLOCK, columns=names):
                     columns = batch.columns if names is None else [batch.column(name) for name in names]
-                    yield np.column_stack([np.from_dlpack(column) for column in columns])
+                    yield np.column_stack([_numbers(column) for column in columns])
 
 
 def load_record(folder: Path) -> Record:
@@ -228,8 +228,16 @@ def _column_of(field: pa.Field) -> Column:
 def _column(file: Path, name: str) -> Array:
     with _opened(file) as parquet:  # pq.read_table takes three times as long to begin
         # not to_numpy, as above
-        column: Array = np.concatenate([np.empty(0), *map(np.from_dlpack, parquet.read([name])[name].chunks)])
+        column: Array = np.concatenate([np.empty(0), *map(_numbers, parquet.read([name])[name].chunks)])
     return column
+
+
+def _numbers(column: pa.Array) -> Array:
+    if column.null_count:
+        raise TypeError("a number is missing")
+    numbers: Any = np.from_dlpack(column)
+    result: Array = numbers
+    return result
 
 
 @contextlib.contextmanager
