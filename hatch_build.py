@@ -47,7 +47,7 @@ class PrebuiltLibraries(BuildHookInterface):  # type: ignore[type-arg]
         if version == "editable" or self._is_there():
             return
         self._folder = tempfile.mkdtemp(prefix="subreach-")
-        subprocess.run([sys.executable, "-c", _COMPILE, self._folder], cwd=self.root, check=True)
+        subprocess.run([sys.executable, "-c", _COMPILE, self._folder], cwd=self.root, check=True)  # noqa: S603 - our own code
         for file in sorted(Path(self._folder).iterdir()):
             build_data["force_include"][str(file)] = f"plant_fmu/prebuilt/{file.name}"
 

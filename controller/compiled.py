@@ -5,6 +5,8 @@ from __future__ import annotations
 import functools
 import hashlib
 import logging
+import os
+import stat
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar
@@ -85,10 +87,26 @@ def _kept_on_disk(function: F, others: tuple[Path, ...], *, counting: bool) -> F
         cache_file._source_stamp  # noqa: B018 - raises where it is gone
         cache_file._source_stamp = stamp
         jitted._cache.save_overload = _if_there_is_room(jitted._cache.save_overload)
+        kept = Path(jitted._cache.cache_path)
+        if not _is_ours(kept, Path(function.__code__.co_filename)):
+            log.warning("Numba's cache %s: others can write there; compiled for this process alone", kept)
+            jitted = numba.njit(**options)(function)
     except AttributeError:
         jitted = numba.njit(**options)(function)
     result: F = jitted
     return result
+
+
+def _is_ours(folder: Path, source: Path) -> bool:
+    """Return whether none but who may change the code itself may change what is kept of it: loading that runs it."""
+    try:
+        about, trusted = folder.stat(), {source.stat().st_uid}
+    except OSError:  # not made yet: it will be this user's
+        return True
+    if os.name == "posix":
+        trusted.add(os.geteuid())
+        return about.st_uid in trusted and not about.st_mode & stat.S_IWOTH
+    return True
 
 
 def _if_there_is_room(save: Callable[..., None]) -> Callable[..., None]:

@@ -14,7 +14,7 @@ from cosim.came import as_it_came
 from cosim.errors import RunError
 from cosim.record import Record, load_record
 from cosim.scenario import Scenario, load_scenario
-from cosim.summary import summarise
+from cosim.summary import seconds_or_none, summarise
 
 SCENARIO = "scenario.toml"
 SUMMARY = "summary.json"
@@ -58,12 +58,12 @@ def load_run(path: Path) -> FlownRun:
     status, wall_time = "killed", None
     try:
         before = json.loads((path / SUMMARY).read_text(encoding="utf-8"))
-        status, wall_time = str(before["status"]), before["wall_time"]
+        status, wall_time = str(before["status"]), seconds_or_none(before["wall_time"])
         law = dataclasses.replace(scenario.law, name=str(before["law"]))  # or who flew in its place
         scenario = dataclasses.replace(scenario, name=str(before["scenario"]), law=law)
     except FileNotFoundError:
         pass
-    except (OSError, ValueError, KeyError, TypeError) as error:
+    except (OSError, ValueError, KeyError, TypeError, RecursionError) as error:
         raise RunError(f"{path / SUMMARY}: cannot be read: {error}") from error
     return flown_run(path, scenario, status, wall_time)
 

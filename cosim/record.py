@@ -8,6 +8,7 @@ import time
 from collections import OrderedDict
 from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
@@ -15,7 +16,9 @@ import pyarrow.parquet as pq
 
 from cosim.errors import RunError
 from cosim.signals import Array, Column
+from plant_fmu.tables import brief
 
+MAX_ROWS = 100_000_001  # of a run of as many steps as a scenario may have
 RECORD = "record.parquet"
 PARTS = "record.parts"  # what a killed run leaves
 _WHOLE = "whole"  # among them, what a finished run makes of them
@@ -147,11 +150,10 @@ class Record:
 
     def __init__(self, files: Sequence[Path]) -> None:
         self._files = list(files)
-        try:
-            schema = pq.read_schema(self._files[0])
-        except (OSError, pa.ArrowException) as error:
-            raise RunError(f"{self._files[0]}: cannot be read: {error}") from error
-        self.columns = tuple(_column_of(field) for field in schema)
+        with _opened(self._files[0]) as parquet:
+            schema, rows = parquet.schema_arrow, parquet.metadata.num_rows
+            _require_numbers(self._files[0], schema, rows)
+            self.columns = tuple(_column_of(field) for field in schema)
         self.units: dict[str, str] = {column.name: column.unit for column in self.columns}
         self._kept: OrderedDict[str, Array] = OrderedDict()
 
@@ -184,13 +186,10 @@ class Record:
             If they cannot be read.
         """
         for file in self._files:
-            try:
-                with pq.ParquetFile(file) as parquet:
-                    for batch in parquet.iter_batches(_BLOCK, columns=names):
-                        columns = batch.columns if names is None else [batch.column(name) for name in names]
-                        yield np.column_stack([np.from_dlpack(column) for column in columns])
-            except (OSError, pa.ArrowException) as error:
-                raise RunError(f"{file}: cannot be read: {error}") from error
+            with _opened(file) as parquet:
+                for batch in parquet.iter_batches(_BLOCK, columns=names):
+                    columns = batch.columns if names is None else [batch.column(name) for name in names]
+                    yield np.column_stack([_numbers(column) for column in columns])
 
 
 def load_record(folder: Path) -> Record:
@@ -211,6 +210,7 @@ def load_record(folder: Path) -> Record:
     RunError
         If there is none, or it cannot be read.
     """
+    require_utf8(folder)
     files = [folder / RECORD] if (folder / RECORD).exists() else _part_files(folder)
     if not files:
         raise RunError(f"{folder}: holds no record of a run")
@@ -226,13 +226,60 @@ def _column_of(field: pa.Field) -> Column:
 
 
 def _column(file: Path, name: str) -> Array:
-    try:
-        with pq.ParquetFile(file) as parquet:  # pq.read_table takes three times as long to begin
-            # not to_numpy, as above
-            column: Array = np.concatenate([np.empty(0), *map(np.from_dlpack, parquet.read([name])[name].chunks)])
-    except (OSError, pa.ArrowException) as error:
-        raise RunError(f"{file}: cannot be read: {error}") from error
+    with _opened(file) as parquet:  # pq.read_table takes three times as long to begin
+        # not to_numpy, as above
+        column: Array = np.concatenate([np.empty(0), *map(_numbers, parquet.read([name])[name].chunks)])
     return column
+
+
+def _numbers(column: pa.Array) -> Array:
+    if column.null_count:
+        raise TypeError("a number is missing")
+    numbers: Any = np.from_dlpack(column)
+    result: Array = numbers
+    return result
+
+
+@contextlib.contextmanager
+def _opened(file: Path) -> Iterator[Any]:
+    """Open a Parquet file; what cannot be read of it is one error, whoever has made it."""
+    require_utf8(file)
+    try:
+        with pq.ParquetFile(file) as parquet:
+            yield parquet
+    except (OSError, pa.ArrowException, UnicodeDecodeError, TypeError, BufferError, KeyError) as error:
+        raise RunError(f"{file}: cannot be read: {brief(error)}") from error
+
+
+def require_utf8(path: Path) -> None:
+    """Refuse a place that Parquet's library cannot be told of.
+
+    Parameters
+    ----------
+    path : Path
+        Of a file or folder.
+
+    Raises
+    ------
+    RunError
+        If its name is no UTF-8.
+    """
+    try:
+        str(path).encode()
+    except UnicodeEncodeError as error:
+        shown = str(path).encode(errors="surrogateescape").decode(errors="backslashreplace")
+        raise RunError(f"{shown}: is no UTF-8, expected such a name, which Parquet files need") from error
+
+
+def _require_numbers(file: Path, schema: pa.Schema, rows: int) -> None:
+    """Refuse a table that is no record: a few bytes of it could say what no memory holds."""
+    odd = next((field.name for field in schema if field.type != pa.float64()), None)
+    if odd is not None:
+        raise RunError(f"{file}: column {odd[:80]!r} is no number, expected the record of a run")
+    if not schema.names or len(set(schema.names)) < len(schema.names):
+        raise RunError(f"{file}: has no columns, or two of one name; expected the record of a run")
+    if rows > MAX_ROWS:
+        raise RunError(f"{file}: has {rows} rows, expected at most {MAX_ROWS}")
 
 
 def _part_files(folder: Path) -> list[Path]:

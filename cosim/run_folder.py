@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import itertools
-import os
 import shutil
 from collections.abc import Collection
 from dataclasses import dataclass
@@ -15,10 +14,11 @@ from typing import Any
 from cosim.errors import RunError
 from cosim.flown_run import ORDERS, SCENARIO, SUMMARY, FlownRun, flown_run, load_run
 from cosim.plain_json import json_text
-from cosim.record import PARTS
+from cosim.record import PARTS, require_utf8
 from cosim.replay.pages import write_replay
 from cosim.report import write_report
 from cosim.scenario import VEHICLE_COPY, Scenario
+from cosim.whole_file import write_whole
 
 
 @dataclass(frozen=True)
@@ -59,6 +59,7 @@ def claim(out: Path | None, scenario: Scenario) -> RunFolder:
         If the folder is in use, or cannot be written.
     """
     where = out or Path("runs")
+    require_utf8(where.absolute())
     try:
         if out is None:
             path, created = _new_folder(where, f"{scenario.name}-{datetime.now().astimezone():%Y%m%d-%H%M%S}"), True
@@ -157,9 +158,7 @@ def report_again(path: Path, formats: Collection[str] = ("html",)) -> tuple[dict
 
 
 def _write(run: FlownRun, formats: Collection[str]) -> list[Path]:
-    scratch = run.path / f".{SUMMARY}-{os.getpid()}"
-    scratch.write_text(json_text(run.summary), encoding="utf-8")
-    scratch.replace(run.path / SUMMARY)
+    write_whole(run.path / SUMMARY, json_text(run.summary))
     files = write_report(run, formats) if formats else []
     if "html" in formats:
         write_replay(run)

@@ -51,7 +51,7 @@ from cosim.scenario_tables import (
     Vector3,
 )
 from plant_fmu.errors import PlantFmuError
-from plant_fmu.tables import decode, hint
+from plant_fmu.tables import brief, decode, hint
 from plant_fmu.vehicle import Vehicle, load_vehicle
 
 __all__ = ["CRITERIA", "VEHICLE_COPY", "Limit", "Scenario", "Time", "load_scenario"]
@@ -142,14 +142,14 @@ def load_scenario(name_or_file: str | Path, overrides: Sequence[str] = ()) -> Sc
     text = str(name_or_file)
     if not text.endswith(".toml") and text not in shipped_scenarios():
         known = hint(text, shipped_scenarios())
-        raise ScenarioError(f"scenario {text!r} is unknown; {known} (or a file ending in .toml)")
+        raise ScenarioError(f"scenario {brief(repr(text))} is unknown; {known} (or a file ending in .toml)")
     try:
         table, name = read_table(text)
         for change in overrides:
             override(table, change)
         return checked_scenario(table, name)
     except (PlantFmuError, ControllerError, ScenarioError) as error:
-        raise ScenarioError(f"{text}: {error}") from error
+        raise ScenarioError(f"{text}: {brief(error)}") from error
 
 
 def checked_scenario(table: dict[str, Any], name: str, vehicle: Vehicle | None = None) -> Scenario:

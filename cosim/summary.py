@@ -117,6 +117,31 @@ def summarise(scenario: Scenario, record: Record, status: str, wall_time: float 
     }
 
 
+def seconds_or_none(value: object) -> float | None:
+    """Return a time that a summary was written with.
+
+    Parameters
+    ----------
+    value : object
+        As JSON has it.
+
+    Returns
+    -------
+    float or None
+        [s].
+
+    Raises
+    ------
+    ValueError
+        If it is none.
+    """
+    if value is None:
+        return None
+    if isinstance(value, bool) or not isinstance(value, int | float) or not 0.0 <= value < 1e12:
+        raise ValueError(f"a time is {str(value)[:80]!r}, expected seconds")
+    return float(value)
+
+
 def _saturated_time(record: Record, acted: slice, period: float) -> float:
     """How long any actuator was asked for more than it gives [s]."""
     of_all = ("wrench_saturated", "allocation_saturated")

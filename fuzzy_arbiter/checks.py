@@ -11,6 +11,8 @@ from fuzzy_arbiter.errors import DefinitionError
 
 _T = TypeVar("_T")
 
+MAX_NAME = 200  # characters
+
 
 def finite(value: object) -> float | None:
     """Return a number as a float.
@@ -78,12 +80,31 @@ def require_name(name: object, what: str) -> None:
     Raises
     ------
     DefinitionError
-        Unless it is printable text without double quotes or outer spaces.
+        Unless it is printable text, not absurdly long, without double quotes or outer spaces.
     """
+    if isinstance(name, str) and len(name) > MAX_NAME:
+        raise DefinitionError(f"{what} name is {shown(name)}, expected at most {MAX_NAME} characters")
     if not isinstance(name, str) or not name or name != name.strip() or not name.isprintable() or '"' in name:
         raise DefinitionError(
             f"{what} name is {shown(name)}, expected printable text without double quotes or outer spaces"
         )
+
+
+def brief(fault: Exception) -> str:
+    """Return what a fault says, cut in the middle where what came is absurdly long.
+
+    Parameters
+    ----------
+    fault : Exception
+        Any.
+
+    Returns
+    -------
+    str
+        At most some hundred characters.
+    """
+    text = str(fault)
+    return text if len(text) <= 1000 else f"{text[:500]} ... {text[-500:]}"
 
 
 def shown(value: object) -> str:

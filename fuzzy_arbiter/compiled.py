@@ -32,7 +32,8 @@ def compiled(system: System) -> Any:
     except ImportError:
         raise EngineError("compiled: Numba is not installed, expected such as pip install numba") from None
     namespace: dict[str, Any] = {}
-    exec(compile(to_python(system), f"<{system.name}>", "exec"), namespace)
+
+    exec(compile(to_python(system), f"<{system.name}>", "exec"), namespace)  # noqa: S102
     # each function finds those it calls in the same namespace
     for name in ("least", "greatest", "either", "envelope", "area_and_moment", "centroid", "evaluate"):
         if name in namespace:

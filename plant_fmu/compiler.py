@@ -134,7 +134,7 @@ def _run(command: Sequence[str]) -> None:
     """Run a compiler; raise its first complaint if it fails."""
     log.debug("%s", shlex.join(command))
     try:
-        done = subprocess.run(command, capture_output=True, text=True, check=False)
+        done = subprocess.run(command, capture_output=True, text=True, check=False)  # noqa: S603
     except OSError as error:
         raise BuildError(f"C compiler {command[0]}: {error.strerror or error}") from error
     if done.returncode != 0:

@@ -18,6 +18,13 @@ from plant_fmu.errors import TableError
 
 T = TypeVar("T")
 
+MAX_FILE = 4_000_000  # bytes of a file; the longest that comes with the package has a thousandth of that
+MAX_DEPTH = 20  # tables and lists within each other
+MAX_DIGITS = 400  # of a whole number; beyond them it is no float either
+
+_LONGEST_NAME = 100  # that is compared with known ones
+_LONGEST_WORDS = 1000  # of a message
+
 _LISTED = 30  # names that a message still lists
 
 
@@ -37,14 +44,35 @@ def read_toml(path: Path) -> dict[str, Any]:
     Raises
     ------
     TableError
-        If it cannot be read, or is no TOML; the caller knows its name.
+        If it cannot be read, is no TOML, or is absurdly long or deep; the caller knows its name.
     """
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
+        with path.open("rb") as file:
+            data = file.read(MAX_FILE + 1)
+        if len(data) > MAX_FILE:
+            raise TableError(f"has more than {MAX_FILE} bytes, expected a file for people")
+        table = tomllib.loads(data.decode())
     except OSError as error:
         raise TableError(error.strerror or str(error)) from error
     except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError, ValueError) as error:
         raise TableError(f"not valid TOML: {error}") from error
+    _require_modest(table)
+    return table
+
+
+def _require_modest(table: dict[str, Any]) -> None:
+    """Refuse tables so deep, and whole numbers so great, that Python itself stumbles over them."""
+    waiting: list[tuple[str, Any, int]] = [(key, value, 1) for key, value in table.items()]
+    while waiting:
+        key, value, depth = waiting.pop()
+        if depth > MAX_DEPTH:
+            raise TableError(f"{key[:80]}: tables are nested deeper than {MAX_DEPTH}")
+        if isinstance(value, int) and abs(value) >= 10**MAX_DIGITS:
+            raise TableError(f"{key[:80]}: a whole number of more than {MAX_DIGITS} digits, expected a number")
+        if isinstance(value, dict):
+            waiting += [(f"{key}.{inner}" if depth < 5 else key, value[inner], depth + 1) for inner in value]
+        elif isinstance(value, list):
+            waiting += [(key, item, depth + 1) for item in value if isinstance(item, dict | list | int)]
 
 
 def decode(table: dict[str, Any], kind: type[T], where: str = "") -> T:
@@ -92,12 +120,29 @@ def hint(came: str, known: typing.Iterable[str]) -> str:
     str
         Such as ``did you mean 'mass'?``.
     """
-    known = sorted(known)
+    known, came = sorted(known), came[:_LONGEST_NAME]  # to compare takes time with the square of the length
     near = difflib.get_close_matches(came, known, n=1, cutoff=0.5)
     if near:
         return f"did you mean {near[0]!r}?"
     listed = ", ".join(known) if len(known) <= _LISTED else f"{len(known)} names, such as {', '.join(known[:3])}"
     return f"expected one of {listed or '(none)'}"
+
+
+def brief(said: object) -> str:
+    """Return what an error says in one line, cut where what came is absurdly long.
+
+    Parameters
+    ----------
+    said : object
+        Such as an exception.
+
+    Returns
+    -------
+    str
+        Begin and end of it.
+    """
+    text, half = " ".join(str(said).splitlines()), _LONGEST_WORDS // 2
+    return text if len(text) <= _LONGEST_WORDS else f"{text[:half]} ... {text[-half:]}"
 
 
 def dataclass_of(annotation: Any) -> type | None:

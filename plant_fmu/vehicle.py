@@ -13,12 +13,15 @@ from numpy.typing import NDArray
 
 from plant_fmu.autopilot import Autopilot, checked_autopilot
 from plant_fmu.errors import TableError, VehicleError
-from plant_fmu.tables import decode, read_toml
+from plant_fmu.tables import brief, decode, read_toml
 
 Vector3 = tuple[float, float, float]
 Vector6 = tuple[float, float, float, float, float, float]
 Rows = tuple[tuple[float, ...], ...]
 Matrix = tuple[float | tuple[float, ...], ...]  # rows, or a diagonal
+
+GREATEST = 1e15  # of any number of a vehicle, so that what is made of them is finite
+MAX_THRUSTERS = 100
 
 # a name becomes C text and a file's name: neither may be a word that C99 or Windows keep for themselves
 _RESERVED = re.compile(
@@ -194,7 +197,7 @@ def _decode(path: Path, where: str) -> Vehicle:
     try:
         file = decode(read_toml(path), _File)
     except TableError as error:
-        raise TableError(f"{where}: {error}") from error
+        raise TableError(f"{where}: {brief(error)}") from error
     return _check(file, where)
 
 
@@ -207,12 +210,13 @@ def _check(file: _File, where: str) -> Vehicle:
 
     def require(good: bool, key: str, came: object, expected: str) -> None:
         if not good:
-            raise VehicleError(f"{where}: {key} is {came}, expected {expected}")
+            raise VehicleError(f"{where}: {key} is {brief(came)}, expected {expected}")
 
     def square(value: Matrix, n: int, key: str) -> NDArray[np.float64]:
-        widths = {len(row) if isinstance(row, tuple) else 0 for row in value}
+        widths = {len(row) or -1 if isinstance(row, tuple) else 0 for row in value}  # 0: a number, no row
         good = len(value) == n and widths in ({0}, {n})
-        require(good, key, f"{len(value)} rows of {sorted(widths)} numbers", f"a diagonal of {n}, or {n} by {n}")
+        came = f"{len(value)} rows of {sorted(max(width, 0) for width in widths)} numbers"
+        require(good, key, came, f"a diagonal of {n}, or {n} by {n}")
         return np.diag(np.array(value)) if widths == {0} else np.array(value, dtype=float)
 
     body, statics, dynamics, thrusters = file.rigid_body, file.hydrostatics, file.hydrodynamics, file.thrusters
@@ -225,10 +229,10 @@ def _check(file: _File, where: str) -> Vehicle:
 
     widths = {len(row) for row in thrusters.matrix}
     require(
-        len(thrusters.matrix) == 6 and len(widths) == 1 and min(widths) >= 1,
+        len(thrusters.matrix) == 6 and len(widths) == 1 and 1 <= min(widths) <= MAX_THRUSTERS,
         "thrusters.matrix",
         f"{len(thrusters.matrix)} rows of {sorted(widths)} numbers",
-        "6 rows (X Y Z K M N) with one number for each thruster",
+        f"6 rows (X Y Z K M N) with one number for each of 1 to {MAX_THRUSTERS} thrusters",
     )
     (n,) = widths
 
@@ -263,7 +267,8 @@ def _check(file: _File, where: str) -> Vehicle:
 
     for key, value in vars(vehicle).items():
         if not isinstance(value, str | Autopilot | None):
-            require(bool(np.all(np.isfinite(value))), _KEYS.get(key, key), "not finite", "finite numbers")
+            good = bool(np.all(np.abs(value) <= GREATEST))  # of no NaN either
+            require(good, _KEYS.get(key, key), "not finite", f"finite numbers of up to {GREATEST:g}")
             if isinstance(value, np.ndarray):
                 value.setflags(write=False)
     require(vehicle.mass > 0, "rigid_body.mass", f"{vehicle.mass} kg", "above 0")

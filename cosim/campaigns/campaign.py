@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from cosim.campaigns.folder import SUMMARY, write_text
+from cosim.campaigns.folder import SUMMARY
 from cosim.campaigns.law_gains import gains_from
 from cosim.campaigns.results import Results
 from cosim.campaigns.runner import carry_out
@@ -17,6 +17,7 @@ from cosim.campaigns.scenes import SceneTask, SceneWork
 from cosim.campaigns.summary import summarise
 from cosim.plain_json import json_text
 from cosim.scene_run import Conditions
+from cosim.whole_file import write_whole
 
 
 @dataclass(frozen=True)
@@ -88,7 +89,7 @@ def run_campaign(
 
         def conclude(results: Results) -> None:
             summary.update(summarise(work.flown, results, out))
-            write_text(out / SUMMARY, json_text(summary))
+            write_whole(out / SUMMARY, json_text(summary))
 
         done = carry_out(work, out, workers, executor, progress, conclude)
     return Campaign(out, done.results, summary, done.flown)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cosim.campaigns.folder import PLAN, RESULTS, SUMMARY, held, read_json, write_text
+from cosim.campaigns.folder import PLAN, RESULTS, SUMMARY, held, read_json
 from cosim.campaigns.page import Html, Page, code, interval, wall, write_figures
 from cosim.campaigns.plan import SCENES
 from cosim.campaigns.repeat import complete_results
@@ -26,6 +26,7 @@ from cosim.campaigns.sections import (
 from cosim.campaigns.summary import OF_ALL, SPREADS, rates_of
 from cosim.campaigns.worst import LISTED, Worst, worst_rows
 from cosim.errors import RunError
+from cosim.whole_file import write_whole
 
 if TYPE_CHECKING:
     from cosim.drawing import Drawing
@@ -65,7 +66,7 @@ def write_campaign_page(folder: Path, replays: int) -> Path:
         figures = write_figures(folder, _drawings(results, kinds, summary) if worst else [])
 
         def write(shown: Mapping[int, Replay]) -> None:
-            write_text(folder / PAGE, _page(folder, results, kinds, summary, worst, figures, shown).html())
+            write_whole(folder / PAGE, _page(folder, results, kinds, summary, worst, figures, shown).html())
 
         write({})
         by = f"by the {summary['law']} law"

@@ -13,7 +13,6 @@ import numpy as np
 from controller import LAWS
 from cosim.campaigns.campaign import Campaign, run_campaign
 from cosim.campaigns.comparison_page import NUMBERS, PAGE
-from cosim.campaigns.folder import write_text
 from cosim.campaigns.law_gains import law_named
 from cosim.campaigns.replays import WORST
 from cosim.campaigns.results import Results
@@ -24,6 +23,7 @@ from cosim.errors import RunError
 from cosim.plain_json import json_text
 from cosim.report import FIGURES
 from cosim.scene_run import Conditions
+from cosim.whole_file import write_whole
 
 
 @dataclass(frozen=True)
@@ -103,7 +103,7 @@ def compare(
             ],
         }
     try:
-        write_text(out / NUMBERS, json_text(numbers))
+        write_whole(out / NUMBERS, json_text(numbers))
     except OSError as error:
         raise RunError(f"{out}: {error.strerror or error}") from error
     return Comparison(out, campaigns, numbers)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cosim.campaigns.campaign_page import FACTS, group_of, spreads_of
-from cosim.campaigns.folder import SUMMARY, read_json, write_text
+from cosim.campaigns.folder import SUMMARY, read_json
 from cosim.campaigns.page import Html, Page, code, interval, number, wall, write_figures
 from cosim.campaigns.repeat import complete_results
 from cosim.campaigns.replays import Replay, replay_of
@@ -18,6 +18,7 @@ from cosim.campaigns.sections import LABELS, basis, quantiles_table, rates_table
 from cosim.campaigns.summary import SPREADS
 from cosim.campaigns.worst import ORDER, Worst, rerun_command, worst_rows
 from cosim.errors import RunError
+from cosim.whole_file import write_whole
 
 if TYPE_CHECKING:
     from cosim.drawing import Drawing
@@ -57,7 +58,7 @@ def write_comparison_page(folder: Path, replays: int) -> Path:
         figures = write_figures(folder, _drawings(results, numbers) if any(worst.values()) else [])
 
         def write(shown: Mapping[int, Replay]) -> None:
-            write_text(folder / PAGE, _page(folder, numbers, worst, figures, shown).html())
+            write_whole(folder / PAGE, _page(folder, numbers, worst, figures, shown).html())
 
         write({})
         keys = dict.fromkeys(w.key for of in worst.values() for w in of[:replays])

@@ -16,6 +16,7 @@ from cosim.campaigns.plan import difference
 from cosim.campaigns.results import Results
 from cosim.campaigns.work import Rows, Work
 from cosim.errors import RunError
+from cosim.whole_file import write_whole
 
 PLAN = "campaign.json"
 RESULTS = "results.parquet"
@@ -71,10 +72,10 @@ class CampaignFolder:
             if differing := difference(read_plan(self.path), json.loads(json.dumps(plan))):
                 raise RunError(f"{self.path}: holds another campaign ({differing}), expected a folder of its own")
         else:
-            write_text(file, json.dumps(plan, indent=2, allow_nan=False) + "\n")
+            write_whole(file, json.dumps(plan, indent=2, allow_nan=False) + "\n")
         for name, content in work.files.items():
             if not (self.path / name).exists():
-                write_bytes(self.path / name, content)
+                write_whole(self.path / name, content)
 
     @property
     def complete(self) -> bool:
@@ -172,7 +173,7 @@ def read_plan(path: Path) -> dict[str, Any]:
         plan = json.loads((path / PLAN).read_text(encoding="utf-8"))
     except FileNotFoundError as error:
         raise RunError(f"{path}: holds no campaign ({PLAN} is missing)") from error
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, RecursionError) as error:
         raise RunError(f"{path / PLAN}: cannot be read: {error}") from error
     if not isinstance(plan, dict):
         raise RunError(f"{path / PLAN}: holds no campaign")
@@ -199,52 +200,11 @@ def read_json(path: Path) -> dict[str, Any]:
     """
     try:
         table = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, RecursionError) as error:
         raise RunError(f"{path}: cannot be read: {error}") from error
     if not isinstance(table, dict):
         raise RunError(f"{path}: cannot be read: it holds no table")
     return table
-
-
-def write_text(path: Path, text: str) -> None:
-    """Write a text file, whole or not at all.
-
-    Parameters
-    ----------
-    path : Path
-        The file; what was there is replaced.
-    text : str
-        Its content.
-
-    Raises
-    ------
-    OSError
-        If it cannot be written.
-    """
-    write_bytes(path, text.encode())
-
-
-def write_bytes(path: Path, content: bytes) -> None:
-    """Write a file, whole or not at all.
-
-    Parameters
-    ----------
-    path : Path
-        The file; what was there is replaced.
-    content : bytes
-        All of it.
-
-    Raises
-    ------
-    OSError
-        If it cannot be written; nothing is left then.
-    """
-    scratch = path.with_name(f".{path.name}")
-    try:
-        scratch.write_bytes(content)
-        scratch.replace(path)
-    finally:
-        scratch.unlink(missing_ok=True)
 
 
 def _lock(path: Path) -> int | None:

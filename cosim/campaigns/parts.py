@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 import logging
-import os
 import re
 import shutil
 from collections.abc import Iterator, Sequence
@@ -17,6 +16,7 @@ import pyarrow.parquet as pq
 
 from cosim.campaigns.work import Rows
 from cosim.errors import RunError
+from cosim.whole_file import whole_file
 
 log = logging.getLogger(__name__)
 
@@ -183,14 +183,9 @@ def write_whole(path: Path, tables: Any, schema: Any) -> None:
     OSError
         If it cannot be written; nothing is left then.
     """
-    scratch = path.with_name(f".{path.name}-{os.getpid()}")
-    try:
-        with pq.ParquetWriter(scratch, schema, compression="zstd") as writer:
-            for table in _grouped(tables):
-                writer.write_table(table)
-        scratch.replace(path)
-    finally:
-        scratch.unlink(missing_ok=True)
+    with whole_file(path) as file, pq.ParquetWriter(file, schema, compression="zstd") as writer:
+        for table in _grouped(tables):
+            writer.write_table(table)
 
 
 def _grouped(tables: Any) -> Iterator[Any]:

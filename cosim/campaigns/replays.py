@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import shutil
 import tempfile
 from collections.abc import Sequence
@@ -10,15 +9,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from cosim.campaigns.folder import write_text
+from cosim.campaigns.folder import read_json
 from cosim.campaigns.page import Html, link
 from cosim.campaigns.repeat import Repeat, repeat_of
-from cosim.errors import CosimError
+from cosim.errors import CosimError, RunError
 from cosim.flown_run import load_run
 from cosim.plain_json import json_text
 from cosim.replay.page import REPLAY, write_page
 from cosim.replay.trace import trace_of
 from cosim.run import run_scenario
+from cosim.whole_file import write_whole
 from plant_fmu import PlantError
 
 WORST = "worst"  # folder of the replays
@@ -81,14 +81,16 @@ def replay_of(out: Path, key: int, folders: Sequence[Path], title: str) -> Repla
                 remarks += [name + remark] if remark else []
             if traces:
                 write_page(scratch / REPLAY, traces, title)
-            write_text(scratch / _FLOWN, json_text({"remarks": remarks}))
+            write_whole(scratch / _FLOWN, json_text({"remarks": remarks}))
             scratch.chmod(0o755)
             shutil.rmtree(place, ignore_errors=True)
             scratch.replace(place)
         finally:
             shutil.rmtree(scratch, ignore_errors=True)
-    remarks = json.loads((place / _FLOWN).read_text(encoding="utf-8"))["remarks"]
-    return Replay(f"{WORST}/{key}/{REPLAY}" if (place / REPLAY).exists() else None, tuple(remarks))
+    said = read_json(place / _FLOWN).get("remarks")
+    if not (isinstance(said, list) and all(isinstance(remark, str) for remark in said)):
+        raise RunError(f"{place / _FLOWN}: cannot be read: remarks are missing")
+    return Replay(f"{WORST}/{key}/{REPLAY}" if (place / REPLAY).exists() else None, tuple(said))
 
 
 def _flown(repeat: Repeat, folder: Path) -> tuple[dict[str, Any] | None, str]:

@@ -8,13 +8,14 @@ from pathlib import Path
 from typing import Any
 
 from cosim.campaigns.design import Design
-from cosim.campaigns.folder import SUMMARY, write_text
+from cosim.campaigns.folder import SUMMARY
 from cosim.campaigns.results import Results
 from cosim.campaigns.runner import carry_out
 from cosim.campaigns.sweep_rows import SweepWork
 from cosim.campaigns.sweep_summary import summarise_sweep
 from cosim.plain_json import json_text
 from cosim.scenario import Scenario
+from cosim.whole_file import write_whole
 
 
 @dataclass(frozen=True)
@@ -79,7 +80,7 @@ def run_sweep(
 
     def conclude(results: Results) -> None:
         summary.update(summarise_sweep(work, results, out))
-        write_text(out / SUMMARY, json_text(summary))
+        write_whole(out / SUMMARY, json_text(summary))
 
     done = carry_out(work, out, workers, executor, progress, conclude)
     return Sweep(out, done.results, summary, done.flown)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cosim.campaigns.folder import PLAN, RESULTS, SUMMARY, held, read_json, write_text
+from cosim.campaigns.folder import PLAN, RESULTS, SUMMARY, held, read_json
 from cosim.campaigns.page import Html, Page, code, interval, number, write_figures
 from cosim.campaigns.plan import SWEEP
 from cosim.campaigns.repeat import complete_results
@@ -28,6 +28,7 @@ from cosim.campaigns.worst import LISTED, Worst, worst_rows
 from cosim.errors import RunError
 from cosim.flown_run import SCENARIO
 from cosim.flying.outcome import FIELDS
+from cosim.whole_file import write_whole
 
 if TYPE_CHECKING:
     from cosim.drawing import Drawing
@@ -66,7 +67,7 @@ def write_sweep_page(folder: Path, replays: int) -> Path:
         figures = write_figures(folder, _drawings(results, summary) if worst else [])
 
         def write(shown: Mapping[int, Replay]) -> None:
-            write_text(folder / PAGE, _page(folder, summary, worst, figures, shown).html())
+            write_whole(folder / PAGE, _page(folder, summary, worst, figures, shown).html())
 
         write({})
         of = f"of the sweep of {summary['name']}"

@@ -5,10 +5,9 @@ from __future__ import annotations
 import importlib
 import json
 import math
-import pickle
+import secrets
 from collections.abc import Mapping
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import dataclass, field
 from hashlib import sha256
 from typing import Any, NamedTuple
 
@@ -98,18 +97,9 @@ def table_of(keys: tuple[str, ...], batch: SweepBatch, flown: Flown) -> Any:
 class SweepTask:
     """What all rows of a sweep have in common."""
 
-    variation: bytes  # a pickled Variation: small and hashable, and unpacked once a process
+    variation: Variation = field(compare=False)
     engine: str  # module:class
-
-    @cached_property
-    def keys(self) -> tuple[str, ...]:
-        """What varies."""
-        return self.open().keys
-
-    def open(self) -> Variation:
-        """Return the variation."""
-        variation: Variation = pickle.loads(self.variation)
-        return variation
+    mark: str = field(default_factory=lambda: secrets.token_hex(16))  # by which processes know it again
 
     def flyer(self) -> SweepFlyer:
         """Return a flyer of its own."""
@@ -132,9 +122,8 @@ class SweepFlyer:
 
     def __init__(self, task: SweepTask) -> None:
         module, _, name = task.engine.partition(":")
-        variation = task.open()
-        self._keys = variation.keys
-        self._engine = getattr(importlib.import_module(module), name)(variation)
+        self._keys = task.variation.keys
+        self._engine = getattr(importlib.import_module(module), name)(task.variation)
 
     def fly(self, batch: SweepBatch) -> Any:
         """Return a table with a row for each of the batch."""
@@ -178,7 +167,7 @@ class SweepWork:
                     f"{vary.key} is a whole number, expected {vary.key}=A,B,C, or a grid that meets no others"
                 )
         self.name, self.design = scenario.name, design
-        self.task = SweepTask(pickle.dumps(self.variation), ENGINES[engine])
+        self.task = SweepTask(self.variation, ENGINES[engine])
         self.schema = schema_of(keys)
         self.files: Mapping[str, bytes] = _files(scenario)
         self.plan: Mapping[str, Any] = {
@@ -205,7 +194,7 @@ class SweepWork:
 
     def refused(self, row: int, reason: str) -> Any:
         """Return the table of one row that could not be flown."""
-        return table_of(self.task.keys, self.batch(np.array([row])), Flown(nothing(1), {0: reason}))
+        return table_of(self.variation.keys, self.batch(np.array([row])), Flown(nothing(1), {0: reason}))
 
 
 def _files(scenario: Scenario) -> dict[str, bytes]:

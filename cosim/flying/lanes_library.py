@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import ctypes
 import functools
 import hashlib
@@ -17,6 +16,7 @@ from pathlib import Path
 
 import platformdirs
 
+from cosim.whole_file import write_whole
 from fuzzy_arbiter import Arbiter
 from fuzzy_arbiter.export import to_c
 from plant_fmu.compiler import FLAGS, compile_library, find_compiler
@@ -28,7 +28,7 @@ from plant_fmu.vehicle import Vehicle
 
 log = logging.getLogger(__name__)
 
-_TOKEN = "lanes"  # there is no description that the library could go with
+_TOKEN = "lanes"  # noqa: S105 -- no secret: there is no description that the library could go with
 _NARROW = ("-Wno-psabi",)  # nothing but this library calls its functions with vectors
 _FMI = "fmi3.c"  # nor an importer
 
@@ -103,17 +103,13 @@ def _checksum(path: Path) -> Path:
 
 def _kept(built: Path, path: Path) -> Path:
     """Move a library to its place in the cache, whole or not at all; where there is no place, leave it where it is."""
-    beside = path.with_name(f"{path.name}.{os.getpid()}")
     library = built.read_bytes()
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         for place, data in ((path, library), (_checksum(path), hashlib.sha256(library).hexdigest().encode())):
-            beside.write_bytes(data)
-            beside.replace(place)
+            write_whole(place, data)
     except OSError as error:
         log.warning("cache %s: %s; built for this process alone", path.parent, error.strerror or error)
-        with contextlib.suppress(OSError):
-            beside.unlink()
         return built
     return path
 
@@ -151,7 +147,7 @@ def _tuned(compiler: Sequence[str]) -> tuple[str, ...]:
 def _machine(compiler: Sequence[str], flags: Sequence[str]) -> str:
     """Return what the compiler says of itself and of the processor: code for another one might not run here."""
     try:
-        said = subprocess.run(
+        said = subprocess.run(  # noqa: S603 -- the compiler that the user has, and flags of ours
             [*compiler, *flags, "-dM", "-E", "-x", "c", os.devnull], capture_output=True, text=True, check=True
         )
     except (OSError, subprocess.CalledProcessError) as error:

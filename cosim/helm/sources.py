@@ -12,6 +12,7 @@ import msgspec
 
 from cosim.errors import OrderError, RunError
 from cosim.helm.orders import Order, check_order
+from plant_fmu.tables import brief
 
 QUEUED = 256  # orders between two steps; further ones are refused
 
@@ -126,7 +127,7 @@ def read_log(file: Path) -> list[tuple[int, Order]]:
         except (msgspec.DecodeError, OrderError) as error:
             if type(error) is msgspec.DecodeError and number > whole:
                 break
-            raise RunError(f"{file}, line {number}: {error}") from error
+            raise RunError(f"{file}, line {number}: {brief(error)}") from error
         entries.append((entry.step, entry.order))
     return sorted(entries, key=lambda entry: entry[0])
 

@@ -11,6 +11,8 @@ from pathlib import Path
 from string import Template
 from typing import Any
 
+from cosim.whole_file import write_whole
+
 REPLAY = "replay.html"
 
 SCENE_SCRIPTS = (
@@ -80,12 +82,7 @@ def write_page(path: Path, runs: Sequence[dict[str, Any]], title: str) -> Path:
     Path
         The file.
     """
-    scratch = path.with_name(f".{path.name}")
-    try:
-        scratch.write_text(replay_page(runs, title), encoding="utf-8")
-        return scratch.replace(path)
-    finally:
-        scratch.unlink(missing_ok=True)
+    return write_whole(path, replay_page(runs, title))
 
 
 def is_page(path: Path) -> bool:

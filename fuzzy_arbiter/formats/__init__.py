@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Literal, get_args
 
-from fuzzy_arbiter.checks import shown
+from fuzzy_arbiter.checks import brief, shown
 from fuzzy_arbiter.definition import System
 from fuzzy_arbiter.errors import ArbiterError, FormatError, UnsupportedError
 from fuzzy_arbiter.files import write_whole
@@ -17,6 +17,7 @@ __all__ = ["FORMATS", "FormatName", "load", "natively", "reads", "save", "writes
 
 FormatName = Literal["json", "toml", "fcl", "fis", "fll"]
 FORMATS: tuple[str, ...] = get_args(FormatName)
+MAX_FILE = 4_000_000  # bytes
 
 _READ: dict[str, Callable[[str], System]] = {
     "json": json_toml.read_json,
@@ -112,7 +113,11 @@ def load(path: str | Path) -> System:
     """
     format = _format(path)
     try:
-        text = Path(path).read_bytes().decode("utf-8")
+        with Path(path).open("rb") as file:
+            data = file.read(MAX_FILE + 1)
+        if len(data) > MAX_FILE:
+            raise FormatError(f"{path}: has more than {MAX_FILE} bytes, expected a definition for people")
+        text = data.decode("utf-8")
     except UnicodeDecodeError as error:
         raise FormatError(f"{path}: byte {error.start} is no UTF-8, expected text in UTF-8") from None
     except (OSError, ValueError) as error:  # the latter for a name with a null in it
@@ -120,7 +125,7 @@ def load(path: str | Path) -> System:
     try:
         return reads(text, format)
     except ArbiterError as error:
-        raise type(error)(f"{path}: {error}") from None
+        raise type(error)(f"{path}: {brief(error)}") from None
 
 
 def save(system: System, path: str | Path) -> None:

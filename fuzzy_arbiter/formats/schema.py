@@ -114,7 +114,7 @@ def _table(data: object, where: str, known: tuple[str, ...] = ()) -> dict[str, A
         _refuse(where or "the file", data, "a table of keys and values")
     for key in data:
         if known and key not in known:
-            near = difflib.get_close_matches(key, known, 1)
+            near = difflib.get_close_matches(key[:100], known, 1)
             hint = f"; did you mean {near[0]!r}" if near else ""
             raise FormatError(f"{_path(where, key)}: unknown key, expected one of {', '.join(known)}{hint}")
     return data

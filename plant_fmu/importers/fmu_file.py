@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-import zipfile
-import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass
-from pathlib import Path, PurePosixPath
+from pathlib import Path
 from xml.etree import ElementTree as ET
 
 import fmpy
 
 from plant_fmu.errors import FmuFileError
 from plant_fmu.importers.task import Task
-
-MAX_SIZE = 2**30  # bytes of an FMU's files together, and
-MAX_FILES = 100_000  # their number, above which it is refused unread
+from plant_fmu.model_limits import require_sane
+from plant_fmu.unpacking import descriptions, opened
 
 _INTERFACES = {"CoSimulation": "CS", "ModelExchange": "ME"}
 
@@ -75,51 +72,27 @@ def read_fmu(path: Path) -> FmuFile:
     Raises
     ------
     FmuFileError
-        If there is no such file, it is no whole zip, would write outside its folder or become too large when
-        extracted, or has no model description of FMI 2.0 or 3.0.
+        If there is no such file, it is not safe to extract, or has no model description of FMI 2.0 or 3.0 that can be.
     """
+    path = Path(path)
+    with opened(path) as archive:
+        root = descriptions(path, archive)
+        version = root.get("fmiVersion", "")
+        if root.tag != "fmiModelDescription" or version.split(".")[0] not in ("2", "3"):
+            raise FmuFileError(f"{path}: is of FMI version {version!r}, expected 2.0 or 3.0")
+        require_sane(path, root)
+        damaged = archive.testzip()  # reads no more than the sizes it states, and so finds those that lie
+        if damaged is not None:
+            raise FmuFileError(f"{path}: is no FMU: {damaged!r} is damaged")
+        names = archive.namelist()
     try:
-        with zipfile.ZipFile(path) as archive:
-            _check_members(path, archive)
-            names = archive.namelist()
-            if "modelDescription.xml" not in names:
-                raise FmuFileError(f"{path}: is no FMU: there is no modelDescription.xml in it")
-            root = ET.fromstring(archive.read("modelDescription.xml"))
-    except OSError as error:
-        raise FmuFileError(f"{path}: {error.strerror or error}") from error
-    except (zipfile.BadZipFile, zlib.error, NotImplementedError, RuntimeError, EOFError) as error:
-        raise FmuFileError(f"{path}: is no FMU: {error}; expected a whole zip file") from error
-    except ET.ParseError as error:
-        raise FmuFileError(f"{path}: modelDescription.xml is no XML: {error}") from error
-    try:
-        return _describe(Path(path), root, names)
+        return _describe(path, root, names)
     except (KeyError, ValueError) as error:
         raise FmuFileError(f"{path}: modelDescription.xml cannot be understood: {error!r}") from error
 
 
-def _check_members(path: Path, archive: zipfile.ZipFile) -> None:
-    """Refuse what no importer should extract: not all of them look where they write."""
-    members = archive.infolist()
-    if len(members) > MAX_FILES:
-        raise FmuFileError(f"{path}: refused: holds {len(members)} files, expected at most {MAX_FILES}")
-    size = sum(member.file_size for member in members)
-    if size > MAX_SIZE:
-        raise FmuFileError(f"{path}: refused: {size} bytes when extracted, expected at most {MAX_SIZE}")
-    for member in members:
-        name = member.orig_filename
-        is_link = member.external_attr >> 16 & 0o170000 == 0o120000
-        if is_link or "\\" in name or ":" in name or name.startswith("/") or ".." in PurePosixPath(name).parts:
-            raise FmuFileError(f"{path}: refused: {name!r} leads out of the folder it is extracted to")
-    damaged = archive.testzip()  # reads no more than the sizes above, and so finds those that lie
-    if damaged is not None:
-        raise FmuFileError(f"{path}: is no FMU: {damaged!r} is damaged")
-
-
 def _describe(path: Path, root: ET.Element, names: list[str]) -> FmuFile:
-    version = root.get("fmiVersion", "")
-    if root.tag != "fmiModelDescription" or version.split(".")[0] not in ("2", "3"):
-        raise FmuFileError(f"{path}: is of FMI version {version!r}, expected 2.0 or 3.0")
-    fmi = int(version.split(".")[0])
+    fmi = int(root.get("fmiVersion", "").split(".")[0])
     experiment = root.find("DefaultExperiment")
     times = {} if experiment is None else experiment.attrib
     default = Task()

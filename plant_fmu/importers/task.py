@@ -12,6 +12,8 @@ from plant_fmu.errors import TaskError
 Status = Literal["ok", "failed", "not installed", "does not apply"]
 Jacobian = dict[str, dict[str, float]]  # by name: [state whose derivative is taken][state or input]
 
+MAX_STEPS = 100_000_000
+
 _ROUNDING = 1e-9  # relative, of a stop time against a whole number of steps
 
 
@@ -41,8 +43,8 @@ class Task:
             if not (math.isfinite(value) and value > 0.0):
                 raise TaskError(f"{name} is {value:g} s, expected a positive number")
         steps = self.stop_time / self.step
-        if not math.isfinite(steps):
-            raise TaskError(f"stop time {self.stop_time:g} s has too many steps of {self.step:g} s")
+        if not steps <= MAX_STEPS:
+            raise TaskError(f"stop time {self.stop_time:g} s has more than {MAX_STEPS} steps of {self.step:g} s")
         if self.steps < 1 or abs(steps - self.steps) > _ROUNDING * steps:
             raise TaskError(f"stop time {self.stop_time:g} s is no whole number of steps of {self.step:g} s")
 

@@ -8,19 +8,19 @@ import shutil
 import tempfile
 import threading
 import weakref
-import zipfile
 from collections import deque
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
-from xml.etree import ElementTree as ET
 
 import fmpy
 from fmpy.fmi2 import FMU2Slave, fmi2CallbackFunctions, fmi2CallbackLoggerTYPE
 from fmpy.fmi2 import defaultCallbacks as default_callbacks
 from fmpy.fmi3 import FMU3Slave
 
-from plant_fmu.errors import PlantError
+from plant_fmu.errors import FmuFileError, PlantError
+from plant_fmu.model_limits import require_sane
+from plant_fmu.unpacking import unpack
 
 log = logging.getLogger(__name__)
 
@@ -101,15 +101,12 @@ class Instance:
 
     def _load(self, path: Path, folder: str, loaded: list[Any]) -> None:
         try:
-            fmpy.extract(str(path), folder)
-            described = Path(folder, "modelDescription.xml")
-            if not described.is_file():
-                raise PlantError(f"{path}: no FMU: holds no modelDescription.xml")
-            root = ET.parse(described).getroot()
-        except (OSError, zipfile.BadZipFile, ET.ParseError) as error:
-            raise PlantError(f"{path}: no FMU: {getattr(error, 'strerror', None) or _one_line(error)}") from error
+            root = unpack(path, Path(folder))
+            require_sane(path, root)
+        except FmuFileError as error:
+            raise PlantError(str(error)) from error
         version = root.get("fmiVersion", "")
-        if version[:2] not in ("2.", "3."):
+        if root.tag != "fmiModelDescription" or version[:2] not in ("2.", "3."):
             raise PlantError(f"{path}: FMI version is {version!r}, expected 2.0 or 3.0")
         self.fmi = int(version[0])
         interface = root.find("CoSimulation")

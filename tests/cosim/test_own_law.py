@@ -11,10 +11,10 @@ from cosim.campaigns.design import Design, vary_from
 from cosim.campaigns.sweep import run_sweep
 from cosim.check import check
 from cosim.errors import RunError, ScenarioError
+from cosim.flown_run import load_run
 from cosim.law import flown_by, law_of
 from cosim.master import Master
 from cosim.record import load_record
-from cosim.replay.folder import load_run
 from cosim.run import run_scenario
 from cosim.scenario import load_scenario
 

@@ -4,15 +4,16 @@ import dataclasses
 import shutil
 import stat
 import zipfile
+from pathlib import Path
 
 import pytest
 
-from plant_fmu import FmuFileError, cached_fmu, load_vehicle
+from plant_fmu import FmuFileError, cached_fmu, load_vehicle, unpacking
 from plant_fmu.__main__ import main
 from plant_fmu.check import check_fmu
 from plant_fmu.compiler import compile_library, find_compiler
 from plant_fmu.errors import TaskError
-from plant_fmu.importers import IMPORTERS, Task, fmu_file, read_fmu, run_importer
+from plant_fmu.importers import IMPORTERS, Task, read_fmu, run_importer
 from plant_fmu.platforms import native_platform
 
 FMPY = next(importer for importer in IMPORTERS if importer.name == "FMPy")
@@ -178,9 +179,9 @@ def test_links_are_refused(tmp_path, capsys):
 
 def test_absurd_sizes_are_refused(tmp_path, capsys, monkeypatch):
     path = write(tmp_path / "large.fmu", **{"modelDescription.xml": DESCRIPTION, "resources/zeros": "0" * 10_000})
-    monkeypatch.setattr(fmu_file, "MAX_SIZE", 9_999)
+    monkeypatch.setattr(unpacking, "MAX_SIZE", 9_999)
     refused(path, capsys, "refused", "expected at most 9999")
-    monkeypatch.setattr(fmu_file, "MAX_FILES", 1)
+    monkeypatch.setattr(unpacking, "MAX_FILES", 1)
     refused(path, capsys, "holds 2 files")
 
 
@@ -204,4 +205,4 @@ def test_impossible_tasks_are_refused(odin):
 
 def test_errors_are_of_the_package():
     with pytest.raises(FmuFileError):
-        read_fmu(fmu_file.Path("none.fmu"))
+        read_fmu(Path("none.fmu"))

@@ -65,7 +65,7 @@ def test_a_plant_is_made_of_a_name_a_file_a_vehicle_or_an_fmu(make_plant, tmp_pa
     ("source", "fmi", "kind", "words"),
     [
         ("odinn", 3, VehicleError, "'odinn' is unknown"),
-        ("missing.fmu", 3, PlantError, r"missing.fmu: no FMU: No such file"),
+        ("missing.fmu", 3, PlantError, r"missing.fmu: No such file"),
         ("odin", 1, PlantError, "FMI version is 1, expected 2 or 3"),
         (7, 3, PlantError, "plant is 7, expected a vehicle"),
     ],

@@ -130,11 +130,11 @@ def test_failing_construction_leaves_nothing(tmp_path, scratch, monkeypatch):
         assert str(caught.value).startswith(str(tmp_path / "edited.fmu: ")) and "\n" not in str(caught.value)
     for content in (b"", b"no zip"):
         (tmp_path / "text.fmu").write_bytes(content)
-        with pytest.raises(PlantError, match="no FMU: File is not a zip file"):
+        with pytest.raises(PlantError, match="is no FMU: File is not a zip file"):
             Plant(tmp_path / "text.fmu")
     with zipfile.ZipFile(tmp_path / "empty.fmu", "w"):
         pass
-    with pytest.raises(PlantError, match=r"holds no modelDescription.xml"):
+    with pytest.raises(PlantError, match=r"there is no modelDescription.xml"):
         Plant(tmp_path / "empty.fmu")
 
     def interrupted(instance, brief):

@@ -202,7 +202,7 @@ def _live(endpoint: tuple[str, int]) -> Iterator[Look]:
                     yield Look(header, row, f"live at {url}")
     except (OSError, WebSocketException) as error:
         raise TelemetryError(f"{url}: {_reason(error)}") from error
-    except (ValueError, KeyError, TypeError) as error:
+    except (ValueError, LookupError, TypeError, RecursionError) as error:
         raise TelemetryError(f"{url}: is no live view of a run ({error})") from error
     raise TelemetryError(f"{url}: the connection has ended before the run")
 

@@ -96,11 +96,10 @@ def test_a_page_appears_whole_or_not_at_all(docking, tmp_path, monkeypatch):
     assert is_page(file) and [p.name for p in tmp_path.iterdir()] == ["replay.html"]
     before = file.read_bytes()
 
-    def full(self, *_, **__):
-        self.write_bytes(b"half")
+    def full(*_):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("pathlib.Path.write_text", full)
+    monkeypatch.setattr("pathlib.Path.replace", full)
     with pytest.raises(OSError, match="No space"):
         write_page(file, [], "live")
     assert file.read_bytes() == before and [p.name for p in tmp_path.iterdir()] == ["replay.html"]

@@ -1,0 +1,99 @@
+"""What a model description may say before an importer takes it at its word."""
+
+from __future__ import annotations
+
+import math
+import re
+from pathlib import Path
+from xml.etree import ElementTree as ET
+
+from plant_fmu.errors import FmuFileError
+
+MAX_REFERENCE = 2**32 - 1  # of a variable: 32 bits in FMI 2.0 and 3.0
+MAX_NAME = 10_000  # characters of a variable's name
+MAX_INDICATORS = 1_000_000  # of events, for which an importer makes room
+MAX_ENTRIES = 100_000_000  # of an array, likewise
+
+# part of the path of the library that is loaded
+_IDENTIFIER = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.+ -]{0,199}")
+_INTERFACES = ("CoSimulation", "ModelExchange", "ScheduledExecution")
+
+
+def require_sane(path: Path, root: ET.Element) -> None:
+    """Refuse a model description that would lead an importer astray.
+
+    Parameters
+    ----------
+    path : Path
+        The FMU, for messages.
+    root : Element
+        Of ``modelDescription.xml``.
+
+    Raises
+    ------
+    FmuFileError
+        At the first number or name that cannot be.
+    """
+    for interface in _INTERFACES:
+        for element in root.findall(interface):
+            identifier = element.get("modelIdentifier", "")
+            if not _IDENTIFIER.fullmatch(identifier):
+                raise FmuFileError(
+                    f"{path}: modelIdentifier of {interface} is {_short(identifier)}, expected a name of letters, "
+                    "digits and _"
+                )
+    indicators = root.get("numberOfEventIndicators")
+    if indicators is not None:
+        _whole(f"{path}: numberOfEventIndicators", indicators, MAX_INDICATORS)
+    for times in root.findall("DefaultExperiment"):
+        for key in ("startTime", "stopTime", "stepSize", "tolerance"):
+            _finite(f"{path}: DefaultExperiment.{key}", times.get(key), above_zero=key in ("stepSize", "tolerance"))
+    _check_variables(path, root)
+
+
+def _check_variables(path: Path, root: ET.Element) -> None:
+    starts: dict[str, str] = {}
+    arrays: list[tuple[str, list[ET.Element]]] = []
+    for element in root.iterfind("ModelVariables/*"):
+        name, reference = element.get("name"), element.get("valueReference")
+        if name is None or reference is None:
+            missing = "name" if name is None else "valueReference"
+            raise FmuFileError(f"{path}: a variable of modelDescription.xml has no {missing}, expected one")
+        if not 0 < len(name) <= MAX_NAME:
+            raise FmuFileError(
+                f"{path}: a variable's name has {len(name)} characters ({_short(name)}), expected 1 to {MAX_NAME}"
+            )
+        _whole(f"{path}: valueReference of {_short(name)}", reference, MAX_REFERENCE)
+        if dimensions := element.findall("Dimension"):
+            arrays.append((name, dimensions))
+        elif (start := element.get("start")) is not None:
+            starts[reference] = start
+    for name, dimensions in arrays:
+        entries = 1
+        for dimension in dimensions:
+            length = dimension.get("start") or starts.get(dimension.get("valueReference", ""), "1")
+            entries *= _whole(f"{path}: a dimension of {_short(name)}", length, MAX_ENTRIES)
+            if entries > MAX_ENTRIES:
+                raise FmuFileError(f"{path}: {_short(name)} has {entries} entries, expected at most {MAX_ENTRIES}")
+
+
+def _whole(what: str, text: str, most: int) -> int:
+    number = int(text) if len(text) <= 20 and re.fullmatch(r"\s*\+?[0-9]+\s*", text, re.ASCII) else most + 1
+    if number > most:
+        raise FmuFileError(f"{what} is {_short(text)}, expected a whole number of at most {most}")
+    return number
+
+
+def _finite(what: str, text: str | None, *, above_zero: bool) -> None:
+    try:
+        number = 1.0 if text is None else float(text)
+    except ValueError:
+        number = math.nan
+    if not (math.isfinite(number) and (number > 0.0 or not above_zero)):
+        raise FmuFileError(
+            f"{what} is {_short(text or '')}, expected a finite number{' above 0' if above_zero else ''}"
+        )
+
+
+def _short(text: str) -> str:
+    return repr(text if len(text) <= 60 else f"{text[:60]}...")

@@ -1,0 +1,197 @@
+"""An FMU's zip file, looked through before anything of it is parsed, extracted or run."""
+
+from __future__ import annotations
+
+import io
+import unicodedata
+import zipfile
+import zlib
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path, PurePosixPath
+from xml.etree import ElementTree as ET
+
+from plant_fmu.errors import FmuFileError
+
+DESCRIPTION = "modelDescription.xml"
+
+MAX_SIZE = 2**30  # bytes of an FMU's files together, and
+MAX_FILES = 100_000  # their number, above which it is refused unread
+MAX_RATIO = 200  # of those bytes to the FMU's own: libraries and descriptions compress to a tenth or so,
+FREE_SIZE = 2**26  # bytes, below which the ratio does not matter
+MAX_READ = 2**24  # bytes that are read at once: the list of the files is, before anything is known of them
+MAX_NAME = 1000  # characters of a file's name
+MAX_XML = 2**26  # bytes of a description,
+MAX_ELEMENTS = 2_000_000  # and of what is in it,
+MAX_DEPTH = 100  # one within the other
+
+_METHODS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)  # those of FMI; the others unpack without measure
+_DESCRIPTIONS = (DESCRIPTION, "sources/buildDescription.xml")  # that FMPy parses
+_PIECE = 2**20  # bytes
+
+
+class _Source(io.BufferedReader):
+    """A file of which never more than `MAX_READ` bytes are taken at once, whatever a zip file says of itself."""
+
+    def read(self, size: int | None = -1, /) -> bytes:
+        if size is None or size < 0:
+            size = MAX_READ + 1
+        data = super().read(min(size, MAX_READ + 1))
+        if len(data) > MAX_READ:
+            raise zipfile.BadZipFile(f"its list of files is larger than {MAX_READ} bytes")
+        return data
+
+
+@contextmanager
+def opened(path: Path) -> Iterator[zipfile.ZipFile]:
+    """Open an FMU whose files are safe to extract.
+
+    Parameters
+    ----------
+    path : Path
+        The FMU.
+
+    Yields
+    ------
+    ZipFile
+        To be read here and now: what is read is what was looked through.
+
+    Raises
+    ------
+    FmuFileError
+        If there is no such file, it is no whole zip, lacks a model description, would write outside its folder or one
+        file over another, or becomes too large when extracted. Errors of reading within the block become one too.
+    """
+    try:
+        if path.exists() and not path.is_file() and not path.is_dir():  # to open a pipe would wait for its other end
+            raise FmuFileError(f"{path}: is no FMU: expected a file")
+        with _Source(io.FileIO(path)) as source, zipfile.ZipFile(source) as archive:
+            _check_members(path, archive)
+            if DESCRIPTION not in archive.namelist():
+                raise FmuFileError(f"{path}: is no FMU: there is no {DESCRIPTION} in it")
+            yield archive
+    except OSError as error:
+        raise FmuFileError(f"{path}: {error.strerror or error}") from error
+    except (zipfile.BadZipFile, zlib.error, NotImplementedError, RuntimeError, EOFError, ValueError) as error:
+        raise FmuFileError(f"{path}: is no FMU: {error}; expected a whole zip file") from error
+
+
+def unpack(path: Path, folder: Path) -> ET.Element:
+    """Extract an FMU, none of whose files leaves the folder, and return its model description.
+
+    Parameters
+    ----------
+    path : Path
+        The FMU.
+    folder : Path
+        Empty, and of this user alone.
+
+    Returns
+    -------
+    Element
+        Of ``modelDescription.xml``.
+
+    Raises
+    ------
+    FmuFileError
+        As `opened` and `descriptions`.
+    """
+    with opened(path) as archive:
+        root = descriptions(path, archive)
+        archive.extractall(folder)
+    return root
+
+
+def descriptions(path: Path, archive: zipfile.ZipFile) -> ET.Element:
+    """Return the model description, after a look at all descriptions that an importer parses.
+
+    Raises
+    ------
+    FmuFileError
+        If one is no XML, declares a document type, or is absurdly large or deep.
+    """
+    names = set(archive.namelist())
+    roots = [_parsed(f"{path}: {name}", archive, name) for name in _DESCRIPTIONS if name in names]
+    return roots[0]
+
+
+# ---- the zip file --------------------------------------------------------------------------------------------------
+
+
+def _check_members(path: Path, archive: zipfile.ZipFile) -> None:
+    """Refuse what no importer should extract: not all of them look where they write."""
+    members = archive.infolist()
+    if len(members) > MAX_FILES:
+        raise FmuFileError(f"{path}: refused: holds {len(members)} files, expected at most {MAX_FILES}")
+    size, packed = sum(member.file_size for member in members), path.stat().st_size
+    if size > MAX_SIZE:
+        raise FmuFileError(f"{path}: refused: {size} bytes when extracted, expected at most {MAX_SIZE}")
+    if size > max(FREE_SIZE, MAX_RATIO * packed):
+        raise FmuFileError(
+            f"{path}: refused: {packed} bytes become {size} when extracted, expected at most {MAX_RATIO} times as many"
+        )
+    seen: dict[str, str] = {}
+    for member in members:
+        name = member.orig_filename
+        if len(name) > MAX_NAME:
+            raise FmuFileError(f"{path}: refused: a file's name has {len(name)} characters, expected {MAX_NAME}")
+        is_link = member.external_attr >> 16 & 0o170000 == 0o120000
+        if is_link or "\\" in name or ":" in name or name.startswith("/") or ".." in PurePosixPath(name).parts:
+            raise FmuFileError(f"{path}: refused: {name!r} leads out of the folder it is extracted to")
+        if not name.isprintable():
+            raise FmuFileError(f"{path}: refused: {name!r} is no name of a file")
+        # one file on systems that take no account of case, or of how an accent is written
+        folded = _folded(name)
+        if folded in seen:
+            raise FmuFileError(f"{path}: refused: {name!r} would be written over {seen[folded]!r}")
+        seen[folded] = name
+        if member.compress_type not in _METHODS:
+            raise FmuFileError(f"{path}: refused: {name!r} is neither stored nor deflated")
+
+
+def _folded(name: str) -> str:
+    return unicodedata.normalize("NFC", str(PurePosixPath(name))).casefold()
+
+
+# ---- its descriptions ----------------------------------------------------------------------------------------------
+
+
+class _Bounded(ET.TreeBuilder):
+    """Builds a tree that is neither too large nor too deep, of a document that declares no type: so has no entities."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._depth = self._count = 0
+
+    def doctype(self, name: str, public: str | None, system: str | None) -> None:
+        raise ET.ParseError("a document type is declared, expected none")
+
+    def start(self, tag: str, attributes: dict[str, str], /) -> ET.Element:
+        self._depth, self._count = self._depth + 1, self._count + 1
+        if self._depth > MAX_DEPTH:
+            raise ET.ParseError(f"elements are nested deeper than {MAX_DEPTH}")
+        if self._count > MAX_ELEMENTS:
+            raise ET.ParseError(f"there are more than {MAX_ELEMENTS} elements")
+        return super().start(tag, attributes)
+
+    def end(self, tag: str, /) -> ET.Element:
+        self._depth -= 1
+        return super().end(tag)
+
+
+def _parsed(where: str, archive: zipfile.ZipFile, name: str) -> ET.Element:
+    size = archive.getinfo(name).file_size
+    if size > MAX_XML:
+        raise FmuFileError(f"{where} has {size} bytes, expected at most {MAX_XML}")
+    # expat guards its own expansions, and here no document type is let through that could have any
+    parser = ET.XMLParser(target=_Bounded())  # noqa: S314
+    try:
+        with archive.open(name) as source:
+            while piece := source.read(_PIECE):
+                parser.feed(piece)
+        root: ET.Element = parser.close()
+    except ET.ParseError as error:
+        raise FmuFileError(f"{where} is no XML that can be read: {error}") from error
+    except (LookupError, ValueError) as error:  # an encoding that is not known, or not as it says
+        raise FmuFileError(f"{where} is no XML that can be read: {' '.join(str(error).split())}") from error
+    return root

@@ -1,0 +1,157 @@
+"""Records that are none, folders with traps in them, and files that are written whole or not at all."""
+
+import os
+import shutil
+import stat
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import controller.compiled
+from cosim.campaigns.folder import PLAN, read_json, read_plan
+from cosim.errors import RunError
+from cosim.flown_run import SUMMARY, load_run
+from cosim.record import RECORD, Record, load_record
+from cosim.replay.page import write_page
+from cosim.run_folder import claim
+from cosim.scenario import load_scenario
+from cosim.whole_file import whole_file, write_whole
+
+ROWS = {"time": [0.0, 1.0], "position.x": [1.0, 2.0]}
+
+
+def written(folder, table):
+    pq.write_table(table, folder / RECORD)
+    return folder
+
+
+def read_all(folder):
+    record = load_record(folder)
+    for name in record.units:
+        record[name]
+    list(record.blocks())
+    return record
+
+
+@pytest.mark.parametrize(
+    "table",
+    [
+        pa.table({"time": ["a", "b"]}),
+        pa.table({"time": pa.array([None, None], pa.float64())}),
+        pa.table({"time": [1, 2]}),
+        pa.table({"time": [[1.0], [2.0]]}),
+        pa.table({}),
+        pa.table([pa.array([1.0]), pa.array([2.0])], names=["time", "time"]),
+        pa.table([pa.array([1.0])], schema=pa.schema([pa.field("time", pa.float64(), metadata={b"unit": b"\xff"})])),
+    ],
+)
+def test_tables_that_are_no_record(tmp_path, table):
+    with pytest.raises(RunError, match="record"):
+        read_all(written(tmp_path, table))
+
+
+def test_a_few_bytes_that_say_a_thousand_million_rows_are_not_believed(tmp_path, monkeypatch):
+    monkeypatch.setattr("cosim.record.MAX_ROWS", 1)
+    with pytest.raises(RunError, match="has 2 rows"):
+        load_record(written(tmp_path, pa.table(ROWS)))
+
+
+@given(st.data())
+def test_any_change_of_a_record_is_read_or_refused(tmp_path_factory, data):
+    folder = tmp_path_factory.mktemp("record")
+    content = bytearray((written(folder, pa.table(ROWS)) / RECORD).read_bytes())
+    for _ in range(data.draw(st.integers(1, 4))):
+        content[data.draw(st.integers(0, len(content) - 1))] = data.draw(st.integers(0, 255))
+    (folder / RECORD).write_bytes(content)
+    said = ""
+    try:
+        read_all(folder)
+    except RunError as error:
+        said = str(error)
+    assert "\n" not in said and len(said) < 1500 + len(str(folder))
+    shutil.rmtree(folder)
+
+
+@pytest.mark.skipif(os.name != "posix", reason="names of files are no bytes here")
+def test_a_folder_whose_name_is_no_utf_8(tmp_path):
+    folder = tmp_path / os.fsdecode(b"run\xff")
+    try:
+        folder.mkdir()
+    except OSError:
+        pytest.skip("such names cannot be here")
+    shutil.copy(written(tmp_path, pa.table(ROWS)) / RECORD, folder / RECORD)
+    for act in (lambda: load_record(folder), lambda: claim(folder / "new", load_scenario("paper"))):
+        with pytest.raises(RunError, match="no UTF-8") as caught:
+            act()
+        str(caught.value).encode()
+    with pytest.raises(RunError, match="no UTF-8"):
+        Record([folder / RECORD])
+
+
+def test_texts_of_a_folder_that_are_no_json_or_endlessly_deep(tmp_path, shipped_run):
+    folder = tmp_path / "run"
+    shutil.copytree(shipped_run("paper", "time.duration=0.1").folder, folder)
+    ended = '{"status": "a", "law": "b", "scenario": "c", "wall_time": []}'
+    for text in ("[" * 100_000, "{", "[]", "1", '{"status": 1}', ended):
+        (folder / SUMMARY).write_text(text)
+        with pytest.raises(RunError, match="cannot be read"):
+            load_run(folder)
+    for text in ("[" * 100_000, "{", "[]"):
+        for name, read in ((PLAN, lambda file: read_plan(file.parent)), ("it.json", read_json)):
+            (folder / name).write_text(text)
+            with pytest.raises(RunError, match=r"cannot be read|holds no campaign"):
+                read(folder / name)
+
+
+# ---- what is written ----
+
+
+@pytest.mark.skipif(os.name != "posix", reason="links need rights here")
+def test_links_that_somebody_left_are_not_followed(tmp_path):
+    mine, folder = tmp_path / "mine.txt", tmp_path / "run"
+    mine.write_text("precious")
+    folder.mkdir()
+    for name in ("replay.html", ".replay.html", f".summary.json-{os.getpid()}"):
+        (folder / name).symlink_to(mine)
+    write_page(folder / "replay.html", [], "live")
+    assert mine.read_text() == "precious"
+    assert not (folder / "replay.html").is_symlink() and (folder / "replay.html").stat().st_size > 1000
+
+
+def test_two_that_write_one_file_do_not_meet(tmp_path):
+    place = tmp_path / "it"
+    with whole_file(place) as one:
+        with whole_file(place) as other:
+            other.write(b"other")
+        assert place.read_bytes() == b"other"
+        one.write(b"one")
+    assert place.read_bytes() == b"one" and list(tmp_path.iterdir()) == [place]
+
+
+def test_what_fails_leaves_what_was(tmp_path):
+    write_whole(tmp_path / "it", "before")
+    with pytest.raises(TypeError), whole_file(tmp_path / "it") as file:
+        file.write("text where bytes are expected")
+    assert (tmp_path / "it").read_text() == "before" and len(list(tmp_path.iterdir())) == 1
+
+
+# ---- what is loaded ----
+
+
+@pytest.mark.skipif(os.name != "posix", reason="of POSIX")
+def test_code_kept_where_others_write_is_not_loaded(tmp_path, monkeypatch):
+    source = tmp_path / "it.py"
+    source.write_text("")
+    folder = tmp_path / "kept"
+    folder.mkdir(mode=0o755)
+    assert controller.compiled._is_ours(folder, source)
+    folder.chmod(0o777)
+    assert stat.S_IMODE(folder.stat().st_mode) == 0o777
+    assert not controller.compiled._is_ours(folder, source)
+    folder.chmod(0o755)
+    monkeypatch.setattr(os, "geteuid", lambda: source.stat().st_uid + 1)
+    assert controller.compiled._is_ours(folder, source)  # who owns the code owns what is kept of it
+    assert controller.compiled._is_ours(tmp_path / "none yet", source)

@@ -1,0 +1,323 @@
+"""FMUs made to do harm: each is refused by both readers, with one line, and nothing of it is written or run."""
+
+import io
+import os
+import platform
+import stat
+import struct
+import subprocess
+import sys
+import zipfile
+
+import fmpy
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from plant_fmu import FmuFileError, Plant, PlantError, cached_fmu, load_vehicle, unpacking
+from plant_fmu.importers import read_fmu
+from plant_fmu.running import instance
+
+SOUND = (
+    '<fmiModelDescription fmiVersion="3.0" modelName="m" instantiationToken="t">'
+    '<CoSimulation modelIdentifier="m"/><ModelVariables>'
+    '<Float64 name="time" valueReference="0" causality="independent"/>'
+    "</ModelVariables><ModelStructure/></fmiModelDescription>"
+)
+
+
+@pytest.fixture(params=["check", "run"])
+def read(request, tmp_path, monkeypatch):
+    """Return a function that opens an FMU that must be refused, and returns what is said."""
+    scratch = tmp_path / "scratch"
+    scratch.mkdir()
+    monkeypatch.setattr("tempfile.tempdir", str(scratch))
+
+    def refused(path):
+        before = set(tmp_path.rglob("*"))
+        with pytest.raises((FmuFileError, PlantError)) as caught:
+            read_fmu(path) if request.param == "check" else Plant(path)
+        said = str(caught.value)
+        assert said.startswith(f"{path}: ") and "\n" not in said and len(said) < 2000 + len(str(path))
+        assert set(tmp_path.rglob("*")) == before
+        return said
+
+    return refused
+
+
+def archive(path, members, description=SOUND, **writing):
+    with zipfile.ZipFile(path, "w", **writing) as made:
+        made.writestr("modelDescription.xml", description)
+        for member, data in members:
+            made.writestr(member, data)
+    return path
+
+
+def described(tmp_path, old, new):
+    assert old in SOUND
+    return archive(tmp_path / "it.fmu", [], SOUND.replace(old, new))
+
+
+# ---- the zip file ----
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["../out", "a/../../out", "/out", "C:/out", "C:out", "a\\..\\..\\out", "\\\\host\\out", "..", "a\nb", "a\x1bb"],
+)
+def test_no_member_is_written_elsewhere(tmp_path, read, name):
+    said = read(archive(tmp_path / "it.fmu", [(name, "x")]))
+    assert "leads out" in said or "no name of a file" in said
+    assert not (tmp_path.parent / "out").exists()
+
+
+def test_a_name_that_hides_its_end_is_refused(tmp_path, read):
+    path = archive(tmp_path / "it.fmu", [("resources/aXb", "x")])
+    path.write_bytes(path.read_bytes().replace(b"resources/aXb", b"resources/a\0b"))
+    assert "no name of a file" in read(path)
+
+
+@pytest.mark.parametrize("kind", [stat.S_IFLNK])
+def test_links_are_refused(tmp_path, read, kind):
+    link = zipfile.ZipInfo("binaries")
+    link.external_attr = (kind | 0o777) << 16
+    assert "leads out" in read(archive(tmp_path / "it.fmu", [(link, "/tmp")]))
+
+
+@pytest.mark.filterwarnings("ignore:Duplicate name")
+@pytest.mark.parametrize(
+    "pair", [("a", "a"), ("a", "A"), ("x/ß", "x/SS"), ("é", "e\u0301"), ("d/a", "d//a"), ("a", "./a")]
+)
+def test_no_member_is_written_over_another(tmp_path, read, pair):
+    assert "would be written over" in read(archive(tmp_path / "it.fmu", [(name, "x") for name in pair]))
+
+
+@pytest.mark.filterwarnings("ignore:Duplicate name")
+def test_there_is_one_model_description(tmp_path, read):
+    assert "would be written over" in read(archive(tmp_path / "it.fmu", [("modelDescription.xml", "<other/>")]))
+
+
+def test_bombs_are_refused_unread(tmp_path, read):
+    path = tmp_path / "it.fmu"
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as made:
+        made.writestr("modelDescription.xml", SOUND)
+        with made.open("resources/zeros", "w") as member:
+            for _ in range(unpacking.FREE_SIZE // 2**20 + 1):
+                member.write(bytes(2**20))
+    assert path.stat().st_size < 200_000
+    assert "expected at most 200 times as many" in read(path)
+
+
+@pytest.mark.parametrize("method", [zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA])
+def test_methods_that_unpack_without_measure_are_refused(tmp_path, read, method):
+    assert "neither stored nor deflated" in read(archive(tmp_path / "it.fmu", [], compression=method))
+
+
+def test_a_size_that_lies_is_found_and_no_more_is_written(tmp_path, read):
+    """The list says ten bytes, the member unpacks to ten million."""
+    zeros = bytes(10_000_000)
+    path = archive(tmp_path / "it.fmu", [("resources/zeros", zeros)], compression=zipfile.ZIP_DEFLATED)
+    path.write_bytes(path.read_bytes().replace(struct.pack("<I", len(zeros)), struct.pack("<I", 10)))
+    with zipfile.ZipFile(path) as lying:
+        assert lying.getinfo("resources/zeros").file_size == 10
+    assert "is no FMU" in read(path)
+
+
+def test_a_list_of_files_without_end_is_not_read(tmp_path, read):
+    path = tmp_path / "it.fmu"
+    entry = struct.pack("<4s4B4HL2L5H2L", b"PK\1\2", 20, 3, 20, 0, *[0] * 14) + b"a"
+    entry = entry[:28] + struct.pack("<H", 1) + entry[30:]
+    count = unpacking.MAX_READ // len(entry) + 2
+    end = struct.pack("<4s4H2LH", b"PK\5\6", 0, 0, 65535, 65535, count * len(entry), 0, 0)
+    path.write_bytes(entry * count + end)
+    assert f"larger than {unpacking.MAX_READ} bytes" in read(path)
+
+
+def test_too_many_files(tmp_path, read, monkeypatch):
+    monkeypatch.setattr(unpacking, "MAX_FILES", 5)
+    assert "holds 7 files" in read(archive(tmp_path / "it.fmu", [(f"resources/{i}", "") for i in range(6)]))
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="there are no pipes by name")
+def test_a_pipe_is_not_waited_for(tmp_path, read):
+    os.mkfifo(tmp_path / "it.fmu")
+    assert "expected a file" in read(tmp_path / "it.fmu")
+
+
+# ---- its model description ----
+
+LAUGHS = "".join(f'<!ENTITY e{i} "{f"&e{i - 1};" * 10}">' for i in range(1, 12))
+
+
+@pytest.mark.parametrize(
+    "document",
+    [
+        f'<!DOCTYPE x [<!ENTITY e0 "ha">{LAUGHS}]>' + SOUND.replace('modelName="m"', 'modelName="&e11;"'),
+        '<!DOCTYPE x [<!ENTITY e SYSTEM "file:///etc/passwd">]>' + SOUND.replace("<ModelStructure/>", "&e;"),
+        '<!DOCTYPE x SYSTEM "http://127.0.0.1:9/x.dtd">' + SOUND,
+        ('<?xml version="1.0" encoding="UTF-16"?><!DOCTYPE x [<!ENTITY e "ha">]>' + SOUND).encode("utf-16"),
+    ],
+)
+def test_no_document_type_so_no_entities(tmp_path, read, document):
+    assert "document type" in read(archive(tmp_path / "it.fmu", [], document))
+
+
+def test_the_same_holds_of_the_build_description(tmp_path, read):
+    member = ("sources/buildDescription.xml", '<!DOCTYPE x SYSTEM "file:///etc/passwd"><x/>')
+    assert "buildDescription.xml is no XML that can be read" in read(archive(tmp_path / "it.fmu", [member]))
+
+
+@pytest.mark.parametrize(
+    "document",
+    [
+        "<a>" * 100_000,
+        '<?xml version="1.0" encoding="nonsense"?><a/>',
+        '<?xml version="1.0" encoding="utf-7"?><a/>',
+        "<a b='\0'/>",
+        b"\xff\xfe\xff",
+        "",
+    ],
+)
+def test_descriptions_that_are_no_xml(tmp_path, read, document):
+    assert "no XML that can be read" in read(archive(tmp_path / "it.fmu", [], document))
+
+
+def test_large_descriptions_are_refused_before_they_are_parsed(tmp_path, read, monkeypatch):
+    monkeypatch.setattr(unpacking, "MAX_XML", 1000)
+    assert "expected at most 1000" in read(archive(tmp_path / "it.fmu", [], SOUND + " " * 1000))
+    monkeypatch.undo()
+    monkeypatch.setattr(unpacking, "MAX_ELEMENTS", 5)
+    assert "more than 5 elements" in read(
+        archive(tmp_path / "it2.fmu", [], SOUND.replace("<ModelS", "<a/><b/><ModelS"))
+    )
+
+
+TEN_THOUSAND = '<Dimension start="10000"/>'
+VARIABLE = 'name="time" valueReference="0" causality="independent"/>'
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ('Identifier="m"', 'Identifier="../../../m"', "modelIdentifier"),
+        ('Identifier="m"', 'Identifier="/m"', "modelIdentifier"),
+        ('Identifier="m"', 'Identifier=""', "modelIdentifier"),
+        ('Identifier="m"', f'Identifier="{"m" * 100_000}"', "modelIdentifier"),
+        ('Reference="0"', f'Reference="{2**32}"', "expected a whole number of at most 4294967295"),
+        ('Reference="0"', f'Reference="{"9" * 5000}"', "valueReference"),
+        ('Reference="0"', 'Reference="-1"', "valueReference"),
+        ('Reference="0"', 'Reference="1_0"', "valueReference"),
+        (' valueReference="0"', "", "valueReference"),
+        ('name="time"', "", "has no name"),
+        ('name="time"', 'name=""', "has 0 characters"),
+        ('name="time"', f'name="{"n" * 1_000_000}"', "1000000 characters"),
+        (VARIABLE, 'name="a" valueReference="1"><Dimension start="1000000000"/></Float64>', "a dimension"),
+        (VARIABLE, f'name="a" valueReference="1">{TEN_THOUSAND * 3}</Float64>', "entries"),
+        ("<ModelV", '<DefaultExperiment stepSize="0"/><ModelV', "stepSize"),
+        ("<ModelV", '<DefaultExperiment stepSize="NaN"/><ModelV', "stepSize"),
+        ("<ModelV", '<DefaultExperiment stepSize="-1"/><ModelV', "stepSize"),
+        ("<ModelV", '<DefaultExperiment stopTime="INF"/><ModelV', "stopTime"),
+        ("<ModelV", '<DefaultExperiment startTime="x"/><ModelV', "startTime"),
+        ('modelName="m"', 'modelName="m" numberOfEventIndicators="1000000000"', "numberOfEventIndicators"),
+    ],
+)
+def test_numbers_and_names_that_cannot_be(tmp_path, read, old, new, words):
+    assert words in read(described(tmp_path, old, new))
+
+
+# ---- its binary ----
+
+
+def binary(tmp_path, data):
+    with zipfile.ZipFile(cached_fmu(load_vehicle("odin"), 3)) as source:
+        description = source.read("modelDescription.xml").decode()
+    place = f"binaries/{fmpy.platform_tuple}/odin{fmpy.sharedLibraryExtension}"
+    return archive(tmp_path / "it.fmu", [(place, data)], description)
+
+
+@pytest.fixture(scope="module")
+def no_fmu(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("library")
+    (folder / "it.c").write_text("int harmless(void) { return 1; }\n")
+    subprocess.run(["cc", "-shared", "-fPIC", "-o", folder / "it.so", folder / "it.c"], check=True)
+    return (folder / "it.so").read_bytes()
+
+
+@pytest.mark.skipif(sys.platform != "linux" or platform.machine() != "x86_64", reason="of another machine")
+def test_libraries_that_are_none_of_an_fmu(tmp_path, no_fmu):
+    of_another_machine = bytearray(no_fmu)
+    of_another_machine[18] = 0xB7  # AArch64
+    of_32_bits = bytearray(no_fmu)
+    of_32_bits[4] = 1
+    for data in (b"", b"\x7fELF", bytes(of_another_machine), bytes(of_32_bits), no_fmu):
+        with pytest.raises(PlantError) as caught:
+            Plant(binary(tmp_path, data))
+        assert str(caught.value).startswith(str(tmp_path / "it.fmu")) and "\n" not in str(caught.value)
+
+
+def test_what_is_extracted_is_for_its_owner_alone(monkeypatch):
+    made = []
+    monkeypatch.setattr(instance, "unpack", lambda path, folder: made.append(folder) or unpacking.unpack(path, folder))
+    plant = Plant("odin")
+    assert stat.S_IMODE(made[0].stat().st_mode) == 0o700
+    plant.close()
+    assert not made[0].exists()
+
+
+def test_no_binary_of_another_folder_is_loaded(tmp_path):
+    """An identifier that leads out of the FMU would load whatever library lies there."""
+    with zipfile.ZipFile(cached_fmu(load_vehicle("odin"), 3)) as source:
+        description = source.read("modelDescription.xml").decode()
+        library = source.read(f"binaries/{fmpy.platform_tuple}/odin{fmpy.sharedLibraryExtension}")
+    (tmp_path / f"planted{fmpy.sharedLibraryExtension}").write_bytes(library)
+    path = archive(
+        tmp_path / "it.fmu", [], description.replace('Identifier="odin"', f'Identifier="{tmp_path / "planted"}"')
+    )
+    with pytest.raises(PlantError, match="modelIdentifier"):
+        Plant(path)
+
+
+# ---- any bytes ----
+
+PIECES = ["", "<", ">", '"', "&", "1e999", "-1", "nan", "\0", "<a/>", "\udc80"]
+
+
+def read_or_refused(path):
+    said = ""
+    try:
+        read_fmu(path)
+    except FmuFileError as error:
+        said = str(error)
+    assert "\n" not in said
+
+
+@given(st.data())
+def test_any_change_of_an_fmu_is_read_or_refused(tmp_path_factory, data):
+    content = bytearray(_small())
+    for _ in range(data.draw(st.integers(1, 4))):
+        at = data.draw(st.integers(0, len(content) - 1))
+        content[at : at + data.draw(st.integers(0, 4))] = data.draw(st.binary(max_size=4))
+    path = tmp_path_factory.getbasetemp() / "changed.fmu"
+    path.write_bytes(content)
+    read_or_refused(path)
+
+
+@given(st.data())
+def test_any_change_of_a_description_is_read_or_refused(tmp_path_factory, data):
+    text = SOUND
+    for _ in range(data.draw(st.integers(1, 4))):
+        at = data.draw(st.integers(0, len(text)))
+        new = data.draw(
+            st.sampled_from(["", "<", ">", '"', "&", "1e999", "-1", "nan", "\0", "<a/>", "�"]) | st.text(max_size=4)
+        )
+        text = text[:at] + new + text[at + data.draw(st.integers(0, 6)) :]
+    path = archive(tmp_path_factory.getbasetemp() / "described.fmu", [], text.encode("utf-8", "surrogatepass"))
+    read_or_refused(path)
+
+
+def _small():
+    kept = io.BytesIO()
+    with zipfile.ZipFile(kept, "w", zipfile.ZIP_DEFLATED) as made:
+        made.writestr("modelDescription.xml", SOUND)
+        made.writestr("resources/it.txt", "some words\n" * 20)
+    return kept.getvalue()
