@@ -82,8 +82,10 @@ class FunctionLaw:
 
         Parameters
         ----------
-        state, goal, regions, weights, forces
+        state, goal, regions, weights
             As of `Law.step`.
+        forces : ndarray, shape (6,) or (n_thrusters,)
+            What it writes to [N, N m], as of `Law.step`.
 
         Raises
         ------

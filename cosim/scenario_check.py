@@ -206,7 +206,13 @@ def check_time(entry: TimeEntry) -> Time:
 
 
 def check_law(entry: LawEntry, through: str, vehicle: Vehicle, period: float, n_regions: int) -> LawSetup:
-    """Return the law's name and gains, once the law has taken them and its period [s]; of one's own the name is all."""
+    """Return the law's name and gains, once the law has taken them and its period [s]; of one's own the name is all.
+
+    Raises
+    ------
+    ScenarioError
+        If there is no such law, or it does not take them.
+    """
     if is_own(entry.name):
         if entry.gains:
             raise ScenarioError(f"law.gains has {next(iter(entry.gains))!r}, expected nothing with a law of one's own")

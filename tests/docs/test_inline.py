@@ -10,7 +10,7 @@ from tests.docs.programs import MODULES, check_foreign, flags, parses, program, 
 
 PAGES = all_pages()
 # flags of other programs that the pages speak of
-FOREIGN = {"--dialect", "--nthreads", "--slow", "--speedup"}
+FOREIGN = {"--dialect", "--editable", "--interface-type", "--nthreads", "--resolution", "--slow", "--speedup"}
 OURS = set().union(*(known for name in MODULES for known in flags(name).values()))
 
 
