@@ -68,11 +68,34 @@ def lean(function: F, *others: Path) -> F:
     return _kept_on_disk(function, others, counting=False)
 
 
+def part(function: F) -> F:
+    """Compile as `lean` does what only compiled functions call.
+
+    It has nothing by which Python could call it, which takes as long to compile as a short function, and it is kept on
+    disk in its callers alone.
+
+    Parameters
+    ----------
+    function : callable
+        As for `lean`.
+
+    Returns
+    -------
+    callable
+        The same, compiled for each of its callers.
+    """
+    jitted: Any = numba.njit(**_options(counting=False), no_cpython_wrapper=True, no_cfunc_wrapper=True)(function)
+    result: F = jitted
+    return result
+
+
+def _options(*, counting: bool) -> dict[str, Any]:
+    """Return how functions are compiled; `_nrt` is said in both cases: else a callee inherits it."""
+    return {"error_model": "numpy", "_nrt": counting}
+
+
 def _kept_on_disk(function: F, others: tuple[Path, ...], *, counting: bool) -> F:
-    options: dict[str, Any] = {
-        "error_model": "numpy",
-        "_nrt": counting,
-    }  # said in both cases: else a callee inherits it
+    options = _options(counting=counting)
     try:
         jitted: Any = numba.njit(cache=True, **options)(function)
     except RuntimeError:  # there is no place to keep it

@@ -14,8 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controller.by_address import call_at
-from controller.compiled import compiled, inlined, lean
+from controller.compiled import inlined, lean
 from controller.errors import RegionError
+from controller.on_stack import zeros
 from controller.regions.box import Box
 from controller.regions.cone import Cone
 from controller.regions.cylinder import Cylinder
@@ -236,7 +237,7 @@ def clearance_of_place(regions: PackedRegions, i: int, position: Array, room: Ar
     return clearance
 
 
-@compiled
+@lean
 def clearance_at(regions: PackedRegions, i: int, position: Array) -> float:
     """Return the clearance [m] of region `i`, where it is now, at a position, shape (3,) [m, NED].
 
@@ -244,7 +245,7 @@ def clearance_at(regions: PackedRegions, i: int, position: Array) -> float:
     """
     if regions.kinds[i] >= FIRST_OF_ATTITUDE:
         return math.inf
-    return clearance_of_place(regions, i, position, np.empty(3))
+    return clearance_of_place(regions, i, position, zeros(3))
 
 
 @lean
@@ -270,20 +271,30 @@ def clearance_of_sphere(regions: PackedRegions, i: int, position: Array) -> floa
     return clearance
 
 
-@compiled
-def attitude_clearance(regions: PackedRegions, i: int, position: Array, quaternion: Array) -> tuple[float, Array]:
-    """Return the clearance [rad] of region `i`, of attitude, at a pose, and its slope over a turn in body axes."""
+@lean
+def attitude_clearance(regions: PackedRegions, i: int, position: Array, quaternion: Array, slope: Array) -> float:
+    """Return the clearance [rad] of region `i`, of attitude, at a pose, and write its slope over a turn in body axes.
+
+    The slope has shape (3,).
+    """
     numbers = regions.numbers[regions.offsets[i] : regions.offsets[i + 1]]
-    at, sign = position - regions.shifts[i], regions.signs[i]
+    at, sign = zeros(3), regions.signs[i]
+    for axis in range(3):
+        at[axis] = position[axis] - regions.shifts[i, axis]
     g, _, _, _, x, y, z = evaluate_shape_of_attitude(regions.kinds[i], at, quaternion, numbers)
-    return -sign * g, np.array([-sign * x, -sign * y, -sign * z])
+    slope[0], slope[1], slope[2] = -sign * x, -sign * y, -sign * z
+    clearance: float = -sign * g
+    return clearance
 
 
-@compiled
+@lean
 def place_clearance(regions: PackedRegions, i: int, position: Array, slope: Array) -> float:
     """Return the clearance [m] of region `i`, of position alone, and write its slope, shape (3,), of length 1 or 0."""
     numbers = regions.numbers[regions.offsets[i] : regions.offsets[i + 1]]
-    _, x, y, z, distance = evaluate_shape(regions.kinds[i], position - regions.shifts[i], numbers)
+    at = zeros(3)
+    for axis in range(3):
+        at[axis] = position[axis] - regions.shifts[i, axis]
+    _, x, y, z, distance = evaluate_shape(regions.kinds[i], at, numbers)
     size, sign = math.sqrt(x * x + y * y + z * z), regions.signs[i]
     scale = -sign / size if size > 0.0 else 0.0
     slope[0], slope[1], slope[2] = scale * x, scale * y, scale * z
