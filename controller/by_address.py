@@ -7,13 +7,15 @@ Addresses come as integers in arguments: captured ones would defeat Numba's cach
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numba
 from llvmlite import ir
 from numba import types
-from numba.core import cgutils
-from numba.extending import intrinsic
+from numba.core import cgutils, errors
+from numba.core.typing import templates
+from numba.extending import intrinsic, lower_builtin
 
 # what a function that is called by address may be given: whole numbers, and where arrays begin
 INTEGER: Any = types.int64
@@ -59,3 +61,83 @@ def _call_code(_context: Any, _address: Any, arguments: Any) -> Any:
 
 
 call_at: Any = intrinsic(_call_code)
+
+
+_templates: Any = templates
+_lower: Any = lower_builtin
+_signatures: dict[Any, tuple[Any, ...]] = {}  # of each function that is called by `call`: the types of its arguments
+
+
+def entry_of(function: Any, arguments: tuple[Any, ...]) -> int:
+    """Compile a function for arguments such as these, and return its address.
+
+    Parameters
+    ----------
+    function : callable
+        As `compiled` or `lean` give it; alive as long as the address is used.
+    arguments : tuple
+        Any of their types: a function is called by address with one kind of arguments alone.
+
+    Returns
+    -------
+    int
+        For `call`; 0 where nothing is compiled.
+    """
+    if numba.config.DISABLE_JIT:
+        return 0
+    kinds = tuple(numba.typeof(argument) for argument in arguments)
+    if _signatures.setdefault(function, kinds) != kinds:
+        raise TypeError(f"{function.__name__} is called by address with {kinds}, expected {_signatures[function]}")
+    function.compile(kinds)
+    result = function.overloads[kinds]
+    address: int = result.library.get_pointer_to_function(result.fndesc.llvm_func_name)
+    return address
+
+
+def call(_address: int, function: Callable[..., Any], arguments: tuple[Any, ...]) -> Any:
+    """Call a function; in compiled code by its address, so that its code is not compiled into the caller.
+
+    Parameters
+    ----------
+    _address : int
+        Of `entry_of`.
+    function : callable
+        The same as there.
+    arguments : tuple
+        Of the types that were given there.
+
+    Returns
+    -------
+    object
+        What the function does.
+    """
+    return function(*arguments)
+
+
+@_templates.infer_global(call)
+class _Call(_templates.AbstractTemplate):  # type: ignore[misc]
+    """What `call` returns."""
+
+    def generic(self, args: Any, _kws: Any) -> Any:
+        _, function, arguments = args
+        kinds = tuple(types.unliteral(kind) for kind in arguments)
+        if kinds != _signatures.get(function.dispatcher):
+            raise errors.TypingError(f"{function} by address: {kinds}, expected {_signatures.get(function.dispatcher)}")
+        result = function.dispatcher.overloads[kinds].signature.return_type
+        return _templates.signature(result, types.intp, function, arguments)
+
+
+@_lower(call, types.intp, types.Dispatcher, types.BaseTuple)
+def _lowered(context: Any, builder: Any, sig: Any, values: Any) -> Any:
+    """Call by Numba's own convention, and pass on what goes wrong."""
+    address, _, packed = values
+    _, _, arguments = sig.args
+    unpack: Any = cgutils.unpack_tuple
+    kind = context.call_conv.get_function_type(sig.return_type, arguments.types)
+    function = builder.inttoptr(address, kind.as_pointer())
+    status, result = context.call_conv.call_function(
+        builder, function, sig.return_type, arguments.types, unpack(builder, packed)
+    )
+    with cgutils.if_unlikely(builder, status.is_error):  # type: ignore[no-untyped-call]
+        context.call_conv.return_status_propagate(builder, status)
+    return result

@@ -8,10 +8,17 @@ import numpy as np
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils
-from numba.core.typing.templates import AbstractTemplate, infer_global, signature
+from numba.core.typing import templates
 from numba.extending import lower_builtin
-from numba.np.arrayobj import make_array, populate_array
+from numba.np import arrayobj
 from numpy.typing import NDArray
+
+# what Numba says no types of
+_types: Any = types
+_templates: Any = templates
+_cgutils: Any = cgutils
+_arrayobj: Any = arrayobj
+_lower: Any = lower_builtin
 
 
 def zeros(*shape: int) -> NDArray[np.float64]:
@@ -32,29 +39,27 @@ def zeros(*shape: int) -> NDArray[np.float64]:
     return np.zeros(shape)
 
 
-@infer_global(zeros)
-class _Zeros(AbstractTemplate):
+@_templates.infer_global(zeros)
+class _Zeros(_templates.AbstractTemplate):  # type: ignore[misc]
     """What `zeros` returns, where its shape is known."""
 
     def generic(self, args: Any, kws: Any) -> Any:
         if not args or kws or not all(isinstance(n, types.IntegerLiteral) for n in args):
             return None
-        array: Any = types.Array
-        return signature(array(types.float64, len(args), "C"), *args)
+        return _templates.signature(_types.Array(types.float64, len(args), "C"), *args)
 
 
-@lower_builtin(zeros, types.VarArg(types.Any))
-def _zeros(context: Any, builder: Any, sig: Any, _args: Any) -> Any:
+@_lower(zeros, _types.VarArg(types.Any))
+def _lowered(context: Any, builder: Any, sig: Any, _args: Any) -> Any:
     """Make the array where the function begins, and its zeros each time it is asked for."""
     shape = [n.literal_value for n in sig.args]
     room = ir.ArrayType(ir.DoubleType(), int(np.prod(shape)))
-    place = cgutils.alloca_once(builder, room)
+    place = _cgutils.alloca_once(builder, room)
     builder.store(ir.Constant(room, None), place)
-    array = make_array(sig.return_type)(context, builder)
+    array = _arrayobj.make_array(sig.return_type)(context, builder)
     sizes = [context.get_constant(types.intp, n) for n in shape]
     strides = [context.get_constant(types.intp, 8 * int(np.prod(shape[i + 1 :]))) for i in range(len(shape))]
     data = builder.bitcast(place, array.data.type)
-    populate_array(
-        array, data=data, shape=sizes, strides=strides, itemsize=context.get_constant(types.intp, 8), meminfo=None
-    )
+    item = context.get_constant(types.intp, 8)
+    _arrayobj.populate_array(array, data=data, shape=sizes, strides=strides, itemsize=item, meminfo=None)
     return array._getvalue()

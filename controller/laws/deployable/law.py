@@ -9,6 +9,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from controller.by_address import call, entry_of
 from controller.compiled import lean, part
 from controller.law import (
     Array,
@@ -31,13 +32,13 @@ from controller.laws.deployable.failure import suspicion_of
 from controller.laws.deployable.gains import DeployableGains, check_gains
 from controller.laws.deployable.guide import guide_of_nothing
 from controller.laws.deployable.linear_algebra import copy
-from controller.laws.deployable.memory import DeployableMemory
+from controller.laws.deployable.memory import DeployableMemory, Stages
 from controller.laws.deployable.model import Dynamics, Thrusters, dynamics_of, thrusters_of
 from controller.laws.deployable.observer import Estimate, estimate_of_nothing
 from controller.laws.deployable.quadratic_program import workspace
 from controller.on_stack import zeros
 from controller.quaternion import write_rotation
-from controller.regions import Orientation, PackedRegions
+from controller.regions import Orientation, PackedRegions, pack
 
 _SPREADS = 3.0  # standard deviations of the position that the margin adds
 _STALE = 0.15  # s without a valid measurement, after which the vehicle is brought to a stop
@@ -81,7 +82,7 @@ def step(
     free, wrench, velocity = zeros(6), zeros(6), zeros(6)
 
     # estimate
-    measured = intake.take_in_measurement(memory, state, gains)
+    measured = call(memory.stages.take_in, intake.take_in_measurement, (memory, state, gains))
     write_rotation(memory.quaternion, R)
     if seen.silence[0] < 0.0 or seen.silence[0] > gains.coast:  # nothing is known any more: drift
         forces[:] = 0.0
@@ -90,15 +91,17 @@ def step(
         return
 
     # failed thrusters
-    failed = failure.suspect(
-        memory.suspicion, seen, memory.attitude.residual, dynamics, thrusters, R, gains, period, measured
+    failed = call(
+        memory.stages.suspect,
+        failure.suspect,
+        (memory.suspicion, seen, memory.attitude.residual, dynamics, thrusters, R, gains, period, measured),
     )
     if failed >= 0 or intake.says_more(state.thruster_health, memory.told, thrusters.health):
         intake.take_in_thrusters(memory, state.thruster_health, failed)
         observer.doubt(seen, 0.01)
 
     # way round, bounded attraction
-    guide.improve(memory.guide, seen.position, goal, regions, gains, period)
+    call(memory.stages.improve, guide.improve, (memory.guide, seen.position, goal, regions, gains, period))
     if seen.silence[0] <= _STALE:
         wanted_velocity(memory.guide, seen.position, goal.velocities[0], gains, wanted)
     wanted_acceleration(wanted, seen.velocity, gains, acceleration)
@@ -115,7 +118,7 @@ def step(
         memory.pushed[axis] += part * (acceleration[axis] - free[axis] - memory.pushed[axis])
     _force_of(dynamics, R, memory.pushed, wrench)
     _soft_forces(memory.sight, regions, memory.weights, R, dynamics, wrench)
-    attitude_loop.aim(memory.attitude, regions, seen.position, gains, period)
+    call(memory.stages.aim, attitude_loop.aim, (memory.attitude, regions, seen.position, gains, period))
     attitude_loop.moment(memory.attitude, dynamics, memory.quaternion, memory.omega, gains, wrench[3:])
     work = memory.program
     for j in range(forces.size):
@@ -135,10 +138,18 @@ def step(
         gains.braking_share * _braking(dynamics, thrusters),
         _SPREADS * observer.position_spread(seen) + 0.5 * gains.acceleration * period**2,
     )
-    rows = write_rows(work, memory.sight, regions, memory.weights, motion, thrusters.lower, thrusters.upper, gains)
+    rows = call(
+        memory.stages.write_rows,
+        write_rows,
+        (work, memory.sight, regions, memory.weights, motion, thrusters.lower, thrusters.upper, gains),
+    )
 
     # quadratic program
-    steps = quadratic_program.solve(work, rows, thrusters.inverse, thrusters.lower, thrusters.upper, forces)
+    steps = call(
+        memory.stages.solve,
+        quadratic_program.solve,
+        (work, rows, thrusters.inverse, thrusters.lower, thrusters.upper, forces),
+    )
     copy(forces, thrusters.forces)
     memory.estimate[0] = seen.restoring[0]
     copy(memory.attitude.moments, memory.estimate[1:])
@@ -244,6 +255,23 @@ def _report_program(report: Array, multipliers: Array, price: Array, rows: int, 
     report[11], report[12], report[13] = active, yielding, steps
 
 
+def _stages(memory: DeployableMemory, gains: DeployableGains) -> Stages:
+    """Return the addresses of the stages, for arguments such as a step gives them."""
+    m, n = memory.told.size, memory.weights.size
+    three, forces, R, regions = np.zeros(3), np.zeros(m), np.zeros((3, 3)), pack([])
+    state, thrusters, seen = VehicleState(three, np.zeros(4), np.zeros(6), forces), memory.thrusters, memory.observed
+    motion, bounds = Motion(three, np.zeros(6), np.zeros(6), memory.push, 0.0, 0.0, 0.0, 0.0), (forces, forces)
+    reason = (memory.suspicion, seen, three, memory.dynamics, thrusters, R, gains, 0.0, False)
+    return Stages(
+        take_in=entry_of(intake.take_in_measurement, (memory, state, gains)),
+        suspect=entry_of(failure.suspect, reason),
+        improve=entry_of(guide.improve, (memory.guide, three, regions, regions, gains, 0.0)),
+        aim=entry_of(attitude_loop.aim, (memory.attitude, regions, three, gains, 0.0)),
+        write_rows=entry_of(write_rows, (memory.program, memory.sight, regions, np.zeros(n), motion, *bounds, gains)),
+        solve=entry_of(quadratic_program.solve, (memory.program, 0, R, *bounds, forces)),
+    )
+
+
 class DeployableLaw(CompiledLaw):
     """Regions kept, goal reached, within real thrusters.
 
@@ -301,7 +329,9 @@ class DeployableLaw(CompiledLaw):
             told=np.ones(m),
             pushed=np.zeros(3),
             push=np.zeros((6, m)),
+            stages=Stages(),
         )
+        self.memory = self.memory._replace(stages=_stages(self.memory, self.gains))
 
     @classmethod
     def for_vehicle(
