@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import numba
+from numba.core.registry import CPUDispatcher
 
 log = logging.getLogger(__name__)
 
@@ -69,10 +70,10 @@ def lean(function: F, *others: Path) -> F:
 
 
 def part(function: F) -> F:
-    """Compile as `lean` does what only compiled functions call.
+    """Compile as `lean` does what compiled functions call.
 
-    It has nothing by which Python could call it, which takes as long to compile as a short function, and it is kept on
-    disk in its callers alone.
+    What Python needs to call a function takes as long to compile as a short function does. A part has it only where
+    Python calls it, as tests do.
 
     Parameters
     ----------
@@ -82,20 +83,27 @@ def part(function: F) -> F:
     Returns
     -------
     callable
-        The same, compiled for each of its callers.
+        The same, compiled at its first call.
     """
-    jitted: Any = numba.njit(**_options(counting=False), no_cpython_wrapper=True, no_cfunc_wrapper=True)(function)
-    result: F = jitted
-    return result
+    return _kept_on_disk(function, (), counting=False, no_cpython_wrapper=True, no_cfunc_wrapper=True)
 
 
-def _options(*, counting: bool) -> dict[str, Any]:
-    """Return how functions are compiled; `_nrt` is said in both cases: else a callee inherits it."""
-    return {"error_model": "numpy", "_nrt": counting}
+class _Part(CPUDispatcher):  # type: ignore[misc]
+    """A compiled function without what Python needs to call it: Numba would crash where Python does."""
+
+    def __call__(self, *arguments: Any) -> Any:
+        """Call it by way of another one, which is made now."""
+        return _caller_of(self)(*arguments)
 
 
-def _kept_on_disk(function: F, others: tuple[Path, ...], *, counting: bool) -> F:
-    options = _options(counting=counting)
+@functools.cache
+def _caller_of(function: Any) -> Any:
+    return numba.njit(lambda *arguments: function(*arguments))
+
+
+def _kept_on_disk(function: F, others: tuple[Path, ...], *, counting: bool, **without: bool) -> F:
+    # whether references are counted is said in both cases: else a callee inherits it
+    options: dict[str, Any] = {"error_model": "numpy", "_nrt": counting, **without}
     try:
         jitted: Any = numba.njit(cache=True, **options)(function)
     except RuntimeError:  # there is no place to keep it
@@ -110,6 +118,8 @@ def _kept_on_disk(function: F, others: tuple[Path, ...], *, counting: bool) -> F
         jitted._cache.save_overload = _if_there_is_room(jitted._cache.save_overload)
     except AttributeError:
         jitted = numba.njit(**options)(function)
+    if without and isinstance(jitted, CPUDispatcher):
+        jitted.__class__ = _Part
     result: F = jitted
     return result
 

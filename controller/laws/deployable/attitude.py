@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from controller.compiled import compiled, lean, part
+from controller.compiled import compiled, part
 from controller.laws.deployable.gains import DeployableGains
 from controller.laws.deployable.linear_algebra import copy, product
 from controller.laws.deployable.model import Dynamics, Thrusters
@@ -49,7 +49,7 @@ def attitude_of(preferred: Array) -> Attitude:
     return Attitude(preferred.copy(), preferred.copy(), np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(1))
 
 
-@lean
+@part
 def adapt(
     attitude: Attitude,
     dynamics: Dynamics,
@@ -83,7 +83,7 @@ def adapt(
     attitude.known[0] = 1.0
 
 
-@lean
+@part
 def carry(attitude: Attitude, dynamics: Dynamics, R: Array, velocity: Array, water: Array) -> None:
     """Bring Munk's moment up to date with the velocities [m/s] of vehicle and water, shape (3,) each, NED."""
     relative, momentum = zeros(3), zeros(3)
@@ -98,7 +98,7 @@ def carry(attitude: Attitude, dynamics: Dynamics, R: Array, velocity: Array, wat
         attitude.carried[i] = relative[b] * momentum[a] - relative[a] * momentum[b]  # -nu_r x (M nu_r)
 
 
-@lean
+@part
 def aim(attitude: Attitude, regions: PackedRegions, position: Array, gains: DeployableGains, period: float) -> None:
     """Turn the held attitude towards the preferred one, or to where regions of attitude have comfort.
 
@@ -170,7 +170,7 @@ def turn(quaternion: Array, omega: Array, period: float, out: Array) -> None:
         out[i] /= length
 
 
-@lean
+@part
 def free_turning(attitude: Attitude, dynamics: Dynamics, quaternion: Array, omega: Array, out: Array) -> None:
     """Write the angular acceleration without thrust, shape (3,) [rad/s2], body axes."""
     k, moments, momentum = zeros(3), zeros(3), zeros(3)
@@ -189,7 +189,7 @@ def free_turning(attitude: Attitude, dynamics: Dynamics, quaternion: Array, omeg
             out[i] += dynamics.inverse_mass[3 + i, 3 + j] * moments[j]
 
 
-@lean
+@part
 def moment(
     attitude: Attitude, dynamics: Dynamics, quaternion: Array, omega: Array, gains: DeployableGains, out: Array
 ) -> None:

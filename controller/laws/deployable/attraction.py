@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from controller.compiled import lean
+from controller.compiled import part
 from controller.laws.deployable.gains import DeployableGains
 from controller.laws.deployable.guide import Guide
 from controller.laws.deployable.linear_algebra import copy
@@ -17,7 +17,7 @@ _AHEAD = 0.4  # m along the way, of the point that is headed for
 _SLOWEST_CORNER = 0.25  # of the full speed, at a corner that turns right back
 
 
-@lean
+@part
 def approach_speed(distance: float, deceleration: float, slope: float) -> float:
     """Return the speed [m/s] from which a distance [m] still suffices to stop.
 
@@ -29,7 +29,7 @@ def approach_speed(distance: float, deceleration: float, slope: float) -> float:
     return float(np.sqrt(2.0 * deceleration * distance + offset * offset)) - offset
 
 
-@lean
+@part
 def wanted_velocity(guide: Guide, position: Array, goal_velocity: Array, gains: DeployableGains, out: Array) -> None:
     """Write the velocity [m/s], world frame, shape (3,), that follows the way; `position` is where the vehicle is."""
     count, way = guide.points[0], guide.way
@@ -61,7 +61,7 @@ def wanted_velocity(guide: Guide, position: Array, goal_velocity: Array, gains: 
         out[axis] = goal_velocity[axis] + (speed * towards[axis] / size if size > 1e-9 else 0.0)
 
 
-@lean
+@part
 def wanted_acceleration(wanted: Array, velocity: Array, gains: DeployableGains, out: Array) -> None:
     """Write the acceleration [m/s2], world frame, that brings the velocity to the wanted one, bounded in length."""
     size = 0.0

@@ -24,7 +24,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from controller.compiled import lean
+from controller.compiled import part
 from controller.laws.deployable.attitude import turn
 from controller.laws.deployable.attraction import approach_speed
 from controller.laws.deployable.faces import FACES, face_ahead, has_faces
@@ -79,7 +79,7 @@ def sight_of(n: int) -> Sight:
     )  # fmt: skip
 
 
-@lean
+@part
 def look(sight: Sight, regions: PackedRegions, position: Array, quaternion: Array, velocity: Array) -> None:
     """Evaluate the regions at a pose, and at the one to which a velocity, shape (6,) as in `Motion`, leads."""
     s = sight
@@ -96,7 +96,7 @@ def look(sight: Sight, regions: PackedRegions, position: Array, quaternion: Arra
     evaluate_packed(moved, place, attitude, s.later_values, s.later_gradients, s.later_turnings, s.later_clearances)
 
 
-@lean
+@part
 def slope_of(gradients: Array, turnings: Array, i: int, of_attitude: bool, out: Array) -> bool:
     """Write the slope of a clearance over the pose, shape (6,); False where there is none.
 
@@ -113,7 +113,7 @@ def slope_of(gradients: Array, turnings: Array, i: int, of_attitude: bool, out: 
     return True
 
 
-@lean
+@part
 def turning_of(kind: int, n: Array, later: Array, velocity: Array) -> float:
     """Return (dn/dt)^T v, from a slope now and later, shape (6,) each, along a velocity against the region.
 
@@ -129,7 +129,7 @@ def turning_of(kind: int, n: Array, later: Array, velocity: Array) -> float:
     return turning
 
 
-@lean
+@part
 def write_rows(
     work: Workspace,
     sight: Sight,

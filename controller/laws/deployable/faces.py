@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from controller.compiled import inlined, lean, part
+from controller.compiled import inlined, part
 from controller.on_stack import zeros
 from controller.regions import Ellipsoid, HalfSpace, PackedRegions, Sphere, clearance_of_place, place_clearance
 
@@ -30,7 +30,7 @@ def has_faces(kind: int) -> bool:
     return kind not in _SMOOTH
 
 
-@lean
+@part
 def face_ahead(
     regions: PackedRegions, i: int, position: Array, nearest: Array, velocity: Array, reach: float, face: Array
 ) -> float:

@@ -22,7 +22,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from controller.compiled import lean, part
+from controller.compiled import part
 from controller.laws.deployable.gains import DeployableGains
 from controller.laws.deployable.linear_algebra import norm
 from controller.laws.deployable.model import Dynamics, Thrusters
@@ -54,7 +54,7 @@ def suspicion_of(m: int) -> Suspicion:
     return Suspicion(np.zeros(m), np.zeros((m, 3)), np.zeros((m, 3)), np.full(1, -1))
 
 
-@lean
+@part
 def suspect(
     suspicion: Suspicion,
     estimate: Estimate,
@@ -172,7 +172,7 @@ def _by_moment(
     return min(max(step, -_MOST_A_STEP), _MOST_A_STEP)
 
 
-@lean
+@part
 def give_up(suspicion: Suspicion, thrusters: Thrusters, failed: int) -> None:
     """Take a suspected thruster out of `health`, and take back the one that was suspected before it.
 

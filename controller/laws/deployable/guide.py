@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from controller.compiled import lean, part
+from controller.compiled import part
 from controller.laws.deployable.gains import DeployableGains
 from controller.laws.deployable.linear_algebra import copy, norm
 from controller.laws.deployable.search import Tree, grow, tree_of_nothing
@@ -81,7 +81,7 @@ def guide_of_nothing(n_regions: int, seed: int) -> Guide:
     )
 
 
-@lean
+@part
 def uniform(random: NDArray[np.uint64]) -> float:
     """Return the next random number in [0, 1): xorshift64*, Vigna 2016."""
     x = random[0]
@@ -98,7 +98,7 @@ def _spread(random: NDArray[np.uint64]) -> float:
     return (uniform(random) + uniform(random) + uniform(random) + uniform(random) - 2.0) * 1.7320508075688772
 
 
-@lean
+@part
 def cost_of(
     way: Array, count: int, start: Array, regions: PackedRegions, far_until: Array, gains: DeployableGains
 ) -> float:
@@ -172,7 +172,7 @@ def cost_of(
     return total
 
 
-@lean
+@part
 def nearest_end(goal: PackedRegions, position: Array, depth: float, end: Array) -> None:
     """Write the point of the goal region nearest to a position, `depth` [m] inside where the region is that deep.
 
@@ -202,7 +202,7 @@ def nearest_end(goal: PackedRegions, position: Array, depth: float, end: Array) 
             part *= 0.5
 
 
-@lean
+@part
 def improve(
     guide: Guide, start: Array, goal: PackedRegions, regions: PackedRegions, gains: DeployableGains, period: float
 ) -> None:

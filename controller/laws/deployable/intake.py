@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from controller.compiled import lean, part
+from controller.compiled import part
 from controller.law import VehicleState
 from controller.laws.deployable import attitude as attitude_loop
 from controller.laws.deployable import failure, model, observer
@@ -44,7 +44,7 @@ def says_more(told: Array, before: Array, health: Array) -> bool:
     return more
 
 
-@lean
+@part
 def take_in_thrusters(memory: DeployableMemory, told: Array, failed: int) -> None:
     """Take in which thrusters are told to have failed, or to work again, and one found to have failed, -1 for none."""
     health = memory.thrusters.health
@@ -57,7 +57,7 @@ def take_in_thrusters(memory: DeployableMemory, told: Array, failed: int) -> Non
     model.share_out(memory.thrusters)
 
 
-@lean
+@part
 def take_in_measurement(memory: DeployableMemory, state: VehicleState, gains: DeployableGains) -> bool:
     """Carry the estimate over the last period and take in the measurement; return whether it was believed."""
     seen, period = memory.observed, memory.period[0]

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from controller.compiled import lean, part
+from controller.compiled import part
 
 Array = NDArray[np.float64]
 
 
-@lean
+@part
 def product(A: Array, x: Array, out: Array) -> None:
     """Write A x into `out`."""
     for i in range(A.shape[0]):
@@ -27,7 +27,7 @@ def copy(values: Array, out: Array) -> None:
         out[i] = values[i]
 
 
-@lean
+@part
 def norm(a: Array) -> float:
     """Return |a|."""
     total = 0.0

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from controller.compiled import compiled, lean
+from controller.compiled import compiled, part
 from controller.law import VehicleModel
 from controller.laws.deployable.linear_algebra import product
 from controller.on_stack import zeros
@@ -135,7 +135,7 @@ def share_out(thrusters: Thrusters) -> None:
             thrusters.allocator[i, k] = total * thrusters.metric[k]
 
 
-@lean
+@part
 def free_acceleration(
     dynamics: Dynamics, R: Array, velocity: Array, omega_body: Array, water: Array, restoring: float, out: Array
 ) -> None:
@@ -184,7 +184,7 @@ def free_acceleration(
             out[i] += R[i, k] * body[k]
 
 
-@lean
+@part
 def thrust_acceleration(dynamics: Dynamics, thrusters: Thrusters, R: Array, forces: Array, out: Array) -> None:
     """Write the acceleration that thruster forces [N] give: linear in the world frame, angular in body axes, (6,)."""
     wrench, body = zeros(6), zeros(6)

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from controller.compiled import lean
+from controller.compiled import part
 from controller.laws.deployable.gains import DeployableGains
 from controller.laws.deployable.linear_algebra import copy
 from controller.laws.deployable.model import Dynamics, Thrusters, free_acceleration, thrust_acceleration
@@ -60,7 +60,7 @@ def estimate_of_nothing() -> Estimate:
     )
 
 
-@lean
+@part
 def begin(estimate: Estimate, position: Array, velocity: Array, gains: DeployableGains) -> None:
     """Start from a first measurement, or anew after losing the vehicle; what is known of water and weight stays."""
     copy(position, estimate.position)
@@ -77,7 +77,7 @@ def begin(estimate: Estimate, position: Array, velocity: Array, gains: Deployabl
     estimate.silence[0] = 0.0
 
 
-@lean
+@part
 def predict(
     estimate: Estimate,
     dynamics: Dynamics,
@@ -117,7 +117,7 @@ def predict(
     estimate.silence[0] += period
 
 
-@lean
+@part
 def correct(estimate: Estimate, position: Array, velocity: Array, gains: DeployableGains) -> bool:
     """Take in a measurement of position [m] and velocity [m/s], shape (3,) each, NED; False if it is not believed."""
     for axis in range(3):
@@ -157,7 +157,7 @@ def correct(estimate: Estimate, position: Array, velocity: Array, gains: Deploya
     return True
 
 
-@lean
+@part
 def doubt(estimate: Estimate, variance: float) -> None:
     """Let velocity and unknowns be found anew: after the thrusters turned out to be other than believed."""
     for axis in range(3):
@@ -165,7 +165,7 @@ def doubt(estimate: Estimate, variance: float) -> None:
         estimate.covariance[axis, 2, 2] += 25.0 if axis == 2 else 0.04
 
 
-@lean
+@part
 def position_spread(estimate: Estimate) -> float:
     """Return the standard deviation of the position [m] along the axis that is known worst."""
     worst = 0.0

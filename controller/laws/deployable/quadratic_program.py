@@ -26,7 +26,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from controller.compiled import lean, part
+from controller.compiled import part
 from controller.laws.deployable.linear_algebra import copy
 
 Array = NDArray[np.float64]
@@ -87,7 +87,7 @@ def workspace(barriers: int, thrusters: int) -> Workspace:
     )
 
 
-@lean
+@part
 def solve(work: Workspace, barriers: int, inverse: Array, lower: Array, upper: Array, forces: Array) -> int:
     """Solve the program whose first `barriers` rows, right sides and prices stand in `work`, with u0 in `wanted`.
 

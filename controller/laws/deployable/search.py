@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from controller.compiled import inlined, lean
+from controller.compiled import inlined, part
 from controller.laws.deployable.gains import DeployableGains
 from controller.laws.deployable.linear_algebra import copy
 from controller.on_stack import zeros
@@ -59,7 +59,7 @@ def _room_at(point: Array, regions: PackedRegions, room: Array) -> float:
     return least
 
 
-@lean
+@part
 def is_free(begin: Array, end: Array, regions: PackedRegions, wanted: float) -> bool:
     """Return whether a straight line keeps a clearance [m] of all hard regions, where they are now.
 
@@ -92,7 +92,7 @@ def is_free(begin: Array, end: Array, regions: PackedRegions, wanted: float) -> 
     return False
 
 
-@lean
+@part
 def grow(
     tree: Tree, start: Array, end: Array, draws: Array, regions: PackedRegions, gains: DeployableGains, way: Array
 ) -> int:
