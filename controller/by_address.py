@@ -13,7 +13,7 @@ from typing import Any
 import numba
 from llvmlite import ir
 from numba import types
-from numba.core import cgutils, errors
+from numba.core import cgutils, config, errors
 from numba.core.typing import templates
 from numba.extending import intrinsic, lower_builtin
 
@@ -65,6 +65,9 @@ call_at: Any = intrinsic(_call_code)
 
 _templates: Any = templates
 _lower: Any = lower_builtin
+_typeof: Any = numba.typeof
+_unliteral: Any = types.unliteral
+_DISABLED: Any = config.DISABLE_JIT  # type: ignore[attr-defined]
 _signatures: dict[Any, tuple[Any, ...]] = {}  # of each function that is called by `call`: the types of its arguments
 
 
@@ -83,9 +86,9 @@ def entry_of(function: Any, arguments: tuple[Any, ...]) -> int:
     int
         For `call`; 0 where nothing is compiled.
     """
-    if numba.config.DISABLE_JIT:
+    if _DISABLED:
         return 0
-    kinds = tuple(numba.typeof(argument) for argument in arguments)
+    kinds = tuple(_typeof(argument) for argument in arguments)
     if _signatures.setdefault(function, kinds) != kinds:
         raise TypeError(f"{function.__name__} is called by address with {kinds}, expected {_signatures[function]}")
     function.compile(kinds)
@@ -120,14 +123,13 @@ class _Call(_templates.AbstractTemplate):  # type: ignore[misc]
 
     def generic(self, args: Any, _kws: Any) -> Any:
         _, function, arguments = args
-        kinds = tuple(types.unliteral(kind) for kind in arguments)
+        kinds = tuple(_unliteral(kind) for kind in arguments)
         if kinds != _signatures.get(function.dispatcher):
             raise errors.TypingError(f"{function} by address: {kinds}, expected {_signatures.get(function.dispatcher)}")
         result = function.dispatcher.overloads[kinds].signature.return_type
         return _templates.signature(result, types.intp, function, arguments)
 
 
-@_lower(call, types.intp, types.Dispatcher, types.BaseTuple)
 def _lowered(context: Any, builder: Any, sig: Any, values: Any) -> Any:
     """Call by Numba's own convention, and pass on what goes wrong."""
     address, _, packed = values
@@ -141,3 +143,6 @@ def _lowered(context: Any, builder: Any, sig: Any, values: Any) -> Any:
     with cgutils.if_unlikely(builder, status.is_error):  # type: ignore[no-untyped-call]
         context.call_conv.return_status_propagate(builder, status)
     return result
+
+
+_lower(call, types.intp, types.Dispatcher, types.BaseTuple)(_lowered)

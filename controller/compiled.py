@@ -88,7 +88,7 @@ def part(function: F) -> F:
     return _kept_on_disk(function, (), counting=False, no_cpython_wrapper=True, no_cfunc_wrapper=True)
 
 
-class _Part(CPUDispatcher):  # type: ignore[misc]
+class _Part(CPUDispatcher):
     """A compiled function without what Python needs to call it: Numba would crash where Python does."""
 
     def __call__(self, *arguments: Any) -> Any:

@@ -49,7 +49,6 @@ class _Zeros(_templates.AbstractTemplate):  # type: ignore[misc]
         return _templates.signature(_types.Array(types.float64, len(args), "C"), *args)
 
 
-@_lower(zeros, _types.VarArg(types.Any))
 def _lowered(context: Any, builder: Any, sig: Any, _args: Any) -> Any:
     """Make the array where the function begins, and its zeros each time it is asked for."""
     shape = [n.literal_value for n in sig.args]
@@ -63,3 +62,6 @@ def _lowered(context: Any, builder: Any, sig: Any, _args: Any) -> Any:
     item = context.get_constant(types.intp, 8)
     _arrayobj.populate_array(array, data=data, shape=sizes, strides=strides, itemsize=item, meminfo=None)
     return array._getvalue()
+
+
+_lower(zeros, _types.VarArg(types.Any))(_lowered)
