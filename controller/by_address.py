@@ -11,89 +11,67 @@ from collections.abc import Callable
 from typing import Any
 
 import numba
-from llvmlite import ir
 from numba import types
 from numba.core import cgutils, config, errors
 from numba.core.typing import templates
-from numba.extending import intrinsic, lower_builtin
-
-# what a function that is called by address may be given: whole numbers, and where arrays begin
-INTEGER: Any = types.int64
-INTEGERS: Any = types.CPointer(types.int64)  # type: ignore[no-untyped-call]
-NUMBERS: Any = types.CPointer(types.float64)  # type: ignore[no-untyped-call]
-
-array_at: Any = numba.carray  # type: ignore[attr-defined]
-
-_I64 = ir.IntType(64)
-
-
-def address_of(function: Any, arguments: tuple[Any, ...]) -> int:
-    """Compile a function that returns an int64, and return its address.
-
-    Parameters
-    ----------
-    function : callable
-        As `compiled` or `lean` give it; alive as long as the address is used.
-    arguments : tuple of Numba types
-        Each `INTEGER`, `INTEGERS` or `NUMBERS`; of the last two `array_at` makes arrays.
-
-    Returns
-    -------
-    int
-        For `call_at`.
-    """
-    function.compile(arguments)
-    result = function.overloads[arguments]
-    address: int = result.library.get_pointer_to_function(result.fndesc.llvm_cfunc_wrapper_name)
-    return address
-
-
-def _call_code(_context: Any, _address: Any, arguments: Any) -> Any:
-    """Call a C function of so many int64, pointers among them, which returns an int64."""
-
-    def generate(_: Any, builder: Any, _signature: Any, values: Any) -> Any:
-        address, packed = values
-        unpack: Any = cgutils.unpack_tuple
-        function = ir.FunctionType(_I64, [_I64] * len(arguments))
-        return builder.call(builder.inttoptr(address, function.as_pointer()), unpack(builder, packed))
-
-    return types.int64(types.int64, arguments), generate
-
-
-call_at: Any = intrinsic(_call_code)
-
+from numba.extending import lower_builtin
 
 _templates: Any = templates
 _lower: Any = lower_builtin
 _typeof: Any = numba.typeof
 _unliteral: Any = types.unliteral
 _DISABLED: Any = config.DISABLE_JIT  # type: ignore[attr-defined]
-_signatures: dict[Any, tuple[Any, ...]] = {}  # of each function that is called by `call`: the types of its arguments
+_signatures: dict[Any, tuple[tuple[Any, ...], Any]] = {}  # types of arguments and result of what `call` may call
 
 
-def entry_of(function: Any, arguments: tuple[Any, ...]) -> int:
-    """Compile a function for arguments such as these, and return its address.
+def declare(function: Any, arguments: tuple[Any, ...], result: Any) -> None:
+    """Say how a function is called by its address, so that callers are compiled without compiling it.
 
     Parameters
     ----------
     function : callable
-        As `compiled` or `lean` give it; alive as long as the address is used.
-    arguments : tuple
-        Any of their types: a function is called by address with one kind of arguments alone.
+        As `part`, `lean` or `compiled` give it.
+    arguments : tuple of Numba types
+        Which it takes, and no others.
+    result : Numba type
+        Of what it returns.
+
+    Raises
+    ------
+    TypeError
+        If it was said otherwise before.
+    """
+    if _signatures.setdefault(function, (arguments, result)) != (arguments, result):
+        raise TypeError(f"{function.__name__} is called by address with {arguments}, expected {_signatures[function]}")
+
+
+def entry_of(function: Any, arguments: tuple[Any, ...] | None = None) -> int:
+    """Compile a function, and return its address.
+
+    Parameters
+    ----------
+    function : callable
+        As `part`, `lean` or `compiled` give it; alive as long as the address is used.
+    arguments : tuple, optional
+        Such as it will be given; where not, it is declared.
 
     Returns
     -------
     int
         For `call`; 0 where nothing is compiled.
+
+    Raises
+    ------
+    TypeError
+        If it is declared for arguments of other types.
     """
     if _DISABLED:
         return 0
-    kinds = tuple(_typeof(argument) for argument in arguments)
-    if _signatures.setdefault(function, kinds) != kinds:
-        raise TypeError(f"{function.__name__} is called by address with {kinds}, expected {_signatures[function]}")
+    kinds = _signatures[function][0] if arguments is None else tuple(_typeof(argument) for argument in arguments)
     function.compile(kinds)
-    result = function.overloads[kinds]
-    address: int = result.library.get_pointer_to_function(result.fndesc.llvm_func_name)
+    compiled = function.overloads[kinds]
+    declare(function, kinds, compiled.signature.return_type)
+    address: int = compiled.library.get_pointer_to_function(compiled.fndesc.llvm_func_name)
     return address
 
 
@@ -124,9 +102,9 @@ class _Call(_templates.AbstractTemplate):  # type: ignore[misc]
     def generic(self, args: Any, _kws: Any) -> Any:
         _, function, arguments = args
         kinds = tuple(_unliteral(kind) for kind in arguments)
-        if kinds != _signatures.get(function.dispatcher):
-            raise errors.TypingError(f"{function} by address: {kinds}, expected {_signatures.get(function.dispatcher)}")
-        result = function.dispatcher.overloads[kinds].signature.return_type
+        expected, result = _signatures.get(function.dispatcher, (None, None))
+        if kinds != expected:
+            raise errors.TypingError(f"{function} by address: {kinds}, expected {expected}")
         return _templates.signature(result, types.intp, function, arguments)
 
 

@@ -9,21 +9,25 @@ from numba.core.errors import TypingError
 from controller import ControllerError
 from controller.by_address import call, entry_of
 from controller.compiled import lean, part
-from controller.regions import Box, DepthBand, Region, Sphere, pack
+from controller.regions import Box, DepthBand, Orientation, Region, Sphere, pack
 
 SPHERE = Region("s", Sphere((1.0, 2.0, 3.0), 0.5), "out")
 BAND = Region("d", DepthBand(2.0, 1.0), "in")
 BOX = Region("b", Box((5.0, 5.0, 5.0), (1.0, 2.0, 3.0)), "out")
+LEVEL = Region("level", Orientation((1.0, 0.0, 0.0, 0.0), 0.2), "in")
 
 
 def test_only_regions_that_need_them_bring_the_other_shapes():
-    assert pack([SPHERE, BAND]).others == 0
-    assert pack([SPHERE, BOX]).others != 0
+    assert pack([SPHERE, BAND])[-2:] == (0, 0)
+    packed = pack([SPHERE, BOX])
+    assert packed.place != 0 and packed.pose == 0
+    packed = pack([SPHERE, LEVEL])
+    assert packed.place == 0 and packed.pose != 0
 
 
 def test_regions_that_were_pickled_find_the_functions_of_their_process():
-    packed = pickle.loads(pickle.dumps(pack([SPHERE, BOX])._replace(others=1)))
-    assert packed.others == pack([BOX]).others
+    packed = pickle.loads(pickle.dumps(pack([SPHERE, BOX])._replace(place=1)))
+    assert packed.place == pack([BOX]).place
 
 
 def test_a_strided_array_is_refused():

@@ -91,7 +91,7 @@ def look(sight: Sight, regions: PackedRegions, position: Array, quaternion: Arra
             s.later_shifts[i, axis] = r.shifts[i, axis] + _AHEAD * r.velocities[i, axis]
     turn(quaternion, velocity[3:], _AHEAD, attitude)
     moved = PackedRegions(
-        r.kinds, r.signs, r.offsets, r.numbers, s.later_shifts, r.velocities, r.gains, r.hard, r.others
+        r.kinds, r.signs, r.offsets, r.numbers, s.later_shifts, r.velocities, r.gains, r.hard, r.place, r.pose
     )
     evaluate_packed(moved, place, attitude, s.later_values, s.later_gradients, s.later_turnings, s.later_clearances)
 
