@@ -2,13 +2,14 @@
 
 import pickle
 
+import numba
 import numpy as np
 import pytest
 from numba.core.errors import TypingError
 
 from controller import ControllerError
 from controller.by_address import call, entry_of
-from controller.compiled import lean, part
+from controller.compiled import part
 from controller.regions import Box, DepthBand, Orientation, Region, Sphere, pack
 
 SPHERE = Region("s", Sphere((1.0, 2.0, 3.0), 0.5), "out")
@@ -44,7 +45,7 @@ def scaled(numbers, scale):
     return scale * total
 
 
-@lean
+@numba.njit  # not kept on disk, whence no code could be looked at
 def by_address(address, numbers, scale):
     return call(address, scaled, (numbers, scale)) + 1.0
 
