@@ -7,55 +7,120 @@ Addresses come as integers in arguments: captured ones would defeat Numba's cach
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numba
-from llvmlite import ir
 from numba import types
-from numba.core import cgutils
-from numba.extending import intrinsic
+from numba.core import cgutils, config, errors
+from numba.core.typing import templates
+from numba.extending import lower_builtin
 
-# what a function that is called by address may be given: whole numbers, and where arrays begin
-INTEGER: Any = types.int64
-INTEGERS: Any = types.CPointer(types.int64)  # type: ignore[no-untyped-call]
-NUMBERS: Any = types.CPointer(types.float64)  # type: ignore[no-untyped-call]
-
-array_at: Any = numba.carray  # type: ignore[attr-defined]
-
-_I64 = ir.IntType(64)
+_templates: Any = templates
+_lower: Any = lower_builtin
+_typeof: Any = numba.typeof
+_unliteral: Any = types.unliteral
+_DISABLED: Any = config.DISABLE_JIT  # type: ignore[attr-defined]
+_signatures: dict[Any, tuple[tuple[Any, ...], Any]] = {}  # types of arguments and result of what `call` may call
 
 
-def address_of(function: Any, arguments: tuple[Any, ...]) -> int:
-    """Compile a function that returns an int64, and return its address.
+def declare(function: Any, arguments: tuple[Any, ...], result: Any) -> None:
+    """Say how a function is called by its address, so that callers are compiled without compiling it.
 
     Parameters
     ----------
     function : callable
-        As `compiled` or `lean` give it; alive as long as the address is used.
+        As `part`, `lean` or `compiled` give it.
     arguments : tuple of Numba types
-        Each `INTEGER`, `INTEGERS` or `NUMBERS`; of the last two `array_at` makes arrays.
+        Which it takes, and no others.
+    result : Numba type
+        Of what it returns.
+
+    Raises
+    ------
+    TypeError
+        If it was said otherwise before.
+    """
+    if _signatures.setdefault(function, (arguments, result)) != (arguments, result):
+        raise TypeError(f"{function.__name__} is called by address with {arguments}, expected {_signatures[function]}")
+
+
+def entry_of(function: Any, arguments: tuple[Any, ...] | None = None) -> int:
+    """Compile a function, and return its address.
+
+    Parameters
+    ----------
+    function : callable
+        As `part`, `lean` or `compiled` give it; alive as long as the address is used.
+    arguments : tuple, optional
+        Such as it will be given; where not, it is declared.
 
     Returns
     -------
     int
-        For `call_at`.
+        For `call`; 0 where nothing is compiled.
+
+    Raises
+    ------
+    TypeError
+        If it is declared for arguments of other types.
     """
-    function.compile(arguments)
-    result = function.overloads[arguments]
-    address: int = result.library.get_pointer_to_function(result.fndesc.llvm_cfunc_wrapper_name)
+    if _DISABLED:
+        return 0
+    kinds = _signatures[function][0] if arguments is None else tuple(_typeof(argument) for argument in arguments)
+    function.compile(kinds)
+    compiled = function.overloads[kinds]
+    declare(function, kinds, compiled.signature.return_type)
+    address: int = compiled.library.get_pointer_to_function(compiled.fndesc.llvm_func_name)
     return address
 
 
-def _call_code(_context: Any, _address: Any, arguments: Any) -> Any:
-    """Call a C function of so many int64, pointers among them, which returns an int64."""
+def call(_address: int, function: Callable[..., Any], arguments: tuple[Any, ...]) -> Any:
+    """Call a function; in compiled code by its address, so that its code is not compiled into the caller.
 
-    def generate(_: Any, builder: Any, _signature: Any, values: Any) -> Any:
-        address, packed = values
-        unpack: Any = cgutils.unpack_tuple
-        function = ir.FunctionType(_I64, [_I64] * len(arguments))
-        return builder.call(builder.inttoptr(address, function.as_pointer()), unpack(builder, packed))
+    Parameters
+    ----------
+    _address : int
+        Of `entry_of`.
+    function : callable
+        The same as there.
+    arguments : tuple
+        Of the types that were given there.
 
-    return types.int64(types.int64, arguments), generate
+    Returns
+    -------
+    object
+        What the function does.
+    """
+    return function(*arguments)
 
 
-call_at: Any = intrinsic(_call_code)
+@_templates.infer_global(call)
+class _Call(_templates.AbstractTemplate):  # type: ignore[misc]
+    """What `call` returns."""
+
+    def generic(self, args: Any, _kws: Any) -> Any:
+        _, function, arguments = args
+        kinds = tuple(_unliteral(kind) for kind in arguments)
+        expected, result = _signatures.get(function.dispatcher, (None, None))
+        if kinds != expected:
+            raise errors.TypingError(f"{function} by address: {kinds}, expected {expected}")
+        return _templates.signature(result, types.intp, function, arguments)
+
+
+def _lowered(context: Any, builder: Any, sig: Any, values: Any) -> Any:
+    """Call by Numba's own convention, and pass on what goes wrong."""
+    address, _, packed = values
+    _, _, arguments = sig.args
+    unpack: Any = cgutils.unpack_tuple
+    kind = context.call_conv.get_function_type(sig.return_type, arguments.types)
+    function = builder.inttoptr(address, kind.as_pointer())
+    status, result = context.call_conv.call_function(
+        builder, function, sig.return_type, arguments.types, unpack(builder, packed)
+    )
+    with cgutils.if_unlikely(builder, status.is_error):  # type: ignore[no-untyped-call]
+        context.call_conv.return_status_propagate(builder, status)
+    return result
+
+
+_lower(call, types.intp, types.Dispatcher, types.BaseTuple)(_lowered)

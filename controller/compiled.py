@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import numba
+from numba.core.registry import CPUDispatcher
 
 log = logging.getLogger(__name__)
 
@@ -70,11 +71,41 @@ def lean(function: F, *others: Path) -> F:
     return _kept_on_disk(function, others, counting=False)
 
 
-def _kept_on_disk(function: F, others: tuple[Path, ...], *, counting: bool) -> F:
-    options: dict[str, Any] = {
-        "error_model": "numpy",
-        "_nrt": counting,
-    }  # said in both cases: else a callee inherits it
+def part(function: F) -> F:
+    """Compile as `lean` does what compiled functions call.
+
+    What Python needs to call a function takes as long to compile as a short function does. A part has it only where
+    Python calls it, as tests do.
+
+    Parameters
+    ----------
+    function : callable
+        As for `lean`.
+
+    Returns
+    -------
+    callable
+        The same, compiled at its first call.
+    """
+    return _kept_on_disk(function, (), counting=False, no_cpython_wrapper=True, no_cfunc_wrapper=True)
+
+
+class _Part(CPUDispatcher):
+    """A compiled function without what Python needs to call it: Numba would crash where Python does."""
+
+    def __call__(self, *arguments: Any) -> Any:
+        """Call it by way of another one, which is made now."""
+        return _caller_of(self)(*arguments)
+
+
+@functools.cache
+def _caller_of(function: Any) -> Any:
+    return numba.njit(lambda *arguments: function(*arguments))
+
+
+def _kept_on_disk(function: F, others: tuple[Path, ...], *, counting: bool, **without: bool) -> F:
+    # whether references are counted is said in both cases: else a callee inherits it
+    options: dict[str, Any] = {"error_model": "numpy", "_nrt": counting, **without}
     try:
         jitted: Any = numba.njit(cache=True, **options)(function)
     except RuntimeError:  # there is no place to keep it
@@ -93,6 +124,8 @@ def _kept_on_disk(function: F, others: tuple[Path, ...], *, counting: bool) -> F
             jitted = numba.njit(**options)(function)
     except AttributeError:
         jitted = numba.njit(**options)(function)
+    if without and isinstance(jitted, CPUDispatcher):
+        jitted.__class__ = _Part
     result: F = jitted
     return result
 

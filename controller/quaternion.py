@@ -43,13 +43,17 @@ def rotation_rows(e: Array) -> tuple[Vector3, Vector3, Vector3]:
     )
 
 
+@lean
+def write_rotation(e: Array, R: Array) -> None:
+    """Write R, shape (3, 3), from body to world, of a unit quaternion: (3)."""
+    (R[0, 0], R[0, 1], R[0, 2]), (R[1, 0], R[1, 1], R[1, 2]), (R[2, 0], R[2, 1], R[2, 2]) = rotation_rows(e)
+
+
 @compiled
 def rotation_matrix(e: Array) -> Array:
     """Return R, shape (3, 3), from body to world, of a unit quaternion `e`: (3)."""
-    rows = rotation_rows(e)
     R = np.empty((3, 3))
-    for i in range(3):
-        R[i, 0], R[i, 1], R[i, 2] = rows[i]
+    write_rotation(e, R)
     return R
 
 
@@ -108,8 +112,16 @@ def error(desired: Array, actual: Array) -> Array:
     return e
 
 
+@lean
+def down_parts(e: Array) -> Vector3:
+    """Return the parts of k = R^T e3: the direction of gravity seen from the body, for (12)."""
+    e0, e1, e2, e3 = e[0], e[1], e[2], e[3]
+    return 2.0 * (e1 * e3 - e0 * e2), 2.0 * (e2 * e3 + e0 * e1), 1.0 - 2.0 * (e1 * e1 + e2 * e2)
+
+
 @compiled
 def down_in_body(e: Array) -> Array:
     """Return k = R^T e3, shape (3,), at the attitude `e`: the direction of gravity seen from the body, for (12)."""
-    e0, e1, e2, e3 = e
-    return np.array([2.0 * (e1 * e3 - e0 * e2), 2.0 * (e2 * e3 + e0 * e1), 1.0 - 2.0 * (e1 * e1 + e2 * e2)])
+    k = np.empty(3)
+    k[0], k[1], k[2] = down_parts(e)
+    return k

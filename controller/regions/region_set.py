@@ -13,9 +13,10 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from controller.by_address import call_at
-from controller.compiled import compiled, inlined, lean
+from controller.by_address import call
+from controller.compiled import inlined, lean, part
 from controller.errors import RegionError
+from controller.on_stack import zeros
 from controller.regions.box import Box
 from controller.regions.cone import Cone
 from controller.regions.cylinder import Cylinder
@@ -26,14 +27,14 @@ from controller.regions.kinds import (
     DEPTH_BAND,
     FIRST_OF_ATTITUDE,
     SPHERE,
+    addresses_of,
     evaluate_shape,
     evaluate_shape_of_attitude,
-    others_of,
 )
 from controller.regions.orientation import Orientation
 from controller.regions.pipe import Pipe
 from controller.regions.prism import Prism
-from controller.regions.shape import Array, Shape, Vector3, require, require_finite
+from controller.regions.shape import Array, Evaluation, EvaluationOfAttitude, Shape, Vector3, require, require_finite
 from controller.regions.sphere import Sphere, sphere_about
 from controller.regions.visibility import Visibility
 
@@ -94,7 +95,8 @@ class PackedRegions(NamedTuple):
     velocities: Array  # (n, 3) m/s, NED
     gains: Array  # (n,) alpha_i
     hard: NDArray[np.bool_]  # (n,)
-    others: int  # address of what evaluates shapes but spheres and bands of depth; 0 where there are none
+    place: int  # address of what evaluates shapes of position alone; 0 where there are but spheres and bands of depth
+    pose: int  # address of what evaluates shapes of attitude; 0 where there are none
 
     def evaluate(
         self, position: Array, quaternion: Array, values: Array, gradients: Array, turnings: Array, clearances: Array
@@ -129,7 +131,7 @@ class PackedRegions(NamedTuple):
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle what holds in another process too: addresses do not."""
-        return _unpickled, (tuple(self)[:-1],)
+        return _unpickled, (tuple(self)[:-2],)
 
     def move_to(self, time: float) -> None:
         """Put every region where its velocity has brought it at a time [s]."""
@@ -151,6 +153,7 @@ def pack(regions: Sequence[Region]) -> PackedRegions:
     """
     packed = [region.shape.packed() for region in regions]
     kinds = np.array([region.shape.kind for region in regions], dtype=np.int64)
+    place, pose = addresses_of(kinds)
     return PackedRegions(
         kinds=kinds,
         signs=np.array([1.0 if region.keep == "in" else -1.0 for region in regions]),
@@ -160,12 +163,13 @@ def pack(regions: Sequence[Region]) -> PackedRegions:
         velocities=np.array([region.velocity for region in regions], dtype=float).reshape(-1, 3),
         gains=np.array([region.gain for region in regions], dtype=float),
         hard=np.array([region.hard for region in regions], dtype=np.bool_),
-        others=others_of(kinds),
+        place=place,
+        pose=pose,
     )
 
 
 def _unpickled(arrays: tuple[Any, ...]) -> PackedRegions:
-    fields: tuple[Any, ...] = (*arrays, others_of(arrays[0]))
+    fields: tuple[Any, ...] = (*arrays, *addresses_of(arrays[0]))
     return PackedRegions(*fields)
 
 
@@ -180,63 +184,59 @@ def evaluate_packed(
     clearances: Array,
 ) -> None:
     """Do what `PackedRegions.evaluate` says, with these `regions`, for compiled callers."""
-    if _evaluate_plain(regions, position, values, gradients, turnings, clearances):
-        call_at(
-            regions.others,
-            (
-                regions.kinds.size,
-                regions.kinds.ctypes.data,
-                regions.signs.ctypes.data,
-                regions.offsets.ctypes.data,
-                regions.numbers.size,
-                regions.numbers.ctypes.data,
-                regions.shifts.ctypes.data,
-                position.ctypes.data,
-                quaternion.ctypes.data,
-                values.ctypes.data,
-                gradients.ctypes.data,
-                turnings.ctypes.data,
-                clearances.ctypes.data,
-            ),
-        )
-
-
-@lean
-def _evaluate_plain(
-    regions: PackedRegions, position: Array, values: Array, gradients: Array, turnings: Array, clearances: Array
-) -> bool:
-    """Evaluate spheres and bands of depth, by numbers alone; return whether there are others."""
-    others = False
+    at = zeros(3)
     for i in range(regions.kinds.size):
-        x = position[0] - regions.shifts[i, 0]
-        y = position[1] - regions.shifts[i, 1]
-        z = position[2] - regions.shifts[i, 2]
-        kind, q, first = regions.kinds[i], regions.numbers, regions.offsets[i]
-        if kind == SPHERE:
-            g, gx, gy, gz, distance = sphere_about(x - q[first], y - q[first + 1], z - q[first + 2], q[first + 3])
-        elif kind == DEPTH_BAND:
-            g, gx, gy, gz, distance = band_about(z - q[first], q[first + 1])
+        tx, ty, tz = 0.0, 0.0, 0.0
+        if regions.kinds[i] < FIRST_OF_ATTITUDE:
+            g, gx, gy, gz, distance = evaluate_place(regions, i, position, at)
         else:
-            others = True
-            continue
+            g, gx, gy, gz, tx, ty, tz = evaluate_pose(regions, i, position, quaternion, at)
+            distance = g
         sign = regions.signs[i]
         values[i], clearances[i] = sign * g, -sign * distance
         gradients[i, 0], gradients[i, 1], gradients[i, 2] = sign * gx, sign * gy, sign * gz
-        turnings[i, 0], turnings[i, 1], turnings[i, 2] = 0.0, 0.0, 0.0
-    return others
+        turnings[i, 0], turnings[i, 1], turnings[i, 2] = sign * tx, sign * ty, sign * tz
 
 
-@inlined
+@part
+def evaluate_place(regions: PackedRegions, i: int, position: Array, at: Array) -> Evaluation:
+    """Evaluate the shape of region `i`, of position alone, where it is now; `at` is room of shape (3,).
+
+    Spheres and bands of depth are evaluated here, by numbers alone; the others are called by address.
+    """
+    x = position[0] - regions.shifts[i, 0]
+    y = position[1] - regions.shifts[i, 1]
+    z = position[2] - regions.shifts[i, 2]
+    kind, q, first = regions.kinds[i], regions.numbers, regions.offsets[i]
+    if kind == SPHERE:
+        return sphere_about(x - q[first], y - q[first + 1], z - q[first + 2], q[first + 3])
+    if kind == DEPTH_BAND:
+        return band_about(z - q[first], q[first + 1])
+    at[0], at[1], at[2] = x, y, z
+    evaluation: Evaluation = call(regions.place, evaluate_shape, (kind, at, q[first : regions.offsets[i + 1]]))
+    return evaluation
+
+
+@part
+def evaluate_pose(regions: PackedRegions, i: int, position: Array, e: Array, at: Array) -> EvaluationOfAttitude:
+    """Evaluate the shape of region `i`, of attitude, where it is now; `at` is room of shape (3,)."""
+    for axis in range(3):
+        at[axis] = position[axis] - regions.shifts[i, axis]
+    numbers = regions.numbers[regions.offsets[i] : regions.offsets[i + 1]]
+    evaluation: EvaluationOfAttitude = call(
+        regions.pose, evaluate_shape_of_attitude, (regions.kinds[i], at, e, numbers)
+    )
+    return evaluation
+
+
+@part
 def clearance_of_place(regions: PackedRegions, i: int, position: Array, room: Array) -> float:
     """Return what `clearance_at` does, of a region known to be of position alone; `room` has shape (3,)."""
-    for axis in range(3):
-        room[axis] = position[axis] - regions.shifts[i, axis]
-    numbers = regions.numbers[regions.offsets[i] : regions.offsets[i + 1]]
-    clearance: float = -regions.signs[i] * evaluate_shape(regions.kinds[i], room, numbers)[4]
+    clearance: float = -regions.signs[i] * evaluate_place(regions, i, position, room)[4]
     return clearance
 
 
-@compiled
+@lean
 def clearance_at(regions: PackedRegions, i: int, position: Array) -> float:
     """Return the clearance [m] of one of the `regions`, `i`, where it is now, at a position, shape (3,) [m, NED].
 
@@ -244,7 +244,7 @@ def clearance_at(regions: PackedRegions, i: int, position: Array) -> float:
     """
     if regions.kinds[i] >= FIRST_OF_ATTITUDE:
         return math.inf
-    return clearance_of_place(regions, i, position, np.empty(3))
+    return clearance_of_place(regions, i, position, zeros(3))
 
 
 @lean
@@ -255,10 +255,7 @@ def clearance_of_pose(regions: PackedRegions, i: int, position: Array, quaternio
     """
     if regions.kinds[i] < FIRST_OF_ATTITUDE:
         return clearance_of_place(regions, i, position, room)
-    for axis in range(3):
-        room[axis] = position[axis] - regions.shifts[i, axis]
-    numbers = regions.numbers[regions.offsets[i] : regions.offsets[i + 1]]
-    clearance: float = -regions.signs[i] * evaluate_shape_of_attitude(regions.kinds[i], room, quaternion, numbers)[0]
+    clearance: float = -regions.signs[i] * evaluate_pose(regions, i, position, quaternion, room)[0]
     return clearance
 
 
@@ -273,26 +270,27 @@ def clearance_of_sphere(regions: PackedRegions, i: int, position: Array) -> floa
     return clearance
 
 
-@compiled
-def attitude_clearance(regions: PackedRegions, i: int, position: Array, quaternion: Array) -> tuple[float, Array]:
-    """Return the clearance [rad] of one of the `regions`, `i`, of attitude, and its slope over a turn in body axes.
+@lean
+def attitude_clearance(regions: PackedRegions, i: int, position: Array, quaternion: Array, slope: Array) -> float:
+    """Return the clearance [rad] of one of the `regions`, `i`, of attitude.
 
-    The pose is a `position` [m, NED] and a unit `quaternion`.
+    Its `slope` over a turn in body axes, shape (3,), is written. The pose is a `position` [m, NED] and a unit
+    `quaternion`.
     """
-    numbers = regions.numbers[regions.offsets[i] : regions.offsets[i + 1]]
-    at, sign = position - regions.shifts[i], regions.signs[i]
-    g, _, _, _, x, y, z = evaluate_shape_of_attitude(regions.kinds[i], at, quaternion, numbers)
-    return -sign * g, np.array([-sign * x, -sign * y, -sign * z])
+    sign = regions.signs[i]
+    g, _, _, _, x, y, z = evaluate_pose(regions, i, position, quaternion, zeros(3))
+    slope[0], slope[1], slope[2] = -sign * x, -sign * y, -sign * z
+    clearance: float = -sign * g
+    return clearance
 
 
-@compiled
+@lean
 def place_clearance(regions: PackedRegions, i: int, position: Array, slope: Array) -> float:
     """Return the clearance [m] of one of the `regions`, `i`, of position alone.
 
     Its `slope` at the `position`, shape (3,), of length 1 or 0, is written.
     """
-    numbers = regions.numbers[regions.offsets[i] : regions.offsets[i + 1]]
-    _, x, y, z, distance = evaluate_shape(regions.kinds[i], position - regions.shifts[i], numbers)
+    _, x, y, z, distance = evaluate_place(regions, i, position, zeros(3))
     size, sign = math.sqrt(x * x + y * y + z * z), regions.signs[i]
     scale = -sign / size if size > 0.0 else 0.0
     slope[0], slope[1], slope[2] = scale * x, scale * y, scale * z

@@ -16,11 +16,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from controller.compiled import compiled
+from controller.compiled import compiled, part
 from controller.laws.deployable.gains import DeployableGains
-from controller.laws.deployable.linear_algebra import product
+from controller.laws.deployable.linear_algebra import copy, product
 from controller.laws.deployable.model import Dynamics, Thrusters
-from controller.quaternion import down_in_body, error
+from controller.on_stack import zeros
+from controller.quaternion import down_parts, error_parts
 from controller.quaternion import rate as quaternion_rate
 from controller.regions import Orientation, PackedRegions, attitude_clearance
 
@@ -48,7 +49,7 @@ def attitude_of(preferred: Array) -> Attitude:
     return Attitude(preferred.copy(), preferred.copy(), np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(1))
 
 
-@compiled
+@part
 def adapt(
     attitude: Attitude,
     dynamics: Dynamics,
@@ -63,9 +64,9 @@ def adapt(
     `omega` is in [rad/s], body axes, and the period in [s].
     """
     if attitude.known[0] > 0.0:
-        wrench = np.empty(6)
+        wrench, k = zeros(6), zeros(3)
         product(thrusters.matrix, thrusters.forces, wrench)
-        k = down_in_body(quaternion)
+        k[0], k[1], k[2] = down_parts(quaternion)
         phi, last, mass = attitude.moments, attitude.last_omega, dynamics.mass
         for i in range(3):
             a, b = (i + 1) % 3, (i + 2) % 3
@@ -81,14 +82,14 @@ def adapt(
             drive = k[a] * attitude.residual[b] - k[b] * attitude.residual[a]  # S(k) r = -S(k)^T r
             phi[i] += gains.adaptation * period * drive
             phi[i] = min(max(phi[i], -gains.moment_bound), gains.moment_bound)
-    attitude.last_omega[:] = omega
+    copy(omega, attitude.last_omega)
     attitude.known[0] = 1.0
 
 
-@compiled
+@part
 def carry(attitude: Attitude, dynamics: Dynamics, R: Array, velocity: Array, water: Array) -> None:
     """Bring Munk's moment up to date with the velocities [m/s] of vehicle and water, shape (3,) each, NED."""
-    relative, momentum = np.zeros(3), np.zeros(3)
+    relative, momentum = zeros(3), zeros(3)
     for i in range(3):
         for axis in range(3):
             relative[i] += R[axis, i] * (velocity[axis] - water[axis])
@@ -100,7 +101,7 @@ def carry(attitude: Attitude, dynamics: Dynamics, R: Array, velocity: Array, wat
         attitude.carried[i] = relative[b] * momentum[a] - relative[a] * momentum[b]  # -nu_r x (M nu_r)
 
 
-@compiled
+@part
 def aim(attitude: Attitude, regions: PackedRegions, position: Array, gains: DeployableGains, period: float) -> None:
     """Turn the held attitude towards the preferred one, or to where regions of attitude have comfort.
 
@@ -117,45 +118,66 @@ def aim(attitude: Attitude, regions: PackedRegions, position: Array, gains: Depl
     period : float
         [s].
     """
-    back = error(attitude.preferred, attitude.desired)  # desired = preferred * back
-    turn = -2.0 * _RETURN * back[1:]
+    back, omega, slope, k = zeros(4), zeros(3), zeros(3), zeros(3)
+    back[0], back[1], back[2], back[3] = error_parts(attitude.preferred, attitude.desired)
+    for axis in range(3):  # desired = preferred * back
+        omega[axis] = -2.0 * _RETURN * back[1 + axis]
     asked = False
     for i in range(regions.kinds.size):
         if regions.kinds[i] < _ATTITUDE:
             continue
-        clearance, slope = attitude_clearance(regions, i, position, attitude.desired)
+        clearance = attitude_clearance(regions, i, position, attitude.desired, slope)
         size = np.sqrt(slope[0] ** 2 + slope[1] ** 2 + slope[2] ** 2)
         if clearance < gains.comfort:
             asked = True
             if size > 0.0:
-                turn += _TURN * (gains.comfort - clearance) / size * slope
+                _add(_TURN * (gains.comfort - clearance) / size, slope, omega)
             elif clearance < 0.0:  # half a turn away, where every way round is as long: about the vertical
-                turn += _TURN * (gains.comfort - clearance) * down_in_body(attitude.desired)
+                k[0], k[1], k[2] = down_parts(attitude.desired)
+                _add(_TURN * (gains.comfort - clearance), k, omega)
     if not asked and back[0] > 1.0 - 1e-15:
         return
-    size = np.sqrt(turn[0] ** 2 + turn[1] ** 2 + turn[2] ** 2)
+    size = np.sqrt(omega[0] ** 2 + omega[1] ** 2 + omega[2] ** 2)
     if size > gains.turning_rate:
-        turn *= gains.turning_rate / size
-    _turned(attitude.desired, turn, period)
+        for axis in range(3):
+            omega[axis] *= gains.turning_rate / size
+    turn(attitude.desired, omega, period, attitude.desired)
     # no more tilted than allowed: what is left of the turn is that about the vertical
-    k = down_in_body(attitude.desired)
-    if k[2] < np.cos(gains.tilt) and k[2] < down_in_body(attitude.preferred)[2]:
-        _turned(attitude.desired, -turn, period)
-        k = down_in_body(attitude.desired)
-        _turned(attitude.desired, (k[0] * turn[0] + k[1] * turn[1] + k[2] * turn[2]) * k, period)
+    upright = down_parts(attitude.desired)[2]
+    if upright < np.cos(gains.tilt) and upright < down_parts(attitude.preferred)[2]:
+        for axis in range(3):
+            omega[axis] = -omega[axis]
+        turn(attitude.desired, omega, period, attitude.desired)
+        k[0], k[1], k[2] = down_parts(attitude.desired)
+        along = -(k[0] * omega[0] + k[1] * omega[1] + k[2] * omega[2])
+        for axis in range(3):
+            omega[axis] = along * k[axis]
+        turn(attitude.desired, omega, period, attitude.desired)
+
+
+@part
+def _add(scale: float, values: Array, out: Array) -> None:
+    """Add `scale` times the values, shape (3,), to `out`."""
+    for axis in range(3):
+        out[axis] += scale * values[axis]
 
 
 @compiled
-def _turned(quaternion: Array, omega: Array, period: float) -> None:
-    """Turn an attitude at a body rate [rad/s] for a period [s], in place."""
-    turned = quaternion + period * quaternion_rate(quaternion, omega)
-    quaternion[:] = turned / np.sqrt(turned[0] ** 2 + turned[1] ** 2 + turned[2] ** 2 + turned[3] ** 2)
+def turn(quaternion: Array, omega: Array, period: float, out: Array) -> None:
+    """Write the attitude to which a body rate [rad/s] leads in a period [s] into `out`, which may be the first."""
+    rate = quaternion_rate(quaternion, omega)
+    for i in range(4):
+        out[i] = quaternion[i] + period * rate[i]
+    length = np.sqrt(out[0] ** 2 + out[1] ** 2 + out[2] ** 2 + out[3] ** 2)
+    for i in range(4):
+        out[i] /= length
 
 
-@compiled
+@part
 def free_turning(attitude: Attitude, dynamics: Dynamics, quaternion: Array, omega: Array, out: Array) -> None:
     """Write the angular acceleration without thrust, shape (3,) [rad/s2], body axes."""
-    k, moments, momentum = down_in_body(quaternion), np.zeros(3), np.zeros(3)
+    k, moments, momentum = zeros(3), zeros(3), zeros(3)
+    k[0], k[1], k[2] = down_parts(quaternion)
     for i in range(3):
         for j in range(3):
             momentum[i] += dynamics.mass[3 + i, 3 + j] * omega[j]
@@ -170,13 +192,14 @@ def free_turning(attitude: Attitude, dynamics: Dynamics, quaternion: Array, omeg
             out[i] += dynamics.inverse_mass[3 + i, 3 + j] * moments[j]
 
 
-@compiled
+@part
 def moment(
     attitude: Attitude, dynamics: Dynamics, quaternion: Array, omega: Array, gains: DeployableGains, out: Array
 ) -> None:
     """Write the wanted moment, shape (3,) [N m], body axes."""
-    e = error(attitude.desired, quaternion)
-    k = down_in_body(quaternion)
+    e, k = zeros(4), zeros(3)
+    e[0], e[1], e[2], e[3] = error_parts(attitude.desired, quaternion)
+    k[0], k[1], k[2] = down_parts(quaternion)
     w = gains.attitude_bandwidth
     for i in range(3):
         a, b = (i + 1) % 3, (i + 2) % 3

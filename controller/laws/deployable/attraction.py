@@ -5,9 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from controller.compiled import compiled
+from controller.compiled import part
 from controller.laws.deployable.gains import DeployableGains
 from controller.laws.deployable.guide import Guide
+from controller.laws.deployable.linear_algebra import copy
+from controller.on_stack import zeros
 
 Array = NDArray[np.float64]
 
@@ -15,7 +17,7 @@ _AHEAD = 0.4  # m along the way, of the point that is headed for
 _SLOWEST_CORNER = 0.25  # of the full speed, at a corner that turns right back
 
 
-@compiled
+@part
 def approach_speed(distance: float, deceleration: float, slope: float) -> float:
     """Return the speed [m/s] from which a distance [m] still suffices to stop.
 
@@ -27,20 +29,21 @@ def approach_speed(distance: float, deceleration: float, slope: float) -> float:
     return float(np.sqrt(2.0 * deceleration * distance + offset * offset)) - offset
 
 
-@compiled
+@part
 def wanted_velocity(guide: Guide, position: Array, goal_velocity: Array, gains: DeployableGains, out: Array) -> None:
     """Write the velocity [m/s], world frame, shape (3,), that follows the way; `position` is where the vehicle is."""
     count, way = guide.points[0], guide.way
-    speed, left, travelled, towards = gains.speed, 0.0, 0.0, np.zeros(3)
-    to_go, before = _AHEAD, np.zeros(3)
+    speed, left, travelled, towards = gains.speed, 0.0, 0.0, zeros(3)
+    to_go, before = _AHEAD, zeros(3)
     for leg in range(count):
-        length, direction = 0.0, np.empty(3)
+        length, direction = 0.0, zeros(3)
         for axis in range(3):
             direction[axis] = way[leg, axis] - (position[axis] if leg == 0 else way[leg - 1, axis])
             length += direction[axis] ** 2
         length = np.sqrt(length)
         if length > 0.0:
-            direction /= length
+            for axis in range(3):
+                direction[axis] /= length
         if leg > 0:  # slower round a corner
             turn = before[0] * direction[0] + before[1] * direction[1] + before[2] * direction[2]
             at_corner = gains.speed * max(_SLOWEST_CORNER, 0.5 * (1.0 + turn))
@@ -50,7 +53,7 @@ def wanted_velocity(guide: Guide, position: Array, goal_velocity: Array, gains: 
             towards[axis] += part * direction[axis]
         to_go -= part
         travelled += length
-        before[:] = direction
+        copy(direction, before)
     left = travelled
     speed = min(speed, approach_speed(left, gains.acceleration, gains.position_bandwidth))
     size = np.sqrt(towards[0] ** 2 + towards[1] ** 2 + towards[2] ** 2)
@@ -58,7 +61,7 @@ def wanted_velocity(guide: Guide, position: Array, goal_velocity: Array, gains: 
         out[axis] = goal_velocity[axis] + (speed * towards[axis] / size if size > 1e-9 else 0.0)
 
 
-@compiled
+@part
 def wanted_acceleration(wanted: Array, velocity: Array, gains: DeployableGains, out: Array) -> None:
     """Write the acceleration [m/s2], world frame, that brings the velocity to the wanted one, bounded in length."""
     size = 0.0

@@ -24,12 +24,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from controller.compiled import compiled
+from controller.compiled import part
+from controller.laws.deployable.attitude import turn
 from controller.laws.deployable.attraction import approach_speed
 from controller.laws.deployable.faces import FACES, face_ahead, has_faces
 from controller.laws.deployable.gains import DeployableGains
+from controller.laws.deployable.linear_algebra import copy
 from controller.laws.deployable.quadratic_program import Workspace
-from controller.quaternion import rate as quaternion_rate
+from controller.on_stack import zeros
 from controller.regions import Box, DepthBand, HalfSpace, Orientation, PackedRegions, Prism, evaluate_packed
 
 Array = NDArray[np.float64]
@@ -49,6 +51,7 @@ class Sight(NamedTuple):
     gradients: Array  # (n, 3)
     turnings: Array  # (n, 3)
     clearances: Array  # (n,)
+    later_shifts: Array  # (n, 3) m, of the regions
     later_values: Array  # (n,)
     later_gradients: Array  # (n, 3)
     later_turnings: Array  # (n, 3)
@@ -71,26 +74,29 @@ class Motion(NamedTuple):
 def sight_of(n: int) -> Sight:
     """Return room for `n` regions."""
     return Sight(
-        np.zeros(n), np.zeros((n, 3)), np.zeros((n, 3)), np.zeros(n),
+        np.zeros(n), np.zeros((n, 3)), np.zeros((n, 3)), np.zeros(n), np.zeros((n, 3)),
         np.zeros(n), np.zeros((n, 3)), np.zeros((n, 3)), np.zeros(n),
     )  # fmt: skip
 
 
-@compiled
+@part
 def look(sight: Sight, regions: PackedRegions, position: Array, quaternion: Array, velocity: Array) -> None:
     """Evaluate the regions at a pose [m, NED], and at the one to which a velocity leads, shape (6,) as in `Motion`."""
     s = sight
     evaluate_packed(regions, position, quaternion, s.values, s.gradients, s.turnings, s.clearances)
-    place = position + _AHEAD * velocity[:3]
-    r = regions
-    shifts = r.shifts + _AHEAD * r.velocities
-    moved = PackedRegions(r.kinds, r.signs, r.offsets, r.numbers, shifts, r.velocities, r.gains, r.hard, r.others)
-    attitude = quaternion + _AHEAD * quaternion_rate(quaternion, velocity[3:])
-    attitude /= np.sqrt(attitude[0] ** 2 + attitude[1] ** 2 + attitude[2] ** 2 + attitude[3] ** 2)
+    r, place, attitude = regions, zeros(3), zeros(4)
+    for axis in range(3):
+        place[axis] = position[axis] + _AHEAD * velocity[axis]
+        for i in range(r.kinds.size):
+            s.later_shifts[i, axis] = r.shifts[i, axis] + _AHEAD * r.velocities[i, axis]
+    turn(quaternion, velocity[3:], _AHEAD, attitude)
+    moved = PackedRegions(
+        r.kinds, r.signs, r.offsets, r.numbers, s.later_shifts, r.velocities, r.gains, r.hard, r.place, r.pose
+    )
     evaluate_packed(moved, place, attitude, s.later_values, s.later_gradients, s.later_turnings, s.later_clearances)
 
 
-@compiled
+@part
 def slope_of(gradients: Array, turnings: Array, i: int, of_attitude: bool, out: Array) -> bool:
     """Write the slope of a clearance over the pose, shape (6,); False where there is none.
 
@@ -107,7 +113,7 @@ def slope_of(gradients: Array, turnings: Array, i: int, of_attitude: bool, out: 
     return True
 
 
-@compiled
+@part
 def turning_of(kind: int, n: Array, later: Array, velocity: Array) -> float:
     """Return (dn/dt)^T v, from a slope now and later, (6,) each, along a velocity [m/s, rad/s] against the region.
 
@@ -123,7 +129,7 @@ def turning_of(kind: int, n: Array, later: Array, velocity: Array) -> float:
     return turning
 
 
-@compiled
+@part
 def write_rows(
     work: Workspace,
     sight: Sight,
@@ -158,7 +164,7 @@ def write_rows(
     int
         Rows written, (1 + FACES) n at most.
     """
-    rows, n, later_n, relative, along_way = 0, np.empty(6), np.empty(6), np.empty(6), np.empty(3)
+    rows, n, later_n, relative, along_way = 0, zeros(6), zeros(6), zeros(6), zeros(3)
     for i in range(regions.kinds.size):
         of_attitude = regions.kinds[i] >= _ATTITUDE
         if not regions.hard[i] or not slope_of(sight.gradients, sight.turnings, i, of_attitude, n):
@@ -176,7 +182,7 @@ def write_rows(
             turning = turning_of(regions.kinds[i], n, later_n, relative)
         distance, reach, faces = sight.clearances[i], 0.0, 1
         if not of_attitude and has_faces(regions.kinds[i]):
-            along_way[:] = relative[:3]
+            copy(relative, along_way)
             speed = np.sqrt(along_way[0] ** 2 + along_way[1] ** 2 + along_way[2] ** 2)
             reach = margin + speed * (speed / (2.0 * braking) + 1.0 / gains.barrier_slope + 1.0 / gains.barrier_rate)
             if 0.0 < distance < reach:
@@ -186,7 +192,7 @@ def write_rows(
                 distance = face_ahead(regions, i, motion.position, n[:3], along_way, reach, later_n[:3])
                 if not distance < np.inf:
                     break
-                n[:3] = later_n[:3]
+                copy(later_n, n[:3])
                 turning = 0.0  # flat, as far as is known
 
             # h, its rate, and what its second derivative is without thrust

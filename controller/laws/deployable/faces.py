@@ -12,7 +12,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from controller.compiled import compiled, inlined
+from controller.compiled import inlined, part
+from controller.on_stack import zeros
 from controller.regions import Ellipsoid, HalfSpace, PackedRegions, Sphere, clearance_of_place, place_clearance
 
 Array = NDArray[np.float64]
@@ -23,13 +24,13 @@ _LOOKS = 16  # along a way at most
 _HALVINGS = 6  # of the stretch in which it leaves the region
 
 
-@compiled
+@part
 def has_faces(kind: int) -> bool:
     """Return whether the clearance of a kind of region of place may bend where two faces are equally near."""
     return kind not in _SMOOTH
 
 
-@compiled
+@part
 def face_ahead(
     regions: PackedRegions, i: int, position: Array, nearest: Array, velocity: Array, reach: float, face: Array
 ) -> float:
@@ -66,7 +67,7 @@ def face_ahead(
     speed = np.sqrt(speed)
     if not speed > 1e-6:
         return np.inf
-    point, room, within, beyond = np.empty(3), np.empty(3), 0.0, 0.0
+    point, room, within, beyond = zeros(3), zeros(3), 0.0, 0.0
     clearance = _clearance_along(regions, i, position, velocity, 0.0, point, room)
     while clearance > 0.0:
         if beyond >= reach:

@@ -22,11 +22,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from controller.compiled import compiled
+from controller.compiled import part
 from controller.laws.deployable.gains import DeployableGains
 from controller.laws.deployable.linear_algebra import norm
 from controller.laws.deployable.model import Dynamics, Thrusters
 from controller.laws.deployable.observer import Estimate
+from controller.on_stack import zeros
 
 Array = NDArray[np.float64]
 
@@ -53,7 +54,7 @@ def suspicion_of(m: int) -> Suspicion:
     return Suspicion(np.zeros(m), np.zeros((m, 3)), np.zeros((m, 3)), np.full(1, -1))
 
 
-@compiled
+@part
 def suspect(
     suspicion: Suspicion,
     estimate: Estimate,
@@ -93,7 +94,7 @@ def suspect(
     """
     if gains.failure_threshold <= 0.0:
         return -1
-    m, variance = thrusters.health.size, np.empty(3)
+    m, variance = thrusters.health.size, zeros(3)
     for axis in range(3):
         variance[axis] = (
             0.0 if axis == 2 else (_BELOW * dynamics.translational_mass[0] * norm(estimate.acceleration)) ** 2
@@ -133,7 +134,7 @@ def suspect(
     return -1
 
 
-@compiled
+@part
 def _by_velocity(
     lag: Array, push: Array, impulse: float, R: Array, innovation: Array, spread: Array, gain: Array, measured: bool
 ) -> float:
@@ -150,7 +151,7 @@ def _by_velocity(
     return min(max(step, -_MOST_A_STEP), _MOST_A_STEP)
 
 
-@compiled
+@part
 def _by_moment(
     adapted: Array, push: Array, force: float, residual: Array, variance: Array, R: Array, adaptation: float
 ) -> float:
@@ -171,7 +172,7 @@ def _by_moment(
     return min(max(step, -_MOST_A_STEP), _MOST_A_STEP)
 
 
-@compiled
+@part
 def give_up(suspicion: Suspicion, thrusters: Thrusters, failed: int) -> None:
     """Take a suspected thruster out of `health`, and take back the one that was suspected before it.
 

@@ -15,10 +15,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from controller.compiled import compiled
+from controller.compiled import part
 from controller.laws.deployable.gains import DeployableGains
-from controller.laws.deployable.linear_algebra import norm
+from controller.laws.deployable.linear_algebra import copy, norm
 from controller.laws.deployable.search import Tree, grow, tree_of_nothing
+from controller.on_stack import zeros
 from controller.regions import (
     Orientation,
     PackedRegions,
@@ -80,7 +81,7 @@ def guide_of_nothing(n_regions: int, seed: int) -> Guide:
     )
 
 
-@compiled
+@part
 def uniform(random: NDArray[np.uint64]) -> float:
     """Return the next random number in [0, 1): xorshift64*, Vigna 2016."""
     x = random[0]
@@ -91,13 +92,13 @@ def uniform(random: NDArray[np.uint64]) -> float:
     return float((x * np.uint64(0x2545F4914F6CDD1D)) >> np.uint64(11)) / 9007199254740992.0
 
 
-@compiled
+@part
 def _spread(random: NDArray[np.uint64]) -> float:
     """Return a random number about 0 with deviation 1, bell-shaped."""
     return (uniform(random) + uniform(random) + uniform(random) + uniform(random) - 2.0) * 1.7320508075688772
 
 
-@compiled
+@part
 def cost_of(
     way: Array, count: int, start: Array, regions: PackedRegions, far_until: Array, gains: DeployableGains
 ) -> float:
@@ -129,7 +130,7 @@ def cost_of(
     enough = gains.clearance + _STRIDE[1] / _TRUST  # m, of clearance: more makes no difference
     far_until[:] = 0.0
     total, travelled, samples = 0.0, 0.0, 0
-    here, point, room = np.empty(3), np.empty(3), np.empty(3)
+    here, point, room = zeros(3), zeros(3), zeros(3)
     for leg in range(count):
         begin = start if leg == 0 else way[leg - 1]
         length = np.sqrt((way[leg, 0] - begin[0]) ** 2 + (way[leg, 1] - begin[1]) ** 2 + (way[leg, 2] - begin[2]) ** 2)
@@ -171,17 +172,18 @@ def cost_of(
     return total
 
 
-@compiled
+@part
 def nearest_end(goal: PackedRegions, position: Array, depth: float, end: Array) -> None:
     """Write the point of the goal region nearest to a position, `depth` [m] inside where the region is that deep.
 
     It goes up the slope of the clearance, half as far wherever that leads little deeper: in a region that is less deep,
     to about its middle.
     """
-    end[:] = position
-    value, gradient, turning, clearance = np.empty(1), np.empty((1, 3)), np.empty((1, 3)), np.empty(1)
-    level = np.array([1.0, 0.0, 0.0, 0.0])  # a goal is a place: no attitude matters
-    other, other_gradient, other_clearance = np.empty(3), np.empty((1, 3)), np.empty(1)
+    copy(position, end)
+    value, gradient, turning, clearance = zeros(1), zeros(1, 3), zeros(1, 3), zeros(1)
+    level = zeros(4)  # a goal is a place: no attitude matters
+    level[0] = 1.0
+    other, other_gradient, other_clearance = zeros(3), zeros(1, 3), zeros(1)
     evaluate_packed(goal, end, level, value, gradient, turning, clearance)
     part = 1.0
     for _ in range(_CLIMBS):
@@ -192,13 +194,15 @@ def nearest_end(goal: PackedRegions, position: Array, depth: float, end: Array) 
             other[axis] = end[axis] - gradient[0, axis] / slope * lack * part
         evaluate_packed(goal, other, level, value, other_gradient, turning, other_clearance)
         if other_clearance[0] > clearance[0] + _PAYS * lack * part:
-            end[:], gradient[:, :], clearance[0] = other, other_gradient, other_clearance[0]
+            copy(other, end)
+            copy(other_gradient[0], gradient[0])
+            clearance[0] = other_clearance[0]
             part = min(2.0 * part, 1.0)
         else:
             part *= 0.5
 
 
-@compiled
+@part
 def improve(
     guide: Guide, start: Array, goal: PackedRegions, regions: PackedRegions, gains: DeployableGains, period: float
 ) -> None:
@@ -212,10 +216,10 @@ def improve(
         for axis in range(3):  # the end moves with the goal, and is put back wherever the goal may have gone
             way[end, axis] += goal.velocities[0, axis] * period
         if not clearance_at(goal, 0, way[end]) > 0.0:
-            nearest_end(goal, way[end].copy(), gains.depth, way[end])
+            nearest_end(goal, way[end], gains.depth, way[end])
     while guide.points[0] > 1 and _distance(way[0], start) < _PASSED:
         for i in range(guide.points[0] - 1):
-            way[i] = way[i + 1]
+            copy(way[i + 1], way[i])
         guide.points[0] -= 1
     # one way a period: the present one and a changed one by turns
     if guide.tried[0] == 0:
@@ -234,12 +238,18 @@ def improve(
         _change(guide, start, goal, gains)
     cost = cost_of(other, guide.points[1], start, regions, guide.far_until, gains)
     if cost < guide.cost[0] - _BETTER - _BETTER_PART * guide.cost[0]:
-        way[:, :] = other
+        _copy_way(other, way)
         guide.points[0] = guide.points[1]
         guide.cost[0] = cost
 
 
-@compiled
+@part
+def _copy_way(way: Array, out: Array) -> None:
+    for i in range(CORNERS + 1):
+        copy(way[i], out[i])
+
+
+@part
 def _length(way: Array, count: int, start: Array) -> float:
     length = _distance(way[0], start)
     for i in range(1, count):
@@ -247,33 +257,33 @@ def _length(way: Array, count: int, start: Array) -> float:
     return float(length)
 
 
-@compiled
+@part
 def _distance(a: Array, b: Array) -> float:
     return float(np.sqrt((a[0] - b[0]) ** 2 + (a[1] - b[1]) ** 2 + (a[2] - b[2]) ** 2))
 
 
-@compiled
+@part
 def _change(guide: Guide, start: Array, goal: PackedRegions, gains: DeployableGains) -> None:
     """Write a changed way into `other`."""
     way, other, random = guide.way, guide.other, guide.random
-    other[:, :] = way
+    _copy_way(way, other)
     count = guide.points[0]
     last = count - 1
     choice = uniform(random)
     if choice < 0.1:  # straight to the nearest end
         nearest_end(goal, start if count == 1 else way[count - 2], gains.depth, other[last])
         if uniform(random) < 0.5:
-            other[0] = other[last]
+            copy(other[last], other[0])
             count = 1
     elif choice < 0.2:  # another end
         reach = 0.05 + uniform(random) * 0.5
         for axis in range(3):
             other[last, axis] += reach * _spread(random)
-        nearest_end(goal, other[last].copy(), gains.depth, other[last])
+        nearest_end(goal, other[last], gains.depth, other[last])
     elif choice < 0.3 and count > 1:  # a corner less
         drop = int(uniform(random) * last)
         for i in range(drop, last):
-            other[i] = other[i + 1]
+            copy(other[i + 1], other[i])
         count -= 1
     elif choice < 0.65 and count > 1:  # a corner moved
         moved = int(uniform(random) * last)
@@ -283,14 +293,14 @@ def _change(guide: Guide, start: Array, goal: PackedRegions, gains: DeployableGa
     elif choice < 0.9 and count <= CORNERS:  # a corner more, anywhere about
         at = int(uniform(random) * count)
         for i in range(count, at, -1):
-            other[i] = other[i - 1]
+            copy(other[i - 1], other[i])
         for axis in range(3):
             low = min(start[axis], way[last, axis]) - _ROOM
             high = max(start[axis], way[last, axis]) + _ROOM
             other[at, axis] = low + uniform(random) * (high - low)
         count += 1
     else:  # one corner alone, anywhere about
-        other[1] = way[last]
+        copy(way[last], other[1])
         for axis in range(3):
             low = min(start[axis], way[last, axis]) - _ROOM
             high = max(start[axis], way[last, axis]) + _ROOM

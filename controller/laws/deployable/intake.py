@@ -8,14 +8,15 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from controller.compiled import compiled
+from controller.compiled import part
 from controller.law import VehicleState
 from controller.laws.deployable import attitude as attitude_loop
 from controller.laws.deployable import failure, model, observer
 from controller.laws.deployable.gains import DeployableGains
+from controller.laws.deployable.linear_algebra import copy
 from controller.laws.deployable.memory import DeployableMemory
-from controller.quaternion import rate as quaternion_rate
-from controller.quaternion import rotation_matrix
+from controller.on_stack import zeros
+from controller.quaternion import write_rotation
 
 Array = NDArray[np.float64]
 
@@ -23,17 +24,14 @@ _FARTHEST = 1e6  # m, beyond which no position is one
 _FASTEST = 100.0  # m/s, rad/s
 
 
-@compiled
-def believed_weights(weights: Array) -> Array:
-    """Return the arbiter's weights, each within [0, 1]; what is no number counts as 1, for it may matter."""
-    believed = np.ones(weights.size)
+@part
+def believe_weights(weights: Array, believed: Array) -> None:
+    """Write the arbiter's weights, each within [0, 1]; what is no number counts as 1, for it may matter."""
     for i in range(weights.size):
-        if not np.isnan(weights[i]):
-            believed[i] = min(max(weights[i], 0.0), 1.0)
-    return believed
+        believed[i] = 1.0 if np.isnan(weights[i]) else min(max(weights[i], 0.0), 1.0)
 
 
-@compiled
+@part
 def says_more(told: Array, before: Array, health: Array) -> bool:
     """Return whether what is told of the thrusters differs from what was, or from what is believed of a failed one.
 
@@ -46,7 +44,7 @@ def says_more(told: Array, before: Array, health: Array) -> bool:
     return more
 
 
-@compiled
+@part
 def take_in_thrusters(memory: DeployableMemory, told: Array, failed: int) -> None:
     """Take in which thrusters are told to have failed, or to work again, and one found to have failed, -1 for none."""
     health = memory.thrusters.health
@@ -59,18 +57,21 @@ def take_in_thrusters(memory: DeployableMemory, told: Array, failed: int) -> Non
     model.share_out(memory.thrusters)
 
 
-@compiled
+@part
 def take_in_measurement(memory: DeployableMemory, state: VehicleState, gains: DeployableGains) -> bool:
     """Carry the estimate over the last period and take in the measurement; return whether it was believed."""
     seen, period = memory.observed, memory.period[0]
     good = _can_be_turned(state.quaternion, state.velocity_body)
     if good:
-        memory.quaternion[:] = state.quaternion / np.sqrt(np.sum(state.quaternion**2))
-        memory.omega[:] = state.velocity_body[3:]
+        e = state.quaternion
+        length = np.sqrt(e[0] ** 2 + e[1] ** 2 + e[2] ** 2 + e[3] ** 2)
+        for i in range(4):
+            memory.quaternion[i] = e[i] / length
+        copy(state.velocity_body[3:], memory.omega)
     else:
         _carry_attitude(memory)
-    R = rotation_matrix(memory.quaternion)
-    velocity, frozen = np.zeros(3), True
+    R, velocity, frozen = zeros(3, 3), zeros(3), True
+    write_rotation(memory.quaternion, R)
     for i in range(3):
         for k in range(3):
             velocity[i] += R[i, k] * state.velocity_body[k]
@@ -78,8 +79,7 @@ def take_in_measurement(memory: DeployableMemory, state: VehicleState, gains: De
     for i in range(3):
         frozen = frozen and state.position[i] == seen.last_measured[i]
         frozen = frozen and state.velocity_body[i] == seen.last_measured[3 + i]
-    seen.last_measured[:3] = state.position
-    seen.last_measured[3:] = state.velocity_body[:3]
+        seen.last_measured[i], seen.last_measured[3 + i] = state.position[i], state.velocity_body[i]
 
     begun = seen.silence[0] >= 0.0
     if begun:
@@ -104,7 +104,7 @@ def take_in_measurement(memory: DeployableMemory, state: VehicleState, gains: De
     return False
 
 
-@compiled
+@part
 def _can_be_turned(quaternion: Array, velocity_body: Array) -> bool:
     """Return whether attitude and rates are such as a vehicle can have."""
     size, fastest = 0.0, 0.0
@@ -115,22 +115,20 @@ def _can_be_turned(quaternion: Array, velocity_body: Array) -> bool:
     return abs(size - 1.0) < 1e-2 and fastest < _FASTEST
 
 
-@compiled
+@part
 def _carry_attitude(memory: DeployableMemory) -> None:
     """Carry attitude and rates over the last period by the model."""
-    turning, pushed, period = np.empty(3), np.empty(6), memory.period[0]
+    R, turning, pushed, period = zeros(3, 3), zeros(3), zeros(6), memory.period[0]
+    write_rotation(memory.quaternion, R)
     attitude_loop.free_turning(memory.attitude, memory.dynamics, memory.quaternion, memory.omega, turning)
-    model.thrust_acceleration(
-        memory.dynamics, memory.thrusters, rotation_matrix(memory.quaternion), memory.thrusters.forces, pushed
-    )
+    model.thrust_acceleration(memory.dynamics, memory.thrusters, R, memory.thrusters.forces, pushed)
     for i in range(3):
         memory.omega[i] += period * (turning[i] + pushed[3 + i])
         memory.omega[i] = min(max(memory.omega[i], -_FASTEST), _FASTEST)
-    carried = memory.quaternion + period * quaternion_rate(memory.quaternion, memory.omega)
-    memory.quaternion[:] = carried / np.sqrt(np.sum(carried**2))
+    attitude_loop.turn(memory.quaternion, memory.omega, period, memory.quaternion)
 
 
-@compiled
+@part
 def _can_be(position: Array, velocity: Array) -> bool:
     """Return whether position [m] and velocity [m/s] are numbers that a vehicle can have."""
     can = True
@@ -139,7 +137,7 @@ def _can_be(position: Array, velocity: Array) -> bool:
     return can
 
 
-@compiled
+@part
 def _forget(memory: DeployableMemory) -> None:
     """Bring the estimate to where it was before the first measurement."""
     seen = memory.observed

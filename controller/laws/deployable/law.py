@@ -9,7 +9,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from controller.compiled import compiled
+from controller.by_address import call, entry_of
+from controller.compiled import lean, part
 from controller.law import (
     Array,
     CompiledLaw,
@@ -30,12 +31,14 @@ from controller.laws.deployable.faces import FACES
 from controller.laws.deployable.failure import suspicion_of
 from controller.laws.deployable.gains import DeployableGains, check_gains
 from controller.laws.deployable.guide import guide_of_nothing
-from controller.laws.deployable.memory import DeployableMemory
+from controller.laws.deployable.linear_algebra import copy
+from controller.laws.deployable.memory import DeployableMemory, Stages
 from controller.laws.deployable.model import Dynamics, Thrusters, dynamics_of, thrusters_of
 from controller.laws.deployable.observer import Estimate, estimate_of_nothing
 from controller.laws.deployable.quadratic_program import workspace
-from controller.quaternion import rotation_matrix
-from controller.regions import Orientation, PackedRegions
+from controller.on_stack import zeros
+from controller.quaternion import write_rotation
+from controller.regions import Orientation, PackedRegions, pack
 
 _SPREADS = 3.0  # standard deviations of the position that the margin adds
 _STALE = 0.15  # s without a valid measurement, after which the vehicle is brought to a stop
@@ -62,7 +65,7 @@ DIAGNOSTICS = (
 )
 
 
-@compiled
+@lean
 def step(
     state: VehicleState,
     goal: PackedRegions,
@@ -74,11 +77,13 @@ def step(
 ) -> None:
     """Do what `CompiledLaw.step` says, by the deployable law."""
     seen, thrusters, dynamics, period = memory.observed, memory.thrusters, memory.dynamics, memory.period[0]
-    weights = intake.believed_weights(weights)
+    intake.believe_weights(weights, memory.weights)
+    R, wanted, acceleration = zeros(3, 3), zeros(3), zeros(3)
+    free, wrench, velocity = zeros(6), zeros(6), zeros(6)
 
     # estimate
-    measured = intake.take_in_measurement(memory, state, gains)
-    R = rotation_matrix(memory.quaternion)
+    measured = call(memory.stages.take_in, intake.take_in_measurement, (memory, state, gains))
+    write_rotation(memory.quaternion, R)
     if seen.silence[0] < 0.0 or seen.silence[0] > gains.coast:  # nothing is known any more: drift
         forces[:] = 0.0
         thrusters.forces[:] = 0.0
@@ -86,33 +91,34 @@ def step(
         return
 
     # failed thrusters
-    failed = failure.suspect(
-        memory.suspicion, seen, memory.attitude.residual, dynamics, thrusters, R, gains, period, measured
+    failed = call(
+        memory.stages.suspect,
+        failure.suspect,
+        (memory.suspicion, seen, memory.attitude.residual, dynamics, thrusters, R, gains, period, measured),
     )
     if failed >= 0 or intake.says_more(state.thruster_health, memory.told, thrusters.health):
         intake.take_in_thrusters(memory, state.thruster_health, failed)
         observer.doubt(seen, 0.01)
 
     # way round, bounded attraction
-    wanted, acceleration = np.zeros(3), np.empty(3)
-    guide.improve(memory.guide, seen.position, goal, regions, gains, period)
+    call(memory.stages.improve, guide.improve, (memory.guide, seen.position, goal, regions, gains, period))
     if seen.silence[0] <= _STALE:
         wanted_velocity(memory.guide, seen.position, goal.velocities[0], gains, wanted)
     wanted_acceleration(wanted, seen.velocity, gains, acceleration)
 
     # wanted wrench
-    free, wrench, velocity = np.empty(6), np.empty(6), np.empty(6)
     model.free_acceleration(dynamics, R, seen.velocity, memory.omega, seen.water, seen.restoring[0], free)
     attitude_loop.carry(memory.attitude, dynamics, R, seen.velocity, seen.water)
     attitude_loop.free_turning(memory.attitude, dynamics, memory.quaternion, memory.omega, free[3:])
-    velocity[:3], velocity[3:] = seen.velocity, memory.omega
+    copy(seen.velocity, velocity[:3])
+    copy(memory.omega, velocity[3:])
     look(memory.sight, regions, seen.position, memory.quaternion, velocity)
     part = period / (period + gains.smoothing)
     for axis in range(3):
         memory.pushed[axis] += part * (acceleration[axis] - free[axis] - memory.pushed[axis])
     _force_of(dynamics, R, memory.pushed, wrench)
-    _soft_forces(memory.sight, regions, weights, R, dynamics, wrench)
-    attitude_loop.aim(memory.attitude, regions, seen.position, gains, period)
+    _soft_forces(memory.sight, regions, memory.weights, R, dynamics, wrench)
+    call(memory.stages.aim, attitude_loop.aim, (memory.attitude, regions, seen.position, gains, period))
     attitude_loop.moment(memory.attitude, dynamics, memory.quaternion, memory.omega, gains, wrench[3:])
     work = memory.program
     for j in range(forces.size):
@@ -121,28 +127,37 @@ def step(
             work.wanted[j] += thrusters.allocator[j, k] * wrench[k]
 
     # barriers
+    _write_push(dynamics, thrusters, R, memory.push)
     motion = Motion(
         seen.position,
         velocity,
         free,
-        _push(dynamics, thrusters, R),
+        memory.push,
         dynamics.translational_mass[0],
         (dynamics.mass[3, 3] + dynamics.mass[4, 4] + dynamics.mass[5, 5]) / 3.0,
         gains.braking_share * _braking(dynamics, thrusters),
         _SPREADS * observer.position_spread(seen) + 0.5 * gains.acceleration * period**2,
     )
-    rows = write_rows(work, memory.sight, regions, weights, motion, thrusters.lower, thrusters.upper, gains)
+    rows = call(
+        memory.stages.write_rows,
+        write_rows,
+        (work, memory.sight, regions, memory.weights, motion, thrusters.lower, thrusters.upper, gains),
+    )
 
     # quadratic program
-    steps = quadratic_program.solve(work, rows, thrusters.inverse, thrusters.lower, thrusters.upper, forces)
-    thrusters.forces[:] = forces
+    steps = call(
+        memory.stages.solve,
+        quadratic_program.solve,
+        (work, rows, thrusters.inverse, thrusters.lower, thrusters.upper, forces),
+    )
+    copy(forces, thrusters.forces)
     memory.estimate[0] = seen.restoring[0]
-    memory.estimate[1:] = memory.attitude.moments
+    copy(memory.attitude.moments, memory.estimate[1:])
     _report(memory.report, seen, memory.guide.cost[0], memory.guide.points[0], thrusters.health, wanted)
     _report_program(memory.report, work.multipliers, work.price, rows, steps)
 
 
-@compiled
+@part
 def _force_of(dynamics: Dynamics, R: Array, acceleration: Array, out: Array) -> None:
     """Write the body force [N] that gives an acceleration, world frame, into out[:3]."""
     for i in range(3):
@@ -154,7 +169,7 @@ def _force_of(dynamics: Dynamics, R: Array, acceleration: Array, out: Array) -> 
             out[i] += dynamics.mass[i, k] * along
 
 
-@compiled
+@part
 def _soft_forces(
     sight: Sight, regions: PackedRegions, weights: Array, R: Array, dynamics: Dynamics, wrench: Array
 ) -> None:
@@ -175,12 +190,11 @@ def _soft_forces(
                 wrench[k] -= push * R[axis, k] * sight.gradients[i, axis] / size
 
 
-@compiled
-def _push(dynamics: Dynamics, thrusters: Thrusters, R: Array) -> Array:
-    """Return the acceleration of one newton of each thruster, shape (6, m), as `barrier.Motion` has it."""
-    m = thrusters.health.size
-    push = np.zeros((6, m))
-    for j in range(m):
+@part
+def _write_push(dynamics: Dynamics, thrusters: Thrusters, R: Array, push: Array) -> None:
+    """Write the acceleration of one newton of each thruster, shape (6, m), as `barrier.Motion` has it."""
+    push[:, :] = 0.0
+    for j in range(thrusters.health.size):
         for i in range(6):
             body = 0.0
             for k in range(6):
@@ -190,10 +204,9 @@ def _push(dynamics: Dynamics, thrusters: Thrusters, R: Array) -> Array:
             else:
                 for axis in range(3):
                     push[axis, j] += R[axis, i] * body
-    return push
 
 
-@compiled
+@part
 def _least(values: Array) -> float:
     least: float = values[0]
     for i in range(values.size):
@@ -201,7 +214,7 @@ def _least(values: Array) -> float:
     return least
 
 
-@compiled
+@part
 def _braking(dynamics: Dynamics, thrusters: Thrusters) -> float:
     """Return the deceleration [m/s2] of the worst direction with one thruster lost: the one that is, or any.
 
@@ -215,12 +228,12 @@ def _braking(dynamics: Dynamics, thrusters: Thrusters) -> float:
     return worst
 
 
-@compiled
+@part
 def _report(report: Array, seen: Estimate, cost: float, points: int, health: Array, wanted: Array) -> None:
     """Write what `DIAGNOSTICS` says of estimate, way and thrusters."""
-    report[:3] = seen.position
-    report[3:6] = seen.velocity
-    report[6:8] = seen.water[:2]
+    copy(seen.position, report[:3])
+    copy(seen.velocity, report[3:6])
+    copy(seen.water, report[6:8])
     report[8] = np.sqrt(wanted[0] ** 2 + wanted[1] ** 2 + wanted[2] ** 2)
     report[9] = cost
     report[10] = points - 1
@@ -231,7 +244,7 @@ def _report(report: Array, seen: Estimate, cost: float, points: int, health: Arr
     report[15] = seen.silence[0]
 
 
-@compiled
+@part
 def _report_program(report: Array, multipliers: Array, price: Array, rows: int, steps: int) -> None:
     """Write what `DIAGNOSTICS` says of barriers and quadratic program."""
     active, yielding = 0, 0.0
@@ -240,6 +253,23 @@ def _report_program(report: Array, multipliers: Array, price: Array, rows: int, 
             active += 1
             yielding = max(yielding, multipliers[i] * price[i])
     report[11], report[12], report[13] = active, yielding, steps
+
+
+def _stages(memory: DeployableMemory, gains: DeployableGains) -> Stages:
+    """Return the addresses of the stages, for arguments such as a step gives them."""
+    m, n = memory.told.size, memory.weights.size
+    three, forces, R, regions = np.zeros(3), np.zeros(m), np.zeros((3, 3)), pack([])
+    state, thrusters, seen = VehicleState(three, np.zeros(4), np.zeros(6), forces), memory.thrusters, memory.observed
+    motion, bounds = Motion(three, np.zeros(6), np.zeros(6), memory.push, 0.0, 0.0, 0.0, 0.0), (forces, forces)
+    reason = (memory.suspicion, seen, three, memory.dynamics, thrusters, R, gains, 0.0, False)
+    return Stages(
+        take_in=entry_of(intake.take_in_measurement, (memory, state, gains)),
+        suspect=entry_of(failure.suspect, reason),
+        improve=entry_of(guide.improve, (memory.guide, three, regions, regions, gains, 0.0)),
+        aim=entry_of(attitude_loop.aim, (memory.attitude, regions, three, gains, 0.0)),
+        write_rows=entry_of(write_rows, (memory.program, memory.sight, regions, np.zeros(n), motion, *bounds, gains)),
+        solve=entry_of(quadratic_program.solve, (memory.program, 0, R, *bounds, forces)),
+    )
 
 
 class DeployableLaw(CompiledLaw):
@@ -295,9 +325,13 @@ class DeployableLaw(CompiledLaw):
             program=workspace((1 + FACES) * n_regions, m),
             quaternion=desired.copy(),
             omega=np.zeros(3),
+            weights=np.ones(n_regions),
             told=np.ones(m),
             pushed=np.zeros(3),
+            push=np.zeros((6, m)),
+            stages=Stages(),
         )
+        self.memory = self.memory._replace(stages=_stages(self.memory, self.gains))
 
     @classmethod
     def for_vehicle(

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from controller.compiled import compiled
+from controller.compiled import part
 
 Array = NDArray[np.float64]
 
 
-@compiled
+@part
 def product(A: Array, x: Array, out: Array) -> None:
     """Write A x into `out`."""
     for i in range(A.shape[0]):
@@ -20,7 +20,14 @@ def product(A: Array, x: Array, out: Array) -> None:
         out[i] = total
 
 
-@compiled
+@part
+def copy(values: Array, out: Array) -> None:
+    """Write values, shape (n,), into `out`: a loop is compiled in a tenth of the time that a slice takes."""
+    for i in range(out.size):
+        out[i] = values[i]
+
+
+@part
 def norm(a: Array) -> float:
     """Return |a|."""
     total = 0.0

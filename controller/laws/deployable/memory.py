@@ -18,8 +18,19 @@ from controller.laws.deployable.quadratic_program import Workspace
 Array = NDArray[np.float64]
 
 
+class Stages(NamedTuple):
+    """Addresses of the long stages of a step, each compiled on its own."""
+
+    take_in: int = 0
+    suspect: int = 0
+    improve: int = 0
+    aim: int = 0
+    write_rows: int = 0
+    solve: int = 0
+
+
 class DeployableMemory(NamedTuple):
-    """Arrays alone, so that compiled code can take it."""
+    """Arrays, and addresses that stay, so that compiled code can take it."""
 
     period: Array  # (1,) s
     estimate: Array  # (4,) phi-hat [N, N m]
@@ -34,5 +45,8 @@ class DeployableMemory(NamedTuple):
     program: Workspace
     quaternion: Array  # (4,) from body to world, as measured or carried by the model
     omega: Array  # (3,) rad/s, likewise
+    weights: Array  # (n,) of the arbiter, as believed
     told: Array  # (m,) health of the thrusters as last told
     pushed: Array  # (3,) m/s2, NED, that the thrusters shall add, smoothed
+    push: Array  # (6, m) as `barrier.Motion` has it
+    stages: Stages

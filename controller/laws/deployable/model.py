@@ -7,9 +7,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from controller.compiled import compiled
+from controller.compiled import compiled, part
 from controller.law import VehicleModel
 from controller.laws.deployable.linear_algebra import product
+from controller.on_stack import zeros
 
 Array = NDArray[np.float64]
 
@@ -108,7 +109,8 @@ def share_out(thrusters: Thrusters) -> None:
     """Bring matrix, limits and inverses up to date with `health`."""
     m = thrusters.health.size
     for j in range(m):
-        thrusters.matrix[:, j] = thrusters.whole[:, j] * thrusters.health[j]
+        for k in range(6):
+            thrusters.matrix[k, j] = thrusters.whole[k, j] * thrusters.health[j]
         thrusters.lower[j] = thrusters.least[j] * thrusters.health[j]
         thrusters.upper[j] = thrusters.greatest[j] * thrusters.health[j]
     H = np.empty((m, m))
@@ -122,8 +124,10 @@ def share_out(thrusters: Thrusters) -> None:
         for k in range(6):
             own += thrusters.whole[k, i] * thrusters.metric[k] * thrusters.whole[k, i]
         H[i, i] += _REGULARISATION * max(own, 1e-12)
-    thrusters.inverse[:, :] = np.linalg.inv(H)
+    inverse = np.linalg.inv(H)
     for i in range(m):
+        for j in range(m):
+            thrusters.inverse[i, j] = inverse[i, j]
         for k in range(6):
             total = 0.0
             for j in range(m):
@@ -131,7 +135,7 @@ def share_out(thrusters: Thrusters) -> None:
             thrusters.allocator[i, k] = total * thrusters.metric[k]
 
 
-@compiled
+@part
 def free_acceleration(
     dynamics: Dynamics, R: Array, velocity: Array, omega_body: Array, water: Array, restoring: float, out: Array
 ) -> None:
@@ -156,13 +160,11 @@ def free_acceleration(
     out : ndarray, shape (3,)
         Receives the acceleration.
     """
-    force, relative, momentum = np.zeros(6), np.empty(3), np.empty(3)
+    force, relative, momentum = zeros(6), zeros(3), zeros(3)
     for i in range(3):
-        relative[i] = 0.0
         for k in range(3):
             relative[i] += R[k, i] * (velocity[k] - water[k])
     for i in range(3):
-        momentum[i] = 0.0
         for k in range(3):
             momentum[i] += dynamics.mass[i, k] * relative[k]
     for i in range(3):
@@ -170,7 +172,7 @@ def free_acceleration(
         j, k = (i + 1) % 3, (i + 2) % 3
         # d(M nu_r)/dt + omega x (M nu_r) = force
         force[i] = restoring * R[2, i] - drag - (omega_body[j] * momentum[k] - omega_body[k] * momentum[j])
-    body = np.empty(6)
+    body = zeros(6)
     product(dynamics.inverse_mass, force, body)
     for i in range(3):  # the body's axes turn: what the relative velocity gains is omega x nu_r
         j, k = (i + 1) % 3, (i + 2) % 3
@@ -182,10 +184,10 @@ def free_acceleration(
             out[i] += R[i, k] * body[k]
 
 
-@compiled
+@part
 def thrust_acceleration(dynamics: Dynamics, thrusters: Thrusters, R: Array, forces: Array, out: Array) -> None:
     """Write the acceleration that thruster forces [N] give: linear in the world frame, angular in body axes, (6,)."""
-    wrench, body = np.empty(6), np.empty(6)
+    wrench, body = zeros(6), zeros(6)
     product(thrusters.matrix, forces, wrench)
     product(dynamics.inverse_mass, wrench, body)
     for i in range(3):

@@ -13,9 +13,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from controller.compiled import compiled
+from controller.compiled import part
 from controller.laws.deployable.gains import DeployableGains
+from controller.laws.deployable.linear_algebra import copy
 from controller.laws.deployable.model import Dynamics, Thrusters, free_acceleration, thrust_acceleration
+from controller.on_stack import zeros
 
 Array = NDArray[np.float64]
 
@@ -58,14 +60,14 @@ def estimate_of_nothing() -> Estimate:
     )
 
 
-@compiled
+@part
 def begin(estimate: Estimate, position: Array, velocity: Array, gains: DeployableGains) -> None:
     """Start from a first measurement [m, m/s, NED], or anew after losing the vehicle.
 
     What is known of water and weight stays.
     """
-    estimate.position[:] = position
-    estimate.velocity[:] = velocity
+    copy(position, estimate.position)
+    copy(velocity, estimate.velocity)
     first = estimate.silence[0] < 0.0
     for axis in range(3):
         P = estimate.covariance[axis]
@@ -78,7 +80,7 @@ def begin(estimate: Estimate, position: Array, velocity: Array, gains: Deployabl
     estimate.silence[0] = 0.0
 
 
-@compiled
+@part
 def predict(
     estimate: Estimate,
     dynamics: Dynamics,
@@ -89,7 +91,7 @@ def predict(
     period: float,
 ) -> None:
     """Carry the estimate over a control period [s] in which the last commanded forces acted."""
-    free, pushed = np.empty(3), np.empty(6)
+    free, pushed = zeros(3), zeros(6)
     free_acceleration(dynamics, R, estimate.velocity, omega_body, estimate.water, estimate.restoring[0], free)
     thrust_acceleration(dynamics, thrusters, R, thrusters.forces, pushed)
     mass = dynamics.translational_mass[0]
@@ -118,7 +120,7 @@ def predict(
     estimate.silence[0] += period
 
 
-@compiled
+@part
 def correct(estimate: Estimate, position: Array, velocity: Array, gains: DeployableGains) -> bool:
     """Take in a measurement of position [m] and velocity [m/s], shape (3,) each, NED; False if it is not believed."""
     for axis in range(3):
@@ -158,7 +160,7 @@ def correct(estimate: Estimate, position: Array, velocity: Array, gains: Deploya
     return True
 
 
-@compiled
+@part
 def doubt(estimate: Estimate, variance: float) -> None:
     """Let velocity and unknowns be found anew: after the thrusters turned out to be other than believed."""
     for axis in range(3):
@@ -166,7 +168,7 @@ def doubt(estimate: Estimate, variance: float) -> None:
         estimate.covariance[axis, 2, 2] += 25.0 if axis == 2 else 0.04
 
 
-@compiled
+@part
 def position_spread(estimate: Estimate) -> float:
     """Return the standard deviation of the position [m] along the axis that is known worst."""
     worst = 0.0

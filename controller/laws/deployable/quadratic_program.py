@@ -26,7 +26,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from controller.compiled import compiled
+from controller.compiled import part
+from controller.laws.deployable.linear_algebra import copy
 
 Array = NDArray[np.float64]
 
@@ -86,7 +87,7 @@ def workspace(barriers: int, thrusters: int) -> Workspace:
     )
 
 
-@compiled
+@part
 def solve(work: Workspace, barriers: int, inverse: Array, lower: Array, upper: Array, forces: Array) -> int:
     """Solve the program whose first `barriers` rows, right sides and prices stand in `work`, with u0 in `wanted`.
 
@@ -112,7 +113,7 @@ def solve(work: Workspace, barriers: int, inverse: Array, lower: Array, upper: A
     """
     n = barriers + 2 * forces.size
     tolerance = _TOLERANCE * _begin(work, barriers, inverse, lower, upper)
-    forces[:] = work.wanted
+    copy(work.wanted, forces)
     count, steps, most = 0, 0, _STEPS_A_ROW * n
     at = _worst(work, barriers, lower, upper, forces, tolerance)
     while at >= 0 and steps < most:
@@ -154,7 +155,7 @@ def solve(work: Workspace, barriers: int, inverse: Array, lower: Array, upper: A
     return steps if at < 0 else -steps
 
 
-@compiled
+@part
 def _begin(work: Workspace, barriers: int, inverse: Array, lower: Array, upper: Array) -> float:
     """Prepare all rows, none of them passive, and return the greatest |d_i| / sqrt(G_ii)."""
     m, scale = lower.size, 0.0
@@ -196,7 +197,7 @@ def _begin(work: Workspace, barriers: int, inverse: Array, lower: Array, upper: 
     return scale
 
 
-@compiled
+@part
 def _worst(work: Workspace, barriers: int, lower: Array, upper: Array, forces: Array, tolerance: float) -> int:
     """Return the free row that is violated most, -1 if none is by more than the tolerance."""
     m, worst, at = forces.size, tolerance, -1
@@ -216,7 +217,7 @@ def _worst(work: Workspace, barriers: int, lower: Array, upper: Array, forces: A
     return at
 
 
-@compiled
+@part
 def _refine(work: Workspace, barriers: int, count: int, lower: Array, upper: Array, forces: Array) -> None:
     """Correct the multipliers and forces of the passive rows by what those forces still lack: rounding."""
     m = forces.size
@@ -238,7 +239,7 @@ def _refine(work: Workspace, barriers: int, count: int, lower: Array, upper: Arr
             forces[j] += work.shaped[i, j] * work.trial[a]
 
 
-@compiled
+@part
 def _append(work: Workspace, barriers: int, a: int) -> bool:
     """Write row `a` of the Cholesky factor, of the passive row in that place; False if it depends on those before."""
     m, L, i = work.wanted.size, work.factor, work.passive[a]
@@ -265,7 +266,7 @@ def _append(work: Workspace, barriers: int, a: int) -> bool:
     return False
 
 
-@compiled
+@part
 def _minimum(work: Workspace, count: int) -> None:
     """Write the multipliers that minimise over the passive rows into `trial`."""
     L = work.factor
@@ -281,7 +282,7 @@ def _minimum(work: Workspace, count: int) -> None:
         work.trial[a] = total / L[a, a]
 
 
-@compiled
+@part
 def _advance(work: Workspace, count: int) -> int:
     """Move the multipliers towards `trial` as far as all stay >= 0; return the place of the row that leaves, or -1."""
     reach, drop = 1.0, -1

@@ -13,8 +13,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from controller.compiled import compiled, inlined
+from controller.compiled import inlined, part
 from controller.laws.deployable.gains import DeployableGains
+from controller.laws.deployable.linear_algebra import copy
+from controller.on_stack import zeros
 from controller.regions import Orientation, PackedRegions, Sphere, clearance_of_place, clearance_of_sphere
 
 Array = NDArray[np.float64]
@@ -57,7 +59,7 @@ def _room_at(point: Array, regions: PackedRegions, room: Array) -> float:
     return least
 
 
-@compiled
+@part
 def is_free(begin: Array, end: Array, regions: PackedRegions, wanted: float) -> bool:
     """Return whether a straight line keeps a clearance [m] of all hard regions, where they are now.
 
@@ -75,7 +77,7 @@ def is_free(begin: Array, end: Array, regions: PackedRegions, wanted: float) -> 
     bool
         False too if the line is too long to be looked at.
     """
-    point, room = np.empty(3), np.empty(3)
+    point, room = zeros(3), zeros(3)
     length = np.sqrt((end[0] - begin[0]) ** 2 + (end[1] - begin[1]) ** 2 + (end[2] - begin[2]) ** 2)
     s = 0.0
     for _ in range(_LOOKS):
@@ -90,7 +92,7 @@ def is_free(begin: Array, end: Array, regions: PackedRegions, wanted: float) -> 
     return False
 
 
-@compiled
+@part
 def grow(
     tree: Tree, start: Array, end: Array, draws: Array, regions: PackedRegions, gains: DeployableGains, way: Array
 ) -> int:
@@ -121,13 +123,13 @@ def grow(
     for axis in range(3):
         moved += (nodes[0, axis] - end[axis]) ** 2
     if tree.size[0] == 0 or tree.size[0] == _NODES or moved > _MOVED**2:
-        nodes[0] = end
+        copy(end, nodes[0])
         parents[0] = -1
         tree.size[0] = 1
     wanted = gains.margin + 0.4 * gains.clearance
 
     # towards a point anywhere about, or the vehicle; from the nearest node
-    target, new = np.empty(3), np.empty(3)
+    target, new = zeros(3), zeros(3)
     for axis in range(3):
         low, high = min(start[axis], end[axis]) - _ROOM, max(start[axis], end[axis]) + _ROOM
         target[axis] = start[axis] if draws[3] < 0.2 else low + draws[axis] * (high - low)
@@ -155,7 +157,7 @@ def grow(
             break
         parent = before
     at = tree.size[0]
-    nodes[at] = new
+    copy(new, nodes[at])
     parents[at] = parent
     tree.size[0] += 1
 
@@ -166,7 +168,7 @@ def grow(
     while node >= 0:
         if count == way.shape[0]:
             return 0
-        way[count] = nodes[node]
+        copy(nodes[node], way[count])
         count += 1
         node = parents[node]
     return count
