@@ -100,7 +100,7 @@ class _Part(CPUDispatcher):
 
 @functools.cache
 def _caller_of(function: Any) -> Any:
-    return numba.njit(lambda *arguments: function(*arguments))
+    return numba.njit(lambda *arguments: function(*arguments))  # noqa: PLW0108 - a caller of it, not itself
 
 
 def _kept_on_disk(function: F, others: tuple[Path, ...], *, counting: bool, **without: bool) -> F:

@@ -200,9 +200,10 @@ def evaluate_packed(
 
 @part
 def evaluate_place(regions: PackedRegions, i: int, position: Array, at: Array) -> Evaluation:
-    """Evaluate the shape of region `i`, of position alone, where it is now; `at` is room of shape (3,).
+    """Evaluate the shape of region `i`, of position alone, where it is now, at a `position`, shape (3,) [m, NED].
 
-    Spheres and bands of depth are evaluated here, by numbers alone; the others are called by address.
+    Spheres and bands of depth are evaluated here, by numbers alone; the others are called by address. `at` is
+    room of shape (3,).
     """
     x = position[0] - regions.shifts[i, 0]
     y = position[1] - regions.shifts[i, 1]
@@ -219,7 +220,10 @@ def evaluate_place(regions: PackedRegions, i: int, position: Array, at: Array) -
 
 @part
 def evaluate_pose(regions: PackedRegions, i: int, position: Array, e: Array, at: Array) -> EvaluationOfAttitude:
-    """Evaluate the shape of region `i`, of attitude, where it is now; `at` is room of shape (3,)."""
+    """Evaluate the shape of region `i`, of attitude, where it is now, at a `position`, shape (3,) [m, NED].
+
+    `e` is the unit quaternion of the pose, and `at` room of shape (3,).
+    """
     for axis in range(3):
         at[axis] = position[axis] - regions.shifts[i, axis]
     numbers = regions.numbers[regions.offsets[i] : regions.offsets[i + 1]]
