@@ -1,0 +1,70 @@
+"""Which sources are mutated, which tests are asked of each, and which mutants change nothing."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from tests.mutation.mutants import Mutant, mutants_of
+
+ROOT = Path(__file__).parents[2]
+HERE = Path(__file__).parent
+
+
+@dataclass(frozen=True)
+class Part:
+    """Sources, and the tests that are to notice what is changed in them."""
+
+    sources: tuple[str, ...]  # patterns from the root of the project
+    tests: tuple[str, ...]  # files from the folder of tests; in this order
+
+
+def parts() -> list[Part]:
+    """Return the parts that `plan.toml` names."""
+    with (HERE / "plan.toml").open("rb") as file:
+        return [Part(tuple(part["sources"]), tuple(part["tests"])) for part in tomllib.load(file)["part"]]
+
+
+def tests_of(path: str) -> tuple[str, ...]:
+    """Return the files of tests of a source: those of the first part that names it."""
+    for part in parts():
+        if any(path in _files(pattern) for pattern in part.sources):
+            return tuple(f"tests/{test}" for test in part.tests)
+    raise ValueError(f"{path}: no part of plan.toml names it")
+
+
+def all_mutants() -> list[Mutant]:
+    """Return every mutant of every source of the plan, ordered by path and place."""
+    paths = sorted({path for part in parts() for pattern in part.sources for path in _files(pattern)})
+    return [mutant for path in paths for mutant in mutants_of(path, (ROOT / path).read_text(encoding="utf-8"))]
+
+
+def equivalent() -> dict[str, str]:
+    """Return why a mutant changes nothing that a test could see, by the key of each that `equivalent.toml` names.
+
+    Raises
+    ------
+    ValueError
+        If there is no such mutant, or it is named twice.
+    """
+    with (HERE / "equivalent.toml").open("rb") as file:
+        groups = tomllib.load(file).get("group", [])
+    named = [(key, group["reason"]) for group in groups for key in group["mutants"]]
+    existing = {mutant.key for mutant in all_mutants()}
+    for i, (key, _) in enumerate(named):
+        if key not in existing:
+            raise ValueError(f"equivalent.toml: there is no mutant {key!r}")
+        if key in dict(named[:i]):
+            raise ValueError(f"equivalent.toml: {key!r} stands there twice")
+    return dict(named)
+
+
+def sources(found: Sequence[Mutant]) -> list[str]:
+    """Return the paths of mutants, each once."""
+    return sorted({mutant.path for mutant in found})
+
+
+def _files(pattern: str) -> list[str]:
+    return [path.relative_to(ROOT).as_posix() for path in ROOT.glob(pattern)]

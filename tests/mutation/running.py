@@ -1,0 +1,209 @@
+"""Mutants given to processes, each with a copy of the project of its own; what came out is kept as it comes."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import py_compile
+import queue
+import random
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+import threading
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+
+from tests.mutation.mutants import Mutant
+from tests.mutation.plan import ROOT, tests_of
+from tests.mutation.plugin import OBJECTS
+from tests.mutation.server import Order, Outcome
+
+COPIED = ("controller", "plant_fmu", "fuzzy_arbiter", "cosim", "tests", "examples", "docs", "benchmarks")
+
+
+@dataclass(frozen=True)
+class Result:
+    """What the tests said of a mutant."""
+
+    key: str
+    source: str  # mark of the unchanged source, so that results of an older one are not taken for this one's
+    survived: bool
+    by: str
+    how: str
+    seconds: float
+    doubtful: bool = False  # the test fails without the mutant, too
+
+
+def sample(mutants: Sequence[Mutant], n: int, seed: int) -> list[Mutant]:
+    """Return so many mutants, in their order: half of them in Python and half in C, drawn by their names."""
+    drawn: list[Mutant] = []
+    languages = [[m for m in mutants if m.path.endswith(".py")], [m for m in mutants if not m.path.endswith(".py")]]
+    for i, group in enumerate(languages):
+        share = (n + i) // 2
+        drawn += random.Random(f"{seed} {i}").sample(group, min(share, len(group)))
+    return [mutant for mutant in mutants if mutant in drawn]
+
+
+def results_of(
+    mutants: Sequence[Mutant], jobs: int, kept: Path | None, *, again: bool = False
+) -> dict[str, Result]:
+    """Ask the tests about mutants.
+
+    Parameters
+    ----------
+    mutants : sequence of Mutant
+        In any order.
+    jobs : int
+        Processes at a time.
+    kept : Path, optional
+        File of results, one a line: those of unchanged sources are taken from it, and new ones written behind.
+    again : bool
+        Whether survivors in the file are asked about anew.
+
+    Returns
+    -------
+    dict of str to Result
+        By the keys of the mutants.
+    """
+    marks = {path: _mark(path) for path in {mutant.path for mutant in mutants}}
+    results: dict[str, Result] = {}
+    current = {mutant.key: marks[mutant.path] for mutant in mutants}
+    if kept and kept.is_file():
+        for line in kept.read_text(encoding="utf-8").splitlines():
+            result = Result(**json.loads(line))
+            if current.get(result.key) == result.source:
+                results[result.key] = result
+        if again:
+            results = {key: result for key, result in results.items() if not (result.survived or result.doubtful)}
+    todo: queue.SimpleQueue[Mutant] = queue.SimpleQueue()
+    left = [mutant for mutant in mutants if mutant.key not in results]
+    for mutant in left:
+        todo.put(mutant)
+    if not left:
+        return results
+    with tempfile.TemporaryDirectory(prefix="mutation-") as scratch:
+        threads = [
+            threading.Thread(target=_work, args=(Path(scratch) / f"copy{i}", todo, marks, results, kept), daemon=True)
+            for i in range(min(jobs, len(left)))
+        ]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+        _doubt([results[mutant.key] for mutant in left], results, Path(scratch) / "copy0")
+    return results
+
+
+class Server:
+    """A process of `server.py` in a copy of the project."""
+
+    def __init__(self, copy: Path):
+        if not copy.exists():
+            _copy(copy)
+        self.copy = copy
+        objects = copy.parent / "objects"
+        objects.mkdir(exist_ok=True)
+        environment = {
+            **os.environ, "NUMBA_DISABLE_JIT": "1", "PYTHONDONTWRITEBYTECODE": "1", "PYTHONPATH": str(copy),
+            OBJECTS: str(objects), "PATH": f"{_compiler(copy.parent)}{os.pathsep}{os.environ['PATH']}",
+            "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1",
+        }  # fmt: skip
+        self.process = subprocess.Popen(
+            [sys.executable, "-m", "tests.mutation.server"],
+            cwd=copy, env=environment, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
+        )  # fmt: skip
+
+    def ask(self, order: Order) -> Outcome:
+        """Return how a run of tests went."""
+        assert self.process.stdin and self.process.stdout
+        self.process.stdin.write(json.dumps(asdict(order)) + "\n")
+        self.process.stdin.flush()
+        answer = self.process.stdout.readline()
+        if not answer:
+            raise RuntimeError(f"the process in {self.copy} has ended")
+        return Outcome(**json.loads(answer))
+
+    def close(self) -> None:
+        """End the process."""
+        assert self.process.stdin
+        self.process.stdin.close()
+        self.process.wait()
+
+
+def _work(
+    copy: Path, todo: queue.SimpleQueue[Mutant], marks: dict[str, str], results: dict[str, Result], kept: Path | None
+) -> None:
+    server = Server(copy)
+    while True:
+        try:
+            mutant = todo.get_nowait()
+        except queue.Empty:
+            break
+        text = mutant.applied((ROOT / mutant.path).read_text(encoding="utf-8"))
+        order = Order(tests_of(mutant.path), _words(mutant), mutant.path, text)
+        outcome = server.ask(order)
+        result = Result(
+            mutant.key, marks[mutant.path], outcome.passed, outcome.by, outcome.how, round(outcome.seconds, 2)
+        )
+        results[mutant.key] = result
+        if kept:
+            with kept.open("a", encoding="utf-8") as file:
+                file.write(json.dumps(asdict(result), ensure_ascii=False) + "\n")
+    server.close()
+
+
+def _doubt(new: Sequence[Result], results: dict[str, Result], copy: Path) -> None:
+    """Run every test that noticed something without any mutant, and mark what it then says no less."""
+    server = Server(copy)
+    for result in new:
+        if not result.survived and not result.by:
+            tests = tests_of(result.key.partition(" | ")[0])
+            if not server.ask(Order(tests, collect_only=True)).passed:
+                results[result.key] = replace(result, doubtful=True)
+    tests = tuple(sorted({result.by for result in new if result.by}))
+    if tests and not server.ask(Order(tests)).passed:
+        failing = {test for test in tests if not server.ask(Order((test,))).passed}
+        for result in new:
+            if result.by in failing:
+                results[result.key] = replace(result, doubtful=True)
+    server.close()
+
+
+def _words(mutant: Mutant) -> tuple[str, ...]:
+    """Return words of the names of function and file, for tests that bear them to come first."""
+    words = re.findall("[a-z]{4,}", f"{Path(mutant.path).stem} {mutant.function}".lower())
+    joined = Path(mutant.path).stem.replace("_", "")
+    return tuple({*words, joined, *(word.rstrip("s") for word in words)} - {"model", "packed", "region", "test"})
+
+
+def _mark(path: str) -> str:
+    return hashlib.sha256((ROOT / path).read_bytes()).hexdigest()[:16]
+
+
+def _compiler(folder: Path) -> Path:
+    """Return a folder with a ``cc`` that does not take the time to optimise."""
+    place = folder / "bin"
+    real = shutil.which("cc")
+    if real and not place.exists():
+        place.mkdir()
+        (place / "cc").write_text(f'#!/bin/sh\nexec {real} "$@" -O0\n', encoding="utf-8")
+        (place / "cc").chmod(0o755)
+    return place
+
+
+def _copy(copy: Path) -> None:
+    """Copy the project; compiled Python in it goes by contents, as mutants have the size and may have the time of others."""
+    copy.mkdir()
+    for name in COPIED:
+        shutil.copytree(ROOT / name, copy / name, ignore=shutil.ignore_patterns("__pycache__", "node_modules"))
+    for file in ROOT.iterdir():
+        if file.is_file():
+            shutil.copy2(file, copy)
+    for name in COPIED[:4]:
+        for source in (copy / name).rglob("*.py"):
+            py_compile.compile(str(source), invalidation_mode=py_compile.PycInvalidationMode.CHECKED_HASH)
