@@ -89,9 +89,7 @@ def mutants_of(path: str, source: str) -> list[Mutant]:
     for sign in signs:
         function, text = functions.get(sign.line, ""), lines[sign.line - 1].strip()
         seen[function, text] += 1
-        found.append(
-            Mutant(path, function, text, seen[function, text], sign.line, sign.offset, sign.text, sign.unary)
-        )
+        found.append(Mutant(path, function, text, seen[function, text], sign.line, sign.offset, sign.text, sign.unary))
     return found
 
 

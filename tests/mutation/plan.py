@@ -18,20 +18,29 @@ class Part:
     """Sources, and the tests that are to notice what is changed in them."""
 
     sources: tuple[str, ...]  # patterns from the root of the project
-    tests: tuple[str, ...]  # files from the folder of tests; in this order
+    tests: tuple[str, ...]  # files from the root of the project; in this order
+    without: tuple[str, ...]  # tests in whose names these stand are not asked
+
+
+def test_folder(files: Sequence[str]) -> tuple[str, ...]:
+    """Return files of the folder of tests from the root of the project."""
+    return tuple(f"tests/{file}" for file in files)
 
 
 def parts() -> list[Part]:
     """Return the parts that `plan.toml` names."""
     with (HERE / "plan.toml").open("rb") as file:
-        return [Part(tuple(part["sources"]), tuple(part["tests"])) for part in tomllib.load(file)["part"]]
+        return [
+            Part(tuple(part["sources"]), test_folder(part["tests"]), tuple(part.get("without", ())))
+            for part in tomllib.load(file)["part"]
+        ]
 
 
-def tests_of(path: str) -> tuple[str, ...]:
-    """Return the files of tests of a source: those of the first part that names it."""
+def part_of(path: str) -> Part:
+    """Return the first part that names a source."""
     for part in parts():
         if any(path in _files(pattern) for pattern in part.sources):
-            return tuple(f"tests/{test}" for test in part.tests)
+            return part
     raise ValueError(f"{path}: no part of plan.toml names it")
 
 
@@ -59,11 +68,6 @@ def equivalent() -> dict[str, str]:
         if key in dict(named[:i]):
             raise ValueError(f"equivalent.toml: {key!r} stands there twice")
     return dict(named)
-
-
-def sources(found: Sequence[Mutant]) -> list[str]:
-    """Return the paths of mutants, each once."""
-    return sorted({mutant.path for mutant in found})
 
 
 def _files(pattern: str) -> list[str]:

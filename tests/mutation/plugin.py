@@ -1,4 +1,4 @@
-"""What a run of tests on a mutant differs in: their order, a limit of time for each, and C compiled once and as it is."""
+"""What is different for tests of a mutant: their order, a limit of time for each, and C that is compiled but once."""
 
 from __future__ import annotations
 
@@ -23,9 +23,10 @@ _PLAIN_RUN = subprocess.run
 class Plugin:
     """Told by pytest what it does."""
 
-    def __init__(self, note: Path, words: tuple[str, ...], seconds: float):
+    def __init__(self, note: Path, words: tuple[str, ...], without: tuple[str, ...], seconds: float):
         self.note = note
         self.words = words
+        self.without = without
         self.seconds = seconds
 
     def pytest_configure(self, config: pytest.Config) -> None:
@@ -37,6 +38,7 @@ class Plugin:
             name = re.sub("[^a-z]", "", item.nodeid.lower())
             return -sum(word in name for word in self.words)
 
+        items[:] = [item for item in items if not any(part in item.nodeid for part in self.without)]
         if self.words:
             items.sort(key=order)
 

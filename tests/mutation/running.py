@@ -13,13 +13,13 @@ import shutil
 import subprocess
 import sys
 import tempfile
-import threading
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 from tests.mutation.mutants import Mutant
-from tests.mutation.plan import ROOT, tests_of
+from tests.mutation.plan import ROOT, part_of, parts
 from tests.mutation.plugin import OBJECTS
 from tests.mutation.server import Order, Outcome
 
@@ -49,9 +49,7 @@ def sample(mutants: Sequence[Mutant], n: int, seed: int) -> list[Mutant]:
     return [mutant for mutant in mutants if mutant in drawn]
 
 
-def results_of(
-    mutants: Sequence[Mutant], jobs: int, kept: Path | None, *, again: bool = False
-) -> dict[str, Result]:
+def results_of(mutants: Sequence[Mutant], jobs: int, kept: Path | None, *, again: bool = False) -> dict[str, Result]:
     """Ask the tests about mutants.
 
     Parameters
@@ -80,22 +78,22 @@ def results_of(
                 results[result.key] = result
         if again:
             results = {key: result for key, result in results.items() if not (result.survived or result.doubtful)}
-    todo: queue.SimpleQueue[Mutant] = queue.SimpleQueue()
-    left = [mutant for mutant in mutants if mutant.key not in results]
-    for mutant in left:
-        todo.put(mutant)
+    # in an order that has nothing to do with where they stand, so that what is done when it is stopped is a fair sample
+    left = sorted((m for m in mutants if m.key not in results), key=lambda m: hashlib.sha256(m.key.encode()).digest())
     if not left:
         return results
-    with tempfile.TemporaryDirectory(prefix="mutation-") as scratch:
-        threads = [
-            threading.Thread(target=_work, args=(Path(scratch) / f"copy{i}", todo, marks, results, kept), daemon=True)
-            for i in range(min(jobs, len(left)))
-        ]
-        for thread in threads:
-            thread.start()
-        for thread in threads:
-            thread.join()
-        _doubt([results[mutant.key] for mutant in left], results, Path(scratch) / "copy0")
+    todo: queue.SimpleQueue[Mutant] = queue.SimpleQueue()
+    for mutant in left:
+        todo.put(mutant)
+    with tempfile.TemporaryDirectory(prefix="mutation-") as scratch, ThreadPoolExecutor(jobs) as pool:
+        copies = [Path(scratch) / f"copy{i}" for i in range(min(jobs, len(left)))]
+        _copy(ROOT, copies[0])
+        _compile(copies[0])
+        for copy in copies[1:]:
+            _copy(copies[0], copy)
+        for done in [pool.submit(_work, copy, todo, marks, results, kept) for copy in copies]:
+            done.result()
+        _doubt([results[mutant.key] for mutant in left], results, copies[0])
     return results
 
 
@@ -103,8 +101,6 @@ class Server:
     """A process of `server.py` in a copy of the project."""
 
     def __init__(self, copy: Path):
-        if not copy.exists():
-            _copy(copy)
         self.copy = copy
         objects = copy.parent / "objects"
         objects.mkdir(exist_ok=True)
@@ -145,7 +141,8 @@ def _work(
         except queue.Empty:
             break
         text = mutant.applied((ROOT / mutant.path).read_text(encoding="utf-8"))
-        order = Order(tests_of(mutant.path), _words(mutant), mutant.path, text)
+        part = part_of(mutant.path)
+        order = Order(part.tests, _words(mutant), part.without, mutant.path, text)
         outcome = server.ask(order)
         result = Result(
             mutant.key, marks[mutant.path], outcome.passed, outcome.by, outcome.how, round(outcome.seconds, 2)
@@ -162,8 +159,8 @@ def _doubt(new: Sequence[Result], results: dict[str, Result], copy: Path) -> Non
     server = Server(copy)
     for result in new:
         if not result.survived and not result.by:
-            tests = tests_of(result.key.partition(" | ")[0])
-            if not server.ask(Order(tests, collect_only=True)).passed:
+            part = part_of(result.key.partition(" | ")[0])
+            if not server.ask(Order(part.tests, collect_only=True)).passed:
                 results[result.key] = replace(result, doubtful=True)
     tests = tuple(sorted({result.by for result in new if result.by}))
     if tests and not server.ask(Order(tests)).passed:
@@ -196,14 +193,27 @@ def _compiler(folder: Path) -> Path:
     return place
 
 
-def _copy(copy: Path) -> None:
-    """Copy the project; compiled Python in it goes by contents, as mutants have the size and may have the time of others."""
+def _copy(project: Path, copy: Path) -> None:
+    """Copy what the tests need of the project."""
     copy.mkdir()
+    left_out = ("__pycache__", "node_modules") if project == ROOT else ()
     for name in COPIED:
-        shutil.copytree(ROOT / name, copy / name, ignore=shutil.ignore_patterns("__pycache__", "node_modules"))
-    for file in ROOT.iterdir():
+        shutil.copytree(project / name, copy / name, ignore=shutil.ignore_patterns(*left_out))
+    for file in project.iterdir():
         if file.is_file():
             shutil.copy2(file, copy)
+
+
+def _compile(copy: Path) -> None:
+    """Compile the Python in a copy ahead.
+
+    The packages go by contents: a mutant is as long as its source, and may be as old. The tests stay as they are.
+    """
     for name in COPIED[:4]:
         for source in (copy / name).rglob("*.py"):
             py_compile.compile(str(source), invalidation_mode=py_compile.PycInvalidationMode.CHECKED_HASH)
+    server = Server(copy)
+    for part in parts():
+        if not server.ask(Order(part.tests, collect_only=True)).passed:
+            raise RuntimeError(f"tests cannot be collected: {', '.join(part.tests)}")
+    server.close()

@@ -1,6 +1,6 @@
-"""A process that stands ready with all imports from elsewhere, and forks for each run of tests in a copy of the project.
+"""A process that has imported all that is not the project's, and forks for each run of tests in a copy of the project.
 
-It is started in the root of the copy. Each line that it reads asks for a run; each line that it writes says how one went.
+It is started in the root of the copy. Each line that it reads asks for a run, each that it writes says how one went.
 """
 
 from __future__ import annotations
@@ -30,9 +30,10 @@ class Order:
 
     tests: tuple[str, ...]
     words: tuple[str, ...] = ()  # tests in whose names they stand come first
+    without: tuple[str, ...] = ()  # tests in whose names they stand are left out
     path: str = ""  # what is written before and put back afterwards, with `text` in it
     text: str = ""
-    collect_only: bool = False
+    collect_only: bool = False  # and keep the tests as compiled, which no mutant changes
 
 
 @dataclass(frozen=True)
@@ -116,8 +117,10 @@ def _test(order: Order, note: Path) -> None:
         options += ["--basetemp", str(Path("mutation-scratch").absolute())]
         if order.collect_only:
             options.append("--collect-only")
-        status = int(pytest.main([*options, *order.tests], plugins=[Plugin(note, tuple(order.words), TEST_SECONDS)]))
-    except BaseException:
+            sys.dont_write_bytecode = False
+        plugin = Plugin(note, tuple(order.words), tuple(order.without), TEST_SECONDS)
+        status = int(pytest.main([*options, *order.tests], plugins=[plugin]))
+    except BaseException:  # noqa: BLE001 - nothing may go on behind the fork
         traceback.print_exc()
     finally:
         sys.stdout.flush()
