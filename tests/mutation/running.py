@@ -149,6 +149,7 @@ def _work(
         )
         results[mutant.key] = result
         if kept:
+            kept.parent.mkdir(parents=True, exist_ok=True)
             with kept.open("a", encoding="utf-8") as file:
                 file.write(json.dumps(asdict(result), ensure_ascii=False) + "\n")
     server.close()

@@ -114,6 +114,10 @@ def _test(order: Order, note: Path) -> None:
 
         options = ["-q", "-x", "--tb=short", "-p", "no:cacheprovider", "-p", "no:xdist"]
         options += ["-W", "ignore::pytest.PytestAssertRewriteWarning"]  # of what is imported before
+        options += [
+            "-W",
+            "ignore:overflow encountered in scalar multiply:RuntimeWarning",
+        ]  # of random numbers, on purpose
         options += ["--basetemp", str(Path("mutation-scratch").absolute())]
         if order.collect_only:
             options.append("--collect-only")
