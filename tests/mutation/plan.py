@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import functools
 import tomllib
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -20,18 +20,20 @@ class Part:
     sources: tuple[str, ...]  # patterns from the root of the project
     tests: tuple[str, ...]  # files from the root of the project; in this order
     without: tuple[str, ...]  # tests in whose names these stand are not asked
+    slow: bool  # whether those marked slow are
 
 
-def test_folder(files: Sequence[str]) -> tuple[str, ...]:
-    """Return files of the folder of tests from the root of the project."""
-    return tuple(f"tests/{file}" for file in files)
-
-
+@functools.cache
 def parts() -> list[Part]:
     """Return the parts that `plan.toml` names."""
     with (HERE / "plan.toml").open("rb") as file:
         return [
-            Part(tuple(part["sources"]), test_folder(part["tests"]), tuple(part.get("without", ())))
+            Part(
+                tuple(part["sources"]),
+                tuple(f"tests/{file}" for file in part["tests"]),
+                tuple(part.get("without", ())),
+                part.get("slow", False),
+            )
             for part in tomllib.load(file)["part"]
         ]
 
@@ -70,5 +72,6 @@ def equivalent() -> dict[str, str]:
     return dict(named)
 
 
+@functools.cache
 def _files(pattern: str) -> list[str]:
     return [path.relative_to(ROOT).as_posix() for path in ROOT.glob(pattern)]

@@ -93,7 +93,7 @@ def results_of(mutants: Sequence[Mutant], jobs: int, kept: Path | None, *, again
             _copy(copies[0], copy)
         for done in [pool.submit(_work, copy, todo, marks, results, kept) for copy in copies]:
             done.result()
-        _doubt([results[mutant.key] for mutant in left], results, copies[0])
+        _doubt(results, copies[0])
     return results
 
 
@@ -142,8 +142,9 @@ def _work(
             break
         text = mutant.applied((ROOT / mutant.path).read_text(encoding="utf-8"))
         part = part_of(mutant.path)
-        order = Order(part.tests, _words(mutant), part.without, mutant.path, text)
-        outcome = server.ask(order)
+        outcome = server.ask(Order(part.tests, _words(mutant), part.without, part.slow, mutant.path, text))
+        if not outcome.passed and not outcome.by and not server.ask(Order(part.tests, collect_only=True)).passed:
+            raise RuntimeError(f"{mutant.path}: its tests cannot be collected without any mutant either")
         result = Result(
             mutant.key, marks[mutant.path], outcome.passed, outcome.by, outcome.how, round(outcome.seconds, 2)
         )
@@ -155,18 +156,13 @@ def _work(
     server.close()
 
 
-def _doubt(new: Sequence[Result], results: dict[str, Result], copy: Path) -> None:
+def _doubt(results: dict[str, Result], copy: Path) -> None:
     """Run every test that noticed something without any mutant, and mark what it then says no less."""
+    tests = tuple(sorted({result.by for result in results.values() if result.by}))
     server = Server(copy)
-    for result in new:
-        if not result.survived and not result.by:
-            part = part_of(result.key.partition(" | ")[0])
-            if not server.ask(Order(part.tests, collect_only=True)).passed:
-                results[result.key] = replace(result, doubtful=True)
-    tests = tuple(sorted({result.by for result in new if result.by}))
-    if tests and not server.ask(Order(tests)).passed:
-        failing = {test for test in tests if not server.ask(Order((test,))).passed}
-        for result in new:
+    if tests and not server.ask(Order(tests, slow=True)).passed:
+        failing = {test for test in tests if not server.ask(Order((test,), slow=True)).passed}
+        for result in list(results.values()):
             if result.by in failing:
                 results[result.key] = replace(result, doubtful=True)
     server.close()

@@ -31,6 +31,7 @@ class Order:
     tests: tuple[str, ...]
     words: tuple[str, ...] = ()  # tests in whose names they stand come first
     without: tuple[str, ...] = ()  # tests in whose names they stand are left out
+    slow: bool = False  # whether those marked slow are run
     path: str = ""  # what is written before and put back afterwards, with `text` in it
     text: str = ""
     collect_only: bool = False  # and keep the tests as compiled, which no mutant changes
@@ -119,6 +120,8 @@ def _test(order: Order, note: Path) -> None:
             "ignore:overflow encountered in scalar multiply:RuntimeWarning",
         ]  # of random numbers, on purpose
         options += ["--basetemp", str(Path("mutation-scratch").absolute())]
+        if order.slow:
+            options.append("--slow")
         if order.collect_only:
             options.append("--collect-only")
             sys.dont_write_bytecode = False

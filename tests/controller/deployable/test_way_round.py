@@ -234,3 +234,12 @@ def test_a_way_is_kept_up_and_replaced_by_one_that_saves_enough():
             assert guide.cost[0] == cost
             np.testing.assert_allclose(way, before, rtol=1e-12)
     assert taken > 5 and grown > 3
+
+
+def test_passed_corners_are_dropped_one_after_the_other():
+    guide, corners = guide_of_nothing(0, 1), [(1.0, 0.0, 2.5), (1.1, 0.1, 2.5), (4.0, 1.0, 2.5), (8.0, 0.5, 2.5)]
+    guide.points[0], guide.way[:4] = 4, corners
+    improve(guide, np.array([1.05, 0.05, 2.5]), pack([GOAL]), pack([]), GAINS, 0.02)
+    assert guide.points[0] == 2
+    assert guide.way[:2].tolist() == [list(corner) for corner in corners[2:]]
+    assert way_round._length(guide.way, 2, START) == pytest.approx(np.hypot(4.0, 0.8) + np.hypot(4.0, 0.5))

@@ -133,12 +133,13 @@ def test_with_unit_gradients_the_three_forms_are_one():
     [
         (Region("s", Sphere((0, 0, 0), 2.0), "out"), (0.5, 0.0, 0.0), (1.5, 0.0, 0.0)),
         (Region("s", Sphere((0, 0, 0), 2.0), "in"), (3.0, 0.0, 0.0), (-1.0, 0.0, 0.0)),
+        (Region("a", Sphere((0, 0, 0), 5.0), "out"), (1.0, 2.0, 2.0), (2.0 / 3.0, 4.0 / 3.0, 4.0 / 3.0)),
         (Region("c", Sphere((0, 0, 0), 2.0), "out"), (0.0, 0.0, 0.0), (2.0, 0.0, 0.0)),
         (Region("d", DepthBand(2.5, 1.8), "out"), (0.0, 0.0, 1.0), (0.0, 0.0, -0.3)),
         (Region("d", DepthBand(2.5, 1.8), "in"), (0.0, 0.0, 5.0), (0.0, 0.0, -0.7)),
         (FLAT, (0.0, 0.1, 0.5), (0.0, 0.0, 0.25)),
     ],
-    ids=["sphere out", "sphere in", "its centre", "band out", "band in", "box out"],
+    ids=["sphere out", "sphere in", "sphere aslant", "its centre", "band out", "band in", "box out"],
 )
 def test_potential_is_the_integral_of_g_along_the_normal(region, position, inward):
     g, dg, clearance = evaluated([region], position)

@@ -1,0 +1,87 @@
+"""How many steps a step is made of, and which motion they can follow: by what does not depend on it."""
+
+import numpy as np
+import pytest
+from fmpy.fmi1 import FMICallException
+
+from tests.plant_fmu.test_limits import begin
+
+MOVING = {"velocity.u": 0.8, "velocity.v": -0.5, "velocity.r": 0.4, "thrust_time_constant[1]": 0.0}
+STATE = [
+    *(f"position.{a}" for a in "xyz"),
+    *(f"quaternion.e{i}" for i in range(4)),
+    *(f"velocity.{a}" for a in "uvwpqr"),
+]
+
+
+def after_one(make_slave, start, length, substep):
+    slave = make_slave()
+    slave.set_values(MOVING | {"substep": substep})
+    begin(slave, start)
+    slave.fmu.doStep(start, length)
+    return slave.get(*STATE)
+
+
+@pytest.mark.parametrize("start", [0.0, 1e6, -1e6])
+def test_a_step_as_long_as_the_substep_is_one_step(make_slave, start):
+    """Whatever its end is rounded to: as with a substep that is longer; half of it is not the same."""
+    one, whole, half = (after_one(make_slave, start, 0.2, substep) for substep in (0.2, 0.5, 0.1))
+    assert one == whole
+    assert one != half
+
+
+def test_two_and_a_half_substeps_are_three_steps(make_slave):
+    assert after_one(make_slave, 0.0, 0.25, 0.1) == after_one(make_slave, 0.0, 0.25, 0.25 / 3.0)
+    assert after_one(make_slave, 0.0, 0.25, 0.1) != after_one(make_slave, 0.0, 0.25, 0.125)
+
+
+LOOKING = {
+    "x": (1.0, 0.0, 0.0, 0.0),
+    "y": (np.sqrt(0.5), 0.0, 0.0, np.sqrt(0.5)),
+    "z": (np.sqrt(0.5), 0.0, -np.sqrt(0.5), 0.0),
+}
+
+
+def fares(make_slave, substep, **values):
+    """Return whether a step is taken."""
+    slave = make_slave().start(**values, substep=substep)
+    try:
+        slave.step(substep)
+    except FMICallException:
+        assert "too long for this motion" in slave.said[-1][1]
+        return False
+    return True
+
+
+@pytest.mark.parametrize("ahead", "xyz")
+def test_damping_counts_by_the_water_along_the_bodys_axes(make_slave, ahead):
+    """Damped along its own x axis alone, which looks along each axis of the world: only a current along that one."""
+    e = dict(zip((f"quaternion.e{i}" for i in range(4)), LOOKING[ahead], strict=True))
+    damping = {f"{kind}_damping[{i}]": 0.0 for kind in ("linear", "quadratic") for i in range(1, 7)}
+    damping |= {"quadratic_damping[1]": 2000.0, "weight": 1226.25, "buoyancy": 1226.25, "position.z": 20.0}
+    damping |= {f"r_{p}.{a}": 0.0 for p in "GB" for a in "xyz"}
+    for axis in "xyz":
+        for sign in (1.0, -1.0):
+            current = {f"current.{axis}": sign}  # 2 d |v| / m = 21 1/s
+            assert fares(make_slave, 0.2, **e, **damping, **current) == (axis != ahead)
+
+
+@pytest.mark.parametrize("axis", range(6))
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_damping_counts_by_the_velocity(make_slave, axis, sign):
+    """Linear and quadratic add up: h (d1 + 2 d2 |v|) / m on either side of 2.5."""
+    mass = 187.5 if axis < 3 else 8.0
+    for rate, taken in ((10.0, True), (14.0, False)):
+        damping = {f"{kind}_damping[{i}]": 0.0 for kind in ("linear", "quadratic") for i in range(1, 7)}
+        damping |= {f"linear_damping[{axis + 1}]": 4.0 * mass, f"quadratic_damping[{axis + 1}]": (rate - 4.0) * mass}
+        damping |= {f"inertia.{a}{a}": 8.0 for a in "xyz"} | {f"velocity.{'uvwpqr'[axis]}": 0.5 * sign}
+        damping |= {f"r_{p}.{a}": 0.0 for p in "GB" for a in "xyz"} | {"position.z": 20.0}
+        assert fares(make_slave, 0.2, **damping) == taken
+
+
+def test_the_bottom_counts_where_it_is_touched(make_slave):
+    """2 / T beside the damping, T four substeps at the least: half of what is allowed."""
+    damping = {f"{kind}_damping[{i}]": 0.0 for kind in ("linear", "quadratic") for i in range(1, 7)}
+    damping |= {"linear_damping[3]": 11.0 * 187.5, "bottom_time_constant": 0.0, "hull_radius": 0.3, "position.z": 9.75}
+    assert fares(make_slave, 0.2, **damping, bottom_depth=10.1)
+    assert not fares(make_slave, 0.2, **damping, bottom_depth=10.0)
