@@ -85,3 +85,31 @@ def test_the_bottom_counts_where_it_is_touched(make_slave):
     damping |= {"linear_damping[3]": 11.0 * 187.5, "bottom_time_constant": 0.0, "hull_radius": 0.3, "position.z": 9.75}
     assert fares(make_slave, 0.2, **damping, bottom_depth=10.1)
     assert not fares(make_slave, 0.2, **damping, bottom_depth=10.0)
+
+
+@pytest.mark.parametrize("free_surface", [False, True])
+def test_swinging_counts_by_what_rights_it(make_slave, free_surface):
+    """Upright, at rest: h sqrt(k max M^-1) on either side of 1, with k of the righting arms and of floating."""
+    r_G, r_B, W = np.array([0.02, -0.03, 0.05]), np.array([0.02, -0.03, -0.06]), 1226.25
+    k = np.linalg.norm(r_G * W - r_B * W)
+    if free_surface:
+        k += 0.75 * W / 0.3 * (1.0 + np.linalg.norm(r_B)) ** 2
+    S = np.array([[0, -r_G[2], r_G[1]], [r_G[2], 0, -r_G[0]], [-r_G[1], r_G[0], 0]])
+    M = np.block([[187.5 * np.eye(3), -125.0 * S], [125.0 * S, 8.0 * np.eye(3)]])
+    swing = np.sqrt(k * np.abs(np.linalg.inv(M)).sum(axis=1).max())
+    values = {f"{kind}_damping[{i}]": 0.0 for kind in ("linear", "quadratic") for i in range(1, 7)}
+    values |= {f"inertia.{a}{a}": 8.0 for a in "xyz"} | {"weight": W, "buoyancy": W, "hull_radius": 0.3}
+    values |= {f"r_G.{a}": x for a, x in zip("xyz", r_G, strict=True)}
+    values |= {f"r_B.{a}": x for a, x in zip("xyz", r_B, strict=True)}
+    values |= {"free_surface": free_surface, "position.z": 20.0, "bottom_depth": 100.0}
+    assert fares(make_slave, 0.99 / swing, **values)
+    assert not fares(make_slave, 1.01 / swing, **values)
+
+
+def test_spinning_counts_by_the_length_of_the_rate(make_slave):
+    values = {f"{kind}_damping[{i}]": 0.0 for kind in ("linear", "quadratic") for i in range(1, 7)}
+    values |= {f"r_{p}.{a}": 0.0 for p in "GB" for a in "xyz"} | {f"inertia.{a}{a}": 8.0 for a in "xyz"}
+    for spin in ((6.0, 0.0, 0.0), (0.0, -6.0, 0.0), (0.0, 0.0, 6.0), (2.0, 4.0, -4.0)):
+        rates = {f"velocity.{a}": x for a, x in zip("pqr", spin, strict=True)}
+        assert fares(make_slave, 0.99 / 6.0, **values, **rates)
+        assert not fares(make_slave, 1.01 / 6.0, **values, **rates)
