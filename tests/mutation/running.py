@@ -158,13 +158,13 @@ def _work(
 
 def _doubt(results: dict[str, Result], copy: Path) -> None:
     """Run every test that noticed something without any mutant, and mark what it then says no less."""
-    tests = tuple(sorted({result.by for result in results.values() if result.by}))
     server = Server(copy)
-    if tests and not server.ask(Order(tests, slow=True)).passed:
-        failing = {test for test in tests if not server.ask(Order((test,), slow=True)).passed}
-        for result in list(results.values()):
-            if result.by in failing:
-                results[result.key] = replace(result, doubtful=True)
+    for slow in (False, True):
+        given = [r for r in results.values() if r.by and part_of(r.key.partition(" | ")[0]).slow == slow]
+        tests = tuple(sorted({result.by for result in given}))
+        if tests and not server.ask(Order(tests, slow=slow)).passed:
+            failing = {test for test in tests if not server.ask(Order((test,), slow=slow)).passed}
+            results.update((r.key, replace(r, doubtful=True)) for r in given if r.by in failing)
     server.close()
 
 
