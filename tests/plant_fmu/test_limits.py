@@ -82,6 +82,18 @@ def test_a_master_that_adds_up_its_time_gets_every_sample(make_slave, fmi):
         assert abs(measured - true) < 1e-7
 
 
+@pytest.mark.parametrize("start", [1e8, -1e8])
+def test_late_ticks_come_in_time_for_a_master_that_adds_up(make_slave, fmi, start):
+    """Each addition of 0.02 s to 1e8 s is 4 ns short of it, and half as many again may be those of the tick."""
+    slave = make_slave(fmi=fmi)
+    slave.set_values({"depth_sensor.rate": 50.0, "wrench.Z": 200.0, "substep": 0.02})
+    begin(slave, start)
+    for _ in range(20):
+        slave.step(0.02)
+        measured, true = slave.get("measured.depth", "position.z")
+        assert abs(measured - true) < 1e-7
+
+
 @pytest.mark.parametrize("start", [1e6, 1e8])
 def test_a_step_is_not_taken_twice(make_slave, fmi, start):
     slave = make_slave(fmi=fmi)

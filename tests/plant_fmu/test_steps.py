@@ -113,3 +113,24 @@ def test_spinning_counts_by_the_length_of_the_rate(make_slave):
         rates = {f"velocity.{a}": x for a, x in zip("pqr", spin, strict=True)}
         assert fares(make_slave, 0.99 / 6.0, **values, **rates)
         assert not fares(make_slave, 1.01 / 6.0, **values, **rates)
+
+
+def test_a_step_in_falling_current_is_judged_by_that_of_its_end(make_slave):
+    """Held in place by its thrusters: the speed through the water is the current's, which falls all the way."""
+    damping = {f"{kind}_damping[{i}]": 0.0 for kind in ("linear", "quadratic") for i in range(1, 7)}
+    values = {"current_variation.x": 1.0, "current_variation_period": 10.0, "current_correlation_time": 20.0}
+    values |= damping | {"position.z": 20.0, "wrench_time_constant": 0.0, "wrench_force_limit": 1e9}
+    values |= {f"r_{p}.{a}": 0.0 for p in "GB" for a in "xyz"}
+    for seed in range(40):
+        slave = make_slave().start(**values, substep=1.0, seed=seed)
+        before = slave.get("water_velocity.x")[0]
+        slave.step(1.0)
+        fall = 1.0 - slave.get("water_velocity.x")[0] / before
+        if abs(before) < 0.3 or not 0.1 < fall < 0.3:
+            continue
+        d = 2.4 * 187.5 / (2.0 * abs(before))  # h 2 d |v| / m = 2.4 of 2.5
+        slave = make_slave().start(**values | {"quadratic_damping[1]": d}, substep=1.0, seed=seed)
+        slave.set_values({"wrench.X": -d * before * abs(before)})
+        slave.step(1.0)
+        return
+    pytest.fail("no current falls")

@@ -120,3 +120,15 @@ def test_what_is_not_finite_moves_nothing(bad):
     forces, _, steps = ask(thrusters, rows, right, price, np.r_[bad, np.zeros(7)])
     assert steps > 0
     assert np.array_equal(forces, alone)
+
+
+def test_steps_are_negative_where_the_search_was_cut_short(monkeypatch):
+    """In plain Python, with one step allowed where four limits are in the way."""
+    plain = getattr(solve, "py_func", solve)
+    thrusters = thrusters_of(MODELS["odin"])
+    wanted, forces, work = np.r_[100.0, -100.0, np.zeros(6)], np.empty(8), workspace(1, 8)
+    for allowed, steps in ((1, -1), (48, 4)):
+        monkeypatch.setitem(plain.__globals__, "_STEPS_A_ROW", allowed / 16.0)
+        work.wanted[:] = wanted
+        assert plain(work, 0, thrusters.inverse, thrusters.lower, thrusters.upper, forces) == steps
+        assert np.all(forces >= thrusters.lower) and np.all(forces <= thrusters.upper)
