@@ -94,6 +94,14 @@ def test_late_ticks_come_in_time_for_a_master_that_adds_up(make_slave, fmi, star
         assert abs(measured - true) < 1e-7
 
 
+def test_time_is_where_the_step_ends_though_a_tick_is_almost_there(make_slave):
+    """Eight times a tenth of a second, added up, are a last bit short of the eighth tick."""
+    slave = make_slave(fmi=3).start(**{"depth_sensor.rate": 10.0})
+    for _ in range(12):
+        slave.step(0.1)
+        assert slave.get("time") == [slave.time]
+
+
 @pytest.mark.parametrize("start", [1e6, 1e8])
 def test_a_step_is_not_taken_twice(make_slave, fmi, start):
     slave = make_slave(fmi=fmi)

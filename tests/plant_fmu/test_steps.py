@@ -55,15 +55,21 @@ def fares(make_slave, substep, **values):
 
 @pytest.mark.parametrize("ahead", "xyz")
 def test_damping_counts_by_the_water_along_the_bodys_axes(make_slave, ahead):
-    """Damped along its own x axis alone, which looks along each axis of the world: only a current along that one."""
+    """Damped along its own x axis alone, which looks along each axis of the world: only a current along that one.
+
+    Its thrusters hold it where it is; where it goes with the water, there is nothing to follow.
+    """
     e = dict(zip((f"quaternion.e{i}" for i in range(4)), LOOKING[ahead], strict=True))
     damping = {f"{kind}_damping[{i}]": 0.0 for kind in ("linear", "quadratic") for i in range(1, 7)}
     damping |= {"quadratic_damping[1]": 2000.0, "weight": 1226.25, "buoyancy": 1226.25, "position.z": 20.0}
     damping |= {f"r_{p}.{a}": 0.0 for p in "GB" for a in "xyz"}
+    damping |= {"wrench_time_constant": 0.0, "wrench_force_limit": 1e9}
     for axis in "xyz":
         for sign in (1.0, -1.0):
             current = {f"current.{axis}": sign}  # 2 d |v| / m = 21 1/s
-            assert fares(make_slave, 0.2, **e, **damping, **current) == (axis != ahead)
+            held = {"wrench.X": -2000.0 * sign if axis == ahead else 0.0}
+            assert fares(make_slave, 0.2, **e, **damping, **current, **held) == (axis != ahead)
+            assert fares(make_slave, 0.2, **e, **damping, **current, **{"velocity.u": sign * (axis == ahead)})
 
 
 @pytest.mark.parametrize("axis", range(6))

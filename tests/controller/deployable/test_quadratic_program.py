@@ -132,3 +132,27 @@ def test_steps_are_negative_where_the_search_was_cut_short(monkeypatch):
         work.wanted[:] = wanted
         assert plain(work, 0, thrusters.inverse, thrusters.lower, thrusters.upper, forces) == steps
         assert np.all(forces >= thrusters.lower) and np.all(forces <= thrusters.upper)
+
+
+def test_steps_are_counted_when_rows_come_and_when_they_go(monkeypatch):
+    """In plain Python: each moves the multipliers once, where no row depends on those before."""
+    plain, moves, rng = getattr(solve, "py_func", solve), [], np.random.default_rng(0)
+    advance = plain.__globals__["_advance"]
+
+    def counting(work, count):
+        moves.append(advance(work, count))
+        return moves[-1]
+
+    monkeypatch.setitem(plain.__globals__, "_advance", counting)
+    gone = 0
+    for _ in range(40):
+        thrusters, rows, right, price, wanted = program(rng, "any")
+        work, forces = workspace(len(rows), 8), np.empty(8)
+        work.rows[:], work.right[:], work.price[:], work.wanted[:] = rows, right, price, wanted
+        moves.clear()
+        steps = plain(work, len(rows), thrusters.inverse, thrusters.lower, thrusters.upper, forces)
+        assert steps >= len(moves)
+        gone += sum(drop >= 0 for drop in moves)
+        dependent = steps - len(moves)
+        assert dependent == 0 or (thrusters.health == 0.0).any()
+    assert gone > 3

@@ -61,6 +61,7 @@ def test_the_cost_is_that_of_looking_everywhere():
     for k in range(60):
         way, count = random_way(rng, 20.0 if k % 6 == 0 else 1.0)
         packed.move_to(0.1 * k)
+        packed.velocities[:3] = rng.normal(size=(3, 3)) * rng.choice([0.05, 0.4])
         expected = expected_cost([START, *way[:count]], packed)
         assert cost_of(way, count, START, packed, far, GAINS) == pytest.approx(expected, rel=1e-9)
         length = np.linalg.norm(np.diff([START, *way[:count]], axis=0), axis=1).sum()

@@ -101,3 +101,8 @@ def test_second_and_third_condition_of_45_hold():
     second, third = gain_fits(GAINS)
     assert second.holds and second.have == 18.8
     assert third.holds and third.have - third.need == pytest.approx(100.0 - 18.8)
+
+
+def test_first_condition_of_45_takes_the_heaviest_direction_of_translation():
+    fit = damping_fit(np.diag([10.0, 20.0, 30.0, 1.0, 2.0, 3.0]), np.full(6, 4.0), 2.0, GAINS._replace(sigma_p=0.5))
+    assert fit.need == pytest.approx(0.5 * 30.0 * 2.0)
