@@ -155,3 +155,9 @@ def test_a_quaternion_without_a_direction_has_derivatives_of_what_it_gives(make_
         ["der(position.x)", "attitude.yaw", "der(velocity.w)"], [f"quaternion.e{i}" for i in range(4)]
     )
     assert (found == 0.0).all()
+
+
+@pytest.mark.parametrize("i", range(4))
+def test_a_quaternion_is_told_by_all_its_parts_from_a_unit_one(make_slave, fmi, i):
+    said = make_slave(fmi=fmi, logging_on=True).start(**{"quaternion.e0": 0.0, f"quaternion.e{i}": 1.5}).said
+    assert said[0][1] == "quaternion of length 1.5 made a unit quaternion"
