@@ -157,3 +157,11 @@ def test_the_likeliest_must_be_ahead_of_the_next_and_above_the_threshold():
             suspicion.ratio[j] = ratio
         given = dynamics, thrusters, np.eye(3), gains, 0.02, False
         assert failure.suspect(suspicion, estimate_of_nothing(), np.zeros(3), *given) == found
+
+
+def test_nothing_is_found_where_it_is_switched_off():
+    suspicion, given = failure.suspicion_of(8), (dynamics_of(ODIN, np.ones(9)), thrusters_of(ODIN), np.eye(3))
+    suspicion.ratio[3] = 100.0
+    for threshold, found in ((12.0, 3), (0.0, -1)):
+        gains = DeployableGains(failure_threshold=threshold)
+        assert failure.suspect(suspicion, estimate_of_nothing(), np.zeros(3), *given, gains, 0.02, False) == found

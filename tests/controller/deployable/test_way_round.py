@@ -244,3 +244,12 @@ def test_passed_corners_are_dropped_one_after_the_other():
     assert guide.points[0] == 2
     assert guide.way[:2].tolist() == [list(corner) for corner in corners[2:]]
     assert way_round._length(guide.way, 2, START) == pytest.approx(np.hypot(4.0, 0.8) + np.hypot(4.0, 0.5))
+
+
+def test_the_first_corner_of_the_longest_way_is_dropped():
+    guide = guide_of_nothing(0, 1)
+    guide.points[0], guide.way[:, 0], guide.way[:, 1:] = CORNERS + 1, np.linspace(0.0, 8.0, CORNERS + 1), (0.5, 2.5)
+    before = guide.way.copy()
+    improve(guide, np.array([0.0, 0.4, 2.5]), pack([GOAL]), pack([]), GAINS, 0.02)
+    assert guide.points[0] == CORNERS
+    assert np.array_equal(guide.way[:CORNERS], before[1:])

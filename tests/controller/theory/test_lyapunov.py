@@ -150,6 +150,13 @@ def test_potential_is_the_integral_of_g_along_the_normal(region, position, inwar
     assert came == pytest.approx(0.7 * (100.0 + 0.08 * 100.0 * 90.0 / 18.8) * expected, rel=1e-9)
 
 
+def test_the_printed_sum_is_by_the_square_of_the_whole_gradient():
+    g, dg, _ = evaluated([Region("s", Sphere((0, 0, 0), 5.0), "out")], (1.0, 2.0, -2.0))
+    assert np.sum(dg**2) == pytest.approx(36.0)
+    came = printed_secondary(g, dg, np.array([0.7]), GAINS)
+    assert came == pytest.approx(0.5 * (100.0 + 0.08 * 100.0 * 90.0 / 18.8) * 0.7 * 16.0**2 / 36.0, rel=1e-12)
+
+
 def test_what_is_satisfied_or_has_no_weight_counts_nothing():
     g, dg, clearance = evaluated([SPHERE, FLAT], (5.0, 0.0, 0.0))
     assert printed_secondary(g, dg, BETAS, GAINS) == normalised_secondary(g, dg, clearance, BETAS, GAINS) == 0.0
