@@ -129,9 +129,11 @@ def test_the_held_attitude_goes_back_at_a_fifth_of_the_way_a_second():
 
 
 def test_an_attitude_that_is_kept_stays_to_the_last_bit():
-    attitude = loop.attitude_of(np.array([0.8, 0.36, -0.48, 0.0]))
-    loop.aim(attitude, pack([]), NOWHERE, GAINS, PERIOD)
-    assert np.array_equal(attitude.desired, attitude.preferred)
+    rng = np.random.default_rng(10)
+    for _ in range(50):
+        attitude = loop.attitude_of(turned(rng))
+        loop.aim(attitude, pack([]), NOWHERE, GAINS, PERIOD)
+        assert np.array_equal(attitude.desired, attitude.preferred)
 
 
 def asked_turn(attitude, regions, position):

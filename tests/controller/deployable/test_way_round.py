@@ -253,3 +253,17 @@ def test_the_first_corner_of_the_longest_way_is_dropped():
     improve(guide, np.array([0.0, 0.4, 2.5]), pack([GOAL]), pack([]), GAINS, 0.02)
     assert guide.points[0] == CORNERS
     assert np.array_equal(guide.way[:CORNERS], before[1:])
+
+
+def test_what_is_found_far_away_is_not_looked_at_again(monkeypatch):
+    """In plain Python: a ball that is farther than the way is long, once; one at half of that, again after a while."""
+    plain, looks = getattr(cost_of, "py_func", cost_of), []
+    look = plain.__globals__["clearance_of_sphere"]
+    monkeypatch.setitem(plain.__globals__, "clearance_of_sphere", lambda *given: looks.append(1) or look(*given))
+    way = np.zeros((CORNERS + 1, 3))
+    way[0] = START + np.array([6.0, 0.0, 0.0])
+    for aside, least, most in ((8.0, 1, 1), (4.0, 2, 9)):
+        looks.clear()
+        regions = pack([Region("ball", Sphere((3.0, 0.2 + aside, 2.5), 0.3), "out")])
+        assert plain(way, 1, START, regions, np.zeros(1), GAINS) == pytest.approx(6.0)
+        assert least <= len(looks) <= most
