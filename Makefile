@@ -7,6 +7,8 @@
 # make packaging  what is shipped: its contents, and runs from the wheel in an empty environment
 # make lowest     tests with the lowest versions of all that is needed, on Python 3.11
 # make bench  what things cost, against peers in an environment of their own
+# make mutation         whether the tests notice every changed sign of controller and plant; hours
+# make mutation-sample  the same of 40 signs, drawn with a fixed seed
 PYTHON ?= python3
 VENV ?= .venv
 BIN := $(VENV)/bin
@@ -15,7 +17,7 @@ comma := ,
 EXTRAS := mavlink,importers,dev$(if $(shell command -v cc),,$(comma)build)
 PYTEST_FLAGS ?=
 
-.PHONY: run test lint coverage docs bench dist packaging lowest clean
+.PHONY: run test lint coverage mutation mutation-sample docs bench dist packaging lowest clean
 
 run: $(VENV)/ready
 	$(BIN)/cosim run paper
@@ -30,6 +32,12 @@ lint: $(VENV)/ready
 
 coverage: $(VENV)/ready
 	$(BIN)/python -m tests.house.coverage
+
+mutation: $(VENV)/ready
+	$(BIN)/python -m tests.mutation --results build/mutation.jsonl
+
+mutation-sample: $(VENV)/ready
+	$(BIN)/python -m tests.mutation --sample 40
 
 docs: $(VENV)/ready
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[docs]'

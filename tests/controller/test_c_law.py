@@ -70,13 +70,14 @@ SHAPES = {
         Visibility((2.0, 0.0, 0.0), (1.0, 0.0, 0.0), 0.4, (0.5, 0.0, 0.0)),
         [(1.5, 0.0, 0.0), (0.0, 0.0, 0.0), (4.0, 0.0, 0.0), (1.0, 1.0, 1.0)],
     ),
+    "aslant visibility": (Visibility((2.0, -1.0, 0.5), (1.0, -2.0, 0.5), 0.4, (0.5, 0.2, -0.3)), [(2.0, -1.0, 0.5)]),
 }
 
 HARNESS = r"""
 #include "law.h"
 #include "regions.h"
 
-enum { N = (int)(sizeof(Real) / sizeof(double)), MOST = 64 };
+enum { N = (int)(sizeof(Real) / sizeof(double)), MOST = 256, REGIONS = 32 };
 
 static void gather(Real out[], const double in[], int n, int at) /* of rows of n numbers, those of N poses */
 {
@@ -95,19 +96,20 @@ static void scatter(double out[], const Real in[], int n, int at)
 void try_regions(int n, const int *kinds, const double *signs, const int *offsets, const double *numbers,
                  const double *shifts, int poses, const double *p, const double *e, double *g, double *dg, double *d)
 {
-    Real packed[MOST], moved[1][3], position[3], quaternion[4], value[1], gradient[1][3], clearance[1];
+    Real packed[MOST], moved[REGIONS][3], position[3], quaternion[4];
+    Real value[REGIONS], gradient[REGIONS][3], clearance[REGIONS];
     for (int i = 0; i < offsets[n]; i++)
         packed[i] = splat(numbers[i]);
-    for (int i = 0; i < 3; i++)
-        moved[0][i] = splat(shifts[i]);
+    for (int i = 0; i < 3 * n; i++)
+        moved[i / 3][i % 3] = splat(shifts[i]);
     const Regions regions = {n, kinds, signs, offsets, packed, (const Real(*)[3])moved};
     for (int at = 0; at < poses; at += N) {
         gather(position, p, 3, at);
         gather(quaternion, e, 4, at);
         regions_evaluate(&regions, (const Real *)position, (const Real *)quaternion, value, gradient, clearance);
-        scatter(g, value, 1, at);
-        scatter(dg, gradient[0], 3, at);
-        scatter(d, clearance, 1, at);
+        scatter(g, value, n, at);
+        scatter(dg, gradient[0], 3 * n, at);
+        scatter(d, clearance, n, at);
     }
 }
 
@@ -171,23 +173,21 @@ def address(array):
 
 
 def in_c(library, packed, positions, quaternions):
-    m = len(positions)
-    values, gradients, clearances = np.empty(m), np.empty((m, 3)), np.empty(m)
+    m, n = len(positions), len(packed.kinds)
+    values, gradients, clearances = np.empty((m, n)), np.empty((m, n, 3)), np.empty((m, n))
     kinds, offsets = packed.kinds.astype(np.int32), packed.offsets.astype(np.int32)
     library.try_regions(
-        1, address(kinds), address(packed.signs), address(offsets), address(packed.numbers), address(packed.shifts),
+        n, address(kinds), address(packed.signs), address(offsets), address(packed.numbers), address(packed.shifts),
         m, address(positions), address(quaternions), address(values), address(gradients), address(clearances),
     )  # fmt: skip
     return values, gradients, clearances
 
 
 def in_python(packed, positions, quaternions):
-    m = len(positions)
-    values, gradients, turnings, clearances = np.empty(m), np.empty((m, 3)), np.empty((1, 3)), np.empty(m)
+    m, n = len(positions), len(packed.kinds)
+    values, gradients, turnings, clearances = np.empty((m, n)), np.empty((m, n, 3)), np.empty((n, 3)), np.empty((m, n))
     for i in range(m):
-        packed.evaluate(
-            positions[i], quaternions[i], values[i : i + 1], gradients[i : i + 1], turnings, clearances[i : i + 1]
-        )
+        packed.evaluate(positions[i], quaternions[i], values[i], gradients[i], turnings, clearances[i])
     return values, gradients, clearances
 
 
@@ -216,6 +216,18 @@ def test_regions_are_those_of_python(library, name, keep):
         in_c(library, packed, places, attitudes), in_python(packed, places, attitudes), strict=True
     ):
         assert np.all(np.isfinite(theirs))
+        np.testing.assert_allclose(ours, theirs, rtol=1e-12, atol=1e-12)
+
+
+def test_regions_of_a_scene_are_each_their_own(library):
+    """All shapes at once, each at a place of its own."""
+    rng = np.random.default_rng(4)
+    packed = pack([Region(name, shape, ("in", "out")[i % 2]) for i, (name, (shape, _)) in enumerate(SHAPES.items())])
+    packed.shifts[:] = rng.normal(size=packed.shifts.shape)
+    places, attitudes = rng.normal(size=(200, 3)) * 3.0 + 1.0, unit_rows(rng, 200)
+    for ours, theirs in zip(
+        in_c(library, packed, places, attitudes), in_python(packed, places, attitudes), strict=True
+    ):
         np.testing.assert_allclose(ours, theirs, rtol=1e-12, atol=1e-12)
 
 

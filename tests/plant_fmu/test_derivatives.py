@@ -159,9 +159,12 @@ def test_no_derivative_of_what_is_not_calculated(make_slave, fmi, unknown, known
     assert "value reference" in slave.said[-1][1]
 
 
-def test_straight_up_a_turn_about_the_vertical_is_yaw(make_slave, fmi):
+@pytest.mark.parametrize("yaw", [0.0, 0.7, 2.5])
+def test_straight_up_a_turn_about_the_vertical_is_yaw(make_slave, fmi, yaw):
     """Where roll and yaw are one, and all is called yaw: the other branch of the angles."""
-    e = np.array([0.5, -0.5, 0.5, 0.5])
+    c, s = np.cos(yaw / 2.0), np.sin(yaw / 2.0)
+    w, x, y, z = np.array([0.5, -0.5, 0.5, 0.5])
+    e = np.array([c * w - s * z, c * x - s * y, c * y + s * x, c * z + s * w])  # first that, then the yaw
     slave = make_slave("odin", fmi).start(**dict(zip(STATES[3:7], e, strict=True)))
     turning = 0.5 * np.array([-e[3], -e[2], e[1], e[0]])  # of (0, 0, 0, 1) times e
     jacobian = slave.jacobian(["attitude.roll", "attitude.pitch", "attitude.yaw"], STATES[3:7])

@@ -82,6 +82,26 @@ def test_a_master_that_adds_up_its_time_gets_every_sample(make_slave, fmi):
         assert abs(measured - true) < 1e-7
 
 
+@pytest.mark.parametrize("start", [1e8, -1e8])
+def test_late_ticks_come_in_time_for_a_master_that_adds_up(make_slave, fmi, start):
+    """Each addition of 0.02 s to 1e8 s is 4 ns short of it, and half as many again may be those of the tick."""
+    slave = make_slave(fmi=fmi)
+    slave.set_values({"depth_sensor.rate": 50.0, "wrench.Z": 200.0, "substep": 0.02})
+    begin(slave, start)
+    for _ in range(20):
+        slave.step(0.02)
+        measured, true = slave.get("measured.depth", "position.z")
+        assert abs(measured - true) < 1e-7
+
+
+def test_time_is_where_the_step_ends_though_a_tick_is_almost_there(make_slave):
+    """Eight times a tenth of a second, added up, are a last bit short of the eighth tick."""
+    slave = make_slave(fmi=3).start(**{"depth_sensor.rate": 10.0})
+    for _ in range(12):
+        slave.step(0.1)
+        assert slave.get("time") == [slave.time]
+
+
 @pytest.mark.parametrize("start", [1e6, 1e8])
 def test_a_step_is_not_taken_twice(make_slave, fmi, start):
     slave = make_slave(fmi=fmi)
@@ -135,3 +155,9 @@ def test_a_quaternion_without_a_direction_has_derivatives_of_what_it_gives(make_
         ["der(position.x)", "attitude.yaw", "der(velocity.w)"], [f"quaternion.e{i}" for i in range(4)]
     )
     assert (found == 0.0).all()
+
+
+@pytest.mark.parametrize("i", range(4))
+def test_a_quaternion_is_told_by_all_its_parts_from_a_unit_one(make_slave, fmi, i):
+    said = make_slave(fmi=fmi, logging_on=True).start(**{"quaternion.e0": 0.0, f"quaternion.e{i}": 1.5}).said
+    assert said[0][1] == "quaternion of length 1.5 made a unit quaternion"

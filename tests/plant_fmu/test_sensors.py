@@ -34,6 +34,14 @@ def test_the_generator_gives_its_published_answers(counter, key, result):
     assert philox(counter, key) == result
 
 
+def test_of_two_uniform_numbers_the_first_is_above_0_and_may_be_1(make_slave, fmi):
+    """A seed whose first number is 1e-6 below 1, where its last bit shows."""
+    slave = make_slave(fmi=fmi).start(**{"depth_sensor.rate": 1.0, "depth_sensor.noise": 1.0, "seed": 2705167})
+    expected = normal(2705167, 0, 0)
+    assert 0.0 < abs(expected) < 2e-3
+    assert slave.get("measured.depth", "position.z") == [pytest.approx(expected, rel=1e-12, abs=0.0), 0.0]
+
+
 def test_sensors_are_true_where_nothing_is_switched_on(make_slave, fmi):
     slave = make_slave(fmi=fmi).start(**TILTED, **{"position.z": 5.0, "bottom_depth": 30.0})
     slave.set_values({"wrench.X": 10.0})

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 from scipy.stats import norm
 
 from controller.laws.deployable import failure
@@ -104,3 +105,63 @@ def test_without_a_measurement_nothing_is_learnt():
             )  # fmt: skip
         assert suspicion.ratio.any() == measured
     assert found == -1  # thrusters 1 and 3 have the same moment, and pushed alike
+
+
+def test_lag_and_what_is_adapted_follow_their_equations():
+    """Over several periods, turned, with thrusters that stay under suspicion and such as do not."""
+    rng, kept = np.random.default_rng(3), 0
+    dynamics, thrusters, gains = dynamics_of(ODIN, np.ones(9)), thrusters_of(ODIN), DeployableGains(adaptation=2.0)
+    mass, inertia = dynamics.translational_mass[0], np.diag(dynamics.mass)[3:]
+    suspicion, lags, adapted, ratios = failure.suspicion_of(8), np.zeros((8, 3)), np.zeros((8, 3)), np.zeros(8)
+    thrusters.forces[:] = rng.uniform(10.0, 20.0, 8) * rng.choice([-1.0, 1.0], 8)
+    thrusters.health[7] = 0.0
+    given = thrusters.forces * ODIN.thruster_matrix
+    for k in range(40):
+        R = Rotation.from_euler("zyx", rng.normal(size=3) * 0.5).as_matrix()
+        estimate, measured = estimate_of_nothing(), k % 5 > 0
+        estimate.spread[:], estimate.gain[:] = rng.uniform(0.005, 0.01, 3), rng.uniform(0.2, 0.6, 3)
+        lags[:7] -= 0.02 / mass * (R @ given[:3]).T[:7]
+        estimate.innovation[:] = lags[2] + rng.normal(size=3) * 0.003
+        residual = -given[3:, 2] + adapted[2] + rng.normal(size=3) * 0.3
+        spread = np.sqrt((0.06 * inertia) ** 2 + np.sum((0.1 * given[3:]) ** 2, axis=1))
+        failure.suspect(suspicion, estimate, residual, dynamics, thrusters, R, gains, 0.02, measured)
+        for i in range(7):
+            step = 0.0
+            if measured:
+                step = norm.logpdf(estimate.innovation, lags[i], estimate.spread).sum()
+                step = np.clip(step - norm.logpdf(estimate.innovation, 0.0, estimate.spread).sum(), -3.0, 3.0)
+                lags[i] *= 1.0 - estimate.gain
+                missing = adapted[i] - given[3:, i]
+                if np.sum((missing / spread) ** 2) > 4.0:
+                    by_moment = norm.logpdf(residual, missing, spread) - norm.logpdf(residual, 0.0, spread)
+                    step += 0.2 * np.clip(by_moment.sum(), -3.0, 3.0)
+                adapted[i] -= gains.adaptation * 0.02 * (missing - (R[2] @ missing) * R[2])
+            ratios[i] += step
+            if ratios[i] <= 0.0:
+                ratios[i] = lags[i, :] = adapted[i, :] = 0.0
+            kept += ratios[i] > 0.0
+        assert suspicion.ratio == pytest.approx(ratios, rel=1e-8, abs=1e-10)
+        assert suspicion.lag == pytest.approx(lags, rel=1e-8, abs=1e-12)
+        assert suspicion.adapted == pytest.approx(adapted, rel=1e-8, abs=1e-10)
+    assert kept > 40 and ratios[2] > 20.0
+
+
+def test_the_likeliest_must_be_ahead_of_the_next_and_above_the_threshold():
+    dynamics, thrusters, gains = dynamics_of(ODIN, np.ones(9)), thrusters_of(ODIN), DeployableGains()
+    for ratios, found in (
+        ({2: 21.0, 5: 12.0}, 2), ({5: 12.0, 2: 21.0, 6: 12.9}, 2), ({2: 19.0, 5: 12.0}, -1), ({6: 11.9}, -1),
+        ({1: 20.0, 6: 30.0}, 6), ({1: 24.0, 6: 30.0}, -1), ({3: 12.1}, 3),
+    ):  # fmt: skip
+        suspicion = failure.suspicion_of(8)
+        for j, ratio in ratios.items():
+            suspicion.ratio[j] = ratio
+        given = dynamics, thrusters, np.eye(3), gains, 0.02, False
+        assert failure.suspect(suspicion, estimate_of_nothing(), np.zeros(3), *given) == found
+
+
+def test_nothing_is_found_where_it_is_switched_off():
+    suspicion, given = failure.suspicion_of(8), (dynamics_of(ODIN, np.ones(9)), thrusters_of(ODIN), np.eye(3))
+    suspicion.ratio[3] = 100.0
+    for threshold, found in ((12.0, 3), (0.0, -1)):
+        gains = DeployableGains(failure_threshold=threshold)
+        assert failure.suspect(suspicion, estimate_of_nothing(), np.zeros(3), *given, gains, 0.02, False) == found

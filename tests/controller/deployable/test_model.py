@@ -117,3 +117,14 @@ def test_nothing_untold_enters_the_model():
     other = dataclasses.replace(vehicle, weight=1500.0, buoyancy=1490.0, r_G=(0.1, 0.0, 0.2), r_B=(0.0, 0.1, 0.0))
     for ours, theirs in zip(vehicle_model(vehicle), vehicle_model(other), strict=True):
         assert np.array_equal(ours, theirs)
+
+
+def test_the_least_force_of_uneven_thrusters_is_that_of_the_weaker_way():
+    """Vertical thrusters that push down less than up: the worst direction is among those that go down, or up."""
+    for low, high in ((-5.0, 27.0), (-27.0, 5.0)):
+        uneven = MODELS["odin"]._replace(thrust_min=np.full(8, -27.0), thrust_max=np.full(8, 27.0))
+        vertical = np.abs(uneven.thruster_matrix[2]) > 0.5
+        uneven.thrust_min[vertical], uneven.thrust_max[vertical] = low, high
+        down = np.sort(uneven.thruster_matrix[2, vertical] * low)
+        assert down.size == 4 and np.all(down == down[0])
+        assert least_forces(uneven)[-1] == pytest.approx(20.0)

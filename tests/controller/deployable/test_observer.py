@@ -1,11 +1,14 @@
 """The observer against a Kalman filter in plain matrices."""
 
+import copy
+
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from controller.laws.deployable import observer
 from controller.laws.deployable.gains import DeployableGains
-from controller.laws.deployable.model import dynamics_of, thrusters_of
+from controller.laws.deployable.model import dynamics_of, free_acceleration, thrust_acceleration, thrusters_of
 from tests.controller.deployable.scenery import ODIN, Sea
 
 GAINS = DeployableGains()
@@ -103,3 +106,67 @@ def test_a_measurement_that_cannot_be_is_not_believed_and_changes_nothing(which)
     for part, was in zip(estimate, before, strict=True):
         assert np.array_equal(part, was, equal_nan=True)
     assert estimate.silence[0] == pytest.approx(PERIOD)
+
+
+def test_the_prediction_follows_the_vehicles_model():
+    """Turned and turning, with thrust: position and velocity after a period of steady acceleration."""
+    rng, omega = np.random.default_rng(5), np.array([0.2, -0.3, 0.4])
+    estimate, dynamics, thrusters = started(velocity=(0.6, -0.4, 0.1))
+    R = Rotation.from_euler("zyx", [0.7, -0.3, 0.2]).as_matrix()
+    estimate.water[:2], estimate.restoring[0] = (0.2, -0.1), 7.0
+    thrusters.forces[:] = rng.uniform(-20.0, 20.0, 8)
+    free, pushed = np.empty(3), np.empty(6)
+    free_acceleration(dynamics, R, estimate.velocity, omega, estimate.water, 7.0, free)
+    thrust_acceleration(dynamics, thrusters, R, thrusters.forces, pushed)
+    a, v, p = free + pushed[:3], estimate.velocity.copy(), estimate.position.copy()
+    observer.predict(estimate, dynamics, thrusters, R, omega, GAINS, PERIOD)
+    assert estimate.acceleration == pytest.approx(a, rel=1e-12)
+    assert estimate.position == pytest.approx(p + PERIOD * v + 0.5 * PERIOD**2 * a, rel=1e-12)
+    assert estimate.velocity == pytest.approx(v + PERIOD * a, rel=1e-12)
+    assert estimate.silence[0] == PERIOD
+
+
+def test_innovation_spread_and_gain_are_those_of_the_velocity():
+    estimate, dynamics, thrusters = started(velocity=(0.1, -0.2, 0.3))
+    for _ in range(3):
+        predict(estimate, dynamics, thrusters)
+    P, before, off = estimate.covariance[:, 1, 1].copy(), estimate.velocity.copy(), np.array([0.01, -0.02, 0.005])
+    assert observer.correct(estimate, estimate.position.copy(), before + off, GAINS)
+    variance = P + GAINS.velocity_noise**2
+    assert estimate.innovation == pytest.approx(off, abs=1e-12)
+    assert estimate.spread == pytest.approx(np.sqrt(variance), rel=1e-12)
+    assert estimate.gain == pytest.approx(P / variance, rel=1e-12)
+
+
+def test_what_is_measured_is_believed_up_to_six_standard_deviations_and_five_hundredths():
+    for which, noise in ((0, GAINS.position_noise), (1, GAINS.velocity_noise)):
+        for part, believed in ((0.98, True), (1.02, False)):
+            estimate, dynamics, thrusters = started()
+            predict(estimate, dynamics, thrusters)
+            gate = 6.0 * np.sqrt(estimate.covariance[1, which, which] + noise**2) + 0.05
+            for sign in (1.0, -1.0):
+                seen = copy.deepcopy(estimate)
+                measured = [seen.position.copy(), seen.velocity.copy()]
+                measured[which][1] += sign * part * gate
+                assert observer.correct(seen, *measured, GAINS) == believed
+
+
+def test_bounds_hold_on_either_side():
+    for sign in (1.0, -1.0):
+        estimate, _, _ = started()
+        estimate.covariance[:, 2, 2] = 1e9
+        estimate.covariance[:, 1, 2] = estimate.covariance[:, 2, 1] = 1e3
+        assert observer.correct(estimate, estimate.position.copy(), np.full(3, 0.04 * sign), GAINS)
+        bound = [GAINS.current_bound, GAINS.current_bound, GAINS.restoring_bound]
+        assert [*estimate.water[:2], estimate.restoring[0]] == (sign * np.array(bound)).tolist()
+
+
+def test_doubt_widens_what_is_to_be_found_anew():
+    estimate, _, _ = started()
+    before = estimate.covariance.copy()
+    observer.doubt(estimate, 0.01)
+    widened = np.zeros((3, 3, 3))
+    widened[:, 1, 1], widened[:, 2, 2] = 0.01, (0.04, 0.04, 25.0)
+    assert estimate.covariance == pytest.approx(before + widened, rel=1e-12)
+    estimate.covariance[:, 0, 0] = 0.04, 0.09, 0.01
+    assert observer.position_spread(estimate) == pytest.approx(0.3)

@@ -63,8 +63,8 @@ def test_forces_are_those_of_quadprog(kind):
     rng = np.random.default_rng(KINDS.index(kind))
     for _ in range(150):
         given = program(rng, kind)
-        forces, _, steps = ask(*given)
-        assert steps >= 0
+        forces, y, steps = ask(*given)
+        assert np.count_nonzero(y[len(given[1]) :]) <= steps <= 3 * y.size
         assert forces == pytest.approx(by_quadprog(*given), abs=3e-7 * (1.0 + np.abs(given[-1]).max()))
 
 
@@ -120,3 +120,39 @@ def test_what_is_not_finite_moves_nothing(bad):
     forces, _, steps = ask(thrusters, rows, right, price, np.r_[bad, np.zeros(7)])
     assert steps > 0
     assert np.array_equal(forces, alone)
+
+
+def test_steps_are_negative_where_the_search_was_cut_short(monkeypatch):
+    """In plain Python, with one step allowed where four limits are in the way."""
+    plain = getattr(solve, "py_func", solve)
+    thrusters = thrusters_of(MODELS["odin"])
+    wanted, forces, work = np.r_[100.0, -100.0, np.zeros(6)], np.empty(8), workspace(1, 8)
+    for allowed, steps in ((1, -1), (48, 4)):
+        monkeypatch.setitem(plain.__globals__, "_STEPS_A_ROW", allowed / 16.0)
+        work.wanted[:] = wanted
+        assert plain(work, 0, thrusters.inverse, thrusters.lower, thrusters.upper, forces) == steps
+        assert np.all(forces >= thrusters.lower) and np.all(forces <= thrusters.upper)
+
+
+def test_steps_are_counted_when_rows_come_and_when_they_go(monkeypatch):
+    """In plain Python: each moves the multipliers once, where no row depends on those before."""
+    plain, moves, rng = getattr(solve, "py_func", solve), [], np.random.default_rng(0)
+    advance = plain.__globals__["_advance"]
+
+    def counting(work, count):
+        moves.append(advance(work, count))
+        return moves[-1]
+
+    monkeypatch.setitem(plain.__globals__, "_advance", counting)
+    gone = 0
+    for _ in range(40):
+        thrusters, rows, right, price, wanted = program(rng, "any")
+        work, forces = workspace(len(rows), 8), np.empty(8)
+        work.rows[:], work.right[:], work.price[:], work.wanted[:] = rows, right, price, wanted
+        moves.clear()
+        steps = plain(work, len(rows), thrusters.inverse, thrusters.lower, thrusters.upper, forces)
+        assert steps >= len(moves)
+        gone += sum(drop >= 0 for drop in moves)
+        dependent = steps - len(moves)
+        assert dependent == 0 or (thrusters.health == 0.0).any()
+    assert gone > 3

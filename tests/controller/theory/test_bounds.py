@@ -29,6 +29,14 @@ def test_35_and_36_are_equalities_where_all_errors_are_equal():
     assert square_bound(errors) == pytest.approx(144.0)
 
 
+def test_44_adds_what_the_velocity_and_the_errors_give():
+    gains, nu, y = GAINS._replace(k_v1=7.0, k_v2=5.0), np.zeros(6), np.array([1.0, -2.0, 0.0, 0.5, 0.0, 1.0])
+    pull = min(gains.sigma_p * gains.k_p1, gains.sigma_a * gains.k_p2) * 6.25
+    assert decay_bound(MODEL, gains, y, nu, 3.0) == pytest.approx(pull)
+    nu[5] = 2.0  # the drag of translation is none at rest
+    assert decay_bound(MODEL, gains, y, nu, 3.0) == pytest.approx(pull + (0.0 + 5.0 - 3.0) * 4.0)
+
+
 @pytest.mark.slow
 def test_44_bounds_w_where_43_holds():
     closest = np.inf

@@ -101,3 +101,21 @@ def test_second_and_third_condition_of_45_hold():
     second, third = gain_fits(GAINS)
     assert second.holds and second.have == 18.8
     assert third.holds and third.have - third.need == pytest.approx(100.0 - 18.8)
+
+
+def test_first_condition_of_45_takes_the_heaviest_direction_of_translation():
+    fit = damping_fit(np.diag([10.0, 20.0, 30.0, 1.0, 2.0, 3.0]), np.full(6, 4.0), 2.0, GAINS._replace(sigma_p=0.5))
+    assert fit.need == pytest.approx(0.5 * 30.0 * 2.0)
+
+
+def test_38_holds_up_to_the_greatest_gradient_of_any_mass():
+    rng, found = np.random.default_rng(3), 0
+    for _ in range(20):
+        root = rng.normal(size=(6, 6))
+        mass = 4.0 * root @ root.T + np.diag([30.0, 60.0, 90.0, 5.0, 6.0, 7.0])
+        most = greatest_gradient(mass, GAINS)
+        if most > 0.0:
+            found += 1
+            assert least_of_potential_test(mass, most * 0.999, GAINS) > 0.0
+            assert least_of_potential_test(mass, most * 1.001, GAINS) < 0.0
+    assert found > 10

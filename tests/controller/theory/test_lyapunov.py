@@ -133,12 +133,13 @@ def test_with_unit_gradients_the_three_forms_are_one():
     [
         (Region("s", Sphere((0, 0, 0), 2.0), "out"), (0.5, 0.0, 0.0), (1.5, 0.0, 0.0)),
         (Region("s", Sphere((0, 0, 0), 2.0), "in"), (3.0, 0.0, 0.0), (-1.0, 0.0, 0.0)),
+        (Region("a", Sphere((0, 0, 0), 5.0), "out"), (1.0, 2.0, 2.0), (2.0 / 3.0, 4.0 / 3.0, 4.0 / 3.0)),
         (Region("c", Sphere((0, 0, 0), 2.0), "out"), (0.0, 0.0, 0.0), (2.0, 0.0, 0.0)),
         (Region("d", DepthBand(2.5, 1.8), "out"), (0.0, 0.0, 1.0), (0.0, 0.0, -0.3)),
         (Region("d", DepthBand(2.5, 1.8), "in"), (0.0, 0.0, 5.0), (0.0, 0.0, -0.7)),
         (FLAT, (0.0, 0.1, 0.5), (0.0, 0.0, 0.25)),
     ],
-    ids=["sphere out", "sphere in", "its centre", "band out", "band in", "box out"],
+    ids=["sphere out", "sphere in", "sphere aslant", "its centre", "band out", "band in", "box out"],
 )
 def test_potential_is_the_integral_of_g_along_the_normal(region, position, inward):
     g, dg, clearance = evaluated([region], position)
@@ -147,6 +148,13 @@ def test_potential_is_the_integral_of_g_along_the_normal(region, position, inwar
     expected, _ = quad(lambda t: evaluated([region], position + t * np.array(inward))[0][0] * length, 0.0, 1.0)
     came = normalised_secondary(g, dg, clearance, np.array([0.7]), GAINS)
     assert came == pytest.approx(0.7 * (100.0 + 0.08 * 100.0 * 90.0 / 18.8) * expected, rel=1e-9)
+
+
+def test_the_printed_sum_is_by_the_square_of_the_whole_gradient():
+    g, dg, _ = evaluated([Region("s", Sphere((0, 0, 0), 5.0), "out")], (1.0, 2.0, -2.0))
+    assert np.sum(dg**2) == pytest.approx(36.0)
+    came = printed_secondary(g, dg, np.array([0.7]), GAINS)
+    assert came == pytest.approx(0.5 * (100.0 + 0.08 * 100.0 * 90.0 / 18.8) * 0.7 * 16.0**2 / 36.0, rel=1e-12)
 
 
 def test_what_is_satisfied_or_has_no_weight_counts_nothing():

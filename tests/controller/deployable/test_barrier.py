@@ -1,0 +1,182 @@
+"""The rows of the barriers against the equations in matrices; faces ahead against a box's own planes."""
+
+import numpy as np
+import pytest
+
+from controller.laws.deployable import barrier, faces
+from controller.laws.deployable.gains import DeployableGains
+from controller.laws.deployable.quadratic_program import workspace
+from controller.regions import Box, HalfSpace, Orientation, Region, Sphere, Visibility, pack
+
+GAINS = DeployableGains()
+AHEAD = 0.1  # s
+
+
+def unit(x):
+    return x / np.linalg.norm(x)
+
+
+def evaluated(regions, time, position, quaternion):
+    """Return clearances, and their slopes over the pose, of length 1 for places."""
+    packed, n = pack(regions), len(regions)
+    packed.move_to(time)
+    values, gradients, turnings, clearances = np.empty(n), np.empty((n, 3)), np.empty((n, 3)), np.empty(n)
+    packed.evaluate(position, quaternion, values, gradients, turnings, clearances)
+    slopes = -np.hstack([gradients, turnings])
+    for i, region in enumerate(regions):
+        if region.shape.unit != "rad":
+            slopes[i] /= np.linalg.norm(gradients[i])
+    return clearances, slopes
+
+
+def later_pose(position, quaternion, velocity):
+    e, w = quaternion, velocity[3:]
+    turning = 0.5 * np.r_[-e[1:] @ w, e[0] * w + np.cross(e[1:], w)]
+    return position + AHEAD * velocity[:3], unit(quaternion + AHEAD * turning)
+
+
+def allowed(h, a, slope):
+    """phi and its derivative."""
+    if h <= 0.0:
+        return slope * h, slope
+    root = np.sqrt(2.0 * a * h + (a / slope) ** 2)
+    return root - a / slope, a / root
+
+
+def expected_row(n, distance, margin, relative, turning, braking, motion):
+    h, rate = distance - margin, n @ relative
+    phi, slope = allowed(h, braking, GAINS.barrier_slope)
+    right = -GAINS.barrier_rate * (rate + phi) - slope * rate - n @ motion.free - turning
+    return n @ motion.push, right
+
+
+def moving(rng, velocity, spread=0.1):
+    return barrier.Motion(
+        rng.normal(size=3), np.asarray(velocity), rng.normal(size=6) * 0.1, rng.normal(size=(6, 8)) * 0.01,
+        180.0, 9.0, 0.25, spread,
+    )  # fmt: skip
+
+
+def written(regions, motion, quaternion, weights, limits=(-30.0, 25.0), time=1.5):
+    packed, n = pack(regions), len(regions)
+    packed.move_to(time)
+    sight, work = barrier.sight_of(n), workspace((1 + faces.FACES) * n, 8)
+    barrier.look(sight, packed, motion.position, quaternion, motion.velocity)
+    lower, upper = (np.full(8, limit) for limit in limits)
+    count = barrier.write_rows(work, sight, packed, weights, motion, lower, upper, GAINS)
+    return work.rows[:count].copy(), work.right[:count].copy(), work.price[:count].copy()
+
+
+def test_rows_are_those_of_the_equations():
+    rng, n_rows, n_dropped, n_inside = np.random.default_rng(1), 0, 0, 0
+    for _ in range(60):
+        motion, quaternion = moving(rng, rng.normal(size=6) * 0.4), unit(rng.normal(size=4))
+        regions = [
+            *(
+                Region(
+                    f"ball {i}", Sphere(tuple(rng.normal(size=3) * 2.0), 0.6), "out", tuple(rng.normal(size=3) * 0.3)
+                )
+                for i in range(3)
+            ),
+            Region("pen", Sphere(tuple(rng.normal(size=3)), 6.0), "in"),
+            Region("soft", Sphere((0.0, 0.0, 0.0), 0.5), "out", hard=False),
+            Region("wall", HalfSpace(tuple(rng.normal(size=3)), tuple(rng.normal(size=3))), "in"),
+            Region("face", Orientation(tuple(rng.normal(size=4)), 2.0), "in"),
+            Region("see", Visibility((2.0, 1.0, 0.5), (1.0, 0.2, -0.1), 1.2, (0.2, 0.1, 0.3)), "in"),
+        ]
+        weights = rng.uniform(size=len(regions))
+        here, n = evaluated(regions, 1.5, motion.position, quaternion)
+        _, later = evaluated(regions, 1.5 + AHEAD, *later_pose(motion.position, quaternion, motion.velocity))
+        rows, right, price = [], [], []
+        for i, region in enumerate(regions):
+            if not region.hard:
+                continue
+            relative = motion.velocity - np.r_[region.velocity, np.zeros(3)]
+            turning = (later[i] - n[i]) / AHEAD @ relative
+            braking, margin, scale = motion.braking, GAINS.margin + motion.spread, motion.mass**2
+            if region.shape.unit == "rad":
+                along = np.linalg.norm(n[i, :3])
+                braking, margin = GAINS.turning_deceleration, 0.02 + along * motion.spread
+                scale = (motion.mass * along) ** 2 + (motion.inertia * np.linalg.norm(n[i, 3:])) ** 2
+            elif turning < 0.0 and (isinstance(region.shape, HalfSpace) or later[i] @ n[i] < 0.5):
+                turning = 0.0
+            row, bound = expected_row(n[i], here[i], margin, relative, turning, braking, motion)
+            n_inside += here[i] < margin
+            if bound <= np.sum(np.where(row > 0.0, -30.0 * row, 25.0 * row)):
+                n_dropped += 1
+                continue
+            rows.append(row)
+            right.append(bound)
+            price.append(10.0 ** (-3.0 - 3.0 * weights[i]) / scale)
+        n_rows += len(rows)
+        ours = written(regions, motion, quaternion, weights)
+        for given, expected in zip(ours, (np.reshape(rows, (-1, 8)), right, price), strict=True):
+            np.testing.assert_allclose(given, expected, rtol=1e-8, atol=1e-10)
+    assert n_rows > 100 and n_dropped > 20 and n_inside > 10
+
+
+def test_the_slope_of_a_flat_face_leaps_and_does_not_turn():
+    n, later, v = np.eye(6)[0], np.eye(6)[1], np.array([1.0, 0.5, 0.0, 0.0, 0.0, 0.0])
+    for kind in (Box.kind, Sphere.kind):
+        assert barrier.turning_of(kind, n, later, v) == 0.0  # towards: a leap
+        assert barrier.turning_of(kind, n, later, -v) == pytest.approx(0.5 / AHEAD)
+    near = unit(np.array([0.9, 0.3, 0.0, 0.0, 0.0, 0.0]))
+    back = np.array([1.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+    assert barrier.turning_of(Sphere.kind, n, near, back) == pytest.approx((near[0] - 1.0) / AHEAD)
+    assert barrier.turning_of(Box.kind, n, near, back) == 0.0
+    assert barrier.turning_of(Orientation.kind, n, later, v) == pytest.approx(-0.5 / AHEAD)
+
+
+def planes(box, position):
+    """Return the distance to each face from within, and its slope inwards."""
+    from_centre = position - np.array(box.centre)
+    half = np.array(box.size) / 2.0
+    return [(half[a] - s * from_centre[a], -s * np.eye(3)[a]) for a in range(3) for s in (1.0, -1.0)]
+
+
+def test_faces_ahead_are_planes_of_the_box():
+    """Of a box that is kept within: the nearest, then those that the rest of the velocity leads to, with rows each."""
+    rng, box, two, three = np.random.default_rng(2), Box((0.5, -0.4, 0.3), (3.0, 4.0, 5.0)), 0, 0
+    region = Region("box", box, "in", (0.05, -0.02, 0.03))
+    for _ in range(80):
+        at = np.array(box.centre) + rng.uniform(-0.49, 0.49, 3) * np.array(box.size)
+        motion = moving(rng, np.r_[rng.normal(size=3) * 0.5, np.zeros(3)], spread=0.02)
+        motion = motion._replace(position=at + 1.5 * np.array(region.velocity), free=np.zeros(6))
+        relative = motion.velocity - np.r_[region.velocity, np.zeros(3)]
+        margin, way = GAINS.margin + motion.spread, relative[:3].copy()
+        speed = np.linalg.norm(way)
+        reach = margin + speed * (speed / (2 * motion.braking) + 1 / GAINS.barrier_slope + 1 / GAINS.barrier_rate)
+        found = [min(planes(box, at), key=lambda plane: plane[0])]
+        for _face in range(2 if found[0][0] < reach else 0):
+            way -= min(way @ found[-1][1], 0.0) * found[-1][1]
+            speed = np.linalg.norm(way)
+            if speed < 1e-6:
+                break
+            ahead = [(d / -(s @ way) * speed, d, s) for d, s in planes(box, at) if s @ way < -1e-9]
+            length, distance, slope = min(ahead, key=lambda plane: plane[0])
+            if abs(length - reach) < 1e-3:  # either way
+                break
+            if length > reach:
+                break
+            found.append((distance, slope))
+        else:
+            two, three = two + (len(found) == 2), three + (len(found) == 3)
+        rows = [expected_row(np.r_[s, np.zeros(3)], d, margin, relative, 0.0, motion.braking, motion) for d, s in found]
+        ours = written([region], motion, np.array([1.0, 0.0, 0.0, 0.0]), np.ones(1), (-1e4, 1e4))
+        assert len(ours[0]) == 0 or np.isfinite(ours[0]).all()
+        kept = [(row, bound) for row, bound in rows if bound > -1e4 * np.abs(row).sum()]
+        np.testing.assert_allclose(ours[0], np.reshape([row for row, _ in kept], (-1, 8)), rtol=1e-7, atol=1e-9)
+        np.testing.assert_allclose(ours[1], [bound for _, bound in kept], rtol=1e-6, atol=1e-8)
+    assert three > 5
+
+
+def test_no_face_lies_ahead_of_what_does_not_move_or_does_not_reach():
+    regions, face = pack([Region("box", Box((0.0, 0.0, 0.0), (4.0, 4.0, 4.0)), "in")]), np.empty(3)
+    nearest, at = np.array([-1.0, 0.0, 0.0]), np.array([1.0, 0.2, 0.1])
+    assert faces.face_ahead(regions, 0, at, nearest, np.array([0.4, 0.0, 0.0]), 3.0, face) == np.inf
+    for reach, distance in ((1.7, np.inf), (1.9, 1.8)):
+        velocity = np.array([0.0, 0.3, 0.0])
+        assert faces.face_ahead(regions, 0, at, nearest, velocity, reach, face) == pytest.approx(distance)
+    assert face.tolist() == [0.0, -1.0, 0.0]
+    assert faces.face_ahead(regions, 0, at, nearest, np.array([0.0, 0.0, -0.3]), 2.5, face) == pytest.approx(2.1)
+    assert face.tolist() == [0.0, 0.0, 1.0]

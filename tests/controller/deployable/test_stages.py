@@ -1,0 +1,237 @@
+"""What stands between estimate and barriers, and what is believed of what comes in, against plain matrices."""
+
+import copy
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from controller import VehicleState
+from controller.laws.deployable import intake, law, observer
+from controller.laws.deployable.attitude import free_turning
+from controller.laws.deployable.attraction import wanted_velocity
+from controller.laws.deployable.barrier import look, sight_of
+from controller.laws.deployable.gains import DeployableGains
+from controller.laws.deployable.guide import CORNERS, guide_of_nothing
+from controller.laws.deployable.model import Dynamics, share_out, thrusters_of
+from controller.regions import HalfSpace, Orientation, Region, Sphere, pack
+from tests.controller.deployable.scenery import LEVEL, ODIN, law_for
+
+GAINS = DeployableGains()
+TURNED = Rotation.from_euler("zyx", [0.7, -0.3, 0.2]).as_matrix()
+ATTITUDE = Rotation.from_matrix(TURNED).as_quat()[[3, 0, 1, 2]]
+
+
+def askew(rng):
+    root = rng.normal(size=(6, 6))
+    mass = root @ root.T + np.diag([90.0, 80.0, 70.0, 9.0, 8.0, 7.0])
+    damping, braking = rng.uniform(1.0, 30.0, (2, 6)), rng.uniform(0.1, 0.4, 9)
+    return Dynamics(mass, np.linalg.inv(mass), *damping, np.array([np.trace(mass[:3, :3]) / 3.0]), braking)
+
+
+def approach(distance, a, slope):
+    return np.sqrt(2.0 * a * distance + (a / slope) ** 2) - a / slope if distance > 0.0 else slope * distance
+
+
+def test_the_wanted_velocity_slows_down_for_corners_and_for_the_end():
+    rng, guide, out, slowed = np.random.default_rng(1), guide_of_nothing(0, 1), np.empty(3), 0
+    for _ in range(200):
+        count, at, drift = int(rng.integers(1, 5)), rng.normal(size=3), rng.normal(size=3) * 0.1
+        guide.points[0], guide.way[:] = count, rng.normal(size=(CORNERS + 1, 3)) * rng.choice([0.15, 1.5])
+        points = np.vstack([at + 0.3 * rng.normal(size=3) if rng.uniform() < 0.3 else at, guide.way[:count]])
+        points[0] = at
+        legs = np.diff(points, axis=0)
+        lengths = np.linalg.norm(legs, axis=1)
+        units, ends = legs / lengths[:, None], np.cumsum(lengths)
+        speed = GAINS.speed
+        for i in range(1, count):
+            corner = GAINS.speed * max(0.25, 0.5 * (1.0 + units[i - 1] @ units[i]))
+            speed = min(speed, np.sqrt(corner**2 + 2.0 * GAINS.acceleration * ends[i - 1]))
+        slowed += speed < GAINS.speed
+        speed = min(speed, approach(ends[-1], GAINS.acceleration, GAINS.position_bandwidth))
+        along, left = np.zeros(3), 0.4  # m ahead on the way
+        for unit, length in zip(units, lengths, strict=True):
+            along += unit * np.clip(left, 0.0, length)
+            left -= length
+        wanted_velocity(guide, at, drift, GAINS, out)
+        assert out == pytest.approx(drift + speed * along / np.linalg.norm(along), rel=1e-9, abs=1e-12)
+    assert slowed > 50
+
+
+def test_a_force_gives_the_acceleration():
+    dynamics, out, a = askew(np.random.default_rng(2)), np.empty(6), np.array([0.3, -0.2, 0.5])
+    law._force_of(dynamics, TURNED, a, out)
+    assert out[:3] == pytest.approx(dynamics.mass[:3, :3] @ TURNED.T @ a, rel=1e-12)
+
+
+def test_what_a_newton_of_each_thruster_does():
+    dynamics, thrusters = askew(np.random.default_rng(3)), thrusters_of(ODIN)
+    body = dynamics.inverse_mass @ thrusters.matrix
+    expected = np.vstack([TURNED @ body[:3], body[3:]])
+    assert law._push(dynamics, thrusters, TURNED) == pytest.approx(expected, rel=1e-12, abs=1e-15)
+
+
+def test_violated_soft_regions_push_out_of_them():
+    rng, position = np.random.default_rng(4), np.array([0.3, -0.1, 0.2])
+    dynamics = askew(rng)
+    regions = [
+        Region("soft", Sphere((0.0, 0.0, 0.0), 2.0), "out", gain=3.0, hard=False),
+        Region("soft wall", HalfSpace((0.0, 0.0, 0.0), (-1.0, -2.0, -3.0)), "out", gain=400.0, hard=False),
+        Region("kept", Sphere((9.0, 0.0, 0.0), 0.1), "out", gain=3.0, hard=False),
+        Region("hard", Sphere((0.0, 0.0, 0.0), 1.0), "out", gain=3.0),
+        Region("face", Orientation((0.0, 1.0, 0.0, 0.0), 0.1), "in", gain=3.0, hard=False),
+    ]
+    weights, sight, wrench = rng.uniform(0.3, 1.0, 5), sight_of(5), rng.normal(size=6)
+    look(sight, pack(regions), position, ATTITUDE, np.zeros(6))
+    most = dynamics.translational_mass[0] * dynamics.braking.min()
+    expected, count = wrench.copy(), 0
+    for i in (0, 1):
+        out = -sight.gradients[i] / np.linalg.norm(sight.gradients[i])
+        push = min(regions[i].gain * weights[i] * sight.values[i], most)
+        count += push < most
+        expected[:3] += TURNED.T @ out * push
+    law._soft_forces(sight, pack(regions), weights, TURNED, dynamics, wrench)
+    assert wrench == pytest.approx(expected, rel=1e-12)
+    assert count == 1
+
+
+@pytest.mark.parametrize("lost", [[], [3], [3, 5], [1, 4, 6]])
+def test_what_deceleration_is_relied_on(lost):
+    dynamics, thrusters = askew(np.random.default_rng(5)), thrusters_of(ODIN)
+    thrusters.health[lost] = 0.0
+    share_out(thrusters)
+    expected = dynamics.braking.min() if not lost else dynamics.braking[lost[0]]
+    for j in lost[1:]:
+        expected = 0.5 * min(expected, dynamics.braking[j])
+    assert law._braking(dynamics, thrusters) == pytest.approx(expected)
+
+
+def test_the_report_says_what_it_is_of():
+    seen, report = observer.estimate_of_nothing(), np.full(len(law.DIAGNOSTICS), np.nan)
+    seen.position[:], seen.velocity[:], seen.water[:2] = (1.0, 2.0, 3.0), (4.0, 5.0, 6.0), (7.0, 8.0)
+    health = np.array([1.0, 1.0, 0.0, 1.0])
+    law._report(report, seen, 9.5, 4, health, np.array([2.0, -3.0, 6.0]))
+    assert report[:11].tolist() == [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 7.0, 9.5, 3.0]
+    assert report[14:].tolist() == [3.0, -1.0]
+    law._report_program(report, np.array([0.0, 2.0, 3.0, 9.0]), np.array([1.0, 0.5, 0.1, 9.0]), 3, -6)
+    assert report[11:14].tolist() == [2.0, 1.0, -6.0]
+
+
+# ---- what is believed ----
+
+
+def begun():
+    memory = law_for([]).memory
+    thrust = np.random.default_rng(6).uniform(-15.0, 15.0, 8)
+    memory.observed.silence[0], memory.thrusters.forces[:] = 0.0, thrust
+    observer.begin(memory.observed, np.array([1.0, 2.0, 3.0]), np.array([0.4, -0.3, 0.2]), GAINS)
+    memory.quaternion[:], memory.omega[:] = ATTITUDE, (0.3, -0.2, 0.1)
+    return memory
+
+
+def test_attitude_and_rates_that_are_not_measured_are_carried_by_the_model():
+    memory = begun()
+    turning = np.empty(3)
+    free_turning(memory.attitude, memory.dynamics, memory.quaternion, memory.omega, turning)
+    wrench = memory.thrusters.matrix @ memory.thrusters.forces
+    omega = memory.omega + 0.02 * (turning + (memory.dynamics.inverse_mass @ wrench)[3:])
+    turned = Rotation.from_matrix(TURNED) * Rotation.from_rotvec(0.02 * omega)
+    intake._carry_attitude(memory)
+    assert memory.omega == pytest.approx(omega, rel=1e-12)
+    assert memory.quaternion == pytest.approx(turned.as_quat()[[3, 0, 1, 2]], abs=1e-6)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_rates_that_are_carried_stay_finite(sign):
+    """The drag of one period at such a rate would throw it back far beyond."""
+    memory = begun()
+    memory.omega[:] = 1e3 * sign
+    intake._carry_attitude(memory)
+    assert memory.omega.tolist() == [-100.0 * sign] * 3
+
+
+def state_of(memory, **change):
+    seen = memory.observed
+    body = np.r_[TURNED.T @ seen.velocity, memory.omega]
+    return VehicleState(seen.position.copy(), ATTITUDE.copy(), body, np.ones(8))._replace(**change)
+
+
+def test_a_measurement_is_turned_into_the_world():
+    memory, theirs = begun(), begun()
+    body = np.r_[TURNED.T @ [0.41, -0.31, 0.21], 0.1, 0.2, -0.3]
+    state = VehicleState(np.array([1.01, 2.0, 3.0]), 1.001 * ATTITUDE, body, np.ones(8))
+    assert intake.take_in_measurement(memory, state, GAINS)
+    assert memory.quaternion == pytest.approx(ATTITUDE, abs=1e-12)
+    assert np.array_equal(memory.omega, body[3:])
+    observer.predict(theirs.observed, theirs.dynamics, theirs.thrusters, TURNED, body[3:], GAINS, 0.02)
+    assert observer.correct(theirs.observed, state.position, np.array([0.41, -0.31, 0.21]), GAINS)
+    assert memory.observed.velocity == pytest.approx(theirs.observed.velocity, rel=1e-9)
+    assert memory.observed.position == pytest.approx(theirs.observed.position, rel=1e-9)
+
+
+def test_what_repeats_itself_to_the_last_bit_while_moving_is_not_believed():
+    for moving in ((0.4, -0.3, 0.2), (-0.05, 0.0, 0.0), (0.0, 0.0, 0.0)):
+        memory = begun()
+        memory.thrusters.forces[:] = 0.0
+        memory.observed.velocity[:] = moving
+        state = state_of(memory)
+        assert intake.take_in_measurement(memory, state, GAINS)
+        assert intake.take_in_measurement(memory, state, GAINS) == (not any(moving))
+        for which in (0, 1, 2):  # one number that differs in its last bit is enough
+            position, body = state.position.copy(), state.velocity_body.copy()
+            position[which] = np.nextafter(position[which], np.inf)
+            other = copy.deepcopy(memory)
+            assert intake.take_in_measurement(other, state._replace(position=position), GAINS)
+            body[which] = np.nextafter(body[which], np.inf)
+            other = copy.deepcopy(memory)
+            assert intake.take_in_measurement(other, state._replace(velocity_body=body), GAINS)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"quaternion": 1.006 * ATTITUDE}, {"quaternion": 0.994 * ATTITUDE}, {"position": np.array([1e7, 0.0, 0.0])},
+        {"velocity_body": np.array([0.0, -200.0, 0.0, 0.0, 0.0, 0.0])},
+        {"velocity_body": np.array([0.0, 0.0, 0.0, 60.0, -60.0, 0.0])},
+        {"velocity_body": np.array([0.0, 0.0, 0.0, -200.0, 0.0, 0.0])},
+    ],
+)  # fmt: skip
+def test_what_no_vehicle_can_have_is_not_believed(change):
+    fresh, memory = law_for([]).memory, begun()
+    assert not intake.take_in_measurement(memory, state_of(memory, **change), GAINS)
+    assert not intake.take_in_measurement(fresh, state_of(memory, **change), GAINS)
+    assert fresh.observed.silence[0] < 0.0
+    assert intake.take_in_measurement(fresh, state_of(memory, quaternion=0.999 * ATTITUDE), GAINS)
+
+
+def test_an_estimate_that_was_led_away_is_forgotten():
+    memory = begun()
+    memory.observed.position[1], memory.suspicion.ratio[2] = 2e6, 5.0
+    bad = state_of(memory, position=np.full(3, np.nan))
+    assert not intake.take_in_measurement(memory, bad, GAINS)
+    assert memory.observed.silence[0] == -1.0
+    assert not memory.observed.position.any() and not memory.suspicion.ratio.any()
+    assert intake.take_in_measurement(memory, state_of(memory), GAINS)
+
+
+def test_what_is_said_for_long_is_believed_in_the_end():
+    memory = begun()
+    elsewhere = state_of(memory, position=np.array([30.0, 2.0, 3.0]))
+    for silence, begins in ((1.0, False), (GAINS.coast + 0.1, True)):
+        memory.observed.silence[0] = silence
+        assert not intake.take_in_measurement(memory, elsewhere, GAINS)
+        assert (memory.observed.position[0] == 30.0) == begins
+        elsewhere.velocity_body[0] += 1e-6
+
+
+def test_weights_and_health_are_taken_for_what_they_can_be():
+    assert intake.believed_weights(np.array([-1.0, 0.3, 2.0, np.nan])).tolist() == [0.0, 0.3, 1.0, 1.0]
+    memory = law_for([]).memory
+    intake.take_in_thrusters(memory, np.ones(8), 2)
+    assert np.flatnonzero(memory.thrusters.health == 0.0).tolist() == [2]
+    told = np.array([1.0, -1.0, 1.0, np.nan, 1.0, 1.0, 1.0, 0.5])
+    assert intake.says_more(told, memory.told, memory.thrusters.health)
+    intake.take_in_thrusters(memory, told, -1)
+    assert np.flatnonzero(memory.thrusters.health == 0.0).tolist() == [1, 2]
+    assert not intake.says_more(told, memory.told, memory.thrusters.health)
+    assert np.array_equal(memory.quaternion, LEVEL)

@@ -1,0 +1,91 @@
+"""A step of the deployable law is its stages, put together as its equations say."""
+
+import copy
+
+import numpy as np
+import pytest
+
+from controller.laws.deployable import attitude, barrier, guide, intake, law, model, observer
+from controller.laws.deployable.attraction import wanted_acceleration, wanted_velocity
+from controller.laws.deployable.gains import DeployableGains
+from controller.laws.deployable.quadratic_program import solve
+from controller.quaternion import rotation_matrix
+from controller.regions import Orientation, Region, pack
+from tests.controller.deployable.scenery import GOAL, REGIONS, Sea, fly, law_for
+
+GAINS = DeployableGains()
+ALL = [*REGIONS, Region("face", Orientation((0.98, 0.0, 0.0, 0.2), 0.1), "in")]
+
+
+def expected(memory, state, goal, regions, weights):
+    """Return what the second half of a step should write, from the memory before it."""
+    thrusters, dynamics, seen = memory.thrusters, memory.dynamics, memory.observed
+    intake.take_in_measurement(memory, state, GAINS)
+    R, omega = rotation_matrix(memory.quaternion), memory.omega
+    wanted, acceleration, free, moment = np.empty(3), np.empty(3), np.empty(6), np.empty(3)
+    guide.improve(memory.guide, seen.position, goal, regions, GAINS, 0.02)
+    wanted_velocity(memory.guide, seen.position, goal.velocities[0], GAINS, wanted)
+    wanted_acceleration(wanted, seen.velocity, GAINS, acceleration)
+    model.free_acceleration(dynamics, R, seen.velocity, omega, seen.water, seen.restoring[0], free)
+    attitude.carry(memory.attitude, dynamics, R, seen.velocity, seen.water)
+    attitude.free_turning(memory.attitude, dynamics, memory.quaternion, omega, free[3:])
+    velocity = np.r_[seen.velocity, omega]
+    barrier.look(memory.sight, regions, seen.position, memory.quaternion, velocity)
+    pushed = memory.pushed + 0.02 / (0.02 + GAINS.smoothing) * (acceleration - free[:3] - memory.pushed)
+    attitude.aim(memory.attitude, regions, seen.position, GAINS, 0.02)
+    attitude.moment(memory.attitude, dynamics, memory.quaternion, omega, GAINS, moment)
+    wrench = np.r_[dynamics.mass[:3, :3] @ R.T @ pushed, moment]
+    memory.program.wanted[:] = thrusters.allocator @ wrench
+    turned = np.kron(np.diag([1, 0]), R) + np.kron(np.diag([0, 1]), np.eye(3))
+    motion = barrier.Motion(
+        seen.position, velocity, free, turned @ dynamics.inverse_mass @ thrusters.matrix,
+        np.trace(dynamics.mass[:3, :3]) / 3.0, np.trace(dynamics.mass[3:, 3:]) / 3.0,
+        GAINS.braking_share * dynamics.braking.min(),
+        3.0 * observer.position_spread(seen) + 0.5 * GAINS.acceleration * 0.02**2,
+    )  # fmt: skip
+    rows = barrier.write_rows(
+        memory.program, memory.sight, regions, weights, motion, thrusters.lower, thrusters.upper, GAINS
+    )
+    forces, program = np.empty(8), copy.deepcopy(memory.program)
+    solve(memory.program, rows, thrusters.inverse, thrusters.lower, thrusters.upper, forces)
+    return pushed, rows, program, forces
+
+
+def test_a_step_is_its_stages():
+    own, sea, weights = law_for(ALL), Sea(noise=(0.02, 0.01)), np.array([1.0, 0.3, 0.7, 0.5])
+    fly(own, sea, regions=ALL, steps=4)
+    sea.quaternion[:] = np.array([0.95, 0.1, -0.2, 0.15]) / np.linalg.norm([0.95, 0.1, -0.2, 0.15])
+    own.memory.observed.water[:2], own.memory.attitude.moments[:] = (0.2, -0.1), (3.0, -2.0, 1.0)
+    # three steps of drag beside the ball, which then has a row
+    own.memory.observed.position[:] = sea.position = np.array([3.1, 0.2, 2.4])
+    own.memory.observed.velocity[:] = sea.velocity = np.array([0.5, 0.1, -0.05])
+    goal, regions, forces, most = pack([GOAL]), pack(ALL), np.empty(8), 0
+    for _ in range(4):
+        state, memory = sea.measured(), copy.deepcopy(own.memory)
+        own.step(state, goal, regions, weights, forces)
+        pushed, rows, program, wanted_forces = expected(memory, state, goal, regions, weights)
+        most = max(most, rows)
+        assert own.memory.pushed == pytest.approx(pushed, rel=1e-10, abs=1e-12)
+        for part in ("rows", "right", "price"):
+            ours, theirs = getattr(own.memory.program, part), getattr(program, part)
+            np.testing.assert_allclose(ours[:rows], theirs[:rows], rtol=1e-8, atol=1e-14)
+        assert own.memory.program.wanted == pytest.approx(program.wanted, rel=1e-8, abs=1e-9)
+        assert forces == pytest.approx(wanted_forces, abs=1e-6)
+        assert np.array_equal(own.memory.thrusters.forces, forces)
+        assert own.estimate.tolist() == [own.memory.observed.restoring[0], *own.memory.attitude.moments]
+    assert most >= 2
+
+
+def test_without_measurements_it_stops_and_then_drifts():
+    """Within 0.15 s it goes on, then wants no speed, and after `coast` no force."""
+    own, sea = law_for([]), Sea()
+    fly(own, sea, regions=[], steps=100)
+    state = sea.measured()._replace(position=np.full(3, np.nan))
+    goal, nothing, forces, wanted = pack([GOAL]), pack([]), np.empty(8), []
+    for _ in range(105):
+        own.step(state, goal, nothing, np.empty(0), forces)
+        wanted.append((own.report[8], forces.any()))
+    assert all(speed > 0.1 for speed, _ in wanted[:7])
+    assert all(speed == 0.0 for speed, _ in wanted[8:99])
+    assert all(pushes for _, pushes in wanted[:99]) and not any(pushes for _, pushes in wanted[102:])
+    assert law.DIAGNOSTICS[8].name == "wanted_speed"

@@ -1,0 +1,139 @@
+"""A process that has imported all that is not the project's, and forks for each run of tests in a copy of the project.
+
+It is started in the root of the copy. Each line that it reads asks for a run, each that it writes says how one went.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import importlib
+import json
+import os
+import signal
+import sys
+import time
+import traceback
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+THIRD_PARTIES = (
+    "pytest", "hypothesis.strategies", "hypothesis.extra.numpy", "numpy", "numba", "numba.extending", "scipy.linalg",
+    "scipy.optimize", "scipy.spatial.transform", "scipy.integrate", "fmpy.fmi2", "fmpy.fmi3", "platformdirs",
+)  # fmt: skip
+TEST_SECONDS = 30  # of processor time, which no test that ends takes
+RUN_SECONDS = 900.0  # by the clock, for all tests of a run
+
+
+@dataclass(frozen=True)
+class Order:
+    """A run of tests, of which the first failure ends it."""
+
+    tests: tuple[str, ...]
+    words: tuple[str, ...] = ()  # tests in whose names they stand come first
+    without: tuple[str, ...] = ()  # tests in whose names they stand are left out
+    slow: bool = False  # whether those marked slow are run
+    path: str = ""  # what is written before and put back afterwards, with `text` in it
+    text: str = ""
+    collect_only: bool = False  # and keep the tests as compiled, which no mutant changes
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How a run went."""
+
+    passed: bool
+    by: str  # the test that failed, or in which the process ended
+    how: str  # "failed", "crashed", "endless", "not imported"
+    seconds: float  # of processor time, with that of compilers
+
+
+def main() -> None:
+    for name in THIRD_PARTIES:
+        with contextlib.suppress(ImportError):
+            importlib.import_module(name)
+    answers = os.fdopen(os.dup(1), "w")
+    os.dup2(2, 1)
+    for line in sys.stdin:
+        order = Order(**json.loads(line))
+        target = Path(order.path)
+        original = target.read_bytes() if order.path else b""
+        try:
+            if order.path:
+                target.write_bytes(order.text.encode())
+            outcome = _run(order)
+        finally:
+            if order.path:
+                target.write_bytes(original)
+        answers.write(json.dumps(asdict(outcome)) + "\n")
+        answers.flush()
+
+
+def _run(order: Order) -> Outcome:
+    note = Path("mutation-note").absolute()
+    note.write_text("")
+    began = time.monotonic()
+    child = os.fork()
+    if child == 0:
+        _test(order, note)
+    while True:
+        ended, status, used = os.wait4(child, os.WNOHANG)
+        if ended:
+            break
+        if time.monotonic() - began > RUN_SECONDS:
+            os.killpg(child, signal.SIGKILL)
+            _, status, used = os.wait4(child, 0)
+            break
+        time.sleep(0.02)
+    with contextlib.suppress(ProcessLookupError, PermissionError):  # what the tests left behind
+        os.killpg(child, signal.SIGKILL)
+    seconds = used.ru_utime + used.ru_stime
+    said = note.read_text().splitlines()
+    by = said[-1].partition(" ")[2] if said else ""
+    if os.WIFSIGNALED(status):
+        endless = os.WTERMSIG(status) in (signal.SIGPROF, signal.SIGKILL)
+        return Outcome(False, by, "endless" if endless else "crashed", seconds)
+    if os.WEXITSTATUS(status) == 0:
+        return Outcome(True, "", "", seconds)
+    if said and said[-1].startswith("failed"):
+        return Outcome(False, by, "failed", seconds)
+    return Outcome(False, by, "not imported", seconds)
+
+
+def _test(order: Order, note: Path) -> None:
+    """Run the tests, in the forked process, which ends here."""
+    status = 3
+    try:
+        os.setsid()
+        out = os.open("mutation-output", os.O_WRONLY | os.O_CREAT | os.O_TRUNC)
+        nothing = os.open(os.devnull, os.O_RDONLY)
+        os.dup2(nothing, 0)
+        os.dup2(out, 1)
+        os.dup2(out, 2)
+        import pytest
+
+        from tests.mutation.plugin import Plugin
+
+        options = ["-q", "-x", "--tb=short", "-p", "no:cacheprovider", "-p", "no:xdist"]
+        options += ["-W", "ignore::pytest.PytestAssertRewriteWarning"]  # of what is imported before
+        options += [
+            "-W",
+            "ignore:overflow encountered in scalar multiply:RuntimeWarning",
+        ]  # of random numbers, on purpose
+        options += ["--basetemp", str(Path("mutation-scratch").absolute())]
+        if order.slow:
+            options.append("--slow")
+        if order.collect_only:
+            options.append("--collect-only")
+            sys.dont_write_bytecode = False
+        plugin = Plugin(note, tuple(order.words), tuple(order.without), TEST_SECONDS)
+        status = int(pytest.main([*options, *order.tests], plugins=[plugin]))
+    except BaseException:  # noqa: BLE001 - nothing may go on behind the fork
+        traceback.print_exc()
+    finally:
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(status)
+
+
+if __name__ == "__main__":
+    main()

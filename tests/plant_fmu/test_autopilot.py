@@ -1,0 +1,40 @@
+"""How an autopilot drives the thrusters: what a table of a vehicle's file may say."""
+
+import dataclasses
+
+import pytest
+
+from plant_fmu.autopilot import LONGEST, SHORTEST, Autopilot, checked_autopilot
+
+
+def require(good, key, came, expected):
+    if not good:
+        raise ValueError(f"{key} is {came}, expected {expected}")
+
+
+def checked(**change):
+    return checked_autopilot(dataclasses.replace(Autopilot("vectored_6dof"), **change), 4, require)
+
+
+def test_each_thruster_has_a_channel_and_a_sign():
+    assert checked().channels == (1, 2, 3, 4)
+    assert checked().signs == (1, 1, 1, 1)
+    assert checked(signs=-1).signs == (-1, -1, -1, -1)
+    assert checked(signs=(1, -1, 1, -1), channels=(4, 0, 2, 1)).channels == (4, 0, 2, 1)
+
+
+@pytest.mark.parametrize("change", [{"signs": 2}, {"signs": 0}, {"channels": (1, 1, 2, 3)}, {"pwm_dead_band": -1}])
+def test_what_cannot_be_is_refused(change):
+    with pytest.raises(ValueError, match=next(iter(change))):
+        checked(**change)
+
+
+@pytest.mark.parametrize(("neutral", "span"), [(1200, 400), (1800, 400), (1500, 700)])
+def test_pulses_reach_as_far_as_speed_controllers_take_them_and_no_farther(neutral, span):
+    low, high = neutral - span, neutral + span
+    assert low == SHORTEST or high == LONGEST
+    assert checked(pwm_neutral=neutral, pwm_span=span).pwm_span == span
+    for beyond in (1, 50):
+        shift = -beyond if low == SHORTEST else beyond
+        with pytest.raises(ValueError, match="pulses of 800 to 2200 us"):
+            checked(pwm_neutral=neutral + shift, pwm_span=span)

@@ -1,0 +1,44 @@
+"""Units and domains: exponents are those that the name of the unit spells."""
+
+import re
+
+import numpy as np
+import pytest
+
+from plant_fmu import quantities
+from plant_fmu.quantities import UNITS, Quantity
+
+BASE = {"N": {"kg": 1, "m": 1, "s": -2}, "Hz": {"s": -1}}
+ALL = {name: value for name, value in vars(quantities).items() if isinstance(value, Quantity)}
+
+
+@pytest.mark.parametrize("unit", UNITS)
+def test_exponents_are_those_of_the_name(unit):
+    over, _, under = unit.partition("/")
+    exponents = {}
+    for part, sign in ((over, 1), (under.strip("()"), -1)):
+        for symbol, power in re.findall(r"([A-Za-z]+)(\d*)", part):
+            for base, exponent in BASE.get(symbol, {symbol: 1}).items():
+                exponents[base] = exponents.get(base, 0) + sign * exponent * int(power or 1)
+    assert UNITS[unit] == {base: exponent for base, exponent in exponents.items() if exponent}
+
+
+MADE = {
+    "unbounded": quantities.unbounded("N"),
+    "diagonal": quantities.inertial("kg.m2", True),
+    "beside it": quantities.inertial("kg.m2", False),
+    "deviation": quantities.deviation("m"),
+    "bias": quantities.bias("m"),
+}
+
+
+@pytest.mark.parametrize("name", [*(name for name in ALL if name != "TIME"), *MADE])
+def test_domains_hold_something_and_are_symmetric_or_of_no_negative_number(name):
+    quantity = {**ALL, **MADE}[name]
+    assert quantity.minimum < quantity.maximum
+    assert quantity.minimum in (0.0, -quantity.maximum) or 0.0 < quantity.minimum <= 1e-3
+
+
+def test_seeds_are_the_integers_of_32_bits_that_are_not_negative():
+    assert (quantities.SEED.minimum, quantities.SEED.maximum) == (0, np.iinfo(np.int32).max)
+    assert [q.minimum < 0.0 for q in MADE.values()] == [True, False, True, False, True]
