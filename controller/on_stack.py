@@ -51,13 +51,13 @@ class _Zeros(_templates.AbstractTemplate):  # type: ignore[misc]
 
 def _lowered(context: Any, builder: Any, sig: Any, _args: Any) -> Any:
     """Make the array where the function begins, and its zeros each time it is asked for."""
-    shape = [n.literal_value for n in sig.args]
+    shape = tuple(n.literal_value for n in sig.args)
     room = ir.ArrayType(ir.DoubleType(), int(np.prod(shape)))
     place = _cgutils.alloca_once(builder, room)
     builder.store(ir.Constant(room, None), place)
     array = _arrayobj.make_array(sig.return_type)(context, builder)
     sizes = [context.get_constant(types.intp, n) for n in shape]
-    strides = [context.get_constant(types.intp, 8 * int(np.prod(shape[i + 1 :]))) for i in range(len(shape))]
+    strides = [context.get_constant(types.intp, n) for n in np.empty(shape).strides]
     data = builder.bitcast(place, array.data.type)
     item = context.get_constant(types.intp, 8)
     _arrayobj.populate_array(array, data=data, shape=sizes, strides=strides, itemsize=item, meminfo=None)

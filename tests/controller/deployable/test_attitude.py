@@ -110,7 +110,7 @@ def test_a_turn_is_that_of_the_exponential():
     rng = np.random.default_rng(5)
     e, omega = turned(rng), rng.normal(size=3)
     before = rotation(e).as_matrix()
-    loop._turned(e, omega, 1e-3)
+    loop.turn(e, omega, 1e-3, e)
     S = np.array([[0, -omega[2], omega[1]], [omega[2], 0, -omega[0]], [-omega[1], omega[0], 0]])
     assert rotation(e).as_matrix() == pytest.approx(before @ expm(1e-3 * S), abs=1e-8)
     assert np.linalg.norm(e) == pytest.approx(1.0, abs=1e-14)
