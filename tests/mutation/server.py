@@ -115,10 +115,7 @@ def _test(order: Order, note: Path) -> None:
 
         options = ["-q", "-x", "--tb=short", "-p", "no:cacheprovider", "-p", "no:xdist"]
         options += ["-W", "ignore::pytest.PytestAssertRewriteWarning"]  # of what is imported before
-        options += [
-            "-W",
-            "ignore:overflow encountered in scalar multiply:RuntimeWarning",
-        ]  # of random numbers, on purpose
+        options += ["-W", "ignore::RuntimeWarning"]  # of overflow and the like, of which compiled code says nothing
         options += ["--basetemp", str(Path("mutation-scratch").absolute())]
         if order.slow:
             options.append("--slow")
