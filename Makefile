@@ -14,12 +14,13 @@ VENV ?= .venv
 BIN := $(VENV)/bin
 comma := ,
 # without a C compiler the ziglang package is one
-EXTRAS := mavlink,importers,dev$(if $(shell command -v cc),,$(comma)build)
+COMPILER := $(if $(shell command -v cc),,build)
+EXTRAS := mavlink,importers,dev$(addprefix $(comma),$(COMPILER))
 PYTEST_FLAGS ?=
 
 .PHONY: run test lint coverage mutation mutation-sample docs bench dist packaging lowest clean
 
-run: $(VENV)/ready
+run: $(VENV)/installed
 	$(BIN)/cosim run paper
 
 test: $(VENV)/ready
@@ -71,11 +72,17 @@ lowest:
 	VIRTUAL_ENV=$(LOWEST)/env $(LOWEST)/uv/bin/uv pip install --quiet --no-deps --editable .
 	$(LOWEST)/env/bin/python -m pytest -q -o filterwarnings= $(LOWEST_TESTS) $(PYTEST_FLAGS) # old versions warn
 
-$(VENV)/ready: pyproject.toml
-	$(PYTHON) -c 'import sys; sys.exit(None if sys.version_info >= (3, 11) else "Python 3.11 or later is needed")'
+# the product alone: a run needs nothing of what the tests do
+$(VENV)/installed: pyproject.toml
+	@$(PYTHON) -c 'import sys; sys.exit(None if sys.version_info >= (3, 11) else "Python 3.11 or later is needed")'
+	@echo 'Setting up $(VENV); the first time some hundred MB are downloaded, which takes minutes'
 	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.$(addsuffix ],$(addprefix [,$(COMPILER)))'
+	@touch $@
+
+$(VENV)/ready: $(VENV)/installed
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[$(EXTRAS)]'
-	touch $@
+	@touch $@
 
 clean:
 	rm -rf $(VENV)

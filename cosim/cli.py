@@ -88,7 +88,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     int
         0; 1 where a check fails; 2 where the user must mend something; 130 after Ctrl-C.
     """
-    options = _parser().parse_args(arguments)
+    parser = _parser()
+    if not (sys.argv[1:] if arguments is None else arguments):
+        parser.print_help(sys.stderr)
+        parser.exit(2)
+    options = parser.parse_args(arguments)
     _log(options.verbose)
     try:
         code = _guarded(options)

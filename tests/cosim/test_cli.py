@@ -78,7 +78,6 @@ def test_what_the_user_must_mend_is_one_line(tmp_path, capsys, monkeypatch, argu
 @pytest.mark.parametrize(
     "arguments",
     [
-        [],
         ["fly"],
         ["run"],
         ["run", "paper", "--rate", "-1"],
@@ -90,6 +89,15 @@ def test_wrong_words_exit_with_2(capsys, arguments):
     with pytest.raises(SystemExit) as left:
         main(arguments)
     assert left.value.code == 2
+
+
+def test_the_command_alone_shows_all_verbs(capsys):
+    with pytest.raises(SystemExit) as left:
+        main([])
+    assert left.value.code == 2
+    said = capsys.readouterr()
+    assert said.out == ""
+    assert "list the shipped scenarios" in said.err and "cosim run paper" in said.err
 
 
 def test_missing_compiler_is_one_line(tmp_path, capsys, monkeypatch):
