@@ -16,7 +16,7 @@ pytestmark = pytest.mark.slow
 
 REQUIREMENTS = ("MAVProxy>=1.8.75", "pymavlink>=2.4.49", "setuptools<81", "future")
 MODULES = "param,wp,fence,mode,arm,cmdlong,link,misc,rc,signing,output,log"
-PATIENCE = 30.0  # s, for what is to be seen
+PATIENCE = 120.0  # s, for what is to be seen
 
 
 class MavProxy:
@@ -63,7 +63,7 @@ class MavProxy:
     def __exit__(self, *_):
         self.process.stdin.close()
         try:
-            self.process.wait(10)
+            self.process.wait(60)
         except subprocess.TimeoutExpired:
             self.process.kill()
         self.reader.join()
