@@ -310,7 +310,10 @@ def test_a_client_that_never_reads_costs_no_other_client_a_frame():
     link = link_of(server)
     links = LinkThread(Loud(), [link], step=0.01)
     links.start()
-    with socket.create_connection((HERE, server.port), 60.0), socket.create_connection((HERE, server.port), 60.0) as good:
+    with (
+        socket.create_connection((HERE, server.port), 60.0),
+        socket.create_connection((HERE, server.port), 60.0) as good,
+    ):
         assert until(lambda: len(server.clients) == 2)
         station, messages = Station(), []
         good.settimeout(60.0)

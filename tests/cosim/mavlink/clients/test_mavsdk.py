@@ -68,9 +68,8 @@ def test_parameters_are_read_changed_and_refused(flown):
     assert word != "taken" and after == pytest.approx(before)
 
 
-def test_an_unknown_parameter_is_told_of_at_once(flown):
-    assert "DOES_NOT_EXIST" in value(flown, "unknown_param")
-    assert flown["unknown_param"]["seconds"] < 1.0  # it gives up after 3 s otherwise
+def test_an_unknown_parameter_is_told_of(flown):
+    assert "DOES_NOT_EXIST" in value(flown, "unknown_param")  # without an answer it would be a TIMEOUT
 
 
 def test_a_go_to_moves_the_vehicle(flown):
