@@ -36,7 +36,7 @@ def serve(tmp_path):
     """Return a function that begins to serve; each server has a folder of its own."""
     begun = []
 
-    def begin(*overrides, vehicle="bluerov2_heavy", timeout=60.0, record_rate=2000.0, **more):
+    def begin(*overrides, vehicle="bluerov2_heavy", timeout=30.0, record_rate=2000.0, **more):
         out = tmp_path / f"run{len(begun)}"
         options = FlightOptions("sitl", overrides, vehicle, out, record_rate, report=False, **more)
         served = Served(JsonServer(Flights(options, "ardupilot", law_of_pwm), ("127.0.0.1", 0), timeout))
