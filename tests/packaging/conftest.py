@@ -63,13 +63,17 @@ def unpacked(wheel, tmp_path_factory) -> Path:
     return folder
 
 
+def program(folder: Path) -> Path:
+    """Return the Python of an environment; lib/python3.x is none."""
+    return next(path for path in (folder / "env").glob("*/python*") if path.is_file())
+
+
 @pytest.fixture(scope="session")
 def installed(wheel, once) -> Path:
     """Return an environment with the wheel and what it asks for, and nothing else."""
 
     def install(folder: Path) -> None:
         run(sys.executable, "-m", "venv", folder / "env")
-        python = next((folder / "env").glob("*/python*"))
-        run(python, "-m", "pip", "install", "--quiet", "--no-compile", "--disable-pip-version-check", wheel)
+        run(program(folder), "-m", "pip", "install", "--quiet", "--no-compile", "--disable-pip-version-check", wheel)
 
-    return next((once("installed", install) / "env").glob("*/python*"))
+    return program(once("installed", install))

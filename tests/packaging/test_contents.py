@@ -99,10 +99,9 @@ def test_fmus_are_made_of_it_without_a_compiler(unpacked, tmp_path, monkeypatch,
     compiled = cached_fmu(load_vehicle(vehicle), fmi)
     monkeypatch.setattr(prebuilt, "FOLDER", unpacked / "plant_fmu" / "prebuilt")
     monkeypatch.setenv("CC", "no-such-compiler")
-    for platforms in ("native", "all"):
-        path = build_fmu(load_vehicle(vehicle), fmi, tmp_path / f"{platforms}.fmu", platforms)
-        assert validate_fmu(str(path)) == []
-        assert trajectory(path) == pytest.approx(trajectory(compiled), rel=1e-10, abs=1e-10)
+    path = build_fmu(load_vehicle(vehicle), fmi, tmp_path / "all.fmu", "all")
+    assert validate_fmu(str(path)) == []
+    assert trajectory(path) == pytest.approx(trajectory(compiled), rel=1e-10, abs=1e-10)
     described = fmpy.read_model_description(str(path))
     assert described.modelName == vehicle
 

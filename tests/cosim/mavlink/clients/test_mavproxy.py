@@ -14,7 +14,6 @@ from tests.cosim.mavlink.clients.conftest import cosim_run, orders_of
 
 pytestmark = pytest.mark.slow
 
-REQUIREMENTS = ("MAVProxy>=1.8.75", "pymavlink>=2.4.49", "setuptools<81", "future")
 MODULES = "param,wp,fence,mode,arm,cmdlong,link,misc,rc,signing,output,log"
 PATIENCE = 120.0  # s, for what is to be seen
 
@@ -70,8 +69,8 @@ class MavProxy:
         self.process.stdout.close()
 
 
-def test_a_pilot_connects_arms_changes_modes_and_lists_what_there_is(environment, udp_port, tmp_path):
-    python, port, folder = environment("mavproxy", *REQUIREMENTS) / "bin" / "python", udp_port(), tmp_path / "run"
+def test_a_pilot_connects_arms_changes_modes_and_lists_what_there_is(ardupilots_tools, udp_port, tmp_path):
+    python, port, folder = ardupilots_tools, udp_port(), tmp_path / "run"
     with cosim_run(folder, "ardusub", f"udpout:127.0.0.1:{port}"), MavProxy(python, tmp_path, port) as mavproxy:
         mavproxy.see(r"Detected vehicle 1:1")
         received = int(mavproxy.see(r"Received (\d+) parameters").group(1))
