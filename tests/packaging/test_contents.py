@@ -15,7 +15,7 @@ from plant_fmu.platforms import PLATFORMS
 from tests.packaging.conftest import ROOT
 from tests.plant_fmu.test_sources import trajectory
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(900)]  # the first of them builds and installs
 PACKAGES = ("controller", "cosim", "fuzzy_arbiter", "plant_fmu")
 BESIDE = ("CHANGELOG.md", "CITATION.cff", "CONTRIBUTING.md", "LICENSE", "README.md", "hatch_build.py", "pyproject.toml")
 MOST = 4e6  # bytes

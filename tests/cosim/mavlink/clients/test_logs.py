@@ -18,7 +18,7 @@ from cosim.mavlink.ground import GroundLink
 from cosim.mavlink.options import PROFILES, MavlinkOptions
 from tests.cosim.mavlink.clients.conftest import HERE
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(900)]  # the first of them builds and installs
 
 READING = 120.0  # s
 LISTENING = 8.0  # s

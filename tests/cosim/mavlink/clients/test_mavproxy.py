@@ -13,7 +13,7 @@ pytest.importorskip("pymavlink", reason="the mavlink extra is not installed")
 
 from tests.cosim.mavlink.clients.conftest import cosim_run, orders_of
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(900)]  # the first of them builds and installs
 
 MODULES = "param,wp,fence,mode,arm,cmdlong,link,misc,rc,signing,output,log"
 PATIENCE = 60.0  # s, for what is to be seen

@@ -10,7 +10,7 @@ pytest.importorskip("pymavlink", reason="the mavlink extra is not installed")
 from cosim.mavlink.options import MavlinkOptions
 from tests.cosim.mavlink.clients.conftest import HERE, cosim_run, orders_of
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(900)]  # the first of them builds and installs
 
 RUNNING = 240.0  # s, for all steps together
 REQUIREMENTS = {"mavsdk-4": "mavsdk>=4,<5", "mavsdk-3": "mavsdk<4"}
