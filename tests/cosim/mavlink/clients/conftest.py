@@ -42,7 +42,7 @@ def environment(request):
 @pytest.fixture(scope="session")
 def ardupilots_tools(environment):
     """Return the Python of an environment with MAVProxy and pymavlink's own tools."""
-    return environment("mavproxy", *REQUIREMENTS) / "bin" / "python"
+    return environment("ardupilot-tools", *REQUIREMENTS) / "bin" / "python"
 
 
 @pytest.fixture(scope="session")
