@@ -145,6 +145,7 @@ def test_a_scheduler_that_is_not_there_is_one_line(tmp_path, capsys, monkeypatch
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.slow
 def test_what_the_parts_of_a_library_log_is_left_out_for_as_long_as_it_is_used(caplog):
     client = logging.getLogger("library.client")
     client.setLevel(logging.WARNING)
