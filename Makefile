@@ -24,7 +24,7 @@ run: $(VENV)/installed
 	$(BIN)/cosim run paper
 
 test: $(VENV)/ready
-	$(BIN)/python -m pytest -q --numprocesses auto $(PYTEST_FLAGS)
+	$(BIN)/python -m pytest -q --numprocesses auto --dist worksteal $(PYTEST_FLAGS)
 
 lint: $(VENV)/ready
 	$(BIN)/ruff format --check .

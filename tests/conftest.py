@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import time
 from pathlib import Path
 
 import pytest
@@ -41,6 +42,43 @@ def fmu_cache(tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("platformdirs.user_cache_dir", lambda *_, **__: str(folder))
         yield folder
+
+
+@pytest.fixture(scope="session")
+def once(tmp_path_factory):
+    """Return a function that makes a folder once for all workers of a session."""
+    base = tmp_path_factory.getbasetemp()
+    shared = base.parent if os.environ.get("PYTEST_XDIST_WORKER") else base
+
+    def made(name, make):
+        folder, ready, failed = shared / name, shared / f"{name}.ready", shared / f"{name}.failed"
+        try:
+            folder.mkdir()
+        except FileExistsError:
+            while not ready.exists():  # a hang ends with the time limit of a test
+                assert not failed.exists(), f"{name}: failed in another worker"
+                time.sleep(0.2)
+            return folder
+        try:
+            make(folder)
+        except BaseException:
+            failed.touch()
+            raise
+        ready.touch()
+        return folder
+
+    return made
+
+
+@pytest.fixture(scope="session")
+def prebuilt_of_eight(once):
+    """Return the libraries of eight thrusters for all platforms, by FMI 3.0, as a wheel has them."""
+    pytest.importorskip("ziglang", reason="the build extra is not installed: no binaries for other platforms")
+    from plant_fmu import prebuilt
+
+    structure = prebuilt.shipped_structures()[0]
+    folder = once("prebuilt-of-eight", lambda folder: prebuilt.write_prebuilt(structure, 3, folder))
+    return folder / prebuilt.file_name(structure, 3)
 
 
 @pytest.fixture(scope="session")

@@ -68,7 +68,9 @@ def test_all_is_one_table_of_ratios(here, subject, capsys, tmp_path):
 
 
 @pytest.mark.slow
-def test_growth_is_told_below_each_curve(capsys):
+def test_growth_is_told_below_each_curve(capsys, monkeypatch):
+    monkeypatch.setattr("benchmarks.scaling.OBSTACLES", (1, 3, 10))
+    monkeypatch.setattr("benchmarks.scaling.HORIZONS", (1.0, 2.0, 4.0))
     main(["scaling", "horizon", "obstacles", "--budget", "1e-4", "--repeats", "1"])
     assert capsys.readouterr().out.count("exponent") >= 6
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 EXAMPLES = sorted((Path(__file__).parents[1] / "examples").glob("*.py"))
-SLOW = {"fmu_reference.py"}
+SLOW = {"fmu_reference.py", "master.py", "own_law.py", "own_vehicle.py"}
 WRITES = {
     "fmu_alone.py": ["bluerov2.fmu"],
     "fmu_reference.py": ["bluerov2_heavy.fmu", "fmu-reference.png"],

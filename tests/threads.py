@@ -3,13 +3,13 @@
 import ctypes
 
 
-def ended(thread, seconds=20.0):
+def ended(thread, seconds=120.0):
     """Wait for a thread and tell whether it ended by itself; interrupt one that does not."""
     thread.join(seconds)
     if not thread.is_alive():
         return True
     interrupt(thread, SystemExit)
-    thread.join(seconds)
+    thread.join(120.0)
     return False
 
 

@@ -70,6 +70,13 @@ def same(a, b):
     return list(a.units) == list(b.units) and all(np.array_equal(a[name], b[name]) for name in a.units)
 
 
+@pytest.fixture(autouse=True)
+def patient_links(monkeypatch):
+    """Give links time to send all that is queued, however busy the machine."""
+    for limit in ("_DRAINING", "_CLOSING"):
+        monkeypatch.setattr(f"cosim.mavlink.thread.{limit}", 120.0)
+
+
 def test_the_record_is_the_same_to_the_last_bit_whoever_listens(tmp_path):
     scenario = load_scenario("harbour", SHORT)
     alone = run_scenario(scenario, tmp_path / "alone", report=False)

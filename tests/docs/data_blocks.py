@@ -86,7 +86,7 @@ def _check_json(block: Block) -> None:
 def _check_c(block: Block) -> None:
     flags = shlex.split(block.directives.compile_with)
     command = [*find_compiler(), "-std=c11", "-Wall", "-Werror", "-fsyntax-only", *flags, "-x", "c", "-"]
-    done = subprocess.run(command, input=block.text, capture_output=True, text=True, timeout=60, check=False)
+    done = subprocess.run(command, input=block.text, capture_output=True, text=True, timeout=240, check=False)
     if done.returncode:
         raise PageError(f"{block.where}: {done.stderr}")
 

@@ -6,9 +6,7 @@ import os
 import shutil
 import subprocess
 import sys
-import time
 import zipfile
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -23,32 +21,6 @@ def tracked() -> list[str]:
         pytest.skip("this is no git checkout: there is no telling what belongs to it")
     listed = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, check=True, capture_output=True, text=True).stdout
     return [name for name in listed.split("\0") if (ROOT / name).is_file()]
-
-
-@pytest.fixture(scope="session")
-def once(tmp_path_factory) -> Callable[[str, Callable[[Path], None]], Path]:
-    """Return a function that makes a folder once for all workers of a session."""
-    base = tmp_path_factory.getbasetemp()
-    shared = base.parent if os.environ.get("PYTEST_XDIST_WORKER") else base
-
-    def made(name: str, make: Callable[[Path], None]) -> Path:
-        folder, ready, failed = shared / name, shared / f"{name}.ready", shared / f"{name}.failed"
-        try:
-            folder.mkdir()
-        except FileExistsError:
-            while not ready.exists():  # a hang ends with the time limit of a test
-                assert not failed.exists(), f"{name}: failed in another worker"
-                time.sleep(0.2)
-            return folder
-        try:
-            make(folder)
-        except BaseException:
-            failed.touch()
-            raise
-        ready.touch()
-        return folder
-
-    return made
 
 
 def run(*command: object, **more: object) -> str:
@@ -91,13 +63,17 @@ def unpacked(wheel, tmp_path_factory) -> Path:
     return folder
 
 
+def program(folder: Path) -> Path:
+    """Return the Python of an environment; lib/python3.x is none."""
+    return next(path for path in (folder / "env").glob("*/python*") if path.is_file())
+
+
 @pytest.fixture(scope="session")
 def installed(wheel, once) -> Path:
     """Return an environment with the wheel and what it asks for, and nothing else."""
 
     def install(folder: Path) -> None:
         run(sys.executable, "-m", "venv", folder / "env")
-        python = next((folder / "env").glob("*/python*"))
-        run(python, "-m", "pip", "install", "--quiet", "--disable-pip-version-check", wheel)
+        run(program(folder), "-m", "pip", "install", "--quiet", "--no-compile", "--disable-pip-version-check", wheel)
 
-    return next((once("installed", install) / "env").glob("*/python*"))
+    return program(once("installed", install))

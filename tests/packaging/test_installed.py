@@ -7,7 +7,7 @@ import pytest
 
 from tests.packaging.conftest import run
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(900)]  # the first of them builds and installs
 
 
 @pytest.fixture

@@ -16,7 +16,7 @@ from fmpy.fmi2 import FMU2Model, FMU2Slave, fmi2CallbackFunctions, fmi2CallbackL
 from fmpy.fmi2 import defaultCallbacks as defaults
 from fmpy.fmi3 import FMU3Model, FMU3Slave
 
-from plant_fmu import Plant, cached_fmu, load_vehicle
+from plant_fmu import Plant, build_fmu, cached_fmu, load_vehicle
 
 STATES = [
     *(f"position.{a}" for a in "xyz"),
@@ -165,6 +165,18 @@ class Slave:
 @pytest.fixture(params=[2, 3], ids=["fmi2", "fmi3"])
 def fmi(request):
     return request.param
+
+
+@pytest.fixture(scope="session")
+def all_platforms(once):
+    """Return a function that builds ODIN's FMU for all platforms, once a session."""
+    pytest.importorskip("ziglang", reason="the build extra is not installed: no binaries for other platforms")
+
+    def built(fmi):
+        make = lambda folder: build_fmu(load_vehicle("odin"), fmi, folder / "odin.fmu", "all")  # noqa: E731
+        return once(f"all-platforms-{fmi}", make) / "odin.fmu"
+
+    return built
 
 
 @pytest.fixture

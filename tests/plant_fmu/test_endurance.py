@@ -81,12 +81,12 @@ def test_loading_again_and_again_leaves_little_behind():
             plant.initialise()
             plant.step(0.01)
 
-    for _ in range(50):
+    for _ in range(20):
         once()
     before = resident()
-    for _ in range(100):
+    for _ in range(50):
         once()
-    assert resident() - before < 100 * 20_000
+    assert resident() - before < 50 * 20_000
 
 
 def test_a_thousand_at_once_are_a_thousand_of_their_own(library):

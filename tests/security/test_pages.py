@@ -105,6 +105,7 @@ def test_a_summary_that_somebody_changed_is_only_read(attacked, plain, tmp_path)
     assert "img" not in {tag for tag, _ in found}
 
 
+@pytest.mark.slow
 def test_pages_to_print_take_any_title(attacked):
     _, files = report_again(attacked, ("pdf", "png"))
     assert files

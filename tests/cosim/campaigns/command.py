@@ -51,7 +51,7 @@ class Command:
     def wait_for_parts(self, n):
         """Wait until so many parts are written."""
         parts = self.out / PARTS
-        deadline = time.monotonic() + 120.0
+        deadline = time.monotonic() + 240.0
         while not parts.exists() or len(list(parts.glob("*.parquet"))) < n:
             assert self.process.poll() is None, self.process.communicate()[1]
             assert time.monotonic() < deadline
@@ -68,7 +68,7 @@ class Command:
 
     def gone(self):
         """Return whether all processes of the session end by themselves, soon."""
-        deadline = time.monotonic() + 20.0
+        deadline = time.monotonic() + 120.0
         while self.members() and time.monotonic() < deadline:
             time.sleep(0.02)
         return not self.members()

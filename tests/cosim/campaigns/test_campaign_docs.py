@@ -62,7 +62,9 @@ def test_the_conditions_are_those_of_the_score():
 
 
 def test_the_commands_are_understood(tmp_path, capsys):
-    commands = [line.split() for line in PAGE[: PAGE.index("A campaign flies")].splitlines() if "cosim " in line]
+    commands = [
+        line.split() for line in PAGE[: PAGE.index("A campaign flies")].splitlines() if line.startswith("cosim ")
+    ]
     assert [words[1] for words in commands] == ["campaign", "compare", "sweep", "rerun"]
     for _, *words in commands:
         words[1] = str(tmp_path / "none.jsonl")

@@ -301,6 +301,7 @@ except RunError as error:
 """
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="limits the size of files")
 def test_a_full_disk_is_one_line_and_the_folder_can_be_gone_on_from(tmp_path):
     def run(*words):

@@ -40,13 +40,13 @@ def test_a_killed_campaign_goes_on_by_the_same_command(tmp_path, command, whole)
     killed = command("campaign", scenes, "--law", "printed", "--workers", 2)
     killed.wait_for_parts(3)
     os.kill(killed.process.pid, signal.SIGKILL)
-    killed.process.communicate(timeout=60)  # which its workers, who follow, hold open
+    killed.process.communicate(timeout=240)  # which its workers, who follow, hold open
     assert killed.gone()
     before = killed.keys()
     assert len(before) >= 3 and len(set(before)) == len(before)
 
     again = command("campaign", scenes, "--law", "printed", "--workers", 2)
-    said, complaints = again.process.communicate(timeout=120)
+    said, complaints = again.process.communicate(timeout=240)
     assert (again.process.returncode, complaints) == (0, "")
     assert f"of {N} scenes reached" in said and (again.out / "campaign.html").exists()
     results = Results(again.out / RESULTS)
@@ -64,7 +64,7 @@ def test_ctrl_c_keeps_what_is_done(tmp_path, command, workers):
     interrupted = command("campaign", scenes, "--law", "printed", "--workers", workers)
     interrupted.wait_for_parts(2)
     os.killpg(interrupted.process.pid, signal.SIGINT)  # as a terminal does
-    said, complaints = interrupted.process.communicate(timeout=60)
+    said, complaints = interrupted.process.communicate(timeout=240)
     assert interrupted.process.returncode == 130
     assert (
         complaints == f"cosim: interrupted; what is flown is kept in {interrupted.out}, and the same command goes on\n"
@@ -81,7 +81,7 @@ def test_a_worker_that_is_killed_is_replaced(tmp_path, command, whole):
     bereft = command("campaign", scenes, "--law", "printed", "--workers", 2)
     bereft.wait_for_parts(3)
     os.kill(bereft.workers()[0], signal.SIGKILL)
-    _, complaints = bereft.process.communicate(timeout=120)
+    _, complaints = bereft.process.communicate(timeout=240)
     assert bereft.process.returncode == 0 and bereft.gone()
     assert "rows are flown again" in complaints
     assert rows(Results(bereft.out / RESULTS)) == whole

@@ -18,7 +18,7 @@ from cosim.scenario import load_scenario
 from tests.threads import ended
 
 ARM = {"order": "arm", "armed": True}
-WAIT = 20.0  # s, that nothing should take
+WAIT = 120.0  # s, that nothing should take, however busy the machine
 
 
 class Viewer:
@@ -99,7 +99,7 @@ def live(tmp_path):
             view = stack.enter_context(LiveView(parse_live("0")))
             running = Running(view, tmp_path / "live")
             running.start(load_scenario(name, ["time.duration=2", *more, *overrides]), **options)
-            stack.callback(ended, running.thread, 1.0)  # some tests have seen enough before the end
+            stack.callback(ended, running.thread, 0.1)  # some tests have seen enough before the end
             return running
 
         yield start

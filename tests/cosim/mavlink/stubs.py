@@ -100,7 +100,7 @@ def tended(link, message):
     return sent
 
 
-def until(condition, seconds=5.0):
+def until(condition, seconds=60.0):
     """Wait for a condition; return whether it came true."""
     deadline = time.monotonic() + seconds
     while not condition():

@@ -16,6 +16,9 @@ from cosim.mavlink.options import PROFILES  # noqa: E402
 pytestmark = pytest.mark.slow
 
 LISTENING = {"heartbeat-rate": 6.0, "stream-rates": 3.0, "home-position": 3.0, "data-stream": 3.0}  # s
+# what a busy machine may hold up, so that it has another chance
+OF_RATES = {"heartbeat-rate", "stream-rates", "home-position", "message-interval", "data-stream", "qgc-connect"}
+ATTEMPTS = 3
 QUICKER = {
     connect: {
         "_LIST_TIMEOUT": 0.3,
@@ -30,9 +33,13 @@ QUICKER = {
 
 @pytest.mark.parametrize("profile", PROFILES)
 def test_our_vehicle_passes_every_check(profile, capsys):
-    code = main(["mavlink-check", "--profile", profile, "--json"])
-    found = json.loads(capsys.readouterr().out)
-    assert [check for check in found["checks"] if check["status"] == "fail"] == []
+    for _ in range(ATTEMPTS):
+        code = main(["mavlink-check", "--profile", profile, "--json"])
+        found = json.loads(capsys.readouterr().out)
+        failed = [check for check in found["checks"] if check["status"] == "fail"]
+        if not failed or {check["name"] for check in failed} - OF_RATES:
+            break
+    assert failed == []
     assert code == 0 and found["passed"]
     assert [check["name"] for check in found["checks"]] == [check.name for check in CHECKS]
     skipped = {check["name"] for check in found["checks"] if check["status"] == "skip"}

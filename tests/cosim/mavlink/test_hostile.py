@@ -79,7 +79,7 @@ def test_in_a_stream_good_frames_between_bad_ones_are_all_heeded():
 
 
 @pytest.mark.slow
-def test_a_million_hostile_datagrams_leave_nothing_behind():
+def test_two_hundred_thousand_hostile_datagrams_leave_nothing_behind():
     gate = open_gate()
 
     def receive(count):
@@ -88,13 +88,13 @@ def test_a_million_hostile_datagrams_leave_nothing_behind():
             pass
         assert link.channel.looked == count
 
-    receive(900_000)
+    receive(180_000)
     tracemalloc.start()  # slow, and it need not watch all of them
     before = tracemalloc.get_traced_memory()[0]
-    receive(100_000)
+    receive(20_000)
     after = tracemalloc.get_traced_memory()[0]
     tracemalloc.stop()
-    assert gate.counts.accepted > 190_000
+    assert gate.counts.accepted > 38_000
     assert after - before < 100_000
 
 

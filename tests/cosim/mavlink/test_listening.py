@@ -273,7 +273,7 @@ def test_on_a_terminal_it_is_drawn_in_place_and_ctrl_c_gives_the_cursor_back():
             if select.select([leader], [], [], 0.1)[0]:
                 seen += os.read(leader, 65536)
         process.send_signal(signal.SIGINT)
-        process.wait(10)
+        process.wait(120)
         while select.select([leader], [], [], 0.2)[0]:
             try:
                 seen += os.read(leader, 65536)

@@ -119,7 +119,7 @@ def test_many_links_at_once_each_with_a_sequence_of_its_own():
         links.start()
         other.address = (HERE, udp_in.port)
         other.say(heartbeat())
-        with socket.create_connection((HERE, server.port), 2.0) as client:
+        with socket.create_connection((HERE, server.port), 60.0) as client:
             assert until(lambda: server.clients and udp_in.peers)
             for k in range(300):
                 links.observe(k, row(k * 0.01))
@@ -310,10 +310,13 @@ def test_a_client_that_never_reads_costs_no_other_client_a_frame():
     link = link_of(server)
     links = LinkThread(Loud(), [link], step=0.01)
     links.start()
-    with socket.create_connection((HERE, server.port), 2.0), socket.create_connection((HERE, server.port), 2.0) as good:
+    with (
+        socket.create_connection((HERE, server.port), 60.0),
+        socket.create_connection((HERE, server.port), 60.0) as good,
+    ):
         assert until(lambda: len(server.clients) == 2)
         station, messages = Station(), []
-        good.settimeout(5.0)
+        good.settimeout(60.0)
         for k in range(4000):
             links.observe(k, row(k * 0.01))
             while len(messages) + 100 < k:

@@ -15,7 +15,7 @@ _QUIET = (
     "--disable-background-networking", "--disable-component-update", "--disable-sync", "--hide-scrollbars",
     "--window-size=1280,900", "--force-color-profile=srgb",
 )  # fmt: skip
-_PATIENCE = 30.0  # s
+_PATIENCE = 120.0  # s
 _TWO_PICTURES = "const done = arguments[0]; requestAnimationFrame(() => requestAnimationFrame(() => done(true)));"
 
 

@@ -23,7 +23,7 @@ return [at.id || at.dataset?.look || at.className || at.tagName, around.some((e)
 def wait_until(browser, script):
     from selenium.webdriver.support.ui import WebDriverWait
 
-    WebDriverWait(browser.driver, 30).until(lambda _: browser.js(f"return {script}"))
+    WebDriverWait(browser.driver, 120).until(lambda _: browser.js(f"return {script}"))
 
 
 def test_the_keyboard_alone_plays_seeks_zooms_and_changes_the_theme(browser, shown, docking):

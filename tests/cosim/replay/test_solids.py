@@ -54,7 +54,7 @@ def run(code, **given):
     scripts = "\n".join((assets / name).read_text(encoding="utf-8") for name in SCENE_SCRIPTS)
     values = "".join(f"const {name} = {json.dumps(value)};\n" for name, value in given.items())
     program = f'"use strict";\n{scripts}\n{values}console.log(JSON.stringify((() => {{ {code} }})()));'
-    done = subprocess.run([NODE, "-"], input=program, capture_output=True, text=True, timeout=60, check=False)
+    done = subprocess.run([NODE, "-"], input=program, capture_output=True, text=True, timeout=240, check=False)
     assert done.returncode == 0, done.stderr
     return json.loads(done.stdout)
 

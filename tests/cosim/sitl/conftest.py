@@ -24,7 +24,7 @@ class Served(threading.Thread):
             self._error = error
 
     def outcome(self):
-        self.join(60.0)
+        self.join(240.0)
         assert not self.is_alive()
         if self._error:
             raise self._error
@@ -36,7 +36,7 @@ def serve(tmp_path):
     """Return a function that begins to serve; each server has a folder of its own."""
     begun = []
 
-    def begin(*overrides, vehicle="bluerov2_heavy", timeout=0.5, record_rate=2000.0, **more):
+    def begin(*overrides, vehicle="bluerov2_heavy", timeout=30.0, record_rate=2000.0, **more):
         out = tmp_path / f"run{len(begun)}"
         options = FlightOptions("sitl", overrides, vehicle, out, record_rate, report=False, **more)
         served = Served(JsonServer(Flights(options, "ardupilot", law_of_pwm), ("127.0.0.1", 0), timeout))

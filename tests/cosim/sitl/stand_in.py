@@ -65,7 +65,7 @@ class StandIn:
 
     def __init__(self, address, rate=1200, channels=16):
         self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        self.socket.settimeout(20.0)
+        self.socket.settimeout(120.0)
         self.address, self.rate, self.channels = address, rate, channels
         self.count = 0
 

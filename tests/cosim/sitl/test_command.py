@@ -60,7 +60,7 @@ def test_a_signal_ends_it_with_a_readable_run(tmp_path, sent):
         for _ in range(240):
             pilot.fly(NEUTRAL)
     process.send_signal(sent)
-    printed, said = process.communicate(timeout=60)
+    printed, said = process.communicate(timeout=240)
     assert process.returncode == 130
     assert "240 steps, 0 frames resent, 0 lost" in printed and "was interrupted at 0.190 s" in printed
     assert "Traceback" not in said

@@ -55,7 +55,7 @@ class Px4:
     """Takes sensors and answers them."""
 
     def __init__(self, address):
-        self.socket = socket.create_connection(address, timeout=20.0)
+        self.socket = socket.create_connection(address, timeout=120.0)
         self.data, self.seen, self.frames = b"", {}, 0
         self.say(packed(0, 0, 2, 12, 0, 4, 3))
 
@@ -102,7 +102,7 @@ class Px4:
 def serve_px4(tmp_path):
     begun = []
 
-    def begin(*overrides, timeout=0.5, vehicle="bluerov2_heavy"):
+    def begin(*overrides, timeout=30.0, vehicle="bluerov2_heavy"):
         options = FlightOptions("sitl", overrides, vehicle, tmp_path / f"px4-{len(begun)}", 1000.0, report=False)
         served = Served(HilServer(Flights(options, "px4", law_of_controls), ("127.0.0.1", 0), timeout))
         begun.append(served)

@@ -298,7 +298,7 @@ def test_no_autopilot_no_run(serve):
 
 
 def test_a_plant_that_fails_leaves_its_record(serve):
-    served = serve(timeout=5.0)
+    served = serve()
     with StandIn(served.address) as pilot:
         for _ in range(5):
             pilot.fly(NEUTRAL)
@@ -310,7 +310,7 @@ def test_a_plant_that_fails_leaves_its_record(serve):
 
 
 def test_a_taken_port_is_told(serve, tmp_path):
-    served = serve()
+    served = serve(timeout=0.1)
     flights = Flights(FlightOptions(), "ardupilot", law_of_pwm)
     with pytest.raises(RunError, match=rf"UDP 127.0.0.1:{served.address[1]}: Address already in use"):
         JsonServer(flights, served.address)

@@ -1,7 +1,6 @@
 """The closed form against the exact centroid, and the proof that there is one."""
 
 import math
-import time
 from fractions import Fraction
 
 import numpy as np
@@ -318,9 +317,7 @@ def test_a_proof_that_would_be_too_long_is_given_up_soon():
         Rule(And((pairs(names[:30]), pairs(names[30:]))), output["high"]),
         Rule(Is("v0", "on"), output["low"]),
     )
-    start = time.perf_counter()
-    arbiter = Arbiter(system=System(variables, (output,), rules))
-    assert time.perf_counter() - start < 30.0  # of minutes
+    arbiter = Arbiter(system=System(variables, (output,), rules))  # at once, or the limit on the time of a test ends it
     assert "more than 512 clauses" in arbiter.why
 
 

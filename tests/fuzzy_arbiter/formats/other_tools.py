@@ -77,7 +77,7 @@ def jfuzzylogic_classes():
 
 
 def _run(command, text=""):
-    return subprocess.run(command, input=text, capture_output=True, text=True, timeout=120, check=False)
+    return subprocess.run(command, input=text, capture_output=True, text=True, timeout=240, check=False)
 
 
 def _output(command, text=""):

@@ -17,6 +17,7 @@ import pytest
 INSTALLING = 420.0  # s, for pip or npm
 ENDING = 60.0  # s, for a run to write what it has
 INTERRUPTED = 130
+REQUIREMENTS = ("MAVProxy>=1.8.75", "pymavlink>=2.4.49", "setuptools<81", "future", "fastcrc", "matplotlib")
 HERE = Path(__file__).parent
 
 
@@ -29,12 +30,19 @@ def environment(request):
         with _locked(folder):
             if not (folder / "made").exists():
                 shutil.rmtree(folder, ignore_errors=True)
-                _install([sys.executable, "-m", "venv", str(folder)])
-                _install([str(folder / "bin" / "python"), "-m", "pip", "install", "-q", *requirements])
+                _install([sys.executable, "-m", "venv", "--without-pip", str(folder)])
+                pip = [sys.executable, "-m", "pip", "--python", str(folder / "bin" / "python")]
+                _install([*pip, "install", "-q", "--no-compile", *requirements])
                 (folder / "made").touch()
         return folder
 
     return make
+
+
+@pytest.fixture(scope="session")
+def ardupilots_tools(environment):
+    """Return the Python of an environment with MAVProxy and pymavlink's own tools."""
+    return environment("ardupilot-tools", *REQUIREMENTS) / "bin" / "python"
 
 
 @pytest.fixture(scope="session")

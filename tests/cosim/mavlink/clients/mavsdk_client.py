@@ -32,7 +32,7 @@ except ImportError:
     from mavsdk.offboard import PositionNedYaw
     from mavsdk.param import ParamError
 
-PATIENCE = 20.0  # s, for a step
+PATIENCE = 60.0  # s, for a step
 SETTLED = 0.05
 FAR, NEARER = 4e-5, 1e-5  # deg, about 4.4 m and 1.1 m
 

@@ -18,7 +18,7 @@ from cosim.mavlink.ground import GroundLink
 from cosim.mavlink.options import PROFILES, MavlinkOptions
 from tests.cosim.mavlink.clients.conftest import HERE
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(900)]  # the first of them builds and installs
 
 READING = 120.0  # s
 LISTENING = 8.0  # s
@@ -28,7 +28,6 @@ LOGS = [
     pytest.param(0, SENT | {"COMMAND_LONG", "PARAM_REQUEST_LIST"}, id="log of the vehicle"),
     pytest.param(1, SENT, id="log of the station"),
 ]
-TOOLS = ("pymavlink>=2.4.49", "setuptools<81", "fastcrc", "matplotlib")
 
 
 class RecordingLink(GroundLink):
@@ -70,8 +69,8 @@ def test_qgroundcontrol_connects_without_a_retry(met):
 
 
 @pytest.mark.parametrize(("which", "some"), LOGS)
-def test_mavlogdump_reads_every_frame(met, which, some, environment):
-    python = environment("pymavlink", *TOOLS) / "bin" / "python"
+def test_mavlogdump_reads_every_frame(met, which, some, ardupilots_tools):
+    python = ardupilots_tools
     done = subprocess.run(
         [python, python.parent / "mavlogdump.py", "--dialect", "all", "--show-source", "--show-types", met[which]],
         capture_output=True, text=True, timeout=READING,
@@ -84,8 +83,8 @@ def test_mavlogdump_reads_every_frame(met, which, some, environment):
 
 
 @pytest.mark.parametrize(("which", "some"), LOGS)
-def test_mavloss_misses_nothing_of_the_vehicle(met, which, some, environment):
-    python = environment("pymavlink", *TOOLS) / "bin" / "python"
+def test_mavloss_misses_nothing_of_the_vehicle(met, which, some, ardupilots_tools):
+    python = ardupilots_tools
     done = subprocess.run(
         [python, python.parent / "mavloss.py", "--dialect", "all", met[which]], capture_output=True, text=True,
         timeout=READING,

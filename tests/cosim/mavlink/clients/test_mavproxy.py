@@ -1,5 +1,6 @@
 """MAVProxy, headless, with its commands on standard input, as a pilot types them."""
 
+import contextlib
 import os
 import re
 import subprocess
@@ -12,11 +13,10 @@ pytest.importorskip("pymavlink", reason="the mavlink extra is not installed")
 
 from tests.cosim.mavlink.clients.conftest import cosim_run, orders_of
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(900)]  # the first of them builds and installs
 
-REQUIREMENTS = ("MAVProxy>=1.8.75", "pymavlink>=2.4.49", "setuptools<81", "future")
 MODULES = "param,wp,fence,mode,arm,cmdlong,link,misc,rc,signing,output,log"
-PATIENCE = 30.0  # s, for what is to be seen
+PATIENCE = 60.0  # s, for what is to be seen
 
 
 class MavProxy:
@@ -41,9 +41,9 @@ class MavProxy:
         self.process.stdin.write(f"{line}\n")
         self.process.stdin.flush()
 
-    def see(self, pattern, since=0):
+    def see(self, pattern, since=0, patience=PATIENCE):
         """Return the match of what is to be printed."""
-        end = time.monotonic() + PATIENCE
+        end = time.monotonic() + patience
         while time.monotonic() < end:
             found = re.search(pattern, self.text[since:])
             if found:
@@ -63,20 +63,25 @@ class MavProxy:
     def __exit__(self, *_):
         self.process.stdin.close()
         try:
-            self.process.wait(10)
+            self.process.wait(60)
         except subprocess.TimeoutExpired:
             self.process.kill()
         self.reader.join()
         self.process.stdout.close()
 
 
-def test_a_pilot_connects_arms_changes_modes_and_lists_what_there_is(environment, udp_port, tmp_path):
-    python, port, folder = environment("mavproxy", *REQUIREMENTS) / "bin" / "python", udp_port(), tmp_path / "run"
+def test_a_pilot_connects_arms_changes_modes_and_lists_what_there_is(ardupilots_tools, udp_port, tmp_path):
+    python, port, folder = ardupilots_tools, udp_port(), tmp_path / "run"
     with cosim_run(folder, "ardusub", f"udpout:127.0.0.1:{port}"), MavProxy(python, tmp_path, port) as mavproxy:
         mavproxy.see(r"Detected vehicle 1:1")
         received = int(mavproxy.see(r"Received (\d+) parameters").group(1))
         assert received > 10
-        mavproxy.do("param fetch", rf"Received {received} parameters")
+        for attempt in range(3):  # it gives up asking for what a busy machine has lost
+            since = len(mavproxy.text)
+            mavproxy.type("param fetch")
+            with contextlib.suppress(AssertionError) if attempt < 2 else contextlib.nullcontext():
+                mavproxy.see(rf"Received {received} parameters", since, patience=30.0)
+                break
         assert (tmp_path / "mav.parm").read_text().count("\n") == received
 
         mavproxy.do("disarm", "DISARMED")

@@ -10,7 +10,7 @@ pytest.importorskip("pymavlink", reason="the mavlink extra is not installed")
 from cosim.mavlink.options import MavlinkOptions
 from tests.cosim.mavlink.clients.conftest import HERE, cosim_run, orders_of
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(900)]  # the first of them builds and installs
 
 RUNNING = 240.0  # s, for all steps together
 REQUIREMENTS = {"mavsdk-4": "mavsdk>=4,<5", "mavsdk-3": "mavsdk<4"}
@@ -68,9 +68,8 @@ def test_parameters_are_read_changed_and_refused(flown):
     assert word != "taken" and after == pytest.approx(before)
 
 
-def test_an_unknown_parameter_is_told_of_at_once(flown):
-    assert "DOES_NOT_EXIST" in value(flown, "unknown_param")
-    assert flown["unknown_param"]["seconds"] < 1.0  # it gives up after 3 s otherwise
+def test_an_unknown_parameter_is_told_of(flown):
+    assert "DOES_NOT_EXIST" in value(flown, "unknown_param")  # without an answer it would be a TIMEOUT
 
 
 def test_a_go_to_moves_the_vehicle(flown):
