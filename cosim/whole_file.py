@@ -29,8 +29,10 @@ def whole_file(path: Path) -> Iterator[BinaryIO]:
 
     Raises
     ------
+    FileExistsError
+        If it is there and is no file, such as a folder or a device.
     OSError
-        If it cannot be written, or is there and is no file, such as a folder or a device; nothing is left then.
+        If it cannot be written; nothing is left then.
     """
     if path.exists() and not path.is_file():
         raise FileExistsError(errno.EEXIST, "exists and is no file", str(path))
