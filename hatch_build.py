@@ -7,7 +7,6 @@ that nothing is compiled when a wheel is built from one; an editable installatio
 
 from __future__ import annotations
 
-import shutil
 import subprocess
 import sys
 import tempfile
@@ -32,7 +31,7 @@ class PrebuiltLibraries(BuildHookInterface):  # type: ignore[type-arg]
     """Adds ``plant_fmu/prebuilt``."""
 
     PLUGIN_NAME = "custom"
-    _folder: str | None = None
+    _folder: tempfile.TemporaryDirectory[str] | None = None
 
     def dependencies(self) -> list[str]:
         """Return what the build needs: a compiler, and what the package itself imports for the work."""
@@ -46,15 +45,16 @@ class PrebuiltLibraries(BuildHookInterface):  # type: ignore[type-arg]
         """Compile the libraries, unless this is an editable installation or they are there."""
         if version == "editable" or self._is_there():
             return
-        self._folder = tempfile.mkdtemp(prefix="subreach-")
-        subprocess.run([sys.executable, "-c", _COMPILE, self._folder], cwd=self.root, check=True)  # noqa: S603 - our own code
-        for file in sorted(Path(self._folder).iterdir()):
+        self._folder = tempfile.TemporaryDirectory(prefix="subreach-")
+        folder = self._folder.name
+        subprocess.run([sys.executable, "-c", _COMPILE, folder], cwd=self.root, check=True)  # noqa: S603 - our own code
+        for file in sorted(Path(folder).iterdir()):
             build_data["force_include"][str(file)] = f"plant_fmu/prebuilt/{file.name}"
 
     def finalize(self, version: str, build_data: dict[str, Any], artifact_path: str) -> None:
         """Leave nothing behind."""
         if self._folder is not None:
-            shutil.rmtree(self._folder, ignore_errors=True)
+            self._folder.cleanup()
 
     def _is_there(self) -> bool:
         return (Path(self.root) / "PKG-INFO").is_file()  # an unpacked source distribution

@@ -14,6 +14,9 @@ from controller.errors import LawError
 from controller.law import Array, Diagnostic, Output, VehicleState
 from controller.regions import PackedRegions
 
+_REAL = "biufO"  # kinds of NumPy's types; O is of whole numbers too long for its own
+_LONGEST = 200  # characters, that a message shows of what came
+
 
 class RegionsSeen(NamedTuple):
     """Regions as they stand at the pose that the law is told; row i is of region i, in the order of the scenario."""
@@ -51,14 +54,14 @@ class FunctionLaw:
     Raises
     ------
     LawError
-        If `function` cannot be called, or `output` is neither of the two.
+        If `function` cannot be called, is a class, or `output` is neither of the two.
     """
 
     diagnostics: tuple[Diagnostic, ...] = ()
 
     def __init__(self, function: LawFunction, output: Output = "wrench") -> None:
-        if not callable(function):
-            raise LawError(f"law is {function!r}, expected a function of state, goal, regions and weights")
+        if not callable(function) or isinstance(function, type):
+            raise LawError(f"law is {_shown(function)}, expected a function of state, goal, regions and weights")
         if output not in get_args(Output):
             raise LawError(f"output of a law is {output!r}, expected one of {', '.join(map(repr, get_args(Output)))}")
         self.output: Output = output
@@ -94,14 +97,26 @@ class FunctionLaw:
         """
         told = VehicleState(*(part.copy() for part in state))
         came = self._function(told, _seen(goal, told), _seen(regions, told), weights.copy())
-        try:
-            numbers = np.asarray(came, dtype=float)
-        except (TypeError, ValueError):
-            numbers = np.empty(0)
+        numbers = _real_numbers(came)
         if numbers.shape != forces.shape or not np.isfinite(numbers).all():
             unit = "N and N m" if self.output == "wrench" else "N"
-            raise LawError(f"law {self.name} returned {came!r}, expected {forces.size} finite numbers [{unit}]")
+            raise LawError(f"law {self.name} returned {_shown(came)}, expected {forces.size} finite numbers [{unit}]")
         forces[:] = numbers
+
+
+def _real_numbers(came: object) -> Array:
+    """Return what came as an array, empty where it is not of real numbers: neither complex ones nor texts will do."""
+    try:
+        array = np.asarray(came)
+        return array.astype(float) if array.dtype.kind in _REAL else np.empty(0)
+    except (TypeError, ValueError, OverflowError):
+        return np.empty(0)
+
+
+def _shown(came: object) -> str:
+    """Return what came in one line, cut where it is long."""
+    text = " ".join(repr(came).split())
+    return text if len(text) <= _LONGEST else f"{text[:_LONGEST]}..."
 
 
 def qualified_name(law: object) -> str:

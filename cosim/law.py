@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from typing import get_args
+
 import numpy as np
 
-from controller import LAWS, CompiledLaw, FunctionLaw, Law
+from controller import LAWS, CompiledLaw, FunctionLaw, Law, LawError
 from controller.function_law import qualified_name
+from controller.law import Output
 from cosim.errors import RunError, ScenarioError
 from cosim.scenario import Scenario, checked_scenario
 from cosim.vehicle_model import vehicle_model
@@ -67,9 +70,13 @@ def flown_by(law: Law, scenario: Scenario) -> Scenario:
 
     Raises
     ------
+    LawError
+        If it is no law, such as a function that no `FunctionLaw` is made of.
     ScenarioError
         If the scenario asks for what goes with shipped laws alone, or for a wrench where the law drives thrusters.
     """
+    if getattr(law, "output", None) not in get_args(Output) or not callable(getattr(law, "step", None)):
+        raise LawError(f"law is {qualified_name(law)}, expected a FunctionLaw, or what else fulfils controller.Law")
     name = law.name if isinstance(law, FunctionLaw) else qualified_name(law)
     through = scenario.actuation.through
     if law.output == "thrusters" and through != "thrusters":

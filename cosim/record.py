@@ -150,10 +150,16 @@ class Record:
 
     def __init__(self, files: Sequence[Path]) -> None:
         self._files = list(files)
-        with _opened(self._files[0]) as parquet:
-            schema, rows = parquet.schema_arrow, parquet.metadata.num_rows
-            _require_numbers(self._files[0], schema, rows)
-            self.columns = tuple(_column_of(field) for field in schema)
+        columns, rows = [], 0
+        for file in self._files:
+            with _opened(file) as parquet:
+                schema = parquet.schema_arrow
+                rows += parquet.metadata.num_rows
+                _require_numbers(file, schema, rows)
+                columns.append(tuple(map(_column_of, schema)))
+            if columns[-1] != columns[0]:
+                raise RunError(f"{file}: has other columns than {self._files[0].name}, expected parts of one record")
+        self.columns = columns[0]
         self.units: dict[str, str] = {column.name: column.unit for column in self.columns}
         self._kept: OrderedDict[str, Array] = OrderedDict()
 
@@ -272,14 +278,14 @@ def require_utf8(path: Path) -> None:
 
 
 def _require_numbers(file: Path, schema: pa.Schema, rows: int) -> None:
-    """Refuse a table that is no record: a few bytes of it could say what no memory holds."""
+    """Refuse a table that is no record, or brings one to too many rows: a few bytes could say what no memory holds."""
     odd = next((field.name for field in schema if field.type != pa.float64()), None)
     if odd is not None:
         raise RunError(f"{file}: column {odd[:80]!r} is no number, expected the record of a run")
     if not schema.names or len(set(schema.names)) < len(schema.names):
         raise RunError(f"{file}: has no columns, or two of one name; expected the record of a run")
     if rows > MAX_ROWS:
-        raise RunError(f"{file}: has {rows} rows, expected at most {MAX_ROWS}")
+        raise RunError(f"{file}: the record has {rows} rows up to here, expected at most {MAX_ROWS}")
 
 
 def _part_files(folder: Path) -> list[Path]:

@@ -27,6 +27,7 @@ from cosim.scenario_check import (
     check_parameters,
     check_record,
     check_regions,
+    check_texts,
     check_time,
     multiple,
 )
@@ -178,6 +179,7 @@ def checked_scenario(table: dict[str, Any], name: str, vehicle: Vehicle | None =
     if isinstance(plant, dict) and isinstance(plant.get("parameters"), dict):
         plant["parameters"] = flat(plant["parameters"])
     file = decode(table, File)
+    check_texts(file)
     time = check_time(file.time)
     check_numbers(file)
     goal, goal_velocity, goal_streamed = check_goal(file.goal)

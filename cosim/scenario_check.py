@@ -40,6 +40,7 @@ from plant_fmu.vehicle import Vehicle
 ROUNDING = 1e-6  # of one period, within which periods count as multiples
 MAX_STEPS = 100_000_000
 MAX_POINTS = 100_001
+MAX_TEXT = 200  # characters
 MAX_SEEN = 100  # obstacles that may come in
 REGION_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9 _-]{0,39}")  # a column of the record, a label of figures
 
@@ -58,6 +59,13 @@ class _Motion:
 
     velocity: Vector3 = (0.0, 0.0, 0.0)  # m/s, NED
     streamed: bool = False
+
+
+def check_texts(file: File) -> None:
+    """Raise `ScenarioError` unless a terminal only shows, and does not obey, the texts that come to it."""
+    for key, text in (("title", file.title), ("law.name", file.law.name)):
+        good = text.isprintable() and len(text) <= MAX_TEXT
+        _require(good, key, repr(text), f"one line of at most {MAX_TEXT} printable characters")
 
 
 def check_numbers(file: File) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import secrets
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -28,9 +29,13 @@ def whole_file(path: Path) -> Iterator[BinaryIO]:
 
     Raises
     ------
+    FileExistsError
+        If it is there and is no file, such as a folder or a device.
     OSError
         If it cannot be written; nothing is left then.
     """
+    if path.exists() and not path.is_file():
+        raise FileExistsError(errno.EEXIST, "exists and is no file", str(path))
     scratch = path.with_name(f".{path.name}-{secrets.token_hex(8)}")
     try:
         with scratch.open("xb") as file:
@@ -58,7 +63,7 @@ def write_whole(path: Path, content: bytes | str) -> Path:
     Raises
     ------
     OSError
-        If it cannot be written; nothing is left then.
+        As `whole_file`.
     """
     with whole_file(path) as file:
         file.write(content.encode() if isinstance(content, str) else content)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-import os
+import secrets
 import tempfile
 import zipfile
 from collections.abc import Mapping
@@ -53,17 +53,15 @@ def write_whole(out: Path, data: bytes) -> None:
         If `out` cannot be written, or is there and is no file.
     """
     require_place(out)
-    scratch = None
+    scratch = out.with_name(f".{out.name}-{secrets.token_hex(4)}")
     try:
-        with tempfile.NamedTemporaryFile(dir=out.parent, prefix=f".{out.name}-", delete=False) as scratch:
-            scratch.write(data)
-        os.chmod(scratch.name, 0o644)
-        os.replace(scratch.name, out)
+        with scratch.open("xb") as file:  # not by `tempfile`, whose files are for their owner alone
+            file.write(data)
+        scratch.replace(out)
     except OSError as error:
         raise BuildError(f"{out}: {error.strerror or error}") from error
     finally:
-        if scratch:
-            Path(scratch.name).unlink(missing_ok=True)
+        scratch.unlink(missing_ok=True)
 
 
 def write_archive(out: Path, members: Mapping[str, bytes]) -> None:

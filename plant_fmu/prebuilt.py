@@ -13,6 +13,7 @@ import os
 import struct
 import sys
 import zipfile
+import zlib
 from collections.abc import Sequence
 from dataclasses import fields, replace
 from pathlib import Path
@@ -70,7 +71,7 @@ def prebuilt_libraries(
     try:
         with zipfile.ZipFile(path) as archive:
             found = [(platform, archive.read(_member(platform))) for platform in platforms]
-    except (OSError, KeyError, zipfile.BadZipFile) as error:
+    except (OSError, KeyError, zipfile.BadZipFile, zlib.error) as error:
         raise BuildError(f"{path}: damaged ({error}); install subreach anew") from error
     return [(platform, _numbered(library, general, component, token)) for platform, library in found]
 

@@ -129,7 +129,7 @@ def hint(came: str, known: typing.Iterable[str]) -> str:
 
 
 def brief(said: object) -> str:
-    """Return what an error says in one line, cut where what came is absurdly long.
+    """Return what an error says in one line that a terminal only shows, cut where what came is absurdly long.
 
     Parameters
     ----------
@@ -139,9 +139,11 @@ def brief(said: object) -> str:
     Returns
     -------
     str
-        Begin and end of it.
+        Begin and end of it; what is not printable, such as the escape of a terminal's orders, as Python writes it.
     """
     text, half = " ".join(str(said).splitlines()), _LONGEST_WORDS // 2
+    if not text.isprintable():
+        text = "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
     return text if len(text) <= _LONGEST_WORDS else f"{text[:half]} ... {text[-half:]}"
 
 

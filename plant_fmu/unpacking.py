@@ -140,9 +140,8 @@ def _check_members(path: Path, archive: zipfile.ZipFile) -> None:
             raise FmuFileError(f"{path}: refused: {name!r} leads out of the folder it is extracted to")
         if not name.isprintable():
             raise FmuFileError(f"{path}: refused: {name!r} is no name of a file")
-        # one file on systems that take no account of case, or of how an accent is written
         folded = _folded(name)
-        if folded in seen:
+        if folded in seen and not (name.endswith("/") and seen[folded].endswith("/")):  # a folder may be named twice
             raise FmuFileError(f"{path}: refused: {name!r} would be written over {seen[folded]!r}")
         seen[folded] = name
         if member.compress_type not in _METHODS:
@@ -150,7 +149,9 @@ def _check_members(path: Path, archive: zipfile.ZipFile) -> None:
 
 
 def _folded(name: str) -> str:
-    return unicodedata.normalize("NFC", str(PurePosixPath(name))).casefold()
+    """Return what is one name on some system: without case, ways to write an accent, dots and blanks at an end."""
+    parts = (part.rstrip(" .") for part in PurePosixPath(name).parts)
+    return unicodedata.normalize("NFC", "/".join(parts)).casefold()
 
 
 # ---- its descriptions ----------------------------------------------------------------------------------------------

@@ -96,7 +96,7 @@ class Parts:
             If it cannot be written; nothing is left of it then.
         """
         file = self._folder / f"{self._next:08}-{self._next:08}.parquet"
-        write_whole(file, [table], self._schema)
+        write_tables(file, [table], self._schema)
         self._files.append(file)
         self._next += 1
         level = 0
@@ -110,7 +110,7 @@ class Parts:
 
     def _merge(self, files: list[Path]) -> None:
         merged = self._folder / f"{_span(files[0])[0]:08}-{_span(files[-1])[1]:08}.parquet"
-        write_whole(merged, in_order(files, self._schema), self._schema)
+        write_tables(merged, in_order(files, self._schema), self._schema)
         self._files[-len(files) :] = [merged]
         for file in files:
             file.unlink()
@@ -128,7 +128,7 @@ class Parts:
         OSError
             If it cannot be written.
         """
-        write_whole(path, in_order(self._files, self._schema), self._schema)
+        write_tables(path, in_order(self._files, self._schema), self._schema)
 
     def remove(self) -> None:
         """Remove the folder."""
@@ -166,7 +166,7 @@ def check_schema(file: Path, schema: Any) -> None:
         )
 
 
-def write_whole(path: Path, tables: Any, schema: Any) -> None:
+def write_tables(path: Path, tables: Any, schema: Any) -> None:
     """Write tables to one Parquet file, whole or not at all.
 
     Parameters

@@ -86,7 +86,7 @@ def export_run(
     path = out or Path(f"{folder.resolve().name}.{to}")
     files = [path, *([path.with_suffix(form.beside)] if form.beside else [])]
     for file in files:
-        if file.exists() and (file.is_dir() or not force):
+        if file.exists() and not (force and file.is_file()):
             raise ExportError(f"{file}: exists; expected a new file, or --force to replace it")
         if file.name in _OF_RUNS and file.parent.resolve() == folder.resolve():
             raise ExportError(f"{file}: is of the run itself, expected another file")

@@ -86,5 +86,5 @@ def write_page(path: Path, runs: Sequence[dict[str, Any]], title: str) -> Path:
 
 
 def is_page(path: Path) -> bool:
-    """Return whether a file is a page of this kind."""
-    return _MARK in path.read_text(encoding="utf-8", errors="replace")
+    """Return whether it is a file, and a page of this kind: a pipe would be waited for."""
+    return path.is_file() and _MARK in path.read_text(encoding="utf-8", errors="replace")

@@ -53,11 +53,18 @@ def test_what_a_function_is_told_is_its_own():
     assert ROCKS.hard.tolist() == [True, False] and ROCKS.gains.tolist() == [7.0, 1.0] and not GOAL.velocities.any()
 
 
-@pytest.mark.parametrize("came", [None, "up", [1.0] * 5, [1.0] * 8, 0.0, [0.0] * 5 + [np.nan], [np.inf] * 6, [1j] * 6])
+@pytest.mark.parametrize(
+    "came",
+    [
+        None, "up", [1.0] * 5, [1.0] * 8, 0.0, [0.0] * 5 + [np.nan], [np.inf] * 6, [1j] * 6, np.full(6, 1.0 + 1j),
+        ["1"] * 6, [10**400] * 6, np.zeros((6, 1)), list(range(10_000)), [[1.0, 2.0], [3.0]],
+    ],
+)  # fmt: skip
 def test_what_are_no_forces_is_refused(came):
     forces = np.ones(6)
-    with pytest.raises(LawError, match=r"law .*:steer returned .*, expected 6 finite numbers \[N and N m\]"):
+    with pytest.raises(LawError, match=r"law .*:steer returned .*, expected 6 finite numbers \[N and N m\]") as caught:
         FunctionLaw(named("steer", came)).step(state(), GOAL, ROCKS, WEIGHTS, forces)
+    assert "\n" not in str(caught.value) and len(str(caught.value)) < 400
     assert forces.tolist() == [1.0] * 6
 
 
@@ -83,7 +90,10 @@ def test_an_object_that_can_be_called_is_named_by_its_class():
     assert FunctionLaw(Pilot()).name.endswith("test_an_object_that_can_be_called_is_named_by_its_class.<locals>.Pilot")
 
 
-@pytest.mark.parametrize(("function", "output", "words"), [(3, "wrench", "law is 3"), (print, "force", "'force'")])
+@pytest.mark.parametrize(
+    ("function", "output", "words"),
+    [(3, "wrench", "law is 3"), (dict, "wrench", "law is <class"), (print, "force", "'force'")],
+)
 def test_what_is_no_law_is_refused(function, output, words):
     with pytest.raises(LawError, match=words):
         FunctionLaw(function, output)

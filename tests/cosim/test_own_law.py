@@ -98,6 +98,25 @@ def test_what_it_breaks_off_with_is_left_readable(scenario, tmp_path):
     assert summary["status"].startswith("failed: law ") and summary["simulated_time"] == pytest.approx(0.07)
 
 
+def test_what_it_raises_itself_comes_through_and_leaves_the_record(scenario, tmp_path):
+    def faulty(state, goal, regions, weights):
+        calls.append(1)
+        return np.zeros(6) if len(calls) < 5 else 1 / 0
+
+    calls = []
+    with pytest.raises(ZeroDivisionError):
+        run_scenario(scenario, tmp_path / "run", law=FunctionLaw(faulty))
+    run = load_run(tmp_path / "run")
+    assert run.summary["status"] == "killed" and run.summary["simulated_time"] == pytest.approx(0.07)
+
+
+@pytest.mark.parametrize("law", [ahead, FunctionLaw, 3])
+def test_what_is_no_law_is_refused(law, scenario, tmp_path):
+    with pytest.raises(LawError, match=r"law is .*:.*, expected a FunctionLaw"):
+        run_scenario(scenario, tmp_path / "run", law=law)
+    assert not (tmp_path / "run").exists()
+
+
 @pytest.mark.parametrize(
     ("key", "words"),
     [("commands.enabled=true", "commands.enabled is true"), ("record.lyapunov=true", "record.lyapunov is true")],

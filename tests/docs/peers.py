@@ -36,6 +36,8 @@ def _beside(work: Callable[[], object]) -> Iterator[None]:
     thread.start()
     yield
     thread.join(60.0)
+    if thread.is_alive():
+        raise TimeoutError("who was to come beside the page's command is still there a minute after its end")
     if failures:
         raise failures[0]
 

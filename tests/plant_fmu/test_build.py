@@ -2,6 +2,7 @@
 
 import os
 import shutil
+import stat
 import sys
 import tempfile
 import zipfile
@@ -11,6 +12,7 @@ import pytest
 
 from plant_fmu import BuildError, TableError, VehicleError, build_fmu, cached_fmu, load_vehicle
 from plant_fmu.__main__ import main
+from plant_fmu.archive import write_whole
 from plant_fmu.compiler import find_compiler
 
 ODIN = (Path(__file__).parents[2] / "plant_fmu" / "vehicles" / "odin.toml").read_text()
@@ -153,6 +155,17 @@ def test_only_files_are_replaced(tmp_path):
         with pytest.raises(BuildError, match=r"is no file"):
             build_fmu(load_vehicle("odin"), 3, tmp_path / name)
     assert sorted(p.name for p in tmp_path.iterdir()) == ["folder", "pipe"]
+
+
+@pytest.mark.skipif(os.name != "posix", reason="of POSIX")
+def test_a_file_has_the_permissions_that_the_user_gives_new_ones(tmp_path):
+    before = os.umask(0o027)
+    try:
+        write_whole(tmp_path / "x.ssv", b"new")
+    finally:
+        os.umask(before)
+    assert stat.S_IMODE((tmp_path / "x.ssv").stat().st_mode) == 0o640
+    assert [path.read_bytes() for path in tmp_path.iterdir()] == [b"new"]
 
 
 def test_unwritable_place_is_one_line(tmp_path, capsys):

@@ -127,16 +127,19 @@ def test_linux_without_glibc_needs_the_compiler(no_compiler, tmp_path, monkeypat
         build_fmu(load_vehicle("odin"), 3, tmp_path / "x.fmu")
 
 
-@pytest.mark.parametrize("damage", ["half", "empty", "another table"])
+@pytest.mark.parametrize("damage", ["half", "flipped", "empty", "another table"])
 def test_damaged_libraries_are_named(folder, tmp_path, monkeypatch, damage):
     monkeypatch.setattr(prebuilt, "FOLDER", tmp_path)
     for file in folder.iterdir():
-        data = file.read_bytes()
-        (tmp_path / file.name).write_bytes(data[: len(data) // 2] if damage == "half" else data)
-        if damage != "half":
-            with zipfile.ZipFile(tmp_path / file.name, "w") as archive:
-                if damage == "another table":
-                    archive.writestr(f"{HERE.name}{HERE.suffix}", b"no table")
+        data, place = file.read_bytes(), tmp_path / file.name
+        with zipfile.ZipFile(place, "w", zipfile.ZIP_DEFLATED) as archive:
+            if damage != "empty":
+                archive.writestr(f"{HERE.name}{HERE.suffix}", b"no table" if damage == "another table" else data)
+        data = place.read_bytes()
+        if damage == "half":
+            place.write_bytes(data[: len(data) // 2])
+        elif damage == "flipped":  # in the middle of what is compressed
+            place.write_bytes(data[:60] + b"\xff" * 30 + data[90:])
     with pytest.raises(BuildError, match=r"damaged|has not the table") as refused:
         build_fmu(load_vehicle("odin"), 3, tmp_path / "x.fmu")
     assert str(tmp_path) in str(refused.value) or damage == "another table"

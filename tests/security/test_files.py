@@ -14,7 +14,7 @@ import controller.compiled
 from cosim.campaigns.folder import PLAN, read_json, read_plan
 from cosim.errors import RunError
 from cosim.flown_run import SUMMARY, load_run
-from cosim.record import RECORD, Record, load_record
+from cosim.record import PARTS, RECORD, Record, load_record
 from cosim.replay.page import write_page
 from cosim.run_folder import claim
 from cosim.scenario import load_scenario
@@ -57,6 +57,16 @@ def test_a_few_bytes_that_say_a_thousand_million_rows_are_not_believed(tmp_path,
     monkeypatch.setattr("cosim.record.MAX_ROWS", 1)
     with pytest.raises(RunError, match="has 2 rows"):
         load_record(written(tmp_path, pa.table(ROWS)))
+
+
+@pytest.mark.parametrize("odd", [pa.table({"time": [1]}), pa.table({"time": [0.0] * 3}), pa.table({"x": [0.0]})])
+def test_each_part_of_a_killed_run_is_looked_at(tmp_path, monkeypatch, odd):
+    monkeypatch.setattr("cosim.record.MAX_ROWS", 4)
+    (tmp_path / PARTS).mkdir()
+    for i, table in enumerate((pa.table({"time": [0.0, 1.0]}), odd)):
+        pq.write_table(table, tmp_path / PARTS / f"{i:06}.parquet")
+    with pytest.raises(RunError, match="expected"):
+        load_record(tmp_path)
 
 
 @given(st.data())
@@ -129,6 +139,19 @@ def test_two_that_write_one_file_do_not_meet(tmp_path):
         assert place.read_bytes() == b"other"
         one.write(b"one")
     assert place.read_bytes() == b"one" and list(tmp_path.iterdir()) == [place]
+
+
+@pytest.mark.skipif(os.name != "posix", reason="pipes have names on POSIX alone")
+def test_what_is_no_file_is_not_replaced(tmp_path):
+    """Else a page written to /dev/null by root would be all that is left of it."""
+    os.mkfifo(tmp_path / "pipe")
+    (tmp_path / "link").symlink_to("pipe")
+    (tmp_path / "folder").mkdir()
+    for name in ("pipe", "link", "folder"):
+        with pytest.raises(FileExistsError, match="is no file"):
+            write_whole(tmp_path / name, "text")
+    assert (tmp_path / "pipe").is_fifo() and (tmp_path / "link").is_symlink()
+    assert len(list(tmp_path.iterdir())) == 3
 
 
 def test_what_fails_leaves_what_was(tmp_path):

@@ -86,10 +86,28 @@ def test_links_are_refused(tmp_path, read, kind):
 
 @pytest.mark.filterwarnings("ignore:Duplicate name")
 @pytest.mark.parametrize(
-    "pair", [("a", "a"), ("a", "A"), ("x/ß", "x/SS"), ("é", "e\u0301"), ("d/a", "d//a"), ("a", "./a")]
+    "pair",
+    [
+        ("a", "a"),
+        ("a", "A"),
+        ("x/ß", "x/SS"),
+        ("é", "e\u0301"),
+        ("d/a", "d//a"),
+        ("a", "./a"),
+        ("a./b", "a/b. "),
+        ("a/", "a"),
+    ],
 )
 def test_no_member_is_written_over_another(tmp_path, read, pair):
     assert "would be written over" in read(archive(tmp_path / "it.fmu", [(name, "x") for name in pair]))
+
+
+@pytest.mark.filterwarnings("ignore:Duplicate name")
+def test_a_folder_may_be_named_twice(tmp_path):
+    path = archive(tmp_path / "it.fmu", [("resources/", ""), ("resources/a", "x"), ("resources/", "")])
+    assert read_fmu(path).fmi == 3
+    unpacking.unpack(path, tmp_path / "folder")
+    assert (tmp_path / "folder" / "resources" / "a").read_text() == "x"
 
 
 @pytest.mark.filterwarnings("ignore:Duplicate name")

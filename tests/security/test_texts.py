@@ -48,7 +48,7 @@ def said_of(read, path, text):
         read(path, content)
     except KINDS as error:
         said = str(error)
-    assert "\n" not in said and len(said) < 3000 + len(str(path))
+    assert said.isprintable() and len(said) < 3000 + len(str(path))
     return said
 
 
@@ -135,6 +135,19 @@ def test_absurd_sizes_name_their_key(change, key):
 def test_names_of_regions_are_plain(name):
     with pytest.raises(CosimError, match="name"):
         load_scenario("paper", [f"regions.0.name={json.dumps(name)}"])
+
+
+@pytest.mark.parametrize("key", ["title", "law.name"])
+@pytest.mark.parametrize("text", ["a:\x1b[31mred", "a:\nb", "a:\x9b2J", "a:\u202eb", "a:" + "b" * 199])
+def test_texts_that_a_terminal_shows_are_plain(key, text):
+    with pytest.raises(CosimError, match=f"{key} is .*printable") as caught:
+        load_scenario("paper", [f"{key}={json.dumps(text)}"])
+    assert str(caught.value).isprintable()
+
+
+@pytest.mark.parametrize("read", [scenario, vehicle])
+def test_a_key_with_orders_to_a_terminal_is_shown_only(read, tmp_path):
+    assert r"\x1b[31mred" in said_of(read, tmp_path / "it.toml", b'"\\u001b[31mred" = 1')
 
 
 @pytest.mark.parametrize("name", ["../../x", "/etc/passwd", "a/b", "con", "a b", "x" * 65, "é", "$(id)", "-o"])

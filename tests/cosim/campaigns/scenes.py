@@ -4,7 +4,7 @@ import json
 from pathlib import Path
 
 from cosim.campaigns import batches
-from cosim.campaigns.parts import write_whole
+from cosim.campaigns.parts import write_tables
 from cosim.campaigns.results import Results
 from cosim.campaigns.scene_rows import SCHEMA, table_of
 from cosim.scene_run import Conditions
@@ -33,7 +33,7 @@ def rows(results):
 
 def results_of(path, rows):
     """Write rows to a file, and return them as results."""
-    write_whole(path, [table_of(rows)], SCHEMA)
+    write_tables(path, [table_of(rows)], SCHEMA)
     return Results(path, SCHEMA)
 
 

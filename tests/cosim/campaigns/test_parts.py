@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from cosim.campaigns import parts
-from cosim.campaigns.parts import Parts, in_order, write_whole
+from cosim.campaigns.parts import Parts, in_order, write_tables
 
 SCHEMA = pa.schema([pa.field("row", pa.int64(), nullable=False), pa.field("x", pa.float64())])
 
@@ -119,7 +119,7 @@ def test_files_are_joined_in_order_whatever_rows_they_hold(rows, chunk):
         files = []
         for i, batch in enumerate(disjoint):
             files.append(Path(folder) / f"{i}.parquet")
-            write_whole(files[-1], [table(batch)], SCHEMA)
+            write_tables(files[-1], [table(batch)], SCHEMA)
         found = list(in_order(files, SCHEMA))
     assert pa.concat_tables(found).equals(table(taken))
     assert all(len(t) for t in found)
@@ -144,6 +144,6 @@ def test_no_more_is_read_at_once_than_overlaps(tmp_path, monkeypatch):
     files = []
     for i in range(10):
         files.append(tmp_path / f"{i}.parquet")
-        write_whole(files[-1], [table(range(10 * i, 10 * i + 10))], SCHEMA)
+        write_tables(files[-1], [table(range(10 * i, 10 * i + 10))], SCHEMA)
     assert pa.concat_tables(in_order(files, SCHEMA)).equals(table(range(100)))
     assert not at_once

@@ -2,6 +2,7 @@
 
 import builtins
 import importlib
+import os
 from pathlib import Path
 
 import numpy as np
@@ -71,6 +72,15 @@ def test_a_file_is_replaced_only_by_force(run, tmp_path, there, capsys):
 def test_a_folder_is_never_replaced(run, tmp_path):
     with pytest.raises(ExportError, match="exists"):
         export_run(run, "npz", tmp_path, force=True)
+
+
+@pytest.mark.skipif(os.name != "posix", reason="pipes have names on POSIX alone")
+def test_what_is_no_file_is_never_replaced(run, tmp_path):
+    out = tmp_path / "out.npz"
+    os.mkfifo(out)
+    with pytest.raises(ExportError, match="exists"):
+        export_run(run, "npz", out, force=True)
+    assert out.is_fifo()
 
 
 def test_a_writer_that_fails_leaves_what_was_there(run, tmp_path, monkeypatch):

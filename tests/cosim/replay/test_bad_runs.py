@@ -152,6 +152,14 @@ def test_several_runs_come_here_under_names_that_tell_them_apart(docking, copy_o
     assert reader.title == "Three <dockings>"
 
 
+@pytest.mark.skipif(os.name != "posix", reason="pipes have names on POSIX alone")
+def test_a_pipe_is_neither_read_nor_written_over(docking, tmp_path, capsys):
+    os.mkfifo(tmp_path / "x.html")
+    assert main(["replay", str(docking.path), "--out", str(tmp_path / "x.html")]) == 2
+    assert "exists and is no replay" in capsys.readouterr().err
+    assert (tmp_path / "x.html").is_fifo()
+
+
 def test_another_file_is_not_written_over(docking, tmp_path, capsys):
     file = tmp_path / "thesis.html"
     file.write_text("years of work")
