@@ -1,0 +1,54 @@
+"""All ways to ask for a clearance say the same, of each region of a scene that has moved."""
+
+import numpy as np
+import pytest
+
+from controller.quaternion import rotation_matrix
+from controller.regions import Region, Visibility, attitude_clearance, clearance_at, pack, place_clearance
+from controller.regions.region_set import clearance_of_place, clearance_of_pose, clearance_of_sphere
+from tests.controller.test_c_law import SHAPES
+
+SCENE = [Region(name, shape, ("in", "out")[i % 2]) for i, (name, (shape, _)) in enumerate(SHAPES.items())]
+
+
+def test_every_way_to_ask_says_the_same():
+    rng, packed, n = np.random.default_rng(1), pack(SCENE), len(SCENE)
+    packed.shifts[:] = rng.normal(size=(n, 3))
+    values, gradients, turnings, clearances = np.empty(n), np.empty((n, 3)), np.empty((n, 3)), np.empty(n)
+    room, slope, asked = np.empty(3), np.empty(3), 0
+    for _ in range(40):
+        p, e = rng.normal(size=3) * 3.0 + 1.0, rng.normal(size=4)
+        e /= np.linalg.norm(e)
+        packed.evaluate(p, e, values, gradients, turnings, clearances)
+        for i, region in enumerate(SCENE):
+            assert clearance_of_pose(packed, i, p, e, room) == pytest.approx(clearances[i], rel=1e-12)
+            if region.shape.unit == "rad":
+                clearance, turning = attitude_clearance(packed, i, p, e)
+                assert clearance == pytest.approx(clearances[i], rel=1e-12)
+                assert turning == pytest.approx(-turnings[i], rel=1e-12, abs=1e-15)
+                assert clearance_at(packed, i, p) == np.inf
+                continue
+            assert clearance_at(packed, i, p) == pytest.approx(clearances[i], rel=1e-12)
+            assert clearance_of_place(packed, i, p, room) == pytest.approx(clearances[i], rel=1e-12)
+            assert place_clearance(packed, i, p, slope) == pytest.approx(clearances[i], rel=1e-12)
+            size = np.linalg.norm(gradients[i])
+            assert slope == pytest.approx(-gradients[i] / size if size > 0.0 else np.zeros(3), rel=1e-12, abs=1e-15)
+            if region.name == "sphere":
+                asked += 1
+                assert clearance_of_sphere(packed, i, p) == pytest.approx(clearances[i], rel=1e-12)
+                distance = np.linalg.norm(p - packed.shifts[i] - region.shape.centre) - region.shape.radius
+                assert clearances[i] == pytest.approx(-distance if region.keep == "in" else distance, rel=1e-12)
+    assert asked == 40
+
+
+def test_a_camera_askew_sees_at_the_angle_of_its_axis():
+    rng = np.random.default_rng(2)
+    for _ in range(30):
+        feature, axis, camera = rng.normal(size=(3, 3))
+        p, e = rng.normal(size=3), rng.normal(size=4)
+        packed = pack([Region("see", Visibility(tuple(feature), tuple(axis), 0.4, tuple(camera)), "in")])
+        e /= np.linalg.norm(e)
+        ray = rotation_matrix(e).T @ (feature - p) - camera
+        angle = np.arccos(ray @ axis / np.linalg.norm(ray) / np.linalg.norm(axis))
+        assert clearance_of_pose(packed, 0, p, e, np.empty(3)) == pytest.approx(0.4 - angle, abs=1e-9)
+    assert Visibility((1.0, 2.0, 3.0), (1.0, 0.0, 0.0), 0.4).bounds() == ((-np.inf,) * 3, (np.inf,) * 3)
