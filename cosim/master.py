@@ -14,14 +14,14 @@ from typing import Protocol
 
 import numpy as np
 
-from controller import CompiledLaw, Law, VehicleState
+from controller import CompiledLaw, FunctionLaw, Law, VehicleState
 from controller.quaternion import from_axis_angle
 from cosim.actuators import Actuators
 from cosim.columns import columns_of
 from cosim.helm.helm import Helm
 from cosim.helm.orders import Order
 from cosim.helm.sources import OrderSource
-from cosim.law import law_of
+from cosim.law import flown_by, law_of
 from cosim.lyapunov import LyapunovSignals
 from cosim.scenario import CRITERIA, Scenario
 from cosim.sensing import Sensor
@@ -72,9 +72,13 @@ class Master:
         If there is no FMU and none can be built.
     LawError, DefinitionError
         If law or arbiter cannot be set up.
+    ScenarioError
+        If the scenario asks for what a law that is a function has not.
     """
 
     def __init__(self, scenario: Scenario, law: Law | None = None) -> None:
+        if isinstance(law, FunctionLaw):
+            scenario = flown_by(law, scenario)  # refuses what such a law cannot have
         self.scenario = scenario
         self.arbiter = Arbiter(engine=scenario.arbiter.engine, points=scenario.arbiter.points)
         self.law: Law = law_of(scenario) if law is None else law
