@@ -12,12 +12,15 @@ from controller.by_address import call, entry_of
 from controller.compiled import part
 from controller.regions import Box, DepthBand, Orientation, Region, Sphere, pack
 
+compiled_only = pytest.mark.skipif(bool(numba.config.DISABLE_JIT), reason="nothing is compiled")
+
 SPHERE = Region("s", Sphere((1.0, 2.0, 3.0), 0.5), "out")
 BAND = Region("d", DepthBand(2.0, 1.0), "in")
 BOX = Region("b", Box((5.0, 5.0, 5.0), (1.0, 2.0, 3.0)), "out")
 LEVEL = Region("level", Orientation((1.0, 0.0, 0.0, 0.0), 0.2), "in")
 
 
+@compiled_only
 def test_only_regions_that_need_them_bring_the_other_shapes():
     assert pack([SPHERE, BAND])[-2:] == (0, 0)
     packed = pack([SPHERE, BOX])
@@ -50,6 +53,7 @@ def by_address(address, numbers, scale):
     return call(address, scaled, (numbers, scale)) + 1.0
 
 
+@compiled_only
 def test_a_function_called_by_its_address_gives_what_it_gives():
     address = entry_of(scaled, (np.zeros(2), 0.0))
     assert by_address(address, np.array([1.0, 2.0, 4.0]), 3.0) == 22.0
@@ -57,6 +61,7 @@ def test_a_function_called_by_its_address_gives_what_it_gives():
     assert "scaled" not in next(iter(by_address.inspect_asm().values()))
 
 
+@compiled_only
 def test_other_arguments_than_the_address_is_for_are_refused():
     address = entry_of(scaled, (np.zeros(2), 0.0))
     with pytest.raises(TypingError, match="by address"):

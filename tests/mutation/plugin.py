@@ -8,13 +8,10 @@ import re
 import shutil
 import signal
 import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
 import pytest
-
-from tests.mutation import uncompiled
 
 OBJECTS = "MUTATION_OBJECTS"  # environment: the folder in which compiled C is kept
 _PLAIN_RUN = subprocess.run
@@ -30,7 +27,6 @@ class Plugin:
         self.seconds = seconds
 
     def pytest_configure(self, config: pytest.Config) -> None:
-        sys.modules["controller.by_address"] = uncompiled.by_address()
         subprocess.run = compile_once  # type: ignore[assignment]
 
     def pytest_collection_modifyitems(self, config: pytest.Config, items: list[pytest.Item]) -> None:

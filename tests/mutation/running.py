@@ -17,6 +17,7 @@ from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
+from typing import Self
 
 from tests.mutation.mutants import Mutant
 from tests.mutation.plan import ROOT, part_of, parts
@@ -124,48 +125,49 @@ class Server:
             raise RuntimeError(f"the process in {self.copy} has ended")
         return Outcome(**json.loads(answer))
 
-    def close(self) -> None:
-        """End the process."""
-        assert self.process.stdin
-        self.process.stdin.close()
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        assert self.process.stdin and self.process.stdout
+        self.process.stdin.close()  # which ends it
         self.process.wait()
+        self.process.stdout.close()
 
 
 def _work(
     copy: Path, todo: queue.SimpleQueue[Mutant], marks: dict[str, str], results: dict[str, Result], kept: Path | None
 ) -> None:
-    server = Server(copy)
-    while True:
-        try:
-            mutant = todo.get_nowait()
-        except queue.Empty:
-            break
-        text = mutant.applied((ROOT / mutant.path).read_text(encoding="utf-8"))
-        part = part_of(mutant.path)
-        outcome = server.ask(Order(part.tests, _words(mutant), part.without, part.slow, mutant.path, text))
-        if not outcome.passed and not outcome.by and not server.ask(Order(part.tests, collect_only=True)).passed:
-            raise RuntimeError(f"{mutant.path}: its tests cannot be collected without any mutant either")
-        result = Result(
-            mutant.key, marks[mutant.path], outcome.passed, outcome.by, outcome.how, round(outcome.seconds, 2)
-        )
-        results[mutant.key] = result
-        if kept:
-            kept.parent.mkdir(parents=True, exist_ok=True)
-            with kept.open("a", encoding="utf-8") as file:
-                file.write(json.dumps(asdict(result), ensure_ascii=False) + "\n")
-    server.close()
+    with Server(copy) as server:
+        while True:
+            try:
+                mutant = todo.get_nowait()
+            except queue.Empty:
+                break
+            text = mutant.applied((ROOT / mutant.path).read_text(encoding="utf-8"))
+            part = part_of(mutant.path)
+            outcome = server.ask(Order(part.tests, _words(mutant), part.without, part.slow, mutant.path, text))
+            if not outcome.passed and not outcome.by and not server.ask(Order(part.tests, collect_only=True)).passed:
+                raise RuntimeError(f"{mutant.path}: its tests cannot be collected without any mutant either")
+            result = Result(
+                mutant.key, marks[mutant.path], outcome.passed, outcome.by, outcome.how, round(outcome.seconds, 2)
+            )
+            results[mutant.key] = result
+            if kept:
+                kept.parent.mkdir(parents=True, exist_ok=True)
+                with kept.open("a", encoding="utf-8") as file:
+                    file.write(json.dumps(asdict(result), ensure_ascii=False) + "\n")
 
 
 def _doubt(results: dict[str, Result], copy: Path) -> None:
     """Run every test that noticed something without any mutant, and mark what it then says no less."""
-    server = Server(copy)
-    for slow in (False, True):
-        given = [r for r in results.values() if r.by and part_of(r.key.partition(" | ")[0]).slow == slow]
-        tests = tuple(sorted({result.by for result in given}))
-        if tests and not server.ask(Order(tests, slow=slow)).passed:
-            failing = {test for test in tests if not server.ask(Order((test,), slow=slow)).passed}
-            results.update((r.key, replace(r, doubtful=True)) for r in given if r.by in failing)
-    server.close()
+    with Server(copy) as server:
+        for slow in (False, True):
+            given = [r for r in results.values() if r.by and part_of(r.key.partition(" | ")[0]).slow == slow]
+            tests = tuple(sorted({result.by for result in given}))
+            if tests and not server.ask(Order(tests, slow=slow)).passed:
+                failing = {test for test in tests if not server.ask(Order((test,), slow=slow)).passed}
+                results.update((r.key, replace(r, doubtful=True)) for r in given if r.by in failing)
 
 
 def _words(mutant: Mutant) -> tuple[str, ...]:
@@ -209,8 +211,7 @@ def _compile(copy: Path) -> None:
     for name in COPIED[:4]:
         for source in (copy / name).rglob("*.py"):
             py_compile.compile(str(source), invalidation_mode=py_compile.PycInvalidationMode.CHECKED_HASH)
-    server = Server(copy)
-    for part in parts():
-        if not server.ask(Order(part.tests, collect_only=True)).passed:
-            raise RuntimeError(f"tests cannot be collected: {', '.join(part.tests)}")
-    server.close()
+    with Server(copy) as server:
+        for part in parts():
+            if not server.ask(Order(part.tests, collect_only=True)).passed:
+                raise RuntimeError(f"tests cannot be collected: {', '.join(part.tests)}")
