@@ -91,7 +91,7 @@ def require_name(name: object, what: str) -> None:
 
 
 def brief(fault: Exception) -> str:
-    """Return what a fault says, cut in the middle where what came is absurdly long.
+    """Return what a fault says in printable characters, cut in the middle where what came is absurdly long.
 
     Parameters
     ----------
@@ -104,6 +104,8 @@ def brief(fault: Exception) -> str:
         At most some hundred characters.
     """
     text = str(fault)
+    if not text.isprintable():
+        text = "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
     return text if len(text) <= 1000 else f"{text[:500]} ... {text[-500:]}"
 
 

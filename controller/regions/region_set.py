@@ -127,6 +127,8 @@ class PackedRegions(NamedTuple):
         """
         for array in (position, quaternion, values, gradients, turnings, clearances):
             require(array.flags.c_contiguous, "evaluate", "array", "a strided one", "contiguous ones")
+        if not (position.flags.writeable and quaternion.flags.writeable):  # which compiled code is not made for
+            position, quaternion = position.copy(), quaternion.copy()
         evaluate_packed(self, position, quaternion, values, gradients, turnings, clearances)
 
     def __reduce__(self) -> tuple[Any, ...]:

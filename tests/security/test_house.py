@@ -21,6 +21,7 @@ ZIPS = {
     "plant_fmu/unpacking.py",
     "plant_fmu/build.py",  # asks whether a file of the cache is one
     "plant_fmu/archive.py",  # writes
+    "plant_fmu/prebuilt.py",  # reads what came with the package
     "cosim/export/as_npz.py",  # writes
 }
 
