@@ -71,7 +71,7 @@ def test_fmpy_flies_it_as_we_do(packed):
 @pytest.mark.slow
 def test_the_page_on_it_does_what_it_says(tmp_path, monkeypatch, capsys):
     text = (ROOT / "docs" / "ssp.md").read_text()
-    command, code = re.search(r"```\ncosim (.*?)```", text, re.S)[1], re.search(r"```python\n(.*?)```", text, re.S)[1]
+    command, code = re.search(r"```sh\ncosim (.*?)```", text, re.S)[1], re.search(r"```python\n(.*?)```", text, re.S)[1]
     monkeypatch.chdir(tmp_path)
     assert main(shlex.split(command.replace("\\\n", " "))) == 0
     names = {}
