@@ -9,8 +9,10 @@ import argparse
 import contextlib
 import logging
 import os
+import signal
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from threading import current_thread, main_thread
 
 from cosim.command_line import campaigns, export, mavlink, package, replay, report, run, sitl, sweep, watch
 from cosim.command_line.campaigns import INTERRUPTED
@@ -112,16 +114,33 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _guarded(options: argparse.Namespace) -> int:
     """Run the verb, and say in one line what the user must mend."""
-    from controller import ControllerError
-    from cosim.errors import CosimError
-    from fuzzy_arbiter import ArbiterError
-    from plant_fmu import PlantFmuError
+    with _interrupts_held():
+        from controller import ControllerError
+        from cosim.errors import CosimError
+        from fuzzy_arbiter import ArbiterError
+        from plant_fmu import PlantFmuError
 
     try:
         return _VERBS[options.verb](options)
     except (CosimError, PlantFmuError, ControllerError, ArbiterError) as error:
         print(f"cosim: {error}", file=sys.stderr)
         return 2
+
+
+@contextlib.contextmanager
+def _interrupts_held() -> Iterator[None]:
+    """Let Ctrl-C wait until libraries are loaded: within its own C, NumPy makes an ImportError of it."""
+    if signal.getsignal(signal.SIGINT) is not signal.default_int_handler or current_thread() is not main_thread():
+        yield
+        return
+    came: list[int] = []
+    before = signal.signal(signal.SIGINT, lambda number, _: came.append(number))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+    if came:
+        raise KeyboardInterrupt
 
 
 def _log(verbose: bool) -> None:
