@@ -239,7 +239,7 @@ def test_an_unknown_law_is_named_with_the_known_ones():
 
 @pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="needs an alarm clock")
 def test_a_signal_in_mid_flight_raises_after_it(flyer):
-    class Alarmed(BaseException):  # noqa: N818 -- as KeyboardInterrupt is, which nobody turns into an error of theirs
+    class Alarmed(BaseException):  # as KeyboardInterrupt is, which nobody takes for an error of theirs
         pass
 
     def ring(*_):
