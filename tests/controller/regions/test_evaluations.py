@@ -5,6 +5,7 @@ import pytest
 
 from controller.quaternion import rotation_matrix
 from controller.regions import Region, Visibility, attitude_clearance, clearance_at, pack, place_clearance
+from controller.regions.kinds import SPHERE, evaluate_shape
 from controller.regions.region_set import clearance_of_place, clearance_of_pose, clearance_of_sphere
 from tests.controller.test_c_law import SHAPES
 
@@ -52,3 +53,13 @@ def test_a_camera_askew_sees_at_the_angle_of_its_axis():
         angle = np.arccos(ray @ axis / np.linalg.norm(ray) / np.linalg.norm(axis))
         assert clearance_of_pose(packed, 0, p, e, np.empty(3)) == pytest.approx(0.4 - angle, abs=1e-9)
     assert Visibility((1.0, 2.0, 3.0), (1.0, 0.0, 0.0), 0.4).bounds() == ((-np.inf,) * 3, (np.inf,) * 3)
+
+
+def test_a_sphere_told_by_its_kind_is_the_sphere():
+    rng = np.random.default_rng(3)
+    for _ in range(20):
+        p, centre, radius = rng.normal(size=3), rng.normal(size=3), rng.uniform(0.1, 2.0)
+        g, *gradient, distance = evaluate_shape(SPHERE, p, np.array([*centre, radius]))
+        assert g == pytest.approx((p - centre) @ (p - centre) - radius**2, rel=1e-12)
+        assert gradient == pytest.approx(2.0 * (p - centre), rel=1e-12)
+        assert distance == pytest.approx(np.linalg.norm(p - centre) - radius, rel=1e-12)
