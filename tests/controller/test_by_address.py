@@ -11,6 +11,8 @@ from controller import ControllerError
 from controller.by_address import call, entry_of
 from controller.compiled import part
 from controller.regions import Box, DepthBand, Orientation, Region, Sphere, pack
+from cosim.law import law_of
+from cosim.scenario import load_scenario
 
 compiled_only = pytest.mark.skipif(bool(numba.config.DISABLE_JIT), reason="nothing is compiled")
 
@@ -72,3 +74,12 @@ def test_other_arguments_than_the_address_is_for_are_refused():
 
 def test_a_part_can_be_called_from_python_too():
     assert scaled(np.array([1.0, 2.0]), 2.0) == 6.0
+
+
+@compiled_only
+def test_a_law_that_was_pickled_finds_the_stages_of_its_process():
+    law = law_of(load_scenario("paper-deployable"))
+    stages = law.memory.stages
+    assert all(stages)
+    law.memory = law.memory._replace(stages=type(stages)())  # as if they were elsewhere
+    assert pickle.loads(pickle.dumps(law)).memory.stages == stages

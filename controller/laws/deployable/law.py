@@ -333,6 +333,11 @@ class DeployableLaw(CompiledLaw):
         )
         self.memory = self.memory._replace(stages=_stages(self.memory, self.gains))
 
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Take what was pickled, but for the addresses of the stages, which are another process's."""
+        vars(self).update(state)
+        self.memory = self.memory._replace(stages=_stages(self.memory, self.gains))
+
     @classmethod
     def for_vehicle(
         cls, vehicle: VehicleModel, gains: Any, desired_quaternion: Array, period: float, n_regions: int
