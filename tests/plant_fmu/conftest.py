@@ -173,7 +173,9 @@ def all_platforms(once):
     pytest.importorskip("ziglang", reason="the build extra is not installed: no binaries for other platforms")
 
     def built(fmi):
-        make = lambda folder: build_fmu(load_vehicle("odin"), fmi, folder / "odin.fmu", "all")  # noqa: E731
+        def make(folder):
+            build_fmu(load_vehicle("odin"), fmi, folder / "odin.fmu", "all")
+
         return once(f"all-platforms-{fmi}", make) / "odin.fmu"
 
     return built

@@ -97,7 +97,10 @@ def test_libraries_of_other_sources_are_not_taken(no_compiler, tmp_path, monkeyp
 
     if change == "source":
         files = sources._files
-        changed = lambda place: {name: data + b"\n" * (name == "instance.c") for name, data in files(place).items()}  # noqa: E731
+
+        def changed(place):
+            return {name: data + b"\n" * (name == "instance.c") for name, data in files(place).items()}
+
         monkeypatch.setattr(sources, "_files", changed)
     elif change == "flag":
         monkeypatch.setattr(libraries, "FLAGS", (*libraries.FLAGS, "-Os"))

@@ -113,9 +113,9 @@ def step(
     copy(seen.velocity, velocity[:3])
     copy(memory.omega, velocity[3:])
     look(memory.sight, regions, seen.position, memory.quaternion, velocity)
-    part = period / (period + gains.smoothing)
+    share = period / (period + gains.smoothing)
     for axis in range(3):
-        memory.pushed[axis] += part * (acceleration[axis] - free[axis] - memory.pushed[axis])
+        memory.pushed[axis] += share * (acceleration[axis] - free[axis] - memory.pushed[axis])
     _force_of(dynamics, R, memory.pushed, wrench)
     _soft_forces(memory.sight, regions, memory.weights, R, dynamics, wrench)
     call(memory.stages.aim, attitude_loop.aim, (memory.attitude, regions, seen.position, gains, period))
