@@ -23,7 +23,7 @@ class MavProxy:
     """The process, and all that it has printed."""
 
     def __init__(self, python, folder, port):
-        self.text, self.began = "", time.monotonic()
+        self.folder, self.text = folder, ""
         self.process = subprocess.Popen(
             [python, "-u", python.parent / "mavproxy.py", f"--master=udpin:127.0.0.1:{port}",
              f"--state-basedir={folder}", f"--default-modules={MODULES}"],
@@ -50,6 +50,14 @@ class MavProxy:
                 return found
             time.sleep(0.05)
         raise AssertionError(f"{pattern!r} was not seen in:\n{self.text[-3000:]}")
+
+    def parameters(self, count):
+        """Return the text of the file that it writes after it has told of so many parameters."""
+        file, end = self.folder / "mav.parm", time.monotonic() + PATIENCE
+        while (text := file.read_text() if file.exists() else "").count("\n") < count and time.monotonic() < end:
+            time.sleep(0.05)
+        assert text.count("\n") == count
+        return text
 
     def do(self, line, *patterns):
         """Type a line and return the matches of what is to be printed after it."""
@@ -82,13 +90,13 @@ def test_a_pilot_connects_arms_changes_modes_and_lists_what_there_is(ardupilots_
             with contextlib.suppress(AssertionError) if attempt < 2 else contextlib.nullcontext():
                 mavproxy.see(rf"Received {received} parameters", since, patience=30.0)
                 break
-        assert (tmp_path / "mav.parm").read_text().count("\n") == received
+        parameters = mavproxy.parameters(received)
 
         mavproxy.do("disarm", "DISARMED")
         mavproxy.do("arm throttle", "COMPONENT_ARM_DISARM: ACCEPTED", r"(?<!DIS)ARMED")
         for mode in ("POSHOLD", "MANUAL", "SURFACE", "GUIDED"):
             mavproxy.do(f"mode {mode}", f"Mode {mode}")
-        name, before = re.search(r"^(\S+)\s+([\d.]+)", (tmp_path / "mav.parm").read_text(), re.MULTILINE).groups()
+        name, before = re.search(r"^(\S+)\s+([\d.]+)", parameters, re.MULTILINE).groups()
         mavproxy.do(f"param show {name}", rf"{name}\s+{float(before):.6f}")
         mavproxy.do("wp list", r"Requesting 0 waypoints|Have 0 waypoints|Saved \d+ waypoints|\d+ waypoints")
         mavproxy.do("status", r"MAV Errors: 0", r"SYS_STATUS", r"HOME_POSITION")
