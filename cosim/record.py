@@ -24,7 +24,8 @@ PARTS = "record.parts"  # what a killed run leaves
 _WHOLE = "whole"  # among them, what a finished run makes of them
 _PART_SECONDS = 1.0  # of the wall clock, after which a part is written even if it is small
 _BLOCK = 10_000  # rows that are read at once
-_KEPT = 24  # signals that a record keeps in memory
+_SMALL = 2**23  # numbers of a record that is read as a whole,
+_KEPT = 24  # and signals that a larger one keeps in memory
 
 
 class Recorder:
@@ -161,6 +162,7 @@ class Record:
                 raise RunError(f"{file}: has other columns than {self._files[0].name}, expected parts of one record")
         self.columns = columns[0]
         self.units: dict[str, str] = {column.name: column.unit for column in self.columns}
+        self._small = rows * len(self.columns) <= _SMALL  # one signal takes a tenth of the time that all take
         self._kept: OrderedDict[str, Array] = OrderedDict()
 
     def __getitem__(self, name: str) -> Array:
@@ -168,9 +170,13 @@ class Record:
         if name not in self.units:
             raise KeyError(name)
         if name not in self._kept:
-            self._kept[name] = np.concatenate([_column(file, name) for file in self._files])
+            names = list(self.units) if self._small else [name]
+            parts = [_read(file, names) for file in self._files]
+            self._kept.update(
+                {n: np.concatenate([np.empty(0), *(c for part in parts for c in part[n])]) for n in names}
+            )
         self._kept.move_to_end(name)
-        while len(self._kept) > _KEPT:
+        while len(self._kept) > _KEPT and not self._small:
             self._kept.popitem(last=False)
         return self._kept[name]
 
@@ -231,11 +237,11 @@ def _column_of(field: pa.Field) -> Column:
     return Column(field.name, about.get(b"unit", b"").decode(), about.get(b"description", b"").decode())
 
 
-def _column(file: Path, name: str) -> Array:
+def _read(file: Path, names: list[str]) -> dict[str, list[Array]]:
+    """Return the pieces of each signal."""
     with _opened(file) as parquet:  # pq.read_table takes three times as long to begin
-        # not to_numpy, as above
-        column: Array = np.concatenate([np.empty(0), *map(_numbers, parquet.read([name])[name].chunks)])
-    return column
+        table = parquet.read(names)
+        return {name: [_numbers(chunk) for chunk in table[name].chunks] for name in names}  # not to_numpy, as above
 
 
 def _numbers(column: pa.Array) -> Array:

@@ -101,10 +101,10 @@ def cached_fmu(what: Vehicle | Component, fmi: int) -> Path:
         As `build_fmu`.
     """
     require_version(fmi)
-    component, key = _component(what), _digest(what, fmi)[:16]
-    path = Path(platformdirs.user_cache_dir("subreach")) / "fmu" / f"{component.name}-fmi{fmi}-{key}.fmu"
+    path = Path(platformdirs.user_cache_dir("subreach")) / "fmu" / f"{what.name}-fmi{fmi}-{_digest(what, fmi)[:16]}.fmu"
     if zipfile.is_zipfile(path):  # one that was damaged is built anew
         return path
+    component = _component(what)
     if prebuilt_libraries(component, token(component, fmi), fmi, [native_platform()]) is None:
         find_compiler()  # so that a missing compiler is said before anything is written
     try:

@@ -6,7 +6,7 @@ import io
 import unicodedata
 import zipfile
 import zlib
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from pathlib import Path, PurePosixPath
 from xml.etree import ElementTree as ET
@@ -76,8 +76,8 @@ def opened(path: Path) -> Iterator[zipfile.ZipFile]:
         raise FmuFileError(f"{path}: is no FMU: {error}; expected a whole zip file") from error
 
 
-def unpack(path: Path, folder: Path) -> ET.Element:
-    """Extract an FMU, none of whose files leaves the folder, and return its model description.
+def unpack(path: Path, folder: Path, platforms: Collection[str]) -> ET.Element:
+    """Extract what a run needs of an FMU, none of whose files leaves the folder, and return its model description.
 
     Parameters
     ----------
@@ -85,6 +85,8 @@ def unpack(path: Path, folder: Path) -> ET.Element:
         The FMU.
     folder : Path
         Empty, and of this user alone.
+    platforms : collection of str
+        Folders of the binaries that are needed. Documents and sources never are: no library can count on them.
 
     Returns
     -------
@@ -98,8 +100,13 @@ def unpack(path: Path, folder: Path) -> ET.Element:
     """
     with opened(path) as archive:
         root = descriptions(path, archive)
-        archive.extractall(folder)
+        archive.extractall(folder, [name for name in archive.namelist() if _is_needed(name, platforms)])
     return root
+
+
+def _is_needed(name: str, platforms: Collection[str]) -> bool:
+    top, *below = name.split("/")
+    return below[0] in platforms if top == "binaries" and below else top not in ("documentation", "sources")
 
 
 def descriptions(path: Path, archive: zipfile.ZipFile) -> ET.Element:

@@ -82,7 +82,8 @@ def variables(vehicle: Vehicle) -> list[Variable]:
                 f"{vehicle.name}: {v.name} is {v.start:g} {v.quantity.unit}, expected {least:g} to {most:g}"
             )
     names = [v.name for v in rows if v.role in ("time", "state", "input", "parameter")]
-    return [replace(v, depends=_expand(v.depends, names)) for v in rows]
+    depends = {patterns: _expand(patterns, names) for patterns in {v.depends for v in rows}}  # many have the same
+    return [replace(v, depends=depends[v.depends]) for v in rows]
 
 
 def _expand(patterns: tuple[str, ...], names: list[str]) -> tuple[str, ...]:

@@ -101,7 +101,7 @@ class Instance:
 
     def _load(self, path: Path, folder: str, loaded: list[Any]) -> None:
         try:
-            root = unpack(path, Path(folder))
+            root = unpack(path, Path(folder), {fmpy.platform, fmpy.platform_tuple})
             require_sane(path, root)
         except FmuFileError as error:
             raise PlantError(str(error)) from error

@@ -106,7 +106,7 @@ def test_no_member_is_written_over_another(tmp_path, read, pair):
 def test_a_folder_may_be_named_twice(tmp_path):
     path = archive(tmp_path / "it.fmu", [("resources/", ""), ("resources/a", "x"), ("resources/", "")])
     assert read_fmu(path).fmi == 3
-    unpacking.unpack(path, tmp_path / "folder")
+    unpacking.unpack(path, tmp_path / "folder", ())
     assert (tmp_path / "folder" / "resources" / "a").read_text() == "x"
 
 
@@ -275,11 +275,22 @@ def test_libraries_that_are_none_of_an_fmu(tmp_path, no_fmu):
 
 def test_what_is_extracted_is_for_its_owner_alone(monkeypatch):
     made = []
-    monkeypatch.setattr(instance, "unpack", lambda path, folder: made.append(folder) or unpacking.unpack(path, folder))
+    monkeypatch.setattr(instance, "unpack", lambda *of: made.append(of[1]) or unpacking.unpack(*of))
     plant = Plant("odin")
     assert stat.S_IMODE(made[0].stat().st_mode) == 0o700
     plant.close()
     assert not made[0].exists()
+
+
+def test_only_what_a_run_needs_is_extracted(tmp_path):
+    members = ["binaries/x86_64-linux/it.so", "binaries/x86_64-linux/of/it.so", "binaries/aarch64-linux/it.so",
+               "documentation/index.html", "sources/it.c", "resources/sources/it.c", "extra/it/a.xml"]  # fmt: skip
+    path = archive(tmp_path / "it.fmu", [(name, "x") for name in members])
+    unpacking.unpack(path, tmp_path / "folder", ["linux64", "x86_64-linux"])
+    found = {file.relative_to(tmp_path / "folder").as_posix() for file in (tmp_path / "folder").rglob("*.*")}
+    assert found - {"modelDescription.xml"} == {
+        "binaries/x86_64-linux/it.so", "binaries/x86_64-linux/of/it.so", "resources/sources/it.c", "extra/it/a.xml"
+    }  # fmt: skip
 
 
 def test_no_binary_of_another_folder_is_loaded(tmp_path):
