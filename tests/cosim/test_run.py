@@ -184,14 +184,17 @@ def test_a_slow_run_is_written_by_the_clock(tmp_path, monkeypatch):
     assert len(load_record(tmp_path)["time"]) >= 30
 
 
-def test_a_record_keeps_few_signals_in_memory(tmp_path):
+@pytest.mark.parametrize("most", [199, 200])
+def test_a_large_record_keeps_few_signals_in_memory_and_a_small_one_all(tmp_path, monkeypatch, most):
+    monkeypatch.setattr("cosim.record._SMALL", most)
     columns = [Column(f"c{i}", "", "x") for i in range(100)]
     recorder = Recorder(tmp_path, columns)
-    recorder.observe(0, np.arange(100.0))
+    for k in range(2):
+        recorder.observe(k, np.arange(100.0) + k)
     recorder.close()
     record = load_record(tmp_path)
-    assert [record[c.name][0] for c in columns] == list(range(100))
-    assert len(record._kept) < 30
+    assert [list(record[c.name]) for c in columns] == [[i, i + 1.0] for i in range(100)]
+    assert len(record._kept) == (24 if most < 200 else 100)
     with pytest.raises(KeyError):
         record["nothing"]
 
