@@ -17,6 +17,8 @@ comma := ,
 COMPILER := $(if $(shell command -v cc),,build)
 EXTRAS := mavlink,importers,dev$(addprefix $(comma),$(COMPILER))
 PYTEST_FLAGS ?=
+# tests start hundreds of processes: where bytecode is not kept, each compiles what it imports again
+export PYTHONDONTWRITEBYTECODE =
 
 .PHONY: run test lint coverage mutation mutation-sample docs bench dist packaging lowest clean
 

@@ -7,6 +7,7 @@ import hashlib
 import logging
 import os
 import stat
+import types
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar
@@ -94,13 +95,20 @@ class _Part(CPUDispatcher):
     """A compiled function without what Python needs to call it: Numba would crash where Python does."""
 
     def __call__(self, *arguments: Any) -> Any:
-        """Call it by way of another one, which is made now."""
-        return _caller_of(self)(*arguments)
+        """Call its twin that has all that is needed, which is made now."""
+        return _callable(self)(*arguments)
 
 
 @functools.cache
-def _caller_of(function: Any) -> Any:
-    return numba.njit(lambda *arguments: function(*arguments))  # noqa: PLW0108 - a caller of it, not itself
+def _callable(part: _Part) -> Any:
+    """Return the same function compiled for Python, too, under a name of its own on disk."""
+    function = part.py_func
+    twin = types.FunctionType(
+        function.__code__, function.__globals__, function.__name__, function.__defaults__, function.__closure__
+    )
+    twin.__qualname__ = f"{function.__qualname__}_for_python"
+    twin.__module__ = function.__module__
+    return lean(twin)
 
 
 def _kept_on_disk(function: F, others: tuple[Path, ...], *, counting: bool, **without: bool) -> F:

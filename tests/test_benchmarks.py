@@ -23,8 +23,6 @@ from plant_fmu import Plant, cached_fmu, load_vehicle
 from plant_fmu.importers import IMPORTERS, Task, read_fmu, run_importer
 from tests.plant_fmu.conftest import STATES
 
-_LONG = ("fmu", "law", "mavlink", "sitl", "view")
-
 
 @pytest.fixture
 def here(monkeypatch):
@@ -36,9 +34,8 @@ def here(monkeypatch):
 # ---- the tables ----
 
 
-@pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=pytest.mark.slow) if name in _LONG else name for name in BENCHMARKS]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("name", BENCHMARKS)
 def test_each_benchmark_prints_a_table(name, capsys, tmp_path):
     main([name, "--steps", "60", "--repeats", "2", "--json", str(tmp_path / "figures.json")])
     lines = capsys.readouterr().out.splitlines()
@@ -177,6 +174,7 @@ def _setup():
     return {"vehicle": vehicle_numbers("odin"), "step": STEP, "thrust": THRUST, "wrench": WRENCH}
 
 
+@pytest.mark.slow
 def test_the_bodies_of_numpy_and_numba_are_the_same_plant():
     setup = _setup() | {"wrench": [0.5, 1.0, 4.0, 2.0, 0.3, -1.0]}
     theirs = numpy_body.Body(setup["vehicle"])
@@ -198,6 +196,7 @@ def test_the_bodies_of_numpy_and_numba_are_the_same_plant():
     assert np.abs(ours).min() > 0.0
 
 
+@pytest.mark.slow
 def test_the_numpy_plant_is_the_same_plant(tmp_path):
     path = export_numpy_plant(tmp_path)
     if path is None:

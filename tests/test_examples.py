@@ -8,7 +8,6 @@ from pathlib import Path
 import pytest
 
 EXAMPLES = sorted((Path(__file__).parents[1] / "examples").glob("*.py"))
-SLOW = {"fmu_reference.py", "master.py", "own_law.py", "own_vehicle.py"}
 WRITES = {
     "fmu_alone.py": ["bluerov2.fmu"],
     "fmu_reference.py": ["bluerov2_heavy.fmu", "fmu-reference.png"],
@@ -27,11 +26,8 @@ SAYS = {
 PACKAGES = ("controller", "cosim", "fuzzy_arbiter", "plant_fmu")
 
 
-@pytest.mark.parametrize(
-    "example",
-    [pytest.param(path, marks=[pytest.mark.slow] if path.name in SLOW else []) for path in EXAMPLES],
-    ids=lambda p: p.name,
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("example", EXAMPLES, ids=lambda p: p.name)
 def test_runs_and_writes_what_it_says(example, tmp_path):
     if example.name == "telemetry.py":
         pytest.importorskip("pymavlink")

@@ -38,7 +38,8 @@ def test_every_picture_that_is_shown_is_there_and_every_one_there_is_shown():
     assert shown() == {path.name for path in IMAGES.glob("*.png")}
 
 
-@pytest.mark.parametrize("maker", [pytest.param("arbiter", marks=pytest.mark.slow), "fmu"])
+@pytest.mark.slow
+@pytest.mark.parametrize("maker", ["arbiter", "fmu"])
 def test_pictures_are_those_that_their_script_draws(maker, draw):
     from PIL import Image
 

@@ -225,6 +225,7 @@ def test_command_succeeds_where_nothing_fails(capsys):
     assert "nothing stands against" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_command_as_json(capsys):
     assert main(["check", "paper", "--set", CLOSED, "--set", "law.gains.sigma_p=0", "--json"]) == 1
     result = json.loads(capsys.readouterr().out)

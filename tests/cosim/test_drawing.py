@@ -88,6 +88,7 @@ def test_every_axis_of_every_figure_has_a_name_and_a_unit(request, name):
                     assert LABELLED.search(axis.get_label_text()), (drawing.name, axis.get_label_text())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["inspection", "drifting"])
 def test_nothing_is_cut_off_and_no_names_overlap(request, name):
     for drawing in drawings(request.getfixturevalue(name)):

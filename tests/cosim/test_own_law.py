@@ -38,6 +38,7 @@ def named(monkeypatch):
     return FunctionLaw(ahead)
 
 
+@pytest.mark.slow
 def test_a_run_by_a_law_of_ones_own_is_whole_and_says_whose_it_is(scenario, named, tmp_path):
     run = run_scenario(scenario, tmp_path / "run", law=named)
     record = load_record(run.folder)

@@ -92,6 +92,7 @@ def test_the_record_is_the_same_to_the_last_bit_whoever_listens(tmp_path):
     assert log.stat().st_size > 10_000
 
 
+@pytest.mark.slow
 def test_what_came_over_the_link_repeats_to_the_last_bit(tmp_path):
     scenario = load_scenario("harbour", ["time.duration=2", "commands.enabled=true", "commands.await_arm=true"])
     target = mavlink.MAVLink_set_position_target_local_ned_message(0, 1, 1, 1, 0b110111111000, 2, -1, 2, *[0] * 8)

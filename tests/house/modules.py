@@ -18,12 +18,18 @@ FILES = {_name(path): path for package in PACKAGES for path in sorted((ROOT / pa
 
 
 @cache
+def tree_of(path: Path) -> ast.Module:
+    """The parsed file."""
+    return ast.parse(path.read_text(encoding="utf-8"))
+
+
+@cache
 def imported(module: str, *, at_once: bool = False) -> frozenset[str]:
     """What a module imports, by full name: modules of the house, and others as written.
 
     `at_once` leaves out what stands inside functions and under ``if TYPE_CHECKING``.
     """
-    tree = ast.parse(FILES[module].read_text())
+    tree = tree_of(FILES[module])
     return frozenset(name for node in _nodes(tree, at_once) for name in _names(node))
 
 

@@ -6,9 +6,12 @@ from collections.abc import Iterator
 from functools import cache
 
 import griffe
+import pytest
 
 from tests.house import public
-from tests.house.modules import FILES
+from tests.house.modules import FILES, tree_of
+
+pytestmark = pytest.mark.slow  # to read all of the code takes seconds
 
 # words of a name that make a number a physical quantity
 KINDS = re.compile(
@@ -97,7 +100,7 @@ def physical(name: str, kind: object) -> bool:
 
 @cache
 def _definitions(module: str) -> dict[int, ast.AST]:
-    tree = ast.parse(FILES[module].read_text())
+    tree = tree_of(FILES[module])
     nodes = [node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef)]
     return {min([node.lineno, *(d.lineno for d in node.decorator_list)]): node for node in nodes}
 

@@ -172,6 +172,7 @@ def test_what_is_optional_or_heavy_is_taken_in_one_place():
     assert not OPTIONAL & users.keys() - ONE_PLACE.keys(), "an optional library with no place of its own"
 
 
+@pytest.mark.slow
 def test_the_base_install_imports_all_but_what_wants_an_extra():
     modules = [module for module in FILES if not module.endswith("__main__")]
     code = _IMPORT_ALL.format(optional=OPTIONAL, modules=modules)
@@ -179,6 +180,7 @@ def test_the_base_install_imports_all_but_what_wants_an_extra():
     assert set(done.stdout.split()) == WANT_AN_EXTRA, done.stderr
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("what", "without"),
     [

@@ -55,6 +55,7 @@ def test_two_builds_give_the_same_bytes(tmp_path, fmi, compiler, monkeypatch, al
     assert not [place for place in places if place.encode() in library]
 
 
+@pytest.mark.slow
 def test_command_line_builds(tmp_path, capsys):
     out = tmp_path / "mine.fmu"
     assert main(["build", "--vehicle", "bluerov2_heavy", "--fmi", "2", "--out", str(out)]) == 0

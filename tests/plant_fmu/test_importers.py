@@ -64,6 +64,7 @@ def test_the_motion_is_in_all_six_degrees_of_freedom(fmu):
     assert all(abs(values[f"velocity.{axis}"]) > 1e-3 for axis in "uvwpqr")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["libcosim", "Ecos"])
 def test_co_simulation_agrees(name, fmu):
     if objection := IMPORTER[name].objection(fmu):

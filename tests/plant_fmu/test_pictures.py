@@ -58,6 +58,7 @@ def extents(figure):
     return {f"{text.get_text()} {i}": text.get_window_extent(canvas.get_renderer()) for i, text in enumerate(texts)}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("picture", PICTURES)
 @pytest.mark.parametrize("name", VEHICLES)
 def test_no_text_is_cut_off_or_covers_another(name, picture):
@@ -99,6 +100,7 @@ def test_rows_say_indices_parts_units_and_types():
     assert rows["seed"] == (1, "integer")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("suffix", ["png", "svg"])
 def test_a_picture_is_the_same_file_each_time(suffix):
     vehicle = load_vehicle("odin")

@@ -1,14 +1,11 @@
 """What no file of the product does, beyond what the linter sees."""
 
 import ast
-from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).parents[2]
-FILES = sorted(
-    p for package in ("fuzzy_arbiter", "plant_fmu", "controller", "cosim") for p in (ROOT / package).rglob("*.py")
-)
+from tests.house.modules import FILES, ROOT, tree_of
+
 MODULES = {"pickle", "marshal", "shelve", "dill", "cloudpickle", "joblib", "yaml", "telnetlib", "ftplib", "xmlrpc"}
 CALLS = {"eval", "exec", "compile", "__import__", "input"}
 MAY = {
@@ -28,15 +25,15 @@ ZIPS = {
 
 def calls_in(path):
     """Return the dotted names of what a file calls, with the names of the arguments."""
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    for node in ast.walk(tree_of(path)):
         if isinstance(node, ast.Call):
             yield ast.unparse(node.func), {k.arg: ast.unparse(k.value) for k in node.keywords}
 
 
-@pytest.mark.parametrize("path", FILES, ids=lambda p: str(p.relative_to(ROOT)))
+@pytest.mark.parametrize("path", FILES.values(), ids=lambda p: str(p.relative_to(ROOT)))
 def test_nothing_runs_what_it_reads(path):
     name = path.relative_to(ROOT).as_posix()
-    tree = ast.parse(path.read_text(encoding="utf-8"))
+    tree = tree_of(path)
     imported = {a.name.split(".")[0] for n in ast.walk(tree) if isinstance(n, ast.Import) for a in n.names}
     imported |= {(n.module or "").split(".")[0] for n in ast.walk(tree) if isinstance(n, ast.ImportFrom)}
     assert not imported & MODULES
@@ -55,6 +52,6 @@ def test_nothing_runs_what_it_reads(path):
 
 
 def test_no_address_but_of_this_machine_is_a_default():
-    for path in FILES:
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    for path in FILES.values():
+        for node in ast.walk(tree_of(path)):
             assert not (isinstance(node, ast.Constant) and node.value in ("0.0.0.0", "::")), path

@@ -70,6 +70,7 @@ def plain(tmp_path_factory):
     return runs_of(tmp_path_factory, PLAIN)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["report.html", "replay.html"])
 def test_a_title_adds_no_element(attacked, plain, name):
     texts = [(folder / name).read_text(encoding="utf-8") for folder in (attacked, plain)]

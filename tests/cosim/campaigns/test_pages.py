@@ -106,6 +106,7 @@ def test_a_replay_shows_the_flight_of_the_row(flown):
     assert run["status"] == "completed"
 
 
+@pytest.mark.slow
 def test_the_page_is_the_same_again_and_flies_no_replay_again(flown, monkeypatch):
     before = (flown / "campaign.html").read_bytes()
     monkeypatch.setattr("cosim.campaigns.replays.run_scenario", None)
@@ -127,6 +128,7 @@ def test_the_page_is_the_same_from_two_processes(tmp_path, monkeypatch):
     assert pages[0] == pages[1] and "replay" in pages[0]
 
 
+@pytest.mark.slow
 def test_ctrl_c_while_replays_are_flown_leaves_the_page_without_them(tmp_path, monkeypatch):
     out = tmp_path / "out"
     run_campaign(write(tmp_path / "s.jsonl", PLAIN[:2]), "printed", out, BRIEF)
@@ -181,6 +183,7 @@ def test_what_is_no_complete_campaign_has_no_page(tmp_path, fakes):
         write_sweep_page(tmp_path / "out", 0)
 
 
+@pytest.mark.slow
 def test_the_page_of_a_sweep(tmp_path, fakes):
     run_sweep(paper(), design(40), tmp_path / "out", "choosy")
     checker = check(write_sweep_page(tmp_path / "out", 0))
@@ -196,6 +199,7 @@ def test_the_page_of_a_sweep(tmp_path, fakes):
     assert "None of the 3 rows could be flown" in write_sweep_page(tmp_path / "none", 1).read_text()
 
 
+@pytest.mark.slow
 def test_the_page_of_a_comparison_has_all_laws_in_each_replay(tmp_path, idle):
     out = tmp_path / "out"
     compare(write(tmp_path / "s.jsonl", [*HARD[:2], REFUSED]), ["printed", "idle"], out, BRIEF)
@@ -237,6 +241,7 @@ def test_shares_count_what_never_comes():
     assert [a.size for a in shares_up_to(np.zeros(0))] == [0, 0]
 
 
+@pytest.mark.slow
 def test_a_scene_of_a_campaign_becomes_a_run(tmp_path, capsys):
     conditions = Conditions(duration=3.0, settled=1.0)
     inside = HARD[0] | {"goal": {"centre": HARD[0]["start"], "radius": 40.0}}

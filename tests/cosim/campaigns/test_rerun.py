@@ -62,6 +62,7 @@ def test_a_row_of_a_sweep_comes_again_to_the_last_bit_and_as_a_run(folder, tmp_p
         assert record[f"position.{axis}"][-1].as_py() == pytest.approx(row[f"final_{axis}"], abs=1e-9)
 
 
+@pytest.mark.slow
 def test_one_bit_of_difference_is_found_and_an_error(folder, tmp_path, capsys):
     before = pq.read_table(folder / RESULTS)["effort"][2].as_py()
     changed(folder, "effort", 2, math.nextafter(before, math.inf))
@@ -132,6 +133,7 @@ def test_a_scenario_that_was_changed_is_not_flown(folder):
         rerun(folder, 0)
 
 
+@pytest.mark.slow
 def test_a_scene_comes_again_to_the_last_bit(tmp_path, capsys):
     out = tmp_path / "out"
     run_campaign(

@@ -264,6 +264,7 @@ def test_what_the_user_must_mend_is_one_line(tmp_path, capsys, words, said):
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.slow
 def test_the_command_tells_what_came_of_it(tmp_path, fakes, capsys):
     out = tmp_path / "out"
     words = [*WORDS, "--engine", "fake", "--replays", "0"]

@@ -49,6 +49,7 @@ def compare(of, values, seeds):
     return got
 
 
+@pytest.mark.slow
 def test_flights_of_the_paper_are_those_of_the_fused_loop():
     """Each lane with other numbers, and a last batch that does not fill the lanes."""
     of = variation()

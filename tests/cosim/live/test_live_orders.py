@@ -89,6 +89,7 @@ def test_without_commands_every_order_is_refused(live):
     assert not (running.end().folder / "orders.jsonl").exists()
 
 
+@pytest.mark.slow
 def test_a_run_that_repeats_orders_takes_no_others(live, tmp_path):
     (tmp_path / "orders.jsonl").write_text('{"step":20,"order":{"order":"move","region":"ship","by":[0.0,3.0,0.0]}}\n')
     running = live(commands=True, await_arm=False, orders=tmp_path / "orders.jsonl", rate=4.0)
@@ -102,6 +103,7 @@ def test_a_run_that_repeats_orders_takes_no_others(live, tmp_path):
     assert np.array_equal(shift, np.where(time < 0.2, 0.0, 3.0))
 
 
+@pytest.mark.slow
 def test_a_ground_station_and_a_viewer_order_the_same_run(live):
     mavlink = pytest.importorskip("pymavlink.dialects.v20.all", reason="the mavlink extra is not installed")
     from tests.cosim.test_run_on_a_link import Station, command, on

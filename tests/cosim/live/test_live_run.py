@@ -42,6 +42,7 @@ def test_the_record_is_the_same_whoever_watches(live, tmp_path):
     assert np.array_equal(one.column("time")[-5:], other.column("time")[-5:])
 
 
+@pytest.mark.slow
 def test_who_comes_late_gets_what_was(live):
     running = live(rate=2.0)
     with running.viewer() as early:
@@ -55,6 +56,7 @@ def test_who_comes_late_gets_what_was(live):
     assert np.array_equal(early.column("time"), late.column("time"))
 
 
+@pytest.mark.slow
 def test_a_viewer_that_takes_nothing_holds_nobody_up(live, tmp_path):
     running = live(rate=2.0)
     host, port = running.url.removeprefix("http://").strip("/").split(":")
@@ -70,6 +72,7 @@ def test_a_viewer_that_takes_nothing_holds_nobody_up(live, tmp_path):
         assert viewer.column("time")[-1] == 2.0
 
 
+@pytest.mark.slow
 def test_a_reset_begins_another_run_for_the_viewers(live):
     running = live(commands=True, await_arm=False, rate=2.0)
     with running.viewer() as viewer:

@@ -116,6 +116,7 @@ def test_a_run_that_is_being_written_is_followed_to_its_end(paper, tmp_path):
     assert last["time"] == 6.0 and last.ended[0] == "completed"
 
 
+@pytest.mark.slow
 def test_a_live_run_is_watched_to_its_end(live):
     running = live(commands=True, rate=4.0)
     with running.viewer() as viewer:

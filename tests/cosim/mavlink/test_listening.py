@@ -222,6 +222,7 @@ def test_following_ends_after_so_many_messages_or_seconds(link):
     assert len(list(follow(link, watch, period=0.05, seconds=0.2))) >= 2
 
 
+@pytest.mark.slow
 def test_the_command_prints_a_picture():
     port = free_port()
     with (

@@ -167,6 +167,7 @@ def test_the_scenario_within_makes_the_same_file(packed, tmp_path):
     assert package_system(load_scenario(inner), tmp_path / "again.ssp").read_bytes() == packed.read_bytes()
 
 
+@pytest.mark.slow
 def test_a_vehicle_of_ones_own_goes_with_it(packed, tmp_path):
     shipped = resources.files("plant_fmu") / "vehicles" / "odin.toml"
     (tmp_path / "mine.toml").write_text(shipped.read_text().replace('name = "odin"', 'name = "mine"'))

@@ -69,6 +69,7 @@ def test_a_violation_that_lasts_says_so(paper):
     assert told(run, "violation") == [(1.0, "Violates SR3 (soft) to the end, by up to 0.500 m")]
 
 
+@pytest.mark.slow
 def test_chatter_is_told_in_few_words(paper):
     n = 20_000
     odd = np.arange(n) % 2

@@ -48,8 +48,9 @@ def free_port():
         return probe.getsockname()[1]
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(os.name != "posix", reason="sends signals")
-@pytest.mark.parametrize("sent", [signal.SIGTERM, pytest.param(signal.SIGINT, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("sent", [signal.SIGTERM, signal.SIGINT])
 def test_a_signal_ends_it_with_a_readable_run(tmp_path, sent):
     out = tmp_path / "run"
     command = [sys.executable, "-m", "cosim", "sitl", "--vehicle", "bluerov2_heavy", "--no-report"]
