@@ -199,7 +199,13 @@ class CompiledLaw:
         forces : ndarray, shape (6,) or (m,)
             Receives the wrench [N, N m], body frame, or the thruster forces [N], as `output` says.
         """
-        if not all(part.flags.writeable for part in state):  # which compiled code is not made for
+        position, quaternion, velocity, health = state
+        if not (
+            position.flags.writeable
+            and quaternion.flags.writeable
+            and velocity.flags.writeable
+            and health.flags.writeable
+        ):  # which compiled code is not made for
             state = VehicleState(*(part.copy() for part in state))
         type(self).function(state, goal, regions, weights, self.gains, self.memory, forces)
 

@@ -32,6 +32,8 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         for item in items:
             if "slow" in item.keywords:
                 item.add_marker(pytest.mark.skip(reason="slow; run with --slow"))
+    # of two processes one begins with these, and has compiled the laws when the other one comes to them
+    items.sort(key=lambda item: item.path.relative_to(Path(__file__).parent).parts[0] in ("controller", "cosim"))
 
 
 def pytest_collection_finish() -> None:

@@ -77,6 +77,16 @@ def test_a_part_can_be_called_from_python_too():
 
 
 @compiled_only
+def test_to_read_a_scenario_compiles_no_stage(monkeypatch):
+    def told(*_):
+        raise AssertionError("compiles")
+
+    monkeypatch.setattr("controller.laws.deployable.law._stages", told)
+    law = law_of(load_scenario("paper-deployable"))
+    with pytest.raises(AssertionError, match="compiles"):
+        law.memory  # noqa: B018 - an access that does something
+
+
 def test_a_law_that_was_pickled_finds_the_stages_of_its_process():
     law = law_of(load_scenario("paper-deployable"))
     stages = law.memory.stages

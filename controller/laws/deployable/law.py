@@ -5,6 +5,7 @@ estimate -> failed thrusters -> way round -> bounded attraction -> barriers -> q
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
@@ -311,7 +312,7 @@ class DeployableLaw(CompiledLaw):
         self.gains = self.checked(gains)
         desired = checked_quaternion(desired_quaternion)
         m = vehicle.thruster_matrix.shape[1]
-        self.memory = DeployableMemory(
+        self._memory = DeployableMemory(
             period=np.array([checked_period(period)]),
             estimate=np.zeros(4),
             report=np.zeros(len(DIAGNOSTICS)),
@@ -331,12 +332,15 @@ class DeployableLaw(CompiledLaw):
             push=np.zeros((6, m)),
             stages=Stages(),
         )
-        self.memory = self.memory._replace(stages=_stages(self.memory, self.gains))
 
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        """Take what was pickled, but for the addresses of the stages, which are another process's."""
-        vars(self).update(state)
-        self.memory = self.memory._replace(stages=_stages(self.memory, self.gains))
+    @cached_property
+    def memory(self) -> DeployableMemory:
+        """What it carries on, with the addresses of the stages: they are compiled when it is first asked for."""
+        return self._memory._replace(stages=_stages(self._memory, self.gains))
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return what is pickled: not the addresses, which are this process's."""
+        return {name: value for name, value in vars(self).items() if name != "memory"}
 
     @classmethod
     def for_vehicle(
