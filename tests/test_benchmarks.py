@@ -45,7 +45,8 @@ def test_each_benchmark_prints_a_table(name, capsys, tmp_path):
     assert lines[: len(figures["machine"])] == figures["machine"]
     for row, line in zip(table["rows"], lines[-len(table["rows"]) :], strict=True):
         assert row["name"] in line
-        assert row["note"] or all(x > 0.0 for x in row["seconds"])
+        # one step of a law may be shorter than what its clock is uncertain by
+        assert row["note"] or (sum(row["seconds"]) if name == "law" else min(row["seconds"])) > 0.0
 
 
 @pytest.mark.slow
