@@ -172,7 +172,8 @@ def _place(table: dict[str, Any], key: str) -> tuple[Any, Any]:
         if place is None:
             where = ".".join(key.split(".")[:depth])
             said = hint(part, map(str, known)) if known else f"{where} holds no others"
-            raise ScenarioError(f"key {key!r} is unknown: {part!r}; {said}")
+            what = "is unknown" if part == key else f"is unknown: {part!r}"
+            raise ScenarioError(f"key {key!r} {what}; {said}")
         if depth == len(path):
             return at, place
         at = at[place]
