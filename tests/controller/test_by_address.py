@@ -87,6 +87,7 @@ def test_to_read_a_scenario_compiles_no_stage(monkeypatch):
         law.memory  # noqa: B018 - an access that does something
 
 
+@compiled_only
 def test_a_law_that_was_pickled_finds_the_stages_of_its_process():
     law = law_of(load_scenario("paper-deployable"))
     stages = law.memory.stages

@@ -146,6 +146,20 @@ def test_seeds_add_up(make_slave, fmi):
     assert together == pytest.approx(slave.jacobian(unknowns, knowns) @ seed, rel=1e-13)
 
 
+def test_what_drifts_follows_the_time(make_slave):  # in FMI 2.0 the time is no variable
+    slave = make_slave("odin", 3).start(**{"current_variation.y": 0.2, "seed": 42})
+    before = slave.get("water_velocity.y")[0]
+    (slope,) = slave.jacobian(["water_velocity.y"], ["time"])[0]
+    slave.fmu.doStep(0.0, 0.01)
+    assert abs(slope) > 1e-3
+    assert slave.get("water_velocity.y")[0] == pytest.approx(before + 0.01 * slope, rel=1e-9)
+
+
+def test_a_command_of_nothing_has_the_slope_of_the_curve(make_slave, fmi):
+    slave = make_slave("odin", fmi).start(**{"thrust_curve[1]": 0.3, "thrust_time_constant[1]": 0.0})
+    assert slave.jacobian(["thruster_force[1]"], ["thrust[1]"])[0] == pytest.approx([0.7])
+
+
 def test_sampled_values_do_not_follow_the_state(make_slave, fmi):
     slave = make_slave("odin", fmi).start(**{"depth_sensor.rate": 10.0})
     assert slave.jacobian(["measured.depth", "measured.position.z"], ["position.z"]).tolist() == [[0.0], [1.0]]

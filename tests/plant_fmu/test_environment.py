@@ -63,6 +63,20 @@ def test_the_variation_is_a_gauss_markov_process(make_slave, fmi):
         slave.fmu.doStep(t, 0.1)
 
 
+def test_an_axis_that_begins_to_vary_later_begins_from_the_process_s_own_distribution(make_slave, fmi):
+    """At once, which makes a knot of that time, by numbers of a stream of its own."""
+    T, dt, s = 5.0, 0.5, 0.3
+    slave = make_slave(fmi=fmi).start(
+        **{"current_variation.y": 0.2, "current_correlation_time": T, "current_variation_period": dt, "seed": 42}
+    )
+    slave.fmu.doStep(0.0, 0.7)
+    slave.set_values({"current_variation.z": s})
+    slave.fmu.doStep(0.7, 0.4)
+    begin = s * normal(42, 15 + 2 + 3, 2)
+    then = np.exp(-dt / T) * begin + s * np.sqrt(1 - np.exp(-2 * dt / T)) * normal(42, 15 + 2, 3)
+    assert slave.get("water_velocity.z")[0] == pytest.approx(begin + (then - begin) * 0.4 / dt, abs=1e-12)
+
+
 def test_its_deviation_and_correlation_are_those_asked_for(make_slave):
     T, s = 2.0, 0.3
     slave = make_slave().start(

@@ -85,6 +85,16 @@ def test_huge_steps_are_refused(make_slave, fmi):
     refused(slave, lambda: slave.fmu.doStep(0.0, 1e9), "substeps")
 
 
+def test_samples_count_as_substeps_do(make_slave, fmi):
+    slave = make_slave(fmi=fmi).start(**{"substep": 1.0, "depth_sensor.rate": 9e3})
+    refused(slave, lambda: slave.fmu.doStep(0.0, 200.0), "1.8e+06 substeps", "rates of sensors")
+
+
+def test_a_start_that_is_right_is_not_remarked_upon(make_slave, fmi):
+    said = make_slave(fmi=fmi, logging_on=True).start().said
+    assert [text for status, text in said if status > 0] == []
+
+
 def test_steps_start_where_the_plant_is(make_slave, fmi):
     slave = make_slave(fmi=fmi).start()
     refused(slave, lambda: slave.fmu.doStep(5.0, 0.1), "the plant is at 0")

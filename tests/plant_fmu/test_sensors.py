@@ -192,3 +192,19 @@ def test_a_rate_may_change_while_it_runs(make_slave, fmi):
     assert slave.get("measured.depth")[0] == pytest.approx(normal(0, 0, 3))
     slave.step(0.05)
     assert slave.get("measured.depth")[0] == pytest.approx(normal(0, 0, 4))
+
+
+def test_a_sample_a_hair_behind_the_end_of_a_step_makes_it_no_longer(make_slave):
+    slave = make_slave(fmi=3).start(**{"depth_sensor.rate": 100.0 / (1.0 + 5e-10)})
+    slave.step(0.01)
+    assert slave.get("time") == [0.01]
+
+
+def test_late_in_a_long_run_a_sample_just_before_the_end_of_a_step_keeps_its_time(make_slave):
+    slave = make_slave(fmi=3)
+    slave.set_values({"depth_sensor.rate": 1.0 / (0.01 - 1e-6), "velocity.w": 10.0, "position.z": 5.0})
+    slave.fmu.enterInitializationMode(startTime=1000.0)
+    slave.fmu.exitInitializationMode()
+    slave.fmu.doStep(1000.0, 0.01)
+    measured, depth, speed = slave.get("measured.depth", "position.z", "der(position.z)")
+    assert depth - measured == pytest.approx(1e-6 * speed, rel=1e-3)

@@ -68,6 +68,25 @@ def test_forces_are_those_of_quadprog(kind):
         assert forces == pytest.approx(by_quadprog(*given), abs=3e-7 * (1.0 + np.abs(given[-1]).max()))
 
 
+def test_a_row_that_no_thruster_moves_is_paid_for():
+    """Of right - price y <= 0 with the least y: right / price, and forces as they were wanted."""
+    thrusters, wanted = thrusters_of(MODELS["odin"]), np.linspace(-3.0, 4.0, 8)
+    forces, y, _ = ask(thrusters, np.zeros((1, 8)), np.array([0.5]), np.array([1e-6]), wanted)
+    assert forces == pytest.approx(wanted)
+    assert y[0] == pytest.approx(0.5e6)
+
+
+def test_a_row_that_thrusters_hardly_move_is_paid_for_in_part():
+    """(right - row u) = price y and u = wanted + H^-1 row y."""
+    thrusters, wanted, row = thrusters_of(MODELS["odin"]), np.linspace(-3.0, 4.0, 8), np.full((1, 8), 1e-3)
+    forces, y, _ = ask(thrusters, row, np.array([0.5]), np.array([0.02]), wanted)
+    shaped = thrusters.inverse @ row[0]
+    expected = (0.5 - row[0] @ wanted) / (row[0] @ shaped + 0.02)
+    assert 0.0 < row[0] @ shaped < 0.02
+    assert y[0] == pytest.approx(expected)
+    assert forces == pytest.approx(wanted + shaped * expected)
+
+
 @pytest.mark.parametrize("kind", KINDS)
 def test_the_solution_fulfils_the_conditions_of_kuhn_and_tucker(kind):
     """Stationary, within the limits, multipliers >= 0 and only where a row holds; steps within their bound."""

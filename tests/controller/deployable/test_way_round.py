@@ -96,6 +96,24 @@ def test_a_line_is_free_if_dense_sampling_says_so():
     assert search.is_free(START, START, packed, 0.1)
 
 
+def test_a_look_goes_no_farther_than_what_is_known_to_be_free():
+    """Past a small ball, 0.45 m from it at the nearest: a longer look from the start would land behind it."""
+    begin, end, packed = (
+        np.zeros(3),
+        np.array([3.0, 0.0, 0.0]),
+        pack([Region("b", Sphere((1.0, 0.55, 0.0), 0.1), "out")]),
+    )
+    assert not search.is_free(begin, end, packed, 0.5)
+    assert search.is_free(begin, end, packed, 0.4)
+
+
+def test_a_start_closer_to_a_region_than_the_way_may_be_is_left():
+    packed = pack([Region("ball", Sphere((4.0, 0.2, 2.4), 0.7), "out")])  # 0.04 m away
+    start, end = np.array([3.26, 0.2, 2.4]), np.array([-2.0, 0.2, 2.4])
+    rng, tree, way = np.random.default_rng(0), search.tree_of_nothing(), np.zeros((9, 3))
+    assert max(search.grow(tree, start, end, rng.uniform(size=4), packed, GAINS, way) for _ in range(40)) > 0
+
+
 def walk(seed_of_tree, packed, steps):
     """Grow a tree beside a transcription of it, and return ways found."""
     rng, tree, way, found = np.random.default_rng(seed_of_tree), search.tree_of_nothing(), np.zeros((9, 3)), []
