@@ -7,7 +7,7 @@
 # make packaging  what is shipped: its contents, and runs from the wheel in an empty environment
 # make lowest     tests with the lowest versions of all that is needed, on Python 3.11
 # make bench  what things cost, against peers in an environment of their own
-# make mutation         whether the tests notice every changed sign of controller and plant; hours
+# make mutation         whether the tests notice every changed sign of controller and plant; half an hour
 # make mutation-sample  the same of 40 signs, drawn with a fixed seed
 PYTHON ?= python3
 VENV ?= .venv
