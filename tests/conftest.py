@@ -33,7 +33,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
             if "slow" in item.keywords:
                 item.add_marker(pytest.mark.skip(reason="slow; run with --slow"))
     # of two processes one begins with these, and has compiled the laws when the other one comes to them
-    items.sort(key=lambda item: item.path.relative_to(Path(__file__).parent).parts[0] in ("controller", "cosim"))
+    items.sort(key=lambda item: item.nodeid.startswith(("tests/controller/", "tests/cosim/")))
 
 
 def pytest_collection_finish() -> None:
