@@ -98,11 +98,8 @@ def test_a_line_is_free_if_dense_sampling_says_so():
 
 def test_a_look_goes_no_farther_than_what_is_known_to_be_free():
     """Past a small ball, 0.45 m from it at the nearest: a longer look from the start would land behind it."""
-    begin, end, packed = (
-        np.zeros(3),
-        np.array([3.0, 0.0, 0.0]),
-        pack([Region("b", Sphere((1.0, 0.55, 0.0), 0.1), "out")]),
-    )
+    packed = pack([Region("ball", Sphere((1.0, 0.55, 0.0), 0.1), "out")])
+    begin, end = np.zeros(3), np.array([3.0, 0.0, 0.0])
     assert not search.is_free(begin, end, packed, 0.5)
     assert search.is_free(begin, end, packed, 0.4)
 
