@@ -205,7 +205,7 @@ class CompiledLaw:
             and quaternion.flags.writeable
             and velocity.flags.writeable
             and health.flags.writeable
-        ):  # which compiled code is not made for
+        ):  # which compiled code is not made for; a loop over the four takes twice as long, at each step
             state = VehicleState(*(part.copy() for part in state))
         type(self).function(state, goal, regions, weights, self.gains, self.memory, forces)
 
