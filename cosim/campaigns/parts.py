@@ -152,7 +152,9 @@ def _level(file: Path) -> int:
 def _keys(file: Path, schema: Any) -> Any:
     try:
         check_schema(file, schema)
-        return pq.read_table(file, columns=[schema.names[0]])[0].to_numpy()
+        with pq.ParquetFile(file) as parquet:
+            chunks = parquet.read([schema.names[0]])[0].chunks
+            return np.concatenate([np.empty(0, dtype=np.int64), *map(np.from_dlpack, chunks)])
     except (OSError, pa.ArrowException) as error:
         raise RunError(f"{file}: cannot be read: {' '.join(str(error).split())}") from error
 
@@ -253,7 +255,7 @@ class _Reader:
             self._file.close()
         else:
             self._table = pa.Table.from_batches([chunk]).cast(self._schema)
-            self._keys = chunk[0].to_numpy()
+            self._keys = np.from_dlpack(chunk[0])  # not to_numpy: see `cosim.campaigns.columns`
             self.last = int(self._keys[-1])
 
     def up_to(self, bound: int) -> Any:

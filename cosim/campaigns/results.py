@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -12,6 +13,7 @@ import pyarrow.compute as pc
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
+from cosim.campaigns.columns import to_array
 from cosim.campaigns.parts import check_schema
 from cosim.errors import RunError
 from cosim.signals import Array
@@ -37,12 +39,10 @@ class Results:
 
     def __init__(self, path: Path, schema: Any = None) -> None:
         self.path = path
-        try:
+        with self._readable():
             if schema is not None:
                 check_schema(path, schema)
             metadata = pq.read_metadata(path)
-        except (OSError, pa.ArrowException) as error:
-            raise RunError(f"{path}: cannot be read: {' '.join(str(error).split())}") from error
         self.schema = metadata.schema.to_arrow_schema()
         self._rows = int(metadata.num_rows)
 
@@ -51,7 +51,7 @@ class Results:
 
     def __getitem__(self, name: str) -> Any:
         """Return a column, shape (rows,); NaN or None where there is nothing."""
-        return self._read(columns=[name])[name].to_numpy()
+        return to_array(self._read([name])[name])
 
     def number(self, name: str, absent: float = np.nan) -> Array:
         """Return a column of numbers, shape (rows,), with `absent` where there is none."""
@@ -60,26 +60,23 @@ class Results:
 
     def fact(self, name: str) -> NDArray[np.bool_]:
         """Return a column of facts, shape (rows,); what is not known is no fact."""
-        facts: NDArray[np.bool_] = pc.fill_null(self._read(columns=[name])[name], False).to_numpy()
+        facts: NDArray[np.bool_] = self[name].astype(bool)  # None is false
         return facts
 
     def absent(self, name: str) -> NDArray[np.bool_]:
         """Return where a column has nothing, shape (rows,)."""
-        absent: NDArray[np.bool_] = pc.is_null(self._read(columns=[name])[name]).to_numpy()
-        return absent
+        return to_array(pc.is_null(self._read([name])[name]))
 
     def pieces(self, name: str) -> Iterator[list[Any]]:
         """Yield a column some rows at a time, in their order; a RunError if it is not there."""
-        try:
-            with pq.ParquetFile(self.path) as file:
-                for batch in file.iter_batches(_PIECE, columns=[name]):
-                    yield batch.column(0).to_pylist()
-        except (OSError, pa.ArrowException) as error:
-            raise RunError(f"{self.path}: cannot be read: {' '.join(str(error).split())}") from error
+        with self._readable(), pq.ParquetFile(self.path) as file:
+            for batch in file.iter_batches(_PIECE, columns=[name]):
+                yield batch.column(0).to_pylist()
 
     def row(self, key: int) -> dict[str, Any] | None:
         """Return the row of a key, None if there is none."""
-        rows = self._read(filters=[(self.schema.names[0], "=", key)]).to_pylist()
+        with self._readable():
+            rows = pq.read_table(self.path, filters=[(self.schema.names[0], "=", key)]).to_pylist()
         return dict(rows[0]) if rows else None
 
     @property
@@ -87,8 +84,13 @@ class Results:
         """All of it, a pyarrow.Table."""
         return self._read()
 
-    def _read(self, **how: Any) -> Any:
+    def _read(self, names: list[str] | None = None) -> Any:
+        with self._readable(), pq.ParquetFile(self.path) as file:
+            return file.read(names)
+
+    @contextlib.contextmanager
+    def _readable(self) -> Iterator[None]:
         try:
-            return pq.read_table(self.path, **how)
+            yield
         except (OSError, pa.ArrowException) as error:
             raise RunError(f"{self.path}: cannot be read: {' '.join(str(error).split())}") from error

@@ -6,8 +6,10 @@ import math
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
+import numpy as np
 import pyarrow as pa
 
+from cosim.campaigns.columns import of_numbers, of_texts
 from cosim.scene_run import Score
 
 
@@ -40,6 +42,7 @@ _COLUMNS = (  # name, type, unit, description
     ("refused", pa.string(), "", "Why the scene was not flown; null if it was"),
     ("scene", pa.string(), "", "The scene itself, as a line of JSON"),
 )
+_DTYPES = {pa.int64(): np.int64, pa.float64(): np.float64, pa.bool_(): np.bool_}
 _MAY_BE_NULL = (pa.float64(), pa.string())
 SCHEMA: Any = pa.schema(
     [
@@ -95,4 +98,12 @@ def _number(x: float) -> float | None:
 
 def table_of(rows: Sequence[Row]) -> Any:
     """Return rows as a table of `SCHEMA`."""
-    return pa.Table.from_pylist([row._asdict() for row in rows], schema=SCHEMA)
+    columns = [_column(field.type, [row[i] for row in rows]) for i, field in enumerate(SCHEMA)]
+    return pa.Table.from_arrays(columns, schema=SCHEMA)
+
+
+def _column(kind: Any, values: list[Any]) -> Any:
+    if kind == pa.string():
+        return of_texts(values)
+    absent = np.array([value is None for value in values], dtype=bool)
+    return of_numbers(np.array([0 if value is None else value for value in values], _DTYPES[kind]), absent)

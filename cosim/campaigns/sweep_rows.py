@@ -15,6 +15,7 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
+from cosim.campaigns.columns import of_numbers, of_texts
 from cosim.campaigns.design import Design
 from cosim.campaigns.plan import SWEEP, code_digest, versions
 from cosim.campaigns.work import Rows
@@ -87,9 +88,9 @@ def table_of(keys: tuple[str, ...], batch: SweepBatch, flown: Flown) -> Any:
     outcomes = []
     for name, (kind, _, _) in FIELDS.items():
         column = flown.outcomes[name]
-        outcomes.append(pa.array(column, mask=refused | (np.isnan(column) if kind is np.float64 else False)))
-    reasons = pa.array([flown.refused.get(i) for i in range(len(batch.rows))], pa.string())
-    columns = [pa.array(batch.rows), *map(pa.array, batch.values.T.copy()), pa.array(batch.seeds), *outcomes, reasons]
+        outcomes.append(of_numbers(column, refused | (np.isnan(column) if kind is np.float64 else False)))
+    reasons = of_texts([flown.refused.get(i) for i in range(len(batch.rows))])
+    columns = [of_numbers(batch.rows), *map(of_numbers, batch.values.T), of_numbers(batch.seeds), *outcomes, reasons]
     return pa.Table.from_arrays(columns, schema=schema_of(keys))
 
 
