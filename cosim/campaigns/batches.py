@@ -10,7 +10,7 @@ import numpy as np
 from cosim.campaigns.work import Rows
 
 FIRST = 1  # rows in the first batch, before anybody knows how long a row takes
-TARGET = 0.25  # s of work in a batch: what a kill can cost of each worker
+TARGET = 1.0  # s of work in a batch: it is sent, written and merged by one process, whatever the number of workers
 LEAST = 0.05  # s of work in the small batches at the end, where workers would wait for each other
 GROWTH = 4  # times the batch before, at the most: the first ones hold the time of compiling
 EVEN = 16  # a batch of more rows is a multiple of this, for engines that fly rows side by side
@@ -77,7 +77,9 @@ class Batches:
         """Have a batch flown again, next."""
         self._back.append(batch)
 
-    def measured(self, rows: int, seconds: float, stretch: float = 1.0) -> None:
-        """Take note of how long a batch took, and make the next ones so many times as long as usual."""
+    def measured(self, rows: int, seconds: float) -> None:
+        """Take note of how long a batch took; one that is small by now may be a worker's first, and tells less."""
+        if rows * GROWTH < self._size:
+            return
         self._row_time = max(seconds, 1e-9) / rows
-        self._size = int(np.clip(stretch * TARGET / self._row_time, 1, min(GROWTH * max(rows, self._size), GREATEST)))
+        self._size = int(np.clip(TARGET / self._row_time, 1, min(GROWTH * max(rows, self._size), GREATEST)))

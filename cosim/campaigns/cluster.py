@@ -15,7 +15,6 @@ from cosim.campaigns.work import Task
 from cosim.campaigns.worker import fly, release
 from cosim.errors import RunError
 
-_STRETCH = 4.0  # times as long as usual is a batch: each passes through client, scheduler and worker, there and back
 _QUEUED = 2  # batches a thread of a worker, so that none waits for work
 _LOOK = 5.0  # s between looks at how many workers there are: they may come and go
 _PATIENCE = 30.0  # s for the first worker, and without any
@@ -46,8 +45,6 @@ class Cluster:
     executor : distributed.cfexecutor.ClientExecutor
         Of its client.
     """
-
-    stretch = _STRETCH
 
     def __init__(self, executor: Any) -> None:
         import distributed

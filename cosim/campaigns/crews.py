@@ -13,7 +13,7 @@ from multiprocessing import resource_tracker
 from typing import Any, Protocol
 
 from cosim.campaigns.work import Task
-from cosim.campaigns.worker import begin_worker, fly
+from cosim.campaigns.worker import begin_worker, fly, prepare
 from cosim.errors import RunError
 
 FATAL = 3  # processes that may die of a batch before it is taken apart
@@ -32,10 +32,6 @@ class Death:
 
 class Crew(Protocol):
     """Flies batches somewhere."""
-
-    @property
-    def stretch(self) -> float:
-        """How many times as long as usual a batch shall take."""
 
     @property
     def width(self) -> int:
@@ -58,7 +54,6 @@ class Here:
     """Nobody but this process: a batch is flown when it is submitted."""
 
     width = 1
-    stretch = 1.0
 
     def submit(self, task: Task, batch: Any) -> Flight:
         """Fly a batch."""
@@ -98,12 +93,13 @@ class Processes:
     ----------
     n : int
         How many.
+    task : Task
+        What they get ready for at once, beside each other.
     """
 
-    stretch = 1.0
-
-    def __init__(self, n: int) -> None:
-        self._hands = [_Hand(_pool()) for _ in range(n)]
+    def __init__(self, n: int, task: Task) -> None:
+        self._task = task
+        self._hands = [self._hand() for _ in range(n)]
         self._hand_of: dict[Flight, _Hand] = {}
 
     @property
@@ -114,12 +110,11 @@ class Processes:
     def submit(self, task: Task, batch: Any) -> Flight:
         """Have a batch flown by the process that has least to do."""
         hand = min(self._hands, key=lambda hand: len(hand.under_way))
-        with interrupts_held():
-            try:
-                flight = hand.pool.submit(fly, task, batch)
-            except BrokenProcessPool:  # it died, and nobody has settled that yet
-                hand = self._replace(hand)
-                flight = hand.pool.submit(fly, task, batch)
+        try:
+            flight = hand.pool.submit(fly, task, batch)
+        except BrokenProcessPool:  # it died, and nobody has settled that yet
+            hand = self._replace(hand)
+            flight = hand.pool.submit(fly, task, batch)
         hand.under_way.append(flight)
         self._hand_of[flight] = hand
         return flight
@@ -141,10 +136,17 @@ class Processes:
         """Be sure to hear of every death."""
 
     def _replace(self, hand: _Hand) -> _Hand:
-        new = _Hand(_pool())
+        new = self._hand()
         self._hands[self._hands.index(hand)] = new
         hand.pool.shutdown(wait=False)
         return new
+
+    def _hand(self) -> _Hand:
+        """Start a process, which it takes a second to get ready."""
+        pool = ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn"), initializer=begin_worker)
+        with interrupts_held():
+            pool.submit(prepare, self._task)
+        return _Hand(pool)
 
     def close(self) -> None:
         """Send everybody home."""
@@ -164,8 +166,6 @@ class Lent:
     workers : int
         How many batches it flies at the same time.
     """
-
-    stretch = 1.0
 
     def __init__(self, executor: Executor, workers: int) -> None:
         self._executor = executor
@@ -195,10 +195,6 @@ class Lent:
 def _broken(error: BaseException) -> RunError:
     said = " ".join(str(error).split()) or type(error).__name__
     return RunError(f"the executor takes no more work ({said}); what is flown is kept")
-
-
-def _pool() -> ProcessPoolExecutor:
-    return ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn"), initializer=begin_worker)
 
 
 def _came_home(flight: Flight) -> bool:

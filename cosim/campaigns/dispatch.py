@@ -70,7 +70,7 @@ def fly_all(work: Work, batches: Batches, crew: Crew) -> Generator[Any, None, No
             batch, came = under_way.pop(flight), crew.settle(flight)
             if not isinstance(came, Death):
                 home, deaths = home + 1, 0
-                batches.measured(len(batch.rows), came[1], crew.stretch)
+                batches.measured(len(batch.rows), came[1])
                 yield came[0]
                 yield from condemned
                 condemned.clear()

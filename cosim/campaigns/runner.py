@@ -21,7 +21,7 @@ from cosim.campaigns.crews import Crew, Here, Lent, Processes
 from cosim.campaigns.dispatch import fly_all
 from cosim.campaigns.folder import CampaignFolder
 from cosim.campaigns.results import Results
-from cosim.campaigns.work import Work
+from cosim.campaigns.work import Task, Work
 from cosim.campaigns.worker import flyer_held
 from cosim.errors import RunError
 
@@ -113,7 +113,7 @@ def _flown(
     left[work.rows_of(folder.keys())] = False
     batches, n, refused = Batches(np.flatnonzero(left)), int(left.sum()), 0
     with (
-        contextlib.closing(_crew(workers, executor) if n else Here()) as crew,
+        contextlib.closing(_crew(work.task, workers, executor) if n else Here()) as crew,
         _bar(work, len(work) - n, progress) as bar,
         contextlib.closing(fly_all(work, batches, crew)) as tables,
     ):
@@ -125,12 +125,12 @@ def _flown(
         log.warning("%d %ss were refused; why is in their column 'refused'", refused, work.unit)
 
 
-def _crew(workers: int, executor: Executor | None) -> Crew:
+def _crew(task: Task, workers: int, executor: Executor | None) -> Crew:
     if executor is not None:
         from cosim.campaigns.cluster import Cluster, is_cluster
 
         return Cluster(executor) if is_cluster(executor) else Lent(executor, workers)
-    return Processes(workers) if workers > 1 else Here()
+    return Processes(workers, task) if workers > 1 else Here()
 
 
 def _tell(table: Any, before: int) -> int:

@@ -60,6 +60,18 @@ def fly(task: Task, batch: Any) -> tuple[Any, float]:
         return table, time.perf_counter() - started
 
 
+def prepare(task: Task) -> None:
+    """Make the flyer of a task; if that fails, its first batch says so.
+
+    Parameters
+    ----------
+    task : Task
+        How batches will be flown.
+    """
+    with _held.lock:
+        _held.of(task)
+
+
 def release(patience: float) -> None:
     """Free the flyer of this process.
 
@@ -78,8 +90,7 @@ def release(patience: float) -> None:
 @contextlib.contextmanager
 def flyer_held(task: Task) -> Iterator[None]:
     """Hold a flyer in this process: it says what it cannot do, and what has to be built once is built."""
-    with _held.lock:
-        _held.of(task)
+    prepare(task)
     try:
         yield
     finally:

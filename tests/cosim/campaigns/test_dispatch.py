@@ -28,8 +28,6 @@ class Work:
 class Crew:
     """Flies in order of submission; dies of some rows."""
 
-    stretch = 1.0
-
     def __init__(self, poison=(), width=4, certain=True):
         self.poison, self.width, self.certain = set(poison), width, certain
         self.deaths, self.sent = [], []
@@ -128,8 +126,18 @@ def test_batches_follow_the_time_that_a_row_takes():
         batch = batches.take(4)
         sizes.append(len(batch.rows))
         batches.measured(len(batch.rows), 0.001 * len(batch.rows))
-    assert sizes[0] == 1 and sizes[-1] == 240  # a quarter of a second, in sixteens
+    assert sizes[0] == 1 and sizes[-1] == 992  # a second, in sixteens
     assert all(after <= 4 * before for before, after in zip(sizes, sizes[1:], strict=False))
+
+
+def test_the_first_batch_of_a_further_worker_does_not_make_batches_small():
+    batches = Batches(np.arange(100_000))
+    for _ in range(12):
+        rows = len(batches.take(4).rows)
+        batches.measured(rows, 0.001 * rows)
+    size = len(batches.take(4).rows)
+    batches.measured(1, 0.5)  # that worker had to load what it flies with
+    assert len(batches.take(4).rows) == size
 
 
 def test_rows_that_take_long_go_one_by_one():
