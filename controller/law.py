@@ -7,6 +7,7 @@ master, which calls `CompiledLaw.step`, and compiled loops, which call the funct
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Callable, Container
 from dataclasses import dataclass
@@ -17,6 +18,7 @@ from numpy.typing import NDArray
 
 from controller.errors import LawError
 from controller.regions import PackedRegions
+from controller.repeated import Repeated
 
 Array = NDArray[np.float64]
 Output = Literal["wrench", "thrusters"]
@@ -101,6 +103,7 @@ class CompiledLaw:
     diagnostics: tuple[Diagnostic, ...] = ()
     gains: Any
     memory: Any
+    _state: VehicleState | None = None  # of the last step
 
     @classmethod
     def for_vehicle(
@@ -199,15 +202,14 @@ class CompiledLaw:
         forces : ndarray, shape (6,) or (m,)
             Receives the wrench [N, N m], body frame, or the thruster forces [N], as `output` says.
         """
-        position, quaternion, velocity, health = state
-        if not (
-            position.flags.writeable
-            and quaternion.flags.writeable
-            and velocity.flags.writeable
-            and health.flags.writeable
-        ):  # which compiled code is not made for; a loop over the four takes twice as long, at each step
-            state = VehicleState(*(part.copy() for part in state))
-        type(self).function(state, goal, regions, weights, self.gains, self.memory, forces)
+        if state is not self._state and not all(part.flags.writeable for part in state):
+            state = VehicleState(*(part.copy() for part in state))  # compiled code is made for what can be written
+        self._state = state
+        self._step(state, goal, regions, weights, self.gains, self.memory, forces)
+
+    @functools.cached_property
+    def _step(self) -> Repeated:
+        return Repeated(type(self).function)
 
 
 class WrenchLaw(CompiledLaw):

@@ -11,6 +11,7 @@ import numpy as np
 from controller import VehicleState
 from controller.compiled import lean
 from controller.regions import PackedRegions, Shape, Sphere, evaluate_packed, pack
+from controller.repeated import Repeated
 from cosim.errors import OrderError, RunError
 from cosim.scenario import Scenario
 from cosim.scenario_tables import FAR_AWAY, Vector3
@@ -59,6 +60,7 @@ class Surroundings:
         self._origins: Array = np.zeros((len(secondary), 3))
         self._gradients: Array = np.zeros((len(self._names), 3))
         self._turnings: Array = np.zeros((len(self._names), 3))
+        self._evaluate_still, self._evaluate_carried = Repeated(evaluate_packed), Repeated(_evaluate)
 
     @property
     def goal(self) -> PackedRegions:
@@ -95,9 +97,9 @@ class Surroundings:
         """
         p, e, gradients, turnings = state.position, state.quaternion, self._gradients, self._turnings
         if self._still is not None:
-            evaluate_packed(self._still, p, e, values, gradients, turnings, clearances)
+            self._evaluate_still(self._still, p, e, values, gradients, turnings, clearances)
         else:
-            _evaluate(self.goal, self.regions, p, e, values, gradients, turnings, clearances)
+            self._evaluate_carried(self.goal, self.regions, p, e, values, gradients, turnings, clearances)
 
     # ---- moved from outside ----
 
