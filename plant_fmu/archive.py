@@ -79,6 +79,22 @@ def write_archive(out: Path, members: Mapping[str, bytes]) -> None:
     BuildError
         If `out` cannot be written, or is there and is no file.
     """
+    write_whole(out, archive_of(members))
+
+
+def archive_of(members: Mapping[str, bytes]) -> bytes:
+    """Return a zip file.
+
+    Parameters
+    ----------
+    members : mapping of str to bytes
+        Contents by name, with forward slashes.
+
+    Returns
+    -------
+    bytes
+        The same each time.
+    """
     data = io.BytesIO()
     with zipfile.ZipFile(data, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, content in sorted(members.items()):
@@ -87,4 +103,4 @@ def write_archive(out: Path, members: Mapping[str, bytes]) -> None:
             info.create_system = _UNIX
             info.external_attr = 0o644 << 16
             archive.writestr(info, content)
-    write_whole(out, data.getvalue())
+    return data.getvalue()

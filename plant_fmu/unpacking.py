@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import io
 import unicodedata
 import zipfile
@@ -9,6 +10,7 @@ import zlib
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from pathlib import Path, PurePosixPath
+from typing import IO
 from xml.etree import ElementTree as ET
 
 from plant_fmu.errors import FmuFileError
@@ -191,15 +193,25 @@ def _parsed(where: str, archive: zipfile.ZipFile, name: str) -> ET.Element:
     size = archive.getinfo(name).file_size
     if size > MAX_XML:
         raise FmuFileError(f"{where} has {size} bytes, expected at most {MAX_XML}")
-    # expat guards its own expansions, and here no document type is let through that could have any
-    parser = ET.XMLParser(target=_Bounded())  # noqa: S314
     try:
         with archive.open(name) as source:
-            while piece := source.read(_PIECE):
-                parser.feed(piece)
-        root: ET.Element = parser.close()
+            return _tree_of(source.read()) if size <= _PIECE else _tree(source)
     except ET.ParseError as error:
         raise FmuFileError(f"{where} is no XML that can be read: {error}") from error
     except (LookupError, ValueError) as error:  # an encoding that is not known, or not as it says
         raise FmuFileError(f"{where} is no XML that can be read: {' '.join(str(error).split())}") from error
+
+
+@functools.lru_cache(maxsize=16)
+def _tree_of(content: bytes) -> ET.Element:
+    """Return the root of a document, to be read alone; one FMU is often opened again and again."""
+    return _tree(io.BytesIO(content))
+
+
+def _tree(source: IO[bytes]) -> ET.Element:
+    # expat guards its own expansions, and here no document type is let through that could have any
+    parser = ET.XMLParser(target=_Bounded())  # noqa: S314
+    while piece := source.read(_PIECE):
+        parser.feed(piece)
+    root: ET.Element = parser.close()
     return root

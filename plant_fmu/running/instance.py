@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+import io
 import logging
 import os
 import shutil
@@ -18,9 +20,10 @@ from fmpy.fmi2 import FMU2Slave, fmi2CallbackFunctions, fmi2CallbackLoggerTYPE
 from fmpy.fmi2 import defaultCallbacks as default_callbacks
 from fmpy.fmi3 import FMU3Slave
 
+from plant_fmu.archive import archive_of
 from plant_fmu.errors import FmuFileError, PlantError
 from plant_fmu.model_limits import require_sane
-from plant_fmu.unpacking import unpack
+from plant_fmu.unpacking import DESCRIPTION, unpack
 
 log = logging.getLogger(__name__)
 
@@ -116,7 +119,7 @@ class Instance:
             name for name, keys in _CAPABILITIES.items() if interface.get(keys[self.fmi - 2]) in ("true", "1")
         }
 
-        description = fmpy.read_model_description(folder)
+        description = _described(Path(folder, DESCRIPTION).read_bytes())
         self.name, self.token = description.modelName, description.guid
         self.variables = {v.name: v for v in description.modelVariables}
         identifier = description.coSimulation.modelIdentifier
@@ -194,6 +197,15 @@ class Instance:
     def close(self) -> None:
         """Free states and instance, unload the library, remove the folder. May be called twice."""
         self._end()
+
+
+@functools.lru_cache(maxsize=16)
+def _described(xml: bytes) -> Any:
+    """Return what FMPy reads in a model description, to be read alone: half of the time that an instance takes to make.
+
+    It wants an FMU, so there is one of nothing else.
+    """
+    return fmpy.read_model_description(io.BytesIO(archive_of({DESCRIPTION: xml})))
 
 
 def _release(loaded: list[Any], states: dict[int, Any], folder: str) -> None:

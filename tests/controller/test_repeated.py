@@ -1,7 +1,6 @@
 """A function called again with the same arrays does what Numba's own call does."""
 
 import copy
-import gc
 from typing import NamedTuple
 
 import numpy as np
@@ -105,7 +104,6 @@ def test_what_is_bound_stays_where_it_is_and_no_more_of_it_than_a_few():
         for _ in range(4):
             call(values, 1.0)
         del values
-        gc.collect()
         assert len(call._bound) <= 8 and len(call._met) <= 8
         for bound in call._bound.values():
             assert bound.words[0] == bound.arguments[0].ctypes.data
