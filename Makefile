@@ -84,6 +84,8 @@ $(VENV)/installed: pyproject.toml
 
 $(VENV)/ready: $(VENV)/installed
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[$(EXTRAS)]'
+	@echo 'Compiling the laws, which takes most of a minute, once'
+	$(BIN)/cosim compile
 	@touch $@
 
 clean:

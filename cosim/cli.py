@@ -14,7 +14,7 @@ import sys
 from collections.abc import Iterator, Sequence
 from threading import current_thread, main_thread
 
-from cosim.command_line import campaigns, export, mavlink, package, replay, report, run, sitl, sweep, watch
+from cosim.command_line import ahead, campaigns, export, mavlink, package, replay, report, run, sitl, sweep, watch
 from cosim.command_line.campaigns import INTERRUPTED
 
 _EPILOG = """examples:
@@ -68,6 +68,7 @@ def _parser() -> argparse.ArgumentParser:
     calibrate = verbs.add_parser("calibrate", help="fit the force limit and lag that bring the paper's window about")
     calibrate.add_argument("--scenario", default="paper", help="scenario to fit (default: paper)")
 
+    ahead.add_verb(verbs)
     export.add_verb(verbs)
     package.add_verb(verbs)
     campaigns.add_verbs(verbs)
@@ -194,6 +195,7 @@ _VERBS = {
     "show": _show,
     "check": _check,
     "calibrate": _calibrate,
+    "compile": ahead.compile_all,
     "export": export.export,
     "package": package.package,
     "campaign": campaigns.campaign,

@@ -30,7 +30,7 @@ ROOMS = {
     "plant_fmu": {"contents": set(), "importers": set(), "pictures": set(), "running": set()},
     "cosim": {
         "campaigns": {"flying", "replay"},
-        "command_line": {"campaigns", "export", "live", "mavlink", "package", "replay", "sitl"},
+        "command_line": {"campaigns", "export", "flying", "live", "mavlink", "package", "replay", "sitl"},
         "export": {"mavlink", "replay"},
         "flying": set(),
         "helm": set(),
