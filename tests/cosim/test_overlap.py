@@ -42,6 +42,7 @@ def test_a_covered_goal_is_known():
     assert overlap.depth == pytest.approx(-0.1, abs=1e-4)  # midway between the surfaces
 
 
+@pytest.mark.slow
 def test_the_band_and_all_else_are_found_by_brute_force_too():
     rng = np.random.default_rng(4)
     for _ in range(4):

@@ -216,6 +216,7 @@ def test_it_does_not_change_and_can_be_copied(arbiter):
     assert arbiter != Arbiter(normalisation="max")
 
 
+@pytest.mark.slow
 def test_threads_do_not_disturb_each_other(arbiter):
     inputs = np.random.default_rng(0).random((4, 40, 3)).tolist()
     expected = [[Arbiter(engine=arbiter.engine)(x) for x in rows] for rows in inputs]
@@ -232,6 +233,7 @@ def test_threads_do_not_disturb_each_other(arbiter):
     assert wrong == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("count", [20, pytest.param(300, marks=pytest.mark.slow)])
 def test_arbiters_leave_nothing_behind(count):
     def build(count):

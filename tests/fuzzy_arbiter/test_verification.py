@@ -333,6 +333,7 @@ def test_a_square_is_not_its_root():
     assert len([f for f in verify(system(rules)).findings if f.about == "rules"]) == 1
 
 
+@pytest.mark.slow
 def test_hundreds_of_rules_with_one_conclusion_are_not_compared():
     v = verify(prioritised([Criterion(f"c{i}") for i in range(7)], "complete"))
     (note,) = [f for f in v.findings if f.about == "rules"]

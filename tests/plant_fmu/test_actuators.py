@@ -9,6 +9,7 @@ from tests.plant_fmu.conftest import WRENCH
 from tests.plant_fmu.test_dynamics import MASS, asymmetric
 
 
+@pytest.mark.parametrize("fmi", [pytest.param(2, marks=pytest.mark.slow), 3], ids=["fmi2", "fmi3"])
 def test_thrusters_saturate_and_say_so(make_slave, fmi):
     slave = make_slave(fmi=fmi).start()
     slave.set_values({"thrust[1]": 30.0, "thrust[2]": -30.0, "thrust[3]": 5.0})

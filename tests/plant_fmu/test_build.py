@@ -205,6 +205,7 @@ def test_a_place_that_cannot_be_written_is_said_before_the_work(tmp_path, monkey
     assert not ran.exists()
 
 
+@pytest.mark.slow
 def test_a_damaged_file_in_the_cache_is_built_anew(tmp_path, monkeypatch):
     good = cached_fmu(load_vehicle("odin"), 3)
     whole = good.read_bytes()

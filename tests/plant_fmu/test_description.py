@@ -23,6 +23,7 @@ ROOT = Path(__file__).parents[2]
 @pytest.mark.parametrize(
     "name", ["odin", *(pytest.param(v, marks=pytest.mark.slow) for v in shipped_vehicles() if v != "odin")]
 )
+@pytest.mark.parametrize("fmi", [pytest.param(2, marks=pytest.mark.slow), 3], ids=["fmi2", "fmi3"])
 def test_fmpy_finds_no_problem(name, fmi):
     assert validate_fmu(str(cached_fmu(load_vehicle(name), fmi))) == []
 

@@ -126,6 +126,7 @@ def run(barrier=None):
     return rows
 
 
+@pytest.mark.slow
 def test_four_threads_give_the_bits_of_one():
     alone = run()
     barrier = threading.Barrier(4)

@@ -51,6 +51,7 @@ def binary(path):
 @pytest.mark.parametrize(
     "vehicle", [name if name == "odin" else pytest.param(name, marks=pytest.mark.slow) for name in shipped_vehicles()]
 )
+@pytest.mark.parametrize("fmi", [pytest.param(2, marks=pytest.mark.slow), 3], ids=["fmi2", "fmi3"])
 def test_the_plant_is_that_of_a_compiler(vehicle, fmi, no_compiler, tmp_path):
     compiled, path = cached_fmu(load_vehicle(vehicle), fmi), build_fmu(load_vehicle(vehicle), fmi, tmp_path / "x.fmu")
     answers = []

@@ -93,6 +93,7 @@ def test_texts_of_a_run_do_not_end_the_script(text):
     assert ours.found == plain.found
 
 
+@pytest.mark.slow
 def test_a_summary_that_somebody_changed_is_only_read(attacked, plain, tmp_path):
     import shutil
 

@@ -203,6 +203,7 @@ TOKENS = st.sampled_from(
 )  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("format", ARBITERS)
 @given(st.data())
 def test_any_change_of_an_arbiter(tmp_path_factory, format, data):

@@ -57,6 +57,7 @@ def random_way(rng):
     return way, count
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("moving", [pytest.param(False, marks=pytest.mark.slow), True])
 def test_a_way_that_costs_no_more_than_its_length_is_clear(moving):
     """And what is found to pass within a region, to more than the least stride, costs metres more."""

@@ -22,7 +22,9 @@ from tests.controller.deployable.scenery import MODELS
 POSE = [*(f"quaternion.e{i}" for i in range(4)), *(f"velocity.{a}" for a in "uvwpqr")]
 
 
-@pytest.mark.parametrize("name", MODELS)
+@pytest.mark.parametrize(
+    "name", [name if name == "odin" else pytest.param(name, marks=pytest.mark.slow) for name in MODELS]
+)
 def test_acceleration_is_that_of_the_plant(name):
     """One FMU step of 0.1 ms at random attitudes, rates and currents, with r_G at the origin as the law takes it."""
     rng, step = np.random.default_rng(3), 1e-4

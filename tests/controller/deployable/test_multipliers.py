@@ -24,6 +24,7 @@ def solved(A, b):
     return rows[:, -1]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["any", "parallel", "contradictory"])
 def test_rounding_is_taken_back(kind):
     """(A H^-1 A^T + diag(rho)) y = b - A u0 over the rows that hold; without the last correction 1e-8 is missed."""

@@ -63,6 +63,7 @@ assert "pandas" not in sys.modules
 """
 
 
+@pytest.mark.slow
 def test_no_sweep_brings_pandas(tmp_path):
     pytest.importorskip("pandas")
     done = subprocess.run([sys.executable, "-c", SWEEP, tmp_path], capture_output=True, text=True, check=False)

@@ -72,11 +72,13 @@ def test_one_bit_of_difference_is_found_and_an_error(folder, tmp_path, capsys):
     assert "identical" not in said.out
 
 
+@pytest.mark.slow
 def test_other_values_than_those_of_the_design_are_found(folder, tmp_path):
     changed(folder, "initial.position.1", 3, 0.25)
     assert list(rerun(folder, 3, tmp_path / "run").differing) == ["initial.position.1"]
 
 
+@pytest.mark.slow
 def test_other_code_is_said(folder, tmp_path, monkeypatch, capsys):
     monkeypatch.setattr("cosim.campaigns.rerun.code_digest", lambda: "other")
     assert main(["rerun", str(folder), "0", "--out", str(tmp_path / "run")]) == 0

@@ -89,6 +89,7 @@ def test_a_reset_begins_another_run_for_the_viewers(live):
     assert running.end().folder.name == "live-2"
 
 
+@pytest.mark.slow
 def test_what_breaks_in_the_view_is_logged_and_the_run_goes_on(live, monkeypatch, caplog):
     def broken(*_):
         raise ZeroDivisionError("made up")

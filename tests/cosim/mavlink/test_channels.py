@@ -204,6 +204,7 @@ def test_clients_are_bounded_and_one_too_many_is_turned_away():
     link.channel.close()
 
 
+@pytest.mark.slow
 def test_a_slow_reader_loses_whole_frames_and_no_other_client_any():
     """Field notes, 3.1.5: 200 000 unread ODOMETRY left 2 torn frames and no word of the rest."""
     link = link_of(TcpIn(HERE, 0))

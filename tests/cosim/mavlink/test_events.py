@@ -99,6 +99,7 @@ def commanding(action, **options):
     return station
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("action", "orders"),
     [("warn", []), ("hold", [Steer("hold")]), ("surface", [Steer("surface")]), ("disarm", [Arm(False)])],

@@ -22,7 +22,7 @@ ALL_SHAPES = Path(__file__).parent / "all-shapes.toml"
 STEP = 0.01
 
 
-@pytest.fixture(scope="module", params=[2, 3], ids=["fmi2", "fmi3"])
+@pytest.fixture(scope="module", params=[pytest.param(2, marks=pytest.mark.slow), 3], ids=["fmi2", "fmi3"])
 def fmi(request):
     return request.param
 

@@ -81,7 +81,7 @@ def test_the_page_on_it_does_what_it_says(tmp_path, monkeypatch, capsys):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("fmi", [2, 3])
+@pytest.mark.parametrize("fmi", [pytest.param(2, marks=pytest.mark.slow), 3])
 @pytest.mark.parametrize("name", ["paper", "paper-limited"])
 @pytest.mark.parametrize("master", ["fmpy", "ecos", "libcosim"])
 def test_masters_fly_the_paper_as_we_do(master, name, fmi, tmp_path):

@@ -108,6 +108,7 @@ def test_a_surface_is_closed_and_its_normals_point_out_of_it(surfaces, name):
     assert volume == pytest.approx(inside.mean() * np.prod(high - low), rel=0.04)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", BOUNDED)
 def test_a_point_is_hidden_where_the_line_from_the_eye_meets_the_shape(name):
     rng = np.random.default_rng(2)

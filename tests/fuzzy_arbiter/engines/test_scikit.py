@@ -162,6 +162,7 @@ def test_all_of_it_is_what_stock_scikit_fuzzy_gives_to_the_last_bit(system):
         assert engine.centroids(row) == expected
 
 
+@pytest.mark.slow
 def test_many_evaluations_forget_no_input():
     """scikit-fuzzy forgets all inputs when it clears its cache, after 1000 runs."""
     engine = ScikitEngine(prioritised(points=3))
@@ -248,6 +249,7 @@ def test_edges_at_the_ends_of_an_input_are_no_jumps():
     assert engine.centroids([0.0]) == [engine.centroid(0, [1, 0, 0])]
 
 
+@pytest.mark.slow
 def test_threads_do_not_disturb_each_other():
     engine = ScikitEngine(prioritised(points=11))
     inputs = np.random.default_rng(0).random((4, 60, 3))
@@ -332,6 +334,7 @@ def test_an_engine_can_be_sent_to_another_process_and_forked():
         process.join()
 
 
+@pytest.mark.slow
 def test_no_warning_of_scikit_fuzzy_reaches_a_run():
     code = (
         "from fuzzy_arbiter import prioritised; from fuzzy_arbiter.engines.scikit import ScikitEngine;"
