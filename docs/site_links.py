@@ -8,6 +8,7 @@ Markdown as it is, any other file with its text as code. A link whose words are 
 from __future__ import annotations
 
 import os
+import posixpath
 import re
 from pathlib import Path
 
@@ -39,7 +40,7 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
         if path.suffix == ".md":
             waiting += _targets(text, path)
         else:
-            text = f"# {path.relative_to(root)}\n\n````{_LANGUAGES.get(path.suffix, 'text')}\n{text}\n````\n"
+            text = f"# {path.relative_to(root).as_posix()}\n\n````{_LANGUAGES.get(path.suffix, 'text')}\n{text}\n````\n"
         # only those of ALWAYS may be in the navigation; the others are left out of it without a warning
         level = InclusionLevel.INCLUDED if path.name in ALWAYS else InclusionLevel.NOT_IN_NAV
         files.append(File.generated(config, _page(path, root), content=text, inclusion=level))
@@ -57,11 +58,12 @@ def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Fil
     def led(match: re.Match[str]) -> str:
         words, target = match.groups()
         path = _resolved(target, here)
-        file = files.get_file_from_path(str(path.relative_to(docs)) if path.is_relative_to(docs) else _page(path, root))
+        inside = path.relative_to(docs).as_posix() if path.is_relative_to(docs) else _page(path, root)
+        file = files.get_file_from_path(inside)
         if file is None:
             return match[0]
         title = _TITLE.search(file.content_string) if words == path.name and path.suffix == ".md" else None
-        return f"[{title[1] if title else words}]({os.path.relpath(file.src_uri, os.path.dirname(uri))}"
+        return f"[{title[1] if title else words}]({posixpath.relpath(file.src_uri, posixpath.dirname(uri))}"
 
     return _LINK.sub(led, markdown)
 
@@ -79,5 +81,5 @@ def _targets(text: str, page: Path) -> list[Path]:
 
 
 def _page(path: Path, root: Path) -> str:
-    inside = os.path.relpath(path, root)
+    inside = Path(os.path.relpath(path, root)).as_posix()
     return f"{FOLDER}/{inside}" if path.suffix == ".md" else f"{FOLDER}/{inside}.md"
