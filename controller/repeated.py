@@ -17,7 +17,7 @@ import numba
 import numpy as np
 from llvmlite import ir
 from numba import types
-from numba.core import cgutils, config
+from numba.core import cgutils
 from numba.extending import intrinsic
 from numba.np import arrayobj
 from numpy.typing import NDArray
@@ -29,7 +29,6 @@ _intrinsic: Any = intrinsic
 _typeof: Any = numba.typeof
 _arrays: Any = arrayobj
 _tuples: Any = types.BaseTuple
-_DISABLED: Any = config.DISABLE_JIT  # type: ignore[attr-defined]
 _WORD = ir.IntType(64)
 
 
@@ -47,12 +46,12 @@ class Repeated:
     Parameters
     ----------
     function : callable
-        As `lean` or `compiled` give it, which returns nothing. Its arguments are arrays, numbers, and tuples of them;
-        no array is resized in place.
+        As `lean` or `compiled` give it, which returns nothing; a plain one is called as it is. Its arguments are
+        arrays, numbers, and tuples of them; no array is resized in place.
     """
 
     def __init__(self, function: Any) -> None:
-        self._function = function
+        self._function, self._is_compiled = function, hasattr(function, "overloads")
         self._met: dict[tuple[int, ...], tuple[Any, ...]] = {}  # arguments by their ids, which are theirs while kept
         self._bound: dict[tuple[int, ...], _Bound] = {}
         self._last = _Bound(_nothing, (), np.empty(0, np.uint64))
@@ -79,7 +78,7 @@ class Repeated:
             bound.call()
             return
         self._function(*arguments)
-        if key in self._met and not _DISABLED:
+        if key in self._met and self._is_compiled:
             self._bound[key] = self._last = _bind(self._function, arguments)
         elif len(self._met) < _MOST:
             self._met[key] = arguments

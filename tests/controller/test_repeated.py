@@ -129,6 +129,14 @@ def test_wrong_numbers_of_arguments_are_refused():
             call(*arguments)
 
 
+def test_a_plain_function_is_called_as_it_is():
+    said = []
+    call = Repeated(said.append)
+    for _ in range(4):
+        call("so")
+    assert said == ["so"] * 4
+
+
 def test_a_copy_has_arrays_of_its_own():
     call, values = Repeated(_refuse), np.zeros(1)
     for _ in range(3):
