@@ -246,7 +246,6 @@ PLOTS = [
 ]
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(("words", "panels"), PLOTS, ids=lambda value: value[0] if isinstance(value, list) else "")
 def test_plot_draws_every_kind(run, tmp_path, words, panels):
     assert run("plot", "section-vi", *words, "--out", "a.svg") == (0, "a.svg\n", "")
