@@ -71,7 +71,23 @@ def entry_of(function: Any, arguments: tuple[Any, ...] | None = None) -> int:
     function.compile(kinds)
     compiled = function.overloads[kinds]
     declare(function, kinds, compiled.signature.return_type)
-    address: int = compiled.library.get_pointer_to_function(compiled.fndesc.llvm_func_name)
+    return address_of(compiled)
+
+
+def address_of(overload: Any) -> int:
+    """Return the address of a function as compiled for arguments of some types.
+
+    Parameters
+    ----------
+    overload : object
+        One of its ``overloads``.
+
+    Returns
+    -------
+    int
+        Where `called` finds it.
+    """
+    address: int = overload.library.get_pointer_to_function(overload.fndesc.llvm_func_name)
     return address
 
 
@@ -109,17 +125,35 @@ class _Call(_templates.AbstractTemplate):  # type: ignore[misc]
 
 
 def _lowered(context: Any, builder: Any, sig: Any, values: Any) -> Any:
-    """Call by Numba's own convention, and pass on what goes wrong."""
     address, _, packed = values
-    _, _, arguments = sig.args
     unpack: Any = cgutils.unpack_tuple
-    kind = context.call_conv.get_function_type(sig.return_type, arguments.types)
-    function = builder.inttoptr(address, kind.as_pointer())
-    status, result = context.call_conv.call_function(
-        builder, function, sig.return_type, arguments.types, unpack(builder, packed)
-    )
+    return called(context, builder, address, sig.return_type, sig.args[2].types, unpack(builder, packed))
+
+
+def called(context: Any, builder: Any, address: Any, result_kind: Any, kinds: Any, arguments: Any) -> Any:
+    """Write the code of a call by Numba's own convention, which passes on what goes wrong.
+
+    Parameters
+    ----------
+    context, builder : object
+        Of the function that is being compiled.
+    address : LLVM value
+        Of `address_of`, as an integer.
+    result_kind, kinds : Numba type, sequence of Numba types
+        Of what it returns and takes.
+    arguments : sequence of LLVM values
+        As many.
+
+    Returns
+    -------
+    LLVM value
+        What it returns.
+    """
+    convention = context.call_conv
+    function = builder.inttoptr(address, convention.get_function_type(result_kind, kinds).as_pointer())
+    status, result = convention.call_function(builder, function, result_kind, kinds, arguments)
     with cgutils.if_unlikely(builder, status.is_error):  # type: ignore[no-untyped-call]
-        context.call_conv.return_status_propagate(builder, status)
+        convention.return_status_propagate(builder, status)
     return result
 
 

@@ -17,11 +17,11 @@ import numba
 import numpy as np
 from llvmlite import ir
 from numba import types
-from numba.core import cgutils
 from numba.extending import intrinsic
 from numba.np import arrayobj
 from numpy.typing import NDArray
 
+from controller.by_address import address_of, called
 from controller.compiled import lean
 
 _MOST = 8  # sets of arguments that are kept
@@ -97,8 +97,7 @@ def _nothing() -> None:
 def _bind(function: Any, arguments: tuple[Any, ...]) -> _Bound:
     """Bind a function, as compiled for such arguments, to them."""
     kinds = tuple(_typeof(argument) for argument in arguments)
-    compiled = function.overloads[kinds]
-    entry = compiled.library.get_pointer_to_function(compiled.fndesc.llvm_func_name)
+    entry = address_of(function.overloads[kinds])
     words = np.array(list(_words(arguments)), dtype=np.uint64)
     return _Bound(functools.partial(_invoker(kinds), entry, words.ctypes.data), arguments, words)
 
@@ -139,7 +138,7 @@ def _invoke(entry: int, words: int) -> None:
 
 
 def _call(kinds: tuple[Any, ...], context: Any, builder: Any, _signature: Any, values: Any) -> Any:
-    """Make the arguments, and call by Numba's own convention; pass on what goes wrong."""
+    """Write the code that makes the arguments, and calls."""
     entry, words = values
     at = builder.inttoptr(words, _WORD.as_pointer())
     count = iter(range(2**31))
@@ -162,10 +161,4 @@ def _call(kinds: tuple[Any, ...], context: Any, builder: Any, _signature: Any, v
             return builder.bitcast(word(), expected)
         return word() if expected == _WORD else builder.trunc(word(), expected)
 
-    arguments = [made(kind) for kind in kinds]
-    convention = context.call_conv
-    function = builder.inttoptr(entry, convention.get_function_type(types.none, kinds).as_pointer())
-    status, _ = convention.call_function(builder, function, types.none, kinds, arguments)
-    with cgutils.if_unlikely(builder, status.is_error):  # type: ignore[no-untyped-call]
-        convention.return_status_propagate(builder, status)
-    return context.get_dummy_value()
+    return called(context, builder, entry, types.none, kinds, [made(kind) for kind in kinds])
