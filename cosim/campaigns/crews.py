@@ -142,7 +142,7 @@ class Processes:
         return new
 
     def _hand(self) -> _Hand:
-        """Start a process, which it takes a second to get ready."""
+        """Start a process, and have it get ready, which takes it a second."""
         pool = ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn"), initializer=begin_worker)
         with interrupts_held():
             pool.submit(prepare, self._task)
