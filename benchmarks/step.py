@@ -12,8 +12,9 @@ import numpy as np
 from benchmarks.table import Row, compared
 from benchmarks.timing import Timing, time_calls
 from cosim.master import Master
-from cosim.record import Recorder
+from cosim.recorder import Recorder
 from cosim.scenario import load_scenario
+from cosim.signals import Array
 
 STEPS = 20_000
 RATIO = "how many times as long as the plant's step"
@@ -33,7 +34,7 @@ def measure(steps: int, repeats: int) -> list[Row]:
     list of Row
         For the table.
     """
-    timings: dict[str, Timing | str] = {}
+    timings: dict[str, Timing] = {}
     rng = np.random.default_rng(0)
 
     def add_calls(name: str, work: Callable[[], object], calls: int = steps) -> None:
@@ -42,10 +43,12 @@ def measure(steps: int, repeats: int) -> list[Row]:
     with Master(load_scenario("paper", ["arbiter.engine=closed"])) as master:
         fmu = f"FMU: set {len(master.plant.inputs)}, step, get {len(master.plant.outputs)}"
         add_calls(fmu, lambda: master.plant.step(1e-3))
-        add_calls(f"FMU: {len(master.plant.flags)} flags", master.plant.read_flags)
+        flags, law = f"FMU: {len(master.plant.flags)} flags", "law alone, printed"
+        add_calls(flags, master.plant.read_flags)
         add_calls("regions: 4 evaluated", master._evaluate_regions)
-        add_calls("arbiter, closed form", master._arbitrate)
-        add_calls("controller, printed law", master._control)
+        add_calls("arbiter, closed form, inputs as before", master._arbitrate)
+        add_calls(law, _law_alone(master))
+        add_calls("controller: law, what it reports, inputs", master._control)
         with tempfile.TemporaryDirectory() as folder:
             recorder = Recorder(Path(folder), master.signals.columns)
             add_calls("record", lambda: recorder.observe(0, master.signals.row))
@@ -56,10 +59,20 @@ def measure(steps: int, repeats: int) -> list[Row]:
 
         add_calls("arbiter, scikit-fuzzy, inputs as before", master._arbitrate)
         add_calls("arbiter, scikit-fuzzy, new inputs", new_inputs, max(1, steps // _SLOWER))
-    timings["whole step, closed form, no record"] = _whole("closed", steps, repeats, record=False)
-    timings["whole step, closed form, with record"] = _whole("closed", steps, repeats, record=True)
+    alone = sum(timing.least for timing in (timings[fmu], timings[flags], timings[law]))
+    for record in (False, True):
+        how = "with record" if record else "no record"
+        whole = timings[f"whole step, closed form, {how}"] = _whole("closed", steps, repeats, record=record)
+        beside = Timing(tuple(sample - alone for sample in whole.samples))
+        timings[f"the same, above FMU, flags and law, {how}"] = beside
     timings["whole step, scikit-fuzzy, with record"] = _whole("skfuzzy", steps, repeats, record=True)
     return compared(timings)
+
+
+def _law_alone(master: Master) -> Callable[[], None]:
+    state, around, forces = master.state, master.surroundings, master.actuators.command
+    weights: Array = np.zeros(len(master.scenario.regions))
+    return lambda: master.law.step(state, around.goal, around.regions, weights, forces)
 
 
 def _whole(engine: str, steps: int, repeats: int, *, record: bool) -> Timing:

@@ -25,6 +25,7 @@ from controller.by_address import address_of, called
 from controller.compiled import lean
 
 _MOST = 8  # sets of arguments that are kept
+_NONE = (None,) * 7
 _intrinsic: Any = intrinsic
 _typeof: Any = numba.typeof
 _arrays: Any = arrayobj
@@ -46,44 +47,47 @@ class Repeated:
     Parameters
     ----------
     function : callable
-        As `lean` or `compiled` give it, which returns nothing; a plain one is called as it is. Its arguments are
-        arrays, numbers, and tuples of them; no array is resized in place.
+        As `lean` or `compiled` give it, which returns nothing; a plain one is called as it is. It takes at most seven
+        arguments: arrays, numbers, and tuples of them; no array is resized in place.
     """
 
     def __init__(self, function: Any) -> None:
         self._function, self._is_compiled = function, hasattr(function, "overloads")
         self._met: dict[tuple[int, ...], tuple[Any, ...]] = {}  # arguments by their ids, which are theirs while kept
         self._bound: dict[tuple[int, ...], _Bound] = {}
-        self._last = _Bound(_nothing, (), np.empty(0, np.uint64))
+        self._last: tuple[Any, ...] = (_nothing, *_NONE)  # the last bound call, and the seven arguments it is for
 
-    def __call__(self, *arguments: Any) -> None:
+    def __call__(
+        self, a: Any, b: Any = None, c: Any = None, d: Any = None, e: Any = None, f: Any = None, g: Any = None
+    ) -> None:
         """Call it.
 
         Parameters
         ----------
-        *arguments : object
-            Of the function.
+        a, b, c, d, e, f, g : object
+            Arguments of the function; None for those that it has not.
         """
-        call, last, _ = self._last
-        if len(arguments) == len(last) and all(map(operator.is_, arguments, last)):
+        # one by one: to compare two tuples item by item takes twice as long
+        call, a0, b0, c0, d0, e0, f0, g0 = self._last
+        if a is a0 and b is b0 and c is c0 and d is d0 and e is e0 and f is f0 and g is g0:
             call()
         else:
-            self._call_anew(arguments)
+            self._call_anew(tuple(argument for argument in (a, b, c, d, e, f, g) if argument is not None))
 
     def _call_anew(self, arguments: tuple[Any, ...]) -> None:
         key = tuple(map(id, arguments))
         bound = self._bound.get(key)
         if bound is not None:
-            self._last = bound
+            self._last = (bound.call, *arguments, *_NONE[len(arguments) :])
             bound.call()
             return
         self._function(*arguments)
         if key in self._met and self._is_compiled:
-            self._bound[key] = self._last = _bind(self._function, arguments)
+            self._bound[key] = _bind(self._function, arguments)
         elif len(self._met) < _MOST:
             self._met[key] = arguments
         else:
-            self._met, self._bound = {key: arguments}, {}
+            self._met, self._bound, self._last = {key: arguments}, {}, (_nothing, *_NONE)
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Leave out, of a copy, what is kept of these very arrays."""
@@ -91,7 +95,7 @@ class Repeated:
 
 
 def _nothing() -> None:
-    raise TypeError("no arguments are bound")
+    raise TypeError("called without arguments")
 
 
 def _bind(function: Any, arguments: tuple[Any, ...]) -> _Bound:

@@ -37,10 +37,14 @@ class Actuators:
     def __init__(self, scenario: Scenario, plant: Plant, signals: Signals) -> None:
         self._scenario, self._plant = scenario, plant
         vehicle = scenario.vehicle
+        self._bounded = scenario.commands.enabled
         self.command = signals.view("command.X", 6)
         self._cut = signals.view("allocation_saturated", 1)
-        self._inputs = signals.view("thrust[1]", len(plant.inputs))
-        self.thrusts, self._wrench = self._inputs[: vehicle.n_thrusters], self._inputs[vehicle.n_thrusters :]
+        inputs = signals.view("thrust[1]", len(plant.inputs))
+        self.thrusts, self._wrench = inputs[: vehicle.n_thrusters], inputs[vehicle.n_thrusters :]
+        # views of their memory, which are copied in a third of the time of arrays
+        self._asked, self._given = self.command.data, self._wrench.data
+        self._decided, self._sent = inputs.data, plant.inputs.values.data
         self.health: Array = np.ones(vehicle.n_thrusters)
         self._limits = {"thrust_min": vehicle.thrust_min.copy(), "thrust_max": vehicle.thrust_max.copy()}
         self._allocate_to_the_healthy()
@@ -63,8 +67,8 @@ class Actuators:
     def push(self) -> None:
         """Bring the wrench `command` to the plant's inputs."""
         if self.allocation is None:
-            self._wrench[:] = self.command
-            if self._scenario.commands.enabled:
+            self._given[:] = self._asked
+            if self._bounded:
                 self._cut[0] = cut(self._wrench)
         else:
             self._cut[0] = self.allocation(self.command, self.thrusts)
@@ -75,7 +79,7 @@ class Actuators:
 
     def send(self) -> None:
         """Hand the inputs to the plant."""
-        self._plant.inputs.values[:] = self._inputs
+        self._sent[:] = self._decided
 
     def _allocate_to_the_healthy(self) -> None:
         actuation = self._scenario.actuation

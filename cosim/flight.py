@@ -17,7 +17,6 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-import fuzzy_arbiter
 import plant_fmu
 from controller import LAWS, CompiledLaw, VehicleState
 from controller.allocation import allocate
@@ -30,18 +29,17 @@ from controller.regions import (
     clearance_of_pose,
     clearance_of_sphere,
 )
+from cosim.memberships import ARBITER, press
 from cosim.native import advance, read, seconds, send
 from fuzzy_arbiter import Arbiter
-from fuzzy_arbiter.membership import ramp
 from plant_fmu.running.native import Native
 
 Array = NDArray[np.float64]
 
 # the folders of what the compiled loop is made of beside this one and that of the laws
-_FOREIGN = (Path(fuzzy_arbiter.__file__).parent, Path(plant_fmu.__file__).parent / "running")
+_FOREIGN = (ARBITER, Path(plant_fmu.__file__).parent / "running")
 
 _weigh: Any = numba.njit(_nrt=False)(Arbiter().compiled().py_func)  # type: ignore[call-overload]
-_ramp: Any = numba.njit(ramp)
 _step: Any = printed.step  # of a law, and whether it gives a wrench: `flight_of` puts others in their places
 _is_wrench = True
 _SPHERE, _ATTITUDE = Sphere.kind, Orientation.kind
@@ -243,11 +241,7 @@ def _fly(  # noqa: C901 - one loop, as a whole
             if not setup.exact:
                 _clearances(setup.regions, state.position, state.quaternion, seen, room.at)
                 told_clearances = seen
-            for i in range(3):
-                memberships[i] = 0.0
-            for i in range(n):
-                degree = _ramp(told_clearances[i], setup.ramp)
-                memberships[setup.criteria[i]] = max(memberships[setup.criteria[i]], degree)
+            press(told_clearances, setup.criteria, setup.ramp, memberships)
             _weigh(memberships, by_criterion)
             for i in range(n):
                 weights[i] = by_criterion[setup.criteria[i]]

@@ -28,7 +28,7 @@ from cosim.sensing import Sensor
 from cosim.signals import Array, Signals
 from cosim.start_values import start_values
 from cosim.surroundings import Surroundings
-from fuzzy_arbiter import Arbiter, ramp
+from fuzzy_arbiter import Arbiter
 from plant_fmu import Plant
 
 _LONGEST_SLEEP = 3600.0  # s
@@ -82,7 +82,6 @@ class Master:
         self.scenario = scenario
         self.arbiter = Arbiter(engine=scenario.arbiter.engine, points=scenario.arbiter.points)
         self.law: Law = law_of(scenario) if law is None else law
-        self._ramp = scenario.arbiter.ramp
         self._jacobi = scenario.master.order == "jacobi"
         self._failures = bool(scenario.failures)
         self.surroundings = Surroundings(scenario)
@@ -104,10 +103,13 @@ class Master:
         s, n = self.signals, len(self.scenario.regions)
         self.actuators = Actuators(self.scenario, self.plant, s)
         plant, n_outputs = self.plant, len(self.plant.outputs)
-        outputs = s.view("position.x", n_outputs + len(plant.flags))
         n_measured = plant.outputs.names.index(_FIRST_APPLIED)
-        self._measured, self._applied, self._flags = np.split(outputs, [n_measured, n_outputs])
-        self._plant_measured, self._plant_applied = np.split(plant.outputs.values, [n_measured])
+        # views of their memory, which are copied in a third of the time of arrays
+        outputs, given = s.view("position.x", n_outputs).data, plant.outputs.values.data
+        self._measured, self._plant_measured = outputs[:n_measured], given[:n_measured]
+        self._applied, self._plant_applied = outputs[n_measured:], given[n_measured:]
+        self._flags = s.view("position.x", n_outputs + len(plant.flags))[n_outputs:]
+        self._raised = b""  # the flags that stand in the row
 
         truth = VehicleState(
             position=s.view("position.x", 3),
@@ -122,10 +124,11 @@ class Master:
             self.state = VehicleState(position, np.zeros(4), velocity, self.actuators.health)
             self._sensor = Sensor(self.scenario.sensing, truth, self.state)
 
-        self._values, self._clearances = s.view("goal.value", n + 1), s.view("goal.clearance", n + 1)
+        values, clearances = s.view("goal.value", n + 1), s.view("goal.clearance", n + 1)
         # where sensing is exact, what the arbiter sees is what is recorded
-        self._seen: Array = self._clearances if self._sensor is None else np.zeros(n + 1)
-        self._seen_of_regions = self._seen[1:]
+        self._outlook = self._seen = self.surroundings.outlook(values, clearances)
+        if self._sensor is not None:
+            self._seen = self.surroundings.outlook(np.zeros(n + 1), np.zeros(n + 1))
         moving = self.scenario.moving
         self._shifts = s.view(f"{moving[0]}.shift.x", 3 * len(moving)).reshape(-1, 3) if moving else np.empty((0, 3))
         self._memberships = s.view(f"membership.{CRITERIA[0]}", len(CRITERIA))
@@ -219,7 +222,7 @@ class Master:
         if self.helm is not None and orders is not None:
             self._heed(self.helm, orders.take(k))
         self._evaluate_regions()
-        if self.helm is not None and self.helm.watch(float(self.signals.row[0]), float(self._seen[0])):
+        if self.helm is not None and self.helm.watch(float(self.signals.row[0]), float(self._seen.clearances[0])):
             self._heed(self.helm, ())  # what the next item of the mission changes
             self._evaluate_regions()
         if jacobi:
@@ -256,7 +259,7 @@ class Master:
             self._sensor.tell_truth()
         self._evaluate_regions()
         if self.helm is not None:
-            self.helm.watch(0.0, float(self._seen[0]))
+            self.helm.watch(0.0, float(self._seen.clearances[0]))
 
     def _await_arming(self, orders: OrderSource | None, awaiting: Observer | None) -> bool:
         """Follow orders before step 0 until one arms the vehicle, or none is to come; return whether it was awaited."""
@@ -284,18 +287,18 @@ class Master:
             if helm.heading is not None:
                 self.law.face(from_axis_angle(_DOWN, helm.heading))
         if helm.changed:
-            self._ramp = helm.settings["arbiter.ramp"]
+            self.surroundings.set_ramp(helm.settings["arbiter.ramp"])
         helm.heeded()
 
     def _evaluate_regions(self) -> None:
         """Evaluate the regions, where they are now, at the pose that is told, and at the true one."""
         self.surroundings.carry_to(self.signals.row[0], self._shifts)
         if self._sensor is not None:
-            self.surroundings.evaluate(self.state, self._values, self._seen)
-        self.surroundings.evaluate(self.truth, self._values, self._clearances)
+            self.surroundings.evaluate(self.state, self._seen)
+        self.surroundings.evaluate(self.truth, self._outlook)
 
     def _arbitrate(self) -> None:
-        """Turn clearances into memberships, and these into weights.
+        """Turn memberships into weights.
 
         While the position is lost there is nothing to decide by: the last weights hold.
         """
@@ -318,10 +321,7 @@ class Master:
         """Return the membership of each criterion, that of its most pressing region; None if the position is lost."""
         if self._sensor is not None and not np.isfinite(self.state.position).all():
             return None
-        memberships = [0.0] * len(CRITERIA)
-        for criterion, clearance in zip(self._criterion_of, self._seen_of_regions.tolist(), strict=True):
-            if clearance <= self._ramp:  # else 0
-                memberships[criterion] = max(memberships[criterion], ramp(clearance, self._ramp))
+        memberships: list[float] = self._seen.memberships.tolist()
         return memberships
 
     def _weigh(self, memberships: list[float]) -> None:
@@ -337,12 +337,12 @@ class Master:
             actuators.command[:] = self.helm.wrench
             actuators.push()
             return
-        self._estimate[:] = self.law.estimate
+        self._estimate[...] = self.law.estimate
         law, by_wrench = self.law, self.law.output == "wrench"
         forces = actuators.command if by_wrench else actuators.thrusts
         law.step(self.state, self.surroundings.goal, self.surroundings.regions, self._weights_of_regions, forces)
-        if self._report.size:
-            self._report[:] = self.law.report
+        if law.diagnostics:
+            self._report[...] = law.report
         if by_wrench:
             actuators.push()
         else:
@@ -351,7 +351,10 @@ class Master:
     def _advance(self, step: float) -> None:
         self.plant.step(step)
         self._applied[:] = self._plant_applied
-        self._flags[:] = self.plant.read_flags()
+        flags = self.plant.read_flags()
+        raised = flags.tobytes()
+        if raised != self._raised:
+            self._flags[...], self._raised = flags, raised
 
     # ---- regions moved from outside ----
 

@@ -1,10 +1,8 @@
-"""The record of a run: a Parquet file with a column for each signal and its unit in the metadata."""
+"""The record of a run, read: a Parquet file with a column for each signal and its unit in the metadata."""
 
 from __future__ import annotations
 
 import contextlib
-import shutil
-import time
 from collections import OrderedDict
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -21,111 +19,9 @@ from plant_fmu.tables import brief
 MAX_ROWS = 100_000_001  # of a run of as many steps as a scenario may have
 RECORD = "record.parquet"
 PARTS = "record.parts"  # what a killed run leaves
-_WHOLE = "whole"  # among them, what a finished run makes of them
-_PART_SECONDS = 1.0  # of the wall clock, after which a part is written even if it is small
 _BLOCK = 10_000  # rows that are read at once
 _SMALL = 2**23  # numbers of a record that is read as a whole,
 _KEPT = 24  # and signals that a larger one keeps in memory
-
-
-class Recorder:
-    """Observer that writes each step's row, in parts that a killed run leaves readable.
-
-    Parameters
-    ----------
-    folder : Path
-        The run folder.
-    columns : sequence of Column
-        Of the rows that will come.
-    rows_per_part : int
-        A part is written when so many rows have come, or a second of the wall clock has passed.
-
-    Attributes
-    ----------
-    rows : int
-        That have come.
-    """
-
-    def __init__(self, folder: Path, columns: Sequence[Column], rows_per_part: int = 10_000) -> None:
-        self._folder = folder
-        self._schema = _schema(columns)
-        self._block: Array = np.empty((rows_per_part, len(columns)))
-        self._filled = 0
-        self._parts = 0
-        self._flushed = time.monotonic()
-        self.rows = 0
-        (folder / PARTS).mkdir()
-        self._whole: pq.ParquetWriter | None = None  # what the record will be, begun with its first rows
-        self._gathered: list[pa.Table] = []  # written as parts, but not yet into the whole
-        self._sound = True  # the whole has what it should have; not so once a write was cut off
-
-    def observe(self, k: int, row: Array) -> None:
-        """Keep the row of step `k`."""
-        if self._filled == len(self._block) or (self._filled and time.monotonic() - self._flushed > _PART_SECONDS):
-            self._flush()
-        self._block[self._filled] = row
-        self._filled += 1
-        self.rows += 1
-
-    def close(self) -> None:
-        """Write what is left, and put the whole in the place of its parts."""
-        self._flush()
-        if not self._sound:
-            self._begin_anew()
-        self._write_gathered()
-        if self._whole is not None:
-            self._whole.close()
-        (self._folder / PARTS / _WHOLE).replace(self._folder / RECORD)
-        shutil.rmtree(self._folder / PARTS)
-
-    def _begin_anew(self) -> None:
-        """Write the whole from its parts: Ctrl-C or a full disk may have come in the middle of it."""
-        if self._whole is not None:
-            with contextlib.suppress(OSError, pa.ArrowException):
-                self._whole.close()
-            self._whole = None
-        self._gathered = []
-        for part in _part_files(self._folder):
-            with pq.ParquetFile(part) as parquet:
-                self._gather(parquet.read())
-
-    def _gather(self, table: pa.Table) -> None:
-        self._gathered.append(table)
-        if sum(gathered.num_rows for gathered in self._gathered) >= len(self._block):
-            self._write_gathered()
-
-    def _write_gathered(self) -> None:
-        if self._gathered:
-            if self._whole is None:
-                self._whole = pq.ParquetWriter(self._folder / PARTS / _WHOLE, self._schema, **_WRITING)
-            self._whole.write_table(pa.concat_tables(self._gathered).combine_chunks())
-            self._gathered = []
-
-    def _flush(self) -> None:
-        if not self._filled:
-            return
-        sound, self._sound = self._sound, False
-        # not pa.array: that imports pandas where it is installed, for nothing
-        columns = [
-            pa.Array.from_buffers(pa.float64(), self._filled, [None, pa.py_buffer(column)])
-            for column in self._block[: self._filled].T.copy("C")  # the block is filled anew
-        ]
-        part = self._folder / PARTS / f"{self._parts:06}.parquet"
-        scratch = part.with_suffix(".tmp")
-        table = pa.Table.from_arrays(columns, schema=self._schema)
-        pq.write_table(table, scratch, **_WRITING_PARTS)
-        scratch.replace(part)
-        # only now: an interrupted write is done again, into the same part
-        self._parts, self._filled = self._parts + 1, 0
-        if sound:
-            self._gather(table)
-        self._sound = sound
-        self._flushed = time.monotonic()
-
-
-# measured: bytes of a float64 column compress best when they are split by place, and dictionaries only cost
-_WRITING = {"compression": "zstd", "use_dictionary": False, "use_byte_stream_split": True}
-_WRITING_PARTS = _WRITING | {"compression": "lz4"}  # a fifth of the time; they do not stay
 
 
 class Record:
@@ -223,7 +119,7 @@ def load_record(folder: Path) -> Record:
         If there is none, or it cannot be read.
     """
     require_utf8(folder)
-    files = [folder / RECORD] if (folder / RECORD).exists() else _part_files(folder)
+    files = [folder / RECORD] if (folder / RECORD).exists() else part_files(folder)
     if not files:
         raise RunError(f"{folder}: holds no record of a run")
     record = Record(files)
@@ -294,14 +190,6 @@ def _require_numbers(file: Path, schema: pa.Schema, rows: int) -> None:
         raise RunError(f"{file}: the record has {rows} rows up to here, expected at most {MAX_ROWS}")
 
 
-def _part_files(folder: Path) -> list[Path]:
+def part_files(folder: Path) -> list[Path]:
+    """Return the parts that a run has left in its folder, in their order."""
     return sorted((folder / PARTS).glob("*.parquet"))
-
-
-def _schema(columns: Sequence[Column]) -> pa.Schema:
-    return pa.schema(
-        [
-            pa.field(c.name, pa.float64(), nullable=False, metadata={"unit": c.unit, "description": c.description})
-            for c in columns
-        ]
-    )

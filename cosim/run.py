@@ -18,7 +18,7 @@ from cosim.flown_run import ORDERS
 from cosim.helm import LoggedOrders, OrderQueue, RecordedOrders
 from cosim.law import flown_by
 from cosim.master import Master, Observer
-from cosim.record import Recorder
+from cosim.recorder import Recorder
 from cosim.report_words import verdict
 from cosim.run_folder import RunFolder, claim, conclude
 from cosim.scenario import Scenario

@@ -1,19 +1,22 @@
-"""The goal and the regions of a run: where each is now, and what they say of a pose."""
+"""The goal and the regions of a run: where each is now, what they say of a pose, and how much each criterion asks."""
 
 from __future__ import annotations
 
 import dataclasses
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from controller import VehicleState
 from controller.compiled import lean
 from controller.regions import PackedRegions, Shape, Sphere, evaluate_packed, pack
 from controller.repeated import Repeated
 from cosim.errors import OrderError, RunError
-from cosim.scenario import Scenario
+from cosim.memberships import ARBITER, press
+from cosim.scenario import CRITERIA, Scenario
 from cosim.scenario_tables import FAR_AWAY, Vector3
 from cosim.signals import Array
 
@@ -28,6 +31,25 @@ class _Target:
     middle: Array  # (3,) m, NED: of its shape as packed
     origin: Array  # (3,) m, NED: how far it would have been from there at time 0, had it always moved as it does now
     radius: float  # m, of a sphere; 0 for the shape of the scenario's goal
+
+
+class Outlook(NamedTuple):
+    """What goal and n regions say of a pose; the goal's come first."""
+
+    values: Array  # (n + 1,) g
+    gradients: Array  # (n + 1, 3) of g by position, world frame
+    turnings: Array  # (n + 1, 3) of g by rotation, body frame [1/rad]
+    clearances: Array  # (n + 1,) m, or rad of attitude
+    memberships: Array  # (3,) of each criterion, that of its most pressing region
+
+
+class _Places(NamedTuple):
+    """All that is evaluated, where it is now."""
+
+    goal: PackedRegions
+    regions: PackedRegions
+    criteria: NDArray[np.int64]  # (n,) of each region
+    ramp: float  # m, width of the memberships
 
 
 class Surroundings:
@@ -47,20 +69,19 @@ class Surroundings:
     def __init__(self, scenario: Scenario) -> None:
         secondary = [region.region for region in scenario.regions]
         self.regions = pack(secondary)
+        self._criteria = np.array([CRITERIA.index(region.criterion) for region in scenario.regions], dtype=np.int64)
+        self._ramp = scenario.arbiter.ramp
         self._goal_region, self._middle = scenario.goal_region, middle_of(scenario.goal)
-        self._target = self._reached = self._new_target(None, self._middle)
+        self._reached = self._new_target(None, self._middle)
+        self._head_for(self._reached)
         self._names = ["goal", *(region.name for region in secondary)]
         self._streamed = ["goal"] if scenario.goal_streamed else []
         self._streamed += [region.region.name for region in scenario.regions if region.streamed and not region.seen]
         self._moving = [self._names.index(name) for name in scenario.moving]
-        # if nothing ever moves, all are evaluated at once where they are; else each part where it has been carried
-        self._still = None if scenario.moving else pack([self._goal_region, *secondary])
         self._seen = [i for i, region in enumerate(scenario.regions) if region.seen]
         # m, NED: where each would have been at time 0, had it always moved as it does now
         self._origins: Array = np.zeros((len(secondary), 3))
-        self._gradients: Array = np.zeros((len(self._names), 3))
-        self._turnings: Array = np.zeros((len(self._names), 3))
-        self._evaluate_still, self._evaluate_carried = Repeated(evaluate_packed), Repeated(_evaluate)
+        self._look_around = Repeated(_evaluate)
 
     @property
     def goal(self) -> PackedRegions:
@@ -77,7 +98,7 @@ class Surroundings:
         shifts : ndarray, shape (moving regions, 3)
             Receives how far each moving one is from where the scenario has it [m, NED].
         """
-        if self._still is not None:
+        if not self._moving:
             return
         for packed, origins in ((self.goal, self._target.origin), (self.regions, self._origins)):
             packed.move_to(time)
@@ -85,21 +106,33 @@ class Surroundings:
         for i, at in enumerate(self._moving):
             shifts[i] = self.regions.shifts[at - 1] if at else self.target - self._middle
 
-    def evaluate(self, state: VehicleState, values: Array, clearances: Array) -> None:
+    def outlook(self, values: Array, clearances: Array) -> Outlook:
+        """Return room for what `evaluate` finds.
+
+        Parameters
+        ----------
+        values, clearances : ndarray, shape (n + 1,)
+            That are to be part of it.
+
+        Returns
+        -------
+        Outlook
+            All else zero.
+        """
+        n = len(self._names)
+        return Outlook(values, np.zeros((n, 3)), np.zeros((n, 3)), clearances, np.zeros(len(CRITERIA)))
+
+    def evaluate(self, state: VehicleState, outlook: Outlook) -> None:
         """Evaluate goal and regions at a pose.
 
         Parameters
         ----------
         state : VehicleState
             Its position and attitude count.
-        values, clearances : ndarray, shape (n + 1,)
-            Receive g and clearance, the goal's first.
+        outlook : Outlook
+            Receives what they say.
         """
-        p, e, gradients, turnings = state.position, state.quaternion, self._gradients, self._turnings
-        if self._still is not None:
-            self._evaluate_still(self._still, p, e, values, gradients, turnings, clearances)
-        else:
-            self._evaluate_carried(self.goal, self.regions, p, e, values, gradients, turnings, clearances)
+        self._look_around(self._places, state, outlook)
 
     # ---- moved from outside ----
 
@@ -195,7 +228,7 @@ class Surroundings:
         target = self._new_target(radius, position)
         target.packed.velocities[0] = velocity
         target.origin[:] -= np.multiply(velocity, time)
-        self._target = target
+        self._head_for(target)
 
     def keep_target(self) -> None:
         """Remember the present target, for `aim_as_before`."""
@@ -203,7 +236,11 @@ class Surroundings:
 
     def aim_as_before(self) -> None:
         """Go back to the target that was remembered last; the scenario's goal, if none was."""
-        self._target = self._reached
+        self._head_for(self._reached)
+
+    def _head_for(self, target: _Target) -> None:
+        self._target = target
+        self._places = _Places(target.packed, self.regions, self._criteria, self._ramp)
 
     def _new_target(self, radius: float | None, position: Vector3) -> _Target:
         """Return a target at rest with its middle at a position, as a sphere or in the shape of the scenario's goal."""
@@ -214,6 +251,11 @@ class Surroundings:
         return _Target(pack([sphere]), np.array(position), np.zeros(3), radius)
 
     # ---- changed from outside ----
+
+    def set_ramp(self, width: float) -> None:
+        """Let the memberships reach 0 at another clearance [m]."""
+        self._ramp = width
+        self._head_for(self._target)
 
     def set_gain(self, name: str, gain: float) -> None:
         """Give a secondary region another gain."""
@@ -235,20 +277,14 @@ class Surroundings:
         regions.numbers[regions.offsets[i] : regions.offsets[i + 1]] = shape.packed()
 
 
-@lean
-def _evaluate(
-    goal: PackedRegions,
-    regions: PackedRegions,
-    position: Array,
-    quaternion: Array,
-    values: Array,
-    gradients: Array,
-    turnings: Array,
-    clearances: Array,
-) -> None:
-    """Evaluate the goal into the first places, and the regions into those behind, in one call."""
-    evaluate_packed(goal, position, quaternion, values[:1], gradients[:1], turnings[:1], clearances[:1])
-    evaluate_packed(regions, position, quaternion, values[1:], gradients[1:], turnings[1:], clearances[1:])
+def _evaluate(places: _Places, state: VehicleState, found: Outlook) -> None:
+    p, e, g, c = state.position, state.quaternion, found.values, found.clearances
+    evaluate_packed(places.goal, p, e, g[:1], found.gradients[:1], found.turnings[:1], c[:1])
+    evaluate_packed(places.regions, p, e, g[1:], found.gradients[1:], found.turnings[1:], c[1:])
+    press(c[1:], places.criteria, places.ramp, found.memberships)
+
+
+_evaluate = lean(_evaluate, ARBITER)
 
 
 def middle_of(shape: Shape) -> Vector3:

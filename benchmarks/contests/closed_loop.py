@@ -20,7 +20,7 @@ from benchmarks.peer_environment import Environment
 from benchmarks.peer_process import peer
 from benchmarks.timing import Contestant, NotMeasuredError, Own
 from cosim.master import Master
-from cosim.record import Recorder
+from cosim.recorder import Recorder
 from cosim.scenario import load_scenario
 
 SCENARIO = "paper"

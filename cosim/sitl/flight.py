@@ -8,7 +8,7 @@ from typing import Any
 
 from cosim.errors import RunError
 from cosim.master import Master
-from cosim.record import Recorder
+from cosim.recorder import Recorder
 from cosim.run_folder import claim, conclude
 from cosim.scenario import Scenario
 from cosim.sitl.law import AutopilotLaw

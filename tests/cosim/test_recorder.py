@@ -1,11 +1,196 @@
+"""What is recorded is there once, to the last bit, however the writing of it ends."""
+
+import contextlib
+import itertools
 import signal
+import traceback
+from pathlib import Path
 
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from cosim.record import RECORD, Recorder, load_record
+from cosim import recorder as recorder_module
+from cosim.record import PARTS, RECORD, load_record
+from cosim.recorder import Recorder
 from cosim.signals import Column
+
+COLUMNS = [Column("time", "s", "Time"), Column("x", "m", "Place")]
+
+
+def test_a_killed_recorder_leaves_its_parts(tmp_path):
+    recorder = Recorder(tmp_path, COLUMNS, rows_per_part=10)
+    for k in range(35):
+        recorder.observe(k, np.array([k, 2.0 * k]))
+    record = load_record(tmp_path)  # nobody closed it
+    assert record["time"].tolist() == list(range(30))
+    assert record.units == {"time": "s", "x": "m"}
+
+
+def test_a_record_keeps_every_bit(tmp_path):
+    rows = np.random.default_rng(0).normal(size=(27, 2)) * 1e-300
+    rows[3] = [np.nan, -0.0]
+    recorder = Recorder(tmp_path, COLUMNS, rows_per_part=10)
+    for k, row in enumerate(rows):
+        recorder.observe(k, row)
+    recorder.close()
+    assert load_record(tmp_path).stack(["time", "x"]).tobytes() == rows.tobytes()
+    assert [p.name for p in tmp_path.iterdir()] == ["record.parquet"]
+
+
+@pytest.mark.parametrize("when", ["before", "after"])
+@pytest.mark.parametrize("where", ["pq.write_table", "pq.ParquetWriter.write_table", "Path.replace"])
+def test_an_interruption_while_a_part_is_written_loses_and_doubles_nothing(tmp_path, monkeypatch, where, when):
+    recorder = Recorder(tmp_path, COLUMNS, rows_per_part=10)
+    name, _, method = where.rpartition(".")
+    owner = {"pq": pq, "pq.ParquetWriter": pq.ParquetWriter, "Path": Path}[name]
+    real, calls = getattr(owner, method), []
+
+    def interrupted(*arguments, **keywords):
+        calls.append(method)
+        if len(calls) == 2 and when == "before":
+            raise KeyboardInterrupt
+        done = real(*arguments, **keywords)
+        if len(calls) == 2:
+            raise KeyboardInterrupt
+        return done
+
+    monkeypatch.setattr(owner, method, interrupted)
+    with contextlib.suppress(KeyboardInterrupt):
+        for k in range(100):
+            recorder.observe(k, np.array([k, 2.0 * k]))
+    assert 10 <= recorder.rows < 100
+    recorder.close()
+    assert load_record(tmp_path)["time"].tolist() == list(range(recorder.rows))
+    assert [p.name for p in tmp_path.iterdir()] == ["record.parquet"]
+
+
+def test_a_slow_run_is_written_by_the_clock(tmp_path, monkeypatch):
+    now = iter(np.arange(0.0, 1e3, 0.3))
+    monkeypatch.setattr("cosim.recorder.time.monotonic", lambda: next(now))
+    recorder = Recorder(tmp_path, COLUMNS)
+    for k in range(40):
+        recorder.observe(k, np.array([k, 2.0 * k]))
+    assert len(load_record(tmp_path)["time"]) >= 30
+
+
+@pytest.mark.parametrize("most", [199, 200])
+def test_a_large_record_keeps_few_signals_in_memory_and_a_small_one_all(tmp_path, monkeypatch, most):
+    monkeypatch.setattr("cosim.record._SMALL", most)
+    columns = [Column(f"c{i}", "", "x") for i in range(100)]
+    recorder = Recorder(tmp_path, columns)
+    for k in range(2):
+        recorder.observe(k, np.arange(100.0) + k)
+    recorder.close()
+    record = load_record(tmp_path)
+    assert [list(record[c.name]) for c in columns] == [[i, i + 1.0] for i in range(100)]
+    assert len(record._kept) == (24 if most < 200 else 100)
+    with pytest.raises(KeyError):
+        record["nothing"]
+
+
+def test_an_interrupted_write_loses_and_repeats_nothing(tmp_path, monkeypatch):
+    """Ctrl-C within the writing of a part, as Python delivers it: when the call returns."""
+    recorder = Recorder(tmp_path, COLUMNS, rows_per_part=10)
+    real, calls = pq.write_table, []
+
+    def interrupted(*arguments, **named):
+        real(*arguments, **named)
+        calls.append(1)
+        if len(calls) in (1, 3):
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr("cosim.recorder.pq.write_table", interrupted)
+    k = 0
+    for _ in range(3):  # what is not written yet when it comes, is written when it goes on
+        with contextlib.suppress(KeyboardInterrupt):
+            while k < 35:
+                recorder.observe(k, np.array([k, 2.0 * k]))
+                k += 1
+    recorder.close()
+    assert load_record(tmp_path)["time"].tolist() == list(range(35))
+
+
+def test_many_small_parts_become_few_row_groups(tmp_path, monkeypatch):
+    now = itertools.count(0.0, 2.0)
+    monkeypatch.setattr("cosim.recorder.time.monotonic", lambda: next(now))
+    recorder = Recorder(tmp_path, COLUMNS, rows_per_part=1000)
+    for k in range(300):
+        recorder.observe(k, np.array([k, 2.0 * k]))
+    assert len(list((tmp_path / PARTS).glob("*.parquet"))) == 299
+    assert len(load_record(tmp_path)["time"]) == 299
+    recorder.close()
+    assert pq.ParquetFile(tmp_path / RECORD).num_row_groups == 1
+    assert load_record(tmp_path)["x"].tolist() == [2.0 * k for k in range(300)]
+
+
+def test_a_fast_run_is_written_once(tmp_path, monkeypatch):
+    monkeypatch.setattr("cosim.recorder.time.monotonic", lambda: 0.0)
+    recorder = Recorder(tmp_path, COLUMNS)
+    for k in range(25_000):
+        recorder.observe(k, np.array([k, 2.0 * k]))
+    assert not list((tmp_path / PARTS).glob("*.parquet"))
+    recorder.close()
+    assert pq.ParquetFile(tmp_path / RECORD).num_row_groups == 3
+    assert load_record(tmp_path)["x"].tolist() == [2.0 * k for k in range(25_000)]
+
+
+def test_a_part_holds_64_mib_at_the_most(tmp_path, monkeypatch):
+    monkeypatch.setattr("cosim.recorder.time.monotonic", lambda: 0.0)
+    columns = [Column(f"c{i}", "", "x") for i in range(2000)]
+    recorder = Recorder(tmp_path, columns)
+    for k in range(2**23 // 2000 + 300):
+        recorder.observe(k, np.full(2000, float(k)))
+    (part,) = (tmp_path / PARTS).glob("*.parquet")
+    assert pq.ParquetFile(part).metadata.num_rows == 4000
+
+
+def test_a_record_that_cannot_be_finished_leaves_all_in_parts(tmp_path, monkeypatch):
+    recorder = Recorder(tmp_path, COLUMNS, rows_per_part=10)
+    for k in range(35):
+        recorder.observe(k, np.array([k, 2.0 * k]))
+
+    def refused(self, target):
+        if target.name == RECORD:
+            raise OSError(28, "No space left on device")
+        return real(self, target)
+
+    real = Path.replace
+    monkeypatch.setattr(Path, "replace", refused)
+    with pytest.raises(OSError, match="No space"):
+        recorder.close()
+    assert not (tmp_path / RECORD).exists()
+    assert load_record(tmp_path)["time"].tolist() == list(range(35))
+
+
+def test_a_storm_of_signals_loses_and_doubles_nothing(tmp_path):
+    recorder, storm = Recorder(tmp_path, COLUMNS, rows_per_part=300), np.random.default_rng(7)
+    caught = 0
+
+    def again(_, frame):
+        signal.setitimer(signal.ITIMER_REAL, storm.uniform(1e-5, 2e-3))
+        within = [f.f_code for f, _ in traceback.walk_stack(frame)]
+        if "__del__" in {code.co_name for code in within}:  # which swallows it
+            return
+        if recorder_module.__file__ in {code.co_filename for code in within}:
+            raise KeyboardInterrupt
+
+    before = signal.signal(signal.SIGALRM, again)
+    signal.setitimer(signal.ITIMER_REAL, 1e-3)
+    try:
+        while recorder.rows < 20_000:
+            try:
+                while recorder.rows < 20_000:
+                    recorder.observe(0, np.array([recorder.rows, 2.0 * recorder.rows]))
+            except KeyboardInterrupt:
+                caught += 1
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.signal(signal.SIGALRM, before)
+    recorder.close()
+    assert caught > 20
+    assert load_record(tmp_path)["time"].tolist() == list(range(20_000))
+    assert load_record(tmp_path)["x"].tolist() == [2.0 * k for k in range(20_000)]
 
 
 @pytest.mark.parametrize("at", range(1, 9))

@@ -1,19 +1,17 @@
 """Run folders: whole, readable, and complete even after an interruption."""
 
-import contextlib
 import json
-from pathlib import Path
 
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
 from cosim.errors import RunError
-from cosim.record import Recorder, load_record
+from cosim.record import load_record
+from cosim.recorder import Recorder
 from cosim.run import run_scenario
 from cosim.run_folder import claim, report_again
 from cosim.scenario import load_scenario
-from cosim.signals import Column
 from cosim.summary import spans
 from plant_fmu import PlantError
 
@@ -125,80 +123,6 @@ def test_ctrl_c_leaves_a_readable_run(tmp_path, monkeypatch):
     assert (run.folder / "report.html").exists()
 
 
-COLUMNS = [Column("time", "s", "Time"), Column("x", "m", "Place")]
-
-
-def test_a_killed_recorder_leaves_its_parts(tmp_path):
-    recorder = Recorder(tmp_path, COLUMNS, rows_per_part=10)
-    for k in range(35):
-        recorder.observe(k, np.array([k, 2.0 * k]))
-    record = load_record(tmp_path)  # nobody closed it
-    assert record["time"].tolist() == list(range(30))
-    assert record.units == {"time": "s", "x": "m"}
-
-
-def test_a_record_keeps_every_bit(tmp_path):
-    rows = np.random.default_rng(0).normal(size=(27, 2)) * 1e-300
-    rows[3] = [np.nan, -0.0]
-    recorder = Recorder(tmp_path, COLUMNS, rows_per_part=10)
-    for k, row in enumerate(rows):
-        recorder.observe(k, row)
-    recorder.close()
-    assert load_record(tmp_path).stack(["time", "x"]).tobytes() == rows.tobytes()
-    assert [p.name for p in tmp_path.iterdir()] == ["record.parquet"]
-
-
-@pytest.mark.parametrize("when", ["before", "after"])
-@pytest.mark.parametrize("where", ["pq.write_table", "pq.ParquetWriter.write_table", "Path.replace"])
-def test_an_interruption_while_a_part_is_written_loses_and_doubles_nothing(tmp_path, monkeypatch, where, when):
-    recorder = Recorder(tmp_path, COLUMNS, rows_per_part=10)
-    name, _, method = where.rpartition(".")
-    owner = {"pq": pq, "pq.ParquetWriter": pq.ParquetWriter, "Path": Path}[name]
-    real, calls = getattr(owner, method), []
-
-    def interrupted(*arguments, **keywords):
-        calls.append(method)
-        if len(calls) == 2 and when == "before":
-            raise KeyboardInterrupt
-        done = real(*arguments, **keywords)
-        if len(calls) == 2:
-            raise KeyboardInterrupt
-        return done
-
-    monkeypatch.setattr(owner, method, interrupted)
-    with contextlib.suppress(KeyboardInterrupt):
-        for k in range(100):
-            recorder.observe(k, np.array([k, 2.0 * k]))
-    assert 10 <= recorder.rows < 100
-    recorder.close()
-    assert load_record(tmp_path)["time"].tolist() == list(range(recorder.rows))
-    assert [p.name for p in tmp_path.iterdir()] == ["record.parquet"]
-
-
-def test_a_slow_run_is_written_by_the_clock(tmp_path, monkeypatch):
-    now = iter(np.arange(0.0, 1e3, 0.3))
-    monkeypatch.setattr("cosim.record.time.monotonic", lambda: next(now))
-    recorder = Recorder(tmp_path, COLUMNS)
-    for k in range(40):
-        recorder.observe(k, np.array([k, 2.0 * k]))
-    assert len(load_record(tmp_path)["time"]) >= 30
-
-
-@pytest.mark.parametrize("most", [199, 200])
-def test_a_large_record_keeps_few_signals_in_memory_and_a_small_one_all(tmp_path, monkeypatch, most):
-    monkeypatch.setattr("cosim.record._SMALL", most)
-    columns = [Column(f"c{i}", "", "x") for i in range(100)]
-    recorder = Recorder(tmp_path, columns)
-    for k in range(2):
-        recorder.observe(k, np.arange(100.0) + k)
-    recorder.close()
-    record = load_record(tmp_path)
-    assert [list(record[c.name]) for c in columns] == [[i, i + 1.0] for i in range(100)]
-    assert len(record._kept) == (24 if most < 200 else 100)
-    with pytest.raises(KeyError):
-        record["nothing"]
-
-
 @pytest.mark.slow
 def test_a_killed_run_can_be_reported(tmp_path):
     import shutil
@@ -246,39 +170,6 @@ def test_whatever_goes_wrong_in_a_step_leaves_a_readable_record(tmp_path, monkey
     with pytest.raises(ZeroDivisionError):
         run_scenario(scenario, tmp_path / "none")
     assert not (tmp_path / "none").exists()
-
-
-def test_an_interrupted_write_loses_and_repeats_nothing(tmp_path, monkeypatch):
-    """Ctrl-C within the writing of a part, as Python delivers it: when the call returns."""
-    recorder = Recorder(tmp_path, COLUMNS, rows_per_part=10)
-    real, calls = pq.write_table, []
-
-    def interrupted(*arguments, **named):
-        real(*arguments, **named)
-        calls.append(1)
-        if len(calls) in (1, 3):
-            raise KeyboardInterrupt
-
-    monkeypatch.setattr("cosim.record.pq.write_table", interrupted)
-    k = 0
-    for _ in range(3):  # what is not written yet when it comes, is written when it goes on
-        with contextlib.suppress(KeyboardInterrupt):
-            while k < 35:
-                recorder.observe(k, np.array([k, 2.0 * k]))
-                k += 1
-    recorder.close()
-    assert load_record(tmp_path)["time"].tolist() == list(range(35))
-
-
-def test_many_small_parts_become_few_row_groups(tmp_path):
-    recorder = Recorder(tmp_path, COLUMNS, rows_per_part=1000)
-    for k in range(300):
-        recorder.observe(k, np.array([k, 2.0 * k]))
-        recorder._flush()
-    assert len(load_record(tmp_path)["time"]) == 300
-    recorder.close()
-    assert pq.ParquetFile(tmp_path / "record.parquet").num_row_groups == 1
-    assert load_record(tmp_path)["x"].tolist() == [2.0 * k for k in range(300)]
 
 
 def test_regions_of_any_name_saturate_nothing(tmp_path):

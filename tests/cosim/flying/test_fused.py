@@ -9,7 +9,8 @@ from cosim.flying.fused import FusedFlyer
 from cosim.flying.outcome import OUTCOME
 from cosim.flying.variation import Variation
 from cosim.master import Master
-from cosim.record import Recorder, load_record
+from cosim.record import load_record
+from cosim.recorder import Recorder
 from cosim.scenario import load_scenario
 from cosim.summary import summarise
 

@@ -19,7 +19,8 @@ from cosim.cli import main
 from cosim.errors import RunError, TelemetryError
 from cosim.flown_run import SCENARIO
 from cosim.live.watching import Look, looks, picture
-from cosim.record import PARTS, RECORD, Recorder, load_record
+from cosim.record import PARTS, RECORD, load_record
+from cosim.recorder import Recorder
 from tests.cosim.live.conftest import ARM
 from tests.threads import ended
 

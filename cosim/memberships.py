@@ -1,0 +1,41 @@
+"""How much each criterion asks for attention, from what is left to its regions: compiled, for master and fused loop."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+import fuzzy_arbiter
+from controller.compiled import part
+from cosim.signals import Array
+from fuzzy_arbiter import ramp
+
+ARBITER = Path(fuzzy_arbiter.__file__).parent  # what is compiled here, and who is compiled with it, depend on it
+_ramp = part(ramp)
+
+
+def press(clearances: Array, criteria: NDArray[np.int64], width: float, memberships: Array) -> None:
+    """Write the membership of each criterion, that of its most pressing region.
+
+    Parameters
+    ----------
+    clearances : ndarray, shape (n,)
+        Of each region [m], or [rad] of attitude; what is no number asks for nothing.
+    criteria : ndarray of int, shape (n,)
+        Of each region.
+    width : float
+        Where memberships reach 0 [m].
+    memberships : ndarray, shape (criteria,)
+        Receives them, in [0, 1].
+    """
+    for i in range(memberships.size):
+        memberships[i] = 0.0
+    for i in range(criteria.size):
+        degree = _ramp(clearances[i], width)
+        if degree > memberships[criteria[i]]:
+            memberships[criteria[i]] = degree
+
+
+press = part(press, ARBITER)
