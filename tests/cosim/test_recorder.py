@@ -163,6 +163,7 @@ def test_a_record_that_cannot_be_finished_leaves_all_in_parts(tmp_path, monkeypa
     assert load_record(tmp_path)["time"].tolist() == list(range(35))
 
 
+@pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="there are no timers")
 def test_a_storm_of_signals_loses_and_doubles_nothing(tmp_path):
     recorder, storm = Recorder(tmp_path, COLUMNS, rows_per_part=300), np.random.default_rng(7)
     caught = 0
@@ -178,9 +179,9 @@ def test_a_storm_of_signals_loses_and_doubles_nothing(tmp_path):
     before = signal.signal(signal.SIGALRM, again)
     signal.setitimer(signal.ITIMER_REAL, 1e-3)
     try:
-        while recorder.rows < 20_000:
+        while caught < 50:
             try:
-                while recorder.rows < 20_000:
+                while caught < 50:
                     recorder.observe(0, np.array([recorder.rows, 2.0 * recorder.rows]))
             except KeyboardInterrupt:
                 caught += 1
@@ -188,9 +189,8 @@ def test_a_storm_of_signals_loses_and_doubles_nothing(tmp_path):
         signal.setitimer(signal.ITIMER_REAL, 0.0)
         signal.signal(signal.SIGALRM, before)
     recorder.close()
-    assert caught > 20
-    assert load_record(tmp_path)["time"].tolist() == list(range(20_000))
-    assert load_record(tmp_path)["x"].tolist() == [2.0 * k for k in range(20_000)]
+    assert load_record(tmp_path)["time"].tolist() == list(range(recorder.rows))
+    assert load_record(tmp_path)["x"].tolist() == [2.0 * k for k in range(recorder.rows)]
 
 
 @pytest.mark.parametrize("at", range(1, 9))
