@@ -72,7 +72,7 @@ def lean(function: F, *others: Path) -> F:
     return _kept_on_disk(function, others, counting=False)
 
 
-def part(function: F, *others: Path) -> F:
+def part(function: F) -> F:
     """Compile as `lean` does what compiled functions call.
 
     What Python needs to call a function takes as long to compile as a short function does. A part has it only where
@@ -82,15 +82,13 @@ def part(function: F, *others: Path) -> F:
     ----------
     function : callable
         As for `lean`.
-    *others : Path
-        As for `compiled`.
 
     Returns
     -------
     callable
         The same, compiled at its first call.
     """
-    return _kept_on_disk(function, others, counting=False, no_cpython_wrapper=True, no_cfunc_wrapper=True)
+    return _kept_on_disk(function, (), counting=False, no_cpython_wrapper=True, no_cfunc_wrapper=True)
 
 
 class _Part(CPUDispatcher):

@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
+import numba
 import numpy as np
 from numpy.typing import NDArray
 
 import fuzzy_arbiter
-from controller.compiled import part
+from controller.compiled import inlined
 from cosim.signals import Array
 from fuzzy_arbiter import ramp
 
-ARBITER = Path(fuzzy_arbiter.__file__).parent  # what is compiled here, and who is compiled with it, depend on it
-_ramp = part(ramp)
+ARBITER = Path(fuzzy_arbiter.__file__).parent  # what `press` is compiled into depends on it
+_ramp: Any = numba.njit(ramp)
 
 
+@inlined
 def press(clearances: Array, criteria: NDArray[np.int64], width: float, memberships: Array) -> None:
     """Write the membership of each criterion, that of its most pressing region.
 
@@ -33,9 +36,4 @@ def press(clearances: Array, criteria: NDArray[np.int64], width: float, membersh
     for i in range(memberships.size):
         memberships[i] = 0.0
     for i in range(criteria.size):
-        degree = _ramp(clearances[i], width)
-        if degree > memberships[criteria[i]]:
-            memberships[criteria[i]] = degree
-
-
-press = part(press, ARBITER)
+        memberships[criteria[i]] = max(memberships[criteria[i]], _ramp(clearances[i], width))

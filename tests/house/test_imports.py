@@ -69,7 +69,8 @@ ONE_PLACE = {
     "mcap_protobuf": {"cosim.export.as_mcap"},
     "numba": {
         *("controller.by_address", "controller.compiled", "controller.on_stack", "controller.regions.kinds"),
-        *("controller.repeated", "cosim.flight", "cosim.native", "fuzzy_arbiter.compiled"),
+        *("controller.repeated", "cosim.flight", "cosim.memberships", "cosim.native"),
+        "fuzzy_arbiter.compiled",
     },
     "pymavlink": {"cosim.mavlink.dialect"},
     "rerun": {"cosim.export.as_rrd"},
