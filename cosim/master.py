@@ -137,6 +137,7 @@ class Master:
         self._asked: list[float] | None = None  # memberships that the weights are of
         self._estimate = s.view("estimate.phi1", 4)
         n_reports = len(self.law.diagnostics)
+        self._reports = n_reports > 0
         self._report = s.view(f"law.{self.law.diagnostics[0].name}", n_reports) if n_reports else np.empty(0)
         self._lyapunov: LyapunovSignals | None = None
         self.helm: Helm | None = None
@@ -341,7 +342,7 @@ class Master:
         law, by_wrench = self.law, self.law.output == "wrench"
         forces = actuators.command if by_wrench else actuators.thrusts
         law.step(self.state, self.surroundings.goal, self.surroundings.regions, self._weights_of_regions, forces)
-        if law.diagnostics:
+        if self._reports:
             self._report[...] = law.report
         if by_wrench:
             actuators.push()

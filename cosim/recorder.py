@@ -18,7 +18,7 @@ from cosim.signals import Array, Column
 _WHOLE = "whole"  # among the parts, what a finished run makes of its rows
 _PART_SECONDS = 1.0  # of the wall clock, after which a part is written even if it is small
 _PART_NUMBERS = 2**23  # in a part at the most, unless another number of rows is asked for: 64 MiB
-_GROUP = 10_000  # rows that go into the whole at once
+_GROUP = 10_000  # rows that go into the whole at once, at the most
 _BLOCK = 250  # rows that wait to be turned into columns: as many as a processor's caches hold
 # measured: bytes of a float64 column compress best when they are split by place, and dictionaries only cost
 _WRITING = {"compression": "zstd", "use_dictionary": False, "use_byte_stream_split": True, "write_statistics": False}
@@ -50,18 +50,19 @@ class Recorder:
         self._folder, self._schema = folder, _schema(columns)
         self._rows_per_part = rows_per_part or max(1, _PART_NUMBERS // len(columns))
         block = min(_BLOCK, self._rows_per_part)
-        self._group = min(_GROUP, self._rows_per_part) // block * block
         self._block: Array = np.empty((block, len(columns)))
         self._rows = [row.data for row in self._block]  # copied to in half the time of an array's row
         self._filled = 0
+        self._group = min(_GROUP, self._rows_per_part) // block * block  # rows that go into the whole at once
         self._columns: Array = np.empty((len(columns), self._group))
-        self._turned = 0  # rows that stand in the columns already
-        self._unsaved: list[pa.Table] = []  # in no part yet
-        self._gathered: list[pa.Table] = []  # not in the whole yet
+        self._turned = 0  # rows of the present group, which stand in the columns;
+        self._saved = 0  # and how many of these are in a part already
+        self._unsaved: list[pa.Table] = []  # of earlier groups, what is in no part
         self._parts = 0
         (folder / PARTS).mkdir()
-        self._whole: pq.ParquetWriter | None = None  # what the record will be, begun with its first rows
-        self._sound = True  # the whole has what it should have; not so once a write was cut off
+        self._whole: pq.ParquetWriter | None = None  # what the record will be, begun with its first group
+        self._sound = True  # it has all earlier groups; not so once a write was cut off
+        self._whole_is_there = False  # in its place
         self._due = time.monotonic() + _PART_SECONDS
         self.rows = 0
 
@@ -80,86 +81,120 @@ class Recorder:
         self.rows += 1
 
     def close(self) -> None:
-        """Write what is left, and put the whole in the place of its parts; if that fails, these have all."""
-        self._gather_block()
-        self._gather_columns()
-        try:
-            if not self._sound:
-                self._begin_anew()
-            self._write_gathered()
-            if self._whole is not None:
-                self._whole.close()
-            (self._folder / PARTS / _WHOLE).replace(self._folder / RECORD)
-        except BaseException:
-            self._save()
-            raise
-        shutil.rmtree(self._folder / PARTS)
+        """Write what is left, and put the whole in the place of its parts; if that fails, these have all.
 
-    # ---- from rows to tables of columns ----
+        May be called again then.
+        """
+        if not self._whole_is_there:
+            try:
+                self._conclude()
+            except BaseException:
+                self._rescue()
+                raise
+        shutil.rmtree(self._folder / PARTS, ignore_errors=True)
+
+    # ---- from rows to columns ----
 
     def _turn(self) -> None:
         """Turn the rows of the block into columns, and write what is due."""
-        self._gather_block()
-        late = time.monotonic() > self._due
-        if late or self._turned == self._group:
-            self._gather_columns()
-        if late or _rows(self._unsaved) + self._group > self._rows_per_part:
+        self._turn_block()
+        if self._turned == self._group:
+            self._end_group()
+        if time.monotonic() > self._due or _rows(self._unsaved) + self._group > self._rows_per_part:
             self._save()
-        if self._sound and _rows(self._gathered) >= self._group:
-            self._write_gathered()
 
-    def _gather_block(self) -> None:
+    def _turn_block(self) -> None:
         if self._turned + self._filled > self._group:
-            self._gather_columns()
+            self._end_group()
         n = self._turned + self._filled
         self._columns[:, self._turned : n] = self._block[: self._filled].T
         self._turned, self._filled = n, 0
 
-    def _gather_columns(self) -> None:
-        if self._turned:
-            # not pa.array: that imports pandas where it is installed, for nothing
-            columns = [
-                pa.Array.from_buffers(pa.float64(), self._turned, [None, pa.py_buffer(column)])
-                for column in self._columns[:, : self._turned]
-            ]
-            table = pa.Table.from_arrays(columns, schema=self._schema)
-            unsaved, gathered, room = [*self._unsaved, table], [*self._gathered, table], np.empty_like(self._columns)
-            self._unsaved, self._gathered, self._columns, self._turned = unsaved, gathered, room, 0
+    def _table(self, first: int) -> pa.Table:
+        """Return the present group from one of its rows on; the columns stay the table's."""
+        # not pa.array: that imports pandas where it is installed, for nothing
+        arrays = [
+            pa.Array.from_buffers(pa.float64(), self._turned - first, [None, pa.py_buffer(column)])
+            for column in self._columns[:, first : self._turned]
+        ]
+        return pa.Table.from_arrays(arrays, schema=self._schema)
 
-    # ---- from tables to files ----
+    def _end_group(self) -> None:
+        """Write the present group into the whole, and begin another one."""
+        group, room, sound = self._table(0), np.empty_like(self._columns), self._sound
+        unsaved = [*self._unsaved, group.slice(self._saved)]
+        self._sound, self._unsaved, self._columns, self._turned, self._saved = False, unsaved, room, 0, 0
+        if sound:
+            self._append(group)
+            self._sound = True
+
+    # ---- from columns to files ----
 
     def _save(self) -> None:
         """Write a part of what is in none."""
-        if self._unsaved:
-            part = self._folder / PARTS / f"{self._parts:06}.parquet"
-            scratch = part.with_suffix(".tmp")
-            pq.write_table(pa.concat_tables(self._unsaved), scratch, **_WRITING)
-            scratch.replace(part)
-            self._parts, self._unsaved = self._parts + 1, []
+        tables = [*self._unsaved, self._table(self._saved)]
+        if _rows(tables):
+            self._write_part(tables)
+            self._parts, self._unsaved, self._saved = self._parts + 1, [], self._turned
         self._due = time.monotonic() + _PART_SECONDS
 
-    def _write_gathered(self) -> None:
-        """Write into the whole what is not in it."""
-        if self._gathered:
-            self._sound = False
-            if self._whole is None:
-                self._whole = pq.ParquetWriter(self._folder / PARTS / _WHOLE, self._schema, **_WRITING)
-            self._whole.write_table(pa.concat_tables(self._gathered).combine_chunks())
-            self._gathered, self._sound = [], True
-
-    def _begin_anew(self) -> None:
-        """Write the whole from its parts: Ctrl-C or a full disk came in the middle of it."""
+    def _rescue(self) -> None:
+        """Write parts of what is in none, in place of the whole, as far as the disk has room."""
+        self._drop_whole()
+        self._turn_block()
+        while self._unsaved:
+            self._write_part(self._unsaved[:1])
+            self._parts, self._unsaved = self._parts + 1, self._unsaved[1:]
         self._save()
+
+    def _write_part(self, tables: Sequence[pa.Table]) -> None:
+        part = self._folder / PARTS / f"{self._parts:06}.parquet"
+        scratch = part.with_suffix(".tmp")
+        try:
+            pq.write_table(pa.concat_tables(tables), scratch, **_WRITING)
+            scratch.replace(part)
+        except BaseException:
+            scratch.unlink(missing_ok=True)
+            raise
+
+    def _append(self, table: pa.Table) -> None:
+        if self._whole is None:
+            self._whole = pq.ParquetWriter(self._folder / PARTS / _WHOLE, self._schema, **_WRITING)
+        self._whole.write_table(table)
+
+    def _conclude(self) -> None:
+        """Finish the whole, and put it in its place."""
+        self._turn_block()
+        sound, self._sound = self._sound, False  # unless this ends well, it is begun anew
+        if not sound:
+            self._append_parts()
+        elif self._turned:
+            self._append(self._table(0))
+        if self._whole is not None:
+            self._whole.close()
+        (self._folder / PARTS / _WHOLE).replace(self._folder / RECORD)
+        self._whole_is_there = True
+
+    def _append_parts(self) -> None:
+        """Begin the whole anew, with all parts: Ctrl-C or a full disk came in the middle of it."""
+        self._drop_whole()
+        self._save()
+        tables: list[pa.Table] = []
+        files = part_files(self._folder)
+        for file in files:
+            with pq.ParquetFile(file) as part:
+                tables.append(part.read())
+            if _rows(tables) >= self._group or file == files[-1]:
+                self._append(pa.concat_tables(tables).combine_chunks())
+                tables = []
+
+    def _drop_whole(self) -> None:
+        self._sound = False
         if self._whole is not None:
             with contextlib.suppress(OSError, pa.ArrowException):
                 self._whole.close()
+            (self._folder / PARTS / _WHOLE).unlink(missing_ok=True)
             self._whole = None
-        self._gathered = []
-        for part in part_files(self._folder):
-            with pq.ParquetFile(part) as parquet:
-                self._gathered.append(parquet.read())
-            if _rows(self._gathered) >= self._group:
-                self._write_gathered()
 
 
 def _rows(tables: Sequence[pa.Table]) -> int:

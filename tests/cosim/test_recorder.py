@@ -4,6 +4,7 @@ import contextlib
 import itertools
 import signal
 import traceback
+import tracemalloc
 from pathlib import Path
 
 import numpy as np
@@ -163,6 +164,71 @@ def test_a_record_that_cannot_be_finished_leaves_all_in_parts(tmp_path, monkeypa
     assert load_record(tmp_path)["time"].tolist() == list(range(35))
 
 
+@pytest.mark.parametrize("first", [1, 2, 3])
+@pytest.mark.parametrize("then", range(6))
+def test_a_close_that_is_interrupted_leaves_all_and_may_be_called_again(tmp_path, monkeypatch, first, then):
+    recorder = Recorder(tmp_path, COLUMNS, rows_per_part=10)
+    for k in range(35):
+        recorder.observe(k, np.array([k, 2.0 * k]))
+    calls = itertools.count(1)
+
+    def interrupted(real):
+        def call(*arguments, **named):
+            done = real(*arguments, **named)
+            if next(calls) in (first, first + then):
+                raise KeyboardInterrupt
+            return done
+
+        return call
+
+    monkeypatch.setattr("cosim.recorder.pq.write_table", interrupted(pq.write_table))
+    for owner, method in [(pq.ParquetWriter, "write_table"), (pq.ParquetWriter, "close"), (Path, "replace")]:
+        monkeypatch.setattr(owner, method, interrupted(getattr(owner, method)))
+    with pytest.raises(KeyboardInterrupt):
+        recorder.close()
+    if not then:  # it was not interrupted in saving what there was either
+        assert load_record(tmp_path)["time"].tolist() == list(range(35))
+    with contextlib.suppress(KeyboardInterrupt):
+        recorder.close()
+    recorder.close()
+    assert load_record(tmp_path)["x"].tolist() == [2.0 * k for k in range(35)]
+    assert [p.name for p in tmp_path.iterdir()] == [RECORD]
+
+
+def test_where_the_whole_finds_no_room_parts_hold_what_there_is_room_for(tmp_path, monkeypatch):
+    resource = pytest.importorskip("resource")
+    monkeypatch.setattr("cosim.recorder.time.monotonic", lambda: 0.0)
+    rng = np.random.default_rng(3)
+    recorder = Recorder(tmp_path, [Column(f"c{i}", "", "x") for i in range(20)])
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (2_000_000, before[1]))  # a group takes 1.5 MB
+    try:
+        with pytest.raises(OSError, match="too large"):
+            _record(recorder, rng.normal(size=(25_000, 20)))
+        with pytest.raises(OSError, match="too large"):
+            recorder.close()
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    assert len(load_record(tmp_path)["c0"]) == recorder.rows == 20_000
+    assert not list((tmp_path / PARTS).glob("*.tmp"))
+
+
+def test_a_slow_run_takes_no_more_memory_as_it_goes_on(tmp_path, monkeypatch):
+    now = itertools.count(0.0, 0.3)
+    monkeypatch.setattr("cosim.recorder.time.monotonic", lambda: next(now))
+    recorder = Recorder(tmp_path, [Column(f"c{i}", "", "x") for i in range(100)])  # room for a group takes 8 MB
+    row, held = np.ones(100), []
+    tracemalloc.start()
+    try:
+        for k in range(300):
+            recorder.observe(k, row)
+            held.append(tracemalloc.get_traced_memory()[0])
+    finally:
+        tracemalloc.stop()
+    assert len(list((tmp_path / PARTS).glob("*.parquet"))) > 20
+    assert held[-1] - held[100] < 2e6
+
+
 @pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="there are no timers")
 def test_a_storm_of_signals_loses_and_doubles_nothing(tmp_path):
     recorder, storm = Recorder(tmp_path, COLUMNS, rows_per_part=300), np.random.default_rng(7)
@@ -210,7 +276,7 @@ def test_a_record_holds_each_row_once_however_its_writing_is_interrupted(tmp_pat
 
     monkeypatch.setattr(pq.ParquetWriter, "write_table", interrupted)
     with pytest.raises(KeyboardInterrupt):
-        _record(recorder)
+        _record(recorder, np.arange(20.0)[:, np.newaxis])
     recorder.close()
     assert pq.read_table(tmp_path / RECORD)["time"].to_pylist() == list(range(recorder.rows))
 
@@ -228,11 +294,11 @@ def test_a_record_is_whole_after_a_disk_that_was_full_for_a_while(tmp_path, monk
 
     monkeypatch.setattr(pq.ParquetWriter, "write_table", full)
     with pytest.raises(OSError, match="No space"):
-        _record(recorder)
+        _record(recorder, np.arange(20.0)[:, np.newaxis])
     recorder.close()
     assert load_record(tmp_path)["time"].tolist() == list(range(recorder.rows))
 
 
-def _record(recorder):
-    for k in range(20):
-        recorder.observe(k, np.array([float(k)]))
+def _record(recorder, rows):
+    for k, row in enumerate(rows):
+        recorder.observe(k, row)
