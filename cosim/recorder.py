@@ -154,7 +154,8 @@ class Recorder:
             pq.write_table(pa.concat_tables(tables), scratch, **_WRITING)
             scratch.replace(part)
         except BaseException:
-            scratch.unlink(missing_ok=True)
+            with contextlib.suppress(OSError):
+                scratch.unlink()
             raise
 
     def _append(self, table: pa.Table) -> None:
@@ -193,7 +194,8 @@ class Recorder:
         if self._whole is not None:
             with contextlib.suppress(OSError, pa.ArrowException):
                 self._whole.close()
-            (self._folder / PARTS / _WHOLE).unlink(missing_ok=True)
+            with contextlib.suppress(OSError):
+                (self._folder / PARTS / _WHOLE).unlink()
             self._whole = None
 
 
