@@ -86,7 +86,8 @@ def _values(column: Any) -> NDArray[Any]:
         pa.Array.from_buffers(chunk.type, len(chunk), [None, chunk.buffers()[1]], 0, chunk.offset)
         for chunk in column.chunks
     ]
-    return np.concatenate([np.empty(0, column.type.to_pandas_dtype()), *map(np.from_dlpack, chunks)])
+    nothing = pa.Array.from_buffers(column.type, 0, [None, pa.py_buffer(b"")])  # tells the type where there is none
+    return np.concatenate([np.from_dlpack(chunk) for chunk in (nothing, *chunks)])
 
 
 def _presence(absent: NDArray[np.bool_] | None) -> Any:
