@@ -86,7 +86,6 @@ class Master:
         self._failures = bool(scenario.failures)
         self.surroundings = Surroundings(scenario)
         self._boundary = 0.0  # s, when the next step begins
-        self._criterion_of = [CRITERIA.index(secondary.criterion) for secondary in scenario.regions]
 
         self.plant = Plant(scenario.vehicle, scenario.plant.fmi)
         try:
@@ -326,10 +325,8 @@ class Master:
         return memberships
 
     def _weigh(self, memberships: list[float]) -> None:
-        weights = self.arbiter(memberships)
-        self._weights[:] = weights
-        for i, criterion in enumerate(self._criterion_of):
-            self._weights_of_regions[i] = weights[criterion]
+        self._weights[:] = self.arbiter(memberships)
+        self._weights_of_regions[:] = self._weights[self.surroundings.criteria]
 
     def _control(self) -> None:
         """Ask the law, or the sticks, for forces of the coming period, and bring them to the plant's inputs."""

@@ -64,16 +64,17 @@ class Surroundings:
     ----------
     regions : PackedRegions
         The n secondary ones, where they are now.
+    criteria : ndarray of int, shape (n,)
+        Of each of them, as an index of `CRITERIA`.
     """
 
     def __init__(self, scenario: Scenario) -> None:
         secondary = [region.region for region in scenario.regions]
         self.regions = pack(secondary)
-        self._criteria = np.array([CRITERIA.index(region.criterion) for region in scenario.regions], dtype=np.int64)
-        self._ramp = scenario.arbiter.ramp
+        self.criteria = np.array([CRITERIA.index(region.criterion) for region in scenario.regions], dtype=np.int64)
         self._goal_region, self._middle = scenario.goal_region, middle_of(scenario.goal)
-        self._reached = self._new_target(None, self._middle)
-        self._head_for(self._reached)
+        self._target = self._reached = self._new_target(None, self._middle)
+        self._places = _Places(self.goal, self.regions, self.criteria, scenario.arbiter.ramp)
         self._names = ["goal", *(region.name for region in secondary)]
         self._streamed = ["goal"] if scenario.goal_streamed else []
         self._streamed += [region.region.name for region in scenario.regions if region.streamed and not region.seen]
@@ -240,7 +241,7 @@ class Surroundings:
 
     def _head_for(self, target: _Target) -> None:
         self._target = target
-        self._places = _Places(target.packed, self.regions, self._criteria, self._ramp)
+        self._places = self._places._replace(goal=target.packed)
 
     def _new_target(self, radius: float | None, position: Vector3) -> _Target:
         """Return a target at rest with its middle at a position, as a sphere or in the shape of the scenario's goal."""
@@ -254,8 +255,7 @@ class Surroundings:
 
     def set_ramp(self, width: float) -> None:
         """Let the memberships reach 0 at another clearance [m]."""
-        self._ramp = width
-        self._head_for(self._target)
+        self._places = self._places._replace(ramp=width)
 
     def set_gain(self, name: str, gain: float) -> None:
         """Give a secondary region another gain."""
@@ -278,6 +278,7 @@ class Surroundings:
 
 
 def _evaluate(places: _Places, state: VehicleState, found: Outlook) -> None:
+    """Evaluate the goal into the first places, and the regions into those behind, in one call."""
     p, e, g, c = state.position, state.quaternion, found.values, found.clearances
     evaluate_packed(places.goal, p, e, g[:1], found.gradients[:1], found.turnings[:1], c[:1])
     evaluate_packed(places.regions, p, e, g[1:], found.gradients[1:], found.turnings[1:], c[1:])
