@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import hashlib
+import io
 import logging
 import os
 import stat
 import types
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, TypeVar
 
 import numba
+from numba.core.caching import IndexDataCacheFile
 from numba.core.registry import CPUDispatcher
 
 log = logging.getLogger(__name__)
@@ -20,6 +23,7 @@ log = logging.getLogger(__name__)
 F = TypeVar("F", bound=Callable[..., object])
 
 _HERE = Path(__file__).parent
+_NumbasCacheFile: Any = IndexDataCacheFile  # which has no types
 
 
 @functools.cache
@@ -122,11 +126,11 @@ def _kept_on_disk(function: F, others: tuple[Path, ...], *, counting: bool, **wi
     # Stamp it with all sources of the package; should Numba's insides move, rather keep nothing on disk than old code.
     stamp = _sources(Path(function.__code__.co_filename).parent, *others)
     try:
-        cache_file = jitted._cache._cache_file
-        cache_file._source_stamp  # noqa: B018 - raises where it is gone
-        cache_file._source_stamp = stamp
-        jitted._cache.save_overload = _if_there_is_room(jitted._cache.save_overload)
-        kept = Path(jitted._cache.cache_path)
+        cache = jitted._cache
+        cache._cache_file._source_stamp  # noqa: B018 - raises where it is gone
+        kept = Path(cache.cache_path)
+        cache._cache_file = _CacheFile(str(kept), f"{cache._impl.filename_base}.summed", stamp)
+        cache.save_overload = _if_there_is_room(cache.save_overload)
         if not _is_ours(kept, Path(function.__code__.co_filename)):
             log.warning("Numba's cache %s: others can write there; compiled for this process alone", kept)
             jitted = numba.njit(**options)(function)
@@ -136,6 +140,53 @@ def _kept_on_disk(function: F, others: tuple[Path, ...], *, counting: bool, **wi
         jitted.__class__ = _Part
     result: F = jitted
     return result
+
+
+class _CacheFile(_NumbasCacheFile):  # type: ignore[misc]
+    """Numba's files of one function, each with the checksum of what is in it: one that is damaged is made anew.
+
+    Code that is damaged could do anything, so it is never loaded. The checksum of code has the stamp of its sources
+    with it, so that an index that was written before a kill never stands for the code of older sources.
+    """
+
+    def _load_index(self) -> Any:
+        return super()._load_index() if self._is_whole(self._index_path) else {}
+
+    def _load_data(self, name: str) -> Any:
+        if not self._is_whole(self._data_path(name)):
+            raise OSError(f"{name} is damaged")  # which Numba takes for a file that is gone
+        return super()._load_data(name)
+
+    @contextlib.contextmanager
+    def _open_for_write(self, path: str) -> Iterator[Any]:
+        content = io.BytesIO()
+        yield content
+        with super()._open_for_write(path) as file:
+            file.write(content.getvalue() + self._sum(path, content.getvalue()))
+
+    def _sum(self, path: str, content: bytes) -> bytes:
+        stamp = "" if path == self._index_path else self._source_stamp
+        return hashlib.sha256(stamp.encode() + content).digest()
+
+    def _is_whole(self, path: str) -> bool:
+        try:
+            content = Path(path).read_bytes()
+        except FileNotFoundError:
+            return False
+        except OSError as error:  # such as one that others alone may read, or a folder in its place
+            log.debug("%s: %s", path, error.strerror or error)
+            content = b""
+        n = hashlib.sha256().digest_size
+        whole = content[-n:] == self._sum(path, content[:-n])
+        if not whole:
+            _tell_of_damage(os.path.dirname(path))
+        return whole
+
+
+@functools.cache
+def _tell_of_damage(folder: str) -> None:
+    """Say it once, however many files there are."""
+    log.warning("Numba's cache %s: a file in it is damaged; what it held is compiled anew", folder)
 
 
 def _is_ours(folder: Path, source: Path) -> bool:

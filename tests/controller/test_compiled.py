@@ -2,10 +2,15 @@
 
 import errno
 import importlib
+import logging
+import os
 import pkgutil
+import runpy
+import shutil
 from pathlib import Path
 
 import numpy as np
+import pytest
 from numba.core.dispatcher import Dispatcher
 
 import controller
@@ -48,6 +53,90 @@ def test_a_full_disk_keeps_nothing_and_the_function_runs(monkeypatch, caplog):
     monkeypatch.setattr(function._cache._cache_file, "save", full)
     assert function(1.0) == 5.0
     assert "No space left" in caplog.text
+
+
+@pytest.fixture
+def kept(tmp_path):
+    """A function that gives 5 for 1, kept in the folder of its own file; returns what loads it anew, and its files."""
+    (tmp_path / "it.py").write_text("def it(x):\n    return x + 4.0\n")
+
+    def load():
+        return compiled(runpy.run_path(str(tmp_path / "it.py"))["it"])
+
+    assert load()(1.0) == 5.0
+    module._tell_of_damage.cache_clear()
+    return load, {ending: next((tmp_path / "__pycache__").glob(f"*.{ending}")) for ending in ("nbi", "nbc")}
+
+
+def a_folder(file):
+    file.unlink()
+    file.mkdir()
+
+
+def one_bit_of_code(file):
+    content = bytearray(file.read_bytes())
+    content[len(content) // 2] ^= 1
+    file.write_bytes(content)
+
+
+DAMAGES = {
+    "empty": lambda file: file.write_bytes(b""),
+    "half": lambda file: os.truncate(file, file.stat().st_size // 2),
+    "one byte short": lambda file: os.truncate(file, file.stat().st_size - 1),
+    "one bit": one_bit_of_code,
+    "garbage": lambda file: file.write_bytes(os.urandom(1000)),
+    "a pickle of another's": lambda file: file.write_bytes(b"\x80\x04cno_such_module\nrun\n."),
+}
+
+
+@pytest.mark.parametrize("ending", ["nbi", "nbc"])
+@pytest.mark.parametrize("damage", DAMAGES.values(), ids=DAMAGES)
+def test_d1_a_damaged_file_of_the_cache_is_made_anew(kept, damage, ending, caplog):
+    load, files = kept
+    damage(files[ending])
+    again = load()
+    assert again(1.0) == 5.0 and not again.stats.cache_hits
+    (said,) = caplog.messages
+    assert "\n" not in said and "damaged" in said and str(files[ending].parent) in said
+    healed = load()
+    assert healed(1.0) == 5.0 and healed.stats.cache_hits
+    assert len(caplog.messages) == 1
+
+
+@pytest.mark.skipif(os.name != "posix" or os.geteuid() == 0, reason="whoever runs this may read every file")
+def test_d1_a_file_that_cannot_be_read_is_made_anew(kept, caplog):
+    load, files = kept
+    files["nbc"].chmod(0)
+    assert load()(1.0) == 5.0 and "damaged" in caplog.text
+    assert load()(1.0) == 5.0 and files["nbc"].stat().st_size > 0
+
+
+@pytest.mark.parametrize("ending", ["nbi", "nbc"])
+def test_d1_a_folder_in_the_place_of_a_file_is_left_and_the_function_runs(kept, ending, caplog):
+    load, files = kept
+    a_folder(files[ending])
+    assert load()(1.0) == 5.0 and files[ending].is_dir()
+    assert all("\n" not in said for said in caplog.messages) and "this process alone" in caplog.text
+
+
+def test_d1_code_of_older_sources_is_not_loaded_by_an_index_of_newer_ones(kept, tmp_path, caplog):
+    """A kill between the two files leaves both."""
+    load, files = kept
+    old = files["nbc"].read_bytes()
+    (tmp_path / "other.py").write_text("a = 1")
+    module._sources.cache_clear()
+    assert load()(1.0) == 5.0
+    files["nbc"].write_bytes(old)
+    again = load()
+    assert again(1.0) == 5.0 and not again.stats.cache_hits
+
+
+def test_d1_what_is_sound_is_loaded_without_a_word(kept, caplog):
+    load, files = kept
+    caplog.set_level(logging.DEBUG, "controller")
+    assert load()(1.0) == 5.0 and not caplog.messages
+    shutil.rmtree(files["nbc"].parent)
+    assert load()(1.0) == 5.0 and not caplog.messages
 
 
 def test_without_numbas_insides_nothing_is_cached(monkeypatch):

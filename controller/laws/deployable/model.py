@@ -127,7 +127,7 @@ def share_out(thrusters: Thrusters) -> None:
     inverse = np.linalg.inv(H)
     for i in range(m):
         for j in range(m):
-            thrusters.inverse[i, j] = inverse[i, j]
+            thrusters.inverse[i, j] = 0.5 * (inverse[i, j] + inverse[j, i])  # symmetric to the last bit
         for k in range(6):
             total = 0.0
             for j in range(m):
@@ -141,7 +141,9 @@ def free_acceleration(
 ) -> None:
     """Write the acceleration over ground, world frame, shape (3,) [m/s2], that is there without thrust.
 
-    From drag against the water, W - B, and the turning of the body's axes, in which mass and drag are given: (11).
+    From drag against the water, W - B, and the turning of the body's axes, in which mass and drag are given: the
+    translational part of (11). Where added mass couples translation and rotation, what turns the vehicle moves it too;
+    that is left out, but for the thrusters' moments in `thrust_acceleration`.
 
     Parameters
     ----------

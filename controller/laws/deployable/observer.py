@@ -1,9 +1,10 @@
 """Where the vehicle is, how it moves, and what pushes it: a Kalman filter for each world axis.
 
 Each has three states: position, velocity over ground, and what the law is not told of that axis: the current north and
-east, W - B downwards. They are coupled through the prediction, which uses the whole model (11); the covariances are
-carried axis by axis. Projection keeps current and W - B within their bounds, and since the prediction uses the forces
-that were commanded within the limits, a saturated thruster winds nothing up.
+east, W - B downwards. They are coupled through the prediction, which uses the translational part of the model (11), see
+`model.free_acceleration`; the covariances are carried axis by axis. Projection keeps current and W - B within their
+bounds, and since the prediction uses the forces that were commanded within the limits, a saturated thruster winds
+nothing up.
 """
 
 from __future__ import annotations

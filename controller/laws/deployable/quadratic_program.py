@@ -34,6 +34,7 @@ Array = NDArray[np.float64]
 _TOLERANCE = 1e-11  # of the greatest violation at the start, below which a row counts as kept
 _DEPENDENT = 1e-12  # of a row's own G_ii: where less is left of it beside the other rows, it depends on them
 _STEPS_A_ROW = 3
+_HALF = 2.0**27 + 1.0  # splits the 53 digits of a number in halves, each exact
 _FREE, _PASSIVE, _ASIDE, _NOTHING = 0, 1, 2, 3  # what a row is: may be added, is in, cannot be now, moves no force
 
 
@@ -55,6 +56,8 @@ class Workspace(NamedTuple):
     passive: NDArray[np.int64]  # (r + 2 m,) rows whose multiplier is free, in order of coming
     factor: Array  # (r + 2 m, r + 2 m) Cholesky factor of G over the passive rows
     wanted: Array  # (m,) u0
+    pull: Array  # (m,) A^T y
+    better: Array  # (m,) u, as corrected
 
 
 def workspace(barriers: int, thrusters: int) -> Workspace:
@@ -84,6 +87,8 @@ def workspace(barriers: int, thrusters: int) -> Workspace:
         passive=np.zeros(n, dtype=np.int64),
         factor=np.zeros((n, n)),
         wanted=np.zeros(thrusters),
+        pull=np.zeros(thrusters),
+        better=np.zeros(thrusters),
     )
 
 
@@ -99,7 +104,7 @@ def solve(work: Workspace, barriers: int, inverse: Array, lower: Array, upper: A
     barriers : int
         How many rows count.
     inverse : ndarray, shape (m, m)
-        H^-1, symmetric positive definite.
+        H^-1, positive definite and symmetric to the last bit.
     lower, upper : ndarray, shape (m,)
         Limits [N], lower <= upper.
     forces : ndarray, shape (m,)
@@ -108,8 +113,8 @@ def solve(work: Workspace, barriers: int, inverse: Array, lower: Array, upper: A
     Returns
     -------
     int
-        Steps taken, each a change of the rows that hold: at most 3 (barriers + 2 m). Negative if that ended the search;
-        the forces are then within the limits, but not the best.
+        Steps taken, each a change of the rows that hold: at most 3 (barriers + 2 m). Negative if that ended the search,
+        or numbers beyond 1e150 did; the forces are then within the limits, but not the best.
     """
     n = barriers + 2 * forces.size
     tolerance = _TOLERANCE * _begin(work, barriers, inverse, lower, upper)
@@ -148,11 +153,25 @@ def solve(work: Workspace, barriers: int, inverse: Array, lower: Array, upper: A
             if work.standing[i] == _ASIDE:
                 work.standing[i] = _FREE
         at = _worst(work, barriers, lower, upper, forces, tolerance)
-    if at < 0:
-        _refine(work, barriers, count, lower, upper, forces)
-    for j in range(forces.size):  # of the last bits; of more if the search was ended
-        forces[j] = min(max(forces[j], lower[j]), upper[j])
-    return steps if at < 0 else -steps
+    if at < 0 and count > 0:
+        _refine(work, barriers, count, inverse, lower, upper, forces)
+    whole = _limit(work, lower, upper, forces)
+    return steps if at < 0 and whole else -steps
+
+
+@part
+def _limit(work: Workspace, lower: Array, upper: Array, forces: Array) -> bool:
+    """Bring the forces into their limits; False if they were no numbers: those that are wanted take their places."""
+    whole = True
+    for j in range(forces.size):
+        if not np.isfinite(forces[j]):
+            forces[j], whole = work.wanted[j], False
+        forces[j] = min(max(forces[j], lower[j]), upper[j])  # of the last bits; of more if the search was ended
+    if not whole:
+        for i in range(work.multipliers.size):
+            if not np.isfinite(work.multipliers[i]):
+                work.multipliers[i] = 0.0
+    return whole
 
 
 @part
@@ -218,25 +237,90 @@ def _worst(work: Workspace, barriers: int, lower: Array, upper: Array, forces: A
 
 
 @part
-def _refine(work: Workspace, barriers: int, count: int, lower: Array, upper: Array, forces: Array) -> None:
-    """Correct the multipliers and forces of the passive rows by what those forces still lack: rounding."""
-    m = forces.size
+def _refine(
+    work: Workspace, barriers: int, count: int, inverse: Array, lower: Array, upper: Array, forces: Array
+) -> None:
+    """Correct forces and multipliers of the passive rows by what they still lack of the two conditions: rounding.
+
+    These are u = u0 + H^-1 A^T y and A u + y / rho = b. Where rows contradict each other, A^T y is a million times
+    less than its terms, and the forces would feel how those are rounded. So what is lacking is summed in twice the
+    precision; the correction itself is small, and needs none of that.
+    """
+    m, better, whole = forces.size, work.better, 0.0
+    _sum_pull(work, barriers, count)
+    for j in range(m):
+        better[j] = work.wanted[j]
+        for q in range(m):
+            better[j] += inverse[j, q] * work.pull[q]
     for a in range(count):
         i = work.passive[a]
-        if i < barriers:
-            work.residual[i] = work.right[i] - work.price[i] * work.multipliers[i]
-            for j in range(m):
-                work.residual[i] -= work.rows[i, j] * forces[j]
-        elif i < barriers + m:
-            work.residual[i] = lower[i - barriers] - forces[i - barriers]
-        else:
-            work.residual[i] = forces[i - barriers - m] - upper[i - barriers - m]
+        work.residual[i] = _lack(work, barriers, i, lower, upper, better)
     _minimum(work, count)
+    for a in range(count):
+        whole += work.trial[a]
+        for j in range(m):
+            better[j] += work.shaped[work.passive[a], j] * work.trial[a]
+    for j in range(m):
+        whole += better[j]
+    if not np.isfinite(whole):  # numbers too great for that
+        return
+    copy(better, forces)
     for a in range(count):
         i = work.passive[a]
         work.multipliers[i] = max(work.multipliers[i] + work.trial[a], 0.0)
-        for j in range(forces.size):
-            forces[j] += work.shaped[i, j] * work.trial[a]
+        if barriers <= i < barriers + m:
+            forces[i - barriers] = lower[i - barriers]
+        elif i >= barriers + m:
+            forces[i - barriers - m] = upper[i - barriers - m]
+
+
+@part
+def _sum_pull(work: Workspace, barriers: int, count: int) -> None:
+    """Write A^T y into `pull`, summed over the passive rows in twice the precision."""
+    m, pull, rest = work.wanted.size, work.pull, work.better
+    for j in range(m):
+        pull[j], rest[j] = 0.0, 0.0
+    for a in range(count):
+        i = work.passive[a]
+        y = work.multipliers[i]
+        if i < barriers:
+            for j in range(m):
+                pull[j], rest[j] = _add(pull[j], rest[j], work.rows[i, j], y)
+        else:
+            j, sign = (i - barriers, 1.0) if i < barriers + m else (i - barriers - m, -1.0)
+            pull[j], rest[j] = _add(pull[j], rest[j], sign, y)
+    for j in range(m):
+        pull[j] += rest[j]
+
+
+@part
+def _lack(work: Workspace, barriers: int, i: int, lower: Array, upper: Array, forces: Array) -> float:
+    """Return what row i lacks at these forces and its multiplier, summed in twice the precision."""
+    m = forces.size
+    if i >= barriers + m:
+        return float(forces[i - barriers - m] - upper[i - barriers - m])
+    if i >= barriers:
+        return float(lower[i - barriers] - forces[i - barriers])
+    total, rest = _add(work.right[i], 0.0, -work.price[i], work.multipliers[i])
+    for j in range(m):
+        total, rest = _add(total, rest, -work.rows[i, j], forces[j])
+    return total + rest
+
+
+@part
+def _add(total: float, rest: float, a: float, b: float) -> tuple[float, float]:
+    """Return total + a b as rounded, and rest with what that rounding lost: of the product and of the sum.
+
+    Both are exact, by Dekker, Veltkamp and Knuth: Ogita, Rump and Oishi, SIAM J. Sci. Comput. 26 (2005), 1955-1988.
+    """
+    product = a * b
+    wide_a, wide_b = _HALF * a, _HALF * b
+    high_a, high_b = wide_a - (wide_a - a), wide_b - (wide_b - b)
+    low_a, low_b = a - high_a, b - high_b
+    of_product = ((high_a * high_b - product) + high_a * low_b + low_a * high_b) + low_a * low_b
+    after = total + product
+    there = after - total
+    return after, rest + (of_product + ((total - (after - there)) + (product - there)))
 
 
 @part
