@@ -1,12 +1,16 @@
 """The build backend: hatchling, with a hook that puts compiled libraries into wheels and source distributions.
 
-With them the FMUs of vehicles need no compiler where the package is used. They are compiled for all platforms, by the
-ziglang package, when a wheel or a source distribution is built from a checkout. A source distribution holds them, so
-that nothing is compiled when a wheel is built from one; an editable installation has none and compiles when it must.
+With them the FMUs of vehicles need no compiler where the package is used. A source distribution gets those of all
+platforms, compiled by the ziglang package; a wheel that is built from it holds them too, and nothing is compiled then.
+A wheel that is built from a checkout, as ``pip install .`` does, gets those of this machine alone, compiled by ``cc``
+where there is one, and its name says for which machine it is. An editable installation has none and compiles when it
+must.
 """
 
 from __future__ import annotations
 
+import os
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -23,7 +27,7 @@ import pathlib, sys
 from plant_fmu.prebuilt import shipped_structures, write_prebuilt
 for structure in shipped_structures():
     for fmi in (2, 3):
-        write_prebuilt(structure, fmi, pathlib.Path(sys.argv[1]))
+        write_prebuilt(structure, fmi, sys.argv[1], pathlib.Path(sys.argv[2]))
 """
 
 
@@ -34,12 +38,13 @@ class PrebuiltLibraries(BuildHookInterface):  # type: ignore[type-arg]
     _folder: tempfile.TemporaryDirectory[str] | None = None
 
     def dependencies(self) -> list[str]:
-        """Return what the build needs: a compiler, and what the package itself imports for the work."""
+        """Return what the build needs: what the package itself imports for the work, and a compiler."""
         if self._is_there():
             return []
         core = self.metadata.core
         needed = [text for text in core.dependencies if text.startswith(_NEEDED)]
-        return [*needed, *core.optional_dependencies["build"]]
+        has_compiler = os.environ.get("CC") or shutil.which("cc")
+        return needed if has_compiler and self._for_this_machine() else [*needed, *core.optional_dependencies["build"]]
 
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:
         """Compile the libraries, unless this is an editable installation or they are there."""
@@ -47,9 +52,12 @@ class PrebuiltLibraries(BuildHookInterface):  # type: ignore[type-arg]
             return
         self._folder = tempfile.TemporaryDirectory(prefix="subreach-")
         folder = self._folder.name
-        subprocess.run([sys.executable, "-c", _COMPILE, folder], cwd=self.root, check=True)  # noqa: S603 - our own code
+        platforms = "native" if self._for_this_machine() else "all"
+        subprocess.run([sys.executable, "-c", _COMPILE, platforms, folder], cwd=self.root, check=True)  # noqa: S603 - our own code
         for file in sorted(Path(folder).iterdir()):
             build_data["force_include"][str(file)] = f"plant_fmu/prebuilt/{file.name}"
+        if self._for_this_machine():
+            build_data |= {"pure_python": False, "infer_tag": True}
 
     def finalize(self, version: str, build_data: dict[str, Any], artifact_path: str) -> None:
         """Leave nothing behind."""
@@ -58,6 +66,9 @@ class PrebuiltLibraries(BuildHookInterface):  # type: ignore[type-arg]
 
     def _is_there(self) -> bool:
         return (Path(self.root) / "PKG-INFO").is_file()  # an unpacked source distribution
+
+    def _for_this_machine(self) -> bool:
+        return bool(self.target_name == "wheel")
 
 
 def get_requires_for_build_editable(config_settings: dict[str, Any] | None = None) -> list[str]:

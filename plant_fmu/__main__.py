@@ -3,26 +3,70 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import math
+import os
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any, NoReturn
 
-from plant_fmu.archive import write_whole
-from plant_fmu.build import FMI_VERSIONS, build_fmu
-from plant_fmu.check import Verdict, check_fmu
-from plant_fmu.contents.layered import reference_files
-from plant_fmu.contents.parameter_set import ssv
-from plant_fmu.contents.reference import reference
-from plant_fmu.description import documentation
-from plant_fmu.errors import PlantFmuError
-from plant_fmu.pictures import IMAGES, PICTURES, image
-from plant_fmu.platforms import ALL, NATIVE, PLATFORMS
-from plant_fmu.vehicle import load_vehicle, shipped_vehicles
+from plant_fmu.installing import install_hint
+
+
+def _missing(error: ModuleNotFoundError) -> str:
+    return f"plant_fmu: {error.name} is not installed: run {install_hint('.')} in the checkout of subreach"
+
+
+try:
+    from plant_fmu.archive import write_whole
+    from plant_fmu.build import FMI_VERSIONS, build_fmu
+    from plant_fmu.check import Verdict, check_fmu
+    from plant_fmu.contents.layered import reference_files
+    from plant_fmu.contents.parameter_set import ssv
+    from plant_fmu.contents.reference import reference
+    from plant_fmu.description import documentation
+    from plant_fmu.errors import PlantFmuError, one_line
+    from plant_fmu.pictures import IMAGES, PICTURES, image
+    from plant_fmu.platforms import ALL, NATIVE, PLATFORMS
+    from plant_fmu.vehicle import load_vehicle, shipped_vehicles
+except ModuleNotFoundError as error:  # in a checkout that is not installed
+    print(_missing(error), file=sys.stderr)
+    sys.exit(2)
+
+FAULT, INTERRUPTED, NO_READER = 2, 130, 141
+
+
+class _Version(argparse.Action):
+    """Prints the version, which takes a while to find."""
+
+    def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
+        from importlib import metadata
+
+        try:
+            version = metadata.version("subreach")
+        except metadata.PackageNotFoundError:
+            version = "of a folder that is not installed"
+        print(f"plant_fmu {version}")
+        parser.exit()
+
+
+class _Parser(argparse.ArgumentParser):
+    """Says what is wrong in one line, as all other errors."""
+
+    def print_help(self, file: Any = None) -> None:
+        """Print it; argparse itself would pass over output that fails."""
+        print(self.format_help(), end="", file=file)
+
+    def error(self, message: str) -> NoReturn:
+        verb = self.prog.removeprefix("python -m plant_fmu").strip()
+        _tell(f"{verb + ': ' if verb else ''}{message}; see --help")
+        self.exit(FAULT)
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog="python -m plant_fmu", description="Underwater vehicles as FMUs.")
+    parser = _Parser(prog="python -m plant_fmu", description="Underwater vehicles as FMUs.")
+    parser.add_argument("--version", action=_Version, nargs=0, help="show program's version number and exit")
     verbs = parser.add_subparsers(dest="verb", required=True)
 
     build = verbs.add_parser("build", help="write the FMU of a vehicle")
@@ -110,44 +154,73 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns
     -------
     int
-        0; 1 if an importer failed with a checked FMU; 2 where the user must mend something; 130 if interrupted.
+        0; 1 if an importer failed with a checked FMU; 2 where the user must mend something; 130 if interrupted; 141 if
+        nobody reads the output.
     """
-    options = _parser().parse_args(arguments)
+    if sys.stdout is None:  # closed by whoever started this: the next file that is opened would take its place
+        _tell("standard output is closed; expected it open, such as on /dev/null")
+        return FAULT
     try:
-        if options.verb == "list":
-            names = shipped_vehicles()
-            for name in names:
-                print(f"{name:{max(map(len, names))}}  {load_vehicle(name).title}")
-        elif options.verb == "docs":
-            print(documentation(load_vehicle(options.vehicle)), end="")
-        elif options.verb == "plot":
-            figure = PICTURES[options.picture](load_vehicle(options.vehicle))
-            write_whole(options.out, image(figure, options.out.suffix[1:].lower()))
-            print(options.out)
-        elif options.verb == "ssv":
-            vehicle = load_vehicle(options.vehicle)
-            print(_write(options.out or Path(f"{vehicle.name}.ssv"), ssv(vehicle)))
-        elif options.verb == "reference":
-            vehicle = load_vehicle(options.vehicle)
-            for name, text in reference_files(vehicle, reference(vehicle)).items():
-                print(_write(options.out / name, text))
-        elif options.verb == "check":
-            verdicts = check_fmu(options.fmu, options.stop_time, options.step, dict(options.set))
-            _print_verdicts(verdicts)
-            return 1 if any(verdict.result.status == "failed" for verdict in verdicts) else 0
-        else:
-            vehicle = load_vehicle(options.vehicle)
-            print(build_fmu(vehicle, options.fmi, options.out or Path(f"{vehicle.name}.fmu"), options.platforms))
+        try:
+            return _run(_parser().parse_args(arguments))
+        finally:
+            sys.stdout.flush()
+    except ModuleNotFoundError as error:  # of this product, whose version an FMU names
+        print(_missing(error), file=sys.stderr)
+        return FAULT
     except PlantFmuError as error:
-        print(f"plant_fmu: {error}", file=sys.stderr)
-        return 2
-    except OSError as error:  # a full disk, or a reader that has gone
-        print(f"plant_fmu: {error.filename or 'output'}: {error.strerror or error}", file=sys.stderr)
-        return 2
+        _tell(str(error))
+        return FAULT
+    except BrokenPipeError:
+        _drop_output()
+        return NO_READER
+    except OSError as error:  # such as a full disk behind the output
+        _drop_output()
+        _tell(f"{error.filename or 'standard output'}: {error.strerror or error}")
+        return FAULT
     except KeyboardInterrupt:
-        print("plant_fmu: interrupted", file=sys.stderr)
-        return 130
+        _tell("interrupted")
+        return INTERRUPTED
+
+
+def _run(options: argparse.Namespace) -> int:
+    if options.verb == "list":
+        names = shipped_vehicles()
+        for name in names:
+            print(f"{name:{max(map(len, names))}}  {load_vehicle(name).title}")
+        return 0
+    if options.verb == "check":
+        verdicts = check_fmu(options.fmu, options.stop_time, options.step, dict(options.set))
+        _print_verdicts(verdicts)
+        return 1 if any(verdict.result.status == "failed" for verdict in verdicts) else 0
+    vehicle = load_vehicle(options.vehicle)
+    if options.verb == "docs":
+        print(documentation(vehicle), end="")
+    elif options.verb == "plot":
+        figure = PICTURES[options.picture](vehicle)
+        write_whole(options.out, image(figure, options.out.suffix[1:].lower()))
+        print(options.out)
+    elif options.verb == "ssv":
+        print(_write(options.out or Path(f"{vehicle.name}.ssv"), ssv(vehicle)))
+    elif options.verb == "reference":
+        for name, text in reference_files(vehicle, reference(vehicle)).items():
+            print(_write(options.out / name, text))
+    else:
+        print(build_fmu(vehicle, options.fmi, options.out or Path(f"{vehicle.name}.fmu"), options.platforms))
     return 0
+
+
+def _tell(what: str) -> None:
+    """Say something in one line on standard error; nothing where that is closed or gone."""
+    if sys.stderr is not None:  # else `print` would take standard output
+        with contextlib.suppress(OSError):
+            print(f"plant_fmu: {one_line(what)}", file=sys.stderr, flush=True)
+
+
+def _drop_output() -> None:
+    """Let what is left of the output go nowhere, else the interpreter fails again to write it at its end."""
+    with contextlib.suppress(OSError):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 if __name__ == "__main__":

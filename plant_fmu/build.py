@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import atexit
+import contextlib
 import errno
 import functools
 import logging
@@ -22,7 +23,7 @@ from plant_fmu.description import model_description, token
 from plant_fmu.errors import BuildError
 from plant_fmu.libraries import compiled_libraries, digest
 from plant_fmu.platforms import NATIVE, Platform, cross_platforms, native_platform
-from plant_fmu.prebuilt import prebuilt_libraries
+from plant_fmu.prebuilt import prebuilt_files, prebuilt_libraries
 from plant_fmu.sources import build_description, c_sources, header
 from plant_fmu.universal import universal_library
 from plant_fmu.vehicle import Vehicle
@@ -92,8 +93,9 @@ def cached_fmu(what: Vehicle | Component, fmi: int) -> Path:
     Returns
     -------
     Path
-        The file; what it is made from is part of its name. It lies in the user's cache folder or, where that cannot be
-        made, in one that goes with the process.
+        The file; what it is made from, and by which compiler, is part of its name. Where there is no compiler any more,
+        one that another compiler made does as well. It lies in the user's cache folder or, where that cannot be made,
+        in one that goes with the process.
 
     Raises
     ------
@@ -101,12 +103,19 @@ def cached_fmu(what: Vehicle | Component, fmi: int) -> Path:
         As `build_fmu`.
     """
     require_version(fmi)
-    path = Path(platformdirs.user_cache_dir("subreach")) / "fmu" / f"{what.name}-fmi{fmi}-{_digest(what, fmi)[:16]}.fmu"
+    name = f"{what.name}-fmi{fmi}-{_digest(what, fmi)[:16]}"
+    path = Path(platformdirs.user_cache_dir("subreach")) / "fmu" / f"{name}-{_maker()}.fmu"
     if zipfile.is_zipfile(path):  # one that was damaged is built anew
         return path
     component = _component(what)
     if prebuilt_libraries(component, token(component, fmi), fmi, [native_platform()]) is None:
-        find_compiler()  # so that a missing compiler is said before anything is written
+        try:
+            find_compiler()  # so that a missing compiler is said before anything is written
+        except BuildError:
+            for other in sorted(path.parent.glob(f"{name}-*.fmu")):
+                if zipfile.is_zipfile(other):
+                    return other
+            raise
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         if not os.access(path.parent, os.W_OK):
@@ -126,6 +135,13 @@ def _digest(what: Vehicle | Component, fmi: int) -> str:
     To write all of that down takes longer than to load an FMU, so a process does it once for each vehicle.
     """
     return digest(neutral_members(what, fmi), native_platform().name, *FLAGS, fmpy.__version__)
+
+
+def _maker() -> str:
+    """Return what names who makes libraries here: each compiler makes other bytes of the same sources."""
+    with contextlib.suppress(BuildError):
+        return digest({}, *prebuilt_files(), *find_compiler())[:8]
+    return digest({}, *prebuilt_files())[:8]
 
 
 @functools.cache

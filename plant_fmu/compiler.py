@@ -15,6 +15,7 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 from plant_fmu.errors import BuildError
+from plant_fmu.installing import install_hint
 from plant_fmu.platforms import Platform, native_platform
 
 log = logging.getLogger(__name__)
@@ -26,7 +27,7 @@ FLAGS = (
     "-DFMI2_OVERRIDE_FUNCTION_PREFIX", "-DFMI3_OVERRIDE_FUNCTION_PREFIX",
 )  # fmt: skip
 _WARNINGS = ("-Wall", "-Wextra", "-Wpedantic")
-_INSTALL = "pip install 'subreach[build]'"
+_ZIGLANG = "ziglang>=0.13"  # which is a C compiler too
 
 
 def find_compiler() -> list[str]:
@@ -55,7 +56,7 @@ def find_compiler() -> list[str]:
         return [path]
     if importlib.util.find_spec("ziglang"):
         return cross_compiler(native_platform())
-    raise BuildError(f"no C compiler: neither cc nor the ziglang package was found; {_INSTALL}")
+    raise BuildError(f"no C compiler: neither cc nor the ziglang package was found; {install_hint(_ZIGLANG)}")
 
 
 def cross_compiler(platform: Platform) -> list[str]:
@@ -77,7 +78,8 @@ def cross_compiler(platform: Platform) -> list[str]:
         If the package is not there.
     """
     if importlib.util.find_spec("ziglang") is None:
-        raise BuildError(f"no compiler for other platforms: the ziglang package was not found; {_INSTALL}")
+        hint = install_hint(_ZIGLANG)
+        raise BuildError(f"no compiler for other platforms: the ziglang package was not found; {hint}")
     return [sys.executable, "-m", "ziglang", "cc", "-target", platform.target]
 
 

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import hashlib
-import math
 from importlib import metadata
 from xml.etree import ElementTree as ET
 
 from plant_fmu.component import Component
 from plant_fmu.markup import xml_text
-from plant_fmu.quantities import UNITS
+from plant_fmu.quantities import DISPLAY_UNITS, UNITS
 from plant_fmu.sources import c_sources, compiled_files, header
 from plant_fmu.variables import Variable, variables
 from plant_fmu.vehicle import Vehicle
@@ -40,7 +39,7 @@ _INTERFACES = {  # by FMI version
 _NEEDS_STATES = ("providesDirectionalDerivative", "providesDirectionalDerivatives", "providesAdjointDerivatives")
 _LOG_CATEGORIES = {
     "logEvents": "Initialisation, and samples in model exchange",
-    "logStatusWarning": "Values that were mended",
+    "logStatusWarning": "Values that were mended, steps that do not fit; logged until switched off",
     "logStatusDiscard": "States that an integrator tried and that lie outside the plant's domain",
     "logStatusError": "Refused values and calls; logged until switched off",
     "logAll": "All of these",
@@ -123,8 +122,8 @@ def model_description(component: Component, fmi: int, token: str) -> str:
     for name, exponents in ((name, exponents) for name, exponents in UNITS.items() if name in used):
         unit = ET.SubElement(units, "Unit", name=name)
         ET.SubElement(unit, "BaseUnit", {key: str(power) for key, power in exponents.items()})
-        if name == "rad":
-            ET.SubElement(unit, "DisplayUnit", name="deg", factor=_number(math.degrees(1.0)))
+        for display, factor in DISPLAY_UNITS.get(name, {}).items():
+            ET.SubElement(unit, "DisplayUnit", name=display, factor=_number(factor))
 
     log = ET.SubElement(root, "LogCategories")
     for category, what in _LOG_CATEGORIES.items():
@@ -161,8 +160,8 @@ def _add_variable(parent: ET.Element, vr: int, v: Variable, fmi: int, number: di
     kind: dict[str, str] = {}
     if v.quantity.unit:
         kind["unit"] = v.quantity.unit
-    if v.quantity.unit == "rad":
-        kind["displayUnit"] = "deg"
+    if v.quantity.display_unit:
+        kind["displayUnit"] = v.quantity.display_unit
     if v.quantity.bounded and v.type != "boolean":
         kind |= {"min": v.text(v.quantity.minimum), "max": v.text(v.quantity.maximum)}
     if real and v.role != "time":

@@ -19,11 +19,11 @@ from dataclasses import fields, replace
 from pathlib import Path
 
 from plant_fmu.archive import write_archive
-from plant_fmu.compiler import cross_compiler
+from plant_fmu.compiler import cross_compiler, find_compiler
 from plant_fmu.component import Component, of_vehicle
 from plant_fmu.errors import BuildError
 from plant_fmu.libraries import compiled_libraries, made_from
-from plant_fmu.platforms import PLATFORMS, Platform
+from plant_fmu.platforms import NATIVE, Platform, cross_platforms, native_platform
 from plant_fmu.signature import signed_anew
 from plant_fmu.variables import Variable
 from plant_fmu.vehicle import Vehicle, load_vehicle, shipped_vehicles
@@ -34,6 +34,11 @@ NAME = "prebuilt"  # which their functions begin with
 STAND_IN = "{" + "-".join("0" * n for n in (8, 4, 4, 4, 12)) + "}"  # for a token
 _GIVEN = ("state", "input", "parameter")  # what has a start value
 _ROW = struct.Struct("<4d")  # of the table: start, min, max, nominal; every platform is little-endian
+
+
+def prebuilt_files() -> list[str]:
+    """Return the names of the files that come with the package, which say what their libraries are made from."""
+    return sorted(path.name for path in FOLDER.iterdir()) if FOLDER.is_dir() else []
 
 
 def prebuilt_libraries(
@@ -55,14 +60,15 @@ def prebuilt_libraries(
     Returns
     -------
     list of (Platform, bytes) or None
-        In the order of `platforms`; None where the package has not all of them, of these very sources.
+        In the order of `platforms`; None where the package has not all of them, of these very sources: one that was
+        installed from a checkout has this machine's alone.
 
     Raises
     ------
     BuildError
         If what comes with the package is damaged.
     """
-    if not FOLDER.is_dir() or not all(platform.name in PLATFORMS and _has_libc(platform) for platform in platforms):
+    if not FOLDER.is_dir() or not all(map(_has_libc, platforms)):
         return None
     general = general_component(component)
     path = FOLDER / file_name(general, fmi)
@@ -70,8 +76,10 @@ def prebuilt_libraries(
         return None
     try:
         with zipfile.ZipFile(path) as archive:
+            if not set(map(_member, platforms)) <= set(archive.namelist()):
+                return None
             found = [(platform, archive.read(_member(platform))) for platform in platforms]
-    except (OSError, KeyError, zipfile.BadZipFile, zlib.error) as error:
+    except (OSError, zipfile.BadZipFile, zlib.error) as error:
         raise BuildError(f"{path}: damaged ({error}); install subreach anew") from error
     return [(platform, _numbered(library, general, component, token)) for platform, library in found]
 
@@ -89,8 +97,8 @@ def shipped_structures() -> list[Component]:
     return list({structure.constants["N_THRUSTERS"]: structure for structure in structures}.values())
 
 
-def write_prebuilt(structure: Component, fmi: int, folder: Path) -> Path:
-    """Compile libraries that come with the package, by the compiler of the ziglang package.
+def write_prebuilt(structure: Component, fmi: int, platforms: str, folder: Path) -> Path:
+    """Compile libraries that come with the package.
 
     Parameters
     ----------
@@ -98,20 +106,25 @@ def write_prebuilt(structure: Component, fmi: int, folder: Path) -> Path:
         One of `shipped_structures`.
     fmi : int
         2 or 3.
+    platforms : str
+        ``all``, by the compiler of the ziglang package, or ``native``, by any.
     folder : Path
         Where the file goes.
 
     Returns
     -------
     Path
-        The file, with the libraries of all platforms.
+        The file, with the libraries of these platforms.
 
     Raises
     ------
     BuildError
         If there is no such compiler, or it fails, or the file cannot be written.
     """
-    compilers = [(platform, cross_compiler(platform)) for platform in PLATFORMS.values()]
+    if platforms == NATIVE:
+        compilers = [(native_platform(), find_compiler())]
+    else:
+        compilers = [(platform, cross_compiler(platform)) for platform in cross_platforms(platforms)]
     libraries = compiled_libraries(structure, STAND_IN, fmi, compilers)
     out = folder / file_name(structure, fmi)
     write_archive(out, {_member(platform): library for platform, library in libraries})

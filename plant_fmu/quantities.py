@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 # unit: exponents of kg, m, s, rad
@@ -38,6 +39,23 @@ UNITS: dict[str, dict[str, int]] = {
     "s2/kg": {"kg": -1, "s": 2},
 }
 
+_G = 9.80665  # m/s2, standard gravity
+
+# what else a tool may show a unit in: name, and how many of it are one of the unit
+DISPLAY_UNITS: dict[str, dict[str, float]] = {
+    "s": {"ms": 1e3, "min": 1 / 60, "h": 1 / 3600},
+    "m": {"mm": 1e3, "cm": 1e2, "km": 1e-3},
+    "m/s": {"cm/s": 1e2, "km/h": 3.6, "kn": 3600 / 1852},
+    "m/s2": {"g": 1 / _G},
+    "rad": {"deg": math.degrees(1.0)},
+    "rad/s": {"deg/s": math.degrees(1.0)},
+    "rad/s2": {"deg/s2": math.degrees(1.0)},
+    "kg": {"t": 1e-3},
+    "N": {"kN": 1e-3, "kgf": 1 / _G},
+    "N.m": {"kN.m": 1e-3},
+}
+_SHOWN_IN = {"rad": "deg", "rad/s": "deg/s", "rad/s2": "deg/s2"}  # unless the user chooses otherwise
+
 
 @dataclass(frozen=True)
 class Quantity:
@@ -47,6 +65,12 @@ class Quantity:
     minimum: float
     maximum: float
     nominal: float = 1.0
+    is_gain: bool = False  # of a control law, which is shown as the law has it
+
+    @property
+    def display_unit(self) -> str:
+        """The unit that tools show it in, "" for its own."""
+        return "" if self.is_gain else _SHOWN_IN.get(self.unit, "")
 
     @property
     def bounded(self) -> bool:

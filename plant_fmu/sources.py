@@ -18,7 +18,7 @@ _DECLARED = re.compile(
     r"^(?!static|typedef)(?:\w[\w ]*[ *]+)([a-z]\w*)\(|^extern [^;\[]*?(\w+)(?:\[\])?;", re.MULTILINE
 )
 
-_OTHER_WRAPPER = {2: "fmi3.c", 3: "fmi2.c"}
+_OTHER_WRAPPER = {2: "fmi3", 3: "fmi2"}
 
 
 def plant_sources() -> dict[str, bytes]:
@@ -47,8 +47,8 @@ def c_sources(component: Component, fmi: int) -> dict[str, bytes]:
     dict of str to bytes
         Contents by name, in alphabetical order.
     """
-    wrapper = _files("csrc/wrapper")
-    del wrapper[_OTHER_WRAPPER[fmi]]
+    other = _OTHER_WRAPPER[fmi]
+    wrapper = {name: code for name, code in _files("csrc/wrapper").items() if not name.startswith(other)}
     return dict(sorted({**wrapper, **component.sources}.items()))
 
 

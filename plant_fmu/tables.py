@@ -23,7 +23,6 @@ MAX_DEPTH = 20  # tables and lists within each other
 MAX_DIGITS = 400  # of a whole number; beyond them it is no float either
 
 _LONGEST_NAME = 100  # that is compared with known ones
-_LONGEST_WORDS = 1000  # of a message
 
 _LISTED = 30  # names that a message still lists
 
@@ -47,6 +46,8 @@ def read_toml(path: Path) -> dict[str, Any]:
         If it cannot be read, is no TOML, or is absurdly long or deep; the caller knows its name.
     """
     try:
+        if path.exists() and not path.is_file():  # to open a pipe would wait for its other end
+            raise TableError("is a folder, a pipe or a device, expected a file")
         with path.open("rb") as file:
             data = file.read(MAX_FILE + 1)
         if len(data) > MAX_FILE:
@@ -56,12 +57,23 @@ def read_toml(path: Path) -> dict[str, Any]:
         raise TableError(error.strerror or str(error)) from error
     except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError, ValueError) as error:
         raise TableError(f"not valid TOML: {error}") from error
-    _require_modest(table)
+    require_modest(table)
     return table
 
 
-def _require_modest(table: dict[str, Any]) -> None:
-    """Refuse tables so deep, and whole numbers so great, that Python itself stumbles over them."""
+def require_modest(table: dict[str, Any]) -> None:
+    """Refuse tables so deep, and whole numbers so great, that Python itself stumbles over them.
+
+    Parameters
+    ----------
+    table : dict
+        As TOML has it.
+
+    Raises
+    ------
+    TableError
+        That names the key.
+    """
     waiting: list[tuple[str, Any, int]] = [(key, value, 1) for key, value in table.items()]
     while waiting:
         key, value, depth = waiting.pop()
@@ -100,6 +112,8 @@ def decode(table: dict[str, Any], kind: type[T], where: str = "") -> T:
     _refuse_unknown(table, kind, where)
     try:
         return msgspec.convert(table, kind)
+    except UnicodeEncodeError as error:  # from a command line: files are read as UTF-8
+        raise TableError(f"{where or 'a text'}: {error.object!r} is no UTF-8, expected such a text") from error
     except msgspec.ValidationError as error:
         text, _, at = str(error).partition(" - at ")
         raise _mistyped(text, at, table, kind, where) from error
@@ -126,25 +140,6 @@ def hint(came: str, known: typing.Iterable[str]) -> str:
         return f"did you mean {near[0]!r}?"
     listed = ", ".join(known) if len(known) <= _LISTED else f"{len(known)} names, such as {', '.join(known[:3])}"
     return f"expected one of {listed or '(none)'}"
-
-
-def brief(said: object) -> str:
-    """Return what an error says in one line that a terminal only shows, cut where what came is absurdly long.
-
-    Parameters
-    ----------
-    said : object
-        Such as an exception.
-
-    Returns
-    -------
-    str
-        Begin and end of it; what is not printable, such as the escape of a terminal's orders, as Python writes it.
-    """
-    text, half = " ".join(str(said).splitlines()), _LONGEST_WORDS // 2
-    if not text.isprintable():
-        text = "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
-    return text if len(text) <= _LONGEST_WORDS else f"{text[:half]} ... {text[-half:]}"
 
 
 def dataclass_of(annotation: Any) -> type | None:

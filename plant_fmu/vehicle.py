@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from plant_fmu.autopilot import Autopilot, checked_autopilot
 from plant_fmu.errors import TableError, VehicleError
-from plant_fmu.tables import brief, decode, read_toml
+from plant_fmu.tables import decode, read_toml
 
 Vector3 = tuple[float, float, float]
 Vector6 = tuple[float, float, float, float, float, float]
@@ -197,7 +197,7 @@ def _decode(path: Path, where: str) -> Vehicle:
     try:
         file = decode(read_toml(path), _File)
     except TableError as error:
-        raise TableError(f"{where}: {brief(error)}") from error
+        raise TableError(f"{where}: {error}") from error
     return _check(file, where)
 
 
@@ -210,7 +210,7 @@ def _check(file: _File, where: str) -> Vehicle:
 
     def require(good: bool, key: str, came: object, expected: str) -> None:
         if not good:
-            raise VehicleError(f"{where}: {key} is {brief(came)}, expected {expected}")
+            raise VehicleError(f"{where}: {key} is {came}, expected {expected}")
 
     def square(value: Matrix, n: int, key: str) -> NDArray[np.float64]:
         widths = {len(row) or -1 if isinstance(row, tuple) else 0 for row in value}  # 0: a number, no row

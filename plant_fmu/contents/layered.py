@@ -1,4 +1,4 @@
-"""The layered standard fmi-ls-ref 1.0.0-alpha.1 in an FMU: parameter sets and reference results, with a manifest."""
+"""The layered standard FMI-LS-REF 1.0.0-beta.1 in an FMU: parameter sets and reference results, with a manifest."""
 
 from __future__ import annotations
 
@@ -19,10 +19,12 @@ FOLDER = "extra/org.fmi-standard.fmi-ls-ref"
 _MANIFEST = {
     "xmlns:fmi-ls": "http://fmi-standard.org/fmi-ls-manifest",
     "fmi-ls:fmi-ls-name": "org.fmi-standard.fmi-ls-ref",
-    "fmi-ls:fmi-ls-version": "1.0.0-alpha.1",
+    # whose labels are used; its own text still names the release before, which knew none
+    "fmi-ls:fmi-ls-version": "1.0.0-beta.1",
     # the schema of the layered standard fixes this sentence
     "fmi-ls:fmi-ls-description": "Layered Standard providing information on related files included in an FMU.",
 }
+_LABEL = {"name": "manoeuvre:reference", "description": "Start, inputs and results of one manoeuvre"}
 _SSV = "application/x-ssp-parameter-set"
 _START = "Start of the reference manoeuvre, and its current"
 _DIGITS = 11  # significant: more than the plant's own integration holds
@@ -60,7 +62,9 @@ def layered_files(vehicle: Vehicle, rows: Sequence[Variable] | None = None) -> d
 
     root = ET.Element("fmiReferences", _MANIFEST)
     for source, kind, role, description in related:
-        ET.SubElement(root, "Related", type=kind, source=source, role=role, description=description)
+        element = ET.SubElement(root, "Related", type=kind, source=source, role=role, description=description)
+        if source != f"{name}.ssv":
+            ET.SubElement(element, "Label", _LABEL)
     return {"fmi-ls-manifest.xml": xml_text(root), **files}
 
 

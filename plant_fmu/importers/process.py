@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import shlex
 import signal
 import subprocess
 import sys
@@ -15,6 +14,7 @@ from pathlib import Path
 from plant_fmu.importers.fmu_file import FmuFile
 from plant_fmu.importers.registry import Importer
 from plant_fmu.importers.task import Result, Task
+from plant_fmu.installing import install_hint
 
 TIMEOUT = 120.0  # s
 
@@ -51,7 +51,7 @@ def run_importer(importer: Importer, fmu: FmuFile, task: Task, timeout: float = 
         return Result(importer.name, version, importer.interface, status, line, **more)  # type: ignore[arg-type]
 
     if missing := importer.missing():
-        return result("not installed", f"pip install {shlex.join(missing)}")
+        return result("not installed", install_hint(*missing))
     if objection := importer.objection(fmu):
         return result("does not apply", objection)
     with tempfile.TemporaryDirectory(prefix="plant_fmu-", ignore_cleanup_errors=True) as scratch:

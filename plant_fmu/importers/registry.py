@@ -71,12 +71,12 @@ def _not_casadi(fmu: FmuFile) -> str:
 _TBB = ("tbb>=2021.13",) if sys.platform == "linux" else ()
 
 IMPORTERS = (
-    Importer("FMPy validation", "fmpy_validation", ("fmpy>=0.3.22",), ""),
+    Importer("FMPy validation", "fmpy_validation", ("fmpy>=0.3.30",), ""),
     Importer("fmu-manipulation-toolbox", "toolbox", ("fmu-manipulation-toolbox>=2.0",), ""),
-    Importer("FMPy", "fmpy_stepping", ("fmpy>=0.3.22",), "CS"),
-    Importer("FMPy FMU state", "fmpy_state", ("fmpy>=0.3.22",), "CS", _not_state),
+    Importer("FMPy", "fmpy_stepping", ("fmpy>=0.3.30",), "CS"),
+    Importer("FMPy FMU state", "fmpy_state", ("fmpy>=0.3.30",), "CS", _not_state),
     Importer("libcosim", "libcosim", ("libcosimpy>=0.0.6",), "CS", _not_libcosim),
     Importer("Ecos", "ecos", ("ecospy>=0.7", *_TBB), "CS"),
-    Importer("FMPy CVode", "fmpy_cvode", ("fmpy>=0.3.22",), "ME"),
+    Importer("FMPy CVode", "fmpy_cvode", ("fmpy>=0.3.30",), "ME"),
     Importer("CasADi", "casadi_import", ("casadi>=3.8",), "ME", _not_casadi),
 )

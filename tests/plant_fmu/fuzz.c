@@ -82,7 +82,7 @@ static void hear(fmi2ComponentEnvironment e, fmi2String name, fmi2Status status,
 static Unit create(int me, int quiet)
 {
     static fmi2CallbackFunctions loud = {hear, NULL, NULL, NULL, NULL}, silent = {NULL, NULL, NULL, NULL, NULL};
-    return fmi2Instantiate(draw(5) ? "x" : NULL, me ? fmi2ModelExchange : fmi2CoSimulation,
+    return fmi2Instantiate(draw(20) ? "x" : NULL, me ? fmi2ModelExchange : fmi2CoSimulation,
                            draw(50) ? INSTANTIATION_TOKEN : "no%s%n", NULL, quiet ? &silent : &loud, 0, draw(2) != 0);
 }
 
@@ -139,7 +139,7 @@ static void hear(fmi3InstanceEnvironment e, fmi3Status status, fmi3String catego
 
 static Unit create(int me, int quiet)
 {
-    const char *token = draw(50) ? INSTANTIATION_TOKEN : "no%s%n", *name = draw(5) ? "x" : NULL;
+    const char *token = draw(50) ? INSTANTIATION_TOKEN : "no%s%n", *name = draw(20) ? "x" : NULL;
     return me ? fmi3InstantiateModelExchange(name, token, NULL, 0, draw(2), NULL, quiet ? NULL : hear)
               : fmi3InstantiateCoSimulation(name, token, NULL, 0, draw(2), 0, 0, NULL, 0, NULL, quiet ? NULL : hear, NULL);
 }
@@ -175,7 +175,7 @@ static int step(Unit c, double t, double h)
 {
     fmi3Boolean b[3];
     double last;
-    return (int)fmi3DoStep(c, t, h, 1, draw(2) ? &b[0] : NULL, &b[1], &b[2], draw(2) ? &last : NULL);
+    return (int)fmi3DoStep(c, t, h, 1, draw(20) ? &b[0] : NULL, &b[1], &b[2], draw(20) ? &last : NULL);
 }
 
 static int integers(Unit c, unsigned reference, int value)

@@ -1,21 +1,27 @@
 """Building FMUs, and refusing to."""
 
 import os
+import re
 import shutil
 import stat
+import subprocess
 import sys
 import tempfile
 import zipfile
+from importlib import metadata
 from pathlib import Path
 
 import pytest
 
+import plant_fmu
 from plant_fmu import BuildError, TableError, VehicleError, build_fmu, cached_fmu, load_vehicle
 from plant_fmu.__main__ import main
 from plant_fmu.archive import write_whole
 from plant_fmu.compiler import find_compiler
+from plant_fmu.installing import install_hint
 
-ODIN = (Path(__file__).parents[2] / "plant_fmu" / "vehicles" / "odin.toml").read_text()
+ROOT = Path(__file__).parents[2]
+ODIN = (ROOT / "plant_fmu" / "vehicles" / "odin.toml").read_text()
 
 
 def written(tmp_path, *changes):
@@ -26,6 +32,35 @@ def written(tmp_path, *changes):
     path = tmp_path / "boat.toml"
     path.write_text(text)
     return path
+
+
+@pytest.mark.parametrize("verb", [["build", "--vehicle", "odin"], ["list"], ["--help"]], ids=lambda verb: verb[0])
+def test_a_checkout_that_is_not_installed_is_one_line(verb):
+    """Without site packages, as the Python of the system has them not."""
+    command = [sys.executable, "-S", "-m", "plant_fmu", *verb]
+    bare = {key: value for key, value in os.environ.items() if key != "PYTHONPATH"}
+    done = subprocess.run(command, cwd=ROOT, env=bare, capture_output=True, text=True)
+    said = r"plant_fmu: \w+ is not installed: run \S+ -m pip install \. in the checkout of subreach\n"
+    assert re.fullmatch(said, done.stderr), done.stderr
+    assert (done.returncode, done.stdout) == (2, "")
+
+
+def test_so_is_one_whose_dependencies_alone_are_there(tmp_path, capsys, monkeypatch):
+    def version(name):
+        raise metadata.PackageNotFoundError(name)
+
+    monkeypatch.setattr(metadata, "version", version)
+    assert main(["build", "--vehicle", "odin", "--out", str(tmp_path / "odin.fmu")]) == 2
+    said = f"plant_fmu: subreach is not installed: run {install_hint('.')} in the checkout of subreach\n"
+    assert capsys.readouterr() == ("", said)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_package_has_the_names_that_it_tells():
+    for name in plant_fmu.__all__:
+        assert getattr(plant_fmu, name).__name__ == name
+    with pytest.raises(AttributeError, match="module 'plant_fmu' has no attribute 'built_fmu'"):
+        plant_fmu.built_fmu  # noqa: B018
 
 
 @pytest.mark.parametrize("compiler", ["cc", "ziglang"])
@@ -122,7 +157,8 @@ def test_missing_compiler_is_one_line(tmp_path, capsys, monkeypatch):
     out = tmp_path / "x.fmu"
     assert main(["build", "--vehicle", "odin", "--out", str(out)]) == 2
     assert capsys.readouterr().err == (
-        "plant_fmu: no C compiler: neither cc nor the ziglang package was found; pip install 'subreach[build]'\n"
+        "plant_fmu: no C compiler: neither cc nor the ziglang package was found; "
+        f'{sys.executable} -m pip install "ziglang>=0.13"\n'  # in full, for there is no python on this PATH
     )
     assert list(tmp_path.iterdir()) == []
 
@@ -215,6 +251,23 @@ def test_a_damaged_file_in_the_cache_is_built_anew(tmp_path, monkeypatch):
     path.write_bytes(whole[: len(whole) // 2])
     assert cached_fmu(load_vehicle("odin"), 3) == path
     assert path.read_bytes() == whole
+
+
+def test_a_file_in_the_cache_is_of_its_compiler_or_of_any_where_there_is_none(tmp_path, monkeypatch):
+    good = cached_fmu(load_vehicle("odin"), 3)
+    monkeypatch.setattr("platformdirs.user_cache_dir", lambda *_, **__: str(tmp_path))
+    there = tmp_path / "fmu" / good.name
+    there.parent.mkdir()
+    shutil.copy(good, there)
+    assert cached_fmu(load_vehicle("odin"), 3) == there
+    monkeypatch.setenv("CC", f"{sys.executable} -c raise(SystemExit('error:_asked'))")
+    with pytest.raises(BuildError, match="asked"):  # the other compiler is
+        cached_fmu(load_vehicle("odin"), 3)
+    monkeypatch.setenv("CC", "no-such-compiler")
+    assert cached_fmu(load_vehicle("odin"), 3) == there
+    there.write_bytes(b"damaged")
+    with pytest.raises(BuildError, match="no-such-compiler"):
+        cached_fmu(load_vehicle("odin"), 3)
 
 
 def test_a_text_that_does_not_fit_leaves_no_part_of_it(tmp_path, monkeypatch, capsys):

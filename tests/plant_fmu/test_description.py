@@ -1,5 +1,6 @@
 """modelDescription.xml, the C header and the docs page: one table, one truth."""
 
+import math
 import re
 import shutil
 import subprocess
@@ -80,6 +81,20 @@ def test_dependencies_name_what_an_output_follows_from(fmi):
     assert changes["der(position.x)"] == {f"quaternion.e{i}" for i in range(4)} | {f"velocity.{a}" for a in "uvw"}
     assert {"position.z", "velocity.r", "wrench.N", "thrust[3]", "actuator.thrust[3]"} <= changes["der(velocity.u)"]
     assert len(changes) == 13 + 8 + 6
+
+
+def test_angles_are_shown_in_degrees(fmi):
+    """Read by FMPy: positions, rates and accelerations of angles, each with a factor; the rest in its own unit."""
+    description = read_model_description(str(cached_fmu(load_vehicle("odin"), fmi)))
+    units = {
+        unit.name: {display.name: display.factor for display in unit.displayUnits}
+        for unit in description.unitDefinitions
+    }
+    shown = {v.unit: v.displayUnit for v in description.modelVariables if v.displayUnit}
+    assert shown == {"rad": "deg", "rad/s": "deg/s", "rad/s2": "deg/s2"}
+    assert all(v.displayUnit for v in description.modelVariables if v.unit in shown)
+    assert {float(units[unit][display]) for unit, display in shown.items()} == {180.0 / math.pi}
+    assert {"kn", "km/h"} <= units["m/s"].keys() and {"kN", "kgf"} == units["N"].keys()
 
 
 def test_header_names_each_variable_once():

@@ -133,6 +133,7 @@ def test_the_manifest(fmi, unpacked):
     bare = etree.Element(f"{LS}fmiLayeredStandardManifest", dict(root.attrib))
     etree.XMLSchema(file=str(XSD)).assertValid(bare)
     assert root.get(f"{LS}fmi-ls-name") == "org.fmi-standard.fmi-ls-ref"
+    assert root.get(f"{LS}fmi-ls-version") == "1.0.0-beta.1"
     related = {r.get("source"): r.get("role") for r in root.findall("Related")}
     assert related == {
         "odin.ssv": "parameter",
@@ -141,6 +142,12 @@ def test_the_manifest(fmi, unpacked):
         "odin_out.csv": "result",
     }
     assert {f.name for f in folder.iterdir()} == {*related, "fmi-ls-manifest.xml"}
+    # what the standard's own schema lets be there
+    assert {e.tag for e in root.iterdescendants()} == {"Related", "Label"}
+    assert {key for e in root.findall("Related") for key in e.attrib} == {"type", "source", "role", "description"}
+    labels = {r.get("source"): [label.get("name") for label in r.findall("Label")] for r in root.findall("Related")}
+    manoeuvre = ["manoeuvre:reference"]
+    assert labels == {"odin.ssv": [], **dict.fromkeys(("odin_start.ssv", "odin_in.csv", "odin_out.csv"), manoeuvre)}
 
 
 def test_another_vehicle_of_a_shipped_name_carries_no_foreign_results():

@@ -2,6 +2,7 @@
 
 import dataclasses
 import hashlib
+import os
 import struct
 import zipfile
 
@@ -36,6 +37,23 @@ def folder(once):
 
 
 @pytest.fixture
+def compiled():
+    """Return a function that returns a vehicle's FMU as this machine's compiler makes it, whatever the test patches."""
+    with_compiler = prebuilt.FOLDER, os.environ.get("CC")
+
+    def fmu(vehicle, fmi):
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(prebuilt, "FOLDER", with_compiler[0])
+            if with_compiler[1] is None:
+                patch.delenv("CC", raising=False)
+            else:
+                patch.setenv("CC", with_compiler[1])
+            return cached_fmu(load_vehicle(vehicle), fmi)
+
+    return fmu
+
+
+@pytest.fixture
 def no_compiler(folder, monkeypatch):
     """A package with prebuilt libraries on a machine without a compiler."""
     monkeypatch.setattr(prebuilt, "FOLDER", folder)
@@ -52,10 +70,10 @@ def binary(path):
     "vehicle", [name if name == "odin" else pytest.param(name, marks=pytest.mark.slow) for name in shipped_vehicles()]
 )
 @pytest.mark.parametrize("fmi", [pytest.param(2, marks=pytest.mark.slow), 3], ids=["fmi2", "fmi3"])
-def test_the_plant_is_that_of_a_compiler(vehicle, fmi, no_compiler, tmp_path):
-    compiled, path = cached_fmu(load_vehicle(vehicle), fmi), build_fmu(load_vehicle(vehicle), fmi, tmp_path / "x.fmu")
+def test_the_plant_is_that_of_a_compiler(vehicle, fmi, compiled, no_compiler, tmp_path):
+    path = build_fmu(load_vehicle(vehicle), fmi, tmp_path / "x.fmu")
     answers = []
-    for file in (compiled, path):
+    for file in (compiled(vehicle, fmi), path):
         slave = Slave(file).start(**{"velocity.p": 0.3})
         slave.set_values({"thrust[2]": 20.0})
         slave.step(1.0)
@@ -67,11 +85,11 @@ def test_the_plant_is_that_of_a_compiler(vehicle, fmi, no_compiler, tmp_path):
 
 
 @IN_FULL
-def test_the_library_is_that_of_a_compiler_to_the_byte(fmi, no_compiler, tmp_path):
+def test_the_library_is_that_of_a_compiler_to_the_byte(fmi, compiled, no_compiler, tmp_path):
     """Compiled from the vehicle's own numbers, beside stand-ins that were written over."""
-    for vehicle in map(load_vehicle, ("odin", "bluerov2_heavy")):
+    for vehicle in ("odin", "bluerov2_heavy"):
         ours, theirs = (
-            binary(path) for path in (build_fmu(vehicle, fmi, tmp_path / "x.fmu"), cached_fmu(vehicle, fmi))
+            binary(path) for path in (build_fmu(load_vehicle(vehicle), fmi, tmp_path / "x.fmu"), compiled(vehicle, fmi))
         )
         assert not differing(ours, theirs) - identity(HERE, ours)
 
@@ -131,14 +149,13 @@ def test_linux_without_glibc_needs_the_compiler(no_compiler, tmp_path, monkeypat
         build_fmu(load_vehicle("odin"), 3, tmp_path / "x.fmu")
 
 
-@pytest.mark.parametrize("damage", ["half", "flipped", "empty", "another table"])
+@pytest.mark.parametrize("damage", ["half", "flipped", "another table"])
 def test_damaged_libraries_are_named(folder, tmp_path, monkeypatch, damage):
     monkeypatch.setattr(prebuilt, "FOLDER", tmp_path)
     for file in folder.iterdir():
         data, place = file.read_bytes(), tmp_path / file.name
         with zipfile.ZipFile(place, "w", zipfile.ZIP_DEFLATED) as archive:
-            if damage != "empty":
-                archive.writestr(f"{HERE.name}{HERE.suffix}", b"no table" if damage == "another table" else data)
+            archive.writestr(f"{HERE.name}{HERE.suffix}", b"no table" if damage == "another table" else data)
         data = place.read_bytes()
         if damage == "half":
             place.write_bytes(data[: len(data) // 2])
@@ -163,6 +180,7 @@ def test_libraries_without_a_signature_stay_as_they_are():
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(900)  # the first that needs them compiles for all platforms
 def test_all_platforms_as_their_linkers_make_them(prebuilt_of_eight, monkeypatch):
     """Even the signature of a Mac's: the linker wrote the one, `signed_anew` the other. But for marks of identity."""
     compilers = [(platform, cross_compiler(platform)) for platform in cross_platforms("all")]

@@ -4,9 +4,10 @@ import re
 
 import numpy as np
 import pytest
+from scipy import constants
 
 from plant_fmu import quantities
-from plant_fmu.quantities import UNITS, Quantity
+from plant_fmu.quantities import DISPLAY_UNITS, UNITS, Quantity
 
 BASE = {"N": {"kg": 1, "m": 1, "s": -2}, "Hz": {"s": -1}}
 ALL = {name: value for name, value in vars(quantities).items() if isinstance(value, Quantity)}
@@ -21,6 +22,21 @@ def test_exponents_are_those_of_the_name(unit):
             for base, exponent in BASE.get(symbol, {symbol: 1}).items():
                 exponents[base] = exponents.get(base, 0) + sign * exponent * int(power or 1)
     assert UNITS[unit] == {base: exponent for base, exponent in exponents.items() if exponent}
+
+
+OF_SCIPY = {
+    "ms": constants.milli, "min": constants.minute, "h": constants.hour, "mm": constants.milli, "cm": constants.centi,
+    "km": constants.kilo, "cm/s": constants.centi, "km/h": constants.kmh, "kn": constants.knot, "g": constants.g,
+    "deg": constants.degree, "deg/s": constants.degree, "deg/s2": constants.degree, "t": constants.metric_ton,
+    "kN": constants.kilo, "kgf": constants.kgf, "kN.m": constants.kilo,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("unit", "display"), [(u, d) for u, factors in DISPLAY_UNITS.items() for d in factors])
+def test_display_units_are_as_great_as_scipy_says(unit, display):
+    """FMI: a value in the display unit is the factor times that in the unit."""
+    assert unit in UNITS and display not in UNITS
+    assert DISPLAY_UNITS[unit][display] == pytest.approx(1 / OF_SCIPY[display], rel=1e-15)
 
 
 MADE = {

@@ -145,10 +145,15 @@ def test_a_forged_state_lets_no_nonsense_in(make_slave, fmi):
     slave = make_slave(fmi=fmi).start(**{"position.x": 123.456})
     state = slave.save()
     data = slave.serialise(state)
-    at = data.index(np.float64(123.456).tobytes())
-    forged = data[:at] + np.float64(np.nan).tobytes() + data[at + 8 :]
-    forged = forged[:24] + np.uint64(fnv1a(forged[32:])).tobytes() + forged[32:]
-    refused(slave, forged, "position.x is outside")
+    of_start = 48  # behind head, interface, mode and flags
+    assert data[of_start : of_start + 8] == bytes(8)
+    for at, words in (
+        (data.index(np.float64(123.456).tobytes()), "position.x is outside"),
+        (of_start, "holds what no state can"),
+    ):
+        forged = data[:at] + np.float64(np.nan).tobytes() + data[at + 8 :]
+        forged = forged[:24] + np.uint64(fnv1a(forged[32:])).tobytes() + forged[32:]
+        refused(slave, forged, words)
     honest = data[:24] + np.uint64(fnv1a(data[32:])).tobytes() + data[32:]
     assert honest == data
     slave.free(state)

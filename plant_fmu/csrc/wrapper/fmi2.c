@@ -22,6 +22,13 @@ static void log_message(const Instance *instance, Status status, const char *cat
     ((fmi2CallbackLogger)instance->logger)(instance->environment, instance->name, (fmi2Status)status, category, format);
 }
 
+/* Refuses a call without an instance, or with NULL as one of the pointers to n values each. */
+#define REFUSE_NULL(n, ...)                                    \
+    do {                                                       \
+        if (!INSTANCE_GIVEN(c, n, __VA_ARGS__))                \
+            return fmi2Error;                                  \
+    } while (0)
+
 /* ---- version, logging, life -------------------------------------------------------------------------------- */
 
 const char *fmi2GetTypesPlatform(void)
@@ -37,6 +44,7 @@ const char *fmi2GetVersion(void)
 fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean loggingOn, size_t nCategories,
                                const fmi2String categories[])
 {
+    REFUSE_NULL(nCategories, categories);
     return (fmi2Status)instance_set_logging(c, loggingOn != fmi2False, nCategories, categories);
 }
 
@@ -81,6 +89,7 @@ fmi2Status fmi2Terminate(fmi2Component c)
 
 fmi2Status fmi2Reset(fmi2Component c)
 {
+    REFUSE_NULL(1, c);
     return (fmi2Status)instance_reset(c);
 }
 
@@ -88,17 +97,20 @@ fmi2Status fmi2Reset(fmi2Component c)
 
 fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, fmi2Real value[])
 {
+    REFUSE_NULL(nvr, vr, value);
     return (fmi2Status)instance_get_reals(c, vr, nvr, value);
 }
 
 fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, const fmi2Real value[])
 {
+    REFUSE_NULL(nvr, vr, value);
     return (fmi2Status)instance_set_reals(c, vr, nvr, value);
 }
 
 #define INTEGERS(type, Type)                                                                                       \
     fmi2Status fmi2Get##type(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, fmi2##type value[])       \
     {                                                                                                              \
+        REFUSE_NULL(nvr, vr, value);                                                                               \
         for (size_t i = 0; i < nvr; i++)                                                                           \
             if (instance_get_integer(c, Type, vr[i], &value[i]) != STATUS_OK)                                      \
                 return fmi2Error;                                                                                  \
@@ -107,6 +119,7 @@ fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[], size_t nv
                                                                                                                    \
     fmi2Status fmi2Set##type(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, const fmi2##type value[]) \
     {                                                                                                              \
+        REFUSE_NULL(nvr, vr, value);                                                                               \
         for (size_t i = 0; i < nvr; i++)                                                                           \
             if (instance_set_integer(c, Type, vr[i], value[i]) != STATUS_OK)                                       \
                 return fmi2Error;                                                                                  \
@@ -120,39 +133,47 @@ fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReferenc
                                         const fmi2ValueReference vKnown_ref[], size_t nKnown,
                                         const fmi2Real dvKnown[], fmi2Real dvUnknown[])
 {
+    REFUSE_NULL(nUnknown, vUnknown_ref, dvUnknown);
+    REFUSE_NULL(nKnown, vKnown_ref, dvKnown);
     return (fmi2Status)instance_directional_derivative(c, vUnknown_ref, nUnknown, vKnown_ref, nKnown, dvKnown, dvUnknown);
 }
 
 /* ---- FMU state --------------------------------------------------------------------------------------------- */
 
-fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *state)
+fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *FMUstate)
 {
-    return (fmi2Status)instance_save(c, (Saved **)state);
+    REFUSE_NULL(1, FMUstate);
+    return (fmi2Status)instance_save(c, (Saved **)FMUstate);
 }
 
-fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate state)
+fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate FMUstate)
 {
-    return (fmi2Status)instance_restore(c, state);
+    REFUSE_NULL(1, FMUstate);
+    return (fmi2Status)instance_restore(c, FMUstate);
 }
 
-fmi2Status fmi2FreeFMUstate(fmi2Component c, fmi2FMUstate *state)
+fmi2Status fmi2FreeFMUstate(fmi2Component c, fmi2FMUstate *FMUstate)
 {
-    return (fmi2Status)instance_free_saved(c, (Saved **)state);
+    REFUSE_NULL(1, c);
+    return (fmi2Status)instance_free_saved(c, (Saved **)FMUstate);
 }
 
-fmi2Status fmi2SerializedFMUstateSize(fmi2Component c, fmi2FMUstate state, size_t *size)
+fmi2Status fmi2SerializedFMUstateSize(fmi2Component c, fmi2FMUstate FMUstate, size_t *size)
 {
-    return (fmi2Status)instance_serialised_size(c, state, size);
+    REFUSE_NULL(1, FMUstate, size);
+    return (fmi2Status)instance_serialised_size(c, FMUstate, size);
 }
 
-fmi2Status fmi2SerializeFMUstate(fmi2Component c, fmi2FMUstate state, fmi2Byte bytes[], size_t size)
+fmi2Status fmi2SerializeFMUstate(fmi2Component c, fmi2FMUstate FMUstate, fmi2Byte serializedState[], size_t size)
 {
-    return (fmi2Status)instance_serialise(c, state, (unsigned char *)bytes, size);
+    REFUSE_NULL(1, FMUstate, serializedState);
+    return (fmi2Status)instance_serialise(c, FMUstate, (unsigned char *)serializedState, size);
 }
 
-fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte bytes[], size_t size, fmi2FMUstate *state)
+fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte serializedState[], size_t size, fmi2FMUstate *FMUstate)
 {
-    return (fmi2Status)instance_deserialise(c, (const unsigned char *)bytes, size, (Saved **)state);
+    REFUSE_NULL(1, serializedState, FMUstate);
+    return (fmi2Status)instance_deserialise(c, (const unsigned char *)serializedState, size, (Saved **)FMUstate);
 }
 
 /* ---- co-simulation ----------------------------------------------------------------------------------------- */
@@ -166,6 +187,7 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real currentCommunicationPoint, fmi2R
 
 fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind s, fmi2Real *value)
 {
+    REFUSE_NULL(1, value);
     if (s != fmi2LastSuccessfulTime)
         return (fmi2Status)instance_unsupported(c, "fmi2GetRealStatus of this kind");
     *value = ((const Instance *)c)->model.time;
@@ -174,6 +196,7 @@ fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind s, fmi2Real *
 
 fmi2Status fmi2GetBooleanStatus(fmi2Component c, const fmi2StatusKind s, fmi2Boolean *value)
 {
+    REFUSE_NULL(1, value);
     if (s != fmi2Terminated)
         return (fmi2Status)instance_unsupported(c, "fmi2GetBooleanStatus of this kind");
     *value = fmi2False; /* no component ends a simulation */
@@ -187,18 +210,19 @@ fmi2Status fmi2EnterEventMode(fmi2Component c)
     return (fmi2Status)instance_enter_event_mode(c, MODE_EVENT | MODE_CONTINUOUS); /* again is no fault in 2.0 */
 }
 
-fmi2Status fmi2NewDiscreteStates(fmi2Component c, fmi2EventInfo *info)
+fmi2Status fmi2NewDiscreteStates(fmi2Component c, fmi2EventInfo *fmi2eventInfo)
 {
+    REFUSE_NULL(1, fmi2eventInfo);
     bool changed = false;
     double next = INFINITY;
     const Status status = instance_update_discrete(c, &changed, &next);
 
-    info->newDiscreteStatesNeeded = fmi2False;
-    info->terminateSimulation = fmi2False;
-    info->nominalsOfContinuousStatesChanged = fmi2False;
-    info->valuesOfContinuousStatesChanged = changed ? fmi2True : fmi2False;
-    info->nextEventTimeDefined = isfinite(next) ? fmi2True : fmi2False;
-    info->nextEventTime = isfinite(next) ? next : 0.0;
+    fmi2eventInfo->newDiscreteStatesNeeded = fmi2False;
+    fmi2eventInfo->terminateSimulation = fmi2False;
+    fmi2eventInfo->nominalsOfContinuousStatesChanged = fmi2False;
+    fmi2eventInfo->valuesOfContinuousStatesChanged = changed ? fmi2True : fmi2False;
+    fmi2eventInfo->nextEventTimeDefined = isfinite(next) ? fmi2True : fmi2False;
+    fmi2eventInfo->nextEventTime = isfinite(next) ? next : 0.0;
     return (fmi2Status)status;
 }
 
@@ -210,6 +234,7 @@ fmi2Status fmi2EnterContinuousTimeMode(fmi2Component c)
 fmi2Status fmi2CompletedIntegratorStep(fmi2Component c, fmi2Boolean noSetFMUStatePriorToCurrentPoint,
                                        fmi2Boolean *enterEventMode, fmi2Boolean *terminateSimulation)
 {
+    REFUSE_NULL(1, enterEventMode, terminateSimulation);
     (void)noSetFMUStatePriorToCurrentPoint;
     *enterEventMode = fmi2False;
     *terminateSimulation = fmi2False;
@@ -223,27 +248,31 @@ fmi2Status fmi2SetTime(fmi2Component c, fmi2Real time)
 
 fmi2Status fmi2SetContinuousStates(fmi2Component c, const fmi2Real x[], size_t nx)
 {
+    REFUSE_NULL(nx, x);
     return (fmi2Status)instance_set_states(c, x, nx);
 }
 
 fmi2Status fmi2GetDerivatives(fmi2Component c, fmi2Real derivatives[], size_t nx)
 {
+    REFUSE_NULL(nx, derivatives);
     return (fmi2Status)instance_get_derivatives(c, derivatives, nx);
 }
 
 fmi2Status fmi2GetEventIndicators(fmi2Component c, fmi2Real eventIndicators[], size_t ni)
 {
-    (void)eventIndicators;
+    REFUSE_NULL(ni, eventIndicators);
     return ni == 0 ? fmi2OK : (fmi2Status)instance_refuse(c, "fmi2GetEventIndicators: there are none");
 }
 
 fmi2Status fmi2GetContinuousStates(fmi2Component c, fmi2Real x[], size_t nx)
 {
+    REFUSE_NULL(nx, x);
     return (fmi2Status)instance_get_states(c, x, nx);
 }
 
 fmi2Status fmi2GetNominalsOfContinuousStates(fmi2Component c, fmi2Real x_nominal[], size_t nx)
 {
+    REFUSE_NULL(nx, x_nominal);
     return (fmi2Status)instance_get_nominals(c, x_nominal, nx);
 }
 
@@ -261,7 +290,7 @@ fmi2Status fmi2GetNominalsOfContinuousStates(fmi2Component c, fmi2Real x_nominal
     fmi2Status function(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, type value[])     \
     {                                                                                                 \
         (void)vr, (void)value;                                                                        \
-        return nvr == 0 ? fmi2OK : (fmi2Status)instance_unsupported(c, #function);                    \
+        return c && nvr == 0 ? fmi2OK : (fmi2Status)instance_unsupported(c, #function);               \
     }
 
 #define UNSUPPORTED_DERIVATIVES(function, type)                                                             \
@@ -269,7 +298,7 @@ fmi2Status fmi2GetNominalsOfContinuousStates(fmi2Component c, fmi2Real x_nominal
                         type value[])                                                                       \
     {                                                                                                       \
         (void)vr, (void)order, (void)value;                                                                 \
-        return nvr == 0 ? fmi2OK : (fmi2Status)instance_unsupported(c, #function);                          \
+        return c && nvr == 0 ? fmi2OK : (fmi2Status)instance_unsupported(c, #function);                     \
     }
 
 UNSUPPORTED_VALUES(fmi2GetString, fmi2String)

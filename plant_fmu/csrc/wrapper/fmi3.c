@@ -10,6 +10,13 @@ static void log_message(const Instance *instance, Status status, const char *cat
         ((fmi3LogMessageCallback)instance->logger)(instance->environment, (fmi3Status)status, category, message);
 }
 
+/* Refuses a call without an instance, or with NULL as one of the pointers to n values each. */
+#define REFUSE_NULL(n, ...)                                    \
+    do {                                                       \
+        if (!INSTANCE_GIVEN(instance, n, __VA_ARGS__))         \
+            return fmi3Error;                                  \
+    } while (0)
+
 /* ---- version, logging, life -------------------------------------------------------------------------------- */
 
 const char *fmi3GetVersion(void)
@@ -20,6 +27,7 @@ const char *fmi3GetVersion(void)
 fmi3Status fmi3SetDebugLogging(fmi3Instance instance, fmi3Boolean loggingOn, size_t nCategories,
                                const fmi3String categories[])
 {
+    REFUSE_NULL(nCategories, categories);
     return (fmi3Status)instance_set_logging(instance, loggingOn, nCategories, categories);
 }
 
@@ -40,7 +48,8 @@ fmi3Instance fmi3InstantiateCoSimulation(fmi3String instanceName, fmi3String ins
                                          fmi3IntermediateUpdateCallback intermediateUpdate)
 {
     (void)resourcePath, (void)visible, (void)earlyReturnAllowed, (void)intermediateUpdate;
-    (void)requiredIntermediateVariables, (void)nRequiredIntermediateVariables;
+    if (nRequiredIntermediateVariables > 0 && !requiredIntermediateVariables)
+        return refuse_instance(instanceEnvironment, logMessage, "requiredIntermediateVariables is NULL");
     if (eventModeUsed)
         return refuse_instance(instanceEnvironment, logMessage, "this FMU has no event mode in co-simulation (eventModeUsed)");
     return instance_create(instanceName, instantiationToken, CO_SIMULATION, loggingOn, log_message, instanceEnvironment,
@@ -79,7 +88,8 @@ fmi3Status fmi3EnterInitializationMode(fmi3Instance instance, fmi3Boolean tolera
                                        fmi3Float64 startTime, fmi3Boolean stopTimeDefined, fmi3Float64 stopTime)
 {
     (void)toleranceDefined, (void)tolerance;
-    if (instance_set_experiment(instance, startTime, stopTimeDefined ? stopTime : INFINITY) != STATUS_OK)
+    if (instance_require_new(instance) != STATUS_OK ||
+        instance_set_experiment(instance, startTime, stopTimeDefined ? stopTime : INFINITY) != STATUS_OK)
         return fmi3Error;
     return (fmi3Status)instance_enter_initialisation(instance);
 }
@@ -96,6 +106,7 @@ fmi3Status fmi3Terminate(fmi3Instance instance)
 
 fmi3Status fmi3Reset(fmi3Instance instance)
 {
+    REFUSE_NULL(1, instance);
     return (fmi3Status)instance_reset(instance);
 }
 
@@ -104,6 +115,7 @@ fmi3Status fmi3Reset(fmi3Instance instance)
 fmi3Status fmi3GetFloat64(fmi3Instance instance, const fmi3ValueReference valueReferences[], size_t nValueReferences,
                           fmi3Float64 values[], size_t nValues)
 {
+    REFUSE_NULL(nValueReferences, valueReferences, values);
     if (nValues != nValueReferences)
         return (fmi3Status)instance_refuse(instance, "fmi3GetFloat64: all variables are scalars");
     return (fmi3Status)instance_get_reals(instance, valueReferences, nValueReferences, values);
@@ -112,6 +124,7 @@ fmi3Status fmi3GetFloat64(fmi3Instance instance, const fmi3ValueReference valueR
 fmi3Status fmi3SetFloat64(fmi3Instance instance, const fmi3ValueReference valueReferences[], size_t nValueReferences,
                           const fmi3Float64 values[], size_t nValues)
 {
+    REFUSE_NULL(nValueReferences, valueReferences, values);
     if (nValues != nValueReferences)
         return (fmi3Status)instance_refuse(instance, "fmi3SetFloat64: all variables are scalars");
     return (fmi3Status)instance_set_reals(instance, valueReferences, nValueReferences, values);
@@ -121,6 +134,7 @@ fmi3Status fmi3SetFloat64(fmi3Instance instance, const fmi3ValueReference valueR
     fmi3Status fmi3Get##type(fmi3Instance instance, const fmi3ValueReference valueReferences[],                       \
                              size_t nValueReferences, fmi3##type values[], size_t nValues)                            \
     {                                                                                                                 \
+        REFUSE_NULL(nValueReferences, valueReferences, values);                                                       \
         if (nValues != nValueReferences)                                                                              \
             return (fmi3Status)instance_refuse(instance, "fmi3Get" #type ": all variables are scalars");              \
         for (size_t i = 0; i < nValueReferences; i++) {                                                               \
@@ -135,6 +149,7 @@ fmi3Status fmi3SetFloat64(fmi3Instance instance, const fmi3ValueReference valueR
     fmi3Status fmi3Set##type(fmi3Instance instance, const fmi3ValueReference valueReferences[],                       \
                              size_t nValueReferences, const fmi3##type values[], size_t nValues)                      \
     {                                                                                                                 \
+        REFUSE_NULL(nValueReferences, valueReferences, values);                                                       \
         if (nValues != nValueReferences)                                                                              \
             return (fmi3Status)instance_refuse(instance, "fmi3Set" #type ": all variables are scalars");              \
         for (size_t i = 0; i < nValueReferences; i++)                                                                 \
@@ -158,6 +173,8 @@ fmi3Status fmi3GetDirectionalDerivative(fmi3Instance instance, const fmi3ValueRe
                                         const fmi3ValueReference knowns[], size_t nKnowns, const fmi3Float64 seed[],
                                         size_t nSeed, fmi3Float64 sensitivity[], size_t nSensitivity)
 {
+    REFUSE_NULL(nUnknowns, unknowns, sensitivity);
+    REFUSE_NULL(nKnowns, knowns, seed);
     if (require_scalars(instance, nUnknowns, nKnowns, nSeed, nSensitivity) != STATUS_OK)
         return fmi3Error;
     return (fmi3Status)instance_directional_derivative(instance, unknowns, nUnknowns, knowns, nKnowns, seed, sensitivity);
@@ -167,6 +184,8 @@ fmi3Status fmi3GetAdjointDerivative(fmi3Instance instance, const fmi3ValueRefere
                                     const fmi3ValueReference knowns[], size_t nKnowns, const fmi3Float64 seed[],
                                     size_t nSeed, fmi3Float64 sensitivity[], size_t nSensitivity)
 {
+    REFUSE_NULL(nUnknowns, unknowns, seed);
+    REFUSE_NULL(nKnowns, knowns, sensitivity);
     if (require_scalars(instance, nKnowns, nUnknowns, nSeed, nSensitivity) != STATUS_OK)
         return fmi3Error;
     return (fmi3Status)instance_adjoint_derivative(instance, unknowns, nUnknowns, knowns, nKnowns, seed, sensitivity);
@@ -176,32 +195,38 @@ fmi3Status fmi3GetAdjointDerivative(fmi3Instance instance, const fmi3ValueRefere
 
 fmi3Status fmi3GetFMUState(fmi3Instance instance, fmi3FMUState *FMUState)
 {
+    REFUSE_NULL(1, FMUState);
     return (fmi3Status)instance_save(instance, (Saved **)FMUState);
 }
 
 fmi3Status fmi3SetFMUState(fmi3Instance instance, fmi3FMUState FMUState)
 {
+    REFUSE_NULL(1, FMUState);
     return (fmi3Status)instance_restore(instance, FMUState);
 }
 
 fmi3Status fmi3FreeFMUState(fmi3Instance instance, fmi3FMUState *FMUState)
 {
+    REFUSE_NULL(1, instance);
     return (fmi3Status)instance_free_saved(instance, (Saved **)FMUState);
 }
 
 fmi3Status fmi3SerializedFMUStateSize(fmi3Instance instance, fmi3FMUState FMUState, size_t *size)
 {
+    REFUSE_NULL(1, FMUState, size);
     return (fmi3Status)instance_serialised_size(instance, FMUState, size);
 }
 
 fmi3Status fmi3SerializeFMUState(fmi3Instance instance, fmi3FMUState FMUState, fmi3Byte serializedState[], size_t size)
 {
+    REFUSE_NULL(1, FMUState, serializedState);
     return (fmi3Status)instance_serialise(instance, FMUState, serializedState, size);
 }
 
 fmi3Status fmi3DeserializeFMUState(fmi3Instance instance, const fmi3Byte serializedState[], size_t size,
                                    fmi3FMUState *FMUState)
 {
+    REFUSE_NULL(1, serializedState, FMUState);
     return (fmi3Status)instance_deserialise(instance, serializedState, size, (Saved **)FMUState);
 }
 
@@ -211,16 +236,13 @@ fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 currentCommunicationPoi
                       fmi3Boolean noSetFMUStatePriorToCurrentPoint, fmi3Boolean *eventHandlingNeeded,
                       fmi3Boolean *terminateSimulation, fmi3Boolean *earlyReturn, fmi3Float64 *lastSuccessfulTime)
 {
+    REFUSE_NULL(1, eventHandlingNeeded, terminateSimulation, earlyReturn, lastSuccessfulTime);
     (void)noSetFMUStatePriorToCurrentPoint;
     const Status status = instance_step(instance, currentCommunicationPoint, communicationStepSize);
-    if (eventHandlingNeeded)
-        *eventHandlingNeeded = fmi3False;
-    if (terminateSimulation)
-        *terminateSimulation = fmi3False;
-    if (earlyReturn)
-        *earlyReturn = fmi3False;
-    if (lastSuccessfulTime)
-        *lastSuccessfulTime = ((const Instance *)instance)->model.time;
+    *eventHandlingNeeded = fmi3False;
+    *terminateSimulation = fmi3False;
+    *earlyReturn = fmi3False;
+    *lastSuccessfulTime = ((const Instance *)instance)->model.time;
     return (fmi3Status)status;
 }
 
@@ -242,6 +264,8 @@ fmi3Status fmi3UpdateDiscreteStates(fmi3Instance instance, fmi3Boolean *discrete
                                     fmi3Boolean *valuesOfContinuousStatesChanged, fmi3Boolean *nextEventTimeDefined,
                                     fmi3Float64 *nextEventTime)
 {
+    REFUSE_NULL(1, discreteStatesNeedUpdate, terminateSimulation, nominalsOfContinuousStatesChanged,
+                valuesOfContinuousStatesChanged, nextEventTimeDefined, nextEventTime);
     bool changed = false;
     double next = INFINITY;
     const Status status = instance_update_discrete(instance, &changed, &next);
@@ -263,6 +287,7 @@ fmi3Status fmi3EnterContinuousTimeMode(fmi3Instance instance)
 fmi3Status fmi3CompletedIntegratorStep(fmi3Instance instance, fmi3Boolean noSetFMUStatePriorToCurrentPoint,
                                        fmi3Boolean *enterEventMode, fmi3Boolean *terminateSimulation)
 {
+    REFUSE_NULL(1, enterEventMode, terminateSimulation);
     (void)noSetFMUStatePriorToCurrentPoint;
     *enterEventMode = fmi3False;
     *terminateSimulation = fmi3False;
@@ -277,124 +302,45 @@ fmi3Status fmi3SetTime(fmi3Instance instance, fmi3Float64 time)
 fmi3Status fmi3SetContinuousStates(fmi3Instance instance, const fmi3Float64 continuousStates[],
                                    size_t nContinuousStates)
 {
+    REFUSE_NULL(nContinuousStates, continuousStates);
     return (fmi3Status)instance_set_states(instance, continuousStates, nContinuousStates);
 }
 
 fmi3Status fmi3GetContinuousStateDerivatives(fmi3Instance instance, fmi3Float64 derivatives[], size_t nContinuousStates)
 {
+    REFUSE_NULL(nContinuousStates, derivatives);
     return (fmi3Status)instance_get_derivatives(instance, derivatives, nContinuousStates);
 }
 
 fmi3Status fmi3GetEventIndicators(fmi3Instance instance, fmi3Float64 eventIndicators[], size_t nEventIndicators)
 {
-    (void)eventIndicators;
+    REFUSE_NULL(nEventIndicators, eventIndicators);
     return nEventIndicators == 0 ? fmi3OK
                                  : (fmi3Status)instance_refuse(instance, "fmi3GetEventIndicators: there are none");
 }
 
 fmi3Status fmi3GetContinuousStates(fmi3Instance instance, fmi3Float64 continuousStates[], size_t nContinuousStates)
 {
+    REFUSE_NULL(nContinuousStates, continuousStates);
     return (fmi3Status)instance_get_states(instance, continuousStates, nContinuousStates);
 }
 
 fmi3Status fmi3GetNominalsOfContinuousStates(fmi3Instance instance, fmi3Float64 nominals[], size_t nContinuousStates)
 {
+    REFUSE_NULL(nContinuousStates, nominals);
     return (fmi3Status)instance_get_nominals(instance, nominals, nContinuousStates);
 }
 
 fmi3Status fmi3GetNumberOfEventIndicators(fmi3Instance instance, size_t *nEventIndicators)
 {
-    (void)instance;
+    REFUSE_NULL(1, nEventIndicators);
     *nEventIndicators = 0;
     return fmi3OK;
 }
 
 fmi3Status fmi3GetNumberOfContinuousStates(fmi3Instance instance, size_t *nContinuousStates)
 {
-    (void)instance;
+    REFUSE_NULL(1, nContinuousStates);
     *nContinuousStates = N_STATES;
     return fmi3OK;
 }
-
-/* ---- what this FMU does not offer: logged, and an error ----------------------------------------------------- */
-
-#define UNSUPPORTED(function, parameters, ...)                                          \
-    fmi3Status function parameters                                                      \
-    {                                                                                   \
-        __VA_ARGS__;                                                                    \
-        return (fmi3Status)instance_unsupported(instance, #function);                   \
-    }
-
-/* reading or writing no variable at all is no fault */
-#define UNSUPPORTED_FOR_ALL(function, parameters, ...)                                            \
-    fmi3Status function parameters                                                                \
-    {                                                                                             \
-        __VA_ARGS__;                                                                              \
-        return n == 0 ? fmi3OK : (fmi3Status)instance_unsupported(instance, #function);           \
-    }
-
-#define UNSUPPORTED_VALUES_OF(function, type)                                                                  \
-    fmi3Status function(fmi3Instance instance, const fmi3ValueReference references[], size_t n, type values[], \
-                        size_t nValues)                                                                        \
-    {                                                                                                          \
-        (void)references, (void)values, (void)nValues;                                                         \
-        return n == 0 ? fmi3OK : (fmi3Status)instance_unsupported(instance, #function);                        \
-    }
-
-#define UNSUPPORTED_VALUES(type)                        \
-    UNSUPPORTED_VALUES_OF(fmi3Get##type, fmi3##type)    \
-    UNSUPPORTED_VALUES_OF(fmi3Set##type, const fmi3##type)
-
-UNSUPPORTED_VALUES(Float32)
-UNSUPPORTED_VALUES(Int8)
-UNSUPPORTED_VALUES(UInt8)
-UNSUPPORTED_VALUES(Int16)
-UNSUPPORTED_VALUES(UInt16)
-UNSUPPORTED_VALUES(UInt32)
-UNSUPPORTED_VALUES(Int64)
-UNSUPPORTED_VALUES(UInt64)
-UNSUPPORTED_VALUES(String)
-
-UNSUPPORTED_FOR_ALL(fmi3GetBinary, (fmi3Instance instance, const fmi3ValueReference r[], size_t n, size_t sizes[],
-                            fmi3Binary v[], size_t nv), (void)r, (void)sizes, (void)v, (void)nv)
-UNSUPPORTED_FOR_ALL(fmi3SetBinary, (fmi3Instance instance, const fmi3ValueReference r[], size_t n, const size_t sizes[],
-                            const fmi3Binary v[], size_t nv), (void)r, (void)sizes, (void)v, (void)nv)
-UNSUPPORTED_FOR_ALL(fmi3GetClock, (fmi3Instance instance, const fmi3ValueReference r[], size_t n, fmi3Clock v[]),
-            (void)r, (void)v)
-UNSUPPORTED_FOR_ALL(fmi3SetClock, (fmi3Instance instance, const fmi3ValueReference r[], size_t n, const fmi3Clock v[]),
-            (void)r, (void)v)
-UNSUPPORTED(fmi3GetNumberOfVariableDependencies, (fmi3Instance instance, fmi3ValueReference r, size_t *n),
-            (void)r, (void)n)
-UNSUPPORTED(fmi3GetVariableDependencies, (fmi3Instance instance, fmi3ValueReference dependent, size_t elements[],
-                                          fmi3ValueReference independents[], size_t independentElements[],
-                                          fmi3DependencyKind kinds[], size_t n),
-            (void)dependent, (void)elements, (void)independents, (void)independentElements, (void)kinds, (void)n)
-UNSUPPORTED(fmi3EnterConfigurationMode, (fmi3Instance instance), (void)0)
-UNSUPPORTED(fmi3ExitConfigurationMode, (fmi3Instance instance), (void)0)
-UNSUPPORTED(fmi3EnterStepMode, (fmi3Instance instance), (void)0)
-UNSUPPORTED_FOR_ALL(fmi3GetIntervalDecimal, (fmi3Instance instance, const fmi3ValueReference r[], size_t n,
-                                     fmi3Float64 intervals[], fmi3IntervalQualifier qualifiers[]),
-            (void)r, (void)intervals, (void)qualifiers)
-UNSUPPORTED_FOR_ALL(fmi3GetIntervalFraction, (fmi3Instance instance, const fmi3ValueReference r[], size_t n,
-                                      fmi3UInt64 counters[], fmi3UInt64 resolutions[],
-                                      fmi3IntervalQualifier qualifiers[]),
-            (void)r, (void)counters, (void)resolutions, (void)qualifiers)
-UNSUPPORTED_FOR_ALL(fmi3GetShiftDecimal, (fmi3Instance instance, const fmi3ValueReference r[], size_t n, fmi3Float64 shifts[]),
-            (void)r, (void)shifts)
-UNSUPPORTED_FOR_ALL(fmi3GetShiftFraction, (fmi3Instance instance, const fmi3ValueReference r[], size_t n, fmi3UInt64 counters[],
-                                   fmi3UInt64 resolutions[]), (void)r, (void)counters, (void)resolutions)
-UNSUPPORTED_FOR_ALL(fmi3SetIntervalDecimal, (fmi3Instance instance, const fmi3ValueReference r[], size_t n,
-                                     const fmi3Float64 intervals[]), (void)r, (void)intervals)
-UNSUPPORTED_FOR_ALL(fmi3SetIntervalFraction, (fmi3Instance instance, const fmi3ValueReference r[], size_t n,
-                                      const fmi3UInt64 counters[], const fmi3UInt64 resolutions[]),
-            (void)r, (void)counters, (void)resolutions)
-UNSUPPORTED_FOR_ALL(fmi3SetShiftDecimal, (fmi3Instance instance, const fmi3ValueReference r[], size_t n,
-                                  const fmi3Float64 shifts[]), (void)r, (void)shifts)
-UNSUPPORTED_FOR_ALL(fmi3SetShiftFraction, (fmi3Instance instance, const fmi3ValueReference r[], size_t n,
-                                   const fmi3UInt64 counters[], const fmi3UInt64 resolutions[]),
-            (void)r, (void)counters, (void)resolutions)
-UNSUPPORTED_FOR_ALL(fmi3GetOutputDerivatives, (fmi3Instance instance, const fmi3ValueReference r[], size_t n,
-                                       const fmi3Int32 orders[], fmi3Float64 v[], size_t nv),
-            (void)r, (void)orders, (void)v, (void)nv)
-UNSUPPORTED(fmi3ActivateModelPartition, (fmi3Instance instance, fmi3ValueReference clock, fmi3Float64 time),
-            (void)clock, (void)time)

@@ -35,7 +35,7 @@ Status instance_refuse(const Instance *instance, const char *format, ...)
 {
     va_list arguments;
 
-    if (!(instance->categories & LOG_ERRORS))
+    if (!instance || !(instance->categories & LOG_ERRORS))
         return STATUS_ERROR;
     va_start(arguments, format);
     log_formatted(instance, STATUS_ERROR, "logStatusError", format, arguments);
@@ -58,6 +58,14 @@ Status instance_tell(const Instance *instance, LogCategories category, const cha
     return STATUS_OK;
 }
 
+Status instance_refuse_null(const Instance *instance, const char *function, const char *names, size_t place)
+{
+    for (; place > 0; place--)
+        names = strchr(names, ',') + 1;
+    names += strspn(names, " ");
+    return instance_refuse(instance, "%s: %.*s is NULL", function, (int)strcspn(names, ","), names);
+}
+
 Status instance_set_logging(Instance *instance, bool on, size_t n, const char *const categories[])
 {
     unsigned wanted = n == 0 ? LOG_ALL : 0;
@@ -65,13 +73,13 @@ Status instance_set_logging(Instance *instance, bool on, size_t n, const char *c
     for (size_t i = 0; i < n; i++) {
         int known = 0;
         for (int j = 0; j < N_CATEGORIES; j++)
-            if (categories && categories[i] && strcmp(categories[i], CATEGORIES[j].name) == 0) {
+            if (categories[i] && strcmp(categories[i], CATEGORIES[j].name) == 0) {
                 wanted |= (unsigned)CATEGORIES[j].category;
                 known = 1;
             }
         if (!known)
             return instance_refuse(instance, "log category \"%s\" is unknown",
-                                   categories && categories[i] ? categories[i] : "");
+                                   categories[i] ? categories[i] : "NULL");
     }
     instance->categories = on ? instance->categories | wanted : instance->categories & ~wanted;
     return STATUS_OK;
@@ -84,8 +92,14 @@ Status instance_unsupported(const Instance *instance, const char *function)
 
 Status instance_require(const Instance *instance, unsigned modes, const char *action)
 {
+    if (!instance)
+        return STATUS_ERROR;
     if ((unsigned)instance->mode & modes)
         return STATUS_OK;
+    const unsigned others = instance->kind == CO_SIMULATION ? MODE_EVENT | MODE_CONTINUOUS : MODE_STEPPING;
+    if (!(modes & ~others))
+        return instance_refuse(instance, "%s: not offered in %s", action,
+                               instance->kind == CO_SIMULATION ? "co-simulation" : "model exchange");
     const char *when = "after termination";
     switch (instance->mode) {
     case MODE_INSTANTIATED: when = "before initialisation"; break;
@@ -115,12 +129,17 @@ Instance *instance_create(const char *name, const char *token, Interface kind, b
     }
     strcpy(instance->name, shown);
     instance->kind = kind;
-    instance->categories = logging_on ? LOG_ALL : LOG_ERRORS; /* errors until they are switched off */
+    instance->categories = logging_on ? LOG_ALL : LOG_ERRORS | LOG_WARNINGS; /* these until they are switched off */
     instance->log = log;
     instance->environment = environment;
     instance->logger = logger;
+    if (!name) {
+        instance_refuse(instance, "instance name is NULL, expected a text");
+        instance_free(instance);
+        return NULL;
+    }
     if (!token || strcmp(token, TOKEN) != 0) {
-        instance_refuse(instance, "instantiation token is \"%s\", expected \"%s\"", token ? token : "", TOKEN);
+        instance_refuse(instance, "instantiation token is \"%s\", expected \"%s\"", token ? token : "NULL", TOKEN);
         instance_free(instance);
         return NULL;
     }
@@ -146,6 +165,8 @@ Status instance_reset(Instance *instance)
     variables_start(&instance->model);
     instance->model.stop_time = INFINITY;
     instance->mode = MODE_INSTANTIATED;
+    instance->start_time = instance->model.time;
+    instance->refused = false;
     instance->unprepared = true;
     instance->outdated = true;
     return STATUS_OK;
@@ -189,19 +210,30 @@ Status instance_set_experiment(Instance *instance, double start_time, double sto
 {
     if (instance_require(instance, MODE_INSTANTIATED, "setting the experiment") != STATUS_OK)
         return STATUS_ERROR;
+    instance->refused = true; /* until all is well */
     if (!(fabs(start_time) <= MAX_TIME))
         return instance_refuse(instance, "start time is %g s, expected a number within %g", start_time, MAX_TIME);
     if (!(stop_time >= start_time))
         return instance_refuse(instance, "stop time is %g s, expected %g s (start time) or later", stop_time, start_time);
-    instance->model.time = start_time;
+    instance->model.time = instance->start_time = start_time;
     instance->model.stop_time = stop_time;
+    instance->refused = false;
     return STATUS_OK;
+}
+
+Status instance_require_new(const Instance *instance)
+{
+    if (instance && instance->mode == MODE_INITIALISING)
+        return instance_refuse(instance, "entering initialisation: it was entered already and has not ended");
+    return instance_require(instance, MODE_INSTANTIATED, "entering initialisation");
 }
 
 Status instance_enter_initialisation(Instance *instance)
 {
-    if (instance_require(instance, MODE_INSTANTIATED, "entering initialisation") != STATUS_OK)
+    if (instance_require_new(instance) != STATUS_OK)
         return STATUS_ERROR;
+    if (instance->refused)
+        return instance_refuse(instance, "entering initialisation: start and stop time were refused, set others first");
     instance->mode = MODE_INITIALISING;
     return STATUS_OK;
 }

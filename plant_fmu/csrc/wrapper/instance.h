@@ -42,6 +42,8 @@ struct Instance {
     Model model;
     Interface kind;
     Mode mode;
+    double start_time;    /* s, of the experiment */
+    bool refused;         /* the times of the experiment: there is no initialisation until others are accepted */
     bool unprepared;      /* parameters changed since the component was prepared */
     bool outdated;        /* outputs are older than the state, the inputs or the parameters */
     unsigned categories;  /* of LogCategories, that are wanted */
@@ -58,6 +60,8 @@ Instance *instance_create(const char *name, const char *token, Interface kind, b
 void instance_free(Instance *instance);
 Status instance_reset(Instance *instance);
 
+/* Refuses to enter initialisation where that is over, or was entered already. */
+Status instance_require_new(const Instance *instance);
 /* Sets the experiment's times; a stop time of INFINITY is none. */
 Status instance_set_experiment(Instance *instance, double start_time, double stop_time);
 Status instance_enter_initialisation(Instance *instance);
@@ -76,8 +80,8 @@ Status instance_prepare(Instance *instance);
 /* Whether initialisation has not ended. */
 bool instance_starting(const Instance *instance);
 
-/* Logs an error in printf's manner, unless errors were switched off, and returns STATUS_ERROR, so that a check is one
- * line. */
+/* Logs an error in printf's manner, unless errors were switched off or there is no instance, and returns STATUS_ERROR, so
+ * that a check is one line. */
 Status instance_refuse(const Instance *instance, const char *format, ...);
 
 /* Logs, if the category is wanted, in printf's manner. Returns the status that goes with the category. */
@@ -87,6 +91,24 @@ Status instance_set_logging(Instance *instance, bool on, size_t n, const char *c
 
 /* Status of a function that this FMU does not offer. */
 Status instance_unsupported(const Instance *instance, const char *function);
+
+/* Refuses NULL as the argument at that place among names with commas between them. */
+Status instance_refuse_null(const Instance *instance, const char *function, const char *names, size_t place);
+
+/* Whether there is an instance and, where n is above 0, no NULL among the pointers to n values each. */
+static inline bool instance_given(const Instance *instance, const char *function, size_t n,
+                                  const void *const pointers[], size_t n_pointers, const char *names)
+{
+    for (size_t i = 0; i < n_pointers; i++)
+        if (n > 0 && !pointers[i])
+            return instance_refuse_null(instance, function, names, i) == STATUS_OK;
+    return instance != NULL;
+}
+
+/* instance_given of the function that it stands in, as INSTANCE_GIVEN(instance, n, first, second). */
+#define INSTANCE_GIVEN(instance, n, ...)                                                  \
+    instance_given(instance, __func__, n, (const void *const[]){__VA_ARGS__},             \
+                   sizeof((const void *const[]){__VA_ARGS__}) / sizeof(void *), #__VA_ARGS__)
 
 /* ---- variables.c ---- */
 

@@ -12,7 +12,8 @@ struct Saved {
     uint32_t size;
     uint64_t origin;   /* hash of the instantiation token: blocks of another FMU do not fit */
     uint64_t checksum; /* of a serialised block: of all that follows */
-    int32_t kind, mode, unprepared, padding;
+    int32_t kind, mode, unprepared, refused;
+    double start_time;
     Model model;
 };
 
@@ -38,8 +39,6 @@ static uint64_t checksum(const Saved *saved)
 
 static Status check_block(const Instance *instance, const Saved *saved)
 {
-    if (!saved)
-        return instance_refuse(instance, "FMU state is NULL, expected one that was got from this FMU");
     if (saved->zero != 0 || saved->magic != MAGIC || saved->size != sizeof *saved ||
         saved->origin != hash(TOKEN, strlen(TOKEN)))
         return instance_refuse(instance, "FMU state is not one of this FMU");
@@ -62,6 +61,8 @@ Status instance_save(Instance *instance, Saved **saved)
     s->kind = (int32_t)instance->kind;
     s->mode = (int32_t)instance->mode;
     s->unprepared = instance->unprepared;
+    s->refused = instance->refused;
+    s->start_time = instance->start_time;
     memcpy(&s->model, &instance->model, sizeof s->model);
     return STATUS_OK;
 }
@@ -75,6 +76,8 @@ Status instance_restore(Instance *instance, const Saved *saved)
     memcpy(&instance->model, &saved->model, sizeof instance->model);
     instance->mode = (Mode)saved->mode;
     instance->unprepared = saved->unprepared != 0;
+    instance->refused = saved->refused != 0;
+    instance->start_time = saved->start_time;
     instance->outdated = true;
     return STATUS_OK;
 }
@@ -116,7 +119,8 @@ static Status check_content(const Instance *instance, const Saved *saved)
 {
     const Model *m = &saved->model;
     const Variable *stray = variables_stray(m);
-    bool good = fabs(m->time) <= MAX_TIME && !isnan(m->stop_time) && COMPONENT.possible(m);
+    bool good = fabs(m->time) <= MAX_TIME && fabs(saved->start_time) <= MAX_TIME && saved->start_time <= m->time &&
+                !isnan(m->stop_time) && COMPONENT.possible(m);
 
     if (stray)
         return instance_refuse(instance, "serialised FMU state: %s is outside [%.9g, %.9g]", stray->name, stray->min,

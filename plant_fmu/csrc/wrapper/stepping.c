@@ -92,6 +92,9 @@ Status instance_set_time(Instance *instance, double time)
         return STATUS_ERROR;
     if (!(fabs(time) <= MAX_TIME))
         return instance_refuse(instance, "time is %g s, expected a number within %g", time, MAX_TIME);
+    if (time < instance->start_time)
+        return instance_refuse(instance, "time is %.12g s, expected the start time of %.12g s or later", time,
+                               instance->start_time);
     instance->model.time = time;
     instance->outdated = true;
     return STATUS_OK;
@@ -122,7 +125,8 @@ Status instance_get_states(Instance *instance, double states[], size_t n)
 {
     if (require_count(instance, n, "getting continuous states") != STATUS_OK)
         return STATUS_ERROR;
-    memcpy(states, states_at(&instance->model, FIRST_STATE), N_STATES * sizeof(double));
+    if (n > 0)
+        memcpy(states, states_at(&instance->model, FIRST_STATE), n * sizeof(double));
     return STATUS_OK;
 }
 
@@ -132,7 +136,8 @@ Status instance_get_derivatives(Instance *instance, double derivatives[], size_t
                          "getting derivatives") != STATUS_OK ||
         require_count(instance, n, "getting derivatives") != STATUS_OK || instance_update(instance) != STATUS_OK)
         return STATUS_ERROR;
-    memcpy(derivatives, states_at(&instance->model, FIRST_DERIVATIVE), N_STATES * sizeof(double));
+    if (n > 0)
+        memcpy(derivatives, states_at(&instance->model, FIRST_DERIVATIVE), n * sizeof(double));
     return STATUS_OK;
 }
 

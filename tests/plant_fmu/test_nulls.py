@@ -1,0 +1,44 @@
+"""NULL where FMI wants a pointer: an error with a reason, never a crash, in every function of FMI's own headers."""
+
+import zipfile
+
+import fmpy
+import pytest
+
+from plant_fmu import cached_fmu, load_vehicle
+from plant_fmu.component import of_vehicle
+from tests.plant_fmu.libraries import read_libraries
+from tests.plant_fmu.nulls import exports, faults, functions, sweep, sweep_sources
+
+
+@pytest.fixture
+def library(fmi, tmp_path):
+    """Return the library of ODIN's FMU, and its description."""
+    path = cached_fmu(load_vehicle("odin"), fmi)
+    with zipfile.ZipFile(path) as archive:
+        (name,) = (name for name in archive.namelist() if name.startswith("binaries/"))
+        archive.extract(name, tmp_path)
+    return tmp_path / name, fmpy.read_model_description(str(path))
+
+
+def test_the_sweep_knows_every_function(fmi, library):
+    known = {function.name for function in functions(fmi)}
+    assert known == exports(fmi) == set().union(*(part.exports for part in read_libraries(library[0].read_bytes())))
+
+
+def test_null_is_refused_everywhere(fmi, library, tmp_path):
+    path, description = library
+    rows = sweep(
+        tmp_path, fmi, description.guid, len(description.derivatives), [str(path), f"-Wl,-rpath,{path.parent}"]
+    )
+    assert len(rows) > 500
+    assert faults(rows) == []
+
+
+@pytest.mark.slow
+def test_null_does_no_harm_to_memory(fmi, tmp_path):
+    """The same with the sources, under AddressSanitizer and UndefinedBehaviorSanitizer."""
+    vehicle = load_vehicle("odin")
+    rows = sweep_sources(tmp_path, fmi, of_vehicle(vehicle))
+    assert len(rows) > 500
+    assert faults(rows) == []
