@@ -5,7 +5,9 @@
 # make docs   the documents as a site, in build/site
 # make dist   source distribution and wheel, in dist/
 # make packaging  what is shipped: its contents, and runs from the wheel in an empty environment
+# make tour       every command of README and tutorial as printed, in fresh clones; most of an hour
 # make lowest     tests with the lowest versions of all that is needed, on Python 3.11
+# make portable   the fast tests with other kernels, processors and Pythons: an hour, or make portable PORTABLE='--only zen'
 # make bench  what things cost, against peers in an environment of their own
 # make mutation         whether the tests notice every changed sign of controller and plant; half an hour
 # make mutation-sample  the same of 40 signs, drawn with a fixed seed
@@ -15,12 +17,13 @@ BIN := $(VENV)/bin
 comma := ,
 # without a C compiler the ziglang package is one
 COMPILER := $(if $(shell command -v cc),,build)
-EXTRAS := mavlink,importers,dev$(addprefix $(comma),$(COMPILER))
+EXTRAS := importers,dev$(addprefix $(comma),$(COMPILER))
 PYTEST_FLAGS ?=
+PORTABLE ?=
 # tests start hundreds of processes: where bytecode is not kept, each compiles what it imports again
 export PYTHONDONTWRITEBYTECODE =
 
-.PHONY: run test lint coverage mutation mutation-sample docs bench dist packaging lowest clean
+.PHONY: run test lint coverage mutation mutation-sample docs bench dist packaging tour lowest portable clean
 
 run: $(VENV)/installed
 	$(BIN)/cosim run paper
@@ -28,21 +31,21 @@ run: $(VENV)/installed
 test: $(VENV)/ready
 	$(BIN)/python -m pytest -q --numprocesses auto --dist worksteal $(PYTEST_FLAGS)
 
-lint: $(VENV)/ready
+lint: $(VENV)/extras
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
 	$(BIN)/mypy
 
-coverage: $(VENV)/ready
+coverage: $(VENV)/extras
 	$(BIN)/python -m tests.house.coverage
 
-mutation: $(VENV)/ready
+mutation: $(VENV)/extras
 	$(BIN)/python -m tests.mutation --results build/mutation.jsonl
 
-mutation-sample: $(VENV)/ready
+mutation-sample: $(VENV)/extras
 	$(BIN)/python -m tests.mutation --sample 40
 
-docs: $(VENV)/ready
+docs: $(VENV)/extras
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[docs]'
 	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict
 
@@ -50,15 +53,18 @@ bench: $(VENV)/ready
 	$(BIN)/python -m benchmarks all
 	$(BIN)/python -m benchmarks scaling
 
-dist: $(VENV)/ready
+dist: $(VENV)/extras
 	rm -rf dist
 	$(BIN)/python -m build --outdir dist
 	$(PYTHON) -m venv build/twine
 	build/twine/bin/python -m pip install --quiet --disable-pip-version-check twine
 	build/twine/bin/twine check --strict dist/*
 
-packaging: $(VENV)/ready
+packaging: $(VENV)/extras
 	$(BIN)/python -m pytest -q --slow tests/packaging
+
+tour: $(VENV)/ready
+	$(BIN)/python -m tests.docs.tour
 
 LOWEST := build/lowest
 LOWEST_TESTS := tests/controller tests/fuzzy_arbiter tests/plant_fmu tests/cosim
@@ -66,13 +72,16 @@ LOWEST_TESTS := tests/controller tests/fuzzy_arbiter tests/plant_fmu tests/cosim
 lowest:
 	$(PYTHON) -m venv $(LOWEST)/uv
 	$(LOWEST)/uv/bin/python -m pip install --quiet --disable-pip-version-check uv
-	$(LOWEST)/uv/bin/uv pip compile --quiet --resolution lowest-direct --python-version 3.11 --extra campaign --extra mavlink \
-		--extra mcap --extra view --output-file $(LOWEST)/requirements.txt pyproject.toml
+	$(LOWEST)/uv/bin/uv pip compile --quiet --resolution lowest-direct --python-version 3.11 --extra campaign --extra mcap \
+		--output-file $(LOWEST)/requirements.txt pyproject.toml
 	$(LOWEST)/uv/bin/uv venv --quiet --clear --python 3.11 $(LOWEST)/env
 	VIRTUAL_ENV=$(LOWEST)/env $(LOWEST)/uv/bin/uv pip install --quiet --requirement $(LOWEST)/requirements.txt \
 		hypothesis pypdf pytest pytest-timeout
 	VIRTUAL_ENV=$(LOWEST)/env $(LOWEST)/uv/bin/uv pip install --quiet --no-deps --editable .
 	$(LOWEST)/env/bin/python -m pytest -q -o filterwarnings= $(LOWEST_TESTS) $(PYTEST_FLAGS) # old versions warn
+
+portable: $(VENV)/extras
+	$(BIN)/python -m tests.portability $(PORTABLE)
 
 # the product alone: a run needs nothing of what the tests do
 $(VENV)/installed: pyproject.toml
@@ -82,8 +91,11 @@ $(VENV)/installed: pyproject.toml
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.$(addsuffix ],$(addprefix [,$(COMPILER)))'
 	@touch $@
 
-$(VENV)/ready: $(VENV)/installed
+$(VENV)/extras: $(VENV)/installed
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[$(EXTRAS)]'
+	@touch $@
+
+$(VENV)/ready: $(VENV)/extras
 	@echo 'Compiling the laws, which takes most of a minute, once'
 	$(BIN)/cosim compile paper-deployable & $(BIN)/cosim compile && wait # the longest of them beside the others
 	@touch $@

@@ -36,6 +36,14 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     items.sort(key=lambda item: item.nodeid.startswith(("tests/controller/", "tests/cosim/")))
 
 
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtest_logstart(nodeid: str) -> None:
+    """Write which test runs, in a file for each process, where RUNNING_TESTS names a folder for them."""
+    if folder := os.environ.get("RUNNING_TESTS"):
+        Path(folder).mkdir(exist_ok=True)
+        Path(folder, os.environ.get("PYTEST_XDIST_WORKER", "main")).write_text(f"{nodeid}\n")
+
+
 def pytest_collection_finish() -> None:
     gc.collect()
     gc.freeze()  # modules and thousands of tests stay: a tenth of the session went into looking at them again and again
@@ -95,7 +103,7 @@ def prebuilt_of_eight(once):
     from plant_fmu import prebuilt
 
     structure = prebuilt.shipped_structures()[0]
-    folder = once("prebuilt-of-eight", lambda folder: prebuilt.write_prebuilt(structure, 3, folder))
+    folder = once("prebuilt-of-eight", lambda folder: prebuilt.write_prebuilt(structure, 3, "all", folder))
     return folder / prebuilt.file_name(structure, 3)
 
 

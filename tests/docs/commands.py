@@ -17,8 +17,9 @@ TIMEOUT = 60  # s, of a command that is not ours
 
 @dataclass(frozen=True)
 class Command:
-    """One command: its words, where its output goes ("" for the page) and its line in the page."""
+    """One command: as it is printed, its words, where its output goes ("" for the page) and its line in the page."""
 
+    text: str
     words: list[str]
     out: str
     line: int
@@ -39,7 +40,7 @@ def commands(block: Block) -> list[Command]:
             words = shlex.split(held, comments=True)
         except ValueError as error:
             raise PageError(f"{block.page}:{first}: {error}") from error
-        held = ""
+        printed, held = held, ""
         if not words:
             continue
         out = ""
@@ -47,7 +48,7 @@ def commands(block: Block) -> list[Command]:
             *words, _, out = words
         if words[0] == "$" or {"|", "&", "&&", ";", "<", ">", ">>", "||"} & set(words):
             raise PageError(f"{block.page}:{first}: one command a line, without prompt, pipe or &, > FILE at its end")
-        found.append(Command(words, out, first))
+        found.append(Command(printed, words, out, first))
     if held:
         raise PageError(f"{block.page}:{first}: nothing follows the last backslash")
     return found

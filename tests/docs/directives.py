@@ -1,5 +1,7 @@
 """What HTML comments above a block say of it; a reader of the page does not see them.
 
+The same for a page that is to be free of them stands in ``beside/PAGE.toml``, by how a block begins.
+
 ==========================================  =======================================================================
 ``not run: REASON``                         of a block, or with ``"PREFIX"`` after ``run`` of the lines that begin so
 ``run with: ARGUMENTS``                     appended to its commands, or with ``"PREFIX"`` to those that begin so

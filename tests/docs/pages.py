@@ -1,6 +1,7 @@
 """Pages of the documents: their code blocks, with the directives above them, and what they have in running text."""
 
 import re
+import tomllib
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,6 +12,7 @@ from markdown_it.token import Token
 from tests.docs.directives import Directives, PageError, looks_like_one, page_wide
 
 ROOT = Path(__file__).parents[2]
+BESIDE = Path(__file__).parent / "beside"  # of pages that are to be free of directives: NAME.toml
 _COMMENT = re.compile(r"<!--(.*?)-->", re.S)
 
 
@@ -41,7 +43,14 @@ class Block:
 
 def blocks(page: Path) -> list[Block]:
     """Return the code blocks of a page, in order; what no rule covers is a PageError."""
-    return list(_blocks(page_name(page), MarkdownIt("commonmark").parse(page.read_text(encoding="utf-8"))))
+    tokens = MarkdownIt("commonmark").parse(page.read_text(encoding="utf-8"))
+    return list(_blocks(page_name(page), tokens, _beside(page)))
+
+
+def _beside(page: Path) -> dict[str, list[str]]:
+    """Return what is said of a page's blocks in a file of the tests, by how a block begins."""
+    path = (BESIDE / page_name(page)).with_suffix(".toml")
+    return tomllib.loads(path.read_text(encoding="utf-8")) if path.is_file() else {}
 
 
 def inline_code(page: Path) -> list[tuple[int, str]]:
@@ -54,8 +63,9 @@ def inline_code(page: Path) -> list[tuple[int, str]]:
     return found
 
 
-def _blocks(name: str, tokens: list[Token]) -> Iterator[Block]:
+def _blocks(name: str, tokens: list[Token], beside: dict[str, list[str]]) -> Iterator[Block]:
     above: list[str] = []  # comments that await their fence
+    awaited = dict(beside)
     everywhere: list[str] = []
     for token in tokens:
         line = token.map[0] + 1 if token.map else 0
@@ -68,6 +78,8 @@ def _blocks(name: str, tokens: list[Token]) -> Iterator[Block]:
             where = f"{name}:{line + 1}"
             if not language:
                 raise PageError(f"{where}: a block without a language")
+            for begins in [begins for begins in awaited if token.content.startswith(begins)]:
+                above += awaited.pop(begins)
             yield Block(name, line + 1, language, token.content, Directives.read(where, above, everywhere))
             above = []
         elif token.type == "code_block":
@@ -76,6 +88,8 @@ def _blocks(name: str, tokens: list[Token]) -> Iterator[Block]:
             _refuse_lost(f"{name}:{line}", above)
             above = []
     _refuse_lost(f"{name}: end", above)
+    if awaited:
+        raise PageError(f"{name}: no block begins with {next(iter(awaited))!r}, as {BESIDE.name}/ has it")
 
 
 def _refuse_lost(where: str, comments: list[str]) -> None:

@@ -4,7 +4,6 @@ import argparse
 import io
 import re
 import runpy
-import signal
 import sys
 import tomllib
 from collections.abc import Callable, Sequence
@@ -56,7 +55,6 @@ def run_script(script: str, arguments: list[str]) -> tuple[int, str, str]:
 def _captured(call: Callable[[], int | None]) -> tuple[int, str, str]:
     output = io.TextIOWrapper(io.BytesIO(), encoding="utf-8", write_through=True)
     errors = io.StringIO()
-    heeded = signal.getsignal(signal.SIGTERM)  # which a program changes for itself
     with redirect_stdout(output), redirect_stderr(errors):
         try:
             status = call() or 0
@@ -65,7 +63,6 @@ def _captured(call: Callable[[], int | None]) -> tuple[int, str, str]:
             if isinstance(ended.code, str):
                 errors.write(ended.code)
         finally:
-            signal.signal(signal.SIGTERM, heeded)
             plt.close("all")
     return status, output.buffer.getvalue().decode(), errors.getvalue()
 

@@ -59,7 +59,7 @@ RIGHT = {
     + fence("text", '{"seed":...'),
     "what is not run": fence("sh", "sim_vehicle.py -v ArduSub", "not run: needs ArduPilot"),
     "one line that is not run": fence("sh", "ardusub\nls", 'not run "ardusub": needs ArduPilot'),
-    "what pip and make do": fence("sh", "pip install '.[mavlink,dev]'\nmake run"),
+    "what pip and make do": fence("sh", "pip install '.[mcap,dev]'\nmake run"),
     "a line that goes on": fence("sh", "python -m fuzzy_arbiter eval \\\n  section-vi 1 0 0"),
     "a place to go": fence(
         "sh", "mkdir there\ncd there\npython -m plant_fmu plot odin thrusters --out a.svg\nls a.svg"
@@ -202,3 +202,17 @@ def test_output_is_compared_by_lines():
     assert same_output("took ... s", "took 0.3 s\n")
     assert not same_output("a\nb", "a b\n")
     assert not same_output("a", "a\nb\n")
+
+
+def test_directives_may_stand_in_a_file_beside_the_tests(run, tmp_path, monkeypatch):
+    monkeypatch.setattr("tests.docs.pages.BESIDE", tmp_path)
+    (tmp_path / "page.toml").write_text('"cosim show" = ["exits: 2"]\n')
+    run(fence("sh", "cosim show nothing"))
+
+
+def test_each_of_them_has_its_block(tmp_path, monkeypatch):
+    monkeypatch.setattr("tests.docs.pages.BESIDE", tmp_path)
+    (tmp_path / "page.toml").write_text('"cosim show" = ["slow"]\n"cosim fly" = ["slow"]\n')
+    (tmp_path / "page.md").write_text(fence("sh", "cosim show paper"))
+    with pytest.raises(PageError, match=re.escape("page.md: no block begins with 'cosim fly'")):
+        blocks(tmp_path / "page.md")

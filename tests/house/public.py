@@ -34,7 +34,7 @@ NAMED = {
     "cosim.mavlink.endpoint": "Endpoint parse_endpoint",
     "cosim.mavlink.options": "MavlinkOptions",
     "cosim.mavlink.setup": "Mavlink",
-    "cosim.record": "Record load_record",
+    "cosim.record": "Record Rows load_record",
     "cosim.recorder": "Recorder",
     "cosim.replay.pages": "replay write_replay",
     "cosim.report": "write_report",

@@ -69,14 +69,15 @@ ONE_PLACE = {
     "mcap_protobuf": {"cosim.export.as_mcap"},
     "numba": {
         *("controller.by_address", "controller.compiled", "controller.on_stack", "controller.regions.kinds"),
-        *("controller.repeated", "cosim.flight", "cosim.memberships", "cosim.native"),
+        *("controller.repeated", "cosim.flight", "cosim.memberships", "cosim.native", "cosim.progress"),
         "fuzzy_arbiter.compiled",
     },
     "pymavlink": {"cosim.mavlink.dialect"},
     "rerun": {"cosim.export.as_rrd"},
     "rich": {"cosim.command_line.watch", "cosim.live.watching.bars", "cosim.live.watching.picture"},
+    "shtab": {"cosim.command_line.completion"},
     "skfuzzy": {"fuzzy_arbiter.engines.scikit"},
-    "tomli_w": {"cosim.scenario"},
+    "tomli_w": {"cosim.scenario_text"},
     "websockets": {"cosim.live.server", "cosim.live.watching.sources"},
 }
 
@@ -86,26 +87,23 @@ OPTIONAL = {
     "dask",
     "distributed",
     "ecospy",
-    "fastcrc",
     "fmu_manipulation_toolbox",
     "foxglove_schemas_protobuf",
 }
-OPTIONAL |= {"google", "libcosimpy", "mcap", "mcap_protobuf", "pandas", "pymavlink", "rerun", "rich", "websockets"}
+OPTIONAL |= {"google", "libcosimpy", "mcap", "mcap_protobuf", "pandas", "rerun"}
 WANT_AN_EXTRA = {
     "cosim.export.as_mcap",
     "cosim.export.as_rrd",
     "cosim.export.foxglove_scene",
     "cosim.export.protobuf_table",
-    "cosim.live.server",
-    "cosim.live.watching",
-    "cosim.live.watching.bars",
-    "cosim.live.watching.picture",
-    "cosim.live.watching.sources",
     "plant_fmu.importers.casadi_import",
     "plant_fmu.importers.ecos",
     "plant_fmu.importers.libcosim",
     "plant_fmu.importers.toolbox",
 }
+
+# what shows a run while it goes on: a run that nobody watches does without
+OF_SHOWING = {"pymavlink", "rich", "websockets"}
 
 _IMPORT_ALL = """
 import importlib, sys
@@ -186,11 +184,12 @@ def test_the_base_install_imports_all_but_what_wants_an_extra():
     ("what", "without"),
     [
         ("cosim", {"numpy"}),
-        ("cosim.cli", {"numpy", "numba", "scipy", "matplotlib", "pyarrow", "fmpy", "pandas", "msgspec"}),
+        ("cosim.cli", {"numpy", "numba", "scipy", "matplotlib", "pyarrow", "fmpy", "pandas", "msgspec", *OF_SHOWING}),
         ("fuzzy_arbiter", {"skfuzzy", "numba", "scipy", "matplotlib", "networkx"}),
         ("controller", {"matplotlib", "fmpy", "pyarrow", "msgspec"}),
         ("plant_fmu", {"numba", "scipy", "matplotlib", "pyarrow"}),
-        ("cosim.scenario", {"matplotlib", "pandas", "skfuzzy"}),
+        ("cosim.scenario", {"matplotlib", "pandas", "skfuzzy", *OF_SHOWING}),
+        ("cosim.run", OF_SHOWING),
     ],
 )
 def test_what_is_heavy_waits_until_it_is_asked_for(what, without):
