@@ -3,20 +3,21 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import json
 import os
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import NoReturn
+from typing import Any, NoReturn
 
 from fuzzy_arbiter.arbiter import Arbiter
 from fuzzy_arbiter.command_line.definitions import BUILT_IN, convert, described, load_system
-from fuzzy_arbiter.command_line.drawing import IMAGES, PICTURES, draw, image
+from fuzzy_arbiter.command_line.drawing import IMAGES, PICTURES, draw, image, middles
 from fuzzy_arbiter.command_line.files import read_text, require_suffix
 from fuzzy_arbiter.command_line.values import evaluated, evaluated_table, sample
 from fuzzy_arbiter.engines import ENGINES
-from fuzzy_arbiter.errors import ArbiterError, InputError
+from fuzzy_arbiter.errors import ArbiterError, InputError, one_line
 from fuzzy_arbiter.files import write_whole
 
 FINDINGS, FAULT, INTERRUPTED, NO_READER = 1, 2, 130, 141
@@ -35,12 +36,30 @@ examples:
 """
 
 
+class _Version(argparse.Action):
+    """Prints the version, which takes a while to find."""
+
+    def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
+        from importlib import metadata
+
+        try:
+            version = metadata.version("subreach")
+        except metadata.PackageNotFoundError:
+            version = "of a folder that is not installed"
+        print(f"fuzzy_arbiter {version}")
+        parser.exit()
+
+
 class _Parser(argparse.ArgumentParser):
     """Says what is wrong in one line, as all other errors."""
 
+    def print_help(self, file: Any = None) -> None:
+        """Print it; argparse itself would pass over output that fails."""
+        print(self.format_help(), end="", file=file)
+
     def error(self, message: str) -> NoReturn:
         verb = self.prog.removeprefix("python -m fuzzy_arbiter").strip()
-        self.exit(FAULT, f"fuzzy_arbiter: {verb + ': ' if verb else ''}{message}; see --help\n")
+        self.exit(FAULT, f"fuzzy_arbiter: {verb + ': ' if verb else ''}{one_line(message)}; see --help\n")
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -50,6 +69,7 @@ def _parser() -> argparse.ArgumentParser:
         epilog=_EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
+    parser.add_argument("--version", action=_Version, nargs=0, help="show program's version number and exit")
     verbs = parser.add_subparsers(dest="verb", required=True)
 
     def verb(name: str, what: str, engine: bool = True) -> argparse.ArgumentParser:
@@ -134,12 +154,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
         0; 1 if `verify` found something; 2 where the user must mend something; 130 if interrupted; 141 if what was
         printed has no reader.
     """
-    options = _parsed(arguments)
+    if sys.stdout is None:  # closed by whoever started this: the next file that is opened would take its place
+        return _fault("standard output is closed; expected it open, such as on /dev/null")
     try:
-        status = _run(options)
-        if sys.stdout is not None:
+        try:
+            return _run(_parsed(arguments))
+        finally:
             sys.stdout.flush()
-        return status
     except BrokenPipeError:
         _drop_output()
         return NO_READER
@@ -149,7 +170,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return _fault(f"{error.name} is not installed")
     except OSError as error:  # such as a full disk behind the output
         _drop_output()
-        return _fault(f"{error.filename or 'output'}: {error.strerror or error}")
+        return _fault(f"{error.filename or 'standard output'}: {error.strerror or error}")
     except KeyboardInterrupt:
         _fault("interrupted")
         return INTERRUPTED
@@ -176,12 +197,19 @@ def _is_number(word: str) -> bool:
 
 def _drop_output() -> None:
     """Let what is left of the output go nowhere, else the interpreter fails again to write it at its end."""
-    if sys.stdout is not None:  # closed by whoever started this
+    with contextlib.suppress(OSError):
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
+def _tell(what: str) -> None:
+    """Say something in one line on standard error; nothing where that is closed or gone."""
+    if sys.stderr is not None:  # else `print` would take standard output
+        with contextlib.suppress(OSError):
+            print(f"fuzzy_arbiter: {one_line(what)}", file=sys.stderr, flush=True)
+
+
 def _fault(what: str) -> int:
-    print(f"fuzzy_arbiter: {' '.join(what.split())}", file=sys.stderr)
+    _tell(what)
     return FAULT
 
 
@@ -209,8 +237,11 @@ def _run(options: argparse.Namespace) -> int:
         explanation = arbiter.explain(sample(options.values, system))
         print(json.dumps(explanation.as_dict(), indent=2, ensure_ascii=False) if options.json else explanation)
     elif options.verb == "plot":
-        figure = draw(arbiter, options.kind, options.input, options.output, options.at, options.relief)
+        assumed = middles(options.at, system) if options.kind == "rules" else []
+        figure = draw(arbiter, options.kind, options.input, options.output, [*options.at, *assumed], options.relief)
         write_whole(options.out, image(figure, Path(options.out).suffix[1:].lower()))
+        if assumed:
+            _tell(f"drawn at the middle of each input that --at leaves out: {' '.join(assumed)}")
         print(options.out)
     else:
         _evaluate(arbiter, options)

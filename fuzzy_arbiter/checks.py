@@ -90,25 +90,6 @@ def require_name(name: object, what: str) -> None:
         )
 
 
-def brief(fault: Exception) -> str:
-    """Return what a fault says in printable characters, cut in the middle where what came is absurdly long.
-
-    Parameters
-    ----------
-    fault : Exception
-        Any.
-
-    Returns
-    -------
-    str
-        At most some hundred characters.
-    """
-    text = str(fault)
-    if not text.isprintable():
-        text = "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
-    return text if len(text) <= 1000 else f"{text[:500]} ... {text[-500:]}"
-
-
 def shown(value: object) -> str:
     """Return what came as a fault quotes it.
 

@@ -30,7 +30,7 @@ def compiled(system: System) -> Any:
     try:
         import numba
     except ImportError:
-        raise EngineError("compiled: Numba is not installed, expected such as pip install numba") from None
+        raise EngineError("compiled: Numba is not installed") from None
     namespace: dict[str, Any] = {}
 
     exec(compile(to_python(system), f"<{system.name}>", "exec"), namespace)  # noqa: S102

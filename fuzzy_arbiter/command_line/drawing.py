@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from fuzzy_arbiter.arbiter import Arbiter
 from fuzzy_arbiter.command_line.values import sample
-from fuzzy_arbiter.definition import variable_names
+from fuzzy_arbiter.definition import System, variable_names
 from fuzzy_arbiter.errors import InputError
 
 if TYPE_CHECKING:
@@ -89,6 +89,27 @@ def draw(
     output = _names(kind, "--output", outputs, output_names, 1)[0]
     ax = new_axes(6.4, 5.2, projection="3d") if relief else None
     return _figure(pictures.surface(arbiter, output, (first, second), places, ax=ax))
+
+
+def middles(at: Sequence[str], system: System) -> list[str]:
+    """Return the middle of each input that a sample of names leaves open.
+
+    Parameters
+    ----------
+    at : sequence of str
+        As ``name=value``; to values without names nothing is added.
+    system : System
+        Whose inputs.
+
+    Returns
+    -------
+    list of str
+        As ``name=value``.
+    """
+    if not all("=" in word for word in at):
+        return []
+    named = {word.rpartition("=")[0] for word in at}
+    return [f"{v.name}={(v.universe[0] + v.universe[1]) / 2.0!r}" for v in system.inputs if v.name not in named]
 
 
 def _names(kind: str, option: str, came: Sequence[str], known: Sequence[str], n: int) -> Sequence[str]:

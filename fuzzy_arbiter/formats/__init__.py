@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Literal, get_args
 
-from fuzzy_arbiter.checks import brief, shown
+from fuzzy_arbiter.checks import shown
 from fuzzy_arbiter.definition import System
 from fuzzy_arbiter.errors import ArbiterError, FormatError, UnsupportedError
 from fuzzy_arbiter.files import write_whole
@@ -113,6 +113,8 @@ def load(path: str | Path) -> System:
     """
     format = _format(path)
     try:
+        if Path(path).exists() and not (Path(path).is_file() or Path(path).is_dir()):  # to open a pipe would wait
+            raise FormatError(f"{path}: is a pipe or a device, expected a file")
         with Path(path).open("rb") as file:
             data = file.read(MAX_FILE + 1)
         if len(data) > MAX_FILE:
@@ -125,7 +127,7 @@ def load(path: str | Path) -> System:
     try:
         return reads(text, format)
     except ArbiterError as error:
-        raise type(error)(f"{path}: {brief(error)}") from None
+        raise type(error)(f"{path}: {error}") from None
 
 
 def save(system: System, path: str | Path) -> None:

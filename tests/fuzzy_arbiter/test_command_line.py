@@ -256,6 +256,19 @@ def test_plot_draws_every_kind(run, tmp_path, words, panels):
     assert (tmp_path / "a.svg").read_bytes() == first
 
 
+def test_rules_without_a_sample_are_drawn_at_the_middle_and_say_so(run, tmp_path, gap):
+    status, out, err = run("plot", "section-vi", "rules", "--out", "a.svg")
+    assert (status, out) == (0, "a.svg\n") and err.count("\n") == 1
+    assert err.endswith("that --at leaves out: obstacle=0.5 shape=0.5 depth=0.5\n")
+    drawn = (tmp_path / "a.svg").read_bytes()
+    assert run("plot", "section-vi", "rules", "--at", "0.5", "0.5", "0.5", "--out", "b.svg")[2] == ""
+    assert (tmp_path / "b.svg").read_bytes() == drawn
+    status, _, err = run("plot", "section-vi", "rules", "--at", "shape=0.1", "--out", "a.svg")
+    assert status == 0 and err.endswith(": obstacle=0.5 depth=0.5\n")
+    assert run("plot", gap, "rules", "--out", "a.svg")[:2] == (0, "a.svg\n")  # wind 10: some rule fires
+    assert run("plot", gap, "rules", "--at", "7", "--out", "a.svg")[:2] == (0, "a.svg\n")
+
+
 @pytest.mark.parametrize(("suffix", "magic"), [("png", b"\x89PNG"), ("PDF", b"%PDF")])
 def test_plot_writes_what_the_suffix_says(run, tmp_path, suffix, magic):
     assert run("plot", "section-vi", "terms", "--input", "depth", "--out", f"a.{suffix}")[0] == 0
@@ -270,7 +283,8 @@ def test_plot_writes_what_the_suffix_says(run, tmp_path, suffix, magic):
             ["terms", "--input", "speed", "--out", "a.png"],
             "no variable 'speed', expected one of obstacle, shape, depth",
         ),
-        (["rules", "--out", "a.png"], "no values came, expected obstacle, shape, depth"),
+        (["rules", "--at", "0.3", "--out", "a.png"], "inputs: 1 came, expected 3: obstacle, shape, depth"),
+        (["rules", "--at", "speed=1", "--out", "a.png"], "speed: unknown input"),
         (
             ["decisions", "--input", "shape", "--out", "a.png"],
             "decisions: 1 of --input, expected 2 of obstacle, shape, depth",
@@ -325,7 +339,7 @@ def test_a_full_disk_costs_one_line():
     command = [sys.executable, "-m", "fuzzy_arbiter", "show", "section-vi"]
     with open("/dev/full", "wb") as full:
         done = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True, check=False)
-    assert (done.returncode, done.stderr) == (2, "fuzzy_arbiter: output: No space left on device\n")
+    assert (done.returncode, done.stderr) == (2, "fuzzy_arbiter: standard output: No space left on device\n")
 
 
 def test_help_has_examples_that_are_understood(run):

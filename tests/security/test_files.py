@@ -1,5 +1,7 @@
 """Records that are none, folders with traps in them, and files that are written whole or not at all."""
 
+import json
+import math
 import os
 import shutil
 import stat
@@ -11,12 +13,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import controller.compiled
-from cosim.campaigns.folder import PLAN, read_json, read_plan
+from cosim.campaigns.folder import PLAN, read_plan
 from cosim.errors import RunError
 from cosim.flown_run import SUMMARY, load_run
+from cosim.live.watching import looks
+from cosim.plain_json import read_json
 from cosim.record import PARTS, RECORD, Record, load_record
 from cosim.replay.page import write_page
-from cosim.run_folder import claim
+from cosim.replay.pages import replay
+from cosim.run import run_scenario
+from cosim.run_folder import claim, report_again
 from cosim.scenario import load_scenario
 from cosim.whole_file import whole_file, write_whole
 
@@ -104,9 +110,8 @@ def test_a_folder_whose_name_is_no_utf_8(tmp_path):
 def test_texts_of_a_folder_that_are_no_json_or_endlessly_deep(tmp_path, shipped_run):
     folder = tmp_path / "run"
     shutil.copytree(shipped_run("paper", "time.duration=0.1").folder, folder)
-    ended = '{"status": "a", "law": "b", "scenario": "c", "wall_time": []}'
-    for text in ("[" * 100_000, "{", "[]", "1", '{"status": 1}', ended):
-        (folder / SUMMARY).write_text(text)
+    for text in ("[" * 100_000, "{", "[]", "1", '"\udc80"'):
+        (folder / SUMMARY).write_text(text, errors="surrogateescape")
         with pytest.raises(RunError, match="cannot be read"):
             load_run(folder)
     for text in ("[" * 100_000, "{", "[]"):
@@ -114,6 +119,61 @@ def test_texts_of_a_folder_that_are_no_json_or_endlessly_deep(tmp_path, shipped_
             (folder / name).write_text(text)
             with pytest.raises(RunError, match=r"cannot be read|holds no campaign"):
                 read(folder / name)
+
+
+SUMMARIES = {
+    "law": ["mine", "pd", "", 7, None, [], "printed" * 900, "printed\x1b[31m"],
+    "status": [7, None, ["completed"], {"a": {}}],
+    "scenario": [7, None, [1], True],
+    "wall_time": ["x", [], {}, -1, True, 1e300, math.nan, math.inf, 10**400],
+}
+
+
+@pytest.mark.parametrize(("key", "values"), SUMMARIES.items(), ids=SUMMARIES)
+def test_d5_a_summary_of_anothers_names_its_key(tmp_path, ordered_run, key, values):
+    folder = tmp_path / "run"
+    shutil.copytree(ordered_run, folder)
+    sound = json.loads((folder / SUMMARY).read_text())
+    for value in values:
+        (folder / SUMMARY).write_text(json.dumps(sound | {key: value}))
+        for read in (load_run, report_again, lambda of: replay([of]), lambda of: list(looks(str(of), None))):
+            with pytest.raises(RunError, match=f"{key} is ") as caught:
+                read(folder)
+            said = str(caught.value)
+            assert said.startswith(f"{folder / SUMMARY}: {key} is ") and said.isprintable()
+
+
+@pytest.mark.parametrize("key", ["law", "status", "scenario"])
+def test_d5_a_summary_that_lacks_a_key_names_it(tmp_path, ordered_run, key):
+    folder = tmp_path / "run"
+    shutil.copytree(ordered_run, folder)
+    sound = json.loads((folder / SUMMARY).read_text())
+    del sound[key]
+    (folder / SUMMARY).write_text(json.dumps(sound))
+    with pytest.raises(RunError, match=f"{SUMMARY}: {key} is missing"):
+        load_run(folder)
+
+
+def test_d5_texts_of_a_summary_are_shown_only(tmp_path, shipped_run):
+    folder = tmp_path / "run"
+    shutil.copytree(shipped_run("paper", "time.duration=0.1").folder, folder)
+    sound = json.loads((folder / SUMMARY).read_text())
+    texts = {"status": "done\n\x1b[31m", "scenario": "a\udc80\x07", "law": "an autopilot\x9b"}
+    (folder / SUMMARY).write_text(json.dumps(sound | texts))
+    summary, _ = report_again(folder)
+    assert {key: summary[key] for key in texts} == {
+        "status": r"done \x1b[31m", "scenario": r"a\udc80\x07", "law": r"an autopilot\x9b"
+    }  # fmt: skip
+
+
+@pytest.mark.skipif(os.name != "posix", reason="names of files are no bytes here")
+def test_d5_a_scenario_whose_name_orders_a_terminal_has_one_that_is_shown_only(tmp_path):
+    file = tmp_path / os.fsdecode(b"a\x1b[31m\xff.toml")
+    file.write_text('base = "paper"\ntime.duration = 0.01')
+    scenario = load_scenario(file)
+    assert scenario.name == r"a\x1b[31m\udcff"
+    run = run_scenario(scenario, tmp_path / "run")
+    assert load_run(run.folder).scenario.name == scenario.name
 
 
 # ---- what is written ----

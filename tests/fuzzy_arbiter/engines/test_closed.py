@@ -57,7 +57,7 @@ def test_it_is_the_exact_centroid_on_100_000_inputs():
     scaled = Arbiter(engine="closed").batch(inputs)
     assert np.abs(scaled - (3 * exact - 1)).max() <= 4 * EPS
     swept = Arbiter(normalisation="none", engine="exact").batch(inputs[:10_000])
-    assert np.abs(raw[:10_000] - swept).max() <= 4 * EPS
+    assert np.abs(raw[:10_000] - swept).max() <= 8 * EPS  # both are rounded
 
 
 @settings(max_examples=examples(60), deadline=None)

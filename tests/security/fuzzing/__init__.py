@@ -1,0 +1,1 @@
+"""Every reader of the product, and changes of what it reads."""

@@ -1,0 +1,219 @@
+"""Readers of the folders of runs, campaigns, sweeps and comparisons."""
+
+from __future__ import annotations
+
+import io
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import pyarrow.parquet as pq
+import pytest
+
+from controller import LAWS
+from cosim.campaigns.campaign_page import write_campaign_page
+from cosim.campaigns.comparison_page import NUMBERS, write_comparison_page
+from cosim.campaigns.folder import PLAN, RESULTS, SUMMARY
+from cosim.campaigns.page import Html
+from cosim.campaigns.parts import Parts
+from cosim.campaigns.plan import plan_of
+from cosim.campaigns.repeat import repeat_of
+from cosim.campaigns.replays import replay_of
+from cosim.campaigns.results import Results
+from cosim.campaigns.scene_rows import SCHEMA
+from cosim.campaigns.summary import summarise
+from cosim.campaigns.sweep_page import write_sweep_page
+from cosim.columns import names_of
+from cosim.flown_run import _concluded, flown_run, load_run
+from cosim.helm.sources import read_log
+from cosim.record import PARTS, RECORD, load_record
+from cosim.replay.events import events_of
+from cosim.replay.page import is_page, write_page
+from cosim.replay.steering import changes_of
+from cosim.replay.trace import trace_of
+from cosim.scenario import load_scenario
+from cosim.scene_run import Conditions
+from tests.security.fuzzing.registry import SCENES, Case, Seeds, reader
+
+# ---- run folders ---------------------------------------------------------------------------------------------------
+
+
+@reader("summary of a run", "json", "cosim.plain_json:read_json")
+def summary(seeds: Seeds) -> Case:
+    planned = load_run(seeds.run).planned
+    return seeds.file("summary.json", lambda path: _concluded(path, planned), (seeds.run / "summary.json").read_bytes())
+
+
+@reader("orders of a run", "jsonl", "cosim.helm.sources:read_log")
+def orders(seeds: Seeds) -> Case:
+    run = load_run(seeds.run)
+
+    def read(path: Path) -> None:
+        log = read_log(path)
+        changes_of(run, log)
+        events_of(run, log)
+
+    return seeds.file("orders.jsonl", read, (seeds.run / "orders.jsonl").read_bytes())
+
+
+def _thinned(folder: Path, rows: int) -> bytes:
+    made = io.BytesIO()
+    pq.write_table(pq.read_table(folder / RECORD).slice(0, rows), made)
+    return made.getvalue()
+
+
+@reader("record", "parquet", "cosim.record:_opened", "cosim.record:_column_of")
+def record(seeds: Seeds) -> Case:
+    table = pq.read_table(seeds.run / RECORD).slice(0, 9)
+    made = io.BytesIO()
+    pq.write_table(table.select(table.column_names[:6]), made)
+
+    def read(path: Path) -> None:
+        found = load_record(path.parent)
+        for name in found.units:
+            found[name]
+        list(found.blocks())
+
+    case = seeds.file(RECORD, read, made.getvalue())
+    return replace(case, named=str(Path(case.named).parent))
+
+
+@reader("part of a record", "parquet", "cosim.record:_opened")
+def part(seeds: Seeds) -> Case:
+    case = record(seeds)
+    folder = seeds.folder()
+    (folder / PARTS).mkdir()
+    (folder / PARTS / "000000.parquet").write_bytes(case.contents[0])
+    path = folder / PARTS / "000001.parquet"
+
+    def read(content: bytes) -> None:
+        path.write_bytes(content)
+        list(load_record(folder).blocks())
+
+    return Case(case.contents, read, str(folder))
+
+
+@reader("run", "parquet", "cosim.record:_opened", "cosim.flown_run:_lines")
+def run(seeds: Seeds) -> Case:
+    """All that is made of a run, whatever the numbers are."""
+    folder, flown = seeds.folder(seeds.run), load_run(seeds.run)
+    names = names_of(flown.planned)
+    seeds.patch.setattr("cosim.columns.names_of", lambda _: names)
+
+    def read(content: bytes) -> None:
+        (folder / RECORD).write_bytes(content)
+        trace_of(flown_run(folder, flown.planned, "completed", None)).as_json()
+
+    return Case((_thinned(seeds.run, 12),), read, str(folder))
+
+
+@reader("replay page", "text", "cosim.replay.page:is_page")
+def page(seeds: Seeds) -> Case:
+    whole = write_page(seeds.folder() / "it.html", [], "a run").read_bytes()
+    return seeds.file("it.html", is_page, whole[-40_000:])
+
+
+# ---- campaigns, sweeps and comparisons -----------------------------------------------------------------------------
+
+
+@reader("plan of a campaign", "json", "cosim.plain_json:read_json")
+def plan(seeds: Seeds) -> Case:
+    seed = json.loads(SCENES[0])["seed"]
+    case = seeds.file(PLAN, lambda path: repeat_of(path.parent, seed), of=seeds.comparison / "printed")
+    return replace(case, named=str(Path(case.named).parent))
+
+
+def _with_its_scenario(seeds: Seeds, name: str) -> Case:
+    """Return the case of a file of a sweep, whose scenario was read before."""
+    scenario = load_scenario(seeds.sweep / "scenario.toml")
+    case = seeds.file(name, lambda path: repeat_of(path.parent, 1), of=seeds.sweep)
+
+    def read(content: bytes) -> None:
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr("cosim.campaigns.repeat.load_scenario", lambda _: scenario)
+            case.read(content)
+
+    return Case(case.contents, read, str(Path(case.named).parent))
+
+
+@reader("plan of a sweep", "json", "cosim.plain_json:read_json", "cosim.campaigns.sweep_rows:_files")
+def plan_of_sweep(seeds: Seeds) -> Case:
+    return _with_its_scenario(seeds, PLAN)
+
+
+_RESULTS = [f"cosim.campaigns.results:Results.{name}" for name in ("__init__", "row", "_read", "pieces")]
+
+
+@reader("results of a campaign", "parquet", *_RESULTS, "cosim.campaigns.parts:check_schema")
+def results(seeds: Seeds) -> Case:
+    of = plan_of("printed", LAWS["printed"].gains_type(), Conditions(), 2, "")
+    seed = json.loads(SCENES[0])["seed"]
+
+    def read(path: Path) -> None:
+        repeat_of(path.parent, seed)
+        found = Results(path, SCHEMA)
+        summarise(of, found, path.parent)
+        list(found.pieces("scene"))
+
+    case = seeds.file(RESULTS, read, of=seeds.comparison / "printed")
+    return replace(case, named=str(Path(case.named).parent))
+
+
+@reader(
+    "results of a sweep", "parquet", "cosim.campaigns.results:Results.__init__", "cosim.campaigns.results:Results.row"
+)
+def results_of_sweep(seeds: Seeds) -> Case:
+    return _with_its_scenario(seeds, RESULTS)
+
+
+@reader("part of a campaign", "parquet", "cosim.campaigns.parts:_keys", "cosim.campaigns.parts:check_schema",
+        "cosim.campaigns.parts:_least", "cosim.campaigns.parts:_Reader.__init__")  # fmt: skip
+def part_of_campaign(seeds: Seeds) -> Case:
+    """One that is damaged is removed, and flown again."""
+    content, folder = (seeds.comparison / "printed" / RESULTS).read_bytes(), seeds.folder()
+
+    def read(content: bytes) -> None:
+        (folder / "00000000-00000000.parquet").write_bytes(content)
+        parts = Parts(folder, SCHEMA)
+        if len(parts.keys()):
+            parts.join(folder.parent / "joined.parquet")
+
+    return Case((content,), read, str(folder))
+
+
+def _without_drawing(seeds: Seeds, module: str) -> None:
+    seeds.patch.setattr(f"cosim.campaigns.{module}.write_figures", lambda folder, _: _AnyFigure())
+
+
+class _AnyFigure(dict[str, Html]):
+    def __missing__(self, name: str) -> Html:
+        return Html("")
+
+
+@reader("summary of a campaign", "json", "cosim.plain_json:read_json")
+def summary_of_campaign(seeds: Seeds) -> Case:
+    _without_drawing(seeds, "campaign_page")
+    return seeds.file(SUMMARY, lambda path: write_campaign_page(path.parent, 0), of=seeds.comparison / "printed")
+
+
+@reader("summary of a sweep", "json", "cosim.plain_json:read_json")
+def summary_of_sweep(seeds: Seeds) -> Case:
+    _without_drawing(seeds, "sweep_page")
+    case = seeds.file(SUMMARY, lambda path: write_sweep_page(path.parent, 0), of=seeds.sweep)
+    return replace(case, named=str(Path(case.named).parent))
+
+
+@reader("comparison", "json", "cosim.plain_json:read_json")
+def comparison(seeds: Seeds) -> Case:
+    _without_drawing(seeds, "comparison_page")
+    case = seeds.file(NUMBERS, lambda path: write_comparison_page(path.parent, 0), of=seeds.comparison)
+    return replace(case, named=str(Path(case.named).parent))
+
+
+@reader("remarks on a replay", "json", "cosim.plain_json:read_json")
+def remarks(seeds: Seeds) -> Case:
+    return seeds.file(
+        "worst/1/flown.json",
+        lambda path: replay_of(path.parents[2], 1, [], "it").cell(),
+        b'{"remarks": ["printed: step by step it came out otherwise"]}',
+    )

@@ -1,0 +1,263 @@
+"""Every reader of what comes over a connection or stands on a command line."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+from pymavlink.dialects.v20 import all as mavlink
+from rich.console import Console
+
+from controller.laws import LAWS
+from cosim.campaigns import vary_from
+from cosim.campaigns.law_gains import gains_from
+from cosim.helm import OrderQueue
+from cosim.live.address import parse_live, stranger
+from cosim.live.messages import bytes_of, text_of
+from cosim.live.orders import LONGEST, Desk
+from cosim.live.watching import looks, picture
+from cosim.mavlink.endpoint import parse_endpoint
+from cosim.mavlink.framing import Counts, Gate, StreamReader
+from cosim.mavlink.ground import Heard
+from cosim.mavlink.listening import Watch
+from cosim.mavlink.listening import picture as table
+from cosim.replay.header import header_of
+from cosim.replay.viewing import Viewing
+from cosim.scenario import load_scenario
+from cosim.sitl import wire
+from cosim.sitl.flights import Counts as HilCounts
+from cosim.sitl.hil import HilServer
+from cosim.sitl.law import law_of_controls, law_of_pwm
+from fuzzy_arbiter import parse_rule
+from plant_fmu import load_vehicle
+from tests.cosim.mavlink.station import Station
+from tests.security.conftest import ORDERS
+from tests.security.fuzzing.registry import Case, Seeds, reader
+
+# ---- the live page -------------------------------------------------------------------------------------------------
+
+
+@reader("order of a viewer", "json", "cosim.live.orders:Desk.take")
+def order(seeds: Seeds) -> Case:
+    scenario = load_scenario("paper", ["commands.enabled=true", "commands.obstacles=2"])
+    queue = OrderQueue()
+    desk = Desk(scenario, queue, lambda name: True)
+
+    def read(content: bytes) -> None:
+        try:
+            message = content[:LONGEST].decode()
+        except UnicodeDecodeError:  # by which WebSocket has a connection fail
+            return
+        queue.take(0)
+        said = desk.take(message)
+        assert said is None or (said.isprintable() and 0 < len(said) < 300), said
+
+    return Case(tuple(json.dumps(order).encode() for order in ORDERS), read)
+
+
+class _Connection:
+    """A live view that says what it is told to."""
+
+    def __init__(self, messages: list[str | bytes]) -> None:
+        self._messages = messages
+
+    def __enter__(self) -> _Connection:
+        return self
+
+    def __exit__(self, *_: object) -> None: ...
+
+    def __iter__(self) -> Iterator[str | bytes]:
+        return iter(self._messages)
+
+
+@reader("live view", "jsonl", "cosim.live.watching.sources:_live")
+def live_view(seeds: Seeds) -> Case:
+    scenario = load_scenario("paper", ["commands.enabled=true", "commands.obstacles=2"])
+    columns = load_columns(seeds)
+    viewing = Viewing(scenario, columns)
+    header = header_of(scenario, viewing.columns, commands=True)
+    rows = bytes_of(np.zeros((2, len(viewing.columns))))
+    texts = [
+        text_of("header", run=header),
+        text_of("said", kind="info", text="a word", time=None),
+        text_of("end", status="completed", verdict="It came to its end."),
+    ]
+    console = Console(width=100, quiet=True)
+
+    def read(content: bytes) -> None:
+        messages: list[str | bytes] = [line.decode("utf-8", "replace") for line in content.splitlines()]
+        messages[1:1] = [rows]
+        seeds.patch.setattr("socket.create_connection", lambda *_, **__: None)
+        seeds.patch.setattr("websockets.sync.client.connect", lambda *_, **__: _Connection(messages))
+        for look in looks("ws://127.0.0.1:8765"):
+            console.print(picture(look, 100, 40))
+
+    return Case(("\n".join(texts).encode() + b"\n",), read, "ws://127.0.0.1:8765")
+
+
+def load_columns(seeds: Seeds) -> Any:
+    from cosim.record import load_record
+
+    return load_record(seeds.run).columns
+
+
+# ---- MAVLink and simulators ----------------------------------------------------------------------------------------
+
+_SENDER = (250, 190)
+
+
+def _frames() -> bytes:
+    codec = mavlink.MAVLink(None, *_SENDER)
+    m = mavlink
+    messages = [
+        m.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3),
+        m.MAVLink_command_long_message(1, 1, m.MAV_CMD_COMPONENT_ARM_DISARM, 0, 1, 0, 0, 0, 0, 0, 0),
+        m.MAVLink_mission_count_message(1, 1, 2, 0),
+        m.MAVLink_mission_item_int_message(1, 1, 0, 6, 16, 0, 1, 0, 0, 0, 0, 559000000, -33000000, -4, 0),
+        m.MAVLink_mission_item_int_message(1, 1, 1, 1, 17, 0, 1, 5, 0, 0, 0, 7, 0, -4, 0),
+        m.MAVLink_mission_request_list_message(1, 1, 0),
+        m.MAVLink_param_request_list_message(1, 1),
+        m.MAVLink_param_set_message(1, 1, b"MAV_SYS_ID", 3.0, 9),
+        m.MAVLink_set_position_target_local_ned_message(0, 1, 1, 1, 0xDF8, 7, 0, 4, 0, 0, 0, 0, 0, 0, 0, 0),
+        m.MAVLink_manual_control_message(1, 100, 0, 500, 0, 0),
+        m.MAVLink_obstacle_distance_message(0, 0, [100] * 72, 5, 10, 900, 5.0, 0.0, 12),
+        m.MAVLink_file_transfer_protocol_message(0, 1, 1, bytes([0, 0, 0, 4, 12]) + b"\0" * 246),
+        m.MAVLink_statustext_message(6, b"a word"),
+    ]
+    return b"".join(message.pack(codec) for message in messages)
+
+
+_FRAMING = ("cosim.mavlink.framing:Gate._judged", "cosim.mavlink.framing:header_at")
+
+
+@reader("MAVLink frames, to a vehicle", "bytes", *_FRAMING, "cosim.mavlink.services.ftp:FileServer._request")
+def to_vehicle(seeds: Seeds) -> Case:
+    station = Station()
+    station.look()
+
+    def read(content: bytes) -> None:
+        for _, message in StreamReader(Gate(Counts(), (1, 1))).read(content):
+            station.autopilot.receive(station.wire, message, station.now)
+        station.wait(0.04)
+        station.ordered()
+        station.wire.clear()
+
+    return Case((_frames(),), read)
+
+
+@reader("MAVLink frames, to a ground station", "bytes", *_FRAMING)
+def to_ground(seeds: Seeds) -> Case:
+    class Link:
+        name = "udpin:127.0.0.1:14550"
+
+        def troubles(self) -> list[str]:
+            return []
+
+    def read(content: bytes) -> None:
+        watch = Watch()
+        for _, m in Gate(Counts()).datagram(content):
+            watch.take(Heard(1.0, m.get_srcSystem(), m.get_srcComponent(), m.get_seq(), m.get_type(), m))
+        watch.sample(2.0)
+        assert all(line.isprintable() for line in table(Link(), watch, 2.0))  # type: ignore[arg-type]
+
+    return Case((_frames(),), read)
+
+
+@reader("MAVLink frames, to a simulator", "bytes", "cosim.sitl.hil:HilServer._controls")
+def to_simulator(seeds: Seeds) -> Case:
+    server: Any = HilServer.__new__(HilServer)
+    server.counts, server._mavlink = HilCounts(), mavlink
+    law = law_of_controls(load_vehicle("bluerov2_heavy"))
+    codec = mavlink.MAVLink(None, 1, 1)
+    frames = b"".join(
+        mavlink.MAVLink_hil_actuator_controls_message(1, [0.1] * 16, 128, 0).pack(codec) for _ in range(3)
+    )
+
+    def read(content: bytes) -> None:
+        codec.robust_parsing = True
+        for controls in server._controls(codec, content):
+            law.take(controls)
+
+    return Case((frames,), read)
+
+
+@reader("servo packet", "bytes", "cosim.sitl.wire:decode")
+def servos(seeds: Seeds) -> Case:
+    law = law_of_pwm(load_vehicle("bluerov2_heavy"))
+
+    def read(content: bytes) -> None:
+        packet = wire.decode(content)
+        if packet is not None:
+            law.take(packet.pwm)
+
+    packets = [wire._MAGICS[magic].pack(magic, 400, 7, *[1500] * n) for magic, n in ((18458, 16), (29569, 32))]
+    return Case(tuple(packets), read)
+
+
+# ---- the command line ----------------------------------------------------------------------------------------------
+
+
+def _argument(read: Callable[[str], object], *sound: str) -> Case:
+    """Return the case of a word, which is any bytes without a null among them."""
+
+    def taken(content: bytes) -> object:
+        return read(content.replace(b"\0", b"").decode("utf-8", "surrogateescape"))
+
+    return Case(tuple(text.encode() for text in sound), taken)
+
+
+@reader("change of a scenario", "text", "cosim.scenario_file:override")
+def change(seeds: Seeds) -> Case:
+    return _argument(
+        lambda text: load_scenario("paper", [text]),
+        "law.gains.k_p1=10", "regions.SR1.shape.radius=2", "initial.position.0=1", "title='a'", "time={duration=2}",
+    )  # fmt: skip
+
+
+@reader("what varies", "text", "cosim.campaigns.design:_vary")
+def varied(seeds: Seeds) -> Case:
+    return _argument(lambda text: vary_from([text]), "limit.force=50:500:4:log", "a.b=-1:1", "c=1,2.5,1e3")
+
+
+@reader("gain", "text", "cosim.campaigns.law_gains:gains_from")
+def gain(seeds: Seeds) -> Case:
+    return _argument(lambda text: LAWS["pd"].checked(gains_from("pd", [text])), "k_p1=10", "k_v1 = 1.5e2")
+
+
+@reader("endpoint", "text", "cosim.mavlink.endpoint:parse_endpoint")
+def endpoint(seeds: Seeds) -> Case:
+    known = {"127.0.0.1": ("127.0.0.1", True)}
+
+    def resolved(host: str) -> tuple[str, bool]:
+        with contextlib.suppress(KeyError):
+            return known[host]
+        raise OSError("not asked")
+
+    seeds.patch.setattr("cosim.mavlink.endpoint.resolved", resolved)
+    seeds.patch.setattr("cosim.live.address.resolved", resolved)
+    sound = "udpout:127.0.0.1:14550", "tcpin:127.0.0.1:5760", "serial:/dev/ttyUSB0:57600", "dive.tlog"
+    return _argument(parse_endpoint, *sound)
+
+
+@reader("live address", "text", "cosim.live.address:parse_live")
+def address(seeds: Seeds) -> Case:
+    endpoint(seeds)
+    return _argument(parse_live, "127.0.0.1:8765", "8765")
+
+
+@reader("host and origin", "text", "cosim.live.address:stranger")
+def origin(seeds: Seeds) -> Case:
+    def read(text: str) -> None:
+        host, _, site = text.partition(" ")
+        said = stranger(parse_live(""), host, site or None)
+        assert said is None or "\n" not in said
+
+    return _argument(read, "127.0.0.1:8765 http://127.0.0.1:8765", "localhost:8765")
+
+
+@reader("rule", "text", "fuzzy_arbiter.rule_text:parse_rule")
+def rule(seeds: Seeds) -> Case:
+    return _argument(parse_rule, 'if a is b and (not "c d" is e or f is very_g) then h is i with 0.5')

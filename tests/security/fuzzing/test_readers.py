@@ -1,0 +1,87 @@
+"""Every reader takes any change of a sound file, or refuses it in one short printable line that names the file."""
+
+from __future__ import annotations
+
+import os
+import resource
+import traceback
+from collections import Counter
+from pathlib import Path
+
+import pytest
+
+from tests.security.fuzzing import files, folders, talkers
+from tests.security.fuzzing.mutations import mutated
+from tests.security.fuzzing.registry import KINDS, READERS, ROOT, Case, Seeds
+
+FEW = 40  # changes of each reader's examples among the fast tests,
+MANY = int(os.environ.get("FUZZ_CHANGES", "120"))  # and among the slow ones; FUZZ_CHANGES=2000 takes an hour
+LONGEST = 300  # characters of a message, beside the path that it names
+MEMORY = 400  # MB that all changes of a reader may take
+
+assert files and folders and talkers  # which register
+
+
+@pytest.fixture(scope="session")
+def all_seeds(tmp_path_factory, ordered_run):
+    return Seeds(tmp_path_factory, ordered_run)
+
+
+@pytest.fixture
+def seeds(all_seeds, monkeypatch):
+    all_seeds.patch = monkeypatch
+    return all_seeds
+
+
+def fault_of(case: Case, content: bytes) -> str:
+    """Return what is wrong with how a content is read, "" if nothing is."""
+    try:
+        case.read(content)
+    except KINDS as error:
+        said = str(error)
+        if not said.isprintable():
+            return "the message is not printable"
+        if len(said.replace(case.named, "")) >= LONGEST:
+            return f"the message is long: {said}"
+        return "" if case.named in said else f"the message does not name {case.named}: {said}"
+    except Exception as error:  # noqa: BLE001 - whatever it is, it is a defect
+        own = [at for at in traceback.extract_tb(error.__traceback__) if at.filename.startswith(str(ROOT))]
+        at = next((at for at in reversed(own) if ".venv" not in at.filename), own[-1])
+        return f"{type(error).__name__} from {Path(at.filename).name}, line {at.lineno}: {str(error)[:100]}"
+    return ""
+
+
+def tried(case: Case, kind: str, numbers: range) -> Counter[str]:
+    """Return the faults that some changes bring to light, each with the number of the first change."""
+    found: Counter[str] = Counter()
+    for number in numbers:
+        content = case.contents[number % len(case.contents)]
+        if fault := fault_of(case, mutated(content, kind, number)):
+            found[fault] += 1
+            print(f"change {number}: {fault}")  # noqa: T201 - which pytest shows
+    return found
+
+
+@pytest.mark.parametrize("name", READERS)
+def test_some_changes_of_what_is_read(name, seeds):
+    assert not tried(READERS[name].case(seeds), READERS[name].kind, range(FEW))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", READERS)
+def test_many_changes_of_what_is_read(name, seeds):
+    case = READERS[name].case(seeds)
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    assert not tried(case, READERS[name].kind, range(FEW, MANY))
+    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < MEMORY * 1024
+
+
+@pytest.mark.parametrize("name", READERS)
+def test_what_is_sound_is_taken(name, seeds):
+    case = READERS[name].case(seeds)
+    for content in case.contents:
+        if name == "model description, run":  # which have no binary
+            with pytest.raises(KINDS, match="has no binary"):
+                case.read(content)
+        else:
+            case.read(content)

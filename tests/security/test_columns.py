@@ -1,0 +1,180 @@
+"""D6: records that lack a column end in one line that names it, unless nothing is made of it."""
+
+import shutil
+
+import pyarrow.parquet as pq
+import pytest
+
+from cosim.columns import names_of, require_columns
+from cosim.errors import RunError
+from cosim.export import export_run
+from cosim.flown_run import SUMMARY, load_run
+from cosim.live.watching import looks
+from cosim.master import Master
+from cosim.mavlink.endpoint import parse_endpoint
+from cosim.mavlink.options import MavlinkOptions
+from cosim.mavlink.replay import replay as stream
+from cosim.record import PARTS, RECORD, load_record
+from cosim.replay.pages import replay
+from cosim.run_folder import report_again
+from cosim.scenario import load_scenario
+from cosim.scenario_file import shipped_scenarios
+
+KINDS = {
+    "ordered": ["commands.enabled=true", "commands.obstacles=2"],
+    "sensed, with V": ["sensing.position_noise=0.01", "record.lyapunov=true"],
+    "thrusters": ["law.name=deployable", "actuation.through=thrusters"],
+}
+
+
+def kind_of(overrides):
+    return load_scenario("paper", ["time.duration=0.03", *overrides])
+
+
+READERS = {
+    "report": report_again,
+    "replay": lambda folder: replay([folder]),
+    "watch": lambda folder: list(looks(str(folder), None)),
+    "export csv": lambda folder: export_run(folder, "csv", folder / "it.csv"),
+    "export npz": lambda folder: export_run(folder, "npz", folder / "it.npz"),
+    "export mat": lambda folder: export_run(folder, "mat", folder / "it.mat"),
+    "export mcap": lambda folder: export_run(folder, "mcap", folder / "it.mcap"),
+    "export tlog": lambda folder: export_run(folder, "tlog", folder / "it.tlog"),
+    "stream": lambda folder: stream(
+        folder, [parse_endpoint(str(folder / "own.tlog"))], MavlinkOptions(), None
+    ),
+}  # fmt: skip
+
+
+def said_of(act, *arguments):
+    """Return what an act is refused with, "" if it is not."""
+    try:
+        act(*arguments)
+    except RunError as error:
+        return str(error)
+    return ""
+
+
+class Table:
+    """What `require_columns` asks of a record."""
+
+    file = "runs/it/record.parquet"
+
+    def __init__(self, names):
+        self.units = dict.fromkeys(names, "")
+
+
+@pytest.fixture(scope="module", params=KINDS.values(), ids=KINDS)
+def kind(request):
+    scenario = kind_of(request.param)
+    return scenario, names_of(scenario)
+
+
+def test_d6_each_column_dropped_singly_is_named_or_warned_of(kind, monkeypatch, caplog):
+    scenario, names = kind
+    monkeypatch.setattr("cosim.columns.names_of", lambda _: names)
+    taken_along = 0
+    for name in names:
+        caplog.clear()
+        said = said_of(require_columns, scenario, Table([other for other in names if other != name]))
+        if said:
+            assert said == f"{Table.file}: has no column {name!r}, which its scenario calls for"
+        else:
+            taken_along += 1
+            (said,) = caplog.messages
+            assert f"has no column {name!r}" in said and Table.file in said
+    require_columns(scenario, Table(names))
+    require_columns(scenario, Table([*names, "of another"]))
+    assert len(names) > 90 and 0 < taken_along < 25
+
+
+def test_d6_the_names_are_those_of_the_run(kind):
+    scenario, names = kind
+    with Master(scenario) as master:
+        assert names == [column.name for column in master.signals.columns]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", shipped_scenarios())
+def test_d6_the_names_are_those_of_every_shipped_scenario(name):
+    scenario = load_scenario(name)
+    with Master(scenario) as master:
+        assert names_of(scenario) == [column.name for column in master.signals.columns]
+
+
+@pytest.mark.parametrize("swapped", [("position.x", "position.y"), ("time", "position.x"), ("helm.mode", "target.z")])
+def test_d6_columns_in_another_order_are_refused(ordered_run, swapped):
+    """What is read side by side would be another quantity."""
+    scenario = load_scenario(ordered_run / "scenario.toml")
+    other = dict(zip(swapped, reversed(swapped), strict=True))
+    names = [other.get(name, name) for name in names_of(scenario)]
+    with pytest.raises(RunError, match="stands elsewhere"):
+        require_columns(scenario, Table(names))
+    with pytest.raises(RunError, match="stands elsewhere"):
+        require_columns(scenario, Table(["of another", *names_of(scenario)]))
+
+
+@pytest.fixture
+def lacking(tmp_path, ordered_run):
+    """Return a function that makes a run without some columns."""
+
+    def made(*names):
+        folder = tmp_path / "run"
+        shutil.rmtree(folder, ignore_errors=True)
+        shutil.copytree(ordered_run, folder)
+        pq.write_table(pq.read_table(ordered_run / RECORD).drop_columns(list(names)), folder / RECORD)
+        return folder
+
+    return made
+
+
+@pytest.mark.parametrize("read", READERS.values(), ids=READERS)
+def test_d6_every_reader_names_the_column_and_the_file(read, lacking):
+    for name in (
+        "target.x",
+        "helm.mode",
+        "thruster_force[1]",
+        "attitude.yaw",
+        "membership.depth",
+        "seen 2.shift.y",
+        "time",
+    ):
+        folder = lacking(name)
+        before = sorted(folder.iterdir())
+        with pytest.raises(RunError) as caught:
+            read(folder)
+        assert str(caught.value) == f"{folder / RECORD}: has no column {name!r}, which its scenario calls for"
+        assert sorted(folder.iterdir()) == before
+
+
+@pytest.mark.parametrize("read", READERS.values(), ids=READERS)
+def test_d6_every_reader_does_without_what_nothing_is_made_of(read, lacking, caplog):
+    folder = lacking("water_velocity.y", "goal.value")
+    read(folder)
+    assert "has no columns 'water_velocity.y', 'goal.value'" in caplog.text and str(folder / RECORD) in caplog.text
+
+
+def test_d6_a_run_that_is_still_written_is_looked_at_too(lacking):
+    folder = lacking("membership.depth")
+    (folder / PARTS).mkdir()
+    (folder / SUMMARY).unlink()
+    (folder / RECORD).rename(folder / PARTS / "000000.parquet")
+    with pytest.raises(RunError, match=r"000000\.parquet: has no column 'membership.depth'"):
+        list(looks(str(folder), None))
+
+
+@pytest.mark.slow
+def test_d6_every_column_of_a_file_dropped_singly(lacking, ordered_run, caplog, monkeypatch):
+    names = list(load_record(ordered_run).units)
+    monkeypatch.setattr("cosim.columns.names_of", lambda _: names)
+    summary, refused = load_run(ordered_run).summary, 0
+    for name in names:
+        caplog.clear()
+        folder = lacking(name)
+        if said := said_of(load_run, folder):
+            refused += 1
+            assert said == f"{folder / RECORD}: has no column {name!r}, which its scenario calls for"
+        else:
+            assert f"has no column {name!r}" in caplog.text
+            assert load_run(folder).summary == summary
+    assert refused > 100

@@ -1,0 +1,139 @@
+"""D9: a disk that is full before anything is recorded leaves no folder that the same command would refuse."""
+
+import contextlib
+import errno
+import os
+import shutil
+import subprocess
+
+import pyarrow.parquet as pq
+import pytest
+
+from cosim.errors import RunError
+from cosim.flown_run import load_run
+from cosim.run import run_scenario
+from cosim.run_folder import claim
+from cosim.scenario import load_scenario
+from cosim.sitl.flight import Flight
+from cosim.sitl.law import law_of_pwm
+from cosim.sitl.scenario import scenario_to_fly
+
+ROOM = 4096  # bytes: for the scenario, and no record
+
+
+def scenario():
+    return load_scenario("paper", ["time.duration=0.1"])
+
+
+@contextlib.contextmanager
+def a_full_disk(of, monkeypatch):
+    """Let nothing be written of what is named."""
+
+    def full(*_, **__):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    with monkeypatch.context() as patch:
+        for place in of:
+            patch.setattr(place, full)
+        yield
+
+
+PLACES = {
+    "the record": ["cosim.recorder.pq.write_table", "cosim.recorder.pq.ParquetWriter"],
+    "the vehicle's file": ["cosim.run_folder.shutil.copyfile"],
+}
+
+
+@pytest.mark.parametrize("of", PLACES.values(), ids=PLACES)
+@pytest.mark.parametrize("there", [False, True], ids=["new", "of its user"])
+def test_d9_the_same_command_works_once_there_is_room(tmp_path, monkeypatch, of, there):
+    out, own = tmp_path / "run", scenario()
+    if there:
+        out.mkdir()
+    if "copyfile" in of[0]:
+        shutil.copy("plant_fmu/vehicles/odin.toml", tmp_path / "boat.toml")
+        (tmp_path / "it.toml").write_text('base = "paper"\nvehicle = "boat.toml"\ntime.duration = 0.1')
+        own = load_scenario(tmp_path / "it.toml")
+    with a_full_disk(of, monkeypatch), pytest.raises(RunError, match="No space left") as caught:
+        run_scenario(own, out, report=False)
+    assert str(caught.value) == f"{out}: No space left on device"
+    assert out.exists() == there and not (there and any(out.iterdir()))
+    assert run_scenario(own, out, report=False).summary["status"] == "completed"
+
+
+def test_d9_what_was_recorded_before_stays(tmp_path, monkeypatch):
+    """A part is written at once here; the next one finds no room."""
+    written, write = 0, pq.write_table
+
+    def room_for_one(*arguments, **options):
+        nonlocal written
+        if written:
+            raise OSError(errno.ENOSPC, "No space left on device")
+        write(*arguments, **options)
+        written += 1
+
+    monkeypatch.setattr("cosim.recorder._PART_SECONDS", 0.0)
+    monkeypatch.setattr("cosim.recorder.pq.write_table", room_for_one)
+    with pytest.raises(RunError, match="No space left"):
+        run_scenario(scenario(), tmp_path / "run", report=False)
+    assert load_run(tmp_path / "run").summary["status"] == "killed"
+
+
+@pytest.mark.parametrize("steps", [1, 3])
+def test_d9_a_flight_of_an_autopilot_leaves_nothing_either(tmp_path, monkeypatch, steps):
+    own = scenario_to_fly("sitl", [], None, 400, "ardupilot")
+
+    def flight():
+        return Flight(own, law_of_pwm(own.vehicle), tmp_path / "run", 400.0)
+
+    with a_full_disk(PLACES["the record"], monkeypatch):
+        flown = flight()
+        for _ in range(steps):
+            flown.step()
+        with pytest.raises(RunError, match="No space left"):
+            flown.end()
+    assert not (tmp_path / "run").exists()
+    again = flight()
+    again.step()
+    again.end()
+    assert again.conclude("completed", report=False)["steps"] == 0
+
+
+@pytest.mark.skipif(os.name != "posix", reason="such a limit is POSIX's")
+def test_d9_files_that_may_not_grow(tmp_path, monkeypatch):
+    """As a quota has it: the system itself refuses what is longer."""
+    import resource
+
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+
+    def claimed(*arguments):  # by then the FMU is extracted
+        resource.setrlimit(resource.RLIMIT_FSIZE, (ROOM, hard))
+        return claim(*arguments)
+
+    try:
+        with monkeypatch.context() as patch:
+            patch.setattr("cosim.run.claim", claimed)
+            with pytest.raises(RunError, match="File too large"):
+                run_scenario(scenario(), tmp_path / "run", report=False)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    assert not (tmp_path / "run").exists()
+    assert run_scenario(scenario(), tmp_path / "run", report=False).summary["status"] == "completed"
+
+
+@pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() != 0, reason="only root mounts")
+def test_d9_a_small_disk_that_is_full(tmp_path):
+    disk = tmp_path / "disk"
+    disk.mkdir()
+    if subprocess.run(["mount", "-t", "tmpfs", "-o", "size=64k", "tmpfs", disk], capture_output=True).returncode:
+        pytest.skip("nothing can be mounted here")
+    try:
+        (disk / "filling").write_bytes(bytes(52 * 1024))
+        with pytest.raises(RunError, match="No space left"):
+            run_scenario(scenario(), disk / "run", report=False)
+        assert [file.name for file in disk.iterdir()] == ["filling"]
+        (disk / "filling").unlink()
+        subprocess.run(["mount", "-o", "remount,size=4m", disk], check=True)
+        assert run_scenario(scenario(), disk / "run", report=False).summary["status"] == "completed"
+    finally:
+        subprocess.run(["umount", disk], check=True)
