@@ -1,4 +1,4 @@
-"""``python -m benchmarks VERB``: times and ratios in a table, the search for the gains of baselines, and its scenes."""
+"""``python -m benchmarks VERB``: times and ratios in a table, and the search for the gains of baselines."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from benchmarks import (
     fmu,
     fuzzy,
     law,
+    long_record,
     mavlink,
     page,
     peer_environment,
     scaling,
-    scenes,
     sitl,
     step,
     view,
@@ -69,10 +69,18 @@ def _parser() -> argparse.ArgumentParser:
     )
     verb.add_argument("--seed", type=int, default=0, help="of the draws (default: %(default)s)")
     verb.add_argument("--workers", type=int, default=2, help="processes (default: %(default)s)")
-    verb = verbs.add_parser("scenes", help=(scenes.__doc__ or "").splitlines()[0])
-    verb.add_argument("first", type=int, help="seed")
-    verb.add_argument("count", type=int, help="of seeds")
-    verb.add_argument("--hard", action="store_true")
+    verb = verbs.add_parser("long-record", help=(long_record.__doc__ or "").splitlines()[0])
+    verb.add_argument("--rows", type=int, nargs="+", default=long_record.ROWS, help="of the runs (default: 1 and 10 M)")
+    verb.add_argument(
+        "--work",
+        nargs="+",
+        choices=long_record.WORK,
+        default=list(long_record.WORK),
+        help="default: all",
+        metavar="WHAT",
+    )
+    verb.add_argument("--scenario", default=long_record.SCENARIO, help="whose rows are repeated (default: %(default)s)")
+    verb.add_argument("--folder", type=Path, help="for the files, some GB (default: that of temporary files)")
     return parser
 
 
@@ -87,8 +95,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser = _parser()
     options = parser.parse_args(arguments)
     match options.name:
-        case "scenes":
-            scenes.print_scenes(options.first, options.count, options.hard)
+        case "long-record":
+            long_record.print_table(options.rows, options.work, options.scenario, options.folder)
         case "baselines":
             _baselines(parser, options)
         case "peers":

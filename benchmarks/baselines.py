@@ -18,10 +18,10 @@ from typing import Any, NamedTuple
 import msgspec
 import numpy as np
 
-from benchmarks.scenes import scene
 from controller import LAWS
 from controller.laws import PdGains
 from cosim.scene import Scene
+from cosim.scene_generator import make_scene
 from cosim.scene_run import Conditions, SceneFlyer, Score
 
 FIRST_SEED = 10_000
@@ -208,7 +208,7 @@ def _flyer(law: str, duration: float) -> SceneFlyer:
 
 @functools.cache
 def _scene(seed: int) -> Scene:
-    return msgspec.convert(scene(seed), Scene)
+    return msgspec.convert(make_scene(seed), Scene)
 
 
 def _sentence(found: Outcome) -> str:

@@ -7,23 +7,45 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import importlib
+import json
 import logging
-import os
-import signal
 import sys
-from collections.abc import Iterator, Sequence
-from threading import current_thread, main_thread
+from collections.abc import Sequence
+from typing import Any, NoReturn
 
-from cosim.command_line import ahead, campaigns, export, mavlink, package, replay, report, run, sitl, sweep, watch
-from cosim.command_line.campaigns import INTERRUPTED
+from cosim.command_line import (
+    ahead,
+    campaigns,
+    completion,
+    export,
+    mavlink,
+    package,
+    replay,
+    report,
+    run,
+    scenes,
+    sitl,
+    sweep,
+    watch,
+)
+from cosim.command_line.process import FAULT, run_guarded, signals_held, tell
 
 _EPILOG = """examples:
   cosim run paper
   cosim run paper --set arbiter.engine=closed --set regions.SR1.gain=5000 --out runs/strong
   cosim run my-scene.toml --mavlink udpout:127.0.0.1:14550 --profile ardusub --commands
+  cosim scenes --count 200 --seed 0 --out scenes.jsonl
   cosim campaign scenes.jsonl --law printed --out campaigns/printed --workers 2
   cosim sweep docking --vary initial.position.1=-4:-2 --samples 1000 --out sweeps/start --workers 2
 """
+
+
+# flags that stand before the verb or behind it
+_EVERYWHERE = {
+    ("-v", "--verbose"): "log what happens inside",
+    ("-q", "--quiet"): "no progress, and no words on what happened: paths, errors and what was asked for alone",
+}
 
 
 class _Version(argparse.Action):
@@ -32,19 +54,47 @@ class _Version(argparse.Action):
     def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
         from importlib import metadata
 
-        print(f"cosim {metadata.version('subreach')}")
+        try:
+            version = metadata.version("subreach")
+        except metadata.PackageNotFoundError:
+            version = "of a folder that is not installed"
+        print(f"cosim {version}")
         parser.exit()
 
 
+class _Parser(argparse.ArgumentParser):
+    """Says what is wrong in one line, as all other errors."""
+
+    def print_help(self, file: Any = None) -> None:
+        """Print it; argparse itself would pass over output that fails."""
+        print(self.format_help(), end="", file=file)
+
+    def error(self, message: str) -> NoReturn:
+        from plant_fmu.errors import one_line
+
+        verb = self.prog.removeprefix("cosim").strip()
+        shown = one_line(message)
+        tell(f"{verb}: {shown}; see cosim {verb} --help" if verb else f"{shown}; see cosim --help")
+        self.exit(FAULT)
+
+
+class _Lines(logging.Formatter):
+    """Makes one line of each message; what was raised stands below it."""
+
+    def formatMessage(self, record: logging.LogRecord) -> str:
+        from plant_fmu.errors import printable
+
+        return printable(super().formatMessage(record))
+
+
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
+    parser = _Parser(
         prog="cosim",
         description="Region-reaching underwater vehicles, co-simulated.",
         epilog=_EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("--version", action=_Version, nargs=0, help="show program's version number and exit")
-    parser.add_argument("-v", "--verbose", action="store_true", help="log what happens inside")
     verbs = parser.add_subparsers(dest="verb", required=True, metavar="VERB")
 
     run.add_verb(verbs)
@@ -54,9 +104,10 @@ def _parser() -> argparse.ArgumentParser:
 
     replay.add_verb(verbs)
 
-    verbs.add_parser("list", help="list the shipped scenarios")
+    listing = verbs.add_parser("list", help="list the shipped scenarios")
+    listing.add_argument("--json", action="store_true", help="print it as JSON")
 
-    show = verbs.add_parser("show", help="print a scenario with every default filled in")
+    show = verbs.add_parser("show", help="print a scenario with every default filled in and every key explained")
     show.add_argument("scenario", help="a shipped name, or a TOML file")
     show.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", dest="overrides", help="as for run")
 
@@ -71,10 +122,21 @@ def _parser() -> argparse.ArgumentParser:
     ahead.add_verb(verbs)
     export.add_verb(verbs)
     package.add_verb(verbs)
+    scenes.add_verb(verbs)
     campaigns.add_verbs(verbs)
     sweep.add_verbs(verbs)
     mavlink.add_verbs(verbs)
     sitl.add_verbs(verbs)
+    completion.add_verb(verbs, parser)
+
+    about = verbs.add_parser("help", help="print this help, or that of a verb")
+    about.add_argument("about", nargs="?", choices=tuple(verbs.choices), metavar="VERB", help="such as run")
+    about.set_defaults(parser=parser, verbs=verbs.choices)
+
+    for flags, meaning in _EVERYWHERE.items():
+        parser.add_argument(*flags, action="store_true", help=meaning)
+        for verb in verbs.choices.values():
+            verb.add_argument(*flags, action="store_true", default=argparse.SUPPRESS, help=meaning)
     return parser
 
 
@@ -89,80 +151,76 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns
     -------
     int
-        0; 1 where a check fails; 2 where the user must mend something; 130 after Ctrl-C.
+        0; 1 where a check fails; 2 where the user must mend something; 130 after Ctrl-C, SIGTERM or SIGHUP; 141 if
+        nobody reads the output.
     """
+    return run_guarded(lambda: _run(sys.argv[1:] if arguments is None else arguments))
+
+
+def _run(arguments: Sequence[str]) -> int:
+    """Run the verb, and say in one line what the user must mend."""
     parser = _parser()
-    if not (sys.argv[1:] if arguments is None else arguments):
+    if not arguments:
         parser.print_help(sys.stderr)
-        parser.exit(2)
+        parser.exit(FAULT)
     options = parser.parse_args(arguments)
     _log(options.verbose)
-    try:
-        code = _guarded(options)
-        sys.stdout.flush()
-    except KeyboardInterrupt:
-        print("cosim: interrupted", file=sys.stderr)
-        return INTERRUPTED
-    except BrokenPipeError:  # who read our output has gone: no more of it, at exit neither
-        with contextlib.suppress(OSError):
-            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 0
-    except OSError as error:
-        print(f"cosim: {error.strerror or error}", file=sys.stderr)
-        return 2
-    return code
+    with contextlib.ExitStack() as stack:
+        if options.verb not in _LIGHT:
+            with signals_held():
+                for package in _ERRORS:
+                    importlib.import_module(package)
+                from cosim.progress import compiling_told
+            if not options.quiet:
+                stack.enter_context(compiling_told(tell))
+        try:
+            return _VERBS[options.verb](options)
+        except _mendable() as error:
+            tell(str(error))
+            return FAULT
 
 
-def _guarded(options: argparse.Namespace) -> int:
-    """Run the verb, and say in one line what the user must mend."""
-    with _interrupts_held():
-        from controller import ControllerError
-        from cosim.errors import CosimError
-        from fuzzy_arbiter import ArbiterError
-        from plant_fmu import PlantFmuError
-
-    try:
-        return _VERBS[options.verb](options)
-    except (CosimError, PlantFmuError, ControllerError, ArbiterError) as error:
-        print(f"cosim: {error}", file=sys.stderr)
-        return 2
-
-
-@contextlib.contextmanager
-def _interrupts_held() -> Iterator[None]:
-    """Let Ctrl-C wait until libraries are loaded: within its own C, NumPy makes an ImportError of it."""
-    if signal.getsignal(signal.SIGINT) is not signal.default_int_handler or current_thread() is not main_thread():
-        yield
-        return
-    came: list[int] = []
-    before = signal.signal(signal.SIGINT, lambda number, _: came.append(number))
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, before)
-    if came:
-        raise KeyboardInterrupt
+def _mendable() -> tuple[type[Exception], ...]:
+    """Return the errors that the user can mend; a package that is not loaded has raised none."""
+    return tuple(
+        getattr(sys.modules[f"{package}.errors"], name)
+        for package, name in _ERRORS.items()
+        if f"{package}.errors" in sys.modules
+    )
 
 
 def _log(verbose: bool) -> None:
-    logging.basicConfig(level=logging.WARNING, format="%(name)s: %(message)s")
+    lines = logging.StreamHandler()
+    lines.setFormatter(_Lines("%(name)s: %(message)s"))
+    logging.basicConfig(level=logging.WARNING, handlers=[lines])
     for name in ("fuzzy_arbiter", "plant_fmu", "controller", "cosim"):
         logging.getLogger(name).setLevel(logging.DEBUG if verbose else logging.WARNING)
 
 
 def _list(options: argparse.Namespace) -> int:
-    from cosim.scenario import load_scenario
-    from cosim.scenario_file import shipped_scenarios
+    from cosim.scenario_file import shipped_titles
 
-    for name in shipped_scenarios():
-        print(f"{name:20} {load_scenario(name).title}")
+    titles = shipped_titles()
+    if options.json:
+        print(json.dumps([{"name": name, "title": title} for name, title in titles.items()], indent=2))
+        return 0
+    for name, title in titles.items():
+        print(f"{name:20} {title}")
+    return 0
+
+
+def _help(options: argparse.Namespace) -> int:
+    (options.verbs[options.about] if options.about else options.parser).print_help()
     return 0
 
 
 def _show(options: argparse.Namespace) -> int:
     from cosim.scenario import load_scenario
 
-    print(load_scenario(options.scenario, options.overrides).toml(), end="")
+    scenario = load_scenario(options.scenario, options.overrides)
+    file = scenario.vehicle_file
+    vehicle = str(file.resolve()) if file else None  # found from wherever the output goes
+    print(scenario.toml(vehicle, commented=True), end="")
     return 0
 
 
@@ -186,18 +244,28 @@ def _calibrate(options: argparse.Namespace) -> int:
     return 0
 
 
+_ERRORS = {
+    "controller": "ControllerError",
+    "cosim": "CosimError",
+    "fuzzy_arbiter": "ArbiterError",
+    "plant_fmu": "PlantFmuError",
+}
+_LIGHT = {"completion", "help", "list", "scenes"}  # verbs that need next to nothing
 _VERBS = {
     "run": run.run,
     "watch": watch.watch,
     "report": report.report,
     "replay": replay.replay,
     "list": _list,
+    "help": _help,
+    "completion": completion.completion,
     "show": _show,
     "check": _check,
     "calibrate": _calibrate,
     "compile": ahead.compile_all,
     "export": export.export,
     "package": package.package,
+    "scenes": scenes.scenes,
     "campaign": campaigns.campaign,
     "compare": campaigns.compare,
     "sweep": sweep.sweep,

@@ -14,7 +14,7 @@ from matplotlib.rcsetup import cycler
 from numpy.typing import NDArray
 
 from controller.regions import Region, Visibility, of_attitude
-from cosim.record import Record
+from cosim.record import Rows
 from cosim.scenario import CRITERIA, Scenario
 from cosim.signals import Array
 
@@ -51,7 +51,7 @@ class Story:
     """What the figures draw from."""
 
     scenario: Scenario
-    record: Record
+    record: Rows  # of a long run those rows alone that tell
     summary: dict[str, Any]
 
 
@@ -148,7 +148,7 @@ def places_of(story: Story) -> Iterator[Place]:
     for region, colour in regions_of(story.scenario):
         if of_attitude(region.shape):
             continue
-        shifts = shifts_of(story, region.name)
+        shifts = shifts_of(story.record, region.name)
         clearance = story.record[f"{region.name}.clearance"]
         # NaN is not the least
         at = -1 if region.name == "goal" else int(np.argmin(np.where(np.isnan(clearance), np.inf, clearance)))
@@ -173,16 +173,16 @@ def features_of(story: Story) -> Iterator[tuple[str, str, Array]]:
     """
     for region, colour in regions_of(story.scenario):
         if isinstance(region.shape, Visibility):
-            yield region.name, colour, np.array(region.shape.feature) + shifts_of(story, region.name)[-1]
+            yield region.name, colour, np.array(region.shape.feature) + shifts_of(story.record, region.name)[-1]
 
 
-def shifts_of(story: Story, name: str) -> Array:
+def shifts_of(record: Rows, name: str) -> Array:
     """Return how far a region was from where the scenario has it at each step, shape (steps, 3) [m, NED].
 
     Parameters
     ----------
-    story : Story
-        The run.
+    record : Rows
+        Of the run.
     name : str
         Of the region.
 
@@ -191,9 +191,9 @@ def shifts_of(story: Story, name: str) -> Array:
     ndarray, shape (steps, 3)
         Zeros for one at rest.
     """
-    if f"{name}.shift.x" not in story.record.units:
-        return np.zeros((len(story.record["time"]), 3))
-    return story.record.stack([f"{name}.shift.{axis}" for axis in "xyz"])
+    if f"{name}.shift.x" not in record.units:
+        return np.zeros((len(record), 3))
+    return record.stack([f"{name}.shift.{axis}" for axis in "xyz"])
 
 
 def legend_columns(labels: Iterable[str]) -> int:
@@ -225,8 +225,7 @@ def overlap_of(story: Story) -> NDArray[np.bool_]:
     ndarray of bool
         True within the windows of the summary.
     """
-    time = story.record["time"]
-    inside = np.zeros(len(time), dtype=bool)
-    for start, end in story.summary["intersection_windows"]:
-        inside |= (time >= start) & (time <= end)
+    time, windows = story.record["time"], np.array(story.summary["intersection_windows"]).reshape(-1, 2)
+    begun = np.searchsorted(windows[:, 0], time, "right")  # windows until then; they come one after the other
+    inside: NDArray[np.bool_] = (begun > 0) & (time <= np.append(windows[:, 1], 0.0)[begun - 1])
     return inside

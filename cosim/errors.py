@@ -4,6 +4,12 @@
 class CosimError(Exception):
     """Base of all errors of this package; its text is one line meant for the user."""
 
+    def __str__(self) -> str:
+        """Return the line."""
+        from plant_fmu.errors import one_line  # with it comes the plant, which takes time to load
+
+        return one_line(super().__str__())
+
 
 class ScenarioError(CosimError):
     """A scenario that is unknown, or a key in it that cannot be."""

@@ -8,6 +8,7 @@ from matplotlib.artist import Artist
 from cosim.drawing import BLACK, BLUE, CYCLE, GREEN, RED, Story
 from cosim.figures_layout import F, Sheet, legend, limits_of, log_axis, symlog_axis
 from cosim.figures_over_time import DASHES, curve, over_time
+from cosim.record import Rows
 from cosim.scenario import Scenario
 from cosim.signals import Array
 
@@ -15,13 +16,28 @@ _FLOOR = 1e-2  # N; less is drawn as that on a logarithmic axis
 _ESTIMATES = ("W − B", "x_G W − x_B B", "y_G W − y_B B", "z_G W − z_B B")
 
 
+def norms_of(record: Rows) -> dict[str, Array]:
+    """Return the norm of the body force as it acted and as it was asked for, each of shape (rows,) [N].
+
+    Parameters
+    ----------
+    record : Rows
+        Any rows of a run.
+
+    Returns
+    -------
+    dict
+        By words.
+    """
+    of = {"acting": "actuation", "asked for": "command"}
+    forces = {words: record.stack([f"{name}.{axis}" for axis in "XYZ"]) for words, name in of.items()}
+    return {words: np.maximum(np.linalg.norm(force, axis=1), _FLOOR) for words, force in forces.items()}
+
+
 def forces(story: Story, sheet: Sheet[F]) -> F:
     """Draw the norm of the body force on a logarithmic axis, and its components."""
     acting = story.record.stack([f"actuation.{a}" for a in "XYZ"])
-    norms = {
-        "acting": np.maximum(np.linalg.norm(acting, axis=1), _FLOOR),
-        "asked for": np.maximum(np.linalg.norm(story.record.stack([f"command.{a}" for a in "XYZ"]), axis=1), _FLOOR),
-    }
+    norms = norms_of(story.record)
     names = [f"{axis}, acting" for axis in "XYZ"]
     labels = [f"norm, {which}" for which in norms] + names
     figure, (norm, parts) = over_time(story, sheet, [1.7, 1.7], labels)
@@ -53,14 +69,33 @@ def thruster_caption(scenario: Scenario) -> str:
     )
 
 
+def thrusts_of(scenario: Scenario, record: Rows) -> Array:
+    """Return the force of each thruster, or what it would have to give, shape (rows, thrusters) [N].
+
+    Parameters
+    ----------
+    scenario : Scenario
+        What was run.
+    record : Rows
+        Any rows of it.
+
+    Returns
+    -------
+    ndarray
+        [N], as `thruster_caption` says.
+    """
+    vehicle = scenario.vehicle
+    if scenario.actuation.through == "thrusters":
+        return record.stack([f"thruster_force[{i + 1}]" for i in range(vehicle.n_thrusters)])
+    wrench = record.stack([f"actuation.{a}" for a in "XYZKMN"])
+    force: Array = wrench @ np.linalg.pinv(vehicle.thruster_matrix).T
+    return force
+
+
 def thrusters(story: Story, sheet: Sheet[F]) -> F:
     """Draw the force of each thruster, or what it would have to give."""
     vehicle = story.scenario.vehicle
-    if story.scenario.actuation.through == "thrusters":
-        force = story.record.stack([f"thruster_force[{i + 1}]" for i in range(vehicle.n_thrusters)])
-    else:
-        wrench = story.record.stack([f"actuation.{a}" for a in "XYZKMN"])
-        force = wrench @ np.linalg.pinv(vehicle.thruster_matrix).T
+    force = thrusts_of(story.scenario, story.record)
     labels = [f"thruster {i + 1}" for i in range(vehicle.n_thrusters)]
     figure, (ax,) = over_time(story, sheet, [2.3], labels)
     entries: dict[str, Artist] = {}

@@ -28,14 +28,16 @@ from cosim.drawing import (
 )
 from cosim.figures_layout import F, Sheet, legend, limits_of, panels, symlog_axis
 from cosim.helm.orders import MODES
-from cosim.scenario import CRITERIA
+from cosim.record import Rows
+from cosim.scenario import CRITERIA, Scenario
 from cosim.signals import Array
-from cosim.summary import spans
+from cosim.spans import spans
 
 _AWAY = 1e4  # m; regions further off have not come yet
 _NAMED = 8  # regions that a legend names one by one
 _NEAREST = 5  # of more, besides the goal
 DASHES = ("-", "--", "-.", ":")
+_WINDOWS = 3  # that are shown one by one
 _WIDER = 1.6  # than up to the end of the overlap
 _TIME = "time [s]"
 
@@ -44,6 +46,19 @@ def zooms(story: Story) -> bool:
     """Return whether the first overlap is so early that figures over the whole run would not show it."""
     windows = story.summary["intersection_windows"]
     return bool(windows) and 0.0 < _WIDER * windows[0][1] <= 0.4 * story.summary["simulated_time"]
+
+
+def enlarged(story: Story) -> list[tuple[float, float]]:
+    """Return the spans of time [s] that figures show enlarged, besides the whole run."""
+    windows = story.summary["intersection_windows"]
+    spans = [_around(story, start, end) for start, end in windows[:_WINDOWS]]
+    return [*spans, (0.0, _WIDER * windows[0][1])] if zooms(story) else spans
+
+
+def _around(story: Story, start: float, end: float) -> tuple[float, float]:
+    """Return what is shown of a window in which the regions overlap."""
+    room = max(0.5 * (end - start), 5 * story.scenario.time.step)
+    return start - room, end + room
 
 
 def _zoomed(story: Story, sheet: Sheet[F], heights: Sequence[float], labels: Sequence[str]) -> tuple[F, Any]:
@@ -85,15 +100,32 @@ def _zero_line(ax: Axes) -> None:
     ax.axhline(0.0, color=BLACK, linewidth=0.8)
 
 
+def error_of(scenario: Scenario, record: Rows) -> tuple[str, Array]:
+    """Return the RMS error to the goal's centre, or the distance to the goal where it has none, and what it is.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        What was run.
+    record : Rows
+        Any rows of it.
+
+    Returns
+    -------
+    str, ndarray of shape (rows,)
+        [m].
+    """
+    bounds = np.array(scenario.goal.bounds())
+    if not np.isfinite(bounds).all():
+        return "distance to the goal", np.maximum(0.0, -record["goal.clearance"])
+    centre = bounds.mean(axis=0) + shifts_of(record, "goal")
+    path = record.stack([f"position.{a}" for a in "xyz"])
+    return "RMS error", np.linalg.norm(path - centre, axis=1) / np.sqrt(3.0)
+
+
 def position_error(story: Story, sheet: Sheet[F]) -> F:
     """Draw the RMS error to the goal's centre, or the distance to the goal where it has none."""
-    bounds = np.array(story.scenario.goal.bounds())
-    if np.isfinite(bounds).all():
-        centre = bounds.mean(axis=0) + shifts_of(story, "goal")
-        path = story.record.stack([f"position.{a}" for a in "xyz"])
-        what, error = "RMS error", np.linalg.norm(path - centre, axis=1) / np.sqrt(3.0)
-    else:
-        what, error = "distance to the goal", np.maximum(0.0, -story.record["goal.clearance"])
+    what, error = error_of(story.scenario, story.record)
     sphere = story.scenario.goal if isinstance(story.scenario.goal, Sphere) else None
     labels = [what, "tolerance r_v/√3"] if sphere else [what]
     figure, (ax,) = over_time(story, sheet, [2.0], labels)
@@ -119,13 +151,13 @@ def attitude(story: Story, sheet: Sheet[F]) -> F:
 
 def weights_overlap(story: Story, sheet: Sheet[F]) -> F:
     """Draw the weights around each window in which the regions overlap, at most the first three."""
-    windows = story.summary["intersection_windows"][:3]
+    windows = story.summary["intersection_windows"][:_WINDOWS]
     labels = [f"α{i + 1} {name}" for i, name in enumerate(CRITERIA)]
     figure, axes = panels(sheet, [2.0], [1.0] * len(windows), [*labels, "overlap"], titles=0.2)
     time = story.record["time"]
     for ax, (start, end) in zip(axes[0], windows, strict=True):
-        room = max(0.5 * (end - start), 5 * story.scenario.time.step)
-        shown = (time >= start - room) & (time <= end + room)
+        first, last = _around(story, start, end)
+        shown = (time >= first) & (time <= last)
         entries: dict[str, Artist] = {}
         for label, name, dashes in zip(labels, CRITERIA, DASHES, strict=False):
             curve = thin(time[shown], story.record[f"weight.{name}"][shown])

@@ -13,7 +13,7 @@ from cosim.scenario import CRITERIA
 from cosim.signals import Array
 
 _TARGETS = 12  # that are drawn on the way at the most
-_POSITION = ("position.x", "position.y", "position.z")
+POSITION = ("position.x", "position.y", "position.z")
 
 
 @dataclass(frozen=True)
@@ -28,7 +28,7 @@ class Way:
 
 def is_known(story: Story) -> bool:
     """Return whether the record has any place of the vehicle that is a number."""
-    return bool(np.isfinite(story.record.stack(_POSITION)).all(axis=1).any())
+    return bool(np.isfinite(story.record.stack(POSITION)).all(axis=1).any())
 
 
 def way_of(story: Story) -> Way:
@@ -44,7 +44,7 @@ def way_of(story: Story) -> Way:
     Way
         Of about as many points as a figure resolves.
     """
-    path = story.record.stack(_POSITION)
+    path = story.record.stack(POSITION)
     known = np.flatnonzero(np.isfinite(path).all(axis=1))
     length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(path[known], axis=0), axis=1))])
     wanted = np.searchsorted(length, np.linspace(0.0, length[-1], POINTS))

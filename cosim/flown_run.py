@@ -3,22 +3,27 @@
 from __future__ import annotations
 
 import dataclasses
-import json
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from controller import LAWS
 from cosim.came import as_it_came
+from cosim.columns import require_columns
 from cosim.errors import RunError
+from cosim.plain_json import read_json
 from cosim.record import Record, load_record
 from cosim.scenario import Scenario, load_scenario
-from cosim.summary import seconds_or_none, summarise
+from cosim.summary import summarise
+from plant_fmu.errors import printable
 
 SCENARIO = "scenario.toml"
 SUMMARY = "summary.json"
 ORDERS = "orders.jsonl"
+
+_LONGEST = 1e12  # s, of the wall clock
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,16 +61,32 @@ def load_run(path: Path) -> FlownRun:
         raise RunError(f"{path}: holds no run ({SCENARIO} is missing)")
     scenario = load_scenario(path / SCENARIO)
     status, wall_time = "killed", None
-    try:
-        before = json.loads((path / SUMMARY).read_text(encoding="utf-8"))
-        status, wall_time = str(before["status"]), seconds_or_none(before["wall_time"])
-        law = dataclasses.replace(scenario.law, name=str(before["law"]))  # or who flew in its place
-        scenario = dataclasses.replace(scenario, name=str(before["scenario"]), law=law)
-    except FileNotFoundError:
-        pass
-    except (OSError, ValueError, KeyError, TypeError, RecursionError) as error:
-        raise RunError(f"{path / SUMMARY}: cannot be read: {error}") from error
+    if (path / SUMMARY).exists():
+        scenario, status, wall_time = _concluded(path / SUMMARY, scenario)
     return flown_run(path, scenario, status, wall_time)
+
+
+def _concluded(file: Path, scenario: Scenario) -> tuple[Scenario, str, float | None]:
+    """Return the scenario by who flew it, how that ended, and what it took [s], as the summary has them."""
+    before = read_json(file)
+    name, law, status = (_text(file, before, key) for key in ("scenario", "law", "status"))
+    # an autopilot flies in the law's place, but nothing of it could be ordered
+    if law != scenario.law.name and (law in LAWS or scenario.commands.enabled):
+        raise RunError(f"{file}: law is {law!r}, expected {scenario.law.name!r} as in {SCENARIO}")
+    took = before.get("wall_time")
+    if not (took is None or (type(took) in (int, float) and 0.0 <= took < _LONGEST)):
+        raise RunError(f"{file}: wall_time is {took!r}, expected seconds, or null")
+    flown = dataclasses.replace(scenario, name=name, law=dataclasses.replace(scenario.law, name=law))
+    return flown, status, None if took is None else float(took)
+
+
+def _text(file: Path, summary: dict[str, Any], key: str) -> str:
+    """Return a text of a summary, which a terminal will only show."""
+    if key not in summary:
+        raise RunError(f"{file}: {key} is missing, expected the summary of a run")
+    if not isinstance(summary[key], str):
+        raise RunError(f"{file}: {key} is {summary[key]!r}, expected a text")
+    return printable(summary[key])
 
 
 def flown_run(path: Path, scenario: Scenario, status: str, wall_time: float | None) -> FlownRun:
@@ -93,14 +114,15 @@ def flown_run(path: Path, scenario: Scenario, status: str, wall_time: float | No
         If the record cannot be read, or is not of this scenario.
     """
     record = load_record(path)
-    try:
-        time = record["time"]
-        if not (np.isfinite(time).all() and (np.diff(time) > 0.0).all()):
+    require_columns(scenario, record)
+    last = -np.inf
+    for block in record.blocks(["time"]):
+        time = block["time"]
+        if not (np.isfinite(time).all() and (np.diff(time, prepend=last) > 0.0).all()):
             raise RunError(f"{path}: the times of the record do not rise from row to row")
-        came = as_it_came(scenario, record)
-        summary = summarise(came, record, status, wall_time)
-    except KeyError as error:
-        raise RunError(f"{path}: the record has no column {error}, which its scenario calls for") from error
+        last = time[-1]
+    came = as_it_came(scenario, record)
+    summary = summarise(came, record, status, wall_time)
     if scenario.commands.enabled:
         summary["orders"] = _lines(path / ORDERS)
     return FlownRun(path, scenario, came, record, summary)

@@ -18,7 +18,7 @@ from controller.theory import (
     printed_secondary,
     value_rate,
 )
-from cosim.record import Record
+from cosim.record import Rows
 from cosim.scenario import Scenario
 from cosim.signals import Array, Column
 from cosim.truth import true_model
@@ -117,12 +117,12 @@ class LyapunovSignals:
         return primary_error(f, gradient), secondary_error(*self._of_regions[:2], betas)
 
 
-def summarise_lyapunov(record: Record) -> dict[str, Any] | None:
+def summarise_lyapunov(record: Rows) -> dict[str, Any] | None:
     """Return what V did in a run.
 
     Parameters
     ----------
-    record : Record
+    record : Rows
         Of the run.
 
     Returns
@@ -134,19 +134,28 @@ def summarise_lyapunov(record: Record) -> dict[str, Any] | None:
     """
     if "lyapunov.rate" not in record.units:
         return None
-    return {form: _course(record["time"], record[f"lyapunov.{form}"]) for form in FORMS}
+    return {form: _course(record, f"lyapunov.{form}") for form in FORMS}
 
 
-def _course(time: Array, V: Array) -> dict[str, Any]:
-    threshold = ROUNDING * float(np.abs(V).max())
-    rises = np.flatnonzero(np.diff(V) > threshold)
-    below = np.flatnonzero(V < 0.0)
+def _course(record: Rows, name: str) -> dict[str, Any]:
+    least, size = np.inf, 0.0
+    for block in record.blocks([name]):
+        least, size = np.minimum(least, block[name].min()), np.maximum(size, np.abs(block[name]).max())
+    threshold = ROUNDING * float(size)
+    before: tuple[Array, Array] = np.empty(0), np.empty(0)  # the row before a block
+    rises, first_rise, first_negative = 0, None, None
+    for block in record.blocks(["time", name]):
+        time, V = np.concatenate([before[0], block["time"]]), np.concatenate([before[1], block[name]])
+        rising, below = np.flatnonzero(np.diff(V) > threshold), np.flatnonzero(V < 0.0)
+        first_rise = float(time[rising[0]]) if rising.size and not rises else first_rise
+        first_negative = float(time[below[0]]) if below.size and first_negative is None else first_negative
+        rises, before = rises + len(rising), (time[-1:], V[-1:])
     return {
-        "start": float(V[0]),
-        "end": float(V[-1]),
-        "least": float(V.min()),
+        "start": record.value(name, 0),
+        "end": record.value(name, -1),
+        "least": float(least),
         "threshold": threshold,
-        "increases": len(rises),
-        "first_rise": float(time[rises[0]]) if len(rises) else None,
-        "first_negative": float(time[below[0]]) if len(below) else None,
+        "increases": rises,
+        "first_rise": first_rise,
+        "first_negative": first_negative,
     }

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import contextlib
 from collections import OrderedDict
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
+from numpy.typing import NDArray
 
 from cosim.errors import RunError
 from cosim.signals import Array, Column
-from plant_fmu.tables import brief
 
 MAX_ROWS = 100_000_001  # of a run of as many steps as a scenario may have
 RECORD = "record.parquet"
@@ -24,8 +24,103 @@ _SMALL = 2**23  # numbers of a record that is read as a whole,
 _KEPT = 24  # and signals that a larger one keeps in memory
 
 
-class Record:
+class Rows:
+    """Signals over some rows of a run, in memory.
+
+    Parameters
+    ----------
+    columns : sequence of Column
+        What the signals are.
+    arrays : mapping of str to ndarray of shape (rows,)
+        The signals, by the names of the columns.
+
+    Attributes
+    ----------
+    columns : tuple of Column
+        In the order of the row.
+    units : dict
+        Unit of each signal, by name, in the order of the columns.
+    """
+
+    def __init__(self, columns: Sequence[Column], arrays: Mapping[str, Array]) -> None:
+        self.columns = tuple(columns)
+        self.units: dict[str, str] = {column.name: column.unit for column in self.columns}
+        self._arrays = arrays
+
+    def __len__(self) -> int:
+        """Return how many rows there are."""
+        return len(self[next(iter(self.units))])
+
+    def __getitem__(self, name: str) -> Array:
+        """Return one signal, shape (rows,)."""
+        return self._arrays[name]
+
+    def stack(self, names: Sequence[str]) -> Array:
+        """Return several signals side by side, shape (rows, len(names))."""
+        return np.column_stack([self[name] for name in names])
+
+    def numbers(self) -> Array:
+        """Return all signals side by side, shape (rows, columns)."""
+        return self.stack(list(self.units))
+
+    def blocks(self, names: Sequence[str] | None = None) -> Iterator[Rows]:
+        """Yield all rows in their order, in blocks that fit into memory.
+
+        Parameters
+        ----------
+        names : sequence of str, optional
+            Which signals; default: all.
+
+        Raises
+        ------
+        RunError
+            If they cannot be read.
+        KeyError
+            If there is no such signal.
+        """
+        columns = self._columns_of(names)
+        for first in range(0, len(self), _BLOCK):
+            yield Rows(columns, {c.name: self[c.name][first : first + _BLOCK] for c in columns})
+
+    def take(self, rows: Sequence[int] | NDArray[np.intp], names: Sequence[str] | None = None) -> Rows:
+        """Return some rows alone.
+
+        Parameters
+        ----------
+        rows : sequence of int
+            Rising, from 0.
+        names : sequence of str, optional
+            Which signals; default: all.
+
+        Raises
+        ------
+        RunError
+            If they cannot be read.
+        KeyError
+            If there is no such signal.
+        """
+        columns = self._columns_of(names)
+        return Rows(columns, {column.name: self[column.name][np.asarray(rows, np.intp)] for column in columns})
+
+    def value(self, name: str, row: int) -> float:
+        """Return the number that a signal (`name`) has at a row (`row`: from 0, or from -1 backwards)."""
+        return float(self.take([row % len(self)], [name])[name][0])
+
+    def _columns_of(self, names: Sequence[str] | None) -> tuple[Column, ...]:
+        if names is None:
+            return self.columns
+        for name in names:
+            if name not in self.units:
+                raise KeyError(name)
+        by_name = {column.name: column for column in self.columns}
+        return tuple(by_name[name] for name in dict.fromkeys(names))
+
+
+class Record(Rows):
     """A run's signals, each an array over its steps, read from the files when they are asked for.
+
+    A small record is held in memory as a whole. Of a larger one take blocks, or some rows: one signal of it may be more
+    than memory holds.
 
     Parameters
     ----------
@@ -38,6 +133,8 @@ class Record:
         In the order of the row.
     units : dict
         Unit of each signal, by name, in the order of the columns.
+    file : Path
+        The first of the files.
 
     Raises
     ------
@@ -46,7 +143,7 @@ class Record:
     """
 
     def __init__(self, files: Sequence[Path]) -> None:
-        self._files = list(files)
+        self._files, self.file = list(files), files[0]
         columns, rows = [], 0
         for file in self._files:
             with _opened(file) as parquet:
@@ -56,10 +153,14 @@ class Record:
                 columns.append(tuple(map(_column_of, schema)))
             if columns[-1] != columns[0]:
                 raise RunError(f"{file}: has other columns than {self._files[0].name}, expected parts of one record")
-        self.columns = columns[0]
-        self.units: dict[str, str] = {column.name: column.unit for column in self.columns}
-        self._small = rows * len(self.columns) <= _SMALL  # one signal takes a tenth of the time that all take
         self._kept: OrderedDict[str, Array] = OrderedDict()
+        super().__init__(columns[0], self._kept)
+        self._count = rows
+        self._small = rows * len(self.columns) <= _SMALL  # one signal takes a tenth of the time that all take
+
+    def __len__(self) -> int:
+        """Return how many rows there are."""
+        return self._count
 
     def __getitem__(self, name: str) -> Array:
         """Return one signal, shape (steps,)."""
@@ -76,28 +177,36 @@ class Record:
             self._kept.popitem(last=False)
         return self._kept[name]
 
-    def stack(self, names: Sequence[str]) -> Array:
-        """Return several signals side by side, shape (steps, len(names))."""
-        return np.column_stack([self[name] for name in names])
-
-    def blocks(self, names: Sequence[str] | None = None) -> Iterator[Array]:
-        """Yield all rows in their order, in blocks of shape (n, len(names)) that fit into memory.
-
-        Parameters
-        ----------
-        names : sequence of str, optional
-            Which signals; default: all, in the order of the columns.
-
-        Raises
-        ------
-        RunError
-            If they cannot be read.
-        """
+    def blocks(self, names: Sequence[str] | None = None) -> Iterator[Rows]:
+        """Yield all rows in their order, in blocks that fit into memory, of all signals or of those by `names`."""
+        if self._small:
+            yield from super().blocks(names)
+            return
+        columns = self._columns_of(names)
         for file in self._files:
             with _opened(file) as parquet:
-                for batch in parquet.iter_batches(_BLOCK, columns=names):
-                    columns = batch.columns if names is None else [batch.column(name) for name in names]
-                    yield np.column_stack([_numbers(column) for column in columns])
+                yield from _batches(parquet, columns, range(parquet.num_row_groups))
+
+    def take(self, rows: Sequence[int] | NDArray[np.intp], names: Sequence[str] | None = None) -> Rows:
+        """Return some rows (`rows`: rising, from 0) alone, of all signals or of those by `names`."""
+        if self._small and self._kept:
+            return super().take(rows, names)
+        columns, rows = self._columns_of(names), np.asarray(rows, np.intp)
+        found: dict[str, list[Array]] = {column.name: [np.empty(0)] for column in columns}
+        first = 0
+        for file in self._files:
+            with _opened(file) as parquet:
+                for group in range(parquet.num_row_groups):
+                    end = first + parquet.metadata.row_group(group).num_rows
+                    if np.searchsorted(rows, first) == np.searchsorted(rows, end):
+                        first = end
+                        continue
+                    for batch in _batches(parquet, columns, [group]):
+                        begin, stop = np.searchsorted(rows, [first, first + len(batch)])
+                        for name, arrays in found.items():
+                            arrays.append(batch[name][rows[begin:stop] - first])
+                        first += len(batch)
+        return Rows(columns, {name: np.concatenate(arrays) for name, arrays in found.items()})
 
 
 def load_record(folder: Path) -> Record:
@@ -123,7 +232,7 @@ def load_record(folder: Path) -> Record:
     if not files:
         raise RunError(f"{folder}: holds no record of a run")
     record = Record(files)
-    if not len(record[next(iter(record.units))]):
+    if not len(record):
         raise RunError(f"{folder}: the record of the run is empty")
     return record
 
@@ -140,6 +249,17 @@ def _read(file: Path, names: list[str]) -> dict[str, list[Array]]:
         return {name: [_numbers(chunk) for chunk in table[name].chunks] for name in names}  # not to_numpy, as above
 
 
+def _batches(parquet: Any, columns: Sequence[Column], groups: Sequence[int]) -> Iterator[Rows]:
+    """Yield the rows of some row groups."""
+    names, rows = [column.name for column in columns], 0
+    for batch in parquet.iter_batches(_BLOCK, row_groups=list(groups), columns=names):
+        rows += len(batch)
+        yield Rows(columns, {name: _numbers(batch.column(name)) for name in names})
+    told = sum(parquet.metadata.row_group(group).num_rows for group in groups)
+    if rows != told:
+        raise TypeError(f"{rows} rows are there, expected {told}")
+
+
 def _numbers(column: pa.Array) -> Array:
     if column.null_count:
         raise TypeError("a number is missing")
@@ -153,10 +273,11 @@ def _opened(file: Path) -> Iterator[Any]:
     """Open a Parquet file; what cannot be read of it is one error, whoever has made it."""
     require_utf8(file)
     try:
-        with pq.ParquetFile(file) as parquet:
+        # read ahead, all that was read of a file would stay in memory until it is closed
+        with pq.ParquetFile(file, pre_buffer=False) as parquet:
             yield parquet
     except (OSError, pa.ArrowException, UnicodeDecodeError, TypeError, BufferError, KeyError) as error:
-        raise RunError(f"{file}: cannot be read: {brief(error)}") from error
+        raise RunError(f"{file}: cannot be read: {error}") from error
 
 
 def require_utf8(path: Path) -> None:

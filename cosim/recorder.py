@@ -18,7 +18,10 @@ from cosim.signals import Array, Column
 _WHOLE = "whole"  # among the parts, what a finished run makes of its rows
 _PART_SECONDS = 1.0  # of the wall clock, after which a part is written even if it is small
 _PART_NUMBERS = 2**23  # in a part at the most, unless another number of rows is asked for: 64 MiB
-_GROUP = 10_000  # rows that go into the whole at once, at the most
+_GROUP = 10_000  # rows that go into the whole at once, at the most;
+_DOUBLED = (
+    100  # after so many groups twice as many: whoever reads the record has a kilobyte of each signal of each group
+)
 _BLOCK = 250  # rows that wait to be turned into columns: as many as a processor's caches hold
 # measured: bytes of a float64 column compress best when they are split by place, and dictionaries only cost
 _WRITING = {"compression": "zstd", "use_dictionary": False, "use_byte_stream_split": True, "write_statistics": False}
@@ -53,7 +56,9 @@ class Recorder:
         self._block: Array = np.empty((block, len(columns)))
         self._rows = [row.data for row in self._block]  # copied to in half the time of an array's row
         self._filled = 0
-        self._group = min(_GROUP, self._rows_per_part) // block * block  # rows that go into the whole at once
+        self._group = min(_GROUP, self._rows_per_part) // block * block  # rows that go into the whole at once,
+        self._largest = max(self._group, (self._rows_per_part - block) // 2 // block * block)  # the most of them,
+        self._groups = 0  # and how often some did
         self._columns: Array = np.empty((len(columns), self._group))
         self._turned = 0  # rows of the present group, which stand in the columns;
         self._saved = 0  # and how many of these are in a part already
@@ -121,9 +126,11 @@ class Recorder:
 
     def _end_group(self) -> None:
         """Write the present group into the whole, and begin another one."""
-        group, room, sound = self._table(0), np.empty_like(self._columns), self._sound
-        unsaved = [*self._unsaved, group.slice(self._saved)]
+        group, groups, sound = self._table(0), self._groups + 1, self._sound
+        rows = min(2 * self._group, self._largest) if groups % _DOUBLED == 0 else self._group
+        unsaved, room = [*self._unsaved, group.slice(self._saved)], np.empty((len(self._columns), rows))
         self._sound, self._unsaved, self._columns, self._turned, self._saved = False, unsaved, room, 0, 0
+        self._group, self._groups = rows, groups
         if sound:
             self._append(group)
             self._sound = True
@@ -151,7 +158,7 @@ class Recorder:
         part = self._folder / PARTS / f"{self._parts:06}.parquet"
         scratch = part.with_suffix(".tmp")
         try:
-            pq.write_table(pa.concat_tables(tables), scratch, **_WRITING)
+            pq.write_table(pa.concat_tables(tables), scratch, row_group_size=_GROUP, **_WRITING)
             scratch.replace(part)
         except BaseException:
             with contextlib.suppress(OSError):
@@ -181,13 +188,15 @@ class Recorder:
         self._drop_whole()
         self._save()
         tables: list[pa.Table] = []
-        files = part_files(self._folder)
-        for file in files:
-            with pq.ParquetFile(file) as part:
-                tables.append(part.read())
-            if _rows(tables) >= self._group or file == files[-1]:
-                self._append(pa.concat_tables(tables).combine_chunks())
-                tables = []
+        for file in part_files(self._folder):
+            with pq.ParquetFile(file, pre_buffer=False) as part:
+                for batch in part.iter_batches(self._group):
+                    tables.append(pa.Table.from_batches([batch]))
+                    if _rows(tables) >= self._group:
+                        self._append(pa.concat_tables(tables).combine_chunks())
+                        tables = []
+        if tables:
+            self._append(pa.concat_tables(tables).combine_chunks())
 
     def _drop_whole(self) -> None:
         self._sound = False

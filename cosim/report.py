@@ -5,10 +5,15 @@ from __future__ import annotations
 import shutil
 import tempfile
 from collections.abc import Collection
+from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from cosim.flown_run import FlownRun
-from cosim.report_contents import contents_of
+from cosim.report_contents import Contents, contents_of
+
+if TYPE_CHECKING:  # see write_report
+    from cosim.drawing import Story
 
 REPORT = "report.html"
 FIGURES = "figures"
@@ -31,53 +36,64 @@ def write_report(run: FlownRun, formats: Collection[str] = ("html",)) -> list[Pa
     Returns
     -------
     list of Path
-        The files, without the figures.
+        The files, the figures last.
     """
+    # Matplotlib takes as long to import as all else together
+    from cosim.drawn_rows import story_of
+
     scratch = Path(tempfile.mkdtemp(prefix=".report-", dir=run.path))
     try:
-        files = [*_with_figures(run, formats, scratch), *_pages(run, formats, scratch)]
+        told = _Told(story_of(run), contents_of(run), about(run))
+        files = [*_with_figures(told, formats, scratch), *_pages(told, formats, scratch)]
         if (scratch / FIGURES).exists():
             shutil.rmtree(run.path / FIGURES, ignore_errors=True)
             (scratch / FIGURES).replace(run.path / FIGURES)
         if "png" in formats:
             for page in run.path.glob("report-*.png"):  # of an earlier report, which may have had more
                 page.unlink()
-        return [file.replace(run.path / file.name) for file in files]
+        written = [file.replace(run.path / file.name) for file in files]
+        return written + (sorted((run.path / FIGURES).iterdir()) if {"html", "png"} & set(formats) else [])
     finally:
         shutil.rmtree(scratch, ignore_errors=True)
 
 
-def _with_figures(run: FlownRun, formats: Collection[str], folder: Path) -> list[Path]:
+@dataclass(frozen=True)
+class _Told:
+    """What a report is made of, whatever it is written as."""
+
+    story: Story
+    contents: Contents
+    about: str
+
+
+def _with_figures(told: _Told, formats: Collection[str], folder: Path) -> list[Path]:
     """Write the figures, and the page that holds them."""
     if not {"html", "png"} & set(formats):
         return []
-    # Matplotlib takes as long to import as all else together
-    from cosim.drawing import Story
     from cosim.figures import drawings
 
     (folder / FIGURES).mkdir()
-    story = Story(run.scenario, run.record, run.summary)
     shown = [
         (drawing.name, drawing.caption, drawing.write(folder / FIGURES, png="png" in formats))
-        for drawing in drawings(story)
+        for drawing in drawings(told.story)
     ]
     if "html" not in formats:
         return []
     from cosim.report_html import html_report
 
     page = folder / REPORT
-    page.write_text(html_report(contents_of(run), about(run), shown), encoding="utf-8")
+    page.write_text(html_report(told.contents, told.about, shown), encoding="utf-8")
     return [page]
 
 
-def _pages(run: FlownRun, formats: Collection[str], folder: Path) -> list[Path]:
+def _pages(told: _Told, formats: Collection[str], folder: Path) -> list[Path]:
     """Write the pages, as one document or as pictures."""
     if not {"pdf", "png"} & set(formats):
         return []
     from cosim.report_pages import pages_of, write_pdf, write_pngs
 
-    pages = pages_of(run, contents_of(run), about(run))
-    files = [write_pdf(pages, folder / "report.pdf", run.scenario.title)] if "pdf" in formats else []
+    pages = pages_of(told.story, told.contents, told.about)
+    files = [write_pdf(pages, folder / "report.pdf", told.contents.title)] if "pdf" in formats else []
     return files + (write_pngs(pages, folder) if "png" in formats else [])
 
 

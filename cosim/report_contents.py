@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,7 +12,8 @@ from cosim.claims import paper_claims
 from cosim.flown_run import ORDERS, SCENARIO, SUMMARY, FlownRun
 from cosim.record import PARTS, RECORD
 from cosim.report_words import asked, kind_of, number, verdict
-from cosim.summary import spans
+from cosim.signals import Array
+from cosim.spans import Spans
 
 
 @dataclass(frozen=True)
@@ -67,32 +67,25 @@ def contents_of(run: FlownRun) -> Contents:
         regions=_regions(run),
         numbers=tuple(table for table in (_goal(run), _effort(run), _estimates(run), _lyapunov(run)) if table),
         setting=_setting(run),
-        scenario=_compact(run.scenario.toml()),
+        scenario=run.scenario.toml(),
         repeat=commands,
         repeats=repeats,
         files=_files(run),
     )
 
 
-def _compact(toml: str) -> str:
-    """Return a file of TOML with lists of numbers, or of names without brackets, in one line each."""
-    return re.sub(
-        r"\[\n((?:\s+[^\[\]{}\n]+,\n)+)\s*\]",
-        lambda found: "[" + " ".join(line.strip() for line in found[1].splitlines()).rstrip(",") + "]",
-        toml,
-    )
-
-
 def _remarks(run: FlownRun) -> tuple[str, ...]:
     names = [*(f"position.{axis}" for axis in "xyz"), "goal.clearance"]
     names += [f"{secondary.region.name}.clearance" for secondary in run.scenario.regions]
-    broken = np.logical_or.reduce([~np.isfinite(run.record[name]) for name in names])
-    if not broken.any():
+    count, first = 0, math.inf
+    for block in run.record.blocks(["time", *names]):
+        broken = np.logical_or.reduce([~np.isfinite(block[name]) for name in names])
+        if broken.any():
+            count, first = count + int(np.count_nonzero(broken)), min(first, block["time"][np.argmax(broken)])
+    if not count:
         return ()
-    many = (
-        f"{np.count_nonzero(broken)} of {len(broken)} rows of the record hold places or clearances that are no numbers"
-    )
-    return (f"{many}; the first is at {run.record['time'][np.argmax(broken)]:g} s. Figures have gaps there.",)
+    many = f"{count} of {len(run.record)} rows of the record hold places or clearances that are no numbers"
+    return (f"{many}; the first is at {first:g} s. Figures have gaps there.",)
 
 
 def _claims(run: FlownRun) -> Table | None:
@@ -105,17 +98,18 @@ def _claims(run: FlownRun) -> Table | None:
 def _regions(run: FlownRun) -> Table | None:
     if not run.scenario.regions:
         return None
-    time = run.record["time"]
+    violations = {secondary.region.name: _Violation() for secondary in run.scenario.regions}
+    for block in run.record.blocks(["time", *(f"{name}.clearance" for name in violations)]):
+        for name, violation in violations.items():
+            violation.add(block["time"], block[f"{name}.clearance"])
     rows = []
     for secondary in run.scenario.regions:
         region = secondary.region
-        signal = run.record[f"{region.name}.clearance"]
-        least, when = run.summary["min_clearance"][region.name], "–"
-        if math.isfinite(least):
-            when = f"{time[np.argmin(np.where(np.isnan(signal), np.inf, signal))]:.2f}"
+        violation, least = violations[region.name], run.summary["min_clearance"][region.name]
+        when = f"{violation.worst_at:.2f}" if math.isfinite(least) else "–"
         degrees = run.summary["clearance_unit"][region.name] == "rad"
         shown = f"{number(math.degrees(least), 4)}°" if degrees else f"{number(least, 4)} m"
-        violated = sum(end - start for start, end in spans(signal < 0.0, time))
+        lasting = violation.lasting()
         rows.append(
             (
                 region.name,
@@ -125,13 +119,34 @@ def _regions(run: FlownRun) -> Table | None:
                 "hard" if region.hard else "soft",
                 shown,
                 when,
-                f"{violated:.2f}" if (signal < 0.0).any() else "never",
+                "never" if lasting is None else f"{lasting:.2f}",
             )
         )
     head = (
         "Region", "Shape", "Criterion", "Keep", "Hard or soft", "Least clearance", "at [s]", "Violated for [s]",
     )  # fmt: skip
     return Table("Regions", head, tuple(rows), (1.6, 1.1, 1.0, 0.8, 0.8, 1.1, 0.8, 0.9))
+
+
+class _Violation:
+    """Gathers when a region's clearance is least, and how long it is violated, block by block."""
+
+    def __init__(self) -> None:
+        self._least, self.worst_at = math.inf, math.nan  # s
+        self._spans, self._ended = Spans(), 0.0
+
+    def add(self, time: Array, clearance: Array) -> None:
+        """Take the next rows."""
+        known = np.where(np.isnan(clearance), np.inf, clearance)
+        at = int(np.argmin(known))
+        if known[at] < self._least:
+            self._least, self.worst_at = float(known[at]), float(time[at])
+        self._ended += sum(span.end - span.start for span in self._spans.add(clearance < 0.0, time))
+
+    def lasting(self) -> float | None:
+        """Return for how long the region was violated [s], None if it never was."""
+        still = self._spans.open
+        return self._ended + (still.end - still.start if still else 0.0) if self._least < 0.0 else None
 
 
 def _goal(run: FlownRun) -> Table:

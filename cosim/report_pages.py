@@ -13,7 +13,6 @@ from matplotlib.figure import Figure, SubFigure
 from cosim.drawing import Story
 from cosim.figures import draw_all
 from cosim.figures_layout import FIGURE_STYLE, WIDTH, Sheet
-from cosim.flown_run import FlownRun
 from cosim.report_contents import Contents, Table
 from cosim.report_typesetting import BOLD, MONO, PLAIN, Face, wrapped
 
@@ -28,12 +27,12 @@ _DPI = 110
 _STYLE: Any = {"pdf.fonttype": 42, "text.parse_math": False}  # whole fonts: text stays text
 
 
-def pages_of(run: FlownRun, contents: Contents, about: str) -> list[Figure]:
+def pages_of(story: Story, contents: Contents, about: str) -> list[Figure]:
     """Return the pages of a report.
 
     Parameters
     ----------
-    run : FlownRun
+    story : Story
         Its figures are drawn.
     contents : Contents
         What it says.
@@ -56,7 +55,7 @@ def pages_of(run: FlownRun, contents: Contents, about: str) -> list[Figure]:
         if contents.claims:
             document.table(contents.claims)
         document.space(12.0)
-        draw_all(Story(run.scenario, run.record, run.summary), document.sheet_for)
+        draw_all(story, document.sheet_for)
         for table in (contents.regions, *contents.numbers, contents.setting):
             if table:
                 document.table(table)

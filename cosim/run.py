@@ -3,29 +3,30 @@
 from __future__ import annotations
 
 import itertools
-import sys
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tqdm import tqdm
-
 from controller import Law, LawError
 from cosim.errors import RunError
-from cosim.flown_run import ORDERS
+from cosim.flown_run import ORDERS, SCENARIO, SUMMARY
 from cosim.helm import LoggedOrders, OrderQueue, RecordedOrders
 from cosim.law import flown_by
 from cosim.master import Master, Observer
+from cosim.progress import ProgressBar
+from cosim.record import RECORD
 from cosim.recorder import Recorder
+from cosim.replay.page import REPLAY
+from cosim.report import REPORT
 from cosim.report_words import verdict
 from cosim.run_folder import RunFolder, claim, conclude
 from cosim.scenario import Scenario
 from cosim.signals import Array
 from plant_fmu import PlantError
 
-if TYPE_CHECKING:  # pymavlink and websockets are extras
+if TYPE_CHECKING:  # pymavlink and websockets wait until a run is shown
     from cosim.live.view import LiveView
     from cosim.mavlink.setup import Mavlink
     from cosim.mavlink.thread import LinkThread
@@ -39,6 +40,12 @@ class Run:
 
     folder: Path
     summary: dict[str, Any]
+
+    def files(self) -> dict[str, Path]:
+        """Return those of its files that are there, by what they are."""
+        named = {"scenario": SCENARIO, "record": RECORD, "summary": SUMMARY, "report": REPORT, "replay": REPLAY}
+        named |= {"orders": ORDERS}
+        return {what: self.folder / name for what, name in named.items() if (self.folder / name).exists()}
 
 
 @dataclass(frozen=True)
@@ -58,14 +65,14 @@ class _Progress:
     def __init__(self, scenario: Scenario) -> None:
         self._every = max(1, scenario.steps // _PROGRESS_STEPS)
         self._step = scenario.time.step
-        self._bar = tqdm(
-            total=round(scenario.time.duration, 3), desc=scenario.name, unit="s", disable=None,
+        self._bar = ProgressBar(
+            shown=True, total=scenario.time.duration, desc=scenario.name, unit="s",
             bar_format="{desc} {percentage:3.0f}%|{bar}| {n:.1f}/{total:.1f} s [{elapsed}<{remaining}]",
         )  # fmt: skip
 
     def observe(self, k: int, row: Array) -> None:
         if k and k % self._every == 0:
-            self._bar.update(self._every * self._step)
+            self._bar.update_to(k * self._step)
 
     def close(self) -> None:
         self._bar.close()
@@ -197,7 +204,7 @@ def _step(
     started = time.perf_counter()
     try:
         recorder = Recorder(folder.path, master.signals.columns)
-        bar = _Progress(master.scenario) if progress and sys.stderr else None
+        bar = _Progress(master.scenario) if progress else None
         watching = [o for o in (link, live) if o is not None]
         observers: list[Observer] = [recorder, *watching, *([bar] if bar else [])]
         started = time.perf_counter()
@@ -212,10 +219,7 @@ def _step(
         wall_time = time.perf_counter() - started
         if bar:
             bar.close()
-        if recorder and recorder.rows:
-            recorder.close()
-        else:  # nothing to read: leave nothing behind
-            folder.discard()
-    if not (recorder and recorder.rows):
+        kept = folder.keep(recorder)
+    if not kept:
         raise failure or KeyboardInterrupt
     return status, wall_time, failure

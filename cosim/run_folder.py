@@ -14,7 +14,8 @@ from typing import Any
 from cosim.errors import RunError
 from cosim.flown_run import ORDERS, SCENARIO, SUMMARY, FlownRun, flown_run, load_run
 from cosim.plain_json import json_text
-from cosim.record import PARTS, require_utf8
+from cosim.record import PARTS, RECORD, part_files, require_utf8
+from cosim.recorder import Recorder
 from cosim.replay.pages import write_replay
 from cosim.report import write_report
 from cosim.scenario import VEHICLE_COPY, Scenario
@@ -27,6 +28,35 @@ class RunFolder:
 
     path: Path
     created: bool  # by the run, not by its user
+
+    def keep(self, recorder: Recorder | None) -> bool:
+        """Close the record of a run; take all away where there is nothing to read, or room for nothing.
+
+        Parameters
+        ----------
+        recorder : Recorder or None
+            Of the run, if it came so far.
+
+        Returns
+        -------
+        bool
+            Whether the folder holds a record.
+
+        Raises
+        ------
+        OSError
+            If the record cannot be written; what parts of it there are stay.
+        """
+        if recorder is None or not recorder.rows:
+            self.discard()
+            return False
+        try:
+            recorder.close()
+        except OSError:
+            if not (part_files(self.path) or (self.path / RECORD).exists()):
+                self.discard()
+            raise
+        return True
 
     def discard(self) -> None:
         """Take away all that a run without a record has made. May be called twice."""
@@ -141,7 +171,7 @@ def report_again(path: Path, formats: Collection[str] = ("html",)) -> tuple[dict
     Returns
     -------
     dict, list of Path
-        The summary, and the files of the report.
+        The summary, and the files that were written, the report first.
 
     Raises
     ------
@@ -158,8 +188,7 @@ def report_again(path: Path, formats: Collection[str] = ("html",)) -> tuple[dict
 
 
 def _write(run: FlownRun, formats: Collection[str]) -> list[Path]:
-    write_whole(run.path / SUMMARY, json_text(run.summary))
-    files = write_report(run, formats) if formats else []
-    if "html" in formats:
-        write_replay(run)
-    return files
+    summary = write_whole(run.path / SUMMARY, json_text(run.summary))
+    pages = write_report(run, formats) if formats else []
+    replay = [write_replay(run)] if "html" in formats else []
+    return [*pages[:1], *replay, summary, *pages[1:]]

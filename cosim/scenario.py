@@ -3,20 +3,20 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import msgspec
 import numpy as np
-import tomli_w
 from numpy.typing import NDArray
 
 from controller import ControllerError
 from controller.regions import Orientation, Region, Shape
 from controller.restoring import parameters
 from cosim.errors import ScenarioError
+from cosim.scenario_changes import changed_keys, differing_keys, joined, shown_title
 from cosim.scenario_check import (
     check_commands,
     check_failures,
@@ -32,6 +32,7 @@ from cosim.scenario_check import (
     multiple,
 )
 from cosim.scenario_file import flat, override, read_table, shipped_scenarios
+from cosim.scenario_keys import comments
 from cosim.scenario_tables import (
     CRITERIA,
     Actuation,
@@ -51,8 +52,9 @@ from cosim.scenario_tables import (
     TimeEntry,
     Vector3,
 )
+from cosim.scenario_text import scenario_text
 from plant_fmu.errors import PlantFmuError
-from plant_fmu.tables import brief, decode, hint
+from plant_fmu.tables import decode, hint, require_modest
 from plant_fmu.vehicle import Vehicle, load_vehicle
 
 __all__ = ["CRITERIA", "VEHICLE_COPY", "Limit", "Scenario", "Time", "load_scenario"]
@@ -65,7 +67,6 @@ class Scenario:
     """A checked scenario."""
 
     name: str
-    title: str
     vehicle: Vehicle
     vehicle_file: Path | None  # where it came from, unless shipped
     time: Time
@@ -92,9 +93,30 @@ class Scenario:
     compare: str  # the claims that the report holds the run against
     table: dict[str, Any]  # as in the file, defaults filled in
 
-    def toml(self, vehicle: str | None = None) -> str:
-        """Return the scenario as the file that repeats it, with another name for the vehicle's file if one is given."""
-        return tomli_w.dumps(self.table | ({"vehicle": vehicle} if vehicle else {}))
+    def toml(self, vehicle: str | None = None, commented: bool = False) -> str:
+        """Format the scenario as the file that repeats it.
+
+        Parameters
+        ----------
+        vehicle : str, optional
+            Another name for the vehicle's file.
+        commented : bool
+            Say behind each key in which unit it is, and what it means.
+
+        Returns
+        -------
+        str
+            In TOML, with every default filled in.
+        """
+        return scenario_text(
+            self.table | ({"vehicle": vehicle} if vehicle else {}),
+            comments(self.law.name, self.vehicle) if commented else {},
+        )
+
+    @property
+    def title(self) -> str:
+        """The title of the file, and what was changed since it was written."""
+        return shown_title(self.table, self.vehicle, self.law.name)
 
     @property
     def goal_region(self) -> Region:
@@ -143,14 +165,30 @@ def load_scenario(name_or_file: str | Path, overrides: Sequence[str] = ()) -> Sc
     text = str(name_or_file)
     if not text.endswith(".toml") and text not in shipped_scenarios():
         known = hint(text, shipped_scenarios())
-        raise ScenarioError(f"scenario {brief(repr(text))} is unknown; {known} (or a file ending in .toml)")
+        raise ScenarioError(f"scenario {text!r} is unknown; {known} (or a file ending in .toml)")
     try:
-        table, name = read_table(text)
+        table, name, titled = read_table(text)
         for change in overrides:
             override(table, change)
-        return checked_scenario(table, name)
+        require_modest(table)
+        if table.get("title") != titled.get("title"):  # it is of what has been set beside it
+            table.pop("changed", None)
+            titled = table
+        scenario = checked_scenario(table, name)
+        return scenario if table == titled else _with_changes(scenario, table, titled)
     except (PlantFmuError, ControllerError, ScenarioError) as error:
-        raise ScenarioError(f"{text}: {brief(error)}") from error
+        raise ScenarioError(f"{text}: {error}") from error
+
+
+def _with_changes(scenario: Scenario, table: dict[str, Any], titled: dict[str, Any]) -> Scenario:
+    """Return a scenario that says in which keys its table differs from the one that its title was written for."""
+    try:
+        before = checked_scenario(titled, scenario.name)
+    except (PlantFmuError, ControllerError, ScenarioError):  # it is no scenario yet: what makes it one is changed too
+        keys: Iterable[str] = differing_keys(titled, table)
+    else:
+        keys = changed_keys(before.table, scenario.table, scenario.vehicle)
+    return dataclasses.replace(scenario, table=scenario.table | {"changed": joined(scenario.table["changed"], keys)})
 
 
 def checked_scenario(table: dict[str, Any], name: str, vehicle: Vehicle | None = None) -> Scenario:
@@ -202,7 +240,6 @@ def checked_scenario(table: dict[str, Any], name: str, vehicle: Vehicle | None =
     )
     return Scenario(
         name=name,
-        title=file.title or name,
         vehicle=vehicle,
         vehicle_file=vehicle_file,
         time=time,

@@ -63,7 +63,7 @@ class _Motion:
 
 def check_texts(file: File) -> None:
     """Raise `ScenarioError` unless a terminal only shows, and does not obey, the texts that come to it."""
-    for key, text in (("title", file.title), ("law.name", file.law.name)):
+    for key, text in (("title", file.title), ("law.name", file.law.name), *(("changed", key) for key in file.changed)):
         good = text.isprintable() and len(text) <= MAX_TEXT
         _require(good, key, repr(text), f"one line of at most {MAX_TEXT} printable characters")
 

@@ -6,10 +6,11 @@ import copy
 import tomllib
 from importlib import resources
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from cosim.errors import ScenarioError
-from plant_fmu.tables import hint, read_toml
+
+_SHOWN = 80  # characters of what is absurdly long
 
 
 def shipped_scenarios() -> list[str]:
@@ -17,11 +18,25 @@ def shipped_scenarios() -> list[str]:
     return sorted(f.name.removesuffix(".toml") for f in _folder().iterdir() if f.name.endswith(".toml"))
 
 
+def shipped_titles() -> dict[str, str]:
+    """Return the title of each scenario that comes with the package, without checking the rest of it."""
+    texts = {name: (_folder() / f"{name}.toml").read_text(encoding="utf-8") for name in shipped_scenarios()}
+    return {name: tomllib.loads(text)["title"] for name, text in texts.items()}
+
+
 def _folder() -> resources.abc.Traversable:
     return resources.files("cosim") / "scenarios"
 
 
-def read_table(name_or_file: str, seen: tuple[str, ...] = (), beside: Path | None = None) -> tuple[dict[str, Any], str]:
+class ScenarioTable(NamedTuple):
+    """What a scenario's file says, laid over its base."""
+
+    table: dict[str, Any]
+    name: str  # of the scenario
+    titled: dict[str, Any]  # the scenario whose title it has: itself, or the base that the title came with
+
+
+def read_table(name_or_file: str, seen: tuple[str, ...] = (), beside: Path | None = None) -> ScenarioTable:
     """Read a scenario, laid over that of its ``base``.
 
     Parameters
@@ -35,8 +50,8 @@ def read_table(name_or_file: str, seen: tuple[str, ...] = (), beside: Path | Non
 
     Returns
     -------
-    dict, str
-        The table and the scenario's name.
+    ScenarioTable
+        Nothing in it is checked yet.
 
     Raises
     ------
@@ -45,10 +60,13 @@ def read_table(name_or_file: str, seen: tuple[str, ...] = (), beside: Path | Non
     TableError
         If a file cannot be read.
     """
+    from plant_fmu.errors import printable
+    from plant_fmu.tables import hint, read_toml  # NumPy and FMPy come with it, which `cosim list` does not need
+
     path = Path(name_or_file)
     if path.suffix == ".toml":
         path = beside / path if beside else path
-        table, name, folder = read_toml(path), path.stem, path.parent
+        table, name, folder = read_toml(path), printable(path.stem), path.parent
         name_or_file = str(path.resolve())
         vehicle = table.get("vehicle")
         if isinstance(vehicle, str) and vehicle.endswith(".toml"):  # beside the file that names it
@@ -64,12 +82,16 @@ def read_table(name_or_file: str, seen: tuple[str, ...] = (), beside: Path | Non
         base = table.pop("base")
         if not isinstance(base, str):
             raise ScenarioError(f"{name}: base is {base!r}, expected the name of a scenario")
-        below = read_table(base, (*seen, name_or_file), folder)[0]
+        below, _, titled = read_table(base, (*seen, name_or_file), folder)
         law = table.get("law")
         if isinstance(law, dict) and "name" in law:
             _name_law(below, law["name"])
-        table = _merge(below, table)
-    return table, name
+        if "title" in table:  # it is of what the file says, whatever was changed before
+            below.pop("changed", None)
+        over, table = table, _merge(below, table)
+        if "title" not in over and "title" in below:
+            return ScenarioTable(table, name, titled)
+    return ScenarioTable(table, name, copy.deepcopy(table))
 
 
 def _name_law(table: dict[str, Any], name: object) -> None:
@@ -104,19 +126,33 @@ def override(table: dict[str, Any], text: str) -> None:
     ScenarioError
         If there is no such place.
     """
+    from plant_fmu.errors import TableError
+    from plant_fmu.tables import MAX_DEPTH, require_modest
+
     key, equals, value_text = text.partition("=")
     if not equals or not key:
-        raise ScenarioError(f"--set {text!r}: expected key=value")
+        raise ScenarioError(f"--set {_short(text)!r}: expected key=value")
+    *path, last = key.strip().split(".")
+    if len(path) >= MAX_DEPTH:
+        raise ScenarioError(
+            f"--set {_short(key)}: {len(path)} tables within each other, expected less than {MAX_DEPTH}"
+        )
     try:
         parsed = tomllib.loads(f"value = {value_text}")
+        require_modest(parsed)
     except tomllib.TOMLDecodeError:
         parsed = {"value": value_text.strip()}  # a bare word is a string
+    except RecursionError as error:
+        raise ScenarioError(f"--set {_short(text)}: is nested too deeply") from error
+    except TableError as error:
+        raise ScenarioError(f"--set {_short(text)}: {error}") from error
+    except ValueError as error:
+        raise ScenarioError(f"--set {_short(text)}: a whole number has too many digits") from error
     if len(parsed) > 1:
-        raise ScenarioError(f"--set {text!r}: expected one key=value")
+        raise ScenarioError(f"--set {_short(text)!r}: expected one key=value")
     value = parsed["value"]
     if key.strip() == "law.name":
         _name_law(table, value)
-    *path, last = key.strip().split(".")
     at: Any = table
     for part in path:
         if isinstance(at, list):
@@ -128,7 +164,11 @@ def override(table: dict[str, Any], text: str) -> None:
     elif isinstance(at, dict):
         at[last] = value
     else:
-        raise ScenarioError(f"--set {key}: there is no table at {'.'.join(path)!r}")
+        raise ScenarioError(f"--set {_short(key)}: there is no table at {_short('.'.join(path))!r}")
+
+
+def _short(text: str) -> str:
+    return text if len(text) <= _SHOWN else f"{text[:_SHOWN]} ..."
 
 
 def _index(items: list[Any], part: str, key: str) -> int:
@@ -136,10 +176,11 @@ def _index(items: list[Any], part: str, key: str) -> int:
     names = [item.get("name") for item in items if isinstance(item, dict)]
     if part in names:
         return names.index(part)
-    if part.isdecimal() and int(part) < len(items):
+    if part.isdecimal() and len(part) < 10 and int(part) < len(items):
         return int(part)
     raise ScenarioError(
-        f"--set {key}: {part!r} is not one of {', '.join(map(str, names))}, nor a number below {len(items)}"
+        f"--set {_short(key)}: {_short(part)!r} is not one of {', '.join(map(str, names))}, "
+        f"nor a number below {len(items)}"
     )
 
 
@@ -162,3 +203,47 @@ def flat(table: dict[str, Any], prefix: str = "") -> dict[str, Any]:
     for key, value in table.items():
         joined |= flat(value, f"{prefix}{key}.") if isinstance(value, dict) else {f"{prefix}{key}": value}
     return joined
+
+
+def place_of(table: dict[str, Any], key: str) -> tuple[Any, Any]:
+    """Return the table or list that holds a key, and the key's place in it.
+
+    Parameters
+    ----------
+    table : dict
+        Of a scenario.
+    key : str
+        With dots; items of lists go by index or name.
+
+    Returns
+    -------
+    dict or list, str or int
+        Where the value stands.
+
+    Raises
+    ------
+    ScenarioError
+        If there is no such key.
+    """
+    *path, last = key.split(".")
+    at: Any = table
+    for depth, part in enumerate([*path, last]):
+        if isinstance(at, list | tuple):
+            names = [item.get("name") for item in at if isinstance(item, dict)]
+            inside = part.isdecimal() and len(part) < 10 and int(part) < len(at)
+            place: Any = names.index(part) if part in names else int(part) if inside else None
+            known = names or list(map(str, range(len(at))))
+        else:
+            known = list(at) if isinstance(at, dict) else []
+            place = part if part in known else None
+        if place is None:
+            from plant_fmu.tables import hint
+
+            where = ".".join(key.split(".")[:depth])
+            said = hint(part, map(str, known)) if known else f"{where} holds no others"
+            what = "is unknown" if part == key else f"is unknown: {part!r}"
+            raise ScenarioError(f"key {key!r} {what}; {said}")
+        if depth == len(path):
+            return at, place
+        at = at[place]
+    raise AssertionError("unreachable")

@@ -165,6 +165,7 @@ class File:
     initial: Initial
     goal: dict[str, Any]
     title: str = ""
+    changed: tuple[str, ...] = ()  # keys, since the title was written
     compare: Literal["", "paper"] = ""
     intersection: tuple[str, ...] = ()
     tell_failures: bool = False

@@ -19,7 +19,7 @@ from controller.regions.shape import GREATEST
 from cosim.errors import ScenarioError
 from cosim.scenario import CRITERIA
 from plant_fmu import PlantFmuError
-from plant_fmu.tables import brief, decode
+from plant_fmu.tables import decode
 from plant_fmu.vehicle import Vehicle
 
 Vector3 = tuple[float, float, float]
@@ -190,7 +190,7 @@ def decode_scene(line: bytes) -> Scene:
             raise ScenarioError(f"expected one JSON object, got {type(table).__name__!r}")
         scene = decode(table, Scene)
     except (msgspec.MsgspecError, PlantFmuError, RecursionError, UnicodeDecodeError) as error:
-        raise ScenarioError(brief(error).removeprefix("file: ")) from error
+        raise ScenarioError(str(error).removeprefix("file: ")) from error
     _check(scene)
     return scene
 

@@ -2,8 +2,8 @@
 
 What one learns: the few keys that make a vehicle, what its FMU says of it, and that a scenario takes it by the file's
 name. The vehicle is a made-up open frame of 20 kg with four vectored horizontal thrusters and two vertical ones: it can
-turn its heading but neither roll nor pitch, and stays upright because its weight hangs below its buoyancy. Writes
-frame.toml, frame.fmu, pool.toml and runs/frame.
+turn its heading but neither roll nor pitch, and stays upright because its weight hangs below its buoyancy. When run
+it writes frame.toml, frame.fmu, pool.toml and runs/frame here.
 """
 
 from pathlib import Path
@@ -67,19 +67,20 @@ name = "pd"
 through = "thrusters"
 """
 
-Path("frame.toml").write_text(FRAME)
+if __name__ == "__main__":
+    Path("frame.toml").write_text(FRAME)
 
-vehicle = load_vehicle(Path("frame.toml"))  # refuses what cannot be, by the name of its key
-fmu = build_fmu(vehicle, 3, Path("frame.fmu"))
-print(f"{vehicle.title}: {vehicle.n_thrusters} thrusters, {fmu.name} of {fmu.stat().st_size / 1024:.0f} kB")
+    vehicle = load_vehicle(Path("frame.toml"))  # refuses what cannot be, by the name of its key
+    fmu = build_fmu(vehicle, 3, Path("frame.fmu"))
+    print(f"{vehicle.title}: {vehicle.n_thrusters} thrusters, {fmu.name} of {fmu.stat().st_size / 1024:.0f} kB")
 
-with Plant(fmu) as plant:
-    plant.set({"position.z": 2.0})
-    plant.initialise()
-    plant.step(5.0)
-    print(f"left alone it comes up from 2.00 m to {plant['position.z']:.2f} m in 5 s")
+    with Plant(fmu) as plant:
+        plant.set({"position.z": 2.0})
+        plant.initialise()
+        plant.step(5.0)
+        print(f"left alone it comes up from 2.00 m to {plant['position.z']:.2f} m in 5 s")
 
-Path("pool.toml").write_text(POOL)
-said = run_scenario(load_scenario("pool.toml"), Path("runs/frame"), report=False).summary
-print(f"{said['law']} law: in the goal after {said['reach_time']:.1f} s, for good: {said['settled']};", end=" ")
-print(f"asked for {said['max_force_asked']:.0f} N, of which the thrusters gave {said['max_force']:.0f} N")
+    Path("pool.toml").write_text(POOL)
+    said = run_scenario(load_scenario("pool.toml"), Path("runs/frame"), report=False).summary
+    print(f"{said['law']} law: in the goal after {said['reach_time']:.1f} s, for good: {said['settled']};", end=" ")
+    print(f"asked for {said['max_force_asked']:.0f} N, of which the thrusters gave {said['max_force']:.0f} N")

@@ -13,14 +13,15 @@ from cosim.mavlink.setup import Mavlink
 from cosim.run import run_scenario
 from cosim.scenario import load_scenario
 
-listener = mavutil.mavlink_connection("udpin:127.0.0.1:0", dialect="common")
-port = listener.port.getsockname()[1]
-link = Mavlink((parse_endpoint(f"udpout:127.0.0.1:{port}"),), MavlinkOptions())
-scenario = load_scenario("paper-limited", ["time.duration=5.0", "arbiter.engine=closed"])
-run_scenario(scenario, Path("runs/streamed"), mavlink=link, report=False)
-heard = []
-while message := listener.recv_match(timeout=0.5, blocking=True):
-    heard.append(message)
-last = next(m for m in reversed(heard) if m.get_type() == "LOCAL_POSITION_NED")
-print(f"{len(heard)} messages, {len({m.get_type() for m in heard})} kinds")
-print(f"last seen at north {last.x:.2f} m, {last.z:.2f} m deep, {last.time_boot_ms / 1000:.1f} s after the start")
+if __name__ == "__main__":
+    listener = mavutil.mavlink_connection("udpin:127.0.0.1:0", dialect="common")
+    port = listener.port.getsockname()[1]
+    link = Mavlink((parse_endpoint(f"udpout:127.0.0.1:{port}"),), MavlinkOptions())
+    scenario = load_scenario("paper-limited", ["time.duration=5.0", "arbiter.engine=closed"])
+    run_scenario(scenario, Path("runs/streamed"), mavlink=link, report=False)
+    heard = []
+    while message := listener.recv_match(timeout=0.5, blocking=True):
+        heard.append(message)
+    last = next(m for m in reversed(heard) if m.get_type() == "LOCAL_POSITION_NED")
+    print(f"{len(heard)} messages, {len({m.get_type() for m in heard})} kinds")
+    print(f"last seen at north {last.x:.2f} m, {last.z:.2f} m deep, {last.time_boot_ms / 1000:.1f} s after the start")

@@ -1,6 +1,7 @@
 """Who gets the fan? An arbiter for a building's ventilation, in cells.
 
-`python examples/ventilation.py` prints what it finds, and writes ventilation.png and ventilation.toml here.
+`python examples/ventilation.py` prints what it finds, and writes ventilation.png and ventilation.toml here. So does
+running it cell by cell; importing it does neither.
 """
 
 # %% [markdown]
@@ -46,7 +47,8 @@ arbiter = Arbiter([SMOKE, AIR, ROOM], outside="clip")
 
 afternoon = {"smoke": 0.1, "co2": 950.0, "temperature": 27.0}
 weights = arbiter(afternoon)
-print("afternoon:", ", ".join(f"{name} {w:.3f}" for name, w in zip(("smoke", "air", "room"), weights, strict=True)))
+if __name__ == "__main__":
+    print("afternoon:", ", ".join(f"{name} {w:.3f}" for name, w in zip(("smoke", "air", "room"), weights, strict=True)))
 
 # %% [markdown]
 # The air is stale to the degree (950 - 800) / 600 = 0.25, so that the room, hot to the degree 0.75, has most of the
@@ -54,7 +56,8 @@ print("afternoon:", ", ".join(f"{name} {w:.3f}" for name, w in zip(("smoke", "ai
 
 # %%
 explanation = arbiter.explain(afternoon)
-print(explanation)
+if __name__ == "__main__":
+    print(explanation)
 
 # %% [markdown]
 # ## Can the rules be trusted?
@@ -64,7 +67,8 @@ print(explanation)
 
 # %%
 verification = arbiter.verify()
-print(verification)
+if __name__ == "__main__":
+    print(verification)
 
 # %% [markdown]
 # ## A day
@@ -88,8 +92,9 @@ day = np.column_stack(
 )
 day_weights = arbiter.batch(day)
 leader = np.where(day_weights.max(axis=1) > 0.0, day_weights.argmax(axis=1), -1)
-for k, name in enumerate(("smoke", "air", "room")):
-    print(f"{name} leads for {np.count_nonzero(leader == k)} minutes")
+if __name__ == "__main__":
+    for k, name in enumerate(("smoke", "air", "room")):
+        print(f"{name} leads for {np.count_nonzero(leader == k)} minutes")
 
 # %% [markdown]
 # ## Pictures
@@ -105,7 +110,8 @@ for k, (name, line) in enumerate((("smoke", "-"), ("air", "--"), ("room", ":")))
 left.set(xlim=(6.0, 20.0), ylim=(0.0, 1.0), xlabel="hour of the day", ylabel="weight")
 left.legend(loc="upper right", frameon=False)
 pictures.decisions(arbiter, ("co2", "temperature"), {"smoke": 0.5}, ax=right)
-figure.savefig("ventilation.png", dpi=100)
+if __name__ == "__main__":
+    figure.savefig("ventilation.png", dpi=100)
 
 # %% [markdown]
 # ## Keep it
@@ -113,8 +119,9 @@ figure.savefig("ventilation.png", dpi=100)
 # The definition is a file, for others to read, to change, and to put under version control. What comes back is equal.
 
 # %%
-arbiter.save("ventilation.toml")
-assert Arbiter.load("ventilation.toml") == arbiter
+if __name__ == "__main__":
+    arbiter.save("ventilation.toml")
+    assert Arbiter.load("ventilation.toml") == arbiter
 
 # %% [markdown]
 # ## Rules of one's own
@@ -149,5 +156,6 @@ speed = Arbiter(
 )
 evening = {"smoke": 0.2, "co2": 1250.0, "temperature": 26.0, "outdoors": 15.0}
 (fan_speed,) = speed(evening)
-print(f"evening: {fan_speed:.1f} % of the fan's speed, by the {speed.engine} engine")
-print(speed)
+if __name__ == "__main__":
+    print(f"evening: {fan_speed:.1f} % of the fan's speed, by the {speed.engine} engine")
+    print(speed)

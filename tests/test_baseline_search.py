@@ -1,4 +1,4 @@
-"""The search for the gains of the laws for comparison: its scenes, its draws, its order, and what it found."""
+"""The search for the gains of the laws for comparison: its draws, its order, and what it found."""
 
 import math
 import re
@@ -12,24 +12,9 @@ from benchmarks import baselines
 from benchmarks.__main__ import main
 from benchmarks.baselines import RANGES, Candidate, Outcome, draws, outcome
 from controller import LAWS
-from cosim.scene import read_scenes
 from cosim.scene_run import Score
 
 ROOT = Path(__file__).parents[1]
-SCENES = ROOT / "tests" / "data" / "scenes"
-
-
-@pytest.mark.parametrize(("name", "flags"), [("plain", []), ("hard", ["--hard"])])
-def test_scenes_are_those_of_the_reference_to_the_last_digit(name, flags, capsys):
-    main(["scenes", "20000", "6", *flags])
-    assert capsys.readouterr().out == (SCENES / f"{name}.jsonl").read_text()
-
-
-def test_scenes_can_be_read(tmp_path, capsys):
-    main(["scenes", "7", "3", "--hard"])
-    path = tmp_path / "scenes.jsonl"
-    path.write_text(capsys.readouterr().out)
-    assert [scene.seed for scene in read_scenes(path)] == [7, 8, 9]
 
 
 @pytest.mark.parametrize("law", RANGES)

@@ -1,6 +1,7 @@
 """The benchmarks run, and what they compare is one plant. No test asserts a time."""
 
 import json
+import re
 import subprocess
 import sys
 
@@ -47,6 +48,17 @@ def test_each_benchmark_prints_a_table(name, capsys, tmp_path):
         assert row["name"] in line
         # one step of a law may be shorter than what its clock is uncertain by
         assert row["note"] or (sum(row["seconds"]) if name == "law" else min(row["seconds"])) > 0.0
+
+
+@pytest.mark.slow
+def test_the_memory_of_long_runs_is_a_table(capfd, tmp_path):
+    work = ["record", "summary", "export csv"]
+    main(["long-record", "--rows", "300", "900", "--work", *work, "--folder", str(tmp_path)])
+    lines = capfd.readouterr().out.splitlines()
+    assert [line[:24].rstrip() for line in lines[-3:]] == work
+    for line in lines[-3:]:
+        assert len(re.findall(r"\d+ MB +\d", line)) == 2 and line.endswith("x")
+    assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.slow

@@ -1,6 +1,7 @@
 """Each example runs from an empty folder, says something, and stays as short as it claims to be."""
 
 import ast
+import runpy
 import subprocess
 import sys
 from pathlib import Path
@@ -29,13 +30,21 @@ PACKAGES = ("controller", "cosim", "fuzzy_arbiter", "plant_fmu")
 @pytest.mark.slow
 @pytest.mark.parametrize("example", EXAMPLES, ids=lambda p: p.name)
 def test_runs_and_writes_what_it_says(example, tmp_path):
-    if example.name == "telemetry.py":
-        pytest.importorskip("pymavlink")
     done = subprocess.run([sys.executable, example], cwd=tmp_path, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     assert done.stderr == ""
     assert SAYS.get(example.name, "") in done.stdout and done.stdout
     assert [file for file in WRITES.get(example.name, []) if not (tmp_path / file).is_file()] == []
+
+
+@pytest.mark.parametrize("example", EXAMPLES, ids=lambda p: p.name)
+def test_importing_it_writes_and_says_nothing(example, tmp_path, monkeypatch, capfd):
+    if example.name == "telemetry.py":
+        pytest.importorskip("pymavlink")
+    monkeypatch.chdir(tmp_path)
+    runpy.run_path(str(example), run_name=example.stem)
+    assert list(tmp_path.rglob("*")) == []
+    assert capfd.readouterr() == ("", "")
 
 
 @pytest.mark.parametrize("example", EXAMPLES, ids=lambda p: p.name)

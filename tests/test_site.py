@@ -126,9 +126,10 @@ def test_the_command_line_page_has_every_verb_and_flag_of_the_help(command, caps
         return capsys.readouterr().out
 
     verbs = re.findall(rf"^### {title} (.*)$", text, re.M)
+    everywhere = text.partition(f"\n## {title}\n")[2].partition("\n##")[0]  # flags of the command stand there alone
     assert re.findall(r"^    ([a-z-]+)(?=  |$)", help_of(), re.M) == verbs
     for verb in verbs:
-        section = text.partition(f"\n### {title} {verb}\n")[2].partition("\n##")[0]
+        section = everywhere + text.partition(f"\n### {title} {verb}\n")[2].partition("\n##")[0]
         for flag in re.findall(r"^  (?:-\w, )?(--[a-z][a-z-]+)\b", help_of(verb), re.M):
             assert flag == "--help" or re.search(rf"^\| .*`{flag}[ `]", section, re.M), f"{verb} {flag}"
 

@@ -8,13 +8,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cosim.campaigns.folder import PLAN, RESULTS, SUMMARY, held, read_json
+from cosim.campaigns.folder import PLAN, RESULTS, SUMMARY, held
 from cosim.campaigns.page import Html, Page, code, interval, wall, write_figures
 from cosim.campaigns.plan import SCENES
-from cosim.campaigns.repeat import complete_results
+from cosim.campaigns.repeat import complete_results, require_complete
 from cosim.campaigns.replays import Replay, replay_of
 from cosim.campaigns.results import Results
 from cosim.campaigns.scene_kinds import FEATURES, SceneKinds, scene_kinds
+from cosim.campaigns.scene_rows import SCHEMA
 from cosim.campaigns.sections import (
     Group,
     basis,
@@ -26,6 +27,7 @@ from cosim.campaigns.sections import (
 from cosim.campaigns.summary import OF_ALL, SPREADS, rates_of
 from cosim.campaigns.worst import LISTED, Worst, worst_rows
 from cosim.errors import RunError
+from cosim.plain_json import read_json, understood
 from cosim.whole_file import write_whole
 
 if TYPE_CHECKING:
@@ -58,15 +60,19 @@ def write_campaign_page(folder: Path, replays: int) -> Path:
     KeyboardInterrupt
         After Ctrl-C; the page is there, without the replays.
     """
-    results, summary = complete_results(folder), read_json(folder / SUMMARY)
+    require_complete(folder)
+    summary = read_json(folder / SUMMARY)
     if summary.get("kind") != SCENES:
-        raise RunError(f"{folder}: holds no campaign of scenes")
+        raise RunError(f"{folder / SUMMARY}: holds no campaign of scenes")
+    results = complete_results(folder, SCHEMA)
     with held(folder):
         kinds, worst = scene_kinds(results), worst_rows(results, max(LISTED, replays))
-        figures = write_figures(folder, _drawings(results, kinds, summary) if worst else [])
+        with understood(folder / SUMMARY):
+            figures = write_figures(folder, _drawings(results, kinds, summary) if worst else [])
 
         def write(shown: Mapping[int, Replay]) -> None:
-            write_whole(folder / PAGE, _page(folder, results, kinds, summary, worst, figures, shown).html())
+            with understood(folder / SUMMARY):
+                write_whole(folder / PAGE, _page(folder, results, kinds, summary, worst, figures, shown).html())
 
         write({})
         by = f"by the {summary['law']} law"

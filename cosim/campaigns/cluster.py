@@ -14,6 +14,7 @@ from cosim.campaigns.crews import Death, Flight, interrupts_held
 from cosim.campaigns.work import Task
 from cosim.campaigns.worker import fly, release
 from cosim.errors import RunError
+from plant_fmu.installing import install_hint
 
 _QUEUED = 2  # batches a thread of a worker, so that none waits for work
 _LOOK = 5.0  # s between looks at how many workers there are: they may come and go
@@ -89,6 +90,10 @@ class Cluster:
         self._look()
         if time.monotonic() - self._seen > _PATIENCE:
             raise RunError(f"the cluster has had no workers for {_PATIENCE:g} s; what is flown is kept")
+
+    def compiling(self) -> bool:
+        """Say no: what the cluster compiles is not told."""
+        return False
 
     def _look(self) -> None:
         try:
@@ -170,7 +175,7 @@ def cluster_executor(scheduler: str | None, workers: int) -> Iterator[Executor]:
         import dask
         import distributed
     except ImportError as error:
-        raise RunError("Dask is not installed; expected: pip install 'subreach[campaign]'") from error
+        raise RunError(f"Dask is not installed; {install_hint('distributed>=2024.5')}") from error
     untyped: Any = distributed
     with contextlib.ExitStack() as stack:
         stack.enter_context(_quiet("distributed"))

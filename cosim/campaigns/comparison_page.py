@@ -8,16 +8,19 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from controller import LAWS
 from cosim.campaigns.campaign_page import FACTS, group_of, spreads_of
-from cosim.campaigns.folder import SUMMARY, read_json
+from cosim.campaigns.folder import SUMMARY
 from cosim.campaigns.page import Html, Page, code, interval, number, wall, write_figures
 from cosim.campaigns.repeat import complete_results
 from cosim.campaigns.replays import Replay, replay_of
 from cosim.campaigns.results import Results
+from cosim.campaigns.scene_rows import SCHEMA
 from cosim.campaigns.sections import LABELS, basis, quantiles_table, rates_table
 from cosim.campaigns.summary import SPREADS
 from cosim.campaigns.worst import ORDER, Worst, rerun_command, worst_rows
 from cosim.errors import RunError
+from cosim.plain_json import read_json, understood
 from cosim.whole_file import write_whole
 
 if TYPE_CHECKING:
@@ -52,13 +55,17 @@ def write_comparison_page(folder: Path, replays: int) -> Path:
         After Ctrl-C; the page is there, without the replays.
     """
     numbers = read_json(folder / NUMBERS)
-    results = {law: complete_results(folder / law) for law in numbers["laws"]}
+    if not (isinstance(numbers.get("laws"), dict) and numbers["laws"].keys() <= LAWS.keys()):
+        raise RunError(f"{folder / NUMBERS}: holds no comparison of laws")
+    results = {law: complete_results(folder / law, SCHEMA) for law in numbers["laws"]}
     worst = {law: worst_rows(rows, max(_LISTED, replays)) for law, rows in results.items()}
     try:
-        figures = write_figures(folder, _drawings(results, numbers) if any(worst.values()) else [])
+        with understood(folder / NUMBERS):
+            figures = write_figures(folder, _drawings(results, numbers) if any(worst.values()) else [])
 
         def write(shown: Mapping[int, Replay]) -> None:
-            write_whole(folder / PAGE, _page(folder, numbers, worst, figures, shown).html())
+            with understood(folder / NUMBERS):
+                write_whole(folder / PAGE, _page(folder, numbers, worst, figures, shown).html())
 
         write({})
         keys = dict.fromkeys(w.key for of in worst.values() for w in of[:replays])

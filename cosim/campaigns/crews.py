@@ -46,6 +46,9 @@ class Crew(Protocol):
     def check(self) -> None:
         """Raise an error if nothing that is under way will ever come home."""
 
+    def compiling(self) -> bool:
+        """Return whether one of its processes, other than this one, is compiling, as far as that is known."""
+
     def close(self) -> None:
         """Send everybody home; what is under way is lost."""
 
@@ -68,6 +71,10 @@ class Here:
     def check(self) -> None:
         """Wait for nobody."""
 
+    def compiling(self) -> bool:
+        """Leave what this process compiles to who listens here."""
+        return False
+
     def close(self) -> None:
         """Nobody to send home."""
 
@@ -77,6 +84,7 @@ class _Hand:
     """One process. Each has a pool of its own, so that when it dies, we know of what, and the others go on."""
 
     pool: ProcessPoolExecutor
+    compiling: Any  # shared with the process: how many functions it is compiling, each within another one
     under_way: list[Flight] = field(default_factory=list)  # in order of submission: the first is being flown
     fatal: Flight | None = None  # what the process has died of
 
@@ -135,6 +143,10 @@ class Processes:
     def check(self) -> None:
         """Be sure to hear of every death."""
 
+    def compiling(self) -> bool:
+        """Return whether one of the processes is compiling."""
+        return any(hand.compiling.value for hand in self._hands)
+
     def _replace(self, hand: _Hand) -> _Hand:
         new = self._hand()
         self._hands[self._hands.index(hand)] = new
@@ -143,10 +155,12 @@ class Processes:
 
     def _hand(self) -> _Hand:
         """Start a process, and have it get ready, which takes it a second."""
-        pool = ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn"), initializer=begin_worker)
+        context = multiprocessing.get_context("spawn")
+        compiling = context.RawValue("i", 0)
         with interrupts_held():
+            pool = ProcessPoolExecutor(1, mp_context=context, initializer=begin_worker, initargs=(compiling,))
             pool.submit(prepare, self._task)
-        return _Hand(pool)
+        return _Hand(pool, compiling)
 
     def close(self) -> None:
         """Send everybody home."""
@@ -188,6 +202,10 @@ class Lent:
     def check(self) -> None:
         """Believe the executor."""
 
+    def compiling(self) -> bool:
+        """Say no: whoever has made the executor does not tell."""
+        return False
+
     def close(self) -> None:
         """Leave the executor to whom it belongs."""
 
@@ -203,13 +221,17 @@ def _came_home(flight: Flight) -> bool:
 
 @contextlib.contextmanager
 def interrupts_held() -> Iterator[None]:
-    """Hold Ctrl-C back while a process is started: it inherits that, and so never hears of it."""
+    """Hold Ctrl-C and a closed terminal back while a process is started: it inherits that, and never hears of them.
+
+    So does the process by which Python frees what all of them share.
+    """
     if not hasattr(signal, "pthread_sigmask"):
         yield
         return
-    resource_tracker.ensure_running()  # which would let Ctrl-C through again when it is started
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGHUP})
     try:
+        resource_tracker.ensure_running()  # which lets Ctrl-C through when it is started, but has its own way with it
+        signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
         yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)

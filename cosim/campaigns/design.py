@@ -276,7 +276,7 @@ def _vary(text: str) -> Vary:
 
 
 def _points(key: str, text: str) -> int:
-    if not (text.isdecimal() and 2 <= int(text) <= MOST):
+    if not (text.isascii() and text.isdecimal() and len(text) < 20 and 2 <= int(text) <= MOST):
         raise RunError(f"{key}: {text!r} points, expected a whole number from 2 to {MOST}")
     return int(text)
 

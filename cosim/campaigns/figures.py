@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter, PercentFormatter
 
 from cosim.campaigns.sections import LABELS
-from cosim.campaigns.statistics import Facts, bins, rate
+from cosim.campaigns.statistics import Facts, bins, quantiles, rate
 from cosim.drawing import BLACK, BLUE, CYCLE, GREEN, ORANGE, RED, Drawing, legend_columns
 from cosim.signals import Array
 
@@ -19,6 +19,8 @@ WIDTH = 5.6  # in, of a figure: readable on a phone too
 _ACROSS = 2  # panels
 _MOST_KEYS = 8  # that are drawn
 _POINTS = 700  # of a panel
+_TICKS = 5  # intervals across a panel at the most: labels of five digits have room
+_WIDE = 30.0  # a logarithmic range over which only powers of ten have room
 _STEPS = 400  # of a drawn distribution
 _DASHES = ("-", "--", "-.", ":")
 
@@ -117,15 +119,19 @@ def distributions(columns: Mapping[str, Mapping[str, Array]], told: str) -> Iter
             x, shares = _thinned(*shares_up_to(values))
             colour, dash = CYCLE[i % len(CYCLE)], _DASHES[i % len(_DASHES)]
             axes.step(x, shares, where="post", color=colour, linestyle=dash, label=name)
-            if x.size and shares[-1] >= 0.5:
-                axes.plot(x[np.searchsorted(shares, 0.5)], 0.5, "o", color=colour, markersize=5)
+            median = quantiles(values)["0.5"]
+            if median is not None:  # half of those that come are below it: of an odd number, on the middle one's riser
+                axes.plot(median, shares[-1] / 2.0, "o", color=colour, markersize=5)
         if column == "min_clearance":
             axes.axvline(0.0, color=BLACK, linewidth=0.8)
         axes.set(xlabel=LABELS[column], ylim=(0.0, 1.02))
+        axes.xaxis.set_major_locator(MaxNLocator(_TICKS, steps=[1, 2, 5, 10]))
         axes.yaxis.set_major_formatter(PercentFormatter(1.0))
     if len(groups) > 1:
         legend_above(figure, panels[0])
-    caption = "Share that comes to at most so much; the dot is the median. Left of 0 a region is violated."
+    caption = (
+        "Share that comes to at most so much, with a dot at the median of what comes. Left of 0 a region is violated."
+    )
     yield Drawing("distributions", f"{caption} {told}".rstrip(), figure)
 
 
@@ -230,11 +236,13 @@ def _across(axes: Axes, key: Key) -> None:
     """Label the axis of a key: few ticks where it is logarithmic, no fractions where it is a whole number."""
     axes.set(xlabel=key.label, xscale="log" if key.log else "linear")
     if key.log:
-        axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        wide = key.values.max() > _WIDE * key.values.min()
+        axes.xaxis.set_major_locator(LogLocator(subs=(1.0,) if wide else (1.0, 2.0, 5.0)))
         axes.xaxis.set_major_formatter(FuncFormatter(lambda x, _: f"{x:g}"))
         axes.xaxis.set_minor_formatter(NullFormatter())
-    elif np.array_equal(key.values, np.round(key.values)):
-        axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+    else:
+        whole = np.array_equal(key.values, np.round(key.values))
+        axes.xaxis.set_major_locator(MaxNLocator(_TICKS, steps=[1, 2, 5, 10], integer=whole))
 
 
 def legend_above(figure: Figure, axes: Axes) -> None:

@@ -16,6 +16,7 @@ from cosim.campaigns.plan import difference
 from cosim.campaigns.results import Results
 from cosim.campaigns.work import Rows, Work
 from cosim.errors import RunError
+from cosim.plain_json import read_json
 from cosim.whole_file import write_whole
 
 PLAN = "campaign.json"
@@ -169,42 +170,9 @@ def read_plan(path: Path) -> dict[str, Any]:
     RunError
         If it holds none that can be read.
     """
-    try:
-        plan = json.loads((path / PLAN).read_text(encoding="utf-8"))
-    except FileNotFoundError as error:
-        raise RunError(f"{path}: holds no campaign ({PLAN} is missing)") from error
-    except (OSError, ValueError, RecursionError) as error:
-        raise RunError(f"{path / PLAN}: cannot be read: {error}") from error
-    if not isinstance(plan, dict):
-        raise RunError(f"{path / PLAN}: holds no campaign")
-    return plan
-
-
-def read_json(path: Path) -> dict[str, Any]:
-    """Return a table that was written as JSON.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-
-    Returns
-    -------
-    dict
-        As it was written.
-
-    Raises
-    ------
-    RunError
-        If it is not there, or holds something else.
-    """
-    try:
-        table = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError, RecursionError) as error:
-        raise RunError(f"{path}: cannot be read: {error}") from error
-    if not isinstance(table, dict):
-        raise RunError(f"{path}: cannot be read: it holds no table")
-    return table
+    if not (path / PLAN).exists():
+        raise RunError(f"{path}: holds no campaign ({PLAN} is missing)")
+    return read_json(path / PLAN)
 
 
 def _lock(path: Path) -> int | None:

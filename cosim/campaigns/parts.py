@@ -150,22 +150,32 @@ def _level(file: Path) -> int:
 
 
 def _keys(file: Path, schema: Any) -> Any:
+    """Return the keys of a part, all of which is read: what is damaged must not come to light when parts are joined."""
     try:
         check_schema(file, schema)
         with pq.ParquetFile(file) as parquet:
-            chunks = parquet.read([schema.names[0]])[0].chunks
-            return np.concatenate([np.empty(0, dtype=np.int64), *map(np.from_dlpack, chunks)])
-    except (OSError, pa.ArrowException) as error:
-        raise RunError(f"{file}: cannot be read: {' '.join(str(error).split())}") from error
+            found = [np.from_dlpack(batch.column(0)) for batch in parquet.iter_batches(_CHUNK)]
+    except (OSError, pa.ArrowException, BufferError) as error:
+        raise RunError(f"{file}: cannot be read: {error}") from error
+    keys = np.concatenate([np.empty(0, dtype=np.int64), *found])
+    if not len(keys) or (np.diff(keys) <= 0).any():
+        raise RunError(f"{file}: cannot be read: its rows are not in order, or there are none")
+    return keys
 
 
 def check_schema(file: Path, schema: Any) -> None:
-    """Raise a RunError if a Parquet file has other columns."""
+    """Raise a RunError that names the first column in which a Parquet file is not of a schema."""
     found = pq.read_schema(file)
-    if not found.equals(schema):
-        raise RunError(
-            f"{file}: cannot be read: has the columns {', '.join(found.names)}, expected {', '.join(schema.names)}"
-        )
+    if found.equals(schema):
+        return
+    for field in schema:
+        if found.names.count(field.name) != 1:
+            there = "two columns" if field.name in found.names else "no column"
+            raise RunError(f"{file}: cannot be read: has {there} {field.name!r}, expected one")
+        if not found.field(field.name).equals(field):
+            raise RunError(f"{file}: cannot be read: column {found.field(field.name)}, expected {field}")
+    odd = next((name for name in found.names if name not in schema.names), found.names[0])
+    raise RunError(f"{file}: cannot be read: column {odd!r} is not expected there")
 
 
 def write_tables(path: Path, tables: Any, schema: Any) -> None:
@@ -236,7 +246,7 @@ def in_order(files: Sequence[Path], schema: Any) -> Iterator[Any]:
 
 def _least(file: Path) -> int:
     with pq.ParquetFile(file) as parquet:
-        return int(parquet.metadata.row_group(0).column(0).statistics.min)
+        return int(next(parquet.iter_batches(1, columns=parquet.schema_arrow.names[:1])).column(0)[0].as_py())
 
 
 class _Reader:

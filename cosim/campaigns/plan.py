@@ -66,7 +66,10 @@ def plan_of(law: str, gains: Any, conditions: Conditions, scenes: int, digest: s
 
 def versions() -> dict[str, str]:
     """Return the versions of what rows depend on."""
-    return {"python": platform.python_version()} | {name: metadata.version(name) for name in _LIBRARIES}
+    return {"python": platform.python_version()} | {name: _version(name) for name in _LIBRARIES}
+
+
+_version = cache(metadata.version)  # which looks through files
 
 
 @cache

@@ -12,24 +12,28 @@ from typing import Any
 
 import numpy as np
 
+from controller import ControllerError
 from controller.regions import of_attitude
 from cosim.campaigns.design import design_of
 from cosim.campaigns.dispatch import KILLED
-from cosim.campaigns.folder import RESULTS, read_plan
+from cosim.campaigns.folder import PLAN, RESULTS, read_plan
 from cosim.campaigns.law_gains import law_named
 from cosim.campaigns.plan import SCENES, SWEEP, difference
 from cosim.campaigns.results import Results
+from cosim.campaigns.scene_rows import SCHEMA
 from cosim.campaigns.scenes import SceneTask
-from cosim.campaigns.sweep_rows import SweepWork
+from cosim.campaigns.sweep_rows import SweepWork, schema_of
 from cosim.campaigns.work import Task
-from cosim.errors import RunError
+from cosim.errors import CosimError, RunError
 from cosim.flown_run import SCENARIO
+from cosim.plain_json import understood
 from cosim.record import Record
 from cosim.scenario import VEHICLE_COPY, Scenario, load_scenario
 from cosim.scene import decode_scene
 from cosim.scene_run import Conditions
 from cosim.scene_scenario import scene_scenario
-from cosim.summary import spans
+from cosim.spans import spans
+from plant_fmu import PlantFmuError
 
 Outcome = dict[str, Any]  # some columns of a row
 _ROUNDING = 1e-6  # of a number, relative and absolute, that two flights of one scenario may differ by
@@ -74,33 +78,40 @@ def repeat_of(folder: Path, key: int) -> Repeat:
     Raises
     ------
     RunError
-        If the folder holds no campaign that is complete, there is no such row, or it kills whoever flies it.
-    Exception
-        Whatever stands against the scenario.
+        If the folder holds no campaign that is complete, there is no such row, it kills whoever flies it, or something
+        stands against its scenario.
     """
     plan = read_plan(folder)
     if plan.get("kind") not in (SCENES, SWEEP):
         raise RunError(f"{folder}: holds a campaign of another version, expected one of this")
-    results = complete_results(folder)
+    with understood(folder / PLAN):
+        schema = SCHEMA if plan["kind"] == SCENES else schema_of(tuple(plan["vary"].keys()))
+    results = complete_results(folder, schema)
     stored = results.row(key)
     if stored is None:
-        first, last = results[results.schema.names[0]][[0, -1]]
-        raise RunError(f"{folder}: has no row {key}, expected one from {first} to {last}")
+        keys = results[schema.names[0]]
+        known = f"one from {keys[0]} to {keys[-1]}" if len(keys) else "a campaign that has rows"
+        raise RunError(f"{folder}: has no row {key}, expected {known}")
     if stored["refused"] == KILLED:
         raise RunError(f"{folder}: row {key} is not flown again: {KILLED}")
     try:
-        return (_of_sweep if plan["kind"] == SWEEP else _of_scene)(folder, plan, stored)
-    except (KeyError, TypeError) as error:
-        raise RunError(f"{folder}: the plan of the campaign cannot be read: {error!r}") from error
+        with understood(folder / PLAN):
+            return (_of_sweep if plan["kind"] == SWEEP else _of_scene)(folder, plan, stored)
+    except (CosimError, PlantFmuError, ControllerError) as error:
+        if str(folder) in str(error):
+            raise
+        raise RunError(f"{folder}: row {key}: {error}") from error
 
 
-def complete_results(folder: Path) -> Results:
+def complete_results(folder: Path, schema: Any) -> Results:
     """Return the rows of a campaign.
 
     Parameters
     ----------
     folder : Path
         Of the campaign.
+    schema : pyarrow.Schema
+        That they are to have.
 
     Returns
     -------
@@ -112,9 +123,14 @@ def complete_results(folder: Path) -> Results:
     RunError
         If it is not complete, or they cannot be read.
     """
+    require_complete(folder)
+    return Results(folder / RESULTS, schema)
+
+
+def require_complete(folder: Path) -> None:
+    """Raise `RunError` if a folder holds no campaign that is complete."""
     if not (folder / RESULTS).exists():
         raise RunError(f"{folder}: is not complete, expected a campaign that is; its own command goes on with it")
-    return Results(folder / RESULTS)
 
 
 def _of_sweep(folder: Path, plan: dict[str, Any], stored: dict[str, Any]) -> Repeat:

@@ -9,12 +9,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from cosim.campaigns.folder import read_json
 from cosim.campaigns.page import Html, link
 from cosim.campaigns.repeat import Repeat, repeat_of
 from cosim.errors import CosimError, RunError
 from cosim.flown_run import load_run
-from cosim.plain_json import json_text
+from cosim.plain_json import json_text, read_json
 from cosim.replay.page import REPLAY, write_page
 from cosim.replay.trace import trace_of
 from cosim.run import run_scenario

@@ -51,7 +51,8 @@ class Results:
 
     def __getitem__(self, name: str) -> Any:
         """Return a column, shape (rows,); NaN or None where there is nothing."""
-        return to_array(self._read([name])[name])
+        with self._readable():
+            return to_array(self._read([name])[name])
 
     def number(self, name: str, absent: float = np.nan) -> Array:
         """Return a column of numbers, shape (rows,), with `absent` where there is none."""
@@ -92,5 +93,5 @@ class Results:
     def _readable(self) -> Iterator[None]:
         try:
             yield
-        except (OSError, pa.ArrowException) as error:
-            raise RunError(f"{self.path}: cannot be read: {' '.join(str(error).split())}") from error
+        except (OSError, pa.ArrowException, UnicodeDecodeError) as error:
+            raise RunError(f"{self.path}: cannot be read: {error}") from error

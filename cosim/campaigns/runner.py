@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import logging
 import multiprocessing
-import sys
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor
 from dataclasses import dataclass
@@ -14,7 +13,6 @@ from typing import Any
 
 import numpy as np
 import pyarrow.compute as pc
-from tqdm import tqdm
 
 from cosim.campaigns.batches import Batches
 from cosim.campaigns.crews import Crew, Here, Lent, Processes
@@ -24,6 +22,7 @@ from cosim.campaigns.results import Results
 from cosim.campaigns.work import Task, Work
 from cosim.campaigns.worker import flyer_held
 from cosim.errors import RunError
+from cosim.progress import ProgressBar
 
 log = logging.getLogger(__name__)
 
@@ -110,11 +109,16 @@ def _flown(
 ) -> Iterator[Any]:
     """Yield the rows that are not in the folder yet, and say how it goes."""
     left = np.ones(len(work), dtype=bool)
-    left[work.rows_of(folder.keys())] = False
+    keys = folder.keys()
+    rows = work.rows_of(keys)
+    if (rows < 0).any():
+        key = keys[np.argmin(rows)]
+        raise RunError(f"{folder.path}: a part holds the {work.unit} {key}, which is not of this campaign")
+    left[rows] = False
     batches, n, refused = Batches(np.flatnonzero(left)), int(left.sum()), 0
     with (
         contextlib.closing(_crew(work.task, workers, executor) if n else Here()) as crew,
-        _bar(work, len(work) - n, progress) as bar,
+        _bar(work, len(work) - n, progress, crew) as bar,
         contextlib.closing(fly_all(work, batches, crew)) as tables,
     ):
         for table in tables:
@@ -142,9 +146,8 @@ def _tell(table: Any, before: int) -> int:
     return before + len(rows)
 
 
-def _bar(work: Work, done: int, progress: bool) -> Any:
-    return tqdm(
-        total=len(work), initial=done, desc=work.name, unit=work.unit,
-        disable=None if progress and sys.stderr else True,
+def _bar(work: Work, done: int, progress: bool, crew: Crew) -> ProgressBar:
+    return ProgressBar(
+        progress, compiling=crew.compiling, total=len(work), initial=done, desc=work.name, unit=work.unit,
         bar_format="{desc} {percentage:3.0f}%|{bar}| {n}/{total} [{elapsed}<{remaining}, {rate_fmt}]",
     )  # fmt: skip

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cosim.campaigns.results import Results
+from cosim.errors import RunError, ScenarioError
 from cosim.scene import Scene, decode_scene
 from cosim.signals import Array
 
@@ -51,12 +52,20 @@ def scene_kinds(results: Results) -> SceneKinds:
     -------
     SceneKinds
         In the order of the rows.
+
+    Raises
+    ------
+    RunError
+        If they cannot be read, or a line is no scene.
     """
     kinds: list[str] = []
     numbers: list[tuple[float, ...]] = []
     for lines in results.pieces("scene"):
         for line in lines:
-            scene = decode_scene(line.encode())
+            try:
+                scene = decode_scene(line.encode())
+            except ScenarioError as error:
+                raise RunError(f"{results.path}: scene: {error}") from error
             kinds.append(kind_of(scene))
             numbers.append(_numbers(scene))
     columns = np.array(numbers, dtype=float).reshape(-1, len(FEATURES)).T

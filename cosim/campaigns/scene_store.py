@@ -42,6 +42,8 @@ class SceneStore:
         self._file = tempfile.TemporaryFile()  # noqa: SIM115 -- closed by close
         try:
             if path == STANDARD_INPUT:
+                if sys.stdin is None:
+                    raise ScenarioError("standard input: is closed")
                 self._read(sys.stdin.buffer, "standard input")
             else:
                 with path.open("rb") as lines:

@@ -95,8 +95,9 @@ class SceneWork:
         return self._store.lines(self._seeds[rows].tolist())
 
     def rows_of(self, keys: Rows) -> Rows:
-        """Return the rows of some seeds."""
-        return np.searchsorted(self._seeds, keys)
+        """Return the rows of some seeds; -1 for one that has none."""
+        rows = np.minimum(np.searchsorted(self._seeds, keys), len(self._seeds) - 1)
+        return np.where(self._seeds[rows] == keys, rows, -1)
 
     def refused(self, row: int, reason: str) -> Any:
         """Return the table of one scene that could not be flown."""

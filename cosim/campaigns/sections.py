@@ -12,15 +12,27 @@ from cosim.campaigns.statistics import QUANTILES
 from cosim.campaigns.worst import ORDER, Worst, rerun_command
 
 LABELS = {  # of columns: what they are called, with unit
+    "reached": "reached the goal",
+    "settled": "settled there",
+    "violated": "violated a hard region",
     "reach_time": "reach time [s]",
     "settle_time": "settle time [s]",
     "min_clearance": "least clearance [m]",
+    "closest_to_goal": "least distance to the goal [m]",
     "effort": "effort [N s]",
     "thrust_variation": "thrust variation [N]",
     "max_force": "greatest force [N]",
     "max_speed": "greatest speed [m/s]",
+    "final_x": "position x at the end [m]",
+    "final_y": "position y at the end [m]",
+    "final_z": "position z at the end [m]",
+    "phi1": "estimate of φ1 at the end [N]",
+    "phi2": "estimate of φ2 at the end [N m]",
+    "phi3": "estimate of φ3 at the end [N m]",
+    "phi4": "estimate of φ4 at the end [N m]",
+    "stopped_at": "stopped by the plant at [s]",
 }
-_WORDS = {"violation": "violated a region", "violated": "violated a hard region"}
+_WORDS = {"violation": "violated a region", "violated": LABELS["violated"]}
 
 
 class Group(NamedTuple):

@@ -1,10 +1,11 @@
-"""Numbers that pages and summaries have in common: rates with intervals, quantiles, bins, paired differences.
+"""Numbers that pages and summaries have in common: rates with intervals, quantiles, bins, effects, paired differences.
 
 SciPy's statistics take as long to import as all else that a worker needs, and no worker needs them.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from typing import Any, NamedTuple
 
@@ -17,7 +18,10 @@ Facts = NDArray[np.bool_]
 
 CONFIDENCE = 0.95
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
+CHANCE = 0.01  # how often chance alone makes an effect or a rank correlation that is told
 _BINS = 6  # at the most; fewer distinct values have one each
+_LEAST_ROWS = 16  # of which an effect is told: two bins of eight
+_ROUNDING = 1e-14  # of a number, within which an outcome is constant
 
 
 def rate(happened: Facts) -> dict[str, Any]:
@@ -82,16 +86,61 @@ def bins(values: Array) -> Iterator[Bin]:
     Bin
         From low to high; none is empty.
     """
-    distinct = np.unique(values)
-    if len(distinct) <= _BINS:
-        of = np.searchsorted(distinct, values)
-    else:
-        edges = np.unique(np.quantile(values, np.linspace(0.0, 1.0, _BINS + 1)[1:-1]))
-        of = np.searchsorted(edges, values, side="left")
+    of = _bin_numbers(values, _BINS)
     for i in np.unique(of):
         rows = of == i
         own = values[rows]
         yield Bin(float(own.min()), float(own.max()), float(np.median(own)), rows)
+
+
+def _bin_numbers(values: Array, most: int) -> NDArray[np.int64]:
+    """Return the bin of each value, counted from 0, of so many bins at the most."""
+    distinct = np.unique(values)
+    if len(distinct) <= most:
+        return np.searchsorted(distinct, values)
+    edges = np.unique(np.quantile(values, np.linspace(0.0, 1.0, most + 1)[1:-1]))
+    return np.searchsorted(edges, values, side="left")
+
+
+def effect(values: Array, outcome: Array) -> dict[str, float] | None:
+    """Estimate the share of an outcome's variance that goes with a key alone: its first-order Sobol' index.
+
+    It sees a dependence of any form, also one that goes up and down again, of which no correlation tells. The outcome
+    is fitted by a line in each of some bins of the key, or by its mean at each value where the key has few; the
+    estimate is the share that the fit explains, less what chance adds to it (adjusted R²; of means: Kelley's ε²).
+
+    Parameters
+    ----------
+    values : ndarray, shape (n,)
+        Of the key, finite. Keys vary independently of each other.
+    outcome : ndarray, shape (n,)
+        Finite, or 0 and 1.
+
+    Returns
+    -------
+    dict of str to float, or None
+        ``share``, up to 1, and a little below 0 by chance; ``floor``, above which chance alone brings it in a
+        hundredth of all cells (F test). None where key or outcome is constant, or rows are too few.
+    """
+    n = len(values)
+    if n < _LEAST_ROWS or np.ptp(values) == 0.0 or np.ptp(outcome) <= _ROUNDING * np.abs(outcome).max():
+        return None
+    few = len(np.unique(values)) <= math.isqrt(n)
+    of = _bin_numbers(values, math.isqrt(n) // (1 if few else 2))
+    y = outcome - outcome.mean()
+    rows = np.maximum(np.bincount(of), 1)
+    explained, terms = np.sum(np.bincount(of, y) ** 2 / rows), np.count_nonzero(np.bincount(of))
+    if not few:
+        x = values - (np.bincount(of, values) / rows)[of]
+        spread = np.bincount(of, x * x)
+        sloped = spread > 0.0
+        explained += np.sum(np.bincount(of, x * y)[sloped] ** 2 / spread[sloped])
+        terms += np.count_nonzero(sloped)
+    from scipy.stats import beta
+
+    chance = beta.ppf(1.0 - CHANCE, (terms - 1) / 2.0, (n - terms) / 2.0)
+    share, floor = (1.0 - (1.0 - of_all) * (n - 1) / (n - terms) for of_all in (explained / (y @ y), chance))
+    return {"share": float(share), "floor": float(floor)}
 
 
 def paired(one: Facts, other: Facts) -> dict[str, Any]:

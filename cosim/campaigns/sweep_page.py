@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cosim.campaigns.folder import PLAN, RESULTS, SUMMARY, held, read_json
+from cosim.campaigns.folder import PLAN, RESULTS, SUMMARY, held
 from cosim.campaigns.page import Html, Page, code, interval, number, write_figures
 from cosim.campaigns.plan import SWEEP
-from cosim.campaigns.repeat import complete_results
+from cosim.campaigns.repeat import complete_results, require_complete
 from cosim.campaigns.replays import Replay, replay_of
 from cosim.campaigns.results import Results
 from cosim.campaigns.sections import (
@@ -23,18 +23,21 @@ from cosim.campaigns.sections import (
     refused_section,
     worst_section,
 )
+from cosim.campaigns.statistics import CHANCE
+from cosim.campaigns.sweep_rows import schema_of
 from cosim.campaigns.sweep_summary import FACTS
 from cosim.campaigns.worst import LISTED, Worst, worst_rows
 from cosim.errors import RunError
 from cosim.flown_run import SCENARIO
 from cosim.flying.outcome import FIELDS
+from cosim.plain_json import read_json, understood
 from cosim.whole_file import write_whole
 
 if TYPE_CHECKING:
     from cosim.drawing import Drawing
 
 PAGE = "sweep.html"
-_TOLD = 0.1  # rank correlations that are worth a place in the table
+_TOLD_SHARE, _TOLD_RHO = 0.01, 0.1  # effects and rank correlations that are worth a place in the table
 
 
 def write_sweep_page(folder: Path, replays: int) -> Path:
@@ -59,15 +62,19 @@ def write_sweep_page(folder: Path, replays: int) -> Path:
     KeyboardInterrupt
         After Ctrl-C; the page is there, without the replays.
     """
-    results, summary = complete_results(folder), read_json(folder / SUMMARY)
-    if summary.get("kind") != SWEEP:
-        raise RunError(f"{folder}: holds no sweep")
+    require_complete(folder)
+    summary = read_json(folder / SUMMARY)
+    if summary.get("kind") != SWEEP or not isinstance(summary.get("vary"), dict):
+        raise RunError(f"{folder / SUMMARY}: holds no sweep")
+    results = complete_results(folder, schema_of(tuple(summary["vary"])))
     with held(folder):
         worst = worst_rows(results, max(LISTED, replays))
-        figures = write_figures(folder, _drawings(results, summary) if worst else [])
+        with understood(folder / SUMMARY):
+            figures = write_figures(folder, _drawings(results, summary) if worst else [])
 
         def write(shown: Mapping[int, Replay]) -> None:
-            write_whole(folder / PAGE, _page(folder, summary, worst, figures, shown).html())
+            with understood(folder / SUMMARY):
+                write_whole(folder / PAGE, _page(folder, summary, worst, figures, shown).html())
 
         write({})
         of = f"of the sweep of {summary['name']}"
@@ -112,7 +119,7 @@ def _drawings(results: Results, s: dict[str, Any]) -> Iterator[Drawing]:
     yield from distributions(columns, "What never comes leaves a curve below 100 %.")
 
     keys = [
-        Key(name, column, bool(s["vary"][name].get("log")))
+        Key(s["words"][name], column, bool(s["vary"][name].get("log")))
         for name in _by_weight(s)
         if np.ptp(column := results.number(name)[flown]) > 0.0
     ]
@@ -140,7 +147,7 @@ def _by_weight(s: dict[str, Any]) -> list[str]:
     outcomes = ("reached", "violated", "min_clearance", "reach_time")
 
     def weight(key: str) -> float:
-        return max(abs(of["rho"]) if (of := s["rank_correlations"][key][name]) else 0.0 for name in outcomes)
+        return max(of["share"] if (of := s["effects"][key][name]) else 0.0 for name in outcomes)
 
     return sorted(s["vary"], key=lambda key: -weight(key))
 
@@ -150,7 +157,11 @@ def _page(
 ) -> Page:
     page = Page(f"{s['name']}: a sweep of {s['rows']} row{'s' if s['rows'] > 1 else ''}")
     page.verdict(_verdict(s))
-    page.table(["what varies", "values"], [[code(key), _range(vary)] for key, vary in s["vary"].items()])
+    page.table(
+        ["what varies", "key", "values"],
+        [[s["words"][key], code(key), _range(vary)] for key, vary in s["vary"].items()],
+    )
+    page.paragraph(f"Scenario: {s['title']}, but for what varies.", faint=True)
     page.paragraph(f"Design {s['design']}, seed {s['seed']}, engine {s['engine']}.", faint=True)
     if worst:
         group = Group("all", s["flown"], {fact: s[fact] for fact in FACTS}, s["quantiles"])
@@ -164,7 +175,7 @@ def _page(
         page.heading("Which key matters for what")
         for name in ("depends", "by-min-clearance", "by-reach-time"):
             page.add(figures.get(name, Html("")))
-        _correlations(page, s)
+        _effects(page, s)
         worst_section(page, folder, "row", worst, shown, {})
     refused_section(page, "row", s["refused"], s["reasons"])
     page.heading("What it rests on")
@@ -190,25 +201,42 @@ def _verdict(s: dict[str, Any]) -> str:
     return text + (f" {s['refused']} were refused." if s["refused"] else "")
 
 
-def _correlations(page: Page, s: dict[str, Any]) -> None:
-    outcomes = [name for name in FIELDS if any(_strong(of[name]) for of in s["rank_correlations"].values())]
-    if not outcomes:
-        page.paragraph("No outcome goes up or down with a key alone.")
+def _effects(page: Page, s: dict[str, Any]) -> None:
+    """Add how much of each outcome goes with each key alone, and whether up or down."""
+    keys, rows = list(s["vary"]), []
+    for name in FIELDS:
+        effects = [s["effects"][key][name] for key in keys]
+        cells = [_effect(of, s["rank_correlations"][key][name]) for key, of in zip(keys, effects, strict=True)]
+        if any(cells):
+            floors = [of["floor"] for of in effects if of]
+            rows.append([LABELS[name], *cells, _percent(max(floors)) if floors else "–"])
+    if not rows:
+        page.paragraph("No outcome depends on a key alone by more than chance.")
         return
-    page.table(
-        ["", *s["rank_correlations"]],
-        [
-            [
-                name,
-                *(f"{of[name]['rho']:+.2f}" if _strong(of[name]) else "" for of in s["rank_correlations"].values()),
-            ]
-            for name in outcomes
-        ],
+    page.table(["", *(s["words"][key] for key in keys), "chance reaches"], rows)
+    page.paragraph(
+        "In percent: the share of an outcome's variance that goes with a key alone, whether up, down or both (its "
+        "first-order Sobol' index, estimated by a line in each bin of the key). The rest goes with several keys "
+        "together, or with what is random. The last column is what chance reaches in one cell of a hundred; shares "
+        "below it are left out. ρ: rank correlation by Spearman, above 0 where the outcome goes up with the key; left "
+        f"out within {number(_TOLD_RHO)} of 0, and where chance gives as much in one cell of a hundred. All are in "
+        "summary.json.",
+        faint=True,
     )
-    told = (
-        f"Rank correlations by Spearman; those within {number(_TOLD)} of 0 are left out here, all are in summary.json."
-    )
-    page.paragraph(told, faint=True)
+
+
+def _effect(effect: dict[str, float] | None, correlation: dict[str, float] | None) -> str:
+    """Return what a cell says of a key and an outcome, nothing where chance may have brought it about."""
+    told = []
+    if effect is not None and effect["share"] >= max(effect["floor"], _TOLD_SHARE):
+        told.append(_percent(effect["share"]))
+    if correlation is not None and abs(correlation["rho"]) >= _TOLD_RHO and correlation["p"] < CHANCE:
+        told.append(f"ρ\N{NO-BREAK SPACE}{correlation['rho']:+.2f}".replace("-", "−"))
+    return ", ".join(told)
+
+
+def _percent(share: float) -> str:
+    return f"{100.0 * share:.0f} %"
 
 
 def _range(vary: dict[str, Any]) -> str:
@@ -216,7 +244,3 @@ def _range(vary: dict[str, Any]) -> str:
         return ", ".join(f"{x:g}" for x in vary["values"])
     points = f", {vary['points']} points" if "points" in vary else ""
     return f"{vary['low']:g} to {vary['high']:g}{points}{', logarithmic' if vary['log'] else ''}"
-
-
-def _strong(correlation: dict[str, float] | None) -> bool:
-    return correlation is not None and abs(correlation["rho"]) >= _TOLD

@@ -190,8 +190,8 @@ class SweepWork:
         return SweepBatch(rows, self.design.values(rows), self.design.seeds(rows))
 
     def rows_of(self, keys: Rows) -> Rows:
-        """Return the rows of some keys, which are their numbers."""
-        return keys
+        """Return the rows of some keys, which are their numbers; -1 for one that has none."""
+        return np.where((keys >= 0) & (keys < len(self)), keys, -1)
 
     def refused(self, row: int, reason: str) -> Any:
         """Return the table of one row that could not be flown."""

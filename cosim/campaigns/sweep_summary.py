@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from cosim.campaigns.results import Results
-from cosim.campaigns.statistics import Facts, quantiles, rate
+from cosim.campaigns.statistics import Facts, effect, quantiles, rate
 from cosim.campaigns.sweep_rows import SweepWork
 from cosim.campaigns.worst import worst_table
 from cosim.flying.outcome import FIELDS
+from cosim.scenario_words import key_name
 from cosim.signals import Array
 
 FACTS = ("reached", "settled", "violated")  # whose rates are told
@@ -35,13 +37,15 @@ def summarise_sweep(work: SweepWork, results: Results, folder: Path) -> dict[str
     -------
     dict
         Ready for JSON: counts, and why the first rows were refused; rates with 95 % intervals by Wilson, of the rows
-        that were flown; quantiles (None where there is nothing); the worst rows; rank correlations by Spearman of
-        every key with every outcome, None where either is constant; and the plan.
+        that were flown; quantiles (None where there is nothing); the worst rows; of every key with every outcome
+        the `effect`, and the rank correlation by Spearman, None where either is constant; and the plan.
         Units as in the columns of the results.
     """
-    flown = results.absent("refused")
+    flown, base = results.absent("refused"), work.variation.base
     return {
         "name": work.name,
+        "title": base.title,
+        "words": {key: key_name(key, base.table, base.vehicle).label for key in work.variation.keys},
         "rows": len(results),
         "flown": int(flown.sum()),
         "refused": int((~flown).sum()),
@@ -50,7 +54,8 @@ def summarise_sweep(work: SweepWork, results: Results, folder: Path) -> dict[str
         **{name: rate(results.fact(name)[flown]) for name in FACTS},
         "quantiles": {name: quantiles(results.number(name)) for name in SPREADS},
         "worst": worst_table(results, folder),
-        "rank_correlations": _correlations(work, results, flown),
+        "effects": _of_keys(work, results, flown, effect),
+        "rank_correlations": _of_keys(work, results, flown, _rank_correlation),
         **{key: value for key, value in work.plan.items() if key != "name"},
     }
 
@@ -61,17 +66,20 @@ def _reasons(results: Results, flown: Facts) -> dict[str, str]:
     return {str(row): str(why) for row, why in zip(results["row"][first], results["refused"][first], strict=True)}
 
 
-def _correlations(work: SweepWork, results: Results, flown: Facts) -> dict[str, dict[str, Any]]:
+def _of_keys(
+    work: SweepWork,
+    results: Results,
+    flown: Facts,
+    measure: Callable[[Array, Array], dict[str, float] | None],
+) -> dict[str, dict[str, Any]]:
+    """Return a measure of each key with each outcome, over those rows that were flown and have a finite number."""
     keys = {key: results.number(key) for key in work.variation.keys}
     found: dict[str, dict[str, Any]] = {key: {} for key in keys}
     for name, (kind, _, _) in FIELDS.items():
-        if kind is np.bool_:
-            outcome, there = results.fact(name).astype(float), flown
-        else:
-            outcome = results.number(name)
-            there = ~np.isnan(outcome)
+        outcome = results.fact(name).astype(float) if kind is np.bool_ else results.number(name)
+        there = flown & np.isfinite(outcome)
         for key, values in keys.items():
-            found[key][name] = _rank_correlation(values[there], outcome[there])
+            found[key][name] = measure(values[there], outcome[there])
     return found
 
 

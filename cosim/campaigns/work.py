@@ -64,7 +64,7 @@ class Work(Protocol):
         """Return what a flyer needs to fly some rows; it can be pickled."""
 
     def rows_of(self, keys: Rows) -> Rows:
-        """Return the rows that have some keys."""
+        """Return the rows that have some keys; -1 for a key that no row has."""
 
     def refused(self, row: int, reason: str) -> Any:
         """Return the table of one row that could not be flown."""

@@ -6,6 +6,8 @@ import argparse
 import time
 from typing import Any
 
+from cosim.command_line.results import say
+
 
 def add_verb(verbs: Any) -> None:
     """Add the verb to the command line."""
@@ -22,7 +24,7 @@ def compile_all(options: argparse.Namespace) -> int:
     for name, scenario, overrides in [(name, name, []) for name in options.scenario] or _laws():
         started = time.perf_counter()
         compile_ahead(scenario, overrides)
-        print(f"{name}: {time.perf_counter() - started:.1f} s", flush=True)
+        say(options, f"{name}: {time.perf_counter() - started:.1f} s")
     return 0
 
 

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import argparse
-import contextlib
-import signal
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-INTERRUPTED = 130  # exit code after Ctrl-C
+from cosim.command_line.numbers import whole
+from cosim.command_line.process import INTERRUPTED, tell
+from cosim.command_line.results import say
+
+WORKERS = whole(1, 1024)
 
 
 def add_verbs(verbs: Any) -> None:
@@ -44,7 +45,7 @@ def _add_scenes(verb: argparse.ArgumentParser) -> None:
         "--out", type=Path, required=True, metavar="DIR",
         help="a new folder, or one that this command began: it goes on with what is left",
     )  # fmt: skip
-    verb.add_argument("--workers", type=workers, default=1, metavar="N", help="processes (default: 1)")
+    verb.add_argument("--workers", type=WORKERS, default=1, metavar="N", help="processes (default: 1)")
     add_replays(verb)
     verb.add_argument("--tell-failures", action="store_true", help="tell the law which thruster fails, and when")
 
@@ -52,22 +53,9 @@ def _add_scenes(verb: argparse.ArgumentParser) -> None:
 def add_replays(verb: argparse.ArgumentParser) -> None:
     """Add the flag that says how many of the worst are shown."""
     verb.add_argument(
-        "--replays", type=_replays, default=3, metavar="N",
+        "--replays", type=whole(0, 1000), default=3, metavar="N",
         help="the worst that are flown again to be seen in the browser (default: 3; of each law that is compared)",
     )  # fmt: skip
-
-
-def _replays(text: str) -> int:
-    if not (text.isdecimal() and int(text) <= 1000):
-        raise argparse.ArgumentTypeError(f"{text!r}: expected a whole number from 0 to 1000")
-    return int(text)
-
-
-def workers(text: str) -> int:
-    """Return a number of workers from its text."""
-    if not (text.isdecimal() and 1 <= int(text) <= 1024):
-        raise argparse.ArgumentTypeError(f"{text!r}: expected a whole number from 1 to 1024")
-    return int(text)
 
 
 def campaign(options: argparse.Namespace) -> int:
@@ -81,11 +69,12 @@ def campaign(options: argparse.Namespace) -> int:
     conditions = Conditions(tell_failures=options.tell_failures)
 
     def run() -> None:
-        done = run_campaign(options.scenes, options.law, options.out, conditions, gains, options.workers, progress=True)
+        done = run_campaign(
+            options.scenes, options.law, options.out, conditions, gains, options.workers, progress=not options.quiet
+        )
         if not done.flown:
-            print(f"{options.out}: was complete already")
-        for line in campaign_lines(done.summary):
-            print(line)
+            say(options, f"{options.out}: was complete already")
+        say(options, *campaign_lines(done.summary))
         print(write_campaign_page(options.out, options.replays))
 
     return resumable(run, options.out)
@@ -103,16 +92,18 @@ def compare(options: argparse.Namespace) -> int:
     conditions = Conditions(tell_failures=options.tell_failures)
 
     def run() -> None:
-        done = compare_laws(options.scenes, laws, options.out, conditions, gains, options.workers, progress=True)
+        done = compare_laws(
+            options.scenes, laws, options.out, conditions, gains, options.workers, progress=not options.quiet
+        )
         for law, s in done.numbers["laws"].items():
-            print(f"{law}: {s['reached']} of {s['scenes']} scenes reached, {s['violations']} with a violation")
+            say(options, f"{law}: {s['reached']} of {s['scenes']} scenes reached, {s['violations']} with a violation")
         print(write_comparison_page(options.out, options.replays))
 
     return resumable(run, options.out)
 
 
 def resumable(run: Callable[[], None], out: Path) -> int:
-    """Run, and say after Ctrl-C, or a polite kill, that what is done is kept.
+    """Run, and say after Ctrl-C or a kill that what is done is kept.
 
     Parameters
     ----------
@@ -126,11 +117,9 @@ def resumable(run: Callable[[], None], out: Path) -> int:
     int
         Exit code.
     """
-    with contextlib.suppress(ValueError):  # which signal raises outside the main thread
-        signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
         run()
     except KeyboardInterrupt:
-        print(f"cosim: interrupted; what is flown is kept in {out}, and the same command goes on", file=sys.stderr)
+        tell(f"interrupted; what is flown is kept in {out}, and the same command goes on")
         return INTERRUPTED
     return 0

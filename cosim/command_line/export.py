@@ -6,6 +6,8 @@ import argparse
 from pathlib import Path
 from typing import Any
 
+from cosim.command_line.numbers import number, whole
+
 
 def add_verb(verbs: Any) -> None:
     """Add the verb to the parser.
@@ -24,29 +26,15 @@ def add_verb(verbs: Any) -> None:
     )  # fmt: skip
     export.add_argument("--out", type=Path, metavar="FILE", help="file to write (default: RUN.FORMAT here)")
     thinned = export.add_mutually_exclusive_group()
-    thinned.add_argument("--every", type=_whole, default=1, metavar="N", help="one step of so many (default: all)")
-    thinned.add_argument("--rate", type=_positive, metavar="HZ", help="steps a simulated second, in its place")
+    thinned.add_argument(
+        "--every", type=whole(1, 10**9), default=1, metavar="N", help="one step of so many (default: all)"
+    )
+    thinned.add_argument("--rate", type=number(1e-9, 1e9), metavar="HZ", help="steps a simulated second, in its place")
     export.add_argument(
         "--signals", nargs="+", action="extend", default=[], metavar="GLOB",
         help="names or patterns such as 'position.*' '*.clearance' (default: all); the time is always there",
     )  # fmt: skip
     export.add_argument("--force", action="store_true", help="replace a file that exists")
-
-
-def _whole(text: str) -> int:
-    if not (text.isascii() and text.isdecimal() and 0 < int(text) <= 10**9):
-        raise argparse.ArgumentTypeError(f"{text!r}: expected a whole number above 0")
-    return int(text)
-
-
-def _positive(text: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = 0.0
-    if not 1e-9 <= value <= 1e9:
-        raise argparse.ArgumentTypeError(f"{text!r}: expected a number above 0")
-    return value
 
 
 def export(options: argparse.Namespace) -> int:

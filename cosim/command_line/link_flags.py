@@ -7,6 +7,7 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from cosim.command_line.numbers import number, whole
 from cosim.errors import TelemetryError
 from cosim.mavlink.options import LOSS_ACTIONS, PROFILES, MavlinkOptions
 
@@ -14,6 +15,7 @@ if TYPE_CHECKING:
     from cosim.mavlink.endpoint import Endpoint
 
 _GREATEST_TIMEOUT = 3600.0  # s
+_SYSTEM = whole(1, 255)
 
 
 def add_link_flags(parser: argparse.ArgumentParser, commands: bool = False, required: bool = False) -> None:
@@ -47,7 +49,7 @@ def add_link_flags(parser: argparse.ArgumentParser, commands: bool = False, requ
         "--allow-system", type=_systems, metavar="ID[,ID]", help="heed these system ids alone (default: all)"
     )
     parser.add_argument(
-        "--system-id", type=_system, default=usual.system_id, metavar="N",
+        "--system-id", type=_SYSTEM, default=usual.system_id, metavar="N",
         help=f"of the vehicle (default: {usual.system_id})",
     )  # fmt: skip
     parser.add_argument(
@@ -68,7 +70,7 @@ def _add_command_flags(parser: argparse.ArgumentParser, usual: MavlinkOptions) -
         help=f"what to do when the ground station that commands falls silent (default: {usual.loss_action})",
     )  # fmt: skip
     parser.add_argument(
-        "--link-timeout", type=_timeout, metavar="S",
+        "--link-timeout", type=number(0.1, _GREATEST_TIMEOUT), metavar="S",
         help=f"seconds of the wall clock that count as silence (default: {usual.loss_timeout:g})",
     )  # fmt: skip
 
@@ -113,14 +115,8 @@ def links_from(options: argparse.Namespace) -> tuple[list[Endpoint], MavlinkOpti
     )
 
 
-def _system(text: str) -> int:
-    if not (text.isdecimal() and 1 <= int(text) <= 255):
-        raise argparse.ArgumentTypeError(f"{text!r}: expected a whole number from 1 to 255")
-    return int(text)
-
-
 def _systems(text: str) -> frozenset[int]:
-    return frozenset(_system(part.strip()) for part in text.split(","))
+    return frozenset(_SYSTEM(part.strip()) for part in text.split(","))
 
 
 def _origin(text: str) -> tuple[float, float]:
@@ -131,13 +127,3 @@ def _origin(text: str) -> tuple[float, float]:
     if not (abs(latitude) <= 90.0 and abs(longitude) <= 180.0):
         raise argparse.ArgumentTypeError(f"{text!r}: expected degrees of latitude and longitude, such as 55.9,-3.3")
     return latitude, longitude
-
-
-def _timeout(text: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = 0.0
-    if not 0.1 <= value <= _GREATEST_TIMEOUT:
-        raise argparse.ArgumentTypeError(f"{text!r}: expected seconds from 0.1 to {_GREATEST_TIMEOUT:g}")
-    return value

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import math
 import shutil
-import signal
 import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from cosim.command_line.link_flags import add_link_flags, links_from
+from cosim.command_line.numbers import number, rate, whole
+from cosim.command_line.process import tell
+from cosim.command_line.results import say
 from cosim.mavlink.options import PROFILES
 
 _REDRAW, _SNAPSHOT = 0.25, 1.0  # s
@@ -31,14 +34,14 @@ def add_verbs(verbs: Any) -> None:
     listen = verbs.add_parser("listen", help="show any vehicle's MAVLink telemetry as a live table")
     _add_ground(listen, "such as udpin:127.0.0.1:14550 or tcp:127.0.0.1:5760", None)
     listen.add_argument("--once", action="store_true", help=f"print one picture, after {_ONCE:g} s, and end")
-    listen.add_argument("--seconds", type=_positive, metavar="S", help="end after so many seconds")
-    listen.add_argument("--count", type=_whole, metavar="N", help="end after so many messages")
+    listen.add_argument("--seconds", type=number(1e-9, 1e9), metavar="S", help="end after so many seconds")
+    listen.add_argument("--count", type=whole(1, 10**12), metavar="N", help="end after so many messages")
 
     stream = verbs.add_parser("stream", help="be a recorded run's vehicle on MAVLink links, or write it as a .tlog")
     stream.add_argument("folder", type=Path, metavar="RUN", help="the run folder")
     add_link_flags(stream, required=True)
     stream.add_argument(
-        "--rate", type=_rate, default=1.0, metavar="N|max", help="simulated seconds a second (default: 1)"
+        "--rate", type=rate, default=1.0, metavar="N|max", help="simulated seconds a second (default: 1)"
     )
 
     check = verbs.add_parser(
@@ -60,23 +63,6 @@ def _add_ground(verb: argparse.ArgumentParser, where: str, number: str | None) -
     verb.add_argument(
         "--signing-key", type=Path, metavar="FILE", help="sign with the key in this file, and hear nothing else"
     )
-
-
-def _positive(text: str) -> float:
-    with contextlib.suppress(ValueError):
-        if 0.0 < (value := float(text)) <= 1e9:
-            return value
-    raise argparse.ArgumentTypeError(f"{text!r}: expected a number above 0")
-
-
-def _whole(text: str) -> int:
-    if not (text.isdecimal() and 0 < int(text) <= 10**12):
-        raise argparse.ArgumentTypeError(f"{text!r}: expected a whole number above 0")
-    return int(text)
-
-
-def _rate(text: str) -> float | None:
-    return None if text == "max" else _positive(text)
 
 
 def _ground_link(options: argparse.Namespace) -> Any:
@@ -102,7 +88,7 @@ def listen(options: argparse.Namespace) -> int:
     live = sys.stdout.isatty() and not options.once
     seconds = options.seconds or (_ONCE if options.once else None)
     period = _REDRAW if live else max(_SNAPSHOT, (seconds or 0.0) + 1.0 if options.once else 0.0)
-    with _ground_link(options) as link, _ending_by_kill(), _screen(live) as show:
+    with _ground_link(options) as link, _screen(live) as show:
         for now in follow(link, watch, period, seconds, options.count):
             size = shutil.get_terminal_size((_WIDE, 24))
             show(picture(link, watch, now, size.columns, size.lines) if live else picture(link, watch, now, _WIDE))
@@ -132,14 +118,6 @@ def _redraw(lines: Sequence[str]) -> None:
     sys.stdout.flush()
 
 
-@contextlib.contextmanager
-def _ending_by_kill() -> Any:
-    """Let a polite kill end what is done as Ctrl-C does."""
-    with contextlib.suppress(ValueError):  # which signal raises outside the main thread
-        signal.signal(signal.SIGTERM, signal.default_int_handler)
-    yield
-
-
 # ---- stream --------------------------------------------------------------------------------------------------------
 
 
@@ -148,11 +126,10 @@ def stream(options: argparse.Namespace) -> int:
     from cosim.mavlink.replay import replay
 
     endpoints, mavlink = links_from(options)
-    with _ending_by_kill():
-        done = replay(options.folder, endpoints, mavlink, options.rate)
-    print(f"{options.folder}: {done.simulated:.1f} s streamed in {done.wall:.1f} s")
+    done = replay(options.folder, endpoints, mavlink, None if options.rate == math.inf else options.rate)
+    say(options, f"{options.folder}: {done.simulated:.1f} s streamed in {done.wall:.1f} s")
     for trouble in done.troubles:
-        print(f"cosim: {trouble}", file=sys.stderr)
+        tell(trouble)
     return 0
 
 

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import argparse
-import sys
 from pathlib import Path
 from typing import Any
+
+from cosim.command_line.process import FAULT, tell
+from cosim.command_line.results import say
 
 _FORMATS = ("html", "pdf", "png")
 
@@ -49,9 +51,9 @@ def report(options: argparse.Namespace) -> int:
         try:
             summary, files = report_again(folder, formats)
         except (CosimError, ControllerError, PlantFmuError) as error:
-            print(f"cosim: {error}", file=sys.stderr)
+            tell(str(error))
             bad += 1
             continue
-        print(verdict(summary))
-        print(files[0])
-    return 2 if bad else 0
+        say(options, verdict(summary))
+        print(*files, sep="\n")
+    return FAULT if bad else 0

@@ -4,20 +4,20 @@ from __future__ import annotations
 
 import argparse
 import contextlib
-import signal
-import sys
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from cosim.command_line.campaigns import INTERRUPTED
 from cosim.command_line.link_flags import add_link_flags, links_from
+from cosim.command_line.numbers import rate
+from cosim.command_line.process import INTERRUPTED, tell
+from cosim.command_line.results import print_run
 from cosim.errors import TelemetryError
 from cosim.live.address import HOST, PORT, parse_live
 
 if TYPE_CHECKING:
     from cosim.mavlink.setup import Mavlink
-
-_MAX = 0.0  # as fast as it goes
+    from cosim.run import Run
 
 
 def add_verb(verbs: Any) -> None:
@@ -36,9 +36,10 @@ def add_verb(verbs: Any) -> None:
         help="change a key of the scenario, such as law.gains.k_p1=10 or regions.SR1.shape.radius=0.7; may be repeated",
     )  # fmt: skip
     run.add_argument(
-        "--rate", type=_rate, metavar="N|max",
+        "--rate", type=rate, metavar="N|max",
         help="simulated seconds a second at the most (default: 1 with --commands or --live, else max)",
     )  # fmt: skip
+    run.add_argument("--json", action="store_true", help="print what it came to, and its files, as JSON")
     run.add_argument("--no-report", action="store_true", help="leave out the report, its figures and the replay")
     run.add_argument(
         "--orders", type=Path, metavar="FILE",
@@ -52,22 +53,8 @@ def add_verb(verbs: Any) -> None:
     add_link_flags(run, commands=True)
 
 
-def _rate(text: str) -> float:
-    if text == "max":
-        return _MAX
-    try:
-        value = float(text)
-    except ValueError:
-        value = 0.0
-    if not 1e-3 <= value <= 1e6:
-        raise argparse.ArgumentTypeError(f"{text!r}: expected a number from 0.001 to 1e6, or max")
-    return value
-
-
 def run(options: argparse.Namespace) -> int:
     """Run ``cosim run``."""
-    from cosim.replay.page import REPLAY
-    from cosim.report_words import verdict
     from cosim.run import run_scenario
     from cosim.scenario import load_scenario
 
@@ -81,26 +68,35 @@ def run(options: argparse.Namespace) -> int:
     address = None if options.live is None else parse_live(options.live, options.allow_remote)
     mavlink = _mavlink(options)
     scenario = load_scenario(options.scenario, overrides)
-    rate = options.rate if options.rate is not None else 1.0 if options.commands or address else _MAX
-    # a polite kill leaves a readable run too
-    with contextlib.suppress(ValueError):  # which signal raises outside the main thread
-        signal.signal(signal.SIGTERM, signal.default_int_handler)
+    usual = 1.0 if options.commands or address else math.inf
+    most = usual if options.rate is None else options.rate
     with contextlib.ExitStack() as stack:
         live = None
         if address is not None:
             from cosim.live.view import LiveView
 
             live = stack.enter_context(LiveView(address))
-            print(f"cosim: the run is shown at {live.url}", file=sys.stderr)
+            tell(f"the run is shown at {live.url}")
         done = run_scenario(
-            scenario, options.out, mavlink, rate or None, progress=True, report=not options.no_report,
-            orders=options.orders, live=live,
+            scenario, options.out, mavlink, None if most == math.inf else most,
+            progress=not options.quiet,
+            report=not options.no_report, orders=options.orders, live=live,
         )  # fmt: skip
-    print(verdict(done.summary))
-    print(done.folder / ("summary.json" if options.no_report else "report.html"))
-    if not options.no_report:
-        print(done.folder / REPLAY)
+    if options.json:
+        print(_json(done), end="")
+    else:
+        print_run(options, done, not options.no_report)
     return INTERRUPTED if done.summary["status"] == "interrupted" else 0
+
+
+def _json(run: Run) -> str:
+    from cosim.plain_json import json_text
+    from cosim.report_words import verdict
+
+    files = {what: str(path) for what, path in run.files().items()}
+    return json_text(
+        {"folder": str(run.folder), "files": files, "verdict": verdict(run.summary), "summary": run.summary}
+    )
 
 
 def _mavlink(options: argparse.Namespace) -> Mavlink | None:

@@ -5,12 +5,12 @@ from __future__ import annotations
 import argparse
 import contextlib
 import os
-import signal
-import sys
 from pathlib import Path
 from typing import Any
 
-from cosim.command_line.campaigns import INTERRUPTED, add_replays, resumable, workers
+from cosim.command_line.campaigns import WORKERS, add_replays, resumable
+from cosim.command_line.process import INTERRUPTED, tell
+from cosim.command_line.results import print_run, say
 from cosim.errors import RunError
 
 _EPILOG = """examples:
@@ -51,7 +51,7 @@ def add_verbs(verbs: Any) -> None:
         "--engine", default="fused", metavar="fused|lanes",
         help="fused: the compiled loop around the FMU (default); lanes: several vehicles side by side, without one",
     )  # fmt: skip
-    sweep.add_argument("--workers", type=workers, metavar="N", help="processes (default: 1; with --dask: one a core)")
+    sweep.add_argument("--workers", type=WORKERS, metavar="N", help="processes (default: 1; with --dask: one a core)")
     where = sweep.add_mutually_exclusive_group()
     where.add_argument("--dask", action="store_true", help="a Dask cluster of its own on this machine")
     where.add_argument("--scheduler", metavar="tcp://HOST:PORT", help="a Dask cluster that exists")
@@ -91,11 +91,10 @@ def sweep(options: argparse.Namespace) -> int:
                 n = options.workers or os.cpu_count() or 1
                 executor = stack.enter_context(cluster_executor(options.scheduler, n))
             n = options.workers or 1
-            done = run_sweep(scenario, design, options.out, options.engine, n, executor, progress=True)
+            done = run_sweep(scenario, design, options.out, options.engine, n, executor, progress=not options.quiet)
         if not done.flown:
-            print(f"{options.out}: was complete already")
-        for line in sweep_lines(done.summary):
-            print(line)
+            say(options, f"{options.out}: was complete already")
+        say(options, *sweep_lines(done.summary))
         print(write_sweep_page(options.out, options.replays))
 
     return resumable(run, options.out)
@@ -104,24 +103,20 @@ def sweep(options: argparse.Namespace) -> int:
 def rerun(options: argparse.Namespace) -> int:
     """Run ``cosim rerun``."""
     from cosim.campaigns.rerun import rerun as rerun_row
-    from cosim.report_words import verdict
 
-    with contextlib.suppress(ValueError):  # which signal raises outside the main thread
-        signal.signal(signal.SIGTERM, signal.default_int_handler)
-    done = rerun_row(options.folder, options.row, options.out, progress=True)
+    done = rerun_row(options.folder, options.row, options.out, progress=not options.quiet)
     if done.other_code:
-        print("cosim: the code is not that which flew the row", file=sys.stderr)
+        tell("the code is not that which flew the row")
     for name, (before, now) in done.differing.items():
-        print(f"cosim: row {done.key}: {name} was {before!r}, is {now!r} now", file=sys.stderr)
+        tell(f"row {done.key}: {name} was {before!r}, is {now!r} now")
     if not done.differing:
-        print(f"row {done.key}: flown again, identical to the last bit")
+        say(options, f"row {done.key}: flown again, identical to the last bit")
     for name, (before, now) in done.apart.items():
-        print(f"cosim: row {done.key}, step by step: {name} was {before!r}, is {now!r} now", file=sys.stderr)
+        tell(f"row {done.key}, step by step: {name} was {before!r}, is {now!r} now")
     if done.stopped is not None:
-        print(f"row {done.key}: step by step too the plant stops: {done.stopped}")
+        say(options, f"row {done.key}: step by step too the plant stops: {done.stopped}")
     if done.run is not None:
-        print(verdict(done.run.summary))
-        print(done.run.folder / "report.html")
+        print_run(options, done.run)
         if done.run.summary["status"] == "interrupted":
             return INTERRUPTED
     return 1 if done.differing or done.apart else 0

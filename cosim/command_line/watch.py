@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import argparse
 import contextlib
-import signal
+import math
 import sys
 from typing import Any
+
+from cosim.command_line.numbers import rate
 
 _WIDE = 120  # characters of a line, where there is no terminal
 
@@ -25,43 +27,32 @@ def add_verb(verbs: Any) -> None:
         help="a run folder, finished or not; or the address of a live view, such as ws://127.0.0.1:8765, or its port",
     )  # fmt: skip
     watch.add_argument(
-        "--rate", type=_rate, default=1.0, metavar="N|max",
+        "--rate", type=rate, default=1.0, metavar="N|max",
         help="simulated seconds a second, when a finished run is played back (default: 1)",
     )  # fmt: skip
     watch.add_argument("--once", action="store_true", help="print one picture of the newest there is, and end")
 
 
-def _rate(text: str) -> float | None:
-    if text == "max":
-        return None
-    with contextlib.suppress(ValueError):
-        if 1e-3 <= (value := float(text)) <= 1e6:
-            return value
-    raise argparse.ArgumentTypeError(f"{text!r}: expected a number from 0.001 to 1e6, or max")
-
-
 def watch(options: argparse.Namespace) -> int:
     """Run ``cosim watch``."""
-    from cosim.errors import TelemetryError
+    from rich.console import Console
+    from rich.live import Live
 
-    try:
-        from rich.console import Console
-        from rich.live import Live
-    except ImportError as error:
-        raise TelemetryError("cosim watch needs rich; pip install 'subreach[view]'") from error
     from cosim.live.watching import looks, picture
 
-    with contextlib.suppress(ValueError):  # which signal raises outside the main thread
-        signal.signal(signal.SIGTERM, signal.default_int_handler)
+    class Screen(Console):
+        def on_broken_pipe(self) -> None:
+            raise  # noqa: PLE0704 - it is called where that is handled, and would end the process with 1
+
     terminal = sys.stdout.isatty()
-    console = Console(width=None if terminal else _WIDE, highlight=False)
+    console = Screen(width=None if terminal else _WIDE, highlight=False)
     ascii_only = console.options.ascii_only
     once = options.once or not terminal
     last = None
     try:
         with contextlib.ExitStack() as stack:
             live = None if once else stack.enter_context(Live(console=console, screen=True, auto_refresh=False))
-            for look in looks(options.run, options.rate, once):
+            for look in looks(options.run, None if options.rate == math.inf else options.rate, once):
                 last = look
                 if live is not None:
                     live.update(picture(look, console.width, console.height, ascii_only), refresh=True)

@@ -25,12 +25,12 @@ def write(excerpt: Excerpt, path: Path) -> list[Path]:
     list of Path
         It, and the table of units beside it.
     """
-    picked = list(excerpt.picked)
+    names = [column.name for column in excerpt.columns]
     with path.open("w", encoding="utf-8", newline="") as file:
-        csv.writer(file, lineterminator="\n").writerow(column.name for column in excerpt.columns)
-        for block in excerpt.blocks():
+        csv.writer(file, lineterminator="\n").writerow(names)
+        for block in excerpt.blocks(names):
             # repr is the shortest text that reads back to the same bits, and has a point, so that 1.0 stays no integer
-            file.writelines(f"{','.join(map(repr, row))}\n" for row in block[:, picked].tolist())
+            file.writelines(f"{','.join(map(repr, row))}\n" for row in block.numbers().tolist())
     units = path.with_suffix(".units.csv")
     with units.open("w", encoding="utf-8", newline="") as file:
         table = csv.writer(file, lineterminator="\n")

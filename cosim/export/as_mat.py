@@ -38,7 +38,7 @@ def write(excerpt: Excerpt, path: Path) -> list[Path]:
         If it is more than the format holds.
     """
     columns = excerpt.columns
-    size = 8 * len(excerpt.rows) * len(columns)
+    size = 8 * excerpt.count * len(columns)
     if size > _GREATEST:
         raise ExportError(
             f"--to mat: the signals have {size / 1e9:.1f} GB, expected {_GREATEST / 1e9:.1f} at most; "

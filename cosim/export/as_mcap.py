@@ -67,7 +67,8 @@ def _write_messages(writer: Writer, excerpt: Excerpt) -> None:
     scene, tables = Scene(excerpt), _tables(writer, excerpt)
     drawing = _Drawing(writer, excerpt.run, scene)
     drawing.begin()
-    for block in excerpt.blocks():
+    for rows in excerpt.blocks():
+        block = rows.numbers()
         times = np.rint(block[:, 0] * 1e9).astype(np.int64).tolist()
         messages = zip(*(numbers_messages(block[:, picked]) for _, picked in tables), strict=True)
         draw = drawing.of(block)

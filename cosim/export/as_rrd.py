@@ -30,7 +30,9 @@ from cosim.export.scene import (
     Scene,
     Solid,
 )
+from cosim.record import Rows
 from cosim.replay.events import events_of
+from cosim.signals import Array
 
 TIMELINE = "sim_time"  # s
 SIGNALS, WORLD, EVENTS = "signals", "world", "events"
@@ -68,9 +70,10 @@ def write(excerpt: Excerpt, path: Path) -> list[Path]:
         recording.send_recording_name(excerpt.run.path.resolve().name)
         sender = _Sender(recording, excerpt)
         sender.send_texts()
-        sender.send_signals()
+        sender.send_names()
         sender.send_vehicle()
         sender.send_regions()
+        sender.send_rows()
         sender.send_events()
         recording.flush()
     except RuntimeError as error:  # as Rerun tells of a disk that is full
@@ -95,11 +98,17 @@ def _layout(excerpt: Excerpt) -> rrb.Blueprint:
 
 
 class _Sender:
-    """Sends a run, a column at a time."""
+    """Sends a run: what stays, then its rows block by block, then what happened."""
 
     def __init__(self, recording: rr.RecordingStream, excerpt: Excerpt) -> None:
         self._recording, self._excerpt, self._scene = recording, excerpt, Scene(excerpt)
-        self._time = excerpt.signal("time")
+        scene, names = self._scene, [column.name for column in excerpt.run.record.columns]
+        self._forces = [f"thruster_force[{i + 1}]" for i in range(len(scene.thrusters))]
+        self._greatest = max((thruster.most for thruster in scene.thrusters), default=0.0)
+        if not self._greatest > 0.0 or not set(self._forces) <= set(names):
+            self._forces = []
+        self._series: dict[str, str] = {}  # signals by their paths
+        self._lines: list[tuple[int, Solid, dict[str, Any]]] = []  # regions, by index, with their kinds of drawing
 
     def send_texts(self) -> None:
         """Send scenario and summary."""
@@ -109,58 +118,79 @@ class _Sender:
         ):
             self._stay(name, rr.TextDocument(f"```{kind}\n{text}\n```", media_type=rr.MediaType.MARKDOWN))
 
-    def send_signals(self) -> None:
-        """Send every signal as a series."""
+    def send_names(self) -> None:
+        """Send what every signal is."""
         for group, members in grouped(self._excerpt.columns).items():
             for name, i in members.items():
                 column = self._excerpt.columns[i]
                 path = rr.new_entity_path([SIGNALS, group, name])
                 self._stay(path, rr.SeriesLines(names=f"{column.name} [{column.unit or '-'}]"))
-                self._send(path, rr.Scalars.columns(scalars=self._excerpt.signal(column.name)))
+                self._series[path] = column.name
 
     def send_vehicle(self) -> None:
-        """Send pose, hull, thrusts and the whole way."""
-        scene, excerpt = self._scene, self._excerpt
+        """Send hull and the whole way."""
+        scene = self._scene
         self._stay(WORLD, rr.ViewCoordinates.FRD)  # north, east, down
-        position = np.column_stack([excerpt.signal(name) for name in POSITION])
-        e = np.column_stack([excerpt.signal(name) for name in QUATERNION])
-        known = np.flatnonzero(np.isfinite(position).all(axis=1) & np.isfinite(e).all(axis=1))
-        self._send(_FRAMES[PLACE], rr.Transform3D.columns(translation=position[known]), known)
-        self._send(_FRAMES[BODY], rr.Transform3D.columns(quaternion=e[known][:, [1, 2, 3, 0]]), known)
         hull = rr.Ellipsoids3D(half_sizes=[[scene.hull_radius] * 3], colors=[HULL_COLOUR])
         self._stay(f"{_FRAMES[BODY]}/hull", hull)
         self._stay(f"{WORLD}/way", rr.LineStrips3D([scene.trail()], colors=[TRAIL_COLOUR], radii=[-_THIN]))
-        self._send_thrusts()
-
-    def _send_thrusts(self) -> None:
-        scene, names = self._scene, [column.name for column in self._excerpt.run.record.columns]
-        forces = [f"thruster_force[{i + 1}]" for i in range(len(scene.thrusters))]
-        greatest = max((thruster.most for thruster in scene.thrusters), default=0.0)
-        if not greatest > 0.0 or not set(forces) <= set(names):
-            return
-        ticks = np.floor((self._time - self._time[0]) * _ARROWS)
-        rows = np.flatnonzero(np.diff(ticks, prepend=-1.0) > 0.0)
-        force = np.nan_to_num(np.column_stack([self._excerpt.signal(name)[rows] for name in forces]))
-        directions = np.array([thruster.direction for thruster in scene.thrusters])
-        vectors = force[:, :, None] * directions * (_ARROW * scene.hull_radius / greatest)
-        path, n = f"{_FRAMES[BODY]}/thrusts", len(forces)
-        places = [thruster.position for thruster in scene.thrusters]
-        self._stay(path, rr.Arrows3D.from_fields(origins=places, colors=[THRUST_COLOUR]))
-        self._send(path, rr.Arrows3D.columns(vectors=vectors.reshape(-1, 3)).partition([n] * len(rows)), rows)
+        if self._forces:
+            places = [thruster.position for thruster in scene.thrusters]
+            self._stay(f"{_FRAMES[BODY]}/thrusts", rr.Arrows3D.from_fields(origins=places, colors=[THRUST_COLOUR]))
 
     def send_regions(self) -> None:
-        """Send regions as lines, brighter and thicker while they are active."""
-        scene = self._scene
-        active = np.array([i for block in self._excerpt.blocks() for i in scene.active(block)])
+        """Send regions as lines."""
+        scene, began = self._scene, self._excerpt.run.record.value("time", 0)
         for i, solid in enumerate(scene.solids):
             place = f"{_FRAMES[solid.frame]}/{rr.escape_entity_path_part(solid.name)}"
+            shapes = [(began, solid), *((time, new) for time, j, new in scene.changes if j == i)]
+            self._lines.append((i, solid, self._send_shapes(place, shapes)))
+
+    def send_rows(self) -> None:
+        """Send every signal as a series, and how the scene moves."""
+        began, tick, before = None, -1.0, None
+        for block in self._excerpt.blocks():
+            time = block["time"]
+            for path, name in self._series.items():
+                self._send(time, path, rr.Scalars.columns(scalars=block[name]))
+            self._send_pose(block)
+            began = time[0] if began is None else began
+            ticks = np.floor((time - began) * _ARROWS)
+            self._send_thrusts(block, np.flatnonzero(np.diff(ticks, prepend=tick) > 0.0))
+            active = np.array(self._scene.active(block.numbers()))
+            self._send_activity(time, active, before)
+            tick, before = ticks[-1], active[-1]
+            self._recording.flush()  # else all that is not on disk yet would wait in memory
+
+    def _send_pose(self, block: Rows) -> None:
+        position, e = block.stack(POSITION), block.stack(QUATERNION)
+        known = np.isfinite(position).all(axis=1) & np.isfinite(e).all(axis=1)
+        time = block["time"]
+        self._send(time[known], _FRAMES[PLACE], rr.Transform3D.columns(translation=position[known]))
+        self._send(time[known], _FRAMES[BODY], rr.Transform3D.columns(quaternion=e[known][:, [1, 2, 3, 0]]))
+        for solid in self._scene.solids:
             if solid.moves:
-                names = [f"{solid.name}.shift.{axis}" for axis in "xyz"]
-                shifts = np.column_stack([self._excerpt.signal(name) for name in names])
-                self._send(place, rr.Transform3D.columns(translation=shifts))
-            shapes = [(float(self._time[0]), solid), *((time, new) for time, j, new in scene.changes if j == i)]
-            for path, kind in self._send_shapes(place, shapes).items():
-                self._send_activity(path, kind, solid, active == i)
+                place = f"{_FRAMES[solid.frame]}/{rr.escape_entity_path_part(solid.name)}"
+                shifts = block.stack([f"{solid.name}.shift.{axis}" for axis in "xyz"])
+                self._send(time, place, rr.Transform3D.columns(translation=shifts))
+
+    def _send_thrusts(self, block: Rows, rows: NDArray[np.intp]) -> None:
+        if not self._forces:
+            return
+        scene, n = self._scene, len(self._forces)
+        force = np.nan_to_num(block.take(rows).stack(self._forces))
+        directions = np.array([thruster.direction for thruster in scene.thrusters])
+        vectors = force[:, :, None] * directions * (_ARROW * scene.hull_radius / self._greatest)
+        arrows = rr.Arrows3D.columns(vectors=vectors.reshape(-1, 3)).partition([n] * len(rows))
+        self._send(block["time"][rows], f"{_FRAMES[BODY]}/thrusts", arrows)
+
+    def _send_activity(self, time: Array, active: NDArray[np.intp], before: int | None) -> None:
+        """Send regions brighter and thicker while they are active."""
+        for i, solid, kinds in self._lines:
+            now = active == i
+            changes = np.flatnonzero(np.diff(now, prepend=not now[0] if before is None else before == i))
+            for path, kind in kinds.items():
+                self._send(time[changes], path, kind.columns(**_look(kind, solid.colour, now[changes])))
 
     def _send_shapes(self, place: str, shapes: list[tuple[float, Solid]]) -> dict[str, Any]:
         """Send what a region is, and from when; return its kinds of drawing by their paths."""
@@ -184,14 +214,10 @@ class _Sender:
             self._recording.set_time(TIMELINE, duration=event.time)
             self._recording.log(EVENTS, rr.TextLog(event.text, level=level))
 
-    def _send_activity(self, path: str, kind: Any, solid: Solid, active: NDArray[np.bool_]) -> None:
-        changes = np.flatnonzero(np.diff(active, prepend=not active[0]))
-        look = kind.columns(**_look(kind, solid.colour, active[changes]))
-        self._send(path, look, changes)
-
-    def _send(self, path: str, columns: Any, rows: Any = slice(None)) -> None:
-        time = rr.TimeColumn(TIMELINE, duration=self._time[rows])
-        self._recording.send_columns(path, indexes=[time], columns=columns, strict=True)
+    def _send(self, time: Array, path: str, columns: Any) -> None:
+        if time.size:
+            index = rr.TimeColumn(TIMELINE, duration=time)
+            self._recording.send_columns(path, indexes=[index], columns=columns, strict=True)
 
     def _stay(self, path: str, what: Any) -> None:
         self._recording.log(path, what, static=True, strict=True)

@@ -6,6 +6,7 @@ import difflib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 from cosim.errors import ExportError
 from cosim.flown_run import SCENARIO, FlownRun, load_run
 from cosim.plain_json import json_text
+from cosim.record import Rows
 from cosim.signals import Array, Column
 
 _ROUNDING = 1e-6  # of a period; a time that is short of a tick by no more has reached it
@@ -25,7 +27,8 @@ class Excerpt:
 
     run: FlownRun
     picked: tuple[int, ...]  # places of the signals in a row of the record, rising, `time` always among them
-    rows: NDArray[np.intp]  # rising; the first one always among them
+    every: int  # one step of so many, from the first one on,
+    rate: float | None = None  # or as many steps a simulated second [Hz]
 
     @property
     def columns(self) -> tuple[Column, ...]:
@@ -42,18 +45,38 @@ class Excerpt:
         """The summary as JSON, null where a number is none."""
         return json_text(self.run.summary)
 
-    def signal(self, name: str) -> Array:
-        """Return any signal of the record at the exported steps."""
-        return self.run.record[name][self.rows]
+    @cached_property
+    def count(self) -> int:
+        """How many steps are exported."""
+        return sum(len(block) for block in self.blocks(["time"]))
 
-    def blocks(self) -> Iterator[Array]:
-        """Yield the exported steps with all signals of the record, in blocks that fit into memory."""
-        first = 0
-        for block in self.run.record.blocks():
-            here = self.rows[np.searchsorted(self.rows, first) : np.searchsorted(self.rows, first + len(block))]
+    def blocks(self, names: Sequence[str] | None = None) -> Iterator[Rows]:
+        """Yield the exported steps, in blocks that fit into memory; by default with all signals of the record."""
+        first, began, tick = 0, None, -1.0
+        for block in self.run.record.blocks(names if names is None or self.rate is None else ["time", *names]):
+            if self.rate is None:
+                here = np.arange(-first % self.every, len(block), self.every)
+            else:
+                began = block["time"][0] if began is None else began
+                ticks = np.floor((block["time"] - began) * self.rate + _ROUNDING)
+                here = np.flatnonzero(np.diff(ticks, prepend=tick) > 0.0)
+                tick = ticks[-1]
             if here.size:
-                yield block[here - first]
+                yield block.take(here, names)
             first += len(block)
+
+    def take(self, steps: NDArray[np.intp], names: Sequence[str]) -> Rows:
+        """Return some of the exported steps, rising, from 0."""
+        found: list[Rows] = []
+        first = 0
+        for block in self.blocks(names):
+            found.append(block.take(steps[(steps >= first) & (steps < first + len(block))] - first))
+            first += len(block)
+        return Rows(found[0].columns, {name: np.concatenate([rows[name] for rows in found]) for name in names})
+
+    def signal(self, name: str) -> Array:
+        """Return any signal of the record at all exported steps."""
+        return np.concatenate([block[name] for block in self.blocks([name])])
 
 
 def excerpt_of(folder: Path, signals: Sequence[str] = (), every: int = 1, rate: float | None = None) -> Excerpt:
@@ -85,14 +108,7 @@ def excerpt_of(folder: Path, signals: Sequence[str] = (), every: int = 1, rate: 
     run = load_run(folder)
     names = [column.name for column in run.record.columns]
     wanted = {name for pattern in signals for name in _fitting(pattern, names)} | {"time"} if signals else {*names}
-    time = run.record["time"]
-    if rate is None:
-        rows = np.arange(0, len(time), every)
-    else:
-        ticks = np.floor((time - time[0]) * rate + _ROUNDING)
-        rows = np.flatnonzero(np.diff(ticks, prepend=-1.0) > 0.0)
-    picked = tuple(i for i, name in enumerate(names) if name in wanted)
-    return Excerpt(run, picked, rows)
+    return Excerpt(run, tuple(i for i, name in enumerate(names) if name in wanted), every, rate)
 
 
 def _fitting(pattern: str, names: Sequence[str]) -> list[str]:

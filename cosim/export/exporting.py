@@ -13,13 +13,14 @@ from cosim.errors import ExportError, RunError
 from cosim.export.excerpt import excerpt_of
 from cosim.flown_run import ORDERS, SCENARIO, SUMMARY
 from cosim.record import RECORD
+from plant_fmu.installing import install_hint
 
 
 @dataclass(frozen=True)
 class Format:
     """A format of other tools; `cosim.export.as_NAME` writes it."""
 
-    extra: str = ""  # of this distribution, that brings what writing it needs
+    needs: tuple[str, ...] = ()  # what the base installation does not bring, as requirements of pip
     beside: str = ""  # ending of a second file, in the place of the suffix
     whole: bool = False  # it has signals and rates of its own, and takes no choice of them
 
@@ -28,9 +29,9 @@ FORMATS = {
     "csv": Format(beside=".units.csv"),
     "npz": Format(),
     "mat": Format(),
-    "mcap": Format(extra="mcap"),
-    "rrd": Format(extra="rerun"),
-    "tlog": Format(extra="mavlink", whole=True),
+    "mcap": Format(("foxglove-schemas-protobuf>=0.3", "mcap>=1.2", "mcap-protobuf-support>=0.5", "protobuf>=4.25")),
+    "rrd": Format(("rerun-sdk>=0.31",)),
+    "tlog": Format(whole=True),
 }
 
 _OF_RUNS = frozenset({RECORD, SCENARIO, SUMMARY, ORDERS})
@@ -106,6 +107,6 @@ def _writer(to: str, form: Format) -> Any:
     try:
         return importlib.import_module(f"cosim.export.as_{to}")
     except ModuleNotFoundError as error:
-        if not form.extra or (error.name or "").startswith("cosim"):
+        if not form.needs or (error.name or "").startswith("cosim"):
             raise
-        raise ExportError(f"--to {to} needs {error.name}; pip install 'subreach[{form.extra}]'") from error
+        raise ExportError(f"--to {to} needs {error.name}; {install_hint(*form.needs)}") from error

@@ -116,9 +116,8 @@ class Scene:
 
     def trail(self) -> Array:
         """Return the way that the vehicle took, as few enough points for a line, shape (n, 3) [m, NED]."""
-        n = len(self._excerpt.rows)
-        rows = self._excerpt.rows[np.unique(np.linspace(0, n - 1, min(n, _TRAIL)).astype(int))]
-        way: Array = np.column_stack([self._record[name][rows] for name in POSITION])
+        n = self._excerpt.count
+        way = self._excerpt.take(np.unique(np.linspace(0, n - 1, min(n, _TRAIL)).astype(int)), POSITION).numbers()
         return way[np.isfinite(way).all(axis=1)]
 
     def _solid(self, index: int, shape: Shape, limits: Bounds) -> Solid:

@@ -30,7 +30,7 @@ log = logging.getLogger(__name__)
 
 _TOKEN = "lanes"  # noqa: S105 -- no secret: there is no description that the library could go with
 _NARROW = ("-Wno-psabi",)  # nothing but this library calls its functions with vectors
-_FMI = "fmi3.c"  # nor an importer
+_FMI = ("fmi3.c", "fmi3_unsupported.c")  # nor an importer
 
 # as many as one register holds, where that is at least four: with fewer, half the vectors take as long
 _WIDTH = """#ifdef __AVX512F__
@@ -118,7 +118,8 @@ def _files(vehicle: Vehicle, beside: Path | None = None) -> dict[str, bytes]:
     """Return the C files: of one vehicle in ``one/``, of several in ``many/``, and what compiles the latter."""
     component = of_vehicle(vehicle)
     sources, own = c_sources(component, 3), _own("cosim/flying/csrc")
-    del sources[_FMI]
+    for name in _FMI:
+        del sources[name]
     one = {**sources, component.header: header(component, _TOKEN).encode(), "start.c": own["start.c"]}
     one |= {"lanes.h": own["lanes.h"], "arbiter.c": to_c(Arbiter().system).encode()}
     lanes = replace(component, name=f"{vehicle.name}_lanes")  # the names that its functions begin with

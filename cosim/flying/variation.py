@@ -9,11 +9,11 @@ from typing import Any
 from controller import ControllerError
 from cosim.errors import ScenarioError
 from cosim.scenario import Scenario, checked_scenario
-from cosim.scenario_check import known_parameters
+from cosim.scenario_changes import joined, value_at
+from cosim.scenario_file import place_of
+from cosim.scenario_words import PARAMETERS
 from plant_fmu.errors import PlantFmuError
-from plant_fmu.tables import hint
 
-_PARAMETERS = "plant.parameters."
 _SEEDS = ("sensing.seed", "plant.parameters.seed")  # what the seed of a row becomes
 
 
@@ -69,13 +69,7 @@ class Variation:
         ScenarioError
             If there is no such key.
         """
-        if key.startswith(_PARAMETERS):
-            name, known = key.removeprefix(_PARAMETERS), known_parameters(self.base.vehicle)
-            if name not in known:
-                raise ScenarioError(f"key {key!r} is no parameter of the vehicle's FMU; {hint(name, known)}")
-            return self.base.plant.parameters.get(name, known[name])
-        at, last = _place(self.base.table, key)
-        return at[last]
+        return value_at(self.base.table, key, self.base.vehicle)
 
     def scenario(self, values: Sequence[float], seed: int) -> Scenario:
         """Return the scenario that values and a seed make.
@@ -98,12 +92,14 @@ class Variation:
             If a value cannot be; it names the key.
         """
         table = _copy(self.base.table)
-        for key, value in self._changes(values, seed):
-            if key.startswith(_PARAMETERS):
-                table["plant"]["parameters"][key.removeprefix(_PARAMETERS)] = value
+        changes = dict(self._changes(values, seed))
+        for key, value in changes.items():
+            if key.startswith(PARAMETERS):
+                table["plant"]["parameters"][key.removeprefix(PARAMETERS)] = value
             else:
-                at, last = _place(table, key)
+                at, last = place_of(table, key)
                 at[last] = value
+        table["changed"] = joined(table["changed"], (k for k, value in changes.items() if value != self.number(k)))
         try:
             return checked_scenario(table, self.base.name, self.base.vehicle)
         except (PlantFmuError, ControllerError) as error:
@@ -154,27 +150,3 @@ def _copy(value: Any) -> Any:
     if isinstance(value, dict):
         return {key: _copy(item) for key, item in value.items()}
     return [_copy(item) for item in value] if isinstance(value, list | tuple) else value
-
-
-def _place(table: dict[str, Any], key: str) -> tuple[Any, Any]:
-    """Return the table or list that holds a key, and the key's place in it."""
-    *path, last = key.split(".")
-    at: Any = table
-    for depth, part in enumerate([*path, last]):
-        if isinstance(at, list | tuple):
-            names = [item.get("name") for item in at if isinstance(item, dict)]
-            inside = part.isdecimal() and int(part) < len(at)
-            place: Any = names.index(part) if part in names else int(part) if inside else None
-            known = names or list(map(str, range(len(at))))
-        else:
-            known = list(at) if isinstance(at, dict) else []
-            place = part if part in known else None
-        if place is None:
-            where = ".".join(key.split(".")[:depth])
-            said = hint(part, map(str, known)) if known else f"{where} holds no others"
-            what = "is unknown" if part == key else f"is unknown: {part!r}"
-            raise ScenarioError(f"key {key!r} {what}; {said}")
-        if depth == len(path):
-            return at, place
-        at = at[place]
-    raise AssertionError("unreachable")

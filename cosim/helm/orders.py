@@ -14,6 +14,8 @@ Mode = Literal["manual", "hold", "reach", "mission", "surface"]
 
 MODES: tuple[Mode, ...] = get_args(Mode)  # a mode's index is its number in the record
 
+NO_ORDER = (msgspec.DecodeError, UnicodeDecodeError, RecursionError)  # what msgspec raises at a text that is none
+
 _FAR = 1e5  # m; beyond it nothing is ordered
 _FAST = 1e2  # m/s
 _LONG = 1e9  # s

@@ -183,7 +183,7 @@ class LiveSettings:
             if isinstance(value, float) and not rest:
                 return name, field, None
             numbers = value if isinstance(value, tuple) else ()
-            if rest.isdecimal() and int(rest) < len(numbers) and isinstance(numbers[int(rest)], float):
+            if rest in map(str, range(len(numbers))) and isinstance(numbers[int(rest)], float):
                 return name, field, int(rest)
         raise OrderError(f"{key} is no setting")
 

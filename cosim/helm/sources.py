@@ -6,13 +6,13 @@ import threading
 from collections import deque
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
-from typing import Protocol
+from typing import Annotated, Protocol
 
 import msgspec
 
 from cosim.errors import OrderError, RunError
-from cosim.helm.orders import Order, check_order
-from plant_fmu.tables import brief
+from cosim.helm.orders import NO_ORDER, Order, check_order
+from cosim.scenario_check import MAX_STEPS
 
 QUEUED = 256  # orders between two steps; further ones are refused
 
@@ -90,7 +90,7 @@ class OrderQueue:
 class _Entry(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A line of the log."""
 
-    step: int
+    step: Annotated[int, msgspec.Meta(ge=0, le=MAX_STEPS)]
     order: Order
 
 
@@ -124,10 +124,10 @@ def read_log(file: Path) -> list[tuple[int, Order]]:
         try:
             entry = msgspec.json.decode(line, type=_Entry)
             check_order(entry.order)
-        except (msgspec.DecodeError, OrderError) as error:
-            if type(error) is msgspec.DecodeError and number > whole:
+        except (*NO_ORDER, OrderError) as error:
+            if type(error) in (msgspec.DecodeError, UnicodeDecodeError) and number > whole:
                 break
-            raise RunError(f"{file}, line {number}: {brief(error)}") from error
+            raise RunError(f"{file}, line {number}: {error}") from error
         entries.append((entry.step, entry.order))
     return sorted(entries, key=lambda entry: entry[0])
 

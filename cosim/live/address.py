@@ -51,7 +51,7 @@ def parse_live(text: str, allow_remote: bool = False) -> LiveAddress:
         return LiveAddress()
     host, colon, number = text.rpartition(":")
     host = host or HOST
-    if not (number.isdecimal() and int(number) <= 65535) or (colon and not text[0].isalnum()):
+    if not (number.isascii() and number.isdecimal() and int(number[:6]) <= 65535) or (colon and not text[0].isalnum()):
         raise TelemetryError(f"--live {text!r}: {_EXPECTED}")
     try:
         ip, loopback = resolved(host)

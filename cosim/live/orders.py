@@ -8,10 +8,11 @@ from collections.abc import Callable
 import msgspec
 
 from cosim.errors import OrderError
-from cosim.helm.orders import Change, Mission, Move, Order
+from cosim.helm.orders import NO_ORDER, Change, Mission, Move, Order
 from cosim.helm.settings import LiveSettings
 from cosim.helm.sources import OrderQueue
 from cosim.scenario import Scenario
+from plant_fmu.errors import one_line
 
 LONGEST = 16_384  # bytes of a message
 
@@ -65,8 +66,8 @@ class Desk:
             self._check(order)
             if not self._queue.give(order, self._run):
                 return "the run is over" if self._queue.run != self._run else "too many orders at once"
-        except msgspec.DecodeError as error:
-            return f"no order: {error}"
+        except NO_ORDER as error:
+            return one_line(f"no order: {error}")
         except OrderError as error:
             return str(error)
         self.follow(order)

@@ -13,7 +13,6 @@ from typing import Any
 
 import numpy as np
 
-from cosim.errors import TelemetryError
 from cosim.helm.orders import Order
 from cosim.helm.sources import OrderQueue
 from cosim.live.address import LiveAddress, bound
@@ -46,14 +45,12 @@ class LiveView:
     Raises
     ------
     TelemetryError
-        If websockets is not installed, or the address cannot be opened.
+        If the address cannot be opened.
     """
 
     def __init__(self, address: LiveAddress) -> None:
-        try:
-            from cosim.live.server import serve
-        except ImportError as error:
-            raise TelemetryError("--live needs websockets; pip install 'subreach[view]'") from error
+        from cosim.live.server import serve
+
         self._socket = bound(address)
         port = self._socket.getsockname()[1]
         self.url = f"http://{address.host}:{port}/"

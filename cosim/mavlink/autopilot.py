@@ -54,11 +54,6 @@ class Autopilot:
         Where orders go; with None, or commands off, it is read-only.
     live : bool
         False for a recorded run, which takes no orders.
-
-    Raises
-    ------
-    TelemetryError
-        If pymavlink is not installed.
     """
 
     def __init__(

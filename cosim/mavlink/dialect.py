@@ -4,21 +4,13 @@ from __future__ import annotations
 
 from typing import Any
 
-from cosim.errors import TelemetryError
-
 
 def dialect() -> Any:
     """Return pymavlink's module of the dialect ``all``, MAVLink 2.
 
-    It is the only one that has the messages of ArduPilot and of modes both.
-
-    Raises
-    ------
-    TelemetryError
-        If pymavlink is not installed.
+    It is the only one that has the messages of ArduPilot and of modes both. Its import takes a tenth of a second, so it
+    waits until somebody speaks MAVLink.
     """
-    try:
-        from pymavlink.dialects.v20 import all as mavlink
-    except ImportError as error:
-        raise TelemetryError("MAVLink needs pymavlink; pip install 'subreach[mavlink]'") from error
+    from pymavlink.dialects.v20 import all as mavlink
+
     return mavlink

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from cosim.columns import names_of, require_columns
 from cosim.errors import RunError
 from cosim.flown_run import SCENARIO
 from cosim.mavlink.autopilot import Autopilot
@@ -19,7 +20,6 @@ from cosim.record import Record, load_record
 from cosim.scenario import load_scenario
 from cosim.signals import Array
 
-_NEEDED = ("position.x", "quaternion.e0", "velocity.u")  # without which there is no vehicle
 _LONGEST_SLEEP = 0.5  # s
 _WAITING = 0.002  # s, for the links to send what is queued
 _MOST_QUEUED = SNAPSHOTS // 2
@@ -65,16 +65,16 @@ def replay(folder: Path, endpoints: Sequence[Endpoint], options: MavlinkOptions,
     if not (folder / SCENARIO).is_file():
         raise RunError(f"{folder}: holds no run ({SCENARIO} is missing)")
     scenario, record = load_scenario(folder / SCENARIO), load_record(folder)
-    lacking = [name for name in _NEEDED if name not in record.units]
-    if lacking or record.columns[0].name != "time":
-        raise RunError(f"{folder}: the record has no column {(lacking or ['time, as its first one'])[0]}")
-    autopilot = Autopilot(scenario, record.columns, options, orders=None, live=False)
+    require_columns(scenario, record)
+    known = set(names_of(scenario))  # what else a record has could stand between what is read side by side
+    columns = [column for column in record.columns if column.name in known or column.name.startswith("law.")]
+    autopilot = Autopilot(scenario, columns, options, orders=None, live=False)
     thread = LinkThread(autopilot, open_links(endpoints, options), scenario.time.step, ahead(scenario, rate))
     every = max(1, round(SNAPSHOT_PERIOD / scenario.time.step))
     thread.start()
     started, simulated = time.perf_counter(), 0.0
     try:
-        for k, row in _rows(record, every):
+        for k, row in _rows(record, every, [column.name for column in columns]):
             simulated = float(row[0])
             if rate is not None:
                 _sleep_until(started + simulated / rate)
@@ -88,10 +88,11 @@ def replay(folder: Path, endpoints: Sequence[Endpoint], options: MavlinkOptions,
     return Replayed(simulated, time.perf_counter() - started, thread.troubles())
 
 
-def _rows(record: Record, every: int) -> Iterator[tuple[int, Array]]:
+def _rows(record: Record, every: int, names: Sequence[str]) -> Iterator[tuple[int, Array]]:
     """Yield each row that the links look at, and its step."""
     first = 0
-    for block in record.blocks():
+    for rows in record.blocks(names):
+        block = rows.numbers()
         for i in range(-first % every, len(block), every):
             yield first + i, block[i]
         first += len(block)

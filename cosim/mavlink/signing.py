@@ -58,13 +58,13 @@ def read_key(path: Path) -> bytes:
             mode = os.fstat(file.fileno()).st_mode
             content = file.read(_LONGEST_KEY + 1)
     except OSError as error:
-        raise TelemetryError(f"key file {str(path)!r}: {error.strerror or error}") from error
+        raise TelemetryError(f"{path}: the key cannot be read: {error.strerror or error}") from error
     if os.name == "posix" and mode & 0o077:
         raise TelemetryError(
-            f"key file {str(path)!r}: mode is {mode & 0o777:o}, expected 600: whoever reads it can command the vehicle"
+            f"{path}: mode is {mode & 0o777:o}, expected 600: whoever reads it can command the vehicle"
         )
     if len(content) > _LONGEST_KEY:
-        raise TelemetryError(f"key file {str(path)!r}: more than {_LONGEST_KEY} bytes, expected a key or a passphrase")
+        raise TelemetryError(f"{path}: more than {_LONGEST_KEY} bytes, expected a key or a passphrase")
     try:
         text = content.decode().strip()
     except UnicodeDecodeError:
@@ -74,7 +74,7 @@ def read_key(path: Path) -> bytes:
     if len(content) == KEY_BYTES:
         return content
     raise TelemetryError(
-        f"key file {str(path)!r}: {len(content)} bytes that are no text, "
+        f"{path}: {len(content)} bytes that are no text, "
         f"expected {KEY_BYTES} bytes, {2 * KEY_BYTES} hexadecimal digits or a passphrase"
     )
 

@@ -176,7 +176,7 @@ def _parameters(scenario: Scenario) -> Iterator[Variable]:
         ("gamma", "s2/kg", "Gamma = gamma I (27): the greater, the slower the adaptation", True),
     ):
         start = getattr(scenario.law.gains, name)
-        quantity = Quantity(unit, _POSITIVE.minimum if positive else 0.0, _POSITIVE.maximum)
+        quantity = Quantity(unit, _POSITIVE.minimum if positive else 0.0, _POSITIVE.maximum, is_gain=True)
         yield _parameter(f"law.gains.{name}", f"gains.{name}", quantity, description, start)
     for i, start in enumerate(scenario.law.desired_quaternion):
         description = f"Attitude to be kept, as unit quaternion from body to world, part {i}"

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import heapq
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import chain, pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from controller.regions import of_attitude
 from cosim.flown_run import FlownRun
@@ -16,6 +17,7 @@ from cosim.replay.order_words import ordered_events
 from cosim.replay.steering import Log
 from cosim.scenario import CRITERIA
 from cosim.signals import Array
+from cosim.spans import Flags, Span, Spans
 
 _MOST = 12  # events of a kind; what comes closer together than that allows is told as one
 
@@ -30,14 +32,6 @@ class Event:
     kind: str  # order, goal, violation, active, failure, saturation or end
     text: str
     until: float | None = None  # s, of what lasts
-
-
-@dataclass(frozen=True)
-class _Span:
-    """Rows from the first one to the one before `end`, in which a condition held."""
-
-    first: int
-    end: int
 
 
 def events_of(run: FlownRun, log: Log) -> list[Event]:
@@ -55,7 +49,7 @@ def events_of(run: FlownRun, log: Log) -> list[Event]:
     list of Event
         The last one is the end of the run.
     """
-    step, rows = run.scenario.time.step, len(run.record["time"])
+    step, rows = run.scenario.time.step, len(run.record)
     # a killed run has logged orders of rows that it did not save; a reset comes behind the last row
     log = [(min(k, rows - 1), order) for k, order in log if k <= rows]
     orders = [Event(time, "order", text) for time, text in ordered_events(log, step, _MOST)]
@@ -64,61 +58,72 @@ def events_of(run: FlownRun, log: Log) -> list[Event]:
 
 
 def _goal(run: FlownRun) -> Iterator[Event]:
-    time, clearance = run.record["time"], run.record["goal.clearance"]
-    known = np.flatnonzero(np.isfinite(clearance))
-    for span in _few(_spans(clearance[known] >= 0.0), time[known], _MOST // 2):
-        began = float(time[known[span.first]])
-        yield Event(began, "goal", "Starts in the goal region" if span.first == 0 else "Enters the goal region")
-        if span.end < len(known):
-            yield Event(float(time[known[span.end]]), "goal", "Leaves the goal region")
+    inside, first = _Few(_MOST // 2), math.inf
+    for block in run.record.blocks(["time", "goal.clearance"]):
+        known = np.isfinite(block["goal.clearance"])
+        time = block["time"][known]
+        first = min(first, *time[:1].tolist(), math.inf)
+        inside.add(block["goal.clearance"][known] >= 0.0, time)
+    for span in inside.found():
+        begins = "Starts in" if span.start == first else "Enters"
+        yield Event(span.start, "goal", f"{begins} the goal region")
+        if not inside.lasts(span):
+            yield Event(span.end, "goal", "Leaves the goal region")
 
 
 def _violations(run: FlownRun) -> Iterator[Event]:
-    time, regions = run.record["time"], run.scenario.regions
+    regions = run.scenario.regions
     most = max(1, _MOST // max(1, len(regions)))
-    for secondary in regions:
-        clearance = run.record[f"{secondary.region.name}.clearance"]
-        for span in _few(_spans(clearance < 0.0), time, most):
-            depth = -float(np.nanmin(clearance[span.first : span.end]))
+    violated = {f"{secondary.region.name}.clearance": _Few(most) for secondary in regions}
+    for block in run.record.blocks(["time", *violated]):
+        for name, few in violated.items():
+            few.add(block[name] < 0.0, block["time"], block[name])
+    for secondary, few in zip(regions, violated.values(), strict=True):
+        for span in few.found():
+            depth = -span.least
             by = f"{math.degrees(depth):.1f}°" if of_attitude(secondary.region.shape) else f"{depth:.3f} m"
             soft = "" if secondary.region.hard else " (soft)"
-            text = f"Violates {secondary.region.name}{soft} {_lasting(span, time)}, by up to {by}"
-            yield Event(float(time[span.first]), "violation", text, _until(span, time))
+            text = f"Violates {secondary.region.name}{soft} {few.lasting(span)}, by up to {by}"
+            yield Event(span.start, "violation", text, span.end)
 
 
 def _active(run: FlownRun) -> Iterator[Event]:
-    record, regions = run.record, run.scenario.regions
-    memberships = record.stack([f"membership.{name}" for name in CRITERIA])
-    weights = record.stack([f"weight.{name}" for name in CRITERIA])
-    clearances = (
-        record.stack([f"{secondary.region.name}.clearance" for secondary in regions])
-        if regions
-        else np.empty((len(weights), 0))
-    )
-    active = active_regions([secondary.criterion for secondary in regions], memberships, weights, clearances)
-    time = record["time"]
-    for row in _turns(active, time):
-        index = int(active[row])
+    regions = run.scenario.regions
+    for i, (time, index) in enumerate(_turns(_takeovers(run))):
         if index:
             secondary = regions[index - 1]
-            yield Event(float(time[row]), "active", f"Gives way to {secondary.region.name} ({secondary.criterion})")
-        elif row:
-            yield Event(float(time[row]), "active", "Goes for the goal again")
+            yield Event(time, "active", f"Gives way to {secondary.region.name} ({secondary.criterion})")
+        elif i:
+            yield Event(time, "active", "Goes for the goal again")
+
+
+def _takeovers(run: FlownRun) -> Iterator[tuple[float, int]]:
+    """Yield when another region takes over and which, the goal being 0; first what is so at first."""
+    regions, before = run.scenario.regions, -1
+    memberships, weights = ([f"{of}.{name}" for name in CRITERIA] for of in ("membership", "weight"))
+    clearances = [f"{secondary.region.name}.clearance" for secondary in regions]
+    for block in run.record.blocks(["time", *memberships, *weights, *clearances]):
+        by_region = block.stack(clearances) if clearances else np.empty((len(block), 0))
+        criteria = [secondary.criterion for secondary in regions]
+        active = active_regions(criteria, block.stack(memberships), block.stack(weights), by_region).astype(int)
+        for row in np.flatnonzero(np.diff(active, prepend=before)).tolist():
+            yield float(block["time"][row]), int(active[row])
+        before = int(active[-1])
 
 
 def _failures(run: FlownRun) -> Iterator[Event]:
-    end = run.record["time"][-1]
+    end = run.record.value("time", -1)
     for failure in run.scenario.failures:
         if failure.time <= end:
             yield Event(failure.time, "failure", f"Thruster {failure.thruster} fails")
 
 
 def _saturation(run: FlownRun) -> Iterator[Event]:
-    record, time = run.record, run.record["time"]
-    cut = (record["wrench_saturated"] > 0.0) | (record["allocation_saturated"] > 0.0)
-    for span in _few(_spans(cut), time, _MOST // 2):
-        text = f"More force is asked for than there is, {_lasting(span, time)}"
-        yield Event(float(time[span.first]), "saturation", text, _until(span, time))
+    cut, flags = _Few(_MOST // 2), ("wrench_saturated", "allocation_saturated")
+    for block in run.record.blocks(["time", *flags]):
+        cut.add(np.logical_or.reduce([block[name] > 0.0 for name in flags]), block["time"])
+    for span in cut.found():
+        yield Event(span.start, "saturation", f"More force is asked for than there is, {cut.lasting(span)}", span.end)
 
 
 def _end(run: FlownRun) -> Event:
@@ -129,50 +134,69 @@ def _end(run: FlownRun) -> Event:
         "reset": "The run was reset",
         "killed": "The run was killed: its record ends here",
     }
-    return Event(float(run.record["time"][-1]), "end", words.get(status, f"The run {status}"))
+    return Event(run.record.value("time", -1), "end", words.get(status, f"The run {status}"))
 
 
-def _spans(flags: NDArray[np.bool_]) -> list[_Span]:
-    edges = np.diff(flags.astype(np.int8), prepend=0, append=0)
-    return [_Span(a, b) for a, b in zip(*(np.flatnonzero(edges == x).tolist() for x in (1, -1)), strict=True)]
+class _Few:
+    """Finds when a condition holds, and joins those spans that are nearest to each other until there are few enough."""
+
+    def __init__(self, most: int) -> None:
+        self._most, self._apart = most, -math.inf  # what is no farther apart than that, is one
+        self._all, self._joined = Spans(), list[Span]()
+
+    def add(self, flags: Flags, time: Array, signal: Array | None = None) -> None:
+        """Take the next rows, as of `Spans`."""
+        self._join(self._all.add(flags, time, signal))
+
+    def found(self) -> list[Span]:
+        """Return the spans, once all rows have come."""
+        self._join([self._all.open] if self._all.open else [])
+        return self._joined
+
+    def lasts(self, span: Span) -> bool:
+        """Return whether a span is open to the end."""
+        return span is self._all.open
+
+    def lasting(self, span: Span) -> str:
+        """Return how long a span lasted, in words."""
+        return "to the end" if self.lasts(span) else f"until {span.end:.3f} s"
+
+    def _join(self, more: list[Span]) -> None:
+        spans = [*self._joined, *more]
+        if len(spans) > self._most:
+            gaps = sorted(b.start - a.end for a, b in pairwise(spans))
+            self._apart = max(self._apart, gaps[len(spans) - self._most - 1])
+        self._joined = spans[:1]
+        for span in spans[1:]:
+            last = self._joined[-1]
+            if span.start - last.end > self._apart:
+                self._joined.append(span)
+                continue
+            # the later one stays, so that the open one is found again
+            span.start, span.least = last.start, float(np.fmin(last.least, span.least))
+            self._joined[-1] = span
 
 
-def _until(span: _Span, time: Array) -> float:
-    return float(time[min(span.end, len(time) - 1)])
+def _turns(takeovers: Iterator[tuple[float, int]]) -> list[tuple[float, int]]:
+    """Return the takeovers that last long enough; of many only those that last longest."""
+    longest = heapq.nsmallest(_MOST, _lasting(takeovers))
+    found: list[tuple[float, int]] = []
+    for _, time, active in sorted(longest, key=lambda of: of[1]):
+        if not found or active != found[-1][1]:
+            found.append((time, active))
+    return found
 
 
-def _lasting(span: _Span, time: Array) -> str:
-    return f"until {time[span.end]:.3f} s" if span.end < len(time) else "to the end"
-
-
-def _few(spans: list[_Span], time: Array, most: int) -> list[_Span]:
-    """Join those spans that are nearest to each other, until there are few enough."""
-    gaps = sorted(time[b.first] - time[a.end] for a, b in zip(spans, spans[1:], strict=False))
-    if len(spans) <= most:
-        return spans
-    apart = gaps[len(spans) - most - 1]  # which, and all that are less, are closed
-    joined = spans[:1]
-    for span in spans[1:]:
-        if time[span.first] - time[joined[-1].end] <= apart:
-            joined[-1] = _Span(joined[-1].first, span.end)
-        else:
-            joined.append(span)
-    return joined
-
-
-def _turns(active: Array, time: Array) -> list[int]:
-    """Return the rows at which another region takes over for long enough; of many only those where it stays longest."""
-    rows = np.array([0, *(np.flatnonzero(np.diff(active)) + 1)])
-    brief = np.diff(time[rows], append=np.inf) < _BACK
-    kept = [0]
-    for i in range(1, len(rows)):
-        # one that is back at once was hardly away
-        before = active[rows[kept[-1]]]
-        if active[rows[i]] != before and not (brief[i] and active[rows[i + 1]] == before):
-            kept.append(i)
-    rows = rows[kept]
-    if len(rows) > _MOST:
-        lasting = np.diff(time[rows], append=np.inf)
-        lasting[0] = np.inf
-        rows = rows[np.sort(np.argsort(-lasting, kind="stable")[:_MOST])]
-    return [int(row) for i, row in enumerate(rows) if i == 0 or active[row] != active[rows[i - 1]]]
+def _lasting(takeovers: Iterator[tuple[float, int]]) -> Iterator[tuple[float, float, int]]:
+    """Yield minus for how long, when, and which region took over; one that is back at once was hardly away."""
+    kept: tuple[float, int] | None = None
+    first = True
+    for (time, active), (then, back) in pairwise(chain(takeovers, [(math.inf, -1)])):
+        if kept is not None and (active == kept[1] or (then - time < _BACK and back == kept[1])):
+            continue
+        if kept is not None:
+            yield -math.inf if first else kept[0] - time, *kept
+            first = False
+        kept = time, active
+    if kept is not None:
+        yield -math.inf, *kept

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from cosim.errors import RunError
@@ -46,7 +46,7 @@ def replay(folders: Sequence[Path], out: Path | None = None, title: str | None =
     out : Path, optional
         The file; default: ``replay.html``, in the folder of a single run, or in the current one.
     title : str, optional
-        Of the page; default: that of the scenario, or of the first one and the names of all runs.
+        Of the page; default: that of the scenario; of several runs `joint_title`.
 
     Returns
     -------
@@ -68,14 +68,32 @@ def replay(folders: Sequence[Path], out: Path | None = None, title: str | None =
             raise RunError(f"{file}: exists and is no replay; expected a new file")
         if len(folders) == 1:
             return write_replay(load_run(folders[0]), file, title)
-        traces, titles = [], []
+        traces, titles = [], {}
         for folder, name in zip(folders, names, strict=True):
             run = load_run(folder)
             traces.append(trace_of(run).as_json() | {"name": name})
-            titles.append(run.scenario.title)
-        return write_page(file, traces, title or f"{titles[0]}: {', '.join(names)}")
+            titles[name] = run.scenario.title
+        return write_page(file, traces, title or joint_title(titles))
     except OSError as error:
         raise RunError(f"{file}: {error.strerror or error}") from error
+
+
+def joint_title(titles: Mapping[str, str]) -> str:
+    """Return the title of several runs: each title once, before the names of those that have it.
+
+    Parameters
+    ----------
+    titles : mapping from str to str
+        Of the scenarios, by the name of the run.
+
+    Returns
+    -------
+    str
+        Such as ``Docking: a, b; Docking (changed: time.duration = 5 s): c``.
+    """
+    return "; ".join(
+        f"{title}: {', '.join(n for n in titles if titles[n] == title)}" for title in dict.fromkeys(titles.values())
+    )
 
 
 def _names(folders: Sequence[Path]) -> list[str]:

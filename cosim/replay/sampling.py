@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
+from cosim.extremes import even_edges, extreme_rows
+from cosim.record import Rows
 from cosim.signals import Array
 
 _BYTES = 400_000  # of numbers, for the first minute
@@ -15,19 +19,21 @@ _OF_EXTREMES = 0.5  # share of the rows that they may take
 
 
 def sampled_rows(
-    time: Array, columns: int, telling: Array, moments: NDArray[np.intp] | None = None
+    record: Rows, columns: int, telling: Iterable[Sequence[Array]], signals: int, moments: NDArray[np.intp]
 ) -> NDArray[np.intp]:
     """Return the rows that a page has: evenly spaced ones, and the extremes between them of what tells the story.
 
     Parameters
     ----------
-    time : ndarray, shape (steps,)
-        Of the record [s].
+    record : Rows
+        Of the run, with its ``time`` [s].
     columns : int
         That the page has of each row.
-    telling : ndarray, shape (steps, m)
-        Signals whose extremes are kept.
-    moments : ndarray of int, optional
+    telling : iterable of sequence of ndarray
+        Signals whose extremes are kept, block by block of the record.
+    signals : int
+        How many these are.
+    moments : ndarray of int
         Steps at which something happened: they are kept, and the ones before them.
 
     Returns
@@ -35,17 +41,14 @@ def sampled_rows(
     ndarray of int
         Rising; the first and the last step among them.
     """
-    n = len(time)
-    minutes = float(time[-1] - time[0]) / 60.0 if n > 1 else 0.0
+    n = len(record)
+    minutes = (record.value("time", -1) - record.value("time", 0)) / 60.0
     budget = min(_BYTES + _BYTES_A_MINUTE * max(0.0, minutes - 1.0), _MOST_BYTES)
     most = max(2, int(budget / (8 * columns)))
     if n <= most:
         return np.arange(n)
-    keep = {int(i) for i in np.concatenate([moments, moments - 1]) if 0 <= i < n} if moments is not None else set()
-    parts = int(np.clip(_OF_EXTREMES * most / (2 * max(1, telling.shape[1])), 1, _PARTS))
-    for part in np.array_split(np.arange(n), parts):
-        for signal in telling[part].T:
-            if np.isfinite(signal).any():
-                keep |= {int(part[np.nanargmin(signal)]), int(part[np.nanargmax(signal)])}
+    keep = {int(i) for i in np.concatenate([moments, moments - 1]) if 0 <= i < n}
+    parts = int(np.clip(_OF_EXTREMES * most / (2 * max(1, signals)), 1, _PARTS))
+    keep |= set(extreme_rows(telling, signals, even_edges(n, parts)).tolist())
     keep |= {int(i) for i in np.linspace(0, n - 1, max(2, most - len(keep)))}
     return np.array(sorted(keep), dtype=np.intp)

@@ -8,16 +8,20 @@ from itertools import groupby
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from controller.regions import Shape, Sphere
+from cosim.came import radii_of
 from cosim.errors import OrderError
 from cosim.flown_run import ORDERS, FlownRun
 from cosim.helm.course import way
 from cosim.helm.orders import MODES, Begin, Change, Item, Mission, Order, Steer
 from cosim.helm.settings import LiveSettings
 from cosim.helm.sources import read_log
+from cosim.record import Rows
 from cosim.replay.header import shape_of
 from cosim.scenario_tables import FAR_AWAY, SecondaryRegion
+from cosim.signals import Array
 from cosim.surroundings import middle_of
 
 Log = Sequence[tuple[int, Order]]  # step that took it, and what was ordered
@@ -78,35 +82,38 @@ class _Changes:
     """Follows the changes that were ordered, at once or by items of a mission, on settings of its own."""
 
     def __init__(self, run: FlownRun) -> None:
-        record = run.record
         self._step = run.scenario.time.step
         self._settings = LiveSettings(run.planned)
         self._middle = middle_of(run.planned.goal)
         self._index = {"goal": 0, **{r.region.name: i + 1 for i, r in enumerate(run.scenario.regions)}}
         self._gains = [run.scenario.goal_region.gain, *(r.region.gain for r in run.scenario.regions)]
-        self._radius = record["target.radius"]
-        self._in_mission = record["helm.mode"] == MODES.index("mission")
-        self._item = record["helm.item"]
+        self._last_row = len(run.record) - 1
+        self._changed, self._was = _steps_of(run.record)
         self._items: tuple[Item, ...] = ()
         self._at = -1  # item of the mission, as far as its orders were followed
 
     def of(self, log: Log) -> Iterator[dict[str, Any]]:
         """Yield what changes, step by step."""
         ordered = {k: [order for _, order in group] for k, group in groupby(log, key=lambda entry: entry[0])}
-        changed = [np.flatnonzero(np.diff(signal)) + 1 for signal in (self._radius, self._in_mission, self._item)]
-        rows = len(self._radius)
-        for k in sorted({0, *ordered, *(int(k) for steps in changed for k in steps)}):
+        for k in sorted({*ordered, *self._changed.tolist()}):
             orders = ordered.get(k, [])
             # the last order, such as a reset, may have come after the last row
-            row = min(k, rows - 1)
-            touched = {name for order in (*orders, *self._by_mission(orders, row)) if (name := self._follow(order))}
-            if (row and self._radius[row] != self._radius[row - 1]) or (not row and self._radius[0] > 0.0):
+            row = min(k, self._last_row)
+            radius, in_mission, item = self._at_row(row)
+            by_mission = self._by_mission(orders, int(item) if in_mission else None)
+            touched = {name for order in (*orders, *by_mission) if (name := self._follow(order))}
+            if radius != self._at_row(row - 1)[0] if row else radius > 0.0:
                 touched.add("goal")
             for name in sorted(touched, key=self._index.__getitem__):
-                yield self._change(name, k, float(self._radius[row]))
+                yield self._change(name, k, float(radius))
 
-    def _by_mission(self, orders: Iterable[Order], row: int) -> Iterator[Order]:
-        """Yield the orders of the items that begin in a step."""
+    def _at_row(self, row: int) -> Array:
+        """Return the target's radius, whether a mission is flown, and its item, shape (3,)."""
+        found: Array = self._was[np.searchsorted(self._changed, row, "right") - 1]
+        return found
+
+    def _by_mission(self, orders: Iterable[Order], now: int | None) -> Iterator[Order]:
+        """Yield the orders of the items that begin in a step, at an item or outside of a mission."""
         begun = False
         for order in orders:
             if isinstance(order, Mission):
@@ -115,10 +122,7 @@ class _Changes:
                 self._at, begun = order.item - 1, True
             elif isinstance(order, Steer) and order.mode == "mission":
                 self._at, begun = max(self._at, 0) - 1, True
-        if not self._in_mission[row]:
-            return
-        now = int(self._item[row])
-        if not 0 <= now < len(self._items) or (now == self._at and not begun):
+        if now is None or not 0 <= now < len(self._items) or (now == self._at and not begun):
             return
         for item in way(self._items, self._at, now) or [now]:
             yield from self._items[item].orders
@@ -145,17 +149,26 @@ class _Changes:
 
 def _sizes(run: FlownRun, index: int, secondary: SecondaryRegion) -> Iterator[dict[str, Any]]:
     """Yield the sizes with which an obstacle came, each at its time."""
-    name, record = secondary.region.name, run.record
-    shifts = record.stack([f"{name}.shift.{axis}" for axis in "xyz"])
-    there = np.flatnonzero(shifts.any(axis=1))
-    positions = record.stack([f"position.{axis}" for axis in "xyz"])[there]
-    radii = np.linalg.norm(positions - shifts[there] - FAR_AWAY, axis=1) - record[f"{name}.clearance"][there]
-    known = np.isfinite(radii)  # not where the pose is none
-    there, radii = there[known], radii[known]
-    fresh = np.abs(np.diff(radii, prepend=-np.inf)) > _SAME
-    for row, radius in zip(there[fresh], radii[fresh], strict=True):
-        shape = Sphere(FAR_AWAY, max(float(radius), _SAME))
-        yield _changed(float(record["time"][row]), index, shape, secondary.region.gain)
+    before = -np.inf
+    for times, radii in radii_of(run.record, secondary.region.name):
+        fresh = np.abs(np.diff(radii, prepend=before)) > _SAME
+        for time, radius in zip(times[fresh], radii[fresh], strict=True):
+            yield _changed(float(time), index, Sphere(FAR_AWAY, max(float(radius), _SAME)), secondary.region.gain)
+        before = radii[-1] if radii.size else before
+
+
+def _steps_of(record: Rows) -> tuple[NDArray[np.intp], Array]:
+    """Return the rows at which target or mission change, the first among them, and what they are from there on."""
+    first, rows, values, before = 0, [], [], np.full((1, 3), np.nan)
+    for block in record.blocks(["target.radius", "helm.mode", "helm.item"]):
+        item = block["helm.item"]
+        in_mission = (block["helm.mode"] == MODES.index("mission")) & np.isfinite(item)
+        told = np.column_stack([block["target.radius"], in_mission, item])
+        changed = np.flatnonzero((np.diff(told, axis=0, prepend=before) != 0.0).any(axis=1))
+        rows.append(first + changed)
+        values.append(told[changed])
+        first, before = first + len(told), told[-1:]
+    return np.concatenate(rows), np.concatenate(values)
 
 
 def _changed(time: float, index: int, shape: Shape, gain: float) -> dict[str, Any]:

@@ -12,9 +12,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from cosim.extremes import rows_at
 from cosim.flown_run import FlownRun
 from cosim.plain_json import plain
-from cosim.record import Record
+from cosim.record import Rows
 from cosim.replay.events import events_of
 from cosim.replay.header import header_of
 from cosim.replay.sampling import sampled_rows
@@ -22,6 +23,8 @@ from cosim.replay.steering import changes_of, log_of
 from cosim.replay.viewing import Viewing
 from cosim.report_words import verdict
 from cosim.signals import Array
+
+_FORCE = [f"command.{axis}" for axis in "XYZ"]
 
 
 @dataclass(frozen=True)
@@ -72,10 +75,11 @@ def trace_of(run: FlownRun) -> Trace:
     viewing = Viewing(scenario, record.columns)
     log = log_of(run)
     changes, events = changes_of(run, log), events_of(run, log)
-    time = record["time"]
     told = [t for event in events for t in (event.time, event.until) if t is not None]
-    moments = np.searchsorted(time, [*(change["time"] for change in changes), *told])
-    steps = sampled_rows(time, len(viewing.columns), _telling(run), moments)
+    moments = rows_at(record, [*(change["time"] for change in changes), *told])
+    clearances = ["goal.clearance", *(f"{secondary.region.name}.clearance" for secondary in scenario.regions)]
+    telling = (_telling(block, clearances) for block in record.blocks([*_FORCE, *clearances]))
+    steps = sampled_rows(record, len(viewing.columns), telling, 1 + len(clearances), moments)
     names = [record.columns[i].name for i in viewing.picked]
     picked, missing = _read(record, names, steps)
     # the goal's shape at the start: what it came to stands in the changes
@@ -91,19 +95,17 @@ def trace_of(run: FlownRun) -> Trace:
     return Trace(plain(header), viewing.extended(picked), steps)
 
 
-def _read(record: Record, names: Sequence[str], steps: NDArray[np.intp]) -> tuple[Array, NDArray[np.intp]]:
+def _read(record: Rows, names: Sequence[str], steps: NDArray[np.intp]) -> tuple[Array, NDArray[np.intp]]:
     """Read some rows of some signals; return them, and how many numbers of each signal are missing in all rows."""
     rows, missing, first = [], np.zeros(len(names), np.intp), 0
     for block in record.blocks(names):
         within = steps[(steps >= first) & (steps < first + len(block))] - first
-        rows.append(block[within])
-        missing += np.isnan(block).sum(axis=0)
+        rows.append(block.take(within).numbers())
+        missing += [np.count_nonzero(np.isnan(block[name])) for name in names]
         first += len(block)
     return np.concatenate(rows), missing
 
 
-def _telling(run: FlownRun) -> Array:
-    """Return the signals whose extremes a page must not miss, shape (steps, m)."""
-    clearances = [run.record[f"{secondary.region.name}.clearance"] for secondary in run.scenario.regions]
-    force = np.linalg.norm(run.record.stack([f"command.{axis}" for axis in "XYZ"]), axis=1)
-    return np.column_stack([run.record["goal.clearance"], force, *clearances])
+def _telling(rows: Rows, clearances: Sequence[str]) -> list[Array]:
+    """Return the signals whose extremes a page must not miss."""
+    return [np.linalg.norm(rows.stack(_FORCE), axis=1), *(rows[name] for name in clearances)]

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import time
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -81,6 +83,8 @@ class Flight:
         ------
         PlantError
             If the FMU fails.
+        RunError
+            If the record cannot be written.
         """
         self._master.step(self.steps)
         self._record()
@@ -94,21 +98,22 @@ class Flight:
     def _record(self) -> None:
         """Keep the row of the step that was made last, if it is due."""
         if self.steps % self._every == 0:
-            self._recorder.observe(self.steps, self._master.row)
+            with self._writing():
+                self._recorder.observe(self.steps, self._master.row)
 
     def end(self) -> None:
-        """Close plant and record. May be called twice."""
+        """Close plant and record; RunError if it cannot be written. May be called twice."""
         if self._wall_time is not None:
             return
         self._wall_time = time.perf_counter() - self._started
-        if self.done:  # the last row: it moves nothing
-            self._master.step(self.steps)
-            self._record()
-        self._master.close()
-        if self._recorder.rows:
-            self._recorder.close()
-        else:  # nothing to read: leave nothing behind
-            self._claimed.discard()
+        try:
+            if self.done:  # the last row: it moves nothing
+                self._master.step(self.steps)
+                self._record()
+        finally:
+            self._master.close()
+            with self._writing():
+                self._claimed.keep(self._recorder)
 
     def conclude(self, status: str, report: bool) -> dict[str, Any]:
         """Write the summary of a flight that has ended, and made a step.
@@ -130,7 +135,12 @@ class Flight:
         RunError
             If the folder cannot be written.
         """
-        try:
+        with self._writing():
             return conclude(self.folder, self.scenario, status, self._wall_time, report)
+
+    @contextlib.contextmanager
+    def _writing(self) -> Iterator[None]:
+        try:
+            yield
         except OSError as error:
             raise RunError(f"{self.folder}: {error.strerror or error}") from error

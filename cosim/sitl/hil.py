@@ -67,8 +67,6 @@ class HilServer:
     ------
     RunError
         If the address cannot be bound.
-    TelemetryError
-        If pymavlink is not installed.
     """
 
     def __init__(

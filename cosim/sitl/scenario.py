@@ -56,4 +56,5 @@ def scenario_to_fly(
     for key, period in (("duration", given.time.duration), ("arbiter", given.time.arbiter), ("control", step)):
         changes.append(f"time.{key}={min(max(1, round(period * frame_rate)), MAX_STEPS) * step!r}")
     scenario = load_scenario(name_or_file, [*changes, f"time.step={step!r}"])
-    return dataclasses.replace(scenario, law=dataclasses.replace(scenario.law, name=autopilot))
+    table = scenario.table | {"changed": given.table["changed"]}  # its steps are the autopilot's, which the title names
+    return dataclasses.replace(scenario, law=dataclasses.replace(scenario.law, name=autopilot), table=table)

@@ -19,8 +19,13 @@ the same with `--help`. Words without dashes are required unless they stand in b
 so; `...` stands for several.
 
 Exit codes: 0; 1 where a check fails; 2 where the user must mend something, said in one line on standard error; 130
-after Ctrl-C.
+after Ctrl-C, SIGTERM or SIGHUP (a closed terminal), which leave a readable run; 141 where whoever reads the output goes
+away, as `head` does. `-v` and `-q` of `cosim` may stand behind the verb, too.
+
+`cosim completion bash`, `zsh` or `fish` prints a script by which the shell completes verbs, flags, shipped scenarios
+and files; `cosim completion --help` says where each shell looks for it.
 """
+_EVERYWHERE = {"verbose", "quiet"}
 _EXAMPLES = """<!-- not run: excerpt of the help, whose examples a test parses -->
 ```text
 {}
@@ -51,9 +56,13 @@ def verbs(parser: argparse.ArgumentParser) -> Iterator[tuple[str, argparse.Argum
 
 
 def _own(parser: argparse.ArgumentParser) -> list[argparse.Action]:
-    """Return the arguments of a parser that the page lists: all but help and verbs."""
+    """Return the arguments of a parser that the page lists: all but help, verbs, and what goes with every verb."""
     left_out = (argparse._HelpAction, argparse._SubParsersAction)
-    return [a for a in parser._actions if not isinstance(a, left_out) and a.help is not argparse.SUPPRESS]
+    return [
+        a
+        for a in parser._actions
+        if not isinstance(a, left_out) and not (a.dest in _EVERYWHERE and a.default is argparse.SUPPRESS)
+    ]
 
 
 def _called(action: argparse.Action, which: int) -> str:

@@ -110,14 +110,6 @@ def test_missing_compiler_is_one_line(tmp_path, capsys, monkeypatch):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_mavlink_without_pymavlink_is_one_line(tmp_path, capsys, monkeypatch):
-    monkeypatch.setitem(sys.modules, "pymavlink.dialects.v20", None)
-    arguments = ["run", "paper", "--mavlink", "udpout:127.0.0.1:14550", "--out", str(tmp_path / "run"), *QUICK]
-    assert main(arguments) == 2
-    assert "pip install 'subreach[mavlink]'" in capsys.readouterr().err
-    assert list(tmp_path.iterdir()) == []
-
-
 @pytest.mark.slow
 def test_report_makes_the_report_again(tmp_path, capsys):
     out = tmp_path / "run"
@@ -145,7 +137,7 @@ def test_a_reader_that_goes_away_is_no_trouble():
 def test_verbose_tells_of_us_alone(tmp_path):
     command = [sys.executable, "-m", "cosim", "-v", "run", "paper", "--out", str(tmp_path / "run"), *QUICK]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
-    assert all(line.split(".")[0] in ("cosim", "plant_fmu") for line in done.stderr.splitlines())
+    assert all(line.startswith(("cosim", "plant_fmu")) for line in done.stderr.splitlines())
 
 
 @pytest.mark.slow
@@ -174,6 +166,7 @@ def test_ctrl_c_is_heeded_from_the_first_imports(tmp_path, delay):
         "cosim",
         "run",
         "paper",
+        "--quiet",  # else it might say that it compiles
         "--set",
         "time.duration=3000",
         "--out",
@@ -192,7 +185,7 @@ def test_ctrl_c_is_heeded_from_the_first_imports(tmp_path, delay):
 
 @pytest.mark.skipif(os.name != "posix", reason="sends signals")
 @pytest.mark.slow
-@pytest.mark.parametrize("sent", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("sent", [signal.SIGINT, signal.SIGTERM, getattr(signal, "SIGHUP", None)])
 def test_ctrl_c_ends_a_real_run_readably(tmp_path, sent):
     """The process as a user has it: from the start of stepping to a report, no traceback."""
     out = tmp_path / "run"

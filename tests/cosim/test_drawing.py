@@ -50,7 +50,7 @@ def test_what_moved_is_drawn_where_it_began_where_it_ended_and_where_it_mattered
     assert list(first.shift) == [0.0, 0.0, 0.0]
     assert last.shift == pytest.approx([-8.0, 2.6, 0.0])
     path = drifting.record.stack(["position.x", "position.y", "position.z"])
-    centre = np.array(nearest.region.shape.centre) + shifts_of(drifting, "crossing buoy")
+    centre = np.array(nearest.region.shape.centre) + shifts_of(drifting.record, "crossing buoy")
     at = np.argmin(np.linalg.norm(path - centre, axis=1))
     assert 20 < at < 180
     assert nearest.shift == pytest.approx(centre[at] - nearest.region.shape.centre)
@@ -66,7 +66,7 @@ def test_every_figure_can_be_drawn(request, name):
     assert labels == (["clearance [m]", "clearance [°]"] if name == "inspection" else ["clearance [m]"])
     (error,) = figures["position-error"].figure.axes
     drawn = error.lines[0].get_ydata()
-    centre = np.array(story.scenario.goal.centre) + shifts_of(story, "goal")
+    centre = np.array(story.scenario.goal.centre) + shifts_of(story.record, "goal")
     path = story.record.stack(["position.x", "position.y", "position.z"])
     assert drawn == pytest.approx(np.linalg.norm(path - centre, axis=1) / np.sqrt(3.0))
 

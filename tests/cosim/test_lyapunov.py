@@ -6,9 +6,10 @@ import pytest
 from cosim.errors import ScenarioError
 from cosim.lyapunov import FORMS, summarise_lyapunov
 from cosim.master import Master
-from cosim.record import load_record
+from cosim.record import Rows, load_record
 from cosim.run import run_scenario
 from cosim.scenario import load_scenario
+from cosim.signals import Column
 
 QUICK = ("arbiter.engine=closed", "record.lyapunov=true")
 ALONE = ("regions=[]", "intersection=[]")
@@ -100,16 +101,13 @@ def test_recording_changes_nothing_else(shipped_run):
 
 
 def test_summary_counts_rises():
-    class Stub(dict):
-        units = ("lyapunov.rate",)
-
     signals = {"time": np.arange(6) * 0.5, "lyapunov.rate": np.zeros(6)}
     signals |= {
         "lyapunov.printed": np.array([5.0, 4.0, 4.0, 4.5, 4.6, 1.0]),
         "lyapunov.normalised": np.array([5.0, 4.0, 3.0, -1.0, -1.0 + 1e-12, -2.0]),  # rises by rounding alone
         "lyapunov.primary": np.array([5.0, 4.0, 3.0, 2.0, 1.0, 0.0]),
     }
-    summary = summarise_lyapunov(Stub(signals))
+    summary = summarise_lyapunov(Rows([Column(name, "", "") for name in signals], signals))
     assert summary["printed"]["increases"] == 2
     assert summary["printed"]["first_rise"] == 1.0
     assert summary["printed"]["first_negative"] is None

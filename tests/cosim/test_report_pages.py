@@ -101,6 +101,18 @@ def test_the_same_run_gives_the_same_pdf(folder):
     assert (folder / "report.pdf").read_bytes() == first
 
 
+@pytest.mark.parametrize("formats", ["html", "pdf,html,png"])
+def test_every_path_that_was_written_is_printed(shipped_run, tmp_path, capsys, formats):
+    folder = tmp_path / "run"
+    shutil.copytree(shipped_run("paper", *SHORT).folder, folder)
+    (folder / "summary.json").unlink()
+    before = set(folder.rglob("*"))
+    assert main(["report", str(folder), "--format", formats, "-q"]) == 0
+    printed = capsys.readouterr().out.splitlines()
+    assert sorted(printed) == sorted(str(file) for file in set(folder.rglob("*")) - before if file.is_file())
+    assert printed[:2] == [str(folder / "report.html"), str(folder / "replay.html")]
+
+
 def test_one_bad_folder_does_not_keep_the_others_from_their_report(shipped_run, tmp_path, capsys):
     good, bad = tmp_path / "good", tmp_path / "bad"
     shutil.copytree(shipped_run("paper", *SHORT).folder, good)

@@ -12,7 +12,7 @@ from cosim.recorder import Recorder
 from cosim.run import run_scenario
 from cosim.run_folder import claim, report_again
 from cosim.scenario import load_scenario
-from cosim.summary import spans
+from cosim.spans import spans
 from plant_fmu import PlantError
 
 SHORT = ["arbiter.engine=closed", "time.duration=0.3"]

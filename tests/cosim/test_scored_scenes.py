@@ -1,25 +1,20 @@
 """The score of the deployable law over scenes that nobody tuned it on, and beside the laws it is compared with."""
 
-import json
-
 import msgspec
 import numpy as np
 import pytest
 
-from benchmarks.scenes import scene
 from cosim.scene import Scene
+from cosim.scene_generator import generate_scenes
 from cosim.scene_run import Conditions, SceneFlyer
 
 BASELINES = ["pd", "sun_cheah", "unarbitrated", "antonelli"]
 
 
 def scores(law, first, count, hard=False, tell=False):
-    flown = []
     with SceneFlyer(law, Conditions(tell_failures=tell)) as flyer:
-        for seed in range(first, first + count):
-            known = msgspec.json.decode(json.dumps(scene(seed, hard)), type=Scene)
-            flown.append(flyer.fly(known)[0])
-    return flown
+        scenes = generate_scenes(count, first, "hard" if hard else "plain")
+        return [flyer.fly(msgspec.json.decode(line, type=Scene))[0] for line in scenes]
 
 
 @pytest.mark.slow

@@ -30,27 +30,36 @@ def run(*command: object, **more: object) -> str:
     return done.stdout
 
 
+def build(tracked: list[str], folder: Path, *flags: str) -> None:
+    """Build what is shipped, in a folder, from a clean copy of the checkout."""
+    copy = folder / "copy"
+    for name in tracked:
+        (copy / name).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy(ROOT / name, copy / name)
+    clean = {key: value for key, value in os.environ.items() if key != "PYTHONPATH"}
+    run(sys.executable, "-m", "build", "--no-isolation", *flags, "--outdir", folder, copy, env=clean)
+    assert sorted(path.relative_to(copy).as_posix() for path in copy.rglob("*.zip")) == [], "left in the checkout"
+
+
 @pytest.fixture(scope="session")
 def dist(tracked, once) -> Path:
     """Return a folder with the source distribution and the wheel that is built from it."""
     pytest.importorskip("ziglang", reason="the build extra is not installed: nothing compiles for all platforms")
 
-    def build(folder: Path) -> None:
-        copy = folder / "copy"
-        for name in tracked:
-            (copy / name).parent.mkdir(parents=True, exist_ok=True)
-            shutil.copy(ROOT / name, copy / name)
-        clean = {key: value for key, value in os.environ.items() if key != "PYTHONPATH"}
-        run(sys.executable, "-m", "build", "--no-isolation", "--outdir", folder, copy, env=clean)
-        assert sorted(path.relative_to(copy).as_posix() for path in copy.rglob("*.zip")) == [], "left in the checkout"
-
-    return once("dist", build)
+    return once("dist", lambda folder: build(tracked, folder))
 
 
 @pytest.fixture(scope="session")
 def wheel(dist) -> Path:
     """Return the wheel."""
     (path,) = dist.glob("*.whl")
+    return path
+
+
+@pytest.fixture(scope="session")
+def own_wheel(tracked, once) -> Path:
+    """Return a wheel that is built from a checkout, as ``pip install .`` does."""
+    (path,) = once("own-wheel", lambda folder: build(tracked, folder, "--wheel")).glob("*.whl")
     return path
 
 

@@ -7,11 +7,13 @@ from email import message_from_string
 from pathlib import PurePosixPath
 
 import fmpy
+import packaging.tags
+import packaging.utils
 import pytest
 from fmpy.validation import validate_fmu
 
 from plant_fmu import build_fmu, cached_fmu, load_vehicle, prebuilt, shipped_vehicles
-from plant_fmu.platforms import PLATFORMS
+from plant_fmu.platforms import PLATFORMS, native_platform
 from tests.packaging.conftest import ROOT
 from tests.plant_fmu.test_sources import trajectory
 
@@ -81,7 +83,7 @@ def test_each_dependency_has_a_lower_bound(project):
     extras = [text for texts in project["optional-dependencies"].values() for text in texts]
     for text in (*project["dependencies"], *extras):
         assert ">=" in text or text.startswith("subreach["), text
-    wanted = {"build", "campaign", "importers", "mavlink", "mcap", "rerun", "view"}
+    wanted = {"build", "campaign", "importers", "mcap", "rerun"}
     (everything,) = project["optional-dependencies"]["all"]
     assert set(everything.removeprefix("subreach[").removesuffix("]").split(",")) == wanted
 
@@ -90,6 +92,38 @@ def test_libraries_are_there_for_every_platform(unpacked):
     for path in (unpacked / "plant_fmu" / "prebuilt").iterdir():
         with zipfile.ZipFile(path) as archive:
             assert sorted(archive.namelist()) == sorted(f"{p.name}{p.suffix}" for p in PLATFORMS.values())
+
+
+def test_a_wheel_of_a_checkout_is_for_this_machine_and_says_so(own_wheel, wheel):
+    with zipfile.ZipFile(own_wheel) as ours, zipfile.ZipFile(wheel) as released:
+        names, everywhere = (
+            {name for name in archive.namelist() if ".dist-info/" not in name} for archive in (ours, released)
+        )
+        assert names == everywhere
+        here = native_platform()
+        for name in {f"plant_fmu/prebuilt/{name}" for name in expected_libraries()}:
+            with zipfile.ZipFile(ours.open(name)) as libraries:
+                assert libraries.namelist() == [f"{here.name}{here.suffix}"]
+    (tag,) = packaging.utils.parse_wheel_filename(own_wheel.name)[3]
+    assert tag in packaging.tags.sys_tags() and tag.platform != "any"
+
+
+def test_a_checkout_needs_ziglang_for_this_machine_only_without_a_compiler(monkeypatch):
+    monkeypatch.chdir(ROOT)
+    monkeypatch.syspath_prepend(str(ROOT))
+    import hatch_build
+
+    def asks(what):
+        return {text.partition(">")[0] for text in getattr(hatch_build, f"get_requires_for_build_{what}")()}
+
+    plant = {"fmpy", "msgspec", "numpy", "platformdirs"}
+    monkeypatch.setattr("shutil.which", lambda name: "/usr/bin/cc")
+    assert asks("wheel") == plant
+    assert asks("sdist") == plant | {"ziglang"}
+    assert not asks("editable") & {*plant, "ziglang"}
+    monkeypatch.setattr("shutil.which", lambda name: None)
+    monkeypatch.delenv("CC", raising=False)
+    assert asks("wheel") == plant | {"ziglang"}
 
 
 @pytest.mark.parametrize("vehicle", shipped_vehicles())

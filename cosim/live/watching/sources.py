@@ -9,11 +9,13 @@ import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 from urllib.parse import urlsplit
 
+import msgspec
 import numpy as np
 
+from cosim.columns import require_columns
 from cosim.errors import RunError, TelemetryError
 from cosim.flown_run import SCENARIO, SUMMARY, load_run
 from cosim.live.messages import rows_of
@@ -30,6 +32,40 @@ _ROWS = 10_000  # of a finished run
 _FRESH = 5.0  # s; parts of a record that are older are not written any more
 _ANSWER = 5.0  # s, that a live view may take to answer
 _GREATEST = 1 << 26  # bytes of a message
+
+
+class _Signal(msgspec.Struct):
+    name: str
+
+
+class _Region(msgspec.Struct):
+    name: str
+    criterion: Literal["obstacle", "shape", "depth"] | None
+    keep: str
+    unit: str
+    comes: bool
+
+
+class _Rule(msgspec.Struct):
+    label: str
+    words: str
+
+
+class _Truth(msgspec.Struct):
+    estimate: tuple[float, float, float, float]
+
+
+class _Header(msgspec.Struct):
+    """What a picture takes of the header of a live view, which may be another's."""
+
+    title: str
+    law: str
+    duration: float
+    ramp: float
+    regions: list[_Region]
+    rules: list[_Rule]
+    signals: list[_Signal]
+    truth: _Truth
 
 
 @dataclass(frozen=True)
@@ -92,10 +128,10 @@ def _newest(found: Iterator[Look]) -> Iterator[Look]:
 def _finished(path: Path, rate: float | None, once: bool) -> Iterator[Look]:
     run = load_run(path)
     viewing = Viewing(run.scenario, run.record.columns)
-    record, steps = run.record, len(run.record["time"])
+    record, steps = run.record, len(run.record)
     # no picture needs more rows than these, and all of a long run would not fit into memory
     rows = np.arange(steps - 1, -1, -max(1, steps // _ROWS))[::-1] if not once else np.array([steps - 1])
-    picked = np.column_stack([record[record.columns[i].name][rows] for i in viewing.picked])
+    picked = record.take(rows, [record.columns[i].name for i in viewing.picked]).numbers()
     times, ended = picked[:, 0], (str(run.summary["status"]), verdict(run.summary))
     header = header_of(run.scenario, viewing.columns)
 
@@ -128,7 +164,6 @@ def _is_written(path: Path) -> bool:
 
 def _growing(path: Path) -> Iterator[Look]:
     scenario = load_scenario(path / SCENARIO)
-    viewing: Viewing | None = None
     header: dict[str, Any] = header_of(scenario, ())
     row: Array | None = None
     known, since = "", time.monotonic()
@@ -137,17 +172,18 @@ def _growing(path: Path) -> Iterator[Look]:
         if newest > known:
             try:
                 record = Record([path / PARTS / newest])
-                viewing = viewing or Viewing(scenario, record.columns)
+                require_columns(scenario, record)
+                viewing = Viewing(scenario, record.columns)
                 header = header_of(scenario, viewing.columns)
-                *_, block = record.blocks()
+                if not len(record):
+                    raise ValueError("it is empty")
+                last = record.take([len(record) - 1]).numbers()
             except RunError:
                 if (path / PARTS / newest).exists():
                     raise
                 continue  # the run ends: its parts have just been joined
-            except ValueError as error:
-                raise RunError(f"{path}: the record is not of its scenario: {error}") from error
             known, since = newest, time.monotonic()
-            row = viewing.extended(block[-1:, viewing.picked])[0]
+            row = viewing.extended(last[:, viewing.picked])[0]
         silent = time.monotonic() - since
         wait = f"no new rows for {silent:.0f} s: waiting, writing its report, or killed"
         fresh = silent < _FRESH
@@ -172,11 +208,9 @@ def _endpoint(what: str) -> tuple[str, int]:
 
 
 def _live(endpoint: tuple[str, int]) -> Iterator[Look]:
-    try:
-        from websockets.exceptions import WebSocketException
-        from websockets.sync.client import connect
-    except ImportError as error:
-        raise TelemetryError("a live view needs websockets; pip install 'subreach[view]'") from error
+    from websockets.exceptions import WebSocketException
+    from websockets.sync.client import connect
+
     url = f"ws://{endpoint[0]}:{endpoint[1]}/ws"
     header: dict[str, Any] | None = None
     try:
@@ -192,6 +226,7 @@ def _live(endpoint: tuple[str, int]) -> Iterator[Look]:
                 else:
                     told = json.loads(message)
                     if told["type"] == "header":
+                        msgspec.convert(told["run"], _Header)
                         header, row = told["run"], None
                     elif told["type"] == "end" and header is not None:
                         yield Look(header, row, f"live at {url}", (told["status"], told["verdict"]))

@@ -11,8 +11,10 @@ import pytest
 from cosim.campaigns import compare, run_campaign, run_sweep
 from cosim.campaigns.campaign_page import write_campaign_page
 from cosim.campaigns.comparison_page import write_comparison_page
-from cosim.campaigns.figures import shares_up_to
+from cosim.campaigns.figures import distributions, shares_up_to
 from cosim.campaigns.page import Page, number
+from cosim.campaigns.sections import Group, quantiles_table
+from cosim.campaigns.statistics import quantiles
 from cosim.campaigns.sweep_page import write_sweep_page
 from cosim.cli import main
 from cosim.errors import RunError
@@ -187,11 +189,18 @@ def test_what_is_no_complete_campaign_has_no_page(tmp_path, fakes):
 def test_the_page_of_a_sweep(tmp_path, fakes):
     run_sweep(paper(), design(40), tmp_path / "out", "choosy")
     checker = check(write_sweep_page(tmp_path / "out", 0))
-    assert ["law.gains.k_p1", "10 to 30"] in checker.rows and [
-        "regions.SR1.gain",
-        "500 to 5000, logarithmic",
-    ] in checker.rows
-    assert any("+1.00" in row for row in checker.rows if row[0] == "reach_time")
+    assert ["gain k_p1 [N/m3]", "law.gains.k_p1", "10 to 30"] in checker.rows
+    assert ["gain of SR1", "regions.SR1.gain", "500 to 5000, logarithmic"] in checker.rows
+    head = ["", "start position y [m]", "gain of SR1", "gain k_p1 [N/m3]", "chance reaches"]
+    told = {row[0]: row[1:] for row in checker.rows[checker.rows.index(head) + 1 :]}
+    share = json.loads((tmp_path / "out" / "summary.json").read_text())["effects"]["initial.position.1"]["violated"]
+    assert (
+        told["violated a hard region"][0] == f"{100 * share['share']:.0f}\N{NO-BREAK SPACE}%, ρ\N{NO-BREAK SPACE}+0.87"
+    )
+    assert told["violated a hard region"][-1] == f"{100 * share['floor']:.0f}\N{NO-BREAK SPACE}%"
+    assert told["least clearance [m]"][0].endswith("ρ\N{NO-BREAK SPACE}+1.00") and told["effort [N s]"][0] == "", (
+        "it is all of the gain"
+    )
     assert sum("expected less" in row[-1] for row in checker.rows) == 5
     names = {p.stem for p in (tmp_path / "out" / "figures").iterdir()}
     assert names == {"rates", "distributions", "depends", "by-min-clearance", "by-reach-time"}
@@ -233,6 +242,26 @@ def test_text_of_a_page_is_escaped():
 )
 def test_numbers_of_tables(x, text):
     assert number(x) == text
+
+
+@pytest.mark.parametrize("n", [1, 2, 5, 40, 1001, 1000], ids=lambda n: f"{n} numbers")
+@pytest.mark.parametrize("never", [0, 3])
+def test_the_dot_of_the_median_is_the_number_of_the_table(n, never):
+    """Of an even number of rows the median lies between two, and so does the dot; both leave out what never comes."""
+    values = np.append(np.random.default_rng(n).exponential(size=n), np.full(never, np.nan))
+    (drawn,) = distributions({"effort": {"": values}}, "")
+    (axes,) = (axes for axes in drawn.figure.axes if axes.get_visible())
+    (dot,) = (line for line in axes.lines if line.get_marker() == "o")
+    page = Page("")
+    quantiles_table(page, [Group("", len(values), {}, {"effort": quantiles(values)})])
+    ((_, *head), (_, *row)) = Checker(page.html()).rows
+    assert number(dot.get_xdata()[0]) == row[head.index("median")]
+    finite = sorted(values[:n])
+    assert dot.get_xdata()[0] == pytest.approx((finite[(n - 1) // 2] + finite[n // 2]) / 2)
+    (curve,) = (line for line in axes.lines if line is not dot)
+    x, shares = curve.get_data()
+    below = shares[x < dot.get_xdata()[0]][-1:].sum()
+    assert below <= dot.get_ydata()[0] <= shares[x >= dot.get_xdata()[0]][0], "the dot lies on the curve"
 
 
 def test_shares_count_what_never_comes():

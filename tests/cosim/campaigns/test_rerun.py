@@ -51,7 +51,7 @@ def test_a_row_of_a_sweep_comes_again_to_the_last_bit_and_as_a_run(folder, tmp_p
     assert main(["rerun", str(folder), "4", "--out", str(tmp_path / "run")]) == 0
     said = capsys.readouterr().out.splitlines()
     assert said[0] == "row 4: flown again, identical to the last bit"
-    assert said[-1] == str(tmp_path / "run" / "report.html")
+    assert said[-2:] == [str(tmp_path / "run" / name) for name in ("report.html", "replay.html")]
     row = pq.read_table(folder / RESULTS).to_pylist()[4]
     scenario = load_scenario(tmp_path / "run" / "scenario.toml")
     assert scenario.initial.position[1] == row["initial.position.1"] and scenario.sensing.seed == row["seed"]

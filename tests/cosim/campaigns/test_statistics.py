@@ -5,9 +5,11 @@ import math
 
 import numpy as np
 import pytest
+from scipy.stats import f as f_test
+from scipy.stats import f_oneway, spearmanr
 
 from cosim.campaigns.scene_rows import row_of
-from cosim.campaigns.statistics import bins, median_difference, paired, rate
+from cosim.campaigns.statistics import bins, effect, median_difference, paired, rate
 from cosim.campaigns.worst import worst_rows
 from cosim.scene_run import Score
 from tests.cosim.campaigns.scenes import results_of
@@ -37,6 +39,107 @@ def test_bins_hold_every_row_once_and_about_as_many():
         assert all(part.low <= part.middle <= part.high for part in parts)
     assert [part.rows.sum() for part in bins(np.arange(600.0))] == [100] * 6
     assert [part.low for part in bins(np.array([2.0, 1.0, 2.0]))] == [1.0, 2.0]
+
+
+def ishigami(x, a=7.0, b=0.1):
+    """Return Ishigami's function of columns of even numbers from -pi to pi, and its first-order indices (1990)."""
+    one, three = (1.0 + b * math.pi**4 / 5.0) ** 2 / 2.0, 8.0 * b**2 * math.pi**8 / 225.0
+    total = one + a**2 / 8.0 + three
+    y = np.sin(x[:, 0]) + a * np.sin(x[:, 1]) ** 2 + b * x[:, 2] ** 4 * np.sin(x[:, 0])
+    return y, [one / total, a**2 / 8.0 / total, 0.0]
+
+
+@pytest.mark.parametrize(("n", "times", "within"), [(100, 100, 0.04), (1000, 10, 0.02), (20_000, 1, 0.01)])
+def test_effects_are_the_first_order_indices_of_ishigami(n, times, within):
+    rng = np.random.default_rng(3)
+    found = []
+    for _ in range(times):
+        x = rng.uniform(-math.pi, math.pi, (n, 3))
+        y, known = ishigami(x)
+        found.append([effect(column, y)["share"] for column in x.T])
+    assert np.mean(found, axis=0) == pytest.approx(known, abs=within)
+
+
+@pytest.mark.parametrize("n", [100, 1000])
+def test_an_effect_that_goes_down_and_up_again_is_seen(n):
+    """Half of the variance of y is that of x², of which a rank correlation sees nothing."""
+    rng = np.random.default_rng(4)
+    shares, correlations, seen = [], [], []
+    for _ in range(100):
+        x = rng.uniform(-1.0, 1.0, n)
+        y = x**2 + rng.normal(scale=math.sqrt(4.0 / 45.0), size=n)
+        found = effect(x, y)
+        shares.append(found["share"])
+        seen.append(found["share"] > found["floor"])
+        correlations.append(spearmanr(x, y).statistic)
+    assert np.mean(shares) == pytest.approx(0.5, abs=0.03) and abs(np.mean(correlations)) < 0.05
+    assert np.mean(seen) > 0.97
+
+
+def test_a_fact_that_happens_in_the_middle_is_seen():
+    """A violation with the chance exp(-y²/2) peaks at y = 0."""
+    rng = np.random.default_rng(5)
+    y = rng.uniform(-3.0, 3.0, 300)
+    violated = (rng.random(300) < np.exp(-(y**2) / 2.0)).astype(float)
+    found = effect(y, violated)
+    assert found["share"] > 2.0 * found["floor"] and abs(spearmanr(y, violated).statistic) < 0.15
+    even = np.linspace(-3.0, 3.0, 100_001)
+    chance = np.exp(-(even**2) / 2.0)
+    assert found["share"] == pytest.approx(np.var(chance) / (chance.mean() * (1.0 - chance.mean())), abs=0.1)
+
+
+OUTCOMES = {
+    "normal": lambda rng, n: rng.normal(size=n),
+    "skewed": lambda rng, n: rng.exponential(size=n) ** 2,
+    "rare": lambda rng, n: (rng.random(n) < 0.05).astype(float),
+    "far from 0": lambda rng, n: 1e9 + rng.random(n),
+}
+
+
+@pytest.mark.parametrize("kind", OUTCOMES)
+@pytest.mark.parametrize("values", [None, 4], ids=["range", "four values"])
+def test_chance_alone_comes_above_the_floor_in_a_hundredth_of_all_cells(kind, values):
+    rng = np.random.default_rng(6)
+    found = []
+    for _ in range(500):
+        x = rng.uniform(size=100) if values is None else rng.integers(0, values, 100).astype(float)
+        found.append(effect(x, OUTCOMES[kind](rng, 100)))
+    above = np.mean([of["share"] > of["floor"] for of in found if of])
+    assert above < 0.03 and np.mean([of["share"] for of in found if of]) == pytest.approx(0.0, abs=0.01)
+
+
+def test_the_floor_is_that_of_the_analysis_of_variance():
+    rng = np.random.default_rng(7)
+    decided = []
+    for _ in range(200):
+        x = rng.integers(0, 5, 60).astype(float)
+        y = 0.2 * x + rng.normal(size=60)
+        found = effect(x, y)
+        test = f_oneway(*(y[x == value] for value in range(5)))
+        assert (found["share"] > found["floor"]) == (test.pvalue < 0.01)
+        f = test.statistic
+        assert found["share"] == pytest.approx(4 * (f - 1.0) / (4 * f + 55))  # Kelley (1935)
+        decided.append(test.pvalue < 0.01)
+    assert 0.1 < np.mean(decided) < 0.9, "both are asked"
+
+
+def test_the_share_is_the_adjusted_one_of_a_line_in_each_bin():
+    rng = np.random.default_rng(8)
+    x, y = rng.uniform(size=(2, 100))
+    of = np.argsort(np.argsort(x)) // 20
+    fit = np.column_stack([(of == i) * power for i in range(5) for power in (np.ones(100), x)])
+    rest = np.linalg.lstsq(fit, y)[1][0]
+    found = effect(x, y)
+    assert found["share"] == pytest.approx(1.0 - (rest / 90.0) / np.var(y, ddof=1))
+    at_floor = (1.0 - found["floor"]) * 90.0 / 99.0  # of the variance is left by a fit that is at the floor
+    assert f_test.sf((1.0 - at_floor) / 9.0 / (at_floor / 90.0), 9, 90) == pytest.approx(0.01)
+
+
+def test_there_is_no_effect_of_what_is_constant_or_too_few():
+    x = np.linspace(0.0, 1.0, 50)
+    assert effect(x, np.full(50, 0.1)) is None and effect(np.ones(50), x) is None
+    assert effect(x[:15], x[:15]) is None and effect(x[:0], x[:0]) is None
+    assert effect(x, 1e9 + x)["share"] == pytest.approx(1.0)
 
 
 def test_the_exact_test_counts_how_coins_fall():

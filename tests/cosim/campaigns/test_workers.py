@@ -58,12 +58,12 @@ def test_a_killed_campaign_goes_on_by_the_same_command(tmp_path, command, whole)
 
 @needs_posix
 @pytest.mark.slow
-@pytest.mark.parametrize("workers", [1, 2])
-def test_ctrl_c_keeps_what_is_done(tmp_path, command, workers):
+@pytest.mark.parametrize(("workers", "sent"), [(1, signal.SIGINT), (2, signal.SIGINT), (2, signal.SIGHUP)])
+def test_ctrl_c_or_a_closed_terminal_keeps_what_is_done(tmp_path, command, workers, sent):
     scenes = write(tmp_path / "s.jsonl", many(2 * N))
     interrupted = command("campaign", scenes, "--law", "printed", "--workers", workers)
     interrupted.wait_for_parts(2)
-    os.killpg(interrupted.process.pid, signal.SIGINT)  # as a terminal does
+    os.killpg(interrupted.process.pid, sent)  # as a terminal does
     said, complaints = interrupted.process.communicate(timeout=240)
     assert interrupted.process.returncode == 130
     assert (

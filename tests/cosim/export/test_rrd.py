@@ -6,7 +6,7 @@ import pytest
 from cosim.export import export_run
 from cosim.record import load_record
 
-pytest.importorskip("rerun", reason="rerun-sdk is not installed; pip install 'subreach[rerun]'")
+pytest.importorskip("rerun", reason="rerun-sdk is not installed")
 chunks_of = pytest.importorskip("rerun.chunk", reason="rerun-sdk is too old to read its files in Python").RrdReader
 
 

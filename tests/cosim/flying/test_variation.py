@@ -25,7 +25,9 @@ def test_values_make_the_scenario_that_the_same_settings_make_of_the_file(paper,
     made = variation.scenario(VALUES, 7)
     file = tmp_path / "base.toml"
     file.write_text(paper.toml())
-    assert made.table == load_scenario(file, variation.overrides(VALUES, 7)).table | {"title": made.title}
+    assert made.table == load_scenario(file, variation.overrides(VALUES, 7)).table | {
+        "changed": tuple(key for key in KEYS if key != "goal.centre.2")  # which has that value already
+    }
     assert made.initial.position[1] == 0.1 and made.plant.parameters["r_B.z"] == 0.01 and made.steps == 30_000
     assert made.sensing.seed == 7 and made.plant.parameters["seed"] == 7
     assert paper.initial.position[1] == 0.0, "the base stays as it is"

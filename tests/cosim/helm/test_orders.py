@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from cosim.errors import OrderError, RunError
-from cosim.helm import LoggedOrders, OrderQueue, RecordedOrders
+from cosim.helm import LiveSettings, LoggedOrders, OrderQueue, RecordedOrders
 from cosim.helm.orders import (
     MODES,
     Aim,
@@ -27,6 +27,7 @@ from cosim.helm.orders import (
     check_order,
 )
 from cosim.helm.sources import QUEUED
+from cosim.scenario import load_scenario
 
 number = st.floats(-1e4, 1e4)
 place = st.tuples(number, number, number)
@@ -162,3 +163,38 @@ def test_a_line_of_the_log_reads_well(tmp_path):
         "step": 7,
         "order": {"order": "aim", "position": [1.0, 2.0, 3.0], "radius": 0.5, "velocity": [0.0, 0.0, 0.0]},
     }
+
+
+ARMED = b'{"step":0,"order":{"order":"arm","armed":true}}\n'
+UNREADABLE = {
+    "bad UTF-8": b'{"step":1,"order":{"order":"move","region":"\xff","by":[0,0,0]}}',
+    "bad UTF-8 in a key": b'{"step":1,"ord\xffer":{"order":"reset"}}',
+    "5,000 nested braces": b'{"step":1,"order":' + b'{"a":' * 5000,
+    "5,000 nested brackets": b'{"step":1,"order":{"items":' + b"[" * 5000,
+    "a step below 0": b'{"step":-1,"order":{"order":"reset"}}',
+    "a step of 5,000 digits": b'{"step":' + b"9" * 5000 + b',"order":{"order":"reset"}}',
+    "a step that no run has": b'{"step":100000001,"order":{"order":"reset"}}',
+}
+
+
+@pytest.mark.parametrize("line", UNREADABLE.values(), ids=UNREADABLE)
+def test_d3_a_log_that_no_parser_reads_is_refused_with_its_line(tmp_path, line):
+    file = tmp_path / "orders.jsonl"
+    file.write_bytes(ARMED + line + b"\n" + ARMED)
+    with pytest.raises(RunError) as caught:
+        RecordedOrders(file)
+    said = str(caught.value)
+    assert said.startswith(f"{file}, line 2: ") and said.isprintable() and len(said) < 300 + len(str(file))
+
+
+@pytest.mark.parametrize("cut", range(1, 7))
+def test_d3_a_last_line_that_was_cut_off_within_a_letter_does_not_count(tmp_path, cut):
+    line = '{"step":1,"order":{"order":"move","region":"ΩΩΩ"'.encode()[:-1]
+    (tmp_path / "orders.jsonl").write_bytes(ARMED + line[:-cut])
+    assert len(RecordedOrders(tmp_path / "orders.jsonl").take(9)) == 1
+
+
+@pytest.mark.parametrize("index", ["9" * 5000, "٣", "-1", "01", "", "0.0"])
+def test_d4_an_index_that_is_none_is_refused(index):
+    with pytest.raises(OrderError, match="no setting"):
+        LiveSettings(load_scenario("paper")).change(f"goal.centre.{index}", 1.0)

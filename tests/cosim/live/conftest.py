@@ -6,9 +6,6 @@ import threading
 
 import numpy as np
 import pytest
-
-pytest.importorskip("websockets", reason="the view extra is not installed")
-
 from websockets.sync.client import connect
 
 from cosim.live.address import parse_live

@@ -89,11 +89,17 @@ def test_nothing_that_comes_hurts_the_run(live, tmp_path, caplog):
             '"arm"',
             "[" * 5000,
             '{"order":"arm","armed":1e999}',
+            '{"a":' * 3000,  # D4: deeper than a parser goes
+            '{"order":"change","key":"goal.centre.' + "9" * 5000 + '","value":1}',
         ):
             viewer.socket.send(bad)
-        for _ in range(9):
+        for _ in range(11):
             viewer.until("said")
-        assert len(viewer.said("refused")) == 9
+        assert len(viewer.said("refused")) == 11
+        assert all(said.isprintable() and len(said) < 300 for said in viewer.said("refused"))
+    with connect(url) as client:  # D4: a text that is no UTF-8, by which WebSocket has a connection fail
+        client.socket.sendall(b'\x81\x8d\0\0\0\0{"order":"\xff"}')
+        assert closed_with(client) == 1007
     with connect(url) as left:  # who goes without a word
         left.socket.shutdown(socket.SHUT_RDWR)
     with running.viewer() as viewer:

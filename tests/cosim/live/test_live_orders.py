@@ -105,10 +105,8 @@ def test_a_run_that_repeats_orders_takes_no_others(live, tmp_path):
 
 @pytest.mark.slow
 def test_a_ground_station_and_a_viewer_order_the_same_run(live):
-    mavlink = pytest.importorskip("pymavlink.dialects.v20.all", reason="the mavlink extra is not installed")
     from tests.cosim.test_run_on_a_link import Station, command, on
 
-    del mavlink
     with Station(command(400, 1.0), command(192, -1.0, 1.0, 0.0, 0.7)) as station:
         running = live(commands=True, rate=1.0, mavlink=on(station, commands=True))
         with running.viewer() as viewer:

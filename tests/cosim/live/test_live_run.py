@@ -2,15 +2,11 @@
 
 import logging
 import socket
-import sys
 
 import numpy as np
 import pytest
 
-from cosim.errors import TelemetryError
-from cosim.live.address import LiveAddress
 from cosim.live.hub import Hub
-from cosim.live.view import LiveView
 from cosim.record import load_record
 from cosim.report_words import verdict
 from cosim.run import run_scenario
@@ -109,9 +105,3 @@ def test_what_the_helm_refuses_later_is_told_too(live, caplog):
         viewer.order(**ARM)
         viewer.until("end")
     assert any("no room for obstacle 2" in text for text in viewer.said("warning"))
-
-
-def test_without_the_library_one_line_says_what_to_install(monkeypatch):
-    monkeypatch.setitem(sys.modules, "cosim.live.server", None)
-    with pytest.raises(TelemetryError, match=r"pip install 'subreach\[view\]'"):
-        LiveView(LiveAddress(port=0))

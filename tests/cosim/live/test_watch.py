@@ -3,16 +3,12 @@
 import io
 import re
 import shutil
-import sys
 import threading
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
-
-pytest.importorskip("rich", reason="the view extra is not installed")
-
 from rich.console import Console
 
 from cosim.cli import main
@@ -99,7 +95,7 @@ def test_a_run_that_is_being_written_is_followed_to_its_end(paper, tmp_path):
     folder.mkdir()
     shutil.copy(paper.folder / SCENARIO, folder)
     record = load_record(paper.folder)
-    rows = np.concatenate(list(record.blocks()))
+    rows = record.numbers()
     recorder = Recorder(folder, record.columns, rows_per_part=1000)
     frames = looks(str(folder))
     assert next(frames).row is None
@@ -139,12 +135,6 @@ def test_where_nothing_is_one_line_says_so(what, capsys):
     assert error.count("\n") == 1 and "cosim: " in error
 
 
-def test_without_the_library_one_line_says_what_to_install(monkeypatch, capsys):
-    monkeypatch.setitem(sys.modules, "rich.console", None)
-    assert main(["watch", "runs/any"]) == 2
-    assert "pip install 'subreach[view]'" in capsys.readouterr().err
-
-
 def test_no_run_is_told():
     with pytest.raises(Exception, match="holds no run"):
         next(looks("no/such/folder"))
@@ -170,5 +160,5 @@ def test_parts_that_are_no_record_are_named_in_one_line(paper, tmp_path, garbage
         part.write_bytes(b"garbage")
     else:
         pq.write_table(pa.table({"a": [1.0]}), part)
-    with pytest.raises(RunError, match=r"cannot be read|not of its scenario"):
+    with pytest.raises(RunError, match=r"cannot be read|which its scenario calls for"):
         next(iter(looks(str(tmp_path))))

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import time
 
-import pytest
+from pymavlink.dialects.v20 import all as mavlink
 
 from cosim.mavlink.channels.udp import UdpOut
 from cosim.mavlink.framing import Counts, Gate
 from cosim.mavlink.link import Link
-
-mavlink = pytest.importorskip("pymavlink.dialects.v20.all", reason="the mavlink extra is not installed")
 
 SOURCE = (1, 1)
 KEY = bytes(range(32))

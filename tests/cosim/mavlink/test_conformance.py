@@ -7,11 +7,10 @@ from collections import deque
 from types import SimpleNamespace
 
 import pytest
+from pymavlink.dialects.v20 import all as mavlink
 
-mavlink = pytest.importorskip("pymavlink.dialects.v20.all", reason="the mavlink extra is not installed")
-
-from cosim.cli import main  # noqa: E402
-from cosim.mavlink.conformance import (  # noqa: E402
+from cosim.cli import main
+from cosim.mavlink.conformance import (
     Client,
     Result,
     as_json,
@@ -23,8 +22,8 @@ from cosim.mavlink.conformance import (  # noqa: E402
     qgc_connect,
     summary,
 )
-from cosim.mavlink.conformance.outcome import Check, failed, judged, passed, skipped, speed_of  # noqa: E402
-from cosim.mavlink.ground import Heard  # noqa: E402
+from cosim.mavlink.conformance.outcome import Check, failed, judged, passed, skipped, speed_of
+from cosim.mavlink.ground import Heard
 
 QUICK = {
     connect: {"_LIST_TIMEOUT": 0.05, "_GAP_TIMEOUT": 0.02, "_MISSION_TIMEOUT": 0.02, "_ACK_TIMEOUT": 0.02,

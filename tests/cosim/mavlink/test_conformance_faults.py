@@ -4,14 +4,12 @@ import itertools
 import json
 
 import pytest
+from pymavlink.dialects.v20 import all as mavlink
 
 from cosim.cli import main
-
-mavlink = pytest.importorskip("pymavlink.dialects.v20.all", reason="the mavlink extra is not installed")
-
-from cosim.mavlink.conformance import CHECKS, Client, connect, ftp, vehicle  # noqa: E402
-from cosim.mavlink.conformance.outcome import Subject  # noqa: E402
-from cosim.mavlink.options import PROFILES  # noqa: E402
+from cosim.mavlink.conformance import CHECKS, Client, connect, ftp, vehicle
+from cosim.mavlink.conformance.outcome import Subject
+from cosim.mavlink.options import PROFILES
 
 pytestmark = pytest.mark.slow
 

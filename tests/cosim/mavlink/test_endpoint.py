@@ -47,7 +47,7 @@ def test_a_log_is_a_new_file(tmp_path):
         parse_endpoint(str(path))
     with pytest.raises(TelemetryError, match="there is no folder"):
         parse_endpoint(str(tmp_path / "none" / "dive.tlog"))
-    with pytest.raises(TelemetryError, match=r"endpoint 'x+\.tlog': .*too long"):
+    with pytest.raises(TelemetryError, match=r"endpoint 'x+ \.\.\. x+\.tlog': .*too long"):
         parse_endpoint("x" * 300 + ".tlog")
 
 
@@ -85,7 +85,7 @@ def test_beyond_this_machine_only_with_leave():
 def test_what_cannot_be_is_refused(text, words):
     with pytest.raises(TelemetryError, match=words) as caught:
         parse_endpoint(text)
-    assert repr(text) in str(caught.value)
+    assert repr(text)[:30] in str(caught.value)  # of a long one the middle is left out
     assert "\n" not in str(caught.value)
 
 

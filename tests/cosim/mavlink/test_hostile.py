@@ -98,25 +98,51 @@ def test_two_hundred_thousand_hostile_datagrams_leave_nothing_behind():
     assert after - before < 100_000
 
 
+class Clock:
+    """A clock that goes on by as much at each look, and by what an answer takes."""
+
+    LOOK, ANSWER = 1e-5, 7e-5  # s
+
+    def __init__(self):
+        self.now = 100.0
+
+    def perf_counter(self):
+        self.now += self.LOOK
+        return self.now
+
+    monotonic = perf_counter
+
+
 class Answering(StubVehicle):
-    """Answers each request with as much as a careless vehicle would, and keeps none."""
+    """Answers each request with as much as a careless vehicle would, which takes its time, and keeps none."""
+
+    def __init__(self, clock):
+        super().__init__()
+        self.clock, self.answered = clock, 0
 
     def receive(self, link, message, now):
         for i in range(20):
             link.send(attitude(i))
+        self.clock.now += self.clock.ANSWER
+        self.answered += 1
 
 
-def test_a_flood_takes_a_bounded_slice_of_each_turn():
+def test_a_flood_takes_a_bounded_slice_of_each_turn(monkeypatch):
     """However much is waiting, a turn ends; the thread then rests for a multiple of what it took."""
-    channel = Script(hostile_datagrams(10**9, seed=3))
-    links = LinkThread(Answering(), [Link("test", channel, open_gate(), SOURCE)], step=0.01)
-    looked = []
-    for _ in range(50):
-        before = channel.looked
+    clock = Clock()
+    monkeypatch.setattr("cosim.mavlink.thread.time", clock)
+    monkeypatch.setattr("cosim.mavlink.link.time", clock)
+    channel, vehicle = Script(hostile_datagrams(10**9, seed=3)), Answering(clock)
+    links = LinkThread(vehicle, [Link("test", channel, open_gate(), SOURCE)], step=0.01)
+    slice_ = thread._RECEIVING
+    for _ in range(500):
+        began, before = clock.now, channel.looked
         rest = links._turn()
-        looked.append(channel.looked - before)
-        assert rest >= thread._REST_RECEIVING * thread._RECEIVING / 1.01
-    assert min(looked) >= 1 and np.median(looked) < 1000
+        took = clock.now - began
+        assert 1 <= channel.looked - before <= slice_ / clock.LOOK
+        assert slice_ < took < slice_ + clock.ANSWER + 10 * clock.LOOK  # what was begun in the slice is ended
+        assert thread._REST_RECEIVING * slice_ <= rest <= thread._REST_RECEIVING * took
+    assert vehicle.answered > 500
 
 
 def test_a_flooded_port_neither_starves_the_stream_nor_another_link():

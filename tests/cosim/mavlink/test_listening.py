@@ -11,17 +11,15 @@ import sys
 import time
 
 import pytest
+from pymavlink.dialects.v20 import all as mavlink
 
 from cosim.cli import main
-
-mavlink = pytest.importorskip("pymavlink.dialects.v20.all", reason="the mavlink extra is not installed")
-
-from cosim.mavlink.endpoint import parse_endpoint  # noqa: E402
-from cosim.mavlink.ground import GroundLink, Heard  # noqa: E402
-from cosim.mavlink.listening import Watch, follow, picture  # noqa: E402
-from cosim.mavlink.listening.fields import values  # noqa: E402
-from cosim.mavlink.listening.watch import ROWS, TEXTS  # noqa: E402
-from cosim.mavlink.modes import mode_name  # noqa: E402
+from cosim.mavlink.endpoint import parse_endpoint
+from cosim.mavlink.ground import GroundLink, Heard
+from cosim.mavlink.listening import Watch, follow, picture
+from cosim.mavlink.listening.fields import values
+from cosim.mavlink.listening.watch import ROWS, TEXTS
+from cosim.mavlink.modes import mode_name
 
 ESCAPE = "\x1b[31mred\x07"
 

@@ -9,18 +9,16 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
+from pymavlink.dialects.v20 import all as mavlink
 
 from cosim.cli import main
 from cosim.errors import RunError
+from cosim.mavlink.conformance import Client
+from cosim.mavlink.endpoint import parse_endpoint
+from cosim.mavlink.ground import GroundLink
+from cosim.mavlink.options import MavlinkOptions
+from cosim.mavlink.replay import replay
 from cosim.record import load_record
-
-mavlink = pytest.importorskip("pymavlink.dialects.v20.all", reason="the mavlink extra is not installed")
-
-from cosim.mavlink.conformance import Client  # noqa: E402
-from cosim.mavlink.endpoint import parse_endpoint  # noqa: E402
-from cosim.mavlink.ground import GroundLink  # noqa: E402
-from cosim.mavlink.options import MavlinkOptions  # noqa: E402
-from cosim.mavlink.replay import replay  # noqa: E402
 
 OVERRIDES = ("arbiter.engine=closed", "time.duration=4")
 COMMANDED = (*OVERRIDES, "commands.enabled=true")
@@ -131,5 +129,5 @@ def test_what_is_no_run_is_said_in_a_line(recorded, tmp_path, capsys):
 def test_a_record_of_something_else_is_refused(recorded, tmp_path):
     shutil.copy(recorded / "scenario.toml", tmp_path)
     pq.write_table(pa.table({"time": [0.0, 0.1]}), tmp_path / "record.parquet")
-    with pytest.raises(RunError, match=r"no column position\.x"):
+    with pytest.raises(RunError, match=r"no columns 'position\.x'"):
         replay(tmp_path, [parse_endpoint(str(tmp_path / "b.tlog"))], MavlinkOptions())

@@ -1,6 +1,7 @@
 """Controller and arbiter as FMUs of their own, against the Python law, regions and arbiter."""
 
 import ctypes
+import logging
 import re
 from pathlib import Path
 
@@ -147,6 +148,32 @@ def test_steps_longer_than_a_period_are_refused(controller, arbiter):
     arbiter.initialise()
     with pytest.raises(PlantError, match=re.escape("step of 0.04 s is longer than time.arbiter = 0.02 s")):
         arbiter.step(0.04)
+
+
+@pytest.mark.parametrize(
+    ("steps", "said"),
+    [
+        ([0.02] * 20, ["the law runs at t = 0.04 s, 0.01 s late: steps do not divide time.control = 0.03 s"]),  # once
+        ([0.01] * 400, []),
+        ([0.02, 0.01] * 200, []),  # no two alike, yet each period ends with one
+        ([0.03 / 7] * 700, []),
+    ],
+)
+def test_steps_that_do_not_divide_the_period_are_warned_about(controller, steps, said, caplog):
+    controller.initialise()
+    with caplog.at_level(logging.DEBUG, "plant_fmu"):
+        for step in steps:
+            controller.step(step)
+    assert [r.message.removeprefix("FMU: ") for r in caplog.records if "late" in r.message] == said
+
+
+def test_so_are_those_of_the_arbiter(arbiter, caplog):
+    arbiter.initialise()
+    with caplog.at_level(logging.DEBUG, "plant_fmu"):
+        for _ in range(9):
+            arbiter.step(0.015)
+    said = "FMU: the arbiter runs at t = 0.03 s, 0.01 s late: steps do not divide time.arbiter = 0.02 s"
+    assert [r.message for r in caplog.records if "late" in r.message] == [said]
 
 
 def test_periods_are_counted_not_summed(arbiter):

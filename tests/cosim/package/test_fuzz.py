@@ -10,6 +10,7 @@ from cosim.package import arbiter_component, controller_component
 from cosim.scenario import load_scenario
 from plant_fmu.build import neutral_members
 from plant_fmu.compiler import find_compiler
+from tests.plant_fmu.nulls import faults, sweep_sources
 
 HERE = Path(__file__).parent
 
@@ -33,3 +34,13 @@ def test_no_order_of_calls_does_harm(make, tmp_path):
     done = subprocess.run([program, "1", "500000"], capture_output=True, text=True)
     assert done.returncode == 0, done.stdout[-500:] + done.stderr[-3000:]
     assert min(int(n) for n in done.stdout.split()[1:]) > 0, done.stdout
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("fmi", [2, 3])
+@pytest.mark.parametrize("make", [controller_component, arbiter_component])
+def test_null_does_no_harm(make, fmi, tmp_path):
+    """Every function with each of its pointers NULL in turn is an error, never a crash."""
+    rows = sweep_sources(tmp_path, fmi, make(load_scenario(HERE / "all-shapes.toml")))
+    assert len(rows) > 500
+    assert faults(rows) == []

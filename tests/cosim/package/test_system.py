@@ -38,6 +38,16 @@ def packed(tmp_path_factory):
     return package_system(load_scenario(ALL_SHAPES), tmp_path_factory.mktemp("ssp") / "all.ssp")
 
 
+def test_a_master_with_another_step_is_warned(packed, capfd):
+    """In FMPy, which prints what FMUs say; the scenario has a step of 10 ms, the law a period of 30 ms."""
+    run_in_fmpy(packed, 20, 0.02)
+    warnings = [line for line in capfd.readouterr().out.splitlines() if "late" in line]
+    assert len(warnings) == 1
+    assert "the law runs at t = 0.04 s, 0.01 s late: steps do not divide time.control = 0.03 s" in warnings[0]
+    run_in_fmpy(packed, 20, 0.01)
+    assert "late" not in capfd.readouterr().out
+
+
 class Motion:
     """Position, quaternion and velocity before each step and after the last."""
 
@@ -199,6 +209,14 @@ def test_what_a_system_has_not_is_refused_by_its_key(name, changes, said, tmp_pa
         package_system(load_scenario(name, changes), tmp_path / "s.ssp")
     assert str(caught.value).startswith(said)
     assert not list(tmp_path.iterdir())
+
+
+def test_a_step_that_does_not_divide_a_period_is_not_packaged(tmp_path, capsys):
+    out = tmp_path / "s.ssp"
+    assert main(["package", str(ALL_SHAPES), "--set", "time.step=0.02", "--out", str(out)]) == 2
+    said = capsys.readouterr().err
+    assert "time.control" in said and "a whole multiple of time.step (0.02 s)" in said and said.count("\n") == 1
+    assert not out.exists()
 
 
 def test_failures_are_refused(tmp_path):

@@ -4,20 +4,43 @@ import importlib.util
 import json
 import shutil
 
+import msgspec
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
 from cosim.flown_run import load_run
+from cosim.helm.orders import Aim, Begin, Change, Forget, Item, Mission, Obstacle, Steer
 from cosim.replay.page import write_page
 from cosim.replay.pages import replay
 from cosim.replay.trace import trace_of
+from cosim.run import run_scenario
+from cosim.scenario import load_scenario
 from tests.cosim.replay.browser import CHROMEDRIVER, CHROMIUM, Browser
 from tests.cosim.replay.decoding import read_page
 
 CLOSED = "arbiter.engine=closed"
 GAPS = ("position.x", "quaternion.e0", "heading.clearance", "membership.obstacle", "weight.shape", "command.X")
+RADIUS = "regions.pile 1.shape.radius"
+ITEMS = (
+    Item((2.0, 0.0, 2.0), 50.0),
+    Item(None, orders=(Change(RADIUS, 0.5), Change("regions.ship.gain", 55.0))),
+    Item(None, orders=(Change("goal.radius", 0.9),)),
+    Item((3.0, -1.0, 2.0), stay=None, orders=(Change("regions.quay.shape.point.1", 6.0),)),
+)
+ORDERS = {
+    20: [Change("goal.radius", 0.75), Change("goal.radius", -1.0), Change("law.gains.speed", 0.3)],
+    40: [Aim((4.0, -1.0, 2.0), 0.6)],
+    60: [Obstacle(7, (5.0, 0.0, 2.0), 0.4), Obstacle(9, (-3.0, 0.0, 2.0), 0.3)],
+    90: [Change("regions.ship.shape.semi_axes.0", 3.5)],
+    120: [Obstacle(7, (5.0, 0.2, 2.0), 0.4, (0.1, 0.0, 0.0))],
+    140: [Obstacle(7, (5.0, 0.3, 2.0), 0.8)],
+    160: [Forget(7)],
+    180: [Aim((4.0, 0.0, 2.0)), Change("goal.centre.0", 12.5)],
+    200: [Mission(ITEMS), Steer("mission")],
+    260: [Change(RADIUS, 0.7), Begin(1)],
+}
 
 
 @pytest.fixture(scope="session")
@@ -28,6 +51,16 @@ def docking(shipped_run):
 @pytest.fixture(scope="session")
 def paper(shipped_run):
     return load_run(shipped_run("paper", CLOSED).folder)
+
+
+@pytest.fixture(scope="session")
+def steered(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("steered")
+    log = folder / "log.jsonl"
+    lines = [{"step": k, "order": order} for k, orders in ORDERS.items() for order in orders]
+    log.write_bytes(b"".join(msgspec.json.encode(line) + b"\n" for line in lines))
+    scenario = load_scenario("harbour", ["commands.enabled=true", "time.duration=4"])
+    return load_run(run_scenario(scenario, folder / "run", report=False, orders=log).folder)
 
 
 @pytest.fixture(scope="session")

@@ -102,7 +102,7 @@ def _bad_scenario(folder):
         (_no_record, "holds no record of a run"),
         (_empty, "the record of the run is empty"),
         (_cut, "record.parquet: cannot be read"),
-        (_other_columns, "the record has no column 'weight.shape'"),
+        (_other_columns, "has no column 'weight.shape'"),
         (_backwards, "the times of the record do not rise"),
         (_no_summary, "summary.json: cannot be read"),
         (_no_scenario, "holds no run (scenario.toml is missing)"),

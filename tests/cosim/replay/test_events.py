@@ -7,23 +7,17 @@ import numpy as np
 import pytest
 
 from cosim.helm.orders import Aim, Arm, Begin, Change, Face, Forget, Item, Mission, Obstacle, Reset, Steer, Sticks
+from cosim.record import Rows
 from cosim.replay.events import events_of
 from cosim.replay.order_words import order_words, ordered_events
 from cosim.signals import Column
 
 
-class Made:
-    """A record made of given signals, the others zero."""
-
-    def __init__(self, time, **signals):
-        self._signals = {"time": np.array(time), **{k.replace("__", "."): np.array(v) for k, v in signals.items()}}
-        self.columns = tuple(Column(name, "", "") for name in self._signals)
-
-    def __getitem__(self, name):
-        return self._signals.get(name, np.zeros(len(self._signals["time"])))
-
-    def stack(self, names):
-        return np.column_stack([self[name] for name in names])
+def rows_of(names, time, **signals):
+    """Return a record made of given signals, the others zero."""
+    given = {"time": np.array(time), **{k.replace("__", "."): np.array(v) for k, v in signals.items()}}
+    zero = np.zeros(len(time))
+    return Rows([Column(name, "", "") for name in names], {name: given.get(name, zero) for name in names})
 
 
 def made(paper, time, status="completed", failures=(), **signals):
@@ -31,7 +25,8 @@ def made(paper, time, status="completed", failures=(), **signals):
     for name in ("SR1", "SR2", "SR3"):
         signals.setdefault(f"{name}__clearance", np.ones(len(time)))
     summary = paper.summary | {"status": status}
-    return dataclasses.replace(paper, scenario=scenario, record=Made(time, **signals), summary=summary)
+    record = rows_of(paper.record.units, time, **signals)
+    return dataclasses.replace(paper, scenario=scenario, record=record, summary=summary)
 
 
 def told(run, kind, log=()):

@@ -8,11 +8,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from cosim.flown_run import load_run
+from cosim.record import Rows
 from cosim.replay.activity import active_regions
 from cosim.replay.sampling import sampled_rows
 from cosim.replay.trace import plain, trace_of
 from cosim.replay.viewing import Viewing
 from cosim.scenario import CRITERIA
+from cosim.signals import Column
 from fuzzy_arbiter import Arbiter
 from tests.cosim.replay.decoding import active_of
 
@@ -46,7 +48,9 @@ def test_sampling_keeps_to_its_budget_and_loses_no_spike(n, columns, data):
     spike = data.draw(st.integers(0, n - 1))
     telling[spike, 1] = -1.0
     moment = data.draw(st.integers(0, n - 1))
-    steps = sampled_rows(time, columns, telling, np.array([moment]))
+    rows = Rows([Column("time", "s", "Time")], {"time": time})
+    telling = np.array_split(telling.T, data.draw(st.integers(1, n)), axis=1)
+    steps = sampled_rows(rows, columns, telling, 2, np.array([moment]))
     assert steps[0] == 0 and steps[-1] == n - 1 and (np.diff(steps) > 0).all()
     assert {spike, moment, max(moment - 1, 0)} <= set(steps.tolist())
     assert len(steps) <= 400_000 / (8 * columns) + 150_000 * n / 60 / (8 * columns) + 402
@@ -131,7 +135,7 @@ def test_what_is_no_number_becomes_none():
 
 
 def test_a_trace_is_of_the_run_as_it_came(docking):
-    slower = dataclasses.replace(docking.scenario, title="elsewhere")
+    slower = dataclasses.replace(docking.scenario, table=docking.scenario.table | {"title": "elsewhere"})
     assert trace_of(dataclasses.replace(docking, scenario=slower)).header["title"] == "elsewhere"
 
 

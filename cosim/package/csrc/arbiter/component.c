@@ -44,6 +44,10 @@ static Status advance(Instance *instance, double end)
     double weights[N_CRITERIA];
     const Ticks ticks = m->ticks;
 
+    const double late = ticks_first_late(&m->ticks, m->time);
+    if (late > 0.0)
+        instance_tell(instance, LOG_WARNINGS, "the arbiter runs at t = %.9g s, %.3g s late: steps do not divide time.arbiter = %.9g s",
+                      m->time, late, m->ticks.period);
     if (ticks_due(&m->ticks, m->time)) {
         if (EVALUATE_RULES(m->memberships, weights) != 0) {
             m->ticks = ticks;

@@ -150,6 +150,10 @@ static Status advance(Instance *instance, double end)
     regions_evaluate(&regions, motion, motion + 3, out->values, gradients, out->clearances);
     pressing(m, out->memberships);
 
+    const double late = ticks_first_late(&m->memory.control, m->time);
+    if (late > 0.0)
+        instance_tell(instance, LOG_WARNINGS, "the law runs at t = %.9g s, %.3g s late: steps do not divide time.control = %.9g s",
+                      m->time, late, p->period);
     if (ticks_due(&m->memory.control, m->time)) {
         for (int i = 1; i < N_ALL; i++)
             alphas[i] = p->alphas[i] * m->inputs.weights[CRITERIA[i]];

@@ -9,8 +9,6 @@ import time
 
 import pytest
 
-pytest.importorskip("pymavlink", reason="the mavlink extra is not installed")
-
 from cosim.mavlink.conformance import Client, fetch_parameters, qgc_connect
 from cosim.mavlink.conformance.vehicle import running_vehicle
 from cosim.mavlink.endpoint import parse_endpoint

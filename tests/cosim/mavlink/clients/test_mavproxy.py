@@ -9,8 +9,6 @@ import time
 
 import pytest
 
-pytest.importorskip("pymavlink", reason="the mavlink extra is not installed")
-
 from tests.cosim.mavlink.clients.conftest import cosim_run, orders_of
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(900)]  # the first of them builds and installs

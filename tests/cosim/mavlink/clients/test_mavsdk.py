@@ -5,8 +5,6 @@ import subprocess
 
 import pytest
 
-pytest.importorskip("pymavlink", reason="the mavlink extra is not installed")
-
 from cosim.mavlink.options import MavlinkOptions
 from tests.cosim.mavlink.clients.conftest import HERE, cosim_run, orders_of
 

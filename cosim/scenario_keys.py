@@ -1,0 +1,194 @@
+"""What the keys of a scenario mean, and in which unit: for the reference, and for comments in a scenario's file."""
+
+from __future__ import annotations
+
+import functools
+import inspect
+import re
+from typing import NamedTuple
+
+from controller import LAWS
+from plant_fmu.variables import variables
+from plant_fmu.vehicle import Vehicle
+
+
+class Key(NamedTuple):
+    """What a key means, in Markdown."""
+
+    unit: str
+    meaning: str  # in a few words
+    more: str = ""  # what the reference says besides
+    default: str = ""  # in words, unless the tables have it as a value
+
+
+# by the path to the key; regions[] stands for each of them
+KEYS = {
+    "vehicle": Key("", "a shipped vehicle, or a TOML file beside the file that names it", " (with `--set`: here)"),
+    "title": Key("", "one line for the report, at most 200 characters", default="the name"),
+    "changed": Key(
+        "",
+        "keys that were changed since the title was written",
+        ", see [below](#titles); runs write it into their folder",
+        default="none",
+    ),
+    "compare": Key("", '`"paper"` puts the paper\'s claims beside the run'),
+    "intersection": Key("", "names of the regions, to be kept out of, whose overlap is reported", default="all"),
+    "tell_failures": Key("", "law and allocation are told when a thruster fails"),
+    "time.duration": Key("s", "of the run"),
+    "time.step": Key("s", "co-simulation step; the other periods are whole multiples"),
+    "time.control": Key("s", "period of the law", default="the step"),
+    "time.arbiter": Key("s", "period of the arbiter", default="the step"),
+    "plant.fmi": Key("", "FMI version of the plant, 2 or 3"),
+    "plant.current": Key("m/s", "velocity of the water, north east down"),
+    "plant.substep": Key("s", "greatest integration step"),
+    "plant.parameters": Key(
+        "", "parameters of the FMU over those of the vehicle, such as `mass` or `r_G.z`", "; the controller is not told"
+    ),
+    "initial.position": Key("m", "north east down"),
+    "initial.quaternion": Key("", "body to world, scalar first"),
+    "initial.velocity": Key("m/s, rad/s", "body frame"),
+    "goal": Key("", "a shape in space: the primary region", ", see below"),
+    "goal.velocity": Key("m/s", "as of a region", ", below", default="0 0 0"),
+    "goal.streamed": Key("", "as of a region", ", below", default="false"),
+    "law.name": Key(
+        "", "one of `controller.LAWS`",
+        "; naming another one than the base drops the base's gains. In the folder of a run that "
+        "[a law of one's own](howto/own-law.md) flew: where that is from, such as `mine.py:steer`",
+    ),
+    "law.desired_quaternion": Key("", "attitude to be kept, body to world, scalar first"),
+    "law.gains": Key(
+        "", "of that law", "; of the printed one section VII: `k_p1 k_p2 k_q k_v1 k_v2 sigma_p sigma_a gamma`",
+        default="the law's own",
+    ),
+    "arbiter.engine": Key("", "`closed`, `exact`, `grid` or `skfuzzy`", "; see [arbiter.md](arbiter.md#engines)"),
+    "arbiter.ramp": Key("m", "width over which a membership falls outside its region; rad for regions of attitude"),
+    "arbiter.points": Key("", "of the output universe, for `grid` and `skfuzzy`"),
+    "limit.force": Key(
+        "N", "on the norm of the direct body force", "; direction kept, moment left alone; not with thrusters"
+    ),
+    "limit.time_constant": Key("s", "lag behind that limit"),
+    "actuation.through": Key(
+        "", "`wrench` on the body, or `thrusters`",
+        ": through the allocation, or set by a law that drives thrusters",
+    ),
+    "actuation.limits": Key("", "`direction` scales all thrusters together, `per-thruster` cuts each"),
+    "sensing.position_noise": Key("m", "standard deviation of each told coordinate"),
+    "sensing.velocity_noise": Key("m/s", "the same of each told linear velocity, body frame"),
+    "sensing.seed": Key("", "of the noise"),
+    "sensing.dead_from": Key("s", "when told position and linear velocity are lost"),
+    "sensing.dead_for": Key("s", "for how long"),
+    "sensing.frozen": Key("", "in that time the last values are told again, instead of NaN"),
+    "master.order": Key(
+        "", "`gauss-seidel`, or `jacobi`: each part on what all had put out a step before",
+        ", see [The order of a step](#the-order-of-a-step)",
+    ),
+    "record.lyapunov": Key(
+        "", "record V of (31) and its rate, with the printed law",
+        ", in three forms; see [theory.md](theory.md#where-the-theory-holds)",
+    ),
+    "commands.enabled": Key(
+        "", "the running vehicle takes [orders](mavlink.md) from outside", "; `cosim run --commands` sets it"
+    ),
+    "commands.await_arm": Key("", "nothing moves before it is armed", "; `--await-arm` sets it"),
+    "commands.obstacles": Key("", "spheres to be kept out of that may come in while it runs; 100 at most"),
+    "commands.obstacle_radius": Key("m", "of one whose size is not told"),
+    "commands.obstacle_gain": Key("N", "of each, per unit of g"),
+    "commands.hold_radius": Key("m", "of the sphere that the vehicle holds in, and surfaces in"),
+    "commands.surface_depth": Key("m", "of that sphere's centre when it surfaces"),
+    "commands.pilot_gain": Key("", "part of the greatest wrench along an axis that full sticks give"),
+    "failures": Key("", "thrusters that fail; only where `thrusters` carry the wrench", default="none"),
+    "failures[].thruster": Key("", "from 1"),
+    "failures[].time": Key("s", "from when on it gives nothing"),
+    "regions": Key("", "secondary regions", default="none"),
+    "regions[].name": Key("", "its own: letters, digits, blanks, - and _"),
+    "regions[].criterion": Key("", "`obstacle`, `shape` or `depth`", ": whose weight multiplies its gain"),
+    "regions[].keep": Key("", "`in` or `out`"),
+    "regions[].gain": Key("", "alpha of section VII"),
+    "regions[].shape": Key("", "a shape", ", below"),
+    "regions[].velocity": Key("m/s", "north east down; the law is told"),
+    "regions[].streamed": Key("", "moved from outside while the run goes on", ", below"),
+    "regions[].hard": Key(
+        "", "must not be violated", "; the printed law, and a law of plain potentials, do not ask"
+    ),
+}  # fmt: skip
+
+_GAIN = re.compile(r"^ +(\w+): float = [^#\n]*# (.*)$", re.M)
+_UNIT = re.compile(
+    r"(?:1|N|kg|m|rad|s)\d?(?:[ /(]+(?:N|kg|m|rad|sqrt\(s\)|s)\d?\)?)*(?=[,: ]|$)"
+)  # at the head of a comment
+_LINK = re.compile(r"\[([^]]*)\]\([^)]*\)")
+_LENGTHS = {
+    *("centre", "radius", "depth", "tolerance", "point", "size", "start", "end", "semi_axes", "corners", "top"),
+    *("bottom", "points", "feature", "range", "camera_position"),
+}
+
+
+def unit_of_shape(kind: str, key: str) -> str:
+    """Return the unit of a key of a shape.
+
+    Parameters
+    ----------
+    kind : str
+        Of shape, such as ``"sphere"``.
+    key : str
+        Such as ``"radius"``.
+
+    Returns
+    -------
+    str
+        Empty where it has none.
+    """
+    if key == "half_angle" or (kind, key) == ("orientation", "tolerance"):
+        return "rad"
+    return "m" if key in _LENGTHS else ""
+
+
+def comments(law: str, vehicle: Vehicle) -> dict[str, str]:
+    """Return what is said of each key in a file: its unit and its meaning, as plain text.
+
+    Parameters
+    ----------
+    law : str
+        Whose gains there are; what is said of them stands beside them in its source.
+    vehicle : Vehicle
+        Whose FMU has the parameters of the plant.
+
+    Returns
+    -------
+    dict of str to str
+        By the path to the key.
+    """
+    said = {path: _comment(key.unit, _LINK.sub(r"\1", key.meaning).replace("`", "")) for path, key in KEYS.items()}
+    said |= {f"law.gains.{gain}": text for gain, text in _gain_comments(law).items()}
+    return said | {f"plant.parameters.{v.name}": _comment(v.quantity.unit, v.description) for v in variables(vehicle)}
+
+
+@functools.cache
+def unit_of_gain(law: str, gain: str) -> str:
+    """Return the unit of a gain of a law.
+
+    Parameters
+    ----------
+    law : str
+        Its name.
+    gain : str
+        Such as ``"k_p1"``.
+
+    Returns
+    -------
+    str
+        Empty where it has none, or none is known.
+    """
+    unit = _UNIT.match(_gain_comments(law).get(gain, ""))
+    return unit[0] if unit else ""
+
+
+def _comment(unit: str, meaning: str) -> str:
+    return ", ".join(filter(None, (unit, meaning)))
+
+
+def _gain_comments(law: str) -> dict[str, str]:
+    try:
+        return dict(_GAIN.findall(inspect.getsource(LAWS[law].gains_type)))
+    except (KeyError, OSError):  # a law of one's own; no source
+        return {}
