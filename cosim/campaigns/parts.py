@@ -163,6 +163,12 @@ def _keys(file: Path, schema: Any) -> Any:
     return keys
 
 
+def _type(schema: Any, name: str) -> str:
+    """Return the type of a column in words."""
+    field = schema.field(name)
+    return f"{field.type}{', perhaps null' if field.nullable else ''}"
+
+
 def check_schema(file: Path, schema: Any) -> None:
     """Raise a RunError that names the first column in which a Parquet file is not of a schema."""
     found = pq.read_schema(file)
@@ -173,7 +179,8 @@ def check_schema(file: Path, schema: Any) -> None:
             there = "two columns" if field.name in found.names else "no column"
             raise RunError(f"{file}: cannot be read: has {there} {field.name!r}, expected one")
         if not found.field(field.name).equals(field):
-            raise RunError(f"{file}: cannot be read: column {found.field(field.name)}, expected {field}")
+            holds, expected = _type(found, field.name), _type(schema, field.name)
+            raise RunError(f"{file}: cannot be read: column {field.name!r} holds {holds}, expected {expected}")
     odd = next((name for name in found.names if name not in schema.names), found.names[0])
     raise RunError(f"{file}: cannot be read: column {odd!r} is not expected there")
 
