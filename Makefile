@@ -20,6 +20,9 @@ COMPILER := $(if $(shell command -v cc),,build)
 EXTRAS := importers,dev$(addprefix $(comma),$(COMPILER))
 PYTEST_FLAGS ?=
 PORTABLE ?=
+# uv takes seconds where pip takes minutes
+INSTALL := $(if $(shell command -v uv),uv pip install --python $(BIN)/python,$(BIN)/python -m pip install \
+	--disable-pip-version-check) --quiet
 # tests start hundreds of processes: where bytecode is not kept, each compiles what it imports again
 export PYTHONDONTWRITEBYTECODE =
 
@@ -46,7 +49,7 @@ mutation-sample: $(VENV)/extras
 	$(BIN)/python -m tests.mutation --sample 40
 
 docs: $(VENV)/extras
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[docs]'
+	$(INSTALL) --editable '.[docs]'
 	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict
 
 bench: $(VENV)/ready
@@ -88,11 +91,11 @@ $(VENV)/installed: pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(None if sys.version_info >= (3, 11) else "Python 3.11 or later is needed")'
 	@echo 'Setting up $(VENV); the first time some hundred MB are downloaded, which takes minutes'
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.$(addsuffix ],$(addprefix [,$(COMPILER)))'
+	$(INSTALL) --editable '.$(addsuffix ],$(addprefix [,$(COMPILER)))'
 	@touch $@
 
 $(VENV)/extras: $(VENV)/installed
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[$(EXTRAS)]'
+	$(INSTALL) --editable '.[$(EXTRAS)]'
 	@touch $@
 
 $(VENV)/ready: $(VENV)/extras
