@@ -40,7 +40,7 @@ lint: $(VENV)/extras
 	$(BIN)/mypy
 
 coverage: $(VENV)/extras
-	$(BIN)/python -m tests.house.coverage
+	$(BIN)/python -m tests.architecture.coverage
 
 mutation: $(VENV)/extras
 	$(BIN)/python -m tests.mutation --results build/mutation.jsonl

@@ -24,7 +24,7 @@ from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 _NEEDED = ("fmpy", "msgspec", "numpy", "platformdirs")  # of the dependencies, by what writes the libraries
 _COMPILE = """
 import pathlib, sys
-from plant_fmu.prebuilt import shipped_structures, write_prebuilt
+from plant_fmu.compiling.prebuilt import shipped_structures, write_prebuilt
 for structure in shipped_structures():
     for fmi in (2, 3):
         write_prebuilt(structure, fmi, sys.argv[1], pathlib.Path(sys.argv[2]))

@@ -20,9 +20,9 @@ import numpy as np
 
 from controller import LAWS
 from controller.laws import PdGains
-from cosim.scene import Scene
-from cosim.scene_generator import make_scene
-from cosim.scene_run import Conditions, SceneFlyer, Score
+from cosim.campaigns.scenes.flyer import Conditions, SceneFlyer, Score
+from cosim.campaigns.scenes.generator import make_scene
+from cosim.campaigns.scenes.scene import Scene
 
 FIRST_SEED = 10_000
 SCENES = 200

@@ -14,8 +14,8 @@ import fmpy
 from fmpy.fmi1 import FMICallException
 from fmpy.simulation import instantiate_fmu
 
-from plant_fmu.compiler import compile_library, find_compiler
-from plant_fmu.platforms import native_platform
+from plant_fmu.compiling.compiler import compile_library, find_compiler
+from plant_fmu.compiling.platforms import native_platform
 
 
 class _Slave(ctypes.Structure):

@@ -8,7 +8,7 @@ import sys
 from collections.abc import Iterator
 from typing import Any
 
-from cosim.mavlink.dialect import dialect
+from cosim.mavlink.wire.dialect import dialect
 
 _PREPARED = 4096  # of which a flood sends one after the other: making them takes longer than sending them
 

@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 from benchmarks.table import Row, compared
 from benchmarks.timing import Timing
 from controller import LAWS, VehicleState
-from controller.compiled import compiled
+from controller.jit.jit import compiled
 from controller.regions import DepthBand, PackedRegions, Region, Sphere, pack
-from cosim.native import Clock, seconds
-from cosim.vehicle_model import vehicle_model
+from cosim.batch.c_calls import Clock, seconds
+from cosim.scenario.vehicle_model import vehicle_model
 from plant_fmu.vehicle import load_vehicle
 
 STEPS = 2_000

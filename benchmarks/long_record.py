@@ -12,12 +12,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from cosim.flown_run import SCENARIO as SCENARIO_FILE
-from cosim.flown_run import SUMMARY
-from cosim.record import load_record
-from cosim.recorder import Recorder
-from cosim.run import run_scenario
-from cosim.scenario import load_scenario
+from cosim.results.record import load_record
+from cosim.results.recorder import Recorder
+from cosim.results.run_result import SCENARIO as SCENARIO_FILE
+from cosim.results.run_result import SUMMARY
+from cosim.run.run import run_scenario
+from cosim.scenario.scenario import load_scenario
 
 ROWS = (1_000_000, 10_000_000)
 SCENARIO = "paper"
@@ -136,8 +136,8 @@ def _peak() -> float:
 
 def _child(verb: str, run: str, *flags: str) -> None:
     """Do a piece of work in this process, and print what it took."""
-    from cosim.cli import main
-    from cosim.flown_run import load_run
+    from cosim.command_line.cli import main
+    from cosim.results.run_result import load_run
 
     began, error = time.perf_counter(), ""
     if verb == "write":

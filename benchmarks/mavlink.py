@@ -19,22 +19,22 @@ from benchmarks import sitl
 from benchmarks.hostile import hostile_datagrams
 from benchmarks.table import Row, compared
 from benchmarks.timing import Timing, time_calls
-from cosim.master import Master
 from cosim.mavlink.channels.udp import UdpIn, UdpOut
 from cosim.mavlink.conformance.client import Client
 from cosim.mavlink.conformance.connect import qgc_connect
 from cosim.mavlink.conformance.vehicle import own_vehicle
-from cosim.mavlink.dialect import dialect
-from cosim.mavlink.framing import Counts, Gate
-from cosim.mavlink.link import Link, Signer
 from cosim.mavlink.messages import MESSAGES
-from cosim.mavlink.options import PROFILES, MavlinkOptions
-from cosim.mavlink.outlet import Outlet
-from cosim.mavlink.signing import SigningClock
 from cosim.mavlink.thread import LinkThread
-from cosim.mavlink.vessel import Vessel
-from cosim.scenario import load_scenario
-from cosim.signals import Array
+from cosim.mavlink.vehicle.vehicle_context import Vessel
+from cosim.mavlink.wire.dialect import dialect
+from cosim.mavlink.wire.framing import Counts, Gate
+from cosim.mavlink.wire.link import Link, Signer
+from cosim.mavlink.wire.message_sink import Outlet
+from cosim.mavlink.wire.options import PROFILES, MavlinkOptions
+from cosim.mavlink.wire.signing import SigningClock
+from cosim.scenario.scenario import load_scenario
+from cosim.simulation.master import Master
+from cosim.simulation.signals import Array
 
 STEPS = 20_000
 RATIO = "how many times as long as what it is compared with"

@@ -15,8 +15,8 @@ from benchmarks.law import LawSteps
 from benchmarks.machine import pinned
 from benchmarks.table import Row, Table, compared, figure
 from benchmarks.timing import Contestant, Own, Timing, growth, straight, take_turns
-from cosim.master import Master
-from cosim.scenario import load_scenario
+from cosim.scenario.scenario import load_scenario
+from cosim.simulation.master import Master
 
 RATIO = "how many times as long as the first of its table"
 REPEATS = 5

@@ -11,10 +11,10 @@ import numpy as np
 
 from benchmarks.table import Row, compared
 from benchmarks.timing import Timing, time_calls
-from cosim.master import Master
-from cosim.recorder import Recorder
-from cosim.scenario import load_scenario
-from cosim.signals import Array
+from cosim.results.recorder import Recorder
+from cosim.scenario.scenario import load_scenario
+from cosim.simulation.master import Master
+from cosim.simulation.signals import Array
 
 STEPS = 20_000
 RATIO = "how many times as long as the plant's step"

@@ -13,10 +13,10 @@ from typing import Any
 
 from benchmarks.table import Row
 from benchmarks.timing import Timing
-from cosim.flown_run import load_run
 from cosim.replay.pages import write_replay
-from cosim.run import run_scenario
-from cosim.scenario import load_scenario
+from cosim.results.run_result import load_run
+from cosim.run.run import run_scenario
+from cosim.scenario.scenario import load_scenario
 
 STEPS = 120_000
 RATIO = "how many times as long as a frame may take at 30 frames a second"

@@ -7,8 +7,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from controller.compiled import lean
 from controller.errors import LawError
+from controller.jit.jit import lean
 
 Array = NDArray[np.float64]
 

@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controller.errors import LawError
+from controller.jit.bound_call import Repeated
 from controller.regions import PackedRegions
-from controller.repeated import Repeated
 
 Array = NDArray[np.float64]
 Output = Literal["wrench", "thrusters"]

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from controller.compiled import compiled, lean
+from controller.jit.jit import compiled, lean
 from controller.quaternion import Vector3, error_parts, rotation_rows
 
 Array = NDArray[np.float64]

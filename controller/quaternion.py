@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from controller.compiled import compiled, lean
+from controller.jit.jit import compiled, lean
 
 Array = NDArray[np.float64]
 Vector3 = tuple[float, float, float]

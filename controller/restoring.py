@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from controller.compiled import compiled
+from controller.jit.jit import compiled
 from controller.quaternion import down_in_body, skew
 
 Array = NDArray[np.float64]

@@ -2,6 +2,6 @@
 
 import sys
 
-from cosim.cli import main
+from cosim.command_line.cli import main
 
 sys.exit(main())

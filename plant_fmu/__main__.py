@@ -22,13 +22,13 @@ try:
     from plant_fmu.archive import write_whole
     from plant_fmu.build import FMI_VERSIONS, build_fmu
     from plant_fmu.check import Verdict, check_fmu
+    from plant_fmu.compiling.platforms import ALL, NATIVE, PLATFORMS
     from plant_fmu.contents.layered import reference_files
     from plant_fmu.contents.parameter_set import ssv
     from plant_fmu.contents.reference import reference
     from plant_fmu.description import documentation
     from plant_fmu.errors import PlantFmuError, one_line
     from plant_fmu.pictures import IMAGES, PICTURES, image
-    from plant_fmu.platforms import ALL, NATIVE, PLATFORMS
     from plant_fmu.vehicle import load_vehicle, shipped_vehicles
 except ModuleNotFoundError as error:  # in a checkout that is not installed
     print(_missing(error), file=sys.stderr)

@@ -17,15 +17,15 @@ import fmpy
 import platformdirs
 
 from plant_fmu.archive import require_place, write_archive
-from plant_fmu.compiler import FLAGS, cross_compiler, find_compiler
+from plant_fmu.compiling.compiler import FLAGS, cross_compiler, find_compiler
+from plant_fmu.compiling.libraries import compiled_libraries, digest
+from plant_fmu.compiling.platforms import NATIVE, Platform, cross_platforms, native_platform
+from plant_fmu.compiling.prebuilt import prebuilt_files, prebuilt_libraries
+from plant_fmu.compiling.sources import build_description, c_sources, header
+from plant_fmu.compiling.universal import universal_library
 from plant_fmu.component import Component, of_vehicle
 from plant_fmu.description import model_description, token
 from plant_fmu.errors import BuildError
-from plant_fmu.libraries import compiled_libraries, digest
-from plant_fmu.platforms import NATIVE, Platform, cross_platforms, native_platform
-from plant_fmu.prebuilt import prebuilt_files, prebuilt_libraries
-from plant_fmu.sources import build_description, c_sources, header
-from plant_fmu.universal import universal_library
 from plant_fmu.vehicle import Vehicle
 
 log = logging.getLogger(__name__)

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from plant_fmu.errors import TaskError
 from plant_fmu.importers import IMPORTERS, Result, Task, read_fmu, run_importer
-from plant_fmu.tables import hint
+from plant_fmu.toml_tables import hint
 
 REFERENCE = "FMPy"  # the importer that the others are measured against
 CS_TOLERANCE = 1e-9  # relative to the greater of an output and one: two masters differ in how they add up the time

@@ -6,10 +6,10 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 
+from plant_fmu.compiling.sources import plant_sources
 from plant_fmu.contents import contents
 from plant_fmu.errors import BuildError
-from plant_fmu.sources import plant_sources
-from plant_fmu.tables import hint
+from plant_fmu.toml_tables import hint
 from plant_fmu.variables import Variable, variables
 from plant_fmu.vehicle import Vehicle
 

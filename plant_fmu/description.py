@@ -6,10 +6,10 @@ import hashlib
 from importlib import metadata
 from xml.etree import ElementTree as ET
 
+from plant_fmu.compiling.sources import c_sources, compiled_files, header
 from plant_fmu.component import Component
 from plant_fmu.markup import xml_text
 from plant_fmu.quantities import DISPLAY_UNITS, UNITS
-from plant_fmu.sources import c_sources, compiled_files, header
 from plant_fmu.variables import Variable, variables
 from plant_fmu.vehicle import Vehicle
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from plant_fmu.autopilot import Autopilot, checked_autopilot
 from plant_fmu.errors import TableError, VehicleError
-from plant_fmu.tables import decode, read_toml
+from plant_fmu.toml_tables import decode, read_toml
 
 Vector3 = tuple[float, float, float]
 Vector6 = tuple[float, float, float, float, float, float]

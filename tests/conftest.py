@@ -102,7 +102,7 @@ def once(tmp_path_factory):
 def prebuilt_of_eight(once):
     """Return the libraries of eight thrusters for all platforms, by FMI 3.0, as a wheel has them."""
     pytest.importorskip("ziglang", reason="the build extra is not installed: no binaries for other platforms")
-    from plant_fmu import prebuilt
+    from plant_fmu.compiling import prebuilt
 
     structure = prebuilt.shipped_structures()[0]
     folder = once("prebuilt-of-eight", lambda folder: prebuilt.write_prebuilt(structure, 3, "all", folder))
@@ -112,8 +112,8 @@ def prebuilt_of_eight(once):
 @pytest.fixture(scope="session")
 def shipped_run(tmp_path_factory):
     """Return a function that runs a shipped scenario once a session, with a report where one is asked for."""
-    from cosim.run import run_scenario
-    from cosim.scenario import load_scenario
+    from cosim.run.run import run_scenario
+    from cosim.scenario.scenario import load_scenario
 
     done = {}
 

@@ -12,7 +12,7 @@ from benchmarks import baselines
 from benchmarks.__main__ import main
 from benchmarks.baselines import RANGES, Candidate, Outcome, draws, outcome
 from controller import LAWS
-from cosim.scene_run import Score
+from cosim.campaigns.scenes.flyer import Score
 
 ROOT = Path(__file__).parents[1]
 

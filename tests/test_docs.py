@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from cosim.scenario_file import shipped_scenarios
-from cosim.scenario_keys import KEYS
-from cosim.scenario_tables import File
+from cosim.scenario.keys import KEYS
+from cosim.scenario.tables import File
+from cosim.scenario.toml_file import shipped_scenarios
 
 ROOT = Path(__file__).parents[1]
 PAGES = [ROOT / "README.md", ROOT / "CHANGELOG.md", *sorted((ROOT / "docs").rglob("*.md"))]

@@ -55,7 +55,7 @@ def test_pictures_are_those_that_their_script_draws(maker, draw):
 @pytest.mark.slow
 def test_the_paths_of_the_readme_are_figures_of_runs(draw, monkeypatch):
     # short runs stand for them, which take a minute
-    from cosim import scenario
+    from cosim.scenario import scenario
 
     whole = scenario.load_scenario
     monkeypatch.setattr(scenario, "load_scenario", lambda name, over: whole(name, [*over, "time.duration=0.5"]))

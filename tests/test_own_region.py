@@ -56,10 +56,10 @@ FLY = """
 from pathlib import Path
 import numpy as np
 from controller import FunctionLaw
-from cosim.check import check
-from cosim.record import load_record
-from cosim.run import run_scenario
-from cosim.scenario import load_scenario
+from cosim.precheck.precheck import check
+from cosim.results.record import load_record
+from cosim.run.run import run_scenario
+from cosim.scenario.scenario import load_scenario
 
 def steer(state, goal, regions, weights):
     # level all the while, so that the axes of the body are those of the world

@@ -5,10 +5,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cosim.law import law_of
-from cosim.master import Master
-from cosim.record import load_record
-from cosim.scenario import load_scenario
+from cosim.results.record import load_record
+from cosim.scenario.law_factory import law_of
+from cosim.scenario.scenario import load_scenario
+from cosim.simulation.master import Master
 
 TEXT = " ".join((Path(__file__).parents[1] / "docs" / "reproduction.md").read_text().split())
 CENTRE, RADIUS = np.array([8.0, 0.0, 5.0]), 0.5

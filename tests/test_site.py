@@ -84,7 +84,7 @@ def test_the_reference_names_nothing_twice_and_nothing_that_is_not_there():
 
 
 # what a shape of one's own stands on, which is a module among them
-WITHIN = {"controller.compiled", "controller.regions.shape"}
+WITHIN = {"controller.jit.jit", "controller.regions.shape"}
 
 
 def test_the_reference_names_what_pages_and_examples_import():
@@ -118,7 +118,7 @@ def test_the_command_line_page_has_every_verb_and_flag_of_the_help(command, caps
     monkeypatch.setenv("COLUMNS", "500")
     text = (DOCS / "reference" / "command-line.md").read_text()
     title = "cosim" if command == "cosim" else f"python -m {command}"
-    main = importlib.import_module("cosim.cli" if command == "cosim" else f"{command}.__main__").main
+    main = importlib.import_module("cosim.command_line.cli" if command == "cosim" else f"{command}.__main__").main
 
     def help_of(*words):
         with pytest.raises(SystemExit):

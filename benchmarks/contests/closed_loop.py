@@ -19,9 +19,9 @@ from benchmarks.contest import Contest, Entry
 from benchmarks.peer_environment import Environment
 from benchmarks.peer_process import peer
 from benchmarks.timing import Contestant, NotMeasuredError, Own
-from cosim.master import Master
-from cosim.recorder import Recorder
-from cosim.scenario import load_scenario
+from cosim.results.recorder import Recorder
+from cosim.scenario.scenario import load_scenario
+from cosim.simulation.master import Master
 
 SCENARIO = "paper"
 STEP = 0.01  # s, in which law, arbiter and plant take one step each
@@ -142,8 +142,8 @@ def flights(
 
     def entry(stack: ExitStack) -> Contestant:
         try:
-            kind = getattr(importlib.import_module(f"cosim.flying.{engine}"), _FLYERS[engine])
-            from cosim.flying.variation import Variation
+            kind = getattr(importlib.import_module(f"cosim.batch.{engine}"), _FLYERS[engine])
+            from cosim.batch.variation import Variation
         except (ImportError, AttributeError) as error:
             raise NotMeasuredError(f"not there: {error}") from error
         scenario = load_scenario(SCENARIO, [*CHANGES, f"time.duration={RUN}", *changes])

@@ -37,8 +37,8 @@ def contests(environment: Environment) -> Iterator[Contest]:
 
 
 def _frame(_: ExitStack) -> Contestant:
-    from cosim.mavlink.dialect import dialect
-    from cosim.mavlink.framing import Framer
+    from cosim.mavlink.wire.dialect import dialect
+    from cosim.mavlink.wire.framing import Framer
 
     framer, message = Framer(SOURCE), dialect().MAVLink_attitude_message(*ATTITUDE)
 

@@ -13,7 +13,7 @@ from pathlib import Path
 from benchmarks.contest import Entry
 from benchmarks.contests.closed_loop import CHANGES, RUN, SCENARIO
 from benchmarks.timing import Contestant
-from cosim.scenario import load_scenario
+from cosim.scenario.scenario import load_scenario
 
 _VARIED = ("initial.position.0=-0.2:0.2",)
 _WARMING = 64  # rows
@@ -44,7 +44,7 @@ def sweep(crew: str, workers: int, engine: str) -> Entry:
 def _executor(crew: str, workers: int) -> Executor:
     if crew == "processes":
         return ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn"))
-    from cosim.campaigns.cluster import cluster_executor
+    from cosim.campaigns.workers.cluster import cluster_executor
 
     executor: Executor = cluster_executor(None, workers)
     return executor
@@ -61,8 +61,8 @@ class _Sweep:
 
     def seconds(self, count: int) -> float:
         """Fly `count` rows, and return what that took [s]."""
-        from cosim.campaigns.design import Design, vary_from
         from cosim.campaigns.sweep import run_sweep
+        from cosim.campaigns.sweeps.design import Design, vary_from
 
         design = Design(vary_from(_VARIED), "random", count, 0)
         before = time.perf_counter()

@@ -1,12 +1,15 @@
-"""The laws, by name."""
+"""The laws, by name.
+
+Imports: jit, regions.
+"""
 
 from controller.law import CompiledLaw
-from controller.laws.antonelli import AntonelliGains, AntonelliLaw
+from controller.laws.baselines.antonelli import AntonelliGains, AntonelliLaw
+from controller.laws.baselines.pd import PdGains, PdLaw
+from controller.laws.baselines.sun_cheah import SunCheahGains, SunCheahLaw
+from controller.laws.baselines.unarbitrated import UnarbitratedGains, UnarbitratedLaw
 from controller.laws.deployable import DeployableGains, DeployableLaw
-from controller.laws.pd import PdGains, PdLaw
 from controller.laws.printed import PrintedLaw
-from controller.laws.sun_cheah import SunCheahGains, SunCheahLaw
-from controller.laws.unarbitrated import UnarbitratedGains, UnarbitratedLaw
 
 LAWS: dict[str, type[CompiledLaw]] = {
     law.name: law for law in (PrintedLaw, DeployableLaw, PdLaw, SunCheahLaw, UnarbitratedLaw, AntonelliLaw)

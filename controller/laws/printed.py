@@ -7,7 +7,7 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 
 from controller import printed_law
-from controller.compiled import lean
+from controller.jit.jit import lean
 from controller.law import Array, VehicleState, WrenchLaw
 from controller.printed_law import Gains
 from controller.regions import PackedRegions, evaluate_packed

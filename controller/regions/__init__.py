@@ -1,4 +1,7 @@
-"""Regions: where the vehicle shall be, and where it shall not."""
+"""Regions: where the vehicle shall be, and where it shall not.
+
+Imports: jit.
+"""
 
 from controller.regions.box import Box
 from controller.regions.cone import Cone

@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from controller.compiled import lean
+from controller.jit.jit import lean
 from controller.quaternion import rotation_matrix
 from controller.regions.geometry import product_distance, to_local, to_world
 from controller.regions.shape import Array, Bounds, Evaluation, Vector3, Vector4, about, require, require_finite, unit

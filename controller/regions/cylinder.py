@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import ClassVar
 
-from controller.compiled import lean
+from controller.jit.jit import lean
 from controller.regions.geometry import product_distance
 from controller.regions.shape import (
     UP_TO_ROUNDING,

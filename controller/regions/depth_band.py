@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from math import inf
 from typing import ClassVar
 
-from controller.compiled import lean
+from controller.jit.jit import lean
 from controller.regions.shape import Array, Bounds, Evaluation, require, require_finite
 
 

@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from controller.compiled import lean
+from controller.jit.jit import lean
 
 Array = NDArray[np.float64]
 

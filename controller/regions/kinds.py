@@ -8,8 +8,8 @@ import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
-from controller.by_address import declare, entry_of
-from controller.compiled import part
+from controller.jit.function_pointer import declare, entry_of
+from controller.jit.jit import part
 from controller.regions.box import box
 from controller.regions.cone import cone
 from controller.regions.cylinder import cylinder

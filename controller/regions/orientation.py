@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from math import inf
 from typing import ClassVar
 
-from controller.compiled import lean
+from controller.jit.jit import lean
 from controller.quaternion import error_parts
 from controller.regions.shape import Array, Bounds, EvaluationOfAttitude, Vector4, require, unit
 

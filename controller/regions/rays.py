@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from controller.compiled import compiled
+from controller.jit.jit import compiled
 from controller.regions.ellipsoid import Ellipsoid
 from controller.regions.kinds import evaluate_shape
 from controller.regions.orientation import Orientation

@@ -13,10 +13,10 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from controller.by_address import call
-from controller.compiled import inlined, lean, part
 from controller.errors import RegionError
-from controller.on_stack import zeros
+from controller.jit.function_pointer import call
+from controller.jit.jit import inlined, lean, part
+from controller.jit.stack_array import zeros
 from controller.regions.box import Box
 from controller.regions.cone import Cone
 from controller.regions.cylinder import Cylinder

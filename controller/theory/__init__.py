@@ -1,4 +1,7 @@
-"""The stability analysis of the printed law, (30)-(45), as functions that can be asked where it holds."""
+"""The stability analysis of the printed law, (30)-(45), as functions that can be asked where it holds.
+
+Imports: jit.
+"""
 
 from controller.theory.bounds import decay_bound, norm_bound, square_bound
 from controller.theory.conditions import (

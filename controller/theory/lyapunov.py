@@ -16,7 +16,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from controller.compiled import compiled
+from controller.jit.jit import compiled
 from controller.printed_law import Gains, violation
 from controller.quaternion import rate, skew
 from controller.theory.model import Model, coriolis, damping

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from controller.compiled import compiled
+from controller.jit.jit import compiled
 from controller.quaternion import down_in_body, skew
 from controller.restoring import parameters, regressor
 

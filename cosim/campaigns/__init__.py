@@ -1,8 +1,33 @@
-"""Campaigns: many scenes flown by one law, or one scenario with numbers of it varied; resumable, on many cores."""
+"""Many runs, resumable and on many cores.
 
-from cosim.campaigns.campaign import Campaign, run_campaign
-from cosim.campaigns.comparison import Comparison, compare
-from cosim.campaigns.design import Design, Vary, vary_from
-from cosim.campaigns.sweep import Sweep, run_sweep
+Scenes flown by one law or by several, or one scenario with numbers of it varied. Public: `run_campaign`, `compare`,
+`run_sweep`, `vary_from`.
+
+Imports: controller, io, report, run, scenario.
+"""
+
+import importlib
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from cosim.campaigns.campaign import Campaign, run_campaign
+    from cosim.campaigns.comparison import Comparison, compare
+    from cosim.campaigns.sweep import Sweep, run_sweep
+    from cosim.campaigns.sweeps.design import Design, Vary, vary_from
 
 __all__ = ["Campaign", "Comparison", "Design", "Sweep", "Vary", "compare", "run_campaign", "run_sweep", "vary_from"]
+
+# imported when asked for: a scene's text needs nothing of what flies it
+_HOMES = {
+    "campaign": {"Campaign", "run_campaign"},
+    "comparison": {"Comparison", "compare"},
+    "sweep": {"Sweep", "run_sweep"},
+    "sweeps.design": {"Design", "Vary", "vary_from"},
+}
+
+
+def __getattr__(name: str) -> object:
+    for home, names in _HOMES.items():
+        if name in names:
+            return getattr(importlib.import_module(f"{__name__}.{home}"), name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -8,16 +8,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from cosim.campaigns.folder import SUMMARY
-from cosim.campaigns.law_gains import gains_from
-from cosim.campaigns.results import Results
+from cosim.campaigns.analysis.summary import summarise
 from cosim.campaigns.runner import carry_out
-from cosim.campaigns.scene_store import SceneStore
-from cosim.campaigns.scenes import SceneTask, SceneWork
-from cosim.campaigns.summary import summarise
-from cosim.plain_json import json_text
-from cosim.scene_run import Conditions
-from cosim.whole_file import write_whole
+from cosim.campaigns.scenes.flyer import Conditions
+from cosim.campaigns.scenes.law_gains import gains_from
+from cosim.campaigns.scenes.scene_store import SceneStore
+from cosim.campaigns.scenes.work import SceneTask, SceneWork
+from cosim.campaigns.store.folder import SUMMARY
+from cosim.campaigns.store.results import Results
+from cosim.io.atomic_file import write_whole
+from cosim.io.strict_json import json_text
 
 
 @dataclass(frozen=True)

@@ -11,19 +11,19 @@ from typing import Any
 import numpy as np
 
 from controller import LAWS
+from cosim.campaigns.analysis.statistics import median_difference, paired
+from cosim.campaigns.analysis.summary import median
 from cosim.campaigns.campaign import Campaign, run_campaign
-from cosim.campaigns.comparison_page import NUMBERS, PAGE
-from cosim.campaigns.law_gains import law_named
-from cosim.campaigns.replays import WORST
-from cosim.campaigns.results import Results
-from cosim.campaigns.scene_store import SceneStore
-from cosim.campaigns.statistics import median_difference, paired
-from cosim.campaigns.summary import median
+from cosim.campaigns.pages.comparison_page import NUMBERS, PAGE
+from cosim.campaigns.pages.replays import WORST
+from cosim.campaigns.scenes.flyer import Conditions
+from cosim.campaigns.scenes.law_gains import law_named
+from cosim.campaigns.scenes.scene_store import SceneStore
+from cosim.campaigns.store.results import Results
 from cosim.errors import RunError
-from cosim.plain_json import json_text
-from cosim.report import FIGURES
-from cosim.scene_run import Conditions
-from cosim.whole_file import write_whole
+from cosim.io.atomic_file import write_whole
+from cosim.io.strict_json import json_text
+from cosim.report.report import FIGURES
 
 
 @dataclass(frozen=True)

@@ -14,15 +14,15 @@ from typing import Any
 import numpy as np
 import pyarrow.compute as pc
 
-from cosim.campaigns.batches import Batches
-from cosim.campaigns.crews import Crew, Here, Lent, Processes
-from cosim.campaigns.dispatch import fly_all
-from cosim.campaigns.folder import CampaignFolder
-from cosim.campaigns.results import Results
-from cosim.campaigns.work import Task, Work
-from cosim.campaigns.worker import flyer_held
+from cosim.campaigns.store.folder import CampaignFolder
+from cosim.campaigns.store.results import Results
+from cosim.campaigns.workers.batch_sizing import Batches
+from cosim.campaigns.workers.dispatch import fly_all
+from cosim.campaigns.workers.work import Task, Work
+from cosim.campaigns.workers.worker import flyer_held
+from cosim.campaigns.workers.worker_pools import Crew, Here, Lent, Processes
 from cosim.errors import RunError
-from cosim.progress import ProgressBar
+from cosim.run.progress import ProgressBar
 
 log = logging.getLogger(__name__)
 
@@ -131,7 +131,7 @@ def _flown(
 
 def _crew(task: Task, workers: int, executor: Executor | None) -> Crew:
     if executor is not None:
-        from cosim.campaigns.cluster import Cluster, is_cluster
+        from cosim.campaigns.workers.cluster import Cluster, is_cluster
 
         return Cluster(executor) if is_cluster(executor) else Lent(executor, workers)
     return Processes(workers, task) if workers > 1 else Here()

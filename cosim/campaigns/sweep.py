@@ -7,15 +7,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from cosim.campaigns.design import Design
-from cosim.campaigns.folder import SUMMARY
-from cosim.campaigns.results import Results
 from cosim.campaigns.runner import carry_out
-from cosim.campaigns.sweep_rows import SweepWork
-from cosim.campaigns.sweep_summary import summarise_sweep
-from cosim.plain_json import json_text
-from cosim.scenario import Scenario
-from cosim.whole_file import write_whole
+from cosim.campaigns.store.folder import SUMMARY
+from cosim.campaigns.store.results import Results
+from cosim.campaigns.sweeps.design import Design
+from cosim.campaigns.sweeps.rows import SweepWork
+from cosim.campaigns.sweeps.summary import summarise_sweep
+from cosim.io.atomic_file import write_whole
+from cosim.io.strict_json import json_text
+from cosim.scenario.scenario import Scenario
 
 
 @dataclass(frozen=True)

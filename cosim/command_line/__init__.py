@@ -1,1 +1,8 @@
-"""Verbs of the ``cosim`` command that have a file of their own."""
+"""The ``cosim`` command.
+
+One verb a file. It alone prints.
+
+Imports: batch, campaigns, campaigns.pages, campaigns.reruns, campaigns.scenes, campaigns.sweeps, campaigns.workers,
+controller, export, io, live, live.watching, mavlink, mavlink.conformance, mavlink.listening, mavlink.wire, plant_fmu,
+precheck, replay, results, run, scenario, sitl, ssp.
+"""

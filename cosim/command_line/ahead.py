@@ -19,7 +19,7 @@ def add_verb(verbs: Any) -> None:
 
 def compile_all(options: argparse.Namespace) -> int:
     """Compile, and say how long it took."""
-    from cosim.flying.ahead import compile_ahead
+    from cosim.command_line.compiling import compile_ahead
 
     for name, scenario, overrides in [(name, name, []) for name in options.scenario] or _laws():
         started = time.perf_counter()

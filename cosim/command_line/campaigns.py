@@ -61,9 +61,9 @@ def add_replays(verb: argparse.ArgumentParser) -> None:
 def campaign(options: argparse.Namespace) -> int:
     """Run ``cosim campaign``."""
     from cosim.campaigns import run_campaign
-    from cosim.campaigns.campaign_page import campaign_lines, write_campaign_page
-    from cosim.campaigns.law_gains import gains_from
-    from cosim.scene_run import Conditions
+    from cosim.campaigns.pages.campaign_page import campaign_lines, write_campaign_page
+    from cosim.campaigns.scenes.flyer import Conditions
+    from cosim.campaigns.scenes.law_gains import gains_from
 
     gains = gains_from(options.law, options.settings)
     conditions = Conditions(tell_failures=options.tell_failures)
@@ -83,9 +83,9 @@ def campaign(options: argparse.Namespace) -> int:
 def compare(options: argparse.Namespace) -> int:
     """Run ``cosim compare``."""
     from cosim.campaigns import compare as compare_laws
-    from cosim.campaigns.comparison_page import write_comparison_page
-    from cosim.campaigns.law_gains import gains_by_law
-    from cosim.scene_run import Conditions
+    from cosim.campaigns.pages.comparison_page import write_comparison_page
+    from cosim.campaigns.scenes.flyer import Conditions
+    from cosim.campaigns.scenes.law_gains import gains_by_law
 
     laws = [law.strip() for law in options.laws.split(",") if law.strip()]
     gains = gains_by_law(laws, options.settings)

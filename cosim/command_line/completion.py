@@ -53,7 +53,7 @@ def completion(options: argparse.Namespace) -> int:
     """Run ``cosim completion``."""
     import shtab
 
-    from cosim.scenario_file import shipped_scenarios
+    from cosim.scenario.toml_file import shipped_scenarios
 
     names = " ".join(shipped_scenarios())
     scenarios = dict.fromkeys(SHELLS, "_cosim_scenarios") | {

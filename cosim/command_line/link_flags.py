@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING
 
 from cosim.command_line.numbers import number, whole
 from cosim.errors import TelemetryError
-from cosim.mavlink.options import LOSS_ACTIONS, PROFILES, MavlinkOptions
+from cosim.mavlink.wire.options import LOSS_ACTIONS, PROFILES, MavlinkOptions
 
 if TYPE_CHECKING:
-    from cosim.mavlink.endpoint import Endpoint
+    from cosim.mavlink.wire.endpoint import Endpoint
 
 _GREATEST_TIMEOUT = 3600.0  # s
 _SYSTEM = whole(1, 255)
@@ -96,8 +96,8 @@ def links_from(options: argparse.Namespace) -> tuple[list[Endpoint], MavlinkOpti
         If an endpoint is none, or leaves this machine without leave, the key cannot be read, or a flag stands without
         the one that it needs.
     """
-    from cosim.mavlink.endpoint import parse_endpoint
-    from cosim.mavlink.signing import read_key
+    from cosim.mavlink.wire.endpoint import parse_endpoint
+    from cosim.mavlink.wire.signing import read_key
 
     for name in ("await_arm", "link_loss", "link_timeout"):
         if getattr(options, name) and not options.commands:

@@ -15,7 +15,7 @@ from cosim.command_line.link_flags import add_link_flags, links_from
 from cosim.command_line.numbers import number, rate, whole
 from cosim.command_line.process import tell
 from cosim.command_line.results import say
-from cosim.mavlink.options import PROFILES
+from cosim.mavlink.wire.options import PROFILES
 
 _REDRAW, _SNAPSHOT = 0.25, 1.0  # s
 _ONCE = 2.0  # s of listening, for one picture
@@ -67,9 +67,9 @@ def _add_ground(verb: argparse.ArgumentParser, where: str, number: str | None) -
 
 def _ground_link(options: argparse.Namespace) -> Any:
     from cosim.errors import TelemetryError
-    from cosim.mavlink.endpoint import parse_endpoint
-    from cosim.mavlink.ground import GroundLink
-    from cosim.mavlink.signing import read_key
+    from cosim.mavlink.wire.endpoint import parse_endpoint
+    from cosim.mavlink.wire.ground_end import GroundLink
+    from cosim.mavlink.wire.signing import read_key
 
     endpoint = parse_endpoint(options.endpoint, options.allow_remote)
     if endpoint.kind == "tlog":

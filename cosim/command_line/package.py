@@ -31,8 +31,8 @@ def add_verb(verbs: Any) -> None:
 
 def package(options: argparse.Namespace) -> int:
     """Run ``cosim package``."""
-    from cosim.package import package_system
-    from cosim.scenario import load_scenario
+    from cosim.scenario.scenario import load_scenario
+    from cosim.ssp import package_system
 
     scenario = load_scenario(options.scenario, options.overrides)
     out = options.out or Path(f"{scenario.name}.ssp")

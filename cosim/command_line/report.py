@@ -41,8 +41,8 @@ def report(options: argparse.Namespace) -> int:
     """Run ``cosim report``: one bad folder does not keep the others from theirs."""
     from controller import ControllerError
     from cosim.errors import CosimError
-    from cosim.report_words import verdict
-    from cosim.run_folder import report_again
+    from cosim.results.wording import verdict
+    from cosim.run.run_folder import report_again
     from plant_fmu import PlantFmuError
 
     formats = [name for group in options.formats for name in group] or ["html"]

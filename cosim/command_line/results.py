@@ -6,7 +6,7 @@ import argparse
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from cosim.run import Run
+    from cosim.run.run import Run
 
 
 def say(options: argparse.Namespace, *lines: str) -> None:
@@ -28,7 +28,7 @@ def print_run(options: argparse.Namespace, run: Run, report: bool = True) -> Non
     report : bool
         Whether it has a report and a replay.
     """
-    from cosim.report_words import verdict
+    from cosim.results.wording import verdict
 
     say(options, verdict(run.summary))
     for path in ("report", "replay") if report else ("summary",):

@@ -17,7 +17,7 @@ from cosim.live.address import HOST, PORT, parse_live
 
 if TYPE_CHECKING:
     from cosim.mavlink.setup import Mavlink
-    from cosim.run import Run
+    from cosim.run.run import Run
 
 
 def add_verb(verbs: Any) -> None:
@@ -55,8 +55,8 @@ def add_verb(verbs: Any) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Run ``cosim run``."""
-    from cosim.run import run_scenario
-    from cosim.scenario import load_scenario
+    from cosim.run.run import run_scenario
+    from cosim.scenario.scenario import load_scenario
 
     overrides = [*options.overrides]
     if options.commands:
@@ -90,8 +90,8 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _json(run: Run) -> str:
-    from cosim.plain_json import json_text
-    from cosim.report_words import verdict
+    from cosim.io.strict_json import json_text
+    from cosim.results.wording import verdict
 
     files = {what: str(path) for what, path in run.files().items()}
     return json_text(

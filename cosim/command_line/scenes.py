@@ -35,8 +35,8 @@ def add_verb(verbs: Any) -> None:
 
 def scenes(options: argparse.Namespace) -> int:
     """Run ``cosim scenes``."""
-    from cosim.scene_generator import generate_scenes
-    from cosim.whole_file import whole_file
+    from cosim.campaigns.scenes.generator import generate_scenes
+    from cosim.io.atomic_file import whole_file
 
     lines = generate_scenes(options.count, options.seed, options.kind)
     if options.out is None:

@@ -6,14 +6,14 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from cosim.address import resolved
 from cosim.command_line.numbers import number, whole
 from cosim.command_line.process import INTERRUPTED, tell
 from cosim.command_line.results import print_run, say
+from cosim.io.network_address import resolved
 from cosim.sitl.ports import PORTS
 
 if TYPE_CHECKING:
-    from cosim.run import Run
+    from cosim.run.run import Run
 
 
 def add_verbs(verbs: Any) -> None:

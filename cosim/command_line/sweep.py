@@ -69,10 +69,10 @@ def add_verbs(verbs: Any) -> None:
 
 def sweep(options: argparse.Namespace) -> int:
     """Run ``cosim sweep``."""
-    from cosim.campaigns.design import Design, vary_from
+    from cosim.campaigns.pages.sweep_page import sweep_lines, write_sweep_page
     from cosim.campaigns.sweep import run_sweep
-    from cosim.campaigns.sweep_page import sweep_lines, write_sweep_page
-    from cosim.scenario import load_scenario
+    from cosim.campaigns.sweeps.design import Design, vary_from
+    from cosim.scenario.scenario import load_scenario
 
     if options.scheduler and options.workers:
         raise RunError("--workers: expected none with --scheduler: the cluster has as many as it has")
@@ -86,7 +86,7 @@ def sweep(options: argparse.Namespace) -> int:
         with contextlib.ExitStack() as stack:
             executor = None
             if options.dask or options.scheduler:
-                from cosim.campaigns.cluster import cluster_executor
+                from cosim.campaigns.workers.cluster import cluster_executor
 
                 n = options.workers or os.cpu_count() or 1
                 executor = stack.enter_context(cluster_executor(options.scheduler, n))
@@ -102,7 +102,7 @@ def sweep(options: argparse.Namespace) -> int:
 
 def rerun(options: argparse.Namespace) -> int:
     """Run ``cosim rerun``."""
-    from cosim.campaigns.rerun import rerun as rerun_row
+    from cosim.campaigns.reruns.rerun import rerun as rerun_row
 
     done = rerun_row(options.folder, options.row, options.out, progress=not options.quiet)
     if done.other_code:

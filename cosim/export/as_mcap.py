@@ -23,9 +23,9 @@ from cosim.export.excerpt import Excerpt
 from cosim.export.names import grouped, legal
 from cosim.export.protobuf_table import numbers_messages, numbers_schema
 from cosim.export.scene import POSITION, QUATERNION, Scene
-from cosim.flown_run import FlownRun
 from cosim.replay.events import events_of
-from cosim.signals import Array
+from cosim.results.run_result import FlownRun
+from cosim.simulation.signals import Array
 
 PACKAGE = "subreach"  # of the schemas of signals
 _CHUNK = 4 * 2**20  # bytes

@@ -30,9 +30,9 @@ from cosim.export.scene import (
     Scene,
     Solid,
 )
-from cosim.record import Rows
 from cosim.replay.events import events_of
-from cosim.signals import Array
+from cosim.results.record import Rows
+from cosim.simulation.signals import Array
 
 TIMELINE = "sim_time"  # s
 SIGNALS, WORLD, EVENTS = "signals", "world", "events"

@@ -6,9 +6,9 @@ from pathlib import Path
 
 from cosim.errors import ExportError
 from cosim.export.excerpt import Excerpt
-from cosim.mavlink.endpoint import Endpoint
-from cosim.mavlink.options import MavlinkOptions
 from cosim.mavlink.replay import replay
+from cosim.mavlink.wire.endpoint import Endpoint
+from cosim.mavlink.wire.options import MavlinkOptions
 
 
 def write(excerpt: Excerpt, path: Path) -> list[Path]:

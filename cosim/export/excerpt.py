@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cosim.errors import ExportError
-from cosim.flown_run import SCENARIO, FlownRun, load_run
-from cosim.plain_json import json_text
-from cosim.record import Rows
-from cosim.signals import Array, Column
+from cosim.io.strict_json import json_text
+from cosim.results.record import Rows
+from cosim.results.run_result import SCENARIO, FlownRun, load_run
+from cosim.simulation.signals import Array, Column
 
 _ROUNDING = 1e-6  # of a period; a time that is short of a tick by no more has reached it
 

@@ -11,8 +11,8 @@ from typing import Any
 
 from cosim.errors import ExportError, RunError
 from cosim.export.excerpt import excerpt_of
-from cosim.flown_run import ORDERS, SCENARIO, SUMMARY
-from cosim.record import RECORD
+from cosim.results.record import RECORD
+from cosim.results.run_result import ORDERS, SCENARIO, SUMMARY
 from plant_fmu.installing import install_hint
 
 

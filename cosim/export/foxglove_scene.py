@@ -18,7 +18,7 @@ from google.protobuf.timestamp_pb2 import Timestamp
 from controller.regions import Box, Cylinder, Ellipsoid, Sphere, of_attitude
 from cosim.export.scene import BODY, HULL_COLOUR, NED, OPAQUE, PLACE, THRUST_COLOUR, TRAIL_COLOUR, Scene, Solid
 from cosim.replay.events import Event
-from cosim.signals import Array
+from cosim.simulation.signals import Array
 
 MAP = "map"  # z upwards, as Foxglove draws
 _HALF_TURN = (0.0, math.sqrt(0.5), math.sqrt(0.5), 0.0)  # about north-east: (north, east, down) to (east, north, up)

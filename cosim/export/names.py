@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Sequence
 
-from cosim.signals import Column
+from cosim.simulation.signals import Column
 
 _OF_REGIONS = ("value", "clearance", "shift.x", "shift.y", "shift.z")
 _ELEMENT = re.compile(r"(.+)\[(\d+)\]")

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from controller.regions import Pipe, Region, clearances_at
-from cosim.signals import Array
+from cosim.simulation.signals import Array
 
 _MOST_STEPS = 20_000  # along a ray that runs beside a straight stretch, just inside its surface
 _ROUNDING = 1e-12  # of the radius

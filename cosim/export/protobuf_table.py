@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from google.protobuf.descriptor_pb2 import FieldDescriptorProto, FileDescriptorProto, FileDescriptorSet
 
-from cosim.signals import Array
+from cosim.simulation.signals import Array
 
 _FIXED_64 = 1  # wire type of a double
 

@@ -15,8 +15,8 @@ from cosim.export.surfaces import Mesh, sector, surface_of
 from cosim.replay.activity import active_regions
 from cosim.replay.header import header_of
 from cosim.replay.steering import changes_of, log_of
-from cosim.scenario import CRITERIA
-from cosim.signals import Array
+from cosim.scenario.scenario import CRITERIA
+from cosim.simulation.signals import Array
 
 NED, PLACE, BODY = "ned", "place", "body"  # the world; the vehicle's place, not turned; the vehicle
 POSITION = ("position.x", "position.y", "position.z")

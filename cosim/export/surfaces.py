@@ -27,7 +27,7 @@ from controller.regions import (
 )
 from controller.regions.shape import Bounds
 from cosim.export.pipe_surface import pipe_rings
-from cosim.signals import Array
+from cosim.simulation.signals import Array
 
 AROUND = 32  # corners of a circle
 _TIMES_SPLIT = 2  # of each triangle of the icosahedron that becomes a ball

@@ -1,1 +1,6 @@
-"""A run that is watched, and ordered about, while it goes on: in browsers, and in a terminal."""
+"""A run that is watched while it goes on.
+
+A server shows the run in browsers and takes commands from them. Public: `LiveView`.
+
+Imports: controller, io, plant_fmu, replay, scenario, simulation, simulation.commands.
+"""

@@ -8,8 +8,8 @@ import socket
 from dataclasses import dataclass
 from urllib.parse import urlsplit
 
-from cosim.address import resolved
 from cosim.errors import TelemetryError
+from cosim.io.network_address import resolved
 
 HOST, PORT = "127.0.0.1", 8765
 _OWN = frozenset({"127.0.0.1", "localhost", "::1"})

@@ -6,7 +6,7 @@ from collections import deque
 
 import numpy as np
 
-from cosim.signals import Array
+from cosim.simulation.signals import Array
 
 _BYTES = 8_000_000  # of old rows
 _NEW = 256  # rows of which none is left out

@@ -10,19 +10,19 @@ import numpy as np
 
 from controller.regions import Shape, Sphere
 from cosim.errors import OrderError
-from cosim.helm.orders import Change, Forget, Obstacle, Order, Sticks
-from cosim.helm.slots import Slots
-from cosim.helm.sources import OrderQueue
 from cosim.live.history import History
 from cosim.live.messages import bytes_of, text_of
 from cosim.live.orders import Desk
 from cosim.replay.header import header_of, shape_of
 from cosim.replay.order_words import order_words
 from cosim.replay.viewing import Viewing
-from cosim.scenario import Scenario
-from cosim.scenario_tables import FAR_AWAY
-from cosim.signals import Array, Column
-from cosim.surroundings import middle_of
+from cosim.scenario.scenario import Scenario
+from cosim.scenario.tables import FAR_AWAY
+from cosim.simulation.commands.commands import Change, Forget, Obstacle, Order, Sticks
+from cosim.simulation.commands.obstacle_slots import Slots
+from cosim.simulation.commands.sources import OrderQueue
+from cosim.simulation.environment import middle_of
+from cosim.simulation.signals import Array, Column
 
 log = logging.getLogger(__name__)
 

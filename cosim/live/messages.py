@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from cosim.signals import Array
+from cosim.simulation.signals import Array
 
 
 def text_of(kind: str, /, **fields: Any) -> str:

@@ -8,10 +8,10 @@ from collections.abc import Callable
 import msgspec
 
 from cosim.errors import OrderError
-from cosim.helm.orders import NO_ORDER, Change, Mission, Move, Order
-from cosim.helm.settings import LiveSettings
-from cosim.helm.sources import OrderQueue
-from cosim.scenario import Scenario
+from cosim.scenario.scenario import Scenario
+from cosim.simulation.commands.commands import NO_ORDER, Change, Mission, Move, Order
+from cosim.simulation.commands.settings import LiveSettings
+from cosim.simulation.commands.sources import OrderQueue
 from plant_fmu.errors import one_line
 
 LONGEST = 16_384  # bytes of a message

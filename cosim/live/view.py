@@ -13,12 +13,12 @@ from typing import Any
 
 import numpy as np
 
-from cosim.helm.orders import Order
-from cosim.helm.sources import OrderQueue
 from cosim.live.address import LiveAddress, bound
 from cosim.live.hub import Hub
-from cosim.scenario import Scenario
-from cosim.signals import Array, Column
+from cosim.scenario.scenario import Scenario
+from cosim.simulation.commands.commands import Order
+from cosim.simulation.commands.sources import OrderQueue
+from cosim.simulation.signals import Array, Column
 
 log = logging.getLogger(__name__)
 

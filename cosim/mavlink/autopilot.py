@@ -6,12 +6,10 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-from cosim.helm.sources import OrderQueue
 from cosim.mavlink.events import Events
 from cosim.mavlink.messages import status
+from cosim.mavlink.messages.streams import Streams
 from cosim.mavlink.messages.table import HEARTBEAT
-from cosim.mavlink.options import MavlinkOptions
-from cosim.mavlink.outlet import Outlet
 from cosim.mavlink.services.commands import Commands
 from cosim.mavlink.services.ftp import FileServer
 from cosim.mavlink.services.manual import Manual
@@ -25,10 +23,12 @@ from cosim.mavlink.services.service import Handler, Service
 from cosim.mavlink.services.supervision import Supervision
 from cosim.mavlink.services.targets import Targets
 from cosim.mavlink.services.timing import Timing
-from cosim.mavlink.streams import Streams
-from cosim.mavlink.vessel import COMPONENT_ID, Sender, Vessel
-from cosim.scenario import Scenario
-from cosim.signals import Array, Column
+from cosim.mavlink.vehicle.vehicle_context import COMPONENT_ID, Sender, Vessel
+from cosim.mavlink.wire.message_sink import Outlet
+from cosim.mavlink.wire.options import MavlinkOptions
+from cosim.scenario.scenario import Scenario
+from cosim.simulation.commands.sources import OrderQueue
+from cosim.simulation.signals import Array, Column
 
 _HEARTBEAT = 1.1  # s of the wall clock without one, until one is sent; longer than the stream's second
 _STILL = 0.5  # s of the wall clock without a snapshot, after which streams go by that clock

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from controller.regions import of_attitude
-from cosim.helm.course import way
 from cosim.mavlink.messages import status
-from cosim.mavlink.profile import MODE_NAMES
-from cosim.mavlink.vessel import Vessel
-from cosim.mavlink.view import View
+from cosim.mavlink.vehicle.profile import MODE_NAMES
+from cosim.mavlink.vehicle.vehicle_context import Vessel
+from cosim.mavlink.vehicle.view import View
+from cosim.simulation.commands.mission_executor import way
 
 _MARGIN = 0.01  # m or rad: a region is entered or left once its surface is that far behind
 _RELEASED = 1_000_000  # µs of simulated time without a limit, until the thrusters are said to be free

@@ -7,18 +7,19 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from cosim.columns import names_of, require_columns
 from cosim.errors import RunError
-from cosim.flown_run import SCENARIO
 from cosim.mavlink.autopilot import Autopilot
-from cosim.mavlink.endpoint import Endpoint
-from cosim.mavlink.link import open_links
-from cosim.mavlink.options import MavlinkOptions
 from cosim.mavlink.setup import ahead
 from cosim.mavlink.thread import SNAPSHOT_PERIOD, SNAPSHOTS, LinkThread
-from cosim.record import Record, load_record
-from cosim.scenario import load_scenario
-from cosim.signals import Array
+from cosim.mavlink.wire.endpoint import Endpoint
+from cosim.mavlink.wire.link import open_links
+from cosim.mavlink.wire.options import MavlinkOptions
+from cosim.results.record import Record, load_record
+from cosim.results.required_columns import require_columns
+from cosim.results.run_result import SCENARIO
+from cosim.scenario.scenario import load_scenario
+from cosim.simulation.columns import names_of
+from cosim.simulation.signals import Array
 
 _LONGEST_SLEEP = 0.5  # s
 _WAITING = 0.002  # s, for the links to send what is queued

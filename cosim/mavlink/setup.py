@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from cosim.helm import OrderQueue
 from cosim.mavlink.autopilot import Autopilot
-from cosim.mavlink.endpoint import Endpoint
-from cosim.mavlink.link import open_links
-from cosim.mavlink.options import MavlinkOptions
 from cosim.mavlink.thread import LinkThread
-from cosim.scenario import Scenario
-from cosim.signals import Column
+from cosim.mavlink.wire.endpoint import Endpoint
+from cosim.mavlink.wire.link import open_links
+from cosim.mavlink.wire.options import MavlinkOptions
+from cosim.scenario.scenario import Scenario
+from cosim.simulation.commands import OrderQueue
+from cosim.simulation.signals import Column
 
 
 @dataclass(frozen=True)

@@ -16,9 +16,9 @@ from collections.abc import Callable, Sequence
 from typing import Any, Protocol
 
 from cosim.mavlink.channels.tlog import Tlog
-from cosim.mavlink.link import Link
-from cosim.mavlink.outlet import Outlet
-from cosim.signals import Array
+from cosim.mavlink.wire.link import Link
+from cosim.mavlink.wire.message_sink import Outlet
+from cosim.simulation.signals import Array
 
 log = logging.getLogger(__name__)
 

@@ -1,1 +1,7 @@
-"""Seeing a run: what a page, a terminal or a live view needs to know of it, and the page."""
+"""The interactive page of a run.
+
+What a page, a terminal or a live view must know of a run: its header, its path, its events; and the page itself.
+Public: `replay`, `write_replay`.
+
+Imports: controller, fuzzy_arbiter, io, plant_fmu, results, scenario, simulation, simulation.commands.
+"""

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from cosim.scenario import CRITERIA
-from cosim.signals import Array
+from cosim.scenario.scenario import CRITERIA
+from cosim.simulation.signals import Array
 
 
 def active_regions(

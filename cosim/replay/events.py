@@ -11,13 +11,13 @@ from itertools import chain, pairwise
 import numpy as np
 
 from controller.regions import of_attitude
-from cosim.flown_run import FlownRun
 from cosim.replay.activity import active_regions
 from cosim.replay.order_words import ordered_events
 from cosim.replay.steering import Log
-from cosim.scenario import CRITERIA
-from cosim.signals import Array
-from cosim.spans import Flags, Span, Spans
+from cosim.results.run_result import FlownRun
+from cosim.results.spans import Flags, Span, Spans
+from cosim.scenario.scenario import CRITERIA
+from cosim.simulation.signals import Array
 
 _MOST = 12  # events of a kind; what comes closer together than that allows is told as one
 

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from controller.regions import SHAPES, Shape, of_attitude
-from cosim.report_words import asked
-from cosim.scenario import Scenario
-from cosim.signals import Column
+from cosim.results.wording import asked
+from cosim.scenario.scenario import Scenario
+from cosim.simulation.signals import Column
 from fuzzy_arbiter import Arbiter, System
 from plant_fmu import Vehicle
 from plant_fmu.thruster_lines import thruster_lines

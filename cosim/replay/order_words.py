@@ -7,7 +7,8 @@ from bisect import bisect_right
 from collections.abc import Sequence
 from typing import assert_never
 
-from cosim.helm.orders import (
+from cosim.scenario.tables import Vector3
+from cosim.simulation.commands.commands import (
     Aim,
     Arm,
     Begin,
@@ -22,7 +23,6 @@ from cosim.helm.orders import (
     Steer,
     Sticks,
 )
-from cosim.scenario_tables import Vector3
 
 _TOLD = 3  # orders of one moment that are told each
 _MODES = {

@@ -11,7 +11,7 @@ from pathlib import Path
 from string import Template
 from typing import Any
 
-from cosim.whole_file import write_whole
+from cosim.io.atomic_file import write_whole
 
 REPLAY = "replay.html"
 

@@ -6,9 +6,9 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from cosim.errors import RunError
-from cosim.flown_run import FlownRun, load_run
 from cosim.replay.page import REPLAY, is_page, write_page
 from cosim.replay.trace import trace_of
+from cosim.results.run_result import FlownRun, load_run
 
 
 def write_replay(run: FlownRun, out: Path | None = None, title: str | None = None) -> Path:

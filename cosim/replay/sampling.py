@@ -7,9 +7,9 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from cosim.extremes import even_edges, extreme_rows
-from cosim.record import Rows
-from cosim.signals import Array
+from cosim.results.extremes import even_edges, extreme_rows
+from cosim.results.record import Rows
+from cosim.simulation.signals import Array
 
 _BYTES = 400_000  # of numbers, for the first minute
 _BYTES_A_MINUTE = 150_000  # for each further one

@@ -11,18 +11,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controller.regions import Shape, Sphere
-from cosim.came import radii_of
 from cosim.errors import OrderError
-from cosim.flown_run import ORDERS, FlownRun
-from cosim.helm.course import way
-from cosim.helm.orders import MODES, Begin, Change, Item, Mission, Order, Steer
-from cosim.helm.settings import LiveSettings
-from cosim.helm.sources import read_log
-from cosim.record import Rows
 from cosim.replay.header import shape_of
-from cosim.scenario_tables import FAR_AWAY, SecondaryRegion
-from cosim.signals import Array
-from cosim.surroundings import middle_of
+from cosim.results.as_flown import radii_of
+from cosim.results.record import Rows
+from cosim.results.run_result import ORDERS, FlownRun
+from cosim.scenario.tables import FAR_AWAY, SecondaryRegion
+from cosim.simulation.commands.commands import MODES, Begin, Change, Item, Mission, Order, Steer
+from cosim.simulation.commands.mission_executor import way
+from cosim.simulation.commands.settings import LiveSettings
+from cosim.simulation.commands.sources import read_log
+from cosim.simulation.environment import middle_of
+from cosim.simulation.signals import Array
 
 Log = Sequence[tuple[int, Order]]  # step that took it, and what was ordered
 

@@ -12,17 +12,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cosim.extremes import rows_at
-from cosim.flown_run import FlownRun
-from cosim.plain_json import plain
-from cosim.record import Rows
+from cosim.io.strict_json import plain
 from cosim.replay.events import events_of
 from cosim.replay.header import header_of
 from cosim.replay.sampling import sampled_rows
 from cosim.replay.steering import changes_of, log_of
 from cosim.replay.viewing import Viewing
-from cosim.report_words import verdict
-from cosim.signals import Array
+from cosim.results.extremes import rows_at
+from cosim.results.record import Rows
+from cosim.results.run_result import FlownRun
+from cosim.results.wording import verdict
+from cosim.simulation.signals import Array
 
 _FORCE = [f"command.{axis}" for axis in "XYZ"]
 

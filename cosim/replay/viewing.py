@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from cosim.replay.activity import active_regions
-from cosim.scenario import CRITERIA, Scenario
-from cosim.signals import Array, Column
+from cosim.scenario.scenario import CRITERIA, Scenario
+from cosim.simulation.signals import Array, Column
 from fuzzy_arbiter import Arbiter
 from fuzzy_arbiter.engines.firing import Firing
 

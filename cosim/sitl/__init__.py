@@ -1,1 +1,6 @@
-"""A real autopilot flies the plant: the other side of ArduPilot's and PX4's simulators in the loop."""
+"""A real autopilot flies the plant.
+
+The other side of ArduPilot's and PX4's simulators in the loop.
+
+Imports: controller, mavlink.vehicle, mavlink.wire, plant_fmu, results, run, scenario, simulation.
+"""

@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import Any
 
 from cosim.errors import RunError
-from cosim.master import Master
-from cosim.recorder import Recorder
-from cosim.run_folder import claim, conclude
-from cosim.scenario import Scenario
+from cosim.results.recorder import Recorder
+from cosim.run.run_folder import claim, conclude
+from cosim.scenario.scenario import Scenario
+from cosim.simulation.master import Master
 from cosim.sitl.law import AutopilotLaw
 from cosim.sitl.motion import Motion, MotionReader
 

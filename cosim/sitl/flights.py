@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from cosim.errors import CosimError, RunError
-from cosim.run import Run
+from cosim.run.run import Run
 from cosim.sitl.flight import Flight
 from cosim.sitl.law import AutopilotLaw
 from cosim.sitl.scenario import SCENARIO, scenario_to_fly

@@ -9,8 +9,8 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 from cosim.errors import RunError
-from cosim.mavlink.dialect import dialect
-from cosim.mavlink.options import ORIGIN
+from cosim.mavlink.wire.dialect import dialect
+from cosim.mavlink.wire.options import ORIGIN
 from cosim.sitl.flight import Flight
 from cosim.sitl.flights import Counts, Flights, Outcome
 from cosim.sitl.hil_messages import at_rest, hil_messages

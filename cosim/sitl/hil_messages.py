@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from controller.quaternion import rotation_matrix
-from cosim.mavlink.geodesy import LocalFrame
+from cosim.mavlink.vehicle.geodesy import LocalFrame
 from cosim.sitl.motion import Motion
 
 FIELD_NED = (0.175, -0.012, 0.466)  # gauss, of the Earth, where it is told to be: near Edinburgh

@@ -11,7 +11,7 @@ from controller import Diagnostic, VehicleState
 from controller.law import Output
 from controller.regions import PackedRegions
 from cosim.errors import RunError
-from cosim.signals import Array
+from cosim.simulation.signals import Array
 from plant_fmu import Vehicle
 from plant_fmu.autopilot import LONGEST, SHORTEST, Autopilot
 

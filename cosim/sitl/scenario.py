@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from cosim.errors import RunError
-from cosim.scenario import Scenario, load_scenario
-from cosim.scenario_check import MAX_STEPS
+from cosim.scenario.scenario import Scenario, load_scenario
+from cosim.scenario.validation import MAX_STEPS
 
 SCENARIO = "sitl"  # that is flown where none is named
 LOWEST_RATE, HIGHEST_RATE = 11, 65535  # Hz: an autopilot's frame is shorter than 0.1 s, and a packet holds 16 bits

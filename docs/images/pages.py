@@ -10,8 +10,8 @@ from selenium import webdriver
 from selenium.webdriver.chrome.service import Service
 from selenium.webdriver.support.wait import WebDriverWait
 
-from cosim.run import run_scenario
-from cosim.scenario import load_scenario
+from cosim.run.run import run_scenario
+from cosim.scenario.scenario import load_scenario
 
 PICTURE = "replay-docking.png"
 _SIZE = {"width": 1200, "height": 860, "deviceScaleFactor": 1, "mobile": False}

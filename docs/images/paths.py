@@ -6,9 +6,9 @@ import shutil
 import tempfile
 from pathlib import Path
 
-from cosim.run import run_scenario
-from cosim.run_folder import report_again
-from cosim.scenario import load_scenario
+from cosim.run.run import run_scenario
+from cosim.run.run_folder import report_again
+from cosim.scenario.scenario import load_scenario
 
 PATHS = {"path-plane.png": "paper", "path-deployable.png": "paper-deployable"}
 

@@ -7,9 +7,9 @@ import shutil
 import tempfile
 from pathlib import Path
 
-from cosim.run import run_scenario
-from cosim.run_folder import report_again
-from cosim.scenario import load_scenario
+from cosim.run.run import run_scenario
+from cosim.run.run_folder import report_again
+from cosim.scenario.scenario import load_scenario
 
 PAGE = Path(__file__).parents[1] / "tutorial.md"
 

@@ -6,7 +6,7 @@ import argparse
 from collections.abc import Iterator
 from pathlib import Path
 
-from cosim.cli import _parser as cosim
+from cosim.command_line.cli import _parser as cosim
 from fuzzy_arbiter.__main__ import _parser as fuzzy_arbiter
 from plant_fmu.__main__ import _parser as plant_fmu
 

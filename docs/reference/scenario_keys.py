@@ -8,9 +8,9 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from cosim.scenario_keys import KEYS
-from cosim.scenario_tables import File, RegionEntry
-from plant_fmu.tables import dataclass_of
+from cosim.scenario.keys import KEYS
+from cosim.scenario.tables import File, RegionEntry
+from plant_fmu.toml_tables import dataclass_of
 
 PAGE = Path(__file__).parents[1] / "scenarios.md"
 

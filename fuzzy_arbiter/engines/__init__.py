@@ -1,4 +1,7 @@
-"""The engines: ways to evaluate one and the same system, chosen by name."""
+"""The engines: ways to evaluate one and the same system, chosen by name.
+
+Imports: nothing.
+"""
 
 from __future__ import annotations
 

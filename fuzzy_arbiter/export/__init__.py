@@ -1,4 +1,7 @@
-"""Export to code that needs nothing of this package."""
+"""Export to code that needs nothing of this package.
+
+Imports: engines.
+"""
 
 from fuzzy_arbiter.export.c import to_c
 from fuzzy_arbiter.export.python import to_python

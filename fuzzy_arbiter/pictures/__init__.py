@@ -2,6 +2,8 @@
 
 Every function draws on the axes that it is given, or on those of a new figure, and returns them; none shows or saves
 anything. Matplotlib is needed only when one is called.
+
+Imports: engines.
 """
 
 from fuzzy_arbiter.pictures.fields import decisions, surface

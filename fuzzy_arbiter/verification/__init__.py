@@ -1,4 +1,7 @@
-"""What is known about a system from its definition alone: completeness, consistency, exclusivity, gaps."""
+"""What is known about a system from its definition alone: completeness, consistency, exclusivity, gaps.
+
+Imports: engines.
+"""
 
 from fuzzy_arbiter.verification.checks import verify
 from fuzzy_arbiter.verification.report import Check, Finding, Row, Verification

@@ -1,4 +1,7 @@
-"""What an FMU holds beside its description, binaries and sources: page, licences, icon, terminals, references."""
+"""What an FMU holds beside its description, binaries and sources: page, licences, icon, terminals, references.
+
+Imports: nothing.
+"""
 
 from __future__ import annotations
 

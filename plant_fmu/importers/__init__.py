@@ -1,4 +1,7 @@
-"""Other tools' importers, each run on an FMU in a process of its own, with their answers in one form."""
+"""Other tools' importers, each run on an FMU in a process of its own, with their answers in one form.
+
+Imports: nothing.
+"""
 
 from plant_fmu.importers.fmu_file import FmuFile, FmuVariable, read_fmu
 from plant_fmu.importers.process import run_importer

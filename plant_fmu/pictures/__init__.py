@@ -1,6 +1,8 @@
 """Pictures of a vehicle: where its thrusters push, and the variables of its FMU.
 
 Every function returns a new figure; none shows or saves anything. Matplotlib is needed only when one is called.
+
+Imports: nothing.
 """
 
 from plant_fmu.pictures.files import IMAGES, image

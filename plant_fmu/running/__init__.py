@@ -1,4 +1,7 @@
-"""FMUs stepped from Python: variables as arrays and by name, states, derivatives."""
+"""FMUs stepped from Python: variables as arrays and by name, states, derivatives.
+
+Imports: nothing.
+"""
 
 from plant_fmu.running.channels import Channel, Channels
 from plant_fmu.running.plant import Plant

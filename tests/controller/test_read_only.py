@@ -5,8 +5,8 @@ import pytest
 
 from controller import VehicleState
 from controller.regions import Orientation, Region, Sphere, pack
-from cosim.law import law_of
-from cosim.scenario import load_scenario
+from cosim.scenario.law_factory import law_of
+from cosim.scenario.scenario import load_scenario
 
 FACING = Orientation((1.0, 0.0, 0.0, 0.0), 0.5)
 REGIONS = [Region("rock", Sphere((3.0, 0.2, 0.0), 0.5), "out"), Region("face", FACING, "in")]

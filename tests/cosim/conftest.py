@@ -6,4 +6,4 @@ import pytest
 @pytest.fixture(autouse=True)
 def untold_compiling(monkeypatch):
     """Leave out what the command says while laws are compiled: whether they are depends on what earlier runs kept."""
-    monkeypatch.setattr("cosim.progress._PERIOD", 1e6)
+    monkeypatch.setattr("cosim.run.progress._PERIOD", 1e6)

@@ -11,13 +11,13 @@ from xml.etree import ElementTree
 
 import tomli_w
 
-from cosim.helm import OrderQueue
+from cosim.campaigns.scenes.scene import decode_scene
 from cosim.live.orders import Desk
-from cosim.scenario import load_scenario
-from cosim.scene import decode_scene
+from cosim.scenario.scenario import load_scenario
+from cosim.simulation.commands import OrderQueue
 from fuzzy_arbiter.formats import load
 from plant_fmu import load_vehicle
-from plant_fmu.compiler import find_compiler
+from plant_fmu.compiling.compiler import find_compiler
 from tests.docs.directives import PageError
 from tests.docs.pages import Block
 

@@ -12,10 +12,10 @@ from cosim.errors import TelemetryError
 from cosim.live.address import parse_live
 from cosim.live.view import LiveView
 from cosim.mavlink.conformance.client import Client
-from cosim.mavlink.endpoint import parse_endpoint
-from cosim.mavlink.ground import GroundLink
-from cosim.run import run_scenario
-from cosim.scenario import load_scenario
+from cosim.mavlink.wire.endpoint import parse_endpoint
+from cosim.mavlink.wire.ground_end import GroundLink
+from cosim.run.run import run_scenario
+from cosim.scenario.scenario import load_scenario
 
 _ARM = 400  # MAV_CMD_COMPONENT_ARM_DISARM
 _PAUSE = 0.05  # s

@@ -15,14 +15,14 @@ from unittest import mock
 import matplotlib.pyplot as plt
 
 import benchmarks.__main__
-import cosim.cli
+import cosim.command_line.cli
 import fuzzy_arbiter.__main__
 import plant_fmu.__main__
 from tests.docs.directives import PageError
 from tests.docs.pages import ROOT
 
 MODULES = {
-    "cosim": cosim.cli,
+    "cosim": cosim.command_line.cli,
     "plant_fmu": plant_fmu.__main__,
     "fuzzy_arbiter": fuzzy_arbiter.__main__,
     "benchmarks": benchmarks.__main__,

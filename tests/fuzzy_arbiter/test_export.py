@@ -27,7 +27,7 @@ from fuzzy_arbiter import (
     triangle,
 )
 from fuzzy_arbiter.export import to_c, to_python
-from plant_fmu.compiler import find_compiler
+from plant_fmu.compiling.compiler import find_compiler
 
 WIDE = System(
     (

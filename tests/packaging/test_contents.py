@@ -12,8 +12,9 @@ import packaging.utils
 import pytest
 from fmpy.validation import validate_fmu
 
-from plant_fmu import build_fmu, cached_fmu, load_vehicle, prebuilt, shipped_vehicles
-from plant_fmu.platforms import PLATFORMS, native_platform
+from plant_fmu import build_fmu, cached_fmu, load_vehicle, shipped_vehicles
+from plant_fmu.compiling import prebuilt
+from plant_fmu.compiling.platforms import PLATFORMS, native_platform
 from tests.packaging.conftest import ROOT
 from tests.plant_fmu.test_sources import trajectory
 
@@ -52,7 +53,7 @@ def test_the_wheel_holds_the_packages_and_nothing_else(wheel, unpacked, tracked,
         "[console_scripts]",
         "cosim",
         "=",
-        "cosim.cli:main",
+        "cosim.command_line.cli:main",
     ]
     assert wheel.name == f"subreach-{project['version']}-py3-none-any.whl"
     assert wheel.stat().st_size < MOST

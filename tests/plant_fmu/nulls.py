@@ -14,7 +14,7 @@ import fmpy
 import pytest
 
 from plant_fmu.build import neutral_members
-from plant_fmu.compiler import find_compiler
+from plant_fmu.compiling.compiler import find_compiler
 from plant_fmu.component import Component
 from plant_fmu.description import token
 

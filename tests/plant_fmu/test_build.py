@@ -17,7 +17,7 @@ import plant_fmu
 from plant_fmu import BuildError, TableError, VehicleError, build_fmu, cached_fmu, load_vehicle
 from plant_fmu.__main__ import main
 from plant_fmu.archive import write_whole
-from plant_fmu.compiler import find_compiler
+from plant_fmu.compiling.compiler import find_compiler
 from plant_fmu.installing import install_hint
 
 ROOT = Path(__file__).parents[2]

@@ -11,10 +11,10 @@ import pytest
 from plant_fmu import FmuFileError, cached_fmu, load_vehicle, unpacking
 from plant_fmu.__main__ import main
 from plant_fmu.check import check_fmu
-from plant_fmu.compiler import compile_library, find_compiler
+from plant_fmu.compiling.compiler import compile_library, find_compiler
+from plant_fmu.compiling.platforms import native_platform
 from plant_fmu.errors import TaskError
 from plant_fmu.importers import IMPORTERS, Task, read_fmu, run_importer
-from plant_fmu.platforms import native_platform
 
 FMPY = next(importer for importer in IMPORTERS if importer.name == "FMPy")
 DESCRIPTION = '<fmiModelDescription fmiVersion="3.0"><ModelVariables/></fmiModelDescription>'

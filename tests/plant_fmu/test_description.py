@@ -12,10 +12,10 @@ from fmpy import read_model_description
 from fmpy.validation import validate_fmu
 
 from plant_fmu import cached_fmu, load_vehicle, shipped_vehicles
+from plant_fmu.compiling.sources import header
 from plant_fmu.component import of_vehicle
 from plant_fmu.description import documentation, model_description
 from plant_fmu.quantities import UNITS
-from plant_fmu.sources import header
 from plant_fmu.variables import variables
 
 ROOT = Path(__file__).parents[2]

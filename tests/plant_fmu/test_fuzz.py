@@ -8,7 +8,7 @@ import pytest
 
 from plant_fmu import load_vehicle
 from plant_fmu.build import neutral_members
-from plant_fmu.compiler import find_compiler
+from plant_fmu.compiling.compiler import find_compiler
 
 HERE = Path(__file__).parent
 

@@ -10,7 +10,7 @@ from fmpy.simulation import instantiate_fmu
 
 from plant_fmu import cached_fmu, load_vehicle
 from plant_fmu.importers import IMPORTERS, Task, read_fmu, run_importer
-from tests.house.modules import ROOT
+from tests.architecture.modules import ROOT
 
 IMPORTER = {importer.name: importer for importer in IMPORTERS}
 

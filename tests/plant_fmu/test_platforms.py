@@ -16,7 +16,7 @@ from fmpy.validation import validate_fmu
 
 from plant_fmu import BuildError, build_fmu, cached_fmu, load_vehicle
 from plant_fmu.__main__ import main
-from plant_fmu.platforms import PLATFORMS
+from plant_fmu.compiling.platforms import PLATFORMS
 from tests.plant_fmu.conftest import STATES, Slave
 from tests.plant_fmu.libraries import parts, read_libraries
 

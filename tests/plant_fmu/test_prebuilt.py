@@ -8,13 +8,14 @@ import zipfile
 
 import pytest
 
-from plant_fmu import BuildError, build_fmu, cached_fmu, load_vehicle, prebuilt, shipped_vehicles
-from plant_fmu.compiler import cross_compiler, find_compiler
+from plant_fmu import BuildError, build_fmu, cached_fmu, load_vehicle, shipped_vehicles
+from plant_fmu.compiling import prebuilt
+from plant_fmu.compiling.compiler import cross_compiler, find_compiler
+from plant_fmu.compiling.libraries import compiled_libraries
+from plant_fmu.compiling.platforms import cross_platforms, native_platform
+from plant_fmu.compiling.signature import signed_anew
 from plant_fmu.component import of_vehicle
 from plant_fmu.description import token
-from plant_fmu.libraries import compiled_libraries
-from plant_fmu.platforms import cross_platforms, native_platform
-from plant_fmu.signature import signed_anew
 from tests.plant_fmu.conftest import STATES, Slave
 
 HERE = native_platform()
@@ -112,7 +113,7 @@ def test_another_number_of_thrusters_needs_the_compiler(no_compiler, tmp_path):
 
 @pytest.mark.parametrize("change", ["source", "flag", "header"])
 def test_libraries_of_other_sources_are_not_taken(no_compiler, tmp_path, monkeypatch, change):
-    from plant_fmu import libraries, sources
+    from plant_fmu.compiling import libraries, sources
 
     if change == "source":
         files = sources._files

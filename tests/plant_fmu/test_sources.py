@@ -14,8 +14,8 @@ from fmpy.build import build_platform_binary
 from lxml import etree
 
 from plant_fmu import cached_fmu, load_vehicle
-from plant_fmu.compiler import find_compiler
-from plant_fmu.platforms import native_platform
+from plant_fmu.compiling.compiler import find_compiler
+from plant_fmu.compiling.platforms import native_platform
 from tests.plant_fmu.conftest import STATES, Slave
 
 FMPY = Path(fmpy.__file__).parent

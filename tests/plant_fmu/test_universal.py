@@ -7,7 +7,7 @@ import fmpy
 import pytest
 
 from plant_fmu import BuildError
-from plant_fmu.universal import universal_library
+from plant_fmu.compiling.universal import universal_library
 from tests.plant_fmu.libraries import parts
 
 INTEL, ARM = 0x01000007, 0x0100000C

@@ -4,8 +4,8 @@ import json
 
 import pytest
 
-from cosim.run import run_scenario
-from cosim.scenario import load_scenario
+from cosim.run.run import run_scenario
+from cosim.scenario.scenario import load_scenario
 
 ORDERS = (
     {"order": "obstacle", "number": 7, "position": [4, 4, 4], "radius": 0.5, "velocity": [0.1, 0, 0]},

@@ -5,20 +5,21 @@ import shutil
 import pyarrow.parquet as pq
 import pytest
 
-from cosim.columns import names_of, require_columns
 from cosim.errors import RunError
 from cosim.export import export_run
-from cosim.flown_run import SUMMARY, load_run
 from cosim.live.watching import looks
-from cosim.master import Master
-from cosim.mavlink.endpoint import parse_endpoint
-from cosim.mavlink.options import MavlinkOptions
 from cosim.mavlink.replay import replay as stream
-from cosim.record import PARTS, RECORD, load_record
+from cosim.mavlink.wire.endpoint import parse_endpoint
+from cosim.mavlink.wire.options import MavlinkOptions
 from cosim.replay.pages import replay
-from cosim.run_folder import report_again
-from cosim.scenario import load_scenario
-from cosim.scenario_file import shipped_scenarios
+from cosim.results.record import PARTS, RECORD, load_record
+from cosim.results.required_columns import require_columns
+from cosim.results.run_result import SUMMARY, load_run
+from cosim.run.run_folder import report_again
+from cosim.scenario.scenario import load_scenario
+from cosim.scenario.toml_file import shipped_scenarios
+from cosim.simulation.columns import names_of
+from cosim.simulation.master import Master
 
 KINDS = {
     "ordered": ["commands.enabled=true", "commands.obstacles=2"],
@@ -72,7 +73,7 @@ def kind(request):
 
 def test_d6_each_column_dropped_singly_is_named_or_warned_of(kind, monkeypatch, caplog):
     scenario, names = kind
-    monkeypatch.setattr("cosim.columns.names_of", lambda _: names)
+    monkeypatch.setattr("cosim.simulation.columns.names_of", lambda _: names)
     taken_along = 0
     for name in names:
         caplog.clear()
@@ -166,7 +167,7 @@ def test_d6_a_run_that_is_still_written_is_looked_at_too(lacking):
 @pytest.mark.slow
 def test_d6_every_column_of_a_file_dropped_singly(lacking, ordered_run, caplog, monkeypatch):
     names = list(load_record(ordered_run).units)
-    monkeypatch.setattr("cosim.columns.names_of", lambda _: names)
+    monkeypatch.setattr("cosim.simulation.columns.names_of", lambda _: names)
     summary, refused = load_run(ordered_run).summary, 0
     for name in names:
         caplog.clear()

@@ -12,19 +12,19 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-import controller.compiled
-from cosim.campaigns.folder import PLAN, read_plan
+import controller.jit.jit
+from cosim.campaigns.store.folder import PLAN, read_plan
 from cosim.errors import RunError
-from cosim.flown_run import SUMMARY, load_run
+from cosim.io.atomic_file import whole_file, write_whole
+from cosim.io.strict_json import read_json
 from cosim.live.watching import looks
-from cosim.plain_json import read_json
-from cosim.record import PARTS, RECORD, Record, load_record
 from cosim.replay.page import write_page
 from cosim.replay.pages import replay
-from cosim.run import run_scenario
-from cosim.run_folder import claim, report_again
-from cosim.scenario import load_scenario
-from cosim.whole_file import whole_file, write_whole
+from cosim.results.record import PARTS, RECORD, Record, load_record
+from cosim.results.run_result import SUMMARY, load_run
+from cosim.run.run import run_scenario
+from cosim.run.run_folder import claim, report_again
+from cosim.scenario.scenario import load_scenario
 
 ROWS = {"time": [0.0, 1.0], "position.x": [1.0, 2.0]}
 
@@ -60,14 +60,14 @@ def test_tables_that_are_no_record(tmp_path, table):
 
 
 def test_a_few_bytes_that_say_a_thousand_million_rows_are_not_believed(tmp_path, monkeypatch):
-    monkeypatch.setattr("cosim.record.MAX_ROWS", 1)
+    monkeypatch.setattr("cosim.results.record.MAX_ROWS", 1)
     with pytest.raises(RunError, match="has 2 rows"):
         load_record(written(tmp_path, pa.table(ROWS)))
 
 
 @pytest.mark.parametrize("odd", [pa.table({"time": [1]}), pa.table({"time": [0.0] * 3}), pa.table({"x": [0.0]})])
 def test_each_part_of_a_killed_run_is_looked_at(tmp_path, monkeypatch, odd):
-    monkeypatch.setattr("cosim.record.MAX_ROWS", 4)
+    monkeypatch.setattr("cosim.results.record.MAX_ROWS", 4)
     (tmp_path / PARTS).mkdir()
     for i, table in enumerate((pa.table({"time": [0.0, 1.0]}), odd)):
         pq.write_table(table, tmp_path / PARTS / f"{i:06}.parquet")
@@ -230,11 +230,11 @@ def test_code_kept_where_others_write_is_not_loaded(tmp_path, monkeypatch):
     source.write_text("")
     folder = tmp_path / "kept"
     folder.mkdir(mode=0o755)
-    assert controller.compiled._is_ours(folder, source)
+    assert controller.jit.jit._is_ours(folder, source)
     folder.chmod(0o777)
     assert stat.S_IMODE(folder.stat().st_mode) == 0o777
-    assert not controller.compiled._is_ours(folder, source)
+    assert not controller.jit.jit._is_ours(folder, source)
     folder.chmod(0o755)
     monkeypatch.setattr(os, "geteuid", lambda: source.stat().st_uid + 1)
-    assert controller.compiled._is_ours(folder, source)  # who owns the code owns what is kept of it
-    assert controller.compiled._is_ours(tmp_path / "none yet", source)
+    assert controller.jit.jit._is_ours(folder, source)  # who owns the code owns what is kept of it
+    assert controller.jit.jit._is_ours(tmp_path / "none yet", source)

@@ -10,10 +10,10 @@ import pyarrow.parquet as pq
 import pytest
 
 from cosim.errors import RunError
-from cosim.flown_run import load_run
-from cosim.run import run_scenario
-from cosim.run_folder import claim
-from cosim.scenario import load_scenario
+from cosim.results.run_result import load_run
+from cosim.run.run import run_scenario
+from cosim.run.run_folder import claim
+from cosim.scenario.scenario import load_scenario
 from cosim.sitl.flight import Flight
 from cosim.sitl.law import law_of_pwm
 from cosim.sitl.scenario import scenario_to_fly
@@ -39,8 +39,8 @@ def a_full_disk(of, monkeypatch):
 
 
 PLACES = {
-    "the record": ["cosim.recorder.pq.write_table", "cosim.recorder.pq.ParquetWriter"],
-    "the vehicle's file": ["cosim.run_folder.shutil.copyfile"],
+    "the record": ["cosim.results.recorder.pq.write_table", "cosim.results.recorder.pq.ParquetWriter"],
+    "the vehicle's file": ["cosim.run.run_folder.shutil.copyfile"],
 }
 
 
@@ -72,8 +72,8 @@ def test_d9_what_was_recorded_before_stays(tmp_path, monkeypatch):
         write(*arguments, **options)
         written += 1
 
-    monkeypatch.setattr("cosim.recorder._PART_SECONDS", 0.0)
-    monkeypatch.setattr("cosim.recorder.pq.write_table", room_for_one)
+    monkeypatch.setattr("cosim.results.recorder._PART_SECONDS", 0.0)
+    monkeypatch.setattr("cosim.results.recorder.pq.write_table", room_for_one)
     with pytest.raises(RunError, match="No space left"):
         run_scenario(scenario(), tmp_path / "run", report=False)
     assert load_run(tmp_path / "run").summary["status"] == "killed"
@@ -112,7 +112,7 @@ def test_d9_files_that_may_not_grow(tmp_path, monkeypatch):
 
     try:
         with monkeypatch.context() as patch:
-            patch.setattr("cosim.run.claim", claimed)
+            patch.setattr("cosim.run.run.claim", claimed)
             with pytest.raises(RunError, match="File too large"):
                 run_scenario(scenario(), tmp_path / "run", report=False)
     finally:

@@ -4,7 +4,7 @@ import ast
 
 import pytest
 
-from tests.house.modules import FILES, ROOT, tree_of
+from tests.architecture.modules import FILES, ROOT, tree_of
 
 MODULES = {"pickle", "marshal", "shelve", "dill", "cloudpickle", "joblib", "yaml", "telnetlib", "ftplib", "xmlrpc"}
 CALLS = {"eval", "exec", "compile", "__import__", "input"}
@@ -12,13 +12,13 @@ MAY = {
     ("exec", "fuzzy_arbiter/compiled.py"),  # text of our own making
     ("compile", "fuzzy_arbiter/compiled.py"),
 }
-PROCESSES = {"plant_fmu/compiler.py", "plant_fmu/importers/process.py", "cosim/flying/lanes_library.py"}
+PROCESSES = {"plant_fmu/compiling/compiler.py", "plant_fmu/importers/process.py", "cosim/batch/lanes_library.py"}
 XML = {"plant_fmu/unpacking.py"}
 ZIPS = {
     "plant_fmu/unpacking.py",
     "plant_fmu/build.py",  # asks whether a file of the cache is one
     "plant_fmu/archive.py",  # writes
-    "plant_fmu/prebuilt.py",  # reads what came with the package
+    "plant_fmu/compiling/prebuilt.py",  # reads what came with the package
     "cosim/export/as_npz.py",  # writes
 }
 

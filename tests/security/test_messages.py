@@ -10,8 +10,8 @@ import controller.errors
 import cosim.errors
 import fuzzy_arbiter.errors
 import plant_fmu.errors
-from cosim.cli import _Lines
-from cosim.cli import main as cosim_main
+from cosim.command_line.cli import _Lines
+from cosim.command_line.cli import main as cosim_main
 from cosim.command_line.process import run_guarded
 from fuzzy_arbiter.__main__ import main as fuzzy_main
 from plant_fmu.__main__ import main as plant_main

@@ -9,11 +9,11 @@ from pathlib import Path
 import pytest
 import tomli_w
 
-from cosim.flown_run import load_run
 from cosim.replay.page import replay_page
-from cosim.run import run_scenario
-from cosim.run_folder import report_again
-from cosim.scenario import load_scenario
+from cosim.results.run_result import load_run
+from cosim.run.run import run_scenario
+from cosim.run.run_folder import report_again
+from cosim.scenario.scenario import load_scenario
 from fuzzy_arbiter.__main__ import main as fuzzy_main
 from plant_fmu import load_vehicle
 from plant_fmu.contents.page import page

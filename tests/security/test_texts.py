@@ -10,15 +10,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from controller import ControllerError
+from cosim.campaigns.scenes.scene import decode_scene
 from cosim.errors import CosimError
-from cosim.helm.sources import read_log
-from cosim.scenario import load_scenario
-from cosim.scenario_file import _folder as scenarios
-from cosim.scene import decode_scene
+from cosim.scenario.scenario import load_scenario
+from cosim.scenario.toml_file import _folder as scenarios
+from cosim.simulation.commands.sources import read_log
 from fuzzy_arbiter import Arbiter, ArbiterError
 from fuzzy_arbiter import formats as arbiters
 from plant_fmu import PlantFmuError, load_vehicle
-from plant_fmu.tables import MAX_FILE
+from plant_fmu.toml_tables import MAX_FILE
 
 SCENARIO = (scenarios() / "paper.toml").read_text(encoding="utf-8")
 VEHICLE = 'name = "odin"\n'

@@ -1,4 +1,7 @@
-"""The deployable law: keeps the paper's idea and works within real thrusters."""
+"""The deployable law: keeps the paper's idea and works within real thrusters.
+
+Imports: jit, regions.
+"""
 
 from controller.laws.deployable.gains import DeployableGains
 from controller.laws.deployable.law import DeployableLaw

@@ -16,11 +16,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from controller.compiled import compiled, part
+from controller.jit.jit import compiled, part
+from controller.jit.stack_array import zeros
 from controller.laws.deployable.gains import DeployableGains
 from controller.laws.deployable.linear_algebra import copy, product
 from controller.laws.deployable.model import Dynamics, Thrusters
-from controller.on_stack import zeros
 from controller.quaternion import down_parts, error_parts
 from controller.quaternion import rate as quaternion_rate
 from controller.regions import Orientation, PackedRegions, attitude_clearance

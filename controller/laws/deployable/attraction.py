@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from controller.compiled import part
+from controller.jit.jit import part
+from controller.jit.stack_array import zeros
 from controller.laws.deployable.gains import DeployableGains
 from controller.laws.deployable.guide import Guide
 from controller.laws.deployable.linear_algebra import copy
-from controller.on_stack import zeros
 
 Array = NDArray[np.float64]
 

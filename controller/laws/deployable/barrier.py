@@ -24,14 +24,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from controller.compiled import part
+from controller.jit.jit import part
+from controller.jit.stack_array import zeros
 from controller.laws.deployable.attitude import turn
 from controller.laws.deployable.attraction import approach_speed
 from controller.laws.deployable.faces import FACES, face_ahead, has_faces
 from controller.laws.deployable.gains import DeployableGains
 from controller.laws.deployable.linear_algebra import copy
 from controller.laws.deployable.quadratic_program import Workspace
-from controller.on_stack import zeros
 from controller.regions import Box, DepthBand, HalfSpace, Orientation, PackedRegions, Prism, evaluate_packed
 
 Array = NDArray[np.float64]

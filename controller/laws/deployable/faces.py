@@ -12,8 +12,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from controller.compiled import inlined, part
-from controller.on_stack import zeros
+from controller.jit.jit import inlined, part
+from controller.jit.stack_array import zeros
 from controller.regions import Ellipsoid, HalfSpace, PackedRegions, Sphere, clearance_of_place, place_clearance
 
 Array = NDArray[np.float64]

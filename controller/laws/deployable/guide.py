@@ -15,11 +15,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from controller.compiled import part
+from controller.jit.jit import part
+from controller.jit.stack_array import zeros
 from controller.laws.deployable.gains import DeployableGains
 from controller.laws.deployable.linear_algebra import copy, norm
 from controller.laws.deployable.search import Tree, grow, tree_of_nothing
-from controller.on_stack import zeros
 from controller.regions import (
     Orientation,
     PackedRegions,

@@ -8,14 +8,14 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from controller.compiled import part
+from controller.jit.jit import part
+from controller.jit.stack_array import zeros
 from controller.law import VehicleState
 from controller.laws.deployable import attitude as attitude_loop
 from controller.laws.deployable import failure, model, observer
 from controller.laws.deployable.gains import DeployableGains
 from controller.laws.deployable.linear_algebra import copy
 from controller.laws.deployable.memory import DeployableMemory
-from controller.on_stack import zeros
 from controller.quaternion import write_rotation
 
 Array = NDArray[np.float64]

@@ -10,8 +10,9 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from controller.by_address import call, entry_of
-from controller.compiled import lean, part
+from controller.jit.function_pointer import call, entry_of
+from controller.jit.jit import lean, part
+from controller.jit.stack_array import zeros
 from controller.law import (
     Array,
     CompiledLaw,
@@ -37,7 +38,6 @@ from controller.laws.deployable.memory import DeployableMemory, Stages
 from controller.laws.deployable.model import Dynamics, Thrusters, dynamics_of, thrusters_of
 from controller.laws.deployable.observer import Estimate, estimate_of_nothing
 from controller.laws.deployable.quadratic_program import workspace
-from controller.on_stack import zeros
 from controller.quaternion import write_rotation
 from controller.regions import Orientation, PackedRegions, pack
 

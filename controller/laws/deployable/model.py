@@ -7,10 +7,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from controller.compiled import compiled, part
+from controller.jit.jit import compiled, part
+from controller.jit.stack_array import zeros
 from controller.law import VehicleModel
 from controller.laws.deployable.linear_algebra import product
-from controller.on_stack import zeros
 
 Array = NDArray[np.float64]
 

@@ -14,11 +14,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from controller.compiled import part
+from controller.jit.jit import part
+from controller.jit.stack_array import zeros
 from controller.laws.deployable.gains import DeployableGains
 from controller.laws.deployable.linear_algebra import copy
 from controller.laws.deployable.model import Dynamics, Thrusters, free_acceleration, thrust_acceleration
-from controller.on_stack import zeros
 
 Array = NDArray[np.float64]
 

@@ -26,7 +26,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from controller.compiled import part
+from controller.jit.jit import part
 from controller.laws.deployable.linear_algebra import copy
 
 Array = NDArray[np.float64]

@@ -13,10 +13,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from controller.compiled import inlined, part
+from controller.jit.jit import inlined, part
+from controller.jit.stack_array import zeros
 from controller.laws.deployable.gains import DeployableGains
 from controller.laws.deployable.linear_algebra import copy
-from controller.on_stack import zeros
 from controller.regions import Orientation, PackedRegions, Sphere, clearance_of_place, clearance_of_sphere
 
 Array = NDArray[np.float64]

@@ -8,10 +8,10 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from cosim.helm.orders import MODES
 from cosim.live.watching.bars import Bars
 from cosim.live.watching.sources import Look
-from cosim.scenario import CRITERIA
+from cosim.scenario.scenario import CRITERIA
+from cosim.simulation.commands.commands import MODES
 
 _STYLES = {"obstacle": "red", "shape": "yellow", "depth": "blue", None: "green"}
 _FIRED = 0.005  # strength of a rule below which it does not count

@@ -15,16 +15,16 @@ from urllib.parse import urlsplit
 import msgspec
 import numpy as np
 
-from cosim.columns import require_columns
 from cosim.errors import RunError, TelemetryError
-from cosim.flown_run import SCENARIO, SUMMARY, load_run
 from cosim.live.messages import rows_of
-from cosim.record import PARTS, RECORD, Record
 from cosim.replay.header import header_of
 from cosim.replay.viewing import Viewing
-from cosim.report_words import verdict
-from cosim.scenario import load_scenario
-from cosim.signals import Array
+from cosim.results.record import PARTS, RECORD, Record
+from cosim.results.required_columns import require_columns
+from cosim.results.run_result import SCENARIO, SUMMARY, load_run
+from cosim.results.wording import verdict
+from cosim.scenario.scenario import load_scenario
+from cosim.simulation.signals import Array
 
 _FRAME = 0.1  # s of the wall clock, between pictures
 _FAST = 200  # pictures of a run that is played back as fast as it goes

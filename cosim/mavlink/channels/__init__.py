@@ -1,1 +1,6 @@
-"""What carries frames: one file a kind, behind one protocol."""
+"""What carries frames.
+
+UDP, TCP, serial lines and files, one kind a file, behind one protocol.
+
+Imports: nothing.
+"""

@@ -1,4 +1,9 @@
-"""Whether a MAVLink vehicle is what ground stations need: named checks from the client's side."""
+"""What ground stations need of a vehicle.
+
+Named checks from the client's side, for `cosim mavlink-check`.
+
+Imports: mavlink.channels, mavlink.listening, mavlink.wire, plant_fmu, scenario, simulation, simulation.commands.
+"""
 
 from cosim.mavlink.conformance.checking import CHECKS, Result, check_vehicle
 from cosim.mavlink.conformance.client import Client

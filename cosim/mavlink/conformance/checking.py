@@ -11,7 +11,7 @@ from cosim.mavlink.conformance import commands, identity, missions, parameters, 
 from cosim.mavlink.conformance.client import Client
 from cosim.mavlink.conformance.connect import qgc_connect
 from cosim.mavlink.conformance.outcome import Check, Outcome, Subject, failed, judged, skipped, speed_of
-from cosim.mavlink.ground import GroundLink, Heard
+from cosim.mavlink.wire.ground_end import GroundLink, Heard
 
 LISTENING = 6.0  # s of its clock, in which the vehicle is heard before anything is asked of it
 _LONGEST = 60.0  # s of ours, for a vehicle whose clock is slow

@@ -8,8 +8,8 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
-from cosim.mavlink.dialect import dialect
-from cosim.mavlink.ground import GroundLink, Heard
+from cosim.mavlink.wire.dialect import dialect
+from cosim.mavlink.wire.ground_end import GroundLink, Heard
 
 _KEPT = 20_000  # messages that are remembered
 _BEAT = 1.0  # s, between our heartbeats

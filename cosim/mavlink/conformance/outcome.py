@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 from cosim.mavlink.conformance.client import Client
-from cosim.mavlink.ground import Heard
+from cosim.mavlink.wire.ground_end import Heard
 
 Status = Literal["pass", "fail", "skip"]
 

@@ -7,18 +7,18 @@ import threading
 from collections.abc import Iterator, Sequence
 
 from cosim.errors import TelemetryError
-from cosim.helm import OrderQueue
-from cosim.helm.orders import Reset
-from cosim.master import Master
 from cosim.mavlink.autopilot import Autopilot
 from cosim.mavlink.channels.udp import UdpIn
-from cosim.mavlink.endpoint import Endpoint
-from cosim.mavlink.ground import GroundLink
-from cosim.mavlink.link import open_links
-from cosim.mavlink.options import MavlinkOptions, ProfileName
 from cosim.mavlink.thread import LinkThread
-from cosim.scenario import load_scenario
-from cosim.signals import Array
+from cosim.mavlink.wire.endpoint import Endpoint
+from cosim.mavlink.wire.ground_end import GroundLink
+from cosim.mavlink.wire.link import open_links
+from cosim.mavlink.wire.options import MavlinkOptions, ProfileName
+from cosim.scenario.scenario import load_scenario
+from cosim.simulation.commands import OrderQueue
+from cosim.simulation.commands.commands import Reset
+from cosim.simulation.master import Master
+from cosim.simulation.signals import Array
 from plant_fmu import PlantError
 
 _SCENARIO = "paper-limited"

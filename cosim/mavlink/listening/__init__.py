@@ -1,4 +1,9 @@
-"""Any vehicle's telemetry as a live table."""
+"""Any vehicle's telemetry as a live table.
+
+The ground's side of a link, for `cosim listen`.
+
+Imports: mavlink.vehicle, mavlink.wire.
+"""
 
 from cosim.mavlink.listening.follow import follow
 from cosim.mavlink.listening.picture import picture

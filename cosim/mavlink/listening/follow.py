@@ -5,8 +5,8 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator
 
-from cosim.mavlink.ground import GroundLink
 from cosim.mavlink.listening.watch import Watch
+from cosim.mavlink.wire.ground_end import GroundLink
 
 _BEAT = 1.0  # s
 _SLICE = 0.1  # s

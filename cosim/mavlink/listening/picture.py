@@ -6,11 +6,11 @@ import math
 import time
 from typing import Any
 
-from cosim.mavlink.dialect import dialect
-from cosim.mavlink.ground import GroundLink
 from cosim.mavlink.listening.fields import values
 from cosim.mavlink.listening.watch import Watch, printable
-from cosim.mavlink.modes import mode_name
+from cosim.mavlink.vehicle.modes import mode_name
+from cosim.mavlink.wire.dialect import dialect
+from cosim.mavlink.wire.ground_end import GroundLink
 
 _DEG = 180.0 / math.pi
 _SILENT = 3.5  # s without a heartbeat, after which QGroundControl gives a vehicle up

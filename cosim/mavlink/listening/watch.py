@@ -6,8 +6,8 @@ from collections import deque
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
-from cosim.mavlink.dialect import dialect
-from cosim.mavlink.ground import Heard
+from cosim.mavlink.wire.dialect import dialect
+from cosim.mavlink.wire.ground_end import Heard
 
 ROWS = 300  # kinds of messages that have a row
 TEXTS = 5  # that are kept

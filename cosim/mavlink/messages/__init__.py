@@ -1,4 +1,9 @@
-"""What the vehicle can say: one table of messages, their builders, rates and groups."""
+"""What the vehicle sends.
+
+One table of messages with their builders, rates and groups, and the streams that send them unasked.
+
+Imports: mavlink.vehicle, mavlink.wire, scenario, simulation.commands.
+"""
 
 from cosim.mavlink.messages.table import MESSAGES, Spec
 

@@ -6,10 +6,10 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-from cosim.mavlink.encode import wrapped
 from cosim.mavlink.messages.pose import degrees
-from cosim.mavlink.vessel import Vessel
-from cosim.scenario import CRITERIA
+from cosim.mavlink.vehicle.vehicle_context import Vessel
+from cosim.mavlink.wire.encode import wrapped
+from cosim.scenario.scenario import CRITERIA
 
 _CENTRE, _SWING = 1500, 400  # µs of PWM: at rest, and to either end
 _SERVOS, _OUTPUTS = 16, 32

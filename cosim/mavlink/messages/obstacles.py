@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from cosim.mavlink.encode import wrapped
-from cosim.mavlink.proximity import REACH, SECTORS
-from cosim.mavlink.vessel import Vessel
-from cosim.scenario_tables import Vector3
+from cosim.mavlink.vehicle.proximity import REACH, SECTORS
+from cosim.mavlink.vehicle.vehicle_context import Vessel
+from cosim.mavlink.wire.encode import wrapped
+from cosim.scenario.tables import Vector3
 
 _MOST = 8  # in a message each, the nearest ones
 _FARTHEST = 1000.0  # m

@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from cosim.mavlink.encode import wrapped
-from cosim.mavlink.vessel import Vessel
-from cosim.scenario_tables import Vector3
+from cosim.mavlink.vehicle.vehicle_context import Vessel
+from cosim.mavlink.wire.encode import wrapped
+from cosim.scenario.tables import Vector3
 
 _E7 = 1e7  # in a degree
 _MM = 1e3

@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from cosim.mavlink.encode import wrapped
 from cosim.mavlink.messages.pose import globe
-from cosim.mavlink.vessel import Vessel
+from cosim.mavlink.vehicle.vehicle_context import Vessel
+from cosim.mavlink.wire.encode import wrapped
 
 SURFACE_PRESSURE = 1013.25  # hPa
 WATER_DENSITY = 1000.0  # kg/m3, as ArduSub's default has it for fresh water

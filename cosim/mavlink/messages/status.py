@@ -8,11 +8,11 @@ from typing import Any
 
 from packaging.version import Version
 
-from cosim.helm.orders import MODES
-from cosim.mavlink.encode import wrapped
 from cosim.mavlink.messages.sensors import has_bottom
-from cosim.mavlink.profile import MODE_NAMES, STANDARD_MODES, SUBMARINE
-from cosim.mavlink.vessel import Vessel
+from cosim.mavlink.vehicle.profile import MODE_NAMES, STANDARD_MODES, SUBMARINE
+from cosim.mavlink.vehicle.vehicle_context import Vessel
+from cosim.mavlink.wire.encode import wrapped
+from cosim.simulation.commands.commands import MODES
 
 _PROTOCOL = 3  # of HEARTBEAT.mavlink_version, for MAVLink 2 as for 1
 _OFFICIAL, _DEVELOPMENT = 255, 0  # FIRMWARE_VERSION_TYPE

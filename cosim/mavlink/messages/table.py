@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from cosim.mavlink.messages import control, obstacles, pose, sensors, status
-from cosim.mavlink.options import PROFILES, ProfileName
-from cosim.mavlink.vessel import Vessel
+from cosim.mavlink.vehicle.vehicle_context import Vessel
+from cosim.mavlink.wire.options import PROFILES, ProfileName
 
 HEARTBEAT = 0
 

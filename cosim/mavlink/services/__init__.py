@@ -1,1 +1,6 @@
-"""The micro-services of the protocol, one file each."""
+"""The micro-services of MAVLink.
+
+Parameters, missions, commands, manual control, FTP and the rest, one service a file.
+
+Imports: mavlink.messages, mavlink.vehicle, mavlink.wire, scenario, simulation.commands.
+"""

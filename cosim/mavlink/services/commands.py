@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from typing import Any
 
 from cosim.mavlink.services.service import Call, Command, Service, unscaled
-from cosim.mavlink.vessel import Sender, Vessel
+from cosim.mavlink.vehicle.vehicle_context import Sender, Vessel
 
 _NOWHERE = 0x7FFFFFFF  # of a COMMAND_INT that names no place
 

@@ -11,7 +11,7 @@ from typing import Any
 from cosim.mavlink.services.packed_parameters import bare_crc32, packed
 from cosim.mavlink.services.parameters import Parameters
 from cosim.mavlink.services.service import Service
-from cosim.mavlink.vessel import Sender, Vessel
+from cosim.mavlink.vehicle.vehicle_context import Sender, Vessel
 
 _HEADER = struct.Struct("<HBBBBBBI")  # seq, session, opcode, size, req_opcode, burst_complete, padding, offset
 _ROOM = 239  # bytes of data in a payload

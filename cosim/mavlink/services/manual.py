@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from cosim.helm.orders import Sticks
 from cosim.mavlink.services.service import Service
-from cosim.mavlink.vessel import Sender, Vessel
-from cosim.scenario_tables import Vector6
+from cosim.mavlink.vehicle.vehicle_context import Sender, Vessel
+from cosim.scenario.tables import Vector6
+from cosim.simulation.commands.commands import Sticks
 
 _FULL = 1000.0
 _INVALID = 0x7FFF

@@ -5,15 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
-from cosim.helm.course import way
-from cosim.helm.orders import Begin, Change, Item, Mission, Order, Steer
-from cosim.mavlink.encode import whole
-from cosim.mavlink.mission_item import MissionItem
 from cosim.mavlink.services.mission_items import ItemError, home_item, meant
 from cosim.mavlink.services.parameters import Parameters
 from cosim.mavlink.services.service import Call, Service, place_of, unscaled
 from cosim.mavlink.services.targets import Targets
-from cosim.mavlink.vessel import Sender, Vessel
+from cosim.mavlink.vehicle.mission_item import MissionItem
+from cosim.mavlink.vehicle.vehicle_context import Sender, Vessel
+from cosim.mavlink.wire.encode import whole
+from cosim.simulation.commands.commands import Begin, Change, Item, Mission, Order, Steer
+from cosim.simulation.commands.mission_executor import way
 
 _MOST = 500  # items
 _RETRY = 1.0  # s of the wall clock

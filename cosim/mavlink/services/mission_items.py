@@ -6,13 +6,13 @@ import math
 from collections.abc import Sequence
 
 from cosim.errors import OrderError
-from cosim.helm.orders import Change, Face, Item
-from cosim.mavlink.encode import whole
-from cosim.mavlink.mission_item import MissionItem
 from cosim.mavlink.services.parameters import shortest
 from cosim.mavlink.services.service import place_of, unscaled
-from cosim.mavlink.vessel import Vessel
-from cosim.scenario_tables import Vector3
+from cosim.mavlink.vehicle.mission_item import MissionItem
+from cosim.mavlink.vehicle.vehicle_context import Vessel
+from cosim.mavlink.wire.encode import whole
+from cosim.scenario.tables import Vector3
+from cosim.simulation.commands.commands import Change, Face, Item
 
 SPEED = "law.gains.speed"  # key of the setting
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from cosim.helm.orders import Aim, Arm, Mode, Order, Reset, Steer
-from cosim.mavlink.profile import MODE_NAMES, STANDARD_MODES, is_custom
 from cosim.mavlink.services.service import Call, Service
-from cosim.mavlink.vessel import Sender, Vessel
+from cosim.mavlink.vehicle.profile import MODE_NAMES, STANDARD_MODES, is_custom
+from cosim.mavlink.vehicle.vehicle_context import Sender, Vessel
+from cosim.simulation.commands.commands import Aim, Arm, Mode, Order, Reset, Steer
 
 _FORCE = 20190226  # PREFLIGHT_REBOOT_SHUTDOWN, parameter 6
 _MODES_BY_STANDARD: dict[int, Mode] = {number: mode for mode, number in STANDARD_MODES.items() if number}

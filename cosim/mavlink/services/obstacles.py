@@ -6,11 +6,11 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-from cosim.helm.orders import Forget, Obstacle
-from cosim.mavlink.layout import euler_of
 from cosim.mavlink.services.service import Service
-from cosim.mavlink.vessel import Sender, Vessel
-from cosim.scenario_tables import Vector3
+from cosim.mavlink.vehicle.layout import euler_of
+from cosim.mavlink.vehicle.vehicle_context import Sender, Vessel
+from cosim.scenario.tables import Vector3
+from cosim.simulation.commands.commands import Forget, Obstacle
 
 _UNMOVED = 0.05  # m: what moved less makes no order
 _FORGOTTEN = 5.0  # s of the wall clock without a word, after which another may take the place

@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from cosim.mavlink.geodesy import LocalFrame
 from cosim.mavlink.messages import pose
 from cosim.mavlink.services.service import Call, Service, place_of
-from cosim.mavlink.vessel import Sender, Vessel
+from cosim.mavlink.vehicle.geodesy import LocalFrame
+from cosim.mavlink.vehicle.vehicle_context import Sender, Vessel
 
 _E7 = 1e-7
 _MM = 1e-3

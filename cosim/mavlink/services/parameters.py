@@ -10,15 +10,15 @@ from dataclasses import dataclass
 from typing import Any
 
 from cosim.errors import OrderError
-from cosim.helm.orders import Change
-from cosim.mavlink.encode import float32
-from cosim.mavlink.outlet import Outlet
 from cosim.mavlink.services.packed_parameters import hash_check
 from cosim.mavlink.services.parameter_names import parameter_names
 from cosim.mavlink.services.service import Service
 from cosim.mavlink.services.station_parameters import station_parameters
-from cosim.mavlink.supervision_settings import ACTIONS, TIMEOUTS
-from cosim.mavlink.vessel import Sender, Vessel
+from cosim.mavlink.vehicle.failsafe_settings import ACTIONS, TIMEOUTS
+from cosim.mavlink.vehicle.vehicle_context import Sender, Vessel
+from cosim.mavlink.wire.encode import float32
+from cosim.mavlink.wire.message_sink import Outlet
+from cosim.simulation.commands.commands import Change
 
 _HASH = "_HASH_CHECK"
 _NO_INDEX = 0xFFFF

@@ -6,10 +6,10 @@ from collections.abc import Mapping
 from typing import Any
 
 from cosim.mavlink.messages import MESSAGES, status
-from cosim.mavlink.outlet import Outlet
+from cosim.mavlink.messages.streams import Streams
 from cosim.mavlink.services.service import Call, Service
-from cosim.mavlink.streams import Streams
-from cosim.mavlink.vessel import Sender, Vessel
+from cosim.mavlink.vehicle.vehicle_context import Sender, Vessel
+from cosim.mavlink.wire.message_sink import Outlet
 
 _SECOND = 1_000_000
 _ALL = 0

@@ -7,9 +7,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from cosim.mavlink.encode import whole
-from cosim.mavlink.vessel import Sender, Vessel
-from cosim.scenario_tables import Vector3
+from cosim.mavlink.vehicle.vehicle_context import Sender, Vessel
+from cosim.mavlink.wire.encode import whole
+from cosim.scenario.tables import Vector3
 
 Handler = Callable[[Sender, Any], None]
 

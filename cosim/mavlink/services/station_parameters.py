@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import partial
 
-from cosim.mavlink.options import LossAction
-from cosim.mavlink.vessel import Vessel
+from cosim.mavlink.vehicle.vehicle_context import Vessel
+from cosim.mavlink.wire.options import LossAction
 
 _HEAVY = "bluerov2_heavy"
 _VECTORED_6DOF, _CUSTOM_FRAME = 2.0, 7.0  # ArduSub's FRAME_CONFIG

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from cosim.helm.orders import Arm, Order, Steer
 from cosim.mavlink.services.service import Service
-from cosim.mavlink.vessel import Sender, Vessel
+from cosim.mavlink.vehicle.vehicle_context import Sender, Vessel
+from cosim.simulation.commands.commands import Arm, Order, Steer
 
 _REMINDER = 30.0  # s
 

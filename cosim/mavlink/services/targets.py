@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from cosim.helm.orders import Aim, Face, Order, Steer
-from cosim.mavlink.profile import MODE_NAMES
 from cosim.mavlink.services.mission_items import SPEED
 from cosim.mavlink.services.parameters import Parameters, shortest
 from cosim.mavlink.services.service import Call, Service, place_of, unscaled
-from cosim.mavlink.vessel import Sender, Vessel
-from cosim.scenario_tables import Vector3
+from cosim.mavlink.vehicle.profile import MODE_NAMES
+from cosim.mavlink.vehicle.vehicle_context import Sender, Vessel
+from cosim.scenario.tables import Vector3
+from cosim.simulation.commands.commands import Aim, Face, Order, Steer
 
 _X_Y, _Z = 0b011, 0b100  # type_mask: what is ignored
 _VELOCITY, _ACCELERATION, _FORCE, _YAW = 0b111000, 0b111 << 6, 1 << 9, 1 << 10

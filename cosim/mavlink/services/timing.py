@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from cosim.mavlink.services.service import Service
-from cosim.mavlink.vessel import Sender, Vessel
+from cosim.mavlink.vehicle.vehicle_context import Sender, Vessel
 
 _NANO = 1000  # ns in a µs
 

@@ -6,7 +6,7 @@ from controller import LAWS, VehicleState
 from controller.laws.deployable.model import dynamics_of, free_acceleration, thrust_acceleration, thrusters_of
 from controller.quaternion import rate, rotation_matrix
 from controller.regions import DepthBand, Region, Sphere, pack
-from cosim.vehicle_model import vehicle_model
+from cosim.scenario.vehicle_model import vehicle_model
 from plant_fmu.vehicle import load_vehicle
 
 LEVEL = np.array([1.0, 0.0, 0.0, 0.0])

@@ -14,7 +14,7 @@ from controller.laws.deployable.model import (
     thrusters_of,
 )
 from controller.quaternion import rotation_matrix
-from cosim.vehicle_model import vehicle_model
+from cosim.scenario.vehicle_model import vehicle_model
 from plant_fmu import Plant
 from plant_fmu.vehicle import load_vehicle
 from tests.controller.deployable.scenery import MODELS

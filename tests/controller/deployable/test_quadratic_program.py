@@ -8,7 +8,7 @@ import pytest
 
 from controller.laws.deployable.model import share_out, thrusters_of
 from controller.laws.deployable.quadratic_program import _add, _lack, solve, workspace
-from cosim.vehicle_model import vehicle_model
+from cosim.scenario.vehicle_model import vehicle_model
 from plant_fmu.vehicle import load_vehicle
 from tests.controller.deployable.exact_program import ROUNDING, error, exact_solution, in_fractions, rounding
 

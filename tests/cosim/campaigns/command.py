@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from cosim.campaigns.folder import PARTS
-from cosim.campaigns.results import Results
+from cosim.campaigns.store.folder import PARTS
+from cosim.campaigns.store.results import Results
 
 ROOT = Path(__file__).parents[3]
 needs_posix = pytest.mark.skipif(sys.platform != "linux", reason="looks into /proc")
@@ -20,7 +20,7 @@ _MAIN = """
 import sys
 from cosim import progress
 from cosim.campaigns import sweep_rows
-from cosim.cli import main
+from cosim.command_line.cli import main
 from tests.cosim.campaigns.fake import ENGINES
 sweep_rows.ENGINES.update(ENGINES)
 progress._PERIOD = 1e6  # whether anything is compiled depends on what earlier runs kept

@@ -7,9 +7,10 @@ import time
 import numpy as np
 import pytest
 
-from cosim.campaigns import Design, sweep_rows, vary_from
-from cosim.flying.outcome import FIELDS, Flown, nothing
-from cosim.scenario import load_scenario
+from cosim.batch.outcome import FIELDS, Flown, nothing
+from cosim.campaigns import Design, vary_from
+from cosim.campaigns.sweeps import rows
+from cosim.scenario.scenario import load_scenario
 
 KEYS = ("initial.position.1", "regions.SR1.gain", "law.gains.k_p1")
 VARY = ("initial.position.1=-2:2", "regions.SR1.gain=500:5000:log", "law.gains.k_p1=10:30")
@@ -85,7 +86,7 @@ ENGINES = {
 def fakes(monkeypatch):
     """Let sweeps have the engines of this file."""
     for name, where in ENGINES.items():
-        monkeypatch.setitem(sweep_rows.ENGINES, name, where)
+        monkeypatch.setitem(rows.ENGINES, name, where)
 
 
 def design(n=50, kind="random", seed=3, vary=VARY):

@@ -14,19 +14,20 @@ from controller import LawError
 from controller.printed_law import Gains
 from cosim.campaigns import campaign as module
 from cosim.campaigns import run_campaign
-from cosim.campaigns.folder import PARTS, RESULTS, SUMMARY, CampaignFolder
-from cosim.campaigns.law_gains import gains_by_law, gains_from
-from cosim.campaigns.plan import difference, plan_of
-from cosim.campaigns.results import Results
-from cosim.campaigns.scene_rows import SCHEMA, row_of
-from cosim.campaigns.scene_store import SceneStore
-from cosim.campaigns.scenes import SceneTask, SceneWork
-from cosim.campaigns.summary import summarise
-from cosim.campaigns.worker import fly
+from cosim.campaigns.analysis.summary import summarise
+from cosim.campaigns.scenes.flyer import Conditions, SceneFlyer, Score
+from cosim.campaigns.scenes.law_gains import gains_by_law, gains_from
+from cosim.campaigns.scenes.plan import plan_of
+from cosim.campaigns.scenes.rows import SCHEMA, row_of
+from cosim.campaigns.scenes.scene import decode_scene
+from cosim.campaigns.scenes.scene_store import SceneStore
+from cosim.campaigns.scenes.work import SceneTask, SceneWork
+from cosim.campaigns.store.folder import PARTS, RESULTS, SUMMARY, CampaignFolder
+from cosim.campaigns.store.plan import difference
+from cosim.campaigns.store.results import Results
+from cosim.campaigns.workers.worker import fly
 from cosim.errors import RunError, ScenarioError
-from cosim.scene import decode_scene
-from cosim.scene_run import Conditions, SceneFlyer, Score
-from tests.cosim.campaigns.scenes import BRIEF, HARD, PLAIN, batches_of, many, results_of, rows, write
+from tests.cosim.campaigns.scene_data import BRIEF, HARD, PLAIN, batches_of, many, results_of, rows, write
 
 
 @pytest.fixture
@@ -85,11 +86,11 @@ def test_what_is_interrupted_goes_on_without_losing_or_repeating(tmp_path, scene
 
     batches_of(monkeypatch, 3)
     for stop in (2, 5):
-        monkeypatch.setattr("cosim.campaigns.crews.fly", until(stop))
+        monkeypatch.setattr("cosim.campaigns.workers.worker_pools.fly", until(stop))
         with pytest.raises(KeyboardInterrupt):
             run_campaign(scenes, "printed", tmp_path / "out", BRIEF)
         assert not (tmp_path / "out" / RESULTS).exists()
-    monkeypatch.setattr("cosim.campaigns.crews.fly", until(99))
+    monkeypatch.setattr("cosim.campaigns.workers.worker_pools.fly", until(99))
     done = run_campaign(scenes, "printed", tmp_path / "out", BRIEF)
     assert sorted(seed for batch in flown for seed in batch) == list(range(1000, 1020))
     assert done.flown == 5
@@ -147,7 +148,7 @@ def test_the_folder_of_another_campaign_is_refused(tmp_path, scenes, monkeypatch
     if "scenes" in change:
         write(scenes, change["scenes"])
     if "code" in change:
-        monkeypatch.setattr("cosim.campaigns.plan.code_digest", lambda: "other")
+        monkeypatch.setattr("cosim.campaigns.store.plan.code_digest", lambda: "other")
     with pytest.raises(RunError, match=f"holds another campaign .*{words}"):
         run_campaign(scenes, "printed", tmp_path / "out", change.get("conditions", BRIEF), change.get("gains"))
     assert {p: p.read_bytes() for p in (tmp_path / "out").rglob("*") if p.is_file()} == before

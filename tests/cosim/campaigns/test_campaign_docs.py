@@ -5,17 +5,17 @@ import re
 import typing
 from pathlib import Path
 
+from cosim.batch.fused import FusedFlyer
+from cosim.batch.outcome import FIELDS
+from cosim.batch.variation import Variation
 from cosim.campaigns import vary_from
-from cosim.campaigns.design import KINDS
-from cosim.campaigns.scene_rows import SCHEMA
-from cosim.cli import main
-from cosim.flying.fused import FusedFlyer
-from cosim.flying.outcome import FIELDS
-from cosim.flying.variation import Variation
-from cosim.scenario import load_scenario
-from cosim.scene import Scene, decode_scene
-from cosim.scene_run import Conditions
-from plant_fmu.tables import dataclass_of
+from cosim.campaigns.scenes.flyer import Conditions
+from cosim.campaigns.scenes.rows import SCHEMA
+from cosim.campaigns.scenes.scene import Scene, decode_scene
+from cosim.campaigns.sweeps.design import KINDS
+from cosim.command_line.cli import main
+from cosim.scenario.scenario import load_scenario
+from plant_fmu.toml_tables import dataclass_of
 
 PAGE = (Path(__file__).parents[3] / "docs" / "campaigns.md").read_text()
 
@@ -96,7 +96,7 @@ def test_designs_and_ranges_are_documented():
 
 
 def test_the_snippet_runs(tmp_path, monkeypatch):
-    from tests.cosim.campaigns.scenes import PLAIN, write
+    from tests.cosim.campaigns.scene_data import PLAIN, write
 
     write(tmp_path / "scenes.jsonl", PLAIN[:1])
     monkeypatch.chdir(tmp_path)

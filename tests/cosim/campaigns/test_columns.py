@@ -7,7 +7,7 @@ import numpy as np
 import pyarrow as pa
 import pytest
 
-from cosim.campaigns.columns import of_numbers, of_texts, to_array
+from cosim.campaigns.store.columns import of_numbers, of_texts, to_array
 
 N = 37  # no multiple of the eight facts in a byte
 
@@ -52,9 +52,9 @@ def test_arrays_against_pyarrow(column):
 SWEEP = """
 import sys
 from pathlib import Path
-from cosim.campaigns.design import Design, vary_from
+from cosim.campaigns.sweeps.design import Design, vary_from
 from cosim.campaigns.sweep import run_sweep
-from cosim.scenario import load_scenario
+from cosim.scenario.scenario import load_scenario
 
 scenario = load_scenario("paper", ["arbiter.engine=closed", "time.duration=0.1"])
 design = Design(vary_from(["initial.position.1=-2:2"]), "random", 3, 0)

@@ -7,13 +7,13 @@ import pytest
 
 from controller import LAWS, PrintedLaw
 from controller.printed_law import Gains
-from cosim import flight
+from cosim.batch import fused_loop
 from cosim.campaigns import compare
 from cosim.campaigns.comparison import difference, pair
-from cosim.campaigns.scene_rows import row_of
+from cosim.campaigns.scenes.flyer import Score
+from cosim.campaigns.scenes.rows import row_of
 from cosim.errors import RunError
-from cosim.scene_run import Score
-from tests.cosim.campaigns.scenes import BRIEF, HARD, results_of, rows, write
+from tests.cosim.campaigns.scene_data import BRIEF, HARD, results_of, rows, write
 
 
 class Idle(PrintedLaw):
@@ -29,7 +29,7 @@ class Idle(PrintedLaw):
 @pytest.fixture
 def idle(monkeypatch):
     monkeypatch.setitem(LAWS, "idle", Idle)
-    monkeypatch.setattr(flight, "_compiled", flight._plain)
+    monkeypatch.setattr(fused_loop, "_compiled", fused_loop._plain)
 
 
 @pytest.fixture

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.stats import qmc
 
-from cosim.campaigns.design import KINDS, MOST, Design, Vary, design_of, vary_from
+from cosim.campaigns.sweeps.design import KINDS, MOST, Design, Vary, design_of, vary_from
 from cosim.errors import RunError
 
 TWO = vary_from(["a=-2:2", "b=1:1000:log"])

@@ -5,10 +5,10 @@ from concurrent.futures import Future
 import numpy as np
 import pytest
 
-from cosim.campaigns import batches as module
-from cosim.campaigns.batches import Batch, Batches
-from cosim.campaigns.crews import FATAL, Death
-from cosim.campaigns.dispatch import fly_all
+from cosim.campaigns.workers import batch_sizing as module
+from cosim.campaigns.workers.batch_sizing import Batch, Batches
+from cosim.campaigns.workers.dispatch import fly_all
+from cosim.campaigns.workers.worker_pools import FATAL, Death
 from cosim.errors import RunError
 
 

@@ -9,18 +9,18 @@ import numpy as np
 import pytest
 
 from cosim.campaigns import compare, run_campaign, run_sweep
-from cosim.campaigns.campaign_page import write_campaign_page
-from cosim.campaigns.comparison_page import write_comparison_page
-from cosim.campaigns.figures import distributions, shares_up_to
-from cosim.campaigns.page import Page, number
-from cosim.campaigns.sections import Group, quantiles_table
-from cosim.campaigns.statistics import quantiles
-from cosim.campaigns.sweep_page import write_sweep_page
-from cosim.cli import main
+from cosim.campaigns.analysis.statistics import quantiles
+from cosim.campaigns.pages.campaign_page import write_campaign_page
+from cosim.campaigns.pages.comparison_page import write_comparison_page
+from cosim.campaigns.pages.figures import distributions, shares_up_to
+from cosim.campaigns.pages.page import Page, number
+from cosim.campaigns.pages.sections import Group, quantiles_table
+from cosim.campaigns.pages.sweep_page import write_sweep_page
+from cosim.campaigns.scenes.flyer import Conditions
+from cosim.command_line.cli import main
 from cosim.errors import RunError
-from cosim.scene_run import Conditions
 from tests.cosim.campaigns.fake import design, fakes, paper
-from tests.cosim.campaigns.scenes import BRIEF, HARD, PLAIN, write
+from tests.cosim.campaigns.scene_data import BRIEF, HARD, PLAIN, write
 from tests.cosim.campaigns.test_comparison import idle
 
 __all__ = ["fakes", "idle"]
@@ -111,7 +111,7 @@ def test_a_replay_shows_the_flight_of_the_row(flown):
 @pytest.mark.slow
 def test_the_page_is_the_same_again_and_flies_no_replay_again(flown, monkeypatch):
     before = (flown / "campaign.html").read_bytes()
-    monkeypatch.setattr("cosim.campaigns.replays.run_scenario", None)
+    monkeypatch.setattr("cosim.campaigns.pages.replays.run_scenario", None)
     write_campaign_page(flown, 1)
     assert (flown / "campaign.html").read_bytes() == before
     assert not [p.name for p in flown.rglob(".*") if p.name != ".lock"]
@@ -135,7 +135,7 @@ def test_ctrl_c_while_replays_are_flown_leaves_the_page_without_them(tmp_path, m
     out = tmp_path / "out"
     run_campaign(write(tmp_path / "s.jsonl", PLAIN[:2]), "printed", out, BRIEF)
     with monkeypatch.context() as patch:
-        patch.setattr("cosim.run.Master.run", lambda *_, **__: (_ for _ in ()).throw(KeyboardInterrupt))
+        patch.setattr("cosim.run.run.Master.run", lambda *_, **__: (_ for _ in ()).throw(KeyboardInterrupt))
         with pytest.raises(KeyboardInterrupt):
             write_campaign_page(out, 2)
     assert check(out / "campaign.html").asked == [] and list((out / "worst").iterdir()) == []
@@ -144,7 +144,7 @@ def test_ctrl_c_while_replays_are_flown_leaves_the_page_without_them(tmp_path, m
 
 
 def test_a_flight_that_comes_out_otherwise_is_said_beside_its_replay(tmp_path, monkeypatch):
-    from cosim.campaigns.repeat import Repeat
+    from cosim.campaigns.reruns.repeat import Repeat
 
     out = tmp_path / "out"
     run_campaign(write(tmp_path / "s.jsonl", PLAIN[:1]), "printed", out, BRIEF)

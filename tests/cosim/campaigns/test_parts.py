@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cosim.campaigns import parts
-from cosim.campaigns.parts import Parts, in_order, write_tables
+from cosim.campaigns.store import parts
+from cosim.campaigns.store.parts import Parts, in_order, write_tables
 
 SCHEMA = pa.schema([pa.field("row", pa.int64(), nullable=False), pa.field("x", pa.float64())])
 

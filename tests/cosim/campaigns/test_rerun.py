@@ -8,13 +8,13 @@ import pyarrow.parquet as pq
 import pytest
 
 from cosim.campaigns import Design, run_campaign, run_sweep, vary_from
-from cosim.campaigns.dispatch import KILLED
-from cosim.campaigns.folder import RESULTS
-from cosim.campaigns.rerun import rerun
-from cosim.cli import main
+from cosim.campaigns.reruns.rerun import rerun
+from cosim.campaigns.store.folder import RESULTS
+from cosim.campaigns.workers.dispatch import KILLED
+from cosim.command_line.cli import main
 from cosim.errors import RunError
-from cosim.scenario import load_scenario
-from tests.cosim.campaigns.scenes import BRIEF, PLAIN, write
+from cosim.scenario.scenario import load_scenario
+from tests.cosim.campaigns.scene_data import BRIEF, PLAIN, write
 
 VARY = ["initial.position.1=-2:2", "regions.SR1.gain=500:5000:log", "plant.parameters.weight=1150:1280"]
 BRIEFLY = ["arbiter.engine=closed", "time.duration=0.3", "sensing.position_noise=0.02"]
@@ -80,7 +80,7 @@ def test_other_values_than_those_of_the_design_are_found(folder, tmp_path):
 
 @pytest.mark.slow
 def test_other_code_is_said(folder, tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr("cosim.campaigns.rerun.code_digest", lambda: "other")
+    monkeypatch.setattr("cosim.campaigns.reruns.rerun.code_digest", lambda: "other")
     assert main(["rerun", str(folder), "0", "--out", str(tmp_path / "run")]) == 0
     assert "the code is not that which flew the row" in capsys.readouterr().err
 

@@ -8,11 +8,11 @@ import pytest
 from scipy.stats import f as f_test
 from scipy.stats import f_oneway, spearmanr
 
-from cosim.campaigns.scene_rows import row_of
-from cosim.campaigns.statistics import bins, effect, median_difference, paired, rate
-from cosim.campaigns.worst import worst_rows
-from cosim.scene_run import Score
-from tests.cosim.campaigns.scenes import results_of
+from cosim.campaigns.analysis.statistics import bins, effect, median_difference, paired, rate
+from cosim.campaigns.analysis.worst_rows import worst_rows
+from cosim.campaigns.scenes.flyer import Score
+from cosim.campaigns.scenes.rows import row_of
+from tests.cosim.campaigns.scene_data import results_of
 
 
 @pytest.mark.parametrize(("k", "n"), [(0, 7), (3, 7), (200, 200), (1, 1)])

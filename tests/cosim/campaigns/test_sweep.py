@@ -13,16 +13,16 @@ import pyarrow.parquet as pq
 import pytest
 from scipy.stats import norm
 
+from cosim.batch.outcome import FIELDS
 from cosim.campaigns import run_sweep
-from cosim.campaigns.design import design_of
-from cosim.campaigns.folder import PARTS, RESULTS, CampaignFolder
-from cosim.campaigns.sweep_rows import schema_of
-from cosim.cli import main
+from cosim.campaigns.store.folder import PARTS, RESULTS, CampaignFolder
+from cosim.campaigns.sweeps.design import design_of
+from cosim.campaigns.sweeps.rows import schema_of
+from cosim.command_line.cli import main
 from cosim.errors import RunError, ScenarioError
-from cosim.flying.outcome import FIELDS
-from cosim.scenario import load_scenario
+from cosim.scenario.scenario import load_scenario
 from tests.cosim.campaigns.fake import KEYS, VARY, Fake, design, fakes, flown, paper
-from tests.cosim.campaigns.scenes import batches_of
+from tests.cosim.campaigns.scene_data import batches_of
 
 ROOT = Path(__file__).parents[3]
 WORDS = ["sweep", "paper", "--vary", *VARY, "--samples", "50", "--seed", "3"]

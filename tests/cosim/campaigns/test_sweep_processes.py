@@ -7,16 +7,16 @@ import signal
 import pyarrow.parquet as pq
 import pytest
 
+from cosim.batch.outcome import FIELDS
 from cosim.campaigns import run_sweep
-from cosim.campaigns.cluster import _quiet
-from cosim.campaigns.dispatch import KILLED
-from cosim.campaigns.folder import RESULTS
-from cosim.cli import main
+from cosim.campaigns.store.folder import RESULTS
+from cosim.campaigns.workers.cluster import _quiet
+from cosim.campaigns.workers.dispatch import KILLED
+from cosim.command_line.cli import main
 from cosim.errors import RunError
-from cosim.flying.outcome import FIELDS
 from tests.cosim.campaigns.command import command, command_cache, needs_posix
 from tests.cosim.campaigns.fake import KEYS, VARY, design, fakes, paper
-from tests.cosim.campaigns.scenes import batches_of
+from tests.cosim.campaigns.scene_data import batches_of
 from tests.cosim.campaigns.test_sweep import expected
 
 __all__ = ["command", "command_cache", "fakes"]
@@ -106,7 +106,7 @@ def test_where_every_worker_dies_no_row_is_blamed(tmp_path, fakes):
 @pytest.fixture(scope="module")
 def cluster():
     pytest.importorskip("distributed")
-    from cosim.campaigns.cluster import cluster_executor
+    from cosim.campaigns.workers.cluster import cluster_executor
 
     with cluster_executor(None, 2) as executor:
         yield executor
@@ -135,7 +135,7 @@ def test_rows_that_kill_workers_of_dask_are_refused_and_all_others_flown(tmp_pat
 @pytest.mark.slow
 def test_a_scheduler_that_is_not_there_is_one_line(tmp_path, capsys, monkeypatch):
     pytest.importorskip("distributed")
-    monkeypatch.setattr("cosim.campaigns.cluster._PATIENCE_WITH_SCHEDULER", 0.5)
+    monkeypatch.setattr("cosim.campaigns.workers.cluster._PATIENCE_WITH_SCHEDULER", 0.5)
     words = ["sweep", "docking", "--vary", "law.gains.k_p1=1:2", "--samples", "3", "--out", str(tmp_path / "out")]
     assert main([*words, "--scheduler", "tcp://127.0.0.1:9"]) == 2
     (line,) = capsys.readouterr().err.splitlines()

@@ -6,12 +6,12 @@ import signal
 import pytest
 
 from cosim.campaigns import run_campaign
-from cosim.campaigns.folder import RESULTS
-from cosim.campaigns.results import Results
-from cosim.cli import main
-from cosim.scene_run import Conditions
+from cosim.campaigns.scenes.flyer import Conditions
+from cosim.campaigns.store.folder import RESULTS
+from cosim.campaigns.store.results import Results
+from cosim.command_line.cli import main
 from tests.cosim.campaigns.command import command, command_cache, needs_posix
-from tests.cosim.campaigns.scenes import HARD, many, rows, write
+from tests.cosim.campaigns.scene_data import HARD, many, rows, write
 
 __all__ = ["command", "command_cache"]
 

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from pymavlink import mavutil
 
-from cosim.cli import main
+from cosim.command_line.cli import main
 from cosim.errors import ExportError, RunError
 from cosim.export import FORMATS, export_run
 from cosim.export.excerpt import excerpt_of
-from cosim.record import load_record
+from cosim.results.record import load_record
 
 
 def test_every_step_and_signal_is_taken_unless_told_otherwise(run):
@@ -157,7 +157,7 @@ def test_a_tlog_is_the_vehicle_as_pymavlink_sees_it(run, tmp_path):
 
 def test_blocks_of_a_long_record_stay_small(run, monkeypatch):
     """A record is read in its blocks: no more rows are in memory than one of them has."""
-    monkeypatch.setattr("cosim.record._BLOCK", 13)
+    monkeypatch.setattr("cosim.results.record._BLOCK", 13)
     sizes = [len(block) for block in excerpt_of(run, every=2).blocks()]
     assert sum(sizes) == 51
     assert max(sizes) <= 7

@@ -9,11 +9,11 @@ from scipy.spatial.transform import Rotation
 
 from cosim.export import export_run
 from cosim.export.names import legal
-from cosim.flown_run import load_run
-from cosim.helm.orders import Aim, Change, Obstacle
-from cosim.record import load_record
-from cosim.run import run_scenario
-from cosim.scenario import load_scenario
+from cosim.results.record import load_record
+from cosim.results.run_result import load_run
+from cosim.run.run import run_scenario
+from cosim.scenario.scenario import load_scenario
+from cosim.simulation.commands.commands import Aim, Change, Obstacle
 
 mcap_reader = pytest.importorskip("mcap.reader")
 decoder = pytest.importorskip("mcap_protobuf.decoder")

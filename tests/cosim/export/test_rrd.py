@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from cosim.export import export_run
-from cosim.record import load_record
+from cosim.results.record import load_record
 
 pytest.importorskip("rerun", reason="rerun-sdk is not installed")
 chunks_of = pytest.importorskip("rerun.chunk", reason="rerun-sdk is too old to read its files in Python").RrdReader

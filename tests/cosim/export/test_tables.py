@@ -12,8 +12,8 @@ from scipy.io import loadmat
 
 from cosim.export import export_run
 from cosim.export.names import grouped, legal
-from cosim.record import load_record
-from cosim.scenario import load_scenario
+from cosim.results.record import load_record
+from cosim.scenario.scenario import load_scenario
 
 
 def bits(array):

@@ -10,8 +10,8 @@ from websockets.sync.client import connect
 
 from cosim.live.address import parse_live
 from cosim.live.view import LiveView
-from cosim.run import run_scenario
-from cosim.scenario import load_scenario
+from cosim.run.run import run_scenario
+from cosim.scenario.scenario import load_scenario
 from tests.threads import ended
 
 ARM = {"order": "arm", "armed": True}

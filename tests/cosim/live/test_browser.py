@@ -6,7 +6,7 @@ import time
 
 import pytest
 
-from cosim.record import load_record
+from cosim.results.record import load_record
 from tests.cosim.live.conftest import WAIT
 from tests.threads import interrupt
 

@@ -11,9 +11,9 @@ from websockets.sync.client import connect
 
 from cosim.live.orders import LONGEST
 from cosim.live.server import CONNECTIONS
-from cosim.record import load_record
-from cosim.run import run_scenario
-from cosim.scenario import load_scenario
+from cosim.results.record import load_record
+from cosim.run.run import run_scenario
+from cosim.scenario.scenario import load_scenario
 from tests.cosim.live.conftest import ARM, WAIT, same
 
 

@@ -5,9 +5,9 @@ import json
 import numpy as np
 import pytest
 
-from cosim.record import load_record
-from cosim.run import run_scenario
-from cosim.scenario import load_scenario
+from cosim.results.record import load_record
+from cosim.run.run import run_scenario
+from cosim.scenario.scenario import load_scenario
 from tests.cosim.live.conftest import ARM, same
 
 
@@ -105,7 +105,7 @@ def test_a_run_that_repeats_orders_takes_no_others(live, tmp_path):
 
 @pytest.mark.slow
 def test_a_ground_station_and_a_viewer_order_the_same_run(live):
-    from tests.cosim.test_run_on_a_link import Station, command, on
+    from tests.cosim.run.test_run_on_a_link import Station, command, on
 
     with Station(command(400, 1.0), command(192, -1.0, 1.0, 0.0, 0.7)) as station:
         running = live(commands=True, rate=1.0, mavlink=on(station, commands=True))

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from cosim.live.hub import Hub
-from cosim.record import load_record
-from cosim.report_words import verdict
-from cosim.run import run_scenario
-from cosim.scenario import load_scenario
+from cosim.results.record import load_record
+from cosim.results.wording import verdict
+from cosim.run.run import run_scenario
+from cosim.scenario.scenario import load_scenario
 from tests.cosim.live.conftest import ARM, same
 
 

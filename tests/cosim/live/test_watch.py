@@ -11,12 +11,12 @@ import pyarrow.parquet as pq
 import pytest
 from rich.console import Console
 
-from cosim.cli import main
+from cosim.command_line.cli import main
 from cosim.errors import RunError, TelemetryError
-from cosim.flown_run import SCENARIO
 from cosim.live.watching import Look, looks, picture
-from cosim.record import PARTS, RECORD, load_record
-from cosim.recorder import Recorder
+from cosim.results.record import PARTS, RECORD, load_record
+from cosim.results.recorder import Recorder
+from cosim.results.run_result import SCENARIO
 from tests.cosim.live.conftest import ARM
 from tests.threads import ended
 

@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 from pymavlink.dialects.v20 import all as mavlink
 
-from cosim.helm import OrderQueue
 from cosim.mavlink.autopilot import Autopilot
-from cosim.mavlink.options import MavlinkOptions
-from cosim.scenario import Scenario, load_scenario
-from cosim.signals import Column
+from cosim.mavlink.wire.options import MavlinkOptions
+from cosim.scenario.scenario import Scenario, load_scenario
+from cosim.simulation.commands import OrderQueue
+from cosim.simulation.signals import Column
 
 NAN = math.nan
 

@@ -7,8 +7,8 @@ import time
 from pymavlink.dialects.v20 import all as mavlink
 
 from cosim.mavlink.channels.udp import UdpOut
-from cosim.mavlink.framing import Counts, Gate
-from cosim.mavlink.link import Link
+from cosim.mavlink.wire.framing import Counts, Gate
+from cosim.mavlink.wire.link import Link
 
 SOURCE = (1, 1)
 KEY = bytes(range(32))

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from pymavlink.dialects.v20 import all as mavlink
 
 from cosim.mavlink.messages import MESSAGES
-from cosim.mavlink.options import PROFILES
+from cosim.mavlink.wire.options import PROFILES
 from tests.cosim.mavlink.station import AT, COLUMNS, Station, Wire, row
 from tests.examples import examples
 

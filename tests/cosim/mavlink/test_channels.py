@@ -15,11 +15,11 @@ from cosim.mavlink.channels.stream import Outgoing
 from cosim.mavlink.channels.tcp import TcpIn, TcpOut
 from cosim.mavlink.channels.tlog import Tlog
 from cosim.mavlink.channels.udp import UdpIn, UdpOut
-from cosim.mavlink.endpoint import Endpoint
-from cosim.mavlink.link import open_links
-from cosim.mavlink.options import MavlinkOptions
 from cosim.mavlink.setup import ahead
-from cosim.scenario import load_scenario
+from cosim.mavlink.wire.endpoint import Endpoint
+from cosim.mavlink.wire.link import open_links
+from cosim.mavlink.wire.options import MavlinkOptions
+from cosim.scenario.scenario import load_scenario
 from tests.cosim.mavlink.stubs import Station, attitude, heartbeat, link_of, mavlink, odometry, tended, until
 
 HERE = "127.0.0.1"

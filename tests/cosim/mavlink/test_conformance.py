@@ -9,7 +9,7 @@ from types import SimpleNamespace
 import pytest
 from pymavlink.dialects.v20 import all as mavlink
 
-from cosim.cli import main
+from cosim.command_line.cli import main
 from cosim.mavlink.conformance import (
     Client,
     Result,
@@ -23,7 +23,7 @@ from cosim.mavlink.conformance import (
     summary,
 )
 from cosim.mavlink.conformance.outcome import Check, failed, judged, passed, skipped, speed_of
-from cosim.mavlink.ground import Heard
+from cosim.mavlink.wire.ground_end import Heard
 
 QUICK = {
     connect: {"_LIST_TIMEOUT": 0.05, "_GAP_TIMEOUT": 0.02, "_MISSION_TIMEOUT": 0.02, "_ACK_TIMEOUT": 0.02,

@@ -6,10 +6,10 @@ import json
 import pytest
 from pymavlink.dialects.v20 import all as mavlink
 
-from cosim.cli import main
+from cosim.command_line.cli import main
 from cosim.mavlink.conformance import CHECKS, Client, connect, ftp, vehicle
 from cosim.mavlink.conformance.outcome import Subject
-from cosim.mavlink.options import PROFILES
+from cosim.mavlink.wire.options import PROFILES
 
 pytestmark = pytest.mark.slow
 

@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from cosim.errors import TelemetryError
-from cosim.mavlink.endpoint import Endpoint, parse_endpoint
+from cosim.mavlink.wire.endpoint import Endpoint, parse_endpoint
 
 
 @pytest.mark.parametrize(

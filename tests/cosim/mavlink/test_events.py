@@ -3,7 +3,7 @@
 import pytest
 from pymavlink.dialects.v20 import all as mavlink
 
-from cosim.helm.orders import Arm, Steer
+from cosim.simulation.commands.commands import Arm, Steer
 from tests.cosim.mavlink.station import Station
 
 BEAT = mavlink.MAVLink_heartbeat_message(mavlink.MAV_TYPE_GCS, mavlink.MAV_AUTOPILOT_INVALID, 0, 0, 4, 3)

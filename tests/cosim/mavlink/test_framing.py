@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cosim.mavlink.framing import Framer, StreamReader, kinds
+from cosim.mavlink.wire.framing import Framer, StreamReader, kinds
 from tests.cosim.mavlink.stubs import Station, attitude, heartbeat, mavlink, odometry, open_gate, request_list
 
 

@@ -10,10 +10,10 @@ import pytest
 from benchmarks.hostile import hostile_datagrams
 from cosim.mavlink import thread
 from cosim.mavlink.channels.udp import PEERS, UdpIn
-from cosim.mavlink.framing import StreamReader
-from cosim.mavlink.link import Link
-from cosim.mavlink.signing import SigningClock, Verifier
 from cosim.mavlink.thread import LinkThread
+from cosim.mavlink.wire.framing import StreamReader
+from cosim.mavlink.wire.link import Link
+from cosim.mavlink.wire.signing import SigningClock, Verifier
 from tests.cosim.mavlink.stubs import KEY, SOURCE, Station, StubVehicle, attitude, link_of, open_gate, until
 
 HERE = "127.0.0.1"
@@ -131,7 +131,7 @@ def test_a_flood_takes_a_bounded_slice_of_each_turn(monkeypatch):
     """However much is waiting, a turn ends; the thread then rests for a multiple of what it took."""
     clock = Clock()
     monkeypatch.setattr("cosim.mavlink.thread.time", clock)
-    monkeypatch.setattr("cosim.mavlink.link.time", clock)
+    monkeypatch.setattr("cosim.mavlink.wire.link.time", clock)
     channel, vehicle = Script(hostile_datagrams(10**9, seed=3)), Answering(clock)
     links = LinkThread(vehicle, [Link("test", channel, open_gate(), SOURCE)], step=0.01)
     slice_ = thread._RECEIVING

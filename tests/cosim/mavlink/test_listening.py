@@ -13,13 +13,13 @@ import time
 import pytest
 from pymavlink.dialects.v20 import all as mavlink
 
-from cosim.cli import main
-from cosim.mavlink.endpoint import parse_endpoint
-from cosim.mavlink.ground import GroundLink, Heard
+from cosim.command_line.cli import main
 from cosim.mavlink.listening import Watch, follow, picture
 from cosim.mavlink.listening.fields import values
 from cosim.mavlink.listening.watch import ROWS, TEXTS
-from cosim.mavlink.modes import mode_name
+from cosim.mavlink.vehicle.modes import mode_name
+from cosim.mavlink.wire.endpoint import parse_endpoint
+from cosim.mavlink.wire.ground_end import GroundLink, Heard
 
 ESCAPE = "\x1b[31mred\x07"
 

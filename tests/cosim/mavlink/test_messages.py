@@ -9,9 +9,9 @@ from packaging.version import Version
 from pymavlink.dialects.v20 import all as mavlink
 
 from controller.quaternion import from_axis_angle, multiply, rotation_matrix
-from cosim.mavlink.encode import Encoder, float32, whole, wrapped
-from cosim.mavlink.geodesy import LocalFrame
-from cosim.mavlink.layout import euler_of
+from cosim.mavlink.vehicle.geodesy import LocalFrame
+from cosim.mavlink.vehicle.layout import euler_of
+from cosim.mavlink.wire.encode import Encoder, float32, whole, wrapped
 from tests.cosim.mavlink.station import Station, scenario
 
 TURN = from_axis_angle(np.array([0.0, 0.0, 1.0]), 2.0)

@@ -5,7 +5,7 @@ import math
 import pytest
 from pymavlink.dialects.v20 import all as mavlink
 
-from cosim.helm.orders import Begin, Change, Face, Item, Mission, Steer
+from cosim.simulation.commands.commands import Begin, Change, Face, Item, Mission, Steer
 from tests.cosim.mavlink.station import NAN, Station, scenario
 
 LOCAL, GLOBAL, RELATIVE, GLOBAL_INT, RELATIVE_INT, TERRAIN = 1, 0, 3, 5, 6, 10

@@ -3,8 +3,8 @@
 import pytest
 from pymavlink.dialects.v20 import all as mavlink
 
-from cosim.helm.orders import Aim, Arm, Reset, Steer
-from cosim.mavlink.profile import PROFILES
+from cosim.mavlink.vehicle.profile import PROFILES
+from cosim.simulation.commands.commands import Aim, Arm, Reset, Steer
 from tests.cosim.mavlink.station import NAN, Station, scenario
 
 ACCEPTED, REJECTED, DENIED, UNSUPPORTED, FAILED = range(5)

@@ -10,8 +10,8 @@ from scipy.spatial.transform import Rotation
 
 from controller.regions import ray_distances
 from cosim.mavlink.autopilot import Autopilot
-from cosim.mavlink.options import PROFILES, MavlinkOptions
-from cosim.scenario_tables import FAR_AWAY
+from cosim.mavlink.wire.options import PROFILES, MavlinkOptions
+from cosim.scenario.tables import FAR_AWAY
 from tests.cosim.mavlink.station import COLUMNS, Station, scenario
 
 NOTHING, UNKNOWN = 2001, 0xFFFF
@@ -231,7 +231,7 @@ def test_all_that_is_compiled_is_loaded_when_it_is_made(monkeypatch):
         called.append(tuple(map(numba.typeof, args)))
         ray_distances(*args)
 
-    monkeypatch.setattr("cosim.mavlink.proximity.ray_distances", noted)
+    monkeypatch.setattr("cosim.mavlink.vehicle.proximity.ray_distances", noted)
     none = scenario("commands.enabled=false", "regions.SR1.criterion='shape'")
     for known in (none, scenario()):
         called.clear()

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from pymavlink.dialects.v20 import all as mavlink
 
-from cosim.helm import OrderQueue
-from cosim.master import Master
 from cosim.mavlink.autopilot import Autopilot
-from cosim.mavlink.options import MavlinkOptions
-from cosim.scenario import load_scenario
+from cosim.mavlink.wire.options import MavlinkOptions
+from cosim.scenario.scenario import load_scenario
+from cosim.simulation.commands import OrderQueue
+from cosim.simulation.master import Master
 from tests.cosim.mavlink.station import NAN, Station, Wire
 from tests.cosim.mavlink.test_targets import local, obstacle, sticks
 

@@ -8,14 +8,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import all as mavlink
 
-from cosim.helm import LiveSettings
-from cosim.helm.orders import Change
 from cosim.mavlink.services.packed_parameters import bare_crc32, hash_check
 from cosim.mavlink.services.parameter_names import parameter_names
 from cosim.mavlink.services.parameters import shortest
 from cosim.mavlink.services.station_parameters import station_parameters
-from cosim.scenario import load_scenario
-from cosim.scenario_file import shipped_scenarios
+from cosim.scenario.scenario import load_scenario
+from cosim.scenario.toml_file import shipped_scenarios
+from cosim.simulation.commands import LiveSettings
+from cosim.simulation.commands.commands import Change
 from tests.cosim.mavlink.station import NAN, Station, scenario
 from tests.examples import examples
 

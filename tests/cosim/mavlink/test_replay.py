@@ -11,14 +11,14 @@ import pyarrow.parquet as pq
 import pytest
 from pymavlink.dialects.v20 import all as mavlink
 
-from cosim.cli import main
+from cosim.command_line.cli import main
 from cosim.errors import RunError
 from cosim.mavlink.conformance import Client
-from cosim.mavlink.endpoint import parse_endpoint
-from cosim.mavlink.ground import GroundLink
-from cosim.mavlink.options import MavlinkOptions
 from cosim.mavlink.replay import replay
-from cosim.record import load_record
+from cosim.mavlink.wire.endpoint import parse_endpoint
+from cosim.mavlink.wire.ground_end import GroundLink
+from cosim.mavlink.wire.options import MavlinkOptions
+from cosim.results.record import load_record
 
 OVERRIDES = ("arbiter.engine=closed", "time.duration=4")
 COMMANDED = (*OVERRIDES, "commands.enabled=true")

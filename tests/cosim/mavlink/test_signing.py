@@ -7,10 +7,10 @@ import time
 import pytest
 
 from cosim.errors import TelemetryError
-from cosim.mavlink import signing
 from cosim.mavlink.channels.udp import UdpOut
-from cosim.mavlink.link import Link, Signer
-from cosim.mavlink.signing import STREAMS, SigningClock, Verifier, read_key
+from cosim.mavlink.wire import signing
+from cosim.mavlink.wire.link import Link, Signer
+from cosim.mavlink.wire.signing import STREAMS, SigningClock, Verifier, read_key
 from tests.cosim.mavlink.stubs import KEY, SOURCE, Station, attitude, heartbeat, mavlink, open_gate
 
 MINUTE = 60 * 100_000

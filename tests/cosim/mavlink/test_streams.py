@@ -6,7 +6,7 @@ import pytest
 from pymavlink.dialects.v20 import all as mavlink
 
 from cosim.mavlink.messages import MESSAGES
-from cosim.mavlink.streams import GREATEST_LOAD
+from cosim.mavlink.messages.streams import GREATEST_LOAD
 from tests.cosim.mavlink.station import NAN, Station
 
 ACCEPTED, _, DENIED, _, FAILED = range(5)

@@ -7,8 +7,8 @@ import pytest
 from pymavlink.dialects.v20 import all as mavlink
 
 from controller.quaternion import from_axis_angle
-from cosim.helm.orders import Aim, Face, Forget, Obstacle, Steer, Sticks
-from cosim.mavlink.geodesy import LocalFrame
+from cosim.mavlink.vehicle.geodesy import LocalFrame
+from cosim.simulation.commands.commands import Aim, Face, Forget, Obstacle, Steer, Sticks
 from tests.cosim.mavlink.station import NAN, Station
 
 POSITION = 0b110111111000

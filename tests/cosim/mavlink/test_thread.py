@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 from pymavlink import mavutil
 
-from cosim.mavlink import link as link_module
 from cosim.mavlink import thread
 from cosim.mavlink.channels.tcp import TcpIn
 from cosim.mavlink.channels.tlog import Tlog
 from cosim.mavlink.channels.udp import UdpIn
-from cosim.mavlink.endpoint import parse_endpoint
-from cosim.mavlink.link import open_links
-from cosim.mavlink.options import MavlinkOptions
 from cosim.mavlink.thread import LinkThread
+from cosim.mavlink.wire import link as link_module
+from cosim.mavlink.wire.endpoint import parse_endpoint
+from cosim.mavlink.wire.link import open_links
+from cosim.mavlink.wire.options import MavlinkOptions
 from tests.cosim.mavlink.stubs import (
     KEY,
     Station,

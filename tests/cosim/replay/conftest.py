@@ -10,13 +10,13 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from cosim.flown_run import load_run
-from cosim.helm.orders import Aim, Begin, Change, Forget, Item, Mission, Obstacle, Steer
 from cosim.replay.page import write_page
 from cosim.replay.pages import replay
 from cosim.replay.trace import trace_of
-from cosim.run import run_scenario
-from cosim.scenario import load_scenario
+from cosim.results.run_result import load_run
+from cosim.run.run import run_scenario
+from cosim.scenario.scenario import load_scenario
+from cosim.simulation.commands.commands import Aim, Begin, Change, Forget, Item, Mission, Obstacle, Steer
 from tests.cosim.replay.browser import CHROMEDRIVER, CHROMIUM, Browser
 from tests.cosim.replay.decoding import read_page
 

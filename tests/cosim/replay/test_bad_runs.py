@@ -7,11 +7,11 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from cosim.cli import main
+from cosim.command_line.cli import main
 from cosim.errors import CosimError, RunError
-from cosim.flown_run import load_run
 from cosim.replay.pages import write_replay
-from cosim.run_folder import conclude
+from cosim.results.run_result import load_run
+from cosim.run.run_folder import conclude
 from tests.cosim.replay.conftest import GAPS
 from tests.cosim.replay.decoding import read_page
 

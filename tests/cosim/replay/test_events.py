@@ -6,11 +6,24 @@ import math
 import numpy as np
 import pytest
 
-from cosim.helm.orders import Aim, Arm, Begin, Change, Face, Forget, Item, Mission, Obstacle, Reset, Steer, Sticks
-from cosim.record import Rows
 from cosim.replay.events import events_of
 from cosim.replay.order_words import order_words, ordered_events
-from cosim.signals import Column
+from cosim.results.record import Rows
+from cosim.simulation.commands.commands import (
+    Aim,
+    Arm,
+    Begin,
+    Change,
+    Face,
+    Forget,
+    Item,
+    Mission,
+    Obstacle,
+    Reset,
+    Steer,
+    Sticks,
+)
+from cosim.simulation.signals import Column
 
 
 def rows_of(names, time, **signals):
@@ -96,7 +109,7 @@ def test_a_brief_look_back_is_no_change_but_a_brief_visit_on_the_way_is(paper):
 
 
 def test_a_failure_is_told_if_the_run_came_so_far(paper):
-    from cosim.scenario_tables import Failure
+    from cosim.scenario.tables import Failure
 
     run = made(paper, [0.0, 1.0, 2.0], failures=(Failure(3, 1.5), Failure(1, 2.5)))
     assert told(run, "failure") == [(1.5, "Thruster 3 fails")]

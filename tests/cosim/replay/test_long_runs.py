@@ -11,18 +11,18 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from benchmarks.long_record import write_long_run
-from cosim.drawing import Story
-from cosim.drawn_rows import story_of
 from cosim.export.excerpt import excerpt_of
-from cosim.extremes import even_edges, extreme_rows
-from cosim.flown_run import load_run
-from cosim.plain_json import json_text
-from cosim.record import Record
+from cosim.io.strict_json import json_text
 from cosim.replay.events import _Few
 from cosim.replay.trace import trace_of
-from cosim.report_contents import contents_of
-from cosim.spans import Spans, spans
-from cosim.summary import _Sum
+from cosim.report.contents import contents_of
+from cosim.report.figures.sampled_rows import story_of
+from cosim.report.figures.style import Story
+from cosim.results.extremes import even_edges, extreme_rows
+from cosim.results.record import Record
+from cosim.results.run_result import load_run
+from cosim.results.spans import Spans, spans
+from cosim.results.summary import _Sum
 
 RUNS = ("paper", "docking", "steered", "with V")
 
@@ -41,12 +41,12 @@ def run_of(request, shipped_run):
 @pytest.fixture
 def streamed(monkeypatch):
     """Return a function that opens a run anew, to be read in blocks of an odd size."""
-    monkeypatch.setattr("cosim.record._BLOCK", 777)
-    monkeypatch.setattr("cosim.drawn_rows._WHOLE", 100)
+    monkeypatch.setattr("cosim.results.record._BLOCK", 777)
+    monkeypatch.setattr("cosim.report.figures.sampled_rows._WHOLE", 100)
 
     def reopened(run):
         with monkeypatch.context() as patch:
-            patch.setattr("cosim.record._SMALL", 0)
+            patch.setattr("cosim.results.record._SMALL", 0)
             again = load_run(run.path)
         assert not again.record._small and not again.record._kept
         return again
@@ -84,8 +84,8 @@ def test_an_excerpt_is_the_same(every, rate, docking, streamed):
 
 @pytest.mark.parametrize("name", RUNS)
 def test_figures_of_a_long_run_draw_few_rows_and_miss_no_extreme(name, run_of, streamed, monkeypatch):
-    monkeypatch.setattr("cosim.drawn_rows._MOST", 2000)
-    monkeypatch.setattr("cosim.drawn_rows._EVEN", 50)
+    monkeypatch.setattr("cosim.report.figures.sampled_rows._MOST", 2000)
+    monkeypatch.setattr("cosim.report.figures.sampled_rows._EVEN", 50)
     run = run_of(name)
     story = story_of(streamed(run))
     n, drawn = len(run.record), story.record
@@ -110,9 +110,9 @@ def test_figures_of_a_long_run_draw_few_rows_and_miss_no_extreme(name, run_of, s
 @pytest.mark.slow
 @pytest.mark.parametrize("name", RUNS)
 def test_every_figure_of_a_long_run_is_drawn(name, run_of, streamed, monkeypatch):
-    from cosim.figures import drawings
+    from cosim.report.figures.figures import drawings
 
-    monkeypatch.setattr("cosim.drawn_rows._MOST", 2000)
+    monkeypatch.setattr("cosim.report.figures.sampled_rows._MOST", 2000)
     run = run_of(name)
     stories = Story(run.scenario, run.record, run.summary), story_of(streamed(run))
     whole, few = ([drawing.name for drawing in drawings(story)] for story in stories)
@@ -219,9 +219,9 @@ def _exported(path):
 
 @pytest.mark.slow
 def test_memory_does_not_grow_with_the_rows(tmp_path, monkeypatch):
-    monkeypatch.setattr("cosim.record._SMALL", 2**21)
-    monkeypatch.setattr("cosim.drawn_rows._MOST", 5000)
-    monkeypatch.setattr("cosim.drawn_rows._WHOLE", 5000)
+    monkeypatch.setattr("cosim.results.record._SMALL", 2**21)
+    monkeypatch.setattr("cosim.report.figures.sampled_rows._MOST", 5000)
+    monkeypatch.setattr("cosim.report.figures.sampled_rows._WHOLE", 5000)
     monkeypatch.setattr("cosim.replay.sampling._MOST_BYTES", 500_000)
     rows = {n: tmp_path / str(n) for n in (40_000, 160_000)}
     for n, path in rows.items():

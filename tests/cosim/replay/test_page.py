@@ -8,9 +8,9 @@ import subprocess
 
 import pytest
 
-from cosim.flown_run import load_run
 from cosim.replay.page import is_page, replay_page, write_page
 from cosim.replay.trace import trace_of
+from cosim.results.run_result import load_run
 from tests.cosim.replay.conftest import CLOSED
 from tests.cosim.replay.decoding import read_page
 

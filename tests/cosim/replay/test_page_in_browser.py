@@ -4,9 +4,9 @@ import json
 
 import pytest
 
-from cosim.flown_run import load_run
 from cosim.replay.page import write_page
 from cosim.replay.trace import trace_of
+from cosim.results.run_result import load_run
 from tests.cosim.replay.test_page import HOSTILE
 
 pytestmark = pytest.mark.slow

@@ -7,9 +7,9 @@ import pytest
 
 from controller.regions import SHAPES, Region, clearances_at
 from cosim.errors import RunError
-from cosim.flown_run import load_run
-from cosim.record import RECORD
 from cosim.replay.trace import trace_of
+from cosim.results.record import RECORD
+from cosim.results.run_result import load_run
 
 
 def shape_at(header, index, time):

@@ -7,14 +7,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cosim.flown_run import load_run
-from cosim.record import Rows
 from cosim.replay.activity import active_regions
 from cosim.replay.sampling import sampled_rows
 from cosim.replay.trace import plain, trace_of
 from cosim.replay.viewing import Viewing
-from cosim.scenario import CRITERIA
-from cosim.signals import Column
+from cosim.results.record import Rows
+from cosim.results.run_result import load_run
+from cosim.scenario.scenario import CRITERIA
+from cosim.simulation.signals import Column
 from fuzzy_arbiter import Arbiter
 from tests.cosim.replay.decoding import active_of
 

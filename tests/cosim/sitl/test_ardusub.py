@@ -9,8 +9,8 @@ import time
 
 import pytest
 
-from cosim.mavlink.dialect import dialect
-from cosim.record import load_record
+from cosim.mavlink.wire.dialect import dialect
+from cosim.results.record import load_record
 
 ARDUSUB = shutil.which("ardusub")
 MANUAL, ALT_HOLD = 19, 2

@@ -9,9 +9,9 @@ import sys
 
 import pytest
 
-from cosim.cli import main
-from cosim.record import load_record
-from cosim.run_folder import report_again
+from cosim.command_line.cli import main
+from cosim.results.record import load_record
+from cosim.run.run_folder import report_again
 from tests.cosim.sitl.stand_in import NEUTRAL, StandIn
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from cosim.errors import RunError
-from cosim.scenario import load_scenario
+from cosim.scenario.scenario import load_scenario
 from cosim.sitl.law import law_of_controls, law_of_pwm
 from plant_fmu import TableError, VehicleError, load_vehicle
 

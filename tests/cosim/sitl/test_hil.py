@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from cosim.errors import RunError
-from cosim.mavlink.dialect import dialect
-from cosim.record import load_record
+from cosim.mavlink.wire.dialect import dialect
+from cosim.results.record import load_record
 from cosim.sitl.flights import FlightOptions, Flights
 from cosim.sitl.hil import LEFT, RATE, HilServer
 from cosim.sitl.hil_messages import FIELD_NED, air_pressure, hil_messages

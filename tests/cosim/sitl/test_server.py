@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from cosim.errors import RunError
-from cosim.master import Master
-from cosim.record import load_record
+from cosim.results.record import load_record
+from cosim.simulation.master import Master
 from cosim.sitl.flights import RESTARTED, FlightOptions, Flights
 from cosim.sitl.law import law_of_pwm
 from cosim.sitl.lockstep import Lockstep

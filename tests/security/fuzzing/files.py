@@ -10,12 +10,12 @@ from functools import partial
 from pathlib import Path
 
 from controller import LAWS
-from cosim.campaigns.scene_store import SceneStore
-from cosim.mavlink.signing import read_key
-from cosim.scenario import load_scenario
-from cosim.scene import decode_scene
-from cosim.scene_run import Conditions
-from cosim.scene_scenario import scene_scenario
+from cosim.campaigns.scenes.as_scenario import scene_scenario
+from cosim.campaigns.scenes.flyer import Conditions
+from cosim.campaigns.scenes.scene import decode_scene
+from cosim.campaigns.scenes.scene_store import SceneStore
+from cosim.mavlink.wire.signing import read_key
+from cosim.scenario.scenario import load_scenario
 from fuzzy_arbiter import Arbiter
 from fuzzy_arbiter import formats as arbiters
 from fuzzy_arbiter.command_line.files import read_text
@@ -28,14 +28,14 @@ from tests.security.fuzzing.registry import KINDS, ROOT, SCENES, Case, Seeds, re
 # ---- files for people ----------------------------------------------------------------------------------------------
 
 
-@reader("scenario", "toml", "plant_fmu.tables:read_toml", "plant_fmu.tables:decode")
+@reader("scenario", "toml", "plant_fmu.toml_tables:read_toml", "plant_fmu.toml_tables:decode")
 def scenario(seeds: Seeds) -> Case:
-    shapes = str(ROOT / "tests" / "cosim" / "package" / "all-shapes.toml")
+    shapes = str(ROOT / "tests" / "cosim" / "ssp" / "all-shapes.toml")
     texts = (load_scenario(name).toml() for name in ("docking", "harbour", "paper-deployable", shapes))
     return seeds.file("it.toml", load_scenario, *(text.encode() for text in texts))
 
 
-@reader("scenario, laid over others", "toml", "plant_fmu.tables:read_toml")
+@reader("scenario, laid over others", "toml", "plant_fmu.toml_tables:read_toml")
 def layers(seeds: Seeds) -> Case:
     """A file that names its base and its vehicle."""
     case = seeds.file("it.toml", load_scenario, b'base = "below.toml"\nvehicle = "boat.toml"\ntime.duration = 2\n')
@@ -45,7 +45,7 @@ def layers(seeds: Seeds) -> Case:
     return case
 
 
-@reader("vehicle", "toml", "plant_fmu.tables:read_toml", "plant_fmu.tables:decode")
+@reader("vehicle", "toml", "plant_fmu.toml_tables:read_toml", "plant_fmu.toml_tables:decode")
 def vehicle(seeds: Seeds) -> Case:
     return seeds.file("it.toml", load_vehicle, *(f.read_bytes() for f in (ROOT / "plant_fmu/vehicles").glob("*.toml")))
 
@@ -76,7 +76,12 @@ def samples(seeds: Seeds) -> Case:
     return seeds.file("it.csv", read, b'obstacle,shape, depth,note\n0.75,1,0,a\n1,0.5,0.25,"b,c"\n\n0,0,1e-3,\n')
 
 
-@reader("scenes", "jsonl", "cosim.scene:decode_scene", "cosim.campaigns.scene_store:SceneStore.__init__")
+@reader(
+    "scenes",
+    "jsonl",
+    "cosim.campaigns.scenes.scene:decode_scene",
+    "cosim.campaigns.scenes.scene_store:SceneStore.__init__",
+)
 def scenes(seeds: Seeds) -> Case:
     gains = LAWS["printed"].gains_type()
 
@@ -93,7 +98,7 @@ def scenes(seeds: Seeds) -> Case:
     return seeds.file("it.jsonl", read, b"".join(SCENES))
 
 
-@reader("signing key", "bytes", "cosim.mavlink.signing:read_key")
+@reader("signing key", "bytes", "cosim.mavlink.wire.signing:read_key")
 def key(seeds: Seeds) -> Case:
     case = seeds.file("key", read_key, bytes(range(32)), b"0f" * 32 + b"\n", b"a passphrase\n")
     Path(case.named).touch(0o600)

@@ -11,40 +11,40 @@ import pyarrow.parquet as pq
 import pytest
 
 from controller import LAWS
-from cosim.campaigns.campaign_page import write_campaign_page
-from cosim.campaigns.comparison_page import NUMBERS, write_comparison_page
-from cosim.campaigns.folder import PLAN, RESULTS, SUMMARY
-from cosim.campaigns.page import Html
-from cosim.campaigns.parts import Parts
-from cosim.campaigns.plan import plan_of
-from cosim.campaigns.repeat import repeat_of
-from cosim.campaigns.replays import replay_of
-from cosim.campaigns.results import Results
-from cosim.campaigns.scene_rows import SCHEMA
-from cosim.campaigns.summary import summarise
-from cosim.campaigns.sweep_page import write_sweep_page
-from cosim.columns import names_of
-from cosim.flown_run import _concluded, flown_run, load_run
-from cosim.helm.sources import read_log
-from cosim.record import PARTS, RECORD, load_record
+from cosim.campaigns.analysis.summary import summarise
+from cosim.campaigns.pages.campaign_page import write_campaign_page
+from cosim.campaigns.pages.comparison_page import NUMBERS, write_comparison_page
+from cosim.campaigns.pages.page import Html
+from cosim.campaigns.pages.replays import replay_of
+from cosim.campaigns.pages.sweep_page import write_sweep_page
+from cosim.campaigns.reruns.repeat import repeat_of
+from cosim.campaigns.scenes.flyer import Conditions
+from cosim.campaigns.scenes.plan import plan_of
+from cosim.campaigns.scenes.rows import SCHEMA
+from cosim.campaigns.store.folder import PLAN, RESULTS, SUMMARY
+from cosim.campaigns.store.parts import Parts
+from cosim.campaigns.store.results import Results
 from cosim.replay.events import events_of
 from cosim.replay.page import is_page, write_page
 from cosim.replay.steering import changes_of
 from cosim.replay.trace import trace_of
-from cosim.scenario import load_scenario
-from cosim.scene_run import Conditions
+from cosim.results.record import PARTS, RECORD, load_record
+from cosim.results.run_result import _concluded, flown_run, load_run
+from cosim.scenario.scenario import load_scenario
+from cosim.simulation.columns import names_of
+from cosim.simulation.commands.sources import read_log
 from tests.security.fuzzing.registry import SCENES, Case, Seeds, reader
 
 # ---- run folders ---------------------------------------------------------------------------------------------------
 
 
-@reader("summary of a run", "json", "cosim.plain_json:read_json")
+@reader("summary of a run", "json", "cosim.io.strict_json:read_json")
 def summary(seeds: Seeds) -> Case:
     planned = load_run(seeds.run).planned
     return seeds.file("summary.json", lambda path: _concluded(path, planned), (seeds.run / "summary.json").read_bytes())
 
 
-@reader("orders of a run", "jsonl", "cosim.helm.sources:read_log")
+@reader("orders of a run", "jsonl", "cosim.simulation.commands.sources:read_log")
 def orders(seeds: Seeds) -> Case:
     run = load_run(seeds.run)
 
@@ -62,7 +62,7 @@ def _thinned(folder: Path, rows: int) -> bytes:
     return made.getvalue()
 
 
-@reader("record", "parquet", "cosim.record:_opened", "cosim.record:_column_of")
+@reader("record", "parquet", "cosim.results.record:_opened", "cosim.results.record:_column_of")
 def record(seeds: Seeds) -> Case:
     table = pq.read_table(seeds.run / RECORD).slice(0, 9)
     made = io.BytesIO()
@@ -78,7 +78,7 @@ def record(seeds: Seeds) -> Case:
     return replace(case, named=str(Path(case.named).parent))
 
 
-@reader("part of a record", "parquet", "cosim.record:_opened")
+@reader("part of a record", "parquet", "cosim.results.record:_opened")
 def part(seeds: Seeds) -> Case:
     case = record(seeds)
     folder = seeds.folder()
@@ -93,12 +93,12 @@ def part(seeds: Seeds) -> Case:
     return Case(case.contents, read, str(folder))
 
 
-@reader("run", "parquet", "cosim.record:_opened", "cosim.flown_run:_lines")
+@reader("run", "parquet", "cosim.results.record:_opened", "cosim.results.run_result:_lines")
 def run(seeds: Seeds) -> Case:
     """All that is made of a run, whatever the numbers are."""
     folder, flown = seeds.folder(seeds.run), load_run(seeds.run)
     names = names_of(flown.planned)
-    seeds.patch.setattr("cosim.columns.names_of", lambda _: names)
+    seeds.patch.setattr("cosim.simulation.columns.names_of", lambda _: names)
 
     def read(content: bytes) -> None:
         (folder / RECORD).write_bytes(content)
@@ -116,7 +116,7 @@ def page(seeds: Seeds) -> Case:
 # ---- campaigns, sweeps and comparisons -----------------------------------------------------------------------------
 
 
-@reader("plan of a campaign", "json", "cosim.plain_json:read_json")
+@reader("plan of a campaign", "json", "cosim.io.strict_json:read_json")
 def plan(seeds: Seeds) -> Case:
     seed = json.loads(SCENES[0])["seed"]
     case = seeds.file(PLAN, lambda path: repeat_of(path.parent, seed), of=seeds.comparison / "printed")
@@ -130,21 +130,21 @@ def _with_its_scenario(seeds: Seeds, name: str) -> Case:
 
     def read(content: bytes) -> None:
         with pytest.MonkeyPatch.context() as patch:
-            patch.setattr("cosim.campaigns.repeat.load_scenario", lambda _: scenario)
+            patch.setattr("cosim.campaigns.reruns.repeat.load_scenario", lambda _: scenario)
             case.read(content)
 
     return Case(case.contents, read, str(Path(case.named).parent))
 
 
-@reader("plan of a sweep", "json", "cosim.plain_json:read_json", "cosim.campaigns.sweep_rows:_files")
+@reader("plan of a sweep", "json", "cosim.io.strict_json:read_json", "cosim.campaigns.sweeps.rows:_files")
 def plan_of_sweep(seeds: Seeds) -> Case:
     return _with_its_scenario(seeds, PLAN)
 
 
-_RESULTS = [f"cosim.campaigns.results:Results.{name}" for name in ("__init__", "row", "_read", "pieces")]
+_RESULTS = [f"cosim.campaigns.store.results:Results.{name}" for name in ("__init__", "row", "_read", "pieces")]
 
 
-@reader("results of a campaign", "parquet", *_RESULTS, "cosim.campaigns.parts:check_schema")
+@reader("results of a campaign", "parquet", *_RESULTS, "cosim.campaigns.store.parts:check_schema")
 def results(seeds: Seeds) -> Case:
     of = plan_of("printed", LAWS["printed"].gains_type(), Conditions(), 2, "")
     seed = json.loads(SCENES[0])["seed"]
@@ -160,14 +160,21 @@ def results(seeds: Seeds) -> Case:
 
 
 @reader(
-    "results of a sweep", "parquet", "cosim.campaigns.results:Results.__init__", "cosim.campaigns.results:Results.row"
+    "results of a sweep",
+    "parquet",
+    "cosim.campaigns.store.results:Results.__init__",
+    "cosim.campaigns.store.results:Results.row",
 )
 def results_of_sweep(seeds: Seeds) -> Case:
     return _with_its_scenario(seeds, RESULTS)
 
 
-@reader("part of a campaign", "parquet", "cosim.campaigns.parts:_keys", "cosim.campaigns.parts:check_schema",
-        "cosim.campaigns.parts:_least", "cosim.campaigns.parts:_Reader.__init__")  # fmt: skip
+@reader(
+    "part of a campaign",
+    "parquet",
+    *("cosim.campaigns.store.parts:_keys", "cosim.campaigns.store.parts:check_schema"),
+    *("cosim.campaigns.store.parts:_least", "cosim.campaigns.store.parts:_Reader.__init__"),
+)
 def part_of_campaign(seeds: Seeds) -> Case:
     """One that is damaged is removed, and flown again."""
     content, folder = (seeds.comparison / "printed" / RESULTS).read_bytes(), seeds.folder()
@@ -190,27 +197,27 @@ class _AnyFigure(dict[str, Html]):
         return Html("")
 
 
-@reader("summary of a campaign", "json", "cosim.plain_json:read_json")
+@reader("summary of a campaign", "json", "cosim.io.strict_json:read_json")
 def summary_of_campaign(seeds: Seeds) -> Case:
     _without_drawing(seeds, "campaign_page")
     return seeds.file(SUMMARY, lambda path: write_campaign_page(path.parent, 0), of=seeds.comparison / "printed")
 
 
-@reader("summary of a sweep", "json", "cosim.plain_json:read_json")
+@reader("summary of a sweep", "json", "cosim.io.strict_json:read_json")
 def summary_of_sweep(seeds: Seeds) -> Case:
     _without_drawing(seeds, "sweep_page")
     case = seeds.file(SUMMARY, lambda path: write_sweep_page(path.parent, 0), of=seeds.sweep)
     return replace(case, named=str(Path(case.named).parent))
 
 
-@reader("comparison", "json", "cosim.plain_json:read_json")
+@reader("comparison", "json", "cosim.io.strict_json:read_json")
 def comparison(seeds: Seeds) -> Case:
     _without_drawing(seeds, "comparison_page")
     case = seeds.file(NUMBERS, lambda path: write_comparison_page(path.parent, 0), of=seeds.comparison)
     return replace(case, named=str(Path(case.named).parent))
 
 
-@reader("remarks on a replay", "json", "cosim.plain_json:read_json")
+@reader("remarks on a replay", "json", "cosim.io.strict_json:read_json")
 def remarks(seeds: Seeds) -> Case:
     return seeds.file(
         "worst/1/flown.json",

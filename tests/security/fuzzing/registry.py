@@ -12,9 +12,9 @@ import pytest
 
 from controller import ControllerError
 from cosim.campaigns import Design, compare, run_sweep, vary_from
+from cosim.campaigns.scenes.flyer import Conditions
 from cosim.errors import CosimError
-from cosim.scenario import load_scenario
-from cosim.scene_run import Conditions
+from cosim.scenario.scenario import load_scenario
 from fuzzy_arbiter import ArbiterError
 from plant_fmu import PlantFmuError
 

@@ -13,20 +13,20 @@ from rich.console import Console
 
 from controller.laws import LAWS
 from cosim.campaigns import vary_from
-from cosim.campaigns.law_gains import gains_from
-from cosim.helm import OrderQueue
+from cosim.campaigns.scenes.law_gains import gains_from
 from cosim.live.address import parse_live, stranger
 from cosim.live.messages import bytes_of, text_of
 from cosim.live.orders import LONGEST, Desk
 from cosim.live.watching import looks, picture
-from cosim.mavlink.endpoint import parse_endpoint
-from cosim.mavlink.framing import Counts, Gate, StreamReader
-from cosim.mavlink.ground import Heard
 from cosim.mavlink.listening import Watch
 from cosim.mavlink.listening import picture as table
+from cosim.mavlink.wire.endpoint import parse_endpoint
+from cosim.mavlink.wire.framing import Counts, Gate, StreamReader
+from cosim.mavlink.wire.ground_end import Heard
 from cosim.replay.header import header_of
 from cosim.replay.viewing import Viewing
-from cosim.scenario import load_scenario
+from cosim.scenario.scenario import load_scenario
+from cosim.simulation.commands import OrderQueue
 from cosim.sitl import wire
 from cosim.sitl.flights import Counts as HilCounts
 from cosim.sitl.hil import HilServer
@@ -99,7 +99,7 @@ def live_view(seeds: Seeds) -> Case:
 
 
 def load_columns(seeds: Seeds) -> Any:
-    from cosim.record import load_record
+    from cosim.results.record import load_record
 
     return load_record(seeds.run).columns
 
@@ -130,7 +130,7 @@ def _frames() -> bytes:
     return b"".join(message.pack(codec) for message in messages)
 
 
-_FRAMING = ("cosim.mavlink.framing:Gate._judged", "cosim.mavlink.framing:header_at")
+_FRAMING = ("cosim.mavlink.wire.framing:Gate._judged", "cosim.mavlink.wire.framing:header_at")
 
 
 @reader("MAVLink frames, to a vehicle", "bytes", *_FRAMING, "cosim.mavlink.services.ftp:FileServer._request")
@@ -209,7 +209,7 @@ def _argument(read: Callable[[str], object], *sound: str) -> Case:
     return Case(tuple(text.encode() for text in sound), taken)
 
 
-@reader("change of a scenario", "text", "cosim.scenario_file:override")
+@reader("change of a scenario", "text", "cosim.scenario.toml_file:override")
 def change(seeds: Seeds) -> Case:
     return _argument(
         lambda text: load_scenario("paper", [text]),
@@ -217,17 +217,17 @@ def change(seeds: Seeds) -> Case:
     )  # fmt: skip
 
 
-@reader("what varies", "text", "cosim.campaigns.design:_vary")
+@reader("what varies", "text", "cosim.campaigns.sweeps.design:_vary")
 def varied(seeds: Seeds) -> Case:
     return _argument(lambda text: vary_from([text]), "limit.force=50:500:4:log", "a.b=-1:1", "c=1,2.5,1e3")
 
 
-@reader("gain", "text", "cosim.campaigns.law_gains:gains_from")
+@reader("gain", "text", "cosim.campaigns.scenes.law_gains:gains_from")
 def gain(seeds: Seeds) -> Case:
     return _argument(lambda text: LAWS["pd"].checked(gains_from("pd", [text])), "k_p1=10", "k_v1 = 1.5e2")
 
 
-@reader("endpoint", "text", "cosim.mavlink.endpoint:parse_endpoint")
+@reader("endpoint", "text", "cosim.mavlink.wire.endpoint:parse_endpoint")
 def endpoint(seeds: Seeds) -> Case:
     known = {"127.0.0.1": ("127.0.0.1", True)}
 
@@ -236,7 +236,7 @@ def endpoint(seeds: Seeds) -> Case:
             return known[host]
         raise OSError("not asked")
 
-    seeds.patch.setattr("cosim.mavlink.endpoint.resolved", resolved)
+    seeds.patch.setattr("cosim.mavlink.wire.endpoint.resolved", resolved)
     seeds.patch.setattr("cosim.live.address.resolved", resolved)
     sound = "udpout:127.0.0.1:14550", "tcpin:127.0.0.1:5760", "serial:/dev/ttyUSB0:57600", "dive.tlog"
     return _argument(parse_endpoint, *sound)

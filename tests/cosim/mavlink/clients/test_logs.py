@@ -11,9 +11,9 @@ import pytest
 
 from cosim.mavlink.conformance import Client, fetch_parameters, qgc_connect
 from cosim.mavlink.conformance.vehicle import running_vehicle
-from cosim.mavlink.endpoint import parse_endpoint
-from cosim.mavlink.ground import GroundLink
-from cosim.mavlink.options import PROFILES, MavlinkOptions
+from cosim.mavlink.wire.endpoint import parse_endpoint
+from cosim.mavlink.wire.ground_end import GroundLink
+from cosim.mavlink.wire.options import PROFILES, MavlinkOptions
 from tests.cosim.mavlink.clients.conftest import HERE
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(900)]  # the first of them builds and installs

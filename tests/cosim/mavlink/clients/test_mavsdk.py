@@ -5,7 +5,7 @@ import subprocess
 
 import pytest
 
-from cosim.mavlink.options import MavlinkOptions
+from cosim.mavlink.wire.options import MavlinkOptions
 from tests.cosim.mavlink.clients.conftest import HERE, cosim_run, orders_of
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(900)]  # the first of them builds and installs

@@ -1,0 +1,6 @@
+"""Laws for comparison.
+
+Each in a file, by the authors it is named after.
+
+Imports: jit, regions.
+"""

@@ -1,0 +1,91 @@
+"""PD control to a set point with gravity compensation, the first thing that anyone would try.
+
+    tau = -k_p1 R^T sat(p - p_d) - k_p2 e_eps - K_v nu + g-hat
+
+Takegaki and Arimoto's regulator (ASME J. Dyn. Syst. Meas. Control 103, 1981) for a vehicle, with attitude in
+quaternions as Fjellstad and Fossen (IEEE Oceans, 1994) have it, the proportional action saturated, and the push of
+the regions. It compensates the weight and buoyancy that it is told. A law is told neither (`VehicleModel`), so that
+g-hat is that of a neutral vehicle, zero, and what is left is a droop of (W - B) / k_p1. Integral action would make it
+another law.
+"""
+
+from __future__ import annotations
+
+from typing import ClassVar, NamedTuple
+
+import numpy as np
+
+from controller.jit.jit import compiled
+from controller.law import Array, VehicleState, WrenchLaw
+from controller.laws.baselines.potential_field import (
+    Field,
+    add_turned,
+    damp,
+    evaluate_field,
+    field_of,
+    set_point_error,
+)
+from controller.quaternion import error, rotation_matrix
+from controller.regions import PackedRegions
+
+
+class PdGains(NamedTuple):
+    """Defaults: by ``python -m benchmarks baselines --draws 300 --seed 0``, where no other source stands beside."""
+
+    k_p1: float = 157.1  # N/m
+    k_p2: float = 36.0  # N m, section VII
+    k_v1: float = 162.2  # N s/m
+    k_v2: float = 40.0  # N m s/rad, section VII
+    limit: float = 177.0  # N, greatest pull to the set point
+    inset: float = 0.5  # m, clearance of the set point within the goal region: the centre of the scenes' goals
+    repulsion: float = 302.9  # N/m, of a region of gain 1
+    reach: float = 1.166  # m, clearance at which regions begin to push
+
+
+class PdMemory(NamedTuple):
+    """Nothing that lasts; where it computes."""
+
+    desired_quaternion: Array  # (4,)
+    estimate: Array  # (4,) zero: it estimates nothing
+    report: Array  # (0,)
+    field: Field
+
+
+@compiled
+def step(
+    state: VehicleState,
+    goal: PackedRegions,
+    regions: PackedRegions,
+    weights: Array,
+    gains: PdGains,
+    memory: PdMemory,
+    forces: Array,
+) -> None:
+    """Do what `CompiledLaw.step` says; all regions push in full, whatever their weights."""
+    R, field = rotation_matrix(state.quaternion), memory.field
+    evaluate_field(state, goal, regions, gains.repulsion, gains.reach, field)
+    set_point_error(field, gains.inset, gains.limit / gains.k_p1)
+    e_att = error(memory.desired_quaternion, state.quaternion)[1:]  # (23)
+    damp(state.velocity_body, e_att, gains.k_p2, gains.k_v1, gains.k_v2, forces)
+    add_turned(R, field.error, -gains.k_p1, forces)
+    add_turned(R, field.push, 1.0, forces)
+
+
+def memory_of(desired_quaternion: Array, period: Array, n_regions: int) -> PdMemory:
+    """Return the memory before the first step; `period` [s] has shape (1,)."""
+    return PdMemory(
+        desired_quaternion=desired_quaternion,
+        estimate=np.zeros(4),
+        report=np.zeros(0),
+        field=field_of(n_regions),
+    )
+
+
+class PdLaw(WrenchLaw):
+    """PD control to a set point, with the push of regions."""
+
+    name: ClassVar[str] = "pd"
+    function = staticmethod(step)
+    memory_of = staticmethod(memory_of)
+    gains_type = PdGains
+    above_zero = ("k_p1",)

@@ -1,0 +1,146 @@
+"""What the laws for comparison share: a bounded pull to the goal region, the push of all other regions, and damping.
+
+Their sources know no obstacles. Here each gets what its kind admits, the potential force (22) of every secondary
+region, with all weights on, for none of the sources has an arbiter. A region is grown by a `reach`, so that it pushes
+before the vehicle is at its surface, and g is the signed distance to the grown region, whose gradient has the length
+1 that (19) wants.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from controller.jit.jit import compiled
+from controller.law import Array, VehicleState
+from controller.printed_law import violation
+from controller.regions import Orientation, PackedRegions, evaluate_packed
+
+_ATTITUDE = Orientation.kind  # shapes from it on depend on attitude
+
+
+class Field(NamedTuple):
+    """Where regions are evaluated, and what comes of it."""
+
+    goal_value: Array  # (1,)
+    goal_gradient: Array  # (1, 3)
+    goal_turning: Array  # (1, 3)
+    goal_clearance: Array  # (1,) m
+    values: Array  # (n,)
+    gradients: Array  # (n, 3)
+    turnings: Array  # (n, 3)
+    clearances: Array  # (n,) m
+    error: Array  # (3,) of the goal, NED
+    push: Array  # (3,) N, NED, of all other regions
+
+
+def field_of(n_regions: int) -> Field:
+    """Return the arrays for `n_regions` secondary regions."""
+    return Field(
+        goal_value=np.zeros(1),
+        goal_gradient=np.zeros((1, 3)),
+        goal_turning=np.zeros((1, 3)),
+        goal_clearance=np.zeros(1),
+        values=np.zeros(n_regions),
+        gradients=np.zeros((n_regions, 3)),
+        turnings=np.zeros((n_regions, 3)),
+        clearances=np.zeros(n_regions),
+        error=np.zeros(3),
+        push=np.zeros(3),
+    )
+
+
+@compiled
+def evaluate_field(
+    state: VehicleState, goal: PackedRegions, regions: PackedRegions, repulsion: float, reach: float, field: Field
+) -> None:
+    """Evaluate all regions at a pose, and sum up the push of those of places.
+
+    Parameters
+    ----------
+    state : VehicleState
+        As measured.
+    goal, regions : PackedRegions
+        The primary region, and the n secondary ones.
+    repulsion : float
+        Slope of the push of a region of gain 1 [N/m].
+    reach : float
+        Clearance at which a region begins to push [m].
+    field : Field
+        Receives everything but `error`.
+    """
+    p, e = state.position, state.quaternion
+    evaluate_packed(goal, p, e, field.goal_value, field.goal_gradient, field.goal_turning, field.goal_clearance)
+    evaluate_packed(regions, p, e, field.values, field.gradients, field.turnings, field.clearances)
+    field.push[:] = 0.0
+    for i in range(field.values.size):
+        if regions.kinds[i] >= _ATTITUDE:
+            continue
+        along(field.gradients[i], -repulsion * regions.gains[i] * violation(reach - field.clearances[i]), field.push)
+
+
+@compiled
+def along(gradient: Array, length: float, total: Array) -> None:
+    """Add a vector of a length [N] along a gradient, shape (3,), to `total`; nothing if the gradient is zero."""
+    norm = math.sqrt(gradient[0] ** 2 + gradient[1] ** 2 + gradient[2] ** 2)
+    if not norm <= 0.0:
+        for axis in range(3):
+            total[axis] += length / norm * gradient[axis]
+
+
+@compiled
+def set_point_error(field: Field, inset: float, most: float) -> None:
+    """Write into `field.error` how far the vehicle is from its set point [m, NED], cut at a length.
+
+    The set point is the nearest point whose clearance within the goal region is `inset`: the centre of a sphere of that
+    radius. No region's deepest point is asked for, so that every shape can be a goal.
+
+    Parameters
+    ----------
+    field : Field
+        Evaluated.
+    inset : float
+        [m], at most the greatest clearance that the goal region has.
+    most : float
+        Greatest length of the error [m].
+    """
+    field.error[:] = 0.0
+    along(field.goal_gradient[0], violation(inset - field.goal_clearance[0]), field.error)
+    shorten(field.error, most)
+
+
+@compiled
+def shorten(vector: Array, most: float) -> None:
+    """Scale a vector, shape (3,), in place so that it is no longer than `most`; NaN stays."""
+    norm = math.sqrt(vector[0] ** 2 + vector[1] ** 2 + vector[2] ** 2)
+    if norm > most:
+        for axis in range(3):
+            vector[axis] *= most / norm
+
+
+@compiled
+def add_turned(R: Array, force: Array, factor: float, wrench: Array) -> None:
+    """Add `factor` times R^T `force`, a force of the world [N], shape (3,), to a body wrench, shape (6,) [N, N m]."""
+    for i in range(3):
+        wrench[i] += factor * (R[0, i] * force[0] + R[1, i] * force[1] + R[2, i] * force[2])
+
+
+@compiled
+def damp(velocity_body: Array, attitude_error: Array, k_p2: float, k_v1: float, k_v2: float, wrench: Array) -> None:
+    """Write the part of (25) that every law has, (6,) [N, N m]: -K_v nu, and -k_p2 times the attitude error (26)."""
+    for i in range(3):
+        wrench[i] = -k_v1 * velocity_body[i]
+        wrench[3 + i] = -k_p2 * attitude_error[i] - k_v2 * velocity_body[3 + i]
+
+
+@compiled
+def keep_within(estimate: Array, first: int, last: int, bound: float) -> None:
+    """Cut the numbers from `first` up to, not including, `last` of an estimate at -`bound` and `bound`; NaN stays.
+
+    This projection keeps an estimate from winding up while something holds the vehicle back.
+    """
+    for i in range(first, last):
+        if abs(estimate[i]) > bound:
+            estimate[i] = math.copysign(bound, estimate[i])

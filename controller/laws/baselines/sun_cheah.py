@@ -1,0 +1,119 @@
+"""Adaptive set-point control through the transposed Jacobian, in the manner of Sun and Cheah.
+
+Y. C. Sun and C. C. Cheah, "Adaptive control schemes for autonomous underwater vehicle", Robotica 27, 2009, the
+paper's reference [1]:
+
+    tau = -J^T K_p s(e) - K_v nu + Z(eta) phi-hat,    d(phi-hat)/dt = -L Z^T (nu + sigma J^T s(e))
+
+with s() saturated and the four numbers of the restoring forces (12) as all that is adapted: the law that the printed
+one (25)-(29) generalises to regions. The article was not at hand; this is its form as the printed law hands it on,
+with attitude errors as quaternions, where J is blkdiag(R, I). Ours are the bounds of the estimate and the push of the
+regions, which stays out of the adaptation.
+"""
+
+from __future__ import annotations
+
+from typing import ClassVar, NamedTuple
+
+import numpy as np
+
+from controller.jit.jit import compiled
+from controller.law import Array, VehicleState, WrenchLaw
+from controller.laws.baselines.potential_field import (
+    Field,
+    add_turned,
+    damp,
+    evaluate_field,
+    field_of,
+    keep_within,
+    set_point_error,
+)
+from controller.quaternion import error, rotation_matrix
+from controller.regions import PackedRegions
+from controller.restoring import regressor
+
+
+class SunCheahGains(NamedTuple):
+    """Defaults: by ``python -m benchmarks baselines --draws 300 --seed 0``, where no other source stands beside."""
+
+    k_p1: float = 152.2  # N/m
+    k_p2: float = 36.0  # N m, section VII
+    k_v1: float = 158.1  # N s/m
+    k_v2: float = 40.0  # N m s/rad, section VII
+    sigma_p: float = 1.217  # 1/s, of position in the adaptation
+    sigma_a: float = 0.9  # rad/s, of attitude in the adaptation, section VII
+    gamma: float = 0.02121  # s2/kg, s2/(kg m2): L = I / gamma
+    bound: float = 26.96  # N, of the estimate of W - B
+    bound_moment: float = 65.0  # N m, of the other estimates: above the righting moments of ODIN-like vehicles
+    limit: float = 172.1  # N, greatest pull to the set point
+    inset: float = 0.5  # m, clearance of the set point within the goal region: the centre of the scenes' goals
+    repulsion: float = 288.6  # N/m, of a region of gain 1
+    reach: float = 1.152  # m, clearance at which regions begin to push
+
+
+class SunCheahMemory(NamedTuple):
+    """What it keeps, and where it computes."""
+
+    desired_quaternion: Array  # (4,)
+    period: Array  # (1,) s
+    estimate: Array  # (4,) phi-hat [N, N m]
+    report: Array  # (0,)
+    drive: Array  # (6,) nu + sigma J^T s(e)
+    field: Field
+
+
+@compiled
+def step(
+    state: VehicleState,
+    goal: PackedRegions,
+    regions: PackedRegions,
+    weights: Array,
+    gains: SunCheahGains,
+    memory: SunCheahMemory,
+    forces: Array,
+) -> None:
+    """Do what `CompiledLaw.step` says; all regions push in full, whatever their weights."""
+    R, Z = rotation_matrix(state.quaternion), regressor(state.quaternion)
+    field, drive, estimate = memory.field, memory.drive, memory.estimate
+    evaluate_field(state, goal, regions, gains.repulsion, gains.reach, field)
+    set_point_error(field, gains.inset, gains.limit / gains.k_p1)
+    e_att = error(memory.desired_quaternion, state.quaternion)[1:]  # (23)
+    # the wrench
+    damp(state.velocity_body, e_att, gains.k_p2, gains.k_v1, gains.k_v2, forces)
+    add_turned(R, field.error, -gains.k_p1, forces)
+    add_turned(R, field.push, 1.0, forces)
+    for i in range(6):
+        for j in range(4):
+            forces[i] += Z[i, j] * estimate[j]
+    # the estimate
+    drive[:] = state.velocity_body
+    add_turned(R, field.error, gains.sigma_p, drive)
+    for i in range(3):
+        drive[3 + i] += gains.sigma_a * e_att[i]
+    for j in range(4):
+        for i in range(6):
+            estimate[j] -= memory.period[0] / gains.gamma * Z[i, j] * drive[i]
+    keep_within(estimate, 0, 1, gains.bound)
+    keep_within(estimate, 1, 4, gains.bound_moment)
+
+
+def memory_of(desired_quaternion: Array, period: Array, n_regions: int) -> SunCheahMemory:
+    """Return the memory before the first step; `period` [s] has shape (1,)."""
+    return SunCheahMemory(
+        desired_quaternion=desired_quaternion,
+        period=period,
+        estimate=np.zeros(4),
+        report=np.zeros(0),
+        drive=np.zeros(6),
+        field=field_of(n_regions),
+    )
+
+
+class SunCheahLaw(WrenchLaw):
+    """Adaptive set-point control through the transposed Jacobian, with the push of regions."""
+
+    name: ClassVar[str] = "sun_cheah"
+    function = staticmethod(step)
+    memory_of = staticmethod(memory_of)
+    gains_type = SunCheahGains
+    above_zero = ("k_p1", "gamma")

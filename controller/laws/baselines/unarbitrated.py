@@ -1,0 +1,95 @@
+"""The printed law (25)-(29) without its arbiter: every region has its full weight at all times.
+
+It is given what the printed law lacks within real thrusters, as every law for comparison is: a bound on the pull of
+the primary region, a margin within that region, regions that push from a `reach` on, and bounds on the estimate. All
+else is as printed.
+"""
+
+from __future__ import annotations
+
+from typing import ClassVar, NamedTuple
+
+import numpy as np
+
+from controller import printed_law
+from controller.jit.jit import compiled
+from controller.law import Array, VehicleState, WrenchLaw
+from controller.laws.baselines.potential_field import Field, evaluate_field, field_of, keep_within, shorten
+from controller.printed_law import Gains, primary_error
+from controller.quaternion import error_parts, rotation_rows
+from controller.regions import PackedRegions
+
+
+class UnarbitratedGains(NamedTuple):
+    """Defaults: by ``python -m benchmarks baselines --draws 300 --seed 0``, where no other source stands beside."""
+
+    k_p1: float = 115.8  # N/m3, on the primary region (16)
+    k_p2: float = 36.0  # N m, on attitude (26), section VII
+    k_v1: float = 175.2  # N s/m (26)
+    k_v2: float = 40.0  # N m s/rad (26), section VII
+    sigma_p: float = 1.607  # 1/(m2 s), of position in the adaptation (27)
+    sigma_a: float = 0.9  # rad/s, of attitude in the adaptation (27), section VII
+    gamma: float = 0.007226  # s2/kg, s2/(kg m2): Gamma = gamma I (27)
+    bound: float = 38.94  # N, of the estimate of W - B
+    bound_moment: float = 65.0  # N m, of the other estimates: above the righting moments of ODIN-like vehicles
+    limit: float = 195.3  # N, greatest pull of the primary region
+    margin: float = 0.1355  # m2: the pull ends where f of a sphere is -margin
+    repulsion: float = 284.6  # N/m, of a region of gain 1
+    reach: float = 1.199  # m, clearance at which regions begin to push
+
+
+class UnarbitratedMemory(NamedTuple):
+    """What it keeps, and where it computes."""
+
+    desired_quaternion: Array  # (4,)
+    period: Array  # (1,) s
+    estimate: Array  # (4,) phi-hat [N, N m]
+    report: Array  # (0,)
+    field: Field
+
+
+@compiled
+def step(
+    state: VehicleState,
+    goal: PackedRegions,
+    regions: PackedRegions,
+    weights: Array,
+    gains: UnarbitratedGains,
+    memory: UnarbitratedMemory,
+    forces: Array,
+) -> None:
+    """Do what `CompiledLaw.step` says; all regions push in full, whatever their weights."""
+    field, estimate = memory.field, memory.estimate
+    k_q = 1.0  # cancels
+    g = Gains(gains.k_p1, gains.k_p2, k_q, gains.k_v1, gains.k_v2, gains.sigma_p, gains.sigma_a, gains.gamma)
+    evaluate_field(state, goal, regions, gains.repulsion, gains.reach, field)
+    field.error[:] = primary_error(field.goal_value[0] + gains.margin, field.goal_gradient[0])  # (20)
+    shorten(field.error, gains.limit / gains.k_p1)
+    e_p = (field.error[0], field.error[1], field.error[2])
+    e_s = (-field.push[0] / k_q, -field.push[1] / k_q, -field.push[2] / k_q)  # (21), (22)
+    e_att = error_parts(memory.desired_quaternion, state.quaternion)[1:]  # (23)
+    R = rotation_rows(state.quaternion)
+    printed_law.apply(e_p, e_s, e_att, R, state.velocity_body, g, memory.period[0], estimate, forces)  # (25), (27)
+    keep_within(estimate, 0, 1, gains.bound)
+    keep_within(estimate, 1, 4, gains.bound_moment)
+
+
+def memory_of(desired_quaternion: Array, period: Array, n_regions: int) -> UnarbitratedMemory:
+    """Return the memory before the first step; `period` [s] has shape (1,)."""
+    return UnarbitratedMemory(
+        desired_quaternion=desired_quaternion,
+        period=period,
+        estimate=np.zeros(4),
+        report=np.zeros(0),
+        field=field_of(n_regions),
+    )
+
+
+class UnarbitratedLaw(WrenchLaw):
+    """The printed law with all weights on, within bounds."""
+
+    name: ClassVar[str] = "unarbitrated"
+    function = staticmethod(step)
+    memory_of = staticmethod(memory_of)
+    gains_type = UnarbitratedGains
+    above_zero = ("k_p1", "gamma")

@@ -1,0 +1,211 @@
+"""Flights by the fused loop: the vehicle's own FMU, stepped in compiled code by the functions of the master."""
+
+from __future__ import annotations
+
+import math
+from types import TracebackType
+
+import numpy as np
+from numpy.typing import NDArray
+
+from controller import Allocation
+from controller.regions import pack
+from cosim.batch.fused_loop import OUTPUTS, Allocator, Array, Marks, Setup, flight_of, room_for
+from cosim.batch.outcome import OUTCOME, Flown, nothing
+from cosim.batch.variation import Variation
+from cosim.errors import RunError, ScenarioError
+from cosim.results.summary import SETTLED_FOR
+from cosim.scenario.law_factory import law_of, require_shipped
+from cosim.scenario.scenario import CRITERIA, Scenario
+from cosim.scenario.start_values import start_values
+from cosim.simulation.sensor import STREAM
+from plant_fmu import Plant, PlantError
+from plant_fmu.running.native import Native
+
+_ROUNDING = 1e-6  # of a step, as in the master
+_NO_CLOCK = np.empty(0, np.int64)
+_NONE = Allocator(np.zeros((1, 0, 6)), np.zeros((1, 0)), np.zeros((1, 0)), False)
+
+
+class FusedFlyer:
+    """Flies variations of a scenario one after the other, with one plant that is reset in between.
+
+    Parameters
+    ----------
+    variation : Variation
+        What is flown. Any law, shape, actuation, noise, failure.
+
+    Raises
+    ------
+    RunError
+        If the scenario has what the loop does not: commands from outside, another arbiter than the closed one, the
+        order of Jacobi, FMI 2.0.
+    BuildError, PlantError
+        If there is no FMU of the vehicle.
+    """
+
+    def __init__(self, variation: Variation) -> None:
+        self.variation = variation
+        base = variation.base
+        for key, came, expected in (
+            ("arbiter.engine", base.arbiter.engine, "closed"),
+            ("master.order", base.master.order, "gauss-seidel"),
+            ("plant.fmi", base.plant.fmi, 3),
+            ("commands.enabled", base.commands.enabled, False),
+        ):
+            if came != expected:
+                way = f", such as by --set {key}={expected}" if isinstance(expected, str) else ""
+                raise RunError(f"{key} is {came!r}, expected {expected!r} for flights without a record{way}")
+            if key in variation.keys:
+                raise RunError(f"{key} varies, expected {expected!r} for flights without a record")
+        require_shipped(base)
+        self._flight = flight_of(base.law.name)
+        self._plant = Plant(base.vehicle)
+
+    def fly(self, values: Array, seeds: NDArray[np.int64]) -> Flown:
+        """Fly a batch.
+
+        Parameters
+        ----------
+        values : ndarray, shape (rows, keys)
+            Of the keys that vary, in their units.
+        seeds : ndarray of int, shape (rows,)
+            Of what is random.
+
+        Returns
+        -------
+        Flown
+            What came of each row.
+        """
+        outcomes, refused = nothing(len(seeds)), {}
+        for row, (of_row, seed) in enumerate(zip(values, seeds, strict=True)):
+            try:
+                scenario = self.variation.scenario(of_row.tolist(), int(seed))
+                outcomes[row] = self.fly_one(scenario)[0]
+            except (ScenarioError, PlantError) as error:
+                refused[row] = str(error)
+        return Flown(outcomes, refused)
+
+    def fly_one(self, scenario: Scenario, trace: bool = False) -> tuple[NDArray[np.void], Array]:
+        """Fly one scenario of the variation.
+
+        Parameters
+        ----------
+        scenario : Scenario
+            From `Variation.scenario`.
+        trace : bool
+            Whether to keep what happened, see `cosim.batch.fused_loop`.
+
+        Returns
+        -------
+        ndarray of OUTCOME, shape (), and ndarray
+            What it came to, and the trace, shape (0, 0) if none is kept.
+
+        Raises
+        ------
+        PlantError
+            If the plant cannot be as the scenario has it. The flyer can go on with another one.
+        """
+        plant, law = self._plant, law_of(scenario)
+        n, through = scenario.vehicle.n_thrusters, scenario.actuation.through == "thrusters"
+        plant.reset()
+        plant.set(start_values(scenario))
+        plant.initialise()
+        if through:
+            inputs = tuple(f"thrust[{i + 1}]" for i in range(n))
+            forces = (*(f"thruster_force[{i + 1}]" for i in range(n)), *(f"actuation.{axis}" for axis in "XYZ"))
+        else:
+            inputs = tuple(f"wrench.{axis}" for axis in "XYZKMN")
+            forces = tuple(f"actuator.wrench.{axis}" for axis in "XYZ")  # states: they cost no evaluation
+        native = plant.native(inputs, (*OUTPUTS, *forces))
+        names = [f"thrust_effectiveness[{i + 1}]" for i in range(n)]
+        effectiveness = plant.native(names, ())
+        effectiveness.inputs[:] = [plant[name] for name in names] if scenario.failures else 1.0
+        setup = _setup(scenario, n if through else 0)
+        allocator, estimate = _allocator(scenario, setup) if through else _NONE, np.zeros(4)
+        decisions = -(-scenario.steps // scenario.control_every)
+        rows = np.zeros((decisions, 20 + len(inputs) + law.report.size) if trace else (0, 0))
+        room = room_for(len(scenario.regions), len(inputs), n)
+        marks = self._flight(setup, native, effectiveness, allocator, law.gains, law.memory, room, estimate, rows)
+        return _outcome(marks, setup, native, estimate), rows
+
+    def close(self) -> None:
+        """Free the plant. May be called twice."""
+        self._plant.close()
+
+    def __enter__(self) -> FusedFlyer:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+
+def _setup(scenario: Scenario, thrusters: int) -> Setup:
+    sensing, step = scenario.sensing, scenario.time.step
+    decisions = -(-scenario.steps // scenario.control_every)
+    noise = np.zeros((0, 6))
+    if not sensing.exact:
+        deviation = np.repeat([sensing.position_noise, sensing.velocity_noise], 3)
+        noise = deviation * np.random.default_rng([sensing.seed, STREAM]).standard_normal((decisions, 6))
+    failures = sorted((math.ceil(f.time / step - _ROUNDING), f.thruster - 1) for f in scenario.failures)
+    return Setup(
+        goal=pack([scenario.goal_region]),
+        regions=pack([secondary.region for secondary in scenario.regions]),
+        criteria=np.array([CRITERIA.index(secondary.criterion) for secondary in scenario.regions], np.int64),
+        ramp=scenario.arbiter.ramp,
+        step=step,
+        steps=scenario.steps,
+        control_every=scenario.control_every,
+        arbiter_every=scenario.arbiter_every,
+        moving=bool(scenario.moving),
+        exact=sensing.exact,
+        noise=noise,
+        dead_from=sensing.dead_from,
+        dead_until=sensing.dead_from + sensing.dead_for,
+        frozen=sensing.frozen,
+        failed=np.array([thruster for _, thruster in failures], np.int64),
+        failure_steps=np.array([at for at, _ in failures], np.int64),
+        tell=scenario.tell_failures,
+        thrusters=thrusters,
+        clock=_NO_CLOCK,
+    )
+
+
+def _allocator(scenario: Scenario, setup: Setup) -> Allocator:
+    """Return a stage for each number of failures that have been told."""
+    vehicle, limits = scenario.vehicle, scenario.actuation.limits
+    health, stages = np.ones(vehicle.n_thrusters), []
+    for failed in (None, *setup.failed) if setup.tell else (None,):
+        if failed is not None:
+            health[failed] = 0.0
+        lower, upper = vehicle.thrust_min * health, vehicle.thrust_max * health
+        stages.append(Allocation(vehicle.thruster_matrix, lower, upper, limits).arguments)
+    inverse, lower, upper, direction = zip(*stages, strict=True)
+    return Allocator(np.array(inverse), np.array(lower), np.array(upper), direction[0])
+
+
+def _outcome(marks: Marks, setup: Setup, native: Native, estimate: Array) -> NDArray[np.void]:
+    def when(step: float) -> float:
+        return step * setup.step if step >= 0 else math.nan
+
+    stopped = marks.failed_step >= 0
+    last = marks.failed_step if stopped else setup.steps
+    stayed = (last - marks.last_entered) * setup.step if marks.inside else 0.0
+    fields = {
+        "reached": marks.first_inside >= 0,
+        "reach_time": when(marks.first_inside),
+        "settled": marks.inside and stayed >= SETTLED_FOR,
+        "settle_time": when(marks.last_entered),
+        "violated": marks.least_clearance < 0.0 or marks.least_angle < 0.0,
+        "min_clearance": marks.least_clearance,
+        "closest_to_goal": -marks.goal_clearance,
+        "effort": marks.effort,
+        "max_force": marks.max_force,
+        "max_speed": marks.max_speed,
+        **{f"final_{axis}": native.outputs[i] for i, axis in enumerate("xyz")},
+        **{f"phi{i + 1}": estimate[i] for i in range(4)},
+        "stopped_at": when(marks.failed_step),
+    }
+    return np.array(tuple(fields[name] for name in OUTCOME.names or ()), OUTCOME)

@@ -1,0 +1,375 @@
+"""The fused loop: a flight from start to end in compiled code, stepping the FMU through its C functions.
+
+The stages are those of `cosim.simulation.master`, by the same functions: measure, regions, arbiter, law, allocation,
+FMU; then the marks that the flight gets, of the true motion at every plant step.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+import types
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+import plant_fmu
+from controller import LAWS, CompiledLaw, VehicleState
+from controller.allocation import allocate
+from controller.jit.jit import compiled, lean
+from controller.laws import printed
+from controller.regions import (
+    Orientation,
+    PackedRegions,
+    Sphere,
+    clearance_of_pose,
+    clearance_of_sphere,
+)
+from cosim.batch.c_calls import advance, read, seconds, send
+from cosim.simulation.memberships import SOURCES, press
+from fuzzy_arbiter import Arbiter
+from plant_fmu.running.native import Native
+
+Array = NDArray[np.float64]
+
+# the folders of what the compiled loop is made of beside this one and that of the laws
+_FOREIGN = (*SOURCES, Path(plant_fmu.__file__).parent / "running")
+
+_weigh: Any = numba.njit(_nrt=False)(Arbiter().compiled().py_func)  # type: ignore[call-overload]
+_step: Any = printed.step  # of a law, and whether it gives a wrench: `flight_of` puts others in their places
+_is_wrench = True
+_SPHERE, _ATTITUDE = Sphere.kind, Orientation.kind
+
+
+class Setup(NamedTuple):
+    """What a flight is made of, beside law and plant."""
+
+    goal: PackedRegions
+    regions: PackedRegions
+    criteria: NDArray[np.int64]  # (n,) of each region
+    ramp: float  # m, width of the memberships
+    step: float  # s, of the plant
+    steps: int  # of the plant
+    control_every: int  # plant steps
+    arbiter_every: int  # plant steps
+    moving: bool  # whether any region moves
+    exact: bool  # what is measured is the truth
+    noise: Array  # (control steps, 6) added to position and linear velocity, anew at each of them; (0, 6) if exact
+    dead_from: float  # s, when position and linear velocity are lost
+    dead_until: float  # s
+    frozen: bool  # their last values are held in that time; otherwise they are NaN
+    failed: NDArray[np.int64]  # (f,) thrusters that fail, from 0, in the order of their failures
+    failure_steps: NDArray[np.int64]  # (f,) plant steps before which they do
+    tell: bool  # whether the law is told
+    thrusters: int  # that carry the wrench; 0: it acts on the body directly
+    clock: NDArray[np.int64]  # of `native.Clock`; (0,) if the law is not to be timed
+
+
+class Allocator(NamedTuple):
+    """Arguments of `controller.allocation.allocate`, one stage after another as thrusters are told to have failed."""
+
+    inverse: Array  # (stages, m, 6)
+    lower: Array  # (stages, m)
+    upper: Array  # (stages, m)
+    direction: bool
+
+
+class Room(NamedTuple):
+    """Where a flight is computed."""
+
+    state: VehicleState  # as it is told
+    memberships: Array  # (3,)
+    by_criterion: Array  # (3,) weights
+    weights: Array  # (n,)
+    clearances: Array  # (n,) true ones
+    seen: Array  # (n,) those that the arbiter is told
+    goal_clearance: Array  # (1,) m or rad
+    wrench: Array  # (6,) N, N m, body frame
+    before: Array  # (i,) inputs of the step before
+    at: Array  # (3,)
+    ticks: NDArray[np.int64]  # (2,)
+
+
+def room_for(regions: int, inputs: int, thrusters: int) -> Room:
+    """Return room for a flight.
+
+    Parameters
+    ----------
+    regions, inputs, thrusters : int
+        How many there are.
+
+    Returns
+    -------
+    Room
+        All zero, all thrusters healthy.
+    """
+    n = regions
+    state = VehicleState(np.zeros(3), np.zeros(4), np.zeros(6), np.ones(thrusters))
+    of_regions = np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(1)
+    return Room(
+        state, np.zeros(3), np.zeros(3), *of_regions, np.zeros(6), np.zeros(inputs), np.zeros(3), np.zeros(2, np.int64)
+    )
+
+
+class Marks(NamedTuple):
+    """What a flight came to. Steps are those of the plant; -1: there was none."""
+
+    first_inside: float  # step at which it was inside the goal region first
+    last_entered: float  # step since when it was inside the last time
+    inside: bool  # it still was at the end
+    least_clearance: float  # m, of all hard regions of place; negative: violated; inf: there is none
+    least_angle: float  # rad, the same of hard regions of attitude
+    goal_clearance: float  # m, greatest
+    effort: float  # N s, integral of the magnitude of the force on the body
+    thrust_effort: float  # N s, sum over thrusters of the integral of the given force's magnitude
+    thrust_variation: float  # N, sum of the changes of what is commanded, from 0 on
+    max_force: float  # N, on the body
+    max_speed: float  # m/s, over ground
+    worst_step: float  # s of the wall clock, the longest that law and allocation took
+    failed_step: float  # that the FMU refused
+
+
+OUTPUTS = (
+    *(f"position.{axis}" for axis in "xyz"),
+    *(f"quaternion.e{i}" for i in range(4)),
+    *(f"velocity.{axis}" for axis in "uvwpqr"),
+)
+
+
+def _fly(  # noqa: C901 - one loop, as a whole
+    setup: Setup,
+    native: Native,
+    effectiveness: Native,
+    allocator: Allocator,
+    gains: Any,
+    memory: Any,
+    room: Room,
+    estimate: Array,
+    trace: Array,
+) -> tuple[float, ...]:
+    """Fly by the law whose compiled function stands in the place of the global `_step`.
+
+    Parameters
+    ----------
+    setup : Setup
+        What is flown.
+    native : Native
+        The plant: inputs are the thrust commands, or the wrench; outputs `OUTPUTS`, then the thrusters' forces if they
+        are used, then the force on the body, its three components.
+    effectiveness : Native
+        The same plant: inputs are the thrusters' effectivenesses, as they are before anything fails.
+    allocator : Allocator
+        For a wrench that thrusters carry.
+    gains, memory : NamedTuple
+        The law's.
+    room : Room
+        Of `room_for`, anew for each flight.
+    estimate : ndarray, shape (4,)
+        Receives the estimate that the last decision rests on.
+    trace : ndarray, shape (control steps, 20 + i + r) or (0, 0)
+        Receives a row for each control step: time, true position, quaternion and velocity, position as measured, the
+        weights of the three criteria, the i inputs, the law's r reports.
+
+    Returns
+    -------
+    tuple
+        What `Marks` is made of, of the whole flight, or up to where the FMU failed. Were it a named tuple, Numba would
+        call Python to make it, and crash where that raises, as after Ctrl-C in mid-flight.
+    """
+    m, n, inputs = setup.thrusters, setup.regions.kinds.size, native.inputs
+    state, weights, clearances, seen = room.state, room.weights, room.clearances, room.seen
+    memberships, by_criterion, goal_clearance = room.memberships, room.by_criterion, room.goal_clearance
+    position, quaternion = native.outputs[:3], native.outputs[3:7]
+    first_inside, last_entered, inside = -1, -1, False
+    least, least_angle, most = np.inf, np.inf, -np.inf
+    effort, thrust_effort, variation = 0.0, 0.0, 0.0
+    max_force, max_speed, worst, refused = 0.0, 0.0, 0.0, -1
+    failures, told = 0, 0
+    timed = setup.clock.size > 0
+    if not read(native):
+        refused = 0
+
+    for k in range(setup.steps + 1):
+        if refused >= 0:
+            break
+        now = k * setup.step
+        # what fails
+        while failures < setup.failed.size and k == setup.failure_steps[failures]:
+            effectiveness.inputs[setup.failed[failures]] = 0.0
+            if setup.tell:
+                state.thruster_health[setup.failed[failures]] = 0.0
+                told = min(told + 1, allocator.lower.shape[0] - 1)
+            failures += 1
+            if not send(effectiveness):
+                refused = k
+        # marks
+        if setup.moving or k == 0:
+            _move(setup, now)
+        _clearances(setup.regions, position, quaternion, clearances, room.at)
+        _clearances(setup.goal, position, quaternion, goal_clearance, room.at)
+        for i in range(n):
+            if setup.regions.hard[i]:
+                if setup.regions.kinds[i] < _ATTITUDE:
+                    least = _least(clearances[i], least)
+                else:
+                    least_angle = _least(clearances[i], least_angle)
+        most = max(most, goal_clearance[0])
+        if goal_clearance[0] >= 0.0 and not inside:
+            last_entered = k
+            if first_inside < 0:
+                first_inside = k
+        inside = goal_clearance[0] >= 0.0
+        u, v, w = native.outputs[7], native.outputs[8], native.outputs[9]
+        max_speed = max(max_speed, math.sqrt(u * u + v * v + w * w))
+        controls = k % setup.control_every == 0
+        if controls:
+            for i in range(4):
+                estimate[i] = memory.estimate[i]
+        if k == setup.steps or refused >= 0:
+            break
+        # measure
+        arbitrates = k % setup.arbiter_every == 0
+        if not setup.exact or controls or arbitrates:
+            _measure(setup, k, now, native.outputs, state)
+        # regions and arbiter: while the position is lost there is nothing to decide by, and the last weights hold
+        if arbitrates and _is_finite(state.position):
+            told_clearances = clearances
+            if not setup.exact:
+                _clearances(setup.regions, state.position, state.quaternion, seen, room.at)
+                told_clearances = seen
+            press(told_clearances, setup.criteria, setup.ramp, memberships)
+            _weigh(memberships, by_criterion)
+            for i in range(n):
+                weights[i] = by_criterion[setup.criteria[i]]
+        # law and allocation
+        if controls:
+            started = seconds(setup.clock, room.ticks) if timed else 0.0
+            if m == 0 or not _is_wrench:
+                _step(state, setup.goal, setup.regions, weights, gains, memory, inputs)
+            else:
+                _step(state, setup.goal, setup.regions, weights, gains, memory, room.wrench)
+                lower, upper = allocator.lower[told], allocator.upper[told]
+                allocate(allocator.inverse[told], lower, upper, allocator.direction, room.wrench, inputs)
+            if timed:
+                worst = max(worst, seconds(setup.clock, room.ticks) - started)
+            if trace.shape[0]:
+                _trace(trace[k // setup.control_every], now, native, state.position, by_criterion, memory.report)
+            for j in range(inputs.size):
+                variation += abs(inputs[j] - room.before[j])
+                room.before[j] = inputs[j]
+            if not send(native):
+                refused = k
+                break
+        # plant
+        if not (advance(native, now, setup.step) and read(native)):
+            refused = k
+            break
+        for j in range(m):
+            thrust_effort += abs(native.outputs[13 + j]) * setup.step
+        x, y, z = native.outputs[13 + m], native.outputs[14 + m], native.outputs[15 + m]
+        force = math.sqrt(x * x + y * y + z * z)
+        effort += force * setup.step
+        max_force = max(max_force, force)
+    return (
+        first_inside, last_entered, inside, least, least_angle, most, effort, thrust_effort, variation,
+        max_force, max_speed, worst, refused,
+    )  # fmt: skip
+
+
+@lean
+def _measure(setup: Setup, k: int, now: float, truth: Array, state: VehicleState) -> None:
+    """Write what is told at plant step `k` as `sensing.Sensor` does."""
+    for i in range(4):
+        state.quaternion[i] = truth[3 + i]
+    for i in range(3):
+        state.velocity_body[3 + i] = truth[10 + i]
+    lost = setup.dead_from <= now < setup.dead_until
+    if lost and setup.frozen and now > 0.0:
+        return
+    control = k // setup.control_every
+    for i in range(3):
+        state.position[i], state.velocity_body[i] = truth[i], truth[7 + i]
+        if lost and not setup.frozen:
+            state.position[i] = state.velocity_body[i] = np.nan
+        elif not (lost or setup.exact):
+            state.position[i] += setup.noise[control, i]
+            state.velocity_body[i] += setup.noise[control, 3 + i]
+
+
+@lean
+def _is_finite(position: Array) -> bool:
+    return math.isfinite(position[0]) and math.isfinite(position[1]) and math.isfinite(position[2])
+
+
+@lean
+def _move(setup: Setup, now: float) -> None:
+    """Put all regions where they are at a time [s]."""
+    for regions in (setup.goal, setup.regions):
+        for i in range(regions.kinds.size):
+            for axis in range(3):
+                regions.shifts[i, axis] = regions.velocities[i, axis] * now
+
+
+@lean
+def _clearances(regions: PackedRegions, position: Array, quaternion: Array, clearances: Array, room: Array) -> None:
+    """Write the clearance of each region, [m] or [rad], at a pose into `clearances`."""
+    for i in range(regions.kinds.size):
+        if regions.kinds[i] == _SPHERE:
+            clearances[i] = clearance_of_sphere(regions, i, position)
+        else:
+            clearances[i] = clearance_of_pose(regions, i, position, quaternion, room)
+
+
+@lean
+def _least(clearance: float, least: float) -> float:
+    """Return the lesser of two numbers; what is no number stays."""
+    return clearance if clearance < least or np.isnan(clearance) else least
+
+
+@compiled
+def _trace(row: Array, now: float, native: Native, position: Array, weights: Array, report: Array) -> None:
+    m = native.inputs.size
+    row[0] = now
+    row[1:14] = native.outputs[:13]
+    row[14:17] = position
+    row[17:20] = weights
+    row[20 : 20 + m] = native.inputs
+    row[20 + m :] = report
+
+
+def flight_of(law: str) -> Callable[..., Marks]:
+    """Return the loop of `_fly` compiled for a law.
+
+    Numba keeps nothing on disk of a function that is given another one, or closes over it. So each law has a copy of
+    the loop with its own function among the globals, under a name of its own.
+
+    Parameters
+    ----------
+    law : str
+        One of those in `controller.LAWS`.
+
+    Returns
+    -------
+    callable
+        ``(setup, native, effectiveness, allocator, gains, memory, room, estimate, trace) -> Marks``.
+    """
+    chosen: Any = LAWS[law]
+    loop = _compiled(law, chosen)
+    return lambda *arguments: Marks(*loop(*arguments))
+
+
+@functools.cache
+def _compiled(name: str, law: type[CompiledLaw]) -> Callable[..., tuple[Any, ...]]:
+    return lean(_plain(name, law), *_FOREIGN)
+
+
+def _plain(name: str, law: type[CompiledLaw]) -> Callable[..., tuple[Any, ...]]:
+    """Return the loop for a law, left to Python."""
+    names = globals() | {"_step": law.function, "_is_wrench": law.output == "wrench"}
+    copy = types.FunctionType(_fly.__code__, names, f"_fly_{name}")
+    copy.__qualname__ = copy.__name__
+    return copy

@@ -1,0 +1,175 @@
+"""Flights side by side: several vehicles in the lanes of the machine's vectors, plant, law and arbiter in C.
+
+There is no FMU in the loop. The mathematics of the plant is compiled a second time from the FMU's own sources, so that
+each lane gets the numbers that the FMU would give.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from types import TracebackType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from controller import Allocation
+from controller.regions import pack
+from cosim.batch.lanes_library import lanes_library
+from cosim.batch.lanes_rows import Array, Rows, require_lanes
+from cosim.batch.outcome import Flown, Outcomes, nothing
+from cosim.batch.variation import Variation
+from cosim.results.summary import SETTLED_FOR
+from cosim.scenario.scenario import CRITERIA
+
+_REFUSAL = 512  # bytes of a message
+_MARKS = (
+    "first_inside", "last_entered", "inside", "least_clearance", "least_angle", "goal_clearance", "effort", "max_force",
+    "max_speed", "final_x", "final_y", "final_z", "phi1", "phi2", "phi3", "phi4", "stopped",
+)  # fmt: skip
+_SAME = ("effort", "max_force", "max_speed", *(f"final_{axis}" for axis in "xyz"), *(f"phi{i}" for i in range(1, 5)))
+
+
+class Batch(ctypes.Structure):
+    """Of csrc/lanes.h."""
+
+    _fields_ = (
+        *((name, ctypes.c_int) for name in (
+            "n_rows", "width", "n_reals", "n_integers", "n_regions", "n_numbers", "steps", "control_every",
+            "arbiter_every", "moving", "thrusters", "keep_direction",
+        )),
+        *((name, ctypes.c_double) for name in ("step", "period", "substep")),
+        *((name, ctypes.c_void_p) for name in (
+            "reals", "integers", "kinds", "signs", "offsets", "criteria", "hard", "inverse", "lower", "upper", "rows",
+            "marks", "refusals",
+        )),
+    )  # fmt: skip
+
+
+class LanesFlyer:
+    """Flies variations of a scenario, as many side by side as the machine has lanes.
+
+    Parameters
+    ----------
+    variation : Variation
+        What is flown: by the printed law and the closed arbiter, any shapes, by wrench or thrusters, without noise,
+        failures and commands.
+
+    Raises
+    ------
+    RunError
+        If the scenario, or a key that varies, is of what the lanes do not have; the fused loop has it.
+    BuildError
+        If there is no C compiler for the library.
+    """
+
+    def __init__(self, variation: Variation) -> None:
+        require_lanes(variation.base)
+        self.variation = variation
+        self._rows = Rows(variation)
+        library: Any = lanes_library(variation.base.vehicle)
+        self.lanes: int = library.lanes_count()
+        self._fly: Any = library.lanes_fly
+        self._fly.argtypes, self._fly.restype = [ctypes.POINTER(Batch)], ctypes.c_int
+        self._batch, self._kept = Batch(), dict[str, NDArray[Any]]()
+        self._describe()
+
+    def _describe(self) -> None:
+        """Fill in what is the same for all rows."""
+        base, rows, b = self.variation.base, self._rows, self._batch
+        packed, thrusters = pack(rows.regions), base.actuation.through == "thrusters"
+        b.width, b.n_reals, b.n_integers = rows.base.size, len(rows.reals), len(rows.integers)
+        b.n_regions, b.n_numbers = packed.kinds.size, packed.numbers.size
+        b.steps, b.control_every, b.arbiter_every = base.steps, base.control_every, base.arbiter_every
+        b.step, b.period, b.substep = base.time.step, base.time.control, base.plant.substep
+        criteria = [CRITERIA.index(secondary.criterion) for secondary in base.regions]
+        self._point("reals", rows.references(rows.reals))
+        self._point("integers", rows.references(rows.integers))
+        self._point("kinds", packed.kinds.astype(np.intc))
+        self._point("signs", packed.signs)
+        self._point("offsets", packed.offsets.astype(np.intc))
+        self._point("criteria", np.array([-1, *criteria], np.intc))
+        self._point("hard", packed.hard.astype(np.intc))
+        if thrusters:
+            v = base.vehicle
+            allocation = Allocation(v.thruster_matrix, v.thrust_min, v.thrust_max, base.actuation.limits).arguments
+            inverse, lower, upper, b.keep_direction = allocation
+            b.thrusters = v.n_thrusters
+            for name, numbers in (("inverse", inverse), ("lower", lower), ("upper", upper)):
+                self._point(name, np.ascontiguousarray(numbers, dtype=float))
+
+    def _point(self, name: str, numbers: NDArray[Any]) -> None:
+        """Let the batch point to an array, which stays."""
+        self._kept[name] = numbers
+        setattr(self._batch, name, numbers.ctypes.data)
+
+    def fly(self, values: Array, seeds: NDArray[np.int64]) -> Flown:
+        """Fly a batch.
+
+        Parameters
+        ----------
+        values : ndarray, shape (rows, keys)
+            Of the keys that vary, in their units.
+        seeds : ndarray of int, shape (rows,)
+            Of what is random, which is nothing here; checked all the same.
+
+        Returns
+        -------
+        Flown
+            What came of each row.
+        """
+        outcomes = nothing(len(seeds))
+        rows, refused = self._rows.fill(
+            np.asarray(values, dtype=float).reshape(len(seeds), len(self.variation.keys)), seeds
+        )
+        flown = np.array([at for at in range(len(seeds)) if at not in refused], np.intp)
+        marks, reasons = self._fly_rows(np.ascontiguousarray(rows[flown]))
+        good = np.array([not reason for reason in reasons], np.bool_)
+        refused |= {int(at): reason for at, reason in zip(flown, reasons, strict=True) if reason}
+        outcomes[flown[good]] = self._outcomes(marks[good])
+        return Flown(outcomes, dict(sorted(refused.items())))
+
+    def _fly_rows(self, rows: Array) -> tuple[Array, list[str]]:
+        """Return the marks of the rows, shape (rows, marks), and why the plant refused them, "" where it did not."""
+        n, b = len(rows), self._batch
+        n_regions = b.n_regions
+        b.n_rows, b.moving = n, bool(rows[:, rows.shape[1] - 3 * n_regions :].any())
+        marks, refusals = np.zeros((n, len(_MARKS))), np.zeros(n, f"S{_REFUSAL}")
+        self._point("rows", rows)
+        self._point("marks", marks)
+        self._point("refusals", refusals)
+        if not self._fly(ctypes.byref(b)):
+            raise MemoryError("no memory for the lanes")
+        return marks, [reason.decode("utf-8", "replace") for reason in refusals.tolist()]
+
+    def _outcomes(self, marks: Array) -> Outcomes:
+        """Return the outcomes that marks come to."""
+        step, steps = self._batch.step, self._batch.steps
+        told = dict(zip(_MARKS, marks.T, strict=True))
+
+        def when(at: Array) -> Array:
+            return np.where(at >= 0.0, at * step, np.nan)
+
+        out = nothing(len(marks))
+        inside, stopped = told["inside"] > 0.0, told["stopped"]
+        last = np.where(stopped >= 0.0, stopped, steps)
+        out["reached"], out["reach_time"] = told["first_inside"] >= 0.0, when(told["first_inside"])
+        out["settled"] = inside & ((last - told["last_entered"]) * step >= SETTLED_FOR)
+        out["settle_time"] = when(told["last_entered"])
+        out["violated"] = (told["least_clearance"] < 0.0) | (told["least_angle"] < 0.0)
+        out["min_clearance"], out["closest_to_goal"] = told["least_clearance"], -told["goal_clearance"]
+        out["stopped_at"] = when(stopped)
+        for name in _SAME:
+            out[name] = told[name]
+        return out
+
+    def close(self) -> None:
+        """Do nothing: a library stays loaded."""
+
+    def __enter__(self) -> LanesFlyer:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()

@@ -1,0 +1,156 @@
+"""The compiled library of one vehicle's lanes: plant, printed law and arbiter, for this very machine."""
+
+from __future__ import annotations
+
+import ctypes
+import functools
+import hashlib
+import logging
+import os
+import subprocess
+import tempfile
+from collections.abc import Sequence
+from dataclasses import replace
+from importlib import resources
+from pathlib import Path
+
+import platformdirs
+
+from cosim.io.atomic_file import write_whole
+from fuzzy_arbiter import Arbiter
+from fuzzy_arbiter.export import to_c
+from plant_fmu.compiling.compiler import FLAGS, compile_library, find_compiler
+from plant_fmu.compiling.platforms import native_platform
+from plant_fmu.compiling.sources import c_sources, header
+from plant_fmu.component import of_vehicle
+from plant_fmu.errors import BuildError
+from plant_fmu.vehicle import Vehicle
+
+log = logging.getLogger(__name__)
+
+_TOKEN = "lanes"  # noqa: S105 -- no secret: there is no description that the library could go with
+_NARROW = ("-Wno-psabi",)  # nothing but this library calls its functions with vectors
+_FMI = ("fmi3.c", "fmi3_unsupported.c")  # nor an importer
+
+# as many as one register holds, where that is at least four: with fewer, half the vectors take as long
+_WIDTH = """#ifdef __AVX512F__
+#define LANES 8
+#else
+#define LANES 4
+#endif
+"""
+_OF_PLANT = ("plant.c", "actuators.c", "environment.c")  # what a step of it needs
+
+
+@functools.cache
+def lanes_library(vehicle: Vehicle, flags: tuple[str, ...] = (), beside: Path | None = None) -> ctypes.CDLL:
+    """Return the library of a vehicle, compiled first where it is not in the cache.
+
+    Parameters
+    ----------
+    vehicle : Vehicle
+        The vehicle.
+    flags : tuple of str, optional
+        For the compiler, after its own: to measure what they change. Those that let it round otherwise, such as
+        ``-ffp-contract=fast``, give up the bits that lanes have in common with the FMU.
+    beside : Path, optional
+        One more C file for the lanes.
+
+    Returns
+    -------
+    CDLL
+        With the functions of ``csrc/lanes.h``.
+
+    Raises
+    ------
+    BuildError
+        If there is no C compiler, or it fails.
+    """
+    compiler = find_compiler()
+    flags = (*_NARROW, *_tuned(compiler), *flags)
+    files = _files(vehicle, beside)
+    made_from = hashlib.sha256(
+        repr((native_platform().name, compiler, FLAGS, flags, _machine(compiler, flags))).encode()
+    )
+    for name, text in sorted(files.items()):
+        made_from.update(f"\n{name} {len(text)}\n".encode() + text)
+    name = f"{vehicle.name}-{made_from.hexdigest()[:16]}{native_platform().suffix}"
+    path = Path(platformdirs.user_cache_dir("subreach")) / "lanes" / name
+    if _is_whole(path):
+        return ctypes.CDLL(str(path))
+    with tempfile.TemporaryDirectory(prefix="lanes-", ignore_cleanup_errors=True) as scratch:
+        folder = Path(scratch)
+        for file, text in files.items():
+            (folder / file).parent.mkdir(exist_ok=True)
+            (folder / file).write_bytes(text)
+        sources = [folder / file for file in sorted(files) if file.endswith(".c") and not file.startswith("many/")]
+        built = folder / name
+        compile_library(compiler, native_platform(), sources, [], built, flags)
+        return ctypes.CDLL(str(_kept(built, path)))
+
+
+def _is_whole(path: Path) -> bool:
+    """Return whether a library in the cache is what was written there: loading half of one can end the process."""
+    try:
+        return _checksum(path).read_text() == hashlib.sha256(path.read_bytes()).hexdigest()
+    except OSError:
+        return False
+
+
+def _checksum(path: Path) -> Path:
+    return path.with_name(f"{path.name}.sha256")
+
+
+def _kept(built: Path, path: Path) -> Path:
+    """Move a library to its place in the cache, whole or not at all; where there is no place, leave it where it is."""
+    library = built.read_bytes()
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        for place, data in ((path, library), (_checksum(path), hashlib.sha256(library).hexdigest().encode())):
+            write_whole(place, data)
+    except OSError as error:
+        log.warning("cache %s: %s; built for this process alone", path.parent, error.strerror or error)
+        return built
+    return path
+
+
+def _files(vehicle: Vehicle, beside: Path | None = None) -> dict[str, bytes]:
+    """Return the C files: of one vehicle in ``one/``, of several in ``many/``, and what compiles the latter."""
+    component = of_vehicle(vehicle)
+    sources, own = c_sources(component, 3), _own("cosim/batch/csrc")
+    for name in _FMI:
+        del sources[name]
+    one = {**sources, component.header: header(component, _TOKEN).encode(), "start.c": own["start.c"]}
+    one |= {"lanes.h": own["lanes.h"], "arbiter.c": to_c(Arbiter().system).encode()}
+    lanes = replace(component, name=f"{vehicle.name}_lanes")  # the names that its functions begin with
+    many = {name: text for name, text in sources.items() if name.endswith(".h") or name in _OF_PLANT}
+    many |= _own("controller/csrc") | {name: text for name, text in own.items() if name != "start.c"}
+    many |= {component.header: header(lanes, _TOKEN).encode(), "width.h": _WIDTH.encode()}
+    if beside is not None:
+        many[beside.name] = beside.read_bytes()
+    files = {f"one/{name}": text for name, text in one.items()} | {f"many/{name}": text for name, text in many.items()}
+    for name in (name for name in many if name.endswith(".c")):
+        files[f"many_{name}"] = f'#include "many/width.h"\n#include "many/{name}"\n'.encode()
+    return files
+
+
+def _own(folder: str) -> dict[str, bytes]:
+    package, _, inside = folder.partition("/")
+    found = resources.files(package).joinpath(inside)
+    return {file.name: file.read_bytes() for file in found.iterdir() if file.name.endswith((".c", ".h"))}
+
+
+def _tuned(compiler: Sequence[str]) -> tuple[str, ...]:
+    """Return the flags that let a compiler use all that this machine's processor can."""
+    return ("-mcpu=native",) if "ziglang" in compiler else ("-march=native",)
+
+
+def _machine(compiler: Sequence[str], flags: Sequence[str]) -> str:
+    """Return what the compiler says of itself and of the processor: code for another one might not run here."""
+    try:
+        said = subprocess.run(  # noqa: S603 -- the compiler that the user has, and flags of ours
+            [*compiler, *flags, "-dM", "-E", "-x", "c", os.devnull], capture_output=True, text=True, check=True
+        )
+    except (OSError, subprocess.CalledProcessError) as error:
+        raise BuildError(f"C compiler {compiler[0]}: {error}") from error
+    return said.stdout

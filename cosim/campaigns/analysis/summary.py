@@ -1,0 +1,101 @@
+"""What a campaign comes to: numbers from its rows alone."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cosim.campaigns.analysis.statistics import Facts, quantiles, rate
+from cosim.campaigns.analysis.worst_rows import worst_table
+from cosim.campaigns.scenes.kinds import scene_kinds
+from cosim.campaigns.scenes.plan import Plan
+from cosim.campaigns.store.results import Results
+from cosim.simulation.signals import Array
+
+SPREADS = ("reach_time", "min_clearance", "effort", "thrust_variation")  # whose quantiles are told
+OF_ALL = ("min_clearance",)  # of these over all scenes; of the others over those that were reached
+_REASONS = 5  # why scenes were refused
+MEDIANS = ("reach_time", "effort", "thrust_variation", "min_clearance", "worst_step_time")
+
+
+def summarise(plan: Plan, results: Results, folder: Path) -> dict[str, Any]:
+    """Return the summary of a campaign.
+
+    Parameters
+    ----------
+    plan : Plan
+        What was flown.
+    results : Results
+        What came of it.
+    folder : Path
+        Where it is, for the commands that repeat scenes.
+
+    Returns
+    -------
+    dict
+        Ready for JSON: counts; rates with 95 % intervals by Wilson; quantiles and medians over the scenes that were
+        reached (None where there are none), of the clearance over all; the same by kind of scene, where there are
+        several; the seeds that failed, the worst scenes, and the plan. Units as in the columns of the results.
+    """
+    reached, violation, seeds = results["reached"], results["violation"], results["seed"]
+    stopped = ~np.isnan(results.number("stopped_at"))
+    return {
+        "law": plan.law,
+        "scenes": len(results),
+        "reached": int(reached.sum()),
+        "violations": int(violation.sum()),
+        "stopped": int(stopped.sum()),
+        "refused": int((~results.absent("refused")).sum()),
+        "reasons": _reasons(results),
+        **_spread(results, np.ones(len(results), dtype=bool)),
+        "kinds": {
+            name: {"scenes": int(of.sum()), **_spread(results, of)} for name, of in scene_kinds(results).groups()
+        },
+        "medians": {name: median(results.number(name)[reached]) for name in MEDIANS},
+        "least_clearance": _or_none(np.min, results.number("min_clearance")),
+        "worst_step_time": _or_none(np.max, results.number("worst_step_time")),
+        "failed": {
+            "not_reached": seeds[~reached].tolist(),
+            "violated": seeds[violation].tolist(),
+            "stopped": seeds[stopped].tolist(),
+        },
+        "worst": worst_table(results, folder),
+        "tell_failures": plan.conditions.tell_failures,
+        **{key: value for key, value in plan.table().items() if key not in ("law", "scenes")},
+    }
+
+
+def rates_of(results: Results) -> dict[str, Facts]:
+    """Return the facts whose rates are told, shape (scenes,) each."""
+    reached, violation = results["reached"], results["violation"]
+    return {"completed": reached & ~violation, "reached": reached, "violation": violation}
+
+
+def _spread(results: Results, of: Facts) -> dict[str, Any]:
+    """Return rates and quantiles of some scenes."""
+    reached = results["reached"]
+    return {
+        "rates": {name: rate(happened[of]) for name, happened in rates_of(results).items()},
+        "quantiles": {
+            name: quantiles(results.number(name)[of if name in OF_ALL else of & reached]) for name in SPREADS
+        },
+    }
+
+
+def _reasons(results: Results) -> dict[str, str]:
+    """Return why the first scenes were refused, by their seed."""
+    first = np.flatnonzero(~results.absent("refused"))[:_REASONS]
+    return {str(seed): str(why) for seed, why in zip(results["seed"][first], results["refused"][first], strict=True)}
+
+
+def median(values: Array) -> float | None:
+    """Return the median of numbers, None of none, or where it is no finite number."""
+    return _or_none(np.median, values[~np.isnan(values)])
+
+
+def _or_none(of: Any, values: Array) -> float | None:
+    values = values[~np.isnan(values)]
+    result = float(of(values)) if values.size else np.nan
+    return result if np.isfinite(result) else None

@@ -1,0 +1,87 @@
+"""Which rows of a campaign most deserve a look."""
+
+from __future__ import annotations
+
+import shlex
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from cosim.campaigns.store.results import Results
+
+LISTED = 10  # rows that summaries and pages name
+ORDER = (
+    "First what violated a hard region, the deepest first (a flight that the plant stopped counts as one, as deep as "
+    "it had come), then what never reached the goal, then the rest, the slowest first."
+)
+
+
+class Worst(NamedTuple):
+    """A row, and why it is among the worst."""
+
+    key: int
+    why: str
+
+
+def worst_rows(results: Results, count: int = LISTED) -> list[Worst]:
+    """Return the worst rows of a sweep or of a campaign of scenes; those that were refused are left out.
+
+    Parameters
+    ----------
+    results : Results
+        Of the campaign.
+    count : int
+        How many at the most.
+
+    Returns
+    -------
+    list of Worst
+        In the order that `ORDER` tells; rows that are as bad in the order of their keys.
+    """
+    names = results.schema.names
+    keys, reached = results[names[0]], results.fact("reached")
+    stopped = results.number("stopped_at")
+    violated = results.fact("violation" if "violation" in names else "violated") | np.isfinite(stopped)
+    clearance, time = results.number("min_clearance"), results.number("reach_time")
+    depth = np.where(np.isfinite(clearance), np.maximum(-clearance, 0.0), 0.0)
+    far = results.number("closest_to_goal", 0.0) if "closest_to_goal" in names else np.zeros(len(keys))
+    group = np.where(violated, 0, np.where(reached, 2, 1))
+    badness = np.select([group == 0, group == 1], [depth, far], np.nan_to_num(time))
+    flown = np.flatnonzero(results.absent("refused"))
+    order = flown[np.lexsort((keys[flown], -badness[flown], group[flown]))][: max(count, 0)]
+    found = []
+    for i in order:
+        if np.isfinite(stopped[i]):
+            why = f"stopped at {stopped[i]:.2f} s"
+        elif violated[i]:
+            why = f"violated, {depth[i]:.3f} m deep" if depth[i] > 0.0 else "violated"
+        elif not reached[i]:
+            why = f"not reached, {far[i]:.2f} m short" if far[i] > 0.0 else "not reached"
+        else:
+            why = f"reached at {time[i]:.2f} s"
+        found.append(Worst(int(keys[i]), why))
+    return found
+
+
+def worst_table(results: Results, folder: Path) -> list[dict[str, Any]]:
+    """Return the worst rows as a summary has them, each with the command that repeats it.
+
+    Parameters
+    ----------
+    results : Results
+        Of the campaign.
+    folder : Path
+        Where it is.
+
+    Returns
+    -------
+    list of dict
+        ``row``, ``why`` and ``command``.
+    """
+    return [{"row": key, "why": why, "command": rerun_command(folder, key)} for key, why in worst_rows(results)]
+
+
+def rerun_command(folder: Path, key: int) -> str:
+    """Return the command that repeats a row."""
+    return f"cosim rerun {shlex.quote(str(folder))} {key}"

@@ -1,0 +1,259 @@
+"""Figures of campaigns: rates with their intervals, distributions, and how outcomes depend on what varies."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter, PercentFormatter
+
+from cosim.campaigns.analysis.statistics import Facts, bins, quantiles, rate
+from cosim.campaigns.pages.sections import LABELS
+from cosim.report.figures.style import BLACK, BLUE, CYCLE, GREEN, ORANGE, RED, Drawing, legend_columns
+from cosim.simulation.signals import Array
+
+WIDTH = 5.6  # in, of a figure: readable on a phone too
+_ACROSS = 2  # panels
+_MOST_KEYS = 8  # that are drawn
+_POINTS = 700  # of a panel
+_TICKS = 5  # intervals across a panel at the most: labels of five digits have room
+_WIDE = 30.0  # a logarithmic range over which only powers of ten have room
+_STEPS = 400  # of a drawn distribution
+_DASHES = ("-", "--", "-.", ":")
+
+FACT_COLOURS = {"completed": BLUE, "reached": GREEN, "settled": BLUE, "violation": RED, "violated": RED}
+_MARKS = {"completed": "D", "reached": "o", "settled": "D", "violation": "s", "violated": "s"}
+
+
+class Rated(NamedTuple):
+    """A line of a forest plot."""
+
+    fact: str
+    group: str  # "" where there is one alone
+    rows: int  # of the group
+    rate: dict[str, Any]
+
+
+class Key(NamedTuple):
+    """What rows differ in."""
+
+    label: str  # with unit
+    values: Array  # (n,)
+    log: bool = False  # drawn on a logarithmic scale
+
+
+def forest(lines: Sequence[Rated]) -> Figure:
+    """Return rates as marks with their 95 % intervals, one line each, under a heading for each fact.
+
+    Parameters
+    ----------
+    lines : sequence of Rated
+        Those of one fact side by side.
+
+    Returns
+    -------
+    Figure
+        Shares from 0 to 100 %.
+    """
+    heads = len({line.fact for line in lines if line.group})
+    figure = Figure(figsize=(WIDTH, 0.75 + 0.27 * (len(lines) + heads)), layout="constrained")
+    axes = figure.add_subplot()
+    y, ticks, labels, before = 0.0, [], [], None
+    for line in lines:
+        if line.group and line.fact != before:
+            ticks.append(y)
+            labels.append(f"$\\bf{{{line.fact}}}$")
+            y += 1.0
+        before = line.fact
+        ticks.append(y)
+        labels.append(f"{line.group or line.fact}  ({line.rate['rows']} of {line.rows})")
+        _interval(axes, line, y)
+        y += 1.0
+    axes.set(xlim=(-0.02, 1.02), ylim=(y - 0.4, -0.6), xlabel="share of all, 95 % interval by Wilson")
+    axes.set_yticks(ticks, labels)
+    axes.tick_params(axis="y", length=0)
+    axes.xaxis.set_major_formatter(PercentFormatter(1.0))
+    axes.grid(visible=False, axis="y")
+    return figure
+
+
+def _interval(axes: Axes, line: Rated, y: float) -> None:
+    share = line.rate["share"]
+    if share is None:
+        return
+    colour = FACT_COLOURS[line.fact]
+    axes.hlines(y, line.rate["low"], line.rate["high"], color=colour, linewidth=2.2)
+    axes.plot(share, y, _MARKS[line.fact], color=colour, markersize=6, clip_on=False)
+    text = f"{100 * share:.1f} %"
+    right = line.rate["high"] < 0.86
+    axes.annotate(
+        text, (line.rate["high"] if right else line.rate["low"], y), (7 if right else -7, 0),
+        textcoords="offset points", ha="left" if right else "right", va="center", fontsize=8,
+    )  # fmt: skip
+
+
+def distributions(columns: Mapping[str, Mapping[str, Array]], told: str) -> Iterator[Drawing]:
+    """Yield the share of all that is at most each value, a panel for each column, with a dot at the median.
+
+    Parameters
+    ----------
+    columns : mapping from str to mapping from str to ndarray, shape (n,)
+        By column, then by group; NaN where there is no number.
+    told : str
+        What the caption adds.
+
+    Yields
+    ------
+    Drawing
+        ``distributions``; nothing if there are no numbers. What never comes leaves a curve below 100 %.
+    """
+    there = {name: of for name, of in columns.items() if any(np.isfinite(values).any() for values in of.values())}
+    if not there:
+        return
+    figure, panels = _panels(len(there), 2.3)
+    for axes, (column, groups) in zip(panels, there.items(), strict=True):
+        for i, (name, values) in enumerate(groups.items()):
+            x, shares = _thinned(*shares_up_to(values))
+            colour, dash = CYCLE[i % len(CYCLE)], _DASHES[i % len(_DASHES)]
+            axes.step(x, shares, where="post", color=colour, linestyle=dash, label=name)
+            median = quantiles(values)["0.5"]
+            if median is not None:  # half of those that come are below it: of an odd number, on the middle one's riser
+                axes.plot(median, shares[-1] / 2.0, "o", color=colour, markersize=5)
+        if column == "min_clearance":
+            axes.axvline(0.0, color=BLACK, linewidth=0.8)
+        axes.set(xlabel=LABELS[column], ylim=(0.0, 1.02))
+        axes.xaxis.set_major_locator(MaxNLocator(_TICKS, steps=[1, 2, 5, 10]))
+        axes.yaxis.set_major_formatter(PercentFormatter(1.0))
+    if len(groups) > 1:
+        legend_above(figure, panels[0])
+    caption = (
+        "Share that comes to at most so much, with a dot at the median of what comes. Left of 0 a region is violated."
+    )
+    yield Drawing("distributions", f"{caption} {told}".rstrip(), figure)
+
+
+def shares_up_to(values: Array) -> tuple[Array, Array]:
+    """Return the empirical distribution of numbers.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n,)
+        NaN where there is none: such are counted, and never come.
+
+    Returns
+    -------
+    ndarray, ndarray
+        The finite ones in rising order, and the share of all that is at most each.
+    """
+    finite = np.sort(values[np.isfinite(values)])
+    return finite, np.arange(1, len(finite) + 1) / max(1, len(values))
+
+
+def binned_rates(keys: Sequence[Key], facts: Mapping[str, Facts]) -> Figure:
+    """Return how often each fact happens in each part of a key's range, with 95 % intervals by Wilson.
+
+    Parameters
+    ----------
+    keys : sequence of Key
+        The first ones are drawn.
+    facts : mapping from str to ndarray of bool, shape (n,)
+        By name, one of `FACT_COLOURS`.
+
+    Returns
+    -------
+    Figure
+        A panel for each key.
+    """
+    figure, panels = _panels(min(len(keys), _MOST_KEYS), 2.1)
+    for axes, key in zip(panels, keys, strict=False):
+        parts = list(bins(key.values))
+        for fact, happened in facts.items():
+            rates = [rate(happened[part.rows]) for part in parts]
+            shares, low, high = (np.array([r[name] for r in rates]) for name in ("share", "low", "high"))
+            axes.errorbar(
+                [part.middle for part in parts], shares, yerr=(shares - low, high - shares), label=fact,
+                color=FACT_COLOURS[fact], marker=_MARKS[fact], markersize=4, linewidth=1.0, elinewidth=1.6,
+            )  # fmt: skip
+        _across(axes, key)
+        axes.set(ylim=(-0.03, 1.03))
+        axes.yaxis.set_major_formatter(PercentFormatter(1.0))
+    legend_above(figure, panels[0])
+    return figure
+
+
+def scatter(keys: Sequence[Key], values: Array, label: str, reached: Facts, violated: Facts) -> Figure:
+    """Return a number of every row over each key, marked by how the row came out.
+
+    Parameters
+    ----------
+    keys : sequence of Key
+        The first ones are drawn.
+    values : ndarray, shape (n,)
+        What is drawn; rows without are left out.
+    label : str
+        Of the values, with unit.
+    reached, violated : ndarray of bool, shape (n,)
+        How the rows came out.
+
+    Returns
+    -------
+    Figure
+        A panel for each key, with as many rows as can be told apart.
+    """
+    some = np.flatnonzero(np.isfinite(values))
+    if len(some) > _POINTS:
+        some = some[np.unique(np.linspace(0, len(some) - 1, _POINTS).astype(int))]
+    figure, panels = _panels(min(len(keys), _MOST_KEYS), 2.1)
+    for axes, key in zip(panels, keys, strict=False):
+        for what, of, colour, mark in (
+            ("reached, nothing violated", reached & ~violated, GREEN, "o"),
+            ("not reached, nothing violated", ~reached & ~violated, ORANGE, "^"),
+            ("violated", violated, RED, "x"),
+        ):
+            if (at := some[of[some]]).size:
+                axes.plot(key.values[at], values[at], mark, color=colour, markersize=3.5, alpha=0.7, label=what)
+        axes.axhline(0.0, color=BLACK, linewidth=0.8)
+        _across(axes, key)
+        axes.set(ylabel=label)
+    legend_above(figure, panels[0])
+    return figure
+
+
+def _panels(count: int, height: float) -> tuple[Figure, list[Axes]]:
+    """Return a figure with so many panels."""
+    down = -(-count // _ACROSS)
+    figure = Figure(figsize=(WIDTH, 0.35 + height * down), layout="constrained")
+    axes = figure.subplots(down, min(count, _ACROSS), squeeze=False).ravel()
+    for unused in axes[count:]:
+        unused.set_visible(False)
+    return figure, list(axes[:count])
+
+
+def _across(axes: Axes, key: Key) -> None:
+    """Label the axis of a key: few ticks where it is logarithmic, no fractions where it is a whole number."""
+    axes.set(xlabel=key.label, xscale="log" if key.log else "linear")
+    if key.log:
+        wide = key.values.max() > _WIDE * key.values.min()
+        axes.xaxis.set_major_locator(LogLocator(subs=(1.0,) if wide else (1.0, 2.0, 5.0)))
+        axes.xaxis.set_major_formatter(FuncFormatter(lambda x, _: f"{x:g}"))
+        axes.xaxis.set_minor_formatter(NullFormatter())
+    else:
+        whole = np.array_equal(key.values, np.round(key.values))
+        axes.xaxis.set_major_locator(MaxNLocator(_TICKS, steps=[1, 2, 5, 10], integer=whole))
+
+
+def legend_above(figure: Figure, axes: Axes) -> None:
+    """Put the legend of one of its panels above a figure, in as many columns as there is room for."""
+    handles, labels = axes.get_legend_handles_labels()
+    columns = int(legend_columns(labels) * WIDTH / 6.4)  # as wide as figures of runs, of which it speaks
+    figure.legend(handles, labels, loc="outside upper center", ncols=max(1, min(columns, len(labels))))
+
+
+def _thinned(x: Array, shares: Array) -> tuple[Array, Array]:
+    if len(x) <= _STEPS:
+        return x, shares
+    some = np.unique(np.linspace(0, len(x) - 1, _STEPS).astype(int))
+    return x[some], shares[some]

@@ -1,0 +1,183 @@
+"""The pages of campaigns: one HTML file that opens without a network, its figures in it and as files beside it."""
+
+from __future__ import annotations
+
+import html
+import shutil
+import tempfile
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from string import Template
+from typing import TYPE_CHECKING, Any
+
+from cosim.report.report import FIGURES
+
+if TYPE_CHECKING:  # Matplotlib takes as long to import as all else together
+    from cosim.report.figures.style import Drawing
+
+_PAGE = Template("""<!DOCTYPE html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<meta name="color-scheme" content="light dark">
+<title>$title</title>
+<style>
+:root { --ink: #1a1a1a; --faint: #555; --paper: #fff; --line: #ccc; --block: #f5f5f5; --link: #0062a0; }
+@media (prefers-color-scheme: dark) {
+  :root { --ink: #e6e6e6; --faint: #aaa; --paper: #1a1a1a; --line: #444; --block: #262626; --link: #6cbcf0; }
+  figure svg { filter: invert(.9) hue-rotate(180deg); }
+}
+body { font: 16px/1.5 Georgia, serif; color: var(--ink); background: var(--paper); }
+body { max-width: 46rem; margin: 2rem auto; padding: 0 1rem; }
+h1 { font-size: 1.5rem; line-height: 1.2; } h2 { font-size: 1.15rem; margin-top: 2.2rem; }
+a { color: var(--link); } .faint { color: var(--faint); font-size: .9rem; }
+.verdict { border-left: 4px solid var(--link); padding: .2rem 0 .2rem 1rem; font-size: 1.08rem; }
+figure { margin: 1.4rem 0; } figure svg { width: 100%; height: auto; display: block; }
+figcaption { font-size: .9rem; color: var(--faint); }
+.wide { overflow-x: auto; } table { border-collapse: collapse; width: 100%; font-size: .88rem; margin: .8rem 0; }
+th, td { text-align: left; vertical-align: top; padding: .35rem .6rem; border-bottom: 1px solid var(--line); }
+thead th { border-bottom: 2px solid var(--ink); vertical-align: bottom; }
+tbody th { font-weight: normal; } td { font-variant-numeric: tabular-nums; }
+code, pre { font-size: .85em; background: var(--block); } code { padding: .1em .3em; overflow-wrap: anywhere; }
+pre { padding: .8rem; overflow-x: auto; }
+td code { white-space: nowrap; }
+</style>
+</head>
+<body>
+<h1>$title</h1>
+$body
+</body>
+</html>
+""")
+
+
+class Html(str):
+    """Text that is HTML already; all other text is escaped."""
+
+
+def code(text: str) -> Html:
+    """Return a piece of text as code."""
+    return Html(f"<code>{html.escape(text)}</code>")
+
+
+def link(where: str, text: str) -> Html:
+    """Return a link to a place relative to the page."""
+    return Html(f'<a href="{html.escape(where)}">{html.escape(text)}</a>')
+
+
+def wall(text: str) -> Html:
+    """Return what the wall clock says, which no repetition gives again."""
+    return Html(f'<span class="wall">{html.escape(text)}</span>')
+
+
+def number(x: float | None, digits: int = 4) -> str:
+    """Return a number as tables have it, a dash where there is none."""
+    if x is None:
+        return "–"
+    text = f"{x:.0f}" if 10**digits <= abs(x) < 1e9 else f"{x:.{digits}g}"
+    return text.replace("-", "−")
+
+
+def interval(rate: dict[str, Any]) -> str:
+    """Return a rate of `cosim.campaigns.analysis.statistics.rate` with its interval."""
+    if rate["share"] is None:
+        return "–"
+    return f"{100 * rate['share']:.1f} % ({100 * rate['low']:.1f} to {100 * rate['high']:.1f})"
+
+
+class Page:
+    """A page that is put together piece by piece.
+
+    Parameters
+    ----------
+    title : str
+        Of the page.
+    """
+
+    def __init__(self, title: str) -> None:
+        self._title = title
+        self._pieces: list[str] = []
+
+    def verdict(self, text: str) -> None:
+        """Add the sentence that says what came of it."""
+        self._pieces.append(f'<p class="verdict">{_escaped(text)}</p>')
+
+    def heading(self, text: str) -> None:
+        """Begin a section."""
+        self._pieces.append(f"<h2>{_escaped(text)}</h2>")
+
+    def paragraph(self, text: str, faint: bool = False) -> None:
+        """Add a paragraph."""
+        self._pieces.append(f'<p class="faint">{_escaped(text)}</p>' if faint else f"<p>{_escaped(text)}</p>")
+
+    def block(self, text: str) -> None:
+        """Add lines of code."""
+        self._pieces.append(f"<pre>{_escaped(text)}</pre>")
+
+    def table(self, head: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
+        """Add a table whose first column names the rows."""
+        body = "".join(
+            f'<tr><th scope="row">{_escaped(first)}</th>{"".join(f"<td>{_escaped(cell)}</td>" for cell in cells)}</tr>'
+            for first, *cells in rows
+        )
+        names = "".join(f'<th scope="col">{_escaped(name)}</th>' for name in head)
+        self._pieces.append(
+            f'<div class="wide"><table><thead><tr>{names}</tr></thead><tbody>{body}</tbody></table></div>'
+        )
+
+    def add(self, piece: Html) -> None:
+        """Add a piece of HTML, such as a figure."""
+        self._pieces.append(piece)
+
+    def html(self) -> str:
+        """Return the whole page."""
+        return _PAGE.substitute(title=html.escape(self._title), body="\n".join(self._pieces))
+
+
+def write_figures(folder: Path, drawings: Iterable[Drawing]) -> dict[str, Html]:
+    """Write figures as SVG and PNG below a folder, in the place of those that were there.
+
+    Parameters
+    ----------
+    folder : Path
+        Of the campaign.
+    drawings : iterable of Drawing
+        In their order.
+
+    Returns
+    -------
+    dict of str to Html
+        By name: the figure with its caption, for the page.
+
+    Raises
+    ------
+    OSError
+        If they cannot be written; what was there stays then.
+    """
+    import matplotlib as mpl
+
+    from cosim.report.figures.style import STYLE
+
+    scratch = Path(tempfile.mkdtemp(prefix=f".{FIGURES}-", dir=folder))
+    try:
+        with mpl.rc_context(STYLE):  # while they are made, and while they are written
+            shown = {drawing.name: _figure(drawing, scratch) for drawing in drawings}
+        scratch.chmod(0o755)
+        shutil.rmtree(folder / FIGURES, ignore_errors=True)
+        if shown:
+            scratch.replace(folder / FIGURES)
+    finally:
+        shutil.rmtree(scratch, ignore_errors=True)
+    return shown
+
+
+def _figure(drawing: Drawing, folder: Path) -> Html:
+    svg = drawing.write(folder)
+    caption = html.escape(drawing.caption)
+    inline = svg[svg.index("<svg") :].replace("<svg", f'<svg role="img" aria-label="{caption}"', 1)
+    return Html(f"<figure>{inline}<figcaption>{caption}</figcaption></figure>")
+
+
+def _escaped(text: str) -> str:
+    return text if isinstance(text, Html) else html.escape(text).replace(" %", "\N{NO-BREAK SPACE}%")

@@ -1,0 +1,120 @@
+"""Replays of the worst rows: flown once more step by step, each on a page of its own below the campaign's folder."""
+
+from __future__ import annotations
+
+import shutil
+import tempfile
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from cosim.campaigns.pages.page import Html, link
+from cosim.campaigns.reruns.repeat import Repeat, repeat_of
+from cosim.errors import CosimError, RunError
+from cosim.io.atomic_file import write_whole
+from cosim.io.strict_json import json_text, read_json
+from cosim.replay.page import REPLAY, write_page
+from cosim.replay.trace import trace_of
+from cosim.results.run_result import load_run
+from cosim.run.run import run_scenario
+from plant_fmu import PlantError
+
+WORST = "worst"  # folder of the replays
+_FLOWN = "flown.json"  # beside a replay: where flights came out otherwise
+
+
+@dataclass(frozen=True)
+class Replay:
+    """The replay of a row, or why there is none."""
+
+    page: str | None  # relative to the folder
+    remarks: tuple[str, ...]  # such as a flight that came out otherwise than its row
+
+    def cell(self) -> Html:
+        """Return it as a cell of a table."""
+        import html
+
+        shown = [link(self.page, "replay")] if self.page else []
+        return Html("; ".join([*shown, *map(html.escape, self.remarks)]))
+
+
+def replay_of(out: Path, key: int, folders: Sequence[Path], title: str) -> Replay:
+    """Fly a row of one or several campaigns again, unless that is done, and put the flights on one page.
+
+    Parameters
+    ----------
+    out : Path
+        Where the page goes, below ``worst``.
+    key : int
+        Of the row.
+    folders : sequence of Path
+        Of the campaigns, which have flown the same scene by several laws; or of a single one.
+    title : str
+        Of the page.
+
+    Returns
+    -------
+    Replay
+        With a page if any of the flights can be shown.
+
+    Raises
+    ------
+    RunError
+        If a folder cannot be read.
+    OSError
+        If the page cannot be written; nothing is left then.
+    KeyboardInterrupt
+        After Ctrl-C; nothing is left.
+    """
+    place = out / WORST / str(key)
+    if not (place / _FLOWN).exists():
+        place.parent.mkdir(exist_ok=True)
+        scratch = Path(tempfile.mkdtemp(prefix=f".{key}-", dir=place.parent))
+        try:
+            traces, remarks = [], []
+            for folder in folders:
+                name = f"{folder.name}: " if len(folders) > 1 else ""
+                trace, remark = _flown(repeat_of(folder, key), scratch / "run")
+                traces += [trace | ({"name": folder.name} if name else {})] if trace else []
+                remarks += [name + remark] if remark else []
+            if traces:
+                write_page(scratch / REPLAY, traces, title)
+            write_whole(scratch / _FLOWN, json_text({"remarks": remarks}))
+            scratch.chmod(0o755)
+            shutil.rmtree(place, ignore_errors=True)
+            scratch.replace(place)
+        finally:
+            shutil.rmtree(scratch, ignore_errors=True)
+    said = read_json(place / _FLOWN).get("remarks")
+    if not (isinstance(said, list) and all(isinstance(remark, str) for remark in said)):
+        raise RunError(f"{place / _FLOWN}: cannot be read: remarks are missing")
+    return Replay(f"{WORST}/{key}/{REPLAY}" if (place / REPLAY).exists() else None, tuple(said))
+
+
+def _flown(repeat: Repeat, folder: Path) -> tuple[dict[str, Any] | None, str]:
+    """Return what a page shows of a flight, and what is to be said of it."""
+    if repeat.scenario is None:
+        return None, f"was not flown: {repeat.stored['refused']}"
+    apart, remark = {}, ""
+    try:
+        try:
+            run_scenario(repeat.scenario, folder, report=False)
+        except PlantError as error:
+            remark = f"the plant stops: {error}"
+        run = load_run(folder)
+        if run.summary["status"] == "interrupted":
+            raise KeyboardInterrupt
+        if run.summary["status"] == "completed":
+            apart = repeat.apart(repeat.outcome(repeat.scenario, run.record, run.summary))
+        trace = trace_of(run).as_json()
+    except CosimError as error:
+        return None, f"cannot be shown: {remark or error}"
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+    told = ", ".join(f"{name} {_said(now)} in the place of {_said(before)}" for name, (before, now) in apart.items())
+    return trace, f"step by step it came out otherwise: {told}" if told else remark
+
+
+def _said(value: Any) -> str:
+    return f"{value:.4g}" if isinstance(value, float) else {None: "none", True: "yes", False: "no"}[value]

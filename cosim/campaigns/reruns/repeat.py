@@ -1,0 +1,193 @@
+"""A row of a campaign as what can be flown again: a batch of one, and the scenario that says the same."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from controller import ControllerError
+from controller.regions import of_attitude
+from cosim.campaigns.scenes.as_scenario import scene_scenario
+from cosim.campaigns.scenes.flyer import Conditions
+from cosim.campaigns.scenes.law_gains import law_named
+from cosim.campaigns.scenes.rows import SCHEMA
+from cosim.campaigns.scenes.scene import decode_scene
+from cosim.campaigns.scenes.work import SceneTask
+from cosim.campaigns.store.folder import PLAN, RESULTS, read_plan
+from cosim.campaigns.store.plan import SCENES, SWEEP, difference
+from cosim.campaigns.store.results import Results
+from cosim.campaigns.sweeps.design import design_of
+from cosim.campaigns.sweeps.rows import SweepWork, schema_of
+from cosim.campaigns.workers.dispatch import KILLED
+from cosim.campaigns.workers.work import Task
+from cosim.errors import CosimError, RunError
+from cosim.io.strict_json import understood
+from cosim.results.record import Record
+from cosim.results.run_result import SCENARIO
+from cosim.results.spans import spans
+from cosim.scenario.scenario import VEHICLE_COPY, Scenario, load_scenario
+from plant_fmu import PlantFmuError
+
+Outcome = dict[str, Any]  # some columns of a row
+_ROUNDING = 1e-6  # of a number, relative and absolute, that two flights of one scenario may differ by
+
+
+@dataclass(frozen=True)
+class Repeat:
+    """What flies a row again."""
+
+    stored: dict[str, Any]  # the row
+    task: Task
+    batch: Any  # of that row alone
+    scenario: Scenario | None  # that says the same; None where the row was refused
+    outcome: Callable[[Scenario, Record, dict[str, Any]], Outcome]  # of a recorded run, as the row tells it
+
+    def apart(self, came: Outcome) -> dict[str, tuple[Any, Any]]:
+        """Return by column what the row has and what came of the master's flight, where that is more than rounding."""
+        assert self.scenario is not None
+        step = 1.5 * self.scenario.time.step
+        return {
+            name: (self.stored[name], now)
+            for name, now in came.items()
+            if not _close(self.stored[name], now, step if name.endswith("_time") else _ROUNDING)
+        }
+
+
+def repeat_of(folder: Path, key: int) -> Repeat:
+    """Return how a row is flown again.
+
+    Parameters
+    ----------
+    folder : Path
+        Of a campaign.
+    key : int
+        Number of the row in a sweep, seed of the scene in a campaign of scenes.
+
+    Returns
+    -------
+    Repeat
+        Of that row.
+
+    Raises
+    ------
+    RunError
+        If the folder holds no campaign that is complete, there is no such row, it kills whoever flies it, or something
+        stands against its scenario.
+    """
+    plan = read_plan(folder)
+    if plan.get("kind") not in (SCENES, SWEEP):
+        raise RunError(f"{folder}: holds a campaign of another version, expected one of this")
+    with understood(folder / PLAN):
+        schema = SCHEMA if plan["kind"] == SCENES else schema_of(tuple(plan["vary"].keys()))
+    results = complete_results(folder, schema)
+    stored = results.row(key)
+    if stored is None:
+        keys = results[schema.names[0]]
+        known = f"one from {keys[0]} to {keys[-1]}" if len(keys) else "a campaign that has rows"
+        raise RunError(f"{folder}: has no row {key}, expected {known}")
+    if stored["refused"] == KILLED:
+        raise RunError(f"{folder}: row {key} is not flown again: {KILLED}")
+    try:
+        with understood(folder / PLAN):
+            return (_of_sweep if plan["kind"] == SWEEP else _of_scene)(folder, plan, stored)
+    except (CosimError, PlantFmuError, ControllerError) as error:
+        if str(folder) in str(error):
+            raise
+        raise RunError(f"{folder}: row {key}: {error}") from error
+
+
+def complete_results(folder: Path, schema: Any) -> Results:
+    """Return the rows of a campaign.
+
+    Parameters
+    ----------
+    folder : Path
+        Of the campaign.
+    schema : pyarrow.Schema
+        That they are to have.
+
+    Returns
+    -------
+    Results
+        All rows.
+
+    Raises
+    ------
+    RunError
+        If it is not complete, or they cannot be read.
+    """
+    require_complete(folder)
+    return Results(folder / RESULTS, schema)
+
+
+def require_complete(folder: Path) -> None:
+    """Raise `RunError` if a folder holds no campaign that is complete."""
+    if not (folder / RESULTS).exists():
+        raise RunError(f"{folder}: is not complete, expected a campaign that is; its own command goes on with it")
+
+
+def _of_sweep(folder: Path, plan: dict[str, Any], stored: dict[str, Any]) -> Repeat:
+    work = SweepWork(load_scenario(folder / SCENARIO), design_of(plan), plan["engine"])
+    if differing := difference(
+        {"scenario": plan["scenario"]}, {"scenario": json.loads(json.dumps(work.plan["scenario"]))}
+    ):
+        raise RunError(f"{folder / SCENARIO}: is not that of the campaign ({differing})")
+    if plan["vehicle_sha256"] != work.plan["vehicle_sha256"]:
+        raise RunError(f"{folder / VEHICLE_COPY}: is not that of the campaign")
+    row = stored["row"]
+    batch = work.batch(np.array([row]))
+    scenario = None
+    if stored["refused"] is None:
+        scenario = work.variation.scenario(batch.values[0].tolist(), int(batch.seeds[0]))
+        scenario = dataclasses.replace(scenario, name=f"{plan['name']}-row-{row}")
+    return Repeat(stored, work.task, batch, scenario, _row_outcome)
+
+
+def _of_scene(folder: Path, plan: dict[str, Any], stored: dict[str, Any]) -> Repeat:
+    gains, conditions = law_named(plan["law"]).gains_type(**plan["gains"]), Conditions(**plan["conditions"])
+    line = stored["scene"].encode()
+    scenario = None
+    if stored["refused"] is None:
+        scenario = scene_scenario(decode_scene(line), plan["law"], gains, conditions)
+
+    def outcome(scenario: Scenario, record: Record, summary: dict[str, Any]) -> Outcome:
+        return _scene_outcome(record, summary, conditions)
+
+    return Repeat(stored, SceneTask(plan["law"], gains, conditions), [line], scenario, outcome)
+
+
+def _row_outcome(scenario: Scenario, record: Record, summary: dict[str, Any]) -> Outcome:
+    """Return what a recorded run comes to, as a row of a sweep tells it."""
+    hard = [r.region.name for r in scenario.regions if r.region.hard and not of_attitude(r.region.shape)]
+    same = ("reached", "reach_time", "settled", "closest_to_goal", "effort", "max_force", "max_speed")
+    return {name: summary[name] for name in same} | {
+        "violated": bool(summary["hard_violated"]),
+        "min_clearance": min((summary["min_clearance"][name] for name in hard), default=math.inf),
+    }
+
+
+def _scene_outcome(record: Record, summary: dict[str, Any], conditions: Conditions) -> Outcome:
+    """Return the same, as a row of a campaign of scenes tells it."""
+    time, inside = record["time"], record["goal.clearance"] >= 0.0
+    entered = spans(inside, time)[-1][0] if inside[-1] else math.inf
+    reached = bool(time[-1] - entered >= conditions.settled - 0.5 * conditions.plant_step)
+    clearance = min(summary["min_clearance"].values())
+    return {
+        "reached": reached,
+        "violation": clearance < 0.0,
+        "min_clearance": clearance,
+        "reach_time": entered if reached else None,
+    }
+
+
+def _close(one: Any, other: Any, tolerance: float) -> bool:
+    if isinstance(one, float) and isinstance(other, float):
+        return math.isclose(one, other, rel_tol=_ROUNDING, abs_tol=tolerance)
+    return bool(one == other)

@@ -1,0 +1,98 @@
+"""A scored scene as a scenario: what campaigns fly in a compiled loop, the readable master flies with full record."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import Any
+
+from controller.regions import SHAPES
+from cosim.campaigns.scenes.flyer import VEHICLE, Conditions
+from cosim.campaigns.scenes.scene import Scene, plant_values, scene_regions
+from cosim.scenario.scenario import Scenario, checked_scenario
+from plant_fmu.vehicle import load_vehicle
+
+_OF_THE_SCENARIO = ("substep", "current", "position")  # values of the plant that have keys of their own
+
+
+def scene_scenario(scene: Scene, law: str, gains: Any, conditions: Conditions) -> Scenario:
+    """Return the scenario that says what a scene says, flown as scenes are.
+
+    Parameters
+    ----------
+    scene : Scene
+        Any.
+    law : str
+        One of those in `controller.LAWS`.
+    gains : NamedTuple
+        Of the law.
+    conditions : Conditions
+        How the scene is flown.
+
+    Returns
+    -------
+    Scenario
+        Its flight is that of `SceneFlyer`, to rounding.
+
+    Raises
+    ------
+    ScenarioError
+        If the vehicle cannot be as the scene has it.
+    PlantFmuError, ControllerError
+        If the law cannot work with the gains, or there is no such vehicle.
+    """
+    vehicle = load_vehicle(VEHICLE)
+    values = plant_values(scene, vehicle, conditions.plant_step)
+    table = {
+        "title": f"Scene {scene.seed}",
+        "vehicle": VEHICLE,
+        "time": {
+            "duration": conditions.controls * conditions.control,
+            "step": conditions.plant_step,
+            "control": conditions.control,
+            "arbiter": conditions.control,
+        },
+        "plant": {
+            "current": scene.current,
+            "substep": conditions.plant_step,
+            "parameters": {k: float(v) for k, v in values.items() if k.partition(".")[0] not in _OF_THE_SCENARIO},
+        },
+        "initial": {"position": scene.start},
+        "goal": {"type": "sphere", **dataclasses.asdict(scene.goal)},
+        "law": {"name": law, "gains": gains._asdict()},
+        "arbiter": {"ramp": conditions.ramp},
+        "actuation": {"through": "thrusters"},
+        "sensing": {
+            "seed": scene.seed,
+            "position_noise": scene.noise.position,
+            "velocity_noise": scene.noise.velocity,
+        },
+        "failures": _failures(scene, conditions),
+        "tell_failures": conditions.tell_failures,
+        "regions": _regions(scene),
+    }
+    return checked_scenario(table, f"{law}-scene-{scene.seed}", vehicle)
+
+
+def _failures(scene: Scene, conditions: Conditions) -> list[dict[str, float]]:
+    """Return the failed thruster, from the control step on at which a scene has it fail."""
+    if scene.failed_thruster is None:
+        return []
+    step = math.ceil(min(scene.failed_thruster.time, conditions.duration) / conditions.control)
+    return [{"thruster": scene.failed_thruster.index, "time": step * conditions.control}]
+
+
+def _regions(scene: Scene) -> list[dict[str, Any]]:
+    """Return the regions that the law is told of, as a scenario's file has them."""
+    kinds = {shape: name for name, shape in SHAPES.items()}
+    return [
+        {
+            "name": region.name,
+            "criterion": criterion,
+            "keep": region.keep,
+            "gain": region.gain,
+            "velocity": region.velocity,
+            "shape": {"type": kinds[type(region.shape)], **dataclasses.asdict(region.shape)},  # type: ignore[call-overload]
+        }
+        for region, criterion in scene_regions(scene)
+    ]

@@ -1,0 +1,198 @@
+"""A scored scene, flown by a law, with the plant's FMU loaded once for many."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from types import TracebackType
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from controller import LAWS
+from cosim.batch.c_calls import Clock
+from cosim.batch.fused_loop import OUTPUTS, Allocator, Marks, Setup, flight_of, room_for
+from cosim.campaigns.scenes.scene import Scene, Told, plant_values, told
+from cosim.errors import RunError
+from cosim.scenario.vehicle_model import vehicle_model
+from plant_fmu import Plant
+from plant_fmu.vehicle import load_vehicle
+
+VEHICLE = "odin"
+LEVEL = (1.0, 0.0, 0.0, 0.0)
+_ROUNDING = 1e-9  # of a count of steps
+
+
+@dataclass(frozen=True)
+class Conditions:
+    """How scenes are flown; the defaults are those of the score."""
+
+    duration: float = 120.0  # s
+    control: float = 0.02  # s
+    plant_steps: int = 2  # plant steps a control step, each one integration step
+    settled: float = 10.0  # s at the end inside the goal region
+    ramp: float = 0.2  # m, width of the arbiter's memberships
+    tell_failures: bool = False
+
+    def __post_init__(self) -> None:
+        for key in ("duration", "control"):
+            if not 0.0 < getattr(self, key) < math.inf:
+                raise RunError(f"{key} is {getattr(self, key)} s, expected a finite number above 0")
+        if self.plant_steps < 1 or self.controls < 1:
+            raise RunError(f"{self.controls} control steps of {self.plant_steps} plant steps, expected 1 or more")
+
+    @property
+    def controls(self) -> int:
+        """How many control steps a flight has."""
+        return round(self.duration / self.control)
+
+    @property
+    def plant_step(self) -> float:
+        """Length of a plant step [s]."""
+        return self.control / self.plant_steps
+
+
+class Score(NamedTuple):
+    """What the flight of a scene came to."""
+
+    reached: bool  # inside the goal region for the last `Conditions.settled` seconds
+    reach_time: float  # s, since when it was inside without a break; inf if it is outside at the end
+    min_clearance: float  # m, least over all regions, the start and all plant steps; negative: violated
+    effort: float  # N s, sum over thrusters of the integral of the given force's magnitude
+    thrust_variation: float  # N, sum over thrusters of the changes of the commanded force, from 0 on
+    worst_step: float  # s of the wall clock, the longest that law and allocation took
+    failed_step: int  # plant step that the FMU refused, -1 for none
+
+
+class SceneFlyer:
+    """One law and one plant, for scene after scene.
+
+    Parameters
+    ----------
+    law : str
+        One of those in `controller.LAWS`.
+    conditions : Conditions
+        The same for all scenes.
+    gains : NamedTuple, optional
+        Of the law; default: its own defaults.
+
+    Raises
+    ------
+    RunError
+        If there is no such law.
+    LawError
+        If it cannot work with the gains.
+    BuildError, PlantError
+        If there is no FMU of the vehicle.
+    """
+
+    def __init__(self, law: str, conditions: Conditions | None = None, gains: Any = None) -> None:
+        if law not in LAWS:
+            raise RunError(f"law is {law!r}, expected one of {', '.join(sorted(LAWS))}")
+        self.law = law
+        self.conditions = conditions or Conditions()
+        self.gains = LAWS[law].gains_type() if gains is None else gains
+        self._vehicle = load_vehicle(VEHICLE)
+        self._model = vehicle_model(self._vehicle)
+        self._law(0)  # says now what it cannot work with
+        self._clock = Clock()
+        self._flight = flight_of(law)
+        self._plant = Plant(self._vehicle)
+
+    def fly(self, scene: Scene, trace: bool = False) -> tuple[Score, NDArray[np.float64]]:
+        """Fly one scene.
+
+        Parameters
+        ----------
+        scene : Scene
+            Any.
+        trace : bool
+            Whether to keep what happened, see `cosim.batch.fused_loop`.
+
+        Returns
+        -------
+        Score, ndarray
+            What it came to, and the trace, shape (0, 0) if none is kept.
+
+        Raises
+        ------
+        ScenarioError, PlantError
+            If the plant cannot be as the scene has it. The flyer can go on with another scene.
+        """
+        c, m = self.conditions, self._vehicle.n_thrusters
+        plant, known = self._plant, told(scene)
+        law = self._law(known.regions.kinds.size)
+        plant.reset()
+        plant.set(plant_values(scene, self._vehicle, c.plant_step))
+        plant.initialise()
+        thrusts = [f"thrust[{i + 1}]" for i in range(m)]
+        forces = [f"thruster_force[{i + 1}]" for i in range(m)]
+        native = plant.native(thrusts, (*OUTPUTS, *forces, *(f"actuation.{axis}" for axis in "XYZ")))
+        effectiveness = plant.native([f"thrust_effectiveness[{i + 1}]" for i in range(m)], ())
+        effectiveness.inputs[:] = 1.0
+        setup = self._setup(scene, known)
+        rows = np.zeros((c.controls, 20 + m + law.report.size) if trace else (0, 0))
+        room, estimate, allocator = room_for(known.regions.kinds.size, m, m), np.zeros(4), self._allocator()
+        marks = self._flight(setup, native, effectiveness, allocator, law.gains, law.memory, room, estimate, rows)
+        return self._score(marks, setup), rows
+
+    def _score(self, marks: Marks, setup: Setup) -> Score:
+        inside, since = marks.inside and marks.failed_step < 0, marks.last_entered
+        return Score(
+            reached=inside and setup.steps - since >= math.ceil(self.conditions.settled / setup.step - _ROUNDING),
+            reach_time=since * setup.step if inside else math.inf,
+            min_clearance=marks.least_clearance,
+            effort=marks.thrust_effort,
+            thrust_variation=marks.thrust_variation,
+            worst_step=marks.worst_step,
+            failed_step=int(marks.failed_step),
+        )
+
+    def _law(self, n_regions: int) -> Any:
+        return LAWS[self.law].for_vehicle(self._model, self.gains, np.array(LEVEL), self.conditions.control, n_regions)
+
+    def _setup(self, scene: Scene, known: Told) -> Setup:
+        c, failure = self.conditions, scene.failed_thruster
+        noise = np.random.default_rng([scene.seed, 1]).standard_normal((c.controls, 6))
+        noise[:, :3] *= scene.noise.position
+        noise[:, 3:] *= scene.noise.velocity
+        fails_at = math.ceil(min(failure.time, c.duration) / c.control) * c.plant_steps if failure else 0
+        return Setup(
+            goal=known.goal,
+            regions=known.regions,
+            criteria=known.criteria,
+            ramp=c.ramp,
+            step=c.plant_step,
+            steps=c.controls * c.plant_steps,
+            control_every=c.plant_steps,
+            arbiter_every=c.plant_steps,
+            moving=any(any(obstacle.velocity) for obstacle in scene.obstacles),
+            exact=not (scene.noise.position or scene.noise.velocity),
+            noise=noise,
+            dead_from=math.inf,
+            dead_until=math.inf,
+            frozen=False,
+            failed=np.array([failure.index - 1] if failure else [], np.int64),
+            failure_steps=np.array([fails_at] if failure else [], np.int64),
+            tell=c.tell_failures,
+            thrusters=self._vehicle.n_thrusters,
+            clock=self._clock.numbers,
+        )
+
+    def _allocator(self) -> Allocator:
+        v = self._vehicle
+        inverse = np.ascontiguousarray(np.linalg.pinv(v.thruster_matrix))
+        return Allocator(inverse[None], v.thrust_min[None], v.thrust_max[None], True)
+
+    def close(self) -> None:
+        """Free the plant. May be called twice."""
+        self._plant.close()
+
+    def __enter__(self) -> SceneFlyer:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()

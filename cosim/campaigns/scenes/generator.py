@@ -1,0 +1,89 @@
+"""Random scenes to fly by campaigns, the same for everyone who uses the same seed.
+
+A scene is a start, a spherical goal region, spheres across the straight way to it, a depth band, a steady current,
+and restoring forces that no law is told. A hard one has more obstacles, the first of which drifts, a stronger
+current, noise, and a thruster that fails. `cosim.campaigns.scenes.scene` says what is done with each number.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+KINDS = ("plain", "hard")
+
+_GOAL_RADIUS = 0.5  # m
+_FREE = 0.6  # m, from an obstacle to the start and to the goal region, at least
+
+
+def generate_scenes(count: int, seed: int = 0, kind: str = "plain") -> Iterator[str]:
+    """Generate scenes, one for each seed from the first on.
+
+    Parameters
+    ----------
+    count : int
+        How many.
+    seed : int
+        Of the first, 0 or above.
+    kind : {"plain", "hard"}
+        Of all of them.
+
+    Yields
+    ------
+    str
+        A line of JSON, as `cosim.campaigns.scenes.scene.read_scenes` reads it.
+    """
+    for one in range(seed, seed + count):
+        yield json.dumps(make_scene(one, kind))
+
+
+def make_scene(seed: int, kind: str = "plain") -> dict[str, Any]:
+    """Make the scene of a seed.
+
+    Parameters
+    ----------
+    seed : int
+        0 or above.
+    kind : {"plain", "hard"}
+        A hard one has drift, noise and a failing thruster.
+
+    Returns
+    -------
+    dict
+        As JSON has it; SI units, NED.
+    """
+    hard = kind == "hard"
+    rng = np.random.default_rng([20261121, seed, int(hard)])
+    start = np.array([0.0, 0.0, rng.uniform(1.5, 4.0)])
+    goal = np.array([rng.uniform(8.0, 12.0), rng.uniform(-3.0, 3.0), rng.uniform(1.5, 4.5)])
+    n_obstacles = int(rng.integers(6, 15) if hard else rng.integers(1, 7))
+    obstacles = [_make_obstacle(rng, start, goal) for _ in range(n_obstacles)]
+    heading, speed = rng.uniform(-np.pi, np.pi), rng.uniform(0.0, 0.4 if hard else 0.25)
+    if hard:
+        obstacles[0]["velocity"] = rng.uniform([-0.08, -0.1, 0.0], [0.0, 0.1, 0.0]).tolist()
+    return {
+        "seed": seed,
+        "start": start.tolist(),
+        "goal": {"centre": goal.tolist(), "radius": _GOAL_RADIUS},
+        "obstacles": obstacles,
+        "depth_band": [0.3, 7.0],
+        "current": [float(speed * np.cos(heading)), float(speed * np.sin(heading)), 0.0],
+        "weight_minus_buoyancy": rng.uniform(-15.0, 15.0),
+        "righting_moment": rng.uniform(10.0, 62.0),
+        "noise": {"position": 0.02, "velocity": 0.01} if hard else {"position": 0.0, "velocity": 0.0},
+        "failed_thruster": {"index": int(rng.integers(1, 9)), "time": rng.uniform(5.0, 30.0)} if hard else None,
+    }
+
+
+def _make_obstacle(rng: np.random.Generator, start: NDArray[np.float64], goal: NDArray[np.float64]) -> dict[str, Any]:
+    while True:
+        radius = rng.uniform(0.3, 0.9)
+        centre = start + rng.uniform(0.2, 0.8) * (goal - start) + rng.normal(0.0, [0.3, 0.6, 0.5])
+        clear_start = np.linalg.norm(centre - start) - radius
+        clear_goal = np.linalg.norm(centre - goal) - radius - _GOAL_RADIUS
+        if min(clear_start, clear_goal) > _FREE:
+            return {"centre": centre.tolist(), "radius": radius, "velocity": [0.0, 0.0, 0.0]}

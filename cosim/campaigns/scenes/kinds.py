@@ -1,0 +1,92 @@
+"""What scenes are like: their kind, and numbers that outcomes may depend on."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cosim.campaigns.scenes.scene import Scene, decode_scene
+from cosim.campaigns.store.results import Results
+from cosim.errors import RunError, ScenarioError
+from cosim.simulation.signals import Array
+
+PLAIN = "plain"
+
+FEATURES = {  # of each number of a scene: its unit
+    "obstacles": "",
+    "current": "m/s",
+    "weight less buoyancy": "N",
+    "righting moment": "N m",
+    "way to the goal": "m",
+}
+
+
+@dataclass(frozen=True)
+class SceneKinds:
+    """What each scene of a campaign is like."""
+
+    kinds: NDArray[np.str_]  # (scenes,) such as "drift, noise, failure"
+    features: dict[str, Array]  # (scenes,) each, by the keys of FEATURES
+
+    def groups(self) -> Iterator[tuple[str, NDArray[np.bool_]]]:
+        """Yield each kind that there is, and which scenes are of it; nothing where all are of one."""
+        names = sorted(set(self.kinds.tolist()), key=lambda name: (name != PLAIN, name))
+        if len(names) > 1:
+            for name in names:
+                yield name, self.kinds == name
+
+
+def scene_kinds(results: Results) -> SceneKinds:
+    """Return what the scenes of a campaign are like.
+
+    Parameters
+    ----------
+    results : Results
+        Whose column ``scene`` has them; they are read some at a time.
+
+    Returns
+    -------
+    SceneKinds
+        In the order of the rows.
+
+    Raises
+    ------
+    RunError
+        If they cannot be read, or a line is no scene.
+    """
+    kinds: list[str] = []
+    numbers: list[tuple[float, ...]] = []
+    for lines in results.pieces("scene"):
+        for line in lines:
+            try:
+                scene = decode_scene(line.encode())
+            except ScenarioError as error:
+                raise RunError(f"{results.path}: scene: {error}") from error
+            kinds.append(kind_of(scene))
+            numbers.append(_numbers(scene))
+    columns = np.array(numbers, dtype=float).reshape(-1, len(FEATURES)).T
+    return SceneKinds(np.array(kinds, dtype=str), dict(zip(FEATURES, columns, strict=True)))
+
+
+def kind_of(scene: Scene) -> str:
+    """Return in words what makes a scene hard beyond its regions: drift of obstacles, noise, a thruster that fails."""
+    present = {
+        "drift": any(any(obstacle.velocity) for obstacle in scene.obstacles),
+        "noise": bool(scene.noise.position or scene.noise.velocity),
+        "failure": scene.failed_thruster is not None,
+    }
+    return ", ".join(name for name, there in present.items() if there) or PLAIN
+
+
+def _numbers(scene: Scene) -> tuple[float, ...]:
+    return (
+        len(scene.obstacles),
+        math.hypot(*scene.current),
+        scene.weight_minus_buoyancy,
+        scene.righting_moment,
+        math.dist(scene.start, scene.goal.centre),
+    )

@@ -1,0 +1,97 @@
+"""The scenes of a campaign, checked once and kept on disk, so that a hundred thousand need no memory."""
+
+from __future__ import annotations
+
+import hashlib
+import sys
+import tempfile
+from collections.abc import Iterable
+from pathlib import Path
+from types import TracebackType
+
+import msgspec
+
+from cosim.campaigns.scenes.scene import scenes_in
+from cosim.errors import ScenarioError
+
+STANDARD_INPUT = Path("-")
+
+
+class SceneStore:
+    """Checked scenes in a temporary file, found by seed.
+
+    Parameters
+    ----------
+    path : Path
+        A file of one JSON object a line; ``-`` for standard input.
+
+    Attributes
+    ----------
+    seeds : list of int
+        In rising order.
+    digest : str
+        SHA-256 over the scenes in their order, whatever blanks the file has.
+
+    Raises
+    ------
+    ScenarioError
+        If the file cannot be read, holds no scene, a line is none, or a seed comes twice.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._file = tempfile.TemporaryFile()  # noqa: SIM115 -- closed by close
+        try:
+            if path == STANDARD_INPUT:
+                if sys.stdin is None:
+                    raise ScenarioError("standard input: is closed")
+                self._read(sys.stdin.buffer, "standard input")
+            else:
+                with path.open("rb") as lines:
+                    self._read(lines, str(path))
+        except OSError as error:
+            self.close()
+            raise ScenarioError(f"{path}: {error.strerror or error}") from error
+        except BaseException:
+            self.close()
+            raise
+
+    def _read(self, lines: Iterable[bytes], name: str) -> None:
+        self._places: dict[int, tuple[int, int]] = {}  # by seed: offset and length
+        digest, offset = hashlib.sha256(), 0
+        for scene in scenes_in(lines, name):
+            if scene.seed in self._places:
+                raise ScenarioError(f"{name}: seed {scene.seed} comes twice, expected each once")
+            line = msgspec.json.encode(scene) + b"\n"
+            self._file.write(line)
+            digest.update(line)
+            self._places[scene.seed] = offset, len(line)
+            offset += len(line)
+        if not self._places:
+            raise ScenarioError(f"{name}: holds no scene, expected one JSON object a line")
+        self._file.flush()
+        self.digest = digest.hexdigest()
+        self.seeds = sorted(self._places)
+
+    def lines(self, seeds: Iterable[int]) -> list[bytes]:
+        """Return the lines of some scenes, in the order of the seeds."""
+        found = []
+        for seed in seeds:
+            offset, length = self._places[seed]
+            self._file.seek(offset)
+            found.append(self._file.read(length))
+        return found
+
+    def __len__(self) -> int:
+        return len(self.seeds)
+
+    def close(self) -> None:
+        """Remove the temporary file. May be called twice."""
+        self._file.close()
+
+    def __enter__(self) -> SceneStore:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()

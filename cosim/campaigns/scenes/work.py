@@ -1,0 +1,105 @@
+"""Scenes as the work of a campaign: a row a scene, in order of seed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from cosim.campaigns.scenes.flyer import Conditions, SceneFlyer
+from cosim.campaigns.scenes.plan import Plan, plan_of
+from cosim.campaigns.scenes.rows import SCHEMA, refused_row, row_of, table_of
+from cosim.campaigns.scenes.scene import decode_scene
+from cosim.campaigns.scenes.scene_store import SceneStore
+from cosim.campaigns.workers.work import Rows
+from cosim.errors import ScenarioError
+from plant_fmu import PlantError
+
+
+@dataclass(frozen=True)
+class SceneTask:
+    """What all scenes of a campaign have in common."""
+
+    law: str
+    gains: Any  # NamedTuple of the law's gains_type
+    conditions: Conditions
+
+    def flyer(self) -> SceneBatches:
+        """Return a flyer of its own."""
+        return SceneBatches(self)
+
+
+class SceneBatches:
+    """Flies scenes, a line each, one after the other.
+
+    Parameters
+    ----------
+    task : SceneTask
+        How.
+
+    Raises
+    ------
+    RunError, LawError, BuildError, PlantError
+        As `SceneFlyer` does.
+    """
+
+    def __init__(self, task: SceneTask) -> None:
+        self._flyer = SceneFlyer(task.law, task.conditions, task.gains)
+
+    def fly(self, batch: list[bytes]) -> Any:
+        """Return a table with a row for each line; what the plant refuses has one that says so."""
+        rows = []
+        for line in batch:
+            scene, text = decode_scene(line), line.decode().strip()
+            try:
+                score, _ = self._flyer.fly(scene)
+            except (PlantError, ScenarioError) as error:
+                rows.append(refused_row(scene.seed, str(error), text))
+            else:
+                rows.append(row_of(scene.seed, score, self._flyer.conditions.plant_step, text))
+        return table_of(rows)
+
+    def close(self) -> None:
+        """Free the plant. May be called twice."""
+        self._flyer.close()
+
+
+class SceneWork:
+    """The scenes of a store, flown by one law.
+
+    Parameters
+    ----------
+    store : SceneStore
+        The scenes.
+    task : SceneTask
+        How they are flown.
+    """
+
+    unit, schema = "scene", SCHEMA
+    files: Mapping[str, bytes] = {}
+
+    def __init__(self, store: SceneStore, task: SceneTask) -> None:
+        self.name, self.task = task.law, task
+        self.flown: Plan = plan_of(task.law, task.gains, task.conditions, len(store), store.digest)
+        self.plan = self.flown.table()
+        self._store = store
+        self._seeds = np.array(store.seeds, dtype=np.int64)
+
+    def __len__(self) -> int:
+        return len(self._seeds)
+
+    def batch(self, rows: Rows) -> list[bytes]:
+        """Return the lines of some rows."""
+        return self._store.lines(self._seeds[rows].tolist())
+
+    def rows_of(self, keys: Rows) -> Rows:
+        """Return the rows of some seeds; -1 for one that has none."""
+        rows = np.minimum(np.searchsorted(self._seeds, keys), len(self._seeds) - 1)
+        return np.where(self._seeds[rows] == keys, rows, -1)
+
+    def refused(self, row: int, reason: str) -> Any:
+        """Return the table of one scene that could not be flown."""
+        (line,) = self.batch(np.array([row]))
+        return table_of([refused_row(int(self._seeds[row]), reason, line.decode().strip())])

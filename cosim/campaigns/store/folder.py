@@ -1,0 +1,195 @@
+"""The folder of a campaign: claimed by one, filled part by part, joined at the end."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+from cosim.campaigns.store.parts import Parts
+from cosim.campaigns.store.plan import difference
+from cosim.campaigns.store.results import Results
+from cosim.campaigns.workers.work import Rows, Work
+from cosim.errors import RunError
+from cosim.io.atomic_file import write_whole
+from cosim.io.strict_json import read_json
+
+PLAN = "campaign.json"
+RESULTS = "results.parquet"
+SUMMARY = "summary.json"
+PARTS = "results.parts"  # what a killed campaign leaves
+LOCK = ".lock"
+
+
+class CampaignFolder:
+    """A folder that belongs to one campaign, and to one process at a time.
+
+    Rows come in parts, each a file that is there whole or not at all. A part that a damaged disk has left unreadable
+    is flown again.
+
+    Parameters
+    ----------
+    path : Path
+        A folder that does not exist, is empty, or holds the same campaign.
+    work : Work
+        What the campaign is.
+
+    Raises
+    ------
+    RunError
+        If the folder holds something else, is in use by another process, or cannot be written.
+    """
+
+    def __init__(self, path: Path, work: Work) -> None:
+        self.path, self._schema = path, work.schema
+        try:
+            path.mkdir(parents=True, exist_ok=True)
+            self._refuse_strangers()
+            self._lock = _lock(path / LOCK)
+        except OSError as error:
+            raise RunError(f"{path}: {error.strerror or error}") from error
+        try:
+            self._claim(work)
+            self._parts = Parts(path / PARTS, work.schema)
+        except OSError as error:
+            self.close()
+            raise RunError(f"{path}: {error.strerror or error}") from error
+        except BaseException:
+            self.close()
+            raise
+
+    def _refuse_strangers(self) -> None:
+        if not (self.path / PLAN).exists() and any(p.name not in (LOCK, f".{PLAN}") for p in self.path.iterdir()):
+            raise RunError(f"{self.path}: exists and holds no campaign, expected a new folder or that of a campaign")
+
+    def _claim(self, work: Work) -> None:
+        file, plan = self.path / PLAN, dict(work.plan)
+        if file.exists():
+            if differing := difference(read_plan(self.path), json.loads(json.dumps(plan))):
+                raise RunError(f"{self.path}: holds another campaign ({differing}), expected a folder of its own")
+        else:
+            write_whole(file, json.dumps(plan, indent=2, allow_nan=False) + "\n")
+        for name, content in work.files.items():
+            if not (self.path / name).exists():
+                write_whole(self.path / name, content)
+
+    @property
+    def complete(self) -> bool:
+        """Whether all rows are joined."""
+        return (self.path / RESULTS).exists()
+
+    def results(self) -> Results:
+        """Return the joined rows.
+
+        Raises
+        ------
+        RunError
+            If they cannot be read.
+        """
+        return Results(self.path / RESULTS, self._schema)
+
+    def remove_parts(self) -> None:
+        """Remove what is joined."""
+        self._parts.remove()
+
+    def keys(self) -> Rows:
+        """Return the keys of the rows that parts hold, shape (n,)."""
+        return self._parts.keys()
+
+    def add(self, table: Any) -> None:
+        """Write the rows of a batch, in order of key."""
+        self._parts.add(table)
+
+    def join(self) -> Results:
+        """Join the parts to one file in order of key, and return it."""
+        self._parts.join(self.path / RESULTS)
+        return self.results()
+
+    def close(self) -> None:
+        """Let others have the folder. May be called twice."""
+        if self._lock is not None:
+            os.close(self._lock)
+            self._lock = None
+
+    def __enter__(self) -> CampaignFolder:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+
+@contextlib.contextmanager
+def held(path: Path) -> Iterator[None]:
+    """Keep other processes out of the folder of a campaign while something is written into it.
+
+    Parameters
+    ----------
+    path : Path
+        The folder.
+
+    Raises
+    ------
+    RunError
+        If another process is at work in it, or it cannot be written.
+    """
+    try:
+        lock = _lock(path / LOCK)
+    except OSError as error:
+        raise RunError(f"{path}: {error.strerror or error}") from error
+    try:
+        yield
+    except OSError as error:
+        raise RunError(f"{path}: {error.strerror or error}") from error
+    finally:
+        if lock is not None:
+            os.close(lock)
+
+
+def read_plan(path: Path) -> dict[str, Any]:
+    """Return the plan of the campaign that a folder holds.
+
+    Parameters
+    ----------
+    path : Path
+        The folder.
+
+    Returns
+    -------
+    dict
+        As it was written.
+
+    Raises
+    ------
+    RunError
+        If it holds none that can be read.
+    """
+    if not (path / PLAN).exists():
+        raise RunError(f"{path}: holds no campaign ({PLAN} is missing)")
+    return read_json(path / PLAN)
+
+
+def _lock(path: Path) -> int | None:
+    """Lock a file for as long as this process lives, and return its descriptor."""
+    descriptor = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
+    try:
+        if sys.platform == "win32":
+            import msvcrt
+
+            msvcrt.locking(descriptor, msvcrt.LK_NBLCK, 1)
+        else:
+            import fcntl
+
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError as error:
+        os.close(descriptor)
+        if isinstance(error, (BlockingIOError, PermissionError)):
+            raise RunError(f"{path.parent}: another process is at work in it") from error
+        raise
+    return descriptor

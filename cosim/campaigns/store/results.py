@@ -1,0 +1,97 @@
+"""The joined rows of a campaign."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
+import pyarrow.parquet as pq
+from numpy.typing import NDArray
+
+from cosim.campaigns.store.columns import to_array
+from cosim.campaigns.store.parts import check_schema
+from cosim.errors import RunError
+from cosim.simulation.signals import Array
+
+_PIECE = 1000  # rows
+
+
+class Results:
+    """The rows of a campaign, in a file that is read column by column as they are asked for.
+
+    Parameters
+    ----------
+    path : Path
+        A Parquet file, in order of key.
+    schema : pyarrow.Schema, optional
+        That it is to have.
+
+    Raises
+    ------
+    RunError
+        If it cannot be read, or has other columns.
+    """
+
+    def __init__(self, path: Path, schema: Any = None) -> None:
+        self.path = path
+        with self._readable():
+            if schema is not None:
+                check_schema(path, schema)
+            metadata = pq.read_metadata(path)
+        self.schema = metadata.schema.to_arrow_schema()
+        self._rows = int(metadata.num_rows)
+
+    def __len__(self) -> int:
+        return self._rows
+
+    def __getitem__(self, name: str) -> Any:
+        """Return a column, shape (rows,); NaN or None where there is nothing."""
+        with self._readable():
+            return to_array(self._read([name])[name])
+
+    def number(self, name: str, absent: float = np.nan) -> Array:
+        """Return a column of numbers, shape (rows,), with `absent` where there is none."""
+        column: Array = self[name].astype(float)
+        return np.where(np.isnan(column), absent, column)
+
+    def fact(self, name: str) -> NDArray[np.bool_]:
+        """Return a column of facts, shape (rows,); what is not known is no fact."""
+        facts: NDArray[np.bool_] = self[name].astype(bool)  # None is false
+        return facts
+
+    def absent(self, name: str) -> NDArray[np.bool_]:
+        """Return where a column has nothing, shape (rows,)."""
+        return to_array(pc.is_null(self._read([name])[name]))
+
+    def pieces(self, name: str) -> Iterator[list[Any]]:
+        """Yield a column some rows at a time, in their order; a RunError if it is not there."""
+        with self._readable(), pq.ParquetFile(self.path) as file:
+            for batch in file.iter_batches(_PIECE, columns=[name]):
+                yield batch.column(0).to_pylist()
+
+    def row(self, key: int) -> dict[str, Any] | None:
+        """Return the row of a key, None if there is none."""
+        with self._readable():
+            rows = pq.read_table(self.path, filters=[(self.schema.names[0], "=", key)]).to_pylist()
+        return dict(rows[0]) if rows else None
+
+    @property
+    def table(self) -> Any:
+        """All of it, a pyarrow.Table."""
+        return self._read()
+
+    def _read(self, names: list[str] | None = None) -> Any:
+        with self._readable(), pq.ParquetFile(self.path) as file:
+            return file.read(names)
+
+    @contextlib.contextmanager
+    def _readable(self) -> Iterator[None]:
+        try:
+            yield
+        except (OSError, pa.ArrowException, UnicodeDecodeError) as error:
+            raise RunError(f"{self.path}: cannot be read: {error}") from error

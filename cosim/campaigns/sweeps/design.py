@@ -1,0 +1,291 @@
+"""Designs: which values a sweep gives the keys that vary. A row's values follow from its number alone."""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Literal, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cosim.campaigns.workers.work import Rows
+from cosim.errors import RunError
+
+Kind = Literal["grid", "random", "sobol", "lhs"]
+KINDS: tuple[Kind, ...] = get_args(Kind)
+MOST = 10_000_000  # rows
+_MOST_SOBOL = 21201  # keys
+_SEEDS = 2**31  # of FMI integers from 0
+
+
+@dataclass(frozen=True)
+class Vary:
+    """The values that a key may take: a range, or a list."""
+
+    key: str
+    low: float = math.nan
+    high: float = math.nan
+    points: int | None = None  # of a range, on a grid
+    log: bool = False  # even steps of a range multiply
+    values: tuple[float, ...] = ()  # a list, in the place of a range
+
+    def at(self, share: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the values at each `share` of the range or list, from 0 up to 1; the ends are met exactly."""
+        if self.values:
+            places = np.minimum(np.floor(share * len(self.values)).astype(np.int64), len(self.values) - 1)
+            return np.array(self.values)[places]
+        if self.log:
+            between = np.exp(math.log(self.low) * (1.0 - share) + math.log(self.high) * share)
+        else:
+            between = self.low * (1.0 - share) + self.high * share
+        inside = np.clip(between, self.low, self.high)
+        return np.where(share == 0.0, self.low, np.where(share == 1.0, self.high, inside))
+
+    @property
+    def steps(self) -> int:
+        """How many values it has on a grid."""
+        return len(self.values) or self.points or 0
+
+    def on_grid(self, places: Rows) -> NDArray[np.float64]:
+        """Return the values at places on a grid, counted from 0."""
+        if self.values:
+            return np.array(self.values)[places]
+        return self.at(places / max(1, self.steps - 1))
+
+    @property
+    def whole(self) -> bool:
+        """Whether all of its values are whole numbers; those of a range are not, but on a grid."""
+        return bool(self.steps) and bool(np.all(np.mod(self.on_grid(np.arange(self.steps)), 1.0) == 0.0))
+
+    def table(self) -> dict[str, Any]:
+        """Return it as a table for JSON."""
+        if self.values:
+            return {"key": self.key, "values": list(self.values)}
+        points = {} if self.points is None else {"points": self.points}
+        return {"key": self.key, "low": self.low, "high": self.high, "log": self.log} | points
+
+
+@dataclass(frozen=True)
+class Design:
+    """Which values the rows of a sweep have.
+
+    Parameters
+    ----------
+    vary : sequence of Vary
+        The keys, at least one.
+    kind : str
+        ``"grid"``, every value with every other, the last key fastest; ``"random"``, each row for itself; ``"sobol"``,
+        scrambled; or ``"lhs"``, a Latin hypercube.
+    samples : int, optional
+        How many rows; on a grid they follow from the points.
+    seed : int
+        Of the values, and of the rows' own seeds.
+
+    Raises
+    ------
+    RunError
+        If there can be no such design.
+    """
+
+    vary: tuple[Vary, ...]
+    kind: Kind = "random"
+    samples: int | None = None
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        if self.kind not in KINDS:
+            raise RunError(f"design is {self.kind!r}, expected one of {', '.join(KINDS)}")
+        if not self.vary:
+            raise RunError("nothing varies, expected at least one key")
+        if not 0 <= self.seed < 2**63:
+            raise RunError(f"seed is {self.seed}, expected a whole number from 0 to 2^63 - 1")
+        if self.kind == "grid":
+            self._check_grid()
+        else:
+            self._check_samples()
+        if self.rows > MOST:
+            raise RunError(f"the design has {self.rows} rows, expected up to {MOST}")
+
+    def _check_grid(self) -> None:
+        if self.samples is not None:
+            raise RunError("samples: a grid has as many rows as its points make, expected none given")
+        for vary in self.vary:
+            if not vary.steps:
+                low, high = f"{vary.low:g}", f"{vary.high:g}"
+                raise RunError(f"{vary.key}: a grid needs to know how many points, expected {vary.key}={low}:{high}:N")
+
+    def _check_samples(self) -> None:
+        if self.samples is None:
+            raise RunError(f"samples is missing: how many rows the design {self.kind} has")
+        if self.samples < 1:
+            raise RunError(f"samples is {self.samples}, expected 1 or more")
+        for vary in self.vary:
+            if vary.points is not None:
+                raise RunError(f"{vary.key}: {vary.points} points are given, expected them with the design grid alone")
+        if self.kind == "sobol" and len(self.vary) > _MOST_SOBOL:
+            raise RunError(f"{len(self.vary)} keys vary, expected up to {_MOST_SOBOL} with the design sobol")
+
+    @property
+    def rows(self) -> int:
+        """How many rows there are."""
+        return math.prod(vary.steps for vary in self.vary) if self.samples is None else self.samples
+
+    def values(self, rows: Rows) -> NDArray[np.float64]:
+        """Return the values of some rows.
+
+        Parameters
+        ----------
+        rows : ndarray of int, shape (n,)
+            In rising order.
+
+        Returns
+        -------
+        ndarray, shape (n, keys)
+            The same for a row, whatever others are asked for.
+        """
+        if self.kind == "grid":
+            places = np.unravel_index(rows, [vary.steps for vary in self.vary])
+            columns = [vary.on_grid(place) for vary, place in zip(self.vary, places, strict=True)]
+        else:
+            shares = self._shares(rows)
+            columns = [vary.at(shares[:, i]) for i, vary in enumerate(self.vary)]
+        return np.column_stack(columns)
+
+    def seeds(self, rows: Rows) -> Rows:
+        """Return the seeds of some rows, shape (n,), each of which has another: a permutation of 0 to 2^31 - 1."""
+        factor, offset = np.random.SeedSequence(self.seed, spawn_key=(1,)).generate_state(2, np.uint32)
+        odd = int(factor) | 1
+        return (rows * odd + int(offset)) % _SEEDS
+
+    def _shares(self, rows: Rows) -> NDArray[np.float64]:
+        """Return where in their ranges the values of some rows are, shape (n, keys)."""
+        if self.kind == "lhs":
+            return self._hypercube[rows]
+        first, n, keys = int(rows[0]), int(rows[-1] - rows[0]) + 1, len(self.vary)
+        if self.kind == "random":
+            bits = np.random.PCG64(self.seed)
+            bits.advance(first * keys)
+            shares = np.random.Generator(bits).random((n, keys))
+        else:
+            from scipy.stats import qmc  # here, for no worker needs it
+
+            sobol = qmc.Sobol(keys, scramble=True, seed=self._generator())
+            with warnings.catch_warnings():  # that it is no power of two: any number of rows may be asked for
+                warnings.simplefilter("ignore", UserWarning)
+                if first:
+                    sobol.fast_forward(first)
+                shares = sobol.random(n)
+        return shares[rows - first]
+
+    @cached_property
+    def _hypercube(self) -> NDArray[np.float64]:
+        from scipy.stats import qmc
+
+        shares: NDArray[np.float64] = qmc.LatinHypercube(len(self.vary), seed=self._generator()).random(self.rows)
+        return shares
+
+    def _generator(self) -> np.random.Generator:
+        return np.random.default_rng(self.seed)
+
+    def table(self) -> dict[str, Any]:
+        """Return it as a table for JSON."""
+        vary = {v.key: {k: x for k, x in v.table().items() if k != "key"} for v in self.vary}
+        return {"vary": vary, "design": self.kind, "samples": self.rows, "seed": self.seed}
+
+
+def design_of(table: dict[str, Any]) -> Design:
+    """Return the design of a table that `Design.table` gave.
+
+    Parameters
+    ----------
+    table : dict
+        As it stands in the plan of a sweep.
+
+    Returns
+    -------
+    Design
+        An equal one.
+
+    Raises
+    ------
+    RunError
+        If it is none.
+    """
+    try:
+        vary = tuple(_vary_of(key, of) for key, of in table["vary"].items())
+        samples = None if table["design"] == "grid" else table["samples"]
+        return Design(vary, table["design"], samples, table["seed"])
+    except (KeyError, TypeError, AttributeError) as error:
+        raise RunError(f"the design of the campaign cannot be read: {error!r}") from error
+
+
+def _vary_of(key: str, table: dict[str, Any]) -> Vary:
+    if "values" in table:
+        return Vary(key, values=tuple(table["values"]))
+    return Vary(key, table["low"], table["high"], table.get("points"), table["log"])
+
+
+def vary_from(texts: Sequence[str]) -> tuple[Vary, ...]:
+    """Return what varies, from texts.
+
+    Parameters
+    ----------
+    texts : sequence of str
+        ``key=low:high``, ``key=low:high:points``, each with ``:log`` behind it where steps multiply, or ``key=a,b,c``.
+
+    Returns
+    -------
+    tuple of Vary
+        In their order.
+
+    Raises
+    ------
+    RunError
+        If a text is none of these, a value is no finite number, a range has no width, or a key comes twice.
+    """
+    found: list[Vary] = []
+    for text in texts:
+        vary = _vary(text)
+        if vary.key in [other.key for other in found]:
+            raise RunError(f"{vary.key} varies twice, expected each key once")
+        found.append(vary)
+    return tuple(found)
+
+
+def _vary(text: str) -> Vary:
+    key, equals, rest = (part.strip() for part in text.partition("="))
+    if not (key and equals and rest):
+        raise RunError(f"{text!r}: expected key=low:high, key=low:high:points or key=a,b,c")
+    if ":" not in rest:
+        return Vary(key, values=tuple(_number(key, item) for item in rest.split(",")))
+    low_text, high_text, *more = (part.strip() for part in rest.split(":"))
+    log = bool(more) and more[-1] == "log"
+    points = more[:-1] if log else more
+    if len(points) > 1:
+        raise RunError(f"{text!r}: expected key=low:high, key=low:high:points or either with :log")
+    low, high = _number(key, low_text), _number(key, high_text)
+    if not low < high:
+        raise RunError(f"{key} goes from {low:g} to {high:g}, expected the lower end first")
+    if log and low <= 0.0:
+        raise RunError(f"{key} goes from {low:g} on a logarithmic scale, expected above 0")
+    return Vary(key, low, high, _points(key, points[0]) if points else None, log)
+
+
+def _points(key: str, text: str) -> int:
+    if not (text.isascii() and text.isdecimal() and len(text) < 20 and 2 <= int(text) <= MOST):
+        raise RunError(f"{key}: {text!r} points, expected a whole number from 2 to {MOST}")
+    return int(text)
+
+
+def _number(key: str, text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise RunError(f"{key}: {text.strip()!r} is no finite number")
+    return value

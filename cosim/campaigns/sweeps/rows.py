@@ -1,0 +1,218 @@
+"""The rows of a sweep: flown in batches by an engine, and told in a table."""
+
+from __future__ import annotations
+
+import importlib
+import json
+import math
+import secrets
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from hashlib import sha256
+from typing import Any, NamedTuple
+
+import numpy as np
+import pyarrow as pa
+from numpy.typing import NDArray
+
+from cosim.batch.outcome import FIELDS, Flown, nothing
+from cosim.batch.variation import Variation
+from cosim.campaigns.store.columns import of_numbers, of_texts
+from cosim.campaigns.store.plan import SWEEP, code_digest, versions
+from cosim.campaigns.sweeps.design import Design
+from cosim.campaigns.workers.work import Rows
+from cosim.errors import RunError
+from cosim.results.run_result import SCENARIO
+from cosim.scenario.scenario import VEHICLE_COPY, Scenario
+from plant_fmu.toml_tables import hint
+
+ENGINES = {"fused": "cosim.batch.fused:FusedFlyer", "lanes": "cosim.batch.lanes:LanesFlyer"}
+
+
+class SweepBatch(NamedTuple):
+    """Some rows of a sweep."""
+
+    rows: Rows  # (n,)
+    values: NDArray[np.float64]  # (n, keys)
+    seeds: Rows  # (n,)
+
+
+def schema_of(keys: tuple[str, ...]) -> Any:
+    """Return the schema of the rows of a sweep.
+
+    Parameters
+    ----------
+    keys : tuple of str
+        What varies.
+
+    Returns
+    -------
+    pyarrow.Schema
+        Number of the row, values of the keys, seed, outcomes with null where there is none, why it was refused.
+    """
+
+    def field(name: str, kind: Any, unit: str, description: str, nullable: bool = False) -> Any:
+        return pa.field(name, kind, nullable=nullable, metadata={"unit": unit, "description": description})
+
+    types = {np.bool_: pa.bool_(), np.float64: pa.float64()}
+    return pa.schema(
+        [
+            field("row", pa.int64(), "", "Number of the row, from 0"),
+            *(field(key, pa.float64(), "", "Key of the scenario, in its own unit") for key in keys),
+            field("seed", pa.int64(), "", "Of what is random in the row"),
+            *(field(name, types[kind], unit, text, True) for name, (kind, unit, text) in FIELDS.items()),
+            field("refused", pa.string(), "", "Why the row was not flown; null if it was", True),
+        ]
+    )
+
+
+def table_of(keys: tuple[str, ...], batch: SweepBatch, flown: Flown) -> Any:
+    """Return flights as a table.
+
+    Parameters
+    ----------
+    keys : tuple of str
+        What varies.
+    batch : SweepBatch
+        What was flown.
+    flown : Flown
+        What came of it.
+
+    Returns
+    -------
+    pyarrow.Table
+        Of `schema_of`; null where an outcome is no number, and all outcomes of a row that was refused.
+    """
+    refused = np.zeros(len(batch.rows), dtype=bool)
+    refused[list(flown.refused)] = True
+    outcomes = []
+    for name, (kind, _, _) in FIELDS.items():
+        column = flown.outcomes[name]
+        outcomes.append(of_numbers(column, refused | (np.isnan(column) if kind is np.float64 else False)))
+    reasons = of_texts([flown.refused.get(i) for i in range(len(batch.rows))])
+    columns = [of_numbers(batch.rows), *map(of_numbers, batch.values.T), of_numbers(batch.seeds), *outcomes, reasons]
+    return pa.Table.from_arrays(columns, schema=schema_of(keys))
+
+
+@dataclass(frozen=True)
+class SweepTask:
+    """What all rows of a sweep have in common."""
+
+    variation: Variation = field(compare=False)
+    engine: str  # module:class
+    mark: str = field(default_factory=lambda: secrets.token_hex(16))  # by which processes know it again
+
+    def flyer(self) -> SweepFlyer:
+        """Return a flyer of its own."""
+        return SweepFlyer(self)
+
+
+class SweepFlyer:
+    """Flies batches of a sweep by an engine.
+
+    Parameters
+    ----------
+    task : SweepTask
+        How.
+
+    Raises
+    ------
+    RunError
+        If the engine cannot fly the scenario.
+    """
+
+    def __init__(self, task: SweepTask) -> None:
+        module, _, name = task.engine.partition(":")
+        self._keys = task.variation.keys
+        self._engine = getattr(importlib.import_module(module), name)(task.variation)
+
+    def fly(self, batch: SweepBatch) -> Any:
+        """Return a table with a row for each of the batch."""
+        return table_of(self._keys, batch, self._engine.fly(batch.values, batch.seeds))
+
+    def close(self) -> None:
+        """Free the engine. May be called twice."""
+        self._engine.close()
+
+
+class SweepWork:
+    """The rows of a design, flown by one engine.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        What stays.
+    design : Design
+        What varies.
+    engine : str
+        One of `ENGINES`.
+
+    Raises
+    ------
+    ScenarioError
+        If a key is unknown, or what it names is no number.
+    RunError
+        If there is no such engine, or a key that is a whole number has values that are none.
+    """
+
+    unit = "row"
+
+    def __init__(self, scenario: Scenario, design: Design, engine: str = "fused") -> None:
+        if engine not in ENGINES:
+            raise RunError(f"engine {engine!r} is unknown; {hint(engine, ENGINES)}")
+        keys = tuple(vary.key for vary in design.vary)
+        self.variation = Variation(scenario, keys)
+        for vary in design.vary:
+            if isinstance(self.variation.number(vary.key), int) and not vary.whole:
+                raise RunError(
+                    f"{vary.key} is a whole number, expected {vary.key}=A,B,C, or a grid that meets no others"
+                )
+        self.name, self.design = scenario.name, design
+        self.task = SweepTask(self.variation, ENGINES[engine])
+        self.schema = schema_of(keys)
+        self.files: Mapping[str, bytes] = _files(scenario)
+        self.plan: Mapping[str, Any] = {
+            "kind": SWEEP,
+            "name": scenario.name,
+            "engine": engine,
+            **design.table(),
+            "scenario": _for_json(scenario.table | ({"vehicle": VEHICLE_COPY} if scenario.vehicle_file else {})),
+            "vehicle_sha256": sha256(self.files.get(VEHICLE_COPY, b"")).hexdigest(),
+            "code_sha256": code_digest(),
+            "versions": versions(),
+        }
+
+    def __len__(self) -> int:
+        return self.design.rows
+
+    def batch(self, rows: Rows) -> SweepBatch:
+        """Return values and seeds of some rows."""
+        return SweepBatch(rows, self.design.values(rows), self.design.seeds(rows))
+
+    def rows_of(self, keys: Rows) -> Rows:
+        """Return the rows of some keys, which are their numbers; -1 for one that has none."""
+        return np.where((keys >= 0) & (keys < len(self)), keys, -1)
+
+    def refused(self, row: int, reason: str) -> Any:
+        """Return the table of one row that could not be flown."""
+        return table_of(self.variation.keys, self.batch(np.array([row])), Flown(nothing(1), {0: reason}))
+
+
+def _files(scenario: Scenario) -> dict[str, bytes]:
+    """Return what repeats the scenario, by name."""
+    if scenario.vehicle_file is None:
+        return {SCENARIO: scenario.toml().encode()}
+    try:
+        vehicle = scenario.vehicle_file.read_bytes()
+    except OSError as error:
+        raise RunError(f"{scenario.vehicle_file}: {error.strerror or error}") from error
+    return {SCENARIO: scenario.toml(VEHICLE_COPY).encode(), VEHICLE_COPY: vehicle}
+
+
+def _for_json(value: Any) -> Any:
+    """Return a table of a scenario as JSON can hold it: what is not finite as a word."""
+    if isinstance(value, dict):
+        return {key: _for_json(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_for_json(item) for item in value]
+    return repr(value) if isinstance(value, float) and not math.isfinite(value) else json.loads(json.dumps(value))

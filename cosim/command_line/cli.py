@@ -1,0 +1,277 @@
+"""The ``cosim`` command.
+
+Nothing heavy is imported before a verb needs it, so that help comes at once and Ctrl-C is heeded from the start.
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import importlib
+import json
+import logging
+import sys
+from collections.abc import Sequence
+from typing import Any, NoReturn
+
+from cosim.command_line import (
+    ahead,
+    campaigns,
+    completion,
+    export,
+    mavlink,
+    package,
+    replay,
+    report,
+    run,
+    scenes,
+    sitl,
+    sweep,
+    watch,
+)
+from cosim.command_line.process import FAULT, run_guarded, signals_held, tell
+
+_EPILOG = """examples:
+  cosim run paper
+  cosim run paper --set arbiter.engine=closed --set regions.SR1.gain=5000 --out runs/strong
+  cosim run my-scene.toml --mavlink udpout:127.0.0.1:14550 --profile ardusub --commands
+  cosim scenes --count 200 --seed 0 --out scenes.jsonl
+  cosim campaign scenes.jsonl --law printed --out campaigns/printed --workers 2
+  cosim sweep docking --vary initial.position.1=-4:-2 --samples 1000 --out sweeps/start --workers 2
+"""
+
+
+# flags that stand before the verb or behind it
+_EVERYWHERE = {
+    ("-v", "--verbose"): "log what happens inside",
+    ("-q", "--quiet"): "no progress, and no words on what happened: paths, errors and what was asked for alone",
+}
+
+
+class _Version(argparse.Action):
+    """Prints the version; finding it takes longer than all else that help needs."""
+
+    def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
+        from importlib import metadata
+
+        try:
+            version = metadata.version("subreach")
+        except metadata.PackageNotFoundError:
+            version = "of a folder that is not installed"
+        print(f"cosim {version}")
+        parser.exit()
+
+
+class _Parser(argparse.ArgumentParser):
+    """Says what is wrong in one line, as all other errors."""
+
+    def print_help(self, file: Any = None) -> None:
+        """Print it; argparse itself would pass over output that fails."""
+        print(self.format_help(), end="", file=file)
+
+    def error(self, message: str) -> NoReturn:
+        from plant_fmu.errors import one_line
+
+        verb = self.prog.removeprefix("cosim").strip()
+        shown = one_line(message)
+        tell(f"{verb}: {shown}; see cosim {verb} --help" if verb else f"{shown}; see cosim --help")
+        self.exit(FAULT)
+
+
+class _Lines(logging.Formatter):
+    """Makes one line of each message; what was raised stands below it."""
+
+    def formatMessage(self, record: logging.LogRecord) -> str:
+        from plant_fmu.errors import printable
+
+        return printable(super().formatMessage(record))
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = _Parser(
+        prog="cosim",
+        description="Region-reaching underwater vehicles, co-simulated.",
+        epilog=_EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("--version", action=_Version, nargs=0, help="show program's version number and exit")
+    verbs = parser.add_subparsers(dest="verb", required=True, metavar="VERB")
+
+    run.add_verb(verbs)
+    watch.add_verb(verbs)
+
+    report.add_verb(verbs)
+
+    replay.add_verb(verbs)
+
+    listing = verbs.add_parser("list", help="list the shipped scenarios")
+    listing.add_argument("--json", action="store_true", help="print it as JSON")
+
+    show = verbs.add_parser("show", help="print a scenario with every default filled in and every key explained")
+    show.add_argument("scenario", help="a shipped name, or a TOML file")
+    show.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", dest="overrides", help="as for run")
+
+    check = verbs.add_parser("check", help="say before a run what stands against a scenario; exit code 1 if anything")
+    check.add_argument("scenario", help="a shipped name, or a TOML file")
+    check.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", dest="overrides", help="as for run")
+    check.add_argument("--json", action="store_true", help="print it as JSON")
+
+    calibrate = verbs.add_parser("calibrate", help="fit the force limit and lag that bring the paper's window about")
+    calibrate.add_argument("--scenario", default="paper", help="scenario to fit (default: paper)")
+
+    ahead.add_verb(verbs)
+    export.add_verb(verbs)
+    package.add_verb(verbs)
+    scenes.add_verb(verbs)
+    campaigns.add_verbs(verbs)
+    sweep.add_verbs(verbs)
+    mavlink.add_verbs(verbs)
+    sitl.add_verbs(verbs)
+    completion.add_verb(verbs, parser)
+
+    about = verbs.add_parser("help", help="print this help, or that of a verb")
+    about.add_argument("about", nargs="?", choices=tuple(verbs.choices), metavar="VERB", help="such as run")
+    about.set_defaults(parser=parser, verbs=verbs.choices)
+
+    for flags, meaning in _EVERYWHERE.items():
+        parser.add_argument(*flags, action="store_true", help=meaning)
+        for verb in verbs.choices.values():
+            verb.add_argument(*flags, action="store_true", default=argparse.SUPPRESS, help=meaning)
+    return parser
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line.
+
+    Parameters
+    ----------
+    arguments : sequence of str, optional
+        Default: those of the process.
+
+    Returns
+    -------
+    int
+        0; 1 where a check fails; 2 where the user must mend something; 130 after Ctrl-C, SIGTERM or SIGHUP; 141 if
+        nobody reads the output.
+    """
+    return run_guarded(lambda: _run(sys.argv[1:] if arguments is None else arguments))
+
+
+def _run(arguments: Sequence[str]) -> int:
+    """Run the verb, and say in one line what the user must mend."""
+    parser = _parser()
+    if not arguments:
+        parser.print_help(sys.stderr)
+        parser.exit(FAULT)
+    options = parser.parse_args(arguments)
+    _log(options.verbose)
+    with contextlib.ExitStack() as stack:
+        if options.verb not in _LIGHT:
+            with signals_held():
+                for package in _ERRORS:
+                    importlib.import_module(package)
+                from cosim.run.progress import compiling_told
+            if not options.quiet:
+                stack.enter_context(compiling_told(tell))
+        try:
+            return _VERBS[options.verb](options)
+        except _mendable() as error:
+            tell(str(error))
+            return FAULT
+
+
+def _mendable() -> tuple[type[Exception], ...]:
+    """Return the errors that the user can mend; a package that is not loaded has raised none."""
+    return tuple(
+        getattr(sys.modules[f"{package}.errors"], name)
+        for package, name in _ERRORS.items()
+        if f"{package}.errors" in sys.modules
+    )
+
+
+def _log(verbose: bool) -> None:
+    lines = logging.StreamHandler()
+    lines.setFormatter(_Lines("%(name)s: %(message)s"))
+    logging.basicConfig(level=logging.WARNING, handlers=[lines])
+    for name in ("fuzzy_arbiter", "plant_fmu", "controller", "cosim"):
+        logging.getLogger(name).setLevel(logging.DEBUG if verbose else logging.WARNING)
+
+
+def _list(options: argparse.Namespace) -> int:
+    from cosim.scenario.toml_file import shipped_titles
+
+    titles = shipped_titles()
+    if options.json:
+        print(json.dumps([{"name": name, "title": title} for name, title in titles.items()], indent=2))
+        return 0
+    for name, title in titles.items():
+        print(f"{name:20} {title}")
+    return 0
+
+
+def _help(options: argparse.Namespace) -> int:
+    (options.verbs[options.about] if options.about else options.parser).print_help()
+    return 0
+
+
+def _show(options: argparse.Namespace) -> int:
+    from cosim.scenario.scenario import load_scenario
+
+    scenario = load_scenario(options.scenario, options.overrides)
+    file = scenario.vehicle_file
+    vehicle = str(file.resolve()) if file else None  # found from wherever the output goes
+    print(scenario.toml(vehicle, commented=True), end="")
+    return 0
+
+
+def _check(options: argparse.Namespace) -> int:
+    from cosim.precheck.output import check_json, check_text
+    from cosim.precheck.precheck import check
+    from cosim.scenario.scenario import load_scenario
+
+    found = check(load_scenario(options.scenario, options.overrides))
+    print(check_json(found) if options.json else check_text(found))
+    return 0 if found.holds else 1
+
+
+def _calibrate(options: argparse.Namespace) -> int:
+    from cosim.precheck.calibration import calibrate
+    from cosim.scenario.scenario import load_scenario
+
+    fit = calibrate(load_scenario(options.scenario, ["arbiter.engine=closed"]))
+    print(f"limit.force = {fit.force:.1f} N, limit.time_constant = {fit.time_constant:.3f} s")
+    print(f"window {fit.window[0]:.3f} s to {fit.window[1]:.3f} s, least-squares cost {fit.cost:.3e} s2")
+    return 0
+
+
+_ERRORS = {
+    "controller": "ControllerError",
+    "cosim": "CosimError",
+    "fuzzy_arbiter": "ArbiterError",
+    "plant_fmu": "PlantFmuError",
+}
+_LIGHT = {"completion", "help", "list", "scenes"}  # verbs that need next to nothing
+_VERBS = {
+    "run": run.run,
+    "watch": watch.watch,
+    "report": report.report,
+    "replay": replay.replay,
+    "list": _list,
+    "help": _help,
+    "completion": completion.completion,
+    "show": _show,
+    "check": _check,
+    "calibrate": _calibrate,
+    "compile": ahead.compile_all,
+    "export": export.export,
+    "package": package.package,
+    "scenes": scenes.scenes,
+    "campaign": campaigns.campaign,
+    "compare": campaigns.compare,
+    "sweep": sweep.sweep,
+    "rerun": sweep.rerun,
+    "listen": mavlink.listen,
+    "stream": mavlink.stream,
+    "mavlink-check": mavlink.mavlink_check,
+    "sitl": sitl.sitl,
+}

@@ -1,0 +1,125 @@
+"""What goes out unasked on one link, and when."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from cosim.mavlink.messages import MESSAGES, Spec
+from cosim.mavlink.messages.table import HEARTBEAT
+from cosim.mavlink.vehicle.vehicle_context import Vessel
+from cosim.mavlink.wire.message_sink import Outlet
+
+SHORTEST_US = 10_000  # between two of the same message
+_LONGEST_US = 3_600_000_000
+GREATEST_LOAD = 250_000.0  # bytes in a simulated second, of all streams of a link
+_FRAME = 12  # bytes about a payload
+_SECOND = 1_000_000
+
+
+class Streams:
+    """The schedule of a link, in whole microseconds of a clock that only goes on; nothing drifts.
+
+    Parameters
+    ----------
+    vessel : Vessel
+        What is told.
+    link : Outlet
+        To whom.
+    clock_us : int
+        When it begins; everything is due then.
+
+    Attributes
+    ----------
+    beaten : bool
+        Whether a heartbeat went out since this was last set to False.
+    """
+
+    def __init__(self, vessel: Vessel, link: Outlet, clock_us: int) -> None:
+        self._vessel, self._link, self._clock = vessel, link, clock_us
+        self._intervals: dict[int, int] = {}
+        self._due: dict[int, int] = {}
+        self._earliest = clock_us
+        self.beaten = False
+        for spec in MESSAGES.values():
+            self._put(spec.id, self._default(spec))
+
+    def _default(self, spec: Spec) -> int:
+        rate = spec.default_rate(self._vessel.options.profile)
+        return round(_SECOND / rate) if rate > 0.0 else -1
+
+    def _put(self, message_id: int, interval_us: int) -> None:
+        if interval_us < 0:
+            self._intervals.pop(message_id, None)
+            self._due.pop(message_id, None)
+            return
+        self._intervals[message_id] = interval_us
+        self._due[message_id] = min(self._due.get(message_id, self._clock), self._clock + interval_us)
+        self._earliest = min(self._earliest, self._due[message_id])
+
+    def _load(self, spec: Spec, interval_us: int) -> float:
+        size: int = (self._vessel.make.size_of[spec.id] + _FRAME) * spec.several
+        return size * _SECOND / interval_us
+
+    @property
+    def load(self) -> float:
+        """Bytes that go out in a simulated second."""
+        return sum(self._load(MESSAGES[i], interval) for i, interval in self._intervals.items())
+
+    def interval(self, message_id: int) -> int:
+        """Return the interval of a message [µs]: -1 if it is not streamed, 0 if there is no such message."""
+        return self._intervals.get(message_id, -1) if message_id in MESSAGES else 0
+
+    def set(self, changes: Iterable[tuple[int, int]]) -> bool:
+        """Change intervals, all or none.
+
+        Parameters
+        ----------
+        changes : iterable of (int, int)
+            Message and interval [µs]: 0 for its default, below 0 to end it. Others are brought within 10 ms and an
+            hour.
+
+        Returns
+        -------
+        bool
+            False, if a message is unknown, or the link would carry more than `GREATEST_LOAD`.
+        """
+        new: dict[int, int] = {}
+        for message_id, interval_us in changes:
+            spec = MESSAGES.get(message_id)
+            if spec is None:
+                return False
+            if interval_us == 0:
+                new[message_id] = self._default(spec)
+            else:
+                new[message_id] = -1 if interval_us < 0 else min(max(interval_us, SHORTEST_US), _LONGEST_US)
+        after = {**self._intervals, **new}
+        load = sum(self._load(MESSAGES[i], interval) for i, interval in after.items() if interval > 0)
+        if load > max(GREATEST_LOAD, self.load):
+            return False
+        for message_id, interval_us in new.items():
+            self._put(message_id, interval_us)
+        return True
+
+    def advance(self, clock_us: int) -> None:
+        """Send what is due; what was missed is not sent twice.
+
+        Parameters
+        ----------
+        clock_us : int
+            The clock now.
+        """
+        self._clock = clock_us
+        if clock_us < self._earliest:
+            return
+        for message_id, due in self._due.items():
+            if due <= clock_us:
+                self.send(message_id)
+                interval = self._intervals[message_id]
+                self._due[message_id] = due + ((clock_us - due) // interval + 1) * interval
+        self._earliest = min(self._due.values(), default=clock_us + _SECOND)
+
+    def send(self, message_id: int) -> None:
+        """Send a message now."""
+        for message in MESSAGES[message_id].build(self._vessel):
+            self._link.send(message)
+        self.beaten |= message_id == HEARTBEAT

@@ -1,0 +1,7 @@
+"""The vehicle's state for MAVLink.
+
+The latest snapshot of the run by named quantities, the profile that it is shown with, the active ground station, and
+geodesy.
+
+Imports: controller, mavlink.wire, scenario, simulation, simulation.commands.
+"""

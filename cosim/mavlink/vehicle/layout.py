@@ -1,0 +1,92 @@
+"""Where in a row of the run the quantities are, and the row before there is one."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from cosim.scenario.scenario import Scenario
+from cosim.scenario.tables import Vector3
+from cosim.simulation.commands.commands import MODES
+from cosim.simulation.environment import middle_of
+from cosim.simulation.signals import Array, Column
+
+
+class Layout:
+    """Where in a row the quantities are.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        Of the run.
+    columns : sequence of Column
+        Of its rows.
+    """
+
+    def __init__(self, scenario: Scenario, columns: Sequence[Column]) -> None:
+        self.at = {column.name: i for i, column in enumerate(columns)}
+        self.length = len(columns)
+        self.thrusters = scenario.vehicle.n_thrusters
+        self.regions = tuple(region.region.name for region in scenario.regions)
+        self.reports = tuple(column.name for column in columns if column.name.startswith("law."))
+        self.goal_middle = middle_of(scenario.goal)
+        self.saturations = tuple(
+            i for name, i in self.at.items() if name.endswith("saturated") or name.startswith("thrust_saturated[")
+        )
+
+    def first_row(self, scenario: Scenario) -> Array:
+        """Return the row before the first step: the vehicle as the scenario has it at time 0, and nothing else known.
+
+        Parameters
+        ----------
+        scenario : Scenario
+            Of the run.
+
+        Returns
+        -------
+        ndarray, shape (n,)
+        """
+        row = np.zeros(self.length)
+        initial, commands = scenario.initial, scenario.commands
+        roll, pitch, yaw = euler_of(initial.quaternion)
+        depth = initial.position[2]
+        known = {
+            "attitude.roll": roll,
+            "attitude.pitch": pitch,
+            "attitude.yaw": yaw,
+            "measured.depth": depth,
+            "measured.heading": yaw,
+            "measured.acceleration.z": -9.81,
+            "altitude": _bottom(scenario) - depth,
+            "measured.altitude": _bottom(scenario) - depth,
+            "helm.armed": float(not commands.await_arm),
+            "helm.mode": float(MODES.index("reach")),
+            "helm.item": -1.0,
+        }
+        for first, values in (
+            ("position.x", initial.position),
+            ("quaternion.e0", initial.quaternion),
+            ("velocity.u", initial.velocity),
+            ("target.x", self.goal_middle),
+        ):
+            if first in self.at:
+                row[self.at[first] : self.at[first] + len(values)] = values
+        for name, value in known.items():
+            if name in self.at:
+                row[self.at[name]] = value
+        return row
+
+
+def euler_of(quaternion: Sequence[float]) -> Vector3:
+    """Return roll, pitch and yaw [rad] of a unit quaternion from body to world, scalar first."""
+    w, x, y, z = quaternion
+    sine = max(-1.0, min(1.0, 2.0 * (w * y - z * x)))
+    roll = math.atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
+    yaw = math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+    return roll, math.asin(sine), yaw
+
+
+def _bottom(scenario: Scenario) -> float:
+    return float(scenario.plant.parameters.get("bottom_depth", math.inf))

@@ -1,0 +1,112 @@
+"""Profiles: as which autopilot the vehicle shows itself, and how its modes are numbered there."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from cosim.mavlink.wire.options import ProfileName
+from cosim.simulation.commands.commands import MODES, Mode
+
+SUBMARINE = 12  # MAV_TYPE_SUBMARINE
+
+MODE_NAMES: dict[Mode, str] = {
+    "manual": "Manual",
+    "hold": "Position hold",
+    "reach": "Region reaching",
+    "mission": "Mission of regions",
+    "surface": "Surface",
+}
+
+# MAV_STANDARD_MODE, for the modes that are like one
+STANDARD_MODES: dict[Mode, int] = {"manual": 0, "hold": 1, "reach": 0, "mission": 6, "surface": 5}
+
+# MAV_MODE_FLAG: custom mode 1, auto 4, guided 8, stabilised 16, manual input 64
+_BASE_MODES: dict[Mode, int] = {"manual": 65, "hold": 25, "reach": 25, "mission": 29, "surface": 29}
+_ARMED = 128
+_CUSTOM = 1
+
+
+@dataclass(frozen=True)
+class Profile:
+    """An autopilot that ground stations know.
+
+    Attributes
+    ----------
+    autopilot : int
+        MAV_AUTOPILOT.
+    numbers : dict of str to int
+        ``custom_mode`` of each mode.
+    packed : bool
+        Whether a mode's number is PX4's: main mode shifted by 16 bits, sub-mode by 24.
+    centred_stick : int
+        Where the vertical stick of MANUAL_CONTROL rests.
+    home_is_first : bool
+        Whether item 0 of a mission is home, as ArduPilot has it.
+    stands_for : tuple of int or None
+        Release of the autopilot whose ways these are; None where it stands for itself.
+    """
+
+    name: ProfileName
+    autopilot: int
+    numbers: dict[Mode, int]
+    packed: bool
+    centred_stick: int
+    home_is_first: bool
+    stands_for: tuple[int, int, int] | None = None
+
+    def mode_of(self, number: int) -> Mode | None:
+        """Return the mode with a ``custom_mode``, or None if there is none."""
+        return next((mode for mode in MODES if self.numbers[mode] == number), None)
+
+    def mode_of_command(self, first: int, second: int) -> Mode | None:
+        """Return the mode that MAV_CMD_DO_SET_MODE asks for, or None if there is none.
+
+        Parameters
+        ----------
+        first, second : int
+            Its parameters 2 and 3. PX4's encoding has main mode and sub-mode there; ArduPilot's the number alone. A
+            number of ArduSub is none of PX4's main modes with a sub-mode 0 that means another of the modes here, but
+            for 1, ACRO there and MANUAL here, which are both by hand.
+        """
+        if not self.packed:
+            return self.mode_of(first)
+        if not (0 <= first <= 0xFF and 0 <= second <= 0xFF):
+            return self.mode_of(first) if second == 0 else None
+        return self.mode_of(_px4(first, second))
+
+    def is_return(self, number: int) -> bool:
+        """Return whether a ``custom_mode`` is PX4's return: no mode here, but an order to surface at home."""
+        return self.packed and number == _RETURN
+
+    @staticmethod
+    def base_mode(mode: Mode, armed: bool) -> int:
+        """Return MAV_MODE_FLAG bits: custom mode always, then who steers, and whether the thrusters may work."""
+        return _BASE_MODES[mode] | (_ARMED if armed else 0)
+
+
+def is_custom(base_mode: int) -> bool:
+    """Return whether a base mode says that the custom mode counts."""
+    return bool(base_mode & _CUSTOM)
+
+
+def _px4(main: int, sub: int = 0) -> int:
+    return main << 16 | sub << 24
+
+
+_RETURN = _px4(4, 5)
+_ARDUSUB: dict[Mode, int] = {"manual": 19, "hold": 16, "reach": 4, "mission": 3, "surface": 9}
+_PX4: dict[Mode, int] = {
+    "manual": _px4(1),
+    "hold": _px4(4, 3),
+    "reach": _px4(6),
+    "mission": _px4(4, 4),
+    "surface": _px4(4, 6),
+}
+
+PROFILES: dict[ProfileName, Profile] = {
+    "ardusub": Profile(
+        "ardusub", 3, _ARDUSUB, packed=False, centred_stick=500, home_is_first=True, stands_for=(4, 5, 0)
+    ),
+    "px4": Profile("px4", 12, _PX4, packed=True, centred_stick=500, home_is_first=False, stands_for=(1, 15, 0)),
+    "generic": Profile("generic", 0, _PX4, packed=True, centred_stick=0, home_is_first=False),
+}

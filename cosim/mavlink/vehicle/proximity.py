@@ -1,0 +1,124 @@
+"""What is near the vehicle: regions that stand for obstacles, where they are now, and a level scan of them."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from controller.regions import Shape, of_attitude, pack, ray_distances
+from cosim.mavlink.vehicle.view import View
+from cosim.scenario.scenario import Scenario
+from cosim.scenario.tables import FAR_AWAY, SecondaryRegion, Vector3
+from cosim.simulation.commands.settings import LiveSettings
+
+SECTORS = 72
+REACH = 20.0  # m
+_RAYS = 3  # in each sector, so that at the end of its reach nothing wider than 0.6 m slips through
+_AT_REST = (0.0, 0.0, 0.0)
+
+
+class Proximity:
+    """Obstacles, packed once; only what changed is written anew.
+
+    Making one loads all compiled code that it uses, which may take seconds: not to be done beside a running simulation.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        Which regions; of those to be kept out of for the criterion ``obstacle``, the ones in space stand for obstacles.
+
+    Attributes
+    ----------
+    ids : tuple of int
+        The n obstacles' numbers in the scenario, from 1.
+    """
+
+    def __init__(self, scenario: Scenario) -> None:
+        every = [(i, secondary) for i, secondary in enumerate(scenario.regions, 1) if _is_obstacle(secondary)]
+        self.ids = tuple(i for i, _ in every)
+        self._seen = tuple(secondary.seen for _, secondary in every)
+        self._names = tuple(secondary.region.name for _, secondary in every)
+        self._shapes: list[Shape] = [secondary.region.shape for _, secondary in every]
+        self._shifts: list[Vector3] = [_AT_REST] * len(every)
+        self._regions = pack([secondary.region for _, secondary in every])
+        n = len(every)
+        self._values, self._clearances = np.zeros(n), np.zeros(n)
+        self._gradients, self._turnings = np.zeros((n, 3)), np.zeros((n, 3))
+        self._angles = (np.arange(SECTORS * _RAYS) - _RAYS // 2) * (2.0 * math.pi / (SECTORS * _RAYS))
+        self._directions, self._distances = np.zeros((SECTORS * _RAYS, 3)), np.zeros(SECTORS * _RAYS)
+        self._position, self._level = np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0])
+        self.inwards(_AT_REST)
+        self.scan(_AT_REST, 0.0)
+
+    def update(self, view: View, settings: LiveSettings) -> None:
+        """Put the obstacles where a snapshot has them, in the shapes that they have now.
+
+        Parameters
+        ----------
+        view : View
+            The snapshot.
+        settings : LiveSettings
+            The present shapes.
+        """
+        regions, clearances = self._regions, view.clearances
+        for k, name in enumerate(self._names):
+            shift, first = view.shift(name), regions.offsets[k]
+            if shift != self._shifts[k]:
+                self._shifts[k] = shift
+                regions.shifts[k] = shift
+            if self._seen[k]:
+                if shift != _AT_REST:  # it has come; only its clearance tells the radius
+                    centre = [a + b for a, b in zip(FAR_AWAY, shift, strict=True)]
+                    regions.numbers[first + 3] = math.dist(centre, view.position_ned) - clearances[self.ids[k]]
+            elif (shape := settings.shapes[name]) is not self._shapes[k]:
+                self._shapes[k] = shape
+                regions.numbers[first : regions.offsets[k + 1]] = shape.packed()
+
+    def inwards(self, position_ned: Vector3) -> list[list[float]]:
+        """Return in which direction the clearance of each obstacle falls.
+
+        Parameters
+        ----------
+        position_ned : tuple of float
+            Of the vehicle [m].
+
+        Returns
+        -------
+        list of list of float
+            n vectors of any length, NED.
+        """
+        self._position[:] = position_ned
+        self._regions.evaluate(
+            self._position, self._level, self._values, self._gradients, self._turnings, self._clearances
+        )
+        directions: list[list[float]] = self._gradients.tolist()
+        return directions
+
+    def scan(self, position_ned: Vector3, heading: float) -> list[float]:
+        """Look around in the level plane of the vehicle.
+
+        Parameters
+        ----------
+        position_ned : tuple of float
+            Of the vehicle [m].
+        heading : float
+            From north, clockwise [rad].
+
+        Returns
+        -------
+        list of float
+            The distance to what is nearest in each sector [m], that about the heading first, then clockwise; infinite
+            where nothing is met within `REACH`, 0 everywhere for a vehicle inside an obstacle, NaN where unknown.
+        """
+        self._position[:] = position_ned
+        np.cos(self._angles + heading, out=self._directions[:, 0])
+        np.sin(self._angles + heading, out=self._directions[:, 1])
+        ray_distances(self._regions, self._position, self._directions, REACH, self._distances)
+        nearest: list[float] = self._distances.reshape(SECTORS, _RAYS).min(axis=1).tolist()
+        return nearest
+
+
+def _is_obstacle(secondary: SecondaryRegion) -> bool:
+    region = secondary.region
+    return region.keep == "out" and secondary.criterion == "obstacle" and not of_attitude(region.shape)

@@ -1,0 +1,280 @@
+"""What all micro-services share: the latest snapshot, the links, the way to give orders, and the voice."""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from cosim.errors import OrderError
+from cosim.mavlink.vehicle.active_gcs import Operator
+from cosim.mavlink.vehicle.geodesy import LocalFrame
+from cosim.mavlink.vehicle.layout import Layout
+from cosim.mavlink.vehicle.mission_item import MissionItem
+from cosim.mavlink.vehicle.profile import PROFILES
+from cosim.mavlink.vehicle.proximity import Proximity
+from cosim.mavlink.vehicle.view import View
+from cosim.mavlink.wire.dialect import dialect
+from cosim.mavlink.wire.encode import Encoder
+from cosim.mavlink.wire.message_sink import Outlet
+from cosim.mavlink.wire.options import MavlinkOptions
+from cosim.scenario.scenario import Scenario
+from cosim.scenario.tables import Vector3, Vector6
+from cosim.simulation.commands.commands import Aim, Arm, Item, Mode, Order, Steer
+from cosim.simulation.commands.settings import LiveSettings
+from cosim.simulation.commands.sources import OrderQueue
+from cosim.simulation.signals import Array, Column
+
+COMPONENT_ID = 1  # MAV_COMP_ID_AUTOPILOT1: ground stations listen to no other
+
+_CHUNK = 50  # characters of a STATUSTEXT
+_LONGEST_TEXT = 200  # characters
+_TEXTS = 12  # in each _TEXTS_PERIOD at the most
+_TEXTS_PERIOD = 1.0  # s
+_WISH_LASTS = 0.5  # s, that an order may take until a snapshot shows it
+
+
+@dataclass(frozen=True)
+class Sender:
+    """Who sent a message, and on which link."""
+
+    link: Outlet
+    system: int
+    component: int
+
+
+class Vessel:
+    """The vehicle as the micro-services see it.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        What is run.
+    columns : sequence of Column
+        Of the rows.
+    options : MavlinkOptions
+        As whom it shows itself, and whom it heeds.
+    orders : OrderQueue or None
+        Where orders go; None for a vehicle that takes none.
+    live : bool
+        False for a recorded run.
+
+    Attributes
+    ----------
+    mavlink : module
+        The dialect.
+    make : Encoder
+        Makes messages.
+    view : View
+        The latest snapshot.
+    waited_us : int
+        For how long arming is awaited [µs], which counts as time since boot.
+    seen : bool
+        Whether a snapshot came at all.
+    links : list of Outlet
+        That are attached.
+    settings : LiveSettings
+        The numbers as they are once all orders are followed.
+    proximity : Proximity
+        What a scan of the water about it shows.
+    frame : LocalFrame
+        Where on the globe position 0 is.
+    home : tuple of float
+        North and east of home [m], which is at the surface.
+    now : float
+        The wall clock, as it was told last [s].
+    failsafe : bool
+        Whether the ground station that commands is lost.
+    loss_timeout, loss_action : float, str
+        For how long it may be silent [s], and what is done then.
+    plan : tuple of MissionItem
+        The mission, without home.
+    course : tuple of Item
+        What its items ask for.
+    sticks : tuple of float
+        As ordered last, X Y Z K M N, from -1 to 1.
+    """
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        columns: Sequence[Column],
+        options: MavlinkOptions,
+        orders: OrderQueue | None,
+        live: bool = True,
+    ) -> None:
+        self.scenario, self.options, self.live = scenario, options, live
+        self.mavlink: Any = dialect()
+        self.make = Encoder(self.mavlink)
+        self.profile = PROFILES[options.profile]
+        self.layout = Layout(scenario, columns)
+        self.operator = Operator()
+        self.links: list[Outlet] = []
+        self.now = 0.0
+        self.failsafe = False
+        self.loss_timeout, self.loss_action = options.loss_timeout, options.loss_action
+        self.proximity = Proximity(scenario)
+        self.frame = LocalFrame(*options.origin)
+        self.unix_start_us = time.time_ns() // 1000  # when simulated time was 0
+        vehicle = scenario.vehicle
+        self._limits = tuple(zip((-vehicle.thrust_min).tolist(), vehicle.thrust_max.tolist(), strict=True))
+        self._orders = orders if options.commands and live and scenario.commands.enabled else None
+        self._said: dict[str, float] = {}
+        self._said_lately: deque[float] = deque(maxlen=_TEXTS)
+        self._text_id = 0
+        self.restart()
+
+    def restart(self) -> None:
+        """Forget what belongs to a run, as at its beginning."""
+        self.waited_us = 0
+        self.view = View(self.layout, self.layout.first_row(self.scenario))
+        self.seen = False
+        self.settings = LiveSettings(self.scenario)
+        self.home = (0.0, 0.0)
+        self.plan: tuple[MissionItem, ...] = ()
+        self.course: tuple[Item, ...] = ()
+        self.sticks: Vector6 = (0.0,) * 6
+        self._run = 0 if self._orders is None else self._orders.run
+        self._wished: tuple[float, Mode] | None = None
+        self._armed_before = self.view.armed
+        self._mode_before: Mode = self.view.mode
+
+    # ---- how things stand ----
+
+    @property
+    def heeds(self) -> bool:
+        """Whether it takes orders at all."""
+        return self._orders is not None
+
+    @property
+    def outlived(self) -> bool:
+        """Whether the run is over that it knows: it gives orders again once it has seen the next one."""
+        return self._orders is not None and self._orders.run != self._run
+
+    @property
+    def armed(self) -> bool:
+        """As the snapshot has it; before there is one, as ordered."""
+        return self.view.armed if self.seen else self._armed_before
+
+    @property
+    def mode(self) -> Mode:
+        """As the snapshot has it; before there is one, as ordered."""
+        return self.view.mode if self.seen else self._mode_before
+
+    @property
+    def mode_ahead(self) -> Mode:
+        """The mode once the orders on their way are followed."""
+        if self._wished is not None and self.now - self._wished[0] <= _WISH_LASTS:
+            return self._wished[1]
+        return self.mode
+
+    def look(self, row: Array) -> None:
+        """Take the next snapshot."""
+        self.view, self.seen = View(self.layout, row, self.waited_us), True
+        if self._wished is not None and self._wished[1] == self.view.mode:
+            self._wished = None
+
+    def home_ned(self) -> Vector3:
+        """Return where home is [m, NED]."""
+        return self.home[0], self.home[1], 0.0
+
+    def thrust_parts(self) -> list[float]:
+        """Return what each thruster gives, as a part of the vehicle's limit on that side, from -1 to 1."""
+        parts = []
+        for force, (backwards, forwards) in zip(self.view.thruster_forces, self._limits, strict=True):
+            limit = forwards if force > 0.0 else backwards
+            parts.append(max(-1.0, min(1.0, force / limit)) if limit > 0.0 else 0.0)
+        return parts
+
+    # ---- orders ----
+
+    def give(self, *orders: Order) -> int:
+        """Give orders, which are followed at the next step.
+
+        Parameters
+        ----------
+        *orders : Order
+            In this order.
+
+        Returns
+        -------
+        int
+            MAV_RESULT: accepted, denied where there are no orders to be given or the numbers cannot be, or temporarily
+            rejected where the queue is full or the run is over.
+        """
+        m = self.mavlink
+        if self._orders is None:
+            self.deny("commands are off: start with --commands" if self.live else "this is a recorded run", "off")
+            return int(m.MAV_RESULT_DENIED)
+        for order in orders:
+            try:
+                if not self._orders.give(order, self._run):
+                    self.deny("the run is over" if self.outlived else "too many orders at once", "full")
+                    return int(m.MAV_RESULT_TEMPORARILY_REJECTED)
+            except OrderError as error:
+                self.deny(str(error), "order")
+                return int(m.MAV_RESULT_DENIED)
+            self._foresee(order)
+        return int(m.MAV_RESULT_ACCEPTED)
+
+    def _foresee(self, order: Order) -> None:
+        match order:
+            case Arm():
+                self._armed_before = order.armed
+            case Steer():
+                self._foresee_mode(order.mode)
+            case Aim():
+                self._foresee_mode("reach")
+
+    def _foresee_mode(self, mode: Mode) -> None:
+        self._wished = None if mode == self.mode else (self.now, mode)
+        self._mode_before = mode
+
+    # ---- the voice ----
+
+    def send(self, message: Any) -> None:
+        """Send a message on every link."""
+        for link in self.links:
+            link.send(message)
+
+    def say(self, text: str, severity: int | None = None, key: str = "", every: float = 0.0) -> None:
+        """Send a text on every link, as STATUSTEXT, in parts if it is long.
+
+        Parameters
+        ----------
+        text : str
+            One line.
+        severity : int, optional
+            MAV_SEVERITY; default: information.
+        key : str
+            Texts of the same key are throttled together.
+        every : float
+            Seconds of the wall clock between two of a key.
+        """
+        if every and self.now - self._said.get(key, -every) < every:
+            return
+        if len(self._said_lately) == _TEXTS and self.now - self._said_lately[0] < _TEXTS_PERIOD:
+            return
+        self._said_lately.append(self.now)
+        if every:
+            self._said[key] = self.now
+        for message in self.text(text, severity):
+            self.send(message)
+
+    def deny(self, reason: str, key: str) -> None:
+        """Say why something is refused; not more often than every two seconds for a kind of reason."""
+        self.say(f"Refused: {reason}", self.mavlink.MAV_SEVERITY_WARNING, f"deny {key}", 2.0)
+
+    def text(self, text: str, severity: int | None = None) -> list[Any]:
+        """Return the STATUSTEXT messages of a text."""
+        level = self.mavlink.MAV_SEVERITY_INFO if severity is None else severity
+        text = text[:_LONGEST_TEXT]
+        if len(text) <= _CHUNK:
+            return [self.make("STATUSTEXT", level, text, 0, 0)]
+        self._text_id = self._text_id % 0xFFFF + 1
+        parts = [text[i : i + _CHUNK] for i in range(0, len(text), _CHUNK)]
+        if len(parts[-1]) == _CHUNK:
+            parts.append("")  # a part that is not full is the last one
+        return [self.make("STATUSTEXT", level, part, self._text_id, i) for i, part in enumerate(parts)]

@@ -1,0 +1,229 @@
+"""A snapshot of the run, by named quantities."""
+
+from __future__ import annotations
+
+import math
+from functools import cached_property
+
+from cosim.mavlink.vehicle.layout import Layout
+from cosim.scenario.scenario import CRITERIA
+from cosim.scenario.tables import Vector3
+from cosim.simulation.commands.commands import MODES, Mode
+from cosim.simulation.signals import Array
+
+_MICRO = 1e6
+_LONGEST = 1e12  # s; a time beyond it is none
+_HALF_TURN = 2.0 * math.pi
+
+
+class View:
+    """One row, by named quantities; whatever the numbers are, none of them raises.
+
+    Parameters
+    ----------
+    layout : Layout
+        Of the row.
+    row : ndarray, shape (n,)
+        Of a step; copied.
+    waited_us : int
+        For how long arming was awaited before simulated time began [µs].
+    """
+
+    def __init__(self, layout: Layout, row: Array, waited_us: int = 0) -> None:
+        self._layout, self._row, self._waited_us = layout, row.tolist(), waited_us
+
+    def number(self, name: str, otherwise: float = 0.0) -> float:
+        """Return a column's value, or something else where the row has no such column."""
+        at = self._layout.at.get(name)
+        return otherwise if at is None else self._row[at]
+
+    def _several(self, first: str, n: int) -> list[float]:
+        at = self._layout.at.get(first)
+        return [0.0] * n if at is None else self._row[at : at + n]
+
+    def _three(self, first: str) -> Vector3:
+        x, y, z = self._several(first, 3)
+        return x, y, z
+
+    @cached_property
+    def boot_us(self) -> int:
+        """Time since boot [µs]: what was waited, and simulated time, unless that is no number."""
+        return self._waited_us + self.simulated_us
+
+    @cached_property
+    def simulated_us(self) -> int:
+        """Simulated time [µs]; 0 if it is no number."""
+        time = self._row[0]
+        return round(time * _MICRO) if 0.0 <= time <= _LONGEST else 0
+
+    # ---- pose and motion ----
+
+    @property
+    def position_ned(self) -> Vector3:
+        """Of the body origin [m]."""
+        return self._three("position.x")
+
+    @property
+    def quaternion(self) -> list[float]:
+        """From body to world, scalar first."""
+        return self._several("quaternion.e0", 4)
+
+    @property
+    def euler(self) -> Vector3:
+        """Roll, pitch and yaw [rad]."""
+        return self._three("attitude.roll")
+
+    @property
+    def velocity_body(self) -> Vector3:
+        """Over ground [m/s]."""
+        return self._three("velocity.u")
+
+    @property
+    def rates(self) -> Vector3:
+        """About the body's axes [rad/s]."""
+        return self._three("velocity.p")
+
+    @cached_property
+    def _rotation(self) -> tuple[Vector3, Vector3, Vector3]:
+        """R from body to world, (3): plain numbers, since arrays of nine take longer."""
+        e0, e1, e2, e3 = self.quaternion
+        return (
+            (1.0 - 2.0 * (e2 * e2 + e3 * e3), 2.0 * (e1 * e2 - e0 * e3), 2.0 * (e1 * e3 + e0 * e2)),
+            (2.0 * (e1 * e2 + e0 * e3), 1.0 - 2.0 * (e1 * e1 + e3 * e3), 2.0 * (e2 * e3 - e0 * e1)),
+            (2.0 * (e1 * e3 - e0 * e2), 2.0 * (e2 * e3 + e0 * e1), 1.0 - 2.0 * (e1 * e1 + e2 * e2)),
+        )
+
+    def to_world(self, vector_body: Vector3) -> Vector3:
+        """Turn a vector from the body's axes into the world's, NED."""
+        (a, b, c), (d, e, f), (g, h, i) = self._rotation
+        x, y, z = vector_body
+        return a * x + b * y + c * z, d * x + e * y + f * z, g * x + h * y + i * z
+
+    def to_body(self, vector_ned: Vector3) -> Vector3:
+        """Turn a vector from the world's axes, NED, into the body's."""
+        (a, b, c), (d, e, f), (g, h, i) = self._rotation
+        x, y, z = vector_ned
+        return a * x + d * y + g * z, b * x + e * y + h * z, c * x + f * y + i * z
+
+    @cached_property
+    def velocity_ned(self) -> Vector3:
+        """Over ground [m/s], (15)."""
+        return self.to_world(self.velocity_body)
+
+    @cached_property
+    def heading(self) -> float:
+        """Yaw from 0 to 2 pi [rad]; NaN if it is no number."""
+        yaw = self.euler[2]
+        return yaw % _HALF_TURN if math.isfinite(yaw) else math.nan
+
+    # ---- what sensors say ----
+
+    @property
+    def depth(self) -> float:
+        """From the pressure sensor [m]."""
+        return self.number("measured.depth", self.position_ned[2])
+
+    @property
+    def acceleration(self) -> Vector3:
+        """Specific force from the IMU, body frame [m/s2]."""
+        return self._three("measured.acceleration.x")
+
+    @property
+    def measured_rates(self) -> Vector3:
+        """From the IMU's gyros [rad/s]."""
+        return self._three("measured.angular_velocity.p")
+
+    @property
+    def altitude(self) -> float:
+        """From the DVL: height above the bottom [m]."""
+        return self.number("measured.altitude", math.inf)
+
+    @property
+    def touches_bottom(self) -> bool:
+        """Whether the hull is on the bottom."""
+        return self.number("bottom_contact") > 0.0
+
+    # ---- what drives it ----
+
+    @property
+    def thruster_forces(self) -> list[float]:
+        """Of each thruster [N]."""
+        return self._several("thruster_force[1]", self._layout.thrusters)
+
+    @property
+    def thruster_commands(self) -> list[float]:
+        """Asked of each thruster [N]."""
+        return self._several("thrust[1]", self._layout.thrusters)
+
+    @property
+    def wrench(self) -> list[float]:
+        """That the law asks for, body frame [N, N m], shape (6,)."""
+        return self._several("command.X", 6)
+
+    @property
+    def saturated(self) -> bool:
+        """Whether a limit cuts what is asked for."""
+        return any(self._row[i] > 0.0 for i in self._layout.saturations)
+
+    # ---- what law and arbiter say ----
+
+    @property
+    def region_values(self) -> list[float]:
+        """Of the goal, then of each region: g, above 0 where violated."""
+        return self._several("goal.value", 1 + len(self._layout.regions))
+
+    @property
+    def clearances(self) -> list[float]:
+        """Of the goal, then of each region: 0 or above where satisfied [m or rad]."""
+        return self._several("goal.clearance", 1 + len(self._layout.regions))
+
+    @property
+    def memberships(self) -> list[float]:
+        """Of the criteria."""
+        return self._several(f"membership.{CRITERIA[0]}", len(CRITERIA))
+
+    @property
+    def weights(self) -> list[float]:
+        """Of the criteria."""
+        return self._several(f"weight.{CRITERIA[0]}", len(CRITERIA))
+
+    @property
+    def estimate(self) -> list[float]:
+        """Of phi in (12) [N, N m], shape (4,)."""
+        return self._several("estimate.phi1", 4)
+
+    def reports(self) -> list[tuple[str, float]]:
+        """Return what the law says of itself, by column."""
+        return [(name, self.number(name)) for name in self._layout.reports]
+
+    def shift(self, region: str) -> Vector3:
+        """Return how far a region, or ``"goal"``, is from where the scenario has it [m, NED]."""
+        return self._three(f"{region}.shift.x")
+
+    # ---- the helm ----
+
+    @property
+    def armed(self) -> bool:
+        """Whether the thrusters may work."""
+        return self.number("helm.armed", 1.0) > 0.0
+
+    @property
+    def mode(self) -> Mode:
+        """Who steers."""
+        number = self.number("helm.mode", float(MODES.index("reach")))
+        return MODES[int(number)] if 0.0 <= number < len(MODES) else "reach"
+
+    @property
+    def item(self) -> int:
+        """Item of the mission; -1 for none."""
+        number = self.number("helm.item", -1.0)
+        return int(number) if 0.0 <= number < 1e6 else -1
+
+    @property
+    def target(self) -> Vector3:
+        """Middle of the target region [m, NED]."""
+        if "target.x" in self._layout.at:
+            return self._three("target.x")
+        x, y, z = self._layout.goal_middle
+        dx, dy, dz = self.shift("goal")
+        return x + dx, y + dy, z + dz

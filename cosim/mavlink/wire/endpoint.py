@@ -1,0 +1,104 @@
+"""Where a MAVLink link leads, as the user writes it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+from cosim.errors import TelemetryError
+from cosim.io.network_address import resolved
+
+Kind = Literal["udpout", "udpin", "tcpin", "tcp", "serial", "tlog"]
+
+_FORMS = "udpout:, udpin:, tcpin: or tcp:HOST:PORT, serial:DEVICE[:BAUD], or a file ending in .tlog"
+_NETWORK: dict[str, Kind] = {"udpout": "udpout", "udpin": "udpin", "tcpin": "tcpin", "tcp": "tcp", "tcpout": "tcp"}
+_BAUD = 57600  # what telemetry radios come with
+_MOST_BAUD = 4_000_000
+
+
+@dataclass(frozen=True)
+class Endpoint:
+    """One way out of the process.
+
+    `host` and `port` are those of networks, the host as an IPv4 address; `path` is that of a serial device, with its
+    `baud`, or of a file. `text` is what the user wrote.
+    """
+
+    kind: Kind
+    text: str
+    host: str = ""
+    port: int = 0
+    path: str = ""
+    baud: int = 0
+
+
+def parse_endpoint(text: str, allow_remote: bool = False) -> Endpoint:
+    """Return what an endpoint such as ``udpout:127.0.0.1:14550`` says.
+
+    ``udpout`` and ``tcp`` speak to an address, ``udpin`` and ``tcpin`` listen on one. The spellings with ``//``
+    (``udpin://127.0.0.1:14550``, ``tcpout://``, ``serial:///dev/ttyUSB0:57600``) mean the same.
+
+    Parameters
+    ----------
+    text : str
+        As pymavlink, MAVProxy and MAVSDK write it.
+    allow_remote : bool
+        Accept addresses beyond this machine, and listening for them: MAVLink has no privacy.
+
+    Returns
+    -------
+    Endpoint
+        Host names are resolved in it.
+
+    Raises
+    ------
+    TelemetryError
+        If it is none, leaves this machine without leave, or names a file that exists.
+    """
+    if text.endswith(".tlog"):
+        return Endpoint("tlog", text, path=_new_file(text))
+    kind, _, rest = text.partition(":")
+    rest = rest.removeprefix("//")
+    if kind == "serial":
+        device, baud = _serial(text, rest)
+        return Endpoint("serial", text, path=device, baud=baud)
+    if kind not in _NETWORK:
+        raise TelemetryError(f"endpoint {text!r}: expected {_FORMS}")
+    host, _, port = rest.rpartition(":")
+    if not host or not (port.isascii() and port.isdecimal() and 0 < int(port[:6]) < 65536):
+        raise TelemetryError(f"endpoint {text!r}: expected {kind}:HOST:PORT, such as {kind}:127.0.0.1:14550")
+    return Endpoint(_NETWORK[kind], text, host=_address(text, host, allow_remote), port=int(port))
+
+
+def _address(text: str, host: str, allow_remote: bool) -> str:
+    """Return the IPv4 address of a host, which is this machine unless others are allowed."""
+    try:
+        address, here = resolved(host)
+    except OSError as error:
+        raise TelemetryError(f"endpoint {text!r}: host {host!r} is not known: {error}") from error
+    if not (allow_remote or here):
+        raise TelemetryError(f"endpoint {text!r}: {address} is beyond this machine; --allow-remote lets it through")
+    return address
+
+
+def _serial(text: str, rest: str) -> tuple[str, int]:
+    device, colon, baud = rest.rpartition(":")
+    if not colon:
+        device, baud = rest, str(_BAUD)
+    if not device or not (baud.isascii() and baud.isdecimal() and 0 < int(baud[:8]) <= _MOST_BAUD):
+        raise TelemetryError(f"endpoint {text!r}: expected serial:DEVICE[:BAUD], such as serial:/dev/ttyUSB0:57600")
+    return device, int(baud)
+
+
+def _new_file(text: str) -> str:
+    path = Path(text)
+    try:
+        exists = path.exists()
+    except OSError as error:  # such as a name that is too long
+        raise TelemetryError(f"endpoint {text!r}: {error.strerror or error}") from error
+    if exists:
+        raise TelemetryError(f"endpoint {text!r}: the file exists; a log is never overwritten")
+    if not path.parent.is_dir():
+        raise TelemetryError(f"endpoint {text!r}: there is no folder {str(path.parent)!r}")
+    return text

@@ -1,0 +1,309 @@
+"""Bytes to frames to messages: the cheapest checks first, and nothing that comes can raise."""
+
+from __future__ import annotations
+
+import re
+import struct
+from collections.abc import Iterator
+from dataclasses import dataclass, field, fields
+from functools import cache
+from typing import Any, NamedTuple
+
+from cosim.mavlink.wire.dialect import dialect
+from cosim.mavlink.wire.signing import Verifier
+
+V1, V2 = 0xFE, 0xFD  # what a frame begins with
+_SIGNED = 0x01  # of the flags that one must understand
+_SIGNATURE = 13  # bytes
+_CRC = 2  # bytes
+_SETUP_SIGNING = 256
+_V2_HEADER = struct.Struct("<BBBxxBBHB")  # marker, length, flags, system, component, id in two parts
+_V2_WHOLE = struct.Struct("<BBBBBBBHB")  # the same with what is skipped there: further flags and sequence number
+_V1_HEADER = struct.Struct("<BBxBBB")  # marker, length, system, component, id
+_HEADERS = {b"\xfd": _V2_HEADER.size, b"\xfe": _V1_HEADER.size}
+_MARKER = re.compile(rb"[\xfd\xfe]")
+
+
+class Kind(NamedTuple):
+    """What the cheap checks know of a message."""
+
+    crc_extra: int
+    size: int  # bytes of the payload at the most
+    target: int | None  # where in it the system is named that it is meant for
+
+
+class Header(NamedTuple):
+    """Who sent a frame, and what it is; offsets are from its first byte."""
+
+    size: int  # bytes of the whole frame
+    payload: int  # where it begins
+    end: int  # where it ends, and the checksum begins
+    signed: bool
+    system: int
+    component: int
+    message: int  # its id
+
+
+@dataclass(slots=True)
+class Counts:
+    """Frames that came, by what became of them."""
+
+    accepted: int = 0
+    foreign: int = field(default=0, metadata={"words": "for another system"})
+    own: int = field(default=0, metadata={"words": "of our own"})
+    unknown: int = field(default=0, metadata={"words": "of an unknown kind"})
+    malformed: int = field(default=0, metadata={"words": "malformed"})
+    checksum: int = field(default=0, metadata={"words": "with a wrong checksum"})
+    system: int = field(default=0, metadata={"words": "of a system that is not allowed"})
+    unsigned: int = field(default=0, metadata={"words": "unsigned"})
+    forged: int = field(default=0, metadata={"words": "forged"})
+    replayed: int = field(default=0, metadata={"words": "replayed"})
+    old: int = field(default=0, metadata={"words": "too old"})
+    crowded: int = field(default=0, metadata={"words": "of too many signing streams"})
+    setup_signing: int = field(default=0, metadata={"words": "that would change the key"})
+
+    def refused(self) -> dict[str, int]:
+        """Return how many were refused for a reason that is worth a word, by that reason."""
+        innocent = ("accepted", "foreign", "own", "unknown")
+        reasons = [item for item in fields(self) if item.name not in innocent]
+        return {item.metadata["words"]: getattr(self, item.name) for item in reasons if getattr(self, item.name)}
+
+
+@cache
+def kinds() -> dict[int, Kind]:
+    """Return what is known of each message of the dialect, by its id."""
+    return {
+        number: Kind(message.crc_extra, message.unpacker.size, _target(message))
+        for number, message in dialect().mavlink_map.items()
+    }
+
+
+def _target(message: Any) -> int | None:
+    """Return where in a payload the target system stands."""
+    name = "target" if message.msgname == "MANUAL_CONTROL" else "target_system"
+    if name not in message.fieldnames:
+        return None
+    offset = 0
+    for other, array in zip(message.ordered_fieldnames, message.array_lengths, strict=True):
+        if other == name:
+            return offset
+        kind = message.fieldtypes[message.fieldnames.index(other)]
+        offset += _SIZES[kind] * (array or 1)
+    return None
+
+
+_SIZES = {"char": 1, "uint8_t": 1, "int8_t": 1, "uint16_t": 2, "int16_t": 2, "uint32_t": 4, "int32_t": 4,
+          "uint64_t": 8, "int64_t": 8, "float": 4, "double": 8}  # fmt: skip
+
+
+def header_at(data: bytes, at: int) -> Header | None:
+    """Return what the header at an offset says, None if there is no whole one."""
+    marker, left = data[at], len(data) - at
+    if marker == V2 and left >= _V2_HEADER.size:
+        _, length, flags, system, component, low, high = _V2_HEADER.unpack_from(data, at)
+        if flags & ~_SIGNED:
+            return None
+        signed, end = bool(flags), _V2_HEADER.size + length
+        return Header(
+            end + _CRC + _SIGNATURE * signed, _V2_HEADER.size, end, signed, system, component, low | high << 16
+        )
+    if marker == V1 and left >= _V1_HEADER.size:
+        _, length, system, component, message = _V1_HEADER.unpack_from(data, at)
+        end = _V1_HEADER.size + length
+        return Header(end + _CRC, _V1_HEADER.size, end, False, system, component, message)
+    return None
+
+
+class Framer:
+    """Makes frames of messages, unsigned, as pymavlink makes them, in less than half the time.
+
+    Parameters
+    ----------
+    source : (int, int)
+        System and component that sends them.
+
+    Attributes
+    ----------
+    seq : int
+        Of the next frame, 0 to 255.
+    """
+
+    def __init__(self, source: tuple[int, int]) -> None:
+        self._source = source
+        self._crc = dialect().x25crc
+        self._message = 0
+        self.seq = 0
+
+    def frame(self, message: Any) -> bytes:
+        """Return a message as a frame.
+
+        Raises
+        ------
+        struct.error, OverflowError, IndexError, TypeError, ValueError
+            If a field cannot hold its value.
+        """
+        self._message = message.get_msgId()  # its `id` may be a field
+        message._pack = self._framed  # which the message's own `pack` calls with its payload
+        try:
+            framed: bytes = message.pack(None)
+        finally:
+            del message._pack  # another link may sign it
+        return framed
+
+    def _framed(self, codec: None, crc_extra: int, payload: bytes, force_mavlink1: bool = False) -> bytes:
+        payload = payload.rstrip(b"\0") or payload[:1]  # zeros at the end are not sent
+        system, component = self._source
+        number = self._message & 0xFFFF, self._message >> 16
+        body = _V2_WHOLE.pack(V2, len(payload), 0, 0, self.seq, system, component, *number) + payload
+        crc: int = self._crc(body[1:] + bytes((crc_extra,))).crc
+        return body + crc.to_bytes(_CRC, "little")
+
+
+class Gate:
+    """Decides which frames are heeded, and decodes these.
+
+    Parameters
+    ----------
+    counts : Counts
+        Told of each frame.
+    own : (int, int), optional
+        System and component that we are: frames of ourselves, and those for other systems, are not for us. Default:
+        whatever comes is looked at.
+    allowed : frozenset of int, optional
+        Systems that are heeded; default: all.
+    verifier : Verifier, optional
+        Of signatures; with it, what is not signed with its key is refused, and so is all of MAVLink 1.
+    """
+
+    def __init__(
+        self,
+        counts: Counts,
+        own: tuple[int, int] | None = None,
+        allowed: frozenset[int] | None = None,
+        verifier: Verifier | None = None,
+    ) -> None:
+        self.counts = counts
+        self._own, self._allowed, self._verifier = own, allowed, verifier
+        mavlink = dialect()
+        self.kinds = kinds()
+        self._crc, self._error = mavlink.x25crc, mavlink.MAVError
+        self._codec = mavlink.MAVLink(None)
+
+    def datagram(self, data: bytes) -> Iterator[tuple[bytes, Any]]:
+        """Yield the frames of a datagram that are heeded, and what they say.
+
+        Frames stand in it one after the other. Nothing is looked for between them: what is broken costs no more than
+        the rest of its own datagram.
+        """
+        at = 0
+        while at < len(data):
+            header = header_at(data, at)
+            if header is None or at + header.size > len(data):
+                self.counts.malformed += 1
+                return
+            frame = data[at : at + header.size]
+            if header.message not in self.kinds:
+                self.counts.unknown += 1
+            elif self._is_for_us(frame, header):
+                if self.is_intact(frame, header):
+                    yield from self._judged(frame, header)
+                else:
+                    self.counts.checksum += 1
+            at += header.size
+
+    def frame(self, frame: bytes, header: Header) -> Iterator[tuple[bytes, Any]]:
+        """Yield an intact frame, and what it says, if it is heeded."""
+        if self._is_for_us(frame, header):
+            yield from self._judged(frame, header)
+
+    def is_intact(self, frame: bytes, header: Header) -> bool:
+        """Return whether the checksum of a frame of a known message is right, and in MAVLink 1 its length can be."""
+        if frame[0] == V1 and header.end - header.payload > self.kinds[header.message].size:
+            return False
+        crc = self._crc(frame[1 : header.end])
+        crc.accumulate(bytes((self.kinds[header.message].crc_extra,)))
+        return bool(crc.crc == frame[header.end] | frame[header.end + 1] << 8)
+
+    def _is_for_us(self, frame: bytes, header: Header) -> bool:
+        target = self.kinds[header.message].target
+        if self._own is not None and target is not None:
+            where = header.payload + target
+            system = frame[where] if where < header.end else 0  # zeros at the end of a payload are not sent
+            if system not in (0, self._own[0]):  # 0 is everybody; each component of ours is answered for
+                self.counts.foreign += 1
+                return False
+        if (header.system, header.component) == self._own:
+            self.counts.own += 1
+            return False
+        if self._allowed is not None and header.system not in self._allowed:
+            self.counts.system += 1
+            return False
+        return True
+
+    def _judged(self, frame: bytes, header: Header) -> Iterator[tuple[bytes, Any]]:
+        """Yield a frame, and what it says, if it is signed as it must be and can be decoded."""
+        counts = self.counts
+        if self._verifier is not None:
+            refusal = self._verifier.judge(frame, header.system, header.component, header.signed)
+            if refusal is not None:
+                setattr(counts, refusal.value, getattr(counts, refusal.value) + 1)
+                return
+        if header.message == _SETUP_SIGNING:
+            counts.setup_signing += 1
+            return
+        try:
+            message = self._codec.decode(bytearray(frame))
+        except self._error:
+            counts.malformed += 1
+            return
+        counts.accepted += 1
+        yield frame, message
+
+
+class StreamReader:
+    """Finds the frames in a stream of bytes; what is none costs no frame behind it.
+
+    Parameters
+    ----------
+    gate : Gate
+        Which they must pass.
+    """
+
+    def __init__(self, gate: Gate) -> None:
+        self._gate = gate
+        self._rest = b""  # the beginning of a frame, less than the greatest one
+        self._lost = False  # since the last frame; each loss counts once
+
+    def read(self, data: bytes) -> Iterator[tuple[bytes, Any]]:
+        """Yield the heeded frames that `data` completes, and what they say. Exhaust it before the next call."""
+        data, at = self._rest + data, 0
+        self._rest = b""
+        while True:
+            marker = _MARKER.search(data, at)
+            start = len(data) if marker is None else marker.start()
+            if start > at:
+                self._lose("malformed")
+            at = start
+            if len(data) - at < _HEADERS.get(data[at : at + 1], 1):
+                break
+            header = header_at(data, at)
+            if header is None or header.message not in self._gate.kinds:
+                self._lose("malformed" if header is None else "unknown")
+                at += 1
+                continue
+            if at + header.size > len(data):
+                break
+            frame = data[at : at + header.size]
+            if not self._gate.is_intact(frame, header):
+                self._lose("checksum")
+                at += 1
+                continue
+            self._lost = False
+            at += header.size
+            yield from self._gate.frame(frame, header)
+        self._rest = data[at:]
+
+    def _lose(self, reason: str) -> None:
+        if not self._lost:
+            self._lost = True
+            setattr(self._gate.counts, reason, getattr(self._gate.counts, reason) + 1)

@@ -1,0 +1,123 @@
+"""The ground's end of a link: hears any vehicle, and speaks to it."""
+
+from __future__ import annotations
+
+import time
+from types import TracebackType
+from typing import Any, NamedTuple
+
+from cosim.mavlink.wire.dialect import dialect
+from cosim.mavlink.wire.endpoint import Endpoint
+from cosim.mavlink.wire.framing import V2, Counts, Gate
+from cosim.mavlink.wire.link import Link, Signer, open_channel
+from cosim.mavlink.wire.signing import SigningClock, Verifier
+
+_AT_ONCE = 512  # messages that one call takes
+_PAUSE = 0.001  # s, between two looks at a link on which nothing is
+_LONGEST = 0.05  # s, that reading goes on without a pause
+
+Identity = tuple[int, int]
+GROUND_STATION: Identity = (255, 190)  # QGroundControl's system and component
+
+
+class Heard(NamedTuple):
+    """A message, and where it came from."""
+
+    time: float  # s, time.monotonic()
+    system: int
+    component: int
+    sequence: int
+    kind: str  # such as HEARTBEAT
+    message: Any
+
+
+class GroundLink:
+    """A ground station's end of an endpoint.
+
+    Parameters
+    ----------
+    endpoint : Endpoint
+        A network or a serial device.
+    key : bytes, optional
+        To sign with; then only what is signed with it is heard. Default: all is.
+    identity : (int, int)
+        System and component that we are.
+
+    Attributes
+    ----------
+    channel : Channel
+        That carries the frames.
+    old : int
+        Frames of MAVLink 1 that were heard.
+    counts : Counts
+        What became of the frames that came.
+
+    Raises
+    ------
+    TelemetryError
+        If it cannot be opened.
+    """
+
+    def __init__(self, endpoint: Endpoint, key: bytes | None = None, identity: Identity = GROUND_STATION) -> None:
+        self.name, self.identity = endpoint.text, identity
+        self.counts, self.old = Counts(), 0
+        clock = SigningClock()
+        gate = Gate(self.counts, verifier=None if key is None else Verifier(key, clock))
+        self.channel, _ = open_channel(endpoint)
+        signer = None if key is None else Signer(key, clock, link=0)
+        self._link = Link(endpoint.text, self.channel, gate, identity, signer=signer)
+        self.speaks_first = endpoint.kind in ("udpout", "tcp", "serial")  # the vehicle may not know of us before
+        m = dialect()
+        self._beat = m.MAVLink_heartbeat_message(m.MAV_TYPE_GCS, m.MAV_AUTOPILOT_INVALID, 0, 0, m.MAV_STATE_ACTIVE, 3)
+
+    def receive(self, timeout: float) -> list[Heard]:
+        """Return what has come, waiting for the first of it.
+
+        Parameters
+        ----------
+        timeout : float
+            For how long at the most [s].
+
+        Returns
+        -------
+        list of Heard
+            In the order in which it came; empty if nothing did.
+        """
+        deadline = time.monotonic() + timeout
+        while True:
+            now = time.monotonic()
+            self.channel.tend(now)
+            found: list[Heard] = []
+            for frame, message in self._link.receive(time.perf_counter() + _LONGEST):
+                self.old += frame[0] != V2
+                sender = message.get_srcSystem(), message.get_srcComponent()
+                found.append(Heard(time.monotonic(), *sender, message.get_seq(), message.get_type(), message))
+                if len(found) == _AT_ONCE:
+                    break
+            if found or now >= deadline:
+                return found
+            time.sleep(min(_PAUSE, max(0.0, deadline - now)))
+
+    def send(self, message: Any) -> bool:
+        """Send a message; return whether it went out."""
+        return self._link.send(message)
+
+    def beat(self) -> None:
+        """Send a ground station's heartbeat."""
+        self._link.send(self._beat)
+
+    def troubles(self) -> list[str]:
+        """Return what did not go out or come in, and how often, in words."""
+        return self._link.troubles()
+
+    def close(self) -> None:
+        """Close it. May be called twice."""
+        self.channel.close()
+
+    def __enter__(self) -> GroundLink:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()

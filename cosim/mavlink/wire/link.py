@@ -1,0 +1,266 @@
+"""One endpoint as a link: frames of its own sequence, signed if asked for, within a budget."""
+
+from __future__ import annotations
+
+import logging
+import struct
+import time
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any, Final
+from weakref import WeakKeyDictionary
+
+from cosim.mavlink.channels.channel import Channel
+from cosim.mavlink.channels.serial import Serial
+from cosim.mavlink.channels.tcp import TcpIn, TcpOut
+from cosim.mavlink.channels.tlog import Tlog
+from cosim.mavlink.channels.udp import UdpIn, UdpOut
+from cosim.mavlink.wire.dialect import dialect
+from cosim.mavlink.wire.endpoint import Endpoint
+from cosim.mavlink.wire.framing import Counts, Framer, Gate, StreamReader
+from cosim.mavlink.wire.options import MavlinkOptions
+from cosim.mavlink.wire.signing import SigningClock, Verifier
+
+log = logging.getLogger(__name__)
+
+COMPONENT_ID = 1  # MAV_COMP_ID_AUTOPILOT1, the only one that ground stations take for a vehicle
+BUDGET = 200_000.0  # bytes/s, of the wall clock, into a network
+_BURST = 0.5  # s of the budget, that can go at once
+_RESERVED = 0.25  # of it, which streams and lists leave to answers
+_ANSWERS = frozenset(  # that go to the link on which they were asked for alone
+    ("AUTOPILOT_VERSION", "AVAILABLE_MODES", "COMMAND_ACK", "FILE_TRANSFER_PROTOCOL", "MESSAGE_INTERVAL",
+     "MISSION_ACK", "MISSION_COUNT", "MISSION_ITEM_INT", "MISSION_REQUEST_INT", "PARAM_ERROR", "PARAM_VALUE", "PING",
+     "TIMESYNC")
+)  # fmt: skip
+_FIRST = frozenset(
+    {
+        "HEARTBEAT", "STATUSTEXT", "COMMAND_ACK", "PARAM_VALUE", "PARAM_ERROR", "FILE_TRANSFER_PROTOCOL", "TIMESYNC",
+        "MISSION_COUNT", "MISSION_ITEM_INT", "MISSION_REQUEST_INT", "MISSION_REQUEST", "MISSION_ACK",
+    }
+)  # fmt: skip
+_UNENCODABLE = (struct.error, OverflowError, IndexError, TypeError, ValueError)  # a field that cannot hold its value
+
+
+class Budget:
+    """Bytes that may be sent now: so many a second, and some at once.
+
+    Parameters
+    ----------
+    rate : float
+        [bytes/s].
+    """
+
+    def __init__(self, rate: float) -> None:
+        self._rate, self._most = rate, rate * _BURST
+        self._left = self._most
+        self._last = time.monotonic()
+
+    @property
+    def plenty(self) -> bool:
+        """Whether more is there than what is left to answers."""
+        self._refill()
+        return self._left >= _RESERVED * self._most
+
+    def _refill(self) -> None:
+        now = time.monotonic()
+        self._left = min(self._most, self._left + (now - self._last) * self._rate)
+        self._last = now
+
+    def take(self, size: int, first: bool) -> bool:
+        """Take some, if there are; what does not come first leaves a quarter of the most to what does."""
+        self._refill()
+        if self._left - size < (0.0 if first else _RESERVED * self._most):
+            return False
+        self._left -= size
+        return True
+
+
+class Signer:
+    """Signs what goes out on one link.
+
+    Parameters
+    ----------
+    key : bytes
+        32 of them.
+    clock : SigningClock
+        Of the vehicle.
+    link : int
+        Id of the link: to a peer, each is a stream of its own.
+    """
+
+    def __init__(self, key: bytes, clock: SigningClock, link: int) -> None:
+        self._clock = clock
+        self._key, self._link = key, link % 256
+
+    def set_up(self, signing: Any) -> None:
+        """Tell a codec of pymavlink to sign."""
+        signing.secret_key, signing.link_id, signing.sign_outgoing = self._key, self._link, True
+
+    def stamp(self, signing: Any) -> None:
+        """Give the next frame its timestamp."""
+        signing.timestamp = self._clock.next()
+
+
+class Link:
+    """An endpoint with its peers; an Outlet.
+
+    Parameters
+    ----------
+    name : str
+        Such as ``udpout:127.0.0.1:14550``.
+    channel : Channel
+        Carries the frames; the link closes it.
+    gate : Gate
+        Lets in what is heeded.
+    source : (int, int)
+        System and component that we are.
+    budget : float, optional
+        Bytes a second of the wall clock; default: as many as come.
+    signer : Signer, optional
+        Default: nothing is signed.
+
+    Attributes
+    ----------
+    logs : list of Link
+        Logs that answers to what came on this link go into too; streams each link has of its own.
+    sent, dropped, unencodable : int
+        Messages that went to the channel, that the budget had no room for, and that have a value no field can hold.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        channel: Channel,
+        gate: Gate,
+        source: tuple[int, int],
+        budget: float | None = None,
+        signer: Signer | None = None,
+    ) -> None:
+        self.name: str = name
+        self.channel: Final = channel
+        self.counts: Final = gate.counts
+        self.logs: list[Link] = []
+        self.sent = self.dropped = self.unencodable = 0
+        self._gate, self._signer = gate, signer
+        self._budget = None if budget is None else Budget(budget)
+        self._framer = Framer(source)
+        self._codec = dialect().MAVLink(None, *source)
+        if signer is not None:
+            signer.set_up(self._codec.signing)
+        self._readers: WeakKeyDictionary[Any, StreamReader] = WeakKeyDictionary()
+        self._frames: Iterator[tuple[bytes, Any]] = iter(())  # of the bytes that came last
+        self._peer: Any = None  # where they came from
+        self._told: set[str] = set()  # of messages that could not be encoded
+
+    def has_room(self) -> bool:
+        """Return whether what can wait should go now."""
+        return self._budget is None or self._budget.plenty
+
+    def send(self, message: Any) -> bool:
+        """Encode, sign where that is asked for, and send a message; return whether it went to all peers."""
+        try:
+            frame = self._framer.frame(message) if self._signer is None else self._signed(message, self._signer)
+        except _UNENCODABLE as error:
+            self.unencodable += 1
+            if message.get_type() not in self._told:
+                self._told.add(message.get_type())
+                log.warning("MAVLink: %s cannot be encoded: %s", message.get_type(), error)
+            return False
+        if self._budget is not None and not self._budget.take(len(frame), message.get_type() in _FIRST):
+            self.dropped += 1
+            return False
+        self._framer.seq = (self._framer.seq + 1) % 256
+        self.sent += 1
+        sent = self.channel.send(frame)
+        if message.get_type() in _ANSWERS:
+            for tlog in self.logs:
+                tlog.send(message)
+        return sent
+
+    def _signed(self, message: Any, signer: Signer) -> bytes:
+        signer.stamp(self._codec.signing)
+        self._codec.seq = self._framer.seq
+        frame: bytes = message.pack(self._codec)
+        return frame
+
+    def receive(self, until: float) -> Iterator[tuple[bytes, Any]]:
+        """Yield frames that are heeded, and what they say, until nothing is left or a moment of `time.perf_counter`.
+
+        What is left by then comes at the next call.
+        """
+        while time.perf_counter() < until:
+            found = next(self._frames, None)
+            if found is not None:
+                self.channel.heard(self._peer)
+                yield found
+                continue
+            came = self.channel.receive()
+            if came is None:
+                return
+            self._peer, data = came
+            self._frames = self._gate.datagram(data) if self.channel.datagrams else self._reader().read(data)
+
+    def _reader(self) -> StreamReader:
+        """Return the reader of the peer whose bytes came last."""
+        reader = self._readers.get(self._peer)
+        if reader is None:
+            reader = self._readers[self._peer] = StreamReader(self._gate)
+        return reader
+
+    def troubles(self) -> list[str]:
+        """Return what did not go out or come in, and how often, in words."""
+        told = {"messages over the budget": self.dropped, "messages that could not be encoded": self.unencodable}
+        refused = {f"frames {reason}": n for reason, n in self.counts.refused().items()}
+        return [f"{n} {what}" for what, n in (told | refused | self.channel.trouble).items() if n]
+
+
+def open_links(endpoints: Sequence[Endpoint], options: MavlinkOptions) -> list[Link]:
+    """Open endpoints as links of one vehicle.
+
+    Parameters
+    ----------
+    endpoints : sequence of Endpoint
+        Where they lead.
+    options : MavlinkOptions
+        Who the vehicle is, whom it heeds, and the key, if there is one.
+
+    Returns
+    -------
+    list of Link
+        In their order.
+
+    Raises
+    ------
+    TelemetryError
+        If one cannot be opened; then none is.
+    """
+    source, key, clock = (options.system_id, COMPONENT_ID), options.key, SigningClock()
+    verifier = None if key is None else Verifier(key, clock)
+    links: list[Link] = []
+    try:
+        for i, endpoint in enumerate(endpoints):
+            gate = Gate(Counts(), source, options.allowed_systems, verifier)
+            channel, budget = open_channel(endpoint)
+            signer = None if key is None or endpoint.kind == "tlog" else Signer(key, clock, i)
+            links.append(Link(endpoint.text, channel, gate, source, budget, signer))
+    except BaseException:
+        for link in links:
+            link.channel.close()
+        raise
+    return links
+
+
+def open_channel(endpoint: Endpoint) -> tuple[Channel, float | None]:
+    """Return what carries the frames of an endpoint, and how many bytes a second it may carry.
+
+    Raises
+    ------
+    TelemetryError
+        If it cannot be opened.
+    """
+    if endpoint.kind == "tlog":
+        return Tlog(endpoint.path), None
+    if endpoint.kind == "serial":
+        return Serial(endpoint.path, endpoint.baud), endpoint.baud / 10  # start and stop bit go along
+    networks: dict[str, Callable[[str, int], Channel]]
+    networks = {"udpout": UdpOut, "udpin": UdpIn, "tcpin": TcpIn, "tcp": TcpOut}
+    return networks[endpoint.kind](endpoint.host, endpoint.port), BUDGET

@@ -1,0 +1,172 @@
+"""Whether the regions of a scenario can be satisfied: at the start, together, with the goal, and on the way."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from controller.regions import Region, of_attitude
+from cosim.precheck.finding import Finding, status
+from cosim.precheck.region_intersection import Overlap, box_about, box_within, search, way_exists
+from cosim.precheck.region_values import evaluated
+from cosim.scenario.scenario import Scenario
+
+Array = NDArray[np.float64]
+
+_ROOM = 3.0  # m, about start and regions, in which points and ways are sought
+_MOST_ROOM = 1e5  # m
+
+
+def region_findings(scenario: Scenario) -> Iterator[Finding]:
+    """Yield what stands in the way of satisfying the regions, as they are at time 0.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        Any.
+
+    Yields
+    ------
+    Finding
+        Start; goal with all regions; regions among each other; overlaps to be decided; way.
+    """
+    goal, start = scenario.goal_region, scenario.initial.position
+    regions = [secondary.region for secondary in scenario.regions]
+    placed = [region for region in regions if not of_attitude(region.shape)]  # the others close no place
+    low, high = _box(goal, placed, start)
+    moving = " Some move: this is how they are at time 0." if scenario.moving else ""
+    violated = [region for region in regions if _clearance(region, scenario) < 0.0]
+    yield from (_start(region, scenario) for region in violated)
+    yield from _common(goal, placed, low, high, moving)
+    yield from _between(placed, low, high)
+    yield _way(goal, [r for r in placed if r not in violated], [r.name for r in violated], start, low, high)
+
+
+def _box(goal: Region, regions: Sequence[Region], start: tuple[float, float, float]) -> tuple[Array, Array]:
+    """Return a box that holds the start, what has an end, and something of whatever is to be kept within."""
+    room = _ROOM
+    while True:
+        low, high = box_about([goal, *regions], [start], room)
+        wanted = [goal, *(region for region in regions if region.keep == "in")]
+        if room > _MOST_ROOM or all(search([region], low, high, tolerance=room).found for region in wanted):
+            return low, high
+        room *= 2.0
+
+
+def _clearance(region: Region, scenario: Scenario) -> float:
+    return float(evaluated([region], scenario.initial.position, scenario.initial.quaternion)[2][0])
+
+
+def _start(region: Region, scenario: Scenario) -> Finding:
+    start = scenario.initial.position
+    _, (gradient,), (clearance,) = evaluated([region], start, scenario.initial.quaternion)
+    turned = of_attitude(region.shape)
+    text = f"The start violates {region.name} by {-clearance:.3f} {'rad' if turned else 'm'}."
+    name, numbers = f"start, {region.name}", {"clearance": float(clearance)}
+    if not region.hard:
+        text += " It is soft: it pushes, and may be violated."
+        return Finding("regions", name, "note", text, numbers=numbers)
+    slope = float(np.linalg.norm(gradient))
+    if turned:
+        advice = f"Turn initial.quaternion, and law.desired_quaternion with it, by at least {-clearance:.3f} rad."
+    elif slope > 0.0:
+        to = np.array(start) + clearance / slope * gradient
+        advice = f"Move initial.position to about {_point(to)}, or {region.name} away from it."
+    else:
+        advice = f"Move initial.position by {-clearance:.3f} m, to any side, or {region.name} away from it."
+    return Finding("regions", name, "fails", text, advice, numbers)
+
+
+def _common(goal: Region, regions: Sequence[Region], low: Array, high: Array, moving: str) -> Iterator[Finding]:
+    """Yield whether goal and regions have a common point, and which regions alone leave none in the goal."""
+    if not regions:
+        return
+    box = box_within(goal, low, high)
+    overlap = search([goal, *regions], *box)
+    yield Finding(
+        "regions", "goal and regions", status(overlap.found), _said(overlap, "the goal and every region") + moving,
+        "" if overlap.found else _mend(goal, regions, box), _numbers(overlap),
+    )  # fmt: skip
+    if not overlap.found:
+        together = search(regions, low, high)
+        yield Finding(
+            "regions", "regions together", status(together.found), _said(together, "every region"),
+            "" if together.found else f"Relax each of them by {-together.depth:.3f} m, or draw them together.",
+            _numbers(together),
+        )  # fmt: skip
+
+
+def _mend(goal: Region, regions: Sequence[Region], box: tuple[Array, Array]) -> str:
+    advice = []
+    for region in regions:
+        alone = search([goal, region], *box)
+        if not alone.found:
+            # one step of that length leads into the goal, and one back to where the region was violated by as much
+            enough = -2.0 * alone.depth
+            advice.append(
+                f"{region.name} alone leaves nothing of the goal: move one of them, or relax {region.name} by "
+                f"{enough:.3f} m."
+            )
+    return " ".join(advice) or "Each region alone leaves some of the goal, all together none: move the goal."
+
+
+def _between(regions: Sequence[Region], low: Array, high: Array) -> Iterator[Finding]:
+    """Yield where shapes to be kept out of overlap: there the arbiter has to choose."""
+    inside = [Region(r.name, r.shape, "in") for r in regions if r.keep == "out"]
+    told, numbers = [], {}
+    for one, other in itertools.combinations(inside, 2):
+        box = box_within(other, *box_within(one, low, high))
+        if np.any(box[0] > box[1]):
+            continue
+        overlap = search([one, other], *box)
+        if overlap.found:
+            told.append(f"{one.name} and {other.name} ({overlap.depth:.3f} m deep at {_point(overlap.point)})")
+            numbers[f"{one.name}, {other.name}"] = overlap.depth
+    if told:
+        text = f"Kept out of, and overlapping, where the arbiter has to choose: {'; '.join(told)}."
+        yield Finding("regions", "overlaps", "note", text, numbers=numbers)
+
+
+def _way(
+    goal: Region,
+    kept: Sequence[Region],
+    left_out: Sequence[str],
+    start: tuple[float, float, float],
+    low: Array,
+    high: Array,
+) -> Finding:
+    exists, width = way_exists(kept, goal, start, low, high)
+    but = f", {', '.join(left_out)} left aside (violated at the start)" if left_out else ""
+    if exists:
+        text = f"There is a way from the start into the goal that satisfies the regions all along{but}."
+    else:
+        text = (
+            f"No way from the start into the goal was found{but}, in cells of {width:.2f} m, within {_point(low)} to "
+            f"{_point(high)}."
+        )
+    advice = "" if exists else f"Open a passage at least {2.0 * width:.2f} m wide between the regions."
+    return Finding("regions", "way", status(exists), text, advice, {"found": exists, "cell": width})
+
+
+def _said(overlap: Overlap, what: str) -> str:
+    if overlap.found:
+        return f"Found a common point of {what} at {_point(overlap.point)}, {overlap.depth:.3f} m within all of them."
+    if overlap.excluded:
+        text = f"There is certainly no common point of {what}"
+    else:
+        text = f"No common point of {what} was found, nor is one excluded"
+    least = max(0.0, -overlap.at_most)
+    best = f"the best, {_point(overlap.point)}, violates one by {-overlap.depth:.3f} m, none less than {least:.3f} m"
+    return f"{text}: {best}."
+
+
+def _numbers(overlap: Overlap) -> dict[str, float | bool]:
+    x, y, z = overlap.point
+    return {"x": x, "y": y, "z": z, "depth": overlap.depth, "at_most": overlap.at_most, "found": overlap.found}
+
+
+def _point(point: Sequence[float] | Array) -> str:
+    return f"({', '.join(f'{x + 0.0:.2f}' for x in point)}) m"

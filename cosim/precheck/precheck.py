@@ -1,0 +1,60 @@
+"""What can be said of a scenario before it is run: vehicle, gains, regions, thrusters."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from cosim.precheck.feasibility import region_findings
+from cosim.precheck.finding import Finding
+from cosim.precheck.stability import gain_findings, start_weights, vehicle_findings
+from cosim.precheck.thrust import asked_finding, thrust_findings
+from cosim.scenario.scenario import Scenario
+
+
+@dataclass(frozen=True)
+class Check:
+    """All findings of a scenario."""
+
+    scenario: str
+    title: str
+    law: str
+    vehicle: str
+    findings: tuple[Finding, ...]
+
+    @property
+    def holds(self) -> bool:
+        """Whether nothing fails."""
+        return not self.failed
+
+    @property
+    def failed(self) -> tuple[Finding, ...]:
+        """The findings that fail."""
+        return tuple(finding for finding in self.findings if finding.status == "fails")
+
+
+def check(scenario: Scenario) -> Check:
+    """Check a scenario without running it.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        With any law; (31)-(45) are of the printed one, and passed over for others.
+
+    Returns
+    -------
+    Check
+        Of the true vehicle, and of regions as they are at time 0.
+
+    Raises
+    ------
+    DefinitionError
+        If the arbiter cannot be set up.
+    """
+    findings = [*vehicle_findings(scenario), *region_findings(scenario), *thrust_findings(scenario)]
+    if scenario.law.name == "printed":
+        weights = start_weights(scenario)
+        findings += [*gain_findings(scenario, weights), asked_finding(scenario, weights)]
+    else:
+        text = f"(31)-(45) are of the printed law, not of this one ({scenario.law.name}): passed over."
+        findings.append(Finding("law", "(38), (45)", "note", text))
+    return Check(scenario.name, scenario.title, scenario.law.name, scenario.vehicle.name, tuple(findings))

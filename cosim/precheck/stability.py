@@ -1,0 +1,293 @@
+"""Properties 1-3 of the vehicle, and the gain conditions of the printed law: where in the state space they hold."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import brentq
+
+from controller.printed_law import Gains, primary_error
+from controller.regions import Region, Sphere
+from controller.theory import (
+    Fit,
+    Model,
+    damping_fit,
+    error_jacobian_bound,
+    gain_fits,
+    greatest_gradient,
+    potential_fits,
+    secondary_fit,
+    sphere_radii,
+)
+from controller.theory.conditions import least_of_potential_test
+from controller.theory.model import asymmetry, damping, least_inertia, restoring_defect, skew_defect
+from cosim.precheck.finding import Finding, status
+from cosim.precheck.region_values import evaluated
+from cosim.scenario.scenario import CRITERIA, Scenario
+from cosim.scenario.true_vehicle import true_model, true_vehicle
+from fuzzy_arbiter import Arbiter, ramp
+
+Array = NDArray[np.float64]
+
+_ROUNDING = 1e-9  # of the greatest element
+_SAMPLES = 50  # velocities and attitudes at which a property is looked at
+_LEVEL = (1.0, 0.0, 0.0, 0.0)  # a goal does not ask for attitude
+_STEP = 1e-4  # m, by which e_p is differentiated
+
+
+def vehicle_findings(scenario: Scenario) -> Iterator[Finding]:
+    """Yield whether the true vehicle has Properties 1-3, and restoring forces that are linear in phi (12).
+
+    Parameters
+    ----------
+    scenario : Scenario
+        Any.
+
+    Yields
+    ------
+    Finding
+        In that order.
+    """
+    vehicle, model = true_vehicle(scenario), true_model(scenario)
+    rng = np.random.default_rng(1)
+    velocities, quaternions = rng.normal(size=(_SAMPLES, 6)), rng.normal(size=(_SAMPLES, 4))
+    quaternions /= np.linalg.norm(quaternions, axis=1)[:, None]
+
+    least, lopsided = least_inertia(model.mass), asymmetry(model.mass)
+    yield Finding(
+        "vehicle", "Property 1", status(least > 0.0 and lopsided < _ROUNDING),
+        f"M is symmetric and positive definite: least eigenvalue {least:.4g}, asymmetry {lopsided:.1g}.",
+        numbers={"least_eigenvalue": least, "asymmetry": lopsided},
+    )  # fmt: skip
+    defect = max(skew_defect(model.mass, nu) for nu in velocities)
+    yield Finding(
+        "vehicle", "Property 2", status(defect < _ROUNDING),
+        f"dM/dt - 2 C is skew-symmetric at {_SAMPLES} velocities, to {defect:.1g} of its greatest element.",
+        numbers={"defect": defect},
+    )  # fmt: skip
+    yield _damping(model, velocities)
+    defect = max(restoring_defect(vehicle.weight, vehicle.buoyancy, vehicle.r_G, vehicle.r_B, q) for q in quaternions)
+    largest = max(vehicle.weight, vehicle.buoyancy, 1.0)
+    yield Finding(
+        "vehicle", "(12)", status(defect < _ROUNDING * largest),
+        f"Restoring forces are Z phi at {_SAMPLES} attitudes, to {defect:.1g} N or N m.",
+        numbers={"defect": defect},
+    )  # fmt: skip
+
+
+def _damping(model: Model, velocities: Array) -> Finding:
+    rest = float(model.linear_damping.min())
+    moving = min(float(damping(model.linear_damping, model.quadratic_damping, nu).min()) for nu in velocities)
+    numbers = {"least_at_rest": rest, "least_moving": moving}
+    if rest > 0.0:
+        text = f"D is positive definite: least eigenvalue {rest:.4g} at rest, and more when moving."
+        return Finding("vehicle", "Property 3", "holds", text, numbers=numbers)
+    if rest == 0.0 and moving > 0.0:
+        text = (
+            "D is positive definite only where every velocity is other than 0: at rest its least eigenvalue is 0 "
+            "(no linear drag). What (45) needs then has to come from K_v alone."
+        )
+        return Finding("vehicle", "Property 3", "note", text, numbers=numbers)
+    text = f"D is not positive definite: least eigenvalue {rest:.4g} at rest, {moving:.4g} when moving."
+    advice = "Give the vehicle drag along and about every axis (hydrodynamics.*_damping)."
+    return Finding("vehicle", "Property 3", "fails", text, advice, numbers)
+
+
+def start_weights(scenario: Scenario) -> Array:
+    """Return the weight of each secondary region at the start, shape (n,), as the master's first step has it.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        Any.
+
+    Raises
+    ------
+    DefinitionError
+        If the arbiter cannot be set up.
+    """
+    arbiter = Arbiter(engine=scenario.arbiter.engine, points=scenario.arbiter.points)
+    initial = scenario.initial
+    clearances = evaluated([r.region for r in scenario.regions], initial.position, initial.quaternion)[2]
+    of = [CRITERIA.index(r.criterion) for r in scenario.regions]
+    memberships = [0.0] * len(CRITERIA)
+    for criterion, clearance in zip(of, clearances.tolist(), strict=True):
+        memberships[criterion] = max(memberships[criterion], ramp(clearance, scenario.arbiter.ramp))
+    weights = arbiter(memberships)
+    return np.array([weights[criterion] for criterion in of], dtype=float)
+
+
+def gain_findings(scenario: Scenario, weights: Array) -> Iterator[Finding]:
+    """Yield whether (38) and (45) hold at the start of a scenario with the printed law, and where else.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        Its law is the printed one.
+    weights : ndarray, shape (n,)
+        Of each secondary region at the start, from the arbiter.
+
+    Yields
+    ------
+    Finding
+        (38), first two conditions as one matrix; third; (45), first; second and third.
+    """
+    gains: Gains = scenario.law.gains
+    model = true_model(scenario)
+    goal = scenario.goal_region
+    start = np.array(scenario.initial.position)
+    f, gradient = _value_and_gradient(goal, start)
+    slope = float(np.linalg.norm(gradient))
+    radii: tuple[float, float, float] | None = None
+    if isinstance(scenario.goal, Sphere):
+        radii = sphere_radii(model.mass, model.linear_damping, scenario.goal.radius, gains)
+    yield _potential(model, gains, slope, radii, scenario)
+    yield _secondary(model, gains, weights, scenario)
+    yield _damped(model, gains, goal, start, f, radii, scenario)
+    second, third = gain_fits(gains)
+    yield Finding(
+        "law", "(45) 2, 3", status(second.holds and third.holds),
+        f"Least eigenvalue of J K_0 is {second.have:.4g} > 0; k_q exceeds it by {third.have - third.need:.4g}.",
+        "" if second.holds and third.holds else f"Raise law.gains.k_q above {third.need:.4g}; k_p1 and k_p2 above 0.",
+        {"least_k_0": second.have, "k_q": third.have},
+    )  # fmt: skip
+
+
+def _potential(
+    model: Model, gains: Gains, slope: float, radii: tuple[float, float, float] | None, scenario: Scenario
+) -> Finding:
+    least = least_of_potential_test(model.mass, slope, gains) if slope else math.inf
+    limit = greatest_gradient(model.mass, gains)
+    first, second = potential_fits(model.mass, slope, gains)
+    where = f"Holds where |df/dp| < {limit:.4g}" + (
+        f", within {radii[0]:.2f} m of the goal's centre; the start is {_distance(scenario):.2f} m away."
+        if radii
+        else f"; at the start it is {slope:.4g}."
+    )
+    scalar = "" if second.holds else (
+        f" With the scalar lambda_m as printed the condition on attitude fails too ({_pair(second)}); "
+        "it takes the mass for an inertia."
+    )  # fmt: skip
+    text = f"P - sigma M sigma has the least eigenvalue {least:.4g} at the start ({_pair(first)} in position). "
+    advice = ""
+    if least <= 0.0:
+        mended = _greatest_sigma(lambda s: least_of_potential_test(model.mass, slope, gains._replace(sigma_p=s)))
+        advice = (
+            f"Lower law.gains.sigma_p to {_below(mended)}" + (f", or start within {radii[0]:.2f} m." if radii else ".")
+            if mended
+            else _mend_attitude(model, gains, slope)
+        )
+    return Finding(
+        "law", "(38) 1, 2", status(least > 0.0), text + where + scalar, advice,
+        {
+            "least_eigenvalue": least, "position_have": first.have, "position_need": first.need,
+            "attitude_have": second.have, "attitude_need_scalar": second.need, "greatest_gradient": limit,
+            "gradient_at_start": slope, "radius": radii[0] if radii else None,
+        },
+    )  # fmt: skip
+
+
+def _mend_attitude(model: Model, gains: Gains, slope: float) -> str:
+    still = gains._replace(sigma_p=0.0)
+    mended = _greatest_sigma(lambda s: least_of_potential_test(model.mass, slope, still._replace(sigma_a=s)))
+    if not mended:
+        return "Raise law.gains.k_p1 and k_p2 above 0."
+    return f"Lower law.gains.sigma_a to {_below(mended)}: the condition fails in attitude, everywhere."
+
+
+def _secondary(model: Model, gains: Gains, weights: Array, scenario: Scenario) -> Finding:
+    regions = [secondary.region for secondary in scenario.regions]
+    values, gradients, _ = evaluated(regions, scenario.initial.position, scenario.initial.quaternion)
+    alphas = np.array([region.gain for region in regions]) * weights
+    active = (values > 0.0) & (alphas > 0.0)
+    fit = secondary_fit(model.mass, np.linalg.norm(gradients[active], axis=1), alphas[active] / gains.k_q, gains)
+    names = ", ".join(region.name for region, on in zip(regions, active, strict=True) if on)
+    at_start = f"Active at the start: {names} ({_pair(fit)})." if names else "No region is active at the start."
+    limits = {}
+    for region in regions:  # alone and fully weighted: where its gradient would be too great
+        if region.gain > 0.0:
+            one = secondary_fit(model.mass, np.ones(1), np.array([region.gain / gains.k_q]), gains)
+            limits[region.name] = math.sqrt(one.have / one.need) if one.need else math.inf
+    where = "; ".join(f"{name} {limit:.3g}" for name, limit in limits.items())
+    return Finding(
+        "law", "(38) 3", status(fit.holds),
+        at_start + (f" Alone and fully weighted a region keeps it while |dg/dp| is below: {where}." if where else ""),
+        "" if fit.holds else "Lower law.gains.sigma_p, or the regions' gains.",
+        {"have": fit.have, "need": fit.need, **{f"greatest_gradient.{name}": x for name, x in limits.items()}},
+    )  # fmt: skip
+
+
+def _damped(
+    model: Model,
+    gains: Gains,
+    goal: Region,
+    start: Array,
+    f: float,
+    radii: tuple[float, float, float] | None,
+    scenario: Scenario,
+) -> Finding:
+    steps = _STEP * np.eye(3)
+    jacobian = np.column_stack([_error(goal, start + h) - _error(goal, start - h) for h in steps]) / (2.0 * _STEP)
+    bound = max(0.0, error_jacobian_bound(jacobian))
+    fit = damping_fit(model.mass, model.linear_damping, bound, gains)
+    translation = damping_fit(model.mass, model.linear_damping, bound, gains, translation_alone=True)
+    text = (
+        f"At the start lambda_min[D] + lambda_min[K_v] = {fit.have:.4g} ({translation.have:.4g} for translation alone) "
+        f"against sigma c_0, of which the term with de_p/dt alone is {fit.need:.4g}."
+    )
+    if radii:
+        text += (
+            f" From that term it can hold within {radii[1]:.2f} m ({radii[2]:.2f} m) of the goal's centre; "
+            f"the start is {_distance(scenario):.2f} m away."
+        )
+    advice = ""
+    if not fit.holds:
+        advice = f"Lower law.gains.sigma_p to {_below(gains.sigma_p * fit.have / fit.need)}" + (
+            f", or start within {radii[1]:.2f} m." if radii else "."
+        )
+    return Finding(
+        "law", "(45) 1", status(fit.holds), text, advice,
+        {
+            "have": fit.have, "have_translation": translation.have, "need": fit.need, "f_at_start": f,
+            "radius": radii[1] if radii else None, "radius_translation": radii[2] if radii else None,
+        },
+    )  # fmt: skip
+
+
+def _value_and_gradient(goal: Region, position: Array) -> tuple[float, Array]:
+    (value,), (gradient,), _ = evaluated([goal], position, _LEVEL)
+    return float(value), gradient
+
+
+def _error(goal: Region, position: Array) -> Array:
+    return primary_error(*_value_and_gradient(goal, position))
+
+
+def _distance(scenario: Scenario) -> float:
+    assert isinstance(scenario.goal, Sphere)
+    return math.dist(scenario.initial.position, scenario.goal.centre)
+
+
+def _greatest_sigma(test: Callable[[float], float]) -> float | None:
+    """Return the sigma above which a test fails, None if it fails for the least ones too."""
+    if test(0.0) <= 0.0:
+        return None
+    upper = 1e-6
+    while test(upper) > 0.0:
+        upper *= 10.0
+    return float(brentq(test, 0.0, upper))
+
+
+def _below(bound: float) -> str:
+    """Return a number just below a bound, in three digits."""
+    if bound <= 0.0:
+        return "0"
+    unit = 10.0 ** (math.floor(math.log10(bound)) - 2)
+    return f"{math.floor(bound / unit) * unit:.3g}"
+
+
+def _pair(fit: Fit) -> str:
+    return f"{fit.have:.3g} {'>' if fit.holds else '<='} {fit.need:.3g}"

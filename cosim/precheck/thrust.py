@@ -1,0 +1,136 @@
+"""Whether the thrusters of a scenario's vehicle can hold it still, and give what the law asks for."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import brentq
+
+from controller import printed_law
+from controller.printed_law import primary_error, secondary_error
+from controller.quaternion import error_parts, rotation_rows
+from cosim.precheck.finding import Finding, status
+from cosim.precheck.region_values import evaluated
+from cosim.precheck.thrust_margin import Margin, ThrustMargin, greatest_force, least_left, thrust_margin
+from cosim.results.wording import newtons
+from cosim.scenario.scenario import Scenario
+from cosim.scenario.true_vehicle import true_vehicle
+
+Array = NDArray[np.float64]
+
+_ROUNDING = 1e-6  # N, of the linear programs
+
+
+def thrust_findings(scenario: Scenario) -> Iterator[Finding]:
+    """Yield what the thrusters give, beside what holding still in the current takes, whole and with one lost.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        Any.
+
+    Yields
+    ------
+    Finding
+        Holding still; one thruster lost, unless already the first fails for all.
+    """
+    vehicle, phi = true_vehicle(scenario), scenario.true_restoring_parameters
+    quaternion, current = np.array(scenario.law.desired_quaternion), np.array(scenario.plant.current)
+    margin = thrust_margin(vehicle, phi, quaternion, current)
+    against = f"the current's drag of {margin.drag:.3g} N and W - B = {margin.excess_weight:.3g} N"
+    numbers: dict[str, float | str | None] = {
+        "drag": margin.drag, "excess_weight": margin.excess_weight,
+        "thrust": _force(margin.thrust), "left": _force(margin.left),
+        "worst": margin.left.direction if margin.left else None,
+    }  # fmt: skip
+    if margin.thrust and margin.left and margin.left.force > _ROUNDING:
+        text = (
+            f"In the worst of 26 directions, {margin.left.direction}, {margin.left.force:.3g} N are left beside "
+            f"{against}, the attitude kept; in still water and weightless it is {margin.thrust.force:.3g} N."
+        )
+        yield Finding("thrust", "holding still", "holds", text, numbers=numbers)
+    else:
+        text = f"The thrusters cannot hold the vehicle still, attitude kept, against {against}."
+        yield Finding("thrust", "holding still", "fails", text, _mend_current(scenario), numbers)
+        return
+    yield _with_one_lost(margin)
+
+
+def _with_one_lost(margin: ThrustMargin) -> Finding:
+    lost = [i + 1 for i, left in enumerate(margin.left_without) if left is None]
+    numbers = {f"left_without[{i + 1}]": _force(left) for i, left in enumerate(margin.left_without)}
+    if lost:
+        text = f"Without thruster {', '.join(map(str, lost))} the vehicle can no longer hold still, attitude kept."
+        return Finding("thrust", "one thruster lost", "note", text, numbers=numbers)
+    worst = min(range(len(margin.left_without)), key=lambda i: numbers[f"left_without[{i + 1}]"] or 0.0)
+    left = margin.left_without[worst]
+    assert left is not None
+    text = f"With any one thruster lost at least {left.force:.3g} N are left (thruster {worst + 1}, {left.direction})."
+    return Finding("thrust", "one thruster lost", "holds" if left.force > 0.0 else "note", text, numbers=numbers)
+
+
+def _force(margin: Margin | None) -> float | None:
+    return margin.force if margin else None
+
+
+def _mend_current(scenario: Scenario) -> str:
+    """Say how much of the current could be held."""
+    vehicle, phi = true_vehicle(scenario), scenario.true_restoring_parameters
+    quaternion, current = np.array(scenario.law.desired_quaternion), np.array(scenario.plant.current)
+
+    def reach(part: float) -> float:
+        left = least_left(vehicle, phi, quaternion, part * current)
+        return left.force - _ROUNDING if left else -1.0
+
+    if reach(0.0) <= 0.0:
+        return "Trim the vehicle (plant.parameters.buoyancy, weight, r_G, r_B) or choose a level desired attitude."
+    part = brentq(reach, 0.0, 1.0, xtol=0.01)
+    return f"Take a current of at most {part * float(np.linalg.norm(current)):.2g} m/s, or stronger thrusters."
+
+
+def asked_finding(scenario: Scenario, weights: Array) -> Finding:
+    """Hold the force that the printed law asks for first against what the thrusters can give in that direction.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        Its law is the printed one.
+    weights : ndarray, shape (n,)
+        Of each secondary region at the start, from the arbiter.
+
+    Returns
+    -------
+    Finding
+        Of the body force alone, no moment beside it.
+    """
+    gains, initial, vehicle = scenario.law.gains, scenario.initial, true_vehicle(scenario)
+    (f,), (slope,), _ = evaluated([scenario.goal_region], initial.position, initial.quaternion)
+    regions = [secondary.region for secondary in scenario.regions]
+    values, gradients, _ = evaluated(regions, initial.position, initial.quaternion)
+    betas = np.array([region.gain for region in regions]) * weights / gains.k_q
+    quaternion, desired = np.array(initial.quaternion), np.array(scenario.law.desired_quaternion)
+    R, turned = rotation_rows(quaternion), error_parts(desired, quaternion)
+    e_p, e_s = primary_error(float(f), slope), secondary_error(values, gradients, betas)
+    tau, velocity = np.empty(6), np.array(initial.velocity)
+    printed_law.apply(tuple(e_p), tuple(e_s), turned[1:], R, velocity, gains, 0.0, np.zeros(4), tau)
+    force = tau[:3]
+    asked = float(np.linalg.norm(force))
+    if not asked > 0.0:
+        text = "The law asks for no force at the start."
+        return Finding("thrust", "asked at t = 0", "holds", text, numbers={"asked": 0.0})
+    alive = np.ones(vehicle.n_thrusters, dtype=bool)
+    given = greatest_force(vehicle, force / asked, np.zeros(6), alive) or 0.0
+    text = f"The law asks for {newtons(asked)} at the start; the thrusters give at most {newtons(given)} that way."
+    if scenario.actuation.through == "wrench":
+        limit = f"at most {newtons(scenario.limit.force)}" if scenario.limit.force < np.inf else "no limit"
+        text += f" In this scenario the wrench acts on the body directly, with {limit}."
+    advice = ""
+    if asked > given:
+        # what pulls to the goal is all but all of it, and is proportional to k_p1
+        k_p1 = gains.k_p1 * given / asked
+        advice = f"Lower law.gains.k_p1 to about {k_p1:.2g}, start nearer, or take a law with a bounded attraction."
+    return Finding(
+        "thrust", "asked at t = 0", status(asked <= given), text, advice, {"asked": asked, "given": given}
+    )  # fmt: skip

@@ -1,0 +1,275 @@
+"""What a report says, whatever it is written as: sentences, tables in plain words, and how to repeat the run."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from controller.laws import LAWS
+from cosim.results.paper_claims import paper_claims
+from cosim.results.record import PARTS, RECORD
+from cosim.results.run_result import ORDERS, SCENARIO, SUMMARY, FlownRun
+from cosim.results.spans import Spans
+from cosim.results.wording import asked, kind_of, number, verdict
+from cosim.simulation.signals import Array
+
+
+@dataclass(frozen=True)
+class Table:
+    """Texts in rows."""
+
+    title: str
+    head: tuple[str, ...]  # empty for a table of names and values
+    rows: tuple[tuple[str, ...], ...]
+    widths: tuple[float, ...]  # of the columns, relative
+
+
+@dataclass(frozen=True)
+class Contents:
+    """All of a report but its figures."""
+
+    title: str
+    asked: str
+    verdict: str
+    remarks: tuple[str, ...]
+    claims: Table | None  # beside the paper's
+    regions: Table | None
+    numbers: tuple[Table, ...]
+    setting: Table
+    scenario: str  # the file, with what stands in lists of numbers in one line
+    repeat: tuple[str, ...]  # commands
+    repeats: str  # what they do
+    files: tuple[tuple[str, str], ...]  # in the run folder, and what each is
+
+
+def contents_of(run: FlownRun) -> Contents:
+    """Return what the report of a run says.
+
+    Parameters
+    ----------
+    run : FlownRun
+        Finished, interrupted or killed.
+
+    Returns
+    -------
+    Contents
+        Plain texts, nothing escaped.
+    """
+    commands, repeats = _repeating(run)
+    return Contents(
+        title=run.scenario.title,
+        asked=asked(run.scenario),
+        verdict=verdict(run.summary),
+        remarks=_remarks(run),
+        claims=_claims(run),
+        regions=_regions(run),
+        numbers=tuple(table for table in (_goal(run), _effort(run), _estimates(run), _lyapunov(run)) if table),
+        setting=_setting(run),
+        scenario=run.scenario.toml(),
+        repeat=commands,
+        repeats=repeats,
+        files=_files(run),
+    )
+
+
+def _remarks(run: FlownRun) -> tuple[str, ...]:
+    names = [*(f"position.{axis}" for axis in "xyz"), "goal.clearance"]
+    names += [f"{secondary.region.name}.clearance" for secondary in run.scenario.regions]
+    count, first = 0, math.inf
+    for block in run.record.blocks(["time", *names]):
+        broken = np.logical_or.reduce([~np.isfinite(block[name]) for name in names])
+        if broken.any():
+            count, first = count + int(np.count_nonzero(broken)), min(first, block["time"][np.argmax(broken)])
+    if not count:
+        return ()
+    many = f"{count} of {len(run.record)} rows of the record hold places or clearances that are no numbers"
+    return (f"{many}; the first is at {first:g} s. Figures have gaps there.",)
+
+
+def _claims(run: FlownRun) -> Table | None:
+    if run.scenario.compare != "paper":
+        return None
+    rows = tuple((c.stated, c.measured, c.why) for c in paper_claims(run.scenario, run.summary))
+    return Table("Beside the paper", ("The paper states", "This run gave", "Why"), rows, (1.0, 1.1, 1.4))
+
+
+def _regions(run: FlownRun) -> Table | None:
+    if not run.scenario.regions:
+        return None
+    violations = {secondary.region.name: _Violation() for secondary in run.scenario.regions}
+    for block in run.record.blocks(["time", *(f"{name}.clearance" for name in violations)]):
+        for name, violation in violations.items():
+            violation.add(block["time"], block[f"{name}.clearance"])
+    rows = []
+    for secondary in run.scenario.regions:
+        region = secondary.region
+        violation, least = violations[region.name], run.summary["min_clearance"][region.name]
+        when = f"{violation.worst_at:.2f}" if math.isfinite(least) else "–"
+        degrees = run.summary["clearance_unit"][region.name] == "rad"
+        shown = f"{number(math.degrees(least), 4)}°" if degrees else f"{number(least, 4)} m"
+        lasting = violation.lasting()
+        rows.append(
+            (
+                region.name,
+                kind_of(region.shape),
+                secondary.criterion,
+                "within" if region.keep == "in" else "out of",
+                "hard" if region.hard else "soft",
+                shown,
+                when,
+                "never" if lasting is None else f"{lasting:.2f}",
+            )
+        )
+    head = (
+        "Region", "Shape", "Criterion", "Keep", "Hard or soft", "Least clearance", "at [s]", "Violated for [s]",
+    )  # fmt: skip
+    return Table("Regions", head, tuple(rows), (1.6, 1.1, 1.0, 0.8, 0.8, 1.1, 0.8, 0.9))
+
+
+class _Violation:
+    """Gathers when a region's clearance is least, and how long it is violated, block by block."""
+
+    def __init__(self) -> None:
+        self._least, self.worst_at = math.inf, math.nan  # s
+        self._spans, self._ended = Spans(), 0.0
+
+    def add(self, time: Array, clearance: Array) -> None:
+        """Take the next rows."""
+        known = np.where(np.isnan(clearance), np.inf, clearance)
+        at = int(np.argmin(known))
+        if known[at] < self._least:
+            self._least, self.worst_at = float(known[at]), float(time[at])
+        self._ended += sum(span.end - span.start for span in self._spans.add(clearance < 0.0, time))
+
+    def lasting(self) -> float | None:
+        """Return for how long the region was violated [s], None if it never was."""
+        still = self._spans.open
+        return self._ended + (still.end - still.start if still else 0.0) if self._least < 0.0 else None
+
+
+def _goal(run: FlownRun) -> Table:
+    s = run.summary
+    outside = s["closest_to_goal"]
+    nearest = f"{number(outside, 4)} m outside" if outside > 0.0 else f"{number(-outside, 4)} m inside"
+    windows = ", ".join(f"{start:.3f} to {end:.3f}" for start, end in s["intersection_windows"])
+    rows = [
+        ("first within the goal [s]", number(s["reach_time"], 5) if s["reached"] else "never"),
+        ("within it for good from [s]", number(s["settle_time"], 5) if s["settled"] else "never"),
+        ("deepest in the goal, or nearest to its surface", nearest if math.isfinite(outside) else "no number"),
+        ("position at the end: north, east, down [m]", ", ".join(number(x, 4) for x in s["final_position"])),
+        ("greatest speed through the ground [m/s]", number(s["max_speed"], 4)),
+    ]
+    if s["intersection"]:
+        rows.append(("within the overlap of regions [s]", windows or "never"))
+    return Table("Goal and way", (), tuple(rows), (1.0, 1.0))
+
+
+def _effort(run: FlownRun) -> Table:
+    s = run.summary
+    factor = s["real_time_factor"]
+    rows = (
+        ("greatest force that the law asked for, norm [N]", number(s["max_force_asked"], 4)),
+        ("greatest force that acted, norm [N]", number(s["max_force"], 4)),
+        ("effort: time integral of the acting force's norm [N s]", number(s["effort"], 4)),
+        ("actuators asked for more than they give, for [s]", number(s["saturated_time"], 4)),
+        ("weights above ½ at once, at the most [–]", str(s["weights_above_half"])),
+        ("sum of the weights, at the most [–]", number(s["weights_sum_max"], 4)),
+        ("how the run ended", s["status"]),
+        ("simulated time [s]", f"{number(s['simulated_time'], 6)} in {s['steps']} steps"),
+        (
+            "stepping took [s]",
+            "not known" if s["wall_time"] is None
+            else number(s["wall_time"], 3) + (f", {number(factor, 3)} times as fast as the clock" if factor else ""),
+        ),
+    )  # fmt: skip
+    return Table("Effort and course", (), rows, (1.0, 1.0))
+
+
+def _estimates(run: FlownRun) -> Table:
+    s = run.summary
+    names = (
+        "weight less buoyancy, W − B [N]",
+        "x_G W − x_B B [N m]",
+        "y_G W − y_B B [N m]",
+        "z_G W − z_B B [N m]",
+    )
+    columns = (s[f"estimate_{which}"] for which in ("final", "true", "lowest", "highest"))
+    rows = tuple((name, *(number(value, 4) for value in values)) for name, *values in zip(names, *columns, strict=True))
+    return Table("Estimates", ("Restoring parameter, body frame", "at the end", "true", "lowest", "highest"), rows,
+                 (2.0, 1.0, 1.0, 1.0, 1.0))  # fmt: skip
+
+
+def _lyapunov(run: FlownRun) -> Table | None:
+    if not run.summary["lyapunov"]:
+        return None
+    rows = tuple(
+        (
+            form,
+            *(number(course[which], 4) for which in ("start", "end", "least")),
+            str(course["increases"]),
+            *(
+                "never" if course[which] is None else number(course[which], 5)
+                for which in ("first_rise", "first_negative")
+            ),
+        )
+        for form, course in run.summary["lyapunov"].items()
+    )
+    head = (
+        "Form", "at the start [N m]", "at the end [N m]", "least [N m]", "steps in which it rose", "first [s]",
+        "first below 0 [s]",
+    )  # fmt: skip
+    return Table("V of (31)", head, rows, (1.1, 1.0, 1.0, 1.0, 1.0, 0.8, 1.0))
+
+
+def _setting(run: FlownRun) -> Table:
+    s = run.scenario
+    through = "the thrusters" if s.actuation.through == "thrusters" else "the body directly, as a wrench"
+    rows = [
+        ("vehicle", f"{s.vehicle.title}. {s.vehicle.source}".strip()),
+        ("law, and what it acts through", f"{s.law.name}; {through}"),
+        ("arbiter", f"{s.arbiter.engine}; memberships fall to 0 over {s.arbiter.ramp:g} m (rad for attitude)"),
+        ("planned for [s], in steps of [s]", f"{s.time.duration:g}, {s.time.step:g}"),
+        ("start: north, east, down [m]", ", ".join(number(x, 6) for x in s.initial.position)),
+        ("current: north, east, down [m/s]", ", ".join(number(x, 6) for x in s.plant.current)),
+        ("what the law is told", "the true state" if s.sensing.exact else "what sensors measure"),
+    ]
+    if math.isfinite(s.limit.force) or s.limit.time_constant > 0.0:
+        rows.append(("limit on the force [N], lag [s]", f"{s.limit.force:g}, {s.limit.time_constant:g}"))
+    if s.failures:
+        rows.append(("failures", f"{len(s.failures)}, {'told' if s.tell_failures else 'not told'} to the law"))
+    if s.commands.enabled:
+        rows.append(("orders", f"could be given while it ran; {run.summary.get('orders', 0)} were"))
+    return Table("Scenario", (), tuple(rows), (1.0, 2.4))
+
+
+def _repeating(run: FlownRun) -> tuple[tuple[str, ...], str]:
+    """Return the commands that repeat a run, and what they do."""
+    again = ("cosim report . --format html,pdf", "cosim replay .")
+    if run.scenario.law.own:
+        whose = f"The law that flew this run, {run.scenario.law.name}, is its user's own and in no file here"
+        return again, f"{whose}: the run is repeated from where the law is, and can be shown again from here."
+    if run.scenario.law.name not in LAWS:
+        return again, "An autopilot outside flew this run: it cannot be repeated from here, but be shown again."
+    orders = f" --orders {ORDERS}" if (run.path / ORDERS).exists() else ""
+    command = f"cosim run {SCENARIO}{orders} --out again"
+    cut = run.summary["status"] != "completed"
+    how = (
+        "In this folder. The first repeats the run to the last bit on a machine of this kind with this version"
+        + (", and goes on to where it was meant to end" if cut else "")
+        + "; the others write report and replay from its record."
+    )
+    return (command, *again), how
+
+
+def _files(run: FlownRun) -> tuple[tuple[str, str], ...]:
+    record = RECORD if (run.path / RECORD).exists() else PARTS
+    files = [
+        (record, "every signal of every step, with its unit"),
+        (SUMMARY, "these numbers, in SI units"),
+        (SCENARIO, "all that the run depends on"),
+    ]
+    if (run.path / ORDERS).exists():
+        files.append((ORDERS, "what was ordered, and when"))
+    return tuple(files)

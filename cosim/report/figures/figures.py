@@ -1,0 +1,121 @@
+"""The figures of a run, in the order of its report: the paper's, and what stands behind them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import Protocol
+
+import matplotlib as mpl
+
+from cosim.report.figures import forces as of_forces
+from cosim.report.figures import path as in_space
+from cosim.report.figures import time_series as over_time
+from cosim.report.figures.layout import FIGURE_STYLE, F, Sheet, own_sheet
+from cosim.report.figures.style import Drawing, Story
+from cosim.report.figures.trajectory import is_known, targets_of
+
+
+def drawings(story: Story) -> Iterator[Drawing]:
+    """Yield every figure that the run has something to show for.
+
+    Parameters
+    ----------
+    story : Story
+        Scenario, record and summary.
+
+    Yields
+    ------
+    Drawing
+        In the order of the report.
+    """
+    for name, caption, draw in _figures(story):
+        with mpl.rc_context(FIGURE_STYLE):
+            yield Drawing(name, caption, draw(story, own_sheet))
+
+
+def draw_all(story: Story, sheet_for: Callable[[str], Sheet[F]]) -> None:
+    """Draw the same figures on sheets that are given.
+
+    Parameters
+    ----------
+    story : Story
+        Scenario, record and summary.
+    sheet_for : callable
+        Gives the sheet of a figure for its caption.
+    """
+    for _, caption, draw in _figures(story):
+        with mpl.rc_context(FIGURE_STYLE):
+            draw(story, sheet_for(caption))
+
+
+class _Draw(Protocol):
+    def __call__(self, story: Story, sheet: Sheet[F]) -> F: ...
+
+
+def _figures(story: Story) -> Iterator[tuple[str, str, _Draw]]:
+    """Yield name, caption, and what draws it."""
+    moved = ""
+    if story.scenario.moving:
+        moved = (
+            " What moved is faint where it began and ended; regions are full where they were when the vehicle had "
+            "least clearance to them."
+        )
+    if targets_of(story):
+        moved += " Diamonds: the targets before the last one, numbered as they were ordered."
+    way = "; the path is in a criterion's colour while the arbiter gives way to a region of it"
+    if is_known(story):
+        yield (
+            "path-3d",
+            f"Path in space (after Fig. 5a), seen from the south-east{way}. Grey: its shadow on the deepest plane.",
+            in_space.path_3d,
+        )
+        yield (
+            "path-plane",
+            f"Path from the side and from above (after Fig. 5b), with outlines of the regions: full to be kept out of, "
+            f"dashed to be kept within{way}.{moved}",
+            in_space.path_plane,
+        )
+    yield (
+        "position-error",
+        "Position error: distance from the middle of the goal over √3 (after Fig. 6; the quantity is assumed).",
+        over_time.position_error,
+    )
+    yield "attitude", "Attitude (after Fig. 7): Euler angles from NED to the body frame.", over_time.attitude
+    if story.summary["intersection_windows"]:
+        yield (
+            "weights-overlap",
+            "Normalised weights around each overlap of regions (after Fig. 8; assumed).",
+            over_time.weights_overlap,
+        )
+    yield "weights", f"Memberships and weights of the criteria.{_zoom(story)}", over_time.weights
+    yield (
+        "clearance",
+        "Clearance to the goal and to each region; red: below 0 it is violated, or the goal not reached."
+        f"{_zoom(story)}",
+        over_time.clearance,
+    )
+    if story.scenario.commands.enabled:
+        yield "helm", "Who steered, as it was ordered; grey where disarmed.", over_time.helm
+    yield (
+        "forces",
+        "Force on the body: its norm, as the law asks for it and as it acts; and what acts forward (X), to starboard "
+        "(Y) and down (Z).",
+        of_forces.forces,
+    )
+    yield "thrusters", of_forces.thruster_caption(story.scenario), of_forces.thrusters
+    yield (
+        "estimates",
+        "Estimates of φ in (12), weight less buoyancy and its levers along the body axes, against the truth (dotted).",
+        of_forces.estimates,
+    )
+    if story.summary["lyapunov"]:
+        yield (
+            "lyapunov",
+            "V of (31), which as printed leaves the frame where a region's gradient vanishes, and −W of (41): dV/dt "
+            "where the law's wrench acts and the water rests. Red: where V is negative, or rises.",
+            over_time.lyapunov,
+        )
+
+
+def _zoom(story: Story) -> str:
+    return " Left, where there are two: the time of the first overlap (grey)." if over_time.zooms(story) else ""

@@ -1,0 +1,137 @@
+"""What pushed the vehicle, and what the law believes of its weight: forces, thrusters and estimates over time."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.artist import Artist
+
+from cosim.report.figures.layout import F, Sheet, legend, limits_of, log_axis, symlog_axis
+from cosim.report.figures.style import BLACK, BLUE, CYCLE, GREEN, RED, Story
+from cosim.report.figures.time_series import DASHES, curve, over_time
+from cosim.results.record import Rows
+from cosim.scenario.scenario import Scenario
+from cosim.simulation.signals import Array
+
+_FLOOR = 1e-2  # N; less is drawn as that on a logarithmic axis
+_ESTIMATES = ("W − B", "x_G W − x_B B", "y_G W − y_B B", "z_G W − z_B B")
+
+
+def norms_of(record: Rows) -> dict[str, Array]:
+    """Return the norm of the body force as it acted and as it was asked for, each of shape (rows,) [N].
+
+    Parameters
+    ----------
+    record : Rows
+        Any rows of a run.
+
+    Returns
+    -------
+    dict
+        By words.
+    """
+    of = {"acting": "actuation", "asked for": "command"}
+    forces = {words: record.stack([f"{name}.{axis}" for axis in "XYZ"]) for words, name in of.items()}
+    return {words: np.maximum(np.linalg.norm(force, axis=1), _FLOOR) for words, force in forces.items()}
+
+
+def forces(story: Story, sheet: Sheet[F]) -> F:
+    """Draw the norm of the body force on a logarithmic axis, and its components."""
+    acting = story.record.stack([f"actuation.{a}" for a in "XYZ"])
+    norms = norms_of(story.record)
+    names = [f"{axis}, acting" for axis in "XYZ"]
+    labels = [f"norm, {which}" for which in norms] + names
+    figure, (norm, parts) = over_time(story, sheet, [1.7, 1.7], labels)
+    entries: dict[str, Artist] = {}
+    for label, force, colour, dashes in zip(labels, norms.values(), (BLACK, RED), DASHES, strict=False):
+        entries[label] = curve(norm, story, force, color=colour, linestyle=dashes)
+    log_axis(norm, list(norms.values()))
+    norm.set_ylabel("force, norm [N]")
+    for i, (name, colour, dashes) in enumerate(zip(names, (BLUE, RED, GREEN), DASHES, strict=False)):
+        entries[name] = curve(parts, story, acting[:, i], color=colour, linestyle=dashes)
+    size = norms["acting"][np.isfinite(norms["acting"])]
+    largest, typical = (float(size.max()), float(np.percentile(size, 90))) if size.size else (0.0, 0.0)
+    if largest > 20.0 * max(typical, 1.0):  # a spike would flatten all the rest
+        symlog_axis(parts, largest, max(typical, 1.0))
+    else:
+        parts.set_ylim(*limits_of([acting], least=1.0))
+    parts.set_ylabel("force, body frame [N]")
+    legend(figure, entries)
+    return figure
+
+
+def thruster_caption(scenario: Scenario) -> str:
+    """Return what the thruster figure shows."""
+    if scenario.actuation.through == "thrusters":
+        return "Force of each thruster, and the least and greatest of any of them (dashed black)."
+    return (
+        "What the acting body wrench would ask of each thruster (pseudo-inverse), and what a thruster gives (dashed "
+        "black): in this scenario the wrench acts on the body directly, not through the thrusters."
+    )
+
+
+def thrusts_of(scenario: Scenario, record: Rows) -> Array:
+    """Return the force of each thruster, or what it would have to give, shape (rows, thrusters) [N].
+
+    Parameters
+    ----------
+    scenario : Scenario
+        What was run.
+    record : Rows
+        Any rows of it.
+
+    Returns
+    -------
+    ndarray
+        [N], as `thruster_caption` says.
+    """
+    vehicle = scenario.vehicle
+    if scenario.actuation.through == "thrusters":
+        return record.stack([f"thruster_force[{i + 1}]" for i in range(vehicle.n_thrusters)])
+    wrench = record.stack([f"actuation.{a}" for a in "XYZKMN"])
+    force: Array = wrench @ np.linalg.pinv(vehicle.thruster_matrix).T
+    return force
+
+
+def thrusters(story: Story, sheet: Sheet[F]) -> F:
+    """Draw the force of each thruster, or what it would have to give."""
+    vehicle = story.scenario.vehicle
+    force = thrusts_of(story.scenario, story.record)
+    labels = [f"thruster {i + 1}" for i in range(vehicle.n_thrusters)]
+    figure, (ax,) = over_time(story, sheet, [2.3], labels)
+    entries: dict[str, Artist] = {}
+    for i, label in enumerate(labels):
+        style = "-" if i < len(CYCLE) // 2 else "--"
+        entries[label] = curve(ax, story, force[:, i], color=CYCLE[i % len(CYCLE)], linestyle=style, linewidth=1.0)
+    bounds = float(vehicle.thrust_min.min()), float(vehicle.thrust_max.max())
+    for bound in bounds:
+        ax.axhline(bound, color=BLACK, linestyle="--", linewidth=0.8)
+    size = np.abs(force[np.isfinite(force)])
+    largest, limit = float(size.max(initial=0.0)), max(bounds[1], -bounds[0])
+    if largest > 5.0 * limit:
+        symlog_axis(ax, largest, limit)
+    else:
+        ax.set_ylim(*limits_of([force, np.array(bounds)]))
+    ax.set_ylabel("thrust [N]")
+    legend(figure, entries)
+    return figure
+
+
+def estimates(story: Story, sheet: Sheet[F]) -> F:
+    """Draw the estimates against the truth."""
+    truth = story.scenario.true_restoring_parameters
+    labels = list(_ESTIMATES)
+    figure, (force, moment) = over_time(story, sheet, [1.6, 1.6], [*labels, "truth"])
+    entries: dict[str, Artist] = {}
+    shown: dict[bool, list[Array]] = {True: [], False: []}
+    for i, label in enumerate(labels):
+        ax, colour = (force, BLUE) if i == 0 else (moment, CYCLE[i])
+        signal = story.record[f"estimate.phi{i + 1}"]
+        entries[label] = curve(ax, story, signal, color=colour, linestyle=DASHES[max(0, i - 1)])
+        entries["truth"] = ax.axhline(truth[i], color=colour, linestyle=(0, (1, 3)), linewidth=1.2)
+        shown[i == 0] += [signal, truth[i : i + 1]]
+    force.set_ylim(*limits_of(shown[True], least=0.1))
+    moment.set_ylim(*limits_of(shown[False], least=0.1))
+    force.set_ylabel("estimate [N]")
+    moment.set_ylabel("estimates [N m]")
+    legend(figure, {label: entries[label] for label in (*labels, "truth")})
+    return figure

@@ -1,0 +1,74 @@
+"""Names beside what they name, where there is room for them: never over another name or over the path."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.path import Path
+
+from cosim.report.figures.layout import short
+from cosim.simulation.signals import Array
+
+_LETTER, _HIGH = 0.066, 0.130  # inches, of a letter and of a line of the size below
+_MARK = 0.06  # inches, from the middle of a mark to its edge
+_MOST = 0.7  # of the picture; what is larger both ways fills it
+_SIZE = 7
+_COLOUR = "#333333"
+_CORNERS = np.array([[i, j] for i in (-1.0, 1.0) for j in (-1.0, 1.0)])
+
+
+class Labels:
+    """Gathers names and places them.
+
+    Parameters
+    ----------
+    ax : Axes
+        With its limits set.
+    scale : float
+        [inch/m], the same along both axes.
+    frame : ndarray, shape (n, 2)
+        Convex outline of what names may cover [m, in the picture].
+    """
+
+    def __init__(self, ax: Axes, scale: float, frame: Array) -> None:
+        self._ax, self._scale, self._frame = ax, scale, frame
+        self._offered: list[tuple[str, Array, Array, Path]] = []
+
+    def offer(self, name: str, outline: Array) -> None:
+        """Ask for a name at what has an outline, or is a mark at a point; shape (n, 2) [m, in the picture]."""
+        room = _MARK / self._scale if len(outline) == 1 else 0.0
+        self._offered.append((short(name), outline.min(axis=0) - room, outline.max(axis=0) + room, Path(outline)))
+
+    def put(self, path: Array) -> None:
+        """Place the names that find room, of small things first, clear of a path of shape (n, 2)."""
+        floor, ceiling, frame = self._frame.min(axis=0), self._frame.max(axis=0), Path(self._frame)
+        taken: list[tuple[Array, Array]] = []
+        for name, low, high, outline in sorted(self._offered, key=lambda of: float(np.prod(of[2] - of[1]))):
+            size = np.array([_LETTER * len(name), _HIGH]) / self._scale
+            low, high = np.maximum(low, floor), np.minimum(high, ceiling)
+            wide = bool((high - low > _MOST * (ceiling - floor)).all())
+            for middle in _candidates(low, high, size, wide):
+                least, most = middle - size / 2.0, middle + size / 2.0
+                corners = middle + size / 2.0 * _CORNERS
+                if not frame.contains_points(corners).all() or (wide and not outline.contains_points(corners).all()):
+                    continue
+                if any((least < b).all() and (most > a).all() for a, b in taken):
+                    continue
+                if ((path > least) & (path < most)).all(axis=1).any():
+                    continue
+                taken.append((least, most))
+                self._ax.text(middle[0], middle[1], name, fontsize=_SIZE, color=_COLOUR, ha="center", va="center")
+                break
+
+
+def _candidates(low: Array, high: Array, size: Array, wide: bool) -> list[Array]:
+    """Return middles for a name, best first: within, then beside; of what fills the picture, in its corners alone."""
+    middle, half = (low + high) / 2.0, size / 2.0
+    inner, outer = (high - low) / 2.0 - 1.1 * half, (high - low) / 2.0 + 1.2 * half
+    corners = list(middle + inner * _CORNERS[::-1])
+    if wide:
+        return [*corners, *(middle + 0.6 * (corner - middle) for corner in corners)]
+    beside = [middle + outer * side for side in ([0, 1], [0, -1], [1, 0], [-1, 0])]
+    if (inner < 0.0).any():
+        return beside
+    return [middle, *corners, middle + inner * [0, 1], middle + inner * [0, -1], *beside]

@@ -1,0 +1,199 @@
+"""Where things stand in a figure: axes, legend and labels at fixed places, which costs no search for them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, TypeVar
+
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure, SubFigure
+from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, MaxNLocator, NullLocator
+
+from cosim.report.figures.style import STYLE
+from cosim.simulation.signals import Array
+
+WIDTH = 6.8  # inches, of every figure
+LEFT, RIGHT, BOTTOM, TOP = 0.80, 0.14, 0.46, 0.10  # inches around the axes
+LEGEND_ROW = 0.19  # inches
+_GAP = 0.14  # inches between axes
+_LABEL = 0.17  # inches from the figure's edge to the middle of an axis label
+_LONGEST = 34  # letters of a name in a legend
+_LETTERS, _MARK = 104, 7  # letters across a figure in a legend's size, that a line and the gap beside it are as wide as
+
+# names come from users: their $ and _ are no mathematics
+FIGURE_STYLE: Any = STYLE | {"text.parse_math": False, "xtick.labelsize": 8, "ytick.labelsize": 8}
+
+F = TypeVar("F", bound=Figure | SubFigure)
+Sheet = Callable[[float], F]  # gives a place for a figure of so many inches height, `WIDTH` wide
+
+_SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+
+def own_sheet(height: float) -> Figure:
+    """Return a figure of its own, so many inches high."""
+    return Figure(figsize=(WIDTH, height))
+
+
+def panels(
+    sheet: Sheet[F],
+    heights: Sequence[float],
+    widths: Sequence[float] = (1.0,),
+    labels: Sequence[str] = (),
+    titles: float = 0.0,
+    sharey: bool = True,
+) -> tuple[F, Any]:
+    """Return a figure and its axes, those of a column on one x axis.
+
+    Parameters
+    ----------
+    sheet : Sheet
+        Gives the place.
+    heights : sequence of float
+        Of the rows [inch].
+    widths : sequence of float
+        Of the columns, relative to each other.
+    labels : sequence of str
+        Of the legend that will stand above all.
+    titles : float
+        Room above the axes [inch].
+    sharey : bool
+        Whether axes of a row have one y axis.
+
+    Returns
+    -------
+    Figure or SubFigure, ndarray of Axes, shape (rows, columns)
+        Ticks have numbers at the left and at the bottom only.
+    """
+    top = TOP + LEGEND_ROW * legend_rows(labels) + titles
+    total = top + sum(heights) + _GAP * (len(heights) - 1) + BOTTOM
+    figure = sheet(total)
+    wide = (WIDTH - LEFT - RIGHT - _GAP * (len(widths) - 1)) * np.array(widths) / sum(widths)
+    axes = np.empty((len(heights), len(widths)), dtype=object)
+    y = total - top
+    for i, height in enumerate(heights):
+        y -= height
+        x = LEFT
+        for j, width in enumerate(wide):
+            beside = axes[i, 0] if j and sharey else None
+            box = (x / WIDTH, y / total, width / WIDTH, height / total)
+            ax = figure.add_axes(box, sharex=axes[0, j] if i else None, sharey=beside)
+            plain_numbers(ax)
+            ax.tick_params(labelbottom=i == len(heights) - 1, labelleft=not j, length=3)
+            ax.yaxis.set_label_coords((_LABEL - LEFT) / width, 0.5)
+            ax.xaxis.set_label_coords(0.5, (_LABEL - BOTTOM) / height)
+            axes[i, j] = ax
+            x += width + _GAP
+        y -= _GAP
+    return figure, axes
+
+
+def plain_numbers(ax: Axes) -> None:
+    """Give the axes some ticks at round numbers, written out."""
+    for axis, most in ((ax.xaxis, 8), (ax.yaxis, 5)):
+        axis.set_major_locator(MaxNLocator(most, steps=[1, 2, 2.5, 5, 10]))
+        axis.set_major_formatter(FuncFormatter(written))
+
+
+def written(value: float, _: object = None) -> str:
+    """Return a number as it stands at an axis."""
+    return f"{value:.6g}".replace("-", "−") if value else "0"
+
+
+def log_axis(ax: Axes, signals: Sequence[Array]) -> None:
+    """Make the y axis logarithmic, with powers of ten written as such, to show all of some signals above 0."""
+    ax.set_yscale("log")
+    ax.yaxis.set_major_locator(LogLocator(numticks=6))
+    ax.yaxis.set_minor_locator(NullLocator())
+    ax.yaxis.set_major_formatter(FuncFormatter(_power))
+    low, high = limits_of([np.log10(signal) for signal in signals])
+    if np.floor(high) - np.ceil(low) < 1.0:  # else hardly a power of ten would be in sight
+        low, high = np.floor(low), max(np.ceil(high), np.floor(low) + 1.0)
+    ax.set_ylim(10.0**low, 10.0**high)
+
+
+def symlog_axis(ax: Axes, largest: float, linear: float) -> None:
+    """Make the y axis linear to about `linear` and logarithmic beyond, up to `largest`."""
+    threshold = 10.0 ** np.ceil(np.log10(linear))
+    decades = 10.0 ** np.arange(np.log10(threshold), np.ceil(np.log10(largest)) + 1.0)
+    decades = decades[:: int(np.ceil(len(decades) / 3))]
+    ax.set_yscale("symlog", linthresh=threshold)
+    ax.yaxis.set_major_locator(FixedLocator([*-decades[::-1], 0.0, *decades]))
+    ax.yaxis.set_minor_locator(NullLocator())
+    ax.yaxis.set_major_formatter(FuncFormatter(_power))
+    ax.set_ylim(-1.5 * largest, 1.5 * largest)
+
+
+def _power(value: float, _: object = None) -> str:
+    if not value:
+        return "0"
+    power = round(float(np.log10(abs(value))))
+    number = f"{10.0**power:g}" if -2 <= power <= 3 else "10" + str(power).translate(_SUPERSCRIPT)
+    return f"{'−' if value < 0.0 else ''}{number}"
+
+
+def limits_of(signals: Sequence[Array], *, least: float = 0.0, room: float = 0.06) -> tuple[float, float]:
+    """Return limits of an axis that show all of some signals.
+
+    Parameters
+    ----------
+    signals : sequence of ndarray
+        What is no finite number is left out.
+    least : float
+        What the axis spans at the least.
+    room : float
+        Beyond the signals, of what they span.
+
+    Returns
+    -------
+    float, float
+        From -1 to 1 where there is nothing to show.
+    """
+    finite = [s[np.isfinite(s)] for s in map(np.asarray, signals)]
+    shown = np.concatenate([f for f in finite if f.size] or [np.array([-1.0, 1.0])])
+    low, high = float(shown.min()), float(shown.max())
+    spread = max(high - low, least, 1e-9 * max(abs(low), abs(high)), 1e-12)
+    extra = (spread - (high - low)) / 2.0 + room * spread
+    return low - extra, high + extra
+
+
+def short(name: str) -> str:
+    """Return a name that fits into a legend."""
+    return name if len(name) <= _LONGEST else name[: _LONGEST - 1].rstrip() + "…"
+
+
+def _rows_of(labels: Sequence[str], across: float = _LETTERS) -> list[list[str]]:
+    """Return labels in rows that fit across a figure, about as long as each other."""
+    rows: list[list[str]] = []
+    room = 0.0
+    for label in labels:
+        letters = len(short(label)) + _MARK
+        if letters > room:
+            rows.append([])
+            room = across
+        rows[-1].append(label)
+        room -= letters
+    even = 1.1 * sum(len(short(label)) + _MARK for label in labels) / max(1, len(rows))
+    if len(rows) > 1 and even < across:
+        evened = _rows_of(labels, even)
+        return evened if len(evened) == len(rows) else rows
+    return rows
+
+
+def legend_rows(labels: Sequence[str]) -> int:
+    """Return how many rows a legend of these labels has."""
+    return len(_rows_of(labels))
+
+
+def legend(figure: F, entries: Mapping[str, Artist]) -> None:
+    """Put a legend above all axes, with names as they are: Matplotlib would leave out those that begin with _."""
+    height = figure.bbox.height / figure.dpi
+    for i, row in enumerate(_rows_of(list(entries))):
+        made = figure.legend(
+            [entries[label] for label in row], ["x"] * len(row), ncols=len(row), loc="upper center", fontsize=8,
+            bbox_to_anchor=(0.0, 1.0 - (0.04 + i * LEGEND_ROW) / height, 1.0, 0.0), borderpad=0.0, borderaxespad=0.0,
+            handlelength=1.8, handletextpad=0.5, columnspacing=1.4,
+        )  # fmt: skip
+        for text, label in zip(made.get_texts(), row, strict=True):
+            text.set_text(short(label))

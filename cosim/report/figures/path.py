@@ -1,0 +1,236 @@
+"""Where the vehicle went: its path among the regions, in space and in the planes."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch, PathPatch
+from matplotlib.path import Path
+
+from cosim.report.figures.axes_box import Box
+from cosim.report.figures.labels import Labels
+from cosim.report.figures.layout import (
+    BOTTOM,
+    LEFT,
+    LEGEND_ROW,
+    RIGHT,
+    TOP,
+    WIDTH,
+    F,
+    Sheet,
+    legend,
+    legend_rows,
+    plain_numbers,
+)
+from cosim.report.figures.shape_outlines import edges_of, outlines, pieces_of, rim
+from cosim.report.figures.style import (
+    BLACK,
+    CRITERION_COLOURS,
+    GOAL_COLOUR,
+    PATH_COLOUR,
+    Place,
+    Story,
+    features_of,
+    places_of,
+)
+from cosim.report.figures.trajectory import Way, way_of
+from cosim.scenario.scenario import CRITERIA
+from cosim.simulation.signals import Array
+
+SIDE = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])  # north and depth, as one looks west
+ABOVE = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])  # north and east
+_TALLEST = 7.6  # inches, of both planes together
+_FAINT = 0.35  # opacity of a region where it began or ended
+_GAP = 0.34  # inches between the planes
+_NAMED = 8  # regions whose names stand in the picture in space
+
+
+def path_3d(story: Story, sheet: Sheet[F]) -> F:
+    """Draw the path, regions and goal in space, as seen from the south-east and above."""
+    way = way_of(story)
+    low, high = _extent(story, way)
+    wide = np.maximum(high - low, 0.4 * (high - low).max())  # a flat path still gets a box with some depth
+    middle = (low + high) / 2.0
+    low, high = middle - wide / 2.0, middle + wide / 2.0
+    entries = _entries(story, way)
+    top = TOP + LEGEND_ROW * legend_rows(list(entries))
+    box = Box(low, high)
+    height = box.height_for(WIDTH - 0.2, 4.4)
+    figure = sheet(height + top)
+    ax = figure.add_axes((0.1 / WIDTH, 0.0, 1.0 - 0.2 / WIDTH, height / (height + top)))
+    labels = box.draw(ax)
+    clip = Path(box.outline)
+    few = len(story.scenario.regions) <= _NAMED  # of more, no one could tell which name is whose
+    for place in places_of(story):
+        seen = _region(ax, place, low, high, box.view, clip)
+        if seen and not place.faint and few:
+            labels.offer(place.region.name, np.vstack(seen))
+    for name, colour, feature in features_of(story):
+        ax.plot(*(box.view @ feature), "*", color=colour, markersize=9)
+        labels.offer(name, (box.view @ feature)[None])
+    floor = np.column_stack([way.points[:, :2], np.full(len(way.points), high[2])])
+    ax.plot(*(floor @ box.view.T).T, color=BLACK, linewidth=0.8, alpha=0.25)
+    _path(ax, way, box.view)
+    labels.put(way.points @ box.view.T)
+    legend(figure, entries)
+    return figure
+
+
+def path_plane(story: Story, sheet: Sheet[F]) -> F:
+    """Draw the path and the outlines of the regions from the side and from above."""
+    way = way_of(story)
+    low, high = _extent(story, way)
+    side, above, along = high[2] - low[2], high[1] - low[1], high[0] - low[0]
+    entries = _entries(story, way)
+    top = TOP + LEGEND_ROW * legend_rows(list(entries)) + 0.16
+    across = WIDTH - LEFT - RIGHT
+    scale = min(across / along, _TALLEST / (side + above))  # inches a metre
+    # a narrow picture is drawn with more of the water beside it, not with a gap
+    room = (across / scale - along) / 2.0
+    low, high = low - np.array([room, 0.0, 0.0]), high + np.array([room, 0.0, 0.0])
+    total = top + scale * (side + above) + _GAP + BOTTOM
+    figure = sheet(total)
+    y = total - top
+    for view, axis, title in ((SIDE, 2, "from the side, looking west"), (ABOVE, 1, "from above")):
+        height = scale * (high - low)[axis]
+        y -= height
+        ax = figure.add_axes((LEFT / WIDTH, y / total, across / WIDTH, height / total))
+        y -= _GAP
+        plain_numbers(ax)
+        ax.set_xlim(low[0], high[0])
+        ax.set_ylim(
+            high[axis], low[axis]
+        )  # depth points down; and so does east, seen from above, with north to the right
+        ax.set_title(title, fontsize=8, loc="left", pad=3)
+        ax.tick_params(labelbottom=axis == 1, length=3)
+        ax.set_ylabel("depth, NED z [m]" if axis == 2 else "east, NED y [m]")
+        ax.yaxis.set_label_coords((0.17 - LEFT) / across, 0.5)
+        labels = Labels(ax, scale, _frame(view @ low, view @ high))
+        for place in places_of(story):
+            seen = _region(ax, place, low, high, view)
+            if seen and not place.faint:
+                labels.offer(place.region.name, np.vstack(seen))
+        for name, colour, feature in features_of(story):
+            ax.plot(*(view @ feature), "*", color=colour, markersize=9)
+            labels.offer(name, (view @ feature)[None])
+        _targets(ax, way, view)
+        _path(ax, way, view)
+        labels.put(way.points @ view.T)
+    ax.set_xlabel("north, NED x [m]")
+    ax.xaxis.set_label_coords(0.5, (0.17 - BOTTOM) / (scale * (high - low)[1]))
+    legend(figure, entries)
+    return figure
+
+
+def _region(ax: Axes, place: Place, low: Array, high: Array, view: Array, clip: Path | None = None) -> list[Array]:
+    """Draw a region as it is seen, with edges where it is clipped; return the outline of each piece in sight."""
+    pieces = pieces_of(place.region.shape, low - place.shift, high - place.shift)
+    seen = [outline + view @ place.shift for outline in outlines(pieces, view)]
+    if not seen or (clip is None and len(seen) == 1 and _fills(seen[0], view @ low, view @ high)):
+        return []
+    alpha = _FAINT if place.faint else 1.0
+    whole = Path.make_compound_path(*(Path(outline, closed=True) for outline in seen))
+    fill = PathPatch(whole, color=place.colour, alpha=(0.15 if clip is None else 0.08) * alpha, linewidth=0)
+    rims = [rim(outline, [other for other in seen if other is not outline]) for outline in seen]
+    dashes = "-" if place.region.keep == "out" else "--"
+    drawn: list[Artist] = [ax.add_patch(fill)]
+    drawn += ax.plot(*_with_gaps(rims), color=place.colour, linewidth=1.1, linestyle=dashes, alpha=alpha)
+    if clip is not None:
+        edges = edges_of(place.region.shape, low - place.shift, high - place.shift)
+        lines = [(line + place.shift) @ view.T for line in edges]
+        drawn += ax.plot(*_with_gaps(lines), color=place.colour, linewidth=0.5, alpha=0.7 * alpha)
+        for artist in drawn:
+            artist.set_clip_path(clip, ax.transData)
+    return seen
+
+
+def _frame(low: Array, high: Array) -> Array:
+    """Return the corners of a picture, closed."""
+    return np.array([low, [high[0], low[1]], high, [low[0], high[1]], low])
+
+
+def _fills(outline: Array, low: Array, high: Array) -> bool:
+    """Return whether the rectangle of an outline leaves nothing of a picture free: it would tell nothing."""
+    return bool((outline.min(axis=0) <= low + 1e-9).all() and (outline.max(axis=0) >= high - 1e-9).all())
+
+
+def _path(ax: Axes, way: Way, view: Array) -> None:
+    """Draw where the vehicle went, in the colour of a criterion while the arbiter gives way to a region of it."""
+    flat = way.points @ view.T
+    ax.plot(*flat.T, color=PATH_COLOUR, linewidth=1.6)
+    for i, name in enumerate(CRITERIA):
+        there = way.given_way == i
+        if there.any():
+            there[:-1] |= there[1:]  # up to where the next piece begins
+            ax.plot(*np.where(there[:, None], flat, np.nan).T, color=CRITERION_COLOURS[name], linewidth=2.4)
+    if way.overlap.any():
+        ax.plot(*np.where(way.overlap[:, None], flat, np.nan).T, color=BLACK, linewidth=3)
+    ax.plot(*flat[0], "x", color=BLACK, mew=2, markersize=7)
+    ax.plot(*flat[-1], "o", color=BLACK, markersize=4)
+
+
+def _targets(ax: Axes, way: Way, view: Array) -> None:
+    """Draw the targets that were ordered before the last one, faint, with their number in the order they came."""
+    for i, (middle, radius) in enumerate(way.targets):
+        centre = view @ middle
+        if radius > 0.0:
+            turn = np.linspace(0.0, 2.0 * np.pi, 49)
+            ax.plot(
+                *(centre[:, None] + radius * np.array([np.cos(turn), np.sin(turn)])),
+                color=GOAL_COLOUR, alpha=0.6, linewidth=0.9, linestyle="--",
+            )  # fmt: skip
+        ax.plot(*centre, "D", color=GOAL_COLOUR, alpha=0.6, markersize=3)
+        ax.annotate(
+            str(i + 1), (centre[0], centre[1]), (3, 3), textcoords="offset points", fontsize=7, color=GOAL_COLOUR
+        )
+
+
+def _entries(story: Story, way: Way) -> dict[str, Artist]:
+    """Return what the legend of a picture in space tells, only of what there is."""
+    shown = {secondary.criterion for secondary in story.scenario.regions}
+    entries: dict[str, Artist] = {"goal": Patch(color=GOAL_COLOUR, alpha=0.4)}
+    entries |= {name: Patch(color=CRITERION_COLOURS[name], alpha=0.4) for name in CRITERIA if name in shown}
+    entries["path"] = Line2D([], [], color=PATH_COLOUR, linewidth=1.6)
+    for i, name in enumerate(CRITERIA):
+        if (way.given_way == i).any():
+            entries[f"gives way to {name}"] = Line2D([], [], color=CRITERION_COLOURS[name], linewidth=2.4)
+    if way.overlap.any():
+        entries["in the overlap"] = Line2D([], [], color=BLACK, linewidth=3)
+    entries["start"] = Line2D([], [], color=BLACK, linestyle="", marker="x", mew=2)
+    entries["end"] = Line2D([], [], color=BLACK, linestyle="", marker="o", markersize=4)
+    if way.targets:
+        entries["earlier targets"] = Line2D([], [], color=GOAL_COLOUR, linestyle="", marker="D", markersize=3)
+    return entries
+
+
+def _with_gaps(lines: list[Array]) -> Array:
+    """Return lines as one, with NaN between them, shape (2, n)."""
+    gap = np.full((1, 2), np.nan)
+    joined: Array = np.vstack([part for line in lines for part in (line, gap)]).T
+    return joined
+
+
+def _extent(story: Story, way: Way) -> tuple[Array, Array]:
+    """Return the corners of a box about the path and the goal, with some room."""
+    path = way.points
+    places = list(places_of(story))
+    all_bounds = [np.array(place.region.shape.bounds()) + place.shift for place in places]
+    goals = [
+        np.where(np.isfinite(bounds), bounds, path[0])
+        for place, bounds in zip(places, all_bounds, strict=True)
+        if place.region.name == "goal" and not place.faint
+    ]
+    targets = [np.array([middle - radius, middle + radius]) for middle, radius in way.targets]
+    points = np.vstack([path, *goals, *targets])  # an endless goal needs no room
+    low, high = points.min(axis=0), points.max(axis=0)
+    size = (high - low).max()
+    for place, bounds in zip(places, all_bounds, strict=True):  # with the regions that are not far away
+        near = (0.1 if place.faint else 0.5) * size
+        if np.isfinite(bounds).all() and (bounds[1] >= low - near).all() and (bounds[0] <= high + near).all():
+            points = np.vstack([points, np.clip(bounds, low - near, high + near)])
+    points = np.vstack([points, *(feature[None] for _, _, feature in features_of(story))])
+    low, high = points.min(axis=0), points.max(axis=0)
+    room = np.maximum(0.06 * (high - low).max(), (1.2 - (high - low)) / 2.0)
+    return low - room, high + room

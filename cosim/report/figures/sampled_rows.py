@@ -1,0 +1,116 @@
+"""What figures draw from: a run's record, or of a long one those rows that tell."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cosim.report.figures.forces import norms_of, thrusts_of
+from cosim.report.figures.style import POINTS, Story
+from cosim.report.figures.time_series import enlarged, error_of
+from cosim.report.figures.trajectory import POSITION
+from cosim.results.extremes import even_edges, extreme_rows, rows_at
+from cosim.results.record import Rows
+from cosim.results.run_result import FlownRun
+from cosim.scenario.scenario import Scenario
+from cosim.simulation.signals import Array
+
+_WHOLE = 200_000  # rows of a record that is drawn as a whole
+_MOST = 80_000  # rows of extremes
+_EVEN = 2_000  # rows that are evenly spaced
+_CHANGES = 100  # by orders that are looked at in a block of rows, and a hundred times as many in all
+_DRAWN = (
+    "time", "position.", "attitude.", "membership.", "weight.", "estimate.", "command.", "actuation.",
+    "thruster_force[", "helm.", "target.", "lyapunov.",
+)  # fmt: skip
+_DRAWN_OF_REGIONS = (".clearance", ".shift.x", ".shift.y", ".shift.z")
+_EXTREME = ("attitude.", "membership.", "weight.", "estimate.", "lyapunov.")
+
+
+def story_of(run: FlownRun) -> Story:
+    """Return what the figures of a run draw from.
+
+    Of a long record these are the rows at which what is drawn is least and greatest in each of some hundred parts of
+    the time, and of those spans that figures show enlarged; evenly spaced rows, in time and along the way; and those at
+    which orders changed something.
+
+    Parameters
+    ----------
+    run : FlownRun
+        Any.
+
+    Returns
+    -------
+    Story
+        Its record, if it is long, has those rows alone, in memory.
+
+    Raises
+    ------
+    RunError
+        If the record cannot be read.
+    """
+    story = Story(run.scenario, run.record, run.summary)
+    if len(run.record) <= _WHOLE:
+        return story
+    names = [name for name in run.record.units if name.startswith(_DRAWN) or name.endswith(_DRAWN_OF_REGIONS)]
+    return dataclasses.replace(story, record=run.record.take(_rows(story, names), names))
+
+
+def _rows(story: Story, names: list[str]) -> NDArray[np.intp]:
+    """Return the rows of a long record that tell."""
+    scenario, record = story.scenario, story.record
+    n, spans = len(record), enlarged(story)
+    bounds = rows_at(record, [time for span in spans for time in span]).clip(0, n - 1)
+    signals = len(_telling(scenario, record.take([0], names)))
+    parts = max(1, _MOST // (2 * signals * (1 + len(spans))))
+    edges = [even_edges(n, parts)]
+    edges += [first + even_edges(end - first, parts) for first, end in bounds.reshape(-1, 2)]
+    blocks = (_telling(scenario, block) for block in record.blocks(names))
+    extremes = extreme_rows(blocks, signals, np.unique(np.concatenate(edges)))
+    even = np.linspace(0, n - 1, _EVEN).astype(np.intp)
+    return np.unique(np.concatenate([even, bounds, extremes, _along(record), _ordered(record)]))
+
+
+def _telling(scenario: Scenario, rows: Rows) -> list[Array]:
+    """Return the signals whose extremes a figure must not miss."""
+    names = [name for name in rows.units if name.startswith(_EXTREME) or name.endswith(_DRAWN_OF_REGIONS)]
+    names += [f"actuation.{axis}" for axis in "XYZ"]
+    _, error = error_of(scenario, rows)
+    return [*(rows[name] for name in names), error, *norms_of(rows).values(), *thrusts_of(scenario, rows).T]
+
+
+def _along(record: Rows) -> NDArray[np.intp]:
+    """Return rows that are evenly along the way of the vehicle."""
+    found, total = [], 0.0
+    for wanted in (0, POINTS):  # the length first
+        marks, first, length, passed = np.linspace(0.0, total, wanted), 0, 0.0, -1.0
+        before: Array | None = None
+        for block in record.blocks(POSITION):
+            path = block.stack(POSITION)
+            known = np.flatnonzero(np.isfinite(path).all(axis=1))
+            if known.size:
+                steps = np.diff(path[known], axis=0, prepend=path[known[:1]] if before is None else before)
+                reached = length + np.cumsum(np.linalg.norm(steps, axis=1))
+                due = marks[(marks > passed) & (marks <= reached[-1])]
+                found.append(first + known[np.searchsorted(reached, due)])
+                length = passed = float(reached[-1])
+                before = path[known[-1:]]
+            first += len(block)
+        total = length
+    return np.concatenate([np.empty(0, np.intp), *found])
+
+
+def _ordered(record: Rows) -> NDArray[np.intp]:
+    """Return the rows at which orders changed something, and the ones before them; of very many only some."""
+    names = [name for name in record.units if name.startswith(("helm.", "target."))]
+    found, first, before = [np.empty(0, np.intp)], 0, np.full((1, len(names)), np.nan)
+    for block in record.blocks(names) if names else ():
+        told = block.numbers()
+        changed = np.flatnonzero((np.diff(told, axis=0, prepend=before) != 0.0).any(axis=1))
+        found.append(first + changed[:: max(1, len(changed) // _CHANGES)])
+        first, before = first + len(told), told[-1:]
+    rows = np.concatenate(found)
+    rows = rows[:: max(1, len(rows) // (100 * _CHANGES))]
+    return np.concatenate([rows, np.maximum(rows - 1, 0)])

@@ -1,0 +1,231 @@
+"""What all figures share: the run they draw from, colours, style, and curves with few enough points."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.rcsetup import cycler
+from numpy.typing import NDArray
+
+from controller.regions import Region, Visibility, of_attitude
+from cosim.results.record import Rows
+from cosim.scenario.scenario import CRITERIA, Scenario
+from cosim.simulation.signals import Array
+
+# Okabe & Ito: told apart by colour-blind readers too
+BLACK, ORANGE, SKY, GREEN, YELLOW, BLUE, RED, PURPLE = (
+    "#000000", "#E69F00", "#56B4E9", "#009E73", "#F0E442", "#0072B2", "#D55E00", "#CC79A7"
+)  # fmt: skip
+CYCLE = (BLUE, RED, GREEN, ORANGE, PURPLE, SKY, BLACK, YELLOW)
+CRITERION_COLOURS = dict(zip(CRITERIA, (RED, ORANGE, SKY), strict=True))
+GOAL_COLOUR = GREEN
+PATH_COLOUR = BLUE
+
+STYLE: Any = {
+    "font.size": 9,
+    "axes.grid": True,
+    "grid.alpha": 0.3,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.prop_cycle": cycler(color=CYCLE),
+    "legend.frameon": False,
+    "lines.linewidth": 1.3,
+    "svg.fonttype": "none",
+    "svg.hashsalt": "subreach",
+}
+
+DPI = 160  # of figures as PNG
+
+_LEGEND_WIDTH, _LEGEND_MARK = 100, 7  # letters that fit across a figure, that a line or marker is as wide as
+POINTS = 1000  # of a drawn curve: about what a figure's width resolves
+
+
+@dataclass(frozen=True)
+class Story:
+    """What the figures draw from."""
+
+    scenario: Scenario
+    record: Rows  # of a long run those rows alone that tell
+    summary: dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """A figure with its name and caption."""
+
+    name: str
+    caption: str
+    figure: Figure
+
+    def write(self, folder: Path, png: bool = False) -> str:
+        """Write it into a folder as SVG, and as PNG if that is asked for; return the SVG."""
+        svg = io.StringIO()
+        self.figure.savefig(svg, format="svg", metadata={"Date": None})
+        (folder / f"{self.name}.svg").write_text(svg.getvalue(), encoding="utf-8")
+        if png:
+            self.figure.savefig(folder / f"{self.name}.png", dpi=DPI)
+        return svg.getvalue()
+
+
+def thin(time: Array, signal: Array) -> tuple[Array, Array]:
+    """Return a signal with few enough points to draw, of each part of the time the least and the greatest.
+
+    Parameters
+    ----------
+    time : ndarray, shape (n,)
+        [s].
+    signal : ndarray, shape (n,)
+        On that time; a gap of NaN stays one.
+
+    Returns
+    -------
+    ndarray, ndarray
+        Time and signal; extremes are kept.
+    """
+    n = len(time)
+    if n <= 2 * POINTS:
+        return time, signal
+    part = -(-n // (POINTS // 2))
+    whole = n // part * part
+    least = np.where(np.isnan(signal), np.inf, signal)[:whole].reshape(-1, part).argmin(axis=1)
+    most = np.where(np.isnan(signal), -np.inf, signal)[:whole].reshape(-1, part).argmax(axis=1)
+    starts = np.arange(0, whole, part)
+    index = np.unique(np.concatenate([[0], starts + least, starts + most, np.arange(whole, n)]))
+    return time[index], signal[index]
+
+
+def regions_of(scenario: Scenario) -> Iterator[tuple[Region, str]]:
+    """Yield the goal and every secondary region with its colour.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        What was run.
+
+    Yields
+    ------
+    (Region, str)
+        The goal first.
+    """
+    yield scenario.goal_region, GOAL_COLOUR
+    for secondary in scenario.regions:
+        yield secondary.region, CRITERION_COLOURS[secondary.criterion]
+
+
+@dataclass(frozen=True)
+class Place:
+    """A region in space, where it was at some time."""
+
+    region: Region
+    colour: str
+    shift: Array  # (3,) m, NED, from where the scenario has it
+    faint: bool  # where it began or ended
+
+
+def places_of(story: Story) -> Iterator[Place]:
+    """Yield where the goal was at the end, and each region when the vehicle had least clearance to it.
+
+    Those that move come before it, faint, where they began and where they ended. Regions of attitude are at no place
+    and left out.
+
+    Parameters
+    ----------
+    story : Story
+        The run.
+
+    Yields
+    ------
+    Place
+        The goal's first.
+    """
+    came = {secondary.region.name for secondary in story.scenario.regions if secondary.seen}
+    for region, colour in regions_of(story.scenario):
+        if of_attitude(region.shape):
+            continue
+        shifts = shifts_of(story.record, region.name)
+        clearance = story.record[f"{region.name}.clearance"]
+        # NaN is not the least
+        at = -1 if region.name == "goal" else int(np.argmin(np.where(np.isnan(clearance), np.inf, clearance)))
+        if shifts.any() and region.name not in came:
+            yield Place(region, colour, shifts[0], faint=True)
+            yield Place(region, colour, shifts[-1], faint=True)
+        yield Place(region, colour, shifts[at], faint=False)
+
+
+def features_of(story: Story) -> Iterator[tuple[str, str, Array]]:
+    """Yield name, colour and place [m, NED], shape (3,), of every feature that is to be seen, as it was at the end.
+
+    Parameters
+    ----------
+    story : Story
+        The run.
+
+    Yields
+    ------
+    (str, str, ndarray)
+        In the order of the regions.
+    """
+    for region, colour in regions_of(story.scenario):
+        if isinstance(region.shape, Visibility):
+            yield region.name, colour, np.array(region.shape.feature) + shifts_of(story.record, region.name)[-1]
+
+
+def shifts_of(record: Rows, name: str) -> Array:
+    """Return how far a region was from where the scenario has it at each step, shape (steps, 3) [m, NED].
+
+    Parameters
+    ----------
+    record : Rows
+        Of the run.
+    name : str
+        Of the region.
+
+    Returns
+    -------
+    ndarray, shape (steps, 3)
+        Zeros for one at rest.
+    """
+    if f"{name}.shift.x" not in record.units:
+        return np.zeros((len(record), 3))
+    return record.stack([f"{name}.shift.{axis}" for axis in "xyz"])
+
+
+def legend_columns(labels: Iterable[str]) -> int:
+    """Return how many columns a legend may have across a figure, as all are as wide as the longest label.
+
+    Parameters
+    ----------
+    labels : iterable of str
+        At least one.
+
+    Returns
+    -------
+    int
+        At least 1.
+    """
+    return max(1, _LEGEND_WIDTH // (max(map(len, labels)) + _LEGEND_MARK))
+
+
+def overlap_of(story: Story) -> NDArray[np.bool_]:
+    """Return when the scenario's regions overlapped about the vehicle, shape (steps,).
+
+    Parameters
+    ----------
+    story : Story
+        The run.
+
+    Returns
+    -------
+    ndarray of bool
+        True within the windows of the summary.
+    """
+    time, windows = story.record["time"], np.array(story.summary["intersection_windows"]).reshape(-1, 2)
+    begun = np.searchsorted(windows[:, 0], time, "right")  # windows until then; they come one after the other
+    inside: NDArray[np.bool_] = (begun > 0) & (time <= np.append(windows[:, 1], 0.0)[begun - 1])
+    return inside

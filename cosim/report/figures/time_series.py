@@ -1,0 +1,275 @@
+"""What the vehicle did and why: errors, attitude, weights, clearances, and who steered, over time."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
+from matplotlib.ticker import MaxNLocator
+
+from controller.regions import Sphere, of_attitude
+from cosim.report.figures.layout import F, Sheet, legend, limits_of, panels, symlog_axis
+from cosim.report.figures.style import (
+    BLACK,
+    BLUE,
+    CRITERION_COLOURS,
+    CYCLE,
+    GOAL_COLOUR,
+    GREEN,
+    ORANGE,
+    RED,
+    Story,
+    regions_of,
+    shifts_of,
+    thin,
+)
+from cosim.results.record import Rows
+from cosim.results.spans import spans
+from cosim.scenario.scenario import CRITERIA, Scenario
+from cosim.simulation.commands.commands import MODES
+from cosim.simulation.signals import Array
+
+_AWAY = 1e4  # m; regions further off have not come yet
+_NAMED = 8  # regions that a legend names one by one
+_NEAREST = 5  # of more, besides the goal
+DASHES = ("-", "--", "-.", ":")
+_WINDOWS = 3  # that are shown one by one
+_WIDER = 1.6  # than up to the end of the overlap
+_TIME = "time [s]"
+
+
+def zooms(story: Story) -> bool:
+    """Return whether the first overlap is so early that figures over the whole run would not show it."""
+    windows = story.summary["intersection_windows"]
+    return bool(windows) and 0.0 < _WIDER * windows[0][1] <= 0.4 * story.summary["simulated_time"]
+
+
+def enlarged(story: Story) -> list[tuple[float, float]]:
+    """Return the spans of time [s] that figures show enlarged, besides the whole run."""
+    windows = story.summary["intersection_windows"]
+    spans = [_around(story, start, end) for start, end in windows[:_WINDOWS]]
+    return [*spans, (0.0, _WIDER * windows[0][1])] if zooms(story) else spans
+
+
+def _around(story: Story, start: float, end: float) -> tuple[float, float]:
+    """Return what is shown of a window in which the regions overlap."""
+    room = max(0.5 * (end - start), 5 * story.scenario.time.step)
+    return start - room, end + room
+
+
+def _zoomed(story: Story, sheet: Sheet[F], heights: Sequence[float], labels: Sequence[str]) -> tuple[F, Any]:
+    """Return axes for the whole run, shape (rows, 1), or (rows, 2) with the time of the overlap on the left."""
+    if not zooms(story):
+        figure, axes = over_time(story, sheet, heights, labels)
+        return figure, axes[:, None]
+    figure, axes = panels(sheet, heights, (2.0, 3.0), labels)
+    start, end = story.summary["intersection_windows"][0]
+    for ax in axes[:, 0]:
+        ax.axvspan(start, end, color=BLACK, alpha=0.08, linewidth=0)
+    axes[0, 0].set_xlim(0.0, _WIDER * end)
+    axes[0, 0].xaxis.set_major_locator(MaxNLocator(4, steps=[1, 2, 5, 10]))
+    axes[0, 1].set_xlim(0.0, story.summary["simulated_time"])
+    for ax in axes[-1]:
+        ax.set_xlabel(_TIME)
+    return figure, axes
+
+
+def over_time(story: Story, sheet: Sheet[F], heights: Sequence[float], labels: Sequence[str]) -> tuple[F, Any]:
+    """Return axes over the whole run, shape (rows,)."""
+    figure, axes = panels(sheet, heights, labels=labels)
+    axes[0, 0].set_xlim(0.0, story.summary["simulated_time"] or story.scenario.time.step)
+    axes[-1, 0].set_xlabel(_TIME)
+    return figure, axes[:, 0]
+
+
+def curve(axes: Any, story: Story, signal: Array, **style: Any) -> Line2D:
+    """Draw a signal into one axes, or into several that show different spans of time; return a line of it."""
+    time = story.record["time"]
+    marker = "o" if len(time) == 1 else ""
+    for ax in np.atleast_1d(axes):
+        seen = slice(0, int(np.searchsorted(time, ax.get_xlim()[1], side="right")) + 1)
+        lines: list[Line2D] = ax.plot(*thin(time[seen], signal[seen]), marker=marker, markersize=4, **style)
+    return lines[0]
+
+
+def _zero_line(ax: Axes) -> None:
+    ax.axhline(0.0, color=BLACK, linewidth=0.8)
+
+
+def error_of(scenario: Scenario, record: Rows) -> tuple[str, Array]:
+    """Return the RMS error to the goal's centre, or the distance to the goal where it has none, and what it is.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        What was run.
+    record : Rows
+        Any rows of it.
+
+    Returns
+    -------
+    str, ndarray of shape (rows,)
+        [m].
+    """
+    bounds = np.array(scenario.goal.bounds())
+    if not np.isfinite(bounds).all():
+        return "distance to the goal", np.maximum(0.0, -record["goal.clearance"])
+    centre = bounds.mean(axis=0) + shifts_of(record, "goal")
+    path = record.stack([f"position.{a}" for a in "xyz"])
+    return "RMS error", np.linalg.norm(path - centre, axis=1) / np.sqrt(3.0)
+
+
+def position_error(story: Story, sheet: Sheet[F]) -> F:
+    """Draw the RMS error to the goal's centre, or the distance to the goal where it has none."""
+    what, error = error_of(story.scenario, story.record)
+    sphere = story.scenario.goal if isinstance(story.scenario.goal, Sphere) else None
+    labels = [what, "tolerance r_v/√3"] if sphere else [what]
+    figure, (ax,) = over_time(story, sheet, [2.0], labels)
+    lines = [curve(ax, story, error)]
+    ax.set_ylabel(f"{what} [m]")
+    if sphere:
+        lines.append(ax.axhline(sphere.radius / np.sqrt(3.0), color=GOAL_COLOUR, linestyle="--"))
+    ax.set_ylim(0.0, limits_of([error, np.array([sphere.radius if sphere else 0.0])])[1])
+    legend(figure, dict(zip(labels, lines, strict=True)))
+    return figure
+
+
+def attitude(story: Story, sheet: Sheet[F]) -> F:
+    """Draw roll, pitch and yaw."""
+    angles = {name: np.rad2deg(story.record[f"attitude.{name}"]) for name in ("roll", "pitch", "yaw")}
+    figure, (ax,) = over_time(story, sheet, [2.0], list(angles))
+    styles = zip(angles.items(), (BLUE, RED, GREEN), DASHES, strict=False)
+    legend(figure, {n: curve(ax, story, angle, color=c, linestyle=s) for (n, angle), c, s in styles})
+    ax.set_ylim(*limits_of(list(angles.values()), least=2.0))
+    ax.set_ylabel("Euler angles, NED to body [°]", fontsize=8)
+    return figure
+
+
+def weights_overlap(story: Story, sheet: Sheet[F]) -> F:
+    """Draw the weights around each window in which the regions overlap, at most the first three."""
+    windows = story.summary["intersection_windows"][:_WINDOWS]
+    labels = [f"α{i + 1} {name}" for i, name in enumerate(CRITERIA)]
+    figure, axes = panels(sheet, [2.0], [1.0] * len(windows), [*labels, "overlap"], titles=0.2)
+    time = story.record["time"]
+    for ax, (start, end) in zip(axes[0], windows, strict=True):
+        first, last = _around(story, start, end)
+        shown = (time >= first) & (time <= last)
+        entries: dict[str, Artist] = {}
+        for label, name, dashes in zip(labels, CRITERIA, DASHES, strict=False):
+            curve = thin(time[shown], story.record[f"weight.{name}"][shown])
+            (entries[label],) = ax.plot(*curve, color=CRITERION_COLOURS[name], linestyle=dashes)
+        entries["overlap"] = ax.axvspan(start, end, color=BLACK, alpha=0.08, linewidth=0)
+        ax.set_title(f"{start:.3f} s to {end:.3f} s", fontsize=8, pad=3)
+        ax.set_xlim(float(time[shown][0]), float(time[shown][-1]) + 1e-9)
+        ax.xaxis.set_major_locator(MaxNLocator(8 // len(windows), steps=[1, 2, 5, 10]))
+        ax.set_xlabel(_TIME)
+    axes[0, 0].set_ylabel("normalised weight [–]")
+    axes[0, 0].set_ylim(-0.05, 1.05)
+    legend(figure, entries)
+    return figure
+
+
+def weights(story: Story, sheet: Sheet[F]) -> F:
+    """Draw memberships and weights of each criterion."""
+    labels = ["weight, in its criterion's colour", "membership"]
+    figure, axes = _zoomed(story, sheet, [0.95] * len(CRITERIA), labels)
+    for i, (row, name) in enumerate(zip(axes, CRITERIA, strict=True)):
+        lines = [
+            curve(row, story, story.record[f"weight.{name}"], color=CRITERION_COLOURS[name], linewidth=1.8),
+            curve(row, story, story.record[f"membership.{name}"], color=BLACK, linestyle=":", linewidth=1.0),
+        ]
+        row[0].set(ylim=(-0.06, 1.06), yticks=(0.0, 0.5, 1.0))
+        row[0].set_ylabel(f"α{i + 1} {name} [–]", fontsize=7.5)
+    legend(figure, dict(zip(labels, lines, strict=True)))
+    return figure
+
+
+def clearance(story: Story, sheet: Sheet[F]) -> F:
+    """Draw the clearance to each region and to the goal: distances, and angles below them where there are any."""
+    regions = list(regions_of(story.scenario))
+    of_places = [of for of in regions if not of_attitude(of[0].shape)]
+    of_angles = [of for of in regions if of_attitude(of[0].shape)]
+    named = _named(story, [region.name for region, _ in regions])
+    others = len(regions) - len(named)
+    labels = [region.name for region, _ in (*of_places, *of_angles) if region.name in named]
+    rest = [f"{others} others"] if others else []
+    figure, axes = _zoomed(story, sheet, [2.5, 1.5] if of_angles else [2.5], [*labels, *rest])
+    entries: dict[str, Artist] = {}
+    order = [region.name for region, _ in regions if region.name in named]
+    for row, group, unit in zip(axes, (of_places, of_angles), ("m", "°"), strict=False):
+        signals = []
+        for region, colour in sorted(group, key=lambda of: of[0].name in named):  # the others behind
+            signal = story.record[f"{region.name}.clearance"]
+            signal = np.rad2deg(signal) if unit == "°" else np.where(np.abs(signal) < _AWAY, signal, np.nan)
+            signals.append(signal)
+            if region.name in named:
+                i = order.index(region.name)
+                dashes, width = DASHES[i % len(DASHES)], 1.3 if i < len(DASHES) else 0.8
+                entries[region.name] = curve(row, story, signal, color=colour, linestyle=dashes, linewidth=width)
+            else:
+                entries[rest[0]] = curve(row, story, signal, color=colour, alpha=0.3, linewidth=0.6)
+        low, high = limits_of(signals)
+        low = min(low, -0.08 * (high - min(low, 0.0)))  # below 0 is always in sight
+        row[0].set_ylim(low, max(high, -0.2 * low))
+        for ax in row:
+            ax.axhspan(low, 0.0, color=RED, alpha=0.06, linewidth=0)
+            _zero_line(ax)
+        row[0].set_ylabel(f"clearance [{unit}]")
+    legend(figure, {label: entries[label] for label in (*labels, *rest)})
+    return figure
+
+
+def _named(story: Story, names: list[str]) -> set[str]:
+    """Return which of the goal and the regions a legend names: all, or of many those that came nearest."""
+    if len(names) <= _NAMED:
+        return set(names)
+    least = story.summary["min_clearance"]
+    return {names[0], *sorted(names[1:], key=lambda name: np.nan_to_num(least[name], nan=np.inf))[:_NEAREST]}
+
+
+def helm(story: Story, sheet: Sheet[F]) -> F:
+    """Draw who steers, and whether the thrusters may work."""
+    figure, (ax,) = over_time(story, sheet, [1.3], [])
+    time, mode = story.record["time"], story.record["helm.mode"]
+    armed = story.record["helm.armed"] > 0.0
+    changes = [0, *(np.flatnonzero(np.diff(mode) != 0.0) + 1).tolist(), len(time) - 1]
+    for first, last in zip(changes, changes[1:], strict=False):
+        if np.isfinite(mode[first]):
+            row = int(mode[first])
+            ax.broken_barh([(time[first], time[last] - time[first])], (row - 0.4, 0.8), color=CYCLE[row])
+    for start, end in spans(~armed, time):
+        ax.axvspan(start, end, color=BLACK, alpha=0.2, linewidth=0)
+    ax.set(ylim=(len(MODES) - 0.4, -0.6), ylabel="mode [–]")
+    ax.set_yticks(range(len(MODES)), labels=MODES)
+    return figure
+
+
+def lyapunov(story: Story, sheet: Sheet[F]) -> F:
+    """Draw V in its three forms, and its rate."""
+    forms = {form: story.record[f"lyapunov.{form}"] for form in ("printed", "normalised", "primary")}
+    labels = ("V as printed", "V, potential of the force", "V, primary region alone")
+    figure, axes = _zoomed(story, sheet, [1.8, 1.8], labels)
+    styles = zip(forms.values(), (ORANGE, BLUE, BLACK), DASHES, strict=False)
+    lines = [curve(axes[0], story, V, color=colour, linestyle=style) for V, colour, style in styles]
+    rate = story.record["lyapunov.rate"]
+    curve(axes[1], story, rate, color=BLUE)
+    for row, signal, bad in ((axes[0], forms["normalised"], -1.0), (axes[1], rate, 1.0)):
+        size = np.abs(signal[np.isfinite(signal)])
+        largest, typical = (float(size.max()), float(np.percentile(size, 50))) if size.size else (0.0, 0.0)
+        if largest > 20.0 * max(typical, 1.0):  # the beginning would flatten all the rest
+            symlog_axis(row[0], largest, max(typical, 1e-3 * largest))
+        else:
+            row[0].set_ylim(*limits_of([signal, np.zeros(1)]))
+        limits = row[0].get_ylim()
+        for ax in row:
+            ax.axhspan(0.0, limits[0] if bad < 0.0 else limits[1], color=RED, alpha=0.06, linewidth=0)
+            _zero_line(ax)
+        row[0].set_ylim(limits)
+    axes[0, 0].set_ylabel("V [N m]")
+    axes[1, 0].set_ylabel("dV/dt = −W [W]")
+    legend(figure, dict(zip(labels, lines, strict=True)))
+    return figure

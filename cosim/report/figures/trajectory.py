@@ -1,0 +1,93 @@
+"""The way that a vehicle went, with few enough points to draw: where, past what, and to which targets."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cosim.replay.activity import active_regions
+from cosim.report.figures.style import POINTS, Story, overlap_of
+from cosim.scenario.scenario import CRITERIA
+from cosim.simulation.signals import Array
+
+_TARGETS = 12  # that are drawn on the way at the most
+POSITION = ("position.x", "position.y", "position.z")
+
+
+@dataclass(frozen=True)
+class Way:
+    """Some points of a path, evenly along its length."""
+
+    points: Array  # (n, 3) m, NED
+    given_way: NDArray[np.intp]  # (n,) criterion of the region that the arbiter gives way to, -1 for the goal
+    overlap: NDArray[np.bool_]  # (n,) whether the scenario's regions overlap there
+    targets: list[tuple[Array, float]]  # before the last one: middle [m, NED], and radius [m], 0 for that of the goal
+
+
+def is_known(story: Story) -> bool:
+    """Return whether the record has any place of the vehicle that is a number."""
+    return bool(np.isfinite(story.record.stack(POSITION)).all(axis=1).any())
+
+
+def way_of(story: Story) -> Way:
+    """Return the way of a run.
+
+    Parameters
+    ----------
+    story : Story
+        The run; its record has some place of the vehicle.
+
+    Returns
+    -------
+    Way
+        Of about as many points as a figure resolves.
+    """
+    path = story.record.stack(POSITION)
+    known = np.flatnonzero(np.isfinite(path).all(axis=1))
+    length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(path[known], axis=0), axis=1))])
+    wanted = np.searchsorted(length, np.linspace(0.0, length[-1], POINTS))
+    at = known[np.unique(np.minimum(wanted, len(known) - 1))]
+    return Way(path[at], _given_way(story, at), overlap_of(story)[at], targets_of(story))
+
+
+def targets_of(story: Story) -> list[tuple[Array, float]]:
+    """Return where the target region was ordered to before the last order: middle [m, NED] and radius [m].
+
+    Parameters
+    ----------
+    story : Story
+        The run.
+
+    Returns
+    -------
+    list of (ndarray of shape (3,), float)
+        The radius is 0 where the target was the scenario's goal. A target that moves on its own gives few of them.
+    """
+    if not story.scenario.commands.enabled:
+        return []
+    targets = story.record.stack([*(f"target.{axis}" for axis in "xyz"), "target.radius"])
+    targets = targets[np.isfinite(targets).all(axis=1)]
+    changes = np.flatnonzero((np.diff(targets, axis=0) != 0.0).any(axis=1))  # the last row of each
+    kept = changes[np.unique(np.linspace(0, len(changes) - 1, min(len(changes), _TARGETS)).round().astype(int))]
+    return [(targets[i, :3], float(targets[i, 3])) for i in kept]
+
+
+def _given_way(story: Story, at: NDArray[np.intp]) -> NDArray[np.intp]:
+    """Return in some rows the criterion of the region that the arbiter gives way to, -1 for the goal."""
+    regions = story.scenario.regions
+    if not regions:
+        return np.full(len(at), -1)
+    criteria = [secondary.criterion for secondary in regions]
+    memberships, weights, clearances = (
+        np.column_stack([story.record[name][at] for name in names])
+        for names in (
+            [f"membership.{name}" for name in CRITERIA],
+            [f"weight.{name}" for name in CRITERIA],
+            [f"{secondary.region.name}.clearance" for secondary in regions],
+        )
+    )
+    active = active_regions(criteria, memberships, weights, clearances).astype(int)
+    given_way: NDArray[np.intp] = np.array([-1, *map(CRITERIA.index, criteria)])[active]
+    return given_way

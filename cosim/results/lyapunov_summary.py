@@ -1,0 +1,57 @@
+"""What V of the printed law's analysis did in a run."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from cosim.results.record import Rows
+from cosim.simulation.lyapunov_signals import FORMS
+from cosim.simulation.signals import Array
+
+ROUNDING = 1e-12  # of the greatest |V| of a run: a smaller rise between two steps is none
+
+
+def summarise_lyapunov(record: Rows) -> dict[str, Any] | None:
+    """Return what V did in a run.
+
+    Parameters
+    ----------
+    record : Rows
+        Of the run.
+
+    Returns
+    -------
+    dict or None
+        For each form of V: value at the start, the end and the least [N m]; number of steps in which it rose, by more
+        than `threshold` [N m]; when it first rose and was first negative [s], None for never. None if V is not
+        recorded.
+    """
+    if "lyapunov.rate" not in record.units:
+        return None
+    return {form: _course(record, f"lyapunov.{form}") for form in FORMS}
+
+
+def _course(record: Rows, name: str) -> dict[str, Any]:
+    least, size = np.inf, 0.0
+    for block in record.blocks([name]):
+        least, size = np.minimum(least, block[name].min()), np.maximum(size, np.abs(block[name]).max())
+    threshold = ROUNDING * float(size)
+    before: tuple[Array, Array] = np.empty(0), np.empty(0)  # the row before a block
+    rises, first_rise, first_negative = 0, None, None
+    for block in record.blocks(["time", name]):
+        time, V = np.concatenate([before[0], block["time"]]), np.concatenate([before[1], block[name]])
+        rising, below = np.flatnonzero(np.diff(V) > threshold), np.flatnonzero(V < 0.0)
+        first_rise = float(time[rising[0]]) if rising.size and not rises else first_rise
+        first_negative = float(time[below[0]]) if below.size and first_negative is None else first_negative
+        rises, before = rises + len(rising), (time[-1:], V[-1:])
+    return {
+        "start": record.value(name, 0),
+        "end": record.value(name, -1),
+        "least": float(least),
+        "threshold": threshold,
+        "increases": rises,
+        "first_rise": first_rise,
+        "first_negative": first_negative,
+    }

@@ -1,0 +1,316 @@
+"""The record of a run, read: a Parquet file with a column for each signal and its unit in the metadata."""
+
+from __future__ import annotations
+
+import contextlib
+from collections import OrderedDict
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+from numpy.typing import NDArray
+
+from cosim.errors import RunError
+from cosim.simulation.signals import Array, Column
+
+MAX_ROWS = 100_000_001  # of a run of as many steps as a scenario may have
+RECORD = "record.parquet"
+PARTS = "record.parts"  # what a killed run leaves
+_BLOCK = 10_000  # rows that are read at once
+_SMALL = 2**23  # numbers of a record that is read as a whole,
+_KEPT = 24  # and signals that a larger one keeps in memory
+
+
+class Rows:
+    """Signals over some rows of a run, in memory.
+
+    Parameters
+    ----------
+    columns : sequence of Column
+        What the signals are.
+    arrays : mapping of str to ndarray of shape (rows,)
+        The signals, by the names of the columns.
+
+    Attributes
+    ----------
+    columns : tuple of Column
+        In the order of the row.
+    units : dict
+        Unit of each signal, by name, in the order of the columns.
+    """
+
+    def __init__(self, columns: Sequence[Column], arrays: Mapping[str, Array]) -> None:
+        self.columns = tuple(columns)
+        self.units: dict[str, str] = {column.name: column.unit for column in self.columns}
+        self._arrays = arrays
+
+    def __len__(self) -> int:
+        """Return how many rows there are."""
+        return len(self[next(iter(self.units))])
+
+    def __getitem__(self, name: str) -> Array:
+        """Return one signal, shape (rows,)."""
+        return self._arrays[name]
+
+    def stack(self, names: Sequence[str]) -> Array:
+        """Return several signals side by side, shape (rows, len(names))."""
+        return np.column_stack([self[name] for name in names])
+
+    def numbers(self) -> Array:
+        """Return all signals side by side, shape (rows, columns)."""
+        return self.stack(list(self.units))
+
+    def blocks(self, names: Sequence[str] | None = None) -> Iterator[Rows]:
+        """Yield all rows in their order, in blocks that fit into memory.
+
+        Parameters
+        ----------
+        names : sequence of str, optional
+            Which signals; default: all.
+
+        Raises
+        ------
+        RunError
+            If they cannot be read.
+        KeyError
+            If there is no such signal.
+        """
+        columns = self._columns_of(names)
+        for first in range(0, len(self), _BLOCK):
+            yield Rows(columns, {c.name: self[c.name][first : first + _BLOCK] for c in columns})
+
+    def take(self, rows: Sequence[int] | NDArray[np.intp], names: Sequence[str] | None = None) -> Rows:
+        """Return some rows alone.
+
+        Parameters
+        ----------
+        rows : sequence of int
+            Rising, from 0.
+        names : sequence of str, optional
+            Which signals; default: all.
+
+        Raises
+        ------
+        RunError
+            If they cannot be read.
+        KeyError
+            If there is no such signal.
+        """
+        columns = self._columns_of(names)
+        return Rows(columns, {column.name: self[column.name][np.asarray(rows, np.intp)] for column in columns})
+
+    def value(self, name: str, row: int) -> float:
+        """Return the number that a signal (`name`) has at a row (`row`: from 0, or from -1 backwards)."""
+        return float(self.take([row % len(self)], [name])[name][0])
+
+    def _columns_of(self, names: Sequence[str] | None) -> tuple[Column, ...]:
+        if names is None:
+            return self.columns
+        for name in names:
+            if name not in self.units:
+                raise KeyError(name)
+        by_name = {column.name: column for column in self.columns}
+        return tuple(by_name[name] for name in dict.fromkeys(names))
+
+
+class Record(Rows):
+    """A run's signals, each an array over its steps, read from the files when they are asked for.
+
+    A small record is held in memory as a whole. Of a larger one take blocks, or some rows: one signal of it may be more
+    than memory holds.
+
+    Parameters
+    ----------
+    files : sequence of Path
+        Parquet files of one schema, one behind the other.
+
+    Attributes
+    ----------
+    columns : tuple of Column
+        In the order of the row.
+    units : dict
+        Unit of each signal, by name, in the order of the columns.
+    file : Path
+        The first of the files.
+
+    Raises
+    ------
+    RunError
+        If they cannot be read.
+    """
+
+    def __init__(self, files: Sequence[Path]) -> None:
+        self._files, self.file = list(files), files[0]
+        columns, rows = [], 0
+        for file in self._files:
+            with _opened(file) as parquet:
+                schema = parquet.schema_arrow
+                rows += parquet.metadata.num_rows
+                _require_numbers(file, schema, rows)
+                columns.append(tuple(map(_column_of, schema)))
+            if columns[-1] != columns[0]:
+                raise RunError(f"{file}: has other columns than {self._files[0].name}, expected parts of one record")
+        self._kept: OrderedDict[str, Array] = OrderedDict()
+        super().__init__(columns[0], self._kept)
+        self._count = rows
+        self._small = rows * len(self.columns) <= _SMALL  # one signal takes a tenth of the time that all take
+
+    def __len__(self) -> int:
+        """Return how many rows there are."""
+        return self._count
+
+    def __getitem__(self, name: str) -> Array:
+        """Return one signal, shape (steps,)."""
+        if name not in self.units:
+            raise KeyError(name)
+        if name not in self._kept:
+            names = list(self.units) if self._small else [name]
+            parts = [_read(file, names) for file in self._files]
+            self._kept.update(
+                {n: np.concatenate([np.empty(0), *(c for part in parts for c in part[n])]) for n in names}
+            )
+        self._kept.move_to_end(name)
+        while len(self._kept) > _KEPT and not self._small:
+            self._kept.popitem(last=False)
+        return self._kept[name]
+
+    def blocks(self, names: Sequence[str] | None = None) -> Iterator[Rows]:
+        """Yield all rows in their order, in blocks that fit into memory, of all signals or of those by `names`."""
+        if self._small:
+            yield from super().blocks(names)
+            return
+        columns = self._columns_of(names)
+        for file in self._files:
+            with _opened(file) as parquet:
+                yield from _batches(parquet, columns, range(parquet.num_row_groups))
+
+    def take(self, rows: Sequence[int] | NDArray[np.intp], names: Sequence[str] | None = None) -> Rows:
+        """Return some rows (`rows`: rising, from 0) alone, of all signals or of those by `names`."""
+        if self._small and self._kept:
+            return super().take(rows, names)
+        columns, rows = self._columns_of(names), np.asarray(rows, np.intp)
+        found: dict[str, list[Array]] = {column.name: [np.empty(0)] for column in columns}
+        first = 0
+        for file in self._files:
+            with _opened(file) as parquet:
+                for group in range(parquet.num_row_groups):
+                    end = first + parquet.metadata.row_group(group).num_rows
+                    if np.searchsorted(rows, first) == np.searchsorted(rows, end):
+                        first = end
+                        continue
+                    for batch in _batches(parquet, columns, [group]):
+                        begin, stop = np.searchsorted(rows, [first, first + len(batch)])
+                        for name, arrays in found.items():
+                            arrays.append(batch[name][rows[begin:stop] - first])
+                        first += len(batch)
+        return Rows(columns, {name: np.concatenate(arrays) for name, arrays in found.items()})
+
+
+def load_record(folder: Path) -> Record:
+    """Open the record of a run, whether it was finished or killed.
+
+    Parameters
+    ----------
+    folder : Path
+        The run folder.
+
+    Returns
+    -------
+    Record
+        All that was written.
+
+    Raises
+    ------
+    RunError
+        If there is none, or it cannot be read.
+    """
+    require_utf8(folder)
+    files = [folder / RECORD] if (folder / RECORD).exists() else part_files(folder)
+    if not files:
+        raise RunError(f"{folder}: holds no record of a run")
+    record = Record(files)
+    if not len(record):
+        raise RunError(f"{folder}: the record of the run is empty")
+    return record
+
+
+def _column_of(field: pa.Field) -> Column:
+    about = field.metadata or {}
+    return Column(field.name, about.get(b"unit", b"").decode(), about.get(b"description", b"").decode())
+
+
+def _read(file: Path, names: list[str]) -> dict[str, list[Array]]:
+    """Return the pieces of each signal."""
+    with _opened(file) as parquet:  # pq.read_table takes three times as long to begin
+        table = parquet.read(names)
+        return {name: [_numbers(chunk) for chunk in table[name].chunks] for name in names}  # not to_numpy, as above
+
+
+def _batches(parquet: Any, columns: Sequence[Column], groups: Sequence[int]) -> Iterator[Rows]:
+    """Yield the rows of some row groups."""
+    names, rows = [column.name for column in columns], 0
+    for batch in parquet.iter_batches(_BLOCK, row_groups=list(groups), columns=names):
+        rows += len(batch)
+        yield Rows(columns, {name: _numbers(batch.column(name)) for name in names})
+    told = sum(parquet.metadata.row_group(group).num_rows for group in groups)
+    if rows != told:
+        raise TypeError(f"{rows} rows are there, expected {told}")
+
+
+def _numbers(column: pa.Array) -> Array:
+    if column.null_count:
+        raise TypeError("a number is missing")
+    numbers: Any = np.from_dlpack(column)
+    result: Array = numbers
+    return result
+
+
+@contextlib.contextmanager
+def _opened(file: Path) -> Iterator[Any]:
+    """Open a Parquet file; what cannot be read of it is one error, whoever has made it."""
+    require_utf8(file)
+    try:
+        # read ahead, all that was read of a file would stay in memory until it is closed
+        with pq.ParquetFile(file, pre_buffer=False) as parquet:
+            yield parquet
+    except (OSError, pa.ArrowException, UnicodeDecodeError, TypeError, BufferError, KeyError) as error:
+        raise RunError(f"{file}: cannot be read: {error}") from error
+
+
+def require_utf8(path: Path) -> None:
+    """Refuse a place that Parquet's library cannot be told of.
+
+    Parameters
+    ----------
+    path : Path
+        Of a file or folder.
+
+    Raises
+    ------
+    RunError
+        If its name is no UTF-8.
+    """
+    try:
+        str(path).encode()
+    except UnicodeEncodeError as error:
+        shown = str(path).encode(errors="surrogateescape").decode(errors="backslashreplace")
+        raise RunError(f"{shown}: is no UTF-8, expected such a name, which Parquet files need") from error
+
+
+def _require_numbers(file: Path, schema: pa.Schema, rows: int) -> None:
+    """Refuse a table that is no record, or brings one to too many rows: a few bytes could say what no memory holds."""
+    odd = next((field.name for field in schema if field.type != pa.float64()), None)
+    if odd is not None:
+        raise RunError(f"{file}: column {odd[:80]!r} is no number, expected the record of a run")
+    if not schema.names or len(set(schema.names)) < len(schema.names):
+        raise RunError(f"{file}: has no columns, or two of one name; expected the record of a run")
+    if rows > MAX_ROWS:
+        raise RunError(f"{file}: the record has {rows} rows up to here, expected at most {MAX_ROWS}")
+
+
+def part_files(folder: Path) -> list[Path]:
+    """Return the parts that a run has left in its folder, in their order."""
+    return sorted((folder / PARTS).glob("*.parquet"))

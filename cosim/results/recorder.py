@@ -1,0 +1,221 @@
+"""The record of a run, written: a Parquet file, and until it is whole, parts that can be read as well."""
+
+from __future__ import annotations
+
+import contextlib
+import shutil
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from cosim.results.record import PARTS, RECORD, part_files
+from cosim.simulation.signals import Array, Column
+
+_WHOLE = "whole"  # among the parts, what a finished run makes of its rows
+_PART_SECONDS = 1.0  # of the wall clock, after which a part is written even if it is small
+_PART_NUMBERS = 2**23  # in a part at the most, unless another number of rows is asked for: 64 MiB
+_GROUP = 10_000  # rows that go into the whole at once, at the most;
+_DOUBLED = (
+    100  # after so many groups twice as many: whoever reads the record has a kilobyte of each signal of each group
+)
+_BLOCK = 250  # rows that wait to be turned into columns: as many as a processor's caches hold
+# measured: bytes of a float64 column compress best when they are split by place, and dictionaries only cost
+_WRITING = {"compression": "zstd", "use_dictionary": False, "use_byte_stream_split": True, "write_statistics": False}
+
+
+class Recorder:
+    """Observer that writes each step's row, in parts that a killed run leaves readable.
+
+    Parameters
+    ----------
+    folder : Path
+        The run folder.
+    columns : sequence of Column
+        Of the rows that will come.
+    rows_per_part : int, optional
+        The most in a part. One is written when there are about as many, or a second of the wall clock has passed.
+        Default: as many as take 64 MiB.
+
+    Attributes
+    ----------
+    rows : int
+        That have come.
+    """
+
+    # Ctrl-C may come at every call. So that an interrupted run has each row once, what says where a row stands is
+    # changed by assignments alone, side by side; and what was interrupted is done again.
+
+    def __init__(self, folder: Path, columns: Sequence[Column], rows_per_part: int | None = None) -> None:
+        self._folder, self._schema = folder, _schema(columns)
+        self._rows_per_part = rows_per_part or max(1, _PART_NUMBERS // len(columns))
+        block = min(_BLOCK, self._rows_per_part)
+        self._block: Array = np.empty((block, len(columns)))
+        self._rows = [row.data for row in self._block]  # copied to in half the time of an array's row
+        self._filled = 0
+        self._group = min(_GROUP, self._rows_per_part) // block * block  # rows that go into the whole at once,
+        self._largest = max(self._group, (self._rows_per_part - block) // 2 // block * block)  # the most of them,
+        self._groups = 0  # and how often some did
+        self._columns: Array = np.empty((len(columns), self._group))
+        self._turned = 0  # rows of the present group, which stand in the columns;
+        self._saved = 0  # and how many of these are in a part already
+        self._unsaved: list[pa.Table] = []  # of earlier groups, what is in no part
+        self._parts = 0
+        (folder / PARTS).mkdir()
+        self._whole: pq.ParquetWriter | None = None  # what the record will be, begun with its first group
+        self._sound = True  # it has all earlier groups; not so once a write was cut off
+        self._whole_is_there = False  # in its place
+        self._due = time.monotonic() + _PART_SECONDS
+        self.rows = 0
+
+    def observe(self, k: int, row: Array) -> None:
+        """Keep the row of step `k`, shape (columns,) of float64.
+
+        Raises
+        ------
+        OSError, pyarrow.ArrowException
+            If rows that came before cannot be written. They are kept, and tried again with the next.
+        """
+        if self._filled == len(self._rows) or time.monotonic() > self._due:
+            self._turn()
+        self._rows[self._filled][:] = row.data
+        self._filled += 1
+        self.rows += 1
+
+    def close(self) -> None:
+        """Write what is left, and put the whole in the place of its parts; if that fails, these have all.
+
+        May be called again then.
+        """
+        if not self._whole_is_there:
+            try:
+                self._conclude()
+            except BaseException:
+                self._rescue()
+                raise
+        shutil.rmtree(self._folder / PARTS, ignore_errors=True)
+
+    # ---- from rows to columns ----
+
+    def _turn(self) -> None:
+        """Turn the rows of the block into columns, and write what is due."""
+        self._turn_block()
+        if self._turned == self._group:
+            self._end_group()
+        if time.monotonic() > self._due or _rows(self._unsaved) + self._group > self._rows_per_part:
+            self._save()
+
+    def _turn_block(self) -> None:
+        if self._turned + self._filled > self._group:
+            self._end_group()
+        n = self._turned + self._filled
+        self._columns[:, self._turned : n] = self._block[: self._filled].T
+        self._turned, self._filled = n, 0
+
+    def _table(self, first: int) -> pa.Table:
+        """Return the present group from one of its rows on; the columns stay the table's."""
+        # not pa.array: that imports pandas where it is installed, for nothing
+        arrays = [
+            pa.Array.from_buffers(pa.float64(), self._turned - first, [None, pa.py_buffer(column)])
+            for column in self._columns[:, first : self._turned]
+        ]
+        return pa.Table.from_arrays(arrays, schema=self._schema)
+
+    def _end_group(self) -> None:
+        """Write the present group into the whole, and begin another one."""
+        group, groups, sound = self._table(0), self._groups + 1, self._sound
+        rows = min(2 * self._group, self._largest) if groups % _DOUBLED == 0 else self._group
+        unsaved, room = [*self._unsaved, group.slice(self._saved)], np.empty((len(self._columns), rows))
+        self._sound, self._unsaved, self._columns, self._turned, self._saved = False, unsaved, room, 0, 0
+        self._group, self._groups = rows, groups
+        if sound:
+            self._append(group)
+            self._sound = True
+
+    # ---- from columns to files ----
+
+    def _save(self) -> None:
+        """Write a part of what is in none."""
+        tables = [*self._unsaved, self._table(self._saved)]
+        if _rows(tables):
+            self._write_part(tables)
+            self._parts, self._unsaved, self._saved = self._parts + 1, [], self._turned
+        self._due = time.monotonic() + _PART_SECONDS
+
+    def _rescue(self) -> None:
+        """Write parts of what is in none, in place of the whole, as far as the disk has room."""
+        self._drop_whole()
+        self._turn_block()
+        while self._unsaved:
+            self._write_part(self._unsaved[:1])
+            self._parts, self._unsaved = self._parts + 1, self._unsaved[1:]
+        self._save()
+
+    def _write_part(self, tables: Sequence[pa.Table]) -> None:
+        part = self._folder / PARTS / f"{self._parts:06}.parquet"
+        scratch = part.with_suffix(".tmp")
+        try:
+            pq.write_table(pa.concat_tables(tables), scratch, row_group_size=_GROUP, **_WRITING)
+            scratch.replace(part)
+        except BaseException:
+            with contextlib.suppress(OSError):
+                scratch.unlink()
+            raise
+
+    def _append(self, table: pa.Table) -> None:
+        if self._whole is None:
+            self._whole = pq.ParquetWriter(self._folder / PARTS / _WHOLE, self._schema, **_WRITING)
+        self._whole.write_table(table)
+
+    def _conclude(self) -> None:
+        """Finish the whole, and put it in its place."""
+        self._turn_block()
+        sound, self._sound = self._sound, False  # unless this ends well, it is begun anew
+        if not sound:
+            self._append_parts()
+        elif self._turned:
+            self._append(self._table(0))
+        if self._whole is not None:
+            self._whole.close()
+        (self._folder / PARTS / _WHOLE).replace(self._folder / RECORD)
+        self._whole_is_there = True
+
+    def _append_parts(self) -> None:
+        """Begin the whole anew, with all parts: Ctrl-C or a full disk came in the middle of it."""
+        self._drop_whole()
+        self._save()
+        tables: list[pa.Table] = []
+        for file in part_files(self._folder):
+            with pq.ParquetFile(file, pre_buffer=False) as part:
+                for batch in part.iter_batches(self._group):
+                    tables.append(pa.Table.from_batches([batch]))
+                    if _rows(tables) >= self._group:
+                        self._append(pa.concat_tables(tables).combine_chunks())
+                        tables = []
+        if tables:
+            self._append(pa.concat_tables(tables).combine_chunks())
+
+    def _drop_whole(self) -> None:
+        self._sound = False
+        if self._whole is not None:
+            with contextlib.suppress(OSError, pa.ArrowException):
+                self._whole.close()
+            with contextlib.suppress(OSError):
+                (self._folder / PARTS / _WHOLE).unlink()
+            self._whole = None
+
+
+def _rows(tables: Sequence[pa.Table]) -> int:
+    return sum(table.num_rows for table in tables)
+
+
+def _schema(columns: Sequence[Column]) -> pa.Schema:
+    return pa.schema(
+        [
+            pa.field(c.name, pa.float64(), nullable=False, metadata={"unit": c.unit, "description": c.description})
+            for c in columns
+        ]
+    )

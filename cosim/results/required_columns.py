@@ -1,0 +1,56 @@
+"""The columns that a record must have for its scenario."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Sequence
+
+from cosim.errors import RunError
+from cosim.results.record import Record
+from cosim.scenario.scenario import Scenario
+from cosim.simulation.columns import names_of
+
+log = logging.getLogger(__name__)
+
+_TAKEN_ALONG = ("law.", "sensed.", "water_velocity.")  # beginnings of names of what is exported, and nothing is made of
+_OF_REGIONS = (".clearance", ".shift.x", ".shift.y", ".shift.z")  # a region may have any of those names
+_NAMED = 3  # columns in a message
+
+
+def require_columns(scenario: Scenario, record: Record) -> None:
+    """Refuse a record that lacks what its scenario calls for; warn where nothing is made of what it lacks.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        What was run.
+    record : Record
+        What it left; it may have more columns.
+
+    Raises
+    ------
+    RunError
+        With the names of some columns that are missing, or stand in another order.
+    """
+    expected, found = names_of(scenario), list(record.units)
+    missing = [name for name in expected if name not in record.units]
+    needed = [name for name in missing if not _is_taken_along(name)]
+    if needed:
+        raise RunError(f"{record.file}: has no {_listed(needed)}, which its scenario calls for")
+    # what is read side by side, or as the first one, counts on the order
+    here = [found[0], *(name for name in found if name in expected)]
+    there = [expected[0], *(name for name in expected if name in record.units)]
+    odd = next((name for name, other in zip(here, there, strict=True) if name != other), None)
+    if odd is not None:
+        raise RunError(f"{record.file}: column {odd!r} stands elsewhere, expected the order that its scenario has")
+    if missing:
+        log.warning("%s: has no %s: what is made of it does without", record.file, _listed(missing))
+
+
+def _is_taken_along(name: str) -> bool:
+    return name.endswith(".value") or (name.startswith(_TAKEN_ALONG) and not name.endswith(_OF_REGIONS))
+
+
+def _listed(names: Sequence[str]) -> str:
+    more = f" and {len(names) - _NAMED} more" if len(names) > _NAMED else ""
+    return f"column{'s' * (len(names) > 1)} {', '.join(map(repr, names[:_NAMED]))}{more}"

@@ -1,0 +1,82 @@
+"""When a condition held in a run, found block by block."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cosim.simulation.signals import Array
+
+Flags = NDArray[np.bool_]
+
+
+@dataclass
+class Span:
+    """A time for which a condition held."""
+
+    start: float  # s, the first instant in
+    end: float  # s, the first instant out; the last one of all while the condition still holds
+    least: float = np.nan  # of a signal meanwhile
+
+
+class Spans:
+    """Finds when a condition holds, from one block of rows to the next.
+
+    Attributes
+    ----------
+    open : Span or None
+        The one that has not ended.
+    """
+
+    def __init__(self) -> None:
+        self.open: Span | None = None
+
+    def add(self, flags: Flags, time: Array, signal: Array | None = None) -> list[Span]:
+        """Take the next rows, and return the spans that end among them.
+
+        Parameters
+        ----------
+        flags : ndarray of bool, shape (rows,)
+            The condition at each row.
+        time : ndarray, shape (rows,)
+            [s].
+        signal : ndarray, shape (rows,), optional
+            Of which each span gets the least.
+        """
+        ended = []
+        edges = np.flatnonzero(np.diff(flags, prepend=self.open is not None)).tolist()
+        for first, end in zip([0, *edges], [*edges, len(flags)], strict=True):
+            if end == first:
+                pass
+            elif flags[first]:
+                span = self.open = self.open or Span(float(time[first]), float(time[first]))
+                span.end = float(time[end - 1])
+                if signal is not None:
+                    span.least = float(np.fmin(span.least, np.fmin.reduce(signal[first:end])))
+            elif self.open is not None:
+                self.open.end = float(time[first])
+                ended.append(self.open)
+                self.open = None
+        return ended
+
+
+def spans(flags: Flags, time: Array) -> list[tuple[float, float]]:
+    """Return when a condition held, as pairs of the first instant in and the first out.
+
+    Parameters
+    ----------
+    flags : ndarray of bool, shape (steps,)
+        The condition at each step.
+    time : ndarray, shape (steps,)
+        [s].
+
+    Returns
+    -------
+    list of (float, float)
+        [s]; a condition that still holds at the end ends at the last instant.
+    """
+    found = Spans()
+    ended = found.add(flags, time)
+    return [(span.start, span.end) for span in (*ended, *([found.open] if found.open else []))]

@@ -1,0 +1,192 @@
+"""What a run comes to: numbers from its record alone."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from controller.regions import of_attitude
+from cosim.results.lyapunov_summary import summarise_lyapunov
+from cosim.results.record import Rows
+from cosim.results.spans import Span, Spans
+from cosim.scenario.scenario import CRITERIA, Scenario
+from cosim.simulation.signals import Array
+
+SETTLED_FOR = 10.0  # s, that the vehicle must be inside at the end
+
+_ADDED = 2**18  # numbers that are added up at once
+
+_FORCE = [f"actuation.{axis}" for axis in "XYZ"]
+_ASKED = [f"command.{axis}" for axis in "XYZ"]
+_SPEED = [f"velocity.{axis}" for axis in "uvw"]
+_PLACE = [f"position.{axis}" for axis in "xyz"]
+_ESTIMATE = [f"estimate.phi{i}" for i in range(1, 5)]
+_WEIGHTS = [f"weight.{name}" for name in CRITERIA]
+
+
+def summarise(scenario: Scenario, record: Rows, status: str, wall_time: float | None) -> dict[str, Any]:
+    """Return the summary of a run.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        What was run.
+    record : Rows
+        What it left, at least one row.
+    status : str
+        ``"completed"``, ``"interrupted"``, ``"killed"``, or ``"failed: ..."``.
+    wall_time : float or None
+        What the stepping took [s], if that is known.
+
+    Returns
+    -------
+    dict
+        Ready for JSON; times in s, lengths in m, forces in N. Clearances are distances to a region's surface where that
+        was then, or angles [rad] for regions of attitude; positive where it is respected, negative where it is violated
+        (inside a region that is to be kept out of).
+
+    Raises
+    ------
+    RunError
+        If the record cannot be read.
+    KeyError
+        If it lacks a signal.
+    """
+    names = [secondary.region.name for secondary in scenario.regions]
+    begun = record.take(range(min(2, len(record))), ["time", *(f"{name}.clearance" for name in names)])
+    # of the record, which may be thinned out
+    period = float(begun["time"][1] - begun["time"][0]) if len(begun) > 1 else scenario.time.step
+    course = _Course(names, scenario, record, period)
+    with np.errstate(over="ignore", invalid="ignore"):  # of a damaged record: a norm too great is infinite
+        for block in record.blocks(course.signals):
+            course.add(block)
+    visits, last = course.visits, course.last
+    simulated = float(last["time"])
+    settled = bool(visits and course.inside.open and simulated - visits[-1].start >= SETTLED_FOR)
+    least = {name: course.least[f"{name}.clearance"] for name in names}
+    return {
+        "scenario": scenario.name,
+        "law": scenario.law.name,
+        "arbiter": scenario.arbiter.engine,
+        "vehicle": scenario.vehicle.name,
+        "status": status,
+        "simulated_time": simulated,
+        "reached": bool(visits),
+        "reach_time": visits[0].start if visits else None,
+        "settled": settled,
+        "settle_time": visits[-1].start if visits else None,
+        "final_position": [last[name] for name in _PLACE],
+        "closest_to_goal": -course.greatest["goal.clearance"],
+        "intersection": [names[i] for i in scenario.intersection],
+        "intersection_windows": [(span.start, span.end) for span in course.windows],
+        "min_clearance": least,
+        "clearance_unit": {r.region.name: "rad" if of_attitude(r.region.shape) else "m" for r in scenario.regions},
+        "hard": [r.region.name for r in scenario.regions if r.region.hard],
+        "hard_violated": [r.region.name for r in scenario.regions if r.region.hard and least[r.region.name] < 0.0],
+        "violated_at_start": [name for name in names if begun[f"{name}.clearance"][0] < 0.0],
+        "max_force": course.greatest.get("force", 0.0),
+        "max_force_asked": course.greatest["asked"],
+        "max_speed": course.greatest["speed"],
+        "weights_above_half": int(course.greatest["above half"]),
+        "weights_sum_max": course.greatest["sum of weights"],
+        "effort": course.force.total() * period,
+        "saturated_time": course.saturated * period,
+        "estimate_final": [last[name] for name in _ESTIMATE],
+        "estimate_true": scenario.true_restoring_parameters.tolist(),
+        "estimate_lowest": [course.least[name] for name in _ESTIMATE],
+        "estimate_highest": [course.greatest[name] for name in _ESTIMATE],
+        "lyapunov": summarise_lyapunov(record),
+        "steps": round(simulated / scenario.time.step),
+        "wall_time": wall_time,
+        "real_time_factor": simulated / wall_time if wall_time else None,
+    }
+
+
+class _Course:
+    """What a summary needs of a record, gathered block by block."""
+
+    def __init__(self, names: Sequence[str], scenario: Scenario, record: Rows, period: float) -> None:
+        self._clearances = [f"{name}.clearance" for name in names]
+        self._together = [self._clearances[i] for i in scenario.intersection]
+        of_all = ("wrench_saturated", "allocation_saturated")
+        self._flags = [name for name in record.units if name.startswith("thrust_saturated[") or name in of_all]
+        self.signals = [
+            "time", "goal.clearance", *self._clearances, *_FORCE, *_ASKED, *_SPEED, *_PLACE, *_ESTIMATE, *_WEIGHTS,
+            *self._flags,
+        ]  # fmt: skip
+        # rows that come; the last row of a whole run decides, but acts no more
+        self._acting = math.ceil(scenario.steps / max(1, round(period / scenario.time.step)))
+        # extremes are of the numbers that there are: fmin and fmax pass over what is none
+        self.least: dict[str, float] = {}
+        self.greatest: dict[str, float] = {}
+        self.force, self.saturated = _Sum(), 0
+        self.inside, self._overlap = Spans(), Spans()
+        self._visits: list[Span] = []  # the first and the last that ended
+        self._windows: list[Span] = []
+        self.last: dict[str, float] = {}
+
+    @property
+    def visits(self) -> list[Span]:
+        """The first and the last times within the goal."""
+        return [*self._visits, *([self.inside.open] if self.inside.open else [])]
+
+    @property
+    def windows(self) -> list[Span]:
+        """All times within the overlap of the regions."""
+        return [*self._windows, *([self._overlap.open] if self._overlap.open else [])]
+
+    def add(self, block: Rows) -> None:
+        """Take the next rows."""
+        time, goal = block["time"], block["goal.clearance"]
+        for span in self.inside.add(goal >= 0.0, time):
+            self._visits = [*self._visits[:1], span]
+        if self._together:
+            overlap = np.logical_and.reduce([block[name] < 0.0 for name in self._together])
+            self._windows += self._overlap.add(overlap, time)
+        acted = slice(0, max(0, self._acting))
+        self._acting -= len(time)
+        force = np.linalg.norm(block.stack(_FORCE), axis=1)[acted]
+        self.force.add(force)
+        self.saturated += int(np.count_nonzero(np.logical_or.reduce([block[n][acted] > 0.0 for n in self._flags])))
+        weights = block.stack(_WEIGHTS)
+        self._stretch(self.greatest, np.fmax, {
+            "goal.clearance": goal,
+            "force": force,
+            "asked": np.linalg.norm(block.stack(_ASKED), axis=1),
+            "speed": np.linalg.norm(block.stack(_SPEED), axis=1),
+            "above half": (weights > 0.5).sum(axis=1),
+            "sum of weights": weights.sum(axis=1),
+            **{name: block[name] for name in _ESTIMATE},
+        })  # fmt: skip
+        self._stretch(self.least, np.fmin, {name: block[name] for name in (*self._clearances, *_ESTIMATE)})
+        self.last = {name: float(block[name][-1]) for name in ("time", *_PLACE, *_ESTIMATE)}
+
+    @staticmethod
+    def _stretch(known: dict[str, float], extreme: np.ufunc, signals: dict[str, Array]) -> None:
+        for name, signal in signals.items():
+            if signal.size:
+                known[name] = float(extreme(known.get(name, np.nan), extreme.reduce(signal)))
+
+
+class _Sum:
+    """A sum that does not depend on the blocks in which numbers come: of so many at once, as NumPy adds them up."""
+
+    def __init__(self) -> None:
+        self._waiting: Array = np.empty(_ADDED)
+        self._filled, self._total = 0, 0.0
+
+    def add(self, numbers: Array) -> None:
+        """Add numbers, shape (n,)."""
+        while numbers.size:
+            taken = numbers[: _ADDED - self._filled]
+            self._waiting[self._filled : self._filled + len(taken)] = taken
+            self._filled, numbers = self._filled + len(taken), numbers[len(taken) :]
+            if self._filled == _ADDED:
+                self._total, self._filled = self.total(), 0
+
+    def total(self) -> float:
+        """Return the sum of all numbers that came."""
+        return self._total + float(self._waiting[: self._filled].sum())

@@ -1,0 +1,137 @@
+"""What a run was asked and what happened, in sentences."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from controller.regions import SHAPES, Shape
+from cosim.scenario.scenario import Scenario
+
+
+def newtons(force: float) -> str:
+    """Return a force [N] in four digits, such as ``26.82 kN``.
+
+    Parameters
+    ----------
+    force : float
+        [N].
+
+    Returns
+    -------
+    str
+        With its unit.
+    """
+    return f"{force / 1e3:.4g} kN" if force >= 1e3 else f"{force:.4g} N"
+
+
+def asked(scenario: Scenario) -> str:
+    """Return what the vehicle was asked to do, in a sentence.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        What is run.
+
+    Returns
+    -------
+    str
+        Plain text.
+    """
+    start = ", ".join(f"{x:g}" for x in scenario.initial.position)
+    regions = [
+        f"{'within' if r.region.keep == 'in' else 'out of'} {r.region.name} ({r.criterion})" for r in scenario.regions
+    ]
+    respecting = f", keeping {', '.join(regions)}" if regions else ""
+    kind = kind_of(scenario.goal)
+    centre = [sum(pair) / 2.0 for pair in zip(*scenario.goal.bounds(), strict=True)]
+    at = f" about ({', '.join(f'{x:g}' for x in centre)}) m" if all(map(math.isfinite, centre)) else ""
+    return f"From ({start}) m into the goal region, a {kind}{at}{respecting}; {scenario.law.name} law."
+
+
+def kind_of(shape: Shape) -> str:
+    """Return what a shape is called, such as ``depth band``.
+
+    Parameters
+    ----------
+    shape : Shape
+        Any.
+
+    Returns
+    -------
+    str
+        In lower case.
+    """
+    return next(name for name, of in SHAPES.items() if isinstance(shape, of)).replace("_", " ")
+
+
+def number(value: float, digits: int) -> str:
+    """Return a number as it is read.
+
+    Parameters
+    ----------
+    value : float
+        Any.
+    digits : int
+        That count.
+
+    Returns
+    -------
+    str
+        With a true minus sign; ``no number`` where it is none.
+    """
+    if not math.isfinite(value):
+        return "no number"
+    if abs(value) >= 10.0**digits:
+        return f"{value:,.0f}".replace(",", " ").replace("-", "−")
+    return f"{value:.{digits}g}".replace("-", "−")
+
+
+def verdict(summary: dict[str, Any]) -> str:
+    """Return what happened, in a sentence or two.
+
+    Parameters
+    ----------
+    summary : dict
+        What the run came to.
+
+    Returns
+    -------
+    str
+        Plain text.
+    """
+    if summary["settled"]:
+        entered, settled = summary["reach_time"], summary["settle_time"]
+        stayed = "and stayed" if settled == entered else f"and was in for good from {settled:.2f} s"
+        goal = f"The vehicle entered the goal region at {entered:.2f} s {stayed}"
+    elif summary["reached"]:
+        goal = f"The vehicle entered the goal region at {summary['reach_time']:.2f} s but did not settle there"
+    else:
+        near = summary["closest_to_goal"]
+        how_near = f"it came within {near:.2f} m of it" if math.isfinite(near) else "how near it came is not recorded"
+        goal = f"The vehicle never entered the goal region; {how_near}"
+    broken = [_broken(summary, name) for name, c in summary["min_clearance"].items() if c < 0.0]
+    kept = "; it kept every region."
+    if broken:
+        but = "" if summary["hard_violated"] or not summary["hard"] else "kept every hard region but "
+        kept = f"; it {but}violated {', '.join(broken)}."
+    wanted, acted = newtons(summary["max_force_asked"]), newtons(summary["max_force"])
+    force = f" The law asked for up to {wanted}" + ("." if wanted == acted else f"; up to {acted} acted.")
+    ended = {
+        "completed": "",
+        "interrupted": f" The run was interrupted at {summary['simulated_time']:.3f} s.",
+        "reset": f" The run was reset at {summary['simulated_time']:.3f} s.",
+        "killed": f" The run was killed; its record ends at {summary['simulated_time']:.3f} s.",
+    }.get(summary["status"], f" The run {summary['status']}.")
+    orders = summary.get("orders", 0)
+    steered = f" It was given {orders} order{'s' if orders > 1 else ''} on the way." if orders else ""
+    return goal + kept + force + steered + ended
+
+
+def _broken(summary: dict[str, Any], name: str) -> str:
+    """Return by how much a region was violated."""
+    remarks = ["soft"] if name not in summary["hard"] else []
+    remarks += ["where it starts"] if name in summary["violated_at_start"] else []
+    depth, unit = -summary["min_clearance"][name], summary["clearance_unit"][name]
+    depth, unit, digits = (math.degrees(depth), "°", 1) if unit == "rad" else (depth, " m", 3)
+    return f"{name} by {depth:.{digits}f}{unit}" + (f" ({', '.join(remarks)})" if remarks else "")

@@ -1,0 +1,225 @@
+"""A run from scenario to folder: set up, step, record, summarise, report."""
+
+from __future__ import annotations
+
+import itertools
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from controller import Law, LawError
+from cosim.errors import RunError
+from cosim.replay.page import REPLAY
+from cosim.report.report import REPORT
+from cosim.results.record import RECORD
+from cosim.results.recorder import Recorder
+from cosim.results.run_result import ORDERS, SCENARIO, SUMMARY
+from cosim.results.wording import verdict
+from cosim.run.progress import ProgressBar
+from cosim.run.run_folder import RunFolder, claim, conclude
+from cosim.scenario.law_factory import flown_by
+from cosim.scenario.scenario import Scenario
+from cosim.simulation.commands import LoggedOrders, OrderQueue, RecordedOrders
+from cosim.simulation.master import Master, Observer
+from cosim.simulation.signals import Array
+from plant_fmu import PlantError
+
+if TYPE_CHECKING:  # pymavlink and websockets wait until a run is shown
+    from cosim.live.view import LiveView
+    from cosim.mavlink.setup import Mavlink
+    from cosim.mavlink.thread import LinkThread
+
+_PROGRESS_STEPS = 200  # times that the bar moves
+
+
+@dataclass(frozen=True)
+class Run:
+    """Where a run was written, and what it came to."""
+
+    folder: Path
+    summary: dict[str, Any]
+
+    def files(self) -> dict[str, Path]:
+        """Return those of its files that are there, by what they are."""
+        named = {"scenario": SCENARIO, "record": RECORD, "summary": SUMMARY, "report": REPORT, "replay": REPLAY}
+        named |= {"orders": ORDERS}
+        return {what: self.folder / name for what, name in named.items() if (self.folder / name).exists()}
+
+
+@dataclass(frozen=True)
+class _Together:
+    """Observer that stands for several."""
+
+    observers: Sequence[Observer]
+
+    def observe(self, k: int, row: Array) -> None:
+        for observer in self.observers:
+            observer.observe(k, row)
+
+
+class _Progress:
+    """Observer that moves a bar on a terminal, and is quiet elsewhere."""
+
+    def __init__(self, scenario: Scenario) -> None:
+        self._every = max(1, scenario.steps // _PROGRESS_STEPS)
+        self._step = scenario.time.step
+        self._bar = ProgressBar(
+            shown=True, total=scenario.time.duration, desc=scenario.name, unit="s",
+            bar_format="{desc} {percentage:3.0f}%|{bar}| {n:.1f}/{total:.1f} s [{elapsed}<{remaining}]",
+        )  # fmt: skip
+
+    def observe(self, k: int, row: Array) -> None:
+        if k and k % self._every == 0:
+            self._bar.update_to(k * self._step)
+
+    def close(self) -> None:
+        self._bar.close()
+
+
+def run_scenario(
+    scenario: Scenario,
+    out: Path | None = None,
+    mavlink: Mavlink | None = None,
+    rate: float | None = None,
+    progress: bool = False,
+    report: bool = True,
+    orders: Path | None = None,
+    live: LiveView | None = None,
+    law: Law | None = None,
+) -> Run:
+    """Run a scenario and write its folder.
+
+    An order to reset ends the run and begins it again, in a folder of its own.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        What to run.
+    out : Path, optional
+        The run folder; it must not exist, or be empty. Default: a new one below ``runs``. After a reset it is the same
+        name with a number.
+    mavlink : Mavlink, optional
+        Where to be a MAVLink vehicle.
+    rate : float, optional
+        Simulated seconds a wall-clock second at the most.
+    progress : bool
+        Show a bar, if there is a terminal.
+    report : bool
+        Write the report and its figures.
+    orders : Path, optional
+        The log of an earlier run, whose orders are repeated; then none are taken from the link or from viewers.
+    live : LiveView, optional
+        Shows the run while it goes on, and takes orders if the scenario's commands are enabled.
+    law : Law, optional
+        One's own, such as a `FunctionLaw`, in the place of the scenario's. The run folder says where it is from, and
+        cannot hold it: the run is repeated from where the law is.
+
+    Returns
+    -------
+    Run
+        The last one. Its ``status`` is ``"completed"``, or ``"interrupted"`` after Ctrl-C, which leaves a readable run.
+
+    Raises
+    ------
+    RunError
+        If the folder cannot be written, or the log of orders cannot be read.
+    TelemetryError
+        If the link cannot be opened.
+    ScenarioError
+        If the scenario asks for what a law of one's own has not.
+    BuildError, LawError, DefinitionError
+        If plant, law or arbiter cannot be set up.
+    LawError
+        If a law of one's own returns no forces; what was recorded until then is left readable.
+    PlantError
+        If the FMU refuses the scenario, or fails in a step; what was recorded until then is left readable.
+    """
+    if law is not None:
+        scenario = flown_by(law, scenario)
+    recorded = _recorded(scenario, orders)
+    queue = OrderQueue()
+    link: LinkThread | None = None
+    try:
+        for attempt in itertools.count(1):
+            with Master(scenario, law) as master:
+                if mavlink is not None and link is None:
+                    link = mavlink.open(scenario, master.signals.columns, None if recorded else queue, rate)
+                folder = claim(out.with_name(f"{out.name}-{attempt}") if out and attempt > 1 else out, scenario)
+                if link is not None and attempt == 1:
+                    link.start()
+                if live is not None:
+                    live.begin(scenario, master.signals.columns, _desk(scenario, recorded, queue))
+                try:
+                    source = LoggedOrders(recorded or queue, folder.path / ORDERS, live.heed if live else None)
+                    status, wall_time, failure = _step(master, folder, source, link, live, rate, progress)
+                    queue.end_run()
+                    if live is not None and report:
+                        live.say("The run is over; its report is being written")
+                    summary = conclude(folder.path, scenario, status, wall_time, report)
+                    if live is not None:
+                        live.end(status, verdict(summary))
+                except OSError as error:
+                    raise RunError(f"{folder.path}: {error.strerror or error}") from error
+            if failure:
+                raise failure
+            if status != "reset" or recorded:
+                return Run(folder.path, summary)
+    finally:
+        if link:
+            link.close()
+    raise AssertionError("unreachable")
+
+
+def _desk(scenario: Scenario, recorded: RecordedOrders | None, queue: OrderQueue) -> OrderQueue | str:
+    """Return where viewers' orders go, or why there are none."""
+    if recorded:
+        return "this run repeats the orders of a log and takes no others"
+    return queue if scenario.commands.enabled else "commands are off: start with --commands"
+
+
+def _recorded(scenario: Scenario, orders: Path | None) -> RecordedOrders | None:
+    if orders is None:
+        return None
+    if not scenario.commands.enabled:
+        raise RunError(f"{orders}: orders are given, expected a scenario with commands.enabled")
+    return RecordedOrders(orders)
+
+
+def _step(
+    master: Master,
+    folder: RunFolder,
+    orders: LoggedOrders,
+    link: LinkThread | None,
+    live: LiveView | None,
+    rate: float | None,
+    progress: bool,
+) -> tuple[str, float, PlantError | LawError | None]:
+    """Step through the run and close its record; return how it ended, what it took [s], and why it failed."""
+    status = "completed"
+    failure: PlantError | LawError | None = None
+    recorder: Recorder | None = None
+    bar: _Progress | None = None
+    started = time.perf_counter()
+    try:
+        recorder = Recorder(folder.path, master.signals.columns)
+        bar = _Progress(master.scenario) if progress else None
+        watching = [o for o in (link, live) if o is not None]
+        observers: list[Observer] = [recorder, *watching, *([bar] if bar else [])]
+        started = time.perf_counter()
+        master.run(observers, rate, orders, awaiting=_Together(watching))
+        if master.helm is not None and master.helm.reset:
+            status = "reset"
+    except KeyboardInterrupt:
+        status = "interrupted"
+    except (PlantError, LawError) as error:
+        status, failure = f"failed: {error}", error
+    finally:
+        wall_time = time.perf_counter() - started
+        if bar:
+            bar.close()
+        kept = folder.keep(recorder)
+    if not kept:
+        raise failure or KeyboardInterrupt
+    return status, wall_time, failure

@@ -1,0 +1,194 @@
+"""Run folders: claimed by one run, concluded with summary, report and replay, or left as if nothing had been."""
+
+from __future__ import annotations
+
+import contextlib
+import itertools
+import shutil
+from collections.abc import Collection
+from dataclasses import dataclass
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+from cosim.errors import RunError
+from cosim.io.atomic_file import write_whole
+from cosim.io.strict_json import json_text
+from cosim.replay.pages import write_replay
+from cosim.report.report import write_report
+from cosim.results.record import PARTS, RECORD, part_files, require_utf8
+from cosim.results.recorder import Recorder
+from cosim.results.run_result import ORDERS, SCENARIO, SUMMARY, FlownRun, flown_run, load_run
+from cosim.scenario.scenario import VEHICLE_COPY, Scenario
+
+
+@dataclass(frozen=True)
+class RunFolder:
+    """A folder that belongs to one run."""
+
+    path: Path
+    created: bool  # by the run, not by its user
+
+    def keep(self, recorder: Recorder | None) -> bool:
+        """Close the record of a run; take all away where there is nothing to read, or room for nothing.
+
+        Parameters
+        ----------
+        recorder : Recorder or None
+            Of the run, if it came so far.
+
+        Returns
+        -------
+        bool
+            Whether the folder holds a record.
+
+        Raises
+        ------
+        OSError
+            If the record cannot be written; what parts of it there are stay.
+        """
+        if recorder is None or not recorder.rows:
+            self.discard()
+            return False
+        try:
+            recorder.close()
+        except OSError:
+            if not (part_files(self.path) or (self.path / RECORD).exists()):
+                self.discard()
+            raise
+        return True
+
+    def discard(self) -> None:
+        """Take away all that a run without a record has made. May be called twice."""
+        for name in (SCENARIO, VEHICLE_COPY, ORDERS):
+            (self.path / name).unlink(missing_ok=True)
+        shutil.rmtree(self.path / PARTS, ignore_errors=True)
+        if self.created:
+            with contextlib.suppress(OSError):  # its user has put something there
+                self.path.rmdir()
+
+
+def claim(out: Path | None, scenario: Scenario) -> RunFolder:
+    """Make the folder of a run and put the scenario into it.
+
+    Parameters
+    ----------
+    out : Path or None
+        A folder that does not exist or is empty; None for a new one of a name of its own below ``runs``.
+    scenario : Scenario
+        What will be run.
+
+    Returns
+    -------
+    RunFolder
+        No other run has it.
+
+    Raises
+    ------
+    RunError
+        If the folder is in use, or cannot be written.
+    """
+    where = out or Path("runs")
+    require_utf8(where.absolute())
+    try:
+        if out is None:
+            path, created = _new_folder(where, f"{scenario.name}-{datetime.now().astimezone():%Y%m%d-%H%M%S}"), True
+        else:
+            path, created = out, not out.exists()
+            path.mkdir(parents=True, exist_ok=True)
+            if any(path.iterdir()):
+                raise RunError(f"{path}: exists and is not empty; expected a new folder")
+        folder = RunFolder(path, created)
+        try:
+            with (path / SCENARIO).open("x", encoding="utf-8") as file:
+                file.write(scenario.toml(VEHICLE_COPY if scenario.vehicle_file else None))
+            if scenario.vehicle_file:
+                shutil.copyfile(scenario.vehicle_file, path / VEHICLE_COPY)
+        except FileExistsError as error:  # another run came in between
+            raise RunError(f"{path}: is taken by another run") from error
+        except BaseException:
+            folder.discard()
+            raise
+    except OSError as error:
+        raise RunError(f"{where}: {error.strerror or error}") from error
+    return folder
+
+
+def _new_folder(parent: Path, name: str) -> Path:
+    for suffix in itertools.chain([""], (f"-{i}" for i in itertools.count(2))):
+        try:
+            path = parent / f"{name}{suffix}"
+            path.mkdir(parents=True)
+        except FileExistsError:
+            if not parent.is_dir():
+                raise
+        else:
+            return path
+    raise AssertionError("unreachable")
+
+
+def conclude(path: Path, scenario: Scenario, status: str, wall_time: float | None, report: bool) -> dict[str, Any]:
+    """Write summary, report and replay of a run from its record.
+
+    Parameters
+    ----------
+    path : Path
+        The run folder.
+    scenario : Scenario
+        What was run.
+    status : str
+        How it ended.
+    wall_time : float or None
+        What the stepping took [s].
+    report : bool
+        Write the report with its figures and the replay too.
+
+    Returns
+    -------
+    dict
+        The summary.
+
+    Raises
+    ------
+    RunError
+        If the record cannot be read.
+    """
+    run = flown_run(path, scenario, status, wall_time)
+    _write(run, ("html",) if report else ())
+    return run.summary
+
+
+def report_again(path: Path, formats: Collection[str] = ("html",)) -> tuple[dict[str, Any], list[Path]]:
+    """Write summary and report of a run that is done, was interrupted, or was killed.
+
+    Parameters
+    ----------
+    path : Path
+        The run folder.
+    formats : collection of str
+        What to write the report as, as in `write_report`; with ``html`` the replay comes too.
+
+    Returns
+    -------
+    dict, list of Path
+        The summary, and the files that were written, the report first.
+
+    Raises
+    ------
+    RunError
+        If the folder holds no run that can be read, or cannot be written.
+    ScenarioError
+        If its scenario is none.
+    """
+    run = load_run(path)
+    try:
+        return run.summary, _write(run, formats)
+    except OSError as error:
+        raise RunError(f"{path}: {error.strerror or error}") from error
+
+
+def _write(run: FlownRun, formats: Collection[str]) -> list[Path]:
+    summary = write_whole(run.path / SUMMARY, json_text(run.summary))
+    pages = write_report(run, formats) if formats else []
+    replay = [write_replay(run)] if "html" in formats else []
+    return [*pages[:1], *replay, summary, *pages[1:]]

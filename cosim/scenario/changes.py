@@ -1,0 +1,177 @@
+"""What was changed in a scenario since its title was written, and the title that says so."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from typing import Any
+
+from controller import LAWS
+from cosim.errors import ScenarioError
+from cosim.scenario.key_names import PARAMETERS, key_name
+from cosim.scenario.toml_file import place_of
+from cosim.scenario.validation import known_parameters
+from plant_fmu.errors import one_line
+from plant_fmu.toml_tables import hint
+from plant_fmu.vehicle import Vehicle
+
+# what no title speaks of: the texts beside it, what is recorded and reported, what may be ordered from outside, seeds
+_BESIDE = ("title", "changed", "compare", "intersection", "record", "commands")
+_SEEDS = ("sensing.seed", "plant.parameters.seed")
+_NAMED = 3  # changes that a title spells out
+
+
+def changed_keys(before: dict[str, Any], after: dict[str, Any], vehicle: Vehicle) -> tuple[str, ...]:
+    """List the keys in which a scenario differs from another, without those that no title speaks of.
+
+    Parameters
+    ----------
+    before, after : dict
+        Tables of scenarios, defaults filled in.
+    vehicle : Vehicle
+        Of the latter.
+
+    Returns
+    -------
+    tuple of str
+        With dots, as ``--set`` takes them; where lists or shapes are of another kind, the key of the whole.
+    """
+    known = known_parameters(vehicle)
+    one, other = (
+        table | {"plant": table["plant"] | {"parameters": known | table["plant"]["parameters"]}}
+        for table in (before, after)
+    )
+    law = other["law"]["name"]
+    if law in LAWS and law != one["law"]["name"]:  # its own gains are no change of those of the law before
+        one["law"] = one["law"] | {"gains": LAWS[law].gains_type()._asdict()}
+    return joined((), differing_keys(one, other))
+
+
+def differing_keys(before: Any, after: Any, path: str = "") -> Iterator[str]:
+    """Yield the keys in which a table differs from another.
+
+    Parameters
+    ----------
+    before, after : dict, or what stands at a key of one
+        Of tables, lists, texts and numbers.
+    path : str
+        Key that leads there.
+
+    Yields
+    ------
+    str
+        With dots; items of lists by name where they have one.
+    """
+    if isinstance(before, dict) and isinstance(after, dict):
+        if before.get("type") == after.get("type") and (not path or before.keys() <= after.keys()):
+            for key, value in after.items():
+                yield from differing_keys(before.get(key), value, f"{path}.{key}" if path else key)
+            return
+    elif isinstance(before, list | tuple) and isinstance(after, list | tuple) and len(before) == len(after):
+        pairs = list(zip(before, after, strict=True))
+        apart = [i for i, pair in enumerate(pairs) if any(differing_keys(*pair, path))]
+        names = [[item.get("name") if isinstance(item, dict) else None for item in items] for items in (before, after)]
+        if names[0] == names[1] and (None not in names[0] or len(apart) == 1):
+            for i in apart:
+                yield from differing_keys(*pairs[i], f"{path}.{i if names[1][i] is None else names[1][i]}")
+        elif apart:
+            yield path
+        return
+    if before != after:
+        yield path
+
+
+def joined(before: Sequence[str], more: Iterable[str]) -> tuple[str, ...]:
+    """Return keys and more of them, each once, without those that no title speaks of.
+
+    Parameters
+    ----------
+    before : sequence of str
+        The first ones.
+    more : iterable of str
+        The others.
+
+    Returns
+    -------
+    tuple of str
+        In their order.
+    """
+    told = (key for key in more if key.partition(".")[0] not in _BESIDE and key not in _SEEDS)
+    return tuple(dict.fromkeys([*before, *told]))
+
+
+def value_at(table: dict[str, Any], key: str, vehicle: Vehicle) -> Any:
+    """Return what a scenario has at a key.
+
+    Parameters
+    ----------
+    table : dict
+        Of the scenario, defaults filled in.
+    key : str
+        As ``--set`` takes it.
+    vehicle : Vehicle
+        Of the scenario.
+
+    Returns
+    -------
+    float, or whatever stands there
+        In the key's own unit.
+
+    Raises
+    ------
+    ScenarioError
+        If there is no such key.
+    """
+    if key.startswith(PARAMETERS):
+        name, known = key.removeprefix(PARAMETERS), known_parameters(vehicle)
+        if name not in known:
+            raise ScenarioError(f"key {key!r} is no parameter of the vehicle's FMU; {hint(name, known)}")
+        return table["plant"]["parameters"].get(name, known[name])
+    at, last = place_of(table, key)
+    return at[last]
+
+
+def shown_title(table: dict[str, Any], vehicle: Vehicle, law: str) -> str:
+    """Return the title of a scenario, with what was changed since it was written, and whose law flies if none of ours.
+
+    Parameters
+    ----------
+    table : dict
+        Of the scenario, defaults filled in.
+    vehicle : Vehicle
+        Of the scenario.
+    law : str
+        That flies it.
+
+    Returns
+    -------
+    str
+        Such as ``Force limited to 108 N (changed: limit.force = 500 N)``.
+    """
+    notes = [] if law in LAWS else [f"flown by {law}"]
+    keys = [key for key in table["changed"] if law in LAWS or not f"{key}.".startswith("law.")]
+    if keys:
+        more = f" and {len(keys) - _NAMED} more" if len(keys) > _NAMED else ""
+        notes.append(f"changed: {', '.join(_setting(table, key, vehicle) for key in keys[:_NAMED])}{more}")
+    return f"{table['title']} ({'; '.join(notes)})" if notes else str(table["title"])
+
+
+def _setting(table: dict[str, Any], key: str, vehicle: Vehicle) -> str:
+    """Return a key with its value and unit; the key alone where the value is a table, a list of such, or gone."""
+    try:
+        value = vehicle.name if key == "vehicle" else value_at(table, key, vehicle)
+    except ScenarioError:
+        return key
+    unit = key_name(key, table, vehicle).unit
+    if isinstance(value, list | tuple) and all(isinstance(x, int | float) for x in value):
+        text = f"({', '.join(map(_number, value))})" if value else "none"
+    elif isinstance(value, int | float):
+        text = _number(value)
+    elif isinstance(value, str):
+        text = one_line(value)
+    else:
+        return key
+    return f"{key} = {text} {unit}".rstrip()
+
+
+def _number(value: float) -> str:
+    return str(value).lower() if isinstance(value, bool) else f"{value:.6g}"

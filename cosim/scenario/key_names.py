@@ -1,0 +1,108 @@
+"""Keys of a scenario in words, with their units, for tables and figures."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+from cosim.scenario.keys import KEYS, unit_of_gain, unit_of_shape
+from plant_fmu.variables import variables
+from plant_fmu.vehicle import Vehicle
+
+PARAMETERS = "plant.parameters."
+
+_WORDS = {  # where the parts of the key would not do
+    "time.duration": "duration",
+    "time.step": "time step",
+    "time.control": "control period",
+    "time.arbiter": "arbiter period",
+    "plant.substep": "integration step",
+    "plant.current": "current",
+    "initial.position": "start position",
+    "initial.quaternion": "start attitude, quaternion",
+    "initial.velocity": "start velocity",
+    "law.desired_quaternion": "desired attitude, quaternion",
+    "arbiter.ramp": "ramp of memberships",
+    "arbiter.points": "points of the arbiter's output",
+    "limit.force": "force limit",
+    "limit.time_constant": "lag of the force",
+    "sensing.position_noise": "position noise",
+    "sensing.velocity_noise": "velocity noise",
+    "sensing.seed": "seed of the noise",
+    "sensing.dead_from": "measurements lost from",
+    "sensing.dead_for": "measurements lost for",
+    "commands.obstacle_radius": "radius of obstacles that come in",
+    "commands.obstacle_gain": "gain of obstacles that come in",
+    "commands.hold_radius": "radius held in",
+    "commands.surface_depth": "depth when surfaced",
+}
+_AXES = {3: "xyz", 4: "wxyz", 6: "uvwpqr"}  # by how many there are
+
+
+class KeyName(NamedTuple):
+    """What a key is called."""
+
+    words: str
+    unit: str  # "" for a pure number, and where none is known
+
+    @property
+    def label(self) -> str:
+        """The words, with the unit in brackets."""
+        return f"{self.words} [{self.unit}]" if self.unit else self.words
+
+
+def key_name(key: str, table: dict[str, Any], vehicle: Vehicle) -> KeyName:
+    """Return what a key of a scenario is called.
+
+    Parameters
+    ----------
+    key : str
+        With dots, as ``--set`` takes it; the scenario has it.
+    table : dict
+        Of the scenario, defaults filled in.
+    vehicle : Vehicle
+        Of the scenario.
+
+    Returns
+    -------
+    KeyName
+        Such as ``start position y`` and ``m``.
+    """
+    if key.startswith(PARAMETERS):
+        name = key.removeprefix(PARAMETERS)
+        units = (v.quantity.unit for v in variables(vehicle) if v.name == name)
+        return KeyName(f"{name} of the plant", next(units, "").replace(".", " "))
+    if key.startswith("law.gains."):
+        gain = key.removeprefix("law.gains.")
+        return KeyName(f"gain {gain}", unit_of_gain(table["law"]["name"], gain))
+    head, *rest = key.split(".")
+    if head == "regions" and len(rest) > 1:
+        regions = table["regions"]
+        at = next((r for r in regions if r["name"] == rest[0]), None) or regions[int(rest[0])]
+        return _of_region(at["name"], at, rest[1:])
+    if head == "goal" and rest:
+        own = rest[0] in ("velocity", "streamed")
+        return _of_region("the goal", table["goal"] | {"shape": table["goal"]}, rest if own else ["shape", *rest])
+    if head == "failures" and len(rest) == 2:
+        return KeyName(f"{rest[1]} of failure {rest[0]}", KEYS[f"failures[].{rest[1]}"].unit)
+    if key not in KEYS and (vector := key.rpartition(".")[0]) in _WORDS:
+        place, count = int(rest[-1]), len(table[head][rest[0]])
+        linear, _, angular = KEYS[vector].unit.partition(", ")
+        return KeyName(f"{_WORDS[vector]} {_AXES[count][place]}", angular if angular and place >= 3 else linear)
+    unit = KEYS[key].unit if key in KEYS else ""
+    return KeyName(_WORDS.get(key, key.replace(".", " ").replace("_", " ")), unit)
+
+
+def _of_region(name: str, region: dict[str, Any], path: list[str]) -> KeyName:
+    """Return what a key of a region is called: of its shape, or one of its own."""
+    if path[0] == "shape" and len(path) > 1:
+        _, key, *places = path
+        value, unit = region["shape"].get(key), unit_of_shape(region["shape"]["type"], key)
+    else:
+        key, *places = path
+        value, unit = region.get(key), KEYS[f"regions[].{key}"].unit
+    words = key.replace("_", " ")
+    if len(places) == 2:  # a corner or point of several
+        words, value, places = f"{words.removesuffix('s')} {places[0]}", value[int(places[0])], places[1:]
+    if places:
+        words += f" {_AXES.get(len(value), 'xy')[int(places[0])]}"
+    return KeyName(f"{words} of {name}", unit)

@@ -1,0 +1,268 @@
+"""Scenarios: one TOML file holds everything a run depends on."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+
+from controller import ControllerError
+from controller.regions import Orientation, Region, Shape
+from controller.restoring import parameters
+from cosim.errors import ScenarioError
+from cosim.scenario.changes import changed_keys, differing_keys, joined, shown_title
+from cosim.scenario.keys import comments
+from cosim.scenario.tables import (
+    CRITERIA,
+    Actuation,
+    ArbiterSetup,
+    Commands,
+    Failure,
+    File,
+    Initial,
+    LawSetup,
+    Limit,
+    MasterSetup,
+    PlantSetup,
+    RecordSetup,
+    SecondaryRegion,
+    Sensing,
+    Time,
+    TimeEntry,
+    Vector3,
+)
+from cosim.scenario.toml_file import flat, override, read_table, shipped_scenarios
+from cosim.scenario.toml_text import scenario_text
+from cosim.scenario.validation import (
+    check_commands,
+    check_failures,
+    check_goal,
+    check_intersection,
+    check_law,
+    check_numbers,
+    check_parameters,
+    check_record,
+    check_regions,
+    check_texts,
+    check_time,
+    multiple,
+)
+from plant_fmu.errors import PlantFmuError
+from plant_fmu.toml_tables import decode, hint, require_modest
+from plant_fmu.vehicle import Vehicle, load_vehicle
+
+__all__ = ["CRITERIA", "VEHICLE_COPY", "Limit", "Scenario", "Time", "load_scenario"]
+
+VEHICLE_COPY = "vehicle.toml"  # name in a run folder of a vehicle that is not shipped
+
+
+@dataclass(frozen=True, eq=False)
+class Scenario:
+    """A checked scenario."""
+
+    name: str
+    vehicle: Vehicle
+    vehicle_file: Path | None  # where it came from, unless shipped
+    time: Time
+    steps: int  # of the plant
+    control_every: int  # steps
+    arbiter_every: int  # steps
+    plant: PlantSetup
+    initial: Initial
+    law: LawSetup
+    arbiter: ArbiterSetup
+    limit: Limit
+    actuation: Actuation
+    sensing: Sensing
+    failures: tuple[Failure, ...]
+    master: MasterSetup
+    record: RecordSetup
+    commands: Commands
+    tell_failures: bool  # the law is told of them when they happen
+    goal: Shape  # the primary region, kept within, at time 0
+    goal_velocity: Vector3  # m/s, NED
+    goal_streamed: bool  # moved from outside while the run goes on
+    regions: tuple[SecondaryRegion, ...]
+    intersection: tuple[int, ...]  # indices of the regions whose overlap the summary reports
+    compare: str  # the claims that the report holds the run against
+    table: dict[str, Any]  # as in the file, defaults filled in
+
+    def toml(self, vehicle: str | None = None, commented: bool = False) -> str:
+        """Format the scenario as the file that repeats it.
+
+        Parameters
+        ----------
+        vehicle : str, optional
+            Another name for the vehicle's file.
+        commented : bool
+            Say behind each key in which unit it is, and what it means.
+
+        Returns
+        -------
+        str
+            In TOML, with every default filled in.
+        """
+        return scenario_text(
+            self.table | ({"vehicle": vehicle} if vehicle else {}),
+            comments(self.law.name, self.vehicle) if commented else {},
+        )
+
+    @property
+    def title(self) -> str:
+        """The title of the file, and what was changed since it was written."""
+        return shown_title(self.table, self.vehicle, self.law.name)
+
+    @property
+    def goal_region(self) -> Region:
+        """The goal as a region among others."""
+        return Region("goal", self.goal, "in", self.goal_velocity)
+
+    @property
+    def moving(self) -> tuple[str, ...]:
+        """Names of the regions, goal included, that may be elsewhere than where the scenario has them."""
+        goal = ("goal",) if self.goal_streamed or any(self.goal_velocity) else ()
+        ordered = self.commands.enabled  # to be anywhere, what is at a place at all
+        regions = [s for s in self.regions if s.moves or (ordered and not isinstance(s.region.shape, Orientation))]
+        return (*goal, *(secondary.region.name for secondary in regions))
+
+    @property
+    def true_restoring_parameters(self) -> NDArray[np.float64]:
+        """Phi of (12), shape (4,) [N, N m]: of the vehicle with the parameters that the plant is given over its own."""
+        v, over = self.vehicle, self.plant.parameters
+        r_G, r_B = (
+            np.array([over.get(f"{name}.{axis}", value) for axis, value in zip("xyz", values, strict=True)])
+            for name, values in (("r_G", v.r_G), ("r_B", v.r_B))
+        )
+        return parameters(over.get("weight", v.weight), over.get("buoyancy", v.buoyancy), r_G, r_B)
+
+
+def load_scenario(name_or_file: str | Path, overrides: Sequence[str] = ()) -> Scenario:
+    """Load a shipped scenario by name, or any scenario by its file.
+
+    Parameters
+    ----------
+    name_or_file : str or Path
+        Such as ``"paper"`` or ``"mine.toml"``.
+    overrides : sequence of str
+        ``key=value``, with dots between the keys and a TOML value; regions go by index or by name.
+
+    Returns
+    -------
+    Scenario
+        The checked scenario.
+
+    Raises
+    ------
+    ScenarioError
+        If there is no such scenario, a key is unknown, missing or mistyped, or a value cannot be.
+    """
+    text = str(name_or_file)
+    if not text.endswith(".toml") and text not in shipped_scenarios():
+        known = hint(text, shipped_scenarios())
+        raise ScenarioError(f"scenario {text!r} is unknown; {known} (or a file ending in .toml)")
+    try:
+        table, name, titled = read_table(text)
+        for change in overrides:
+            override(table, change)
+        require_modest(table)
+        if table.get("title") != titled.get("title"):  # it is of what has been set beside it
+            table.pop("changed", None)
+            titled = table
+        scenario = checked_scenario(table, name)
+        return scenario if table == titled else _with_changes(scenario, table, titled)
+    except (PlantFmuError, ControllerError, ScenarioError) as error:
+        raise ScenarioError(f"{text}: {error}") from error
+
+
+def _with_changes(scenario: Scenario, table: dict[str, Any], titled: dict[str, Any]) -> Scenario:
+    """Return a scenario that says in which keys its table differs from the one that its title was written for."""
+    try:
+        before = checked_scenario(titled, scenario.name)
+    except (PlantFmuError, ControllerError, ScenarioError):  # it is no scenario yet: what makes it one is changed too
+        keys: Iterable[str] = differing_keys(titled, table)
+    else:
+        keys = changed_keys(before.table, scenario.table, scenario.vehicle)
+    return dataclasses.replace(scenario, table=scenario.table | {"changed": joined(scenario.table["changed"], keys)})
+
+
+def checked_scenario(table: dict[str, Any], name: str, vehicle: Vehicle | None = None) -> Scenario:
+    """Turn the table of a scenario's file into a scenario.
+
+    Parameters
+    ----------
+    table : dict
+        As in the file; its ``plant.parameters`` are joined to flat keys in place.
+    name : str
+        The scenario's.
+    vehicle : Vehicle, optional
+        What its ``vehicle`` names, if that is loaded already.
+
+    Returns
+    -------
+    Scenario
+        The checked scenario.
+
+    Raises
+    ------
+    ScenarioError, PlantFmuError, ControllerError
+        At the first key that cannot be right.
+    """
+    plant = table.get("plant")
+    if isinstance(plant, dict) and isinstance(plant.get("parameters"), dict):
+        plant["parameters"] = flat(plant["parameters"])
+    file = decode(table, File)
+    check_texts(file)
+    time = check_time(file.time)
+    check_numbers(file)
+    goal, goal_velocity, goal_streamed = check_goal(file.goal)
+    regions = check_regions(file.regions)
+    overlapping = check_intersection(file.intersection, regions)
+    seen = check_commands(file.commands, file.record, file.law.name, tuple(r.region.name for r in regions))
+    vehicle_file = Path(file.vehicle) if file.vehicle.endswith(".toml") else None
+    vehicle = vehicle or load_vehicle(vehicle_file or file.vehicle)
+    check_parameters(file.plant.parameters, vehicle)
+    law = check_law(file.law, file.actuation.through, vehicle, time.control, len(regions) + len(seen))
+    check_failures(file.failures, file.actuation.through, vehicle)
+    check_record(file.record, law, regions)
+
+    filled = dataclasses.replace(
+        file,
+        title=file.title or name,
+        time=TimeEntry(time.duration, time.step, time.control, time.arbiter),
+        law=dataclasses.replace(file.law, gains=law.gains._asdict()),
+        intersection=tuple(regions[i].region.name for i in overlapping),
+    )
+    return Scenario(
+        name=name,
+        vehicle=vehicle,
+        vehicle_file=vehicle_file,
+        time=time,
+        steps=multiple("time.duration", time.duration, time.step),
+        control_every=multiple("time.control", time.control, time.step),
+        arbiter_every=multiple("time.arbiter", time.arbiter, time.step),
+        plant=file.plant,
+        initial=file.initial,
+        law=law,
+        arbiter=file.arbiter,
+        limit=file.limit,
+        actuation=file.actuation,
+        sensing=file.sensing,
+        failures=file.failures,
+        master=file.master,
+        record=file.record,
+        commands=file.commands,
+        tell_failures=file.tell_failures,
+        goal=goal,
+        goal_velocity=goal_velocity,
+        goal_streamed=goal_streamed or file.commands.enabled,
+        regions=regions + seen,
+        intersection=overlapping,
+        compare=file.compare,
+        table=msgspec.to_builtins(dataclasses.asdict(filled)),
+    )

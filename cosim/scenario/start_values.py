@@ -1,0 +1,34 @@
+"""What a scenario tells the plant before it starts."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cosim.scenario.scenario import Scenario
+
+
+def start_values(scenario: Scenario) -> dict[str, float]:
+    """Return what the FMU is told before initialisation.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        What is run.
+
+    Returns
+    -------
+    dict of str to float
+        Parameters and start values by name.
+    """
+    initial, plant, limit = scenario.initial, scenario.plant, scenario.limit
+    values = {"substep": plant.substep, "wrench_time_constant": limit.time_constant}
+    if limit.force < np.inf:
+        values["wrench_force_limit"] = limit.force
+    for prefix, names, numbers in (
+        ("current", "xyz", plant.current),
+        ("position", "xyz", initial.position),
+        ("quaternion", ("e0", "e1", "e2", "e3"), initial.quaternion),
+        ("velocity", "uvwpqr", initial.velocity),
+    ):
+        values |= {f"{prefix}.{name}": number for name, number in zip(names, numbers, strict=True)}
+    return values | plant.parameters

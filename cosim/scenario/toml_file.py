@@ -1,0 +1,249 @@
+"""Scenario files as tables: where they are, how one is laid over another, how a key is set from the command line."""
+
+from __future__ import annotations
+
+import copy
+import tomllib
+from importlib import resources
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from cosim.errors import ScenarioError
+
+_SHOWN = 80  # characters of what is absurdly long
+
+
+def shipped_scenarios() -> list[str]:
+    """Return the names of the scenarios that come with the package."""
+    return sorted(f.name.removesuffix(".toml") for f in _folder().iterdir() if f.name.endswith(".toml"))
+
+
+def shipped_titles() -> dict[str, str]:
+    """Return the title of each scenario that comes with the package, without checking the rest of it."""
+    texts = {name: (_folder() / f"{name}.toml").read_text(encoding="utf-8") for name in shipped_scenarios()}
+    return {name: tomllib.loads(text)["title"] for name, text in texts.items()}
+
+
+def _folder() -> resources.abc.Traversable:
+    return resources.files("cosim.scenario") / "shipped"
+
+
+class ScenarioTable(NamedTuple):
+    """What a scenario's file says, laid over its base."""
+
+    table: dict[str, Any]
+    name: str  # of the scenario
+    titled: dict[str, Any]  # the scenario whose title it has: itself, or the base that the title came with
+
+
+def read_table(name_or_file: str, seen: tuple[str, ...] = (), beside: Path | None = None) -> ScenarioTable:
+    """Read a scenario, laid over that of its ``base``.
+
+    Parameters
+    ----------
+    name_or_file : str
+        A shipped name, or a file ending in .toml.
+    seen : tuple of str
+        The scenarios that lead here as bases.
+    beside : Path, optional
+        Folder that a file is looked for in.
+
+    Returns
+    -------
+    ScenarioTable
+        Nothing in it is checked yet.
+
+    Raises
+    ------
+    ScenarioError
+        If a base is unknown, or its own.
+    TableError
+        If a file cannot be read.
+    """
+    from plant_fmu.errors import printable
+    from plant_fmu.toml_tables import hint, read_toml  # NumPy and FMPy come with it, which `cosim list` does not need
+
+    path = Path(name_or_file)
+    if path.suffix == ".toml":
+        path = beside / path if beside else path
+        table, name, folder = read_toml(path), printable(path.stem), path.parent
+        name_or_file = str(path.resolve())
+        vehicle = table.get("vehicle")
+        if isinstance(vehicle, str) and vehicle.endswith(".toml"):  # beside the file that names it
+            table["vehicle"] = str(folder / vehicle)
+    elif name_or_file in shipped_scenarios():
+        with resources.as_file(_folder() / f"{name_or_file}.toml") as shipped:
+            table, name, folder = read_toml(shipped), name_or_file, Path()
+    else:
+        raise ScenarioError(f"base {name_or_file!r} is unknown; {hint(name_or_file, shipped_scenarios())}")
+    if name_or_file in seen:
+        raise ScenarioError(f"{name}: is its own base")
+    if "base" in table:
+        base = table.pop("base")
+        if not isinstance(base, str):
+            raise ScenarioError(f"{name}: base is {base!r}, expected the name of a scenario")
+        below, _, titled = read_table(base, (*seen, name_or_file), folder)
+        law = table.get("law")
+        if isinstance(law, dict) and "name" in law:
+            _name_law(below, law["name"])
+        if "title" in table:  # it is of what the file says, whatever was changed before
+            below.pop("changed", None)
+        over, table = table, _merge(below, table)
+        if "title" not in over and "title" in below:
+            return ScenarioTable(table, name, titled)
+    return ScenarioTable(table, name, copy.deepcopy(table))
+
+
+def _name_law(table: dict[str, Any], name: object) -> None:
+    """Name the law of a scenario; gains belong to a law, so that those of another one go with its name."""
+    law = table.setdefault("law", {})
+    if isinstance(law, dict) and law.get("name", "printed") != name:
+        law.pop("gains", None)
+        law["name"] = name
+
+
+def _merge(base: dict[str, Any], over: dict[str, Any]) -> dict[str, Any]:
+    result = copy.deepcopy(base)
+    for key, value in over.items():
+        both = isinstance(value, dict) and isinstance(result.get(key), dict)
+        result[key] = _merge(result[key], value) if both else value
+    return result
+
+
+def override(table: dict[str, Any], text: str) -> None:
+    """Set one key of a table in place.
+
+    Parameters
+    ----------
+    table : dict
+        A scenario's.
+    text : str
+        ``key=value``, with dots between the keys and a TOML value, or a bare word; items of lists go by index or name.
+        Another ``law.name`` drops the gains of the law before.
+
+    Raises
+    ------
+    ScenarioError
+        If there is no such place.
+    """
+    from plant_fmu.errors import TableError
+    from plant_fmu.toml_tables import MAX_DEPTH, require_modest
+
+    key, equals, value_text = text.partition("=")
+    if not equals or not key:
+        raise ScenarioError(f"--set {_short(text)!r}: expected key=value")
+    *path, last = key.strip().split(".")
+    if len(path) >= MAX_DEPTH:
+        raise ScenarioError(
+            f"--set {_short(key)}: {len(path)} tables within each other, expected less than {MAX_DEPTH}"
+        )
+    try:
+        parsed = tomllib.loads(f"value = {value_text}")
+        require_modest(parsed)
+    except tomllib.TOMLDecodeError:
+        parsed = {"value": value_text.strip()}  # a bare word is a string
+    except RecursionError as error:
+        raise ScenarioError(f"--set {_short(text)}: is nested too deeply") from error
+    except TableError as error:
+        raise ScenarioError(f"--set {_short(text)}: {error}") from error
+    except ValueError as error:
+        raise ScenarioError(f"--set {_short(text)}: a whole number has too many digits") from error
+    if len(parsed) > 1:
+        raise ScenarioError(f"--set {_short(text)!r}: expected one key=value")
+    value = parsed["value"]
+    if key.strip() == "law.name":
+        _name_law(table, value)
+    at: Any = table
+    for part in path:
+        if isinstance(at, list):
+            at = at[_index(at, part, key)]
+        elif isinstance(at, dict):
+            at = at.setdefault(part, {})
+    if isinstance(at, list):
+        at[_index(at, last, key)] = value
+    elif isinstance(at, dict):
+        at[last] = value
+    else:
+        raise ScenarioError(f"--set {_short(key)}: there is no table at {_short('.'.join(path))!r}")
+
+
+def _short(text: str) -> str:
+    return text if len(text) <= _SHOWN else f"{text[:_SHOWN]} ..."
+
+
+def _index(items: list[Any], part: str, key: str) -> int:
+    """Return the place in a list that a number or an item's name means."""
+    names = [item.get("name") for item in items if isinstance(item, dict)]
+    if part in names:
+        return names.index(part)
+    if part.isdecimal() and len(part) < 10 and int(part) < len(items):
+        return int(part)
+    raise ScenarioError(
+        f"--set {_short(key)}: {_short(part)!r} is not one of {', '.join(map(str, names))}, "
+        f"nor a number below {len(items)}"
+    )
+
+
+def flat(table: dict[str, Any], prefix: str = "") -> dict[str, Any]:
+    """Join nested keys with dots, as TOML nests ``r_G.z = 0.1`` where the FMU's parameter has that name.
+
+    Parameters
+    ----------
+    table : dict
+        Of tables and values.
+    prefix : str
+        Before every key.
+
+    Returns
+    -------
+    dict
+        Of values.
+    """
+    joined: dict[str, Any] = {}
+    for key, value in table.items():
+        joined |= flat(value, f"{prefix}{key}.") if isinstance(value, dict) else {f"{prefix}{key}": value}
+    return joined
+
+
+def place_of(table: dict[str, Any], key: str) -> tuple[Any, Any]:
+    """Return the table or list that holds a key, and the key's place in it.
+
+    Parameters
+    ----------
+    table : dict
+        Of a scenario.
+    key : str
+        With dots; items of lists go by index or name.
+
+    Returns
+    -------
+    dict or list, str or int
+        Where the value stands.
+
+    Raises
+    ------
+    ScenarioError
+        If there is no such key.
+    """
+    *path, last = key.split(".")
+    at: Any = table
+    for depth, part in enumerate([*path, last]):
+        if isinstance(at, list | tuple):
+            names = [item.get("name") for item in at if isinstance(item, dict)]
+            inside = part.isdecimal() and len(part) < 10 and int(part) < len(at)
+            place: Any = names.index(part) if part in names else int(part) if inside else None
+            known = names or list(map(str, range(len(at))))
+        else:
+            known = list(at) if isinstance(at, dict) else []
+            place = part if part in known else None
+        if place is None:
+            from plant_fmu.toml_tables import hint
+
+            where = ".".join(key.split(".")[:depth])
+            said = hint(part, map(str, known)) if known else f"{where} holds no others"
+            what = "is unknown" if part == key else f"is unknown: {part!r}"
+            raise ScenarioError(f"key {key!r} {what}; {said}")
+        if depth == len(path):
+            return at, place
+        at = at[place]
+    raise AssertionError("unreachable")

@@ -1,0 +1,91 @@
+"""A scenario as the text of its file: a line a key, a vector in one line, and if wanted what each key means."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import tomli_w
+
+from cosim.scenario.keys import unit_of_shape
+
+_WIDE = 100  # characters of a value in one line
+_COMMENT_AT = 40  # column that comments begin at, where the value leaves room
+
+
+def scenario_text(table: Mapping[str, Any], said: Mapping[str, str]) -> str:
+    """Format the table of a scenario as TOML.
+
+    Parameters
+    ----------
+    table : mapping
+        As in the file, with every default filled in.
+    said : mapping of str to str
+        What to write behind keys, by their paths, as `cosim.scenario.keys.comments` returns it; units of shapes are
+        written, too. If empty, there are no comments.
+
+    Returns
+    -------
+    str
+        That reads back as the table.
+    """
+    return "\n".join(_lines(table, said)) + "\n"
+
+
+def _lines(table: Mapping[str, Any], said: Mapping[str, str], head: str = "", path: str = "") -> Iterator[str]:
+    """Yield the lines of a table: its values, then the tables in it, then its lists of tables.
+
+    What is said of keys goes by their path, in which a list of tables stands once for all of them.
+    """
+    values, tables, lists = [], [], []
+    for key, value in table.items():
+        if value and isinstance(value, list | tuple) and all(isinstance(item, Mapping) for item in value):
+            lists.append((key, value))
+        elif value and isinstance(value, Mapping) and (key != "shape" or len(_value(value)) > _WIDE):
+            tables.append((key, value))
+        else:
+            values.append((key, value))
+    for key, value in values:
+        comment = said.get(f"{path}{key}", "")
+        if said and (units := _units(table, key, value)):
+            comment = ", ".join(filter(None, (units, comment)))
+        yield _with(f"{_key(key)} = {_value(value)}", comment)
+    for key, inner in tables:
+        yield ""
+        yield _with(f"[{head}{_key(key)}]", said.get(f"{path}{key}", ""))
+        yield from _lines(inner, said, f"{head}{_key(key)}.", f"{path}{key}.")
+    for key, several in lists:
+        for i, one in enumerate(several):
+            known = {} if i else said  # what the first has need not be explained again
+            yield ""
+            yield _with(f"[[{head}{_key(key)}]]", known.get(f"{path}{key}", ""))
+            yield from _lines(one, known, f"{head}{_key(key)}.", f"{path}{key}[].")
+
+
+def _units(table: Mapping[str, Any], key: str, value: Any) -> str:
+    """Return the units of a key of a shape, or of all keys of a shape in one line."""
+    if isinstance(value, Mapping) and "type" in value:
+        return ", ".join(sorted({unit_of_shape(value["type"], inner) for inner in value} - {""}))
+    return unit_of_shape(table["type"], key) if "type" in table else ""
+
+
+def _with(line: str, comment: str) -> str:
+    if not comment:
+        return line
+    return f"# {comment}\n{line}" if "\n" in line else f"{line:{_COMMENT_AT}}  # {comment}"
+
+
+def _key(key: str) -> str:
+    return tomli_w.dumps({key: 0}).removesuffix(" = 0\n")
+
+
+def _value(value: Any) -> str:
+    """Return a value as TOML: in one line, or a list that is too long for that with a line for each item."""
+    if isinstance(value, Mapping):
+        inner = ", ".join(f"{_key(key)} = {_value(item)}" for key, item in value.items())
+        return f"{{ {inner} }}" if inner else "{}"
+    if isinstance(value, list | tuple):
+        items = [_value(item) for item in value]
+        line = f"[{', '.join(items)}]"
+        return line if len(line) <= _WIDE else "[\n" + "".join(f"    {item},\n" for item in items) + "]"
+    return tomli_w.dumps({"v": value}).removeprefix("v = ").removesuffix("\n")

@@ -1,0 +1,85 @@
+"""The vehicle as the plant has it: its file, with the scenario's `plant.parameters` laid over."""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+
+import numpy as np
+from numpy.typing import NDArray
+
+from controller.theory import Model
+from cosim.scenario.scenario import Scenario
+from plant_fmu.vehicle import Vehicle
+
+Array = NDArray[np.float64]
+
+_INDEXED = re.compile(r"(\w+)\[(\d+)(?:,(\d+))?\]")
+_SYMMETRIC = ("added_mass", "inertia")
+
+
+def true_vehicle(scenario: Scenario) -> Vehicle:
+    """Return the vehicle with the parameters that the plant is given over its own.
+
+    Thrusters' limits are multiplied by their effectiveness, so that one that is failed from the start has none.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        Any.
+
+    Returns
+    -------
+    Vehicle
+        Numbers that the FMU itself might still refuse.
+    """
+    vehicle, over = scenario.vehicle, scenario.plant.parameters
+    changed: dict[str, float | Array] = {}
+    effectiveness = np.ones(vehicle.n_thrusters)
+    for name, value in over.items():
+        stem, place = _place(name)
+        if stem == "thrust_effectiveness":
+            effectiveness[place] = value
+        elif hasattr(vehicle, stem):
+            if not place:
+                changed[stem] = float(value)
+                continue
+            array = np.array(changed.get(stem, getattr(vehicle, stem)))
+            array[place] = value
+            if stem in _SYMMETRIC:
+                array[place[::-1]] = value
+            changed[stem] = array
+    for limit in ("thrust_min", "thrust_max"):
+        changed[limit] = np.asarray(changed.get(limit, getattr(vehicle, limit))) * effectiveness
+    return dataclasses.replace(vehicle, **changed)  # type: ignore[arg-type]
+
+
+def true_model(scenario: Scenario) -> Model:
+    """Return what the stability analysis takes for the vehicle: the true one.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        Any.
+
+    Returns
+    -------
+    Model
+        In still water.
+    """
+    vehicle = true_vehicle(scenario)
+    return Model(
+        np.ascontiguousarray(vehicle.mass_matrix),
+        np.array(vehicle.linear_damping),
+        np.array(vehicle.quadratic_damping),
+        scenario.true_restoring_parameters,
+    )
+
+
+def _place(name: str) -> tuple[str, tuple[int, ...]]:
+    """Return which attribute of a vehicle a parameter of the FMU stands for, and which element of it."""
+    indexed = _INDEXED.fullmatch(name)
+    if indexed:
+        return indexed[1], tuple(int(i) - 1 for i in indexed.groups()[1:] if i is not None)
+    stem, _, axes = name.partition(".")
+    return stem, tuple("xyz".index(axis) for axis in axes if axis in "xyz")

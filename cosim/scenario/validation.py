@@ -1,0 +1,266 @@
+"""The checks of a scenario's tables: each names the first key that cannot be right."""
+
+from __future__ import annotations
+
+import functools
+import math
+import re
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from controller import LAWS, RegionError
+from controller.law import checked_quaternion
+from controller.regions import SHAPES, Region, Shape, Sphere, of_attitude
+from cosim.errors import ScenarioError
+from cosim.scenario.tables import (
+    FAR_AWAY,
+    Commands,
+    Failure,
+    File,
+    LawEntry,
+    LawSetup,
+    Limit,
+    NoGains,
+    RecordSetup,
+    RegionEntry,
+    SecondaryRegion,
+    Sensing,
+    Time,
+    TimeEntry,
+    Vector3,
+    is_own,
+)
+from cosim.scenario.vehicle_model import vehicle_model
+from plant_fmu.toml_tables import decode, hint
+from plant_fmu.variables import variables
+from plant_fmu.vehicle import Vehicle
+
+ROUNDING = 1e-6  # of one period, within which periods count as multiples
+MAX_STEPS = 100_000_000
+MAX_POINTS = 100_001
+MAX_TEXT = 200  # characters
+MAX_SEEN = 100  # obstacles that may come in
+REGION_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9 _-]{0,39}")  # a column of the record, a label of figures
+
+# parameters of the FMU that have a key of their own in a scenario
+_OWN_KEYS = {
+    "wrench_force_limit": "limit.force",
+    "wrench_time_constant": "limit.time_constant",
+    "substep": "plant.substep",
+    "current": "plant.current",
+}
+
+
+@dataclass(frozen=True)
+class _Motion:
+    """What stands beside the keys of the goal's shape."""
+
+    velocity: Vector3 = (0.0, 0.0, 0.0)  # m/s, NED
+    streamed: bool = False
+
+
+def check_texts(file: File) -> None:
+    """Raise `ScenarioError` unless a terminal only shows, and does not obey, the texts that come to it."""
+    for key, text in (("title", file.title), ("law.name", file.law.name), *(("changed", key) for key in file.changed)):
+        good = text.isprintable() and len(text) <= MAX_TEXT
+        _require(good, key, repr(text), f"one line of at most {MAX_TEXT} printable characters")
+
+
+def check_numbers(file: File) -> None:
+    """Raise `ScenarioError` unless the numbers that stand alone are within their ranges."""
+    limit, arbiter = file.limit, file.arbiter
+    _require(file.plant.substep > 0.0, "plant.substep", file.plant.substep, "above 0 s")
+    _require(limit.force >= 0.0, "limit.force", limit.force, "0 N or above (inf for none)")
+    _require(0.0 <= limit.time_constant < math.inf, "limit.time_constant", limit.time_constant, "0 s or above")
+    _require(0.0 <= arbiter.ramp < math.inf, "arbiter.ramp", arbiter.ramp, "0 m or above")
+    _require(3 <= arbiter.points <= MAX_POINTS, "arbiter.points", arbiter.points, f"3 to {MAX_POINTS}")
+    for key, values in (
+        ("initial.position", file.initial.position),
+        ("initial.velocity", file.initial.velocity),
+        ("plant.current", file.plant.current),
+        *((f"plant.parameters.{k}", (v,)) for k, v in file.plant.parameters.items()),
+    ):
+        _require(all(map(math.isfinite, values)), key, values, "finite numbers")
+    for key, quaternion in (
+        ("initial.quaternion", file.initial.quaternion),
+        ("law.desired_quaternion", file.law.desired_quaternion),
+    ):
+        _require(abs(math.hypot(*quaternion) - 1.0) < 1e-6, key, quaternion, "four numbers of length 1")
+    if file.actuation.through == "thrusters":
+        none_given = limit == Limit()
+        _require(none_given, "limit", "given", "none with actuation.through = 'thrusters': it is of the direct wrench")
+    _check_sensing(file.sensing)
+
+
+def _check_sensing(sensing: Sensing) -> None:
+    for key in ("position_noise", "velocity_noise", "dead_for"):
+        value = getattr(sensing, key)
+        _require(0.0 <= value < math.inf, f"sensing.{key}", value, "a finite number, 0 or above")
+    _require(sensing.dead_from >= 0.0, "sensing.dead_from", sensing.dead_from, "0 s or above (inf for never)")
+    _require(sensing.seed >= 0, "sensing.seed", sensing.seed, "a whole number, 0 or above")
+
+
+def check_failures(failures: tuple[Failure, ...], through: str, vehicle: Vehicle) -> None:
+    """Raise `ScenarioError` unless the failures are of thrusters that the run drives."""
+    if failures and through != "thrusters":
+        raise ScenarioError("failures are given, expected none with actuation.through = 'wrench': no thruster is used")
+    for i, failure in enumerate(failures):
+        known = 1 <= failure.thruster <= vehicle.n_thrusters
+        _require(known, f"failures.{i}.thruster", failure.thruster, f"1 to {vehicle.n_thrusters}")
+        _require(0.0 <= failure.time < math.inf, f"failures.{i}.time", failure.time, "0 s or above")
+
+
+def check_record(record: RecordSetup, law: LawSetup, regions: tuple[SecondaryRegion, ...]) -> None:
+    """Raise `ScenarioError` unless what is recorded is defined for the law and the regions."""
+    if not record.lyapunov:
+        return
+    _require(law.name == "printed", "record.lyapunov", "true", "false: V of (31) is the printed law's")
+    names = [r.region.name for r in regions if of_attitude(r.region.shape)]
+    _require(not names, "record.lyapunov", "true", f"false: the analysis knows no attitude in regions ({names})")
+
+
+def check_commands(
+    commands: Commands, record: RecordSetup, law: str, names: tuple[str, ...]
+) -> tuple[SecondaryRegion, ...]:
+    """Return the regions that stand for obstacles that may come in, none where commands are not enabled."""
+    if not commands.enabled:
+        _require(not commands.await_arm, "commands.await_arm", "true", "false without commands.enabled: nobody arms")
+        return ()
+    _require(not record.lyapunov, "record.lyapunov", "true", "false with commands.enabled: V is of one target")
+    _require(not is_own(law), "commands.enabled", "true", f"false: nothing of {law} can be ordered from outside")
+    _require(0 <= commands.obstacles <= MAX_SEEN, "commands.obstacles", commands.obstacles, f"0 to {MAX_SEEN}")
+    for key in ("obstacle_radius", "hold_radius"):
+        value = getattr(commands, key)
+        _require(0.0 < value < math.inf, f"commands.{key}", value, "above 0 m")
+    for key, greatest in (("obstacle_gain", math.inf), ("surface_depth", 1e3), ("pilot_gain", 1.0)):
+        value = getattr(commands, key)
+        _require(0.0 <= value <= greatest and value < math.inf, f"commands.{key}", value, f"0 to {greatest:g}")
+    seen = [f"seen {i}" for i in range(1, commands.obstacles + 1)]
+    for name in seen:
+        _require(name not in names, f"regions.{name}.name", "used", "another one: obstacles that come in have it")
+    far = Sphere(FAR_AWAY, commands.obstacle_radius)
+    return tuple(
+        SecondaryRegion(Region(name, far, "out", gain=commands.obstacle_gain), "obstacle", streamed=True, seen=True)
+        for name in seen
+    )
+
+
+def check_goal(table: dict[str, Any]) -> tuple[Shape, Vector3, bool]:
+    """Return the goal's shape, its velocity [m/s, NED], and whether it is streamed."""
+    beside = ("velocity", "streamed")
+    shape = _shape({key: value for key, value in table.items() if key not in beside}, "goal")
+    _require(not of_attitude(shape), "goal.type", repr(table["type"]), "a shape in space")
+    motion = decode({key: table[key] for key in beside if key in table}, _Motion, "goal")
+    _require(all(map(math.isfinite, motion.velocity)), "goal.velocity", motion.velocity, "finite numbers")
+    Region("goal", shape, "in", motion.velocity)  # says now what it cannot be
+    return shape, motion.velocity, motion.streamed
+
+
+def check_regions(entries: tuple[RegionEntry, ...]) -> tuple[SecondaryRegion, ...]:
+    """Return the secondary regions."""
+    names = [entry.name for entry in entries]
+    regions = []
+    for entry in entries:
+        key = f"regions.{entry.name}"
+        good = REGION_NAME.fullmatch(entry.name) is not None and entry.name != "goal"
+        _require(good, f"{key}.name", repr(entry.name), "at most 40 letters, digits, blanks, - and _, and not goal")
+        _require(names.count(entry.name) == 1, f"{key}.name", "used twice", "a name of its own")
+        _require(0.0 <= entry.gain < math.inf, f"{key}.gain", entry.gain, "a finite number, 0 or above")
+        _require(all(map(math.isfinite, entry.velocity)), f"{key}.velocity", entry.velocity, "finite numbers")
+        shape = _shape(entry.shape, f"{key}.shape")
+        region = Region(entry.name, shape, entry.keep, entry.velocity, entry.gain, entry.hard)
+        regions.append(SecondaryRegion(region, entry.criterion, entry.streamed))
+    return tuple(regions)
+
+
+def check_intersection(wanted: tuple[str, ...], regions: tuple[SecondaryRegion, ...]) -> tuple[int, ...]:
+    """Return the indices of the regions whose overlap is reported: those that are named, else all to be kept out of.
+
+    A ScenarioError if one is not there.
+    """
+    kept_out = {r.region.name: i for i, r in enumerate(regions) if r.region.keep == "out"}
+    _require(len(set(wanted)) == len(wanted), "intersection", f"{list(wanted)}", "each name once")
+    for name in wanted:
+        if name not in kept_out:
+            raise ScenarioError(f"intersection: {name!r} is no region to be kept out of; {hint(name, kept_out)}")
+    return tuple(kept_out[name] for name in wanted or kept_out)
+
+
+def check_parameters(given: dict[str, float | bool], vehicle: Vehicle) -> None:
+    """Raise `ScenarioError` unless the FMU has these parameters, and the scenario no key for them."""
+    known = known_parameters(vehicle)
+    for name in given:
+        if name not in known:
+            own = _OWN_KEYS.get(name.partition(".")[0])
+            tip = f"set {own} instead" if own else hint(name, known)
+            raise ScenarioError(f"plant.parameters.{name} is no parameter of the FMU, expected one; {tip}")
+
+
+@functools.lru_cache(maxsize=8)
+def known_parameters(vehicle: Vehicle) -> dict[str, float]:
+    """Return the start values of the FMU's parameters that a scenario has no key of its own for, by name."""
+    parameters = [v for v in variables(vehicle) if v.role == "parameter"]
+    return {v.name: v.start for v in parameters if v.name.partition(".")[0] not in _OWN_KEYS}
+
+
+def check_time(entry: TimeEntry) -> Time:
+    """Return the periods, those left out filled in."""
+    for key in ("duration", "step", "control", "arbiter"):
+        value = getattr(entry, key)
+        _require(value is None or 0.0 < value < math.inf, f"time.{key}", value, "above 0 s")
+    return Time(entry.duration, entry.step, entry.control or entry.step, entry.arbiter or entry.step)
+
+
+def check_law(entry: LawEntry, through: str, vehicle: Vehicle, period: float, n_regions: int) -> LawSetup:
+    """Return the law's name and gains, once the law has taken them and its period [s]; of one's own the name is all.
+
+    Raises
+    ------
+    ScenarioError
+        If there is no such law, or it does not take them.
+    """
+    if is_own(entry.name):
+        if entry.gains:
+            raise ScenarioError(f"law.gains has {next(iter(entry.gains))!r}, expected nothing with a law of one's own")
+        checked_quaternion(np.array(entry.desired_quaternion))
+        return LawSetup(entry.name, entry.desired_quaternion, NoGains())
+    if entry.name not in LAWS:
+        known = ", ".join(map(repr, sorted(LAWS)))
+        raise ScenarioError(f"law.name is {entry.name!r}, expected one of {known}")
+    law = LAWS[entry.name]
+    for key in entry.gains:
+        if key not in law.gains_type._fields:
+            raise ScenarioError(f"law.gains.{key}: unknown key; {hint(key, law.gains_type._fields)}")
+    if law.output == "thrusters" and through != "thrusters":
+        raise ScenarioError(f"actuation.through is {through!r}, expected 'thrusters': law {entry.name!r} drives them")
+    gains = law.gains_type(**entry.gains)
+    law.for_vehicle(vehicle_model(vehicle), gains, np.array(entry.desired_quaternion), period, n_regions)
+    return LawSetup(entry.name, entry.desired_quaternion, gains)
+
+
+def multiple(key: str, period: float, step: float) -> int:
+    """Return how many steps [s] a period [s] takes; it must be a whole number."""
+    ratio = period / step if period / step < MAX_STEPS + 1 else math.inf
+    _require(ratio < math.inf, key, f"{period} s, {period / step:.3g} steps", f"at most {MAX_STEPS} steps")
+    n = round(ratio)
+    _require(n >= 1 and abs(ratio - n) < ROUNDING, key, period, f"a whole multiple of time.step ({step} s)")
+    return n
+
+
+def _shape(table: dict[str, Any], where: str) -> Shape:
+    kind = table.get("type")
+    if kind is None:
+        raise ScenarioError(f"{where}.type is missing, expected one of {', '.join(sorted(SHAPES))}")
+    if not isinstance(kind, str) or kind not in SHAPES:
+        raise ScenarioError(f"{where}.type is {kind!r}, unknown shape; {hint(str(kind), SHAPES)}")
+    try:
+        return decode({key: value for key, value in table.items() if key != "type"}, SHAPES[kind], where)
+    except RegionError as error:
+        raise ScenarioError(f"{where}: {error}") from error
+
+
+def _require(good: bool, key: str, came: object, expected: str) -> None:
+    if not good:
+        raise ScenarioError(f"{key} is {came}, expected {expected}")

@@ -1,0 +1,115 @@
+"""From what is asked for to the inputs of the plant: thruster allocation, limits, and thrusters that fail."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from controller import Allocation
+from cosim.scenario.scenario import Scenario
+from cosim.simulation.signals import Array, Signals
+from plant_fmu import Plant
+
+MOST = 1e5  # N, N m: more is not asked of the plant in a run that can be sent anywhere, where a law might ask for any
+
+
+class Actuators:
+    """Brings a wrench, or thruster forces, to the plant.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        What is run.
+    plant : Plant
+        Whose thrusters fail, and are limited.
+    signals : Signals
+        Whose row holds what is asked for, and the inputs.
+
+    Attributes
+    ----------
+    command : ndarray, shape (6,)
+        Wrench that is asked for [N, N m], body frame.
+    thrusts : ndarray, shape (m,)
+        Thruster forces that are asked for [N].
+    health : ndarray, shape (m,)
+        Of the thrusters as far as the law is told: 1 working, 0 failed.
+    """
+
+    def __init__(self, scenario: Scenario, plant: Plant, signals: Signals) -> None:
+        self._scenario, self._plant = scenario, plant
+        vehicle = scenario.vehicle
+        self._bounded = scenario.commands.enabled
+        self.command = signals.view("command.X", 6)
+        self._cut = signals.view("allocation_saturated", 1)
+        inputs = signals.view("thrust[1]", len(plant.inputs))
+        self.thrusts, self._wrench = inputs[: vehicle.n_thrusters], inputs[vehicle.n_thrusters :]
+        # views of their memory, which are copied in a third of the time of arrays
+        self._asked, self._given = self.command.data, self._wrench.data
+        self._decided, self._sent = inputs.data, plant.inputs.values.data
+        self.health: Array = np.ones(vehicle.n_thrusters)
+        self._limits = {"thrust_min": vehicle.thrust_min.copy(), "thrust_max": vehicle.thrust_max.copy()}
+        self._allocate_to_the_healthy()
+
+    def fail(self, thruster: int) -> None:
+        """Let a thruster, from 1, give nothing from now on, and tell the law if it is to be told."""
+        self._plant.set({f"thrust_effectiveness[{thruster}]": 0.0})
+        if self._scenario.tell_failures:
+            self.health[thruster - 1] = 0.0
+            self._allocate_to_the_healthy()
+
+    def limit(self, parameter: str, value: float) -> None:
+        """Set a limit of the plant, such as ``thrust_max[1]``, and keep to it; the law is not told."""
+        self._plant.set({parameter: value})
+        kind, _, rest = parameter.partition("[")
+        if kind in self._limits:
+            self._limits[kind][int(rest[:-1]) - 1] = value
+            self._allocate_to_the_healthy()
+
+    def push(self) -> None:
+        """Bring the wrench `command` to the plant's inputs."""
+        if self.allocation is None:
+            self._given[:] = self._asked
+            if self._bounded:
+                self._cut[0] = cut(self._wrench)
+        else:
+            self._cut[0] = self.allocation(self.command, self.thrusts)
+
+    def push_thrusters(self) -> None:
+        """Bring the forces `thrusts` to the plant's inputs, and write the wrench that they amount to."""
+        self.command[:] = self._scenario.vehicle.thruster_matrix @ self.thrusts
+
+    def send(self) -> None:
+        """Hand the inputs to the plant."""
+        self._sent[:] = self._decided
+
+    def _allocate_to_the_healthy(self) -> None:
+        actuation = self._scenario.actuation
+        self.allocation: Allocation | None = None
+        if actuation.through == "thrusters":
+            self.allocation = Allocation(
+                self._scenario.vehicle.thruster_matrix,
+                self._limits["thrust_min"] * self.health,
+                self._limits["thrust_max"] * self.health,
+                actuation.limits,
+            )
+
+
+def cut(wrench: Array) -> bool:
+    """Scale a wrench in place until force and moment are at most `MOST`; 0 where they are no numbers.
+
+    Parameters
+    ----------
+    wrench : ndarray, shape (6,)
+        [N, N m].
+
+    Returns
+    -------
+    bool
+        Whether anything was changed.
+    """
+    changed = False
+    for part in (wrench[:3], wrench[3:]):
+        greatest = float(np.max(np.abs(part)))
+        if not greatest <= MOST:
+            part[:] = part * (MOST / greatest) if greatest < np.inf else 0.0
+            changed = True
+    return changed

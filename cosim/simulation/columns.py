@@ -1,0 +1,127 @@
+"""The columns of a run's row, in its order."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from controller import LAWS, Law
+from controller.law import Diagnostic
+from controller.regions import of_attitude
+from cosim.scenario.scenario import CRITERIA, Scenario
+from cosim.simulation.commands.commands import MODES
+from cosim.simulation.lyapunov_signals import lyapunov_columns
+from cosim.simulation.signals import Column
+from plant_fmu import Channel, Plant
+from plant_fmu.variables import variables
+
+_FORCE_UNITS = ("N",) * 3 + ("N.m",) * 3
+
+
+def columns_of(scenario: Scenario, plant: Plant, law: Law) -> list[Column]:
+    """Return the columns of a run.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        What is run.
+    plant : Plant
+        Its outputs, flags and inputs are columns.
+    law : Law
+        Its diagnostics are columns.
+
+    Returns
+    -------
+    list of Column
+        In the order of the row.
+    """
+    channels = (plant.outputs.channels, plant.flags.channels, plant.inputs.channels)
+    return _columns(scenario, *channels, law.diagnostics)
+
+
+def names_of(scenario: Scenario) -> list[str]:
+    """Return the names of the columns of a run, without the reports of a law that is not shipped.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        What is run.
+
+    Returns
+    -------
+    list of str
+        In the order of the row.
+    """
+    table = [v for v in variables(scenario.vehicle) if not v.local]
+    outputs, flags, inputs = (
+        [Channel(v.name, v.quantity.unit, v.description) for v in table if v.role in roles and v.type == kind]
+        for roles, kind in ((("state", "output"), "real"), (("output",), "boolean"), (("input",), "real"))
+    )
+    law = LAWS.get(scenario.law.name)
+    return [column.name for column in _columns(scenario, outputs, flags, inputs, law.diagnostics if law else ())]
+
+
+def _columns(
+    scenario: Scenario,
+    outputs: Sequence[Channel],
+    flags: Sequence[Channel],
+    inputs: Sequence[Channel],
+    diagnostics: Sequence[Diagnostic],
+) -> list[Column]:
+    regions = [("goal", scenario.goal), *((r.region.name, r.region.shape) for r in scenario.regions)]
+    return [
+        Column("time", "s", "Simulated time at the beginning of the step"),
+        *_of(outputs),
+        *_of(flags),
+        *(Column(f"{name}.value", shape.unit, f"g of {name}, above 0 where violated") for name, shape in regions),
+        *(
+            Column(f"{name}.clearance", "rad", f"Angle left within {name}, below 0 where violated")
+            if of_attitude(shape)
+            else Column(f"{name}.clearance", "m", f"Distance to the surface of {name}, below 0 where violated")
+            for name, shape in regions
+        ),
+        *(
+            Column(f"membership.{name}", "", f"Degree to which criterion {name} asks for attention")
+            for name in CRITERIA
+        ),
+        *(Column(f"weight.{name}", "", f"Weight of the criterion {name} from the arbiter") for name in CRITERIA),
+        *(Column(f"estimate.phi{i + 1}", "N.m" if i else "N", f"Estimate of phi {i + 1} in (12)") for i in range(4)),
+        *(
+            Column(f"command.{name}", unit, "Wrench that the law asks for, body frame")
+            for name, unit in zip("XYZKMN", _FORCE_UNITS, strict=True)
+        ),
+        Column("allocation_saturated", "", "The thrusters' limits cut the wrench that the law asks for"),
+        *_of(inputs),
+        *(
+            Column(f"{name}.shift.{axis}", "m", f"How far {name} has moved {where} from where the scenario has it")
+            for name in scenario.moving
+            for axis, where in zip("xyz", ("north", "east", "down"), strict=True)
+        ),
+        *_sensed(scenario),
+        *_ordered(scenario),
+        *(Column(f"law.{d.name}", d.unit, d.description) for d in diagnostics),
+        *lyapunov_columns(scenario),
+    ]
+
+
+def _sensed(scenario: Scenario) -> Iterator[Column]:
+    if scenario.sensing.exact:
+        return
+    for axis, where in zip("xyz", ("north", "east", "down"), strict=True):
+        yield Column(f"sensed.{axis}", "m", f"Position {where} that the law is told")
+    for i, name in enumerate("uvwpqr"):
+        yield Column(f"sensed.{name}", "m/s" if i < 3 else "rad/s", f"Velocity {name} that the law is told, body frame")
+
+
+def _ordered(scenario: Scenario) -> Iterator[Column]:
+    if not scenario.commands.enabled:
+        return
+    yield Column("helm.armed", "", "The thrusters may work")
+    yield Column("helm.mode", "", f"Who steers: {', '.join(f'{i} {mode}' for i, mode in enumerate(MODES))}")
+    yield Column("helm.item", "", "Item of the mission, from 0; -1 for none")
+    for axis, where in zip("xyz", ("north", "east", "down"), strict=True):
+        yield Column(f"target.{axis}", "m", f"Middle of the target region, {where}")
+    yield Column("target.radius", "m", "Radius of the target region if it is a sphere of its own, 0 if it is the goal")
+
+
+def _of(channels: Sequence[Channel]) -> list[Column]:
+    return [Column(channel.name, channel.unit, channel.description) for channel in channels]

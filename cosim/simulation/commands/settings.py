@@ -1,0 +1,192 @@
+"""Numbers of a scenario that can be changed while it runs: gains, regions and limits."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+from controller import LAWS, ControllerError
+from controller.regions import Region, Shape
+from cosim.errors import OrderError
+from cosim.scenario.scenario import Scenario
+from plant_fmu.variables import variables
+
+_GREATEST_RAMP = 1e3  # m
+_LEAST_RADIUS = 1e-2  # m
+_OF_COMMANDS = {  # unit, least, greatest
+    "obstacle_radius": ("m", _LEAST_RADIUS, 1e3),
+    "hold_radius": ("m", _LEAST_RADIUS, 1e3),
+    "surface_depth": ("m", 0.0, 1e3),
+    "pilot_gain": ("", 0.0, 1.0),
+}
+
+
+@dataclass(frozen=True)
+class Setting:
+    """A number as it is now."""
+
+    key: str  # as `cosim run --set` takes it
+    unit: str
+    value: float
+
+
+class LiveSettings:
+    """The present numbers; each change is checked before it is taken.
+
+    Whoever makes the same changes to another one of the same scenario has the same numbers.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        What is run.
+
+    Attributes
+    ----------
+    gains : NamedTuple
+        Of the law.
+    shapes : dict of str to Shape
+        Of the regions, and of the goal.
+    """
+
+    def __init__(self, scenario: Scenario) -> None:
+        self._law = LAWS[scenario.law.name]
+        self.gains: Any = scenario.law.gains
+        known = [secondary.region for secondary in scenario.regions if not secondary.seen]
+        self._regions: dict[str, Region] = {region.name: region for region in known}
+        self.shapes: dict[str, Shape] = {"goal": scenario.goal, **{region.name: region.shape for region in known}}
+        self._numbers: dict[str, float] = {f"regions.{region.name}.gain": region.gain for region in known}
+        self._units: dict[str, str] = {}
+        self._ranges: dict[str, tuple[float, float]] = {}
+        self._add("arbiter.ramp", "m", scenario.arbiter.ramp, 0.0, _GREATEST_RAMP)
+        self._add_limits(scenario)
+        if scenario.commands.enabled:
+            for name, (unit, least, greatest) in _OF_COMMANDS.items():
+                self._add(f"commands.{name}", unit, getattr(scenario.commands, name), least, greatest)
+
+    def _add(self, key: str, unit: str, value: float, least: float, greatest: float) -> None:
+        self._numbers[key] = min(max(value, least), greatest)
+        self._units[key], self._ranges[key] = unit, (least, greatest)
+
+    def _add_limits(self, scenario: Scenario) -> None:
+        """Add the limits of what drives the vehicle: the direct wrench's, or each thruster's."""
+        table = {v.name: v for v in variables(scenario.vehicle)}
+        wrench = {"wrench_force_limit": scenario.limit.force, "wrench_time_constant": scenario.limit.time_constant}
+        keys = {"limit.force": "wrench_force_limit", "limit.time_constant": "wrench_time_constant"}
+        if scenario.actuation.through == "thrusters":
+            each = range(1, scenario.vehicle.n_thrusters + 1)
+            names = [f"thrust_{end}[{i}]" for end in ("min", "max") for i in each]
+            keys = {f"plant.parameters.{name}": name for name in names}
+        for key, name in keys.items():
+            variable = table[name]
+            value = float(scenario.plant.parameters.get(name, wrench.get(name, variable.start)))
+            least, greatest = variable.quantity.minimum, variable.quantity.maximum
+            # a thruster's limits hold 0 between them
+            least = 0.0 if name.startswith("thrust_max") else least
+            greatest = 0.0 if name.startswith("thrust_min") else greatest
+            self._add(key, variable.quantity.unit, value, least, greatest)
+        self.of_plant = keys  # the FMU's parameter behind a key
+
+    def __iter__(self) -> Iterator[Setting]:
+        """Iterate over all settings, always in the same order."""
+        for name in self.gains._fields:
+            yield Setting(f"law.gains.{name}", "", float(getattr(self.gains, name)))
+        for key, value in self._numbers.items():
+            yield Setting(key, self._units.get(key, ""), value)
+        for name, shape in self.shapes.items():
+            where = "goal" if name == "goal" else f"regions.{name}.shape"
+            for field in dataclasses.fields(shape):  # type: ignore[arg-type]
+                value = getattr(shape, field.name)
+                if isinstance(value, tuple):
+                    for i, number in enumerate(value):
+                        if isinstance(number, float):
+                            yield Setting(f"{where}.{field.name}.{i}", "", number)
+                else:
+                    yield Setting(f"{where}.{field.name}", "", float(value))
+
+    def __getitem__(self, key: str) -> float:
+        """Return the present value of one of the numbers that stand alone."""
+        return self._numbers[key]
+
+    def change(self, key: str, value: float) -> None:
+        """Take another value.
+
+        Parameters
+        ----------
+        key : str
+            Of a setting.
+        value : float
+            In its unit.
+
+        Raises
+        ------
+        OrderError
+            If there is no such setting, or the value cannot be; then nothing is changed.
+        """
+        try:
+            if key.startswith("law.gains."):
+                name = key.removeprefix("law.gains.")
+                if name not in self.gains._fields:
+                    raise OrderError(f"{key} is no setting")
+                self.gains = self._law.checked(self.gains._replace(**{name: value}))
+            elif key in self._numbers:
+                self._change_number(key, value)
+            else:
+                self._change_shape(key, value)
+        except ControllerError as error:
+            raise OrderError(f"{key}: {error}") from error
+
+    def _change_number(self, key: str, value: float) -> None:
+        if key in self._ranges:
+            least, greatest = self._ranges[key]
+            if not least <= value <= greatest:
+                raise OrderError(f"{key} is {value:g}, expected {least:g} to {greatest:g}")
+        else:  # regions.NAME.gain, which the region itself checks
+            name = key.removeprefix("regions.").removesuffix(".gain")
+            self._regions[name] = dataclasses.replace(self._regions[name], gain=value)
+        self._numbers[key] = value
+
+    def _change_shape(self, key: str, value: float) -> None:
+        name, field, index = self._part(key)
+        shape = self.shapes[name]
+        new: Any = value
+        if index is not None:
+            numbers = list(getattr(shape, field))
+            numbers[index] = value
+            new = tuple(numbers)
+        self.shapes[name] = dataclasses.replace(shape, **{field: new})  # type: ignore[type-var]
+
+    def region_of(self, key: str) -> str | None:
+        """Return the region, or ``"goal"``, that the setting `key` belongs to; None if it belongs to none."""
+        if key.startswith("regions.") and key.endswith(".gain") and key in self._numbers:
+            return key.removeprefix("regions.").removesuffix(".gain")
+        try:
+            return self._part(key)[0]
+        except OrderError:
+            return None
+
+    def _part(self, key: str) -> tuple[str, str, int | None]:
+        """Return of which region a key of a shape is, which field of the shape it is, and which number of that.
+
+        Raises
+        ------
+        OrderError
+            If it is none.
+        """
+        for name, shape in self.shapes.items():
+            where = "goal." if name == "goal" else f"regions.{name}.shape."
+            if not key.startswith(where):
+                continue
+            field, _, rest = key.removeprefix(where).partition(".")
+            value = getattr(shape, field, None) if field in _fields(shape) else None
+            if isinstance(value, float) and not rest:
+                return name, field, None
+            numbers = value if isinstance(value, tuple) else ()
+            if rest in map(str, range(len(numbers))) and isinstance(numbers[int(rest)], float):
+                return name, field, int(rest)
+        raise OrderError(f"{key} is no setting")
+
+
+def _fields(shape: Shape) -> set[str]:
+    return {field.name for field in dataclasses.fields(shape)}  # type: ignore[arg-type]

@@ -1,0 +1,113 @@
+"""V of the printed law's analysis as signals of a run."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from controller import VehicleState
+from controller.printed_law import primary_error, secondary_error
+from controller.quaternion import error, rotation_matrix
+from controller.regions import PackedRegions
+from controller.theory import (
+    mapped_error,
+    mapped_error_rate,
+    normalised_secondary,
+    primary_value,
+    printed_secondary,
+    value_rate,
+)
+from cosim.scenario.scenario import Scenario
+from cosim.scenario.true_vehicle import true_model
+from cosim.simulation.signals import Array, Column
+
+FORMS = ("printed", "normalised", "primary")  # in the order of the columns
+
+_STEP = 1e-4  # m, by which the errors are differentiated along the motion
+
+
+def lyapunov_columns(scenario: Scenario) -> list[Column]:
+    """Return the columns of V and its rate, none unless the scenario records them."""
+    if not scenario.record.lyapunov:
+        return []
+    return [
+        Column("lyapunov.printed", "N.m", "V of (31) as printed"),
+        Column("lyapunov.normalised", "N.m", "V of (31) with the potential of the normalised force (22)"),
+        Column("lyapunov.primary", "N.m", "V of (31) without secondary regions"),
+        Column("lyapunov.rate", "W", "dV/dt = -W of (40), (41)"),
+    ]
+
+
+class LyapunovSignals:
+    """Writes V and its rate into the row of a step.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        Its law is the printed one.
+    state : VehicleState
+        The true state, read at each `write`.
+    goal, regions : PackedRegions
+        The goal alone, and the n secondary regions. The theory takes them to be at rest: if they move, the rate is
+        that of the vehicle's own motion.
+    weights : ndarray, shape (n,)
+        Of each secondary region, from the arbiter.
+    estimate : ndarray, shape (4,)
+        Phi-hat.
+    out : ndarray, shape (4,)
+        Receives the signals of `lyapunov_columns`.
+    """
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        state: VehicleState,
+        goal: PackedRegions,
+        regions: PackedRegions,
+        weights: Array,
+        estimate: Array,
+        out: Array,
+    ) -> None:
+        self._model, self._gains = true_model(scenario), scenario.law.gains
+        self._desired = np.array(scenario.law.desired_quaternion)
+        self._state, self._goal, self._regions = state, goal, regions
+        self._weights, self._estimate, self._out = weights, estimate, out
+        n = len(weights)
+        self._of_goal = np.empty(1), np.empty((1, 3)), np.empty((1, 3)), np.empty(1)
+        self._of_regions = np.empty(n), np.empty((n, 3)), np.empty((n, 3)), np.empty(n)
+
+    def write(self) -> None:
+        """Write V in its three forms, and its rate."""
+        model, gains, state, out = self._model, self._gains, self._state, self._out
+        velocity, estimate, betas = state.velocity_body, self._estimate, self._regions.gains * self._weights / gains.k_q
+        R, turned = rotation_matrix(state.quaternion), error(self._desired, state.quaternion)
+        region_rate = self._region_rate(R @ velocity[:3], betas)
+        e_p, e_s = self._region_errors(state.position, betas)
+        f, (g, g_gradients, _, clearances) = self._of_goal[0][0], self._of_regions
+        y = mapped_error(e_p, e_s, turned[1:], R, gains)
+        alone = mapped_error(e_p, np.zeros(3), turned[1:], R, gains)
+        value = primary_value(model, gains, f, turned, y, velocity, estimate)
+        out[0] = value + printed_secondary(g, g_gradients, betas, gains)
+        out[1] = value + normalised_secondary(g, g_gradients, clearances, betas, gains)
+        out[2] = primary_value(model, gains, f, turned, alone, velocity, estimate)
+        y_rate = mapped_error_rate(region_rate, y, turned, R, velocity[3:])
+        out[3] = value_rate(model, gains, y, y_rate, velocity)
+
+    def _region_rate(self, velocity: Array, betas: Array) -> Array:
+        """Return d/dt (e_p + (k_q/k_p1) e_s), shape (3,), by central differences along the motion, weights held."""
+        speed = float(np.linalg.norm(velocity))
+        if not speed > 0.0:
+            return 0.0 * velocity
+        ratio = self._gains.k_q / self._gains.k_p1
+        offset = _STEP / speed * velocity
+        (p_ahead, s_ahead), (p_behind, s_behind) = (
+            self._region_errors(self._state.position + side * offset, betas) for side in (1.0, -1.0)
+        )
+        result: Array = (p_ahead - p_behind + ratio * (s_ahead - s_behind)) * (speed / (2.0 * _STEP))
+        return result
+
+    def _region_errors(self, position: Array, betas: Array) -> tuple[Array, Array]:
+        """Evaluate goal and regions at a position; return e_p and e_s, shape (3,) each."""
+        self._goal.evaluate(position, self._state.quaternion, *self._of_goal)
+        self._regions.evaluate(position, self._state.quaternion, *self._of_regions)
+        (f, *_), (gradient, *_) = self._of_goal[:2]
+        return primary_error(f, gradient), secondary_error(*self._of_regions[:2], betas)

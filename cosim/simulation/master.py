@@ -1,0 +1,392 @@
+"""The co-simulation master: one step of plant, arbiter and controller, from measuring to publishing.
+
+Read `Master.run` from top to bottom: each stage is one call. Observers see the row of signals when a step is done; they
+copy what they keep, and cannot change it.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Sequence
+from types import TracebackType
+from typing import Protocol
+
+import numpy as np
+
+from controller import CompiledLaw, FunctionLaw, Law, VehicleState
+from controller.quaternion import from_axis_angle
+from cosim.scenario.law_factory import flown_by, law_of
+from cosim.scenario.scenario import CRITERIA, Scenario
+from cosim.scenario.start_values import start_values
+from cosim.simulation.actuators import Actuators
+from cosim.simulation.columns import columns_of
+from cosim.simulation.commands.command_handler import Helm
+from cosim.simulation.commands.commands import Order
+from cosim.simulation.commands.sources import OrderSource
+from cosim.simulation.environment import Surroundings
+from cosim.simulation.lyapunov_signals import LyapunovSignals
+from cosim.simulation.sensor import Sensor
+from cosim.simulation.signals import Array, Signals
+from fuzzy_arbiter import Arbiter
+from plant_fmu import Plant
+
+_LONGEST_SLEEP = 3600.0  # s
+_MADE_UP = 0.1  # s of the wall clock, that a paced run may be behind and make up for
+_ARMING_PERIOD = 0.005  # s of the wall clock, at which orders are looked for while nothing moves
+_ROUNDING = 1e-6  # of a step
+_DOWN: Array = np.array([0.0, 0.0, 1.0])
+_FIRST_APPLIED = "thruster_force[1]"  # outputs before it are read at the beginning of a step, from it on at the end
+
+
+class Observer(Protocol):
+    """Listens to a run."""
+
+    def observe(self, k: int, row: Array) -> None:
+        """Take the row of step `k`, shape (n,); it is overwritten in the next step, so copy what is kept."""
+        ...
+
+
+class Master:
+    """Everything that a run needs, made once; `run` then steps it.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        What to run.
+    law : Law, optional
+        What steers; default: the scenario's law.
+
+    Attributes
+    ----------
+    signals : Signals
+        The row that each step fills.
+    truth, state : VehicleState
+        The vehicle as it is, and as law and arbiter are told; the same where sensing is exact.
+
+    Raises
+    ------
+    PlantError
+        If the FMU refuses the scenario's numbers.
+    BuildError
+        If there is no FMU and none can be built.
+    LawError, DefinitionError
+        If law or arbiter cannot be set up.
+    ScenarioError
+        If the scenario asks for what a law that is a function has not.
+    """
+
+    def __init__(self, scenario: Scenario, law: Law | None = None) -> None:
+        if isinstance(law, FunctionLaw):
+            scenario = flown_by(law, scenario)  # refuses what such a law cannot have
+        self.scenario = scenario
+        self.arbiter = Arbiter(engine=scenario.arbiter.engine, points=scenario.arbiter.points)
+        self.law: Law = law_of(scenario) if law is None else law
+        self._jacobi = scenario.master.order == "jacobi"
+        self._failures = bool(scenario.failures)
+        self.surroundings = Surroundings(scenario)
+        self._boundary = 0.0  # s, when the next step begins
+
+        self.plant = Plant(scenario.vehicle, scenario.plant.fmi)
+        try:
+            self.plant.set(start_values(scenario))
+            self.plant.initialise()
+            self.signals = Signals(columns_of(scenario, self.plant, self.law))
+            self._bind()
+        except BaseException:
+            self.plant.close()
+            raise
+
+    def _bind(self) -> None:
+        """Name the parts of the row, and the buffers beside it."""
+        s, n = self.signals, len(self.scenario.regions)
+        self.actuators = Actuators(self.scenario, self.plant, s)
+        plant, n_outputs = self.plant, len(self.plant.outputs)
+        n_measured = plant.outputs.names.index(_FIRST_APPLIED)
+        # views of their memory, which are copied in a third of the time of arrays
+        outputs, given = s.view("position.x", n_outputs).data, plant.outputs.values.data
+        self._measured, self._plant_measured = outputs[:n_measured], given[:n_measured]
+        self._applied, self._plant_applied = outputs[n_measured:], given[n_measured:]
+        self._flags = s.view("position.x", n_outputs + len(plant.flags))[n_outputs:]
+        self._raised = b""  # the flags that stand in the row
+
+        truth = VehicleState(
+            position=s.view("position.x", 3),
+            quaternion=s.view("quaternion.e0", 4),
+            velocity_body=s.view("velocity.u", 6),
+            thruster_health=self.actuators.health,
+        )
+        self.truth = self.state = truth
+        self._sensor: Sensor | None = None
+        if not self.scenario.sensing.exact:
+            position, velocity = s.view("sensed.x", 3), s.view("sensed.u", 6)
+            self.state = VehicleState(position, np.zeros(4), velocity, self.actuators.health)
+            self._sensor = Sensor(self.scenario.sensing, truth, self.state)
+
+        values, clearances = s.view("goal.value", n + 1), s.view("goal.clearance", n + 1)
+        # where sensing is exact, what the arbiter sees is what is recorded
+        self._outlook = self._seen = self.surroundings.outlook(values, clearances)
+        if self._sensor is not None:
+            self._seen = self.surroundings.outlook(np.zeros(n + 1), np.zeros(n + 1))
+        moving = self.scenario.moving
+        self._shifts = s.view(f"{moving[0]}.shift.x", 3 * len(moving)).reshape(-1, 3) if moving else np.empty((0, 3))
+        self._memberships = s.view(f"membership.{CRITERIA[0]}", len(CRITERIA))
+        self._weights = s.view(f"weight.{CRITERIA[0]}", len(CRITERIA))
+        self._weights_of_regions: Array = np.zeros(n)
+        self._asked: list[float] | None = None  # memberships that the weights are of
+        self._estimate = s.view("estimate.phi1", 4)
+        n_reports = len(self.law.diagnostics)
+        self._reports = n_reports > 0
+        self._report = s.view(f"law.{self.law.diagnostics[0].name}", n_reports) if n_reports else np.empty(0)
+        self._lyapunov: LyapunovSignals | None = None
+        self.helm: Helm | None = None
+        if self.scenario.commands.enabled:
+            self.helm = Helm(self.scenario, self.surroundings, self.actuators, self.state, s.view("helm.armed", 7))
+        if self.scenario.record.lyapunov:
+            out = s.view("lyapunov.printed", 4)
+            goal, regions, weights = self.surroundings.goal, self.surroundings.regions, self._weights_of_regions
+            self._lyapunov = LyapunovSignals(self.scenario, truth, goal, regions, weights, self._estimate, out)
+
+    @property
+    def row(self) -> Array:
+        """The row of the present step, shape (n,), which cannot be written."""
+        seen = self.signals.row.view()
+        seen.flags.writeable = False
+        return seen
+
+    def run(
+        self,
+        observers: Sequence[Observer] = (),
+        rate: float | None = None,
+        orders: OrderSource | None = None,
+        awaiting: Observer | None = None,
+    ) -> None:
+        """Step from time 0 to the end, once, telling the observers of each step.
+
+        The row of step k holds what was measured and decided at its beginning, and the forces that acted at its end.
+
+        Parameters
+        ----------
+        observers : sequence of Observer
+            Told in this order.
+        rate : float, optional
+            Simulated seconds a wall-clock second at the most; default: as fast as it goes.
+        orders : OrderSource, optional
+            What is ordered on the way, if the scenario's commands are enabled. Where nothing moves before the vehicle
+            is armed, the first step waits for that order. After an order to reset, the run ends.
+        awaiting : Observer, optional
+            Told how things stand, as of step 0, while arming is awaited.
+
+        Raises
+        ------
+        PlantError
+            If the FMU fails in a step.
+        """
+        step, last = self.scenario.time.step, self.scenario.steps
+        seen = self.row
+        waited = self._await_arming(orders, awaiting)
+        started = time.perf_counter()
+        for k in range(last + 1):
+            self.step(k, orders if k or not waited else None)
+            for observer in observers:
+                observer.observe(k, seen)
+            if self.helm is not None and self.helm.reset:
+                return
+            if rate is not None:
+                ahead = started + (k + 1) * step / rate - time.perf_counter()
+                time.sleep(min(max(0.0, ahead), _LONGEST_SLEEP))
+                started -= min(0.0, ahead + _MADE_UP)  # what took longer, such as loading, is not made up for in a rush
+
+    def step(self, k: int, orders: OrderSource | None = None) -> None:
+        """Do step `k`: the first is 0, and each is done once, in their order; the last one moves nothing.
+
+        Parameters
+        ----------
+        k : int
+            Which.
+        orders : OrderSource, optional
+            As for `run`.
+
+        Raises
+        ------
+        PlantError
+            If the FMU fails.
+        """
+        scenario, step, jacobi = self.scenario, self.scenario.time.step, self._jacobi
+        self.signals.row[0] = k * step
+        if self._failures:
+            self._fail(k)
+        if jacobi and k:
+            self._exchange(k - 1)
+        self._measure(k)
+        if self.helm is not None and orders is not None:
+            self._heed(self.helm, orders.take(k))
+        self._evaluate_regions()
+        if self.helm is not None and self.helm.watch(float(self.signals.row[0]), float(self._seen.clearances[0])):
+            self._heed(self.helm, ())  # what the next item of the mission changes
+            self._evaluate_regions()
+        if jacobi:
+            self.actuators.send()  # what was asked for in the step before
+        elif k % scenario.arbiter_every == 0:
+            self._arbitrate()
+        if k % scenario.control_every == 0:
+            self._control()
+        if self._lyapunov is not None:
+            self._lyapunov.write()
+        if k < scenario.steps:
+            if not jacobi:
+                self.actuators.send()
+            self._advance(step)
+        self._boundary = (k + 1) * step
+
+    # ---- the stages of a step ----
+
+    def _fail(self, k: int) -> None:
+        """Let thrusters fail whose time has come."""
+        for failure in self.scenario.failures:
+            if k == math.ceil(failure.time / self.scenario.time.step - _ROUNDING):
+                self.actuators.fail(failure.thruster)
+
+    def _measure(self, k: int) -> None:
+        self._measured[:] = self._plant_measured
+        if self._sensor is not None:
+            self._sensor.measure(self.signals.row[0], k % self.scenario.control_every == 0)
+
+    def look(self) -> None:
+        """Fill the row with how things stand before the first step; nothing moves, and no noise is drawn."""
+        self._measured[:] = self._plant_measured
+        if self._sensor is not None:
+            self._sensor.tell_truth()
+        self._evaluate_regions()
+        if self.helm is not None:
+            self.helm.watch(0.0, float(self._seen.clearances[0]))
+
+    def _await_arming(self, orders: OrderSource | None, awaiting: Observer | None) -> bool:
+        """Follow orders before step 0 until one arms the vehicle, or none is to come; return whether it was awaited."""
+        helm = self.helm
+        if helm is None or helm.armed or orders is None:
+            return False
+        while not (helm.armed or orders.exhausted):
+            self.look()
+            self._heed(helm, orders.take(0))
+            helm.reset = False  # nothing has begun
+            if awaiting is not None:
+                awaiting.observe(0, self.row)
+            time.sleep(_ARMING_PERIOD)
+        return True
+
+    def _heed(self, helm: Helm, orders: Sequence[Order]) -> None:
+        """Follow the orders of this step, and take over what was changed."""
+        now = float(self.signals.row[0])
+        for order in orders:
+            helm.follow(order, now)
+        if helm.took_over:
+            self.law = law_of(self.scenario)
+        if isinstance(self.law, CompiledLaw) and (helm.took_over or helm.changed or helm.turned):
+            self.law.gains = helm.settings.gains
+            if helm.heading is not None:
+                self.law.face(from_axis_angle(_DOWN, helm.heading))
+        if helm.changed:
+            self.surroundings.set_ramp(helm.settings["arbiter.ramp"])
+        helm.heeded()
+
+    def _evaluate_regions(self) -> None:
+        """Evaluate the regions, where they are now, at the pose that is told, and at the true one."""
+        self.surroundings.carry_to(self.signals.row[0], self._shifts)
+        if self._sensor is not None:
+            self.surroundings.evaluate(self.state, self._seen)
+        self.surroundings.evaluate(self.truth, self._outlook)
+
+    def _arbitrate(self) -> None:
+        """Turn memberships into weights.
+
+        While the position is lost there is nothing to decide by: the last weights hold.
+        """
+        memberships = self._press()
+        # what asks as it did in the step before is weighed as then, and stands in the row still
+        if memberships is not None and memberships != self._asked:
+            self._asked = memberships
+            self._memberships[:] = memberships
+            self._weigh(memberships)
+
+    def _exchange(self, before: int) -> None:
+        """Hand on what regions and arbiter made, in the step `before`, of what stood at its beginning (Jacobi)."""
+        if before % self.scenario.arbiter_every == 0:
+            self._weigh(self._memberships.tolist())
+        memberships = self._press()
+        if memberships is not None:
+            self._memberships[:] = memberships
+
+    def _press(self) -> list[float] | None:
+        """Return the membership of each criterion, that of its most pressing region; None if the position is lost."""
+        if self._sensor is not None and not np.isfinite(self.state.position).all():
+            return None
+        memberships: list[float] = self._seen.memberships.tolist()
+        return memberships
+
+    def _weigh(self, memberships: list[float]) -> None:
+        self._weights[:] = self.arbiter(memberships)
+        self._weights_of_regions[:] = self._weights[self.surroundings.criteria]
+
+    def _control(self) -> None:
+        """Ask the law, or the sticks, for forces of the coming period, and bring them to the plant's inputs."""
+        actuators = self.actuators
+        if self.helm is not None and not self.helm.law_steers:
+            actuators.command[:] = self.helm.wrench
+            actuators.push()
+            return
+        self._estimate[...] = self.law.estimate
+        law, by_wrench = self.law, self.law.output == "wrench"
+        forces = actuators.command if by_wrench else actuators.thrusts
+        law.step(self.state, self.surroundings.goal, self.surroundings.regions, self._weights_of_regions, forces)
+        if self._reports:
+            self._report[...] = law.report
+        if by_wrench:
+            actuators.push()
+        else:
+            actuators.push_thrusters()
+
+    def _advance(self, step: float) -> None:
+        self.plant.step(step)
+        self._applied[:] = self._plant_applied
+        flags = self.plant.read_flags()
+        raised = flags.tobytes()
+        if raised != self._raised:
+            self._flags[...], self._raised = flags, raised
+
+    # ---- regions moved from outside ----
+
+    def move_region(self, name: str, displacement: Array, velocity: Array) -> None:
+        """Say where a streamed region is from the next step on, and how it goes on from there.
+
+        To be called between steps: before `run`, or by an observer.
+
+        Parameters
+        ----------
+        name : str
+            Of a region, or ``"goal"``, that the scenario calls streamed.
+        displacement : array_like, shape (3,)
+            At the beginning of the next step, from where the scenario has it [m, NED].
+        velocity : array_like, shape (3,)
+            From then on [m/s, NED]; the law is told.
+
+        Raises
+        ------
+        RunError
+            If there is no such region, it is not streamed, or a number is not finite.
+        """
+        self.surroundings.move(name, displacement, velocity, self._boundary)
+
+    # ---- the end ----
+
+    def close(self) -> None:
+        """Free the FMU. May be called twice."""
+        self.plant.close()
+
+    def __enter__(self) -> Master:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()

@@ -1,0 +1,39 @@
+"""How much each criterion asks for attention, from what is left to its regions: compiled, for master and fused loop."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+import fuzzy_arbiter
+from controller.jit.jit import inlined
+from cosim.simulation.signals import Array
+from fuzzy_arbiter import ramp
+
+SOURCES = (Path(fuzzy_arbiter.__file__).parent, Path(__file__).parent)  # folders that the code of `press` stands in
+_ramp: Any = numba.njit(ramp)
+
+
+@inlined
+def press(clearances: Array, criteria: NDArray[np.int64], width: float, memberships: Array) -> None:
+    """Write the membership of each criterion, that of its most pressing region.
+
+    Parameters
+    ----------
+    clearances : ndarray, shape (n,)
+        Of each region [m], or [rad] of attitude; what is no number asks for nothing.
+    criteria : ndarray of int, shape (n,)
+        Of each region.
+    width : float
+        Where memberships reach 0 [m].
+    memberships : ndarray, shape (criteria,)
+        Receives them, in [0, 1].
+    """
+    for i in range(memberships.size):
+        memberships[i] = 0.0
+    for i in range(criteria.size):
+        memberships[criteria[i]] = max(memberships[criteria[i]], _ramp(clearances[i], width))

@@ -1,0 +1,75 @@
+"""The fuzzy arbiter of a scenario as a component for FMUs."""
+
+from __future__ import annotations
+
+import re
+
+from cosim.scenario.scenario import CRITERIA, Scenario
+from cosim.ssp.c_sources import c_files, under_own_names
+from cosim.ssp.documentation import contents
+from fuzzy_arbiter import Arbiter
+from fuzzy_arbiter.export import to_c
+from plant_fmu import quantities as q
+from plant_fmu.component import Component
+from plant_fmu.quantities import Quantity
+from plant_fmu.variables import Variable
+
+_WORDS = """To what degree each criterion asks for attention goes in; what weight the fuzzy arbiter gives to
+each comes out, by the closed form of its rules, which is exact.
+
+The weights are worked out in a step, from the memberships at its beginning, once in each time.arbiter counted
+from the start, and hold until the next time; before the first step they are 0."""
+
+_DECLARATION = re.compile(r"^int (\w+)\(const double inputs\[\d+\], double outputs\[\d+\]\);$", re.MULTILINE)
+
+
+def arbiter_component(scenario: Scenario) -> Component:
+    """Return the arbiter of a scenario.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        Its engine is the closed form, or gives the same.
+
+    Returns
+    -------
+    Component
+        Without states, for co-simulation.
+    """
+    rows = (
+        Variable("time", "time", "time", q.TIME, "Simulated time"),
+        *(
+            Variable(f"membership.{name}", "input", f"memberships[{i}]", q.FRACTION,
+                     f"Degree to which criterion {name} asks for attention")
+            for i, name in enumerate(CRITERIA)
+        ),
+        *(
+            Variable(f"weight.{name}", "output", f"weights[{i}]", q.unbounded(""), f"Weight of criterion {name}")
+            for i, name in enumerate(CRITERIA)
+        ),
+        Variable("time.arbiter", "parameter", "period", Quantity("s", 1e-6, 1e6), "Period of the arbiter",
+                 scenario.time.arbiter),
+    )  # fmt: skip
+    return Component(
+        name="arbiter",
+        description="Fuzzy arbiter: which criterion matters now",
+        variables=rows,
+        sources=_sources(),
+        contents=lambda fmi: contents("Arbiter", _WORDS, rows, fmi),
+        constants={"N_CRITERIA": len(CRITERIA)},
+        stop_time=scenario.time.duration,
+        step=scenario.time.step,
+    )
+
+
+def _sources() -> dict[str, bytes]:
+    code = to_c(Arbiter(engine="closed").system)
+    declared = _DECLARATION.search(code)
+    if declared is None:
+        raise AssertionError("the arbiter's C code declares no function that evaluates it")
+    header = f"/* The arbiter's rules: generated. */\n{declared[0]}\n#define EVALUATE_RULES {declared[1]}\n"
+    return {
+        **c_files("cosim.ssp", "csrc/arbiter"),
+        **under_own_names({"rules.c": code.encode(), "rules.h": header.encode()}),
+        "ticks.h": c_files("cosim.ssp", "csrc")["ticks.h"],
+    }

@@ -1,0 +1,48 @@
+"""What the FMUs of controller and arbiter hold beside description, sources and binaries: a page, and licences."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from html import escape
+from importlib import metadata, resources
+from string import Template
+
+from plant_fmu.contents.licenses import licenses
+from plant_fmu.contents.page import tables
+from plant_fmu.variables import Variable
+
+
+def contents(title: str, words: str, rows: Sequence[Variable], fmi: int) -> dict[str, bytes]:
+    """Return the members of an FMU.
+
+    Parameters
+    ----------
+    title : str
+        Of the page.
+    words : str
+        What it does, in paragraphs with an empty line between them.
+    rows : sequence of Variable
+        Of the FMU.
+    fmi : int
+        2 or 3.
+
+    Returns
+    -------
+    dict of str to bytes
+        By path in the archive.
+
+    Raises
+    ------
+    BuildError
+        If the installation has lost its licence.
+    """
+    page = Template((resources.files("cosim.ssp") / "page.html").read_text(encoding="utf-8")).substitute(
+        title=escape(title),
+        words="\n".join(f"<p>{escape(paragraph)}</p>" for paragraph in words.split("\n\n")),
+        fmi=f"{fmi}.0",
+        version=escape(metadata.version("subreach")),
+        variables=tables(rows),
+    )
+    texts = {"documentation/index.html": page}
+    texts |= {f"documentation/licenses/{name}": licence for name, licence in licenses(fmi).items()}
+    return {name: text.encode() for name, text in texts.items()}

@@ -1,0 +1,147 @@
+"""Finding a C compiler on this machine, and making a shared library with it."""
+
+from __future__ import annotations
+
+import importlib.util
+import logging
+import os
+import shlex
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+from plant_fmu.compiling.platforms import Platform, native_platform
+from plant_fmu.errors import BuildError
+from plant_fmu.installing import install_hint
+
+log = logging.getLogger(__name__)
+
+# no contraction of a*b+c, so that compilers differ in no bit beyond what their C libraries do;
+# and no debug information, which would name the folder of the build
+FLAGS = (
+    "-std=c99", "-O3", "-fno-math-errno", "-g0", "-ffp-contract=off", "-fPIC", "-fvisibility=hidden", "-shared",
+    "-DFMI2_OVERRIDE_FUNCTION_PREFIX", "-DFMI3_OVERRIDE_FUNCTION_PREFIX",
+)  # fmt: skip
+_WARNINGS = ("-Wall", "-Wextra", "-Wpedantic")
+_ZIGLANG = "ziglang>=0.13"  # which is a C compiler too
+
+
+def find_compiler() -> list[str]:
+    """Return the command of a C compiler for this machine: ``CC``, else ``cc``, else that of the ziglang package.
+
+    Returns
+    -------
+    list of str
+        The command and its first arguments.
+
+    Raises
+    ------
+    BuildError
+        If there is none.
+    """
+    named = os.environ.get("CC")
+    if named:
+        try:
+            words = shlex.split(named)
+        except ValueError as error:
+            raise BuildError(f"no C compiler: CC is {named!r}: {error}") from error
+        if not words or shutil.which(words[0]) is None:
+            raise BuildError(f"no C compiler: CC is {named!r}, which is not on the PATH")
+        return words
+    if path := shutil.which("cc"):
+        return [path]
+    if importlib.util.find_spec("ziglang"):
+        return cross_compiler(native_platform())
+    raise BuildError(f"no C compiler: neither cc nor the ziglang package was found; {install_hint(_ZIGLANG)}")
+
+
+def cross_compiler(platform: Platform) -> list[str]:
+    """Return the command of the ziglang package's C compiler for a platform.
+
+    Parameters
+    ----------
+    platform : Platform
+        What to compile for.
+
+    Returns
+    -------
+    list of str
+        The command and its first arguments.
+
+    Raises
+    ------
+    BuildError
+        If the package is not there.
+    """
+    if importlib.util.find_spec("ziglang") is None:
+        hint = install_hint(_ZIGLANG)
+        raise BuildError(f"no compiler for other platforms: the ziglang package was not found; {hint}")
+    return [sys.executable, "-m", "ziglang", "cc", "-target", platform.target]
+
+
+def compile_library(
+    compiler: Sequence[str],
+    platform: Platform,
+    sources: Sequence[Path],
+    includes: Sequence[Path],
+    library: Path,
+    flags: Sequence[str] = (),
+) -> None:
+    """Compile C files into one shared library without any dependency but the C library.
+
+    Parameters
+    ----------
+    compiler : sequence of str
+        The command and its first arguments.
+    platform : Platform
+        What the compiler compiles for.
+    sources : sequence of Path
+        The C files.
+    includes : sequence of Path
+        Folders of headers.
+    library : Path
+        What to write.
+    flags : sequence of str, optional
+        After `FLAGS`.
+
+    Raises
+    ------
+    BuildError
+        If the compiler fails; its first complaint is in the message.
+    """
+    link = ["-s"]
+    if platform.system == "darwin":
+        # Named, for the linker else writes the place of the build into the library. Names of functions stay: Apple's
+        # linker knows no -s, and ziglang's, told to drop them, leaves some numbers of a table to chance.
+        link = [f"-Wl,-install_name,@rpath/{library.name}"]
+    options = [*FLAGS, *_WARNINGS, *flags, *(f"-I{folder}" for folder in includes)]
+    with tempfile.TemporaryDirectory(prefix="plant_fmu-") as scratch:
+        objects = [Path(scratch) / f"{source.stem}.o" for source in sources]
+        with ThreadPoolExecutor(os.cpu_count()) as pool:  # a process each: they take turns if there is but one core
+            commands = [
+                [*compiler, *options, "-c", str(source), "-o", str(made)]
+                for source, made in zip(sources, objects, strict=True)
+            ]
+            list(pool.map(_run, commands))
+        _run([*compiler, *FLAGS, *link, *map(str, objects), "-o", str(library), "-lm"])
+    if not library.is_file():
+        raise BuildError(f"C compiler {shlex.join(compiler)} failed: it wrote no library, and no word")
+
+
+def _run(command: Sequence[str]) -> None:
+    """Run a compiler; raise its first complaint if it fails."""
+    log.debug("%s", shlex.join(command))
+    try:
+        done = subprocess.run(command, capture_output=True, text=True, check=False)  # noqa: S603
+    except OSError as error:
+        raise BuildError(f"C compiler {command[0]}: {error.strerror or error}") from error
+    if done.returncode != 0:
+        lines = done.stderr.splitlines()
+        said = [line for line in lines if "error" in line] or lines or ["it wrote nothing, and no word"]
+        raise BuildError(f"C compiler {command[0]} failed: {said[0].strip()}")
+    for line in done.stderr.splitlines():
+        log.debug("%s", line)

@@ -1,0 +1,104 @@
+"""The shared libraries of an FMU, compiled from its C sources."""
+
+from __future__ import annotations
+
+import hashlib
+import re
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+
+import fmpy
+
+from plant_fmu.compiling.compiler import FLAGS, compile_library
+from plant_fmu.compiling.platforms import Platform
+from plant_fmu.compiling.sources import c_sources, compiled_files, header
+from plant_fmu.component import Component
+
+FMI_HEADERS = Path(fmpy.__file__).parent / "c-code"
+_COMMENT = re.compile(r"/\*.*?\*/", re.DOTALL)
+
+
+def compiled_libraries(
+    component: Component, token: str, fmi: int, compilers: Sequence[tuple[Platform, list[str]]]
+) -> list[tuple[Platform, bytes]]:
+    """Compile a component for some platforms.
+
+    Parameters
+    ----------
+    component : Component
+        What the libraries are of.
+    token : str
+        Of the description that they go with.
+    fmi : int
+        2 or 3.
+    compilers : sequence of (Platform, list of str)
+        Each platform with the command of a compiler for it.
+
+    Returns
+    -------
+    list of (Platform, bytes)
+        In the order of `compilers`.
+
+    Raises
+    ------
+    BuildError
+        If a compiler fails.
+    """
+    made = []
+    with tempfile.TemporaryDirectory(prefix="plant_fmu-") as scratch:
+        folder = Path(scratch)
+        for name, data in {**c_sources(component, fmi), component.header: header(component, token).encode()}.items():
+            (folder / name).write_bytes(data)
+        files = [folder / file for file in compiled_files(component, fmi)]
+        for platform, compiler in compilers:
+            library = folder / platform.name / f"{component.name}{platform.suffix}"
+            library.parent.mkdir()
+            compile_library(compiler, platform, files, [folder, FMI_HEADERS], library)
+            made.append((platform, library.read_bytes()))
+    return made
+
+
+def made_from(component: Component, token: str, fmi: int) -> str:
+    """Return a digest of all that libraries are compiled from, whatever the platform and the compiler.
+
+    Parameters
+    ----------
+    component : Component
+        What they are of.
+    token : str
+        Of the description that they go with.
+    fmi : int
+        2 or 3.
+
+    Returns
+    -------
+    str
+        Hexadecimal.
+    """
+    files = {**c_sources(component, fmi), component.header: header(component, token).encode()}
+    for file in FMI_HEADERS.glob(f"fmi{fmi}*.h"):
+        declared = _COMMENT.sub(" ", file.read_text(encoding="utf-8"))  # without what differs between releases of FMPy
+        files[f"fmi/{file.name}"] = " ".join(declared.split()).encode()
+    return digest(files, *FLAGS)
+
+
+def digest(files: dict[str, bytes], *words: str) -> str:
+    """Return a digest of files and words.
+
+    Parameters
+    ----------
+    files : dict of str to bytes
+        By name, in any order.
+    *words : str
+        What else counts.
+
+    Returns
+    -------
+    str
+        Hexadecimal.
+    """
+    found = hashlib.sha256(" ".join(words).encode())
+    for name, data in sorted(files.items()):
+        found.update(f"\n{name} {len(data)}\n".encode() + data)
+    return found.hexdigest()

@@ -1,0 +1,209 @@
+"""Libraries that come compiled with the package, so that an FMU can be made where there is no compiler.
+
+One vehicle's library differs from that of another with as many thrusters in numbers alone: the start values of its
+variables and the token, which stand in one table of the binary. A prebuilt library is compiled with stand-ins there,
+numbers that no vehicle has, and each vehicle's own are written over them. Its file is named by a digest of the very
+sources, flags and headers that it is compiled from, so that one of other sources is never taken.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import struct
+import sys
+import zipfile
+import zlib
+from collections.abc import Sequence
+from dataclasses import fields, replace
+from pathlib import Path
+
+from plant_fmu.archive import write_archive
+from plant_fmu.compiling.compiler import cross_compiler, find_compiler
+from plant_fmu.compiling.libraries import compiled_libraries, made_from
+from plant_fmu.compiling.platforms import NATIVE, Platform, cross_platforms, native_platform
+from plant_fmu.compiling.signature import signed_anew
+from plant_fmu.component import Component, of_vehicle
+from plant_fmu.errors import BuildError
+from plant_fmu.variables import Variable
+from plant_fmu.vehicle import Vehicle, load_vehicle, shipped_vehicles
+
+FOLDER = Path(__file__).parents[1] / "prebuilt"  # in a wheel; a checkout has none
+NAME = "prebuilt"  # which their functions begin with
+
+STAND_IN = "{" + "-".join("0" * n for n in (8, 4, 4, 4, 12)) + "}"  # for a token
+_GIVEN = ("state", "input", "parameter")  # what has a start value
+_ROW = struct.Struct("<4d")  # of the table: start, min, max, nominal; every platform is little-endian
+
+
+def prebuilt_files() -> list[str]:
+    """Return the names of the files that come with the package, which say what their libraries are made from."""
+    return sorted(path.name for path in FOLDER.iterdir()) if FOLDER.is_dir() else []
+
+
+def prebuilt_libraries(
+    component: Component, token: str, fmi: int, platforms: Sequence[Platform]
+) -> list[tuple[Platform, bytes]] | None:
+    """Return a component's libraries from those that come with the package.
+
+    Parameters
+    ----------
+    component : Component
+        What they are to be of.
+    token : str
+        Of the description that they go with.
+    fmi : int
+        2 or 3.
+    platforms : sequence of Platform
+        What they are to run on.
+
+    Returns
+    -------
+    list of (Platform, bytes) or None
+        In the order of `platforms`; None where the package has not all of them, of these very sources: one that was
+        installed from a checkout has this machine's alone.
+
+    Raises
+    ------
+    BuildError
+        If what comes with the package is damaged.
+    """
+    if not FOLDER.is_dir() or not all(map(_has_libc, platforms)):
+        return None
+    general = general_component(component)
+    path = FOLDER / file_name(general, fmi)
+    if not path.is_file():
+        return None
+    try:
+        with zipfile.ZipFile(path) as archive:
+            if not set(map(_member, platforms)) <= set(archive.namelist()):
+                return None
+            found = [(platform, archive.read(_member(platform))) for platform in platforms]
+    except (OSError, zipfile.BadZipFile, zlib.error) as error:
+        raise BuildError(f"{path}: damaged ({error}); install subreach anew") from error
+    return [(platform, _numbered(library, general, component, token)) for platform, library in found]
+
+
+def shipped_structures() -> list[Component]:
+    """Return what libraries of the package are compiled from: for the shipped vehicles, and for six thrusters.
+
+    Returns
+    -------
+    list of Component
+        One for each number of thrusters.
+    """
+    vehicles = [load_vehicle(name) for name in shipped_vehicles()]
+    structures = [general_component(of_vehicle(v)) for v in (*vehicles, _with_thrusters(vehicles[0], 6))]
+    return list({structure.constants["N_THRUSTERS"]: structure for structure in structures}.values())
+
+
+def write_prebuilt(structure: Component, fmi: int, platforms: str, folder: Path) -> Path:
+    """Compile libraries that come with the package.
+
+    Parameters
+    ----------
+    structure : Component
+        One of `shipped_structures`.
+    fmi : int
+        2 or 3.
+    platforms : str
+        ``all``, by the compiler of the ziglang package, or ``native``, by any.
+    folder : Path
+        Where the file goes.
+
+    Returns
+    -------
+    Path
+        The file, with the libraries of these platforms.
+
+    Raises
+    ------
+    BuildError
+        If there is no such compiler, or it fails, or the file cannot be written.
+    """
+    if platforms == NATIVE:
+        compilers = [(native_platform(), find_compiler())]
+    else:
+        compilers = [(platform, cross_compiler(platform)) for platform in cross_platforms(platforms)]
+    libraries = compiled_libraries(structure, STAND_IN, fmi, compilers)
+    out = folder / file_name(structure, fmi)
+    write_archive(out, {_member(platform): library for platform, library in libraries})
+    return out
+
+
+def _with_thrusters(vehicle: Vehicle, n: int) -> Vehicle:
+    """Return a vehicle with the first few thrusters of another."""
+    names = [field.name for field in fields(vehicle) if field.name.startswith("thrust")]
+    return replace(vehicle, autopilot=None, **{name: getattr(vehicle, name)[..., :n] for name in names})
+
+
+def general_component(component: Component) -> Component:
+    """Return what a component's prebuilt library is compiled from: the same with a stand-in for each start value.
+
+    Parameters
+    ----------
+    component : Component
+        Any.
+
+    Returns
+    -------
+    Component
+        The same for all components that differ in their numbers alone, but for the description.
+    """
+    rows = tuple(replace(v, start=_stand_in(i)) if v.role in _GIVEN else v for i, v in enumerate(component.variables))
+    return replace(component, name=NAME, variables=rows)
+
+
+def _stand_in(i: int) -> float:
+    return math.ldexp(1.0 + i / 2**20, -1000)  # of the size 1e-301: no quantity is as small
+
+
+def file_name(general: Component, fmi: int) -> str:
+    """Return the name of the file with prebuilt libraries.
+
+    Parameters
+    ----------
+    general : Component
+        From `general_component`.
+    fmi : int
+        2 or 3.
+
+    Returns
+    -------
+    str
+        It tells all that the libraries are compiled from.
+    """
+    return f"fmi{fmi}-{made_from(general, STAND_IN, fmi)[:32]}.zip"
+
+
+def _member(platform: Platform) -> str:
+    return f"{platform.name}{platform.suffix}"
+
+
+def _has_libc(platform: Platform) -> bool:
+    """Whether a library with glibc loads: Linux may have another C library."""
+    if platform.system != "linux" or not sys.platform.startswith("linux"):
+        return True
+    try:
+        return (os.confstr("CS_GNU_LIBC_VERSION") or "").startswith("glibc")
+    except (OSError, ValueError):
+        return False
+
+
+def _numbered(library: bytes, general: Component, component: Component, token: str) -> bytes:
+    """Return a library with a component's numbers and token in place of the stand-ins."""
+    changes = [(STAND_IN.encode() + b"\0", token.encode() + b"\0")]
+    for there, here in zip(general.variables, component.variables, strict=True):
+        if there.role in _GIVEN:
+            changes.append((_row(there), _row(here)))
+    written = bytearray(library)
+    for old, new in changes:
+        if library.count(old) != 1 or len(old) != len(new):
+            raise BuildError("a library that comes with subreach has not the table that was expected")
+        at = library.index(old)
+        written[at : at + len(new)] = new
+    return signed_anew(bytes(written))
+
+
+def _row(v: Variable) -> bytes:
+    return _ROW.pack(v.start, v.quantity.minimum, v.quantity.maximum, v.nominal)

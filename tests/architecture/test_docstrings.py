@@ -1,0 +1,206 @@
+"""What docstrings say is what the code has: parameters, errors, what comes back, and units."""
+
+import ast
+import re
+from collections.abc import Iterator
+from functools import cache
+
+import griffe
+import pytest
+
+from tests.architecture import public
+from tests.architecture.modules import FILES, tree_of
+
+pytestmark = pytest.mark.slow  # to read all of the code takes seconds
+
+# words of a name that make a number a physical quantity
+KINDS = re.compile(
+    r"(?:^|_)(?:acceleration|altitude|angle|bearing|buoyancy|clearance|current|damping|delay|density|depth|diameter|"
+    r"distances?|duration|forces?|frequency|heading|horizon|inertia|lag|length|mass|moment|period|position|radius|range|"
+    r"substep|tau|temperature|thrusts?|timeout|times?|torque|velocity|volume|wrench|yaw)(?:_|$)"
+)
+NUMBERS = re.compile(r"float|Array|Vector|ndarray")
+_ONE = r"(?:1/s|[kmµn]?s|[km]?m|k?N|kg|m?rad|deg|degE7|Hz|Pa|m?G|bar|%)[234]?"
+UNIT = re.compile(
+    rf"\[(?:-|{_ONE}(?:[ /]{_ONE})*)[],;: ]"  # [m/s], [m, NED], [-]
+    rf"|(?:^|(?<=[\s(,])){_ONE}(?:[ /]{_ONE})*(?=[\s,.;:)]|$)"  # m/s, rad
+    r"|\bSI\b|\b(?:metre|second|newton|radian|degree)s?\b|dimensionless|units? of|as a part of"
+)
+# what a function may raise without a word: that it is abstract, a fault of our own, Ctrl-C, or argparse's own errors
+UNSAID = {"NotImplementedError", "AssertionError", "KeyboardInterrupt", "ArgumentTypeError"}
+
+ELSEWHERE = re.compile(
+    r"(?:Do what|Return what|[Aa]rguments as|[Aa]s|[Aa]s for|see|of) `([\w.]+)`"
+)  # the rest is said there
+
+Part = griffe.DocstringSectionKind
+
+
+def everything() -> Iterator[griffe.Object]:
+    """Every class, function and attribute of the four packages whose name, and whose class's, does not begin with _."""
+    for package in public.packages().values():
+        for module in public.modules(package):
+            yield from _below(module)
+
+
+def _below(parent: griffe.Object) -> Iterator[griffe.Object]:
+    for name, member in parent.members.items():
+        if not (name.startswith("_") or member.is_alias or member.is_module):
+            yield member
+            yield from _below(member) if member.is_class else ()
+
+
+def functions() -> Iterator[griffe.Function]:
+    return (what for what in everything() if isinstance(what, griffe.Function))
+
+
+def said(what: griffe.Object) -> str:
+    """A docstring, and those of the functions it leaves the rest to."""
+    words = what.docstring.value if what.docstring else ""
+    others = [path for name in ELSEWHERE.findall(words) for path in _paths() if f".{path}".endswith(f".{name}")]
+    return "\n".join([words, *(_paths()[path] for path in others)])
+
+
+@cache
+def _paths() -> dict[str, str]:
+    return {what.path: what.docstring.value for what in everything() if what.docstring}
+
+
+def section(what: griffe.Object, kind: griffe.DocstringSectionKind) -> list[tuple[str, str]]:
+    """Names and all that is said of them, of one section of a docstring."""
+    parts = what.docstring.parse("numpy") if what.docstring else []
+    entries = [entry for part in parts if part.kind is kind for entry in part.value]
+    return [
+        (name.strip().lstrip("*"), f"{entry.annotation} {entry.description}")
+        for entry in entries
+        for name in (entry.name.split(",") if kind in (Part.parameters, Part.attributes) else [""])
+    ]
+
+
+def shown(wrong: dict[str, object]) -> str:
+    return "\n".join(f"{path}: {what}" for path, what in wrong.items())
+
+
+def parameters(function: griffe.Function) -> list[griffe.Parameter]:
+    return [p for p in function.parameters if p.name not in ("self", "cls")]
+
+
+def comment_on(attribute: griffe.Attribute) -> str:
+    """The comment behind an attribute, and those on the lines before it."""
+    lines = attribute.lines_collection[attribute.filepath]
+    first = attribute.lineno - 1
+    while lines[first - 1].strip().startswith("#"):
+        first -= 1
+    return " ".join(line.partition("#")[2] for line in lines[first : attribute.endlineno])
+
+
+def physical(name: str, kind: object) -> bool:
+    return bool(KINDS.search(name) and NUMBERS.search(str(kind)))
+
+
+@cache
+def _definitions(module: str) -> dict[int, ast.AST]:
+    tree = tree_of(FILES[module])
+    nodes = [node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef)]
+    return {min([node.lineno, *(d.lineno for d in node.decorator_list)]): node for node in nodes}
+
+
+def body(function: griffe.Function) -> Iterator[ast.AST]:
+    """The nodes of a function, those of functions inside it left out."""
+    pending = [_definitions(function.module.path)[function.lineno]]
+    while pending:
+        for child in ast.iter_child_nodes(pending.pop()):
+            if not isinstance(child, ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda | ast.ClassDef):
+                yield child
+                pending.append(child)
+
+
+def test_sections_of_parameters_have_each_parameter_and_no_other():
+    wrong = {}
+    for function in functions():
+        documented = sorted(name for name, _ in section(function, Part.parameters))
+        there = sorted(p.name for p in parameters(function))
+        if documented and documented != there:
+            wrong[function.path] = sorted(set(documented) ^ set(there)) or documented
+    assert not wrong, shown(wrong)
+
+
+def test_what_is_public_names_each_of_its_parameters():
+    """In a section, or in the words where there is none."""
+    wrong = {}
+    for name in public.names():
+        what = public.target(name)
+        for function in [what] if what.is_function else public.members(what) if what.is_class else []:
+            if function.is_function:
+                listed = {entry for entry, _ in section(function, Part.parameters)}
+                words = set(re.findall(r"\w+", said(function)))
+                if missing := [p.name for p in parameters(function) if p.name not in (listed or words)]:
+                    wrong[function.path] = missing
+    assert not wrong, shown(wrong)
+
+
+def test_what_comes_back_is_said():
+    wrong = []
+    for function in functions():
+        kinds = {part.kind for part in function.docstring.parse("numpy")} if function.docstring else set()
+        summary = said(function).partition("\n\n")[0]
+        if any(isinstance(node, ast.Yield | ast.YieldFrom) for node in body(function)):
+            context = any("contextmanager" in str(d.value) for d in function.decorators)
+            right = context or Part.yields in kinds or summary.startswith("Yield")
+        elif Part.parameters in kinds and str(function.returns) not in ("None", "NoReturn"):
+            right = bool({Part.returns, Part.yields} & kinds) or "eturn" in summary
+        else:
+            right = bool(summary)
+        wrong += [] if right else [function.path]
+    assert not wrong, "\n".join(wrong)
+
+
+def test_what_a_function_raises_is_said():
+    wrong = {}
+    for function in functions():
+        if function.path.startswith("cosim.command_line."):
+            continue  # the verbs: `cosim.command_line.cli` prints what they raise
+        own = list(body(function))
+        caught = {
+            id(n) for t in own if isinstance(t, ast.Try) and t.handlers for part in t.body for n in ast.walk(part)
+        }
+        raised = [n.exc for n in own if isinstance(n, ast.Raise) and n.exc and id(n) not in caught]
+        names = {ast.unparse(e.func if isinstance(e, ast.Call) else e).split(".")[-1] for e in raised}
+        types = {name for name in names if name.isidentifier() and name[0].isupper()} - UNSAID
+        if silent := {name for name in types if name not in said(function)}:
+            wrong[function.path] = silent
+    assert not wrong, shown(wrong)
+
+
+def test_physical_quantities_have_units():
+    """Parameters and what comes back: where they are listed, there; else somewhere in the docstring."""
+    wrong = {}
+    for function in functions():
+        entries = dict(section(function, Part.parameters))
+        for p in parameters(function):
+            if physical(p.name, p.annotation) and not UNIT.search(entries.get(p.name, said(function))):
+                wrong[f"{function.path}({p.name})"] = entries.get(p.name, said(function))
+        back = " ".join(text for _, text in section(function, Part.returns)) or said(function)
+        if physical(function.name, function.returns) and not UNIT.search(back):
+            wrong[function.path] = back
+    assert not wrong, shown(wrong)
+
+
+def test_fields_and_properties_that_are_physical_quantities_have_units():
+    """In a comment, in the class's section of attributes or parameters, or in the property's docstring."""
+    wrong = {}
+    for attribute in everything():
+        field = isinstance(attribute, griffe.Attribute) and attribute.parent.is_class
+        if field and physical(attribute.name, attribute.annotation):
+            about = dict(section(attribute.parent, Part.attributes) + section(attribute.parent, Part.parameters))
+            words = " ".join([said(attribute), comment_on(attribute), about.get(attribute.name, "")])
+            if not UNIT.search(words):
+                wrong[attribute.path] = words
+    assert not wrong, shown(wrong)
+
+
+def test_the_rule_of_units_can_fail():
+    for words in ("", "A thruster fails.", "Where the vehicle is, shape (3,).", "a thing of its own", "(6, 6)"):
+        assert not UNIT.search(words), words
+    for words in ("[m]", "m, NED", "# s", "(3,) m/s", "float [N m]", "[-]", "shape (6,) [N, N m]", "in seconds"):
+        assert UNIT.search(words), words

@@ -1,0 +1,188 @@
+"""Who may import whom, what stays out until it is asked for, and how long a file is."""
+
+import graphlib
+import subprocess
+import sys
+from collections import Counter, defaultdict
+
+import pytest
+
+from tests.architecture.modules import FILES, PACKAGES, ROOT, imported
+from tests.architecture.rooms import ROOMS, arrows, imports_of, room_of, said_of
+
+MAY_IMPORT = {
+    "fuzzy_arbiter": {"fuzzy_arbiter"},
+    "plant_fmu": {"plant_fmu"},
+    "controller": {"controller"},
+    "cosim": set(PACKAGES),
+}
+
+# the rooms of cosim from the ground up: each imports rooms above it in this list, and none below
+FLOORS = (
+    *("io", "scenario", "simulation", "results", "batch", "ssp", "replay", "mavlink", "report", "export", "live"),
+    *("precheck", "run", "sitl", "campaigns", "command_line"),
+)
+MOST_MODULES = 20  # in one room
+MOST_AT_THE_ROOT = 8  # modules of cosim
+
+# what is optional, heavy or foreign to the rest: the one place that takes it
+ONE_PLACE = {
+    "casadi": {"plant_fmu.importers.casadi_import"},
+    "dask": {"cosim.campaigns.workers.cluster"},
+    "distributed": {"cosim.campaigns.workers.cluster"},
+    "ecospy": {"plant_fmu.importers.ecos"},
+    "fmu_manipulation_toolbox": {"plant_fmu.importers.toolbox"},
+    "foxglove_schemas_protobuf": {"cosim.export.as_mcap", "cosim.export.foxglove_scene"},
+    "google": {"cosim.export.foxglove_scene", "cosim.export.protobuf_table"},
+    "libcosimpy": {"plant_fmu.importers.libcosim"},
+    "llvmlite": {"controller.jit.stack_array", "controller.jit.bound_call", "cosim.batch.c_calls"},
+    "mcap": {"cosim.export.as_mcap"},
+    "mcap_protobuf": {"cosim.export.as_mcap"},
+    "numba": {
+        *(
+            "controller.jit.function_pointer",
+            "controller.jit.jit",
+            "controller.jit.stack_array",
+            "controller.regions.kinds",
+        ),
+        *(
+            "controller.jit.bound_call",
+            "cosim.batch.fused_loop",
+            "cosim.simulation.memberships",
+            "cosim.batch.c_calls",
+            "cosim.run.progress",
+        ),
+        "fuzzy_arbiter.compiled",
+    },
+    "pymavlink": {"cosim.mavlink.wire.dialect"},
+    "rerun": {"cosim.export.as_rrd"},
+    "rich": {"cosim.command_line.watch", "cosim.live.watching.bars", "cosim.live.watching.picture"},
+    "shtab": {"cosim.command_line.completion"},
+    "skfuzzy": {"fuzzy_arbiter.engines.scikit"},
+    "tomli_w": {"cosim.scenario.toml_text"},
+    "websockets": {"cosim.live.server", "cosim.live.watching.sources"},
+}
+
+# of these, what the base install does not bring, and the modules that cannot be imported without it
+OPTIONAL = {
+    "casadi",
+    "dask",
+    "distributed",
+    "ecospy",
+    "fmu_manipulation_toolbox",
+    "foxglove_schemas_protobuf",
+}
+OPTIONAL |= {"google", "libcosimpy", "mcap", "mcap_protobuf", "pandas", "rerun"}
+WANT_AN_EXTRA = {
+    "cosim.export.as_mcap",
+    "cosim.export.as_rrd",
+    "cosim.export.foxglove_scene",
+    "cosim.export.protobuf_table",
+    "plant_fmu.importers.casadi_import",
+    "plant_fmu.importers.ecos",
+    "plant_fmu.importers.libcosim",
+    "plant_fmu.importers.toolbox",
+}
+
+# what shows a run while it goes on: a run that nobody watches does without
+OF_SHOWING = {"pymavlink", "rich", "websockets"}
+
+_IMPORT_ALL = """
+import importlib, sys
+
+class Missing:
+    def find_spec(self, name, path=None, target=None):
+        if name.split(".")[0] in {optional!r}:
+            raise ModuleNotFoundError(name)
+
+sys.meta_path.insert(0, Missing())
+for module in {modules!r}:
+    try:
+        importlib.import_module(module)
+    except ImportError:
+        print(module)
+"""
+
+
+def test_imports_run_one_way():
+    packages = {module: {name.split(".")[0] for name in imported(module)} & set(PACKAGES) for module in FILES}
+    assert {module: used for module, used in packages.items() if not used <= MAY_IMPORT[module.split(".")[0]]} == {}
+
+
+def test_nothing_imports_itself_by_a_way_round():
+    """Import cycles, those inside functions left out: Python meets only the others."""
+    graph = {module: imported(module, at_once=True) & FILES.keys() for module in FILES}
+    graphlib.TopologicalSorter(graph).prepare()  # raises CycleError, which names the ring
+
+
+@pytest.mark.parametrize("room", ROOMS)
+def test_a_room_imports_what_its_docstring_says(room):
+    assert imports_of(room) == said_of(room)
+
+
+def test_the_rooms_of_cosim_stand_on_each_other():
+    used = arrows("cosim")
+    assert used.keys() == set(FLOORS)
+    backwards = {(one, other) for one, others in used.items() for other in others}
+    assert {(a, b) for a, b in backwards if FLOORS.index(a) <= FLOORS.index(b)} == set()
+
+
+@pytest.mark.parametrize("package", PACKAGES)
+def test_no_two_rooms_import_each_other(package):
+    graphlib.TopologicalSorter(arrows(package)).prepare()  # raises CycleError, which names the ring
+
+
+def test_rooms_hold_few_modules():
+    held = Counter(room_of(module) for module in FILES)
+    assert {room: count for room, count in held.items() if count > MOST_MODULES} == {}
+    assert held["cosim"] <= MOST_AT_THE_ROOT
+
+
+def test_the_controller_knows_neither_fmi_nor_mavlink_and_the_arbiter_no_vehicle():
+    for module in FILES:
+        if module.split(".")[0] in ("controller", "fuzzy_arbiter"):
+            assert not {name.split(".")[0] for name in imported(module)} & {"fmpy", "pymavlink"}
+
+
+def test_what_is_optional_or_heavy_is_taken_in_one_place():
+    users = defaultdict(set)
+    for module in FILES:
+        for name in imported(module):
+            users[name.split(".")[0]].add(module)
+    assert {name: users[name] for name in ONE_PLACE} == ONE_PLACE
+    assert not OPTIONAL & users.keys() - ONE_PLACE.keys(), "an optional library with no place of its own"
+
+
+@pytest.mark.slow
+def test_the_base_install_imports_all_but_what_wants_an_extra():
+    modules = [module for module in FILES if not module.endswith("__main__")]
+    code = _IMPORT_ALL.format(optional=OPTIONAL, modules=modules)
+    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
+    assert set(done.stdout.split()) == WANT_AN_EXTRA, done.stderr
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("what", "without"),
+    [
+        ("cosim", {"numpy"}),
+        (
+            "cosim.command_line.cli",
+            {"numpy", "numba", "scipy", "matplotlib", "pyarrow", "fmpy", "pandas", "msgspec", *OF_SHOWING},
+        ),
+        ("fuzzy_arbiter", {"skfuzzy", "numba", "scipy", "matplotlib", "networkx"}),
+        ("controller", {"matplotlib", "fmpy", "pyarrow", "msgspec"}),
+        ("plant_fmu", {"numba", "scipy", "matplotlib", "pyarrow"}),
+        ("cosim.scenario.scenario", {"matplotlib", "pandas", "skfuzzy", *OF_SHOWING}),
+        ("cosim.run.run", OF_SHOWING),
+    ],
+)
+def test_what_is_heavy_waits_until_it_is_asked_for(what, without):
+    code = f"import sys, {what}; print(*({without!r} & set(sys.modules)))"
+    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
+    assert done.stdout.split() == []
+
+
+def test_files_fit_in_the_head():
+    lines = {module: len(path.read_text().splitlines()) for module, path in FILES.items()}
+    assert {module: count for module, count in lines.items() if count > 400} == {}

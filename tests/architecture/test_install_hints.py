@@ -1,0 +1,92 @@
+"""What says how to install something says it by one helper, with the bounds of ``pyproject.toml``, and pip takes it."""
+
+import ast
+import re
+import shlex
+import subprocess
+import sys
+import tomllib
+
+import pytest
+
+from plant_fmu.installing import install_hint
+from tests.architecture.modules import FILES, PACKAGES, ROOT, tree_of
+
+REQUIREMENT = re.compile(r"[A-Za-z][\w.-]*>=[\d.]+")
+
+
+def required():
+    """Requirements by extra, without their markers; those of the base under ""."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    extras = {"": project["dependencies"], **project["optional-dependencies"]}
+    return {extra: {text.partition(";")[0] for text in texts} for extra, texts in extras.items()}
+
+
+def test_nothing_else_speaks_of_installing():
+    """Nor of the name of this distribution in an index, which has none there."""
+    files = [
+        path for package in PACKAGES for path in (ROOT / package).rglob("*") if path.suffix in (".py", ".html", ".txt")
+    ]
+    assert len(files) > len(FILES)
+    wrong = re.compile(r"pip3? install|subreach\[")
+    assert [str(path) for path in files if wrong.search(path.read_text(encoding="utf-8"))] == []
+
+
+def test_what_is_named_has_the_bound_that_is_tried():
+    named = {
+        (module, node.value)
+        for module, path in FILES.items()
+        for node in ast.walk(tree_of(path))
+        if isinstance(node, ast.Constant) and isinstance(node.value, str) and REQUIREMENT.fullmatch(node.value)
+    }
+    known = set().union(*required().values())
+    assert {text for _, text in named} > {"ziglang>=0.13"}
+    assert [(module, text) for module, text in named if text not in known] == []
+
+
+def test_what_an_extra_brings_is_named_whole():
+    from cosim.export import FORMATS
+    from plant_fmu.importers import IMPORTERS
+
+    extras = required()
+    assert set(FORMATS["mcap"].needs) == extras["mcap"]
+    assert set(FORMATS["rrd"].needs) == extras["rerun"]
+    named = {text for importer in IMPORTERS for text in importer.packages} - extras[""]
+    assert named | {text for text in extras["importers"] if text.startswith("tbb")} == extras["importers"]
+
+
+def test_pip_takes_it_from_a_shell(monkeypatch):
+    """For what is there already, without a network."""
+    monkeypatch.setenv("PIP_NO_INDEX", "1")
+    done = subprocess.run(install_hint("numpy>=2.1.3", "rich>=13"), shell=True, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert re.findall(r"already satisfied: (\S+)", done.stdout)[:2] == ["numpy>=2.1.3", "rich>=13"]
+
+
+@pytest.mark.parametrize("short", [True, False])
+@pytest.mark.parametrize("name", ["python", "python3"])
+@pytest.mark.parametrize("folder", ["env", "my env"])
+def test_the_python_is_the_one_that_runs(monkeypatch, tmp_path, folder, name, short):
+    """Its short name stands there where the shell knows it: in an environment that is active."""
+    bins = tmp_path / folder / "bin"
+    bins.mkdir(parents=True)
+    for link in ("python", "python3"):
+        (bins / link).symlink_to(sys.executable)
+    monkeypatch.setattr(sys, "executable", str(bins / name))
+    monkeypatch.setenv("PATH", str(bins if short else tmp_path))
+    shown = "python" if short else str(bins / name)
+    assert shlex.split(install_hint("mcap>=1.2")) == [shown, "-m", "pip", "install", "mcap>=1.2"]
+
+
+def test_another_python_of_the_same_folder_is_another(monkeypatch, tmp_path):
+    for name in ("python", "python3"):
+        (tmp_path / name).touch(0o755)
+    monkeypatch.setattr(sys, "executable", str(tmp_path / "python3"))
+    monkeypatch.setenv("PATH", str(tmp_path))
+    assert install_hint("mcap>=1.2").startswith(f"{tmp_path / 'python3'} -m pip")
+
+
+def test_a_place_on_windows_stands_as_it_is(monkeypatch):
+    monkeypatch.setattr("shutil.which", lambda name: None)
+    monkeypatch.setattr(sys, "executable", r"C:\env\Scripts\python.exe")
+    assert install_hint("mcap>=1.2") == r'C:\env\Scripts\python.exe -m pip install "mcap>=1.2"'

@@ -1,0 +1,45 @@
+"""What is public changes when somebody means it to."""
+
+import difflib
+import importlib
+import importlib.util
+import re
+
+import griffe
+import pytest
+
+from tests.architecture import public
+from tests.architecture.modules import ROOT
+
+REFERENCE = ROOT / "docs" / "reference"
+
+
+def test_what_is_public_is_what_is_written_down():
+    written = public.WRITTEN.read_text().splitlines()
+    changed = list(difflib.unified_diff(written, public.text().splitlines(), "written", "now", lineterm="", n=0))
+    assert not changed, "if it is meant so, `python -m tests.architecture.public` writes it anew:\n" + "\n".join(
+        changed
+    )
+
+
+def test_public_names_are_there():
+    without = () if importlib.util.find_spec("rich") else ("cosim.live.watching",)
+    homes = [name.rpartition(".")[::2] for name in public.names()]
+    gone = [home for home in homes if home[0] not in without and not hasattr(importlib.import_module(home[0]), home[1])]
+    assert gone == []
+
+
+@pytest.mark.skipif(not REFERENCE.is_dir(), reason="the pages of the reference are not there")
+def test_the_reference_shows_what_is_public():
+    shown = {name for page in REFERENCE.glob("*.md") for name in re.findall(r"^::: ([\w.]+)", page.read_text(), re.M)}
+    behind = {public.target(name).path for name in shown}
+    assert behind == {public.target(name).path for name in public.names()}
+
+
+def test_nothing_public_takes_keywords_that_nobody_knows():
+    """So Python itself refuses an unknown one."""
+    for name in public.names():
+        what = public.target(name)
+        for function in [what, *public.members(what)] if what.is_class else [what] if what.is_function else []:
+            if function.is_function or function.is_class:
+                assert all(p.kind is not griffe.ParameterKind.var_keyword for p in function.parameters), function.path

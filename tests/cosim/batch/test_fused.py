@@ -1,0 +1,166 @@
+"""The fused loop flies as the readable master does, to the last bit, whatever the law."""
+
+import numpy as np
+import pytest
+
+from controller import LAWS
+from cosim.batch.fused import FusedFlyer
+from cosim.batch.outcome import OUTCOME
+from cosim.batch.variation import Variation
+from cosim.errors import RunError
+from cosim.results.record import load_record
+from cosim.results.recorder import Recorder
+from cosim.results.summary import summarise
+from cosim.scenario.scenario import load_scenario
+from cosim.simulation.master import Master
+
+CLOSED = 'arbiter.engine="closed"'
+BRISK = [CLOSED, "time.duration=12.0", "time.step=0.01", "time.control=0.02", "time.arbiter=0.01"]
+THROUGH = {"wrench": "wrench", "thrusters": "thrusters"}
+
+
+def scenario_of(law, *more):
+    through = THROUGH[LAWS[law].output]
+    return load_scenario("paper", [CLOSED, f"law.name={law}", f"actuation.through={through}", *more])
+
+
+class Rows:
+    def __init__(self):
+        self.rows = []
+
+    def observe(self, k, row):
+        self.rows.append(row.copy())
+
+
+def recorded(scenario):
+    rows = Rows()
+    with Master(scenario) as master:
+        master.run([rows])
+        return np.array(rows.rows), master.signals
+
+
+def assert_same_flight(scenario):
+    rows, signals = recorded(scenario)
+    with FusedFlyer(Variation(scenario, [])) as flyer:
+        _, trace = flyer.fly_one(scenario, trace=True)
+    decided = rows[:-1][:: scenario.control_every]
+    inputs = [c.name for c in signals.columns].index("thrust[1]")
+    direct = scenario.actuation.through == "wrench"
+    first = signals.index("wrench.X") if direct else inputs
+    n = 6 if direct else scenario.vehicle.n_thrusters
+    at = signals.index("position.x")
+    np.testing.assert_array_equal(trace[:, 1:14], decided[:, at : at + 13])
+    np.testing.assert_array_equal(trace[:, 20 : 20 + n], decided[:, first : first + n])
+    at = signals.index("weight.obstacle")
+    np.testing.assert_array_equal(trace[:, 17:20], decided[:, at : at + 3])
+    assert np.abs(trace[:, 20 : 20 + n]).max() > 1.0
+
+
+def test_a_short_flight_of_the_printed_law_is_the_masters_to_the_last_bit():
+    assert_same_flight(scenario_of("printed", *BRISK, "limit.force=150.0", "limit.time_constant=0.1"))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("law", sorted(LAWS))
+def test_the_papers_run_is_the_masters_to_the_last_bit(law):
+    assert_same_flight(scenario_of(law))
+
+
+NOISY = [
+    "sensing.position_noise=0.05", "sensing.velocity_noise=0.02", "sensing.seed=3", "sensing.dead_from=3.0",
+    "sensing.dead_for=1.0",
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("frozen", ["true", "false"])
+def test_noise_and_gaps_in_what_is_measured_are_the_masters(frozen):
+    # the printed law, told nothing, asks for nothing that a plant takes: it is told the last values, or does not steer
+    law = "printed" if frozen == "true" else "pd"
+    gap = [] if frozen == "true" else ["sensing.dead_for=0.0"]
+    assert_same_flight(scenario_of(law, *BRISK, *NOISY, f"sensing.frozen={frozen}", "limit.force=150.0", *gap))
+
+
+@pytest.mark.parametrize("told", ["true", "false"])
+def test_thrusters_that_fail_are_the_masters(told):
+    failures = "failures=[{thruster=3, time=2.0}, {thruster=6, time=4.005}]"
+    given = [*BRISK, "actuation.through=thrusters", failures, f"tell_failures={told}"]
+    assert_same_flight(load_scenario("paper", [*given, "law.name=pd"]))
+
+
+SHIPPED = ("dense-field", "depth-transit", "docking", "moving-obstacle", "pipe-inspection", "paper-limited")
+
+
+@pytest.mark.parametrize(
+    "name", [SHIPPED[3], *(pytest.param(n, marks=pytest.mark.slow) for n in SHIPPED if n != SHIPPED[3])]
+)
+def test_an_outcome_is_what_the_summary_of_a_recorded_run_says(name, tmp_path):
+    scenario = load_scenario(name, [CLOSED, "time.duration=20.0"])
+    with Master(scenario) as master:
+        recorder = Recorder(tmp_path, master.signals.columns)
+        master.run([recorder])
+        recorder.close()
+    said = summarise(scenario, load_record(tmp_path), "completed", None)
+    with FusedFlyer(Variation(scenario, [])) as flyer:
+        outcome, _ = flyer.fly_one(scenario)
+
+    def same(field, expected):
+        expected = np.nan if expected is None else expected
+        assert outcome[field] == pytest.approx(expected, rel=1e-9, abs=1e-12, nan_ok=True), field
+
+    for field in ("reached", "reach_time", "settled", "settle_time", "closest_to_goal", "effort", "max_force"):
+        same(field, said[field])
+    same("max_speed", said["max_speed"])
+    hard = [said["min_clearance"][r] for r in said["hard"] if said["clearance_unit"][r] == "m"]
+    same("min_clearance", min(hard, default=np.inf))
+    assert outcome["violated"] == bool(said["hard_violated"])
+    for i, axis in enumerate("xyz"):
+        same(f"final_{axis}", said["final_position"][i])
+    for i in range(4):
+        same(f"phi{i + 1}", said["estimate_final"][i])
+    assert np.isnan(outcome["stopped_at"])
+
+
+def test_a_batch_flies_each_row_as_it_would_alone_and_names_what_is_refused():
+    scenario = scenario_of("printed", *BRISK, "limit.force=150.0")
+    variation = Variation(scenario, ["initial.position.1", "plant.parameters.mass"])
+    mass = variation.number("plant.parameters.mass")
+    values = np.array([[0.0, mass], [0.3, 1e9], [0.3, -1.0], [0.3, 1.1 * mass], [np.nan, mass]])
+    with FusedFlyer(variation) as flyer:
+        flown = flyer.fly(values, np.arange(5))
+        alone = flyer.fly(values[3:4], np.array([3]))
+    assert sorted(flown.refused) == [1, 2, 4] and "mass" in flown.refused[2] and "position" in flown.refused[4]
+    assert flown.outcomes[3].tobytes() == alone.outcomes[0].tobytes() != flown.outcomes[0].tobytes()
+    assert np.isnan(flown.outcomes[2]["effort"]) and not flown.outcomes[2]["reached"]
+    assert flown.outcomes.dtype == OUTCOME
+
+
+def test_a_plant_that_refuses_a_step_ends_the_flight_there():
+    given = [
+        *BRISK,
+        "plant.substep=0.01",
+        "plant.parameters.quadratic_damping[1]=1e9",
+        "initial.velocity=[1,0,0,0,0,0]",
+    ]
+    scenario = scenario_of("printed", *given)
+    with FusedFlyer(Variation(scenario, [])) as flyer:
+        (outcome,) = flyer.fly(np.zeros((1, 0)), np.zeros(1, int)).outcomes
+    assert outcome["stopped_at"] == 0.0 and not outcome["reached"]
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ('arbiter.engine="grid"', "arbiter.engine is 'grid', expected 'closed' .*--set arbiter.engine=closed"),
+        ("plant.fmi=2", "plant.fmi is 2, expected 3"),
+        ('master.order="jacobi"', "master.order is 'jacobi'"),
+        ("commands.enabled=true", "commands.enabled is True"),
+    ],
+)
+def test_what_the_loop_cannot_do_is_refused(change, words):
+    with pytest.raises(RunError, match=words):
+        FusedFlyer(Variation(load_scenario("paper", [CLOSED, change]), []))
+
+
+def test_the_version_of_the_fmu_cannot_vary_for_one_is_loaded_for_all_rows():
+    with pytest.raises(RunError, match=r"plant\.fmi varies, expected 3"):
+        FusedFlyer(Variation(load_scenario("paper", [CLOSED]), ["plant.fmi"]))

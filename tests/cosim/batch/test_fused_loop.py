@@ -1,0 +1,302 @@
+"""Flights: the compiled loop does what a readable one does, and a plant that flew before flies as a new one."""
+
+import ctypes
+import math
+import signal
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from controller import LAWS, Allocation, PrintedLaw, VehicleState
+from cosim.batch import fused_loop
+from cosim.batch.c_calls import Clock, advance, seconds
+from cosim.campaigns.scenes.flyer import Conditions, SceneFlyer
+from cosim.campaigns.scenes.scene import Ball, Failure, Obstacle, plant_values, read_scenes, told
+from cosim.errors import RunError, ScenarioError
+from cosim.scenario.scenario import CRITERIA
+from cosim.scenario.vehicle_model import vehicle_model
+from fuzzy_arbiter import Arbiter, ramp
+from plant_fmu import Plant, PlantError, load_vehicle
+from plant_fmu.running.native import Native
+
+SCENES = Path(__file__).parents[2] / "data" / "scenes"
+PLAIN, HARD = (list(read_scenes(SCENES / f"{kind}.jsonl")) for kind in ("plain", "hard"))
+SHORT = Conditions(duration=8.0)
+
+
+@pytest.fixture(scope="module")
+def flyer():
+    with SceneFlyer("printed", SHORT) as flyer:
+        yield flyer
+
+
+class Readable:
+    """A flight in plain Python, over the FMU's Python interface."""
+
+    def __init__(self, scene, conditions, law="printed"):
+        self.scene, self.conditions = scene, conditions
+        self.vehicle = load_vehicle("odin")
+        self.known = told(scene)
+        n = self.known.regions.kinds.size
+        gains, level = LAWS[law].gains_type(), np.array([1.0, 0.0, 0.0, 0.0])
+        self.law = LAWS[law].for_vehicle(vehicle_model(self.vehicle), gains, level, conditions.control, n)
+        self.values, self.gradients, self.turnings = np.zeros(n), np.zeros((n, 3)), np.zeros((n, 3))
+        self.clearances = np.zeros(n)
+
+    def fly(self):
+        scene, c = self.scene, self.conditions
+        arbiter = Arbiter()
+        v = self.vehicle
+        allocation = Allocation(v.thruster_matrix, v.thrust_min, v.thrust_max)
+        noise = np.random.default_rng([scene.seed, 1]).standard_normal((round(c.duration / c.control), 6))
+        wrench, forces, before, weights = np.zeros(6), np.zeros(8), np.zeros(8), np.zeros(len(self.clearances))
+        step, steps = c.control / c.plant_steps, round(c.duration / c.control)
+        failure = scene.failed_thruster
+        positions, effort, variation, rows = [], 0.0, 0.0, []
+        with Plant(v) as plant:
+            plant.set(plant_values(scene, v, step))
+            plant.initialise()
+            positions.append(self.position(plant))
+            for k in range(steps):
+                if failure and (k - 1) * c.control < failure.time <= k * c.control:
+                    plant[f"thrust_effectiveness[{failure.index}]"] = 0.0
+                state = VehicleState(
+                    self.position(plant) + scene.noise.position * noise[k, :3],
+                    np.array([plant[f"quaternion.e{i}"] for i in range(4)]),
+                    np.array([plant[f"velocity.{axis}"] for axis in "uvwpqr"]),
+                    np.ones(8),
+                )
+                state.velocity_body[:3] += scene.noise.velocity * noise[k, 3:]
+                for regions in (self.known.goal, self.known.regions):
+                    regions.move_to(plant.time)
+                self.known.regions.evaluate(
+                    state.position, state.quaternion, self.values, self.gradients, self.turnings, self.clearances
+                )
+                memberships = [0.0] * len(CRITERIA)
+                for criterion, clearance in zip(self.known.criteria, self.clearances, strict=True):
+                    memberships[criterion] = max(memberships[criterion], ramp(clearance, c.ramp))
+                weights[:] = np.array(arbiter(memberships))[self.known.criteria]
+                if self.law.output == "wrench":
+                    self.law.step(state, self.known.goal, self.known.regions, weights, wrench)
+                    allocation(wrench, forces)
+                else:
+                    self.law.step(state, self.known.goal, self.known.regions, weights, forces)
+                rows.append(np.concatenate([self.position(plant), state.position, forces]))
+                variation += np.abs(forces - before).sum()
+                before[:] = forces
+                for i in range(8):
+                    plant[f"thrust[{i + 1}]"] = forces[i]
+                for _ in range(c.plant_steps):
+                    plant.step(step)
+                    positions.append(self.position(plant))
+                    effort += sum(abs(plant[f"thruster_force[{i + 1}]"]) for i in range(8)) * step
+        return np.array(rows), np.array(positions), effort, variation
+
+    @staticmethod
+    def position(plant):
+        return np.array([plant[f"position.{axis}"] for axis in "xyz"])
+
+
+def distances(scene, positions, step):
+    """Clearance of each instant from formulas of its own: spheres that drift, and a band of depths."""
+    time = np.arange(len(positions))[:, None] * step
+    of = [
+        np.linalg.norm(positions - (np.array(o.centre) + time * np.array(o.velocity)), axis=1) - o.radius
+        for o in scene.obstacles
+    ]
+    shallow, deep = scene.depth_band
+    return np.min([*of, positions[:, 2] - shallow, deep - positions[:, 2]], axis=0)
+
+
+@pytest.mark.parametrize("scene", [PLAIN[0], HARD[1]], ids=["plain", "hard"])
+@pytest.mark.parametrize(
+    "law",
+    ["printed", *(pytest.param(law, marks=pytest.mark.slow) for law in sorted(LAWS) if law != "printed")],
+)
+def test_compiled_loop_flies_as_the_readable_one(law, scene):
+    if scene.failed_thruster:
+        scene = replace(scene, failed_thruster=Failure(scene.failed_thruster.index, 3.01))
+    with SceneFlyer(law, SHORT) as flyer:
+        score, trace = flyer.fly(scene, trace=True)
+    rows, positions, effort, variation = Readable(scene, SHORT, law).fly()
+    np.testing.assert_array_equal(trace[:, 1:4], rows[:, :3])  # to the last bit
+    np.testing.assert_array_equal(trace[:, 14:17], rows[:, 3:6])
+    np.testing.assert_array_equal(trace[:, 20:28], rows[:, 6:])
+    assert score.effort == pytest.approx(effort, rel=1e-12)
+    assert score.thrust_variation == pytest.approx(variation, rel=1e-12)
+    assert score.min_clearance == pytest.approx(distances(scene, positions, 0.01).min(), abs=1e-12)
+    assert score.failed_step == -1 and 0.0 < score.worst_step < 1.0
+
+
+def test_a_plant_that_flew_before_flies_as_a_new_one(flyer):
+    flyer.fly(HARD[2])
+    again, trace = flyer.fly(HARD[0], trace=True)
+    with SceneFlyer("printed", SHORT) as new:
+        fresh, expected = new.fly(HARD[0], trace=True)
+    np.testing.assert_array_equal(trace, expected)
+    assert again._replace(worst_step=0.0) == fresh._replace(worst_step=0.0)
+
+
+def test_reached_means_inside_for_the_last_seconds_and_reach_time_is_since_when(flyer):
+    around = replace(PLAIN[0], goal=Ball(PLAIN[0].start, 50.0))  # it starts inside and never leaves
+    score, _ = flyer.fly(around)
+    assert score.reach_time == 0.0 and not score.reached  # 8 s are less than 10
+    with SceneFlyer("printed", replace(SHORT, settled=8.0)) as patient:
+        assert patient.fly(around)[0].reached
+    with SceneFlyer("printed", replace(SHORT, settled=8.001)) as impatient:
+        assert not impatient.fly(around)[0].reached
+
+
+def test_reach_time_is_the_first_instant_of_the_stay(flyer):
+    scene = replace(PLAIN[0], goal=Ball(PLAIN[0].goal.centre, 9.0), obstacles=PLAIN[0].obstacles[:1])
+    score, _ = flyer.fly(scene)
+    _, positions, _, _ = Readable(scene, SHORT).fly()
+    outside = np.linalg.norm(positions - np.array(scene.goal.centre), axis=1) > 9.0
+    assert outside[0] and not outside[-1]
+    assert score.reach_time == pytest.approx((np.flatnonzero(outside)[-1] + 1) * 0.01, abs=1e-9)
+
+
+def test_the_start_is_scored_too(flyer):
+    x, y, z = PLAIN[0].start
+    gone_at_once = Obstacle((x + 0.5, y, z), 0.4, velocity=(1000.0, 0.0, 0.0))
+    scene = replace(PLAIN[0], depth_band=(-90.0, 90.0), obstacles=(gone_at_once,))
+    assert flyer.fly(scene)[0].min_clearance == pytest.approx(0.1, abs=1e-12)
+
+
+# ---- what fails ----
+
+
+class _Loose(PrintedLaw):
+    """Gives up after 50 steps."""
+
+    name = "loose"
+    calls = 0
+
+    @staticmethod
+    def function(state, goal, regions, weights, gains, memory, forces):
+        forces[:] = math.nan if _Loose.calls >= 50 else 0.0
+        _Loose.calls += 1
+
+
+@pytest.fixture
+def loose(monkeypatch):
+    monkeypatch.setitem(LAWS, "loose", _Loose)
+    monkeypatch.setattr(fused_loop, "_compiled", fused_loop._plain)
+    monkeypatch.setattr(_Loose, "calls", 0)
+    with SceneFlyer("loose", SHORT) as flyer:
+        yield flyer
+
+
+def test_a_law_that_asks_for_no_number_ends_the_flight_there_and_not_the_next(loose, monkeypatch):
+    failed, trace = loose.fly(PLAIN[0], trace=True)
+    assert failed.failed_step == 100 and not failed.reached and failed.reach_time == math.inf
+    assert trace[49, 0] == pytest.approx(0.98) and not trace[51:].any()
+    monkeypatch.setattr(_Loose, "calls", -1000)
+    assert loose.fly(PLAIN[1])[0].failed_step == -1
+    monkeypatch.setattr(_Loose, "calls", 50)
+    assert loose.fly(PLAIN[0])[0].failed_step == 0
+    with pytest.raises(PlantError) as refused:
+        loose.fly(replace(PLAIN[0], current=(1e300, 0.0, 0.0)))
+    assert "current" in str(refused.value) and "thrust" not in str(refused.value)  # nothing of what was before
+
+
+@pytest.mark.parametrize(
+    ("change", "error", "words"),
+    [
+        ({"weight_minus_buoyancy": 1e5}, ScenarioError, "weight_minus_buoyancy is 100000.0, expected less than"),
+        ({"failed_thruster": Failure(9, 5.0)}, ScenarioError, "failed_thruster.index is 9, expected one of the 8"),
+        ({"current": (1e300, 0.0, 0.0)}, PlantError, "current"),
+        ({"righting_moment": 1e300}, PlantError, "r_B"),
+    ],
+)
+def test_a_plant_that_cannot_be_is_refused_and_the_next_scene_flies(flyer, change, error, words):
+    expected = flyer.fly(PLAIN[0])[0]
+    with pytest.raises(error, match=words):
+        flyer.fly(replace(PLAIN[0], **change))
+    assert flyer.fly(PLAIN[0])[0]._replace(worst_step=0.0) == expected._replace(worst_step=0.0)
+
+
+def test_a_failure_after_the_end_is_none(flyer):
+    late = replace(PLAIN[0], failed_thruster=Failure(1, 1e300))
+    assert flyer.fly(late)[0]._replace(worst_step=0.0) == flyer.fly(PLAIN[0])[0]._replace(worst_step=0.0)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "words"),
+    [({"duration": math.nan}, "duration"), ({"control": 0.0}, "control"), ({"plant_steps": 0}, "0 plant steps")],
+)
+def test_conditions_that_cannot_be(wrong, words):
+    with pytest.raises(RunError, match=words):
+        Conditions(**wrong)
+
+
+def test_an_unknown_law_is_named_with_the_known_ones():
+    with pytest.raises(RunError, match=r"law is 'prinetd', expected one of .*printed"):
+        SceneFlyer("prinetd")
+
+
+@pytest.mark.filterwarnings("ignore:Exception ignored")
+@pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="needs an alarm clock")
+def test_a_signal_in_mid_flight_raises_after_it(flyer):
+    class Alarmed(BaseException):  # as KeyboardInterrupt is, which nobody takes for an error of theirs
+        pass
+
+    def ring(*_):
+        raise Alarmed
+
+    flyer.fly(HARD[0])  # Numba's compiler has callbacks, and what is raised in one is lost
+    caught = 0
+    before = signal.signal(signal.SIGVTALRM, ring)  # SIGALRM is that of the time limit of tests
+    try:
+        for _ in range(10):
+            try:
+                signal.setitimer(signal.ITIMER_VIRTUAL, 0.004)
+                for _ in range(200):
+                    flyer.fly(HARD[0])
+            except Alarmed:
+                caught += 1
+    finally:
+        signal.setitimer(signal.ITIMER_VIRTUAL, 0.0)
+        signal.signal(signal.SIGVTALRM, before)
+    assert caught >= 8  # what is raised in a finaliser is lost, too
+    assert flyer.fly(HARD[0])[0].failed_step == -1
+
+
+# ---- C functions ----
+
+DO_STEP = ctypes.CFUNCTYPE(
+    ctypes.c_int, ctypes.c_void_p, ctypes.c_double, ctypes.c_double, ctypes.c_bool,
+    *[ctypes.POINTER(ctypes.c_bool)] * 3, ctypes.POINTER(ctypes.c_double),
+)  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("status", "ends", "goes_on"), [(0, False, True), (1, False, True), (3, False, False), (0, True, False)]
+)
+def test_do_step_gets_its_arguments_and_its_results_are_heeded(status, ends, goes_on):
+    came = []
+
+    @DO_STEP
+    def do_step(instance, now, step, forgets, event, terminate, early, last):
+        came.append((instance, now, step, forgets))
+        event[0], terminate[0], early[0], last[0] = True, ends, True, now + step
+        return status
+
+    none = np.zeros(0)
+    address = ctypes.cast(do_step, ctypes.c_void_p).value
+    results = np.zeros(4, np.int64)
+    native = Native(1234, 0, 0, address, np.zeros(0, np.uint32), none, np.zeros(0, np.uint32), none, results)
+    assert advance(native, 1.5, 0.25) == goes_on
+    assert came == [(1234, 1.5, 0.25, True)]
+    assert results[3:].view(float)[0] == 1.75
+
+
+def test_the_clock_goes_with_pythons():
+    import time
+
+    clock, room = Clock().numbers, np.zeros(2, np.int64)
+    seconds(clock, room)
+    before, mine, after = time.monotonic(), seconds(clock, room), time.monotonic()
+    assert before - 1e-6 <= mine <= after + 1e-6

@@ -1,0 +1,67 @@
+"""The library of the lanes: built once, whole, and anew where it is damaged."""
+
+import logging
+
+import platformdirs
+import pytest
+
+from cosim.batch import lanes_library as module
+from cosim.batch.lanes_library import lanes_library
+from plant_fmu import BuildError, load_vehicle
+
+QUICK = ("-O1",)
+
+
+@pytest.fixture
+def cache(tmp_path, monkeypatch):
+    lanes_library.cache_clear()
+    monkeypatch.setattr(platformdirs, "user_cache_dir", lambda name: str(tmp_path / name))
+    return tmp_path / "subreach" / "lanes"
+
+
+def test_without_a_compiler_one_line_says_so(cache, monkeypatch):
+    monkeypatch.setenv("CC", "no-such-compiler")
+    with pytest.raises(BuildError, match="no C compiler: CC is 'no-such-compiler'"):
+        lanes_library(load_vehicle("odin"))
+    assert not cache.exists()
+
+
+def test_a_compiler_that_fails_leaves_nothing(cache, monkeypatch):
+    monkeypatch.setattr(module, "_files", lambda vehicle, beside: {"many_bad.c": b"no C"})
+    with pytest.raises(BuildError, match="failed"):
+        lanes_library(load_vehicle("odin"))
+    assert not cache.exists() or not list(cache.iterdir())
+
+
+@pytest.mark.slow
+def test_it_is_built_once_and_anew_where_it_is_damaged(cache, tmp_path, monkeypatch):
+    built = []
+    compile_library = module.compile_library
+    monkeypatch.setattr(module, "compile_library", lambda *a: (built.append(a[4].name), compile_library(*a)))
+
+    def load():
+        lanes_library.cache_clear()
+        assert lanes_library(load_vehicle("odin"), QUICK).lanes_count() in (4, 8)
+
+    load()
+    load()
+    library, checksum = sorted(cache.iterdir())
+    assert built == [library.name]
+    # elsewhere, for whoever has loaded a file does not look at it again
+    elsewhere = tmp_path / "elsewhere" / "subreach" / "lanes"
+    monkeypatch.setattr(platformdirs, "user_cache_dir", lambda name: str(tmp_path / "elsewhere" / name))
+    elsewhere.mkdir(parents=True)
+    (elsewhere / library.name).write_bytes(library.read_bytes()[:1000])
+    (elsewhere / checksum.name).write_bytes(checksum.read_bytes())
+    load()
+    assert built == [library.name] * 2 and sorted(p.name for p in elsewhere.iterdir()) == [library.name, checksum.name]
+    assert (elsewhere / library.name).stat().st_size > 1000
+
+
+@pytest.mark.slow
+def test_where_there_is_no_place_for_it_it_serves_the_process(cache, caplog):
+    cache.parent.mkdir()
+    cache.write_text("a file, no folder")
+    with caplog.at_level(logging.WARNING):
+        assert lanes_library(load_vehicle("odin"), QUICK).lanes_count() in (4, 8)
+    assert "built for this process alone" in caplog.text

@@ -1,0 +1,185 @@
+"""Scenes: read line by line, refused with the line and the key, and told to the law without what it must not know."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from controller import LAWS, PrintedLaw
+from cosim.batch import fused_loop
+from cosim.campaigns.scenes.flyer import Conditions, SceneFlyer
+from cosim.campaigns.scenes.scene import Failure, plant_values, read_scenes, told
+from cosim.errors import ScenarioError
+from plant_fmu import load_vehicle
+
+SCENES = Path(__file__).parents[3] / "data" / "scenes"
+LINE = json.loads((SCENES / "hard.jsonl").read_text().splitlines()[0])
+SCENE = next(read_scenes(SCENES / "hard.jsonl"))
+
+
+def test_a_line_is_read_whole():
+    assert SCENE.seed == LINE["seed"] and list(SCENE.start) == LINE["start"]
+    assert list(SCENE.goal.centre) == LINE["goal"]["centre"] and SCENE.goal.radius == LINE["goal"]["radius"]
+    assert [(list(o.centre), o.radius, list(o.velocity)) for o in SCENE.obstacles] == [
+        (o["centre"], o["radius"], o["velocity"]) for o in LINE["obstacles"]
+    ]
+    assert SCENE.failed_thruster == Failure(**LINE["failed_thruster"])
+    assert (SCENE.noise.position, SCENE.noise.velocity) == (0.02, 0.01)
+
+
+def test_blank_lines_are_passed_over(tmp_path):
+    file = tmp_path / "scenes.jsonl"
+    file.write_text(f"\n{json.dumps(LINE)}\n  \n{json.dumps(LINE)}")
+    assert list(read_scenes(file)) == [SCENE, SCENE]
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("nothing", "malformed"),
+        ("[1, 2]", "expected one JSON object"),
+        ("{}", "missing"),
+        ("\xff", "invalid|malformed"),
+        ('{"seed": ' + "9" * 500 + "}", "out of range|whole number|missing"),
+        ({"seed": -1}, "seed is -1"),
+        ({"seed": 2**63}, "seed"),
+        ({"seed": 1.5}, "seed"),
+        ({"obstacle": []}, "obstacle: unknown key; did you mean 'obstacles'"),
+        ({"noise": {"pos": 1.0}}, "noise.pos"),
+        ({"start": [1, 2]}, "start: expected a list of length 3"),
+        ({"start": [1, 2, 1e7]}, "start"),
+        ({"goal": {"centre": [1, 2, 3], "radius": 0.0}}, "goal.radius"),
+        ({"obstacles": [{"centre": [1, 2, 3], "radius": -1.0}]}, "obstacles.0.radius is -1.0"),
+        ({"obstacles": [{"centre": [1, 2, 3], "radius": 1.0, "velocity": [1e9, 0, 0]}]}, "obstacles.0.velocity"),
+        ({"depth_band": [7.0, 0.3]}, "depth_band"),
+        ({"noise": {"position": -0.1}}, "noise.position"),
+        ({"failed_thruster": {"index": 0, "time": 1.0}}, "failed_thruster.index"),
+        ({"failed_thruster": {"index": 1, "time": -1.0}}, "failed_thruster.time"),
+        ({"weight_minus_buoyancy": [1]}, "weight_minus_buoyancy"),
+        ({"current": [True, 0, 0]}, "current"),
+    ],
+)
+def test_a_line_that_is_no_scene_is_named_with_its_key(tmp_path, text, words):
+    file = tmp_path / "scenes.jsonl"
+    bad = text.encode("latin-1") if isinstance(text, str) else json.dumps(LINE | text).encode()
+    file.write_bytes(json.dumps(LINE).encode() + b"\n" + bad)
+    with pytest.raises(ScenarioError, match=f"scenes.jsonl, line 2: .*({words})") as refused:
+        list(read_scenes(file))
+    assert "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize("name", ["nowhere.jsonl", "."])
+def test_a_file_that_cannot_be_read(tmp_path, name):
+    with pytest.raises(ScenarioError, match=r"No such file|directory"):
+        list(read_scenes(tmp_path / name))
+
+
+def test_the_plant_has_what_the_scene_sets():
+    vehicle = load_vehicle("odin")
+    values = plant_values(SCENE, vehicle, 0.01)
+    assert vehicle.weight - values["buoyancy"] == pytest.approx(SCENE.weight_minus_buoyancy)
+    righting = vehicle.r_G[2] * vehicle.weight - values["r_B.z"] * values["buoyancy"]
+    assert righting == pytest.approx(SCENE.righting_moment)
+    assert not {"weight", "mass", "r_G.z"} & values.keys()  # those of the vehicle's file
+    assert [values[f"thrust_time_constant[{i}]"] for i in range(1, 9)] == [0.0] * 8
+    assert values["substep"] == 0.01
+
+
+# ---- what the law is told ----
+
+UNTOLD = {
+    "current": {"current": (0.3, -0.2, 0.1)},
+    "weight and buoyancy": {"weight_minus_buoyancy": -SCENE.weight_minus_buoyancy},
+    "righting moment": {"righting_moment": 60.0},
+    "which thruster fails": {"failed_thruster": Failure(7, 0.1)},
+    "when it fails": {"failed_thruster": Failure(LINE["failed_thruster"]["index"], 0.0)},
+    "that one fails": {"failed_thruster": None},
+}
+TOLD = {
+    "start": {"start": (0.1, 0.0, 2.0)},
+    "goal": {"goal": replace(SCENE.goal, radius=0.6)},
+    "obstacles": {"obstacles": SCENE.obstacles[1:]},
+    "depth band": {"depth_band": (0.4, 7.0)},
+    "noise": {"noise": replace(SCENE.noise, position=0.03)},
+}
+
+
+class _Spy(PrintedLaw):
+    """Notes all that it is made of, and all that it is given at each step."""
+
+    name = "spy"
+    made = ()
+    steps = ()
+
+    @classmethod
+    def for_vehicle(cls, *arguments):
+        _Spy.made, _Spy.steps = _frozen(arguments), []
+        return super().for_vehicle(*arguments)
+
+    @staticmethod
+    def function(*arguments):
+        _Spy.steps.append(_frozen(arguments))
+        PrintedLaw.function(*arguments)
+
+
+def _frozen(value):
+    """Return nested tuples and arrays as bytes, to be compared later to the last bit."""
+    if isinstance(value, tuple):
+        return tuple(_frozen(item) for item in value)
+    return value.tobytes() if isinstance(value, np.ndarray) else value
+
+
+@pytest.fixture
+def spied(monkeypatch):
+    """Return a function that flies a scene for half a second, and what the law was made of and given."""
+    monkeypatch.setitem(LAWS, "spy", _Spy)
+    monkeypatch.setattr(fused_loop, "_compiled", fused_loop._plain)
+
+    def fly(scene, tell=False):
+        with SceneFlyer("spy", Conditions(duration=0.5, tell_failures=tell)) as flyer:
+            flyer.fly(scene)
+        return _Spy.made, _Spy.steps
+
+    return fly
+
+
+@pytest.mark.parametrize("change", UNTOLD.values(), ids=UNTOLD)
+def test_what_is_untold_changes_the_plant_alone(spied, change):
+    before, after = SCENE, replace(SCENE, **change)
+    made, steps = spied(before)
+    made_after, steps_after = spied(after)
+    vehicle = load_vehicle("odin")
+    assert before != after  # and that in the plant, or in what fails
+    assert (
+        plant_values(before, vehicle, 0.01) != plant_values(after, vehicle, 0.01)
+        or before.failed_thruster != after.failed_thruster
+    )
+    assert made_after == made
+    assert steps_after[0] == steps[0]
+    for one, other in zip(steps, steps_after, strict=True):
+        state, goal, regions, _weights, gains, _memory, _forces = one
+        state_after, goal_after, regions_after, _, gains_after, _, _ = other
+        assert (goal, regions, gains, state[3]) == (goal_after, regions_after, gains_after, state_after[3])
+
+
+@pytest.mark.parametrize("change", TOLD.values(), ids=TOLD)
+def test_what_is_told_arrives(spied, change):
+    assert spied(replace(SCENE, **change)) != spied(SCENE)
+
+
+def test_the_law_hears_of_a_failure_only_when_told(spied):
+    scene = replace(SCENE, failed_thruster=Failure(3, 0.2))
+    healths = [np.frombuffer(step[0][3]) for step in spied(scene, tell=True)[1]]
+    assert all((h == 1.0).all() for h in healths[:10])
+    assert all(h.tolist() == [1, 1, 0, 1, 1, 1, 1, 1] for h in healths[10:])
+    assert all((np.frombuffer(step[0][3]) == 1.0).all() for step in spied(scene)[1])
+
+
+def test_regions_come_with_their_present_place_and_velocity(spied):
+    _, steps = spied(SCENE)
+    shifts, velocities = (np.frombuffer(steps[20][2][i]).reshape(-1, 3) for i in (4, 5))
+    np.testing.assert_allclose(shifts, 0.4 * velocities, rtol=1e-12)
+    assert velocities[0].tolist() == LINE["obstacles"][0]["velocity"] and not velocities[1:].any()
+    assert told(SCENE).regions._fields[4:6] == ("shifts", "velocities")

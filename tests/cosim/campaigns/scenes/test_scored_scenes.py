@@ -1,0 +1,39 @@
+"""The score of the deployable law over scenes that nobody tuned it on, and beside the laws it is compared with."""
+
+import msgspec
+import numpy as np
+import pytest
+
+from cosim.campaigns.scenes.flyer import Conditions, SceneFlyer
+from cosim.campaigns.scenes.generator import generate_scenes
+from cosim.campaigns.scenes.scene import Scene
+
+BASELINES = ["pd", "sun_cheah", "unarbitrated", "antonelli"]
+
+
+def scores(law, first, count, hard=False, tell=False):
+    with SceneFlyer(law, Conditions(tell_failures=tell)) as flyer:
+        scenes = generate_scenes(count, first, "hard" if hard else "plain")
+        return [flyer.fly(msgspec.json.decode(line, type=Scene))[0] for line in scenes]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("hard", "tell"), [(False, False), (True, False), (True, True)], ids=["plain", "hard", "told"])
+def test_no_scene_is_violated_and_every_goal_reached(hard, tell):
+    flown = scores("deployable", 70_000, 40, hard, tell)
+    assert min(score.min_clearance for score in flown) > 0.0
+    assert all(score.reached and score.failed_step < 0 for score in flown)
+
+
+@pytest.mark.slow
+def test_where_a_baseline_succeeds_it_is_neither_faster_nor_thriftier():
+    """Medians over the plain scenes that the baseline reaches without violation."""
+    ours = scores("deployable", 71_000, 30)
+    for law in BASELINES:
+        pairs = [
+            (b, o) for b, o in zip(scores(law, 71_000, 30), ours, strict=True) if b.reached and b.min_clearance > 0.0
+        ]
+        assert len(pairs) > 15, law
+        for what in ("reach_time", "effort"):
+            theirs, own = (np.median([getattr(score, what) for score in side]) for side in zip(*pairs, strict=True))
+            assert own <= theirs, (law, what)

@@ -1,0 +1,30 @@
+"""JSON with numbers that are none: what Python writes by itself, no other reader takes."""
+
+import json
+import math
+
+import pytest
+
+from cosim.io.strict_json import json_text, plain
+
+
+def refuse(constant):
+    raise ValueError(constant)
+
+
+@pytest.mark.parametrize("nothing", [math.nan, math.inf, -math.inf])
+def test_what_is_no_number_is_null_however_deep(nothing):
+    value = {"a": nothing, "b": [1.5, (nothing, {"c": nothing})], "d": "NaN", "e": True}
+    text = json_text(value)
+    assert json.loads(text, parse_constant=refuse) == {
+        "a": None,
+        "b": [1.5, [None, {"c": None}]],
+        "d": "NaN",
+        "e": True,
+    }
+    assert text.endswith("}\n")
+
+
+def test_numbers_keep_every_bit():
+    numbers = [0.1 + 0.2, 5e-324, -0.0, 2**60]
+    assert [*map(repr, json.loads(json_text(numbers)))] == [*map(repr, plain(numbers))] == [*map(repr, numbers)]

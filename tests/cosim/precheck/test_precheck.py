@@ -1,0 +1,240 @@
+"""`cosim check`: every shipped scenario, the paper's figures, and advice that mends what it is given for."""
+
+import json
+import math
+import re
+
+import pytest
+
+from cosim.command_line.cli import main
+from cosim.precheck.feasibility import region_findings
+from cosim.precheck.output import check_json, check_text
+from cosim.precheck.precheck import check
+from cosim.precheck.stability import gain_findings, start_weights, vehicle_findings
+from cosim.precheck.thrust import asked_finding, thrust_findings
+from cosim.scenario.scenario import load_scenario
+from cosim.scenario.toml_file import shipped_scenarios
+
+CLOSED = "arbiter.engine=closed"
+MENDED = ("law.gains.sigma_p=0.0004", "law.gains.k_p1=0.05")
+
+
+def named(found):
+    return {finding.name: finding for finding in found}
+
+
+def of_law(*overrides):
+    scenario = load_scenario("paper", [CLOSED, *overrides])
+    weights = start_weights(scenario)
+    found = [*vehicle_findings(scenario), *gain_findings(scenario, weights), asked_finding(scenario, weights)]
+    return named(found)
+
+
+def of_regions(*overrides):
+    return named(region_findings(load_scenario("paper", [CLOSED, *overrides])))
+
+
+def of_thrust(*overrides):
+    return named(thrust_findings(load_scenario("paper", [CLOSED, *overrides])))
+
+
+@pytest.fixture(scope="module")
+def paper():
+    return named(check(load_scenario("paper", [CLOSED])).findings)
+
+
+EACH_SCENARIO = [
+    name if name == "paper" else pytest.param(name, marks=pytest.mark.slow) for name in shipped_scenarios()
+]
+
+
+@pytest.mark.parametrize("name", EACH_SCENARIO)
+def test_every_shipped_scenario_can_be_checked(name):
+    result = check(load_scenario(name, [CLOSED]))
+    assert {finding.topic for finding in result.findings} == {"vehicle", "law", "regions", "thrust"}
+    for finding in result.findings:
+        assert finding.text
+        assert bool(finding.advice) == (finding.status == "fails"), finding
+    assert check_text(result).splitlines()[0].startswith(result.title)
+
+
+def test_properties_of_the_papers_vehicle(paper):
+    assert [paper[name].status for name in ("Property 1", "Property 2", "Property 3", "(12)")] == [
+        "holds", "holds", "note", "holds",
+    ]  # fmt: skip
+    assert paper["Property 3"].numbers["least_at_rest"] == 0.0
+
+
+def test_vehicle_of_the_plant_is_looked_at(paper):
+    heavy = of_law("plant.parameters.mass=300", "plant.parameters.linear_damping[1]=1")
+    assert heavy["(38) 1, 2"].numbers["position_need"] > 1.5 * paper["(38) 1, 2"].numbers["position_need"]
+    drag = [f"plant.parameters.linear_damping[{i}]=2" for i in (1, 2, 3)]
+    assert of_law(*drag)["Property 3"].status == "holds"
+
+
+def test_conditions_of_the_paper(paper):
+    first = paper["(38) 1, 2"]
+    assert first.status == "fails"
+    assert first.numbers["position_have"] == pytest.approx(0.04, abs=0.001)
+    assert first.numbers["position_need"] == pytest.approx(1.2, abs=0.01)
+    assert first.numbers["radius"] == pytest.approx(1.64, abs=0.005)
+    assert first.numbers["attitude_need_scalar"] == pytest.approx(152.0, abs=0.1)
+    assert paper["(38) 3"].status == "holds"
+    second = paper["(45) 1"]
+    assert second.status == "fails"
+    assert second.numbers["need"] == pytest.approx(7190, rel=1e-3)
+    assert (second.numbers["have"], second.numbers["have_translation"]) == (40.0, 90.0)
+    assert second.numbers["radius"] == pytest.approx(0.73, abs=0.005)
+    assert second.numbers["radius_translation"] == pytest.approx(1.04, abs=0.005)
+    assert paper["(45) 2, 3"].status == "holds"
+
+
+def test_asked_force_of_the_paper(paper):
+    finding = paper["asked at t = 0"]
+    assert finding.status == "fails"
+    assert finding.numbers["asked"] == pytest.approx(26.82e3, rel=1e-3)
+    # along (2, 0, 1) / sqrt(5): the horizontal thrusters, 76.4 N to the north, end first
+    assert finding.numbers["given"] == pytest.approx(4 * 27.0 / math.sqrt(2.0) * math.sqrt(5.0) / 2.0, rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("finding", "key"), [("(38) 1, 2", "sigma_p"), ("(45) 1", "sigma_p"), ("asked at t = 0", "k_p1")]
+)
+def test_advice_mends(paper, finding, key):
+    value = float(re.search(rf"law\.gains\.{key} to (?:about )?([0-9.e-]+[0-9])", paper[finding].advice)[1])
+    assert of_law(f"law.gains.{key}={0.98 * value}")[finding].status == "holds"
+    assert of_law(f"law.gains.{key}={1.05 * value}")[finding].status == "fails"
+
+
+def test_advice_on_attitude():
+    heavy = of_law("law.gains.sigma_a=50")
+    assert heavy["(38) 1, 2"].numbers["greatest_gradient"] == 0.0
+    value = float(re.search(r"sigma_a to ([0-9.]+[0-9])", heavy["(38) 1, 2"].advice)[1])
+    assert of_law(f"law.gains.sigma_a={value}", MENDED[0])["(38) 1, 2"].status == "holds"
+
+
+def test_start_near_the_goal_holds():
+    near = of_law("initial.position=[7.4,0,5]")
+    assert near["(38) 1, 2"].status == near["(45) 1"].status == "holds"
+
+
+def test_goals_that_are_no_sphere():
+    box = "goal={type='box',centre=[8,0,5],size=[1,1,1]}"
+    found = of_law(box)
+    assert found["(38) 1, 2"].status == "holds"  # |df/dp| = 1
+    assert found["(45) 1"].status == "holds"
+    plane = of_regions("goal={type='half_space',point=[60,0,0],normal=[-1,0,0]}", "regions=[]", "intersection=[]")
+    assert plane["way"].status == "holds"
+
+
+def test_start_inside_a_hard_region_fails_and_the_advice_leads_out():
+    found = of_regions("regions.SR1.shape.centre=[0,0,1.2]")["start, SR1"]
+    assert found.status == "fails" and found.numbers["clearance"] == pytest.approx(-0.3)
+    place = re.search(r"\((.*?)\) m", found.advice)[1]
+    assert [float(x) for x in place.split(",")] == pytest.approx([0.0, 0.0, 0.7], abs=0.01)
+
+
+def test_covered_goal_fails_and_names_who_covers_it():
+    found = of_regions("regions.SR2.shape.centre=[8,0,5.1]", "regions.SR2.shape.radius=0.8")
+    assert found["goal and regions"].status == "fails"
+    assert "SR2 alone" in found["goal and regions"].advice
+    # the farthest point of the goal from SR2's centre is 0.6 m away
+    assert found["goal and regions"].numbers["depth"] == pytest.approx(-0.1, abs=0.01)
+    relaxed = float(re.search(r"relax SR2 by ([0-9.]+) m", found["goal and regions"].advice)[1])
+    assert relaxed == pytest.approx(0.2, abs=0.02)
+    assert found["regions together"].status == "holds"
+    assert found["way"].status == "fails"
+
+
+def test_contradictory_regions_fail():
+    found = of_regions(
+        "regions.SR1.keep=in",
+        "regions.SR2.keep=in",
+        "intersection=[]",
+        "regions.SR2.shape.centre=[2,0,4.2]",
+        "regions.SR3.shape.depth=20",
+    )
+    assert found["regions together"].status == "fails"
+    assert found["regions together"].numbers["depth"] == pytest.approx(-0.7, abs=1e-3)
+
+
+def test_overlaps_of_regions_to_be_kept_out_of(paper):
+    # centres 0.4 m apart, radii 0.5 m
+    assert paper["overlaps"].numbers["SR1, SR2"] == pytest.approx(0.3, abs=1e-3)
+    assert "overlaps" not in of_regions("regions.SR2.shape.centre=[2,0,9]", "regions.SR1.shape.centre=[2,9,9]")
+
+
+def test_current_that_is_too_strong():
+    found = of_thrust("plant.current=[2.0,0.0,0.0]")["holding still"]
+    assert found.status == "fails"
+    # 76.4 N against 48 N s2/m2
+    speed = float(re.search(r"at most ([0-9.]+) m/s", found.advice)[1])
+    assert speed == pytest.approx(math.sqrt(4 * 27.0 / math.sqrt(2.0) / 48.0), abs=0.06)
+
+
+def test_a_vehicle_that_is_too_heavy_is_not_blamed_on_the_current():
+    found = of_thrust("plant.current=[0.5,0.0,0.0]", "plant.parameters.weight=1400")["holding still"]
+    assert found.status == "fails" and "Trim" in found.advice
+
+
+def test_thruster_that_cannot_be_missed_is_a_note():
+    found = of_thrust("plant.parameters.weight=1320")["one thruster lost"]
+    assert found.status == "note" and "5, 6, 7, 8" in found.text
+
+
+def test_other_laws_are_not_held_to_the_printed_laws_theory():
+    changes = ("law.name=deployable", "law.gains={}", "actuation.through=thrusters")
+    result = check(load_scenario("paper", [CLOSED, *changes]))
+    assert result.holds
+    (law,) = (finding for finding in result.findings if finding.topic == "law")
+    assert law.status == "note" and "not of this one (deployable)" in law.text
+
+
+def test_regions_of_attitude_close_no_place_but_can_be_violated_at_the_start():
+    view = (
+        "{name='view',criterion='shape',keep='in',gain=1,"
+        "shape={type='visibility',feature=[-9,0,1],camera_axis=[1,0,0],half_angle=0.5}}"
+    )
+    found = of_regions(f"regions=[{view}]", "intersection=[]")
+    start = found["start, view"]
+    assert start.status == "fails" and "rad" in start.text and "Turn initial.quaternion" in start.advice
+    assert start.numbers["clearance"] == pytest.approx(0.5 - math.pi)
+    assert "goal and regions" not in found and found["way"].status == "holds"
+
+
+def test_moving_regions_are_taken_as_they_are_first():
+    found = of_regions("regions.SR1.velocity=[0.1,0,0]")
+    assert "at time 0" in found["goal and regions"].text
+
+
+def test_no_regions():
+    found = of_regions("regions=[]", "intersection=[]")
+    assert "goal and regions" not in found and found["way"].status == "holds"
+
+
+def test_command_says_what_to_change_and_fails(capsys):
+    assert main(["check", "paper", "--set", CLOSED]) == 1
+    said = capsys.readouterr().out
+    assert "Verdict: 3 of 15 fail" in said
+    assert "within 1.64 m" in said and "26.82 kN" in said
+
+
+def test_command_succeeds_where_nothing_fails(capsys):
+    arguments = [word for change in (CLOSED, *MENDED) for word in ("--set", change)]
+    assert main(["check", "paper", *arguments]) == 0
+    assert "nothing stands against" in capsys.readouterr().out
+
+
+@pytest.mark.slow
+def test_command_as_json(capsys):
+    assert main(["check", "paper", "--set", CLOSED, "--set", "law.gains.sigma_p=0", "--json"]) == 1
+    result = json.loads(capsys.readouterr().out)
+    assert result["holds"] is False and result["law"] == "printed"
+    by_name = {finding["name"]: finding for finding in result["findings"]}
+    assert by_name["(38) 1, 2"]["numbers"]["greatest_gradient"] is None  # everywhere
+    assert result == json.loads(check_json(check(load_scenario("paper", [CLOSED, "law.gains.sigma_p=0"]))))
+
+
+def test_unknown_scenario_is_one_line(capsys):
+    assert main(["check", "papre"]) == 2
+    assert "did you mean 'paper'" in capsys.readouterr().err

@@ -1,0 +1,93 @@
+"""Thrust in each direction, against what can be read off the ODIN-like vehicle's thrusters."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from controller.restoring import parameters
+from cosim.precheck.thrust_margin import DIRECTIONS, greatest_force, thrust_margin
+from plant_fmu import load_vehicle
+
+ODIN = load_vehicle("odin")
+LEVEL = np.array([1.0, 0.0, 0.0, 0.0])
+ALL = np.ones(8, dtype=bool)
+NOTHING = np.zeros(6)
+STILL = np.zeros(3)
+
+
+def test_directions_are_26_unit_vectors_with_names_of_their_own():
+    assert len(DIRECTIONS) == 26
+    assert DIRECTIONS["north"] == (1.0, 0.0, 0.0) and DIRECTIONS["up"] == (0.0, 0.0, -1.0)
+    assert DIRECTIONS["south-east-down"] == pytest.approx(np.array([-1.0, 1.0, 1.0]) / math.sqrt(3.0))
+
+
+@pytest.mark.parametrize(
+    ("direction", "expected"),
+    # four horizontal thrusters at 45 degrees, four vertical ones, of 27 N each
+    [("north", 4 * 27.0 / math.sqrt(2.0)), ("south-west", 54.0), ("down", 108.0), ("up", 108.0)],
+)
+def test_greatest_force(direction, expected):
+    assert greatest_force(ODIN, np.array(DIRECTIONS[direction]), NOTHING, ALL) == pytest.approx(expected)
+
+
+def test_a_lost_vertical_thruster_takes_its_opposite_with_it():
+    alive = ALL.copy()
+    alive[4] = False
+    assert greatest_force(ODIN, np.array(DIRECTIONS["down"]), NOTHING, alive) == pytest.approx(54.0)
+
+
+def test_what_cannot_be_held_is_none():
+    assert greatest_force(ODIN, np.array(DIRECTIONS["down"]), np.r_[0.0, 0.0, 108.1, 0.0, 0.0, 0.0], ALL) is None
+    left = greatest_force(ODIN, np.array(DIRECTIONS["down"]), np.r_[0.0, 0.0, 100.0, 0.0, 0.0, 0.0], ALL)
+    assert left == pytest.approx(8.0)
+
+
+def margin(current, weight=ODIN.weight, quaternion=LEVEL, vehicle=ODIN):
+    phi = parameters(weight, vehicle.buoyancy, vehicle.r_G, vehicle.r_B)
+    return thrust_margin(vehicle, phi, quaternion, np.array(current))
+
+
+def test_still_water():
+    m = margin(STILL)
+    assert m.drag == 0.0 and m.excess_weight == pytest.approx(-2.0)
+    assert m.thrust.force == pytest.approx(54.0) == m.left.force  # 2 N of 108 N leave the horizontal as it is
+    assert [left.force for left in m.left_without[:4]] == pytest.approx([27.0] * 4)
+    assert [left.force for left in m.left_without[4:]] == pytest.approx([52.0] * 4)
+
+
+def test_current_takes_its_drag():
+    """48 N s2/m2 at 0.4 m/s from the south: 7.68 N, of which 1/sqrt(2) along the weak diagonal."""
+    m = margin([0.4, 0.0, 0.0])
+    assert m.drag == pytest.approx(7.68)
+    assert m.hold == pytest.approx([-7.68, 0.0, 2.0, 0.0, 0.0, 0.0])
+    assert m.left.direction.startswith("south-")
+    assert m.left.force == pytest.approx(54.0 - 7.68 / math.sqrt(2.0))
+
+
+def test_weight_narrows_the_vertical():
+    m = margin(STILL, weight=ODIN.buoyancy + 100.0)
+    assert m.hold[2] == pytest.approx(-100.0)  # up
+    assert m.left.direction == "up" and m.left.force == pytest.approx(8.0)
+    assert m.left_without[4] is None
+
+
+def test_too_much_cannot_be_held():
+    assert margin([2.0, 0.0, 0.0]).left is None
+
+
+def test_munks_moment_is_held_too():
+    """A long body in an oblique stream wants to turn across it."""
+    rov = load_vehicle("bluerov2_heavy")
+    m = margin([0.3, 0.3, 0.0], weight=rov.weight, vehicle=rov)
+    surge, sway = rov.added_mass[0, 0], rov.added_mass[1, 1]
+    # nu_r = (-0.3, -0.3): C_A nu_r turns by (Y_added - X_added) u v
+    assert m.hold[5] == pytest.approx((sway - surge) * 0.3 * 0.3)
+
+
+def test_attitude_turns_the_thrusters_with_it():
+    turned = Rotation.from_euler("z", 45, degrees=True).as_quat(scalar_first=True)
+    m = margin(STILL, quaternion=turned)
+    assert m.thrust.direction in ("north", "east", "south", "west")
+    assert m.thrust.force == pytest.approx(54.0)

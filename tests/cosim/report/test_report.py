@@ -1,0 +1,240 @@
+"""The report: complete, self-contained, and saying no more than the numbers."""
+
+import re
+import tomllib
+from html.parser import HTMLParser
+from xml.etree import ElementTree as ET
+
+import numpy as np
+import pytest
+
+from cosim.report.contents import contents_of
+from cosim.report.figures.style import thin
+from cosim.results.paper_claims import paper_claims
+from cosim.results.run_result import load_run
+from cosim.run.run import run_scenario
+from cosim.scenario.scenario import load_scenario
+
+FIGURES = [
+    "attitude",
+    "clearance",
+    "estimates",
+    "forces",
+    "path-3d",
+    "path-plane",
+    "position-error",
+    "thrusters",
+    "weights",
+]
+VOID = {"meta", "br", "img"}
+SHORT = ("arbiter.engine=closed", "time.duration=0.3")  # long enough to be inside SR1 and SR2
+
+
+class Checker(HTMLParser):
+    """Collects what a page asks the network for, and whether its tags close."""
+
+    def __init__(self):
+        super().__init__()
+        self.open, self.asked, self.captions, self.words = [], [], [], []
+
+    def handle_starttag(self, tag, attributes):
+        if tag not in VOID:
+            self.open.append(tag)
+        if tag == "figcaption":
+            self.captions.append("")
+        for name, value in attributes:
+            if name in ("src", "href", "xlink:href") and value and not value.startswith(("#", "data:")):
+                self.asked.append(value)
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+    def handle_data(self, data):
+        if "style" not in self.open and "svg" not in self.open:
+            self.words.append(data)
+        if "figcaption" in self.open:
+            self.captions[-1] += data
+
+
+def page_of(run):
+    return (run.folder / "report.html").read_text()
+
+
+@pytest.mark.parametrize(
+    ("name", "overrides"),
+    [
+        ("paper", SHORT),
+        pytest.param("paper", SHORT[:1], marks=pytest.mark.slow),
+        pytest.param("paper-limited", SHORT[:1], marks=pytest.mark.slow),
+    ],
+)
+def test_page_is_whole_and_needs_no_network(shipped_run, name, overrides):
+    page = page_of(shipped_run(name, *overrides, report=True))
+    checker = Checker()
+    checker.feed(page)
+    assert checker.open == []
+    assert not [target for target in checker.asked if "://" in target or target.startswith("/")]
+    assert "<script" not in page
+    assert len(page) < 1_000_000
+    assert not re.search(r"\$[a-z]+", page)
+
+
+def test_every_figure_is_there_as_a_vector_file_numbered_and_with_a_caption(shipped_run):
+    run = shipped_run("paper", *SHORT, report=True)
+    names = sorted([*FIGURES, "weights-overlap"])
+    assert sorted(p.name for p in (run.folder / "figures").iterdir()) == sorted(f"{name}.svg" for name in names)
+    checker = Checker()
+    checker.feed(page_of(run))
+    assert len(checker.captions) == len(names)
+    for i, caption in enumerate(checker.captions):
+        assert re.match(rf"Figure {i + 1}\. .{{20,}}", caption)
+    for name in names:
+        ET.parse(run.folder / "figures" / f"{name}.svg")
+
+
+def test_whatever_the_page_points_to_is_there(shipped_run):
+    run = shipped_run("paper", *SHORT, report=True)
+    checker = Checker()
+    checker.feed(page_of(run))
+    assert {"replay.html", "record.parquet", "summary.json", "scenario.toml", "figures/"} < set(checker.asked)
+    for target in checker.asked:
+        assert (run.folder / target).exists(), target
+
+
+@pytest.mark.slow
+def test_no_overlap_no_figure_of_it(tmp_path):
+    scenario = load_scenario("paper", ["arbiter.engine=closed", "time.duration=0.05"])
+    run = run_scenario(scenario, tmp_path / "run")
+    assert sorted(p.stem for p in run.folder.glob("figures/*.svg")) == FIGURES
+    assert "Never inside SR1 and SR2" in page_of(run)
+
+
+@pytest.mark.slow
+def test_claims_carry_this_runs_numbers(shipped_run):
+    for name in ("paper", "paper-limited", "paper-calibrated"):
+        scenario = load_scenario(name, ["arbiter.engine=closed"])
+        summary = shipped_run(name, "arbiter.engine=closed").summary
+        reaching, window, avoiding, single, effort, adapting = paper_claims(scenario, summary)
+        (start, end), *_ = summary["intersection_windows"]
+        assert f"{start:.3f} s to {end:.3f} s" in window.measured
+        assert ("Never in" in reaching.measured) == (not summary["reached"])
+        assert ("no evidence" in window.why) == (name != "paper")
+        assert f"{summary['min_clearance']['SR1']:+.3f} m" in avoiding.measured
+        assert "At most 1" in single.measured
+        assert "26.82 kN" in effort.measured
+        assert ("Winds up" in adapting.why) == (name != "paper")
+
+
+@pytest.mark.slow
+def test_claims_know_of_thrusters(tmp_path):
+    overrides = ["arbiter.engine=closed", "time.duration=20", "actuation.through=thrusters"]
+    scenario = load_scenario("paper", overrides)
+    summary = run_scenario(scenario, tmp_path / "run", report=False).summary
+    assert summary["saturated_time"] == pytest.approx(7.145, abs=0.05)
+    reaching, window, *_, adapting = paper_claims(scenario, summary)
+    assert "never saturated" not in reaching.why
+    assert "thrusters' limits" in window.why
+    assert "Winds up" in adapting.why
+
+
+def test_claims_blame_no_sphere_that_was_not_entered(tmp_path):
+    scenario = load_scenario("paper", ["arbiter.engine=closed", "time.duration=1", "initial.position=[0,3,1]"])
+    summary = run_scenario(scenario, tmp_path / "run", report=False).summary
+    avoiding = paper_claims(scenario, summary)[2]
+    assert "sphere" not in avoiding.why
+    assert "starts" in avoiding.why
+
+
+@pytest.mark.slow
+def test_other_scenarios_are_not_held_against_the_paper(tmp_path):
+    scenario = load_scenario("paper", ["arbiter.engine=closed", "time.duration=0.01", 'compare=""'])
+    assert "Beside the paper" not in page_of(run_scenario(scenario, tmp_path / "run"))
+
+
+@pytest.mark.slow
+def test_names_from_files_are_escaped(tmp_path):
+    scenario = load_scenario("paper", ["time.duration=0.01", 'title="<script>alert(1)</script> & $x"'])
+    page = page_of(run_scenario(scenario, tmp_path / "run"))
+    assert "<script" not in page
+    assert "&lt;script&gt;alert(1)&lt;/script&gt; &amp; $x" in page
+
+
+@pytest.mark.slow
+def test_a_goal_far_aside_still_fits_the_page(tmp_path):
+    overrides = ["arbiter.engine=closed", "time.duration=0.05", "goal.centre=[0,20,5]"]
+    run = run_scenario(load_scenario("paper", overrides), tmp_path / "run")
+    root = ET.parse(run.folder / "figures" / "path-plane.svg").getroot()
+    width, height = (float(root.get(side).removesuffix("pt")) for side in ("width", "height"))
+    assert height < 2 * width
+
+
+SHAPES = {
+    "box": '{type="box",centre=[2,0,2],size=[1,1,1]}',
+    "cylinder": '{type="cylinder",start=[2,0,0],end=[2,0,4],radius=0.4}',
+    "ellipsoid": '{type="ellipsoid",centre=[2,0,2],semi_axes=[1,0.5,0.3]}',
+    "half_space": '{type="half_space",point=[6,0,0],normal=[-1,0,0]}',
+    "prism": '{type="prism",corners=[[1,-1],[3,-1],[2,1]],top=1,bottom=3}',
+    "pipe": '{type="pipe",points=[[0,1,1],[2,1,2],[4,1,2]],radius=0.3}',
+    "cone": '{type="cone",feature=[8,0,5],axis=[-1,0,-0.5],half_angle=0.4,range=4}',
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("shape", ["prism", *(pytest.param(s, marks=pytest.mark.slow) for s in SHAPES if s != "prism")])
+def test_every_shape_can_be_drawn_and_be_a_goal(tmp_path, shape):
+    overrides = [
+        "arbiter.engine=closed",
+        "time.duration=0.05",
+        f"regions.SR1.shape={SHAPES[shape]}",
+        f"goal={SHAPES[shape]}",
+    ]
+    run = run_scenario(load_scenario("paper", overrides), tmp_path / "run")
+    assert (run.folder / "figures" / "path-3d.svg").exists()
+
+
+def test_thinned_curves_keep_their_extremes():
+    time = np.linspace(0.0, 1.0, 100_001)
+    signal = np.sin(40.0 * time)
+    signal[54_321] = 9.0
+    few, thinned = thin(time, signal)
+    assert len(few) < 2000
+    assert thinned.max() == 9.0 and thinned.min() == signal.min()
+    assert few[0] == 0.0 and few[-1] == 1.0
+
+
+def test_thinned_curves_keep_their_gaps():
+    time = np.linspace(0.0, 1.0, 100_001)
+    signal = np.sin(40.0 * time)
+    signal[30_000:40_000] = np.nan
+    few, thinned = thin(time, signal)
+    gap = np.isnan(thinned)
+    assert gap.any() and not gap.all()
+    assert few[gap].min() == pytest.approx(0.3, abs=0.004) and few[gap].max() == pytest.approx(0.4, abs=0.004)
+    assert not gap[(few < 0.299) | (few > 0.401)].any()
+
+
+def test_numbers_are_the_summarys_in_words_with_units(shipped_run):
+    run = shipped_run("paper", *SHORT, report=True)
+    checker = Checker()
+    checker.feed(page_of(run))
+    words = " ".join(" ".join(checker.words).split())
+    assert "greatest force that acted, norm [N]" in words
+    assert f"{run.summary['max_force']:,.0f}".replace(",", " ") in words
+    assert "max_force" not in words and "reach_time" not in words
+    assert "cosim run scenario.toml --out again" in words
+
+
+def test_the_table_of_regions_says_when_and_how_long(shipped_run):
+    run = load_run(shipped_run("paper", *SHORT, report=True).folder)
+    rows = {row[0]: row for row in contents_of(run).regions.rows}
+    signal, time = run.record["SR1.clearance"], run.record["time"]
+    assert rows["SR1"][:5] == ("SR1", "sphere", "obstacle", "out of", "hard")
+    assert float(rows["SR1"][5].removesuffix(" m").replace("−", "-")) == pytest.approx(signal.min(), rel=1e-3)
+    assert float(rows["SR1"][6]) == pytest.approx(time[signal.argmin()], abs=0.005)
+    inside = time[signal < 0.0]
+    assert float(rows["SR1"][7]) == pytest.approx(inside[-1] - inside[0] + time[1], abs=0.0051)
+
+
+def test_the_scenario_in_the_report_is_the_scenario(shipped_run):
+    run = load_run(shipped_run("paper", *SHORT, report=True).folder)
+    assert tomllib.loads(contents_of(run).scenario) == tomllib.loads(run.scenario.toml())

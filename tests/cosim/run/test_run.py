@@ -1,0 +1,210 @@
+"""Run folders: whole, readable, and complete even after an interruption."""
+
+import json
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+
+from cosim.errors import RunError
+from cosim.results.record import load_record
+from cosim.results.recorder import Recorder
+from cosim.results.spans import spans
+from cosim.run.run import run_scenario
+from cosim.run.run_folder import claim, report_again
+from cosim.scenario.scenario import load_scenario
+from plant_fmu import PlantError
+
+SHORT = ["arbiter.engine=closed", "time.duration=0.3"]
+REQUIRED = {
+    "law", "reached", "reach_time", "settled", "settle_time", "final_position", "intersection_windows", "min_clearance",
+    "max_force", "max_speed", "effort", "estimate_final", "steps", "wall_time", "real_time_factor",
+}  # fmt: skip
+
+
+def test_folder_holds_what_is_promised(shipped_run):
+    folder = shipped_run("paper", *SHORT, report=True).folder
+    names = sorted(p.name for p in folder.iterdir())
+    assert names == ["figures", "record.parquet", "replay.html", "report.html", "scenario.toml", "summary.json"]
+    assert json.loads((folder / "summary.json").read_text()).keys() >= REQUIRED
+
+
+def test_record_has_every_signal_with_its_unit(shipped_run):
+    folder = shipped_run("paper", *SHORT, report=True).folder
+    schema = pq.read_schema(folder / "record.parquet")
+    units = {f.name: f.metadata[b"unit"].decode() for f in schema}
+    assert all(f.metadata[b"description"] for f in schema)
+    expected = {
+        "time": "s", "position.z": "m", "quaternion.e0": "", "velocity.u": "m/s", "velocity.r": "rad/s",
+        "attitude.yaw": "rad", "thrust[8]": "N", "wrench.K": "N.m", "thruster_force[1]": "N", "actuation.X": "N",
+        "thrust_saturated[1]": "", "wrench_saturated": "", "goal.value": "m2", "goal.clearance": "m", "SR1.value": "m2",
+        "SR3.clearance": "m", "membership.shape": "", "weight.depth": "", "estimate.phi1": "N", "estimate.phi4": "N.m",
+        "command.Z": "N", "command.N": "N.m",
+    }  # fmt: skip
+    assert units.items() >= expected.items()
+    assert load_record(folder).units == units
+    assert len(units) == len(set(units))
+
+
+def test_summary_follows_from_the_record(shipped_run):
+    run = shipped_run("paper-limited", "arbiter.engine=closed", "time.duration=5")  # past both spheres
+    record, summary = load_record(run.folder), run.summary
+    force = np.sqrt(sum(record[f"actuation.{a}"] ** 2 for a in "XYZ"))[:-1]
+    assert summary["effort"] == pytest.approx(np.sum(force) * 0.001, rel=1e-12)
+    assert summary["final_position"] == [record[f"position.{a}"][-1] for a in "xyz"]
+    distance = np.sqrt(
+        (record["position.x"] - 2.0) ** 2 + record["position.y"] ** 2 + (record["position.z"] - 1.8) ** 2
+    )
+    assert summary["min_clearance"]["SR1"] == pytest.approx(distance.min() - 0.5, abs=1e-12)
+    assert summary["saturated_time"] == pytest.approx(np.count_nonzero(force > 107.999) * 0.001, abs=0.01)
+
+
+@pytest.mark.slow
+def test_settled_means_inside_for_the_last_ten_seconds(shipped_run):
+    early = shipped_run("paper", "arbiter.engine=closed", "time.duration=20").summary
+    assert early["reached"] and early["settle_time"] == pytest.approx(13.87, abs=0.1) and not early["settled"]
+
+
+def test_spans():
+    time = np.arange(6) * 0.5
+    assert spans(np.array([0, 1, 1, 0, 0, 1], bool), time) == [(0.5, 1.5), (2.5, 2.5)]
+    assert spans(np.array([1, 1, 1, 1, 1, 1], bool), time) == [(0.0, 2.5)]
+    assert spans(np.zeros(6, bool), time) == []
+
+
+def test_a_folder_in_use_is_refused(tmp_path):
+    (tmp_path / "precious").write_text("x")
+    with pytest.raises(RunError, match="not empty"):
+        run_scenario(load_scenario("paper", SHORT), tmp_path)
+    assert [p.name for p in tmp_path.iterdir()] == ["precious"]
+
+
+def test_a_place_that_cannot_be_written_is_refused(tmp_path):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(RunError, match="file"):
+        run_scenario(load_scenario("paper", SHORT), tmp_path / "file" / "run")
+
+
+def test_a_scenario_that_the_fmu_refuses_leaves_no_folder(tmp_path):
+    out = tmp_path / "run"
+    for override in ("plant.parameters.mass=-5", "law.gains.k_p1=1e9"):  # before the first step, and in it
+        with pytest.raises(PlantError):
+            run_scenario(load_scenario("paper", [*SHORT, override]), out)
+        assert not out.exists()
+
+
+@pytest.mark.slow
+def test_a_failure_midway_leaves_what_was_recorded(tmp_path):
+    out = tmp_path / "run"
+    scenario = load_scenario("paper", [*SHORT, "law.gains.k_v1=5e5"])  # which no 1 kHz loop can hold: k_v1 h > 2 m
+    with pytest.raises(PlantError):
+        run_scenario(scenario, out)
+    summary = json.loads((out / "summary.json").read_text())
+    assert summary["status"].startswith("failed: t = ")
+    assert 0 < summary["steps"] < 30
+    assert np.isfinite(load_record(out)["position.x"]).all()
+    assert (out / "report.html").exists()
+
+
+@pytest.mark.slow
+def test_ctrl_c_leaves_a_readable_run(tmp_path, monkeypatch):
+    class Interrupting(Recorder):
+        def observe(self, k, row):
+            super().observe(k, row)
+            if k == 150:
+                raise KeyboardInterrupt
+
+    monkeypatch.setattr("cosim.run.run.Recorder", Interrupting)
+    run = run_scenario(load_scenario("paper", SHORT), tmp_path / "run")
+    assert run.summary["status"] == "interrupted"
+    assert run.summary["steps"] == 150
+    assert len(load_record(run.folder)["time"]) == 151
+    assert "was interrupted at 0.150 s" in (run.folder / "report.html").read_text()
+    assert (run.folder / "report.html").exists()
+
+
+@pytest.mark.slow
+def test_a_killed_run_can_be_reported(tmp_path):
+    import shutil
+
+    whole = run_scenario(load_scenario("paper", SHORT), tmp_path / "run", report=False)
+    killed = tmp_path / "killed"
+    (killed / "record.parts").mkdir(parents=True)
+    shutil.copy(whole.folder / "scenario.toml", killed)
+    shutil.copy(whole.folder / "record.parquet", killed / "record.parts" / "000000.parquet")
+    summary, _ = report_again(killed)
+    assert summary["status"] == "killed"
+    assert summary["real_time_factor"] is None
+    assert summary["min_clearance"] == whole.summary["min_clearance"]
+    assert "was killed" in (killed / "report.html").read_text()
+    assert report_again(whole.folder)[0] == whole.summary  # of a whole run it says the same again
+    assert not list(killed.glob(".*"))
+
+
+def test_what_is_no_run_cannot_be_reported(tmp_path):
+    with pytest.raises(RunError, match="no run"):
+        report_again(tmp_path)
+
+
+def test_runs_that_start_together_get_folders_of_their_own(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    scenario = load_scenario("paper", SHORT)
+    paths = [claim(None, scenario).path for _ in range(5)]
+    assert len(set(paths)) == 5
+
+
+def test_a_discarded_run_leaves_the_users_folder(tmp_path):
+    mine = tmp_path / "mine"
+    mine.mkdir()
+    with pytest.raises(PlantError):
+        run_scenario(load_scenario("paper", [*SHORT, "law.gains.k_p1=1e9"]), mine)
+    assert list(mine.iterdir()) == []
+
+
+def test_whatever_goes_wrong_in_a_step_leaves_a_readable_record(tmp_path, monkeypatch):
+    def broken(self):
+        raise ZeroDivisionError
+
+    scenario = load_scenario("paper", [*SHORT, "time.arbiter=0.1"])
+    monkeypatch.setattr("cosim.simulation.master.Master._arbitrate", broken)
+    with pytest.raises(ZeroDivisionError):
+        run_scenario(scenario, tmp_path / "none")
+    assert not (tmp_path / "none").exists()
+
+
+def test_regions_of_any_name_saturate_nothing(tmp_path):
+    scenario = load_scenario("paper", [*SHORT, "regions.SR3.name=not_saturated"])
+    assert run_scenario(scenario, tmp_path / "run", report=False).summary["saturated_time"] == 0.0
+
+
+def test_an_interrupt_before_the_first_step_leaves_nothing(tmp_path, monkeypatch):
+    def interrupted(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("cosim.run.run.Recorder", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        run_scenario(load_scenario("paper", SHORT), tmp_path / "run")
+    assert not (tmp_path / "run").exists()
+
+
+def test_no_record_is_a_clear_error(tmp_path):
+    with pytest.raises(RunError, match="no record"):
+        load_record(tmp_path)
+    (tmp_path / "record.parquet").write_bytes(b"PAR1 and then nothing")
+    with pytest.raises(RunError, match="cannot be read"):
+        load_record(tmp_path)
+
+
+@pytest.mark.slow
+def test_own_vehicle_travels_with_the_run(tmp_path):
+    from importlib import resources
+
+    text = (
+        (resources.files("plant_fmu") / "vehicles" / "odin.toml").read_text().replace("mass = 125.0 ", "mass = 126.0 ")
+    )
+    (tmp_path / "boat.toml").write_text(text)
+    (tmp_path / "mine.toml").write_text('base = "paper"\nvehicle = "boat.toml"\n')
+    run = run_scenario(load_scenario(tmp_path / "mine.toml", SHORT), tmp_path / "run", report=False)
+    assert not (run.folder / "report.html").exists()
+    (tmp_path / "boat.toml").unlink()
+    assert load_scenario(run.folder / "scenario.toml").vehicle.mass == 126.0

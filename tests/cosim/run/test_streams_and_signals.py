@@ -1,0 +1,382 @@
+"""Streams that are closed, readers that go away, signals that end a command, and texts and files that are traps.
+
+Each costs one clear line and the right exit status: no traceback, no hang, nothing half-written.
+"""
+
+import contextlib
+import os
+import pty
+import select
+import signal
+import socket
+import subprocess
+import sys
+import termios
+import time
+
+import pytest
+
+import fuzzy_arbiter.__main__
+import plant_fmu.__main__
+from cosim.command_line import cli
+from cosim.command_line.cli import main
+from cosim.command_line.process import kills_interrupt
+from cosim.results.record import load_record
+from cosim.run.run_folder import report_again
+from tests.docs.peers import flying
+
+pytestmark = pytest.mark.skipif(os.name != "posix", reason="signals, pipes and devices of POSIX")
+
+QUICK = ["--set", "arbiter.engine=closed", "--set", "time.duration=0.02"]
+MAINS = {"cosim": main, "plant_fmu": plant_fmu.__main__.main, "fuzzy_arbiter": fuzzy_arbiter.__main__.main}
+PRINTS = {  # of each program, what prints something
+    "cosim": ["list"],
+    "plant_fmu": ["list"],
+    "fuzzy_arbiter": ["show", "section-vi"],
+}
+
+
+# ---- D7: standard output closed --------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("words", [["list"], ["--help"], ["run", "paper"], ["show", "nowhere"]])
+@pytest.mark.parametrize("program", MAINS)
+def test_D7_a_closed_standard_output_is_one_line_and_nothing_is_done(program, words, tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "stdout", None)
+    assert MAINS[program](words) == 2
+    assert capsys.readouterr().err == f"{program}: standard output is closed; expected it open, such as on /dev/null\n"
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("program", MAINS)
+def test_D7_a_process_without_standard_output(program):
+    command = f"{sys.executable} -m {program} {' '.join(PRINTS[program])} >&-"
+    done = subprocess.run(command, shell=True, stderr=subprocess.PIPE, text=True, check=False)
+    assert done.returncode == 2
+    assert done.stderr == f"{program}: standard output is closed; expected it open, such as on /dev/null\n"
+
+
+@pytest.mark.parametrize(
+    ("program", "words"),
+    [("cosim", ["show", "x"]), ("plant_fmu", ["docs", "--vehicle", "x"]), ("fuzzy_arbiter", ["show", "x"])],
+)
+def test_D7_without_standard_error_complaints_do_not_go_into_the_output(program, words, capsys, monkeypatch):
+    monkeypatch.setattr(sys, "stderr", None)
+    assert MAINS[program](words) == 2
+    assert capsys.readouterr().out == ""
+
+
+def test_D7_without_standard_input_scenes_are_none(tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr(sys, "stdin", None)
+    assert main(["campaign", "-", "--law", "printed", "--out", str(tmp_path / "out")]) == 2
+    assert capsys.readouterr() == ("", "cosim: standard input: is closed\n")
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="needs a device that is always full")
+@pytest.mark.parametrize("program", MAINS)
+def test_D7_a_full_standard_output_is_one_line(program):
+    with open("/dev/full", "wb") as full:
+        command, buffered = [sys.executable, "-m", program, *PRINTS[program]], os.environ | {"PYTHONUNBUFFERED": ""}
+        done = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, env=buffered, text=True, check=False)
+    assert (done.returncode, done.stderr) == (2, f"{program}: standard output: No space left on device\n")
+
+
+# ---- D8: texts of --set that are deep, or long -----------------------------------------------------------------------
+
+DEEP = ".".join("a" for _ in range(5000))
+SETTINGS = {
+    "a deep key": f"{DEEP}=1",
+    "a deep key in a table": f"goal.{DEEP}=1",
+    "a deep parameter": f"plant.parameters.{DEEP}=1",
+    "open brackets": f"limit.force={'[' * 5000}",
+    "brackets": f"limit.force={'[' * 5000}{']' * 5000}",
+    "brackets that Python can parse": f"goal.centre={'[' * 300}1{']' * 300}",
+    "tables": f"goal={'{a=' * 5000}1{'}' * 5000}",
+    "a deep key in a value": f"goal={{{DEEP}=1}}",
+    "digits": f"limit.force={'9' * 5000}",
+    "digits for a region": f"regions.{'9' * 5000}.gain=1",
+    "no value": "x" * 5000,
+    "two lines": "title=1\nvehicle=2",
+}
+
+
+@pytest.mark.parametrize("setting", SETTINGS.values(), ids=SETTINGS)
+@pytest.mark.parametrize(
+    "words",
+    [["show", "paper"], ["run", "paper", "--out", "out"], ["check", "paper"], ["package", "paper", "--out", "out"],
+     ["sweep", "paper", "--vary", "arbiter.ramp=0.1:0.2", "--samples", "2", "--out", "out"],
+     ["sitl", "--port", "9113", "--timeout", "1", "--out", "out"]],
+    ids=lambda words: words[0],
+)  # fmt: skip
+def test_D8_a_deep_or_long_setting_is_one_line(words, setting, tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert main([*words, "--set", setting]) == 2
+    said = capsys.readouterr()
+    line = said.err.splitlines()[-1]  # sitl waits first
+    assert said.out == "" and line.startswith("cosim: ") and "--set" in line and len(line) < 400
+    assert "Traceback" not in said.err and list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["sweep", "paper", "--vary", f"{DEEP}=1:2", "--samples", "2"],
+        ["sweep", "paper", "--vary", f"regions.{'9' * 5000}.gain=1:2", "--samples", "2"],
+        ["sweep", "paper", "--vary", f"limit.force=1:2:{'9' * 5000}", "--design", "grid"],
+        ["sweep", "paper", "--vary", f"limit.force=1:{'9' * 5000}", "--samples", "2"],
+        ["campaign", "scenes.jsonl", "--law", "printed", "--set", f"{DEEP}=1"],
+        ["campaign", "scenes.jsonl", "--law", "printed", "--set", f"k_p1={'[' * 5000}"],
+        ["compare", "scenes.jsonl", "--laws", "printed,pd", "--set", f"{DEEP}=1"],
+        ["compare", "scenes.jsonl", "--laws", "printed,pd", "--set", f"printed.k_p1={'{a=' * 5000}"],
+    ],
+    ids=lambda words: " ".join(words)[:40],
+)
+def test_D8_what_else_is_set_from_a_text(words, tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert main([*words, "--out", "out"]) == 2
+    said = capsys.readouterr()
+    assert said.out == "" and said.err.startswith("cosim: ") and said.err.count("\n") == 1
+    assert list(tmp_path.iterdir()) == []
+
+
+# ---- D10: a closed terminal ------------------------------------------------------------------------------------------
+
+
+def receive(number):
+    os.kill(os.getpid(), number)
+    time.sleep(60.0)
+
+
+@pytest.mark.parametrize("sent", [signal.SIGHUP, signal.SIGTERM, signal.SIGINT])
+def test_D10_every_verb_ends_by_a_signal_as_by_ctrl_c(sent, capsys, monkeypatch):
+    before = [signal.getsignal(number) for number in (signal.SIGHUP, signal.SIGTERM, signal.SIGINT)]
+    monkeypatch.setitem(cli._VERBS, "show", lambda options: receive(sent))
+    assert main(["show", "paper"]) == 130
+    assert capsys.readouterr() == ("", "cosim: interrupted\n")
+    assert [signal.getsignal(number) for number in (signal.SIGHUP, signal.SIGTERM, signal.SIGINT)] == before
+
+
+def test_D10_a_terminal_that_closes_twice_does_not_disturb_the_end():
+    with kills_interrupt():
+        with pytest.raises(KeyboardInterrupt):
+            receive(signal.SIGHUP)
+        for number in (signal.SIGHUP, signal.SIGTERM):  # as a shell and a service manager send them once more
+            os.kill(os.getpid(), number)
+            time.sleep(0.01)
+
+
+def test_D10_under_nohup_a_closed_terminal_stays_ignored():
+    before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    try:
+        with kills_interrupt():
+            os.kill(os.getpid(), signal.SIGHUP)
+            time.sleep(0.01)
+            assert signal.getsignal(signal.SIGHUP) == signal.SIG_IGN
+            with pytest.raises(KeyboardInterrupt):
+                receive(signal.SIGTERM)
+    finally:
+        signal.signal(signal.SIGHUP, before)
+
+
+@pytest.mark.slow
+def test_D10_a_run_whose_terminal_is_closed_is_readable(tmp_path):
+    """The process as a user has it: it leads the session of a terminal, whose other end goes."""
+    import fcntl
+
+    out = tmp_path / "run"
+    command = [sys.executable, "-m", "cosim", "run", "paper", "--out", str(out), "--set", "arbiter.engine=closed"]
+    terminal, slave = pty.openpty()
+    process = subprocess.Popen(
+        [*command, "--set", "time.duration=3000"], stdin=slave, stdout=slave, stderr=slave, start_new_session=True,
+        preexec_fn=lambda: fcntl.ioctl(0, termios.TIOCSCTTY, 0),  # noqa: PLW1509 - it is ours from then on
+    )  # fmt: skip
+    os.close(slave)
+    with contextlib.suppress(OSError):
+        while not any(out.glob("record.parts/*.parquet")) and process.poll() is None:
+            if select.select([terminal], [], [], 0.05)[0]:
+                os.read(terminal, 65536)
+    os.close(terminal)
+    assert process.wait(timeout=240) in (130, 2)  # the second where its last words found no terminal
+    assert (out / "report.html").exists() and not (out / "record.parts").exists()
+    assert report_again(out, ())[0]["status"] == "interrupted"
+    assert len(load_record(out)["time"]) > 1
+
+
+# ---- D12: a reader that goes away ------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def unread():
+    """Return a function that makes standard output a pipe whose reader has gone, for a block."""
+
+    @contextlib.contextmanager
+    def replaced():
+        reading, writing = os.pipe()
+        os.close(reading)
+        with open(writing, "w", encoding="utf-8") as stream, contextlib.redirect_stdout(stream):
+            yield
+
+    return replaced
+
+
+@pytest.fixture(scope="session")
+def flown(shipped_run):
+    return str(shipped_run("paper", "arbiter.engine=closed", "time.duration=0.05").folder)
+
+
+@pytest.fixture
+def place(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    main(["scenes", "--count", "1", "--out", "scenes.jsonl"])
+    return tmp_path
+
+
+CAMPAIGN = ["--replays", "0", "--out", "out"]
+VERBS = {  # {run}: a run folder
+    "run": ["paper", *QUICK, "--no-report", "--out", "out"],
+    "watch": ["{run}", "--once"],
+    "report": ["{run}", "--format", "html"],
+    "replay": ["{run}", "--out", "replay.html"],
+    "list": [],
+    "show": ["paper"],
+    "check": ["paper"],
+    "calibrate": [],
+    "compile": ["paper"],
+    "export": ["{run}", "--to", "npz"],
+    "package": ["paper", "--set", "arbiter.engine=closed"],
+    "scenes": ["--count", "3"],
+    "campaign": ["scenes.jsonl", "--law", "printed", *CAMPAIGN],
+    "compare": ["scenes.jsonl", "--laws", "printed,pd", *CAMPAIGN],
+    "sweep": ["paper", *QUICK, "--vary", "initial.position.1=-1:1", "--samples", "2", *CAMPAIGN],
+    "rerun": ["out", "0", "--out", "again"],
+    "listen": ["udpin:127.0.0.1:14571", "--seconds", "0.1"],
+    "stream": ["{run}", "--mavlink", "run.tlog", "--rate", "max"],
+    "mavlink-check": [],
+    "sitl": ["--port", "9114", "--timeout", "60", "--set", "time.duration=0.02", "--no-report", "--out", "out"],
+    "completion": ["bash"],
+    "help": [],
+}
+SLOW = {"report", "check", "calibrate", "compile", "package", "campaign", "compare", "sweep", "rerun", "mavlink-check"}
+NEED = {"watch": "rich", "listen": "pymavlink", "stream": "pymavlink", "mavlink-check": "pymavlink"}
+
+
+def test_D12_every_verb_is_tried():
+    assert set(VERBS) == set(cli._VERBS)
+
+
+@pytest.mark.parametrize(
+    "verb", [pytest.param(verb, marks=pytest.mark.slow) if verb in SLOW | {"sitl"} else verb for verb in VERBS]
+)
+def test_D12_a_reader_that_goes_away_ends_every_verb_alike(verb, flown, place, unread, capsys):
+    if verb in NEED:
+        pytest.importorskip(NEED[verb])
+    if verb == "rerun":
+        assert main(["sweep", *VERBS["sweep"]]) == 0
+    capsys.readouterr()
+    with contextlib.ExitStack() as stack:
+        if verb == "sitl":
+            stack.enter_context(flying(9114))
+        stack.enter_context(unread())
+        assert main([verb, *(word.format(run=flown) for word in VERBS[verb])]) == 141
+    assert verb == "sitl" or capsys.readouterr().err == ""  # which says there that it waits, and who came
+
+
+OTHERS = [
+    ("plant_fmu", ["--help"]),
+    ("plant_fmu", ["list"]),
+    ("plant_fmu", ["docs", "--vehicle", "odin"]),
+    ("plant_fmu", ["ssv", "--vehicle", "odin"]),
+    ("plant_fmu", ["plot", "odin", "thrusters", "--out", "a.svg"]),
+    pytest.param("plant_fmu", ["reference", "--vehicle", "odin"], marks=pytest.mark.slow),
+    pytest.param("plant_fmu", ["build", "--vehicle", "odin"], marks=pytest.mark.slow),
+    pytest.param("plant_fmu", ["check", "odin.fmu"], marks=pytest.mark.slow),
+    ("fuzzy_arbiter", ["--help"]),
+    ("fuzzy_arbiter", ["show", "section-vi"]),
+    ("fuzzy_arbiter", ["eval", "section-vi", "0", "0", "0"]),
+    ("fuzzy_arbiter", ["explain", "section-vi", "0", "0", "0"]),
+    ("fuzzy_arbiter", ["verify", "section-vi"]),
+    ("fuzzy_arbiter", ["convert", "section-vi", "a.json"]),
+    ("fuzzy_arbiter", ["plot", "section-vi", "terms", "--out", "a.svg"]),
+    pytest.param("fuzzy_arbiter", ["bench", "section-vi"], marks=pytest.mark.slow),
+    ("cosim", ["--help"]),
+    ("cosim", ["--version"]),
+    ("cosim", ["run", "--help"]),
+]
+
+
+@pytest.mark.parametrize(("program", "words"), OTHERS, ids=lambda value: value if isinstance(value, str) else value[0])
+def test_D12_a_reader_that_goes_away_ends_the_other_commands_alike(
+    program, words, tmp_path, unread, capsys, monkeypatch
+):
+    monkeypatch.chdir(tmp_path)
+    if words == ["check", "odin.fmu"]:
+        assert MAINS[program](["build", "--vehicle", "odin"]) == 0
+    capsys.readouterr()
+    with unread():
+        assert MAINS[program](words) == 141
+    assert capsys.readouterr().err == ""
+
+
+@pytest.mark.parametrize(
+    ("program", "words"),
+    [*PRINTS.items(), ("cosim", ["scenes", "--count", "3000"]), ("cosim", ["--help"]), ("plant_fmu", ["--help"])],
+    ids=lambda value: value if isinstance(value, str) else " ".join(value),
+)
+@pytest.mark.parametrize("unbuffered", ["", "1"])
+def test_D12_a_process_whose_reader_goes_away_ends_silently_with_141(program, words, unbuffered):
+    reading, writing = os.pipe()
+    os.close(reading)
+    command = [sys.executable, "-m", program, *words]
+    environment = os.environ | {"PYTHONUNBUFFERED": unbuffered}
+    done = subprocess.run(command, stdout=writing, stderr=subprocess.PIPE, env=environment, check=False)
+    os.close(writing)
+    assert (done.returncode, done.stderr) == (141, b"")
+
+
+def test_D12_another_pipe_that_breaks_is_told(capsys, monkeypatch):
+    def broken(options):
+        raise BrokenPipeError(32, "Broken pipe")
+
+    monkeypatch.setitem(cli._VERBS, "show", broken)
+    assert main(["show", "paper"]) == 2
+    assert capsys.readouterr() == ("", "cosim: Broken pipe\n")
+
+
+# ---- D13: pipes, devices and folders as files ------------------------------------------------------------------------
+
+
+def make_trap(kind, path):
+    if kind == "pipe":
+        os.mkfifo(path)
+    elif kind == "folder":
+        path.mkdir()
+    elif kind == "socket":
+        with socket.socket(socket.AF_UNIX) as server:
+            server.bind(str(path))
+    else:
+        path.symlink_to(kind)
+
+
+@pytest.mark.parametrize("kind", ["pipe", "folder", "socket", "/dev/null", "/dev/zero"])
+@pytest.mark.parametrize("role", ["scenario", "base", "vehicle", "vehicle of a plant", "definition"])
+def test_D13_what_is_no_file_is_one_line_and_no_hang(role, kind, tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(os.path.realpath(tmp_path))  # short enough for the name of a socket
+    make_trap(kind, tmp_path / "trap.toml")
+    before = set(tmp_path.iterdir())
+    if role == "base":
+        (tmp_path / "mine.toml").write_text('base = "trap.toml"\n')
+        before.add(tmp_path / "mine.toml")
+    program, words = {
+        "scenario": ("cosim", ["run", "trap.toml", "--out", "out"]),
+        "base": ("cosim", ["show", "mine.toml"]),
+        "vehicle": ("cosim", ["run", "paper", "--set", "vehicle=trap.toml", "--out", "out"]),
+        "vehicle of a plant": ("plant_fmu", ["build", "--vehicle", "trap.toml", "--out", "out.fmu"]),
+        "definition": ("fuzzy_arbiter", ["show", "trap.toml"]),
+    }[role]
+    assert MAINS[program](words) == 2
+    said = capsys.readouterr()
+    assert said.out == "" and said.err.startswith(f"{program}: ") and said.err.count("\n") == 1
+    assert "trap.toml" in said.err or role == "base"
+    assert set(tmp_path.iterdir()) == before

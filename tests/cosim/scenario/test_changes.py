@@ -1,0 +1,180 @@
+"""Titles say what was changed since they were written, wherever they are shown."""
+
+import dataclasses
+import re
+
+import numpy as np
+import pytest
+
+from controller import FunctionLaw
+from cosim.batch.variation import Variation
+from cosim.campaigns import run_sweep
+from cosim.campaigns.reruns.repeat import repeat_of
+from cosim.precheck.output import check_text
+from cosim.precheck.precheck import check
+from cosim.replay.header import header_of
+from cosim.replay.pages import joint_title
+from cosim.report.contents import contents_of
+from cosim.results.run_result import load_run
+from cosim.run.run import run_scenario
+from cosim.run.run_folder import report_again
+from cosim.scenario.law_factory import flown_by
+from cosim.scenario.scenario import load_scenario
+from cosim.scenario.toml_file import shipped_scenarios
+from cosim.sitl.scenario import scenario_to_fly
+from tests.cosim.campaigns.fake import design, fakes
+from tests.cosim.replay.decoding import read_page
+
+__all__ = ["fakes"]
+
+LIMITED = "The paper's scenario, printed law, body force limited to 108 N"
+FORCE = f"{LIMITED} (changed: limit.force = 500 N)"
+
+
+def saved(path, text):
+    path.write_text(text)
+    return path
+
+
+@pytest.mark.parametrize("name", shipped_scenarios())
+def test_what_is_shipped_is_as_its_title_says(name):
+    scenario = load_scenario(name)
+    assert scenario.title == scenario.table["title"] and scenario.table["changed"] == ()
+
+
+def test_the_numbers_of_shipped_titles_are_those_of_their_scenarios():
+    of = {name: load_scenario(name) for name in shipped_scenarios()}
+    assert "108 N" in of["paper-limited"].title and of["paper-limited"].limit.force == 108.0
+    assert "no limit" in of["paper"].title and of["paper"].limit.force == np.inf
+    assert "8 N too heavy" in of["depth-transit"].title
+    assert of["depth-transit"].true_restoring_parameters[0] == pytest.approx(8.0, abs=0.1)
+    assert "twenty-four rocks" in of["dense-field"].title
+    assert sum(r.criterion == "obstacle" for r in of["dense-field"].regions) == 24
+    assert "two drifting buoys" in of["moving-obstacle"].title
+    assert sum(r.moves for r in of["moving-obstacle"].regions) == 2 and any(of["moving-obstacle"].goal_velocity)
+    stating = {name for name, scenario in of.items() if re.search(r"\d|twenty|two|no limit", scenario.title)}
+    assert stating == {"paper-limited", "paper", "depth-transit", "dense-field", "moving-obstacle"}, "all are asked"
+
+
+@pytest.mark.parametrize(
+    ("overrides", "added"),
+    [
+        (["limit.force=108"], ""),
+        (["arbiter.points=101"], ""),
+        (["limit.force=500"], " (changed: limit.force = 500 N)"),
+        (["limit.force=500", "limit.force=108.0"], ""),
+        (["regions.1.gain=7"], " (changed: regions.SR2.gain = 7)"),
+        (["initial.position.1=2"], " (changed: initial.position.1 = 2 m)"),
+        (["initial.position=[1,2,3]"], " (changed: initial.position = (1, 2, 3) m)"),
+        (["regions.SR1.shape.centre.0=3"], " (changed: regions.SR1.shape.centre.0 = 3 m)"),
+        (['goal={type="box",centre=[8,0,5],size=[1,1,1]}'], " (changed: goal)"),
+        (["intersection=[]", "regions=[]"], " (changed: regions = none)"),
+        (["vehicle=rexrov"], " (changed: vehicle = rexrov)"),
+        (["tell_failures=true"], " (changed: tell_failures = true)"),
+        (["plant.parameters.weight=1230"], " (changed: plant.parameters.weight = 1230 N)"),
+        (["plant.parameters.r_B.z=0.5"], " (changed: plant.parameters.r_B.z = 0.5 m)"),
+        (["law.name=pd"], " (changed: law.name = pd)"),
+        (["law.name=pd", "law.gains.limit=50"], " (changed: law.name = pd, law.gains.limit = 50 N)"),
+        (["commands.enabled=true", "sensing.seed=3", "record.lyapunov=false", "compare=''"], ""),
+        (
+            ["limit.force=1", "limit.time_constant=2", "arbiter.ramp=3", "plant.substep=0.001", "time.duration=5"],
+            " (changed: time.duration = 5 s, plant.substep = 0.001 s, arbiter.ramp = 3 m and 2 more)",
+        ),
+    ],
+)
+def test_what_is_set_is_told_beside_the_title(overrides, added):
+    assert load_scenario("paper-limited", overrides).title == LIMITED + added
+
+
+def test_a_title_that_is_set_along_is_taken_at_its_word(tmp_path):
+    both = ["limit.force=500", 'title="Limited to 500 N"']
+    assert load_scenario("paper-limited", both).title == "Limited to 500 N"
+    changed = saved(tmp_path / "changed.toml", load_scenario("paper-limited", ["limit.force=500"]).toml())
+    assert load_scenario(changed, ['title="Limited to 500 N"']).title == "Limited to 500 N"
+    own = saved(tmp_path / "own.toml", 'base = "changed.toml"\ntitle = "My own"\narbiter = { ramp = 1.0 }\n')
+    assert load_scenario(own).title == "My own"
+
+
+def test_a_base_lends_its_title_with_what_is_laid_over_it(tmp_path):
+    one = saved(tmp_path / "one.toml", 'base = "paper-limited"\nlimit = { force = 500.0 }\n')
+    two = saved(tmp_path / "two.toml", 'base = "one.toml"\n[arbiter]\nramp = 0.5\n')
+    assert load_scenario(one).title == FORCE
+    told = f"{LIMITED} (changed: arbiter.ramp = 0.5 m, limit.force = 500 N"
+    assert load_scenario(two).title == f"{told})"
+    assert load_scenario(two, ["time.duration=1"]).title.startswith(f"{LIMITED} (changed: time.duration = 1 s, arbiter")
+    assert load_scenario(two, ["limit.force=108"]).title == f"{LIMITED} (changed: arbiter.ramp = 0.5 m)"
+
+
+def test_what_is_no_scenario_without_its_base_or_its_settings_says_what_makes_it_one(tmp_path):
+    half = saved(tmp_path / "half.toml", 'title = "Half"\nvehicle = "odin"\ntime = { duration = 2.0 }\n')
+    rest = ["initial.position=[0,0,1]", 'goal={type="sphere",centre=[3,0,2],radius=0.5}']
+    assert load_scenario(half, rest).title == "Half (changed: initial, goal)"
+
+
+def test_a_file_written_from_a_changed_scenario_says_the_same_and_more(tmp_path):
+    changed = load_scenario("paper-limited", ["limit.force=500"])
+    file = saved(tmp_path / "mine.toml", changed.toml())
+    assert load_scenario(file).title == FORCE and load_scenario(file).toml() == changed.toml()
+    assert load_scenario(file, ["arbiter.ramp=0.5"]).title == f"{FORCE[:-1]}, arbiter.ramp = 0.5 m)"
+    gone = saved(tmp_path / "gone.toml", load_scenario("paper-limited", ["regions.SR3.gain=1"]).toml())
+    overrides = ["regions=[]", "intersection=[]"]
+    assert load_scenario(gone, overrides).title == f"{LIMITED} (changed: regions.SR3.gain, regions = none)"
+
+
+def test_a_title_that_is_shown_stays_printable(tmp_path):
+    from cosim.errors import ScenarioError
+
+    file = saved(
+        tmp_path / "mine.toml", load_scenario("paper").toml().replace("changed = []", 'changed = ["\\u001b[2J"]')
+    )
+    with pytest.raises(ScenarioError, match=r"changed is .* printable"):
+        load_scenario(file)
+
+
+def test_the_pages_of_a_run_say_so_when_it_is_flown_and_when_it_is_reported_again(tmp_path):
+    scenario = load_scenario("paper-limited", ["limit.force=500", "time.duration=0.05", "arbiter.engine=closed"])
+    folder = run_scenario(scenario, tmp_path / "run").folder
+    assert "limit.force = 500 N" in scenario.title
+    for _ in range(2):
+        assert f"<h1>{scenario.title}</h1>".replace("'", "&#x27;") in (folder / "report.html").read_text()
+        reader, [(header, _)] = read_page((folder / "replay.html").read_text())
+        assert reader.title == header["title"] == scenario.title
+        report_again(folder)
+    run = load_run(folder)
+    assert run.planned.title == run.scenario.title == contents_of(run).title == scenario.title
+    assert header_of(scenario, ())["title"] == scenario.title
+    assert check_text(check(scenario)).startswith(scenario.title)
+    assert load_scenario(folder / "scenario.toml").title == scenario.title
+
+
+def test_rows_of_a_sweep_say_what_varies(tmp_path, fakes):
+    base = load_scenario("paper-limited", ["arbiter.ramp=0.5"])
+    made = Variation(base, ["limit.force", "law.gains.k_p1"]).scenario([1 / 3, 18.8], 7)
+    assert made.title == f"{LIMITED} (changed: arbiter.ramp = 0.5 m, limit.force = 0.333333 N)"
+    run_sweep(base, design(3, vary=["limit.force=50:500"]), tmp_path / "out", "fake")
+    repeated = repeat_of(tmp_path / "out", 1).scenario
+    assert repeated.title.startswith(f"{LIMITED} (changed: arbiter.ramp = 0.5 m, limit.force = ")
+
+
+def test_the_title_says_who_flew_if_no_law_of_ours():
+    def rest(*_):
+        return np.zeros(6)
+
+    own = flown_by(FunctionLaw(rest), load_scenario("paper-limited", ["limit.force=500"]))
+    assert own.title == f"{LIMITED} (flown by {own.law.name}; changed: limit.force = 500 N)"
+    assert (
+        scenario_to_fly("sitl", [], None, 400, "ardupilot").title == "Open water for an autopilot (flown by ardupilot)"
+    )
+    heavy = scenario_to_fly("sitl", ["time.duration=60"], "bluerov2_heavy_wu", 400, "ardupilot").title
+    assert heavy.endswith("(flown by ardupilot; changed: vehicle = bluerov2_heavy_wu, time.duration = 60 s)")
+
+
+def test_several_runs_on_a_page_have_each_title_once():
+    assert joint_title({"a": "One", "b": "One"}) == "One: a, b"
+    assert joint_title({"a": "One", "b": "Two", "c": "One"}) == "One: a, c; Two: b"
+
+
+def test_a_title_follows_the_law_that_a_summary_names():
+    scenario = load_scenario("paper")
+    autopilot = dataclasses.replace(scenario, law=dataclasses.replace(scenario.law, name="px4"))
+    assert autopilot.title == f"{scenario.title} (flown by px4)"

@@ -1,0 +1,144 @@
+"""A law of one's own in the place of a scenario's: flown, named in the run folder, refused where it cannot be."""
+
+import json
+import tomllib
+
+import numpy as np
+import pytest
+
+from controller import FunctionLaw, LawError
+from cosim.campaigns.sweep import run_sweep
+from cosim.campaigns.sweeps.design import Design, vary_from
+from cosim.errors import RunError, ScenarioError
+from cosim.precheck.precheck import check
+from cosim.results.record import load_record
+from cosim.results.run_result import load_run
+from cosim.run.run import run_scenario
+from cosim.scenario.law_factory import flown_by, law_of
+from cosim.scenario.scenario import load_scenario
+from cosim.simulation.master import Master
+
+SHORT = ("arbiter.engine=closed", "time.duration=0.2", "time.step=0.01", "time.control=0.02", "time.arbiter=0.01")
+NAME = "tests.cosim.scenario.test_own_law:ahead"
+
+
+def ahead(state, goal, regions, weights):
+    return [20.0, 0.0, 0.0, 0.0, 0.0, 0.0]
+
+
+@pytest.fixture
+def scenario():
+    return load_scenario("paper", SHORT)
+
+
+@pytest.fixture
+def named(monkeypatch):
+    """Give the function the name that it has however the tests are imported."""
+    monkeypatch.setattr(ahead, "__module__", NAME.partition(":")[0])
+    return FunctionLaw(ahead)
+
+
+@pytest.mark.slow
+def test_a_run_by_a_law_of_ones_own_is_whole_and_says_whose_it_is(scenario, named, tmp_path):
+    run = run_scenario(scenario, tmp_path / "run", law=named)
+    record = load_record(run.folder)
+    assert (record["command.X"] == 20.0).all() and (record["estimate.phi1"] == 0.0).all()
+    assert record["velocity.u"][-1] > 0.01
+    assert run.summary["law"] == NAME
+    assert tomllib.loads((run.folder / "scenario.toml").read_text())["law"] == {
+        "name": NAME, "desired_quaternion": [1.0, 0.0, 0.0, 0.0], "gains": {},
+    }  # fmt: skip
+    report = (run.folder / "report.html").read_text()
+    assert NAME in report and "cosim run scenario.toml" not in report
+    assert NAME in (run.folder / "replay.html").read_text()
+
+
+def test_the_same_law_as_a_function_flies_the_same_to_the_bit(tmp_path):
+    scenario = load_scenario("paper", [*SHORT, "time.control=0.01", "time.duration=0.5"])
+    law = law_of(scenario)
+    run = run_scenario(scenario, tmp_path / "own", report=False, law=law)
+    run_scenario(scenario, tmp_path / "shipped", report=False)
+    one, other = load_record(tmp_path / "own"), load_record(tmp_path / "shipped")
+    assert run.summary["law"] == "controller.laws.printed:PrintedLaw"
+    assert all(np.array_equal(one[name], other[name], equal_nan=True) for name in other.units)
+
+
+def test_a_killed_run_says_whose_law_it_was(scenario, named, tmp_path):
+    run = run_scenario(scenario, tmp_path / "run", report=False, law=named)
+    (run.folder / "summary.json").unlink()
+    assert load_run(run.folder).summary["law"] == NAME
+
+
+def test_the_file_of_such_a_run_is_read_but_not_run(scenario, named, tmp_path):
+    run = run_scenario(scenario, tmp_path / "run", report=False, law=named)
+    again = load_scenario(run.folder / "scenario.toml")
+    assert again.law.name == NAME and again.law.own
+    assert check(again).law == NAME
+    for attempt in (lambda: run_scenario(again, tmp_path / "again"), lambda: Master(again)):
+        with pytest.raises(RunError, match=f"law.name is '{NAME}', a law of one's own"):
+            attempt()
+    assert not (tmp_path / "again").exists()
+    assert run_scenario(again, tmp_path / "again", report=False, law=named).summary["law"] == NAME
+
+
+@pytest.mark.parametrize("engine", ["fused", "lanes"])
+def test_a_sweep_refuses_it(scenario, named, engine, tmp_path):
+    design = Design(vary_from(["initial.position.1=-1:1"]), samples=2)
+    with pytest.raises(RunError, match=r"law\.name is "):
+        run_sweep(flown_by(named, scenario), design, tmp_path / "sweep", engine)
+
+
+def test_what_it_breaks_off_with_is_left_readable(scenario, tmp_path):
+    def late(state, goal, regions, weights):
+        return np.zeros(6) if state.position[0] == 0.0 and not calls.append(1) and len(calls) < 5 else np.zeros(3)
+
+    calls = []
+    with pytest.raises(LawError, match="late returned"):
+        run_scenario(scenario, tmp_path / "run", report=False, law=FunctionLaw(late))
+    summary = json.loads((tmp_path / "run" / "summary.json").read_text())
+    assert summary["status"].startswith("failed: law ") and summary["simulated_time"] == pytest.approx(0.07)
+
+
+def test_what_it_raises_itself_comes_through_and_leaves_the_record(scenario, tmp_path):
+    def faulty(state, goal, regions, weights):
+        calls.append(1)
+        return np.zeros(6) if len(calls) < 5 else 1 / 0
+
+    calls = []
+    with pytest.raises(ZeroDivisionError):
+        run_scenario(scenario, tmp_path / "run", law=FunctionLaw(faulty))
+    run = load_run(tmp_path / "run")
+    assert run.summary["status"] == "killed" and run.summary["simulated_time"] == pytest.approx(0.07)
+
+
+@pytest.mark.parametrize("law", [ahead, FunctionLaw, 3])
+def test_what_is_no_law_is_refused(law, scenario, tmp_path):
+    with pytest.raises(LawError, match=r"law is .*:.*, expected a FunctionLaw"):
+        run_scenario(scenario, tmp_path / "run", law=law)
+    assert not (tmp_path / "run").exists()
+
+
+@pytest.mark.parametrize(
+    ("key", "words"),
+    [("commands.enabled=true", "commands.enabled is true"), ("record.lyapunov=true", "record.lyapunov is true")],
+)
+def test_what_goes_with_shipped_laws_alone_is_refused(key, words, named, tmp_path):
+    scenario = load_scenario("paper", [*SHORT, key])
+    for attempt in (lambda: run_scenario(scenario, tmp_path / "run", law=named), lambda: Master(scenario, named)):
+        with pytest.raises(ScenarioError, match=words):
+            attempt()
+    assert not (tmp_path / "run").exists()
+
+
+def test_forces_of_thrusters_want_thrusters(scenario, tmp_path):
+    law = FunctionLaw(lambda *_: [1.0] * 8, output="thrusters")
+    with pytest.raises(ScenarioError, match=r"actuation.through is 'wrench', expected 'thrusters': law .*<lambda>"):
+        run_scenario(scenario, tmp_path / "run", law=law)
+    through = load_scenario("paper", [*SHORT, "actuation.through=thrusters"])
+    run_scenario(through, tmp_path / "run", report=False, law=law)
+    assert (load_record(tmp_path / "run")["thrust[8]"] == 1.0).all()
+
+
+def test_gains_of_a_law_of_ones_own_are_refused():
+    with pytest.raises(ScenarioError, match=r"law\.gains has 'k_p1', expected nothing with a law of one's own"):
+        load_scenario("paper", ["law.name=mine.py:steer", "law.gains.k_p1=1.0"])

@@ -1,0 +1,283 @@
+"""Scenario files: every key checked, every fault named."""
+
+import dataclasses
+import tomllib
+
+import pytest
+
+from controller.regions import Pipe, Sphere
+from cosim.errors import ScenarioError
+from cosim.scenario.scenario import load_scenario
+from cosim.scenario.toml_file import shipped_scenarios
+
+MINIMAL = """
+vehicle = "bluerov2_heavy"
+time = { duration = 2.0 }
+initial = { position = [0.0, 0.0, 1.0] }
+goal = { type = "sphere", centre = [3.0, 0.0, 2.0], radius = 0.5 }
+"""
+
+
+def saved(tmp_path, text, name="mine.toml"):
+    path = tmp_path / name
+    path.write_text(text)
+    return path
+
+
+def test_shipped_scenarios_load():
+    assert shipped_scenarios() == [
+        "dense-field", "depth-transit", "docking", "harbour", "moving-obstacle", "paper", "paper-calibrated",
+        "paper-deployable", "paper-limited", "pipe-inspection", "sitl",
+    ]  # fmt: skip
+    for name in shipped_scenarios():
+        assert load_scenario(name).title
+
+
+def test_minimal_file_gets_defaults(tmp_path):
+    scenario = load_scenario(saved(tmp_path, MINIMAL))
+    assert scenario.steps == 2000 and scenario.control_every == scenario.arbiter_every == 1
+    assert scenario.arbiter.ramp == 0.2
+    assert scenario.limit.force == float("inf")
+    assert scenario.goal == Sphere((3.0, 0.0, 2.0), 0.5)
+    assert scenario.regions == ()
+
+
+@pytest.mark.parametrize("name", shipped_scenarios())
+def test_written_scenario_reads_back_the_same(tmp_path, name):
+    first = load_scenario(name, ["time.control=0.04"])
+    again = load_scenario(saved(tmp_path, first.toml(), f"{name}.toml"))
+    assert again.toml() == first.toml()
+    for f in dataclasses.fields(first):
+        if f.name not in ("vehicle", "vehicle_file"):
+            assert getattr(again, f.name) == getattr(first, f.name), f.name
+
+
+def test_base_lays_one_scenario_over_another(tmp_path):
+    path = saved(tmp_path, 'base = "paper"\nlimit = { force = 5.0 }\n')
+    scenario = load_scenario(path)
+    assert scenario.limit.force == 5.0
+    assert scenario.limit.time_constant == 0.0
+    assert len(scenario.regions) == 3
+
+
+def test_base_may_be_a_file_beside(tmp_path):
+    saved(tmp_path, MINIMAL, "other.toml")
+    assert load_scenario(saved(tmp_path, 'base = "other.toml"\ntitle = "Mine"\n')).title == "Mine"
+
+
+def test_base_of_itself_is_refused(tmp_path):
+    with pytest.raises(ScenarioError, match="base"):
+        load_scenario(saved(tmp_path, 'base = "mine.toml"\n'))
+
+
+def test_base_lies_elsewhere_with_its_vehicle(tmp_path):
+    from importlib import resources
+
+    (tmp_path / "common").mkdir()
+    (tmp_path / "mine").mkdir()
+    boat = (resources.files("plant_fmu") / "vehicles" / "odin.toml").read_text()
+    saved(tmp_path / "common", boat, "boat.toml")
+    saved(tmp_path / "common", MINIMAL.replace('"bluerov2_heavy"', '"boat.toml"'), "base.toml")
+    assert load_scenario(saved(tmp_path / "mine", 'base = "../common/base.toml"\n')).vehicle.mass == 125.0
+    # files of one name in two folders are two files
+    saved(tmp_path / "common", 'base = "base.toml"\n', "a.toml")
+    saved(tmp_path / "common", 'base = "a.toml"\n', "b.toml")
+    assert load_scenario(saved(tmp_path / "mine", 'base = "../common/b.toml"\n', "a.toml")).vehicle.mass == 125.0
+
+
+def test_overlap_is_of_regions_to_be_kept_out_of():
+    scenario = load_scenario("paper", ["regions.SR1.keep=in", "intersection=[]"])
+    assert scenario.intersection == (1, 2)
+    with pytest.raises(ScenarioError, match="SR1"):
+        load_scenario("paper", ["regions.SR1.keep=in"])
+
+
+def test_own_vehicle_file_is_found_beside_the_scenario(tmp_path):
+    from importlib import resources
+
+    (tmp_path / "boat.toml").write_text((resources.files("plant_fmu") / "vehicles" / "odin.toml").read_text())
+    scenario = load_scenario(saved(tmp_path, MINIMAL.replace('"bluerov2_heavy"', '"boat.toml"')))
+    assert scenario.vehicle.mass == 125.0
+    assert tomllib.loads(scenario.toml())["vehicle"] == str(tmp_path / "boat.toml")
+    assert tomllib.loads(scenario.toml("copy.toml"))["vehicle"] == "copy.toml"
+
+
+def test_overrides_reach_every_depth(tmp_path):
+    scenario = load_scenario(
+        "paper",
+        ["law.gains.k_p1=3", "regions.SR2.shape.radius=0.25", "regions.0.gain=7", "limit.force=inf",
+         "vehicle=bluerov2_heavy",
+         "plant.parameters.mass=14", 'regions.SR3.shape={type="pipe",points=[[0,0,0],[1,0,0]],radius=0.3}'],
+    )  # fmt: skip
+    assert scenario.law.gains.k_p1 == 3.0
+    assert scenario.regions[1].region.shape.radius == 0.25
+    assert scenario.regions[0].region.gain == 7.0
+    assert scenario.vehicle.name == "bluerov2_heavy"
+    assert scenario.plant.parameters == {"mass": 14.0}
+    assert scenario.regions[2].region.shape == Pipe(((0.0, 0.0, 0.0), (1.0, 0.0, 0.0)), 0.3)
+
+
+@pytest.mark.parametrize(
+    ("override", "words"),
+    [
+        ("law.gains.k_p=3", ["law.gains.k_p", "unknown", "k_p"]),
+        ("law.gains.k_p1=abc", ["law.gains.k_p1", "number", "'abc'"]),
+        ("law.gains.k_p1=0", ["law.gains.k_p1", "0"]),
+        ("law.gains.gamma=nan", ["law.gains.gamma", "nan"]),
+        ("law.name=best", ["law.name", "'printed'", "'best'"]),
+        ("law.name=deployable", ["actuation.through", "'thrusters'", "'deployable'"]),
+        ("law.desired_quaternion=[1,1,0,0]", ["law.desired_quaternion", "length 1"]),
+        ("goal.velocity=[0.1,0,nan]", ["goal.velocity", "finite"]),
+        ("goal.velocity=[0.1,0,1e9]", ["goal", "velocity", "1e+06"]),
+        ("goal.velocity=0.1", ["goal.velocity", "list"]),
+        ('goal={type="orientation",quaternion=[1,0,0,0],tolerance=0.1}', ["goal.type", "'orientation'", "in space"]),
+        ("regions.SR1.velocity=[0,0,inf]", ["regions.SR1.velocity", "finite"]),
+        ('regions.SR1.shape={type="visibility",feature=[0,0,0],camera_axis=[1,0,0]}', ["SR1.shape", "half_angle"]),
+        ("failures=[{thruster=3,time=1.0}]", ["failures", "actuation.through = 'wrench'"]),
+        ("sensing.position_noise=-1", ["sensing.position_noise", "0 or above"]),
+        ("sensing.velocity_noise=nan", ["sensing.velocity_noise", "nan"]),
+        ("sensing.dead_for=inf", ["sensing.dead_for", "inf"]),
+        ("sensing.dead_from=-1", ["sensing.dead_from", "0 s"]),
+        ("sensing.seed=-1", ["sensing.seed", "-1"]),
+        ("sensing.noise=1", ["sensing.noise", "unknown key"]),
+        ("arbiter.engine=fast", ["arbiter.engine", "'closed'", "'skfuzzy'", "'fast'"]),
+        ("arbiter.ramp=-1", ["arbiter.ramp", "-1"]),
+        ("arbiter.points=2", ["arbiter.points", "3"]),
+        ("time.duration=-1", ["time.duration", "above 0"]),
+        ("time.duration=long", ["time.duration", "number", "'long'"]),
+        ("time.step=0.0007", ["multiple", "time.step"]),
+        ("time.control=0.0015", ["time.control", "multiple"]),
+        ("time.step=1e-10", ["time.duration", "steps"]),
+        ("vehicle=odinn", ["odinn", "bluerov2_heavy, bluerov2_heavy_wu, odin, rexrov"]),
+        ("vehicle=nowhere.toml", ["nowhere.toml"]),
+        ("initial.position=[1,2]", ["initial.position", "3"]),
+        ("initial.position=[0,0,inf]", ["initial.position", "finite"]),
+        ("initial.quaternion=[1,1,0,0]", ["initial.quaternion", "length 1"]),
+        ("plant.fmi=4", ["plant.fmi", "2, 3"]),
+        ("plant.parameters.mass=nan", ["plant.parameters.mass", "finite"]),
+        ("plant.parameters.wrench_force_limit=5", ["plant.parameters.wrench_force_limit", "limit.force"]),
+        ("plant.parameters.current.x=0.5", ["plant.parameters.current.x", "plant.current"]),
+        ("limit.force=-1", ["limit.force"]),
+        ("goal=5", ["goal", "table"]),
+        ("goal.type=sphear", ["goal.type", "'sphear'", "'sphere'"]),
+        ("goal.radius=-1", ["goal", "radius", "-1"]),
+        ("goal.typo=1", ["goal.typo", "unknown"]),
+        ("regions.SR9.gain=1", ["SR9", "SR1, SR2, SR3"]),
+        ("regions.SR1.gain=-1", ["regions.SR1.gain"]),
+        ("regions.SR1.name=SR2", ["SR2", "own"]),
+        ("regions.SR1.keep=on", ["keep", "'in', 'out'"]),
+        ("regions.SR1.criterion=fear", ["criterion", "'obstacle', 'shape', 'depth'"]),
+        ("regions.SR1.shape.radius=nan", ["SR1", "radius", "nan"]),
+        ('intersection=["SR7"]', ["intersection", "SR7"]),
+        ("tme.duration=3", ["tme", "'time'"]),
+        ("time.duration.x.y=1", ["time.duration.x"]),
+        ("title.x.y=3", ["title"]),
+        ("time.duration=1\nb=2", ["one key=value"]),
+        ("time.step=5e-324", ["time.duration", "steps"]),
+        ("time.duration=1e308", ["time.duration", "steps"]),
+        (f"law.gains.k_p1={'9' * 400}", ["law.gains"]),
+        ("arbiter.points=100000000000000", ["arbiter.points", "100001"]),
+        ("plant.parameters.position.x=3", ["plant.parameters.position.x", "no parameter"]),
+        ("plant.parameters.wrench.X=3", ["plant.parameters.wrench.X", "no parameter"]),
+        ("plant.parameters.mas=3", ["plant.parameters.mas", "'mass'"]),
+        ("regions.SR1.name=goal", ["'goal'"]),
+        ("regions.SR1.name=$\\frac$", ["name"]),
+        ("regions.SR1.name=_hidden", ["name"]),
+        ('regions.SR1.name=""', ["name"]),
+        ("regions.SR1.shape.radius=1e300", ["radius", "1e+06"]),
+        ('intersection=["SR1"]\nregions=[]', ["one key=value"]),
+        ("goal={radius=1}", ["goal.type is missing", "sphere"]),
+        ("title", ["key=value"]),
+        ("title.x=3", ["title"]),
+    ],
+)
+def test_faults_are_named_in_one_line(override, words):
+    with pytest.raises(ScenarioError) as caught:
+        load_scenario("paper", [override])
+    said = str(caught.value)
+    assert "\n" not in said
+    for word in words:
+        assert word in said
+
+
+@pytest.mark.parametrize(
+    ("override", "words"),
+    [
+        ("failures.0.thruster=9", "failures.0.thruster is 9, expected 1 to 8"),
+        ("failures.0.thruster=0", "failures.0.thruster is 0, expected 1 to 8"),
+        ("failures.0.time=-1.0", "failures.0.time is -1.0, expected 0 s or above"),
+        ("failures.0.when=3", r"failures.0.when: unknown key"),
+        ("law.gains.k_p1=3", r"law.gains.k_p1: unknown key"),
+        ("law.gains.speed=0", "law.gains.speed is 0.0, expected a finite number above 0"),
+        ("actuation.through=wrench", "'wrench', expected 'thrusters'"),
+    ],
+)
+def test_faults_about_thrusters_and_their_law_are_named(override, words):
+    with pytest.raises(ScenarioError, match=words):
+        load_scenario("dense-field", [override])
+
+
+def test_gains_go_with_the_name_of_their_law(tmp_path):
+    """A base's gains are those of the base's law: naming another one drops them, naming the same one keeps them."""
+    through = "actuation.through=thrusters"
+    other = load_scenario("paper", ["law.gains.k_p1=3", "law.name=deployable", through, "law.gains.speed=0.5"])
+    assert (type(other.law.gains).__name__, other.law.gains.speed) == ("DeployableGains", 0.5)
+    assert load_scenario("paper", ["law.gains.k_p1=3", "law.name=printed"]).law.gains.k_p1 == 3.0
+    assert load_scenario(saved(tmp_path, 'base = "paper"\nlaw = { name = "printed" }\n')).law.gains.k_v1 == 90.0
+    text = 'base = "paper"\nlaw = { name = "deployable" }\nactuation = { through = "thrusters" }\n'
+    assert load_scenario(saved(tmp_path, text)).law.gains == type(other.law.gains)()
+
+
+def test_what_moves_is_named():
+    scenario = load_scenario("paper", ["goal.velocity=[0.1,0,0]", "regions.SR2.streamed=true"])
+    assert scenario.moving == ("goal", "SR2")
+    assert scenario.goal_region.velocity == (0.1, 0.0, 0.0)
+    assert scenario.goal == Sphere((8.0, 0.0, 5.0), 0.5)
+    assert load_scenario("paper").moving == ()
+
+
+@pytest.mark.parametrize(
+    ("keys", "exact"),
+    [
+        ([], True),
+        (["sensing.seed=3"], True),
+        (["sensing.dead_for=1.0"], True),
+        (["sensing.dead_from=1.0"], True),
+        (["sensing.dead_from=1.0", "sensing.dead_for=1.0"], False),
+        (["sensing.position_noise=0.1"], False),
+        (["sensing.velocity_noise=0.1"], False),
+    ],
+)
+def test_sensing_is_exact_unless_something_is_wrong_with_it(keys, exact):
+    assert load_scenario("paper", keys).sensing.exact == exact
+
+
+def test_a_limit_of_the_wrench_says_nothing_of_thrusters():
+    with pytest.raises(ScenarioError, match="limit"):
+        load_scenario("paper-limited", ["actuation.through=thrusters"])
+
+
+@pytest.mark.parametrize("missing", ["vehicle", "time", "initial", "goal"])
+def test_missing_keys_are_named(tmp_path, missing):
+    text = "\n".join(line for line in MINIMAL.splitlines() if not line.startswith(missing))
+    with pytest.raises(ScenarioError, match=rf"mine\.toml.*missing.*{missing}"):
+        load_scenario(saved(tmp_path, text))
+
+
+def test_unknown_scenario_suggests_the_nearest():
+    with pytest.raises(ScenarioError, match=r"'papr' is unknown; did you mean 'paper'"):
+        load_scenario("papr")
+
+
+@pytest.mark.parametrize("content", [b"\xff\xfe", b"a = [", b""])
+def test_broken_files_are_refused(tmp_path, content):
+    path = tmp_path / "broken.toml"
+    path.write_bytes(content)
+    with pytest.raises(ScenarioError, match=r"broken\.toml"):
+        load_scenario(path)
+
+
+def test_a_table_that_is_given_in_part_is_filled_in_too():
+    table = load_scenario("paper", ["sensing.position_noise=0.02"]).table
+    assert table["sensing"].keys() == load_scenario("paper").table["sensing"].keys()
+    assert table["sensing"]["position_noise"] == 0.02 and table["sensing"]["seed"] == 0

@@ -1,0 +1,261 @@
+"""The deployable law against what nobody should give it, and against places that are hard to get through."""
+
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from controller import VehicleState
+from controller.laws import DeployableGains, DeployableLaw
+from controller.laws.deployable.barrier import look, sight_of, slope_of, turning_of
+from controller.laws.deployable.faces import face_ahead
+from controller.regions import (
+    Box,
+    Cone,
+    Cylinder,
+    DepthBand,
+    Ellipsoid,
+    HalfSpace,
+    Orientation,
+    Pipe,
+    Prism,
+    Region,
+    Sphere,
+    Visibility,
+    pack,
+)
+from cosim.scenario.vehicle_model import vehicle_model
+from plant_fmu.vehicle import load_vehicle
+from tests.cosim.simulation.test_deployable import fly, reached, within_limits
+from tests.examples import examples
+
+ODIN = vehicle_model(load_vehicle("odin"))
+LEVEL = np.array([1.0, 0.0, 0.0, 0.0])
+PERIOD = 0.02
+HERE = np.array([0.0, 0.0, 2.0])
+# every shape where its slope is hardest to tell: centres, axes, edges, a feature in the camera, half a turn away
+SHAPES = (
+    Sphere((0.0, 0.0, 2.0), 0.5),
+    DepthBand(2.0, 0.2),
+    HalfSpace((0.0, 0.0, 2.0), (0.0, 0.6, 0.8)),
+    Box((0.0, 0.0, 2.0), (1.0, 1.0, 1.0)),
+    Box((0.5, 0.5, 2.5), (1.0, 1.0, 1.0)),
+    Cylinder((0.0, 0.0, 1.0), (0.0, 0.0, 3.0), 0.4),
+    Ellipsoid((0.0, 0.0, 2.0), (0.5, 0.7, 0.9)),
+    Prism(((-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (0.0, 0.0), (-1.0, 1.0)), 1.0, 3.0),
+    Pipe(((-2.0, 0.0, 2.0), (0.0, 0.0, 2.0), (0.0, 2.0, 2.0)), 0.4),
+    Cone((0.0, 0.0, 2.0), (1.0, 0.0, 0.0), 0.5, 2.0),
+    Orientation((1.0, 0.0, 0.0, 0.0), 0.1),
+    Orientation((0.0, 0.0, 0.0, 1.0), 0.1),
+    Orientation((0.0, 1.0, 0.0, 0.0), 0.1),
+    Visibility((0.0, 0.0, 2.0), (1.0, 0.0, 0.0), 0.3),
+    Visibility((-4.0, 0.0, 2.0), (1.0, 0.0, 0.0), 0.3),
+)
+PLACES = SHAPES[:10]
+NUMBERS = (np.nan, np.inf, -np.inf, 1e308, -1e154, 1e20, 1e7, -1e4, 99.0, 1e-308, 0.0)
+
+
+def law_for(n_regions, period=PERIOD):
+    return DeployableLaw(ODIN, DeployableGains(), LEVEL, period, n_regions)
+
+
+def numbers_of(memory):
+    """Return all that a law keeps from step to step, one array behind the other."""
+    for name, part in zip(memory._fields, memory, strict=True):
+        if name in ("program", "sight"):  # written anew at each step
+            continue
+        if hasattr(part, "_fields"):
+            yield from ((f"{name}.{key}", value) for key, value in numbers_of(part))
+        else:
+            yield name, part
+
+
+def assert_sound(law, forces):
+    assert np.isfinite(forces).all() and np.abs(forces).max() <= 27.0
+    for key, value in numbers_of(law.memory):
+        if key not in ("observed.last_measured", "guide.far_until"):
+            assert np.isfinite(value).all(), key
+
+
+class Spoilt(NamedTuple):
+    """One number of what the law is given, and what is put in its place."""
+
+    array: int
+    index: int
+    number: float
+
+
+spoilt = st.builds(Spoilt, st.integers(0, 4), st.integers(0, 99), st.sampled_from(NUMBERS))
+
+
+@settings(max_examples=examples(60), deadline=None)
+@given(
+    shapes=st.lists(st.tuples(st.sampled_from(SHAPES), st.booleans(), st.booleans()), max_size=6),
+    goal=st.tuples(st.sampled_from(PLACES), st.booleans()),
+    steps=st.lists(st.lists(spoilt, max_size=3), min_size=1, max_size=12),
+)
+def test_whatever_comes_forces_are_finite_and_within_limits_and_it_recovers(shapes, goal, steps):
+    regions = [Region(str(i), s, "in" if within else "out", hard=hard) for i, (s, within, hard) in enumerate(shapes)]
+    law, packed, forces = law_for(len(regions)), pack(regions), np.zeros(8)
+    packed_goal = pack([Region("goal", goal[0], "in" if goal[1] else "out")])
+    for changes in (*steps, *[[]] * 10):
+        given = [HERE.copy(), LEVEL.copy(), np.zeros(6), np.ones(8), np.full(len(regions), 0.5)]
+        for array, index, number in changes:
+            if given[array].size:
+                given[array][index % given[array].size] = number
+        law.step(VehicleState(*given[:4]), packed_goal, packed, given[4], forces)
+        assert_sound(law, forces)
+
+
+def test_it_believes_again_after_a_first_measurement_that_was_false():
+    """Led away by a false start, the estimate would be no number for ever: it begins anew instead."""
+    law, goal, forces = law_for(0, 0.1), pack([Region("goal", Sphere((3.0, 0.0, 2.0), 0.5), "in")]), np.zeros(8)
+    far = VehicleState(np.full(3, 9e5), LEVEL, np.array([90.0, -90.0, 90.0, 30.0, 30.0, -30.0]), np.ones(8))
+    for k in range(200):
+        here = VehicleState(
+            HERE + 1e-6 * k, LEVEL, np.zeros(6), np.ones(8)
+        )  # to the bit the same would be a dead sensor
+        law.step(far if k < 20 else here, goal, pack([]), np.zeros(0), forces)
+        assert_sound(law, forces)
+    assert law.report[0:3] == pytest.approx(HERE, abs=0.05)
+    assert forces.any()
+
+
+def test_hundreds_of_regions_are_a_step_like_any_other():
+    rng = np.random.default_rng(3)
+    regions = [
+        Region(str(i), Sphere(tuple(HERE + rng.normal(size=3) * 2.0), 0.4), "out", velocity=tuple(rng.normal(size=3)))
+        for i in range(300)
+    ]
+    law, packed, forces = law_for(300), pack(regions), np.zeros(8)
+    goal = pack([Region("goal", Sphere((6.0, 0.0, 2.0), 0.5), "in")])
+    for k in range(20):
+        packed.move_to(k * PERIOD)
+        law.step(VehicleState(HERE, LEVEL, np.zeros(6), np.ones(8)), goal, packed, np.full(300, 0.5), forces)
+        assert_sound(law, forces)
+
+
+def test_a_lone_false_rate_teaches_no_moment():
+    law, goal, forces = law_for(0), pack([Region("goal", Sphere((0.0, 0.0, 2.0), 0.5), "in")]), np.zeros(8)
+    for k in range(50):
+        rates = np.array([0.0, 0.0, 0.0, 60.0, -60.0, 60.0]) if k == 30 else np.zeros(6)
+        law.step(VehicleState(HERE, LEVEL, rates, np.ones(8)), goal, pack([]), np.zeros(0), forces)
+    assert np.abs(law.estimate[1:]).max() < 5.0
+
+
+CAGES = {
+    "box": (Box((3.0, 0.0, 2.0), (8.0, 2.0, 2.0)), (0.0, 0.7, 2.0), (9.0, 3.0, 3.5)),
+    "turned box": (Box((3.0, 0.0, 2.0), (8.0, 2.0, 2.0), (0.96, 0.0, 0.0, 0.28)), (0.0, -1.0, 2.0), (9.0, 3.0, 2.0)),
+    "tunnel": (Cylinder((-1.0, 0.0, 2.0), (9.0, 0.0, 2.0), 0.5), (0.0, 0.1, 2.0), (11.0, 0.3, 2.0)),
+    "prism": (
+        Prism(((-1.0, -1.0), (7.0, -1.0), (7.0, 5.0), (5.0, 5.0), (5.0, 1.0), (-1.0, 1.0)), 1.0, 3.0),
+        (0.0, 0.6, 2.0),
+        (10.0, 0.5, 2.0),
+    ),
+    "cone": (Cone((8.0, 0.0, 2.0), (-1.0, 0.0, 0.0), 0.3, 8.5), (0.0, 0.0, 2.0), (11.0, 0.0, 2.0)),
+    "pipe": (Pipe(((-1.0, 0.0, 2.0), (5.0, 0.0, 2.0), (5.0, 4.0, 2.0)), 0.6), (0.0, 0.2, 2.0), (9.0, 0.0, 2.0)),
+    "depth band": (DepthBand(2.0, 0.3), (0.0, 0.0, 1.8), (1.0, 0.0, 7.0)),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", CAGES)
+def test_it_stops_before_the_end_of_what_it_shall_stay_within(name):
+    """The goal lies beyond; on the way there the nearest face is one alongside, not the one ahead."""
+    shape, start, goal = CAGES[name]
+    cage = Region("cage", shape, "in")
+    flight = fly([cage], Region("goal", Sphere(goal, 0.4), "in"), start=start, duration=25.0)
+    assert flight.clearance(cage).min() > 0.0 and within_limits(flight)
+
+
+def wall(x, y, z, size):
+    return Region(f"wall {x} {y} {z}", Box((x, y, z), size), "out")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("width", [0.6, 0.3])
+def test_a_door_that_is_the_only_way_is_found_and_passed(width):
+    beside, above = 3.0 + width / 2, (0.2, width + 0.01, 6.0)
+    walls = [wall(4.0, side * beside, 2.0, (0.2, 6.0, 8.0)) for side in (-1, 1)]
+    walls += [wall(4.0, 0.0, 2.0 + side * beside, above) for side in (-1, 1)]
+    flight = fly(walls, Region("goal", Sphere((8.0, 1.0, 2.0), 0.5), "in"), start=(0.0, -1.0, 2.0), duration=50.0)
+    assert reached(flight) and within_limits(flight)
+    assert min(flight.clearance(each).min() for each in walls) > 0.0
+
+
+@pytest.mark.parametrize(
+    ("shape", "at", "nearest", "velocity", "distance", "face"),
+    [
+        (Box((0, 0, 0), (8, 2, 2)), (0, 0.9, 0), (0, -1, 0), (1.0, 0.1, 0), 4.0, (-1, 0, 0)),
+        (Box((0, 0, 0), (8, 2, 2)), (3.5, 0.9, 0.2), (0, -1, 0), (0.1, 0, -1.0), 1.2, (0, 0, 1)),
+        (Cylinder((-1, 0, 0), (5, 0, 0), 0.5), (0, 0, 0.4), (0, 0, -1), (0.8, 0, 0.1), 5.0, (-1, 0, 0)),
+        (DepthBand(0, 0.3), (0, 0, -0.2), (0, 0, 1), (0.3, 0, 0.4), 0.5, (0, 0, -1)),
+        (Box((0, 0, 0), (8, 2, 2)), (0, 0.9, 0), (0, -1, 0), (0, 0.1, 0), np.inf, None),
+        (Box((0, 0, 0), (80, 2, 2)), (0, 0.9, 0), (0, -1, 0), (1, 0, 0), np.inf, None),
+    ],
+)
+def test_the_face_ahead_is_found(shape, at, nearest, velocity, distance, face):
+    found, packed = np.empty(3), pack([Region("cage", shape, "in")])
+    plane = face_ahead(packed, 0, np.array(at, float), np.array(nearest, float), np.array(velocity, float), 6.0, found)
+    assert plane == pytest.approx(distance, abs=1e-12)
+    if face is not None:
+        assert found == pytest.approx(np.array(face, float), abs=1e-12)
+
+
+def test_a_slope_turns_by_the_motion_against_the_region():
+    """Side by side with a ball that moves along, nothing turns; against finite differences where it does."""
+    for own in ((0.0, 0.0, 0.0), (0.0, 0.3, 0.0), (0.0, -0.1, 0.05)):
+        packed = pack([Region("ball", Sphere((2.0, 0.0, 2.0), 0.5), "out", velocity=own)])
+        velocity, sight, n, later = np.array([0.05, 0.3, 0.0, 0.0, 0.0, 0.0]), sight_of(1), np.empty(6), np.empty(6)
+        look(sight, packed, HERE, LEVEL, velocity)
+        assert slope_of(sight.gradients, sight.turnings, 0, False, n)
+        assert slope_of(sight.later_gradients, sight.later_turnings, 0, False, later)
+        relative = velocity - np.r_[own, np.zeros(3)]
+        line, step = HERE - [2.0, 0.0, 2.0], 1e-3
+        distances = [np.linalg.norm(line + k * step * relative[:3]) for k in (-1, 0, 1)]
+        truth = (distances[0] - 2.0 * distances[1] + distances[2]) / step**2
+        assert turning_of(Sphere.kind, n, later, relative) == pytest.approx(truth, abs=0.003)
+
+
+def test_no_turn_is_seen_where_another_face_becomes_the_nearest():
+    """In the middle between two walls the slope leaps to the opposite, which is no acceleration."""
+    one, other = np.array([0.0, 1.0, 0.0, 0.0, 0.0, 0.0]), np.array([0.0, -1.0, 0.0, 0.0, 0.0, 0.0])
+    for kind in (Box.kind, DepthBand.kind, Cylinder.kind, Sphere.kind):
+        assert turning_of(kind, one, other, 0.5 * one) == 0.0
+
+
+@pytest.mark.parametrize(
+    "region",
+    [
+        Region("view", Visibility((-4.0, 0.0, 2.0), (1.0, 0.0, 0.0), 0.4), "in"),
+        Region("facing", Orientation((0.0, 0.0, 0.0, 1.0), 0.2), "in"),
+    ],
+    ids=["a feature right behind", "an attitude half a turn away"],
+)
+def test_half_a_turn_away_it_turns_one_way_round(region):
+    """There the slope is zero: nothing would say which way to turn."""
+    flight = fly([region], Region("goal", Sphere((0.0, 0.0, 2.0), 0.5), "in"), duration=20.0)
+    north = 1.0 - 2.0 * (flight.quaternion[:, 2] ** 2 + flight.quaternion[:, 3] ** 2)  # of the body's x axis
+    assert north[0] > 0.99 and north[-1] < -np.cos(0.4)
+    assert np.abs(flight.forces[-100:]).max() < 27.0
+
+
+@pytest.mark.slow
+def test_smoothing_halves_what_noise_makes_of_the_thrust():
+    rng = np.random.default_rng(8)
+    noise = rng.normal(size=(1000, 2, 3)) * np.array([[0.02], [0.01]])
+
+    def noisy(now, state):
+        k = round(now / PERIOD)
+        velocity = state.velocity_body.copy()
+        velocity[:3] += noise[k, 1]
+        return state._replace(position=state.position + noise[k, 0], velocity_body=velocity)
+
+    variation = []
+    for smoothing in (0.0, DeployableGains().smoothing):
+        flight = fly([], duration=20.0, spoil=noisy, gains=DeployableGains(smoothing=smoothing))
+        assert reached(flight)
+        variation.append(np.abs(np.diff(flight.forces, axis=0)).sum())
+    assert variation[1] < 0.5 * variation[0]

@@ -1,0 +1,58 @@
+"""The order of a step: Jacobi's is that of masters that exchange all values at once."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cosim.scenario.scenario import CRITERIA, load_scenario
+from cosim.simulation.master import Master
+from tests.cosim.ssp.jacobi import jacobi as by_parts
+
+ALL_SHAPES = Path(__file__).parents[1] / "ssp" / "all-shapes.toml"
+
+SHORT = [
+    'arbiter.engine="closed"', "time.duration=6.0", "time.step=0.01", "time.control=0.02", "time.arbiter=0.03",
+    "limit.force=120.0",
+]  # fmt: skip
+
+
+class Rows:
+    def __init__(self):
+        self.rows = []
+
+    def observe(self, k, row):
+        self.rows.append(row.copy())
+
+
+def rows_of(scenario):
+    rows = Rows()
+    with Master(scenario) as master:
+        master.run([rows])
+        return np.array(rows.rows), master.signals
+
+
+@pytest.mark.parametrize("scenario", [("paper", SHORT), (ALL_SHAPES, [])], ids=["paper", "all shapes"])
+def test_jacobi_is_three_parts_that_exchange_at_the_end_of_each_step(scenario):
+    name, settings = scenario
+    loaded = load_scenario(name, [*settings, "master.order=jacobi"])
+    rows, signals = rows_of(loaded)
+    at = signals.index("position.x")
+    np.testing.assert_array_equal(rows[:, at : at + 13], by_parts(loaded))
+    at = signals.index(f"weight.{CRITERIA[0]}")
+    assert rows[:, at : at + 3].max() > 0.5
+
+
+def test_the_orders_come_together_as_the_step_gets_shorter():
+    def apart(step):
+        given = [*SHORT[:2], *(f"time.{key}={step}" for key in ("step", "control", "arbiter")), SHORT[-1]]
+        ends = []
+        for order in ("gauss-seidel", "jacobi"):
+            rows, signals = rows_of(load_scenario("paper", [*given, f'master.order="{order}"']))
+            at = signals.index("position.x")
+            ends.append(rows[-1, at : at + 3])
+        return np.linalg.norm(ends[0] - ends[1])
+
+    coarse, fine = apart(0.02), apart(0.005)
+    assert fine > 1e-6
+    assert coarse / fine == pytest.approx(4.0, rel=0.4)  # of first order in the step

@@ -1,0 +1,153 @@
+"""The stepping: order, periods, actuation, and what observers see."""
+
+import time
+
+import numpy as np
+import pytest
+
+from cosim.scenario.scenario import load_scenario
+from cosim.simulation.master import Master
+from plant_fmu import PlantError
+
+SHORT = ["arbiter.engine=closed", "time.duration=0.5"]
+
+
+class Keep:
+    def __init__(self, master):
+        self.rows, self.signals = [], master.signals
+
+    def observe(self, k, row):
+        assert k == len(self.rows)
+        self.rows.append(row.copy())
+
+    def __getitem__(self, name):
+        return np.array(self.rows)[:, self.signals.index(name)]
+
+
+def run(name="paper-limited", *overrides):
+    with Master(load_scenario(name, [*SHORT, *overrides])) as master:
+        kept = Keep(master)
+        master.run([kept])
+    return kept
+
+
+def test_time_is_a_count_of_steps():
+    kept = run()
+    assert len(kept.rows) == 501
+    assert np.array_equal(kept["time"], np.arange(501) * 0.001)
+
+
+def test_first_row_is_the_start_and_the_first_decision():
+    kept = run()
+    assert [kept[f"position.{a}"][0] for a in "xyz"] == [0.0, 0.0, 1.0]
+    assert kept["command.X"][0] > 2e4
+    assert kept["wrench.X"][0] == kept["command.X"][0]  # Gauss-Seidel: this step's measurement, this step's force
+    force = np.array([kept[f"actuation.{a}"][0] for a in "XYZ"])
+    assert np.linalg.norm(force) == pytest.approx(108.0)
+
+
+def test_a_step_is_newtons_law_from_row_to_row():
+    """From rest the first millisecond gives F / (m + added mass), by the numbers of the record alone."""
+    kept = run("paper-limited", "plant.parameters.r_G.z=0")  # nothing couples surge to pitch
+    assert kept["velocity.u"][1] == pytest.approx(kept["actuation.X"][0] / 187.5 * 0.001, rel=1e-6)
+
+
+def test_control_and_arbiter_hold_between_their_periods():
+    kept = run("paper-limited", "time.control=0.010", "time.arbiter=0.050")
+    commands = np.array([kept[f"command.{a}"] for a in "XZ"]).T
+    changes = np.flatnonzero(np.any(np.diff(commands, axis=0) != 0.0, axis=1)) + 1
+    assert np.all(changes % 10 == 0) and len(changes) > 40
+    memberships = kept["membership.depth"]
+    assert np.all(np.flatnonzero(np.diff(memberships)) % 50 == 49)
+
+
+def test_estimate_moves_once_a_control_period():
+    kept = run("paper-limited", "time.control=0.010")
+    changes = np.flatnonzero(np.diff(kept["estimate.phi1"])) + 1
+    assert np.all(changes % 10 == 0)
+
+
+@pytest.mark.parametrize("limits", ["direction", "per-thruster"])
+def test_thrusters_carry_the_wrench(limits):
+    kept = run("paper", "actuation.through=thrusters", f"actuation.limits={limits}")
+    thrusts = np.array([kept[f"thrust[{i + 1}]"] for i in range(8)])[:, :-1]
+    assert np.abs(thrusts).max() == pytest.approx(27.0)
+    # the last row decides, but acts no more
+    assert np.array_equal(thrusts, np.array([kept[f"thruster_force[{i + 1}]"] for i in range(8)])[:, :-1])
+    assert not kept["wrench.X"].any()
+    x, z = (kept[f"actuation.{a}"][:-1] / kept[f"command.{a}"][:-1] for a in "XZ")
+    assert np.allclose(x, z, rtol=1e-9) == (limits == "direction")
+
+
+def test_membership_of_a_criterion_is_that_of_its_most_pressing_region():
+    kept = run("paper", "regions.SR2.criterion=obstacle")
+    clearance = np.minimum(kept["SR1.clearance"], kept["SR2.clearance"])
+    assert kept["membership.obstacle"] == pytest.approx(np.clip(1.0 - clearance / 0.2, 0.0, 1.0), abs=1e-12)
+
+
+def test_no_regions_is_a_scene_too():
+    kept = run("paper", "regions=[]", "intersection=[]")
+    assert not kept["weight.obstacle"].any()
+
+
+def test_current_and_parameters_reach_the_plant():
+    still, moving = run("paper-limited"), run("paper-limited", "plant.current=[0.0,0.5,0.0]")
+    assert still["velocity.v"][-1] == 0.0 and moving["velocity.v"][-1] > 0.0
+    heavy = run("paper-limited", "plant.parameters.mass=250")
+    assert heavy["velocity.u"][-1] < still["velocity.u"][-1]
+
+
+@pytest.mark.parametrize(
+    ("override", "words"),
+    [
+        ("plant.parameters.mass=-5", "mass = -5 refused"),
+        ("plant.parameters.r_G.z=5e3", "r_G.z = 5000 refused"),
+        ("initial.position=[1e9,0,0]", "position.x"),
+    ],
+)
+def test_what_the_fmu_refuses_is_told(override, words):
+    with pytest.raises(Exception, match=words):
+        Master(load_scenario("paper", [override]))
+
+
+def test_a_failing_step_says_when():
+    with (
+        Master(load_scenario("paper", [*SHORT, "law.gains.k_p1=1e9"])) as master,
+        pytest.raises(PlantError, match=r"t = 0 s: wrench"),
+    ):
+        master.run()
+
+
+@pytest.mark.slow
+def test_many_masters_leave_nothing_behind(tmp_path, monkeypatch):
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    for _ in range(20):
+        with Master(load_scenario("paper", [*SHORT, "time.duration=0.005"])) as master:
+            master.run()
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.slow
+def test_a_stall_is_not_made_up_for_in_a_rush():
+    walls = []
+
+    class Stalling:
+        def observe(self, k, row):
+            if k == 10:
+                time.sleep(0.6)
+            walls.append(time.perf_counter())
+
+    with Master(load_scenario("paper-limited", ["arbiter.engine=closed", "time.duration=0.5"])) as master:
+        master.run([Stalling()], rate=1.0)
+    # the steps after the stall would otherwise go by at once; a tenth of a second is made up for
+    assert walls[-1] - walls[10] > 0.3
+
+
+def test_rate_paces_by_the_wall_clock():
+    """No time is asserted beyond the one that was asked for."""
+    with Master(load_scenario("paper-limited", [*SHORT, "time.duration=0.2"])) as master:
+        master.run()  # warm
+    with Master(load_scenario("paper-limited", [*SHORT, "time.duration=0.2"])) as master:
+        before = time.perf_counter()
+        master.run(rate=1.0)
+        assert time.perf_counter() - before >= 0.2

@@ -1,0 +1,245 @@
+"""A scenario as a system of FMUs: the same flight in masters that we did not write as in Jacobi's order here."""
+
+import importlib.util
+import io
+import re
+import shlex
+import subprocess
+import sys
+import zipfile
+from importlib import resources
+from pathlib import Path
+
+import fmpy.ssp
+import numpy as np
+import pytest
+from fmpy.ssp.ssd import get_connections, read_ssd
+from lxml import etree
+
+from cosim.command_line.cli import main
+from cosim.errors import RunError
+from cosim.scenario.scenario import load_scenario
+from cosim.simulation.master import Master
+from cosim.ssp import package_system
+from cosim.ssp.system import MOTION
+from plant_fmu.running.slave import Slave
+from tests.cosim.ssp.masters import fmpy as run_in_fmpy
+
+ROOT = Path(__file__).parents[3]
+ALL_SHAPES = Path(__file__).parent / "all-shapes.toml"
+CLOSED = "arbiter.engine=closed"
+TEN_MS = [CLOSED, "time.step=0.01", "time.control=0.01", "time.arbiter=0.01"]
+COMES_IN = {"ecos": "ecospy", "libcosim": "libcosimpy"}
+
+
+@pytest.fixture(scope="module")
+def packed(tmp_path_factory):
+    """The system of every shape of region, FMI 2.0."""
+    return package_system(load_scenario(ALL_SHAPES), tmp_path_factory.mktemp("ssp") / "all.ssp")
+
+
+def test_a_master_with_another_step_is_warned(packed, capfd):
+    """In FMPy, which prints what FMUs say; the scenario has a step of 10 ms, the law a period of 30 ms."""
+    run_in_fmpy(packed, 20, 0.02)
+    warnings = [line for line in capfd.readouterr().out.splitlines() if "late" in line]
+    assert len(warnings) == 1
+    assert "the law runs at t = 0.04 s, 0.01 s late: steps do not divide time.control = 0.03 s" in warnings[0]
+    run_in_fmpy(packed, 20, 0.01)
+    assert "late" not in capfd.readouterr().out
+
+
+class Motion:
+    """Position, quaternion and velocity before each step and after the last."""
+
+    def __init__(self, signals):
+        self.at, self.rows = [signals.index(name) for name in MOTION], []
+
+    def observe(self, k, row):
+        self.rows.append(row[self.at])
+
+
+def jacobi(name, settings=()):
+    """Fly a scenario in our own master in Jacobi's order."""
+    with Master(load_scenario(name, [*settings, "master.order=jacobi"])) as master:
+        motion = Motion(master.signals)
+        master.run([motion])
+    return np.array(motion.rows)
+
+
+def compared(ours, theirs):
+    np.testing.assert_allclose(theirs, ours[1:], rtol=0.0, atol=1e-10)
+
+
+def test_fmpy_flies_it_as_we_do(packed):
+    """With every shape, regions and goal on the move, a current, a lag, and three periods."""
+    scenario = load_scenario(ALL_SHAPES)
+    ours = jacobi(ALL_SHAPES)
+    assert np.linalg.norm(ours[-1, :3] - ours[0, :3]) > 0.5
+    compared(ours, run_in_fmpy(packed, scenario.steps, scenario.time.step))
+
+
+@pytest.mark.slow
+def test_the_page_on_it_does_what_it_says(tmp_path, monkeypatch, capsys):
+    text = (ROOT / "docs" / "ssp.md").read_text()
+    command, code = re.search(r"```sh\ncosim (.*?)```", text, re.S)[1], re.search(r"```python\n(.*?)```", text, re.S)[1]
+    monkeypatch.chdir(tmp_path)
+    assert main(shlex.split(command.replace("\\\n", " "))) == 0
+    names = {}
+    exec(code, names)
+    assert len(names["result"]) == 3000
+    assert names["result"]["plant.position.z"][-1] == pytest.approx(6.2665, abs=1e-3)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("fmi", [pytest.param(2, marks=pytest.mark.slow), 3])
+@pytest.mark.parametrize("name", ["paper", "paper-limited"])
+@pytest.mark.parametrize("master", ["fmpy", "ecos", "libcosim"])
+def test_masters_fly_the_paper_as_we_do(master, name, fmi, tmp_path):
+    """30 s at 10 ms; in the first step FMPy's connectors are 0, those of the others hold the plant's first outputs."""
+    if fmi == 3 and master != "ecos":
+        pytest.skip("takes FMI 2.0 alone in a system")
+    if master in COMES_IN and importlib.util.find_spec(COMES_IN[master]) is None:
+        pytest.skip(f"{COMES_IN[master]} is not installed")
+    settings = [*TEN_MS, "time.duration=30.0"]
+    scenario = load_scenario(name, settings)
+    path, out = package_system(scenario, tmp_path / "s.ssp", fmi), tmp_path / "rows.npy"
+    command = [sys.executable, "-m", "tests.cosim.ssp.masters", master, path, "3000", "0.01", out]
+    done = subprocess.run([*map(str, command)], cwd=ROOT, capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout[-300:] + done.stderr[-300:]
+    compared(jacobi(name, settings), np.load(out))
+
+
+# ---- the file ----
+
+
+def test_it_keeps_to_the_schema_and_names_what_its_fmus_have(packed, tmp_path):
+    with zipfile.ZipFile(packed) as archive:
+        archive.extractall(tmp_path)
+    schema = Path(fmpy.ssp.__file__).parent / "schema" / "SystemStructureDescription.xsd"
+    etree.XMLSchema(etree.parse(schema)).assertValid(etree.parse(tmp_path / "SystemStructure.ssd"))
+    (experiment,) = etree.parse(tmp_path / "SystemStructure.ssd").iterfind("{*}DefaultExperiment")
+    assert dict(experiment.attrib) == {"startTime": "0.0", "stopTime": "2.0"}
+    described = read_ssd(str(packed))
+    for component in described.system.elements:
+        model = fmpy.read_model_description(str(tmp_path / component.source))
+        variables = {v.name: v for v in model.modelVariables}
+        for connector in component.connectors:
+            assert variables[connector.name].causality == connector.kind
+        shown = {connector.name for connector in component.connectors}
+        if component.name != "plant":  # whose thrusters nobody drives here
+            assert {v.name for v in model.modelVariables if v.causality == "input"} <= shown
+    ends = [end for _, end in get_connections(described.system)]
+    inputs = [c for component in described.system.elements for c in component.connectors if c.kind == "input"]
+    assert len(ends) == len(inputs) == 13 + 6 + 3 + 3  # each once
+
+
+def test_units_of_both_ends_are_one(packed):
+    with zipfile.ZipFile(packed) as archive:
+        root = etree.fromstring(archive.read("SystemStructure.ssd"))
+    ns = {"ssd": root.nsmap["ssd"], "ssc": root.nsmap["ssc"]}
+    units = {
+        (component.get("name"), connector.get("name")): connector.find("ssc:Real", ns).get("unit")
+        for component in root.iterfind(".//ssd:Component", ns)
+        for connector in component.iterfind(".//ssd:Connector", ns)
+    }
+    for c in root.iterfind(".//ssd:Connection", ns):
+        ends = [(c.get(f"{end}Element"), c.get(f"{end}Connector")) for end in ("start", "end")]
+        assert units[ends[0]] == units[ends[1]], ends
+    defined = {unit.get("name") for unit in root.iterfind("./ssd:Units/ssc:Unit", ns)}
+    assert {unit for unit in units.values() if unit} == defined
+
+
+def test_the_plant_starts_as_the_scenario_says(packed, tmp_path):
+    with zipfile.ZipFile(packed) as archive:
+        archive.extract("resources/plant.fmu", tmp_path)
+    with Slave(tmp_path / "resources" / "plant.fmu") as plant:
+        plant.initialise()
+        got = {name: plant[name] for name in ("position.x", "quaternion.e2", "velocity.u", "current.y", "weight")}
+        assert got == {"position.x": 0.5, "quaternion.e2": 0.6, "velocity.u": 0.1, "current.y": -0.05, "weight": 1230.0}
+        assert plant["wrench_force_limit"] == 200.0 and plant["seed"] == 7 and plant["free_surface"] is True
+
+
+def test_the_same_bytes_each_time_and_no_python_inside(packed, tmp_path):
+    again = package_system(load_scenario(ALL_SHAPES), tmp_path / "again.ssp")
+    assert again.read_bytes() == packed.read_bytes()
+    with zipfile.ZipFile(packed) as archive:
+        names = archive.namelist()
+        for name in names:
+            if name.endswith(".fmu"):
+                names += zipfile.ZipFile(io.BytesIO(archive.read(name))).namelist()
+    assert not [name for name in names if ".py" in name]
+
+
+def test_the_scenario_within_makes_the_same_file(packed, tmp_path):
+    with zipfile.ZipFile(packed) as archive:
+        inner = tmp_path / "all-shapes.toml"
+        inner.write_bytes(archive.read("documentation/scenario.toml"))
+    assert package_system(load_scenario(inner), tmp_path / "again.ssp").read_bytes() == packed.read_bytes()
+
+
+@pytest.mark.slow
+def test_a_vehicle_of_ones_own_goes_with_it(packed, tmp_path):
+    shipped = resources.files("plant_fmu") / "vehicles" / "odin.toml"
+    (tmp_path / "mine.toml").write_text(shipped.read_text().replace('name = "odin"', 'name = "mine"'))
+    scenario = load_scenario(ALL_SHAPES, [f"vehicle='{tmp_path / 'mine.toml'}'"])
+    with zipfile.ZipFile(package_system(scenario, tmp_path / "mine.ssp")) as archive:
+        archive.extractall(tmp_path / "out")
+    assert str(tmp_path) not in (tmp_path / "out" / "documentation" / "scenario.toml").read_text()
+    again = load_scenario(tmp_path / "out" / "documentation" / "scenario.toml")
+    assert again.vehicle.name == scenario.vehicle.name
+
+
+# ---- what it cannot be ----
+
+
+@pytest.mark.parametrize(
+    ("name", "changes", "said"),
+    [
+        ("paper", [], "arbiter.engine is 'skfuzzy', expected 'closed' or 'exact'"),
+        ("paper", [CLOSED, "law.name='unarbitrated'"], "law.name is 'unarbitrated', expected 'printed'"),
+        ("paper", [CLOSED, "actuation.through='thrusters'"], "actuation.through is 'thrusters', expected 'wrench'"),
+        ("paper", [CLOSED, "sensing.position_noise=0.1"], "sensing is not exact, expected neither noise nor gaps"),
+        ("paper", [CLOSED, "commands.enabled=true"], "commands.enabled is true, expected false"),
+        ("paper", [CLOSED, "goal.streamed=true"], "goal.streamed is true, expected false"),
+        ("paper", [CLOSED, "regions.SR2.streamed=true"], "regions.SR2.streamed is true, expected false"),
+    ],
+)
+def test_what_a_system_has_not_is_refused_by_its_key(name, changes, said, tmp_path):
+    with pytest.raises(RunError) as caught:
+        package_system(load_scenario(name, changes), tmp_path / "s.ssp")
+    assert str(caught.value).startswith(said)
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_step_that_does_not_divide_a_period_is_not_packaged(tmp_path, capsys):
+    out = tmp_path / "s.ssp"
+    assert main(["package", str(ALL_SHAPES), "--set", "time.step=0.02", "--out", str(out)]) == 2
+    said = capsys.readouterr().err
+    assert "time.control" in said and "a whole multiple of time.step (0.02 s)" in said and said.count("\n") == 1
+    assert not out.exists()
+
+
+def test_failures_are_refused(tmp_path):
+    changes = [CLOSED, "actuation.through='thrusters'", "failures=[{thruster=1, time=2.0}]"]
+    with pytest.raises(RunError, match=r"^actuation\.through"):  # which they need
+        package_system(load_scenario("paper", changes), tmp_path / "s.ssp")
+
+
+# ---- the command ----
+
+
+def test_the_command_writes_it(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert main(["package", str(ALL_SHAPES), "--to", "ssp"]) == 0
+    assert capsys.readouterr().out == "all-shapes.ssp\n"
+    assert zipfile.is_zipfile("all-shapes.ssp")
+
+
+def test_the_command_says_what_stands_against_it(tmp_path, capsys):
+    out = tmp_path / "nowhere" / "s.ssp"
+    assert main(["package", str(ALL_SHAPES), "--out", str(out)]) == 2
+    assert "nowhere" in capsys.readouterr().err
+    assert main(["package", "paper", "--out", str(tmp_path / "s.ssp")]) == 2
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1 and "arbiter.engine" in said
+    assert not list(tmp_path.iterdir())
