@@ -6,6 +6,7 @@ import gc
 import os
 import signal
 import time
+import zlib
 from pathlib import Path
 
 import pytest
@@ -22,6 +23,7 @@ DATA = Path(__file__).parent / "data"
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--slow", action="store_true", help="also run the tests marked slow")
+    parser.addoption("--share", default="1/1", metavar="K/N", help="of the slow ones the K-th of N shares")
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -30,10 +32,12 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    if not config.getoption("--slow"):
-        for item in items:
-            if "slow" in item.keywords:
-                item.add_marker(pytest.mark.skip(reason="slow; run with --slow"))
+    share, shares = map(int, config.getoption("--share").split("/"))
+    for item in (item for item in items if "slow" in item.keywords):
+        if not config.getoption("--slow"):
+            item.add_marker(pytest.mark.skip(reason="slow; run with --slow"))
+        elif zlib.crc32(item.nodeid.encode()) % shares != share % shares:
+            item.add_marker(pytest.mark.skip(reason="slow, and of another --share"))
     # of two processes one begins with these, and has compiled the laws when the other one comes to them
     items.sort(key=lambda item: item.nodeid.startswith(("tests/controller/", "tests/cosim/")))
 
