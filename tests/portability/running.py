@@ -155,7 +155,7 @@ def _python_of(version: str, extras: Sequence[str]) -> Path:
     resolve += ["--output-file", str(requirements), "pyproject.toml"]
     _asked([str(uv), *resolve], NotToBeHadError, f"wheels of all that is needed on Python {version}")
     _asked(
-        [str(uv), "venv", "--quiet", "--clear", "--python", version, str(python.parents[1])],
+        [str(uv), "venv", "--quiet", "--clear", "--seed", "--python", version, str(python.parents[1])],
         NotToBeHadError,
         f"Python {version}",
     )

@@ -148,7 +148,7 @@ def test_the_folder_of_another_campaign_is_refused(tmp_path, scenes, monkeypatch
     if "scenes" in change:
         write(scenes, change["scenes"])
     if "code" in change:
-        monkeypatch.setattr("cosim.campaigns.store.plan.code_digest", lambda: "other")
+        monkeypatch.setattr("cosim.campaigns.scenes.plan.code_digest", lambda: "other")
     with pytest.raises(RunError, match=f"holds another campaign .*{words}"):
         run_campaign(scenes, "printed", tmp_path / "out", change.get("conditions", BRIEF), change.get("gains"))
     assert {p: p.read_bytes() for p in (tmp_path / "out").rglob("*") if p.is_file()} == before

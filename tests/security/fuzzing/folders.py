@@ -189,7 +189,7 @@ def part_of_campaign(seeds: Seeds) -> Case:
 
 
 def _without_drawing(seeds: Seeds, module: str) -> None:
-    seeds.patch.setattr(f"cosim.campaigns.{module}.write_figures", lambda folder, _: _AnyFigure())
+    seeds.patch.setattr(f"cosim.campaigns.pages.{module}.write_figures", lambda folder, _: _AnyFigure())
 
 
 class _AnyFigure(dict[str, Html]):
