@@ -18,11 +18,11 @@ needs_posix = pytest.mark.skipif(sys.platform != "linux", reason="looks into /pr
 
 _MAIN = """
 import sys
-from cosim import progress
-from cosim.campaigns import sweep_rows
+from cosim.run import progress
+from cosim.campaigns.sweeps import rows
 from cosim.command_line.cli import main
 from tests.cosim.campaigns.fake import ENGINES
-sweep_rows.ENGINES.update(ENGINES)
+rows.ENGINES.update(ENGINES)
 progress._PERIOD = 1e6  # whether anything is compiled depends on what earlier runs kept
 sys.exit(main(sys.argv[1:]))
 """

@@ -287,12 +287,14 @@ def test_the_command_tells_what_came_of_it(tmp_path, fakes, capsys):
 _FULL = """
 import resource, sys
 from pathlib import Path
-from cosim.campaigns import batches, run_sweep, sweep_rows
+from cosim.campaigns import run_sweep
+from cosim.campaigns.sweeps import rows
+from cosim.campaigns.workers import batch_sizing
 from cosim.errors import RunError
 from tests.cosim.campaigns.fake import ENGINES, design, paper
-sweep_rows.ENGINES.update(ENGINES)
-batches.FIRST = batches.GREATEST = int(sys.argv[2])
-batches.TARGET = batches.LEAST = 1e9  # s: none is smaller because the machine is slow
+rows.ENGINES.update(ENGINES)
+batch_sizing.FIRST = batch_sizing.GREATEST = int(sys.argv[2])
+batch_sizing.TARGET = batch_sizing.LEAST = 1e9  # s: none is smaller because the machine is slow
 if len(sys.argv) > 3:
     resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[3]), -1))
 try:
@@ -328,10 +330,13 @@ def flown_rows(folder):
 _MEMORY = """
 import sys
 from pathlib import Path
-from cosim.campaigns import batches, parts, run_sweep, sweep_rows
+from cosim.campaigns import run_sweep
+from cosim.campaigns.store import parts
+from cosim.campaigns.sweeps import rows
+from cosim.campaigns.workers import batch_sizing
 from tests.cosim.campaigns.fake import ENGINES, design, paper
-sweep_rows.ENGINES.update(ENGINES)
-batches.FIRST = batches.GREATEST = 48
+rows.ENGINES.update(ENGINES)
+batch_sizing.FIRST = batch_sizing.GREATEST = 48
 
 def resident():
     pages = int(Path("/proc/self/statm").read_text().split()[1])
