@@ -70,7 +70,7 @@ def measure(steps: int, repeats: int) -> list[Row]:
 
 
 def _law_alone(master: Master) -> Callable[[], None]:
-    state, around, forces = master.state, master.surroundings, master.actuators.command
+    state, around, forces = master.state, master.environment, master.actuators.command
     weights: Array = np.zeros(len(master.scenario.regions))
     return lambda: master.law.step(state, around.goal, around.regions, weights, forces)
 

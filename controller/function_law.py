@@ -23,7 +23,7 @@ class RegionsSeen(NamedTuple):
 
     values: Array  # (n,) g, above 0 where violated, in the unit of the shape
     gradients: Array  # (n, 3) dg/dp, world frame
-    turnings: Array  # (n, 3) dg/dtheta [1/rad], for a small rotation about the body's axes
+    rotation_gradients: Array  # (n, 3) dg/dtheta [1/rad], for a small rotation about the body's axes
     clearances: Array  # (n,) to the surface, m (rad for shapes of attitude), below 0 where violated
     velocities: Array  # (n, 3) m/s, NED
     gains: Array  # (n,) alpha_i
@@ -140,8 +140,14 @@ def qualified_name(law: object) -> str:
 
 def _seen(regions: PackedRegions, state: VehicleState) -> RegionsSeen:
     n = regions.kinds.size
-    values, gradients, turnings, clearances = np.zeros(n), np.zeros((n, 3)), np.zeros((n, 3)), np.zeros(n)
-    regions.evaluate(state.position, state.quaternion, values, gradients, turnings, clearances)
+    values, gradients, rotation_gradients, clearances = np.zeros(n), np.zeros((n, 3)), np.zeros((n, 3)), np.zeros(n)
+    regions.evaluate(state.position, state.quaternion, values, gradients, rotation_gradients, clearances)
     return RegionsSeen(
-        values, gradients, turnings, clearances, regions.velocities.copy(), regions.gains.copy(), regions.hard.copy()
+        values,
+        gradients,
+        rotation_gradients,
+        clearances,
+        regions.velocities.copy(),
+        regions.gains.copy(),
+        regions.hard.copy(),
     )

@@ -23,8 +23,8 @@ class TelemetryError(CosimError):
     """A telemetry link that cannot be opened."""
 
 
-class OrderError(CosimError):
-    """An order to a running vehicle that cannot be followed."""
+class CommandError(CosimError):
+    """A command to a running vehicle that cannot be followed."""
 
 
 class ExportError(CosimError):

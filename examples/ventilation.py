@@ -35,7 +35,7 @@ from fuzzy_arbiter import (
 # ## From measurements to weights
 #
 # A criterion is a measurement and the degree to which it asks for attention: below the first number not at all, above
-# the second fully. The order is the priority. Sensors may read more than the second number; `outside="clip"` says
+# the second fully. The command is the priority. Sensors may read more than the second number; `outside="clip"` says
 # that this is no fault, but as good as the end.
 
 # %%
@@ -127,7 +127,7 @@ if __name__ == "__main__":
 # ## Rules of one's own
 #
 # Criteria make their rules themselves. Any other Mamdani system can be written down by hand: as text, or with `&`,
-# `|` and `~` on the variables' terms. This one gives the speed of the fan. Its last rule is a wish, not an order, and
+# `|` and `~` on the variables' terms. This one gives the speed of the fan. Its last rule is a wish, not a command, and
 # so has a weight; `default` says what happens where no rule fires.
 
 # %%

@@ -26,7 +26,7 @@ class PrintedMemory(NamedTuple):
     goal_clearance: Array  # (1,) m or rad
     values: Array  # (n,)
     gradients: Array  # (n, 3)
-    turnings: Array  # (n, 3)
+    rotation_gradients: Array  # (n, 3)
     clearances: Array  # (n,)
     alphas: Array  # (n,) gains of the regions times their weights
 
@@ -45,7 +45,7 @@ def step(
     p, e = state.position, state.quaternion
     # regions push by force alone (22): what they say of attitude is passed over
     evaluate_packed(goal, p, e, memory.goal_value, memory.goal_gradient, memory.goal_turning, memory.goal_clearance)
-    evaluate_packed(regions, p, e, memory.values, memory.gradients, memory.turnings, memory.clearances)
+    evaluate_packed(regions, p, e, memory.values, memory.gradients, memory.rotation_gradients, memory.clearances)
     for i in range(weights.size):
         memory.alphas[i] = regions.gains[i] * weights[i]
     printed_law.step(
@@ -77,7 +77,7 @@ def memory_of(desired_quaternion: Array, period: Array, n_regions: int) -> Print
         goal_clearance=np.zeros(1),
         values=np.zeros(n_regions),
         gradients=np.zeros((n_regions, 3)),
-        turnings=np.zeros((n_regions, 3)),
+        rotation_gradients=np.zeros((n_regions, 3)),
         clearances=np.zeros(n_regions),
         alphas=np.zeros(n_regions),
     )

@@ -99,7 +99,13 @@ class PackedRegions(NamedTuple):
     pose: int  # address of what evaluates shapes of attitude; 0 where there are none
 
     def evaluate(
-        self, position: Array, quaternion: Array, values: Array, gradients: Array, turnings: Array, clearances: Array
+        self,
+        position: Array,
+        quaternion: Array,
+        values: Array,
+        gradients: Array,
+        rotation_gradients: Array,
+        clearances: Array,
     ) -> None:
         """Evaluate every region at a pose, into the given arrays.
 
@@ -125,11 +131,11 @@ class PackedRegions(NamedTuple):
         RegionError
             If an array is not contiguous.
         """
-        for array in (position, quaternion, values, gradients, turnings, clearances):
+        for array in (position, quaternion, values, gradients, rotation_gradients, clearances):
             require(array.flags.c_contiguous, "evaluate", "array", "a strided one", "contiguous ones")
         if not (position.flags.writeable and quaternion.flags.writeable):  # which compiled code is not made for
             position, quaternion = position.copy(), quaternion.copy()
-        evaluate_packed(self, position, quaternion, values, gradients, turnings, clearances)
+        evaluate_packed(self, position, quaternion, values, gradients, rotation_gradients, clearances)
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle what holds in another process too: addresses do not."""
@@ -182,7 +188,7 @@ def evaluate_packed(
     quaternion: Array,
     values: Array,
     gradients: Array,
-    turnings: Array,
+    rotation_gradients: Array,
     clearances: Array,
 ) -> None:
     """Do what `PackedRegions.evaluate` says, with these `regions`, for compiled callers."""
@@ -197,7 +203,7 @@ def evaluate_packed(
         sign = regions.signs[i]
         values[i], clearances[i] = sign * g, -sign * distance
         gradients[i, 0], gradients[i, 1], gradients[i, 2] = sign * gx, sign * gy, sign * gz
-        turnings[i, 0], turnings[i, 1], turnings[i, 2] = sign * tx, sign * ty, sign * tz
+        rotation_gradients[i, 0], rotation_gradients[i, 1], rotation_gradients[i, 2] = sign * tx, sign * ty, sign * tz
 
 
 @part

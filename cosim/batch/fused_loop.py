@@ -30,7 +30,7 @@ from controller.regions import (
     clearance_of_sphere,
 )
 from cosim.batch.c_calls import advance, read, seconds, send
-from cosim.simulation.memberships import SOURCES, press
+from cosim.simulation.memberships import SOURCES, compute_memberships
 from fuzzy_arbiter import Arbiter
 from plant_fmu.running.native import Native
 
@@ -241,7 +241,7 @@ def _fly(  # noqa: C901 - one loop, as a whole
             if not setup.exact:
                 _clearances(setup.regions, state.position, state.quaternion, seen, room.at)
                 told_clearances = seen
-            press(told_clearances, setup.criteria, setup.ramp, memberships)
+            compute_memberships(told_clearances, setup.criteria, setup.ramp, memberships)
             _weigh(memberships, by_criterion)
             for i in range(n):
                 weights[i] = by_criterion[setup.criteria[i]]

@@ -65,7 +65,7 @@ def completion(options: argparse.Namespace) -> int:
             action.complete = scenarios  # type: ignore[attr-defined]
         elif action.metavar in _FOLDERS:
             action.complete = shtab.DIRECTORY  # type: ignore[attr-defined]
-        elif action.dest in ("scenes", "signing_key", "orders", "out", "vehicle"):
+        elif action.dest in ("scenes", "signing_key", "commands", "out", "vehicle"):
             action.complete = shtab.FILE  # type: ignore[attr-defined]
     print(shtab.complete(options.completed, options.shell))
     return 0

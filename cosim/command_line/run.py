@@ -42,12 +42,12 @@ def add_verb(verbs: Any) -> None:
     run.add_argument("--json", action="store_true", help="print what it came to, and its files, as JSON")
     run.add_argument("--no-report", action="store_true", help="leave out the report, its figures and the replay")
     run.add_argument(
-        "--orders", type=Path, metavar="FILE",
-        help="repeat what an earlier run was ordered: its orders.jsonl, with its scenario.toml",
+        "--replay-commands", dest="commands_log", type=Path, metavar="FILE",
+        help="repeat what an earlier run was commanded: its commands.jsonl, with its scenario.toml",
     )  # fmt: skip
     run.add_argument(
         "--live", nargs="?", const="", metavar="[HOST:]PORT",
-        help="show the run in browsers while it goes on, and take their orders with --commands "
+        help="show the run in browsers while it goes on, and take their commands with --commands "
         f"(default: {HOST}:{PORT}, or another port if that is taken)",
     )  # fmt: skip
     add_link_flags(run, commands=True)
@@ -60,8 +60,8 @@ def run(options: argparse.Namespace) -> int:
 
     overrides = [*options.overrides]
     if options.commands:
-        if options.orders is not None:
-            raise TelemetryError("--orders: expected no --commands with it: the orders are those of the log")
+        if options.commands_log is not None:
+            raise TelemetryError("--replay-commands: expected no --commands with it: the commands are those of the log")
         overrides.append("commands.enabled=true")
     if options.await_arm:
         overrides.append("commands.await_arm=true")
@@ -80,7 +80,7 @@ def run(options: argparse.Namespace) -> int:
         done = run_scenario(
             scenario, options.out, mavlink, None if most == math.inf else most,
             progress=not options.quiet,
-            report=not options.no_report, orders=options.orders, live=live,
+            report=not options.no_report, commands_log=options.commands_log, live=live,
         )  # fmt: skip
     if options.json:
         print(_json(done), end="")

@@ -12,7 +12,7 @@ from typing import Any
 from cosim.errors import ExportError, RunError
 from cosim.export.excerpt import excerpt_of
 from cosim.results.record import RECORD
-from cosim.results.run_result import ORDERS, SCENARIO, SUMMARY
+from cosim.results.run_result import COMMANDS_LOG, SCENARIO, SUMMARY
 from plant_fmu.installing import install_hint
 
 
@@ -34,7 +34,7 @@ FORMATS = {
     "tlog": Format(whole=True),
 }
 
-_OF_RUNS = frozenset({RECORD, SCENARIO, SUMMARY, ORDERS})
+_OF_RUNS = frozenset({RECORD, SCENARIO, SUMMARY, COMMANDS_LOG})
 
 
 def export_run(

@@ -67,7 +67,7 @@ class Scene:
     changes : tuple of (float, int, Solid)
         When [s] which of them becomes what.
     log : sequence of (int, Order)
-        What the run was ordered.
+        What the run was commanded.
     hull_radius : float
         [m].
     thrusters : tuple of Thruster

@@ -9,19 +9,19 @@ from dataclasses import dataclass
 import numpy as np
 
 from controller.regions import Shape, Sphere
-from cosim.errors import OrderError
+from cosim.errors import CommandError
+from cosim.live.command_desk import Desk
 from cosim.live.history import History
 from cosim.live.messages import bytes_of, text_of
-from cosim.live.orders import Desk
+from cosim.replay.command_words import command_words
 from cosim.replay.header import header_of, shape_of
-from cosim.replay.order_words import order_words
 from cosim.replay.viewing import Viewing
 from cosim.scenario.scenario import Scenario
-from cosim.scenario.tables import FAR_AWAY
-from cosim.simulation.commands.commands import Change, Forget, Obstacle, Order, Sticks
-from cosim.simulation.commands.obstacle_slots import Slots
-from cosim.simulation.commands.sources import OrderQueue
-from cosim.simulation.environment import middle_of
+from cosim.scenario.tables import PARKED_POSITION
+from cosim.simulation.commands.commands import AddObstacle, ChangeSetting, Command, ManualControl, RemoveObstacle
+from cosim.simulation.commands.obstacle_slots import ObstacleSlots
+from cosim.simulation.commands.sources import CommandQueue
+from cosim.simulation.environment import shape_center
 from cosim.simulation.signals import Array, Column
 
 log = logging.getLogger(__name__)
@@ -58,7 +58,7 @@ class Hub:
         self._dropped = 0  # texts that are kept no more
         self._last: Array | None = None
 
-    def begin(self, run: int, scenario: Scenario, columns: Sequence[Column], queue: OrderQueue | str) -> None:
+    def begin(self, run: int, scenario: Scenario, columns: Sequence[Column], queue: CommandQueue | str) -> None:
         """Show another run from now on.
 
         Parameters
@@ -69,18 +69,18 @@ class Hub:
             What is run.
         columns : sequence of Column
             Of its rows.
-        queue : OrderQueue or str
-            Where orders go, or why there are none.
+        queue : CommandQueue or str
+            Where commands go, or why there are none.
         """
         self.run = run
         self._viewing = Viewing(scenario, columns)
         self._names = {column.name: i for i, column in enumerate(self._viewing.columns)}
-        self._header = header_of(scenario, self._viewing.columns, isinstance(queue, OrderQueue))
+        self._header = header_of(scenario, self._viewing.columns, isinstance(queue, CommandQueue))
         self._header["changes"] = []
         self._step = scenario.time.step
-        self._middle, self._target_radius = middle_of(scenario.goal), 0.0
+        self._middle, self._target_radius = shape_center(scenario.goal), 0.0
         self._regions = ["goal", *(secondary.region.name for secondary in scenario.regions)]
-        self._slots = Slots(scenario.commands.obstacles)
+        self._slots = ObstacleSlots(scenario.commands.obstacles)
         self._came = [secondary.region.name for secondary in scenario.regions if secondary.seen]  # by slot
         self._history = History(len(self._viewing.columns))
         self._texts, self._dropped, self._last = [], 0, None
@@ -108,31 +108,31 @@ class Hub:
                     self._target_radius = float(row[self._names["target.radius"]])
                     self._change("goal", float(row[0]))
 
-    def heed(self, k: int, orders: Sequence[Order]) -> None:
-        """Tell of the orders that step `k` follows, and of the regions that they change."""
+    def heed(self, k: int, commands: Sequence[Command]) -> None:
+        """Tell of the commands that step `k` follows, and of the regions that they change."""
         time = k * self._step
-        for order in orders:
-            if not isinstance(order, Sticks):  # which come all the time
-                self.say(order_words(order), "order", time)
+        for command in commands:
+            if not isinstance(command, ManualControl):  # which come all the time
+                self.say(command_words(command), "command", time)
             try:
-                self._follow(order, time)
-            except OrderError as error:
-                log.debug("%s", error)  # which the helm tells
+                self._follow(command, time)
+            except CommandError as error:
+                log.debug("%s", error)  # which the command handler tells
 
-    def _follow(self, order: Order, time: float) -> None:
+    def _follow(self, command: Command, time: float) -> None:
         assert self.desk is not None
-        self.desk.follow(order)
-        match order:
-            case Change():
-                region = self.desk.settings.region_of(order.key)
+        self.desk.follow(command)
+        match command:
+            case ChangeSetting():
+                region = self.desk.settings.region_of(command.key)
                 if region is not None:
                     self._change(region, time)
-            case Obstacle():
-                name = self._came[self._slots.take(order.number)]
-                self._change(name, time, Sphere(FAR_AWAY, order.radius))
-                self._header["changes"][-1]["number"] = order.number  # by which it is moved and forgotten
-            case Forget():
-                self._slots.leave(order.number)
+            case AddObstacle():
+                name = self._came[self._slots.take(command.number)]
+                self._change(name, time, Sphere(PARKED_POSITION, command.radius))
+                self._header["changes"][-1]["number"] = command.number  # by which it is moved and forgotten
+            case RemoveObstacle():
+                self._slots.leave(command.number)
 
     def _change(self, name: str, time: float, shape: Shape | None = None) -> None:
         """Note another shape or gain of a region; default: as the settings have it."""

@@ -18,9 +18,9 @@ from websockets.exceptions import ConnectionClosed
 from websockets.http11 import Request, Response
 
 from cosim.live.address import LiveAddress, stranger
+from cosim.live.command_desk import LONGEST
 from cosim.live.hub import Cursor, Hub
 from cosim.live.messages import text_of
-from cosim.live.orders import LONGEST
 from cosim.replay.page import replay_page
 
 log = logging.getLogger(__name__)
@@ -141,7 +141,7 @@ class _Viewers:
         return Response(HTTPStatus.OK, HTTPStatus.OK.phrase, headers, self._page)
 
     async def show(self, connection: ServerConnection) -> None:
-        """Show a viewer the run, and take its orders, until it goes."""
+        """Show a viewer the run, and take its commands, until it goes."""
         cursor = Cursor()
         self.cursors.append(cursor)
         telling = asyncio.create_task(self._tell(connection, cursor))
@@ -171,7 +171,7 @@ class _Viewers:
             await connection.close(1011)
 
     async def _heed(self, connection: ServerConnection) -> None:
-        """Take orders, no faster than a person gives them."""
+        """Take commands, no faster than a person gives them."""
         allowance, then, hasty = float(_AT_ONCE), time.monotonic(), 0
         async for message in connection:
             now = time.monotonic()

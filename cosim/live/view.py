@@ -16,8 +16,8 @@ import numpy as np
 from cosim.live.address import LiveAddress, bound
 from cosim.live.hub import Hub
 from cosim.scenario.scenario import Scenario
-from cosim.simulation.commands.commands import Order
-from cosim.simulation.commands.sources import OrderQueue
+from cosim.simulation.commands.commands import Command
+from cosim.simulation.commands.sources import CommandQueue
 from cosim.simulation.signals import Array, Column
 
 log = logging.getLogger(__name__)
@@ -30,7 +30,7 @@ _CLOSING = 3.0  # s
 class LiveView:
     """Observer that copies some rows for viewers, who are served in a thread of its own.
 
-    Nothing that viewers do reaches the stepper but their orders, through the queue; nothing that goes wrong here does.
+    Only the commands of viewers reach the stepper, through the queue. No error here reaches it.
 
     Parameters
     ----------
@@ -66,7 +66,7 @@ class LiveView:
 
     # ---- called by whoever runs the run ----
 
-    def begin(self, scenario: Scenario, columns: Sequence[Column], queue: OrderQueue | str) -> None:
+    def begin(self, scenario: Scenario, columns: Sequence[Column], queue: CommandQueue | str) -> None:
         """Show another run from now on.
 
         Parameters
@@ -75,8 +75,8 @@ class LiveView:
             What is run.
         columns : sequence of Column
             Of its rows.
-        queue : OrderQueue or str
-            Where orders go, or why there are none.
+        queue : CommandQueue or str
+            Where commands go, or why there are none.
         """
         self._run += 1
         hub = self._hub
@@ -99,9 +99,9 @@ class LiveView:
             self._due = now + PERIOD
             self._rows.append((self._run, row[self._picked]))
 
-    def heed(self, k: int, orders: Sequence[Order]) -> None:
-        """Tell of orders that step `k` follows."""
-        self._call(self._hub.heed, k, orders)
+    def heed(self, k: int, commands: Sequence[Command]) -> None:
+        """Tell of commands that step `k` follows."""
+        self._call(self._hub.heed, k, commands)
 
     def say(self, text: str, kind: str = "info") -> None:
         """Tell all viewers a `text`; its `kind` is info, order or warning."""
@@ -161,7 +161,7 @@ class LiveView:
 
 
 class _Warnings(logging.Handler):
-    """Shows viewers what the terminal is warned of, such as an order that could not be followed."""
+    """Shows viewers what the terminal is warned of, such as a command that could not be followed."""
 
     def __init__(self, view: LiveView) -> None:
         super().__init__(logging.WARNING)

@@ -27,7 +27,7 @@ from cosim.mavlink.vehicle.vehicle_context import COMPONENT_ID, Sender, Vessel
 from cosim.mavlink.wire.message_sink import Outlet
 from cosim.mavlink.wire.options import MavlinkOptions
 from cosim.scenario.scenario import Scenario
-from cosim.simulation.commands.sources import OrderQueue
+from cosim.simulation.commands.sources import CommandQueue
 from cosim.simulation.signals import Array, Column
 
 _HEARTBEAT = 1.1  # s of the wall clock without one, until one is sent; longer than the stream's second
@@ -50,10 +50,10 @@ class Autopilot:
         Of the rows that it observes.
     options : MavlinkOptions
         As whom it shows itself, and whom it heeds.
-    orders : OrderQueue or None
-        Where orders go; with None, or commands off, it is read-only.
+    commands : CommandQueue or None
+        Where commands go; with None, or commands off, it is read-only.
     live : bool
-        False for a recorded run, which takes no orders.
+        False for a recorded run, which takes no commands.
     """
 
     def __init__(
@@ -61,10 +61,10 @@ class Autopilot:
         scenario: Scenario,
         columns: Sequence[Column],
         options: MavlinkOptions,
-        orders: OrderQueue | None,
+        commands: CommandQueue | None,
         live: bool = True,
     ) -> None:
-        self._vessel = vessel = Vessel(scenario, columns, options, orders, live)
+        self._vessel = vessel = Vessel(scenario, columns, options, commands, live)
         self._streams: dict[Outlet, Streams] = {}
         self._events = Events(vessel)
         parameters = Parameters(vessel)

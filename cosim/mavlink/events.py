@@ -42,13 +42,13 @@ class Events:
         if before is None:
             self._fine = [clearance >= 0.0 for clearance in view.clearances]
             return
-        self._watch_helm(before, view)
+        self._watch_commands(before, view)
         self._watch_regions(view)
         self._watch_limits(view)
         if view.touches_bottom and not before.touches_bottom:
             vessel.say("Bottom touched", vessel.mavlink.MAV_SEVERITY_WARNING, "bottom", _EVERY)
 
-    def _watch_helm(self, before: View, view: View) -> None:
+    def _watch_commands(self, before: View, view: View) -> None:
         vessel, m = self._vessel, self._vessel.mavlink
         if view.armed != before.armed:
             vessel.say("Armed" if view.armed else "Disarmed", m.MAV_SEVERITY_NOTICE)

@@ -69,7 +69,7 @@ def replay(folder: Path, endpoints: Sequence[Endpoint], options: MavlinkOptions,
     require_columns(scenario, record)
     known = set(names_of(scenario))  # what else a record has could stand between what is read side by side
     columns = [column for column in record.columns if column.name in known or column.name.startswith("law.")]
-    autopilot = Autopilot(scenario, columns, options, orders=None, live=False)
+    autopilot = Autopilot(scenario, columns, options, commands=None, live=False)
     thread = LinkThread(autopilot, open_links(endpoints, options), scenario.time.step, ahead(scenario, rate))
     every = max(1, round(SNAPSHOT_PERIOD / scenario.time.step))
     thread.start()

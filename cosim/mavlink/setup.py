@@ -11,7 +11,7 @@ from cosim.mavlink.wire.endpoint import Endpoint
 from cosim.mavlink.wire.link import open_links
 from cosim.mavlink.wire.options import MavlinkOptions
 from cosim.scenario.scenario import Scenario
-from cosim.simulation.commands import OrderQueue
+from cosim.simulation.commands import CommandQueue
 from cosim.simulation.signals import Column
 
 
@@ -23,7 +23,7 @@ class Mavlink:
     options: MavlinkOptions
 
     def open(
-        self, scenario: Scenario, columns: Sequence[Column], orders: OrderQueue | None, rate: float | None
+        self, scenario: Scenario, columns: Sequence[Column], commands: CommandQueue | None, rate: float | None
     ) -> LinkThread:
         """Open all links.
 
@@ -33,7 +33,7 @@ class Mavlink:
             What is run.
         columns : sequence of Column
             Of its rows.
-        orders : OrderQueue or None
+        commands : CommandQueue or None
             Where commands go; None heeds none.
         rate : float or None
             Simulated seconds a second at the most; None for as many as can be.
@@ -48,7 +48,7 @@ class Mavlink:
         TelemetryError
             If a link cannot be opened.
         """
-        autopilot = Autopilot(scenario, columns, self.options, orders if self.options.commands else None)
+        autopilot = Autopilot(scenario, columns, self.options, commands if self.options.commands else None)
         links = open_links(self.endpoints, self.options)
         return LinkThread(autopilot, links, scenario.time.step, ahead(scenario, rate))
 

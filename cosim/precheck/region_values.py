@@ -32,7 +32,7 @@ def evaluated(
         Values, shape (n,), gradients, shape (n, 3), clearances, shape (n,) [m], or [rad] for shapes of attitude.
     """
     n = len(regions)
-    values, gradients, turnings, clearances = np.empty(n), np.empty((n, 3)), np.empty((n, 3)), np.empty(n)
+    values, gradients, rotation_gradients, clearances = np.empty(n), np.empty((n, 3)), np.empty((n, 3)), np.empty(n)
     pose = np.array(position, dtype=float), np.array(quaternion, dtype=float)
-    pack(regions).evaluate(*pose, values, gradients, turnings, clearances)
+    pack(regions).evaluate(*pose, values, gradients, rotation_gradients, clearances)
     return values, gradients, clearances

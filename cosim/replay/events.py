@@ -12,7 +12,7 @@ import numpy as np
 
 from controller.regions import of_attitude
 from cosim.replay.activity import active_regions
-from cosim.replay.order_words import ordered_events
+from cosim.replay.command_words import command_events
 from cosim.replay.steering import Log
 from cosim.results.run_result import FlownRun
 from cosim.results.spans import Flags, Span, Spans
@@ -42,7 +42,7 @@ def events_of(run: FlownRun, log: Log) -> list[Event]:
     run : FlownRun
         Any.
     log : sequence of (int, Order)
-        What it was ordered.
+        What it was commanded.
 
     Returns
     -------
@@ -50,10 +50,10 @@ def events_of(run: FlownRun, log: Log) -> list[Event]:
         The last one is the end of the run.
     """
     step, rows = run.scenario.time.step, len(run.record)
-    # a killed run has logged orders of rows that it did not save; a reset comes behind the last row
+    # a killed run has logged commands of rows that it did not save; a reset comes behind the last row
     log = [(min(k, rows - 1), order) for k, order in log if k <= rows]
-    orders = [Event(time, "order", text) for time, text in ordered_events(log, step, _MOST)]
-    found = [*orders, *_goal(run), *_violations(run), *_active(run), *_failures(run), *_saturation(run)]
+    commands = [Event(time, "command", text) for time, text in command_events(log, step, _MOST)]
+    found = [*commands, *_goal(run), *_violations(run), *_active(run), *_failures(run), *_saturation(run)]
     return [*sorted(found, key=lambda event: event.time), _end(run)]
 
 

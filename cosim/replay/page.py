@@ -24,7 +24,7 @@ _PLAYER = (
     "player.js", "words.js", "curves.js", "axes.js", "plot.js", "charts.js", "board.js", "timeline.js", "panel.js",
     "stage.js", "head.js", "keys.js", "page.js",
 )  # fmt: skip
-_LIVE = ("things.js", "ghost.js", "dragging.js", "helm.js", "live.js")
+_LIVE = ("things.js", "ghost.js", "dragging.js", "command_panel.js", "live.js")
 _SCRIPTS = ("data.js", *SCENE_SCRIPTS, *_PLAYER, *_LIVE, "main.js")
 _STYLES = ("style.css", "stage.css", "charts.css", "panel.css", "transport.css", "layout.css", "live.css")
 

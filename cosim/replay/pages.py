@@ -31,7 +31,7 @@ def write_replay(run: FlownRun, out: Path | None = None, title: str | None = Non
     Raises
     ------
     RunError
-        If its log of orders cannot be read.
+        If its log of commands cannot be read.
     """
     return write_page(out or run.path / REPLAY, [trace_of(run).as_json()], title or run.scenario.title)
 

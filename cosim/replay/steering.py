@@ -1,4 +1,4 @@
-"""What orders made of the regions on the way: their shapes and gains, from the log of orders and the record."""
+"""What commands made of the regions on the way: their shapes and gains, from the log of commands and the record."""
 
 from __future__ import annotations
 
@@ -11,26 +11,34 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controller.regions import Shape, Sphere
-from cosim.errors import OrderError
+from cosim.errors import CommandError
 from cosim.replay.header import shape_of
 from cosim.results.as_flown import radii_of
 from cosim.results.record import Rows
-from cosim.results.run_result import ORDERS, FlownRun
-from cosim.scenario.tables import FAR_AWAY, SecondaryRegion
-from cosim.simulation.commands.commands import MODES, Begin, Change, Item, Mission, Order, Steer
+from cosim.results.run_result import COMMANDS_LOG, FlownRun
+from cosim.scenario.tables import PARKED_POSITION, SecondaryRegion
+from cosim.simulation.commands.commands import (
+    MODES,
+    ChangeSetting,
+    Command,
+    MissionItem,
+    SetCurrentItem,
+    SetMission,
+    SetMode,
+)
 from cosim.simulation.commands.mission_executor import way
 from cosim.simulation.commands.settings import LiveSettings
 from cosim.simulation.commands.sources import read_log
-from cosim.simulation.environment import middle_of
+from cosim.simulation.environment import shape_center
 from cosim.simulation.signals import Array
 
-Log = Sequence[tuple[int, Order]]  # step that took it, and what was ordered
+Log = Sequence[tuple[int, Command]]  # step that took it, and what was commanded
 
 _SAME = 1e-6  # m; radii from a record that are nearer to each other are equal, but for rounding
 
 
 def log_of(run: FlownRun) -> Log:
-    """Return what a run was ordered.
+    """Return what a run was commanded.
 
     Parameters
     ----------
@@ -40,14 +48,14 @@ def log_of(run: FlownRun) -> Log:
     Returns
     -------
     sequence of (int, Order)
-        Steps, and orders that were taken at them; none where nothing could be ordered.
+        Steps, and commands that were taken at them; none where nothing could be commanded.
 
     Raises
     ------
     RunError
         If there is a log that cannot be read.
     """
-    file = run.path / ORDERS
+    file = run.path / COMMANDS_LOG
     return read_log(file) if run.scenario.commands.enabled and file.exists() else ()
 
 
@@ -79,29 +87,29 @@ def changes_of(run: FlownRun, log: Log) -> list[dict[str, Any]]:
 
 
 class _Changes:
-    """Follows the changes that were ordered, at once or by items of a mission, on settings of its own."""
+    """Follows the changes that were commanded, at once or by items of a mission, on settings of its own."""
 
     def __init__(self, run: FlownRun) -> None:
         self._step = run.scenario.time.step
         self._settings = LiveSettings(run.planned)
-        self._middle = middle_of(run.planned.goal)
+        self._middle = shape_center(run.planned.goal)
         self._index = {"goal": 0, **{r.region.name: i + 1 for i, r in enumerate(run.scenario.regions)}}
         self._gains = [run.scenario.goal_region.gain, *(r.region.gain for r in run.scenario.regions)]
         self._last_row = len(run.record) - 1
         self._changed, self._was = _steps_of(run.record)
-        self._items: tuple[Item, ...] = ()
-        self._at = -1  # item of the mission, as far as its orders were followed
+        self._items: tuple[MissionItem, ...] = ()
+        self._at = -1  # item of the mission, as far as its commands were followed
 
     def of(self, log: Log) -> Iterator[dict[str, Any]]:
         """Yield what changes, step by step."""
-        ordered = {k: [order for _, order in group] for k, group in groupby(log, key=lambda entry: entry[0])}
-        for k in sorted({*ordered, *self._changed.tolist()}):
-            orders = ordered.get(k, [])
-            # the last order, such as a reset, may have come after the last row
+        commanded = {k: [command for _, command in group] for k, group in groupby(log, key=lambda entry: entry[0])}
+        for k in sorted({*commanded, *self._changed.tolist()}):
+            commands = commanded.get(k, [])
+            # the last command, such as a reset, may have come after the last row
             row = min(k, self._last_row)
             radius, in_mission, item = self._at_row(row)
-            by_mission = self._by_mission(orders, int(item) if in_mission else None)
-            touched = {name for order in (*orders, *by_mission) if (name := self._follow(order))}
+            by_mission = self._by_mission(commands, int(item) if in_mission else None)
+            touched = {name for command in (*commands, *by_mission) if (name := self._follow(command))}
             if radius != self._at_row(row - 1)[0] if row else radius > 0.0:
                 touched.add("goal")
             for name in sorted(touched, key=self._index.__getitem__):
@@ -112,31 +120,31 @@ class _Changes:
         found: Array = self._was[np.searchsorted(self._changed, row, "right") - 1]
         return found
 
-    def _by_mission(self, orders: Iterable[Order], now: int | None) -> Iterator[Order]:
-        """Yield the orders of the items that begin in a step, at an item or outside of a mission."""
+    def _by_mission(self, commands: Iterable[Command], now: int | None) -> Iterator[Command]:
+        """Yield the commands of the items that begin in a step, at an item or outside of a mission."""
         begun = False
-        for order in orders:
-            if isinstance(order, Mission):
-                self._items, self._at = order.items, -1
-            elif isinstance(order, Begin):
-                self._at, begun = order.item - 1, True
-            elif isinstance(order, Steer) and order.mode == "mission":
+        for command in commands:
+            if isinstance(command, SetMission):
+                self._items, self._at = command.items, -1
+            elif isinstance(command, SetCurrentItem):
+                self._at, begun = command.item - 1, True
+            elif isinstance(command, SetMode) and command.mode == "mission":
                 self._at, begun = max(self._at, 0) - 1, True
         if now is None or not 0 <= now < len(self._items) or (now == self._at and not begun):
             return
         for item in way(self._items, self._at, now) or [now]:
-            yield from self._items[item].orders
+            yield from self._items[item].commands
         self._at = now
 
-    def _follow(self, order: Order) -> str | None:
+    def _follow(self, command: Command) -> str | None:
         """Take a change, and return the region that has it; None if none has, or it was refused then too."""
-        if not isinstance(order, Change):
+        if not isinstance(command, ChangeSetting):
             return None
-        region = self._settings.region_of(order.key)
-        with contextlib.suppress(OrderError):
-            self._settings.change(order.key, order.value)
-            if region is not None and order.key.endswith(".gain"):
-                self._gains[self._index[region]] = order.value
+        region = self._settings.region_of(command.key)
+        with contextlib.suppress(CommandError):
+            self._settings.change(command.key, command.value)
+            if region is not None and command.key.endswith(".gain"):
+                self._gains[self._index[region]] = command.value
             return region
         return None
 
@@ -153,16 +161,18 @@ def _sizes(run: FlownRun, index: int, secondary: SecondaryRegion) -> Iterator[di
     for times, radii in radii_of(run.record, secondary.region.name):
         fresh = np.abs(np.diff(radii, prepend=before)) > _SAME
         for time, radius in zip(times[fresh], radii[fresh], strict=True):
-            yield _changed(float(time), index, Sphere(FAR_AWAY, max(float(radius), _SAME)), secondary.region.gain)
+            yield _changed(
+                float(time), index, Sphere(PARKED_POSITION, max(float(radius), _SAME)), secondary.region.gain
+            )
         before = radii[-1] if radii.size else before
 
 
 def _steps_of(record: Rows) -> tuple[NDArray[np.intp], Array]:
     """Return the rows at which target or mission change, the first among them, and what they are from there on."""
     first, rows, values, before = 0, [], [], np.full((1, 3), np.nan)
-    for block in record.blocks(["target.radius", "helm.mode", "helm.item"]):
-        item = block["helm.item"]
-        in_mission = (block["helm.mode"] == MODES.index("mission")) & np.isfinite(item)
+    for block in record.blocks(["target.radius", "commands.mode", "commands.item"]):
+        item = block["commands.item"]
+        in_mission = (block["commands.mode"] == MODES.index("mission")) & np.isfinite(item)
         told = np.column_stack([block["target.radius"], in_mission, item])
         changed = np.flatnonzero((np.diff(told, axis=0, prepend=before) != 0.0).any(axis=1))
         rows.append(first + changed)

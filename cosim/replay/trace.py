@@ -69,7 +69,7 @@ def trace_of(run: FlownRun) -> Trace:
     Raises
     ------
     RunError
-        If its log of orders cannot be read.
+        If its log of commands cannot be read.
     """
     scenario, record, summary = run.scenario, run.record, run.summary
     viewing = Viewing(scenario, record.columns)

@@ -10,7 +10,7 @@ import numpy as np
 from controller.laws import LAWS
 from cosim.results.paper_claims import paper_claims
 from cosim.results.record import PARTS, RECORD
-from cosim.results.run_result import ORDERS, SCENARIO, SUMMARY, FlownRun
+from cosim.results.run_result import COMMANDS_LOG, SCENARIO, SUMMARY, FlownRun
 from cosim.results.spans import Spans
 from cosim.results.wording import asked, kind_of, number, verdict
 from cosim.simulation.signals import Array
@@ -240,7 +240,7 @@ def _setting(run: FlownRun) -> Table:
     if s.failures:
         rows.append(("failures", f"{len(s.failures)}, {'told' if s.tell_failures else 'not told'} to the law"))
     if s.commands.enabled:
-        rows.append(("orders", f"could be given while it ran; {run.summary.get('orders', 0)} were"))
+        rows.append(("commands", f"could be given while it ran; {run.summary.get('commands', 0)} were"))
     return Table("Scenario", (), tuple(rows), (1.0, 2.4))
 
 
@@ -252,8 +252,8 @@ def _repeating(run: FlownRun) -> tuple[tuple[str, ...], str]:
         return again, f"{whose}: the run is repeated from where the law is, and can be shown again from here."
     if run.scenario.law.name not in LAWS:
         return again, "An autopilot outside flew this run: it cannot be repeated from here, but be shown again."
-    orders = f" --orders {ORDERS}" if (run.path / ORDERS).exists() else ""
-    command = f"cosim run {SCENARIO}{orders} --out again"
+    commands = f" --replay-commands {COMMANDS_LOG}" if (run.path / COMMANDS_LOG).exists() else ""
+    command = f"cosim run {SCENARIO}{commands} --out again"
     cut = run.summary["status"] != "completed"
     how = (
         "In this folder. The first repeats the run to the last bit on a machine of this kind with this version"
@@ -270,6 +270,6 @@ def _files(run: FlownRun) -> tuple[tuple[str, str], ...]:
         (SUMMARY, "these numbers, in SI units"),
         (SCENARIO, "all that the run depends on"),
     ]
-    if (run.path / ORDERS).exists():
-        files.append((ORDERS, "what was ordered, and when"))
+    if (run.path / COMMANDS_LOG).exists():
+        files.append((COMMANDS_LOG, "what was commanded, and when"))
     return tuple(files)

@@ -1,4 +1,4 @@
-"""What was there of what orders can bring about: obstacles that came, and the target in the end."""
+"""What was there of what commands can bring about: obstacles that came, and the target in the end."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ import numpy as np
 from controller.regions import Sphere
 from cosim.results.record import Rows
 from cosim.scenario.scenario import Scenario
-from cosim.scenario.tables import FAR_AWAY, SecondaryRegion
-from cosim.simulation.environment import middle_of
+from cosim.scenario.tables import PARKED_POSITION, SecondaryRegion
+from cosim.simulation.environment import shape_center
 from cosim.simulation.signals import Array
 
 
@@ -28,14 +28,14 @@ def as_it_came(scenario: Scenario, record: Rows) -> Scenario:
     Returns
     -------
     Scenario
-        The same one, where nothing could be ordered.
+        The same one, where nothing could be commanded.
     """
     if not scenario.commands.enabled:
         return scenario
     regions = tuple(region for region in (_came(region, record) for region in scenario.regions) if region is not None)
     goal, radius = scenario.goal, record.value("target.radius", -1)
     if radius > 0.0:
-        goal = Sphere(middle_of(goal), radius)
+        goal = Sphere(shape_center(goal), radius)
     return dataclasses.replace(scenario, regions=regions, goal=goal)
 
 
@@ -57,7 +57,7 @@ def radii_of(record: Rows, name: str) -> Iterator[tuple[Array, Array]]:
     place, shift = ([f"{of}.{axis}" for axis in "xyz"] for of in ("position", f"{name}.shift"))
     for block in record.blocks(["time", *place, *shift, f"{name}.clearance"]):
         shifts = block.stack(shift)
-        radii = np.linalg.norm(block.stack(place) - shifts - FAR_AWAY, axis=1) - block[f"{name}.clearance"]
+        radii = np.linalg.norm(block.stack(place) - shifts - PARKED_POSITION, axis=1) - block[f"{name}.clearance"]
         known = shifts.any(axis=1) & np.isfinite(radii)
         yield block["time"][known], radii[known]
 
@@ -71,4 +71,6 @@ def _came(secondary: SecondaryRegion, record: Rows) -> SecondaryRegion | None:
         radius = float(radii[-1]) if radii.size else radius
     if radius is None:
         return None
-    return dataclasses.replace(secondary, region=dataclasses.replace(secondary.region, shape=Sphere(FAR_AWAY, radius)))
+    return dataclasses.replace(
+        secondary, region=dataclasses.replace(secondary.region, shape=Sphere(PARKED_POSITION, radius))
+    )

@@ -30,10 +30,10 @@ def summarise_lyapunov(record: Rows) -> dict[str, Any] | None:
     """
     if "lyapunov.rate" not in record.units:
         return None
-    return {form: _course(record, f"lyapunov.{form}") for form in FORMS}
+    return {form: _mission(record, f"lyapunov.{form}") for form in FORMS}
 
 
-def _course(record: Rows, name: str) -> dict[str, Any]:
+def _mission(record: Rows, name: str) -> dict[str, Any]:
     least, size = np.inf, 0.0
     for block in record.blocks([name]):
         least, size = np.minimum(least, block[name].min()), np.maximum(size, np.abs(block[name]).max())

@@ -21,7 +21,7 @@ from plant_fmu.errors import printable
 
 SCENARIO = "scenario.toml"
 SUMMARY = "summary.json"
-ORDERS = "orders.jsonl"
+COMMANDS_LOG = "commands.jsonl"
 
 _LONGEST = 1e12  # s, of the wall clock
 
@@ -70,7 +70,7 @@ def _concluded(file: Path, scenario: Scenario) -> tuple[Scenario, str, float | N
     """Return the scenario by who flew it, how that ended, and what it took [s], as the summary has them."""
     before = read_json(file)
     name, law, status = (_text(file, before, key) for key in ("scenario", "law", "status"))
-    # an autopilot flies in the law's place, but nothing of it could be ordered
+    # an autopilot flies in the law's place, but nothing of it could be commanded
     if law != scenario.law.name and (law in LAWS or scenario.commands.enabled):
         raise RunError(f"{file}: law is {law!r}, expected {scenario.law.name!r} as in {SCENARIO}")
     took = before.get("wall_time")
@@ -124,7 +124,7 @@ def flown_run(path: Path, scenario: Scenario, status: str, wall_time: float | No
     came = as_it_came(scenario, record)
     summary = summarise(came, record, status, wall_time)
     if scenario.commands.enabled:
-        summary["orders"] = _lines(path / ORDERS)
+        summary["commands"] = _lines(path / COMMANDS_LOG)
     return FlownRun(path, scenario, came, record, summary)
 
 

@@ -123,8 +123,8 @@ def verdict(summary: dict[str, Any]) -> str:
         "reset": f" The run was reset at {summary['simulated_time']:.3f} s.",
         "killed": f" The run was killed; its record ends at {summary['simulated_time']:.3f} s.",
     }.get(summary["status"], f" The run {summary['status']}.")
-    orders = summary.get("orders", 0)
-    steered = f" It was given {orders} order{'s' if orders > 1 else ''} on the way." if orders else ""
+    commands = summary.get("commands", 0)
+    steered = f" It was given {commands} command{'s' if commands > 1 else ''} on the way." if commands else ""
     return goal + kept + force + steered + ended
 
 

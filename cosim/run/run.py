@@ -15,13 +15,13 @@ from cosim.replay.page import REPLAY
 from cosim.report.report import REPORT
 from cosim.results.record import RECORD
 from cosim.results.recorder import Recorder
-from cosim.results.run_result import ORDERS, SCENARIO, SUMMARY
+from cosim.results.run_result import COMMANDS_LOG, SCENARIO, SUMMARY
 from cosim.results.wording import verdict
 from cosim.run.progress import ProgressBar
 from cosim.run.run_folder import RunFolder, claim, conclude
 from cosim.scenario.law_factory import flown_by
 from cosim.scenario.scenario import Scenario
-from cosim.simulation.commands import LoggedOrders, OrderQueue, RecordedOrders
+from cosim.simulation.commands import CommandQueue, LoggedCommands, ReplayedCommands
 from cosim.simulation.master import Master, Observer
 from cosim.simulation.signals import Array
 from plant_fmu import PlantError
@@ -44,7 +44,7 @@ class Run:
     def files(self) -> dict[str, Path]:
         """Return those of its files that are there, by what they are."""
         named = {"scenario": SCENARIO, "record": RECORD, "summary": SUMMARY, "report": REPORT, "replay": REPLAY}
-        named |= {"orders": ORDERS}
+        named |= {"commands": COMMANDS_LOG}
         return {what: self.folder / name for what, name in named.items() if (self.folder / name).exists()}
 
 
@@ -85,13 +85,13 @@ def run_scenario(
     rate: float | None = None,
     progress: bool = False,
     report: bool = True,
-    orders: Path | None = None,
+    commands_log: Path | None = None,
     live: LiveView | None = None,
     law: Law | None = None,
 ) -> Run:
     """Run a scenario and write its folder.
 
-    An order to reset ends the run and begins it again, in a folder of its own.
+    A command to reset ends the run and begins it again, in a folder of its own.
 
     Parameters
     ----------
@@ -108,10 +108,10 @@ def run_scenario(
         Show a bar, if there is a terminal.
     report : bool
         Write the report and its figures.
-    orders : Path, optional
-        The log of an earlier run, whose orders are repeated; then none are taken from the link or from viewers.
+    commands : Path, optional
+        The log of an earlier run, whose commands are repeated; then none are taken from the link or from viewers.
     live : LiveView, optional
-        Shows the run while it goes on, and takes orders if the scenario's commands are enabled.
+        Shows the run while it goes on, and takes commands if the scenario's commands are enabled.
     law : Law, optional
         One's own, such as a `FunctionLaw`, in the place of the scenario's. The run folder says where it is from, and
         cannot hold it: the run is repeated from where the law is.
@@ -124,7 +124,7 @@ def run_scenario(
     Raises
     ------
     RunError
-        If the folder cannot be written, or the log of orders cannot be read.
+        If the folder cannot be written, or the log of commands cannot be read.
     TelemetryError
         If the link cannot be opened.
     ScenarioError
@@ -138,8 +138,8 @@ def run_scenario(
     """
     if law is not None:
         scenario = flown_by(law, scenario)
-    recorded = _recorded(scenario, orders)
-    queue = OrderQueue()
+    recorded = _recorded(scenario, commands_log)
+    queue = CommandQueue()
     link: LinkThread | None = None
     try:
         for attempt in itertools.count(1):
@@ -152,7 +152,7 @@ def run_scenario(
                 if live is not None:
                     live.begin(scenario, master.signals.columns, _desk(scenario, recorded, queue))
                 try:
-                    source = LoggedOrders(recorded or queue, folder.path / ORDERS, live.heed if live else None)
+                    source = LoggedCommands(recorded or queue, folder.path / COMMANDS_LOG, live.heed if live else None)
                     status, wall_time, failure = _step(master, folder, source, link, live, rate, progress)
                     queue.end_run()
                     if live is not None and report:
@@ -172,25 +172,25 @@ def run_scenario(
     raise AssertionError("unreachable")
 
 
-def _desk(scenario: Scenario, recorded: RecordedOrders | None, queue: OrderQueue) -> OrderQueue | str:
-    """Return where viewers' orders go, or why there are none."""
+def _desk(scenario: Scenario, recorded: ReplayedCommands | None, queue: CommandQueue) -> CommandQueue | str:
+    """Return where viewers' commands go, or why there are none."""
     if recorded:
-        return "this run repeats the orders of a log and takes no others"
+        return "this run repeats the commands of a log and takes no others"
     return queue if scenario.commands.enabled else "commands are off: start with --commands"
 
 
-def _recorded(scenario: Scenario, orders: Path | None) -> RecordedOrders | None:
-    if orders is None:
+def _recorded(scenario: Scenario, commands_log: Path | None) -> ReplayedCommands | None:
+    if commands_log is None:
         return None
     if not scenario.commands.enabled:
-        raise RunError(f"{orders}: orders are given, expected a scenario with commands.enabled")
-    return RecordedOrders(orders)
+        raise RunError(f"{commands_log}: commands are given, expected a scenario with commands.enabled")
+    return ReplayedCommands(commands_log)
 
 
 def _step(
     master: Master,
     folder: RunFolder,
-    orders: LoggedOrders,
+    commands_log: LoggedCommands,
     link: LinkThread | None,
     live: LiveView | None,
     rate: float | None,
@@ -208,8 +208,8 @@ def _step(
         watching = [o for o in (link, live) if o is not None]
         observers: list[Observer] = [recorder, *watching, *([bar] if bar else [])]
         started = time.perf_counter()
-        master.run(observers, rate, orders, awaiting=_Together(watching))
-        if master.helm is not None and master.helm.reset:
+        master.run(observers, rate, commands_log, awaiting=_Together(watching))
+        if master.command_handler is not None and master.command_handler.reset:
             status = "reset"
     except KeyboardInterrupt:
         status = "interrupted"

@@ -18,7 +18,7 @@ from cosim.replay.pages import write_replay
 from cosim.report.report import write_report
 from cosim.results.record import PARTS, RECORD, part_files, require_utf8
 from cosim.results.recorder import Recorder
-from cosim.results.run_result import ORDERS, SCENARIO, SUMMARY, FlownRun, flown_run, load_run
+from cosim.results.run_result import COMMANDS_LOG, SCENARIO, SUMMARY, FlownRun, flown_run, load_run
 from cosim.scenario.scenario import VEHICLE_COPY, Scenario
 
 
@@ -60,7 +60,7 @@ class RunFolder:
 
     def discard(self) -> None:
         """Take away all that a run without a record has made. May be called twice."""
-        for name in (SCENARIO, VEHICLE_COPY, ORDERS):
+        for name in (SCENARIO, VEHICLE_COPY, COMMANDS_LOG):
             (self.path / name).unlink(missing_ok=True)
         shutil.rmtree(self.path / PARTS, ignore_errors=True)
         if self.created:

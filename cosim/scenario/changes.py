@@ -14,7 +14,7 @@ from plant_fmu.errors import one_line
 from plant_fmu.toml_tables import hint
 from plant_fmu.vehicle import Vehicle
 
-# what no title speaks of: the texts beside it, what is recorded and reported, what may be ordered from outside, seeds
+# what no title speaks of: the texts beside it, what is recorded and reported, what may be commanded from outside, seeds
 _BESIDE = ("title", "changed", "compare", "intersection", "record", "commands")
 _SEEDS = ("sensing.seed", "plant.parameters.seed")
 _NAMED = 3  # changes that a title spells out

@@ -87,7 +87,7 @@ KEYS = {
         ", in three forms; see [theory.md](theory.md#where-the-theory-holds)",
     ),
     "commands.enabled": Key(
-        "", "the running vehicle takes [orders](mavlink.md) from outside", "; `cosim run --commands` sets it"
+        "", "the running vehicle takes [commands](mavlink.md) from outside", "; `cosim run --commands` sets it"
     ),
     "commands.await_arm": Key("", "nothing moves before it is armed", "; `--await-arm` sets it"),
     "commands.obstacles": Key("", "spheres to be kept out of that may come in while it runs; 100 at most"),

@@ -127,8 +127,8 @@ class Scenario:
     def moving(self) -> tuple[str, ...]:
         """Names of the regions, goal included, that may be elsewhere than where the scenario has them."""
         goal = ("goal",) if self.goal_streamed or any(self.goal_velocity) else ()
-        ordered = self.commands.enabled  # to be anywhere, what is at a place at all
-        regions = [s for s in self.regions if s.moves or (ordered and not isinstance(s.region.shape, Orientation))]
+        commanded = self.commands.enabled  # to be anywhere, what is at a place at all
+        regions = [s for s in self.regions if s.moves or (commanded and not isinstance(s.region.shape, Orientation))]
         return (*goal, *(secondary.region.name for secondary in regions))
 
     @property

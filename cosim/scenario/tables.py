@@ -15,7 +15,7 @@ Vector6 = tuple[float, float, float, float, float, float]
 
 CRITERIA = tuple(c.name for c in SECTION_VI)
 
-FAR_AWAY: Vector3 = (0.0, 0.0, -1e5)  # m, NED: where obstacles are that have not come
+PARKED_POSITION: Vector3 = (0.0, 0.0, -1e5)  # m, NED: where obstacles are that have not come
 
 
 # ---- the same in the file and checked ------------------------------------------------------------------------------

@@ -15,7 +15,7 @@ from controller.law import checked_quaternion
 from controller.regions import SHAPES, Region, Shape, Sphere, of_attitude
 from cosim.errors import ScenarioError
 from cosim.scenario.tables import (
-    FAR_AWAY,
+    PARKED_POSITION,
     Commands,
     Failure,
     File,
@@ -129,7 +129,7 @@ def check_commands(
         _require(not commands.await_arm, "commands.await_arm", "true", "false without commands.enabled: nobody arms")
         return ()
     _require(not record.lyapunov, "record.lyapunov", "true", "false with commands.enabled: V is of one target")
-    _require(not is_own(law), "commands.enabled", "true", f"false: nothing of {law} can be ordered from outside")
+    _require(not is_own(law), "commands.enabled", "true", f"false: nothing of {law} can be commanded from outside")
     _require(0 <= commands.obstacles <= MAX_SEEN, "commands.obstacles", commands.obstacles, f"0 to {MAX_SEEN}")
     for key in ("obstacle_radius", "hold_radius"):
         value = getattr(commands, key)
@@ -140,7 +140,7 @@ def check_commands(
     seen = [f"seen {i}" for i in range(1, commands.obstacles + 1)]
     for name in seen:
         _require(name not in names, f"regions.{name}.name", "used", "another one: obstacles that come in have it")
-    far = Sphere(FAR_AWAY, commands.obstacle_radius)
+    far = Sphere(PARKED_POSITION, commands.obstacle_radius)
     return tuple(
         SecondaryRegion(Region(name, far, "out", gain=commands.obstacle_gain), "obstacle", streamed=True, seen=True)
         for name in seen

@@ -9,7 +9,9 @@ from cosim.scenario.scenario import Scenario
 from cosim.simulation.signals import Array, Signals
 from plant_fmu import Plant
 
-MOST = 1e5  # N, N m: more is not asked of the plant in a run that can be sent anywhere, where a law might ask for any
+MAX_WRENCH = (
+    1e5  # N, N m: more is not asked of the plant in a run that can be sent anywhere, where a law might ask for any
+)
 
 
 class Actuators:
@@ -64,20 +66,20 @@ class Actuators:
             self._limits[kind][int(rest[:-1]) - 1] = value
             self._allocate_to_the_healthy()
 
-    def push(self) -> None:
+    def allocate(self) -> None:
         """Bring the wrench `command` to the plant's inputs."""
         if self.allocation is None:
             self._given[:] = self._asked
             if self._bounded:
-                self._cut[0] = cut(self._wrench)
+                self._cut[0] = saturate(self._wrench)
         else:
             self._cut[0] = self.allocation(self.command, self.thrusts)
 
-    def push_thrusters(self) -> None:
+    def apply_thrusts(self) -> None:
         """Bring the forces `thrusts` to the plant's inputs, and write the wrench that they amount to."""
         self.command[:] = self._scenario.vehicle.thruster_matrix @ self.thrusts
 
-    def send(self) -> None:
+    def write_inputs(self) -> None:
         """Hand the inputs to the plant."""
         self._sent[:] = self._decided
 
@@ -93,8 +95,8 @@ class Actuators:
             )
 
 
-def cut(wrench: Array) -> bool:
-    """Scale a wrench in place until force and moment are at most `MOST`; 0 where they are no numbers.
+def saturate(wrench: Array) -> bool:
+    """Scale a wrench in place until force and moment are at most `MAX_WRENCH`; 0 where they are no numbers.
 
     Parameters
     ----------
@@ -109,7 +111,7 @@ def cut(wrench: Array) -> bool:
     changed = False
     for part in (wrench[:3], wrench[3:]):
         greatest = float(np.max(np.abs(part)))
-        if not greatest <= MOST:
-            part[:] = part * (MOST / greatest) if greatest < np.inf else 0.0
+        if not greatest <= MAX_WRENCH:
+            part[:] = part * (MAX_WRENCH / greatest) if greatest < np.inf else 0.0
             changed = True
     return changed

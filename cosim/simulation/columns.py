@@ -115,9 +115,9 @@ def _sensed(scenario: Scenario) -> Iterator[Column]:
 def _ordered(scenario: Scenario) -> Iterator[Column]:
     if not scenario.commands.enabled:
         return
-    yield Column("helm.armed", "", "The thrusters may work")
-    yield Column("helm.mode", "", f"Who steers: {', '.join(f'{i} {mode}' for i, mode in enumerate(MODES))}")
-    yield Column("helm.item", "", "Item of the mission, from 0; -1 for none")
+    yield Column("commands.armed", "", "The thrusters may work")
+    yield Column("commands.mode", "", f"Who steers: {', '.join(f'{i} {mode}' for i, mode in enumerate(MODES))}")
+    yield Column("commands.item", "", "Item of the mission, from 0; -1 for none")
     for axis, where in zip("xyz", ("north", "east", "down"), strict=True):
         yield Column(f"target.{axis}", "m", f"Middle of the target region, {where}")
     yield Column("target.radius", "m", "Radius of the target region if it is a sphere of its own, 0 if it is the goal")

@@ -14,10 +14,10 @@ from controller import VehicleState
 from controller.jit.bound_call import Repeated
 from controller.jit.jit import lean
 from controller.regions import PackedRegions, Shape, Sphere, evaluate_packed, pack
-from cosim.errors import OrderError, RunError
+from cosim.errors import CommandError, RunError
 from cosim.scenario.scenario import CRITERIA, Scenario
-from cosim.scenario.tables import FAR_AWAY, Vector3
-from cosim.simulation.memberships import SOURCES, press
+from cosim.scenario.tables import PARKED_POSITION, Vector3
+from cosim.simulation.memberships import SOURCES, compute_memberships
 from cosim.simulation.signals import Array
 
 _AT_REST = (0.0, 0.0, 0.0)
@@ -33,12 +33,12 @@ class _Target:
     radius: float  # m, of a sphere; 0 for the shape of the scenario's goal
 
 
-class Outlook(NamedTuple):
+class RegionEvaluation(NamedTuple):
     """What goal and n regions say of a pose; the goal's come first."""
 
     values: Array  # (n + 1,) g
     gradients: Array  # (n + 1, 3) of g by position, world frame
-    turnings: Array  # (n + 1, 3) of g by rotation, body frame [1/rad]
+    rotation_gradients: Array  # (n + 1, 3) of g by rotation, body frame [1/rad]
     clearances: Array  # (n + 1,) m, or rad of attitude
     memberships: Array  # (3,) of each criterion, that of its most pressing region
 
@@ -52,7 +52,7 @@ class _Places(NamedTuple):
     ramp: float  # m, width of the memberships
 
 
-class Surroundings:
+class RegionEnvironment:
     """Goal and regions, moved by their velocities, or from outside where the scenario calls them streamed.
 
     Parameters
@@ -72,7 +72,7 @@ class Surroundings:
         secondary = [region.region for region in scenario.regions]
         self.regions = pack(secondary)
         self.criteria = np.array([CRITERIA.index(region.criterion) for region in scenario.regions], dtype=np.int64)
-        self._goal_region, self._middle = scenario.goal_region, middle_of(scenario.goal)
+        self._goal_region, self._middle = scenario.goal_region, shape_center(scenario.goal)
         self._target = self._reached = self._new_target(None, self._middle)
         self._places = _Places(self.goal, self.regions, self.criteria, scenario.arbiter.ramp)
         self._names = ["goal", *(region.name for region in secondary)]
@@ -89,7 +89,7 @@ class Surroundings:
         """The region to be reached alone, where it is now."""
         return self._target.packed
 
-    def carry_to(self, time: float, shifts: Array) -> None:
+    def update_positions(self, time: float, shifts: Array) -> None:
         """Put all regions where they are at a time.
 
         Parameters
@@ -107,7 +107,7 @@ class Surroundings:
         for i, at in enumerate(self._moving):
             shifts[i] = self.regions.shifts[at - 1] if at else self.target - self._middle
 
-    def outlook(self, values: Array, clearances: Array) -> Outlook:
+    def empty_evaluation(self, values: Array, clearances: Array) -> RegionEvaluation:
         """Return room for what `evaluate` finds.
 
         Parameters
@@ -121,19 +121,19 @@ class Surroundings:
             All else zero.
         """
         n = len(self._names)
-        return Outlook(values, np.zeros((n, 3)), np.zeros((n, 3)), clearances, np.zeros(len(CRITERIA)))
+        return RegionEvaluation(values, np.zeros((n, 3)), np.zeros((n, 3)), clearances, np.zeros(len(CRITERIA)))
 
-    def evaluate(self, state: VehicleState, outlook: Outlook) -> None:
+    def evaluate(self, state: VehicleState, evaluation: RegionEvaluation) -> None:
         """Evaluate goal and regions at a pose.
 
         Parameters
         ----------
         state : VehicleState
             Its position and attitude count.
-        outlook : Outlook
+        outlook : RegionEvaluation
             Receives what they say.
         """
-        self._look_around(self._places, state, outlook)
+        self._look_around(self._places, state, evaluation)
 
     # ---- moved from outside ----
 
@@ -159,7 +159,7 @@ class Surroundings:
         self.regions.velocities[i] = velocity
         self._origins[i] = displacement - velocity * time
 
-    def place(self, slot: int, position: Vector3, radius: float, velocity: Vector3, time: float) -> None:
+    def add_obstacle(self, slot: int, position: Vector3, radius: float, velocity: Vector3, time: float) -> None:
         """Put an obstacle that came while running somewhere.
 
         Parameters
@@ -176,27 +176,27 @@ class Surroundings:
             [s].
         """
         i = self._seen[slot]
-        self._reshape(self.regions, i, Sphere(FAR_AWAY, radius))
-        self._carry(i, np.subtract(position, FAR_AWAY), np.array(velocity), time)
+        self._reshape(self.regions, i, Sphere(PARKED_POSITION, radius))
+        self._carry(i, np.subtract(position, PARKED_POSITION), np.array(velocity), time)
 
-    def forget(self, slot: int) -> None:
+    def remove_obstacle(self, slot: int) -> None:
         """Take an obstacle away that came while running; `slot` counts them from 0."""
         self._carry(self._seen[slot], np.zeros(3), np.zeros(3), 0.0)
 
-    def displace(self, name: str, by: Vector3) -> None:
+    def shift_region(self, name: str, by: Vector3) -> None:
         """Move a region, also of an obstacle that came, by so much [m, NED] from where it is.
 
         Raises
         ------
-        OrderError
+        CommandError
             If there is no such region, it is at no place, or it is an obstacle that has not come.
         """
         movable = [self._names[at] for at in self._moving if at]
         if name not in movable:
-            raise OrderError(f"region is {name!r}, expected one of {', '.join(movable) or 'none'}")
+            raise CommandError(f"region is {name!r}, expected one of {', '.join(movable) or 'none'}")
         i = self._names.index(name) - 1
         if i in self._seen and not self._origins[i].any():
-            raise OrderError(f"region is {name!r}: no such obstacle has come")
+            raise CommandError(f"region is {name!r}: no such obstacle has come")
         self._origins[i] += by
 
     # ---- the target ----
@@ -212,7 +212,9 @@ class Surroundings:
         """Radius of the region to be reached [m], 0 if it has the shape of the scenario's goal."""
         return self._target.radius
 
-    def aim(self, position: Vector3, radius: float | None, velocity: Vector3 = _AT_REST, time: float = 0.0) -> None:
+    def set_target(
+        self, position: Vector3, radius: float | None, velocity: Vector3 = _AT_REST, time: float = 0.0
+    ) -> None:
         """Put the region to be reached somewhere.
 
         Parameters
@@ -231,11 +233,11 @@ class Surroundings:
         target.origin[:] -= np.multiply(velocity, time)
         self._head_for(target)
 
-    def keep_target(self) -> None:
-        """Remember the present target, for `aim_as_before`."""
+    def save_target(self) -> None:
+        """Remember the present target, for `restore_target`."""
         self._reached = self._target
 
-    def aim_as_before(self) -> None:
+    def restore_target(self) -> None:
         """Go back to the target that was remembered last; the scenario's goal, if none was."""
         self._head_for(self._reached)
 
@@ -277,18 +279,18 @@ class Surroundings:
         regions.numbers[regions.offsets[i] : regions.offsets[i + 1]] = shape.packed()
 
 
-def _evaluate(places: _Places, state: VehicleState, found: Outlook) -> None:
+def _evaluate(places: _Places, state: VehicleState, found: RegionEvaluation) -> None:
     """Evaluate the goal into the first places, and the regions into those behind, in one call."""
     p, e, g, c = state.position, state.quaternion, found.values, found.clearances
-    evaluate_packed(places.goal, p, e, g[:1], found.gradients[:1], found.turnings[:1], c[:1])
-    evaluate_packed(places.regions, p, e, g[1:], found.gradients[1:], found.turnings[1:], c[1:])
-    press(c[1:], places.criteria, places.ramp, found.memberships)
+    evaluate_packed(places.goal, p, e, g[:1], found.gradients[:1], found.rotation_gradients[:1], c[:1])
+    evaluate_packed(places.regions, p, e, g[1:], found.gradients[1:], found.rotation_gradients[1:], c[1:])
+    compute_memberships(c[1:], places.criteria, places.ramp, found.memberships)
 
 
 _evaluate = lean(_evaluate, *SOURCES)
 
 
-def middle_of(shape: Shape) -> Vector3:
+def shape_center(shape: Shape) -> Vector3:
     """Return the point that moves with a shape, by which targets are placed.
 
     Parameters

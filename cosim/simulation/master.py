@@ -21,10 +21,10 @@ from cosim.scenario.scenario import CRITERIA, Scenario
 from cosim.scenario.start_values import start_values
 from cosim.simulation.actuators import Actuators
 from cosim.simulation.columns import columns_of
-from cosim.simulation.commands.command_handler import Helm
-from cosim.simulation.commands.commands import Order
-from cosim.simulation.commands.sources import OrderSource
-from cosim.simulation.environment import Surroundings
+from cosim.simulation.commands.command_handler import CommandHandler
+from cosim.simulation.commands.commands import Command
+from cosim.simulation.commands.sources import CommandSource
+from cosim.simulation.environment import RegionEnvironment
 from cosim.simulation.lyapunov_signals import LyapunovSignals
 from cosim.simulation.sensor import Sensor
 from cosim.simulation.signals import Array, Signals
@@ -33,7 +33,7 @@ from plant_fmu import Plant
 
 _LONGEST_SLEEP = 3600.0  # s
 _MADE_UP = 0.1  # s of the wall clock, that a paced run may be behind and make up for
-_ARMING_PERIOD = 0.005  # s of the wall clock, at which orders are looked for while nothing moves
+_ARMING_PERIOD = 0.005  # s of the wall clock, at which commands are looked for while nothing moves
 _ROUNDING = 1e-6  # of a step
 _DOWN: Array = np.array([0.0, 0.0, 1.0])
 _FIRST_APPLIED = "thruster_force[1]"  # outputs before it are read at the beginning of a step, from it on at the end
@@ -84,7 +84,7 @@ class Master:
         self.law: Law = law_of(scenario) if law is None else law
         self._jacobi = scenario.master.order == "jacobi"
         self._failures = bool(scenario.failures)
-        self.surroundings = Surroundings(scenario)
+        self.environment = RegionEnvironment(scenario)
         self._boundary = 0.0  # s, when the next step begins
 
         self.plant = Plant(scenario.vehicle, scenario.plant.fmi)
@@ -125,9 +125,9 @@ class Master:
 
         values, clearances = s.view("goal.value", n + 1), s.view("goal.clearance", n + 1)
         # where sensing is exact, what the arbiter sees is what is recorded
-        self._outlook = self._seen = self.surroundings.outlook(values, clearances)
+        self._true_evaluation = self._given_evaluation = self.environment.empty_evaluation(values, clearances)
         if self._sensor is not None:
-            self._seen = self.surroundings.outlook(np.zeros(n + 1), np.zeros(n + 1))
+            self._given_evaluation = self.environment.empty_evaluation(np.zeros(n + 1), np.zeros(n + 1))
         moving = self.scenario.moving
         self._shifts = s.view(f"{moving[0]}.shift.x", 3 * len(moving)).reshape(-1, 3) if moving else np.empty((0, 3))
         self._memberships = s.view(f"membership.{CRITERIA[0]}", len(CRITERIA))
@@ -139,12 +139,14 @@ class Master:
         self._reports = n_reports > 0
         self._report = s.view(f"law.{self.law.diagnostics[0].name}", n_reports) if n_reports else np.empty(0)
         self._lyapunov: LyapunovSignals | None = None
-        self.helm: Helm | None = None
+        self.command_handler: CommandHandler | None = None
         if self.scenario.commands.enabled:
-            self.helm = Helm(self.scenario, self.surroundings, self.actuators, self.state, s.view("helm.armed", 7))
+            self.command_handler = CommandHandler(
+                self.scenario, self.environment, self.actuators, self.state, s.view("commands.armed", 7)
+            )
         if self.scenario.record.lyapunov:
             out = s.view("lyapunov.printed", 4)
-            goal, regions, weights = self.surroundings.goal, self.surroundings.regions, self._weights_of_regions
+            goal, regions, weights = self.environment.goal, self.environment.regions, self._weights_of_regions
             self._lyapunov = LyapunovSignals(self.scenario, truth, goal, regions, weights, self._estimate, out)
 
     @property
@@ -158,7 +160,7 @@ class Master:
         self,
         observers: Sequence[Observer] = (),
         rate: float | None = None,
-        orders: OrderSource | None = None,
+        commands: CommandSource | None = None,
         awaiting: Observer | None = None,
     ) -> None:
         """Step from time 0 to the end, once, telling the observers of each step.
@@ -171,9 +173,9 @@ class Master:
             Told in this order.
         rate : float, optional
             Simulated seconds a wall-clock second at the most; default: as fast as it goes.
-        orders : OrderSource, optional
-            What is ordered on the way, if the scenario's commands are enabled. Where nothing moves before the vehicle
-            is armed, the first step waits for that order. After an order to reset, the run ends.
+        commands : CommandSource, optional
+            What is commanded on the way, if the scenario's commands are enabled. Where nothing moves before the vehicle
+            is armed, the first step waits for that command. After a command to reset, the run ends.
         awaiting : Observer, optional
             Told how things stand, as of step 0, while arming is awaited.
 
@@ -184,27 +186,27 @@ class Master:
         """
         step, last = self.scenario.time.step, self.scenario.steps
         seen = self.row
-        waited = self._await_arming(orders, awaiting)
+        waited = self._await_arming(commands, awaiting)
         started = time.perf_counter()
         for k in range(last + 1):
-            self.step(k, orders if k or not waited else None)
+            self.step(k, commands if k or not waited else None)
             for observer in observers:
                 observer.observe(k, seen)
-            if self.helm is not None and self.helm.reset:
+            if self.command_handler is not None and self.command_handler.reset:
                 return
             if rate is not None:
                 ahead = started + (k + 1) * step / rate - time.perf_counter()
                 time.sleep(min(max(0.0, ahead), _LONGEST_SLEEP))
                 started -= min(0.0, ahead + _MADE_UP)  # what took longer, such as loading, is not made up for in a rush
 
-    def step(self, k: int, orders: OrderSource | None = None) -> None:
+    def step(self, k: int, commands: CommandSource | None = None) -> None:
         """Do step `k`: the first is 0, and each is done once, in their order; the last one moves nothing.
 
         Parameters
         ----------
         k : int
             Which.
-        orders : OrderSource, optional
+        commands : CommandSource, optional
             As for `run`.
 
         Raises
@@ -215,18 +217,20 @@ class Master:
         scenario, step, jacobi = self.scenario, self.scenario.time.step, self._jacobi
         self.signals.row[0] = k * step
         if self._failures:
-            self._fail(k)
+            self._fail_scheduled_thrusters(k)
         if jacobi and k:
-            self._exchange(k - 1)
+            self._exchange_delayed(k - 1)
         self._measure(k)
-        if self.helm is not None and orders is not None:
-            self._heed(self.helm, orders.take(k))
+        if self.command_handler is not None and commands is not None:
+            self._apply_commands(self.command_handler, commands.take(k))
         self._evaluate_regions()
-        if self.helm is not None and self.helm.watch(float(self.signals.row[0]), float(self._seen.clearances[0])):
-            self._heed(self.helm, ())  # what the next item of the mission changes
+        if self.command_handler is not None and self.command_handler.update(
+            float(self.signals.row[0]), float(self._given_evaluation.clearances[0])
+        ):
+            self._apply_commands(self.command_handler, ())  # what the next item of the mission changes
             self._evaluate_regions()
         if jacobi:
-            self.actuators.send()  # what was asked for in the step before
+            self.actuators.write_inputs()  # what was asked for in the step before
         elif k % scenario.arbiter_every == 0:
             self._arbitrate()
         if k % scenario.control_every == 0:
@@ -235,13 +239,13 @@ class Master:
             self._lyapunov.write()
         if k < scenario.steps:
             if not jacobi:
-                self.actuators.send()
-            self._advance(step)
+                self.actuators.write_inputs()
+            self._step_plant(step)
         self._boundary = (k + 1) * step
 
     # ---- the stages of a step ----
 
-    def _fail(self, k: int) -> None:
+    def _fail_scheduled_thrusters(self, k: int) -> None:
         """Let thrusters fail whose time has come."""
         for failure in self.scenario.failures:
             if k == math.ceil(failure.time / self.scenario.time.step - _ROUNDING):
@@ -252,101 +256,103 @@ class Master:
         if self._sensor is not None:
             self._sensor.measure(self.signals.row[0], k % self.scenario.control_every == 0)
 
-    def look(self) -> None:
+    def measure_initial_state(self) -> None:
         """Fill the row with how things stand before the first step; nothing moves, and no noise is drawn."""
         self._measured[:] = self._plant_measured
         if self._sensor is not None:
             self._sensor.tell_truth()
         self._evaluate_regions()
-        if self.helm is not None:
-            self.helm.watch(0.0, float(self._seen.clearances[0]))
+        if self.command_handler is not None:
+            self.command_handler.update(0.0, float(self._given_evaluation.clearances[0]))
 
-    def _await_arming(self, orders: OrderSource | None, awaiting: Observer | None) -> bool:
-        """Follow orders before step 0 until one arms the vehicle, or none is to come; return whether it was awaited."""
-        helm = self.helm
-        if helm is None or helm.armed or orders is None:
+    def _await_arming(self, commands: CommandSource | None, awaiting: Observer | None) -> bool:
+        """Apply commands before step 0 until one arms the vehicle, or none is to come; return whether it waited."""
+        command_handler = self.command_handler
+        if command_handler is None or command_handler.armed or commands is None:
             return False
-        while not (helm.armed or orders.exhausted):
-            self.look()
-            self._heed(helm, orders.take(0))
-            helm.reset = False  # nothing has begun
+        while not (command_handler.armed or commands.exhausted):
+            self.measure_initial_state()
+            self._apply_commands(command_handler, commands.take(0))
+            command_handler.reset = False  # nothing has begun
             if awaiting is not None:
                 awaiting.observe(0, self.row)
             time.sleep(_ARMING_PERIOD)
         return True
 
-    def _heed(self, helm: Helm, orders: Sequence[Order]) -> None:
-        """Follow the orders of this step, and take over what was changed."""
+    def _apply_commands(self, command_handler: CommandHandler, commands: Sequence[Command]) -> None:
+        """Follow the commands of this step, and take over what was changed."""
         now = float(self.signals.row[0])
-        for order in orders:
-            helm.follow(order, now)
-        if helm.took_over:
+        for command in commands:
+            command_handler.apply(command, now)
+        if command_handler.control_regained:
             self.law = law_of(self.scenario)
-        if isinstance(self.law, CompiledLaw) and (helm.took_over or helm.changed or helm.turned):
-            self.law.gains = helm.settings.gains
-            if helm.heading is not None:
-                self.law.face(from_axis_angle(_DOWN, helm.heading))
-        if helm.changed:
-            self.surroundings.set_ramp(helm.settings["arbiter.ramp"])
-        helm.heeded()
+        if isinstance(self.law, CompiledLaw) and (
+            command_handler.control_regained or command_handler.changed or command_handler.turned
+        ):
+            self.law.gains = command_handler.settings.gains
+            if command_handler.heading is not None:
+                self.law.face(from_axis_angle(_DOWN, command_handler.heading))
+        if command_handler.changed:
+            self.environment.set_ramp(command_handler.settings["arbiter.ramp"])
+        command_handler.mark_applied()
 
     def _evaluate_regions(self) -> None:
         """Evaluate the regions, where they are now, at the pose that is told, and at the true one."""
-        self.surroundings.carry_to(self.signals.row[0], self._shifts)
+        self.environment.update_positions(self.signals.row[0], self._shifts)
         if self._sensor is not None:
-            self.surroundings.evaluate(self.state, self._seen)
-        self.surroundings.evaluate(self.truth, self._outlook)
+            self.environment.evaluate(self.state, self._given_evaluation)
+        self.environment.evaluate(self.truth, self._true_evaluation)
 
     def _arbitrate(self) -> None:
         """Turn memberships into weights.
 
         While the position is lost there is nothing to decide by: the last weights hold.
         """
-        memberships = self._press()
+        memberships = self._asked_memberships()
         # what asks as it did in the step before is weighed as then, and stands in the row still
         if memberships is not None and memberships != self._asked:
             self._asked = memberships
             self._memberships[:] = memberships
-            self._weigh(memberships)
+            self._compute_weights(memberships)
 
-    def _exchange(self, before: int) -> None:
+    def _exchange_delayed(self, before: int) -> None:
         """Hand on what regions and arbiter made, in the step `before`, of what stood at its beginning (Jacobi)."""
         if before % self.scenario.arbiter_every == 0:
-            self._weigh(self._memberships.tolist())
-        memberships = self._press()
+            self._compute_weights(self._memberships.tolist())
+        memberships = self._asked_memberships()
         if memberships is not None:
             self._memberships[:] = memberships
 
-    def _press(self) -> list[float] | None:
+    def _asked_memberships(self) -> list[float] | None:
         """Return the membership of each criterion, that of its most pressing region; None if the position is lost."""
         if self._sensor is not None and not np.isfinite(self.state.position).all():
             return None
-        memberships: list[float] = self._seen.memberships.tolist()
+        memberships: list[float] = self._given_evaluation.memberships.tolist()
         return memberships
 
-    def _weigh(self, memberships: list[float]) -> None:
+    def _compute_weights(self, memberships: list[float]) -> None:
         self._weights[:] = self.arbiter(memberships)
-        self._weights_of_regions[:] = self._weights[self.surroundings.criteria]
+        self._weights_of_regions[:] = self._weights[self.environment.criteria]
 
     def _control(self) -> None:
         """Ask the law, or the sticks, for forces of the coming period, and bring them to the plant's inputs."""
         actuators = self.actuators
-        if self.helm is not None and not self.helm.law_steers:
-            actuators.command[:] = self.helm.wrench
-            actuators.push()
+        if self.command_handler is not None and not self.command_handler.automatic_control:
+            actuators.command[:] = self.command_handler.wrench
+            actuators.allocate()
             return
         self._estimate[...] = self.law.estimate
         law, by_wrench = self.law, self.law.output == "wrench"
         forces = actuators.command if by_wrench else actuators.thrusts
-        law.step(self.state, self.surroundings.goal, self.surroundings.regions, self._weights_of_regions, forces)
+        law.step(self.state, self.environment.goal, self.environment.regions, self._weights_of_regions, forces)
         if self._reports:
             self._report[...] = law.report
         if by_wrench:
-            actuators.push()
+            actuators.allocate()
         else:
-            actuators.push_thrusters()
+            actuators.apply_thrusts()
 
-    def _advance(self, step: float) -> None:
+    def _step_plant(self, step: float) -> None:
         self.plant.step(step)
         self._applied[:] = self._plant_applied
         flags = self.plant.read_flags()
@@ -375,7 +381,7 @@ class Master:
         RunError
             If there is no such region, it is not streamed, or a number is not finite.
         """
-        self.surroundings.move(name, displacement, velocity, self._boundary)
+        self.environment.move(name, displacement, velocity, self._boundary)
 
     # ---- the end ----
 

@@ -14,12 +14,15 @@ from controller.jit.jit import inlined
 from cosim.simulation.signals import Array
 from fuzzy_arbiter import ramp
 
-SOURCES = (Path(fuzzy_arbiter.__file__).parent, Path(__file__).parent)  # folders that the code of `press` stands in
+SOURCES = (
+    Path(fuzzy_arbiter.__file__).parent,
+    Path(__file__).parent,
+)  # folders that the code of `compute_memberships` stands in
 _ramp: Any = numba.njit(ramp)
 
 
 @inlined
-def press(clearances: Array, criteria: NDArray[np.int64], width: float, memberships: Array) -> None:
+def compute_memberships(clearances: Array, criteria: NDArray[np.int64], width: float, memberships: Array) -> None:
     """Write the membership of each criterion, that of its most pressing region.
 
     Parameters

@@ -23,20 +23,20 @@ from tests.architecture.modules import ROOT
 
 LIKE_NONE = "brandnew"
 
-ITEM = {"position": [1.0, 2.0, 3.0], "orders": [{"order": "face", "heading": 1.0}]}
-ORDERS = [
-    {"order": "arm", "armed": True},
-    {"order": "steer", "mode": "hold"},
-    {"order": "aim", "position": [1.0, 2.0, 3.0]},
-    {"order": "face", "heading": 1.0},
-    {"order": "sticks", "wrench": [0.0] * 6},
-    {"order": "obstacle", "number": 1, "position": [1.0, 2.0, 3.0], "radius": 1.0},
-    {"order": "forget", "number": 1},
-    {"order": "move", "region": "SR1", "by": [1.0, 2.0, 3.0]},
-    {"order": "change", "key": "a.b", "value": 1.0},
-    {"order": "mission", "items": [ITEM]},
-    {"order": "begin", "item": 0},
-    {"order": "reset"},
+ITEM = {"position": [1.0, 2.0, 3.0], "commands": [{"command": "set_heading", "heading": 1.0}]}
+COMMANDS_LOG = [
+    {"command": "arm", "armed": True},
+    {"command": "set_mode", "mode": "hold"},
+    {"command": "set_target", "position": [1.0, 2.0, 3.0]},
+    {"command": "set_heading", "heading": 1.0},
+    {"command": "manual_control", "wrench": [0.0] * 6},
+    {"command": "add_obstacle", "number": 1, "position": [1.0, 2.0, 3.0], "radius": 1.0},
+    {"command": "remove_obstacle", "number": 1},
+    {"command": "shift_region", "region": "SR1", "by": [1.0, 2.0, 3.0]},
+    {"command": "change_setting", "key": "a.b", "value": 1.0},
+    {"command": "set_mission", "items": [ITEM]},
+    {"command": "set_current_item", "item": 0},
+    {"command": "reset"},
 ]
 CRITERIA = {"criteria": [{"name": "a", "off": "below 1"}, {"name": "b"}]}
 
@@ -62,8 +62,8 @@ def scenes(table, folder):
     return list(read_scenes(path))
 
 
-def orders(table, folder):
-    path = folder / "orders.jsonl"
+def commands(table, folder):
+    path = folder / "commands.jsonl"
     path.write_text(json.dumps(table) + "\n")
     return read_log(path)
 
@@ -89,7 +89,7 @@ def examples():
         (vehicle, tomllib.loads((ROOT / f"plant_fmu/vehicles/{name}.toml").read_text())) for name in shipped_vehicles()
     ]
     found += [(read, table) for read in (arbiter_toml, arbiter_json) for table in (tipping, CRITERIA)]
-    return found + [(scenes, scene)] + [(orders, {"step": 1, "order": order}) for order in ORDERS]
+    return found + [(scenes, scene)] + [(commands, {"step": 1, "command": order}) for order in COMMANDS_LOG]
 
 
 # tables whose keys are names that the file itself gives
@@ -113,7 +113,7 @@ def at(table, path):
 def kind_of(table, path):
     """Its path without numbers, and its type where it has one: one of a kind is enough."""
     inner = at(table, path)
-    named = [inner[key] for key in ("type", "order") if isinstance(inner.get(key), str)]
+    named = [inner[key] for key in ("type", "command") if isinstance(inner.get(key), str)]
     return ".".join([*(key for key in path if isinstance(key, str)), *named])
 
 

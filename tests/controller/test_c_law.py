@@ -196,9 +196,14 @@ def in_c(library, packed, positions, quaternions):
 
 def in_python(packed, positions, quaternions):
     m, n = len(positions), len(packed.kinds)
-    values, gradients, turnings, clearances = np.empty((m, n)), np.empty((m, n, 3)), np.empty((n, 3)), np.empty((m, n))
+    values, gradients, rotation_gradients, clearances = (
+        np.empty((m, n)),
+        np.empty((m, n, 3)),
+        np.empty((n, 3)),
+        np.empty((m, n)),
+    )
     for i in range(m):
-        packed.evaluate(positions[i], quaternions[i], values[i], gradients[i], turnings, clearances[i])
+        packed.evaluate(positions[i], quaternions[i], values[i], gradients[i], rotation_gradients, clearances[i])
     return values, gradients, clearances
 
 

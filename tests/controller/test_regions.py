@@ -59,9 +59,9 @@ LEVEL = np.array([1.0, 0.0, 0.0, 0.0])
 def evaluated(shape, p, e=LEVEL, keep="in"):
     """Return g, its derivatives by position and by rotation, and the clearance."""
     packed = pack([Region("r", shape, keep)])
-    values, gradients, turnings, clearances = np.empty(1), np.empty((1, 3)), np.empty((1, 3)), np.empty(1)
-    packed.evaluate(np.asarray(p, float), np.asarray(e, float), values, gradients, turnings, clearances)
-    return values[0], gradients[0], turnings[0], clearances[0]
+    values, gradients, rotation_gradients, clearances = np.empty(1), np.empty((1, 3)), np.empty((1, 3)), np.empty(1)
+    packed.evaluate(np.asarray(p, float), np.asarray(e, float), values, gradients, rotation_gradients, clearances)
+    return values[0], gradients[0], rotation_gradients[0], clearances[0]
 
 
 def at(shape, p, keep="in"):
@@ -344,12 +344,12 @@ def test_a_moving_region_is_where_it_would_be_seen_from_its_own_place(shape, p, 
         return  # at no place
     packed = pack([Region("r", shape, "in", tuple(velocity))])
     packed.move_to(1.5)
-    values, gradients, turnings, clearances = np.empty(1), np.empty((1, 3)), np.empty((1, 3)), np.empty(1)
-    packed.evaluate(p + 1.5 * velocity, e, values, gradients, turnings, clearances)
+    values, gradients, rotation_gradients, clearances = np.empty(1), np.empty((1, 3)), np.empty((1, 3)), np.empty(1)
+    packed.evaluate(p + 1.5 * velocity, e, values, gradients, rotation_gradients, clearances)
     g, gradient, turning, clearance = evaluated(shape, (p + 1.5 * velocity) - 1.5 * velocity, e)
     assert (values[0], clearances[0]) == (g, clearance)
     assert np.array_equal(gradients[0], gradient)
-    assert np.array_equal(turnings[0], turning)
+    assert np.array_equal(rotation_gradients[0], turning)
 
 
 @pytest.mark.parametrize("shape", [shape for shape in EXAMPLES if of_attitude(shape)])

@@ -12,9 +12,9 @@ from xml.etree import ElementTree
 import tomli_w
 
 from cosim.campaigns.scenes.scene import decode_scene
-from cosim.live.orders import Desk
+from cosim.live.command_desk import Desk
 from cosim.scenario.scenario import load_scenario
-from cosim.simulation.commands import OrderQueue
+from cosim.simulation.commands import CommandQueue
 from fuzzy_arbiter.formats import load
 from plant_fmu import load_vehicle
 from plant_fmu.compiling.compiler import find_compiler
@@ -75,9 +75,9 @@ def _check_json(block: Block) -> None:
     if block.directives.kind == "scenes":
         for line in lines:
             decode_scene(line.encode())
-    if block.directives.orders_of:
-        scenario = load_scenario(block.directives.orders_of, ["commands.enabled=true"])
-        desk = Desk(scenario, OrderQueue(), lambda name: True)
+    if block.directives.commands_of:
+        scenario = load_scenario(block.directives.commands_of, ["commands.enabled=true"])
+        desk = Desk(scenario, CommandQueue(), lambda name: True)
         for line in lines:
             if why := desk.take(line):
                 raise PageError(f"{block.where}: {line} is refused: {why}")

@@ -12,7 +12,7 @@ The same for a page that is to be free of them stands in ``beside/PAGE.toml``, b
 ``setup sh`` or ``setup python``, lines     done before the block, or with a ``"PREFIX"`` before the first command so
 ``scenario``, ``vehicle``, ``arbiter``      what a block of TOML is; with ``onto: NAME`` it is merged onto a shipped one
 ``scenes``                                  of a block of JSON: each line is a scene of a campaign
-``orders of: SCENARIO``                     of a block of JSON: each line is an order that a run of it takes
+``commands of: SCENARIO``                     of a block of JSON: each line is a command that a run of it takes
 ``compile with: FLAGS``                     of a block of C
 ``alone``                                   the block of Python runs in a process of its own, with names of its own
 ``slow``                                    the page runs with --slow alone
@@ -29,10 +29,10 @@ _PREFIXED = re.compile(r'(page run with|run with|not run|exits)(?: "([^"]+)")?: 
 _GIVEN = re.compile(r"given: (\S+) as (\S+)")
 _NAMED = re.compile(r"(file|compile with): (\S.*)")
 _KIND = re.compile(r"(scenario|vehicle|arbiter|scenes)(?: onto: (\S+))?")
-_ORDERS = re.compile(r"orders of: (\S+)")
+_COMMANDS = re.compile(r"commands of: (\S+)")
 _SETUP = re.compile(r'setup (sh|python)(?: "([^"]+)")?\n(.*)', re.S)
 _WORDS = re.compile(
-    r"(page run|run with|not run|exits|given|file:|setup|scenario|vehicle|arbiter|scenes|orders of|compile with|alone"
+    r"(page run|run with|not run|exits|given|file:|setup|scenario|vehicle|arbiter|scenes|commands of|compile with|alone"
     r"|slow)\b"
 )
 
@@ -53,7 +53,7 @@ class Directives:
     kind: str = ""
     onto: str = ""
     file: str = ""
-    orders_of: str = ""
+    commands_of: str = ""
     compile_with: str = ""
     alone: bool = False
     slow: bool = False
@@ -85,8 +85,8 @@ class Directives:
             setattr(self, {"file": "file", "compile with": "compile_with"}[match[1]], match[2])
         elif match := _KIND.fullmatch(text):
             self.kind, self.onto = match[1], match[2] or ""
-        elif match := _ORDERS.fullmatch(text):
-            self.orders_of = match[1]
+        elif match := _COMMANDS.fullmatch(text):
+            self.commands_of = match[1]
         elif match := _SETUP.fullmatch(text):
             self.setups.append((match[2] or "", match[1], match[3]))
         elif text in ("slow", "alone"):

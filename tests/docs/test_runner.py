@@ -52,7 +52,7 @@ RIGHT = {
     "a scenario": fence("toml", "[time]\nduration = 5.0", "scenario onto: docking"),
     "an arbiter": fence("toml", 'criteria = [{ name = "a" }, { name = "b" }]', "arbiter"),
     "lines of JSON": fence("json", '{"a": 1}\n{"a": 2}'),
-    "orders": fence("json", '{"order": "arm", "armed": true}\n{"order": "reset"}', "orders of: harbour"),
+    "commands": fence("json", '{"command": "arm", "armed": true}\n{"command": "reset"}', "commands of: harbour"),
     "XML": fence("xml", "<a><b/></a>"),
     "C": fence("c", "#include <math.h>\ndouble half(double x) { return x / 2; }"),
     "a file of the repository": fence("sh", "cat plain.jsonl", "given: tests/data/scenes/plain.jsonl as plain.jsonl")
@@ -119,7 +119,7 @@ WRONG = {
     "a key of nobody": (fence("toml", "[time]\nduratoin = 1.0", "scenario onto: paper"), "duratoin"),
     "a vehicle that cannot be": (fence("toml", "[hull]\nradius = -1.0", "vehicle onto: odin"), "radius"),
     "JSON that is none": (fence("json", '{"a": 1'), "page.md:3"),
-    "an order of nobody": (fence("json", '{"order": "fly"}', "orders of: harbour"), "is refused"),
+    "an unknown command": (fence("json", '{"command": "fly"}', "commands of: harbour"), "is refused"),
     "a scene that is none": (fence("json", '{"seed": 1}', "scenes"), "start"),
     "XML that is none": (fence("xml", "<a>"), "no element|unclosed"),
     "C that is none": (fence("c", "int f( { }"), "error"),

@@ -68,5 +68,5 @@ def test_error_falls_with_the_fourth_power_of_the_substep(make_slave):
 
     truth = end(0.001)
     errors = [np.abs(end(h) - truth).max() for h in (0.08, 0.04, 0.02)]
-    orders = np.log2(np.array(errors[:-1]) / errors[1:])
-    assert np.all((orders > 3.7) & (orders < 4.4)), (errors, orders)
+    commands = np.log2(np.array(errors[:-1]) / errors[1:])
+    assert np.all((commands > 3.7) & (commands < 4.4)), (errors, commands)

@@ -22,7 +22,7 @@ from cosim.simulation.columns import names_of
 from cosim.simulation.master import Master
 
 KINDS = {
-    "ordered": ["commands.enabled=true", "commands.obstacles=2"],
+    "commanded": ["commands.enabled=true", "commands.obstacles=2"],
     "sensed, with V": ["sensing.position_noise=0.01", "record.lyapunov=true"],
     "thrusters": ["law.name=deployable", "actuation.through=thrusters"],
 }
@@ -103,7 +103,9 @@ def test_d6_the_names_are_those_of_every_shipped_scenario(name):
         assert names_of(scenario) == [column.name for column in master.signals.columns]
 
 
-@pytest.mark.parametrize("swapped", [("position.x", "position.y"), ("time", "position.x"), ("helm.mode", "target.z")])
+@pytest.mark.parametrize(
+    "swapped", [("position.x", "position.y"), ("time", "position.x"), ("commands.mode", "target.z")]
+)
 def test_d6_columns_in_another_order_are_refused(ordered_run, swapped):
     """What is read side by side would be another quantity."""
     scenario = load_scenario(ordered_run / "scenario.toml")
@@ -133,7 +135,7 @@ def lacking(tmp_path, ordered_run):
 def test_d6_every_reader_names_the_column_and_the_file(read, lacking):
     for name in (
         "target.x",
-        "helm.mode",
+        "commands.mode",
         "thruster_force[1]",
         "attitude.yaw",
         "membership.depth",

@@ -167,7 +167,7 @@ def test_d5_texts_of_a_summary_are_shown_only(tmp_path, shipped_run):
 
 
 @pytest.mark.skipif(os.name != "posix", reason="names of files are no bytes here")
-def test_d5_a_scenario_whose_name_orders_a_terminal_has_one_that_is_shown_only(tmp_path):
+def test_d5_a_scenario_whose_name_commands_a_terminal_has_one_that_is_shown_only(tmp_path):
     file = tmp_path / os.fsdecode(b"a\x1b[31m\xff.toml")
     file.write_text('base = "paper"\ntime.duration = 0.01')
     scenario = load_scenario(file)

@@ -20,7 +20,7 @@ BASES = [
     controller.errors.ControllerError, cosim.errors.CosimError, fuzzy_arbiter.errors.ArbiterError,
     plant_fmu.errors.PlantFmuError,
 ]  # fmt: skip
-ORDERS = "\x1b[31m\x9b2J\u202e\n\r\x07"  # to a terminal
+COMMANDS_LOG = "\x1b[31m\x9b2J\u202e\n\r\x07"  # to a terminal
 SHOWN = r"\x1b[31m\x9b2J\u202e"
 
 
@@ -45,7 +45,7 @@ def test_d11_a_message_quotes_little_and_keeps_its_ends(base, came):
 
 @pytest.mark.parametrize("base", BASES)
 def test_d11_a_message_orders_a_terminal_nothing(base):
-    said = str(base(f"{ORDERS}.toml: {ORDERS}"))
+    said = str(base(f"{COMMANDS_LOG}.toml: {COMMANDS_LOG}"))
     assert said.isprintable() and said.count(SHOWN) == 2
 
 
@@ -64,7 +64,7 @@ COMMANDS = {
     "export": lambda file: cosim_main(["export", file, "--to", "csv"]),
     "rerun": lambda file: cosim_main(["rerun", file, "1"]),
     "stream": lambda file: cosim_main(["stream", file, "--mavlink", "udpout:127.0.0.1:9"]),
-    "orders": lambda file: cosim_main(["run", "paper", "--orders", file]),
+    "commands": lambda file: cosim_main(["run", "paper", "--replay-commands", file]),
     "campaign": lambda file: cosim_main(["campaign", file, "--law", "pd", "--out", "x"]),
     "key": lambda file: cosim_main(["listen", "udpin:127.0.0.1:14999", "--signing-key", file]),
     "endpoint": lambda file: cosim_main(["listen", file]),
@@ -83,7 +83,7 @@ COMMANDS = {
 
 @pytest.mark.parametrize("command", COMMANDS.values(), ids=COMMANDS)
 @pytest.mark.parametrize(
-    "name", [f"it{ORDERS}", "it" + "a" * 900, os.fsdecode(b"it\xff\xfe")], ids=["orders", "long", "bytes"]
+    "name", [f"it{COMMANDS_LOG}", "it" + "a" * 900, os.fsdecode(b"it\xff\xfe")], ids=["commands", "long", "bytes"]
 )
 def test_d11_what_commands_say_of_any_name(command, name, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
@@ -106,5 +106,5 @@ def test_d11_an_error_of_the_system_names_its_file(tmp_path, capsys):
 
 
 def test_d11_warnings_order_a_terminal_nothing():
-    record = logging.LogRecord("cosim", logging.WARNING, "", 0, "%s: is odd", (ORDERS,), None)
+    record = logging.LogRecord("cosim", logging.WARNING, "", 0, "%s: is odd", (COMMANDS_LOG,), None)
     assert _Lines("%(name)s: %(message)s").format(record).startswith(f"cosim: {SHOWN}")

@@ -1,4 +1,4 @@
-"""Scenarios, vehicles, arbiters, scenes and orders made to do harm end in one short line of a known kind."""
+"""Scenarios, vehicles, arbiters, scenes and commands made to do harm end in one short line of a known kind."""
 
 import json
 import math
@@ -146,7 +146,7 @@ def test_texts_that_a_terminal_shows_are_plain(key, text):
 
 
 @pytest.mark.parametrize("read", [scenario, vehicle])
-def test_a_key_with_orders_to_a_terminal_is_shown_only(read, tmp_path):
+def test_a_key_with_commands_to_a_terminal_is_shown_only(read, tmp_path):
     assert r"\x1b[31mred" in said_of(read, tmp_path / "it.toml", b'"\\u001b[31mred" = 1')
 
 
@@ -163,7 +163,7 @@ def test_names_of_vehicles_are_plain(tmp_path, name):
 @pytest.mark.parametrize(
     "line", [b"[" * 100_000, b'{"seed":' * 50_000, b"\xff", b"{}", b"1", b'{"seed":1' + b"0" * 5000]
 )
-def test_scenes_and_orders_that_cannot_be(tmp_path, line):
+def test_scenes_and_commands_that_cannot_be(tmp_path, line):
     assert said_of(lambda path, text: decode_scene(text), tmp_path, line)
     (tmp_path / "log").write_bytes(line + b"\n")
     assert said_of(lambda path, text: read_log(path), tmp_path / "log", line)

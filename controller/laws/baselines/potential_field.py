@@ -30,7 +30,7 @@ class Field(NamedTuple):
     goal_clearance: Array  # (1,) m
     values: Array  # (n,)
     gradients: Array  # (n, 3)
-    turnings: Array  # (n, 3)
+    rotation_gradients: Array  # (n, 3)
     clearances: Array  # (n,) m
     error: Array  # (3,) of the goal, NED
     push: Array  # (3,) N, NED, of all other regions
@@ -45,7 +45,7 @@ def field_of(n_regions: int) -> Field:
         goal_clearance=np.zeros(1),
         values=np.zeros(n_regions),
         gradients=np.zeros((n_regions, 3)),
-        turnings=np.zeros((n_regions, 3)),
+        rotation_gradients=np.zeros((n_regions, 3)),
         clearances=np.zeros(n_regions),
         error=np.zeros(3),
         push=np.zeros(3),
@@ -73,7 +73,7 @@ def evaluate_field(
     """
     p, e = state.position, state.quaternion
     evaluate_packed(goal, p, e, field.goal_value, field.goal_gradient, field.goal_turning, field.goal_clearance)
-    evaluate_packed(regions, p, e, field.values, field.gradients, field.turnings, field.clearances)
+    evaluate_packed(regions, p, e, field.values, field.gradients, field.rotation_gradients, field.clearances)
     field.push[:] = 0.0
     for i in range(field.values.size):
         if regions.kinds[i] >= _ATTITUDE:

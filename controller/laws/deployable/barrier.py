@@ -49,12 +49,12 @@ class Sight(NamedTuple):
 
     values: Array  # (n,)
     gradients: Array  # (n, 3)
-    turnings: Array  # (n, 3)
+    rotation_gradients: Array  # (n, 3)
     clearances: Array  # (n,)
     later_shifts: Array  # (n, 3) m, of the regions
     later_values: Array  # (n,)
     later_gradients: Array  # (n, 3)
-    later_turnings: Array  # (n, 3)
+    later_rotation_gradients: Array  # (n, 3)
     later_clearances: Array  # (n,)
 
 
@@ -83,7 +83,7 @@ def sight_of(n: int) -> Sight:
 def look(sight: Sight, regions: PackedRegions, position: Array, quaternion: Array, velocity: Array) -> None:
     """Evaluate the regions at a pose [m, NED], and at the one to which a velocity leads, shape (6,) as in `Motion`."""
     s = sight
-    evaluate_packed(regions, position, quaternion, s.values, s.gradients, s.turnings, s.clearances)
+    evaluate_packed(regions, position, quaternion, s.values, s.gradients, s.rotation_gradients, s.clearances)
     r, place, attitude = regions, zeros(3), zeros(4)
     for axis in range(3):
         place[axis] = position[axis] + _AHEAD * velocity[axis]
@@ -93,23 +93,25 @@ def look(sight: Sight, regions: PackedRegions, position: Array, quaternion: Arra
     moved = PackedRegions(
         r.kinds, r.signs, r.offsets, r.numbers, s.later_shifts, r.velocities, r.gains, r.hard, r.place, r.pose
     )
-    evaluate_packed(moved, place, attitude, s.later_values, s.later_gradients, s.later_turnings, s.later_clearances)
+    evaluate_packed(
+        moved, place, attitude, s.later_values, s.later_gradients, s.later_rotation_gradients, s.later_clearances
+    )
 
 
 @part
-def slope_of(gradients: Array, turnings: Array, i: int, of_attitude: bool, out: Array) -> bool:
+def slope_of(gradients: Array, rotation_gradients: Array, i: int, of_attitude: bool, out: Array) -> bool:
     """Write the slope of a clearance over the pose, shape (6,); False where there is none.
 
     A distance follows the gradient's direction with slope 1, whatever the unit of g; an angle is -g itself.
     """
     size = np.sqrt(gradients[i, 0] ** 2 + gradients[i, 1] ** 2 + gradients[i, 2] ** 2)
-    turning = np.sqrt(turnings[i, 0] ** 2 + turnings[i, 1] ** 2 + turnings[i, 2] ** 2)
+    turning = np.sqrt(rotation_gradients[i, 0] ** 2 + rotation_gradients[i, 1] ** 2 + rotation_gradients[i, 2] ** 2)
     if not size + turning > 0.0:
         return False
     scale = 1.0 if of_attitude else 1.0 / size
     for axis in range(3):
         out[axis] = -scale * gradients[i, axis]
-        out[3 + axis] = -scale * turnings[i, axis]
+        out[3 + axis] = -scale * rotation_gradients[i, axis]
     return True
 
 
@@ -167,7 +169,7 @@ def write_rows(
     rows, n, later_n, relative, along_way = 0, zeros(6), zeros(6), zeros(6), zeros(3)
     for i in range(regions.kinds.size):
         of_attitude = regions.kinds[i] >= _ATTITUDE
-        if not regions.hard[i] or not slope_of(sight.gradients, sight.turnings, i, of_attitude, n):
+        if not regions.hard[i] or not slope_of(sight.gradients, sight.rotation_gradients, i, of_attitude, n):
             continue
         braking, margin, scale = motion.braking, gains.margin + motion.spread, motion.mass**2
         if of_attitude:
@@ -178,7 +180,7 @@ def write_rows(
         for axis in range(6):
             relative[axis] = motion.velocity[axis] - (regions.velocities[i, axis] if axis < 3 else 0.0)
         turning = 0.0
-        if slope_of(sight.later_gradients, sight.later_turnings, i, of_attitude, later_n):
+        if slope_of(sight.later_gradients, sight.later_rotation_gradients, i, of_attitude, later_n):
             turning = turning_of(regions.kinds[i], n, later_n, relative)
         distance, reach, faces = sight.clearances[i], 0.0, 1
         if not of_attitude and has_faces(regions.kinds[i]):

@@ -100,7 +100,7 @@ def _now(look: Look) -> Text:
     else:
         line.append(f"Gives way to {plain(region['name'])}", style=f"bold {_STYLES[criterion]}")
         line.append(f" ({criterion}, {keep})")
-    mode, armed = look["helm.mode"], look["helm.armed"]
+    mode, armed = look["commands.mode"], look["commands.armed"]
     if 0 <= mode < len(MODES):
         line.append(f"; mode {MODES[int(mode)]}, {'armed' if armed else 'DISARMED'}")
     return line

@@ -15,7 +15,7 @@ from cosim.mavlink.wire.ground_end import GroundLink
 from cosim.mavlink.wire.link import open_links
 from cosim.mavlink.wire.options import MavlinkOptions, ProfileName
 from cosim.scenario.scenario import load_scenario
-from cosim.simulation.commands import OrderQueue
+from cosim.simulation.commands import CommandQueue
 from cosim.simulation.commands.commands import Reset
 from cosim.simulation.master import Master
 from cosim.simulation.signals import Array
@@ -61,15 +61,15 @@ def running_vehicle(endpoints: Sequence[Endpoint], options: MavlinkOptions, rate
         If a link cannot be opened, or the vehicle does not begin to move.
     """
     scenario = load_scenario(_SCENARIO, _OVERRIDES)
-    orders, begun = OrderQueue(), _Begun()
+    commands, begun = CommandQueue(), _Begun()
     with Master(scenario) as master:
         failures: list[PlantError] = []
-        autopilot = Autopilot(scenario, master.signals.columns, options, orders)
+        autopilot = Autopilot(scenario, master.signals.columns, options, commands)
         links = LinkThread(autopilot, open_links(endpoints, options), scenario.time.step)
 
         def step() -> None:
             try:
-                master.run([begun, links], rate, orders)
+                master.run([begun, links], rate, commands)
             except PlantError as error:
                 failures.append(error)
 
@@ -81,7 +81,7 @@ def running_vehicle(endpoints: Sequence[Endpoint], options: MavlinkOptions, rate
             links.start()
             yield links
         finally:
-            orders.give(Reset())  # which ends the run
+            commands.give(Reset())  # which ends the run
             stepper.join()
             links.close()
         if failures:

@@ -74,7 +74,7 @@ def extended_sys_state(vessel: Vessel) -> list[Any]:
 
 
 def current_mode(vessel: Vessel) -> list[Any]:
-    """CURRENT_MODE, and the one that is ordered."""
+    """CURRENT_MODE, and the one that is commanded."""
     numbers, mode = vessel.profile.numbers, vessel.mode
     return [vessel.make("CURRENT_MODE", STANDARD_MODES[mode], numbers[mode], numbers[vessel.mode_ahead])]
 

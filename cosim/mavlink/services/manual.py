@@ -7,7 +7,7 @@ from typing import Any
 from cosim.mavlink.services.service import Service
 from cosim.mavlink.vehicle.vehicle_context import Sender, Vessel
 from cosim.scenario.tables import Vector6
-from cosim.simulation.commands.commands import Sticks
+from cosim.simulation.commands.commands import ManualControl
 
 _FULL = 1000.0
 _INVALID = 0x7FFF
@@ -30,7 +30,7 @@ class Manual(Service):
         self._heard = None
 
     def looked(self) -> None:
-        """Begin anew with neutral sticks, as the helm does, when another mode is on or the vehicle is armed."""
+        """Reset the sticks to neutral, as the command handler does, when the mode changes or the vehicle is armed."""
         state = self.vessel.armed, self.vessel.mode
         if state != self._state:
             self._state, self.vessel.sticks = state, _NEUTRAL
@@ -62,7 +62,7 @@ class Manual(Service):
 
     def _order(self, sticks: Vector6) -> None:
         vessel = self.vessel
-        if sticks != vessel.sticks and vessel.give(Sticks(sticks)) == vessel.mavlink.MAV_RESULT_ACCEPTED:
+        if sticks != vessel.sticks and vessel.give(ManualControl(sticks)) == vessel.mavlink.MAV_RESULT_ACCEPTED:
             vessel.sticks = sticks
 
     def _wrench(self, message: Any) -> Vector6:

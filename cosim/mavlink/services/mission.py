@@ -9,10 +9,10 @@ from cosim.mavlink.services.mission_items import ItemError, home_item, meant
 from cosim.mavlink.services.parameters import Parameters
 from cosim.mavlink.services.service import Call, Service, place_of, unscaled
 from cosim.mavlink.services.targets import Targets
-from cosim.mavlink.vehicle.mission_item import MissionItem
+from cosim.mavlink.vehicle.mission_item import ReceivedMissionItem
 from cosim.mavlink.vehicle.vehicle_context import Sender, Vessel
 from cosim.mavlink.wire.encode import whole
-from cosim.simulation.commands.commands import Begin, Change, Item, Mission, Order, Steer
+from cosim.simulation.commands.commands import ChangeSetting, Command, MissionItem, SetCurrentItem, SetMission, SetMode
 from cosim.simulation.commands.mission_executor import way
 
 _MOST = 500  # items
@@ -30,8 +30,8 @@ class _Upload:
     sender: Sender
     count: int
     asked: float  # s, when the item that is missing was asked for
-    items: list[MissionItem] = field(default_factory=list)
-    meant: list[Item] = field(default_factory=list)  # without home
+    items: list[ReceivedMissionItem] = field(default_factory=list)
+    meant: list[MissionItem] = field(default_factory=list)  # without home
     retries: int = 0
 
 
@@ -81,13 +81,13 @@ class Missions(Service):
         if now == before or not 0 <= now < len(vessel.course):
             return
         for item in way(vessel.course, before, now) or [now]:
-            for order in vessel.course[item].orders:
-                if isinstance(order, Change):
-                    self._parameters.learn(order.key, order.value)
+            for command in vessel.course[item].commands:
+                if isinstance(command, ChangeSetting):
+                    self._parameters.learn(command.key, command.value)
 
     # ---- out ----
 
-    def _all_items(self) -> tuple[MissionItem, ...]:
+    def _all_items(self) -> tuple[ReceivedMissionItem, ...]:
         plan = self.vessel.plan
         return (home_item(self.vessel), *plan) if plan and self._first else plan
 
@@ -197,10 +197,10 @@ class Missions(Service):
         accepted = self._targets.go(sender, place) == m.MAV_RESULT_ACCEPTED
         return int(m.MAV_MISSION_ACCEPTED if accepted else m.MAV_MISSION_DENIED)
 
-    def _taken(self, sender: Sender, items: list[MissionItem], course: list[Item]) -> int:
+    def _taken(self, sender: Sender, items: list[ReceivedMissionItem], course: list[MissionItem]) -> int:
         """Order a mission, and return MAV_MISSION_RESULT."""
         vessel, m = self.vessel, self.vessel.mavlink
-        result = vessel.give(Mission(tuple(course)))
+        result = vessel.give(SetMission(tuple(course)))
         if result == m.MAV_RESULT_ACCEPTED:
             vessel.plan, vessel.course = tuple(items), tuple(course)
             vessel.operator.commanded(sender.system)
@@ -239,7 +239,7 @@ class Missions(Service):
 
     # ---- where it is ----
 
-    def _begin(self, sender: Sender, seq: int | None, *more: Order) -> int:
+    def _begin(self, sender: Sender, seq: int | None, *more: Command) -> int:
         vessel, m = self.vessel, self.vessel.mavlink
         if not vessel.heeds:
             return vessel.give()
@@ -247,7 +247,7 @@ class Missions(Service):
         if item is None or item >= len(vessel.plan):
             vessel.deny(f"mission item {seq}: there are {len(self._all_items())}", "item")
             return int(m.MAV_RESULT_DENIED if vessel.plan else m.MAV_RESULT_FAILED)
-        result = vessel.give(Begin(item), *more)
+        result = vessel.give(SetCurrentItem(item), *more)
         if result == m.MAV_RESULT_ACCEPTED:
             vessel.operator.commanded(sender.system)
         return result
@@ -260,7 +260,7 @@ class Missions(Service):
         return self._begin(call.sender, seq if seq is None or seq >= 0 else self.vessel.view.item + self._first)
 
     def _start(self, call: Call) -> int:
-        return self._begin(call.sender, max(call.whole(1) or 0, 0), Steer("mission"))
+        return self._begin(call.sender, max(call.whole(1) or 0, 0), SetMode("mission"))
 
 
 def _scale(frame: int, mavlink: Any) -> float:
@@ -268,7 +268,7 @@ def _scale(frame: int, mavlink: Any) -> float:
     return {mavlink.MAV_FRAME_LOCAL_NED: 1e4, mavlink.MAV_FRAME_MISSION: 1.0}.get(frame, 1e7)
 
 
-def _as_it_came(message: Any, mavlink: Any) -> MissionItem | None:
+def _as_it_came(message: Any, mavlink: Any) -> ReceivedMissionItem | None:
     """Return an item, or None if its place is no number that an item can hold."""
     x, y = message.x, message.y
     if message.get_type() == "MISSION_ITEM":
@@ -276,4 +276,4 @@ def _as_it_came(message: Any, mavlink: Any) -> MissionItem | None:
         if x is None or y is None or max(abs(x), abs(y)) > 0x7FFFFFFF:
             return None
     numbers = message.param1, message.param2, message.param3, message.param4
-    return MissionItem(message.frame, message.command, message.autocontinue, *numbers, x, y, message.z)
+    return ReceivedMissionItem(message.frame, message.command, message.autocontinue, *numbers, x, y, message.z)

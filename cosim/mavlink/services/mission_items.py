@@ -5,14 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from cosim.errors import OrderError
+from cosim.errors import CommandError
 from cosim.mavlink.services.parameters import shortest
 from cosim.mavlink.services.service import place_of, unscaled
-from cosim.mavlink.vehicle.mission_item import MissionItem
+from cosim.mavlink.vehicle.mission_item import ReceivedMissionItem
 from cosim.mavlink.vehicle.vehicle_context import Vessel
 from cosim.mavlink.wire.encode import whole
 from cosim.scenario.tables import Vector3
-from cosim.simulation.commands.commands import Change, Face, Item
+from cosim.simulation.commands.commands import ChangeSetting, MissionItem, SetHeading
 
 SPEED = "law.gains.speed"  # key of the setting
 
@@ -29,7 +29,7 @@ class ItemError(Exception):
         self.result = result
 
 
-def meant(vessel: Vessel, item: MissionItem, before: Sequence[Item], count: int) -> Item:
+def meant(vessel: Vessel, item: ReceivedMissionItem, before: Sequence[MissionItem], count: int) -> MissionItem:
     """Return what an item asks for.
 
     NAV_WAYPOINT is a sphere about its place, of its acceptance radius (parameter 2), or for 0 the scenario's goal
@@ -45,9 +45,9 @@ def meant(vessel: Vessel, item: MissionItem, before: Sequence[Item], count: int)
     ----------
     vessel : Vessel
         Where the globe's frame and home are.
-    item : MissionItem
+    item : ReceivedMissionItem
         As it came.
-    before : sequence of Item
+    before : sequence of MissionItem
         What the items before it ask for.
     count : int
         Items of the mission.
@@ -62,21 +62,21 @@ def meant(vessel: Vessel, item: MissionItem, before: Sequence[Item], count: int)
     radius, surface = settings["commands.hold_radius"], settings["commands.surface_depth"]
     match item.command:
         case m.MAV_CMD_NAV_WAYPOINT:
-            return Item(_place(vessel, item), _acceptance(vessel, item), _stay(vessel, item))
+            return MissionItem(_place(vessel, item), _acceptance(vessel, item), _stay(vessel, item))
         case m.MAV_CMD_NAV_SPLINE_WAYPOINT | m.MAV_CMD_NAV_LOITER_TIME:
-            return Item(_place(vessel, item), None, _stay(vessel, item))
+            return MissionItem(_place(vessel, item), None, _stay(vessel, item))
         case m.MAV_CMD_NAV_LOITER_UNLIM:
-            return Item(_place(vessel, item), None, None)
+            return MissionItem(_place(vessel, item), None, None)
         case m.MAV_CMD_NAV_LAND:
             above = (other.position for other in reversed(before) if other.position is not None)
             here = item.x == item.y == 0
             north, east, _ = next(above, vessel.view.position_ned) if here else _place(vessel, item)
-            return Item((north, east, surface), radius, None)
+            return MissionItem((north, east, surface), radius, None)
         case m.MAV_CMD_NAV_RETURN_TO_LAUNCH:
             north, east, _ = vessel.home_ned()
-            return Item((north, east, surface), radius, None)
+            return MissionItem((north, east, surface), radius, None)
         case m.MAV_CMD_NAV_DELAY | m.MAV_CMD_CONDITION_DELAY:
-            return Item(None, stay=_stay(vessel, item))
+            return MissionItem(None, stay=_stay(vessel, item))
         case m.MAV_CMD_DO_CHANGE_SPEED:
             return _another_speed(vessel, item)
         case m.MAV_CMD_CONDITION_YAW:
@@ -88,22 +88,22 @@ def meant(vessel: Vessel, item: MissionItem, before: Sequence[Item], count: int)
     raise ItemError(m.MAV_MISSION_UNSUPPORTED, f"command {item.command}{name} is not known in a mission")
 
 
-def _another_speed(vessel: Vessel, item: MissionItem) -> Item:
+def _another_speed(vessel: Vessel, item: ReceivedMissionItem) -> MissionItem:
     m, speed = vessel.mavlink, shortest(item.param2)
     if speed < 0.0:  # as it is
-        return Item(None)
+        return MissionItem(None)
     before = getattr(vessel.settings.gains, "speed", None)
     if before is None:
         raise ItemError(m.MAV_MISSION_UNSUPPORTED, f"law {vessel.scenario.law.name} has no speed")
     try:
         vessel.settings.change(SPEED, speed)
-    except OrderError as error:
+    except CommandError as error:
         raise ItemError(m.MAV_MISSION_INVALID_PARAM2, str(error)) from error
     vessel.settings.change(SPEED, before)
-    return Item(None, orders=(Change(SPEED, speed),))
+    return MissionItem(None, commands=(ChangeSetting(SPEED, speed),))
 
 
-def _another_heading(vessel: Vessel, item: MissionItem) -> Item:
+def _another_heading(vessel: Vessel, item: ReceivedMissionItem) -> MissionItem:
     m = vessel.mavlink
     if item.param4 != 0.0 and not math.isnan(item.param4):
         raise ItemError(
@@ -111,10 +111,10 @@ def _another_heading(vessel: Vessel, item: MissionItem) -> Item:
         )
     if not math.isfinite(item.param1):
         raise ItemError(m.MAV_MISSION_INVALID_PARAM1, f"a heading of {item.param1:g} deg")
-    return Item(None, orders=(Face(math.radians(item.param1)),))
+    return MissionItem(None, commands=(SetHeading(math.radians(item.param1)),))
 
 
-def _jump(vessel: Vessel, item: MissionItem, count: int) -> Item:
+def _jump(vessel: Vessel, item: ReceivedMissionItem, count: int) -> MissionItem:
     m, first = vessel.mavlink, int(vessel.profile.home_is_first)
     to, times = whole(item.param1), whole(item.param2)
     if to is None or not 0 <= to - first < count:
@@ -123,10 +123,10 @@ def _jump(vessel: Vessel, item: MissionItem, count: int) -> Item:
         )
     if times is None:
         raise ItemError(m.MAV_MISSION_INVALID_PARAM2, f"a jump {item.param2:g} times")
-    return Item(None, jump=to - first, times=None if times < 0 else times)
+    return MissionItem(None, jump=to - first, times=None if times < 0 else times)
 
 
-def _place(vessel: Vessel, item: MissionItem) -> Vector3:
+def _place(vessel: Vessel, item: ReceivedMissionItem) -> Vector3:
     m = vessel.mavlink
     x, y = unscaled(item.frame, item.x, item.y)
     place = place_of(vessel, item.frame, x, y, item.z)
@@ -139,7 +139,7 @@ def _place(vessel: Vessel, item: MissionItem) -> Vector3:
     return place
 
 
-def _stay(vessel: Vessel, item: MissionItem) -> float:
+def _stay(vessel: Vessel, item: ReceivedMissionItem) -> float:
     if math.isnan(item.param1):
         return 0.0
     if not 0.0 <= item.param1 <= _LONGEST_STAY:
@@ -147,7 +147,7 @@ def _stay(vessel: Vessel, item: MissionItem) -> float:
     return item.param1
 
 
-def _acceptance(vessel: Vessel, item: MissionItem) -> float | None:
+def _acceptance(vessel: Vessel, item: ReceivedMissionItem) -> float | None:
     if math.isnan(item.param2) or item.param2 == 0.0:
         return None
     if not 0.0 < item.param2 <= _LARGEST:
@@ -155,9 +155,9 @@ def _acceptance(vessel: Vessel, item: MissionItem) -> float | None:
     return item.param2
 
 
-def home_item(vessel: Vessel) -> MissionItem:
+def home_item(vessel: Vessel) -> ReceivedMissionItem:
     """Return home as ArduPilot has it, the first item of every mission."""
     latitude, longitude, altitude = vessel.frame.to_global(vessel.home_ned())
     m = vessel.mavlink
     x, y = round(latitude * 1e7), round(longitude * 1e7)
-    return MissionItem(m.MAV_FRAME_GLOBAL, m.MAV_CMD_NAV_WAYPOINT, 1, 0.0, 0.0, 0.0, 0.0, x, y, altitude)
+    return ReceivedMissionItem(m.MAV_FRAME_GLOBAL, m.MAV_CMD_NAV_WAYPOINT, 1, 0.0, 0.0, 0.0, 0.0, x, y, altitude)

@@ -8,7 +8,7 @@ from typing import Any
 from cosim.mavlink.services.service import Call, Service
 from cosim.mavlink.vehicle.profile import MODE_NAMES, STANDARD_MODES, is_custom
 from cosim.mavlink.vehicle.vehicle_context import Sender, Vessel
-from cosim.simulation.commands.commands import Aim, Arm, Mode, Order, Reset, Steer
+from cosim.simulation.commands.commands import Arm, Command, Mode, Reset, SetMode, SetTarget
 
 _FORCE = 20190226  # PREFLIGHT_REBOOT_SHUTDOWN, parameter 6
 _MODES_BY_STANDARD: dict[int, Mode] = {number: mode for mode, number in STANDARD_MODES.items() if number}
@@ -34,8 +34,8 @@ class Modes(Service):
             m.MAV_CMD_DO_PAUSE_CONTINUE: self._pause,
         }
 
-    def _give(self, sender: Sender, *orders: Order) -> int:
-        result = self.vessel.give(*orders)
+    def _give(self, sender: Sender, *commands: Command) -> int:
+        result = self.vessel.give(*commands)
         if result == self.vessel.mavlink.MAV_RESULT_ACCEPTED:
             self.vessel.operator.commanded(sender.system)
         return result
@@ -81,7 +81,7 @@ class Modes(Service):
         if mode == "mission" and not vessel.plan and vessel.heeds:
             vessel.deny("there is no mission", "mission")
             return int(vessel.mavlink.MAV_RESULT_FAILED)
-        return self._give(sender, Steer(mode))
+        return self._give(sender, SetMode(mode))
 
     def _return_home(self, sender: Sender) -> int:
         north, east, _ = self.vessel.home_ned()
@@ -89,7 +89,7 @@ class Modes(Service):
         if not self.vessel.heeds:
             return self.vessel.give()
         depth, radius = settings["commands.surface_depth"], settings["commands.hold_radius"]
-        return self._give(sender, Aim((north, east, depth), radius))
+        return self._give(sender, SetTarget((north, east, depth), radius))
 
     # ---- pause ----
 

@@ -10,9 +10,9 @@ from cosim.mavlink.services.service import Service
 from cosim.mavlink.vehicle.layout import euler_of
 from cosim.mavlink.vehicle.vehicle_context import Sender, Vessel
 from cosim.scenario.tables import Vector3
-from cosim.simulation.commands.commands import Forget, Obstacle
+from cosim.simulation.commands.commands import AddObstacle, RemoveObstacle
 
-_UNMOVED = 0.05  # m: what moved less makes no order
+_UNMOVED = 0.05  # m: what moved less makes no command
 _FORGOTTEN = 5.0  # s of the wall clock without a word, after which another may take the place
 _LOCAL_NED, _BODY_FRD, _LOCAL_FRD = 1, 12, 20
 _RADIUS = "commands.obstacle_radius"
@@ -20,7 +20,7 @@ _RADIUS = "commands.obstacle_radius"
 
 @dataclass
 class _Known:
-    """An obstacle that was ordered."""
+    """An obstacle that was commanded."""
 
     position: Vector3  # m, NED
     radius: float  # m
@@ -62,7 +62,7 @@ class Obstacles(Service):
         if known is None and not self._has_room():
             vessel.deny(f"no room for obstacle {number}: {len(self._known)} have come already", "obstacle")
             return
-        if vessel.give(Obstacle(number, position, radius)) == vessel.mavlink.MAV_RESULT_ACCEPTED:
+        if vessel.give(AddObstacle(number, position, radius)) == vessel.mavlink.MAV_RESULT_ACCEPTED:
             self._known[number] = _Known(position, radius, vessel.now)
 
     def _position(self, frame: int, point: Vector3) -> Vector3 | None:
@@ -88,7 +88,7 @@ class Obstacles(Service):
         oldest = min(self._known, key=lambda number: self._known[number].heard)
         if vessel.now - self._known[oldest].heard < _FORGOTTEN:
             return False
-        if vessel.give(Forget(oldest)) != vessel.mavlink.MAV_RESULT_ACCEPTED:
+        if vessel.give(RemoveObstacle(oldest)) != vessel.mavlink.MAV_RESULT_ACCEPTED:
             return False
         del self._known[oldest]
         return True

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from cosim.errors import OrderError
+from cosim.errors import CommandError
 from cosim.mavlink.services.packed_parameters import hash_check
 from cosim.mavlink.services.parameter_names import parameter_names
 from cosim.mavlink.services.service import Service
@@ -18,7 +18,7 @@ from cosim.mavlink.vehicle.failsafe_settings import ACTIONS, TIMEOUTS
 from cosim.mavlink.vehicle.vehicle_context import Sender, Vessel
 from cosim.mavlink.wire.encode import float32
 from cosim.mavlink.wire.message_sink import Outlet
-from cosim.simulation.commands.commands import Change
+from cosim.simulation.commands.commands import ChangeSetting
 
 _HASH = "_HASH_CHECK"
 _NO_INDEX = 0xFFFF
@@ -104,10 +104,10 @@ class Parameters(Service):
             return vessel.give()
         try:
             vessel.settings.change(key, value)
-        except OrderError as error:
+        except CommandError as error:
             vessel.deny(str(error), "value")
             return int(vessel.mavlink.MAV_RESULT_DENIED)
-        result = vessel.give(Change(key, value))
+        result = vessel.give(ChangeSetting(key, value))
         if result != vessel.mavlink.MAV_RESULT_ACCEPTED:
             vessel.settings.change(key, before)
             return result
@@ -116,7 +116,7 @@ class Parameters(Service):
 
     def learn(self, key: str, value: float) -> None:
         """Note another value of a setting, that a mission brought about."""
-        with contextlib.suppress(OrderError):  # as the helm does, which logs it
+        with contextlib.suppress(CommandError):  # as the command handler does, which logs it
             self.vessel.settings.change(key, value)
             self._values[key] = value
 

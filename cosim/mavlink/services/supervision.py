@@ -6,7 +6,7 @@ from typing import Any
 
 from cosim.mavlink.services.service import Service
 from cosim.mavlink.vehicle.vehicle_context import Sender, Vessel
-from cosim.simulation.commands.commands import Arm, Order, Steer
+from cosim.simulation.commands.commands import Arm, Command, SetMode
 
 _REMINDER = 30.0  # s
 
@@ -52,12 +52,12 @@ class Supervision(Service):
     def _act(self) -> bool:
         """Order what was asked for, and return whether the order found room."""
         vessel = self.vessel
-        order: Order
+        command: Command
         match vessel.loss_action:
             case "disarm":
-                order = Arm(False)
+                command = Arm(False)
             case "hold" | "surface" as mode:
-                order = Steer(mode)
+                command = SetMode(mode)
             case _:
                 return True
-        return bool(vessel.give(order) != vessel.mavlink.MAV_RESULT_TEMPORARILY_REJECTED)
+        return bool(vessel.give(command) != vessel.mavlink.MAV_RESULT_TEMPORARILY_REJECTED)

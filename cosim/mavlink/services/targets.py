@@ -11,7 +11,7 @@ from cosim.mavlink.services.service import Call, Service, place_of, unscaled
 from cosim.mavlink.vehicle.profile import MODE_NAMES
 from cosim.mavlink.vehicle.vehicle_context import Sender, Vessel
 from cosim.scenario.tables import Vector3
-from cosim.simulation.commands.commands import Aim, Face, Order, Steer
+from cosim.simulation.commands.commands import Command, SetHeading, SetMode, SetTarget
 
 _X_Y, _Z = 0b011, 0b100  # type_mask: what is ignored
 _VELOCITY, _ACCELERATION, _FORCE, _YAW = 0b111000, 0b111 << 6, 1 << 9, 1 << 10
@@ -24,7 +24,7 @@ class Targets(Service):
     """SET_POSITION_TARGET_*, and the commands that move, turn and pace the vehicle.
 
     Set-points are heeded while the region is to be reached, as ArduSub heeds them in GUIDED alone. One that says what
-    the last one said makes no order, unless it is a way from here and none came for a second: QGroundControl's change
+    the last one said makes no command, unless it is a way from here and none came for a second: QGroundControl's change
     of depth, made twice.
 
     Parameters
@@ -118,11 +118,11 @@ class Targets(Service):
         if said == self._last and (frame not in _FROM_HERE or since < _ANEW):
             return
         position = (*vessel.view.target[:2], place[2]) if mask & _X_Y else place
-        orders: list[Order] = [Aim(position, None, self._levelled(frame, going))]
+        commands: list[Command] = [SetTarget(position, None, self._levelled(frame, going))]
         if yaw is not None and self._last[-1:] != (yaw,):
             turned = frame in (_BODY, _BODY_OFFSET, _BODY_FRD)
-            orders.append(Face(yaw + (vessel.view.euler[2] if turned else 0.0)))
-        if vessel.give(*orders) == vessel.mavlink.MAV_RESULT_ACCEPTED:
+            commands.append(SetHeading(yaw + (vessel.view.euler[2] if turned else 0.0)))
+        if vessel.give(*commands) == vessel.mavlink.MAV_RESULT_ACCEPTED:
             self._last = said
 
     def _may(self, sender: Sender) -> bool:
@@ -166,11 +166,11 @@ class Targets(Service):
         if not self._may(sender):
             return int(vessel.mavlink.MAV_RESULT_DENIED)
         x, y, z = (a if math.isfinite(a) else b for a, b in zip(place, vessel.view.position_ned, strict=True))
-        orders: list[Order] = [Aim((x, y, z)) if any(map(math.isfinite, place)) else Steer("hold")]
+        commands: list[Command] = [SetTarget((x, y, z)) if any(map(math.isfinite, place)) else SetMode("hold")]
         if math.isfinite(yaw):
-            orders.append(Face(yaw))
+            commands.append(SetHeading(yaw))
         self._last = ()
-        return vessel.give(*orders)
+        return vessel.give(*commands)
 
     def _turn(self, call: Call) -> int:
         vessel = self.vessel
@@ -181,7 +181,7 @@ class Targets(Service):
             angle = vessel.view.euler[2] + math.copysign(1.0, -1.0 if call[3] < 0.0 else 1.0) * angle
         if not self._may(call.sender):
             return int(vessel.mavlink.MAV_RESULT_DENIED)
-        return vessel.give(Face(angle))
+        return vessel.give(SetHeading(angle))
 
     def _speed(self, call: Call) -> int:
         m, speed = self.vessel.mavlink, call[2]

@@ -10,7 +10,7 @@ import numpy as np
 from cosim.scenario.scenario import Scenario
 from cosim.scenario.tables import Vector3
 from cosim.simulation.commands.commands import MODES
-from cosim.simulation.environment import middle_of
+from cosim.simulation.environment import shape_center
 from cosim.simulation.signals import Array, Column
 
 
@@ -31,7 +31,7 @@ class Layout:
         self.thrusters = scenario.vehicle.n_thrusters
         self.regions = tuple(region.region.name for region in scenario.regions)
         self.reports = tuple(column.name for column in columns if column.name.startswith("law."))
-        self.goal_middle = middle_of(scenario.goal)
+        self.goal_middle = shape_center(scenario.goal)
         self.saturations = tuple(
             i for name, i in self.at.items() if name.endswith("saturated") or name.startswith("thrust_saturated[")
         )
@@ -61,9 +61,9 @@ class Layout:
             "measured.acceleration.z": -9.81,
             "altitude": _bottom(scenario) - depth,
             "measured.altitude": _bottom(scenario) - depth,
-            "helm.armed": float(not commands.await_arm),
-            "helm.mode": float(MODES.index("reach")),
-            "helm.item": -1.0,
+            "commands.armed": float(not commands.await_arm),
+            "commands.mode": float(MODES.index("reach")),
+            "commands.item": -1.0,
         }
         for first, values in (
             ("position.x", initial.position),

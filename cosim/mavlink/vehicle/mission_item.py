@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
-class MissionItem:
+class ReceivedMissionItem:
     """The fields of MISSION_ITEM_INT; a station reads back what it wrote."""
 
     frame: int

@@ -75,7 +75,7 @@ class Profile:
         return self.mode_of(_px4(first, second))
 
     def is_return(self, number: int) -> bool:
-        """Return whether a ``custom_mode`` is PX4's return: no mode here, but an order to surface at home."""
+        """Return whether a ``custom_mode`` is PX4's return: no mode here, but a command to surface at home."""
         return self.packed and number == _RETURN
 
     @staticmethod

@@ -9,7 +9,7 @@ import numpy as np
 from controller.regions import Shape, of_attitude, pack, ray_distances
 from cosim.mavlink.vehicle.view import View
 from cosim.scenario.scenario import Scenario
-from cosim.scenario.tables import FAR_AWAY, SecondaryRegion, Vector3
+from cosim.scenario.tables import PARKED_POSITION, SecondaryRegion, Vector3
 from cosim.simulation.commands.settings import LiveSettings
 
 SECTORS = 72
@@ -69,7 +69,7 @@ class Proximity:
                 regions.shifts[k] = shift
             if self._seen[k]:
                 if shift != _AT_REST:  # it has come; only its clearance tells the radius
-                    centre = [a + b for a, b in zip(FAR_AWAY, shift, strict=True)]
+                    centre = [a + b for a, b in zip(PARKED_POSITION, shift, strict=True)]
                     regions.numbers[first + 3] = math.dist(centre, view.position_ned) - clearances[self.ids[k]]
             elif (shape := settings.shapes[name]) is not self._shapes[k]:
                 self._shapes[k] = shape

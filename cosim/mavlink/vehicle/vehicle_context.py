@@ -1,4 +1,4 @@
-"""What all micro-services share: the latest snapshot, the links, the way to give orders, and the voice."""
+"""What all micro-services share: the latest snapshot, the links, the way to give commands, and the voice."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from cosim.errors import OrderError
+from cosim.errors import CommandError
 from cosim.mavlink.vehicle.active_gcs import Operator
 from cosim.mavlink.vehicle.geodesy import LocalFrame
 from cosim.mavlink.vehicle.layout import Layout
-from cosim.mavlink.vehicle.mission_item import MissionItem
+from cosim.mavlink.vehicle.mission_item import ReceivedMissionItem
 from cosim.mavlink.vehicle.profile import PROFILES
 from cosim.mavlink.vehicle.proximity import Proximity
 from cosim.mavlink.vehicle.view import View
@@ -22,9 +22,9 @@ from cosim.mavlink.wire.message_sink import Outlet
 from cosim.mavlink.wire.options import MavlinkOptions
 from cosim.scenario.scenario import Scenario
 from cosim.scenario.tables import Vector3, Vector6
-from cosim.simulation.commands.commands import Aim, Arm, Item, Mode, Order, Steer
+from cosim.simulation.commands.commands import Arm, Command, MissionItem, Mode, SetMode, SetTarget
 from cosim.simulation.commands.settings import LiveSettings
-from cosim.simulation.commands.sources import OrderQueue
+from cosim.simulation.commands.sources import CommandQueue
 from cosim.simulation.signals import Array, Column
 
 COMPONENT_ID = 1  # MAV_COMP_ID_AUTOPILOT1: ground stations listen to no other
@@ -33,7 +33,7 @@ _CHUNK = 50  # characters of a STATUSTEXT
 _LONGEST_TEXT = 200  # characters
 _TEXTS = 12  # in each _TEXTS_PERIOD at the most
 _TEXTS_PERIOD = 1.0  # s
-_WISH_LASTS = 0.5  # s, that an order may take until a snapshot shows it
+_WISH_LASTS = 0.5  # s, that a command may take until a snapshot shows it
 
 
 @dataclass(frozen=True)
@@ -56,8 +56,8 @@ class Vessel:
         Of the rows.
     options : MavlinkOptions
         As whom it shows itself, and whom it heeds.
-    orders : OrderQueue or None
-        Where orders go; None for a vehicle that takes none.
+    commands : CommandQueue or None
+        Where commands go; None for a vehicle that takes none.
     live : bool
         False for a recorded run.
 
@@ -76,7 +76,7 @@ class Vessel:
     links : list of Outlet
         That are attached.
     settings : LiveSettings
-        The numbers as they are once all orders are followed.
+        The numbers as they are once all commands are followed.
     proximity : Proximity
         What a scan of the water about it shows.
     frame : LocalFrame
@@ -89,12 +89,12 @@ class Vessel:
         Whether the ground station that commands is lost.
     loss_timeout, loss_action : float, str
         For how long it may be silent [s], and what is done then.
-    plan : tuple of MissionItem
+    plan : tuple of ReceivedMissionItem
         The mission, without home.
-    course : tuple of Item
+    course : tuple of MissionItem
         What its items ask for.
     sticks : tuple of float
-        As ordered last, X Y Z K M N, from -1 to 1.
+        As commanded last, X Y Z K M N, from -1 to 1.
     """
 
     def __init__(
@@ -102,7 +102,7 @@ class Vessel:
         scenario: Scenario,
         columns: Sequence[Column],
         options: MavlinkOptions,
-        orders: OrderQueue | None,
+        commands: CommandQueue | None,
         live: bool = True,
     ) -> None:
         self.scenario, self.options, self.live = scenario, options, live
@@ -120,7 +120,7 @@ class Vessel:
         self.unix_start_us = time.time_ns() // 1000  # when simulated time was 0
         vehicle = scenario.vehicle
         self._limits = tuple(zip((-vehicle.thrust_min).tolist(), vehicle.thrust_max.tolist(), strict=True))
-        self._orders = orders if options.commands and live and scenario.commands.enabled else None
+        self._commands = commands if options.commands and live and scenario.commands.enabled else None
         self._said: dict[str, float] = {}
         self._said_lately: deque[float] = deque(maxlen=_TEXTS)
         self._text_id = 0
@@ -133,10 +133,10 @@ class Vessel:
         self.seen = False
         self.settings = LiveSettings(self.scenario)
         self.home = (0.0, 0.0)
-        self.plan: tuple[MissionItem, ...] = ()
-        self.course: tuple[Item, ...] = ()
+        self.plan: tuple[ReceivedMissionItem, ...] = ()
+        self.course: tuple[MissionItem, ...] = ()
         self.sticks: Vector6 = (0.0,) * 6
-        self._run = 0 if self._orders is None else self._orders.run
+        self._run = 0 if self._commands is None else self._commands.run
         self._wished: tuple[float, Mode] | None = None
         self._armed_before = self.view.armed
         self._mode_before: Mode = self.view.mode
@@ -145,27 +145,27 @@ class Vessel:
 
     @property
     def heeds(self) -> bool:
-        """Whether it takes orders at all."""
-        return self._orders is not None
+        """Whether it takes commands at all."""
+        return self._commands is not None
 
     @property
     def outlived(self) -> bool:
-        """Whether the run is over that it knows: it gives orders again once it has seen the next one."""
-        return self._orders is not None and self._orders.run != self._run
+        """Whether the run is over that it knows: it gives commands again once it has seen the next one."""
+        return self._commands is not None and self._commands.run != self._run
 
     @property
     def armed(self) -> bool:
-        """As the snapshot has it; before there is one, as ordered."""
+        """As the snapshot has it; before there is one, as commanded."""
         return self.view.armed if self.seen else self._armed_before
 
     @property
     def mode(self) -> Mode:
-        """As the snapshot has it; before there is one, as ordered."""
+        """As the snapshot has it; before there is one, as commanded."""
         return self.view.mode if self.seen else self._mode_before
 
     @property
     def mode_ahead(self) -> Mode:
-        """The mode once the orders on their way are followed."""
+        """The mode once the commands on their way are followed."""
         if self._wished is not None and self.now - self._wished[0] <= _WISH_LASTS:
             return self._wished[1]
         return self.mode
@@ -188,44 +188,44 @@ class Vessel:
             parts.append(max(-1.0, min(1.0, force / limit)) if limit > 0.0 else 0.0)
         return parts
 
-    # ---- orders ----
+    # ---- commands ----
 
-    def give(self, *orders: Order) -> int:
-        """Give orders, which are followed at the next step.
+    def give(self, *commands: Command) -> int:
+        """Give commands, which are followed at the next step.
 
         Parameters
         ----------
-        *orders : Order
+        *commands : Command
             In this order.
 
         Returns
         -------
         int
-            MAV_RESULT: accepted, denied where there are no orders to be given or the numbers cannot be, or temporarily
+            MAV_RESULT: accepted, denied where no commands can be given or the numbers cannot be, or temporarily
             rejected where the queue is full or the run is over.
         """
         m = self.mavlink
-        if self._orders is None:
+        if self._commands is None:
             self.deny("commands are off: start with --commands" if self.live else "this is a recorded run", "off")
             return int(m.MAV_RESULT_DENIED)
-        for order in orders:
+        for command in commands:
             try:
-                if not self._orders.give(order, self._run):
-                    self.deny("the run is over" if self.outlived else "too many orders at once", "full")
+                if not self._commands.give(command, self._run):
+                    self.deny("the run is over" if self.outlived else "too many commands at once", "full")
                     return int(m.MAV_RESULT_TEMPORARILY_REJECTED)
-            except OrderError as error:
+            except CommandError as error:
                 self.deny(str(error), "order")
                 return int(m.MAV_RESULT_DENIED)
-            self._foresee(order)
+            self._foresee(command)
         return int(m.MAV_RESULT_ACCEPTED)
 
-    def _foresee(self, order: Order) -> None:
-        match order:
+    def _foresee(self, command: Command) -> None:
+        match command:
             case Arm():
-                self._armed_before = order.armed
-            case Steer():
-                self._foresee_mode(order.mode)
-            case Aim():
+                self._armed_before = command.armed
+            case SetMode():
+                self._foresee_mode(command.mode)
+            case SetTarget():
                 self._foresee_mode("reach")
 
     def _foresee_mode(self, mode: Mode) -> None:

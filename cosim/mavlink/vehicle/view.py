@@ -200,23 +200,23 @@ class View:
         """Return how far a region, or ``"goal"``, is from where the scenario has it [m, NED]."""
         return self._three(f"{region}.shift.x")
 
-    # ---- the helm ----
+    # ---- the command handler ----
 
     @property
     def armed(self) -> bool:
         """Whether the thrusters may work."""
-        return self.number("helm.armed", 1.0) > 0.0
+        return self.number("commands.armed", 1.0) > 0.0
 
     @property
     def mode(self) -> Mode:
         """Who steers."""
-        number = self.number("helm.mode", float(MODES.index("reach")))
+        number = self.number("commands.mode", float(MODES.index("reach")))
         return MODES[int(number)] if 0.0 <= number < len(MODES) else "reach"
 
     @property
     def item(self) -> int:
         """Item of the mission; -1 for none."""
-        number = self.number("helm.item", -1.0)
+        number = self.number("commands.item", -1.0)
         return int(number) if 0.0 <= number < 1e6 else -1
 
     @property

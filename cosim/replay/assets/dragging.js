@@ -24,7 +24,7 @@ class Dragging {
     });
   }
 
-  /** Let go without an order. */
+  /** Let go without a command. */
   cancel() {
     this.held = null;
     this.ghost.clear();
@@ -105,7 +105,7 @@ class Dragging {
     this.canvas.style.cursor = "";
     if (held.moved && held.run === link.run) {
       const round = held.to.map((x, i) => (x === held.from[i] ? x : Number(x.toFixed(3))));
-      link.order(orderToMove(link.run, held.region, held.from, round, link.run.end));
+      link.command(commandToMove(link.run, held.region, held.from, round, link.run.end));
     }
     setTimeout(() => {
       if (!this.held) this.ghost.clear();

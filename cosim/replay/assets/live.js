@@ -1,4 +1,4 @@
-// A run that goes on: its rows come over a WebSocket from the page's own host, and orders go back.
+// A run that goes on: its rows come over a WebSocket from the page's own host, and commands go back.
 
 const RETRY = [500, 5000]; // ms, after which a lost connection is tried again: at first, and at the most
 
@@ -9,13 +9,13 @@ class LiveLink {
     this.page = page;
     this.run = null;
     this.over = false; // whether the run has ended
-    this.helm = new HelmPanel(this);
+    this.commandPanel = new CommandPanel(this);
     this.dragging = new Dragging(this);
     this._wait = RETRY[0];
     this._next = 0;
   }
 
-  /** Whether orders can be given now. */
+  /** Whether commands can be given now. */
   get heeded() {
     return Boolean(this.run?.header.commands) && !this.over && this._socket?.readyState === WebSocket.OPEN;
   }
@@ -41,13 +41,13 @@ class LiveLink {
     });
   }
 
-  /** Order something of the run, as its log of orders has it; whether it could be sent. */
-  order(order) {
+  /** Command the run, in the words of its log of commands; whether it could be sent. */
+  command(command) {
     if (!this.heeded) {
-      this.page.say(this.over ? "The run has ended: nothing can be ordered any more." : "Nothing can be ordered: the connection is lost, or commands are off.", "warning");
+      this.page.say(this.over ? "The run has ended: nothing can be commanded any more." : "Nothing can be commanded: the connection is lost, or commands are off.", "warning");
       return false;
     }
-    this._socket.send(JSON.stringify(order));
+    this._socket.send(JSON.stringify(command));
     return true;
   }
 
@@ -71,7 +71,7 @@ class LiveLink {
     this.page.show([this.run]);
     this.page.player.live = true;
     this.page.say(again ? "The run begins again." : "");
-    this.helm.setRun(this.run);
+    this.commandPanel.setRun(this.run);
   }
 
   _rows(numbers) {
@@ -81,7 +81,7 @@ class LiveLink {
   }
 
   _said({ kind, text, time }) {
-    if (kind === "order") this.run.header.events.push({ time, kind, text: `Ordered: ${text}` });
+    if (kind === "command") this.run.header.events.push({ time, kind, text: `Commanded: ${text}` });
     else this.page.say(kind === "refused" ? `Refused: ${text}` : text, kind === "info" ? "info" : "warning");
   }
 
@@ -94,12 +94,12 @@ class LiveLink {
     player.growing = false;
     this.page.select(0); // which tells the verdict
     this.page.say(`The run has ended (${status}). This page replays what it has received.`, "good");
-    this.helm.tell();
+    this.commandPanel.tell();
   }
 
   _lost() {
     this.dragging.cancel();
-    this.helm.tell();
+    this.commandPanel.tell();
     if (this.over) return;
     this.page.say(this.run ? "The connection is lost; trying again …" : "No run answers here; trying again …", "warning");
     if (!this.run) this.page.nothing("Waiting for a run.");
@@ -112,7 +112,7 @@ class LiveLink {
     this._next ||= requestAnimationFrame(() => {
       this._next = 0;
       this.page.refresh();
-      this.helm.tell();
+      this.commandPanel.tell();
       this.dragging.draw();
     });
   }

@@ -20,10 +20,10 @@ function canMove(run, index) {
 const isFlat = (run, index) => run.header.regions[index].shape.kind === "depth_band";
 
 /** The order that moves a region so that its place goes from one point to another. */
-function orderToMove(run, index, from, to, t) {
+function commandToMove(run, index, from, to, t) {
   if (index === 0) {
     const radius = run.held("target.radius", t);
-    return { order: "aim", position: to, radius: radius > 0 ? radius : null };
+    return { command: "set_target", position: to, radius: radius > 0 ? radius : null };
   }
-  return { order: "move", region: run.header.regions[index].name, by: Vec.sub(to, from) };
+  return { command: "shift_region", region: run.header.regions[index].name, by: Vec.sub(to, from) };
 }

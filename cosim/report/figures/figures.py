@@ -61,7 +61,7 @@ def _figures(story: Story) -> Iterator[tuple[str, str, _Draw]]:
             "least clearance to them."
         )
     if targets_of(story):
-        moved += " Diamonds: the targets before the last one, numbered as they were ordered."
+        moved += " Diamonds: the targets before the last one, numbered as they were commanded."
     way = "; the path is in a criterion's colour while the arbiter gives way to a region of it"
     if is_known(story):
         yield (
@@ -95,7 +95,7 @@ def _figures(story: Story) -> Iterator[tuple[str, str, _Draw]]:
         over_time.clearance,
     )
     if story.scenario.commands.enabled:
-        yield "helm", "Who steered, as it was ordered; grey where disarmed.", over_time.helm
+        yield "control-mode", "Who steered, as it was commanded; grey where disarmed.", over_time.control_mode
     yield (
         "forces",
         "Force on the body: its norm, as the law asks for it and as it acts; and what acts forward (X), to starboard "

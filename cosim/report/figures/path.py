@@ -172,7 +172,7 @@ def _path(ax: Axes, way: Way, view: Array) -> None:
 
 
 def _targets(ax: Axes, way: Way, view: Array) -> None:
-    """Draw the targets that were ordered before the last one, faint, with their number in the order they came."""
+    """Draw the targets that were commanded before the last one, faint, with their number in the order they came."""
     for i, (middle, radius) in enumerate(way.targets):
         centre = view @ middle
         if radius > 0.0:

@@ -20,10 +20,10 @@ from cosim.simulation.signals import Array
 _WHOLE = 200_000  # rows of a record that is drawn as a whole
 _MOST = 80_000  # rows of extremes
 _EVEN = 2_000  # rows that are evenly spaced
-_CHANGES = 100  # by orders that are looked at in a block of rows, and a hundred times as many in all
+_CHANGES = 100  # by commands that are looked at in a block of rows, and a hundred times as many in all
 _DRAWN = (
     "time", "position.", "attitude.", "membership.", "weight.", "estimate.", "command.", "actuation.",
-    "thruster_force[", "helm.", "target.", "lyapunov.",
+    "thruster_force[", "commands.", "target.", "lyapunov.",
 )  # fmt: skip
 _DRAWN_OF_REGIONS = (".clearance", ".shift.x", ".shift.y", ".shift.z")
 _EXTREME = ("attitude.", "membership.", "weight.", "estimate.", "lyapunov.")
@@ -34,7 +34,7 @@ def story_of(run: FlownRun) -> Story:
 
     Of a long record these are the rows at which what is drawn is least and greatest in each of some hundred parts of
     the time, and of those spans that figures show enlarged; evenly spaced rows, in time and along the way; and those at
-    which orders changed something.
+    which commands changed something.
 
     Parameters
     ----------
@@ -103,8 +103,8 @@ def _along(record: Rows) -> NDArray[np.intp]:
 
 
 def _ordered(record: Rows) -> NDArray[np.intp]:
-    """Return the rows at which orders changed something, and the ones before them; of very many only some."""
-    names = [name for name in record.units if name.startswith(("helm.", "target."))]
+    """Return the rows at which commands changed something, and the ones before them; of very many only some."""
+    names = [name for name in record.units if name.startswith(("commands.", "target."))]
     found, first, before = [np.empty(0, np.intp)], 0, np.full((1, len(names)), np.nan)
     for block in record.blocks(names) if names else ():
         told = block.numbers()

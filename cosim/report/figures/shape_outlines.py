@@ -266,5 +266,5 @@ def _section(low: Array, high: Array, point: Array, normal: Array) -> Array:
     points = np.array(met)
     turned = _around(normal)[[0, 18]]  # two directions in the plane, at right angles
     angles = np.arctan2(*((points - points.mean(axis=0)) @ turned.T).T)
-    ordered = points[np.argsort(angles)]
-    return np.vstack([ordered, ordered[:1]])
+    commanded = points[np.argsort(angles)]
+    return np.vstack([commanded, commanded[:1]])

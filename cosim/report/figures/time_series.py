@@ -199,7 +199,7 @@ def clearance(story: Story, sheet: Sheet[F]) -> F:
     rest = [f"{others} others"] if others else []
     figure, axes = _zoomed(story, sheet, [2.5, 1.5] if of_angles else [2.5], [*labels, *rest])
     entries: dict[str, Artist] = {}
-    order = [region.name for region, _ in regions if region.name in named]
+    command = [region.name for region, _ in regions if region.name in named]
     for row, group, unit in zip(axes, (of_places, of_angles), ("m", "°"), strict=False):
         signals = []
         for region, colour in sorted(group, key=lambda of: of[0].name in named):  # the others behind
@@ -207,7 +207,7 @@ def clearance(story: Story, sheet: Sheet[F]) -> F:
             signal = np.rad2deg(signal) if unit == "°" else np.where(np.abs(signal) < _AWAY, signal, np.nan)
             signals.append(signal)
             if region.name in named:
-                i = order.index(region.name)
+                i = command.index(region.name)
                 dashes, width = DASHES[i % len(DASHES)], 1.3 if i < len(DASHES) else 0.8
                 entries[region.name] = curve(row, story, signal, color=colour, linestyle=dashes, linewidth=width)
             else:
@@ -231,11 +231,11 @@ def _named(story: Story, names: list[str]) -> set[str]:
     return {names[0], *sorted(names[1:], key=lambda name: np.nan_to_num(least[name], nan=np.inf))[:_NEAREST]}
 
 
-def helm(story: Story, sheet: Sheet[F]) -> F:
+def control_mode(story: Story, sheet: Sheet[F]) -> F:
     """Draw who steers, and whether the thrusters may work."""
     figure, (ax,) = over_time(story, sheet, [1.3], [])
-    time, mode = story.record["time"], story.record["helm.mode"]
-    armed = story.record["helm.armed"] > 0.0
+    time, mode = story.record["time"], story.record["commands.mode"]
+    armed = story.record["commands.armed"] > 0.0
     changes = [0, *(np.flatnonzero(np.diff(mode) != 0.0) + 1).tolist(), len(time) - 1]
     for first, last in zip(changes, changes[1:], strict=False):
         if np.isfinite(mode[first]):

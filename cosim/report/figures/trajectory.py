@@ -53,7 +53,7 @@ def way_of(story: Story) -> Way:
 
 
 def targets_of(story: Story) -> list[tuple[Array, float]]:
-    """Return where the target region was ordered to before the last order: middle [m, NED] and radius [m].
+    """Return where the target region was commanded to before the last command: middle [m, NED] and radius [m].
 
     Parameters
     ----------

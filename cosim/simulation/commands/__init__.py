@@ -5,20 +5,20 @@ What can be asked of a vehicle from outside, applied between two steps, logged, 
 Imports: controller, plant_fmu, scenario.
 """
 
-from cosim.simulation.commands.command_handler import MODES, Helm, Mode
-from cosim.simulation.commands.commands import Order
+from cosim.simulation.commands.command_handler import MODES, CommandHandler, Mode
+from cosim.simulation.commands.commands import Command
 from cosim.simulation.commands.settings import LiveSettings, Setting
-from cosim.simulation.commands.sources import LoggedOrders, OrderQueue, OrderSource, RecordedOrders
+from cosim.simulation.commands.sources import CommandQueue, CommandSource, LoggedCommands, ReplayedCommands
 
 __all__ = [
     "MODES",
-    "Helm",
+    "Command",
+    "CommandHandler",
+    "CommandQueue",
+    "CommandSource",
     "LiveSettings",
-    "LoggedOrders",
+    "LoggedCommands",
     "Mode",
-    "Order",
-    "OrderQueue",
-    "OrderSource",
-    "RecordedOrders",
+    "ReplayedCommands",
     "Setting",
 ]

@@ -1,4 +1,4 @@
-"""The helm of a running vehicle: armed or not, by hand or by the law, and where the target region is."""
+"""Commands to a running vehicle, applied: armed or not, by hand or by the law, and where the target region is."""
 
 from __future__ import annotations
 
@@ -9,47 +9,47 @@ from typing import assert_never
 import numpy as np
 
 from controller import VehicleState
-from cosim.errors import OrderError
+from cosim.errors import CommandError
 from cosim.scenario.scenario import Scenario
 from cosim.scenario.tables import Vector3
 from cosim.simulation.actuators import Actuators
 from cosim.simulation.commands.commands import (
     MODES,
-    Aim,
+    AddObstacle,
     Arm,
-    Begin,
-    Change,
-    Face,
-    Forget,
-    Item,
-    Mission,
+    ChangeSetting,
+    Command,
+    ManualControl,
+    MissionItem,
     Mode,
-    Move,
-    Obstacle,
-    Order,
+    RemoveObstacle,
     Reset,
-    Steer,
-    Sticks,
+    SetCurrentItem,
+    SetHeading,
+    SetMission,
+    SetMode,
+    SetTarget,
+    ShiftRegion,
 )
-from cosim.simulation.commands.mission_executor import Course
-from cosim.simulation.commands.obstacle_slots import Slots
+from cosim.simulation.commands.mission_executor import MissionExecutor
+from cosim.simulation.commands.obstacle_slots import ObstacleSlots
 from cosim.simulation.commands.settings import LiveSettings
-from cosim.simulation.environment import Surroundings
+from cosim.simulation.environment import RegionEnvironment
 from cosim.simulation.signals import Array
 
-__all__ = ["MODES", "Helm", "Mode"]
+__all__ = ["MODES", "CommandHandler", "Mode"]
 
 log = logging.getLogger(__name__)
 
 
-class Helm:
-    """Follows orders, and carries the target region from one item of a mission to the next.
+class CommandHandler:
+    """Follows commands, and carries the target region from one item of a mission to the next.
 
     Parameters
     ----------
     scenario : Scenario
         What is run; its commands are enabled.
-    surroundings : Surroundings
+    surroundings : RegionEnvironment
         Whose target and obstacles are moved.
     actuators : Actuators
         Whose limits are changed.
@@ -67,10 +67,10 @@ class Helm:
     mode : Mode
         Who steers, and whither.
     heading : float or None
-        Heading to be kept [rad], once one is ordered.
+        Heading to be kept [rad], once one is commanded.
     took_over, turned, changed : bool
-        Whether the law steers from now on and did not before, another heading was ordered, and settings were changed,
-        since `heeded`.
+        Whether the law steers from now on and did not before, another heading was commanded, and settings were changed,
+        since `mark_applied`.
     reset : bool
         Whether the run is to begin again.
     """
@@ -78,7 +78,7 @@ class Helm:
     def __init__(
         self,
         scenario: Scenario,
-        surroundings: Surroundings,
+        environment: RegionEnvironment,
         actuators: Actuators,
         state: VehicleState,
         out: Array,
@@ -86,17 +86,17 @@ class Helm:
         self.settings = LiveSettings(scenario)
         self.armed, self.mode = not scenario.commands.await_arm, "reach"
         self.heading: float | None = None
-        self.took_over = self.turned = self.changed = self.reset = False
-        self._surroundings, self._actuators, self._state, self._out = surroundings, actuators, state, out
+        self.control_regained = self.turned = self.changed = self.reset = False
+        self._environment, self._actuators, self._state, self._out = environment, actuators, state, out
         vehicle = scenario.vehicle
         # greatest wrench along and about each axis, which full sticks are parts of
         self._reach = greatest_wrench(vehicle.thruster_matrix, vehicle.thrust_min, vehicle.thrust_max)
-        self._sticks: Array = np.zeros(6)
-        self._course = Course()
-        self._slots = Slots(scenario.commands.obstacles)
+        self._manual: Array = np.zeros(6)
+        self._mission = MissionExecutor()
+        self._slots = ObstacleSlots(scenario.commands.obstacles)
 
     @property
-    def law_steers(self) -> bool:
+    def automatic_control(self) -> bool:
         """Whether the law says what the thrusters do; otherwise `wrench` does."""
         return self.armed and self.mode != "manual"
 
@@ -104,119 +104,119 @@ class Helm:
     def wrench(self) -> Array:
         """What the sticks ask for, shape (6,) [N, N m], body frame; nothing unless armed."""
         gain = self.settings["commands.pilot_gain"] if self.armed else 0.0
-        wrench: Array = gain * self._sticks * self._reach
+        wrench: Array = gain * self._manual * self._reach
         return wrench
 
-    def follow(self, order: Order, time: float) -> None:
-        """Follow an order, at the beginning of a step; what cannot be followed is logged and changes nothing.
+    def apply(self, command: Command, time: float) -> None:
+        """Follow a command, at the beginning of a step; what cannot be followed is logged and changes nothing.
 
         Parameters
         ----------
-        order : Order
+        command : Command
             Any.
         time : float
             Of the step [s].
         """
-        steered = self.law_steers
+        steered = self.automatic_control
         try:
-            self._follow(order, time)
-        except OrderError as error:
-            log.warning("%s: %s", type(order).__name__.lower(), error)
-        self.took_over |= self.law_steers and not steered
+            self._dispatch(command, time)
+        except CommandError as error:
+            log.warning("%s: %s", type(command).__name__.lower(), error)
+        self.control_regained |= self.automatic_control and not steered
 
-    def _follow(self, order: Order, time: float) -> None:
-        match order:
+    def _dispatch(self, command: Command, time: float) -> None:
+        match command:
             case Arm():
-                self.armed = order.armed
-                self._sticks[:] = 0.0
-            case Steer():
-                self._steer(order.mode, time)
-            case Aim():
-                self._surroundings.aim(order.position, order.radius, order.velocity, time)
-                self._surroundings.keep_target()
+                self.armed = command.armed
+                self._manual[:] = 0.0
+            case SetMode():
+                self._set_mode(command.mode, time)
+            case SetTarget():
+                self._environment.set_target(command.position, command.radius, command.velocity, time)
+                self._environment.save_target()
                 self.mode = "reach"
-            case Face():
-                self.heading, self.turned = order.heading, True
-            case Sticks():
-                self._sticks[:] = order.wrench
-            case Obstacle():
-                slot = self._slots.take(order.number)
-                self._surroundings.place(slot, order.position, order.radius, order.velocity, time)
-            case Forget():
-                left = self._slots.leave(order.number)
+            case SetHeading():
+                self.heading, self.turned = command.heading, True
+            case ManualControl():
+                self._manual[:] = command.wrench
+            case AddObstacle():
+                slot = self._slots.take(command.number)
+                self._environment.add_obstacle(slot, command.position, command.radius, command.velocity, time)
+            case RemoveObstacle():
+                left = self._slots.leave(command.number)
                 if left is not None:
-                    self._surroundings.forget(left)
-            case Move():
-                self._surroundings.displace(order.region, order.by)
-            case Change():
-                self.settings.change(order.key, order.value)
+                    self._environment.remove_obstacle(left)
+            case ShiftRegion():
+                self._environment.shift_region(command.region, command.by)
+            case ChangeSetting():
+                self.settings.change(command.key, command.value)
                 self.changed = True
-                self._apply(order.key)
-            case Mission():
-                self._course.take(order.items)
+                self._apply_setting(command.key)
+            case SetMission():
+                self._mission.take(command.items)
                 if self.mode == "mission":
-                    self._steer("hold", time)
-            case Begin():
-                self._course.begin(order.item)
+                    self._set_mode("hold", time)
+            case SetCurrentItem():
+                self._mission.begin(command.item)
                 if self.mode == "mission":
                     self._resume(time)
             case Reset():
                 self.reset = True
             case _:
-                assert_never(order)
+                assert_never(command)
 
-    def heeded(self) -> None:
+    def mark_applied(self) -> None:
         """Note that whoever steps the run has taken over what is new."""
-        self.took_over = self.turned = self.changed = False
+        self.control_regained = self.turned = self.changed = False
 
-    def _apply(self, key: str) -> None:
+    def _apply_setting(self, key: str) -> None:
         """Bring a changed setting to regions and actuators; the law's gains and the arbiter's ramp the master takes."""
         settings, region = self.settings, self.settings.region_of(key)
         if region is not None and key.endswith(".gain"):
-            self._surroundings.set_gain(region, settings[key])
+            self._environment.set_gain(region, settings[key])
         elif region is not None:
-            self._surroundings.set_shape(region, settings.shapes[region])
+            self._environment.set_shape(region, settings.shapes[region])
         elif key in settings.of_plant:
             self._actuators.limit(settings.of_plant[key], settings[key])
 
-    def _steer(self, mode: Mode, time: float) -> None:
+    def _set_mode(self, mode: Mode, time: float) -> None:
         here: Vector3 = (float(self._state.position[0]), float(self._state.position[1]), float(self._state.position[2]))
         radius = self.settings["commands.hold_radius"]
         if mode in ("hold", "surface") and not all(map(math.isfinite, here)):
-            raise OrderError(f"mode {mode} needs a position, and none is known")
-        if mode == "mission" and not self._course.items:
-            raise OrderError("mode mission: there is no mission")
+            raise CommandError(f"mode {mode} needs a position, and none is known")
+        if mode == "mission" and not self._mission.items:
+            raise CommandError("mode mission: there is no mission")
         self.mode = mode
-        self._sticks[:] = 0.0
+        self._manual[:] = 0.0
         match mode:
             case "hold":
-                self._surroundings.aim(here, radius)
+                self._environment.set_target(here, radius)
             case "surface":
                 up = (here[0], here[1], self.settings["commands.surface_depth"])
-                self._surroundings.aim(up, radius)
+                self._environment.set_target(up, radius)
             case "reach":
-                self._surroundings.aim_as_before()
+                self._environment.restore_target()
             case "mission":
-                self._course.enter(max(self._course.at, 0))
+                self._mission.enter(max(self._mission.at, 0))
                 self._resume(time)
 
     def _resume(self, time: float) -> None:
         """Go on with the present item of the mission, from wherever the vehicle is."""
-        region, item = self._course.region(), self._course.items[self._course.at]
+        region, item = self._mission.region(), self._mission.items[self._mission.at]
         if region is not None and region is not item:
-            self._aim_at(region)
+            self._set_target_of(region)
         self._begin(item, time)
 
-    def _begin(self, item: Item, time: float) -> None:
-        self._aim_at(item)
-        for order in item.orders:
-            self.follow(order, time)
+    def _begin(self, item: MissionItem, time: float) -> None:
+        self._set_target_of(item)
+        for command in item.commands:
+            self.apply(command, time)
 
-    def _aim_at(self, item: Item) -> None:
+    def _set_target_of(self, item: MissionItem) -> None:
         if item.position is not None:
-            self._surroundings.aim(item.position, item.radius)
+            self._environment.set_target(item.position, item.radius)
 
-    def watch(self, time: float, clearance: float) -> bool:
+    def update(self, time: float, clearance: float) -> bool:
         """Write how things stand, and go on with the mission once its region was reached.
 
         Parameters
@@ -229,15 +229,15 @@ class Helm:
         Returns
         -------
         bool
-            Whether another item is under way now; what it changed is for `heeded` to note.
+            Whether another item is under way now; what it changed is for `mark_applied` to note.
         """
         following = None
         if self.armed and self.mode == "mission":
-            following = self._course.following(time, clearance)
+            following = self._mission.following(time, clearance)
         if following is not None:
-            self._begin(self._course.enter(following), time)
-        self._out[0], self._out[1], self._out[2] = self.armed, MODES.index(self.mode), self._course.at
-        self._out[3:6], self._out[6] = self._surroundings.target, self._surroundings.target_radius
+            self._begin(self._mission.enter(following), time)
+        self._out[0], self._out[1], self._out[2] = self.armed, MODES.index(self.mode), self._mission.at
+        self._out[3:6], self._out[6] = self._environment.target, self._environment.target_radius
         return following is not None
 
 

@@ -5,16 +5,16 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from cosim.errors import OrderError
-from cosim.simulation.commands.commands import Item
+from cosim.errors import CommandError
+from cosim.simulation.commands.commands import MissionItem
 
 
-class Course:
+class MissionExecutor:
     """A mission under way.
 
     Attributes
     ----------
-    items : tuple of Item
+    items : tuple of MissionItem
         Of the mission.
     at : int
         The item under way, from 0; -1 before there is one.
@@ -23,7 +23,7 @@ class Course:
     def __init__(self) -> None:
         self.take(())
 
-    def take(self, items: tuple[Item, ...]) -> None:
+    def take(self, items: tuple[MissionItem, ...]) -> None:
         """Take another mission, which has not begun."""
         self.items, self.at = items, -1
         self._jumps: dict[int, int] = {}  # made so far, by item
@@ -34,20 +34,20 @@ class Course:
 
         Raises
         ------
-        OrderError
+        CommandError
             If there is no such item.
         """
         if not 0 <= item < len(self.items):
-            raise OrderError(f"item is {item}, expected 0 to {len(self.items) - 1}")
+            raise CommandError(f"item is {item}, expected 0 to {len(self.items) - 1}")
         self._jumps.clear()
         self.enter(item)
 
-    def enter(self, item: int) -> Item:
+    def enter(self, item: int) -> MissionItem:
         """Let an item be under way, and return it."""
         self.at, self._since = item, math.inf
         return self.items[item]
 
-    def region(self) -> Item | None:
+    def region(self) -> MissionItem | None:
         """Return the item whose region counts: the present one, or the last one before it that has a place."""
         return next((item for item in self.items[self.at :: -1] if item.position is not None), None)
 
@@ -75,14 +75,14 @@ class Course:
         return self.at + 1 if self.at + 1 < len(self.items) else None
 
 
-def way(items: Sequence[Item], before: int, now: int) -> list[int] | None:
+def way(items: Sequence[MissionItem], before: int, now: int) -> list[int] | None:
     """Return the items that a mission went through from one to another that is under way now.
 
     Only those are gone through at once that have no place.
 
     Parameters
     ----------
-    items : sequence of Item
+    items : sequence of MissionItem
         Of the mission.
     before, now : int
         Items.

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from cosim.errors import OrderError
+from cosim.errors import CommandError
 
 
-class Slots:
+class ObstacleSlots:
     """Places for obstacles, given out by the lowest free one.
 
     Parameters
@@ -23,12 +23,12 @@ class Slots:
 
         Raises
         ------
-        OrderError
+        CommandError
             If there is none.
         """
         if number not in self._taken:
             if not self._free:
-                raise OrderError(f"no room for obstacle {number}: {len(self._taken)} have come already")
+                raise CommandError(f"no room for obstacle {number}: {len(self._taken)} have come already")
             self._taken[number] = self._free.pop(0)
         return self._taken[number]
 

@@ -9,7 +9,7 @@ from typing import Any
 
 from controller import LAWS, ControllerError
 from controller.regions import Region, Shape
-from cosim.errors import OrderError
+from cosim.errors import CommandError
 from cosim.scenario.scenario import Scenario
 from plant_fmu.variables import variables
 
@@ -121,27 +121,27 @@ class LiveSettings:
 
         Raises
         ------
-        OrderError
+        CommandError
             If there is no such setting, or the value cannot be; then nothing is changed.
         """
         try:
             if key.startswith("law.gains."):
                 name = key.removeprefix("law.gains.")
                 if name not in self.gains._fields:
-                    raise OrderError(f"{key} is no setting")
+                    raise CommandError(f"{key} is no setting")
                 self.gains = self._law.checked(self.gains._replace(**{name: value}))
             elif key in self._numbers:
                 self._change_number(key, value)
             else:
                 self._change_shape(key, value)
         except ControllerError as error:
-            raise OrderError(f"{key}: {error}") from error
+            raise CommandError(f"{key}: {error}") from error
 
     def _change_number(self, key: str, value: float) -> None:
         if key in self._ranges:
             least, greatest = self._ranges[key]
             if not least <= value <= greatest:
-                raise OrderError(f"{key} is {value:g}, expected {least:g} to {greatest:g}")
+                raise CommandError(f"{key} is {value:g}, expected {least:g} to {greatest:g}")
         else:  # regions.NAME.gain, which the region itself checks
             name = key.removeprefix("regions.").removesuffix(".gain")
             self._regions[name] = dataclasses.replace(self._regions[name], gain=value)
@@ -163,7 +163,7 @@ class LiveSettings:
             return key.removeprefix("regions.").removesuffix(".gain")
         try:
             return self._part(key)[0]
-        except OrderError:
+        except CommandError:
             return None
 
     def _part(self, key: str) -> tuple[str, str, int | None]:
@@ -171,7 +171,7 @@ class LiveSettings:
 
         Raises
         ------
-        OrderError
+        CommandError
             If it is none.
         """
         for name, shape in self.shapes.items():
@@ -185,7 +185,7 @@ class LiveSettings:
             numbers = value if isinstance(value, tuple) else ()
             if rest in map(str, range(len(numbers))) and isinstance(numbers[int(rest)], float):
                 return name, field, int(rest)
-        raise OrderError(f"{key} is no setting")
+        raise CommandError(f"{key} is no setting")
 
 
 def _fields(shape: Shape) -> set[str]:

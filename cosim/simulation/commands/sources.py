@@ -1,7 +1,8 @@
-"""Where orders come from: a queue that another thread fills, or the log of an earlier run."""
+"""Where commands come from: a queue that another thread fills, or the log of an earlier run."""
 
 from __future__ import annotations
 
+import re
 import threading
 from collections import deque
 from collections.abc import Callable, Iterable, Sequence
@@ -10,28 +11,28 @@ from typing import Annotated, Protocol
 
 import msgspec
 
-from cosim.errors import OrderError, RunError
+from cosim.errors import CommandError, RunError
 from cosim.scenario.validation import MAX_STEPS
-from cosim.simulation.commands.commands import NO_ORDER, Order, check_order
+from cosim.simulation.commands.commands import NOT_A_COMMAND, Command, validate_command
 
-QUEUED = 256  # orders between two steps; further ones are refused
+QUEUED = 256  # commands between two steps; further ones are refused
 
 
-class OrderSource(Protocol):
-    """Gives the orders of each step."""
+class CommandSource(Protocol):
+    """Gives the commands of each step."""
 
-    def take(self, k: int) -> Sequence[Order]:
-        """Return the orders to be applied at the beginning of step `k`."""
+    def take(self, k: int) -> Sequence[Command]:
+        """Return the commands to be applied at the beginning of step `k`."""
         ...
 
     @property
     def exhausted(self) -> bool:
-        """Whether no order will come any more."""
+        """Whether no command will come any more."""
         ...
 
 
-class OrderQueue:
-    """Orders from another thread, in the order in which they were given. Bounded: a flood is refused, not kept.
+class CommandQueue:
+    """Commands from another thread, in the order in which they were given. Bounded: a flood is refused, not kept.
 
     Attributes
     ----------
@@ -43,15 +44,15 @@ class OrderQueue:
 
     def __init__(self) -> None:
         self.run = 0
-        self._orders: deque[Order] = deque()
+        self._commands: deque[Command] = deque()
         self._lock = threading.Lock()
 
-    def give(self, order: Order, run: int | None = None) -> bool:
-        """Queue an order for the next step.
+    def give(self, command: Command, run: int | None = None) -> bool:
+        """Queue a command for the next step.
 
         Parameters
         ----------
-        order : Order
+        command : Command
             To be applied.
         run : int, optional
             The run that it is meant for; default: whichever takes it.
@@ -63,39 +64,42 @@ class OrderQueue:
 
         Raises
         ------
-        OrderError
+        CommandError
             If its numbers cannot be.
         """
-        check_order(order)
+        validate_command(command)
         with self._lock:
-            if len(self._orders) >= QUEUED or run not in (None, self.run):
+            if len(self._commands) >= QUEUED or run not in (None, self.run):
                 return False
-            self._orders.append(order)
+            self._commands.append(command)
         return True
 
     def end_run(self) -> None:
         """Forget what is queued, and refuse what still comes for the run that is over."""
         with self._lock:
             self.run += 1
-            self._orders.clear()
+            self._commands.clear()
 
-    def take(self, k: int) -> Sequence[Order]:
+    def take(self, k: int) -> Sequence[Command]:
         """Return what is queued, whatever the step `k`."""
         taken = []
-        while self._orders:
-            taken.append(self._orders.popleft())
+        while self._commands:
+            taken.append(self._commands.popleft())
         return taken
+
+
+_OLDER = re.compile(rb'\{"step": ?\d+, ?"order"')  # how a log of older versions begins
 
 
 class _Entry(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A line of the log."""
 
     step: Annotated[int, msgspec.Meta(ge=0, le=MAX_STEPS)]
-    order: Order
+    command: Command
 
 
-def read_log(file: Path) -> list[tuple[int, Order]]:
-    """Return the orders of an earlier run, each with the step that took it, in their order.
+def read_log(file: Path) -> list[tuple[int, Command]]:
+    """Return the commands of an earlier run, each with the step that took it, in their order.
 
     A last line that was cut off, by a kill or a full disk, does not count: that run did not follow it either.
 
@@ -106,34 +110,36 @@ def read_log(file: Path) -> list[tuple[int, Order]]:
 
     Returns
     -------
-    list of (int, Order)
+    list of (int, Command)
         As they were followed.
 
     Raises
     ------
     RunError
-        If it cannot be read, or a line is no order.
+        If it cannot be read, or a line is no command.
     """
     try:
         content = file.read_bytes()
     except OSError as error:
         raise RunError(f"{file}: {error.strerror or error}") from error
+    if _OLDER.match(content):
+        raise RunError(f"{file}: has the words of an older version ('order'), expected those of this one ('command')")
     lines, whole = content.splitlines(), content.count(b"\n")
     entries = []
     for number, line in enumerate(lines, 1):
         try:
             entry = msgspec.json.decode(line, type=_Entry)
-            check_order(entry.order)
-        except (*NO_ORDER, OrderError) as error:
+            validate_command(entry.command)
+        except (*NOT_A_COMMAND, CommandError) as error:
             if type(error) in (msgspec.DecodeError, UnicodeDecodeError) and number > whole:
                 break
             raise RunError(f"{file}, line {number}: {error}") from error
-        entries.append((entry.step, entry.order))
+        entries.append((entry.step, entry.command))
     return sorted(entries, key=lambda entry: entry[0])
 
 
-class RecordedOrders:
-    """The orders of an earlier run, at the steps at which that run took them.
+class ReplayedCommands:
+    """The commands of an earlier run, at the steps at which that run took them.
 
     Parameters
     ----------
@@ -143,7 +149,7 @@ class RecordedOrders:
     Raises
     ------
     RunError
-        If it cannot be read, or a line is no order.
+        If it cannot be read, or a line is no command.
     """
 
     def __init__(self, file: Path) -> None:
@@ -151,48 +157,48 @@ class RecordedOrders:
 
     @property
     def exhausted(self) -> bool:
-        """Whether no order is left."""
+        """Whether no command is left."""
         return not self._entries
 
-    def take(self, k: int) -> Sequence[Order]:
-        """Return the orders of step `k`, and of earlier ones that were not taken."""
+    def take(self, k: int) -> Sequence[Command]:
+        """Return the commands of step `k`, and of earlier ones that were not taken."""
         taken = []
         while self._entries and self._entries[0][0] <= k:
             taken.append(self._entries.popleft()[1])
         return taken
 
 
-class LoggedOrders:
-    """Another source, of which each order that is taken is written down at once, so that a killed run has its log.
+class LoggedCommands:
+    """Another source, of which each command that is taken is written down at once, so that a killed run has its log.
 
     Parameters
     ----------
-    source : OrderSource
-        Where the orders come from.
+    source : CommandSource
+        Where the commands come from.
     file : Path
-        The log; made when the first order is taken.
+        The log; made when the first command is taken.
     tell : callable, optional
-        Told of each step that takes orders, and of these, once they are written.
+        Told of each step that takes commands, and of these, once they are written.
     """
 
     def __init__(
-        self, source: OrderSource, file: Path, tell: Callable[[int, Sequence[Order]], None] | None = None
+        self, source: CommandSource, file: Path, tell: Callable[[int, Sequence[Command]], None] | None = None
     ) -> None:
         self._source, self._file, self._tell = source, file, tell
 
     @property
     def exhausted(self) -> bool:
-        """Whether no order will come any more."""
+        """Whether no command will come any more."""
         return self._source.exhausted
 
-    def take(self, k: int) -> Sequence[Order]:
-        """Return the orders of step `k`, once they are written."""
-        orders = self._source.take(k)
-        if orders:
-            self._write(_Entry(k, order) for order in orders)
+    def take(self, k: int) -> Sequence[Command]:
+        """Return the commands of step `k`, once they are written."""
+        commands = self._source.take(k)
+        if commands:
+            self._write(_Entry(k, command) for command in commands)
             if self._tell is not None:
-                self._tell(k, orders)
-        return orders
+                self._tell(k, commands)
+        return commands
 
     def _write(self, entries: Iterable[_Entry]) -> None:
         with self._file.open("ab") as file:

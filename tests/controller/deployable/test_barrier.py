@@ -20,9 +20,9 @@ def evaluated(regions, time, position, quaternion):
     """Return clearances, and their slopes over the pose, of length 1 for places."""
     packed, n = pack(regions), len(regions)
     packed.move_to(time)
-    values, gradients, turnings, clearances = np.empty(n), np.empty((n, 3)), np.empty((n, 3)), np.empty(n)
-    packed.evaluate(position, quaternion, values, gradients, turnings, clearances)
-    slopes = -np.hstack([gradients, turnings])
+    values, gradients, rotation_gradients, clearances = np.empty(n), np.empty((n, 3)), np.empty((n, 3)), np.empty(n)
+    packed.evaluate(position, quaternion, values, gradients, rotation_gradients, clearances)
+    slopes = -np.hstack([gradients, rotation_gradients])
     for i, region in enumerate(regions):
         if region.shape.unit != "rad":
             slopes[i] /= np.linalg.norm(gradients[i])

@@ -15,18 +15,18 @@ SCENE = [Region(name, shape, ("in", "out")[i % 2]) for i, (name, (shape, _)) in 
 def test_every_way_to_ask_says_the_same():
     rng, packed, n = np.random.default_rng(1), pack(SCENE), len(SCENE)
     packed.shifts[:] = rng.normal(size=(n, 3))
-    values, gradients, turnings, clearances = np.empty(n), np.empty((n, 3)), np.empty((n, 3)), np.empty(n)
+    values, gradients, rotation_gradients, clearances = np.empty(n), np.empty((n, 3)), np.empty((n, 3)), np.empty(n)
     room, slope, turning, asked = np.empty(3), np.empty(3), np.empty(3), 0
     for _ in range(40):
         p, e = rng.normal(size=3) * 3.0 + 1.0, rng.normal(size=4)
         e /= np.linalg.norm(e)
-        packed.evaluate(p, e, values, gradients, turnings, clearances)
+        packed.evaluate(p, e, values, gradients, rotation_gradients, clearances)
         for i, region in enumerate(SCENE):
             assert clearance_of_pose(packed, i, p, e, room) == pytest.approx(clearances[i], rel=1e-12)
             if region.shape.unit == "rad":
                 clearance = attitude_clearance(packed, i, p, e, turning)
                 assert clearance == pytest.approx(clearances[i], rel=1e-12)
-                assert turning == pytest.approx(-turnings[i], rel=1e-12, abs=1e-15)
+                assert turning == pytest.approx(-rotation_gradients[i], rel=1e-12, abs=1e-15)
                 assert clearance_at(packed, i, p) == np.inf
                 continue
             assert clearance_at(packed, i, p) == pytest.approx(clearances[i], rel=1e-12)

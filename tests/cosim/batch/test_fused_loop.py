@@ -42,7 +42,7 @@ class Readable:
         n = self.known.regions.kinds.size
         gains, level = LAWS[law].gains_type(), np.array([1.0, 0.0, 0.0, 0.0])
         self.law = LAWS[law].for_vehicle(vehicle_model(self.vehicle), gains, level, conditions.control, n)
-        self.values, self.gradients, self.turnings = np.zeros(n), np.zeros((n, 3)), np.zeros((n, 3))
+        self.values, self.gradients, self.rotation_gradients = np.zeros(n), np.zeros((n, 3)), np.zeros((n, 3))
         self.clearances = np.zeros(n)
 
     def fly(self):
@@ -72,7 +72,12 @@ class Readable:
                 for regions in (self.known.goal, self.known.regions):
                     regions.move_to(plant.time)
                 self.known.regions.evaluate(
-                    state.position, state.quaternion, self.values, self.gradients, self.turnings, self.clearances
+                    state.position,
+                    state.quaternion,
+                    self.values,
+                    self.gradients,
+                    self.rotation_gradients,
+                    self.clearances,
                 )
                 memberships = [0.0] * len(CRITERIA)
                 for criterion, clearance in zip(self.known.criteria, self.clearances, strict=True):

@@ -13,7 +13,7 @@ from cosim.results.record import load_record
 from cosim.results.run_result import load_run
 from cosim.run.run import run_scenario
 from cosim.scenario.scenario import load_scenario
-from cosim.simulation.commands.commands import Aim, Change, Obstacle
+from cosim.simulation.commands.commands import AddObstacle, ChangeSetting, SetTarget
 
 mcap_reader = pytest.importorskip("mcap.reader")
 decoder = pytest.importorskip("mcap_protobuf.decoder")
@@ -189,7 +189,7 @@ def test_regions_that_move_have_frames_of_their_own(moving_run, tmp_path):
     assert {e.id: e.frame_id for e in scene.entities}["crossing buoy"] == "region crossing buoy"
 
 
-def test_what_an_order_changes_is_drawn_from_then_on(run, tmp_path, monkeypatch):
+def test_what_a_command_changes_is_drawn_from_then_on(run, tmp_path, monkeypatch):
     change = {"time": 0.5, "region": 0, "shape": {"kind": "sphere", "centre": (7.0, 0.0, 4.0), "radius": 0.9}}
     monkeypatch.setattr("cosim.export.scene.changes_of", lambda *_: [change])
     (path,) = export_run(run, "mcap", tmp_path / "out.mcap")
@@ -218,21 +218,21 @@ def test_chosen_signals_leave_the_scene_whole(run, tmp_path):
 @pytest.fixture(scope="module")
 def steered(tmp_path_factory):
     """The folder of a run to which an obstacle comes, and grows, and whose target becomes another."""
-    orders = {
-        20: Obstacle(7, (5.0, 0.0, 2.0), 0.4),
-        40: Aim((4.0, -1.0, 2.0), 0.6),
-        60: Obstacle(7, (5.0, 0.3, 2.0), 0.8),
-        70: Change("regions.ship.shape.semi_axes.0", 3.5),
+    commands = {
+        20: AddObstacle(7, (5.0, 0.0, 2.0), 0.4),
+        40: SetTarget((4.0, -1.0, 2.0), 0.6),
+        60: AddObstacle(7, (5.0, 0.3, 2.0), 0.8),
+        70: ChangeSetting("regions.ship.shape.semi_axes.0", 3.5),
     }
     folder = tmp_path_factory.mktemp("steered")
     log = folder / "log.jsonl"
-    log.write_bytes(b"".join(msgspec.json.encode({"step": k, "order": o}) + b"\n" for k, o in orders.items()))
+    log.write_bytes(b"".join(msgspec.json.encode({"step": k, "command": o}) + b"\n" for k, o in commands.items()))
     scenario = load_scenario("harbour", ["commands.enabled=true", "time.duration=1"])
-    return run_scenario(scenario, folder / "run", report=False, orders=log).folder
+    return run_scenario(scenario, folder / "run", report=False, commands_log=log).folder
 
 
 def test_spheres_as_they_are_drawn_give_the_recorded_clearances(steered, tmp_path):
-    """Through orders that bring them, move them and change their size."""
+    """Through commands that bring them, move them and change their size."""
     (path,) = export_run(steered, "mcap", tmp_path / "out.mcap")
     read, record = Read(path), load_record(steered)
     scenes, sizes = dict(read.messages["/scene"]), set()

@@ -84,7 +84,7 @@ def test_what_happened_stands_in_words(read):
     assert any(text.startswith("Gives way to") for text in said)
 
 
-def test_what_an_order_changes_is_drawn_from_then_on(run, tmp_path, monkeypatch):
+def test_what_a_command_changes_is_drawn_from_then_on(run, tmp_path, monkeypatch):
     changes = [
         {"time": 0.5, "region": 0, "shape": {"kind": "sphere", "centre": (7.0, 0.0, 4.0), "radius": 0.9}},
         {"time": 0.8, "region": 0, "shape": {"kind": "box", "centre": (7.0, 0.0, 4.0), "size": (1.0, 1.0, 1.0)}},

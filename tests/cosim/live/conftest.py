@@ -14,7 +14,7 @@ from cosim.run.run import run_scenario
 from cosim.scenario.scenario import load_scenario
 from tests.threads import ended
 
-ARM = {"order": "arm", "armed": True}
+ARM = {"command": "arm", "armed": True}
 WAIT = 120.0  # s, that nothing should take, however busy the machine
 
 
@@ -32,8 +32,8 @@ class Viewer:
     def __exit__(self, *error):
         self._connecting.__exit__(*error)
 
-    def order(self, **order):
-        self.socket.send(json.dumps(order))
+    def command(self, **command):
+        self.socket.send(json.dumps(command))
 
     def hear(self):
         """Take one message; return its kind."""

@@ -57,7 +57,7 @@ def test_the_target_is_dragged_with_the_mouse(browser, live, tmp_path):
     )
     where = "return subreach.scene.drawn.runs[0].position"
     first = until(lambda: browser.execute_script(where))
-    browser.execute_script("document.querySelector('#helm [data-armed=true]').click()")
+    browser.execute_script("document.querySelector('#commands [data-armed=true]').click()")
     until(lambda: abs(browser.execute_script(where)[0] - first[0]) > 0.05)
     browser.execute_script('subreach.scene.camera.look("top"); subreach.paint()')
 
@@ -80,20 +80,24 @@ def test_the_target_is_dragged_with_the_mouse(browser, live, tmp_path):
     assert browser.execute_script(HELD, *after) == pytest.approx([x - 40, y + 60], abs=5)
 
     # without a mouse: a number beside the scene
-    field = browser.find_element("css selector", '#helm input[aria-label="ship, east in metres"]')
+    field = browser.find_element("css selector", '#commands input[aria-label="ship, east in metres"]')
     browser.execute_script("arguments[0].scrollIntoView()", field)
     field.send_keys("\ue009" + "a" + "\ue009", "7", "\ue007")  # Control A, 7, Enter
     ship = "const r = subreach.runs[0]; return r.held('ship.shift.y', r.end)"
     until(lambda: browser.execute_script(ship) == 3.0)
 
-    browser.execute_script("document.querySelector('#helm [data-mode=hold]').click()")
-    until(lambda: browser.execute_script("return document.querySelector('#helm summary').textContent.includes('hold')"))
+    browser.execute_script("document.querySelector('#commands [data-mode=hold]').click()")
+    until(
+        lambda: browser.execute_script(
+            "return document.querySelector('#commands summary').textContent.includes('hold')"
+        )
+    )
     interrupt(running.thread)
     until(lambda: browser.execute_script("return Boolean(subreach.runs[0].header.verdict)"))
     assert browser.get_log("browser") == []
     done = running.end()
-    log = [json.loads(line)["order"] for line in (done.folder / "orders.jsonl").read_text().splitlines()]
-    assert [order["order"] for order in log] == ["arm", "aim", "move", "steer"]
+    log = [json.loads(line)["command"] for line in (done.folder / "commands.jsonl").read_text().splitlines()]
+    assert [command["command"] for command in log] == ["arm", "set_target", "shift_region", "set_mode"]
     assert log[1]["position"] == pytest.approx(after, abs=1e-12)
     target = load_record(done.folder).stack([f"target.{axis}" for axis in "xyz"])
     assert (target == after).all(axis=1).any()

@@ -1,4 +1,4 @@
-"""Pages of other sites, floods and garbage: none of it orders anything, or hurts the run."""
+"""Pages of other sites, floods and garbage: none of it commands anything, or hurts the run."""
 
 import contextlib
 import socket
@@ -9,7 +9,7 @@ import pytest
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
-from cosim.live.orders import LONGEST
+from cosim.live.command_desk import LONGEST
 from cosim.live.server import CONNECTIONS
 from cosim.results.record import load_record
 from cosim.run.run import run_scenario
@@ -52,7 +52,7 @@ def test_the_page_is_served_alone_and_to_our_own_pages(live):
             connect(running.url.replace("http", "ws") + "ws", additional_headers=headers)
         assert caught.value.response.status_code == 403
     with running.viewer() as viewer:
-        viewer.order(**ARM)
+        viewer.command(**ARM)
         viewer.until("end")
 
 
@@ -85,12 +85,12 @@ def test_nothing_that_comes_hurts_the_run(live, tmp_path, caplog):
             "null",
             "[]",
             "{",
-            '{"order":1}',
+            '{"command":1}',
             '"arm"',
             "[" * 5000,
-            '{"order":"arm","armed":1e999}',
+            '{"command":"arm","armed":1e999}',
             '{"a":' * 3000,  # D4: deeper than a parser goes
-            '{"order":"change","key":"goal.centre.' + "9" * 5000 + '","value":1}',
+            '{"command":"change_setting","key":"goal.centre.' + "9" * 5000 + '","value":1}',
         ):
             viewer.socket.send(bad)
         for _ in range(11):
@@ -98,19 +98,19 @@ def test_nothing_that_comes_hurts_the_run(live, tmp_path, caplog):
         assert len(viewer.said("refused")) == 11
         assert all(said.isprintable() and len(said) < 300 for said in viewer.said("refused"))
     with connect(url) as client:  # D4: a text that is no UTF-8, by which WebSocket has a connection fail
-        client.socket.sendall(b'\x81\x8d\0\0\0\0{"order":"\xff"}')
+        client.socket.sendall(b'\x81\x8f\0\0\0\0{"command":"\xff"}')
         assert closed_with(client) == 1007
     with connect(url) as left:  # who goes without a word
         left.socket.shutdown(socket.SHUT_RDWR)
     with running.viewer() as viewer:
-        viewer.order(**ARM)
+        viewer.command(**ARM)
         viewer.until("end")
     assert "Traceback" not in caplog.text
     done = running.end()
-    assert done.summary["orders"] == 1
+    assert done.summary["commands"] == 1
     alone = run_scenario(
         load_scenario(done.folder / "scenario.toml"), tmp_path / "alone", report=False,
-        orders=done.folder / "orders.jsonl",
+        commands_log=done.folder / "commands.jsonl",
     )  # fmt: skip
     assert same(load_record(done.folder), load_record(alone.folder))
 
@@ -121,12 +121,12 @@ def test_a_flood_is_slowed_down_and_shut_out(live):
     with connect(running.url.replace("http", "ws") + "ws") as flood:
         with contextlib.suppress(ConnectionClosed):
             for _ in range(5000):
-                flood.send('{"order":"steer","mode":"reach"}')
+                flood.send('{"command":"set_mode","mode":"reach"}')
         assert closed_with(flood) == 1008
     with running.viewer() as viewer:
-        viewer.order(**ARM)
+        viewer.command(**ARM)
         viewer.until("end")
-    assert running.end().summary["orders"] < 500
+    assert running.end().summary["commands"] < 500
 
 
 def test_more_viewers_than_there_is_room_for_are_sent_away(live):
@@ -138,7 +138,7 @@ def test_more_viewers_than_there_is_room_for_are_sent_away(live):
         with pytest.raises(InvalidStatus) as caught, running.viewer():
             pass
         assert caught.value.response.status_code == 503
-        viewers[0].order(**ARM)
+        viewers[0].command(**ARM)
         viewers[0].until("end")
 
 
@@ -158,6 +158,6 @@ def test_connections_beyond_the_most_are_cut_off_so_that_the_run_keeps_files_to_
             with pytest.raises(BlockingIOError):
                 early.recv(1)
     with running.viewer() as viewer:
-        viewer.order(**ARM)
+        viewer.command(**ARM)
         viewer.until("end")
     assert running.end().summary["status"] == "completed"

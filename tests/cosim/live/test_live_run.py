@@ -74,14 +74,14 @@ def test_a_reset_begins_another_run_for_the_viewers(live):
     with running.viewer() as viewer:
         while not viewer.rows or viewer.column("time")[-1] < 0.2:
             viewer.hear()
-        viewer.order(order="reset")
+        viewer.command(command="reset")
         assert viewer.until("end")["status"] == "reset"
         viewer.until("header")
         viewer.until("rows")
         assert viewer.column("time")[0] == 0.0
-        viewer.order(order="steer", mode="hold")
+        viewer.command(command="set_mode", mode="hold")
         assert viewer.until("end")["status"] == "completed"
-    assert "Holds its place" in viewer.said("order")
+    assert "Holds its place" in viewer.said("command")
     assert running.end().folder.name == "live-2"
 
 
@@ -101,7 +101,7 @@ def test_what_the_helm_refuses_later_is_told_too(live, caplog):
     with running.viewer() as viewer, caplog.at_level(logging.WARNING):
         viewer.until("header")
         for number in (1, 2):
-            viewer.order(order="obstacle", number=number, position=[1.0, 50.0, 3.0], radius=0.5)
-        viewer.order(**ARM)
+            viewer.command(command="add_obstacle", number=number, position=[1.0, 50.0, 3.0], radius=0.5)
+        viewer.command(**ARM)
         viewer.until("end")
     assert any("no room for obstacle 2" in text for text in viewer.said("warning"))

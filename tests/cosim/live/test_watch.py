@@ -121,7 +121,7 @@ def test_a_live_run_is_watched_to_its_end(live):
         seen = []
         watching = threading.Thread(target=lambda: seen.extend(looks(running.url.replace("http", "ws"))), daemon=True)
         watching.start()
-        viewer.order(**ARM)
+        viewer.command(**ARM)
         viewer.until("end")
         assert ended(watching)
     assert seen[-1].ended == ("completed", viewer.told("end")[0]["verdict"])

@@ -12,7 +12,7 @@ from pymavlink.dialects.v20 import all as mavlink
 from cosim.mavlink.autopilot import Autopilot
 from cosim.mavlink.wire.options import MavlinkOptions
 from cosim.scenario.scenario import Scenario, load_scenario
-from cosim.simulation.commands import OrderQueue
+from cosim.simulation.commands import CommandQueue
 from cosim.simulation.signals import Column
 
 NAN = math.nan
@@ -30,8 +30,8 @@ COLUMNS = tuple(
         *(f"membership.{c}" for c in ("obstacle", "shape", "depth")),
         *(f"weight.{c}" for c in ("obstacle", "shape", "depth")), *(f"estimate.phi{i}" for i in range(1, 5)),
         *(f"command.{f}" for f in "XYZKMN"), "allocation_saturated", *(f"thrust[{i}]" for i in range(1, 9)),
-        *(f"{name}.shift.{a}" for name in ("goal", "SR1", "seen 1", "seen 2") for a in "xyz"), "helm.armed",
-        "helm.mode", "helm.item", "target.x", "target.y", "target.z", "law.yielding",
+        *(f"{name}.shift.{a}" for name in ("goal", "SR1", "seen 1", "seen 2") for a in "xyz"), "commands.armed",
+        "commands.mode", "commands.item", "target.x", "target.y", "target.z", "law.yielding",
     )
 )  # fmt: skip
 AT = {column.name: i for i, column in enumerate(COLUMNS)}
@@ -45,7 +45,8 @@ def row(**values: Any) -> np.ndarray:
     """Return a row of an armed vehicle that reaches for its target; names have `_` for dots, or are whole groups."""
     new = np.zeros(len(COLUMNS))
     defaults = {
-        "position.x": (1.0, 2.0, 5.0), "quaternion.e0": 1.0, "helm.armed": 1.0, "helm.mode": 2.0, "helm.item": -1.0,
+        "position.x": (1.0, 2.0, 5.0), "quaternion.e0": 1.0,
+        "commands.armed": 1.0, "commands.mode": 2.0, "commands.item": -1.0,
         "target.x": (8.0, 0.0, 5.0), "goal.clearance": (-3.0, 2.0, 2.0, 2.0, 1e5, 1e5), "measured.depth": 5.0,
         "altitude": 1e6, "measured.altitude": 1e6,
     }  # fmt: skip
@@ -93,9 +94,9 @@ class Station:
     def __init__(
         self, profile: str = "ardusub", commands: bool = True, of: Scenario | None = None, **options: Any
     ) -> None:
-        self.orders = OrderQueue()
+        self.commands = CommandQueue()
         self.autopilot = Autopilot(
-            of or scenario(), COLUMNS, MavlinkOptions(profile=profile, commands=commands, **options), self.orders
+            of or scenario(), COLUMNS, MavlinkOptions(profile=profile, commands=commands, **options), self.commands
         )  # type: ignore[arg-type]
         self.wire = Wire()
         self.now = 100.0
@@ -135,6 +136,6 @@ class Station:
         assert (ack.command, ack.target_system, ack.target_component) == (message.command, who.get("system", 255), 190)
         return ack.result
 
-    def ordered(self) -> list[Any]:
-        """Take the orders that were given."""
-        return list(self.orders.take(0))
+    def commanded(self) -> list[Any]:
+        """Take the commands that were given."""
+        return list(self.commands.take(0))

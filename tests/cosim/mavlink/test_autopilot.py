@@ -114,7 +114,7 @@ def test_no_message_raises(stations, sent):
                 continue  # no message at all
             station.send(message, system=250)
         station.wait(0.04)
-        station.ordered()
+        station.commanded()
         station.wire.clear()
 
 
@@ -122,7 +122,7 @@ def test_no_message_raises(stations, sent):
 @given(commands())
 def test_a_command_is_acknowledged_once(stations, message):
     for station in stations:
-        station.ordered()
+        station.commanded()
         before = len(station.wire.got)
         station.send(message)
         acks = [m for m in station.wire.got[before:] if m.get_type() == "COMMAND_ACK"]
@@ -218,7 +218,7 @@ def test_identity(profile, autopilot, number):
 
 def test_a_disarmed_vehicle_stands_by():
     station = Station()
-    station.look(**{"helm.armed": 0.0})
+    station.look(**{"commands.armed": 0.0})
     station.command(512, 0)
     beat = station.wire.of("HEARTBEAT")[-1]
     assert not beat.base_mode & 128 and beat.system_status == mavlink.MAV_STATE_STANDBY
@@ -239,7 +239,7 @@ def test_what_is_meant_for_others_is_not_heard():
     assert station.send(long(2, 1, 400, 0, 1, 0, 0, 0, 0, 0, 0)) == []
     assert station.send(long(1, 100, 400, 0, 1, 0, 0, 0, 0, 0, 0)) == []
     assert station.send(long(1, 1, 400, 0, 1, 0, 0, 0, 0, 0, 0), system=1, component=1) == []
-    assert station.ordered() == []
+    assert station.commanded() == []
     assert len(station.send(long(0, 0, 400, 0, 1, 0, 0, 0, 0, 0, 0))) == 1
 
 
@@ -252,7 +252,7 @@ def test_only_allowed_systems_are_heard():
 
 @settings(max_examples=examples(150), deadline=None)
 @given(st.one_of(messages(), commands()))
-def test_read_only_orders_nothing(message):
+def test_read_only_commands_nothing(message):
     try:
         message.pack(mavlink.MAVLink(None))
     except (struct.error, OverflowError, TypeError):
@@ -261,7 +261,7 @@ def test_read_only_orders_nothing(message):
     station.look()
     station.send(message)
     station.wait(0.02)
-    assert station.ordered() == []
+    assert station.commanded() == []
     station.wire.clear()
 
 
@@ -295,13 +295,13 @@ def test_nothing_is_heeded_between_one_run_and_the_next(last):
     radius = mavlink.MAVLink_param_set_message(1, 1, b"SR1_RADIUS", 0.75, 9)
     assert station.command(400, 1.0) == accepted
     (before,) = station.send(mavlink.MAVLink_param_request_read_message(1, 1, b"SR1_RADIUS", -1))
-    station.orders.end_run()
+    station.commands.end_run()
     assert station.command(400, 1.0) == rejected
     assert "Refused: the run is over" in station.wire.texts
     assert station.send(radius)[-1].param_value == before.param_value
-    assert station.ordered() == []
+    assert station.commanded() == []
     station.look(0.0)
     assert "The run begins again" in station.wire.texts
     assert station.command(400, 1.0) == accepted
     assert station.send(radius)[-1].param_value == 0.75
-    assert len(station.ordered()) == 2
+    assert len(station.commanded()) == 2

@@ -3,7 +3,7 @@
 import pytest
 from pymavlink.dialects.v20 import all as mavlink
 
-from cosim.simulation.commands.commands import Arm, Steer
+from cosim.simulation.commands.commands import Arm, SetMode
 from tests.cosim.mavlink.station import Station
 
 BEAT = mavlink.MAVLink_heartbeat_message(mavlink.MAV_TYPE_GCS, mavlink.MAV_AUTOPILOT_INVALID, 0, 0, 4, 3)
@@ -56,7 +56,7 @@ def test_saturation(station):
 
 
 def test_armed_disarmed_and_the_bottom(station):
-    station.look(1.0, **{"helm.armed": 0.0})
+    station.look(1.0, **{"commands.armed": 0.0})
     station.look(1.1)
     station.look(1.2, bottom_contact=1.0)
     assert station.wire.texts == ["Disarmed", "Armed", "Bottom touched"]
@@ -94,27 +94,27 @@ def commanding(action, **options):
     station.look(0.0)
     station.send(BEAT)
     station.command(400, 1.0)
-    station.ordered()
+    station.commanded()
     station.wire.clear()
     return station
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("action", "orders"),
-    [("warn", []), ("hold", [Steer("hold")]), ("surface", [Steer("surface")]), ("disarm", [Arm(False)])],
+    ("action", "commands"),
+    [("warn", []), ("hold", [SetMode("hold")]), ("surface", [SetMode("surface")]), ("disarm", [Arm(False)])],
 )
-def test_a_station_that_falls_silent(action, orders):
+def test_a_station_that_falls_silent(action, commands):
     station = commanding(action)
     station.wait(4.9)
-    assert station.ordered() == [] and not any("lost" in text for text in station.wire.texts)
+    assert station.commanded() == [] and not any("lost" in text for text in station.wire.texts)
     station.wait(0.3)
-    assert station.ordered() == orders
+    assert station.commanded() == commands
     assert any(text.startswith("Link to station 255 lost") for text in station.wire.texts)
     station.command(512, 0)
     assert station.wire.of("HEARTBEAT")[-1].system_status == mavlink.MAV_STATE_CRITICAL
     station.wait(60.5)
-    assert station.ordered() == []
+    assert station.commanded() == []
     assert len([text for text in station.wire.texts if "lost" in text]) == 3  # every 30 s
     station.send(BEAT)
     station.wait(0.1)
@@ -126,7 +126,7 @@ def test_a_station_that_falls_silent(action, orders):
 def test_none_is_none():
     station = commanding("none")
     station.wait(100.0, 0.5)
-    assert not any("lost" in text for text in station.wire.texts) and station.ordered() == []
+    assert not any("lost" in text for text in station.wire.texts) and station.commanded() == []
 
 
 def test_only_who_commands_is_missed():
@@ -134,16 +134,16 @@ def test_only_who_commands_is_missed():
     station.look(0.0)
     station.send(BEAT, system=250)  # never commands
     station.command(400, 1.0)  # never sends a heartbeat
-    station.ordered()
+    station.commanded()
     station.wait(60.0, 0.5)
-    assert station.ordered() == []
+    assert station.commanded() == []
     station.send(BEAT)
     station.wait(4.0)
     station.send(BEAT)
     station.wait(4.0)
-    assert station.ordered() == []
+    assert station.commanded() == []
     station.wait(2.0)
-    assert station.ordered() == [Arm(False)]
+    assert station.commanded() == [Arm(False)]
 
 
 def test_simulated_time_does_not_count():
@@ -151,7 +151,7 @@ def test_simulated_time_does_not_count():
     for k in range(200):
         station.look(5.0 * k)
     station.wait(1.0)
-    assert station.ordered() == []
+    assert station.commanded() == []
 
 
 def test_time_and_action_are_parameters():
@@ -160,19 +160,19 @@ def test_time_and_action_are_parameters():
         station.send(mavlink.MAVLink_param_set_message(1, 1, name, value, 9))
     station.send(BEAT)
     station.wait(19.0)
-    assert station.ordered() == []
+    assert station.commanded() == []
     station.wait(2.0)
-    assert station.ordered() == [Arm(False)]
+    assert station.commanded() == [Arm(False)]
 
 
 def test_an_action_that_finds_the_queue_full_is_tried_again():
     station = commanding("disarm")
-    while station.orders.give(Arm(True)):
+    while station.commands.give(Arm(True)):
         pass
     station.wait(6.0)
-    assert Arm(False) not in station.ordered()
+    assert Arm(False) not in station.commanded()
     station.wait(0.1)
-    assert station.ordered() == [Arm(False)]
+    assert station.commanded() == [Arm(False)]
 
 
 def test_clocks(station):

@@ -146,7 +146,7 @@ def test_what_is_armed_is_under_way_even_on_the_bottom(station):
     assert ask(station, 245)[0].landed_state == mavlink.MAV_LANDED_STATE_IN_AIR
     station.look(13.0, bottom_contact=1.0)
     assert ask(station, 245)[0].landed_state == mavlink.MAV_LANDED_STATE_IN_AIR
-    station.look(14.0, **{"helm.armed": 0.0})
+    station.look(14.0, **{"commands.armed": 0.0})
     assert ask(station, 245)[0].landed_state == mavlink.MAV_LANDED_STATE_ON_GROUND
 
 

@@ -5,7 +5,14 @@ import math
 import pytest
 from pymavlink.dialects.v20 import all as mavlink
 
-from cosim.simulation.commands.commands import Begin, Change, Face, Item, Mission, Steer
+from cosim.simulation.commands.commands import (
+    ChangeSetting,
+    MissionItem,
+    SetCurrentItem,
+    SetHeading,
+    SetMission,
+    SetMode,
+)
 from tests.cosim.mavlink.station import NAN, Station, scenario
 
 LOCAL, GLOBAL, RELATIVE, GLOBAL_INT, RELATIVE_INT, TERRAIN = 1, 0, 3, 5, 6, 10
@@ -84,16 +91,16 @@ def test_what_the_items_mean(station):
         {"command": LAND, "place": (70_000, 80_000, 0.0)},
         {"command": HOME, "frame": 2, "place": (0, 0, 0.0)},
     )
-    (order,) = station.ordered()
-    assert order == Mission(
+    (command,) = station.commanded()
+    assert command == SetMission(
         (
-            Item((1.0, 2.0, 3.0), 1.5, 5.0),
-            Item((0.0, 0.0, 4.0), None, 0.0),
-            Item((0.0, 0.0, 2.0), None, 9.0),
-            Item((1.0, 2.0, 3.0), None, None),
-            Item((1.0, 2.0, 0.5), 0.3, None),
-            Item((7.0, 8.0, 0.5), 0.3, None),
-            Item((0.0, 0.0, 0.5), 0.3, None),
+            MissionItem((1.0, 2.0, 3.0), 1.5, 5.0),
+            MissionItem((0.0, 0.0, 4.0), None, 0.0),
+            MissionItem((0.0, 0.0, 2.0), None, 9.0),
+            MissionItem((1.0, 2.0, 3.0), None, None),
+            MissionItem((1.0, 2.0, 0.5), 0.3, None),
+            MissionItem((7.0, 8.0, 0.5), 0.3, None),
+            MissionItem((0.0, 0.0, 0.5), 0.3, None),
         )
     )
 
@@ -113,17 +120,17 @@ def test_what_is_done_at_once(station):
         {"command": JUMP, "numbers": (jump, -1.0, NAN, NAN), "frame": 2, "place": (0, 0, NAN)},
         {"command": LAND, "place": (0, 0, 0.0)},
     )
-    (order,) = station.ordered()
-    assert order.items == (
-        Item(None, orders=(Change("law.gains.speed", 0.3),)),
-        Item(None),
-        Item((1.0, 2.0, 3.0), None, 4.0),
-        Item(None, stay=5.0),
-        Item(None, stay=6.0),
-        Item(None, orders=(Face(math.pi / 2),)),
-        Item(None, jump=2, times=3),
-        Item(None, jump=2, times=None),
-        Item((1.0, 2.0, 0.5), 0.3, None),
+    (command,) = station.commanded()
+    assert command.items == (
+        MissionItem(None, commands=(ChangeSetting("law.gains.speed", 0.3),)),
+        MissionItem(None),
+        MissionItem((1.0, 2.0, 3.0), None, 4.0),
+        MissionItem(None, stay=5.0),
+        MissionItem(None, stay=6.0),
+        MissionItem(None, commands=(SetHeading(math.pi / 2),)),
+        MissionItem(None, jump=2, times=3),
+        MissionItem(None, jump=2, times=None),
+        MissionItem((1.0, 2.0, 0.5), 0.3, None),
     )
     (back,) = station.send(mavlink.MAVLink_mission_request_message(1, 1, 6 + first(station), 0))
     assert (back.command, back.frame, back.param1, back.x) == (JUMP, 2, jump, 0.0)
@@ -150,13 +157,13 @@ def test_an_item_is_refused_as_it_comes_and_named(station):
 def test_a_speed_of_a_mission_is_a_parameter_from_then_on(station):
     upload(station, {}, {"command": SPEED, "numbers": (1, 0.25, -1, 0)}, {})
     for item in (0.0, 2.0):  # the step of item 1 was not seen
-        station.look(1.0 + item, **{"helm.mode": 3.0, "helm.item": item})
+        station.look(1.0 + item, **{"commands.mode": 3.0, "commands.item": item})
     (value,) = station.send(mavlink.MAVLink_param_request_read_message(1, 1, b"LAW_SPEED", -1))
     assert value.param_value == 0.25
     assert [m.seq for m in station.wire.of("MISSION_ITEM_REACHED")] == [first(station)]  # nor is it told of
-    station.ordered()
+    station.commanded()
     station.send(mavlink.MAVLink_param_set_message(1, 1, b"LAW_SPEED", 1.0, 9))
-    assert station.ordered() == [Change("law.gains.speed", 1.0)]
+    assert station.commanded() == [ChangeSetting("law.gains.speed", 1.0)]
 
 
 @pytest.mark.parametrize(
@@ -183,9 +190,9 @@ def test_a_speed_of_a_mission_is_a_parameter_from_then_on(station):
 )
 def test_what_cannot_be_flown_is_refused_whole(station, fields, result):
     upload(station, {})
-    station.ordered()
+    station.commanded()
     assert upload(station, {}, fields) == result
-    assert station.ordered() == []
+    assert station.commanded() == []
     (count,) = station.send(mavlink.MAVLink_mission_request_list_message(1, 1, 0))
     assert count.count == 1 + first(station)  # the mission before is still there
 
@@ -197,7 +204,7 @@ def test_the_old_form_of_items_is_taken_too():
     old = mavlink.MAVLink_mission_item_message(1, 1, 0, LOCAL, WAYPOINT, 0, 1, 0, 2.0, 0, 0, 1.5, -2.5, 4.0, 0)
     (ack,) = station.send(old)
     assert ack.type == mavlink.MAV_MISSION_ACCEPTED
-    assert station.ordered() == [Mission((Item((1.5, -2.5, 4.0), 2.0, 0.0),))]
+    assert station.commanded() == [SetMission((MissionItem((1.5, -2.5, 4.0), 2.0, 0.0),))]
 
 
 def test_home_is_the_first_item_for_ardupilot():
@@ -218,7 +225,7 @@ def test_fences_and_rally_points_are_none(station):
         assert ack.type == mavlink.MAV_MISSION_ACCEPTED
     (ack,) = station.send(mavlink.MAVLink_mission_request_list_message(1, 1, 9))
     assert ack.type == mavlink.MAV_MISSION_UNSUPPORTED
-    assert station.ordered() == []
+    assert station.commanded() == []
 
 
 def test_an_item_that_does_not_come_is_asked_for_again_and_given_up(station):
@@ -258,18 +265,18 @@ def test_clear(station):
     upload(station, {})
     (ack,) = station.send(mavlink.MAVLink_mission_clear_all_message(1, 1, 255))
     assert ack.type == mavlink.MAV_MISSION_ACCEPTED
-    assert station.ordered()[-1] == Mission(())
+    assert station.commanded()[-1] == SetMission(())
     (count,) = station.send(mavlink.MAVLink_mission_request_list_message(1, 1, 0))
     assert count.count == 0
 
 
 def test_start_and_set_current(station):
     upload(station, {}, {}, {})
-    station.ordered()
+    station.commanded()
     assert station.command(300, 0.0, 0.0) == mavlink.MAV_RESULT_ACCEPTED
     assert station.command(224, 2.0 + first(station)) == mavlink.MAV_RESULT_ACCEPTED
     station.send(mavlink.MAVLink_mission_set_current_message(1, 1, 1 + first(station)))
-    assert station.ordered() == [Begin(0), Steer("mission"), Begin(2), Begin(1)]
+    assert station.commanded() == [SetCurrentItem(0), SetMode("mission"), SetCurrentItem(2), SetCurrentItem(1)]
     assert station.command(224, 3.0 + first(station)) == mavlink.MAV_RESULT_DENIED
     assert station.command(224, NAN) == mavlink.MAV_RESULT_DENIED
 
@@ -287,16 +294,16 @@ def test_progress_is_told(station):
 
     station.command(512, 42)
     assert (current().seq, current().total, current().mission_state) == (0, 2, mavlink.MISSION_STATE_NOT_STARTED)
-    station.look(1.1, **{"helm.mode": 3.0, "helm.item": 0.0})
+    station.look(1.1, **{"commands.mode": 3.0, "commands.item": 0.0})
     station.command(512, 42)
     assert (current().seq, current().mission_state) == (seq, mavlink.MISSION_STATE_ACTIVE)
-    station.look(1.2, **{"helm.mode": 3.0, "helm.item": 1.0})
+    station.look(1.2, **{"commands.mode": 3.0, "commands.item": 1.0})
     assert [m.seq for m in station.wire.of("MISSION_ITEM_REACHED")] == [seq]
-    station.look(1.3, **{"helm.mode": 3.0, "helm.item": 1.0, "goal.clearance": 0.1})
+    station.look(1.3, **{"commands.mode": 3.0, "commands.item": 1.0, "goal.clearance": 0.1})
     station.command(512, 42)
     assert current().mission_state == mavlink.MISSION_STATE_COMPLETE
     assert [m.seq for m in station.wire.of("MISSION_ITEM_REACHED")] == [seq, seq + 1]
-    station.look(1.4, **{"helm.mode": 1.0, "helm.item": 1.0})
+    station.look(1.4, **{"commands.mode": 1.0, "commands.item": 1.0})
     station.command(512, 42)
     assert current().mission_state == mavlink.MISSION_STATE_PAUSED
 

@@ -4,7 +4,7 @@ import pytest
 from pymavlink.dialects.v20 import all as mavlink
 
 from cosim.mavlink.vehicle.profile import PROFILES
-from cosim.simulation.commands.commands import Aim, Arm, Reset, Steer
+from cosim.simulation.commands.commands import Arm, Reset, SetMode, SetTarget
 from tests.cosim.mavlink.station import NAN, Station, scenario
 
 ACCEPTED, REJECTED, DENIED, UNSUPPORTED, FAILED = range(5)
@@ -23,7 +23,7 @@ def test_arming(station):
     assert station.command(400, 0.0, 21196.0) == ACCEPTED
     assert station.command(400, NAN) == DENIED
     assert station.command(400, 2.0) == DENIED
-    assert station.ordered() == [Arm(True), Arm(False)]
+    assert station.commanded() == [Arm(True), Arm(False)]
 
 
 @pytest.mark.parametrize(
@@ -47,7 +47,7 @@ def test_each_profile_has_its_numbers(profile, numbers, mode):
     upload(station)
     for base in (1, 129):
         assert station.command(SET_MODE, base, *numbers) == ACCEPTED
-    assert station.ordered()[-2:] == [Steer(mode), Steer(mode)]
+    assert station.commanded()[-2:] == [SetMode(mode), SetMode(mode)]
 
 
 @pytest.mark.parametrize("profile", ["px4", "generic"])
@@ -57,7 +57,7 @@ def test_a_number_of_ardusub_means_nothing_else(profile, number):
     station.look()
     assert station.command(SET_MODE, 1, number, 0) == FAILED
     assert "no such mode" in "".join(station.wire.texts)
-    assert station.ordered() == []
+    assert station.commanded() == []
 
 
 @pytest.mark.parametrize("number", [0, 1, 2, 6, 7, 20, 21, 77])
@@ -65,13 +65,13 @@ def test_a_mode_that_is_not_there_is_refused(number):
     station = Station("ardusub")
     station.look()
     assert station.command(SET_MODE, 1, number) == FAILED
-    assert station.ordered() == []
+    assert station.commanded() == []
 
 
 def test_a_mode_needs_the_bit_of_custom_modes(station):
     assert station.command(SET_MODE, 208, 0.0) == FAILED
     assert station.command(SET_MODE, NAN, 4.0) == FAILED
-    assert station.ordered() == []
+    assert station.commanded() == []
 
 
 def test_set_mode_message():
@@ -80,18 +80,18 @@ def test_set_mode_message():
         station.look()
         station.send(mavlink.MAVLink_set_mode_message(1, 1, number))
         station.send(mavlink.MAVLink_set_mode_message(1, 0, number))  # without the bit of custom modes
-        assert station.ordered() == [Steer("surface")]
+        assert station.commanded() == [SetMode("surface")]
 
 
 def test_standard_modes(station):
     upload(station)
-    station.ordered()
+    station.commanded()
     for number, mode in ((1, "hold"), (6, "mission"), (5, "surface")):
         assert station.command(262, number) == ACCEPTED
-        assert station.ordered() == [Steer(mode)]
+        assert station.commanded() == [SetMode(mode)]
     for number in (0, 2, 3, 4, 8, NAN):
         assert station.command(262, number) == FAILED
-    assert station.ordered() == []
+    assert station.commanded() == []
 
 
 def test_available_modes_say_what_can_be_set(station):
@@ -100,12 +100,12 @@ def test_available_modes_say_what_can_be_set(station):
     assert [(m.number_modes, m.mode_index) for m in modes] == [(5, i) for i in range(1, 6)]
     profile = PROFILES[station.autopilot._vessel.options.profile]
     upload(station)
-    station.ordered()
+    station.commanded()
     for message in modes:
         if message.mode_name != "Mission of regions":
             station.send(mavlink.MAVLink_set_mode_message(1, 1, message.custom_mode))
-            (order,) = station.ordered()
-            assert profile.numbers[order.mode] == message.custom_mode
+            (command,) = station.commanded()
+            assert profile.numbers[command.mode] == message.custom_mode
     assert station.command(512, 435, 6) == FAILED
     station.wire.clear()
     station.command(512, 435, 3)
@@ -120,7 +120,7 @@ def test_the_mode_shown_is_that_of_the_snapshot(station):
     mode = station.wire.of("CURRENT_MODE")[-1]
     assert (mode.custom_mode, mode.intended_custom_mode) == (numbers["reach"], numbers["hold"])
     station.wire.clear()
-    station.look(1.01, **{"helm.mode": 1.0})
+    station.look(1.01, **{"commands.mode": 1.0})
     assert station.wire.of("CURRENT_MODE")[-1].custom_mode == numbers["hold"]  # at once
     assert station.wire.of("HEARTBEAT")[-1].custom_mode == numbers["hold"]
     assert "Mode: Position hold" in station.wire.texts
@@ -137,33 +137,33 @@ def test_pause_and_go_on(station):
     assert station.command(252, 0.0, 2.0) == ACCEPTED
     assert station.command(252, 0.0, 2.0) == ACCEPTED
     assert station.command(252, 1.0) == ACCEPTED
-    assert station.ordered() == [Steer(mode) for mode in ("hold", "reach", "hold", "hold", "reach")]
+    assert station.commanded() == [SetMode(mode) for mode in ("hold", "reach", "hold", "hold", "reach")]
     assert station.command(252, 0.0, 3.0) == UNSUPPORTED
 
 
 def test_landing_is_surfacing_and_home_is_at_the_surface(station):
     assert station.command(21) == ACCEPTED
     assert station.command(20) == ACCEPTED
-    assert station.ordered() == [Steer("surface"), Aim((0.0, 0.0, 0.5), 0.3)]
+    assert station.commanded() == [SetMode("surface"), SetTarget((0.0, 0.0, 0.5), 0.3)]
 
 
 @pytest.mark.parametrize("profile", ["px4", "generic"])
-def test_px4s_mode_of_return_is_an_order_to_surface_at_home(profile):
+def test_px4s_mode_of_return_is_a_command_to_surface_at_home(profile):
     station = Station(profile)
     station.look()
     assert station.command(176, 129, 4, 5) == ACCEPTED
     station.send(mavlink.MAVLink_set_mode_message(1, 1, 4 << 16 | 5 << 24))
-    assert station.ordered() == [Aim((0.0, 0.0, 0.5), 0.3)] * 2
+    assert station.commanded() == [SetTarget((0.0, 0.0, 0.5), 0.3)] * 2
     assert station.command(176, 129, -4, -5) == mavlink.MAV_RESULT_FAILED
 
 
 def test_a_restart_is_refused_while_armed(station):
     assert station.command(246, 1.0) == DENIED
     assert station.command(246, 1.0, 0, 0, 0, 0, 20190226.0) == ACCEPTED
-    station.look(2.0, **{"helm.armed": 0.0})
+    station.look(2.0, **{"commands.armed": 0.0})
     assert station.command(246, 1.0) == ACCEPTED
     assert station.command(246, 3.0) == UNSUPPORTED
-    assert station.ordered() == [Reset(), Reset()]
+    assert station.commanded() == [Reset(), Reset()]
 
 
 def test_before_there_is_a_snapshot_what_was_ordered_shows():
@@ -174,7 +174,7 @@ def test_before_there_is_a_snapshot_what_was_ordered_shows():
     assert (beat.custom_mode, beat.base_mode & 128) == (16, 0)
 
 
-def test_too_many_orders_are_turned_away(station):
+def test_too_many_commands_are_turned_away(station):
     results = [station.command(400, 1.0) for _ in range(300)]
     assert results == [ACCEPTED] * 256 + [REJECTED] * 44
 

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from controller.regions import ray_distances
 from cosim.mavlink.autopilot import Autopilot
 from cosim.mavlink.wire.options import PROFILES, MavlinkOptions
-from cosim.scenario.tables import FAR_AWAY
+from cosim.scenario.tables import PARKED_POSITION
 from tests.cosim.mavlink.station import COLUMNS, Station, scenario
 
 NOTHING, UNKNOWN = 2001, 0xFFFF
@@ -39,7 +39,7 @@ def attitude(roll=0.0, pitch=0.0, yaw=0.0):
 
 def seen(offset, radius):
     """Return what a row has of an obstacle that came while running, so far from the vehicle [m, NED]."""
-    shift = tuple(HERE + offset - FAR_AWAY)
+    shift = tuple(HERE + offset - PARKED_POSITION)
     return {"seen 1.shift.x": shift, "seen 1.clearance": math.hypot(*offset) - radius}
 
 

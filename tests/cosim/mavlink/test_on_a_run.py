@@ -7,7 +7,7 @@ from pymavlink.dialects.v20 import all as mavlink
 from cosim.mavlink.autopilot import Autopilot
 from cosim.mavlink.wire.options import MavlinkOptions
 from cosim.scenario.scenario import load_scenario
-from cosim.simulation.commands import OrderQueue
+from cosim.simulation.commands import CommandQueue
 from cosim.simulation.master import Master
 from tests.cosim.mavlink.station import NAN, Station, Wire
 from tests.cosim.mavlink.test_targets import local, obstacle, sticks
@@ -18,14 +18,14 @@ class Flight(Station):
 
     def __init__(self, master, **options):
         self.master, self.k = master, 0
-        self.orders, self.wire, self.now = OrderQueue(), Wire(), 0.0
+        self.commands, self.wire, self.now = CommandQueue(), Wire(), 0.0
         options = MavlinkOptions(**{"profile": "ardusub", "commands": True, **options})
-        self.autopilot = Autopilot(master.scenario, master.signals.columns, options, self.orders)
+        self.autopilot = Autopilot(master.scenario, master.signals.columns, options, self.commands)
         self.autopilot.attach(self.wire)
 
     def fly(self, seconds):
         for _ in range(round(seconds / self.master.scenario.time.step)):
-            self.master.step(self.k, self.orders)
+            self.master.step(self.k, self.commands)
             self.k += 1
             self.now += self.master.scenario.time.step
             self.autopilot.observe(self.master.signals.row.copy())
@@ -46,7 +46,7 @@ def test_disarm_and_arm(flight):
     flight.fly(0.5)
     flight.command(400, 0.0)
     flight.fly(0.5)
-    assert not flight.last("HEARTBEAT").base_mode & 128 and not flight.master.helm.armed
+    assert not flight.last("HEARTBEAT").base_mode & 128 and not flight.master.command_handler.armed
     assert np.all(flight.master.signals.view("thrust[1]", 8) == 0.0)
     flight.command(400, 1.0)
     flight.fly(0.1)
@@ -58,7 +58,7 @@ def test_a_set_point_is_reached(flight):
     flight.fly(0.1)
     flight.send(local(place=(1.5, 0.5, 1.0)))
     flight.fly(0.1)
-    target = flight.master.surroundings.target
+    target = flight.master.environment.target
     assert target.tolist() == [1.5, 0.5, 1.0]
     flight.fly(15.0)
     assert "Target reached" in flight.wire.texts
@@ -72,7 +72,7 @@ def test_parameters_take_effect(flight):
         flight.send(mavlink.MAVLink_param_set_message(1, 1, name, value, 9))
     flight.fly(0.1)
     assert flight.master.law.gains.speed == 0.7
-    settings = flight.master.helm.settings
+    settings = flight.master.command_handler.settings
     assert settings.shapes["SR1"].radius == 0.4 and settings["plant.parameters.thrust_max[1]"] == 20.0
     assert [(s.key, s.value) for s in settings] == [(s.key, s.value) for s in flight.autopilot._vessel.settings]
 
@@ -141,5 +141,5 @@ def test_no_parameter_ends_the_run(flight, value):
         flight.send(mavlink.MAVLink_param_set_message(1, 1, name.encode(), before, 9))
         flight.wire.clear()
     flight.fly(0.02)
-    settings = flight.master.helm.settings
+    settings = flight.master.command_handler.settings
     assert [(s.key, s.value) for s in settings] == [(s.key, s.value) for s in flight.autopilot._vessel.settings]

@@ -15,7 +15,7 @@ from cosim.mavlink.services.station_parameters import station_parameters
 from cosim.scenario.scenario import load_scenario
 from cosim.scenario.toml_file import shipped_scenarios
 from cosim.simulation.commands import LiveSettings
-from cosim.simulation.commands.commands import Change
+from cosim.simulation.commands.commands import ChangeSetting
 from tests.cosim.mavlink.station import NAN, Station, scenario
 from tests.examples import examples
 
@@ -167,7 +167,7 @@ def test_what_is_not_there_is_said_to_be_so(station, name, index):
 def test_setting_one(station):
     (value,) = put(station, "GOAL_RADIUS", 0.7)
     assert value.param_value == pytest.approx(0.7, rel=1e-7)
-    assert station.ordered() == [Change("goal.radius", 0.7)]  # with the digits that were meant
+    assert station.commanded() == [ChangeSetting("goal.radius", 0.7)]  # with the digits that were meant
     assert read(station, "GOAL_RADIUS")[0].param_value == value.param_value
 
 
@@ -178,7 +178,7 @@ def test_the_same_value_makes_no_order(station):
         *errors, back = put(station, value.param_id, value.param_value)
         assert back.param_value == value.param_value
         assert [error.error for error in errors] in ([], [mavlink.MAV_PARAM_ERROR_READ_ONLY])
-    assert station.ordered() == []
+    assert station.commanded() == []
 
 
 @pytest.mark.parametrize(
@@ -200,7 +200,7 @@ def test_what_cannot_be_is_refused_and_the_old_value_told(station, name, value, 
     assert (replies[0].get_type(), replies[0].error) == ("PARAM_ERROR", error)
     if before.get_type() == "PARAM_VALUE":
         assert replies[1].param_value == before.param_value
-    assert station.ordered() == []
+    assert station.commanded() == []
 
 
 def test_the_refusal_says_what_is_expected(station):
@@ -218,13 +218,13 @@ def test_an_integer_is_cast_for_ardupilot_alone():
     for profile, taken in (("ardusub", True), ("px4", False), ("generic", False)):
         station = Station(profile)
         put(station, "GOAL_RADIUS", 2.0, INT32)
-        assert station.ordered() == ([Change("goal.radius", 2.0)] if taken else [])
+        assert station.commanded() == ([ChangeSetting("goal.radius", 2.0)] if taken else [])
 
 
 def test_a_full_queue_leaves_the_value(station):
     for i in range(300):
         put(station, "GOAL_RADIUS", 1.0 + i)
-    assert len(station.ordered()) == 256
+    assert len(station.commanded()) == 256
     assert read(station, "GOAL_RADIUS")[0].param_value == 256.0
 
 
@@ -232,7 +232,7 @@ def test_speed_is_a_parameter(station):
     assert station.command(178, 1.0, 0.6) == mavlink.MAV_RESULT_ACCEPTED
     assert station.command(178, 1.0, -1.0) == mavlink.MAV_RESULT_ACCEPTED  # as it is
     assert station.command(178, 1.0, NAN) == mavlink.MAV_RESULT_DENIED
-    assert station.ordered() == [Change("law.gains.speed", 0.6)]
+    assert station.commanded() == [ChangeSetting("law.gains.speed", 0.6)]
     assert read(station, "LAW_SPEED")[0].param_value == pytest.approx(0.6)
 
 

@@ -8,7 +8,14 @@ from pymavlink.dialects.v20 import all as mavlink
 
 from controller.quaternion import from_axis_angle
 from cosim.mavlink.vehicle.geodesy import LocalFrame
-from cosim.simulation.commands.commands import Aim, Face, Forget, Obstacle, Steer, Sticks
+from cosim.simulation.commands.commands import (
+    AddObstacle,
+    ManualControl,
+    RemoveObstacle,
+    SetHeading,
+    SetMode,
+    SetTarget,
+)
 from tests.cosim.mavlink.station import NAN, Station
 
 POSITION = 0b110111111000
@@ -32,7 +39,7 @@ def test_a_set_point_moves_the_target_once(station):
     for _ in range(20):
         station.send(local())
     station.send(local(place=(3.5, 4.0, 5.0)))
-    assert station.ordered() == [Aim((3.0, 4.0, 5.0)), Aim((3.5, 4.0, 5.0))]
+    assert station.commanded() == [SetTarget((3.0, 4.0, 5.0)), SetTarget((3.5, 4.0, 5.0))]
 
 
 @pytest.mark.parametrize(
@@ -41,20 +48,22 @@ def test_a_set_point_moves_the_target_once(station):
 def test_frames(station, frame, position):
     station.look(2.0, **EAST)  # at 1, 2, 5
     station.send(local(frame))
-    (order,) = station.ordered()
-    assert order.position == pytest.approx(position)
+    (command,) = station.commanded()
+    assert command.position == pytest.approx(position)
 
 
 def test_with_velocity_and_yaw(station):
     station.send(local(mask=WITH_VELOCITY, speed=(0.1, 0.2, 0.0)))
     station.send(local(mask=POSITION & ~1024, yaw=1.0, place=(1.0, 1.0, 1.0)))
-    aim, other, face = station.ordered()
-    assert aim.velocity == pytest.approx((0.1, 0.2, 0.0)) and other.position == (1.0, 1.0, 1.0) and face == Face(1.0)
+    aim, other, face = station.commanded()
+    assert (
+        aim.velocity == pytest.approx((0.1, 0.2, 0.0)) and other.position == (1.0, 1.0, 1.0) and face == SetHeading(1.0)
+    )
 
 
 def test_depth_alone(station):
     station.send(local(mask=POSITION | 0b011, place=(NAN, NAN, 2.0)))
-    assert station.ordered() == [Aim((8.0, 0.0, 2.0))]
+    assert station.commanded() == [SetTarget((8.0, 0.0, 2.0))]
 
 
 @pytest.mark.parametrize("message", [
@@ -65,25 +74,25 @@ def test_depth_alone(station):
 def test_what_is_no_place_is_refused_with_a_word(station, message):
     for _ in range(5):
         station.send(message)
-    assert station.ordered() == []
+    assert station.commanded() == []
     assert len([t for t in station.wire.texts if t.startswith("Refused")]) == 1
 
 
 def test_set_points_count_while_the_region_is_to_be_reached(station):
-    station.look(2.0, **{"helm.mode": 1.0})
+    station.look(2.0, **{"commands.mode": 1.0})
     station.send(local())
-    assert station.ordered() == []
+    assert station.commanded() == []
     station.command(176, 1, 4)  # and at once, before a snapshot shows it
     station.send(local())
-    assert station.ordered()[1:] == [Aim((3.0, 4.0, 5.0))]
+    assert station.commanded()[1:] == [SetTarget((3.0, 4.0, 5.0))]
 
 
 def test_the_same_set_point_counts_again_after_another_mode(station):
     station.send(local())
-    station.look(2.0, **{"helm.mode": 1.0})
+    station.look(2.0, **{"commands.mode": 1.0})
     station.look(3.0)
     station.send(local())
-    assert station.ordered() == [Aim((3.0, 4.0, 5.0))] * 2
+    assert station.commanded() == [SetTarget((3.0, 4.0, 5.0))] * 2
 
 
 def globe(frame, place, mask=POSITION):
@@ -100,14 +109,14 @@ def where(position):
 @pytest.mark.parametrize("frame", [0, 3, 5, 6])
 def test_set_points_on_the_globe(station, frame):
     station.send(globe(frame, where((30.0, -20.0, 4.0))))
-    (order,) = station.ordered()
-    assert order.position == pytest.approx((30.0, -20.0, 4.0), abs=0.02)
+    (command,) = station.commanded()
+    assert command.position == pytest.approx((30.0, -20.0, 4.0), abs=0.02)
 
 
 def test_other_frames_on_the_globe(station):
     for frame in (1, 11):
         station.send(globe(frame, where((30.0, -20.0, 4.0))))
-    assert station.ordered() == []
+    assert station.commanded() == []
 
 
 def test_reposition(station):
@@ -115,10 +124,10 @@ def test_reposition(station):
     assert station.command_int(REPOSITION, 0, (-1.0, 1.0, 0.0, 0.5), x, y, z) == mavlink.MAV_RESULT_ACCEPTED
     assert station.command(REPOSITION, -1.0, 1.0, 0.0, NAN, x / 1e7, y / 1e7, z) == mavlink.MAV_RESULT_ACCEPTED
     assert station.command_int(REPOSITION, 1, (-1, 1, 0, NAN), 10_000, 20_000, 3.0) == mavlink.MAV_RESULT_ACCEPTED
-    first, face, second, third = station.ordered()
-    assert first.position == pytest.approx((30.0, -20.0, 4.0), abs=0.02) and face == Face(0.5)
+    first, face, second, third = station.commanded()
+    assert first.position == pytest.approx((30.0, -20.0, 4.0), abs=0.02) and face == SetHeading(0.5)
     assert second.position == pytest.approx((30.0, -20.0, 4.0), abs=3.0)  # a float32 of degrees
-    assert third == Aim((1.0, 2.0, 3.0))
+    assert third == SetTarget((1.0, 2.0, 3.0))
     assert station.command_int(REPOSITION, 11, (-1, 1, 0, NAN), x, y, z) == mavlink.MAV_RESULT_UNSUPPORTED
     assert station.command_int(REPOSITION, 0, (-1, 1, 0, NAN), 0, 0, 0.0) == mavlink.MAV_RESULT_DENIED
 
@@ -127,7 +136,7 @@ def test_reposition_without_a_place_holds_this_one(station):
     assert station.command(REPOSITION, -1.0, 1.0, 0.0) == mavlink.MAV_RESULT_ACCEPTED  # QGroundControl's pause for PX4
     assert station.command(REPOSITION, -1.0, 1.0, 0.0, 0.5) == mavlink.MAV_RESULT_ACCEPTED
     assert station.command(REPOSITION, -1.0, 1.0, 0.0, NAN, NAN, NAN, -2.0) == mavlink.MAV_RESULT_ACCEPTED
-    assert station.ordered() == [Steer("hold"), Steer("hold"), Face(0.5), Aim((1.0, 2.0, 2.0))]
+    assert station.commanded() == [SetMode("hold"), SetMode("hold"), SetHeading(0.5), SetTarget((1.0, 2.0, 2.0))]
 
 
 def test_another_depth_as_qgroundcontrol_asks_ardupilot_for_it(station):
@@ -138,7 +147,7 @@ def test_another_depth_as_qgroundcontrol_asks_ardupilot_for_it(station):
     station.wait(2.0)
     station.look(2.0, **{"position.z": 6.5})
     station.send(deeper)  # again, after a while
-    assert station.ordered() == [Aim((1.0, 2.0, 6.5)), Aim((1.0, 2.0, 8.0))]
+    assert station.commanded() == [SetTarget((1.0, 2.0, 6.5)), SetTarget((1.0, 2.0, 8.0))]
 
 
 def guided(current, frame=3, place=(55.9098, -3.3202, -4.0), command=16):
@@ -149,11 +158,11 @@ def guided(current, frame=3, place=(55.9098, -3.3202, -4.0), command=16):
 def test_go_to_location_as_qgroundcontrol_asks_ardupilot_for_it(station):
     (ack,) = station.send(guided(2))
     assert (ack.get_type(), ack.type) == ("MISSION_ACK", mavlink.MAV_MISSION_ACCEPTED)
-    (order,) = station.ordered()
+    (command,) = station.commanded()
     expected = LocalFrame(55.9097, -3.3203).to_local(55.9098, -3.3202, 0.0)
-    assert order.position == pytest.approx((*expected[:2], 4.0), abs=0.5)
+    assert command.position == pytest.approx((*expected[:2], 4.0), abs=0.5)
     assert station.send(guided(3))[-1].type == mavlink.MAV_MISSION_ACCEPTED
-    assert station.ordered() == [Aim((8.0, 0.0, 4.0))]  # the target's depth alone
+    assert station.commanded() == [SetTarget((8.0, 0.0, 4.0))]  # the target's depth alone
 
 
 def test_a_place_to_go_to_that_cannot_be_is_refused(station):
@@ -161,9 +170,9 @@ def test_a_place_to_go_to_that_cannot_be_is_refused(station):
     assert station.send(guided(2, command=17))[-1].type == mavlink.MAV_MISSION_UNSUPPORTED
     assert station.send(guided(2, place=(0.0, 0.0, 0.0)))[-1].type == mavlink.MAV_MISSION_DENIED
     assert station.send(guided(2, place=(math.inf, -3.3, -4.0)))[-1].type == mavlink.MAV_MISSION_INVALID
-    assert station.ordered() == []
+    assert station.commanded() == []
     assert station.send(guided(2, place=(55.9097, -3.3203, NAN)))[-1].type == mavlink.MAV_MISSION_ACCEPTED
-    assert station.ordered()[0].position[2] == 5.0  # as deep as it is
+    assert station.commanded()[0].position[2] == 5.0  # as deep as it is
 
 
 def test_turning(station):
@@ -171,7 +180,7 @@ def test_turning(station):
     assert station.command(YAW, 30.0, 0.0, 1.0, 0.0) == mavlink.MAV_RESULT_ACCEPTED
     assert station.command(YAW, 30.0, 0.0, -1.0, 1.0) == mavlink.MAV_RESULT_ACCEPTED
     assert station.command(YAW, NAN, 0.0, 1.0, 0.0) == mavlink.MAV_RESULT_DENIED
-    absolute, relative = station.ordered()
+    absolute, relative = station.commanded()
     assert absolute.heading == pytest.approx(math.radians(30)) and relative.heading == pytest.approx(math.radians(60))
 
 
@@ -182,7 +191,7 @@ def test_the_first_that_comes_steers_until_it_is_silent(station):
     station.now += 3.1
     station.send(local(place=(9.0, 9.0, 9.0)), system=250)
     station.send(local(place=(1.0, 9.0, 9.0)))
-    assert station.ordered() == [Aim((3.0, 4.0, 5.0)), Aim((9.0, 9.0, 9.0))]
+    assert station.commanded() == [SetTarget((3.0, 4.0, 5.0)), SetTarget((9.0, 9.0, 9.0))]
 
 
 # ---- sticks ----
@@ -206,36 +215,36 @@ def sticks(x=0, y=0, z=500, r=0, s=0, t=0, extensions=0):
 )
 def test_sticks(profile, message, wrench):
     station = Station(profile)
-    station.look(**{"helm.mode": 0.0})
+    station.look(**{"commands.mode": 0.0})
     station.send(message)
     station.send(message)  # unchanged
-    orders = station.ordered()
-    assert orders == ([Sticks(wrench)] if any(wrench) else [])
+    commands = station.commanded()
+    assert commands == ([ManualControl(wrench)] if any(wrench) else [])
 
 
 def test_sticks_count_in_manual_alone(station):
     station.send(sticks(x=1000))
-    assert station.ordered() == []
+    assert station.commanded() == []
 
 
 def test_sticks_that_nobody_holds_are_let_go(station):
-    station.look(2.0, **{"helm.mode": 0.0})
+    station.look(2.0, **{"commands.mode": 0.0})
     station.send(sticks(x=1000))
     station.wait(2.9)
-    assert len(station.ordered()) == 1
+    assert len(station.commanded()) == 1
     station.wait(0.3)
-    assert station.ordered() == [Sticks((0.0,) * 6)]
+    assert station.commanded() == [ManualControl((0.0,) * 6)]
     assert "Lost manual control" in station.wire.texts
     station.wait(5.0)
-    assert station.ordered() == []
+    assert station.commanded() == []
 
 
 def test_sticks_count_anew_once_armed(station):
-    station.look(2.0, **{"helm.mode": 0.0, "helm.armed": 0.0})
+    station.look(2.0, **{"commands.mode": 0.0, "commands.armed": 0.0})
     station.send(sticks(x=1000))
-    station.look(2.1, **{"helm.mode": 0.0})
+    station.look(2.1, **{"commands.mode": 0.0})
     station.send(sticks(x=1000))
-    assert len(station.ordered()) == 2
+    assert len(station.commanded()) == 2
 
 
 # ---- obstacles ----
@@ -250,36 +259,36 @@ def test_an_obstacle_that_is_seen_is_kept_out_of(station, frame, position):
     station.look(2.0, **EAST)
     station.send(obstacle(frame=frame))
     station.send(obstacle(frame=frame, place=(4.0, 5.02, 6.0)))  # hardly moved
-    (order,) = station.ordered()
-    assert (order.number, order.radius) == (1, 0.5) and order.position == pytest.approx(position)
+    (command,) = station.commanded()
+    assert (command.number, command.radius) == (1, 0.5) and command.position == pytest.approx(position)
 
 
 def test_the_body_frame_leans_with_the_body(station):
     quaternion = from_axis_angle(np.array([0.0, 1.0, 0.0]), math.pi / 2)  # nose up: ahead is up
     station.look(2.0, **{"quaternion.e0": tuple(quaternion)})
     station.send(obstacle(frame=12, place=(2.0, 0.0, 0.0)))
-    assert station.ordered()[0].position == pytest.approx((1.0, 2.0, 3.0))
+    assert station.commanded()[0].position == pytest.approx((1.0, 2.0, 3.0))
 
 
 def test_an_obstacle_that_moves_is_moved(station):
     station.send(obstacle())
     station.send(obstacle(place=(4.0, 5.5, 6.0)))
-    assert station.ordered() == [Obstacle(1, (4.0, 5.0, 6.0), 0.5), Obstacle(1, (4.0, 5.5, 6.0), 0.5)]
+    assert station.commanded() == [AddObstacle(1, (4.0, 5.0, 6.0), 0.5), AddObstacle(1, (4.0, 5.5, 6.0), 0.5)]
 
 
 def test_only_so_many_and_the_one_not_seen_for_long_goes(station):
     for number in (1, 2, 3):
         station.send(obstacle(number))
-    assert [order.number for order in station.ordered()] == [1, 2]
+    assert [command.number for command in station.commanded()] == [1, 2]
     assert any("no room for obstacle 3" in text for text in station.wire.texts)
     station.now += 4.0
     station.send(obstacle(1))
     station.now += 2.0
     station.send(obstacle(3))
-    assert station.ordered() == [Forget(2), Obstacle(3, (4.0, 5.0, 6.0), 0.5)]
+    assert station.commanded() == [RemoveObstacle(2), AddObstacle(3, (4.0, 5.0, 6.0), 0.5)]
 
 
 def test_obstacles_in_other_frames_or_nowhere(station):
     station.send(obstacle(frame=8))
     station.send(obstacle(place=(NAN, 0.0, 0.0)))
-    assert station.ordered() == []
+    assert station.commanded() == []

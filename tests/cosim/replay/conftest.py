@@ -16,7 +16,16 @@ from cosim.replay.trace import trace_of
 from cosim.results.run_result import load_run
 from cosim.run.run import run_scenario
 from cosim.scenario.scenario import load_scenario
-from cosim.simulation.commands.commands import Aim, Begin, Change, Forget, Item, Mission, Obstacle, Steer
+from cosim.simulation.commands.commands import (
+    AddObstacle,
+    ChangeSetting,
+    MissionItem,
+    RemoveObstacle,
+    SetCurrentItem,
+    SetMission,
+    SetMode,
+    SetTarget,
+)
 from tests.cosim.replay.browser import CHROMEDRIVER, CHROMIUM, Browser
 from tests.cosim.replay.decoding import read_page
 
@@ -24,22 +33,22 @@ CLOSED = "arbiter.engine=closed"
 GAPS = ("position.x", "quaternion.e0", "heading.clearance", "membership.obstacle", "weight.shape", "command.X")
 RADIUS = "regions.pile 1.shape.radius"
 ITEMS = (
-    Item((2.0, 0.0, 2.0), 50.0),
-    Item(None, orders=(Change(RADIUS, 0.5), Change("regions.ship.gain", 55.0))),
-    Item(None, orders=(Change("goal.radius", 0.9),)),
-    Item((3.0, -1.0, 2.0), stay=None, orders=(Change("regions.quay.shape.point.1", 6.0),)),
+    MissionItem((2.0, 0.0, 2.0), 50.0),
+    MissionItem(None, commands=(ChangeSetting(RADIUS, 0.5), ChangeSetting("regions.ship.gain", 55.0))),
+    MissionItem(None, commands=(ChangeSetting("goal.radius", 0.9),)),
+    MissionItem((3.0, -1.0, 2.0), stay=None, commands=(ChangeSetting("regions.quay.shape.point.1", 6.0),)),
 )
-ORDERS = {
-    20: [Change("goal.radius", 0.75), Change("goal.radius", -1.0), Change("law.gains.speed", 0.3)],
-    40: [Aim((4.0, -1.0, 2.0), 0.6)],
-    60: [Obstacle(7, (5.0, 0.0, 2.0), 0.4), Obstacle(9, (-3.0, 0.0, 2.0), 0.3)],
-    90: [Change("regions.ship.shape.semi_axes.0", 3.5)],
-    120: [Obstacle(7, (5.0, 0.2, 2.0), 0.4, (0.1, 0.0, 0.0))],
-    140: [Obstacle(7, (5.0, 0.3, 2.0), 0.8)],
-    160: [Forget(7)],
-    180: [Aim((4.0, 0.0, 2.0)), Change("goal.centre.0", 12.5)],
-    200: [Mission(ITEMS), Steer("mission")],
-    260: [Change(RADIUS, 0.7), Begin(1)],
+COMMANDS_LOG = {
+    20: [ChangeSetting("goal.radius", 0.75), ChangeSetting("goal.radius", -1.0), ChangeSetting("law.gains.speed", 0.3)],
+    40: [SetTarget((4.0, -1.0, 2.0), 0.6)],
+    60: [AddObstacle(7, (5.0, 0.0, 2.0), 0.4), AddObstacle(9, (-3.0, 0.0, 2.0), 0.3)],
+    90: [ChangeSetting("regions.ship.shape.semi_axes.0", 3.5)],
+    120: [AddObstacle(7, (5.0, 0.2, 2.0), 0.4, (0.1, 0.0, 0.0))],
+    140: [AddObstacle(7, (5.0, 0.3, 2.0), 0.8)],
+    160: [RemoveObstacle(7)],
+    180: [SetTarget((4.0, 0.0, 2.0)), ChangeSetting("goal.centre.0", 12.5)],
+    200: [SetMission(ITEMS), SetMode("mission")],
+    260: [ChangeSetting(RADIUS, 0.7), SetCurrentItem(1)],
 }
 
 
@@ -57,10 +66,10 @@ def paper(shipped_run):
 def steered(tmp_path_factory):
     folder = tmp_path_factory.mktemp("steered")
     log = folder / "log.jsonl"
-    lines = [{"step": k, "order": order} for k, orders in ORDERS.items() for order in orders]
+    lines = [{"step": k, "command": command} for k, commands in COMMANDS_LOG.items() for command in commands]
     log.write_bytes(b"".join(msgspec.json.encode(line) + b"\n" for line in lines))
     scenario = load_scenario("harbour", ["commands.enabled=true", "time.duration=4"])
-    return load_run(run_scenario(scenario, folder / "run", report=False, orders=log).folder)
+    return load_run(run_scenario(scenario, folder / "run", report=False, commands_log=log).folder)
 
 
 @pytest.fixture(scope="session")

@@ -6,22 +6,22 @@ import math
 import numpy as np
 import pytest
 
+from cosim.replay.command_words import command_events, command_words
 from cosim.replay.events import events_of
-from cosim.replay.order_words import order_words, ordered_events
 from cosim.results.record import Rows
 from cosim.simulation.commands.commands import (
-    Aim,
+    AddObstacle,
     Arm,
-    Begin,
-    Change,
-    Face,
-    Forget,
-    Item,
-    Mission,
-    Obstacle,
+    ChangeSetting,
+    ManualControl,
+    MissionItem,
+    RemoveObstacle,
     Reset,
-    Steer,
-    Sticks,
+    SetCurrentItem,
+    SetHeading,
+    SetMission,
+    SetMode,
+    SetTarget,
 )
 from cosim.simulation.signals import Column
 
@@ -86,7 +86,7 @@ def test_chatter_is_told_in_few_words(paper):
         paper, np.arange(n) * 0.01, **signals, membership__obstacle=odd * 1.0, weight__obstacle=odd * 1.0,
         wrench_saturated=odd * 1.0,
     )  # fmt: skip
-    log = [(k, Change("arbiter.ramp", 0.1 + k)) for k in range(0, n, 2)]
+    log = [(k, ChangeSetting("arbiter.ramp", 0.1 + k)) for k in range(0, n, 2)]
     events = events_of(run, log)
     assert len(events) <= 60
     assert told(run, "saturation")[0][0] == 0.01
@@ -129,40 +129,45 @@ def test_the_end_says_how(paper, status, text):
 
 
 @pytest.mark.parametrize(
-    ("order", "words"),
+    ("command", "words"),
     [
         (Arm(True), "Armed"),
         (Arm(False), "Disarmed"),
-        (Steer("hold"), "Holds its place"),
-        (Aim((7.0, 0.0, 4.5)), "Target at (7, 0, 4.5) m"),
-        (Aim((7.0, 0.0, 4.5), 0.3), "Target at (7, 0, 4.5) m, radius 0.3 m"),
-        (Face(-math.pi / 2), "Heading 270°"),
-        (Sticks((0.0,) * 6), "Sticks moved"),
-        (Obstacle(4, (1.0, 2.0, 3.0), 0.5), "Obstacle 4 at (1, 2, 3) m, radius 0.5 m"),
-        (Forget(4), "Obstacle 4 gone"),
-        (Change("law.gains.k_p1", 1500.0), "law.gains.k_p1 is 1500"),
-        (Mission((Item(None),) * 3), "Mission of 3 items"),
-        (Begin(2), "Mission goes on with item 2"),
+        (SetMode("hold"), "Holds its place"),
+        (SetTarget((7.0, 0.0, 4.5)), "Target at (7, 0, 4.5) m"),
+        (SetTarget((7.0, 0.0, 4.5), 0.3), "Target at (7, 0, 4.5) m, radius 0.3 m"),
+        (SetHeading(-math.pi / 2), "Heading 270°"),
+        (ManualControl((0.0,) * 6), "Sticks moved"),
+        (AddObstacle(4, (1.0, 2.0, 3.0), 0.5), "Obstacle 4 at (1, 2, 3) m, radius 0.5 m"),
+        (RemoveObstacle(4), "Obstacle 4 gone"),
+        (ChangeSetting("law.gains.k_p1", 1500.0), "law.gains.k_p1 is 1500"),
+        (SetMission((MissionItem(None),) * 3), "Mission of 3 items"),
+        (SetCurrentItem(2), "Mission goes on with item 2"),
         (Reset(), "Reset"),
     ],
 )
-def test_each_order_has_its_words(order, words):
-    assert order_words(order) == words
+def test_each_order_has_its_words(command, words):
+    assert command_words(command) == words
 
 
-def test_orders_of_a_moment_are_told_together():
-    log = [(0, Arm(True)), (0, Steer("hold")), *((k, Sticks((0.1,) * 6)) for k in range(100, 300)), (900, Reset())]
-    assert ordered_events(log, 0.01, 3) == [
-        (0.0, "Ordered: Armed; Holds its place"),
-        (1.0, "Ordered: Sticks moved"),
-        (9.0, "Ordered: Reset"),
+def test_commands_of_a_moment_are_told_together():
+    log = [
+        (0, Arm(True)),
+        (0, SetMode("hold")),
+        *((k, ManualControl((0.1,) * 6)) for k in range(100, 300)),
+        (900, Reset()),
     ]
-    many = [(0, Change(f"key.{i}", 1.0)) for i in range(9)]
-    assert ordered_events(many, 0.01, 3) == [(0.0, "Ordered: key.0 is 1; key.1 is 1; key.2 is 1; 6 more orders")]
+    assert command_events(log, 0.01, 3) == [
+        (0.0, "Commanded: Armed; Holds its place"),
+        (1.0, "Commanded: Sticks moved"),
+        (9.0, "Commanded: Reset"),
+    ]
+    many = [(0, ChangeSetting(f"key.{i}", 1.0)) for i in range(9)]
+    assert command_events(many, 0.01, 3) == [(0.0, "Commanded: key.0 is 1; key.1 is 1; key.2 is 1; 6 more commands")]
 
 
-def test_orders_of_rows_that_a_kill_took_are_not_told_and_the_end_is_last(paper):
+def test_commands_of_rows_that_a_kill_took_are_not_told_and_the_end_is_last(paper):
     run = made(paper, [0.0, 0.001, 0.002], status="killed")
     log = [(1, Arm(True)), (3, Reset()), (900, Arm(False))]
-    assert told(run, "order", log) == [(0.001, "Ordered: Armed"), (0.002, "Ordered: Reset")]
+    assert told(run, "command", log) == [(0.001, "Commanded: Armed"), (0.002, "Commanded: Reset")]
     assert events_of(run, log)[-1].kind == "end"

@@ -1,4 +1,4 @@
-"""What orders made of goal and regions stands in the page: it gives the recorded clearances again."""
+"""What commands made of goal and regions stands in the page: it gives the recorded clearances again."""
 
 import numpy as np
 import pyarrow as pa
@@ -58,16 +58,16 @@ def test_changes_are_few_and_at_their_steps(steered):
     ]  # fmt: skip
 
 
-def test_gains_are_those_of_the_orders(steered):
+def test_gains_are_those_of_the_commands(steered):
     header = trace_of(steered).header
     ship = [region["name"] for region in header["regions"]].index("ship")
     assert header["regions"][ship]["gain"] == 100.0
     assert [c["gain"] for c in header["changes"] if c["region"] == ship] == [100.0, 55.0, 55.0]
 
 
-def test_orders_are_told(steered):
-    texts = [event["text"] for event in trace_of(steered).header["events"] if event["kind"] == "order"]
-    assert texts[1] == "Ordered: Target at (4, -1, 2) m, radius 0.6 m"
+def test_commands_are_told(steered):
+    texts = [event["text"] for event in trace_of(steered).header["events"] if event["kind"] == "command"]
+    assert texts[1] == "Commanded: Target at (4, -1, 2) m, radius 0.6 m"
     assert any("Mission of 4 items; Follows the mission" in text for text in texts)
 
 
@@ -77,8 +77,8 @@ def test_a_run_that_was_not_steered_has_no_changes(docking):
 
 def test_a_log_that_is_none_is_one_line(steered, copy_of):
     folder = copy_of(steered)
-    (folder / "orders.jsonl").write_text('{"step": 1}\n{"step": 2}\n')
-    with pytest.raises(RunError, match=r"orders\.jsonl, line 1: .*order"):
+    (folder / "commands.jsonl").write_text('{"step": 1}\n{"step": 2}\n')
+    with pytest.raises(RunError, match=r"commands\.jsonl, line 1: .*command"):
         trace_of(load_run(folder))
 
 

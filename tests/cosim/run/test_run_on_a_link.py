@@ -1,4 +1,4 @@
-"""A run that is a MAVLink vehicle: its record does not know who listens, and repeats from what was ordered."""
+"""A run that is a MAVLink vehicle: its record does not know who listens, and repeats from what was commanded."""
 
 import socket
 import threading
@@ -119,13 +119,13 @@ def test_what_came_over_the_link_repeats_to_the_last_bit(tmp_path):
         )
     acks = {m.command: m.result for m in station.of("COMMAND_ACK")}
     assert acks == {400: 0, 192: 0, 176: 0}
-    assert live.summary["orders"] >= 4
+    assert live.summary["commands"] >= 4
     again = run_scenario(
         load_scenario(live.folder / "scenario.toml"), tmp_path / "again", report=False,
-        orders=live.folder / "orders.jsonl",
+        commands_log=live.folder / "commands.jsonl",
     )  # fmt: skip
     assert same(load_record(live.folder), load_record(again.folder))
-    modes = load_record(live.folder)["helm.mode"]
+    modes = load_record(live.folder)["commands.mode"]
     assert modes[0] == 2.0 and modes[-1] == 1.0  # reach, then hold
 
 
@@ -145,16 +145,16 @@ def test_a_restart_is_another_run_on_the_same_link(tmp_path):
     # the log of the first run repeats it alone
     again = run_scenario(
         load_scenario(tmp_path / "run" / "scenario.toml"), tmp_path / "again", report=False,
-        orders=tmp_path / "run" / "orders.jsonl",
+        commands_log=tmp_path / "run" / "commands.jsonl",
     )  # fmt: skip
     assert again.summary["status"] == "reset"
     assert same(first, load_record(again.folder))
 
 
-def test_orders_need_a_scenario_that_heeds_them(tmp_path):
-    (tmp_path / "orders.jsonl").touch()
+def test_commands_need_a_scenario_that_heeds_them(tmp_path):
+    (tmp_path / "commands.jsonl").touch()
     with pytest.raises(RunError, match=r"expected a scenario with commands\.enabled"):
-        run_scenario(load_scenario("paper", SHORT), tmp_path / "run", orders=tmp_path / "orders.jsonl")
+        run_scenario(load_scenario("paper", SHORT), tmp_path / "run", commands_log=tmp_path / "commands.jsonl")
     assert not (tmp_path / "run").exists()
 
 

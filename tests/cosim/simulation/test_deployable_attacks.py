@@ -210,8 +210,8 @@ def test_a_slope_turns_by_the_motion_against_the_region():
         packed = pack([Region("ball", Sphere((2.0, 0.0, 2.0), 0.5), "out", velocity=own)])
         velocity, sight, n, later = np.array([0.05, 0.3, 0.0, 0.0, 0.0, 0.0]), sight_of(1), np.empty(6), np.empty(6)
         look(sight, packed, HERE, LEVEL, velocity)
-        assert slope_of(sight.gradients, sight.turnings, 0, False, n)
-        assert slope_of(sight.later_gradients, sight.later_turnings, 0, False, later)
+        assert slope_of(sight.gradients, sight.rotation_gradients, 0, False, n)
+        assert slope_of(sight.later_gradients, sight.later_rotation_gradients, 0, False, later)
         relative = velocity - np.r_[own, np.zeros(3)]
         line, step = HERE - [2.0, 0.0, 2.0], 1e-3
         distances = [np.linalg.norm(line + k * step * relative[:3]) for k in (-1, 0, 1)]

@@ -79,7 +79,7 @@ def test_between_words_from_outside_it_goes_on():
     )
     t = kept["time"][:, None]
     assert shift(kept, "SR2") == pytest.approx([1.0, 0.0, 0.0] + t * [0.0, 0.5, 0.0], abs=1e-12)
-    assert list(told[0].surroundings.regions.velocities[1]) == [0.0, 0.5, 0.0]
+    assert list(told[0].environment.regions.velocities[1]) == [0.0, 0.5, 0.0]
 
 
 @pytest.mark.parametrize(

@@ -43,7 +43,7 @@ def test_jacobi_is_three_parts_that_exchange_at_the_end_of_each_step(scenario):
     assert rows[:, at : at + 3].max() > 0.5
 
 
-def test_the_orders_come_together_as_the_step_gets_shorter():
+def test_the_commands_come_together_as_the_step_gets_shorter():
     def apart(step):
         given = [*SHORT[:2], *(f"time.{key}={step}" for key in ("step", "control", "arbiter")), SHORT[-1]]
         ends = []

@@ -44,8 +44,8 @@ def summary(seeds: Seeds) -> Case:
     return seeds.file("summary.json", lambda path: _concluded(path, planned), (seeds.run / "summary.json").read_bytes())
 
 
-@reader("orders of a run", "jsonl", "cosim.simulation.commands.sources:read_log")
-def orders(seeds: Seeds) -> Case:
+@reader("commands of a run", "jsonl", "cosim.simulation.commands.sources:read_log")
+def commands(seeds: Seeds) -> Case:
     run = load_run(seeds.run)
 
     def read(path: Path) -> None:
@@ -53,7 +53,7 @@ def orders(seeds: Seeds) -> Case:
         changes_of(run, log)
         events_of(run, log)
 
-    return seeds.file("orders.jsonl", read, (seeds.run / "orders.jsonl").read_bytes())
+    return seeds.file("commands.jsonl", read, (seeds.run / "commands.jsonl").read_bytes())
 
 
 def _thinned(folder: Path, rows: int) -> bytes:

@@ -15,8 +15,8 @@ from controller.laws import LAWS
 from cosim.campaigns import vary_from
 from cosim.campaigns.scenes.law_gains import gains_from
 from cosim.live.address import parse_live, stranger
+from cosim.live.command_desk import LONGEST, Desk
 from cosim.live.messages import bytes_of, text_of
-from cosim.live.orders import LONGEST, Desk
 from cosim.live.watching import looks, picture
 from cosim.mavlink.listening import Watch
 from cosim.mavlink.listening import picture as table
@@ -26,7 +26,7 @@ from cosim.mavlink.wire.ground_end import Heard
 from cosim.replay.header import header_of
 from cosim.replay.viewing import Viewing
 from cosim.scenario.scenario import load_scenario
-from cosim.simulation.commands import OrderQueue
+from cosim.simulation.commands import CommandQueue
 from cosim.sitl import wire
 from cosim.sitl.flights import Counts as HilCounts
 from cosim.sitl.hil import HilServer
@@ -34,16 +34,16 @@ from cosim.sitl.law import law_of_controls, law_of_pwm
 from fuzzy_arbiter import parse_rule
 from plant_fmu import load_vehicle
 from tests.cosim.mavlink.station import Station
-from tests.security.conftest import ORDERS
+from tests.security.conftest import COMMANDS_LOG
 from tests.security.fuzzing.registry import Case, Seeds, reader
 
 # ---- the live page -------------------------------------------------------------------------------------------------
 
 
-@reader("order of a viewer", "json", "cosim.live.orders:Desk.take")
-def order(seeds: Seeds) -> Case:
+@reader("command of a viewer", "json", "cosim.live.command_desk:Desk.take")
+def command(seeds: Seeds) -> Case:
     scenario = load_scenario("paper", ["commands.enabled=true", "commands.obstacles=2"])
-    queue = OrderQueue()
+    queue = CommandQueue()
     desk = Desk(scenario, queue, lambda name: True)
 
     def read(content: bytes) -> None:
@@ -55,7 +55,7 @@ def order(seeds: Seeds) -> Case:
         said = desk.take(message)
         assert said is None or (said.isprintable() and 0 < len(said) < 300), said
 
-    return Case(tuple(json.dumps(order).encode() for order in ORDERS), read)
+    return Case(tuple(json.dumps(command).encode() for command in COMMANDS_LOG), read)
 
 
 class _Connection:
@@ -142,7 +142,7 @@ def to_vehicle(seeds: Seeds) -> Case:
         for _, message in StreamReader(Gate(Counts(), (1, 1))).read(content):
             station.autopilot.receive(station.wire, message, station.now)
         station.wait(0.04)
-        station.ordered()
+        station.commanded()
         station.wire.clear()
 
     return Case((_frames(),), read)

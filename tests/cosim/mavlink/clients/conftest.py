@@ -97,9 +97,9 @@ def cosim_run(folder, profile, *endpoints):
     assert "Traceback" not in said and "times" not in said, said
 
 
-def orders_of(folder):
-    """Return the names of the orders that a run took, in their order."""
-    return [json.loads(line)["order"]["order"] for line in (folder / "orders.jsonl").read_text().splitlines()]
+def commands_of(folder):
+    """Return the names of the commands that a run took, in their order."""
+    return [json.loads(line)["command"]["command"] for line in (folder / "commands.jsonl").read_text().splitlines()]
 
 
 @pytest.fixture(scope="session")

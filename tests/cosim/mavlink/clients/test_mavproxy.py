@@ -9,7 +9,7 @@ import time
 
 import pytest
 
-from tests.cosim.mavlink.clients.conftest import cosim_run, orders_of
+from tests.cosim.mavlink.clients.conftest import commands_of, cosim_run
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(900)]  # the first of them builds and installs
 
@@ -101,4 +101,4 @@ def test_a_pilot_connects_arms_changes_modes_and_lists_what_there_is(ardupilots_
         text = mavproxy.text.lower()
     assert "fence breach" not in text
     assert "traceback" not in text and "error in" not in text
-    assert orders_of(folder)[:2] == ["arm", "arm"] and orders_of(folder).count("steer") == 4
+    assert commands_of(folder)[:2] == ["arm", "arm"] and commands_of(folder).count("set_mode") == 4

@@ -6,7 +6,7 @@ import subprocess
 import pytest
 
 from cosim.mavlink.wire.options import MavlinkOptions
-from tests.cosim.mavlink.clients.conftest import HERE, cosim_run, orders_of
+from tests.cosim.mavlink.clients.conftest import HERE, commands_of, cosim_run
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(900)]  # the first of them builds and installs
 
@@ -21,7 +21,7 @@ def generation(request):
 
 @pytest.fixture(scope="module", params=["px4", "generic"])
 def flown(request, generation, environment, udp_port, tmp_path_factory):
-    """Return what each step gave, how long it took, and under `orders` what the run was ordered."""
+    """Return what each step gave, how long it took, and under `commands` what the run was commanded."""
     python = environment(generation, REQUIREMENTS[generation]) / "bin" / "python"
     port = udp_port()
     folder = tmp_path_factory.mktemp("flown") / "run"
@@ -32,7 +32,7 @@ def flown(request, generation, environment, udp_port, tmp_path_factory):
         )  # fmt: skip
     lines = [line for line in done.stdout.splitlines() if line.startswith("{")]
     assert lines, done.stderr[-2000:]
-    return json.loads(lines[-1]) | {"orders": orders_of(folder)}
+    return json.loads(lines[-1]) | {"commands": commands_of(folder)}
 
 
 def value(flown, step):
@@ -41,7 +41,7 @@ def value(flown, step):
 
 
 def test_every_step_comes_to_its_end(flown):
-    assert {name: done["error"] for name, done in flown.items() if "error" in done and name != "orders"} == {}
+    assert {name: done["error"] for name, done in flown.items() if "error" in done and name != "commands"} == {}
 
 
 def test_health_is_all_ok(flown):
@@ -88,7 +88,7 @@ def test_hold_and_offboard_are_shown_as_such(flown):
 
 
 def test_what_was_commanded_is_in_the_log_of_the_run(flown):
-    assert {"arm", "steer", "aim", "change", "mission"} <= set(flown["orders"])
+    assert {"arm", "set_mode", "set_target", "change_setting", "set_mission"} <= set(flown["commands"])
 
 
 def test_its_clock_goes_as_the_wall_clock_does(flown):

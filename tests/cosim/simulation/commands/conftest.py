@@ -1,4 +1,4 @@
-"""Runs that are ordered about."""
+"""Runs that are commanded about."""
 
 import numpy as np
 import pytest
@@ -8,15 +8,15 @@ from cosim.simulation.master import Master
 
 
 class Script:
-    """Orders by step."""
+    """Commands by step."""
 
     exhausted = False
 
-    def __init__(self, orders):
-        self._orders = dict(orders)
+    def __init__(self, commands):
+        self._commands = dict(commands)
 
     def take(self, k):
-        return self._orders.pop(k, [])
+        return self._commands.pop(k, [])
 
 
 class Rows:
@@ -29,8 +29,8 @@ class Rows:
         self.rows.append(row.copy())
 
 
-class Ordered:
-    """What a run under orders left, by column."""
+class Commanded:
+    """What a run under commands left, by column."""
 
     def __init__(self, master, rows):
         self.rows, self._at = np.array(rows), master.signals.index
@@ -53,7 +53,7 @@ def fly():
         scenario = load_scenario(name, ["commands.enabled=true", *overrides])
         with Master(scenario) as master:
             rows = Rows()
-            master.run([rows], orders=script if hasattr(script, "take") else Script(script), awaiting=awaiting)
-            return Ordered(master, rows.rows)
+            master.run([rows], commands=script if hasattr(script, "take") else Script(script), awaiting=awaiting)
+            return Commanded(master, rows.rows)
 
     return run

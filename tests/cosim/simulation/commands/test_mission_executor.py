@@ -4,17 +4,17 @@ import math
 
 import pytest
 
-from cosim.errors import OrderError
-from cosim.simulation.commands.commands import Item
-from cosim.simulation.commands.mission_executor import Course, way
+from cosim.errors import CommandError
+from cosim.simulation.commands.commands import MissionItem
+from cosim.simulation.commands.mission_executor import MissionExecutor, way
 
-PLACE = Item((1.0, 2.0, 3.0), 0.5)
-AT_ONCE = Item(None)
+PLACE = MissionItem((1.0, 2.0, 3.0), 0.5)
+AT_ONCE = MissionItem(None)
 
 
 def followed(items, clearance=1.0, steps=12, start=0):
     """Return the items under way, step by step, of one second each."""
-    course = Course()
+    course = MissionExecutor()
     course.take(tuple(items))
     course.begin(start)
     seen = [course.at]
@@ -37,39 +37,39 @@ def test_only_a_place_has_to_be_reached():
 
 
 def test_a_stay_counts_from_within_and_anew_after_leaving():
-    course = Course()
-    course.take((Item((0.0, 0.0, 0.0), stay=2.0), PLACE))
+    course = MissionExecutor()
+    course.take((MissionItem((0.0, 0.0, 0.0), stay=2.0), PLACE))
     course.begin(0)
     clearances = [-1.0, 0.1, -0.1, 0.0, 0.1, 0.1]
     following = [course.following(float(time), clearance) for time, clearance in enumerate(clearances)]
     assert following == [None] * 5 + [1]
-    assert followed([Item(None, stay=3.0), PLACE], clearance=-1.0, steps=3) == [0]
-    assert followed([Item(None, stay=3.0), PLACE], clearance=-1.0, steps=4) == [0, 1]
-    assert followed([Item(None, stay=None), PLACE]) == [0]
+    assert followed([MissionItem(None, stay=3.0), PLACE], clearance=-1.0, steps=3) == [0]
+    assert followed([MissionItem(None, stay=3.0), PLACE], clearance=-1.0, steps=4) == [0, 1]
+    assert followed([MissionItem(None, stay=None), PLACE]) == [0]
 
 
 def test_jumps_are_made_as_often_as_they_say():
-    assert followed([PLACE, Item(None, jump=0, times=2), PLACE]) == [0, 1, 0, 1, 0, 1, 2]
-    assert followed([PLACE, Item(None, jump=0, times=0), PLACE]) == [0, 1, 2]
-    assert followed([PLACE, Item(None, jump=0)], steps=5) == [0, 1, 0, 1, 0, 1]
-    assert followed([Item(None, jump=0)], steps=3) == [0] * 4  # one a step, for ever
-    assert followed([PLACE, Item(None, jump=3, times=1), PLACE, PLACE]) == [0, 1, 3]
+    assert followed([PLACE, MissionItem(None, jump=0, times=2), PLACE]) == [0, 1, 0, 1, 0, 1, 2]
+    assert followed([PLACE, MissionItem(None, jump=0, times=0), PLACE]) == [0, 1, 2]
+    assert followed([PLACE, MissionItem(None, jump=0)], steps=5) == [0, 1, 0, 1, 0, 1]
+    assert followed([MissionItem(None, jump=0)], steps=3) == [0] * 4  # one a step, for ever
+    assert followed([PLACE, MissionItem(None, jump=3, times=1), PLACE, PLACE]) == [0, 1, 3]
 
 
 def test_begun_anew_all_jumps_can_be_made_again():
-    course = Course()
-    course.take((PLACE, Item(None, jump=0, times=1), PLACE))
+    course = MissionExecutor()
+    course.take((PLACE, MissionItem(None, jump=0, times=1), PLACE))
     for _ in range(2):
         course.begin(1)
         assert course.following(0.0, 1.0) == 0
         course.enter(1)
         assert course.following(1.0, 1.0) == 2
-    with pytest.raises(OrderError, match="item is 3, expected 0 to 2"):
+    with pytest.raises(CommandError, match="item is 3, expected 0 to 2"):
         course.begin(3)
 
 
 def test_the_region_is_that_of_the_last_place():
-    course = Course()
+    course = MissionExecutor()
     course.take((AT_ONCE, PLACE, AT_ONCE, AT_ONCE))
     assert course.enter(3) is AT_ONCE and course.region() is PLACE
     course.enter(0)
@@ -77,10 +77,10 @@ def test_the_region_is_that_of_the_last_place():
 
 
 def test_the_way_goes_through_what_is_done_at_once():
-    items = [PLACE, AT_ONCE, Item(None, jump=0, times=2), PLACE, PLACE]
+    items = [PLACE, AT_ONCE, MissionItem(None, jump=0, times=2), PLACE, PLACE]
     assert way(items, 0, 1) == [1] and way(items, 0, 3) == [1, 2, 3] and way(items, 3, 4) == [4]
     assert way(items, 1, 0) == [2, 0]
     assert way(items, -1, 0) == [0]
     assert way(items, 0, 4) is None and way(items, 4, 0) is None and way(items, 3, 1) is None
     assert way([], 0, 5) is None
-    assert way([Item(None, jump=0)], -1, 1) == [0, 1] and way([Item(None, jump=0)], -1, 7) is None
+    assert way([MissionItem(None, jump=0)], -1, 1) == [0, 1] and way([MissionItem(None, jump=0)], -1, 7) is None

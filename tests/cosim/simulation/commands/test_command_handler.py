@@ -1,4 +1,4 @@
-"""The helm: orders change where the vehicle goes, at their step, and can be repeated to the last bit."""
+"""The helm: commands change where the vehicle goes, at their step, and can be repeated to the last bit."""
 
 import numpy as np
 import pytest
@@ -7,23 +7,23 @@ from cosim.results.as_flown import as_it_came
 from cosim.results.record import load_record
 from cosim.run.run import run_scenario
 from cosim.scenario.scenario import load_scenario
-from cosim.simulation.actuators import MOST, cut
-from cosim.simulation.commands import MODES, LoggedOrders, OrderQueue, RecordedOrders
+from cosim.simulation.actuators import MAX_WRENCH, saturate
+from cosim.simulation.commands import MODES, CommandQueue, LoggedCommands, ReplayedCommands
 from cosim.simulation.commands.command_handler import greatest_wrench
 from cosim.simulation.commands.commands import (
-    Aim,
+    AddObstacle,
     Arm,
-    Begin,
-    Change,
-    Face,
-    Forget,
-    Item,
-    Mission,
-    Move,
-    Obstacle,
+    ChangeSetting,
+    ManualControl,
+    MissionItem,
+    RemoveObstacle,
     Reset,
-    Steer,
-    Sticks,
+    SetCurrentItem,
+    SetHeading,
+    SetMission,
+    SetMode,
+    SetTarget,
+    ShiftRegion,
 )
 from cosim.simulation.master import Master
 from plant_fmu.vehicle import load_vehicle
@@ -33,8 +33,8 @@ SHORT = "time.duration=20"
 OPEN = ["regions=[]", "sensing.position_noise=0", "sensing.velocity_noise=0", "plant.current=[0.0,0.0,0.0]"]
 
 
-def test_without_orders_nothing_differs(fly):
-    ordered = fly({}, "time.duration=5")
+def test_without_commands_nothing_differs(fly):
+    commanded = fly({}, "time.duration=5")
     plain = load_scenario("pipe-inspection", ["time.duration=5"])
     rows = []
     with Master(plain) as master:
@@ -42,7 +42,7 @@ def test_without_orders_nothing_differs(fly):
             master.step(k)
             rows.append(master.row.copy())
     for column, values in zip(master.signals.columns, np.array(rows).T, strict=True):
-        assert np.array_equal(values, ordered[column.name]), column.name
+        assert np.array_equal(values, commanded[column.name]), column.name
 
 
 def test_disarmed_thrusters_give_nothing_and_armed_ones_work_again(fly):
@@ -50,11 +50,11 @@ def test_disarmed_thrusters_give_nothing_and_armed_ones_work_again(fly):
     thrusts = np.abs(run.stack(*(f"thrust[{i}]" for i in range(1, 9)))).max(axis=1)
     assert thrusts[:200].max() > 1.0 and thrusts[400:].max() > 1.0
     assert not thrusts[200:400].any()
-    assert set(run["helm.armed"][200:400]) == {0.0} and set(run["helm.armed"][:200]) == {1.0}
+    assert set(run["commands.armed"][200:400]) == {0.0} and set(run["commands.armed"][:200]) == {1.0}
 
 
 def test_an_aimed_target_is_reached(fly):
-    run = fly({100: [Aim((3.0, 2.0, 4.0), radius=0.4)]}, SHORT)
+    run = fly({100: [SetTarget((3.0, 2.0, 4.0), radius=0.4)]}, SHORT)
     assert np.linalg.norm(run.position[-1] - [3.0, 2.0, 4.0]) < 0.4
     assert run["goal.clearance"][-1] == pytest.approx(0.4 - np.linalg.norm(run.position[-1] - [3.0, 2.0, 4.0]), abs=0.1)
     assert run["target.radius"][-1] == 0.4 and run["target.radius"][0] == 0.0
@@ -62,7 +62,7 @@ def test_an_aimed_target_is_reached(fly):
 
 
 def test_a_target_without_a_radius_is_the_goal_moved(fly):
-    run = fly({100: [Aim((3.0, 2.0, 4.0), velocity=(0.0, -0.1, 0.0))]}, SHORT, *OPEN)
+    run = fly({100: [SetTarget((3.0, 2.0, 4.0), velocity=(0.0, -0.1, 0.0))]}, SHORT, *OPEN)
     k = 1500
     middle = np.array([3.0, 2.0 - 0.1 * (k - 100) / STEPS, 4.0])
     assert run.stack("target.x", "target.y", "target.z")[k] == pytest.approx(middle, abs=1e-9)
@@ -73,23 +73,23 @@ def test_a_target_without_a_radius_is_the_goal_moved(fly):
 
 
 def test_holding_keeps_the_place_of_the_order(fly):
-    run = fly({300: [Steer("hold")]}, SHORT, *OPEN)
+    run = fly({300: [SetMode("hold")]}, SHORT, *OPEN)
     place = run.stack("target.x", "target.y", "target.z")[300]
     assert place == pytest.approx(run.position[300], abs=1e-9)
     assert np.linalg.norm(run.position[800:] - place, axis=1).max() < 0.3
-    assert MODES[int(run["helm.mode"][-1])] == "hold"
+    assert MODES[int(run["commands.mode"][-1])] == "hold"
 
 
 @pytest.mark.slow
 def test_back_to_reaching_is_back_to_the_target_that_was(fly):
-    run = fly({100: [Steer("hold")], 300: [Steer("reach")]}, "time.duration=60")
+    run = fly({100: [SetMode("hold")], 300: [SetMode("reach")]}, "time.duration=60")
     straight = fly({}, "time.duration=60")
     assert run["goal.clearance"][-1] > 0.0 and straight["goal.clearance"][-1] > 0.0
     assert run["target.x"][-1] == pytest.approx(straight["target.x"][-1], abs=1e-9)  # it travels
 
 
 def test_surfacing_goes_up_where_it_is(fly):
-    run = fly({300: [Steer("surface")]}, SHORT, *OPEN)
+    run = fly({300: [SetMode("surface")]}, SHORT, *OPEN)
     assert run.position[-1][2] == pytest.approx(0.5, abs=0.3)
     assert np.linalg.norm(run.position[-1][:2] - run.position[300][:2]) < 0.35
 
@@ -98,7 +98,7 @@ def test_surfacing_goes_up_where_it_is(fly):
 def test_sticks_push_along_their_axis(fly, axis):
     part = [0.0] * 6
     part[axis] = 1.0
-    run = fly({0: [Steer("manual"), Sticks(tuple(part))]}, "time.duration=2", *OPEN)
+    run = fly({0: [SetMode("manual"), ManualControl(tuple(part))]}, "time.duration=2", *OPEN)
     wrench = run.stack(*(f"command.{name}" for name in "XYZKMN"))[-1]
     vehicle = load_vehicle("bluerov2_heavy")
     greatest = greatest_wrench(vehicle.thruster_matrix, vehicle.thrust_min, vehicle.thrust_max)
@@ -120,9 +120,13 @@ def test_greatest_wrench_is_where_the_first_thruster_is_at_its_limit():
 
 
 def test_a_mission_goes_from_region_to_region(fly):
-    items = (Item((1.0, 0.0, 3.0), 0.3), Item((0.0, 2.0, 2.0), None, 2.0), Item((1.0, 1.0, 2.0), 0.3))
-    run = fly({0: [Mission(items), Steer("mission")]}, "time.duration=40", *OPEN)
-    item = run["helm.item"]
+    items = (
+        MissionItem((1.0, 0.0, 3.0), 0.3),
+        MissionItem((0.0, 2.0, 2.0), None, 2.0),
+        MissionItem((1.0, 1.0, 2.0), 0.3),
+    )
+    run = fly({0: [SetMission(items), SetMode("mission")]}, "time.duration=40", *OPEN)
+    item = run["commands.item"]
     assert list(dict.fromkeys(item.tolist())) == [0.0, 1.0, 2.0]
     first, second = int(np.argmax(item == 1)), int(np.argmax(item == 2))
     assert np.linalg.norm(run.position[first] - items[0].position) < 0.3
@@ -132,10 +136,18 @@ def test_a_mission_goes_from_region_to_region(fly):
 
 
 def test_what_a_mission_does_at_once_counts_from_then_on(fly):
-    slowly = Item(None, orders=(Change("law.gains.speed", 0.2), Face(0.8)))
-    items = (slowly, Item((1.0, 0.0, 3.0), 0.3), Item(None, stay=1.0), Item(None, jump=1, times=1), slowly)
-    run = fly({0: [Mission(items), Steer("mission")], 1200: [Steer("hold")], 1300: [Steer("mission")]}, SHORT, *OPEN)
-    item = run["helm.item"]
+    slowly = MissionItem(None, commands=(ChangeSetting("law.gains.speed", 0.2), SetHeading(0.8)))
+    items = (
+        slowly,
+        MissionItem((1.0, 0.0, 3.0), 0.3),
+        MissionItem(None, stay=1.0),
+        MissionItem(None, jump=1, times=1),
+        slowly,
+    )
+    run = fly(
+        {0: [SetMission(items), SetMode("mission")], 1200: [SetMode("hold")], 1300: [SetMode("mission")]}, SHORT, *OPEN
+    )
+    item = run["commands.item"]
     seen = [1, *item[1:][np.diff(item) != 0].tolist()]
     assert item[0] == 1 and seen == [1, 2, 3, 1, 2, 3, 4]  # there, a delay, and once again
     assert run.stack("target.x", "target.y", "target.z")[-1] == pytest.approx(items[1].position)  # after the hold, too
@@ -146,45 +158,49 @@ def test_what_a_mission_does_at_once_counts_from_then_on(fly):
 
 
 def test_an_item_to_stay_at_is_not_left_but_on_order(fly):
-    items = (Item((1.0, 0.0, 3.0), 0.3, None), Item((0.0, 1.0, 2.0), 0.3))
-    run = fly({0: [Mission(items), Steer("mission")], 1500: [Begin(1)]}, SHORT, *OPEN)
-    assert set(run["helm.item"][:1500]) == {0.0} and set(run["helm.item"][1500:]) == {1.0}
+    items = (MissionItem((1.0, 0.0, 3.0), 0.3, None), MissionItem((0.0, 1.0, 2.0), 0.3))
+    run = fly({0: [SetMission(items), SetMode("mission")], 1500: [SetCurrentItem(1)]}, SHORT, *OPEN)
+    assert set(run["commands.item"][:1500]) == {0.0} and set(run["commands.item"][1500:]) == {1.0}
     assert np.linalg.norm(run.position[1499] - items[0].position) < 0.3
 
 
 @pytest.mark.slow
 def test_another_heading_is_kept(fly):
-    run = fly({100: [Face(1.2)]}, SHORT, *OPEN)
+    run = fly({100: [SetHeading(1.2)]}, SHORT, *OPEN)
     assert run["attitude.yaw"][-1] == pytest.approx(1.2, abs=0.05)
-    by_wrench = fly({100: [Face(1.2)]}, "time.duration=15", name="paper")
+    by_wrench = fly({100: [SetHeading(1.2)]}, "time.duration=15", name="paper")
     assert by_wrench["attitude.yaw"][-1] == pytest.approx(1.2, abs=0.05)
 
 
 def test_an_obstacle_that_comes_is_kept_out_of(fly):
     centre = (2.5, 0.0, 3.0)
-    way = [Aim((5.0, 0.0, 3.0), 0.4)]
+    way = [SetTarget((5.0, 0.0, 3.0), 0.4)]
     through = fly({0: way}, SHORT, *OPEN)
-    round_it = fly({0: way, 50: [Obstacle(7, centre, 0.6)]}, SHORT, *OPEN)
+    round_it = fly({0: way, 50: [AddObstacle(7, centre, 0.6)]}, SHORT, *OPEN)
     assert np.linalg.norm(through.position - centre, axis=1).min() < 0.1
     assert np.linalg.norm(round_it.position - centre, axis=1).min() >= 0.6
     assert np.linalg.norm(round_it.position[-1] - [5.0, 0.0, 3.0]) < 0.4
     assert round_it["seen 1.clearance"][-1] == pytest.approx(np.linalg.norm(round_it.position[-1] - centre) - 0.6)
-    gone = fly({0: way, 50: [Obstacle(7, centre, 0.6)], 60: [Forget(7)]}, SHORT, *OPEN)
+    gone = fly({0: way, 50: [AddObstacle(7, centre, 0.6)], 60: [RemoveObstacle(7)]}, SHORT, *OPEN)
     assert np.linalg.norm(gone.position - centre, axis=1).min() < 0.3
 
 
 def test_obstacles_beyond_the_room_are_refused_and_known_ones_move(fly, caplog):
-    far = [Obstacle(i, (50.0, float(i), 3.0), 0.5) for i in range(3)]
-    run = fly({0: far, 5: [Obstacle(1, (60.0, 0.0, 3.0), 0.5)]}, "time.duration=0.1", "commands.obstacles=2", *OPEN)
+    far = [AddObstacle(i, (50.0, float(i), 3.0), 0.5) for i in range(3)]
+    run = fly({0: far, 5: [AddObstacle(1, (60.0, 0.0, 3.0), 0.5)]}, "time.duration=0.1", "commands.obstacles=2", *OPEN)
     assert "no room for obstacle 2" in caplog.text
     assert run["seen 2.shift.x"][4:6].tolist() == [50.0, 60.0]
 
 
 def test_moved_regions_keep_their_shape_and_the_record_has_where_they_are(fly):
-    travels = Obstacle(4, (30.0, 0.0, 3.0), 0.5, velocity=(1.0, 0.0, 0.0))
+    travels = AddObstacle(4, (30.0, 0.0, 3.0), 0.5, velocity=(1.0, 0.0, 0.0))
     away, back = (0.0, 3.0, -1.0), (0.0, -3.0, 1.0)
-    script = {0: [travels], 10: [Move("pipe", away), Move("seen 1", away), Steer("hold")], 20: [Move("pipe", back)]}
-    run, plain = fly(script, "time.duration=0.3"), fly({0: [Steer("hold")]}, "time.duration=0.3")
+    script = {
+        0: [travels],
+        10: [ShiftRegion("pipe", away), ShiftRegion("seen 1", away), SetMode("hold")],
+        20: [ShiftRegion("pipe", back)],
+    }
+    run, plain = fly(script, "time.duration=0.3"), fly({0: [SetMode("hold")]}, "time.duration=0.3")
     shifts = run.stack(*(f"pipe.shift.{axis}" for axis in "xyz"))
     assert not shifts[:10].any() and not shifts[20:].any()
     assert shifts[10:20].tolist() == [list(away)] * 10
@@ -207,7 +223,7 @@ def test_moved_regions_keep_their_shape_and_the_record_has_where_they_are(fly):
     ],
 )
 def test_what_is_not_there_is_not_moved(fly, caplog, region, why):
-    run = fly({1: [Move(region, (1.0, 1.0, 1.0))]}, "time.duration=0.05")
+    run = fly({1: [ShiftRegion(region, (1.0, 1.0, 1.0))]}, "time.duration=0.05")
     assert why in caplog.text
     moved = [f"{name}.shift.{axis}" for name in ("pipe", "seen 1", "seen 2") for axis in "xyz"]
     assert not run.stack(*moved).any()
@@ -215,8 +231,9 @@ def test_what_is_not_there_is_not_moved(fly, caplog, region, why):
 
 def test_numbers_change_while_it_runs(fly):
     changes = [
-        Change("law.gains.speed", 0.15), Change("goal.radius", 0.9), Change("regions.pipe.shape.radius", 0.8),
-        Change("plant.parameters.thrust_max[1]", 3.0), Change("arbiter.ramp", 0.7),
+        ChangeSetting("law.gains.speed", 0.15), ChangeSetting("goal.radius", 0.9),
+        ChangeSetting("regions.pipe.shape.radius", 0.8),
+        ChangeSetting("plant.parameters.thrust_max[1]", 3.0), ChangeSetting("arbiter.ramp", 0.7),
     ]  # fmt: skip
     run = fly({300: changes}, "time.duration=10")
     assert run.master.law.gains.speed == 0.15
@@ -227,31 +244,37 @@ def test_numbers_change_while_it_runs(fly):
 
 
 def test_a_change_of_a_gain_reaches_a_law_that_takes_over_later(fly):
-    run = fly({10: [Steer("manual"), Change("law.gains.speed", 0.2)], 100: [Steer("reach")]}, "time.duration=2")
+    run = fly(
+        {10: [SetMode("manual"), ChangeSetting("law.gains.speed", 0.2)], 100: [SetMode("reach")]}, "time.duration=2"
+    )
     assert run.master.law.gains.speed == 0.2
 
 
 def test_gains_and_limits_of_the_direct_wrench(fly):
-    run = fly({500: [Change("limit.force", 20.0), Change("regions.SR1.gain", 3.0)]}, "time.duration=1", name="paper")
+    run = fly(
+        {500: [ChangeSetting("limit.force", 20.0), ChangeSetting("regions.SR1.gain", 3.0)]},
+        "time.duration=1",
+        name="paper",
+    )
     force = np.linalg.norm(run.stack(*(f"actuation.{axis}" for axis in "XYZ")), axis=1)
     assert force[:500].max() > 25.0 and force[501:-1].max() <= 20.0 + 1e-9
-    assert run.master.surroundings.regions.gains[0] == 3.0
+    assert run.master.environment.regions.gains[0] == 3.0
 
 
 @pytest.mark.parametrize(
-    ("order", "why"),
+    ("command", "why"),
     [
-        (Steer("mission"), "there is no mission"),
-        (Begin(3), "item is 3"),
-        (Change("law.gains.nonsense", 1.0), "is no setting"),
-        (Change("regions.pipe.shape.colour", 1.0), "is no setting"),
-        (Change("goal.radius", -1.0), "radius is -1.0, expected above 0 m"),
-        (Change("arbiter.ramp", -1.0), "arbiter.ramp is -1, expected 0 to 1000"),
-        (Change("law.gains.speed", 0.0), "expected a finite number above 0"),
+        (SetMode("mission"), "there is no mission"),
+        (SetCurrentItem(3), "item is 3"),
+        (ChangeSetting("law.gains.nonsense", 1.0), "is no setting"),
+        (ChangeSetting("regions.pipe.shape.colour", 1.0), "is no setting"),
+        (ChangeSetting("goal.radius", -1.0), "radius is -1.0, expected above 0 m"),
+        (ChangeSetting("arbiter.ramp", -1.0), "arbiter.ramp is -1, expected 0 to 1000"),
+        (ChangeSetting("law.gains.speed", 0.0), "expected a finite number above 0"),
     ],
 )
-def test_what_cannot_be_followed_is_logged_and_changes_nothing(fly, caplog, order, why):
-    run = fly({5: [order]}, "time.duration=0.2")
+def test_what_cannot_be_followed_is_logged_and_changes_nothing(fly, caplog, command, why):
+    run = fly({5: [command]}, "time.duration=0.2")
     assert why in caplog.text
     plain = fly({}, "time.duration=0.2")
     assert np.array_equal(run.rows, plain.rows)
@@ -259,71 +282,73 @@ def test_what_cannot_be_followed_is_logged_and_changes_nothing(fly, caplog, orde
 
 def test_no_shape_that_cannot_be_flown_by_is_taken(fly, caplog):
     """What is too short to have a direction is refused when it is set, not found out in the step."""
-    end = Change("regions.mooring.shape.end.2", 1e-38)
+    end = ChangeSetting("regions.mooring.shape.end.2", 1e-38)
     run = fly({5: [end]}, "time.duration=0.2", name="depth-transit")
     assert "expected a point other than start" in caplog.text
-    assert run.master.helm.settings.shapes["mooring"].end[2] > 1.0
+    assert run.master.command_handler.settings.shapes["mooring"].end[2] > 1.0
 
 
 def test_a_lost_position_cannot_be_held(fly, caplog):
     lost = ["sensing.dead_from=0.1", "sensing.dead_for=1.0"]
-    run = fly({20: [Steer("hold")]}, "time.duration=0.5", *lost)
+    run = fly({20: [SetMode("hold")]}, "time.duration=0.5", *lost)
     assert "needs a position" in caplog.text
-    assert MODES[int(run["helm.mode"][-1])] == "reach"
+    assert MODES[int(run["commands.mode"][-1])] == "reach"
 
 
 def test_a_reset_ends_the_run(fly):
     run = fly({70: [Reset()]}, "time.duration=5")
-    assert len(run.rows) == 71 and run.master.helm.reset
+    assert len(run.rows) == 71 and run.master.command_handler.reset
 
 
 class Told:
     """Observer that arms after some looks."""
 
-    def __init__(self, queue, after, orders):
-        self.queue, self.after, self.orders, self.rows = queue, after, orders, []
+    def __init__(self, queue, after, commands):
+        self.queue, self.after, self.commands, self.rows = queue, after, commands, []
 
     def observe(self, k, row):
         self.rows.append(row.copy())
         if len(self.rows) == self.after:
-            for order in self.orders:
-                self.queue.give(order)
+            for command in self.commands:
+                self.queue.give(command)
 
 
 def test_nothing_moves_before_it_is_armed_and_the_wait_repeats_to_the_last_bit(fly, tmp_path):
-    queue = OrderQueue()
-    told = Told(queue, 5, [Change("law.gains.speed", 0.5), Steer("hold"), Arm(True), Steer("reach")])
+    queue = CommandQueue()
+    told = Told(queue, 5, [ChangeSetting("law.gains.speed", 0.5), SetMode("hold"), Arm(True), SetMode("reach")])
     await_arm = ["commands.await_arm=true", "time.duration=3"]
-    live = fly(LoggedOrders(queue, tmp_path / "orders.jsonl"), *await_arm, awaiting=told)
+    live = fly(LoggedCommands(queue, tmp_path / "commands.jsonl"), *await_arm, awaiting=told)
     assert len(told.rows) >= 5
     assert all(np.array_equal(row, told.rows[0]) for row in told.rows[:5])
     assert told.rows[0][live.master.signals.index("position.z")] == 3.0
-    assert told.rows[0][live.master.signals.index("helm.armed")] == 0.0
-    again = fly(RecordedOrders(tmp_path / "orders.jsonl"), *await_arm)
+    assert told.rows[0][live.master.signals.index("commands.armed")] == 0.0
+    again = fly(ReplayedCommands(tmp_path / "commands.jsonl"), *await_arm)
     assert np.array_equal(live.rows, again.rows)
 
 
 def test_an_empty_log_does_not_wait_for_ever(fly, tmp_path):
-    (tmp_path / "orders.jsonl").touch()
-    run = fly(RecordedOrders(tmp_path / "orders.jsonl"), "commands.await_arm=true", "time.duration=0.1")
-    assert not run["helm.armed"].any()
+    (tmp_path / "commands.jsonl").touch()
+    run = fly(ReplayedCommands(tmp_path / "commands.jsonl"), "commands.await_arm=true", "time.duration=0.1")
+    assert not run["commands.armed"].any()
 
 
-def test_orders_of_a_run_repeat_it_to_the_last_bit(tmp_path):
+def test_commands_of_a_run_repeat_it_to_the_last_bit(tmp_path):
     """Through the run folder: a scenario and a log are all that is needed."""
     scenario = load_scenario("pipe-inspection", ["commands.enabled=true", "time.duration=1.8"])
-    log = tmp_path / "orders.jsonl"
-    logged = LoggedOrders(queue := OrderQueue(), log)
-    for k, order in enumerate([Aim((2.0, 1.0, 3.5), 0.3), Obstacle(3, (1.0, 0.5, 3.2), 0.2), Face(0.4), Steer("hold")]):
-        queue.give(order)
+    log = tmp_path / "commands.jsonl"
+    logged = LoggedCommands(queue := CommandQueue(), log)
+    for k, command in enumerate(
+        [SetTarget((2.0, 1.0, 3.5), 0.3), AddObstacle(3, (1.0, 0.5, 3.2), 0.2), SetHeading(0.4), SetMode("hold")]
+    ):
+        queue.give(command)
         logged.take(50 * k)
-    first = run_scenario(scenario, tmp_path / "first", report=False, orders=log)
+    first = run_scenario(scenario, tmp_path / "first", report=False, commands_log=log)
     again = load_scenario(first.folder / "scenario.toml")
-    second = run_scenario(again, tmp_path / "second", report=False, orders=first.folder / "orders.jsonl")
+    second = run_scenario(again, tmp_path / "second", report=False, commands_log=first.folder / "commands.jsonl")
     a, b = load_record(first.folder), load_record(second.folder)
     for name in a.units:
         assert np.array_equal(a[name], b[name]), name
-    assert (first.folder / "orders.jsonl").read_bytes() == (second.folder / "orders.jsonl").read_bytes()
+    assert (first.folder / "commands.jsonl").read_bytes() == (second.folder / "commands.jsonl").read_bytes()
     came = as_it_came(scenario, a)
     assert [r.region.name for r in came.regions if r.seen] == ["seen 1"]
     assert came.regions[-1].region.shape.radius == pytest.approx(0.2, abs=1e-6)
@@ -334,30 +359,30 @@ def test_orders_of_a_run_repeat_it_to_the_last_bit(tmp_path):
 @pytest.mark.parametrize("away", [300.0, 1e5])
 def test_no_target_is_too_far_for_the_run_to_go_on(fly, name, away):
     """The printed law's force grows with the cube of the distance."""
-    run = fly({100: [Aim((away, 0.0, 5.0))]}, "time.duration=0.5", name=name)
+    run = fly({100: [SetTarget((away, 0.0, 5.0))]}, "time.duration=0.5", name=name)
     asked = np.abs(run.stack(*(f"command.{axis}" for axis in "XYZ"))).max()
     given = np.linalg.norm(run.stack(*(f"wrench.{axis}" for axis in "XYZ")), axis=1)
-    assert asked > 1e8 and given.max() <= MOST * 1.8
+    assert asked > 1e8 and given.max() <= MAX_WRENCH * 1.8
     assert run["allocation_saturated"][-1] == 1.0 and run["allocation_saturated"][0] == 0.0
 
 
 def test_a_wrench_that_is_no_number_is_none():
-    wrench = np.array([np.nan, 1.0, np.inf, 2 * MOST, -MOST, 0.0])
-    assert cut(wrench)
-    assert wrench.tolist() == [0.0, 0.0, 0.0, MOST, -MOST / 2, 0.0]
-    assert not cut(wrench)
+    wrench = np.array([np.nan, 1.0, np.inf, 2 * MAX_WRENCH, -MAX_WRENCH, 0.0])
+    assert saturate(wrench)
+    assert wrench.tolist() == [0.0, 0.0, 0.0, MAX_WRENCH, -MAX_WRENCH / 2, 0.0]
+    assert not saturate(wrench)
 
 
 @pytest.mark.parametrize(("gain", "value"), [("k_p2", 3e38), ("sigma_a", 3e38), ("gamma", 1e-45)])
 def test_no_gain_ends_a_run_by_the_moment_that_is_asked_for(fly, gain, value):
-    run = fly({10: [Change(f"law.gains.{gain}", value)]}, "time.duration=0.5", name="paper")
+    run = fly({10: [ChangeSetting(f"law.gains.{gain}", value)]}, "time.duration=0.5", name="paper")
     assert len(run["time"]) == 501
     assert run["allocation_saturated"].max() == 1.0
 
 
 @pytest.mark.slow
 def test_a_run_that_is_reset_in_its_first_step_has_a_report(tmp_path):
-    (log := tmp_path / "orders.jsonl").write_bytes(b'{"step":0,"order":{"order":"reset"}}\n')
-    run = run_scenario(load_scenario("harbour", ["commands.enabled=true"]), tmp_path / "run", orders=log)
+    (log := tmp_path / "commands.jsonl").write_bytes(b'{"step":0,"command":{"command":"reset"}}\n')
+    run = run_scenario(load_scenario("harbour", ["commands.enabled=true"]), tmp_path / "run", commands_log=log)
     assert run.summary["status"] == "reset" and run.summary["simulated_time"] == 0.0
     assert (run.folder / "report.html").exists()

@@ -1,22 +1,22 @@
-// The helm of a live run: buttons, and the places of target and regions as numbers, for who has no mouse.
+// Commands to a live run: buttons, and the places of target and regions as numbers, for who has no mouse.
 
 const MODE_NAMES = ["manual", "hold", "reach", "mission", "surface"];
 const SURE = 4000; // ms, for which a button that was pressed once waits to be pressed again
 const NEW_OBSTACLES = 1001; // their numbers begin here, away from those that sensors give
 
 /** Buttons and numbers beside the scene. */
-class HelmPanel {
+class CommandPanel {
   /** @param {LiveLink} link */
   constructor(link) {
     this.link = link;
-    this.holder = element("details", "helm");
-    this.holder.id = "helm";
+    this.holder = element("details", "commands");
+    this.holder.id = "commands";
     this.holder.open = matchMedia("(min-width: 960px)").matches;
     this.holder.hidden = true;
     this.state = element("span", "note");
     const summary = element("summary", "", "Steer ");
     summary.append(this.state);
-    this.body = element("div", "helm-body");
+    this.body = element("div", "command-body");
     this.holder.append(summary, this.body);
     const { stage } = link.page;
     document.getElementById("stage").append(this.holder);
@@ -48,8 +48,8 @@ class HelmPanel {
   tell() {
     const { run, link } = this;
     if (!run) return;
-    const mode = run.rows && run.has("helm.mode") ? MODE_NAMES[run.held("helm.mode", run.end)] : null;
-    const armed = run.has("helm.armed") ? run.held("helm.armed", run.end) > 0 : true;
+    const mode = run.rows && run.has("commands.mode") ? MODE_NAMES[run.held("commands.mode", run.end)] : null;
+    const armed = run.has("commands.armed") ? run.held("commands.armed", run.end) > 0 : true;
     let state = "watching";
     if (link.over) state = "the run has ended";
     else if (run.header.commands) state = link.heeded ? `${armed ? "armed" : "disarmed"}, ${mode ?? "waiting"}` : "no connection";
@@ -61,22 +61,22 @@ class HelmPanel {
   }
 
   _buttons() {
-    const group = element("div", "helm-buttons");
+    const group = element("div", "command-buttons");
     group.setAttribute("role", "group");
-    group.setAttribute("aria-label", "Orders");
-    const add = (text, title, order, data = {}) => {
+    group.setAttribute("aria-label", "Commands");
+    const add = (text, title, command, data = {}) => {
       const button = element("button", "", text);
       button.type = "button";
       button.title = title;
       Object.assign(button.dataset, data);
-      button.addEventListener("click", () => this.link.order(order));
+      button.addEventListener("click", () => this.link.command(command));
       group.append(button);
     };
-    add("Arm", "Let the thrusters work", { order: "arm", armed: true }, { armed: "true" });
-    add("Disarm", "Stop the thrusters", { order: "arm", armed: false }, { armed: "false" });
-    add("Reach", "Go to the target region", { order: "steer", mode: "reach" }, { mode: "reach" });
-    add("Hold", "Stay here", { order: "steer", mode: "hold" }, { mode: "hold" });
-    add("Surface", "Come up", { order: "steer", mode: "surface" }, { mode: "surface" });
+    add("Arm", "Let the thrusters work", { command: "arm", armed: true }, { armed: "true" });
+    add("Disarm", "Stop the thrusters", { command: "arm", armed: false }, { armed: "false" });
+    add("Reach", "Go to the target region", { command: "set_mode", mode: "reach" }, { mode: "reach" });
+    add("Hold", "Stay here", { command: "set_mode", mode: "hold" }, { mode: "hold" });
+    add("Surface", "Come up", { command: "set_mode", mode: "surface" }, { mode: "surface" });
     group.append(this._reset());
     return group;
   }
@@ -88,7 +88,7 @@ class HelmPanel {
     button.title = "End this run, and begin it again";
     let sure = 0;
     button.addEventListener("click", () => {
-      if (sure) this.link.order({ order: "reset" });
+      if (sure) this.link.command({ command: "reset" });
       clearTimeout(sure);
       setText(button, sure ? "Reset" : "Really reset?");
       sure = sure ? 0 : setTimeout(() => {
@@ -100,7 +100,7 @@ class HelmPanel {
   }
 
   _list() {
-    const list = element("div", "helm-list");
+    const list = element("div", "command-list");
     list.append(element("p", "hint", "Drag target and regions in the scene (Shift: up and down), or give numbers in metres: north, east, down."));
     this.run.header.regions.forEach((region, index) => {
       if (canMove(this.run, index)) list.append(this._row(region, index));
@@ -155,7 +155,7 @@ class HelmPanel {
       // what stands there rounded is left as it is
       return !Number.isFinite(written) || Math.abs(written - from[axis]) <= 0.005 ? from[axis] : written;
     });
-    if (Vec.norm(Vec.sub(to, from)) > 0) this.link.order(orderToMove(run, index, from, to, run.end));
+    if (Vec.norm(Vec.sub(to, from)) > 0) this.link.command(commandToMove(run, index, from, to, run.end));
   }
 
   /** A new obstacle stands ahead of the vehicle, from where it may be dragged. */
@@ -172,13 +172,13 @@ class HelmPanel {
       const way = Vec.unit([ahead[0], ahead[1], 0]);
       const place = Vec.along(position, way, 4 * radius + run.header.vehicle.radius);
       const known = run.header.changes.map((change) => change.number ?? 0);
-      this.link.order({ order: "obstacle", number: Math.max(NEW_OBSTACLES - 1, ...known) + 1, position: place, radius });
+      this.link.command({ command: "add_obstacle", number: Math.max(NEW_OBSTACLES - 1, ...known) + 1, position: place, radius });
     });
     return button;
   }
 
   _forget(index) {
     const came = this.run.header.changes.findLast((change) => change.region === index && change.number !== undefined);
-    if (came) this.link.order({ order: "forget", number: came.number });
+    if (came) this.link.command({ command: "remove_obstacle", number: came.number });
   }
 }

@@ -1,0 +1,115 @@
+"""Commands in plain words, few enough to be read."""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_right
+from collections.abc import Sequence
+from typing import assert_never
+
+from cosim.scenario.tables import Vector3
+from cosim.simulation.commands.commands import (
+    AddObstacle,
+    Arm,
+    ChangeSetting,
+    Command,
+    ManualControl,
+    RemoveObstacle,
+    Reset,
+    SetCurrentItem,
+    SetHeading,
+    SetMission,
+    SetMode,
+    SetTarget,
+    ShiftRegion,
+)
+
+_TOLD = 3  # commands of one moment that are told each
+_MODES = {
+    "manual": "Steered by hand",
+    "hold": "Holds its place",
+    "reach": "Heads for the target",
+    "mission": "Follows the mission",
+    "surface": "Surfaces",
+}
+
+
+def command_events(log: Sequence[tuple[int, Command]], step: float, most: int) -> list[tuple[float, str]]:
+    """Return when commands were given, and which.
+
+    Parameters
+    ----------
+    log : sequence of (int, Order)
+        Steps, and commands that were taken at them.
+    step : float
+        [s].
+    most : int
+        Moments; commands that follow each other closely are told together where there are more.
+
+    Returns
+    -------
+    list of (float, str)
+        Times [s] of the first order of each moment, and words for all of its.
+    """
+    steps = sorted({k for k, _ in log})
+    gaps = [later - earlier for earlier, later in zip(steps, steps[1:], strict=False)]
+    # commands that are no farther apart than this are of one moment
+    apart = sorted(gaps)[len(steps) - most - 1] if len(steps) > most else 0
+    begins = [k for k, gap in zip(steps, [apart + 1, *gaps], strict=False) if gap > apart]
+    words: dict[int, list[str]] = {k: [] for k in begins}
+    for k, command in log:
+        words[begins[bisect_right(begins, k) - 1]].append(command_words(command))
+    return [(k * step, _joined(of_moment)) for k, of_moment in words.items()]
+
+
+def _joined(words: Sequence[str]) -> str:
+    kinds = list(dict.fromkeys(words))  # sticks say the same many times
+    more = f"; {len(kinds) - _TOLD} more commands" if len(kinds) > _TOLD else ""
+    return "Commanded: " + "; ".join(kinds[:_TOLD]) + more
+
+
+def command_words(command: Command) -> str:
+    """Return what a command asks for.
+
+    Parameters
+    ----------
+    command : Command
+        Any.
+
+    Returns
+    -------
+    str
+        Such as ``Target at (7, 0, 4) m``.
+    """
+    match command:
+        case Arm():
+            return "Armed" if command.armed else "Disarmed"
+        case SetMode():
+            return _MODES[command.mode]
+        case SetTarget():
+            size = "" if command.radius is None else f", radius {command.radius:.3g} m"
+            return f"Target at {_place(command.position)}{size}"
+        case SetHeading():
+            return f"Heading {math.degrees(command.heading) % 360.0:.0f}°"
+        case ManualControl():
+            return "Sticks moved"
+        case AddObstacle():
+            return f"Obstacle {command.number} at {_place(command.position)}, radius {command.radius:.3g} m"
+        case RemoveObstacle():
+            return f"Obstacle {command.number} gone"
+        case ShiftRegion():
+            return f"{command.region} moved by {_place(command.by)}"
+        case ChangeSetting():
+            return f"{command.key} is {command.value:.6g}"
+        case SetMission():
+            return f"Mission of {len(command.items)} items"
+        case SetCurrentItem():
+            return f"Mission goes on with item {command.item}"
+        case Reset():
+            return "Reset"
+        case _:
+            assert_never(command)
+
+
+def _place(position: Vector3) -> str:
+    return "(" + ", ".join(f"{x:.3g}" for x in position) + ") m"

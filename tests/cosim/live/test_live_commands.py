@@ -1,0 +1,120 @@
+"""What viewers order is followed, logged, told to all, and repeated; or refused with the reason."""
+
+import json
+
+import numpy as np
+import pytest
+
+from cosim.results.record import load_record
+from cosim.run.run import run_scenario
+from cosim.scenario.scenario import load_scenario
+from tests.cosim.live.conftest import ARM, same
+
+
+def commanded(viewer, *commands):
+    """Give commands while the run waits for arming; return how each was refused, after all were answered."""
+    viewer.until("header")
+    for command in commands:
+        viewer.command(**command)
+    viewer.command(command="set_heading", heading="north")  # is refused, which tells that all before were taken
+    while not viewer.said("refused") or "heading" not in viewer.said("refused")[-1]:
+        viewer.hear()
+    return viewer.said("refused")[:-1]
+
+
+def test_commands_are_followed_told_to_all_and_repeat_to_the_last_bit(live, tmp_path):
+    running = live("harbour", commands=True)
+    with running.viewer() as viewer, running.viewer() as other:
+        refused = commanded(
+            viewer,
+            {"command": "set_target", "position": [3.0, -2.0, 2.0], "radius": 0.4},
+            {"command": "shift_region", "region": "ship", "by": [1.0, 2.0, 0.5]},
+            {"command": "add_obstacle", "number": 9, "position": [5.0, -3.0, 2.0], "radius": 0.3},
+            {"command": "change_setting", "key": "regions.pile 1.shape.radius", "value": 0.9},
+        )
+        assert not refused
+        viewer.command(**ARM)
+        viewer.until("end")
+        other.until("end")
+    done = running.end()
+    record = load_record(done.folder)
+    assert record.stack([f"target.{a}" for a in "xyz"])[-1].tolist() == [3.0, -2.0, 2.0]
+    assert record.stack([f"ship.shift.{a}" for a in "xyz"])[-1].tolist() == [1.0, 2.0, 0.5]
+    log = [json.loads(line)["command"]["command"] for line in (done.folder / "commands.jsonl").read_text().splitlines()]
+    assert log == ["set_target", "shift_region", "add_obstacle", "change_setting", "arm"]
+    assert "ship moved by (1, 2, 0.5) m" in other.said("command")
+    assert other.said("command") == viewer.said("command")
+    names = [region["name"] for region in other.headers[0]["regions"]]
+    changes = [change for text in other.told("changes") for change in text["changes"]] or other.headers[0]["changes"]
+    shapes = {names[change["region"]]: change["shape"] for change in changes}
+    assert shapes["pile 1"]["radius"] == 0.9 and shapes["seen 1"]["radius"] == 0.3
+    assert shapes["goal"] == {"kind": "sphere", "centre": [12.0, 2.0, 3.0], "radius": 0.4}
+    again = run_scenario(
+        load_scenario(done.folder / "scenario.toml"), tmp_path / "again", report=False,
+        commands_log=done.folder / "commands.jsonl",
+    )  # fmt: skip
+    assert same(record, load_record(again.folder))
+
+
+def test_what_cannot_be_is_refused_with_the_reason(live):
+    running = live("harbour", commands=True)
+    wrong = {
+        "expected one of ship": {"command": "shift_region", "region": "shop", "by": [1, 0, 0]},
+        "expected one of ship, quay": {"command": "shift_region", "region": "goal", "by": [1, 0, 0]},
+        "no such obstacle has come": {"command": "shift_region", "region": "seen 3", "by": [1, 0, 0]},
+        "finite numbers up to": {"command": "set_target", "position": [1e9, 0, 0]},
+        "is no setting": {"command": "change_setting", "key": "time.duration", "value": 1.0},
+        "commands.pilot_gain is 7": {"command": "change_setting", "key": "commands.pilot_gain", "value": 7.0},
+        "Invalid value 'sail'": {"command": "sail", "to": "Ithaca"},
+        "unknown field": {"command": "arm", "armed": True, "really": True},
+        "missing required field": {"command": "arm"},
+        "Invalid enum value": {"command": "set_mode", "mode": "dive"},
+    }
+    with running.viewer() as viewer:
+        refused = commanded(viewer, *wrong.values())
+        viewer.command(**ARM)
+        viewer.until("end")
+    for reason, text in zip(wrong, refused, strict=True):
+        assert reason in text
+    assert running.end().summary["commands"] == 1
+
+
+def test_without_commands_every_order_is_refused(live):
+    running = live(rate=4.0)
+    with running.viewer() as viewer:
+        assert viewer.until("header")["run"]["commands"] is False
+        viewer.command(**ARM)
+        viewer.until("end")
+    assert viewer.said("refused") == ["commands are off: start with --commands"]
+    assert not (running.end().folder / "commands.jsonl").exists()
+
+
+@pytest.mark.slow
+def test_a_run_that_repeats_commands_takes_no_others(live, tmp_path):
+    (tmp_path / "commands.jsonl").write_text(
+        '{"step":20,"command":{"command":"shift_region","region":"ship","by":[0.0,3.0,0.0]}}\n'
+    )
+    running = live(commands=True, await_arm=False, commands_log=tmp_path / "commands.jsonl", rate=4.0)
+    with running.viewer() as viewer:
+        viewer.until("header")
+        viewer.command(command="set_mode", mode="hold")
+        viewer.until("end")
+    assert viewer.said("refused") == ["this run repeats the commands of a log and takes no others"]
+    assert "ship moved by (0, 3, 0) m" in viewer.said("command")
+    time, shift = viewer.column("time"), viewer.column("ship.shift.y")
+    assert np.array_equal(shift, np.where(time < 0.2, 0.0, 3.0))
+
+
+@pytest.mark.slow
+def test_a_ground_station_and_a_viewer_order_the_same_run(live):
+    from tests.cosim.run.test_run_on_a_link import Station, command, on
+
+    with Station(command(400, 1.0), command(192, -1.0, 1.0, 0.0, 0.7)) as station:
+        running = live(commands=True, rate=1.0, mavlink=on(station, commands=True))
+        with running.viewer() as viewer:
+            viewer.until("header")
+            viewer.command(command="shift_region", region="ship", by=[0.0, 1.0, 0.0])
+            viewer.until("end")
+    log = (running.end().folder / "commands.jsonl").read_text()
+    assert '"arm"' in log and '"move"' in log
+    assert "Armed" in viewer.said("command") and "ship moved by (0, 1, 0) m" in viewer.said("command")

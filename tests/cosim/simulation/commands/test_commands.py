@@ -1,0 +1,212 @@
+"""Commands, their queue and their log."""
+
+import math
+
+import msgspec
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from cosim.errors import CommandError, RunError
+from cosim.scenario.scenario import load_scenario
+from cosim.simulation.commands import CommandQueue, LiveSettings, LoggedCommands, ReplayedCommands
+from cosim.simulation.commands.commands import (
+    MODES,
+    AddObstacle,
+    Arm,
+    ChangeSetting,
+    ManualControl,
+    MissionItem,
+    RemoveObstacle,
+    Reset,
+    SetCurrentItem,
+    SetHeading,
+    SetMission,
+    SetMode,
+    SetTarget,
+    ShiftRegion,
+    validate_command,
+)
+from cosim.simulation.commands.sources import QUEUED
+
+number = st.floats(-1e4, 1e4)
+place = st.tuples(number, number, number)
+radius = st.floats(1e-3, 1e3)
+ITEMS = st.builds(
+    MissionItem,
+    st.none() | place,
+    st.none() | radius,
+    st.none() | st.floats(0, 99),
+    st.lists(st.builds(SetHeading, number) | st.builds(ChangeSetting, st.text(max_size=9), number), max_size=2).map(
+        tuple
+    ),
+    st.none() | st.just(0),
+    st.none() | st.integers(0, 9),
+)
+COMMANDS_LOG = st.one_of(
+    st.builds(Arm, st.booleans()),
+    st.builds(SetMode, st.sampled_from(MODES)),
+    st.builds(SetTarget, place, st.none() | radius, st.tuples(*[st.floats(-9, 9)] * 3)),
+    st.builds(SetHeading, number),
+    st.builds(ManualControl, st.tuples(*[st.floats(-1, 1)] * 6)),
+    st.builds(AddObstacle, st.integers(0, 1 << 16), place, radius),
+    st.builds(RemoveObstacle, st.integers(0, 1 << 16)),
+    st.builds(ShiftRegion, st.text(max_size=30), place),
+    st.builds(ChangeSetting, st.text(max_size=30), number),
+    st.builds(SetMission, st.lists(ITEMS).map(tuple)),
+    st.builds(SetCurrentItem, st.integers(0, 99)),
+    st.just(Reset()),
+)
+
+
+@given(st.lists(st.tuples(st.integers(0, 9), COMMANDS_LOG), max_size=20))
+def test_the_log_gives_back_every_order_at_its_step(tmp_path_factory, given_commands):
+    file = tmp_path_factory.mktemp("log") / "commands.jsonl"
+    queue, by_step = CommandQueue(), {}
+    for k, command in given_commands:
+        by_step.setdefault(k, []).append(command)
+    logged = LoggedCommands(queue, file)
+    for k in range(10):
+        for command in by_step.get(k, []):
+            assert queue.give(command)
+        assert list(logged.take(k)) == by_step.get(k, [])
+    if not given_commands:
+        assert not file.exists()
+        return
+    recorded = ReplayedCommands(file)
+    for k in range(10):
+        assert list(recorded.take(k)) == by_step.get(k, [])
+    assert recorded.exhausted
+
+
+def test_a_flood_is_refused_not_kept():
+    queue = CommandQueue()
+    assert all(queue.give(Arm(True)) for _ in range(QUEUED))
+    assert not queue.give(Arm(False))
+    assert len(queue.take(0)) == QUEUED
+
+
+def test_what_was_meant_for_a_run_that_is_over_is_followed_by_no_other():
+    queue = CommandQueue()
+    assert queue.give(Arm(True), run=0)
+    queue.end_run()
+    assert not queue.give(Arm(True), run=0)
+    assert queue.run == 1 and not queue.take(0)
+    assert queue.give(Arm(False), run=1) and queue.give(Arm(True))
+    assert queue.take(0) == [Arm(False), Arm(True)]
+    assert queue.give(Arm(False))
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        SetTarget((math.nan, 0.0, 0.0)),
+        SetTarget((0.0, math.inf, 0.0)),
+        SetTarget((0.0, 0.0, 0.0), radius=0.0),
+        SetTarget((0.0, 0.0, 0.0), velocity=(1e3, 0.0, 0.0)),
+        AddObstacle(1, (0.0, 0.0, 1e9), 1.0),
+        AddObstacle(1, (0.0, 0.0, 0.0), math.nan),
+        ManualControl((1.1, 0.0, 0.0, 0.0, 0.0, 0.0)),
+        ManualControl((math.nan,) * 6),
+        SetHeading(math.inf),
+        ShiftRegion("SR1", (0.0, math.nan, 0.0)),
+        ShiftRegion("SR1", (0.0, 0.0, 2e5)),
+        ChangeSetting("goal.radius", math.nan),
+        SetMission((MissionItem((0.0, 0.0, 0.0), stay=-1.0),)),
+        SetMission((MissionItem((0.0, 0.0, math.nan)),)),
+        SetMission((MissionItem(None, jump=1),)),
+        SetMission((MissionItem(None, jump=0, times=-1),)),
+        SetMission((MissionItem(None, commands=(SetHeading(math.nan),)),)),
+    ],
+)
+def test_absurd_numbers_are_refused(command):
+    with pytest.raises(CommandError, match=r"is .*, expected"):
+        validate_command(command)
+    with pytest.raises(CommandError):
+        CommandQueue().give(command)
+
+
+@pytest.mark.parametrize(
+    "line",
+    [b"no JSON", b'{"step":1}', b'{"step":1,"command":{"command":"fly"}}', b'{"step":1,"command":{"command":"arm"}}',
+     b'{"step":1,"command":{"command":"set_heading","heading":1,"and":2}}',
+     b'{"step":1,"command":{"command":"set_heading","heading":null}}',
+     b'{"step":1,"command":{"command":"set_target","position":[1e9,0,0]}}'],
+)  # fmt: skip
+def test_a_broken_log_names_the_line(tmp_path, line):
+    file = tmp_path / "commands.jsonl"
+    file.write_bytes(b'{"step":0,"command":{"command":"reset"}}\n' + line + b"\n")
+    with pytest.raises(RunError, match="line 2"):
+        ReplayedCommands(file)
+
+
+@pytest.mark.parametrize("size", [1, 30, 62])
+def test_a_last_line_that_was_cut_off_does_not_count(tmp_path, size):
+    file, line = (
+        tmp_path / "commands.jsonl",
+        b'{"step":1,"command":{"command":"set_target","position":[1.25,0.0,0.0]}}\n',
+    )
+    file.write_bytes(line + line[:size])
+    assert ReplayedCommands(file).take(1) == [SetTarget((1.25, 0.0, 0.0))] * (1 + (size >= len(line) - 1))
+    file.write_bytes(line + line[:30] + b"\n")
+    with pytest.raises(RunError, match="line 2"):
+        ReplayedCommands(file)
+    file.write_bytes(line + b'{"step":1,"command":{"command":"set_target","position":[1e9,0,0]}}')
+    with pytest.raises(RunError, match="line 2"):
+        ReplayedCommands(file)
+
+
+def test_no_log_is_one_line(tmp_path):
+    with pytest.raises(RunError, match="No such file"):
+        ReplayedCommands(tmp_path / "none.jsonl")
+
+
+def test_a_line_of_the_log_reads_well(tmp_path):
+    logged = LoggedCommands(queue := CommandQueue(), tmp_path / "log")
+    queue.give(SetTarget((1.0, 2.0, 3.0), 0.5))
+    logged.take(7)
+    assert msgspec.json.decode((tmp_path / "log").read_bytes()) == {
+        "step": 7,
+        "command": {"command": "set_target", "position": [1.0, 2.0, 3.0], "radius": 0.5, "velocity": [0.0, 0.0, 0.0]},
+    }
+
+
+ARMED = b'{"step":0,"command":{"command":"arm","armed":true}}\n'
+UNREADABLE = {
+    "bad UTF-8": b'{"step":1,"command":{"command":"shift_region","region":"\xff","by":[0,0,0]}}',
+    "bad UTF-8 in a key": b'{"step":1,"ord\xffer":{"command":"reset"}}',
+    "5,000 nested braces": b'{"step":1,"command":' + b'{"a":' * 5000,
+    "5,000 nested brackets": b'{"step":1,"command":{"items":' + b"[" * 5000,
+    "a step below 0": b'{"step":-1,"command":{"command":"reset"}}',
+    "a step of 5,000 digits": b'{"step":' + b"9" * 5000 + b',"command":{"command":"reset"}}',
+    "a step that no run has": b'{"step":100000001,"command":{"command":"reset"}}',
+}
+
+
+@pytest.mark.parametrize("line", UNREADABLE.values(), ids=UNREADABLE)
+def test_d3_a_log_that_no_parser_reads_is_refused_with_its_line(tmp_path, line):
+    file = tmp_path / "commands.jsonl"
+    file.write_bytes(ARMED + line + b"\n" + ARMED)
+    with pytest.raises(RunError) as caught:
+        ReplayedCommands(file)
+    said = str(caught.value)
+    assert said.startswith(f"{file}, line 2: ") and said.isprintable() and len(said) < 300 + len(str(file))
+
+
+@pytest.mark.parametrize("cut", range(1, 7))
+def test_d3_a_last_line_that_was_cut_off_within_a_letter_does_not_count(tmp_path, cut):
+    line = '{"step":1,"command":{"command":"shift_region","region":"ΩΩΩ"'.encode()[:-1]
+    (tmp_path / "commands.jsonl").write_bytes(ARMED + line[:-cut])
+    assert len(ReplayedCommands(tmp_path / "commands.jsonl").take(9)) == 1
+
+
+@pytest.mark.parametrize("index", ["9" * 5000, "٣", "-1", "01", "", "0.0"])
+def test_d4_an_index_that_is_none_is_refused(index):
+    with pytest.raises(CommandError, match="no setting"):
+        LiveSettings(load_scenario("paper")).change(f"goal.centre.{index}", 1.0)
+
+
+def test_a_log_of_an_older_version_is_refused_by_its_word(tmp_path):
+    (log := tmp_path / "orders.jsonl").write_bytes(b'{"step":0,"order":{"order":"arm","armed":true}}\n')
+    with pytest.raises(RunError, match=r"orders\.jsonl: has the words of an older version \('order'\), expected"):
+        ReplayedCommands(log)
