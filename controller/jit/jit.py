@@ -152,7 +152,10 @@ class _CacheFile(_NumbasCacheFile):  # type: ignore[misc]
     """
 
     def _load_index(self) -> Any:
-        return super()._load_index() if self._is_whole(self._index_path) else {}
+        try:
+            return super()._load_index() if self._is_whole(self._index_path) else {}
+        except (AttributeError, ImportError):  # an index of older sources, of which a class has gone
+            return {}
 
     def _load_data(self, name: str) -> Any:
         if not self._is_whole(self._data_path(name)):

@@ -7,6 +7,7 @@ import os
 import pkgutil
 import runpy
 import shutil
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -103,6 +104,20 @@ def test_d1_a_damaged_file_of_the_cache_is_made_anew(kept, damage, ending, caplo
     healed = load()
     assert healed(1.0) == 5.0 and healed.stats.cache_hits
     assert len(caplog.messages) == 1
+
+
+def test_an_index_whose_class_has_gone_is_made_anew(tmp_path, monkeypatch):
+    """As after an update that names a class otherwise."""
+    monkeypatch.syspath_prepend(tmp_path)
+    text = "from typing import NamedTuple\n\nclass Old(NamedTuple):\n    x: float\n\ndef it(a):\n    return a.x + 4.0\n"
+    for name in ("Old", "New"):
+        (tmp_path / "of_a_class.py").write_text(text.replace("Old", name))
+        importlib.invalidate_caches()
+        sys.modules.pop("of_a_class", None)
+        module._sources.cache_clear()
+        source = importlib.import_module("of_a_class")
+        monkeypatch.setattr(source, "__cached__", None)
+        assert compiled(source.it)(getattr(source, name)(1.0)) == 5.0
 
 
 @pytest.mark.skipif(os.name != "posix" or os.geteuid() == 0, reason="whoever runs this may read every file")
