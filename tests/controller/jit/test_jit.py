@@ -7,6 +7,7 @@ import os
 import pkgutil
 import runpy
 import shutil
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -105,6 +106,20 @@ def test_d1_a_damaged_file_of_the_cache_is_made_anew(kept, damage, ending, caplo
     assert len(caplog.messages) == 1
 
 
+def test_an_index_whose_class_has_gone_is_made_anew(tmp_path, monkeypatch):
+    """As after an update that names a class otherwise."""
+    monkeypatch.syspath_prepend(tmp_path)
+    text = "from typing import NamedTuple\n\nclass Old(NamedTuple):\n    x: float\n\ndef it(a):\n    return a.x + 4.0\n"
+    for name in ("Old", "New"):
+        (tmp_path / "of_a_class.py").write_text(text.replace("Old", name))
+        importlib.invalidate_caches()
+        sys.modules.pop("of_a_class", None)
+        module._sources.cache_clear()
+        source = importlib.import_module("of_a_class")
+        monkeypatch.setattr(source, "__cached__", None)
+        assert compiled(source.it)(getattr(source, name)(1.0)) == 5.0
+
+
 @pytest.mark.skipif(os.name != "posix" or os.geteuid() == 0, reason="whoever runs this may read every file")
 def test_d1_a_file_that_cannot_be_read_is_made_anew(kept, caplog):
     load, files = kept
@@ -193,7 +208,7 @@ def lean_functions():
 def test_what_counts_no_references_calls_nothing_that_returns_an_array():
     """Its result would never be freed."""
     functions = lean_functions()
-    assert "controller.regions.visibility.visibility" in functions and "cosim.batch.c_calls.read" in functions
+    assert "controller.regions.visibility.visibility" in functions and "cosim.batch.c_calls.fmi_get" in functions
     for name, function in functions.items():
         python = function.py_func
         for called in (python.__globals__.get(word) for word in python.__code__.co_names):
