@@ -25,11 +25,11 @@ from cosim.mavlink.conformance.connect import qgc_connect
 from cosim.mavlink.conformance.vehicle import own_vehicle
 from cosim.mavlink.messages import MESSAGES
 from cosim.mavlink.thread import LinkThread
-from cosim.mavlink.vehicle.vehicle_context import Vessel
+from cosim.mavlink.vehicle.vehicle_context import VehicleContext
 from cosim.mavlink.wire.dialect import dialect
 from cosim.mavlink.wire.framing import Counts, Gate
 from cosim.mavlink.wire.link import Link, Signer
-from cosim.mavlink.wire.message_sink import Outlet
+from cosim.mavlink.wire.message_sink import MessageSink
 from cosim.mavlink.wire.options import PROFILES, MavlinkOptions
 from cosim.mavlink.wire.signing import SigningClock
 from cosim.scenario.scenario import load_scenario
@@ -56,21 +56,21 @@ class Seventeen:
     """
 
     def __init__(self, master: Master) -> None:
-        self._vessel = Vessel(master.scenario, master.signals.columns, MavlinkOptions(), None)
+        self._context = VehicleContext(master.scenario, master.signals.columns, MavlinkOptions(), None)
         self._row: Array | None = None
         self._rounds = 0
         self._began = time.monotonic()
         self.busy = 0.0
 
-    def attach(self, link: Outlet) -> None:
+    def attach(self, link: MessageSink) -> None:
         """Begin to send on a link."""
-        self._vessel.links.append(link)
+        self._context.links.append(link)
 
     def observe(self, row: Array) -> None:
         """Keep the row, to be shown."""
         self._row = row
 
-    def receive(self, link: Outlet, message: Any, now: float) -> None:
+    def receive(self, link: MessageSink, message: Any, now: float) -> None:
         """Answer, as to a request for a parameter."""
         self._send(_SENT[0])
 
@@ -78,13 +78,13 @@ class Seventeen:
         """Send what is due."""
         while self._row is not None and self._rounds < (now - self._began) * _ROUNDS:
             self._rounds += 1
-            self._vessel.look(self._row)
+            self._context.look(self._row)
             for number in _SENT:
                 self._send(number)
 
     def _send(self, number: int) -> None:
-        for message in MESSAGES[number].build(self._vessel):
-            self._vessel.send(message)
+        for message in MESSAGES[number].build(self._context):
+            self._context.send(message)
 
     def close(self, now: float) -> None:
         """Note how much of a processor the thread took."""

@@ -8,14 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controller.errors import LawError
-from controller.jit.jit import lean
+from controller.jit.jit import jit_noalloc
 
 Array = NDArray[np.float64]
 
 _ROUNDING = 1e-12  # of the greatest force: what is smaller asks for nothing
 
 
-@lean
+@jit_noalloc
 def _greatest(forces: Array) -> float:
     """Return the greatest magnitude [N]; NaN if there is one."""
     greatest = 0.0
@@ -27,7 +27,7 @@ def _greatest(forces: Array) -> float:
     return greatest
 
 
-@lean
+@jit_noalloc
 def clip_each(forces: Array, lower: Array, upper: Array) -> bool:
     """Cut thruster forces [N], shape (n,), in place, each at its own limits, and return whether any was beyond them.
 
@@ -41,7 +41,7 @@ def clip_each(forces: Array, lower: Array, upper: Array) -> bool:
     return cut
 
 
-@lean
+@jit_noalloc
 def keep_direction(forces: Array, lower: Array, upper: Array) -> bool:
     """Scale thruster forces [N], shape (n,), in place until all are within limits, and return whether any was beyond.
 
@@ -59,7 +59,7 @@ def keep_direction(forces: Array, lower: Array, upper: Array) -> bool:
     return scale < 1.0
 
 
-@lean
+@jit_noalloc
 def allocate(inverse: Array, lower: Array, upper: Array, direction: bool, tau: Array, forces: Array) -> bool:
     """Write the least-squares thruster forces for a wrench, within limits, into `forces`.
 

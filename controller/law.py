@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controller.errors import LawError
-from controller.jit.bound_call import Repeated
+from controller.jit.bound_call import BoundCall
 from controller.regions import PackedRegions
 
 Array = NDArray[np.float64]
@@ -157,7 +157,7 @@ class CompiledLaw:
         """
         raise NotImplementedError
 
-    def face(self, quaternion: Array) -> None:
+    def set_attitude(self, quaternion: Array) -> None:
         """Keep another attitude from the next step on.
 
         Parameters
@@ -170,7 +170,7 @@ class CompiledLaw:
         LawError
             If it is not of length 1.
         """
-        self.memory.desired_quaternion[:] = checked_quaternion(quaternion)
+        self.memory.desired_quaternion[:] = validate_quaternion(quaternion)
 
     @property
     def estimate(self) -> Array:
@@ -208,8 +208,8 @@ class CompiledLaw:
         self._step(state, goal, regions, weights, self.gains, self.memory, forces)
 
     @functools.cached_property
-    def _step(self) -> Repeated:
-        return Repeated(type(self).function)
+    def _step(self) -> BoundCall:
+        return BoundCall(type(self).function)
 
 
 class WrenchLaw(CompiledLaw):
@@ -250,7 +250,7 @@ class WrenchLaw(CompiledLaw):
 
     def __init__(self, gains: Any, desired_quaternion: Array, period: float, n_regions: int) -> None:
         self.gains = self.checked(gains)
-        desired, lasting = checked_quaternion(desired_quaternion), np.array([checked_period(period)])
+        desired, lasting = validate_quaternion(desired_quaternion), np.array([checked_period(period)])
         self.memory = type(self).memory_of(desired, lasting, n_regions)
 
 
@@ -277,7 +277,7 @@ def checked_period(period: float) -> float:
     return period
 
 
-def checked_quaternion(quaternion: Array) -> Array:
+def validate_quaternion(quaternion: Array) -> Array:
     """Return a desired attitude as an array of its own, shape (4,).
 
     Parameters

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from controller.jit.jit import compiled, lean
+from controller.jit.jit import compiled, jit_noalloc
 from controller.quaternion import Vector3, error_parts, rotation_rows
 
 Array = NDArray[np.float64]
@@ -32,7 +32,7 @@ class Gains(NamedTuple):
     gamma: float = 2.0  # s2/kg, s2/(kg m2): Gamma = gamma I (27)
 
 
-@lean
+@jit_noalloc
 def violation(value: float) -> float:
     """Return max(0, g) of a `value` g, as in (16), (17), (20) and (22).
 
@@ -65,7 +65,7 @@ def primary_error(value: float, gradient: Array) -> Array:
     return violation(value) * gradient
 
 
-@lean
+@jit_noalloc
 def secondary_parts(values: Array, gradients: Array, alphas: Array, k_q: float) -> Vector3:
     """Return e_s as `secondary_error` does, of alphas, shape (n,), of which beta_i = alpha_i / k_q."""
     x, y, z = 0.0, 0.0, 0.0
@@ -98,7 +98,7 @@ def secondary_error(values: Array, gradients: Array, betas: Array) -> Array:
     return e_s
 
 
-@lean
+@jit_noalloc
 def in_body(R: Rows, x: Vector3) -> Vector3:
     """Return R^T x, a world vector seen from the body."""
     return (
@@ -108,7 +108,7 @@ def in_body(R: Rows, x: Vector3) -> Vector3:
     )
 
 
-@lean
+@jit_noalloc
 def apply(
     e_p: Vector3,
     e_s: Vector3,
@@ -164,13 +164,13 @@ def apply(
         estimate[1 + i] += period / gains.gamma * turning[i]
 
 
-@lean
+@jit_noalloc
 def turned_by(k: Vector3, x: float, y: float, z: float) -> Vector3:
     """Return S(k) [x y z]^T = k x [x y z]^T: (4)."""
     return k[1] * z - k[2] * y, k[2] * x - k[0] * z, k[0] * y - k[1] * x
 
 
-@lean
+@jit_noalloc
 def step(
     quaternion: Array,
     velocity_body: Array,

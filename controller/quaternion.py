@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from controller.jit.jit import compiled, lean
+from controller.jit.jit import compiled, jit_noalloc
 
 Array = NDArray[np.float64]
 Vector3 = tuple[float, float, float]
@@ -32,7 +32,7 @@ def skew(a: Array) -> Array:
     return np.array([[0.0, -a[2], a[1]], [a[2], 0.0, -a[0]], [-a[1], a[0], 0.0]])
 
 
-@lean
+@jit_noalloc
 def rotation_rows(e: Array) -> tuple[Vector3, Vector3, Vector3]:
     """Return the rows of R, from body to world, of a unit quaternion `e`: (3)."""
     e0, e1, e2, e3 = e[0], e[1], e[2], e[3]
@@ -43,7 +43,7 @@ def rotation_rows(e: Array) -> tuple[Vector3, Vector3, Vector3]:
     )
 
 
-@lean
+@jit_noalloc
 def write_rotation(e: Array, R: Array) -> None:
     """Write R, shape (3, 3), from body to world, of a unit quaternion: (3)."""
     (R[0, 0], R[0, 1], R[0, 2]), (R[1, 0], R[1, 1], R[1, 2]), (R[2, 0], R[2, 1], R[2, 2]) = rotation_rows(e)
@@ -89,7 +89,7 @@ def multiply(a: Array, b: Array) -> Array:
     )
 
 
-@lean
+@jit_noalloc
 def error_parts(desired: Array, actual: Array) -> Vector4:
     """Return the parts of desired^-1 * actual, the error of the shortest rotation (scalar part >= 0): (23)."""
     d0, d1, d2, d3 = desired[0], desired[1], desired[2], desired[3]
@@ -112,7 +112,7 @@ def error(desired: Array, actual: Array) -> Array:
     return e
 
 
-@lean
+@jit_noalloc
 def down_parts(e: Array) -> Vector3:
     """Return the parts of k = R^T e3: the direction of gravity seen from the body, for (12)."""
     e0, e1, e2, e3 = e[0], e[1], e[2], e[3]

@@ -18,7 +18,7 @@ from fuzzy_arbiter.command_line.files import read_text, require_suffix
 from fuzzy_arbiter.command_line.values import evaluated, evaluated_table, sample
 from fuzzy_arbiter.engines import ENGINES
 from fuzzy_arbiter.errors import ArbiterError, InputError, one_line
-from fuzzy_arbiter.files import write_whole
+from fuzzy_arbiter.files import write_atomic
 
 FINDINGS, FAULT, INTERRUPTED, NO_READER = 1, 2, 130, 141
 
@@ -98,9 +98,9 @@ def _parser() -> argparse.ArgumentParser:
     evaluate.add_argument("--out", metavar="FILE", help="file to write (default: standard output)")
     evaluate.add_argument("--json", action="store_true", help="JSON in the place of text")
 
-    why = verb("explain", "which rules fire for a sample, how strongly, and which decide")
-    why.add_argument("values", nargs="*", metavar="VALUE", help=values)
-    why.add_argument("--json", action="store_true", help="JSON in the place of text")
+    engine_reason = verb("explain", "which rules fire for a sample, how strongly, and which decide")
+    engine_reason.add_argument("values", nargs="*", metavar="VALUE", help=values)
+    engine_reason.add_argument("--json", action="store_true", help="JSON in the place of text")
 
     verify = verb("verify", "whether the rules are complete and consistent; exit status 1 if not", engine=False)
     verify.add_argument("--json", action="store_true", help="JSON in the place of text")
@@ -239,7 +239,7 @@ def _run(options: argparse.Namespace) -> int:
     elif options.verb == "plot":
         assumed = middles(options.at, system) if options.kind == "rules" else []
         figure = draw(arbiter, options.kind, options.input, options.output, [*options.at, *assumed], options.relief)
-        write_whole(options.out, image(figure, Path(options.out).suffix[1:].lower()))
+        write_atomic(options.out, image(figure, Path(options.out).suffix[1:].lower()))
         if assumed:
             _tell(f"drawn at the middle of each input that --at leaves out: {' '.join(assumed)}")
         print(options.out)
@@ -259,7 +259,7 @@ def _evaluate(arbiter: Arbiter, options: argparse.Namespace) -> None:
     if options.out is None:
         print(text)
     else:
-        write_whole(options.out, f"{text}\n".encode())
+        write_atomic(options.out, f"{text}\n".encode())
 
 
 if __name__ == "__main__":

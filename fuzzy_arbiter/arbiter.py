@@ -85,7 +85,7 @@ class Arbiter:
         return self._engine.name
 
     @property
-    def why(self) -> str:
+    def engine_reason(self) -> str:
         """Why it is this engine."""
         return self._why
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from fuzzy_arbiter.errors import FormatError
 
 
-def write_whole(path: str | Path, data: bytes) -> None:
+def write_atomic(path: str | Path, data: bytes) -> None:
     """Write a file that appears whole or not at all, and replaces an older one.
 
     Parameters

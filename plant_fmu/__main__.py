@@ -19,7 +19,7 @@ def _missing(error: ModuleNotFoundError) -> str:
 
 
 try:
-    from plant_fmu.archive import write_whole
+    from plant_fmu.archive import write_atomic
     from plant_fmu.build import FMI_VERSIONS, build_fmu
     from plant_fmu.check import Verdict, check_fmu
     from plant_fmu.compiling.platforms import ALL, NATIVE, PLATFORMS
@@ -108,7 +108,7 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _write(out: Path, text: str) -> Path:
-    write_whole(out, text.encode())
+    write_atomic(out, text.encode())
     return out
 
 
@@ -198,7 +198,7 @@ def _run(options: argparse.Namespace) -> int:
         print(documentation(vehicle), end="")
     elif options.verb == "plot":
         figure = PICTURES[options.picture](vehicle)
-        write_whole(options.out, image(figure, options.out.suffix[1:].lower()))
+        write_atomic(options.out, image(figure, options.out.suffix[1:].lower()))
         print(options.out)
     elif options.verb == "ssv":
         print(_write(options.out or Path(f"{vehicle.name}.ssv"), ssv(vehicle)))

@@ -37,7 +37,7 @@ def require_place(out: Path) -> None:
         raise BuildError(f"{out}: {error.strerror or error}") from error
 
 
-def write_whole(out: Path, data: bytes) -> None:
+def write_atomic(out: Path, data: bytes) -> None:
     """Write a file that appears whole or not at all, and replaces an older one.
 
     Parameters
@@ -79,7 +79,7 @@ def write_archive(out: Path, members: Mapping[str, bytes]) -> None:
     BuildError
         If `out` cannot be written, or is there and is no file.
     """
-    write_whole(out, archive_of(members))
+    write_atomic(out, archive_of(members))
 
 
 def archive_of(members: Mapping[str, bytes]) -> bytes:

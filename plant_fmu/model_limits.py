@@ -19,7 +19,7 @@ _IDENTIFIER = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.+ -]{0,199}")
 _INTERFACES = ("CoSimulation", "ModelExchange", "ScheduledExecution")
 
 
-def require_sane(path: Path, root: ET.Element) -> None:
+def validate_description(path: Path, root: ET.Element) -> None:
     """Refuse a model description that would lead an importer astray.
 
     Parameters

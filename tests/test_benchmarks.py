@@ -114,7 +114,7 @@ def test_figures_have_their_unit(seconds, text):
 # ---- taking turns ----
 
 
-class Told:
+class KnownScene:
     """A contestant that takes what it is told, and notes when it had its turn."""
 
     def __init__(self, name, log, each=1.0, fails_at=None):
@@ -129,14 +129,16 @@ class Told:
 
 def test_contestants_take_turns_and_one_that_fails_leaves_the_others_alone():
     log = []
-    found = take_turns([Told("a", log), "missing", Told("b", log, 2.0), Told("c", log, fails_at=2)], 0.0, 3, count=1)
+    found = take_turns(
+        [KnownScene("a", log), "missing", KnownScene("b", log, 2.0), KnownScene("c", log, fails_at=2)], 0.0, 3, count=1
+    )
     assert found == [Timing((1.0,) * 3), "missing", Timing((2.0,) * 3), "broke"]
     assert "".join(log) == "abcabcab"
 
 
 def test_items_are_counted_for_the_budget():
     log = []
-    count = count_for(Told("a", log, 1e-6), 0.25)
+    count = count_for(KnownScene("a", log, 1e-6), 0.25)
     assert 0.25 <= 1e-6 * count < 1.0
     assert len(log) < 10
 
@@ -153,7 +155,7 @@ def test_one_that_cannot_begin_is_told_in_its_row():
 def test_the_exponent_of_a_growth_is_found():
     assert growth([1, 10, 100], [3.0, 3e2, 3e4]) == pytest.approx(2.0)
     log = []
-    curve = Curve("a step", "things", {n: lambda _, n=n: Told("a", log, n**1.5) for n in (1, 4, 16)}, count=1)
+    curve = Curve("a step", "things", {n: lambda _, n=n: KnownScene("a", log, n**1.5) for n in (1, 4, 16)}, count=1)
     assert curve.measure(0.0, 2).notes[0] == "exponent 1.50; from one size to the next 1.50, 1.50"
 
 

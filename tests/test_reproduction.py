@@ -110,7 +110,7 @@ class AllOn:
         self.law.step(state, goal, regions, np.ones_like(weights), forces)
 
 
-class Way:
+class SampledPath:
     """Observer that keeps the position."""
 
     def __init__(self, master):
@@ -130,7 +130,7 @@ def test_what_the_arbiter_changes_at_the_printed_gains(name, said):
         scenario = load_scenario(name, ["arbiter.engine=closed", "time.duration=20"])
         law = law_of(scenario)
         with Master(scenario, AllOn(law) if all_on else law) as master:
-            kept = Way(master)
+            kept = SampledPath(master)
             master.run([kept])
         ways.append(np.array(kept.rows))
     assert f"{1e3 * np.abs(ways[0] - ways[1]).max():.1f} mm (`{name}`)" == said

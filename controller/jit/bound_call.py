@@ -22,7 +22,7 @@ from numba.np import arrayobj
 from numpy.typing import NDArray
 
 from controller.jit.function_pointer import address_of, called
-from controller.jit.jit import lean
+from controller.jit.jit import jit_noalloc
 
 _MOST = 8  # sets of arguments that are kept
 _NONE = (None,) * 7
@@ -41,14 +41,14 @@ class _Bound(NamedTuple):
     words: NDArray[np.uint64]
 
 
-class Repeated:
+class BoundCall:
     """A compiled function, faster from the third call on that is given the same objects.
 
     Parameters
     ----------
     function : callable
-        As `lean` or `compiled` give it, which returns nothing; a plain one is called as it is. It takes at most seven
-        arguments: arrays, numbers, and tuples of them; no array is resized in place.
+        As `jit_noalloc` or `compiled` give it, which returns nothing; a plain one is called as it is. It takes at most
+        seven arguments: arrays, numbers, and tuples of them; no array is resized in place.
     """
 
     def __init__(self, function: Any) -> None:
@@ -91,7 +91,7 @@ class Repeated:
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Leave out, of a copy, what is kept of these very arrays."""
-        return Repeated, (self._function,)
+        return BoundCall, (self._function,)
 
 
 def _nothing() -> None:
@@ -134,7 +134,7 @@ def _invoker(kinds: tuple[Any, ...]) -> Any:
     name = f"invoke_{hashlib.sha256(repr(kinds).encode()).hexdigest()[:16]}"
     copy = FunctionType(_invoke.__code__, {"_call": _intrinsic(call), "__name__": __name__}, name)
     copy.__qualname__ = name
-    return lean(copy)
+    return jit_noalloc(copy)
 
 
 def _invoke(entry: int, words: int) -> None:

@@ -30,7 +30,7 @@ def declare(function: Any, arguments: tuple[Any, ...], result: Any) -> None:
     Parameters
     ----------
     function : callable
-        As `part`, `lean` or `compiled` give it.
+        As `part`, `jit_noalloc` or `compiled` give it.
     arguments : tuple of Numba types
         Which it takes, and no others.
     result : Numba type
@@ -45,13 +45,13 @@ def declare(function: Any, arguments: tuple[Any, ...], result: Any) -> None:
         raise TypeError(f"{function.__name__} is called by address with {arguments}, expected {_signatures[function]}")
 
 
-def entry_of(function: Any, arguments: tuple[Any, ...] | None = None) -> int:
+def pointer_to(function: Any, arguments: tuple[Any, ...] | None = None) -> int:
     """Compile a function, and return its address.
 
     Parameters
     ----------
     function : callable
-        As `part`, `lean` or `compiled` give it; alive as long as the address is used.
+        As `part`, `jit_noalloc` or `compiled` give it; alive as long as the address is used.
     arguments : tuple, optional
         Such as it will be given; where not, it is declared.
 
@@ -97,7 +97,7 @@ def call(_address: int, function: Callable[..., Any], arguments: tuple[Any, ...]
     Parameters
     ----------
     _address : int
-        Of `entry_of`.
+        Of `pointer_to`.
     function : callable
         The same as there.
     arguments : tuple

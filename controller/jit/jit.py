@@ -57,7 +57,7 @@ def compiled(function: F, *others: Path) -> F:
     return _kept_on_disk(function, others, counting=True)
 
 
-def lean(function: F, *others: Path) -> F:
+def jit_noalloc(function: F, *others: Path) -> F:
     """Compile as `compiled` does a function that makes no array, and calls none that returns one.
 
     It does not count references to the arrays that it is given. In a loop that takes a microsecond a turn, the counting
@@ -79,7 +79,7 @@ def lean(function: F, *others: Path) -> F:
 
 
 def part(function: F) -> F:
-    """Compile as `lean` does what compiled functions call.
+    """Compile as `jit_noalloc` does what compiled functions call.
 
     What Python needs to call a function takes as long to compile as a short function does. A part has it only where
     Python calls it, as tests do.
@@ -87,7 +87,7 @@ def part(function: F) -> F:
     Parameters
     ----------
     function : callable
-        As for `lean`.
+        As for `jit_noalloc`.
 
     Returns
     -------
@@ -97,7 +97,7 @@ def part(function: F) -> F:
     return _kept_on_disk(function, (), counting=False, no_cpython_wrapper=True, no_cfunc_wrapper=True)
 
 
-class _Part(CPUDispatcher):
+class _Internal(CPUDispatcher):
     """A compiled function without what Python needs to call it: Numba would crash where Python does."""
 
     def __call__(self, *arguments: Any) -> Any:
@@ -106,7 +106,7 @@ class _Part(CPUDispatcher):
 
 
 @functools.cache
-def _callable(part: _Part) -> Any:
+def _callable(part: _Internal) -> Any:
     """Return the same function compiled for Python, too, under a name of its own on disk."""
     function = part.py_func
     twin = types.FunctionType(
@@ -114,7 +114,7 @@ def _callable(part: _Part) -> Any:
     )
     twin.__qualname__ = f"{function.__qualname__}_for_python"
     twin.__module__ = function.__module__
-    return lean(twin)
+    return jit_noalloc(twin)
 
 
 def _kept_on_disk(function: F, others: tuple[Path, ...], *, counting: bool, **without: bool) -> F:
@@ -139,7 +139,7 @@ def _kept_on_disk(function: F, others: tuple[Path, ...], *, counting: bool, **wi
     except AttributeError:
         jitted = numba.njit(**options)(function)
     if without and isinstance(jitted, CPUDispatcher):
-        jitted.__class__ = _Part
+        jitted.__class__ = _Internal
     result: F = jitted
     return result
 

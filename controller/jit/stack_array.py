@@ -24,7 +24,7 @@ _lower: Any = lower_builtin
 def zeros(*shape: int) -> NDArray[np.float64]:
     """Return an array of zeros, which in compiled code lasts until the function that asked for it returns.
 
-    A `lean` function may make it. It must not be returned, nor kept in what outlasts the call.
+    A `jit_noalloc` function may make it. It must not be returned, nor kept in what outlasts the call.
 
     Parameters
     ----------

@@ -7,7 +7,7 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 
 from controller import printed_law
-from controller.jit.jit import lean
+from controller.jit.jit import jit_noalloc
 from controller.law import Array, VehicleState, WrenchLaw
 from controller.printed_law import Gains
 from controller.regions import PackedRegions, evaluate_packed
@@ -31,7 +31,7 @@ class PrintedMemory(NamedTuple):
     alphas: Array  # (n,) gains of the regions times their weights
 
 
-@lean
+@jit_noalloc
 def step(
     state: VehicleState,
     goal: PackedRegions,

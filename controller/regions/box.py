@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from controller.jit.jit import lean
+from controller.jit.jit import jit_noalloc
 from controller.quaternion import rotation_matrix
 from controller.regions.geometry import product_distance, to_local, to_world
 from controller.regions.shape import Array, Bounds, Evaluation, Vector3, Vector4, about, require, require_finite, unit
@@ -43,7 +43,7 @@ class Box:
         return about(self.centre, reach.tolist())
 
 
-@lean
+@jit_noalloc
 def box(p: Array, q: Array) -> Evaluation:
     """Evaluate a packed `Box` at the position `p`."""
     x, y, z = to_local(p, q, 0)

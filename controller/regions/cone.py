@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import ClassVar
 
-from controller.jit.jit import lean
+from controller.jit.jit import jit_noalloc
 from controller.regions.geometry import clamp
 from controller.regions.shape import Array, Bounds, Evaluation, Vector3, ball_bounds, require, require_finite, unit
 
@@ -41,7 +41,7 @@ class Cone:
         return ball_bounds(self.feature, self.range)
 
 
-@lean
+@jit_noalloc
 def cone(p: Array, q: Array) -> Evaluation:
     """Evaluate a packed `Cone` at the position `p`."""
     # in the half-plane through the axis: `along` it, and `aside` from it

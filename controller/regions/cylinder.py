@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import ClassVar
 
-from controller.jit.jit import lean
+from controller.jit.jit import jit_noalloc
 from controller.regions.geometry import product_distance
 from controller.regions.shape import (
     UP_TO_ROUNDING,
@@ -51,7 +51,7 @@ class Cylinder:
         return join(discs)
 
 
-@lean
+@jit_noalloc
 def cylinder(p: Array, q: Array) -> Evaluation:
     """Evaluate a packed `Cylinder` at the position `p`."""
     x, y, z = p[0] - q[0], p[1] - q[1], p[2] - q[2]

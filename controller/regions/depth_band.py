@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from math import inf
 from typing import ClassVar
 
-from controller.jit.jit import lean
+from controller.jit.jit import jit_noalloc
 from controller.regions.shape import Array, Bounds, Evaluation, require, require_finite
 
 
@@ -32,13 +32,13 @@ class DepthBand:
         return (-inf, -inf, self.depth - self.tolerance), (inf, inf, self.depth + self.tolerance)
 
 
-@lean
+@jit_noalloc
 def band_about(z: float, tolerance: float) -> Evaluation:
     """Evaluate a band of a tolerance at a depth told from its middle [m]."""
     return z * z - tolerance * tolerance, 0.0, 0.0, 2.0 * z, abs(z) - tolerance
 
 
-@lean
+@jit_noalloc
 def depth_band(p: Array, q: Array) -> Evaluation:
     """Evaluate a packed `DepthBand` at the position `p`."""
     return band_about(p[2] - q[0], q[1])

@@ -8,7 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from controller.jit.jit import lean
+from controller.jit.jit import jit_noalloc
 from controller.quaternion import rotation_matrix
 from controller.regions.geometry import to_local, to_world
 from controller.regions.shape import Array, Bounds, Evaluation, Vector3, Vector4, about, require, require_finite, unit
@@ -46,7 +46,7 @@ class Ellipsoid:
         return about(self.centre, reach.tolist())
 
 
-@lean
+@jit_noalloc
 def ellipsoid(p: Array, q: Array) -> Evaluation:
     """Evaluate a packed `Ellipsoid` at the position `p`."""
     x, y, z = to_local(p, q, 0)
@@ -57,7 +57,7 @@ def ellipsoid(p: Array, q: Array) -> Evaluation:
     return g, wx, wy, wz, distance if g > 0.0 else -distance
 
 
-@lean
+@jit_noalloc
 def _surface_distance(x: float, y: float, z: float, a: float, b: float, c: float) -> float:
     """Distance from a point of the first octant to the surface.
 

@@ -7,18 +7,18 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from controller.jit.jit import lean
+from controller.jit.jit import jit_noalloc
 
 Array = NDArray[np.float64]
 
 
-@lean
+@jit_noalloc
 def clamp(x: float, low: float, high: float) -> float:
     """Return `x` moved into [low, high]."""
     return min(max(x, low), high)
 
 
-@lean
+@jit_noalloc
 def to_local(p: Array, q: Array, at: int) -> tuple[float, float, float]:
     """Return R^T (p - c) for a centre packed at `at` and a rotation matrix, row by row, behind it."""
     d0, d1, d2 = p[0] - q[at], p[1] - q[at + 1], p[2] - q[at + 2]
@@ -30,7 +30,7 @@ def to_local(p: Array, q: Array, at: int) -> tuple[float, float, float]:
     )
 
 
-@lean
+@jit_noalloc
 def to_world(q: Array, at: int, x: float, y: float, z: float) -> tuple[float, float, float]:
     """Return R (x, y, z) for a rotation matrix packed at `at`."""
     return (
@@ -40,7 +40,7 @@ def to_world(q: Array, at: int, x: float, y: float, z: float) -> tuple[float, fl
     )
 
 
-@lean
+@jit_noalloc
 def product_distance(first: float, second: float) -> tuple[float, float, float]:
     """Return the signed distance to the product of two sets in perpendicular directions, and how it follows each.
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from math import inf
 from typing import ClassVar
 
-from controller.jit.jit import lean
+from controller.jit.jit import jit_noalloc
 from controller.regions.shape import Array, Bounds, Evaluation, Vector3, require_finite, unit
 
 
@@ -32,7 +32,7 @@ class HalfSpace:
         return (-inf, -inf, -inf), (inf, inf, inf)
 
 
-@lean
+@jit_noalloc
 def half_space(p: Array, q: Array) -> Evaluation:
     """Evaluate a packed `HalfSpace` at the position `p`."""
     g = q[3] * (p[0] - q[0]) + q[4] * (p[1] - q[1]) + q[5] * (p[2] - q[2])

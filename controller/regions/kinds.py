@@ -8,7 +8,7 @@ import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
-from controller.jit.function_pointer import declare, entry_of
+from controller.jit.function_pointer import declare, pointer_to
 from controller.jit.jit import part
 from controller.regions.box import box
 from controller.regions.cone import cone
@@ -67,6 +67,6 @@ def addresses_of(kinds: NDArray[np.int64]) -> tuple[int, int]:
     """Return the addresses of what evaluates shapes of place and of attitude; 0 where these kinds need it not."""
     place = np.any((kinds != SPHERE) & (kinds != DEPTH_BAND) & (kinds < FIRST_OF_ATTITUDE))
     return (
-        entry_of(evaluate_shape) if place else 0,
-        entry_of(evaluate_shape_of_attitude) if np.any(kinds >= FIRST_OF_ATTITUDE) else 0,
+        pointer_to(evaluate_shape) if place else 0,
+        pointer_to(evaluate_shape_of_attitude) if np.any(kinds >= FIRST_OF_ATTITUDE) else 0,
     )

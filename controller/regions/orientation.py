@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from math import inf
 from typing import ClassVar
 
-from controller.jit.jit import lean
+from controller.jit.jit import jit_noalloc
 from controller.quaternion import error_parts
 from controller.regions.shape import Array, Bounds, EvaluationOfAttitude, Vector4, require, unit
 
@@ -38,7 +38,7 @@ class Orientation:
         return (-inf, -inf, -inf), (inf, inf, inf)
 
 
-@lean
+@jit_noalloc
 def orientation(p: Array, e: Array, q: Array) -> EvaluationOfAttitude:
     """Evaluate a packed `Orientation` at the attitude `e`, wherever that is."""
     turn = error_parts(q[:4], e)

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import ClassVar
 
-from controller.jit.jit import lean
+from controller.jit.jit import jit_noalloc
 from controller.regions.geometry import clamp
 from controller.regions.shape import Array, Bounds, Evaluation, Vector3, ball_bounds, join, require, require_finite
 
@@ -41,7 +41,7 @@ class Pipe:
         return join([ball_bounds(point, self.radius) for point in self.points])
 
 
-@lean
+@jit_noalloc
 def pipe(p: Array, q: Array) -> Evaluation:
     """Evaluate a packed `Pipe` at the position `p`."""
     nearest = math.inf

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import ClassVar
 
-from controller.jit.jit import lean
+from controller.jit.jit import jit_noalloc
 from controller.regions.geometry import clamp, product_distance
 from controller.regions.shape import Array, Bounds, Evaluation, Vector2, require, require_finite
 
@@ -79,7 +79,7 @@ def _touches_itself(corners: tuple[Vector2, ...]) -> bool:
     return False
 
 
-@lean
+@jit_noalloc
 def prism(p: Array, q: Array) -> Evaluation:
     """Evaluate a packed `Prism` at the position `p`."""
     n = (q.size - 2) // 2

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from controller.errors import RegionError
 from controller.jit.function_pointer import call
-from controller.jit.jit import inlined, lean, part
+from controller.jit.jit import inlined, jit_noalloc, part
 from controller.jit.stack_array import zeros
 from controller.regions.box import Box
 from controller.regions.cone import Cone
@@ -181,7 +181,7 @@ def _unpickled(arrays: tuple[Any, ...]) -> PackedRegions:
     return PackedRegions(*fields)
 
 
-@lean
+@jit_noalloc
 def evaluate_packed(
     regions: PackedRegions,
     position: Array,
@@ -248,7 +248,7 @@ def clearance_of_place(regions: PackedRegions, i: int, position: Array, room: Ar
     return clearance
 
 
-@lean
+@jit_noalloc
 def clearance_at(regions: PackedRegions, i: int, position: Array) -> float:
     """Return the clearance [m] of one of the `regions`, `i`, where it is now, at a position, shape (3,) [m, NED].
 
@@ -259,7 +259,7 @@ def clearance_at(regions: PackedRegions, i: int, position: Array) -> float:
     return clearance_of_place(regions, i, position, zeros(3))
 
 
-@lean
+@jit_noalloc
 def clearance_of_pose(regions: PackedRegions, i: int, position: Array, quaternion: Array, room: Array) -> float:
     """Return the clearance of one of the `regions`, `i`, of any kind, [m] or [rad], at a pose; `room` has shape (3,).
 
@@ -282,7 +282,7 @@ def clearance_of_sphere(regions: PackedRegions, i: int, position: Array) -> floa
     return clearance
 
 
-@lean
+@jit_noalloc
 def attitude_clearance(regions: PackedRegions, i: int, position: Array, quaternion: Array, slope: Array) -> float:
     """Return the clearance [rad] of one of the `regions`, `i`, of attitude.
 
@@ -296,7 +296,7 @@ def attitude_clearance(regions: PackedRegions, i: int, position: Array, quaterni
     return clearance
 
 
-@lean
+@jit_noalloc
 def place_clearance(regions: PackedRegions, i: int, position: Array, slope: Array) -> float:
     """Return the clearance [m] of one of the `regions`, `i`, of position alone.
 
@@ -330,7 +330,7 @@ def clearances_at(points: Array, region: Region) -> Array:
     return clearances
 
 
-@lean
+@jit_noalloc
 def _clearances_at(regions: PackedRegions, points: Array, room: Array, clearances: Array) -> None:
     for i in range(points.shape[0]):
         if regions.kinds[0] < FIRST_OF_ATTITUDE:

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import ClassVar
 
-from controller.jit.jit import lean
+from controller.jit.jit import jit_noalloc
 from controller.regions.shape import Array, Bounds, Evaluation, Vector3, ball_bounds, require, require_finite
 
 
@@ -32,14 +32,14 @@ class Sphere:
         return ball_bounds(self.centre, self.radius)
 
 
-@lean
+@jit_noalloc
 def sphere_about(x: float, y: float, z: float, radius: float) -> Evaluation:
     """Evaluate a sphere of a radius at a place told from its centre [m]."""
     square = x * x + y * y + z * z
     return square - radius * radius, 2.0 * x, 2.0 * y, 2.0 * z, math.sqrt(square) - radius
 
 
-@lean
+@jit_noalloc
 def sphere(p: Array, q: Array) -> Evaluation:
     """Evaluate a packed `Sphere` at the position `p`."""
     return sphere_about(p[0] - q[0], p[1] - q[1], p[2] - q[2], q[3])

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from math import inf
 from typing import ClassVar
 
-from controller.jit.jit import lean
+from controller.jit.jit import jit_noalloc
 from controller.quaternion import rotation_rows
 from controller.regions.shape import Array, Bounds, EvaluationOfAttitude, Vector3, require, require_finite, unit
 
@@ -48,7 +48,7 @@ class Visibility:
         return (-inf, -inf, -inf), (inf, inf, inf)
 
 
-@lean
+@jit_noalloc
 def visibility(p: Array, e: Array, q: Array) -> EvaluationOfAttitude:
     """Evaluate a packed `Visibility` at the position `p` and the attitude `e`."""
     # the feature in the body frame: u from the origin, b from the camera

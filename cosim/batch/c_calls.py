@@ -16,7 +16,7 @@ from numba.core import cgutils
 from numba.extending import intrinsic
 from numpy.typing import NDArray
 
-from controller.jit.jit import lean
+from controller.jit.jit import jit_noalloc
 from plant_fmu.running.native import Native
 
 _WARNING = 1  # the highest status that is no failure
@@ -79,8 +79,8 @@ _do_step: Any = intrinsic(_do_step_code)
 _read_clock: Any = intrinsic(_read_clock_code)
 
 
-@lean
-def send(native: Native) -> bool:
+@jit_noalloc
+def fmi_set(native: Native) -> bool:
     """Send the inputs, and return whether the FMU took them."""
     n = native.inputs.size
     references, values = native.input_references.ctypes.data, native.inputs.ctypes.data
@@ -88,8 +88,8 @@ def send(native: Native) -> bool:
     return status <= _WARNING
 
 
-@lean
-def read(native: Native) -> bool:
+@jit_noalloc
+def fmi_get(native: Native) -> bool:
     """Read the outputs, and return whether the FMU gave them."""
     n = native.outputs.size
     references, values = native.output_references.ctypes.data, native.outputs.ctypes.data
@@ -97,8 +97,8 @@ def read(native: Native) -> bool:
     return status <= _WARNING
 
 
-@lean
-def advance(native: Native, now: float, step: float) -> bool:
+@jit_noalloc
+def fmi_do_step(native: Native, now: float, step: float) -> bool:
     """Step from `now` [s] by `step` [s], and return whether the FMU did, and does not ask to end the simulation."""
     status: int = _do_step(native.do_step, native.instance, now, step, native.results.ctypes.data)
     return status <= _WARNING and native.results[_ENDED] == 0
@@ -126,11 +126,11 @@ class Clock:
         self.numbers = np.array([address, which, ticks], dtype=np.int64)
 
 
-@lean
-def seconds(clock: NDArray[np.int64], room: NDArray[np.int64]) -> float:
-    """Return the time [s] of a `Clock`'s numbers; `room`, shape (2,), is what the C function fills."""
-    _read_clock(clock[0], clock[1], room.ctypes.data)
-    whole, rest = float(room[0]), float(room[1])
+@jit_noalloc
+def seconds(clock: NDArray[np.int64], workspace: NDArray[np.int64]) -> float:
+    """Return the time [s] of a `Clock`'s numbers; `workspace`, shape (2,), is what the C function fills."""
+    _read_clock(clock[0], clock[1], workspace.ctypes.data)
+    whole, rest = float(workspace[0]), float(workspace[1])
     if clock[1] < 0:
         return whole / float(clock[2])
     return whole + 1e-9 * rest

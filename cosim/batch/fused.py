@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 
 from controller import Allocation
 from controller.regions import pack
-from cosim.batch.fused_loop import OUTPUTS, Allocator, Array, Marks, Setup, flight_of, room_for
+from cosim.batch.fused_loop import OUTPUTS, Allocator, Array, FlightConfig, FlightMetrics, fused_loop_of, make_workspace
 from cosim.batch.outcome import OUTCOME, Flown, nothing
 from cosim.batch.variation import Variation
 from cosim.errors import RunError, ScenarioError
 from cosim.results.summary import SETTLED_FOR
-from cosim.scenario.law_factory import law_of, require_shipped
+from cosim.scenario.law_factory import law_of, require_builtin_law
 from cosim.scenario.scenario import CRITERIA, Scenario
 from cosim.scenario.start_values import start_values
 from cosim.simulation.sensor import STREAM
@@ -58,8 +58,8 @@ class FusedFlyer:
                 raise RunError(f"{key} is {came!r}, expected {expected!r} for flights without a record{way}")
             if key in variation.keys:
                 raise RunError(f"{key} varies, expected {expected!r} for flights without a record")
-        require_shipped(base)
-        self._flight = flight_of(base.law.name)
+        require_builtin_law(base)
+        self._flight = fused_loop_of(base.law.name)
         self._plant = Plant(base.vehicle)
 
     def fly(self, values: Array, seeds: NDArray[np.int64]) -> Flown:
@@ -125,9 +125,11 @@ class FusedFlyer:
         allocator, estimate = _allocator(scenario, setup) if through else _NONE, np.zeros(4)
         decisions = -(-scenario.steps // scenario.control_every)
         rows = np.zeros((decisions, 20 + len(inputs) + law.report.size) if trace else (0, 0))
-        room = room_for(len(scenario.regions), len(inputs), n)
-        marks = self._flight(setup, native, effectiveness, allocator, law.gains, law.memory, room, estimate, rows)
-        return _outcome(marks, setup, native, estimate), rows
+        workspace = make_workspace(len(scenario.regions), len(inputs), n)
+        metrics = self._flight(
+            setup, native, effectiveness, allocator, law.gains, law.memory, workspace, estimate, rows
+        )
+        return _outcome(metrics, setup, native, estimate), rows
 
     def close(self) -> None:
         """Free the plant. May be called twice."""
@@ -142,7 +144,7 @@ class FusedFlyer:
         self.close()
 
 
-def _setup(scenario: Scenario, thrusters: int) -> Setup:
+def _setup(scenario: Scenario, thrusters: int) -> FlightConfig:
     sensing, step = scenario.sensing, scenario.time.step
     decisions = -(-scenario.steps // scenario.control_every)
     noise = np.zeros((0, 6))
@@ -150,7 +152,7 @@ def _setup(scenario: Scenario, thrusters: int) -> Setup:
         deviation = np.repeat([sensing.position_noise, sensing.velocity_noise], 3)
         noise = deviation * np.random.default_rng([sensing.seed, STREAM]).standard_normal((decisions, 6))
     failures = sorted((math.ceil(f.time / step - _ROUNDING), f.thruster - 1) for f in scenario.failures)
-    return Setup(
+    return FlightConfig(
         goal=pack([scenario.goal_region]),
         regions=pack([secondary.region for secondary in scenario.regions]),
         criteria=np.array([CRITERIA.index(secondary.criterion) for secondary in scenario.regions], np.int64),
@@ -173,7 +175,7 @@ def _setup(scenario: Scenario, thrusters: int) -> Setup:
     )
 
 
-def _allocator(scenario: Scenario, setup: Setup) -> Allocator:
+def _allocator(scenario: Scenario, setup: FlightConfig) -> Allocator:
     """Return a stage for each number of failures that have been told."""
     vehicle, limits = scenario.vehicle, scenario.actuation.limits
     health, stages = np.ones(vehicle.n_thrusters), []
@@ -186,26 +188,26 @@ def _allocator(scenario: Scenario, setup: Setup) -> Allocator:
     return Allocator(np.array(inverse), np.array(lower), np.array(upper), direction[0])
 
 
-def _outcome(marks: Marks, setup: Setup, native: Native, estimate: Array) -> NDArray[np.void]:
+def _outcome(metrics: FlightMetrics, setup: FlightConfig, native: Native, estimate: Array) -> NDArray[np.void]:
     def when(step: float) -> float:
         return step * setup.step if step >= 0 else math.nan
 
-    stopped = marks.failed_step >= 0
-    last = marks.failed_step if stopped else setup.steps
-    stayed = (last - marks.last_entered) * setup.step if marks.inside else 0.0
+    stopped = metrics.failed_step >= 0
+    last = metrics.failed_step if stopped else setup.steps
+    stayed = (last - metrics.last_entered) * setup.step if metrics.inside else 0.0
     fields = {
-        "reached": marks.first_inside >= 0,
-        "reach_time": when(marks.first_inside),
-        "settled": marks.inside and stayed >= SETTLED_FOR,
-        "settle_time": when(marks.last_entered),
-        "violated": marks.least_clearance < 0.0 or marks.least_angle < 0.0,
-        "min_clearance": marks.least_clearance,
-        "closest_to_goal": -marks.goal_clearance,
-        "effort": marks.effort,
-        "max_force": marks.max_force,
-        "max_speed": marks.max_speed,
+        "reached": metrics.first_inside >= 0,
+        "reach_time": when(metrics.first_inside),
+        "settled": metrics.inside and stayed >= SETTLED_FOR,
+        "settle_time": when(metrics.last_entered),
+        "violated": metrics.least_clearance < 0.0 or metrics.least_angle < 0.0,
+        "min_clearance": metrics.least_clearance,
+        "closest_to_goal": -metrics.goal_clearance,
+        "effort": metrics.effort,
+        "max_force": metrics.max_force,
+        "max_speed": metrics.max_speed,
         **{f"final_{axis}": native.outputs[i] for i, axis in enumerate("xyz")},
         **{f"phi{i + 1}": estimate[i] for i in range(4)},
-        "stopped_at": when(marks.failed_step),
+        "stopped_at": when(metrics.failed_step),
     }
     return np.array(tuple(fields[name] for name in OUTCOME.names or ()), OUTCOME)

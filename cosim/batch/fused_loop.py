@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 import plant_fmu
 from controller import LAWS, CompiledLaw, VehicleState
 from controller.allocation import allocate
-from controller.jit.jit import compiled, lean
+from controller.jit.jit import compiled, jit_noalloc
 from controller.laws import printed
 from controller.regions import (
     Orientation,
@@ -29,7 +29,7 @@ from controller.regions import (
     clearance_of_pose,
     clearance_of_sphere,
 )
-from cosim.batch.c_calls import advance, read, seconds, send
+from cosim.batch.c_calls import fmi_do_step, fmi_get, fmi_set, seconds
 from cosim.simulation.memberships import SOURCES, compute_memberships
 from fuzzy_arbiter import Arbiter
 from plant_fmu.running.native import Native
@@ -40,12 +40,12 @@ Array = NDArray[np.float64]
 _FOREIGN = (*SOURCES, Path(plant_fmu.__file__).parent / "running")
 
 _weigh: Any = numba.njit(_nrt=False)(Arbiter().compiled().py_func)  # type: ignore[call-overload]
-_step: Any = printed.step  # of a law, and whether it gives a wrench: `flight_of` puts others in their places
+_step: Any = printed.step  # of a law, and whether it gives a wrench: `fused_loop_of` puts others in their places
 _is_wrench = True
 _SPHERE, _ATTITUDE = Sphere.kind, Orientation.kind
 
 
-class Setup(NamedTuple):
+class FlightConfig(NamedTuple):
     """What a flight is made of, beside law and plant."""
 
     goal: PackedRegions
@@ -78,7 +78,7 @@ class Allocator(NamedTuple):
     direction: bool
 
 
-class Room(NamedTuple):
+class Workspace(NamedTuple):
     """Where a flight is computed."""
 
     state: VehicleState  # as it is told
@@ -94,7 +94,7 @@ class Room(NamedTuple):
     ticks: NDArray[np.int64]  # (2,)
 
 
-def room_for(regions: int, inputs: int, thrusters: int) -> Room:
+def make_workspace(regions: int, inputs: int, thrusters: int) -> Workspace:
     """Return room for a flight.
 
     Parameters
@@ -110,12 +110,12 @@ def room_for(regions: int, inputs: int, thrusters: int) -> Room:
     n = regions
     state = VehicleState(np.zeros(3), np.zeros(4), np.zeros(6), np.ones(thrusters))
     of_regions = np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(1)
-    return Room(
+    return Workspace(
         state, np.zeros(3), np.zeros(3), *of_regions, np.zeros(6), np.zeros(inputs), np.zeros(3), np.zeros(2, np.int64)
     )
 
 
-class Marks(NamedTuple):
+class FlightMetrics(NamedTuple):
     """What a flight came to. Steps are those of the plant; -1: there was none."""
 
     first_inside: float  # step at which it was inside the goal region first
@@ -141,13 +141,13 @@ OUTPUTS = (
 
 
 def _fly(  # noqa: C901 - one loop, as a whole
-    setup: Setup,
+    setup: FlightConfig,
     native: Native,
     effectiveness: Native,
     allocator: Allocator,
     gains: Any,
     memory: Any,
-    room: Room,
+    workspace: Workspace,
     estimate: Array,
     trace: Array,
 ) -> tuple[float, ...]:
@@ -155,7 +155,7 @@ def _fly(  # noqa: C901 - one loop, as a whole
 
     Parameters
     ----------
-    setup : Setup
+    setup : FlightConfig
         What is flown.
     native : Native
         The plant: inputs are the thrust commands, or the wrench; outputs `OUTPUTS`, then the thrusters' forces if they
@@ -166,8 +166,8 @@ def _fly(  # noqa: C901 - one loop, as a whole
         For a wrench that thrusters carry.
     gains, memory : NamedTuple
         The law's.
-    room : Room
-        Of `room_for`, anew for each flight.
+    room : Workspace
+        Of `make_workspace`, anew for each flight.
     estimate : ndarray, shape (4,)
         Receives the estimate that the last decision rests on.
     trace : ndarray, shape (control steps, 20 + i + r) or (0, 0)
@@ -177,12 +177,12 @@ def _fly(  # noqa: C901 - one loop, as a whole
     Returns
     -------
     tuple
-        What `Marks` is made of, of the whole flight, or up to where the FMU failed. Were it a named tuple, Numba would
-        call Python to make it, and crash where that raises, as after Ctrl-C in mid-flight.
+        The fields of `FlightMetrics`, of the whole flight, or up to where the FMU failed. Numba would call Python to
+        make a named tuple, and crash where that raises, as after Ctrl-C in mid-flight.
     """
     m, n, inputs = setup.thrusters, setup.regions.kinds.size, native.inputs
-    state, weights, clearances, seen = room.state, room.weights, room.clearances, room.seen
-    memberships, by_criterion, goal_clearance = room.memberships, room.by_criterion, room.goal_clearance
+    state, weights, clearances, seen = workspace.state, workspace.weights, workspace.clearances, workspace.seen
+    memberships, by_criterion, goal_clearance = workspace.memberships, workspace.by_criterion, workspace.goal_clearance
     position, quaternion = native.outputs[:3], native.outputs[3:7]
     first_inside, last_entered, inside = -1, -1, False
     least, least_angle, most = np.inf, np.inf, -np.inf
@@ -190,7 +190,7 @@ def _fly(  # noqa: C901 - one loop, as a whole
     max_force, max_speed, worst, refused = 0.0, 0.0, 0.0, -1
     failures, told = 0, 0
     timed = setup.clock.size > 0
-    if not read(native):
+    if not fmi_get(native):
         refused = 0
 
     for k in range(setup.steps + 1):
@@ -204,13 +204,13 @@ def _fly(  # noqa: C901 - one loop, as a whole
                 state.thruster_health[setup.failed[failures]] = 0.0
                 told = min(told + 1, allocator.lower.shape[0] - 1)
             failures += 1
-            if not send(effectiveness):
+            if not fmi_set(effectiveness):
                 refused = k
         # marks
         if setup.moving or k == 0:
             _move(setup, now)
-        _clearances(setup.regions, position, quaternion, clearances, room.at)
-        _clearances(setup.goal, position, quaternion, goal_clearance, room.at)
+        _clearances(setup.regions, position, quaternion, clearances, workspace.at)
+        _clearances(setup.goal, position, quaternion, goal_clearance, workspace.at)
         for i in range(n):
             if setup.regions.hard[i]:
                 if setup.regions.kinds[i] < _ATTITUDE:
@@ -239,7 +239,7 @@ def _fly(  # noqa: C901 - one loop, as a whole
         if arbitrates and _is_finite(state.position):
             told_clearances = clearances
             if not setup.exact:
-                _clearances(setup.regions, state.position, state.quaternion, seen, room.at)
+                _clearances(setup.regions, state.position, state.quaternion, seen, workspace.at)
                 told_clearances = seen
             compute_memberships(told_clearances, setup.criteria, setup.ramp, memberships)
             _weigh(memberships, by_criterion)
@@ -247,25 +247,25 @@ def _fly(  # noqa: C901 - one loop, as a whole
                 weights[i] = by_criterion[setup.criteria[i]]
         # law and allocation
         if controls:
-            started = seconds(setup.clock, room.ticks) if timed else 0.0
+            started = seconds(setup.clock, workspace.ticks) if timed else 0.0
             if m == 0 or not _is_wrench:
                 _step(state, setup.goal, setup.regions, weights, gains, memory, inputs)
             else:
-                _step(state, setup.goal, setup.regions, weights, gains, memory, room.wrench)
+                _step(state, setup.goal, setup.regions, weights, gains, memory, workspace.wrench)
                 lower, upper = allocator.lower[told], allocator.upper[told]
-                allocate(allocator.inverse[told], lower, upper, allocator.direction, room.wrench, inputs)
+                allocate(allocator.inverse[told], lower, upper, allocator.direction, workspace.wrench, inputs)
             if timed:
-                worst = max(worst, seconds(setup.clock, room.ticks) - started)
+                worst = max(worst, seconds(setup.clock, workspace.ticks) - started)
             if trace.shape[0]:
                 _trace(trace[k // setup.control_every], now, native, state.position, by_criterion, memory.report)
             for j in range(inputs.size):
-                variation += abs(inputs[j] - room.before[j])
-                room.before[j] = inputs[j]
-            if not send(native):
+                variation += abs(inputs[j] - workspace.before[j])
+                workspace.before[j] = inputs[j]
+            if not fmi_set(native):
                 refused = k
                 break
         # plant
-        if not (advance(native, now, setup.step) and read(native)):
+        if not (fmi_do_step(native, now, setup.step) and fmi_get(native)):
             refused = k
             break
         for j in range(m):
@@ -280,8 +280,8 @@ def _fly(  # noqa: C901 - one loop, as a whole
     )  # fmt: skip
 
 
-@lean
-def _measure(setup: Setup, k: int, now: float, truth: Array, state: VehicleState) -> None:
+@jit_noalloc
+def _measure(setup: FlightConfig, k: int, now: float, truth: Array, state: VehicleState) -> None:
     """Write what is told at plant step `k` as `sensing.Sensor` does."""
     for i in range(4):
         state.quaternion[i] = truth[3 + i]
@@ -300,13 +300,13 @@ def _measure(setup: Setup, k: int, now: float, truth: Array, state: VehicleState
             state.velocity_body[i] += setup.noise[control, 3 + i]
 
 
-@lean
+@jit_noalloc
 def _is_finite(position: Array) -> bool:
     return math.isfinite(position[0]) and math.isfinite(position[1]) and math.isfinite(position[2])
 
 
-@lean
-def _move(setup: Setup, now: float) -> None:
+@jit_noalloc
+def _move(setup: FlightConfig, now: float) -> None:
     """Put all regions where they are at a time [s]."""
     for regions in (setup.goal, setup.regions):
         for i in range(regions.kinds.size):
@@ -314,17 +314,19 @@ def _move(setup: Setup, now: float) -> None:
                 regions.shifts[i, axis] = regions.velocities[i, axis] * now
 
 
-@lean
-def _clearances(regions: PackedRegions, position: Array, quaternion: Array, clearances: Array, room: Array) -> None:
+@jit_noalloc
+def _clearances(
+    regions: PackedRegions, position: Array, quaternion: Array, clearances: Array, workspace: Array
+) -> None:
     """Write the clearance of each region, [m] or [rad], at a pose into `clearances`."""
     for i in range(regions.kinds.size):
         if regions.kinds[i] == _SPHERE:
             clearances[i] = clearance_of_sphere(regions, i, position)
         else:
-            clearances[i] = clearance_of_pose(regions, i, position, quaternion, room)
+            clearances[i] = clearance_of_pose(regions, i, position, quaternion, workspace)
 
 
-@lean
+@jit_noalloc
 def _least(clearance: float, least: float) -> float:
     """Return the lesser of two numbers; what is no number stays."""
     return clearance if clearance < least or np.isnan(clearance) else least
@@ -341,7 +343,7 @@ def _trace(row: Array, now: float, native: Native, position: Array, weights: Arr
     row[20 + m :] = report
 
 
-def flight_of(law: str) -> Callable[..., Marks]:
+def fused_loop_of(law: str) -> Callable[..., FlightMetrics]:
     """Return the loop of `_fly` compiled for a law.
 
     Numba keeps nothing on disk of a function that is given another one, or closes over it. So each law has a copy of
@@ -355,16 +357,16 @@ def flight_of(law: str) -> Callable[..., Marks]:
     Returns
     -------
     callable
-        ``(setup, native, effectiveness, allocator, gains, memory, room, estimate, trace) -> Marks``.
+        ``(setup, native, effectiveness, allocator, gains, memory, workspace, estimate, trace) -> FlightMetrics``.
     """
     chosen: Any = LAWS[law]
     loop = _compiled(law, chosen)
-    return lambda *arguments: Marks(*loop(*arguments))
+    return lambda *arguments: FlightMetrics(*loop(*arguments))
 
 
 @functools.cache
 def _compiled(name: str, law: type[CompiledLaw]) -> Callable[..., tuple[Any, ...]]:
-    return lean(_plain(name, law), *_FOREIGN)
+    return jit_noalloc(_plain(name, law), *_FOREIGN)
 
 
 def _plain(name: str, law: type[CompiledLaw]) -> Callable[..., tuple[Any, ...]]:

@@ -123,10 +123,10 @@ class LanesFlyer:
             np.asarray(values, dtype=float).reshape(len(seeds), len(self.variation.keys)), seeds
         )
         flown = np.array([at for at in range(len(seeds)) if at not in refused], np.intp)
-        marks, reasons = self._fly_rows(np.ascontiguousarray(rows[flown]))
+        metrics, reasons = self._fly_rows(np.ascontiguousarray(rows[flown]))
         good = np.array([not reason for reason in reasons], np.bool_)
         refused |= {int(at): reason for at, reason in zip(flown, reasons, strict=True) if reason}
-        outcomes[flown[good]] = self._outcomes(marks[good])
+        outcomes[flown[good]] = self._outcomes(metrics[good])
         return Flown(outcomes, dict(sorted(refused.items())))
 
     def _fly_rows(self, rows: Array) -> tuple[Array, list[str]]:
@@ -134,23 +134,23 @@ class LanesFlyer:
         n, b = len(rows), self._batch
         n_regions = b.n_regions
         b.n_rows, b.moving = n, bool(rows[:, rows.shape[1] - 3 * n_regions :].any())
-        marks, refusals = np.zeros((n, len(_MARKS))), np.zeros(n, f"S{_REFUSAL}")
+        metrics, refusals = np.zeros((n, len(_MARKS))), np.zeros(n, f"S{_REFUSAL}")
         self._point("rows", rows)
-        self._point("marks", marks)
+        self._point("marks", metrics)
         self._point("refusals", refusals)
         if not self._fly(ctypes.byref(b)):
             raise MemoryError("no memory for the lanes")
-        return marks, [reason.decode("utf-8", "replace") for reason in refusals.tolist()]
+        return metrics, [reason.decode("utf-8", "replace") for reason in refusals.tolist()]
 
-    def _outcomes(self, marks: Array) -> Outcomes:
+    def _outcomes(self, metrics: Array) -> Outcomes:
         """Return the outcomes that marks come to."""
         step, steps = self._batch.step, self._batch.steps
-        told = dict(zip(_MARKS, marks.T, strict=True))
+        told = dict(zip(_MARKS, metrics.T, strict=True))
 
         def when(at: Array) -> Array:
             return np.where(at >= 0.0, at * step, np.nan)
 
-        out = nothing(len(marks))
+        out = nothing(len(metrics))
         inside, stopped = told["inside"] > 0.0, told["stopped"]
         last = np.where(stopped >= 0.0, stopped, steps)
         out["reached"], out["reach_time"] = told["first_inside"] >= 0.0, when(told["first_inside"])

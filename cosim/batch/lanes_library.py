@@ -16,7 +16,7 @@ from pathlib import Path
 
 import platformdirs
 
-from cosim.io.atomic_file import write_whole
+from cosim.io.atomic_file import write_atomic
 from fuzzy_arbiter import Arbiter
 from fuzzy_arbiter.export import to_c
 from plant_fmu.compiling.compiler import FLAGS, compile_library, find_compiler
@@ -107,7 +107,7 @@ def _kept(built: Path, path: Path) -> Path:
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         for place, data in ((path, library), (_checksum(path), hashlib.sha256(library).hexdigest().encode())):
-            write_whole(place, data)
+            write_atomic(place, data)
     except OSError as error:
         log.warning("cache %s: %s; built for this process alone", path.parent, error.strerror or error)
         return built

@@ -10,7 +10,7 @@ from controller import ControllerError
 from cosim.errors import ScenarioError
 from cosim.scenario.changes import joined, value_at
 from cosim.scenario.key_names import PARAMETERS
-from cosim.scenario.scenario import Scenario, checked_scenario
+from cosim.scenario.scenario import Scenario, validate_scenario
 from cosim.scenario.toml_file import place_of
 from plant_fmu.errors import PlantFmuError
 
@@ -101,7 +101,7 @@ class Variation:
                 at[last] = value
         table["changed"] = joined(table["changed"], (k for k, value in changes.items() if value != self.number(k)))
         try:
-            return checked_scenario(table, self.base.name, self.base.vehicle)
+            return validate_scenario(table, self.base.name, self.base.vehicle)
         except (PlantFmuError, ControllerError) as error:
             raise ScenarioError(str(error)) from error
 

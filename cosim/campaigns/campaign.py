@@ -16,7 +16,7 @@ from cosim.campaigns.scenes.scene_store import SceneStore
 from cosim.campaigns.scenes.work import SceneTask, SceneWork
 from cosim.campaigns.store.folder import SUMMARY
 from cosim.campaigns.store.results import Results
-from cosim.io.atomic_file import write_whole
+from cosim.io.atomic_file import write_atomic
 from cosim.io.strict_json import json_text
 
 
@@ -89,7 +89,7 @@ def run_campaign(
 
         def conclude(results: Results) -> None:
             summary.update(summarise(work.flown, results, out))
-            write_whole(out / SUMMARY, json_text(summary))
+            write_atomic(out / SUMMARY, json_text(summary))
 
         done = carry_out(work, out, workers, executor, progress, conclude)
     return Campaign(out, done.results, summary, done.flown)

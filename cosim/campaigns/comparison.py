@@ -21,7 +21,7 @@ from cosim.campaigns.scenes.law_gains import law_named
 from cosim.campaigns.scenes.scene_store import SceneStore
 from cosim.campaigns.store.results import Results
 from cosim.errors import RunError
-from cosim.io.atomic_file import write_whole
+from cosim.io.atomic_file import write_atomic
 from cosim.io.strict_json import json_text
 from cosim.report.report import FIGURES
 
@@ -103,7 +103,7 @@ def compare(
             ],
         }
     try:
-        write_whole(out / NUMBERS, json_text(numbers))
+        write_atomic(out / NUMBERS, json_text(numbers))
     except OSError as error:
         raise RunError(f"{out}: {error.strerror or error}") from error
     return Comparison(out, campaigns, numbers)

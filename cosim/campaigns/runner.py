@@ -20,7 +20,7 @@ from cosim.campaigns.workers.batch_sizing import Batches
 from cosim.campaigns.workers.dispatch import fly_all
 from cosim.campaigns.workers.work import Task, Work
 from cosim.campaigns.workers.worker import flyer_held
-from cosim.campaigns.workers.worker_pools import Crew, Here, Lent, Processes
+from cosim.campaigns.workers.worker_pools import ExternalExecutor, InProcess, Processes, WorkerPool
 from cosim.errors import RunError
 from cosim.run.progress import ProgressBar
 
@@ -117,9 +117,9 @@ def _flown(
     left[rows] = False
     batches, n, refused = Batches(np.flatnonzero(left)), int(left.sum()), 0
     with (
-        contextlib.closing(_crew(work.task, workers, executor) if n else Here()) as crew,
-        _bar(work, len(work) - n, progress, crew) as bar,
-        contextlib.closing(fly_all(work, batches, crew)) as tables,
+        contextlib.closing(_pool(work.task, workers, executor) if n else InProcess()) as pool,
+        _bar(work, len(work) - n, progress, pool) as bar,
+        contextlib.closing(fly_all(work, batches, pool)) as tables,
     ):
         for table in tables:
             yield table
@@ -129,12 +129,12 @@ def _flown(
         log.warning("%d %ss were refused; why is in their column 'refused'", refused, work.unit)
 
 
-def _crew(task: Task, workers: int, executor: Executor | None) -> Crew:
+def _pool(task: Task, workers: int, executor: Executor | None) -> WorkerPool:
     if executor is not None:
         from cosim.campaigns.workers.cluster import Cluster, is_cluster
 
-        return Cluster(executor) if is_cluster(executor) else Lent(executor, workers)
-    return Processes(workers, task) if workers > 1 else Here()
+        return Cluster(executor) if is_cluster(executor) else ExternalExecutor(executor, workers)
+    return Processes(workers, task) if workers > 1 else InProcess()
 
 
 def _tell(table: Any, before: int) -> int:
@@ -146,8 +146,8 @@ def _tell(table: Any, before: int) -> int:
     return before + len(rows)
 
 
-def _bar(work: Work, done: int, progress: bool, crew: Crew) -> ProgressBar:
+def _bar(work: Work, done: int, progress: bool, pool: WorkerPool) -> ProgressBar:
     return ProgressBar(
-        progress, compiling=crew.compiling, total=len(work), initial=done, desc=work.name, unit=work.unit,
+        progress, compiling=pool.compiling, total=len(work), initial=done, desc=work.name, unit=work.unit,
         bar_format="{desc} {percentage:3.0f}%|{bar}| {n}/{total} [{elapsed}<{remaining}, {rate_fmt}]",
     )  # fmt: skip

@@ -13,7 +13,7 @@ from cosim.campaigns.store.results import Results
 from cosim.campaigns.sweeps.design import Design
 from cosim.campaigns.sweeps.rows import SweepWork
 from cosim.campaigns.sweeps.summary import summarise_sweep
-from cosim.io.atomic_file import write_whole
+from cosim.io.atomic_file import write_atomic
 from cosim.io.strict_json import json_text
 from cosim.scenario.scenario import Scenario
 
@@ -80,7 +80,7 @@ def run_sweep(
 
     def conclude(results: Results) -> None:
         summary.update(summarise_sweep(work, results, out))
-        write_whole(out / SUMMARY, json_text(summary))
+        write_atomic(out / SUMMARY, json_text(summary))
 
     done = carry_out(work, out, workers, executor, progress, conclude)
     return Sweep(out, done.results, summary, done.flown)

@@ -36,7 +36,7 @@ def add_verb(verbs: Any) -> None:
 def scenes(options: argparse.Namespace) -> int:
     """Run ``cosim scenes``."""
     from cosim.campaigns.scenes.generator import generate_scenes
-    from cosim.io.atomic_file import whole_file
+    from cosim.io.atomic_file import atomic_file
 
     lines = generate_scenes(options.count, options.seed, options.kind)
     if options.out is None:
@@ -44,7 +44,7 @@ def scenes(options: argparse.Namespace) -> int:
             print(line)
         return 0
     try:
-        with whole_file(options.out) as file:
+        with atomic_file(options.out) as file:
             for line in lines:
                 file.write(f"{line}\n".encode())
     except OSError as error:

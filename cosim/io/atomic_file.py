@@ -11,7 +11,7 @@ from typing import BinaryIO
 
 
 @contextmanager
-def whole_file(path: Path) -> Iterator[BinaryIO]:
+def atomic_file(path: Path) -> Iterator[BinaryIO]:
     """Open a file that takes its place once the block has ended well.
 
     What is written meanwhile has a name that cannot be foreseen, and is new: a link that somebody left in a folder is
@@ -45,7 +45,7 @@ def whole_file(path: Path) -> Iterator[BinaryIO]:
         scratch.unlink(missing_ok=True)
 
 
-def write_whole(path: Path, content: bytes | str) -> Path:
+def write_atomic(path: Path, content: bytes | str) -> Path:
     """Write a file whole or not at all.
 
     Parameters
@@ -63,8 +63,8 @@ def write_whole(path: Path, content: bytes | str) -> Path:
     Raises
     ------
     OSError
-        As `whole_file`.
+        As `atomic_file`.
     """
-    with whole_file(path) as file:
+    with atomic_file(path) as file:
         file.write(content.encode() if isinstance(content, str) else content)
     return path

@@ -19,7 +19,7 @@ LONGEST = 16_384  # bytes of a message
 _decoder = msgspec.json.Decoder(Command)
 
 
-class Desk:
+class CommandDesk:
     """Takes the commands of all viewers of one run.
 
     Parameters
@@ -64,7 +64,7 @@ class Desk:
         try:
             command = _decoder.decode(message)
             self._check(command)
-            if not self._queue.give(command, self._run):
+            if not self._queue.submit(command, self._run):
                 return "the run is over" if self._queue.run != self._run else "too many commands at once"
         except NOT_A_COMMAND as error:
             return one_line(f"no command: {error}")

@@ -10,7 +10,7 @@ import numpy as np
 
 from controller.regions import Shape, Sphere
 from cosim.errors import CommandError
-from cosim.live.command_desk import Desk
+from cosim.live.command_desk import CommandDesk
 from cosim.live.history import History
 from cosim.live.messages import bytes_of, text_of
 from cosim.replay.command_words import command_words
@@ -47,13 +47,13 @@ class Hub:
     ----------
     run : int
         Which run it is, from 0; -1 before the first.
-    desk : Desk
+    desk : CommandDesk
         Takes what viewers order.
     """
 
     def __init__(self) -> None:
         self.run = -1
-        self.desk: Desk | None = None
+        self.desk: CommandDesk | None = None
         self._texts: list[str] = []
         self._dropped = 0  # texts that are kept no more
         self._last: Array | None = None
@@ -84,7 +84,7 @@ class Hub:
         self._came = [secondary.region.name for secondary in scenario.regions if secondary.seen]  # by slot
         self._history = History(len(self._viewing.columns))
         self._texts, self._dropped, self._last = [], 0, None
-        self.desk = Desk(scenario, queue, self._has_come)
+        self.desk = CommandDesk(scenario, queue, self._has_come)
 
     @property
     def picked(self) -> list[int]:

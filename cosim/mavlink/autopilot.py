@@ -12,6 +12,7 @@ from cosim.mavlink.messages.streams import Streams
 from cosim.mavlink.messages.table import HEARTBEAT
 from cosim.mavlink.services.commands import Commands
 from cosim.mavlink.services.ftp import FileServer
+from cosim.mavlink.services.gcs_failsafe import GcsFailsafe
 from cosim.mavlink.services.manual import Manual
 from cosim.mavlink.services.mission import Missions
 from cosim.mavlink.services.modes import Modes
@@ -20,11 +21,10 @@ from cosim.mavlink.services.origin import Origin
 from cosim.mavlink.services.parameters import Parameters
 from cosim.mavlink.services.requests import Requests, banner
 from cosim.mavlink.services.service import Handler, Service
-from cosim.mavlink.services.supervision import Supervision
 from cosim.mavlink.services.targets import Targets
 from cosim.mavlink.services.timing import Timing
-from cosim.mavlink.vehicle.vehicle_context import COMPONENT_ID, Sender, Vessel
-from cosim.mavlink.wire.message_sink import Outlet
+from cosim.mavlink.vehicle.vehicle_context import COMPONENT_ID, Sender, VehicleContext
+from cosim.mavlink.wire.message_sink import MessageSink
 from cosim.mavlink.wire.options import MavlinkOptions
 from cosim.scenario.scenario import Scenario
 from cosim.simulation.commands.sources import CommandQueue
@@ -64,25 +64,25 @@ class Autopilot:
         commands: CommandQueue | None,
         live: bool = True,
     ) -> None:
-        self._vessel = vessel = Vessel(scenario, columns, options, commands, live)
-        self._streams: dict[Outlet, Streams] = {}
-        self._events = Events(vessel)
-        parameters = Parameters(vessel)
-        targets = Targets(vessel, parameters)
+        self._context = context = VehicleContext(scenario, columns, options, commands, live)
+        self._streams: dict[MessageSink, Streams] = {}
+        self._events = Events(context)
+        parameters = Parameters(context)
+        targets = Targets(context, parameters)
         services: list[Service] = [
-            Requests(vessel, self._streams),
-            Modes(vessel),
+            Requests(context, self._streams),
+            Modes(context),
             targets,
-            Obstacles(vessel),
-            Manual(vessel),
+            Obstacles(context),
+            Manual(context),
             parameters,
-            Missions(vessel, targets, parameters),
-            FileServer(vessel, parameters),
-            Timing(vessel),
-            Origin(vessel),
-            Supervision(vessel),
+            Missions(context, targets, parameters),
+            FileServer(context, parameters),
+            Timing(context),
+            Origin(context),
+            GcsFailsafe(context),
         ]
-        self._services = [*services, Commands(vessel, services)]
+        self._services = [*services, Commands(context, services)]
         self._handlers: dict[str, Handler] = {}
         for service in self._services:
             self._handlers.update(service.messages)
@@ -91,15 +91,15 @@ class Autopilot:
         self._awaiting = False  # arming, before anything moves
         self._moved = False  # a snapshot came since the last tick
         self._moved_at = -math.inf
-        self._beaten_at: dict[Outlet, float] = {}
+        self._beaten_at: dict[MessageSink, float] = {}
         self._ticked: float | None = None
 
-    def attach(self, link: Outlet) -> None:
+    def attach(self, link: MessageSink) -> None:
         """Begin to stream on a link."""
-        self._vessel.links.append(link)
-        self._streams[link] = Streams(self._vessel, link, self._clock_us)
-        for line in banner(self._vessel):
-            for message in self._vessel.text(line):
+        self._context.links.append(link)
+        self._streams[link] = Streams(self._context, link, self._clock_us)
+        for line in banner(self._context):
+            for message in self._context.text(line):
                 link.send(message)
 
     def observe(self, row: Array) -> None:
@@ -111,53 +111,53 @@ class Autopilot:
             Of a step, in the order of the columns; its first number is simulated time [s]. One that is earlier than
             the one before begins another run.
         """
-        vessel = self._vessel
-        vessel.look(row)
-        now = vessel.view.simulated_us
-        if (self._last_us is not None and now < self._last_us) or (now == 0 and vessel.outlived):
+        context = self._context
+        context.look(row)
+        now = context.view.simulated_us
+        if (self._last_us is not None and now < self._last_us) or (now == 0 and context.outlived):
             self._restart()
-            vessel.look(row)
+            context.look(row)
         self._awaiting = now == self._last_us == 0  # the same snapshot comes again and again
         self._moved |= now != self._last_us
         self._clock_us += max(0, now - (now if self._last_us is None else self._last_us))
         self._last_us = now
         self._events.watch()
         for service in self._services:
-            service.looked()
+            service.on_snapshot()
         self._advance()
 
     def _restart(self) -> None:
-        vessel = self._vessel
-        vessel.restart()
+        context = self._context
+        context.restart()
         self._events.restart()
         for service in self._services:
             service.restart()
-        vessel.say("The run begins again", vessel.mavlink.MAV_SEVERITY_NOTICE)
+        context.say("The run begins again", context.mavlink.MAV_SEVERITY_NOTICE)
 
     def _advance(self) -> None:
         for streams in list(self._streams.values()):
             streams.advance(self._clock_us)
 
-    def receive(self, link: Outlet, message: Any, now: float) -> None:
+    def receive(self, link: MessageSink, message: Any, now: float) -> None:
         """Heed a message.
 
         Parameters
         ----------
-        link : Outlet
+        link : MessageSink
             That it came on.
         message : MAVLink_message
             Decoded, and accepted: its checksum, and its signature where one is asked for, are right.
         now : float
             The wall clock, ``time.monotonic()`` [s].
         """
-        vessel = self._vessel
-        vessel.now = now
+        context = self._context
+        context.now = now
         handler = self._handlers.get(message.get_type())
         if handler is None or link not in self._streams:
             return
         sender = Sender(link, message.get_srcSystem(), message.get_srcComponent())
-        own = vessel.options.system_id, COMPONENT_ID
-        allowed = vessel.options.allowed_systems
+        own = context.options.system_id, COMPONENT_ID
+        allowed = context.options.allowed_systems
         if (sender.system, sender.component) == own or (allowed is not None and sender.system not in allowed):
             return
         system, component = getattr(message, "target_system", 0), getattr(message, "target_component", 0)
@@ -172,8 +172,8 @@ class Autopilot:
         now : float
             ``time.monotonic()`` [s].
         """
-        vessel = self._vessel
-        vessel.now = now
+        context = self._context
+        context.now = now
         since = 0.0 if self._ticked is None else min(max(now - self._ticked, 0.0), 1.0)
         self._ticked = now
         if self._moved:
@@ -181,7 +181,7 @@ class Autopilot:
         elif self._last_us is not None and now - self._moved_at >= _STILL:
             self._clock_us += round(since * _SECOND)
             if self._awaiting:
-                vessel.waited_us += round(since * _SECOND)
+                context.waited_us += round(since * _SECOND)
             self._advance()
         for service in self._services:
             service.tick()
@@ -194,7 +194,7 @@ class Autopilot:
 
     def close(self, now: float) -> None:
         """Say goodbye: that it ends, and a last heartbeat, in standby."""
-        vessel = self._vessel
-        vessel.now = now
-        vessel.say(f"The {'run' if vessel.live else 'recording'} has ended", vessel.mavlink.MAV_SEVERITY_NOTICE)
-        vessel.send(status.beat(vessel, vessel.mavlink.MAV_STATE_STANDBY))
+        context = self._context
+        context.now = now
+        context.say(f"The {'run' if context.live else 'recording'} has ended", context.mavlink.MAV_SEVERITY_NOTICE)
+        context.send(status.beat(context, context.mavlink.MAV_STATE_STANDBY))

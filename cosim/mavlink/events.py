@@ -5,7 +5,7 @@ from __future__ import annotations
 from controller.regions import of_attitude
 from cosim.mavlink.messages import status
 from cosim.mavlink.vehicle.profile import MODE_NAMES
-from cosim.mavlink.vehicle.vehicle_context import Vessel
+from cosim.mavlink.vehicle.vehicle_context import VehicleContext
 from cosim.mavlink.vehicle.view import View
 from cosim.simulation.commands.mission_executor import way
 
@@ -19,12 +19,12 @@ class Events:
 
     Parameters
     ----------
-    vessel : Vessel
+    vessel : VehicleContext
         Whose voice is used.
     """
 
-    def __init__(self, vessel: Vessel) -> None:
-        self._vessel = vessel
+    def __init__(self, context: VehicleContext) -> None:
+        self._context = context
         self.restart()
 
     def restart(self) -> None:
@@ -36,7 +36,7 @@ class Events:
 
     def watch(self) -> None:
         """Compare the vessel's snapshot with the one before."""
-        vessel, view = self._vessel, self._vessel.view
+        context, view = self._context, self._context.view
         before = self._before
         self._before = view
         if before is None:
@@ -46,36 +46,36 @@ class Events:
         self._watch_regions(view)
         self._watch_limits(view)
         if view.touches_bottom and not before.touches_bottom:
-            vessel.say("Bottom touched", vessel.mavlink.MAV_SEVERITY_WARNING, "bottom", _EVERY)
+            context.say("Bottom touched", context.mavlink.MAV_SEVERITY_WARNING, "bottom", _EVERY)
 
     def _watch_commands(self, before: View, view: View) -> None:
-        vessel, m = self._vessel, self._vessel.mavlink
+        context, m = self._context, self._context.mavlink
         if view.armed != before.armed:
-            vessel.say("Armed" if view.armed else "Disarmed", m.MAV_SEVERITY_NOTICE)
+            context.say("Armed" if view.armed else "Disarmed", m.MAV_SEVERITY_NOTICE)
         if view.mode != before.mode:
-            vessel.say(f"Mode: {MODE_NAMES[view.mode]}", m.MAV_SEVERITY_NOTICE)
+            context.say(f"Mode: {MODE_NAMES[view.mode]}", m.MAV_SEVERITY_NOTICE)
         if (view.armed, view.mode) != (before.armed, before.mode):
-            for message in (*status.heartbeat(vessel), *status.current_mode(vessel)):
-                vessel.send(message)
+            for message in (*status.heartbeat(context), *status.current_mode(context)):
+                context.send(message)
         if view.mode == before.mode == "mission" and view.item != before.item:
             self._watch_course(before.item, view.item)
 
     def _watch_course(self, before: int, now: int) -> None:
         """Tell of the items that were gone through; those without a place were not reached but done."""
-        passed = way(self._vessel.course, before, now) if before >= 0 else None
+        passed = way(self._context.course, before, now) if before >= 0 else None
         for item in [before, *passed[:-1]] if passed else []:
             self._reached_item(item)
 
     def _reached_item(self, item: int) -> None:
-        vessel = self._vessel
-        if not 0 <= item < len(vessel.course) or vessel.course[item].position is None:
+        context = self._context
+        if not 0 <= item < len(context.course) or context.course[item].position is None:
             return
-        number = item + int(vessel.profile.home_is_first)
-        vessel.send(vessel.make("MISSION_ITEM_REACHED", number))
-        vessel.say(f"Reached mission item {number}")
+        number = item + int(context.profile.home_is_first)
+        context.send(context.make("MISSION_ITEM_REACHED", number))
+        context.say(f"Reached mission item {number}")
 
     def _watch_regions(self, view: View) -> None:
-        m = self._vessel.mavlink
+        m = self._context.mavlink
         for i, clearance in enumerate(view.clearances):
             fine = self._fine[i]
             # once the surface is a margin behind; NaN changes nothing
@@ -86,27 +86,27 @@ class Events:
             if i == 0:
                 self._tell_of_target(view, now_fine)
                 continue
-            region = self._vessel.scenario.regions[i - 1].region
+            region = self._context.scenario.regions[i - 1].region
             what = "Attitude" if of_attitude(region.shape) else "Region"
             inside = now_fine == (region.keep == "in")
             text = f"{what} {region.name} {'entered' if inside else 'left'}"
             severity = m.MAV_SEVERITY_INFO if now_fine else m.MAV_SEVERITY_WARNING
-            self._vessel.say(text if now_fine else f"{text}: keep {region.keep}", severity, text, _EVERY)
+            self._context.say(text if now_fine else f"{text}: keep {region.keep}", severity, text, _EVERY)
 
     def _tell_of_target(self, view: View, inside: bool) -> None:
-        vessel = self._vessel
-        last = view.item == len(vessel.plan) - 1 and view.mode == "mission"
-        vessel.say("Target reached" if inside else "Target left", None, f"target {inside}", _EVERY)
+        context = self._context
+        last = view.item == len(context.plan) - 1 and view.mode == "mission"
+        context.say("Target reached" if inside else "Target left", None, f"target {inside}", _EVERY)
         if inside and last:
             self._reached_item(view.item)
 
     def _watch_limits(self, view: View) -> None:
-        vessel = self._vessel
+        context = self._context
         if view.saturated:
             self._cut_us = view.boot_us
             if not self._saturated:
-                vessel.say("Thrust saturated", vessel.mavlink.MAV_SEVERITY_WARNING, "saturated", _EVERY)
+                context.say("Thrust saturated", context.mavlink.MAV_SEVERITY_WARNING, "saturated", _EVERY)
             self._saturated = True
         elif self._saturated and view.boot_us - self._cut_us >= _RELEASED:
             self._saturated = False
-            vessel.say("Thrust no longer saturated", None, "released", _EVERY)
+            context.say("Thrust no longer saturated", None, "released", _EVERY)

@@ -17,7 +17,7 @@ from typing import Any, Protocol
 
 from cosim.mavlink.channels.tlog import Tlog
 from cosim.mavlink.wire.link import Link
-from cosim.mavlink.wire.message_sink import Outlet
+from cosim.mavlink.wire.message_sink import MessageSink
 from cosim.simulation.signals import Array
 
 log = logging.getLogger(__name__)
@@ -41,7 +41,7 @@ _CLOSING = 4.0  # s, that closing waits at all
 class Vehicle(Protocol):
     """The vehicle's side of the protocol; it does no input or output of its own."""
 
-    def attach(self, link: Outlet) -> None:
+    def attach(self, link: MessageSink) -> None:
         """Begin to stream on a link."""
         ...
 
@@ -49,7 +49,7 @@ class Vehicle(Protocol):
         """Take the next snapshot, a row of the run's signals, and send what is due by its time."""
         ...
 
-    def receive(self, link: Outlet, message: Any, now: float) -> None:
+    def receive(self, link: MessageSink, message: Any, now: float) -> None:
         """Take a message that came on a link, at monotonic time `now` [s]."""
         ...
 

@@ -11,7 +11,7 @@ from pathlib import Path
 from string import Template
 from typing import Any
 
-from cosim.io.atomic_file import write_whole
+from cosim.io.atomic_file import write_atomic
 
 REPLAY = "replay.html"
 
@@ -82,7 +82,7 @@ def write_page(path: Path, runs: Sequence[dict[str, Any]], title: str) -> Path:
     Path
         The file.
     """
-    return write_whole(path, replay_page(runs, title))
+    return write_atomic(path, replay_page(runs, title))
 
 
 def is_page(path: Path) -> bool:

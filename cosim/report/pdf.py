@@ -13,7 +13,7 @@ from matplotlib.figure import Figure, SubFigure
 from cosim.report.contents import Contents, Table
 from cosim.report.figures.figures import draw_all
 from cosim.report.figures.layout import FIGURE_STYLE, WIDTH, Sheet
-from cosim.report.figures.style import Story
+from cosim.report.figures.style import FigureData
 from cosim.report.line_breaking import BOLD, MONO, PLAIN, Face, wrapped
 
 _A4 = (8.27, 11.69)  # inches
@@ -27,12 +27,12 @@ _DPI = 110
 _STYLE: Any = {"pdf.fonttype": 42, "text.parse_math": False}  # whole fonts: text stays text
 
 
-def pages_of(story: Story, contents: Contents, about: str) -> list[Figure]:
+def pages_of(data: FigureData, contents: Contents, about: str) -> list[Figure]:
     """Return the pages of a report.
 
     Parameters
     ----------
-    story : Story
+    story : FigureData
         Its figures are drawn.
     contents : Contents
         What it says.
@@ -55,7 +55,7 @@ def pages_of(story: Story, contents: Contents, about: str) -> list[Figure]:
         if contents.claims:
             document.table(contents.claims)
         document.space(12.0)
-        draw_all(story, document.sheet_for)
+        draw_all(data, document.sheet_for)
         for table in (contents.regions, *contents.numbers, contents.setting):
             if table:
                 document.table(table)

@@ -13,7 +13,7 @@ from cosim.report.contents import Contents, contents_of
 from cosim.results.run_result import FlownRun
 
 if TYPE_CHECKING:  # see write_report
-    from cosim.report.figures.style import Story
+    from cosim.report.figures.style import FigureData
 
 REPORT = "report.html"
 FIGURES = "figures"
@@ -61,7 +61,7 @@ def write_report(run: FlownRun, formats: Collection[str] = ("html",)) -> list[Pa
 class _Told:
     """What a report is made of, whatever it is written as."""
 
-    story: Story
+    data: FigureData
     contents: Contents
     about: str
 
@@ -75,7 +75,7 @@ def _with_figures(told: _Told, formats: Collection[str], folder: Path) -> list[P
     (folder / FIGURES).mkdir()
     shown = [
         (drawing.name, drawing.caption, drawing.write(folder / FIGURES, png="png" in formats))
-        for drawing in drawings(told.story)
+        for drawing in drawings(told.data)
     ]
     if "html" not in formats:
         return []
@@ -92,7 +92,7 @@ def _pages(told: _Told, formats: Collection[str], folder: Path) -> list[Path]:
         return []
     from cosim.report.pdf import pages_of, write_pdf, write_pngs
 
-    pages = pages_of(told.story, told.contents, told.about)
+    pages = pages_of(told.data, told.contents, told.about)
     files = [write_pdf(pages, folder / "report.pdf", told.contents.title)] if "pdf" in formats else []
     return files + (write_pngs(pages, folder) if "png" in formats else [])
 

@@ -15,7 +15,7 @@ from cosim.simulation.environment import shape_center
 from cosim.simulation.signals import Array
 
 
-def as_it_came(scenario: Scenario, record: Rows) -> Scenario:
+def scenario_as_flown(scenario: Scenario, record: Rows) -> Scenario:
     """Return the scenario with those obstacles that came in, at their size, and with the target as it was in the end.
 
     Parameters

@@ -12,7 +12,7 @@ import numpy as np
 from controller import LAWS
 from cosim.errors import RunError
 from cosim.io.strict_json import read_json
-from cosim.results.as_flown import as_it_came
+from cosim.results.as_flown import scenario_as_flown
 from cosim.results.record import Record, load_record
 from cosim.results.required_columns import require_columns
 from cosim.results.summary import summarise
@@ -121,7 +121,7 @@ def flown_run(path: Path, scenario: Scenario, status: str, wall_time: float | No
         if not (np.isfinite(time).all() and (np.diff(time, prepend=last) > 0.0).all()):
             raise RunError(f"{path}: the times of the record do not rise from row to row")
         last = time[-1]
-    came = as_it_came(scenario, record)
+    came = scenario_as_flown(scenario, record)
     summary = summarise(came, record, status, wall_time)
     if scenario.commands.enabled:
         summary["commands"] = _lines(path / COMMANDS_LOG)

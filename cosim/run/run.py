@@ -19,7 +19,7 @@ from cosim.results.run_result import COMMANDS_LOG, SCENARIO, SUMMARY
 from cosim.results.wording import verdict
 from cosim.run.progress import ProgressBar
 from cosim.run.run_folder import RunFolder, claim, conclude
-from cosim.scenario.law_factory import flown_by
+from cosim.scenario.law_factory import with_custom_law
 from cosim.scenario.scenario import Scenario
 from cosim.simulation.commands import CommandQueue, LoggedCommands, ReplayedCommands
 from cosim.simulation.master import Master, Observer
@@ -137,7 +137,7 @@ def run_scenario(
         If the FMU refuses the scenario, or fails in a step; what was recorded until then is left readable.
     """
     if law is not None:
-        scenario = flown_by(law, scenario)
+        scenario = with_custom_law(law, scenario)
     recorded = _recorded(scenario, commands_log)
     queue = CommandQueue()
     link: LinkThread | None = None

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from cosim.errors import RunError
-from cosim.io.atomic_file import write_whole
+from cosim.io.atomic_file import write_atomic
 from cosim.io.strict_json import json_text
 from cosim.replay.pages import write_replay
 from cosim.report.report import write_report
@@ -188,7 +188,7 @@ def report_again(path: Path, formats: Collection[str] = ("html",)) -> tuple[dict
 
 
 def _write(run: FlownRun, formats: Collection[str]) -> list[Path]:
-    summary = write_whole(run.path / SUMMARY, json_text(run.summary))
+    summary = write_atomic(run.path / SUMMARY, json_text(run.summary))
     pages = write_report(run, formats) if formats else []
     replay = [write_replay(run)] if "html" in formats else []
     return [*pages[:1], *replay, summary, *pages[1:]]

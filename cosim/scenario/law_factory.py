@@ -10,7 +10,7 @@ from controller import LAWS, CompiledLaw, FunctionLaw, Law, LawError
 from controller.function_law import qualified_name
 from controller.law import Output
 from cosim.errors import RunError, ScenarioError
-from cosim.scenario.scenario import Scenario, checked_scenario
+from cosim.scenario.scenario import Scenario, validate_scenario
 from cosim.scenario.vehicle_model import vehicle_model
 
 
@@ -34,7 +34,7 @@ def law_of(scenario: Scenario) -> CompiledLaw:
     RunError
         If it is a law of one's own.
     """
-    require_shipped(scenario)
+    require_builtin_law(scenario)
     return LAWS[scenario.law.name].for_vehicle(
         vehicle_model(scenario.vehicle),
         scenario.law.gains,
@@ -44,7 +44,7 @@ def law_of(scenario: Scenario) -> CompiledLaw:
     )
 
 
-def require_shipped(scenario: Scenario) -> None:
+def require_builtin_law(scenario: Scenario) -> None:
     """Raise `RunError` if a scenario's law is one's own, which its file names but cannot hold."""
     if scenario.law.own:
         raise RunError(
@@ -53,7 +53,7 @@ def require_shipped(scenario: Scenario) -> None:
         )
 
 
-def flown_by(law: Law, scenario: Scenario) -> Scenario:
+def with_custom_law(law: Law, scenario: Scenario) -> Scenario:
     """Return a scenario as a law of one's own flies it.
 
     Parameters
@@ -82,4 +82,4 @@ def flown_by(law: Law, scenario: Scenario) -> Scenario:
     if law.output == "thrusters" and through != "thrusters":
         raise ScenarioError(f"actuation.through is {through!r}, expected 'thrusters': law {name} drives them")
     own = {"name": name, "desired_quaternion": list(scenario.law.desired_quaternion), "gains": {}}
-    return checked_scenario(scenario.table | {"law": own}, scenario.name, scenario.vehicle)
+    return validate_scenario(scenario.table | {"law": own}, scenario.name, scenario.vehicle)

@@ -51,7 +51,7 @@ from cosim.scenario.validation import (
     check_regions,
     check_texts,
     check_time,
-    multiple,
+    steps_per_period,
 )
 from plant_fmu.errors import PlantFmuError
 from plant_fmu.toml_tables import decode, hint, require_modest
@@ -174,7 +174,7 @@ def load_scenario(name_or_file: str | Path, overrides: Sequence[str] = ()) -> Sc
         if table.get("title") != titled.get("title"):  # it is of what has been set beside it
             table.pop("changed", None)
             titled = table
-        scenario = checked_scenario(table, name)
+        scenario = validate_scenario(table, name)
         return scenario if table == titled else _with_changes(scenario, table, titled)
     except (PlantFmuError, ControllerError, ScenarioError) as error:
         raise ScenarioError(f"{text}: {error}") from error
@@ -183,7 +183,7 @@ def load_scenario(name_or_file: str | Path, overrides: Sequence[str] = ()) -> Sc
 def _with_changes(scenario: Scenario, table: dict[str, Any], titled: dict[str, Any]) -> Scenario:
     """Return a scenario that says in which keys its table differs from the one that its title was written for."""
     try:
-        before = checked_scenario(titled, scenario.name)
+        before = validate_scenario(titled, scenario.name)
     except (PlantFmuError, ControllerError, ScenarioError):  # it is no scenario yet: what makes it one is changed too
         keys: Iterable[str] = differing_keys(titled, table)
     else:
@@ -191,7 +191,7 @@ def _with_changes(scenario: Scenario, table: dict[str, Any], titled: dict[str, A
     return dataclasses.replace(scenario, table=scenario.table | {"changed": joined(scenario.table["changed"], keys)})
 
 
-def checked_scenario(table: dict[str, Any], name: str, vehicle: Vehicle | None = None) -> Scenario:
+def validate_scenario(table: dict[str, Any], name: str, vehicle: Vehicle | None = None) -> Scenario:
     """Turn the table of a scenario's file into a scenario.
 
     Parameters
@@ -243,9 +243,9 @@ def checked_scenario(table: dict[str, Any], name: str, vehicle: Vehicle | None =
         vehicle=vehicle,
         vehicle_file=vehicle_file,
         time=time,
-        steps=multiple("time.duration", time.duration, time.step),
-        control_every=multiple("time.control", time.control, time.step),
-        arbiter_every=multiple("time.arbiter", time.arbiter, time.step),
+        steps=steps_per_period("time.duration", time.duration, time.step),
+        control_every=steps_per_period("time.control", time.control, time.step),
+        arbiter_every=steps_per_period("time.arbiter", time.arbiter, time.step),
         plant=file.plant,
         initial=file.initial,
         law=law,

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from controller import LAWS, RegionError
-from controller.law import checked_quaternion
+from controller.law import validate_quaternion
 from controller.regions import SHAPES, Region, Shape, Sphere, of_attitude
 from cosim.errors import ScenarioError
 from cosim.scenario.tables import (
@@ -224,7 +224,7 @@ def check_law(entry: LawEntry, through: str, vehicle: Vehicle, period: float, n_
     if is_own(entry.name):
         if entry.gains:
             raise ScenarioError(f"law.gains has {next(iter(entry.gains))!r}, expected nothing with a law of one's own")
-        checked_quaternion(np.array(entry.desired_quaternion))
+        validate_quaternion(np.array(entry.desired_quaternion))
         return LawSetup(entry.name, entry.desired_quaternion, NoGains())
     if entry.name not in LAWS:
         known = ", ".join(map(repr, sorted(LAWS)))
@@ -240,7 +240,7 @@ def check_law(entry: LawEntry, through: str, vehicle: Vehicle, period: float, n_
     return LawSetup(entry.name, entry.desired_quaternion, gains)
 
 
-def multiple(key: str, period: float, step: float) -> int:
+def steps_per_period(key: str, period: float, step: float) -> int:
     """Return how many steps [s] a period [s] takes; it must be a whole number."""
     ratio = period / step if period / step < MAX_STEPS + 1 else math.inf
     _require(ratio < math.inf, key, f"{period} s, {period / step:.3g} steps", f"at most {MAX_STEPS} steps")

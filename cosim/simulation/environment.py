@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controller import VehicleState
-from controller.jit.bound_call import Repeated
-from controller.jit.jit import lean
+from controller.jit.bound_call import BoundCall
+from controller.jit.jit import jit_noalloc
 from controller.regions import PackedRegions, Shape, Sphere, evaluate_packed, pack
 from cosim.errors import CommandError, RunError
 from cosim.scenario.scenario import CRITERIA, Scenario
@@ -82,7 +82,7 @@ class RegionEnvironment:
         self._seen = [i for i, region in enumerate(scenario.regions) if region.seen]
         # m, NED: where each would have been at time 0, had it always moved as it does now
         self._origins: Array = np.zeros((len(secondary), 3))
-        self._look_around = Repeated(_evaluate)
+        self._look_around = BoundCall(_evaluate)
 
     @property
     def goal(self) -> PackedRegions:
@@ -287,7 +287,7 @@ def _evaluate(places: _Places, state: VehicleState, found: RegionEvaluation) -> 
     compute_memberships(c[1:], places.criteria, places.ramp, found.memberships)
 
 
-_evaluate = lean(_evaluate, *SOURCES)
+_evaluate = jit_noalloc(_evaluate, *SOURCES)
 
 
 def shape_center(shape: Shape) -> Vector3:

@@ -16,7 +16,7 @@ import numpy as np
 
 from controller import CompiledLaw, FunctionLaw, Law, VehicleState
 from controller.quaternion import from_axis_angle
-from cosim.scenario.law_factory import flown_by, law_of
+from cosim.scenario.law_factory import law_of, with_custom_law
 from cosim.scenario.scenario import CRITERIA, Scenario
 from cosim.scenario.start_values import start_values
 from cosim.simulation.actuators import Actuators
@@ -78,7 +78,7 @@ class Master:
 
     def __init__(self, scenario: Scenario, law: Law | None = None) -> None:
         if isinstance(law, FunctionLaw):
-            scenario = flown_by(law, scenario)  # refuses what such a law cannot have
+            scenario = with_custom_law(law, scenario)  # refuses what such a law cannot have
         self.scenario = scenario
         self.arbiter = Arbiter(engine=scenario.arbiter.engine, points=scenario.arbiter.points)
         self.law: Law = law_of(scenario) if law is None else law
@@ -291,7 +291,7 @@ class Master:
         ):
             self.law.gains = command_handler.settings.gains
             if command_handler.heading is not None:
-                self.law.face(from_axis_angle(_DOWN, command_handler.heading))
+                self.law.set_attitude(from_axis_angle(_DOWN, command_handler.heading))
         if command_handler.changed:
             self.environment.set_ramp(command_handler.settings["arbiter.ramp"])
         command_handler.mark_applied()

@@ -7,7 +7,7 @@ from pathlib import Path
 from fuzzy_arbiter.arbiter import Arbiter
 from fuzzy_arbiter.command_line.files import require_suffix
 from fuzzy_arbiter.definition import Output, System, Variable
-from fuzzy_arbiter.files import write_whole
+from fuzzy_arbiter.files import write_atomic
 from fuzzy_arbiter.hierarchy import prioritised
 
 BUILT_IN = "section-vi"
@@ -61,7 +61,7 @@ def described(arbiter: Arbiter) -> str:
     lines += ["", "rules", *(f"  {line}" for line in str(system).splitlines()), ""]
     norms = ("conjunction", "disjunction", "implication", "normalisation", "outside", "points")
     lines += [f"{name:14} {getattr(system, name)}" for name in norms]
-    lines += [f"{'engine':14} {arbiter.engine}: {arbiter.why}"]
+    lines += [f"{'engine':14} {arbiter.engine}: {arbiter.engine_reason}"]
     return "\n".join(lines)
 
 
@@ -97,16 +97,16 @@ def convert(file: str, out: str, native: bool) -> None:
     UnsupportedError
         If the format cannot say all of the system; nothing is written then.
     """
-    from fuzzy_arbiter.formats import FORMATS, natively, save
+    from fuzzy_arbiter.formats import FORMATS, fold_normalization, save
 
     suffix = Path(out).suffix[1:].lower()
     require_suffix(out, (*FORMATS, *EXPORTS))
     system = load_system(file)
     if native:
-        system = natively(system)
+        system = fold_normalization(system)
     if suffix in EXPORTS:
         from fuzzy_arbiter.export import to_c, to_python
 
-        write_whole(out, (to_c if suffix == "c" else to_python)(system).encode())
+        write_atomic(out, (to_c if suffix == "c" else to_python)(system).encode())
     else:
         save(system, out)

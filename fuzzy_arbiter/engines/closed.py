@@ -22,7 +22,7 @@ from typing import ClassVar
 import numpy as np
 
 from fuzzy_arbiter.definition import Output, System
-from fuzzy_arbiter.engines.engine import Engine, Shortcut, shared, shared_of_many
+from fuzzy_arbiter.engines.engine import Engine, Shortcut, normalize_weights, normalize_weights_of_many
 from fuzzy_arbiter.engines.firing import Array, degrees_of_many
 from fuzzy_arbiter.engines.normal_form import Clause, Literal, high_clauses, ladder
 from fuzzy_arbiter.engines.pieces import Piece, pieces
@@ -111,7 +111,7 @@ class ClosedEngine(Engine):
         result = [_value(forms, h) for forms, h in zip(self.scaled, self._highs(inputs), strict=True)]
         if self.clips:
             result = [min(max(weight, 0.0), 1.0) for weight in result]
-        return shared(result, self.system.normalisation)
+        return normalize_weights(result, self.system.normalisation)
 
     def weights_of_many(self, inputs: Array) -> Array:
         """Return the normalised value of each output for many samples; as of `Engine`."""
@@ -126,7 +126,7 @@ class ClosedEngine(Engine):
             if self.clips:
                 np.clip(values, 0.0, 1.0, out=values)
             result[start : start + _BLOCK] = values.T
-        return shared_of_many(result, self.system.normalisation)
+        return normalize_weights_of_many(result, self.system.normalisation)
 
     def shortcut(self) -> Shortcut | None:
         """Return a faster way to the weights of prioritised criteria whose degrees are the inputs; as of `Engine`."""

@@ -159,7 +159,7 @@ class Engine(ABC):
         if not self.scale:
             return tuple(raw)
         scaled = [min(max((c - low) / (high - low), 0.0), 1.0) for c, (low, high) in zip(raw, self.scale, strict=True)]
-        return shared(scaled, self.system.normalisation)
+        return normalize_weights(scaled, self.system.normalisation)
 
     def weights_of_many(self, inputs: Array) -> Array:
         """Return the normalised value of each output for many samples.
@@ -183,7 +183,7 @@ class Engine(ABC):
         if not self.scale:
             return raw
         low, high = np.array(self.scale).T
-        return shared_of_many(np.clip((raw - low) / (high - low), 0.0, 1.0), self.system.normalisation)
+        return normalize_weights_of_many(np.clip((raw - low) / (high - low), 0.0, 1.0), self.system.normalisation)
 
     def shortcut(self) -> Shortcut | None:
         """Return a faster way to `weights` for samples that are plain, if there is one.
@@ -209,7 +209,7 @@ class Engine(ABC):
         return low, high
 
 
-def shared(weights: Sequence[float], normalisation: str) -> tuple[float, ...]:
+def normalize_weights(weights: Sequence[float], normalisation: str) -> tuple[float, ...]:
     """Return range-normalised weights as a normalisation over all outputs wants them.
 
     Parameters
@@ -231,7 +231,7 @@ def shared(weights: Sequence[float], normalisation: str) -> tuple[float, ...]:
     return tuple(w / whole for w in weights) if whole > 0.0 else (0.0,) * len(weights)
 
 
-def shared_of_many(weights: Array, normalisation: str) -> Array:
+def normalize_weights_of_many(weights: Array, normalisation: str) -> Array:
     """Return range-normalised weights of many samples as a normalisation over all outputs wants them.
 
     Parameters

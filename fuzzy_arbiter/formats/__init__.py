@@ -12,11 +12,11 @@ from typing import Literal, get_args
 from fuzzy_arbiter.checks import shown
 from fuzzy_arbiter.definition import System
 from fuzzy_arbiter.errors import ArbiterError, FormatError, UnsupportedError
-from fuzzy_arbiter.files import write_whole
+from fuzzy_arbiter.files import write_atomic
 from fuzzy_arbiter.formats import fcl, fis, fll, json_toml
-from fuzzy_arbiter.formats.native import natively
+from fuzzy_arbiter.formats.native import fold_normalization
 
-__all__ = ["FORMATS", "FormatName", "load", "natively", "reads", "save", "writes"]
+__all__ = ["FORMATS", "FormatName", "fold_normalization", "load", "reads", "save", "writes"]
 
 FormatName = Literal["json", "toml", "fcl", "fis", "fll"]
 FORMATS: tuple[str, ...] = get_args(FormatName)
@@ -150,7 +150,7 @@ def save(system: System, path: str | Path) -> None:
     FormatError
         If the file cannot be written.
     """
-    write_whole(path, writes(system, _format(path)).encode("utf-8"))
+    write_atomic(path, writes(system, _format(path)).encode("utf-8"))
 
 
 def _format(path: str | Path) -> str:

@@ -11,7 +11,7 @@ from fuzzy_arbiter.errors import DefinitionError, UnsupportedError
 from fuzzy_arbiter.shapes import Shape
 
 
-def natively(system: System) -> System:
+def fold_normalization(system: System) -> System:
     """Return the system whose raw centroids are the weights of a range-normalised one.
 
     Normalising to the range maps the centroids of an output's least and greatest term, each alone, to 0 and 1. The same

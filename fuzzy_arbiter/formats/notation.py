@@ -214,7 +214,7 @@ def require_word(name: str, format: str, reserved: frozenset[str]) -> None:
         raise UnsupportedError(f"{format} cannot say the name {name!r}: it is a word of the language")
 
 
-def cannot_say(format: str, i: int, rule: Rule, why: str, what: str = "condition") -> UnsupportedError:
+def cannot_say(format: str, i: int, rule: Rule, engine_reason: str, what: str = "condition") -> UnsupportedError:
     """Return the error for a rule that a format cannot say.
 
     Parameters
@@ -235,4 +235,6 @@ def cannot_say(format: str, i: int, rule: Rule, why: str, what: str = "condition
     UnsupportedError
         To be raised.
     """
-    return UnsupportedError(f"{format} cannot say the {what} of R{i + 1} {shortened(str(rule))!r}: expected {why}")
+    return UnsupportedError(
+        f"{format} cannot say the {what} of R{i + 1} {shortened(str(rule))!r}: expected {engine_reason}"
+    )

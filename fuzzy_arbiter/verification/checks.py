@@ -87,15 +87,17 @@ class _Checks:
         answers = ask.ask(goals)
         for output, answer in zip(self._terms, answers, strict=True):
             for place in map(ask.places, answer.boxes):
-                why = reasons(self.system, row_strengths(self.system, place), self._terms[output], 1.0)
-                text = f"output {output!r}: rules contradict each other where {_said(place)}: {why}"
+                engine_reason = reasons(self.system, row_strengths(self.system, place), self._terms[output], 1.0)
+                text = f"output {output!r}: rules contradict each other where {_said(place)}: {engine_reason}"
                 self._found("fault", "consistent", text, place)
         self._decided("consistent", answers, "on every crisp row")
         high = tuple(map(ask.above_half, self._high))
         (answer,) = ask.ask([Goal(high, 2, ANY)])
         for place in map(ask.places, answer.boxes):
-            why = reasons(self.system, row_strengths(self.system, place), self._high, 0.5)
-            self._found("warning", "exclusive", f"two outputs are {self._highs()} where {_said(place)}: {why}", place)
+            engine_reason = reasons(self.system, row_strengths(self.system, place), self._high, 0.5)
+            self._found(
+                "warning", "exclusive", f"two outputs are {self._highs()} where {_said(place)}: {engine_reason}", place
+            )
         self._decided("exclusive", [answer], "on every crisp row")
         exclusive = answer.all_found and not answer.boxes
         if len(high) == 1:
@@ -131,8 +133,8 @@ class _Checks:
                 verdicts.add(verdict)
                 hows.add(how)
                 if place is not None:
-                    why = reasons(self.system, graded_strengths(self.system, place), terms, 0.5)
-                    self._found("warning", name, f"{text.format(output)} where {_said(place)}: {why}", place)
+                    engine_reason = reasons(self.system, graded_strengths(self.system, place), terms, 0.5)
+                    self._found("warning", name, f"{text.format(output)} where {_said(place)}: {engine_reason}", place)
             holds = False if False in verdicts else None if None in verdicts else True
             how = "by an example" if holds is False else "; ".join(sorted(hows))
             self.checks.append(Check(name, holds, how))

@@ -11,7 +11,7 @@ import fmpy
 
 from plant_fmu.errors import FmuFileError
 from plant_fmu.importers.task import Task
-from plant_fmu.model_limits import require_sane
+from plant_fmu.model_limits import validate_description
 from plant_fmu.unpacking import descriptions, opened
 
 _INTERFACES = {"CoSimulation": "CS", "ModelExchange": "ME"}
@@ -80,7 +80,7 @@ def read_fmu(path: Path) -> FmuFile:
         version = root.get("fmiVersion", "")
         if root.tag != "fmiModelDescription" or version.split(".")[0] not in ("2", "3"):
             raise FmuFileError(f"{path}: is of FMI version {version!r}, expected 2.0 or 3.0")
-        require_sane(path, root)
+        validate_description(path, root)
         damaged = archive.testzip()  # reads no more than the sizes it states, and so finds those that lie
         if damaged is not None:
             raise FmuFileError(f"{path}: is no FMU: {damaged!r} is damaged")

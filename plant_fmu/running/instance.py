@@ -22,7 +22,7 @@ from fmpy.fmi3 import FMU3Slave
 
 from plant_fmu.archive import archive_of
 from plant_fmu.errors import FmuFileError, PlantError
-from plant_fmu.model_limits import require_sane
+from plant_fmu.model_limits import validate_description
 from plant_fmu.unpacking import DESCRIPTION, unpack
 
 log = logging.getLogger(__name__)
@@ -105,7 +105,7 @@ class Instance:
     def _load(self, path: Path, folder: str, loaded: list[Any]) -> None:
         try:
             root = unpack(path, Path(folder), {fmpy.platform, fmpy.platform_tuple})
-            require_sane(path, root)
+            validate_description(path, root)
         except FmuFileError as error:
             raise PlantError(str(error)) from error
         version = root.get("fmiVersion", "")

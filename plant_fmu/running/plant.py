@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 from plant_fmu.build import FMI_VERSIONS, cached_fmu
 from plant_fmu.errors import PlantError
 from plant_fmu.running.channels import DOUBLES
+from plant_fmu.running.co_simulation_instance import CoSimulationInstance
 from plant_fmu.running.native import Native, native_of
-from plant_fmu.running.slave import Slave
 from plant_fmu.running.state import Clock, State, from_bytes, to_bytes
 from plant_fmu.vehicle import Vehicle, load_vehicle
 
 
-class Plant(Slave):
+class Plant(CoSimulationInstance):
     """A vehicle, or any co-simulation FMU, that is stepped from Python.
 
     Parameters

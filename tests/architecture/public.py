@@ -42,7 +42,7 @@ NAMED = {
     "cosim.run.run_folder": "COMMANDS_LOG SCENARIO RunFolder claim conclude report_again",
     "cosim.scenario.scenario": "CRITERIA VEHICLE_COPY Limit Scenario Time load_scenario",
     "cosim.scenario.toml_file": "shipped_scenarios",
-    "cosim.campaigns.scenes.scene": "Ball Failure Noise Obstacle Scene read_scenes",
+    "cosim.campaigns.scenes.scene": "SphereSpec Failure Noise Obstacle Scene read_scenes",
     "cosim.campaigns.scenes.flyer": "Conditions SceneFlyer Score",
     "cosim.simulation.signals": "Column Signals",
     "fuzzy_arbiter.engines": "ENGINES EngineName choose",

@@ -106,12 +106,12 @@ def test_regressor_times_parameters_is_weight_and_buoyancy(e, r_G, r_B):
 def test_regressor_gives_the_plants_restoring_wrench():
     """At rest, in still water, the plant's acceleration is that of -Z phi: controller and FMU agree."""
     from plant_fmu import cached_fmu, load_vehicle
-    from tests.plant_fmu.conftest import STATES, Slave
+    from tests.plant_fmu.conftest import STATES, CoSimulationInstance
 
     vehicle = load_vehicle("bluerov2_heavy")
     e = np.array([0.7, 0.3, -0.5, 0.41])
     e /= np.linalg.norm(e)
-    slave = Slave(cached_fmu(vehicle, 3)).start(**dict(zip(STATES[3:7], e, strict=True)))
+    slave = CoSimulationInstance(cached_fmu(vehicle, 3)).start(**dict(zip(STATES[3:7], e, strict=True)))
     h = 1e-6
     slave.step(h)
     acceleration = np.array(slave.get(*STATES[7:])) / h

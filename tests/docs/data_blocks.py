@@ -12,7 +12,7 @@ from xml.etree import ElementTree
 import tomli_w
 
 from cosim.campaigns.scenes.scene import decode_scene
-from cosim.live.command_desk import Desk
+from cosim.live.command_desk import CommandDesk
 from cosim.scenario.scenario import load_scenario
 from cosim.simulation.commands import CommandQueue
 from fuzzy_arbiter.formats import load
@@ -77,7 +77,7 @@ def _check_json(block: Block) -> None:
             decode_scene(line.encode())
     if block.directives.commands_of:
         scenario = load_scenario(block.directives.commands_of, ["commands.enabled=true"])
-        desk = Desk(scenario, CommandQueue(), lambda name: True)
+        desk = CommandDesk(scenario, CommandQueue(), lambda name: True)
         for line in lines:
             if why := desk.take(line):
                 raise PageError(f"{block.where}: {line} is refused: {why}")

@@ -200,9 +200,9 @@ def test_without_scikit_fuzzy_it_is_said(monkeypatch):
 
 def test_it_says_which_engine_it_took_and_why():
     assert (Arbiter().engine, Arbiter(form="complete").engine) == ("closed", "exact")
-    assert "closed form" in Arbiter().why
-    assert "there is no closed form" in Arbiter(form="complete").why
-    assert Arbiter(engine="grid").why == "it was asked for"
+    assert "closed form" in Arbiter().engine_reason
+    assert "there is no closed form" in Arbiter(form="complete").engine_reason
+    assert Arbiter(engine="grid").engine_reason == "it was asked for"
 
 
 def test_it_does_not_change_and_can_be_copied(arbiter):

@@ -6,13 +6,13 @@ import stat
 import pytest
 
 from fuzzy_arbiter import FormatError
-from fuzzy_arbiter.files import write_whole
+from fuzzy_arbiter.files import write_atomic
 
 
 def test_a_file_has_the_permissions_that_the_user_gives_new_ones(tmp_path):
     before = os.umask(0o027)
     try:
-        write_whole(tmp_path / "a", b"new")
+        write_atomic(tmp_path / "a", b"new")
     finally:
         os.umask(before)
     assert (tmp_path / "a").read_bytes() == b"new"
@@ -22,7 +22,7 @@ def test_a_file_has_the_permissions_that_the_user_gives_new_ones(tmp_path):
 def test_a_link_stays_one(tmp_path):
     (tmp_path / "a").write_text("old")
     (tmp_path / "link").symlink_to(tmp_path / "a")
-    write_whole(tmp_path / "link", b"new")
+    write_atomic(tmp_path / "link", b"new")
     assert (tmp_path / "link").is_symlink() and (tmp_path / "a").read_bytes() == b"new"
 
 
@@ -30,5 +30,5 @@ def test_a_link_stays_one(tmp_path):
 def test_what_cannot_be_written_leaves_nothing(name, tmp_path):
     (tmp_path / "folder").mkdir()
     with pytest.raises(FormatError, match=name[:4]):
-        write_whole(tmp_path / name, b"new")
+        write_atomic(tmp_path / name, b"new")
     assert [path.name for path in tmp_path.iterdir()] == ["folder"]

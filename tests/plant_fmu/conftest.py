@@ -37,7 +37,7 @@ def extracted(path, modified):
 KINDS = {(2, "cs"): FMU2Slave, (3, "cs"): FMU3Slave, (2, "me"): FMU2Model, (3, "me"): FMU3Model}
 
 
-class Slave:
+class CoSimulationInstance:
     """An instance with variables by name; `said` collects what the FMU logs."""
 
     def __init__(self, path, interface="cs", logging_on=False):
@@ -187,7 +187,7 @@ def make_slave():
     slaves = []
 
     def make(vehicle="odin", fmi=3, **more):
-        slaves.append(Slave(cached_fmu(load_vehicle(vehicle), fmi), **more))
+        slaves.append(CoSimulationInstance(cached_fmu(load_vehicle(vehicle), fmi), **more))
         return slaves[-1]
 
     yield make

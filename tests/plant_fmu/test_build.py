@@ -16,7 +16,7 @@ import pytest
 import plant_fmu
 from plant_fmu import BuildError, TableError, VehicleError, build_fmu, cached_fmu, load_vehicle
 from plant_fmu.__main__ import main
-from plant_fmu.archive import write_whole
+from plant_fmu.archive import write_atomic
 from plant_fmu.compiling.compiler import find_compiler
 from plant_fmu.installing import install_hint
 
@@ -198,7 +198,7 @@ def test_only_files_are_replaced(tmp_path):
 def test_a_file_has_the_permissions_that_the_user_gives_new_ones(tmp_path):
     before = os.umask(0o027)
     try:
-        write_whole(tmp_path / "x.ssv", b"new")
+        write_atomic(tmp_path / "x.ssv", b"new")
     finally:
         os.umask(before)
     assert stat.S_IMODE((tmp_path / "x.ssv").stat().st_mode) == 0o640
@@ -219,9 +219,9 @@ def test_own_vehicle_with_six_thrusters_and_full_added_mass(tmp_path, make_slave
         ("[62.5, 62.5, 62.5, 0.0, 0.0, 0.0]", f"[\n{rows}\n]"),
         (ODIN[ODIN.index("matrix = [") : ODIN.index("force_min")], f"matrix = [\n{rows}\n]\n"),
     )
-    from tests.plant_fmu.conftest import Slave
+    from tests.plant_fmu.conftest import CoSimulationInstance
 
-    slave = Slave(build_fmu(load_vehicle(path), 3, tmp_path / "six.fmu")).start()
+    slave = CoSimulationInstance(build_fmu(load_vehicle(path), 3, tmp_path / "six.fmu")).start()
     assert "thrust[6]" in slave.by_name and "thrust[7]" not in slave.by_name
     slave.set_values({"thrust[6]": 20.0})
     slave.step(0.1)

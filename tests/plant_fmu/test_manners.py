@@ -7,7 +7,7 @@ import pytest
 from fmpy.fmi1 import FMICallException
 
 from plant_fmu import cached_fmu, load_vehicle
-from tests.plant_fmu.conftest import STATES, Slave
+from tests.plant_fmu.conftest import STATES, CoSimulationInstance
 
 
 def refused(slave, call, *words):
@@ -238,7 +238,7 @@ def test_both_versions_give_the_same_bits(make_slave):
 
 def test_instances_do_not_disturb_each_other():
     path = cached_fmu(load_vehicle("odin"), 3)
-    slaves = [Slave(path).start(**{"position.z": float(i)}) for i in range(3)]
+    slaves = [CoSimulationInstance(path).start(**{"position.z": float(i)}) for i in range(3)]
     for slave in slaves:
         slave.step(0.1)
     assert [round(slave.get("position.z")[0]) for slave in slaves] == [0, 1, 2]

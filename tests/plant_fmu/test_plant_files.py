@@ -9,7 +9,7 @@ from xml.etree import ElementTree as ET
 import numpy as np
 import pytest
 
-import plant_fmu.running.slave
+import plant_fmu.running.co_simulation_instance
 from plant_fmu import Plant, PlantError, cached_fmu, load_vehicle
 from tests.plant_fmu.conftest import drive
 
@@ -140,7 +140,7 @@ def test_failing_construction_leaves_nothing(tmp_path, scratch, monkeypatch):
     def interrupted(instance, brief):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(plant_fmu.running.slave, "Bound", interrupted)
+    monkeypatch.setattr(plant_fmu.running.co_simulation_instance, "Bound", interrupted)
     with pytest.raises(KeyboardInterrupt):
         Plant("odin")
     assert list(scratch.iterdir()) == []

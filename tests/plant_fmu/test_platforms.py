@@ -17,7 +17,7 @@ from fmpy.validation import validate_fmu
 from plant_fmu import BuildError, build_fmu, cached_fmu, load_vehicle
 from plant_fmu.__main__ import main
 from plant_fmu.compiling.platforms import PLATFORMS
-from tests.plant_fmu.conftest import STATES, Slave
+from tests.plant_fmu.conftest import STATES, CoSimulationInstance
 from tests.plant_fmu.libraries import parts, read_libraries
 
 HEADERS = Path(fmpy.__file__).parent / "c-code"
@@ -194,7 +194,7 @@ def test_libraries_compute_the_same(all_platforms, fmi, platform, tmp_path):
     path = all_platforms(fmi)
     with zipfile.ZipFile(path) as archive:
         archive.extractall(tmp_path)
-    slave = Slave(cached_fmu(load_vehicle("odin"), fmi)).start()
+    slave = CoSimulationInstance(cached_fmu(load_vehicle("odin"), fmi)).start()
     references = [slave.by_name[name].valueReference for name in ("thrust[2]", *STATES)]
     slave.set_values({"thrust[2]": 20.0})
     for _ in range(1000):

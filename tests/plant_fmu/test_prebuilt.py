@@ -16,7 +16,7 @@ from plant_fmu.compiling.platforms import cross_platforms, native_platform
 from plant_fmu.compiling.signature import signed_anew
 from plant_fmu.component import of_vehicle
 from plant_fmu.description import token
-from tests.plant_fmu.conftest import STATES, Slave
+from tests.plant_fmu.conftest import STATES, CoSimulationInstance
 
 HERE = native_platform()
 # as the compiler names nothing in it: on Linux the names of functions are not in a library
@@ -75,7 +75,7 @@ def test_the_plant_is_that_of_a_compiler(vehicle, fmi, compiled, no_compiler, tm
     path = build_fmu(load_vehicle(vehicle), fmi, tmp_path / "x.fmu")
     answers = []
     for file in (compiled(vehicle, fmi), path):
-        slave = Slave(file).start(**{"velocity.p": 0.3})
+        slave = CoSimulationInstance(file).start(**{"velocity.p": 0.3})
         slave.set_values({"thrust[2]": 20.0})
         slave.step(1.0)
         parameters = [v.name for v in slave.description.modelVariables if v.causality == "parameter"]
@@ -97,7 +97,7 @@ def test_the_library_is_that_of_a_compiler_to_the_byte(fmi, compiled, no_compile
 
 def test_numbers_of_an_own_vehicle_go_in(no_compiler, tmp_path):
     own = dataclasses.replace(load_vehicle("odin"), name="own", mass=130.25)
-    slave = Slave(build_fmu(own, 3, tmp_path / "own.fmu")).start()
+    slave = CoSimulationInstance(build_fmu(own, 3, tmp_path / "own.fmu")).start()
     assert slave.get("mass") == [130.25]
     slave.close()
 
@@ -171,7 +171,7 @@ def test_damaged_libraries_are_named(folder, tmp_path, monkeypatch, damage):
 def test_no_two_vehicles_have_one_token(no_compiler, tmp_path):
     """What was written in is what the binary compares with."""
     first, second = (build_fmu(load_vehicle(name), 3, tmp_path / f"{name}.fmu") for name in ("odin", "rexrov"))
-    slave = Slave(first)
+    slave = CoSimulationInstance(first)
     assert slave.description.guid.encode() in binary(first)
     assert slave.description.guid.encode() not in binary(second)
 

@@ -16,7 +16,7 @@ from lxml import etree
 from plant_fmu import cached_fmu, load_vehicle
 from plant_fmu.compiling.compiler import find_compiler
 from plant_fmu.compiling.platforms import native_platform
-from tests.plant_fmu.conftest import STATES, Slave
+from tests.plant_fmu.conftest import STATES, CoSimulationInstance
 
 FMPY = Path(fmpy.__file__).parent
 
@@ -35,7 +35,7 @@ def packed(folder):
 
 
 def trajectory(path):
-    slave = Slave(path).start(**{"velocity.p": 0.3})
+    slave = CoSimulationInstance(path).start(**{"velocity.p": 0.3})
     slave.set_values({"thrust[2]": 20.0})
     states = []
     for _ in range(100):

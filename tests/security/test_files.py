@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 import controller.jit.jit
 from cosim.campaigns.store.folder import PLAN, read_plan
 from cosim.errors import RunError
-from cosim.io.atomic_file import whole_file, write_whole
+from cosim.io.atomic_file import atomic_file, write_atomic
 from cosim.io.strict_json import read_json
 from cosim.live.watching import looks
 from cosim.replay.page import write_page
@@ -193,8 +193,8 @@ def test_links_that_somebody_left_are_not_followed(tmp_path):
 
 def test_two_that_write_one_file_do_not_meet(tmp_path):
     place = tmp_path / "it"
-    with whole_file(place) as one:
-        with whole_file(place) as other:
+    with atomic_file(place) as one:
+        with atomic_file(place) as other:
             other.write(b"other")
         assert place.read_bytes() == b"other"
         one.write(b"one")
@@ -209,14 +209,14 @@ def test_what_is_no_file_is_not_replaced(tmp_path):
     (tmp_path / "folder").mkdir()
     for name in ("pipe", "link", "folder"):
         with pytest.raises(FileExistsError, match="is no file"):
-            write_whole(tmp_path / name, "text")
+            write_atomic(tmp_path / name, "text")
     assert (tmp_path / "pipe").is_fifo() and (tmp_path / "link").is_symlink()
     assert len(list(tmp_path.iterdir())) == 3
 
 
 def test_what_fails_leaves_what_was(tmp_path):
-    write_whole(tmp_path / "it", "before")
-    with pytest.raises(TypeError), whole_file(tmp_path / "it") as file:
+    write_atomic(tmp_path / "it", "before")
+    with pytest.raises(TypeError), atomic_file(tmp_path / "it") as file:
         file.write("text where bytes are expected")
     assert (tmp_path / "it").read_text() == "before" and len(list(tmp_path.iterdir())) == 1
 

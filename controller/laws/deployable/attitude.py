@@ -87,7 +87,7 @@ def adapt(
 
 
 @part
-def carry(attitude: Attitude, dynamics: Dynamics, R: Array, velocity: Array, water: Array) -> None:
+def propagate(attitude: Attitude, dynamics: Dynamics, R: Array, velocity: Array, water: Array) -> None:
     """Bring Munk's moment up to date with the velocities [m/s] of vehicle and water, shape (3,) each, NED."""
     relative, momentum = zeros(3), zeros(3)
     for i in range(3):

@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 from controller.jit.jit import part
 from controller.jit.stack_array import zeros
 from controller.laws.deployable.gains import DeployableGains
-from controller.laws.deployable.guide import Guide
 from controller.laws.deployable.linear_algebra import copy
+from controller.laws.deployable.path_planner import Guide
 
 Array = NDArray[np.float64]
 

@@ -10,8 +10,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from controller.jit.function_pointer import call, entry_of
-from controller.jit.jit import lean, part
+from controller.jit.function_pointer import call, pointer_to
+from controller.jit.jit import jit_noalloc, part
 from controller.jit.stack_array import zeros
 from controller.law import (
     Array,
@@ -21,22 +21,29 @@ from controller.law import (
     VehicleModel,
     VehicleState,
     checked_period,
-    checked_quaternion,
+    validate_quaternion,
 )
 from controller.laws.deployable import attitude as attitude_loop
-from controller.laws.deployable import failure, guide, intake, model, observer, quadratic_program
+from controller.laws.deployable import (
+    fault_detection,
+    input_validation,
+    model,
+    observer,
+    path_planner,
+    quadratic_program,
+)
 from controller.laws.deployable.attitude import attitude_of
 from controller.laws.deployable.attraction import wanted_acceleration, wanted_velocity
 from controller.laws.deployable.barrier import Motion, Sight, look, sight_of, write_rows
 from controller.laws.deployable.braking import least_forces
 from controller.laws.deployable.faces import FACES
-from controller.laws.deployable.failure import suspicion_of
+from controller.laws.deployable.fault_detection import suspicion_of
 from controller.laws.deployable.gains import DeployableGains, check_gains
-from controller.laws.deployable.guide import guide_of_nothing
 from controller.laws.deployable.linear_algebra import copy
 from controller.laws.deployable.memory import DeployableMemory, Stages
 from controller.laws.deployable.model import Dynamics, Thrusters, dynamics_of, thrusters_of
 from controller.laws.deployable.observer import Estimate, estimate_of_nothing
+from controller.laws.deployable.path_planner import guide_of_nothing
 from controller.laws.deployable.quadratic_program import workspace
 from controller.quaternion import write_rotation
 from controller.regions import Orientation, PackedRegions, pack
@@ -66,7 +73,7 @@ DIAGNOSTICS = (
 )
 
 
-@lean
+@jit_noalloc
 def step(
     state: VehicleState,
     goal: PackedRegions,
@@ -78,12 +85,12 @@ def step(
 ) -> None:
     """Do what `CompiledLaw.step` says, by the deployable law."""
     seen, thrusters, dynamics, period = memory.observed, memory.thrusters, memory.dynamics, memory.period[0]
-    intake.believe_weights(weights, memory.weights)
+    input_validation.sanitize_weights(weights, memory.weights)
     R, wanted, acceleration = zeros(3, 3), zeros(3), zeros(3)
     free, wrench, velocity = zeros(6), zeros(6), zeros(6)
 
     # estimate
-    measured = call(memory.stages.take_in, intake.take_in_measurement, (memory, state, gains))
+    measured = call(memory.stages.take_in, input_validation.take_in_measurement, (memory, state, gains))
     write_rotation(memory.quaternion, R)
     if seen.silence[0] < 0.0 or seen.silence[0] > gains.coast:  # nothing is known any more: drift
         forces[:] = 0.0
@@ -93,23 +100,23 @@ def step(
 
     # failed thrusters
     failed = call(
-        memory.stages.suspect,
-        failure.suspect,
+        memory.stages.detect_fault,
+        fault_detection.detect_fault,
         (memory.suspicion, seen, memory.attitude.residual, dynamics, thrusters, R, gains, period, measured),
     )
-    if failed >= 0 or intake.says_more(state.thruster_health, memory.told, thrusters.health):
-        intake.take_in_thrusters(memory, state.thruster_health, failed)
-        observer.doubt(seen, 0.01)
+    if failed >= 0 or input_validation.says_more(state.thruster_health, memory.told, thrusters.health):
+        input_validation.take_in_thrusters(memory, state.thruster_health, failed)
+        observer.inflate_covariance(seen, 0.01)
 
     # way round, bounded attraction
-    call(memory.stages.improve, guide.improve, (memory.guide, seen.position, goal, regions, gains, period))
+    call(memory.stages.improve, path_planner.improve, (memory.guide, seen.position, goal, regions, gains, period))
     if seen.silence[0] <= _STALE:
         wanted_velocity(memory.guide, seen.position, goal.velocities[0], gains, wanted)
     wanted_acceleration(wanted, seen.velocity, gains, acceleration)
 
     # wanted wrench
     model.free_acceleration(dynamics, R, seen.velocity, memory.omega, seen.water, seen.restoring[0], free)
-    attitude_loop.carry(memory.attitude, dynamics, R, seen.velocity, seen.water)
+    attitude_loop.propagate(memory.attitude, dynamics, R, seen.velocity, seen.water)
     attitude_loop.free_turning(memory.attitude, dynamics, memory.quaternion, memory.omega, free[3:])
     copy(seen.velocity, velocity[:3])
     copy(memory.omega, velocity[3:])
@@ -264,12 +271,12 @@ def _stages(memory: DeployableMemory, gains: DeployableGains) -> Stages:
     motion, bounds = Motion(three, np.zeros(6), np.zeros(6), memory.push, 0.0, 0.0, 0.0, 0.0), (forces, forces)
     reason = (memory.suspicion, seen, three, memory.dynamics, thrusters, R, gains, 0.0, False)
     return Stages(
-        take_in=entry_of(intake.take_in_measurement, (memory, state, gains)),
-        suspect=entry_of(failure.suspect, reason),
-        improve=entry_of(guide.improve, (memory.guide, three, regions, regions, gains, 0.0)),
-        aim=entry_of(attitude_loop.aim, (memory.attitude, regions, three, gains, 0.0)),
-        write_rows=entry_of(write_rows, (memory.program, memory.sight, regions, np.zeros(n), motion, *bounds, gains)),
-        solve=entry_of(quadratic_program.solve, (memory.program, 0, R, *bounds, forces)),
+        take_in=pointer_to(input_validation.take_in_measurement, (memory, state, gains)),
+        detect_fault=pointer_to(fault_detection.detect_fault, reason),
+        improve=pointer_to(path_planner.improve, (memory.guide, three, regions, regions, gains, 0.0)),
+        aim=pointer_to(attitude_loop.aim, (memory.attitude, regions, three, gains, 0.0)),
+        write_rows=pointer_to(write_rows, (memory.program, memory.sight, regions, np.zeros(n), motion, *bounds, gains)),
+        solve=pointer_to(quadratic_program.solve, (memory.program, 0, R, *bounds, forces)),
     )
 
 
@@ -310,7 +317,7 @@ class DeployableLaw(CompiledLaw):
         n_regions: int,
     ) -> None:
         self.gains = self.checked(gains)
-        desired = checked_quaternion(desired_quaternion)
+        desired = validate_quaternion(desired_quaternion)
         m = vehicle.thruster_matrix.shape[1]
         self._memory = DeployableMemory(
             period=np.array([checked_period(period)]),
@@ -354,6 +361,6 @@ class DeployableLaw(CompiledLaw):
         """Return gains if the law can work with them."""
         return check_gains(gains)
 
-    def face(self, quaternion: Array) -> None:
+    def set_attitude(self, quaternion: Array) -> None:
         """Keep another attitude, a unit `quaternion`, where no region asks for one, from the next step on."""
-        self.memory.attitude.preferred[:] = checked_quaternion(quaternion)
+        self.memory.attitude.preferred[:] = validate_quaternion(quaternion)

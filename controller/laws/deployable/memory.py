@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 
 from controller.laws.deployable.attitude import Attitude
 from controller.laws.deployable.barrier import Sight
-from controller.laws.deployable.failure import Suspicion
-from controller.laws.deployable.guide import Guide
+from controller.laws.deployable.fault_detection import FaultState
 from controller.laws.deployable.model import Dynamics, Thrusters
 from controller.laws.deployable.observer import Estimate
+from controller.laws.deployable.path_planner import Guide
 from controller.laws.deployable.quadratic_program import Workspace
 
 Array = NDArray[np.float64]
@@ -22,7 +22,7 @@ class Stages(NamedTuple):
     """Addresses of the long stages of a step, each compiled on its own."""
 
     take_in: int = 0
-    suspect: int = 0
+    detect_fault: int = 0
     improve: int = 0
     aim: int = 0
     write_rows: int = 0
@@ -39,7 +39,7 @@ class DeployableMemory(NamedTuple):
     thrusters: Thrusters
     observed: Estimate
     attitude: Attitude
-    suspicion: Suspicion
+    suspicion: FaultState
     guide: Guide
     sight: Sight
     program: Workspace

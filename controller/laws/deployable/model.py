@@ -100,12 +100,12 @@ def thrusters_of(vehicle: VehicleModel) -> Thrusters:
         health=np.ones(m),
         forces=np.zeros(m),
     )
-    share_out(thrusters)
+    reallocate(thrusters)
     return thrusters
 
 
 @compiled
-def share_out(thrusters: Thrusters) -> None:
+def reallocate(thrusters: Thrusters) -> None:
     """Bring matrix, limits and inverses up to date with `health`."""
     m = thrusters.health.size
     for j in range(m):

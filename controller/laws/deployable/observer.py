@@ -162,7 +162,7 @@ def correct(estimate: Estimate, position: Array, velocity: Array, gains: Deploya
 
 
 @part
-def doubt(estimate: Estimate, variance: float) -> None:
+def inflate_covariance(estimate: Estimate, variance: float) -> None:
     """Let velocity and unknowns be found anew: after the thrusters turned out to be other than believed."""
     for axis in range(3):
         estimate.covariance[axis, 1, 1] += variance

@@ -27,11 +27,11 @@ from cosim.campaigns.store.folder import PLAN, RESULTS, SUMMARY, held
 from cosim.campaigns.store.plan import SCENES
 from cosim.campaigns.store.results import Results
 from cosim.errors import RunError
-from cosim.io.atomic_file import write_whole
+from cosim.io.atomic_file import write_atomic
 from cosim.io.strict_json import read_json, understood
 
 if TYPE_CHECKING:
-    from cosim.report.figures.style import Drawing
+    from cosim.report.figures.style import NamedFigure
 
 PAGE = "campaign.html"
 FACTS = ("completed", "reached", "violation")  # in the order of the page
@@ -72,7 +72,7 @@ def write_campaign_page(folder: Path, replays: int) -> Path:
 
         def write(shown: Mapping[int, Replay]) -> None:
             with understood(folder / SUMMARY):
-                write_whole(folder / PAGE, _page(folder, results, kinds, summary, worst, figures, shown).html())
+                write_atomic(folder / PAGE, _page(folder, results, kinds, summary, worst, figures, shown).html())
 
         write({})
         by = f"by the {summary['law']} law"
@@ -128,9 +128,9 @@ def spreads_of(results: Results, groups: Mapping[str, Any]) -> dict[str, dict[st
     return found
 
 
-def _drawings(results: Results, kinds: SceneKinds, summary: dict[str, Any]) -> Iterator[Drawing]:
+def _drawings(results: Results, kinds: SceneKinds, summary: dict[str, Any]) -> Iterator[NamedFigure]:
     from cosim.campaigns.pages.figures import Key, Rated, binned_rates, distributions, forest, scatter
-    from cosim.report.figures.style import Drawing
+    from cosim.report.figures.style import NamedFigure
 
     groups = {"all": summary} | summary["kinds"]
     several = len(groups) > 1
@@ -139,7 +139,7 @@ def _drawings(results: Results, kinds: SceneKinds, summary: dict[str, Any]) -> I
         for fact in FACTS
         for name, of in groups.items()
     ]
-    yield Drawing("rates", "How many scenes were completed, reached, and violated a region.", forest(lines))
+    yield NamedFigure("rates", "How many scenes were completed, reached, and violated a region.", forest(lines))
 
     which = dict(kinds.groups()) or {"all": np.ones(len(results), dtype=bool)}
     yield from distributions(spreads_of(results, which), "Effort and variation of the thrust: where it was reached.")
@@ -153,12 +153,12 @@ def _drawings(results: Results, kinds: SceneKinds, summary: dict[str, Any]) -> I
         facts = rates_of(results)
         caption = "Outcomes by what the scenes are like, in parts of the range with about as many scenes each."
         if any(0 < facts[name].sum() < len(results) for name in _DRAWN):
-            yield Drawing("depends", caption, binned_rates(keys, {name: facts[name] for name in _DRAWN}))
+            yield NamedFigure("depends", caption, binned_rates(keys, {name: facts[name] for name in _DRAWN}))
         caption = "Least clearance of each scene; below 0 a region is violated."
         drawn = scatter(
             keys, results.number("min_clearance"), "least clearance [m]", facts["reached"], facts["violation"]
         )
-        yield Drawing("clearances", caption, drawn)
+        yield NamedFigure("clearances", caption, drawn)
 
 
 def _page(

@@ -20,11 +20,11 @@ from cosim.campaigns.scenes.rows import SCHEMA
 from cosim.campaigns.store.folder import SUMMARY
 from cosim.campaigns.store.results import Results
 from cosim.errors import RunError
-from cosim.io.atomic_file import write_whole
+from cosim.io.atomic_file import write_atomic
 from cosim.io.strict_json import read_json, understood
 
 if TYPE_CHECKING:
-    from cosim.report.figures.style import Drawing
+    from cosim.report.figures.style import NamedFigure
 
 NUMBERS = "compare.json"
 PAGE = "compare.html"
@@ -65,7 +65,7 @@ def write_comparison_page(folder: Path, replays: int) -> Path:
 
         def write(shown: Mapping[int, Replay]) -> None:
             with understood(folder / NUMBERS):
-                write_whole(folder / PAGE, _page(folder, numbers, worst, figures, shown).html())
+                write_atomic(folder / PAGE, _page(folder, numbers, worst, figures, shown).html())
 
         write({})
         keys = dict.fromkeys(w.key for of in worst.values() for w in of[:replays])
@@ -78,14 +78,14 @@ def write_comparison_page(folder: Path, replays: int) -> Path:
     return folder / PAGE
 
 
-def _drawings(results: Mapping[str, Results], numbers: dict[str, Any]) -> Iterator[Drawing]:
+def _drawings(results: Mapping[str, Results], numbers: dict[str, Any]) -> Iterator[NamedFigure]:
     from cosim.campaigns.pages.comparison_figures import side_by_side
     from cosim.campaigns.pages.figures import Rated, distributions, forest
-    from cosim.report.figures.style import Drawing
+    from cosim.report.figures.style import NamedFigure
 
     laws = numbers["laws"]
     lines = [Rated(fact, law, of["scenes"], of["rates"][fact]) for fact in FACTS for law, of in laws.items()]
-    yield Drawing("rates", "How many scenes each law completed, reached, and violated a region in.", forest(lines))
+    yield NamedFigure("rates", "How many scenes each law completed, reached, and violated a region in.", forest(lines))
     by_law = {law: spreads_of(rows, {law: np.ones(len(rows), dtype=bool)}) for law, rows in results.items()}
     columns = {name: {law: by_law[law][name][law] for law in laws} for name in SPREADS}
     yield from distributions(columns, "Effort and variation of the thrust: where the law reached the goal.")
@@ -95,7 +95,7 @@ def _drawings(results: Mapping[str, Results], numbers: dict[str, Any]) -> Iterat
             f"Each scene by what it came to with {first} (across) and {other} (up). On the line both come to the same."
         )
         drawn = side_by_side(first, results[first], other, results[other], [(name, LABELS[name]) for name in _SEEN])
-        yield Drawing(f"scenes-{first}-{other}", caption, drawn)
+        yield NamedFigure(f"scenes-{first}-{other}", caption, drawn)
 
 
 def _page(

@@ -12,7 +12,7 @@ from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormat
 
 from cosim.campaigns.analysis.statistics import Facts, bins, quantiles, rate
 from cosim.campaigns.pages.sections import LABELS
-from cosim.report.figures.style import BLACK, BLUE, CYCLE, GREEN, ORANGE, RED, Drawing, legend_columns
+from cosim.report.figures.style import BLACK, BLUE, CYCLE, GREEN, ORANGE, RED, NamedFigure, legend_columns
 from cosim.simulation.signals import Array
 
 WIDTH = 5.6  # in, of a figure: readable on a phone too
@@ -95,7 +95,7 @@ def _interval(axes: Axes, line: Rated, y: float) -> None:
     )  # fmt: skip
 
 
-def distributions(columns: Mapping[str, Mapping[str, Array]], told: str) -> Iterator[Drawing]:
+def distributions(columns: Mapping[str, Mapping[str, Array]], told: str) -> Iterator[NamedFigure]:
     """Yield the share of all that is at most each value, a panel for each column, with a dot at the median.
 
     Parameters
@@ -132,7 +132,7 @@ def distributions(columns: Mapping[str, Mapping[str, Array]], told: str) -> Iter
     caption = (
         "Share that comes to at most so much, with a dot at the median of what comes. Left of 0 a region is violated."
     )
-    yield Drawing("distributions", f"{caption} {told}".rstrip(), figure)
+    yield NamedFigure("distributions", f"{caption} {told}".rstrip(), figure)
 
 
 def shares_up_to(values: Array) -> tuple[Array, Array]:

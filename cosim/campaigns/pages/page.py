@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 from cosim.report.report import FIGURES
 
 if TYPE_CHECKING:  # Matplotlib takes as long to import as all else together
-    from cosim.report.figures.style import Drawing
+    from cosim.report.figures.style import NamedFigure
 
 _PAGE = Template("""<!DOCTYPE html>
 <html lang="en">
@@ -135,14 +135,14 @@ class Page:
         return _PAGE.substitute(title=html.escape(self._title), body="\n".join(self._pieces))
 
 
-def write_figures(folder: Path, drawings: Iterable[Drawing]) -> dict[str, Html]:
+def write_figures(folder: Path, drawings: Iterable[NamedFigure]) -> dict[str, Html]:
     """Write figures as SVG and PNG below a folder, in the place of those that were there.
 
     Parameters
     ----------
     folder : Path
         Of the campaign.
-    drawings : iterable of Drawing
+    drawings : iterable of NamedFigure
         In their order.
 
     Returns
@@ -172,7 +172,7 @@ def write_figures(folder: Path, drawings: Iterable[Drawing]) -> dict[str, Html]:
     return shown
 
 
-def _figure(drawing: Drawing, folder: Path) -> Html:
+def _figure(drawing: NamedFigure, folder: Path) -> Html:
     svg = drawing.write(folder)
     caption = html.escape(drawing.caption)
     inline = svg[svg.index("<svg") :].replace("<svg", f'<svg role="img" aria-label="{caption}"', 1)

@@ -12,7 +12,7 @@ from typing import Any
 from cosim.campaigns.pages.page import Html, link
 from cosim.campaigns.reruns.repeat import Repeat, repeat_of
 from cosim.errors import CosimError, RunError
-from cosim.io.atomic_file import write_whole
+from cosim.io.atomic_file import write_atomic
 from cosim.io.strict_json import json_text, read_json
 from cosim.replay.page import REPLAY, write_page
 from cosim.replay.trace import trace_of
@@ -80,7 +80,7 @@ def replay_of(out: Path, key: int, folders: Sequence[Path], title: str) -> Repla
                 remarks += [name + remark] if remark else []
             if traces:
                 write_page(scratch / REPLAY, traces, title)
-            write_whole(scratch / _FLOWN, json_text({"remarks": remarks}))
+            write_atomic(scratch / _FLOWN, json_text({"remarks": remarks}))
             scratch.chmod(0o755)
             shutil.rmtree(place, ignore_errors=True)
             scratch.replace(place)

@@ -29,12 +29,12 @@ from cosim.campaigns.store.results import Results
 from cosim.campaigns.sweeps.rows import schema_of
 from cosim.campaigns.sweeps.summary import FACTS
 from cosim.errors import RunError
-from cosim.io.atomic_file import write_whole
+from cosim.io.atomic_file import write_atomic
 from cosim.io.strict_json import read_json, understood
 from cosim.results.run_result import SCENARIO
 
 if TYPE_CHECKING:
-    from cosim.report.figures.style import Drawing
+    from cosim.report.figures.style import NamedFigure
 
 PAGE = "sweep.html"
 _TOLD_SHARE, _TOLD_RHO = 0.01, 0.1  # effects and rank correlations that are worth a place in the table
@@ -74,7 +74,7 @@ def write_sweep_page(folder: Path, replays: int) -> Path:
 
         def write(shown: Mapping[int, Replay]) -> None:
             with understood(folder / SUMMARY):
-                write_whole(folder / PAGE, _page(folder, summary, worst, figures, shown).html())
+                write_atomic(folder / PAGE, _page(folder, summary, worst, figures, shown).html())
 
         write({})
         of = f"of the sweep of {summary['name']}"
@@ -107,13 +107,15 @@ def sweep_lines(summary: dict[str, Any]) -> Iterator[str]:
         yield f"worst: {worst['command']}"
 
 
-def _drawings(results: Results, s: dict[str, Any]) -> Iterator[Drawing]:
+def _drawings(results: Results, s: dict[str, Any]) -> Iterator[NamedFigure]:
     from cosim.campaigns.pages.figures import Key, Rated, binned_rates, distributions, forest, scatter
-    from cosim.report.figures.style import Drawing
+    from cosim.report.figures.style import NamedFigure
 
     flown = results.absent("refused")
     lines = [Rated(fact, "", s["flown"], s[fact]) for fact in FACTS]
-    yield Drawing("rates", "How many rows reached the goal, settled there, and violated a hard region.", forest(lines))
+    yield NamedFigure(
+        "rates", "How many rows reached the goal, settled there, and violated a hard region.", forest(lines)
+    )
 
     columns = {name: {"": results.number(name)[flown]} for name in s["quantiles"]}
     yield from distributions(columns, "What never comes leaves a curve below 100 %.")
@@ -129,13 +131,13 @@ def _drawings(results: Results, s: dict[str, Any]) -> Iterator[Drawing]:
             "Outcomes by what varies, in parts of the range with about as many rows each; what matters most first."
         )
         if any(0 < fact.sum() < len(fact) for fact in (reached, violated)):
-            yield Drawing("depends", caption, binned_rates(keys, {"reached": reached, "violated": violated}))
+            yield NamedFigure("depends", caption, binned_rates(keys, {"reached": reached, "violated": violated}))
         for name in ("min_clearance", "reach_time"):
             column = results.number(name)[flown]
             if _any(column):
                 caption = f"{LABELS[name].partition(' [')[0].capitalize()} of each row by what varies."
                 drawn = scatter(keys, column, LABELS[name], reached, violated)
-                yield Drawing(f"by-{name}".replace("_", "-"), caption, drawn)
+                yield NamedFigure(f"by-{name}".replace("_", "-"), caption, drawn)
 
 
 def _any(values: Any) -> bool:

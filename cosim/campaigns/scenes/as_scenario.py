@@ -9,7 +9,7 @@ from typing import Any
 from controller.regions import SHAPES
 from cosim.campaigns.scenes.flyer import VEHICLE, Conditions
 from cosim.campaigns.scenes.scene import Scene, plant_values, scene_regions
-from cosim.scenario.scenario import Scenario, checked_scenario
+from cosim.scenario.scenario import Scenario, validate_scenario
 from plant_fmu.vehicle import load_vehicle
 
 _OF_THE_SCENARIO = ("substep", "current", "position")  # values of the plant that have keys of their own
@@ -71,7 +71,7 @@ def scene_scenario(scene: Scene, law: str, gains: Any, conditions: Conditions) -
         "tell_failures": conditions.tell_failures,
         "regions": _regions(scene),
     }
-    return checked_scenario(table, f"{law}-scene-{scene.seed}", vehicle)
+    return validate_scenario(table, f"{law}-scene-{scene.seed}", vehicle)
 
 
 def _failures(scene: Scene, conditions: Conditions) -> list[dict[str, float]]:

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from controller import LAWS
 from cosim.batch.c_calls import Clock
-from cosim.batch.fused_loop import OUTPUTS, Allocator, Marks, Setup, flight_of, room_for
-from cosim.campaigns.scenes.scene import Scene, Told, plant_values, told
+from cosim.batch.fused_loop import OUTPUTS, Allocator, FlightConfig, FlightMetrics, fused_loop_of, make_workspace
+from cosim.campaigns.scenes.scene import KnownScene, Scene, plant_values, told
 from cosim.errors import RunError
 from cosim.scenario.vehicle_model import vehicle_model
 from plant_fmu import Plant
@@ -97,7 +97,7 @@ class SceneFlyer:
         self._model = vehicle_model(self._vehicle)
         self._law(0)  # says now what it cannot work with
         self._clock = Clock()
-        self._flight = flight_of(law)
+        self._flight = fused_loop_of(law)
         self._plant = Plant(self._vehicle)
 
     def fly(self, scene: Scene, trace: bool = False) -> tuple[Score, NDArray[np.float64]]:
@@ -133,32 +133,34 @@ class SceneFlyer:
         effectiveness.inputs[:] = 1.0
         setup = self._setup(scene, known)
         rows = np.zeros((c.controls, 20 + m + law.report.size) if trace else (0, 0))
-        room, estimate, allocator = room_for(known.regions.kinds.size, m, m), np.zeros(4), self._allocator()
-        marks = self._flight(setup, native, effectiveness, allocator, law.gains, law.memory, room, estimate, rows)
-        return self._score(marks, setup), rows
+        workspace, estimate, allocator = make_workspace(known.regions.kinds.size, m, m), np.zeros(4), self._allocator()
+        metrics = self._flight(
+            setup, native, effectiveness, allocator, law.gains, law.memory, workspace, estimate, rows
+        )
+        return self._score(metrics, setup), rows
 
-    def _score(self, marks: Marks, setup: Setup) -> Score:
-        inside, since = marks.inside and marks.failed_step < 0, marks.last_entered
+    def _score(self, metrics: FlightMetrics, setup: FlightConfig) -> Score:
+        inside, since = metrics.inside and metrics.failed_step < 0, metrics.last_entered
         return Score(
             reached=inside and setup.steps - since >= math.ceil(self.conditions.settled / setup.step - _ROUNDING),
             reach_time=since * setup.step if inside else math.inf,
-            min_clearance=marks.least_clearance,
-            effort=marks.thrust_effort,
-            thrust_variation=marks.thrust_variation,
-            worst_step=marks.worst_step,
-            failed_step=int(marks.failed_step),
+            min_clearance=metrics.least_clearance,
+            effort=metrics.thrust_effort,
+            thrust_variation=metrics.thrust_variation,
+            worst_step=metrics.worst_step,
+            failed_step=int(metrics.failed_step),
         )
 
     def _law(self, n_regions: int) -> Any:
         return LAWS[self.law].for_vehicle(self._model, self.gains, np.array(LEVEL), self.conditions.control, n_regions)
 
-    def _setup(self, scene: Scene, known: Told) -> Setup:
+    def _setup(self, scene: Scene, known: KnownScene) -> FlightConfig:
         c, failure = self.conditions, scene.failed_thruster
         noise = np.random.default_rng([scene.seed, 1]).standard_normal((c.controls, 6))
         noise[:, :3] *= scene.noise.position
         noise[:, 3:] *= scene.noise.velocity
         fails_at = math.ceil(min(failure.time, c.duration) / c.control) * c.plant_steps if failure else 0
-        return Setup(
+        return FlightConfig(
             goal=known.goal,
             regions=known.regions,
             criteria=known.criteria,

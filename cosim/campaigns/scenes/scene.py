@@ -1,6 +1,6 @@
 """Scored scenes: a start, a goal region, obstacles, a depth band, and what the law is not told of the plant.
 
-One JSON object a line. What the law is told of a scene is `Told`; `plant_values` is for the plant alone.
+One JSON object a line. What the law is told of a scene is `KnownScene`; `plant_values` is for the plant alone.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ Vector3 = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
-class Ball:
+class SphereSpec:
     """The goal region."""
 
     centre: Vector3  # m, NED
@@ -64,7 +64,7 @@ class Scene:
 
     seed: int
     start: Vector3  # m, NED
-    goal: Ball
+    goal: SphereSpec
     obstacles: tuple[Obstacle, ...]
     depth_band: tuple[float, float]  # m
     current: Vector3  # m/s, NED
@@ -74,7 +74,7 @@ class Scene:
     failed_thruster: Failure | None = None
 
 
-class Told(NamedTuple):
+class KnownScene(NamedTuple):
     """What the law is told of a scene: no more than this, and its measurements."""
 
     goal: PackedRegions
@@ -82,7 +82,7 @@ class Told(NamedTuple):
     criteria: NDArray[np.int64]  # (n,) index into CRITERIA of each of the regions
 
 
-def told(scene: Scene) -> Told:
+def told(scene: Scene) -> KnownScene:
     """Return what the law is told of a scene.
 
     Parameters
@@ -96,7 +96,7 @@ def told(scene: Scene) -> Told:
         Arrays of its own.
     """
     regions, criteria = zip(*scene_regions(scene), strict=True)
-    return Told(
+    return KnownScene(
         goal=pack([Region("goal", Sphere(scene.goal.centre, scene.goal.radius), "in")]),
         regions=pack(regions),
         criteria=np.array([CRITERIA.index(criterion) for criterion in criteria], dtype=np.int64),
@@ -202,7 +202,7 @@ def _check(scene: Scene) -> None:
     for key in ("start", "current", "depth_band"):
         _require_moderate(key, getattr(scene, key))
     _require(shallow < deep, "depth_band", scene.depth_band, "two depths, the shallow one first")
-    balls: dict[str, Ball | Obstacle] = {"goal": scene.goal}
+    balls: dict[str, SphereSpec | Obstacle] = {"goal": scene.goal}
     for key, ball in (balls | {f"obstacles.{i}": o for i, o in enumerate(scene.obstacles)}).items():
         _require_moderate(f"{key}.centre", ball.centre)
         _require(0.0 < ball.radius <= GREATEST, f"{key}.radius", ball.radius, "above 0 m")

@@ -16,7 +16,7 @@ from cosim.campaigns.store.plan import difference
 from cosim.campaigns.store.results import Results
 from cosim.campaigns.workers.work import Rows, Work
 from cosim.errors import RunError
-from cosim.io.atomic_file import write_whole
+from cosim.io.atomic_file import write_atomic
 from cosim.io.strict_json import read_json
 
 PLAN = "campaign.json"
@@ -73,10 +73,10 @@ class CampaignFolder:
             if differing := difference(read_plan(self.path), json.loads(json.dumps(plan))):
                 raise RunError(f"{self.path}: holds another campaign ({differing}), expected a folder of its own")
         else:
-            write_whole(file, json.dumps(plan, indent=2, allow_nan=False) + "\n")
+            write_atomic(file, json.dumps(plan, indent=2, allow_nan=False) + "\n")
         for name, content in work.files.items():
             if not (self.path / name).exists():
-                write_whole(self.path / name, content)
+                write_atomic(self.path / name, content)
 
     @property
     def complete(self) -> bool:

@@ -16,7 +16,7 @@ import pyarrow.parquet as pq
 
 from cosim.campaigns.workers.work import Rows
 from cosim.errors import RunError
-from cosim.io.atomic_file import whole_file
+from cosim.io.atomic_file import atomic_file
 
 log = logging.getLogger(__name__)
 
@@ -202,7 +202,7 @@ def write_tables(path: Path, tables: Any, schema: Any) -> None:
     OSError
         If it cannot be written; nothing is left then.
     """
-    with whole_file(path) as file, pq.ParquetWriter(file, schema, compression="zstd") as writer:
+    with atomic_file(path) as file, pq.ParquetWriter(file, schema, compression="zstd") as writer:
         for table in _grouped(tables):
             writer.write_table(table)
 

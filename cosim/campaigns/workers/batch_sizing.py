@@ -22,13 +22,13 @@ class Batch:
     """Rows that are flown together."""
 
     rows: Rows
-    strikes: int = 0  # how often a process has died of it
+    crash_count: int = 0  # how often a process has died of it
     alone: bool = False  # to be flown while nothing else is, so that a death can be laid to it
 
-    def halves(self, strikes: int) -> tuple[Batch, Batch]:
+    def halves(self, crash_count: int) -> tuple[Batch, Batch]:
         """Return it in two parts, each of which begins with some strikes."""
         middle = len(self.rows) // 2
-        return Batch(self.rows[:middle], strikes, self.alone), Batch(self.rows[middle:], strikes, self.alone)
+        return Batch(self.rows[:middle], crash_count, self.alone), Batch(self.rows[middle:], crash_count, self.alone)
 
 
 class Batches:

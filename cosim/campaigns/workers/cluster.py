@@ -12,7 +12,7 @@ from typing import Any
 
 from cosim.campaigns.workers.work import Task
 from cosim.campaigns.workers.worker import fly, release
-from cosim.campaigns.workers.worker_pools import Death, Flight, interrupts_held
+from cosim.campaigns.workers.worker_pools import Flight, WorkerCrash, interrupts_held
 from cosim.errors import RunError
 from plant_fmu.installing import install_hint
 
@@ -75,13 +75,13 @@ class Cluster:
             raise _lost(error) from error
         return flight
 
-    def settle(self, flight: Flight) -> tuple[Any, float] | Death:
+    def result(self, flight: Flight) -> tuple[Any, float] | WorkerCrash:
         """Return what came of it; Dask lays the death of a worker to everything that had been sent there."""
         try:
             return flight.result()
         except self._killed as error:
             self._bereft = True
-            return Death(error.allowed_failures + 1, certain=False)
+            return WorkerCrash(error.allowed_failures + 1, certain=False)
         except (CancelledError, OSError) as error:
             raise _lost(error) from error
 

@@ -9,7 +9,7 @@ from typing import Any
 
 from cosim.campaigns.workers.batch_sizing import Batch, Batches
 from cosim.campaigns.workers.work import Work
-from cosim.campaigns.workers.worker_pools import FATAL, Crew, Death, Flight
+from cosim.campaigns.workers.worker_pools import FATAL, Flight, WorkerCrash, WorkerPool
 from cosim.errors import RunError
 
 log = logging.getLogger(__name__)
@@ -19,7 +19,7 @@ _LOOK = 5.0  # s between looks at the crew, where nothing comes home
 _DEATHS = 30  # in a row, with nothing that came home between them: it is not the rows
 
 
-def fly_all(work: Work, batches: Batches, crew: Crew) -> Generator[Any, None, None]:
+def fly_all(work: Work, batches: Batches, pool: WorkerPool) -> Generator[Any, None, None]:
     """Fly batches, and yield the rows of each as it comes home, in whatever order that is.
 
     A batch that processes die of is flown again; the third time it is taken apart, down to the row that is to blame,
@@ -31,7 +31,7 @@ def fly_all(work: Work, batches: Batches, crew: Crew) -> Generator[Any, None, No
         What is flown.
     batches : Batches
         What is left of it.
-    crew : Crew
+    crew : WorkerPool
         By whom.
 
     Yields
@@ -49,7 +49,7 @@ def fly_all(work: Work, batches: Batches, crew: Crew) -> Generator[Any, None, No
     home, deaths = 0, 0
 
     def send() -> None:
-        width = crew.width if home else 1
+        width = pool.width if home else 1
         while len(under_way) < width and not any(batch.alone for batch in under_way.values()):
             batch = batches.take(width)
             if batch is None:
@@ -57,7 +57,7 @@ def fly_all(work: Work, batches: Batches, crew: Crew) -> Generator[Any, None, No
             if batch.alone and under_way:
                 batches.put_back(batch)
                 return
-            under_way[crew.submit(work.task, work.batch(batch.rows))] = batch
+            under_way[pool.submit(work.task, work.batch(batch.rows))] = batch
 
     while True:
         send()
@@ -65,17 +65,17 @@ def fly_all(work: Work, batches: Batches, crew: Crew) -> Generator[Any, None, No
             break
         done = wait(under_way, _LOOK, FIRST_COMPLETED).done
         if not done:
-            crew.check()
+            pool.check()
         for flight in done:
-            batch, came = under_way.pop(flight), crew.settle(flight)
-            if not isinstance(came, Death):
+            batch, came = under_way.pop(flight), pool.result(flight)
+            if not isinstance(came, WorkerCrash):
                 home, deaths = home + 1, 0
                 batches.measured(len(batch.rows), came[1])
                 yield came[0]
                 yield from condemned
                 condemned.clear()
                 continue
-            deaths += came.strikes > 0
+            deaths += came.crash_count > 0
             if deaths > _DEATHS:
                 raise RunError(
                     f"{deaths} processes died one after the other, whatever they flew; what is flown is kept"
@@ -86,16 +86,16 @@ def fly_all(work: Work, batches: Batches, crew: Crew) -> Generator[Any, None, No
     yield from condemned
 
 
-def _again(work: Work, batches: Batches, batch: Batch, death: Death) -> list[Any]:
+def _again(work: Work, batches: Batches, batch: Batch, crash: WorkerCrash) -> list[Any]:
     """Put back a batch that did not come home, whole or in halves; return the table of its row if that is to blame."""
-    if not death.strikes:
+    if not crash.crash_count:
         batches.put_back(batch)
-    elif not (death.certain or batch.alone):
+    elif not (crash.certain or batch.alone):
         log.warning("a process died; what it may have died of is flown again alone")
-        batches.put_back(Batch(batch.rows, batch.strikes, alone=True))
-    elif (strikes := batch.strikes + death.strikes) < FATAL:
+        batches.put_back(Batch(batch.rows, batch.crash_count, alone=True))
+    elif (crash_count := batch.crash_count + crash.crash_count) < FATAL:
         log.warning("a process died (killed, or out of memory); its %d rows are flown again", len(batch.rows))
-        batches.put_back(Batch(batch.rows, strikes, batch.alone))
+        batches.put_back(Batch(batch.rows, crash_count, batch.alone))
     elif len(batch.rows) > 1:
         for half in reversed(batch.halves(FATAL - 1)):
             batches.put_back(half)

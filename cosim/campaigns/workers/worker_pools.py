@@ -23,14 +23,14 @@ Flight = Future[tuple[Any, float]]  # table, s
 
 
 @dataclass(frozen=True)
-class Death:
+class WorkerCrash:
     """A batch did not come home, because its process died."""
 
-    strikes: int  # how many have died of it
+    crash_count: int  # how many have died of it
     certain: bool = True  # that it was this batch
 
 
-class Crew(Protocol):
+class WorkerPool(Protocol):
     """Flies batches somewhere."""
 
     @property
@@ -40,7 +40,7 @@ class Crew(Protocol):
     def submit(self, task: Task, batch: Any) -> Flight:
         """Have a batch flown."""
 
-    def settle(self, flight: Flight) -> tuple[Any, float] | Death:
+    def result(self, flight: Flight) -> tuple[Any, float] | WorkerCrash:
         """Return what came of a batch that is done; raise what cannot be mended."""
 
     def check(self) -> None:
@@ -53,7 +53,7 @@ class Crew(Protocol):
         """Send everybody home; what is under way is lost."""
 
 
-class Here:
+class InProcess:
     """Nobody but this process: a batch is flown when it is submitted."""
 
     width = 1
@@ -64,7 +64,7 @@ class Here:
         flight.set_result(fly(task, batch))
         return flight
 
-    def settle(self, flight: Flight) -> tuple[Any, float] | Death:
+    def result(self, flight: Flight) -> tuple[Any, float] | WorkerCrash:
         """Return what came of it."""
         return flight.result()
 
@@ -80,7 +80,7 @@ class Here:
 
 
 @dataclass(eq=False)
-class _Hand:
+class _Worker:
     """One process. Each has a pool of its own, so that when it dies, we know of what, and the others go on."""
 
     pool: ProcessPoolExecutor
@@ -91,7 +91,7 @@ class _Hand:
     def blame(self) -> None:
         """Lay a death to the first flight that has not come home."""
         if self.fatal is None:
-            self.fatal = next(flight for flight in self.under_way if not _came_home(flight))
+            self.fatal = next(flight for flight in self.under_way if not _has_finished(flight))
 
 
 class Processes:
@@ -107,70 +107,70 @@ class Processes:
 
     def __init__(self, n: int, task: Task) -> None:
         self._task = task
-        self._hands = [self._hand() for _ in range(n)]
-        self._hand_of: dict[Flight, _Hand] = {}
+        self._workers = [self._free_worker() for _ in range(n)]
+        self._hand_of: dict[Flight, _Worker] = {}
 
     @property
     def width(self) -> int:
         """How many batches may be under way."""
-        return _QUEUED * len(self._hands)
+        return _QUEUED * len(self._workers)
 
     def submit(self, task: Task, batch: Any) -> Flight:
         """Have a batch flown by the process that has least to do."""
-        hand = min(self._hands, key=lambda hand: len(hand.under_way))
+        worker = min(self._workers, key=lambda worker: len(worker.under_way))
         try:
-            flight = hand.pool.submit(fly, task, batch)
+            flight = worker.pool.submit(fly, task, batch)
         except BrokenProcessPool:  # it died, and nobody has settled that yet
-            hand = self._replace(hand)
-            flight = hand.pool.submit(fly, task, batch)
-        hand.under_way.append(flight)
-        self._hand_of[flight] = hand
+            worker = self._replace(worker)
+            flight = worker.pool.submit(fly, task, batch)
+        worker.under_way.append(flight)
+        self._hand_of[flight] = worker
         return flight
 
-    def settle(self, flight: Flight) -> tuple[Any, float] | Death:
+    def result(self, flight: Flight) -> tuple[Any, float] | WorkerCrash:
         """Return what came of it."""
-        hand = self._hand_of.pop(flight)
+        worker = self._hand_of.pop(flight)
         try:
             return flight.result()
         except BrokenProcessPool:
-            hand.blame()
-            if hand in self._hands:
-                self._replace(hand)
-            return Death(1 if flight is hand.fatal else 0)
+            worker.blame()
+            if worker in self._workers:
+                self._replace(worker)
+            return WorkerCrash(1 if flight is worker.fatal else 0)
         finally:
-            hand.under_way.remove(flight)
+            worker.under_way.remove(flight)
 
     def check(self) -> None:
         """Be sure to hear of every death."""
 
     def compiling(self) -> bool:
         """Return whether one of the processes is compiling."""
-        return any(hand.compiling.value for hand in self._hands)
+        return any(worker.compiling.value for worker in self._workers)
 
-    def _replace(self, hand: _Hand) -> _Hand:
-        new = self._hand()
-        self._hands[self._hands.index(hand)] = new
-        hand.pool.shutdown(wait=False)
+    def _replace(self, worker: _Worker) -> _Worker:
+        new = self._free_worker()
+        self._workers[self._workers.index(worker)] = new
+        worker.pool.shutdown(wait=False)
         return new
 
-    def _hand(self) -> _Hand:
+    def _free_worker(self) -> _Worker:
         """Start a process, and have it get ready, which takes it a second."""
         context = multiprocessing.get_context("spawn")
         compiling = context.RawValue("i", 0)
         with interrupts_held():
             pool = ProcessPoolExecutor(1, mp_context=context, initializer=begin_worker, initargs=(compiling,))
             pool.submit(prepare, self._task)
-        return _Hand(pool, compiling)
+        return _Worker(pool, compiling)
 
     def close(self) -> None:
         """Send everybody home."""
-        for hand in self._hands:
-            hand.pool.shutdown(wait=False, cancel_futures=True)
-        for hand in self._hands:
-            hand.pool.shutdown(wait=True)
+        for worker in self._workers:
+            worker.pool.shutdown(wait=False, cancel_futures=True)
+        for worker in self._workers:
+            worker.pool.shutdown(wait=True)
 
 
-class Lent:
+class ExternalExecutor:
     """An executor that somebody else has made, and closes.
 
     Parameters
@@ -192,7 +192,7 @@ class Lent:
         except (BrokenExecutor, RuntimeError) as error:
             raise _broken(error) from error
 
-    def settle(self, flight: Flight) -> tuple[Any, float] | Death:
+    def result(self, flight: Flight) -> tuple[Any, float] | WorkerCrash:
         """Return what came of it."""
         try:
             return flight.result()
@@ -215,7 +215,7 @@ def _broken(error: BaseException) -> RunError:
     return RunError(f"the executor takes no more work ({said}); what is flown is kept")
 
 
-def _came_home(flight: Flight) -> bool:
+def _has_finished(flight: Flight) -> bool:
     return flight.done() and flight.exception() is None
 
 

@@ -81,7 +81,7 @@ def running_vehicle(endpoints: Sequence[Endpoint], options: MavlinkOptions, rate
             links.start()
             yield links
         finally:
-            commands.give(Reset())  # which ends the run
+            commands.submit(Reset())  # which ends the run
             stepper.join()
             links.close()
         if failures:

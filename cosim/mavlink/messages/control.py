@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from cosim.mavlink.messages.pose import degrees
-from cosim.mavlink.vehicle.vehicle_context import Vessel
+from cosim.mavlink.vehicle.vehicle_context import VehicleContext
 from cosim.mavlink.wire.encode import wrapped
 from cosim.scenario.scenario import CRITERIA
 
@@ -28,53 +28,53 @@ _WATCHED = {
 WEIGHTS, VALUES, CLEARANCES, THRUSTS, REPORTS = 1, 2, 3, 4, 5
 
 
-def nav_controller_output(vessel: Vessel) -> list[Any]:
+def nav_controller_output(context: VehicleContext) -> list[Any]:
     """NAV_CONTROLLER_OUTPUT: bearing and distance of the target's middle; the altitude error is that of its depth."""
-    view = vessel.view
+    view = context.view
     north, east, down = (a - b for a, b in zip(view.target, view.position_ned, strict=True))
     bearing = degrees(math.atan2(east, north))
     heading = degrees(view.euler[2])
     roll, pitch = degrees(view.euler[0]), degrees(view.euler[1])
     values = roll, pitch, heading, bearing, math.hypot(north, east), -down, 0.0, 0.0
-    return [vessel.make("NAV_CONTROLLER_OUTPUT", *values)]
+    return [context.make("NAV_CONTROLLER_OUTPUT", *values)]
 
 
-def servo_output_raw(vessel: Vessel) -> list[Any]:
+def servo_output_raw(context: VehicleContext) -> list[Any]:
     """SERVO_OUTPUT_RAW: the thrusters' forces as PWM [µs], linear, 0 where there is none; its time wraps."""
-    pulses = [_CENTRE + _SWING * part for part in vessel.thrust_parts()]
+    pulses = [_CENTRE + _SWING * part for part in context.thrust_parts()]
     pulses = (pulses + [0] * _SERVOS)[:_SERVOS]
-    return [vessel.make("SERVO_OUTPUT_RAW", wrapped(vessel.view.boot_us, 1), 0, *pulses)]
+    return [context.make("SERVO_OUTPUT_RAW", wrapped(context.view.boot_us, 1), 0, *pulses)]
 
 
-def actuator_output_status(vessel: Vessel) -> list[Any]:
+def actuator_output_status(context: VehicleContext) -> list[Any]:
     """ACTUATOR_OUTPUT_STATUS: the same as parts from -1 to 1."""
-    parts = vessel.thrust_parts()[:_OUTPUTS]
-    return [vessel.make("ACTUATOR_OUTPUT_STATUS", vessel.view.boot_us, (1 << len(parts)) - 1, parts)]
+    parts = context.thrust_parts()[:_OUTPUTS]
+    return [context.make("ACTUATOR_OUTPUT_STATUS", context.view.boot_us, (1 << len(parts)) - 1, parts)]
 
 
-def rc_channels(vessel: Vessel) -> list[Any]:
+def rc_channels(context: VehicleContext) -> list[Any]:
     """RC_CHANNELS: the sticks as they were heeded last, in the order of ArduSub: pitch roll up yaw forward lateral."""
-    surge, sway, heave, roll, pitch, yaw = vessel.sticks
+    surge, sway, heave, roll, pitch, yaw = context.sticks
     order = pitch, roll, -heave, yaw, surge, sway
     pulses = [_CENTRE + _SWING * stick for stick in order] + [0xFFFF] * 12
-    return [vessel.make("RC_CHANNELS", wrapped(vessel.view.boot_us), len(order), *pulses, 0xFF)]
+    return [context.make("RC_CHANNELS", wrapped(context.view.boot_us), len(order), *pulses, 0xFF)]
 
 
-def position_target_local_ned(vessel: Vessel) -> list[Any]:
+def position_target_local_ned(context: VehicleContext) -> list[Any]:
     """POSITION_TARGET_LOCAL_NED: the middle of the target region."""
-    m, view = vessel.mavlink, vessel.view
+    m, view = context.mavlink, context.view
     none = (0.0,) * 8
     mask = _POSITION_AND_VELOCITY | 0b111000
     return [
-        vessel.make(
+        context.make(
             "POSITION_TARGET_LOCAL_NED", wrapped(view.boot_us), m.MAV_FRAME_LOCAL_NED, mask, *view.target, *none
         )
     ]
 
 
-def named_values(vessel: Vessel) -> list[tuple[str, float]]:
+def named_values(context: VehicleContext) -> list[tuple[str, float]]:
     """Return the few quantities to be watched, by a name of up to ten characters."""
-    view = vessel.view
+    view = context.view
     values = [(f"w_{name}", weight) for name, weight in zip(CRITERIA, view.weights, strict=True)]
     values += [(f"phi{i}", phi) for i, phi in enumerate(view.estimate, 1)]
     clearances = view.clearances
@@ -82,20 +82,20 @@ def named_values(vessel: Vessel) -> list[tuple[str, float]]:
     values.append(("goal_clear", clearances[0]))
     nearest = min((c for c in clearances[1:] if not math.isnan(c)), default=math.nan)
     values.append(("clearance", nearest))  # the least of all regions
-    values.append(("thrust", max(map(abs, vessel.thrust_parts()), default=0.0)))
+    values.append(("thrust", max(map(abs, context.thrust_parts()), default=0.0)))
     values.append(("force", math.hypot(*view.wrench[:3])))
     values.append(("saturated", float(view.saturated)))
     values += [(_WATCHED[name], value) for name, value in view.reports() if name in _WATCHED]
     return values
 
 
-def named_value_float(vessel: Vessel) -> list[Any]:
+def named_value_float(context: VehicleContext) -> list[Any]:
     """NAMED_VALUE_FLOAT: one for each of `named_values`."""
-    time = wrapped(vessel.view.boot_us)
-    return [vessel.make("NAMED_VALUE_FLOAT", time, name, value) for name, value in named_values(vessel)]
+    time = wrapped(context.view.boot_us)
+    return [context.make("NAMED_VALUE_FLOAT", time, name, value) for name, value in named_values(context)]
 
 
-def debug_float_array(vessel: Vessel) -> list[Any]:
+def debug_float_array(context: VehicleContext) -> list[Any]:
     """DEBUG_FLOAT_ARRAY: all that law and arbiter say, by array_id.
 
     1, ``weights``: memberships, then weights, of obstacle, shape and depth. 2, ``values``: g of the goal, then of each
@@ -103,7 +103,7 @@ def debug_float_array(vessel: Vessel) -> list[Any]:
     [N], then what is asked of each. 5, ``law``: what the law reports of itself, in the order of the run's columns.
     58 numbers at the most.
     """
-    view = vessel.view
+    view = context.view
     arrays: list[tuple[int, str, Sequence[float]]] = [
         (WEIGHTS, "weights", [*view.memberships, *view.weights]),
         (VALUES, "values", view.region_values),
@@ -113,4 +113,4 @@ def debug_float_array(vessel: Vessel) -> list[Any]:
     reports = [value for _, value in view.reports()]
     if reports:
         arrays.append((REPORTS, "law", reports))
-    return [vessel.make("DEBUG_FLOAT_ARRAY", view.boot_us, name, number, data) for number, name, data in arrays]
+    return [context.make("DEBUG_FLOAT_ARRAY", view.boot_us, name, number, data) for number, name, data in arrays]

@@ -6,7 +6,7 @@ import math
 from typing import Any
 
 from cosim.mavlink.vehicle.proximity import REACH, SECTORS
-from cosim.mavlink.vehicle.vehicle_context import Vessel
+from cosim.mavlink.vehicle.vehicle_context import VehicleContext
 from cosim.mavlink.wire.encode import wrapped
 from cosim.scenario.tables import Vector3
 
@@ -16,32 +16,32 @@ _CENTIMETRES = 100.0  # in a metre
 _INCREMENT = 360 // SECTORS  # degrees
 
 
-def obstacle_distance(vessel: Vessel) -> list[Any]:
+def obstacle_distance(context: VehicleContext) -> list[Any]:
     """OBSTACLE_DISTANCE: a level scan, sector by sector clockwise from where the vehicle heads.
 
     A sector's angle is that of its middle. In cm: one more than `max_distance` where there is nothing, 65535 where
     position, heading or an obstacle's place is no number.
     """
-    m, view, proximity = vessel.mavlink, vessel.view, vessel.proximity
-    proximity.update(view, vessel.settings)
+    m, view, proximity = context.mavlink, context.view, context.proximity
+    proximity.update(view, context.settings)
     farthest = REACH * _CENTIMETRES
     nothing = farthest + 1.0
     distances = [
         nothing if d == math.inf else d * _CENTIMETRES for d in proximity.scan(view.position_ned, view.heading)
     ]
     geometry = _INCREMENT, 0, farthest, float(_INCREMENT), 0.0, m.MAV_FRAME_BODY_FRD
-    return [vessel.make("OBSTACLE_DISTANCE", view.boot_us, m.MAV_DISTANCE_SENSOR_UNKNOWN, distances, *geometry)]
+    return [context.make("OBSTACLE_DISTANCE", view.boot_us, m.MAV_DISTANCE_SENSOR_UNKNOWN, distances, *geometry)]
 
 
-def obstacle_distance_3d(vessel: Vessel) -> list[Any]:
+def obstacle_distance_3d(context: VehicleContext) -> list[Any]:
     """OBSTACLE_DISTANCE_3D: the nearest point, in the body's axes, of each region that stands for an obstacle.
 
     `obstacle_id` is the region's number in the scenario, from 1. None is known before the first snapshot.
     """
-    m, view, proximity = vessel.mavlink, vessel.view, vessel.proximity
-    if not vessel.seen:
+    m, view, proximity = context.mavlink, context.view, context.proximity
+    if not context.seen:
         return []
-    proximity.update(view, vessel.settings)
+    proximity.update(view, context.settings)
     inwards = dict(zip(proximity.ids, proximity.inwards(view.position_ned), strict=True))
     near = sorted((clearance, i) for i in inwards if abs(clearance := view.clearances[i]) <= _FARTHEST)
     messages = []
@@ -50,7 +50,7 @@ def obstacle_distance_3d(vessel: Vessel) -> list[Any]:
         if away is not None and all(map(math.isfinite, away)):
             kind = m.MAV_DISTANCE_SENSOR_UNKNOWN, m.MAV_FRAME_BODY_FRD, i
             values = *view.to_body(away), 0.0, _FARTHEST
-            messages.append(vessel.make("OBSTACLE_DISTANCE_3D", wrapped(view.boot_us), *kind, *values))
+            messages.append(context.make("OBSTACLE_DISTANCE_3D", wrapped(view.boot_us), *kind, *values))
     return messages
 
 

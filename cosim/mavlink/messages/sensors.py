@@ -6,7 +6,7 @@ import math
 from typing import Any
 
 from cosim.mavlink.messages.pose import globe
-from cosim.mavlink.vehicle.vehicle_context import Vessel
+from cosim.mavlink.vehicle.vehicle_context import VehicleContext
 from cosim.mavlink.wire.encode import wrapped
 
 SURFACE_PRESSURE = 1013.25  # hPa
@@ -23,89 +23,89 @@ def pressure_at(depth: float) -> float:
     return SURFACE_PRESSURE + WATER_DENSITY * GRAVITY * depth / _PASCAL
 
 
-def scaled_pressure(vessel: Vessel) -> list[Any]:
+def scaled_pressure(context: VehicleContext) -> list[Any]:
     """SCALED_PRESSURE: within the hull, that of the surface."""
-    return [vessel.make("SCALED_PRESSURE", wrapped(vessel.view.boot_us), SURFACE_PRESSURE, 0.0, 0)]
+    return [context.make("SCALED_PRESSURE", wrapped(context.view.boot_us), SURFACE_PRESSURE, 0.0, 0)]
 
 
-def scaled_pressure2(vessel: Vessel) -> list[Any]:
+def scaled_pressure2(context: VehicleContext) -> list[Any]:
     """SCALED_PRESSURE2: of the water, from the depth sensor, as ArduSub has it."""
-    view = vessel.view
+    view = context.view
     pressure = pressure_at(view.depth)
-    return [vessel.make("SCALED_PRESSURE2", wrapped(view.boot_us), pressure, pressure - SURFACE_PRESSURE, 0)]
+    return [context.make("SCALED_PRESSURE2", wrapped(view.boot_us), pressure, pressure - SURFACE_PRESSURE, 0)]
 
 
-def scaled_imu2(vessel: Vessel) -> list[Any]:
+def scaled_imu2(context: VehicleContext) -> list[Any]:
     """SCALED_IMU2: specific force [mG] and rates [mrad/s]; there is no magnetometer."""
-    view = vessel.view
+    view = context.view
     force = [a / GRAVITY * 1e3 for a in view.acceleration]
     rates = [w * 1e3 for w in view.measured_rates]
-    return [vessel.make("SCALED_IMU2", wrapped(view.boot_us), *force, *rates, 0, 0, 0)]
+    return [context.make("SCALED_IMU2", wrapped(view.boot_us), *force, *rates, 0, 0, 0)]
 
 
-def highres_imu(vessel: Vessel) -> list[Any]:
+def highres_imu(context: VehicleContext) -> list[Any]:
     """HIGHRES_IMU, without a magnetometer."""
-    view = vessel.view
+    view = context.view
     pressure = pressure_at(view.depth)
     none = math.nan, math.nan, math.nan
     values = *view.acceleration, *view.measured_rates, *none, pressure, 0.0, -view.depth, math.nan, _HIGHRES_FIELDS
-    return [vessel.make("HIGHRES_IMU", view.boot_us, *values)]
+    return [context.make("HIGHRES_IMU", view.boot_us, *values)]
 
 
-def has_bottom(vessel: Vessel) -> bool:
+def has_bottom(context: VehicleContext) -> bool:
     """Return whether there is a bottom near enough to be measured."""
-    return vessel.view.altitude <= _DEEPEST_BOTTOM
+    return context.view.altitude <= _DEEPEST_BOTTOM
 
 
-def distance_sensor(vessel: Vessel) -> list[Any]:
+def distance_sensor(context: VehicleContext) -> list[Any]:
     """DISTANCE_SENSOR: down to the bottom, where there is one."""
-    if not has_bottom(vessel):
+    if not has_bottom(context):
         return []
-    m, view = vessel.mavlink, vessel.view
+    m, view = context.mavlink, context.view
     kind = m.MAV_DISTANCE_SENSOR_ULTRASOUND, 0, m.MAV_SENSOR_ROTATION_PITCH_270, 0xFF
     reach = 5, _DEEPEST_BOTTOM * _CENTI
-    return [vessel.make("DISTANCE_SENSOR", wrapped(view.boot_us), *reach, view.altitude * _CENTI, *kind)]
+    return [context.make("DISTANCE_SENSOR", wrapped(view.boot_us), *reach, view.altitude * _CENTI, *kind)]
 
 
-def rangefinder(vessel: Vessel) -> list[Any]:
+def rangefinder(context: VehicleContext) -> list[Any]:
     """RANGEFINDER: the same, for stations that know no other."""
-    return [vessel.make("RANGEFINDER", vessel.view.altitude, 0.0)] if has_bottom(vessel) else []
+    return [context.make("RANGEFINDER", context.view.altitude, 0.0)] if has_bottom(context) else []
 
 
-def water_depth(vessel: Vessel) -> list[Any]:
+def water_depth(context: VehicleContext) -> list[Any]:
     """WATER_DEPTH: the height above the bottom, where there is one."""
-    if not has_bottom(vessel):
+    if not has_bottom(context):
         return []
-    view = vessel.view
-    latitude, longitude, millimetres = globe(vessel, view.position_ned)
+    view = context.view
+    latitude, longitude, millimetres = globe(context, view.position_ned)
     values = 0, 1, latitude, longitude, millimetres / 1e3, *view.euler, view.altitude, 0.0
-    return [vessel.make("WATER_DEPTH", wrapped(view.boot_us), *values)]
+    return [context.make("WATER_DEPTH", wrapped(view.boot_us), *values)]
 
 
-def battery_status(vessel: Vessel) -> list[Any]:
+def battery_status(context: VehicleContext) -> list[Any]:
     """BATTERY_STATUS: nothing is known of it, for the plant has none."""
-    m = vessel.mavlink
+    m = context.mavlink
     kind = 0, m.MAV_BATTERY_FUNCTION_ALL, m.MAV_BATTERY_TYPE_UNKNOWN, 0x7FFF
-    return [vessel.make("BATTERY_STATUS", *kind, [0xFFFF] * 10, -1, -1, -1, -1)]
+    return [context.make("BATTERY_STATUS", *kind, [0xFFFF] * 10, -1, -1, -1, -1)]
 
 
-def _position_known(vessel: Vessel) -> bool:
-    return all(map(math.isfinite, vessel.view.position_ned))
+def _position_known(context: VehicleContext) -> bool:
+    return all(map(math.isfinite, context.view.position_ned))
 
 
-def estimator_status(vessel: Vessel) -> list[Any]:
+def estimator_status(context: VehicleContext) -> list[Any]:
     """ESTIMATOR_STATUS: what is known of the pose; innovations are not."""
-    m = vessel.mavlink
+    m = context.mavlink
     flags = m.ESTIMATOR_ATTITUDE | m.ESTIMATOR_VELOCITY_HORIZ | m.ESTIMATOR_VELOCITY_VERT
-    if _position_known(vessel):
+    if _position_known(context):
         flags |= m.ESTIMATOR_POS_HORIZ_REL | m.ESTIMATOR_POS_HORIZ_ABS | m.ESTIMATOR_POS_VERT_ABS
-    return [vessel.make("ESTIMATOR_STATUS", vessel.view.boot_us, flags, *[0.0] * 6, math.nan, math.nan)]
+    return [context.make("ESTIMATOR_STATUS", context.view.boot_us, flags, *[0.0] * 6, math.nan, math.nan)]
 
 
-def ekf_status_report(vessel: Vessel) -> list[Any]:
+def ekf_status_report(context: VehicleContext) -> list[Any]:
     """EKF_STATUS_REPORT, the same as ArduPilot has it."""
-    m = vessel.mavlink
+    m = context.mavlink
     flags = m.EKF_ATTITUDE | m.EKF_VELOCITY_HORIZ | m.EKF_VELOCITY_VERT
-    if _position_known(vessel):
+    if _position_known(context):
         flags |= m.EKF_POS_HORIZ_REL | m.EKF_POS_HORIZ_ABS | m.EKF_POS_VERT_ABS
-    return [vessel.make("EKF_STATUS_REPORT", flags, *[0.0] * 5)]
+    return [context.make("EKF_STATUS_REPORT", flags, *[0.0] * 5)]

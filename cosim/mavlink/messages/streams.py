@@ -6,8 +6,8 @@ from collections.abc import Iterable
 
 from cosim.mavlink.messages import MESSAGES, Spec
 from cosim.mavlink.messages.table import HEARTBEAT
-from cosim.mavlink.vehicle.vehicle_context import Vessel
-from cosim.mavlink.wire.message_sink import Outlet
+from cosim.mavlink.vehicle.vehicle_context import VehicleContext
+from cosim.mavlink.wire.message_sink import MessageSink
 
 SHORTEST_US = 10_000  # between two of the same message
 _LONGEST_US = 3_600_000_000
@@ -21,9 +21,9 @@ class Streams:
 
     Parameters
     ----------
-    vessel : Vessel
+    vessel : VehicleContext
         What is told.
-    link : Outlet
+    link : MessageSink
         To whom.
     clock_us : int
         When it begins; everything is due then.
@@ -34,8 +34,8 @@ class Streams:
         Whether a heartbeat went out since this was last set to False.
     """
 
-    def __init__(self, vessel: Vessel, link: Outlet, clock_us: int) -> None:
-        self._vessel, self._link, self._clock = vessel, link, clock_us
+    def __init__(self, context: VehicleContext, link: MessageSink, clock_us: int) -> None:
+        self._context, self._link, self._clock = context, link, clock_us
         self._intervals: dict[int, int] = {}
         self._due: dict[int, int] = {}
         self._earliest = clock_us
@@ -44,7 +44,7 @@ class Streams:
             self._put(spec.id, self._default(spec))
 
     def _default(self, spec: Spec) -> int:
-        rate = spec.default_rate(self._vessel.options.profile)
+        rate = spec.default_rate(self._context.options.profile)
         return round(_SECOND / rate) if rate > 0.0 else -1
 
     def _put(self, message_id: int, interval_us: int) -> None:
@@ -57,7 +57,7 @@ class Streams:
         self._earliest = min(self._earliest, self._due[message_id])
 
     def _load(self, spec: Spec, interval_us: int) -> float:
-        size: int = (self._vessel.make.size_of[spec.id] + _FRAME) * spec.several
+        size: int = (self._context.make.size_of[spec.id] + _FRAME) * spec.several
         return size * _SECOND / interval_us
 
     @property
@@ -120,6 +120,6 @@ class Streams:
 
     def send(self, message_id: int) -> None:
         """Send a message now."""
-        for message in MESSAGES[message_id].build(self._vessel):
+        for message in MESSAGES[message_id].build(self._context):
             self._link.send(message)
         self.beaten |= message_id == HEARTBEAT

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from cosim.mavlink.messages import control, obstacles, pose, sensors, status
-from cosim.mavlink.vehicle.vehicle_context import Vessel
+from cosim.mavlink.vehicle.vehicle_context import VehicleContext
 from cosim.mavlink.wire.options import PROFILES, ProfileName
 
 HEARTBEAT = 0
@@ -21,7 +21,7 @@ class Spec:
     """A message that the vehicle sends by itself, or when asked."""
 
     id: int
-    build: Callable[[Vessel], list[Any]]
+    build: Callable[[VehicleContext], list[Any]]
     rate: float  # Hz, in simulated time; 0: on request only
     group: int = 0  # of REQUEST_DATA_STREAM; 0: in none
     profiles: tuple[ProfileName, ...] = PROFILES  # in which it is streamed unasked

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from typing import Any
 
 from cosim.mavlink.services.service import Call, Command, Service, unscaled
-from cosim.mavlink.vehicle.vehicle_context import Sender, Vessel
+from cosim.mavlink.vehicle.vehicle_context import Sender, VehicleContext
 
 _NOWHERE = 0x7FFFFFFF  # of a COMMAND_INT that names no place
 
@@ -17,14 +17,14 @@ class Commands(Service):
 
     Parameters
     ----------
-    vessel : Vessel
+    vessel : VehicleContext
         Whom it serves.
     services : iterable of Service
         Whose commands are understood.
     """
 
-    def __init__(self, vessel: Vessel, services: Iterable[Service]) -> None:
-        super().__init__(vessel)
+    def __init__(self, context: VehicleContext, services: Iterable[Service]) -> None:
+        super().__init__(context)
         self.messages = {"COMMAND_LONG": self._long, "COMMAND_INT": self._int}
         self._known: dict[int, Command] = {}
         for service in services:
@@ -32,7 +32,7 @@ class Commands(Service):
 
     def _long(self, sender: Sender, message: Any) -> None:
         numbers = tuple(float(getattr(message, f"param{i}")) for i in range(1, 8))
-        self._answer(Call(sender, message.command, numbers, self.vessel.mavlink.MAV_FRAME_GLOBAL))
+        self._answer(Call(sender, message.command, numbers, self.context.mavlink.MAV_FRAME_GLOBAL))
 
     def _int(self, sender: Sender, message: Any) -> None:
         first = tuple(float(getattr(message, f"param{i}")) for i in range(1, 5))
@@ -42,8 +42,8 @@ class Commands(Service):
         self._answer(Call(sender, message.command, (*first, x, y, float(message.z)), message.frame))
 
     def _answer(self, call: Call) -> None:
-        vessel = self.vessel
+        context = self.context
         command = self._known.get(call.number)
-        result = vessel.mavlink.MAV_RESULT_UNSUPPORTED if command is None else command(call)
+        result = context.mavlink.MAV_RESULT_UNSUPPORTED if command is None else command(call)
         to = call.sender
-        to.link.send(vessel.make("COMMAND_ACK", call.number, result, 0, 0, to.system, to.component))
+        to.link.send(context.make("COMMAND_ACK", call.number, result, 0, 0, to.system, to.component))

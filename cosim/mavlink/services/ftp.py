@@ -11,7 +11,7 @@ from typing import Any
 from cosim.mavlink.services.packed_parameters import bare_crc32, packed
 from cosim.mavlink.services.parameters import Parameters
 from cosim.mavlink.services.service import Service
-from cosim.mavlink.vehicle.vehicle_context import Sender, Vessel
+from cosim.mavlink.vehicle.vehicle_context import Sender, VehicleContext
 
 _HEADER = struct.Struct("<HBBBBBBI")  # seq, session, opcode, size, req_opcode, burst_complete, padding, offset
 _ROOM = 239  # bytes of data in a payload
@@ -62,14 +62,14 @@ class FileServer(Service):
 
     Parameters
     ----------
-    vessel : Vessel
+    vessel : VehicleContext
         Whom it serves.
     parameters : Parameters
         What the file holds.
     """
 
-    def __init__(self, vessel: Vessel, parameters: Parameters) -> None:
-        super().__init__(vessel)
+    def __init__(self, context: VehicleContext, parameters: Parameters) -> None:
+        super().__init__(context)
         self._parameters = parameters
         self._clients: OrderedDict[tuple[str, int, int], _Client] = OrderedDict()
         self.messages = {"FILE_TRANSFER_PROTOCOL": self._request}
@@ -88,7 +88,7 @@ class FileServer(Service):
             client.last_request, client.last_replies = raw, replies
         for reply in replies:
             to = sender.system, sender.component
-            sender.link.send(self.vessel.make("FILE_TRANSFER_PROTOCOL", 0, *to, reply))
+            sender.link.send(self.context.make("FILE_TRANSFER_PROTOCOL", 0, *to, reply))
 
     def _client_of(self, sender: Sender) -> _Client:
         key = sender.link.name, sender.system, sender.component

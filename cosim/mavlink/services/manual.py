@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from cosim.mavlink.services.service import Service
-from cosim.mavlink.vehicle.vehicle_context import Sender, Vessel
+from cosim.mavlink.vehicle.vehicle_context import Sender, VehicleContext
 from cosim.scenario.tables import Vector6
 from cosim.simulation.commands.commands import ManualControl
 
@@ -19,55 +19,55 @@ _NEUTRAL: Vector6 = (0.0,) * 6
 class Manual(Service):
     """Sticks become parts of the greatest wrench, while the mode is manual."""
 
-    def __init__(self, vessel: Vessel) -> None:
-        super().__init__(vessel)
+    def __init__(self, context: VehicleContext) -> None:
+        super().__init__(context)
         self.messages = {"MANUAL_CONTROL": self._manual_control}
         self._heard: float | None = None
-        self._state = (vessel.armed, vessel.mode)
+        self._state = (context.armed, context.mode)
 
     def restart(self) -> None:
         """Let go of the sticks."""
         self._heard = None
 
-    def looked(self) -> None:
+    def on_snapshot(self) -> None:
         """Reset the sticks to neutral, as the command handler does, when the mode changes or the vehicle is armed."""
-        state = self.vessel.armed, self.vessel.mode
+        state = self.context.armed, self.context.mode
         if state != self._state:
-            self._state, self.vessel.sticks = state, _NEUTRAL
+            self._state, self.context.sticks = state, _NEUTRAL
 
     def tick(self) -> None:
         """Let go of sticks that nobody holds any more."""
-        vessel = self.vessel
-        if self._heard is None or vessel.now - self._heard < _TIMEOUT:
+        context = self.context
+        if self._heard is None or context.now - self._heard < _TIMEOUT:
             return
         self._heard = None
-        if vessel.mode_ahead == "manual":
+        if context.mode_ahead == "manual":
             self._order(_NEUTRAL)
-            vessel.say("Lost manual control", vessel.mavlink.MAV_SEVERITY_CRITICAL, "sticks", _TIMEOUT)
+            context.say("Lost manual control", context.mavlink.MAV_SEVERITY_CRITICAL, "sticks", _TIMEOUT)
 
     def _manual_control(self, sender: Sender, message: Any) -> None:
-        vessel = self.vessel
-        if message.target != vessel.options.system_id:
+        context = self.context
+        if message.target != context.options.system_id:
             return
-        if not vessel.heeds:
-            vessel.give()
+        if not context.accepts_commands:
+            context.submit()
             return
-        if vessel.mode_ahead != "manual":
+        if context.mode_ahead != "manual":
             return
-        if not vessel.operator.may_steer(sender.system, vessel.now):
-            vessel.deny("another station has the vehicle in hand", "operator")
+        if not context.operator.may_steer(sender.system, context.now):
+            context.reject("another station has the vehicle in hand", "active gcs")
             return
-        self._heard = vessel.now
+        self._heard = context.now
         self._order(self._wrench(message))
 
     def _order(self, sticks: Vector6) -> None:
-        vessel = self.vessel
-        if sticks != vessel.sticks and vessel.give(ManualControl(sticks)) == vessel.mavlink.MAV_RESULT_ACCEPTED:
-            vessel.sticks = sticks
+        context = self.context
+        if sticks != context.sticks and context.submit(ManualControl(sticks)) == context.mavlink.MAV_RESULT_ACCEPTED:
+            context.sticks = sticks
 
     def _wrench(self, message: Any) -> Vector6:
         """Return X Y Z K M N from -1 to 1; the vertical stick is up where positive, Z is down."""
-        centre = self.vessel.profile.centred_stick
+        centre = self.context.profile.centred_stick
         up = 0.0 if message.z == _INVALID else _part((message.z - centre) / (_FULL - centre))
         roll = _axis(message.t) if message.enabled_extensions & _ROLL else 0.0
         pitch = _axis(message.s) if message.enabled_extensions & _PITCH else 0.0

@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
-from cosim.mavlink.services.mission_items import ItemError, home_item, meant
+from cosim.mavlink.services.mission_items import ItemError, decode_mission_item, home_item
 from cosim.mavlink.services.parameters import Parameters
 from cosim.mavlink.services.service import Call, Service, place_of, unscaled
 from cosim.mavlink.services.targets import Targets
 from cosim.mavlink.vehicle.mission_item import ReceivedMissionItem
-from cosim.mavlink.vehicle.vehicle_context import Sender, Vessel
+from cosim.mavlink.vehicle.vehicle_context import Sender, VehicleContext
 from cosim.mavlink.wire.encode import whole
 from cosim.simulation.commands.commands import ChangeSetting, Command, MissionItem, SetCurrentItem, SetMission, SetMode
 from cosim.simulation.commands.mission_executor import way
@@ -31,7 +31,7 @@ class _Upload:
     count: int
     asked: float  # s, when the item that is missing was asked for
     items: list[ReceivedMissionItem] = field(default_factory=list)
-    meant: list[MissionItem] = field(default_factory=list)  # without home
+    decoded: list[MissionItem] = field(default_factory=list)  # without home
     retries: int = 0
 
 
@@ -42,7 +42,7 @@ class Missions(Service):
 
     Parameters
     ----------
-    vessel : Vessel
+    vessel : VehicleContext
         Whom it serves.
     targets : Targets
         Where items go that are to be followed at once.
@@ -50,13 +50,13 @@ class Missions(Service):
         Which learns what a mission changes.
     """
 
-    def __init__(self, vessel: Vessel, targets: Targets, parameters: Parameters) -> None:
-        super().__init__(vessel)
-        m = vessel.mavlink
+    def __init__(self, context: VehicleContext, targets: Targets, parameters: Parameters) -> None:
+        super().__init__(context)
+        m = context.mavlink
         self._targets, self._parameters = targets, parameters
         self._under_way = -1  # item of the snapshot before
         self._upload: _Upload | None = None
-        self._first = int(vessel.profile.home_is_first)
+        self._first = int(context.profile.home_is_first)
         self.messages = {
             "MISSION_REQUEST_LIST": self._count,
             "MISSION_REQUEST": self._item,
@@ -74,59 +74,59 @@ class Missions(Service):
         """Break off what is under way."""
         self._upload, self._under_way = None, -1
 
-    def looked(self) -> None:
+    def on_snapshot(self) -> None:
         """Learn what the items have changed that were gone through since the snapshot before."""
-        vessel, before = self.vessel, self._under_way
-        now = self._under_way = vessel.view.item if vessel.mode == "mission" else -1
-        if now == before or not 0 <= now < len(vessel.course):
+        context, before = self.context, self._under_way
+        now = self._under_way = context.view.item if context.mode == "mission" else -1
+        if now == before or not 0 <= now < len(context.course):
             return
-        for item in way(vessel.course, before, now) or [now]:
-            for command in vessel.course[item].commands:
+        for item in way(context.course, before, now) or [now]:
+            for command in context.course[item].commands:
                 if isinstance(command, ChangeSetting):
                     self._parameters.learn(command.key, command.value)
 
     # ---- out ----
 
     def _all_items(self) -> tuple[ReceivedMissionItem, ...]:
-        plan = self.vessel.plan
-        return (home_item(self.vessel), *plan) if plan and self._first else plan
+        plan = self.context.plan
+        return (home_item(self.context), *plan) if plan and self._first else plan
 
     def _count(self, sender: Sender, message: Any) -> None:
         kind = message.mission_type
         if kind not in _KNOWN_TYPES:
-            self._ack(sender, self.vessel.mavlink.MAV_MISSION_UNSUPPORTED, kind)
+            self._ack(sender, self.context.mavlink.MAV_MISSION_UNSUPPORTED, kind)
             return
         count = len(self._all_items()) if kind == _OF_REGIONS else 0
-        sender.link.send(self.vessel.make("MISSION_COUNT", sender.system, sender.component, count, kind))
+        sender.link.send(self.context.make("MISSION_COUNT", sender.system, sender.component, count, kind))
 
     def _item(self, sender: Sender, message: Any) -> None:
-        vessel, m = self.vessel, self.vessel.mavlink
+        context, m = self.context, self.context.mavlink
         seq, kind = message.seq, message.mission_type
         items = self._all_items() if kind == _OF_REGIONS else ()
         if seq >= len(items):
             self._ack(sender, m.MAV_MISSION_INVALID_SEQUENCE, kind)
             return
         item = items[seq]
-        current = int(vessel.mode == "mission" and vessel.view.item + self._first == seq)
+        current = int(context.mode == "mission" and context.view.item + self._first == seq)
         head = sender.system, sender.component, seq, item.frame, item.command, current, item.autocontinue
         numbers = item.param1, item.param2, item.param3, item.param4
         if message.get_type() == "MISSION_REQUEST_INT":
-            reply = vessel.make("MISSION_ITEM_INT", *head, *numbers, item.x, item.y, item.z, kind)
+            reply = context.make("MISSION_ITEM_INT", *head, *numbers, item.x, item.y, item.z, kind)
         else:
             scale = _scale(item.frame, m)
-            reply = vessel.make("MISSION_ITEM", *head, *numbers, item.x / scale, item.y / scale, item.z, kind)
+            reply = context.make("MISSION_ITEM", *head, *numbers, item.x / scale, item.y / scale, item.z, kind)
         sender.link.send(reply)
 
     def _ack(self, sender: Sender, result: int, kind: int) -> None:
-        sender.link.send(self.vessel.make("MISSION_ACK", sender.system, sender.component, result, kind))
+        sender.link.send(self.context.make("MISSION_ACK", sender.system, sender.component, result, kind))
 
     # ---- in ----
 
     def _begin_upload(self, sender: Sender, message: Any) -> None:
-        vessel, m, kind = self.vessel, self.vessel.mavlink, message.mission_type
+        context, m, kind = self.context, self.context.mavlink, message.mission_type
         under_way = self._upload
-        if not vessel.heeds:
-            vessel.give()
+        if not context.accepts_commands:
+            context.submit()
             self._ack(sender, m.MAV_MISSION_DENIED, kind)
         elif kind != _OF_REGIONS:
             self._ack(sender, m.MAV_MISSION_UNSUPPORTED if message.count else m.MAV_MISSION_ACCEPTED, kind)
@@ -135,27 +135,27 @@ class Missions(Service):
         elif message.count > _MOST:
             self._ack(sender, m.MAV_MISSION_NO_SPACE, kind)
         else:
-            self._upload = _Upload(sender, message.count, vessel.now)
+            self._upload = _Upload(sender, message.count, context.now)
             self._go_on(self._upload)
 
     def _go_on(self, upload: _Upload) -> None:
         """Ask for the next item, or finish."""
-        vessel, sender = self.vessel, upload.sender
-        upload.asked = vessel.now
+        context, sender = self.context, upload.sender
+        upload.asked = context.now
         if len(upload.items) < upload.count:
             to = sender.system, sender.component
-            sender.link.send(vessel.make("MISSION_REQUEST_INT", *to, len(upload.items), _OF_REGIONS))
+            sender.link.send(context.make("MISSION_REQUEST_INT", *to, len(upload.items), _OF_REGIONS))
             return
         self._upload = None
-        self._ack(sender, self._taken(sender, upload.items[self._first :], upload.meant), _OF_REGIONS)
+        self._ack(sender, self._taken(sender, upload.items[self._first :], upload.decoded), _OF_REGIONS)
 
     def _take_item(self, sender: Sender, message: Any) -> None:
-        m, upload, kind = self.vessel.mavlink, self._upload, message.mission_type
+        m, upload, kind = self.context.mavlink, self._upload, message.mission_type
         if message.current in (_GO_THERE, _CHANGE_DEPTH) and kind == _OF_REGIONS:
             self._ack(sender, self._go(sender, message), kind)
             return
         if upload is None or upload.sender != sender or kind != _OF_REGIONS:
-            self._ack(sender, m.MAV_MISSION_DENIED if not self.vessel.heeds else m.MAV_MISSION_ERROR, kind)
+            self._ack(sender, m.MAV_MISSION_DENIED if not self.context.accepts_commands else m.MAV_MISSION_ERROR, kind)
             return
         if message.seq != len(upload.items):  # one that came before, or too early
             return
@@ -169,41 +169,41 @@ class Missions(Service):
 
     def _add(self, upload: _Upload, message: Any) -> int:
         """Add an item to an upload, and return MAV_MISSION_RESULT."""
-        vessel, m, first = self.vessel, self.vessel.mavlink, self._first
+        context, m, first = self.context, self.context.mavlink, self._first
         item = _as_it_came(message, m)
         if item is None:
             return int(m.MAV_MISSION_INVALID)
         if message.seq >= first:
             try:
-                upload.meant.append(meant(vessel, item, upload.meant, upload.count - first))
+                upload.decoded.append(decode_mission_item(context, item, upload.decoded, upload.count - first))
             except ItemError as error:
-                vessel.deny(f"mission item {message.seq}: {error}", "item")
+                context.reject(f"mission item {message.seq}: {error}", "item")
                 return error.result
         upload.items.append(item)
         return int(m.MAV_MISSION_ACCEPTED)
 
     def _go(self, sender: Sender, message: Any) -> int:
         """Follow an item at once, as QGroundControl has ArduPilot go to a place; return MAV_MISSION_RESULT."""
-        vessel, m = self.vessel, self.vessel.mavlink
+        context, m = self.context, self.context.mavlink
         if message.command != m.MAV_CMD_NAV_WAYPOINT:
             return int(m.MAV_MISSION_UNSUPPORTED)
         item = _as_it_came(message, m)
         x, y = (0.0, 0.0) if item is None else unscaled(item.frame, item.x, item.y)
-        place = None if item is None else place_of(vessel, item.frame, x, y, item.z)
+        place = None if item is None else place_of(context, item.frame, x, y, item.z)
         if place is None:
             return int(m.MAV_MISSION_INVALID if item is None else m.MAV_MISSION_UNSUPPORTED_FRAME)
         if message.current == _CHANGE_DEPTH:
-            place = *vessel.view.target[:2], place[2]
+            place = *context.view.target[:2], place[2]
         accepted = self._targets.go(sender, place) == m.MAV_RESULT_ACCEPTED
         return int(m.MAV_MISSION_ACCEPTED if accepted else m.MAV_MISSION_DENIED)
 
     def _taken(self, sender: Sender, items: list[ReceivedMissionItem], course: list[MissionItem]) -> int:
         """Order a mission, and return MAV_MISSION_RESULT."""
-        vessel, m = self.vessel, self.vessel.mavlink
-        result = vessel.give(SetMission(tuple(course)))
+        context, m = self.context, self.context.mavlink
+        result = context.submit(SetMission(tuple(course)))
         if result == m.MAV_RESULT_ACCEPTED:
-            vessel.plan, vessel.course = tuple(items), tuple(course)
-            vessel.operator.commanded(sender.system)
+            context.plan, context.course = tuple(items), tuple(course)
+            context.operator.commanded(sender.system)
             return int(m.MAV_MISSION_ACCEPTED)
         return int(m.MAV_MISSION_DENIED if result == m.MAV_RESULT_DENIED else m.MAV_MISSION_ERROR)
 
@@ -214,22 +214,22 @@ class Missions(Service):
 
     def tick(self) -> None:
         """Ask again for an item that does not come, and give up in the end."""
-        upload, vessel = self._upload, self.vessel
-        if upload is None or vessel.now - upload.asked < _RETRY:
+        upload, context = self._upload, self.context
+        if upload is None or context.now - upload.asked < _RETRY:
             return
         if upload.retries < _RETRIES:
             upload.retries += 1
             self._go_on(upload)
         else:
             self._upload = None
-            self._ack(upload.sender, vessel.mavlink.MAV_MISSION_OPERATION_CANCELLED, _OF_REGIONS)
+            self._ack(upload.sender, context.mavlink.MAV_MISSION_OPERATION_CANCELLED, _OF_REGIONS)
 
     def _clear(self, sender: Sender, message: Any) -> None:
-        m, kind = self.vessel.mavlink, message.mission_type
+        m, kind = self.context.mavlink, message.mission_type
         if kind not in (*_KNOWN_TYPES, _ALL):
             self._ack(sender, m.MAV_MISSION_UNSUPPORTED, kind)
-        elif not self.vessel.heeds:
-            self.vessel.give()
+        elif not self.context.accepts_commands:
+            self.context.submit()
             self._ack(sender, m.MAV_MISSION_DENIED, kind)
         elif kind in (_OF_REGIONS, _ALL):
             self._upload = None
@@ -240,16 +240,16 @@ class Missions(Service):
     # ---- where it is ----
 
     def _begin(self, sender: Sender, seq: int | None, *more: Command) -> int:
-        vessel, m = self.vessel, self.vessel.mavlink
-        if not vessel.heeds:
-            return vessel.give()
+        context, m = self.context, self.context.mavlink
+        if not context.accepts_commands:
+            return context.submit()
         item = None if seq is None else max(seq - self._first, 0)
-        if item is None or item >= len(vessel.plan):
-            vessel.deny(f"mission item {seq}: there are {len(self._all_items())}", "item")
-            return int(m.MAV_RESULT_DENIED if vessel.plan else m.MAV_RESULT_FAILED)
-        result = vessel.give(SetCurrentItem(item), *more)
+        if item is None or item >= len(context.plan):
+            context.reject(f"mission item {seq}: there are {len(self._all_items())}", "item")
+            return int(m.MAV_RESULT_DENIED if context.plan else m.MAV_RESULT_FAILED)
+        result = context.submit(SetCurrentItem(item), *more)
         if result == m.MAV_RESULT_ACCEPTED:
-            vessel.operator.commanded(sender.system)
+            context.operator.commanded(sender.system)
         return result
 
     def _set_current(self, sender: Sender, message: Any) -> None:
@@ -257,7 +257,7 @@ class Missions(Service):
 
     def _command_current(self, call: Call) -> int:
         seq = call.whole(1)
-        return self._begin(call.sender, seq if seq is None or seq >= 0 else self.vessel.view.item + self._first)
+        return self._begin(call.sender, seq if seq is None or seq >= 0 else self.context.view.item + self._first)
 
     def _start(self, call: Call) -> int:
         return self._begin(call.sender, max(call.whole(1) or 0, 0), SetMode("mission"))

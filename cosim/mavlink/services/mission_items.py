@@ -9,7 +9,7 @@ from cosim.errors import CommandError
 from cosim.mavlink.services.parameters import shortest
 from cosim.mavlink.services.service import place_of, unscaled
 from cosim.mavlink.vehicle.mission_item import ReceivedMissionItem
-from cosim.mavlink.vehicle.vehicle_context import Vessel
+from cosim.mavlink.vehicle.vehicle_context import VehicleContext
 from cosim.mavlink.wire.encode import whole
 from cosim.scenario.tables import Vector3
 from cosim.simulation.commands.commands import ChangeSetting, MissionItem, SetHeading
@@ -29,7 +29,9 @@ class ItemError(Exception):
         self.result = result
 
 
-def meant(vessel: Vessel, item: ReceivedMissionItem, before: Sequence[MissionItem], count: int) -> MissionItem:
+def decode_mission_item(
+    context: VehicleContext, item: ReceivedMissionItem, before: Sequence[MissionItem], count: int
+) -> MissionItem:
     """Return what an item asks for.
 
     NAV_WAYPOINT is a sphere about its place, of its acceptance radius (parameter 2), or for 0 the scenario's goal
@@ -43,7 +45,7 @@ def meant(vessel: Vessel, item: ReceivedMissionItem, before: Sequence[MissionIte
 
     Parameters
     ----------
-    vessel : Vessel
+    vessel : VehicleContext
         Where the globe's frame and home are.
     item : ReceivedMissionItem
         As it came.
@@ -57,54 +59,54 @@ def meant(vessel: Vessel, item: ReceivedMissionItem, before: Sequence[MissionIte
     ItemError
         If there is no such item here, or a number of it cannot be.
     """
-    m = vessel.mavlink
-    settings = vessel.settings
+    m = context.mavlink
+    settings = context.settings
     radius, surface = settings["commands.hold_radius"], settings["commands.surface_depth"]
     match item.command:
         case m.MAV_CMD_NAV_WAYPOINT:
-            return MissionItem(_place(vessel, item), _acceptance(vessel, item), _stay(vessel, item))
+            return MissionItem(_place(context, item), _acceptance(context, item), _stay(context, item))
         case m.MAV_CMD_NAV_SPLINE_WAYPOINT | m.MAV_CMD_NAV_LOITER_TIME:
-            return MissionItem(_place(vessel, item), None, _stay(vessel, item))
+            return MissionItem(_place(context, item), None, _stay(context, item))
         case m.MAV_CMD_NAV_LOITER_UNLIM:
-            return MissionItem(_place(vessel, item), None, None)
+            return MissionItem(_place(context, item), None, None)
         case m.MAV_CMD_NAV_LAND:
             above = (other.position for other in reversed(before) if other.position is not None)
             here = item.x == item.y == 0
-            north, east, _ = next(above, vessel.view.position_ned) if here else _place(vessel, item)
+            north, east, _ = next(above, context.view.position_ned) if here else _place(context, item)
             return MissionItem((north, east, surface), radius, None)
         case m.MAV_CMD_NAV_RETURN_TO_LAUNCH:
-            north, east, _ = vessel.home_ned()
+            north, east, _ = context.home_ned()
             return MissionItem((north, east, surface), radius, None)
         case m.MAV_CMD_NAV_DELAY | m.MAV_CMD_CONDITION_DELAY:
-            return MissionItem(None, stay=_stay(vessel, item))
+            return MissionItem(None, stay=_stay(context, item))
         case m.MAV_CMD_DO_CHANGE_SPEED:
-            return _another_speed(vessel, item)
+            return _another_speed(context, item)
         case m.MAV_CMD_CONDITION_YAW:
-            return _another_heading(vessel, item)
+            return _another_heading(context, item)
         case m.MAV_CMD_DO_JUMP:
-            return _jump(vessel, item, count)
+            return _jump(context, item, count)
     entry = m.enums["MAV_CMD"].get(item.command)
     name = f" {entry.name.removeprefix('MAV_CMD_')}" if entry else ""
     raise ItemError(m.MAV_MISSION_UNSUPPORTED, f"command {item.command}{name} is not known in a mission")
 
 
-def _another_speed(vessel: Vessel, item: ReceivedMissionItem) -> MissionItem:
-    m, speed = vessel.mavlink, shortest(item.param2)
+def _another_speed(context: VehicleContext, item: ReceivedMissionItem) -> MissionItem:
+    m, speed = context.mavlink, shortest(item.param2)
     if speed < 0.0:  # as it is
         return MissionItem(None)
-    before = getattr(vessel.settings.gains, "speed", None)
+    before = getattr(context.settings.gains, "speed", None)
     if before is None:
-        raise ItemError(m.MAV_MISSION_UNSUPPORTED, f"law {vessel.scenario.law.name} has no speed")
+        raise ItemError(m.MAV_MISSION_UNSUPPORTED, f"law {context.scenario.law.name} has no speed")
     try:
-        vessel.settings.change(SPEED, speed)
+        context.settings.change(SPEED, speed)
     except CommandError as error:
         raise ItemError(m.MAV_MISSION_INVALID_PARAM2, str(error)) from error
-    vessel.settings.change(SPEED, before)
+    context.settings.change(SPEED, before)
     return MissionItem(None, commands=(ChangeSetting(SPEED, speed),))
 
 
-def _another_heading(vessel: Vessel, item: ReceivedMissionItem) -> MissionItem:
-    m = vessel.mavlink
+def _another_heading(context: VehicleContext, item: ReceivedMissionItem) -> MissionItem:
+    m = context.mavlink
     if item.param4 != 0.0 and not math.isnan(item.param4):
         raise ItemError(
             m.MAV_MISSION_INVALID_PARAM4, "a heading from the present one; parameter 4 may be 0: from north"
@@ -114,8 +116,8 @@ def _another_heading(vessel: Vessel, item: ReceivedMissionItem) -> MissionItem:
     return MissionItem(None, commands=(SetHeading(math.radians(item.param1)),))
 
 
-def _jump(vessel: Vessel, item: ReceivedMissionItem, count: int) -> MissionItem:
-    m, first = vessel.mavlink, int(vessel.profile.home_is_first)
+def _jump(context: VehicleContext, item: ReceivedMissionItem, count: int) -> MissionItem:
+    m, first = context.mavlink, int(context.profile.home_is_first)
     to, times = whole(item.param1), whole(item.param2)
     if to is None or not 0 <= to - first < count:
         raise ItemError(
@@ -126,10 +128,10 @@ def _jump(vessel: Vessel, item: ReceivedMissionItem, count: int) -> MissionItem:
     return MissionItem(None, jump=to - first, times=None if times < 0 else times)
 
 
-def _place(vessel: Vessel, item: ReceivedMissionItem) -> Vector3:
-    m = vessel.mavlink
+def _place(context: VehicleContext, item: ReceivedMissionItem) -> Vector3:
+    m = context.mavlink
     x, y = unscaled(item.frame, item.x, item.y)
-    place = place_of(vessel, item.frame, x, y, item.z)
+    place = place_of(context, item.frame, x, y, item.z)
     if place is None:
         raise ItemError(m.MAV_MISSION_UNSUPPORTED_FRAME, f"frame {item.frame}; it may be 0, 1, 3, 5 or 6")
     results = m.MAV_MISSION_INVALID_PARAM5_X, m.MAV_MISSION_INVALID_PARAM6_Y, m.MAV_MISSION_INVALID_PARAM7
@@ -139,25 +141,25 @@ def _place(vessel: Vessel, item: ReceivedMissionItem) -> Vector3:
     return place
 
 
-def _stay(vessel: Vessel, item: ReceivedMissionItem) -> float:
+def _stay(context: VehicleContext, item: ReceivedMissionItem) -> float:
     if math.isnan(item.param1):
         return 0.0
     if not 0.0 <= item.param1 <= _LONGEST_STAY:
-        raise ItemError(vessel.mavlink.MAV_MISSION_INVALID_PARAM1, f"a stay of {item.param1:g} s")
+        raise ItemError(context.mavlink.MAV_MISSION_INVALID_PARAM1, f"a stay of {item.param1:g} s")
     return item.param1
 
 
-def _acceptance(vessel: Vessel, item: ReceivedMissionItem) -> float | None:
+def _acceptance(context: VehicleContext, item: ReceivedMissionItem) -> float | None:
     if math.isnan(item.param2) or item.param2 == 0.0:
         return None
     if not 0.0 < item.param2 <= _LARGEST:
-        raise ItemError(vessel.mavlink.MAV_MISSION_INVALID_PARAM2, f"an acceptance radius of {item.param2:g} m")
+        raise ItemError(context.mavlink.MAV_MISSION_INVALID_PARAM2, f"an acceptance radius of {item.param2:g} m")
     return item.param2
 
 
-def home_item(vessel: Vessel) -> ReceivedMissionItem:
+def home_item(context: VehicleContext) -> ReceivedMissionItem:
     """Return home as ArduPilot has it, the first item of every mission."""
-    latitude, longitude, altitude = vessel.frame.to_global(vessel.home_ned())
-    m = vessel.mavlink
+    latitude, longitude, altitude = context.frame.to_global(context.home_ned())
+    m = context.mavlink
     x, y = round(latitude * 1e7), round(longitude * 1e7)
     return ReceivedMissionItem(m.MAV_FRAME_GLOBAL, m.MAV_CMD_NAV_WAYPOINT, 1, 0.0, 0.0, 0.0, 0.0, x, y, altitude)

@@ -7,7 +7,7 @@ from typing import Any
 
 from cosim.mavlink.services.service import Call, Service
 from cosim.mavlink.vehicle.profile import MODE_NAMES, STANDARD_MODES, is_custom
-from cosim.mavlink.vehicle.vehicle_context import Sender, Vessel
+from cosim.mavlink.vehicle.vehicle_context import Sender, VehicleContext
 from cosim.simulation.commands.commands import Arm, Command, Mode, Reset, SetMode, SetTarget
 
 _FORCE = 20190226  # PREFLIGHT_REBOOT_SHUTDOWN, parameter 6
@@ -17,9 +17,9 @@ _MODES_BY_STANDARD: dict[int, Mode] = {number: mode for mode, number in STANDARD
 class Modes(Service):
     """What changes who steers."""
 
-    def __init__(self, vessel: Vessel) -> None:
-        super().__init__(vessel)
-        m = vessel.mavlink
+    def __init__(self, context: VehicleContext) -> None:
+        super().__init__(context)
+        m = context.mavlink
         self._paused_from: Mode = "reach"
         self.messages = {"SET_MODE": self._set_mode}
         self.commands = {
@@ -35,22 +35,22 @@ class Modes(Service):
         }
 
     def _give(self, sender: Sender, *commands: Command) -> int:
-        result = self.vessel.give(*commands)
-        if result == self.vessel.mavlink.MAV_RESULT_ACCEPTED:
-            self.vessel.operator.commanded(sender.system)
+        result = self.context.submit(*commands)
+        if result == self.context.mavlink.MAV_RESULT_ACCEPTED:
+            self.context.operator.commanded(sender.system)
         return result
 
     def _arm(self, call: Call) -> int:
         wanted = call[1]
         if wanted not in (0.0, 1.0):
-            return int(self.vessel.mavlink.MAV_RESULT_DENIED)
+            return int(self.context.mavlink.MAV_RESULT_DENIED)
         return self._give(call.sender, Arm(wanted == 1.0))
 
     def _set_mode(self, sender: Sender, message: Any) -> None:
-        if is_custom(message.base_mode) and self.vessel.profile.is_return(message.custom_mode):
+        if is_custom(message.base_mode) and self.context.profile.is_return(message.custom_mode):
             self._return_home(sender)
         elif is_custom(message.base_mode):
-            self._mode(sender, self.vessel.profile.mode_of(message.custom_mode), f"{message.custom_mode}")
+            self._mode(sender, self.context.profile.mode_of(message.custom_mode), f"{message.custom_mode}")
         else:
             self._mode(sender, None, f"of base mode {message.base_mode}")
 
@@ -58,43 +58,43 @@ class Modes(Service):
         base, first, second = call.whole(1), call.whole(2), call.whole(3) or 0
         if base is None or first is None or not is_custom(base):
             return self._mode(call.sender, None, "without a number")
-        if self.vessel.profile.is_return(first << 16 | second << 24):  # MAVSDK's return to launch
+        if self.context.profile.is_return(first << 16 | second << 24):  # MAVSDK's return to launch
             return self._return_home(call.sender)
         named = f"{first}" if not second else f"{first}, {second}"
-        return self._mode(call.sender, self.vessel.profile.mode_of_command(first, second), named)
+        return self._mode(call.sender, self.context.profile.mode_of_command(first, second), named)
 
     def _standard_mode(self, call: Call) -> int:
         number = call.whole(1)
         return self._mode(call.sender, None if number is None else _MODES_BY_STANDARD.get(number), f"standard {number}")
 
     def _mode(self, sender: Sender, mode: Mode | None, named: str) -> int:
-        vessel = self.vessel
+        context = self.context
         if mode is None:
-            numbers = vessel.profile.numbers
+            numbers = context.profile.numbers
             known = ", ".join(f"{MODE_NAMES[mode].split()[0].lower()} {number}" for mode, number in numbers.items())
-            vessel.deny(f"no such mode: {named}; profile {vessel.profile.name} has {known}", "mode")
-            return int(vessel.mavlink.MAV_RESULT_FAILED)
+            context.reject(f"no such mode: {named}; profile {context.profile.name} has {known}", "mode")
+            return int(context.mavlink.MAV_RESULT_FAILED)
         return self._steer(sender, mode)
 
     def _steer(self, sender: Sender, mode: Mode) -> int:
-        vessel = self.vessel
-        if mode == "mission" and not vessel.plan and vessel.heeds:
-            vessel.deny("there is no mission", "mission")
-            return int(vessel.mavlink.MAV_RESULT_FAILED)
+        context = self.context
+        if mode == "mission" and not context.plan and context.accepts_commands:
+            context.reject("there is no mission", "mission")
+            return int(context.mavlink.MAV_RESULT_FAILED)
         return self._give(sender, SetMode(mode))
 
     def _return_home(self, sender: Sender) -> int:
-        north, east, _ = self.vessel.home_ned()
-        settings = self.vessel.settings
-        if not self.vessel.heeds:
-            return self.vessel.give()
+        north, east, _ = self.context.home_ned()
+        settings = self.context.settings
+        if not self.context.accepts_commands:
+            return self.context.submit()
         depth, radius = settings["commands.surface_depth"], settings["commands.hold_radius"]
         return self._give(sender, SetTarget((north, east, depth), radius))
 
     # ---- pause ----
 
     def _goto(self, call: Call) -> int:
-        m = self.vessel.mavlink
+        m = self.context.mavlink
         here = call.whole(2) in (None, 0, m.MAV_GOTO_HOLD_AT_CURRENT_POSITION)
         if call.whole(1) == m.MAV_GOTO_DO_HOLD and here:
             return self._hold(call.sender)
@@ -107,10 +107,10 @@ class Modes(Service):
             return self._hold(call.sender)
         if call[1] == 1.0:
             return self._steer(call.sender, self._paused_from)
-        return int(self.vessel.mavlink.MAV_RESULT_DENIED)
+        return int(self.context.mavlink.MAV_RESULT_DENIED)
 
     def _hold(self, sender: Sender) -> int:
-        mode = self.vessel.mode_ahead
+        mode = self.context.mode_ahead
         if mode != "hold":
             self._paused_from = mode
         return self._steer(sender, "hold")
@@ -118,10 +118,10 @@ class Modes(Service):
     # ---- from the beginning ----
 
     def _reboot(self, call: Call) -> int:
-        m, vessel = self.vessel.mavlink, self.vessel
+        m, context = self.context.mavlink, self.context
         if call[1] != 1.0:
             return int(m.MAV_RESULT_UNSUPPORTED if math.isfinite(call[1]) else m.MAV_RESULT_DENIED)
-        if vessel.armed and call[6] != _FORCE and vessel.heeds:
-            vessel.deny("armed: disarm before a restart", "restart")
+        if context.armed and call[6] != _FORCE and context.accepts_commands:
+            context.reject("armed: disarm before a restart", "restart")
             return int(m.MAV_RESULT_DENIED)
         return self._give(call.sender, Reset())

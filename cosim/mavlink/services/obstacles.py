@@ -8,7 +8,7 @@ from typing import Any
 
 from cosim.mavlink.services.service import Service
 from cosim.mavlink.vehicle.layout import euler_of
-from cosim.mavlink.vehicle.vehicle_context import Sender, Vessel
+from cosim.mavlink.vehicle.vehicle_context import Sender, VehicleContext
 from cosim.scenario.tables import Vector3
 from cosim.simulation.commands.commands import AddObstacle, RemoveObstacle
 
@@ -33,10 +33,10 @@ class Obstacles(Service):
     In LOCAL_FRD forward is where the vehicle looked at time 0.
     """
 
-    def __init__(self, vessel: Vessel) -> None:
-        super().__init__(vessel)
+    def __init__(self, context: VehicleContext) -> None:
+        super().__init__(context)
         self.messages = {"OBSTACLE_DISTANCE_3D": self._obstacle}
-        self._first_yaw = euler_of(vessel.scenario.initial.quaternion)[2]
+        self._first_yaw = euler_of(context.scenario.initial.quaternion)[2]
         self.restart()
 
     def restart(self) -> None:
@@ -44,29 +44,29 @@ class Obstacles(Service):
         self._known: dict[int, _Known] = {}
 
     def _obstacle(self, sender: Sender, message: Any) -> None:
-        vessel = self.vessel
-        if not vessel.heeds:
-            vessel.give()
+        context = self.context
+        if not context.accepts_commands:
+            context.submit()
             return
         position = self._position(message.frame, (message.x, message.y, message.z))
         if position is None:
-            vessel.deny(f"obstacle in frame {message.frame}; it may be 1, 12 or 20", "frame")
+            context.reject(f"obstacle in frame {message.frame}; it may be 1, 12 or 20", "frame")
             return
         if not all(map(math.isfinite, position)):
             return
-        number, radius = message.obstacle_id, vessel.settings[_RADIUS]
+        number, radius = message.obstacle_id, context.settings[_RADIUS]
         known = self._known.get(number)
         if known is not None and known.radius == radius and math.dist(known.position, position) < _UNMOVED:
-            known.heard = vessel.now
+            known.heard = context.now
             return
         if known is None and not self._has_room():
-            vessel.deny(f"no room for obstacle {number}: {len(self._known)} have come already", "obstacle")
+            context.reject(f"no room for obstacle {number}: {len(self._known)} have come already", "obstacle")
             return
-        if vessel.give(AddObstacle(number, position, radius)) == vessel.mavlink.MAV_RESULT_ACCEPTED:
-            self._known[number] = _Known(position, radius, vessel.now)
+        if context.submit(AddObstacle(number, position, radius)) == context.mavlink.MAV_RESULT_ACCEPTED:
+            self._known[number] = _Known(position, radius, context.now)
 
     def _position(self, frame: int, point: Vector3) -> Vector3 | None:
-        view = self.vessel.view
+        view = self.context.view
         if frame == _LOCAL_NED:
             return point
         if frame == _BODY_FRD:
@@ -80,15 +80,15 @@ class Obstacles(Service):
 
     def _has_room(self) -> bool:
         """Return whether one more fits, once the one that was silent longest is forgotten if it may be."""
-        vessel = self.vessel
-        if len(self._known) < vessel.scenario.commands.obstacles:
+        context = self.context
+        if len(self._known) < context.scenario.commands.obstacles:
             return True
         if not self._known:
             return False
         oldest = min(self._known, key=lambda number: self._known[number].heard)
-        if vessel.now - self._known[oldest].heard < _FORGOTTEN:
+        if context.now - self._known[oldest].heard < _FORGOTTEN:
             return False
-        if vessel.give(RemoveObstacle(oldest)) != vessel.mavlink.MAV_RESULT_ACCEPTED:
+        if context.submit(RemoveObstacle(oldest)) != context.mavlink.MAV_RESULT_ACCEPTED:
             return False
         del self._known[oldest]
         return True

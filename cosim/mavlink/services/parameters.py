@@ -15,9 +15,9 @@ from cosim.mavlink.services.parameter_names import parameter_names
 from cosim.mavlink.services.service import Service
 from cosim.mavlink.services.station_parameters import station_parameters
 from cosim.mavlink.vehicle.failsafe_settings import ACTIONS, TIMEOUTS
-from cosim.mavlink.vehicle.vehicle_context import Sender, Vessel
+from cosim.mavlink.vehicle.vehicle_context import Sender, VehicleContext
 from cosim.mavlink.wire.encode import float32
-from cosim.mavlink.wire.message_sink import Outlet
+from cosim.mavlink.wire.message_sink import MessageSink
 from cosim.simulation.commands.commands import ChangeSetting
 
 _HASH = "_HASH_CHECK"
@@ -41,45 +41,45 @@ class Parameters(Service):
     who asks again and again takes nothing from others.
     """
 
-    def __init__(self, vessel: Vessel) -> None:
-        super().__init__(vessel)
+    def __init__(self, context: VehicleContext) -> None:
+        super().__init__(context)
         self.messages = {
             "PARAM_REQUEST_LIST": self._list,
             "PARAM_REQUEST_READ": self._read,
             "PARAM_SET": self._set,
         }
-        self._key_of = {name: key for key, name in parameter_names(s.key for s in vessel.settings).items()}
+        self._key_of = {name: key for key, name in parameter_names(s.key for s in context.settings).items()}
         self._own = self._make_own()
         self.names = sorted({*self._key_of, *self._own})
         self._index = {name: i for i, name in enumerate(self.names)}
-        self._bursts: dict[Outlet, tuple[int, int]] = {}  # where it is, and how many are left
+        self._bursts: dict[MessageSink, tuple[int, int]] = {}  # where it is, and how many are left
         self.restart()
 
     def _make_own(self) -> dict[str, _Own]:
-        vessel, profile = self.vessel, self.vessel.profile.name
-        own = {name: _Own(read) for name, read in station_parameters(vessel).items()}
+        context, profile = self.context, self.context.profile.name
+        own = {name: _Own(read) for name, read in station_parameters(context).items()}
         return own | {
-            "MAV_SYS_ID" if profile == "px4" else "SYSID_THISMAV": _Own(lambda: float(vessel.options.system_id)),
-            "FS_GCS_TIMEOUT": _Own(lambda: vessel.loss_timeout, self._write_timeout),
-            "FS_GCS_ENABLE": _Own(lambda: float(ACTIONS.index(vessel.loss_action)), self._write_action),
+            "MAV_SYS_ID" if profile == "px4" else "SYSID_THISMAV": _Own(lambda: float(context.options.system_id)),
+            "FS_GCS_TIMEOUT": _Own(lambda: context.loss_timeout, self._write_timeout),
+            "FS_GCS_ENABLE": _Own(lambda: float(ACTIONS.index(context.loss_action)), self._write_action),
         }
 
     def _write_timeout(self, value: float) -> str | None:
         least, greatest = TIMEOUTS
         if not least <= value <= greatest:
             return f"{least:g} to {greatest:g}"
-        self.vessel.loss_timeout = value
+        self.context.loss_timeout = value
         return None
 
     def _write_action(self, value: float) -> str | None:
         if value not in range(len(ACTIONS)):
             return ", ".join(f"{i} {action}" for i, action in enumerate(ACTIONS))
-        self.vessel.loss_action = ACTIONS[int(value)]
+        self.context.loss_action = ACTIONS[int(value)]
         return None
 
     def restart(self) -> None:
         """Take the numbers as the vessel's settings have them."""
-        self._values = {setting.key: setting.value for setting in self.vessel.settings}
+        self._values = {setting.key: setting.value for setting in self.context.settings}
 
     # ---- what others use ----
 
@@ -99,17 +99,17 @@ class Parameters(Service):
 
     def change(self, key: str, value: float) -> int:
         """Order another value of a setting, and return MAV_RESULT; a value that cannot be is denied with the reason."""
-        vessel, before = self.vessel, self._values[key]
-        if not vessel.heeds:
-            return vessel.give()
+        context, before = self.context, self._values[key]
+        if not context.accepts_commands:
+            return context.submit()
         try:
-            vessel.settings.change(key, value)
+            context.settings.change(key, value)
         except CommandError as error:
-            vessel.deny(str(error), "value")
-            return int(vessel.mavlink.MAV_RESULT_DENIED)
-        result = vessel.give(ChangeSetting(key, value))
-        if result != vessel.mavlink.MAV_RESULT_ACCEPTED:
-            vessel.settings.change(key, before)
+            context.reject(str(error), "value")
+            return int(context.mavlink.MAV_RESULT_DENIED)
+        result = context.submit(ChangeSetting(key, value))
+        if result != context.mavlink.MAV_RESULT_ACCEPTED:
+            context.settings.change(key, before)
             return result
         self._values[key] = value
         return result
@@ -117,14 +117,14 @@ class Parameters(Service):
     def learn(self, key: str, value: float) -> None:
         """Note another value of a setting, that a mission brought about."""
         with contextlib.suppress(CommandError):  # as the command handler does, which logs it
-            self.vessel.settings.change(key, value)
+            self.context.settings.change(key, value)
             self._values[key] = value
 
     # ---- the list ----
 
     def _list(self, sender: Sender, message: Any) -> None:
         at, left = self._bursts.get(sender.link, (0, 0))
-        if not left and self.vessel.profile.name == "px4":
+        if not left and self.context.profile.name == "px4":
             self._send_hash(sender.link)
         self._bursts[sender.link] = at, len(self.names)
         if not left:
@@ -135,7 +135,7 @@ class Parameters(Service):
         for link in list(self._bursts):
             self._send_slice(link)
 
-    def _send_slice(self, link: Outlet) -> None:
+    def _send_slice(self, link: MessageSink) -> None:
         at, left = self._bursts[link]
         for _ in range(min(left, _SLICE)):
             if not link.has_room():
@@ -147,13 +147,13 @@ class Parameters(Service):
         else:
             del self._bursts[link]
 
-    def _send_value(self, link: Outlet, name: str) -> None:
-        m = self.vessel.mavlink
+    def _send_value(self, link: MessageSink, name: str) -> None:
+        m = self.context.mavlink
         kind = m.MAV_PARAM_TYPE_REAL32, len(self.names), self._index[name]
-        link.send(self.vessel.make("PARAM_VALUE", name, self.value(name), *kind))
+        link.send(self.context.make("PARAM_VALUE", name, self.value(name), *kind))
 
-    def _send_hash(self, link: Outlet) -> None:
-        m = self.vessel.mavlink
+    def _send_hash(self, link: MessageSink) -> None:
+        m = self.context.mavlink
         (bits,) = struct.unpack("<f", struct.pack("<I", hash_check(dict(self.all()))))
         link.send(
             m.MAVLink_param_value_message(_HASH.encode(), bits, m.MAV_PARAM_TYPE_UINT32, len(self.names), _NO_INDEX)
@@ -162,10 +162,10 @@ class Parameters(Service):
     # ---- one ----
 
     def _read(self, sender: Sender, message: Any) -> None:
-        m, index, name = self.vessel.mavlink, message.param_index, message.param_id
+        m, index, name = self.context.mavlink, message.param_index, message.param_id
         if index >= 0:
             name = self.names[index] if index < len(self.names) else ""
-        elif name == _HASH and self.vessel.profile.name == "px4":
+        elif name == _HASH and self.context.profile.name == "px4":
             self._send_hash(sender.link)
             return
         if name in self._index:
@@ -175,10 +175,10 @@ class Parameters(Service):
 
     def _refuse(self, sender: Sender, name: str, index: int, error: int) -> None:
         to = sender.system, sender.component
-        sender.link.send(self.vessel.make("PARAM_ERROR", *to, name, index, error))
+        sender.link.send(self.context.make("PARAM_ERROR", *to, name, index, error))
 
     def _set(self, sender: Sender, message: Any) -> None:
-        m, name, value = self.vessel.mavlink, message.param_id, message.param_value
+        m, name, value = self.context.mavlink, message.param_id, message.param_value
         if name == _HASH:  # the station has the list already
             self._bursts.pop(sender.link, None)
             return
@@ -192,18 +192,18 @@ class Parameters(Service):
 
     def _taken(self, name: str, value: float, kind: int) -> int:
         """Take a value, and return MAV_PARAM_ERROR."""
-        m, vessel = self.vessel.mavlink, self.vessel
+        m, context = self.context.mavlink, self.context
         own = self._own.get(name)
         if own is not None and own.write is None:
             return int(m.MAV_PARAM_ERROR_READ_ONLY)
-        if not vessel.heeds:
-            vessel.give()
+        if not context.accepts_commands:
+            context.submit()
             return int(m.MAV_PARAM_ERROR_PERMISSION_DENIED)
-        if kind != m.MAV_PARAM_TYPE_REAL32 and vessel.profile.name != "ardusub":  # ArduPilot's stations cast
-            vessel.deny(f"{name} came as type {kind}, expected REAL32 ({m.MAV_PARAM_TYPE_REAL32})", "value")
+        if kind != m.MAV_PARAM_TYPE_REAL32 and context.profile.name != "ardusub":  # ArduPilot's stations cast
+            context.reject(f"{name} came as type {kind}, expected REAL32 ({m.MAV_PARAM_TYPE_REAL32})", "value")
             return int(m.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE)
         if not math.isfinite(value):
-            vessel.deny(f"{name} is {value}, expected a finite number", "value")
+            context.reject(f"{name} is {value}, expected a finite number", "value")
             return int(m.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE)
         if _as_float32(self.value(name)) == value:
             return int(m.MAV_PARAM_ERROR_NO_ERROR)
@@ -211,7 +211,7 @@ class Parameters(Service):
         if own is not None and own.write is not None:
             expected = own.write(value)
             if expected is not None:
-                vessel.deny(f"{name} is {value:g}, expected {expected}", "value")
+                context.reject(f"{name} is {value:g}, expected {expected}", "value")
                 return int(m.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE)
             return int(m.MAV_PARAM_ERROR_NO_ERROR)
         result = self.change(self._key_of[name], value)

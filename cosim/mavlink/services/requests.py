@@ -8,8 +8,8 @@ from typing import Any
 from cosim.mavlink.messages import MESSAGES, status
 from cosim.mavlink.messages.streams import Streams
 from cosim.mavlink.services.service import Call, Service
-from cosim.mavlink.vehicle.vehicle_context import Sender, Vessel
-from cosim.mavlink.wire.message_sink import Outlet
+from cosim.mavlink.vehicle.vehicle_context import Sender, VehicleContext
+from cosim.mavlink.wire.message_sink import MessageSink
 
 _SECOND = 1_000_000
 _ALL = 0
@@ -21,16 +21,16 @@ class Requests(Service):
 
     Parameters
     ----------
-    vessel : Vessel
+    vessel : VehicleContext
         Whom it serves.
-    streams : mapping of Outlet to Streams
+    streams : mapping of MessageSink to Streams
         The schedule of each link.
     """
 
-    def __init__(self, vessel: Vessel, streams: Mapping[Outlet, Streams]) -> None:
-        super().__init__(vessel)
+    def __init__(self, context: VehicleContext, streams: Mapping[MessageSink, Streams]) -> None:
+        super().__init__(context)
         self._streams = streams
-        m = vessel.mavlink
+        m = context.mavlink
         self.messages = {"REQUEST_DATA_STREAM": self._group}
         self.commands = {
             m.MAV_CMD_SET_MESSAGE_INTERVAL: self._set_interval,
@@ -41,67 +41,67 @@ class Requests(Service):
         }
 
     def _set_interval(self, call: Call) -> int:
-        m, vessel = self.vessel.mavlink, self.vessel
+        m, context = self.context.mavlink, self.context
         message_id, interval = call.whole(1), call.whole(2)
         if message_id is None or interval is None:
             return int(m.MAV_RESULT_DENIED)
         if message_id not in MESSAGES:
             return int(m.MAV_RESULT_FAILED)
         if not self._streams[call.sender.link].set([(message_id, interval)]):
-            vessel.deny("the link would carry too much", "load")
+            context.reject("the link would carry too much", "load")
             return int(m.MAV_RESULT_DENIED)
         return int(m.MAV_RESULT_ACCEPTED)
 
     def _get_interval(self, call: Call) -> int:
-        m, vessel, link = self.vessel.mavlink, self.vessel, call.sender.link
+        m, context, link = self.context.mavlink, self.context, call.sender.link
         message_id = call.whole(1)
         interval = 0 if message_id is None else self._streams[link].interval(message_id)
-        link.send(vessel.make("MESSAGE_INTERVAL", message_id or 0, interval))
+        link.send(context.make("MESSAGE_INTERVAL", message_id or 0, interval))
         return int(m.MAV_RESULT_ACCEPTED if interval else m.MAV_RESULT_FAILED)
 
     def _message(self, call: Call) -> int:
         """REQUEST_MESSAGE: any of the table; parameter 2 says which of several. As ArduPilot, others fail."""
-        m, vessel, link = self.vessel.mavlink, self.vessel, call.sender.link
+        m, context, link = self.context.mavlink, self.context, call.sender.link
         message_id = call.whole(1)
         spec = None if message_id is None else MESSAGES.get(message_id)
         if spec is None and message_id != m.MAVLINK_MSG_ID_MESSAGE_INTERVAL:
             return int(m.MAV_RESULT_FAILED)
         which = call.whole(2) or 0
         if spec is None:
-            link.send(vessel.make("MESSAGE_INTERVAL", which, self._streams[link].interval(which)))
+            link.send(context.make("MESSAGE_INTERVAL", which, self._streams[link].interval(which)))
             return int(m.MAV_RESULT_ACCEPTED)
         several = spec.build is status.available_modes
-        messages = status.available_modes(vessel, which) if several else spec.build(vessel)
+        messages = status.available_modes(context, which) if several else spec.build(context)
         for message in messages:
             link.send(message)
         return int(m.MAV_RESULT_ACCEPTED if messages else m.MAV_RESULT_FAILED)
 
     def _version(self, call: Call) -> int:
-        for message in status.autopilot_version(self.vessel):
+        for message in status.autopilot_version(self.context):
             call.sender.link.send(message)
-        return int(self.vessel.mavlink.MAV_RESULT_ACCEPTED)
+        return int(self.context.mavlink.MAV_RESULT_ACCEPTED)
 
     def _banner(self, call: Call) -> int:
-        for line in banner(self.vessel):
-            for message in self.vessel.text(line):
+        for line in banner(self.context):
+            for message in self.context.text(line):
                 call.sender.link.send(message)
-        return int(self.vessel.mavlink.MAV_RESULT_ACCEPTED)
+        return int(self.context.mavlink.MAV_RESULT_ACCEPTED)
 
     def _group(self, sender: Sender, message: Any) -> None:
         group, rate = message.req_stream_id, min(message.req_message_rate, _GREATEST_RATE)
         interval = _SECOND // rate if message.start_stop and rate else -1
         changes = [(spec.id, interval) for spec in MESSAGES.values() if spec.group and group in (_ALL, spec.group)]
         if not self._streams[sender.link].set(changes):
-            self.vessel.deny("the link would carry too much", "load")
+            self.context.reject("the link would carry too much", "load")
 
 
-def banner(vessel: Vessel) -> list[str]:
+def banner(context: VehicleContext) -> list[str]:
     """Return who this is, line by line: a simulation, whatever autopilot it shows itself as."""
-    scenario = vessel.scenario
-    lines = [f"subreach co-simulation, profile {vessel.profile.name}", f"Vehicle {scenario.vehicle.name}"]
+    scenario = context.scenario
+    lines = [f"subreach co-simulation, profile {context.profile.name}", f"Vehicle {scenario.vehicle.name}"]
     lines.append(f"Scenario {scenario.name}, law {scenario.law.name}")
-    if not vessel.live:
+    if not context.live:
         lines.append("A recorded run")
-    elif not vessel.heeds:
+    elif not context.accepts_commands:
         lines.append("Read-only: commands are off")
     return lines

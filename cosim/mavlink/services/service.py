@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from cosim.mavlink.vehicle.vehicle_context import Sender, Vessel
+from cosim.mavlink.vehicle.vehicle_context import Sender, VehicleContext
 from cosim.mavlink.wire.encode import whole
 from cosim.scenario.tables import Vector3
 
@@ -53,7 +53,7 @@ class Service:
 
     Parameters
     ----------
-    vessel : Vessel
+    vessel : VehicleContext
         Whom it serves.
 
     Attributes
@@ -67,27 +67,27 @@ class Service:
     messages: Mapping[str, Handler]
     commands: Mapping[int, Command]
 
-    def __init__(self, vessel: Vessel) -> None:
-        self.vessel = vessel
+    def __init__(self, context: VehicleContext) -> None:
+        self.context = context
         self.messages = {}
         self.commands = {}
 
     def tick(self) -> None:
-        """Do what goes by the wall clock, `vessel.now`."""
+        """Do what goes by the wall clock, `context.now`."""
 
-    def looked(self) -> None:
+    def on_snapshot(self) -> None:
         """Do what a new snapshot asks for."""
 
     def restart(self) -> None:
         """Forget what belongs to a run, as at its beginning."""
 
 
-def place_of(vessel: Vessel, frame: int, x: float, y: float, z: float) -> Vector3 | None:
+def place_of(context: VehicleContext, frame: int, x: float, y: float, z: float) -> Vector3 | None:
     """Return a place that a station names as a position [m, NED]; NaN where it is not finite.
 
     Parameters
     ----------
-    vessel : Vessel
+    vessel : VehicleContext
         Where the globe's frame is.
     frame : int
         MAV_FRAME.
@@ -102,9 +102,9 @@ def place_of(vessel: Vessel, frame: int, x: float, y: float, z: float) -> Vector
     if frame == _LOCAL_NED:
         position = x, y, z
     elif frame in _GLOBAL:
-        position = vessel.frame.to_local(x, y, z)
+        position = context.frame.to_local(x, y, z)
     elif frame in _RELATIVE:
-        north, east, _ = vessel.frame.to_local(x, y, 0.0)
+        north, east, _ = context.frame.to_local(x, y, 0.0)
         position = north, east, -z  # home is at the surface
     else:
         return None

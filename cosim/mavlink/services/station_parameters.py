@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import partial
 
-from cosim.mavlink.vehicle.vehicle_context import Vessel
+from cosim.mavlink.vehicle.vehicle_context import VehicleContext
 from cosim.mavlink.wire.options import LossAction
 
 _HEAVY = "bluerov2_heavy"
@@ -30,30 +30,30 @@ _ON_LOSS: dict[LossAction, float] = {
 }  # NAV_DLL_ACT
 
 
-def station_parameters(vessel: Vessel) -> dict[str, Callable[[], float]]:
+def station_parameters(context: VehicleContext) -> dict[str, Callable[[], float]]:
     """Return what can be read, by name, in the vessel's profile; none of it can be set.
 
     Parameters
     ----------
-    vessel : Vessel
+    vessel : VehicleContext
         Whose profile and vehicle it is.
     """
-    match vessel.profile.name:
+    match context.profile.name:
         case "ardusub":
-            values = _of_ardusub(vessel)
+            values = _of_ardusub(context)
         case "px4":
-            values = _of_px4(vessel)
+            values = _of_px4(context)
         case "generic":
             return {}
     table: dict[str, Callable[[], float]] = {name: partial(float, value) for name, value in values.items()}
-    if vessel.profile.name == "px4":
-        table["NAV_DLL_ACT"] = lambda: _ON_LOSS[vessel.loss_action]
-        table["COM_DL_LOSS_T"] = lambda: vessel.loss_timeout
+    if context.profile.name == "px4":
+        table["NAV_DLL_ACT"] = lambda: _ON_LOSS[context.loss_action]
+        table["COM_DL_LOSS_T"] = lambda: context.loss_timeout
     return table
 
 
-def _of_ardusub(vessel: Vessel) -> dict[str, float]:
-    vehicle = vessel.scenario.vehicle
+def _of_ardusub(context: VehicleContext) -> dict[str, float]:
+    vehicle = context.scenario.vehicle
     motors = _MOTORS[: vehicle.n_thrusters]
     functions = [*motors, *[0] * max(0, _SERVOS - len(motors))]
     numbers = ("", "2", "3")
@@ -76,10 +76,10 @@ def _of_ardusub(vessel: Vessel) -> dict[str, float]:
     }
 
 
-def _of_px4(vessel: Vessel) -> dict[str, float]:
+def _of_px4(context: VehicleContext) -> dict[str, float]:
     sticks = ("ROLL", "PITCH", "YAW", "THROTTLE", "FLAPS", "AUX1", "AUX2")
     return {
-        "SYS_AUTOSTART": _BLUEROV2_HEAVY if vessel.scenario.vehicle.name == _HEAVY else _UUV,
+        "SYS_AUTOSTART": _BLUEROV2_HEAVY if context.scenario.vehicle.name == _HEAVY else _UUV,
         "CAL_ACC0_ID": 1.0,
         "CAL_GYRO0_ID": 1.0,
         # there is neither magnetometer nor battery

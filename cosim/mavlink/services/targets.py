@@ -9,7 +9,7 @@ from cosim.mavlink.services.mission_items import SPEED
 from cosim.mavlink.services.parameters import Parameters, shortest
 from cosim.mavlink.services.service import Call, Service, place_of, unscaled
 from cosim.mavlink.vehicle.profile import MODE_NAMES
-from cosim.mavlink.vehicle.vehicle_context import Sender, Vessel
+from cosim.mavlink.vehicle.vehicle_context import Sender, VehicleContext
 from cosim.scenario.tables import Vector3
 from cosim.simulation.commands.commands import Command, SetHeading, SetMode, SetTarget
 
@@ -29,16 +29,16 @@ class Targets(Service):
 
     Parameters
     ----------
-    vessel : Vessel
+    vessel : VehicleContext
         Whom it serves.
     parameters : Parameters
         Through which the speed is set.
     """
 
-    def __init__(self, vessel: Vessel, parameters: Parameters) -> None:
-        super().__init__(vessel)
+    def __init__(self, context: VehicleContext, parameters: Parameters) -> None:
+        super().__init__(context)
         self._parameters = parameters
-        m = vessel.mavlink
+        m = context.mavlink
         self._last: tuple[object, ...] = ()
         self._last_at = -math.inf
         self.messages = {
@@ -51,9 +51,9 @@ class Targets(Service):
             m.MAV_CMD_DO_CHANGE_SPEED: self._speed,
         }
 
-    def looked(self) -> None:
+    def on_snapshot(self) -> None:
         """Forget the last set-point once another mode is on."""
-        if self.vessel.mode_ahead != "reach":
+        if self.context.mode_ahead != "reach":
             self._last = ()
 
     def restart(self) -> None:
@@ -65,7 +65,7 @@ class Targets(Service):
     def _local(self, sender: Sender, message: Any) -> None:
         frame = message.coordinate_frame
         if frame not in (_LOCAL, *_FROM_HERE):
-            self.vessel.deny(f"set-point in frame {frame}; it may be 1, 7, 8, 9 or 12", "frame")
+            self.context.reject(f"set-point in frame {frame}; it may be 1, 7, 8, 9 or 12", "frame")
             return
         raw = message.x, message.y, message.z
         self._set_point(sender, message, frame, self._from_local(frame, raw), raw)
@@ -75,9 +75,9 @@ class Targets(Service):
         place = None
         if frame != _LOCAL:
             latitude, longitude = unscaled(frame, message.lat_int, message.lon_int)
-            place = place_of(self.vessel, frame, latitude, longitude, message.alt)
+            place = place_of(self.context, frame, latitude, longitude, message.alt)
         if place is None:
-            self.vessel.deny(f"set-point in frame {frame}; it may be 0, 3, 5 or 6", "frame")
+            self.context.reject(f"set-point in frame {frame}; it may be 0, 3, 5 or 6", "frame")
             return
         self._set_point(sender, message, frame, place, (message.lat_int, message.lon_int, message.alt))
 
@@ -86,13 +86,13 @@ class Targets(Service):
         if frame == _LOCAL:
             return raw
         north, east, down = self._levelled(frame, raw)
-        x, y, z = self.vessel.view.position_ned
+        x, y, z = self.context.view.position_ned
         return x + north, y + east, z + down
 
     def _levelled(self, frame: int, vector: Vector3) -> Vector3:
         if frame not in (_BODY, _BODY_OFFSET, _BODY_FRD):
             return vector
-        yaw = self.vessel.view.heading
+        yaw = self.context.view.heading
         if math.isnan(yaw):
             return math.nan, math.nan, vector[2]
         ahead, right, down = vector
@@ -100,48 +100,48 @@ class Targets(Service):
         return ahead * cosine - right * sine, ahead * sine + right * cosine, down
 
     def _set_point(self, sender: Sender, message: Any, frame: int, place: Vector3, raw: Vector3) -> None:
-        vessel, mask = self.vessel, message.type_mask
+        context, mask = self.context, message.type_mask
         if not self._may(sender):
             return
         forced = mask & _FORCE and mask & _ACCELERATION != _ACCELERATION  # QGroundControl sets all bits but those
         if mask & _Z or mask & _X_Y not in (0, _X_Y) or forced:
-            vessel.deny(f"set-point with mask {mask}: a position is needed", "mask")
+            context.reject(f"set-point with mask {mask}: a position is needed", "mask")
             return
-        if vessel.mode_ahead != "reach":
-            name = MODE_NAMES[vessel.mode_ahead].lower()
-            vessel.deny(f"set-point while the mode is {name}", "mode of set-point")
+        if context.mode_ahead != "reach":
+            name = MODE_NAMES[context.mode_ahead].lower()
+            context.reject(f"set-point while the mode is {name}", "mode of set-point")
             return
         going = (0.0, 0.0, 0.0) if mask & _VELOCITY else (message.vx, message.vy, message.vz)
         yaw = None if mask & _YAW or not math.isfinite(message.yaw) else message.yaw
         said = (frame, mask, raw, going, yaw)
-        since, self._last_at = vessel.now - self._last_at, vessel.now
+        since, self._last_at = context.now - self._last_at, context.now
         if said == self._last and (frame not in _FROM_HERE or since < _ANEW):
             return
-        position = (*vessel.view.target[:2], place[2]) if mask & _X_Y else place
+        position = (*context.view.target[:2], place[2]) if mask & _X_Y else place
         commands: list[Command] = [SetTarget(position, None, self._levelled(frame, going))]
         if yaw is not None and self._last[-1:] != (yaw,):
             turned = frame in (_BODY, _BODY_OFFSET, _BODY_FRD)
-            commands.append(SetHeading(yaw + (vessel.view.euler[2] if turned else 0.0)))
-        if vessel.give(*commands) == vessel.mavlink.MAV_RESULT_ACCEPTED:
+            commands.append(SetHeading(yaw + (context.view.euler[2] if turned else 0.0)))
+        if context.submit(*commands) == context.mavlink.MAV_RESULT_ACCEPTED:
             self._last = said
 
     def _may(self, sender: Sender) -> bool:
-        vessel = self.vessel
-        if not vessel.heeds:
-            vessel.give()
+        context = self.context
+        if not context.accepts_commands:
+            context.submit()
             return False
-        if not vessel.operator.may_steer(sender.system, vessel.now):
-            vessel.deny("another station has the vehicle in hand", "operator")
+        if not context.operator.may_steer(sender.system, context.now):
+            context.reject("another station has the vehicle in hand", "active gcs")
             return False
         return True
 
     # ---- commands ----
 
     def _reposition(self, call: Call) -> int:
-        m, vessel = self.vessel.mavlink, self.vessel
-        place = place_of(vessel, call.frame, call[5], call[6], call[7])
+        m, context = self.context.mavlink, self.context
+        place = place_of(context, call.frame, call[5], call[6], call[7])
         if place is None:
-            vessel.deny(f"frame {call.frame} of a position", "frame")
+            context.reject(f"frame {call.frame} of a position", "frame")
             return int(m.MAV_RESULT_UNSUPPORTED)
         return self.go(call.sender, place, call[4])
 
@@ -162,29 +162,29 @@ class Targets(Service):
         int
             MAV_RESULT.
         """
-        vessel = self.vessel
+        context = self.context
         if not self._may(sender):
-            return int(vessel.mavlink.MAV_RESULT_DENIED)
-        x, y, z = (a if math.isfinite(a) else b for a, b in zip(place, vessel.view.position_ned, strict=True))
+            return int(context.mavlink.MAV_RESULT_DENIED)
+        x, y, z = (a if math.isfinite(a) else b for a, b in zip(place, context.view.position_ned, strict=True))
         commands: list[Command] = [SetTarget((x, y, z)) if any(map(math.isfinite, place)) else SetMode("hold")]
         if math.isfinite(yaw):
             commands.append(SetHeading(yaw))
         self._last = ()
-        return vessel.give(*commands)
+        return context.submit(*commands)
 
     def _turn(self, call: Call) -> int:
-        vessel = self.vessel
+        context = self.context
         angle = math.radians(call[1])
         if not math.isfinite(angle) or not math.isfinite(call[4]):
-            return int(vessel.mavlink.MAV_RESULT_DENIED)
+            return int(context.mavlink.MAV_RESULT_DENIED)
         if call[4] == 1.0:
-            angle = vessel.view.euler[2] + math.copysign(1.0, -1.0 if call[3] < 0.0 else 1.0) * angle
+            angle = context.view.euler[2] + math.copysign(1.0, -1.0 if call[3] < 0.0 else 1.0) * angle
         if not self._may(call.sender):
-            return int(vessel.mavlink.MAV_RESULT_DENIED)
-        return vessel.give(SetHeading(angle))
+            return int(context.mavlink.MAV_RESULT_DENIED)
+        return context.submit(SetHeading(angle))
 
     def _speed(self, call: Call) -> int:
-        m, speed = self.vessel.mavlink, call[2]
+        m, speed = self.context.mavlink, call[2]
         if not self._parameters.has(SPEED):
             return int(m.MAV_RESULT_UNSUPPORTED)
         if speed < 0.0:  # as it is

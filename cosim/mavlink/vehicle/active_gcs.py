@@ -6,7 +6,7 @@ _KEEPS = 3.0  # s of silence, after which another system may take over
 _KNOWN = 64  # systems whose heartbeats are remembered
 
 
-class Operator:
+class ActiveGcs:
     """Who has the vehicle in hand: the first that comes keeps it until it is silent.
 
     Attributes

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from cosim.errors import CommandError
-from cosim.mavlink.vehicle.active_gcs import Operator
+from cosim.mavlink.vehicle.active_gcs import ActiveGcs
 from cosim.mavlink.vehicle.geodesy import LocalFrame
 from cosim.mavlink.vehicle.layout import Layout
 from cosim.mavlink.vehicle.mission_item import ReceivedMissionItem
@@ -18,7 +18,7 @@ from cosim.mavlink.vehicle.proximity import Proximity
 from cosim.mavlink.vehicle.view import View
 from cosim.mavlink.wire.dialect import dialect
 from cosim.mavlink.wire.encode import Encoder
-from cosim.mavlink.wire.message_sink import Outlet
+from cosim.mavlink.wire.message_sink import MessageSink
 from cosim.mavlink.wire.options import MavlinkOptions
 from cosim.scenario.scenario import Scenario
 from cosim.scenario.tables import Vector3, Vector6
@@ -40,12 +40,12 @@ _WISH_LASTS = 0.5  # s, that a command may take until a snapshot shows it
 class Sender:
     """Who sent a message, and on which link."""
 
-    link: Outlet
+    link: MessageSink
     system: int
     component: int
 
 
-class Vessel:
+class VehicleContext:
     """The vehicle as the micro-services see it.
 
     Parameters
@@ -73,7 +73,7 @@ class Vessel:
         For how long arming is awaited [µs], which counts as time since boot.
     seen : bool
         Whether a snapshot came at all.
-    links : list of Outlet
+    links : list of MessageSink
         That are attached.
     settings : LiveSettings
         The numbers as they are once all commands are followed.
@@ -110,8 +110,8 @@ class Vessel:
         self.make = Encoder(self.mavlink)
         self.profile = PROFILES[options.profile]
         self.layout = Layout(scenario, columns)
-        self.operator = Operator()
-        self.links: list[Outlet] = []
+        self.operator = ActiveGcs()
+        self.links: list[MessageSink] = []
         self.now = 0.0
         self.failsafe = False
         self.loss_timeout, self.loss_action = options.loss_timeout, options.loss_action
@@ -144,7 +144,7 @@ class Vessel:
     # ---- how things stand ----
 
     @property
-    def heeds(self) -> bool:
+    def accepts_commands(self) -> bool:
         """Whether it takes commands at all."""
         return self._commands is not None
 
@@ -190,7 +190,7 @@ class Vessel:
 
     # ---- commands ----
 
-    def give(self, *commands: Command) -> int:
+    def submit(self, *commands: Command) -> int:
         """Give commands, which are followed at the next step.
 
         Parameters
@@ -206,15 +206,15 @@ class Vessel:
         """
         m = self.mavlink
         if self._commands is None:
-            self.deny("commands are off: start with --commands" if self.live else "this is a recorded run", "off")
+            self.reject("commands are off: start with --commands" if self.live else "this is a recorded run", "off")
             return int(m.MAV_RESULT_DENIED)
         for command in commands:
             try:
-                if not self._commands.give(command, self._run):
-                    self.deny("the run is over" if self.outlived else "too many commands at once", "full")
+                if not self._commands.submit(command, self._run):
+                    self.reject("the run is over" if self.outlived else "too many commands at once", "full")
                     return int(m.MAV_RESULT_TEMPORARILY_REJECTED)
             except CommandError as error:
-                self.deny(str(error), "order")
+                self.reject(str(error), "order")
                 return int(m.MAV_RESULT_DENIED)
             self._foresee(command)
         return int(m.MAV_RESULT_ACCEPTED)
@@ -263,7 +263,7 @@ class Vessel:
         for message in self.text(text, severity):
             self.send(message)
 
-    def deny(self, reason: str, key: str) -> None:
+    def reject(self, reason: str, key: str) -> None:
         """Say why something is refused; not more often than every two seconds for a kind of reason."""
         self.say(f"Refused: {reason}", self.mavlink.MAV_SEVERITY_WARNING, f"deny {key}", 2.0)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any, Protocol
 
 
-class Outlet(Protocol):
+class MessageSink(Protocol):
     """Takes messages; what cannot be sent is counted, and never raises."""
 
     name: str  # such as udpout:127.0.0.1:14550

@@ -11,16 +11,16 @@ from cosim.report.figures import forces as of_forces
 from cosim.report.figures import path as in_space
 from cosim.report.figures import time_series as over_time
 from cosim.report.figures.layout import FIGURE_STYLE, F, Sheet, own_sheet
-from cosim.report.figures.style import Drawing, Story
+from cosim.report.figures.style import FigureData, NamedFigure
 from cosim.report.figures.trajectory import is_known, targets_of
 
 
-def drawings(story: Story) -> Iterator[Drawing]:
+def drawings(data: FigureData) -> Iterator[NamedFigure]:
     """Yield every figure that the run has something to show for.
 
     Parameters
     ----------
-    story : Story
+    story : FigureData
         Scenario, record and summary.
 
     Yields
@@ -28,42 +28,42 @@ def drawings(story: Story) -> Iterator[Drawing]:
     Drawing
         In the order of the report.
     """
-    for name, caption, draw in _figures(story):
+    for name, caption, draw in _figures(data):
         with mpl.rc_context(FIGURE_STYLE):
-            yield Drawing(name, caption, draw(story, own_sheet))
+            yield NamedFigure(name, caption, draw(data, own_sheet))
 
 
-def draw_all(story: Story, sheet_for: Callable[[str], Sheet[F]]) -> None:
+def draw_all(data: FigureData, sheet_for: Callable[[str], Sheet[F]]) -> None:
     """Draw the same figures on sheets that are given.
 
     Parameters
     ----------
-    story : Story
+    story : FigureData
         Scenario, record and summary.
     sheet_for : callable
         Gives the sheet of a figure for its caption.
     """
-    for _, caption, draw in _figures(story):
+    for _, caption, draw in _figures(data):
         with mpl.rc_context(FIGURE_STYLE):
-            draw(story, sheet_for(caption))
+            draw(data, sheet_for(caption))
 
 
 class _Draw(Protocol):
-    def __call__(self, story: Story, sheet: Sheet[F]) -> F: ...
+    def __call__(self, data: FigureData, sheet: Sheet[F]) -> F: ...
 
 
-def _figures(story: Story) -> Iterator[tuple[str, str, _Draw]]:
+def _figures(data: FigureData) -> Iterator[tuple[str, str, _Draw]]:
     """Yield name, caption, and what draws it."""
     moved = ""
-    if story.scenario.moving:
+    if data.scenario.moving:
         moved = (
             " What moved is faint where it began and ended; regions are full where they were when the vehicle had "
             "least clearance to them."
         )
-    if targets_of(story):
+    if targets_of(data):
         moved += " Diamonds: the targets before the last one, numbered as they were commanded."
     way = "; the path is in a criterion's colour while the arbiter gives way to a region of it"
-    if is_known(story):
+    if is_known(data):
         yield (
             "path-3d",
             f"Path in space (after Fig. 5a), seen from the south-east{way}. Grey: its shadow on the deepest plane.",
@@ -81,20 +81,19 @@ def _figures(story: Story) -> Iterator[tuple[str, str, _Draw]]:
         over_time.position_error,
     )
     yield "attitude", "Attitude (after Fig. 7): Euler angles from NED to the body frame.", over_time.attitude
-    if story.summary["intersection_windows"]:
+    if data.summary["intersection_windows"]:
         yield (
             "weights-overlap",
             "Normalised weights around each overlap of regions (after Fig. 8; assumed).",
             over_time.weights_overlap,
         )
-    yield "weights", f"Memberships and weights of the criteria.{_zoom(story)}", over_time.weights
+    yield "weights", f"Memberships and weights of the criteria.{_zoom(data)}", over_time.weights
     yield (
         "clearance",
-        "Clearance to the goal and to each region; red: below 0 it is violated, or the goal not reached."
-        f"{_zoom(story)}",
+        f"Clearance to the goal and to each region; red: below 0 it is violated, or the goal not reached.{_zoom(data)}",
         over_time.clearance,
     )
-    if story.scenario.commands.enabled:
+    if data.scenario.commands.enabled:
         yield "control-mode", "Who steered, as it was commanded; grey where disarmed.", over_time.control_mode
     yield (
         "forces",
@@ -102,13 +101,13 @@ def _figures(story: Story) -> Iterator[tuple[str, str, _Draw]]:
         "(Y) and down (Z).",
         of_forces.forces,
     )
-    yield "thrusters", of_forces.thruster_caption(story.scenario), of_forces.thrusters
+    yield "thrusters", of_forces.thruster_caption(data.scenario), of_forces.thrusters
     yield (
         "estimates",
         "Estimates of φ in (12), weight less buoyancy and its levers along the body axes, against the truth (dotted).",
         of_forces.estimates,
     )
-    if story.summary["lyapunov"]:
+    if data.summary["lyapunov"]:
         yield (
             "lyapunov",
             "V of (31), which as printed leaves the frame where a region's gradient vanishes, and −W of (41): dV/dt "
@@ -117,5 +116,5 @@ def _figures(story: Story) -> Iterator[tuple[str, str, _Draw]]:
         )
 
 
-def _zoom(story: Story) -> str:
-    return " Left, where there are two: the time of the first overlap (grey)." if over_time.zooms(story) else ""
+def _zoom(data: FigureData) -> str:
+    return " Left, where there are two: the time of the first overlap (grey)." if over_time.zooms(data) else ""

@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.artist import Artist
 
 from cosim.report.figures.layout import F, Sheet, legend, limits_of, log_axis, symlog_axis
-from cosim.report.figures.style import BLACK, BLUE, CYCLE, GREEN, RED, Story
+from cosim.report.figures.style import BLACK, BLUE, CYCLE, GREEN, RED, FigureData
 from cosim.report.figures.time_series import DASHES, curve, over_time
 from cosim.results.record import Rows
 from cosim.scenario.scenario import Scenario
@@ -34,20 +34,20 @@ def norms_of(record: Rows) -> dict[str, Array]:
     return {words: np.maximum(np.linalg.norm(force, axis=1), _FLOOR) for words, force in forces.items()}
 
 
-def forces(story: Story, sheet: Sheet[F]) -> F:
+def forces(data: FigureData, sheet: Sheet[F]) -> F:
     """Draw the norm of the body force on a logarithmic axis, and its components."""
-    acting = story.record.stack([f"actuation.{a}" for a in "XYZ"])
-    norms = norms_of(story.record)
+    acting = data.record.stack([f"actuation.{a}" for a in "XYZ"])
+    norms = norms_of(data.record)
     names = [f"{axis}, acting" for axis in "XYZ"]
     labels = [f"norm, {which}" for which in norms] + names
-    figure, (norm, parts) = over_time(story, sheet, [1.7, 1.7], labels)
+    figure, (norm, parts) = over_time(data, sheet, [1.7, 1.7], labels)
     entries: dict[str, Artist] = {}
     for label, force, colour, dashes in zip(labels, norms.values(), (BLACK, RED), DASHES, strict=False):
-        entries[label] = curve(norm, story, force, color=colour, linestyle=dashes)
+        entries[label] = curve(norm, data, force, color=colour, linestyle=dashes)
     log_axis(norm, list(norms.values()))
     norm.set_ylabel("force, norm [N]")
     for i, (name, colour, dashes) in enumerate(zip(names, (BLUE, RED, GREEN), DASHES, strict=False)):
-        entries[name] = curve(parts, story, acting[:, i], color=colour, linestyle=dashes)
+        entries[name] = curve(parts, data, acting[:, i], color=colour, linestyle=dashes)
     size = norms["acting"][np.isfinite(norms["acting"])]
     largest, typical = (float(size.max()), float(np.percentile(size, 90))) if size.size else (0.0, 0.0)
     if largest > 20.0 * max(typical, 1.0):  # a spike would flatten all the rest
@@ -92,16 +92,16 @@ def thrusts_of(scenario: Scenario, record: Rows) -> Array:
     return force
 
 
-def thrusters(story: Story, sheet: Sheet[F]) -> F:
+def thrusters(data: FigureData, sheet: Sheet[F]) -> F:
     """Draw the force of each thruster, or what it would have to give."""
-    vehicle = story.scenario.vehicle
-    force = thrusts_of(story.scenario, story.record)
+    vehicle = data.scenario.vehicle
+    force = thrusts_of(data.scenario, data.record)
     labels = [f"thruster {i + 1}" for i in range(vehicle.n_thrusters)]
-    figure, (ax,) = over_time(story, sheet, [2.3], labels)
+    figure, (ax,) = over_time(data, sheet, [2.3], labels)
     entries: dict[str, Artist] = {}
     for i, label in enumerate(labels):
         style = "-" if i < len(CYCLE) // 2 else "--"
-        entries[label] = curve(ax, story, force[:, i], color=CYCLE[i % len(CYCLE)], linestyle=style, linewidth=1.0)
+        entries[label] = curve(ax, data, force[:, i], color=CYCLE[i % len(CYCLE)], linestyle=style, linewidth=1.0)
     bounds = float(vehicle.thrust_min.min()), float(vehicle.thrust_max.max())
     for bound in bounds:
         ax.axhline(bound, color=BLACK, linestyle="--", linewidth=0.8)
@@ -116,17 +116,17 @@ def thrusters(story: Story, sheet: Sheet[F]) -> F:
     return figure
 
 
-def estimates(story: Story, sheet: Sheet[F]) -> F:
+def estimates(data: FigureData, sheet: Sheet[F]) -> F:
     """Draw the estimates against the truth."""
-    truth = story.scenario.true_restoring_parameters
+    truth = data.scenario.true_restoring_parameters
     labels = list(_ESTIMATES)
-    figure, (force, moment) = over_time(story, sheet, [1.6, 1.6], [*labels, "truth"])
+    figure, (force, moment) = over_time(data, sheet, [1.6, 1.6], [*labels, "truth"])
     entries: dict[str, Artist] = {}
     shown: dict[bool, list[Array]] = {True: [], False: []}
     for i, label in enumerate(labels):
         ax, colour = (force, BLUE) if i == 0 else (moment, CYCLE[i])
-        signal = story.record[f"estimate.phi{i + 1}"]
-        entries[label] = curve(ax, story, signal, color=colour, linestyle=DASHES[max(0, i - 1)])
+        signal = data.record[f"estimate.phi{i + 1}"]
+        entries[label] = curve(ax, data, signal, color=colour, linestyle=DASHES[max(0, i - 1)])
         entries["truth"] = ax.axhline(truth[i], color=colour, linestyle=(0, (1, 3)), linewidth=1.2)
         shown[i == 0] += [signal, truth[i : i + 1]]
     force.set_ylim(*limits_of(shown[True], least=0.1))

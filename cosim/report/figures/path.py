@@ -30,12 +30,12 @@ from cosim.report.figures.style import (
     CRITERION_COLOURS,
     GOAL_COLOUR,
     PATH_COLOUR,
+    FigureData,
     Place,
-    Story,
     features_of,
     places_of,
 )
-from cosim.report.figures.trajectory import Way, way_of
+from cosim.report.figures.trajectory import SampledPath, way_of
 from cosim.scenario.scenario import CRITERIA
 from cosim.simulation.signals import Array
 
@@ -47,14 +47,14 @@ _GAP = 0.34  # inches between the planes
 _NAMED = 8  # regions whose names stand in the picture in space
 
 
-def path_3d(story: Story, sheet: Sheet[F]) -> F:
+def path_3d(data: FigureData, sheet: Sheet[F]) -> F:
     """Draw the path, regions and goal in space, as seen from the south-east and above."""
-    way = way_of(story)
-    low, high = _extent(story, way)
+    way = way_of(data)
+    low, high = _extent(data, way)
     wide = np.maximum(high - low, 0.4 * (high - low).max())  # a flat path still gets a box with some depth
     middle = (low + high) / 2.0
     low, high = middle - wide / 2.0, middle + wide / 2.0
-    entries = _entries(story, way)
+    entries = _entries(data, way)
     top = TOP + LEGEND_ROW * legend_rows(list(entries))
     box = Box(low, high)
     height = box.height_for(WIDTH - 0.2, 4.4)
@@ -62,12 +62,12 @@ def path_3d(story: Story, sheet: Sheet[F]) -> F:
     ax = figure.add_axes((0.1 / WIDTH, 0.0, 1.0 - 0.2 / WIDTH, height / (height + top)))
     labels = box.draw(ax)
     clip = Path(box.outline)
-    few = len(story.scenario.regions) <= _NAMED  # of more, no one could tell which name is whose
-    for place in places_of(story):
+    few = len(data.scenario.regions) <= _NAMED  # of more, no one could tell which name is whose
+    for place in places_of(data):
         seen = _region(ax, place, low, high, box.view, clip)
         if seen and not place.faint and few:
             labels.offer(place.region.name, np.vstack(seen))
-    for name, colour, feature in features_of(story):
+    for name, colour, feature in features_of(data):
         ax.plot(*(box.view @ feature), "*", color=colour, markersize=9)
         labels.offer(name, (box.view @ feature)[None])
     floor = np.column_stack([way.points[:, :2], np.full(len(way.points), high[2])])
@@ -78,12 +78,12 @@ def path_3d(story: Story, sheet: Sheet[F]) -> F:
     return figure
 
 
-def path_plane(story: Story, sheet: Sheet[F]) -> F:
+def path_plane(data: FigureData, sheet: Sheet[F]) -> F:
     """Draw the path and the outlines of the regions from the side and from above."""
-    way = way_of(story)
-    low, high = _extent(story, way)
+    way = way_of(data)
+    low, high = _extent(data, way)
     side, above, along = high[2] - low[2], high[1] - low[1], high[0] - low[0]
-    entries = _entries(story, way)
+    entries = _entries(data, way)
     top = TOP + LEGEND_ROW * legend_rows(list(entries)) + 0.16
     across = WIDTH - LEFT - RIGHT
     scale = min(across / along, _TALLEST / (side + above))  # inches a metre
@@ -108,11 +108,11 @@ def path_plane(story: Story, sheet: Sheet[F]) -> F:
         ax.set_ylabel("depth, NED z [m]" if axis == 2 else "east, NED y [m]")
         ax.yaxis.set_label_coords((0.17 - LEFT) / across, 0.5)
         labels = Labels(ax, scale, _frame(view @ low, view @ high))
-        for place in places_of(story):
+        for place in places_of(data):
             seen = _region(ax, place, low, high, view)
             if seen and not place.faint:
                 labels.offer(place.region.name, np.vstack(seen))
-        for name, colour, feature in features_of(story):
+        for name, colour, feature in features_of(data):
             ax.plot(*(view @ feature), "*", color=colour, markersize=9)
             labels.offer(name, (view @ feature)[None])
         _targets(ax, way, view)
@@ -156,7 +156,7 @@ def _fills(outline: Array, low: Array, high: Array) -> bool:
     return bool((outline.min(axis=0) <= low + 1e-9).all() and (outline.max(axis=0) >= high - 1e-9).all())
 
 
-def _path(ax: Axes, way: Way, view: Array) -> None:
+def _path(ax: Axes, way: SampledPath, view: Array) -> None:
     """Draw where the vehicle went, in the colour of a criterion while the arbiter gives way to a region of it."""
     flat = way.points @ view.T
     ax.plot(*flat.T, color=PATH_COLOUR, linewidth=1.6)
@@ -171,7 +171,7 @@ def _path(ax: Axes, way: Way, view: Array) -> None:
     ax.plot(*flat[-1], "o", color=BLACK, markersize=4)
 
 
-def _targets(ax: Axes, way: Way, view: Array) -> None:
+def _targets(ax: Axes, way: SampledPath, view: Array) -> None:
     """Draw the targets that were commanded before the last one, faint, with their number in the order they came."""
     for i, (middle, radius) in enumerate(way.targets):
         centre = view @ middle
@@ -187,9 +187,9 @@ def _targets(ax: Axes, way: Way, view: Array) -> None:
         )
 
 
-def _entries(story: Story, way: Way) -> dict[str, Artist]:
+def _entries(data: FigureData, way: SampledPath) -> dict[str, Artist]:
     """Return what the legend of a picture in space tells, only of what there is."""
-    shown = {secondary.criterion for secondary in story.scenario.regions}
+    shown = {secondary.criterion for secondary in data.scenario.regions}
     entries: dict[str, Artist] = {"goal": Patch(color=GOAL_COLOUR, alpha=0.4)}
     entries |= {name: Patch(color=CRITERION_COLOURS[name], alpha=0.4) for name in CRITERIA if name in shown}
     entries["path"] = Line2D([], [], color=PATH_COLOUR, linewidth=1.6)
@@ -212,10 +212,10 @@ def _with_gaps(lines: list[Array]) -> Array:
     return joined
 
 
-def _extent(story: Story, way: Way) -> tuple[Array, Array]:
+def _extent(data: FigureData, way: SampledPath) -> tuple[Array, Array]:
     """Return the corners of a box about the path and the goal, with some room."""
     path = way.points
-    places = list(places_of(story))
+    places = list(places_of(data))
     all_bounds = [np.array(place.region.shape.bounds()) + place.shift for place in places]
     goals = [
         np.where(np.isfinite(bounds), bounds, path[0])
@@ -230,7 +230,7 @@ def _extent(story: Story, way: Way) -> tuple[Array, Array]:
         near = (0.1 if place.faint else 0.5) * size
         if np.isfinite(bounds).all() and (bounds[1] >= low - near).all() and (bounds[0] <= high + near).all():
             points = np.vstack([points, np.clip(bounds, low - near, high + near)])
-    points = np.vstack([points, *(feature[None] for _, _, feature in features_of(story))])
+    points = np.vstack([points, *(feature[None] for _, _, feature in features_of(data))])
     low, high = points.min(axis=0), points.max(axis=0)
     room = np.maximum(0.06 * (high - low).max(), (1.2 - (high - low)) / 2.0)
     return low - room, high + room

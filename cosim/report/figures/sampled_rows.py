@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cosim.report.figures.forces import norms_of, thrusts_of
-from cosim.report.figures.style import POINTS, Story
+from cosim.report.figures.style import POINTS, FigureData
 from cosim.report.figures.time_series import enlarged, error_of
 from cosim.report.figures.trajectory import POSITION
 from cosim.results.extremes import even_edges, extreme_rows, rows_at
@@ -29,7 +29,7 @@ _DRAWN_OF_REGIONS = (".clearance", ".shift.x", ".shift.y", ".shift.z")
 _EXTREME = ("attitude.", "membership.", "weight.", "estimate.", "lyapunov.")
 
 
-def story_of(run: FlownRun) -> Story:
+def story_of(run: FlownRun) -> FigureData:
     """Return what the figures of a run draw from.
 
     Of a long record these are the rows at which what is drawn is least and greatest in each of some hundred parts of
@@ -51,17 +51,17 @@ def story_of(run: FlownRun) -> Story:
     RunError
         If the record cannot be read.
     """
-    story = Story(run.scenario, run.record, run.summary)
+    data = FigureData(run.scenario, run.record, run.summary)
     if len(run.record) <= _WHOLE:
-        return story
+        return data
     names = [name for name in run.record.units if name.startswith(_DRAWN) or name.endswith(_DRAWN_OF_REGIONS)]
-    return dataclasses.replace(story, record=run.record.take(_rows(story, names), names))
+    return dataclasses.replace(data, record=run.record.take(_rows(data, names), names))
 
 
-def _rows(story: Story, names: list[str]) -> NDArray[np.intp]:
+def _rows(data: FigureData, names: list[str]) -> NDArray[np.intp]:
     """Return the rows of a long record that tell."""
-    scenario, record = story.scenario, story.record
-    n, spans = len(record), enlarged(story)
+    scenario, record = data.scenario, data.record
+    n, spans = len(record), enlarged(data)
     bounds = rows_at(record, [time for span in spans for time in span]).clip(0, n - 1)
     signals = len(_telling(scenario, record.take([0], names)))
     parts = max(1, _MOST // (2 * signals * (1 + len(spans))))

@@ -47,7 +47,7 @@ POINTS = 1000  # of a drawn curve: about what a figure's width resolves
 
 
 @dataclass(frozen=True)
-class Story:
+class FigureData:
     """What the figures draw from."""
 
     scenario: Scenario
@@ -56,7 +56,7 @@ class Story:
 
 
 @dataclass(frozen=True)
-class Drawing:
+class NamedFigure:
     """A figure with its name and caption."""
 
     name: str
@@ -128,7 +128,7 @@ class Place:
     faint: bool  # where it began or ended
 
 
-def places_of(story: Story) -> Iterator[Place]:
+def places_of(data: FigureData) -> Iterator[Place]:
     """Yield where the goal was at the end, and each region when the vehicle had least clearance to it.
 
     Those that move come before it, faint, where they began and where they ended. Regions of attitude are at no place
@@ -136,7 +136,7 @@ def places_of(story: Story) -> Iterator[Place]:
 
     Parameters
     ----------
-    story : Story
+    story : FigureData
         The run.
 
     Yields
@@ -144,12 +144,12 @@ def places_of(story: Story) -> Iterator[Place]:
     Place
         The goal's first.
     """
-    came = {secondary.region.name for secondary in story.scenario.regions if secondary.seen}
-    for region, colour in regions_of(story.scenario):
+    came = {secondary.region.name for secondary in data.scenario.regions if secondary.seen}
+    for region, colour in regions_of(data.scenario):
         if of_attitude(region.shape):
             continue
-        shifts = shifts_of(story.record, region.name)
-        clearance = story.record[f"{region.name}.clearance"]
+        shifts = shifts_of(data.record, region.name)
+        clearance = data.record[f"{region.name}.clearance"]
         # NaN is not the least
         at = -1 if region.name == "goal" else int(np.argmin(np.where(np.isnan(clearance), np.inf, clearance)))
         if shifts.any() and region.name not in came:
@@ -158,12 +158,12 @@ def places_of(story: Story) -> Iterator[Place]:
         yield Place(region, colour, shifts[at], faint=False)
 
 
-def features_of(story: Story) -> Iterator[tuple[str, str, Array]]:
+def features_of(data: FigureData) -> Iterator[tuple[str, str, Array]]:
     """Yield name, colour and place [m, NED], shape (3,), of every feature that is to be seen, as it was at the end.
 
     Parameters
     ----------
-    story : Story
+    story : FigureData
         The run.
 
     Yields
@@ -171,9 +171,9 @@ def features_of(story: Story) -> Iterator[tuple[str, str, Array]]:
     (str, str, ndarray)
         In the order of the regions.
     """
-    for region, colour in regions_of(story.scenario):
+    for region, colour in regions_of(data.scenario):
         if isinstance(region.shape, Visibility):
-            yield region.name, colour, np.array(region.shape.feature) + shifts_of(story.record, region.name)[-1]
+            yield region.name, colour, np.array(region.shape.feature) + shifts_of(data.record, region.name)[-1]
 
 
 def shifts_of(record: Rows, name: str) -> Array:
@@ -212,12 +212,12 @@ def legend_columns(labels: Iterable[str]) -> int:
     return max(1, _LEGEND_WIDTH // (max(map(len, labels)) + _LEGEND_MARK))
 
 
-def overlap_of(story: Story) -> NDArray[np.bool_]:
+def overlap_of(data: FigureData) -> NDArray[np.bool_]:
     """Return when the scenario's regions overlapped about the vehicle, shape (steps,).
 
     Parameters
     ----------
-    story : Story
+    story : FigureData
         The run.
 
     Returns
@@ -225,7 +225,7 @@ def overlap_of(story: Story) -> NDArray[np.bool_]:
     ndarray of bool
         True within the windows of the summary.
     """
-    time, windows = story.record["time"], np.array(story.summary["intersection_windows"]).reshape(-1, 2)
+    time, windows = data.record["time"], np.array(data.summary["intersection_windows"]).reshape(-1, 2)
     begun = np.searchsorted(windows[:, 0], time, "right")  # windows until then; they come one after the other
     inside: NDArray[np.bool_] = (begun > 0) & (time <= np.append(windows[:, 1], 0.0)[begun - 1])
     return inside

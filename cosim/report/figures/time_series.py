@@ -22,7 +22,7 @@ from cosim.report.figures.style import (
     GREEN,
     ORANGE,
     RED,
-    Story,
+    FigureData,
     regions_of,
     shifts_of,
     thin,
@@ -42,53 +42,53 @@ _WIDER = 1.6  # than up to the end of the overlap
 _TIME = "time [s]"
 
 
-def zooms(story: Story) -> bool:
+def zooms(data: FigureData) -> bool:
     """Return whether the first overlap is so early that figures over the whole run would not show it."""
-    windows = story.summary["intersection_windows"]
-    return bool(windows) and 0.0 < _WIDER * windows[0][1] <= 0.4 * story.summary["simulated_time"]
+    windows = data.summary["intersection_windows"]
+    return bool(windows) and 0.0 < _WIDER * windows[0][1] <= 0.4 * data.summary["simulated_time"]
 
 
-def enlarged(story: Story) -> list[tuple[float, float]]:
+def enlarged(data: FigureData) -> list[tuple[float, float]]:
     """Return the spans of time [s] that figures show enlarged, besides the whole run."""
-    windows = story.summary["intersection_windows"]
-    spans = [_around(story, start, end) for start, end in windows[:_WINDOWS]]
-    return [*spans, (0.0, _WIDER * windows[0][1])] if zooms(story) else spans
+    windows = data.summary["intersection_windows"]
+    spans = [_around(data, start, end) for start, end in windows[:_WINDOWS]]
+    return [*spans, (0.0, _WIDER * windows[0][1])] if zooms(data) else spans
 
 
-def _around(story: Story, start: float, end: float) -> tuple[float, float]:
+def _around(data: FigureData, start: float, end: float) -> tuple[float, float]:
     """Return what is shown of a window in which the regions overlap."""
-    room = max(0.5 * (end - start), 5 * story.scenario.time.step)
+    room = max(0.5 * (end - start), 5 * data.scenario.time.step)
     return start - room, end + room
 
 
-def _zoomed(story: Story, sheet: Sheet[F], heights: Sequence[float], labels: Sequence[str]) -> tuple[F, Any]:
+def _zoomed(data: FigureData, sheet: Sheet[F], heights: Sequence[float], labels: Sequence[str]) -> tuple[F, Any]:
     """Return axes for the whole run, shape (rows, 1), or (rows, 2) with the time of the overlap on the left."""
-    if not zooms(story):
-        figure, axes = over_time(story, sheet, heights, labels)
+    if not zooms(data):
+        figure, axes = over_time(data, sheet, heights, labels)
         return figure, axes[:, None]
     figure, axes = panels(sheet, heights, (2.0, 3.0), labels)
-    start, end = story.summary["intersection_windows"][0]
+    start, end = data.summary["intersection_windows"][0]
     for ax in axes[:, 0]:
         ax.axvspan(start, end, color=BLACK, alpha=0.08, linewidth=0)
     axes[0, 0].set_xlim(0.0, _WIDER * end)
     axes[0, 0].xaxis.set_major_locator(MaxNLocator(4, steps=[1, 2, 5, 10]))
-    axes[0, 1].set_xlim(0.0, story.summary["simulated_time"])
+    axes[0, 1].set_xlim(0.0, data.summary["simulated_time"])
     for ax in axes[-1]:
         ax.set_xlabel(_TIME)
     return figure, axes
 
 
-def over_time(story: Story, sheet: Sheet[F], heights: Sequence[float], labels: Sequence[str]) -> tuple[F, Any]:
+def over_time(data: FigureData, sheet: Sheet[F], heights: Sequence[float], labels: Sequence[str]) -> tuple[F, Any]:
     """Return axes over the whole run, shape (rows,)."""
     figure, axes = panels(sheet, heights, labels=labels)
-    axes[0, 0].set_xlim(0.0, story.summary["simulated_time"] or story.scenario.time.step)
+    axes[0, 0].set_xlim(0.0, data.summary["simulated_time"] or data.scenario.time.step)
     axes[-1, 0].set_xlabel(_TIME)
     return figure, axes[:, 0]
 
 
-def curve(axes: Any, story: Story, signal: Array, **style: Any) -> Line2D:
+def curve(axes: Any, data: FigureData, signal: Array, **style: Any) -> Line2D:
     """Draw a signal into one axes, or into several that show different spans of time; return a line of it."""
-    time = story.record["time"]
+    time = data.record["time"]
     marker = "o" if len(time) == 1 else ""
     for ax in np.atleast_1d(axes):
         seen = slice(0, int(np.searchsorted(time, ax.get_xlim()[1], side="right")) + 1)
@@ -123,13 +123,13 @@ def error_of(scenario: Scenario, record: Rows) -> tuple[str, Array]:
     return "RMS error", np.linalg.norm(path - centre, axis=1) / np.sqrt(3.0)
 
 
-def position_error(story: Story, sheet: Sheet[F]) -> F:
+def position_error(data: FigureData, sheet: Sheet[F]) -> F:
     """Draw the RMS error to the goal's centre, or the distance to the goal where it has none."""
-    what, error = error_of(story.scenario, story.record)
-    sphere = story.scenario.goal if isinstance(story.scenario.goal, Sphere) else None
+    what, error = error_of(data.scenario, data.record)
+    sphere = data.scenario.goal if isinstance(data.scenario.goal, Sphere) else None
     labels = [what, "tolerance r_v/√3"] if sphere else [what]
-    figure, (ax,) = over_time(story, sheet, [2.0], labels)
-    lines = [curve(ax, story, error)]
+    figure, (ax,) = over_time(data, sheet, [2.0], labels)
+    lines = [curve(ax, data, error)]
     ax.set_ylabel(f"{what} [m]")
     if sphere:
         lines.append(ax.axhline(sphere.radius / np.sqrt(3.0), color=GOAL_COLOUR, linestyle="--"))
@@ -138,29 +138,29 @@ def position_error(story: Story, sheet: Sheet[F]) -> F:
     return figure
 
 
-def attitude(story: Story, sheet: Sheet[F]) -> F:
+def attitude(data: FigureData, sheet: Sheet[F]) -> F:
     """Draw roll, pitch and yaw."""
-    angles = {name: np.rad2deg(story.record[f"attitude.{name}"]) for name in ("roll", "pitch", "yaw")}
-    figure, (ax,) = over_time(story, sheet, [2.0], list(angles))
+    angles = {name: np.rad2deg(data.record[f"attitude.{name}"]) for name in ("roll", "pitch", "yaw")}
+    figure, (ax,) = over_time(data, sheet, [2.0], list(angles))
     styles = zip(angles.items(), (BLUE, RED, GREEN), DASHES, strict=False)
-    legend(figure, {n: curve(ax, story, angle, color=c, linestyle=s) for (n, angle), c, s in styles})
+    legend(figure, {n: curve(ax, data, angle, color=c, linestyle=s) for (n, angle), c, s in styles})
     ax.set_ylim(*limits_of(list(angles.values()), least=2.0))
     ax.set_ylabel("Euler angles, NED to body [°]", fontsize=8)
     return figure
 
 
-def weights_overlap(story: Story, sheet: Sheet[F]) -> F:
+def weights_overlap(data: FigureData, sheet: Sheet[F]) -> F:
     """Draw the weights around each window in which the regions overlap, at most the first three."""
-    windows = story.summary["intersection_windows"][:_WINDOWS]
+    windows = data.summary["intersection_windows"][:_WINDOWS]
     labels = [f"α{i + 1} {name}" for i, name in enumerate(CRITERIA)]
     figure, axes = panels(sheet, [2.0], [1.0] * len(windows), [*labels, "overlap"], titles=0.2)
-    time = story.record["time"]
+    time = data.record["time"]
     for ax, (start, end) in zip(axes[0], windows, strict=True):
-        first, last = _around(story, start, end)
+        first, last = _around(data, start, end)
         shown = (time >= first) & (time <= last)
         entries: dict[str, Artist] = {}
         for label, name, dashes in zip(labels, CRITERIA, DASHES, strict=False):
-            curve = thin(time[shown], story.record[f"weight.{name}"][shown])
+            curve = thin(time[shown], data.record[f"weight.{name}"][shown])
             (entries[label],) = ax.plot(*curve, color=CRITERION_COLOURS[name], linestyle=dashes)
         entries["overlap"] = ax.axvspan(start, end, color=BLACK, alpha=0.08, linewidth=0)
         ax.set_title(f"{start:.3f} s to {end:.3f} s", fontsize=8, pad=3)
@@ -173,14 +173,14 @@ def weights_overlap(story: Story, sheet: Sheet[F]) -> F:
     return figure
 
 
-def weights(story: Story, sheet: Sheet[F]) -> F:
+def weights(data: FigureData, sheet: Sheet[F]) -> F:
     """Draw memberships and weights of each criterion."""
     labels = ["weight, in its criterion's colour", "membership"]
-    figure, axes = _zoomed(story, sheet, [0.95] * len(CRITERIA), labels)
+    figure, axes = _zoomed(data, sheet, [0.95] * len(CRITERIA), labels)
     for i, (row, name) in enumerate(zip(axes, CRITERIA, strict=True)):
         lines = [
-            curve(row, story, story.record[f"weight.{name}"], color=CRITERION_COLOURS[name], linewidth=1.8),
-            curve(row, story, story.record[f"membership.{name}"], color=BLACK, linestyle=":", linewidth=1.0),
+            curve(row, data, data.record[f"weight.{name}"], color=CRITERION_COLOURS[name], linewidth=1.8),
+            curve(row, data, data.record[f"membership.{name}"], color=BLACK, linestyle=":", linewidth=1.0),
         ]
         row[0].set(ylim=(-0.06, 1.06), yticks=(0.0, 0.5, 1.0))
         row[0].set_ylabel(f"α{i + 1} {name} [–]", fontsize=7.5)
@@ -188,30 +188,30 @@ def weights(story: Story, sheet: Sheet[F]) -> F:
     return figure
 
 
-def clearance(story: Story, sheet: Sheet[F]) -> F:
+def clearance(data: FigureData, sheet: Sheet[F]) -> F:
     """Draw the clearance to each region and to the goal: distances, and angles below them where there are any."""
-    regions = list(regions_of(story.scenario))
+    regions = list(regions_of(data.scenario))
     of_places = [of for of in regions if not of_attitude(of[0].shape)]
     of_angles = [of for of in regions if of_attitude(of[0].shape)]
-    named = _named(story, [region.name for region, _ in regions])
+    named = _named(data, [region.name for region, _ in regions])
     others = len(regions) - len(named)
     labels = [region.name for region, _ in (*of_places, *of_angles) if region.name in named]
     rest = [f"{others} others"] if others else []
-    figure, axes = _zoomed(story, sheet, [2.5, 1.5] if of_angles else [2.5], [*labels, *rest])
+    figure, axes = _zoomed(data, sheet, [2.5, 1.5] if of_angles else [2.5], [*labels, *rest])
     entries: dict[str, Artist] = {}
     command = [region.name for region, _ in regions if region.name in named]
     for row, group, unit in zip(axes, (of_places, of_angles), ("m", "°"), strict=False):
         signals = []
         for region, colour in sorted(group, key=lambda of: of[0].name in named):  # the others behind
-            signal = story.record[f"{region.name}.clearance"]
+            signal = data.record[f"{region.name}.clearance"]
             signal = np.rad2deg(signal) if unit == "°" else np.where(np.abs(signal) < _AWAY, signal, np.nan)
             signals.append(signal)
             if region.name in named:
                 i = command.index(region.name)
                 dashes, width = DASHES[i % len(DASHES)], 1.3 if i < len(DASHES) else 0.8
-                entries[region.name] = curve(row, story, signal, color=colour, linestyle=dashes, linewidth=width)
+                entries[region.name] = curve(row, data, signal, color=colour, linestyle=dashes, linewidth=width)
             else:
-                entries[rest[0]] = curve(row, story, signal, color=colour, alpha=0.3, linewidth=0.6)
+                entries[rest[0]] = curve(row, data, signal, color=colour, alpha=0.3, linewidth=0.6)
         low, high = limits_of(signals)
         low = min(low, -0.08 * (high - min(low, 0.0)))  # below 0 is always in sight
         row[0].set_ylim(low, max(high, -0.2 * low))
@@ -223,19 +223,19 @@ def clearance(story: Story, sheet: Sheet[F]) -> F:
     return figure
 
 
-def _named(story: Story, names: list[str]) -> set[str]:
+def _named(data: FigureData, names: list[str]) -> set[str]:
     """Return which of the goal and the regions a legend names: all, or of many those that came nearest."""
     if len(names) <= _NAMED:
         return set(names)
-    least = story.summary["min_clearance"]
+    least = data.summary["min_clearance"]
     return {names[0], *sorted(names[1:], key=lambda name: np.nan_to_num(least[name], nan=np.inf))[:_NEAREST]}
 
 
-def control_mode(story: Story, sheet: Sheet[F]) -> F:
+def control_mode(data: FigureData, sheet: Sheet[F]) -> F:
     """Draw who steers, and whether the thrusters may work."""
-    figure, (ax,) = over_time(story, sheet, [1.3], [])
-    time, mode = story.record["time"], story.record["commands.mode"]
-    armed = story.record["commands.armed"] > 0.0
+    figure, (ax,) = over_time(data, sheet, [1.3], [])
+    time, mode = data.record["time"], data.record["commands.mode"]
+    armed = data.record["commands.armed"] > 0.0
     changes = [0, *(np.flatnonzero(np.diff(mode) != 0.0) + 1).tolist(), len(time) - 1]
     for first, last in zip(changes, changes[1:], strict=False):
         if np.isfinite(mode[first]):
@@ -248,15 +248,15 @@ def control_mode(story: Story, sheet: Sheet[F]) -> F:
     return figure
 
 
-def lyapunov(story: Story, sheet: Sheet[F]) -> F:
+def lyapunov(data: FigureData, sheet: Sheet[F]) -> F:
     """Draw V in its three forms, and its rate."""
-    forms = {form: story.record[f"lyapunov.{form}"] for form in ("printed", "normalised", "primary")}
+    forms = {form: data.record[f"lyapunov.{form}"] for form in ("printed", "normalised", "primary")}
     labels = ("V as printed", "V, potential of the force", "V, primary region alone")
-    figure, axes = _zoomed(story, sheet, [1.8, 1.8], labels)
+    figure, axes = _zoomed(data, sheet, [1.8, 1.8], labels)
     styles = zip(forms.values(), (ORANGE, BLUE, BLACK), DASHES, strict=False)
-    lines = [curve(axes[0], story, V, color=colour, linestyle=style) for V, colour, style in styles]
-    rate = story.record["lyapunov.rate"]
-    curve(axes[1], story, rate, color=BLUE)
+    lines = [curve(axes[0], data, V, color=colour, linestyle=style) for V, colour, style in styles]
+    rate = data.record["lyapunov.rate"]
+    curve(axes[1], data, rate, color=BLUE)
     for row, signal, bad in ((axes[0], forms["normalised"], -1.0), (axes[1], rate, 1.0)):
         size = np.abs(signal[np.isfinite(signal)])
         largest, typical = (float(size.max()), float(np.percentile(size, 50))) if size.size else (0.0, 0.0)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cosim.replay.activity import active_regions
-from cosim.report.figures.style import POINTS, Story, overlap_of
+from cosim.report.figures.style import POINTS, FigureData, overlap_of
 from cosim.scenario.scenario import CRITERIA
 from cosim.simulation.signals import Array
 
@@ -17,7 +17,7 @@ POSITION = ("position.x", "position.y", "position.z")
 
 
 @dataclass(frozen=True)
-class Way:
+class SampledPath:
     """Some points of a path, evenly along its length."""
 
     points: Array  # (n, 3) m, NED
@@ -26,17 +26,17 @@ class Way:
     targets: list[tuple[Array, float]]  # before the last one: middle [m, NED], and radius [m], 0 for that of the goal
 
 
-def is_known(story: Story) -> bool:
+def is_known(data: FigureData) -> bool:
     """Return whether the record has any place of the vehicle that is a number."""
-    return bool(np.isfinite(story.record.stack(POSITION)).all(axis=1).any())
+    return bool(np.isfinite(data.record.stack(POSITION)).all(axis=1).any())
 
 
-def way_of(story: Story) -> Way:
+def way_of(data: FigureData) -> SampledPath:
     """Return the way of a run.
 
     Parameters
     ----------
-    story : Story
+    story : FigureData
         The run; its record has some place of the vehicle.
 
     Returns
@@ -44,20 +44,20 @@ def way_of(story: Story) -> Way:
     Way
         Of about as many points as a figure resolves.
     """
-    path = story.record.stack(POSITION)
+    path = data.record.stack(POSITION)
     known = np.flatnonzero(np.isfinite(path).all(axis=1))
     length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(path[known], axis=0), axis=1))])
     wanted = np.searchsorted(length, np.linspace(0.0, length[-1], POINTS))
     at = known[np.unique(np.minimum(wanted, len(known) - 1))]
-    return Way(path[at], _given_way(story, at), overlap_of(story)[at], targets_of(story))
+    return SampledPath(path[at], _given_way(data, at), overlap_of(data)[at], targets_of(data))
 
 
-def targets_of(story: Story) -> list[tuple[Array, float]]:
+def targets_of(data: FigureData) -> list[tuple[Array, float]]:
     """Return where the target region was commanded to before the last command: middle [m, NED] and radius [m].
 
     Parameters
     ----------
-    story : Story
+    story : FigureData
         The run.
 
     Returns
@@ -65,23 +65,23 @@ def targets_of(story: Story) -> list[tuple[Array, float]]:
     list of (ndarray of shape (3,), float)
         The radius is 0 where the target was the scenario's goal. A target that moves on its own gives few of them.
     """
-    if not story.scenario.commands.enabled:
+    if not data.scenario.commands.enabled:
         return []
-    targets = story.record.stack([*(f"target.{axis}" for axis in "xyz"), "target.radius"])
+    targets = data.record.stack([*(f"target.{axis}" for axis in "xyz"), "target.radius"])
     targets = targets[np.isfinite(targets).all(axis=1)]
     changes = np.flatnonzero((np.diff(targets, axis=0) != 0.0).any(axis=1))  # the last row of each
     kept = changes[np.unique(np.linspace(0, len(changes) - 1, min(len(changes), _TARGETS)).round().astype(int))]
     return [(targets[i, :3], float(targets[i, 3])) for i in kept]
 
 
-def _given_way(story: Story, at: NDArray[np.intp]) -> NDArray[np.intp]:
+def _given_way(data: FigureData, at: NDArray[np.intp]) -> NDArray[np.intp]:
     """Return in some rows the criterion of the region that the arbiter gives way to, -1 for the goal."""
-    regions = story.scenario.regions
+    regions = data.scenario.regions
     if not regions:
         return np.full(len(at), -1)
     criteria = [secondary.criterion for secondary in regions]
     memberships, weights, clearances = (
-        np.column_stack([story.record[name][at] for name in names])
+        np.column_stack([data.record[name][at] for name in names])
         for names in (
             [f"membership.{name}" for name in CRITERIA],
             [f"weight.{name}" for name in CRITERIA],

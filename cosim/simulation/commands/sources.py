@@ -47,7 +47,7 @@ class CommandQueue:
         self._commands: deque[Command] = deque()
         self._lock = threading.Lock()
 
-    def give(self, command: Command, run: int | None = None) -> bool:
+    def submit(self, command: Command, run: int | None = None) -> bool:
         """Queue a command for the next step.
 
         Parameters

@@ -72,7 +72,7 @@ def test_munks_moment_is_that_of_the_momentum():
     attitude, dynamics, e, velocity, water = loop_of(rng), askew(rng), turned(rng), *rng.normal(size=(2, 3))
     R = rotation(e).as_matrix()
     relative = R.T @ (velocity - water)
-    loop.carry(attitude, dynamics, R, velocity, water)
+    loop.propagate(attitude, dynamics, R, velocity, water)
     assert attitude.carried == pytest.approx(-np.cross(relative, dynamics.mass[:3, :3] @ relative), rel=1e-12)
 
 

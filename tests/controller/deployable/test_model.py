@@ -9,7 +9,7 @@ from controller.laws.deployable.braking import least_forces
 from controller.laws.deployable.model import (
     dynamics_of,
     free_acceleration,
-    share_out,
+    reallocate,
     thrust_acceleration,
     thrusters_of,
 )
@@ -61,7 +61,7 @@ def test_a_lost_thruster_gives_nothing_and_the_others_give_the_wrench():
         for lost in range(8):
             thrusters.health[:] = 1.0
             thrusters.health[lost] = 0.0
-            share_out(thrusters)
+            reallocate(thrusters)
             assert thrusters.lower[lost] == thrusters.upper[lost] == 0.0
             wrench = np.array([3.0, -4.0, 2.0, 0.1, -0.2, 0.3])
             forces = thrusters.allocator @ wrench

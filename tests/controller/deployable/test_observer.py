@@ -165,7 +165,7 @@ def test_bounds_hold_on_either_side():
 def test_doubt_widens_what_is_to_be_found_anew():
     estimate, _, _ = started()
     before = estimate.covariance.copy()
-    observer.doubt(estimate, 0.01)
+    observer.inflate_covariance(estimate, 0.01)
     widened = np.zeros((3, 3, 3))
     widened[:, 1, 1], widened[:, 2, 2] = 0.01, (0.04, 0.04, 25.0)
     assert estimate.covariance == pytest.approx(before + widened, rel=1e-12)

@@ -6,7 +6,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from controller.laws.deployable.model import share_out, thrusters_of
+from controller.laws.deployable.model import reallocate, thrusters_of
 from controller.laws.deployable.quadratic_program import _add, _lack, solve, workspace
 from cosim.scenario.vehicle_model import vehicle_model
 from plant_fmu.vehicle import load_vehicle
@@ -23,7 +23,7 @@ def program(rng, kind):
     thrusters = thrusters_of(model)
     for lost in rng.choice(8, size=rng.choice([0, 0, 1, 2]), replace=False):
         thrusters.health[lost] = 0.0
-    share_out(thrusters)
+    reallocate(thrusters)
     mass = model.rigid_mass[0, 0] + model.added_mass[0, 0]
     count = 1 if kind == "one" else int(rng.integers(2, 15))
     slopes = rng.normal(size=(count, 3))

@@ -7,13 +7,13 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from controller import VehicleState
-from controller.laws.deployable import intake, law, observer
+from controller.laws.deployable import input_validation, law, observer
 from controller.laws.deployable.attitude import free_turning
 from controller.laws.deployable.attraction import wanted_velocity
 from controller.laws.deployable.barrier import look, sight_of
 from controller.laws.deployable.gains import DeployableGains
-from controller.laws.deployable.guide import CORNERS, guide_of_nothing
-from controller.laws.deployable.model import Dynamics, share_out, thrusters_of
+from controller.laws.deployable.model import Dynamics, reallocate, thrusters_of
+from controller.laws.deployable.path_planner import CORNERS, guide_of_nothing
 from controller.regions import HalfSpace, Orientation, Region, Sphere, pack
 from tests.controller.deployable.scenery import LEVEL, ODIN, law_for
 
@@ -101,7 +101,7 @@ def test_violated_soft_regions_push_out_of_them():
 def test_what_deceleration_is_relied_on(lost):
     dynamics, thrusters = askew(np.random.default_rng(5)), thrusters_of(ODIN)
     thrusters.health[lost] = 0.0
-    share_out(thrusters)
+    reallocate(thrusters)
     expected = dynamics.braking.min() if not lost else dynamics.braking[lost[0]]
     for j in lost[1:]:
         expected = 0.5 * min(expected, dynamics.braking[j])
@@ -138,7 +138,7 @@ def test_attitude_and_rates_that_are_not_measured_are_carried_by_the_model():
     wrench = memory.thrusters.matrix @ memory.thrusters.forces
     omega = memory.omega + 0.02 * (turning + (memory.dynamics.inverse_mass @ wrench)[3:])
     turned = Rotation.from_matrix(TURNED) * Rotation.from_rotvec(0.02 * omega)
-    intake._carry_attitude(memory)
+    input_validation._carry_attitude(memory)
     assert memory.omega == pytest.approx(omega, rel=1e-12)
     assert memory.quaternion == pytest.approx(turned.as_quat()[[3, 0, 1, 2]], abs=1e-6)
 
@@ -148,7 +148,7 @@ def test_rates_that_are_carried_stay_finite(sign):
     """The drag of one period at such a rate would throw it back far beyond."""
     memory = begun()
     memory.omega[:] = 1e3 * sign
-    intake._carry_attitude(memory)
+    input_validation._carry_attitude(memory)
     assert memory.omega.tolist() == [-100.0 * sign] * 3
 
 
@@ -162,7 +162,7 @@ def test_a_measurement_is_turned_into_the_world():
     memory, theirs = begun(), begun()
     body = np.r_[TURNED.T @ [0.41, -0.31, 0.21], 0.1, 0.2, -0.3]
     state = VehicleState(np.array([1.01, 2.0, 3.0]), 1.001 * ATTITUDE, body, np.ones(8))
-    assert intake.take_in_measurement(memory, state, GAINS)
+    assert input_validation.take_in_measurement(memory, state, GAINS)
     assert memory.quaternion == pytest.approx(ATTITUDE, abs=1e-12)
     assert np.array_equal(memory.omega, body[3:])
     observer.predict(theirs.observed, theirs.dynamics, theirs.thrusters, TURNED, body[3:], GAINS, 0.02)
@@ -177,16 +177,16 @@ def test_what_repeats_itself_to_the_last_bit_while_moving_is_not_believed():
         memory.thrusters.forces[:] = 0.0
         memory.observed.velocity[:] = moving
         state = state_of(memory)
-        assert intake.take_in_measurement(memory, state, GAINS)
-        assert intake.take_in_measurement(memory, state, GAINS) == (not any(moving))
+        assert input_validation.take_in_measurement(memory, state, GAINS)
+        assert input_validation.take_in_measurement(memory, state, GAINS) == (not any(moving))
         for which in (0, 1, 2):  # one number that differs in its last bit is enough
             position, body = state.position.copy(), state.velocity_body.copy()
             position[which] = np.nextafter(position[which], np.inf)
             other = copy.deepcopy(memory)
-            assert intake.take_in_measurement(other, state._replace(position=position), GAINS)
+            assert input_validation.take_in_measurement(other, state._replace(position=position), GAINS)
             body[which] = np.nextafter(body[which], np.inf)
             other = copy.deepcopy(memory)
-            assert intake.take_in_measurement(other, state._replace(velocity_body=body), GAINS)
+            assert input_validation.take_in_measurement(other, state._replace(velocity_body=body), GAINS)
 
 
 @pytest.mark.parametrize(
@@ -200,20 +200,20 @@ def test_what_repeats_itself_to_the_last_bit_while_moving_is_not_believed():
 )  # fmt: skip
 def test_what_no_vehicle_can_have_is_not_believed(change):
     fresh, memory = law_for([]).memory, begun()
-    assert not intake.take_in_measurement(memory, state_of(memory, **change), GAINS)
-    assert not intake.take_in_measurement(fresh, state_of(memory, **change), GAINS)
+    assert not input_validation.take_in_measurement(memory, state_of(memory, **change), GAINS)
+    assert not input_validation.take_in_measurement(fresh, state_of(memory, **change), GAINS)
     assert fresh.observed.silence[0] < 0.0
-    assert intake.take_in_measurement(fresh, state_of(memory, quaternion=0.999 * ATTITUDE), GAINS)
+    assert input_validation.take_in_measurement(fresh, state_of(memory, quaternion=0.999 * ATTITUDE), GAINS)
 
 
 def test_an_estimate_that_was_led_away_is_forgotten():
     memory = begun()
     memory.observed.position[1], memory.suspicion.ratio[2] = 2e6, 5.0
     bad = state_of(memory, position=np.full(3, np.nan))
-    assert not intake.take_in_measurement(memory, bad, GAINS)
+    assert not input_validation.take_in_measurement(memory, bad, GAINS)
     assert memory.observed.silence[0] == -1.0
     assert not memory.observed.position.any() and not memory.suspicion.ratio.any()
-    assert intake.take_in_measurement(memory, state_of(memory), GAINS)
+    assert input_validation.take_in_measurement(memory, state_of(memory), GAINS)
 
 
 def test_what_is_said_for_long_is_believed_in_the_end():
@@ -221,21 +221,21 @@ def test_what_is_said_for_long_is_believed_in_the_end():
     elsewhere = state_of(memory, position=np.array([30.0, 2.0, 3.0]))
     for silence, begins in ((1.0, False), (GAINS.coast + 0.1, True)):
         memory.observed.silence[0] = silence
-        assert not intake.take_in_measurement(memory, elsewhere, GAINS)
+        assert not input_validation.take_in_measurement(memory, elsewhere, GAINS)
         assert (memory.observed.position[0] == 30.0) == begins
         elsewhere.velocity_body[0] += 1e-6
 
 
 def test_weights_and_health_are_taken_for_what_they_can_be():
     believed = np.empty(4)
-    intake.believe_weights(np.array([-1.0, 0.3, 2.0, np.nan]), believed)
+    input_validation.sanitize_weights(np.array([-1.0, 0.3, 2.0, np.nan]), believed)
     assert believed.tolist() == [0.0, 0.3, 1.0, 1.0]
     memory = law_for([]).memory
-    intake.take_in_thrusters(memory, np.ones(8), 2)
+    input_validation.take_in_thrusters(memory, np.ones(8), 2)
     assert np.flatnonzero(memory.thrusters.health == 0.0).tolist() == [2]
     told = np.array([1.0, -1.0, 1.0, np.nan, 1.0, 1.0, 1.0, 0.5])
-    assert intake.says_more(told, memory.told, memory.thrusters.health)
-    intake.take_in_thrusters(memory, told, -1)
+    assert input_validation.says_more(told, memory.told, memory.thrusters.health)
+    input_validation.take_in_thrusters(memory, told, -1)
     assert np.flatnonzero(memory.thrusters.health == 0.0).tolist() == [1, 2]
-    assert not intake.says_more(told, memory.told, memory.thrusters.health)
+    assert not input_validation.says_more(told, memory.told, memory.thrusters.health)
     assert np.array_equal(memory.quaternion, LEVEL)

@@ -5,7 +5,7 @@ import copy
 import numpy as np
 import pytest
 
-from controller.laws.deployable import attitude, barrier, guide, intake, law, model, observer
+from controller.laws.deployable import attitude, barrier, input_validation, law, model, observer, path_planner
 from controller.laws.deployable.attraction import wanted_acceleration, wanted_velocity
 from controller.laws.deployable.gains import DeployableGains
 from controller.laws.deployable.quadratic_program import solve
@@ -20,14 +20,14 @@ ALL = [*REGIONS, Region("face", Orientation((0.98, 0.0, 0.0, 0.2), 0.1), "in")]
 def expected(memory, state, goal, regions, weights):
     """Return what the second half of a step should write, from the memory before it."""
     thrusters, dynamics, seen = memory.thrusters, memory.dynamics, memory.observed
-    intake.take_in_measurement(memory, state, GAINS)
+    input_validation.take_in_measurement(memory, state, GAINS)
     R, omega = rotation_matrix(memory.quaternion), memory.omega
     wanted, acceleration, free, moment = np.empty(3), np.empty(3), np.empty(6), np.empty(3)
-    guide.improve(memory.guide, seen.position, goal, regions, GAINS, 0.02)
+    path_planner.improve(memory.guide, seen.position, goal, regions, GAINS, 0.02)
     wanted_velocity(memory.guide, seen.position, goal.velocities[0], GAINS, wanted)
     wanted_acceleration(wanted, seen.velocity, GAINS, acceleration)
     model.free_acceleration(dynamics, R, seen.velocity, omega, seen.water, seen.restoring[0], free)
-    attitude.carry(memory.attitude, dynamics, R, seen.velocity, seen.water)
+    attitude.propagate(memory.attitude, dynamics, R, seen.velocity, seen.water)
     attitude.free_turning(memory.attitude, dynamics, memory.quaternion, omega, free[3:])
     velocity = np.r_[seen.velocity, omega]
     barrier.look(memory.sight, regions, seen.position, memory.quaternion, velocity)

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from controller.laws.deployable import guide as way_round
+from controller.laws.deployable import path_planner as way_round
 from controller.laws.deployable import search
 from controller.laws.deployable.gains import DeployableGains
-from controller.laws.deployable.guide import CORNERS, cost_of, guide_of_nothing, improve, nearest_end, uniform
+from controller.laws.deployable.path_planner import CORNERS, cost_of, guide_of_nothing, improve, nearest_end, uniform
 from controller.regions import Box, DepthBand, Orientation, Region, Sphere, clearance_at, pack
 
 GAINS = DeployableGains()

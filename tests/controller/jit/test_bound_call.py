@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from numba.core import config
 
-from controller.jit.bound_call import Repeated
-from controller.jit.jit import compiled, lean
+from controller.jit.bound_call import BoundCall
+from controller.jit.jit import compiled, jit_noalloc
 
 pytestmark = pytest.mark.skipif(config.DISABLE_JIT, reason="is not compiled")
 
@@ -25,7 +25,7 @@ class Parts(NamedTuple):
     rest: tuple
 
 
-@lean
+@jit_noalloc
 def _mix(parts, factor, out):
     out[0] = parts.scale * factor * parts.vector.sum()
     out[1] = parts.steps + parts.count[parts.count.size - 1]
@@ -44,7 +44,7 @@ def _grow(values, by):
     values += np.ones(values.size) * by  # an array of its own: references are counted
 
 
-@lean
+@jit_noalloc
 def _refuse(values):
     if values[0] > 2.0:
         raise ValueError("more than two")
@@ -66,7 +66,7 @@ def parts():
 
 def test_every_kind_of_argument_comes_as_it_was():
     mine, theirs, out, expected = parts(), parts(), np.zeros(5), np.zeros(5)
-    call = Repeated(_mix)
+    call = BoundCall(_mix)
     for turn in range(6):
         call(mine, 1.5, out)
         _mix.py_func(theirs, 1.5, expected)
@@ -77,7 +77,7 @@ def test_every_kind_of_argument_comes_as_it_was():
 
 
 def test_it_is_the_repeated_call_that_is_bound():
-    call, factor = Repeated(_grow), 2.0
+    call, factor = BoundCall(_grow), 2.0
     values = np.zeros(3)
     for _ in range(2):
         call(values, factor)
@@ -87,7 +87,7 @@ def test_it_is_the_repeated_call_that_is_bound():
 
 
 def test_other_arguments_are_never_taken_for_those_before():
-    call, factor = Repeated(_grow), 1.0
+    call, factor = BoundCall(_grow), 1.0
     arrays = [np.zeros(n) for n in (3, 3, 1, 1)]
     for turn in range(12):
         for k, values in enumerate(arrays):
@@ -98,7 +98,7 @@ def test_other_arguments_are_never_taken_for_those_before():
 
 
 def test_what_is_bound_stays_where_it_is_and_no_more_of_it_than_a_few():
-    call = Repeated(_grow)
+    call = BoundCall(_grow)
     for n in range(1, 40):
         values = np.zeros(n)
         for _ in range(4):
@@ -110,7 +110,7 @@ def test_what_is_bound_stays_where_it_is_and_no_more_of_it_than_a_few():
 
 
 def test_what_is_raised_comes_through():
-    call, values = Repeated(_refuse), np.zeros(1)
+    call, values = BoundCall(_refuse), np.zeros(1)
     for _ in range(3):
         call(values)
     with pytest.raises(ValueError, match="more than two"):
@@ -121,7 +121,7 @@ def test_what_is_raised_comes_through():
 
 
 def test_wrong_numbers_of_arguments_are_refused():
-    call, values = Repeated(_refuse), np.zeros(1)
+    call, values = BoundCall(_refuse), np.zeros(1)
     for _ in range(3):
         call(values)
     for arguments in ((), (values, values)):
@@ -131,14 +131,14 @@ def test_wrong_numbers_of_arguments_are_refused():
 
 def test_a_plain_function_is_called_as_it_is():
     said = []
-    call = Repeated(said.append)
+    call = BoundCall(said.append)
     for _ in range(4):
         call("so")
     assert said == ["so"] * 4
 
 
 def test_a_copy_has_arrays_of_its_own():
-    call, values = Repeated(_refuse), np.zeros(1)
+    call, values = BoundCall(_refuse), np.zeros(1)
     for _ in range(3):
         call(values)
     twin, others = copy.deepcopy((call, values))

@@ -8,7 +8,7 @@ import pytest
 from numba.core.errors import TypingError
 
 from controller import ControllerError
-from controller.jit.function_pointer import call, entry_of
+from controller.jit.function_pointer import call, pointer_to
 from controller.jit.jit import part
 from controller.regions import Box, DepthBand, Orientation, Region, Sphere, pack
 from cosim.scenario.law_factory import law_of
@@ -57,7 +57,7 @@ def by_address(address, numbers, scale):
 
 @compiled_only
 def test_a_function_called_by_its_address_gives_what_it_gives():
-    address = entry_of(scaled, (np.zeros(2), 0.0))
+    address = pointer_to(scaled, (np.zeros(2), 0.0))
     assert by_address(address, np.array([1.0, 2.0, 4.0]), 3.0) == 22.0
     assert by_address.py_func(0, np.array([1.0, 2.0, 4.0]), 3.0) == 22.0
     assert "scaled" not in next(iter(by_address.inspect_asm().values()))
@@ -65,11 +65,11 @@ def test_a_function_called_by_its_address_gives_what_it_gives():
 
 @compiled_only
 def test_other_arguments_than_the_address_is_for_are_refused():
-    address = entry_of(scaled, (np.zeros(2), 0.0))
+    address = pointer_to(scaled, (np.zeros(2), 0.0))
     with pytest.raises(TypingError, match="by address"):
         by_address(address, np.zeros(4)[::2], 3.0)
     with pytest.raises(TypeError, match="scaled is called by address"):
-        entry_of(scaled, (np.zeros(2), 1))
+        pointer_to(scaled, (np.zeros(2), 1))
 
 
 def test_a_part_can_be_called_from_python_too():

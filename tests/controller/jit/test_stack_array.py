@@ -3,11 +3,11 @@
 import pytest
 from numba.core.errors import TypingError
 
-from controller.jit.jit import lean
+from controller.jit.jit import jit_noalloc
 from controller.jit.stack_array import zeros
 
 
-@lean
+@jit_noalloc
 def filled(x, rounds):
     total = 0.0
     for _ in range(rounds):
@@ -27,4 +27,4 @@ def test_they_are_zeros_each_time_and_do_not_overlap():
 
 def test_a_shape_that_is_not_written_as_numbers_is_refused():
     with pytest.raises(TypingError):
-        lean(lambda n: zeros(n)[0])(3)
+        jit_noalloc(lambda n: zeros(n)[0])(3)

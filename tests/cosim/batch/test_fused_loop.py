@@ -11,9 +11,9 @@ import pytest
 
 from controller import LAWS, Allocation, PrintedLaw, VehicleState
 from cosim.batch import fused_loop
-from cosim.batch.c_calls import Clock, advance, seconds
+from cosim.batch.c_calls import Clock, fmi_do_step, seconds
 from cosim.campaigns.scenes.flyer import Conditions, SceneFlyer
-from cosim.campaigns.scenes.scene import Ball, Failure, Obstacle, plant_values, read_scenes, told
+from cosim.campaigns.scenes.scene import Failure, Obstacle, SphereSpec, plant_values, read_scenes, told
 from cosim.errors import RunError, ScenarioError
 from cosim.scenario.scenario import CRITERIA
 from cosim.scenario.vehicle_model import vehicle_model
@@ -145,7 +145,7 @@ def test_a_plant_that_flew_before_flies_as_a_new_one(flyer):
 
 
 def test_reached_means_inside_for_the_last_seconds_and_reach_time_is_since_when(flyer):
-    around = replace(PLAIN[0], goal=Ball(PLAIN[0].start, 50.0))  # it starts inside and never leaves
+    around = replace(PLAIN[0], goal=SphereSpec(PLAIN[0].start, 50.0))  # it starts inside and never leaves
     score, _ = flyer.fly(around)
     assert score.reach_time == 0.0 and not score.reached  # 8 s are less than 10
     with SceneFlyer("printed", replace(SHORT, settled=8.0)) as patient:
@@ -155,7 +155,7 @@ def test_reached_means_inside_for_the_last_seconds_and_reach_time_is_since_when(
 
 
 def test_reach_time_is_the_first_instant_of_the_stay(flyer):
-    scene = replace(PLAIN[0], goal=Ball(PLAIN[0].goal.centre, 9.0), obstacles=PLAIN[0].obstacles[:1])
+    scene = replace(PLAIN[0], goal=SphereSpec(PLAIN[0].goal.centre, 9.0), obstacles=PLAIN[0].obstacles[:1])
     score, _ = flyer.fly(scene)
     _, positions, _, _ = Readable(scene, SHORT).fly()
     outside = np.linalg.norm(positions - np.array(scene.goal.centre), axis=1) > 9.0
@@ -293,7 +293,7 @@ def test_do_step_gets_its_arguments_and_its_results_are_heeded(status, ends, goe
     address = ctypes.cast(do_step, ctypes.c_void_p).value
     results = np.zeros(4, np.int64)
     native = Native(1234, 0, 0, address, np.zeros(0, np.uint32), none, np.zeros(0, np.uint32), none, results)
-    assert advance(native, 1.5, 0.25) == goes_on
+    assert fmi_do_step(native, 1.5, 0.25) == goes_on
     assert came == [(1234, 1.5, 0.25, True)]
     assert results[3:].view(float)[0] == 1.75
 

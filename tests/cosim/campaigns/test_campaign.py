@@ -98,10 +98,10 @@ def test_what_is_interrupted_goes_on_without_losing_or_repeating(tmp_path, scene
     assert not (tmp_path / "out" / PARTS).exists()
 
 
-@pytest.mark.parametrize("at", ["join", "write_whole"])
+@pytest.mark.parametrize("at", ["join", "write_atomic"])
 def test_killed_at_the_end_nothing_is_flown_again(tmp_path, scenes, monkeypatch, at):
     with monkeypatch.context() as patch:
-        where = (CampaignFolder, "remove_parts") if at == "join" else (module, "write_whole")
+        where = (CampaignFolder, "remove_parts") if at == "join" else (module, "write_atomic")
         patch.setattr(*where, lambda *_: (_ for _ in ()).throw(KeyboardInterrupt))
         with pytest.raises(KeyboardInterrupt):
             run_campaign(scenes, "printed", tmp_path / "out", BRIEF)

@@ -8,7 +8,7 @@ import pytest
 from cosim.campaigns.workers import batch_sizing as module
 from cosim.campaigns.workers.batch_sizing import Batch, Batches
 from cosim.campaigns.workers.dispatch import fly_all
-from cosim.campaigns.workers.worker_pools import FATAL, Death
+from cosim.campaigns.workers.worker_pools import FATAL, WorkerCrash
 from cosim.errors import RunError
 
 
@@ -25,7 +25,7 @@ class Work:
         return [-row]
 
 
-class Crew:
+class WorkerPool:
     """Flies in order of submission; dies of some rows."""
 
     def __init__(self, poison=(), width=4, certain=True):
@@ -43,77 +43,77 @@ class Crew:
         self.most = max(self.most, len(self.under_way))
         return flight
 
-    def settle(self, flight):
+    def result(self, flight):
         self.under_way.remove(flight)
         if self.poison & set(flight.rows):
             self.deaths.append(flight.rows)
             if not self.certain:  # everything that was under way is under suspicion
                 for other in self.under_way:
-                    other.suspect = True
-            return Death(1, self.certain)
+                    other.detect_fault = True
+            return WorkerCrash(1, self.certain)
         if getattr(flight, "suspect", False):
-            return Death(1, certain=False)
+            return WorkerCrash(1, certain=False)
         return flight.rows, 0.01 * len(flight.rows)
 
     def close(self):
         pass
 
 
-def flown(crew, n=200):
-    return sorted(row for table in fly_all(Work(), Batches(np.arange(n)), crew) for row in table)
+def flown(pool, n=200):
+    return sorted(row for table in fly_all(Work(), Batches(np.arange(n)), pool) for row in table)
 
 
 def test_every_row_comes_home_once():
-    crew = Crew()
-    assert flown(crew) == list(range(200))
-    assert crew.sent[0] == [0] and crew.most == 4
-    assert sum(len(batch) for batch in crew.sent) == 200
+    pool = WorkerPool()
+    assert flown(pool) == list(range(200))
+    assert pool.sent[0] == [0] and pool.most == 4
+    assert sum(len(batch) for batch in pool.sent) == 200
 
 
 @pytest.mark.parametrize("certain", [True, False])
 @pytest.mark.parametrize("poison", [{77}, {60, 61, 150}, {1}, {199}, {0}])
 def test_rows_that_kill_are_found_and_refused_and_no_others(poison, certain):
-    crew = Crew(poison, certain=certain)
-    found = flown(crew)
+    pool = WorkerPool(poison, certain=certain)
+    found = flown(pool)
     zero = {0} & poison  # refused as -0
     assert found == sorted([-p for p in poison] + [row for row in range(200) if row not in poison])
     for row in poison - zero:
-        assert any(batch == [row] for batch in crew.deaths)
-    assert len(crew.deaths) <= len(poison) * (FATAL + 8) * (1 if certain else 2)
+        assert any(batch == [row] for batch in pool.deaths)
+    assert len(pool.deaths) <= len(poison) * (FATAL + 8) * (1 if certain else 2)
 
 
 def test_what_is_not_certain_to_kill_is_flown_while_nothing_else_is():
-    crew = Crew({77}, certain=False)
+    pool = WorkerPool({77}, certain=False)
     alone = []
-    submit = crew.submit
+    submit = pool.submit
 
     def watched(task, batch):
-        if 77 in batch and crew.deaths:
-            alone.append(not crew.under_way)
+        if 77 in batch and pool.deaths:
+            alone.append(not pool.under_way)
         return submit(task, batch)
 
-    crew.submit = watched
-    flown(crew)
+    pool.submit = watched
+    flown(pool)
     assert alone and all(alone)
 
 
 def test_a_death_by_chance_costs_nobody_a_row():
-    class Unlucky(Crew):
-        def settle(self, flight):
+    class Unlucky(WorkerPool):
+        def result(self, flight):
             if len(self.sent) in (5, 6) and not self.deaths:
                 self.under_way.remove(flight)
                 self.deaths.append(flight.rows)
-                return Death(1)
-            return super().settle(flight)
+                return WorkerCrash(1)
+            return super().result(flight)
 
     assert flown(Unlucky()) == list(range(200))
 
 
 def test_where_everything_dies_no_row_is_blamed():
     with pytest.raises(RunError, match="processes died one after the other, whatever they flew"):
-        flown(Crew(range(200)))
+        flown(WorkerPool(range(200)))
     with pytest.raises(RunError, match="every process died, whatever it flew"):
-        flown(Crew(range(3)), 3)
+        flown(WorkerPool(range(3)), 3)
 
 
 # ---- batches ----
@@ -163,7 +163,7 @@ def test_towards_the_end_batches_are_shared_out_evenly_but_not_too_small():
 def test_halves_have_all_rows(monkeypatch):
     one, other = Batch(np.arange(7), 1, True).halves(2)
     assert one.rows.tolist() + other.rows.tolist() == list(range(7))
-    assert one.strikes == other.strikes == 2 and one.alone and other.alone
+    assert one.crash_count == other.crash_count == 2 and one.alone and other.alone
 
 
 def test_the_first_batches_take_no_longer_than_a_row(monkeypatch):

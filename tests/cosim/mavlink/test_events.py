@@ -63,13 +63,13 @@ def test_armed_disarmed_and_the_bottom(station):
 
 
 def test_a_long_text_comes_in_parts(station):
-    vessel = station.autopilot._vessel
+    context = station.autopilot._context
     for length in (50, 51, 100, 101, 150, 500):
         station.wire.clear()
         station.now += 10.0
         station.autopilot.tick(station.now)
         station.wire.clear()
-        vessel.say("x" * length)
+        context.say("x" * length)
         parts = station.wire.of("STATUSTEXT")
         assert "".join(part.text for part in parts) == "x" * min(length, 200)
         if length > 50:
@@ -82,7 +82,7 @@ def test_a_long_text_comes_in_parts(station):
 
 def test_who_says_too_much_is_not_heard(station):
     for i in range(100):
-        station.autopilot._vessel.say(f"line {i}")
+        station.autopilot._context.say(f"line {i}")
     assert len(station.wire.texts) == 12
 
 
@@ -167,7 +167,7 @@ def test_time_and_action_are_parameters():
 
 def test_an_action_that_finds_the_queue_full_is_tried_again():
     station = commanding("disarm")
-    while station.commands.give(Arm(True)):
+    while station.commands.submit(Arm(True)):
         pass
     station.wait(6.0)
     assert Arm(False) not in station.commanded()

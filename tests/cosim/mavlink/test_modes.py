@@ -98,7 +98,7 @@ def test_available_modes_say_what_can_be_set(station):
     assert station.command(512, 435, 0) == ACCEPTED
     modes = station.wire.of("AVAILABLE_MODES")
     assert [(m.number_modes, m.mode_index) for m in modes] == [(5, i) for i in range(1, 6)]
-    profile = PROFILES[station.autopilot._vessel.options.profile]
+    profile = PROFILES[station.autopilot._context.options.profile]
     upload(station)
     station.commanded()
     for message in modes:
@@ -114,7 +114,7 @@ def test_available_modes_say_what_can_be_set(station):
 
 
 def test_the_mode_shown_is_that_of_the_snapshot(station):
-    numbers = PROFILES[station.autopilot._vessel.options.profile].numbers
+    numbers = PROFILES[station.autopilot._context.options.profile].numbers
     station.command(262, 1)  # hold
     station.command(512, 436)
     mode = station.wire.of("CURRENT_MODE")[-1]
@@ -189,7 +189,7 @@ def test_read_only_refuses():
 
 
 def upload(station):
-    home = int(station.autopilot._vessel.profile.home_is_first)
+    home = int(station.autopilot._context.profile.home_is_first)
     station.send(mavlink.MAVLink_mission_count_message(1, 1, 1 + home, 0))
     for seq in range(1 + home):
         station.send(mavlink.MAVLink_mission_item_int_message(1, 1, seq, 1, 16, 0, 1, 0, 0, 0, 0, 10_000, 0, 2.0, 0))

@@ -74,14 +74,14 @@ def test_parameters_take_effect(flight):
     assert flight.master.law.gains.speed == 0.7
     settings = flight.master.command_handler.settings
     assert settings.shapes["SR1"].radius == 0.4 and settings["plant.parameters.thrust_max[1]"] == 20.0
-    assert [(s.key, s.value) for s in settings] == [(s.key, s.value) for s in flight.autopilot._vessel.settings]
+    assert [(s.key, s.value) for s in settings] == [(s.key, s.value) for s in flight.autopilot._context.settings]
 
 
 def test_an_obstacle_counts(flight):
     flight.fly(0.1)
     flight.send(obstacle(place=(4.0, 0.0, 3.0)))
     flight.fly(0.1)
-    view = flight.autopilot._vessel.view
+    view = flight.autopilot._context.view
     here = np.array(view.position_ned)
     assert view.clearances[4] == pytest.approx(np.linalg.norm(here - [4.0, 0.0, 3.0]) - 0.5)
 
@@ -142,4 +142,4 @@ def test_no_parameter_ends_the_run(flight, value):
         flight.wire.clear()
     flight.fly(0.02)
     settings = flight.master.command_handler.settings
-    assert [(s.key, s.value) for s in settings] == [(s.key, s.value) for s in flight.autopilot._vessel.settings]
+    assert [(s.key, s.value) for s in settings] == [(s.key, s.value) for s in flight.autopilot._context.settings]

@@ -131,7 +131,7 @@ def test_no_setting_is_hidden_by_a_name_that_stations_look_for(name):
     keys = [setting.key for setting in LiveSettings(scenario(name=name))]
     taken = set(parameter_names(keys).values())
     for profile in ("ardusub", "px4"):
-        assert not taken & set(station_parameters(Station(profile).autopilot._vessel))
+        assert not taken & set(station_parameters(Station(profile).autopilot._context))
 
 
 def test_a_flood_of_requests_makes_one_list(station):

@@ -23,7 +23,7 @@ def station():
 
 
 def run(station, seconds, step=0.01, **values):
-    start = station.autopilot._vessel.view.boot_us / 1e6
+    start = station.autopilot._context.view.boot_us / 1e6
     station.wire.clear()
     for k in range(1, round(seconds / step) + 1):
         station.look(start + step * k, **values)

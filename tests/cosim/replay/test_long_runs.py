@@ -17,7 +17,7 @@ from cosim.replay.events import _Few
 from cosim.replay.trace import trace_of
 from cosim.report.contents import contents_of
 from cosim.report.figures.sampled_rows import story_of
-from cosim.report.figures.style import Story
+from cosim.report.figures.style import FigureData
 from cosim.results.extremes import even_edges, extreme_rows
 from cosim.results.record import Record
 from cosim.results.run_result import load_run
@@ -114,7 +114,7 @@ def test_every_figure_of_a_long_run_is_drawn(name, run_of, streamed, monkeypatch
 
     monkeypatch.setattr("cosim.report.figures.sampled_rows._MOST", 2000)
     run = run_of(name)
-    stories = Story(run.scenario, run.record, run.summary), story_of(streamed(run))
+    stories = FigureData(run.scenario, run.record, run.summary), story_of(streamed(run))
     whole, few = ([drawing.name for drawing in drawings(story)] for story in stories)
     assert whole == few
 

@@ -9,7 +9,7 @@ from matplotlib.text import Text
 
 from cosim.report.figures.axes_box import Box
 from cosim.report.figures.figures import drawings
-from cosim.report.figures.style import Story, features_of, legend_columns, places_of, shifts_of
+from cosim.report.figures.style import FigureData, features_of, legend_columns, places_of, shifts_of
 from cosim.results.record import load_record
 from cosim.results.wording import verdict
 from cosim.run.run import run_scenario
@@ -19,7 +19,7 @@ from cosim.scenario.scenario import load_scenario
 def story_of(folder, name, *overrides):
     scenario = load_scenario(name, [*overrides, "time.duration=2.0"])
     run = run_scenario(scenario, folder, report=False)
-    return Story(scenario, load_record(run.folder), run.summary)
+    return FigureData(scenario, load_record(run.folder), run.summary)
 
 
 @pytest.fixture(scope="module")
@@ -59,15 +59,15 @@ def test_what_moved_is_drawn_where_it_began_where_it_ended_and_where_it_mattered
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["inspection", "drifting"])
 def test_every_figure_can_be_drawn(request, name):
-    story = request.getfixturevalue(name)
-    figures = {drawing.name: drawing for drawing in drawings(story)}
+    data = request.getfixturevalue(name)
+    figures = {drawing.name: drawing for drawing in drawings(data)}
     assert "faint" in figures["path-plane"].caption
     labels = [ax.get_ylabel() for ax in figures["clearance"].figure.axes]
     assert labels == (["clearance [m]", "clearance [°]"] if name == "inspection" else ["clearance [m]"])
     (error,) = figures["position-error"].figure.axes
     drawn = error.lines[0].get_ydata()
-    centre = np.array(story.scenario.goal.centre) + shifts_of(story.record, "goal")
-    path = story.record.stack(["position.x", "position.y", "position.z"])
+    centre = np.array(data.scenario.goal.centre) + shifts_of(data.record, "goal")
+    path = data.record.stack(["position.x", "position.y", "position.z"])
     assert drawn == pytest.approx(np.linalg.norm(path - centre, axis=1) / np.sqrt(3.0))
 
 

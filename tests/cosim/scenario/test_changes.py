@@ -18,7 +18,7 @@ from cosim.report.contents import contents_of
 from cosim.results.run_result import load_run
 from cosim.run.run import run_scenario
 from cosim.run.run_folder import report_again
-from cosim.scenario.law_factory import flown_by
+from cosim.scenario.law_factory import with_custom_law
 from cosim.scenario.scenario import load_scenario
 from cosim.scenario.toml_file import shipped_scenarios
 from cosim.sitl.scenario import scenario_to_fly
@@ -160,7 +160,7 @@ def test_the_title_says_who_flew_if_no_law_of_ours():
     def rest(*_):
         return np.zeros(6)
 
-    own = flown_by(FunctionLaw(rest), load_scenario("paper-limited", ["limit.force=500"]))
+    own = with_custom_law(FunctionLaw(rest), load_scenario("paper-limited", ["limit.force=500"]))
     assert own.title == f"{LIMITED} (flown by {own.law.name}; changed: limit.force = 500 N)"
     assert (
         scenario_to_fly("sitl", [], None, 400, "ardupilot").title == "Open water for an autopilot (flown by ardupilot)"

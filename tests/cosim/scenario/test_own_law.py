@@ -14,7 +14,7 @@ from cosim.precheck.precheck import check
 from cosim.results.record import load_record
 from cosim.results.run_result import load_run
 from cosim.run.run import run_scenario
-from cosim.scenario.law_factory import flown_by, law_of
+from cosim.scenario.law_factory import law_of, with_custom_law
 from cosim.scenario.scenario import load_scenario
 from cosim.simulation.master import Master
 
@@ -85,7 +85,7 @@ def test_the_file_of_such_a_run_is_read_but_not_run(scenario, named, tmp_path):
 def test_a_sweep_refuses_it(scenario, named, engine, tmp_path):
     design = Design(vary_from(["initial.position.1=-1:1"]), samples=2)
     with pytest.raises(RunError, match=r"law\.name is "):
-        run_sweep(flown_by(named, scenario), design, tmp_path / "sweep", engine)
+        run_sweep(with_custom_law(named, scenario), design, tmp_path / "sweep", engine)
 
 
 def test_what_it_breaks_off_with_is_left_readable(scenario, tmp_path):

@@ -16,7 +16,7 @@ from cosim.ssp.system import MOTION, WRENCH
 from fuzzy_arbiter import Arbiter
 from plant_fmu import PlantError, cached_fmu
 from plant_fmu.check import check_fmu
-from plant_fmu.running.slave import Slave
+from plant_fmu.running.co_simulation_instance import CoSimulationInstance
 from tests.cosim.ssp.jacobi import Parts
 
 ALL_SHAPES = Path(__file__).parent / "all-shapes.toml"
@@ -35,13 +35,13 @@ def scenario():
 
 @pytest.fixture
 def controller(scenario, fmi):
-    with Slave(cached_fmu(controller_component(scenario), fmi)) as slave:
+    with CoSimulationInstance(cached_fmu(controller_component(scenario), fmi)) as slave:
         yield slave
 
 
 @pytest.fixture
 def arbiter(scenario, fmi):
-    with Slave(cached_fmu(arbiter_component(scenario), fmi)) as slave:
+    with CoSimulationInstance(cached_fmu(arbiter_component(scenario), fmi)) as slave:
         yield slave
 
 

@@ -22,7 +22,7 @@ from cosim.scenario.scenario import load_scenario
 from cosim.simulation.master import Master
 from cosim.ssp import package_system
 from cosim.ssp.system import MOTION
-from plant_fmu.running.slave import Slave
+from plant_fmu.running.co_simulation_instance import CoSimulationInstance
 from tests.cosim.ssp.masters import fmpy as run_in_fmpy
 
 ROOT = Path(__file__).parents[3]
@@ -152,7 +152,7 @@ def test_units_of_both_ends_are_one(packed):
 def test_the_plant_starts_as_the_scenario_says(packed, tmp_path):
     with zipfile.ZipFile(packed) as archive:
         archive.extract("resources/plant.fmu", tmp_path)
-    with Slave(tmp_path / "resources" / "plant.fmu") as plant:
+    with CoSimulationInstance(tmp_path / "resources" / "plant.fmu") as plant:
         plant.initialise()
         got = {name: plant[name] for name in ("position.x", "quaternion.e2", "velocity.u", "current.y", "weight")}
         assert got == {"position.x": 0.5, "quaternion.e2": 0.6, "velocity.u": 0.1, "current.y": -0.05, "weight": 1230.0}

@@ -227,7 +227,7 @@ def test_what_has_no_closed_form_is_said(rules, words):
         Arbiter(system=system, engine="closed")
     automatic = Arbiter(system=system)
     assert automatic.engine == "exact"
-    assert words in automatic.why
+    assert words in automatic.engine_reason
 
 
 def test_terms_that_are_no_complements_are_not_taken_for_them():
@@ -318,7 +318,7 @@ def test_a_proof_that_would_be_too_long_is_given_up_soon():
         Rule(Is("v0", "on"), output["low"]),
     )
     arbiter = Arbiter(system=System(variables, (output,), rules))  # at once, or the limit on the time of a test ends it
-    assert "more than 512 clauses" in arbiter.why
+    assert "more than 512 clauses" in arbiter.engine_reason
 
 
 OFF_ON = (Term("off", falling(0, 1)), Term("on", rising(0, 1)))
@@ -354,7 +354,7 @@ def test_terms_of_which_only_one_is_the_other_s_complement_to_the_last_bit(order
     output = Output("y", (0, 1), (Term("low", falling(0, 1)), Term("high", rising(0, 1))))
     rules = ("if x is on then y is high", "if x is off then y is low")
     arbiter = Arbiter(system=System((Variable("x", (0, 1), terms),), (output,), rules))
-    assert "'low' is not 1 minus that of 'high'" in arbiter.why
+    assert "'low' is not 1 minus that of 'high'" in arbiter.engine_reason
 
 
 def test_rules_that_add_nothing_hinder_no_closed_form():

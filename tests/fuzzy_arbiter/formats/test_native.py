@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from fuzzy_arbiter import Output, Term, UnsupportedError, falling, prioritised, rising, trapezoid, triangle
 from fuzzy_arbiter.engines.exact import ExactEngine
-from fuzzy_arbiter.formats import FORMATS, natively, reads, writes
+from fuzzy_arbiter.formats import FORMATS, fold_normalization, reads, writes
 from fuzzy_arbiter.formats.native import range_ends
 
 EPS = np.finfo(float).eps
@@ -27,7 +27,7 @@ def weight(pair, universe=(0.0, 1.0), default=None):
 
 
 def test_triangles_reach_one_width_further_on_both_sides():
-    output = natively(prioritised()).outputs[0]
+    output = fold_normalization(prioritised()).outputs[0]
     assert output.universe == (-1.0, 2.0)
     assert [term.shape for term in output.terms] == [falling(-1, 2), rising(-1, 2)]
 
@@ -40,41 +40,41 @@ def test_the_ends_are_exact():
 @given(st.lists(st.floats(0, 1), min_size=3, max_size=3))
 def test_its_centroids_are_the_weights(pair, memberships):
     system = prioritised(weight=weight(pair))
-    centroids = ExactEngine(natively(system)).weights(memberships)
+    centroids = ExactEngine(fold_normalization(system)).weights(memberships)
     assert np.clip(centroids, 0, 1) == pytest.approx(ExactEngine(system).weights(memberships), abs=16 * EPS)
 
 
 def test_a_default_is_mapped_and_held_within_the_range():
     for default, mapped in ((0.5, 0.5), (0.0, 0.0), (1.0, 1.0), (0.4, 0.2)):
-        output = natively(prioritised(weight=weight("triangles", default=default))).outputs[0]
+        output = fold_normalization(prioritised(weight=weight("triangles", default=default))).outputs[0]
         assert output.default == pytest.approx(mapped, abs=EPS)
 
 
 def test_what_has_no_normalisation_stays():
     system = prioritised(normalisation="none")
-    assert natively(system) is system
+    assert fold_normalization(system) is system
 
 
 @pytest.mark.parametrize("normalisation", ["sum", "max"])
 def test_a_normalisation_over_all_outputs_is_refused(normalisation):
     with pytest.raises(UnsupportedError, match=f"no universe can say the normalisation '{normalisation}'"):
-        natively(prioritised(normalisation=normalisation))
+        fold_normalization(prioritised(normalisation=normalisation))
 
 
 def test_terms_with_one_centroid_are_refused():
     twin = Output("w", (0, 1), (Term("low", triangle(0, 0.5, 1)), Term("high", trapezoid(0, 0.4, 0.6, 1))))
     with pytest.raises(UnsupportedError, match=r"output 'w_1': its terms have one centroid, 0\.5"):
-        natively(prioritised(weight=twin))
+        fold_normalization(prioritised(weight=twin))
 
 
 def test_terms_too_close_for_floating_point_are_refused():
     near = Output("w", (0, 1), (Term("low", falling(0, 1e-200)), Term("high", falling(0, 2e-200))), 1e300)
     with pytest.raises(UnsupportedError, match="too far apart, or too close"):
-        natively(prioritised(weight=near))
+        fold_normalization(prioritised(weight=near))
 
 
 @pytest.mark.parametrize("format", FORMATS)
 def test_every_format_can_say_it(format):
-    system = natively(prioritised(form="minimal"))
+    system = fold_normalization(prioritised(form="minimal"))
     assert reads(writes(system, format), format) == system
     assert reads(writes(system, format), format) == replace(system, normalisation="none")

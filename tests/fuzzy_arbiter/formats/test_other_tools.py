@@ -9,7 +9,7 @@ import pytest
 
 from fuzzy_arbiter import Output, Shape, System, Term, Variable, falling, prioritised, rising, trapezoid, triangle
 from fuzzy_arbiter.engines.exact import ExactEngine
-from fuzzy_arbiter.formats import FORMATS, load, natively, writes
+from fuzzy_arbiter.formats import FORMATS, fold_normalization, load, writes
 from tests.fuzzy_arbiter.formats.other_tools import DATA, TOOLS
 from tests.fuzzy_arbiter.formats.systems import TIPPING
 
@@ -88,7 +88,7 @@ WILD = replace(
         WILD,
         replace(WILD, conjunction="prod", disjunction="probor"),
         prioritised(outside="clip", points=1000),
-        natively(prioritised(points=1000)),
+        fold_normalization(prioritised(points=1000)),
     ],
     ids=["plain", "scaled", "wild", "product", "prioritised", "natively"],
 )

@@ -15,7 +15,7 @@ from controller.laws import LAWS
 from cosim.campaigns import vary_from
 from cosim.campaigns.scenes.law_gains import gains_from
 from cosim.live.address import parse_live, stranger
-from cosim.live.command_desk import LONGEST, Desk
+from cosim.live.command_desk import LONGEST, CommandDesk
 from cosim.live.messages import bytes_of, text_of
 from cosim.live.watching import looks, picture
 from cosim.mavlink.listening import Watch
@@ -40,11 +40,11 @@ from tests.security.fuzzing.registry import Case, Seeds, reader
 # ---- the live page -------------------------------------------------------------------------------------------------
 
 
-@reader("command of a viewer", "json", "cosim.live.command_desk:Desk.take")
+@reader("command of a viewer", "json", "cosim.live.command_desk:CommandDesk.take")
 def command(seeds: Seeds) -> Case:
     scenario = load_scenario("paper", ["commands.enabled=true", "commands.obstacles=2"])
     queue = CommandQueue()
-    desk = Desk(scenario, queue, lambda name: True)
+    desk = CommandDesk(scenario, queue, lambda name: True)
 
     def read(content: bytes) -> None:
         try:

@@ -5,14 +5,14 @@ import pytest
 
 from cosim.campaigns.scenes.as_scenario import scene_scenario
 from cosim.campaigns.scenes.flyer import Conditions, SceneFlyer
-from cosim.campaigns.scenes.scene import Ball, Failure, Noise, Obstacle, Scene
+from cosim.campaigns.scenes.scene import Failure, Noise, Obstacle, Scene, SphereSpec
 from cosim.simulation.master import Master
 from tests.cosim.simulation.test_master import Keep
 
 SCENE = Scene(
     seed=42,
     start=(0.0, 0.0, 2.0),
-    goal=Ball((4.0, 0.5, 2.5), 0.5),
+    goal=SphereSpec((4.0, 0.5, 2.5), 0.5),
     obstacles=(Obstacle((2.0, 0.1, 2.2), 0.5, (-0.05, 0.05, 0.0)), Obstacle((2.2, 1.4, 2.4), 0.4)),
     depth_band=(0.3, 7.0),
     current=(0.1, -0.2, 0.0),

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from cosim.results.as_flown import as_it_came
+from cosim.results.as_flown import scenario_as_flown
 from cosim.results.record import load_record
 from cosim.run.run import run_scenario
 from cosim.scenario.scenario import load_scenario
@@ -300,7 +300,7 @@ def test_a_reset_ends_the_run(fly):
     assert len(run.rows) == 71 and run.master.command_handler.reset
 
 
-class Told:
+class KnownScene:
     """Observer that arms after some looks."""
 
     def __init__(self, queue, after, commands):
@@ -310,12 +310,12 @@ class Told:
         self.rows.append(row.copy())
         if len(self.rows) == self.after:
             for command in self.commands:
-                self.queue.give(command)
+                self.queue.submit(command)
 
 
 def test_nothing_moves_before_it_is_armed_and_the_wait_repeats_to_the_last_bit(fly, tmp_path):
     queue = CommandQueue()
-    told = Told(queue, 5, [ChangeSetting("law.gains.speed", 0.5), SetMode("hold"), Arm(True), SetMode("reach")])
+    told = KnownScene(queue, 5, [ChangeSetting("law.gains.speed", 0.5), SetMode("hold"), Arm(True), SetMode("reach")])
     await_arm = ["commands.await_arm=true", "time.duration=3"]
     live = fly(LoggedCommands(queue, tmp_path / "commands.jsonl"), *await_arm, awaiting=told)
     assert len(told.rows) >= 5
@@ -340,7 +340,7 @@ def test_commands_of_a_run_repeat_it_to_the_last_bit(tmp_path):
     for k, command in enumerate(
         [SetTarget((2.0, 1.0, 3.5), 0.3), AddObstacle(3, (1.0, 0.5, 3.2), 0.2), SetHeading(0.4), SetMode("hold")]
     ):
-        queue.give(command)
+        queue.submit(command)
         logged.take(50 * k)
     first = run_scenario(scenario, tmp_path / "first", report=False, commands_log=log)
     again = load_scenario(first.folder / "scenario.toml")
@@ -349,7 +349,7 @@ def test_commands_of_a_run_repeat_it_to_the_last_bit(tmp_path):
     for name in a.units:
         assert np.array_equal(a[name], b[name]), name
     assert (first.folder / "commands.jsonl").read_bytes() == (second.folder / "commands.jsonl").read_bytes()
-    came = as_it_came(scenario, a)
+    came = scenario_as_flown(scenario, a)
     assert [r.region.name for r in came.regions if r.seen] == ["seen 1"]
     assert came.regions[-1].region.shape.radius == pytest.approx(0.2, abs=1e-6)
     assert "seen 2" not in first.summary["min_clearance"]

@@ -68,7 +68,7 @@ def test_the_log_gives_back_every_order_at_its_step(tmp_path_factory, given_comm
     logged = LoggedCommands(queue, file)
     for k in range(10):
         for command in by_step.get(k, []):
-            assert queue.give(command)
+            assert queue.submit(command)
         assert list(logged.take(k)) == by_step.get(k, [])
     if not given_commands:
         assert not file.exists()
@@ -81,20 +81,20 @@ def test_the_log_gives_back_every_order_at_its_step(tmp_path_factory, given_comm
 
 def test_a_flood_is_refused_not_kept():
     queue = CommandQueue()
-    assert all(queue.give(Arm(True)) for _ in range(QUEUED))
-    assert not queue.give(Arm(False))
+    assert all(queue.submit(Arm(True)) for _ in range(QUEUED))
+    assert not queue.submit(Arm(False))
     assert len(queue.take(0)) == QUEUED
 
 
 def test_what_was_meant_for_a_run_that_is_over_is_followed_by_no_other():
     queue = CommandQueue()
-    assert queue.give(Arm(True), run=0)
+    assert queue.submit(Arm(True), run=0)
     queue.end_run()
-    assert not queue.give(Arm(True), run=0)
+    assert not queue.submit(Arm(True), run=0)
     assert queue.run == 1 and not queue.take(0)
-    assert queue.give(Arm(False), run=1) and queue.give(Arm(True))
+    assert queue.submit(Arm(False), run=1) and queue.submit(Arm(True))
     assert queue.take(0) == [Arm(False), Arm(True)]
-    assert queue.give(Arm(False))
+    assert queue.submit(Arm(False))
 
 
 @pytest.mark.parametrize(
@@ -123,7 +123,7 @@ def test_absurd_numbers_are_refused(command):
     with pytest.raises(CommandError, match=r"is .*, expected"):
         validate_command(command)
     with pytest.raises(CommandError):
-        CommandQueue().give(command)
+        CommandQueue().submit(command)
 
 
 @pytest.mark.parametrize(
@@ -163,7 +163,7 @@ def test_no_log_is_one_line(tmp_path):
 
 def test_a_line_of_the_log_reads_well(tmp_path):
     logged = LoggedCommands(queue := CommandQueue(), tmp_path / "log")
-    queue.give(SetTarget((1.0, 2.0, 3.0), 0.5))
+    queue.submit(SetTarget((1.0, 2.0, 3.0), 0.5))
     logged.take(7)
     assert msgspec.json.decode((tmp_path / "log").read_bytes()) == {
         "step": 7,

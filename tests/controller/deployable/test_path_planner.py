@@ -5,10 +5,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from controller.laws.deployable import guide as way_round
+from controller.laws.deployable import path_planner as way_round
 from controller.laws.deployable.attraction import approach_speed, wanted_acceleration, wanted_velocity
 from controller.laws.deployable.gains import DeployableGains
-from controller.laws.deployable.guide import CORNERS, cost_of, guide_of_nothing, improve, nearest_end, uniform
+from controller.laws.deployable.path_planner import CORNERS, cost_of, guide_of_nothing, improve, nearest_end, uniform
 from controller.regions import Box, DepthBand, HalfSpace, Region, Sphere, clearance_at, pack
 
 GAINS = DeployableGains()

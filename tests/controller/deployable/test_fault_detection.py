@@ -5,9 +5,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 from scipy.stats import norm
 
-from controller.laws.deployable import failure
+from controller.laws.deployable import fault_detection
 from controller.laws.deployable.gains import DeployableGains
-from controller.laws.deployable.model import dynamics_of, share_out, thrusters_of
+from controller.laws.deployable.model import dynamics_of, reallocate, thrusters_of
 from controller.laws.deployable.observer import estimate_of_nothing
 from tests.controller.deployable.scenery import ODIN, REGIONS, Sea, fly, law_for
 
@@ -45,11 +45,11 @@ def test_it_can_be_switched_off():
 
 
 def test_a_suspicion_takes_back_the_one_before_but_not_what_was_told():
-    thrusters, suspicion = thrusters_of(ODIN), failure.suspicion_of(8)
+    thrusters, suspicion = thrusters_of(ODIN), fault_detection.suspicion_of(8)
     thrusters.health[1] = 0.0  # told
     for failed in (4, 6):
         suspicion.ratio[:] = 5.0
-        failure.give_up(suspicion, thrusters, failed)
+        fault_detection.give_up(suspicion, thrusters, failed)
         assert np.flatnonzero(thrusters.health == 0.0).tolist() == [1, failed]
         assert not suspicion.ratio.any()
 
@@ -58,8 +58,8 @@ def test_a_wrong_suspicion_is_corrected():
     """With a working thruster given up, the one that has in truth failed is found and takes its place."""
     law, sea = law_for(REGIONS), Sea(noise=NOISE)
     fly(law, sea, steps=100)
-    failure.give_up(law.memory.suspicion, law.memory.thrusters, 3)
-    share_out(law.memory.thrusters)
+    fault_detection.give_up(law.memory.suspicion, law.memory.thrusters, 3)
+    reallocate(law.memory.thrusters)
     sea.failed = 0
     fly(law, sea, steps=500, first=100)
     assert given_up(law) == [0]
@@ -71,11 +71,11 @@ def test_the_ratio_is_that_of_the_two_densities():
     dynamics, thrusters, gains = dynamics_of(ODIN, np.ones(9)), thrusters_of(ODIN), DeployableGains()
     compared = 0
     for _ in range(40):
-        estimate, suspicion = estimate_of_nothing(), failure.suspicion_of(8)
+        estimate, suspicion = estimate_of_nothing(), fault_detection.suspicion_of(8)
         thrusters.forces[:] = rng.uniform(-20.0, 20.0, 8)
         estimate.acceleration[:], estimate.spread[:] = rng.normal(size=3) * 0.05, rng.uniform(0.01, 0.02, 3)
         estimate.innovation[:], residual = rng.normal(size=3) * 0.02, rng.normal(size=3) * 4.0
-        failure.suspect(suspicion, estimate, residual, dynamics, thrusters, np.eye(3), gains, 0.02, True)
+        fault_detection.detect_fault(suspicion, estimate, residual, dynamics, thrusters, np.eye(3), gains, 0.02, True)
         given = thrusters.forces * ODIN.thruster_matrix
         inertia = np.diag(dynamics.mass)[3:]
         spread = (0.06 * inertia) ** 2 + np.sum((0.1 * given[3:]) ** 2, axis=1)
@@ -94,12 +94,12 @@ def test_the_ratio_is_that_of_the_two_densities():
 
 
 def test_without_a_measurement_nothing_is_learnt():
-    thrusters, suspicion, estimate = thrusters_of(ODIN), failure.suspicion_of(8), estimate_of_nothing()
+    thrusters, suspicion, estimate = thrusters_of(ODIN), fault_detection.suspicion_of(8), estimate_of_nothing()
     thrusters.forces[:] = 20.0
     residual = -ODIN.thruster_matrix[3:, 2] * 20.0
     for measured in (False, True):
         for _ in range(200):
-            found = failure.suspect(
+            found = fault_detection.detect_fault(
                 suspicion, estimate, residual, dynamics_of(ODIN, np.ones(9)), thrusters, np.eye(3), DeployableGains(),
                 0.02, measured,
             )  # fmt: skip
@@ -112,7 +112,7 @@ def test_lag_and_what_is_adapted_follow_their_equations():
     rng, kept = np.random.default_rng(3), 0
     dynamics, thrusters, gains = dynamics_of(ODIN, np.ones(9)), thrusters_of(ODIN), DeployableGains(adaptation=2.0)
     mass, inertia = dynamics.translational_mass[0], np.diag(dynamics.mass)[3:]
-    suspicion, lags, adapted, ratios = failure.suspicion_of(8), np.zeros((8, 3)), np.zeros((8, 3)), np.zeros(8)
+    suspicion, lags, adapted, ratios = fault_detection.suspicion_of(8), np.zeros((8, 3)), np.zeros((8, 3)), np.zeros(8)
     thrusters.forces[:] = rng.uniform(10.0, 20.0, 8) * rng.choice([-1.0, 1.0], 8)
     thrusters.health[7] = 0.0
     given = thrusters.forces * ODIN.thruster_matrix
@@ -124,7 +124,7 @@ def test_lag_and_what_is_adapted_follow_their_equations():
         estimate.innovation[:] = lags[2] + rng.normal(size=3) * 0.003
         residual = -given[3:, 2] + adapted[2] + rng.normal(size=3) * 0.3
         spread = np.sqrt((0.06 * inertia) ** 2 + np.sum((0.1 * given[3:]) ** 2, axis=1))
-        failure.suspect(suspicion, estimate, residual, dynamics, thrusters, R, gains, 0.02, measured)
+        fault_detection.detect_fault(suspicion, estimate, residual, dynamics, thrusters, R, gains, 0.02, measured)
         for i in range(7):
             step = 0.0
             if measured:
@@ -152,16 +152,19 @@ def test_the_likeliest_must_be_ahead_of_the_next_and_above_the_threshold():
         ({2: 21.0, 5: 12.0}, 2), ({5: 12.0, 2: 21.0, 6: 12.9}, 2), ({2: 19.0, 5: 12.0}, -1), ({6: 11.9}, -1),
         ({1: 20.0, 6: 30.0}, 6), ({1: 24.0, 6: 30.0}, -1), ({3: 12.1}, 3),
     ):  # fmt: skip
-        suspicion = failure.suspicion_of(8)
+        suspicion = fault_detection.suspicion_of(8)
         for j, ratio in ratios.items():
             suspicion.ratio[j] = ratio
         given = dynamics, thrusters, np.eye(3), gains, 0.02, False
-        assert failure.suspect(suspicion, estimate_of_nothing(), np.zeros(3), *given) == found
+        assert fault_detection.detect_fault(suspicion, estimate_of_nothing(), np.zeros(3), *given) == found
 
 
 def test_nothing_is_found_where_it_is_switched_off():
-    suspicion, given = failure.suspicion_of(8), (dynamics_of(ODIN, np.ones(9)), thrusters_of(ODIN), np.eye(3))
+    suspicion, given = fault_detection.suspicion_of(8), (dynamics_of(ODIN, np.ones(9)), thrusters_of(ODIN), np.eye(3))
     suspicion.ratio[3] = 100.0
     for threshold, found in ((12.0, 3), (0.0, -1)):
         gains = DeployableGains(failure_threshold=threshold)
-        assert failure.suspect(suspicion, estimate_of_nothing(), np.zeros(3), *given, gains, 0.02, False) == found
+        assert (
+            fault_detection.detect_fault(suspicion, estimate_of_nothing(), np.zeros(3), *given, gains, 0.02, False)
+            == found
+        )

@@ -12,7 +12,7 @@ from controller.jit.jit import part
 from controller.jit.stack_array import zeros
 from controller.law import VehicleState
 from controller.laws.deployable import attitude as attitude_loop
-from controller.laws.deployable import failure, model, observer
+from controller.laws.deployable import fault_detection, model, observer
 from controller.laws.deployable.gains import DeployableGains
 from controller.laws.deployable.linear_algebra import copy
 from controller.laws.deployable.memory import DeployableMemory
@@ -25,7 +25,7 @@ _FASTEST = 100.0  # m/s, rad/s
 
 
 @part
-def believe_weights(weights: Array, believed: Array) -> None:
+def sanitize_weights(weights: Array, believed: Array) -> None:
     """Write the arbiter's weights, each within [0, 1]; what is no number counts as 1, for it may matter."""
     for i in range(weights.size):
         believed[i] = 1.0 if np.isnan(weights[i]) else min(max(weights[i], 0.0), 1.0)
@@ -49,12 +49,12 @@ def take_in_thrusters(memory: DeployableMemory, told: Array, failed: int) -> Non
     """Take in which thrusters are told to have failed, or to work again, and one found to have failed, -1 for none."""
     health = memory.thrusters.health
     if failed >= 0:
-        failure.give_up(memory.suspicion, memory.thrusters, failed)
+        fault_detection.give_up(memory.suspicion, memory.thrusters, failed)
     for j in range(told.size):
         works = 0.0 if told[j] <= 0.0 else 1.0
         if works != memory.told[j] or works == 0.0:
             health[j] = memory.told[j] = works
-    model.share_out(memory.thrusters)
+    model.reallocate(memory.thrusters)
 
 
 @part

@@ -40,7 +40,7 @@ _MOST_A_STEP = 3.0  # of the log-likelihood ratio of either kind, lest one odd m
 _LEAD = 8.0  # by which the likeliest must be ahead of the next
 
 
-class Suspicion(NamedTuple):
+class FaultState(NamedTuple):
     """The hypotheses, one for each thruster."""
 
     ratio: Array  # (m,) summed log-likelihood ratio
@@ -49,14 +49,14 @@ class Suspicion(NamedTuple):
     suspected: NDArray[np.int64]  # (1,) the thruster that is given up on suspicion, -1 for none
 
 
-def suspicion_of(m: int) -> Suspicion:
+def suspicion_of(m: int) -> FaultState:
     """Return the hypotheses about `m` thrusters, all at zero."""
-    return Suspicion(np.zeros(m), np.zeros((m, 3)), np.zeros((m, 3)), np.full(1, -1))
+    return FaultState(np.zeros(m), np.zeros((m, 3)), np.zeros((m, 3)), np.full(1, -1))
 
 
 @part
-def suspect(
-    suspicion: Suspicion,
+def detect_fault(
+    suspicion: FaultState,
     estimate: Estimate,
     residual: Array,
     dynamics: Dynamics,
@@ -70,7 +70,7 @@ def suspect(
 
     Parameters
     ----------
-    suspicion : Suspicion
+    suspicion : FaultState
         Updated in place.
     estimate : Estimate
         With the innovation of the last correction.
@@ -173,15 +173,15 @@ def _by_moment(
 
 
 @part
-def give_up(suspicion: Suspicion, thrusters: Thrusters, failed: int) -> None:
+def give_up(suspicion: FaultState, thrusters: Thrusters, failed: int) -> None:
     """Take a suspected thruster out of `health`, and take back the one that was suspected before it.
 
     Parameters
     ----------
-    suspicion : Suspicion
+    suspicion : FaultState
         Starts anew.
     thrusters : Thrusters
-        Whose `health` changes; `model.share_out` is for the caller to do.
+        Whose `health` changes; `model.reallocate` is for the caller to do.
     failed : int
         From 0.
     """

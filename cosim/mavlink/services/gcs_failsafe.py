@@ -5,59 +5,59 @@ from __future__ import annotations
 from typing import Any
 
 from cosim.mavlink.services.service import Service
-from cosim.mavlink.vehicle.vehicle_context import Sender, Vessel
+from cosim.mavlink.vehicle.vehicle_context import Sender, VehicleContext
 from cosim.simulation.commands.commands import Arm, Command, SetMode
 
 _REMINDER = 30.0  # s
 
 
-class Supervision(Service):
+class GcsFailsafe(Service):
     """Acts when the heartbeats of the system that commands stay away; one that never sent any is not missed."""
 
-    def __init__(self, vessel: Vessel) -> None:
-        super().__init__(vessel)
+    def __init__(self, context: VehicleContext) -> None:
+        super().__init__(context)
         self._reminded = 0.0
         self._acted = True
         self.messages = {"HEARTBEAT": self._heartbeat}
 
     def _heartbeat(self, sender: Sender, message: Any) -> None:
-        self.vessel.operator.beat(sender.system, self.vessel.now)
+        self.context.operator.beat(sender.system, self.context.now)
 
     def tick(self) -> None:
         """See whether the station is still there."""
-        vessel = self.vessel
-        silence = vessel.operator.silence(vessel.now)
-        lost = vessel.loss_action != "none" and silence > vessel.loss_timeout
-        if lost and not vessel.failsafe:
-            vessel.failsafe, self._reminded = True, vessel.now
+        context = self.context
+        silence = context.operator.silence(context.now)
+        lost = context.loss_action != "none" and silence > context.loss_timeout
+        if lost and not context.failsafe:
+            context.failsafe, self._reminded = True, context.now
             self._say(silence)
             self._acted = False
-        elif lost and vessel.now - self._reminded >= _REMINDER:
-            self._reminded = vessel.now
+        elif lost and context.now - self._reminded >= _REMINDER:
+            self._reminded = context.now
             self._say(silence)
-        elif vessel.failsafe and not lost:
-            vessel.failsafe = False
+        elif context.failsafe and not lost:
+            context.failsafe = False
             self._acted = True
-            vessel.say(f"Link to station {vessel.operator.commander} regained", vessel.mavlink.MAV_SEVERITY_NOTICE)
+            context.say(f"Link to station {context.operator.commander} regained", context.mavlink.MAV_SEVERITY_NOTICE)
         if not self._acted:
             self._acted = self._act()
 
     def _say(self, silence: float) -> None:
-        vessel = self.vessel
-        action = vessel.loss_action
+        context = self.context
+        action = context.loss_action
         then = "" if action == "warn" else f": {action}"
-        text = f"Link to station {vessel.operator.commander} lost for {silence:.0f} s{then}"
-        vessel.say(text, vessel.mavlink.MAV_SEVERITY_CRITICAL)
+        text = f"Link to station {context.operator.commander} lost for {silence:.0f} s{then}"
+        context.say(text, context.mavlink.MAV_SEVERITY_CRITICAL)
 
     def _act(self) -> bool:
         """Order what was asked for, and return whether the order found room."""
-        vessel = self.vessel
+        context = self.context
         command: Command
-        match vessel.loss_action:
+        match context.loss_action:
             case "disarm":
                 command = Arm(False)
             case "hold" | "surface" as mode:
                 command = SetMode(mode)
             case _:
                 return True
-        return bool(vessel.give(command) != vessel.mavlink.MAV_RESULT_TEMPORARILY_REJECTED)
+        return bool(context.submit(command) != context.mavlink.MAV_RESULT_TEMPORARILY_REJECTED)

@@ -22,7 +22,7 @@ _LONGEST_STEP = 1e9  # s
 _AT_ZERO = Clock(0.0, 0, math.nan)
 
 
-class Slave:
+class CoSimulationInstance:
     """Any co-simulation FMU, FMI 2.0 or 3.0, that is stepped from Python.
 
     Parameters
