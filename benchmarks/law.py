@@ -20,7 +20,7 @@ from cosim.scenario.vehicle_model import vehicle_model
 from plant_fmu.vehicle import load_vehicle
 
 STEPS = 2_000
-RATIO = "how many times as long as the printed law"
+RATIO = "how many times as long as the paper's law"
 OBSTACLES = (1, 6, 14, 40)
 _PERIOD = 0.02  # s
 _SPEED = 0.6  # m/s
@@ -134,7 +134,7 @@ def measure(steps: int, repeats: int) -> list[Row]:
     rows = []
     for obstacles in OBSTACLES:
         timings: dict[str, Timing | str] = {}
-        for law in sorted(LAWS, key=lambda name: name != "printed"):
+        for law in sorted(LAWS, key=lambda name: name != "ismail_dunnigan"):
             contestant = LawSteps(law, obstacles)
             found = [contestant.each(steps) for _ in range(repeats + 1)][1:]  # the first warms the caches
             timings[f"{law}, {obstacles} obstacles"] = Timing(tuple(np.concatenate(found).tolist()))

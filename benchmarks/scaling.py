@@ -24,7 +24,7 @@ OBSTACLES = (1, 3, 10, 30, 100)
 HORIZONS = (10.0, 30.0, 100.0, 300.0)  # s
 VEHICLES = (1, 8, 64, 512)
 ROWS = {"fused": 1_000, "lanes": 10_000}  # of a sweep
-LAWS = ("printed", "deployable")
+LAWS = ("ismail_dunnigan", "deployable")
 _SWEEPS = 3  # repeats at most
 
 

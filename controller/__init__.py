@@ -4,8 +4,8 @@ from controller.allocation import Allocation
 from controller.errors import ControllerError, LawError, RegionError
 from controller.function_law import FunctionLaw, RegionsSeen
 from controller.law import CompiledLaw, Diagnostic, Law, VehicleModel, VehicleState, WrenchLaw
-from controller.laws import LAWS, PrintedLaw
-from controller.printed_law import Gains
+from controller.laws import LAWS, IsmailDunniganLaw
+from controller.paper_law import Gains
 
 __all__ = [
     "LAWS",
@@ -15,9 +15,9 @@ __all__ = [
     "Diagnostic",
     "FunctionLaw",
     "Gains",
+    "IsmailDunniganLaw",
     "Law",
     "LawError",
-    "PrintedLaw",
     "RegionError",
     "RegionsSeen",
     "VehicleModel",

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from controller import Gains, PrintedLaw, VehicleState
+from controller import Gains, IsmailDunniganLaw, VehicleState
 from controller.regions import Region, Sphere, pack
 from fuzzy_arbiter import Arbiter, ramp
 from plant_fmu import Plant
@@ -14,7 +14,7 @@ ROCK = Region("rock", Sphere((1.5, 0.2, 1.5), 0.4), keep="out", gain=500.0)
 goal, rocks = pack([GOAL]), pack([ROCK])
 value, gradient, turning, clearance = np.zeros(1), np.zeros((1, 3)), np.zeros((1, 3)), np.zeros(1)
 arbiter = Arbiter()
-law = PrintedLaw(Gains(k_p1=40.0), np.array([1.0, 0.0, 0.0, 0.0]), STEP, n_regions=1)
+law = IsmailDunniganLaw(Gains(k_p1=40.0), np.array([1.0, 0.0, 0.0, 0.0]), STEP, n_regions=1)
 
 if __name__ == "__main__":
     with Plant("odin") as plant:

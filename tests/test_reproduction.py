@@ -93,7 +93,7 @@ def test_estimates(flown):
 
 
 class AllOn:
-    """The printed law with every weight at 1."""
+    """The paper's law with every weight at 1."""
 
     def __init__(self, law):
         self.law, self.output, self.diagnostics = law, law.output, law.diagnostics

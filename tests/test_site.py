@@ -181,7 +181,7 @@ def test_a_balance_of_pull_and_push_is_an_equilibrium_with_w_0():
     from scipy.optimize import brentq
 
     from controller import Gains
-    from controller.printed_law import primary_error, secondary_error
+    from controller.paper_law import primary_error, secondary_error
     from controller.theory import mapped_error
 
     gains, radius, alpha = Gains(), 0.5, 2000.0

@@ -1,4 +1,4 @@
-"""The closed loop of the paper's scenario at 100 Hz, printed law, closed form: a step of it, and whole runs."""
+"""The closed loop of the paper's scenario at 100 Hz, paper's law, closed form: a step of it, and whole runs."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from cosim.simulation.master import Master
 SCENARIO = "paper"
 STEP = 0.01  # s, in which law, arbiter and plant take one step each
 CHANGES = (
-    "arbiter.engine=closed", "law.name=printed", f"plant.substep={STEP}",
+    "arbiter.engine=closed", "law.name=ismail_dunnigan", f"plant.substep={STEP}",
     *(f"time.{key}={STEP}" for key in ("step", "control", "arbiter")),
 )  # fmt: skip
 RUN = 30.0  # s

@@ -17,7 +17,7 @@ from benchmarks.timing import Contestant, Own
 from fuzzy_arbiter import SECTION_VI, Arbiter
 
 POINTS = 101
-LAWS = ("printed", "deployable")
+LAWS = ("ismail_dunnigan", "deployable")
 OBSTACLES = 6
 
 

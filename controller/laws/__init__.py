@@ -9,10 +9,10 @@ from controller.laws.baselines.pd import PdGains, PdLaw
 from controller.laws.baselines.sun_cheah import SunCheahGains, SunCheahLaw
 from controller.laws.baselines.unarbitrated import UnarbitratedGains, UnarbitratedLaw
 from controller.laws.deployable import DeployableGains, DeployableLaw
-from controller.laws.printed import PrintedLaw
+from controller.laws.ismail_dunnigan import IsmailDunniganLaw
 
 LAWS: dict[str, type[CompiledLaw]] = {
-    law.name: law for law in (PrintedLaw, DeployableLaw, PdLaw, SunCheahLaw, UnarbitratedLaw, AntonelliLaw)
+    law.name: law for law in (IsmailDunniganLaw, DeployableLaw, PdLaw, SunCheahLaw, UnarbitratedLaw, AntonelliLaw)
 }
 
 __all__ = [
@@ -21,9 +21,9 @@ __all__ = [
     "AntonelliLaw",
     "DeployableGains",
     "DeployableLaw",
+    "IsmailDunniganLaw",
     "PdGains",
     "PdLaw",
-    "PrintedLaw",
     "SunCheahGains",
     "SunCheahLaw",
     "UnarbitratedGains",

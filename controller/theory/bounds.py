@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from controller.printed_law import Gains
+from controller.paper_law import Gains
 from controller.theory.model import Model, damping
 
 Array = NDArray[np.float64]

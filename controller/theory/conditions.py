@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from controller.printed_law import Gains
+from controller.paper_law import Gains
 from controller.theory.lyapunov import secondary_gain
 
 Array = NDArray[np.float64]

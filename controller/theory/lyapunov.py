@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controller.jit.jit import compiled
-from controller.printed_law import Gains, violation
+from controller.paper_law import Gains, violation
 from controller.quaternion import rate, skew
 from controller.theory.model import Model, coriolis, damping
 

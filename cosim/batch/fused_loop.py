@@ -21,7 +21,7 @@ import plant_fmu
 from controller import LAWS, CompiledLaw, VehicleState
 from controller.allocation import allocate
 from controller.jit.jit import compiled, jit_noalloc
-from controller.laws import printed
+from controller.laws import ismail_dunnigan
 from controller.regions import (
     Orientation,
     PackedRegions,
@@ -40,7 +40,7 @@ Array = NDArray[np.float64]
 _FOREIGN = (*SOURCES, Path(plant_fmu.__file__).parent / "running")
 
 _weigh: Any = numba.njit(_nrt=False)(Arbiter().compiled().py_func)  # type: ignore[call-overload]
-_step: Any = printed.step  # of a law, and whether it gives a wrench: `fused_loop_of` puts others in their places
+_step: Any = ismail_dunnigan.step  # of a law; `fused_loop_of` puts others in its place
 _is_wrench = True
 _SPHERE, _ATTITUDE = Sphere.kind, Orientation.kind
 

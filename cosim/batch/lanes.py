@@ -52,7 +52,7 @@ class LanesFlyer:
     Parameters
     ----------
     variation : Variation
-        What is flown: by the printed law and the closed arbiter, any shapes, by wrench or thrusters, without noise,
+        What is flown: by the paper's law and the closed arbiter, any shapes, by wrench or thrusters, without noise,
         failures and commands.
 
     Raises

@@ -1,4 +1,4 @@
-"""The compiled library of one vehicle's lanes: plant, printed law and arbiter, for this very machine."""
+"""The compiled library of one vehicle's lanes: plant, paper's law and arbiter, for this very machine."""
 
 from __future__ import annotations
 

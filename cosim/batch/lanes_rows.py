@@ -204,7 +204,7 @@ def require_lanes(scenario: Scenario) -> None:
     s = scenario
     clocks = [name for name, value in s.plant.parameters.items() if name.startswith(_CLOCKED) and value]
     for key, came, expected in (
-        ("law.name", s.law.name, "printed"),
+        ("law.name", s.law.name, "ismail_dunnigan"),
         ("arbiter.engine", s.arbiter.engine, "closed"),
         ("master.order", s.master.order, "gauss-seidel"),
         ("commands.enabled", s.commands.enabled, False),

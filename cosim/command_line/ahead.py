@@ -29,13 +29,13 @@ def compile_all(options: argparse.Namespace) -> int:
 
 
 def _laws() -> list[tuple[str, str, list[str]]]:
-    """Return every law, a scenario, and what brings the law into it; with the printed one its analysis.
+    """Return every law, a scenario, and what brings the law into it; with the paper's law its analysis.
 
     The one that takes longest comes last: who is in a hurry compiles it beside the others.
     """
     from controller import LAWS
 
-    analysis = {"printed": ["record.lyapunov=true"]}
+    analysis = {"ismail_dunnigan": ["record.lyapunov=true"]}
     return [
         (name, "paper", [f"law.name={name}", f"actuation.through={law.output}", *analysis.get(name, [])])
         for name, law in sorted(LAWS.items(), key=lambda law: law[0] == "deployable")

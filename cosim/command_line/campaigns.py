@@ -24,7 +24,7 @@ def add_verbs(verbs: Any) -> None:
     """
     campaign = verbs.add_parser("campaign", help="fly many scenes by one law")
     _add_scenes(campaign)
-    campaign.add_argument("--law", required=True, help="such as printed")
+    campaign.add_argument("--law", required=True, help="such as ismail_dunnigan")
     campaign.add_argument(
         "--set", action="append", default=[], metavar="KEY=VALUE", dest="settings",
         help="set a gain of the law, such as k_p1=10; may be repeated",
@@ -35,7 +35,7 @@ def add_verbs(verbs: Any) -> None:
     compare.add_argument("--laws", required=True, metavar="A,B[,C]", help="two or more, with commas between them")
     compare.add_argument(
         "--set", action="append", default=[], metavar="LAW.KEY=VALUE", dest="settings",
-        help="set a gain of a law, such as printed.k_p1=10; may be repeated",
+        help="set a gain of a law, such as ismail_dunnigan.k_p1=10; may be repeated",
     )  # fmt: skip
 
 

@@ -36,7 +36,7 @@ _EPILOG = """examples:
   cosim run paper --set arbiter.engine=closed --set regions.SR1.gain=5000 --out runs/strong
   cosim run my-scene.toml --mavlink udpout:127.0.0.1:14550 --profile ardusub --commands
   cosim scenes --count 200 --seed 0 --out scenes.jsonl
-  cosim campaign scenes.jsonl --law printed --out campaigns/printed --workers 2
+  cosim campaign scenes.jsonl --law ismail_dunnigan --out campaigns/ismail_dunnigan --workers 2
   cosim sweep docking --vary initial.position.1=-4:-2 --samples 1000 --out sweeps/start --workers 2
 """
 

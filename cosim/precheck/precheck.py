@@ -51,10 +51,10 @@ def check(scenario: Scenario) -> Check:
         If the arbiter cannot be set up.
     """
     findings = [*vehicle_findings(scenario), *region_findings(scenario), *thrust_findings(scenario)]
-    if scenario.law.name == "printed":
+    if scenario.law.name == "ismail_dunnigan":
         weights = start_weights(scenario)
         findings += [*gain_findings(scenario, weights), asked_finding(scenario, weights)]
     else:
-        text = f"(31)-(45) are of the printed law, not of this one ({scenario.law.name}): passed over."
+        text = f"(31)-(45) are of the paper's law, not of this one ({scenario.law.name}): passed over."
         findings.append(Finding("law", "(38), (45)", "note", text))
     return Check(scenario.name, scenario.title, scenario.law.name, scenario.vehicle.name, tuple(findings))

@@ -1,4 +1,4 @@
-"""Properties 1-3 of the vehicle, and the gain conditions of the printed law: where in the state space they hold."""
+"""Properties 1-3 of the vehicle, and the gain conditions of the paper's law: where in the state space they hold."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from controller.printed_law import Gains, primary_error
+from controller.paper_law import Gains, primary_error
 from controller.regions import Region, Sphere
 from controller.theory import (
     Fit,
@@ -121,7 +121,7 @@ def start_weights(scenario: Scenario) -> Array:
 
 
 def gain_findings(scenario: Scenario, weights: Array) -> Iterator[Finding]:
-    """Yield whether (38) and (45) hold at the start of a scenario with the printed law, and where else.
+    """Yield whether (38) and (45) hold at the start of a scenario with the paper's law, and where else.
 
     Parameters
     ----------

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from controller import printed_law
-from controller.printed_law import primary_error, secondary_error
+from controller import paper_law
+from controller.paper_law import primary_error, secondary_error
 from controller.quaternion import error_parts, rotation_rows
 from cosim.precheck.finding import Finding, status
 from cosim.precheck.region_values import evaluated
@@ -91,7 +91,7 @@ def _mend_current(scenario: Scenario) -> str:
 
 
 def asked_finding(scenario: Scenario, weights: Array) -> Finding:
-    """Hold the force that the printed law asks for first against what the thrusters can give in that direction.
+    """Hold the force that the paper's law asks for first against what the thrusters can give in that direction.
 
     Parameters
     ----------
@@ -114,7 +114,7 @@ def asked_finding(scenario: Scenario, weights: Array) -> Finding:
     R, turned = rotation_rows(quaternion), error_parts(desired, quaternion)
     e_p, e_s = primary_error(float(f), slope), secondary_error(values, gradients, betas)
     tau, velocity = np.empty(6), np.array(initial.velocity)
-    printed_law.apply(tuple(e_p), tuple(e_s), turned[1:], R, velocity, gains, 0.0, np.zeros(4), tau)
+    paper_law.apply(tuple(e_p), tuple(e_s), turned[1:], R, velocity, gains, 0.0, np.zeros(4), tau)
     force = tau[:3]
     asked = float(np.linalg.norm(force))
     if not asked > 0.0:

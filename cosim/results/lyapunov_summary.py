@@ -1,4 +1,4 @@
-"""What V of the printed law's analysis did in a run."""
+"""What V of the paper's law's analysis did in a run."""
 
 from __future__ import annotations
 

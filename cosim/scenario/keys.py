@@ -83,7 +83,7 @@ KEYS = {
         ", see [The order of a step](#the-order-of-a-step)",
     ),
     "record.lyapunov": Key(
-        "", "record V of (31) and its rate, with the printed law",
+        "", "record V of (31) and its rate, with the paper's law",
         ", in three forms; see [theory.md](theory.md#where-the-theory-holds)",
     ),
     "commands.enabled": Key(
@@ -108,7 +108,7 @@ KEYS = {
     "regions[].velocity": Key("m/s", "north east down; the law is told"),
     "regions[].streamed": Key("", "moved from outside while the run goes on", ", below"),
     "regions[].hard": Key(
-        "", "must not be violated", "; the printed law, and a law of plain potentials, do not ask"
+        "", "must not be violated", "; the paper's law, and a law of plain potentials, do not ask"
     ),
 }  # fmt: skip
 

@@ -117,7 +117,7 @@ class MasterSetup:
 class RecordSetup:
     """What a run records beyond its signals."""
 
-    lyapunov: bool = False  # V of (31) and its rate, with the printed law
+    lyapunov: bool = False  # V of (31) and its rate, with the paper's law
 
 
 # ---- as they stand in the file -------------------------------------------------------------------------------------
@@ -137,7 +137,7 @@ class TimeEntry:
 class LawEntry:
     """Name and gains before anybody knows whether they go together."""
 
-    name: str = "printed"
+    name: str = "ismail_dunnigan"
     desired_quaternion: Vector4 = (1.0, 0.0, 0.0, 0.0)
     gains: dict[str, float] = field(default_factory=dict)
 

@@ -97,7 +97,7 @@ def read_table(name_or_file: str, seen: tuple[str, ...] = (), beside: Path | Non
 def _name_law(table: dict[str, Any], name: object) -> None:
     """Name the law of a scenario; gains belong to a law, so that those of another one go with its name."""
     law = table.setdefault("law", {})
-    if isinstance(law, dict) and law.get("name", "printed") != name:
+    if isinstance(law, dict) and law.get("name", "ismail_dunnigan") != name:
         law.pop("gains", None)
         law["name"] = name
 

@@ -116,7 +116,7 @@ def check_record(record: RecordSetup, law: LawSetup, regions: tuple[SecondaryReg
     """Raise `ScenarioError` unless what is recorded is defined for the law and the regions."""
     if not record.lyapunov:
         return
-    _require(law.name == "printed", "record.lyapunov", "true", "false: V of (31) is the printed law's")
+    _require(law.name == "ismail_dunnigan", "record.lyapunov", "true", "false: V of (31) is the paper's law's")
     names = [r.region.name for r in regions if of_attitude(r.region.shape)]
     _require(not names, "record.lyapunov", "true", f"false: the analysis knows no attitude in regions ({names})")
 
@@ -226,6 +226,18 @@ def check_law(entry: LawEntry, through: str, vehicle: Vehicle, period: float, n_
             raise ScenarioError(f"law.gains has {next(iter(entry.gains))!r}, expected nothing with a law of one's own")
         validate_quaternion(np.array(entry.desired_quaternion))
         return LawSetup(entry.name, entry.desired_quaternion, NoGains())
+    if entry.name == "printed":
+        raise ScenarioError(
+            "law.name is 'printed', expected 'ismail_dunnigan': the paper's law has its authors' names now"
+        )
+    if entry.name == "printed":
+        raise ScenarioError(
+            "law.name is 'printed', expected 'ismail_dunnigan': the paper's law has its authors' names now"
+        )
+    if entry.name == "printed":
+        raise ScenarioError("law.name is 'printed', expected 'ismail_dunnigan': laws have their authors' names")
+    if entry.name == "printed":
+        raise ScenarioError("law.name is 'printed', expected 'ismail_dunnigan': the paper's law has its authors' names now")
     if entry.name not in LAWS:
         known = ", ".join(map(repr, sorted(LAWS)))
         raise ScenarioError(f"law.name is {entry.name!r}, expected one of {known}")

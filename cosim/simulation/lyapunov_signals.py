@@ -1,11 +1,11 @@
-"""V of the printed law's analysis as signals of a run."""
+"""V of the paper's law's analysis as signals of a run."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from controller import VehicleState
-from controller.printed_law import primary_error, secondary_error
+from controller.paper_law import primary_error, secondary_error
 from controller.quaternion import error, rotation_matrix
 from controller.regions import PackedRegions
 from controller.theory import (

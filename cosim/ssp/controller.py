@@ -1,4 +1,4 @@
-"""The printed law of a scenario, with its regions, as a component for FMUs."""
+"""The paper's law of a scenario, with its regions, as a component for FMUs."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from plant_fmu.component import Component
 from plant_fmu.quantities import Quantity
 from plant_fmu.variables import AXES, FORCES, VELOCITIES, Role, Variable
 
-_WORDS = """A pose and the weights of the criteria go in; the body wrench of the printed law, and to what degree
+_WORDS = """A pose and the weights of the criteria go in; the body wrench of the paper's law, and to what degree
 each criterion asks for attention, come out. The law is that of Ismail and Dunnigan, equations (16) to (29); a
 region's value g is at most 0 where it is satisfied.
 

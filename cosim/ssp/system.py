@@ -43,7 +43,7 @@ def package_system(scenario: Scenario, out: Path, fmi: int = 2, platforms: str =
     Parameters
     ----------
     scenario : Scenario
-        With the printed law, on the direct wrench, and nothing that comes from outside.
+        With the paper's law, on the direct wrench, and nothing that comes from outside.
     out : Path
         The file to write; it appears whole or not at all, with the same bytes each time.
     fmi : int
@@ -119,7 +119,12 @@ def _require(scenario: Scenario) -> None:
     """Refuse what the FMUs of a system have not."""
     streamed = [r.region.name for r in scenario.regions if r.streamed]
     for good, key, came, expected in (
-        (scenario.law.name == "printed", "law.name", repr(scenario.law.name), "'printed': the law there is in C"),
+        (
+            scenario.law.name == "ismail_dunnigan",
+            "law.name",
+            repr(scenario.law.name),
+            "'ismail_dunnigan': the law there is in C",
+        ),
         (
             scenario.actuation.through == "wrench",
             "actuation.through",

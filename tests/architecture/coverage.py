@@ -41,7 +41,7 @@ PARTS = (
         (
             "tests/controller/deployable/test_quadratic_program.py",
             "tests/controller/test_allocation.py",
-            "tests/controller/test_printed_law.py",
+            "tests/controller/test_paper_law.py",
             "tests/controller/test_quaternion.py",
             "tests/controller/theory/test_conditions.py",
             "tests/controller/theory/test_model.py",
@@ -49,7 +49,7 @@ PARTS = (
         (
             "controller/allocation.py",
             "controller/laws/deployable/quadratic_program.py",
-            "controller/printed_law.py",
+            "controller/paper_law.py",
             "controller/quaternion.py",
             "controller/restoring.py",
             "controller/theory/conditions.py",

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from controller import printed_law
-from controller.printed_law import Gains
+from controller import paper_law
+from controller.paper_law import Gains
 from controller.regions import (
     Box,
     Cone,
@@ -277,7 +277,7 @@ def test_the_law_is_that_of_python(library):
     estimate, period = rng.normal(size=(m, 4)) * 10.0, 0.01
     expected_estimate, expected = estimate.copy(), np.empty((m, 6))
     for i in range(m):
-        printed_law.step(
+        paper_law.step(
             quaternions[i], velocities[i], desired[i], goal[i, 0], goal[i, 1:], values[i], gradients[i], alphas[i],
             Gains(*gains[i].tolist()), period, expected_estimate[i], expected[i],
         )  # fmt: skip

@@ -122,7 +122,7 @@ def test_texts_of_a_folder_that_are_no_json_or_endlessly_deep(tmp_path, shipped_
 
 
 SUMMARIES = {
-    "law": ["mine", "pd", "", 7, None, [], "printed" * 900, "printed\x1b[31m"],
+    "law": ["mine", "pd", "", 7, None, [], "ismail_dunnigan" * 900, "printed\x1b[31m"],
     "status": [7, None, ["completed"], {"a": {}}],
     "scenario": [7, None, [1], True],
     "wall_time": ["x", [], {}, -1, True, 1e300, math.nan, math.inf, 10**400],

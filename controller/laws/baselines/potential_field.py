@@ -15,7 +15,7 @@ import numpy as np
 
 from controller.jit.jit import compiled
 from controller.law import Array, VehicleState
-from controller.printed_law import violation
+from controller.paper_law import violation
 from controller.regions import Orientation, PackedRegions, evaluate_packed
 
 _ATTITUDE = Orientation.kind  # shapes from it on depend on attitude

@@ -6,7 +6,7 @@ paper's reference [1]:
     tau = -J^T K_p s(e) - K_v nu + Z(eta) phi-hat,    d(phi-hat)/dt = -L Z^T (nu + sigma J^T s(e))
 
 with s() saturated and the four numbers of the restoring forces (12) as all that is adapted: the law that the printed
-one (25)-(29) generalises to regions. The article was not at hand; this is its form as the printed law hands it on,
+one (25)-(29) generalises to regions. The article was not at hand; this is its form as the paper's law hands it on,
 with attitude errors as quaternions, where J is blkdiag(R, I). Ours are the bounds of the estimate and the push of the
 regions, which stays out of the adaptation.
 """

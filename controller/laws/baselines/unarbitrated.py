@@ -1,6 +1,6 @@
-"""The printed law (25)-(29) without its arbiter: every region has its full weight at all times.
+"""The paper's law (25)-(29) without its arbiter: every region has its full weight at all times.
 
-It is given what the printed law lacks within real thrusters, as every law for comparison is: a bound on the pull of
+It is given what the paper's law lacks within real thrusters, as every law for comparison is: a bound on the pull of
 the primary region, a margin within that region, regions that push from a `reach` on, and bounds on the estimate. All
 else is as printed.
 """
@@ -11,11 +11,11 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from controller import printed_law
+from controller import paper_law
 from controller.jit.jit import compiled
 from controller.law import Array, VehicleState, WrenchLaw
 from controller.laws.baselines.potential_field import Field, evaluate_field, field_of, keep_within, shorten
-from controller.printed_law import Gains, primary_error
+from controller.paper_law import Gains, primary_error
 from controller.quaternion import error_parts, rotation_rows
 from controller.regions import PackedRegions
 
@@ -69,7 +69,7 @@ def step(
     e_s = (-field.push[0] / k_q, -field.push[1] / k_q, -field.push[2] / k_q)  # (21), (22)
     e_att = error_parts(memory.desired_quaternion, state.quaternion)[1:]  # (23)
     R = rotation_rows(state.quaternion)
-    printed_law.apply(e_p, e_s, e_att, R, state.velocity_body, g, memory.period[0], estimate, forces)  # (25), (27)
+    paper_law.apply(e_p, e_s, e_att, R, state.velocity_body, g, memory.period[0], estimate, forces)  # (25), (27)
     keep_within(estimate, 0, 1, gains.bound)
     keep_within(estimate, 1, 4, gains.bound_moment)
 
@@ -86,7 +86,7 @@ def memory_of(desired_quaternion: Array, period: Array, n_regions: int) -> Unarb
 
 
 class UnarbitratedLaw(WrenchLaw):
-    """The printed law with all weights on, within bounds."""
+    """The paper's law with all weights on, within bounds."""
 
     name: ClassVar[str] = "unarbitrated"
     function = staticmethod(step)

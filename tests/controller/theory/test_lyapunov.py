@@ -6,7 +6,7 @@ from scipy.integrate import quad, solve_ivp
 from scipy.spatial.transform import Rotation
 
 from controller import Gains
-from controller.printed_law import primary_error, secondary_error
+from controller.paper_law import primary_error, secondary_error
 from controller.quaternion import error, rotation_matrix
 from controller.regions import Box, DepthBand, Region, Sphere, pack
 from controller.theory import (

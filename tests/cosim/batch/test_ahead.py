@@ -51,7 +51,7 @@ def test_after_it_nothing_is_compiled(tmp_path):
         return {file.name for file in (tmp_path / "numba").rglob("*.nbc")}
 
     kept = cosim("compile", "paper")
-    assert any(name.startswith("fused_loop._fly_printed") for name in kept)
+    assert any(name.startswith("fused_loop._fly_ismail_dunnigan") for name in kept)
     short = ["--set", "time.duration=0.02", "--set", "arbiter.engine=closed"]
     assert cosim("run", "paper", *short, "--no-report", "--out", str(tmp_path / "run")) == kept
     varied = ["--samples", "2", "--vary", "initial.position.1=-2:2", *short, "--out", str(tmp_path / "sweep")]

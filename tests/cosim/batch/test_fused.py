@@ -57,7 +57,7 @@ def assert_same_flight(scenario):
 
 
 def test_a_short_flight_of_the_printed_law_is_the_masters_to_the_last_bit():
-    assert_same_flight(scenario_of("printed", *BRISK, "limit.force=150.0", "limit.time_constant=0.1"))
+    assert_same_flight(scenario_of("ismail_dunnigan", *BRISK, "limit.force=150.0", "limit.time_constant=0.1"))
 
 
 @pytest.mark.slow
@@ -74,8 +74,8 @@ NOISY = [
 
 @pytest.mark.parametrize("frozen", ["true", "false"])
 def test_noise_and_gaps_in_what_is_measured_are_the_masters(frozen):
-    # the printed law, told nothing, asks for nothing that a plant takes: it is told the last values, or does not steer
-    law = "printed" if frozen == "true" else "pd"
+    # the paper's law, told nothing, asks for nothing that a plant takes: it is told the last values, or does not steer
+    law = "ismail_dunnigan" if frozen == "true" else "pd"
     gap = [] if frozen == "true" else ["sensing.dead_for=0.0"]
     assert_same_flight(scenario_of(law, *BRISK, *NOISY, f"sensing.frozen={frozen}", "limit.force=150.0", *gap))
 
@@ -121,7 +121,7 @@ def test_an_outcome_is_what_the_summary_of_a_recorded_run_says(name, tmp_path):
 
 
 def test_a_batch_flies_each_row_as_it_would_alone_and_names_what_is_refused():
-    scenario = scenario_of("printed", *BRISK, "limit.force=150.0")
+    scenario = scenario_of("ismail_dunnigan", *BRISK, "limit.force=150.0")
     variation = Variation(scenario, ["initial.position.1", "plant.parameters.mass"])
     mass = variation.number("plant.parameters.mass")
     values = np.array([[0.0, mass], [0.3, 1e9], [0.3, -1.0], [0.3, 1.1 * mass], [np.nan, mass]])
@@ -141,7 +141,7 @@ def test_a_plant_that_refuses_a_step_ends_the_flight_there():
         "plant.parameters.quadratic_damping[1]=1e9",
         "initial.velocity=[1,0,0,0,0,0]",
     ]
-    scenario = scenario_of("printed", *given)
+    scenario = scenario_of("ismail_dunnigan", *given)
     with FusedFlyer(Variation(scenario, [])) as flyer:
         (outcome,) = flyer.fly(np.zeros((1, 0)), np.zeros(1, int)).outcomes
     assert outcome["stopped_at"] == 0.0 and not outcome["reached"]

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from controller import LAWS, Allocation, PrintedLaw, VehicleState
+from controller import LAWS, Allocation, IsmailDunniganLaw, VehicleState
 from cosim.batch import fused_loop
 from cosim.batch.c_calls import Clock, fmi_do_step, seconds
 from cosim.campaigns.scenes.flyer import Conditions, SceneFlyer
@@ -28,14 +28,14 @@ SHORT = Conditions(duration=8.0)
 
 @pytest.fixture(scope="module")
 def flyer():
-    with SceneFlyer("printed", SHORT) as flyer:
+    with SceneFlyer("ismail_dunnigan", SHORT) as flyer:
         yield flyer
 
 
 class Readable:
     """A flight in plain Python, over the FMU's Python interface."""
 
-    def __init__(self, scene, conditions, law="printed"):
+    def __init__(self, scene, conditions, law="ismail_dunnigan"):
         self.scene, self.conditions = scene, conditions
         self.vehicle = load_vehicle("odin")
         self.known = told(scene)
@@ -118,7 +118,10 @@ def distances(scene, positions, step):
 @pytest.mark.parametrize("scene", [PLAIN[0], HARD[1]], ids=["plain", "hard"])
 @pytest.mark.parametrize(
     "law",
-    ["printed", *(pytest.param(law, marks=pytest.mark.slow) for law in sorted(LAWS) if law != "printed")],
+    [
+        "ismail_dunnigan",
+        *(pytest.param(law, marks=pytest.mark.slow) for law in sorted(LAWS) if law != "ismail_dunnigan"),
+    ],
 )
 def test_compiled_loop_flies_as_the_readable_one(law, scene):
     if scene.failed_thruster:
@@ -138,7 +141,7 @@ def test_compiled_loop_flies_as_the_readable_one(law, scene):
 def test_a_plant_that_flew_before_flies_as_a_new_one(flyer):
     flyer.fly(HARD[2])
     again, trace = flyer.fly(HARD[0], trace=True)
-    with SceneFlyer("printed", SHORT) as new:
+    with SceneFlyer("ismail_dunnigan", SHORT) as new:
         fresh, expected = new.fly(HARD[0], trace=True)
     np.testing.assert_array_equal(trace, expected)
     assert again._replace(worst_step=0.0) == fresh._replace(worst_step=0.0)
@@ -148,9 +151,9 @@ def test_reached_means_inside_for_the_last_seconds_and_reach_time_is_since_when(
     around = replace(PLAIN[0], goal=SphereSpec(PLAIN[0].start, 50.0))  # it starts inside and never leaves
     score, _ = flyer.fly(around)
     assert score.reach_time == 0.0 and not score.reached  # 8 s are less than 10
-    with SceneFlyer("printed", replace(SHORT, settled=8.0)) as patient:
+    with SceneFlyer("ismail_dunnigan", replace(SHORT, settled=8.0)) as patient:
         assert patient.fly(around)[0].reached
-    with SceneFlyer("printed", replace(SHORT, settled=8.001)) as impatient:
+    with SceneFlyer("ismail_dunnigan", replace(SHORT, settled=8.001)) as impatient:
         assert not impatient.fly(around)[0].reached
 
 
@@ -173,7 +176,7 @@ def test_the_start_is_scored_too(flyer):
 # ---- what fails ----
 
 
-class _Loose(PrintedLaw):
+class _Loose(IsmailDunniganLaw):
     """Gives up after 50 steps."""
 
     name = "loose"
@@ -238,8 +241,8 @@ def test_conditions_that_cannot_be(wrong, words):
 
 
 def test_an_unknown_law_is_named_with_the_known_ones():
-    with pytest.raises(RunError, match=r"law is 'prinetd', expected one of .*printed"):
-        SceneFlyer("prinetd")
+    with pytest.raises(RunError, match=r"law is 'ismail_duningan', expected one of .*ismail_dunnigan"):
+        SceneFlyer("ismail_duningan")
 
 
 @pytest.mark.filterwarnings("ignore:Exception ignored")

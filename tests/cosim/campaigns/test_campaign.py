@@ -11,7 +11,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from controller import LawError
-from controller.printed_law import Gains
+from controller.paper_law import Gains
 from cosim.campaigns import campaign as module
 from cosim.campaigns import run_campaign
 from cosim.campaigns.analysis.summary import summarise
@@ -36,7 +36,7 @@ def scenes(tmp_path):
 
 
 def test_a_row_a_scene_in_order_of_seed(tmp_path, scenes):
-    done = run_campaign(scenes, "printed", tmp_path / "out", BRIEF)
+    done = run_campaign(scenes, "ismail_dunnigan", tmp_path / "out", BRIEF)
     assert done.flown == 20
     assert sorted(p.name for p in (tmp_path / "out").iterdir()) == [
         ".lock", "campaign.json", "results.parquet", "summary.json"
@@ -54,8 +54,8 @@ def test_a_row_a_scene_in_order_of_seed(tmp_path, scenes):
 def test_rows_are_what_the_flyer_scores(tmp_path):
     wide = [scene | {"goal": {"centre": scene["start"], "radius": 40.0}} for scene in HARD]  # they start inside
     conditions = replace(BRIEF, settled=0.3)
-    found = run_campaign(write(tmp_path / "s.jsonl", wide), "printed", tmp_path / "out", conditions).results
-    with SceneFlyer("printed", conditions) as flyer:
+    found = run_campaign(write(tmp_path / "s.jsonl", wide), "ismail_dunnigan", tmp_path / "out", conditions).results
+    with SceneFlyer("ismail_dunnigan", conditions) as flyer:
         for i, scene in enumerate(wide):
             score, _ = flyer.fly(decode_scene(json.dumps(scene).encode()))
             row = found.table.to_pylist()[i]
@@ -66,13 +66,13 @@ def test_rows_are_what_the_flyer_scores(tmp_path):
 
 
 def test_another_law_is_refused_by_its_name_alone(tmp_path, scenes):
-    run_campaign(scenes, "printed", tmp_path / "out", BRIEF)
-    with pytest.raises(RunError, match=r"another campaign \(law is 'printed', now 'deployable'\)"):
+    run_campaign(scenes, "ismail_dunnigan", tmp_path / "out", BRIEF)
+    with pytest.raises(RunError, match=r"another campaign \(law is 'ismail_dunnigan', now 'deployable'\)"):
         run_campaign(scenes, "deployable", tmp_path / "out", BRIEF)
 
 
 def test_what_is_interrupted_goes_on_without_losing_or_repeating(tmp_path, scenes, monkeypatch):
-    whole = run_campaign(scenes, "printed", tmp_path / "whole", BRIEF)
+    whole = run_campaign(scenes, "ismail_dunnigan", tmp_path / "whole", BRIEF)
     flown = []
 
     def until(stop):
@@ -88,10 +88,10 @@ def test_what_is_interrupted_goes_on_without_losing_or_repeating(tmp_path, scene
     for stop in (2, 5):
         monkeypatch.setattr("cosim.campaigns.workers.worker_pools.fly", until(stop))
         with pytest.raises(KeyboardInterrupt):
-            run_campaign(scenes, "printed", tmp_path / "out", BRIEF)
+            run_campaign(scenes, "ismail_dunnigan", tmp_path / "out", BRIEF)
         assert not (tmp_path / "out" / RESULTS).exists()
     monkeypatch.setattr("cosim.campaigns.workers.worker_pools.fly", until(99))
-    done = run_campaign(scenes, "printed", tmp_path / "out", BRIEF)
+    done = run_campaign(scenes, "ismail_dunnigan", tmp_path / "out", BRIEF)
     assert sorted(seed for batch in flown for seed in batch) == list(range(1000, 1020))
     assert done.flown == 5
     assert rows(done.results) == rows(whole.results)
@@ -104,24 +104,24 @@ def test_killed_at_the_end_nothing_is_flown_again(tmp_path, scenes, monkeypatch,
         where = (CampaignFolder, "remove_parts") if at == "join" else (module, "write_atomic")
         patch.setattr(*where, lambda *_: (_ for _ in ()).throw(KeyboardInterrupt))
         with pytest.raises(KeyboardInterrupt):
-            run_campaign(scenes, "printed", tmp_path / "out", BRIEF)
-    done = run_campaign(scenes, "printed", tmp_path / "out", BRIEF)
+            run_campaign(scenes, "ismail_dunnigan", tmp_path / "out", BRIEF)
+    done = run_campaign(scenes, "ismail_dunnigan", tmp_path / "out", BRIEF)
     assert done.flown == 0 and done.summary["scenes"] == 20
     assert (tmp_path / "out" / SUMMARY).exists() and not (tmp_path / "out" / PARTS).exists()
 
 
 def test_a_damaged_part_is_flown_again(tmp_path, scenes, monkeypatch):
-    whole = run_campaign(scenes, "printed", tmp_path / "whole", BRIEF)
+    whole = run_campaign(scenes, "ismail_dunnigan", tmp_path / "whole", BRIEF)
     batches_of(monkeypatch, 5)
     with monkeypatch.context() as patch:
         patch.setattr(CampaignFolder, "join", lambda _: (_ for _ in ()).throw(KeyboardInterrupt))
         with pytest.raises(KeyboardInterrupt):
-            run_campaign(scenes, "printed", tmp_path / "out", BRIEF)
+            run_campaign(scenes, "ismail_dunnigan", tmp_path / "out", BRIEF)
     parts = sorted((tmp_path / "out" / PARTS).iterdir())
     assert len(parts) == 4
     parts[1].write_bytes(parts[1].read_bytes()[:100])
     (tmp_path / "out" / PARTS / ".00000009-00000009.parquet-1").write_bytes(b"half")
-    done = run_campaign(scenes, "printed", tmp_path / "out", BRIEF)
+    done = run_campaign(scenes, "ismail_dunnigan", tmp_path / "out", BRIEF)
     assert done.flown == 5 and rows(done.results) == rows(whole.results)
 
 
@@ -141,7 +141,7 @@ def test_the_folder_of_another_campaign_is_refused(tmp_path, scenes, monkeypatch
         if not complete:
             patch.setattr(CampaignFolder, "join", lambda _: (_ for _ in ()).throw(KeyboardInterrupt))
         try:
-            run_campaign(scenes, "printed", tmp_path / "out", BRIEF)
+            run_campaign(scenes, "ismail_dunnigan", tmp_path / "out", BRIEF)
         except KeyboardInterrupt:
             assert not complete
     before = {p: p.read_bytes() for p in (tmp_path / "out").rglob("*") if p.is_file()}
@@ -150,7 +150,7 @@ def test_the_folder_of_another_campaign_is_refused(tmp_path, scenes, monkeypatch
     if "code" in change:
         monkeypatch.setattr("cosim.campaigns.scenes.plan.code_digest", lambda: "other")
     with pytest.raises(RunError, match=f"holds another campaign .*{words}"):
-        run_campaign(scenes, "printed", tmp_path / "out", change.get("conditions", BRIEF), change.get("gains"))
+        run_campaign(scenes, "ismail_dunnigan", tmp_path / "out", change.get("conditions", BRIEF), change.get("gains"))
     assert {p: p.read_bytes() for p in (tmp_path / "out").rglob("*") if p.is_file()} == before
 
 
@@ -158,7 +158,7 @@ def test_a_folder_that_holds_something_else_is_refused(tmp_path, scenes):
     (tmp_path / "out").mkdir()
     (tmp_path / "out" / "precious").write_text("x")
     with pytest.raises(RunError, match="holds no campaign"):
-        run_campaign(scenes, "printed", tmp_path / "out", BRIEF)
+        run_campaign(scenes, "ismail_dunnigan", tmp_path / "out", BRIEF)
     assert [p.name for p in (tmp_path / "out").iterdir()] == ["precious"]
 
 
@@ -167,22 +167,22 @@ def test_a_damaged_plan_is_refused(tmp_path, scenes, content):
     (tmp_path / "out").mkdir()
     (tmp_path / "out" / "campaign.json").write_bytes(content.encode("latin-1"))
     with pytest.raises(RunError, match=r"campaign\.json"):
-        run_campaign(scenes, "printed", tmp_path / "out", BRIEF)
+        run_campaign(scenes, "ismail_dunnigan", tmp_path / "out", BRIEF)
 
 
 def test_a_folder_in_use_is_refused(tmp_path, scenes):
     with SceneStore(scenes) as store:
-        work = SceneWork(store, SceneTask("printed", Gains(), BRIEF))
+        work = SceneWork(store, SceneTask("ismail_dunnigan", Gains(), BRIEF))
     with CampaignFolder(tmp_path / "out", work):
         with pytest.raises(RunError, match="another process is at work"):
-            run_campaign(scenes, "printed", tmp_path / "out", BRIEF)
-    assert run_campaign(scenes, "printed", tmp_path / "out", BRIEF).flown == 20
+            run_campaign(scenes, "ismail_dunnigan", tmp_path / "out", BRIEF)
+    assert run_campaign(scenes, "ismail_dunnigan", tmp_path / "out", BRIEF).flown == 20
 
 
 def test_a_folder_that_cannot_be_written(tmp_path, scenes):
     (tmp_path / "file").write_text("")
     with pytest.raises(RunError, match="file"):
-        run_campaign(scenes, "printed", tmp_path / "file" / "out", BRIEF)
+        run_campaign(scenes, "ismail_dunnigan", tmp_path / "file" / "out", BRIEF)
 
 
 def test_a_full_disk_is_one_line_and_what_was_done_is_kept(tmp_path, scenes, monkeypatch):
@@ -197,13 +197,13 @@ def test_a_full_disk_is_one_line_and_what_was_done_is_kept(tmp_path, scenes, mon
     with monkeypatch.context() as patch:
         patch.setattr(CampaignFolder, "add", full)
         with pytest.raises(RunError, match="No space left"):
-            run_campaign(scenes, "printed", tmp_path / "out", BRIEF)
-    assert run_campaign(scenes, "printed", tmp_path / "out", BRIEF).flown == 10
+            run_campaign(scenes, "ismail_dunnigan", tmp_path / "out", BRIEF)
+    assert run_campaign(scenes, "ismail_dunnigan", tmp_path / "out", BRIEF).flown == 10
 
 
 def test_what_the_plant_refuses_has_a_row_that_says_so(tmp_path):
     bad = [PLAIN[0], PLAIN[1] | {"weight_minus_buoyancy": 1e6}, PLAIN[2] | {"righting_moment": 1e300}, PLAIN[3]]
-    done = run_campaign(write(tmp_path / "s.jsonl", bad), "printed", tmp_path / "out", BRIEF)
+    done = run_campaign(write(tmp_path / "s.jsonl", bad), "ismail_dunnigan", tmp_path / "out", BRIEF)
     first, *refused, last = done.results.table.to_pylist()
     assert first["stopped_at"] is None and last["stopped_at"] is None and last["effort"] > 0.0
     for row in refused:
@@ -242,12 +242,17 @@ def test_the_summary_follows_from_the_rows(tmp_path):
         Score(False, math.inf, 0.1, 900.0, 90.0, 2e-6, -1),
         Score(False, math.inf, 0.4, 5.0, 5.0, 1e-6, 10),
     ]
-    plan = plan_of("printed", Gains(), Conditions(tell_failures=True), 4, "abc")
+    plan = plan_of("ismail_dunnigan", Gains(), Conditions(tell_failures=True), 4, "abc")
     lines = [json.dumps(scene) for scene in (*PLAIN[:2], *HARD[:2])]
     told = [row_of(9 - i, s, 0.01, line) for i, (s, line) in enumerate(zip(scores, lines, strict=True))]
     found = results_of(tmp_path / "rows.parquet", told[::-1])
     summary = summarise(plan, found, tmp_path)
-    assert (summary["law"], summary["scenes"], summary["reached"], summary["violations"]) == ("printed", 4, 2, 2)
+    assert (summary["law"], summary["scenes"], summary["reached"], summary["violations"]) == (
+        "ismail_dunnigan",
+        4,
+        2,
+        2,
+    )
     assert summary["medians"] == {
         "reach_time": 40.0, "effort": 200.0, "thrust_variation": 20.0, "worst_step_time": 2e-6,
         "min_clearance": pytest.approx(0.05),
@@ -268,7 +273,7 @@ def test_the_summary_follows_from_the_rows(tmp_path):
 
 
 def test_medians_of_nothing_are_none(tmp_path, scenes):
-    assert run_campaign(scenes, "printed", tmp_path / "out", BRIEF).summary["medians"]["reach_time"] is None
+    assert run_campaign(scenes, "ismail_dunnigan", tmp_path / "out", BRIEF).summary["medians"]["reach_time"] is None
 
 
 # ---- scenes and gains ----
@@ -284,7 +289,7 @@ def test_medians_of_nothing_are_none(tmp_path, scenes):
 )
 def test_scenes_that_cannot_be_flown_are_refused_before_anything_is_written(tmp_path, lines, words):
     with pytest.raises(ScenarioError, match=words):
-        run_campaign(write(tmp_path / "s.jsonl", lines), "printed", tmp_path / "out", BRIEF)
+        run_campaign(write(tmp_path / "s.jsonl", lines), "ismail_dunnigan", tmp_path / "out", BRIEF)
     assert not (tmp_path / "out").exists()
 
 
@@ -298,17 +303,17 @@ def test_a_store_gives_back_each_scene_and_knows_blanks_for_nothing(tmp_path):
 
 
 def test_gains_from_texts():
-    assert gains_from("printed", ["k_p1=10", " gamma = 3e0 "]) == Gains(k_p1=10.0, gamma=3.0)
-    assert gains_by_law(["printed"], ["printed.k_q=2"]) == {"printed": Gains(k_q=2.0)}
+    assert gains_from("ismail_dunnigan", ["k_p1=10", " gamma = 3e0 "]) == Gains(k_p1=10.0, gamma=3.0)
+    assert gains_by_law(["ismail_dunnigan"], ["ismail_dunnigan.k_q=2"]) == {"ismail_dunnigan": Gains(k_q=2.0)}
 
 
 @pytest.mark.parametrize(
     ("law", "settings", "words"),
     [
-        ("prined", [], "law 'prined' is unknown; did you mean 'printed'"),
-        ("printed", ["k_p1"], "expected key=value"),
-        ("printed", ["kp1=3"], "no such gain; did you mean 'k_p1'"),
-        ("printed", ["k_p1=much"], "'much' is no number"),
+        ("ismail_dunigan", [], "law 'ismail_dunigan' is unknown; did you mean 'ismail_dunnigan'"),
+        ("ismail_dunnigan", ["k_p1"], "expected key=value"),
+        ("ismail_dunnigan", ["kp1=3"], "no such gain; did you mean 'k_p1'"),
+        ("ismail_dunnigan", ["k_p1=much"], "'much' is no number"),
     ],
 )
 def test_gains_that_cannot_be(law, settings, words):
@@ -317,19 +322,19 @@ def test_gains_that_cannot_be(law, settings, words):
 
 
 def test_gains_of_a_law_that_is_not_compared():
-    with pytest.raises(RunError, match=r"expected LAW\.KEY=VALUE with one of printed"):
-        gains_by_law(["printed"], ["k_p1=3"])
+    with pytest.raises(RunError, match=r"expected LAW\.KEY=VALUE with one of ismail_dunnigan"):
+        gains_by_law(["ismail_dunnigan"], ["k_p1=3"])
 
 
 def test_gains_that_the_law_refuses_leave_no_folder(tmp_path, scenes):
     with pytest.raises(LawError, match="gamma"):
-        run_campaign(scenes, "printed", tmp_path / "out", BRIEF, gains_from("printed", ["gamma=0"]))
+        run_campaign(scenes, "ismail_dunnigan", tmp_path / "out", BRIEF, gains_from("ismail_dunnigan", ["gamma=0"]))
     assert not (tmp_path / "out").exists()
 
 
 def test_no_workers_are_refused(tmp_path, scenes):
     with pytest.raises(RunError, match="workers is 0"):
-        run_campaign(scenes, "printed", tmp_path / "out", BRIEF, workers=0)
+        run_campaign(scenes, "ismail_dunnigan", tmp_path / "out", BRIEF, workers=0)
 
 
 def test_a_difference_is_said_in_words():

@@ -5,8 +5,8 @@ import math
 
 import pytest
 
-from controller import LAWS, PrintedLaw
-from controller.printed_law import Gains
+from controller import LAWS, IsmailDunniganLaw
+from controller.paper_law import Gains
 from cosim.batch import fused_loop
 from cosim.campaigns import compare
 from cosim.campaigns.comparison import difference, pair
@@ -16,7 +16,7 @@ from cosim.errors import RunError
 from tests.cosim.campaigns.scene_data import BRIEF, HARD, results_of, rows, write
 
 
-class Idle(PrintedLaw):
+class Idle(IsmailDunniganLaw):
     """Does nothing, well."""
 
     name = "idle"
@@ -39,29 +39,33 @@ def scenes(tmp_path):
 
 def test_laws_stand_side_by_side(tmp_path, scenes, idle):
     out = tmp_path / "out"
-    done = compare(scenes, ["printed", "idle"], out, BRIEF, {"printed": Gains(k_p1=9.0)})
-    assert sorted(p.name for p in out.iterdir()) == ["compare.json", "idle", "printed"]
+    done = compare(scenes, ["ismail_dunnigan", "idle"], out, BRIEF, {"ismail_dunnigan": Gains(k_p1=9.0)})
+    assert sorted(p.name for p in out.iterdir()) == ["compare.json", "idle", "ismail_dunnigan"]
     numbers = json.loads((out / "compare.json").read_text())
     assert numbers == done.numbers and numbers["scenes"] == 2
-    assert numbers["laws"]["printed"]["gains"]["k_p1"] == 9.0
+    assert numbers["laws"]["ismail_dunnigan"]["gains"]["k_p1"] == 9.0
     assert numbers["laws"]["idle"] == json.loads((out / "idle" / "summary.json").read_text())
     assert done.campaigns["idle"].results["effort"].tolist() == [0.0, 0.0]
     (paired,) = numbers["paired"]
-    assert paired["laws"] == ["printed", "idle"] and paired["neither"] == 2 and paired["p"] is None
+    assert paired["laws"] == ["ismail_dunnigan", "idle"] and paired["neither"] == 2 and paired["p"] is None
 
 
 @pytest.mark.slow
 def test_what_is_compared_already_is_not_flown_again_and_more_laws_may_come(tmp_path, scenes, idle, monkeypatch):
     monkeypatch.setitem(LAWS, "idler", type("Idler", (Idle,), {"name": "idler"}))
-    first = compare(scenes, ["printed", "idle"], tmp_path / "out", BRIEF)
-    done = compare(scenes, ["idle", "idler", "printed"], tmp_path / "out", BRIEF)
-    assert {law: c.flown for law, c in done.campaigns.items()} == {"idle": 0, "idler": 2, "printed": 0}
-    assert rows(done.campaigns["printed"].results) == rows(first.campaigns["printed"].results)
+    first = compare(scenes, ["ismail_dunnigan", "idle"], tmp_path / "out", BRIEF)
+    done = compare(scenes, ["idle", "idler", "ismail_dunnigan"], tmp_path / "out", BRIEF)
+    assert {law: c.flown for law, c in done.campaigns.items()} == {"idle": 0, "idler": 2, "ismail_dunnigan": 0}
+    assert rows(done.campaigns["ismail_dunnigan"].results) == rows(first.campaigns["ismail_dunnigan"].results)
 
 
 @pytest.mark.parametrize(
     ("laws", "words"),
-    [(["printed"], "expected two or more"), (["printed", "printed"], "each once"), (["printed", "nil"], "'nil'")],
+    [
+        (["ismail_dunnigan"], "expected two or more"),
+        (["ismail_dunnigan", "ismail_dunnigan"], "each once"),
+        (["ismail_dunnigan", "nil"], "'nil'"),
+    ],
 )
 def test_laws_that_cannot_be_compared(tmp_path, scenes, laws, words):
     with pytest.raises(RunError, match=words):
@@ -73,7 +77,7 @@ def test_a_folder_that_holds_something_else_is_refused(tmp_path, scenes, idle):
     (tmp_path / "out").mkdir()
     (tmp_path / "out" / "precious").write_text("x")
     with pytest.raises(RunError, match="holds 'precious'"):
-        compare(scenes, ["printed", "idle"], tmp_path / "out", BRIEF)
+        compare(scenes, ["ismail_dunnigan", "idle"], tmp_path / "out", BRIEF)
     assert [p.name for p in (tmp_path / "out").iterdir()] == ["precious"]
 
 

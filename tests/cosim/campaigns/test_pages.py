@@ -79,7 +79,7 @@ def runs_of(replay):
 def flown(tmp_path_factory):
     """Return the folder of a campaign of two kinds of scenes and a refused one, with its page and a replay."""
     folder = tmp_path_factory.mktemp("flown")
-    run_campaign(write(folder / "s.jsonl", [*PLAIN[:4], *HARD[4:], REFUSED]), "printed", folder / "out", BRIEF)
+    run_campaign(write(folder / "s.jsonl", [*PLAIN[:4], *HARD[4:], REFUSED]), "ismail_dunnigan", folder / "out", BRIEF)
     write_campaign_page(folder / "out", 1)
     return folder / "out"
 
@@ -104,7 +104,7 @@ def test_the_page_of_a_campaign_is_whole_and_says_what_the_summary_says(flown):
 def test_a_replay_shows_the_flight_of_the_row(flown):
     key = json.loads((flown / "summary.json").read_text())["worst"][0]["row"]
     (run,) = runs_of(flown / "worst" / str(key) / "replay.html")
-    assert run["name"] == f"printed-scene-{key}" and run["duration"] == BRIEF.duration
+    assert run["name"] == f"ismail_dunnigan-scene-{key}" and run["duration"] == BRIEF.duration
     assert run["status"] == "completed"
 
 
@@ -124,7 +124,7 @@ def test_the_page_is_the_same_from_two_processes(tmp_path, monkeypatch):
         (tmp_path / name).mkdir()
         monkeypatch.chdir(tmp_path / name)
         write(tmp_path / name / "s.jsonl", [*PLAIN[:3], *HARD[3:]])
-        words = ["--law", "printed", "--out", "out", "--workers", str(workers), "--replays", "1"]
+        words = ["--law", "ismail_dunnigan", "--out", "out", "--workers", str(workers), "--replays", "1"]
         assert main(["campaign", "s.jsonl", *words]) == 0
         pages.append(without_wall((tmp_path / name / "out" / "campaign.html").read_text()))
     assert pages[0] == pages[1] and "replay" in pages[0]
@@ -133,7 +133,7 @@ def test_the_page_is_the_same_from_two_processes(tmp_path, monkeypatch):
 @pytest.mark.slow
 def test_ctrl_c_while_replays_are_flown_leaves_the_page_without_them(tmp_path, monkeypatch):
     out = tmp_path / "out"
-    run_campaign(write(tmp_path / "s.jsonl", PLAIN[:2]), "printed", out, BRIEF)
+    run_campaign(write(tmp_path / "s.jsonl", PLAIN[:2]), "ismail_dunnigan", out, BRIEF)
     with monkeypatch.context() as patch:
         patch.setattr("cosim.run.run.Master.run", lambda *_, **__: (_ for _ in ()).throw(KeyboardInterrupt))
         with pytest.raises(KeyboardInterrupt):
@@ -147,7 +147,7 @@ def test_a_flight_that_comes_out_otherwise_is_said_beside_its_replay(tmp_path, m
     from cosim.campaigns.reruns.repeat import Repeat
 
     out = tmp_path / "out"
-    run_campaign(write(tmp_path / "s.jsonl", PLAIN[:1]), "printed", out, BRIEF)
+    run_campaign(write(tmp_path / "s.jsonl", PLAIN[:1]), "ismail_dunnigan", out, BRIEF)
     monkeypatch.setattr(Repeat, "apart", lambda self, came: {"min_clearance": (0.5, came["min_clearance"])})
     write_campaign_page(out, 1)
     assert "it came out otherwise: min_clearance" in (out / "campaign.html").read_text()
@@ -155,7 +155,7 @@ def test_a_flight_that_comes_out_otherwise_is_said_beside_its_replay(tmp_path, m
 
 @pytest.mark.parametrize("scenes", [[REFUSED], PLAIN[:1]], ids=["none that could be flown", "one"])
 def test_few_scenes_have_a_page_too(tmp_path, scenes):
-    run_campaign(write(tmp_path / "s.jsonl", scenes), "printed", tmp_path / "out", BRIEF)
+    run_campaign(write(tmp_path / "s.jsonl", scenes), "ismail_dunnigan", tmp_path / "out", BRIEF)
     text = write_campaign_page(tmp_path / "out", 0).read_text()
     check(tmp_path / "out" / "campaign.html")
     assert ("None of the 1 scenes could be flown" in text) == (scenes[0] is REFUSED)
@@ -164,7 +164,9 @@ def test_few_scenes_have_a_page_too(tmp_path, scenes):
 
 def test_a_flight_that_the_plant_stops_can_be_seen_until_then(tmp_path):
     out = tmp_path / "out"
-    done = run_campaign(write(tmp_path / "s.jsonl", [PLAIN[0] | {"righting_moment": -5e4}]), "printed", out, BRIEF)
+    done = run_campaign(
+        write(tmp_path / "s.jsonl", [PLAIN[0] | {"righting_moment": -5e4}]), "ismail_dunnigan", out, BRIEF
+    )
     (row,) = done.results.table.to_pylist()
     assert row["stopped_at"] > 0.0
     write_campaign_page(out, 1)
@@ -211,13 +213,13 @@ def test_the_page_of_a_sweep(tmp_path, fakes):
 @pytest.mark.slow
 def test_the_page_of_a_comparison_has_all_laws_in_each_replay(tmp_path, idle):
     out = tmp_path / "out"
-    compare(write(tmp_path / "s.jsonl", [*HARD[:2], REFUSED]), ["printed", "idle"], out, BRIEF)
+    compare(write(tmp_path / "s.jsonl", [*HARD[:2], REFUSED]), ["ismail_dunnigan", "idle"], out, BRIEF)
     checker = check(write_comparison_page(out, 1))
     assert checker.asked and "p:" in (out / "compare.html").read_text()
     runs = runs_of(out / checker.asked[0])
-    assert [run["name"] for run in runs] == ["printed", "idle"]
+    assert [run["name"] for run in runs] == ["ismail_dunnigan", "idle"]
     assert {p.stem for p in (out / "figures").iterdir()} == {"rates", "distributions", "scenes-printed-idle"}
-    compare(tmp_path / "s.jsonl", ["printed", "idle"], out, BRIEF)  # a folder with a page is no stranger
+    compare(tmp_path / "s.jsonl", ["ismail_dunnigan", "idle"], out, BRIEF)  # a folder with a page is no stranger
     with pytest.raises(RunError, match=r"compare\.json: cannot be read"):
         write_comparison_page(tmp_path, 1)
 
@@ -225,7 +227,7 @@ def test_the_page_of_a_comparison_has_all_laws_in_each_replay(tmp_path, idle):
 def test_how_many_replays_is_a_number(capsys):
     for text in ("-1", "all", "1e9"):
         with pytest.raises(SystemExit):
-            main(["campaign", "s.jsonl", "--law", "printed", "--out", "o", "--replays", text])
+            main(["campaign", "s.jsonl", "--law", "ismail_dunnigan", "--out", "o", "--replays", text])
         assert "from 0 to 1000" in capsys.readouterr().err
 
 
@@ -275,7 +277,7 @@ def test_a_scene_of_a_campaign_becomes_a_run(tmp_path, capsys):
     conditions = Conditions(duration=3.0, settled=1.0)
     inside = HARD[0] | {"goal": {"centre": HARD[0]["start"], "radius": 40.0}}
     out = tmp_path / "out"
-    run_campaign(write(tmp_path / "s.jsonl", [inside]), "printed", out, conditions)
+    run_campaign(write(tmp_path / "s.jsonl", [inside]), "ismail_dunnigan", out, conditions)
     assert main(["rerun", str(out), "20000", "--out", str(tmp_path / "run")]) == 0
     said = capsys.readouterr()
     assert said.out.startswith("row 20000: flown again, identical to the last bit\n") and said.err == ""

@@ -139,7 +139,10 @@ def test_a_scenario_that_was_changed_is_not_flown(folder):
 def test_a_scene_comes_again_to_the_last_bit(tmp_path, capsys):
     out = tmp_path / "out"
     run_campaign(
-        write(tmp_path / "s.jsonl", [*PLAIN[:2], PLAIN[2] | {"weight_minus_buoyancy": 1e6}]), "printed", out, BRIEF
+        write(tmp_path / "s.jsonl", [*PLAIN[:2], PLAIN[2] | {"weight_minus_buoyancy": 1e6}]),
+        "ismail_dunnigan",
+        out,
+        BRIEF,
     )
     for seed in (20000, 20001, 20002):
         assert main(["rerun", str(out), str(seed), "--out", str(tmp_path / str(seed))]) == 0

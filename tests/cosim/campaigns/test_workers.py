@@ -22,14 +22,14 @@ N = 60
 def whole(tmp_path_factory):
     """Return the rows of scenes that were flown in one go, by one process."""
     folder = tmp_path_factory.mktemp("whole")
-    return rows(run_campaign(write(folder / "s.jsonl", many(N)), "printed", folder / "out").results)
+    return rows(run_campaign(write(folder / "s.jsonl", many(N)), "ismail_dunnigan", folder / "out").results)
 
 
 @pytest.mark.slow
 def test_two_workers_give_the_same_rows_as_one(tmp_path):
     scenes, brief = write(tmp_path / "s.jsonl", [*many(18), *HARD]), Conditions(duration=20.0)
-    one = run_campaign(scenes, "printed", tmp_path / "one", brief)
-    two = run_campaign(scenes, "printed", tmp_path / "two", brief, workers=2)
+    one = run_campaign(scenes, "ismail_dunnigan", tmp_path / "one", brief)
+    two = run_campaign(scenes, "ismail_dunnigan", tmp_path / "two", brief, workers=2)
     assert rows(one.results) == rows(two.results) and len(rows(one.results)) == 24
 
 
@@ -37,7 +37,7 @@ def test_two_workers_give_the_same_rows_as_one(tmp_path):
 @pytest.mark.slow
 def test_a_killed_campaign_goes_on_by_the_same_command(tmp_path, command, whole):
     scenes = write(tmp_path / "s.jsonl", many(N))
-    killed = command("campaign", scenes, "--law", "printed", "--workers", 2)
+    killed = command("campaign", scenes, "--law", "ismail_dunnigan", "--workers", 2)
     killed.wait_for_parts(3)
     os.kill(killed.process.pid, signal.SIGKILL)
     killed.process.communicate(timeout=240)  # which its workers, who follow, hold open
@@ -45,7 +45,7 @@ def test_a_killed_campaign_goes_on_by_the_same_command(tmp_path, command, whole)
     before = killed.keys()
     assert len(before) >= 3 and len(set(before)) == len(before)
 
-    again = command("campaign", scenes, "--law", "printed", "--workers", 2)
+    again = command("campaign", scenes, "--law", "ismail_dunnigan", "--workers", 2)
     said, complaints = again.process.communicate(timeout=240)
     assert (again.process.returncode, complaints) == (0, "")
     assert f"of {N} scenes reached" in said and (again.out / "campaign.html").exists()
@@ -61,7 +61,7 @@ def test_a_killed_campaign_goes_on_by_the_same_command(tmp_path, command, whole)
 @pytest.mark.parametrize(("workers", "sent"), [(1, signal.SIGINT), (2, signal.SIGINT), (2, signal.SIGHUP)])
 def test_ctrl_c_or_a_closed_terminal_keeps_what_is_done(tmp_path, command, workers, sent):
     scenes = write(tmp_path / "s.jsonl", many(2 * N))
-    interrupted = command("campaign", scenes, "--law", "printed", "--workers", workers)
+    interrupted = command("campaign", scenes, "--law", "ismail_dunnigan", "--workers", workers)
     interrupted.wait_for_parts(2)
     os.killpg(interrupted.process.pid, sent)  # as a terminal does
     said, complaints = interrupted.process.communicate(timeout=240)
@@ -78,7 +78,7 @@ def test_ctrl_c_or_a_closed_terminal_keeps_what_is_done(tmp_path, command, worke
 @pytest.mark.slow
 def test_a_worker_that_is_killed_is_replaced(tmp_path, command, whole):
     scenes = write(tmp_path / "s.jsonl", many(N))
-    bereft = command("campaign", scenes, "--law", "printed", "--workers", 2)
+    bereft = command("campaign", scenes, "--law", "ismail_dunnigan", "--workers", 2)
     bereft.wait_for_parts(3)
     os.kill(bereft.workers()[0], signal.SIGKILL)
     _, complaints = bereft.process.communicate(timeout=240)
@@ -90,9 +90,9 @@ def test_a_worker_that_is_killed_is_replaced(tmp_path, command, whole):
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["--law", "prinetd"], "law 'prinetd' is unknown; did you mean 'printed'"),
-        (["--law", "printed", "--set", "k_p1=big"], "'big' is no number"),
-        (["--law", "printed", "--set", "k_p1=-1"], "law.gains.k_p1 is -1.0"),
+        (["--law", "ismail_duningan"], "law 'ismail_duningan' is unknown; did you mean 'ismail_dunnigan'"),
+        (["--law", "ismail_dunnigan", "--set", "k_p1=big"], "'big' is no number"),
+        (["--law", "ismail_dunnigan", "--set", "k_p1=-1"], "law.gains.k_p1 is -1.0"),
     ],
 )
 def test_what_the_user_must_mend_is_one_line(tmp_path, capsys, words, said):
@@ -105,14 +105,14 @@ def test_what_the_user_must_mend_is_one_line(tmp_path, capsys, words, said):
 @pytest.mark.parametrize("workers", ["0", "-1", "two", "1e3", "9999"])
 def test_a_number_of_workers_that_cannot_be(capsys, workers):
     with pytest.raises(SystemExit) as left:
-        main(["campaign", "s.jsonl", "--law", "printed", "--out", "out", "--workers", workers])
+        main(["campaign", "s.jsonl", "--law", "ismail_dunnigan", "--out", "out", "--workers", workers])
     assert left.value.code == 2 and "from 1 to 1024" in capsys.readouterr().err
 
 
 def test_scenes_come_by_standard_input_too(tmp_path, capsys, monkeypatch):
     scenes = write(tmp_path / "s.jsonl", HARD[:1])
     out = tmp_path / "out"
-    words = ["--law", "printed", "--out", str(out), "--replays", "0"]
+    words = ["--law", "ismail_dunnigan", "--out", str(out), "--replays", "0"]
     with scenes.open() as stream:
         monkeypatch.setattr("sys.stdin", stream)
         assert main(["campaign", "-", *words, "--tell-failures"]) == 0
@@ -125,7 +125,7 @@ def test_scenes_come_by_standard_input_too(tmp_path, capsys, monkeypatch):
 
 def test_compare_from_the_command_line(tmp_path, capsys):
     scenes = write(tmp_path / "s.jsonl", HARD[:1])
-    assert main(["compare", str(scenes), "--laws", "printed", "--out", str(tmp_path / "out")]) == 2
+    assert main(["compare", str(scenes), "--laws", "ismail_dunnigan", "--out", str(tmp_path / "out")]) == 2
     assert "expected two or more" in capsys.readouterr().err
-    assert main(["compare", str(scenes), "--laws", "printed,none", "--out", str(tmp_path / "out")]) == 2
+    assert main(["compare", str(scenes), "--laws", "ismail_dunnigan,none", "--out", str(tmp_path / "out")]) == 2
     assert "law 'none' is unknown" in capsys.readouterr().err

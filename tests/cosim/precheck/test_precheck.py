@@ -229,7 +229,7 @@ def test_command_succeeds_where_nothing_fails(capsys):
 def test_command_as_json(capsys):
     assert main(["check", "paper", "--set", CLOSED, "--set", "law.gains.sigma_p=0", "--json"]) == 1
     result = json.loads(capsys.readouterr().out)
-    assert result["holds"] is False and result["law"] == "printed"
+    assert result["holds"] is False and result["law"] == "ismail_dunnigan"
     by_name = {finding["name"]: finding for finding in result["findings"]}
     assert by_name["(38) 1, 2"]["numbers"]["greatest_gradient"] is None  # everywhere
     assert result == json.loads(check_json(check(load_scenario("paper", [CLOSED, "law.gains.sigma_p=0"]))))

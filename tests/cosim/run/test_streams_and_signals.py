@@ -69,7 +69,7 @@ def test_D7_without_standard_error_complaints_do_not_go_into_the_output(program,
 
 def test_D7_without_standard_input_scenes_are_none(tmp_path, capsys, monkeypatch):
     monkeypatch.setattr(sys, "stdin", None)
-    assert main(["campaign", "-", "--law", "printed", "--out", str(tmp_path / "out")]) == 2
+    assert main(["campaign", "-", "--law", "ismail_dunnigan", "--out", str(tmp_path / "out")]) == 2
     assert capsys.readouterr() == ("", "cosim: standard input: is closed\n")
     assert list(tmp_path.iterdir()) == []
 
@@ -126,10 +126,10 @@ def test_D8_a_deep_or_long_setting_is_one_line(words, setting, tmp_path, capsys,
         ["sweep", "paper", "--vary", f"regions.{'9' * 5000}.gain=1:2", "--samples", "2"],
         ["sweep", "paper", "--vary", f"limit.force=1:2:{'9' * 5000}", "--design", "grid"],
         ["sweep", "paper", "--vary", f"limit.force=1:{'9' * 5000}", "--samples", "2"],
-        ["campaign", "scenes.jsonl", "--law", "printed", "--set", f"{DEEP}=1"],
-        ["campaign", "scenes.jsonl", "--law", "printed", "--set", f"k_p1={'[' * 5000}"],
+        ["campaign", "scenes.jsonl", "--law", "ismail_dunnigan", "--set", f"{DEEP}=1"],
+        ["campaign", "scenes.jsonl", "--law", "ismail_dunnigan", "--set", f"k_p1={'[' * 5000}"],
         ["compare", "scenes.jsonl", "--laws", "printed,pd", "--set", f"{DEEP}=1"],
-        ["compare", "scenes.jsonl", "--laws", "printed,pd", "--set", f"printed.k_p1={'{a=' * 5000}"],
+        ["compare", "scenes.jsonl", "--laws", "ismail_dunnigan,pd", "--set", f"ismail_dunnigan.k_p1={'{a=' * 5000}"],
     ],
     ids=lambda words: " ".join(words)[:40],
 )
@@ -247,7 +247,7 @@ VERBS = {  # {run}: a run folder
     "export": ["{run}", "--to", "npz"],
     "package": ["paper", "--set", "arbiter.engine=closed"],
     "scenes": ["--count", "3"],
-    "campaign": ["scenes.jsonl", "--law", "printed", *CAMPAIGN],
+    "campaign": ["scenes.jsonl", "--law", "ismail_dunnigan", *CAMPAIGN],
     "compare": ["scenes.jsonl", "--laws", "printed,pd", *CAMPAIGN],
     "sweep": ["paper", *QUICK, "--vary", "initial.position.1=-1:1", "--samples", "2", *CAMPAIGN],
     "rerun": ["out", "0", "--out", "again"],

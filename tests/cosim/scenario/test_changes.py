@@ -27,7 +27,7 @@ from tests.cosim.replay.decoding import read_page
 
 __all__ = ["fakes"]
 
-LIMITED = "The paper's scenario, printed law, body force limited to 108 N"
+LIMITED = "The paper's scenario, paper's law, body force limited to 108 N"
 FORCE = f"{LIMITED} (changed: limit.force = 500 N)"
 
 

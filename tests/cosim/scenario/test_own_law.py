@@ -59,7 +59,7 @@ def test_the_same_law_as_a_function_flies_the_same_to_the_bit(tmp_path):
     run = run_scenario(scenario, tmp_path / "own", report=False, law=law)
     run_scenario(scenario, tmp_path / "shipped", report=False)
     one, other = load_record(tmp_path / "own"), load_record(tmp_path / "shipped")
-    assert run.summary["law"] == "controller.laws.printed:PrintedLaw"
+    assert run.summary["law"] == "controller.laws.ismail_dunnigan:IsmailDunniganLaw"
     assert all(np.array_equal(one[name], other[name], equal_nan=True) for name in other.units)
 
 

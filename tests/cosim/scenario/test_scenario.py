@@ -124,7 +124,7 @@ def test_overrides_reach_every_depth(tmp_path):
         ("law.gains.k_p1=abc", ["law.gains.k_p1", "number", "'abc'"]),
         ("law.gains.k_p1=0", ["law.gains.k_p1", "0"]),
         ("law.gains.gamma=nan", ["law.gains.gamma", "nan"]),
-        ("law.name=best", ["law.name", "'printed'", "'best'"]),
+        ("law.name=best", ["law.name", "'ismail_dunnigan'", "'best'"]),
         ("law.name=deployable", ["actuation.through", "'thrusters'", "'deployable'"]),
         ("law.desired_quaternion=[1,1,0,0]", ["law.desired_quaternion", "length 1"]),
         ("goal.velocity=[0.1,0,nan]", ["goal.velocity", "finite"]),
@@ -222,8 +222,8 @@ def test_gains_go_with_the_name_of_their_law(tmp_path):
     through = "actuation.through=thrusters"
     other = load_scenario("paper", ["law.gains.k_p1=3", "law.name=deployable", through, "law.gains.speed=0.5"])
     assert (type(other.law.gains).__name__, other.law.gains.speed) == ("DeployableGains", 0.5)
-    assert load_scenario("paper", ["law.gains.k_p1=3", "law.name=printed"]).law.gains.k_p1 == 3.0
-    assert load_scenario(saved(tmp_path, 'base = "paper"\nlaw = { name = "printed" }\n')).law.gains.k_v1 == 90.0
+    assert load_scenario("paper", ["law.gains.k_p1=3", "law.name=ismail_dunnigan"]).law.gains.k_p1 == 3.0
+    assert load_scenario(saved(tmp_path, 'base = "paper"\nlaw = { name = "ismail_dunnigan" }\n')).law.gains.k_v1 == 90.0
     text = 'base = "paper"\nlaw = { name = "deployable" }\nactuation = { through = "thrusters" }\n'
     assert load_scenario(saved(tmp_path, text)).law.gains == type(other.law.gains)()
 

@@ -97,8 +97,9 @@ def test_every_gain_of_every_law_is_explained():
 @pytest.mark.parametrize(
     ("law", "gain", "unit"),
     [
-        ("printed", "k_p1", "N/m3"), ("printed", "k_v2", "N m s/rad"), ("printed", "sigma_p", "1/(m2 s)"),
-        ("printed", "k_q", ""),
+        ("ismail_dunnigan", "k_p1", "N/m3"), ("ismail_dunnigan", "k_v2", "N m s/rad"),
+        ("ismail_dunnigan", "sigma_p", "1/(m2 s)"),
+        ("ismail_dunnigan", "k_q", ""),
         ("deployable", "coast", "s"), ("deployable", "braking_share", ""), ("deployable", "failure_threshold", ""),
         ("deployable", "current_drift", "m/s/sqrt(s)"), ("unarbitrated", "margin", "m2"),
         ("antonelli", "k_theta_moment", "s2/(kg m2)"),
@@ -113,7 +114,7 @@ def test_only_pure_numbers_among_gains_have_no_unit():
     without = {
         (name, gain) for name, law in LAWS.items() for gain in law.gains_type._fields if not unit_of_gain(name, gain)
     }
-    assert without == {("printed", "k_q"), ("deployable", "braking_share"), ("deployable", "failure_threshold")}
+    assert without == {("ismail_dunnigan", "k_q"), ("deployable", "braking_share"), ("deployable", "failure_threshold")}
 
 
 def test_every_key_of_a_shape_has_a_unit_or_none():

@@ -147,7 +147,7 @@ LOOKING = (
 @pytest.mark.parametrize(
     ("overrides", "words"),
     [
-        (("law.name=deployable", "law.gains={}", "actuation.through=thrusters"), "printed law's"),
+        (("law.name=deployable", "law.gains={}", "actuation.through=thrusters"), "paper's law's"),
         ((f"regions=[{LOOKING}]", "intersection=[]"), r"knows no attitude in regions \(\['view'\]\)"),
     ],
     ids=["another law", "a region of attitude"],

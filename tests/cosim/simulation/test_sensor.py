@@ -6,7 +6,7 @@ from typing import ClassVar
 import numpy as np
 import pytest
 
-from controller import LAWS, PrintedLaw
+from controller import LAWS, IsmailDunniganLaw
 from cosim.scenario.scenario import load_scenario
 from cosim.simulation.master import Master
 from tests.cosim.simulation.test_master import Keep
@@ -46,7 +46,7 @@ class Given:
 def spy(monkeypatch):
     """Return a function that runs a scenario with a law in the printed one's place that keeps all that it is given."""
 
-    class Spy(PrintedLaw):
+    class Spy(IsmailDunniganLaw):
         given: ClassVar[Given]
 
         @classmethod
@@ -64,7 +64,7 @@ def spy(monkeypatch):
         kept = run(*overrides)
         return Spy.given, kept
 
-    monkeypatch.setitem(LAWS, "printed", Spy)
+    monkeypatch.setitem(LAWS, "ismail_dunnigan", Spy)
     return of
 
 
@@ -166,7 +166,7 @@ def test_arbiter_goes_by_what_is_told_and_the_record_by_the_truth():
     assert np.ptp(kept["membership.obstacle"]) > 0.5
 
 
-class Still(PrintedLaw):
+class Still(IsmailDunniganLaw):
     """Asks for nothing, whatever it is told."""
 
     def step(self, state, goal, regions, weights, forces):
@@ -177,7 +177,7 @@ class Still(PrintedLaw):
 @pytest.fixture
 def still(monkeypatch):
     Still.told = []
-    monkeypatch.setitem(LAWS, "printed", Still)
+    monkeypatch.setitem(LAWS, "ismail_dunnigan", Still)
     return Still.told
 
 

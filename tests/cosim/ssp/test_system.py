@@ -196,7 +196,7 @@ def test_a_vehicle_of_ones_own_goes_with_it(packed, tmp_path):
     ("name", "changes", "said"),
     [
         ("paper", [], "arbiter.engine is 'skfuzzy', expected 'closed' or 'exact'"),
-        ("paper", [CLOSED, "law.name='unarbitrated'"], "law.name is 'unarbitrated', expected 'printed'"),
+        ("paper", [CLOSED, "law.name='unarbitrated'"], "law.name is 'unarbitrated', expected 'ismail_dunnigan'"),
         ("paper", [CLOSED, "actuation.through='thrusters'"], "actuation.through is 'thrusters', expected 'wrench'"),
         ("paper", [CLOSED, "sensing.position_noise=0.1"], "sensing is not exact, expected neither noise nor gaps"),
         ("paper", [CLOSED, "commands.enabled=true"], "commands.enabled is true, expected false"),

@@ -83,14 +83,14 @@ def samples(seeds: Seeds) -> Case:
     "cosim.campaigns.scenes.scene_store:SceneStore.__init__",
 )
 def scenes(seeds: Seeds) -> Case:
-    gains = LAWS["printed"].gains_type()
+    gains = LAWS["ismail_dunnigan"].gains_type()
 
     def read(path: Path) -> None:
         with SceneStore(path) as store:
             for line in store.lines(store.seeds):  # what is refused then is a row of the campaign
                 with_error = None
                 try:
-                    scene_scenario(decode_scene(line), "printed", gains, Conditions())
+                    scene_scenario(decode_scene(line), "ismail_dunnigan", gains, Conditions())
                 except KINDS as error:
                     with_error = error
                 assert with_error is None or str(with_error).isprintable()

@@ -119,7 +119,7 @@ def page(seeds: Seeds) -> Case:
 @reader("plan of a campaign", "json", "cosim.io.strict_json:read_json")
 def plan(seeds: Seeds) -> Case:
     seed = json.loads(SCENES[0])["seed"]
-    case = seeds.file(PLAN, lambda path: repeat_of(path.parent, seed), of=seeds.comparison / "printed")
+    case = seeds.file(PLAN, lambda path: repeat_of(path.parent, seed), of=seeds.comparison / "ismail_dunnigan")
     return replace(case, named=str(Path(case.named).parent))
 
 
@@ -146,7 +146,7 @@ _RESULTS = [f"cosim.campaigns.store.results:Results.{name}" for name in ("__init
 
 @reader("results of a campaign", "parquet", *_RESULTS, "cosim.campaigns.store.parts:check_schema")
 def results(seeds: Seeds) -> Case:
-    of = plan_of("printed", LAWS["printed"].gains_type(), Conditions(), 2, "")
+    of = plan_of("ismail_dunnigan", LAWS["ismail_dunnigan"].gains_type(), Conditions(), 2, "")
     seed = json.loads(SCENES[0])["seed"]
 
     def read(path: Path) -> None:
@@ -155,7 +155,7 @@ def results(seeds: Seeds) -> Case:
         summarise(of, found, path.parent)
         list(found.pieces("scene"))
 
-    case = seeds.file(RESULTS, read, of=seeds.comparison / "printed")
+    case = seeds.file(RESULTS, read, of=seeds.comparison / "ismail_dunnigan")
     return replace(case, named=str(Path(case.named).parent))
 
 
@@ -177,7 +177,7 @@ def results_of_sweep(seeds: Seeds) -> Case:
 )
 def part_of_campaign(seeds: Seeds) -> Case:
     """One that is damaged is removed, and flown again."""
-    content, folder = (seeds.comparison / "printed" / RESULTS).read_bytes(), seeds.folder()
+    content, folder = (seeds.comparison / "ismail_dunnigan" / RESULTS).read_bytes(), seeds.folder()
 
     def read(content: bytes) -> None:
         (folder / "00000000-00000000.parquet").write_bytes(content)
@@ -200,7 +200,9 @@ class _AnyFigure(dict[str, Html]):
 @reader("summary of a campaign", "json", "cosim.io.strict_json:read_json")
 def summary_of_campaign(seeds: Seeds) -> Case:
     _without_drawing(seeds, "campaign_page")
-    return seeds.file(SUMMARY, lambda path: write_campaign_page(path.parent, 0), of=seeds.comparison / "printed")
+    return seeds.file(
+        SUMMARY, lambda path: write_campaign_page(path.parent, 0), of=seeds.comparison / "ismail_dunnigan"
+    )
 
 
 @reader("summary of a sweep", "json", "cosim.io.strict_json:read_json")

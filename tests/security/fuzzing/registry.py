@@ -92,7 +92,7 @@ class Seeds:
     def comparison(self) -> Path:
         """A comparison of two laws, with a campaign of each in it."""
         folder = self.folder() / "comparison"
-        compare(self.scenes, ["printed", "pd"], folder, Conditions(duration=0.4))
+        compare(self.scenes, ["ismail_dunnigan", "pd"], folder, Conditions(duration=0.4))
         return folder
 
     @cached_property

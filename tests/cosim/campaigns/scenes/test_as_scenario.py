@@ -24,7 +24,7 @@ SCENE = Scene(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("law", "tell"), [("deployable", False), ("deployable", True), ("printed", False)])
+@pytest.mark.parametrize(("law", "tell"), [("deployable", False), ("deployable", True), ("ismail_dunnigan", False)])
 def test_master_and_compiled_loop_fly_the_same_way(law, tell):
     conditions = Conditions(duration=12.0, tell_failures=tell)
     with SceneFlyer(law, conditions) as flyer:

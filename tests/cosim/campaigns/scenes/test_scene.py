@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from controller import LAWS, PrintedLaw
+from controller import LAWS, IsmailDunniganLaw
 from cosim.batch import fused_loop
 from cosim.campaigns.scenes.flyer import Conditions, SceneFlyer
 from cosim.campaigns.scenes.scene import Failure, plant_values, read_scenes, told
@@ -106,7 +106,7 @@ TOLD = {
 }
 
 
-class _Spy(PrintedLaw):
+class _Spy(IsmailDunniganLaw):
     """Notes all that it is made of, and all that it is given at each step."""
 
     name = "spy"
@@ -121,7 +121,7 @@ class _Spy(PrintedLaw):
     @staticmethod
     def function(*arguments):
         _Spy.steps.append(_frozen(arguments))
-        PrintedLaw.function(*arguments)
+        IsmailDunniganLaw.function(*arguments)
 
 
 def _frozen(value):

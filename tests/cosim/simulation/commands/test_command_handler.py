@@ -358,7 +358,7 @@ def test_commands_of_a_run_repeat_it_to_the_last_bit(tmp_path):
 @pytest.mark.parametrize("name", ["paper", "paper-limited"])
 @pytest.mark.parametrize("away", [300.0, 1e5])
 def test_no_target_is_too_far_for_the_run_to_go_on(fly, name, away):
-    """The printed law's force grows with the cube of the distance."""
+    """The paper's law's force grows with the cube of the distance."""
     run = fly({100: [SetTarget((away, 0.0, 5.0))]}, "time.duration=0.5", name=name)
     asked = np.abs(run.stack(*(f"command.{axis}" for axis in "XYZ"))).max()
     given = np.linalg.norm(run.stack(*(f"wrench.{axis}" for axis in "XYZ")), axis=1)

@@ -1,4 +1,4 @@
-"""The printed law (25)-(29) as a law among others, see `controller.printed_law`."""
+"""The paper's law (25)-(29) as a law among others, see `controller.paper_law`."""
 
 from __future__ import annotations
 
@@ -6,15 +6,15 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from controller import printed_law
+from controller import paper_law
 from controller.jit.jit import jit_noalloc
 from controller.law import Array, VehicleState, WrenchLaw
-from controller.printed_law import Gains
+from controller.paper_law import Gains
 from controller.regions import PackedRegions, evaluate_packed
 
 
 class PrintedMemory(NamedTuple):
-    """What the printed law keeps, and where it evaluates regions."""
+    """What the paper's law keeps, and where it evaluates regions."""
 
     desired_quaternion: Array  # (4,)
     period: Array  # (1,) s
@@ -41,14 +41,14 @@ def step(
     memory: PrintedMemory,
     forces: Array,
 ) -> None:
-    """Do what `CompiledLaw.step` says, by the printed law."""
+    """Do what `CompiledLaw.step` says, by the paper's law."""
     p, e = state.position, state.quaternion
     # regions push by force alone (22): what they say of attitude is passed over
     evaluate_packed(goal, p, e, memory.goal_value, memory.goal_gradient, memory.goal_turning, memory.goal_clearance)
     evaluate_packed(regions, p, e, memory.values, memory.gradients, memory.rotation_gradients, memory.clearances)
     for i in range(weights.size):
         memory.alphas[i] = regions.gains[i] * weights[i]
-    printed_law.step(
+    paper_law.step(
         state.quaternion,
         state.velocity_body,
         memory.desired_quaternion,
@@ -83,10 +83,10 @@ def memory_of(desired_quaternion: Array, period: Array, n_regions: int) -> Print
     )
 
 
-class PrintedLaw(WrenchLaw):
+class IsmailDunniganLaw(WrenchLaw):
     """The law as printed: a wrench without limits."""
 
-    name: ClassVar[str] = "printed"
+    name: ClassVar[str] = "ismail_dunnigan"
     function = staticmethod(step)
     memory_of = staticmethod(memory_of)
     gains_type = Gains

@@ -1,4 +1,4 @@
-"""The printed law against a transcription of its equations in plain matrices."""
+"""The paper's law against a transcription of its equations in plain matrices."""
 
 import math
 
@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from controller import Gains, LawError, PrintedLaw, VehicleState
-from controller.printed_law import primary_error, primary_potential, secondary_error, secondary_potential, step
+from controller import Gains, IsmailDunniganLaw, LawError, VehicleState
+from controller.paper_law import primary_error, primary_potential, secondary_error, secondary_potential, step
 from controller.regions import Region, Sphere, pack
 
 GAINS = Gains()
@@ -118,7 +118,7 @@ def test_k_q_cancels():
 
 def test_the_law_evaluates_its_regions_and_weighs_them():
     """At a quarter of a metre from the centre of a sphere of one metre to be kept out of: 0.5 * 100 * (1 - 1/16) N."""
-    law, tau = PrintedLaw(GAINS, IDENTITY, 0.001, 1), np.empty(6)
+    law, tau = IsmailDunniganLaw(GAINS, IDENTITY, 0.001, 1), np.empty(6)
     goal, rock = (
         pack([Region("goal", Sphere((0.0, 0.0, 0.0), 1.0), "in")]),
         pack([Region("rock", Sphere((0.0, 0.25, 0.0), 1.0), "out", gain=100.0)]),
@@ -156,7 +156,7 @@ def test_defaults_are_those_of_section_vii():
 )
 def test_gains_that_cannot_be_are_named(change, words):
     with pytest.raises(LawError, match=words):
-        PrintedLaw(GAINS._replace(**change), IDENTITY, 0.001, 0)
+        IsmailDunniganLaw(GAINS._replace(**change), IDENTITY, 0.001, 0)
 
 
 @pytest.mark.parametrize(
@@ -170,4 +170,4 @@ def test_gains_that_cannot_be_are_named(change, words):
 )
 def test_set_up_that_cannot_be_is_refused(attitude, period):
     with pytest.raises(LawError):
-        PrintedLaw(GAINS, attitude, period, 0)
+        IsmailDunniganLaw(GAINS, attitude, period, 0)
