@@ -8,7 +8,7 @@ import pytest
 
 from cosim.scenario.keys import KEYS
 from cosim.scenario.tables import File
-from cosim.scenario.toml_file import shipped_scenarios
+from cosim.scenario.toml_file import list_scenarios
 
 ROOT = Path(__file__).parents[1]
 PAGES = [ROOT / "README.md", ROOT / "CHANGELOG.md", *sorted((ROOT / "docs").rglob("*.md"))]
@@ -22,7 +22,7 @@ def test_links_lead_somewhere(page):
 
 def test_readme_names_the_shipped_scenarios():
     readme = " ".join((ROOT / "README.md").read_text().split())
-    assert f"Shipped scenarios: {', '.join(shipped_scenarios())}." in readme
+    assert f"Shipped scenarios: {', '.join(list_scenarios())}." in readme
 
 
 def test_the_keys_of_a_scenario_are_documented_as_the_code_has_them():

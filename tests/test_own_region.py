@@ -56,7 +56,7 @@ FLY = """
 from pathlib import Path
 import numpy as np
 from controller import FunctionLaw
-from cosim.precheck.precheck import check
+from cosim.precheck.precheck import check_scenario
 from cosim.results.record import load_record
 from cosim.run.run import run_scenario
 from cosim.scenario.scenario import load_scenario
@@ -73,7 +73,7 @@ p = record.stack([f"position.{axis}" for axis in "xyz"]) - [2.0, 0.3, 2.0]
 apart = np.hypot(np.hypot(p[:, 1], p[:, 2]) - 1.0, p[:, 0]) - 0.2
 np.testing.assert_allclose(record["ring.clearance"], apart, atol=1e-9)
 through = np.interp(0.0, p[:, 0], np.hypot(p[:, 1], p[:, 2]))
-print(run.summary["reached"], run.summary["min_clearance"]["ring"] > 0.0, through < 0.8, check(scenario).holds)
+print(run.summary["reached"], run.summary["min_clearance"]["ring"] > 0.0, through < 0.8, check_scenario(scenario).holds)
 """
 
 

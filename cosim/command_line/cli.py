@@ -226,10 +226,10 @@ def _show(options: argparse.Namespace) -> int:
 
 def _check(options: argparse.Namespace) -> int:
     from cosim.precheck.output import check_json, check_text
-    from cosim.precheck.precheck import check
+    from cosim.precheck.precheck import check_scenario
     from cosim.scenario.scenario import load_scenario
 
-    found = check(load_scenario(options.scenario, options.overrides))
+    found = check_scenario(load_scenario(options.scenario, options.overrides))
     print(check_json(found) if options.json else check_text(found))
     return 0 if found.holds else 1
 

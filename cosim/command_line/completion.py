@@ -53,9 +53,9 @@ def completion(options: argparse.Namespace) -> int:
     """Run ``cosim completion``."""
     import shtab
 
-    from cosim.scenario.toml_file import shipped_scenarios
+    from cosim.scenario.toml_file import list_scenarios
 
-    names = " ".join(shipped_scenarios())
+    names = " ".join(list_scenarios())
     scenarios = dict.fromkeys(SHELLS, "_cosim_scenarios") | {
         "fish": "(_cosim_scenarios)",
         "preamble": {shell: text.format(names=names) for shell, text in _SCENARIOS.items()},

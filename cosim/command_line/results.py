@@ -6,7 +6,7 @@ import argparse
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from cosim.run.run import Run
+    from cosim.results.run_result import Run
 
 
 def say(options: argparse.Namespace, *lines: str) -> None:

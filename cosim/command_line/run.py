@@ -17,7 +17,7 @@ from cosim.live.address import HOST, PORT, parse_live
 
 if TYPE_CHECKING:
     from cosim.mavlink.setup import Mavlink
-    from cosim.run.run import Run
+    from cosim.results.run_result import Run
 
 
 def add_verb(verbs: Any) -> None:

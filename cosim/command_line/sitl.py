@@ -13,7 +13,7 @@ from cosim.io.network_address import resolved
 from cosim.sitl.ports import PORTS
 
 if TYPE_CHECKING:
-    from cosim.run.run import Run
+    from cosim.results.run_result import Run
 
 
 def add_verbs(verbs: Any) -> None:

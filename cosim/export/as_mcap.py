@@ -24,7 +24,7 @@ from cosim.export.names import grouped, legal
 from cosim.export.protobuf_table import numbers_messages, numbers_schema
 from cosim.export.scene import POSITION, QUATERNION, Scene
 from cosim.replay.events import events_of
-from cosim.results.run_result import FlownRun
+from cosim.results.run_result import Run
 from cosim.simulation.signals import Array
 
 PACKAGE = "subreach"  # of the schemas of signals
@@ -96,7 +96,7 @@ def _tables(writer: Writer, excerpt: Excerpt) -> list[tuple[int, list[int]]]:
 class _Drawing:
     """Writes the scene as it changes."""
 
-    def __init__(self, writer: Writer, run: FlownRun, scene: Scene) -> None:
+    def __init__(self, writer: Writer, run: Run, scene: Scene) -> None:
         self._writer, self._scene = writer, scene
         self._channels: dict[str, int] = {}
         for topic, kind in (

@@ -67,7 +67,7 @@ def write(excerpt: Excerpt, path: Path) -> list[Path]:
     recording = rr.RecordingStream("subreach")
     try:
         recording.save(path, default_blueprint=_layout(excerpt))
-        recording.send_recording_name(excerpt.run.path.resolve().name)
+        recording.send_recording_name(excerpt.run.folder.resolve().name)
         sender = _Sender(recording, excerpt)
         sender.send_texts()
         sender.send_names()

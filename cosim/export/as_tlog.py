@@ -31,7 +31,7 @@ def write(excerpt: Excerpt, path: Path) -> list[Path]:
     ExportError
         If anything of the run could not be written.
     """
-    done = replay(excerpt.run.path, [Endpoint("tlog", path.name, path=str(path))], MavlinkOptions(), rate=None)
+    done = replay(excerpt.run.folder, [Endpoint("tlog", path.name, path=str(path))], MavlinkOptions(), rate=None)
     if done.troubles:
         raise ExportError(f"--to tlog: not all was written: {'; '.join(done.troubles)}")
     return [path]

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from cosim.errors import ExportError
 from cosim.io.strict_json import json_text
 from cosim.results.record import Rows
-from cosim.results.run_result import SCENARIO, FlownRun, load_run
+from cosim.results.run_result import SCENARIO, Run, load_run
 from cosim.simulation.signals import Array, Column
 
 _ROUNDING = 1e-6  # of a period; a time that is short of a tick by no more has reached it
@@ -25,7 +25,7 @@ _ROUNDING = 1e-6  # of a period; a time that is short of a tick by no more has r
 class Excerpt:
     """A run, and what of it is exported."""
 
-    run: FlownRun
+    run: Run
     picked: tuple[int, ...]  # places of the signals in a row of the record, rising, `time` always among them
     every: int  # one step of so many, from the first one on,
     rate: float | None = None  # or as many steps a simulated second [Hz]
@@ -38,7 +38,7 @@ class Excerpt:
     @property
     def scenario_text(self) -> str:
         """The scenario as it stands in the run folder."""
-        return (self.run.path / SCENARIO).read_text(encoding="utf-8")
+        return (self.run.folder / SCENARIO).read_text(encoding="utf-8")
 
     @property
     def summary_text(self) -> str:

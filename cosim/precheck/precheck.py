@@ -32,7 +32,7 @@ class Check:
         return tuple(finding for finding in self.findings if finding.status == "fails")
 
 
-def check(scenario: Scenario) -> Check:
+def check_scenario(scenario: Scenario) -> Check:
     """Check a scenario without running it.
 
     Parameters

@@ -14,7 +14,7 @@ from controller.regions import of_attitude
 from cosim.replay.activity import active_regions
 from cosim.replay.command_words import command_events
 from cosim.replay.steering import Log
-from cosim.results.run_result import FlownRun
+from cosim.results.run_result import Run
 from cosim.results.spans import Flags, Span, Spans
 from cosim.scenario.scenario import CRITERIA
 from cosim.simulation.signals import Array
@@ -34,12 +34,12 @@ class Event:
     until: float | None = None  # s, of what lasts
 
 
-def events_of(run: FlownRun, log: Log) -> list[Event]:
+def events_of(run: Run, log: Log) -> list[Event]:
     """Return what happened in a run, in the order of time; few enough to be read.
 
     Parameters
     ----------
-    run : FlownRun
+    run : Run
         Any.
     log : sequence of (int, Order)
         What it was commanded.
@@ -57,7 +57,7 @@ def events_of(run: FlownRun, log: Log) -> list[Event]:
     return [*sorted(found, key=lambda event: event.time), _end(run)]
 
 
-def _goal(run: FlownRun) -> Iterator[Event]:
+def _goal(run: Run) -> Iterator[Event]:
     inside, first = _Few(_MOST // 2), math.inf
     for block in run.record.blocks(["time", "goal.clearance"]):
         known = np.isfinite(block["goal.clearance"])
@@ -71,7 +71,7 @@ def _goal(run: FlownRun) -> Iterator[Event]:
             yield Event(span.end, "goal", "Leaves the goal region")
 
 
-def _violations(run: FlownRun) -> Iterator[Event]:
+def _violations(run: Run) -> Iterator[Event]:
     regions = run.scenario.regions
     most = max(1, _MOST // max(1, len(regions)))
     violated = {f"{secondary.region.name}.clearance": _Few(most) for secondary in regions}
@@ -87,7 +87,7 @@ def _violations(run: FlownRun) -> Iterator[Event]:
             yield Event(span.start, "violation", text, span.end)
 
 
-def _active(run: FlownRun) -> Iterator[Event]:
+def _active(run: Run) -> Iterator[Event]:
     regions = run.scenario.regions
     for i, (time, index) in enumerate(_turns(_takeovers(run))):
         if index:
@@ -97,7 +97,7 @@ def _active(run: FlownRun) -> Iterator[Event]:
             yield Event(time, "active", "Goes for the goal again")
 
 
-def _takeovers(run: FlownRun) -> Iterator[tuple[float, int]]:
+def _takeovers(run: Run) -> Iterator[tuple[float, int]]:
     """Yield when another region takes over and which, the goal being 0; first what is so at first."""
     regions, before = run.scenario.regions, -1
     memberships, weights = ([f"{of}.{name}" for name in CRITERIA] for of in ("membership", "weight"))
@@ -111,14 +111,14 @@ def _takeovers(run: FlownRun) -> Iterator[tuple[float, int]]:
         before = int(active[-1])
 
 
-def _failures(run: FlownRun) -> Iterator[Event]:
+def _failures(run: Run) -> Iterator[Event]:
     end = run.record.value("time", -1)
     for failure in run.scenario.failures:
         if failure.time <= end:
             yield Event(failure.time, "failure", f"Thruster {failure.thruster} fails")
 
 
-def _saturation(run: FlownRun) -> Iterator[Event]:
+def _saturation(run: Run) -> Iterator[Event]:
     cut, flags = _Few(_MOST // 2), ("wrench_saturated", "allocation_saturated")
     for block in run.record.blocks(["time", *flags]):
         cut.add(np.logical_or.reduce([block[name] > 0.0 for name in flags]), block["time"])
@@ -126,7 +126,7 @@ def _saturation(run: FlownRun) -> Iterator[Event]:
         yield Event(span.start, "saturation", f"More force is asked for than there is, {cut.lasting(span)}", span.end)
 
 
-def _end(run: FlownRun) -> Event:
+def _end(run: Run) -> Event:
     status = run.summary["status"]
     words = {
         "completed": "End of the run",

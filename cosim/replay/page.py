@@ -13,8 +13,6 @@ from typing import Any
 
 from cosim.io.atomic_file import write_atomic
 
-REPLAY = "replay.html"
-
 SCENE_SCRIPTS = (
     "palette.js", "vectors.js", "camera.js", "solids.js", "pipes.js", "planes.js", "painter.js", "sights.js",
     "hull.js", "vehicle.js", "forces.js", "trail.js", "shadows.js", "bounds.js", "order.js",

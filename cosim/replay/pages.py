@@ -6,17 +6,17 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from cosim.errors import RunError
-from cosim.replay.page import REPLAY, is_page, write_page
+from cosim.replay.page import is_page, write_page
 from cosim.replay.trace import trace_of
-from cosim.results.run_result import FlownRun, load_run
+from cosim.results.run_result import REPLAY, Run, load_run
 
 
-def write_replay(run: FlownRun, out: Path | None = None, title: str | None = None) -> Path:
+def write_replay(run: Run, out: Path | None = None, title: str | None = None) -> Path:
     """Write the page of one run.
 
     Parameters
     ----------
-    run : FlownRun
+    run : Run
         Any.
     out : Path, optional
         The file; default: ``replay.html`` in the run folder.
@@ -33,7 +33,7 @@ def write_replay(run: FlownRun, out: Path | None = None, title: str | None = Non
     RunError
         If its log of commands cannot be read.
     """
-    return write_page(out or run.path / REPLAY, [trace_of(run).as_json()], title or run.scenario.title)
+    return write_page(out or run.folder / REPLAY, [trace_of(run).as_json()], title or run.scenario.title)
 
 
 def replay(folders: Sequence[Path], out: Path | None = None, title: str | None = None) -> Path:

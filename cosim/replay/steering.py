@@ -15,7 +15,7 @@ from cosim.errors import CommandError
 from cosim.replay.header import shape_of
 from cosim.results.as_flown import radii_of
 from cosim.results.record import Rows
-from cosim.results.run_result import COMMANDS_LOG, FlownRun
+from cosim.results.run_result import COMMANDS_LOG, Run
 from cosim.scenario.tables import PARKED_POSITION, SecondaryRegion
 from cosim.simulation.commands.commands import (
     MODES,
@@ -37,12 +37,12 @@ Log = Sequence[tuple[int, Command]]  # step that took it, and what was commanded
 _SAME = 1e-6  # m; radii from a record that are nearer to each other are equal, but for rounding
 
 
-def log_of(run: FlownRun) -> Log:
+def log_of(run: Run) -> Log:
     """Return what a run was commanded.
 
     Parameters
     ----------
-    run : FlownRun
+    run : Run
         Any.
 
     Returns
@@ -55,16 +55,16 @@ def log_of(run: FlownRun) -> Log:
     RunError
         If there is a log that cannot be read.
     """
-    file = run.path / COMMANDS_LOG
+    file = run.folder / COMMANDS_LOG
     return read_log(file) if run.scenario.commands.enabled and file.exists() else ()
 
 
-def changes_of(run: FlownRun, log: Log) -> list[dict[str, Any]]:
+def changes_of(run: Run, log: Log) -> list[dict[str, Any]]:
     """Return how regions changed on the way, beside their motion.
 
     Parameters
     ----------
-    run : FlownRun
+    run : Run
         Any.
     log : sequence of (int, Order)
         From `log_of`.
@@ -89,7 +89,7 @@ def changes_of(run: FlownRun, log: Log) -> list[dict[str, Any]]:
 class _Changes:
     """Follows the changes that were commanded, at once or by items of a mission, on settings of its own."""
 
-    def __init__(self, run: FlownRun) -> None:
+    def __init__(self, run: Run) -> None:
         self._step = run.scenario.time.step
         self._settings = LiveSettings(run.planned)
         self._middle = shape_center(run.planned.goal)
@@ -155,7 +155,7 @@ class _Changes:
         return _changed(k * self._step, self._index[name], shape, self._gains[self._index[name]])
 
 
-def _sizes(run: FlownRun, index: int, secondary: SecondaryRegion) -> Iterator[dict[str, Any]]:
+def _sizes(run: Run, index: int, secondary: SecondaryRegion) -> Iterator[dict[str, Any]]:
     """Yield the sizes with which an obstacle came, each at its time."""
     before = -np.inf
     for times, radii in radii_of(run.record, secondary.region.name):

@@ -20,7 +20,7 @@ from cosim.replay.steering import changes_of, log_of
 from cosim.replay.viewing import Viewing
 from cosim.results.extremes import rows_at
 from cosim.results.record import Rows
-from cosim.results.run_result import FlownRun
+from cosim.results.run_result import Run
 from cosim.results.wording import verdict
 from cosim.simulation.signals import Array
 
@@ -53,12 +53,12 @@ class Trace:
         return {**self.header, "rows": len(self.rows), "data": base64.b64encode(packed).decode()}
 
 
-def trace_of(run: FlownRun) -> Trace:
+def trace_of(run: Run) -> Trace:
     """Return what a page shows of a run.
 
     Parameters
     ----------
-    run : FlownRun
+    run : Run
         Any.
 
     Returns

@@ -10,7 +10,7 @@ import numpy as np
 from controller.laws import LAWS
 from cosim.results.paper_claims import paper_claims
 from cosim.results.record import PARTS, RECORD
-from cosim.results.run_result import COMMANDS_LOG, SCENARIO, SUMMARY, FlownRun
+from cosim.results.run_result import COMMANDS_LOG, SCENARIO, SUMMARY, Run
 from cosim.results.spans import Spans
 from cosim.results.wording import asked, kind_of, number, verdict
 from cosim.simulation.signals import Array
@@ -44,12 +44,12 @@ class Contents:
     files: tuple[tuple[str, str], ...]  # in the run folder, and what each is
 
 
-def contents_of(run: FlownRun) -> Contents:
+def contents_of(run: Run) -> Contents:
     """Return what the report of a run says.
 
     Parameters
     ----------
-    run : FlownRun
+    run : Run
         Finished, interrupted or killed.
 
     Returns
@@ -74,7 +74,7 @@ def contents_of(run: FlownRun) -> Contents:
     )
 
 
-def _remarks(run: FlownRun) -> tuple[str, ...]:
+def _remarks(run: Run) -> tuple[str, ...]:
     names = [*(f"position.{axis}" for axis in "xyz"), "goal.clearance"]
     names += [f"{secondary.region.name}.clearance" for secondary in run.scenario.regions]
     count, first = 0, math.inf
@@ -88,14 +88,14 @@ def _remarks(run: FlownRun) -> tuple[str, ...]:
     return (f"{many}; the first is at {first:g} s. Figures have gaps there.",)
 
 
-def _claims(run: FlownRun) -> Table | None:
+def _claims(run: Run) -> Table | None:
     if run.scenario.compare != "paper":
         return None
     rows = tuple((c.stated, c.measured, c.why) for c in paper_claims(run.scenario, run.summary))
     return Table("Beside the paper", ("The paper states", "This run gave", "Why"), rows, (1.0, 1.1, 1.4))
 
 
-def _regions(run: FlownRun) -> Table | None:
+def _regions(run: Run) -> Table | None:
     if not run.scenario.regions:
         return None
     violations = {secondary.region.name: _Violation() for secondary in run.scenario.regions}
@@ -149,7 +149,7 @@ class _Violation:
         return self._ended + (still.end - still.start if still else 0.0) if self._least < 0.0 else None
 
 
-def _goal(run: FlownRun) -> Table:
+def _goal(run: Run) -> Table:
     s = run.summary
     outside = s["closest_to_goal"]
     nearest = f"{number(outside, 4)} m outside" if outside > 0.0 else f"{number(-outside, 4)} m inside"
@@ -166,7 +166,7 @@ def _goal(run: FlownRun) -> Table:
     return Table("Goal and way", (), tuple(rows), (1.0, 1.0))
 
 
-def _effort(run: FlownRun) -> Table:
+def _effort(run: Run) -> Table:
     s = run.summary
     factor = s["real_time_factor"]
     rows = (
@@ -187,7 +187,7 @@ def _effort(run: FlownRun) -> Table:
     return Table("Effort and course", (), rows, (1.0, 1.0))
 
 
-def _estimates(run: FlownRun) -> Table:
+def _estimates(run: Run) -> Table:
     s = run.summary
     names = (
         "weight less buoyancy, W − B [N]",
@@ -201,7 +201,7 @@ def _estimates(run: FlownRun) -> Table:
                  (2.0, 1.0, 1.0, 1.0, 1.0))  # fmt: skip
 
 
-def _lyapunov(run: FlownRun) -> Table | None:
+def _lyapunov(run: Run) -> Table | None:
     if not run.summary["lyapunov"]:
         return None
     rows = tuple(
@@ -223,7 +223,7 @@ def _lyapunov(run: FlownRun) -> Table | None:
     return Table("V of (31)", head, rows, (1.1, 1.0, 1.0, 1.0, 1.0, 0.8, 1.0))
 
 
-def _setting(run: FlownRun) -> Table:
+def _setting(run: Run) -> Table:
     s = run.scenario
     through = "the thrusters" if s.actuation.through == "thrusters" else "the body directly, as a wrench"
     rows = [
@@ -244,7 +244,7 @@ def _setting(run: FlownRun) -> Table:
     return Table("Scenario", (), tuple(rows), (1.0, 2.4))
 
 
-def _repeating(run: FlownRun) -> tuple[tuple[str, ...], str]:
+def _repeating(run: Run) -> tuple[tuple[str, ...], str]:
     """Return the commands that repeat a run, and what they do."""
     again = ("cosim report . --format html,pdf", "cosim replay .")
     if run.scenario.law.own:
@@ -252,7 +252,7 @@ def _repeating(run: FlownRun) -> tuple[tuple[str, ...], str]:
         return again, f"{whose}: the run is repeated from where the law is, and can be shown again from here."
     if run.scenario.law.name not in LAWS:
         return again, "An autopilot outside flew this run: it cannot be repeated from here, but be shown again."
-    commands = f" --replay-commands {COMMANDS_LOG}" if (run.path / COMMANDS_LOG).exists() else ""
+    commands = f" --replay-commands {COMMANDS_LOG}" if (run.folder / COMMANDS_LOG).exists() else ""
     command = f"cosim run {SCENARIO}{commands} --out again"
     cut = run.summary["status"] != "completed"
     how = (
@@ -263,13 +263,13 @@ def _repeating(run: FlownRun) -> tuple[tuple[str, ...], str]:
     return (command, *again), how
 
 
-def _files(run: FlownRun) -> tuple[tuple[str, str], ...]:
-    record = RECORD if (run.path / RECORD).exists() else PARTS
+def _files(run: Run) -> tuple[tuple[str, str], ...]:
+    record = RECORD if (run.folder / RECORD).exists() else PARTS
     files = [
         (record, "every signal of every step, with its unit"),
         (SUMMARY, "these numbers, in SI units"),
         (SCENARIO, "all that the run depends on"),
     ]
-    if (run.path / COMMANDS_LOG).exists():
+    if (run.folder / COMMANDS_LOG).exists():
         files.append((COMMANDS_LOG, "what was commanded, and when"))
     return tuple(files)

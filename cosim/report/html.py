@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from importlib import resources
 from string import Template
 
-from cosim.replay.page import REPLAY
 from cosim.report.contents import Contents, Table
+from cosim.results.run_result import REPLAY
 
 
 def html_report(contents: Contents, about: str, figures: Sequence[tuple[str, str, str]]) -> str:

@@ -10,24 +10,23 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from cosim.report.contents import Contents, contents_of
-from cosim.results.run_result import FlownRun
+from cosim.results.run_result import REPORT, Run
 
 if TYPE_CHECKING:  # see write_report
     from cosim.report.figures.style import FigureData
 
-REPORT = "report.html"
 FIGURES = "figures"
 FORMATS = ("html", "pdf", "png")
 
 
-def write_report(run: FlownRun, formats: Collection[str] = ("html",)) -> list[Path]:
+def write_report(run: Run, formats: Collection[str] = ("html",)) -> list[Path]:
     """Write the report of a run into its folder.
 
     All is written beside what is there, and put in its place when all is done.
 
     Parameters
     ----------
-    run : FlownRun
+    run : Run
         Finished, interrupted or killed.
     formats : collection of str
         Of `FORMATS`: ``html`` is ``report.html`` with its figures as SVG, ``pdf`` is ``report.pdf``, ``png`` is
@@ -41,18 +40,18 @@ def write_report(run: FlownRun, formats: Collection[str] = ("html",)) -> list[Pa
     # Matplotlib takes as long to import as all else together
     from cosim.report.figures.sampled_rows import story_of
 
-    scratch = Path(tempfile.mkdtemp(prefix=".report-", dir=run.path))
+    scratch = Path(tempfile.mkdtemp(prefix=".report-", dir=run.folder))
     try:
         told = _Told(story_of(run), contents_of(run), about(run))
         files = [*_with_figures(told, formats, scratch), *_pages(told, formats, scratch)]
         if (scratch / FIGURES).exists():
-            shutil.rmtree(run.path / FIGURES, ignore_errors=True)
-            (scratch / FIGURES).replace(run.path / FIGURES)
+            shutil.rmtree(run.folder / FIGURES, ignore_errors=True)
+            (scratch / FIGURES).replace(run.folder / FIGURES)
         if "png" in formats:
-            for page in run.path.glob("report-*.png"):  # of an earlier report, which may have had more
+            for page in run.folder.glob("report-*.png"):  # of an earlier report, which may have had more
                 page.unlink()
-        written = [file.replace(run.path / file.name) for file in files]
-        return written + (sorted((run.path / FIGURES).iterdir()) if {"html", "png"} & set(formats) else [])
+        written = [file.replace(run.folder / file.name) for file in files]
+        return written + (sorted((run.folder / FIGURES).iterdir()) if {"html", "png"} & set(formats) else [])
     finally:
         shutil.rmtree(scratch, ignore_errors=True)
 
@@ -97,7 +96,7 @@ def _pages(told: _Told, formats: Collection[str], folder: Path) -> list[Path]:
     return files + (write_pngs(pages, folder) if "png" in formats else [])
 
 
-def about(run: FlownRun) -> str:
+def about(run: Run) -> str:
     """Return the run in a line."""
     s = run.scenario
     return f"A run of the scenario {s.name}: {s.vehicle.title}, {s.law.name} law, {s.arbiter.engine} arbiter."

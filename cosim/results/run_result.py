@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
+import fnmatch
 from dataclasses import dataclass
+from html import escape
 from pathlib import Path
 from typing import Any
 
@@ -13,31 +15,146 @@ from controller import LAWS
 from cosim.errors import RunError
 from cosim.io.strict_json import read_json
 from cosim.results.as_flown import scenario_as_flown
-from cosim.results.record import Record, load_record
+from cosim.results.record import RECORD, Record, load_record
 from cosim.results.required_columns import require_columns
 from cosim.results.summary import summarise
 from cosim.scenario.scenario import Scenario, load_scenario
 from plant_fmu.errors import printable
+from plant_fmu.installing import install_hint
+from plant_fmu.toml_tables import hint
 
 SCENARIO = "scenario.toml"
 SUMMARY = "summary.json"
 COMMANDS_LOG = "commands.jsonl"
+REPORT = "report.html"
+REPLAY = "replay.html"
 
 _LONGEST = 1e12  # s, of the wall clock
 
 
 @dataclass(frozen=True, eq=False)
-class FlownRun:
-    """A run that is over."""
+class Run:
+    """A run in its folder: finished, interrupted or killed.
 
-    path: Path  # its folder
-    planned: Scenario  # as its file has it, by the law that flew it
-    scenario: Scenario  # as it came: with those obstacles that did, and with the target of the end
-    record: Record
+    Examples
+    --------
+    >>> run = load_run(Path("runs/docking"))  # doctest: +SKIP
+    >>> run.summary["goal"]["reached_at"]  # doctest: +SKIP
+    41.3
+    >>> run.frame()[["time", "goal.clearance"]]  # doctest: +SKIP
+    """
+
+    folder: Path
+    planned: Scenario  # as its file has it, with the law that flew it
+    scenario: Scenario  # as flown: with the obstacles that were added, and with the last target
+    record: Record  # signals over time, read when they are asked for
     summary: dict[str, Any]
 
+    def files(self) -> dict[str, Path]:
+        """Return those files of the run that exist, by what they are."""
+        named = {"scenario": SCENARIO, "record": RECORD, "summary": SUMMARY, "report": REPORT, "replay": REPLAY}
+        named |= {"commands": COMMANDS_LOG}
+        return {what: self.folder / name for what, name in named.items() if (self.folder / name).exists()}
 
-def load_run(path: Path) -> FlownRun:
+    def table(self) -> Any:
+        """Return the record as a table of Arrow.
+
+        Returns
+        -------
+        pyarrow.Table
+            A row a step, a column a signal; each field's metadata has its ``unit``.
+        """
+        import pyarrow as pa
+
+        fields = [
+            pa.field(column.name, pa.float64(), metadata={"unit": column.unit, "description": column.description})
+            for column in self.record.columns
+        ]
+        return pa.table([self.record[field.name] for field in fields], schema=pa.schema(fields))
+
+    def frame(self) -> Any:
+        """Return the record as a data frame of pandas.
+
+        Returns
+        -------
+        pandas.DataFrame
+            A row a step, a column a signal.
+
+        Raises
+        ------
+        RunError
+            If pandas is not installed.
+        """
+        try:
+            import pandas as pd
+        except ImportError as error:
+            raise RunError(f"a data frame needs pandas: {install_hint('pandas>=2.2')}") from error
+        return pd.DataFrame({column.name: self.record[column.name] for column in self.record.columns})
+
+    def plot(self, *signals: str, ax: Any = None) -> Any:
+        """Draw signals over time.
+
+        Parameters
+        ----------
+        *signals : str
+            Names, or patterns such as ``"weight.*"``. Default: the clearance of the goal and of each region.
+        ax : matplotlib.axes.Axes, optional
+            Where to draw; default: new axes.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+            With a line for each signal.
+
+        Raises
+        ------
+        RunError
+            If the record has no such signal.
+        """
+        import matplotlib.pyplot as plt
+
+        units = self.record.units
+        names = [name for pattern in signals or ("*.clearance",) for name in fnmatch.filter(units, pattern)]
+        unknown = next((pattern for pattern in signals if not fnmatch.filter(units, pattern)), None)
+        if unknown is not None:
+            raise RunError(f"signal {unknown!r} is unknown; {hint(unknown, list(units))}")
+        ax = plt.subplots()[1] if ax is None else ax
+        for name in dict.fromkeys(names):
+            ax.plot(self.record["time"], self.record[name], label=f"{name} [{units[name]}]" if units[name] else name)
+        ax.set(xlabel="time [s]", title=self.scenario.title)
+        ax.legend()
+        return ax
+
+    def replay(self) -> Path:
+        """Return the page in which the run can be seen again.
+
+        Returns
+        -------
+        Path
+            An HTML file that opens in a browser without a network.
+
+        Raises
+        ------
+        RunError
+            If the run was made without it.
+        """
+        if "replay" not in self.files():
+            raise RunError(f"{self.folder}: has no {REPLAY}; `cosim replay {self.folder}` writes it")
+        return self.folder / REPLAY
+
+    def __repr__(self) -> str:
+        status, end = self.summary.get("status"), self.summary.get("simulated_time")
+        return f"Run({str(self.folder)!r}: {self.scenario.name}, {status}, {end} s)"
+
+    def _repr_html_(self) -> str:
+        """Return the run as a small table, for notebooks."""
+        rows = {"folder": self.folder, "scenario": self.scenario.title, "law": self.scenario.law.name}
+        rows |= {key: value for key, value in self.summary.items() if isinstance(value, str | int | float)}
+        cells = "".join(f"<tr><th>{escape(str(k))}</th><td>{escape(str(v))}</td></tr>" for k, v in rows.items())
+        return f"<table>{cells}</table>"
+
+
+def load_run(path: Path) -> Run:
     """Open a run that is done, was interrupted, or was killed.
 
     Parameters
@@ -47,7 +164,7 @@ def load_run(path: Path) -> FlownRun:
 
     Returns
     -------
-    FlownRun
+    Run
         Its summary is made anew from its record.
 
     Raises
@@ -63,7 +180,7 @@ def load_run(path: Path) -> FlownRun:
     status, wall_time = "killed", None
     if (path / SUMMARY).exists():
         scenario, status, wall_time = _concluded(path / SUMMARY, scenario)
-    return flown_run(path, scenario, status, wall_time)
+    return open_run(path, scenario, status, wall_time)
 
 
 def _concluded(file: Path, scenario: Scenario) -> tuple[Scenario, str, float | None]:
@@ -89,7 +206,7 @@ def _text(file: Path, summary: dict[str, Any], key: str) -> str:
     return printable(summary[key])
 
 
-def flown_run(path: Path, scenario: Scenario, status: str, wall_time: float | None) -> FlownRun:
+def open_run(path: Path, scenario: Scenario, status: str, wall_time: float | None) -> Run:
     """Return a run of which is known how it ended.
 
     Parameters
@@ -105,7 +222,7 @@ def flown_run(path: Path, scenario: Scenario, status: str, wall_time: float | No
 
     Returns
     -------
-    FlownRun
+    Run
         With its summary.
 
     Raises
@@ -125,7 +242,7 @@ def flown_run(path: Path, scenario: Scenario, status: str, wall_time: float | No
     summary = summarise(came, record, status, wall_time)
     if scenario.commands.enabled:
         summary["commands"] = _lines(path / COMMANDS_LOG)
-    return FlownRun(path, scenario, came, record, summary)
+    return Run(path, scenario, came, record, summary)
 
 
 def _lines(file: Path) -> int:

@@ -7,15 +7,12 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from controller import Law, LawError
 from cosim.errors import RunError
-from cosim.replay.page import REPLAY
-from cosim.report.report import REPORT
-from cosim.results.record import RECORD
 from cosim.results.recorder import Recorder
-from cosim.results.run_result import COMMANDS_LOG, SCENARIO, SUMMARY
+from cosim.results.run_result import COMMANDS_LOG, Run
 from cosim.results.wording import verdict
 from cosim.run.progress import ProgressBar
 from cosim.run.run_folder import RunFolder, claim, conclude
@@ -32,20 +29,6 @@ if TYPE_CHECKING:  # pymavlink and websockets wait until a run is shown
     from cosim.mavlink.thread import LinkThread
 
 _PROGRESS_STEPS = 200  # times that the bar moves
-
-
-@dataclass(frozen=True)
-class Run:
-    """Where a run was written, and what it came to."""
-
-    folder: Path
-    summary: dict[str, Any]
-
-    def files(self) -> dict[str, Path]:
-        """Return those of its files that are there, by what they are."""
-        named = {"scenario": SCENARIO, "record": RECORD, "summary": SUMMARY, "report": REPORT, "replay": REPLAY}
-        named |= {"commands": COMMANDS_LOG}
-        return {what: self.folder / name for what, name in named.items() if (self.folder / name).exists()}
 
 
 @dataclass(frozen=True)
@@ -80,7 +63,7 @@ class _Progress:
 
 def run_scenario(
     scenario: Scenario,
-    out: Path | None = None,
+    out: str | Path | None = None,
     mavlink: Mavlink | None = None,
     rate: float | None = None,
     progress: bool = False,
@@ -88,6 +71,7 @@ def run_scenario(
     commands_log: Path | None = None,
     live: LiveView | None = None,
     law: Law | None = None,
+    overwrite: bool = False,
 ) -> Run:
     """Run a scenario and write its folder.
 
@@ -97,7 +81,7 @@ def run_scenario(
     ----------
     scenario : Scenario
         What to run.
-    out : Path, optional
+    out : str or Path, optional
         The run folder; it must not exist, or be empty. Default: a new one below ``runs``. After a reset it is the same
         name with a number.
     mavlink : Mavlink, optional
@@ -108,13 +92,15 @@ def run_scenario(
         Show a bar, if there is a terminal.
     report : bool
         Write the report and its figures.
-    commands : Path, optional
+    commands_log : Path, optional
         The log of an earlier run, whose commands are repeated; then none are taken from the link or from viewers.
     live : LiveView, optional
         Shows the run while it goes on, and takes commands if the scenario's commands are enabled.
     law : Law, optional
         One's own, such as a `FunctionLaw`, in the place of the scenario's. The run folder says where it is from, and
         cannot hold it: the run is repeated from where the law is.
+    overwrite : bool
+        Replace a run that `out` holds; a folder that holds anything else is refused.
 
     Returns
     -------
@@ -136,6 +122,7 @@ def run_scenario(
     PlantError
         If the FMU refuses the scenario, or fails in a step; what was recorded until then is left readable.
     """
+    out = None if out is None else Path(out)
     if law is not None:
         scenario = with_custom_law(law, scenario)
     recorded = _recorded(scenario, commands_log)
@@ -146,7 +133,9 @@ def run_scenario(
             with Master(scenario, law) as master:
                 if mavlink is not None and link is None:
                     link = mavlink.open(scenario, master.signals.columns, None if recorded else queue, rate)
-                folder = claim(out.with_name(f"{out.name}-{attempt}") if out and attempt > 1 else out, scenario)
+                folder = claim(
+                    out.with_name(f"{out.name}-{attempt}") if out and attempt > 1 else out, scenario, overwrite
+                )
                 if link is not None and attempt == 1:
                     link.start()
                 if live is not None:
@@ -157,15 +146,15 @@ def run_scenario(
                     queue.end_run()
                     if live is not None and report:
                         live.say("The run is over; its report is being written")
-                    summary = conclude(folder.path, scenario, status, wall_time, report)
+                    run = conclude(folder.path, scenario, status, wall_time, report)
                     if live is not None:
-                        live.end(status, verdict(summary))
+                        live.end(status, verdict(run.summary))
                 except OSError as error:
                     raise RunError(f"{folder.path}: {error.strerror or error}") from error
             if failure:
                 raise failure
             if status != "reset" or recorded:
-                return Run(folder.path, summary)
+                return run
     finally:
         if link:
             link.close()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import itertools
 import shutil
+import tempfile
 from collections.abc import Collection
 from dataclasses import dataclass
 from datetime import datetime
@@ -15,10 +16,10 @@ from cosim.errors import RunError
 from cosim.io.atomic_file import write_atomic
 from cosim.io.strict_json import json_text
 from cosim.replay.pages import write_replay
-from cosim.report.report import write_report
+from cosim.report.report import FIGURES, write_report
 from cosim.results.record import PARTS, RECORD, part_files, require_utf8
 from cosim.results.recorder import Recorder
-from cosim.results.run_result import COMMANDS_LOG, SCENARIO, SUMMARY, FlownRun, flown_run, load_run
+from cosim.results.run_result import COMMANDS_LOG, REPLAY, REPORT, SCENARIO, SUMMARY, Run, load_run, open_run
 from cosim.scenario.scenario import VEHICLE_COPY, Scenario
 
 
@@ -68,7 +69,7 @@ class RunFolder:
                 self.path.rmdir()
 
 
-def claim(out: Path | None, scenario: Scenario) -> RunFolder:
+def claim(out: Path | None, scenario: Scenario, overwrite: bool = False) -> RunFolder:
     """Make the folder of a run and put the scenario into it.
 
     Parameters
@@ -77,6 +78,8 @@ def claim(out: Path | None, scenario: Scenario) -> RunFolder:
         A folder that does not exist or is empty; None for a new one of a name of its own below ``runs``.
     scenario : Scenario
         What will be run.
+    overwrite : bool
+        Remove the run that the folder holds.
 
     Returns
     -------
@@ -96,6 +99,8 @@ def claim(out: Path | None, scenario: Scenario) -> RunFolder:
         else:
             path, created = out, not out.exists()
             path.mkdir(parents=True, exist_ok=True)
+            if overwrite and any(path.iterdir()):
+                _remove_run(path)
             if any(path.iterdir()):
                 raise RunError(f"{path}: exists and is not empty; expected a new folder")
         folder = RunFolder(path, created)
@@ -114,6 +119,19 @@ def claim(out: Path | None, scenario: Scenario) -> RunFolder:
     return folder
 
 
+def _remove_run(path: Path) -> None:
+    """Remove what a run has made in its folder, and raise a RunError if the folder holds anything else."""
+    made = {SCENARIO, VEHICLE_COPY, COMMANDS_LOG, RECORD, PARTS, SUMMARY, REPORT, REPLAY, FIGURES}
+    odd = sorted(file.name for file in path.iterdir() if file.name not in made and not file.match("report*.*"))
+    if odd or not (path / SCENARIO).is_file():
+        what = f"{odd[0]!r}, which no run makes" if odd else "no run"
+        raise RunError(f"{path}: holds {what}; expected a run to be replaced, or a new folder")
+    aside = Path(tempfile.mkdtemp(prefix=f".{path.name}-", dir=path.parent))
+    for file in path.iterdir():
+        file.replace(aside / file.name)
+    shutil.rmtree(aside)
+
+
 def _new_folder(parent: Path, name: str) -> Path:
     for suffix in itertools.chain([""], (f"-{i}" for i in itertools.count(2))):
         try:
@@ -127,7 +145,7 @@ def _new_folder(parent: Path, name: str) -> Path:
     raise AssertionError("unreachable")
 
 
-def conclude(path: Path, scenario: Scenario, status: str, wall_time: float | None, report: bool) -> dict[str, Any]:
+def conclude(path: Path, scenario: Scenario, status: str, wall_time: float | None, report: bool) -> Run:
     """Write summary, report and replay of a run from its record.
 
     Parameters
@@ -145,17 +163,17 @@ def conclude(path: Path, scenario: Scenario, status: str, wall_time: float | Non
 
     Returns
     -------
-    dict
-        The summary.
+    Run
+        With its summary.
 
     Raises
     ------
     RunError
         If the record cannot be read.
     """
-    run = flown_run(path, scenario, status, wall_time)
+    run = open_run(path, scenario, status, wall_time)
     _write(run, ("html",) if report else ())
-    return run.summary
+    return run
 
 
 def report_again(path: Path, formats: Collection[str] = ("html",)) -> tuple[dict[str, Any], list[Path]]:
@@ -187,8 +205,8 @@ def report_again(path: Path, formats: Collection[str] = ("html",)) -> tuple[dict
         raise RunError(f"{path}: {error.strerror or error}") from error
 
 
-def _write(run: FlownRun, formats: Collection[str]) -> list[Path]:
-    summary = write_atomic(run.path / SUMMARY, json_text(run.summary))
+def _write(run: Run, formats: Collection[str]) -> list[Path]:
+    summary = write_atomic(run.folder / SUMMARY, json_text(run.summary))
     pages = write_report(run, formats) if formats else []
     replay = [write_replay(run)] if "html" in formats else []
     return [*pages[:1], *replay, summary, *pages[1:]]

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterable, Sequence
+import tomllib
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -37,7 +38,7 @@ from cosim.scenario.tables import (
     TimeEntry,
     Vector3,
 )
-from cosim.scenario.toml_file import flat, override, read_table, shipped_scenarios
+from cosim.scenario.toml_file import flat, list_scenarios, override, read_table, set_key
 from cosim.scenario.toml_text import scenario_text
 from cosim.scenario.validation import (
     check_commands,
@@ -113,6 +114,43 @@ class Scenario:
             comments(self.law.name, self.vehicle) if commented else {},
         )
 
+    def replace(self, changes: Mapping[str, Any]) -> Scenario:
+        """Make a scenario in which some keys have other values.
+
+        Parameters
+        ----------
+        changes : mapping of str to value
+            By key, with dots between its parts, as ``--set`` has them; regions go by index or by name.
+
+        Returns
+        -------
+        Scenario
+            Checked as any other; its title says what was changed.
+
+        Raises
+        ------
+        ScenarioError
+            If a key is unknown, or a value cannot be.
+
+        Examples
+        --------
+        >>> load_scenario("paper").replace({"limit.force": 500.0, "regions.SR1.gain": 5000.0}).limit.force
+        500.0
+        """
+        before, table = tomllib.loads(self.toml()), tomllib.loads(self.toml())
+        try:
+            for key, value in changes.items():
+                set_key(table, key, value.tolist() if isinstance(value, np.generic | np.ndarray) else value)
+            require_modest(table)
+            scenario = validate_scenario(table, self.name)
+            return _with_changes(scenario, table, before)
+        except (PlantFmuError, ControllerError, ScenarioError) as error:
+            raise ScenarioError(f"{self.name}: {error}") from error
+
+    def __repr__(self) -> str:
+        regions = ", ".join(region.region.name for region in self.regions) or "none"
+        return f"Scenario({self.title!r}, law={self.law.name!r}, vehicle={self.vehicle.name!r}, regions: {regions})"
+
     @property
     def title(self) -> str:
         """The title of the file, and what was changed since it was written."""
@@ -163,8 +201,8 @@ def load_scenario(name_or_file: str | Path, overrides: Sequence[str] = ()) -> Sc
         If there is no such scenario, a key is unknown, missing or mistyped, or a value cannot be.
     """
     text = str(name_or_file)
-    if not text.endswith(".toml") and text not in shipped_scenarios():
-        known = hint(text, shipped_scenarios())
+    if not text.endswith(".toml") and text not in list_scenarios():
+        known = hint(text, list_scenarios())
         raise ScenarioError(f"scenario {text!r} is unknown; {known} (or a file ending in .toml)")
     try:
         table, name, titled = read_table(text)

@@ -13,14 +13,14 @@ from cosim.errors import ScenarioError
 _SHOWN = 80  # characters of what is absurdly long
 
 
-def shipped_scenarios() -> list[str]:
+def list_scenarios() -> list[str]:
     """Return the names of the scenarios that come with the package."""
     return sorted(f.name.removesuffix(".toml") for f in _folder().iterdir() if f.name.endswith(".toml"))
 
 
 def shipped_titles() -> dict[str, str]:
     """Return the title of each scenario that comes with the package, without checking the rest of it."""
-    texts = {name: (_folder() / f"{name}.toml").read_text(encoding="utf-8") for name in shipped_scenarios()}
+    texts = {name: (_folder() / f"{name}.toml").read_text(encoding="utf-8") for name in list_scenarios()}
     return {name: tomllib.loads(text)["title"] for name, text in texts.items()}
 
 
@@ -71,11 +71,11 @@ def read_table(name_or_file: str, seen: tuple[str, ...] = (), beside: Path | Non
         vehicle = table.get("vehicle")
         if isinstance(vehicle, str) and vehicle.endswith(".toml"):  # beside the file that names it
             table["vehicle"] = str(folder / vehicle)
-    elif name_or_file in shipped_scenarios():
+    elif name_or_file in list_scenarios():
         with resources.as_file(_folder() / f"{name_or_file}.toml") as shipped:
             table, name, folder = read_toml(shipped), name_or_file, Path()
     else:
-        raise ScenarioError(f"base {name_or_file!r} is unknown; {hint(name_or_file, shipped_scenarios())}")
+        raise ScenarioError(f"base {name_or_file!r} is unknown; {hint(name_or_file, list_scenarios())}")
     if name_or_file in seen:
         raise ScenarioError(f"{name}: is its own base")
     if "base" in table:
@@ -132,11 +132,9 @@ def override(table: dict[str, Any], text: str) -> None:
     key, equals, value_text = text.partition("=")
     if not equals or not key:
         raise ScenarioError(f"--set {_short(text)!r}: expected key=value")
-    *path, last = key.strip().split(".")
-    if len(path) >= MAX_DEPTH:
-        raise ScenarioError(
-            f"--set {_short(key)}: {len(path)} tables within each other, expected less than {MAX_DEPTH}"
-        )
+    depth = key.count(".")
+    if depth >= MAX_DEPTH:
+        raise ScenarioError(f"--set {_short(key)}: {depth} tables within each other, expected less than {MAX_DEPTH}")
     try:
         parsed = tomllib.loads(f"value = {value_text}")
         require_modest(parsed)
@@ -150,7 +148,28 @@ def override(table: dict[str, Any], text: str) -> None:
         raise ScenarioError(f"--set {_short(text)}: a whole number has too many digits") from error
     if len(parsed) > 1:
         raise ScenarioError(f"--set {_short(text)!r}: expected one key=value")
-    value = parsed["value"]
+    set_key(table, key, parsed["value"])
+
+
+def set_key(table: dict[str, Any], key: str, value: Any) -> None:
+    """Set one key of a table in place.
+
+    Parameters
+    ----------
+    table : dict
+        A scenario's.
+    key : str
+        With dots between its parts; items of lists go by index or name. Another ``law.name`` drops the gains of the law
+        before.
+    value : object
+        Of a type that TOML has.
+
+    Raises
+    ------
+    ScenarioError
+        If there is no such place.
+    """
+    *path, last = key.strip().split(".")
     if key.strip() == "law.name":
         _name_law(table, value)
     at: Any = table

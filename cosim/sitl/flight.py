@@ -6,10 +6,10 @@ import contextlib
 import time
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 from cosim.errors import RunError
 from cosim.results.recorder import Recorder
+from cosim.results.run_result import Run
 from cosim.run.run_folder import claim, conclude
 from cosim.scenario.scenario import Scenario
 from cosim.simulation.master import Master
@@ -115,7 +115,7 @@ class Flight:
             with self._writing():
                 self._claimed.keep(self._recorder)
 
-    def conclude(self, status: str, report: bool) -> dict[str, Any]:
+    def conclude(self, status: str, report: bool) -> Run:
         """Write the summary of a flight that has ended, and made a step.
 
         Parameters
@@ -127,8 +127,8 @@ class Flight:
 
         Returns
         -------
-        dict
-            The summary.
+        Run
+            With its summary.
 
         Raises
         ------

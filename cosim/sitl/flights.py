@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from cosim.errors import CosimError, RunError
-from cosim.run.run import Run
+from cosim.results.run_result import Run
 from cosim.sitl.flight import Flight
 from cosim.sitl.law import AutopilotLaw
 from cosim.sitl.scenario import SCENARIO, scenario_to_fly
@@ -154,4 +154,4 @@ class Flights:
     def _conclude(self) -> list[Run]:
         """Write the reports of all runs that made a step, unless they are not wanted, and return these runs."""
         report = self._options.report
-        return [Run(flight.folder, flight.conclude(status, report)) for flight, status in self._ended]
+        return [flight.conclude(status, report) for flight, status in self._ended]

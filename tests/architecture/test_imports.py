@@ -54,6 +54,7 @@ ONE_PLACE = {
         ),
         "fuzzy_arbiter.compiled",
     },
+    "pandas": {"cosim.results.run_result"},
     "pymavlink": {"cosim.mavlink.wire.dialect"},
     "rerun": {"cosim.export.as_rrd"},
     "rich": {"cosim.command_line.watch", "cosim.live.watching.bars", "cosim.live.watching.picture"},

@@ -17,7 +17,7 @@ from cosim.results.required_columns import require_columns
 from cosim.results.run_result import SUMMARY, load_run
 from cosim.run.run_folder import report_again
 from cosim.scenario.scenario import load_scenario
-from cosim.scenario.toml_file import shipped_scenarios
+from cosim.scenario.toml_file import list_scenarios
 from cosim.simulation.columns import names_of
 from cosim.simulation.master import Master
 
@@ -96,7 +96,7 @@ def test_d6_the_names_are_those_of_the_run(kind):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", shipped_scenarios())
+@pytest.mark.parametrize("name", list_scenarios())
 def test_d6_the_names_are_those_of_every_shipped_scenario(name):
     scenario = load_scenario(name)
     with Master(scenario) as master:

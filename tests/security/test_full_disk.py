@@ -96,7 +96,7 @@ def test_d9_a_flight_of_an_autopilot_leaves_nothing_either(tmp_path, monkeypatch
     again = flight()
     again.step()
     again.end()
-    assert again.conclude("completed", report=False)["steps"] == 0
+    assert again.conclude("completed", report=False).summary["steps"] == 0
 
 
 @pytest.mark.skipif(os.name != "posix", reason="such a limit is POSIX's")

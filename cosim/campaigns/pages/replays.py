@@ -14,9 +14,9 @@ from cosim.campaigns.reruns.repeat import Repeat, repeat_of
 from cosim.errors import CosimError, RunError
 from cosim.io.atomic_file import write_atomic
 from cosim.io.strict_json import json_text, read_json
-from cosim.replay.page import REPLAY, write_page
+from cosim.replay.page import write_page
 from cosim.replay.trace import trace_of
-from cosim.results.run_result import load_run
+from cosim.results.run_result import REPLAY, load_run
 from cosim.run.run import run_scenario
 from plant_fmu import PlantError
 

@@ -11,7 +11,8 @@ from cosim.campaigns.reruns.repeat import repeat_of
 from cosim.campaigns.store.folder import read_plan
 from cosim.campaigns.store.plan import code_digest
 from cosim.results.record import load_record
-from cosim.run.run import Run, run_scenario
+from cosim.results.run_result import Run
+from cosim.run.run import run_scenario
 from plant_fmu import PlantError
 
 _OF_THE_CLOCK = ("worst_step_time",)  # columns that no repetition gives again

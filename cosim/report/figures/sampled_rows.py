@@ -13,7 +13,7 @@ from cosim.report.figures.time_series import enlarged, error_of
 from cosim.report.figures.trajectory import POSITION
 from cosim.results.extremes import even_edges, extreme_rows, rows_at
 from cosim.results.record import Rows
-from cosim.results.run_result import FlownRun
+from cosim.results.run_result import Run
 from cosim.scenario.scenario import Scenario
 from cosim.simulation.signals import Array
 
@@ -29,7 +29,7 @@ _DRAWN_OF_REGIONS = (".clearance", ".shift.x", ".shift.y", ".shift.z")
 _EXTREME = ("attitude.", "membership.", "weight.", "estimate.", "lyapunov.")
 
 
-def story_of(run: FlownRun) -> FigureData:
+def story_of(run: Run) -> FigureData:
     """Return what the figures of a run draw from.
 
     Of a long record these are the rows at which what is drawn is least and greatest in each of some hundred parts of
@@ -38,7 +38,7 @@ def story_of(run: FlownRun) -> FigureData:
 
     Parameters
     ----------
-    run : FlownRun
+    run : Run
         Any.
 
     Returns

@@ -12,7 +12,7 @@ import fuzzy_arbiter.__main__
 import plant_fmu.__main__
 from cosim.command_line.cli import _parser, main
 from cosim.scenario.scenario import load_scenario
-from cosim.scenario.toml_file import shipped_scenarios, shipped_titles
+from cosim.scenario.toml_file import list_scenarios, shipped_titles
 
 QUICK = ["--no-report", "--set", "arbiter.engine=closed", "--set", "time.duration=0.02"]
 HEAVY = {"numba", "scipy", "matplotlib", "pyarrow", "numpy", "fmpy", "msgspec", "pandas", "tqdm", "controller"}
@@ -74,11 +74,11 @@ def test_list_as_json_is_the_same_list(capsys):
     assert main(["list"]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert [line.split(maxsplit=1) for line in lines] == [[entry["name"], entry["title"]] for entry in listed]
-    assert [entry["name"] for entry in listed] == shipped_scenarios()
+    assert [entry["name"] for entry in listed] == list_scenarios()
 
 
 def test_titles_that_are_listed_are_those_of_the_scenarios():
-    assert shipped_titles() == {name: load_scenario(name).title for name in shipped_scenarios()}
+    assert shipped_titles() == {name: load_scenario(name).title for name in list_scenarios()}
 
 
 @pytest.mark.parametrize("words", [["list"], ["list", "--json"], ["help", "run"]])

@@ -13,7 +13,7 @@ from cosim.mavlink.services.parameter_names import parameter_names
 from cosim.mavlink.services.parameters import shortest
 from cosim.mavlink.services.station_parameters import station_parameters
 from cosim.scenario.scenario import load_scenario
-from cosim.scenario.toml_file import shipped_scenarios
+from cosim.scenario.toml_file import list_scenarios
 from cosim.simulation.commands import LiveSettings
 from cosim.simulation.commands.commands import ChangeSetting
 from tests.cosim.mavlink.station import NAN, Station, scenario
@@ -39,7 +39,7 @@ def put(station, name, value, kind=REAL32):
     return station.send(mavlink.MAVLink_param_set_message(1, 1, name.encode(), value, kind))
 
 
-@pytest.mark.parametrize("name", shipped_scenarios())
+@pytest.mark.parametrize("name", list_scenarios())
 def test_every_setting_has_a_name_of_its_own(name):
     keys = [setting.key for setting in LiveSettings(load_scenario(name, ["commands.enabled=true"]))]
     names = parameter_names(keys)
@@ -126,7 +126,7 @@ def test_the_frame_is_that_of_the_vehicle():
     assert read(Station("px4", of=heavy), "SYS_AUTOSTART")[0].param_value == 60002.0
 
 
-@pytest.mark.parametrize("name", shipped_scenarios())
+@pytest.mark.parametrize("name", list_scenarios())
 def test_no_setting_is_hidden_by_a_name_that_stations_look_for(name):
     keys = [setting.key for setting in LiveSettings(scenario(name=name))]
     taken = set(parameter_names(keys).values())

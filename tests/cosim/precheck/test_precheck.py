@@ -1,4 +1,4 @@
-"""`cosim check`: every shipped scenario, the paper's figures, and advice that mends what it is given for."""
+"""`cosim check_scenario`: every shipped scenario, the paper's figures, and advice that mends what it is given for."""
 
 import json
 import math
@@ -9,11 +9,11 @@ import pytest
 from cosim.command_line.cli import main
 from cosim.precheck.feasibility import region_findings
 from cosim.precheck.output import check_json, check_text
-from cosim.precheck.precheck import check
+from cosim.precheck.precheck import check_scenario
 from cosim.precheck.stability import gain_findings, start_weights, vehicle_findings
 from cosim.precheck.thrust import asked_finding, thrust_findings
 from cosim.scenario.scenario import load_scenario
-from cosim.scenario.toml_file import shipped_scenarios
+from cosim.scenario.toml_file import list_scenarios
 
 CLOSED = "arbiter.engine=closed"
 MENDED = ("law.gains.sigma_p=0.0004", "law.gains.k_p1=0.05")
@@ -40,17 +40,15 @@ def of_thrust(*overrides):
 
 @pytest.fixture(scope="module")
 def paper():
-    return named(check(load_scenario("paper", [CLOSED])).findings)
+    return named(check_scenario(load_scenario("paper", [CLOSED])).findings)
 
 
-EACH_SCENARIO = [
-    name if name == "paper" else pytest.param(name, marks=pytest.mark.slow) for name in shipped_scenarios()
-]
+EACH_SCENARIO = [name if name == "paper" else pytest.param(name, marks=pytest.mark.slow) for name in list_scenarios()]
 
 
 @pytest.mark.parametrize("name", EACH_SCENARIO)
 def test_every_shipped_scenario_can_be_checked(name):
-    result = check(load_scenario(name, [CLOSED]))
+    result = check_scenario(load_scenario(name, [CLOSED]))
     assert {finding.topic for finding in result.findings} == {"vehicle", "law", "regions", "thrust"}
     for finding in result.findings:
         assert finding.text
@@ -184,7 +182,7 @@ def test_thruster_that_cannot_be_missed_is_a_note():
 
 def test_other_laws_are_not_held_to_the_printed_laws_theory():
     changes = ("law.name=deployable", "law.gains={}", "actuation.through=thrusters")
-    result = check(load_scenario("paper", [CLOSED, *changes]))
+    result = check_scenario(load_scenario("paper", [CLOSED, *changes]))
     assert result.holds
     (law,) = (finding for finding in result.findings if finding.topic == "law")
     assert law.status == "note" and "not of this one (deployable)" in law.text
@@ -232,7 +230,7 @@ def test_command_as_json(capsys):
     assert result["holds"] is False and result["law"] == "ismail_dunnigan"
     by_name = {finding["name"]: finding for finding in result["findings"]}
     assert by_name["(38) 1, 2"]["numbers"]["greatest_gradient"] is None  # everywhere
-    assert result == json.loads(check_json(check(load_scenario("paper", [CLOSED, "law.gains.sigma_p=0"]))))
+    assert result == json.loads(check_json(check_scenario(load_scenario("paper", [CLOSED, "law.gains.sigma_p=0"]))))
 
 
 def test_unknown_scenario_is_one_line(capsys):

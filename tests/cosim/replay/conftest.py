@@ -78,7 +78,7 @@ def copy_of(tmp_path_factory):
 
     def copy(run, name="run"):
         folder = tmp_path_factory.mktemp("copies") / name
-        shutil.copytree(run.path, folder)
+        shutil.copytree(run.folder, folder)
         return folder
 
     return copy
@@ -104,10 +104,10 @@ def shown(tmp_path_factory):
     pages = {}
 
     def page_of(run):
-        if run.path not in pages:
+        if run.folder not in pages:
             file = tmp_path_factory.mktemp("pages") / "replay.html"
-            pages[run.path] = Shown(run, write_page(file, [trace_of(run).as_json()], run.scenario.title))
-        return pages[run.path]
+            pages[run.folder] = Shown(run, write_page(file, [trace_of(run).as_json()], run.scenario.title))
+        return pages[run.folder]
 
     return page_of
 

@@ -155,7 +155,7 @@ def test_several_runs_come_here_under_names_that_tell_them_apart(docking, copy_o
 @pytest.mark.skipif(os.name != "posix", reason="pipes have names on POSIX alone")
 def test_a_pipe_is_neither_read_nor_written_over(docking, tmp_path, capsys):
     os.mkfifo(tmp_path / "x.html")
-    assert main(["replay", str(docking.path), "--out", str(tmp_path / "x.html")]) == 2
+    assert main(["replay", str(docking.folder), "--out", str(tmp_path / "x.html")]) == 2
     assert "exists and is no replay" in capsys.readouterr().err
     assert (tmp_path / "x.html").is_fifo()
 
@@ -163,13 +163,13 @@ def test_a_pipe_is_neither_read_nor_written_over(docking, tmp_path, capsys):
 def test_another_file_is_not_written_over(docking, tmp_path, capsys):
     file = tmp_path / "thesis.html"
     file.write_text("years of work")
-    assert main(["replay", str(docking.path), "--out", str(file)]) == 2
+    assert main(["replay", str(docking.folder), "--out", str(file)]) == 2
     assert capsys.readouterr().err == f"cosim: {file}: exists and is no replay; expected a new file\n"
     assert file.read_text() == "years of work"
-    assert main(["replay", str(docking.path), str(docking.path), "--out", str(tmp_path / "x.html")]) == 2
+    assert main(["replay", str(docking.folder), str(docking.folder), "--out", str(tmp_path / "x.html")]) == 2
     assert "is given twice" in capsys.readouterr().err
     for out in (tmp_path, tmp_path / "nowhere" / "x.html", file / "x.html"):
-        assert main(["replay", str(docking.path), "--out", str(out)]) == 2
+        assert main(["replay", str(docking.folder), "--out", str(out)]) == 2
         assert capsys.readouterr().err.count("\n") == 1
     assert [p.name for p in tmp_path.iterdir()] == ["thesis.html"]
 
@@ -180,4 +180,4 @@ def test_a_place_that_cannot_be_written_is_one_line(docking, tmp_path):
 
     tmp_path.chmod(0o500)
     with pytest.raises(RunError, match="Permission denied"):
-        replay([docking.path], tmp_path / "x.html")
+        replay([docking.folder], tmp_path / "x.html")

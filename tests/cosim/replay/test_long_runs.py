@@ -47,7 +47,7 @@ def streamed(monkeypatch):
     def reopened(run):
         with monkeypatch.context() as patch:
             patch.setattr("cosim.results.record._SMALL", 0)
-            again = load_run(run.path)
+            again = load_run(run.folder)
         assert not again.record._small and not again.record._kept
         return again
 
@@ -74,7 +74,7 @@ def test_gaps_are_told_as_they_are(docking, copy_of, spoil, streamed):
 
 @pytest.mark.parametrize(("every", "rate"), [(1, None), (7, None), (1, 30.0)])
 def test_an_excerpt_is_the_same(every, rate, docking, streamed):
-    held, long = (excerpt_of(run.path, every=every, rate=rate) for run in (docking, docking))
+    held, long = (excerpt_of(run.folder, every=every, rate=rate) for run in (docking, docking))
     long = dataclasses.replace(long, run=streamed(docking))
     for name in ("time", "position.x"):
         assert long.signal(name).tobytes() == held.signal(name).tobytes()

@@ -11,7 +11,7 @@ from cosim.batch.variation import Variation
 from cosim.campaigns import run_sweep
 from cosim.campaigns.reruns.repeat import repeat_of
 from cosim.precheck.output import check_text
-from cosim.precheck.precheck import check
+from cosim.precheck.precheck import check_scenario
 from cosim.replay.header import header_of
 from cosim.replay.pages import joint_title
 from cosim.report.contents import contents_of
@@ -20,7 +20,7 @@ from cosim.run.run import run_scenario
 from cosim.run.run_folder import report_again
 from cosim.scenario.law_factory import with_custom_law
 from cosim.scenario.scenario import load_scenario
-from cosim.scenario.toml_file import shipped_scenarios
+from cosim.scenario.toml_file import list_scenarios
 from cosim.sitl.scenario import scenario_to_fly
 from tests.cosim.campaigns.fake import design, fakes
 from tests.cosim.replay.decoding import read_page
@@ -36,14 +36,14 @@ def saved(path, text):
     return path
 
 
-@pytest.mark.parametrize("name", shipped_scenarios())
+@pytest.mark.parametrize("name", list_scenarios())
 def test_what_is_shipped_is_as_its_title_says(name):
     scenario = load_scenario(name)
     assert scenario.title == scenario.table["title"] and scenario.table["changed"] == ()
 
 
 def test_the_numbers_of_shipped_titles_are_those_of_their_scenarios():
-    of = {name: load_scenario(name) for name in shipped_scenarios()}
+    of = {name: load_scenario(name) for name in list_scenarios()}
     assert "108 N" in of["paper-limited"].title and of["paper-limited"].limit.force == 108.0
     assert "no limit" in of["paper"].title and of["paper"].limit.force == np.inf
     assert "8 N too heavy" in of["depth-transit"].title
@@ -143,7 +143,7 @@ def test_the_pages_of_a_run_say_so_when_it_is_flown_and_when_it_is_reported_agai
     run = load_run(folder)
     assert run.planned.title == run.scenario.title == contents_of(run).title == scenario.title
     assert header_of(scenario, ())["title"] == scenario.title
-    assert check_text(check(scenario)).startswith(scenario.title)
+    assert check_text(check_scenario(scenario)).startswith(scenario.title)
     assert load_scenario(folder / "scenario.toml").title == scenario.title
 
 

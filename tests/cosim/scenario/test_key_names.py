@@ -10,7 +10,7 @@ from cosim.campaigns.pages.sections import LABELS
 from cosim.scenario.changes import value_at
 from cosim.scenario.key_names import key_name
 from cosim.scenario.scenario import load_scenario
-from cosim.scenario.toml_file import shipped_scenarios
+from cosim.scenario.toml_file import list_scenarios
 
 DOCUMENT = Path(__file__).parents[3] / "docs" / "scenarios.md"
 
@@ -57,7 +57,7 @@ def test_keys_of_other_shapes_in_words():
     assert label("goal.corners.1.0", overrides=prism) == "corner 1 x of the goal [m]"
 
 
-@pytest.mark.parametrize("name", shipped_scenarios())
+@pytest.mark.parametrize("name", list_scenarios())
 def test_every_key_of_a_scenario_has_words(name):
     scenario = load_scenario(name)
     for key in keys_of(scenario.table):

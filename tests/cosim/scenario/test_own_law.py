@@ -10,7 +10,7 @@ from controller import FunctionLaw, LawError
 from cosim.campaigns.sweep import run_sweep
 from cosim.campaigns.sweeps.design import Design, vary_from
 from cosim.errors import RunError, ScenarioError
-from cosim.precheck.precheck import check
+from cosim.precheck.precheck import check_scenario
 from cosim.results.record import load_record
 from cosim.results.run_result import load_run
 from cosim.run.run import run_scenario
@@ -73,7 +73,7 @@ def test_the_file_of_such_a_run_is_read_but_not_run(scenario, named, tmp_path):
     run = run_scenario(scenario, tmp_path / "run", report=False, law=named)
     again = load_scenario(run.folder / "scenario.toml")
     assert again.law.name == NAME and again.law.own
-    assert check(again).law == NAME
+    assert check_scenario(again).law == NAME
     for attempt in (lambda: run_scenario(again, tmp_path / "again"), lambda: Master(again)):
         with pytest.raises(RunError, match=f"law.name is '{NAME}', a law of one's own"):
             attempt()

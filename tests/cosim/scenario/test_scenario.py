@@ -8,7 +8,7 @@ import pytest
 from controller.regions import Pipe, Sphere
 from cosim.errors import ScenarioError
 from cosim.scenario.scenario import load_scenario
-from cosim.scenario.toml_file import shipped_scenarios
+from cosim.scenario.toml_file import list_scenarios
 
 MINIMAL = """
 vehicle = "bluerov2_heavy"
@@ -25,11 +25,11 @@ def saved(tmp_path, text, name="mine.toml"):
 
 
 def test_shipped_scenarios_load():
-    assert shipped_scenarios() == [
+    assert list_scenarios() == [
         "dense-field", "depth-transit", "docking", "harbour", "moving-obstacle", "paper", "paper-calibrated",
         "paper-deployable", "paper-limited", "pipe-inspection", "sitl",
     ]  # fmt: skip
-    for name in shipped_scenarios():
+    for name in list_scenarios():
         assert load_scenario(name).title
 
 
@@ -42,7 +42,7 @@ def test_minimal_file_gets_defaults(tmp_path):
     assert scenario.regions == ()
 
 
-@pytest.mark.parametrize("name", shipped_scenarios())
+@pytest.mark.parametrize("name", list_scenarios())
 def test_written_scenario_reads_back_the_same(tmp_path, name):
     first = load_scenario(name, ["time.control=0.04"])
     again = load_scenario(saved(tmp_path, first.toml(), f"{name}.toml"))

@@ -6,7 +6,7 @@ from cosim.results.record import load_record
 from cosim.results.wording import verdict
 from cosim.run.run import run_scenario
 from cosim.scenario.scenario import load_scenario
-from cosim.scenario.toml_file import shipped_scenarios
+from cosim.scenario.toml_file import list_scenarios
 
 DEPLOYABLE = [
     "dense-field",
@@ -21,7 +21,7 @@ LONG = ("dense-field", "harbour", "paper-deployable")
 
 
 def test_these_are_all_that_are_shipped_with_that_law():
-    assert [name for name in shipped_scenarios() if load_scenario(name).law.name == "deployable"] == DEPLOYABLE
+    assert [name for name in list_scenarios() if load_scenario(name).law.name == "deployable"] == DEPLOYABLE
 
 
 @pytest.mark.parametrize("name", [pytest.param(n, marks=pytest.mark.slow) if n in LONG else n for n in DEPLOYABLE])

@@ -13,7 +13,7 @@ from controller.regions import SHAPES
 from cosim.command_line.cli import main
 from cosim.scenario.keys import comments, unit_of_gain, unit_of_shape
 from cosim.scenario.scenario import load_scenario
-from cosim.scenario.toml_file import shipped_scenarios
+from cosim.scenario.toml_file import list_scenarios
 from cosim.scenario.toml_text import scenario_text
 from plant_fmu import load_vehicle
 
@@ -29,7 +29,7 @@ def shown(capsys):
     return show
 
 
-@pytest.mark.parametrize("name", shipped_scenarios())
+@pytest.mark.parametrize("name", list_scenarios())
 def test_what_is_shown_is_the_same_scenario(name, shown, tmp_path):
     (tmp_path / "mine.toml").write_text(shown(name))
     first, again = load_scenario(name), load_scenario(tmp_path / "mine.toml")
@@ -66,7 +66,7 @@ def load_vehicle_file(name):
     return resources.files("plant_fmu") / "vehicles" / f"{name}.toml"
 
 
-@pytest.mark.parametrize("name", shipped_scenarios())
+@pytest.mark.parametrize("name", list_scenarios())
 def test_a_vector_takes_one_line_and_a_key_of_one_region_says_what_it_means(name, shown):
     text = shown(name)
     assert not re.search(r"^\s*[-\d.]+,?$", text, re.M)

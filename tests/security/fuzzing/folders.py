@@ -29,7 +29,7 @@ from cosim.replay.page import is_page, write_page
 from cosim.replay.steering import changes_of
 from cosim.replay.trace import trace_of
 from cosim.results.record import PARTS, RECORD, load_record
-from cosim.results.run_result import _concluded, flown_run, load_run
+from cosim.results.run_result import _concluded, load_run, open_run
 from cosim.scenario.scenario import load_scenario
 from cosim.simulation.columns import names_of
 from cosim.simulation.commands.sources import read_log
@@ -102,7 +102,7 @@ def run(seeds: Seeds) -> Case:
 
     def read(content: bytes) -> None:
         (folder / RECORD).write_bytes(content)
-        trace_of(flown_run(folder, flown.planned, "completed", None)).as_json()
+        trace_of(open_run(folder, flown.planned, "completed", None)).as_json()
 
     return Case((_thinned(seeds.run, 12),), read, str(folder))
 

@@ -1,0 +1,136 @@
+"""The names of `cosim` itself: what a script or a notebook does with them."""
+
+import ast
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+
+import cosim
+from cosim.errors import RunError, ScenarioError
+from tests.architecture.modules import FILES, ROOT
+
+SHORT = {"time.duration": 0.05, "arbiter.engine": "closed"}
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory):
+    return cosim.run_scenario(cosim.load_scenario("paper").replace(SHORT), tmp_path_factory.mktemp("face") / "run")
+
+
+def test_every_name_is_what_it_says_whatever_was_imported_before():
+    modules = sorted(module for module in FILES if not module.endswith("__main__"))
+    code = (
+        f"import importlib, types, cosim\nfor name in {modules!r}:\n    importlib.import_module(name)\n"
+        "print([name for name in cosim.__all__ if isinstance(getattr(cosim, name), types.ModuleType)])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
+    assert done.stdout == "[]\n"
+
+
+def test_there_is_nothing_else():
+    assert dir(cosim) == sorted(cosim.__all__)
+    with pytest.raises(AttributeError, match="module 'cosim' has no attribute 'anything'"):
+        _ = cosim.anything
+
+
+def test_numbers_are_replaced_as_set_does():
+    paper = cosim.load_scenario("paper")
+    changed = paper.replace({"limit.force": 500.0, "regions.SR1.gain": 5000, "initial.position": np.array([1.0, 2, 3])})
+    words = ["limit.force=500.0", "regions.SR1.gain=5000", "initial.position=[1.0,2.0,3.0]"]
+    assert changed.toml() == cosim.load_scenario("paper", words).toml()
+    assert changed.title == cosim.load_scenario("paper", words).title != paper.title
+    assert paper.limit.force != 500.0 and paper.toml() == cosim.load_scenario("paper").toml()
+    assert changed.replace({"limit.force": 600.0}).limit.force == 600.0
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"limit.forse": 1.0}, "paper: .*limit.forse"),
+        ({"limit.force": -1.0}, "paper: limit.force is -1"),
+        ({"regions.SR9.gain": 1.0}, "paper: .*SR9"),
+        ({"time.duration": "long"}, "paper: .*time.duration"),
+        ({"title": object()}, "paper: .*title"),
+    ],
+)
+def test_what_cannot_be_replaced_is_one_line(changes, words):
+    with pytest.raises(ScenarioError, match=words) as refused:
+        cosim.load_scenario("paper").replace(changes)
+    assert "\n" not in str(refused.value)
+
+
+def test_a_run_is_the_same_from_its_folder(run):
+    again = cosim.load_run(run.folder)
+    assert type(again) is type(run) is cosim.Run
+    assert again.summary == run.summary == json.loads((run.folder / "summary.json").read_text())
+    assert again.files() == run.files() and {"scenario", "record", "summary", "report", "replay"} == run.files().keys()
+    assert run.replay() == run.folder / "replay.html" and len(repr(run).splitlines()) == 1
+
+
+def test_its_record_is_a_table_with_units_and_a_data_frame(run):
+    table, frame = run.table(), run.frame()
+    assert table.column_names == list(frame.columns) == list(run.record.units)
+    assert table.schema.field("goal.clearance").metadata[b"unit"] == b"m"
+    assert np.array_equal(frame["goal.clearance"], run.record["goal.clearance"])
+    assert np.array_equal(table["time"].to_numpy(), run.record["time"])
+
+
+def test_it_draws_signals(run):
+    ax = run.plot("weight.*")
+    assert [line.get_label() for line in ax.lines] == ["weight.obstacle", "weight.shape", "weight.depth"]
+    assert run.plot(ax=ax) is ax and len(ax.lines) > 3
+    with pytest.raises(RunError, match="signal 'wieght' is unknown"):
+        run.plot("wieght")
+    plt.close("all")
+
+
+def test_a_notebook_shows_it_as_text_and_nothing_of_it_is_markup(run, monkeypatch):
+    monkeypatch.setitem(run.summary, "status", "<script>")
+    assert "<script>" not in run._repr_html_() and "&lt;script&gt;" in run._repr_html_()
+
+
+def test_without_pandas_it_says_what_to_install(run, monkeypatch):
+    monkeypatch.setitem(sys.modules, "pandas", None)
+    with pytest.raises(RunError, match=r"a data frame needs pandas: .*pip install"):
+        run.frame()
+
+
+def test_a_cell_can_be_run_twice(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    scenario = cosim.load_scenario("paper").replace(SHORT)
+    first, second = (cosim.run_scenario(scenario, report=False) for _ in range(2))
+    assert first.folder != second.folder and np.array_equal(first.record.numbers(), second.record.numbers())
+    (once, again) = (cosim.run_scenario(scenario, "mine", report=False, overwrite=True) for _ in range(2))
+    assert once.folder == again.folder and len(again.record) == len(first.record)
+    with pytest.raises(RunError, match="exists and is not empty"):
+        cosim.run_scenario(scenario, "mine", report=False)
+    (Path("mine") / "notes.txt").write_text("mine")
+    with pytest.raises(RunError, match=r"holds 'notes\.txt', which no run makes"):
+        cosim.run_scenario(scenario, "mine", report=False, overwrite=True)
+    assert (Path("mine") / "record.parquet").exists() and (Path("mine") / "notes.txt").exists()
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["mine", "runs"]
+
+
+def test_texts_of_values_are_short():
+    assert repr(cosim.load_scenario("paper")).startswith("Scenario(") and len(repr(cosim.load_scenario("paper"))) < 300
+
+
+@pytest.mark.slow
+def test_the_notebook_runs(tmp_path, monkeypatch):
+    """Each of its cells, in their order, as a notebook does."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(plt, "show", lambda: None)
+    cells = json.loads((ROOT / "examples" / "notebook.ipynb").read_text())["cells"]
+    here = {"__name__": "__main__"}
+    for cell in cells:
+        if cell["cell_type"] == "code":
+            source = "".join(cell["source"])
+            ast.parse(source)
+            exec(compile(source, "notebook", "exec"), here)
+    assert len(here["frame"]) > 1000 and len(here["sweep"].results) == 8
+    plt.close("all")
