@@ -20,6 +20,15 @@ def test_links_lead_somewhere(page):
         assert target.startswith("http") or (page.parent / target).exists(), target
 
 
+def test_places_that_the_page_on_the_architecture_names_are_there():
+    text = (ROOT / "docs" / "architecture.md").read_text()
+    places = re.findall(r"`((?:fuzzy_arbiter|plant_fmu|controller|cosim|tests)/[\w./]*)(?:: (\w+))?`", text)
+    assert len(places) > 40
+    for path, name in places:
+        assert (ROOT / path).exists(), path
+        assert not name or re.search(rf"\b(?:def|class) {name}\b", (ROOT / path).read_text()), (path, name)
+
+
 def test_readme_names_the_shipped_scenarios():
     readme = " ".join((ROOT / "README.md").read_text().split())
     assert f"Shipped scenarios: {', '.join(list_scenarios())}." in readme

@@ -35,7 +35,12 @@ def shown():
 
 
 def test_every_picture_that_is_shown_is_there_and_every_one_there_is_shown():
-    assert shown() == {path.name for path in IMAGES.glob("*.png")}
+    assert shown() == {path.name for suffix in ("png", "svg") for path in IMAGES.glob(f"*.{suffix}")}
+
+
+def test_the_rooms_that_are_drawn_are_those_of_the_code(draw):
+    drawn = draw("architecture")["architecture.svg"].read_text()
+    assert drawn == (IMAGES / "architecture.svg").read_text(), "python docs/images architecture draws it anew"
 
 
 @pytest.mark.slow

@@ -146,7 +146,7 @@ class _Viewers:
         self.cursors.append(cursor)
         telling = asyncio.create_task(self._tell(connection, cursor))
         try:
-            await self._heed(connection)
+            await self._accept(connection)
         except ConnectionClosed:
             log.debug("a viewer has gone")
         except Exception as error:  # broad: whatever one viewer brings about, the others go on
@@ -170,7 +170,7 @@ class _Viewers:
                 log.exception("a viewer was lost")
             await connection.close(1011)
 
-    async def _heed(self, connection: ServerConnection) -> None:
+    async def _accept(self, connection: ServerConnection) -> None:
         """Take commands, no faster than a person gives them."""
         allowance, then, hasty = float(_AT_ONCE), time.monotonic(), 0
         async for message in connection:

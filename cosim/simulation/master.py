@@ -246,7 +246,7 @@ class Master:
     # ---- the stages of a step ----
 
     def _fail_scheduled_thrusters(self, k: int) -> None:
-        """Let thrusters fail whose time has come."""
+        """Fail the thrusters that are scheduled for step `k`."""
         for failure in self.scenario.failures:
             if k == math.ceil(failure.time / self.scenario.time.step - _ROUNDING):
                 self.actuators.fail(failure.thruster)

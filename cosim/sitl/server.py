@@ -103,14 +103,14 @@ class JsonServer:
             except OSError:  # nothing in time; or word that an answer before did not arrive, where a system tells that
                 data, sender = b"", None
             now = time.monotonic()
-            if sender is not None and self._heed(data, sender, now):
+            if sender is not None and self._accept(data, sender, now):
                 self._heard = now
                 if self._flights.flight is not None and self._flights.flight.done:
                     return "completed"
             elif self._timeout is not None and now - self._heard > self._timeout:
                 return f"ended: silence for {self._timeout:g} s"
 
-    def _heed(self, data: bytes, sender: Sender, now: float) -> bool:
+    def _accept(self, data: bytes, sender: Sender, now: float) -> bool:
         """Do what a datagram asks for; return whether it is of the autopilot."""
         packet = wire.decode(data)
         if packet is None or packet.frame_rate < LOWEST_RATE:

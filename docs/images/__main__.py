@@ -10,6 +10,7 @@ import tempfile
 from pathlib import Path
 
 import arbiter
+import architecture
 import fmu
 import pages
 import paths
@@ -29,6 +30,7 @@ def reference() -> None:
 
 MAKERS = {
     "arbiter": arbiter.main,
+    "architecture": architecture.main,
     "fmu": fmu.main,
     "pages": pages.main,
     "paths": paths.main,
