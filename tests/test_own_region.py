@@ -12,20 +12,6 @@ import pytest
 ROOT = Path(__file__).parents[1]
 PAGE = (ROOT / "docs" / "howto" / "own-region.md").read_text()
 
-VISIBILITY = "from controller.regions.visibility"
-EDITS = {  # the rows of the page's table that make a shape fly
-    "orientation.py": [("kind: ClassVar[int] = 9", "kind: ClassVar[int] = 10")],
-    "visibility.py": [("kind: ClassVar[int] = 10", "kind: ClassVar[int] = 11")],
-    "kinds.py": [
-        (VISIBILITY, f"from controller.regions.torus import torus\n{VISIBILITY}"),
-        ("    return cone(p, q)", "    if kind == 8:\n        return cone(p, q)\n    return torus(p, q)"),
-    ],
-    "region_set.py": [
-        (VISIBILITY, f"from controller.regions.torus import Torus\n{VISIBILITY}"),
-        ('    "cone": Cone,', '    "cone": Cone,\n    "torus": Torus,'),
-    ],
-}  # fmt: skip
-
 SCENARIO = """
 vehicle = "odin"
 
@@ -77,25 +63,122 @@ print(run.summary["reached"], run.summary["min_clearance"]["ring"] > 0.0, throug
 """
 
 
-@pytest.mark.slow
-def test_the_torus_of_the_page_flies(tmp_path):
+STRUCK = """
+vehicle = "odin"
+
+[time]
+duration = 2.0
+step = 0.02
+control = 0.02
+arbiter = 0.02
+
+[plant]
+fmi = 3
+
+[master]
+order = "gauss-seidel"
+
+[arbiter]
+engine = "closed"
+
+[initial]
+position = [0.0, 0.0, 2.0]
+
+[goal]
+type = "sphere"
+centre = [4.0, 0.0, 2.0]
+radius = 0.5
+
+[law]
+name = "ismail_dunnigan"
+
+[[regions]]
+name = "ring"
+criterion = "obstacle"
+keep = "out"
+gain = 10.0
+shape = { type = "torus", centre = [0.0, 1.0, 2.0], axis = [0.0, 0.0, 1.0], radius = 1.05, tube = 0.2 }
+"""
+
+SWEEP = """
+import numpy as np
+from cosim.batch.fused import FusedFlyer
+from cosim.batch.lanes import LanesFlyer
+from cosim.batch.variation import Variation
+from cosim.scenario.scenario import load_scenario
+
+variation = Variation(load_scenario("struck.toml"), ("initial.position.1",))
+values, seeds = np.array([[-0.05], [0.0], [-1.0]]), np.zeros(3, int)
+flown = []
+for flyer in (FusedFlyer, LanesFlyer):
+    with flyer(variation) as fleet:
+        flown.append(fleet.fly(values, seeds).outcomes)
+fused, lanes = flown
+assert fused["violated"].tolist() == [True, True, False], fused
+assert lanes["violated"].tolist() == fused["violated"].tolist()
+np.testing.assert_allclose(lanes["min_clearance"], fused["min_clearance"], atol=1e-9)
+"""
+
+
+def of_page(name, language):
+    (code,) = re.findall(rf"<!-- file: {re.escape(name)} -->\n```{language}\n(.*?)```", PAGE, re.DOTALL)
+    return code
+
+
+@pytest.fixture(scope="module")
+def copy(tmp_path_factory):
+    """A copy of the packages with the page's one Python file, and how a command is run in it."""
+    folder = tmp_path_factory.mktemp("copy")
     for package in ("fuzzy_arbiter", "plant_fmu", "controller", "cosim"):
-        shutil.copytree(ROOT / package, tmp_path / package, ignore=shutil.ignore_patterns("__pycache__"))
-    shutil.copy(ROOT / "LICENSE", tmp_path)  # FMUs carry it
-    regions = tmp_path / "controller" / "regions"
-    (code,) = re.findall(r"<!-- file: torus\.py -->\n```python\n(.*?)```", PAGE, re.DOTALL)
-    (regions / "torus.py").write_text(code)
-    for name, changes in EDITS.items():
-        text = (regions / name).read_text()
-        assert name in PAGE
-        for old, new in changes:
-            assert text.count(old) == 1, old
-            text = text.replace(old, new)
-        (regions / name).write_text(text)
-    (tmp_path / "ring.toml").write_text(SCENARIO)
-    environment = {**os.environ, "PYTHONPATH": str(tmp_path)}
-    done = subprocess.run(
-        [sys.executable, "-c", FLY], cwd=tmp_path, env=environment, capture_output=True, text=True, check=False
-    )
+        shutil.copytree(ROOT / package, folder / package, ignore=shutil.ignore_patterns("__pycache__"))
+    shutil.copy(ROOT / "LICENSE", folder)  # FMUs carry it
+    (folder / "controller" / "regions" / "shapes" / "torus.py").write_text(of_page("torus.py", "python"))
+    (folder / "ring.toml").write_text(SCENARIO)
+    (folder / "struck.toml").write_text(STRUCK)
+    return folder
+
+
+def python(copy, *arguments):
+    return subprocess.run(
+        [sys.executable, *arguments],
+        cwd=copy, env={**os.environ, "PYTHONPATH": str(copy)}, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+
+
+@pytest.mark.slow
+def test_the_torus_of_the_page_flies(copy):
+    done = python(copy, "-c", FLY)
     assert done.returncode == 0, done.stderr
     assert done.stdout.split() == ["True", "True", "True", "True"]
+
+
+@pytest.mark.slow
+def test_report_replay_exports_and_check_draw_the_torus(copy):
+    for command in (
+        ["run", "struck.toml", "--out", "struck"],
+        ["replay", "struck", "--out", "struck.html"],
+        ["export", "struck", "--to", "mcap", "--out", "struck.mcap"],
+        ["export", "struck", "--to", "rrd", "--out", "struck.rrd"],
+    ):
+        done = python(copy, "-m", "cosim", *command)
+        assert done.returncode == 0, (command, done.stderr)
+    assert '"kind":"torus"' in (copy / "struck.html").read_text() and '"mesh":' in (copy / "struck.html").read_text()
+    checked = python(copy, "-m", "cosim", "check", "struck.toml")
+    assert "Traceback" not in checked.stderr, checked.stderr
+
+
+@pytest.mark.slow
+def test_c_refuses_the_torus_by_name_until_it_has_its_c_file(copy):
+    package = ["-m", "cosim", "package", "struck.toml", "--to", "ssp", "--out", "struck.ssp"]
+    named = "region 'ring': shape 'torus' has no C code"
+    packaged, swept = python(copy, *package), python(copy, "-c", SWEEP)
+    assert packaged.returncode == 2 and named in packaged.stderr and packaged.stderr.count("\n") == 1
+    assert swept.returncode != 0 and named in swept.stderr
+    beside = copy / "controller" / "regions" / "shapes" / "torus.c"
+    beside.write_text(of_page("torus.c", "c"))
+    try:
+        packaged, swept = python(copy, *package), python(copy, "-c", SWEEP)
+    finally:
+        beside.unlink()
+    assert packaged.returncode == 0, packaged.stderr
+    assert swept.returncode == 0, swept.stderr

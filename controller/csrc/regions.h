@@ -7,20 +7,7 @@
 #define REGIONS_H
 
 #include "real.h"
-
-enum { /* as `kind` of each shape in Python */
-    SHAPE_SPHERE,
-    SHAPE_DEPTH_BAND,
-    SHAPE_HALF_SPACE,
-    SHAPE_BOX,
-    SHAPE_CYLINDER,
-    SHAPE_ELLIPSOID,
-    SHAPE_PRISM,
-    SHAPE_PIPE,
-    SHAPE_CONE,
-    SHAPE_ORIENTATION, /* from here on they depend on attitude */
-    SHAPE_VISIBILITY
-};
+#include "shapes.h" /* SHAPE_SPHERE and so on, as `kind` of each shape in Python: generated */
 
 typedef struct {
     int n;

@@ -3,15 +3,6 @@
 Imports: jit.
 """
 
-from controller.regions.box import Box
-from controller.regions.cone import Cone
-from controller.regions.cylinder import Cylinder
-from controller.regions.depth_band import DepthBand
-from controller.regions.ellipsoid import Ellipsoid
-from controller.regions.half_space import HalfSpace
-from controller.regions.orientation import Orientation
-from controller.regions.pipe import Pipe
-from controller.regions.prism import Prism
 from controller.regions.rays import ray_distances
 from controller.regions.region_set import (
     SHAPES,
@@ -29,8 +20,17 @@ from controller.regions.region_set import (
     place_clearance,
 )
 from controller.regions.shape import Shape
-from controller.regions.sphere import Sphere
-from controller.regions.visibility import Visibility
+from controller.regions.shapes.box import Box
+from controller.regions.shapes.cone import Cone
+from controller.regions.shapes.cylinder import Cylinder
+from controller.regions.shapes.depth_band import DepthBand
+from controller.regions.shapes.ellipsoid import Ellipsoid
+from controller.regions.shapes.half_space import HalfSpace
+from controller.regions.shapes.orientation import Orientation
+from controller.regions.shapes.pipe import Pipe
+from controller.regions.shapes.prism import Prism
+from controller.regions.shapes.sphere import Sphere
+from controller.regions.shapes.visibility import Visibility
 
 __all__ = [
     "SHAPES",

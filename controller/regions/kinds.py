@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -10,52 +11,35 @@ from numpy.typing import NDArray
 
 from controller.jit.function_pointer import declare, pointer_to
 from controller.jit.jit import part
-from controller.regions.box import box
-from controller.regions.cone import cone
-from controller.regions.cylinder import cylinder
-from controller.regions.depth_band import DepthBand, depth_band
-from controller.regions.ellipsoid import ellipsoid
-from controller.regions.half_space import half_space
-from controller.regions.orientation import Orientation, orientation
-from controller.regions.pipe import pipe
-from controller.regions.prism import prism
-from controller.regions.shape import Array, Evaluation, EvaluationOfAttitude
-from controller.regions.sphere import Sphere, sphere
-from controller.regions.visibility import visibility
+from controller.regions.shapes import ENTRIES
+from controller.regions.shapes.depth_band import DepthBand
+from controller.regions.shapes.sphere import Sphere
 
 SPHERE, DEPTH_BAND = Sphere.kind, DepthBand.kind
-FIRST_OF_ATTITUDE = Orientation.kind  # kinds from it on depend on attitude
+FIRST_OF_ATTITUDE = sum(not entry.of_attitude for entry in ENTRIES.values())  # kinds from it on depend on attitude
 
 
-@part
-def evaluate_shape(kind: int, p: Array, q: Array) -> Evaluation:
-    """Evaluate a packed shape of position alone, told by its kind, at the position `p` [m, NED]."""
-    if kind == 0:
-        return sphere(p, q)
-    if kind == 1:
-        return depth_band(p, q)
-    if kind == 2:
-        return half_space(p, q)
-    if kind == 3:
-        return box(p, q)
-    if kind == 4:
-        return cylinder(p, q)
-    if kind == 5:
-        return ellipsoid(p, q)
-    if kind == 6:
-        return prism(p, q)
-    if kind == 7:
-        return pipe(p, q)
-    return cone(p, q)
+def _by_kind(name: str, arguments: str, of_attitude: bool) -> Callable[..., Any]:
+    """Return a function that evaluates the shape of a kind, its first argument, at the `arguments`.
+
+    Numba compiles no table of functions, so that it is written: a choice of each kind by its number.
+    """
+    entries = {kind: entry for kind, entry in ENTRIES.items() if entry.of_attitude == of_attitude}
+    names: dict[str, Any] = {f"_{kind}": entry.evaluate for kind, entry in entries.items()}
+    choices = [f"    if kind == {entry.shape.kind}: return _{kind}({arguments})\n" for kind, entry in entries.items()]
+    last = f"    return _{list(entries)[-1]}({arguments})\n"  # there are no other kinds: `pack` takes shapes alone
+    code = compile(f"def {name}(kind, {arguments}):\n{''.join(choices[:-1])}{last}", __file__, "exec")
+    names["__name__"] = __name__
+    exec(code, names)  # noqa: S102 -- of the names of this package's files
+    made: Callable[..., Any] = part(names[name])
+    return made
 
 
-@part
-def evaluate_shape_of_attitude(kind: int, p: Array, e: Array, q: Array) -> EvaluationOfAttitude:
-    """Evaluate a packed shape of attitude, told by its kind, at the position `p` [m, NED] and the attitude `e`."""
-    if kind == FIRST_OF_ATTITUDE:
-        return orientation(p, e, q)
-    return visibility(p, e, q)
+# of a packed shape of position alone, told by its kind, at the position `p` [m, NED]
+evaluate_shape = _by_kind("evaluate_shape", "p, q", of_attitude=False)
 
+# of a packed shape of attitude, told by its kind, at the position `p` [m, NED] and the attitude `e`
+evaluate_shape_of_attitude = _by_kind("evaluate_shape_of_attitude", "p, e, q", of_attitude=True)
 
 _NUMBERS: Any = types.float64[::1]
 _Tuple: Any = types.UniTuple

@@ -7,18 +7,16 @@ import math
 import numpy as np
 
 from controller.jit.jit import compiled
-from controller.regions.ellipsoid import Ellipsoid
-from controller.regions.kinds import evaluate_shape
-from controller.regions.orientation import Orientation
-from controller.regions.pipe import Pipe
-from controller.regions.prism import Prism
+from controller.regions.kinds import FIRST_OF_ATTITUDE, evaluate_shape
 from controller.regions.region_set import PackedRegions
 from controller.regions.shape import Array, Evaluation
+from controller.regions.shapes.ellipsoid import Ellipsoid
+from controller.regions.shapes.pipe import Pipe
+from controller.regions.shapes.prism import Prism
 
 TOUCHING = 1e-4  # m; so near a surface a ray has met it
 LOOKS = 64  # along a ray, at a region
 
-_FIRST_OF_ATTITUDE = Orientation.kind
 _ELLIPSOID = Ellipsoid.kind
 _PIPE = Pipe.kind
 _PRISM = Prism.kind
@@ -52,7 +50,7 @@ def ray_distances(regions: PackedRegions, origin: Array, directions: Array, fart
     start, piece = np.empty(3), np.empty(7)
     for i in range(regions.kinds.size):
         kind = regions.kinds[i]
-        if kind >= _FIRST_OF_ATTITUDE:
+        if kind >= FIRST_OF_ATTITUDE:
             continue
         for axis in range(3):
             start[axis] = origin[axis] - regions.shifts[i, axis]

@@ -17,12 +17,6 @@ from controller.errors import RegionError
 from controller.jit.function_pointer import call
 from controller.jit.jit import inlined, jit_noalloc, part
 from controller.jit.stack_array import zeros
-from controller.regions.box import Box
-from controller.regions.cone import Cone
-from controller.regions.cylinder import Cylinder
-from controller.regions.depth_band import DepthBand, band_about
-from controller.regions.ellipsoid import Ellipsoid
-from controller.regions.half_space import HalfSpace
 from controller.regions.kinds import (
     DEPTH_BAND,
     FIRST_OF_ATTITUDE,
@@ -31,26 +25,13 @@ from controller.regions.kinds import (
     evaluate_shape,
     evaluate_shape_of_attitude,
 )
-from controller.regions.orientation import Orientation
-from controller.regions.pipe import Pipe
-from controller.regions.prism import Prism
 from controller.regions.shape import Array, Evaluation, EvaluationOfAttitude, Shape, Vector3, require, require_finite
-from controller.regions.sphere import Sphere, sphere_about
-from controller.regions.visibility import Visibility
+from controller.regions.shapes import ENTRIES
+from controller.regions.shapes.depth_band import band_about
+from controller.regions.shapes.orientation import Orientation
+from controller.regions.shapes.sphere import sphere_about
 
-SHAPES: dict[str, type[Shape]] = {
-    "sphere": Sphere,
-    "depth_band": DepthBand,
-    "half_space": HalfSpace,
-    "box": Box,
-    "cylinder": Cylinder,
-    "ellipsoid": Ellipsoid,
-    "prism": Prism,
-    "pipe": Pipe,
-    "cone": Cone,
-    "orientation": Orientation,
-    "visibility": Visibility,
-}
+SHAPES: dict[str, type[Shape]] = {name: entry.shape for name, entry in ENTRIES.items()}
 
 
 @dataclass(frozen=True)
@@ -74,6 +55,30 @@ class Region:
         require(0.0 <= self.gain < math.inf, f"region {self.name!r}", "gain", self.gain, "a finite number, 0 or above")
         at_rest = not isinstance(self.shape, Orientation) or not any(self.velocity)
         require(at_rest, f"region {self.name!r}", "velocity", self.velocity, "none: an orientation is at no place")
+
+
+def name_of(shape: Shape) -> str:
+    """Return the name of a shape's kind, such as ``"depth_band"``.
+
+    Parameters
+    ----------
+    shape : Shape
+        One of those in `SHAPES`.
+
+    Returns
+    -------
+    str
+        Its key there.
+
+    Raises
+    ------
+    RegionError
+        If it is none of them.
+    """
+    for name, kind in SHAPES.items():
+        if type(shape) is kind:
+            return name
+    raise RegionError(f"shape is of type {type(shape).__name__}, expected one of {', '.join(SHAPES)}")
 
 
 def of_attitude(shape: Shape) -> bool:

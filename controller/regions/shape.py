@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controller.errors import RegionError
+from controller.regions.numbers import Number
 
 Array = NDArray[np.float64]
 Vector2 = tuple[float, float]
@@ -38,11 +39,15 @@ class Shape(Protocol):
     by rotation; -g is its clearance.
     """
 
-    kind: ClassVar[int]  # tells the shapes apart in packed arrays
+    kind: ClassVar[int]  # tells the shapes apart in packed arrays; given when the shapes are loaded
     unit: ClassVar[str]  # of g
 
     def packed(self) -> tuple[float, ...]:
         """Return the numbers that the compiled function reads."""
+        ...
+
+    def numbers(self) -> tuple[Number, ...]:
+        """Return name, unit and range of each number that `packed` gives."""
         ...
 
     def bounds(self) -> Bounds:

@@ -23,12 +23,12 @@ from controller.allocation import allocate
 from controller.jit.jit import compiled, jit_noalloc
 from controller.laws import ismail_dunnigan
 from controller.regions import (
-    Orientation,
     PackedRegions,
     Sphere,
     clearance_of_pose,
     clearance_of_sphere,
 )
+from controller.regions.kinds import FIRST_OF_ATTITUDE
 from cosim.batch.c_calls import fmi_do_step, fmi_get, fmi_set, seconds
 from cosim.simulation.memberships import SOURCES, compute_memberships
 from fuzzy_arbiter import Arbiter
@@ -42,7 +42,7 @@ _FOREIGN = (*SOURCES, Path(plant_fmu.__file__).parent / "running")
 _weigh: Any = numba.njit(_nrt=False)(Arbiter().compiled().py_func)  # type: ignore[call-overload]
 _step: Any = ismail_dunnigan.step  # of a law; `fused_loop_of` puts others in its place
 _is_wrench = True
-_SPHERE, _ATTITUDE = Sphere.kind, Orientation.kind
+_SPHERE, _ATTITUDE = Sphere.kind, FIRST_OF_ATTITUDE
 
 
 class FlightConfig(NamedTuple):

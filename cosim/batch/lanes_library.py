@@ -16,6 +16,7 @@ from pathlib import Path
 
 import platformdirs
 
+from controller.regions.in_c import c_sources as law_sources
 from cosim.io.atomic_file import write_atomic
 from fuzzy_arbiter import Arbiter
 from fuzzy_arbiter.export import to_c
@@ -124,7 +125,7 @@ def _files(vehicle: Vehicle, beside: Path | None = None) -> dict[str, bytes]:
     one |= {"lanes.h": own["lanes.h"], "arbiter.c": to_c(Arbiter().system).encode()}
     lanes = replace(component, name=f"{vehicle.name}_lanes")  # the names that its functions begin with
     many = {name: text for name, text in sources.items() if name.endswith(".h") or name in _OF_PLANT}
-    many |= _own("controller/csrc") | {name: text for name, text in own.items() if name != "start.c"}
+    many |= law_sources() | {name: text for name, text in own.items() if name != "start.c"}
     many |= {component.header: header(lanes, _TOKEN).encode(), "width.h": _WIDTH.encode()}
     if beside is not None:
         many[beside.name] = beside.read_bytes()

@@ -8,7 +8,9 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from controller.errors import RegionError
 from controller.regions import Pipe, Prism, Region, pack
+from controller.regions.in_c import require_in_c
 from cosim.batch.variation import Variation
 from cosim.errors import RunError, ScenarioError
 from cosim.scenario.scenario import Scenario
@@ -214,6 +216,10 @@ def require_lanes(scenario: Scenario) -> None:
     ):
         if came != expected:
             raise RunError(f"{key} is {came!r}, expected {expected!r} for lanes; the fused loop flies it")
+    try:
+        require_in_c(regions_of(s), "lanes")
+    except RegionError as error:
+        raise RunError(f"{error}; the fused loop flies it") from error
     if s.time.step / s.plant.substep > 1e6:
         raise RunError(f"plant.substep is {s.plant.substep} s, expected a millionth of time.step or more for lanes")
 

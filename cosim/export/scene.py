@@ -9,20 +9,22 @@ import numpy as np
 
 from controller.quaternion import rotation_matrix
 from controller.regions import SHAPES, Orientation, Shape, Visibility, of_attitude
+from controller.regions.mesh import Mesh
+from controller.regions.region_set import name_of
 from controller.regions.shape import Bounds
+from cosim.errors import ExportError
 from cosim.export.excerpt import Excerpt
-from cosim.export.surfaces import Mesh, sector, surface_of
+from cosim.export.surfaces import sector, surface_of
 from cosim.replay.activity import active_regions
 from cosim.replay.header import header_of
 from cosim.replay.steering import changes_of, log_of
+from cosim.scenario.colours import colour_of
 from cosim.scenario.scenario import CRITERIA
 from cosim.simulation.signals import Array
 
 NED, PLACE, BODY = "ned", "place", "body"  # the world; the vehicle's place, not turned; the vehicle
 POSITION = ("position.x", "position.y", "position.z")
 QUATERNION = ("quaternion.e0", "quaternion.e1", "quaternion.e2", "quaternion.e3")
-# Okabe and Ito's, which colour-blind people can tell apart
-_COLOURS = {"obstacle": (213, 94, 0), "shape": (230, 159, 0), "depth": (86, 180, 233), None: (0, 158, 115)}
 HULL_COLOUR, TRAIL_COLOUR, THRUST_COLOUR = (240, 228, 66), (140, 140, 140), (204, 121, 167)
 OPAQUE = {False: 0.25, True: 0.75}  # of a region that is not, and is, active
 _MARGIN = 1.0  # m, about all that is seen
@@ -127,7 +129,7 @@ class Scene:
         return Solid(
             region.name,
             f"{region.name}: keep {region.keep}",
-            _COLOURS[secondary.criterion if secondary else None],
+            _rgb(colour_of(secondary.criterion if secondary else None)),
             shape,
             self._mesh(shape, limits),
             {Orientation: PLACE, Visibility: BODY}.get(type(shape), NED),
@@ -149,12 +151,18 @@ class Scene:
         reach = _SIGHT * self.hull_radius
         if isinstance(shape, Visibility):
             return sector(shape.camera_position, shape.camera_axis, shape.half_angle, reach)
-        assert isinstance(shape, Orientation)
+        if not isinstance(shape, Orientation):
+            raise ExportError(f"shape {name_of(shape)!r} has no picture, expected orientation or visibility")
         # the vehicle's bow must be within it
         e = np.array(shape.quaternion) / np.linalg.norm(shape.quaternion)
         return sector((0.0, 0.0, 0.0), rotation_matrix(e)[:, 0].tolist(), shape.tolerance, reach)
 
 
+def _rgb(colour: str) -> tuple[int, int, int]:
+    red, green, blue = bytes.fromhex(colour.removeprefix("#"))
+    return red, green, blue
+
+
 def _shape(numbers: dict[str, Any]) -> Shape:
     """Return the shape that its numbers say."""
-    return SHAPES[numbers["kind"]](**{key: value for key, value in numbers.items() if key != "kind"})
+    return SHAPES[numbers["kind"]](**{key: value for key, value in numbers.items() if key not in ("kind", "mesh")})

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,21 +24,16 @@ from controller.regions import (
     Shape,
     Sphere,
 )
+from controller.regions.mesh import Mesh
 from controller.regions.shape import Bounds
+from controller.regions.shapes import ENTRIES
+from cosim.errors import ExportError
 from cosim.export.pipe_surface import pipe_rings
 from cosim.simulation.signals import Array
 
 AROUND = 32  # corners of a circle
 _TIMES_SPLIT = 2  # of each triangle of the icosahedron that becomes a ball
 _GOLDEN = (1.0 + math.sqrt(5.0)) / 2.0
-
-
-@dataclass(frozen=True, eq=False)
-class Mesh:
-    """Triangles abc whose normals (b - a) x (c - a) point outward."""
-
-    vertices: Array  # (n, 3) m, NED
-    triangles: NDArray[np.intp]  # (m, 3) places in vertices
 
 
 def surface_of(shape: Shape, limits: Bounds) -> Mesh:
@@ -59,9 +53,12 @@ def surface_of(shape: Shape, limits: Bounds) -> Mesh:
 
     Raises
     ------
-    TypeError
-        If the shape is one of attitude.
+    ExportError
+        If the shape has none, as those of attitude.
     """
+    surface = next((entry.surface for entry in ENTRIES.values() if type(shape) is entry.shape), None)
+    if surface is not None:
+        return surface(shape, limits)
     if isinstance(shape, Sphere):
         ball = _ball()
         return Mesh(np.array(shape.centre) + shape.radius * ball.vertices, ball.triangles)
@@ -89,7 +86,7 @@ def surface_of(shape: Shape, limits: Bounds) -> Mesh:
         )
     if isinstance(shape, HalfSpace):
         return _patch(shape.point, shape.normal, limits)
-    raise TypeError(f"{type(shape).__name__} has no surface")
+    raise ExportError(f"shape {type(shape).__name__} has no surface, expected one of a shape in space")
 
 
 def sector(apex: Sequence[float], axis: Sequence[float], half_angle: float, reach: float) -> Mesh:

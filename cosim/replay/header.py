@@ -8,7 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from controller.regions import SHAPES, Shape, of_attitude
+from controller.regions import Shape, of_attitude
+from controller.regions.region_set import name_of
+from controller.regions.shapes import ENTRIES
+from cosim.errors import RunError
 from cosim.results.wording import asked
 from cosim.scenario.scenario import Scenario
 from cosim.simulation.signals import Column
@@ -17,6 +20,11 @@ from plant_fmu import Vehicle
 from plant_fmu.thruster_lines import thruster_lines
 
 VERSION = 1  # of the format
+# whose pictures the page makes of their numbers; all others are drawn by the mesh of their entry
+DRAWN_BY_NUMBERS = (
+    "sphere", "ellipsoid", "box", "cylinder", "prism", "cone", "pipe", "depth_band", "half_space", "orientation",
+    "visibility",
+)  # fmt: skip
 _SEA_WATER = 1026.0 * 9.81  # N/m3; only for the size of a hull that no vehicle's file tells
 
 
@@ -65,9 +73,22 @@ def rules_of(system: System) -> list[dict[str, str]]:
 
 
 def shape_of(shape: Shape) -> dict[str, Any]:
-    """Return a shape with its ``kind`` and its own parameters [m, rad, NED]."""
-    kind = next(name for name, of in SHAPES.items() if isinstance(shape, of))
-    return {"kind": kind, **dataclasses.asdict(shape)}  # type: ignore[call-overload]
+    """Return a shape with its ``kind`` and its own parameters [m, rad, NED], and its ``mesh`` where its entry has one.
+
+    Raises
+    ------
+    RunError
+        If the page could draw it by neither.
+    """
+    kind = name_of(shape)
+    told = {"kind": kind, **dataclasses.asdict(shape)}  # type: ignore[call-overload]
+    surface = ENTRIES[kind].surface
+    if surface is not None:
+        mesh = surface(shape, shape.bounds())
+        told["mesh"] = {"points": mesh.vertices.tolist(), "faces": mesh.triangles.tolist()}
+    elif kind not in DRAWN_BY_NUMBERS:
+        raise RunError(f"shape {kind!r} has no surface, expected one in its entry: the replay cannot draw it")
+    return told
 
 
 def _region(scenario: Scenario, index: int) -> dict[str, Any]:

@@ -8,6 +8,7 @@ import re
 from typing import NamedTuple
 
 from controller import LAWS
+from controller.regions.shapes import ENTRIES
 from plant_fmu.variables import variables
 from plant_fmu.vehicle import Vehicle
 
@@ -117,10 +118,6 @@ _UNIT = re.compile(
     r"(?:1|N|kg|m|rad|s)\d?(?:[ /(]+(?:N|kg|m|rad|sqrt\(s\)|s)\d?\)?)*(?=[,: ]|$)"
 )  # at the head of a comment
 _LINK = re.compile(r"\[([^]]*)\]\([^)]*\)")
-_LENGTHS = {
-    *("centre", "radius", "depth", "tolerance", "point", "size", "start", "end", "semi_axes", "corners", "top"),
-    *("bottom", "points", "feature", "range", "camera_position"),
-}
 
 
 def unit_of_shape(kind: str, key: str) -> str:
@@ -138,9 +135,7 @@ def unit_of_shape(kind: str, key: str) -> str:
     str
         Empty where it has none.
     """
-    if key == "half_angle" or (kind, key) == ("orientation", "tolerance"):
-        return "rad"
-    return "m" if key in _LENGTHS else ""
+    return ENTRIES[kind].units.get(key, "") if kind in ENTRIES else ""
 
 
 def comments(law: str, vehicle: Vehicle) -> dict[str, str]:

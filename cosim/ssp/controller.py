@@ -6,6 +6,8 @@ import re
 from collections.abc import Iterator, Sequence
 
 from controller.regions import PackedRegions, Region, of_attitude, pack
+from controller.regions.in_c import c_sources
+from controller.regions.region_set import name_of
 from cosim.scenario.scenario import CRITERIA, Scenario
 from cosim.ssp.c_sources import c_files, under_own_names
 from cosim.ssp.documentation import contents
@@ -94,7 +96,7 @@ def prefixes(regions: Sequence[Region]) -> list[str]:
 def _sources(scene: str) -> dict[str, bytes]:
     return {
         **c_files("cosim.ssp", "csrc/controller"),
-        **under_own_names(c_files("controller", "csrc")),
+        **under_own_names(c_sources()),
         "ticks.h": c_files("cosim.ssp", "csrc")["ticks.h"],
         "real.h": plant_sources()["real.h"],
         "scene.h": scene.encode(),
@@ -105,7 +107,7 @@ def _scene(regions: Sequence[Region], packed: PackedRegions, criteria: Sequence[
     """Return ``scene.h``: what of the regions is no parameter."""
     names = [f'"{prefix}"' for prefix in prefixes(regions)]
     rows: dict[str, Sequence[object]] = {
-        "KINDS": packed.kinds.tolist(),
+        "KINDS": [f"SHAPE_{name_of(region.shape).upper()}" for region in regions],
         "SIGNS": packed.signs.tolist(),
         "OFFSETS": packed.offsets.tolist(),
         "CRITERIA": criteria,

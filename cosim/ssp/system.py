@@ -5,6 +5,8 @@ from __future__ import annotations
 import tempfile
 from pathlib import Path
 
+from controller.errors import RegionError
+from controller.regions.in_c import require_in_c
 from cosim.errors import RunError
 from cosim.scenario.scenario import CRITERIA, VEHICLE_COPY, Scenario
 from cosim.scenario.start_values import start_values
@@ -145,3 +147,7 @@ def _require(scenario: Scenario) -> None:
     ):
         if not good:
             raise RunError(f"{key} is {came}, expected {expected} in a system of FMUs")
+    try:
+        require_in_c((scenario.goal_region, *(r.region for r in scenario.regions)), "a system of FMUs")
+    except RegionError as error:
+        raise RunError(str(error)) from error

@@ -10,6 +10,7 @@ import pytest
 
 from controller import paper_law
 from controller.paper_law import Gains
+from controller.regions import SHAPES as ALL
 from controller.regions import (
     Box,
     Cone,
@@ -25,11 +26,11 @@ from controller.regions import (
     Visibility,
     pack,
 )
+from controller.regions.in_c import c_sources
 from fuzzy_arbiter import ramp
 
 ROOT = Path(__file__).parents[2]
-SOURCES = [ROOT / "controller" / "csrc" / name for name in ("regions.c", "law.c")]
-INCLUDES = [ROOT / "controller" / "csrc", ROOT / "plant_fmu" / "csrc"]
+REAL = ROOT / "plant_fmu" / "csrc"
 TURNED = (0.9, 0.1, -0.3, 0.2)
 
 # every shape with the places where it has a corner, an edge, a face or a centre
@@ -165,14 +166,14 @@ def library(request, tmp_path_factory):
     if compiler is None:
         pytest.skip("needs cc")
     folder = tmp_path_factory.mktemp("c_law")
-    harness = folder / "harness.c"
-    harness.write_text(HARNESS, encoding="utf-8")
+    for file, code in ({"harness.c": HARNESS.encode()} | c_sources()).items():
+        (folder / file).write_bytes(code)
     flags = ["-std=c99", "-O2", "-Wall", "-Wextra", "-Werror", "-Wno-psabi", "-ffp-contract=off", "-fPIC", "-shared"]
     if request.param > 1:
         flags.append(f"-DLANES={request.param}")
     else:
         flags.append("-Wpedantic")
-    command = [compiler, *flags, *(f"-I{i}" for i in INCLUDES), str(harness), *map(str, SOURCES)]
+    command = [compiler, *flags, f"-I{folder}", f"-I{REAL}", *map(str, folder.glob("*.c"))]
     out = folder / "law.so"
     subprocess.run([*command, "-o", str(out), "-lm"], check=True)
     return ctypes.CDLL(str(out))
@@ -233,6 +234,13 @@ def test_regions_are_those_of_python(library, name, keep):
     ):
         assert np.all(np.isfinite(theirs))
         np.testing.assert_allclose(ours, theirs, rtol=1e-12, atol=1e-12)
+
+
+def test_a_kind_without_c_code_is_read_as_no_other(library):
+    packed = pack([Region("r", Sphere((0.0, 0.0, 0.0), 1.0), "out")])
+    unknown = packed._replace(kinds=np.array([max(kind.kind for kind in ALL.values()) + 1]))
+    for numbers in in_c(library, unknown, np.ones((4, 3)), unit_rows(np.random.default_rng(5), 4)):
+        assert np.isnan(numbers).all()
 
 
 def test_regions_of_a_scene_are_each_their_own(library):

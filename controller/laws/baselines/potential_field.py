@@ -16,9 +16,10 @@ import numpy as np
 from controller.jit.jit import compiled
 from controller.law import Array, VehicleState
 from controller.paper_law import violation
-from controller.regions import Orientation, PackedRegions, evaluate_packed
+from controller.regions import PackedRegions, evaluate_packed
+from controller.regions.kinds import FIRST_OF_ATTITUDE
 
-_ATTITUDE = Orientation.kind  # shapes from it on depend on attitude
+_ATTITUDE = FIRST_OF_ATTITUDE  # shapes from it on depend on attitude
 
 
 class Field(NamedTuple):

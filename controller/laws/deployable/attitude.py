@@ -23,11 +23,12 @@ from controller.laws.deployable.linear_algebra import copy, product
 from controller.laws.deployable.model import Dynamics, Thrusters
 from controller.quaternion import down_parts, error_parts
 from controller.quaternion import rate as quaternion_rate
-from controller.regions import Orientation, PackedRegions, attitude_clearance
+from controller.regions import PackedRegions, attitude_clearance
+from controller.regions.kinds import FIRST_OF_ATTITUDE
 
 Array = NDArray[np.float64]
 
-_ATTITUDE = Orientation.kind  # shapes from it on depend on attitude
+_ATTITUDE = FIRST_OF_ATTITUDE  # shapes from it on depend on attitude
 _RETURN = 0.2  # 1/s, at which the held attitude goes back to the preferred one
 _TURN = 4.0  # 1/s, at which it turns to where a region has comfort
 

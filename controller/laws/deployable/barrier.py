@@ -32,11 +32,12 @@ from controller.laws.deployable.faces import FACES, face_ahead, has_faces
 from controller.laws.deployable.gains import DeployableGains
 from controller.laws.deployable.linear_algebra import copy
 from controller.laws.deployable.quadratic_program import Workspace
-from controller.regions import Box, DepthBand, HalfSpace, Orientation, PackedRegions, Prism, evaluate_packed
+from controller.regions import Box, DepthBand, HalfSpace, PackedRegions, Prism, evaluate_packed
+from controller.regions.kinds import FIRST_OF_ATTITUDE
 
 Array = NDArray[np.float64]
 
-_ATTITUDE = Orientation.kind  # shapes from it on depend on attitude
+_ATTITUDE = FIRST_OF_ATTITUDE  # shapes from it on depend on attitude
 _FLAT = (Box.kind, Prism.kind, DepthBand.kind, HalfSpace.kind)
 _AHEAD = 0.1  # s, over which the turning of a slope is measured
 _FIRM = (3.0, 3.0)  # decades: price of yielding against missing the wanted force, at weight 0, and added at weight 1

@@ -46,12 +46,13 @@ from controller.laws.deployable.observer import Estimate, estimate_of_nothing
 from controller.laws.deployable.path_planner import guide_of_nothing
 from controller.laws.deployable.quadratic_program import workspace
 from controller.quaternion import write_rotation
-from controller.regions import Orientation, PackedRegions, pack
+from controller.regions import PackedRegions, pack
+from controller.regions.kinds import FIRST_OF_ATTITUDE
 
 _SPREADS = 3.0  # standard deviations of the position that the margin adds
 _STALE = 0.15  # s without a valid measurement, after which the vehicle is brought to a stop
 _SEED = 1
-_ATTITUDE = Orientation.kind  # shapes from it on depend on attitude
+_ATTITUDE = FIRST_OF_ATTITUDE  # shapes from it on depend on attitude
 
 DIAGNOSTICS = (
     Diagnostic("position.x", "m", "Estimated position, north"),

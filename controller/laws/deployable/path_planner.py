@@ -21,7 +21,6 @@ from controller.laws.deployable.gains import DeployableGains
 from controller.laws.deployable.linear_algebra import copy, norm
 from controller.laws.deployable.search import Tree, grow, tree_of_nothing
 from controller.regions import (
-    Orientation,
     PackedRegions,
     Sphere,
     clearance_at,
@@ -29,6 +28,7 @@ from controller.regions import (
     clearance_of_sphere,
     evaluate_packed,
 )
+from controller.regions.kinds import FIRST_OF_ATTITUDE
 
 Array = NDArray[np.float64]
 
@@ -43,7 +43,7 @@ _BETTER_PART = 0.01  # of its cost, that a new way must save to be taken
 _BLOCKED = 1.3  # of its length, cost of a way from which on the tree looks for another
 _PASSED = 0.25  # m from a corner, within which it counts as passed
 _SPHERE = Sphere.kind
-_ATTITUDE = Orientation.kind  # shapes from it on close no place
+_ATTITUDE = FIRST_OF_ATTITUDE  # shapes from it on close no place
 _CLIMBS = 12  # towards the inside of the goal region
 _PAYS = 0.05  # m deeper for each metre that a climb must bring; straight up it brings 1
 _DEEP_ENOUGH = 1e-3  # m, by which an end may lie less deep than asked for

@@ -17,12 +17,13 @@ from controller.jit.jit import inlined, part
 from controller.jit.stack_array import zeros
 from controller.laws.deployable.gains import DeployableGains
 from controller.laws.deployable.linear_algebra import copy
-from controller.regions import Orientation, PackedRegions, Sphere, clearance_of_place, clearance_of_sphere
+from controller.regions import PackedRegions, Sphere, clearance_of_place, clearance_of_sphere
+from controller.regions.kinds import FIRST_OF_ATTITUDE
 
 Array = NDArray[np.float64]
 
 _SPHERE = Sphere.kind
-_ATTITUDE = Orientation.kind  # shapes from it on close no place
+_ATTITUDE = FIRST_OF_ATTITUDE  # shapes from it on close no place
 _NODES = 256  # after which the tree is grown anew
 _REACH = 1.5  # m, that a node is from the one it grows from at most
 _ROOM = 3.0  # m beyond start and end in which nodes are looked for

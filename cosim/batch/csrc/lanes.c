@@ -134,7 +134,7 @@ static void mark(Fleet *f, int k)
 
     for (int j = 1; j < f->batch->n_regions; j++)
         if (f->batch->hard[j]) {
-            Real *least = f->batch->kinds[j] < SHAPE_ORIENTATION ? &m->least_clearance : &m->least_angle;
+            Real *least = f->batch->kinds[j] < SHAPES_OF_ATTITUDE ? &m->least_clearance : &m->least_angle;
             const Mask less = (f->clearances[j] < *least) | (f->clearances[j] != f->clearances[j]); /* NaN stays, too */
             *least = choose(f->flying & less, f->clearances[j], *least);
         }

@@ -4,7 +4,7 @@
 const SURFACES = new WeakMap();
 
 function surfaceOf(shape) {
-  if (!SURFACES.has(shape)) SURFACES.set(shape, SOLIDS[shape.kind](shape));
+  if (!SURFACES.has(shape)) SURFACES.set(shape, solidMaker(shape)(shape));
   return SURFACES.get(shape);
 }
 
@@ -20,7 +20,7 @@ function placesOf(run) {
   if (run.rows) places.push([xs[run.rows - 1], ys[run.rows - 1], zs[run.rows - 1]]);
   const kept = places.filter(Vec.finite);
   const { shape } = run.header.regions[0]; // the goal
-  if (SOLIDS[shape.kind]) {
+  if (solidMaker(shape)) {
     const { centre, radius } = surfaceOf(shape);
     for (const t of [run.start, run.end]) {
       const at = Vec.add(centre, run.shift(0, t));
@@ -53,7 +53,7 @@ function boxOfSolid({ points }, shift) {
  */
 function reachOf(shape, shift, way, limits, room) {
   const inLimits = (x, k) => x >= limits[0][k] && x <= limits[1][k];
-  if (SOLIDS[shape.kind]) {
+  if (solidMaker(shape)) {
     const solid = surfaceOf(shape);
     if (!isThere(Vec.add(solid.centre, shift))) return [];
     const box = boxOfSolid(solid, shift);

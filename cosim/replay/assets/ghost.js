@@ -79,7 +79,7 @@ class Ghost {
   /** The hull about the picture of a surface, moved by so much from where it is now; empty for what has none. */
   _outline(scene, run, region, by) {
     const shape = run.shape(region, run.end);
-    if (!SOLIDS[shape.kind]) return [];
+    if (!solidMaker(shape)) return [];
     const shift = Vec.add(run.shift(region, run.end), by);
     const { points } = surfaceOf(shape);
     const seen = [];

@@ -44,7 +44,7 @@ class Regions {
   }
 
   _of(shape, shift, region, pose, target) {
-    if (SOLIDS[shape.kind]) {
+    if (solidMaker(shape)) {
       const solid = surfaceOf(shape);
       if (!isThere(Vec.add(solid.centre, shift))) return [];
       const middle = solid.spine ? nearestOnChain(solid.spine, Vec.sub(target, shift)) : solid.centre;

@@ -226,3 +226,6 @@ const SOLIDS = {
   cone: coneOf,
   pipe: pipeOf,
 };
+
+/** How the surface of a shape is made: of its mesh where it brings one, else of its numbers; none where it has no end. */
+const solidMaker = (shape) => (shape.mesh ? ({ mesh }) => solidOf(mesh.points, mesh.faces) : SOLIDS[shape.kind]);

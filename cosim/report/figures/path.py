@@ -24,11 +24,9 @@ from cosim.report.figures.layout import (
     legend_rows,
     plain_numbers,
 )
-from cosim.report.figures.shape_outlines import edges_of, outlines, pieces_of, rim
+from cosim.report.figures.shape_outlines import edges_of, mesh_of, outlines, pieces_of, rim, silhouette
 from cosim.report.figures.style import (
     BLACK,
-    CRITERION_COLOURS,
-    GOAL_COLOUR,
     PATH_COLOUR,
     FigureData,
     Place,
@@ -36,6 +34,7 @@ from cosim.report.figures.style import (
     places_of,
 )
 from cosim.report.figures.trajectory import SampledPath, way_of
+from cosim.scenario.colours import CRITERION_COLOURS, GOAL_COLOUR
 from cosim.scenario.scenario import CRITERIA
 from cosim.simulation.signals import Array
 
@@ -133,14 +132,19 @@ def _region(ax: Axes, place: Place, low: Array, high: Array, view: Array, clip: 
     alpha = _FAINT if place.faint else 1.0
     whole = Path.make_compound_path(*(Path(outline, closed=True) for outline in seen))
     fill = PathPatch(whole, color=place.colour, alpha=(0.15 if clip is None else 0.08) * alpha, linewidth=0)
-    rims = [rim(outline, [other for other in seen if other is not outline]) for outline in seen]
+    mesh = mesh_of(place.region.shape)
+    if mesh is None:
+        rims = [rim(outline, [other for other in seen if other is not outline]) for outline in seen]
+    else:
+        rims = [edge + view @ place.shift for edge in silhouette(mesh, view)]
     dashes = "-" if place.region.keep == "out" else "--"
     drawn: list[Artist] = [ax.add_patch(fill)]
     drawn += ax.plot(*_with_gaps(rims), color=place.colour, linewidth=1.1, linestyle=dashes, alpha=alpha)
     if clip is not None:
         edges = edges_of(place.region.shape, low - place.shift, high - place.shift)
         lines = [(line + place.shift) @ view.T for line in edges]
-        drawn += ax.plot(*_with_gaps(lines), color=place.colour, linewidth=0.5, alpha=0.7 * alpha)
+        if lines:  # of a mesh, the rims are all
+            drawn += ax.plot(*_with_gaps(lines), color=place.colour, linewidth=0.5, alpha=0.7 * alpha)
         for artist in drawn:
             artist.set_clip_path(clip, ax.transData)
     return seen

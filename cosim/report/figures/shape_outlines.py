@@ -21,6 +21,10 @@ from controller.regions import (
     Shape,
     Sphere,
 )
+from controller.regions.mesh import Mesh
+from controller.regions.region_set import name_of
+from controller.regions.shapes import ENTRIES
+from cosim.errors import RunError
 from cosim.simulation.signals import Array
 
 _TURN = np.linspace(0.0, 2.0 * np.pi, 73)  # rad
@@ -85,6 +89,41 @@ def _pieces(shape: Shape, low: Array, high: Array) -> Iterator[Piece]:
             for point, normal in _planes(shape):
                 corners = _cut(corners, point, normal)
             yield Piece(corners)
+        case _:
+            mesh = mesh_of(shape)
+            if mesh is None:
+                raise RunError(f"shape {name_of(shape)!r} cannot be drawn, expected a surface in its entry")
+            yield from (Piece(mesh.vertices[triangle], polygon=True) for triangle in mesh.triangles)
+
+
+def mesh_of(shape: Shape) -> Mesh | None:
+    """Return the mesh of the entry of a shape; none where the shape is drawn by its numbers."""
+    surface = ENTRIES[name_of(shape)].surface
+    return surface(shape, shape.bounds()) if surface is not None else None
+
+
+def silhouette(mesh: Mesh, view: Array) -> list[Array]:
+    """Return the edges of a mesh between a face that is seen and one that is not.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        Closed.
+    view : ndarray, shape (2, 3)
+        As for `outlines`.
+
+    Returns
+    -------
+    list of ndarray, shape (2, 2)
+        In the picture; those that the mesh itself hides are among them.
+    """
+    a, b, c = (mesh.vertices[mesh.triangles[:, k]] for k in range(3))
+    seen = np.cross(b - a, c - a) @ np.cross(view[0], view[1]) > 0.0
+    flat, sides = mesh.vertices @ view.T, {}
+    for triangle, faces in zip(mesh.triangles.tolist(), seen.tolist(), strict=True):
+        for start, end in zip(triangle, triangle[1:] + triangle[:1], strict=True):
+            sides[start, end] = faces
+    return [flat[[i, j]] for (i, j), faces in sides.items() if faces and not sides.get((j, i), False)]
 
 
 def edges_of(shape: Shape, low: Array, high: Array) -> Iterator[Array]:

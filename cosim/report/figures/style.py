@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 
 from controller.regions import Region, Visibility, of_attitude
 from cosim.results.record import Rows
-from cosim.scenario.scenario import CRITERIA, Scenario
+from cosim.scenario.colours import CRITERION_COLOURS, GOAL_COLOUR
+from cosim.scenario.scenario import Scenario
 from cosim.simulation.signals import Array
 
 # Okabe & Ito: told apart by colour-blind readers too
@@ -23,8 +24,6 @@ BLACK, ORANGE, SKY, GREEN, YELLOW, BLUE, RED, PURPLE = (
     "#000000", "#E69F00", "#56B4E9", "#009E73", "#F0E442", "#0072B2", "#D55E00", "#CC79A7"
 )  # fmt: skip
 CYCLE = (BLUE, RED, GREEN, ORANGE, PURPLE, SKY, BLACK, YELLOW)
-CRITERION_COLOURS = dict(zip(CRITERIA, (RED, ORANGE, SKY), strict=True))
-GOAL_COLOUR = GREEN
 PATH_COLOUR = BLUE
 
 STYLE: Any = {

@@ -16,9 +16,7 @@ from cosim.report.figures.layout import F, Sheet, legend, limits_of, panels, sym
 from cosim.report.figures.style import (
     BLACK,
     BLUE,
-    CRITERION_COLOURS,
     CYCLE,
-    GOAL_COLOUR,
     GREEN,
     ORANGE,
     RED,
@@ -29,6 +27,7 @@ from cosim.report.figures.style import (
 )
 from cosim.results.record import Rows
 from cosim.results.spans import spans
+from cosim.scenario.colours import CRITERION_COLOURS, GOAL_COLOUR
 from cosim.scenario.scenario import CRITERIA, Scenario
 from cosim.simulation.commands.commands import MODES
 from cosim.simulation.signals import Array

@@ -208,7 +208,7 @@ def lean_functions():
 def test_what_counts_no_references_calls_nothing_that_returns_an_array():
     """Its result would never be freed."""
     functions = lean_functions()
-    assert "controller.regions.visibility.visibility" in functions and "cosim.batch.c_calls.fmi_get" in functions
+    assert "controller.regions.shapes.visibility.visibility" in functions and "cosim.batch.c_calls.fmi_get" in functions
     for name, function in functions.items():
         python = function.py_func
         for called in (python.__globals__.get(word) for word in python.__code__.co_names):

@@ -22,6 +22,7 @@ from controller.regions import (
     Sphere,
     clearances_at,
 )
+from cosim.errors import ExportError
 from cosim.export.surfaces import sector, surface_of
 
 LIMITS = ((-4.0, -3.0, 0.0), (4.0, 5.0, 6.0))
@@ -131,5 +132,5 @@ def test_a_sector_of_more_than_half_a_turn_is_closed_too():
 
 
 def test_shapes_of_attitude_have_no_surface():
-    with pytest.raises(TypeError, match="Orientation"):
+    with pytest.raises(ExportError, match="Orientation has no surface"):
         surface_of(Orientation((1.0, 0.0, 0.0, 0.0), 0.5), LIMITS)

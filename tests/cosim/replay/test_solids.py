@@ -26,8 +26,12 @@ from controller.regions import (
     clearances_at,
     pack,
 )
-from cosim.replay.header import shape_of
+from controller.regions.shapes import ENTRIES
+from cosim.export.surfaces import surface_of
+from cosim.replay.header import DRAWN_BY_NUMBERS, shape_of
 from cosim.replay.page import SCENE_SCRIPTS
+from cosim.scenario.colours import CRITERION_COLOURS, GOAL_COLOUR
+from cosim.scenario.scenario import CRITERIA
 
 NODE = shutil.which("node")
 pytestmark = pytest.mark.skipif(NODE is None, reason="node, which runs the scene's scripts, is not installed")
@@ -81,7 +85,22 @@ def outside(shape, points):
 
 
 def test_every_shape_of_a_region_has_a_drawer():
-    assert set(run("return DRAWN_SHAPES;")) == set(SHAPES)
+    assert set(run("return DRAWN_SHAPES;")) == set(DRAWN_BY_NUMBERS)
+    by_mesh = {name for name, entry in ENTRIES.items() if entry.surface is not None}
+    assert set(SHAPES) == by_mesh | set(DRAWN_BY_NUMBERS)
+
+
+def test_the_page_has_the_colours_of_all_others():
+    assert run("return [CRITERION_COLOURS, GOAL_COLOUR];") == [CRITERION_COLOURS, GOAL_COLOUR]
+    assert set(CRITERION_COLOURS) == set(CRITERIA)
+
+
+def test_a_mesh_is_drawn_as_it_comes():
+    box, mesh = BOUNDED["box"], surface_of(BOUNDED["box"], ((-9.0,) * 3, (9.0,) * 3))
+    told = {"kind": "ring", "mesh": {"points": mesh.vertices.tolist(), "faces": mesh.triangles.tolist()}}
+    solid = run("const s = solidMaker(shape)(shape); return { ...s, points: [...s.points] };", shape=told)
+    np.testing.assert_allclose(outside(box, np.reshape(solid["points"], (-1, 3))), 0.0, atol=1e-9)
+    assert sum(edge[4] for edge in solid["edges"]) == 12  # those between its sides alone are sharp
 
 
 @pytest.mark.parametrize("name", BOUNDED)

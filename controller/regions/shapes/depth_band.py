@@ -7,6 +7,8 @@ from math import inf
 from typing import ClassVar
 
 from controller.jit.jit import jit_noalloc
+from controller.regions.entry import Entry
+from controller.regions.numbers import LENGTH, SIZE, Number
 from controller.regions.shape import Array, Bounds, Evaluation, require, require_finite
 
 
@@ -14,7 +16,7 @@ from controller.regions.shape import Array, Bounds, Evaluation, require, require
 class DepthBand:
     """All depths within `tolerance` [m] of `depth` [m]; g = (z - z_o)^2 - r^2 [m2]."""
 
-    kind: ClassVar[int] = 1
+    kind: ClassVar[int]
     unit: ClassVar[str] = "m2"
     depth: float  # m
     tolerance: float
@@ -26,6 +28,10 @@ class DepthBand:
     def packed(self) -> tuple[float, ...]:
         """Return depth and tolerance."""
         return (self.depth, self.tolerance)
+
+    def numbers(self) -> tuple[Number, ...]:
+        """Return what `packed` gives, by name and unit."""
+        return (Number("depth", *LENGTH), Number("tolerance", *SIZE))
 
     def bounds(self) -> Bounds:
         """Return the depths, without end to the sides."""
@@ -42,3 +48,7 @@ def band_about(z: float, tolerance: float) -> Evaluation:
 def depth_band(p: Array, q: Array) -> Evaluation:
     """Evaluate a packed `DepthBand` at the position `p`."""
     return band_about(p[2] - q[0], q[1])
+
+
+_UNITS = {"depth": "m", "tolerance": "m"}
+ENTRY = Entry(DepthBand, depth_band, DepthBand(2.5, 1.8), _UNITS)

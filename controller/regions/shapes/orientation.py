@@ -9,6 +9,8 @@ from typing import ClassVar
 
 from controller.jit.jit import jit_noalloc
 from controller.quaternion import error_parts
+from controller.regions.entry import Entry
+from controller.regions.numbers import ANGLE, PART, Number
 from controller.regions.shape import Array, Bounds, EvaluationOfAttitude, Vector4, require, unit
 
 
@@ -20,7 +22,7 @@ class Orientation:
     attitude itself, and half a turn away from it.
     """
 
-    kind: ClassVar[int] = 9
+    kind: ClassVar[int]
     unit: ClassVar[str] = "rad"
     quaternion: Vector4
     tolerance: float
@@ -32,6 +34,10 @@ class Orientation:
     def packed(self) -> tuple[float, ...]:
         """Return the unit quaternion and the tolerance."""
         return (*unit("orientation", "quaternion", self.quaternion), self.tolerance)
+
+    def numbers(self) -> tuple[Number, ...]:
+        """Return what `packed` gives, by name and unit."""
+        return (*(Number(f"quaternion.e{i}", *PART) for i in range(4)), Number("tolerance", *ANGLE))
 
     def bounds(self) -> Bounds:
         """Return no bounds: every place is in it."""
@@ -47,3 +53,7 @@ def orientation(p: Array, e: Array, q: Array) -> EvaluationOfAttitude:
     if sine == 0.0 or turn[0] == 0.0:
         return g, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     return g, 0.0, 0.0, 0.0, turn[1] / sine, turn[2] / sine, turn[3] / sine
+
+
+_UNITS = {"quaternion": "", "tolerance": "rad"}
+ENTRY = Entry(Orientation, orientation, Orientation((0.9, 0.1, -0.3, 0.2), 0.8), _UNITS, of_attitude=True)

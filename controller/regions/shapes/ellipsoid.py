@@ -10,7 +10,9 @@ import numpy as np
 
 from controller.jit.jit import jit_noalloc
 from controller.quaternion import rotation_matrix
+from controller.regions.entry import Entry
 from controller.regions.geometry import to_local, to_world
+from controller.regions.numbers import SIZE, TURNED, Number, vector
 from controller.regions.shape import Array, Bounds, Evaluation, Vector3, Vector4, about, require, require_finite, unit
 
 _STEPS = 200  # more than the root below ever takes
@@ -23,7 +25,7 @@ class Ellipsoid:
     `quaternion` (scalar first) turns the axes, of half lengths `semi_axes` [m], into the world.
     """
 
-    kind: ClassVar[int] = 5
+    kind: ClassVar[int]
     unit: ClassVar[str] = ""
     centre: Vector3
     semi_axes: Vector3
@@ -38,6 +40,10 @@ class Ellipsoid:
         """Return centre, rotation matrix and half axes."""
         R = rotation_matrix(np.array(unit("ellipsoid", "quaternion", self.quaternion)))
         return (*self.centre, *R.ravel().tolist(), *self.semi_axes)
+
+    def numbers(self) -> tuple[Number, ...]:
+        """Return what `packed` gives, by name and unit."""
+        return (*TURNED, *vector("semi_axes", SIZE))
 
     def bounds(self) -> Bounds:
         """Return the corners of the upright box about it."""
@@ -80,3 +86,7 @@ def _surface_distance(x: float, y: float, z: float, a: float, b: float, c: float
         s = new
     nearest_x, nearest_y, nearest_z = x * a * a / (s + da), y * b * b / (s + db), z * c * c / (s + dc)
     return math.sqrt((x - nearest_x) ** 2 + (y - nearest_y) ** 2 + (z - nearest_z) ** 2)
+
+
+_UNITS = {"centre": "m", "semi_axes": "m", "quaternion": ""}
+ENTRY = Entry(Ellipsoid, ellipsoid, Ellipsoid((1.0, 0.0, 1.0), (2.0, 1.0, 0.5), (0.9, 0.1, -0.3, 0.2)), _UNITS)

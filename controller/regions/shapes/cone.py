@@ -7,7 +7,9 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from controller.jit.jit import jit_noalloc
+from controller.regions.entry import Entry
 from controller.regions.geometry import clamp
+from controller.regions.numbers import LENGTH, PART, SIZE, Number, vector
 from controller.regions.shape import Array, Bounds, Evaluation, Vector3, ball_bounds, require, require_finite, unit
 
 
@@ -18,7 +20,7 @@ class Cone:
     The axis points from the feature into the water. g is the signed distance [m].
     """
 
-    kind: ClassVar[int] = 8
+    kind: ClassVar[int]
     unit: ClassVar[str] = "m"
     feature: Vector3
     axis: Vector3
@@ -35,6 +37,16 @@ class Cone:
         """Return feature, unit axis, sine and cosine of the half angle, and range."""
         axis = unit("cone", "axis", self.axis)
         return (*self.feature, *axis, math.sin(self.half_angle), math.cos(self.half_angle), self.range)
+
+    def numbers(self) -> tuple[Number, ...]:
+        """Return what `packed` gives, by name and unit."""
+        return (
+            *vector("feature", LENGTH),
+            *vector("axis", PART),
+            Number("sine", *PART),
+            Number("cosine", *PART),
+            Number("range", *SIZE),
+        )
 
     def bounds(self) -> Bounds:
         """Return the corners of the cube about its range, which hold it."""
@@ -70,3 +82,7 @@ def cone(p: Array, q: Array) -> Evaluation:
             of_aside, of_along = cosine, -sine
     outward = of_aside / aside if aside > 0.0 else 0.0
     return g, outward * x + of_along * q[3], outward * y + of_along * q[4], outward * z + of_along * q[5], g
+
+
+_UNITS = {"feature": "m", "axis": "", "half_angle": "rad", "range": "m"}
+ENTRY = Entry(Cone, cone, Cone((1.0, 1.0, 1.0), (-1.0, 0.0, 0.3), 0.6, 3.0), _UNITS)

@@ -9,6 +9,8 @@ from typing import ClassVar
 
 from controller.jit.jit import jit_noalloc
 from controller.quaternion import rotation_rows
+from controller.regions.entry import Entry
+from controller.regions.numbers import ANGLE, LENGTH, PART, Number, vector
 from controller.regions.shape import Array, Bounds, EvaluationOfAttitude, Vector3, require, require_finite, unit
 
 
@@ -22,7 +24,7 @@ class Visibility:
     impossible. A feature in the camera itself counts as behind it.
     """
 
-    kind: ClassVar[int] = 10
+    kind: ClassVar[int]
     unit: ClassVar[str] = "rad"
     feature: Vector3
     camera_axis: Vector3
@@ -41,6 +43,15 @@ class Visibility:
             *unit("visibility", "camera_axis", self.camera_axis),
             *self.camera_position,
             self.half_angle,
+        )
+
+    def numbers(self) -> tuple[Number, ...]:
+        """Return what `packed` gives, by name and unit."""
+        return (
+            *vector("feature", LENGTH),
+            *vector("camera_axis", PART),
+            *vector("camera_position", LENGTH),
+            Number("half_angle", *ANGLE),
         )
 
     def bounds(self) -> Bounds:
@@ -85,3 +96,8 @@ def visibility(p: Array, e: Array, q: Array) -> EvaluationOfAttitude:
         sz * ux - sx * uz,
         sx * uy - sy * ux,
     )
+
+
+_UNITS = {"feature": "m", "camera_axis": "", "half_angle": "rad", "camera_position": "m"}
+_EXAMPLE = Visibility((1.0, 2.0, 3.0), (1.0, 0.2, 0.5), 0.9, (0.3, -0.1, 0.2))
+ENTRY = Entry(Visibility, visibility, _EXAMPLE, _UNITS, of_attitude=True)

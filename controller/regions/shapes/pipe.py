@@ -7,7 +7,9 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from controller.jit.jit import jit_noalloc
+from controller.regions.entry import Entry
 from controller.regions.geometry import clamp
+from controller.regions.numbers import LENGTH, SIZE, Number, vector
 from controller.regions.shape import Array, Bounds, Evaluation, Vector3, ball_bounds, join, require, require_finite
 
 
@@ -18,7 +20,7 @@ class Pipe:
     Where pieces of the pipe meet, the distance is that to the surface outside, and inside a bound of it.
     """
 
-    kind: ClassVar[int] = 7
+    kind: ClassVar[int]
     unit: ClassVar[str] = "m"
     points: tuple[Vector3, ...]
     radius: float  # m
@@ -35,6 +37,13 @@ class Pipe:
     def packed(self) -> tuple[float, ...]:
         """Return the radius and the points."""
         return (self.radius, *(x for point in self.points for x in point))
+
+    def numbers(self) -> tuple[Number, ...]:
+        """Return what `packed` gives, by name and unit."""
+        return (
+            Number("radius", *SIZE),
+            *(number for i in range(1, len(self.points) + 1) for number in vector(f"point[{i}]", LENGTH)),
+        )
 
     def bounds(self) -> Bounds:
         """Return the corners of the upright box about it."""
@@ -58,3 +67,7 @@ def pipe(p: Array, q: Array) -> Evaluation:
     if nearest > 0.0:
         return g, nx / nearest, ny / nearest, nz / nearest, g
     return g, 0.0, 0.0, 0.0, g
+
+
+_UNITS = {"points": "m", "radius": "m"}
+ENTRY = Entry(Pipe, pipe, Pipe(((0.0, 0.0, 0.0), (2.0, 0.0, 0.0), (2.0, 2.0, 1.0)), 0.4), _UNITS)

@@ -9,7 +9,9 @@ import numpy as np
 
 from controller.jit.jit import jit_noalloc
 from controller.quaternion import rotation_matrix
+from controller.regions.entry import Entry
 from controller.regions.geometry import product_distance, to_local, to_world
+from controller.regions.numbers import SIZE, TURNED, Number, vector
 from controller.regions.shape import Array, Bounds, Evaluation, Vector3, Vector4, about, require, require_finite, unit
 
 
@@ -20,7 +22,7 @@ class Box:
     `quaternion` (scalar first) turns the box's axes into the world.
     """
 
-    kind: ClassVar[int] = 3
+    kind: ClassVar[int]
     unit: ClassVar[str] = "m"
     centre: Vector3
     size: Vector3
@@ -35,6 +37,10 @@ class Box:
         """Return centre, rotation matrix and half sizes."""
         R = rotation_matrix(np.array(unit("box", "quaternion", self.quaternion)))
         return (*self.centre, *R.ravel().tolist(), *(s / 2.0 for s in self.size))
+
+    def numbers(self) -> tuple[Number, ...]:
+        """Return what `packed` gives, by name and unit."""
+        return (*TURNED, *vector("half_size", SIZE))
 
     def bounds(self) -> Bounds:
         """Return the corners of the upright box about it."""
@@ -54,3 +60,7 @@ def box(p: Array, q: Array) -> Evaluation:
     gz = of_z if z >= 0.0 else -of_z
     wx, wy, wz = to_world(q, 3, gx, gy, gz)
     return g, wx, wy, wz, g
+
+
+_UNITS = {"centre": "m", "size": "m", "quaternion": ""}
+ENTRY = Entry(Box, box, Box((1.0, 1.0, 1.0), (2.0, 3.0, 1.0), (0.9, 0.1, -0.3, 0.2)), _UNITS)

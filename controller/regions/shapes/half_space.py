@@ -7,6 +7,8 @@ from math import inf
 from typing import ClassVar
 
 from controller.jit.jit import jit_noalloc
+from controller.regions.entry import Entry
+from controller.regions.numbers import LENGTH, PART, Number, vector
 from controller.regions.shape import Array, Bounds, Evaluation, Vector3, require_finite, unit
 
 
@@ -14,7 +16,7 @@ from controller.regions.shape import Array, Bounds, Evaluation, Vector3, require
 class HalfSpace:
     """All points behind the plane through `point` [m, NED] that `normal` points away from; g is the distance [m]."""
 
-    kind: ClassVar[int] = 2
+    kind: ClassVar[int]
     unit: ClassVar[str] = "m"
     point: Vector3
     normal: Vector3
@@ -27,6 +29,10 @@ class HalfSpace:
         """Return point and unit normal."""
         return (*self.point, *unit("half_space", "normal", self.normal))
 
+    def numbers(self) -> tuple[Number, ...]:
+        """Return what `packed` gives, by name and unit."""
+        return (*vector("point", LENGTH), *vector("normal", PART))
+
     def bounds(self) -> Bounds:
         """Return no bounds: it ends in no direction of the axes."""
         return (-inf, -inf, -inf), (inf, inf, inf)
@@ -37,3 +43,7 @@ def half_space(p: Array, q: Array) -> Evaluation:
     """Evaluate a packed `HalfSpace` at the position `p`."""
     g = q[3] * (p[0] - q[0]) + q[4] * (p[1] - q[1]) + q[5] * (p[2] - q[2])
     return g, q[3], q[4], q[5], g
+
+
+_UNITS = {"point": "m", "normal": ""}
+ENTRY = Entry(HalfSpace, half_space, HalfSpace((0.0, 0.0, 1.0), (1.0, 1.0, 0.2)), _UNITS)

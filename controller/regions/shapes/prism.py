@@ -7,7 +7,9 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from controller.jit.jit import jit_noalloc
+from controller.regions.entry import Entry
 from controller.regions.geometry import clamp, product_distance
+from controller.regions.numbers import LENGTH, Number
 from controller.regions.shape import Array, Bounds, Evaluation, Vector2, require, require_finite
 
 
@@ -18,7 +20,7 @@ class Prism:
     The polygon need not be convex, but its edges must not cross. g is the signed distance [m].
     """
 
-    kind: ClassVar[int] = 6
+    kind: ClassVar[int]
     unit: ClassVar[str] = "m"
     corners: tuple[Vector2, ...]
     top: float
@@ -39,6 +41,18 @@ class Prism:
         """Return top, bottom, and the corners in the sense in which the outward normal is to the right."""
         corners = self.corners if _signed_area(self.corners) > 0.0 else self.corners[::-1]
         return (self.top, self.bottom, *(x for corner in corners for x in corner))
+
+    def numbers(self) -> tuple[Number, ...]:
+        """Return what `packed` gives, by name and unit."""
+        return (
+            Number("top", *LENGTH),
+            Number("bottom", *LENGTH),
+            *(
+                Number(f"corner[{i}].{axis}", *LENGTH)
+                for i in range(1, len(self.corners) + 1)
+                for axis in ("north", "east")
+            ),
+        )
 
     def bounds(self) -> Bounds:
         """Return the corners of the upright box about it."""
@@ -114,3 +128,7 @@ def prism(p: Array, q: Array) -> Evaluation:
     down = 1.0 if p[2] - q[1] >= q[0] - p[2] else -1.0
     g, of_flat, of_vertical = product_distance(nearest, vertical)
     return g, of_flat * gx, of_flat * gy, of_vertical * down, g
+
+
+_UNITS = {"corners": "m", "top": "m", "bottom": "m"}
+ENTRY = Entry(Prism, prism, Prism(((0.0, 0.0), (3.0, 0.0), (3.0, 2.0), (1.0, 0.5), (0.0, 2.0)), 1.0, 3.0), _UNITS)

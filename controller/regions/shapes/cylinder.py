@@ -7,7 +7,9 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from controller.jit.jit import jit_noalloc
+from controller.regions.entry import Entry
 from controller.regions.geometry import product_distance
+from controller.regions.numbers import LENGTH, PART, SIZE, Number, vector
 from controller.regions.shape import (
     UP_TO_ROUNDING,
     Array,
@@ -26,7 +28,7 @@ from controller.regions.shape import (
 class Cylinder:
     """All points within `radius` [m] of the axis from `start` to `end` [m, NED]; g is the signed distance [m]."""
 
-    kind: ClassVar[int] = 4
+    kind: ClassVar[int]
     unit: ClassVar[str] = "m"
     start: Vector3
     end: Vector3
@@ -43,6 +45,15 @@ class Cylinder:
         between = tuple(b - a for a, b in zip(self.start, self.end, strict=True))
         middle = tuple((a + b) / 2.0 for a, b in zip(self.start, self.end, strict=True))
         return (*middle, *unit("cylinder", "axis", between), math.hypot(*between) / 2.0, self.radius)
+
+    def numbers(self) -> tuple[Number, ...]:
+        """Return what `packed` gives, by name and unit."""
+        return (
+            *vector("middle", LENGTH),
+            *vector("axis", PART),
+            Number("half_length", *SIZE),
+            Number("radius", *SIZE),
+        )
 
     def bounds(self) -> Bounds:
         """Return the corners of the upright box about it."""
@@ -62,3 +73,7 @@ def cylinder(p: Array, q: Array) -> Evaluation:
     outward = of_radius / radius if radius > 0.0 else 0.0
     axial = of_along if along >= 0.0 else -of_along
     return g, outward * x + axial * q[3], outward * y + axial * q[4], outward * z + axial * q[5], g
+
+
+_UNITS = {"start": "m", "end": "m", "radius": "m"}
+ENTRY = Entry(Cylinder, cylinder, Cylinder((0.0, 0.0, 0.0), (1.0, 2.0, 3.0), 0.7), _UNITS)

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from controller.jit.jit import jit_noalloc
+from controller.regions.entry import Entry
+from controller.regions.numbers import LENGTH, SIZE, Number, vector
 from controller.regions.shape import Array, Bounds, Evaluation, Vector3, ball_bounds, require, require_finite
 
 
@@ -14,7 +16,7 @@ from controller.regions.shape import Array, Bounds, Evaluation, Vector3, ball_bo
 class Sphere:
     """All points within `radius` [m] of `centre` [m, NED]; g = |p - c|^2 - r^2 [m2]."""
 
-    kind: ClassVar[int] = 0
+    kind: ClassVar[int]
     unit: ClassVar[str] = "m2"
     centre: Vector3
     radius: float  # m
@@ -26,6 +28,10 @@ class Sphere:
     def packed(self) -> tuple[float, ...]:
         """Return centre and radius."""
         return (*self.centre, self.radius)
+
+    def numbers(self) -> tuple[Number, ...]:
+        """Return what `packed` gives, by name and unit."""
+        return (*vector("centre", LENGTH), Number("radius", *SIZE))
 
     def bounds(self) -> Bounds:
         """Return the corners of the cube about it."""
@@ -43,3 +49,7 @@ def sphere_about(x: float, y: float, z: float, radius: float) -> Evaluation:
 def sphere(p: Array, q: Array) -> Evaluation:
     """Evaluate a packed `Sphere` at the position `p`."""
     return sphere_about(p[0] - q[0], p[1] - q[1], p[2] - q[2], q[3])
+
+
+_UNITS = {"centre": "m", "radius": "m"}
+ENTRY = Entry(Sphere, sphere, Sphere((2.0, 0.0, 1.8), 0.5), _UNITS)

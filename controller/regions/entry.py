@@ -1,0 +1,60 @@
+"""The entry of a shape: all that the software knows of it, in one place."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, fields
+from typing import Any
+
+from controller.regions.mesh import Mesh
+from controller.regions.shape import Bounds, Shape
+
+_FACES = ("unit", "packed", "numbers", "bounds")
+
+
+@dataclass(frozen=True)
+class Entry:
+    """What a file of `controller.regions.shapes` says of its shape, as ``ENTRY``.
+
+    Parameters
+    ----------
+    shape : type
+        The frozen dataclass, a `Shape`: its fields are the keys of a scenario.
+    evaluate : callable
+        The compiled function of g, its gradient and the distance, as `Shape` says.
+    example : Shape
+        One of its kind, which tests and pictures take.
+    units : mapping of str to str
+        Unit of each field of the dataclass, "" for none.
+    surface : callable, optional
+        Its mesh, of one of them and the corners of a box in which what has no end is cut: pictures, replay and exports
+        draw it. The shapes that they draw by their numbers have none here.
+    of_attitude : bool, optional
+        Whether it depends on attitude.
+
+    Raises
+    ------
+    TypeError
+        If a face is missing, or the numbers that it packs are not those that it names.
+    """
+
+    shape: type[Shape]
+    evaluate: Callable[..., Any]
+    example: Shape
+    units: Mapping[str, str]
+    surface: Callable[[Any, Bounds], Mesh] | None = None
+    of_attitude: bool = False
+
+    def __post_init__(self) -> None:
+        name = self.shape.__name__
+        missing = [face for face in _FACES if not hasattr(self.shape, face)]
+        if missing:
+            raise TypeError(f"shape {name} has no {', '.join(missing)}")
+        if type(self.example) is not self.shape:
+            raise TypeError(f"shape {name}: example is a {type(self.example).__name__}, expected one of its own")
+        keys = [field.name for field in fields(self.shape)]  # type: ignore[arg-type]
+        if sorted(self.units) != sorted(keys):
+            raise TypeError(f"shape {name}: units are of {', '.join(self.units)}, expected of {', '.join(keys)}")
+        packed, named = len(self.example.packed()), len(self.example.numbers())
+        if packed != named:
+            raise TypeError(f"shape {name}: numbers names {named} numbers, expected the {packed} that packed gives")

@@ -1,0 +1,28 @@
+"""Shapes: one file each, which holds all that the software knows of the shape as its ``ENTRY``.
+
+A file that is put here is a shape, known by the name of the file; C code of the same name may stand beside it.
+
+Imports: jit.
+"""
+
+from importlib import import_module
+from pkgutil import iter_modules
+
+from controller.regions.entry import Entry
+
+
+def _found() -> dict[str, Entry]:
+    """Return the entries of all files here, those of position first, each with its kind."""
+    found = {}
+    for module in iter_modules(__path__):
+        entry = getattr(import_module(f"{__name__}.{module.name}"), "ENTRY", None)
+        if not isinstance(entry, Entry):
+            raise TypeError(f"{__name__}.{module.name} has no ENTRY, expected the Entry of its shape")
+        found[module.name] = entry
+    ordered = dict(sorted(found.items(), key=lambda item: (item[1].of_attitude, item[0])))
+    for kind, entry in enumerate(ordered.values()):
+        entry.shape.kind = kind
+    return ordered
+
+
+ENTRIES: dict[str, Entry] = _found()
