@@ -31,6 +31,8 @@ class Entry:
         draw it. The shapes that they draw by their numbers have none here.
     of_attitude : bool, optional
         Whether it depends on attitude.
+    convex : bool, optional
+        Whether each is convex: rays, such as those of a proximity sensor, then go on by tangents, else by distances.
 
     Raises
     ------
@@ -44,6 +46,7 @@ class Entry:
     units: Mapping[str, str]
     surface: Callable[[Any, Bounds], Mesh] | None = None
     of_attitude: bool = False
+    convex: bool = False
 
     def __post_init__(self) -> None:
         name = self.shape.__name__

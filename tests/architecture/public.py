@@ -13,6 +13,7 @@ WRITTEN = Path(__file__).parents[1] / "data" / "public_api.txt"
 
 # a package is public by its ``__all__``, a module as far as it is named here
 NAMED = {
+    "controller.regions.entry": "Entry",
     "controller.paper_law": "apply primary_error primary_potential secondary_error secondary_parts "
     "secondary_potential step violation",
     "controller.quaternion": "angular_velocity down_in_body error error_parts from_axis_angle kinematic_matrix "

@@ -11,6 +11,8 @@ CALLS = {"eval", "exec", "compile", "__import__", "input"}
 MAY = {
     ("exec", "fuzzy_arbiter/compiled.py"),  # text of our own making
     ("compile", "fuzzy_arbiter/compiled.py"),
+    ("exec", "controller/regions/kinds.py"),  # likewise: a choice among the shapes that there are
+    ("compile", "controller/regions/kinds.py"),
 }
 PROCESSES = {"plant_fmu/compiling/compiler.py", "plant_fmu/importers/process.py", "cosim/batch/lanes_library.py"}
 XML = {"plant_fmu/unpacking.py"}

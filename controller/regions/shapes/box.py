@@ -63,4 +63,4 @@ def box(p: Array, q: Array) -> Evaluation:
 
 
 _UNITS = {"centre": "m", "size": "m", "quaternion": ""}
-ENTRY = Entry(Box, box, Box((1.0, 1.0, 1.0), (2.0, 3.0, 1.0), (0.9, 0.1, -0.3, 0.2)), _UNITS)
+ENTRY = Entry(Box, box, Box((1.0, 1.0, 1.0), (2.0, 3.0, 1.0), (0.9, 0.1, -0.3, 0.2)), _UNITS, convex=True)

@@ -85,4 +85,4 @@ def cone(p: Array, q: Array) -> Evaluation:
 
 
 _UNITS = {"feature": "m", "axis": "", "half_angle": "rad", "range": "m"}
-ENTRY = Entry(Cone, cone, Cone((1.0, 1.0, 1.0), (-1.0, 0.0, 0.3), 0.6, 3.0), _UNITS)
+ENTRY = Entry(Cone, cone, Cone((1.0, 1.0, 1.0), (-1.0, 0.0, 0.3), 0.6, 3.0), _UNITS, convex=True)

@@ -76,4 +76,4 @@ def cylinder(p: Array, q: Array) -> Evaluation:
 
 
 _UNITS = {"start": "m", "end": "m", "radius": "m"}
-ENTRY = Entry(Cylinder, cylinder, Cylinder((0.0, 0.0, 0.0), (1.0, 2.0, 3.0), 0.7), _UNITS)
+ENTRY = Entry(Cylinder, cylinder, Cylinder((0.0, 0.0, 0.0), (1.0, 2.0, 3.0), 0.7), _UNITS, convex=True)

@@ -51,4 +51,4 @@ def depth_band(p: Array, q: Array) -> Evaluation:
 
 
 _UNITS = {"depth": "m", "tolerance": "m"}
-ENTRY = Entry(DepthBand, depth_band, DepthBand(2.5, 1.8), _UNITS)
+ENTRY = Entry(DepthBand, depth_band, DepthBand(2.5, 1.8), _UNITS, convex=True)

@@ -89,4 +89,6 @@ def _surface_distance(x: float, y: float, z: float, a: float, b: float, c: float
 
 
 _UNITS = {"centre": "m", "semi_axes": "m", "quaternion": ""}
-ENTRY = Entry(Ellipsoid, ellipsoid, Ellipsoid((1.0, 0.0, 1.0), (2.0, 1.0, 0.5), (0.9, 0.1, -0.3, 0.2)), _UNITS)
+ENTRY = Entry(
+    Ellipsoid, ellipsoid, Ellipsoid((1.0, 0.0, 1.0), (2.0, 1.0, 0.5), (0.9, 0.1, -0.3, 0.2)), _UNITS, convex=True
+)

@@ -46,4 +46,4 @@ def half_space(p: Array, q: Array) -> Evaluation:
 
 
 _UNITS = {"point": "m", "normal": ""}
-ENTRY = Entry(HalfSpace, half_space, HalfSpace((0.0, 0.0, 1.0), (1.0, 1.0, 0.2)), _UNITS)
+ENTRY = Entry(HalfSpace, half_space, HalfSpace((0.0, 0.0, 1.0), (1.0, 1.0, 0.2)), _UNITS, convex=True)

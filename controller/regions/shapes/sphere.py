@@ -52,4 +52,4 @@ def sphere(p: Array, q: Array) -> Evaluation:
 
 
 _UNITS = {"centre": "m", "radius": "m"}
-ENTRY = Entry(Sphere, sphere, Sphere((2.0, 0.0, 1.8), 0.5), _UNITS)
+ENTRY = Entry(Sphere, sphere, Sphere((2.0, 0.0, 1.8), 0.5), _UNITS, convex=True)
