@@ -21,14 +21,14 @@ try:  # MAVSDK 4: in this process
     from mavsdk.asyncio.plugins.param import ParamAsync
     from mavsdk.asyncio.plugins.telemetry import TelemetryAsync
     from mavsdk.plugins.info import InfoError
-    from mavsdk.plugins.mission_raw import ReceivedMissionItem
+    from mavsdk.plugins.mission_raw import MissionItem
     from mavsdk.plugins.offboard import PositionNedYaw
     from mavsdk.plugins.param import ParamError
 except ImportError:
     Mavsdk = None
     from mavsdk import System
     from mavsdk.info import InfoError
-    from mavsdk.mission_raw import ReceivedMissionItem
+    from mavsdk.mission_raw import MissionItem
     from mavsdk.offboard import PositionNedYaw
     from mavsdk.param import ParamError
 
@@ -156,7 +156,7 @@ async def steps(vehicle, address):  # noqa: C901 - one step after the other
         """Upload regions about where it is, read them back, and set out."""
         there = await first(vehicle.stream("position"))
         items = [
-            ReceivedMissionItem(i, 6, 16, int(i == 0), 1, 0.0, 1.0, 0.0, math.nan,
+            MissionItem(i, 6, 16, int(i == 0), 1, 0.0, 1.0, 0.0, math.nan,
                         round(1e7 * (there.latitude_deg + i * NEARER)), round(1e7 * there.longitude_deg), -3.0, 0)
             for i in range(3)
         ]  # fmt: skip
