@@ -98,9 +98,9 @@ def _parser() -> argparse.ArgumentParser:
     evaluate.add_argument("--out", metavar="FILE", help="file to write (default: standard output)")
     evaluate.add_argument("--json", action="store_true", help="JSON in the place of text")
 
-    engine_reason = verb("explain", "which rules fire for a sample, how strongly, and which decide")
-    engine_reason.add_argument("values", nargs="*", metavar="VALUE", help=values)
-    engine_reason.add_argument("--json", action="store_true", help="JSON in the place of text")
+    explain = verb("explain", "which rules fire for a sample, how strongly, and which decide")
+    explain.add_argument("values", nargs="*", metavar="VALUE", help=values)
+    explain.add_argument("--json", action="store_true", help="JSON in the place of text")
 
     verify = verb("verify", "whether the rules are complete and consistent; exit status 1 if not", engine=False)
     verify.add_argument("--json", action="store_true", help="JSON in the place of text")

@@ -124,7 +124,7 @@ class PackedRegions(NamedTuple):
             Receives g_i, at most 0 where satisfied, in the unit of the shape.
         gradients : ndarray, shape (n, 3)
             Receives dg_i/dp, world frame.
-        turnings : ndarray, shape (n, 3)
+        rotation_gradients : ndarray, shape (n, 3)
             Receives dg_i/dtheta [1/rad] for a small rotation theta about the body's axes, which takes the quaternion
             e to e exp(theta / 2); 0 for shapes of position alone.
         clearances : ndarray, shape (n,)

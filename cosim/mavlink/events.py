@@ -19,7 +19,7 @@ class Events:
 
     Parameters
     ----------
-    vessel : VehicleContext
+    context : VehicleContext
         Whose voice is used.
     """
 
@@ -35,7 +35,7 @@ class Events:
         self._cut_us = 0  # when a limit cut something last
 
     def watch(self) -> None:
-        """Compare the vessel's snapshot with the one before."""
+        """Compare the vehicle's snapshot with the one before."""
         context, view = self._context, self._context.view
         before = self._before
         self._before = view

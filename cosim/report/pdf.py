@@ -32,7 +32,7 @@ def pages_of(data: FigureData, contents: Contents, about: str) -> list[Figure]:
 
     Parameters
     ----------
-    story : FigureData
+    data : FigureData
         Its figures are drawn.
     contents : Contents
         What it says.

@@ -230,16 +230,6 @@ def check_law(entry: LawEntry, through: str, vehicle: Vehicle, period: float, n_
         raise ScenarioError(
             "law.name is 'printed', expected 'ismail_dunnigan': the paper's law has its authors' names now"
         )
-    if entry.name == "printed":
-        raise ScenarioError(
-            "law.name is 'printed', expected 'ismail_dunnigan': the paper's law has its authors' names now"
-        )
-    if entry.name == "printed":
-        raise ScenarioError("law.name is 'printed', expected 'ismail_dunnigan': laws have their authors' names")
-    if entry.name == "printed":
-        raise ScenarioError(
-            "law.name is 'printed', expected 'ismail_dunnigan': the paper's law has its authors' names now"
-        )
     if entry.name not in LAWS:
         known = ", ".join(map(repr, sorted(LAWS)))
         raise ScenarioError(f"law.name is {entry.name!r}, expected one of {known}")

@@ -130,7 +130,7 @@ class RegionEnvironment:
         ----------
         state : VehicleState
             Its position and attitude count.
-        outlook : RegionEvaluation
+        evaluation : RegionEvaluation
             Receives what they say.
         """
         self._look_around(self._places, state, evaluation)

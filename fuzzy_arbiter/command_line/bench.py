@@ -32,7 +32,7 @@ class Cost:
         Median time of a call and of a row of a batch [us]; None if the engine cannot evaluate the system.
     rows : int
         Rows of the batch.
-    why : str
+    reason : str
         Why there are no times.
     """
 
@@ -40,7 +40,7 @@ class Cost:
     call: float | None
     row: float | None
     rows: int = 0
-    engine_reason: str = ""
+    reason: str = ""
 
 
 def bench(system: System) -> list[Cost]:
@@ -71,10 +71,10 @@ def bench(system: System) -> list[Cost]:
         try:
             arbiter = Arbiter(system=system, engine=name)
         except EngineError as error:
-            costs.append(Cost(name, None, None, engine_reason=str(error)))
+            costs.append(Cost(name, None, None, reason=str(error)))
             continue
         except ImportError as error:
-            costs.append(Cost(name, None, None, engine_reason=f"{error.name} is not installed"))
+            costs.append(Cost(name, None, None, reason=f"{error.name} is not installed"))
             continue
         row, rows = _median(_batch(arbiter, samples), len(samples))
         costs.append(Cost(name, _median(_calls(arbiter, samples), _MOST_ROWS)[0], row, rows))
@@ -139,7 +139,7 @@ def table(costs: list[Cost]) -> str:
     lines = [f"{'engine':8} {'call [us]':>12} {'ratio':>9}   {'batch [us a row]':>16} {'ratio':>9} {'rows':>8}"]
     for cost in costs:
         if cost.call is None or cost.row is None:
-            lines.append(f"{cost.engine:8} {cost.engine_reason}")
+            lines.append(f"{cost.engine:8} {cost.reason}")
             continue
         lines.append(
             f"{cost.engine:8} {cost.call:12.3f} {cost.call / min(calls):9.1f}   "

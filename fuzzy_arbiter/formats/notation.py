@@ -214,7 +214,7 @@ def require_word(name: str, format: str, reserved: frozenset[str]) -> None:
         raise UnsupportedError(f"{format} cannot say the name {name!r}: it is a word of the language")
 
 
-def cannot_say(format: str, i: int, rule: Rule, engine_reason: str, what: str = "condition") -> UnsupportedError:
+def cannot_say(format: str, i: int, rule: Rule, expected: str, what: str = "condition") -> UnsupportedError:
     """Return the error for a rule that a format cannot say.
 
     Parameters
@@ -225,8 +225,8 @@ def cannot_say(format: str, i: int, rule: Rule, engine_reason: str, what: str = 
         Number of the rule, from 0.
     rule : Rule
         The rule, which is quoted.
-    why : str
-        What the format can say.
+    expected : str
+        What the format can say instead.
     what : str
         Which part of the rule it is.
 
@@ -236,5 +236,5 @@ def cannot_say(format: str, i: int, rule: Rule, engine_reason: str, what: str = 
         To be raised.
     """
     return UnsupportedError(
-        f"{format} cannot say the {what} of R{i + 1} {shortened(str(rule))!r}: expected {engine_reason}"
+        f"{format} cannot say the {what} of R{i + 1} {shortened(str(rule))!r}: expected {expected}"
     )

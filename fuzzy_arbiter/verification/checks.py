@@ -87,16 +87,16 @@ class _Checks:
         answers = ask.ask(goals)
         for output, answer in zip(self._terms, answers, strict=True):
             for place in map(ask.places, answer.boxes):
-                engine_reason = reasons(self.system, row_strengths(self.system, place), self._terms[output], 1.0)
-                text = f"output {output!r}: rules contradict each other where {_said(place)}: {engine_reason}"
+                causes = reasons(self.system, row_strengths(self.system, place), self._terms[output], 1.0)
+                text = f"output {output!r}: rules contradict each other where {_said(place)}: {causes}"
                 self._found("fault", "consistent", text, place)
         self._decided("consistent", answers, "on every crisp row")
         high = tuple(map(ask.above_half, self._high))
         (answer,) = ask.ask([Goal(high, 2, ANY)])
         for place in map(ask.places, answer.boxes):
-            engine_reason = reasons(self.system, row_strengths(self.system, place), self._high, 0.5)
+            causes = reasons(self.system, row_strengths(self.system, place), self._high, 0.5)
             self._found(
-                "warning", "exclusive", f"two outputs are {self._highs()} where {_said(place)}: {engine_reason}", place
+                "warning", "exclusive", f"two outputs are {self._highs()} where {_said(place)}: {causes}", place
             )
         self._decided("exclusive", [answer], "on every crisp row")
         exclusive = answer.all_found and not answer.boxes
@@ -133,8 +133,8 @@ class _Checks:
                 verdicts.add(verdict)
                 hows.add(how)
                 if place is not None:
-                    engine_reason = reasons(self.system, graded_strengths(self.system, place), terms, 0.5)
-                    self._found("warning", name, f"{text.format(output)} where {_said(place)}: {engine_reason}", place)
+                    causes = reasons(self.system, graded_strengths(self.system, place), terms, 0.5)
+                    self._found("warning", name, f"{text.format(output)} where {_said(place)}: {causes}", place)
             holds = False if False in verdicts else None if None in verdicts else True
             how = "by an example" if holds is False else "; ".join(sorted(hows))
             self.checks.append(Check(name, holds, how))

@@ -31,7 +31,7 @@ def fly_all(work: Work, batches: Batches, pool: WorkerPool) -> Generator[Any, No
         What is flown.
     batches : Batches
         What is left of it.
-    crew : WorkerPool
+    pool : WorkerPool
         By whom.
 
     Yields

@@ -21,7 +21,7 @@ class Streams:
 
     Parameters
     ----------
-    vessel : VehicleContext
+    context : VehicleContext
         What is told.
     link : MessageSink
         To whom.

@@ -17,7 +17,7 @@ class Commands(Service):
 
     Parameters
     ----------
-    vessel : VehicleContext
+    context : VehicleContext
         Whom it serves.
     services : iterable of Service
         Whose commands are understood.

@@ -62,7 +62,7 @@ class FileServer(Service):
 
     Parameters
     ----------
-    vessel : VehicleContext
+    context : VehicleContext
         Whom it serves.
     parameters : Parameters
         What the file holds.

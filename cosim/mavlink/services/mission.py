@@ -42,7 +42,7 @@ class Missions(Service):
 
     Parameters
     ----------
-    vessel : VehicleContext
+    context : VehicleContext
         Whom it serves.
     targets : Targets
         Where items go that are to be followed at once.

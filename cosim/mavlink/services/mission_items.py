@@ -45,7 +45,7 @@ def decode_mission_item(
 
     Parameters
     ----------
-    vessel : VehicleContext
+    context : VehicleContext
         Where the globe's frame and home are.
     item : ReceivedMissionItem
         As it came.

@@ -78,7 +78,7 @@ class Parameters(Service):
         return None
 
     def restart(self) -> None:
-        """Take the numbers as the vessel's settings have them."""
+        """Take the numbers as the vehicle's settings have them."""
         self._values = {setting.key: setting.value for setting in self.context.settings}
 
     # ---- what others use ----

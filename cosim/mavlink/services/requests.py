@@ -21,7 +21,7 @@ class Requests(Service):
 
     Parameters
     ----------
-    vessel : VehicleContext
+    context : VehicleContext
         Whom it serves.
     streams : mapping of MessageSink to Streams
         The schedule of each link.

@@ -53,7 +53,7 @@ class Service:
 
     Parameters
     ----------
-    vessel : VehicleContext
+    context : VehicleContext
         Whom it serves.
 
     Attributes
@@ -87,7 +87,7 @@ def place_of(context: VehicleContext, frame: int, x: float, y: float, z: float) 
 
     Parameters
     ----------
-    vessel : VehicleContext
+    context : VehicleContext
         Where the globe's frame is.
     frame : int
         MAV_FRAME.

@@ -31,11 +31,11 @@ _ON_LOSS: dict[LossAction, float] = {
 
 
 def station_parameters(context: VehicleContext) -> dict[str, Callable[[], float]]:
-    """Return what can be read, by name, in the vessel's profile; none of it can be set.
+    """Return what can be read, by name, in the vehicle's profile; none of it can be set.
 
     Parameters
     ----------
-    vessel : VehicleContext
+    context : VehicleContext
         Whose profile and vehicle it is.
     """
     match context.profile.name:

@@ -29,7 +29,7 @@ class Targets(Service):
 
     Parameters
     ----------
-    vessel : VehicleContext
+    context : VehicleContext
         Whom it serves.
     parameters : Parameters
         Through which the speed is set.

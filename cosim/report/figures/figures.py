@@ -20,7 +20,7 @@ def drawings(data: FigureData) -> Iterator[NamedFigure]:
 
     Parameters
     ----------
-    story : FigureData
+    data : FigureData
         Scenario, record and summary.
 
     Yields
@@ -38,7 +38,7 @@ def draw_all(data: FigureData, sheet_for: Callable[[str], Sheet[F]]) -> None:
 
     Parameters
     ----------
-    story : FigureData
+    data : FigureData
         Scenario, record and summary.
     sheet_for : callable
         Gives the sheet of a figure for its caption.

@@ -135,7 +135,7 @@ def places_of(data: FigureData) -> Iterator[Place]:
 
     Parameters
     ----------
-    story : FigureData
+    data : FigureData
         The run.
 
     Yields
@@ -162,7 +162,7 @@ def features_of(data: FigureData) -> Iterator[tuple[str, str, Array]]:
 
     Parameters
     ----------
-    story : FigureData
+    data : FigureData
         The run.
 
     Yields
@@ -216,7 +216,7 @@ def overlap_of(data: FigureData) -> NDArray[np.bool_]:
 
     Parameters
     ----------
-    story : FigureData
+    data : FigureData
         The run.
 
     Returns

@@ -36,7 +36,7 @@ def way_of(data: FigureData) -> SampledPath:
 
     Parameters
     ----------
-    story : FigureData
+    data : FigureData
         The run; its record has some place of the vehicle.
 
     Returns
@@ -57,7 +57,7 @@ def targets_of(data: FigureData) -> list[tuple[Array, float]]:
 
     Parameters
     ----------
-    story : FigureData
+    data : FigureData
         The run.
 
     Returns

@@ -49,7 +49,7 @@ class CommandHandler:
     ----------
     scenario : Scenario
         What is run; its commands are enabled.
-    surroundings : RegionEnvironment
+    environment : RegionEnvironment
         Whose target and obstacles are moved.
     actuators : Actuators
         Whose limits are changed.
@@ -68,7 +68,7 @@ class CommandHandler:
         Who steers, and whither.
     heading : float or None
         Heading to be kept [rad], once one is commanded.
-    took_over, turned, changed : bool
+    control_regained, turned, changed : bool
         Whether the law steers from now on and did not before, another heading was commanded, and settings were changed,
         since `mark_applied`.
     reset : bool

@@ -69,7 +69,7 @@ def test_the_commands_are_understood(tmp_path, capsys):
     for _, *words in commands[1:]:
         words[1] = str(tmp_path / "none.jsonl")
         words[words.index("--out") + 1] = str(tmp_path / "out")
-        assert main([word.replace("printed,deployable", "printed,none") for word in words]) == 2
+        assert main([word.replace("ismail_dunnigan,deployable", "ismail_dunnigan,none") for word in words]) == 2
         assert re.search("No such file|law 'none'|scenario .* is unknown|holds no campaign", capsys.readouterr().err)
 
 

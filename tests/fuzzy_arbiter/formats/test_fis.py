@@ -180,8 +180,8 @@ def bent():
             r"the term 'low' of 'tip', \(0, 0\) \(0.5, 0.7\) \(1, 0\): expected a triangle, a trapezoid or a half",
         ),
         *(
-            ({"rules": (f"if {condition} then tip is low",)}, f"the condition of R1 .*: expected {engine_reason}")
-            for condition, engine_reason in (
+            ({"rules": (f"if {condition} then tip is low",)}, f"the condition of R1 .*: expected {expected}")
+            for condition, expected in (
                 ("quality is poor and (service is poor or service is good)", "one connective per rule"),
                 ("not (quality is poor and service is poor)", "one connective per rule, and only terms negated"),
                 ("quality is not not poor", "one connective per rule, and only terms negated"),
