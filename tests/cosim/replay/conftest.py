@@ -115,7 +115,7 @@ def shown(tmp_path_factory):
 @pytest.fixture(scope="session")
 def both(docking, paper, tmp_path_factory):
     """Return the page of two runs."""
-    return replay([docking.path, paper.path], tmp_path_factory.mktemp("both") / "replay.html")
+    return replay([docking.folder, paper.folder], tmp_path_factory.mktemp("both") / "replay.html")
 
 
 @pytest.fixture(scope="session")
