@@ -235,6 +235,4 @@ def cannot_say(format: str, i: int, rule: Rule, expected: str, what: str = "cond
     UnsupportedError
         To be raised.
     """
-    return UnsupportedError(
-        f"{format} cannot say the {what} of R{i + 1} {shortened(str(rule))!r}: expected {expected}"
-    )
+    return UnsupportedError(f"{format} cannot say the {what} of R{i + 1} {shortened(str(rule))!r}: expected {expected}")
