@@ -19,7 +19,7 @@ import msgspec
 import numpy as np
 
 from controller import LAWS
-from controller.laws import PdGains
+from controller.laws.pd import PdGains
 from cosim.campaigns.scenes.flyer import Conditions, SceneFlyer, Score
 from cosim.campaigns.scenes.generator import make_scene
 from cosim.campaigns.scenes.scene import Scene

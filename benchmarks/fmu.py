@@ -12,7 +12,8 @@ from benchmarks.c_loop import c_loop
 from benchmarks.peers import fmpy_steps
 from benchmarks.table import Row, compared
 from benchmarks.timing import Timing, time_batches, time_calls
-from plant_fmu import Plant, cached_fmu, load_vehicle
+from plant_fmu import Plant, load_vehicle
+from plant_fmu.build import cached_fmu
 
 STEPS = 20_000
 RATIO = "how many times as long as the loop in C"

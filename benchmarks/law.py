@@ -14,7 +14,8 @@ from benchmarks.table import Row, compared
 from benchmarks.timing import Timing
 from controller import LAWS, VehicleState
 from controller.jit.jit import compiled
-from controller.regions import DepthBand, PackedRegions, Region, Sphere, pack
+from controller.regions import DepthBand, Region, Sphere, pack
+from controller.regions.region_set import PackedRegions
 from cosim.batch.c_calls import Clock, seconds
 from cosim.scenario.vehicle_model import vehicle_model
 from plant_fmu.vehicle import load_vehicle

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from controller.errors import LawError
 from controller.law import Array, Diagnostic, Output, VehicleState
-from controller.regions import PackedRegions
+from controller.regions.region_set import PackedRegions
 
 _REAL = "biufO"  # kinds of NumPy's types; O is of whole numbers too long for its own
 _LONGEST = 200  # characters, that a message shows of what came

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from controller.errors import LawError
 from controller.jit.bound_call import BoundCall
-from controller.regions import PackedRegions
+from controller.regions.region_set import PackedRegions
 
 Array = NDArray[np.float64]
 Output = Literal["wrench", "thrusters"]
@@ -96,7 +96,7 @@ class CompiledLaw:
         What it keeps between steps; has at least ``estimate`` and ``report``.
     """
 
-    name: ClassVar[str]
+    name: ClassVar[str]  # of its module, given when the laws are loaded
     output: ClassVar[Output]
     function: ClassVar[Callable[..., None]]
     gains_type: ClassVar[type[Any]]  # a NamedTuple of floats with defaults

@@ -14,10 +14,15 @@ import importlib
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from cosim.campaigns import Design, compare, run_campaign, run_sweep, vary_from
-    from cosim.errors import CosimError
+    from cosim.campaigns import Campaign, Comparison, Design, Sweep, compare, run_campaign, run_sweep, vary_from
+    from cosim.campaigns.scenes.flyer import SceneFlyer
+    from cosim.campaigns.scenes.scene import Scene, read_scenes
+    from cosim.errors import CosimError, RunError
     from cosim.export import export_run
-    from cosim.precheck.precheck import check_scenario
+    from cosim.mavlink.setup import Mavlink
+    from cosim.mavlink.wire.endpoint import parse_endpoint
+    from cosim.mavlink.wire.options import MavlinkOptions
+    from cosim.precheck.precheck import Check, check_scenario
     from cosim.results.record import Record
     from cosim.results.run_result import Run, load_run
     from cosim.run.run import run_scenario
@@ -26,18 +31,29 @@ if TYPE_CHECKING:
     from cosim.simulation.master import Master
 
 __all__ = [
+    "Campaign",
+    "Check",
+    "Comparison",
     "CosimError",
     "Design",
     "Master",
+    "Mavlink",
+    "MavlinkOptions",
     "Record",
     "Run",
+    "RunError",
     "Scenario",
+    "Scene",
+    "SceneFlyer",
+    "Sweep",
     "check_scenario",
     "compare",
     "export_run",
     "list_scenarios",
     "load_run",
     "load_scenario",
+    "parse_endpoint",
+    "read_scenes",
     "run_campaign",
     "run_scenario",
     "run_sweep",
@@ -45,10 +61,15 @@ __all__ = [
 ]
 
 _HOMES = {
-    "campaigns": {"Design", "compare", "run_campaign", "run_sweep", "vary_from"},
-    "errors": {"CosimError"},
+    "campaigns": {"Campaign", "Comparison", "Design", "Sweep", "compare", "run_campaign", "run_sweep", "vary_from"},
+    "campaigns.scenes.flyer": {"SceneFlyer"},
+    "campaigns.scenes.scene": {"Scene", "read_scenes"},
+    "errors": {"CosimError", "RunError"},
     "export": {"export_run"},
-    "precheck.precheck": {"check_scenario"},
+    "mavlink.setup": {"Mavlink"},
+    "mavlink.wire.endpoint": {"parse_endpoint"},
+    "mavlink.wire.options": {"MavlinkOptions"},
+    "precheck.precheck": {"Check", "check_scenario"},
     "results.record": {"Record"},
     "results.run_result": {"Run", "load_run"},
     "run.run": {"run_scenario"},

@@ -12,8 +12,7 @@ import numpy as np
 
 from controller import FunctionLaw, RegionsSeen, VehicleState
 from controller.quaternion import rotation_matrix
-from cosim.run.run import run_scenario
-from cosim.scenario.scenario import load_scenario
+from cosim import load_scenario, run_scenario
 
 PULL, PUSH, REACH = 60.0, 180.0, 0.8  # N a metre from the goal, N on a region's surface, m from which it pushes
 BRAKE, UPRIGHT, CALM = 70.0, 40.0, 20.0  # N s/m, N m, N m s/rad

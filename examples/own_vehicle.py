@@ -8,8 +8,7 @@ it writes frame.toml, frame.fmu, pool.toml and runs/frame here.
 
 from pathlib import Path
 
-from cosim.run.run import run_scenario
-from cosim.scenario.scenario import load_scenario
+from cosim import load_scenario, run_scenario
 from plant_fmu import Plant, build_fmu, load_vehicle
 
 FRAME = """

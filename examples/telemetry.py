@@ -7,11 +7,7 @@ from pathlib import Path
 
 from pymavlink import mavutil
 
-from cosim.mavlink.setup import Mavlink
-from cosim.mavlink.wire.endpoint import parse_endpoint
-from cosim.mavlink.wire.options import MavlinkOptions
-from cosim.run.run import run_scenario
-from cosim.scenario.scenario import load_scenario
+from cosim import Mavlink, MavlinkOptions, load_scenario, parse_endpoint, run_scenario
 
 if __name__ == "__main__":
     listener = mavutil.mavlink_connection("udpin:127.0.0.1:0", dialect="common")

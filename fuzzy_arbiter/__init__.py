@@ -6,21 +6,11 @@
 
 from fuzzy_arbiter.arbiter import Arbiter
 from fuzzy_arbiter.definition import Output, System, Term, Variable
-from fuzzy_arbiter.errors import (
-    ArbiterError,
-    DefinitionError,
-    EngineError,
-    FormatError,
-    InputError,
-    UndefinedOutputError,
-    UnsupportedError,
-)
+from fuzzy_arbiter.errors import ArbiterError, UndefinedOutputError
 from fuzzy_arbiter.hierarchy import SECTION_VI, Criterion, prioritised
 from fuzzy_arbiter.hysteresis import HysteresisArbiter
 from fuzzy_arbiter.membership import ramp
-from fuzzy_arbiter.propositions import Is
 from fuzzy_arbiter.rule import Rule
-from fuzzy_arbiter.rule_text import parse_rule
 from fuzzy_arbiter.shapes import Shape, falling, rising, trapezoid, triangle
 
 __all__ = [
@@ -28,22 +18,15 @@ __all__ = [
     "Arbiter",
     "ArbiterError",
     "Criterion",
-    "DefinitionError",
-    "EngineError",
-    "FormatError",
     "HysteresisArbiter",
-    "InputError",
-    "Is",
     "Output",
     "Rule",
     "Shape",
     "System",
     "Term",
     "UndefinedOutputError",
-    "UnsupportedError",
     "Variable",
     "falling",
-    "parse_rule",
     "prioritised",
     "ramp",
     "rising",

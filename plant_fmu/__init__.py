@@ -4,33 +4,25 @@ import importlib
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from plant_fmu.build import build_fmu, cached_fmu
-    from plant_fmu.errors import BuildError, FmuFileError, PlantError, PlantFmuError, TableError, VehicleError
-    from plant_fmu.running import Channel, Channels, Plant, State
+    from plant_fmu.build import build_fmu
+    from plant_fmu.errors import PlantError, PlantFmuError
+    from plant_fmu.running import Plant
     from plant_fmu.vehicle import Vehicle, load_vehicle, shipped_vehicles
 
 __all__ = [
-    "BuildError",
-    "Channel",
-    "Channels",
-    "FmuFileError",
     "Plant",
     "PlantError",
     "PlantFmuError",
-    "State",
-    "TableError",
     "Vehicle",
-    "VehicleError",
     "build_fmu",
-    "cached_fmu",
     "load_vehicle",
     "shipped_vehicles",
 ]
 
 # imported when asked for, so that the command can say what is not installed
 _HOMES = {
-    "build": {"build_fmu", "cached_fmu"},
-    "running": {"Channel", "Channels", "Plant", "State"},
+    "build": {"build_fmu"},
+    "running": {"Plant"},
     "vehicle": {"Vehicle", "load_vehicle", "shipped_vehicles"},
 }
 

@@ -20,7 +20,8 @@ from benchmarks.scaling import Curve
 from benchmarks.table import Row, Table, as_json, figure, print_tables, write_json
 from benchmarks.timing import NotMeasuredError, Own, Timing, count_for, growth, straight, take_turns
 from benchmarks.vehicle_numbers import vehicle_numbers
-from plant_fmu import Plant, cached_fmu, load_vehicle
+from plant_fmu import Plant, load_vehicle
+from plant_fmu.build import cached_fmu
 from plant_fmu.importers import IMPORTERS, Task, read_fmu, run_importer
 from tests.plant_fmu.conftest import STATES
 

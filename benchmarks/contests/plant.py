@@ -12,7 +12,8 @@ from benchmarks.peer_environment import Environment
 from benchmarks.peer_process import peer
 from benchmarks.timing import Contestant, Own, each
 from benchmarks.vehicle_numbers import vehicle_numbers
-from plant_fmu import Plant, cached_fmu, load_vehicle
+from plant_fmu import Plant, load_vehicle
+from plant_fmu.build import cached_fmu
 
 VEHICLE = "odin"
 STEP = 0.01  # s, which all of them integrate in one step

@@ -1,31 +1,28 @@
-"""The laws, by name.
+"""The laws: one module each, which names its class as ``LAW``.
+
+A module that is put here is a law, known by the module's name.
 
 Imports: jit, regions.
 """
 
+from importlib import import_module
+from pkgutil import iter_modules
+
 from controller.law import CompiledLaw
-from controller.laws.baselines.antonelli import AntonelliGains, AntonelliLaw
-from controller.laws.baselines.pd import PdGains, PdLaw
-from controller.laws.baselines.sun_cheah import SunCheahGains, SunCheahLaw
-from controller.laws.baselines.unarbitrated import UnarbitratedGains, UnarbitratedLaw
-from controller.laws.deployable import DeployableGains, DeployableLaw
-from controller.laws.ismail_dunnigan import IsmailDunniganLaw
 
-LAWS: dict[str, type[CompiledLaw]] = {
-    law.name: law for law in (IsmailDunniganLaw, DeployableLaw, PdLaw, SunCheahLaw, UnarbitratedLaw, AntonelliLaw)
-}
+__all__ = ["LAWS"]
 
-__all__ = [
-    "LAWS",
-    "AntonelliGains",
-    "AntonelliLaw",
-    "DeployableGains",
-    "DeployableLaw",
-    "IsmailDunniganLaw",
-    "PdGains",
-    "PdLaw",
-    "SunCheahGains",
-    "SunCheahLaw",
-    "UnarbitratedGains",
-    "UnarbitratedLaw",
-]
+
+def _find_laws() -> dict[str, type[CompiledLaw]]:
+    """Return the class of each module here, with its name set."""
+    found = {}
+    for module in iter_modules(__path__):
+        law = getattr(import_module(f"{__name__}.{module.name}"), "LAW", None)
+        if not (isinstance(law, type) and issubclass(law, CompiledLaw)):
+            raise TypeError(f"{__name__}.{module.name} has no LAW, expected its class, a CompiledLaw")
+        law.name = module.name
+        found[module.name] = law
+    return found
+
+
+LAWS: dict[str, type[CompiledLaw]] = _find_laws()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import ClassVar, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -10,10 +10,10 @@ from controller import paper_law
 from controller.jit.jit import jit_noalloc
 from controller.law import Array, VehicleState, WrenchLaw
 from controller.paper_law import Gains
-from controller.regions import PackedRegions, evaluate_packed
+from controller.regions.region_set import PackedRegions, evaluate_packed
 
 
-class PrintedMemory(NamedTuple):
+class IsmailDunniganMemory(NamedTuple):
     """What the paper's law keeps, and where it evaluates regions."""
 
     desired_quaternion: Array  # (4,)
@@ -38,7 +38,7 @@ def step(
     regions: PackedRegions,
     weights: Array,
     gains: Gains,
-    memory: PrintedMemory,
+    memory: IsmailDunniganMemory,
     forces: Array,
 ) -> None:
     """Do what `CompiledLaw.step` says, by the paper's law."""
@@ -64,9 +64,9 @@ def step(
     )
 
 
-def memory_of(desired_quaternion: Array, period: Array, n_regions: int) -> PrintedMemory:
+def memory_of(desired_quaternion: Array, period: Array, n_regions: int) -> IsmailDunniganMemory:
     """Return the memory before the first step; `period` [s] has shape (1,)."""
-    return PrintedMemory(
+    return IsmailDunniganMemory(
         desired_quaternion=desired_quaternion,
         period=period,
         estimate=np.zeros(4),
@@ -86,8 +86,10 @@ def memory_of(desired_quaternion: Array, period: Array, n_regions: int) -> Print
 class IsmailDunniganLaw(WrenchLaw):
     """The law as printed: a wrench without limits."""
 
-    name: ClassVar[str] = "ismail_dunnigan"
     function = staticmethod(step)
     memory_of = staticmethod(memory_of)
     gains_type = Gains
     above_zero = ("k_p1", "k_q", "gamma")
+
+
+LAW = IsmailDunniganLaw

@@ -3,23 +3,7 @@
 Imports: jit.
 """
 
-from controller.regions.rays import ray_distances
-from controller.regions.region_set import (
-    SHAPES,
-    PackedRegions,
-    Region,
-    attitude_clearance,
-    clearance_at,
-    clearance_of_place,
-    clearance_of_pose,
-    clearance_of_sphere,
-    clearances_at,
-    evaluate_packed,
-    of_attitude,
-    pack,
-    place_clearance,
-)
-from controller.regions.shape import Shape
+from controller.regions.region_set import Region, pack
 from controller.regions.shapes.box import Box
 from controller.regions.shapes.cone import Cone
 from controller.regions.shapes.cylinder import Cylinder
@@ -33,7 +17,6 @@ from controller.regions.shapes.sphere import Sphere
 from controller.regions.shapes.visibility import Visibility
 
 __all__ = [
-    "SHAPES",
     "Box",
     "Cone",
     "Cylinder",
@@ -41,22 +24,10 @@ __all__ = [
     "Ellipsoid",
     "HalfSpace",
     "Orientation",
-    "PackedRegions",
     "Pipe",
     "Prism",
     "Region",
-    "Shape",
     "Sphere",
     "Visibility",
-    "attitude_clearance",
-    "clearance_at",
-    "clearance_of_place",
-    "clearance_of_pose",
-    "clearance_of_sphere",
-    "clearances_at",
-    "evaluate_packed",
-    "of_attitude",
     "pack",
-    "place_clearance",
-    "ray_distances",
 ]

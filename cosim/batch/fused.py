@@ -8,7 +8,7 @@ from types import TracebackType
 import numpy as np
 from numpy.typing import NDArray
 
-from controller import Allocation
+from controller.allocation import Allocation
 from controller.regions import pack
 from cosim.batch.fused_loop import OUTPUTS, Allocator, Array, FlightConfig, FlightMetrics, fused_loop_of, make_workspace
 from cosim.batch.outcome import OUTCOME, Flown, nothing

@@ -22,13 +22,9 @@ from controller import LAWS, CompiledLaw, VehicleState
 from controller.allocation import allocate
 from controller.jit.jit import compiled, jit_noalloc
 from controller.laws import ismail_dunnigan
-from controller.regions import (
-    PackedRegions,
-    Sphere,
-    clearance_of_pose,
-    clearance_of_sphere,
-)
+from controller.regions import Sphere
 from controller.regions.kinds import FIRST_OF_ATTITUDE
+from controller.regions.region_set import PackedRegions, clearance_of_pose, clearance_of_sphere
 from cosim.batch.c_calls import fmi_do_step, fmi_get, fmi_set, seconds
 from cosim.simulation.memberships import SOURCES, compute_memberships
 from fuzzy_arbiter import Arbiter

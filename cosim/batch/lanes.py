@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from controller import Allocation
+from controller.allocation import Allocation
 from controller.regions import pack
 from cosim.batch.lanes_library import lanes_library
 from cosim.batch.lanes_rows import Array, Rows, require_lanes

@@ -15,7 +15,8 @@ from foxglove_schemas_protobuf.SceneEntity_pb2 import SceneEntity
 from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
 from google.protobuf.timestamp_pb2 import Timestamp
 
-from controller.regions import Box, Cylinder, Ellipsoid, Sphere, of_attitude
+from controller.regions import Box, Cylinder, Ellipsoid, Sphere
+from controller.regions.region_set import of_attitude
 from cosim.export.scene import BODY, HULL_COLOUR, NED, OPAQUE, PLACE, THRUST_COLOUR, TRAIL_COLOUR, Scene, Solid
 from cosim.replay.events import Event
 from cosim.simulation.signals import Array

@@ -7,7 +7,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from controller.regions import Pipe, Region, clearances_at
+from controller.regions import Pipe, Region
+from controller.regions.region_set import clearances_at
 from cosim.simulation.signals import Array
 
 _MOST_STEPS = 20_000  # along a ray that runs beside a straight stretch, just inside its surface

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 
 from controller.quaternion import rotation_matrix
-from controller.regions import SHAPES, Orientation, Shape, Visibility, of_attitude
+from controller.regions import Orientation, Visibility
 from controller.regions.mesh import Mesh
-from controller.regions.region_set import name_of
-from controller.regions.shape import Bounds
+from controller.regions.region_set import SHAPES, name_of, of_attitude
+from controller.regions.shape import Bounds, Shape
 from cosim.errors import ExportError
 from cosim.export.excerpt import Excerpt
 from cosim.export.surfaces import sector, surface_of

@@ -12,20 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controller.quaternion import rotation_matrix
-from controller.regions import (
-    Box,
-    Cone,
-    Cylinder,
-    DepthBand,
-    Ellipsoid,
-    HalfSpace,
-    Pipe,
-    Prism,
-    Shape,
-    Sphere,
-)
+from controller.regions import Box, Cone, Cylinder, DepthBand, Ellipsoid, HalfSpace, Pipe, Prism, Sphere
 from controller.regions.mesh import Mesh
-from controller.regions.shape import Bounds
+from controller.regions.shape import Bounds, Shape
 from controller.regions.shapes import ENTRIES
 from cosim.errors import ExportError
 from cosim.export.pipe_surface import pipe_rings

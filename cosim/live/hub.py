@@ -8,7 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from controller.regions import Shape, Sphere
+from controller.regions import Sphere
+from controller.regions.shape import Shape
 from cosim.errors import CommandError
 from cosim.live.command_desk import CommandDesk
 from cosim.live.history import History

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from controller.regions import of_attitude
+from controller.regions.region_set import of_attitude
 from cosim.mavlink.messages import status
 from cosim.mavlink.vehicle.profile import MODE_NAMES
 from cosim.mavlink.vehicle.vehicle_context import VehicleContext

@@ -8,7 +8,8 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from controller.regions import Region, of_attitude
+from controller.regions import Region
+from controller.regions.region_set import of_attitude
 from cosim.precheck.finding import Finding, status
 from cosim.precheck.region_intersection import Overlap, box_about, box_within, search, way_exists
 from cosim.precheck.region_values import evaluated

@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from scipy import ndimage
 from scipy.optimize import minimize
 
-from controller.regions import Region, clearances_at
+from controller.regions import Region
+from controller.regions.region_set import clearances_at
 
 Array = NDArray[np.float64]
 Vector3 = tuple[float, float, float]

@@ -10,7 +10,7 @@ from itertools import chain, pairwise
 
 import numpy as np
 
-from controller.regions import of_attitude
+from controller.regions.region_set import of_attitude
 from cosim.replay.activity import active_regions
 from cosim.replay.command_words import command_events
 from cosim.replay.steering import Log

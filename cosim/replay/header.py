@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from controller.regions import Shape, of_attitude
-from controller.regions.region_set import name_of
+from controller.regions.region_set import name_of, of_attitude
+from controller.regions.shape import Shape
 from controller.regions.shapes import ENTRIES
 from cosim.errors import RunError
 from cosim.results.wording import asked

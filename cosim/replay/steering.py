@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from controller.regions import Shape, Sphere
+from controller.regions import Sphere
+from controller.regions.shape import Shape
 from cosim.errors import CommandError
 from cosim.replay.header import shape_of
 from cosim.results.as_flown import radii_of

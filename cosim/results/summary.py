@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from controller.regions import of_attitude
+from controller.regions.region_set import of_attitude
 from cosim.results.lyapunov_summary import summarise_lyapunov
 from cosim.results.record import Rows
 from cosim.results.spans import Span, Spans

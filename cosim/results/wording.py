@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from controller.regions import SHAPES, Shape
+from controller.regions.region_set import SHAPES
+from controller.regions.shape import Shape
 from cosim.scenario.scenario import Scenario
 
 

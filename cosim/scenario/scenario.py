@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controller import ControllerError
-from controller.regions import Orientation, Region, Shape
+from controller.regions import Orientation, Region
+from controller.regions.shape import Shape
 from controller.restoring import parameters
 from cosim.errors import ScenarioError
 from cosim.scenario.changes import changed_keys, differing_keys, joined, shown_title

@@ -10,9 +10,12 @@ from typing import Any
 
 import numpy as np
 
-from controller import LAWS, RegionError
+from controller import LAWS
+from controller.errors import RegionError
 from controller.law import validate_quaternion
-from controller.regions import SHAPES, Region, Shape, Sphere, of_attitude
+from controller.regions import Region, Sphere
+from controller.regions.region_set import SHAPES, of_attitude
+from controller.regions.shape import Shape
 from cosim.errors import ScenarioError
 from cosim.scenario.tables import (
     PARKED_POSITION,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from controller import Allocation
+from controller.allocation import Allocation
 from cosim.scenario.scenario import Scenario
 from cosim.simulation.signals import Array, Signals
 from plant_fmu import Plant

@@ -6,12 +6,13 @@ from collections.abc import Iterator, Sequence
 
 from controller import LAWS, Law
 from controller.law import Diagnostic
-from controller.regions import of_attitude
+from controller.regions.region_set import of_attitude
 from cosim.scenario.scenario import CRITERIA, Scenario
 from cosim.simulation.commands.commands import MODES
 from cosim.simulation.lyapunov_signals import lyapunov_columns
 from cosim.simulation.signals import Column
-from plant_fmu import Channel, Plant
+from plant_fmu import Plant
+from plant_fmu.running import Channel
 from plant_fmu.variables import variables
 
 _FORCE_UNITS = ("N",) * 3 + ("N.m",) * 3

@@ -13,7 +13,9 @@ from numpy.typing import NDArray
 from controller import VehicleState
 from controller.jit.bound_call import BoundCall
 from controller.jit.jit import jit_noalloc
-from controller.regions import PackedRegions, Shape, Sphere, evaluate_packed, pack
+from controller.regions import Sphere, pack
+from controller.regions.region_set import PackedRegions, evaluate_packed
+from controller.regions.shape import Shape
 from cosim.errors import CommandError, RunError
 from cosim.scenario.scenario import CRITERIA, Scenario
 from cosim.scenario.tables import PARKED_POSITION, Vector3

@@ -7,7 +7,7 @@ import numpy as np
 from controller import VehicleState
 from controller.paper_law import primary_error, secondary_error
 from controller.quaternion import error, rotation_matrix
-from controller.regions import PackedRegions
+from controller.regions.region_set import PackedRegions
 from controller.theory import (
     mapped_error,
     mapped_error_rate,

@@ -11,7 +11,8 @@ from cosim.results.run_result import Run
 from cosim.sitl.flight import Flight
 from cosim.sitl.law import AutopilotLaw
 from cosim.sitl.scenario import SCENARIO, scenario_to_fly
-from plant_fmu import PlantFmuError, Vehicle, cached_fmu
+from plant_fmu import PlantFmuError, Vehicle
+from plant_fmu.build import cached_fmu
 
 RESTARTED = "ended: the autopilot started again"
 

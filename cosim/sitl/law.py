@@ -7,9 +7,9 @@ from typing import ClassVar
 
 import numpy as np
 
-from controller import Diagnostic, VehicleState
-from controller.law import Output
-from controller.regions import PackedRegions
+from controller import VehicleState
+from controller.law import Diagnostic, Output
+from controller.regions.region_set import PackedRegions
 from cosim.errors import RunError
 from cosim.simulation.signals import Array
 from plant_fmu import Vehicle

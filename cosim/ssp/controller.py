@@ -5,9 +5,9 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Sequence
 
-from controller.regions import PackedRegions, Region, of_attitude, pack
+from controller.regions import Region, pack
 from controller.regions.in_c import c_sources
-from controller.regions.region_set import name_of
+from controller.regions.region_set import PackedRegions, name_of, of_attitude
 from cosim.scenario.scenario import CRITERIA, Scenario
 from cosim.ssp.c_sources import c_files, under_own_names
 from cosim.ssp.documentation import contents

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from controller.regions import Shape
+from controller.regions.shape import Shape
 from plant_fmu.quantities import Quantity
 
 

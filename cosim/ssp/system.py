@@ -13,8 +13,9 @@ from cosim.scenario.start_values import start_values
 from cosim.ssp.arbiter import arbiter_component
 from cosim.ssp.controller import controller_component
 from cosim.ssp.structure import Part, Wire, structure
-from plant_fmu import build_fmu, cached_fmu
+from plant_fmu import build_fmu
 from plant_fmu.archive import require_place, write_archive
+from plant_fmu.build import cached_fmu
 from plant_fmu.compiling.platforms import NATIVE
 from plant_fmu.component import Component, of_vehicle
 from plant_fmu.variables import AXES, FORCES, VELOCITIES

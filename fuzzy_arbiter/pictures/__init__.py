@@ -11,4 +11,12 @@ from fuzzy_arbiter.pictures.firing import rules
 from fuzzy_arbiter.pictures.lines import normalisations, profile, terms
 from fuzzy_arbiter.pictures.style import COLOURS
 
-__all__ = ["COLOURS", "decisions", "normalisations", "profile", "rules", "surface", "terms"]
+__all__ = [
+    "COLOURS",
+    "decisions",
+    "normalisations",
+    "profile",
+    "rules",
+    "surface",
+    "terms",
+]

@@ -4,6 +4,9 @@ Imports: engines.
 """
 
 from fuzzy_arbiter.verification.checks import verify
-from fuzzy_arbiter.verification.report import Check, Finding, Row, Verification
+from fuzzy_arbiter.verification.report import Verification
 
-__all__ = ["Check", "Finding", "Row", "Verification", "verify"]
+__all__ = [
+    "Verification",
+    "verify",
+]

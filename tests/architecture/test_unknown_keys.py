@@ -10,7 +10,7 @@ import pytest
 import tomli_w
 
 from controller import LAWS
-from controller.regions import SHAPES
+from controller.regions.region_set import SHAPES
 from cosim.campaigns.scenes.law_gains import gains_from
 from cosim.campaigns.scenes.scene import read_scenes
 from cosim.errors import CosimError, RunError, ScenarioError

@@ -5,7 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from controller import Allocation, LawError
+from controller import LawError
+from controller.allocation import Allocation
 from plant_fmu import load_vehicle
 
 VEHICLE = load_vehicle("odin")

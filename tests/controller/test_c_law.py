@@ -10,7 +10,6 @@ import pytest
 
 from controller import paper_law
 from controller.paper_law import Gains
-from controller.regions import SHAPES as ALL
 from controller.regions import (
     Box,
     Cone,
@@ -27,6 +26,7 @@ from controller.regions import (
     pack,
 )
 from controller.regions.in_c import c_sources
+from controller.regions.region_set import SHAPES as ALL
 from fuzzy_arbiter import ramp
 
 ROOT = Path(__file__).parents[2]

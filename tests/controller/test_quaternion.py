@@ -105,7 +105,8 @@ def test_regressor_times_parameters_is_weight_and_buoyancy(e, r_G, r_B):
 
 def test_regressor_gives_the_plants_restoring_wrench():
     """At rest, in still water, the plant's acceleration is that of -Z phi: controller and FMU agree."""
-    from plant_fmu import cached_fmu, load_vehicle
+    from plant_fmu import load_vehicle
+    from plant_fmu.build import cached_fmu
     from tests.plant_fmu.conftest import STATES, CoSimulationInstance
 
     vehicle = load_vehicle("bluerov2_heavy")

@@ -11,9 +11,8 @@ from hypothesis import strategies as st
 from scipy.optimize import minimize
 from scipy.spatial.transform import Rotation
 
-from controller import RegionError
+from controller.errors import RegionError
 from controller.regions import (
-    SHAPES,
     Box,
     Cone,
     Cylinder,
@@ -26,10 +25,9 @@ from controller.regions import (
     Region,
     Sphere,
     Visibility,
-    clearances_at,
-    of_attitude,
     pack,
 )
+from controller.regions.region_set import SHAPES, clearances_at, of_attitude
 
 TURNED = tuple(np.array([0.9, 0.1, -0.3, 0.2]) / np.linalg.norm([0.9, 0.1, -0.3, 0.2]))
 R = Rotation.from_quat(np.roll(TURNED, -1)).as_matrix()

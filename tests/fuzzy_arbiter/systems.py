@@ -2,8 +2,8 @@
 
 from hypothesis import strategies as st
 
-from fuzzy_arbiter import Is, Output, Rule, Shape, System, Term, Variable
-from fuzzy_arbiter.propositions import And, Not, Or
+from fuzzy_arbiter import Output, Rule, Shape, System, Term, Variable
+from fuzzy_arbiter.propositions import And, Is, Not, Or
 
 grid = st.integers(0, 16).map(lambda i: i / 16.0)
 

@@ -14,17 +14,8 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from fuzzy_arbiter import (
-    SECTION_VI,
-    Arbiter,
-    Criterion,
-    DefinitionError,
-    EngineError,
-    InputError,
-    prioritised,
-    ramp,
-    rising,
-)
+from fuzzy_arbiter import SECTION_VI, Arbiter, Criterion, prioritised, ramp, rising
+from fuzzy_arbiter.errors import DefinitionError, EngineError, InputError
 
 ENGINES = ("closed", "exact", "grid", "skfuzzy")
 

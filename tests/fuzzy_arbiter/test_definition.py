@@ -7,26 +7,11 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from fuzzy_arbiter import (
-    Criterion,
-    DefinitionError,
-    FormatError,
-    Is,
-    Output,
-    Rule,
-    Shape,
-    System,
-    Term,
-    UnsupportedError,
-    Variable,
-    falling,
-    parse_rule,
-    prioritised,
-    rising,
-    triangle,
-)
+from fuzzy_arbiter import Criterion, Output, Rule, Shape, System, Term, Variable, falling, prioritised, rising, triangle
+from fuzzy_arbiter.errors import DefinitionError, FormatError, UnsupportedError
 from fuzzy_arbiter.formats import reads, writes
-from fuzzy_arbiter.propositions import And, Not, Or
+from fuzzy_arbiter.propositions import And, Is, Not, Or
+from fuzzy_arbiter.rule_text import parse_rule
 
 TERMS = (Term("calm", falling(2, 6)), Term("strong", rising(4, 12)))
 wind = Variable("wind", (0, 20), TERMS)

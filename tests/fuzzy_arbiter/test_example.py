@@ -9,10 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fuzzy_arbiter import Arbiter, Criterion, Is, Rule, Shape, Term, UnsupportedError, prioritised
+from fuzzy_arbiter import Arbiter, Criterion, Rule, Shape, Term, prioritised
+from fuzzy_arbiter.errors import UnsupportedError
 from fuzzy_arbiter.formats import reads, writes
 from fuzzy_arbiter.hierarchy import FORMS
-from fuzzy_arbiter.propositions import And, Not, Or
+from fuzzy_arbiter.propositions import And, Is, Not, Or
 
 ROOT = Path(__file__).parents[2]
 EXAMPLE = ROOT / "examples" / "ventilation.py"

@@ -13,7 +13,6 @@ import pytest
 from fuzzy_arbiter import (
     Arbiter,
     Criterion,
-    EngineError,
     Output,
     Shape,
     System,
@@ -26,6 +25,7 @@ from fuzzy_arbiter import (
     trapezoid,
     triangle,
 )
+from fuzzy_arbiter.errors import EngineError
 from fuzzy_arbiter.export import to_c, to_python
 from plant_fmu.compiling.compiler import find_compiler
 

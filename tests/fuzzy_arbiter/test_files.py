@@ -5,7 +5,7 @@ import stat
 
 import pytest
 
-from fuzzy_arbiter import FormatError
+from fuzzy_arbiter.errors import FormatError
 from fuzzy_arbiter.files import write_atomic
 
 

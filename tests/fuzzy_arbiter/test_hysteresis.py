@@ -15,8 +15,6 @@ import fuzzy_arbiter
 from fuzzy_arbiter import (
     Arbiter,
     Criterion,
-    DefinitionError,
-    InputError,
     Output,
     Shape,
     System,
@@ -27,6 +25,7 @@ from fuzzy_arbiter import (
     propositions,
     rising,
 )
+from fuzzy_arbiter.errors import DefinitionError, InputError
 from fuzzy_arbiter.hysteresis import HysteresisArbiter
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "chatter.py"

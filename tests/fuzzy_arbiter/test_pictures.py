@@ -11,8 +11,6 @@ from matplotlib.figure import Figure
 from fuzzy_arbiter import (
     Arbiter,
     Criterion,
-    DefinitionError,
-    InputError,
     Output,
     System,
     Term,
@@ -23,6 +21,7 @@ from fuzzy_arbiter import (
     trapezoid,
     triangle,
 )
+from fuzzy_arbiter.errors import DefinitionError, InputError
 from fuzzy_arbiter.pictures.style import colour, hatch, line_style, wrapped
 
 MEASURED = (

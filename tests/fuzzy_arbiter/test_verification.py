@@ -10,7 +10,6 @@ import pytest
 from fuzzy_arbiter import (
     Arbiter,
     Criterion,
-    Is,
     Output,
     Rule,
     Shape,
@@ -24,6 +23,7 @@ from fuzzy_arbiter import (
     trapezoid,
     triangle,
 )
+from fuzzy_arbiter.propositions import Is
 from fuzzy_arbiter.verification import verify
 from fuzzy_arbiter.verification.cells import stretches
 

@@ -6,8 +6,8 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fuzzy_arbiter import Is, Output, Rule, Shape, System, Term, Variable, falling, rising
-from fuzzy_arbiter.propositions import And, Not, Or
+from fuzzy_arbiter import Output, Rule, Shape, System, Term, Variable, falling, rising
+from fuzzy_arbiter.propositions import And, Is, Not, Or
 from fuzzy_arbiter.verification import verify
 from fuzzy_arbiter.verification.cells import stretches
 from tests.examples import examples

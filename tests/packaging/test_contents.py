@@ -12,7 +12,8 @@ import packaging.utils
 import pytest
 from fmpy.validation import validate_fmu
 
-from plant_fmu import build_fmu, cached_fmu, load_vehicle, shipped_vehicles
+from plant_fmu import build_fmu, load_vehicle, shipped_vehicles
+from plant_fmu.build import cached_fmu
 from plant_fmu.compiling import prebuilt
 from plant_fmu.compiling.platforms import PLATFORMS, native_platform
 from tests.packaging.conftest import ROOT

@@ -16,7 +16,8 @@ from fmpy.fmi2 import FMU2Model, FMU2Slave, fmi2CallbackFunctions, fmi2CallbackL
 from fmpy.fmi2 import defaultCallbacks as defaults
 from fmpy.fmi3 import FMU3Model, FMU3Slave
 
-from plant_fmu import Plant, build_fmu, cached_fmu, load_vehicle
+from plant_fmu import Plant, build_fmu, load_vehicle
+from plant_fmu.build import cached_fmu
 
 STATES = [
     *(f"position.{a}" for a in "xyz"),

@@ -14,10 +14,12 @@ from pathlib import Path
 import pytest
 
 import plant_fmu
-from plant_fmu import BuildError, TableError, VehicleError, build_fmu, cached_fmu, load_vehicle
+from plant_fmu import build_fmu, load_vehicle
 from plant_fmu.__main__ import main
 from plant_fmu.archive import write_atomic
+from plant_fmu.build import cached_fmu
 from plant_fmu.compiling.compiler import find_compiler
+from plant_fmu.errors import BuildError, TableError, VehicleError
 from plant_fmu.installing import install_hint
 
 ROOT = Path(__file__).parents[2]

@@ -8,12 +8,13 @@ from pathlib import Path
 
 import pytest
 
-from plant_fmu import FmuFileError, cached_fmu, load_vehicle, unpacking
+from plant_fmu import load_vehicle, unpacking
 from plant_fmu.__main__ import main
+from plant_fmu.build import cached_fmu
 from plant_fmu.check import check_fmu
 from plant_fmu.compiling.compiler import compile_library, find_compiler
 from plant_fmu.compiling.platforms import native_platform
-from plant_fmu.errors import TaskError
+from plant_fmu.errors import FmuFileError, TaskError
 from plant_fmu.importers import IMPORTERS, Task, read_fmu, run_importer
 
 FMPY = next(importer for importer in IMPORTERS if importer.name == "FMPy")

@@ -13,7 +13,8 @@ import pytest
 from fmpy import read_model_description
 from lxml import etree
 
-from plant_fmu import cached_fmu, load_vehicle, shipped_vehicles
+from plant_fmu import load_vehicle, shipped_vehicles
+from plant_fmu.build import cached_fmu
 from plant_fmu.contents import contents
 from plant_fmu.contents.page import page
 from plant_fmu.variables import variables

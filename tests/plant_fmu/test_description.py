@@ -11,7 +11,8 @@ import pytest
 from fmpy import read_model_description
 from fmpy.validation import validate_fmu
 
-from plant_fmu import cached_fmu, load_vehicle, shipped_vehicles
+from plant_fmu import load_vehicle, shipped_vehicles
+from plant_fmu.build import cached_fmu
 from plant_fmu.compiling.sources import header
 from plant_fmu.component import of_vehicle
 from plant_fmu.description import documentation, model_description

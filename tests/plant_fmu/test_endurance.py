@@ -10,7 +10,8 @@ import fmpy
 import numpy as np
 import pytest
 
-from plant_fmu import Plant, cached_fmu, load_vehicle
+from plant_fmu import Plant, load_vehicle
+from plant_fmu.build import cached_fmu
 from tests.plant_fmu.test_state import LIVELY
 
 needs_proc = pytest.mark.skipif(not Path("/proc/self/statm").exists(), reason="reads memory from /proc")

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from fmpy.simulation import instantiate_fmu
 
-from plant_fmu import cached_fmu, load_vehicle
+from plant_fmu import load_vehicle
+from plant_fmu.build import cached_fmu
 from plant_fmu.importers import IMPORTERS, Task, read_fmu, run_importer
 from tests.architecture.modules import ROOT
 

@@ -12,8 +12,9 @@ from fmpy.ssp.ssd import read_ssv
 from fmpy.util import read_csv
 from lxml import etree
 
-from plant_fmu import build_fmu, cached_fmu, load_vehicle, shipped_vehicles
+from plant_fmu import build_fmu, load_vehicle, shipped_vehicles
 from plant_fmu.__main__ import main
+from plant_fmu.build import cached_fmu
 from plant_fmu.contents.layered import FOLDER, layered_files, reference_files
 from plant_fmu.contents.reference import COLUMNS, reference
 

@@ -6,7 +6,8 @@ import math
 import pytest
 from fmpy.fmi1 import FMICallException
 
-from plant_fmu import cached_fmu, load_vehicle
+from plant_fmu import load_vehicle
+from plant_fmu.build import cached_fmu
 from tests.plant_fmu.conftest import STATES, CoSimulationInstance
 
 

@@ -10,7 +10,8 @@ from fmpy import simulate_fmu
 from fmpy.fmi1 import FMICallException
 from scipy.integrate import solve_ivp
 
-from plant_fmu import cached_fmu, load_vehicle
+from plant_fmu import load_vehicle
+from plant_fmu.build import cached_fmu
 from tests.plant_fmu.conftest import STATES
 
 MOVING = {

@@ -10,7 +10,9 @@ import numpy as np
 import pytest
 
 import plant_fmu
-from plant_fmu import Plant, PlantError, VehicleError, cached_fmu, load_vehicle
+from plant_fmu import Plant, PlantError, load_vehicle
+from plant_fmu.build import cached_fmu
+from plant_fmu.errors import VehicleError
 from tests.plant_fmu.conftest import drive
 
 WRENCH = tuple(f"wrench.{a}" for a in "XYZKMN")

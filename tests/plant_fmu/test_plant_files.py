@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 import plant_fmu.running.co_simulation_instance
-from plant_fmu import Plant, PlantError, cached_fmu, load_vehicle
+from plant_fmu import Plant, PlantError, load_vehicle
+from plant_fmu.build import cached_fmu
 from tests.plant_fmu.conftest import drive
 
 

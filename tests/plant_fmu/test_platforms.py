@@ -14,9 +14,11 @@ import fmpy
 import pytest
 from fmpy.validation import validate_fmu
 
-from plant_fmu import BuildError, build_fmu, cached_fmu, load_vehicle
+from plant_fmu import build_fmu, load_vehicle
 from plant_fmu.__main__ import main
+from plant_fmu.build import cached_fmu
 from plant_fmu.compiling.platforms import PLATFORMS
+from plant_fmu.errors import BuildError
 from tests.plant_fmu.conftest import STATES, CoSimulationInstance
 from tests.plant_fmu.libraries import parts, read_libraries
 

@@ -8,7 +8,8 @@ import zipfile
 
 import pytest
 
-from plant_fmu import BuildError, build_fmu, cached_fmu, load_vehicle, shipped_vehicles
+from plant_fmu import build_fmu, load_vehicle, shipped_vehicles
+from plant_fmu.build import cached_fmu
 from plant_fmu.compiling import prebuilt
 from plant_fmu.compiling.compiler import cross_compiler, find_compiler
 from plant_fmu.compiling.libraries import compiled_libraries
@@ -16,6 +17,7 @@ from plant_fmu.compiling.platforms import cross_platforms, native_platform
 from plant_fmu.compiling.signature import signed_anew
 from plant_fmu.component import of_vehicle
 from plant_fmu.description import token
+from plant_fmu.errors import BuildError
 from tests.plant_fmu.conftest import STATES, CoSimulationInstance
 
 HERE = native_platform()

@@ -13,7 +13,8 @@ from fmpy import read_model_description
 from fmpy.build import build_platform_binary
 from lxml import etree
 
-from plant_fmu import cached_fmu, load_vehicle
+from plant_fmu import load_vehicle
+from plant_fmu.build import cached_fmu
 from plant_fmu.compiling.compiler import find_compiler
 from plant_fmu.compiling.platforms import native_platform
 from tests.plant_fmu.conftest import STATES, CoSimulationInstance

@@ -6,8 +6,8 @@ from pathlib import Path
 import fmpy
 import pytest
 
-from plant_fmu import BuildError
 from plant_fmu.compiling.universal import universal_library
+from plant_fmu.errors import BuildError
 from tests.plant_fmu.libraries import parts
 
 INTEL, ARM = 0x01000007, 0x0100000C

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from plant_fmu import VehicleError, load_vehicle, shipped_vehicles
+from plant_fmu import load_vehicle, shipped_vehicles
 from plant_fmu.build import neutral_members
+from plant_fmu.errors import VehicleError
 from tests.plant_fmu.test_build import written
 
 VEHICLES = shipped_vehicles()

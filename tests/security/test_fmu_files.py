@@ -14,7 +14,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from plant_fmu import FmuFileError, Plant, PlantError, cached_fmu, load_vehicle, unpacking
+from plant_fmu import Plant, PlantError, load_vehicle, unpacking
+from plant_fmu.build import cached_fmu
+from plant_fmu.errors import FmuFileError
 from plant_fmu.importers import read_fmu
 from plant_fmu.running import instance
 

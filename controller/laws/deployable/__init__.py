@@ -6,4 +6,6 @@ Imports: jit, regions.
 from controller.laws.deployable.gains import DeployableGains
 from controller.laws.deployable.law import DeployableLaw
 
-__all__ = ["DeployableGains", "DeployableLaw"]
+__all__ = ["LAW", "DeployableGains", "DeployableLaw"]
+
+LAW = DeployableLaw

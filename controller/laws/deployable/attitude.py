@@ -23,8 +23,8 @@ from controller.laws.deployable.linear_algebra import copy, product
 from controller.laws.deployable.model import Dynamics, Thrusters
 from controller.quaternion import down_parts, error_parts
 from controller.quaternion import rate as quaternion_rate
-from controller.regions import PackedRegions, attitude_clearance
 from controller.regions.kinds import FIRST_OF_ATTITUDE
+from controller.regions.region_set import PackedRegions, attitude_clearance
 
 Array = NDArray[np.float64]
 

@@ -32,8 +32,9 @@ from controller.laws.deployable.faces import FACES, face_ahead, has_faces
 from controller.laws.deployable.gains import DeployableGains
 from controller.laws.deployable.linear_algebra import copy
 from controller.laws.deployable.quadratic_program import Workspace
-from controller.regions import Box, DepthBand, HalfSpace, PackedRegions, Prism, evaluate_packed
+from controller.regions import Box, DepthBand, HalfSpace, Prism
 from controller.regions.kinds import FIRST_OF_ATTITUDE
+from controller.regions.region_set import PackedRegions, evaluate_packed
 
 Array = NDArray[np.float64]
 

@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from controller.jit.jit import inlined, part
 from controller.jit.stack_array import zeros
-from controller.regions import Ellipsoid, HalfSpace, PackedRegions, Sphere, clearance_of_place, place_clearance
+from controller.regions import Ellipsoid, HalfSpace, Sphere
+from controller.regions.region_set import PackedRegions, clearance_of_place, place_clearance
 
 Array = NDArray[np.float64]
 

@@ -46,8 +46,9 @@ from controller.laws.deployable.observer import Estimate, estimate_of_nothing
 from controller.laws.deployable.path_planner import guide_of_nothing
 from controller.laws.deployable.quadratic_program import workspace
 from controller.quaternion import write_rotation
-from controller.regions import PackedRegions, pack
+from controller.regions import pack
 from controller.regions.kinds import FIRST_OF_ATTITUDE
+from controller.regions.region_set import PackedRegions
 
 _SPREADS = 3.0  # standard deviations of the position that the margin adds
 _STALE = 0.15  # s without a valid measurement, after which the vehicle is brought to a stop
@@ -303,7 +304,6 @@ class DeployableLaw(CompiledLaw):
         If gains, attitude or period cannot be.
     """
 
-    name: ClassVar[str] = "deployable"
     output: ClassVar[Output] = "thrusters"
     function = staticmethod(step)
     gains_type = DeployableGains

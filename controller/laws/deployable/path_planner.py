@@ -20,15 +20,15 @@ from controller.jit.stack_array import zeros
 from controller.laws.deployable.gains import DeployableGains
 from controller.laws.deployable.linear_algebra import copy, norm
 from controller.laws.deployable.search import Tree, grow, tree_of_nothing
-from controller.regions import (
+from controller.regions import Sphere
+from controller.regions.kinds import FIRST_OF_ATTITUDE
+from controller.regions.region_set import (
     PackedRegions,
-    Sphere,
     clearance_at,
     clearance_of_place,
     clearance_of_sphere,
     evaluate_packed,
 )
-from controller.regions.kinds import FIRST_OF_ATTITUDE
 
 Array = NDArray[np.float64]
 

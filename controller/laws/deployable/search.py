@@ -17,8 +17,9 @@ from controller.jit.jit import inlined, part
 from controller.jit.stack_array import zeros
 from controller.laws.deployable.gains import DeployableGains
 from controller.laws.deployable.linear_algebra import copy
-from controller.regions import PackedRegions, Sphere, clearance_of_place, clearance_of_sphere
+from controller.regions import Sphere
 from controller.regions.kinds import FIRST_OF_ATTITUDE
+from controller.regions.region_set import PackedRegions, clearance_of_place, clearance_of_sphere
 
 Array = NDArray[np.float64]
 

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from controller import ControllerError
-from controller.regions import of_attitude
+from controller.regions.region_set import of_attitude
 from cosim.campaigns.scenes.as_scenario import scene_scenario
 from cosim.campaigns.scenes.flyer import Conditions
 from cosim.campaigns.scenes.law_gains import law_named

@@ -6,7 +6,7 @@ import dataclasses
 import math
 from typing import Any
 
-from controller.regions import SHAPES
+from controller.regions.region_set import SHAPES
 from cosim.campaigns.scenes.flyer import VEHICLE, Conditions
 from cosim.campaigns.scenes.scene import Scene, plant_values, scene_regions
 from cosim.scenario.scenario import Scenario, validate_scenario

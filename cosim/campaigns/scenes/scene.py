@@ -14,7 +14,8 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from controller.regions import DepthBand, PackedRegions, Region, Sphere, pack
+from controller.regions import DepthBand, Region, Sphere, pack
+from controller.regions.region_set import PackedRegions
 from controller.regions.shape import GREATEST
 from cosim.errors import ScenarioError
 from cosim.scenario.scenario import CRITERIA

@@ -6,7 +6,10 @@ import math
 
 import numpy as np
 
-from controller.regions import Shape, of_attitude, pack, ray_distances
+from controller.regions import pack
+from controller.regions.rays import ray_distances
+from controller.regions.region_set import of_attitude
+from controller.regions.shape import Shape
 from cosim.mavlink.vehicle.view import View
 from cosim.scenario.scenario import Scenario
 from cosim.scenario.tables import PARKED_POSITION, SecondaryRegion, Vector3

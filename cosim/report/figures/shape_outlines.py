@@ -9,20 +9,10 @@ import numpy as np
 from matplotlib.path import Path
 
 from controller.quaternion import rotation_matrix
-from controller.regions import (
-    Box,
-    Cone,
-    Cylinder,
-    DepthBand,
-    Ellipsoid,
-    HalfSpace,
-    Pipe,
-    Prism,
-    Shape,
-    Sphere,
-)
+from controller.regions import Box, Cone, Cylinder, DepthBand, Ellipsoid, HalfSpace, Pipe, Prism, Sphere
 from controller.regions.mesh import Mesh
 from controller.regions.region_set import name_of
+from controller.regions.shape import Shape
 from controller.regions.shapes import ENTRIES
 from cosim.errors import RunError
 from cosim.simulation.signals import Array

@@ -13,7 +13,8 @@ from matplotlib.figure import Figure
 from matplotlib.rcsetup import cycler
 from numpy.typing import NDArray
 
-from controller.regions import Region, Visibility, of_attitude
+from controller.regions import Region, Visibility
+from controller.regions.region_set import of_attitude
 from cosim.results.record import Rows
 from cosim.scenario.colours import CRITERION_COLOURS, GOAL_COLOUR
 from cosim.scenario.scenario import Scenario

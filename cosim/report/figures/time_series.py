@@ -11,7 +11,8 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
-from controller.regions import Sphere, of_attitude
+from controller.regions import Sphere
+from controller.regions.region_set import of_attitude
 from cosim.report.figures.layout import F, Sheet, legend, limits_of, panels, symlog_axis
 from cosim.report.figures.style import (
     BLACK,

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from controller import LAWS, ControllerError
-from controller.regions import Region, Shape
+from controller.regions import Region
+from controller.regions.shape import Shape
 from cosim.errors import CommandError
 from cosim.scenario.scenario import Scenario
 from plant_fmu.variables import variables

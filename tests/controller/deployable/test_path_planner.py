@@ -9,7 +9,8 @@ from controller.laws.deployable import path_planner as way_round
 from controller.laws.deployable.attraction import approach_speed, wanted_acceleration, wanted_velocity
 from controller.laws.deployable.gains import DeployableGains
 from controller.laws.deployable.path_planner import CORNERS, cost_of, guide_of_nothing, improve, nearest_end, uniform
-from controller.regions import Box, DepthBand, HalfSpace, Region, Sphere, clearance_at, pack
+from controller.regions import Box, DepthBand, HalfSpace, Region, Sphere, pack
+from controller.regions.region_set import clearance_at
 
 GAINS = DeployableGains()
 START = np.array([0.0, 0.0, 2.5])

@@ -7,7 +7,8 @@ from controller.laws.deployable import path_planner as way_round
 from controller.laws.deployable import search
 from controller.laws.deployable.gains import DeployableGains
 from controller.laws.deployable.path_planner import CORNERS, cost_of, guide_of_nothing, improve, nearest_end, uniform
-from controller.regions import Box, DepthBand, Orientation, Region, Sphere, clearance_at, pack
+from controller.regions import Box, DepthBand, Orientation, Region, Sphere, pack
+from controller.regions.region_set import clearance_at
 
 GAINS = DeployableGains()
 START = np.array([0.0, 0.2, 2.5])

@@ -19,7 +19,7 @@ import cosim
 from controller import regions
 from controller.jit import jit as module
 from controller.jit.jit import compiled
-from controller.regions import evaluate_packed
+from controller.regions.region_set import evaluate_packed
 
 
 def test_cached_functions_carry_the_stamp_of_all_sources():

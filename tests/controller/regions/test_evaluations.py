@@ -4,9 +4,16 @@ import numpy as np
 import pytest
 
 from controller.quaternion import rotation_matrix
-from controller.regions import Region, Visibility, attitude_clearance, clearance_at, pack, place_clearance
+from controller.regions import Region, Visibility, pack
 from controller.regions.kinds import SPHERE, evaluate_shape
-from controller.regions.region_set import clearance_of_place, clearance_of_pose, clearance_of_sphere
+from controller.regions.region_set import (
+    attitude_clearance,
+    clearance_at,
+    clearance_of_place,
+    clearance_of_pose,
+    clearance_of_sphere,
+    place_clearance,
+)
 from tests.controller.test_c_law import SHAPES
 
 SCENE = [Region(name, shape, ("in", "out")[i % 2]) for i, (name, (shape, _)) in enumerate(SHAPES.items())]

@@ -5,8 +5,9 @@ from dataclasses import dataclass
 import pytest
 
 from controller.errors import RegionError
-from controller.regions import SHAPES, Region, Sphere
+from controller.regions import Region, Sphere
 from controller.regions.in_c import c_sources, require_in_c
+from controller.regions.region_set import SHAPES
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ import itertools
 import numpy as np
 import pytest
 
-from controller import RegionError
+from controller.errors import RegionError
 from controller.regions import Orientation, Prism
 from controller.regions.rays import _circle_about, _is_convex
 

@@ -20,11 +20,10 @@ from controller.regions import (
     Region,
     Sphere,
     Visibility,
-    clearances_at,
     pack,
-    ray_distances,
 )
-from controller.regions.rays import TOUCHING
+from controller.regions.rays import TOUCHING, ray_distances
+from controller.regions.region_set import clearances_at
 from tests.examples import examples
 
 NORTH, EAST, DOWN = np.eye(3)

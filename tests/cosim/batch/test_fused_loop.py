@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from controller import LAWS, Allocation, IsmailDunniganLaw, VehicleState
+from controller import LAWS, IsmailDunniganLaw, VehicleState
+from controller.allocation import Allocation
 from cosim.batch import fused_loop
 from cosim.batch.c_calls import Clock, fmi_do_step, seconds
 from cosim.campaigns.scenes.flyer import Conditions, SceneFlyer

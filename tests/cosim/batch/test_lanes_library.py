@@ -7,7 +7,8 @@ import pytest
 
 from cosim.batch import lanes_library as module
 from cosim.batch.lanes_library import lanes_library
-from plant_fmu import BuildError, load_vehicle
+from plant_fmu import load_vehicle
+from plant_fmu.errors import BuildError
 
 QUICK = ("-O1",)
 

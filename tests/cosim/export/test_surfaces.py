@@ -20,8 +20,8 @@ from controller.regions import (
     Prism,
     Region,
     Sphere,
-    clearances_at,
 )
+from controller.regions.region_set import clearances_at
 from cosim.errors import ExportError
 from cosim.export.surfaces import sector, surface_of
 

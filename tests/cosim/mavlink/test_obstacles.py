@@ -8,7 +8,7 @@ import pytest
 from pymavlink.dialects.v20 import all as mavlink
 from scipy.spatial.transform import Rotation
 
-from controller.regions import ray_distances
+from controller.regions.rays import ray_distances
 from cosim.mavlink.autopilot import Autopilot
 from cosim.mavlink.wire.options import PROFILES, MavlinkOptions
 from cosim.scenario.tables import PARKED_POSITION

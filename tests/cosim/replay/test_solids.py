@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from controller.regions import (
-    SHAPES,
     Box,
     Cone,
     Cylinder,
@@ -22,10 +21,9 @@ from controller.regions import (
     Region,
     Sphere,
     Visibility,
-    attitude_clearance,
-    clearances_at,
     pack,
 )
+from controller.regions.region_set import SHAPES, attitude_clearance, clearances_at
 from controller.regions.shapes import ENTRIES
 from cosim.export.surfaces import surface_of
 from cosim.replay.header import DRAWN_BY_NUMBERS, shape_of

@@ -5,7 +5,8 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from controller.regions import SHAPES, Region, clearances_at
+from controller.regions import Region
+from controller.regions.region_set import SHAPES, clearances_at
 from cosim.errors import RunError
 from cosim.replay.trace import trace_of
 from cosim.results.record import RECORD

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from controller import LAWS
-from controller.regions import SHAPES
+from controller.regions.region_set import SHAPES
 from cosim.command_line.cli import main
 from cosim.scenario.keys import comments, unit_of_gain, unit_of_shape
 from cosim.scenario.scenario import load_scenario

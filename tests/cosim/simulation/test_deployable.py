@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from controller import LAWS, LawError, VehicleState
-from controller.laws import DeployableGains, DeployableLaw
-from controller.regions import Box, HalfSpace, Orientation, Region, Sphere, Visibility, clearance_at, pack
+from controller.laws.deployable import DeployableGains, DeployableLaw
+from controller.regions import Box, HalfSpace, Orientation, Region, Sphere, Visibility, pack
+from controller.regions.region_set import clearance_at
 from cosim.scenario.vehicle_model import vehicle_model
 from plant_fmu import Plant
 from plant_fmu.vehicle import load_vehicle

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from controller import VehicleState
-from controller.laws import DeployableGains, DeployableLaw
+from controller.laws.deployable import DeployableGains, DeployableLaw
 from controller.laws.deployable.barrier import look, sight_of, slope_of, turning_of
 from controller.laws.deployable.faces import face_ahead
 from controller.regions import (

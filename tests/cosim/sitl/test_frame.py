@@ -9,7 +9,8 @@ import pytest
 from cosim.errors import RunError
 from cosim.scenario.scenario import load_scenario
 from cosim.sitl.law import law_of_controls, law_of_pwm
-from plant_fmu import TableError, VehicleError, load_vehicle
+from plant_fmu import load_vehicle
+from plant_fmu.errors import TableError, VehicleError
 
 SHIPPED = resources.files("plant_fmu") / "vehicles"
 

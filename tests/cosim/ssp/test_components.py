@@ -14,7 +14,8 @@ from cosim.scenario.scenario import load_scenario
 from cosim.ssp import arbiter_component, controller_component
 from cosim.ssp.system import MOTION, WRENCH
 from fuzzy_arbiter import Arbiter
-from plant_fmu import PlantError, cached_fmu
+from plant_fmu import PlantError
+from plant_fmu.build import cached_fmu
 from plant_fmu.check import check_fmu
 from plant_fmu.running.co_simulation_instance import CoSimulationInstance
 from tests.cosim.ssp.jacobi import Parts

@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 from fuzzy_arbiter import (
     Arbiter,
     Criterion,
-    EngineError,
     Output,
     Rule,
     Shape,
@@ -26,6 +25,7 @@ from fuzzy_arbiter import (
 from fuzzy_arbiter.engines.closed import ClosedEngine
 from fuzzy_arbiter.engines.exact import ExactEngine
 from fuzzy_arbiter.engines.pieces import pieces
+from fuzzy_arbiter.errors import EngineError
 from fuzzy_arbiter.propositions import And, Is, Or
 from tests.examples import examples
 from tests.fuzzy_arbiter import reference

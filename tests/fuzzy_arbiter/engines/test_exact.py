@@ -9,7 +9,6 @@ from hypothesis import strategies as st
 
 from fuzzy_arbiter import (
     Arbiter,
-    EngineError,
     Output,
     Shape,
     System,
@@ -22,6 +21,7 @@ from fuzzy_arbiter import (
 )
 from fuzzy_arbiter.engines.exact import ExactEngine
 from fuzzy_arbiter.engines.sweep import centroid, outline
+from fuzzy_arbiter.errors import EngineError
 from tests.examples import examples
 from tests.fuzzy_arbiter import reference
 from tests.fuzzy_arbiter.systems import shapes, systems

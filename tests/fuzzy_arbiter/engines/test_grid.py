@@ -9,20 +9,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fuzzy_arbiter import (
-    DefinitionError,
-    EngineError,
-    Output,
-    Rule,
-    Shape,
-    System,
-    Term,
-    Variable,
-    prioritised,
-    triangle,
-)
+from fuzzy_arbiter import Output, Rule, Shape, System, Term, Variable, prioritised, triangle
 from fuzzy_arbiter.engines.grid import LEAST_AREA, GridEngine, sampled
 from fuzzy_arbiter.engines.scikit import ScikitEngine
+from fuzzy_arbiter.errors import DefinitionError, EngineError
 from fuzzy_arbiter.hierarchy import WEIGHT
 from tests.fuzzy_arbiter.engines.test_scikit import TIP, TIPPING, gap, mixed
 

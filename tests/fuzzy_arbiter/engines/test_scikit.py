@@ -19,7 +19,6 @@ from skfuzzy.control.term import WeightedTerm
 
 from fuzzy_arbiter import (
     Criterion,
-    EngineError,
     Output,
     Rule,
     Shape,
@@ -28,7 +27,6 @@ from fuzzy_arbiter import (
     UndefinedOutputError,
     Variable,
     falling,
-    parse_rule,
     prioritised,
     rising,
     trapezoid,
@@ -36,7 +34,9 @@ from fuzzy_arbiter import (
 )
 from fuzzy_arbiter.engines.firing import degrees_of_many
 from fuzzy_arbiter.engines.scikit import ScikitEngine
+from fuzzy_arbiter.errors import EngineError
 from fuzzy_arbiter.propositions import And, Is, Not, Or
+from fuzzy_arbiter.rule_text import parse_rule
 
 STATES = (
     control.Antecedent.input,

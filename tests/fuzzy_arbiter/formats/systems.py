@@ -2,8 +2,8 @@
 
 from hypothesis import strategies as st
 
-from fuzzy_arbiter import Is, Output, Rule, Shape, System, Term, Variable, falling, rising, trapezoid, triangle
-from fuzzy_arbiter.propositions import And, Not, Or
+from fuzzy_arbiter import Output, Rule, Shape, System, Term, Variable, falling, rising, trapezoid, triangle
+from fuzzy_arbiter.propositions import And, Is, Not, Or
 
 
 def _grades(low, mid, high):

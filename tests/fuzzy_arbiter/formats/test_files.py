@@ -5,7 +5,8 @@ from dataclasses import replace
 
 import pytest
 
-from fuzzy_arbiter import DefinitionError, FormatError, UnsupportedError, prioritised
+from fuzzy_arbiter import prioritised
+from fuzzy_arbiter.errors import DefinitionError, FormatError, UnsupportedError
 from fuzzy_arbiter.formats import FORMATS, load, save
 from tests.fuzzy_arbiter.formats.systems import TIPPING
 

@@ -4,21 +4,8 @@ from dataclasses import replace
 
 import pytest
 
-from fuzzy_arbiter import (
-    DefinitionError,
-    FormatError,
-    Output,
-    Rule,
-    Shape,
-    Term,
-    UnsupportedError,
-    Variable,
-    falling,
-    prioritised,
-    rising,
-    trapezoid,
-    triangle,
-)
+from fuzzy_arbiter import Output, Rule, Shape, Term, Variable, falling, prioritised, rising, trapezoid, triangle
+from fuzzy_arbiter.errors import DefinitionError, FormatError, UnsupportedError
 from fuzzy_arbiter.formats import reads, writes
 from tests.fuzzy_arbiter.formats.systems import TIPPING
 

@@ -8,8 +8,6 @@ import pytest
 
 from fuzzy_arbiter import (
     Criterion,
-    DefinitionError,
-    FormatError,
     Output,
     Shape,
     System,
@@ -21,6 +19,7 @@ from fuzzy_arbiter import (
     trapezoid,
     triangle,
 )
+from fuzzy_arbiter.errors import DefinitionError, FormatError
 from fuzzy_arbiter.formats import reads, writes
 from tests.fuzzy_arbiter.formats.systems import TIPPING
 

@@ -8,8 +8,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fuzzy_arbiter import Output, Term, UnsupportedError, falling, prioritised, rising, trapezoid, triangle
+from fuzzy_arbiter import Output, Term, falling, prioritised, rising, trapezoid, triangle
 from fuzzy_arbiter.engines.exact import ExactEngine
+from fuzzy_arbiter.errors import UnsupportedError
 from fuzzy_arbiter.formats import FORMATS, fold_normalization, reads, writes
 from fuzzy_arbiter.formats.native import range_ends
 

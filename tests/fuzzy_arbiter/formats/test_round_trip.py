@@ -6,18 +6,8 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from fuzzy_arbiter import (
-    ArbiterError,
-    DefinitionError,
-    FormatError,
-    Output,
-    Shape,
-    System,
-    Term,
-    UnsupportedError,
-    Variable,
-    prioritised,
-)
+from fuzzy_arbiter import ArbiterError, Output, Shape, System, Term, Variable, prioritised
+from fuzzy_arbiter.errors import DefinitionError, FormatError, UnsupportedError
 from fuzzy_arbiter.formats import FORMATS, reads, writes
 from fuzzy_arbiter.hierarchy import FORMS
 from fuzzy_arbiter.propositions import Is, Not

@@ -31,7 +31,7 @@ from cosim.sitl import wire
 from cosim.sitl.flights import Counts as HilCounts
 from cosim.sitl.hil import HilServer
 from cosim.sitl.law import law_of_controls, law_of_pwm
-from fuzzy_arbiter import parse_rule
+from fuzzy_arbiter.rule_text import parse_rule
 from plant_fmu import load_vehicle
 from tests.cosim.mavlink.station import Station
 from tests.security.conftest import COMMANDS_LOG

@@ -16,8 +16,8 @@ import numpy as np
 from controller.jit.jit import compiled
 from controller.law import Array, VehicleState
 from controller.paper_law import violation
-from controller.regions import PackedRegions, evaluate_packed
 from controller.regions.kinds import FIRST_OF_ATTITUDE
+from controller.regions.region_set import PackedRegions, evaluate_packed
 
 _ATTITUDE = FIRST_OF_ATTITUDE  # shapes from it on depend on attitude
 

@@ -7,17 +7,17 @@ else is as printed.
 
 from __future__ import annotations
 
-from typing import ClassVar, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from controller import paper_law
 from controller.jit.jit import compiled
 from controller.law import Array, VehicleState, WrenchLaw
-from controller.laws.baselines.potential_field import Field, evaluate_field, field_of, keep_within, shorten
 from controller.paper_law import Gains, primary_error
+from controller.potential_field import Field, evaluate_field, field_of, keep_within, shorten
 from controller.quaternion import error_parts, rotation_rows
-from controller.regions import PackedRegions
+from controller.regions.region_set import PackedRegions
 
 
 class UnarbitratedGains(NamedTuple):
@@ -88,8 +88,10 @@ def memory_of(desired_quaternion: Array, period: Array, n_regions: int) -> Unarb
 class UnarbitratedLaw(WrenchLaw):
     """The paper's law with all weights on, within bounds."""
 
-    name: ClassVar[str] = "unarbitrated"
     function = staticmethod(step)
     memory_of = staticmethod(memory_of)
     gains_type = UnarbitratedGains
     above_zero = ("k_p1", "gamma")
+
+
+LAW = UnarbitratedLaw

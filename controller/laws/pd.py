@@ -11,13 +11,13 @@ another law.
 
 from __future__ import annotations
 
-from typing import ClassVar, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from controller.jit.jit import compiled
 from controller.law import Array, VehicleState, WrenchLaw
-from controller.laws.baselines.potential_field import (
+from controller.potential_field import (
     Field,
     add_turned,
     damp,
@@ -26,7 +26,7 @@ from controller.laws.baselines.potential_field import (
     set_point_error,
 )
 from controller.quaternion import error, rotation_matrix
-from controller.regions import PackedRegions
+from controller.regions.region_set import PackedRegions
 
 
 class PdGains(NamedTuple):
@@ -84,8 +84,10 @@ def memory_of(desired_quaternion: Array, period: Array, n_regions: int) -> PdMem
 class PdLaw(WrenchLaw):
     """PD control to a set point, with the push of regions."""
 
-    name: ClassVar[str] = "pd"
     function = staticmethod(step)
     memory_of = staticmethod(memory_of)
     gains_type = PdGains
     above_zero = ("k_p1",)
+
+
+LAW = PdLaw

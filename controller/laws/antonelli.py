@@ -17,13 +17,13 @@ out of the adaptation.
 
 from __future__ import annotations
 
-from typing import ClassVar, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from controller.jit.jit import compiled
 from controller.law import Array, VehicleState, WrenchLaw
-from controller.laws.baselines.potential_field import (
+from controller.potential_field import (
     Field,
     add_turned,
     damp,
@@ -33,7 +33,7 @@ from controller.laws.baselines.potential_field import (
     set_point_error,
 )
 from controller.quaternion import down_in_body, error, rotation_matrix, skew
-from controller.regions import PackedRegions
+from controller.regions.region_set import PackedRegions
 
 
 class AntonelliGains(NamedTuple):
@@ -133,8 +133,10 @@ def memory_of(desired_quaternion: Array, period: Array, n_regions: int) -> Anton
 class AntonelliLaw(WrenchLaw):
     """Adaptive set-point control with restoring forces and current, with the push of regions."""
 
-    name: ClassVar[str] = "antonelli"
     function = staticmethod(step)
     memory_of = staticmethod(memory_of)
     gains_type = AntonelliGains
     above_zero = ("k_p1", "k_theta", "k_theta_moment")
+
+
+LAW = AntonelliLaw

@@ -13,13 +13,13 @@ regions, which stays out of the adaptation.
 
 from __future__ import annotations
 
-from typing import ClassVar, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from controller.jit.jit import compiled
 from controller.law import Array, VehicleState, WrenchLaw
-from controller.laws.baselines.potential_field import (
+from controller.potential_field import (
     Field,
     add_turned,
     damp,
@@ -29,7 +29,7 @@ from controller.laws.baselines.potential_field import (
     set_point_error,
 )
 from controller.quaternion import error, rotation_matrix
-from controller.regions import PackedRegions
+from controller.regions.region_set import PackedRegions
 from controller.restoring import regressor
 
 
@@ -112,8 +112,10 @@ def memory_of(desired_quaternion: Array, period: Array, n_regions: int) -> SunCh
 class SunCheahLaw(WrenchLaw):
     """Adaptive set-point control through the transposed Jacobian, with the push of regions."""
 
-    name: ClassVar[str] = "sun_cheah"
     function = staticmethod(step)
     memory_of = staticmethod(memory_of)
     gains_type = SunCheahGains
     above_zero = ("k_p1", "gamma")
+
+
+LAW = SunCheahLaw
