@@ -1,10 +1,10 @@
 """A run in the formats of other tools.
 
-One format a file; each imports what it needs when it is asked for. Public: `export_run`, `FORMATS`.
+A format is a module of `formats`, which imports what it needs when it is asked for. Public: `export_run`.
 
-Imports: controller, io, mavlink, mavlink.wire, plant_fmu, replay, results, scenario, simulation.
+Imports: controller, io, plant_fmu, replay, results, scenario, simulation.
 """
 
-from cosim.export.exporting import FORMATS, export_run
+from cosim.export.exporting import export_run
 
-__all__ = ["FORMATS", "export_run"]
+__all__ = ["export_run"]

@@ -32,12 +32,12 @@ ONE_PLACE = {
     "distributed": {"cosim.campaigns.workers.cluster"},
     "ecospy": {"plant_fmu.importers.ecos"},
     "fmu_manipulation_toolbox": {"plant_fmu.importers.toolbox"},
-    "foxglove_schemas_protobuf": {"cosim.export.as_mcap", "cosim.export.foxglove_scene"},
+    "foxglove_schemas_protobuf": {"cosim.export.mcap_writer", "cosim.export.foxglove_scene"},
     "google": {"cosim.export.foxglove_scene", "cosim.export.protobuf_table"},
     "libcosimpy": {"plant_fmu.importers.libcosim"},
     "llvmlite": {"controller.jit.stack_array", "controller.jit.bound_call", "cosim.batch.c_calls"},
-    "mcap": {"cosim.export.as_mcap"},
-    "mcap_protobuf": {"cosim.export.as_mcap"},
+    "mcap": {"cosim.export.mcap_writer"},
+    "mcap_protobuf": {"cosim.export.mcap_writer"},
     "numba": {
         *(
             "controller.jit.function_pointer",
@@ -56,7 +56,7 @@ ONE_PLACE = {
     },
     "pandas": {"cosim.results.run_result"},
     "pymavlink": {"cosim.mavlink.wire.dialect"},
-    "rerun": {"cosim.export.as_rrd"},
+    "rerun": {"cosim.export.rrd_writer"},
     "rich": {"cosim.command_line.watch", "cosim.live.watching.bars", "cosim.live.watching.picture"},
     "shtab": {"cosim.command_line.completion"},
     "skfuzzy": {"fuzzy_arbiter.engines.scikit"},
@@ -75,8 +75,8 @@ OPTIONAL = {
 }
 OPTIONAL |= {"google", "libcosimpy", "mcap", "mcap_protobuf", "pandas", "rerun"}
 WANT_AN_EXTRA = {
-    "cosim.export.as_mcap",
-    "cosim.export.as_rrd",
+    "cosim.export.mcap_writer",
+    "cosim.export.rrd_writer",
     "cosim.export.foxglove_scene",
     "cosim.export.protobuf_table",
     "plant_fmu.importers.casadi_import",

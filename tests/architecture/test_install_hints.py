@@ -45,7 +45,7 @@ def test_what_is_named_has_the_bound_that_is_tried():
 
 
 def test_what_an_extra_brings_is_named_whole():
-    from cosim.export import FORMATS
+    from cosim.export.formats import FORMATS
     from plant_fmu.importers import IMPORTERS
 
     extras = required()

@@ -197,7 +197,9 @@ def lean_functions():
     found = {}
     for package in (controller, cosim):
         for info in pkgutil.walk_packages(package.__path__, f"{package.__name__}."):
-            if info.name.endswith(("__main__", "as_rrd")):  # the latter needs what is not among the tests' own packages
+            if info.name.endswith(
+                ("__main__", "rrd_writer")
+            ):  # the latter needs what is not among the tests' own packages
                 continue
             for value in vars(importlib.import_module(info.name)).values():
                 if isinstance(value, Dispatcher) and value.targetoptions.get("_nrt") is False:

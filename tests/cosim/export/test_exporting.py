@@ -3,6 +3,7 @@
 import builtins
 import importlib
 import os
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,8 +12,10 @@ from pymavlink import mavutil
 
 from cosim.command_line.cli import main
 from cosim.errors import ExportError, RunError
-from cosim.export import FORMATS, export_run
+from cosim.export import export_run
 from cosim.export.excerpt import excerpt_of
+from cosim.export.format import Format
+from cosim.export.formats import FORMATS
 from cosim.results.record import load_record
 
 
@@ -87,8 +90,6 @@ def test_what_is_no_file_is_never_replaced(run, tmp_path):
 
 
 def test_a_writer_that_fails_leaves_what_was_there(run, tmp_path, monkeypatch):
-    from cosim.export import as_csv
-
     out = tmp_path / "out.csv"
     out.write_text("mine")
 
@@ -96,7 +97,7 @@ def test_a_writer_that_fails_leaves_what_was_there(run, tmp_path, monkeypatch):
         path.write_text("half")
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(as_csv, "write", full)
+    monkeypatch.setitem(FORMATS, "csv", Format(full, beside=".units.csv"))
     with pytest.raises(RunError, match="No space left"):
         export_run(run, "csv", out, force=True)
     assert out.read_text() == "mine"
@@ -117,7 +118,7 @@ def test_what_is_not_installed_is_named(run, tmp_path, monkeypatch, to, lacking,
             raise ModuleNotFoundError(f"No module named {name!r}", name=name)
         return plain(name, *rest, **keywords)
 
-    monkeypatch.delitem(importlib.sys.modules, f"cosim.export.as_{to}", raising=False)
+    monkeypatch.delitem(importlib.sys.modules, f"cosim.export.{to}_writer", raising=False)
     monkeypatch.setattr(builtins, "__import__", without)
     with pytest.raises(ExportError, match=rf'--to {to} needs {lacking}\S*; .+ -m pip install .*"{brings}>='):
         export_run(run, to, tmp_path / "out")
@@ -168,14 +169,13 @@ def test_blocks_of_a_long_record_stay_small(run, monkeypatch):
 def test_a_full_disk_is_told_and_leaves_nothing(run, tmp_path, monkeypatch, to):
     if to == "rrd":
         pytest.importorskip("rerun")
-    writer = importlib.import_module(f"cosim.export.as_{to}")
-    write = writer.write
+    entry = FORMATS[to]
 
     def on_full_disk(excerpt, path):
         path.symlink_to("/dev/full")
-        return write(excerpt, path)
+        return entry.write(excerpt, path)
 
-    monkeypatch.setattr(writer, "write", on_full_disk)
+    monkeypatch.setitem(FORMATS, to, replace(entry, write=on_full_disk))
     with pytest.raises((ExportError, RunError), match=r"space|cannot be written"):
         export_run(run, to, tmp_path / f"out.{to}")
     assert not list(tmp_path.iterdir())

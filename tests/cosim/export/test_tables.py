@@ -81,9 +81,9 @@ def test_scipy_reads_the_record_to_the_last_bit(which, request, tmp_path):
 
 def test_more_than_a_mat_file_holds_is_refused(run, tmp_path, monkeypatch):
     from cosim.errors import ExportError
-    from cosim.export import as_mat
+    from cosim.export.formats import mat
 
-    monkeypatch.setattr(as_mat, "_GREATEST", 1000)
+    monkeypatch.setattr(mat, "_GREATEST", 1000)
     with pytest.raises(ExportError, match=r"expected 0\.0 at most"):
         export_run(run, "mat", tmp_path / "out.mat")
     assert not list(tmp_path.iterdir())

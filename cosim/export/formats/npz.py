@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cosim.export.excerpt import Excerpt
+from cosim.export.format import Format
 
 
 def write(excerpt: Excerpt, path: Path) -> list[Path]:
@@ -52,3 +53,6 @@ def _texts(excerpt: Excerpt) -> Iterator[tuple[str, NDArray[Any]]]:
     yield "descriptions", np.array([column.description for column in excerpt.columns])
     yield "scenario", np.array(excerpt.scenario_text)
     yield "summary", np.array(excerpt.summary_text)
+
+
+FORMAT = Format(write)

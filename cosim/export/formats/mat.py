@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.io import savemat
 
 from cosim.errors import ExportError
 from cosim.export.excerpt import Excerpt
+from cosim.export.format import Format
 from cosim.export.names import legal
 
 _GREATEST = 2**31 - 2**20  # bytes of a variable in a file of version 5, less what names and heads take
@@ -37,6 +37,8 @@ def write(excerpt: Excerpt, path: Path) -> list[Path]:
     ExportError
         If it is more than the format holds.
     """
+    from scipy.io import savemat
+
     columns = excerpt.columns
     size = 8 * excerpt.count * len(columns)
     if size > _GREATEST:
@@ -66,3 +68,6 @@ def write(excerpt: Excerpt, path: Path) -> list[Path]:
 def _cells(texts: Iterable[str]) -> NDArray[Any]:
     """Return a row of MATLAB cells."""
     return np.array([[*texts]], dtype=object)
+
+
+FORMAT = Format(write)

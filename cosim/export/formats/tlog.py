@@ -6,9 +6,7 @@ from pathlib import Path
 
 from cosim.errors import ExportError
 from cosim.export.excerpt import Excerpt
-from cosim.mavlink.replay import replay
-from cosim.mavlink.wire.endpoint import Endpoint
-from cosim.mavlink.wire.options import MavlinkOptions
+from cosim.export.format import Format
 
 
 def write(excerpt: Excerpt, path: Path) -> list[Path]:
@@ -31,7 +29,14 @@ def write(excerpt: Excerpt, path: Path) -> list[Path]:
     ExportError
         If anything of the run could not be written.
     """
+    from cosim.mavlink.replay import replay
+    from cosim.mavlink.wire.endpoint import Endpoint
+    from cosim.mavlink.wire.options import MavlinkOptions
+
     done = replay(excerpt.run.folder, [Endpoint("tlog", path.name, path=str(path))], MavlinkOptions(), rate=None)
     if done.troubles:
         raise ExportError(f"--to tlog: not all was written: {'; '.join(done.troubles)}")
     return [path]
+
+
+FORMAT = Format(write, whole=True)

@@ -1,0 +1,18 @@
+"""RRD: signals and the scene, as Rerun shows them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from cosim.export.excerpt import Excerpt
+from cosim.export.format import Format
+
+
+def write(excerpt: Excerpt, path: Path) -> list[Path]:
+    """Write the file, as `cosim.export.rrd_writer.write`."""
+    from cosim.export import rrd_writer
+
+    return rrd_writer.write(excerpt, path)
+
+
+FORMAT = Format(write, needs=("rerun-sdk>=0.31",))
