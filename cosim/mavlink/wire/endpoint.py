@@ -94,11 +94,11 @@ def _serial(text: str, rest: str) -> tuple[str, int]:
 def _new_file(text: str) -> str:
     path = Path(text)
     try:
-        exists = path.exists()
-    except OSError as error:  # such as a name that is too long
-        raise TelemetryError(f"endpoint {text!r}: {error.strerror or error}") from error
-    if exists:
-        raise TelemetryError(f"endpoint {text!r}: the file exists; a log is never overwritten")
-    if not path.parent.is_dir():
-        raise TelemetryError(f"endpoint {text!r}: there is no folder {str(path.parent)!r}")
-    return text
+        path.stat()  # Path.exists is False from Python 3.14 on, whatever the error
+    except (FileNotFoundError, NotADirectoryError):
+        if not path.parent.is_dir():
+            raise TelemetryError(f"endpoint {text!r}: there is no folder {str(path.parent)!r}") from None
+        return text
+    except (OSError, ValueError) as error:  # such as a name that is too long, or has a null in it
+        raise TelemetryError(f"endpoint {text!r}: {getattr(error, 'strerror', None) or error}") from error
+    raise TelemetryError(f"endpoint {text!r}: the file exists; a log is never overwritten")
