@@ -1,15 +1,11 @@
 """The page on regions of one's own, followed to the letter in a copy of the packages: its shape flies."""
 
-import os
 import re
-import shutil
-import subprocess
-import sys
-from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).parents[1]
+from tests.copies import ROOT, copy_of_the_packages, python
+
 PAGE = (ROOT / "docs" / "howto" / "own-region.md").read_text()
 
 SCENARIO = """
@@ -128,21 +124,11 @@ def of_page(name, language):
 @pytest.fixture(scope="module")
 def copy(tmp_path_factory):
     """A copy of the packages with the page's one Python file, and how a command is run in it."""
-    folder = tmp_path_factory.mktemp("copy")
-    for package in ("fuzzy_arbiter", "plant_fmu", "controller", "cosim"):
-        shutil.copytree(ROOT / package, folder / package, ignore=shutil.ignore_patterns("__pycache__"))
-    shutil.copy(ROOT / "LICENSE", folder)  # FMUs carry it
+    folder = copy_of_the_packages(tmp_path_factory.mktemp("copy"))
     (folder / "controller" / "regions" / "shapes" / "torus.py").write_text(of_page("torus.py", "python"))
     (folder / "ring.toml").write_text(SCENARIO)
     (folder / "struck.toml").write_text(STRUCK)
     return folder
-
-
-def python(copy, *arguments):
-    return subprocess.run(
-        [sys.executable, *arguments],
-        cwd=copy, env={**os.environ, "PYTHONPATH": str(copy)}, capture_output=True, text=True, check=False,
-    )  # fmt: skip
 
 
 @pytest.mark.slow

@@ -39,7 +39,7 @@ class Run:
     Examples
     --------
     >>> run = load_run(Path("runs/docking"))  # doctest: +SKIP
-    >>> run.summary["goal"]["reached_at"]  # doctest: +SKIP
+    >>> run.summary["reach_time"]  # doctest: +SKIP
     41.3
     >>> run.frame()[["time", "goal.clearance"]]  # doctest: +SKIP
     """

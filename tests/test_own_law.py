@@ -1,0 +1,83 @@
+"""The page on laws of one's own, followed to the letter in a copy of the packages: its law flies."""
+
+import json
+import re
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+
+from tests.copies import ROOT, copy_of_the_packages, python
+
+PAGE = (ROOT / "docs" / "howto" / "own-law.md").read_text()
+
+SCENARIO = """
+vehicle = "odin"
+
+[time]
+duration = 60.0
+step = 0.01
+
+[initial]
+position = [0.0, 0.0, 2.0]
+
+[goal]
+type = "sphere"
+centre = [4.0, 0.0, 2.0]
+radius = 0.5
+
+[law]
+name = "sliding_mode"
+
+[[regions]]
+name = "rock"
+criterion = "obstacle"
+keep = "out"
+gain = 100.0
+shape = { type = "sphere", centre = [2.0, 0.2, 2.0], radius = 0.5 }
+"""
+
+pytestmark = pytest.mark.slow
+
+
+@pytest.fixture(scope="module")
+def copy(tmp_path_factory):
+    """A copy of the packages with the page's one file."""
+    folder = copy_of_the_packages(tmp_path_factory.mktemp("copy"))
+    (code,) = re.findall(r"<!-- file: sliding_mode.py -->\n```python\n(.*?)```", PAGE, re.DOTALL)
+    (folder / "controller" / "laws" / "sliding_mode.py").write_text(code)
+    return folder
+
+
+def cosim(copy, *words):
+    return python(copy, "-m", "cosim", *words)
+
+
+def test_the_law_of_the_page_reaches_the_goal_past_an_obstacle(copy):
+    (copy / "past.toml").write_text(SCENARIO)
+    done = cosim(copy, "run", "past.toml", "--no-report", "--out", "run")
+    assert done.returncode == 0, done.stderr
+    summary = json.loads((copy / "run" / "summary.json").read_text())
+    record = pq.read_table(copy / "run" / "record.parquet")
+    place = np.column_stack([record[f"position.{axis}"] for axis in "xyz"])
+    assert summary["law"] == "sliding_mode"
+    assert np.linalg.norm(place[-1] - [4.0, 0.0, 2.0]) < 0.5
+    assert np.linalg.norm(place - [2.0, 0.2, 2.0], axis=1).min() > 0.5
+
+
+def test_it_is_compared_over_scenes(copy):
+    scenes = cosim(copy, "scenes", "--count", "4", "--seed", "3", "--out", "scenes.jsonl")
+    assert scenes.returncode == 0, scenes.stderr
+    words = ["scenes.jsonl", "--laws", "sliding_mode,pd", "--replays", "0", "--out", "side"]
+    done = cosim(copy, "compare", *words)
+    assert done.returncode == 0, done.stderr
+    assert (copy / "side" / "sliding_mode" / "results.parquet").exists()
+
+
+@pytest.mark.parametrize("words", [["package", "--to", "ssp", "--out", "x.ssp"], ["sweep", "--engine", "lanes"]])
+def test_where_it_has_no_c_it_is_refused_by_name(copy, words):
+    verb, *options = words
+    more = ["--vary", "initial.position.1=0:1", "--samples", "4", "--out", "swept"] if verb == "sweep" else []
+    done = cosim(copy, verb, "paper", "--set", "law.name=sliding_mode", *options, *more)
+    assert done.returncode == 2, done.stdout + done.stderr
+    assert "sliding_mode" in done.stderr and done.stderr.count("\n") == 1
