@@ -10,9 +10,9 @@ from cosim.export.format import Format
 
 def write(excerpt: Excerpt, path: Path) -> list[Path]:
     """Write the file, as `cosim.export.mcap_writer.write`."""
-    from cosim.export import mcap_writer
+    from cosim.export.mcap_writer import write as write_mcap
 
-    return mcap_writer.write(excerpt, path)
+    return write_mcap(excerpt, path)
 
 
 FORMAT = Format(

@@ -10,9 +10,9 @@ from cosim.export.format import Format
 
 def write(excerpt: Excerpt, path: Path) -> list[Path]:
     """Write the file, as `cosim.export.rrd_writer.write`."""
-    from cosim.export import rrd_writer
+    from cosim.export.rrd_writer import write as write_rrd
 
-    return rrd_writer.write(excerpt, path)
+    return write_rrd(excerpt, path)
 
 
 FORMAT = Format(write, needs=("rerun-sdk>=0.31",))
