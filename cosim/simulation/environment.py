@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from controller import VehicleState
 from controller.jit.bound_call import BoundCall
@@ -19,7 +18,6 @@ from controller.regions.shape import Shape
 from cosim.errors import CommandError, RunError
 from cosim.scenario.scenario import CRITERIA, Scenario
 from cosim.scenario.tables import PARKED_POSITION, Vector3
-from cosim.simulation.memberships import SOURCES, compute_memberships
 from cosim.simulation.signals import Array
 
 _AT_REST = (0.0, 0.0, 0.0)
@@ -42,7 +40,6 @@ class RegionEvaluation(NamedTuple):
     gradients: Array  # (n + 1, 3) of g by position, world frame
     rotation_gradients: Array  # (n + 1, 3) of g by rotation, body frame [1/rad]
     clearances: Array  # (n + 1,) m, or rad of attitude
-    memberships: Array  # (3,) of each criterion, that of its most pressing region
 
 
 class _Places(NamedTuple):
@@ -50,8 +47,6 @@ class _Places(NamedTuple):
 
     goal: PackedRegions
     regions: PackedRegions
-    criteria: NDArray[np.int64]  # (n,) of each region
-    ramp: float  # m, width of the memberships
 
 
 class RegionEnvironment:
@@ -76,7 +71,7 @@ class RegionEnvironment:
         self.criteria = np.array([CRITERIA.index(region.criterion) for region in scenario.regions], dtype=np.int64)
         self._goal_region, self._middle = scenario.goal_region, shape_center(scenario.goal)
         self._target = self._reached = self._new_target(None, self._middle)
-        self._places = _Places(self.goal, self.regions, self.criteria, scenario.arbiter.ramp)
+        self._places = _Places(self.goal, self.regions)
         self._names = ["goal", *(region.name for region in secondary)]
         self._streamed = ["goal"] if scenario.goal_streamed else []
         self._streamed += [region.region.name for region in scenario.regions if region.streamed and not region.seen]
@@ -84,7 +79,7 @@ class RegionEnvironment:
         self._seen = [i for i, region in enumerate(scenario.regions) if region.seen]
         # m, NED: where each would have been at time 0, had it always moved as it does now
         self._origins: Array = np.zeros((len(secondary), 3))
-        self._look_around = BoundCall(_evaluate)
+        self._evaluate_places = BoundCall(_evaluate)
 
     @property
     def goal(self) -> PackedRegions:
@@ -119,11 +114,11 @@ class RegionEnvironment:
 
         Returns
         -------
-        Outlook
+        RegionEvaluation
             All else zero.
         """
         n = len(self._names)
-        return RegionEvaluation(values, np.zeros((n, 3)), np.zeros((n, 3)), clearances, np.zeros(len(CRITERIA)))
+        return RegionEvaluation(values, np.zeros((n, 3)), np.zeros((n, 3)), clearances)
 
     def evaluate(self, state: VehicleState, evaluation: RegionEvaluation) -> None:
         """Evaluate goal and regions at a pose.
@@ -135,7 +130,7 @@ class RegionEnvironment:
         evaluation : RegionEvaluation
             Receives what they say.
         """
-        self._look_around(self._places, state, evaluation)
+        self._evaluate_places(self._places, state, evaluation)
 
     # ---- moved from outside ----
 
@@ -257,10 +252,6 @@ class RegionEnvironment:
 
     # ---- changed from outside ----
 
-    def set_ramp(self, width: float) -> None:
-        """Let the memberships reach 0 at another clearance [m]."""
-        self._places = self._places._replace(ramp=width)
-
     def set_gain(self, name: str, gain: float) -> None:
         """Give a secondary region another gain."""
         self.regions.gains[self._names.index(name) - 1] = gain
@@ -286,10 +277,9 @@ def _evaluate(places: _Places, state: VehicleState, found: RegionEvaluation) -> 
     p, e, g, c = state.position, state.quaternion, found.values, found.clearances
     evaluate_packed(places.goal, p, e, g[:1], found.gradients[:1], found.rotation_gradients[:1], c[:1])
     evaluate_packed(places.regions, p, e, g[1:], found.gradients[1:], found.rotation_gradients[1:], c[1:])
-    compute_memberships(c[1:], places.criteria, places.ramp, found.memberships)
 
 
-_evaluate = jit_noalloc(_evaluate, *SOURCES)
+_evaluate = jit_noalloc(_evaluate)
 
 
 def shape_center(shape: Shape) -> Vector3:

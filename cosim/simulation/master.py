@@ -26,6 +26,7 @@ from cosim.simulation.commands.commands import Command
 from cosim.simulation.commands.sources import CommandSource
 from cosim.simulation.environment import RegionEnvironment
 from cosim.simulation.lyapunov_signals import LyapunovSignals
+from cosim.simulation.memberships import Memberships
 from cosim.simulation.sensor import Sensor
 from cosim.simulation.signals import Array, Signals
 from fuzzy_arbiter import Arbiter
@@ -128,12 +129,15 @@ class Master:
         self._true_evaluation = self._given_evaluation = self.environment.empty_evaluation(values, clearances)
         if self._sensor is not None:
             self._given_evaluation = self.environment.empty_evaluation(np.zeros(n + 1), np.zeros(n + 1))
+        self._membership_functions = Memberships(
+            self._given_evaluation.clearances[1:], self.environment.criteria, self.scenario.arbiter.ramp, len(CRITERIA)
+        )
         moving = self.scenario.moving
         self._shifts = s.view(f"{moving[0]}.shift.x", 3 * len(moving)).reshape(-1, 3) if moving else np.empty((0, 3))
         self._memberships = s.view(f"membership.{CRITERIA[0]}", len(CRITERIA))
         self._weights = s.view(f"weight.{CRITERIA[0]}", len(CRITERIA))
         self._weights_of_regions: Array = np.zeros(n)
-        self._asked: list[float] | None = None  # memberships that the weights are of
+        self._weighed: list[float] | None = None  # memberships that the weights are of
         self._estimate = s.view("estimate.phi1", 4)
         n_reports = len(self.law.diagnostics)
         self._reports = n_reports > 0
@@ -281,9 +285,8 @@ class Master:
 
     def _apply_commands(self, command_handler: CommandHandler, commands: Sequence[Command]) -> None:
         """Follow the commands of this step, and take over what was changed."""
-        now = float(self.signals.row[0])
         for command in commands:
-            command_handler.apply(command, now)
+            command_handler.apply(command, float(self.signals.row[0]))
         if command_handler.control_regained:
             self.law = law_of(self.scenario)
         if isinstance(self.law, CompiledLaw) and (
@@ -293,7 +296,7 @@ class Master:
             if command_handler.heading is not None:
                 self.law.set_attitude(from_axis_angle(_DOWN, command_handler.heading))
         if command_handler.changed:
-            self.environment.set_ramp(command_handler.settings["arbiter.ramp"])
+            self._membership_functions.width = command_handler.settings["arbiter.ramp"]
         command_handler.mark_applied()
 
     def _evaluate_regions(self) -> None:
@@ -304,14 +307,14 @@ class Master:
         self.environment.evaluate(self.truth, self._true_evaluation)
 
     def _arbitrate(self) -> None:
-        """Turn memberships into weights.
+        """Turn clearances into memberships, and these into weights.
 
-        While the position is lost there is nothing to decide by: the last weights hold.
+        While the position is lost, the last weights hold.
         """
-        memberships = self._asked_memberships()
-        # what asks as it did in the step before is weighed as then, and stands in the row still
-        if memberships is not None and memberships != self._asked:
-            self._asked = memberships
+        memberships = self._compute_memberships()
+        # the same memberships have the same weights, which stand in the row still
+        if memberships is not None and memberships != self._weighed:
+            self._weighed = memberships
             self._memberships[:] = memberships
             self._compute_weights(memberships)
 
@@ -319,16 +322,15 @@ class Master:
         """Hand on what regions and arbiter made, in the step `before`, of what stood at its beginning (Jacobi)."""
         if before % self.scenario.arbiter_every == 0:
             self._compute_weights(self._memberships.tolist())
-        memberships = self._asked_memberships()
+        memberships = self._compute_memberships()
         if memberships is not None:
             self._memberships[:] = memberships
 
-    def _asked_memberships(self) -> list[float] | None:
-        """Return the membership of each criterion, that of its most pressing region; None if the position is lost."""
+    def _compute_memberships(self) -> list[float] | None:
+        """Return the membership of each criterion; None while the position is lost."""
         if self._sensor is not None and not np.isfinite(self.state.position).all():
             return None
-        memberships: list[float] = self._given_evaluation.memberships.tolist()
-        return memberships
+        return self._membership_functions.compute()
 
     def _compute_weights(self, memberships: list[float]) -> None:
         self._weights[:] = self.arbiter(memberships)
