@@ -14,6 +14,7 @@ import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from cosim.errors import RunError
+from cosim.io.format_number import require_format
 from cosim.simulation.signals import Array, Column
 
 MAX_ROWS = 100_000_001  # of a run of as many steps as a scenario may have
@@ -150,6 +151,8 @@ class Record(Rows):
                 schema = parquet.schema_arrow
                 rows += parquet.metadata.num_rows
                 _require_numbers(file, schema, rows)
+                said = (schema.metadata or {}).get(b"format", b"").decode("utf-8", "replace")
+                require_format(file, int(said) if said.isdecimal() else said or None)
                 columns.append(tuple(map(_column_of, schema)))
             if columns[-1] != columns[0]:
                 raise RunError(f"{file}: has other columns than {self._files[0].name}, expected parts of one record")

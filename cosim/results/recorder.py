@@ -12,6 +12,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from cosim.io.format_number import FORMAT
 from cosim.results.record import PARTS, RECORD, part_files
 from cosim.simulation.signals import Array, Column
 
@@ -217,5 +218,6 @@ def _schema(columns: Sequence[Column]) -> pa.Schema:
         [
             pa.field(c.name, pa.float64(), nullable=False, metadata={"unit": c.unit, "description": c.description})
             for c in columns
-        ]
+        ],
+        metadata={"format": str(FORMAT)},
     )

@@ -17,6 +17,7 @@ from cosim.campaigns.store.results import Results
 from cosim.campaigns.workers.work import Rows, Work
 from cosim.errors import RunError
 from cosim.io.atomic_file import write_atomic
+from cosim.io.format_number import FORMAT, require_format
 from cosim.io.strict_json import read_json
 
 PLAN = "campaign.json"
@@ -68,7 +69,7 @@ class CampaignFolder:
             raise RunError(f"{self.path}: exists and holds no campaign, expected a new folder or that of a campaign")
 
     def _claim(self, work: Work) -> None:
-        file, plan = self.path / PLAN, dict(work.plan)
+        file, plan = self.path / PLAN, {"format": FORMAT, **work.plan}
         if file.exists():
             if differing := difference(read_plan(self.path), json.loads(json.dumps(plan))):
                 raise RunError(f"{self.path}: holds another campaign ({differing}), expected a folder of its own")
@@ -172,7 +173,9 @@ def read_plan(path: Path) -> dict[str, Any]:
     """
     if not (path / PLAN).exists():
         raise RunError(f"{path}: holds no campaign ({PLAN} is missing)")
-    return read_json(path / PLAN)
+    plan = read_json(path / PLAN)
+    require_format(path / PLAN, plan.get("format"))
+    return plan
 
 
 def _lock(path: Path) -> int | None:
