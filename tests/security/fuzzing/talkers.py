@@ -73,7 +73,7 @@ class _Connection:
         return iter(self._messages)
 
 
-@reader("live view", "jsonl", "cosim.live.watching.sources:_live")
+@reader("live view", "jsonl", "cosim.live.watching.sources:_live", "cosim.live.messages:rows_of")
 def live_view(seeds: Seeds) -> Case:
     scenario = load_scenario("paper", ["commands.enabled=true", "commands.obstacles=2"])
     columns = load_columns(seeds)

@@ -12,7 +12,7 @@ import pytest
 
 from tests.security.fuzzing import files, folders, talkers
 from tests.security.fuzzing.mutations import mutated
-from tests.security.fuzzing.registry import KINDS, READERS, ROOT, Case, Seeds
+from tests.security.fuzzing.registry import KINDS, READERS, ROOT, Case
 
 FEW = 40  # changes of each reader's examples among the fast tests,
 MANY = int(os.environ.get("FUZZ_CHANGES", "120"))  # and among the slow ones; FUZZ_CHANGES=2000 takes an hour
@@ -20,17 +20,6 @@ LONGEST = 300  # characters of a message, beside the path that it names
 MEMORY = 400  # MB that all changes of a reader may take
 
 assert files and folders and talkers  # which register
-
-
-@pytest.fixture(scope="session")
-def all_seeds(tmp_path_factory, ordered_run):
-    return Seeds(tmp_path_factory, ordered_run)
-
-
-@pytest.fixture
-def seeds(all_seeds, monkeypatch):
-    all_seeds.patch = monkeypatch
-    return all_seeds
 
 
 def fault_of(case: Case, content: bytes) -> str:

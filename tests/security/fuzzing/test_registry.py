@@ -1,0 +1,97 @@
+"""No reader of the product is forgotten, and each goes through the functions that it is registered for."""
+
+from __future__ import annotations
+
+import ast
+import contextlib
+import sys
+import threading
+from collections.abc import Iterator
+
+import pytest
+
+from plant_fmu import PlantError, unpacking
+from plant_fmu.running import instance
+from tests.architecture.modules import FILES, tree_of
+from tests.security.fuzzing import files, folders, talkers
+from tests.security.fuzzing.registry import READERS
+
+assert files and folders and talkers  # which register
+
+PARSE = {"json.loads", "tomllib.loads", "csv.reader", "zipfile.ZipFile", "np.frombuffer"}
+METHODS = {
+    "ParquetFile", "read_table", "read_metadata", "read_schema", "fromstring", "iterparse", "unpack", "unpack_from",
+}  # fmt: skip
+ITS_OWN = {  # what parses nothing that comes from outside: why
+    "controller.jit.function_pointer:_lowered": "arguments of a compiled call",
+    "controller.laws.deployable.braking:_least_forces": "an array in memory",
+    "cosim.campaigns.reruns.repeat:_of_sweep": "a copy of the plan, which was read",
+    "cosim.campaigns.store.folder:CampaignFolder._claim": "a copy of its own plan",
+    "cosim.campaigns.sweeps.rows:_for_json": "a copy of its own plan",
+    "cosim.export.formats.npz:write": "writes",
+    "cosim.mavlink.conformance.ftp:_packet": "a payload whose length MAVLink fixes",
+    "cosim.mavlink.conformance.parameters:parameter_file": "a head whose length was just asked for",
+    "cosim.mavlink.services.parameters:Parameters._send_hash": "its own hash",
+    "cosim.mavlink.services.parameters:_as_float32": "its own number",
+    "cosim.results.recorder:Recorder._append_parts": "the parts that it has just written",
+    "cosim.scenario.scenario:Scenario.replace": "its own text",
+    "cosim.scenario.toml_file:shipped_titles": "what came with the package",
+    "cosim.scenario.toml_file:read_table": "calls the reader of plant_fmu.toml_tables",
+    "cosim.scenario.scenario:load_scenario": "calls cosim.scenario.toml_file:read_table",
+    "plant_fmu.archive:archive_of": "writes",
+    "plant_fmu.compiling.prebuilt:prebuilt_libraries": "what came with the package; test_prebuilt damages it",
+    "plant_fmu.compiling.signature:_signed": "what the linker wrote",
+    "plant_fmu.compiling.signature:signed_anew": "what the linker wrote",
+    "plant_fmu.compiling.universal:universal_library": "what the linker wrote",
+    "plant_fmu.importers.__main__:main": "what its parent process wrote",
+    "plant_fmu.importers.process:run_importer": "what its child process wrote",
+    "plant_fmu.running.channels:_as_bools": "an array in memory",
+}
+
+
+def parsing() -> Iterator[str]:
+    """Every function of the product that calls a parser, as ``module:function``."""
+
+    def walked(node: ast.AST, inside: str) -> Iterator[str]:
+        for child in ast.iter_child_nodes(node):
+            name = inside
+            if isinstance(child, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef):
+                name = f"{inside}.{child.name}" if inside else child.name
+            if isinstance(child, ast.Call):
+                called = ast.unparse(child.func)
+                if called in PARSE or called.rpartition(".")[2] in METHODS:
+                    yield inside
+            yield from walked(child, name)
+
+    for module, path in FILES.items():
+        yield from (f"{module}:{name}" for name in walked(tree_of(path), ""))
+
+
+def test_whoever_parses_is_fuzzed_or_reads_its_own():
+    opened = {name for reader in READERS.values() for name in reader.opens}
+    found = set(parsing())
+    assert sorted(found - opened - ITS_OWN.keys()) == []
+    assert sorted(ITS_OWN.keys() - found) == [], "no longer parse"
+
+
+@pytest.mark.parametrize("name", READERS)
+def test_sound_content_goes_through_what_is_named(name, seeds):
+    case, met = READERS[name].case(seeds), set()
+    for kept in (unpacking._tree_of, instance._described):  # which may have read the same before
+        kept.cache_clear()
+
+    def seen(frame, event, argument):
+        if event == "call":
+            met.add(f"{frame.f_globals.get('__name__')}:{frame.f_code.co_qualname}")
+
+    before = sys.getprofile()
+    threading.setprofile(seen)
+    sys.setprofile(seen)
+    try:
+        for content in case.contents:
+            with contextlib.suppress(PlantError):  # of a description without a binary
+                case.read(content)
+    finally:
+        sys.setprofile(before)
+        threading.setprofile(before)
+    assert sorted(set(READERS[name].opens) - met) == []
