@@ -2,6 +2,15 @@
 
 import sys
 
-from cosim.command_line.cli import main
+from plant_fmu.installing import install_hint
 
-sys.exit(main())
+try:
+    from cosim.command_line.cli import main
+
+    status = main()
+except ModuleNotFoundError as error:  # in a checkout that is not installed
+    if (error.name or "").partition(".")[0] in ("cosim", "controller", "fuzzy_arbiter", "plant_fmu"):
+        raise
+    print(f"cosim: {error.name} is not installed: run {install_hint('.')} in the checkout of subreach", file=sys.stderr)
+    status = 2
+sys.exit(status)

@@ -11,14 +11,18 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NoReturn
 
-from fuzzy_arbiter.arbiter import Arbiter
-from fuzzy_arbiter.command_line.definitions import BUILT_IN, convert, described, load_system
-from fuzzy_arbiter.command_line.drawing import IMAGES, PICTURES, draw, image, middles
-from fuzzy_arbiter.command_line.files import read_text, require_suffix
-from fuzzy_arbiter.command_line.values import evaluated, evaluated_table, sample
-from fuzzy_arbiter.engines import ENGINES
-from fuzzy_arbiter.errors import ArbiterError, InputError, one_line
-from fuzzy_arbiter.files import write_atomic
+try:
+    from fuzzy_arbiter.arbiter import Arbiter
+    from fuzzy_arbiter.command_line.definitions import BUILT_IN, convert, described, load_system
+    from fuzzy_arbiter.command_line.drawing import IMAGES, PICTURES, draw, image, middles
+    from fuzzy_arbiter.command_line.files import read_text, require_suffix
+    from fuzzy_arbiter.command_line.values import evaluated, evaluated_table, sample
+    from fuzzy_arbiter.engines import ENGINES
+    from fuzzy_arbiter.errors import ArbiterError, InputError, one_line
+    from fuzzy_arbiter.files import write_atomic
+except ModuleNotFoundError as error:  # in a checkout that is not installed
+    print(f"fuzzy_arbiter: {error.name} is not installed, expected what pyproject.toml requires", file=sys.stderr)
+    sys.exit(2)
 
 FINDINGS, FAULT, INTERRUPTED, NO_READER = 1, 2, 130, 141
 

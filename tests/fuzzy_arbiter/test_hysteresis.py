@@ -290,7 +290,8 @@ def test_what_is_no_arbiter():
 
 def test_repr_makes_the_same_again():
     h = steady(dwell=0.5, graded=True)
-    assert repr(eval(repr(h), {**vars(fuzzy_arbiter), **vars(propositions)})) == repr(h)
+    names = {name: getattr(fuzzy_arbiter, name) for name in fuzzy_arbiter.__all__}
+    assert repr(eval(repr(h), {**names, **vars(propositions)})) == repr(h)
 
 
 def test_hysteresis_takes_the_chatter_away():
