@@ -5,10 +5,10 @@ One JSON object a line. What the law is told of a scene is `KnownScene`; `plant_
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
+from typing import IO, NamedTuple
 
 import msgspec
 import numpy as np
@@ -24,6 +24,7 @@ from plant_fmu.toml_tables import decode
 from plant_fmu.vehicle import Vehicle
 
 Vector3 = tuple[float, float, float]
+_LONGEST = 1_000_000  # bytes of a scene: a pipe may never end its line
 
 
 @dataclass(frozen=True)
@@ -244,19 +245,19 @@ def read_scenes(path: Path) -> Iterator[Scene]:
         If the file cannot be read, or a line is no scene; it names the line and the key.
     """
     try:
-        with path.open("rb") as lines:
-            yield from scenes_in(lines, str(path))
+        with path.open("rb") as file:
+            yield from scenes_in(file, str(path))
     except OSError as error:
         raise ScenarioError(f"{path}: {error.strerror or error}") from error
 
 
-def scenes_in(lines: Iterable[bytes], name: str) -> Iterator[Scene]:
-    """Read scenes from lines.
+def scenes_in(file: IO[bytes], name: str) -> Iterator[Scene]:
+    """Read scenes from a file.
 
     Parameters
     ----------
-    lines : iterable of bytes
-        One JSON object each; blank ones are passed over.
+    file : file object
+        A line is one JSON object; blank ones are passed over. It may be a pipe that never ends.
     name : str
         Of where they come from, for messages.
 
@@ -270,7 +271,9 @@ def scenes_in(lines: Iterable[bytes], name: str) -> Iterator[Scene]:
     ScenarioError
         At a line that is no scene; it names the line and the key.
     """
-    for number, line in enumerate(lines, 1):
+    for number, line in enumerate(iter(lambda: file.readline(_LONGEST + 1), b""), 1):
+        if len(line) > _LONGEST:
+            raise ScenarioError(f"{name}, line {number}: has more than {_LONGEST} bytes, expected a scene")
         if line.strip():
             try:
                 yield decode_scene(line)

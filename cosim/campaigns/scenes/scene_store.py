@@ -8,6 +8,7 @@ import tempfile
 from collections.abc import Iterable
 from pathlib import Path
 from types import TracebackType
+from typing import IO
 
 import msgspec
 
@@ -46,8 +47,8 @@ class SceneStore:
                     raise ScenarioError("standard input: is closed")
                 self._read(sys.stdin.buffer, "standard input")
             else:
-                with path.open("rb") as lines:
-                    self._read(lines, str(path))
+                with path.open("rb") as file:
+                    self._read(file, str(path))
         except OSError as error:
             self.close()
             raise ScenarioError(f"{path}: {error.strerror or error}") from error
@@ -55,10 +56,10 @@ class SceneStore:
             self.close()
             raise
 
-    def _read(self, lines: Iterable[bytes], name: str) -> None:
+    def _read(self, file: IO[bytes], name: str) -> None:
         self._places: dict[int, tuple[int, int]] = {}  # by seed: offset and length
         digest, offset = hashlib.sha256(), 0
-        for scene in scenes_in(lines, name):
+        for scene in scenes_in(file, name):
             if scene.seed in self._places:
                 raise ScenarioError(f"{name}: seed {scene.seed} comes twice, expected each once")
             line = msgspec.json.encode(scene) + b"\n"

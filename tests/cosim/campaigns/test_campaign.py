@@ -285,6 +285,7 @@ def test_medians_of_nothing_are_none(tmp_path, scenes):
         ([*PLAIN, PLAIN[2]], "seed 20002 comes twice"),
         ([], "holds no scene"),
         ([PLAIN[0], {}], "line 2"),
+        ([PLAIN[0], {"x": "y" * 1_000_001}], "line 2: has more than 1000000 bytes"),
     ],
 )
 def test_scenes_that_cannot_be_flown_are_refused_before_anything_is_written(tmp_path, lines, words):
