@@ -11,6 +11,7 @@ import os
 import shutil
 import tempfile
 import zipfile
+import zlib
 from pathlib import Path
 
 import fmpy
@@ -105,7 +106,7 @@ def cached_fmu(what: Vehicle | Component, fmi: int) -> Path:
     require_version(fmi)
     name = f"{what.name}-fmi{fmi}-{_digest(what, fmi)[:16]}"
     path = Path(platformdirs.user_cache_dir("subreach")) / "fmu" / f"{name}-{_maker()}.fmu"
-    if zipfile.is_zipfile(path):  # one that was damaged is built anew
+    if _is_whole(path):  # one that was damaged is built anew
         return path
     component = _component(what)
     if prebuilt_libraries(component, token(component, fmi), fmi, [native_platform()]) is None:
@@ -113,7 +114,7 @@ def cached_fmu(what: Vehicle | Component, fmi: int) -> Path:
             find_compiler()  # so that a missing compiler is said before anything is written
         except BuildError:
             for other in sorted(path.parent.glob(f"{name}-*.fmu")):
-                if zipfile.is_zipfile(other):
+                if _is_whole(other):
                     return other
             raise
     try:
@@ -126,6 +127,24 @@ def cached_fmu(what: Vehicle | Component, fmi: int) -> Path:
         if path.exists():
             return path
     return build_fmu(component, fmi, path)
+
+
+def _is_whole(path: Path) -> bool:
+    """Return whether a file is there and all that is packed in it has its checksum."""
+    try:
+        about = path.stat()
+    except OSError:
+        return False
+    return _has_checksums(path, about.st_mtime_ns, about.st_size)
+
+
+@functools.lru_cache(maxsize=64)
+def _has_checksums(path: Path, written: int, size: int) -> bool:
+    try:
+        with zipfile.ZipFile(path) as archive:
+            return archive.testzip() is None
+    except (OSError, RuntimeError, ValueError, zipfile.BadZipFile, zlib.error, NotImplementedError):
+        return False
 
 
 @functools.lru_cache(maxsize=64)

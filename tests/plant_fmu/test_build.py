@@ -253,13 +253,16 @@ def test_a_place_that_cannot_be_written_is_said_before_the_work(tmp_path, monkey
 
 
 @pytest.mark.slow
-def test_a_damaged_file_in_the_cache_is_built_anew(tmp_path, monkeypatch):
+@pytest.mark.parametrize("damage", ["half", "a byte of a third", "a byte of two thirds"])
+def test_a_damaged_file_in_the_cache_is_built_anew(tmp_path, monkeypatch, damage):
     good = cached_fmu(load_vehicle("odin"), 3)
     whole = good.read_bytes()
+    at = len(whole) // 3 * (2 if "two" in damage else 1)
+    damaged = whole[: len(whole) // 2] if damage == "half" else whole[:at] + bytes([whole[at] ^ 1]) + whole[at + 1 :]
     monkeypatch.setattr("platformdirs.user_cache_dir", lambda *_, **__: str(tmp_path))
     path = tmp_path / "fmu" / good.name
     path.parent.mkdir()
-    path.write_bytes(whole[: len(whole) // 2])
+    path.write_bytes(damaged)
     assert cached_fmu(load_vehicle("odin"), 3) == path
     assert path.read_bytes() == whole
 
