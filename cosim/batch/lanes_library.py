@@ -93,7 +93,7 @@ def lanes_library(vehicle: Vehicle, flags: tuple[str, ...] = (), beside: Path | 
 def _is_whole(path: Path) -> bool:
     """Return whether a library in the cache is what was written there: loading half of one can end the process."""
     try:
-        return _checksum(path).read_text() == hashlib.sha256(path.read_bytes()).hexdigest()
+        return _checksum(path).read_bytes() == hashlib.sha256(path.read_bytes()).hexdigest().encode()
     except OSError:
         return False
 

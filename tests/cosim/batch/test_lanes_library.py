@@ -1,5 +1,6 @@
 """The library of the lanes: built once, whole, and anew where it is damaged."""
 
+import hashlib
 import logging
 
 import platformdirs
@@ -57,6 +58,16 @@ def test_it_is_built_once_and_anew_where_it_is_damaged(cache, tmp_path, monkeypa
     load()
     assert built == [library.name] * 2 and sorted(p.name for p in elsewhere.iterdir()) == [library.name, checksum.name]
     assert (elsewhere / library.name).stat().st_size > 1000
+
+
+@pytest.mark.parametrize("checksum", [None, b"", b"\xff" * 64, b"0" * 64])
+def test_a_library_is_whole_if_its_checksum_says_so(tmp_path, checksum):
+    (library := tmp_path / "lanes.so").write_bytes(b"library")
+    beside = tmp_path / "lanes.so.sha256"
+    beside.write_text(hashlib.sha256(b"library").hexdigest())
+    assert module._is_whole(library)
+    beside.unlink() if checksum is None else beside.write_bytes(checksum)
+    assert not module._is_whole(library)
 
 
 @pytest.mark.slow
