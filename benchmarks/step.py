@@ -43,7 +43,7 @@ def measure(steps: int, repeats: int) -> list[Row]:
     with Master(load_scenario("paper", ["arbiter.engine=closed"])) as master:
         fmu = f"FMU: set {len(master.plant.inputs)}, step, get {len(master.plant.outputs)}"
         add_calls(fmu, lambda: master.plant.step(1e-3))
-        flags, law = f"FMU: {len(master.plant.flags)} flags", "law alone, printed"
+        flags, law = f"FMU: {len(master.plant.flags)} flags", "law alone, ismail_dunnigan"
         add_calls(flags, master.plant.read_flags)
         add_calls("regions: 4 evaluated", master._evaluate_regions)
         add_calls("arbiter, closed form, inputs as before", master._arbitrate)

@@ -19,7 +19,17 @@ _LONGEST = 200  # characters, that a message shows of what came
 
 
 class RegionsSeen(NamedTuple):
-    """Regions as they stand at the pose that the law is told; row i is of region i, in the order of the scenario."""
+    """Regions as they stand at the pose that the law is told; row i is of region i, in the order of the scenario.
+
+    Examples
+    --------
+    >>> from controller import FunctionLaw
+    >>> def away(state, goal, regions, weights):
+    ...     nearest = regions.clearances.argmin()
+    ...     return [*(-100.0 * regions.gradients[nearest]), 0.0, 0.0, 0.0]
+    >>> FunctionLaw(away).output
+    'wrench'
+    """
 
     values: Array  # (n,) g, above 0 where violated, in the unit of the shape
     gradients: Array  # (n, 3) dg/dp, world frame
@@ -55,6 +65,14 @@ class FunctionLaw:
     ------
     LawError
         If `function` cannot be called, is a class, or `output` is neither of the two.
+
+    Examples
+    --------
+    >>> from controller import FunctionLaw
+    >>> def brake(state, goal, regions, weights):
+    ...     return -30.0 * state.velocity_body
+    >>> FunctionLaw(brake).output
+    'wrench'
     """
 
     diagnostics: tuple[Diagnostic, ...] = ()

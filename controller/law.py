@@ -26,7 +26,16 @@ G = TypeVar("G", bound=tuple[float, ...])
 
 
 class VehicleState(NamedTuple):
-    """What is measured of the vehicle."""
+    """What is measured of the vehicle.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from controller import VehicleState
+    >>> state = VehicleState(np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]), np.zeros(6), np.ones(8))
+    >>> state.velocity_body.shape
+    (6,)
+    """
 
     position: Array  # (3,) m, NED
     quaternion: Array  # (4,) from body to world
@@ -35,7 +44,14 @@ class VehicleState(NamedTuple):
 
 
 class VehicleModel(NamedTuple):
-    """What a law may know of a vehicle: neither weight nor buoyancy, nor their centres, nor the current."""
+    """What a law may know of a vehicle: neither weight nor buoyancy, nor their centres, nor the current.
+
+    Examples
+    --------
+    >>> from controller import VehicleModel
+    >>> VehicleModel._fields[-3:]
+    ('thruster_matrix', 'thrust_min', 'thrust_max')
+    """
 
     rigid_mass: Array  # (6, 6) kg, kg m2, with the centre of gravity taken to be the origin
     added_mass: Array  # (6, 6) kg, kg m, kg m2
@@ -56,7 +72,15 @@ class Diagnostic:
 
 
 class Law(Protocol):
-    """State, regions and weights in; forces out."""
+    """State, regions and weights in; forces out.
+
+    Examples
+    --------
+    >>> from controller import FunctionLaw, Law
+    >>> law: Law = FunctionLaw(lambda state, goal, regions, weights: [0.0] * 6)
+    >>> law.estimate.shape
+    (4,)
+    """
 
     diagnostics: tuple[Diagnostic, ...]  # what the numbers of `report` are
 
@@ -94,6 +118,14 @@ class CompiledLaw:
         Numbers that stay.
     memory : NamedTuple of ndarray
         What it keeps between steps; has at least ``estimate`` and ``report``.
+
+    Examples
+    --------
+    >>> from controller import LAWS
+    >>> LAWS["deployable"].output
+    'thrusters'
+    >>> LAWS["pd"].gains_type()._fields[:2]
+    ('k_p1', 'k_p2')
     """
 
     name: ClassVar[str]  # of its module, given when the laws are loaded

@@ -20,7 +20,14 @@ Rows = tuple[Vector3, Vector3, Vector3]
 
 
 class Gains(NamedTuple):
-    """The scalars of section VII, which are its defaults."""
+    """The scalars of section VII, which are its defaults.
+
+    Examples
+    --------
+    >>> from controller import Gains
+    >>> Gains(k_p1=10.0)._replace(k_q=5.0).k_q
+    5.0
+    """
 
     k_p1: float = 18.8  # N/m3, on the primary region (16)
     k_p2: float = 36.0  # N m, on attitude (26)

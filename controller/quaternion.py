@@ -19,7 +19,15 @@ Vector4 = tuple[float, float, float, float]
 
 @compiled
 def from_axis_angle(axis: Array, angle: float) -> Array:
-    """Return the quaternion of a rotation by `angle` [rad] about a unit `axis`, shape (3,): (1), (2)."""
+    """Return the quaternion of a rotation by `angle` [rad] about a unit `axis`, shape (3,): (1), (2).
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from controller.quaternion import from_axis_angle
+    >>> from_axis_angle(np.array([0.0, 0.0, 1.0]), np.pi).round(6)
+    array([0., 0., 0., 1.])
+    """
     e = np.empty(4)
     e[0] = np.cos(angle / 2.0)
     e[1:] = axis * np.sin(angle / 2.0)
@@ -51,7 +59,15 @@ def write_rotation(e: Array, R: Array) -> None:
 
 @compiled
 def rotation_matrix(e: Array) -> Array:
-    """Return R, shape (3, 3), from body to world, of a unit quaternion `e`: (3)."""
+    """Return R, shape (3, 3), from body to world, of a unit quaternion `e`: (3).
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from controller.quaternion import rotation_matrix
+    >>> rotation_matrix(np.array([0.0, 1.0, 0.0, 0.0])).diagonal()
+    array([ 1., -1., -1.])
+    """
     R = np.empty((3, 3))
     write_rotation(e, R)
     return R

@@ -5,9 +5,10 @@ These names are what a script or a notebook needs; each is imported when it is f
 Examples
 --------
 >>> import cosim
->>> scenario = cosim.load_scenario("paper").replace({"limit.force": 500.0})
->>> run = cosim.run_scenario(scenario)  # doctest: +SKIP
->>> run.frame()  # doctest: +SKIP
+>>> scenario = cosim.load_scenario("paper").replace({"limit.force": 500.0, "time.duration": 0.2})
+>>> run = cosim.run_scenario(scenario, "runs/short", report=False)
+>>> run.table().num_rows
+201
 """
 
 import importlib
@@ -16,6 +17,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from cosim.campaigns import Campaign, Comparison, Design, Sweep, compare, run_campaign, run_sweep, vary_from
     from cosim.campaigns.scenes.flyer import SceneFlyer
+    from cosim.campaigns.scenes.generator import generate_scenes
     from cosim.campaigns.scenes.scene import Scene, read_scenes
     from cosim.errors import CosimError, RunError
     from cosim.export import export_run
@@ -49,6 +51,7 @@ __all__ = [
     "check_scenario",
     "compare",
     "export_run",
+    "generate_scenes",
     "list_scenarios",
     "load_run",
     "load_scenario",
@@ -63,6 +66,7 @@ __all__ = [
 _HOMES = {
     "campaigns": {"Campaign", "Comparison", "Design", "Sweep", "compare", "run_campaign", "run_sweep", "vary_from"},
     "campaigns.scenes.flyer": {"SceneFlyer"},
+    "campaigns.scenes.generator": {"generate_scenes"},
     "campaigns.scenes.scene": {"Scene", "read_scenes"},
     "errors": {"CosimError", "RunError"},
     "export": {"export_run"},

@@ -45,6 +45,7 @@ class Arbiter:
 
     Examples
     --------
+    >>> from fuzzy_arbiter import Arbiter
     >>> Arbiter()([1.0, 1.0, 0.0])
     (1.0, 0.0, 0.0)
     """

@@ -33,6 +33,12 @@ class Term:
     ------
     DefinitionError
         If the shape is none.
+
+    Examples
+    --------
+    >>> from fuzzy_arbiter import Term, triangle
+    >>> Term("medium", triangle(0.0, 0.5, 1.0)).shape(0.25)
+    0.5
     """
 
     name: str
@@ -65,7 +71,7 @@ class Variable:
 
     Examples
     --------
-    >>> from fuzzy_arbiter import falling, rising
+    >>> from fuzzy_arbiter import Term, Variable, falling, rising
     >>> wind = Variable("wind", (0, 20), (Term("calm", falling(2, 6)), Term("strong", rising(4, 12))))
     >>> print(~wind["calm"])
     wind is not calm
@@ -137,6 +143,12 @@ class Output(Variable):
     DefinitionError
         If a term has no area in the universe, so that it has no centroid, or the universe is wider than 1e100 or
         narrower than 1e-100, so that floating point cannot hold its moments.
+
+    Examples
+    --------
+    >>> from fuzzy_arbiter import Output, Term, falling, rising
+    >>> Output("speed", (0.0, 2.0), (Term("slow", falling(0.0, 2.0)), Term("fast", rising(0.0, 2.0)))).term_names
+    ('slow', 'fast')
     """
 
     default: float | None = None
@@ -189,6 +201,13 @@ class System:
     ------
     DefinitionError
         If names clash, or a rule speaks of what there is not.
+
+    Examples
+    --------
+    >>> from fuzzy_arbiter import Arbiter
+    >>> system = Arbiter().system
+    >>> [variable.name for variable in system.inputs], len(system.rules)
+    (['obstacle', 'shape', 'depth'], 8)
     """
 
     inputs: tuple[Variable, ...]

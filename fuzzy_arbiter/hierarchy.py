@@ -40,6 +40,13 @@ class Criterion:
     ------
     DefinitionError
         If both terms have one name, or the membership jumps or is the same everywhere.
+
+    Examples
+    --------
+    >>> from fuzzy_arbiter import Arbiter, Criterion, rising
+    >>> arbiter = Arbiter([Criterion("battery", membership=rising(0.0, 1.0)), Criterion("survey")])
+    >>> [round(weight, 3) for weight in arbiter({"battery": 0.9, "survey": 1.0})]
+    [0.972, 0.028]
     """
 
     name: str
@@ -110,6 +117,12 @@ def prioritised(
     ------
     DefinitionError
         If there is no criterion, two share a name, or the pattern has not two terms.
+
+    Examples
+    --------
+    >>> from fuzzy_arbiter import prioritised
+    >>> len(prioritised().rules), len(prioritised(form="complete").rules)
+    (8, 24)
     """
     criteria = all_of(Criterion, criteria, "criteria", "a sequence of Criterion")
     if not criteria:

@@ -18,6 +18,12 @@ def ramp(clearance: float, width: float) -> float:
     -------
     float
         Degree in [0, 1]; NaN for a clearance that is NaN.
+
+    Examples
+    --------
+    >>> from fuzzy_arbiter import ramp
+    >>> ramp(-0.1, 0.2), ramp(0.05, 0.2), ramp(0.3, 0.2)
+    (1.0, 0.75, 0.0)
     """
     if clearance <= 0.0:
         return 1.0

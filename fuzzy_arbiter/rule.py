@@ -26,6 +26,13 @@ class Rule:
     ------
     DefinitionError
         If there is no conclusion, or the weight is outside its range.
+
+    Examples
+    --------
+    >>> from fuzzy_arbiter import Arbiter
+    >>> system = Arbiter().system
+    >>> print(system.rules[0])
+    if obstacle is exist then alpha_1 is high
     """
 
     condition: Proposition

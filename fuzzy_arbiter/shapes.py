@@ -32,6 +32,7 @@ class Shape:
 
     Examples
     --------
+    >>> from fuzzy_arbiter import Shape
     >>> Shape(((0, 1), (2, 0)))(0.5)
     0.75
     """
@@ -187,6 +188,12 @@ def triangle(left: float, peak: float, right: float) -> Shape:
     -------
     Shape
         As ``trimf`` of other tools.
+
+    Examples
+    --------
+    >>> from fuzzy_arbiter import triangle
+    >>> triangle(0.0, 1.0, 3.0)(2.0)
+    0.5
     """
     return trapezoid(left, peak, peak, right)
 
@@ -203,6 +210,12 @@ def trapezoid(left: float, rise: float, fall: float, right: float) -> Shape:
     -------
     Shape
         As ``trapmf`` of other tools.
+
+    Examples
+    --------
+    >>> from fuzzy_arbiter import trapezoid
+    >>> trapezoid(0.0, 1.0, 2.0, 4.0)(3.0)
+    0.5
     """
     top = ((rise, 1.0),) if rise == fall else ((rise, 1.0), (fall, 1.0))
     return Shape(((left, 0.0), *top, (right, 0.0)))
@@ -220,6 +233,12 @@ def rising(start: float, end: float) -> Shape:
     -------
     Shape
         0 below the start and 1 above the end.
+
+    Examples
+    --------
+    >>> from fuzzy_arbiter import rising
+    >>> rising(0.0, 2.0)(0.5)
+    0.25
     """
     return Shape(((start, 0.0), (end, 1.0)))
 
@@ -236,5 +255,11 @@ def falling(start: float, end: float) -> Shape:
     -------
     Shape
         1 below the start and 0 above the end.
+
+    Examples
+    --------
+    >>> from fuzzy_arbiter import falling
+    >>> falling(0.0, 2.0)(0.5)
+    0.75
     """
     return Shape(((start, 1.0), (end, 0.0)))

@@ -65,6 +65,13 @@ def build_fmu(what: Vehicle | Component, fmi: int, out: Path, platforms: str = N
     ------
     BuildError
         If a platform is not known, there is no compiler, it fails, or `out` cannot be written.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from plant_fmu import build_fmu, load_vehicle
+    >>> build_fmu(load_vehicle("odin"), 3, Path("odin.fmu")).name
+    'odin.fmu'
     """
     require_version(fmi)
     out = Path(out)

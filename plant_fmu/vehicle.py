@@ -114,7 +114,15 @@ class _File:
 
 @dataclass(frozen=True, eq=False)
 class Vehicle:
-    """A checked vehicle in SI units; body frame x forward, y right, z down."""
+    """A checked vehicle in SI units; body frame x forward, y right, z down.
+
+    Examples
+    --------
+    >>> from plant_fmu import load_vehicle
+    >>> odin = load_vehicle("odin")
+    >>> odin.n_thrusters, odin.mass
+    (8, 125.0)
+    """
 
     name: str  # a C identifier
     title: str  # one line for people
@@ -152,7 +160,14 @@ class Vehicle:
 
 
 def shipped_vehicles() -> list[str]:
-    """Return the names of the vehicles that come with the package."""
+    """Return the names of the vehicles that come with the package.
+
+    Examples
+    --------
+    >>> from plant_fmu import shipped_vehicles
+    >>> shipped_vehicles()[:2]
+    ['bluerov2_heavy', 'bluerov2_heavy_wu']
+    """
     return sorted(f.name.removesuffix(".toml") for f in _folder().iterdir() if f.name.endswith(".toml"))
 
 
@@ -175,6 +190,12 @@ def load_vehicle(name_or_file: str | Path) -> Vehicle:
         If there is no such vehicle, or its numbers cannot be right.
     TableError
         If the file has a missing, unknown or mistyped key.
+
+    Examples
+    --------
+    >>> from plant_fmu import load_vehicle
+    >>> load_vehicle("bluerov2_heavy").title
+    'BlueROV2 Heavy, after von Benzon et al. 2022'
     """
     text = str(name_or_file)
     path = Path(text)

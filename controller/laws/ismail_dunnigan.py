@@ -84,7 +84,15 @@ def memory_of(desired_quaternion: Array, period: Array, n_regions: int) -> Ismai
 
 
 class IsmailDunniganLaw(WrenchLaw):
-    """The law as printed: a wrench without limits."""
+    """The law as printed: a wrench without limits.
+
+    Examples
+    --------
+    >>> from controller import Gains, IsmailDunniganLaw
+    >>> law = IsmailDunniganLaw(Gains(), desired_quaternion=[1.0, 0.0, 0.0, 0.0], period=0.01, n_regions=2)
+    >>> law.estimate
+    array([0., 0., 0., 0.])
+    """
 
     function = staticmethod(step)
     memory_of = staticmethod(memory_of)

@@ -39,6 +39,12 @@ class Region:
     """A shape to be kept within (``"in"``), or kept out of (``"out"``), at rest or on the move.
 
     A hard region must not be violated; a soft one pushes. Which laws tell them apart is said there.
+
+    Examples
+    --------
+    >>> from controller.regions import Region, Sphere
+    >>> Region("rock", Sphere((2.0, 0.0, 2.0), 0.5), keep="out", gain=100.0).hard
+    True
     """
 
     name: str
@@ -163,6 +169,16 @@ def pack(regions: Sequence[Region]) -> PackedRegions:
     -------
     PackedRegions
         In the same order.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from controller.regions import DepthBand, Region, Sphere, pack
+    >>> regions = pack([Region("rock", Sphere((2.0, 0.0, 2.0), 0.5), "out"), Region("band", DepthBand(2.0, 0.5), "in")])
+    >>> g, slopes, turns, clearances = np.zeros(2), np.zeros((2, 3)), np.zeros((2, 3)), np.zeros(2)
+    >>> regions.evaluate(np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]), g, slopes, turns, clearances)
+    >>> clearances.round(3)
+    array([ 2.328, -1.5  ])
     """
     packed = [region.shape.packed() for region in regions]
     kinds = np.array([region.shape.kind for region in regions], dtype=np.int64)

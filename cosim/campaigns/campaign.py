@@ -22,7 +22,17 @@ from cosim.io.strict_json import json_text
 
 @dataclass(frozen=True)
 class Campaign:
-    """Where a campaign was written, and what it came to."""
+    r"""Where a campaign was written, and what it came to.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> import cosim
+    >>> _ = Path("scenes.jsonl").write_text("\n".join(cosim.generate_scenes(2)))
+    >>> campaign = cosim.run_campaign(Path("scenes.jsonl"), "pd", Path("pd"))
+    >>> campaign.flown, len(campaign.results)
+    (2, 2)
+    """
 
     folder: Path
     results: Results
@@ -40,7 +50,7 @@ def run_campaign(
     executor: Executor | None = None,
     progress: bool = False,
 ) -> Campaign:
-    """Fly every scene of a file by a law, or those that are left, and write results and summary.
+    r"""Fly every scene of a file by a law, or those that are left, and write results and summary.
 
     Parameters
     ----------
@@ -80,6 +90,14 @@ def run_campaign(
         If there is no FMU of the vehicle.
     KeyboardInterrupt
         After Ctrl-C; what is done is kept.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> import cosim
+    >>> _ = Path("scenes.jsonl").write_text("\n".join(cosim.generate_scenes(2)))
+    >>> cosim.run_campaign(Path("scenes.jsonl"), "pd", Path("pd")).summary["scenes"]
+    2
     """
     task = SceneTask(law, gains_from(law) if gains is None else gains, conditions or Conditions())
     with contextlib.ExitStack() as stack:

@@ -28,7 +28,17 @@ from cosim.report.report import FIGURES
 
 @dataclass(frozen=True)
 class Comparison:
-    """Where a comparison was written, and what it came to."""
+    r"""Where a comparison was written, and what it came to.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> import cosim
+    >>> _ = Path("scenes.jsonl").write_text("\n".join(cosim.generate_scenes(2)))
+    >>> comparison = cosim.compare(Path("scenes.jsonl"), ["pd", "sun_cheah"], Path("both"))
+    >>> sorted(comparison.campaigns)
+    ['pd', 'sun_cheah']
+    """
 
     folder: Path
     campaigns: dict[str, Campaign]  # by law
@@ -44,7 +54,7 @@ def compare(
     workers: int = 1,
     progress: bool = False,
 ) -> Comparison:
-    """Fly the same scenes by several laws, and write the numbers side by side.
+    r"""Fly the same scenes by several laws, and write the numbers side by side.
 
     Parameters
     ----------
@@ -75,6 +85,15 @@ def compare(
         If the laws cannot be compared, or the folder holds something else or cannot be written.
     Exception
         Whatever `run_campaign` raises.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> import cosim
+    >>> _ = Path("scenes.jsonl").write_text("\n".join(cosim.generate_scenes(2)))
+    >>> comparison = cosim.compare(Path("scenes.jsonl"), ["pd", "sun_cheah"], Path("both"))
+    >>> sorted(path.name for path in comparison.folder.iterdir() if path.is_dir())
+    ['pd', 'sun_cheah']
     """
     for law in laws:
         law_named(law)

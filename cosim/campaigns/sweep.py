@@ -20,7 +20,18 @@ from cosim.scenario.scenario import Scenario
 
 @dataclass(frozen=True)
 class Sweep:
-    """Where a sweep was written, and what it came to."""
+    """Where a sweep was written, and what it came to.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> import cosim
+    >>> design = cosim.Design(cosim.vary_from(["initial.position.1=-4:-2"]), samples=2)
+    >>> scenario = cosim.load_scenario("paper", ["time.duration=0.2", "arbiter.engine=closed"])
+    >>> sweep = cosim.run_sweep(scenario, design, Path("sweep"))
+    >>> sweep.results["initial.position.1"].shape
+    (2,)
+    """
 
     folder: Path
     results: Results
@@ -74,6 +85,16 @@ def run_sweep(
         If there is no FMU of the vehicle.
     KeyboardInterrupt
         After Ctrl-C; what is done is kept.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> import cosim
+    >>> design = cosim.Design(cosim.vary_from(["initial.position.1=-4:-2"]), samples=2)
+    >>> scenario = cosim.load_scenario("paper", ["time.duration=0.2", "arbiter.engine=closed"])
+    >>> sweep = cosim.run_sweep(scenario, design, Path("sweep"))
+    >>> sweep.flown
+    2
     """
     work = SweepWork(scenario, design, engine)
     summary: dict[str, Any] = {}

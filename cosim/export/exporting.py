@@ -57,6 +57,13 @@ def export_run(
     ExportError
         If the format is unknown, cannot hold what was asked for or needs what is not installed, a pattern fits no
         signal, or a file is in the way or of the run itself.
+
+    Examples
+    --------
+    >>> import cosim
+    >>> run = cosim.run_scenario(cosim.load_scenario("paper", ["time.duration=0.2"]), "run", report=False)
+    >>> [path.name for path in cosim.export_run(run.folder, "csv", signals=["time", "position.*"])]
+    ['run.csv', 'run.units.csv']
     """
     if to not in FORMATS:
         raise ExportError(f"--to {to}: expected one of {', '.join(FORMATS)}")

@@ -17,7 +17,15 @@ from cosim.simulation.signals import Column
 
 @dataclass(frozen=True)
 class Mavlink:
-    """Where a run is to be a MAVLink vehicle, and how."""
+    """Where a run is to be a MAVLink vehicle, and how.
+
+    Examples
+    --------
+    >>> import cosim
+    >>> link = cosim.Mavlink((cosim.parse_endpoint("udpout:127.0.0.1:14550"),), cosim.MavlinkOptions(profile="ardusub"))
+    >>> link.options.system_id
+    1
+    """
 
     endpoints: tuple[Endpoint, ...]
     options: MavlinkOptions

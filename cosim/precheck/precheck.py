@@ -13,7 +13,17 @@ from cosim.scenario.scenario import Scenario
 
 @dataclass(frozen=True)
 class Check:
-    """All findings of a scenario."""
+    """All findings of a scenario.
+
+    Examples
+    --------
+    >>> import cosim
+    >>> check = cosim.check_scenario(cosim.load_scenario("docking"))
+    >>> check.holds
+    True
+    >>> [finding.name for finding in check.findings][:2]
+    ['Property 1', 'Property 2']
+    """
 
     scenario: str
     title: str
@@ -49,6 +59,14 @@ def check_scenario(scenario: Scenario) -> Check:
     ------
     DefinitionError
         If the arbiter cannot be set up.
+
+    Examples
+    --------
+    >>> import cosim
+    >>> check = cosim.check_scenario(cosim.load_scenario("paper-limited"))
+    >>> for finding in check.failed[:1]:
+    ...     print(finding.name)
+    (38) 1, 2
     """
     findings = [*vehicle_findings(scenario), *region_findings(scenario), *thrust_findings(scenario)]
     if scenario.law.name == "ismail_dunnigan":

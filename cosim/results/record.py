@@ -141,6 +141,15 @@ class Record(Rows):
     ------
     RunError
         If they cannot be read.
+
+    Examples
+    --------
+    >>> import cosim
+    >>> run = cosim.run_scenario(cosim.load_scenario("paper", ["time.duration=0.2"]), "run", report=False)
+    >>> run.record["position.z"].shape
+    (201,)
+    >>> run.record.units["position.z"]
+    'm'
     """
 
     def __init__(self, files: Sequence[Path]) -> None:

@@ -38,10 +38,12 @@ class Run:
 
     Examples
     --------
-    >>> run = load_run(Path("runs/docking"))  # doctest: +SKIP
-    >>> run.summary["reach_time"]  # doctest: +SKIP
-    41.3
-    >>> run.frame()[["time", "goal.clearance"]]  # doctest: +SKIP
+    >>> import cosim
+    >>> run = cosim.run_scenario(cosim.load_scenario("paper", ["time.duration=0.2"]), "run", report=False)
+    >>> run.summary["status"], run.summary["reached"]
+    ('completed', False)
+    >>> run.table().num_rows
+    201
     """
 
     folder: Path
@@ -173,6 +175,13 @@ def load_run(path: Path) -> Run:
         If the folder holds no run that can be read.
     ScenarioError
         If its scenario is none.
+
+    Examples
+    --------
+    >>> import cosim
+    >>> run = cosim.run_scenario(cosim.load_scenario("paper", ["time.duration=0.2"]), "run", report=False)
+    >>> cosim.load_run(run.folder).summary["status"]
+    'completed'
     """
     if not (path / SCENARIO).is_file():
         raise RunError(f"{path}: holds no run ({SCENARIO} is missing)")

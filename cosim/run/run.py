@@ -121,6 +121,13 @@ def run_scenario(
         If a law of one's own returns no forces; what was recorded until then is left readable.
     PlantError
         If the FMU refuses the scenario, or fails in a step; what was recorded until then is left readable.
+
+    Examples
+    --------
+    >>> import cosim
+    >>> scenario = cosim.load_scenario("paper").replace({"time.duration": 0.2})
+    >>> cosim.run_scenario(scenario, "run", report=False).summary["simulated_time"]
+    0.2
     """
     out = None if out is None else Path(out)
     if law is not None:

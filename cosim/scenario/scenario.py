@@ -66,7 +66,15 @@ VEHICLE_COPY = "vehicle.toml"  # name in a run folder of a vehicle that is not s
 
 @dataclass(frozen=True, eq=False)
 class Scenario:
-    """A checked scenario."""
+    """A checked scenario.
+
+    Examples
+    --------
+    >>> import cosim
+    >>> scenario = cosim.load_scenario("paper-limited")
+    >>> scenario.limit.force, scenario.replace({"limit.force": 500.0}).limit.force
+    (108.0, 500.0)
+    """
 
     name: str
     vehicle: Vehicle
@@ -200,6 +208,12 @@ def load_scenario(name_or_file: str | Path, overrides: Sequence[str] = ()) -> Sc
     ------
     ScenarioError
         If there is no such scenario, a key is unknown, missing or mistyped, or a value cannot be.
+
+    Examples
+    --------
+    >>> import cosim
+    >>> cosim.load_scenario("paper", ["time.duration=2.0"]).time.duration
+    2.0
     """
     text = str(name_or_file)
     if not text.endswith(".toml") and text not in list_scenarios():

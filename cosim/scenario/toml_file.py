@@ -14,7 +14,14 @@ _SHOWN = 80  # characters of what is absurdly long
 
 
 def list_scenarios() -> list[str]:
-    """Return the names of the scenarios that come with the package."""
+    """Return the names of the scenarios that come with the package.
+
+    Examples
+    --------
+    >>> import cosim
+    >>> cosim.list_scenarios()[:3]
+    ['dense-field', 'depth-transit', 'docking']
+    """
     return sorted(f.name.removesuffix(".toml") for f in _folder().iterdir() if f.name.endswith(".toml"))
 
 

@@ -20,13 +20,13 @@ from cosim.scenario.law_factory import law_of, with_custom_law
 from cosim.scenario.scenario import CRITERIA, Scenario
 from cosim.scenario.start_values import start_values
 from cosim.simulation.actuators import Actuators
+from cosim.simulation.arbitration import Arbitration
 from cosim.simulation.columns import columns_of
 from cosim.simulation.commands.command_handler import CommandHandler
 from cosim.simulation.commands.commands import Command
 from cosim.simulation.commands.sources import CommandSource
 from cosim.simulation.environment import RegionEnvironment
 from cosim.simulation.lyapunov_signals import LyapunovSignals
-from cosim.simulation.memberships import Memberships
 from cosim.simulation.sensor import Sensor
 from cosim.simulation.signals import Array, Signals
 from fuzzy_arbiter import Arbiter
@@ -75,6 +75,15 @@ class Master:
         If law or arbiter cannot be set up.
     ScenarioError
         If the scenario asks for what a law that is a function has not.
+
+    Examples
+    --------
+    >>> import cosim
+    >>> with cosim.Master(cosim.load_scenario("paper")) as master:
+    ...     for k in range(3):
+    ...         master.step(k)
+    ...     print(master.row[0].round(3))
+    0.002
     """
 
     def __init__(self, scenario: Scenario, law: Law | None = None) -> None:
@@ -129,15 +138,13 @@ class Master:
         self._true_evaluation = self._given_evaluation = self.environment.empty_evaluation(values, clearances)
         if self._sensor is not None:
             self._given_evaluation = self.environment.empty_evaluation(np.zeros(n + 1), np.zeros(n + 1))
-        self._membership_functions = Memberships(
-            self._given_evaluation.clearances[1:], self.environment.criteria, self.scenario.arbiter.ramp, len(CRITERIA)
-        )
         moving = self.scenario.moving
         self._shifts = s.view(f"{moving[0]}.shift.x", 3 * len(moving)).reshape(-1, 3) if moving else np.empty((0, 3))
-        self._memberships = s.view(f"membership.{CRITERIA[0]}", len(CRITERIA))
-        self._weights = s.view(f"weight.{CRITERIA[0]}", len(CRITERIA))
-        self._weights_of_regions: Array = np.zeros(n)
-        self._weighed: list[float] | None = None  # memberships that the weights are of
+        count, first = len(CRITERIA), CRITERIA[0]
+        self._arbitration = Arbitration(
+            self.arbiter, self._given_evaluation.clearances[1:], self.environment.criteria, self.scenario.arbiter.ramp,
+            s.view(f"membership.{first}", count), s.view(f"weight.{first}", count),
+        )  # fmt: skip
         self._estimate = s.view("estimate.phi1", 4)
         n_reports = len(self.law.diagnostics)
         self._reports = n_reports > 0
@@ -150,7 +157,11 @@ class Master:
             )
         if self.scenario.record.lyapunov:
             out = s.view("lyapunov.printed", 4)
-            goal, regions, weights = self.environment.goal, self.environment.regions, self._weights_of_regions
+            goal, regions, weights = (
+                self.environment.goal,
+                self.environment.regions,
+                self._arbitration.region_weights,
+            )
             self._lyapunov = LyapunovSignals(self.scenario, truth, goal, regions, weights, self._estimate, out)
 
     @property
@@ -296,7 +307,7 @@ class Master:
             if command_handler.heading is not None:
                 self.law.set_attitude(from_axis_angle(_DOWN, command_handler.heading))
         if command_handler.changed:
-            self._membership_functions.width = command_handler.settings["arbiter.ramp"]
+            self._arbitration.ramp = command_handler.settings["arbiter.ramp"]
         command_handler.mark_applied()
 
     def _evaluate_regions(self) -> None:
@@ -307,34 +318,20 @@ class Master:
         self.environment.evaluate(self.truth, self._true_evaluation)
 
     def _arbitrate(self) -> None:
-        """Turn clearances into memberships, and these into weights.
-
-        While the position is lost, the last weights hold.
-        """
-        memberships = self._compute_memberships()
-        # the same memberships have the same weights, which stand in the row still
-        if memberships is not None and memberships != self._weighed:
-            self._weighed = memberships
-            self._memberships[:] = memberships
-            self._compute_weights(memberships)
+        """Decide by the regions as they stand; while the position is lost, the last weights hold."""
+        if self._position_known:
+            self._arbitration.decide()
 
     def _exchange_delayed(self, before: int) -> None:
         """Hand on what regions and arbiter made, in the step `before`, of what stood at its beginning (Jacobi)."""
         if before % self.scenario.arbiter_every == 0:
-            self._compute_weights(self._memberships.tolist())
-        memberships = self._compute_memberships()
-        if memberships is not None:
-            self._memberships[:] = memberships
+            self._arbitration.weigh()
+        if self._position_known:
+            self._arbitration.update_memberships()
 
-    def _compute_memberships(self) -> list[float] | None:
-        """Return the membership of each criterion; None while the position is lost."""
-        if self._sensor is not None and not np.isfinite(self.state.position).all():
-            return None
-        return self._membership_functions.compute()
-
-    def _compute_weights(self, memberships: list[float]) -> None:
-        self._weights[:] = self.arbiter(memberships)
-        self._weights_of_regions[:] = self._weights[self.environment.criteria]
+    @property
+    def _position_known(self) -> bool:
+        return self._sensor is None or bool(np.isfinite(self.state.position).all())
 
     def _control(self) -> None:
         """Ask the law, or the sticks, for forces of the coming period, and bring them to the plant's inputs."""
@@ -346,7 +343,9 @@ class Master:
         self._estimate[...] = self.law.estimate
         law, by_wrench = self.law, self.law.output == "wrench"
         forces = actuators.command if by_wrench else actuators.thrusts
-        law.step(self.state, self.environment.goal, self.environment.regions, self._weights_of_regions, forces)
+        law.step(
+            self.state, self.environment.goal, self.environment.regions, self._arbitration.region_weights, forces
+        )
         if self._reports:
             self._report[...] = law.report
         if by_wrench:

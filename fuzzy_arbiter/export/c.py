@@ -32,6 +32,14 @@ def to_c(system: System) -> str:
         system's, with an underscore for each sign that C has not in names. Files of different names go into one
         program. It gives what the arbiter's own engine does, to the last bit if the compiler does not contract
         operations (``-ffp-contract=off``) and keeps to the rules of NaN (no ``-ffast-math``).
+
+    Examples
+    --------
+    >>> from fuzzy_arbiter import Arbiter
+    >>> system = Arbiter().system
+    >>> from fuzzy_arbiter.export import to_c
+    >>> "arbiter_evaluate" in to_c(system)
+    True
     """
     return "\n".join(_file(program(system))) + "\n"
 

@@ -55,6 +55,14 @@ def to_python(system: System) -> str:
         A module with ``evaluate(inputs, outputs)``, which fills the outputs and returns 0, or -i if the i-th input is
         not in its universe, or k if no rule fires for the k-th output; and ``weights(inputs)``, which returns a tuple
         or raises ``ValueError``. Both give what the arbiter's own engine does, to the last bit.
+
+    Examples
+    --------
+    >>> from fuzzy_arbiter import Arbiter
+    >>> system = Arbiter().system
+    >>> from fuzzy_arbiter.export import to_python
+    >>> "def " in to_python(system)
+    True
     """
     return "\n".join(_module(program(system))) + "\n"
 

@@ -59,6 +59,14 @@ def reads(text: str, format: str) -> System:
         If there is no such format, the text is not of it, or it says what this package does not know.
     DefinitionError
         If what it defines cannot be.
+
+    Examples
+    --------
+    >>> from fuzzy_arbiter import Arbiter
+    >>> system = Arbiter().system
+    >>> from fuzzy_arbiter.formats import reads, writes
+    >>> reads(writes(system, "fcl"), "fcl") == system
+    True
     """
     _require_format(format, f"format is {format!r}")
     if not isinstance(text, str):
@@ -87,6 +95,14 @@ def writes(system: System, format: str) -> str:
         If there is no such format.
     UnsupportedError
         If the format cannot say all of the system; what it cannot say is named.
+
+    Examples
+    --------
+    >>> from fuzzy_arbiter import Arbiter
+    >>> system = Arbiter().system
+    >>> from fuzzy_arbiter.formats import writes
+    >>> print(writes(system, "fll").splitlines()[0])
+    # fuzzy_arbiter: normalisation = range
     """
     _require_format(format, f"format is {format!r}")
     if not isinstance(system, System):
@@ -113,6 +129,15 @@ def load(path: str | Path) -> System:
         If the file cannot be read, is not of its format, or says what this package does not know.
     DefinitionError
         If what it defines cannot be.
+
+    Examples
+    --------
+    >>> from fuzzy_arbiter import Arbiter
+    >>> system = Arbiter().system
+    >>> from fuzzy_arbiter.formats import load, save
+    >>> save(system, "arbiter.toml")
+    >>> load("arbiter.toml") == system
+    True
     """
     format = _format(path)
     try:
@@ -149,6 +174,15 @@ def save(system: System, path: str | Path) -> None:
         If the format cannot say all of the system; nothing is written then.
     FormatError
         If the file cannot be written.
+
+    Examples
+    --------
+    >>> from fuzzy_arbiter import Arbiter
+    >>> system = Arbiter().system
+    >>> from fuzzy_arbiter.formats import save
+    >>> save(system, "arbiter.json")
+    >>> Arbiter.load("arbiter.json").system == system
+    True
     """
     write_atomic(path, writes(system, _format(path)).encode("utf-8"))
 

@@ -42,7 +42,8 @@ def fold_normalization(system: System) -> System:
     Examples
     --------
     >>> from fuzzy_arbiter import prioritised
-    >>> natively(prioritised()).outputs[0].universe
+    >>> from fuzzy_arbiter.formats import fold_normalization
+    >>> fold_normalization(prioritised()).outputs[0].universe
     (-1.0, 2.0)
     """
     if system.normalisation == "none":

@@ -57,6 +57,13 @@ def surface(
         If there is no such output or input.
     InputError
         If a value is not a number in its universe.
+
+    Examples
+    --------
+    >>> from fuzzy_arbiter import Arbiter
+    >>> from fuzzy_arbiter.pictures import surface
+    >>> surface(Arbiter(), "alpha_1", over=("obstacle", "shape")).get_xlabel()
+    'obstacle'
     """
     k = one_of(arbiter.system.outputs, output, "output")
     x, y, weights, where = _field(arbiter, over, at, points)
@@ -117,6 +124,13 @@ def decisions(
         If there is no such input, or one output only.
     InputError
         If a value is not a number in its universe.
+
+    Examples
+    --------
+    >>> from fuzzy_arbiter import Arbiter
+    >>> from fuzzy_arbiter.pictures import decisions
+    >>> decisions(Arbiter(), over=("obstacle", "shape")).get_xlabel()
+    'obstacle'
     """
     from matplotlib.colors import to_rgb
     from matplotlib.patches import Patch

@@ -55,6 +55,13 @@ def rules(arbiter: Arbiter, inputs: Sample, output: str | None = None, ax: Axes 
         If there is no such output.
     InputError
         If an input is missing, unknown, not a number, or outside its universe.
+
+    Examples
+    --------
+    >>> from fuzzy_arbiter import Arbiter
+    >>> from fuzzy_arbiter.pictures import rules
+    >>> rules(Arbiter(), {"obstacle": 0.75, "shape": 1.0, "depth": 0.0}).get_xlabel()
+    'alpha_1'
     """
     system = arbiter.system
     k = one_of(system.outputs, system.outputs[0].name if output is None else output, "output")

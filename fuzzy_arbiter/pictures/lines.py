@@ -48,6 +48,13 @@ def terms(arbiter: Arbiter, variable: str, at: float | None = None, ax: Axes | N
         If there is no such variable.
     InputError
         If the place is outside the universe.
+
+    Examples
+    --------
+    >>> from fuzzy_arbiter import Arbiter
+    >>> from fuzzy_arbiter.pictures import terms
+    >>> terms(Arbiter(), "obstacle").get_ylabel()
+    'degree'
     """
     variables = (*arbiter.system.inputs, *arbiter.system.outputs)
     drawn = variables[one_of(variables, variable, "variable")]
@@ -119,6 +126,13 @@ def profile(
         If there is no such input.
     InputError
         If a value is not a number in its universe.
+
+    Examples
+    --------
+    >>> from fuzzy_arbiter import Arbiter
+    >>> from fuzzy_arbiter.pictures import profile
+    >>> profile(Arbiter(), over="obstacle").get_xlabel()
+    'obstacle'
     """
     system = arbiter.system
     fixed = fixed_inputs(arbiter, (over,), at)
@@ -167,6 +181,13 @@ def normalisations(
         If there is no such input, or no such normalisation.
     InputError
         If a value is not a number in its universe.
+
+    Examples
+    --------
+    >>> from fuzzy_arbiter import Arbiter
+    >>> from fuzzy_arbiter.pictures import normalisations
+    >>> sorted(normalisations(Arbiter(), over="obstacle"))
+    ['max', 'none', 'range', 'sum']
     """
     fixed = fixed_inputs(arbiter, (over,), at)
     new = axes is None

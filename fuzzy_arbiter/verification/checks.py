@@ -49,6 +49,14 @@ def verify(system: System, effort: int = EFFORT) -> Verification:
     -------
     Verification
         As data; its text is for people.
+
+    Examples
+    --------
+    >>> from fuzzy_arbiter import Arbiter
+    >>> system = Arbiter().system
+    >>> from fuzzy_arbiter.verification import verify
+    >>> verify(system).complete
+    True
     """
     checks = _Checks(system, effort)
     checks.rows()

@@ -93,6 +93,13 @@ class Verification:
         All of them, the last term first; none if there are too many.
     stretches : tuple of Stretch
         Where the degrees of an input do not sum to 1.
+
+    Examples
+    --------
+    >>> from fuzzy_arbiter import Arbiter
+    >>> verification = Arbiter().verify()
+    >>> verification.ok, verification.row_count
+    (True, 8)
     """
 
     inputs: tuple[str, ...]

@@ -51,6 +51,17 @@ class Plant(CoSimulationInstance):
     -----
     ``plant[name]`` reads any scalar variable; ``plant[name] = value`` sets an input for the next step, or whatever else
     `set` sets. A plant belongs to one thread at a time; different plants know nothing of each other.
+
+    Examples
+    --------
+    >>> from plant_fmu import Plant
+    >>> plant = Plant("odin")
+    >>> plant.set({"position.z": 2.0})
+    >>> plant.initialise()
+    >>> plant.step(0.1)
+    >>> 0.0 < plant["position.z"] < 4.0
+    True
+    >>> plant.close()
     """
 
     def __init__(self, source: str | Path | Vehicle, fmi: int = 3) -> None:

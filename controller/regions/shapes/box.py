@@ -20,6 +20,12 @@ class Box:
     """All points of a cuboid of full `size` [m] about `centre` [m, NED]; g is the signed distance [m].
 
     `quaternion` (scalar first) turns the box's axes into the world.
+
+    Examples
+    --------
+    >>> from controller.regions import Box
+    >>> Box(centre=(0.0, 0.0, 5.0), size=(4.0, 2.0, 1.0)).bounds()
+    ((-2.0, -1.0, 4.5), (2.0, 1.0, 5.5))
     """
 
     kind: ClassVar[int]

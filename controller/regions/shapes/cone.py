@@ -18,6 +18,12 @@ class Cone:
     """All points within `range` [m] of a `feature` [m, NED] and within `half_angle` [rad] of the `axis` it faces.
 
     The axis points from the feature into the water. g is the signed distance [m].
+
+    Examples
+    --------
+    >>> from controller.regions import Cone
+    >>> Cone(feature=(0.0, 0.0, 5.0), axis=(1.0, 0.0, 0.0), half_angle=0.5, range=4.0).unit
+    'm'
     """
 
     kind: ClassVar[int]

@@ -26,7 +26,14 @@ from controller.regions.shape import (
 
 @dataclass(frozen=True)
 class Cylinder:
-    """All points within `radius` [m] of the axis from `start` to `end` [m, NED]; g is the signed distance [m]."""
+    """All points within `radius` [m] of the axis from `start` to `end` [m, NED]; g is the signed distance [m].
+
+    Examples
+    --------
+    >>> from controller.regions import Cylinder
+    >>> Cylinder(start=(0.0, 0.0, 0.0), end=(0.0, 0.0, 8.0), radius=0.5).bounds()
+    ((-0.5, -0.5, 0.0), (0.5, 0.5, 8.0))
+    """
 
     kind: ClassVar[int]
     unit: ClassVar[str] = "m"

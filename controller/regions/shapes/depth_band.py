@@ -14,7 +14,14 @@ from controller.regions.shape import Array, Bounds, Evaluation, require, require
 
 @dataclass(frozen=True)
 class DepthBand:
-    """All depths within `tolerance` [m] of `depth` [m]; g = (z - z_o)^2 - r^2 [m2]."""
+    """All depths within `tolerance` [m] of `depth` [m]; g = (z - z_o)^2 - r^2 [m2].
+
+    Examples
+    --------
+    >>> from controller.regions import DepthBand
+    >>> DepthBand(depth=2.0, tolerance=0.5).bounds()
+    ((-inf, -inf, 1.5), (inf, inf, 2.5))
+    """
 
     kind: ClassVar[int]
     unit: ClassVar[str] = "m2"

@@ -23,6 +23,12 @@ class Ellipsoid:
     """All points of an ellipsoid about `centre` [m, NED]; g = sum (x_i / a_i)^2 - 1 [-].
 
     `quaternion` (scalar first) turns the axes, of half lengths `semi_axes` [m], into the world.
+
+    Examples
+    --------
+    >>> from controller.regions import Ellipsoid
+    >>> Ellipsoid(centre=(0.0, 0.0, 5.0), semi_axes=(2.0, 1.0, 1.0)).bounds()
+    ((-2.0, -1.0, 4.0), (2.0, 1.0, 6.0))
     """
 
     kind: ClassVar[int]

@@ -14,7 +14,14 @@ from controller.regions.shape import Array, Bounds, Evaluation, Vector3, require
 
 @dataclass(frozen=True)
 class HalfSpace:
-    """All points behind the plane through `point` [m, NED] that `normal` points away from; g is the distance [m]."""
+    """All points behind the plane through `point` [m, NED] that `normal` points away from; g is the distance [m].
+
+    Examples
+    --------
+    >>> from controller.regions import HalfSpace
+    >>> HalfSpace(point=(0.0, 4.0, 0.0), normal=(0.0, -1.0, 0.0)).packed()
+    (0.0, 4.0, 0.0, 0.0, -1.0, 0.0)
+    """
 
     kind: ClassVar[int]
     unit: ClassVar[str] = "m"

@@ -20,6 +20,12 @@ class Orientation:
 
     g is the angle of that turn less the tolerance [rad]. Its derivative is taken as zero where it has none: at the
     attitude itself, and half a turn away from it.
+
+    Examples
+    --------
+    >>> from controller.regions import Orientation
+    >>> Orientation(quaternion=(1.0, 0.0, 0.0, 0.0), tolerance=0.1).unit
+    'rad'
     """
 
     kind: ClassVar[int]

@@ -18,6 +18,12 @@ class Pipe:
     """All points within `radius` [m] of the line through `points` [m, NED], rounded at its ends; g is the distance [m].
 
     Where pieces of the pipe meet, the distance is that to the surface outside, and inside a bound of it.
+
+    Examples
+    --------
+    >>> from controller.regions import Pipe
+    >>> Pipe(points=((0.0, 0.0, 5.0), (4.0, 0.0, 5.0), (4.0, 3.0, 5.0)), radius=0.5).bounds()
+    ((-0.5, -0.5, 4.5), (4.5, 3.5, 5.5))
     """
 
     kind: ClassVar[int]

@@ -18,6 +18,12 @@ class Prism:
     """All points over a polygon, given by its corners [m, north and east], between two depths [m].
 
     The polygon need not be convex, but its edges must not cross. g is the signed distance [m].
+
+    Examples
+    --------
+    >>> from controller.regions import Prism
+    >>> Prism(corners=((0.0, 0.0), (4.0, 0.0), (0.0, 3.0)), top=1.0, bottom=6.0).bounds()
+    ((0.0, 0.0, 1.0), (4.0, 3.0, 6.0))
     """
 
     kind: ClassVar[int]

@@ -14,7 +14,14 @@ from controller.regions.shape import Array, Bounds, Evaluation, Vector3, ball_bo
 
 @dataclass(frozen=True)
 class Sphere:
-    """All points within `radius` [m] of `centre` [m, NED]; g = |p - c|^2 - r^2 [m2]."""
+    """All points within `radius` [m] of `centre` [m, NED]; g = |p - c|^2 - r^2 [m2].
+
+    Examples
+    --------
+    >>> from controller.regions import Sphere
+    >>> Sphere(centre=(1.0, 0.0, 2.0), radius=0.5).bounds()
+    ((0.5, -0.5, 1.5), (1.5, 0.5, 2.5))
+    """
 
     kind: ClassVar[int]
     unit: ClassVar[str] = "m2"

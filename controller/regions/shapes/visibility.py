@@ -22,6 +22,12 @@ class Visibility:
     the half angle [rad]. How far it sees is a region of its own, such as a sphere or a `Cone` about the feature.
     By position, g changes with one over the distance: a feature closer than some tenths of a metre asks for the
     impossible. A feature in the camera itself counts as behind it.
+
+    Examples
+    --------
+    >>> from controller.regions import Visibility
+    >>> Visibility(feature=(3.0, 0.0, 2.0), camera_axis=(1.0, 0.0, 0.0), half_angle=0.5).unit
+    'rad'
     """
 
     kind: ClassVar[int]

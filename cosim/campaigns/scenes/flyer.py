@@ -66,7 +66,7 @@ class Score(NamedTuple):
 
 
 class SceneFlyer:
-    """One law and one plant, for scene after scene.
+    r"""One law and one plant, for scene after scene.
 
     Parameters
     ----------
@@ -85,6 +85,18 @@ class SceneFlyer:
         If it cannot work with the gains.
     BuildError, PlantError
         If there is no FMU of the vehicle.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> import cosim
+    >>> _ = Path("scenes.jsonl").write_text("\n".join(cosim.generate_scenes(2)))
+    >>> flyer = cosim.SceneFlyer("pd")
+    >>> for scene in cosim.read_scenes(Path("scenes.jsonl")):
+    ...     score, _ = flyer.fly(scene)
+    >>> flyer.close()
+    >>> score.reached
+    True
     """
 
     def __init__(self, law: str, conditions: Conditions | None = None, gains: Any = None) -> None:

@@ -21,7 +21,7 @@ _FREE = 0.6  # m, from an obstacle to the start and to the goal region, at least
 
 
 def generate_scenes(count: int, seed: int = 0, kind: str = "plain") -> Iterator[str]:
-    """Generate scenes, one for each seed from the first on.
+    r"""Generate scenes, one for each seed from the first on.
 
     Parameters
     ----------
@@ -36,6 +36,14 @@ def generate_scenes(count: int, seed: int = 0, kind: str = "plain") -> Iterator[
     ------
     str
         A line of JSON, as `cosim.campaigns.scenes.scene.read_scenes` reads it.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> import cosim
+    >>> _ = Path("scenes.jsonl").write_text("\n".join(cosim.generate_scenes(2)))
+    >>> len(list(cosim.read_scenes(Path("scenes.jsonl"))))
+    2
     """
     for one in range(seed, seed + count):
         yield json.dumps(make_scene(one, kind))

@@ -62,7 +62,17 @@ class Failure:
 
 @dataclass(frozen=True)
 class Scene:
-    """One scene, as its line has it."""
+    r"""One scene, as its line has it.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> import cosim
+    >>> _ = Path("scenes.jsonl").write_text("\n".join(cosim.generate_scenes(2)))
+    >>> scene = next(cosim.read_scenes(Path("scenes.jsonl")))
+    >>> scene.seed, scene.goal.radius
+    (0, 0.5)
+    """
 
     seed: int
     start: Vector3  # m, NED
@@ -227,7 +237,7 @@ def _require_moderate(key: str, values: tuple[float, ...]) -> None:
 
 
 def read_scenes(path: Path) -> Iterator[Scene]:
-    """Read scenes from a file, one JSON object a line; blank lines are passed over.
+    r"""Read scenes from a file, one JSON object a line; blank lines are passed over.
 
     Parameters
     ----------
@@ -243,6 +253,14 @@ def read_scenes(path: Path) -> Iterator[Scene]:
     ------
     ScenarioError
         If the file cannot be read, or a line is no scene; it names the line and the key.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> import cosim
+    >>> _ = Path("scenes.jsonl").write_text("\n".join(cosim.generate_scenes(2)))
+    >>> [scene.seed for scene in cosim.read_scenes(Path("scenes.jsonl"))]
+    [0, 1]
     """
     try:
         with path.open("rb") as file:

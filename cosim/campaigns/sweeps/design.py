@@ -89,6 +89,13 @@ class Design:
     ------
     RunError
         If there can be no such design.
+
+    Examples
+    --------
+    >>> import cosim
+    >>> design = cosim.Design(cosim.vary_from(["limit.force=100:500", "regions.SR1.gain=10,100"]), samples=6, seed=1)
+    >>> design.rows
+    6
     """
 
     vary: tuple[Vary, ...]
@@ -246,6 +253,12 @@ def vary_from(texts: Sequence[str]) -> tuple[Vary, ...]:
     ------
     RunError
         If a text is none of these, a value is no finite number, a range has no width, or a key comes twice.
+
+    Examples
+    --------
+    >>> import cosim
+    >>> cosim.vary_from(["limit.force=100:500:5"])[0].points
+    5
     """
     found: list[Vary] = []
     for text in texts:

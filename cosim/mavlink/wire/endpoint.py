@@ -55,6 +55,12 @@ def parse_endpoint(text: str, allow_remote: bool = False) -> Endpoint:
     ------
     TelemetryError
         If it is none, leaves this machine without leave, or names a file that exists.
+
+    Examples
+    --------
+    >>> import cosim
+    >>> cosim.parse_endpoint("udpout:127.0.0.1:14550").port
+    14550
     """
     if text.endswith(".tlog"):
         return Endpoint("tlog", text, path=_new_file(text))

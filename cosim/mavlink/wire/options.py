@@ -15,7 +15,14 @@ ORIGIN = (55.9097, -3.3203)  # deg, latitude and longitude of position 0 where n
 
 @dataclass(frozen=True)
 class MavlinkOptions:
-    """How the vehicle shows itself, and whom it heeds."""
+    """How the vehicle shows itself, and whom it heeds.
+
+    Examples
+    --------
+    >>> import cosim
+    >>> cosim.MavlinkOptions(commands=True).loss_action
+    'warn'
+    """
 
     profile: ProfileName = "generic"
     commands: bool = False  # heed commands, set-points, parameter and mission writes; otherwise they are refused
