@@ -20,6 +20,7 @@ from cosim.simulation.signals import Array, Column
 MAX_ROWS = 100_000_001  # of a run of as many steps as a scenario may have
 RECORD = "record.parquet"
 PARTS = "record.parts"  # what a killed run leaves
+_DIGITS = 9  # of a format's number
 _BLOCK = 10_000  # rows that are read at once
 _SMALL = 2**23  # numbers of a record that is read as a whole,
 _KEPT = 24  # and signals that a larger one keeps in memory
@@ -160,8 +161,8 @@ class Record(Rows):
                 schema = parquet.schema_arrow
                 rows += parquet.metadata.num_rows
                 _require_numbers(file, schema, rows)
-                said = (schema.metadata or {}).get(b"format", b"").decode("utf-8", "replace")
-                require_format(file, int(said) if said.isdecimal() else said or None)
+                if (said := _format_of(schema)) is not None:
+                    require_format(file, said)
                 columns.append(tuple(map(_column_of, schema)))
             if columns[-1] != columns[0]:
                 raise RunError(f"{file}: has other columns than {self._files[0].name}, expected parts of one record")
@@ -321,6 +322,14 @@ def _require_numbers(file: Path, schema: pa.Schema, rows: int) -> None:
         raise RunError(f"{file}: has no columns, or two of one name; expected the record of a run")
     if rows > MAX_ROWS:
         raise RunError(f"{file}: the record has {rows} rows up to here, expected at most {MAX_ROWS}")
+
+
+def _format_of(schema: pa.Schema) -> int | str | None:
+    """Return the number of its format as a table says it, 1 for one with names of that; None if nothing tells."""
+    said = (schema.metadata or {}).get(b"format", b"").decode("utf-8", "replace")
+    if not said:
+        return 1 if any(name.startswith("helm.") for name in schema.names) else None
+    return int(said) if said.isdecimal() and len(said) < _DIGITS else said
 
 
 def part_files(folder: Path) -> list[Path]:

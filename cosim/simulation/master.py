@@ -343,9 +343,7 @@ class Master:
         self._estimate[...] = self.law.estimate
         law, by_wrench = self.law, self.law.output == "wrench"
         forces = actuators.command if by_wrench else actuators.thrusts
-        law.step(
-            self.state, self.environment.goal, self.environment.regions, self._arbitration.region_weights, forces
-        )
+        law.step(self.state, self.environment.goal, self.environment.regions, self._arbitration.region_weights, forces)
         if self._reports:
             self._report[...] = law.report
         if by_wrench:

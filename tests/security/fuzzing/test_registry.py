@@ -39,6 +39,7 @@ ITS_OWN = {  # what parses nothing that comes from outside: why
     "cosim.scenario.toml_file:read_table": "calls the reader of plant_fmu.toml_tables",
     "cosim.scenario.scenario:load_scenario": "calls cosim.scenario.toml_file:read_table",
     "plant_fmu.archive:archive_of": "writes",
+    "plant_fmu.build:_has_checksums": "a file of the cache, built anew if it is damaged",
     "plant_fmu.compiling.prebuilt:prebuilt_libraries": "what came with the package; test_prebuilt damages it",
     "plant_fmu.compiling.signature:_signed": "what the linker wrote",
     "plant_fmu.compiling.signature:signed_anew": "what the linker wrote",
