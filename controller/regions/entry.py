@@ -28,7 +28,7 @@ class Entry:
         Unit of each field of the dataclass, "" for none.
     surface : callable, optional
         Its mesh, of one of them and the corners of a box in which what has no end is cut: pictures, replay and exports
-        draw it. The shapes that they draw by their numbers have none here.
+        draw it. A shape of attitude has none.
     of_attitude : bool, optional
         Whether it depends on attitude.
     convex : bool, optional
@@ -53,6 +53,8 @@ class Entry:
         missing = [face for face in _FACES if not hasattr(self.shape, face)]
         if missing:
             raise TypeError(f"shape {name} has no {', '.join(missing)}")
+        if self.surface is None and not self.of_attitude:
+            raise TypeError(f"shape {name} has no surface, which only shapes of attitude do without")
         if type(self.example) is not self.shape:
             raise TypeError(f"shape {name}: example is a {type(self.example).__name__}, expected one of its own")
         keys = [field.name for field in fields(self.shape)]  # type: ignore[arg-type]

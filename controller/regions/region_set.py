@@ -25,7 +25,17 @@ from controller.regions.kinds import (
     evaluate_shape,
     evaluate_shape_of_attitude,
 )
-from controller.regions.shape import Array, Evaluation, EvaluationOfAttitude, Shape, Vector3, require, require_finite
+from controller.regions.mesh import Mesh
+from controller.regions.shape import (
+    Array,
+    Bounds,
+    Evaluation,
+    EvaluationOfAttitude,
+    Shape,
+    Vector3,
+    require,
+    require_finite,
+)
 from controller.regions.shapes import ENTRIES
 from controller.regions.shapes.depth_band import band_about
 from controller.regions.shapes.orientation import Orientation
@@ -85,6 +95,33 @@ def name_of(shape: Shape) -> str:
         if type(shape) is kind:
             return name
     raise RegionError(f"shape is of type {type(shape).__name__}, expected one of {', '.join(SHAPES)}")
+
+
+def surface_of(shape: Shape, limits: Bounds) -> Mesh:
+    """Return the surface of a shape of position.
+
+    Parameters
+    ----------
+    shape : Shape
+        None of attitude.
+    limits : Bounds
+        What has no end is cut to a patch of their size.
+
+    Returns
+    -------
+    Mesh
+        Closed, but for planes.
+
+    Raises
+    ------
+    RegionError
+        If the shape is one of attitude.
+    """
+    name = name_of(shape)
+    surface = ENTRIES[name].surface
+    if surface is None:
+        raise RegionError(f"shape {name!r} has no surface, expected one of a shape of position")
+    return surface(shape, limits)
 
 
 def of_attitude(shape: Shape) -> bool:

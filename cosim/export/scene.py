@@ -9,12 +9,11 @@ import numpy as np
 
 from controller.quaternion import rotation_matrix
 from controller.regions import Orientation, Visibility
-from controller.regions.mesh import Mesh
-from controller.regions.region_set import SHAPES, name_of, of_attitude
+from controller.regions.mesh import Mesh, sector
+from controller.regions.region_set import SHAPES, name_of, of_attitude, surface_of
 from controller.regions.shape import Bounds, Shape
 from cosim.errors import ExportError
 from cosim.export.excerpt import Excerpt
-from cosim.export.surfaces import sector, surface_of
 from cosim.replay.activity import active_regions
 from cosim.replay.header import header_of
 from cosim.replay.steering import changes_of, log_of

@@ -8,10 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from controller.regions.region_set import name_of, of_attitude
+from controller.regions.region_set import name_of, of_attitude, surface_of
 from controller.regions.shape import Shape
-from controller.regions.shapes import ENTRIES
-from cosim.errors import RunError
 from cosim.results.wording import asked
 from cosim.scenario.scenario import Scenario
 from cosim.simulation.signals import Column
@@ -77,17 +75,14 @@ def shape_of(shape: Shape) -> dict[str, Any]:
 
     Raises
     ------
-    RunError
+    RegionError
         If the page could draw it by neither.
     """
     kind = name_of(shape)
     told = {"kind": kind, **dataclasses.asdict(shape)}  # type: ignore[call-overload]
-    surface = ENTRIES[kind].surface
-    if surface is not None:
-        mesh = surface(shape, shape.bounds())
+    if kind not in DRAWN_BY_NUMBERS:
+        mesh = surface_of(shape, shape.bounds())
         told["mesh"] = {"points": mesh.vertices.tolist(), "faces": mesh.triangles.tolist()}
-    elif kind not in DRAWN_BY_NUMBERS:
-        raise RunError(f"shape {kind!r} has no surface, expected one in its entry: the replay cannot draw it")
     return told
 
 

@@ -11,6 +11,7 @@ from controller.jit.jit import jit_noalloc
 from controller.quaternion import rotation_matrix
 from controller.regions.entry import Entry
 from controller.regions.geometry import product_distance, to_local, to_world
+from controller.regions.mesh import Mesh, placed
 from controller.regions.numbers import SIZE, TURNED, Number, vector
 from controller.regions.shape import Array, Bounds, Evaluation, Vector3, Vector4, about, require, require_finite, unit
 
@@ -68,5 +69,13 @@ def box(p: Array, q: Array) -> Evaluation:
     return g, wx, wy, wz, g
 
 
+def surface(shape: Box, limits: Bounds) -> Mesh:
+    """Return its six faces."""
+    corners = np.array([(x, y, z) for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
+    faces = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+    triangles = np.array([t for a, b, c, d in faces for t in ((a, b, c), (a, c, d))])
+    return Mesh(placed(corners * np.array(shape.size), shape.centre, shape.quaternion), triangles)
+
+
 _UNITS = {"centre": "m", "size": "m", "quaternion": ""}
-ENTRY = Entry(Box, box, Box((1.0, 1.0, 1.0), (2.0, 3.0, 1.0), (0.9, 0.1, -0.3, 0.2)), _UNITS, convex=True)
+ENTRY = Entry(Box, box, Box((1.0, 1.0, 1.0), (2.0, 3.0, 1.0), (0.9, 0.1, -0.3, 0.2)), _UNITS, surface, convex=True)

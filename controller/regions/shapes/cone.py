@@ -9,6 +9,7 @@ from typing import ClassVar
 from controller.jit.jit import jit_noalloc
 from controller.regions.entry import Entry
 from controller.regions.geometry import clamp
+from controller.regions.mesh import Mesh, sector
 from controller.regions.numbers import LENGTH, PART, SIZE, Number, vector
 from controller.regions.shape import Array, Bounds, Evaluation, Vector3, ball_bounds, require, require_finite, unit
 
@@ -90,5 +91,10 @@ def cone(p: Array, q: Array) -> Evaluation:
     return g, outward * x + of_along * q[3], outward * y + of_along * q[4], outward * z + of_along * q[5], g
 
 
+def surface(shape: Cone, limits: Bounds) -> Mesh:
+    """Return its side and its round end."""
+    return sector(shape.feature, shape.axis, shape.half_angle, shape.range)
+
+
 _UNITS = {"feature": "m", "axis": "", "half_angle": "rad", "range": "m"}
-ENTRY = Entry(Cone, cone, Cone((1.0, 1.0, 1.0), (-1.0, 0.0, 0.3), 0.6, 3.0), _UNITS, convex=True)
+ENTRY = Entry(Cone, cone, Cone((1.0, 1.0, 1.0), (-1.0, 0.0, 0.3), 0.6, 3.0), _UNITS, surface, convex=True)

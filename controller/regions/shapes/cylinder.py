@@ -6,9 +6,12 @@ import math
 from dataclasses import dataclass
 from typing import ClassVar
 
+import numpy as np
+
 from controller.jit.jit import jit_noalloc
 from controller.regions.entry import Entry
 from controller.regions.geometry import product_distance
+from controller.regions.mesh import Mesh, circle, frame, lathe
 from controller.regions.numbers import LENGTH, PART, SIZE, Number, vector
 from controller.regions.shape import (
     UP_TO_ROUNDING,
@@ -82,5 +85,13 @@ def cylinder(p: Array, q: Array) -> Evaluation:
     return g, outward * x + axial * q[3], outward * y + axial * q[4], outward * z + axial * q[5], g
 
 
+def surface(shape: Cylinder, limits: Bounds) -> Mesh:
+    """Return its side and its two ends."""
+    start, end = np.array(shape.start), np.array(shape.end)
+    _, *across = frame(end - start)
+    rim = shape.radius * circle(*across)
+    return lathe([start + rim, end + rim], start, end)
+
+
 _UNITS = {"start": "m", "end": "m", "radius": "m"}
-ENTRY = Entry(Cylinder, cylinder, Cylinder((0.0, 0.0, 0.0), (1.0, 2.0, 3.0), 0.7), _UNITS, convex=True)
+ENTRY = Entry(Cylinder, cylinder, Cylinder((0.0, 0.0, 0.0), (1.0, 2.0, 3.0), 0.7), _UNITS, surface, convex=True)

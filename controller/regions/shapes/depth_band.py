@@ -6,8 +6,11 @@ from dataclasses import dataclass
 from math import inf
 from typing import ClassVar
 
+import numpy as np
+
 from controller.jit.jit import jit_noalloc
 from controller.regions.entry import Entry
+from controller.regions.mesh import Mesh, patch
 from controller.regions.numbers import LENGTH, SIZE, Number
 from controller.regions.shape import Array, Bounds, Evaluation, require, require_finite
 
@@ -57,5 +60,15 @@ def depth_band(p: Array, q: Array) -> Evaluation:
     return band_about(p[2] - q[0], q[1])
 
 
+def surface(shape: DepthBand, limits: Bounds) -> Mesh:
+    """Return a patch of each of its two planes."""
+    low, high = shape.depth - shape.tolerance, shape.depth + shape.tolerance
+    upper, lower = (patch((0.0, 0.0, z), (0.0, 0.0, up), limits) for z, up in ((low, -1.0), (high, 1.0)))
+    return Mesh(
+        np.vstack([upper.vertices, lower.vertices]),
+        np.vstack([upper.triangles, lower.triangles + len(upper.vertices)]),
+    )
+
+
 _UNITS = {"depth": "m", "tolerance": "m"}
-ENTRY = Entry(DepthBand, depth_band, DepthBand(2.5, 1.8), _UNITS, convex=True)
+ENTRY = Entry(DepthBand, depth_band, DepthBand(2.5, 1.8), _UNITS, surface, convex=True)

@@ -12,6 +12,7 @@ from controller.jit.jit import jit_noalloc
 from controller.quaternion import rotation_matrix
 from controller.regions.entry import Entry
 from controller.regions.geometry import to_local, to_world
+from controller.regions.mesh import Mesh, ball, placed
 from controller.regions.numbers import SIZE, TURNED, Number, vector
 from controller.regions.shape import Array, Bounds, Evaluation, Vector3, Vector4, about, require, require_finite, unit
 
@@ -94,7 +95,19 @@ def _surface_distance(x: float, y: float, z: float, a: float, b: float, c: float
     return math.sqrt((x - nearest_x) ** 2 + (y - nearest_y) ** 2 + (z - nearest_z) ** 2)
 
 
+def surface(shape: Ellipsoid, limits: Bounds) -> Mesh:
+    """Return a ball that is drawn out."""
+    unit_ball = ball()
+    scaled = unit_ball.vertices * np.array(shape.semi_axes)
+    return Mesh(placed(scaled, shape.centre, shape.quaternion), unit_ball.triangles)
+
+
 _UNITS = {"centre": "m", "semi_axes": "m", "quaternion": ""}
 ENTRY = Entry(
-    Ellipsoid, ellipsoid, Ellipsoid((1.0, 0.0, 1.0), (2.0, 1.0, 0.5), (0.9, 0.1, -0.3, 0.2)), _UNITS, convex=True
+    Ellipsoid,
+    ellipsoid,
+    Ellipsoid((1.0, 0.0, 1.0), (2.0, 1.0, 0.5), (0.9, 0.1, -0.3, 0.2)),
+    _UNITS,
+    surface,
+    convex=True,
 )

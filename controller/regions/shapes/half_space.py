@@ -8,6 +8,7 @@ from typing import ClassVar
 
 from controller.jit.jit import jit_noalloc
 from controller.regions.entry import Entry
+from controller.regions.mesh import Mesh, patch
 from controller.regions.numbers import LENGTH, PART, Number, vector
 from controller.regions.shape import Array, Bounds, Evaluation, Vector3, require_finite, unit
 
@@ -52,5 +53,10 @@ def half_space(p: Array, q: Array) -> Evaluation:
     return g, q[3], q[4], q[5], g
 
 
+def surface(shape: HalfSpace, limits: Bounds) -> Mesh:
+    """Return a patch of its plane."""
+    return patch(shape.point, shape.normal, limits)
+
+
 _UNITS = {"point": "m", "normal": ""}
-ENTRY = Entry(HalfSpace, half_space, HalfSpace((0.0, 0.0, 1.0), (1.0, 1.0, 0.2)), _UNITS, convex=True)
+ENTRY = Entry(HalfSpace, half_space, HalfSpace((0.0, 0.0, 1.0), (1.0, 1.0, 0.2)), _UNITS, surface, convex=True)

@@ -9,7 +9,9 @@ from typing import ClassVar
 from controller.jit.jit import jit_noalloc
 from controller.regions.entry import Entry
 from controller.regions.geometry import clamp
+from controller.regions.mesh import AROUND, Mesh, lathe
 from controller.regions.numbers import LENGTH, SIZE, Number, vector
+from controller.regions.pipe_surface import pipe_rings
 from controller.regions.shape import Array, Bounds, Evaluation, Vector3, ball_bounds, join, require, require_finite
 
 
@@ -75,5 +77,11 @@ def pipe(p: Array, q: Array) -> Evaluation:
     return g, 0.0, 0.0, 0.0, g
 
 
+def surface(shape: Pipe, limits: Bounds) -> Mesh:
+    """Return rings along its line, and its round ends."""
+    first, rings, last = pipe_rings(shape, AROUND)
+    return lathe(rings, first, last)
+
+
 _UNITS = {"points": "m", "radius": "m"}
-ENTRY = Entry(Pipe, pipe, Pipe(((0.0, 0.0, 0.0), (2.0, 0.0, 0.0), (2.0, 2.0, 1.0)), 0.4), _UNITS)
+ENTRY = Entry(Pipe, pipe, Pipe(((0.0, 0.0, 0.0), (2.0, 0.0, 0.0), (2.0, 2.0, 1.0)), 0.4), _UNITS, surface)

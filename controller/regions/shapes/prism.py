@@ -6,9 +6,12 @@ import math
 from dataclasses import dataclass
 from typing import ClassVar
 
+import numpy as np
+
 from controller.jit.jit import jit_noalloc
 from controller.regions.entry import Entry
 from controller.regions.geometry import clamp, product_distance
+from controller.regions.mesh import Mesh
 from controller.regions.numbers import LENGTH, Number
 from controller.regions.shape import Array, Bounds, Evaluation, Vector2, require, require_finite
 
@@ -136,5 +139,42 @@ def prism(p: Array, q: Array) -> Evaluation:
     return g, of_flat * gx, of_flat * gy, of_vertical * down, g
 
 
+def surface(shape: Prism, limits: Bounds) -> Mesh:
+    """Return its top, its bottom and its sides."""
+    corners = np.array(shape.corners)
+    following = np.roll(corners, -1, axis=0)
+    if np.sum(corners[:, 0] * following[:, 1] - following[:, 0] * corners[:, 1]) < 0.0:
+        corners = corners[::-1]
+    n = len(corners)
+    flat = np.array(_ears(corners))
+    vertices = np.vstack([np.column_stack([corners, np.full(n, z)]) for z in (shape.top, shape.bottom)])
+    sides = [t for i in range(n) for j in ((i + 1) % n,) for t in ((i, j, n + j), (i, n + j, n + i))]
+    return Mesh(vertices, np.vstack([flat[:, ::-1], flat + n, sides]))
+
+
+def _ears(corners: Array) -> list[tuple[int, int, int]]:
+    """Return the triangles of a simple polygon, whose corners go around from north to east."""
+
+    def side(a: int, b: int, c: int) -> float:
+        u, v = corners[b] - corners[a], corners[c] - corners[a]
+        return float(u[0] * v[1] - u[1] * v[0])
+
+    left, triangles = [*range(len(corners))], []
+    while len(left) > 3:
+        for i, b in enumerate(left):
+            a, c = left[i - 1], left[(i + 1) % len(left)]
+            others = (p for p in left if p not in (a, b, c))
+            if side(a, b, c) > 0.0 and not any(min(side(a, b, p), side(b, c, p), side(c, a, p)) >= 0.0 for p in others):
+                triangles.append((a, b, c))
+                break
+        else:  # corners in a line are no ear of any area
+            i = next(i for i in range(len(left)) if side(left[i - 1], left[i], left[(i + 1) % len(left)]) <= 0.0)
+            triangles.append((left[i - 1], left[i], left[(i + 1) % len(left)]))
+        left.pop(i)
+    return [*triangles, (left[0], left[1], left[2])]
+
+
 _UNITS = {"corners": "m", "top": "m", "bottom": "m"}
-ENTRY = Entry(Prism, prism, Prism(((0.0, 0.0), (3.0, 0.0), (3.0, 2.0), (1.0, 0.5), (0.0, 2.0)), 1.0, 3.0), _UNITS)
+ENTRY = Entry(
+    Prism, prism, Prism(((0.0, 0.0), (3.0, 0.0), (3.0, 2.0), (1.0, 0.5), (0.0, 2.0)), 1.0, 3.0), _UNITS, surface
+)

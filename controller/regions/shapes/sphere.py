@@ -6,8 +6,11 @@ import math
 from dataclasses import dataclass
 from typing import ClassVar
 
+import numpy as np
+
 from controller.jit.jit import jit_noalloc
 from controller.regions.entry import Entry
+from controller.regions.mesh import Mesh, ball
 from controller.regions.numbers import LENGTH, SIZE, Number, vector
 from controller.regions.shape import Array, Bounds, Evaluation, Vector3, ball_bounds, require, require_finite
 
@@ -58,5 +61,11 @@ def sphere(p: Array, q: Array) -> Evaluation:
     return sphere_about(p[0] - q[0], p[1] - q[1], p[2] - q[2], q[3])
 
 
+def surface(shape: Sphere, limits: Bounds) -> Mesh:
+    """Return the ball."""
+    unit_ball = ball()
+    return Mesh(np.array(shape.centre) + shape.radius * unit_ball.vertices, unit_ball.triangles)
+
+
 _UNITS = {"centre": "m", "radius": "m"}
-ENTRY = Entry(Sphere, sphere, Sphere((2.0, 0.0, 1.8), 0.5), _UNITS, convex=True)
+ENTRY = Entry(Sphere, sphere, Sphere((2.0, 0.0, 1.8), 0.5), _UNITS, surface, convex=True)

@@ -11,12 +11,12 @@ from matplotlib.path import Path
 from controller.quaternion import rotation_matrix
 from controller.regions import Box, Cone, Cylinder, DepthBand, Ellipsoid, HalfSpace, Pipe, Prism, Sphere
 from controller.regions.mesh import Mesh
-from controller.regions.region_set import name_of
+from controller.regions.region_set import surface_of
 from controller.regions.shape import Shape
-from controller.regions.shapes import ENTRIES
-from cosim.errors import RunError
 from cosim.simulation.signals import Array
 
+# drawn with smoother lines than their meshes have
+_BY_NUMBERS = (Sphere, Box, Cylinder, Ellipsoid, Cone, Pipe, Prism, HalfSpace, DepthBand)
 _TURN = np.linspace(0.0, 2.0 * np.pi, 73)  # rad
 _CORNERS = np.array([[i, j, k] for i in (-1.0, 1.0) for j in (-1.0, 1.0) for k in (-1.0, 1.0)])
 _BOX_EDGES = [(a, b) for a in range(8) for b in range(a) if (_CORNERS[a] != _CORNERS[b]).sum() == 1]
@@ -80,16 +80,13 @@ def _pieces(shape: Shape, low: Array, high: Array) -> Iterator[Piece]:
                 corners = _cut(corners, point, normal)
             yield Piece(corners)
         case _:
-            mesh = mesh_of(shape)
-            if mesh is None:
-                raise RunError(f"shape {name_of(shape)!r} cannot be drawn, expected a surface in its entry")
+            mesh = surface_of(shape, shape.bounds())
             yield from (Piece(mesh.vertices[triangle], polygon=True) for triangle in mesh.triangles)
 
 
 def mesh_of(shape: Shape) -> Mesh | None:
-    """Return the mesh of the entry of a shape; none where the shape is drawn by its numbers."""
-    surface = ENTRIES[name_of(shape)].surface
-    return surface(shape, shape.bounds()) if surface is not None else None
+    """Return the mesh of a shape; none where the shape is drawn by its numbers."""
+    return None if isinstance(shape, _BY_NUMBERS) else surface_of(shape, shape.bounds())
 
 
 def silhouette(mesh: Mesh, view: Array) -> list[Array]:

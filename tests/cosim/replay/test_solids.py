@@ -23,9 +23,8 @@ from controller.regions import (
     Visibility,
     pack,
 )
-from controller.regions.region_set import SHAPES, attitude_clearance, clearances_at
+from controller.regions.region_set import SHAPES, attitude_clearance, clearances_at, surface_of
 from controller.regions.shapes import ENTRIES
-from cosim.export.surfaces import surface_of
 from cosim.replay.header import DRAWN_BY_NUMBERS, shape_of
 from cosim.replay.page import SCENE_SCRIPTS
 from cosim.scenario.colours import CRITERION_COLOURS, GOAL_COLOUR
@@ -85,7 +84,7 @@ def outside(shape, points):
 def test_every_shape_of_a_region_has_a_drawer():
     assert set(run("return DRAWN_SHAPES;")) == set(DRAWN_BY_NUMBERS)
     by_mesh = {name for name, entry in ENTRIES.items() if entry.surface is not None}
-    assert set(SHAPES) == by_mesh | set(DRAWN_BY_NUMBERS)
+    assert set(SHAPES) == by_mesh | set(DRAWN_BY_NUMBERS) == by_mesh | {"orientation", "visibility"}
 
 
 def test_the_page_has_the_colours_of_all_others():

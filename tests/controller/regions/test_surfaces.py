@@ -8,6 +8,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
+from controller.errors import RegionError
 from controller.regions import (
     Box,
     Cone,
@@ -21,9 +22,8 @@ from controller.regions import (
     Region,
     Sphere,
 )
-from controller.regions.region_set import clearances_at
-from cosim.errors import ExportError
-from cosim.export.surfaces import sector, surface_of
+from controller.regions.mesh import sector
+from controller.regions.region_set import clearances_at, surface_of
 
 LIMITS = ((-4.0, -3.0, 0.0), (4.0, 5.0, 6.0))
 TURNED = (0.9, 0.1, -0.3, 0.2)
@@ -132,5 +132,5 @@ def test_a_sector_of_more_than_half_a_turn_is_closed_too():
 
 
 def test_shapes_of_attitude_have_no_surface():
-    with pytest.raises(ExportError, match="Orientation has no surface"):
+    with pytest.raises(RegionError, match="'orientation' has no surface"):
         surface_of(Orientation((1.0, 0.0, 0.0, 0.0), 0.5), LIMITS)

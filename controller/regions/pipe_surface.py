@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from controller.regions import Pipe, Region
-from controller.regions.region_set import clearances_at
-from cosim.simulation.signals import Array
+from controller.regions.shape import Array
+
+if TYPE_CHECKING:
+    from controller.regions.shapes.pipe import Pipe
 
 _MOST_STEPS = 20_000  # along a ray that runs beside a straight stretch, just inside its surface
 _ROUNDING = 1e-12  # of the radius
@@ -81,6 +83,8 @@ def _turned(vector: Array, axis: Array, angle: float) -> Array:
 
 def _left(pipe: Pipe, origins: Array, directions: Array) -> Array:
     """Return where rays from inside leave the pipe: the distance to the surface is never more than is left to go."""
+    from controller.regions.region_set import Region, clearances_at  # which know of all shapes
+
     region = Region("pipe", pipe, "in")
     gone = np.zeros(len(origins))
     inside = np.arange(len(origins))
