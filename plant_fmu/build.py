@@ -24,10 +24,11 @@ from plant_fmu.compiling.platforms import NATIVE, Platform, cross_platforms, nat
 from plant_fmu.compiling.prebuilt import prebuilt_files, prebuilt_libraries
 from plant_fmu.compiling.sources import build_description, c_sources, header
 from plant_fmu.compiling.universal import universal_library
-from plant_fmu.component import Component, of_vehicle
+from plant_fmu.component import Component
 from plant_fmu.description import model_description, token
 from plant_fmu.errors import BuildError
 from plant_fmu.vehicle import Vehicle
+from plant_fmu.vehicle_component import of_vehicle
 
 log = logging.getLogger(__name__)
 

@@ -2,16 +2,10 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
-from plant_fmu.compiling.sources import plant_sources
-from plant_fmu.contents import contents
-from plant_fmu.errors import BuildError
-from plant_fmu.toml_tables import hint
-from plant_fmu.variables import Variable, variables
-from plant_fmu.vehicle import Vehicle
+from plant_fmu.variables import Variable
 
 STOP_TIME = 10.0  # s, of the default experiment
 STEP = 0.01  # s
@@ -39,57 +33,3 @@ class Component:
     def has_states(self) -> bool:
         """Whether it has continuous states."""
         return any(v.role == "state" for v in self.variables)
-
-
-def of_vehicle(
-    vehicle: Vehicle, start: Mapping[str, float] | None = None, stop_time: float = STOP_TIME, step: float = STEP
-) -> Component:
-    """Return the plant of a vehicle.
-
-    Parameters
-    ----------
-    vehicle : Vehicle
-        The vehicle.
-    start : mapping from str to float, optional
-        Start values of parameters and states, by name, over those of the vehicle.
-    stop_time, step : float, optional
-        Of the default experiment [s].
-
-    Returns
-    -------
-    Component
-        What its FMU is made of.
-
-    Raises
-    ------
-    BuildError
-        If a start value is of no parameter, input or state, or beyond its range.
-    VehicleError
-        If a number of the vehicle is beyond the range of its parameter.
-    """
-    rows = tuple(variables(vehicle))
-    if start is not None:
-        rows = _started(rows, start)
-    return Component(
-        name=vehicle.name,
-        description=f"Underwater vehicle, six degrees of freedom: {vehicle.title}",
-        variables=rows,
-        sources=plant_sources(),
-        contents=lambda fmi: contents(vehicle, fmi, rows if start is not None else None),
-        header="vehicle.h",
-        constants={"N_THRUSTERS": vehicle.n_thrusters},
-        stop_time=stop_time,
-        step=step,
-    )
-
-
-def _started(rows: tuple[Variable, ...], start: Mapping[str, float]) -> tuple[Variable, ...]:
-    """Return the variables with other start values."""
-    settable = {v.name: v for v in rows if v.role in ("state", "input", "parameter")}
-    for name, value in start.items():
-        if name not in settable:
-            raise BuildError(f"start value of {name!r}: no such parameter, input or state; {hint(name, settable)}")
-        q = settable[name].quantity
-        if not (math.isfinite(value) and q.minimum <= value <= q.maximum):
-            raise BuildError(f"start value of {name} is {value:g} {q.unit}, expected {q.minimum:g} to {q.maximum:g}")
-    return tuple(replace(v, start=float(start[v.name])) if v.name in start else v for v in rows)

@@ -23,9 +23,9 @@ from fuzzy_arbiter.export import to_c
 from plant_fmu.compiling.compiler import FLAGS, compile_library, find_compiler
 from plant_fmu.compiling.platforms import native_platform
 from plant_fmu.compiling.sources import c_sources, header
-from plant_fmu.component import of_vehicle
 from plant_fmu.errors import BuildError
 from plant_fmu.vehicle import Vehicle
+from plant_fmu.vehicle_component import of_vehicle
 
 log = logging.getLogger(__name__)
 

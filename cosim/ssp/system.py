@@ -17,8 +17,9 @@ from plant_fmu import build_fmu
 from plant_fmu.archive import require_place, write_archive
 from plant_fmu.build import cached_fmu
 from plant_fmu.compiling.platforms import NATIVE
-from plant_fmu.component import Component, of_vehicle
+from plant_fmu.component import Component
 from plant_fmu.variables import AXES, FORCES, VELOCITIES
+from plant_fmu.vehicle_component import of_vehicle
 
 _EXACT = ("closed", "exact")  # engines whose weights are those of the closed form
 MOTION = (

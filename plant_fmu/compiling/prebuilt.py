@@ -23,10 +23,11 @@ from plant_fmu.compiling.compiler import cross_compiler, find_compiler
 from plant_fmu.compiling.libraries import compiled_libraries, made_from
 from plant_fmu.compiling.platforms import NATIVE, Platform, cross_platforms, native_platform
 from plant_fmu.compiling.signature import signed_anew
-from plant_fmu.component import Component, of_vehicle
+from plant_fmu.component import Component
 from plant_fmu.errors import BuildError
 from plant_fmu.variables import Variable
 from plant_fmu.vehicle import Vehicle, load_vehicle, shipped_vehicles
+from plant_fmu.vehicle_component import of_vehicle
 
 FOLDER = Path(__file__).parents[1] / "prebuilt"  # in a wheel; a checkout has none
 NAME = "prebuilt"  # which their functions begin with

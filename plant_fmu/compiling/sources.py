@@ -5,13 +5,10 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 from importlib import resources
-from typing import TYPE_CHECKING
 from xml.etree import ElementTree as ET
 
+from plant_fmu.component import Component
 from plant_fmu.markup import xml_text
-
-if TYPE_CHECKING:
-    from plant_fmu.component import Component
 
 # a function is named after its file, at the beginning of a line; data are declared extern
 _DECLARED = re.compile(

@@ -14,10 +14,10 @@ from fmpy.validation import validate_fmu
 from plant_fmu import load_vehicle, shipped_vehicles
 from plant_fmu.build import cached_fmu
 from plant_fmu.compiling.sources import header
-from plant_fmu.component import of_vehicle
 from plant_fmu.description import documentation, model_description
 from plant_fmu.quantities import UNITS
 from plant_fmu.variables import variables
+from plant_fmu.vehicle_component import of_vehicle
 
 ROOT = Path(__file__).parents[2]
 

@@ -7,7 +7,7 @@ import pytest
 
 from plant_fmu import load_vehicle
 from plant_fmu.build import cached_fmu
-from plant_fmu.component import of_vehicle
+from plant_fmu.vehicle_component import of_vehicle
 from tests.plant_fmu.libraries import read_libraries
 from tests.plant_fmu.nulls import exports, faults, functions, sweep, sweep_sources
 

@@ -15,9 +15,9 @@ from plant_fmu.compiling.compiler import cross_compiler, find_compiler
 from plant_fmu.compiling.libraries import compiled_libraries
 from plant_fmu.compiling.platforms import cross_platforms, native_platform
 from plant_fmu.compiling.signature import signed_anew
-from plant_fmu.component import of_vehicle
 from plant_fmu.description import token
 from plant_fmu.errors import BuildError
+from plant_fmu.vehicle_component import of_vehicle
 from tests.plant_fmu.conftest import STATES, CoSimulationInstance
 
 HERE = native_platform()

@@ -138,7 +138,7 @@ def description(seeds: Seeds) -> Case:
 
 
 def _descriptions() -> tuple[bytes, ...]:
-    from plant_fmu.component import of_vehicle
+    from plant_fmu.vehicle_component import of_vehicle
 
     component = of_vehicle(load_vehicle("odin"))
     return SMALL, *(model_description(component, fmi, "token").encode() for fmi in (2, 3))
