@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 
 from controller.regions import Region, pack
 from controller.regions.in_c import c_sources
+from controller.regions.numbers import constraints
 from controller.regions.region_set import PackedRegions, name_of, of_attitude
 from cosim.scenario.scenario import CRITERIA, Scenario
 from cosim.ssp.c_sources import c_files, under_own_names
@@ -112,9 +113,19 @@ def _scene(regions: Sequence[Region], packed: PackedRegions, criteria: Sequence[
         "OFFSETS": packed.offsets.tolist(),
         "CRITERIA": criteria,
         "NAMES": names,
+        "CONSTRAINTS": [*_constraints(regions, packed), "{0}"],
     }
     lines = (f"#define REGION_{name} {{{', '.join(map(str, values))}}}" for name, values in rows.items())
     return "\n".join(["/* Regions of the scene, the goal first: generated. */", *lines, ""])
+
+
+def _constraints(regions: Sequence[Region], packed: PackedRegions) -> Iterator[str]:
+    """Yield what must hold among the numbers of shapes, a ``Constraint`` of C each."""
+    for i, region in enumerate(regions):
+        offset = int(packed.offsets[i])
+        for what, place, other, fault in constraints(region.shape.numbers()):
+            more = offset + other if what == "above" else other
+            yield f'{{HOLDS_{what.upper()}, {i}, {offset + place}, {more}, "{fault}"}}'
 
 
 def _variables(scenario: Scenario, regions: Sequence[Region]) -> Iterator[Variable]:

@@ -19,4 +19,4 @@ def shape_numbers(shape: Shape) -> tuple[tuple[str, Quantity], ...]:
     tuple of (str, Quantity)
         In the order of ``shape.packed()``.
     """
-    return tuple((name, Quantity(unit, least, greatest)) for name, unit, least, greatest in shape.numbers())
+    return tuple((name, Quantity(unit, least, greatest)) for name, unit, least, greatest, _ in shape.numbers())

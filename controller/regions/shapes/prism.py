@@ -55,7 +55,7 @@ class Prism:
         """Return what `packed` gives, by name and unit."""
         return (
             Number("top", *LENGTH),
-            Number("bottom", *LENGTH),
+            Number("bottom", *LENGTH, above="top"),
             *(
                 Number(f"corner[{i}].{axis}", *LENGTH)
                 for i in range(1, len(self.corners) + 1)

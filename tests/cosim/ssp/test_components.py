@@ -124,7 +124,7 @@ def test_numbers_of_the_scenario_are_parameters(controller):
     [
         ({"regions.drum.shape.axis.x": 0.9}, "regions.drum: axis is not of length 1"),
         ({"regions._3_box.shape.rotation[1,1]": 0.5}, "regions._3_box: rotation is no rotation matrix"),
-        ({"regions.wreck.shape.top": 4.0}, "regions.wreck: bottom is not below top"),
+        ({"regions.wreck.shape.top": 4.0}, "regions.wreck: bottom is not above top"),
         ({"regions.view.shape.sine": 0.9}, "regions.view: sine and cosine are of no angle"),
         ({"law.desired_quaternion.e0": 0.0}, "law.desired_quaternion is not of length 1"),
         ({"initial.quaternion.e0": 0.0}, "initial.quaternion is not of length 1"),

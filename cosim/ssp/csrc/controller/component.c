@@ -13,6 +13,16 @@ static const int OFFSETS[N_ALL + 1] = REGION_OFFSETS;
 static const int CRITERIA[N_ALL] = REGION_CRITERIA;
 static const char *const NAMES[N_ALL] = REGION_NAMES;
 
+/* What must hold among the numbers of all shapes, beyond their ranges; the last has no fault. */
+typedef struct Constraint {
+    enum { HOLDS_UNIT, HOLDS_ROTATION, HOLDS_ABOVE } what;
+    int region, place;
+    int more; /* how many numbers, or the place of the one to exceed */
+    const char *fault;
+} Constraint;
+
+static const Constraint CONSTRAINTS[] = REGION_CONSTRAINTS;
+
 static void rewind_memory(Model *m)
 {
     memset(&m->memory, 0, sizeof m->memory);
@@ -37,30 +47,11 @@ static bool is_rotation(const double R[9])
     return true;
 }
 
-/* What is wrong with the numbers of a shape beyond their ranges, NULL if nothing. */
-static const char *fault_of_shape(int kind, const double numbers[])
+static bool holds(const Constraint *c, const double numbers[])
 {
-    switch (kind) {
-    case SHAPE_HALF_SPACE:
-        return is_unit(numbers + 3, 3) ? NULL : "normal is not of length 1";
-    case SHAPE_BOX:
-    case SHAPE_ELLIPSOID:
-        return is_rotation(numbers + 3) ? NULL : "rotation is no rotation matrix";
-    case SHAPE_CYLINDER:
-        return is_unit(numbers + 3, 3) ? NULL : "axis is not of length 1";
-    case SHAPE_PRISM:
-        return numbers[1] > numbers[0] ? NULL : "bottom is not below top";
-    case SHAPE_CONE:
-        if (!is_unit(numbers + 6, 2))
-            return "sine and cosine are of no angle";
-        return is_unit(numbers + 3, 3) ? NULL : "axis is not of length 1";
-    case SHAPE_ORIENTATION:
-        return is_unit(numbers, 4) ? NULL : "quaternion is not of length 1";
-    case SHAPE_VISIBILITY:
-        return is_unit(numbers + 3, 3) ? NULL : "camera_axis is not of length 1";
-    default:
-        return NULL;
-    }
+    if (c->what == HOLDS_ABOVE)
+        return numbers[c->place] > numbers[c->more];
+    return c->what == HOLDS_ROTATION ? is_rotation(numbers + c->place) : is_unit(numbers + c->place, c->more);
 }
 
 static Status prepare(Instance *instance)
@@ -71,11 +62,9 @@ static Status prepare(Instance *instance)
         return instance_refuse(instance, "law.desired_quaternion is not of length 1");
     if (!is_unit(m->parameters.start + 3, 4))
         return instance_refuse(instance, "initial.quaternion is not of length 1");
-    for (int i = 0; i < N_ALL; i++) {
-        const char *fault = fault_of_shape(KINDS[i], m->parameters.numbers + OFFSETS[i]);
-        if (fault)
-            return instance_refuse(instance, "%s: %s", NAMES[i], fault);
-    }
+    for (const Constraint *c = CONSTRAINTS; c->fault; c++)
+        if (!holds(c, m->parameters.numbers))
+            return instance_refuse(instance, "%s: %s", NAMES[c->region], c->fault);
     ticks_begin(&m->memory.control, m->parameters.period, m->time);
     return STATUS_OK;
 }
