@@ -15,7 +15,7 @@ def compiled(system: System) -> Any:
     Parameters
     ----------
     system : System
-        Any.
+        What is compiled.
 
     Returns
     -------

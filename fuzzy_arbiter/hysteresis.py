@@ -197,7 +197,7 @@ class HysteresisArbiter:
         Parameters
         ----------
         inputs : array_like, shape (n, inputs)
-            Any.
+            Not used: the error names `scan` instead.
 
         Raises
         ------

@@ -34,7 +34,7 @@ def require_in_c(regions: Iterable[Region], where: str) -> None:
     Parameters
     ----------
     regions : iterable of Region
-        Any.
+        That C code is to evaluate.
     where : str
         What evaluates them in C, such as ``"lanes"``.
 

@@ -376,7 +376,7 @@ def clearances_at(points: Array, region: Region) -> Array:
     points : ndarray, shape (m, 3)
         [m, NED].
     region : Region
-        Any.
+        Whose clearance is asked for.
 
     Returns
     -------

@@ -27,7 +27,7 @@ def region_findings(scenario: Scenario) -> Iterator[Finding]:
     Parameters
     ----------
     scenario : Scenario
-        Any.
+        What is checked.
 
     Yields
     ------

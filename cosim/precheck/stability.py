@@ -44,7 +44,7 @@ def vehicle_findings(scenario: Scenario) -> Iterator[Finding]:
     Parameters
     ----------
     scenario : Scenario
-        Any.
+        What is checked.
 
     Yields
     ------
@@ -102,7 +102,7 @@ def start_weights(scenario: Scenario) -> Array:
     Parameters
     ----------
     scenario : Scenario
-        Any.
+        What is checked.
 
     Raises
     ------

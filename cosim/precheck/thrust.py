@@ -29,7 +29,7 @@ def thrust_findings(scenario: Scenario) -> Iterator[Finding]:
     Parameters
     ----------
     scenario : Scenario
-        Any.
+        What is checked.
 
     Yields
     ------

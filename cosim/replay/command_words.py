@@ -74,7 +74,7 @@ def command_words(command: Command) -> str:
     Parameters
     ----------
     command : Command
-        Any.
+        What is put into words.
 
     Returns
     -------

@@ -40,7 +40,7 @@ def events_of(run: Run, log: Log) -> list[Event]:
     Parameters
     ----------
     run : Run
-        Any.
+        What is replayed.
     log : sequence of (int, Order)
         What it was commanded.
 

@@ -17,7 +17,7 @@ def write_replay(run: Run, out: Path | None = None, title: str | None = None) ->
     Parameters
     ----------
     run : Run
-        Any.
+        What is replayed.
     out : Path, optional
         The file; default: ``replay.html`` in the run folder.
     title : str, optional

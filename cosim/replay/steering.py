@@ -44,7 +44,7 @@ def log_of(run: Run) -> Log:
     Parameters
     ----------
     run : Run
-        Any.
+        What is replayed.
 
     Returns
     -------
@@ -66,7 +66,7 @@ def changes_of(run: Run, log: Log) -> list[dict[str, Any]]:
     Parameters
     ----------
     run : Run
-        Any.
+        What is replayed.
     log : sequence of (int, Order)
         From `log_of`.
 

@@ -59,7 +59,7 @@ def trace_of(run: Run) -> Trace:
     Parameters
     ----------
     run : Run
-        Any.
+        What is replayed.
 
     Returns
     -------

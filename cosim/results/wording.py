@@ -56,7 +56,7 @@ def kind_of(shape: Shape) -> str:
     Parameters
     ----------
     shape : Shape
-        Any.
+        What is named.
 
     Returns
     -------
@@ -72,9 +72,9 @@ def number(value: float, digits: int) -> str:
     Parameters
     ----------
     value : float
-        Any.
+        What is written.
     digits : int
-        That count.
+        Significant digits.
 
     Returns
     -------

@@ -26,7 +26,7 @@ def true_vehicle(scenario: Scenario) -> Vehicle:
     Parameters
     ----------
     scenario : Scenario
-        Any.
+        Whose plant has numbers of its own.
 
     Returns
     -------
@@ -60,7 +60,7 @@ def true_model(scenario: Scenario) -> Model:
     Parameters
     ----------
     scenario : Scenario
-        Any.
+        Whose plant has numbers of its own.
 
     Returns
     -------

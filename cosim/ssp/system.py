@@ -91,7 +91,7 @@ def plant_component(scenario: Scenario) -> Component:
     Parameters
     ----------
     scenario : Scenario
-        Any.
+        Whose vehicle, start and plant numbers are used.
 
     Returns
     -------

@@ -32,7 +32,7 @@ class Logic(Generic[D]):
         Parameters
         ----------
         proposition : Proposition
-            Any.
+            Of terms of the system's inputs.
         of : callable
             Gives the degree of each statement in it.
 

@@ -22,7 +22,7 @@ def to_c(system: System) -> str:
     Parameters
     ----------
     system : System
-        Any.
+        What the code evaluates.
 
     Returns
     -------

@@ -88,7 +88,7 @@ def program(system: System) -> Program:
     Parameters
     ----------
     system : System
-        Any.
+        What the code evaluates.
 
     Returns
     -------

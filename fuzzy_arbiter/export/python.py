@@ -47,7 +47,7 @@ def to_python(system: System) -> str:
     Parameters
     ----------
     system : System
-        Any.
+        What the code evaluates.
 
     Returns
     -------

@@ -25,7 +25,7 @@ def say_shape(shape: Shape) -> str:
     Parameters
     ----------
     shape : Shape
-        Any.
+        What is written.
 
     Returns
     -------

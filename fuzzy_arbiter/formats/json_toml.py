@@ -90,7 +90,7 @@ def write_json(system: System) -> str:
     Parameters
     ----------
     system : System
-        Any.
+        What is written.
 
     Returns
     -------
@@ -118,7 +118,7 @@ def write_toml(system: System) -> str:
     Parameters
     ----------
     system : System
-        Any.
+        What is written.
 
     Returns
     -------

@@ -62,7 +62,7 @@ def range_ends(output: Output) -> tuple[Fraction, Fraction]:
     Parameters
     ----------
     output : Output
-        Any.
+        Whose value is scaled.
 
     Returns
     -------

@@ -231,7 +231,7 @@ def _exact(variable: Variable) -> list[Degree]:
 
 
 def _opposite(shape: Shape, other: Shape) -> bool:
-    """Whether shapes are one minus each other but for rounding, and that exactly where one is 0 or 1."""
+    """Return whether shapes are one minus each other but for rounding, and exactly so where one is 0 or 1."""
     if shape.jumps or other.jumps or len(shape.points) != len(other.points):
         return False
     return (shape.complement() == other or other.complement() == shape) and all(

@@ -41,7 +41,7 @@ def verify(system: System, effort: int = EFFORT) -> Verification:
     Parameters
     ----------
     system : System
-        Any.
+        What is verified.
     effort : int
         Most statements to evaluate; a check that needs more is not decided, and says so.
 
@@ -152,7 +152,7 @@ class _Checks:
     def _both_above_half(
         self, ask: Questions, terms: Sequence[Is], answer: Answer
     ) -> tuple[bool | None, str, dict[str, float | str] | None]:
-        """Whether never two of some terms are above 1/2, how that is known, and where they are."""
+        """Return whether never two of some terms are above 1/2, how that is known, and where they are."""
         reaches = reach(self.system, [rule.condition for term in terms for rule in rules_on(self.system, term)])
         if answer.all_found and not answer.boxes and reaches == "exact":
             return True, _ALL, None

@@ -58,7 +58,7 @@ def greatest_term(output: Output) -> str:
     Parameters
     ----------
     output : Output
-        Any.
+        An output of the system.
 
     Returns
     -------
@@ -75,7 +75,7 @@ def rules_on(system: System, statement: Is) -> tuple[Rule, ...]:
     Parameters
     ----------
     system : System
-        Any.
+        What is verified.
     statement : Is
         About an output.
 
@@ -193,7 +193,7 @@ def reach(system: System, conditions: Sequence[Proposition]) -> Reach:
     Parameters
     ----------
     system : System
-        Any.
+        What is verified.
     conditions : sequence of Proposition
         Those that matter.
 
@@ -224,7 +224,7 @@ def sampled(system: System, questions: Questions, statements: Sequence[Is]) -> d
     Parameters
     ----------
     system : System
-        Any.
+        What is verified.
     questions : Questions
         Of halves.
     statements : sequence of Is

@@ -15,7 +15,7 @@ def row_strengths(system: System, place: Mapping[str, float | str]) -> list[floa
     Parameters
     ----------
     system : System
-        Any.
+        What is verified.
     place : mapping from str to str
         Term of each input, or of those that matter.
 
@@ -37,7 +37,7 @@ def graded_strengths(system: System, place: Mapping[str, float | str]) -> list[f
     Parameters
     ----------
     system : System
-        Any.
+        What is verified.
     place : mapping from str to float
         Value of each input, or of those that matter.
 
@@ -55,7 +55,7 @@ def reasons(system: System, strengths: Sequence[float], statements: Sequence[Is]
     Parameters
     ----------
     system : System
-        Any.
+        What is verified.
     strengths : sequence of float
         Of each rule.
     statements : sequence of Is

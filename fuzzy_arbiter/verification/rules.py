@@ -19,7 +19,7 @@ def unused(system: System) -> Iterator[Finding]:
     Parameters
     ----------
     system : System
-        Any.
+        What is verified.
 
     Yields
     ------
@@ -52,7 +52,7 @@ def redundant(system: System) -> Iterator[Finding]:
     Parameters
     ----------
     system : System
-        Any.
+        What is verified.
 
     Yields
     ------
@@ -87,7 +87,7 @@ def redundant(system: System) -> Iterator[Finding]:
 
 
 def _below(p: Proposition, q: Proposition, lattice: bool) -> bool:
-    """Whether the form of two propositions shows that the first is never above the second."""
+    """Return whether the form of two propositions shows that the first is never above the second."""
     if p == q:
         return True
     if isinstance(p, Not) and isinstance(q, Not):
@@ -111,7 +111,7 @@ def labels(system: System) -> dict[Proposition, str]:
     Parameters
     ----------
     system : System
-        Any.
+        What is verified.
 
     Returns
     -------

@@ -161,7 +161,7 @@ class Search:
         return {self._order[i]: int(self._patterns[i][p]) for i, p in enumerate(row)}
 
     def _judge(self, boxes: NDArray[np.int32]) -> tuple[list[Flags], list[Flags]]:
-        """Whether each goal is met in all of a box, and whether it may be in some of it."""
+        """Return whether each goal is met in all of a box, and whether it may be in some of it."""
         n, depth = boxes.shape
         known: dict[Is, Bounds] = {}
 

@@ -144,7 +144,7 @@ def general_component(component: Component) -> Component:
     Parameters
     ----------
     component : Component
-        Any.
+        Whose start values are replaced.
 
     Returns
     -------
@@ -182,7 +182,7 @@ def _member(platform: Platform) -> str:
 
 
 def _has_libc(platform: Platform) -> bool:
-    """Whether a library with glibc loads: Linux may have another C library."""
+    """Return whether a library with glibc loads: Linux may have another C library."""
     if platform.system != "linux" or not sys.platform.startswith("linux"):
         return True
     try:

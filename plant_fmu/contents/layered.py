@@ -99,7 +99,7 @@ def reference_files(vehicle: Vehicle, results: Reference) -> dict[str, str]:
 
 
 def _is_shipped(vehicle: Vehicle) -> bool:
-    """Whether this is a vehicle of the package with all the FMU's numbers, not one of the same name."""
+    """Return whether this is a vehicle of the package with all the FMU's numbers, not one of the same name."""
     if vehicle.name not in shipped_vehicles():
         return False
     shipped = load_vehicle(vehicle.name)

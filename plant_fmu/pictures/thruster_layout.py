@@ -66,7 +66,7 @@ def thrusters(vehicle: Vehicle) -> Figure:
     Parameters
     ----------
     vehicle : Vehicle
-        Any.
+        What is drawn.
 
     Returns
     -------

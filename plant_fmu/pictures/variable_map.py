@@ -55,7 +55,7 @@ def variable_map(vehicle: Vehicle) -> Figure:
     Parameters
     ----------
     vehicle : Vehicle
-        Any.
+        What is drawn.
 
     Returns
     -------

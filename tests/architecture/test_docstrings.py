@@ -33,6 +33,8 @@ ELSEWHERE = re.compile(
     r"(?:Do what|Return what|[Aa]rguments as|[Aa]s|[Aa]s for|see|of) `([\w.]+)`"
 )  # the rest is said there
 
+NOT_IMPERATIVE = {"What", "Whether", "How", "Where", "When", "Who", "Which", "The", "A", "An", "Its", "Each", "All"}
+
 Part = griffe.DocstringSectionKind
 
 
@@ -204,3 +206,18 @@ def test_the_rule_of_units_can_fail():
         assert not UNIT.search(words), words
     for words in ("[m]", "m, NED", "# s", "(3,) m/s", "float [N m]", "[-]", "shape (6,) [N, N m]", "in seconds"):
         assert UNIT.search(words), words
+
+
+def test_a_first_line_is_imperative_and_no_parameter_is_any():
+    """What a function does, not what it is about; properties say what they are."""
+    wrong = {}
+    for function in functions():
+        words = function.docstring.value if function.docstring else ""
+        is_property = {"property", "cached_property"} & {str(d.value) for d in function.decorators} or (
+            "property" in function.labels
+        )
+        if words and not is_property and words.split()[0] in NOT_IMPERATIVE:
+            wrong[function.path] = words.splitlines()[0]
+        if re.search(r"^\s*Any\.$", words, re.M):
+            wrong[function.path] = "Any."
+    assert not wrong, shown(wrong)

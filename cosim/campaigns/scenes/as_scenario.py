@@ -21,7 +21,7 @@ def scene_scenario(scene: Scene, law: str, gains: Any, conditions: Conditions) -
     Parameters
     ----------
     scene : Scene
-        Any.
+        What becomes a scenario.
     law : str
         One of those in `controller.LAWS`.
     gains : NamedTuple

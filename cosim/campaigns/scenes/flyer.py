@@ -118,7 +118,7 @@ class SceneFlyer:
         Parameters
         ----------
         scene : Scene
-            Any.
+            With all that the plant needs.
         trace : bool
             Whether to keep what happened, see `cosim.batch.fused_loop`.
 

@@ -100,7 +100,7 @@ def told(scene: Scene) -> KnownScene:
     Parameters
     ----------
     scene : Scene
-        Any.
+        With all that the plant needs.
 
     Returns
     -------
@@ -121,7 +121,7 @@ def scene_regions(scene: Scene) -> list[tuple[Region, str]]:
     Parameters
     ----------
     scene : Scene
-        Any.
+        With all that the plant needs.
 
     Returns
     -------
@@ -143,7 +143,7 @@ def plant_values(scene: Scene, vehicle: Vehicle, substep: float) -> dict[str, fl
     Parameters
     ----------
     scene : Scene
-        Any.
+        With all that the plant needs.
     vehicle : Vehicle
         Whose weight and centre of gravity count.
     substep : float

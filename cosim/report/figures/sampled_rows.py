@@ -39,7 +39,7 @@ def story_of(run: Run) -> FigureData:
     Parameters
     ----------
     run : Run
-        Any.
+        What is drawn.
 
     Returns
     -------

@@ -113,7 +113,7 @@ class CommandHandler:
         Parameters
         ----------
         command : Command
-            Any.
+            What is asked of the vehicle.
         time : float
             Of the step [s].
         """

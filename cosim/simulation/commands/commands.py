@@ -151,7 +151,7 @@ def validate_command(command: Command) -> None:
     Parameters
     ----------
     command : Command
-        Any.
+        What is checked.
 
     Raises
     ------
