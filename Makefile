@@ -79,7 +79,7 @@ lowest:
 		--output-file $(LOWEST)/requirements.txt pyproject.toml
 	$(LOWEST)/uv/bin/uv venv --quiet --clear --python 3.11 $(LOWEST)/env
 	VIRTUAL_ENV=$(LOWEST)/env $(LOWEST)/uv/bin/uv pip install --quiet --requirement $(LOWEST)/requirements.txt \
-		hypothesis pypdf pytest pytest-timeout
+		hypothesis pytest pytest-timeout
 	VIRTUAL_ENV=$(LOWEST)/env $(LOWEST)/uv/bin/uv pip install --quiet --no-deps --editable .
 	$(LOWEST)/env/bin/python -m pytest -q -o filterwarnings= $(LOWEST_TESTS) $(PYTEST_FLAGS) # old versions warn
 

@@ -9,7 +9,7 @@ from typing import Any
 from cosim.command_line.process import FAULT, tell
 from cosim.command_line.results import say
 
-_FORMATS = ("html", "pdf", "png")
+_FORMATS = ("html", "png")
 
 
 def add_verb(verbs: Any) -> None:
@@ -23,9 +23,9 @@ def add_verb(verbs: Any) -> None:
     report = verbs.add_parser("report", help="write summary and report of runs again, or of killed ones")
     report.add_argument("folders", type=Path, nargs="+", metavar="RUN", help="a run folder")
     report.add_argument(
-        "--format", type=_formats, action="append", default=[], metavar="html|pdf|png", dest="formats",
-        help="html: a page with its figures, and the replay (default); pdf: a document; png: pictures of its pages and "
-        "figures; several with commas between them",
+        "--format", type=_formats, action="append", default=[], metavar="html|png", dest="formats",
+        help="html: a page with its figures, and the replay (default), which browsers print; png: the figures as "
+        "pictures; both with a comma between them",
     )  # fmt: skip
 
 

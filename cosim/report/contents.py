@@ -246,7 +246,7 @@ def _setting(run: Run) -> Table:
 
 def _repeating(run: Run) -> tuple[tuple[str, ...], str]:
     """Return the commands that repeat a run, and what they do."""
-    again = ("cosim report . --format html,pdf", "cosim replay .")
+    again = ("cosim report . --format html,png", "cosim replay .")
     if run.scenario.law.own:
         whose = f"The law that flew this run, {run.scenario.law.name}, is its user's own and in no file here"
         return again, f"{whose}: the run is repeated from where the law is, and can be shown again from here."

@@ -109,7 +109,7 @@ def test_a_summary_that_somebody_changed_is_only_read(attacked, plain, tmp_path)
 
 @pytest.mark.slow
 def test_pages_to_print_take_any_title(attacked):
-    _, files = report_again(attacked, ("pdf", "png"))
+    _, files = report_again(attacked, ("html", "png"))
     assert files
     assert load_run(attacked).scenario.title == f"{ATTACK} (changed: time.duration = 0.2 s)"
 

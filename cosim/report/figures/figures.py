@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from typing import Protocol
 
 import matplotlib as mpl
+from matplotlib.figure import Figure
 
 from cosim.report.figures import forces as of_forces
 from cosim.report.figures import path as in_space
 from cosim.report.figures import time_series as over_time
-from cosim.report.figures.layout import FIGURE_STYLE, F, Sheet, own_sheet
+from cosim.report.figures.layout import FIGURE_STYLE
 from cosim.report.figures.style import FigureData, NamedFigure
 from cosim.report.figures.trajectory import is_known, targets_of
 
@@ -25,34 +25,15 @@ def drawings(data: FigureData) -> Iterator[NamedFigure]:
 
     Yields
     ------
-    Drawing
+    NamedFigure
         In the order of the report.
     """
     for name, caption, draw in _figures(data):
         with mpl.rc_context(FIGURE_STYLE):
-            yield NamedFigure(name, caption, draw(data, own_sheet))
+            yield NamedFigure(name, caption, draw(data))
 
 
-def draw_all(data: FigureData, sheet_for: Callable[[str], Sheet[F]]) -> None:
-    """Draw the same figures on sheets that are given.
-
-    Parameters
-    ----------
-    data : FigureData
-        Scenario, record and summary.
-    sheet_for : callable
-        Gives the sheet of a figure for its caption.
-    """
-    for _, caption, draw in _figures(data):
-        with mpl.rc_context(FIGURE_STYLE):
-            draw(data, sheet_for(caption))
-
-
-class _Draw(Protocol):
-    def __call__(self, data: FigureData, sheet: Sheet[F]) -> F: ...
-
-
-def _figures(data: FigureData) -> Iterator[tuple[str, str, _Draw]]:
+def _figures(data: FigureData) -> Iterator[tuple[str, str, Callable[[FigureData], Figure]]]:
     """Yield name, caption, and what draws it."""
     moved = ""
     if data.scenario.moving:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 from matplotlib.artist import Artist
+from matplotlib.figure import Figure
 
-from cosim.report.figures.layout import F, Sheet, legend, limits_of, log_axis, symlog_axis
+from cosim.report.figures.layout import legend, limits_of, log_axis, symlog_axis
 from cosim.report.figures.style import BLACK, BLUE, CYCLE, GREEN, RED, FigureData
 from cosim.report.figures.time_series import DASHES, curve, over_time
 from cosim.results.record import Rows
@@ -34,13 +35,13 @@ def norms_of(record: Rows) -> dict[str, Array]:
     return {words: np.maximum(np.linalg.norm(force, axis=1), _FLOOR) for words, force in forces.items()}
 
 
-def forces(data: FigureData, sheet: Sheet[F]) -> F:
+def forces(data: FigureData) -> Figure:
     """Draw the norm of the body force on a logarithmic axis, and its components."""
     acting = data.record.stack([f"actuation.{a}" for a in "XYZ"])
     norms = norms_of(data.record)
     names = [f"{axis}, acting" for axis in "XYZ"]
     labels = [f"norm, {which}" for which in norms] + names
-    figure, (norm, parts) = over_time(data, sheet, [1.7, 1.7], labels)
+    figure, (norm, parts) = over_time(data, [1.7, 1.7], labels)
     entries: dict[str, Artist] = {}
     for label, force, colour, dashes in zip(labels, norms.values(), (BLACK, RED), DASHES, strict=False):
         entries[label] = curve(norm, data, force, color=colour, linestyle=dashes)
@@ -92,12 +93,12 @@ def thrusts_of(scenario: Scenario, record: Rows) -> Array:
     return force
 
 
-def thrusters(data: FigureData, sheet: Sheet[F]) -> F:
+def thrusters(data: FigureData) -> Figure:
     """Draw the force of each thruster, or what it would have to give."""
     vehicle = data.scenario.vehicle
     force = thrusts_of(data.scenario, data.record)
     labels = [f"thruster {i + 1}" for i in range(vehicle.n_thrusters)]
-    figure, (ax,) = over_time(data, sheet, [2.3], labels)
+    figure, (ax,) = over_time(data, [2.3], labels)
     entries: dict[str, Artist] = {}
     for i, label in enumerate(labels):
         style = "-" if i < len(CYCLE) // 2 else "--"
@@ -116,11 +117,11 @@ def thrusters(data: FigureData, sheet: Sheet[F]) -> F:
     return figure
 
 
-def estimates(data: FigureData, sheet: Sheet[F]) -> F:
+def estimates(data: FigureData) -> Figure:
     """Draw the estimates against the truth."""
     truth = data.scenario.true_restoring_parameters
     labels = list(_ESTIMATES)
-    figure, (force, moment) = over_time(data, sheet, [1.6, 1.6], [*labels, "truth"])
+    figure, (force, moment) = over_time(data, [1.6, 1.6], [*labels, "truth"])
     entries: dict[str, Artist] = {}
     shown: dict[bool, list[Array]] = {True: [], False: []}
     for i, label in enumerate(labels):

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from typing import Any, TypeVar
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure, SubFigure
+from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, MaxNLocator, NullLocator
 
 from cosim.report.figures.style import STYLE
@@ -25,31 +25,25 @@ _LETTERS, _MARK = 104, 7  # letters across a figure in a legend's size, that a l
 # names come from users: their $ and _ are no mathematics
 FIGURE_STYLE: Any = STYLE | {"text.parse_math": False, "xtick.labelsize": 8, "ytick.labelsize": 8}
 
-F = TypeVar("F", bound=Figure | SubFigure)
-Sheet = Callable[[float], F]  # gives a place for a figure of so many inches height, `WIDTH` wide
-
 _SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
-def own_sheet(height: float) -> Figure:
-    """Return a figure of its own, so many inches high."""
+def new_figure(height: float) -> Figure:
+    """Return a figure of a height [inch], `WIDTH` wide."""
     return Figure(figsize=(WIDTH, height))
 
 
 def panels(
-    sheet: Sheet[F],
     heights: Sequence[float],
     widths: Sequence[float] = (1.0,),
     labels: Sequence[str] = (),
     titles: float = 0.0,
     sharey: bool = True,
-) -> tuple[F, Any]:
+) -> tuple[Figure, Any]:
     """Return a figure and its axes, those of a column on one x axis.
 
     Parameters
     ----------
-    sheet : Sheet
-        Gives the place.
     heights : sequence of float
         Of the rows [inch].
     widths : sequence of float
@@ -63,12 +57,12 @@ def panels(
 
     Returns
     -------
-    Figure or SubFigure, ndarray of Axes, shape (rows, columns)
+    Figure, ndarray of Axes, shape (rows, columns)
         Ticks have numbers at the left and at the bottom only.
     """
     top = TOP + LEGEND_ROW * legend_rows(labels) + titles
     total = top + sum(heights) + _GAP * (len(heights) - 1) + BOTTOM
-    figure = sheet(total)
+    figure = new_figure(total)
     wide = (WIDTH - LEFT - RIGHT - _GAP * (len(widths) - 1)) * np.array(widths) / sum(widths)
     axes = np.empty((len(heights), len(widths)), dtype=object)
     y = total - top
@@ -186,7 +180,7 @@ def legend_rows(labels: Sequence[str]) -> int:
     return len(_rows_of(labels))
 
 
-def legend(figure: F, entries: Mapping[str, Artist]) -> None:
+def legend(figure: Figure, entries: Mapping[str, Artist]) -> None:
     """Put a legend above all axes, with names as they are: Matplotlib would leave out those that begin with _."""
     height = figure.bbox.height / figure.dpi
     for i, row in enumerate(_rows_of(list(entries))):

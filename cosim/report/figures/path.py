@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, PathPatch
 from matplotlib.path import Path
@@ -18,10 +19,9 @@ from cosim.report.figures.layout import (
     RIGHT,
     TOP,
     WIDTH,
-    F,
-    Sheet,
     legend,
     legend_rows,
+    new_figure,
     plain_numbers,
 )
 from cosim.report.figures.shape_outlines import edges_of, mesh_of, outlines, pieces_of, rim, silhouette
@@ -46,7 +46,7 @@ _GAP = 0.34  # inches between the planes
 _NAMED = 8  # regions whose names stand in the picture in space
 
 
-def path_3d(data: FigureData, sheet: Sheet[F]) -> F:
+def path_3d(data: FigureData) -> Figure:
     """Draw the path, regions and goal in space, as seen from the south-east and above."""
     way = way_of(data)
     low, high = _extent(data, way)
@@ -57,7 +57,7 @@ def path_3d(data: FigureData, sheet: Sheet[F]) -> F:
     top = TOP + LEGEND_ROW * legend_rows(list(entries))
     box = Box(low, high)
     height = box.height_for(WIDTH - 0.2, 4.4)
-    figure = sheet(height + top)
+    figure = new_figure(height + top)
     ax = figure.add_axes((0.1 / WIDTH, 0.0, 1.0 - 0.2 / WIDTH, height / (height + top)))
     labels = box.draw(ax)
     clip = Path(box.outline)
@@ -77,7 +77,7 @@ def path_3d(data: FigureData, sheet: Sheet[F]) -> F:
     return figure
 
 
-def path_plane(data: FigureData, sheet: Sheet[F]) -> F:
+def path_plane(data: FigureData) -> Figure:
     """Draw the path and the outlines of the regions from the side and from above."""
     way = way_of(data)
     low, high = _extent(data, way)
@@ -90,7 +90,7 @@ def path_plane(data: FigureData, sheet: Sheet[F]) -> F:
     room = (across / scale - along) / 2.0
     low, high = low - np.array([room, 0.0, 0.0]), high + np.array([room, 0.0, 0.0])
     total = top + scale * (side + above) + _GAP + BOTTOM
-    figure = sheet(total)
+    figure = new_figure(total)
     y = total - top
     for view, axis, title in ((SIDE, 2, "from the side, looking west"), (ABOVE, 1, "from above")):
         height = scale * (high - low)[axis]

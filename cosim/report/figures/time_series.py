@@ -8,12 +8,13 @@ from typing import Any
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
 from controller.regions import Sphere
 from controller.regions.region_set import of_attitude
-from cosim.report.figures.layout import F, Sheet, legend, limits_of, panels, symlog_axis
+from cosim.report.figures.layout import legend, limits_of, panels, symlog_axis
 from cosim.report.figures.style import (
     BLACK,
     BLUE,
@@ -61,12 +62,12 @@ def _around(data: FigureData, start: float, end: float) -> tuple[float, float]:
     return start - room, end + room
 
 
-def _zoomed(data: FigureData, sheet: Sheet[F], heights: Sequence[float], labels: Sequence[str]) -> tuple[F, Any]:
+def _zoomed(data: FigureData, heights: Sequence[float], labels: Sequence[str]) -> tuple[Figure, Any]:
     """Return axes for the whole run, shape (rows, 1), or (rows, 2) with the time of the overlap on the left."""
     if not zooms(data):
-        figure, axes = over_time(data, sheet, heights, labels)
+        figure, axes = over_time(data, heights, labels)
         return figure, axes[:, None]
-    figure, axes = panels(sheet, heights, (2.0, 3.0), labels)
+    figure, axes = panels(heights, (2.0, 3.0), labels)
     start, end = data.summary["intersection_windows"][0]
     for ax in axes[:, 0]:
         ax.axvspan(start, end, color=BLACK, alpha=0.08, linewidth=0)
@@ -78,9 +79,9 @@ def _zoomed(data: FigureData, sheet: Sheet[F], heights: Sequence[float], labels:
     return figure, axes
 
 
-def over_time(data: FigureData, sheet: Sheet[F], heights: Sequence[float], labels: Sequence[str]) -> tuple[F, Any]:
+def over_time(data: FigureData, heights: Sequence[float], labels: Sequence[str]) -> tuple[Figure, Any]:
     """Return axes over the whole run, shape (rows,)."""
-    figure, axes = panels(sheet, heights, labels=labels)
+    figure, axes = panels(heights, labels=labels)
     axes[0, 0].set_xlim(0.0, data.summary["simulated_time"] or data.scenario.time.step)
     axes[-1, 0].set_xlabel(_TIME)
     return figure, axes[:, 0]
@@ -123,12 +124,12 @@ def error_of(scenario: Scenario, record: Rows) -> tuple[str, Array]:
     return "RMS error", np.linalg.norm(path - centre, axis=1) / np.sqrt(3.0)
 
 
-def position_error(data: FigureData, sheet: Sheet[F]) -> F:
+def position_error(data: FigureData) -> Figure:
     """Draw the RMS error to the goal's centre, or the distance to the goal where it has none."""
     what, error = error_of(data.scenario, data.record)
     sphere = data.scenario.goal if isinstance(data.scenario.goal, Sphere) else None
     labels = [what, "tolerance r_v/√3"] if sphere else [what]
-    figure, (ax,) = over_time(data, sheet, [2.0], labels)
+    figure, (ax,) = over_time(data, [2.0], labels)
     lines = [curve(ax, data, error)]
     ax.set_ylabel(f"{what} [m]")
     if sphere:
@@ -138,10 +139,10 @@ def position_error(data: FigureData, sheet: Sheet[F]) -> F:
     return figure
 
 
-def attitude(data: FigureData, sheet: Sheet[F]) -> F:
+def attitude(data: FigureData) -> Figure:
     """Draw roll, pitch and yaw."""
     angles = {name: np.rad2deg(data.record[f"attitude.{name}"]) for name in ("roll", "pitch", "yaw")}
-    figure, (ax,) = over_time(data, sheet, [2.0], list(angles))
+    figure, (ax,) = over_time(data, [2.0], list(angles))
     styles = zip(angles.items(), (BLUE, RED, GREEN), DASHES, strict=False)
     legend(figure, {n: curve(ax, data, angle, color=c, linestyle=s) for (n, angle), c, s in styles})
     ax.set_ylim(*limits_of(list(angles.values()), least=2.0))
@@ -149,11 +150,11 @@ def attitude(data: FigureData, sheet: Sheet[F]) -> F:
     return figure
 
 
-def weights_overlap(data: FigureData, sheet: Sheet[F]) -> F:
+def weights_overlap(data: FigureData) -> Figure:
     """Draw the weights around each window in which the regions overlap, at most the first three."""
     windows = data.summary["intersection_windows"][:_WINDOWS]
     labels = [f"α{i + 1} {name}" for i, name in enumerate(CRITERIA)]
-    figure, axes = panels(sheet, [2.0], [1.0] * len(windows), [*labels, "overlap"], titles=0.2)
+    figure, axes = panels([2.0], [1.0] * len(windows), [*labels, "overlap"], titles=0.2)
     time = data.record["time"]
     for ax, (start, end) in zip(axes[0], windows, strict=True):
         first, last = _around(data, start, end)
@@ -173,10 +174,10 @@ def weights_overlap(data: FigureData, sheet: Sheet[F]) -> F:
     return figure
 
 
-def weights(data: FigureData, sheet: Sheet[F]) -> F:
+def weights(data: FigureData) -> Figure:
     """Draw memberships and weights of each criterion."""
     labels = ["weight, in its criterion's colour", "membership"]
-    figure, axes = _zoomed(data, sheet, [0.95] * len(CRITERIA), labels)
+    figure, axes = _zoomed(data, [0.95] * len(CRITERIA), labels)
     for i, (row, name) in enumerate(zip(axes, CRITERIA, strict=True)):
         lines = [
             curve(row, data, data.record[f"weight.{name}"], color=CRITERION_COLOURS[name], linewidth=1.8),
@@ -188,7 +189,7 @@ def weights(data: FigureData, sheet: Sheet[F]) -> F:
     return figure
 
 
-def clearance(data: FigureData, sheet: Sheet[F]) -> F:
+def clearance(data: FigureData) -> Figure:
     """Draw the clearance to each region and to the goal: distances, and angles below them where there are any."""
     regions = list(regions_of(data.scenario))
     of_places = [of for of in regions if not of_attitude(of[0].shape)]
@@ -197,7 +198,7 @@ def clearance(data: FigureData, sheet: Sheet[F]) -> F:
     others = len(regions) - len(named)
     labels = [region.name for region, _ in (*of_places, *of_angles) if region.name in named]
     rest = [f"{others} others"] if others else []
-    figure, axes = _zoomed(data, sheet, [2.5, 1.5] if of_angles else [2.5], [*labels, *rest])
+    figure, axes = _zoomed(data, [2.5, 1.5] if of_angles else [2.5], [*labels, *rest])
     entries: dict[str, Artist] = {}
     command = [region.name for region, _ in regions if region.name in named]
     for row, group, unit in zip(axes, (of_places, of_angles), ("m", "°"), strict=False):
@@ -231,9 +232,9 @@ def _named(data: FigureData, names: list[str]) -> set[str]:
     return {names[0], *sorted(names[1:], key=lambda name: np.nan_to_num(least[name], nan=np.inf))[:_NEAREST]}
 
 
-def control_mode(data: FigureData, sheet: Sheet[F]) -> F:
+def control_mode(data: FigureData) -> Figure:
     """Draw who steers, and whether the thrusters may work."""
-    figure, (ax,) = over_time(data, sheet, [1.3], [])
+    figure, (ax,) = over_time(data, [1.3], [])
     time, mode = data.record["time"], data.record["commands.mode"]
     armed = data.record["commands.armed"] > 0.0
     changes = [0, *(np.flatnonzero(np.diff(mode) != 0.0) + 1).tolist(), len(time) - 1]
@@ -248,11 +249,11 @@ def control_mode(data: FigureData, sheet: Sheet[F]) -> F:
     return figure
 
 
-def lyapunov(data: FigureData, sheet: Sheet[F]) -> F:
+def lyapunov(data: FigureData) -> Figure:
     """Draw V in its three forms, and its rate."""
     forms = {form: data.record[f"lyapunov.{form}"] for form in ("printed", "normalised", "primary")}
     labels = ("V as printed", "V, potential of the force", "V, primary region alone")
-    figure, axes = _zoomed(data, sheet, [1.8, 1.8], labels)
+    figure, axes = _zoomed(data, [1.8, 1.8], labels)
     styles = zip(forms.values(), (ORANGE, BLUE, BLACK), DASHES, strict=False)
     lines = [curve(axes[0], data, V, color=colour, linestyle=style) for V, colour, style in styles]
     rate = data.record["lyapunov.rate"]
