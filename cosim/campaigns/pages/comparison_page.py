@@ -55,7 +55,8 @@ def write_comparison_page(folder: Path, replays: int) -> Path:
         After Ctrl-C; the page is there, without the replays.
     """
     numbers = read_json(folder / NUMBERS)
-    if not (isinstance(numbers.get("laws"), dict) and numbers["laws"].keys() <= LAWS.keys()):
+    laws = numbers.get("laws")
+    if not (isinstance(laws, dict) and laws and laws.keys() <= LAWS.keys()):
         raise RunError(f"{folder / NUMBERS}: holds no comparison of laws")
     results = {law: complete_results(folder / law, SCHEMA) for law in numbers["laws"]}
     worst = {law: worst_rows(rows, max(_LISTED, replays)) for law, rows in results.items()}

@@ -10,6 +10,7 @@ from controller.paper_law import Gains
 from cosim.batch import fused_loop
 from cosim.campaigns import compare
 from cosim.campaigns.comparison import difference, pair
+from cosim.campaigns.pages.comparison_page import write_comparison_page
 from cosim.campaigns.scenes.flyer import Score
 from cosim.campaigns.scenes.rows import row_of
 from cosim.errors import RunError
@@ -117,3 +118,10 @@ def test_a_difference_is_that_of_the_scenes_that_both_complete(results):
     found = difference("mine", mine, "other", other)
     assert [found[name] for name in ("both", "only_one", "only_other", "neither")] == [2, 1, 1, 0]
     assert found["differences"]["reach_time"]["median"] == 1.5 and found["differences"]["effort"]["median"] == 15.0
+
+
+@pytest.mark.parametrize("laws", [{}, [], None, {"none": {}}])
+def test_numbers_without_laws_are_no_comparison(tmp_path, laws):
+    (tmp_path / "compare.json").write_text(json.dumps({"laws": laws}))
+    with pytest.raises(RunError, match="holds no comparison of laws"):
+        write_comparison_page(tmp_path, 0)
