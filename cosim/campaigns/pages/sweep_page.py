@@ -66,7 +66,9 @@ def write_sweep_page(folder: Path, replays: int) -> Path:
     summary = read_json(folder / SUMMARY)
     if summary.get("kind") != SWEEP or not isinstance(summary.get("vary"), dict):
         raise RunError(f"{folder / SUMMARY}: holds no sweep")
-    results = complete_results(folder, schema_of(tuple(summary["vary"])))
+    with understood(folder / SUMMARY):
+        schema = schema_of(tuple(summary["vary"]))
+    results = complete_results(folder, schema)
     with held(folder):
         worst = worst_rows(results, max(LISTED, replays))
         with understood(folder / SUMMARY):

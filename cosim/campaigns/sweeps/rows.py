@@ -49,7 +49,14 @@ def schema_of(keys: tuple[str, ...]) -> Any:
     -------
     pyarrow.Schema
         Number of the row, values of the keys, seed, outcomes with null where there is none, why it was refused.
+
+    Raises
+    ------
+    ValueError
+        If a key has the name of another column: no key of a scenario has.
     """
+    if taken := {"row", "seed", "refused", *FIELDS} & set(keys):
+        raise ValueError(f"{min(taken)!r} varies, expected keys of a scenario")
 
     def field(name: str, kind: Any, unit: str, description: str, nullable: bool = False) -> Any:
         return pa.field(name, kind, nullable=nullable, metadata={"unit": unit, "description": description})

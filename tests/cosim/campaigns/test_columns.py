@@ -8,6 +8,7 @@ import pyarrow as pa
 import pytest
 
 from cosim.campaigns.store.columns import of_numbers, of_texts, to_array
+from cosim.campaigns.sweeps.rows import schema_of
 
 N = 37  # no multiple of the eight facts in a byte
 
@@ -68,3 +69,9 @@ def test_no_sweep_brings_pandas(tmp_path):
     pytest.importorskip("pandas")
     done = subprocess.run([sys.executable, "-c", SWEEP, tmp_path], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.parametrize("key", ["row", "seed", "reached", "refused"])
+def test_no_key_of_a_sweep_has_the_name_of_another_column(key):
+    with pytest.raises(ValueError, match=f"'{key}' varies"):
+        schema_of(("limit.force", key))
