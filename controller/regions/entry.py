@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields
 from typing import Any
 
 from controller.regions.mesh import Mesh
-from controller.regions.shape import Bounds, Shape
+from controller.regions.shape import Array, Bounds, Shape
 
 _FACES = ("unit", "packed", "numbers", "bounds")
 
@@ -31,6 +31,12 @@ class Entry:
         draw it. A shape of attitude has none.
     of_attitude : bool, optional
         Whether it depends on attitude.
+    half_axes : callable, optional
+        Where it is an ellipsoid: its centre [m, NED], shape (3,), and its half axes as rows [m], shape (3, 3), of one
+        of them. Pictures then draw the very ellipse that it is seen as, not its mesh.
+    planes : callable, optional
+        Where planes bound it and it has no end: a point [m, NED] and the unit normal out of it for each plane, of one
+        of them. Pictures then cut the planes where the picture ends.
     convex : bool, optional
         Whether each is convex: rays, such as those of a proximity sensor, then go on by tangents, else by distances.
 
@@ -45,6 +51,8 @@ class Entry:
     example: Shape
     units: Mapping[str, str]
     surface: Callable[[Any, Bounds], Mesh] | None = None
+    half_axes: Callable[[Any], tuple[Array, Array]] | None = None
+    planes: Callable[[Any], Sequence[tuple[Array, Array]]] | None = None
     of_attitude: bool = False
     convex: bool = False
 

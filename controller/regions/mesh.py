@@ -17,6 +17,7 @@ from controller.regions.shape import Array, Bounds
 
 AROUND = 32  # corners of a circle
 _TIMES_SPLIT = 2  # of each triangle of the icosahedron that becomes a ball
+_SAME_PLACE = 1e-8  # m
 _GOLDEN = (1.0 + math.sqrt(5.0)) / 2.0
 
 
@@ -123,15 +124,28 @@ def _outward(vertices: Array, triangles: NDArray[np.intp]) -> NDArray[np.intp]:
     return turned
 
 
-def patch(point: Sequence[float], normal: Sequence[float], limits: Bounds) -> Mesh:
-    """Return a square of a plane, about its point nearest to the middle of the limits."""
+def patches(planes: Sequence[tuple[Array, Array]], limits: Bounds) -> Mesh:
+    """Return a square of each plane, given by a point and a normal, about its point nearest to the limits' middle."""
     low, high = np.array(limits[0]), np.array(limits[1])
-    along, u, v = frame(np.array(normal, dtype=float))
-    middle = (low + high) / 2.0
-    centre = middle - ((middle - np.array(point)) @ along) * along
-    half = float(np.linalg.norm(high - low)) / 2.0
-    corners = [centre + half * (a * u + b * v) for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
-    return Mesh(np.array(corners), np.array([(0, 1, 2), (0, 2, 3)]))
+    middle, half = (low + high) / 2.0, float(np.linalg.norm(high - low)) / 2.0
+    corners, triangles = [], []
+    for i, (point, normal) in enumerate(planes):
+        along, u, v = frame(normal)
+        centre = middle - ((middle - point) @ along) * along
+        corners += [centre + half * (a * u + b * v) for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
+        triangles += [(4 * i, 4 * i + 1, 4 * i + 2), (4 * i, 4 * i + 2, 4 * i + 3)]
+    return Mesh(np.array(corners), np.array(triangles))
+
+
+def welded(mesh: Mesh) -> Mesh:
+    """Return a mesh with one corner where several were, within `_SAME_PLACE`, and without triangles of no area."""
+    _, first, index = np.unique(np.round(mesh.vertices / _SAME_PLACE), axis=0, return_index=True, return_inverse=True)
+    order = np.argsort(first)  # the corners stay in their order
+    place = np.empty(len(order), dtype=np.intp)
+    place[order] = np.arange(len(order))
+    triangles = place[index.reshape(-1)][mesh.triangles]
+    a, b, c = triangles.T
+    return Mesh(mesh.vertices[first[order]], triangles[(a != b) & (b != c) & (c != a)])
 
 
 def frame(axis: Array) -> tuple[Array, Array, Array]:

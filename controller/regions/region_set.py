@@ -17,6 +17,7 @@ from controller.errors import RegionError
 from controller.jit.function_pointer import call
 from controller.jit.jit import inlined, jit_noalloc, part
 from controller.jit.stack_array import zeros
+from controller.regions.entry import Entry
 from controller.regions.kinds import (
     DEPTH_BAND,
     FIRST_OF_ATTITUDE,
@@ -107,21 +108,20 @@ def surface_of(shape: Shape, limits: Bounds) -> Mesh:
     limits : Bounds
         What has no end is cut to a patch of their size.
 
-    Returns
-    -------
-    Mesh
-        Closed, but for planes.
-
     Raises
     ------
     RegionError
         If the shape is one of attitude.
     """
-    name = name_of(shape)
-    surface = ENTRIES[name].surface
+    surface = shape_entry(shape).surface
     if surface is None:
-        raise RegionError(f"shape {name!r} has no surface, expected one of a shape of position")
+        raise RegionError(f"shape {name_of(shape)!r} has no surface, expected one of a shape of position")
     return surface(shape, limits)
+
+
+def shape_entry(shape: Shape) -> Entry:
+    """Return the entry of a shape's kind."""
+    return ENTRIES[name_of(shape)]
 
 
 def of_attitude(shape: Shape) -> bool:

@@ -164,4 +164,4 @@ def _rgb(colour: str) -> tuple[int, int, int]:
 
 def _shape(numbers: dict[str, Any]) -> Shape:
     """Return the shape that its numbers say."""
-    return SHAPES[numbers["kind"]](**{key: value for key, value in numbers.items() if key not in ("kind", "mesh")})
+    return SHAPES[numbers["kind"]](**{key: value for key, value in numbers.items() if key not in ("kind", "drawing")})

@@ -15,7 +15,7 @@ from cosim.live.command_desk import CommandDesk
 from cosim.live.history import History
 from cosim.live.messages import bytes_of, text_of
 from cosim.replay.command_words import command_words
-from cosim.replay.header import header_of, shape_of
+from cosim.replay.header import header_of, limits_of, shape_of
 from cosim.replay.viewing import Viewing
 from cosim.scenario.scenario import Scenario
 from cosim.scenario.tables import PARKED_POSITION
@@ -78,6 +78,7 @@ class Hub:
         self._names = {column.name: i for i, column in enumerate(self._viewing.columns)}
         self._header = header_of(scenario, self._viewing.columns, isinstance(queue, CommandQueue))
         self._header["changes"] = []
+        self._limits = limits_of(scenario)
         self._step = scenario.time.step
         self._middle, self._target_radius = shape_center(scenario.goal), 0.0
         self._regions = ["goal", *(secondary.region.name for secondary in scenario.regions)]
@@ -142,9 +143,8 @@ class Hub:
         if name == "goal" and self._target_radius > 0.0:
             shape = Sphere(self._middle, self._target_radius)
         gain = self._header["regions"][index]["gain"] if shape or not index else settings[f"regions.{name}.gain"]
-        self._header["changes"].append(
-            {"time": time, "region": index, "shape": shape_of(shape or settings.shapes[name]), "gain": gain}
-        )
+        drawn = shape_of(shape or settings.shapes[name], self._limits)
+        self._header["changes"].append({"time": time, "region": index, "shape": drawn, "gain": gain})
 
     def say(self, text: str, kind: str = "info", time: float | None = None) -> None:
         """Tell all viewers something; `kind` is info, order or warning, `time` simulated [s]."""

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from controller.regions.region_set import name_of, of_attitude, surface_of
-from controller.regions.shape import Shape
+from controller.regions.region_set import name_of, of_attitude, shape_entry, surface_of
+from controller.regions.shape import Bounds, Shape
 from cosim.results.wording import asked
 from cosim.scenario.scenario import Scenario
 from cosim.simulation.signals import Column
@@ -18,11 +18,9 @@ from plant_fmu import Vehicle
 from plant_fmu.thruster_lines import thruster_lines
 
 VERSION = 1  # of the format
-# whose pictures the page makes of their numbers; all others are drawn by the mesh of their entry
-DRAWN_BY_NUMBERS = (
-    "sphere", "ellipsoid", "box", "cylinder", "prism", "cone", "pipe", "depth_band", "half_space", "orientation",
-    "visibility",
-)  # fmt: skip
+OF_ATTITUDE = ("orientation", "visibility")  # shapes that the page draws at the vehicle
+_LEAST_ROOM = 5.0  # m
+_DIGITS = 6  # of coordinates in m
 _SEA_WATER = 1026.0 * 9.81  # N/m3; only for the size of a hull that no vehicle's file tells
 
 
@@ -43,7 +41,7 @@ def header_of(scenario: Scenario, columns: Sequence[Column], commands: bool = Fa
     dict
         Of texts, numbers, booleans, lists and dicts.
     """
-    system = Arbiter(engine="closed").system
+    system, limits = Arbiter(engine="closed").system, limits_of(scenario)
     return {
         "version": VERSION,
         "name": scenario.name,
@@ -56,7 +54,7 @@ def header_of(scenario: Scenario, columns: Sequence[Column], commands: bool = Fa
         "commands": commands,
         "through": scenario.actuation.through,
         "vehicle": _vehicle(scenario.vehicle),
-        "regions": [_region(scenario, i) for i in range(len(scenario.regions) + 1)],
+        "regions": [_region(scenario, i, limits) for i in range(len(scenario.regions) + 1)],
         "rules": rules_of(system),
         "truth": {"estimate": [float(phi) for phi in scenario.true_restoring_parameters]},
         "signals": [dataclasses.asdict(column) for column in columns],
@@ -70,23 +68,51 @@ def rules_of(system: System) -> list[dict[str, str]]:
     ]
 
 
-def shape_of(shape: Shape) -> dict[str, Any]:
-    """Return a shape with its ``kind`` and its own parameters [m, rad, NED], and its ``mesh`` where its entry has one.
+def shape_of(shape: Shape, limits: Bounds) -> dict[str, Any]:
+    """Return a shape with its ``kind``, its own parameters [m, rad, NED], and its ``drawing``.
+
+    The drawing of a shape of position is its ``centre`` and ``half_axes``, or its ``planes``, each with ``point`` and
+    ``normal``, or the ``points`` and ``faces`` of its mesh.
+
+    Parameters
+    ----------
+    shape : Shape
+        Of a region.
+    limits : Bounds
+        Where a mesh is cut that has no end [m, NED].
 
     Raises
     ------
     RegionError
-        If the page could draw it by neither.
+        If it is of attitude, and none that the page knows.
     """
     kind = name_of(shape)
-    told = {"kind": kind, **dataclasses.asdict(shape)}  # type: ignore[call-overload]
-    if kind not in DRAWN_BY_NUMBERS:
-        mesh = surface_of(shape, shape.bounds())
-        told["mesh"] = {"points": mesh.vertices.tolist(), "faces": mesh.triangles.tolist()}
-    return told
+    known = {"kind": kind, **dataclasses.asdict(shape)}  # type: ignore[call-overload]
+    return known if kind in OF_ATTITUDE else known | {"drawing": _drawing(shape, limits)}
 
 
-def _region(scenario: Scenario, index: int) -> dict[str, Any]:
+def limits_of(scenario: Scenario) -> Bounds:
+    """Return the corners of a box about the start and all regions that end somewhere, with as much room about them."""
+    regions = [scenario.goal_region, *(secondary.region for secondary in scenario.regions if not secondary.seen)]
+    corners = [np.array(corner) for region in regions for corner in region.shape.bounds()]
+    points = np.array([scenario.initial.position, *(corner for corner in corners if np.isfinite(corner).all())])
+    low, high = points.min(axis=0), points.max(axis=0)
+    room = max(_LEAST_ROOM, float((high - low).max()))
+    return tuple((low - room).tolist()), tuple((high + room).tolist())
+
+
+def _drawing(shape: Shape, limits: Bounds) -> dict[str, Any]:
+    entry = shape_entry(shape)
+    if entry.half_axes is not None:
+        centre, axes = entry.half_axes(shape)
+        return {"centre": centre.tolist(), "half_axes": axes.tolist()}
+    if entry.planes is not None:
+        return {"planes": [{"point": p.tolist(), "normal": n.tolist()} for p, n in entry.planes(shape)]}
+    mesh = surface_of(shape, limits)
+    return {"points": np.round(mesh.vertices, _DIGITS).tolist(), "faces": mesh.triangles.tolist()}
+
+
+def _region(scenario: Scenario, index: int, limits: Bounds) -> dict[str, Any]:
     secondary = scenario.regions[index - 1] if index else None
     region = secondary.region if secondary else scenario.goal_region
     return {
@@ -98,7 +124,7 @@ def _region(scenario: Scenario, index: int) -> dict[str, Any]:
         "moves": region.name in scenario.moving,
         "comes": bool(secondary and secondary.seen),  # is there only while it is shifted
         "unit": "rad" if of_attitude(region.shape) else "m",  # of its clearance
-        "shape": shape_of(region.shape),
+        "shape": shape_of(region.shape, limits),
     }
 
 

@@ -14,7 +14,7 @@ from typing import Any
 from cosim.io.atomic_file import write_atomic
 
 SCENE_SCRIPTS = (
-    "palette.js", "vectors.js", "camera.js", "solids.js", "pipes.js", "planes.js", "painter.js", "sights.js",
+    "palette.js", "vectors.js", "camera.js", "solids.js", "planes.js", "painter.js", "sights.js",
     "hull.js", "vehicle.js", "forces.js", "trail.js", "shadows.js", "bounds.js", "order.js",
     "regions.js", "labels.js", "floor.js", "controls.js", "scene.js",
 )  # fmt: skip

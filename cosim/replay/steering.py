@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controller.regions import Sphere
-from controller.regions.shape import Shape
+from controller.regions.shape import Bounds, Shape
 from cosim.errors import CommandError
-from cosim.replay.header import shape_of
+from cosim.replay.header import limits_of, shape_of
 from cosim.results.as_flown import radii_of
 from cosim.results.record import Rows
 from cosim.results.run_result import COMMANDS_LOG, Run
@@ -92,6 +92,7 @@ class _Changes:
 
     def __init__(self, run: Run) -> None:
         self._step = run.scenario.time.step
+        self._limits = limits_of(run.scenario)
         self._settings = LiveSettings(run.planned)
         self._middle = shape_center(run.planned.goal)
         self._index = {"goal": 0, **{r.region.name: i + 1 for i, r in enumerate(run.scenario.regions)}}
@@ -153,18 +154,17 @@ class _Changes:
         shape: Shape = self._settings.shapes[name]
         if name == "goal" and target_radius > 0.0:
             shape = Sphere(self._middle, target_radius)
-        return _changed(k * self._step, self._index[name], shape, self._gains[self._index[name]])
+        return _changed(k * self._step, self._index[name], shape, self._gains[self._index[name]], self._limits)
 
 
 def _sizes(run: Run, index: int, secondary: SecondaryRegion) -> Iterator[dict[str, Any]]:
     """Yield the sizes with which an obstacle came, each at its time."""
-    before = -np.inf
+    before, limits = -np.inf, limits_of(run.scenario)
     for times, radii in radii_of(run.record, secondary.region.name):
         fresh = np.abs(np.diff(radii, prepend=before)) > _SAME
         for time, radius in zip(times[fresh], radii[fresh], strict=True):
-            yield _changed(
-                float(time), index, Sphere(PARKED_POSITION, max(float(radius), _SAME)), secondary.region.gain
-            )
+            obstacle = Sphere(PARKED_POSITION, max(float(radius), _SAME))
+            yield _changed(float(time), index, obstacle, secondary.region.gain, limits)
         before = radii[-1] if radii.size else before
 
 
@@ -182,5 +182,5 @@ def _steps_of(record: Rows) -> tuple[NDArray[np.intp], Array]:
     return np.concatenate(rows), np.concatenate(values)
 
 
-def _changed(time: float, index: int, shape: Shape, gain: float) -> dict[str, Any]:
-    return {"time": time, "region": index, "shape": shape_of(shape), "gain": gain}
+def _changed(time: float, index: int, shape: Shape, gain: float, limits: Bounds) -> dict[str, Any]:
+    return {"time": time, "region": index, "shape": shape_of(shape, limits), "gain": gain}

@@ -10,7 +10,7 @@ import numpy as np
 
 from controller.jit.jit import jit_noalloc
 from controller.regions.entry import Entry
-from controller.regions.mesh import Mesh, patch
+from controller.regions.mesh import Mesh, patches
 from controller.regions.numbers import LENGTH, SIZE, Number
 from controller.regions.shape import Array, Bounds, Evaluation, require, require_finite
 
@@ -62,13 +62,14 @@ def depth_band(p: Array, q: Array) -> Evaluation:
 
 def surface(shape: DepthBand, limits: Bounds) -> Mesh:
     """Return a patch of each of its two planes."""
-    low, high = shape.depth - shape.tolerance, shape.depth + shape.tolerance
-    upper, lower = (patch((0.0, 0.0, z), (0.0, 0.0, up), limits) for z, up in ((low, -1.0), (high, 1.0)))
-    return Mesh(
-        np.vstack([upper.vertices, lower.vertices]),
-        np.vstack([upper.triangles, lower.triangles + len(upper.vertices)]),
-    )
+    return patches(planes(shape), limits)
+
+
+def planes(shape: DepthBand) -> list[tuple[Array, Array]]:
+    """Return the upper plane, then the lower one."""
+    down = np.array([0.0, 0.0, 1.0])
+    return [((shape.depth + side * shape.tolerance) * down, side * down) for side in (-1.0, 1.0)]
 
 
 _UNITS = {"depth": "m", "tolerance": "m"}
-ENTRY = Entry(DepthBand, depth_band, DepthBand(2.5, 1.8), _UNITS, surface, convex=True)
+ENTRY = Entry(DepthBand, depth_band, DepthBand(2.5, 1.8), _UNITS, surface, planes=planes, convex=True)

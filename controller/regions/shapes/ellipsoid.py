@@ -102,6 +102,12 @@ def surface(shape: Ellipsoid, limits: Bounds) -> Mesh:
     return Mesh(placed(scaled, shape.centre, shape.quaternion), unit_ball.triangles)
 
 
+def half_axes(shape: Ellipsoid) -> tuple[Array, Array]:
+    """Return its centre and its half axes."""
+    centre = np.array(shape.centre)
+    return centre, placed(np.diag(shape.semi_axes), shape.centre, shape.quaternion) - centre
+
+
 _UNITS = {"centre": "m", "semi_axes": "m", "quaternion": ""}
 ENTRY = Entry(
     Ellipsoid,
@@ -109,5 +115,6 @@ ENTRY = Entry(
     Ellipsoid((1.0, 0.0, 1.0), (2.0, 1.0, 0.5), (0.9, 0.1, -0.3, 0.2)),
     _UNITS,
     surface,
+    half_axes,
     convex=True,
 )

@@ -6,9 +6,11 @@ from dataclasses import dataclass
 from math import inf
 from typing import ClassVar
 
+import numpy as np
+
 from controller.jit.jit import jit_noalloc
 from controller.regions.entry import Entry
-from controller.regions.mesh import Mesh, patch
+from controller.regions.mesh import Mesh, patches
 from controller.regions.numbers import LENGTH, PART, Number, vector
 from controller.regions.shape import Array, Bounds, Evaluation, Vector3, require_finite, unit
 
@@ -55,8 +57,22 @@ def half_space(p: Array, q: Array) -> Evaluation:
 
 def surface(shape: HalfSpace, limits: Bounds) -> Mesh:
     """Return a patch of its plane."""
-    return patch(shape.point, shape.normal, limits)
+    return patches(planes(shape), limits)
+
+
+def planes(shape: HalfSpace) -> list[tuple[Array, Array]]:
+    """Return its plane."""
+    normal = np.array(shape.normal, dtype=float)
+    return [(np.array(shape.point, dtype=float), normal / np.linalg.norm(normal))]
 
 
 _UNITS = {"point": "m", "normal": ""}
-ENTRY = Entry(HalfSpace, half_space, HalfSpace((0.0, 0.0, 1.0), (1.0, 1.0, 0.2)), _UNITS, surface, convex=True)
+ENTRY = Entry(
+    HalfSpace,
+    half_space,
+    HalfSpace((0.0, 0.0, 1.0), (1.0, 1.0, 0.2)),
+    _UNITS,
+    surface,
+    planes=planes,
+    convex=True,
+)

@@ -12,7 +12,7 @@ import numpy as np
 from controller.jit.jit import jit_noalloc
 from controller.regions.entry import Entry
 from controller.regions.geometry import clamp
-from controller.regions.mesh import AROUND, Mesh, lathe
+from controller.regions.mesh import AROUND, Mesh, lathe, welded
 from controller.regions.numbers import LENGTH, SIZE, Number, vector
 from controller.regions.shape import Array, Bounds, Evaluation, Vector3, ball_bounds, join, require, require_finite
 
@@ -87,7 +87,7 @@ def pipe(p: Array, q: Array) -> Evaluation:
 def surface(shape: Pipe, limits: Bounds) -> Mesh:
     """Return rings along its line, and its round ends."""
     first, rings, last = _rings(shape, AROUND)
-    return lathe(rings, first, last)
+    return welded(lathe(rings, first, last))  # inside a bend, rings share their corners
 
 
 def _rings(shape: Pipe, around: int) -> tuple[Array, list[Array], Array]:

@@ -67,5 +67,10 @@ def surface(shape: Sphere, limits: Bounds) -> Mesh:
     return Mesh(np.array(shape.centre) + shape.radius * unit_ball.vertices, unit_ball.triangles)
 
 
+def half_axes(shape: Sphere) -> tuple[Array, Array]:
+    """Return its centre and its half axes."""
+    return np.array(shape.centre), shape.radius * np.eye(3)
+
+
 _UNITS = {"centre": "m", "radius": "m"}
-ENTRY = Entry(Sphere, sphere, Sphere((2.0, 0.0, 1.8), 0.5), _UNITS, surface, convex=True)
+ENTRY = Entry(Sphere, sphere, Sphere((2.0, 0.0, 1.8), 0.5), _UNITS, surface, half_axes, convex=True)

@@ -1,13 +1,5 @@
 // How large the scene is: where vehicles go and bounded regions are.
 
-/** The surface of a shape in space, as it stands in the scenario; one object for each shape, made once. */
-const SURFACES = new WeakMap();
-
-function surfaceOf(shape) {
-  if (!SURFACES.has(shape)) SURFACES.set(shape, solidMaker(shape)(shape));
-  return SURFACES.get(shape);
-}
-
 /** Whether a region is where it can be met: an obstacle that is not there yet waits far above the water. */
 const isThere = (place) => Vec.finite(place) && place[2] > -1e4;
 
@@ -20,8 +12,9 @@ function placesOf(run) {
   if (run.rows) places.push([xs[run.rows - 1], ys[run.rows - 1], zs[run.rows - 1]]);
   const kept = places.filter(Vec.finite);
   const { shape } = run.header.regions[0]; // the goal
-  if (solidMaker(shape)) {
-    const { centre, radius } = surfaceOf(shape);
+  const solid = surfaceOf(shape);
+  if (solid) {
+    const { centre, radius } = solid;
     for (const t of [run.start, run.end]) {
       const at = Vec.add(centre, run.shift(0, t));
       if (Vec.finite(at)) kept.push(at.map((x) => x - radius), at.map((x) => x + radius));
@@ -53,17 +46,16 @@ function boxOfSolid({ points }, shift) {
  */
 function reachOf(shape, shift, way, limits, room) {
   const inLimits = (x, k) => x >= limits[0][k] && x <= limits[1][k];
-  if (solidMaker(shape)) {
-    const solid = surfaceOf(shape);
+  const solid = surfaceOf(shape);
+  if (solid) {
     if (!isThere(Vec.add(solid.centre, shift))) return [];
     const box = boxOfSolid(solid, shift);
     if (box[0].some((x, k) => x > limits[1][k]) || box[1].some((x, k) => x < limits[0][k])) return [];
     const within = (x, k) => (inLimits(x, k) ? x : Math.min(way[1][k], Math.max(way[0][k], x)));
     return box.map((corner) => corner.map(within));
   }
-  if (!PLANES[shape.kind]) return [];
   const middle = Vec.scale(Vec.add(...way), 0.5);
-  return PLANES[shape.kind](shape)
+  return (shape.drawing?.planes ?? [])
     .map(({ point, normal }) => Vec.along(middle, normal, Vec.dot(Vec.sub(Vec.add(point, shift), middle), normal)))
     .filter((p) => p.every((x, k) => x >= limits[0][k] - room && x <= limits[1][k] + room));
 }

@@ -79,9 +79,10 @@ class Ghost {
   /** The hull about the picture of a surface, moved by so much from where it is now; empty for what has none. */
   _outline(scene, run, region, by) {
     const shape = run.shape(region, run.end);
-    if (!solidMaker(shape)) return [];
+    const solid = surfaceOf(shape);
+    if (!solid) return [];
     const shift = Vec.add(run.shift(region, run.end), by);
-    const { points } = surfaceOf(shape);
+    const { points } = solid;
     const seen = [];
     for (let i = 0; i < points.length; i += 3) seen.push(scene.project([points[i] + shift[0], points[i + 1] + shift[1], points[i + 2] + shift[2]]));
     return convexRing(seen.filter(([x, y]) => Number.isFinite(x) && Number.isFinite(y)));

@@ -16,6 +16,14 @@ function hullPart(colour, points, polygons) {
   });
 }
 
+/** Faces between rings of as many points each, one behind the other as the outward side is to the right of it. */
+function bandFaces(from, to, count) {
+  return Array.from({ length: count }, (_, i) => {
+    const next = (i + 1) % count;
+    return [from + i, from + next, to + next, to + i];
+  });
+}
+
 /** A body between rings of as many points, closed at its ends. */
 function hullTube(colour, rings) {
   const n = rings[0].length;

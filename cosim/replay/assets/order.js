@@ -7,20 +7,6 @@
  * @property {object} style  @property {number[]} middle where it is, for its order
  */
 
-/** The point of a chain of points that is nearest to another point. */
-function nearestOnChain(chain, p) {
-  let nearest = chain[0];
-  let least = Infinity;
-  for (let i = 1; i < chain.length; i++) {
-    const way = Vec.sub(chain[i], chain[i - 1]);
-    const part = Vec.dot(Vec.sub(p, chain[i - 1]), way) / Vec.dot(way, way);
-    const q = Vec.along(chain[i - 1], way, Math.min(1, Math.max(0, part)));
-    const off = Vec.norm(Vec.sub(q, p));
-    if (off < least) [nearest, least] = [q, off];
-  }
-  return nearest;
-}
-
 /** The entries from the farthest to the nearest. Sheets part the others: what is beyond a sheet comes before it. */
 function farthestFirst(entries, eye) {
   const sheets = entries.filter((entry) => entry.sheet);

@@ -8,19 +8,10 @@
  * @property {number[][][]} hatch pairs of points: strokes along the rim, on the forbidden side
  */
 
-/** How the planes of each kind of unbounded shape lie, from its fields: a point and the normal out of the shape. */
-const PLANES = {
-  depth_band: ({ depth, tolerance }) => [
-    { point: [0, 0, depth - tolerance], normal: [0, 0, -1] },
-    { point: [0, 0, depth + tolerance], normal: [0, 0, 1] },
-  ],
-  half_space: ({ point, normal }) => [{ point: [...point], normal: Vec.unit(normal) }],
-};
-
 /** The parts of a region's planes within bounds, [lowest corner, highest corner]; none where a plane is outside. */
 function sheetsOf(shape, keep, shift, bounds) {
   const sign = keep === "in" ? 1 : -1;
-  return PLANES[shape.kind](shape).flatMap(({ point, normal }) => {
+  return shape.drawing.planes.flatMap(({ point, normal }) => {
     const corners = cutOfBounds(Vec.add(point, shift), normal, bounds);
     if (corners.length < 3) return [];
     const forbidden = Vec.scale(normal, sign);

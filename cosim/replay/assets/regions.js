@@ -44,13 +44,13 @@ class Regions {
   }
 
   _of(shape, shift, region, pose, target) {
-    if (solidMaker(shape)) {
-      const solid = surfaceOf(shape);
+    const solid = surfaceOf(shape);
+    if (solid) {
       if (!isThere(Vec.add(solid.centre, shift))) return [];
-      const middle = solid.spine ? nearestOnChain(solid.spine, Vec.sub(target, shift)) : solid.centre;
+      const middle = solid.long ? nearestOnSurface(solid, Vec.sub(target, shift)) : solid.centre;
       return [{ solid, middle: Vec.add(middle, shift) }];
     }
-    if (PLANES[shape.kind]) {
+    if (shape.drawing?.planes) {
       const key = JSON.stringify([shape, region.keep, shift]);
       if (!this._sheets.has(key)) {
         if (this._sheets.size > 200) this._sheets.clear(); // of regions that move
@@ -86,7 +86,7 @@ function sameRegion(entry, region, shape, shift) {
 function anchorOf({ solid, sheet, sight, shift, middle }, camera) {
   if (sight) return sight.anchor;
   if (sheet) return sheet.corners.reduce((a, b) => (camera.project(b)[0] > camera.project(a)[0] ? b : a));
-  return solid.spine ? middle : [middle[0], middle[1], solid.top + shift[2]];
+  return solid.long ? middle : [middle[0], middle[1], solid.top + shift[2]];
 }
 
 /** Regions to be kept out of, by entry, the nearest to the vehicle first; those to be kept within are not among them. */

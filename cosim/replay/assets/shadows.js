@@ -1,18 +1,31 @@
 // Shadows straight down on the floor, from which depth can be read.
 
-/** The outline of points seen from above: their convex hull, after Andrew. */
-function outlineFromAbove(points) {
-  const flat = points.map(([n, e]) => [n, e]).sort((a, b) => a[0] - b[0] || a[1] - b[1]);
-  const left = (a, b, c) => (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]) > 1e-12;
-  const half = (sorted) => {
-    const chain = [];
-    for (const p of sorted) {
-      while (chain.length > 1 && !left(chain[chain.length - 2], chain[chain.length - 1], p)) chain.pop();
-      chain.push(p);
+/** The closed lines, north and east, about the faces of a surface that look up: what is about one of them is hidden. */
+function shadowsOf({ points, faces, normals }) {
+  const up = faces.map((_, i) => normals[3 * i + 2] < -1e-9);
+  const onward = new Map(); // edges of faces that look up, of which the other face does not
+  faces.forEach((face, i) => {
+    if (!up[i]) return;
+    face.forEach((a, k) => {
+      const b = face[(k + 1) % face.length];
+      if (onward.get(b)?.delete(a)) return;
+      onward.set(a, (onward.get(a) ?? new Set()).add(b));
+    });
+  });
+  const lines = [];
+  for (const [start, next] of onward) {
+    while (next.size) {
+      const line = [];
+      for (let a = start; onward.get(a)?.size; ) {
+        line.push([points[3 * a], points[3 * a + 1]]);
+        const [b] = onward.get(a);
+        onward.get(a).delete(b);
+        a = b;
+      }
+      lines.push(line.reverse()); // as an ellipse goes around, so that shadows add up
     }
-    return chain.slice(0, -1);
-  };
-  return [...half(flat), ...half([...flat].reverse())];
+  }
+  return lines;
 }
 
 /** The outline of an ellipsoid seen from above: the unit circle through a root of its squared half axes. */

@@ -75,6 +75,3 @@ function paintSight(painter, sight, style) {
   }
   painter.stroke(style.colour, Math.max(1.8, style.width));
 }
-
-/** The kinds of shape that can be drawn. */
-const DRAWN_SHAPES = [...Object.keys(SOLIDS), ...Object.keys(PLANES), ...Object.keys(SIGHTS)];

@@ -1,7 +1,9 @@
 // Regions of space that end somewhere, as surfaces: points on g = 0, faces between them, and where they hide things.
 
-const AROUND = 32; // faces around what is round
+const AROUND = 32; // pieces of half a great circle
 const SHARP = Math.cos((31 * Math.PI) / 180); // faces that turn more from each other are seen as an edge
+const CLUSTER = 32; // faces that are looked at together
+const LONG = 3; // times as far as a ball of its volume and surface goes: what goes farther has no middle of its own
 
 /**
  * A surface of flat faces. Faces that meet bluntly belong to one round surface.
@@ -12,27 +14,102 @@ const SHARP = Math.cos((31 * Math.PI) / 180); // faces that turn more from each 
  * @property {number[][]} edges [point, point, face, face, 1 if sharp]
  * @property {number[][]} lines of points on an ellipsoid, drawn to tell its form
  * @property {number[]} centre, {number} radius of a ball about it  @property {number} top its least depth [m]
- * @property {number[][]|null} spine the line in its middle, where it is long
+ * @property {boolean} long whether it is where its nearest point is, not where its centre is
  * @property {object|null} ellipsoid {centre, axes} where it is one: three half axes as vectors
- * @property {number[][][]} shadows polygons, north and east, that it is seen as from above
+ * @property {number[][][]} shadows closed lines, north and east, about what it hides from above
  * @property {function(number[]): function(number, number, number): boolean} from tells of an eye whether the solid is
  * between it and a point, or holds the point; asked for each piece of a way in each frame, so it makes no arrays
  */
 
 /** The surface that some points and faces make. */
 function solidOf(points, faces, lines = []) {
-  const solid = { points: Float64Array.from(points.flat()), faces, lines, spine: null, ellipsoid: null };
+  const solid = { points: Float64Array.from(points.flat()), faces, lines, long: false, ellipsoid: null };
   solid.normals = new Float64Array(3 * faces.length);
   faces.forEach((face, i) => solid.normals.set(normalOf(face.map((k) => points[k])), 3 * i));
   solid.edges = edgesOf(faces, solid.normals);
-  const low = [0, 1, 2].map((axis) => Math.min(...points.map((p) => p[axis])));
-  const high = [0, 1, 2].map((axis) => Math.max(...points.map((p) => p[axis])));
-  solid.centre = Vec.scale(Vec.add(low, high), 0.5);
-  solid.radius = Math.max(...points.map((p) => Vec.norm(Vec.sub(p, solid.centre))));
-  solid.top = low[2];
-  solid.from = (eye) => (x, y, z) => nearSight(solid, eye, x, y, z) && crossesFaces(solid, eye, [x, y, z]);
-  solid.shadows = faces.length ? [outlineFromAbove(points)] : [];
+  Object.assign(solid, ballAbout(points));
+  solid.top = points.reduce((top, p) => Math.min(top, p[2]), Infinity);
+  if (!faces.length) return solid;
+  solid.long = isLong(solid);
+  solid.shadows = shadowsOf(solid);
+  const clusters = clustersOf(points, faces);
+  solid.from = (eye) => (x, y, z) =>
+    nearSight(solid, eye, x, y, z) &&
+    clusters.some((cluster) => nearSight(cluster, eye, x, y, z) && crossesFaces(solid, cluster, eye, [x, y, z]));
   return solid;
+}
+
+/** A ball about some points. */
+function ballAbout(points) {
+  const [low, high] = [Math.min, Math.max].map((most) =>
+    [0, 1, 2].map((axis) => points.reduce((x, p) => most(x, p[axis]), points[0][axis])),
+  );
+  const centre = Vec.scale(Vec.add(low, high), 0.5);
+  return { centre, radius: points.reduce((most, p) => Math.max(most, Vec.norm(Vec.sub(p, centre))), 0) };
+}
+
+/** Faces in a row with the ball about them: most of a large surface is far from a line of sight. */
+function clustersOf(points, faces) {
+  const clusters = [];
+  for (let from = 0; from < faces.length; from += CLUSTER) {
+    const to = Math.min(from + CLUSTER, faces.length);
+    clusters.push({ from, to, ...ballAbout(faces.slice(from, to).flatMap((face) => face.map((k) => points[k]))) });
+  }
+  return clusters;
+}
+
+/** Whether a surface goes much farther than its volume and its area ask for: a pipe, a wall. */
+function isLong({ points, faces, radius }) {
+  let [volume, area] = [0, 0];
+  const corner = (k) => [points[3 * k], points[3 * k + 1], points[3 * k + 2]];
+  for (const [first, ...others] of faces) {
+    for (let i = 1; i < others.length; i++) {
+      const [a, b, c] = [first, others[i - 1], others[i]].map(corner);
+      volume += Vec.dot(a, Vec.cross(b, c)) / 6;
+      area += Vec.norm(Vec.cross(Vec.sub(b, a), Vec.sub(c, a))) / 2;
+    }
+  }
+  return radius * area > LONG * 3 * volume;
+}
+
+/** The point of a surface that is nearest to another point. */
+function nearestOnSurface({ points, faces }, p) {
+  let nearest = null;
+  let least = Infinity;
+  const corner = (k) => [points[3 * k], points[3 * k + 1], points[3 * k + 2]];
+  for (const face of faces) {
+    const [first, ...others] = face.map(corner);
+    for (let i = 1; i < others.length; i++) {
+      const q = nearestOnTriangle(first, others[i - 1], others[i], p);
+      const off = Vec.norm(Vec.sub(q, p));
+      if (off < least) [nearest, least] = [q, off];
+    }
+  }
+  return nearest;
+}
+
+/** The point of a triangle that is nearest to another point. */
+function nearestOnTriangle(a, b, c, p) {
+  const normal = Vec.cross(Vec.sub(b, a), Vec.sub(c, a));
+  const inside = (u, v) => Vec.dot(Vec.cross(Vec.sub(v, u), Vec.sub(p, u)), normal) >= 0;
+  if (inside(a, b) && inside(b, c) && inside(c, a)) {
+    return Vec.along(p, normal, Vec.dot(Vec.sub(a, p), normal) / Vec.dot(normal, normal));
+  }
+  return nearestOnChain([a, b, c, a], p);
+}
+
+/** The point of a chain of points that is nearest to another point. */
+function nearestOnChain(chain, p) {
+  let nearest = chain[0];
+  let least = Infinity;
+  for (let i = 1; i < chain.length; i++) {
+    const way = Vec.sub(chain[i], chain[i - 1]);
+    const part = Vec.dot(Vec.sub(p, chain[i - 1]), way) / Vec.dot(way, way);
+    const q = Vec.along(chain[i - 1], way, Math.min(1, Math.max(0, part)));
+    const off = Vec.norm(Vec.sub(q, p));
+    if (off < least) [nearest, least] = [q, off];
+  }
+  return nearest;
 }
 
 /** The unit normal of a polygon, after Newell: it need not be convex. */
@@ -74,9 +151,8 @@ function nearSight({ centre, radius }, eye, x, y, z) {
 }
 
 /** Whether a line from an eye to a point goes in through a face: then the point is inside the solid or behind it. */
-function crossesFaces(solid, eye, p) {
-  const { points, faces, normals } = solid;
-  for (let i = 0; i < faces.length; i++) {
+function crossesFaces({ points, faces, normals }, { from, to }, eye, p) {
+  for (let i = from; i < to; i++) {
     const [nx, ny, nz] = [normals[3 * i], normals[3 * i + 1], normals[3 * i + 2]];
     const v = 3 * faces[i][0];
     const before = nx * (eye[0] - points[v]) + ny * (eye[1] - points[v + 1]) + nz * (eye[2] - points[v + 2]);
@@ -144,88 +220,13 @@ function ellipsoidOf(centre, axes) {
   return solid;
 }
 
-function boxOf(shape) {
-  const R = Vec.matrix(shape.quaternion);
-  const points = [];
-  for (let i = 0; i < 8; i++) {
-    const half = shape.size.map((size, axis) => (i & (1 << axis) ? 0.5 : -0.5) * size);
-    points.push(Vec.add(shape.centre, Vec.turned(R, half)));
+/** The surface of a shape that ends somewhere, as it stands in the scenario; made once for each object, or null. */
+function surfaceOf(shape) {
+  if (!SURFACES.has(shape)) {
+    const { centre, half_axes: axes, points, faces } = shape.drawing ?? {};
+    SURFACES.set(shape, axes ? ellipsoidOf(centre, axes) : points ? solidOf(points, faces) : null);
   }
-  return solidOf(points, [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]]);
+  return SURFACES.get(shape);
 }
 
-/** Faces between rings of as many points each, one behind the other as the outward side is to the right of it. */
-function bandFaces(from, to, count) {
-  return Array.from({ length: count }, (_, i) => {
-    const next = (i + 1) % count;
-    return [from + i, from + next, to + next, to + i];
-  });
-}
-
-function ring(centre, first, second, radius) {
-  return Array.from({ length: AROUND }, (_, i) => {
-    const angle = (2 * Math.PI * i) / AROUND;
-    return Vec.along(Vec.along(centre, first, radius * Math.cos(angle)), second, radius * Math.sin(angle));
-  });
-}
-
-function cylinderOf(shape) {
-  const axis = Vec.unit(Vec.sub(shape.end, shape.start));
-  const [first, second] = Vec.aside(axis);
-  const points = [...ring(shape.start, first, second, shape.radius), ...ring(shape.end, first, second, shape.radius)];
-  const around = Array.from({ length: AROUND }, (_, i) => i);
-  const ends = [[...around].reverse(), around.map((i) => AROUND + i)];
-  const solid = solidOf(points, [...bandFaces(0, AROUND, AROUND), ...ends]);
-  solid.spine = [shape.start, shape.end];
-  return solid;
-}
-
-function prismOf(shape) {
-  const n = shape.corners.length;
-  const area = shape.corners.reduce((sum, [x, y], i) => {
-    const [u, v] = shape.corners[(i + 1) % n];
-    return sum + x * v - u * y;
-  }, 0);
-  const corners = area > 0 ? shape.corners : [...shape.corners].reverse();
-  const points = [shape.top, shape.bottom].flatMap((depth) => corners.map(([x, y]) => [x, y, depth]));
-  const around = corners.map((_, i) => i);
-  const solid = solidOf(points, [...bandFaces(0, n, n), [...around].reverse(), around.map((i) => n + i)]);
-  solid.shadows = [corners];
-  return solid;
-}
-
-/** A cone that ends in a part of a ball. */
-function coneOf(shape) {
-  const axis = Vec.unit(shape.axis);
-  const [first, second] = Vec.aside(axis);
-  const rings = 6;
-  const points = [[...shape.feature]];
-  for (let k = rings; k > 0; k--) {
-    const angle = (shape.half_angle * k) / rings;
-    const centre = Vec.along(shape.feature, axis, shape.range * Math.cos(angle));
-    points.push(...ring(centre, first, second, shape.range * Math.sin(angle)));
-  }
-  points.push(Vec.along(shape.feature, axis, shape.range));
-  const faces = Array.from({ length: AROUND }, (_, i) => [0, 1 + ((i + 1) % AROUND), 1 + i]);
-  for (let k = 1; k < rings; k++) faces.push(...bandFaces(1 + (k - 1) * AROUND, 1 + k * AROUND, AROUND));
-  const last = 1 + (rings - 1) * AROUND;
-  for (let i = 0; i < AROUND; i++) faces.push([last + i, last + ((i + 1) % AROUND), points.length - 1]);
-  return solidOf(points, faces);
-}
-
-/** How the surface of each kind of bounded shape is made, from its fields. */
-const SOLIDS = {
-  sphere: ({ centre, radius }) => ellipsoidOf(centre, [[radius, 0, 0], [0, radius, 0], [0, 0, radius]]),
-  ellipsoid({ centre, semi_axes, quaternion }) {
-    const R = Vec.matrix(quaternion);
-    return ellipsoidOf(centre, semi_axes.map((a, i) => [a * R[i], a * R[3 + i], a * R[6 + i]]));
-  },
-  box: boxOf,
-  cylinder: cylinderOf,
-  prism: prismOf,
-  cone: coneOf,
-  pipe: pipeOf,
-};
-
-/** How the surface of a shape is made: of its mesh where it brings one, else of its numbers; none where it has no end. */
-const solidMaker = (shape) => (shape.mesh ? ({ mesh }) => solidOf(mesh.points, mesh.faces) : SOLIDS[shape.kind]);
+const SURFACES = new WeakMap();

@@ -6,8 +6,8 @@ function placeOf(run, index, t) {
   if (index === 0 && run.has("target.x")) return ["x", "y", "z"].map((axis) => run.held(`target.${axis}`, t));
   const shape = run.shape(index, t);
   const shift = run.shift(index, t);
-  if (solidMaker(shape)) return Vec.add(surfaceOf(shape).centre, shift);
-  const point = { depth_band: [0, 0, shape.depth], half_space: shape.point, visibility: shape.feature }[shape.kind];
+  const planes = shape.drawing?.planes;
+  const point = surfaceOf(shape)?.centre ?? (planes ? middleOf(planes.map((plane) => plane.point)) : shape.feature);
   return point ? Vec.add(point, shift) : null;
 }
 

@@ -9,7 +9,7 @@ from matplotlib.ticker import MaxNLocator
 
 from cosim.report.figures.labels import Labels
 from cosim.report.figures.layout import written
-from cosim.report.figures.shape_outlines import Piece, outlines
+from cosim.report.figures.shape_outlines import hull_of
 from cosim.simulation.signals import Array
 
 _HEADING, _DOWN = np.deg2rad(-62.0), np.deg2rad(22.0)  # in which the viewer looks, and how steeply
@@ -38,7 +38,7 @@ class Box:
         ahead, right = [np.cos(_HEADING), np.sin(_HEADING)], [-np.sin(_HEADING), np.cos(_HEADING)]
         self.view = np.array([[*right, 0.0], [*(np.sin(_DOWN) * np.array(ahead)), -np.cos(_DOWN)]])
         corners = np.array([[(low, high)[i >> k & 1][k] for k in range(3)] for i in range(8)])
-        self.outline = outlines([Piece(corners)], self.view)[0]
+        self.outline = hull_of(corners, self.view)
         self._least, self._most = self.outline.min(axis=0), self.outline.max(axis=0)
         self._scale = 1.0  # inches a metre
 

@@ -24,7 +24,7 @@ from cosim.report.figures.layout import (
     new_figure,
     plain_numbers,
 )
-from cosim.report.figures.shape_outlines import edges_of, mesh_of, outlines, pieces_of, rim, silhouette
+from cosim.report.figures.shape_outlines import cover, drawing_of
 from cosim.report.figures.style import (
     BLACK,
     PATH_COLOUR,
@@ -124,40 +124,33 @@ def path_plane(data: FigureData) -> Figure:
 
 
 def _region(ax: Axes, place: Place, low: Array, high: Array, view: Array, clip: Path | None = None) -> list[Array]:
-    """Draw a region as it is seen, with edges where it is clipped; return the outline of each piece in sight."""
-    pieces = pieces_of(place.region.shape, low - place.shift, high - place.shift)
-    seen = [outline + view @ place.shift for outline in outlines(pieces, view)]
-    if not seen or (clip is None and len(seen) == 1 and _fills(seen[0], view @ low, view @ high)):
+    """Draw a region as it is seen, with edges where it is clipped; return the areas in sight."""
+    drawing = drawing_of(place.region.shape, low - place.shift, high - place.shift, view)
+    if drawing is None:
         return []
+    areas, outline, edges = (
+        [line + view @ place.shift for line in lines] for lines in (drawing.areas, drawing.outline, drawing.edges)
+    )
+    if clip is None and cover(areas, view @ low, view @ high):
+        return []  # what leaves nothing of a picture free would tell nothing
     alpha = _FAINT if place.faint else 1.0
-    whole = Path.make_compound_path(*(Path(outline, closed=True) for outline in seen))
-    fill = PathPatch(whole, color=place.colour, alpha=(0.15 if clip is None else 0.08) * alpha, linewidth=0)
-    mesh = mesh_of(place.region.shape)
-    if mesh is None:
-        rims = [rim(outline, [other for other in seen if other is not outline]) for outline in seen]
-    else:
-        rims = [edge + view @ place.shift for edge in silhouette(mesh, view)]
+    whole = Path.make_compound_path(*(Path(area, closed=True) for area in areas))
     dashes = "-" if place.region.keep == "out" else "--"
-    drawn: list[Artist] = [ax.add_patch(fill)]
-    drawn += ax.plot(*_with_gaps(rims), color=place.colour, linewidth=1.1, linestyle=dashes, alpha=alpha)
+    drawn: list[Artist] = [
+        ax.add_patch(PathPatch(whole, color=place.colour, alpha=(0.15 if clip is None else 0.08) * alpha, linewidth=0)),
+        *ax.plot(*_with_gaps(outline), color=place.colour, linewidth=1.1, linestyle=dashes, alpha=alpha),
+    ]
     if clip is not None:
-        edges = edges_of(place.region.shape, low - place.shift, high - place.shift)
-        lines = [(line + place.shift) @ view.T for line in edges]
-        if lines:  # of a mesh, the rims are all
-            drawn += ax.plot(*_with_gaps(lines), color=place.colour, linewidth=0.5, alpha=0.7 * alpha)
+        if edges:
+            drawn += ax.plot(*_with_gaps(edges), color=place.colour, linewidth=0.5, alpha=0.7 * alpha)
         for artist in drawn:
             artist.set_clip_path(clip, ax.transData)
-    return seen
+    return areas
 
 
 def _frame(low: Array, high: Array) -> Array:
     """Return the corners of a picture, closed."""
     return np.array([low, [high[0], low[1]], high, [low[0], high[1]], low])
-
-
-def _fills(outline: Array, low: Array, high: Array) -> bool:
-    """Return whether the rectangle of an outline leaves nothing of a picture free: it would tell nothing."""
-    return bool((outline.min(axis=0) <= low + 1e-9).all() and (outline.max(axis=0) >= high - 1e-9).all())
 
 
 def _path(ax: Axes, way: SampledPath, view: Array) -> None:

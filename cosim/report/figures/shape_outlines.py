@@ -1,4 +1,7 @@
-"""Shapes of regions as lines: their outlines as they are seen from some side, and edges that show them as solids."""
+"""Shapes of regions as lines: what of them is seen from some side, their outlines, and edges that show them as solids.
+
+All comes from the entry of a shape: its mesh, or what makes finer lines, its half axes or its planes.
+"""
 
 from __future__ import annotations
 
@@ -6,264 +9,98 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from matplotlib.path import Path
 
-from controller.quaternion import rotation_matrix
-from controller.regions import Box, Cone, Cylinder, DepthBand, Ellipsoid, HalfSpace, Pipe, Prism, Sphere
-from controller.regions.mesh import Mesh
-from controller.regions.region_set import surface_of
-from controller.regions.shape import Shape
+from controller.regions.mesh import Mesh, frame
+from controller.regions.region_set import shape_entry, surface_of
+from controller.regions.shape import Bounds, Shape
 from cosim.simulation.signals import Array
 
-# drawn with smoother lines than their meshes have
-_BY_NUMBERS = (Sphere, Box, Cylinder, Ellipsoid, Cone, Pipe, Prism, HalfSpace, DepthBand)
 _TURN = np.linspace(0.0, 2.0 * np.pi, 73)  # rad
+_AROUND = np.column_stack([np.cos(_TURN), np.sin(_TURN)])
 _CORNERS = np.array([[i, j, k] for i in (-1.0, 1.0) for j in (-1.0, 1.0) for k in (-1.0, 1.0)])
 _BOX_EDGES = [(a, b) for a in range(8) for b in range(a) if (_CORNERS[a] != _CORNERS[b]).sum() == 1]
+_SHARP = np.cos(np.radians(31.0))  # faces that turn more from each other have an edge between them
+_BESIDE = 1e-3  # of a shape's size, from its outline
+_GRID = 12  # points a side
+_PIECES = 4  # of an edge of an outline, each hidden or not
 
 
 @dataclass(frozen=True)
-class Piece:
-    """All that is within `radius` of the convex hull of points; or a polygon in space as it is."""
+class Drawing:
+    """A shape as it is seen, in lines of the picture, shape (n, 2)."""
 
-    points: Array  # (n, 3) m
-    radius: float = 0.0  # m
-    polygon: bool = False
-
-
-def pieces_of(shape: Shape, low: Array, high: Array) -> list[Piece]:
-    """Return a shape as pieces that make it up.
-
-    Parameters
-    ----------
-    shape : Shape
-        At some place, not of attitude.
-    low, high : ndarray, shape (3,)
-        Corners of a box [m, NED]: what has no end is cut there, and pieces quite outside are left out.
-
-    Returns
-    -------
-    list of Piece
-        Empty if no part of it is in the box.
-    """
-    return [
-        piece
-        for piece in _pieces(shape, low, high)
-        if len(piece.points)
-        and (piece.points.min(axis=0) - piece.radius < high).all()
-        and (piece.points.max(axis=0) + piece.radius > low).all()
-    ]
+    areas: list[Array]  # closed: what any of them goes around is filled
+    outline: list[Array]  # NaN where it is hidden
+    edges: list[Array]
 
 
-def _pieces(shape: Shape, low: Array, high: Array) -> Iterator[Piece]:
-    match shape:
-        case Sphere():
-            yield Piece(np.array([shape.centre]), shape.radius)
-        case Box():
-            yield Piece(_box_corners(shape))
-        case Cylinder() | Ellipsoid():
-            yield Piece(np.vstack(list(edges_of(shape, low, high))))
-        case Cone():
-            yield Piece(np.vstack([shape.feature, *(_cap(shape, share) for share in np.linspace(0.0, 1.0, 7))]))
-        case Pipe():
-            points = np.array(shape.points)
-            for start, end in zip(points, points[1:], strict=False):
-                yield Piece(np.array([start, end]), shape.radius)
-        case Prism():
-            top, bottom = _prism_ends(shape)
-            yield from (Piece(top, polygon=True), Piece(bottom, polygon=True))
-            for i in range(len(top)):
-                yield Piece(np.array([top[i - 1], top[i], bottom[i], bottom[i - 1]]))
-        case HalfSpace() | DepthBand():
-            corners = _box_between(low, high)
-            for point, normal in _planes(shape):
-                corners = _cut(corners, point, normal)
-            yield Piece(corners)
-        case _:
-            mesh = surface_of(shape, shape.bounds())
-            yield from (Piece(mesh.vertices[triangle], polygon=True) for triangle in mesh.triangles)
-
-
-def mesh_of(shape: Shape) -> Mesh | None:
-    """Return the mesh of a shape; none where the shape is drawn by its numbers."""
-    return None if isinstance(shape, _BY_NUMBERS) else surface_of(shape, shape.bounds())
-
-
-def silhouette(mesh: Mesh, view: Array) -> list[Array]:
-    """Return the edges of a mesh between a face that is seen and one that is not.
-
-    Parameters
-    ----------
-    mesh : Mesh
-        Closed.
-    view : ndarray, shape (2, 3)
-        As for `outlines`.
-
-    Returns
-    -------
-    list of ndarray, shape (2, 2)
-        In the picture; those that the mesh itself hides are among them.
-    """
-    a, b, c = (mesh.vertices[mesh.triangles[:, k]] for k in range(3))
-    seen = np.cross(b - a, c - a) @ np.cross(view[0], view[1]) > 0.0
-    flat, sides = mesh.vertices @ view.T, {}
-    for triangle, faces in zip(mesh.triangles.tolist(), seen.tolist(), strict=True):
-        for start, end in zip(triangle, triangle[1:] + triangle[:1], strict=True):
-            sides[start, end] = faces
-    return [flat[[i, j]] for (i, j), faces in sides.items() if faces and not sides.get((j, i), False)]
-
-
-def edges_of(shape: Shape, low: Array, high: Array) -> Iterator[Array]:
-    """Yield lines, shape (n, 3) [m, NED], that show a shape as a solid.
+def drawing_of(shape: Shape, low: Array, high: Array, view: Array) -> Drawing | None:
+    """Return a shape as it is seen.
 
     Parameters
     ----------
     shape : Shape
         At some place, not of attitude.
     low, high : ndarray, shape (3,)
-        Corners of the box in which planes end [m, NED].
-
-    Yields
-    ------
-    ndarray, shape (n, 3)
-        Drawn one by one.
-    """
-    match shape:
-        case Sphere():
-            yield from _circles(np.array(shape.centre), shape.radius * np.eye(3))
-        case Ellipsoid():
-            axes = rotation_matrix(np.array(shape.quaternion)) * np.array(shape.semi_axes)
-            steps = np.linspace(-0.95, 0.95, 11)
-            for step in steps:  # rings along the first axis
-                ring = np.sqrt(1.0 - step**2) * (
-                    np.outer(np.cos(_TURN), axes[:, 1]) + np.outer(np.sin(_TURN), axes[:, 2])
-                )
-                yield np.array(shape.centre) + step * axes[:, 0] + ring
-            yield from _circles(np.array(shape.centre), axes)
-        case Box():
-            corners = _box_corners(shape)
-            yield from (corners[[a, b]] for a, b in _BOX_EDGES)
-        case Cylinder():
-            start, end = np.array(shape.start), np.array(shape.end)
-            for centre in (start, end):
-                yield centre + shape.radius * _around(end - start)
-        case Cone():
-            rim = _cap(shape, 1.0)
-            yield rim
-            yield from (np.array([shape.feature, rim[i]]) for i in (0, 18, 36, 54))
-        case Pipe():
-            yield np.array(shape.points)
-        case Prism():
-            top, bottom = _prism_ends(shape)
-            yield from (np.vstack([end, end[:1]]) for end in (top, bottom))
-            yield from (np.array(pair) for pair in zip(top, bottom, strict=True))
-        case HalfSpace() | DepthBand():
-            for point, normal in _planes(shape):
-                yield _section(low, high, point, normal)
-
-
-def outlines(pieces: Sequence[Piece], view: Array) -> list[Array]:
-    """Return the outline of each piece as it is seen.
-
-    Parameters
-    ----------
-    pieces : sequence of Piece
-        In space.
+        Corners of a box [m, NED], where what has no end is cut.
     view : ndarray, shape (2, 3)
         Orthonormal rows: the directions [NED] that point right and up in the picture.
 
     Returns
     -------
-    list of ndarray, shape (n, 2)
-        Closed, counterclockwise.
+    Drawing
+        None if no part of it is in the box.
     """
-    around = np.column_stack([np.cos(_TURN), np.sin(_TURN)])
-    seen = []
-    for piece in pieces:
-        flat = piece.points @ view.T
-        if piece.polygon:
-            x, y = flat.T
-            clockwise = float(x @ np.roll(y, -1) - y @ np.roll(x, -1)) < 0.0
-            flat = flat[::-1] if clockwise else flat
-            seen.append(np.vstack([flat, flat[:1]]))
-        else:  # the farthest point in each direction
-            seen.append(flat[np.argmax(around @ flat.T, axis=1)] + piece.radius * around)
-    return seen
+    entry = shape_entry(shape)
+    if entry.half_axes is not None:
+        return _ellipsoid(*entry.half_axes(shape), low, high, view)
+    if entry.planes is not None:
+        return _between_planes(entry.planes(shape), low, high, view)
+    limits: Bounds = (tuple(low.tolist()), tuple(high.tolist()))
+    mesh = surface_of(shape, limits)
+    if not _meet(mesh.vertices.min(axis=0), mesh.vertices.max(axis=0), low, high):
+        return None
+    areas = _silhouettes(mesh, view)
+    return Drawing(areas, [_seen_part(area, areas) for area in areas], list(_sharp_edges(mesh, view)))
 
 
-def rim(outline: Array, others: Sequence[Array]) -> Array:
-    """Return an outline with NaN where it is within others, which hide it.
-
-    Parameters
-    ----------
-    outline : ndarray, shape (n, 2)
-        Closed.
-    others : sequence of ndarray, shape (m, 2)
-        Closed outlines of the same region.
-
-    Returns
-    -------
-    ndarray, shape (k, 2)
-        With more points, if there are others.
-    """
-    if not others:
-        return outline
-    share = np.linspace(0.0, 1.0, 12, endpoint=False)[:, None]
-    fine = np.vstack(
-        [*((1.0 - share) * a + share * b for a, b in zip(outline, outline[1:], strict=False)), outline[-1:]]
-    )
-    size = np.ptp(outline, axis=0).max()
-    for other in others:
-        fine[Path(other).contains_points(fine, radius=-1e-3 * size)] = np.nan
-    return fine
+def hull_of(points: Array, view: Array) -> Array:
+    """Return the closed line about points [m, NED], shape (n, 3), as they are seen from a side as for `drawing_of`."""
+    flat = points @ view.T
+    farthest: Array = flat[np.argmax(_AROUND @ flat.T, axis=1)]  # in each direction
+    return farthest
 
 
-def _box_corners(box: Box) -> Array:
-    corners: Array = (
-        np.array(box.centre) + (0.5 * np.array(box.size) * _CORNERS) @ rotation_matrix(np.array(box.quaternion)).T
-    )
-    return corners
+def cover(areas: Sequence[Array], low: Array, high: Array) -> bool:
+    """Return whether areas of a `Drawing` leave nothing free of a rectangle, as far as a grid of points tells."""
+    shares = np.linspace(0.01, 0.99, _GRID)
+    points = np.array([[x, y] for x in low[0] + shares * (high - low)[0] for y in low[1] + shares * (high - low)[1]])
+    return bool((sum(_turns_about(points, area) for area in areas) != 0).all())
 
 
-def _box_between(low: Array, high: Array) -> Array:
-    corners: Array = (low + high) / 2.0 + (high - low) / 2.0 * _CORNERS
-    return corners
+def _meet(least: Array, most: Array, low: Array, high: Array) -> bool:
+    return bool((least < high).all() and (most > low).all())
 
 
-def _circles(centre: Array, axes: Array) -> Iterator[Array]:
-    """Yield the circles through the ends of half axes, which are the columns of `axes`."""
-    for i, j in ((0, 1), (0, 2), (1, 2)):
-        yield centre + np.outer(np.cos(_TURN), axes[:, i]) + np.outer(np.sin(_TURN), axes[:, j])
+def _ellipsoid(centre: Array, half_axes: Array, low: Array, high: Array, view: Array) -> Drawing | None:
+    reach = np.linalg.norm(half_axes, axis=0)
+    if not _meet(centre - reach, centre + reach, low, high):
+        return None
+    middle, flat = view @ centre, half_axes @ view.T
+    outline = middle + _AROUND @ np.linalg.cholesky(flat.T @ flat).T
+    circles = [middle + _AROUND @ flat[[i, j]] for i, j in ((0, 1), (0, 2), (1, 2))]
+    return Drawing([outline], [outline], circles)
 
 
-def _around(axis: Array) -> Array:
-    """Return unit vectors at right angles to an axis, all around it, shape (n, 3)."""
-    unit = axis / np.linalg.norm(axis)
-    first = np.cross(unit, np.eye(3)[np.argmin(np.abs(unit))])
-    first /= np.linalg.norm(first)
-    result: Array = np.outer(np.cos(_TURN), first) + np.outer(np.sin(_TURN), np.cross(unit, first))
-    return result
-
-
-def _cap(cone: Cone, share: float) -> Array:
-    """Return a circle on the round end of a cone, at a share of its half angle."""
-    axis = np.array(cone.axis) / np.linalg.norm(cone.axis)
-    angle = share * cone.half_angle
-    points: Array = np.array(cone.feature) + cone.range * (np.cos(angle) * axis + np.sin(angle) * _around(axis))
-    return points
-
-
-def _prism_ends(prism: Prism) -> tuple[Array, Array]:
-    top, bottom = (np.column_stack([prism.corners, np.full(len(prism.corners), z)]) for z in (prism.top, prism.bottom))
-    return top, bottom
-
-
-def _planes(shape: HalfSpace | DepthBand) -> list[tuple[Array, Array]]:
-    """Return a point of each plane that bounds a shape, and the direction that points out of it."""
-    if isinstance(shape, HalfSpace):
-        return [(np.array(shape.point), np.array(shape.normal) / np.linalg.norm(shape.normal))]
-    down = np.array([0.0, 0.0, 1.0])
-    return [((shape.depth + side * shape.tolerance) * down, side * down) for side in (-1.0, 1.0)]
+def _between_planes(planes: Sequence[tuple[Array, Array]], low: Array, high: Array, view: Array) -> Drawing | None:
+    corners = (low + high) / 2.0 + (high - low) / 2.0 * _CORNERS
+    for point, normal in planes:
+        corners = _cut(corners, point, normal)
+    if not len(corners):
+        return None
+    hull = hull_of(corners, view)
+    sections = [_section(low, high, point, normal) @ view.T for point, normal in planes]
+    return Drawing([hull], [hull], sections)
 
 
 def _cut(corners: Array, point: Array, normal: Array) -> Array:
@@ -280,7 +117,7 @@ def _cut(corners: Array, point: Array, normal: Array) -> Array:
 
 def _section(low: Array, high: Array, point: Array, normal: Array) -> Array:
     """Return the polygon in which a plane cuts a box, closed; empty if it does not."""
-    corners = _box_between(low, high)
+    corners = (low + high) / 2.0 + (high - low) / 2.0 * _CORNERS
     out = (corners - point) @ normal
     met = [
         corners[a] + (corners[b] - corners[a]) * (out[a] / (out[a] - out[b]))
@@ -290,7 +127,75 @@ def _section(low: Array, high: Array, point: Array, normal: Array) -> Array:
     if len(met) < 3:
         return np.empty((0, 3))
     points = np.array(met)
-    turned = _around(normal)[[0, 18]]  # two directions in the plane, at right angles
-    angles = np.arctan2(*((points - points.mean(axis=0)) @ turned.T).T)
-    commanded = points[np.argsort(angles)]
-    return np.vstack([commanded, commanded[:1]])
+    in_plane = np.array(frame(normal)[1:])
+    angles = np.arctan2(*((points - points.mean(axis=0)) @ in_plane.T).T)
+    around = points[np.argsort(angles)]
+    return np.vstack([around, around[:1]])
+
+
+def _normals(mesh: Mesh) -> Array:
+    a, b, c = (mesh.vertices[mesh.triangles[:, k]] for k in range(3))
+    across = np.cross(b - a, c - a)
+    normals: Array = across / np.maximum(np.linalg.norm(across, axis=1, keepdims=True), np.finfo(float).tiny)
+    return normals
+
+
+def _silhouettes(mesh: Mesh, view: Array) -> list[Array]:
+    """Return the closed lines about the faces of a mesh that look to one side, each with those faces on its left."""
+    away = np.cross(view[0], view[1])
+    facing = mesh.triangles[_normals(mesh) @ away > 1e-9].tolist()
+    onward: dict[int, list[int]] = {}
+    sides = {(a, b) for triangle in facing for a, b in zip(triangle, triangle[1:] + triangle[:1], strict=True)}
+    for a, b in sorted(sides):
+        if (b, a) not in sides:
+            onward.setdefault(a, []).append(b)
+    flat, lines = mesh.vertices @ view.T, []
+    for start, following in onward.items():
+        while following:
+            line = [start]
+            while onward.get(line[-1]):
+                line.append(onward[line[-1]].pop())
+            lines.append(flat[line])
+    return lines
+
+
+def _seen_part(outline: Array, areas: Sequence[Array]) -> Array:
+    """Return an outline with NaN where the shape is on both of its sides."""
+    share = np.linspace(0.0, 1.0, _PIECES, endpoint=False)[:, None]
+    starts = np.vstack([(1.0 - share) * a + share * b for a, b in zip(outline, outline[1:], strict=False)])
+    ends = np.roll(starts, -1, axis=0)
+    ways = ends - starts
+    right = np.column_stack([ways[:, 1], -ways[:, 0]]) / np.maximum(np.linalg.norm(ways, axis=1), 1e-12)[:, None]
+    beside = (starts + ends) / 2.0 + _BESIDE * np.ptp(outline, axis=0).max() * right
+    hidden = sum(_turns_about(beside, area) for area in areas) != 0
+    pieces = np.stack([starts, ends, np.full_like(starts, np.nan)], axis=1)
+    pieces[hidden] = np.nan
+    joined = ~hidden & ~np.roll(hidden, -1)  # goes on in the next piece
+    keep = np.ones(pieces.shape[:2], dtype=bool)
+    keep[joined, 1:] = False
+    keep[-1] = True
+    seen: Array = pieces[keep]
+    return seen
+
+
+def _turns_about(points: Array, line: Array) -> Array:
+    """Return how often a closed line goes around each point, shape (n,)."""
+    x, y = points[:, :1], points[:, 1:]
+    (ax, ay), (bx, by) = line[:-1].T, line[1:].T
+    left = (bx - ax) * (y - ay) - (x - ax) * (by - ay)
+    up, down = (ay <= y) & (by > y) & (left > 0.0), (ay > y) & (by <= y) & (left < 0.0)
+    turns: Array = up.sum(axis=1) - down.sum(axis=1)
+    return turns
+
+
+def _sharp_edges(mesh: Mesh, view: Array) -> Iterator[Array]:
+    normals, flat = _normals(mesh), mesh.vertices @ view.T
+    faces: dict[tuple[int, int], int] = {}
+    for i, triangle in enumerate(mesh.triangles.tolist()):
+        for a, b in zip(triangle, triangle[1:] + triangle[:1], strict=True):
+            other = faces.pop((b, a), None)
+            if other is None:
+                faces[a, b] = i
+            elif normals[i] @ normals[other] < _SHARP:
+                yield flat[[a, b]]
+    yield from (flat[[a, b]] for a, b in faces)  # where it is cut

@@ -73,6 +73,9 @@ def test_solids_are_closed_and_face_outward(name):
     ways = Counter((a, b) for t in mesh.triangles.tolist() for a, b in zip(t, [*t[1:], t[0]], strict=True))
     assert set(ways.values()) == {1}  # each edge once in each direction
     assert all((b, a) in ways for a, b in ways)
+    assert all(a != b for a, b in ways)
+    places = np.round(mesh.vertices, 7)
+    assert len(np.unique(places, axis=0)) == len(places)  # one corner at each place
     assert signed_volume(mesh) > 0.0
 
 

@@ -18,7 +18,7 @@ def shape_at(header, index, time):
     for change in header["changes"]:
         if change["region"] == index and change["time"] <= time:
             found = change["shape"]
-    fields = {key: _tuples(value) for key, value in found.items() if key != "kind"}
+    fields = {key: _tuples(value) for key, value in found.items() if key not in ("kind", "drawing")}
     return SHAPES[found["kind"]](**fields)
 
 
