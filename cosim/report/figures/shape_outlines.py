@@ -9,6 +9,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from controller.regions.mesh import Mesh, frame
 from controller.regions.region_set import shape_entry, surface_of
@@ -75,7 +76,7 @@ def cover(areas: Sequence[Array], low: Array, high: Array) -> bool:
     """Return whether areas of a `Drawing` leave nothing free of a rectangle, as far as a grid of points tells."""
     shares = np.linspace(0.01, 0.99, _GRID)
     points = np.array([[x, y] for x in low[0] + shares * (high - low)[0] for y in low[1] + shares * (high - low)[1]])
-    return bool((sum(_turns_about(points, area) for area in areas) != 0).all())
+    return bool(_within(points, areas).all())
 
 
 def _meet(least: Array, most: Array, low: Array, high: Array) -> bool:
@@ -167,7 +168,7 @@ def _seen_part(outline: Array, areas: Sequence[Array]) -> Array:
     ways = ends - starts
     right = np.column_stack([ways[:, 1], -ways[:, 0]]) / np.maximum(np.linalg.norm(ways, axis=1), 1e-12)[:, None]
     beside = (starts + ends) / 2.0 + _BESIDE * np.ptp(outline, axis=0).max() * right
-    hidden = sum(_turns_about(beside, area) for area in areas) != 0
+    hidden = _within(beside, areas)
     pieces = np.stack([starts, ends, np.full_like(starts, np.nan)], axis=1)
     pieces[hidden] = np.nan
     joined = ~hidden & ~np.roll(hidden, -1)  # goes on in the next piece
@@ -178,13 +179,20 @@ def _seen_part(outline: Array, areas: Sequence[Array]) -> Array:
     return seen
 
 
-def _turns_about(points: Array, line: Array) -> Array:
+def _within(points: Array, areas: Sequence[Array]) -> NDArray[np.bool_]:
+    """Return of each point whether the closed lines about areas go around it, shape (n,)."""
+    turns = np.sum([_turns_about(points, area) for area in areas], axis=0)
+    within: NDArray[np.bool_] = turns != 0
+    return within
+
+
+def _turns_about(points: Array, line: Array) -> NDArray[np.intp]:
     """Return how often a closed line goes around each point, shape (n,)."""
     x, y = points[:, :1], points[:, 1:]
     (ax, ay), (bx, by) = line[:-1].T, line[1:].T
     left = (bx - ax) * (y - ay) - (x - ax) * (by - ay)
     up, down = (ay <= y) & (by > y) & (left > 0.0), (ay > y) & (by <= y) & (left < 0.0)
-    turns: Array = up.sum(axis=1) - down.sum(axis=1)
+    turns: NDArray[np.intp] = up.sum(axis=1) - down.sum(axis=1)
     return turns
 
 

@@ -1,0 +1,99 @@
+"""Outlines of shapes in figures, against lines of sight through the shapes themselves."""
+
+import numpy as np
+import pytest
+
+from controller.regions import (
+    Box,
+    Cone,
+    Cylinder,
+    DepthBand,
+    Ellipsoid,
+    HalfSpace,
+    Pipe,
+    Prism,
+    Region,
+    Sphere,
+)
+from controller.regions.region_set import clearances_at
+from controller.regions.shapes import ENTRIES
+from cosim.report.figures.path import ABOVE, SIDE
+from cosim.report.figures.shape_outlines import drawing_of
+
+TURNED = (0.9, 0.1, -0.3, 0.2)
+LOW, HIGH = np.array([-4.0, -4.0, -4.0]), np.array([4.0, 4.0, 4.0])
+ASLANT = np.array([[0.6, 0.8, 0.0], [0.48, -0.36, -0.8]])
+SHAPES = {
+    "sphere": Sphere((0.5, -1.0, 1.0), 1.5),
+    "ellipsoid": Ellipsoid((0.0, 1.0, 0.0), (2.0, 0.5, 1.0), TURNED),
+    "box": Box((0.0, 0.0, 1.0), (1.0, 2.0, 3.0), TURNED),
+    "cylinder": Cylinder((0.0, 0.0, -1.0), (2.0, -1.0, 2.0), 0.7),
+    "star": Prism(((-2.0, -2.0), (2.0, -1.5), (3.0, 0.0), (1.5, -1.0), (1.0, 1.0), (0.8, -1.0)), -1.0, 1.0),
+    "cone": Cone((1.0, 1.0, 2.0), (-1.0, 0.5, -0.7), 0.5, 3.0),
+    "bent pipe": Pipe(((-2.0, 0.0, 0.0), (2.0, 0.0, 0.5), (2.0, 2.0, 0.0), (0.0, 2.0, -2.0), (0.0, -2.0, -2.0)), 0.4),
+    "band": DepthBand(1.0, 1.2),
+    "half space": HalfSpace((1.0, 0.0, 0.0), (1.0, 1.0, 0.4)),
+}
+
+
+def within(areas, points):
+    """Return whether closed lines go around points, by the angles that they turn about them."""
+    turns = np.zeros(len(points))
+    for area in areas:
+        x, y = np.moveaxis(area[None] - points[:, None], 2, 0)
+        turns += np.sum(np.diff(np.unwrap(np.arctan2(y, x), axis=1), axis=1), axis=1) / (2.0 * np.pi)
+    return np.round(turns) != 0
+
+
+@pytest.mark.parametrize("view", [SIDE, ABOVE, ASLANT], ids=["side", "above", "aslant"])
+@pytest.mark.parametrize("name", SHAPES)
+def test_an_area_is_what_lines_of_sight_meet(name, view):
+    shape = SHAPES[name]
+    drawing = drawing_of(shape, LOW, HIGH, view)
+    places = np.random.default_rng(5).uniform(-4.0, 4.0, (300, 2))
+    along = np.linspace(-9.0, 9.0, 721)[:, None] * np.cross(view[0], view[1])
+    clear = np.full(len(places), np.inf)
+    for i, place in enumerate(places):
+        line = place @ view + along
+        line = line[((line >= LOW) & (line <= HIGH)).all(axis=1)]
+        if len(line):
+            clear[i] = clearances_at(line, Region("it", shape, "out")).min()
+    covered = within(drawing.areas, places)
+    told = np.abs(clear) > 0.06  # flat faces cut some cm off what is round
+    assert (clear[told] < 0.0).sum() > 5
+    assert (covered == (clear < 0.0))[told].all()
+
+
+@pytest.mark.parametrize("name", ["star", "bent pipe", "cylinder", "box", "cone"])
+def test_an_outline_is_drawn_where_it_is_seen_alone(name):
+    drawing = drawing_of(SHAPES[name], LOW, HIGH, ASLANT)
+    size = 8e-3
+    for outline in drawing.outline:
+        ends = np.stack([outline[:-1], outline[1:]], axis=1)
+        for a, b in ends[np.isfinite(ends).all(axis=(1, 2))]:
+            across = np.array([(b - a)[1], -(b - a)[0]]) / np.linalg.norm(b - a)
+            sides = (a + b) / 2.0 + size * np.array([[1.0], [-1.0]]) * across
+            assert not within(drawing.areas, sides).all()
+
+
+def test_a_shape_beyond_the_box_is_not_drawn():
+    for shape in (Sphere((9.0, 0.0, 0.0), 1.0), Box((9.0, 0.0, 0.0), (1.0, 1.0, 1.0)), DepthBand(9.0, 1.0)):
+        assert drawing_of(shape, LOW, HIGH, SIDE) is None
+
+
+@pytest.mark.parametrize("name", [name for name, entry in ENTRIES.items() if entry.half_axes or entry.planes])
+def test_half_axes_and_planes_of_an_entry_are_on_its_surface(name):
+    entry = ENTRIES[name]
+    shape = entry.example
+    if entry.half_axes:
+        centre, axes = entry.half_axes(shape)
+        ways = np.random.default_rng(6).normal(size=(50, 3))
+        points = centre + ways / np.linalg.norm(ways, axis=1, keepdims=True) @ axes
+        outward = np.empty((0, 3))
+    else:
+        points = np.array([point for point, _ in entry.planes(shape)])
+        outward = points + 1e-3 * np.array([normal for _, normal in entry.planes(shape)])
+    region = Region("it", shape, "out")
+    np.testing.assert_allclose(clearances_at(points, region), 0.0, atol=1e-9)
+    if len(outward):
+        np.testing.assert_allclose(clearances_at(outward, region), 1e-3, atol=1e-9)
