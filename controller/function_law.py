@@ -113,27 +113,29 @@ class FunctionLaw:
         LawError
             If it returns anything but finite numbers of the right shape.
         """
-        told = VehicleState(*(part.copy() for part in state))
-        came = self._function(told, _seen(goal, told), _seen(regions, told), weights.copy())
-        numbers = _real_numbers(came)
+        given = VehicleState(*(part.copy() for part in state))
+        received = self._function(given, _seen(goal, given), _seen(regions, given), weights.copy())
+        numbers = _real_numbers(received)
         if numbers.shape != forces.shape or not np.isfinite(numbers).all():
             unit = "N and N m" if self.output == "wrench" else "N"
-            raise LawError(f"law {self.name} returned {_shown(came)}, expected {forces.size} finite numbers [{unit}]")
+            raise LawError(
+                f"law {self.name} returned {_shown(received)}, expected {forces.size} finite numbers [{unit}]"
+            )
         forces[:] = numbers
 
 
-def _real_numbers(came: object) -> Array:
+def _real_numbers(received: object) -> Array:
     """Return what came as an array, empty where it is not of real numbers: neither complex ones nor texts will do."""
     try:
-        array = np.asarray(came)
+        array = np.asarray(received)
         return array.astype(float) if array.dtype.kind in _REAL else np.empty(0)
     except (TypeError, ValueError, OverflowError):
         return np.empty(0)
 
 
-def _shown(came: object) -> str:
+def _shown(received: object) -> str:
     """Return what came in one line, cut where it is long."""
-    text = " ".join(repr(came).split())
+    text = " ".join(repr(received).split())
     return text if len(text) <= _LONGEST else f"{text[:_LONGEST]}..."
 
 

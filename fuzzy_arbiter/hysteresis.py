@@ -236,27 +236,27 @@ class HysteresisArbiter:
 
 
 def _settings(
-    key: str, came: Setting, names: Sequence[str], expected: str, fits: Callable[[float], bool]
+    key: str, received: Setting, names: Sequence[str], expected: str, fits: Callable[[float], bool]
 ) -> list[float]:
     """One setting for each input, from one for all or from a mapping."""
-    if isinstance(came, Mapping):
-        _require_names(key, came, names)
-        each = [came[name] for name in names]
+    if isinstance(received, Mapping):
+        _require_names(key, received, names)
+        each = [received[name] for name in names]
     else:
-        each = [came] * len(names)
+        each = [received] * len(names)
     for name, x in zip(names, each, strict=True):
         if not isinstance(x, Real) or isinstance(x, bool) or not fits(float(x)):
-            where = f" for {name!r}" if isinstance(came, Mapping) else ""
+            where = f" for {name!r}" if isinstance(received, Mapping) else ""
             raise DefinitionError(f"{key}: {x!r} came{where}, expected {expected}")
     return [float(x) for x in each]
 
 
-def _require_names(key: str, came: Mapping[str, object], names: Sequence[str]) -> None:
-    for name in came:
+def _require_names(key: str, received: Mapping[str, object], names: Sequence[str]) -> None:
+    for name in received:
         if name not in names:
             raise DefinitionError(f"{key}: {name!r} is no input, expected {', '.join(names)}")
     for name in names:
-        if name not in came:
+        if name not in received:
             raise DefinitionError(f"{key}: nothing came for {name!r}, expected {', '.join(names)}")
 
 

@@ -77,10 +77,10 @@ class Samples:
             such row is named.
         """
         try:
-            came = np.asarray(inputs)
-            if came.dtype.kind not in "biufO":  # NumPy would read numbers from texts, too
-                raise TypeError(f"values of the type {came.dtype.name} came")
-            values = came.astype(np.float64, copy=False)
+            received = np.asarray(inputs)
+            if received.dtype.kind not in "biufO":  # NumPy would read numbers from texts, too
+                raise TypeError(f"values of the type {received.dtype.name} came")
+            values = received.astype(np.float64, copy=False)
         except (TypeError, ValueError) as error:
             raise InputError(f"inputs: {error}; expected rows of numbers for {', '.join(self._names)}") from None
         if values.ndim != 2 or values.shape[1] != len(self._names):

@@ -54,9 +54,12 @@ def checked_autopilot(
     require(len(set(used)) == len(used), "autopilot.channels", channels, "each servo output once")
     require(all(abs(sign) == 1 for sign in signs), "autopilot.signs", signs, "1 or -1")
     good = given.pwm_neutral - given.pwm_span >= SHORTEST and given.pwm_neutral + given.pwm_span <= LONGEST
-    came = f"{given.pwm_neutral} and {given.pwm_span} us"
+    received = f"{given.pwm_neutral} and {given.pwm_span} us"
     require(
-        good and given.pwm_span > 0, "autopilot.pwm_neutral and pwm_span", came, f"pulses of {SHORTEST} to {LONGEST} us"
+        good and given.pwm_span > 0,
+        "autopilot.pwm_neutral and pwm_span",
+        received,
+        f"pulses of {SHORTEST} to {LONGEST} us",
     )
     good = 0 <= given.pwm_dead_band < given.pwm_span
     require(good, "autopilot.pwm_dead_band", f"{given.pwm_dead_band} us", "0 or above, and less than pwm_span")

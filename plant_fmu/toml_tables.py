@@ -119,7 +119,7 @@ def decode(table: dict[str, Any], kind: type[T], where: str = "") -> T:
         raise _mistyped(text, at, table, kind, where) from error
 
 
-def hint(came: str, known: typing.Iterable[str]) -> str:
+def hint(received: str, known: typing.Iterable[str]) -> str:
     """Return what to say of a name that nothing knows: the nearest known one, else all of them.
 
     Parameters
@@ -134,8 +134,8 @@ def hint(came: str, known: typing.Iterable[str]) -> str:
     str
         Such as ``did you mean 'mass'?``.
     """
-    known, came = sorted(known), came[:_LONGEST_NAME]  # to compare takes time with the square of the length
-    near = difflib.get_close_matches(came, known, n=1, cutoff=0.5)
+    known, received = sorted(known), received[:_LONGEST_NAME]  # to compare takes time with the square of the length
+    near = difflib.get_close_matches(received, known, n=1, cutoff=0.5)
     if near:
         return f"did you mean {near[0]!r}?"
     listed = ", ".join(known) if len(known) <= _LISTED else f"{len(known)} names, such as {', '.join(known[:3])}"
@@ -220,5 +220,5 @@ def _mistyped(text: str, at: str, table: Any, kind: Any, where: str) -> TableErr
     text = text[:1].lower() + text[1:].replace("`", "'")
     if typing.get_origin(annotation) is typing.Literal:
         text = f"expected one of {', '.join(map(repr, typing.get_args(annotation)))}"
-    came = "" if isinstance(value, dict) else f" (came: {value!r})"
-    return TableError(f"{'.'.join(path) or 'file'}: {text}{came}")
+    received = "" if isinstance(value, dict) else f" (came: {value!r})"
+    return TableError(f"{'.'.join(path) or 'file'}: {text}{received}")

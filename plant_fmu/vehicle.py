@@ -229,15 +229,15 @@ def _folder() -> resources.abc.Traversable:
 def _check(file: _File, where: str) -> Vehicle:
     """Turn the file's numbers into arrays, and name the first that cannot be right."""
 
-    def require(good: bool, key: str, came: object, expected: str) -> None:
+    def require(good: bool, key: str, received: object, expected: str) -> None:
         if not good:
-            raise VehicleError(f"{where}: {key} is {came}, expected {expected}")
+            raise VehicleError(f"{where}: {key} is {received}, expected {expected}")
 
     def square(value: Matrix, n: int, key: str) -> NDArray[np.float64]:
         widths = {len(row) or -1 if isinstance(row, tuple) else 0 for row in value}  # 0: a number, no row
         good = len(value) == n and widths in ({0}, {n})
-        came = f"{len(value)} rows of {sorted(max(width, 0) for width in widths)} numbers"
-        require(good, key, came, f"a diagonal of {n}, or {n} by {n}")
+        received = f"{len(value)} rows of {sorted(max(width, 0) for width in widths)} numbers"
+        require(good, key, received, f"a diagonal of {n}, or {n} by {n}")
         return np.diag(np.array(value)) if widths == {0} else np.array(value, dtype=float)
 
     body, statics, dynamics, thrusters = file.rigid_body, file.hydrostatics, file.hydrodynamics, file.thrusters

@@ -55,7 +55,7 @@ class Shape(Protocol):
         ...
 
 
-def require(good: bool, shape: str, key: str, came: object, expected: str) -> None:
+def require(good: bool, shape: str, key: str, received: object, expected: str) -> None:
     """Raise an error that names the key, unless the condition holds.
 
     Parameters
@@ -75,7 +75,7 @@ def require(good: bool, shape: str, key: str, came: object, expected: str) -> No
         If `good` is false.
     """
     if not good:
-        raise RegionError(f"{shape}: {key} is {came}, expected {expected}")
+        raise RegionError(f"{shape}: {key} is {received}, expected {expected}")
 
 
 def require_finite(shape: str, **values: float | tuple[float, ...]) -> None:

@@ -47,15 +47,15 @@ class FusedFlyer:
     def __init__(self, variation: Variation) -> None:
         self.variation = variation
         base = variation.base
-        for key, came, expected in (
+        for key, received, expected in (
             ("arbiter.engine", base.arbiter.engine, "closed"),
             ("master.order", base.master.order, "gauss-seidel"),
             ("plant.fmi", base.plant.fmi, 3),
             ("commands.enabled", base.commands.enabled, False),
         ):
-            if came != expected:
+            if received != expected:
                 way = f", such as by --set {key}={expected}" if isinstance(expected, str) else ""
-                raise RunError(f"{key} is {came!r}, expected {expected!r} for flights without a record{way}")
+                raise RunError(f"{key} is {received!r}, expected {expected!r} for flights without a record{way}")
             if key in variation.keys:
                 raise RunError(f"{key} varies, expected {expected!r} for flights without a record")
         require_builtin_law(base)

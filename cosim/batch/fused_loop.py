@@ -184,7 +184,7 @@ def _fly(  # noqa: C901 - one loop, as a whole
     least, least_angle, most = np.inf, np.inf, -np.inf
     effort, thrust_effort, variation = 0.0, 0.0, 0.0
     max_force, max_speed, worst, refused = 0.0, 0.0, 0.0, -1
-    failures, told = 0, 0
+    failures, known_failures = 0, 0
     timed = setup.clock.size > 0
     if not fmi_get(native):
         refused = 0
@@ -198,7 +198,7 @@ def _fly(  # noqa: C901 - one loop, as a whole
             effectiveness.inputs[setup.failed[failures]] = 0.0
             if setup.tell:
                 state.thruster_health[setup.failed[failures]] = 0.0
-                told = min(told + 1, allocator.lower.shape[0] - 1)
+                known_failures = min(known_failures + 1, allocator.lower.shape[0] - 1)
             failures += 1
             if not fmi_set(effectiveness):
                 refused = k
@@ -248,8 +248,8 @@ def _fly(  # noqa: C901 - one loop, as a whole
                 _step(state, setup.goal, setup.regions, weights, gains, memory, inputs)
             else:
                 _step(state, setup.goal, setup.regions, weights, gains, memory, workspace.wrench)
-                lower, upper = allocator.lower[told], allocator.upper[told]
-                allocate(allocator.inverse[told], lower, upper, allocator.direction, workspace.wrench, inputs)
+                lower, upper = allocator.lower[known_failures], allocator.upper[known_failures]
+                allocate(allocator.inverse[known_failures], lower, upper, allocator.direction, workspace.wrench, inputs)
             if timed:
                 worst = max(worst, seconds(setup.clock, workspace.ticks) - started)
             if trace.shape[0]:
@@ -277,18 +277,18 @@ def _fly(  # noqa: C901 - one loop, as a whole
 
 
 @jit_noalloc
-def _measure(setup: FlightConfig, k: int, now: float, truth: Array, state: VehicleState) -> None:
+def _measure(setup: FlightConfig, k: int, now: float, true_state: Array, state: VehicleState) -> None:
     """Write what is told at plant step `k` as `sensing.Sensor` does."""
     for i in range(4):
-        state.quaternion[i] = truth[3 + i]
+        state.quaternion[i] = true_state[3 + i]
     for i in range(3):
-        state.velocity_body[3 + i] = truth[10 + i]
+        state.velocity_body[3 + i] = true_state[10 + i]
     lost = setup.dead_from <= now < setup.dead_until
     if lost and setup.frozen and now > 0.0:
         return
     control = k // setup.control_every
     for i in range(3):
-        state.position[i], state.velocity_body[i] = truth[i], truth[7 + i]
+        state.position[i], state.velocity_body[i] = true_state[i], true_state[7 + i]
         if lost and not setup.frozen:
             state.position[i] = state.velocity_body[i] = np.nan
         elif not (lost or setup.exact):

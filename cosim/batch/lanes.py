@@ -145,22 +145,22 @@ class LanesFlyer:
     def _outcomes(self, metrics: Array) -> Outcomes:
         """Return the outcomes that marks come to."""
         step, steps = self._batch.step, self._batch.steps
-        told = dict(zip(_MARKS, metrics.T, strict=True))
+        by_name = dict(zip(_MARKS, metrics.T, strict=True))
 
         def when(at: Array) -> Array:
             return np.where(at >= 0.0, at * step, np.nan)
 
         out = nothing(len(metrics))
-        inside, stopped = told["inside"] > 0.0, told["stopped"]
+        inside, stopped = by_name["inside"] > 0.0, by_name["stopped"]
         last = np.where(stopped >= 0.0, stopped, steps)
-        out["reached"], out["reach_time"] = told["first_inside"] >= 0.0, when(told["first_inside"])
-        out["settled"] = inside & ((last - told["last_entered"]) * step >= SETTLED_FOR)
-        out["settle_time"] = when(told["last_entered"])
-        out["violated"] = (told["least_clearance"] < 0.0) | (told["least_angle"] < 0.0)
-        out["min_clearance"], out["closest_to_goal"] = told["least_clearance"], -told["goal_clearance"]
+        out["reached"], out["reach_time"] = by_name["first_inside"] >= 0.0, when(by_name["first_inside"])
+        out["settled"] = inside & ((last - by_name["last_entered"]) * step >= SETTLED_FOR)
+        out["settle_time"] = when(by_name["last_entered"])
+        out["violated"] = (by_name["least_clearance"] < 0.0) | (by_name["least_angle"] < 0.0)
+        out["min_clearance"], out["closest_to_goal"] = by_name["least_clearance"], -by_name["goal_clearance"]
         out["stopped_at"] = when(stopped)
         for name in _SAME:
-            out[name] = told[name]
+            out[name] = by_name[name]
         return out
 
     def close(self) -> None:

@@ -205,7 +205,7 @@ def require_lanes(scenario: Scenario) -> None:
     """Raise `RunError` for the first key of a scenario by which the lanes cannot fly it."""
     s = scenario
     clocks = [name for name, value in s.plant.parameters.items() if name.startswith(_CLOCKED) and value]
-    for key, came, expected in (
+    for key, received, expected in (
         ("law.name", s.law.name, "ismail_dunnigan"),
         ("arbiter.engine", s.arbiter.engine, "closed"),
         ("master.order", s.master.order, "gauss-seidel"),
@@ -214,8 +214,8 @@ def require_lanes(scenario: Scenario) -> None:
         ("failures", len(s.failures), 0),
         *((f"{_PARAMETERS}{name}", s.plant.parameters[name], 0.0) for name in clocks),
     ):
-        if came != expected:
-            raise RunError(f"{key} is {came!r}, expected {expected!r} for lanes; the fused loop flies it")
+        if received != expected:
+            raise RunError(f"{key} is {received!r}, expected {expected!r} for lanes; the fused loop flies it")
     try:
         require_in_c(regions_of(s), "lanes")
     except RegionError as error:

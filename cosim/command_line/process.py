@@ -82,14 +82,14 @@ def kills_interrupt() -> Iterator[None]:
 @contextlib.contextmanager
 def signals_held() -> Iterator[None]:
     """Let Ctrl-C and kills wait until libraries are loaded: within its own C, NumPy makes an ImportError of them."""
-    came: list[int] = []
+    received: list[int] = []
     with contextlib.ExitStack() as stack:
         for number in _catchable(("SIGINT", *_KILLS)):
-            before = signal.signal(number, lambda number, _: came.append(number))
+            before = signal.signal(number, lambda number, _: received.append(number))
             stack.callback(signal.signal, number, before)
         yield
-    if came:
-        signal.raise_signal(came[0])
+    if received:
+        signal.raise_signal(received[0])
 
 
 def _catchable(names: tuple[str, ...]) -> list[signal.Signals]:

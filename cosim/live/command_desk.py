@@ -42,7 +42,7 @@ class CommandDesk:
         self._queue, self._has_come = queue, has_come
         self._run = queue.run if isinstance(queue, CommandQueue) else 0
         self._movable = [name for name in scenario.moving if name != "goal"]
-        self._comes = {secondary.region.name for secondary in scenario.regions if secondary.seen}
+        self._comes = {secondary.region.name for secondary in scenario.regions if secondary.is_dynamic}
 
     def take(self, message: str | bytes) -> str | None:
         """Give the run what a viewer sent.

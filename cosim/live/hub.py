@@ -83,7 +83,7 @@ class Hub:
         self._middle, self._target_radius = shape_center(scenario.goal), 0.0
         self._regions = ["goal", *(secondary.region.name for secondary in scenario.regions)]
         self._slots = ObstacleSlots(scenario.commands.obstacles)
-        self._came = [secondary.region.name for secondary in scenario.regions if secondary.seen]  # by slot
+        self._came = [secondary.region.name for secondary in scenario.regions if secondary.is_dynamic]  # by slot
         self._history = History(len(self._viewing.columns))
         self._texts, self._dropped, self._last = [], 0, None
         self.desk = CommandDesk(scenario, queue, self._has_come)
@@ -110,7 +110,7 @@ class Hub:
                     self._target_radius = float(row[self._names["target.radius"]])
                     self._change("goal", float(row[0]))
 
-    def heed(self, k: int, commands: Sequence[Command]) -> None:
+    def show_commands(self, k: int, commands: Sequence[Command]) -> None:
         """Tell of the commands that step `k` follows, and of the regions that they change."""
         time = k * self._step
         for command in commands:
@@ -182,8 +182,8 @@ class Hub:
             cursor.row = number
             return bytes_of(rows)
         if cursor.change < len(changes := self._header["changes"]):
-            told, cursor.change = cursor.change, len(changes)
-            return text_of("changes", changes=changes[told:])
+            sent, cursor.change = cursor.change, len(changes)
+            return text_of("changes", changes=changes[sent:])
         cursor.text = max(cursor.text, self._dropped)
         if cursor.text < self._dropped + len(self._texts):
             cursor.text += 1

@@ -99,9 +99,9 @@ class LiveView:
             self._due = now + PERIOD
             self._rows.append((self._run, row[self._picked]))
 
-    def heed(self, k: int, commands: Sequence[Command]) -> None:
+    def show_commands(self, k: int, commands: Sequence[Command]) -> None:
         """Tell of commands that step `k` follows."""
-        self._call(self._hub.heed, k, commands)
+        self._call(self._hub.show_commands, k, commands)
 
     def say(self, text: str, kind: str = "info") -> None:
         """Tell all viewers a `text`; its `kind` is info, order or warning."""

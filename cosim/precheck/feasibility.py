@@ -117,17 +117,17 @@ def _mend(goal: Region, regions: Sequence[Region], box: tuple[Array, Array]) -> 
 def _between(regions: Sequence[Region], low: Array, high: Array) -> Iterator[Finding]:
     """Yield where shapes to be kept out of overlap: there the arbiter has to choose."""
     inside = [Region(r.name, r.shape, "in") for r in regions if r.keep == "out"]
-    told, numbers = [], {}
+    pairs, numbers = [], {}
     for one, other in itertools.combinations(inside, 2):
         box = box_within(other, *box_within(one, low, high))
         if np.any(box[0] > box[1]):
             continue
         overlap = search([one, other], *box)
         if overlap.found:
-            told.append(f"{one.name} and {other.name} ({overlap.depth:.3f} m deep at {_point(overlap.point)})")
+            pairs.append(f"{one.name} and {other.name} ({overlap.depth:.3f} m deep at {_point(overlap.point)})")
             numbers[f"{one.name}, {other.name}"] = overlap.depth
-    if told:
-        text = f"Kept out of, and overlapping, where the arbiter has to choose: {'; '.join(told)}."
+    if pairs:
+        text = f"Kept out of, and overlapping, where the arbiter has to choose: {'; '.join(pairs)}."
         yield Finding("regions", "overlaps", "note", text, numbers=numbers)
 
 

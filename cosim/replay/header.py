@@ -93,7 +93,7 @@ def shape_of(shape: Shape, limits: Bounds) -> dict[str, Any]:
 
 def limits_of(scenario: Scenario) -> Bounds:
     """Return the corners of a box about the start and all regions that end somewhere, with as much room about them."""
-    regions = [scenario.goal_region, *(secondary.region for secondary in scenario.regions if not secondary.seen)]
+    regions = [scenario.goal_region, *(secondary.region for secondary in scenario.regions if not secondary.is_dynamic)]
     corners = [np.array(corner) for region in regions for corner in region.shape.bounds()]
     points = np.array([scenario.initial.position, *(corner for corner in corners if np.isfinite(corner).all())])
     low, high = points.min(axis=0), points.max(axis=0)
@@ -122,7 +122,7 @@ def _region(scenario: Scenario, index: int, limits: Bounds) -> dict[str, Any]:
         "hard": region.hard,
         "gain": region.gain,
         "moves": region.name in scenario.moving,
-        "comes": bool(secondary and secondary.seen),  # is there only while it is shifted
+        "comes": bool(secondary and secondary.is_dynamic),  # is there only while it is shifted
         "unit": "rad" if of_attitude(region.shape) else "m",  # of its clearance
         "shape": shape_of(region.shape, limits),
     }

@@ -81,7 +81,7 @@ def changes_of(run: Run, log: Log) -> list[dict[str, Any]]:
     by_obstacles = (
         change
         for i, secondary in enumerate(run.scenario.regions)
-        if secondary.seen
+        if secondary.is_dynamic
         for change in _sizes(run, i + 1, secondary)
     )
     return sorted([*by_settings, *by_obstacles], key=lambda change: change["time"])
@@ -174,11 +174,11 @@ def _steps_of(record: Rows) -> tuple[NDArray[np.intp], Array]:
     for block in record.blocks(["target.radius", "commands.mode", "commands.item"]):
         item = block["commands.item"]
         in_mission = (block["commands.mode"] == MODES.index("mission")) & np.isfinite(item)
-        told = np.column_stack([block["target.radius"], in_mission, item])
-        changed = np.flatnonzero((np.diff(told, axis=0, prepend=before) != 0.0).any(axis=1))
+        rows_now = np.column_stack([block["target.radius"], in_mission, item])
+        changed = np.flatnonzero((np.diff(rows_now, axis=0, prepend=before) != 0.0).any(axis=1))
         rows.append(first + changed)
-        values.append(told[changed])
-        first, before = first + len(told), told[-1:]
+        values.append(rows_now[changed])
+        first, before = first + len(rows_now), rows_now[-1:]
     return np.concatenate(rows), np.concatenate(values)
 
 

@@ -75,8 +75,8 @@ def trace_of(run: Run) -> Trace:
     viewing = Viewing(scenario, record.columns)
     log = log_of(run)
     changes, events = changes_of(run, log), events_of(run, log)
-    told = [t for event in events for t in (event.time, event.until) if t is not None]
-    moments = rows_at(record, [*(change["time"] for change in changes), *told])
+    times = [t for event in events for t in (event.time, event.until) if t is not None]
+    moments = rows_at(record, [*(change["time"] for change in changes), *times])
     clearances = ["goal.clearance", *(f"{secondary.region.name}.clearance" for secondary in scenario.regions)]
     telling = (_telling(block, clearances) for block in record.blocks([*_FORCE, *clearances]))
     steps = sampled_rows(record, len(viewing.columns), telling, 1 + len(clearances), moments)

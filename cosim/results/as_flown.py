@@ -64,7 +64,7 @@ def radii_of(record: Rows, name: str) -> Iterator[tuple[Array, Array]]:
 
 def _came(secondary: SecondaryRegion, record: Rows) -> SecondaryRegion | None:
     """Return a region at its size, None for an obstacle that never came, or of which no row tells the size."""
-    if not secondary.seen:
+    if not secondary.is_dynamic:
         return secondary
     radius = None
     for _, radii in radii_of(record, secondary.region.name):

@@ -268,9 +268,9 @@ def _batches(parquet: Any, columns: Sequence[Column], groups: Sequence[int]) -> 
     for batch in parquet.iter_batches(_BLOCK, row_groups=list(groups), columns=names):
         rows += len(batch)
         yield Rows(columns, {name: _numbers(batch.column(name)) for name in names})
-    told = sum(parquet.metadata.row_group(group).num_rows for group in groups)
-    if rows != told:
-        raise TypeError(f"{rows} rows are there, expected {told}")
+    expected_rows = sum(parquet.metadata.row_group(group).num_rows for group in groups)
+    if rows != expected_rows:
+        raise TypeError(f"{rows} rows are there, expected {expected_rows}")
 
 
 def _numbers(column: pa.Array) -> Array:

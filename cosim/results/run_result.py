@@ -247,11 +247,11 @@ def open_run(path: Path, scenario: Scenario, status: str, wall_time: float | Non
         if not (np.isfinite(time).all() and (np.diff(time, prepend=last) > 0.0).all()):
             raise RunError(f"{path}: the times of the record do not rise from row to row")
         last = time[-1]
-    came = scenario_as_flown(scenario, record)
-    summary = summarise(came, record, status, wall_time)
+    as_flown = scenario_as_flown(scenario, record)
+    summary = summarise(as_flown, record, status, wall_time)
     if scenario.commands.enabled:
         summary["commands"] = _lines(path / COMMANDS_LOG)
-    return Run(path, scenario, came, record, summary)
+    return Run(path, scenario, as_flown, record, summary)
 
 
 def _lines(file: Path) -> int:

@@ -148,7 +148,9 @@ def run_scenario(
                 if live is not None:
                     live.begin(scenario, master.signals.columns, _desk(scenario, recorded, queue))
                 try:
-                    source = LoggedCommands(recorded or queue, folder.path / COMMANDS_LOG, live.heed if live else None)
+                    source = LoggedCommands(
+                        recorded or queue, folder.path / COMMANDS_LOG, live.show_commands if live else None
+                    )
                     status, wall_time, failure = _step(master, folder, source, link, live, rate, progress)
                     queue.end_run()
                     if live is not None and report:

@@ -95,8 +95,8 @@ def joined(before: Sequence[str], more: Iterable[str]) -> tuple[str, ...]:
     tuple of str
         In their order.
     """
-    told = (key for key in more if key.partition(".")[0] not in _BESIDE and key not in _SEEDS)
-    return tuple(dict.fromkeys([*before, *told]))
+    varied = (key for key in more if key.partition(".")[0] not in _BESIDE and key not in _SEEDS)
+    return tuple(dict.fromkeys([*before, *varied]))
 
 
 def value_at(table: dict[str, Any], key: str, vehicle: Vehicle) -> Any:

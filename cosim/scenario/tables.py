@@ -225,7 +225,7 @@ class SecondaryRegion:
     region: Region
     criterion: str  # one of CRITERIA
     streamed: bool = False  # moved from outside while the run goes on
-    seen: bool = False  # stands for an obstacle that may come in while the run goes on
+    is_dynamic: bool = False  # stands for an obstacle that may come in while the run goes on
 
     @property
     def moves(self) -> bool:

@@ -145,7 +145,9 @@ def check_commands(
         _require(name not in names, f"regions.{name}.name", "used", "another one: obstacles that come in have it")
     far = Sphere(PARKED_POSITION, commands.obstacle_radius)
     return tuple(
-        SecondaryRegion(Region(name, far, "out", gain=commands.obstacle_gain), "obstacle", streamed=True, seen=True)
+        SecondaryRegion(
+            Region(name, far, "out", gain=commands.obstacle_gain), "obstacle", streamed=True, is_dynamic=True
+        )
         for name in seen
     )
 
@@ -268,6 +270,6 @@ def _shape(table: dict[str, Any], where: str) -> Shape:
         raise ScenarioError(f"{where}: {error}") from error
 
 
-def _require(good: bool, key: str, came: object, expected: str) -> None:
+def _require(good: bool, key: str, received: object, expected: str) -> None:
     if not good:
-        raise ScenarioError(f"{key} is {came}, expected {expected}")
+        raise ScenarioError(f"{key} is {received}, expected {expected}")

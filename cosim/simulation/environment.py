@@ -74,9 +74,11 @@ class RegionEnvironment:
         self._places = _Places(self.goal, self.regions)
         self._names = ["goal", *(region.name for region in secondary)]
         self._streamed = ["goal"] if scenario.goal_streamed else []
-        self._streamed += [region.region.name for region in scenario.regions if region.streamed and not region.seen]
+        self._streamed += [
+            region.region.name for region in scenario.regions if region.streamed and not region.is_dynamic
+        ]
         self._moving = [self._names.index(name) for name in scenario.moving]
-        self._seen = [i for i, region in enumerate(scenario.regions) if region.seen]
+        self._seen = [i for i, region in enumerate(scenario.regions) if region.is_dynamic]
         # m, NED: where each would have been at time 0, had it always moved as it does now
         self._origins: Array = np.zeros((len(secondary), 3))
         self._evaluate_places = BoundCall(_evaluate)

@@ -120,18 +120,18 @@ class Master:
         self._flags = s.view("position.x", n_outputs + len(plant.flags))[n_outputs:]
         self._raised = b""  # the flags that stand in the row
 
-        truth = VehicleState(
+        true_state = VehicleState(
             position=s.view("position.x", 3),
             quaternion=s.view("quaternion.e0", 4),
             velocity_body=s.view("velocity.u", 6),
             thruster_health=self.actuators.health,
         )
-        self.truth = self.state = truth
+        self.true_state = self.state = true_state
         self._sensor: Sensor | None = None
         if not self.scenario.sensing.exact:
             position, velocity = s.view("sensed.x", 3), s.view("sensed.u", 6)
             self.state = VehicleState(position, np.zeros(4), velocity, self.actuators.health)
-            self._sensor = Sensor(self.scenario.sensing, truth, self.state)
+            self._sensor = Sensor(self.scenario.sensing, true_state, self.state)
 
         values, clearances = s.view("goal.value", n + 1), s.view("goal.clearance", n + 1)
         # where sensing is exact, what the arbiter sees is what is recorded
@@ -162,7 +162,7 @@ class Master:
                 self.environment.regions,
                 self._arbitration.region_weights,
             )
-            self._lyapunov = LyapunovSignals(self.scenario, truth, goal, regions, weights, self._estimate, out)
+            self._lyapunov = LyapunovSignals(self.scenario, true_state, goal, regions, weights, self._estimate, out)
 
     @property
     def row(self) -> Array:
@@ -275,7 +275,7 @@ class Master:
         """Fill the row with how things stand before the first step; nothing moves, and no noise is drawn."""
         self._measured[:] = self._plant_measured
         if self._sensor is not None:
-            self._sensor.tell_truth()
+            self._sensor.give_true_state()
         self._evaluate_regions()
         if self.command_handler is not None:
             self.command_handler.update(0.0, float(self._given_evaluation.clearances[0]))
@@ -315,7 +315,7 @@ class Master:
         self.environment.update_positions(self.signals.row[0], self._shifts)
         if self._sensor is not None:
             self.environment.evaluate(self.state, self._given_evaluation)
-        self.environment.evaluate(self.truth, self._true_evaluation)
+        self.environment.evaluate(self.true_state, self._true_evaluation)
 
     def _arbitrate(self) -> None:
         """Decide by the regions as they stand; while the position is lost, the last weights hold."""

@@ -24,17 +24,17 @@ class Sensor:
         Receives what is told.
     """
 
-    def __init__(self, sensing: Sensing, truth: VehicleState, told: VehicleState) -> None:
-        self._sensing, self._truth, self._told = sensing, truth, told
+    def __init__(self, sensing: Sensing, true_state: VehicleState, given: VehicleState) -> None:
+        self._sensing, self._true_state, self._given = sensing, true_state, given
         self._rng = np.random.default_rng([sensing.seed, STREAM])
         self._deviation: Array = np.repeat([sensing.position_noise, sensing.velocity_noise], 3)
         self._noise: Array = np.zeros(6)
 
-    def tell_truth(self) -> None:
+    def give_true_state(self) -> None:
         """Write the true state, as before the first measurement."""
-        self._told.position[:] = self._truth.position
-        self._told.quaternion[:] = self._truth.quaternion
-        self._told.velocity_body[:] = self._truth.velocity_body
+        self._given.position[:] = self._true_state.position
+        self._given.quaternion[:] = self._true_state.quaternion
+        self._given.velocity_body[:] = self._true_state.velocity_body
 
     def measure(self, time: float, anew: bool) -> None:
         """Write what is told at a time.
@@ -46,18 +46,18 @@ class Sensor:
         anew : bool
             Draw new noise, as at each control step; otherwise that of the last one stays.
         """
-        sensing, truth, told = self._sensing, self._truth, self._told
+        sensing, true_state, given = self._sensing, self._true_state, self._given
         if anew:
             self._noise[:] = self._deviation * self._rng.standard_normal(6)
-        told.quaternion[:] = truth.quaternion
-        told.velocity_body[3:] = truth.velocity_body[3:]
+        given.quaternion[:] = true_state.quaternion
+        given.velocity_body[3:] = true_state.velocity_body[3:]
         if sensing.dead_from <= time < sensing.dead_from + sensing.dead_for:
             if not sensing.frozen:
-                told.position[:] = np.nan
-                told.velocity_body[:3] = np.nan
+                given.position[:] = np.nan
+                given.velocity_body[:3] = np.nan
             elif time == 0.0:  # nothing was measured before
-                told.position[:] = truth.position
-                told.velocity_body[:3] = truth.velocity_body[:3]
+                given.position[:] = true_state.position
+                given.velocity_body[:3] = true_state.velocity_body[:3]
             return
-        told.position[:] = truth.position + self._noise[:3]
-        told.velocity_body[:3] = truth.velocity_body[:3] + self._noise[3:]
+        given.position[:] = true_state.position + self._noise[:3]
+        given.velocity_body[:3] = true_state.velocity_body[:3] + self._noise[3:]

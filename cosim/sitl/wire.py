@@ -44,8 +44,8 @@ def decode(data: bytes) -> ServoPacket | None:
     magic, packing = _MAGIC_OF_LENGTH.get(len(data), (0, None))
     if packing is None:
         return None
-    came, frame_rate, frame_count, *pwm = packing.unpack(data)
-    return ServoPacket(frame_rate, frame_count, tuple(pwm)) if came == magic else None
+    received, frame_rate, frame_count, *pwm = packing.unpack(data)
+    return ServoPacket(frame_rate, frame_count, tuple(pwm)) if received == magic else None
 
 
 def encode(motion: Motion) -> bytes:

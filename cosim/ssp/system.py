@@ -122,7 +122,7 @@ def _fmu(component: Component, fmi: int, platforms: str) -> bytes:
 def _require(scenario: Scenario) -> None:
     """Refuse what the FMUs of a system have not."""
     streamed = [r.region.name for r in scenario.regions if r.streamed]
-    for good, key, came, expected in (
+    for good, key, received, expected in (
         (
             scenario.law.name == "ismail_dunnigan",
             "law.name",
@@ -148,7 +148,7 @@ def _require(scenario: Scenario) -> None:
         (not streamed, f"regions.{streamed[0]}.streamed" if streamed else "", "true", "false"),
     ):
         if not good:
-            raise RunError(f"{key} is {came}, expected {expected} in a system of FMUs")
+            raise RunError(f"{key} is {received}, expected {expected} in a system of FMUs")
     try:
         require_in_c((scenario.goal_region, *(r.region for r in scenario.regions)), "a system of FMUs")
     except RegionError as error:

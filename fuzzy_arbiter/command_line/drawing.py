@@ -63,8 +63,8 @@ def draw(
     from fuzzy_arbiter import pictures
     from fuzzy_arbiter.pictures.style import new_axes
 
-    came = {"--input": inputs, "--output": outputs, "--at": at, "--relief": relief}
-    for option, value in came.items():
+    received = {"--input": inputs, "--output": outputs, "--at": at, "--relief": relief}
+    for option, value in received.items():
         if value and option not in PICTURES[kind]:
             raise InputError(f"{kind}: {option} came, expected none but {', '.join(PICTURES[kind])}")
     system = arbiter.system
@@ -112,8 +112,8 @@ def middles(at: Sequence[str], system: System) -> list[str]:
     return [f"{v.name}={(v.universe[0] + v.universe[1]) / 2.0!r}" for v in system.inputs if v.name not in named]
 
 
-def _names(kind: str, option: str, came: Sequence[str], known: Sequence[str], n: int) -> Sequence[str]:
-    chosen = came or known[:n]
+def _names(kind: str, option: str, received: Sequence[str], known: Sequence[str], n: int) -> Sequence[str]:
+    chosen = received or known[:n]
     if len(chosen) != n:
         raise InputError(f"{kind}: {len(chosen)} of {option}, expected {n} of {', '.join(known)}")
     return chosen

@@ -156,9 +156,9 @@ def _rows(text: str, where: str, names: Sequence[str]) -> tuple[list[int], list[
         for name in names:
             if header.count(name) != 1:
                 fault = "stands twice" if name in header else "is missing"
-                came = ", ".join(map(repr, header))
-                came = came if len(came) <= 200 else f"{came[:200]} ..."
-                raise InputError(f"{where}: column {name!r} {fault} in the first line, which has {came or 'none'}")
+                received = ", ".join(map(repr, header))
+                received = received if len(received) <= 200 else f"{received[:200]} ..."
+                raise InputError(f"{where}: column {name!r} {fault} in the first line, which has {received or 'none'}")
         columns = [header.index(name) for name in names]
         lines, rows = [], []
         for cells in reader:

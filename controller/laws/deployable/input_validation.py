@@ -32,28 +32,28 @@ def sanitize_weights(weights: Array, believed: Array) -> None:
 
 
 @part
-def says_more(told: Array, before: Array, health: Array) -> bool:
+def says_more(reported: Array, before: Array, health: Array) -> bool:
     """Return whether what is told of the thrusters differs from what was, or from what is believed of a failed one.
 
     A thruster is told to have failed by a health of 0 or below; whatever else comes says that it works.
     """
     more = False
-    for j in range(told.size):
-        works = 0.0 if told[j] <= 0.0 else 1.0
+    for j in range(reported.size):
+        works = 0.0 if reported[j] <= 0.0 else 1.0
         more = more or works != before[j] or (works == 0.0 and health[j] != 0.0)
     return more
 
 
 @part
-def take_in_thrusters(memory: DeployableMemory, told: Array, failed: int) -> None:
+def take_in_thrusters(memory: DeployableMemory, reported: Array, failed: int) -> None:
     """Take in which thrusters are told to have failed, or to work again, and one found to have failed, -1 for none."""
     health = memory.thrusters.health
     if failed >= 0:
         fault_detection.give_up(memory.suspicion, memory.thrusters, failed)
-    for j in range(told.size):
-        works = 0.0 if told[j] <= 0.0 else 1.0
-        if works != memory.told[j] or works == 0.0:
-            health[j] = memory.told[j] = works
+    for j in range(reported.size):
+        works = 0.0 if reported[j] <= 0.0 else 1.0
+        if works != memory.reported[j] or works == 0.0:
+            health[j] = memory.reported[j] = works
     model.reallocate(memory.thrusters)
 
 

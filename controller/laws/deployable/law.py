@@ -106,7 +106,7 @@ def step(
         fault_detection.detect_fault,
         (memory.suspicion, seen, memory.attitude.residual, dynamics, thrusters, R, gains, period, measured),
     )
-    if failed >= 0 or input_validation.says_more(state.thruster_health, memory.told, thrusters.health):
+    if failed >= 0 or input_validation.says_more(state.thruster_health, memory.reported, thrusters.health):
         input_validation.take_in_thrusters(memory, state.thruster_health, failed)
         observer.inflate_covariance(seen, 0.01)
 
@@ -267,7 +267,7 @@ def _report_program(report: Array, multipliers: Array, price: Array, rows: int, 
 
 def _stages(memory: DeployableMemory, gains: DeployableGains) -> Stages:
     """Return the addresses of the stages, for arguments such as a step gives them."""
-    m, n = memory.told.size, memory.weights.size
+    m, n = memory.reported.size, memory.weights.size
     three, forces, R, regions = np.zeros(3), np.zeros(m), np.zeros((3, 3)), pack([])
     state, thrusters, seen = VehicleState(three, np.zeros(4), np.zeros(6), forces), memory.thrusters, memory.observed
     motion, bounds = Motion(three, np.zeros(6), np.zeros(6), memory.push, 0.0, 0.0, 0.0, 0.0), (forces, forces)
@@ -335,7 +335,7 @@ class DeployableLaw(CompiledLaw):
             quaternion=desired.copy(),
             omega=np.zeros(3),
             weights=np.ones(n_regions),
-            told=np.ones(m),
+            reported=np.ones(m),
             pushed=np.zeros(3),
             push=np.zeros((6, m)),
             stages=Stages(),

@@ -46,7 +46,7 @@ class DeployableMemory(NamedTuple):
     quaternion: Array  # (4,) from body to world, as measured or carried by the model
     omega: Array  # (3,) rad/s, likewise
     weights: Array  # (n,) of the arbiter, as believed
-    told: Array  # (m,) health of the thrusters as last told
+    reported: Array  # (m,) health of the thrusters as last told
     pushed: Array  # (3,) m/s2, NED, that the thrusters shall add, smoothed
     push: Array  # (6, m) as `barrier.Motion` has it
     stages: Stages

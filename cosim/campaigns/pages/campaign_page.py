@@ -178,13 +178,13 @@ def _page(
         page.heading("How often")
         page.add(figures["rates"])
         rates_table(page, "scenes", groups, FACTS)
-        told = (
+        text = (
             "Completed: inside the goal region to the end, with no region violated on the way. Intervals are at 95 %, "
         )
-        told += "by Wilson."
+        text += "by Wilson."
         if s["kinds"]:
-            told += " Kinds: obstacles drift, measurements have noise, a thruster fails; plain is none of it."
-        page.paragraph(told, faint=True)
+            text += " Kinds: obstacles drift, measurements have noise, a thruster fails; plain is none of it."
+        page.paragraph(text, faint=True)
         page.heading("How much")
         page.add(figures.get("distributions", Html("")))
         quantiles_table(page, groups)

@@ -114,10 +114,10 @@ def _page(
         page.heading("How often")
         page.add(figures["rates"])
         rates_table(page, "scenes", groups, FACTS)
-        told = (
+        text = (
             "Completed: inside the goal region to the end, with no region violated on the way. Intervals are at 95 %, "
         )
-        page.paragraph(told + "by Wilson.", faint=True)
+        page.paragraph(text + "by Wilson.", faint=True)
         page.heading("How much")
         page.add(figures.get("distributions", Html("")))
         quantiles_table(page, groups)

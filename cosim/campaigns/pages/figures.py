@@ -95,7 +95,7 @@ def _interval(axes: Axes, line: Rated, y: float) -> None:
     )  # fmt: skip
 
 
-def distributions(columns: Mapping[str, Mapping[str, Array]], told: str) -> Iterator[NamedFigure]:
+def distributions(columns: Mapping[str, Mapping[str, Array]], addition: str) -> Iterator[NamedFigure]:
     """Yield the share of all that is at most each value, a panel for each column, with a dot at the median.
 
     Parameters
@@ -132,7 +132,7 @@ def distributions(columns: Mapping[str, Mapping[str, Array]], told: str) -> Iter
     caption = (
         "Share that comes to at most so much, with a dot at the median of what comes. Left of 0 a region is violated."
     )
-    yield NamedFigure("distributions", f"{caption} {told}".rstrip(), figure)
+    yield NamedFigure("distributions", f"{caption} {addition}".rstrip(), figure)
 
 
 def shares_up_to(values: Array) -> tuple[Array, Array]:

@@ -112,8 +112,10 @@ def _flown(repeat: Repeat, folder: Path) -> tuple[dict[str, Any] | None, str]:
         return None, f"cannot be shown: {remark or error}"
     finally:
         shutil.rmtree(folder, ignore_errors=True)
-    told = ", ".join(f"{name} {_said(now)} in the place of {_said(before)}" for name, (before, now) in apart.items())
-    return trace, f"step by step it came out otherwise: {told}" if told else remark
+    differences = ", ".join(
+        f"{name} {_said(now)} in the place of {_said(before)}" for name, (before, now) in apart.items()
+    )
+    return trace, f"step by step it came out otherwise: {differences}" if differences else remark
 
 
 def _said(value: Any) -> str:

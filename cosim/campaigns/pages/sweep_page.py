@@ -231,12 +231,12 @@ def _effects(page: Page, s: dict[str, Any]) -> None:
 
 def _effect(effect: dict[str, float] | None, correlation: dict[str, float] | None) -> str:
     """Return what a cell says of a key and an outcome, nothing where chance may have brought it about."""
-    told = []
+    measures = []
     if effect is not None and effect["share"] >= max(effect["floor"], _TOLD_SHARE):
-        told.append(_percent(effect["share"]))
+        measures.append(_percent(effect["share"]))
     if correlation is not None and abs(correlation["rho"]) >= _TOLD_RHO and correlation["p"] < CHANCE:
-        told.append(f"ρ\N{NO-BREAK SPACE}{correlation['rho']:+.2f}".replace("-", "−"))
-    return ", ".join(told)
+        measures.append(f"ρ\N{NO-BREAK SPACE}{correlation['rho']:+.2f}".replace("-", "−"))
+    return ", ".join(measures)
 
 
 def _percent(share: float) -> str:

@@ -49,13 +49,13 @@ class Repeat:
     scenario: Scenario | None  # that says the same; None where the row was refused
     outcome: Callable[[Scenario, Record, dict[str, Any]], Outcome]  # of a recorded run, as the row tells it
 
-    def apart(self, came: Outcome) -> dict[str, tuple[Any, Any]]:
+    def apart(self, received: Outcome) -> dict[str, tuple[Any, Any]]:
         """Return by column what the row has and what came of the master's flight, where that is more than rounding."""
         assert self.scenario is not None
         step = 1.5 * self.scenario.time.step
         return {
             name: (self.stored[name], now)
-            for name, now in came.items()
+            for name, now in received.items()
             if not _close(self.stored[name], now, step if name.endswith("_time") else _ROUNDING)
         }
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from controller import LAWS
 from cosim.batch.c_calls import Clock
 from cosim.batch.fused_loop import OUTPUTS, Allocator, FlightConfig, FlightMetrics, fused_loop_of, make_workspace
-from cosim.campaigns.scenes.scene import KnownScene, Scene, plant_values, told
+from cosim.campaigns.scenes.scene import KnownScene, Scene, known_scene, plant_values
 from cosim.errors import RunError
 from cosim.scenario.vehicle_model import vehicle_model
 from plant_fmu import Plant
@@ -133,7 +133,7 @@ class SceneFlyer:
             If the plant cannot be as the scene has it. The flyer can go on with another scene.
         """
         c, m = self.conditions, self._vehicle.n_thrusters
-        plant, known = self._plant, told(scene)
+        plant, known = self._plant, known_scene(scene)
         law = self._law(known.regions.kinds.size)
         plant.reset()
         plant.set(plant_values(scene, self._vehicle, c.plant_step))

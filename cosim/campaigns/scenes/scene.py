@@ -94,7 +94,7 @@ class KnownScene(NamedTuple):
     criteria: NDArray[np.int64]  # (n,) index into CRITERIA of each of the regions
 
 
-def told(scene: Scene) -> KnownScene:
+def known_scene(scene: Scene) -> KnownScene:
     """Return what the law is told of a scene.
 
     Parameters
@@ -227,9 +227,9 @@ def _check(scene: Scene) -> None:
         _require(failure.time >= 0.0, "failed_thruster.time", failure.time, "0 s or above")
 
 
-def _require(good: bool, key: str, came: object, expected: str) -> None:
+def _require(good: bool, key: str, received: object, expected: str) -> None:
     if not good:
-        raise ScenarioError(f"{key} is {came}, expected {expected}")
+        raise ScenarioError(f"{key} is {received}, expected {expected}")
 
 
 def _require_moderate(key: str, values: tuple[float, ...]) -> None:

@@ -67,20 +67,20 @@ def fly_all(work: Work, batches: Batches, pool: WorkerPool) -> Generator[Any, No
         if not done:
             pool.check()
         for flight in done:
-            batch, came = under_way.pop(flight), pool.result(flight)
-            if not isinstance(came, WorkerCrash):
+            batch, received = under_way.pop(flight), pool.result(flight)
+            if not isinstance(received, WorkerCrash):
                 home, deaths = home + 1, 0
-                batches.measured(len(batch.rows), came[1])
-                yield came[0]
+                batches.measured(len(batch.rows), received[1])
+                yield received[0]
                 yield from condemned
                 condemned.clear()
                 continue
-            deaths += came.crash_count > 0
+            deaths += received.crash_count > 0
             if deaths > _DEATHS:
                 raise RunError(
                     f"{deaths} processes died one after the other, whatever they flew; what is flown is kept"
                 )
-            condemned += _again(work, batches, batch, came)
+            condemned += _again(work, batches, batch, received)
     if condemned and not home:
         raise RunError("every process died, whatever it flew (killed, or out of memory)")
     yield from condemned

@@ -186,8 +186,8 @@ def _state(look: Look) -> list[Text]:
 
 
 def _estimates(look: Look) -> list[Text]:
-    truth = look.header["truth"]["estimate"]
-    parts = [f"φ{i + 1} {look[f'estimate.phi{i + 1}']:z.1f} ({true:z.1f})" for i, true in enumerate(truth)]
+    true_values = look.header["truth"]["estimate"]
+    parts = [f"φ{i + 1} {look[f'estimate.phi{i + 1}']:z.1f} ({true:z.1f})" for i, true in enumerate(true_values)]
     return [_title("Estimates (true)"), Text("  ".join(parts[:2])), Text("  ".join(parts[2:]))]
 
 

@@ -224,13 +224,13 @@ def _live(endpoint: tuple[str, int]) -> Iterator[Look]:
                     if header is not None:
                         row = rows_of(message, len(header["signals"]))[-1]
                 else:
-                    told = json.loads(message)
-                    if told["type"] == "header":
-                        msgspec.convert(told["run"], _Header)
-                        header, row = told["run"], None
-                    elif told["type"] == "end" and header is not None:
-                        yield Look(header, row, f"live at {url}", (told["status"], told["verdict"]))
-                        if told["status"] != "reset":
+                    content = json.loads(message)
+                    if content["type"] == "header":
+                        msgspec.convert(content["run"], _Header)
+                        header, row = content["run"], None
+                    elif content["type"] == "end" and header is not None:
+                        yield Look(header, row, f"live at {url}", (content["status"], content["verdict"]))
+                        if content["status"] != "reset":
                             return
                 if header is not None and time.monotonic() - shown >= _FRAME:
                     shown = time.monotonic()

@@ -37,8 +37,8 @@ def connect_as_qgc(subject: Subject) -> Outcome:
         bad = next((step for step in connection.steps if not step.good), None)
         return failed(f"{took}; {bad.name if bad else 'no heartbeat'}: {bad.said if bad else ''}", "all steps")
     slowest = max(connection.steps, key=lambda step: step.seconds)
-    came = f"{took}, {len(connection.steps)} steps, {slowest.name} {slowest.seconds:.2f} s"
-    return judged(connection.retries == 0, came, "no retry")
+    received = f"{took}, {len(connection.steps)} steps, {slowest.name} {slowest.seconds:.2f} s"
+    return judged(connection.retries == 0, received, "no retry")
 
 
 def no_gaps(subject: Subject) -> Outcome:

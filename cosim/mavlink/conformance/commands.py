@@ -29,9 +29,9 @@ def one_ack(subject: Subject) -> Outcome:
         return failed(f"{len(acks)} acks", "one")
     took, ack = acks[0].time - started, acks[0].message
     target = ack.target_system, ack.target_component
-    came = f"result {ack.result} after {1e3 * took:.0f} ms for {target}"
+    received = f"result {ack.result} after {1e3 * took:.0f} ms for {target}"
     good = ack.result == m.MAV_RESULT_ACCEPTED and took < _QUICK and target == client.identity
-    return judged(good, came, f"result 0 within {_QUICK:g} s for {client.identity}")
+    return judged(good, received, f"result 0 within {_QUICK:g} s for {client.identity}")
 
 
 def command_int(subject: Subject) -> Outcome:
@@ -132,9 +132,9 @@ def bad_mode(subject: Subject) -> Outcome:
     ack = _set_mode(subject, 0xEE, packed=False)
     client.collect(1.2)
     after = client.last("HEARTBEAT")
-    came = f"ack {ack and ack.result}, mode {before and before.custom_mode} then {after and after.custom_mode}"
+    received = f"ack {ack and ack.result}, mode {before and before.custom_mode} then {after and after.custom_mode}"
     good = ack is not None and ack.result != 0 and before is not None and after.custom_mode == before.custom_mode
-    return judged(good, came, "a refusal, and the mode as it was")
+    return judged(good, received, "a refusal, and the mode as it was")
 
 
 def _set_mode(subject: Subject, number: int, packed: bool) -> Any:

@@ -21,9 +21,11 @@ def heartbeat_identity(subject: Subject) -> Outcome:
         return failed("no heartbeat of component 1", "one a second")
     names = m.enums["MAV_TYPE"], m.enums["MAV_AUTOPILOT"], m.enums["MAV_STATE"]
     known = all(value in names[i] for i, value in enumerate((beat.type, beat.autopilot, beat.system_status)))
-    came = f"system {vehicle.system}, type {beat.type}, autopilot {beat.autopilot}, base mode {beat.base_mode:#x}"
+    received = f"system {vehicle.system}, type {beat.type}, autopilot {beat.autopilot}, base mode {beat.base_mode:#x}"
     good = known and vehicle.system != 0 and beat.mavlink_version == _VERSION_3
-    return judged(good, came, f"known type, autopilot and state, version {_VERSION_3} (came {beat.mavlink_version})")
+    return judged(
+        good, received, f"known type, autopilot and state, version {_VERSION_3} (came {beat.mavlink_version})"
+    )
 
 
 def heartbeat_custom_mode(subject: Subject) -> Outcome:
@@ -45,17 +47,17 @@ def heartbeat_rate(subject: Subject) -> Outcome:
         return failed(f"{len(beats)} in {subject.seconds:.1f} s", "one a second")
     silence = max(b - a for a, b in pairwise(times))
     between = max(b - a - 1 for a, b in pairwise(beats))
-    came = f"{len(beats)} in {subject.seconds:.1f} s, {silence:.2f} s and {between} messages apart at the most"
+    received = f"{len(beats)} in {subject.seconds:.1f} s, {silence:.2f} s and {between} messages apart at the most"
     good = silence <= _LONGEST_SILENCE and between <= _MOST_BETWEEN and len(beats) <= 6 * subject.seconds
-    return judged(good, came, f"up to {_LONGEST_SILENCE:g} s and {_MOST_BETWEEN} messages apart")
+    return judged(good, received, f"up to {_LONGEST_SILENCE:g} s and {_MOST_BETWEEN} messages apart")
 
 
 def mavlink_2(subject: Subject) -> Outcome:
     """Check that all frames are of MAVLink 2: QGroundControl heeds no other."""
     link = subject.client.link
     unknown, troubles = link.counts.unknown, link.troubles()
-    came = [f"{subject.client.total} messages", f"{link.old} of MAVLink 1", f"{unknown} unknown", *troubles]
-    return judged(link.old == unknown == 0 and not troubles, ", ".join(came), "only whole, known ones of MAVLink 2")
+    received = [f"{subject.client.total} messages", f"{link.old} of MAVLink 1", f"{unknown} unknown", *troubles]
+    return judged(link.old == unknown == 0 and not troubles, ", ".join(received), "only whole, known ones of MAVLink 2")
 
 
 def autopilot_version(subject: Subject) -> Outcome:
@@ -88,8 +90,8 @@ def available_modes(subject: Subject) -> Outcome:
         and len(set(numbers)) == len(numbers)
         and all(mode.mode_name or mode.standard_mode for mode in found)
     )
-    came = ", ".join(f"{mode.mode_name} {mode.custom_mode:#x}" for mode in found)
-    return judged(good, came, "indices in order, and different numbers and names")
+    received = ", ".join(f"{mode.mode_name} {mode.custom_mode:#x}" for mode in found)
+    return judged(good, received, "indices in order, and different numbers and names")
 
 
 def current_mode(subject: Subject) -> Outcome:
@@ -99,8 +101,8 @@ def current_mode(subject: Subject) -> Outcome:
     beat = subject.client.last("HEARTBEAT")
     if mode is None or beat is None:
         return skipped("no CURRENT_MODE, as of ArduPilot") if subject.ardupilot else failed("nothing", "CURRENT_MODE")
-    came = f"custom mode {mode.custom_mode}, heartbeat {beat.custom_mode}"
-    return judged(mode.custom_mode == beat.custom_mode, came, "the same")
+    received = f"custom mode {mode.custom_mode}, heartbeat {beat.custom_mode}"
+    return judged(mode.custom_mode == beat.custom_mode, received, "the same")
 
 
 def component_metadata(subject: Subject) -> Outcome:

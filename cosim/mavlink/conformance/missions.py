@@ -40,9 +40,9 @@ def mission_round_trip(subject: Subject) -> Outcome:
         return skipped("the vehicle heeds no commands")
     after, text, _ = fetch_mission(client, m.MAV_MISSION_TYPE_MISSION)
     restored = upload(subject, before)
-    came = f"ack {result}, {text} back, ack {restored} of the old one"
+    received = f"ack {result}, {text} back, ack {restored} of the old one"
     if result != m.MAV_MISSION_ACCEPTED or after is None or len(after) != len(items):
-        return failed(came, "ack 0, and as many items back")
+        return failed(received, "ack 0, and as many items back")
     # where item 0 is home, as of ArduPilot, it may come back as something else
     first = 1 if subject.ardupilot else 0
     different = [
@@ -52,8 +52,8 @@ def mission_round_trip(subject: Subject) -> Outcome:
         if abs(getattr(a, name) - getattr(b, name)) > 1e-3 * (name == "z") + 1.0 * (name in "xy")
     ]
     if different:
-        return failed(f"{came}; {'; '.join(different)}", "the same items back")
-    return judged(restored == m.MAV_MISSION_ACCEPTED, came, "ack 0")
+        return failed(f"{received}; {'; '.join(different)}", "the same items back")
+    return judged(restored == m.MAV_MISSION_ACCEPTED, received, "ack 0")
 
 
 def bad_upload(subject: Subject) -> Outcome:
@@ -68,12 +68,12 @@ def bad_upload(subject: Subject) -> Outcome:
     if result == m.MAV_MISSION_DENIED:
         return skipped("the vehicle heeds no commands")
     after, _, _ = fetch_mission(client, m.MAV_MISSION_TYPE_MISSION)
-    came = f"ack {result}, {text} before, {None if after is None else len(after)} after"
+    received = f"ack {result}, {text} before, {None if after is None else len(after)} after"
     if result == m.MAV_MISSION_ACCEPTED and before is not None:
         upload(subject, before)
     if result is None or result == m.MAV_MISSION_ACCEPTED or before is None or after is None:
-        return failed(came, "a refusal, and as many items as before")
-    return judged(len(after) == len(before), came, "a refusal, and as many items as before")
+        return failed(received, "a refusal, and as many items as before")
+    return judged(len(after) == len(before), received, "a refusal, and as many items as before")
 
 
 def _item(subject: Subject, sequence: int, latitude: int, longitude: int, altitude: float) -> Any:

@@ -18,18 +18,18 @@ class Outcome:
     """What came of a check, in a line."""
 
     status: Status
-    came: str
+    received: str
     expected: str = ""
 
 
-def passed(came: str) -> Outcome:
+def passed(received: str) -> Outcome:
     """Return that what came is right."""
-    return Outcome("pass", came)
+    return Outcome("pass", received)
 
 
-def failed(came: str, expected: str) -> Outcome:
+def failed(received: str, expected: str) -> Outcome:
     """Return that something else was expected."""
-    return Outcome("fail", came, expected)
+    return Outcome("fail", received, expected)
 
 
 def skipped(why: str) -> Outcome:
@@ -37,9 +37,9 @@ def skipped(why: str) -> Outcome:
     return Outcome("skip", why)
 
 
-def judged(good: bool, came: str, expected: str) -> Outcome:
+def judged(good: bool, received: str, expected: str) -> Outcome:
     """Return what came, and what was expected unless it is good."""
-    return passed(came) if good else failed(came, expected)
+    return passed(received) if good else failed(received, expected)
 
 
 @dataclass(frozen=True)

@@ -24,11 +24,11 @@ def parameter_list(subject: Subject) -> Outcome:
     """Check that the list comes whole, without a gap, each with a name and an index of its own."""
     started = time.monotonic()
     values, count, retries = fetch_parameters(subject.client)
-    came = f"{len(values)} of {count} in {time.monotonic() - started:.2f} s, {retries} retries"
+    received = f"{len(values)} of {count} in {time.monotonic() - started:.2f} s, {retries} retries"
     names = {value.param_id for value in values.values()}
     counts = {value.param_count for value in values.values()}
     good = count is not None and sorted(values) == list(range(count)) and len(names) == count and counts == {count}
-    return judged(good and retries == 0, came, "all, at the first asking, with different names and one count")
+    return judged(good and retries == 0, received, "all, at the first asking, with different names and one count")
 
 
 def parameter_read(subject: Subject) -> Outcome:
@@ -39,9 +39,9 @@ def parameter_read(subject: Subject) -> Outcome:
     by_name = _read(subject, first.param_id)
     if by_name is None:
         return failed(f"{first.param_id}: nothing", "PARAM_VALUE")
-    came = f"{first.param_id} {first.param_value:g}, by name {by_name.param_value:g} (index {by_name.param_index})"
+    received = f"{first.param_id} {first.param_value:g}, by name {by_name.param_value:g} (index {by_name.param_index})"
     good = by_name.param_id == first.param_id and by_name.param_type == first.param_type
-    return judged(good and _same(first.param_value, by_name.param_value), came, "the same twice")
+    return judged(good and _same(first.param_value, by_name.param_value), received, "the same twice")
 
 
 def parameter_unknown(subject: Subject) -> Outcome:
@@ -63,8 +63,8 @@ def parameter_set(subject: Subject) -> Outcome:
     echo, error = _set(subject, value, value.param_value)
     if echo is None:
         return failed("error alone" if error else "nothing", "PARAM_VALUE with the value that counts")
-    came = f"{value.param_id} {value.param_value:g}, echo {echo.param_value:g}{', refused: read-only' * error}"
-    return judged(_same(echo.param_value, value.param_value), came, "the same value")
+    received = f"{value.param_id} {value.param_value:g}, echo {echo.param_value:g}{', refused: read-only' * error}"
+    return judged(_same(echo.param_value, value.param_value), received, "the same value")
 
 
 def parameter_change(subject: Subject) -> Outcome:
@@ -82,10 +82,10 @@ def parameter_change(subject: Subject) -> Outcome:
         read = _read(subject, value.param_id)
         _set(subject, value, value.param_value)
         again = _read(subject, value.param_id)
-        came = f"{value.param_id} {value.param_value:g} to {other:g}: echo {echo.param_value:g}, read "
-        came += f"{read and read.param_value:g}, then {again and again.param_value:g}"
+        received = f"{value.param_id} {value.param_value:g} to {other:g}: echo {echo.param_value:g}, read "
+        received += f"{read and read.param_value:g}, then {again and again.param_value:g}"
         good = read is not None and again is not None and _same(read.param_value, other)
-        return judged(good and _same(again.param_value, value.param_value), came, "what was set, each time")
+        return judged(good and _same(again.param_value, value.param_value), received, "what was set, each time")
     if refusals:
         return skipped("the vehicle refuses to change any")
     return failed(f"none of {len(listed)} can be changed", "one that can")
@@ -100,11 +100,13 @@ def parameter_nan(subject: Subject) -> Outcome:
     after = _read(subject, value.param_id)
     if after is None:
         return failed("nothing afterwards", "the old value")
-    came = f"{'an error, ' * error}echo {echo and echo.param_value}, read {after.param_value:g}"
+    received = f"{'an error, ' * error}echo {echo and echo.param_value}, read {after.param_value:g}"
     if not _same(after.param_value, value.param_value):
         _set(subject, value, value.param_value)
     answered = error or echo is not None
-    return judged(answered and _same(after.param_value, value.param_value), came, f"an answer, {value.param_value:g}")
+    return judged(
+        answered and _same(after.param_value, value.param_value), received, f"an answer, {value.param_value:g}"
+    )
 
 
 def parameter_file(subject: Subject) -> Outcome:
@@ -120,9 +122,9 @@ def parameter_file(subject: Subject) -> Outcome:
     magic, stored, total = _HEAD.unpack_from(file.data)
     value = _read(subject, index=0)
     count = value and value.param_count
-    came = f"{len(file.data)} bytes, {stored} of {total} parameters, list {count}, {file.retries} retries"
+    received = f"{len(file.data)} bytes, {stored} of {total} parameters, list {count}, {file.retries} retries"
     good = magic in _MAGICS and stored == total == count and file.retries == 0
-    return judged(good, came, f"magic {_MAGICS[0]:#x} (came {magic:#x}), all parameters of the list")
+    return judged(good, received, f"magic {_MAGICS[0]:#x} (came {magic:#x}), all parameters of the list")
 
 
 def missing_file(subject: Subject) -> Outcome:

@@ -27,9 +27,9 @@ def stream_rates(subject: Subject) -> Outcome:
     enough = {kind: max(_TOLERANCE * rate - 1.0 / (subject.seconds * subject.speed), 0.01) for kind, rate in
               _NEEDED.items()}  # fmt: skip
     lacking = [kind for kind in _NEEDED if rates.get(kind, 0.0) < enough[kind]]
-    came = f"{len(rates)} kinds, {sum(rates.values()):.0f} messages a second, clock at {subject.speed:.2f}"
+    received = f"{len(rates)} kinds, {sum(rates.values()):.0f} messages a second, clock at {subject.speed:.2f}"
     too_few = ", ".join(f"{kind} {rates.get(kind, 0.0):.1f} of {_NEEDED[kind]:g} Hz" for kind in lacking)
-    return failed(f"{came}; {too_few}", "each at its rate") if lacking else passed(came)
+    return failed(f"{received}; {too_few}", "each at its rate") if lacking else passed(received)
 
 
 def boot_clock(subject: Subject) -> Outcome:
@@ -55,11 +55,11 @@ def sensors_healthy(subject: Subject) -> Outcome:
         and status.onboard_control_sensors_health & (sensors | ready) == sensors | ready
         and status.onboard_control_sensors_enabled & ready == ready
     )
-    came = (
+    received = (
         f"present {status.onboard_control_sensors_present:#x}, enabled {status.onboard_control_sensors_enabled:#x}, "
         f"healthy {status.onboard_control_sensors_health:#x}"
     )
-    return judged(good, came, f"present {sensors:#x}, enabled {ready:#x}, healthy {sensors | ready:#x} at least")
+    return judged(good, received, f"present {sensors:#x}, enabled {ready:#x}, healthy {sensors | ready:#x} at least")
 
 
 def no_fence_breach(subject: Subject) -> Outcome:
@@ -68,8 +68,8 @@ def no_fence_breach(subject: Subject) -> Outcome:
     if status is None:
         return failed("no SYS_STATUS", "one a second")
     bit = m.MAV_SYS_STATUS_GEOFENCE
-    came = f"healthy {status.onboard_control_sensors_health:#x}"
-    return judged(bool(status.onboard_control_sensors_health & bit), came, f"bit {bit:#x} among them")
+    received = f"healthy {status.onboard_control_sensors_health:#x}"
+    return judged(bool(status.onboard_control_sensors_health & bit), received, f"bit {bit:#x} among them")
 
 
 def home_position(subject: Subject) -> Outcome:
@@ -77,9 +77,9 @@ def home_position(subject: Subject) -> Outcome:
     m, rate = subject.mavlink, subject.rates().get("HOME_POSITION", 0.0)
     home = subject.client.request(m.MAVLINK_MSG_ID_HOME_POSITION)
     ack = subject.client.command(m.MAV_CMD_GET_HOME_POSITION)
-    came = f"{rate:.1f} Hz, {'' if home else 'not '}on request, ack of command 410 {ack and ack.result}"
+    received = f"{rate:.1f} Hz, {'' if home else 'not '}on request, ack of command 410 {ack and ack.result}"
     good = rate >= _QGC_SILENCE and home is not None and ack is not None
-    return judged(good, came, "at least 0.1 Hz, on request, and an ack")
+    return judged(good, received, "at least 0.1 Hz, on request, and an ack")
 
 
 def statustext(subject: Subject) -> Outcome:
@@ -102,16 +102,18 @@ def message_interval(subject: Subject) -> Outcome:
     rate = _rate_of(subject, "ATTITUDE")
     client.forget()
     client.send_command(m.MAV_CMD_GET_MESSAGE_INTERVAL, [number])
-    told = client.wait(lambda x: x.get_type() == "MESSAGE_INTERVAL" and x.message_id == number, 1.0)
+    interval = client.wait(lambda x: x.get_type() == "MESSAGE_INTERVAL" and x.message_id == number, 1.0)
     client.command(m.MAV_CMD_SET_MESSAGE_INTERVAL, [number, 0, 0, 0, 0, 0, 0])
     again = _rate_of(subject, "ATTITUDE")
-    came = f"ack {ack and ack.result}, {rate:.1f} Hz, told {told and told.interval_us} us, then {again:.1f} Hz"
+    received = (
+        f"ack {ack and ack.result}, {rate:.1f} Hz, told {interval and interval.interval_us} us, then {again:.1f} Hz"
+    )
     good = (
-        ack is not None and ack.result == m.MAV_RESULT_ACCEPTED and told is not None
-        and abs(told.interval_us - asked) <= 0.2 * asked and _TOLERANCE * _ASKED <= rate <= 1.3 * _ASKED
+        ack is not None and ack.result == m.MAV_RESULT_ACCEPTED and interval is not None
+        and abs(interval.interval_us - asked) <= 0.2 * asked and _TOLERANCE * _ASKED <= rate <= 1.3 * _ASKED
         and again < _TOLERANCE * _ASKED
     )  # fmt: skip
-    return judged(good, came, f"ack 0, about {_ASKED:g} Hz, told {asked:g} us, then less")
+    return judged(good, received, f"ack 0, about {_ASKED:g} Hz, told {asked:g} us, then less")
 
 
 def greedy_interval(subject: Subject) -> Outcome:
@@ -121,8 +123,8 @@ def greedy_interval(subject: Subject) -> Outcome:
     ack = client.command(m.MAV_CMD_SET_MESSAGE_INTERVAL, [number, 1, 0, 0, 0, 0, 0])
     rate = _rate_of(subject, "ATTITUDE")
     client.command(m.MAV_CMD_SET_MESSAGE_INTERVAL, [number, 0, 0, 0, 0, 0, 0])
-    came = f"ack {ack and ack.result}, {rate:.0f} Hz"
-    return judged(ack is not None and rate <= _FASTEST, came, f"an ack, and at most {_FASTEST:g} Hz")
+    received = f"ack {ack and ack.result}, {rate:.0f} Hz"
+    return judged(ack is not None and rate <= _FASTEST, received, f"an ack, and at most {_FASTEST:g} Hz")
 
 
 def unknown_interval(subject: Subject) -> Outcome:

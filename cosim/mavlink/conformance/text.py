@@ -16,7 +16,7 @@ def as_text(result: Result) -> str:
     check, outcome = result.check, result.outcome
     expected = f"; expected {outcome.expected}" if outcome.expected else ""
     clients = ", ".join(check.clients)
-    return f"{outcome.status.upper()} {check.name:<22} {printable(outcome.came)}{expected} [{clients}]"
+    return f"{outcome.status.upper()} {check.name:<22} {printable(outcome.received)}{expected} [{clients}]"
 
 
 def summary(results: Sequence[Result]) -> str:
@@ -46,7 +46,7 @@ def as_json(name: str, results: Sequence[Result]) -> str:
             "name": result.check.name,
             "clients": list(result.check.clients),
             "status": result.outcome.status,
-            "came": printable(result.outcome.came),
+            "received": printable(result.outcome.received),
             "expected": result.outcome.expected,
             "seconds": round(result.seconds, 3),
         }

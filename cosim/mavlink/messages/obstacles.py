@@ -39,7 +39,7 @@ def obstacle_distance_3d(context: VehicleContext) -> list[Any]:
     `obstacle_id` is the region's number in the scenario, from 1. None is known before the first snapshot.
     """
     m, view, proximity = context.mavlink, context.view, context.proximity
-    if not context.seen:
+    if not context.has_view:
         return []
     proximity.update(view, context.settings)
     inwards = dict(zip(proximity.ids, proximity.inwards(view.position_ned), strict=True))

@@ -18,7 +18,7 @@ _PX4_MAIN = {
 _PX4_AUTO = {1: "READY", 2: "TAKEOFF", 3: "LOITER", 4: "MISSION", 5: "RTL", 6: "LAND", 8: "FOLLOW", 9: "PRECLAND"}
 
 
-def mode_name(heartbeat: Any, told: Mapping[int, str]) -> str:
+def mode_name(heartbeat: Any, names: Mapping[int, str]) -> str:
     """Return the name of a vehicle's mode.
 
     Parameters
@@ -34,8 +34,8 @@ def mode_name(heartbeat: Any, told: Mapping[int, str]) -> str:
         The custom mode's number where no name is known.
     """
     number = heartbeat.custom_mode
-    if told.get(number):
-        return told[number]
+    if names.get(number):
+        return names[number]
     if heartbeat.autopilot == _PX4:
         main, sub = number >> _MAIN & 0xFF, number >> _SUB & 0xFF
         name = _PX4_MAIN.get(main, str(main))

@@ -40,7 +40,7 @@ class Proximity:
     def __init__(self, scenario: Scenario) -> None:
         every = [(i, secondary) for i, secondary in enumerate(scenario.regions, 1) if _is_obstacle(secondary)]
         self.ids = tuple(i for i, _ in every)
-        self._seen = tuple(secondary.seen for _, secondary in every)
+        self._seen = tuple(secondary.is_dynamic for _, secondary in every)
         self._names = tuple(secondary.region.name for _, secondary in every)
         self._shapes: list[Shape] = [secondary.region.shape for _, secondary in every]
         self._shifts: list[Vector3] = [_AT_REST] * len(every)

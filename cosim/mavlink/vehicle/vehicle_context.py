@@ -71,7 +71,7 @@ class VehicleContext:
         The latest snapshot.
     waited_us : int
         For how long arming is awaited [µs], which counts as time since boot.
-    seen : bool
+    has_view : bool
         Whether a snapshot came at all.
     links : list of MessageSink
         That are attached.
@@ -130,7 +130,7 @@ class VehicleContext:
         """Forget what belongs to a run, as at its beginning."""
         self.waited_us = 0
         self.view = View(self.layout, self.layout.first_row(self.scenario))
-        self.seen = False
+        self.has_view = False
         self.settings = LiveSettings(self.scenario)
         self.home = (0.0, 0.0)
         self.plan: tuple[ReceivedMissionItem, ...] = ()
@@ -156,12 +156,12 @@ class VehicleContext:
     @property
     def armed(self) -> bool:
         """As the snapshot has it; before there is one, as commanded."""
-        return self.view.armed if self.seen else self._armed_before
+        return self.view.armed if self.has_view else self._armed_before
 
     @property
     def mode(self) -> Mode:
         """As the snapshot has it; before there is one, as commanded."""
-        return self.view.mode if self.seen else self._mode_before
+        return self.view.mode if self.has_view else self._mode_before
 
     @property
     def mode_ahead(self) -> Mode:
@@ -172,7 +172,7 @@ class VehicleContext:
 
     def look(self, row: Array) -> None:
         """Take the next snapshot."""
-        self.view, self.seen = View(self.layout, row, self.waited_us), True
+        self.view, self.has_view = View(self.layout, row, self.waited_us), True
         if self._wished is not None and self._wished[1] == self.view.mode:
             self._wished = None
 

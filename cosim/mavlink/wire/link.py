@@ -193,10 +193,10 @@ class Link:
                 self.channel.heard(self._peer)
                 yield found
                 continue
-            came = self.channel.receive()
-            if came is None:
+            received = self.channel.receive()
+            if received is None:
                 return
-            self._peer, data = came
+            self._peer, data = received
             self._frames = self._gate.datagram(data) if self.channel.datagrams else self._reader().read(data)
 
     def _reader(self) -> StreamReader:
@@ -208,9 +208,9 @@ class Link:
 
     def troubles(self) -> list[str]:
         """Return what did not go out or come in, and how often, in words."""
-        told = {"messages over the budget": self.dropped, "messages that could not be encoded": self.unencodable}
+        lost = {"messages over the budget": self.dropped, "messages that could not be encoded": self.unencodable}
         refused = {f"frames {reason}": n for reason, n in self.counts.refused().items()}
-        return [f"{n} {what}" for what, n in (told | refused | self.channel.trouble).items() if n]
+        return [f"{n} {what}" for what, n in (lost | refused | self.channel.trouble).items() if n]
 
 
 def open_links(endpoints: Sequence[Endpoint], options: MavlinkOptions) -> list[Link]:

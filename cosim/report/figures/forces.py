@@ -119,7 +119,7 @@ def thrusters(data: FigureData) -> Figure:
 
 def estimates(data: FigureData) -> Figure:
     """Draw the estimates against the truth."""
-    truth = data.scenario.true_restoring_parameters
+    true_values = data.scenario.true_restoring_parameters
     labels = list(_ESTIMATES)
     figure, (force, moment) = over_time(data, [1.6, 1.6], [*labels, "truth"])
     entries: dict[str, Artist] = {}
@@ -128,8 +128,8 @@ def estimates(data: FigureData) -> Figure:
         ax, colour = (force, BLUE) if i == 0 else (moment, CYCLE[i])
         signal = data.record[f"estimate.phi{i + 1}"]
         entries[label] = curve(ax, data, signal, color=colour, linestyle=DASHES[max(0, i - 1)])
-        entries["truth"] = ax.axhline(truth[i], color=colour, linestyle=(0, (1, 3)), linewidth=1.2)
-        shown[i == 0] += [signal, truth[i : i + 1]]
+        entries["truth"] = ax.axhline(true_values[i], color=colour, linestyle=(0, (1, 3)), linewidth=1.2)
+        shown[i == 0] += [signal, true_values[i : i + 1]]
     force.set_ylim(*limits_of(shown[True], least=0.1))
     moment.set_ylim(*limits_of(shown[False], least=0.1))
     force.set_ylabel("estimate [N]")

@@ -107,10 +107,10 @@ def _ordered(record: Rows) -> NDArray[np.intp]:
     names = [name for name in record.units if name.startswith(("commands.", "target."))]
     found, first, before = [np.empty(0, np.intp)], 0, np.full((1, len(names)), np.nan)
     for block in record.blocks(names) if names else ():
-        told = block.numbers()
-        changed = np.flatnonzero((np.diff(told, axis=0, prepend=before) != 0.0).any(axis=1))
+        block_rows = block.numbers()
+        changed = np.flatnonzero((np.diff(block_rows, axis=0, prepend=before) != 0.0).any(axis=1))
         found.append(first + changed[:: max(1, len(changed) // _CHANGES)])
-        first, before = first + len(told), told[-1:]
+        first, before = first + len(block_rows), block_rows[-1:]
     rows = np.concatenate(found)
     rows = rows[:: max(1, len(rows) // (100 * _CHANGES))]
     return np.concatenate([rows, np.maximum(rows - 1, 0)])

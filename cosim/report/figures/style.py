@@ -144,7 +144,7 @@ def places_of(data: FigureData) -> Iterator[Place]:
     Place
         The goal's first.
     """
-    came = {secondary.region.name for secondary in data.scenario.regions if secondary.seen}
+    dynamic = {secondary.region.name for secondary in data.scenario.regions if secondary.is_dynamic}
     for region, colour in regions_of(data.scenario):
         if of_attitude(region.shape):
             continue
@@ -152,7 +152,7 @@ def places_of(data: FigureData) -> Iterator[Place]:
         clearance = data.record[f"{region.name}.clearance"]
         # NaN is not the least
         at = -1 if region.name == "goal" else int(np.argmin(np.where(np.isnan(clearance), np.inf, clearance)))
-        if shifts.any() and region.name not in came:
+        if shifts.any() and region.name not in dynamic:
             yield Place(region, colour, shifts[0], faint=True)
             yield Place(region, colour, shifts[-1], faint=True)
         yield Place(region, colour, shifts[at], faint=False)

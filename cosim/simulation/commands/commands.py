@@ -192,6 +192,6 @@ def _check_place(position: Vector3, radius: float | None) -> None:
     _require(radius is None or 0.0 < radius <= _FAR, "radius", radius, f"above 0 and up to {_FAR:g} m")
 
 
-def _require(good: bool, key: str, came: object, expected: str) -> None:
+def _require(good: bool, key: str, received: object, expected: str) -> None:
     if not good:
-        raise CommandError(f"{key} is {came}, expected {expected}")
+        raise CommandError(f"{key} is {received}, expected {expected}")

@@ -54,7 +54,7 @@ class LiveSettings:
     def __init__(self, scenario: Scenario) -> None:
         self._law = LAWS[scenario.law.name]
         self.gains: Any = scenario.law.gains
-        known = [secondary.region for secondary in scenario.regions if not secondary.seen]
+        known = [secondary.region for secondary in scenario.regions if not secondary.is_dynamic]
         self._regions: dict[str, Region] = {region.name: region for region in known}
         self.shapes: dict[str, Shape] = {"goal": scenario.goal, **{region.name: region.shape for region in known}}
         self._numbers: dict[str, float] = {f"regions.{region.name}.gain": region.gain for region in known}

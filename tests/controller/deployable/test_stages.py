@@ -234,8 +234,8 @@ def test_weights_and_health_are_taken_for_what_they_can_be():
     input_validation.take_in_thrusters(memory, np.ones(8), 2)
     assert np.flatnonzero(memory.thrusters.health == 0.0).tolist() == [2]
     told = np.array([1.0, -1.0, 1.0, np.nan, 1.0, 1.0, 1.0, 0.5])
-    assert input_validation.says_more(told, memory.told, memory.thrusters.health)
+    assert input_validation.says_more(told, memory.reported, memory.thrusters.health)
     input_validation.take_in_thrusters(memory, told, -1)
     assert np.flatnonzero(memory.thrusters.health == 0.0).tolist() == [1, 2]
-    assert not input_validation.says_more(told, memory.told, memory.thrusters.health)
+    assert not input_validation.says_more(told, memory.reported, memory.thrusters.health)
     assert np.array_equal(memory.quaternion, LEVEL)

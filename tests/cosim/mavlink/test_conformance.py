@@ -243,7 +243,7 @@ def test_results_are_told_in_a_line_and_as_json():
     document = json.loads(as_json("udpin:here", results))
     assert document["endpoint"] == "udpin:here" and document["passed"] is False
     assert document["checks"][1] == {
-        "name": "some-check", "clients": ["QGC", "MAVSDK"], "status": "fail", "came": "?[2Jbad", "expected": "good",
+        "name": "some-check", "clients": ["QGC", "MAVSDK"], "status": "fail", "received": "?[2Jbad", "expected": "good",
         "seconds": 0.2,
     }  # fmt: skip
     assert judged(True, "a", "b") == passed("a") and judged(False, "a", "b") == failed("a", "b")

@@ -1,4 +1,4 @@
-"""Scenes: read line by line, refused with the line and the key, and told to the law without what it must not know."""
+"""Scenes: read line by line, refused with the line and the key, and given to the law without what it must not know."""
 
 import json
 from dataclasses import replace
@@ -10,7 +10,7 @@ import pytest
 from controller import LAWS, IsmailDunniganLaw
 from cosim.batch import fused_loop
 from cosim.campaigns.scenes.flyer import Conditions, SceneFlyer
-from cosim.campaigns.scenes.scene import Failure, plant_values, read_scenes, told
+from cosim.campaigns.scenes.scene import Failure, known_scene, plant_values, read_scenes
 from cosim.errors import ScenarioError
 from plant_fmu import load_vehicle
 
@@ -87,7 +87,7 @@ def test_the_plant_has_what_the_scene_sets():
     assert values["substep"] == 0.01
 
 
-# ---- what the law is told ----
+# ---- what the law knows ----
 
 UNTOLD = {
     "current": {"current": (0.3, -0.2, 0.1)},
@@ -182,4 +182,4 @@ def test_regions_come_with_their_present_place_and_velocity(spied):
     shifts, velocities = (np.frombuffer(steps[20][2][i]).reshape(-1, 3) for i in (4, 5))
     np.testing.assert_allclose(shifts, 0.4 * velocities, rtol=1e-12)
     assert velocities[0].tolist() == LINE["obstacles"][0]["velocity"] and not velocities[1:].any()
-    assert told(SCENE).regions._fields[4:6] == ("shifts", "velocities")
+    assert known_scene(SCENE).regions._fields[4:6] == ("shifts", "velocities")

@@ -350,7 +350,7 @@ def test_commands_of_a_run_repeat_it_to_the_last_bit(tmp_path):
         assert np.array_equal(a[name], b[name]), name
     assert (first.folder / "commands.jsonl").read_bytes() == (second.folder / "commands.jsonl").read_bytes()
     came = scenario_as_flown(scenario, a)
-    assert [r.region.name for r in came.regions if r.seen] == ["seen 1"]
+    assert [r.region.name for r in came.regions if r.is_dynamic] == ["seen 1"]
     assert came.regions[-1].region.shape.radius == pytest.approx(0.2, abs=1e-6)
     assert "seen 2" not in first.summary["min_clearance"]
 
