@@ -1,12 +1,11 @@
 """Attitude: held by proportional and rate feedback, with the restoring moments adapted from the body rates.
 
-The rates are measured well, so what the model misses of a moment shows within one period: I omega' = tau - D omega -
-S(k) phi_{2..4} - nu_r x (M nu_r) + residual, where the fourth is what added mass makes of motion askew (Munk's moment).
-The residual drives the three moments of phi (12), within their bounds.
+Rates are measured well, and a moment that the model lacks shows within a period: I omega' = tau - D omega -
+S(k) phi_{2..4} - nu_r x (M nu_r) + residual, where the fourth is Munk's moment, which added mass causes in oblique
+motion. The residual drives the three moments of phi (12), within their bounds.
 
-The attitude that is held is the preferred one unless a region asks for another: where a region of attitude would have
-less than some comfort there, the held attitude is turned until it has, no more tilted than is allowed, and drifts back
-when it may.
+The desired attitude is the preferred one unless a region of attitude asks for another: where its clearance would be
+less than `comfort`, the desired attitude turns until it has that much, within the allowed tilt, and returns afterwards.
 """
 
 from __future__ import annotations
@@ -29,24 +28,24 @@ from controller.regions.region_set import PackedRegions, attitude_clearance
 Array = NDArray[np.float64]
 
 _ATTITUDE = FIRST_OF_ATTITUDE  # shapes from it on depend on attitude
-_RETURN = 0.2  # 1/s, at which the held attitude goes back to the preferred one
-_TURN = 4.0  # 1/s, at which it turns to where a region has comfort
+_RETURN = 0.2  # 1/s, rate of return to the preferred attitude
+_TURN = 4.0  # 1/s, rate of turning to where a region has its comfort
 
 
 class Attitude(NamedTuple):
-    """What is kept of the attitude loop."""
+    """State of the attitude loop."""
 
-    preferred: Array  # (4,) attitude to be kept where no region asks for another, from body to world
-    desired: Array  # (4,) attitude that is held
+    preferred: Array  # (4,) attitude where no region asks for another, from body to world
+    desired: Array  # (4,) setpoint of the loop
     moments: Array  # (3,) phi_2..phi_4 [N m]
     last_omega: Array  # (3,) rad/s
-    carried: Array  # (3,) N m, Munk's moment, body axes
-    residual: Array  # (3,) N m, moment that the model missed in the last period, within the bound
-    known: Array  # (1,) 1 once last_omega is there
+    munk_moment: Array  # (3,) N m, Munk's moment, body axes
+    residual: Array  # (3,) N m, moment that the model lacked in the last period, within the bound
+    started: Array  # (1,) 1 once last_omega is there
 
 
-def attitude_of(preferred: Array) -> Attitude:
-    """Return the loop's memory before the first step, for an attitude to be kept, shape (4,)."""
+def empty_attitude(preferred: Array) -> Attitude:
+    """Return the state before the first step, for a preferred attitude, shape (4,)."""
     return Attitude(preferred.copy(), preferred.copy(), np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(1))
 
 
@@ -60,11 +59,11 @@ def adapt(
     gains: DeployableGains,
     period: float,
 ) -> None:
-    """Compare the rates with what the last forces should have made of them, and learn the restoring moments.
+    """Adapt the restoring moments to the difference between measured and predicted rates.
 
     `omega` is in [rad/s], body axes, and the period in [s].
     """
-    if attitude.known[0] > 0.0:
+    if attitude.started[0] > 0.0:
         wrench, k = zeros(6), zeros(3)
         product(thrusters.matrix, thrusters.forces, wrench)
         k[0], k[1], k[2] = down_parts(quaternion)
@@ -76,7 +75,7 @@ def adapt(
             change = 0.0
             for j in range(3):
                 change += mass[3 + i, 3 + j] * (omega[j] - last[j]) / period
-            missed = change - (wrench[3 + i] + attitude.carried[i] - damping - restoring)
+            missed = change - (wrench[3 + i] + attitude.munk_moment[i] - damping - restoring)
             attitude.residual[i] = min(max(missed, -gains.moment_bound), gains.moment_bound)
         for i in range(3):  # phi' = -rate S(k)^T residual
             a, b = (i + 1) % 3, (i + 2) % 3
@@ -84,34 +83,38 @@ def adapt(
             phi[i] += gains.adaptation * period * drive
             phi[i] = min(max(phi[i], -gains.moment_bound), gains.moment_bound)
     copy(omega, attitude.last_omega)
-    attitude.known[0] = 1.0
+    attitude.started[0] = 1.0
 
 
 @part
-def propagate(attitude: Attitude, dynamics: Dynamics, R: Array, velocity: Array, water: Array) -> None:
-    """Bring Munk's moment up to date with the velocities [m/s] of vehicle and water, shape (3,) each, NED."""
+def update_munk_moment(
+    attitude: Attitude, dynamics: Dynamics, R: Array, velocity: Array, water_velocity: Array
+) -> None:
+    """Update Munk's moment from the velocities [m/s] of vehicle and water, shape (3,) each, NED."""
     relative, momentum = zeros(3), zeros(3)
     for i in range(3):
         for axis in range(3):
-            relative[i] += R[axis, i] * (velocity[axis] - water[axis])
+            relative[i] += R[axis, i] * (velocity[axis] - water_velocity[axis])
     for i in range(3):
         for j in range(3):
             momentum[i] += dynamics.mass[i, j] * relative[j]
     for i in range(3):
         a, b = (i + 1) % 3, (i + 2) % 3
-        attitude.carried[i] = relative[b] * momentum[a] - relative[a] * momentum[b]  # -nu_r x (M nu_r)
+        attitude.munk_moment[i] = relative[b] * momentum[a] - relative[a] * momentum[b]  # -nu_r x (M nu_r)
 
 
 @part
-def aim(attitude: Attitude, regions: PackedRegions, position: Array, gains: DeployableGains, period: float) -> None:
-    """Turn the held attitude towards the preferred one, or to where regions of attitude have comfort.
+def update_desired(
+    attitude: Attitude, regions: PackedRegions, position: Array, gains: DeployableGains, period: float
+) -> None:
+    """Turn the desired attitude towards the preferred one, or to where regions of attitude have their comfort.
 
     Parameters
     ----------
     attitude : Attitude
         `desired` is updated.
     regions : PackedRegions
-        Those of attitude among them are heeded, hard or soft.
+        Those of attitude among them count, hard or soft.
     position : ndarray, shape (3,)
         Where the vehicle is [m, NED].
     gains : DeployableGains
@@ -119,53 +122,53 @@ def aim(attitude: Attitude, regions: PackedRegions, position: Array, gains: Depl
     period : float
         [s].
     """
-    back, omega, slope, k = zeros(4), zeros(3), zeros(3), zeros(3)
-    back[0], back[1], back[2], back[3] = error_parts(attitude.preferred, attitude.desired)
+    error, omega, gradient, k = zeros(4), zeros(3), zeros(3), zeros(3)
+    error[0], error[1], error[2], error[3] = error_parts(attitude.preferred, attitude.desired)
     for axis in range(3):  # desired = preferred * back
-        omega[axis] = -2.0 * _RETURN * back[1 + axis]
-    asked = False
+        omega[axis] = -2.0 * _RETURN * error[1 + axis]
+    limited = False
     for i in range(regions.kinds.size):
         if regions.kinds[i] < _ATTITUDE:
             continue
-        clearance = attitude_clearance(regions, i, position, attitude.desired, slope)
-        size = np.sqrt(slope[0] ** 2 + slope[1] ** 2 + slope[2] ** 2)
+        clearance = attitude_clearance(regions, i, position, attitude.desired, gradient)
+        size = np.sqrt(gradient[0] ** 2 + gradient[1] ** 2 + gradient[2] ** 2)
         if clearance < gains.comfort:
-            asked = True
+            limited = True
             if size > 0.0:
-                _add(_TURN * (gains.comfort - clearance) / size, slope, omega)
-            elif clearance < 0.0:  # half a turn away, where every way round is as long: about the vertical
+                _add_scaled(_TURN * (gains.comfort - clearance) / size, gradient, omega)
+            elif clearance < 0.0:  # half a turn away, where all axes are as short: about the vertical
                 k[0], k[1], k[2] = down_parts(attitude.desired)
-                _add(_TURN * (gains.comfort - clearance), k, omega)
-    if not asked and back[0] > 1.0 - 1e-15:
+                _add_scaled(_TURN * (gains.comfort - clearance), k, omega)
+    if not limited and error[0] > 1.0 - 1e-15:
         return
     size = np.sqrt(omega[0] ** 2 + omega[1] ** 2 + omega[2] ** 2)
     if size > gains.turning_rate:
         for axis in range(3):
             omega[axis] *= gains.turning_rate / size
-    turn(attitude.desired, omega, period, attitude.desired)
-    # no more tilted than allowed: what is left of the turn is that about the vertical
+    integrate_attitude(attitude.desired, omega, period, attitude.desired)
+    # within the allowed tilt: only the turn about the vertical remains
     upright = down_parts(attitude.desired)[2]
     if upright < np.cos(gains.tilt) and upright < down_parts(attitude.preferred)[2]:
         for axis in range(3):
             omega[axis] = -omega[axis]
-        turn(attitude.desired, omega, period, attitude.desired)
+        integrate_attitude(attitude.desired, omega, period, attitude.desired)
         k[0], k[1], k[2] = down_parts(attitude.desired)
         along = -(k[0] * omega[0] + k[1] * omega[1] + k[2] * omega[2])
         for axis in range(3):
             omega[axis] = along * k[axis]
-        turn(attitude.desired, omega, period, attitude.desired)
+        integrate_attitude(attitude.desired, omega, period, attitude.desired)
 
 
 @part
-def _add(scale: float, values: Array, out: Array) -> None:
+def _add_scaled(scale: float, values: Array, out: Array) -> None:
     """Add `scale` times the values, shape (3,), to `out`."""
     for axis in range(3):
         out[axis] += scale * values[axis]
 
 
 @compiled
-def turn(quaternion: Array, omega: Array, period: float, out: Array) -> None:
-    """Write the attitude to which a body rate [rad/s] leads in a period [s] into `out`, which may be the first."""
+def integrate_attitude(quaternion: Array, omega: Array, period: float, out: Array) -> None:
+    """Integrate a body rate [rad/s] over a period [s] into `out`, shape (4,), which may be `quaternion` itself."""
     rate = quaternion_rate(quaternion, omega)
     for i in range(4):
         out[i] = quaternion[i] + period * rate[i]
@@ -175,7 +178,9 @@ def turn(quaternion: Array, omega: Array, period: float, out: Array) -> None:
 
 
 @part
-def free_turning(attitude: Attitude, dynamics: Dynamics, quaternion: Array, omega: Array, out: Array) -> None:
+def free_angular_acceleration(
+    attitude: Attitude, dynamics: Dynamics, quaternion: Array, omega: Array, out: Array
+) -> None:
     """Write the angular acceleration without thrust, shape (3,) [rad/s2], body axes."""
     k, moments, momentum = zeros(3), zeros(3), zeros(3)
     k[0], k[1], k[2] = down_parts(quaternion)
@@ -186,7 +191,7 @@ def free_turning(attitude: Attitude, dynamics: Dynamics, quaternion: Array, omeg
         a, b = (i + 1) % 3, (i + 2) % 3
         damping = (dynamics.linear_damping[3 + i] + dynamics.quadratic_damping[3 + i] * abs(omega[i])) * omega[i]
         restoring = k[a] * attitude.moments[b] - k[b] * attitude.moments[a]
-        moments[i] = attitude.carried[i] - damping - restoring - (omega[a] * momentum[b] - omega[b] * momentum[a])
+        moments[i] = attitude.munk_moment[i] - damping - restoring - (omega[a] * momentum[b] - omega[b] * momentum[a])
     for i in range(3):
         out[i] = 0.0
         for j in range(3):
@@ -194,10 +199,10 @@ def free_turning(attitude: Attitude, dynamics: Dynamics, quaternion: Array, omeg
 
 
 @part
-def moment(
+def compute_moment(
     attitude: Attitude, dynamics: Dynamics, quaternion: Array, omega: Array, gains: DeployableGains, out: Array
 ) -> None:
-    """Write the wanted moment, shape (3,) [N m], body axes."""
+    """Write the desired moment, shape (3,) [N m], body axes."""
     e, k = zeros(4), zeros(3)
     e[0], e[1], e[2], e[3] = error_parts(attitude.desired, quaternion)
     k[0], k[1], k[2] = down_parts(quaternion)
@@ -206,4 +211,4 @@ def moment(
         a, b = (i + 1) % 3, (i + 2) % 3
         inertia = dynamics.mass[3 + i, 3 + i]
         restoring = k[a] * attitude.moments[b] - k[b] * attitude.moments[a]
-        out[i] = restoring - attitude.carried[i] - 2.0 * inertia * w * w * e[1 + i] - 2.0 * inertia * w * omega[i]
+        out[i] = restoring - attitude.munk_moment[i] - 2.0 * inertia * w * w * e[1 + i] - 2.0 * inertia * w * omega[i]

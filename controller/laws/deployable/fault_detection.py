@@ -1,18 +1,18 @@
-"""Which thruster has failed, from what the vehicle measures.
+"""Detection of a failed thruster from measured rates and velocity.
 
-Each thruster has a hypothesis: it gives nothing. If it holds, the moment that the model misses is -b_i f_i, less what
-the restoring moments have since been adapted to explain of it; and the velocity falls behind its prediction by what
--b_i f_i makes of it within the observer's loop. The log-likelihood ratio against "all is well" is summed, never below
-zero (Page's test; the hypothesis starts anew whenever it is at zero, which is the time at which the failure is supposed
-to have happened), and the thruster is given up when its sum passes the threshold, well ahead of every other.
+The hypothesis about each thruster is that it gives no force. Then the moment that the model lacks is -b_i f_i, less the
+part that the restoring moments have adapted to since; and the velocity lags its prediction by the effect of -b_i f_i
+within the observer's loop. The log-likelihood ratio against "all work" is summed, never below zero: Page's test, whose
+hypothesis starts anew whenever the sum is at zero, the supposed time of the failure. The thruster is isolated when its
+sum passes the threshold, well ahead of every other.
 
-A moment tells only where the thruster's part of it stands out from what the model may miss anyway: an angular
-acceleration, more of it in roll and pitch while the vehicle speeds up, for the height of its centre of gravity is not
-told, and a tenth of what each thruster is believed to give. So a thruster that fails while it pushes little is found
-when it is used.
+A moment counts only where the thruster's part of it exceeds the model's own uncertainty: an angular acceleration; more
+of it in roll and pitch while the vehicle accelerates, for the height of the centre of gravity is unknown; and a tenth
+of the force that each thruster is assumed to give. So a thruster that fails at low thrust is found when it is used.
 
-A single failure is the rule: a suspicion takes back the one before, never what was told. A thruster that was given up
-wrongly is only left idle; the one that has in truth failed goes on being missed, is found, and takes its place.
+A single failure is assumed: isolating a thruster restores the one that was isolated before, but never one that was
+reported as failed. A thruster that was isolated wrongly is only idle; the one that has failed is found afterwards, and
+takes its place.
 """
 
 from __future__ import annotations
@@ -31,32 +31,32 @@ from controller.laws.deployable.observer import Estimate
 
 Array = NDArray[np.float64]
 
-_UNMODELLED = 0.06  # rad/s2, standard deviation of the angular acceleration that the model misses
+_UNMODELLED = 0.06  # rad/s2, standard deviation of the angular acceleration that the model lacks
 _BELOW = 0.02  # m, standard deviation of how far the centre of gravity lies above or below the origin
-_EFFECTIVENESS = 0.1  # standard deviation of what a working thruster gives, as part of what it is believed to give
-_STANDS_OUT = 2.0  # standard deviations that a thruster's moment must have to tell anything
-_CORRELATED = 0.1  # s, for which what the model misses of a moment stays about the same
-_MOST_A_STEP = 3.0  # of the log-likelihood ratio of either kind, lest one odd measurement decided
-_LEAD = 8.0  # by which the likeliest must be ahead of the next
+_EFFECTIVENESS = 0.1  # standard deviation of a working thruster's force, as part of the assumed one
+_STANDS_OUT = 2.0  # standard deviations that a thruster's moment must exceed to count
+_CORRELATED = 0.1  # s, correlation time of the moment that the model lacks
+_MOST_A_STEP = 3.0  # of the log-likelihood ratio of either kind, so that no single outlier decides
+_LEAD = 8.0  # of the likeliest thruster before the next
 
 
 class FaultState(NamedTuple):
     """The hypotheses, one for each thruster."""
 
     ratio: Array  # (m,) summed log-likelihood ratio
-    lag: Array  # (m, 3) m/s, how far velocity falls behind its prediction, NED
-    adapted: Array  # (m, 3) N m, body axes: what the restoring moments explain of the failure by now
-    suspected: NDArray[np.int64]  # (1,) the thruster that is given up on suspicion, -1 for none
+    lag: Array  # (m, 3) m/s, lag of the velocity behind its prediction, NED
+    adapted: Array  # (m, 3) N m, body axes: part of the failure that the restoring moments have adapted to
+    isolated: NDArray[np.int64]  # (1,) the isolated thruster, -1 for none
 
 
-def suspicion_of(m: int) -> FaultState:
-    """Return the hypotheses about `m` thrusters, all at zero."""
+def empty_fault_state(m: int) -> FaultState:
+    """Return the state for `m` thrusters, all sums at zero."""
     return FaultState(np.zeros(m), np.zeros((m, 3)), np.zeros((m, 3)), np.full(1, -1))
 
 
 @part
 def detect_fault(
-    suspicion: FaultState,
+    fault_state: FaultState,
     estimate: Estimate,
     residual: Array,
     dynamics: Dynamics,
@@ -66,16 +66,16 @@ def detect_fault(
     period: float,
     measured: bool,
 ) -> int:
-    """Weigh the last period, and return the thruster that has failed, or -1.
+    """Test the last period, and return the thruster that has failed, or -1.
 
     Parameters
     ----------
-    suspicion : FaultState
+    fault_state : FaultState
         Updated in place.
     estimate : Estimate
         With the innovation of the last correction.
     residual : ndarray, shape (3,)
-        Moment that the model missed [N m].
+        Moment that the model lacked [N m].
     dynamics, thrusters : Dynamics, Thrusters
         Of the vehicle.
     R : ndarray, shape (3, 3)
@@ -85,7 +85,7 @@ def detect_fault(
     period : float
         [s].
     measured : bool
-        Whether there was a valid measurement; without, nothing is learnt.
+        Whether there was a valid measurement; without one, only the lags are propagated.
 
     Returns
     -------
@@ -107,28 +107,28 @@ def detect_fault(
     for i in range(m):
         if thrusters.health[i] == 0.0:
             continue
-        push, force = thrusters.whole[:, i], thrusters.forces[i]
+        effect, force = thrusters.nominal_matrix[:, i], thrusters.forces[i]
         step = _by_velocity(
-            suspicion.lag[i],
-            push,
+            fault_state.lag[i],
+            effect,
             force * period / mass,
             R,
             estimate.innovation,
-            estimate.spread,
+            estimate.innovation_deviation,
             estimate.gain,
             measured,
         )
         if measured:
             step += weight * _by_moment(
-                suspicion.adapted[i], push, force, residual, variance, R, gains.adaptation * period
+                fault_state.adapted[i], effect, force, residual, variance, R, gains.adaptation * period
             )
-        suspicion.ratio[i] += step
-        if not suspicion.ratio[i] > 0.0:
-            suspicion.ratio[i], suspicion.lag[i, :], suspicion.adapted[i, :] = 0.0, 0.0, 0.0
-        if suspicion.ratio[i] > best:
-            best, next_best, at = suspicion.ratio[i], best, i
-        elif suspicion.ratio[i] > next_best:
-            next_best = suspicion.ratio[i]
+        fault_state.ratio[i] += step
+        if not fault_state.ratio[i] > 0.0:
+            fault_state.ratio[i], fault_state.lag[i, :], fault_state.adapted[i, :] = 0.0, 0.0, 0.0
+        if fault_state.ratio[i] > best:
+            best, next_best, at = fault_state.ratio[i], best, i
+        elif fault_state.ratio[i] > next_best:
+            next_best = fault_state.ratio[i]
     if best > gains.failure_threshold and best > next_best + _LEAD:
         return at
     return -1
@@ -136,59 +136,66 @@ def detect_fault(
 
 @part
 def _by_velocity(
-    lag: Array, push: Array, impulse: float, R: Array, innovation: Array, spread: Array, gain: Array, measured: bool
+    lag: Array,
+    effect: Array,
+    impulse: float,
+    R: Array,
+    innovation: Array,
+    innovation_deviation: Array,
+    gain: Array,
+    measured: bool,
 ) -> float:
-    """Return the log-likelihood ratio of the last innovation, and carry a thruster's lag over the period.
+    """Return the log-likelihood ratio of the last innovation, and propagate a thruster's lag over the period.
 
-    Single arrays are passed: a call that passes named tuples costs more than the work.
+    Takes arrays, not named tuples, which would cost more to pass than the work itself.
     """
     step = 0.0
     for axis in range(3):
-        lag[axis] -= (R[axis, 0] * push[0] + R[axis, 1] * push[1] + R[axis, 2] * push[2]) * impulse
+        lag[axis] -= (R[axis, 0] * effect[0] + R[axis, 1] * effect[1] + R[axis, 2] * effect[2]) * impulse
         if measured:
-            step += lag[axis] * (2.0 * innovation[axis] - lag[axis]) / (2.0 * spread[axis] ** 2)
+            step += lag[axis] * (2.0 * innovation[axis] - lag[axis]) / (2.0 * innovation_deviation[axis] ** 2)
             lag[axis] *= 1.0 - gain[axis]
     return min(max(step, -_MOST_A_STEP), _MOST_A_STEP)
 
 
 @part
 def _by_moment(
-    adapted: Array, push: Array, force: float, residual: Array, variance: Array, R: Array, adaptation: float
+    adapted: Array, effect: Array, force: float, residual: Array, variance: Array, R: Array, adaptation: float
 ) -> float:
-    """Return the log-likelihood ratio of the last residual, and carry what is adapted over the period.
+    """Return the log-likelihood ratio of the last residual, and propagate the adapted part over the period.
 
-    The adaptation takes S(k) phi-hat after the residual at its rate, in all directions but k: S(k) S(k) = k k^T - I.
+    The adaptation moves S(k) phi_hat towards the residual at its rate, in all directions but k: S(k) S(k) = k k^T - I.
     """
     step, size, along = 0.0, 0.0, 0.0
     for j in range(3):
-        missing = adapted[j] - push[3 + j] * force
+        missing = adapted[j] - effect[3 + j] * force
         along += R[2, j] * missing  # k = R^T e3
         size += missing**2 / variance[j]
         step += missing * (2.0 * residual[j] - missing) / (2.0 * variance[j])
     for j in range(3):
-        adapted[j] -= adaptation * (adapted[j] - push[3 + j] * force - along * R[2, j])
+        adapted[j] -= adaptation * (adapted[j] - effect[3 + j] * force - along * R[2, j])
     if not size > _STANDS_OUT**2:
         return 0.0
     return min(max(step, -_MOST_A_STEP), _MOST_A_STEP)
 
 
 @part
-def give_up(suspicion: FaultState, thrusters: Thrusters, failed: int) -> None:
-    """Take a suspected thruster out of `health`, and take back the one that was suspected before it.
+def isolate_thruster(fault_state: FaultState, thrusters: Thrusters, failed: int) -> None:
+    """Mark a thruster as failed in `health`, and restore the one that was isolated before it.
 
     Parameters
     ----------
-    suspicion : FaultState
-        Starts anew.
+    fault_state : FaultState
+        Reset.
     thrusters : Thrusters
-        Whose `health` changes; `model.reallocate` is for the caller to do.
+        Whose `health` changes; the caller calls `model.reallocate`.
     failed : int
         From 0.
     """
-    if suspicion.suspected[0] >= 0:
-        thrusters.health[suspicion.suspected[0]] = 1.0
-    suspicion.suspected[0] = failed
+    if fault_state.isolated[0] >= 0:
+        thrusters.health[fault_state.isolated[0]] = 1.0
+    fault_state.isolated[0] = failed
     thrusters.health[failed] = 0.0
-    suspicion.ratio[:] = 0.0
-    suspicion.lag[:, :] = 0.0
-    suspicion.adapted[:, :] = 0.0
+    fault_state.ratio[:] = 0.0
+    fault_state.lag[:, :] = 0.0
+    fault_state.adapted[:, :] = 0.0

@@ -16,8 +16,8 @@ class DeployableGains(NamedTuple):
     acceleration: float = 0.35  # m/s2, with which the attraction speeds up and brakes
     velocity_bandwidth: float = 1.2  # rad/s, of the loop that follows the wanted velocity
     smoothing: float = 0.05  # s, over which the wanted acceleration is smoothed, to spare the thrusters noise
-    position_bandwidth: float = 0.8  # 1/s, of the approach to the end of the way
-    depth: float = 0.3  # m, how far inside the goal region the way ends, where the region is that deep
+    position_bandwidth: float = 0.8  # 1/s, of the approach to the end of the path
+    depth: float = 0.3  # m, depth in the goal region at which the path ends, where the region is that deep
     attitude_bandwidth: float = 2.0  # rad/s
     # attitude asked for by regions
     comfort: float = 0.15  # rad, clearance that a region of attitude has where the held attitude heeds it
@@ -29,8 +29,8 @@ class DeployableGains(NamedTuple):
     braking_share: float = 0.8  # of the deceleration that is left with any one thruster lost, relied on for stopping
     barrier_slope: float = 1.5  # 1/s, greatest rate at which a barrier may be approached per metre
     barrier_rate: float = 4.0  # 1/s, at which a barrier's speed limit is enforced
-    # way round
-    clearance: float = 0.25  # m, that the way keeps of hard regions where it can
+    # path planner
+    clearance: float = 0.25  # m, of the path from hard regions, where there is room
     # estimates
     position_noise: float = 0.02  # m, standard deviation of one measurement
     velocity_noise: float = 0.01  # m/s

@@ -1,6 +1,6 @@
-"""What the law believes of what it is given: measurements, weights, and which thrusters work.
+"""Validation of the law's inputs: measurements, weights, thruster health.
 
-Whatever comes in, what goes on from here is finite.
+All outputs are finite, whatever the inputs are.
 """
 
 from __future__ import annotations
@@ -20,93 +20,93 @@ from controller.quaternion import write_rotation
 
 Array = NDArray[np.float64]
 
-_FARTHEST = 1e6  # m, beyond which no position is one
+_FARTHEST = 1e6  # m, of a plausible position
 _FASTEST = 100.0  # m/s, rad/s
 
 
 @part
-def sanitize_weights(weights: Array, believed: Array) -> None:
-    """Write the arbiter's weights, each within [0, 1]; what is no number counts as 1, for it may matter."""
+def sanitize_weights(weights: Array, sanitized: Array) -> None:
+    """Write the arbiter's weights, each clipped to [0, 1]; NaN becomes 1, the cautious value."""
     for i in range(weights.size):
-        believed[i] = 1.0 if np.isnan(weights[i]) else min(max(weights[i], 0.0), 1.0)
+        sanitized[i] = 1.0 if np.isnan(weights[i]) else min(max(weights[i], 0.0), 1.0)
 
 
 @part
-def says_more(reported: Array, before: Array, health: Array) -> bool:
-    """Return whether what is told of the thrusters differs from what was, or from what is believed of a failed one.
+def reports_change(reported: Array, before: Array, health: Array) -> bool:
+    """Return whether the reported health differs from the last report, or from the assumed health of a failed thruster.
 
-    A thruster is told to have failed by a health of 0 or below; whatever else comes says that it works.
+    A health of 0 or below reports a failure; any other value, NaN too, a working thruster.
     """
-    more = False
+    changed = False
     for j in range(reported.size):
-        works = 0.0 if reported[j] <= 0.0 else 1.0
-        more = more or works != before[j] or (works == 0.0 and health[j] != 0.0)
-    return more
+        working = 0.0 if reported[j] <= 0.0 else 1.0
+        changed = changed or working != before[j] or (working == 0.0 and health[j] != 0.0)
+    return changed
 
 
 @part
-def take_in_thrusters(memory: DeployableMemory, reported: Array, failed: int) -> None:
-    """Take in which thrusters are told to have failed, or to work again, and one found to have failed, -1 for none."""
+def update_thrusters(memory: DeployableMemory, reported: Array, failed: int) -> None:
+    """Apply the reported health of the thrusters, and isolate a thruster that was detected as failed, -1 for none."""
     health = memory.thrusters.health
     if failed >= 0:
-        fault_detection.give_up(memory.suspicion, memory.thrusters, failed)
+        fault_detection.isolate_thruster(memory.fault_state, memory.thrusters, failed)
     for j in range(reported.size):
-        works = 0.0 if reported[j] <= 0.0 else 1.0
-        if works != memory.reported[j] or works == 0.0:
-            health[j] = memory.reported[j] = works
+        working = 0.0 if reported[j] <= 0.0 else 1.0
+        if working != memory.reported[j] or working == 0.0:
+            health[j] = memory.reported[j] = working
     model.reallocate(memory.thrusters)
 
 
 @part
-def take_in_measurement(memory: DeployableMemory, state: VehicleState, gains: DeployableGains) -> bool:
-    """Carry the estimate over the last period and take in the measurement; return whether it was believed."""
-    seen, period = memory.observed, memory.period[0]
-    good = _can_be_turned(state.quaternion, state.velocity_body)
-    if good:
+def process_measurement(memory: DeployableMemory, state: VehicleState, gains: DeployableGains) -> bool:
+    """Propagate the estimate over the last period and correct it; return whether the measurement was accepted."""
+    estimate, period = memory.state_estimate, memory.period[0]
+    valid = _is_plausible_attitude(state.quaternion, state.velocity_body)
+    if valid:
         e = state.quaternion
         length = np.sqrt(e[0] ** 2 + e[1] ** 2 + e[2] ** 2 + e[3] ** 2)
         for i in range(4):
             memory.quaternion[i] = e[i] / length
         copy(state.velocity_body[3:], memory.omega)
     else:
-        _carry_attitude(memory)
+        _propagate_attitude(memory)
     R, velocity, frozen = zeros(3, 3), zeros(3), True
     write_rotation(memory.quaternion, R)
     for i in range(3):
         for k in range(3):
             velocity[i] += R[i, k] * state.velocity_body[k]
-    good = good and _can_be(state.position, velocity)
+    valid = valid and _is_plausible_motion(state.position, velocity)
     for i in range(3):
-        frozen = frozen and state.position[i] == seen.last_measured[i]
-        frozen = frozen and state.velocity_body[i] == seen.last_measured[3 + i]
-        seen.last_measured[i], seen.last_measured[3 + i] = state.position[i], state.velocity_body[i]
+        frozen = frozen and state.position[i] == estimate.last_measured[i]
+        frozen = frozen and state.velocity_body[i] == estimate.last_measured[3 + i]
+        estimate.last_measured[i], estimate.last_measured[3 + i] = state.position[i], state.velocity_body[i]
 
-    begun = seen.silence[0] >= 0.0
-    if begun:
-        observer.predict(seen, memory.dynamics, memory.thrusters, R, memory.omega, gains, period)
-        if not _can_be(seen.position, seen.velocity):  # a false measurement led it away
-            _forget(memory)
-            begun = False
+    started = estimate.time_since_measurement[0] >= 0.0
+    if started:
+        observer.predict(estimate, memory.dynamics, memory.thrusters, R, memory.omega, gains, period)
+        if not _is_plausible_motion(estimate.position, estimate.velocity):  # diverged after a false measurement
+            _reset_estimate(memory)
+            started = False
     attitude_loop.adapt(
         memory.attitude, memory.dynamics, memory.thrusters, memory.quaternion, memory.omega, gains, period
     )
-    if not begun:
-        if good:
-            observer.begin(seen, state.position, velocity, gains)
-        return good
-    moving = abs(seen.velocity[0]) + abs(seen.velocity[1]) + abs(seen.velocity[2]) > 0.02
-    if not good or (frozen and moving):
+    if not started:
+        if valid:
+            observer.initialize(estimate, state.position, velocity, gains)
+        return valid
+    moving = abs(estimate.velocity[0]) + abs(estimate.velocity[1]) + abs(estimate.velocity[2]) > 0.02
+    if not valid or (frozen and moving):
         return False
-    if observer.correct(seen, state.position, velocity, gains):
+    if observer.correct(estimate, state.position, velocity, gains):
         return True
-    if seen.silence[0] > gains.coast:  # it has been saying so for long: believe it
-        observer.begin(seen, state.position, velocity, gains)
+    if estimate.time_since_measurement[0] > gains.coast:  # consistently elsewhere: start from there
+        observer.initialize(estimate, state.position, velocity, gains)
     return False
 
 
 @part
-def _can_be_turned(quaternion: Array, velocity_body: Array) -> bool:
-    """Return whether attitude and rates are such as a vehicle can have."""
+def _is_plausible_attitude(quaternion: Array, velocity_body: Array) -> bool:
+    """Return whether a quaternion has length 1 and the rates are plausible."""
     size, fastest = 0.0, 0.0
     for i in range(4):
         size += quaternion[i] ** 2
@@ -116,21 +116,21 @@ def _can_be_turned(quaternion: Array, velocity_body: Array) -> bool:
 
 
 @part
-def _carry_attitude(memory: DeployableMemory) -> None:
-    """Carry attitude and rates over the last period by the model."""
-    R, turning, pushed, period = zeros(3, 3), zeros(3), zeros(6), memory.period[0]
+def _propagate_attitude(memory: DeployableMemory) -> None:
+    """Propagate attitude and rates over the last period by the model."""
+    R, turning, thrust_acceleration, period = zeros(3, 3), zeros(3), zeros(6), memory.period[0]
     write_rotation(memory.quaternion, R)
-    attitude_loop.free_turning(memory.attitude, memory.dynamics, memory.quaternion, memory.omega, turning)
-    model.thrust_acceleration(memory.dynamics, memory.thrusters, R, memory.thrusters.forces, pushed)
+    attitude_loop.free_angular_acceleration(memory.attitude, memory.dynamics, memory.quaternion, memory.omega, turning)
+    model.thrust_acceleration(memory.dynamics, memory.thrusters, R, memory.thrusters.forces, thrust_acceleration)
     for i in range(3):
-        memory.omega[i] += period * (turning[i] + pushed[3 + i])
+        memory.omega[i] += period * (turning[i] + thrust_acceleration[3 + i])
         memory.omega[i] = min(max(memory.omega[i], -_FASTEST), _FASTEST)
-    attitude_loop.turn(memory.quaternion, memory.omega, period, memory.quaternion)
+    attitude_loop.integrate_attitude(memory.quaternion, memory.omega, period, memory.quaternion)
 
 
 @part
-def _can_be(position: Array, velocity: Array) -> bool:
-    """Return whether position [m] and velocity [m/s] are numbers that a vehicle can have."""
+def _is_plausible_motion(position: Array, velocity: Array) -> bool:
+    """Return whether position [m] and velocity [m/s] are finite and plausible."""
     can = True
     for i in range(3):
         can = can and abs(position[i]) < _FARTHEST and abs(velocity[i]) < _FASTEST
@@ -138,12 +138,12 @@ def _can_be(position: Array, velocity: Array) -> bool:
 
 
 @part
-def _forget(memory: DeployableMemory) -> None:
-    """Bring the estimate to where it was before the first measurement."""
-    seen = memory.observed
-    seen.position[:], seen.velocity[:], seen.water[:], seen.restoring[0] = 0.0, 0.0, 0.0, 0.0
-    seen.covariance[:, :, :] = 0.0
-    seen.innovation[:], seen.spread[:], seen.gain[:] = 0.0, 1.0, 0.0
-    seen.silence[0] = -1.0
-    memory.suspicion.ratio[:] = 0.0
-    memory.suspicion.lag[:, :] = 0.0
+def _reset_estimate(memory: DeployableMemory) -> None:
+    """Reset the estimate to its state before the first measurement."""
+    estimate = memory.state_estimate
+    estimate.position[:], estimate.velocity[:], estimate.water_velocity[:], estimate.net_weight[0] = 0.0, 0.0, 0.0, 0.0
+    estimate.covariance[:, :, :] = 0.0
+    estimate.innovation[:], estimate.innovation_deviation[:], estimate.gain[:] = 0.0, 1.0, 0.0
+    estimate.time_since_measurement[0] = -1.0
+    memory.fault_state.ratio[:] = 0.0
+    memory.fault_state.lag[:, :] = 0.0

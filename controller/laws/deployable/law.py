@@ -1,6 +1,6 @@
 """The deployable law: one step from measurement to thruster forces, in named stages.
 
-estimate -> failed thrusters -> way round -> bounded attraction -> barriers -> quadratic program.
+estimate -> fault detection -> path planner -> bounded attraction -> barriers -> quadratic program.
 """
 
 from __future__ import annotations
@@ -32,19 +32,19 @@ from controller.laws.deployable import (
     path_planner,
     quadratic_program,
 )
-from controller.laws.deployable.attitude import attitude_of
-from controller.laws.deployable.attraction import wanted_acceleration, wanted_velocity
-from controller.laws.deployable.barrier import Motion, Sight, look, sight_of, write_rows
+from controller.laws.deployable.attitude import empty_attitude
+from controller.laws.deployable.attraction import desired_acceleration, desired_velocity
+from controller.laws.deployable.barrier import Motion, RegionObservation, empty_observation, observe_regions, write_rows
 from controller.laws.deployable.braking import least_forces
 from controller.laws.deployable.faces import FACES
-from controller.laws.deployable.fault_detection import suspicion_of
+from controller.laws.deployable.fault_detection import empty_fault_state
 from controller.laws.deployable.gains import DeployableGains, check_gains
 from controller.laws.deployable.linear_algebra import copy
 from controller.laws.deployable.memory import DeployableMemory, Stages
-from controller.laws.deployable.model import Dynamics, Thrusters, dynamics_of, thrusters_of
-from controller.laws.deployable.observer import Estimate, estimate_of_nothing
-from controller.laws.deployable.path_planner import guide_of_nothing
-from controller.laws.deployable.quadratic_program import workspace
+from controller.laws.deployable.model import Dynamics, Thrusters, make_dynamics, make_thrusters
+from controller.laws.deployable.observer import Estimate, empty_estimate
+from controller.laws.deployable.path_planner import empty_plan
+from controller.laws.deployable.quadratic_program import empty_workspace
 from controller.quaternion import write_rotation
 from controller.regions import pack
 from controller.regions.kinds import FIRST_OF_ATTITUDE
@@ -64,14 +64,14 @@ DIAGNOSTICS = (
     Diagnostic("velocity.z", "m/s", "Estimated velocity over ground, down"),
     Diagnostic("current.x", "m/s", "Estimated current, north"),
     Diagnostic("current.y", "m/s", "Estimated current, east"),
-    Diagnostic("wanted_speed", "m/s", "Speed that the attraction wants"),
-    Diagnostic("way_cost", "m", "Length of the way into the goal region, and what it costs to pass close"),
-    Diagnostic("way_corners", "", "Corners of the way"),
-    Diagnostic("barriers", "", "Barriers that hold the thrusters back"),
-    Diagnostic("yielding", "m/s2", "By how much the barrier that yields most yields"),
-    Diagnostic("program_steps", "", "Steps of the quadratic program, negative if it was cut short"),
-    Diagnostic("failed_thruster", "", "Thruster that is given up, from 1; 0 for none"),
-    Diagnostic("silence", "s", "Time since the last measurement that was believed"),
+    Diagnostic("desired_speed", "m/s", "Speed that the attraction wants"),
+    Diagnostic("path_cost", "m", "Length of the path into the goal region, and what it costs to pass close"),
+    Diagnostic("path_corners", "", "Corners of the path"),
+    Diagnostic("barriers", "", "Active barriers"),
+    Diagnostic("constraint_slack", "m/s2", "Greatest slack of a barrier"),
+    Diagnostic("qp_steps", "", "Steps of the quadratic program, negative if it was cut short"),
+    Diagnostic("failed_thruster", "", "Isolated thruster, from 1; 0 for none"),
+    Diagnostic("time_since_measurement", "s", "Time since the last measurement that was accepted"),
 )
 
 
@@ -86,72 +86,88 @@ def step(
     forces: Array,
 ) -> None:
     """Do what `CompiledLaw.step` says, by the deployable law."""
-    seen, thrusters, dynamics, period = memory.observed, memory.thrusters, memory.dynamics, memory.period[0]
+    estimate, thrusters, dynamics, period = memory.state_estimate, memory.thrusters, memory.dynamics, memory.period[0]
     input_validation.sanitize_weights(weights, memory.weights)
-    R, wanted, acceleration = zeros(3, 3), zeros(3), zeros(3)
-    free, wrench, velocity = zeros(6), zeros(6), zeros(6)
+    R, desired, acceleration = zeros(3, 3), zeros(3), zeros(3)
+    free_acceleration, wrench, velocity = zeros(6), zeros(6), zeros(6)
 
     # estimate
-    measured = call(memory.stages.take_in, input_validation.take_in_measurement, (memory, state, gains))
+    measured = call(memory.stages.process_measurement, input_validation.process_measurement, (memory, state, gains))
     write_rotation(memory.quaternion, R)
-    if seen.silence[0] < 0.0 or seen.silence[0] > gains.coast:  # nothing is known any more: drift
+    if (
+        estimate.time_since_measurement[0] < 0.0 or estimate.time_since_measurement[0] > gains.coast
+    ):  # the estimate is too old: drift
         forces[:] = 0.0
         thrusters.forces[:] = 0.0
-        memory.report[15] = seen.silence[0]
+        memory.report[15] = estimate.time_since_measurement[0]
         return
 
-    # failed thrusters
+    # fault detection
     failed = call(
         memory.stages.detect_fault,
         fault_detection.detect_fault,
-        (memory.suspicion, seen, memory.attitude.residual, dynamics, thrusters, R, gains, period, measured),
+        (memory.fault_state, estimate, memory.attitude.residual, dynamics, thrusters, R, gains, period, measured),
     )
-    if failed >= 0 or input_validation.says_more(state.thruster_health, memory.reported, thrusters.health):
-        input_validation.take_in_thrusters(memory, state.thruster_health, failed)
-        observer.inflate_covariance(seen, 0.01)
+    if failed >= 0 or input_validation.reports_change(state.thruster_health, memory.reported, thrusters.health):
+        input_validation.update_thrusters(memory, state.thruster_health, failed)
+        observer.inflate_covariance(estimate, 0.01)
 
-    # way round, bounded attraction
-    call(memory.stages.improve, path_planner.improve, (memory.guide, seen.position, goal, regions, gains, period))
-    if seen.silence[0] <= _STALE:
-        wanted_velocity(memory.guide, seen.position, goal.velocities[0], gains, wanted)
-    wanted_acceleration(wanted, seen.velocity, gains, acceleration)
+    # path planner, bounded attraction
+    call(
+        memory.stages.improve_path,
+        path_planner.improve_path,
+        (memory.plan, estimate.position, goal, regions, gains, period),
+    )
+    if estimate.time_since_measurement[0] <= _STALE:
+        desired_velocity(memory.plan, estimate.position, goal.velocities[0], gains, desired)
+    desired_acceleration(desired, estimate.velocity, gains, acceleration)
 
-    # wanted wrench
-    model.free_acceleration(dynamics, R, seen.velocity, memory.omega, seen.water, seen.restoring[0], free)
-    attitude_loop.propagate(memory.attitude, dynamics, R, seen.velocity, seen.water)
-    attitude_loop.free_turning(memory.attitude, dynamics, memory.quaternion, memory.omega, free[3:])
-    copy(seen.velocity, velocity[:3])
+    # desired wrench
+    model.free_acceleration(
+        dynamics, R, estimate.velocity, memory.omega, estimate.water_velocity, estimate.net_weight[0], free_acceleration
+    )
+    attitude_loop.update_munk_moment(memory.attitude, dynamics, R, estimate.velocity, estimate.water_velocity)
+    attitude_loop.free_angular_acceleration(
+        memory.attitude, dynamics, memory.quaternion, memory.omega, free_acceleration[3:]
+    )
+    copy(estimate.velocity, velocity[:3])
     copy(memory.omega, velocity[3:])
-    look(memory.sight, regions, seen.position, memory.quaternion, velocity)
+    observe_regions(memory.observation, regions, estimate.position, memory.quaternion, velocity)
     share = period / (period + gains.smoothing)
     for axis in range(3):
-        memory.pushed[axis] += share * (acceleration[axis] - free[axis] - memory.pushed[axis])
-    _force_of(dynamics, R, memory.pushed, wrench)
-    _soft_forces(memory.sight, regions, memory.weights, R, dynamics, wrench)
-    call(memory.stages.aim, attitude_loop.aim, (memory.attitude, regions, seen.position, gains, period))
-    attitude_loop.moment(memory.attitude, dynamics, memory.quaternion, memory.omega, gains, wrench[3:])
+        memory.filtered_acceleration[axis] += share * (
+            acceleration[axis] - free_acceleration[axis] - memory.filtered_acceleration[axis]
+        )
+    _force_of(dynamics, R, memory.filtered_acceleration, wrench)
+    _soft_forces(memory.observation, regions, memory.weights, R, dynamics, wrench)
+    call(
+        memory.stages.update_desired,
+        attitude_loop.update_desired,
+        (memory.attitude, regions, estimate.position, gains, period),
+    )
+    attitude_loop.compute_moment(memory.attitude, dynamics, memory.quaternion, memory.omega, gains, wrench[3:])
     work = memory.program
     for j in range(forces.size):
-        work.wanted[j] = 0.0
+        work.nominal[j] = 0.0
         for k in range(6):
-            work.wanted[j] += thrusters.allocator[j, k] * wrench[k]
+            work.nominal[j] += thrusters.allocator[j, k] * wrench[k]
 
     # barriers
-    _write_push(dynamics, thrusters, R, memory.push)
+    _write_thruster_acceleration(dynamics, thrusters, R, memory.thruster_acceleration)
     motion = Motion(
-        seen.position,
+        estimate.position,
         velocity,
-        free,
-        memory.push,
+        free_acceleration,
+        memory.thruster_acceleration,
         dynamics.translational_mass[0],
         (dynamics.mass[3, 3] + dynamics.mass[4, 4] + dynamics.mass[5, 5]) / 3.0,
         gains.braking_share * _braking(dynamics, thrusters),
-        _SPREADS * observer.position_spread(seen) + 0.5 * gains.acceleration * period**2,
+        _SPREADS * observer.position_spread(estimate) + 0.5 * gains.acceleration * period**2,
     )
     rows = call(
         memory.stages.write_rows,
         write_rows,
-        (work, memory.sight, regions, memory.weights, motion, thrusters.lower, thrusters.upper, gains),
+        (work, memory.observation, regions, memory.weights, motion, thrusters.lower, thrusters.upper, gains),
     )
 
     # quadratic program
@@ -161,9 +177,9 @@ def step(
         (work, rows, thrusters.inverse, thrusters.lower, thrusters.upper, forces),
     )
     copy(forces, thrusters.forces)
-    memory.estimate[0] = seen.restoring[0]
+    memory.estimate[0] = estimate.net_weight[0]
     copy(memory.attitude.moments, memory.estimate[1:])
-    _report(memory.report, seen, memory.guide.cost[0], memory.guide.points[0], thrusters.health, wanted)
+    _report(memory.report, estimate, memory.plan.cost[0], memory.plan.counts[0], thrusters.health, desired)
     _report_program(memory.report, work.multipliers, work.price, rows, steps)
 
 
@@ -181,56 +197,60 @@ def _force_of(dynamics: Dynamics, R: Array, acceleration: Array, out: Array) -> 
 
 @part
 def _soft_forces(
-    sight: Sight, regions: PackedRegions, weights: Array, R: Array, dynamics: Dynamics, wrench: Array
+    observation: RegionObservation, regions: PackedRegions, weights: Array, R: Array, dynamics: Dynamics, wrench: Array
 ) -> None:
-    """Add the push of violated soft regions of place (22), -alpha_i g_i grad g_i / |grad g_i|.
+    """Add the repulsive force of violated soft regions of position (22), -alpha_i g_i grad g_i / |grad g_i|.
 
-    Each at most what the thrusters can always give.
+    Each is at most the force that the thrusters give in every direction.
     """
-    most = dynamics.translational_mass[0] * _least(dynamics.braking)
+    most = dynamics.translational_mass[0] * _smallest(dynamics.braking)
     for i in range(regions.kinds.size):
-        if regions.hard[i] or not sight.values[i] > 0.0 or regions.kinds[i] >= _ATTITUDE:
+        if regions.hard[i] or not observation.values[i] > 0.0 or regions.kinds[i] >= _ATTITUDE:
             continue
-        size = np.sqrt(sight.gradients[i, 0] ** 2 + sight.gradients[i, 1] ** 2 + sight.gradients[i, 2] ** 2)
+        size = np.sqrt(
+            observation.gradients[i, 0] ** 2 + observation.gradients[i, 1] ** 2 + observation.gradients[i, 2] ** 2
+        )
         if not size > 0.0:
             continue
-        push = min(regions.gains[i] * weights[i] * sight.values[i], most)
+        thruster_acceleration = min(regions.gains[i] * weights[i] * observation.values[i], most)
         for k in range(3):
             for axis in range(3):
-                wrench[k] -= push * R[axis, k] * sight.gradients[i, axis] / size
+                wrench[k] -= thruster_acceleration * R[axis, k] * observation.gradients[i, axis] / size
 
 
 @part
-def _write_push(dynamics: Dynamics, thrusters: Thrusters, R: Array, push: Array) -> None:
+def _write_thruster_acceleration(
+    dynamics: Dynamics, thrusters: Thrusters, R: Array, thruster_acceleration: Array
+) -> None:
     """Write the acceleration of one newton of each thruster, shape (6, m), as `barrier.Motion` has it."""
-    push[:, :] = 0.0
+    thruster_acceleration[:, :] = 0.0
     for j in range(thrusters.health.size):
         for i in range(6):
             body = 0.0
             for k in range(6):
                 body += dynamics.inverse_mass[i, k] * thrusters.matrix[k, j]
             if i >= 3:
-                push[i, j] = body
+                thruster_acceleration[i, j] = body
             else:
                 for axis in range(3):
-                    push[axis, j] += R[axis, i] * body
+                    thruster_acceleration[axis, j] += R[axis, i] * body
 
 
 @part
-def _least(values: Array) -> float:
-    least: float = values[0]
+def _smallest(values: Array) -> float:
+    smallest: float = values[0]
     for i in range(values.size):
-        least = min(least, values[i])
-    return least
+        smallest = min(smallest, values[i])
+    return smallest
 
 
 @part
 def _braking(dynamics: Dynamics, thrusters: Thrusters) -> float:
-    """Return the deceleration [m/s2] of the worst direction with one thruster lost: the one that is, or any.
+    """Return the deceleration [m/s2] in the worst direction with one thruster lost: the failed one, or any.
 
-    With more lost, half of that for each; a rule of thumb.
+    Each further failure halves it, which is a rule of thumb.
     """
-    worst, lost = _least(dynamics.braking), 0
+    worst, lost = _smallest(dynamics.braking), 0
     for j in range(thrusters.health.size):
         if thrusters.health[j] == 0.0:
             worst = dynamics.braking[j] if lost == 0 else 0.5 * min(worst, dynamics.braking[j])
@@ -239,24 +259,24 @@ def _braking(dynamics: Dynamics, thrusters: Thrusters) -> float:
 
 
 @part
-def _report(report: Array, seen: Estimate, cost: float, points: int, health: Array, wanted: Array) -> None:
-    """Write what `DIAGNOSTICS` says of estimate, way and thrusters."""
-    copy(seen.position, report[:3])
-    copy(seen.velocity, report[3:6])
-    copy(seen.water, report[6:8])
-    report[8] = np.sqrt(wanted[0] ** 2 + wanted[1] ** 2 + wanted[2] ** 2)
+def _report(report: Array, estimate: Estimate, cost: float, points: int, health: Array, desired: Array) -> None:
+    """Write the `DIAGNOSTICS` of estimate, path and thrusters."""
+    copy(estimate.position, report[:3])
+    copy(estimate.velocity, report[3:6])
+    copy(estimate.water_velocity, report[6:8])
+    report[8] = np.sqrt(desired[0] ** 2 + desired[1] ** 2 + desired[2] ** 2)
     report[9] = cost
     report[10] = points - 1
     report[14] = 0.0
     for j in range(health.size):
         if health[j] == 0.0:
             report[14] = j + 1
-    report[15] = seen.silence[0]
+    report[15] = estimate.time_since_measurement[0]
 
 
 @part
 def _report_program(report: Array, multipliers: Array, price: Array, rows: int, steps: int) -> None:
-    """Write what `DIAGNOSTICS` says of barriers and quadratic program."""
+    """Write the `DIAGNOSTICS` of barriers and quadratic program."""
     active, yielding = 0, 0.0
     for i in range(rows):
         if multipliers[i] > 0.0:
@@ -269,21 +289,30 @@ def _stages(memory: DeployableMemory, gains: DeployableGains) -> Stages:
     """Return the addresses of the stages, for arguments such as a step gives them."""
     m, n = memory.reported.size, memory.weights.size
     three, forces, R, regions = np.zeros(3), np.zeros(m), np.zeros((3, 3)), pack([])
-    state, thrusters, seen = VehicleState(three, np.zeros(4), np.zeros(6), forces), memory.thrusters, memory.observed
-    motion, bounds = Motion(three, np.zeros(6), np.zeros(6), memory.push, 0.0, 0.0, 0.0, 0.0), (forces, forces)
-    reason = (memory.suspicion, seen, three, memory.dynamics, thrusters, R, gains, 0.0, False)
+    state, thrusters, estimate = (
+        VehicleState(three, np.zeros(4), np.zeros(6), forces),
+        memory.thrusters,
+        memory.state_estimate,
+    )
+    motion, bounds = (
+        Motion(three, np.zeros(6), np.zeros(6), memory.thruster_acceleration, 0.0, 0.0, 0.0, 0.0),
+        (forces, forces),
+    )
+    reason = (memory.fault_state, estimate, three, memory.dynamics, thrusters, R, gains, 0.0, False)
     return Stages(
-        take_in=pointer_to(input_validation.take_in_measurement, (memory, state, gains)),
+        process_measurement=pointer_to(input_validation.process_measurement, (memory, state, gains)),
         detect_fault=pointer_to(fault_detection.detect_fault, reason),
-        improve=pointer_to(path_planner.improve, (memory.guide, three, regions, regions, gains, 0.0)),
-        aim=pointer_to(attitude_loop.aim, (memory.attitude, regions, three, gains, 0.0)),
-        write_rows=pointer_to(write_rows, (memory.program, memory.sight, regions, np.zeros(n), motion, *bounds, gains)),
+        improve_path=pointer_to(path_planner.improve_path, (memory.plan, three, regions, regions, gains, 0.0)),
+        update_desired=pointer_to(attitude_loop.update_desired, (memory.attitude, regions, three, gains, 0.0)),
+        write_rows=pointer_to(
+            write_rows, (memory.program, memory.observation, regions, np.zeros(n), motion, *bounds, gains)
+        ),
         solve=pointer_to(quadratic_program.solve, (memory.program, 0, R, *bounds, forces)),
     )
 
 
 class DeployableLaw(CompiledLaw):
-    """Regions kept, goal reached, within real thrusters.
+    """Reach the goal region and keep every hard region, within the limits of the thrusters.
 
     Parameters
     ----------
@@ -296,12 +325,12 @@ class DeployableLaw(CompiledLaw):
     period : float
         Control period [s].
     n_regions : int
-        How many secondary regions it will be given.
+        Number of secondary regions.
 
     Raises
     ------
     LawError
-        If gains, attitude or period cannot be.
+        If gains, attitude or period are invalid.
     """
 
     output: ClassVar[Output] = "thrusters"
@@ -324,30 +353,30 @@ class DeployableLaw(CompiledLaw):
             period=np.array([checked_period(period)]),
             estimate=np.zeros(4),
             report=np.zeros(len(DIAGNOSTICS)),
-            dynamics=dynamics_of(vehicle, least_forces(vehicle)),
-            thrusters=thrusters_of(vehicle),
-            observed=estimate_of_nothing(),
-            attitude=attitude_of(desired),
-            suspicion=suspicion_of(m),
-            guide=guide_of_nothing(n_regions, _SEED),
-            sight=sight_of(n_regions),
-            program=workspace((1 + FACES) * n_regions, m),
+            dynamics=make_dynamics(vehicle, least_forces(vehicle)),
+            thrusters=make_thrusters(vehicle),
+            state_estimate=empty_estimate(),
+            attitude=empty_attitude(desired),
+            fault_state=empty_fault_state(m),
+            plan=empty_plan(n_regions, _SEED),
+            observation=empty_observation(n_regions),
+            program=empty_workspace((1 + FACES) * n_regions, m),
             quaternion=desired.copy(),
             omega=np.zeros(3),
             weights=np.ones(n_regions),
             reported=np.ones(m),
-            pushed=np.zeros(3),
-            push=np.zeros((6, m)),
+            filtered_acceleration=np.zeros(3),
+            thruster_acceleration=np.zeros((6, m)),
             stages=Stages(),
         )
 
     @cached_property
     def memory(self) -> DeployableMemory:
-        """What it carries on, with the addresses of the stages: they are compiled when it is first asked for."""
+        """State between steps, with the addresses of the stages, which are compiled at the first access."""
         return self._memory._replace(stages=_stages(self._memory, self.gains))
 
     def __getstate__(self) -> dict[str, Any]:
-        """Return what is pickled: not the addresses, which are this process's."""
+        """Return the picklable state, without addresses, which hold in this process alone."""
         return {name: value for name, value in vars(self).items() if name != "memory"}
 
     @classmethod

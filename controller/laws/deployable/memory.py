@@ -1,4 +1,4 @@
-"""What the deployable law keeps between steps."""
+"""State of the deployable law between steps."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controller.laws.deployable.attitude import Attitude
-from controller.laws.deployable.barrier import Sight
+from controller.laws.deployable.barrier import RegionObservation
 from controller.laws.deployable.fault_detection import FaultState
 from controller.laws.deployable.model import Dynamics, Thrusters
 from controller.laws.deployable.observer import Estimate
-from controller.laws.deployable.path_planner import Guide
+from controller.laws.deployable.path_planner import PathPlan
 from controller.laws.deployable.quadratic_program import Workspace
 
 Array = NDArray[np.float64]
@@ -21,10 +21,10 @@ Array = NDArray[np.float64]
 class Stages(NamedTuple):
     """Addresses of the long stages of a step, each compiled on its own."""
 
-    take_in: int = 0
+    process_measurement: int = 0
     detect_fault: int = 0
-    improve: int = 0
-    aim: int = 0
+    improve_path: int = 0
+    update_desired: int = 0
     write_rows: int = 0
     solve: int = 0
 
@@ -33,20 +33,20 @@ class DeployableMemory(NamedTuple):
     """Arrays, and addresses that stay, so that compiled code can take it."""
 
     period: Array  # (1,) s
-    estimate: Array  # (4,) phi-hat [N, N m]
-    report: Array  # (r,) what the last step has to say
+    estimate: Array  # (4,) phi_hat [N, N m]
+    report: Array  # (r,) diagnostics of the last step
     dynamics: Dynamics
     thrusters: Thrusters
-    observed: Estimate
+    state_estimate: Estimate
     attitude: Attitude
-    suspicion: FaultState
-    guide: Guide
-    sight: Sight
+    fault_state: FaultState
+    plan: PathPlan
+    observation: RegionObservation
     program: Workspace
-    quaternion: Array  # (4,) from body to world, as measured or carried by the model
+    quaternion: Array  # (4,) from body to world, measured, or propagated by the model
     omega: Array  # (3,) rad/s, likewise
-    weights: Array  # (n,) of the arbiter, as believed
-    reported: Array  # (m,) health of the thrusters as last told
-    pushed: Array  # (3,) m/s2, NED, that the thrusters shall add, smoothed
-    push: Array  # (6, m) as `barrier.Motion` has it
+    weights: Array  # (n,) of the arbiter, sanitized
+    reported: Array  # (m,) health of the thrusters as last reported
+    filtered_acceleration: Array  # (3,) m/s2, NED, desired of the thrusters, low-pass filtered
+    thruster_acceleration: Array  # (6, m) as `barrier.Motion` has it
     stages: Stages

@@ -1,4 +1,4 @@
-"""The vehicle as the deployable law sees it: how it accelerates, and which thrusters still push."""
+"""The vehicle model of the deployable law: accelerations, and working thrusters."""
 
 from __future__ import annotations
 
@@ -29,23 +29,23 @@ class Dynamics(NamedTuple):
 
 
 class Thrusters(NamedTuple):
-    """What pushes now; a thruster that is given up has a column of zeros and limits of zero."""
+    """Thrusters and their allocation; a failed thruster has a column of zeros and limits of zero."""
 
-    whole: Array  # (6, m) the vehicle's matrix
-    matrix: Array  # (6, m) of those that work
+    nominal_matrix: Array  # (6, m) thruster matrix of the vehicle
+    matrix: Array  # (6, m) of the working thrusters
     lower: Array  # (m,) N
     upper: Array  # (m,) N
-    least: Array  # (m,) N, limits of the vehicle
-    greatest: Array  # (m,) N
+    nominal_lower: Array  # (m,) N, limits of the vehicle
+    nominal_upper: Array  # (m,) N
     inverse: Array  # (m, m) H^-1 with H = B^T Q B + regularisation
-    allocator: Array  # (m, 6) H^-1 B^T Q: wrench to the forces nearest to it
-    metric: Array  # (6,) Q: what an error of the wrench costs, 1/N2, 1/(N m)2
-    health: Array  # (m,) 1 works, 0 given up
+    allocator: Array  # (m, 6) H^-1 B^T Q: from wrench to nearest forces
+    metric: Array  # (6,) Q: cost of an error of the wrench, 1/N2, 1/(N m)2
+    health: Array  # (m,) 1 working, 0 failed
     forces: Array  # (m,) N, commanded in the last period
 
 
-def dynamics_of(vehicle: VehicleModel, braking: Array) -> Dynamics:
-    """Return the constant numbers.
+def make_dynamics(vehicle: VehicleModel, braking: Array) -> Dynamics:
+    """Return the constant numbers of a vehicle.
 
     Parameters
     ----------
@@ -71,7 +71,7 @@ def dynamics_of(vehicle: VehicleModel, braking: Array) -> Dynamics:
     )
 
 
-def thrusters_of(vehicle: VehicleModel) -> Thrusters:
+def make_thrusters(vehicle: VehicleModel) -> Thrusters:
     """Return the thrusters, all working.
 
     Parameters
@@ -88,12 +88,12 @@ def thrusters_of(vehicle: VehicleModel) -> Thrusters:
     m = B.shape[1]
     arm = np.sqrt(np.sum(B[3:] ** 2) / np.sum(B[:3] ** 2))  # m, typical
     thrusters = Thrusters(
-        whole=B.copy(),
+        nominal_matrix=B.copy(),
         matrix=B.copy(),
         lower=vehicle.thrust_min.copy(),
         upper=vehicle.thrust_max.copy(),
-        least=vehicle.thrust_min.copy(),
-        greatest=vehicle.thrust_max.copy(),
+        nominal_lower=vehicle.thrust_min.copy(),
+        nominal_upper=vehicle.thrust_max.copy(),
         inverse=np.zeros((m, m)),
         allocator=np.zeros((m, 6)),
         metric=np.array([1.0] * 3 + [4.0 / arm**2] * 3),
@@ -106,13 +106,13 @@ def thrusters_of(vehicle: VehicleModel) -> Thrusters:
 
 @compiled
 def reallocate(thrusters: Thrusters) -> None:
-    """Bring matrix, limits and inverses up to date with `health`."""
+    """Update matrix, limits and inverses to `health`."""
     m = thrusters.health.size
     for j in range(m):
         for k in range(6):
-            thrusters.matrix[k, j] = thrusters.whole[k, j] * thrusters.health[j]
-        thrusters.lower[j] = thrusters.least[j] * thrusters.health[j]
-        thrusters.upper[j] = thrusters.greatest[j] * thrusters.health[j]
+            thrusters.matrix[k, j] = thrusters.nominal_matrix[k, j] * thrusters.health[j]
+        thrusters.lower[j] = thrusters.nominal_lower[j] * thrusters.health[j]
+        thrusters.upper[j] = thrusters.nominal_upper[j] * thrusters.health[j]
     H = np.empty((m, m))
     for i in range(m):
         for j in range(m):
@@ -122,7 +122,7 @@ def reallocate(thrusters: Thrusters) -> None:
             H[i, j] = total
         own = 0.0
         for k in range(6):
-            own += thrusters.whole[k, i] * thrusters.metric[k] * thrusters.whole[k, i]
+            own += thrusters.nominal_matrix[k, i] * thrusters.metric[k] * thrusters.nominal_matrix[k, i]
         H[i, i] += _REGULARISATION * max(own, 1e-12)
     inverse = np.linalg.inv(H)
     for i in range(m):
@@ -137,13 +137,19 @@ def reallocate(thrusters: Thrusters) -> None:
 
 @part
 def free_acceleration(
-    dynamics: Dynamics, R: Array, velocity: Array, omega_body: Array, water: Array, restoring: float, out: Array
+    dynamics: Dynamics,
+    R: Array,
+    velocity: Array,
+    omega_body: Array,
+    water_velocity: Array,
+    net_weight: float,
+    out: Array,
 ) -> None:
-    """Write the acceleration over ground, world frame, shape (3,) [m/s2], that is there without thrust.
+    """Write the acceleration over ground without thrust, NED, shape (3,) [m/s2].
 
-    From drag against the water, W - B, and the turning of the body's axes, in which mass and drag are given: the
-    translational part of (11). Where added mass couples translation and rotation, what turns the vehicle moves it too;
-    that is left out, but for the thrusters' moments in `thrust_acceleration`.
+    The translational part of (11): drag against the water, W - B, and the rotation of the body axes, in which mass and
+    drag are given. The coupling of rotation into translation through added mass is neglected, except for the thrusters'
+    moments in `thrust_acceleration`.
 
     Parameters
     ----------
@@ -155,9 +161,9 @@ def free_acceleration(
         Over ground [m/s], world frame.
     omega_body : ndarray, shape (3,)
         [rad/s].
-    water : ndarray, shape (3,)
+    water_velocity : ndarray, shape (3,)
         Velocity of the water [m/s], world frame.
-    restoring : float
+    net_weight : float
         W - B [N].
     out : ndarray, shape (3,)
         Receives the acceleration.
@@ -165,7 +171,7 @@ def free_acceleration(
     force, relative, momentum = zeros(6), zeros(3), zeros(3)
     for i in range(3):
         for k in range(3):
-            relative[i] += R[k, i] * (velocity[k] - water[k])
+            relative[i] += R[k, i] * (velocity[k] - water_velocity[k])
     for i in range(3):
         for k in range(3):
             momentum[i] += dynamics.mass[i, k] * relative[k]
@@ -173,10 +179,10 @@ def free_acceleration(
         drag = (dynamics.linear_damping[i] + dynamics.quadratic_damping[i] * abs(relative[i])) * relative[i]
         j, k = (i + 1) % 3, (i + 2) % 3
         # d(M nu_r)/dt + omega x (M nu_r) = force
-        force[i] = restoring * R[2, i] - drag - (omega_body[j] * momentum[k] - omega_body[k] * momentum[j])
+        force[i] = net_weight * R[2, i] - drag - (omega_body[j] * momentum[k] - omega_body[k] * momentum[j])
     body = zeros(6)
     product(dynamics.inverse_mass, force, body)
-    for i in range(3):  # the body's axes turn: what the relative velocity gains is omega x nu_r
+    for i in range(3):  # the body axes rotate: omega x nu_r
         j, k = (i + 1) % 3, (i + 2) % 3
         relative_turning = omega_body[j] * relative[k] - omega_body[k] * relative[j]
         body[i] += relative_turning
@@ -188,7 +194,7 @@ def free_acceleration(
 
 @part
 def thrust_acceleration(dynamics: Dynamics, thrusters: Thrusters, R: Array, forces: Array, out: Array) -> None:
-    """Write the acceleration that thruster forces [N] give: linear in the world frame, angular in body axes, (6,)."""
+    """Write the acceleration by thruster forces [N], shape (6,): linear in NED, angular in body axes."""
     wrench, body = zeros(6), zeros(6)
     product(thrusters.matrix, forces, wrench)
     product(dynamics.inverse_mass, wrench, body)

@@ -1,10 +1,9 @@
-"""Where the vehicle is, how it moves, and what pushes it: a Kalman filter for each world axis.
+"""Observer of position, velocity, current and W - B: a Kalman filter for each world axis.
 
-Each has three states: position, velocity over ground, and what the law is not told of that axis: the current north and
-east, W - B downwards. They are coupled through the prediction, which uses the translational part of the model (11), see
-`model.free_acceleration`; the covariances are carried axis by axis. Projection keeps current and W - B within their
-bounds, and since the prediction uses the forces that were commanded within the limits, a saturated thruster winds
-nothing up.
+Each filter has three states: position, velocity over ground, and an unknown input: the current north and east, W - B
+downwards. The prediction couples them by the translational part of the model (11), see `model.free_acceleration`; the
+covariances are propagated axis by axis. Projection keeps current and W - B within their bounds. The prediction uses the
+commanded forces within their limits, so that a saturated thruster causes no wind-up.
 """
 
 from __future__ import annotations
@@ -22,9 +21,9 @@ from controller.laws.deployable.model import Dynamics, Thrusters, free_accelerat
 
 Array = NDArray[np.float64]
 
-_UNMODELLED = 0.03  # m/s2/sqrt(Hz), acceleration that the model does not know
-_SLOWEST = 0.15  # m/s against the water, at which the drag's slope is taken at least
-_GATE = 6.0  # standard deviations beyond which a measurement is not believed
+_UNMODELLED = 0.03  # m/s2/sqrt(Hz), acceleration noise of the model
+_SLOWEST = 0.15  # m/s against the water, least speed at which drag is linearized
+_GATE = 6.0  # standard deviations beyond which a measurement is rejected
 _FIRST_CURRENT, _FIRST_RESTORING = 0.3, 15.0  # m/s, N: standard deviations at the start
 
 
@@ -33,43 +32,43 @@ class Estimate(NamedTuple):
 
     position: Array  # (3,) m, NED
     velocity: Array  # (3,) m/s over ground, NED
-    water: Array  # (3,) m/s, velocity of the water, NED; down is taken to be 0
-    restoring: Array  # (1,) N, W - B
+    water_velocity: Array  # (3,) m/s, NED; its down component is 0
+    net_weight: Array  # (1,) N, W - B
     covariance: Array  # (3, 3, 3) of each axis: position, velocity, unknown
     acceleration: Array  # (3,) m/s2 over ground, NED, predicted for the last period
     innovation: Array  # (3,) m/s, measured less predicted velocity, NED
-    spread: Array  # (3,) m/s, standard deviation of the innovation
-    gain: Array  # (3,) how much of the innovation the velocity takes
-    silence: Array  # (1,) s since the last valid measurement; negative before the first
-    last_measured: Array  # (6,) position and velocity as last measured, bit for bit
+    innovation_deviation: Array  # (3,) m/s, standard deviation of the innovation
+    gain: Array  # (3,) Kalman gain of the velocity for its innovation
+    time_since_measurement: Array  # (1,) s since the last valid measurement; negative before the first
+    last_measured: Array  # (6,) position and velocity, as last measured
 
 
-def estimate_of_nothing() -> Estimate:
+def empty_estimate() -> Estimate:
     """Return the estimate before the first measurement."""
     return Estimate(
         position=np.zeros(3),
         velocity=np.zeros(3),
-        water=np.zeros(3),
-        restoring=np.zeros(1),
+        water_velocity=np.zeros(3),
+        net_weight=np.zeros(1),
         covariance=np.zeros((3, 3, 3)),
         acceleration=np.zeros(3),
         innovation=np.zeros(3),
-        spread=np.ones(3),
+        innovation_deviation=np.ones(3),
         gain=np.zeros(3),
-        silence=np.array([-1.0]),
+        time_since_measurement=np.array([-1.0]),
         last_measured=np.full(6, np.nan),
     )
 
 
 @part
-def begin(estimate: Estimate, position: Array, velocity: Array, gains: DeployableGains) -> None:
-    """Start from a first measurement [m, m/s, NED], or anew after losing the vehicle.
+def initialize(estimate: Estimate, position: Array, velocity: Array, gains: DeployableGains) -> None:
+    """Initialize from a measurement [m, m/s, NED]: the first one, or one after a loss.
 
-    What is known of water and weight stays.
+    Current and W - B keep their estimates.
     """
     copy(position, estimate.position)
     copy(velocity, estimate.velocity)
-    first = estimate.silence[0] < 0.0
+    first = estimate.time_since_measurement[0] < 0.0
     for axis in range(3):
         P = estimate.covariance[axis]
         unknown = P[2, 2]
@@ -78,7 +77,7 @@ def begin(estimate: Estimate, position: Array, velocity: Array, gains: Deployabl
         P[:, :] = 0.0
         P[0, 0], P[1, 1], P[2, 2] = gains.position_noise**2, gains.velocity_noise**2, unknown
     estimate.innovation[:] = 0.0
-    estimate.silence[0] = 0.0
+    estimate.time_since_measurement[0] = 0.0
 
 
 @part
@@ -91,15 +90,15 @@ def predict(
     gains: DeployableGains,
     period: float,
 ) -> None:
-    """Carry the estimate over a control period [s] in which the last commanded forces acted."""
-    free, pushed = zeros(3), zeros(6)
-    free_acceleration(dynamics, R, estimate.velocity, omega_body, estimate.water, estimate.restoring[0], free)
-    thrust_acceleration(dynamics, thrusters, R, thrusters.forces, pushed)
+    """Predict the estimate over a control period [s] under the last commanded forces."""
+    free, by_thrusters = zeros(3), zeros(6)
+    free_acceleration(dynamics, R, estimate.velocity, omega_body, estimate.water_velocity, estimate.net_weight[0], free)
+    thrust_acceleration(dynamics, thrusters, R, thrusters.forces, by_thrusters)
     mass = dynamics.translational_mass[0]
     linear = (dynamics.linear_damping[0] + dynamics.linear_damping[1] + dynamics.linear_damping[2]) / 3.0
     quadratic = (dynamics.quadratic_damping[0] + dynamics.quadratic_damping[1] + dynamics.quadratic_damping[2]) / 3.0
     for axis in range(3):
-        relative = abs(estimate.velocity[axis] - estimate.water[axis])
+        relative = abs(estimate.velocity[axis] - estimate.water_velocity[axis])
         slope = (linear + 2.0 * quadratic * max(relative, _SLOWEST)) / mass
         by_unknown = slope if axis < 2 else 1.0 / mass
         # F = [1 T 0; 0 1 - slope T, by_unknown T; 0 0 1]
@@ -114,16 +113,16 @@ def predict(
         P[0, 0], P[0, 1], P[0, 2] = p00, p01, p02
         P[1, 0], P[1, 1], P[1, 2] = p01, p11 + _UNMODELLED**2 * T, p12
         P[2, 0], P[2, 1], P[2, 2] = p02, p12, P[2, 2] + drift**2 * T
-        acceleration = free[axis] + pushed[axis]
+        acceleration = free[axis] + by_thrusters[axis]
         estimate.acceleration[axis] = acceleration
         estimate.position[axis] += T * (estimate.velocity[axis] + 0.5 * T * acceleration)
         estimate.velocity[axis] += T * acceleration
-    estimate.silence[0] += period
+    estimate.time_since_measurement[0] += period
 
 
 @part
 def correct(estimate: Estimate, position: Array, velocity: Array, gains: DeployableGains) -> bool:
-    """Take in a measurement of position [m] and velocity [m/s], shape (3,) each, NED; False if it is not believed."""
+    """Correct by a measurement of position [m] and velocity [m/s], shape (3,) each, NED; return False if rejected."""
     for axis in range(3):
         P = estimate.covariance[axis]
         off = abs(position[axis] - estimate.position[axis])
@@ -135,9 +134,9 @@ def correct(estimate: Estimate, position: Array, velocity: Array, gains: Deploya
     for axis in range(3):
         P = estimate.covariance[axis]
         estimate.innovation[axis] = velocity[axis] - estimate.velocity[axis]
-        estimate.spread[axis] = np.sqrt(P[1, 1] + gains.velocity_noise**2)
+        estimate.innovation_deviation[axis] = np.sqrt(P[1, 1] + gains.velocity_noise**2)
         estimate.gain[axis] = P[1, 1] / (P[1, 1] + gains.velocity_noise**2)
-        unknown = estimate.restoring[0] if axis == 2 else estimate.water[axis]
+        unknown = estimate.net_weight[0] if axis == 2 else estimate.water_velocity[axis]
         for row in range(2):  # first by the position, then by the velocity
             measured = (
                 position[axis] - estimate.position[axis] if row == 0 else velocity[axis] - estimate.velocity[axis]
@@ -154,16 +153,16 @@ def correct(estimate: Estimate, position: Array, velocity: Array, gains: Deploya
                 P[1, column] -= k1 * r
                 P[2, column] -= k2 * r
         if axis == 2:
-            estimate.restoring[0] = min(max(unknown, -gains.restoring_bound), gains.restoring_bound)
+            estimate.net_weight[0] = min(max(unknown, -gains.restoring_bound), gains.restoring_bound)
         else:
-            estimate.water[axis] = min(max(unknown, -gains.current_bound), gains.current_bound)
-    estimate.silence[0] = 0.0
+            estimate.water_velocity[axis] = min(max(unknown, -gains.current_bound), gains.current_bound)
+    estimate.time_since_measurement[0] = 0.0
     return True
 
 
 @part
 def inflate_covariance(estimate: Estimate, variance: float) -> None:
-    """Let velocity and unknowns be found anew: after the thrusters turned out to be other than believed."""
+    """Add variance to velocity [m2/s2] and unknowns, after the assumed health of a thruster has changed."""
     for axis in range(3):
         estimate.covariance[axis, 1, 1] += variance
         estimate.covariance[axis, 2, 2] += 25.0 if axis == 2 else 0.04
@@ -171,7 +170,7 @@ def inflate_covariance(estimate: Estimate, variance: float) -> None:
 
 @part
 def position_spread(estimate: Estimate) -> float:
-    """Return the standard deviation of the position [m] along the axis that is known worst."""
+    """Return the greatest standard deviation [m] of the position among the axes."""
     worst = 0.0
     for axis in range(3):
         worst = max(worst, estimate.covariance[axis, 0, 0])

@@ -1,22 +1,22 @@
-"""The quadratic program of the barriers: the thruster forces nearest to the wanted ones that keep every barrier.
+"""The quadratic program of the barriers: the thruster forces nearest to the nominal ones that keep every barrier.
 
     minimise    1/2 (u - u0)^T H (u - u0) + 1/2 sum rho_i s_i^2
     subject to  a_i^T u + s_i >= b_i,   lower <= u <= upper
 
-A barrier may give way by s_i at the price rho_i, so there is always a solution, and only one. Its dual has a multiplier
+Slack s_i of a barrier costs rho_i, so there is always exactly one solution. Its dual has a multiplier
 for each barrier and each limit and asks only that they be >= 0,
 
     minimise    1/2 y^T G y - d^T y,   y >= 0,   G = A H^-1 A^T + diag(1 / rho),   d = b - A u0,
 
 which the active-set method of Lawson and Hanson (Solving Least Squares Problems, 1974, ch. 23) solves. It adds the row
-that is violated most, in the measure sqrt(G_ii) of what its multiplier can do, and moves to the minimum over the rows
-it has, dropping those whose multiplier would turn negative on the way. Each such minimum is below the one before, so
-that no set of rows comes twice and the search ends. Rounding could still let it turn in circles: a row that cannot be
-added, since it depends on those that are there or its multiplier would not grow, is set aside until another one has
-moved the forces, and three steps a row end the search in any case.
+that is violated most, measured by sqrt(G_ii), and moves to the minimum over the passive rows, dropping those whose
+multiplier would turn negative. Each such minimum is below the one before, so that no set of rows occurs twice and the
+search ends. Rounding could still cause a cycle: a row that cannot be added, because it depends on the passive rows or
+its multiplier would not grow, is set aside until another one has moved the forces, and three steps a row end the search
+in any case.
 
-It is written here, and not taken from a library, because it must compile into the loop (a call of quadprog costs 7 us
-of which 1 us is work), allocate nothing and end after a stated number of steps.
+It is not taken from a library, because it must compile into the loop (a call of quadprog costs 7 us, of which 1 us is
+work), allocate nothing, and end after a known number of steps.
 """
 
 from __future__ import annotations
@@ -34,39 +34,39 @@ Array = NDArray[np.float64]
 _TOLERANCE = 1e-11  # of the greatest violation at the start, below which a row counts as kept
 _DEPENDENT = 1e-12  # of a row's own G_ii: where less is left of it beside the other rows, it depends on them
 _STEPS_A_ROW = 3
-_HALF = 2.0**27 + 1.0  # splits the 53 digits of a number in halves, each exact
-_FREE, _PASSIVE, _ASIDE, _NOTHING = 0, 1, 2, 3  # what a row is: may be added, is in, cannot be now, moves no force
+_HALF = 2.0**27 + 1.0  # splits the 53 bits of a number into two exact halves
+_FREE, _PASSIVE, _ASIDE, _NOTHING = 0, 1, 2, 3  # state of a row: may be added, is passive, is set aside, moves no force
 
 
 class Workspace(NamedTuple):
-    """Where a program of up to r barriers and m thrusters is worked out.
+    """Arrays for a program of up to r barriers and m thrusters.
 
-    Its rows are the barriers that count, then the lower limits, then the upper ones.
+    Its rows are the barriers in use, then the lower limits, then the upper ones.
     """
 
     rows: Array  # (r, m) a_i
     right: Array  # (r,) b_i
     price: Array  # (r,) 1 / rho_i
-    shaped: Array  # (r + 2 m, m) H^-1 a_i
+    mapped_rows: Array  # (r + 2 m, m) H^-1 a_i
     size: Array  # (r + 2 m,) sqrt(G_ii)
     residual: Array  # (r + 2 m,) d
     multipliers: Array  # (r + 2 m,) y
     trial: Array  # (r + 2 m,) multipliers that minimise over the passive rows, in their order
-    standing: NDArray[np.int64]  # (r + 2 m,) what each row is
-    passive: NDArray[np.int64]  # (r + 2 m,) rows whose multiplier is free, in order of coming
+    row_state: NDArray[np.int64]  # (r + 2 m,) state of each row
+    passive: NDArray[np.int64]  # (r + 2 m,) rows whose multiplier is free, in order of addition
     factor: Array  # (r + 2 m, r + 2 m) Cholesky factor of G over the passive rows
-    wanted: Array  # (m,) u0
-    pull: Array  # (m,) A^T y
-    better: Array  # (m,) u, as corrected
+    nominal: Array  # (m,) u0
+    dual_force: Array  # (m,) A^T y
+    refined: Array  # (m,) u after refinement
 
 
-def workspace(barriers: int, thrusters: int) -> Workspace:
-    """Return room for programs of a size.
+def empty_workspace(barriers: int, thrusters: int) -> Workspace:
+    """Return a workspace for programs of a size.
 
     Parameters
     ----------
     barriers, thrusters : int
-        How many at most.
+        Their greatest numbers.
 
     Returns
     -------
@@ -78,31 +78,31 @@ def workspace(barriers: int, thrusters: int) -> Workspace:
         rows=np.zeros((barriers, thrusters)),
         right=np.zeros(barriers),
         price=np.zeros(barriers),
-        shaped=np.zeros((n, thrusters)),
+        mapped_rows=np.zeros((n, thrusters)),
         size=np.zeros(n),
         residual=np.zeros(n),
         multipliers=np.zeros(n),
         trial=np.zeros(n),
-        standing=np.zeros(n, dtype=np.int64),
+        row_state=np.zeros(n, dtype=np.int64),
         passive=np.zeros(n, dtype=np.int64),
         factor=np.zeros((n, n)),
-        wanted=np.zeros(thrusters),
-        pull=np.zeros(thrusters),
-        better=np.zeros(thrusters),
+        nominal=np.zeros(thrusters),
+        dual_force=np.zeros(thrusters),
+        refined=np.zeros(thrusters),
     )
 
 
 @part
 def solve(work: Workspace, barriers: int, inverse: Array, lower: Array, upper: Array, forces: Array) -> int:
-    """Solve the program whose first `barriers` rows, right sides and prices stand in `work`, with u0 in `wanted`.
+    """Solve the program whose first `barriers` rows, right sides and prices stand in `work`, with u0 in `nominal`.
 
     Parameters
     ----------
     work : Workspace
-        Holds the program; its multipliers hold the solution's afterwards. A barrier with a number that is not finite
-        is left out, and a force that is not finite is not wanted: both become 0.
+        Holds the program, and afterwards the multipliers of the solution. A barrier with a number that is not finite is
+        left out; a nominal force that is not finite becomes 0.
     barriers : int
-        How many rows count.
+        Number of rows in use.
     inverse : ndarray, shape (m, m)
         H^-1, positive definite and symmetric to the last bit.
     lower, upper : ndarray, shape (m,)
@@ -113,26 +113,26 @@ def solve(work: Workspace, barriers: int, inverse: Array, lower: Array, upper: A
     Returns
     -------
     int
-        Steps taken, each a change of the rows that hold: at most 3 (barriers + 2 m). Negative if that ended the search,
-        or numbers beyond 1e150 did; the forces are then within the limits, but not the best.
+        Steps taken, each a change of the passive rows: at most 3 (barriers + 2 m). Negative if that bound, or numbers
+        beyond 1e150, ended the search; the forces are then within the limits, but not optimal.
     """
     n = barriers + 2 * forces.size
-    tolerance = _TOLERANCE * _begin(work, barriers, inverse, lower, upper)
-    copy(work.wanted, forces)
+    tolerance = _TOLERANCE * _prepare(work, barriers, inverse, lower, upper)
+    copy(work.nominal, forces)
     count, steps, most = 0, 0, _STEPS_A_ROW * n
-    at = _worst(work, barriers, lower, upper, forces, tolerance)
-    while at >= 0 and steps < most:
+    row = _most_violated(work, barriers, lower, upper, forces, tolerance)
+    while row >= 0 and steps < most:
         steps += 1
-        work.passive[count] = at
-        added = _append(work, barriers, count)
+        work.passive[count] = row
+        added = _append_factor_row(work, barriers, count)
         if added:
-            _minimum(work, count + 1)
+            _solve_passive(work, count + 1)
             added = work.trial[count] > 0.0
         if not added:
-            work.standing[at] = _ASIDE
-            at = _worst(work, barriers, lower, upper, forces, tolerance)
+            work.row_state[row] = _ASIDE
+            row = _most_violated(work, barriers, lower, upper, forces, tolerance)
             continue
-        work.standing[at] = _PASSIVE
+        work.row_state[row] = _PASSIVE
         count += 1
         drop = _advance(work, count)
         while drop >= 0 and steps < most:
@@ -141,87 +141,87 @@ def solve(work: Workspace, barriers: int, inverse: Array, lower: Array, upper: A
             for k in range(drop, count):
                 work.passive[k] = work.passive[k + 1]
             for k in range(drop, count):
-                _append(work, barriers, k)
-            _minimum(work, count)
+                _append_factor_row(work, barriers, k)
+            _solve_passive(work, count)
             drop = _advance(work, count)
         for j in range(forces.size):
-            total = work.wanted[j]
+            total = work.nominal[j]
             for k in range(count):
-                total += work.shaped[work.passive[k], j] * work.multipliers[work.passive[k]]
+                total += work.mapped_rows[work.passive[k], j] * work.multipliers[work.passive[k]]
             forces[j] = total
         for i in range(n):
-            if work.standing[i] == _ASIDE:
-                work.standing[i] = _FREE
-        at = _worst(work, barriers, lower, upper, forces, tolerance)
-    if at < 0 and count > 0:
+            if work.row_state[i] == _ASIDE:
+                work.row_state[i] = _FREE
+        row = _most_violated(work, barriers, lower, upper, forces, tolerance)
+    if row < 0 and count > 0:
         _refine(work, barriers, count, inverse, lower, upper, forces)
-    whole = _limit(work, lower, upper, forces)
-    return steps if at < 0 and whole else -steps
+    finite = _clip_to_limits(work, lower, upper, forces)
+    return steps if row < 0 and finite else -steps
 
 
 @part
-def _limit(work: Workspace, lower: Array, upper: Array, forces: Array) -> bool:
-    """Bring the forces into their limits; False if they were no numbers: those that are wanted take their places."""
-    whole = True
+def _clip_to_limits(work: Workspace, lower: Array, upper: Array, forces: Array) -> bool:
+    """Clip the forces to their limits; return False if any was not finite, which its nominal force then replaces."""
+    finite = True
     for j in range(forces.size):
         if not np.isfinite(forces[j]):
-            forces[j], whole = work.wanted[j], False
-        forces[j] = min(max(forces[j], lower[j]), upper[j])  # of the last bits; of more if the search was ended
-    if not whole:
+            forces[j], finite = work.nominal[j], False
+        forces[j] = min(max(forces[j], lower[j]), upper[j])  # rounding; more if the search was cut short
+    if not finite:
         for i in range(work.multipliers.size):
             if not np.isfinite(work.multipliers[i]):
                 work.multipliers[i] = 0.0
-    return whole
+    return finite
 
 
 @part
-def _begin(work: Workspace, barriers: int, inverse: Array, lower: Array, upper: Array) -> float:
+def _prepare(work: Workspace, barriers: int, inverse: Array, lower: Array, upper: Array) -> float:
     """Prepare all rows, none of them passive, and return the greatest |d_i| / sqrt(G_ii)."""
     m, scale = lower.size, 0.0
     for j in range(m):
-        if not np.isfinite(work.wanted[j]):
-            work.wanted[j] = 0.0
+        if not np.isfinite(work.nominal[j]):
+            work.nominal[j] = 0.0
     for i in range(barriers):
-        whole = work.right[i] + work.price[i]
+        finite = work.right[i] + work.price[i]
         for j in range(m):
-            whole += work.rows[i, j]
-        if not np.isfinite(whole):
+            finite += work.rows[i, j]
+        if not np.isfinite(finite):
             work.rows[i, :], work.right[i], work.price[i] = 0.0, 0.0, 1.0
         own, kept = 0.0, 0.0
         for j in range(m):
             total = 0.0
             for q in range(m):
                 total += inverse[j, q] * work.rows[i, q]
-            work.shaped[i, j] = total
+            work.mapped_rows[i, j] = total
             own += work.rows[i, j] * total
-            kept += work.rows[i, j] * work.wanted[j]
+            kept += work.rows[i, j] * work.nominal[j]
         work.residual[i] = work.right[i] - kept
         work.size[i] = np.sqrt(own + work.price[i])
-        work.multipliers[i], work.standing[i] = 0.0, _FREE
+        work.multipliers[i], work.row_state[i] = 0.0, _FREE
         if not own > 0.0:
             work.multipliers[i] = max(work.right[i], 0.0) / work.price[i] if work.price[i] > 0.0 else 0.0
-            work.standing[i] = _NOTHING
+            work.row_state[i] = _NOTHING
         else:
             scale = max(scale, abs(work.residual[i]) / work.size[i])
     for j in range(m):
         low, high = barriers + j, barriers + m + j
         for q in range(m):
-            work.shaped[low, q] = inverse[j, q]
-            work.shaped[high, q] = -inverse[j, q]
-        work.residual[low], work.residual[high] = lower[j] - work.wanted[j], work.wanted[j] - upper[j]
+            work.mapped_rows[low, q] = inverse[j, q]
+            work.mapped_rows[high, q] = -inverse[j, q]
+        work.residual[low], work.residual[high] = lower[j] - work.nominal[j], work.nominal[j] - upper[j]
         for i in (low, high):
             work.size[i] = np.sqrt(inverse[j, j])
-            work.multipliers[i], work.standing[i] = 0.0, _FREE
+            work.multipliers[i], work.row_state[i] = 0.0, _FREE
             scale = max(scale, abs(work.residual[i]) / work.size[i])
     return scale
 
 
 @part
-def _worst(work: Workspace, barriers: int, lower: Array, upper: Array, forces: Array, tolerance: float) -> int:
+def _most_violated(work: Workspace, barriers: int, lower: Array, upper: Array, forces: Array, tolerance: float) -> int:
     """Return the free row that is violated most, -1 if none is by more than the tolerance."""
-    m, worst, at = forces.size, tolerance, -1
+    m, worst, row = forces.size, tolerance, -1
     for i in range(barriers + 2 * m):
-        if work.standing[i] != _FREE:
+        if work.row_state[i] != _FREE:
             continue
         if i < barriers:
             lack = work.right[i]
@@ -232,39 +232,39 @@ def _worst(work: Workspace, barriers: int, lower: Array, upper: Array, forces: A
         else:
             lack = forces[i - barriers - m] - upper[i - barriers - m]
         if lack > worst * work.size[i]:
-            worst, at = lack / work.size[i], i
-    return at
+            worst, row = lack / work.size[i], i
+    return row
 
 
 @part
 def _refine(
     work: Workspace, barriers: int, count: int, inverse: Array, lower: Array, upper: Array, forces: Array
 ) -> None:
-    """Correct forces and multipliers of the passive rows by what they still lack of the two conditions: rounding.
+    """Correct forces and multipliers of the passive rows by their residuals: iterative refinement.
 
-    These are u = u0 + H^-1 A^T y and A u + y / rho = b. Where rows contradict each other, A^T y is a million times
-    less than its terms, and the forces would feel how those are rounded. So what is lacking is summed in twice the
-    precision; the correction itself is small, and needs none of that.
+    The conditions are u = u0 + H^-1 A^T y and A u + y / rho = b. Where rows contradict each other, A^T y is a million
+    times less than its terms, so that their rounding would show in the forces. The residuals are summed in twice the
+    precision; the correction itself is small, and does not need that.
     """
-    m, better, whole = forces.size, work.better, 0.0
-    _sum_pull(work, barriers, count)
+    m, refined, finite = forces.size, work.refined, 0.0
+    _sum_dual_force(work, barriers, count)
     for j in range(m):
-        better[j] = work.wanted[j]
+        refined[j] = work.nominal[j]
         for q in range(m):
-            better[j] += inverse[j, q] * work.pull[q]
+            refined[j] += inverse[j, q] * work.dual_force[q]
     for a in range(count):
         i = work.passive[a]
-        work.residual[i] = _lack(work, barriers, i, lower, upper, better)
-    _minimum(work, count)
+        work.residual[i] = _row_residual(work, barriers, i, lower, upper, refined)
+    _solve_passive(work, count)
     for a in range(count):
-        whole += work.trial[a]
+        finite += work.trial[a]
         for j in range(m):
-            better[j] += work.shaped[work.passive[a], j] * work.trial[a]
+            refined[j] += work.mapped_rows[work.passive[a], j] * work.trial[a]
     for j in range(m):
-        whole += better[j]
-    if not np.isfinite(whole):  # numbers too great for that
+        finite += refined[j]
+    if not np.isfinite(finite):  # numbers too great
         return
-    copy(better, forces)
+    copy(refined, forces)
     for a in range(count):
         i = work.passive[a]
         work.multipliers[i] = max(work.multipliers[i] + work.trial[a], 0.0)
@@ -275,41 +275,41 @@ def _refine(
 
 
 @part
-def _sum_pull(work: Workspace, barriers: int, count: int) -> None:
-    """Write A^T y into `pull`, summed over the passive rows in twice the precision."""
-    m, pull, rest = work.wanted.size, work.pull, work.better
+def _sum_dual_force(work: Workspace, barriers: int, count: int) -> None:
+    """Write A^T y into `dual_force`, summed over the passive rows in twice the precision."""
+    m, dual_force, rest = work.nominal.size, work.dual_force, work.refined
     for j in range(m):
-        pull[j], rest[j] = 0.0, 0.0
+        dual_force[j], rest[j] = 0.0, 0.0
     for a in range(count):
         i = work.passive[a]
         y = work.multipliers[i]
         if i < barriers:
             for j in range(m):
-                pull[j], rest[j] = _add(pull[j], rest[j], work.rows[i, j], y)
+                dual_force[j], rest[j] = _add_product(dual_force[j], rest[j], work.rows[i, j], y)
         else:
             j, sign = (i - barriers, 1.0) if i < barriers + m else (i - barriers - m, -1.0)
-            pull[j], rest[j] = _add(pull[j], rest[j], sign, y)
+            dual_force[j], rest[j] = _add_product(dual_force[j], rest[j], sign, y)
     for j in range(m):
-        pull[j] += rest[j]
+        dual_force[j] += rest[j]
 
 
 @part
-def _lack(work: Workspace, barriers: int, i: int, lower: Array, upper: Array, forces: Array) -> float:
-    """Return what row i lacks at these forces and its multiplier, summed in twice the precision."""
+def _row_residual(work: Workspace, barriers: int, i: int, lower: Array, upper: Array, forces: Array) -> float:
+    """Return the residual of row i at these forces and its multiplier, summed in twice the precision."""
     m = forces.size
     if i >= barriers + m:
         return float(forces[i - barriers - m] - upper[i - barriers - m])
     if i >= barriers:
         return float(lower[i - barriers] - forces[i - barriers])
-    total, rest = _add(work.right[i], 0.0, -work.price[i], work.multipliers[i])
+    total, rest = _add_product(work.right[i], 0.0, -work.price[i], work.multipliers[i])
     for j in range(m):
-        total, rest = _add(total, rest, -work.rows[i, j], forces[j])
+        total, rest = _add_product(total, rest, -work.rows[i, j], forces[j])
     return total + rest
 
 
 @part
-def _add(total: float, rest: float, a: float, b: float) -> tuple[float, float]:
-    """Return total + a b as rounded, and rest with what that rounding lost: of the product and of the sum.
+def _add_product(total: float, rest: float, a: float, b: float) -> tuple[float, float]:
+    """Return total + a b, rounded, and rest plus the rounding errors of product and sum.
 
     Both are exact, by Dekker, Veltkamp and Knuth: Ogita, Rump and Oishi, SIAM J. Sci. Comput. 26 (2005), 1955-1988.
     """
@@ -324,19 +324,19 @@ def _add(total: float, rest: float, a: float, b: float) -> tuple[float, float]:
 
 
 @part
-def _append(work: Workspace, barriers: int, a: int) -> bool:
-    """Write row `a` of the Cholesky factor, of the passive row in that place; False if it depends on those before."""
-    m, L, i = work.wanted.size, work.factor, work.passive[a]
+def _append_factor_row(work: Workspace, barriers: int, a: int) -> bool:
+    """Write row `a` of the Cholesky factor, of the passive row in that place; return False if it is dependent."""
+    m, L, i = work.nominal.size, work.factor, work.passive[a]
     for b in range(a + 1):
         k = work.passive[b]
         total = 0.0
         if i < barriers:
             for j in range(m):
-                total += work.rows[i, j] * work.shaped[k, j]
+                total += work.rows[i, j] * work.mapped_rows[k, j]
         elif i < barriers + m:
-            total = work.shaped[k, i - barriers]
+            total = work.mapped_rows[k, i - barriers]
         else:
-            total = -work.shaped[k, i - barriers - m]
+            total = -work.mapped_rows[k, i - barriers - m]
         if a == b and i < barriers:
             total += work.price[i]
         for q in range(b):
@@ -351,7 +351,7 @@ def _append(work: Workspace, barriers: int, a: int) -> bool:
 
 
 @part
-def _minimum(work: Workspace, count: int) -> None:
+def _solve_passive(work: Workspace, count: int) -> None:
     """Write the multipliers that minimise over the passive rows into `trial`."""
     L = work.factor
     for a in range(count):
@@ -381,5 +381,5 @@ def _advance(work: Workspace, count: int) -> int:
         work.multipliers[i] = max(work.multipliers[i] + reach * (work.trial[k] - work.multipliers[i]), 0.0)
     if drop >= 0:
         work.multipliers[work.passive[drop]] = 0.0
-        work.standing[work.passive[drop]] = _FREE
+        work.row_state[work.passive[drop]] = _FREE
     return drop

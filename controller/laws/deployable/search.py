@@ -1,9 +1,9 @@
-"""The way out of pockets: a tree of free straight lines that grows from the end of the way towards the vehicle.
+"""Tree search out of pockets: a tree of free straight lines that grows from the end of the path towards the vehicle.
 
-Changing one corner at a time finds no way that needs several at once. So while the way is blocked, a tree in the manner
-of LaValle's RRT (Planning Algorithms, 2006, ch. 5) grows by one node a period at most, from the goal outwards, so that
-it stays good while the vehicle moves. Each node holds on to the farthest of its ancestors that it sees, which saves
-corners. When the vehicle sees a new node, the chain of its ancestors is a way.
+Changing one corner at a time finds no path that needs several changes at once. So while the path is blocked, a tree
+(RRT: LaValle, Planning Algorithms, 2006, ch. 5) grows by at most one node a period. Its root is the goal, so that it
+stays valid while the vehicle moves. Each node connects to the farthest visible one of its ancestors, which saves
+corners. When the vehicle sees a new node, the chain of its ancestors is a path.
 """
 
 from __future__ import annotations
@@ -24,46 +24,46 @@ from controller.regions.region_set import PackedRegions, clearance_of_place, cle
 Array = NDArray[np.float64]
 
 _SPHERE = Sphere.kind
-_ATTITUDE = FIRST_OF_ATTITUDE  # shapes from it on close no place
-_NODES = 256  # after which the tree is grown anew
-_REACH = 1.5  # m, that a node is from the one it grows from at most
-_ROOM = 3.0  # m beyond start and end in which nodes are looked for
-_STRIDE = 0.05  # m, least distance between two looks along a line
-_LOOKS = 32  # along a line at most
-_ANCESTORS = 2  # that a new node looks at beyond its own
+_ATTITUDE = FIRST_OF_ATTITUDE  # shapes from it on do not depend on position alone
+_NODES = 256  # after which the tree starts anew
+_REACH = 1.5  # m, longest edge
+_ROOM = 3.0  # m beyond start and end, in which nodes are drawn
+_STRIDE = 0.05  # m, least distance between two evaluations along a line
+_LOOKS = 32  # evaluations along a line at most
+_ANCESTORS = 2  # tested beside its parent
 _SLACK = 0.005  # m
-_MOVED = 0.3  # m, that the end may move before the tree is grown anew
+_MOVED = 0.3  # m, by which the end may move before the tree starts anew
 
 
 class Tree(NamedTuple):
-    """Nodes, each with the one it leads to; the first is the end of the way."""
+    """Nodes, each with its parent; the root is the end of the path."""
 
     nodes: Array  # (_NODES, 3) m, NED
     parents: NDArray[np.int64]  # (_NODES,)
-    size: NDArray[np.int64]  # (1,) nodes that there are
+    size: NDArray[np.int64]  # (1,) number of nodes
 
 
-def tree_of_nothing() -> Tree:
-    """Return a tree that has not begun."""
+def empty_tree() -> Tree:
+    """Return a tree without nodes."""
     return Tree(np.zeros((_NODES, 3)), np.zeros(_NODES, dtype=np.int64), np.zeros(1, dtype=np.int64))
 
 
 @inlined
-def _room_at(point: Array, regions: PackedRegions, room: Array) -> float:
+def _clearance_at(point: Array, regions: PackedRegions, gradient: Array) -> float:
     least = np.inf
     for i in range(regions.kinds.size):
         if regions.hard[i] and regions.kinds[i] < _ATTITUDE:
             if regions.kinds[i] == _SPHERE:
                 clearance = clearance_of_sphere(regions, i, point)
             else:
-                clearance = clearance_of_place(regions, i, point, room)
+                clearance = clearance_of_place(regions, i, point, gradient)
             least = min(least, clearance)
     return least
 
 
 @part
-def is_free(begin: Array, end: Array, regions: PackedRegions, wanted: float) -> bool:
-    """Return whether a straight line keeps a clearance [m] of all hard regions, where they are now.
+def is_line_free(start: Array, end: Array, regions: PackedRegions, margin: float) -> bool:
+    """Return whether a straight line keeps a clearance [m] of all hard regions at their present places.
 
     Parameters
     ----------
@@ -71,54 +71,60 @@ def is_free(begin: Array, end: Array, regions: PackedRegions, wanted: float) -> 
         Ends of the line [m, NED].
     regions : PackedRegions
         The hard ones among them count.
-    wanted : float
+    margin : float
         Clearance [m].
 
     Returns
     -------
     bool
-        False too if the line is too long to be looked at.
+        Also False if the line needs more than `_LOOKS` evaluations.
     """
-    point, room = zeros(3), zeros(3)
-    length = np.sqrt((end[0] - begin[0]) ** 2 + (end[1] - begin[1]) ** 2 + (end[2] - begin[2]) ** 2)
+    point, gradient = zeros(3), zeros(3)
+    length = np.sqrt((end[0] - start[0]) ** 2 + (end[1] - start[1]) ** 2 + (end[2] - start[2]) ** 2)
     s = 0.0
     for _ in range(_LOOKS):
         for axis in range(3):
-            point[axis] = begin[axis] + (end[axis] - begin[axis]) * (s / length if length > 0.0 else 0.0)
-        least = _room_at(point, regions, room)
-        if not least >= wanted:
+            point[axis] = start[axis] + (end[axis] - start[axis]) * (s / length if length > 0.0 else 0.0)
+        least = _clearance_at(point, regions, gradient)
+        if not least >= margin:
             return False
         if s >= length:
             return True
-        s = min(length, s + max(least - wanted, _STRIDE))
+        s = min(length, s + max(least - margin, _STRIDE))
     return False
 
 
 @part
-def grow(
-    tree: Tree, start: Array, end: Array, draws: Array, regions: PackedRegions, gains: DeployableGains, way: Array
+def grow_tree(
+    tree: Tree,
+    start: Array,
+    end: Array,
+    random_numbers: Array,
+    regions: PackedRegions,
+    gains: DeployableGains,
+    path: Array,
 ) -> int:
-    """Grow the tree by one node at most, and return how many points a way has that it found, 0 for none.
+    """Grow the tree by at most one node, and return the number of points of a path that it found, 0 for none.
 
     Parameters
     ----------
     tree : Tree
         Grown in place.
     start, end : ndarray, shape (3,)
-        Where the vehicle is, and the end of the way [m, NED].
-    draws : ndarray, shape (4,)
+        Positions of the vehicle and of the end of the path [m, NED].
+    random_numbers : ndarray, shape (4,)
         Random numbers in [0, 1).
     regions : PackedRegions
-        The regions.
+        At their present places.
     gains : DeployableGains
         Clearance and margin.
-    way : ndarray, shape (k, 3)
-        Receives corners and end, if they are no more than k.
+    path : ndarray, shape (k, 3)
+        Receives corners and end, if there are at most k.
 
     Returns
     -------
     int
-        Points of the way.
+        Points of the path.
     """
     nodes, parents = tree.nodes, tree.parents
     moved = 0.0
@@ -128,13 +134,13 @@ def grow(
         copy(end, nodes[0])
         parents[0] = -1
         tree.size[0] = 1
-    wanted = gains.margin + 0.4 * gains.clearance
+    margin = gains.margin + 0.4 * gains.clearance
 
-    # towards a point anywhere about, or the vehicle; from the nearest node
+    # from the nearest node towards a random point, or the vehicle
     target, new = zeros(3), zeros(3)
     for axis in range(3):
         low, high = min(start[axis], end[axis]) - _ROOM, max(start[axis], end[axis]) + _ROOM
-        target[axis] = start[axis] if draws[3] < 0.2 else low + draws[axis] * (high - low)
+        target[axis] = start[axis] if random_numbers[3] < 0.2 else low + random_numbers[axis] * (high - low)
     nearest, least = 0, np.inf
     for i in range(tree.size[0]):
         square = 0.0
@@ -148,14 +154,14 @@ def grow(
     for axis in range(3):
         part = min(1.0, _REACH / distance)
         new[axis] = nodes[nearest, axis] + part * (target[axis] - nodes[nearest, axis])
-    if not is_free(new, nodes[nearest], regions, wanted):
+    if not is_line_free(new, nodes[nearest], regions, margin):
         return 0
 
-    # hold on to the farthest ancestor in sight
+    # connect to the farthest visible ancestor
     parent = nearest
     for _ in range(_ANCESTORS):
         before = parents[parent]
-        if before < 0 or not is_free(new, nodes[before], regions, wanted):
+        if before < 0 or not is_line_free(new, nodes[before], regions, margin):
             break
         parent = before
     at = tree.size[0]
@@ -163,14 +169,14 @@ def grow(
     parents[at] = parent
     tree.size[0] += 1
 
-    # the way, if the vehicle sees the node; it may be closer to a region itself, but no closer on the way
-    if not is_free(new, start, regions, min(0.5 * wanted, _room_at(start, regions, target) - _SLACK)):
+    # a path, if the vehicle sees the node; it may start closer to a region, but must not come closer
+    if not is_line_free(new, start, regions, min(0.5 * margin, _clearance_at(start, regions, target) - _SLACK)):
         return 0
     count, node = 0, at
     while node >= 0:
-        if count == way.shape[0]:
+        if count == path.shape[0]:
             return 0
-        copy(nodes[node], way[count])
+        copy(nodes[node], path[count])
         count += 1
         node = parents[node]
     return count

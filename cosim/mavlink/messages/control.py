@@ -17,10 +17,10 @@ _POSITION_AND_VELOCITY = 0b110111000000  # type_mask: all but these is ignored
 
 # what a law reports of itself that is worth watching, if it does
 _WATCHED = {
-    "law.yielding": "qp_slack",
+    "law.constraint_slack": "qp_slack",
     "law.barriers": "barriers",
-    "law.wanted_speed": "want_speed",
-    "law.silence": "silence",
+    "law.desired_speed": "des_speed",
+    "law.time_since_measurement": "meas_age",
     "law.failed_thruster": "failed_thr",
 }
 

@@ -3,7 +3,7 @@
 import numpy as np
 
 from controller import LAWS, VehicleState
-from controller.laws.deployable.model import dynamics_of, free_acceleration, thrust_acceleration, thrusters_of
+from controller.laws.deployable.model import free_acceleration, make_dynamics, make_thrusters, thrust_acceleration
 from controller.quaternion import rate, rotation_matrix
 from controller.regions import DepthBand, Region, Sphere, pack
 from cosim.scenario.vehicle_model import vehicle_model
@@ -25,8 +25,8 @@ class Sea:
     with it. The wrench of a failed thruster is missing."""
 
     def __init__(self, current=(0.1, -0.15, 0.0), restoring=-8.0, noise=(0.0, 0.0), failed=-1, seed=0):
-        self.dynamics, self.thrusters = dynamics_of(ODIN, np.ones(9)), thrusters_of(ODIN)
-        self.current, self.restoring, self.noise, self.failed = np.array(current), restoring, noise, failed
+        self.dynamics, self.thrusters = make_dynamics(ODIN, np.ones(9)), make_thrusters(ODIN)
+        self.current, self.net_weight, self.noise, self.failed = np.array(current), restoring, noise, failed
         self.position, self.quaternion = np.array([0.0, 0.0, 2.5]), LEVEL.copy()
         self.velocity, self.omega = np.zeros(3), np.zeros(3)
         self.rng = np.random.default_rng(seed)
@@ -44,7 +44,7 @@ class Sea:
         h = period / substeps
         for _ in range(substeps):
             R, free, pushed = rotation_matrix(self.quaternion), np.empty(3), np.empty(6)
-            free_acceleration(self.dynamics, R, self.velocity, self.omega, self.current, self.restoring, free)
+            free_acceleration(self.dynamics, R, self.velocity, self.omega, self.current, self.net_weight, free)
             thrust_acceleration(self.dynamics, self.thrusters, R, given, pushed)
             drag = (ODIN.linear_damping[3:] + ODIN.quadratic_damping[3:] * abs(self.omega)) * self.omega
             righting = 30.0 * np.cross(R[2], [0.0, 0.0, 1.0])  # N m, back to level

@@ -7,7 +7,7 @@ from scipy.spatial.transform import Rotation
 
 from controller.laws.deployable import attitude as loop
 from controller.laws.deployable.gains import DeployableGains
-from controller.laws.deployable.model import Dynamics, thrusters_of
+from controller.laws.deployable.model import Dynamics, make_thrusters
 from controller.regions import Orientation, Region, Sphere, Visibility, pack
 from tests.controller.deployable.scenery import ODIN
 
@@ -37,8 +37,8 @@ def askew(rng):
 
 
 def loop_of(rng):
-    attitude = loop.attitude_of(turned(rng))
-    for part in (attitude.moments, attitude.last_omega, attitude.carried):
+    attitude = loop.empty_attitude(turned(rng))
+    for part in (attitude.moments, attitude.last_omega, attitude.munk_moment):
         part[:] = rng.normal(size=3)
     return attitude
 
@@ -50,15 +50,15 @@ def drag(dynamics, omega):
 @pytest.mark.parametrize("bound", [1e9, 1.5])
 def test_what_the_model_misses_drives_the_moments(bound):
     rng, gains = np.random.default_rng(1), GAINS._replace(moment_bound=bound)
-    thrusters = thrusters_of(ODIN)
+    thrusters = make_thrusters(ODIN)
     for _ in range(30):
         attitude, dynamics, e, omega = loop_of(rng), askew(rng), turned(rng), rng.normal(size=3) * 0.5
         thrusters.forces[:] = rng.uniform(-20.0, 20.0, 8)
-        attitude.known[0] = 1.0
+        attitude.started[0] = 1.0
         phi, last, k = attitude.moments.copy(), attitude.last_omega.copy(), down(e)
         tau = ODIN.thruster_matrix[3:] @ thrusters.forces
         missed = dynamics.mass[3:, 3:] @ (omega - last) / PERIOD
-        missed -= tau + attitude.carried - drag(dynamics, last) - np.cross(k, phi)
+        missed -= tau + attitude.munk_moment - drag(dynamics, last) - np.cross(k, phi)
         missed = np.clip(missed, -bound, bound)
         phi = np.clip(phi + 0.5 * PERIOD * np.cross(k, missed), -bound, bound)
         loop.adapt(attitude, dynamics, thrusters, e, omega, gains, PERIOD)
@@ -72,16 +72,16 @@ def test_munks_moment_is_that_of_the_momentum():
     attitude, dynamics, e, velocity, water = loop_of(rng), askew(rng), turned(rng), *rng.normal(size=(2, 3))
     R = rotation(e).as_matrix()
     relative = R.T @ (velocity - water)
-    loop.propagate(attitude, dynamics, R, velocity, water)
-    assert attitude.carried == pytest.approx(-np.cross(relative, dynamics.mass[:3, :3] @ relative), rel=1e-12)
+    loop.update_munk_moment(attitude, dynamics, R, velocity, water)
+    assert attitude.munk_moment == pytest.approx(-np.cross(relative, dynamics.mass[:3, :3] @ relative), rel=1e-12)
 
 
 def test_turning_without_thrust_is_eulers_equation():
     rng, out = np.random.default_rng(3), np.empty(3)
     attitude, dynamics, e, omega = loop_of(rng), askew(rng), turned(rng), rng.normal(size=3)
-    moments = attitude.carried - drag(dynamics, omega) - np.cross(down(e), attitude.moments)
+    moments = attitude.munk_moment - drag(dynamics, omega) - np.cross(down(e), attitude.moments)
     moments -= np.cross(omega, dynamics.mass[3:, 3:] @ omega)
-    loop.free_turning(attitude, dynamics, e, omega, out)
+    loop.free_angular_acceleration(attitude, dynamics, e, omega, out)
     assert out == pytest.approx(dynamics.inverse_mass[3:, 3:] @ moments, rel=1e-10)
 
 
@@ -91,9 +91,9 @@ def test_the_wanted_moment_turns_the_short_way_and_carries_what_is_known():
         attitude, dynamics, e, omega = loop_of(rng), askew(rng), turned(rng), rng.normal(size=3)
         off = (rotation(attitude.desired).inv() * rotation(e)).as_rotvec()  # at most half a turn
         off *= np.sin(np.linalg.norm(off) / 2.0) / np.linalg.norm(off)
-        expected = np.cross(down(e), attitude.moments) - attitude.carried
+        expected = np.cross(down(e), attitude.moments) - attitude.munk_moment
         expected -= 2.0 * np.diag(dynamics.mass)[3:] * (w * w * off + w * omega)
-        loop.moment(attitude, dynamics, e, omega, GAINS, out)
+        loop.compute_moment(attitude, dynamics, e, omega, GAINS, out)
         assert out == pytest.approx(expected, rel=1e-9, abs=1e-9)
 
 
@@ -110,7 +110,7 @@ def test_a_turn_is_that_of_the_exponential():
     rng = np.random.default_rng(5)
     e, omega = turned(rng), rng.normal(size=3)
     before = rotation(e).as_matrix()
-    loop.turn(e, omega, 1e-3, e)
+    loop.integrate_attitude(e, omega, 1e-3, e)
     S = np.array([[0, -omega[2], omega[1]], [omega[2], 0, -omega[0]], [-omega[1], omega[0], 0]])
     assert rotation(e).as_matrix() == pytest.approx(before @ expm(1e-3 * S), abs=1e-8)
     assert np.linalg.norm(e) == pytest.approx(1.0, abs=1e-14)
@@ -123,7 +123,7 @@ def test_the_held_attitude_goes_back_at_a_fifth_of_the_way_a_second():
         back = Rotation.from_rotvec(rng.normal(size=3) * 0.02)
         x, y, z, w = (rotation(attitude.preferred) * back).as_quat()
         attitude.desired[:] = w, x, y, z
-        loop.aim(attitude, pack([]), NOWHERE, gains, PERIOD)
+        loop.update_desired(attitude, pack([]), NOWHERE, gains, PERIOD)
         expected = rotation(attitude.preferred) * Rotation.from_rotvec(back.as_rotvec() * (1.0 - 0.2 * PERIOD))
         assert apart(attitude.desired, expected) < 1e-6 * back.magnitude() + 1e-9
 
@@ -131,8 +131,8 @@ def test_the_held_attitude_goes_back_at_a_fifth_of_the_way_a_second():
 def test_an_attitude_that_is_kept_stays_to_the_last_bit():
     rng = np.random.default_rng(10)
     for _ in range(50):
-        attitude = loop.attitude_of(turned(rng))
-        loop.aim(attitude, pack([]), NOWHERE, GAINS, PERIOD)
+        attitude = loop.empty_attitude(turned(rng))
+        loop.update_desired(attitude, pack([]), NOWHERE, GAINS, PERIOD)
         assert np.array_equal(attitude.desired, attitude.preferred)
 
 
@@ -167,30 +167,32 @@ def test_it_turns_to_where_regions_of_attitude_have_comfort():
             Region("see", Visibility((2.0, 1.0, 0.5), (1.0, 0.2, -0.1), 0.4, (0.2, 0.1, 0.3)), "in"),
         ]
         expected = after(attitude.desired, asked_turn(attitude, regions, position), 1e-4)
-        loop.aim(attitude, pack([Region("ball", Sphere((1.0, 1.0, 1.0), 1.0), "out"), *regions]), position, gains, 1e-4)
+        loop.update_desired(
+            attitude, pack([Region("ball", Sphere((1.0, 1.0, 1.0), 1.0), "out"), *regions]), position, gains, 1e-4
+        )
         assert apart(attitude.desired, expected) < 1e-7
 
 
 def test_it_turns_no_faster_than_allowed():
-    attitude = loop.attitude_of(np.array([1.0, 0.0, 0.0, 0.0]))
+    attitude = loop.empty_attitude(np.array([1.0, 0.0, 0.0, 0.0]))
     before = attitude.desired.copy()
     aside = Region("aside", Orientation((np.cos(0.75), 0.0, 0.0, np.sin(0.75)), 0.1), "in")
-    loop.aim(attitude, pack([aside]), NOWHERE, GAINS, PERIOD)
+    loop.update_desired(attitude, pack([aside]), NOWHERE, GAINS, PERIOD)
     assert apart(attitude.desired, after(before, np.array([0.0, 0.0, GAINS.turning_rate]))) < 1e-6
 
 
 def test_half_a_turn_away_it_turns_about_the_vertical():
     for held, away in (((1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0)), ((0.96, 0.28, 0.0, 0.0), (0.0, 0.0, 0.8, -0.6))):
-        attitude, regions = loop.attitude_of(np.array(held)), pack([Region("back", Orientation(away, 0.1), "in")])
+        attitude, regions = loop.empty_attitude(np.array(held)), pack([Region("back", Orientation(away, 0.1), "in")])
         before = attitude.desired.copy()
-        loop.aim(attitude, regions, NOWHERE, GAINS, PERIOD)
+        loop.update_desired(attitude, regions, NOWHERE, GAINS, PERIOD)
         assert apart(attitude.desired, after(before, GAINS.turning_rate * down(before))) < 1e-6
 
 
 def test_tilted_as_far_as_allowed_it_turns_about_the_vertical_alone():
     rng, tried = np.random.default_rng(9), 0
     for _ in range(60):
-        attitude = loop.attitude_of(np.array([1.0, 0.0, 0.0, 0.0]))
+        attitude = loop.empty_attitude(np.array([1.0, 0.0, 0.0, 0.0]))
         axis = rng.normal(size=2)
         axis *= GAINS.tilt / np.linalg.norm(axis)
         x, y, z, w = (Rotation.from_rotvec([0, 0, rng.uniform(-2, 2)]) * Rotation.from_rotvec([*axis, 0.0])).as_quat()
@@ -200,7 +202,7 @@ def test_tilted_as_far_as_allowed_it_turns_about_the_vertical_alone():
         turn *= min(1.0, GAINS.turning_rate / np.linalg.norm(turn))
         free = after(attitude.desired, turn)
         before, k = attitude.desired.copy(), down(attitude.desired)
-        loop.aim(attitude, pack([region]), NOWHERE, GAINS, PERIOD)
+        loop.update_desired(attitude, pack([region]), NOWHERE, GAINS, PERIOD)
         if free.as_matrix()[2, 2] < np.cos(GAINS.tilt) - 1e-6:
             tried += 1
             assert apart(attitude.desired, after(before, (k @ turn) * k)) < 1e-4 * np.linalg.norm(turn) * PERIOD + 1e-5

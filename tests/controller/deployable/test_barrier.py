@@ -5,7 +5,7 @@ import pytest
 
 from controller.laws.deployable import barrier, faces
 from controller.laws.deployable.gains import DeployableGains
-from controller.laws.deployable.quadratic_program import workspace
+from controller.laws.deployable.quadratic_program import empty_workspace
 from controller.regions import Box, HalfSpace, Orientation, Region, Sphere, Visibility, pack
 
 GAINS = DeployableGains()
@@ -46,22 +46,22 @@ def allowed(h, a, slope):
 def expected_row(n, distance, margin, relative, turning, braking, motion):
     h, rate = distance - margin, n @ relative
     phi, slope = allowed(h, braking, GAINS.barrier_slope)
-    right = -GAINS.barrier_rate * (rate + phi) - slope * rate - n @ motion.free - turning
-    return n @ motion.push, right
+    right = -GAINS.barrier_rate * (rate + phi) - slope * rate - n @ motion.free_acceleration - turning
+    return n @ motion.thruster_acceleration, right
 
 
-def moving(rng, velocity, spread=0.1):
+def moving(rng, velocity, position_spread=0.1):
     return barrier.Motion(
         rng.normal(size=3), np.asarray(velocity), rng.normal(size=6) * 0.1, rng.normal(size=(6, 8)) * 0.01,
-        180.0, 9.0, 0.25, spread,
+        180.0, 9.0, 0.25, position_spread,
     )  # fmt: skip
 
 
 def written(regions, motion, quaternion, weights, limits=(-30.0, 25.0), time=1.5):
     packed, n = pack(regions), len(regions)
     packed.move_to(time)
-    sight, work = barrier.sight_of(n), workspace((1 + faces.FACES) * n, 8)
-    barrier.look(sight, packed, motion.position, quaternion, motion.velocity)
+    sight, work = barrier.empty_observation(n), empty_workspace((1 + faces.FACES) * n, 8)
+    barrier.observe_regions(sight, packed, motion.position, quaternion, motion.velocity)
     lower, upper = (np.full(8, limit) for limit in limits)
     count = barrier.write_rows(work, sight, packed, weights, motion, lower, upper, GAINS)
     return work.rows[:count].copy(), work.right[:count].copy(), work.price[:count].copy()
@@ -93,10 +93,10 @@ def test_rows_are_those_of_the_equations():
                 continue
             relative = motion.velocity - np.r_[region.velocity, np.zeros(3)]
             turning = (later[i] - n[i]) / AHEAD @ relative
-            braking, margin, scale = motion.braking, GAINS.margin + motion.spread, motion.mass**2
+            braking, margin, scale = motion.braking, GAINS.margin + motion.position_spread, motion.mass**2
             if region.shape.unit == "rad":
                 along = np.linalg.norm(n[i, :3])
-                braking, margin = GAINS.turning_deceleration, 0.02 + along * motion.spread
+                braking, margin = GAINS.turning_deceleration, 0.02 + along * motion.position_spread
                 scale = (motion.mass * along) ** 2 + (motion.inertia * np.linalg.norm(n[i, 3:])) ** 2
             elif turning < 0.0 and (isinstance(region.shape, HalfSpace) or later[i] @ n[i] < 0.5):
                 turning = 0.0
@@ -118,13 +118,13 @@ def test_rows_are_those_of_the_equations():
 def test_the_slope_of_a_flat_face_leaps_and_does_not_turn():
     n, later, v = np.eye(6)[0], np.eye(6)[1], np.array([1.0, 0.5, 0.0, 0.0, 0.0, 0.0])
     for kind in (Box.kind, Sphere.kind):
-        assert barrier.turning_of(kind, n, later, v) == 0.0  # towards: a leap
-        assert barrier.turning_of(kind, n, later, -v) == pytest.approx(0.5 / AHEAD)
+        assert barrier.gradient_rate(kind, n, later, v) == 0.0  # towards: a leap
+        assert barrier.gradient_rate(kind, n, later, -v) == pytest.approx(0.5 / AHEAD)
     near = unit(np.array([0.9, 0.3, 0.0, 0.0, 0.0, 0.0]))
     back = np.array([1.0, 0.0, 0.0, 0.0, 0.0, 0.0])
-    assert barrier.turning_of(Sphere.kind, n, near, back) == pytest.approx((near[0] - 1.0) / AHEAD)
-    assert barrier.turning_of(Box.kind, n, near, back) == 0.0
-    assert barrier.turning_of(Orientation.kind, n, later, v) == pytest.approx(-0.5 / AHEAD)
+    assert barrier.gradient_rate(Sphere.kind, n, near, back) == pytest.approx((near[0] - 1.0) / AHEAD)
+    assert barrier.gradient_rate(Box.kind, n, near, back) == 0.0
+    assert barrier.gradient_rate(Orientation.kind, n, later, v) == pytest.approx(-0.5 / AHEAD)
 
 
 def planes(box, position):
@@ -140,10 +140,10 @@ def test_faces_ahead_are_planes_of_the_box():
     region = Region("box", box, "in", (0.05, -0.02, 0.03))
     for _ in range(80):
         at = np.array(box.centre) + rng.uniform(-0.49, 0.49, 3) * np.array(box.size)
-        motion = moving(rng, np.r_[rng.normal(size=3) * 0.5, np.zeros(3)], spread=0.02)
-        motion = motion._replace(position=at + 1.5 * np.array(region.velocity), free=np.zeros(6))
+        motion = moving(rng, np.r_[rng.normal(size=3) * 0.5, np.zeros(3)], position_spread=0.02)
+        motion = motion._replace(position=at + 1.5 * np.array(region.velocity), free_acceleration=np.zeros(6))
         relative = motion.velocity - np.r_[region.velocity, np.zeros(3)]
-        margin, way = GAINS.margin + motion.spread, relative[:3].copy()
+        margin, way = GAINS.margin + motion.position_spread, relative[:3].copy()
         speed = np.linalg.norm(way)
         reach = margin + speed * (speed / (2 * motion.braking) + 1 / GAINS.barrier_slope + 1 / GAINS.barrier_rate)
         found = [min(planes(box, at), key=lambda plane: plane[0])]

@@ -57,16 +57,16 @@ def test_the_law_without_its_compiler_is_the_same_to_rounding():
 def test_it_reaches_the_goal_clear_of_the_regions_and_within_the_limits():
     law, sea, clear = law_for(REGIONS), Sea(noise=NOISE), []
 
-    def look(t):
+    def check(t):
         at = [np.add(r.shape.centre, np.multiply(r.velocity, t)) for r in REGIONS[:2]]
         clear.extend(np.linalg.norm(sea.position - c) - r.shape.radius for c, r in zip(at, REGIONS, strict=False))
 
-    forces = fly(law, sea, steps=1500, each=look)
+    forces = fly(law, sea, steps=1500, each=check)
     assert min(clear) > 0.0
     assert np.abs(forces).max() <= 27.0
     assert np.linalg.norm(sea.position - GOAL.shape.centre) < 0.5
     assert np.linalg.norm(sea.velocity) < 0.05
-    assert law.estimate[0] == pytest.approx(sea.restoring, abs=1.0)
+    assert law.estimate[0] == pytest.approx(sea.net_weight, abs=1.0)
 
 
 def dead(which):
@@ -100,11 +100,11 @@ def test_a_sensor_that_is_dead_for_a_second_is_borne(which):
     law, sea, clear = law_for(REGIONS), Sea(noise=NOISE), []
     ball = REGIONS[0].shape
 
-    def look(t):
+    def check(t):
         clear.append(np.linalg.norm(sea.position - ball.centre) - ball.radius)
         assert law.memory.thrusters.health.all(), t
 
-    forces = fly(law, sea, steps=1500, change=dead(which), each=look)
+    forces = fly(law, sea, steps=1500, change=dead(which), each=check)
     assert np.isfinite(forces).all() and np.abs(forces).max() <= 27.0
     assert min(clear) > 0.0
     assert np.linalg.norm(sea.position - GOAL.shape.centre) < 0.5

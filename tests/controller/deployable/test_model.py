@@ -7,11 +7,11 @@ from scipy.optimize import linprog, minimize
 from controller import LawError
 from controller.laws.deployable.braking import least_forces
 from controller.laws.deployable.model import (
-    dynamics_of,
     free_acceleration,
+    make_dynamics,
+    make_thrusters,
     reallocate,
     thrust_acceleration,
-    thrusters_of,
 )
 from controller.quaternion import rotation_matrix
 from cosim.scenario.vehicle_model import vehicle_model
@@ -29,7 +29,7 @@ def test_acceleration_is_that_of_the_plant(name):
     """One FMU step of 0.1 ms at random attitudes, rates and currents, with r_G at the origin as the law takes it."""
     rng, step = np.random.default_rng(3), 1e-4
     vehicle, model = load_vehicle(name), MODELS[name]
-    dynamics, thrusters = dynamics_of(model, np.ones(9)), thrusters_of(model)
+    dynamics, thrusters = make_dynamics(model, np.ones(9)), make_thrusters(model)
     with Plant(vehicle) as plant:
         for _ in range(8):
             e, nu = rng.normal(size=4), rng.normal(size=6) * [0.6, 0.6, 0.6, 0.3, 0.3, 0.3]
@@ -57,7 +57,7 @@ def test_acceleration_is_that_of_the_plant(name):
 
 def test_a_lost_thruster_gives_nothing_and_the_others_give_the_wrench():
     for model in MODELS.values():
-        thrusters = thrusters_of(model)
+        thrusters = make_thrusters(model)
         for lost in range(8):
             thrusters.health[:] = 1.0
             thrusters.health[lost] = 0.0

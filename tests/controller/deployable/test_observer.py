@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from controller.laws.deployable import observer
 from controller.laws.deployable.gains import DeployableGains
-from controller.laws.deployable.model import dynamics_of, free_acceleration, thrust_acceleration, thrusters_of
+from controller.laws.deployable.model import free_acceleration, make_dynamics, make_thrusters, thrust_acceleration
 from tests.controller.deployable.scenery import ODIN, Sea
 
 GAINS = DeployableGains()
@@ -16,9 +16,9 @@ PERIOD = 0.02
 
 
 def started(position=(0.0, 0.0, 2.0), velocity=(0.0, 0.0, 0.0), model=ODIN):
-    estimate = observer.estimate_of_nothing()
-    observer.begin(estimate, np.array(position), np.array(velocity), GAINS)
-    return estimate, dynamics_of(model, np.ones(9)), thrusters_of(model)
+    estimate = observer.empty_estimate()
+    observer.initialize(estimate, np.array(position), np.array(velocity), GAINS)
+    return estimate, make_dynamics(model, np.ones(9)), make_thrusters(model)
 
 
 def predict(estimate, dynamics, thrusters):
@@ -34,9 +34,13 @@ def test_covariance_and_gains_are_those_of_a_kalman_filter():
     linear, quadratic = model.linear_damping[:3].mean(), model.quadratic_damping[:3].mean()
     H, N = np.eye(3)[:2], np.diag([GAINS.position_noise**2, GAINS.velocity_noise**2])
     for _ in range(60):
-        P, speed = estimate.covariance.copy(), abs(estimate.velocity - estimate.water)
+        P, speed = estimate.covariance.copy(), abs(estimate.velocity - estimate.water_velocity)
         predict(estimate, dynamics, thrusters)
-        before = [estimate.position.copy(), estimate.velocity.copy(), np.r_[estimate.water[:2], estimate.restoring]]
+        before = [
+            estimate.position.copy(),
+            estimate.velocity.copy(),
+            np.r_[estimate.water_velocity[:2], estimate.net_weight],
+        ]
         expected = np.empty((3, 3, 3))
         for axis in range(3):
             slope = (linear + 2.0 * quadratic * max(speed[axis], 0.15)) / mass
@@ -48,7 +52,9 @@ def test_covariance_and_gains_are_those_of_a_kalman_filter():
         position = estimate.position + 0.02 * rng.normal(size=3)
         velocity = estimate.velocity + 0.01 * rng.normal(size=3)
         assert observer.correct(estimate, position, velocity, GAINS)
-        after = np.array([estimate.position, estimate.velocity, np.r_[estimate.water[:2], estimate.restoring]])
+        after = np.array(
+            [estimate.position, estimate.velocity, np.r_[estimate.water_velocity[:2], estimate.net_weight]]
+        )
         for axis in range(3):
             S = H @ expected[axis] @ H.T + N
             K = expected[axis] @ H.T @ np.linalg.inv(S)
@@ -74,8 +80,8 @@ def test_current_and_weight_are_found():
         assert observer.correct(estimate, *noisy(sea), GAINS)
     spread = np.sqrt(estimate.covariance[:, 2, 2])
     assert np.all(spread < [0.1, 0.1, 3.0])
-    assert np.all(abs(estimate.water[:2] - sea.current[:2]) < 4.0 * spread[:2])
-    assert abs(estimate.restoring[0] - 11.0) < 4.0 * spread[2]
+    assert np.all(abs(estimate.water_velocity[:2] - sea.current[:2]) < 4.0 * spread[:2])
+    assert abs(estimate.net_weight[0] - 11.0) < 4.0 * spread[2]
 
 
 def noisy(sea):
@@ -89,10 +95,10 @@ def test_unknowns_stay_within_their_bounds():
     for _ in range(2000):
         predict(estimate, dynamics, thrusters)
         observer.correct(estimate, np.array([0.0, 0.0, 2.0]), np.zeros(3), GAINS)
-        if estimate.silence[0] > GAINS.coast:
-            observer.begin(estimate, np.array([0.0, 0.0, 2.0]), np.zeros(3), GAINS)
-        assert np.all(abs(estimate.water) <= GAINS.current_bound)
-        assert abs(estimate.restoring[0]) <= GAINS.restoring_bound
+        if estimate.time_since_measurement[0] > GAINS.coast:
+            observer.initialize(estimate, np.array([0.0, 0.0, 2.0]), np.zeros(3), GAINS)
+        assert np.all(abs(estimate.water_velocity) <= GAINS.current_bound)
+        assert abs(estimate.net_weight[0]) <= GAINS.restoring_bound
 
 
 @pytest.mark.parametrize("which", [0, 1])
@@ -106,7 +112,7 @@ def test_a_measurement_that_cannot_be_is_not_believed_and_changes_nothing(which)
         assert not observer.correct(estimate, *measured, GAINS)
     for part, was in zip(estimate, before, strict=True):
         assert np.array_equal(part, was, equal_nan=True)
-    assert estimate.silence[0] == pytest.approx(PERIOD)
+    assert estimate.time_since_measurement[0] == pytest.approx(PERIOD)
 
 
 def test_the_prediction_follows_the_vehicles_model():
@@ -114,17 +120,17 @@ def test_the_prediction_follows_the_vehicles_model():
     rng, omega = np.random.default_rng(5), np.array([0.2, -0.3, 0.4])
     estimate, dynamics, thrusters = started(velocity=(0.6, -0.4, 0.1))
     R = Rotation.from_euler("zyx", [0.7, -0.3, 0.2]).as_matrix()
-    estimate.water[:2], estimate.restoring[0] = (0.2, -0.1), 7.0
+    estimate.water_velocity[:2], estimate.net_weight[0] = (0.2, -0.1), 7.0
     thrusters.forces[:] = rng.uniform(-20.0, 20.0, 8)
     free, pushed = np.empty(3), np.empty(6)
-    free_acceleration(dynamics, R, estimate.velocity, omega, estimate.water, 7.0, free)
+    free_acceleration(dynamics, R, estimate.velocity, omega, estimate.water_velocity, 7.0, free)
     thrust_acceleration(dynamics, thrusters, R, thrusters.forces, pushed)
     a, v, p = free + pushed[:3], estimate.velocity.copy(), estimate.position.copy()
     observer.predict(estimate, dynamics, thrusters, R, omega, GAINS, PERIOD)
     assert estimate.acceleration == pytest.approx(a, rel=1e-12)
     assert estimate.position == pytest.approx(p + PERIOD * v + 0.5 * PERIOD**2 * a, rel=1e-12)
     assert estimate.velocity == pytest.approx(v + PERIOD * a, rel=1e-12)
-    assert estimate.silence[0] == PERIOD
+    assert estimate.time_since_measurement[0] == PERIOD
 
 
 def test_innovation_spread_and_gain_are_those_of_the_velocity():
@@ -135,7 +141,7 @@ def test_innovation_spread_and_gain_are_those_of_the_velocity():
     assert observer.correct(estimate, estimate.position.copy(), before + off, GAINS)
     variance = P + GAINS.velocity_noise**2
     assert estimate.innovation == pytest.approx(off, abs=1e-12)
-    assert estimate.spread == pytest.approx(np.sqrt(variance), rel=1e-12)
+    assert estimate.innovation_deviation == pytest.approx(np.sqrt(variance), rel=1e-12)
     assert estimate.gain == pytest.approx(P / variance, rel=1e-12)
 
 
@@ -159,7 +165,7 @@ def test_bounds_hold_on_either_side():
         estimate.covariance[:, 1, 2] = estimate.covariance[:, 2, 1] = 1e3
         assert observer.correct(estimate, estimate.position.copy(), np.full(3, 0.04 * sign), GAINS)
         bound = [GAINS.current_bound, GAINS.current_bound, GAINS.restoring_bound]
-        assert [*estimate.water[:2], estimate.restoring[0]] == (sign * np.array(bound)).tolist()
+        assert [*estimate.water_velocity[:2], estimate.net_weight[0]] == (sign * np.array(bound)).tolist()
 
 
 def test_doubt_widens_what_is_to_be_found_anew():

@@ -6,9 +6,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from controller.laws.deployable import path_planner as way_round
-from controller.laws.deployable.attraction import approach_speed, wanted_acceleration, wanted_velocity
+from controller.laws.deployable.attraction import approach_speed, desired_acceleration, desired_velocity
 from controller.laws.deployable.gains import DeployableGains
-from controller.laws.deployable.path_planner import CORNERS, cost_of, guide_of_nothing, improve, nearest_end, uniform
+from controller.laws.deployable.path_planner import (
+    CORNERS,
+    empty_plan,
+    improve_path,
+    nearest_goal_point,
+    path_cost,
+    uniform,
+)
 from controller.regions import Box, DepthBand, HalfSpace, Region, Sphere, pack
 from controller.regions.region_set import clearance_at
 
@@ -66,7 +73,7 @@ def test_a_way_that_costs_no_more_than_its_length_is_clear(moving):
     for seed in range(60):
         regions = scene(seed, moving)
         way, count = random_way(rng)
-        extra = cost_of(way, count, START, regions, far, GAINS) - length_of(way, count)
+        extra = path_cost(way, count, START, regions, far, GAINS) - length_of(way, count)
         least = least_clearance(way, count, regions)
         assert extra >= -1e-9
         if extra < 1e-9:  # it may come closer than wanted between two looks, but by less than half of the least stride
@@ -83,9 +90,9 @@ def test_what_lies_beyond_the_last_look_is_not_free():
     wall = pack([Region("floor", HalfSpace((0.0, 0.0, -1.0), (0.0, 0.0, 2.7)), "in")])
     way, far = np.zeros((CORNERS + 1, 3)), np.zeros(1)
     way[0], way[1], way[2] = (20.0, 0.0, 2.5), (20.0, 10.0, 2.5), (0.0, 10.0, 2.5)
-    whole = cost_of(way, 3, START, wall, far, GAINS)
+    whole = path_cost(way, 3, START, wall, far, GAINS)
     assert whole > length_of(way, 3) + 10.0 * 40.0
-    assert whole > cost_of(way, 2, START, wall, far, GAINS) + 20.0
+    assert whole > path_cost(way, 2, START, wall, far, GAINS) + 20.0
 
 
 @pytest.mark.parametrize(
@@ -104,23 +111,23 @@ def test_what_lies_beyond_the_last_look_is_not_free():
 def test_the_end_lies_within_goals_of_any_shape_and_depth(goal, depth):
     rng, packed, end = np.random.default_rng(6), pack([Region("goal", goal, "in")]), np.empty(3)
     for _ in range(50):
-        nearest_end(packed, rng.normal([4.0, 0.0, 2.5], [5.0, 3.0, 2.0]), GAINS.depth, end)
+        nearest_goal_point(packed, rng.normal([4.0, 0.0, 2.5], [5.0, 3.0, 2.0]), GAINS.depth, end)
         assert clearance_at(packed, 0, end) > 0.5 * depth
 
 
 def test_the_end_of_a_ball_is_the_nearest_point():
     end = np.empty(3)
-    nearest_end(pack([GOAL]), START, 0.3, end)
+    nearest_goal_point(pack([GOAL]), START, 0.3, end)
     assert end == pytest.approx([9.0 - 0.2, 0.0, 2.5], abs=1e-9)
 
 
-def run(regions, steps=400, goal=GOAL, start=START, guide=None, moved=None):
-    guide, packed = guide or guide_of_nothing(regions.kinds.size, 1), pack([goal])
+def run(regions, steps=400, goal=GOAL, start=START, plan=None, moved=None):
+    plan, packed = plan or empty_plan(regions.kinds.size, 1), pack([goal])
     for k in range(steps):
         if moved:
             moved(k, packed)
-        improve(guide, start, packed, regions, GAINS, 0.02)
-    return guide, packed
+        improve_path(plan, start, packed, regions, GAINS, 0.02)
+    return plan, packed
 
 
 def test_it_finds_a_way_round_what_lies_across():
@@ -136,20 +143,20 @@ def test_it_finds_a_way_round_what_lies_across():
         ):
             continue
         blocked += 1
-        guide, goal = run(regions)
-        found += least_clearance(guide.way, guide.points[0], regions) > 0.1
-        assert clearance_at(goal, 0, guide.way[guide.points[0] - 1]) > 0.0
+        plan, goal = run(regions)
+        found += least_clearance(plan.path, plan.counts[0], regions) > 0.1
+        assert clearance_at(goal, 0, plan.path[plan.counts[0] - 1]) > 0.0
     assert blocked > 8
     assert found == blocked
 
 
 def test_a_goal_that_is_partly_covered_is_entered_where_it_is_not():
     regions = pack([Region("cover", Sphere((8.4, 0.0, 2.5), 0.6), "out")])
-    guide, goal = run(regions, 800)
-    end = guide.way[guide.points[0] - 1]
+    plan, goal = run(regions, 800)
+    end = plan.path[plan.counts[0] - 1]
     assert clearance_at(goal, 0, end) > 0.0
     assert clearance_at(regions, 0, end) > GAINS.margin
-    assert least_clearance(guide.way, guide.points[0], regions) > GAINS.margin
+    assert least_clearance(plan.path, plan.counts[0], regions) > GAINS.margin
 
 
 def test_the_end_goes_with_a_goal_that_moves_even_without_a_velocity():
@@ -163,13 +170,13 @@ def test_the_end_goes_with_a_goal_that_moves_even_without_a_velocity():
         packed.shifts[0] = (0.0, 0.004 * k, 0.0) if k < 200 else (-3.0, 1.0, 0.5)
 
     for goal, moved in ((sailing, sail), (GOAL, jump)):
-        guide, packed = run(NOTHING, 400, goal, moved=moved)
-        assert clearance_at(packed, 0, guide.way[guide.points[0] - 1]) > 0.05
+        plan, packed = run(NOTHING, 400, goal, moved=moved)
+        assert clearance_at(packed, 0, plan.path[plan.counts[0] - 1]) > 0.05
 
 
 def test_the_same_start_makes_the_same_way_to_the_last_bit():
     one, other = (run(scene(3, moving=True))[0] for _ in range(2))
-    assert one.points[0] > 1
+    assert one.counts[0] > 1
     for a, b in zip((*one.tree, *one._replace(tree=0)), (*other.tree, *other._replace(tree=0)), strict=True):
         assert np.array_equal(a, b)
 
@@ -194,11 +201,11 @@ def test_looks_are_bounded(monkeypatch):
         looked.append(i)
         return clearance_at(regions, i, point)
 
-    monkeypatch.setitem(way_round.cost_of.py_func.__globals__, "clearance_of_place", counting)
+    monkeypatch.setitem(way_round.path_cost.py_func.__globals__, "clearance_of_place", counting)
     regions = pack([Region(f"floor {i}", HalfSpace((0.0, 0.0, -1.0), (0.0, 0.0, 2.55)), "in") for i in range(3)])
     way = np.zeros((CORNERS + 1, 3))
     way[:] = [(100.0 * (i + 1), 50.0 * (-1.0) ** i, 2.5) for i in range(CORNERS + 1)]
-    way_round.cost_of.py_func(way, CORNERS + 1, START, regions, np.zeros(3), GAINS)
+    way_round.path_cost.py_func(way, CORNERS + 1, START, regions, np.zeros(3), GAINS)
     assert len(looked) == 64 * 3
 
 
@@ -218,18 +225,18 @@ def test_the_approach_can_be_braked(distance, deceleration, slope):
 
 
 def test_the_wanted_velocity_is_bounded_and_leads_along_the_way():
-    rng, guide, out = np.random.default_rng(8), guide_of_nothing(0, 1), np.empty(3)
+    rng, plan, out = np.random.default_rng(8), empty_plan(0, 1), np.empty(3)
     for _ in range(300):
-        guide.points[0] = rng.integers(1, CORNERS + 2)
-        guide.way[:] = rng.normal(size=(CORNERS + 1, 3)) * 4.0
+        plan.counts[0] = rng.integers(1, CORNERS + 2)
+        plan.path[:] = rng.normal(size=(CORNERS + 1, 3)) * 4.0
         drift, at = rng.normal(size=3) * 0.1, rng.normal(size=3)
-        wanted_velocity(guide, at, drift, GAINS, out)
+        desired_velocity(plan, at, drift, GAINS, out)
         assert np.linalg.norm(out - drift) <= GAINS.speed * (1.0 + 1e-12)
-        if np.linalg.norm(guide.way[0] - at) > 0.4 and np.linalg.norm(out - drift) > 0.0:
-            along = (guide.way[0] - at) / np.linalg.norm(guide.way[0] - at)
+        if np.linalg.norm(plan.path[0] - at) > 0.4 and np.linalg.norm(out - drift) > 0.0:
+            along = (plan.path[0] - at) / np.linalg.norm(plan.path[0] - at)
             assert (out - drift) / np.linalg.norm(out - drift) == pytest.approx(along, abs=1e-9)
-    guide.points[0], guide.way[0] = 1, at
-    wanted_velocity(guide, at, drift, GAINS, out)
+    plan.counts[0], plan.path[0] = 1, at
+    desired_velocity(plan, at, drift, GAINS, out)
     assert np.array_equal(out, drift)
 
 
@@ -237,7 +244,7 @@ def test_the_wanted_acceleration_is_bounded():
     rng, out = np.random.default_rng(9), np.empty(3)
     for scale in (1e-3, 1.0, 1e6):
         wanted, velocity = rng.normal(size=(2, 3)) * scale
-        wanted_acceleration(wanted, velocity, GAINS, out)
+        desired_acceleration(wanted, velocity, GAINS, out)
         free = GAINS.velocity_bandwidth * (wanted - velocity)
         assert np.linalg.norm(out) == pytest.approx(min(np.linalg.norm(free), GAINS.acceleration))
         assert out @ free > 0.0

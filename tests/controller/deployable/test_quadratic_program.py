@@ -6,8 +6,8 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from controller.laws.deployable.model import reallocate, thrusters_of
-from controller.laws.deployable.quadratic_program import _add, _lack, solve, workspace
+from controller.laws.deployable.model import make_thrusters, reallocate
+from controller.laws.deployable.quadratic_program import _add_product, _row_residual, empty_workspace, solve
 from cosim.scenario.vehicle_model import vehicle_model
 from plant_fmu.vehicle import load_vehicle
 from tests.controller.deployable.exact_program import ROUNDING, error, exact_solution, in_fractions, rounding
@@ -20,7 +20,7 @@ KINDS = ("any", "one", "parallel", "contradictory", "zero", "enclosed", "saturat
 def program(rng, kind):
     """Return a program as the law makes them: thrusters, slopes of clearances times what thrusters push, prices."""
     model = MODELS[str(rng.choice(list(MODELS)))]
-    thrusters = thrusters_of(model)
+    thrusters = make_thrusters(model)
     for lost in rng.choice(8, size=rng.choice([0, 0, 1, 2]), replace=False):
         thrusters.health[lost] = 0.0
     reallocate(thrusters)
@@ -47,8 +47,8 @@ def program(rng, kind):
 def ask(thrusters, rows, right, price, wanted):
     """Return forces, multipliers and steps of our own solver."""
     count, m = rows.shape
-    work, forces = workspace(count + 2, m), np.full(m, np.nan)
-    work.rows[:count], work.right[:count], work.price[:count], work.wanted[:] = rows, right, price, wanted
+    work, forces = empty_workspace(count + 2, m), np.full(m, np.nan)
+    work.rows[:count], work.right[:count], work.price[:count], work.nominal[:] = rows, right, price, wanted
     steps = solve(work, count, thrusters.inverse, thrusters.lower, thrusters.upper, forces)
     return forces, work.multipliers[: count + 2 * m].copy(), steps
 
@@ -128,7 +128,7 @@ def test_multipliers_are_the_exact_ones(programs):
 
 def test_products_are_added_in_twice_the_precision():
     """In plain Python: total and rest hold what the fractions do, but for a rounding of a rounding."""
-    add, rng = getattr(_add, "py_func", _add), np.random.default_rng(3)
+    add, rng = getattr(_add_product, "py_func", _add_product), np.random.default_rng(3)
     for total, rest, a, b in rng.normal(size=(300, 4)) * 10.0 ** rng.integers(-6, 7, (300, 4)):
         rest *= ROUNDING
         expected = Fraction(total) + Fraction(rest) + Fraction(a) * Fraction(b)
@@ -139,20 +139,20 @@ def test_products_are_added_in_twice_the_precision():
 
 
 def test_what_a_row_lacks_is_right_where_nearly_all_of_it_cancels():
-    work, rng = workspace(1, 8), np.random.default_rng(4)
+    work, rng = empty_workspace(1, 8), np.random.default_rng(4)
     for _ in range(100):
         forces, work.rows[0] = rng.normal(size=8) * 20.0, rng.normal(size=8)
         work.price[0], work.multipliers[0] = rng.uniform(0.0, 1e-6), rng.uniform(0.0, 1e6)
         work.right[0] = work.rows[0] @ forces + work.price[0] * work.multipliers[0]
         expected = in_fractions(work.right[0]) - in_fractions(work.price[0]) * in_fractions(work.multipliers[0])
         expected -= np.sum(in_fractions(work.rows[0]) * in_fractions(forces))
-        lack = _lack(work, 1, 0, forces, forces, forces)
+        lack = _row_residual(work, 1, 0, forces, forces, forces)
         assert lack == pytest.approx(float(expected), rel=1e-9, abs=1e-28)
 
 
 def test_a_row_that_no_thruster_moves_is_paid_for():
     """Of right - price y <= 0 with the least y: right / price, and forces as they were wanted."""
-    thrusters, wanted = thrusters_of(MODELS["odin"]), np.linspace(-3.0, 4.0, 8)
+    thrusters, wanted = make_thrusters(MODELS["odin"]), np.linspace(-3.0, 4.0, 8)
     forces, y, _ = ask(thrusters, np.zeros((1, 8)), np.array([0.5]), np.array([1e-6]), wanted)
     assert forces == pytest.approx(wanted)
     assert y[0] == pytest.approx(0.5e6)
@@ -160,7 +160,7 @@ def test_a_row_that_no_thruster_moves_is_paid_for():
 
 def test_a_row_that_thrusters_hardly_move_is_paid_for_in_part():
     """(right - row u) = price y and u = wanted + H^-1 row y."""
-    thrusters, wanted, row = thrusters_of(MODELS["odin"]), np.linspace(-3.0, 4.0, 8), np.full((1, 8), 1e-3)
+    thrusters, wanted, row = make_thrusters(MODELS["odin"]), np.linspace(-3.0, 4.0, 8), np.full((1, 8), 1e-3)
     forces, y, _ = ask(thrusters, row, np.array([0.5]), np.array([0.02]), wanted)
     shaped = thrusters.inverse @ row[0]
     expected = (0.5 - row[0] @ wanted) / (row[0] @ shaped + 0.02)
@@ -194,7 +194,7 @@ def test_the_solution_fulfils_the_conditions_of_kuhn_and_tucker(kind):
 
 
 def test_a_wanted_force_that_hurts_nothing_is_given_to_the_last_bit():
-    thrusters = thrusters_of(MODELS["odin"])
+    thrusters = make_thrusters(MODELS["odin"])
     wanted = np.linspace(-20.0, 20.0, 8)
     forces, y, steps = ask(thrusters, np.ones((1, 8)), np.array([-1e3]), np.array([1e-6]), wanted)
     assert steps == 0 and not y.any()
@@ -203,7 +203,7 @@ def test_a_wanted_force_that_hurts_nothing_is_given_to_the_last_bit():
 
 def test_the_barrier_of_greater_price_yields_less():
     """Two that contradict each other, and cannot both hold within what the forces cost: s_1 / s_2 = rho_2 / rho_1."""
-    thrusters = thrusters_of(MODELS["odin"])
+    thrusters = make_thrusters(MODELS["odin"])
     along = thrusters.matrix[0] / 187.5
     price = np.array([1e-3, 1e-5]) / 187.5**2
     forces, y, _ = ask(thrusters, np.array([along, -along]), np.array([0.2, 0.2]), price, np.zeros(8))
@@ -214,7 +214,7 @@ def test_the_barrier_of_greater_price_yields_less():
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
 def test_what_is_not_finite_moves_nothing(bad):
-    thrusters = thrusters_of(MODELS["odin"])
+    thrusters = make_thrusters(MODELS["odin"])
     rows, right, price = np.ones((3, 8)) / 187.5, np.full(3, 0.3), np.full(3, 1e-8)
     alone, _, _ = ask(thrusters, rows[:1], right[:1], price[:1], np.zeros(8))
     rows[1, 3], right[2] = bad, bad
@@ -243,11 +243,11 @@ def test_forces_stay_within_their_limits_whatever_the_numbers():
 def test_steps_are_negative_where_the_search_was_cut_short(monkeypatch):
     """In plain Python, with one step allowed where four limits are in the way."""
     plain = getattr(solve, "py_func", solve)
-    thrusters = thrusters_of(MODELS["odin"])
-    wanted, forces, work = np.r_[100.0, -100.0, np.zeros(6)], np.empty(8), workspace(1, 8)
+    thrusters = make_thrusters(MODELS["odin"])
+    wanted, forces, work = np.r_[100.0, -100.0, np.zeros(6)], np.empty(8), empty_workspace(1, 8)
     for allowed, steps in ((1, -1), (48, 4)):
         monkeypatch.setitem(plain.__globals__, "_STEPS_A_ROW", allowed / 16.0)
-        work.wanted[:] = wanted
+        work.nominal[:] = wanted
         assert plain(work, 0, thrusters.inverse, thrusters.lower, thrusters.upper, forces) == steps
         assert np.all(forces >= thrusters.lower) and np.all(forces <= thrusters.upper)
 
@@ -265,8 +265,8 @@ def test_steps_are_counted_when_rows_come_and_when_they_go(monkeypatch):
     gone = 0
     for _ in range(40):
         thrusters, rows, right, price, wanted = program(rng, "any")
-        work, forces = workspace(len(rows), 8), np.empty(8)
-        work.rows[:], work.right[:], work.price[:], work.wanted[:] = rows, right, price, wanted
+        work, forces = empty_workspace(len(rows), 8), np.empty(8)
+        work.rows[:], work.right[:], work.price[:], work.nominal[:] = rows, right, price, wanted
         moves.clear()
         steps = plain(work, len(rows), thrusters.inverse, thrusters.lower, thrusters.upper, forces)
         assert steps >= len(moves)

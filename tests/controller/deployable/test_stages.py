@@ -8,12 +8,12 @@ from scipy.spatial.transform import Rotation
 
 from controller import VehicleState
 from controller.laws.deployable import input_validation, law, observer
-from controller.laws.deployable.attitude import free_turning
-from controller.laws.deployable.attraction import wanted_velocity
-from controller.laws.deployable.barrier import look, sight_of
+from controller.laws.deployable.attitude import free_angular_acceleration
+from controller.laws.deployable.attraction import desired_velocity
+from controller.laws.deployable.barrier import empty_observation, observe_regions
 from controller.laws.deployable.gains import DeployableGains
-from controller.laws.deployable.model import Dynamics, reallocate, thrusters_of
-from controller.laws.deployable.path_planner import CORNERS, guide_of_nothing
+from controller.laws.deployable.model import Dynamics, make_thrusters, reallocate
+from controller.laws.deployable.path_planner import CORNERS, empty_plan
 from controller.regions import HalfSpace, Orientation, Region, Sphere, pack
 from tests.controller.deployable.scenery import LEVEL, ODIN, law_for
 
@@ -34,11 +34,11 @@ def approach(distance, a, slope):
 
 
 def test_the_wanted_velocity_slows_down_for_corners_and_for_the_end():
-    rng, guide, out, slowed = np.random.default_rng(1), guide_of_nothing(0, 1), np.empty(3), 0
+    rng, plan, out, slowed = np.random.default_rng(1), empty_plan(0, 1), np.empty(3), 0
     for _ in range(200):
         count, at, drift = int(rng.integers(1, 5)), rng.normal(size=3), rng.normal(size=3) * 0.1
-        guide.points[0], guide.way[:] = count, rng.normal(size=(CORNERS + 1, 3)) * rng.choice([0.15, 1.5])
-        points = np.vstack([at + 0.3 * rng.normal(size=3) if rng.uniform() < 0.3 else at, guide.way[:count]])
+        plan.counts[0], plan.path[:] = count, rng.normal(size=(CORNERS + 1, 3)) * rng.choice([0.15, 1.5])
+        points = np.vstack([at + 0.3 * rng.normal(size=3) if rng.uniform() < 0.3 else at, plan.path[:count]])
         points[0] = at
         legs = np.diff(points, axis=0)
         lengths = np.linalg.norm(legs, axis=1)
@@ -53,7 +53,7 @@ def test_the_wanted_velocity_slows_down_for_corners_and_for_the_end():
         for unit, length in zip(units, lengths, strict=True):
             along += unit * np.clip(left, 0.0, length)
             left -= length
-        wanted_velocity(guide, at, drift, GAINS, out)
+        desired_velocity(plan, at, drift, GAINS, out)
         assert out == pytest.approx(drift + speed * along / np.linalg.norm(along), rel=1e-9, abs=1e-12)
     assert slowed > 50
 
@@ -65,11 +65,11 @@ def test_a_force_gives_the_acceleration():
 
 
 def test_what_a_newton_of_each_thruster_does():
-    dynamics, thrusters = askew(np.random.default_rng(3)), thrusters_of(ODIN)
+    dynamics, thrusters = askew(np.random.default_rng(3)), make_thrusters(ODIN)
     body = dynamics.inverse_mass @ thrusters.matrix
     expected = np.vstack([TURNED @ body[:3], body[3:]])
     push = np.zeros((6, thrusters.health.size))
-    law._write_push(dynamics, thrusters, TURNED, push)
+    law._write_thruster_acceleration(dynamics, thrusters, TURNED, push)
     assert push == pytest.approx(expected, rel=1e-12, abs=1e-15)
 
 
@@ -83,8 +83,8 @@ def test_violated_soft_regions_push_out_of_them():
         Region("hard", Sphere((0.0, 0.0, 0.0), 1.0), "out", gain=3.0),
         Region("face", Orientation((0.0, 1.0, 0.0, 0.0), 0.1), "in", gain=3.0, hard=False),
     ]
-    weights, sight, wrench = rng.uniform(0.3, 1.0, 5), sight_of(5), rng.normal(size=6)
-    look(sight, pack(regions), position, ATTITUDE, np.zeros(6))
+    weights, sight, wrench = rng.uniform(0.3, 1.0, 5), empty_observation(5), rng.normal(size=6)
+    observe_regions(sight, pack(regions), position, ATTITUDE, np.zeros(6))
     most = dynamics.translational_mass[0] * dynamics.braking.min()
     expected, count = wrench.copy(), 0
     for i in (0, 1):
@@ -99,7 +99,7 @@ def test_violated_soft_regions_push_out_of_them():
 
 @pytest.mark.parametrize("lost", [[], [3], [3, 5], [1, 4, 6]])
 def test_what_deceleration_is_relied_on(lost):
-    dynamics, thrusters = askew(np.random.default_rng(5)), thrusters_of(ODIN)
+    dynamics, thrusters = askew(np.random.default_rng(5)), make_thrusters(ODIN)
     thrusters.health[lost] = 0.0
     reallocate(thrusters)
     expected = dynamics.braking.min() if not lost else dynamics.braking[lost[0]]
@@ -109,8 +109,8 @@ def test_what_deceleration_is_relied_on(lost):
 
 
 def test_the_report_says_what_it_is_of():
-    seen, report = observer.estimate_of_nothing(), np.full(len(law.DIAGNOSTICS), np.nan)
-    seen.position[:], seen.velocity[:], seen.water[:2] = (1.0, 2.0, 3.0), (4.0, 5.0, 6.0), (7.0, 8.0)
+    seen, report = observer.empty_estimate(), np.full(len(law.DIAGNOSTICS), np.nan)
+    seen.position[:], seen.velocity[:], seen.water_velocity[:2] = (1.0, 2.0, 3.0), (4.0, 5.0, 6.0), (7.0, 8.0)
     health = np.array([1.0, 1.0, 0.0, 1.0])
     law._report(report, seen, 9.5, 4, health, np.array([2.0, -3.0, 6.0]))
     assert report[:11].tolist() == [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 7.0, 9.5, 3.0]
@@ -125,8 +125,8 @@ def test_the_report_says_what_it_is_of():
 def begun():
     memory = law_for([]).memory
     thrust = np.random.default_rng(6).uniform(-15.0, 15.0, 8)
-    memory.observed.silence[0], memory.thrusters.forces[:] = 0.0, thrust
-    observer.begin(memory.observed, np.array([1.0, 2.0, 3.0]), np.array([0.4, -0.3, 0.2]), GAINS)
+    memory.state_estimate.time_since_measurement[0], memory.thrusters.forces[:] = 0.0, thrust
+    observer.initialize(memory.state_estimate, np.array([1.0, 2.0, 3.0]), np.array([0.4, -0.3, 0.2]), GAINS)
     memory.quaternion[:], memory.omega[:] = ATTITUDE, (0.3, -0.2, 0.1)
     return memory
 
@@ -134,11 +134,11 @@ def begun():
 def test_attitude_and_rates_that_are_not_measured_are_carried_by_the_model():
     memory = begun()
     turning = np.empty(3)
-    free_turning(memory.attitude, memory.dynamics, memory.quaternion, memory.omega, turning)
+    free_angular_acceleration(memory.attitude, memory.dynamics, memory.quaternion, memory.omega, turning)
     wrench = memory.thrusters.matrix @ memory.thrusters.forces
     omega = memory.omega + 0.02 * (turning + (memory.dynamics.inverse_mass @ wrench)[3:])
     turned = Rotation.from_matrix(TURNED) * Rotation.from_rotvec(0.02 * omega)
-    input_validation._carry_attitude(memory)
+    input_validation._propagate_attitude(memory)
     assert memory.omega == pytest.approx(omega, rel=1e-12)
     assert memory.quaternion == pytest.approx(turned.as_quat()[[3, 0, 1, 2]], abs=1e-6)
 
@@ -148,12 +148,12 @@ def test_rates_that_are_carried_stay_finite(sign):
     """The drag of one period at such a rate would throw it back far beyond."""
     memory = begun()
     memory.omega[:] = 1e3 * sign
-    input_validation._carry_attitude(memory)
+    input_validation._propagate_attitude(memory)
     assert memory.omega.tolist() == [-100.0 * sign] * 3
 
 
 def state_of(memory, **change):
-    seen = memory.observed
+    seen = memory.state_estimate
     body = np.r_[TURNED.T @ seen.velocity, memory.omega]
     return VehicleState(seen.position.copy(), ATTITUDE.copy(), body, np.ones(8))._replace(**change)
 
@@ -162,31 +162,31 @@ def test_a_measurement_is_turned_into_the_world():
     memory, theirs = begun(), begun()
     body = np.r_[TURNED.T @ [0.41, -0.31, 0.21], 0.1, 0.2, -0.3]
     state = VehicleState(np.array([1.01, 2.0, 3.0]), 1.001 * ATTITUDE, body, np.ones(8))
-    assert input_validation.take_in_measurement(memory, state, GAINS)
+    assert input_validation.process_measurement(memory, state, GAINS)
     assert memory.quaternion == pytest.approx(ATTITUDE, abs=1e-12)
     assert np.array_equal(memory.omega, body[3:])
-    observer.predict(theirs.observed, theirs.dynamics, theirs.thrusters, TURNED, body[3:], GAINS, 0.02)
-    assert observer.correct(theirs.observed, state.position, np.array([0.41, -0.31, 0.21]), GAINS)
-    assert memory.observed.velocity == pytest.approx(theirs.observed.velocity, rel=1e-9)
-    assert memory.observed.position == pytest.approx(theirs.observed.position, rel=1e-9)
+    observer.predict(theirs.state_estimate, theirs.dynamics, theirs.thrusters, TURNED, body[3:], GAINS, 0.02)
+    assert observer.correct(theirs.state_estimate, state.position, np.array([0.41, -0.31, 0.21]), GAINS)
+    assert memory.state_estimate.velocity == pytest.approx(theirs.state_estimate.velocity, rel=1e-9)
+    assert memory.state_estimate.position == pytest.approx(theirs.state_estimate.position, rel=1e-9)
 
 
 def test_what_repeats_itself_to_the_last_bit_while_moving_is_not_believed():
     for moving in ((-0.05, 0.0, 0.0), (0.0, -0.05, 0.0), (0.0, 0.0, -0.05), (0.0, 0.0, 0.0)):
         memory = begun()
         memory.thrusters.forces[:] = 0.0
-        memory.observed.velocity[:] = moving
+        memory.state_estimate.velocity[:] = moving
         state = state_of(memory)
-        assert input_validation.take_in_measurement(memory, state, GAINS)
-        assert input_validation.take_in_measurement(memory, state, GAINS) == (not any(moving))
+        assert input_validation.process_measurement(memory, state, GAINS)
+        assert input_validation.process_measurement(memory, state, GAINS) == (not any(moving))
         for which in (0, 1, 2):  # one number that differs in its last bit is enough
             position, body = state.position.copy(), state.velocity_body.copy()
             position[which] = np.nextafter(position[which], np.inf)
             other = copy.deepcopy(memory)
-            assert input_validation.take_in_measurement(other, state._replace(position=position), GAINS)
+            assert input_validation.process_measurement(other, state._replace(position=position), GAINS)
             body[which] = np.nextafter(body[which], np.inf)
             other = copy.deepcopy(memory)
-            assert input_validation.take_in_measurement(other, state._replace(velocity_body=body), GAINS)
+            assert input_validation.process_measurement(other, state._replace(velocity_body=body), GAINS)
 
 
 @pytest.mark.parametrize(
@@ -200,29 +200,29 @@ def test_what_repeats_itself_to_the_last_bit_while_moving_is_not_believed():
 )  # fmt: skip
 def test_what_no_vehicle_can_have_is_not_believed(change):
     fresh, memory = law_for([]).memory, begun()
-    assert not input_validation.take_in_measurement(memory, state_of(memory, **change), GAINS)
-    assert not input_validation.take_in_measurement(fresh, state_of(memory, **change), GAINS)
-    assert fresh.observed.silence[0] < 0.0
-    assert input_validation.take_in_measurement(fresh, state_of(memory, quaternion=0.999 * ATTITUDE), GAINS)
+    assert not input_validation.process_measurement(memory, state_of(memory, **change), GAINS)
+    assert not input_validation.process_measurement(fresh, state_of(memory, **change), GAINS)
+    assert fresh.state_estimate.time_since_measurement[0] < 0.0
+    assert input_validation.process_measurement(fresh, state_of(memory, quaternion=0.999 * ATTITUDE), GAINS)
 
 
 def test_an_estimate_that_was_led_away_is_forgotten():
     memory = begun()
-    memory.observed.position[1], memory.suspicion.ratio[2] = 2e6, 5.0
+    memory.state_estimate.position[1], memory.fault_state.ratio[2] = 2e6, 5.0
     bad = state_of(memory, position=np.full(3, np.nan))
-    assert not input_validation.take_in_measurement(memory, bad, GAINS)
-    assert memory.observed.silence[0] == -1.0
-    assert not memory.observed.position.any() and not memory.suspicion.ratio.any()
-    assert input_validation.take_in_measurement(memory, state_of(memory), GAINS)
+    assert not input_validation.process_measurement(memory, bad, GAINS)
+    assert memory.state_estimate.time_since_measurement[0] == -1.0
+    assert not memory.state_estimate.position.any() and not memory.fault_state.ratio.any()
+    assert input_validation.process_measurement(memory, state_of(memory), GAINS)
 
 
 def test_what_is_said_for_long_is_believed_in_the_end():
     memory = begun()
     elsewhere = state_of(memory, position=np.array([30.0, 2.0, 3.0]))
     for silence, begins in ((1.0, False), (GAINS.coast + 0.1, True)):
-        memory.observed.silence[0] = silence
-        assert not input_validation.take_in_measurement(memory, elsewhere, GAINS)
-        assert (memory.observed.position[0] == 30.0) == begins
+        memory.state_estimate.time_since_measurement[0] = silence
+        assert not input_validation.process_measurement(memory, elsewhere, GAINS)
+        assert (memory.state_estimate.position[0] == 30.0) == begins
         elsewhere.velocity_body[0] += 1e-6
 
 
@@ -231,11 +231,11 @@ def test_weights_and_health_are_taken_for_what_they_can_be():
     input_validation.sanitize_weights(np.array([-1.0, 0.3, 2.0, np.nan]), believed)
     assert believed.tolist() == [0.0, 0.3, 1.0, 1.0]
     memory = law_for([]).memory
-    input_validation.take_in_thrusters(memory, np.ones(8), 2)
+    input_validation.update_thrusters(memory, np.ones(8), 2)
     assert np.flatnonzero(memory.thrusters.health == 0.0).tolist() == [2]
     told = np.array([1.0, -1.0, 1.0, np.nan, 1.0, 1.0, 1.0, 0.5])
-    assert input_validation.says_more(told, memory.reported, memory.thrusters.health)
-    input_validation.take_in_thrusters(memory, told, -1)
+    assert input_validation.reports_change(told, memory.reported, memory.thrusters.health)
+    input_validation.update_thrusters(memory, told, -1)
     assert np.flatnonzero(memory.thrusters.health == 0.0).tolist() == [1, 2]
-    assert not input_validation.says_more(told, memory.reported, memory.thrusters.health)
+    assert not input_validation.reports_change(told, memory.reported, memory.thrusters.health)
     assert np.array_equal(memory.quaternion, LEVEL)

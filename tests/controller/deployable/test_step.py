@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from controller.laws.deployable import attitude, barrier, input_validation, law, model, observer, path_planner
-from controller.laws.deployable.attraction import wanted_acceleration, wanted_velocity
+from controller.laws.deployable.attraction import desired_acceleration, desired_velocity
 from controller.laws.deployable.gains import DeployableGains
 from controller.laws.deployable.quadratic_program import solve
 from controller.quaternion import rotation_matrix
@@ -19,23 +19,25 @@ ALL = [*REGIONS, Region("face", Orientation((0.98, 0.0, 0.0, 0.2), 0.1), "in")]
 
 def expected(memory, state, goal, regions, weights):
     """Return what the second half of a step should write, from the memory before it."""
-    thrusters, dynamics, seen = memory.thrusters, memory.dynamics, memory.observed
-    input_validation.take_in_measurement(memory, state, GAINS)
+    thrusters, dynamics, seen = memory.thrusters, memory.dynamics, memory.state_estimate
+    input_validation.process_measurement(memory, state, GAINS)
     R, omega = rotation_matrix(memory.quaternion), memory.omega
     wanted, acceleration, free, moment = np.empty(3), np.empty(3), np.empty(6), np.empty(3)
-    path_planner.improve(memory.guide, seen.position, goal, regions, GAINS, 0.02)
-    wanted_velocity(memory.guide, seen.position, goal.velocities[0], GAINS, wanted)
-    wanted_acceleration(wanted, seen.velocity, GAINS, acceleration)
-    model.free_acceleration(dynamics, R, seen.velocity, omega, seen.water, seen.restoring[0], free)
-    attitude.propagate(memory.attitude, dynamics, R, seen.velocity, seen.water)
-    attitude.free_turning(memory.attitude, dynamics, memory.quaternion, omega, free[3:])
+    path_planner.improve_path(memory.plan, seen.position, goal, regions, GAINS, 0.02)
+    desired_velocity(memory.plan, seen.position, goal.velocities[0], GAINS, wanted)
+    desired_acceleration(wanted, seen.velocity, GAINS, acceleration)
+    model.free_acceleration(dynamics, R, seen.velocity, omega, seen.water_velocity, seen.net_weight[0], free)
+    attitude.update_munk_moment(memory.attitude, dynamics, R, seen.velocity, seen.water_velocity)
+    attitude.free_angular_acceleration(memory.attitude, dynamics, memory.quaternion, omega, free[3:])
     velocity = np.r_[seen.velocity, omega]
-    barrier.look(memory.sight, regions, seen.position, memory.quaternion, velocity)
-    pushed = memory.pushed + 0.02 / (0.02 + GAINS.smoothing) * (acceleration - free[:3] - memory.pushed)
-    attitude.aim(memory.attitude, regions, seen.position, GAINS, 0.02)
-    attitude.moment(memory.attitude, dynamics, memory.quaternion, omega, GAINS, moment)
+    barrier.observe_regions(memory.observation, regions, seen.position, memory.quaternion, velocity)
+    pushed = memory.filtered_acceleration + 0.02 / (0.02 + GAINS.smoothing) * (
+        acceleration - free[:3] - memory.filtered_acceleration
+    )
+    attitude.update_desired(memory.attitude, regions, seen.position, GAINS, 0.02)
+    attitude.compute_moment(memory.attitude, dynamics, memory.quaternion, omega, GAINS, moment)
     wrench = np.r_[dynamics.mass[:3, :3] @ R.T @ pushed, moment]
-    memory.program.wanted[:] = thrusters.allocator @ wrench
+    memory.program.nominal[:] = thrusters.allocator @ wrench
     turned = np.kron(np.diag([1, 0]), R) + np.kron(np.diag([0, 1]), np.eye(3))
     motion = barrier.Motion(
         seen.position, velocity, free, turned @ dynamics.inverse_mass @ thrusters.matrix,
@@ -44,7 +46,7 @@ def expected(memory, state, goal, regions, weights):
         3.0 * observer.position_spread(seen) + 0.5 * GAINS.acceleration * 0.02**2,
     )  # fmt: skip
     rows = barrier.write_rows(
-        memory.program, memory.sight, regions, weights, motion, thrusters.lower, thrusters.upper, GAINS
+        memory.program, memory.observation, regions, weights, motion, thrusters.lower, thrusters.upper, GAINS
     )
     forces, program = np.empty(8), copy.deepcopy(memory.program)
     solve(memory.program, rows, thrusters.inverse, thrusters.lower, thrusters.upper, forces)
@@ -55,24 +57,24 @@ def test_a_step_is_its_stages():
     own, sea, weights = law_for(ALL), Sea(noise=(0.02, 0.01)), np.array([1.0, 0.3, 0.7, 0.5])
     fly(own, sea, regions=ALL, steps=4)
     sea.quaternion[:] = np.array([0.95, 0.1, -0.2, 0.15]) / np.linalg.norm([0.95, 0.1, -0.2, 0.15])
-    own.memory.observed.water[:2], own.memory.attitude.moments[:] = (0.2, -0.1), (3.0, -2.0, 1.0)
+    own.memory.state_estimate.water_velocity[:2], own.memory.attitude.moments[:] = (0.2, -0.1), (3.0, -2.0, 1.0)
     # three steps of drag beside the ball, which then has a row
-    own.memory.observed.position[:] = sea.position = np.array([3.1, 0.2, 2.4])
-    own.memory.observed.velocity[:] = sea.velocity = np.array([0.5, 0.1, -0.05])
+    own.memory.state_estimate.position[:] = sea.position = np.array([3.1, 0.2, 2.4])
+    own.memory.state_estimate.velocity[:] = sea.velocity = np.array([0.5, 0.1, -0.05])
     goal, regions, forces, most = pack([GOAL]), pack(ALL), np.empty(8), 0
     for _ in range(4):
         state, memory = sea.measured(), copy.deepcopy(own.memory)
         own.step(state, goal, regions, weights, forces)
         pushed, rows, program, wanted_forces = expected(memory, state, goal, regions, weights)
         most = max(most, rows)
-        assert own.memory.pushed == pytest.approx(pushed, rel=1e-10, abs=1e-12)
+        assert own.memory.filtered_acceleration == pytest.approx(pushed, rel=1e-10, abs=1e-12)
         for part in ("rows", "right", "price"):
             ours, theirs = getattr(own.memory.program, part), getattr(program, part)
             np.testing.assert_allclose(ours[:rows], theirs[:rows], rtol=1e-8, atol=1e-14)
-        assert own.memory.program.wanted == pytest.approx(program.wanted, rel=1e-8, abs=1e-9)
+        assert own.memory.program.nominal == pytest.approx(program.nominal, rel=1e-8, abs=1e-9)
         assert forces == pytest.approx(wanted_forces, abs=1e-6)
         assert np.array_equal(own.memory.thrusters.forces, forces)
-        assert own.estimate.tolist() == [own.memory.observed.restoring[0], *own.memory.attitude.moments]
+        assert own.estimate.tolist() == [own.memory.state_estimate.net_weight[0], *own.memory.attitude.moments]
     assert most >= 2
 
 
@@ -88,4 +90,4 @@ def test_without_measurements_it_stops_and_then_drifts():
     assert all(speed > 0.1 for speed, _ in wanted[:7])
     assert all(speed == 0.0 for speed, _ in wanted[8:99])
     assert all(pushes for _, pushes in wanted[:99]) and not any(pushes for _, pushes in wanted[102:])
-    assert law.DIAGNOSTICS[8].name == "wanted_speed"
+    assert law.DIAGNOSTICS[8].name == "desired_speed"

@@ -14,7 +14,7 @@ from controller.allocation import Allocation
 from cosim.batch import fused_loop
 from cosim.batch.c_calls import Clock, fmi_do_step, seconds
 from cosim.campaigns.scenes.flyer import Conditions, SceneFlyer
-from cosim.campaigns.scenes.scene import Failure, Obstacle, SphereSpec, plant_values, read_scenes, told
+from cosim.campaigns.scenes.scene import Failure, Obstacle, SphereSpec, known_scene, plant_values, read_scenes
 from cosim.errors import RunError, ScenarioError
 from cosim.scenario.scenario import CRITERIA
 from cosim.scenario.vehicle_model import vehicle_model
@@ -39,7 +39,7 @@ class Readable:
     def __init__(self, scene, conditions, law="ismail_dunnigan"):
         self.scene, self.conditions = scene, conditions
         self.vehicle = load_vehicle("odin")
-        self.known = told(scene)
+        self.known = known_scene(scene)
         n = self.known.regions.kinds.size
         gains, level = LAWS[law].gains_type(), np.array([1.0, 0.0, 0.0, 0.0])
         self.law = LAWS[law].for_vehicle(vehicle_model(self.vehicle), gains, level, conditions.control, n)

@@ -31,7 +31,7 @@ COLUMNS = tuple(
         *(f"weight.{c}" for c in ("obstacle", "shape", "depth")), *(f"estimate.phi{i}" for i in range(1, 5)),
         *(f"command.{f}" for f in "XYZKMN"), "allocation_saturated", *(f"thrust[{i}]" for i in range(1, 9)),
         *(f"{name}.shift.{a}" for name in ("goal", "SR1", "seen 1", "seen 2") for a in "xyz"), "commands.armed",
-        "commands.mode", "commands.item", "target.x", "target.y", "target.z", "law.yielding",
+        "commands.mode", "commands.item", "target.x", "target.y", "target.z", "law.constraint_slack",
     )
 )  # fmt: skip
 AT = {column.name: i for i, column in enumerate(COLUMNS)}

@@ -26,7 +26,7 @@ def station():
         12.5,
         **{
             "quaternion.e0": tuple(TURN), "attitude.roll": EULER, "velocity.u": (0.5, -0.2, 0.1, 0.01, 0.02, 0.03),
-            "weight.obstacle": (0.7, 0.2, 0.1), "estimate.phi1": (1.0, 2.0, 3.0, 4.0), "law.yielding": 0.25,
+            "weight.obstacle": (0.7, 0.2, 0.1), "estimate.phi1": (1.0, 2.0, 3.0, 4.0), "law.constraint_slack": 0.25,
             "thruster_force[1]": (13.5, -27.0, 0.0, 54.0), "measured.acceleration.x": (0.0, 0.0, -9.80665),
         },
     )  # fmt: skip

@@ -76,9 +76,9 @@ def test_it_goes_round_a_rock():
 
 @pytest.mark.parametrize(("weight", "share"), [(0.0, 1e-3), (1.0, 1e-6)])
 def test_a_barrier_that_works_gives_way_by_a_small_share_of_what_it_asks_for(weight, share):
-    """A rock alone on the way: `yielding` is never 0 then, but far below what docs/deployable.md counts as kept."""
+    """A rock alone on the way: the slack is never 0 then, but far below what docs/deployable.md counts as kept."""
     flight = fly([ROCK], weights=[weight])
-    yielding, held = flight.report("yielding"), flight.report("barriers") > 0
+    yielding, held = flight.report("constraint_slack"), flight.report("barriers") > 0
     assert held.any() and (yielding[held] > 0.0).all() and not yielding[~held].any()
     most = 4 * 27.0 / 187.5  # m/s2, no less than what ODIN's thrusters give
     assert 0.1 * share * most < yielding.max() < share * most
@@ -94,7 +94,7 @@ def test_a_measurement_of_nan_is_bridged_then_waited_for(length):
     flight = fly([ROCK], duration=40.0, spoil=lambda t, s: NOWHERE if 2.0 < t < 2.0 + length else s)
     assert within_limits(flight) and reached(flight)
     assert flight.clearance(ROCK).min() > 0.0
-    silence = flight.report("silence")
+    silence = flight.report("time_since_measurement")
     assert silence.max() == pytest.approx(length, abs=0.05)
     rests = silence > DeployableGains().coast
     assert rests.any() == (length > 2.0) and not flight.forces[rests].any()
@@ -112,7 +112,7 @@ def test_a_frozen_sensor_is_a_dead_one():
 
     flight = fly([ROCK], spoil=freeze)
     assert reached(flight) and flight.clearance(ROCK).min() > 0.0
-    assert flight.report("silence").max() == pytest.approx(1.0, abs=0.05)
+    assert flight.report("time_since_measurement").max() == pytest.approx(1.0, abs=0.05)
 
 
 def test_a_vehicle_that_is_held_still_to_the_bit_is_believed_in_the_end():
@@ -126,7 +126,7 @@ def test_a_vehicle_that_is_held_still_to_the_bit_is_believed_in_the_end():
         return state
 
     flight = fly([], duration=16.0, spoil=hold, plant={"current.x": -0.4, "current.y": 0.3})
-    silence = flight.report("silence")
+    silence = flight.report("time_since_measurement")
     assert silence[flight.time > 10.0].max() <= DeployableGains().coast + 0.05
     assert (silence[flight.time > 13.0] == 0.0).any()
 
@@ -158,7 +158,7 @@ def test_of_two_regions_that_exclude_each_other_the_weightier_is_kept(weights, k
     assert within_limits(flight)
     clearances = [flight.clearance(south)[-1], flight.clearance(north)[-1]]
     assert clearances[kept] > 0.0 > clearances[1 - kept]
-    assert flight.report("yielding")[-1] > 0.1
+    assert flight.report("constraint_slack")[-1] > 0.1
 
 
 def test_with_equal_weights_both_yield_alike():

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from controller import VehicleState
 from controller.laws.deployable import DeployableGains, DeployableLaw
-from controller.laws.deployable.barrier import look, sight_of, slope_of, turning_of
+from controller.laws.deployable.barrier import empty_observation, gradient_rate, observe_regions, pose_gradient
 from controller.laws.deployable.faces import face_ahead
 from controller.regions import (
     Box,
@@ -75,7 +75,7 @@ def numbers_of(memory):
 def assert_sound(law, forces):
     assert np.isfinite(forces).all() and np.abs(forces).max() <= 27.0
     for key, value in numbers_of(law.memory):
-        if key not in ("observed.last_measured", "guide.far_until"):
+        if key not in ("state_estimate.last_measured", "plan.clear_until"):
             assert np.isfinite(value).all(), key
 
 
@@ -208,22 +208,27 @@ def test_a_slope_turns_by_the_motion_against_the_region():
     """Side by side with a ball that moves along, nothing turns; against finite differences where it does."""
     for own in ((0.0, 0.0, 0.0), (0.0, 0.3, 0.0), (0.0, -0.1, 0.05)):
         packed = pack([Region("ball", Sphere((2.0, 0.0, 2.0), 0.5), "out", velocity=own)])
-        velocity, sight, n, later = np.array([0.05, 0.3, 0.0, 0.0, 0.0, 0.0]), sight_of(1), np.empty(6), np.empty(6)
-        look(sight, packed, HERE, LEVEL, velocity)
-        assert slope_of(sight.gradients, sight.rotation_gradients, 0, False, n)
-        assert slope_of(sight.later_gradients, sight.later_rotation_gradients, 0, False, later)
+        velocity, sight, n, later = (
+            np.array([0.05, 0.3, 0.0, 0.0, 0.0, 0.0]),
+            empty_observation(1),
+            np.empty(6),
+            np.empty(6),
+        )
+        observe_regions(sight, packed, HERE, LEVEL, velocity)
+        assert pose_gradient(sight.gradients, sight.rotation_gradients, 0, False, n)
+        assert pose_gradient(sight.later_gradients, sight.later_rotation_gradients, 0, False, later)
         relative = velocity - np.r_[own, np.zeros(3)]
         line, step = HERE - [2.0, 0.0, 2.0], 1e-3
         distances = [np.linalg.norm(line + k * step * relative[:3]) for k in (-1, 0, 1)]
         truth = (distances[0] - 2.0 * distances[1] + distances[2]) / step**2
-        assert turning_of(Sphere.kind, n, later, relative) == pytest.approx(truth, abs=0.003)
+        assert gradient_rate(Sphere.kind, n, later, relative) == pytest.approx(truth, abs=0.003)
 
 
 def test_no_turn_is_seen_where_another_face_becomes_the_nearest():
     """In the middle between two walls the slope leaps to the opposite, which is no acceleration."""
     one, other = np.array([0.0, 1.0, 0.0, 0.0, 0.0, 0.0]), np.array([0.0, -1.0, 0.0, 0.0, 0.0, 0.0])
     for kind in (Box.kind, DepthBand.kind, Cylinder.kind, Sphere.kind):
-        assert turning_of(kind, one, other, 0.5 * one) == 0.0
+        assert gradient_rate(kind, one, other, 0.5 * one) == 0.0
 
 
 @pytest.mark.parametrize(

@@ -223,7 +223,7 @@ def test_exact_sensing_leaves_the_record_as_it_was():
 def test_diagnostics_of_the_law_are_columns():
     kept = run(name="paper-deployable")
     assert kept["law.position.x"][1:] == pytest.approx(kept["position.x"][1:], abs=0.05)
-    assert kept["law.way_cost"][0] > 5.0
+    assert kept["law.path_cost"][0] > 5.0
     # a law that drives thrusters: the wrench that it asks for is what they amount to
     with Master(load_scenario("paper-deployable", THRUSTERS)) as master:
         B = master.scenario.vehicle.thruster_matrix

@@ -6,7 +6,14 @@ import pytest
 from controller.laws.deployable import path_planner as way_round
 from controller.laws.deployable import search
 from controller.laws.deployable.gains import DeployableGains
-from controller.laws.deployable.path_planner import CORNERS, cost_of, guide_of_nothing, improve, nearest_end, uniform
+from controller.laws.deployable.path_planner import (
+    CORNERS,
+    empty_plan,
+    improve_path,
+    nearest_goal_point,
+    path_cost,
+    uniform,
+)
 from controller.regions import Box, DepthBand, Orientation, Region, Sphere, pack
 from controller.regions.region_set import clearance_at
 
@@ -64,7 +71,7 @@ def test_the_cost_is_that_of_looking_everywhere():
         packed.move_to(0.1 * k)
         packed.velocities[:3] = rng.normal(size=(3, 3)) * rng.choice([0.05, 0.4])
         expected = expected_cost([START, *way[:count]], packed)
-        assert cost_of(way, count, START, packed, far, GAINS) == pytest.approx(expected, rel=1e-9)
+        assert path_cost(way, count, START, packed, far, GAINS) == pytest.approx(expected, rel=1e-9)
         length = np.linalg.norm(np.diff([START, *way[:count]], axis=0), axis=1).sum()
         dear, long = dear + (expected > 1.2 * length), long + (expected > 50.0 * length)
     assert dear > 20 and long > 1
@@ -76,7 +83,7 @@ def test_the_nearest_end_is_along_the_slope_where_the_goal_is_deep_enough():
         packed = pack([goal])
         for _ in range(20):
             at = np.array([4.0, *rng.uniform([0.0, 2.0], [1.0, 3.0])])
-            nearest_end(packed, at, depth, end)
+            nearest_goal_point(packed, at, depth, end)
             assert clearance_at(packed, 0, end) == pytest.approx(depth, abs=2e-3)
             from_centre = end - [8.0, 0.5, 2.5]
             if goal is GOAL:
@@ -91,30 +98,30 @@ def test_a_line_is_free_if_dense_sampling_says_so():
         a, b = rng.normal([4.0, 0.0, 2.5], [1.5, 1.0, 0.7], size=(2, 3))
         least = min(clearance(packed, a + (b - a) * s) for s in np.linspace(0.0, 1.0, 60))
         if abs(least - 0.13) > 0.03:  # else a look may step over it
-            said.append(search.is_free(a, b, packed, 0.13))
+            said.append(search.is_line_free(a, b, packed, 0.13))
             assert said[-1] == (least > 0.13)
     assert 20 < sum(said) < len(said) - 20
-    assert search.is_free(START, START, packed, 0.1)
+    assert search.is_line_free(START, START, packed, 0.1)
 
 
 def test_a_look_goes_no_farther_than_what_is_known_to_be_free():
     """Past a small ball, 0.45 m from it at the nearest: a longer look from the start would land behind it."""
     packed = pack([Region("ball", Sphere((1.0, 0.55, 0.0), 0.1), "out")])
     begin, end = np.zeros(3), np.array([3.0, 0.0, 0.0])
-    assert not search.is_free(begin, end, packed, 0.5)
-    assert search.is_free(begin, end, packed, 0.4)
+    assert not search.is_line_free(begin, end, packed, 0.5)
+    assert search.is_line_free(begin, end, packed, 0.4)
 
 
 def test_a_start_closer_to_a_region_than_the_way_may_be_is_left():
     packed = pack([Region("ball", Sphere((4.0, 0.2, 2.4), 0.7), "out")])  # 0.04 m away
     start, end = np.array([3.26, 0.2, 2.4]), np.array([-2.0, 0.2, 2.4])
-    rng, tree, way = np.random.default_rng(0), search.tree_of_nothing(), np.zeros((9, 3))
-    assert max(search.grow(tree, start, end, rng.uniform(size=4), packed, GAINS, way) for _ in range(40)) > 0
+    rng, tree, way = np.random.default_rng(0), search.empty_tree(), np.zeros((9, 3))
+    assert max(search.grow_tree(tree, start, end, rng.uniform(size=4), packed, GAINS, way) for _ in range(40)) > 0
 
 
 def walk(seed_of_tree, packed, steps):
     """Grow a tree beside a transcription of it, and return ways found."""
-    rng, tree, way, found = np.random.default_rng(seed_of_tree), search.tree_of_nothing(), np.zeros((9, 3)), []
+    rng, tree, way, found = np.random.default_rng(seed_of_tree), search.empty_tree(), np.zeros((9, 3)), []
     nodes, parents, end, wanted = [], [], np.array([8.0, 0.5, 2.5]), 0.03 + 0.4 * 0.25
     for k in range(steps):
         if k == steps // 2:
@@ -122,22 +129,22 @@ def walk(seed_of_tree, packed, steps):
         draws = rng.uniform(size=4)
         if not nodes or np.linalg.norm(nodes[0] - end) > 0.3:
             nodes, parents = [end], [-1]
-        count = search.grow(tree, START, end, draws, packed, GAINS, way)
+        count = search.grow_tree(tree, START, end, draws, packed, GAINS, way)
         low, high = np.minimum(START, end) - 3.0, np.maximum(START, end) + 3.0
         target = START if draws[3] < 0.2 else low + draws[:3] * (high - low)
         apart = np.linalg.norm(np.array(nodes) - target, axis=1)
         nearest = int(apart.argmin())
         new = nodes[nearest] + min(1.0, 1.5 / max(apart[nearest], 1e-9)) * (target - nodes[nearest])
         expected = []
-        if apart[nearest] >= 0.05 and search.is_free(new, nodes[nearest], packed, wanted):
+        if apart[nearest] >= 0.05 and search.is_line_free(new, nodes[nearest], packed, wanted):
             parent = nearest
             for _ in range(2):
-                if parents[parent] < 0 or not search.is_free(new, nodes[parents[parent]], packed, wanted):
+                if parents[parent] < 0 or not search.is_line_free(new, nodes[parents[parent]], packed, wanted):
                     break
                 parent = parents[parent]
             nodes.append(new)
             parents.append(parent)
-            if search.is_free(new, START, packed, min(0.5 * wanted, clearance(packed, START) - 0.005)):
+            if search.is_line_free(new, START, packed, min(0.5 * wanted, clearance(packed, START) - 0.005)):
                 at = len(nodes) - 1
                 while at >= 0:
                     expected.append(nodes[at])
@@ -157,11 +164,11 @@ def test_the_tree_is_that_of_the_transcription():
 
 
 class Change:
-    """`guide._change`, from the same random numbers."""
+    """`path_planner._mutate_path`, from the same random numbers."""
 
-    def __init__(self, guide, goal):
-        self.random, self.goal = guide.random.copy(), goal
-        self.way = guide.way[: guide.points[0]].copy()
+    def __init__(self, plan, goal):
+        self.random, self.goal = plan.random.copy(), goal
+        self.way = plan.path[: plan.counts[0]].copy()
 
     def draw(self):
         return uniform(self.random)
@@ -171,7 +178,7 @@ class Change:
 
     def end(self, at):
         found = np.empty(3)
-        nearest_end(self.goal, np.array(at), GAINS.depth, found)
+        nearest_goal_point(self.goal, np.array(at), GAINS.depth, found)
         return found
 
     def anywhere(self):
@@ -201,31 +208,31 @@ class Change:
 
 
 def test_changes_are_those_of_the_transcription():
-    guide, goal, rng = guide_of_nothing(0, 3), pack([GOAL]), np.random.default_rng(5)
+    plan, goal, rng = empty_plan(0, 3), pack([GOAL]), np.random.default_rng(5)
     for k in range(300):
-        guide.points[0] = 1 + k % (CORNERS + 1)
-        guide.way[:] = rng.normal([4.0, 0.0, 2.5], 2.0, size=(CORNERS + 1, 3))
-        change = Change(guide, goal)
+        plan.counts[0] = 1 + k % (CORNERS + 1)
+        plan.path[:] = rng.normal([4.0, 0.0, 2.5], 2.0, size=(CORNERS + 1, 3))
+        change = Change(plan, goal)
         expected = change.made()
-        way_round._change(guide, START, goal, GAINS)
-        assert guide.points[1] == len(expected)
-        np.testing.assert_allclose(guide.other[: len(expected)], expected, rtol=1e-12, atol=1e-12)
-        assert guide.random[0] == change.random[0]
+        way_round._mutate_path(plan, START, goal, GAINS)
+        assert plan.counts[1] == len(expected)
+        np.testing.assert_allclose(plan.candidate[: len(expected)], expected, rtol=1e-12, atol=1e-12)
+        assert plan.random[0] == change.random[0]
 
 
 def test_a_way_is_kept_up_and_replaced_by_one_that_saves_enough():
     """Turn by turn: the end goes with the goal, corners are passed, the cheaper way stays."""
-    packed, goal, guide = pack(REGIONS), pack([GOAL]), guide_of_nothing(5, 1)
+    packed, goal, plan = pack(REGIONS), pack([GOAL]), empty_plan(5, 1)
     goal.velocities[0] = 0.05, -0.02, 0.01
     start, taken, grown = START.copy(), 0, 0
     for k in range(240):
         start = start + np.array([0.004, 0.0, 0.0])
         packed.move_to(0.02 * k)
         goal.move_to(0.02 * k)
-        before, random = guide.way[: guide.points[0]].copy(), guide.random.copy()
-        cost, turn, tree = guide.cost[0], guide.tried[0], guide.tree.size[0]
-        improve(guide, start, goal, packed, GAINS, 0.02)
-        way = guide.way[: guide.points[0]]
+        before, random = plan.path[: plan.counts[0]].copy(), plan.random.copy()
+        cost, turn, tree = plan.cost[0], plan.phase[0], plan.tree.size[0]
+        improve_path(plan, start, goal, packed, GAINS, 0.02)
+        way = plan.path[: plan.counts[0]]
         if k == 0:
             continue
         before[-1] += np.array([0.05, -0.02, 0.01]) * 0.02
@@ -233,49 +240,49 @@ def test_a_way_is_kept_up_and_replaced_by_one_that_saves_enough():
             before = before[1:]
         if turn == 0:
             np.testing.assert_allclose(way, before, rtol=1e-12)
-            assert guide.cost[0] == pytest.approx(expected_cost([start, *before], packed), rel=1e-9)
-            assert np.array_equal(random, guide.random)
+            assert plan.cost[0] == pytest.approx(expected_cost([start, *before], packed), rel=1e-9)
+            assert np.array_equal(random, plan.random)
             continue
         draws = [uniform(random) for _ in range(5)]
         length = np.linalg.norm(np.diff([start, *before], axis=0), axis=1).sum()
         looked = cost > 1.3 * length and draws[4] < 0.7
-        grown += guide.tree.size[0] != tree
-        assert looked == np.array_equal(random, guide.random)
-        other = guide.other[: guide.points[1]]
+        grown += plan.tree.size[0] != tree
+        assert looked == np.array_equal(random, plan.random)
+        other = plan.candidate[: plan.counts[1]]
         new = expected_cost([start, *other], packed) if len(other) else np.inf
         if new < cost - 0.03 - 0.01 * cost:
             taken += 1
-            assert guide.cost[0] == pytest.approx(new, rel=1e-9)
+            assert plan.cost[0] == pytest.approx(new, rel=1e-9)
             assert np.array_equal(way, other)
         else:
-            assert guide.cost[0] == cost
+            assert plan.cost[0] == cost
             np.testing.assert_allclose(way, before, rtol=1e-12)
     assert taken > 5 and grown > 3
 
 
 def test_passed_corners_are_dropped_one_after_the_other():
-    guide, corners = guide_of_nothing(0, 1), [(1.0, 0.0, 2.5), (1.1, 0.1, 2.5), (4.0, 1.0, 2.5), (8.0, 0.5, 2.5)]
-    guide.points[0], guide.way[:4] = 4, corners
-    improve(guide, np.array([1.05, 0.05, 2.5]), pack([GOAL]), pack([]), GAINS, 0.02)
-    assert guide.points[0] == 2
-    assert guide.way[:2].tolist() == [list(corner) for corner in corners[2:]]
-    assert way_round._length(guide.way, 2, START) == pytest.approx(np.hypot(4.0, 0.8) + np.hypot(4.0, 0.5))
+    plan, corners = empty_plan(0, 1), [(1.0, 0.0, 2.5), (1.1, 0.1, 2.5), (4.0, 1.0, 2.5), (8.0, 0.5, 2.5)]
+    plan.counts[0], plan.path[:4] = 4, corners
+    improve_path(plan, np.array([1.05, 0.05, 2.5]), pack([GOAL]), pack([]), GAINS, 0.02)
+    assert plan.counts[0] == 2
+    assert plan.path[:2].tolist() == [list(corner) for corner in corners[2:]]
+    assert way_round._length(plan.path, 2, START) == pytest.approx(np.hypot(4.0, 0.8) + np.hypot(4.0, 0.5))
 
 
 def test_the_first_corner_of_the_longest_way_is_dropped():
-    guide = guide_of_nothing(0, 1)
-    guide.points[0], guide.way[:, 0], guide.way[:, 1:] = CORNERS + 1, np.linspace(0.0, 8.0, CORNERS + 1), (0.5, 2.5)
-    before = guide.way.copy()
-    improve(guide, np.array([0.0, 0.4, 2.5]), pack([GOAL]), pack([]), GAINS, 0.02)
-    assert guide.points[0] == CORNERS
-    assert np.array_equal(guide.way[:CORNERS], before[1:])
+    plan = empty_plan(0, 1)
+    plan.counts[0], plan.path[:, 0], plan.path[:, 1:] = CORNERS + 1, np.linspace(0.0, 8.0, CORNERS + 1), (0.5, 2.5)
+    before = plan.path.copy()
+    improve_path(plan, np.array([0.0, 0.4, 2.5]), pack([GOAL]), pack([]), GAINS, 0.02)
+    assert plan.counts[0] == CORNERS
+    assert np.array_equal(plan.path[:CORNERS], before[1:])
 
 
 def test_what_is_found_far_away_is_not_looked_at_again(monkeypatch):
     """In plain Python: a ball that is farther than the way is long, once; one at half of that, again after a while."""
-    plain, looks = getattr(cost_of, "py_func", cost_of), []
-    look = plain.__globals__["clearance_of_sphere"]
-    monkeypatch.setitem(plain.__globals__, "clearance_of_sphere", lambda *given: looks.append(1) or look(*given))
+    plain, looks = getattr(path_cost, "py_func", path_cost), []
+    clearance = plain.__globals__["clearance_of_sphere"]
+    monkeypatch.setitem(plain.__globals__, "clearance_of_sphere", lambda *given: looks.append(1) or clearance(*given))
     way = np.zeros((CORNERS + 1, 3))
     way[0] = START + np.array([6.0, 0.0, 0.0])
     for aside, least, most in ((8.0, 1, 1), (4.0, 2, 9)):
