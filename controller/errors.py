@@ -70,3 +70,7 @@ def printable(said: object) -> str:
 def _cut(text: str, most: int) -> str:
     half = (most - 5) // 2
     return text if len(text) <= most else f"{text[:half]} ... {text[-half:]}"
+
+
+class TranslationError(ControllerError):
+    """Python that is not translated to C; the message names file and line."""

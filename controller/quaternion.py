@@ -80,10 +80,24 @@ def kinematic_matrix(e: Array) -> Array:
     return np.array([[-e1, -e2, -e3], [e0, -e3, e2], [e3, e0, -e1], [-e2, e1, e0]])
 
 
+@jit_noalloc
+def rate_parts(e: Array, omega: Array) -> Vector4:
+    """Return the parts of de/dt of `e` at the body angular velocity `omega` [rad/s]: (6), (24)."""
+    e0, e1, e2, e3, p, q, r = e[0], e[1], e[2], e[3], omega[0], omega[1], omega[2]
+    return (
+        0.5 * (-e1 * p - e2 * q - e3 * r),
+        0.5 * (e0 * p - e3 * q + e2 * r),
+        0.5 * (e3 * p + e0 * q - e1 * r),
+        0.5 * (-e2 * p + e1 * q + e0 * r),
+    )
+
+
 @compiled
 def rate(e: Array, omega: Array) -> Array:
     """Return de/dt, shape (4,), of `e` at the body angular velocity `omega` [rad/s]: (6), (24)."""
-    return 0.5 * kinematic_matrix(e) @ omega
+    e_dot = np.empty(4)
+    e_dot[0], e_dot[1], e_dot[2], e_dot[3] = rate_parts(e, omega)
+    return e_dot
 
 
 @compiled

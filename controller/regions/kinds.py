@@ -28,9 +28,10 @@ def _by_kind(name: str, arguments: str, of_attitude: bool) -> Callable[..., Any]
     names: dict[str, Any] = {f"_{kind}": entry.evaluate for kind, entry in entries.items()}
     choices = [f"    if kind == {entry.shape.kind}: return _{kind}({arguments})\n" for kind, entry in entries.items()]
     last = f"    return _{list(entries)[-1]}({arguments})\n"  # there are no other kinds: `pack` takes shapes alone
-    code = compile(f"def {name}(kind, {arguments}):\n{''.join(choices[:-1])}{last}", __file__, "exec")
+    source = f"def {name}(kind, {arguments}):\n{''.join(choices[:-1])}{last}"
     names["__name__"] = __name__
-    exec(code, names)  # noqa: S102 -- of the names of this package's files
+    exec(compile(source, __file__, "exec"), names)  # noqa: S102 -- of the names of this package's files
+    names[name].source = source  # which stands in no file
     made: Callable[..., Any] = part(names[name])
     return made
 

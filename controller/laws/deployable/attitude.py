@@ -15,13 +15,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from controller.jit.jit import compiled, part
+from controller.jit.jit import part
 from controller.jit.stack_array import zeros
 from controller.laws.deployable.gains import DeployableGains
 from controller.laws.deployable.linear_algebra import copy, product
 from controller.laws.deployable.model import Dynamics, Thrusters
-from controller.quaternion import down_parts, error_parts
-from controller.quaternion import rate as quaternion_rate
+from controller.quaternion import down_parts, error_parts, rate_parts
 from controller.regions.kinds import FIRST_OF_ATTITUDE
 from controller.regions.region_set import PackedRegions, attitude_clearance
 
@@ -166,10 +165,10 @@ def _add_scaled(scale: float, values: Array, out: Array) -> None:
         out[axis] += scale * values[axis]
 
 
-@compiled
+@part
 def integrate_attitude(quaternion: Array, omega: Array, period: float, out: Array) -> None:
     """Integrate a body rate [rad/s] over a period [s] into `out`, shape (4,), which may be `quaternion` itself."""
-    rate = quaternion_rate(quaternion, omega)
+    rate = rate_parts(quaternion, omega)
     for i in range(4):
         out[i] = quaternion[i] + period * rate[i]
     length = np.sqrt(out[0] ** 2 + out[1] ** 2 + out[2] ** 2 + out[3] ** 2)

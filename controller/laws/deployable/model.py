@@ -7,10 +7,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from controller.jit.jit import compiled, part
+from controller.jit.jit import part
 from controller.jit.stack_array import zeros
 from controller.law import VehicleModel
-from controller.laws.deployable.linear_algebra import product
+from controller.laws.deployable.linear_algebra import invert_symmetric, product
 
 Array = NDArray[np.float64]
 
@@ -104,7 +104,7 @@ def make_thrusters(vehicle: VehicleModel) -> Thrusters:
     return thrusters
 
 
-@compiled
+@part
 def reallocate(thrusters: Thrusters) -> None:
     """Update matrix, limits and inverses to `health`."""
     m = thrusters.health.size
@@ -113,7 +113,7 @@ def reallocate(thrusters: Thrusters) -> None:
             thrusters.matrix[k, j] = thrusters.nominal_matrix[k, j] * thrusters.health[j]
         thrusters.lower[j] = thrusters.nominal_lower[j] * thrusters.health[j]
         thrusters.upper[j] = thrusters.nominal_upper[j] * thrusters.health[j]
-    H = np.empty((m, m))
+    H = thrusters.inverse
     for i in range(m):
         for j in range(m):
             total = 0.0
@@ -124,10 +124,8 @@ def reallocate(thrusters: Thrusters) -> None:
         for k in range(6):
             own += thrusters.nominal_matrix[k, i] * thrusters.metric[k] * thrusters.nominal_matrix[k, i]
         H[i, i] += _REGULARISATION * max(own, 1e-12)
-    inverse = np.linalg.inv(H)
+    invert_symmetric(H)
     for i in range(m):
-        for j in range(m):
-            thrusters.inverse[i, j] = 0.5 * (inverse[i, j] + inverse[j, i])  # symmetric to the last bit
         for k in range(6):
             total = 0.0
             for j in range(m):

@@ -1,0 +1,164 @@
+"""A program: functions with all that they call, as one file of C99."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from types import FunctionType
+from typing import Any
+
+from controller.errors import TranslationError
+from controller.translator.statements import Function
+from controller.translator.types import Array, Nothing, Record, Scalar, Tuple, Type
+
+_HEAD = """\
+/* Translated from Python: change that text, not this one. No heap; compile with -ffp-contract=off. */
+#include <math.h>
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* As Python orders them: the first of equals, and the first where one is no number. */
+static inline double min_f64(double a, double b) { return b < a ? b : a; }
+static inline double max_f64(double a, double b) { return b > a ? b : a; }
+static inline int64_t min_i64(int64_t a, int64_t b) { return b < a ? b : a; }
+static inline int64_t max_i64(int64_t a, int64_t b) { return b > a ? b : a; }
+
+/* Rounded down, as Python divides. */
+static inline int64_t floor_div(int64_t a, int64_t b) { return a / b - (a % b != 0 && (a < 0) != (b < 0)); }
+static inline int64_t floor_mod(int64_t a, int64_t b) { return a - b * floor_div(a, b); }
+"""
+
+
+class Program:
+    """Functions in C, each for arguments of the types that it is called with.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from controller.laws.deployable.linear_algebra import norm
+    >>> from controller.translator.program import Program
+    >>> from controller.translator.types import type_of
+    >>> program = Program()
+    >>> program.export("length", norm, (type_of(np.zeros(3)),))
+    >>> "linear_algebra_norm(f64_1 a)" in program.text()
+    True
+    """
+
+    def __init__(self) -> None:
+        self._instances: dict[tuple[FunctionType, tuple[Type, ...]], tuple[str, Type]] = {}
+        self._under_way: set[FunctionType] = set()
+        self._reserved: set[str] = set()
+        self._functions: list[str] = []
+        self._types: dict[Type, str] = {}
+        self._definitions: list[str] = []
+        self._exports: list[str] = []
+
+    def export(self, name: str, function: Any, arguments: tuple[Type, ...]) -> None:
+        """Translate a function, and let it be called by a name, with its arguments as words.
+
+        Parameters
+        ----------
+        name : str
+            In C, of ``void name(const void *words)``.
+        function : callable
+            Plain, or compiled; it returns nothing.
+        arguments : tuple of Type
+            That it is called with.
+
+        Raises
+        ------
+        TranslationError
+            If it, or what it calls, is beyond the subset; with file and line.
+        """
+        self._reserved.add(name)
+        called, _ = self.instance(getattr(function, "py_func", function), arguments)
+        fields = "".join(f"    {self.name(kind)} a{i};\n" for i, kind in enumerate(arguments))
+        given = ", ".join(f"{'&' if isinstance(kind, Record) else ''}w->a{i}" for i, kind in enumerate(arguments))
+        self._exports.append(
+            f"typedef struct {{\n{fields}}} {name}_arguments;\n\n"
+            f"void {name}(const void *words);\nvoid {name}(const void *words)\n{{\n"
+            f"    const {name}_arguments *w = words;\n    {called}({given});\n}}\n"
+        )
+
+    def text(self) -> str:
+        """Return the file."""
+        return "\n".join([_HEAD, *self._definitions, *self._functions, *self._exports])
+
+    def instance(self, function: FunctionType, arguments: tuple[Type, ...]) -> tuple[str, Type]:
+        """Return the C name of a function for some arguments, and the type of what it returns."""
+        key = (function, arguments)
+        if key not in self._instances:
+            if function in self._under_way:
+                raise TranslationError(f"{function.__qualname__} calls itself, which is not translated to C")
+            self._under_way.add(function)
+            stem = f"{function.__module__.rpartition('.')[2]}_{function.__name__.strip('_')}"
+            taken = self._reserved.union(name for name, _ in self._instances.values())
+            name = next(n for n in _numbered(stem) if n not in taken)
+            made = Function(self, function, arguments)
+            code = made.translate(name)
+            self._under_way.discard(function)
+            self._instances[key] = (name, made.result)
+            self._functions.append(code)
+        return self._instances[key]
+
+    def name(self, kind: Type) -> str:
+        """Return the C name of a type, which is defined before what uses it."""
+        match kind:
+            case Scalar():
+                return kind.c
+            case Nothing():
+                return "void"
+        if kind not in self._types:
+            name, text = self._defined(kind)
+            self._types[kind] = name
+            self._definitions.append(text)
+        return self._types[kind]
+
+    def _defined(self, kind: Type) -> tuple[str, str]:
+        match kind:
+            case Array():
+                return kind.c, _array(kind)
+            case Record():
+                fields = [f"{self.name(item)} {field};" for field, item in zip(kind.fields, kind.items, strict=True)]
+                return self._struct(kind.python.__name__, fields)
+            case Tuple():
+                if kind.uniform:
+                    return self._struct("tuple", [f"{self.name(kind.items[0])} f[{len(kind.items)}];"])
+                return self._struct("tuple", [f"{self.name(item)} f{i};" for i, item in enumerate(kind.items)])
+        raise TypeError(kind)
+
+    def _struct(self, stem: str, fields: Sequence[str]) -> tuple[str, str]:
+        name = next(n for n in _numbered(stem) if n not in self._types.values())
+        inside = "".join(f"    {field}\n" for field in fields)
+        return name, f"typedef struct {{\n{inside}}} {name};\n"
+
+
+def _numbered(stem: str) -> Any:
+    yield stem
+    n = 2
+    while True:
+        yield f"{stem}_{n}"
+        n += 1
+
+
+def _array(kind: Array) -> str:
+    """Return the struct of a view, and what copies and fills it."""
+    name, item, n = kind.c, kind.item.c, kind.ndim
+    sizes = "".join(f"    int64_t n{i};\n" for i in range(n))
+    strides = "" if kind.contiguous else "".join(f"    int64_t s{i};\n" for i in range(n))
+    text = f"typedef struct {{\n    {item} *data;\n{sizes}{strides}}} {name};\n"
+    if n == 1 and kind.contiguous:
+        text += (
+            f"\nstatic inline {name} {name}_slice({name} a, int64_t from, int64_t to)\n{{\n"
+            "    from = from < 0 ? max_i64(from + a.n0, 0) : min_i64(from, a.n0);\n"
+            "    to = to < 0 ? max_i64(to + a.n0, 0) : min_i64(to, a.n0);\n"
+            f"    return ({name}){{a.data + from, max_i64(to - from, 0)}};\n}}\n"
+        )
+    if kind.contiguous:
+        total = " * ".join(f"a.n{i}" for i in range(n))
+        loop = f"    const int64_t n = {total};\n    for (int64_t i = 0; i < n; i++)\n        a.data[i] = "
+        text += f"\nstatic inline void {name}_fill({name} a, {item} x)\n{{\n{loop}x;\n}}\n"
+        text += f"\nstatic inline void {name}_copy({name} a, {name} b)\n{{\n{loop}b.data[i];\n}}\n"
+    return text

@@ -1,0 +1,136 @@
+"""Types of translated code: numbers, arrays, tuples and named tuples, and the C that stands for each."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Scalar:
+    """A number or a truth value."""
+
+    c: str
+
+
+DOUBLE, INT, UINT, BOOL = Scalar("double"), Scalar("int64_t"), Scalar("uint64_t"), Scalar("bool")
+_ITEMS = {"float64": DOUBLE, "int64": INT, "uint64": UINT, "bool": BOOL}
+_SHORT = {DOUBLE: "f64", INT: "i64", UINT: "u64", BOOL: "b8"}
+
+
+@dataclass(frozen=True)
+class Array:
+    """A view of an array: a pointer, its shape, and its strides where it is not contiguous."""
+
+    item: Scalar
+    ndim: int
+    contiguous: bool = True
+
+    @property
+    def c(self) -> str:
+        """The name of its struct."""
+        return f"{_SHORT[self.item]}{'' if self.contiguous else 's'}_{self.ndim}"
+
+
+@dataclass(frozen=True)
+class Tuple:
+    """A tuple whose items are known by their places; passed by value."""
+
+    items: tuple[Type, ...]
+
+    @property
+    def uniform(self) -> bool:
+        """Whether all items are numbers of one type: then a place in it may be computed."""
+        return isinstance(self.items[0], Scalar) and len(set(self.items)) == 1
+
+    def item(self, place: int) -> str:
+        """Return the C member of an item."""
+        return f"f[{place}]" if self.uniform else f"f{place}"
+
+
+@dataclass(frozen=True)
+class Record:
+    """A named tuple; passed by pointer, and never written."""
+
+    python: type
+    items: tuple[Type, ...]
+
+    @property
+    def fields(self) -> tuple[str, ...]:
+        """Names of its items."""
+        names: tuple[str, ...] = self.python._fields  # type: ignore[attr-defined]
+        return names
+
+
+@dataclass(frozen=True)
+class Nothing:
+    """What a function without a result returns."""
+
+
+Type = Scalar | Array | Tuple | Record | Nothing
+
+
+def type_of(value: Any) -> Type:
+    """Return the type of an argument.
+
+    Parameters
+    ----------
+    value : object
+        A number, a C-contiguous array of float64, int64, uint64 or bool, or a tuple of such.
+
+    Raises
+    ------
+    TypeError
+        If it is of another type.
+    """
+    match value:
+        case bool() | np.bool_():
+            return BOOL
+        case int() | np.int64():
+            return INT
+        case float():
+            return DOUBLE
+        case np.ndarray() if value.dtype.name in _ITEMS and value.flags.c_contiguous:
+            return Array(_ITEMS[value.dtype.name], value.ndim)
+        case tuple():
+            items = tuple(map(type_of, value))
+            return Record(type(value), items) if hasattr(value, "_fields") else Tuple(items)
+    kind = f"an array of {value.dtype}" if isinstance(value, np.ndarray) else type(value).__name__
+    raise TypeError(f"argument is {kind}, expected a number, a contiguous array of numbers, or a tuple of such")
+
+
+def unified(one: Type, other: Type) -> Type:
+    """Return the type that holds values of both: of numbers the wider one.
+
+    Raises
+    ------
+    TypeError
+        If there is none.
+    """
+    if one == other:
+        return one
+    rank = [BOOL, INT, DOUBLE]
+    if isinstance(one, Scalar) and isinstance(other, Scalar) and one in rank and other in rank:
+        return max(one, other, key=rank.index)
+    if isinstance(one, Tuple) and isinstance(other, Tuple) and len(one.items) == len(other.items):
+        return Tuple(tuple(map(unified, one.items, other.items)))
+    if isinstance(one, Array) and isinstance(other, Array) and (one.item, one.ndim) == (other.item, other.ndim):
+        return Array(one.item, one.ndim, False)
+    raise TypeError(f"{name_of(one)} and {name_of(other)} in the same place")
+
+
+def name_of(kind: Type) -> str:
+    """Return a type in a few words, for errors."""
+    match kind:
+        case Scalar():
+            return kind.c
+        case Array():
+            return f"an array of {kind.ndim} dimensions"
+        case Tuple():
+            return f"a tuple of {len(kind.items)}"
+        case Record():
+            return kind.python.__name__
+        case Nothing():
+            return "no value"
