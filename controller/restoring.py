@@ -8,19 +8,28 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from controller.jit.jit import compiled
-from controller.quaternion import down_in_body, skew
+from controller.jit.jit import compiled, jit_noalloc
+from controller.quaternion import down_parts
 
 Array = NDArray[np.float64]
 
 
+@jit_noalloc
+def write_regressor(e: Array, Z: Array) -> None:
+    """Write Z(eta), shape (6, 4), of a unit quaternion `e`: (12), Z = [-k 0; 0 S(k)] with k = R^T e3."""
+    x, y, z = down_parts(e)
+    Z[:, :] = 0.0
+    Z[0, 0], Z[1, 0], Z[2, 0] = -x, -y, -z
+    Z[3, 2], Z[3, 3] = -z, y
+    Z[4, 1], Z[4, 3] = z, -x
+    Z[5, 1], Z[5, 2] = -y, x
+
+
 @compiled
 def regressor(e: Array) -> Array:
-    """Return Z(eta), shape (6, 4), of a unit quaternion `e`: (12), Z = [-k 0; 0 S(k)] with k = R^T e3."""
-    k = down_in_body(e)
-    Z = np.zeros((6, 4))
-    Z[:3, 0] = -k
-    Z[3:, 1:] = skew(k)
+    """Return Z(eta), shape (6, 4), as `write_regressor` writes it."""
+    Z = np.empty((6, 4))
+    write_regressor(e, Z)
     return Z
 
 

@@ -21,7 +21,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from controller.jit.jit import compiled
+from controller.jit.jit import jit_noalloc
+from controller.jit.stack_array import zeros
 from controller.law import Array, VehicleState, WrenchLaw
 from controller.potential_field import (
     Field,
@@ -32,7 +33,7 @@ from controller.potential_field import (
     keep_within,
     set_point_error,
 )
-from controller.quaternion import down_in_body, error, rotation_matrix, skew
+from controller.quaternion import down_parts, error_parts, write_rotation
 from controller.regions.region_set import PackedRegions
 
 
@@ -67,18 +68,19 @@ class AntonelliMemory(NamedTuple):
     field: Field
 
 
-@compiled
-def regressor(quaternion: Array) -> Array:
-    """Return Phi, shape (6, 9), of a unit quaternion, shape (4,)."""
-    Phi = np.zeros((6, 9))
-    R_T = rotation_matrix(quaternion).T
-    Phi[3:, :3] = skew(down_in_body(quaternion))
-    Phi[:3, 3:6] = R_T
-    Phi[3:, 6:] = R_T
-    return Phi
+@jit_noalloc
+def write_regressor(quaternion: Array, R: Array, Phi: Array) -> None:
+    """Write Phi, shape (6, 9), of a unit quaternion, shape (4,), and its rotation, shape (3, 3), over zeros."""
+    x, y, z = down_parts(quaternion)
+    Phi[3, 1], Phi[3, 2] = -z, y
+    Phi[4, 0], Phi[4, 2] = z, -x
+    Phi[5, 0], Phi[5, 1] = -y, x
+    for i in range(3):
+        for j in range(3):
+            Phi[i, 3 + j] = Phi[3 + i, 6 + j] = R[j, i]
 
 
-@compiled
+@jit_noalloc
 def step(
     state: VehicleState,
     goal: PackedRegions,
@@ -89,11 +91,13 @@ def step(
     forces: Array,
 ) -> None:
     """Do what `CompiledLaw.step` says; all regions push in full, whatever their weights."""
-    R, Phi = rotation_matrix(state.quaternion), regressor(state.quaternion)
+    R, Phi = zeros(3, 3), zeros(6, 9)
+    write_rotation(state.quaternion, R)
+    write_regressor(state.quaternion, R, Phi)
     field, drive, theta = memory.field, memory.drive, memory.theta
     evaluate_field(state, goal, regions, gains.repulsion, gains.reach, field)
     set_point_error(field, gains.inset, gains.limit / gains.k_p1)
-    e_att = error(memory.desired_quaternion, state.quaternion)[1:]  # (23)
+    e_att = error_parts(memory.desired_quaternion, state.quaternion)[1:]  # (23)
     # the wrench
     damp(state.velocity_body, e_att, gains.k_p2, gains.k_v1, gains.k_v2, forces)
     add_turned(R, field.error, -gains.k_p1, forces)
@@ -102,7 +106,8 @@ def step(
         for j in range(9):
             forces[i] += Phi[i, j] * theta[j]
     # the estimate
-    drive[:] = state.velocity_body
+    for i in range(6):
+        drive[i] = state.velocity_body[i]
     add_turned(R, field.error, gains.lambda_p, drive)
     for i in range(3):
         drive[3 + i] += gains.lambda_a * e_att[i]
@@ -114,7 +119,8 @@ def step(
     keep_within(theta, 3, 6, gains.bound)
     keep_within(theta, 6, 9, gains.bound_moment)
     memory.estimate[0] = -theta[5]
-    memory.estimate[1:] = theta[:3]
+    for i in range(3):
+        memory.estimate[1 + i] = theta[i]
 
 
 def memory_of(desired_quaternion: Array, period: Array, n_regions: int) -> AntonelliMemory:

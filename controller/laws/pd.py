@@ -15,7 +15,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from controller.jit.jit import compiled
+from controller.jit.jit import jit_noalloc
+from controller.jit.stack_array import zeros
 from controller.law import Array, VehicleState, WrenchLaw
 from controller.potential_field import (
     Field,
@@ -25,7 +26,7 @@ from controller.potential_field import (
     field_of,
     set_point_error,
 )
-from controller.quaternion import error, rotation_matrix
+from controller.quaternion import error_parts, write_rotation
 from controller.regions.region_set import PackedRegions
 
 
@@ -51,7 +52,7 @@ class PdMemory(NamedTuple):
     field: Field
 
 
-@compiled
+@jit_noalloc
 def step(
     state: VehicleState,
     goal: PackedRegions,
@@ -62,10 +63,11 @@ def step(
     forces: Array,
 ) -> None:
     """Do what `CompiledLaw.step` says; all regions push in full, whatever their weights."""
-    R, field = rotation_matrix(state.quaternion), memory.field
+    R, field = zeros(3, 3), memory.field
+    write_rotation(state.quaternion, R)
     evaluate_field(state, goal, regions, gains.repulsion, gains.reach, field)
     set_point_error(field, gains.inset, gains.limit / gains.k_p1)
-    e_att = error(memory.desired_quaternion, state.quaternion)[1:]  # (23)
+    e_att = error_parts(memory.desired_quaternion, state.quaternion)[1:]  # (23)
     damp(state.velocity_body, e_att, gains.k_p2, gains.k_v1, gains.k_v2, forces)
     add_turned(R, field.error, -gains.k_p1, forces)
     add_turned(R, field.push, 1.0, forces)

@@ -17,7 +17,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from controller.jit.jit import compiled
+from controller.jit.jit import jit_noalloc
+from controller.jit.stack_array import zeros
 from controller.law import Array, VehicleState, WrenchLaw
 from controller.potential_field import (
     Field,
@@ -28,9 +29,9 @@ from controller.potential_field import (
     keep_within,
     set_point_error,
 )
-from controller.quaternion import error, rotation_matrix
+from controller.quaternion import error_parts, write_rotation
 from controller.regions.region_set import PackedRegions
-from controller.restoring import regressor
+from controller.restoring import write_regressor
 
 
 class SunCheahGains(NamedTuple):
@@ -62,7 +63,7 @@ class SunCheahMemory(NamedTuple):
     field: Field
 
 
-@compiled
+@jit_noalloc
 def step(
     state: VehicleState,
     goal: PackedRegions,
@@ -73,11 +74,13 @@ def step(
     forces: Array,
 ) -> None:
     """Do what `CompiledLaw.step` says; all regions push in full, whatever their weights."""
-    R, Z = rotation_matrix(state.quaternion), regressor(state.quaternion)
+    R, Z = zeros(3, 3), zeros(6, 4)
+    write_rotation(state.quaternion, R)
+    write_regressor(state.quaternion, Z)  # (12)
     field, drive, estimate = memory.field, memory.drive, memory.estimate
     evaluate_field(state, goal, regions, gains.repulsion, gains.reach, field)
     set_point_error(field, gains.inset, gains.limit / gains.k_p1)
-    e_att = error(memory.desired_quaternion, state.quaternion)[1:]  # (23)
+    e_att = error_parts(memory.desired_quaternion, state.quaternion)[1:]  # (23)
     # the wrench
     damp(state.velocity_body, e_att, gains.k_p2, gains.k_v1, gains.k_v2, forces)
     add_turned(R, field.error, -gains.k_p1, forces)
@@ -86,7 +89,8 @@ def step(
         for j in range(4):
             forces[i] += Z[i, j] * estimate[j]
     # the estimate
-    drive[:] = state.velocity_body
+    for i in range(6):
+        drive[i] = state.velocity_body[i]
     add_turned(R, field.error, gains.sigma_p, drive)
     for i in range(3):
         drive[3 + i] += gains.sigma_a * e_att[i]

@@ -1,177 +1,21 @@
-"""Expressions: what each construct of Python becomes in C, in Python's order of evaluation and rounding."""
+"""Expressions of numbers: what each becomes in C, in Python's order of evaluation and rounding."""
 
 from __future__ import annotations
 
 import ast
-import math
-import types as python_types
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from typing import Any, NoReturn
+from typing import Any
 
-import numpy as np
-
-from controller.errors import TranslationError
-from controller.translator.types import (
-    BOOL,
-    DOUBLE,
-    INT,
-    UINT,
-    Array,
-    Nothing,
-    Record,
-    Scalar,
-    Tuple,
-    Type,
-    name_of,
-    unified,
-)
+from controller.translator.operands import Items, Known, Operand, Operands, Value, bracketed
+from controller.translator.types import BOOL, DOUBLE, INT, UINT, Array, Record, name_of, unified
 
 _ARITHMETIC = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*"}
 _BITS = {ast.BitXor: "^", ast.BitAnd: "&", ast.BitOr: "|", ast.LShift: "<<", ast.RShift: ">>"}
 _COMPARED = {ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: "==", ast.NotEq: "!="}
-_MATH = {
-    "sqrt": "sqrt", "cos": "cos", "sin": "sin", "acos": "acos", "atan2": "atan2", "hypot": "hypot",
-    "copysign": "copysign", "tan": "tan", "exp": "exp", "log": "log",
-    "arccos": "acos", "arctan2": "atan2",
-}  # fmt: skip
-_TESTS = {"isnan": "isnan", "isfinite": "isfinite", "isinf": "isinf"}
-_CAST = {float: DOUBLE, int: INT, bool: BOOL, np.uint64: UINT, np.int64: INT, np.float64: DOUBLE}
 _LARGEST_POWER = 8  # that is multiplied out
-_MODULES = (math, np)
 
 
-@dataclass(frozen=True)
-class Value:
-    """A value that C computes: of a record, the pointer to it."""
-
-    type: Type
-    code: str
-    simple: bool = False  # a name or a number: it may be written twice, and nothing that follows changes it
-
-
-@dataclass(frozen=True)
-class Known:
-    """What is known when the code is translated: a number, a tuple of such, a function, a module, a class."""
-
-    value: Any
-
-
-@dataclass(frozen=True)
-class Items:
-    """A tuple that is not put together, but known by its items."""
-
-    items: tuple[Operand, ...]
-
-
-Operand = Value | Known | Items
-
-
-class Expressions:
-    """Translates the expressions of one function; statements that they need first go to `lines`."""
-
-    names: dict[str, Type]  # of variables, as far as they are known
-    globals: dict[str, Any]
-    lines: list[str]
-
-    def fail(self, node: ast.AST, what: str) -> NoReturn:
-        """Refuse a construct by its place."""
-        raise NotImplementedError
-
-    def temporary(self, kind: Type, code: str) -> Value:
-        """Return a new variable with a value."""
-        raise NotImplementedError
-
-    def call_translated(self, function: Callable[..., Any], arguments: Sequence[Operand], node: ast.AST) -> Operand:
-        """Call a function of Python that is translated too."""
-        raise NotImplementedError
-
-    def make_zeros(self, shape: tuple[int, ...]) -> Value:
-        """Return a new array of zeros on the stack."""
-        raise NotImplementedError
-
-    def make_record(self, kind: type, items: Sequence[Value]) -> Value:
-        """Return a new named tuple on the stack."""
-        raise NotImplementedError
-
-    # ---- operands ----
-
-    def in_order(self, nodes: Sequence[ast.expr]) -> list[Operand]:
-        """Return operands, each evaluated before what the following ones do first."""
-        operands: list[Operand] = []
-        for node in nodes:
-            mark = len(self.lines)
-            operand = self.expression(node)
-            if len(self.lines) > mark:
-                later, self.lines[mark:] = self.lines[mark:], []
-                operands = [self._kept(operand) for operand in operands]
-                self.lines += later
-            operands.append(operand)
-        return operands
-
-    def _kept(self, operand: Operand) -> Operand:
-        if isinstance(operand, Items):
-            return Items(tuple(map(self._kept, operand.items)))
-        if isinstance(operand, Value) and not operand.simple and isinstance(operand.type, Scalar):
-            return self.temporary(operand.type, operand.code)
-        return operand
-
-    def value(self, operand: Operand, node: ast.AST) -> Value:
-        """Return an operand as C computes it."""
-        match operand:
-            case Value():
-                return operand
-            case Known(bool(x) | np.bool_(x)):
-                return Value(BOOL, "true" if x else "false", True)
-            case Known(np.uint64() as x):
-                return Value(UINT, f"UINT64_C({int(x)})", True)
-            case Known(int(x)) | Known(np.integer() as x):  # type: ignore[misc]
-                return Value(INT, f"INT64_C({int(x)})" if abs(int(x)) > 2**31 else f"{int(x)}", True)
-            case Known(float(x)):
-                return Value(DOUBLE, _number(x), True)
-            case Known(tuple(items)):
-                return self.value(Items(tuple(map(Known, items))), node)
-            case Items(items):
-                values = [self.value(item, node) for item in items]
-                kind = Tuple(tuple(value.type for value in values))
-                return Value(kind, self.compound(kind, [value.code for value in values]))
-        return self.fail(node, "not a value")
-
-    def compound(self, kind: Type, codes: Sequence[str]) -> str:
-        """Return a tuple made of its items."""
-        inside = ", ".join(codes)
-        braces = f"{{{inside}}}" if isinstance(kind, Tuple) and kind.uniform else inside
-        return f"({self.c(kind)}){{{braces}}}"
-
-    def c(self, kind: Type) -> str:
-        """Return the C name of a type."""
-        raise NotImplementedError
-
-    def scalar(self, operand: Operand, node: ast.AST) -> Value:
-        """Return an operand that is a number."""
-        value = self.value(operand, node)
-        if not isinstance(value.type, Scalar):
-            self.fail(node, f"{name_of(value.type)}, expected a number")
-        return value
-
-    def converted(self, value: Value, kind: Type) -> str:
-        """Return the code of a number as another type of number."""
-        if value.type == kind or not isinstance(kind, Scalar):
-            return value.code
-        return f"({kind.c}){_bracketed(value)}"
-
-    def items_of(self, operand: Operand, node: ast.AST) -> list[Operand]:
-        """Return the items of a tuple."""
-        match operand:
-            case Items(items):
-                return list(items)
-            case Known(tuple(items)):
-                return [Known(item) for item in items]
-            case Value(Tuple() as kind, code):
-                return [Value(item, f"{code}.{kind.item(i)}", operand.simple) for i, item in enumerate(kind.items)]
-        return self.fail(node, "expected a tuple")
-
-    # ---- expressions ----
+class Expressions(Operands):
+    """Translates names, numbers, operators and choices."""
 
     def expression(self, node: ast.expr) -> Operand:
         """Return what an expression is."""
@@ -195,10 +39,6 @@ class Expressions:
             self.fail(node, f"{node.id} is not known here")
         return Known(found)
 
-    def variable(self, name: str) -> str:
-        """Return the C name of a variable."""
-        raise NotImplementedError
-
     def _attribute(self, node: ast.Attribute) -> Operand:
         owner = self.expression(node.value)
         match owner:
@@ -206,7 +46,7 @@ class Expressions:
                 return Known(getattr(value, node.attr))
             case Value(Record() as kind, code) if node.attr in kind.fields:
                 item = kind.items[kind.fields.index(node.attr)]
-                inside = f"{_bracketed(owner)}->{node.attr}"
+                inside = f"{bracketed(owner)}->{node.attr}"
                 return Value(item, f"(&{inside})" if isinstance(item, Record) else inside, True)
             case Value(Array() as kind, code) if node.attr == "size":
                 return Value(INT, " * ".join(f"{code}.n{i}" for i in range(kind.ndim)), kind.ndim == 1)
@@ -224,11 +64,11 @@ class Expressions:
         value = self.scalar(operand, node)
         match node.op:
             case ast.USub():
-                return Value(value.type if value.type != BOOL else INT, f"-{_bracketed(value)}")
+                return Value(value.type if value.type != BOOL else INT, f"-{bracketed(value)}")
             case ast.UAdd():
                 return value
             case ast.Not():
-                return Value(BOOL, f"!{_bracketed(value)}")
+                return Value(BOOL, f"!{bracketed(value)}")
         return self.fail(node, f"{type(node.op).__name__} is not translated")
 
     def _binop(self, node: ast.BinOp) -> Operand:
@@ -244,12 +84,12 @@ class Expressions:
             sign = _BITS.get(type(op)) or _ARITHMETIC.get(type(op))
             if sign is None or a.type != b.type:
                 self.fail(node, "an operation on uint64 and another type")
-            return Value(UINT, f"{_bracketed(a)} {sign} {_bracketed(b)}")
+            return Value(UINT, f"{bracketed(a)} {sign} {bracketed(b)}")
         if isinstance(op, ast.Div):
-            return Value(DOUBLE, f"{_bracketed(a, DOUBLE)} / {_bracketed(b, DOUBLE)}")
+            return Value(DOUBLE, f"{bracketed(a, DOUBLE)} / {bracketed(b, DOUBLE)}")
         kind = unified(unified(a.type, b.type), INT)
         if type(op) in _ARITHMETIC:
-            return Value(kind, f"{_bracketed(a, kind)} {_ARITHMETIC[type(op)]} {_bracketed(b, kind)}")
+            return Value(kind, f"{bracketed(a, kind)} {_ARITHMETIC[type(op)]} {bracketed(b, kind)}")
         if kind == INT and isinstance(op, ast.Mod | ast.FloorDiv):
             return Value(INT, f"{'floor_mod' if isinstance(op, ast.Mod) else 'floor_div'}({a.code}, {b.code})")
         return self.fail(node, f"{type(op).__name__} of {name_of(kind)}")
@@ -259,7 +99,7 @@ class Expressions:
         if isinstance(exponent, Known) and isinstance(exponent.value, int) and 1 <= exponent.value <= _LARGEST_POWER:
             if not a.simple:
                 a = self.temporary(a.type, a.code)
-            result, factor, n = "", _bracketed(a), exponent.value
+            result, factor, n = "", bracketed(a), exponent.value
             while n:  # as Numba multiplies
                 if n & 1:
                     result = f"{result} * {factor}" if result else factor
@@ -285,7 +125,7 @@ class Expressions:
             if type(op) not in _COMPARED:
                 self.fail(node, f"{type(op).__name__} is not translated")
             kind = a.type if a.type == b.type else unified(a.type, b.type)
-            parts.append(f"{_bracketed(a, kind)} {_COMPARED[type(op)]} {_bracketed(b, kind)}")
+            parts.append(f"{bracketed(a, kind)} {_COMPARED[type(op)]} {bracketed(b, kind)}")
         return Value(BOOL, parts[0] if len(parts) == 1 else " && ".join(f"({part})" for part in parts))
 
     def _boolop(self, node: ast.BoolOp) -> Operand:
@@ -295,7 +135,7 @@ class Expressions:
             mark = len(self.lines)
             value = self.truth(other)
             if len(self.lines) == mark:
-                result = Value(BOOL, f"{_bracketed(result)} {sign} {_bracketed(value)}")
+                result = Value(BOOL, f"{bracketed(result)} {sign} {bracketed(value)}")
                 continue
             later, self.lines[mark:] = self.lines[mark:], []
             held = self.temporary(BOOL, result.code)
@@ -307,7 +147,7 @@ class Expressions:
     def truth(self, node: ast.expr) -> Value:
         """Return an expression as a truth value."""
         value = self.scalar(self.expression(node), node)
-        return value if value.type == BOOL else Value(BOOL, f"{_bracketed(value)} != 0")
+        return value if value.type == BOOL else Value(BOOL, f"{bracketed(value)} != 0")
 
     def _ifexp(self, node: ast.IfExp) -> Operand:
         condition = self.truth(node.test)
@@ -336,186 +176,4 @@ class Expressions:
             kind = unified(x.type, y.type)
         except TypeError as error:
             self.fail(node, str(error))
-        return Value(kind, f"{_bracketed(condition)} ? {_bracketed(x, kind)} : {_bracketed(y, kind)}")
-
-    # ---- arrays ----
-
-    def _subscript(self, node: ast.Subscript) -> Operand:
-        owner = self.expression(node.value)
-        places = list(node.slice.elts) if isinstance(node.slice, ast.Tuple) else [node.slice]
-        if isinstance(owner, Value) and isinstance(owner.type, Array):
-            return self.element(owner, places, node)
-        items = self.items_of(owner, node)
-        if not isinstance(node.slice, ast.Slice):
-            place = self.expression(node.slice)
-            if isinstance(place, Value):
-                return self._computed_item(owner, place, node)
-        if isinstance(node.slice, ast.Slice):
-            bounds = (node.slice.lower, node.slice.upper, node.slice.step)
-            low, high, step = (None if n is None else self._known_int(n) for n in bounds)
-            return Items(tuple(items[low:high:step]))
-        return items[self._known_int(node.slice)]
-
-    def _computed_item(self, owner: Operand, place: Value, node: ast.AST) -> Value:
-        values = self.value(owner, node)
-        kind = values.type
-        if not isinstance(kind, Tuple) or not kind.uniform or place.type != INT:
-            self.fail(node, "a computed place in a tuple whose items are not all numbers of one type")
-        held = values if values.simple else self.temporary(kind, values.code)
-        return Value(kind.items[0], f"{held.code}.f[{place.code}]")
-
-    def _known_int(self, node: ast.expr) -> int:
-        operand = self.expression(node)
-        if isinstance(operand, Known) and isinstance(operand.value, int):
-            return operand.value
-        return self.fail(node, "a place in a tuple has to be a constant")
-
-    def element(self, array: Value, places: Sequence[ast.expr], node: ast.AST) -> Value:
-        """Return an element of an array, or a view of it."""
-        kind = array.type
-        assert isinstance(kind, Array)
-        if len(places) > kind.ndim:
-            self.fail(node, f"{len(places)} indices of {name_of(kind)}")
-        if isinstance(places[0], ast.Slice) and len(places) == 1 and kind.ndim == 1:
-            return self._sliced(array, places[0])
-        if all(isinstance(place, ast.Slice) for place in places) and all(map(_is_whole, places)):
-            return array
-        indices = [None if isinstance(place, ast.Slice) else place for place in places]
-        indices += [None] * (kind.ndim - len(indices))
-        if any(isinstance(place, ast.Slice) and not _is_whole(place) for place in places):
-            self.fail(node, "a slice of one of several dimensions")
-        found = [None if n is None else self.index(array, axis, n) for axis, n in enumerate(indices)]
-        strides = [self._stride(array, axis) for axis in range(kind.ndim)]
-        at = " + ".join(_product(n, stride) for n, stride in zip(found, strides, strict=True) if n is not None)
-        left = [axis for axis, n in enumerate(found) if n is None]
-        if not left:
-            return Value(kind.item, f"{array.code}.data[{at}]")
-        contiguous = kind.contiguous and left == list(range(kind.ndim - len(left), kind.ndim))
-        view = Array(kind.item, len(left), contiguous)
-        sizes = [f"{array.code}.n{axis}" for axis in left] + ([] if contiguous else [strides[axis] for axis in left])
-        return Value(view, f"({self.c(view)}){{{array.code}.data + {at}, {', '.join(sizes)}}}")
-
-    def index(self, array: Value, axis: int, node: ast.expr) -> str:
-        """Return an index of an array; one that is a negative constant counts from the end."""
-        operand = self.expression(node)
-        if isinstance(operand, Known) and isinstance(operand.value, int) and operand.value < 0:
-            return f"({array.code}.n{axis} - {-operand.value})"
-        value = self.scalar(operand, node)
-        if value.type not in (INT, BOOL):
-            self.fail(node, f"an index of type {name_of(value.type)}")
-        return _bracketed(value)
-
-    def _stride(self, array: Value, axis: int) -> str:
-        kind = array.type
-        assert isinstance(kind, Array)
-        if not kind.contiguous:
-            return f"{array.code}.s{axis}"
-        return " * ".join(f"{array.code}.n{k}" for k in range(axis + 1, kind.ndim)) or "1"
-
-    def _sliced(self, array: Value, node: ast.Slice) -> Value:
-        if node.step is not None:
-            self.fail(node, "a slice with a step")
-        bounds = []
-        for bound, default in ((node.lower, "0"), (node.upper, f"{array.code}.n0")):
-            bounds.append(default if bound is None else self.index(array, 0, bound))
-        if bounds == ["0", f"{array.code}.n0"]:
-            return array
-        assert isinstance(array.type, Array)
-        return Value(array.type, f"{array.type.c}_slice({array.code}, {bounds[0]}, {bounds[1]})")
-
-    # ---- calls ----
-
-    def _call(self, node: ast.Call) -> Operand:
-        called = self.expression(node.func)
-        if not isinstance(called, Known):
-            self.fail(node, "a call of what is no function")
-        function = called.value
-        if node.keywords and not hasattr(function, "_fields"):
-            self.fail(node, "an argument by its name")
-        if getattr(function, "__name__", "") == "call" and "jit" in getattr(function, "__module__", ""):
-            _, target, arguments = self.in_order(node.args)
-            assert isinstance(target, Known)
-            return self.call_translated(_plain(target.value), self.items_of(arguments, node), node)
-        operands = self.in_order([*node.args, *(keyword.value for keyword in node.keywords)])
-        name = getattr(function, "__name__", "")
-        if name == "zeros" and "stack_array" in function.__module__:
-            shape = [operand.value for operand in operands if isinstance(operand, Known)]
-            if len(shape) != len(operands):
-                self.fail(node, "zeros of a shape that is not written as numbers")
-            return self.make_zeros(tuple(shape))
-        if hasattr(function, "_fields"):
-            return self.make_record(function, [self.value(operand, node) for operand in operands])
-        if function in (min, max):
-            return self._extreme(function, operands, node)
-        if function is abs:
-            value = self.scalar(operands[0], node)
-            return Value(value.type, f"{'fabs' if value.type == DOUBLE else 'llabs'}({value.code})")
-        if function in _CAST:
-            value = self.scalar(operands[0], node)
-            kind = _CAST[function]
-            return Value(kind, f"{_bracketed(value)} != 0" if kind == BOOL != value.type else self.converted(value, kind))
-        if _is_of(function, _MODULES) or isinstance(function, np.ufunc):
-            return self._of_math(name, operands, node)
-        function = _plain(function)
-        if isinstance(function, python_types.FunctionType):
-            return self.call_translated(function, operands, node)
-        return self.fail(node, f"a call of {name or function!r}")
-
-    def _of_math(self, name: str, operands: Sequence[Operand], node: ast.AST) -> Value:
-        codes = [self.converted(self.scalar(operand, node), DOUBLE) for operand in operands]
-        if name in _TESTS:
-            return Value(BOOL, f"{_TESTS[name]}({', '.join(codes)}) != 0")
-        if name in _MATH:
-            return Value(DOUBLE, f"{_MATH[name]}({', '.join(codes)})")
-        return self.fail(node, f"{name} has no C here")
-
-    def _extreme(self, function: Any, operands: Sequence[Operand], node: ast.AST) -> Value:
-        values = [self.scalar(operand, node) for operand in operands]
-        kind = values[0].type
-        for value in values[1:]:
-            kind = unified(kind, value.type)
-        if kind not in (DOUBLE, INT):
-            self.fail(node, f"{function.__name__} of {name_of(kind)}")
-        name = f"{function.__name__}_{'f64' if kind == DOUBLE else 'i64'}"
-        code = self.converted(values[0], kind)
-        for value in values[1:]:
-            code = f"{name}({code}, {self.converted(value, kind)})"
-        return Value(kind, code)
-
-
-def _number(x: float) -> str:
-    if math.isnan(x):
-        return "NAN"
-    if math.isinf(x):
-        return "INFINITY" if x > 0.0 else "(-INFINITY)"
-    return repr(float(x)) if x >= 0.0 and math.copysign(1.0, x) > 0.0 else f"({float(x)!r})"
-
-
-def _bracketed(value: Value, kind: Type | None = None) -> str:
-    """Return a value's code as an operand: with brackets around it unless it is a name, a number or a call."""
-    code = value.code
-    if kind is not None and kind != value.type and isinstance(kind, Scalar):
-        code = f"({kind.c})({code})"
-        return code
-    plain = code.replace("_", "").replace(".", "").replace("->", "")
-    return code if plain.isalnum() else f"({code})"
-
-
-def _product(index: str, stride: str) -> str:
-    return index if stride == "1" else f"{index} * ({stride})" if " " in stride else f"{index} * {stride}"
-
-
-def _is_whole(node: ast.expr) -> bool:
-    return isinstance(node, ast.Slice) and node.lower is None and node.upper is None and node.step is None
-
-
-def _plain(function: Any) -> Any:
-    """Return the function as it is written, of a compiled one."""
-    return getattr(function, "py_func", function)
-
-
-def _is_of(function: Any, modules: Sequence[Any]) -> bool:
-    return any(getattr(module, getattr(function, "__name__", ""), None) is function for module in modules)
-
-
-__all__ = ["Expressions", "Items", "Known", "Nothing", "Operand", "Record", "TranslationError", "Value"]
+        return Value(kind, f"{bracketed(condition)} ? {bracketed(x, kind)} : {bracketed(y, kind)}")

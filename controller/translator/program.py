@@ -7,7 +7,7 @@ from types import FunctionType
 from typing import Any
 
 from controller.errors import TranslationError
-from controller.translator.statements import Function
+from controller.translator.functions import Function
 from controller.translator.types import Array, Nothing, Record, Scalar, Tuple, Type
 
 _HEAD = """\

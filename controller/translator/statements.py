@@ -1,160 +1,25 @@
-"""Statements: one function of Python, for arguments of some types, as a function of C."""
+"""Statements: what each becomes in C."""
 
 from __future__ import annotations
 
 import ast
-import inspect
-import textwrap
-from collections.abc import Callable, Sequence
-from types import FunctionType
-from typing import Any, NoReturn, Protocol
+from collections.abc import Sequence
 
-from controller.errors import TranslationError
-from controller.translator.expressions import Expressions, Items, Known, Operand, Value
+from controller.translator.calls import Calls
+from controller.translator.operands import Items, Known, Operand, Value
 from controller.translator.types import BOOL, INT, Array, Nothing, Record, Scalar, Tuple, Type, name_of, unified
 
-_KEPT = frozenset(
-    "auto break case char const continue default do double else enum extern float for goto if inline int long register "
-    "restrict return short signed sizeof static struct switch typedef union unsigned void volatile while bool true "
-    "false NAN INFINITY gamma div free index j0 j1 jn y0 y1 yn time remove signal".split()
-)
-_PASSES = 6  # until the types of variables stand
 
+class Statements(Calls):
+    """Translates the statements of one function into `lines`."""
 
-class Functions(Protocol):
-    """What a function that is translated asks of the program that it is part of."""
+    parameters: list[str]
+    declared: dict[str, str]  # of variables that Python has not, what declares them
+    result: Type
 
-    def instance(self, function: FunctionType, arguments: tuple[Type, ...]) -> tuple[str, Type]:
-        """Return the C name of a function for some arguments, and the type of what it returns."""
-        ...
-
-    def name(self, kind: Type) -> str:
-        """Return the C name of a type."""
-        ...
-
-
-class Function(Expressions):
-    """One function for arguments of some types.
-
-    Parameters
-    ----------
-    program : Functions
-        Which translates what it calls.
-    function : function
-        Plain Python.
-    arguments : tuple of Type
-        Of its parameters.
-    """
-
-    def __init__(self, program: Functions, function: FunctionType, arguments: tuple[Type, ...]) -> None:
-        self._program, self._function = program, function
-        self.globals = function.__globals__ | _captured(function)
-        text = getattr(function, "source", None)
-        self._file = inspect.getsourcefile(function) or "?"
-        lines, self._first = ([text], 1) if text else inspect.getsourcelines(function)
-        tree = ast.parse(textwrap.dedent("".join(lines))).body[0]
-        if not isinstance(tree, ast.FunctionDef) or tree.args.kwonlyargs or tree.args.vararg or tree.args.kwarg:
-            raise TranslationError(f"{self._file}:{self._first}: expected a function with parameters by their places")
-        self._tree = tree
-        self._parameters = [argument.arg for argument in tree.args.args]
-        if len(self._parameters) != len(arguments):
-            self.fail(tree, f"{tree.name} is given {len(arguments)} arguments, expected {len(self._parameters)}")
-        self.names = dict(zip(self._parameters, arguments, strict=True))
-        self._arguments = arguments
-        self.result: Type = Nothing()
-
-    def fail(self, node: ast.AST, what: str) -> NoReturn:
-        """Refuse a construct by its place."""
-        line = self._first + getattr(node, "lineno", 1) - 1
-        raise TranslationError(f"{self._file}:{line}: {what}, which is not translated to C")
-
-    def translate(self, name: str) -> str:
-        """Return the function in C, under a name; its result's type is known then."""
-        for _ in range(_PASSES):
-            known, result = dict(self.names), self.result
-            self.lines: list[str] = []
-            self._declared: dict[str, str] = {}
-            self._count = 0
-            for statement in self._tree.body:
-                self.statement(statement)
-            if known == self.names and result == self.result:
-                break
-        else:
-            self.fail(self._tree, "types that do not settle")
-        variables = [
-            f"{self._declaration(kind, self.variable(variable))}{_zero(kind)};"
-            for variable, kind in self.names.items()
-            if variable not in self._parameters
-        ]
-        head = f"{self.signature(name)}\n{{\n"
-        used = {inner.id for inner in ast.walk(self._tree) if isinstance(inner, ast.Name)}
-        unused = [f"(void){self.variable(name)};" for name in self._parameters if name not in used]
-        body = [*unused, *variables, *self._declared.values(), *self.lines]
-        return head + _indented(body) + "}\n"
-
-    def signature(self, name: str) -> str:
-        """Return the head of the function."""
-        given = ", ".join(
-            self._declaration(kind, self.variable(parameter))
-            for parameter, kind in zip(self._parameters, self._arguments, strict=True)
-        )
-        return f"static {self._program.name(self.result)} {name}({given or 'void'})"
-
-    def _declaration(self, kind: Type, name: str) -> str:
-        return f"const {self.c(kind)} *{name}" if isinstance(kind, Record) else f"{self.c(kind)} {name}"
-
-    def c(self, kind: Type) -> str:
-        """Return the C name of a type."""
-        return self._program.name(kind)
-
-    def variable(self, name: str) -> str:
-        """Return the C name of a variable."""
-        return f"{name}_" if name in _KEPT else name
-
-    def temporary(self, kind: Type, code: str) -> Value:
-        """Return a new variable with a value."""
-        name = self._new("t")
-        self._declared[name] = f"{self._declaration(kind, name)}{_zero(kind)};"
-        if code:
-            self.lines.append(f"{name} = {code};")
-        return Value(kind, name, True)
-
-    def _new(self, stem: str) -> str:
-        self._count += 1
-        return f"{stem}{self._count}_"
-
-    def make_zeros(self, shape: tuple[int, ...]) -> Value:
-        """Return a new array of zeros on the stack."""
-        kind = Array(Scalar("double"), len(shape))
-        room, size = self._new("room"), 1
-        for n in shape:
-            size *= n
-        self._declared[room] = f"double {room}[{size}];"
-        self.lines.append(f"memset({room}, 0, sizeof {room});")
-        return Value(kind, f"({self.c(kind)}){{{room}, {', '.join(map(str, shape))}}}")
-
-    def make_record(self, kind: type, items: Sequence[Value]) -> Value:
-        """Return a new named tuple on the stack."""
-        record = Record(kind, tuple(item.type for item in items))
-        name = self._new("record")
-        self._declared[name] = f"{self.c(record)} {name};"
-        for field, item in zip(record.fields, items, strict=True):
-            self.lines.append(f"{name}.{field} = {'*' if isinstance(item.type, Record) else ''}{item.code};")
-        return Value(record, f"(&{name})")
-
-    def call_translated(self, function: Callable[..., Any], arguments: Sequence[Operand], node: ast.AST) -> Operand:
-        """Call a function of Python that is translated too."""
-        if not isinstance(function, FunctionType):
-            self.fail(node, f"a call of {function!r}")
-        values = [self.value(argument, node) for argument in arguments]
-        name, result = self._program.instance(function, tuple(value.type for value in values))
-        code = f"{name}({', '.join(value.code for value in values)})"
-        if isinstance(result, Nothing):
-            self.lines.append(f"{code};")
-            return Known(None)
-        return self.temporary(result, code)
-
-    # ---- statements ----
+    def new_name(self, stem: str) -> str:
+        """Return a name that no variable has."""
+        raise NotImplementedError
 
     def statement(self, node: ast.stmt) -> None:
         """Translate a statement."""
@@ -176,7 +41,7 @@ class Function(Expressions):
         result = self.expression(node.value)
         if isinstance(result, Value) and len(self.lines) > mark and self.lines[-1].startswith(f"{result.code} = "):
             self.lines[-1] = f"(void){self.lines[-1].removeprefix(f'{result.code} = ')}"
-            del self._declared[result.code]
+            del self.declared[result.code]
 
     def _do_pass(self, node: ast.Pass) -> None:
         pass
@@ -249,7 +114,7 @@ class Function(Expressions):
             return
         value = self.value(operand, node)
         kind = self._unified(self.names[name], value.type, node) if name in self.names else value.type
-        if name in self._parameters and kind != self.names[name]:
+        if name in self.parameters and kind != self.names[name]:
             self.fail(node, f"another type for the parameter {name}")
         self.names[name] = kind
         self.lines.append(f"{self.variable(name)} = {self._as(value, kind, node)};")
@@ -274,11 +139,9 @@ class Function(Expressions):
             return
         assert isinstance(place.type, Array)
         if isinstance(value.type, Array):
-            self.lines.append(f"{self._program.name(place.type)}_copy({place.code}, {value.code});")
+            self.lines.append(f"{self.c(place.type)}_copy({place.code}, {value.code});")
         else:
-            self.lines.append(
-                f"{self._program.name(place.type)}_fill({place.code}, {self.converted(value, place.type.item)});"
-            )
+            self.lines.append(f"{self.c(place.type)}_fill({place.code}, {self.converted(value, place.type.item)});")
 
     def _do_augassign(self, node: ast.AugAssign) -> None:
         if isinstance(node.target, ast.Name):
@@ -365,14 +228,14 @@ class Function(Expressions):
         last = self.scalar(operands[-1] if len(operands) < 3 else operands[1], node)
         end = last.code if isinstance(operands[0 if len(operands) == 1 else 1], Known) else self._end(last)
         name = node.target.id
-        counter = self._new("i") if name == "_" or _is_written(name, node.body) else ""
+        counter = self.new_name("i") if name == "_" or _is_written(name, node.body) else ""
         if name != "_":
             self.names.setdefault(name, INT)
             if self.names[name] != INT:
                 self.fail(node, f"{name}, which counts and is {name_of(self.names[name])} elsewhere")
         variable = counter or self.variable(name)
         if counter:
-            self._declared[counter] = f"int64_t {counter};"
+            self.declared[counter] = f"int64_t {counter};"
         sign, change = ("<", f"{variable} += {step.value}") if step.value > 0 else (">", f"{variable} -= {-step.value}")
         self.lines.append(f"for ({variable} = {first}; {variable} {sign} {end}; {change}) {{")
         if counter and name != "_":
@@ -384,33 +247,6 @@ class Function(Expressions):
         return self.temporary(INT, last.code).code
 
 
-def _captured(function: FunctionType) -> dict[str, Any]:
-    cells = function.__closure__ or ()
-    return dict(zip(function.__code__.co_freevars, (cell.cell_contents for cell in cells), strict=True))
-
-
 def _is_written(name: str, body: Sequence[ast.stmt]) -> bool:
     names = (inner for statement in body for inner in ast.walk(statement))
     return any(isinstance(n, ast.Name) and n.id == name and isinstance(n.ctx, ast.Store) for n in names)
-
-
-def _zero(kind: Type) -> str:
-    match kind:
-        case Record():
-            return " = NULL"
-        case Array():
-            return " = {0}"
-        case Tuple():
-            return ""
-    return " = false" if kind == BOOL else " = 0"
-
-
-def _indented(lines: Sequence[str]) -> str:
-    depth, out = 1, []
-    for line in lines:
-        if line.startswith("}"):
-            depth -= 1
-        out.append("    " * depth + line + "\n")
-        if line.endswith("{"):
-            depth += 1
-    return "".join(out)

@@ -85,18 +85,17 @@ def type_of(value: Any) -> Type:
     TypeError
         If it is of another type.
     """
-    match value:
-        case bool() | np.bool_():
-            return BOOL
-        case int() | np.int64():
-            return INT
-        case float():
-            return DOUBLE
-        case np.ndarray() if value.dtype.name in _ITEMS and value.flags.c_contiguous:
-            return Array(_ITEMS[value.dtype.name], value.ndim)
-        case tuple():
-            items = tuple(map(type_of, value))
-            return Record(type(value), items) if hasattr(value, "_fields") else Tuple(items)
+    if isinstance(value, bool | np.bool):
+        return BOOL
+    if isinstance(value, int | np.int64):
+        return INT
+    if isinstance(value, float):
+        return DOUBLE
+    if isinstance(value, np.ndarray) and value.dtype.name in _ITEMS and value.flags.c_contiguous:
+        return Array(_ITEMS[value.dtype.name], value.ndim)
+    if isinstance(value, tuple):
+        items = tuple(map(type_of, value))
+        return Record(type(value), items) if hasattr(value, "_fields") else Tuple(items)
     kind = f"an array of {value.dtype}" if isinstance(value, np.ndarray) else type(value).__name__
     raise TypeError(f"argument is {kind}, expected a number, a contiguous array of numbers, or a tuple of such")
 

@@ -1,0 +1,96 @@
+"""Calls: of what Python has, of `math` and NumPy, and of functions that are translated too."""
+
+from __future__ import annotations
+
+import ast
+import math
+import types as python_types
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from controller.translator.operands import Known, Operand, Value, bracketed
+from controller.translator.subscripts import Subscripts
+from controller.translator.types import BOOL, DOUBLE, INT, UINT, name_of, unified
+
+_MATH = {
+    "sqrt": "sqrt", "cos": "cos", "sin": "sin", "acos": "acos", "atan2": "atan2", "hypot": "hypot",
+    "copysign": "copysign", "tan": "tan", "exp": "exp", "log": "log",
+    "arccos": "acos", "arctan2": "atan2",
+}  # fmt: skip
+_TESTS = {"isnan": "isnan", "isfinite": "isfinite", "isinf": "isinf"}
+_CAST = {float: DOUBLE, int: INT, bool: BOOL, np.uint64: UINT, np.int64: INT, np.float64: DOUBLE}
+_MODULES = (math, np)
+
+
+class Calls(Subscripts):
+    """Translates calls."""
+
+    def _call(self, node: ast.Call) -> Operand:
+        called = self.expression(node.func)
+        if not isinstance(called, Known):
+            self.fail(node, "a call of what is no function")
+        function = called.value
+        if node.keywords and not hasattr(function, "_fields"):
+            self.fail(node, "an argument by its name")
+        if getattr(function, "__name__", "") == "call" and "jit" in getattr(function, "__module__", ""):
+            _, target, arguments = self.in_order(node.args)
+            assert isinstance(target, Known)
+            return self.call_translated(_plain(target.value), self.items_of(arguments, node), node)
+        operands = self.in_order([*node.args, *(keyword.value for keyword in node.keywords)])
+        name = getattr(function, "__name__", "")
+        if name == "zeros" and "stack_array" in function.__module__:
+            shape = [operand.value for operand in operands if isinstance(operand, Known)]
+            if len(shape) != len(operands):
+                self.fail(node, "zeros of a shape that is not written as numbers")
+            return self.make_zeros(tuple(shape))
+        if hasattr(function, "_fields"):
+            return self.make_record(function, [self.value(operand, node) for operand in operands])
+        if function in (min, max):
+            return self._extreme(function, operands, node)
+        if function is abs:
+            value = self.scalar(operands[0], node)
+            return Value(value.type, f"{'fabs' if value.type == DOUBLE else 'llabs'}({value.code})")
+        if function in _CAST:
+            value = self.scalar(operands[0], node)
+            kind = _CAST[function]
+            if kind == BOOL != value.type:
+                return Value(BOOL, f"{bracketed(value)} != 0")
+            return Value(kind, self.converted(value, kind))
+        if _is_of(function, _MODULES) or isinstance(function, np.ufunc):
+            return self._of_math(name, operands, node)
+        function = _plain(function)
+        if isinstance(function, python_types.FunctionType):
+            return self.call_translated(function, operands, node)
+        return self.fail(node, f"a call of {name or function!r}")
+
+    def _of_math(self, name: str, operands: Sequence[Operand], node: ast.AST) -> Value:
+        codes = [self.converted(self.scalar(operand, node), DOUBLE) for operand in operands]
+        if name in _TESTS:
+            return Value(BOOL, f"{_TESTS[name]}({', '.join(codes)}) != 0")
+        if name in _MATH:
+            return Value(DOUBLE, f"{_MATH[name]}({', '.join(codes)})")
+        return self.fail(node, f"{name} has no C here")
+
+    def _extreme(self, function: Any, operands: Sequence[Operand], node: ast.AST) -> Value:
+        values = [self.scalar(operand, node) for operand in operands]
+        kind = values[0].type
+        for value in values[1:]:
+            kind = unified(kind, value.type)
+        if kind not in (DOUBLE, INT):
+            self.fail(node, f"{function.__name__} of {name_of(kind)}")
+        name = f"{function.__name__}_{'f64' if kind == DOUBLE else 'i64'}"
+        code = self.converted(values[0], kind)
+        for value in values[1:]:
+            code = f"{name}({code}, {self.converted(value, kind)})"
+        return Value(kind, code)
+
+
+def _plain(function: Any) -> Any:
+    """Return the function as it is written, of a compiled one."""
+    return getattr(function, "py_func", function)
+
+
+def _is_of(function: Any, modules: Sequence[Any]) -> bool:
+    return any(getattr(module, getattr(function, "__name__", ""), None) is function for module in modules)

@@ -1,0 +1,165 @@
+"""Operands of expressions: what C computes, what is known beforehand, and tuples that are known by their items."""
+
+from __future__ import annotations
+
+import ast
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, NoReturn
+
+import numpy as np
+
+from controller.translator.types import BOOL, DOUBLE, INT, UINT, Scalar, Tuple, Type, name_of
+
+
+@dataclass(frozen=True)
+class Value:
+    """A value that C computes: of a record, the pointer to it."""
+
+    type: Type
+    code: str
+    simple: bool = False  # a name or a number: it may be written twice, and nothing that follows changes it
+
+
+@dataclass(frozen=True)
+class Known:
+    """What is known when the code is translated: a number, a tuple of such, a function, a module, a class."""
+
+    value: Any
+
+
+@dataclass(frozen=True)
+class Items:
+    """A tuple that is not put together, but known by its items."""
+
+    items: tuple[Operand, ...]
+
+
+Operand = Value | Known | Items
+
+
+class Operands:
+    """Computes the operands of one function; statements that they need first go to `lines`."""
+
+    names: dict[str, Type]  # of variables, as far as they are known
+    globals: dict[str, Any]
+    lines: list[str]
+
+    def fail(self, node: ast.AST, what: str) -> NoReturn:
+        """Refuse a construct by its place."""
+        raise NotImplementedError
+
+    def temporary(self, kind: Type, code: str) -> Value:
+        """Return a new variable with a value."""
+        raise NotImplementedError
+
+    def call_translated(self, function: Callable[..., Any], arguments: Sequence[Operand], node: ast.AST) -> Operand:
+        """Call a function of Python that is translated too."""
+        raise NotImplementedError
+
+    def make_zeros(self, shape: tuple[int, ...]) -> Value:
+        """Return a new array of zeros on the stack."""
+        raise NotImplementedError
+
+    def make_record(self, kind: type, items: Sequence[Value]) -> Value:
+        """Return a new named tuple on the stack."""
+        raise NotImplementedError
+
+    def expression(self, node: ast.expr) -> Operand:
+        """Return what an expression is."""
+        raise NotImplementedError
+
+    def variable(self, name: str) -> str:
+        """Return the C name of a variable."""
+        raise NotImplementedError
+
+    def in_order(self, nodes: Sequence[ast.expr]) -> list[Operand]:
+        """Return operands, each evaluated before what the following ones do first."""
+        operands: list[Operand] = []
+        for node in nodes:
+            mark = len(self.lines)
+            operand = self.expression(node)
+            if len(self.lines) > mark:
+                later, self.lines[mark:] = self.lines[mark:], []
+                operands = [self._kept(operand) for operand in operands]
+                self.lines += later
+            operands.append(operand)
+        return operands
+
+    def _kept(self, operand: Operand) -> Operand:
+        if isinstance(operand, Items):
+            return Items(tuple(map(self._kept, operand.items)))
+        if isinstance(operand, Value) and not operand.simple and isinstance(operand.type, Scalar):
+            return self.temporary(operand.type, operand.code)
+        return operand
+
+    def value(self, operand: Operand, node: ast.AST) -> Value:
+        """Return an operand as C computes it."""
+        if isinstance(operand, Value):
+            return operand
+        known = operand.value if isinstance(operand, Known) else None
+        if isinstance(known, bool | np.bool):
+            return Value(BOOL, "true" if known else "false", True)
+        if isinstance(known, np.uint64):
+            return Value(UINT, f"UINT64_C({int(known)})", True)
+        if isinstance(known, int | np.integer):
+            return Value(INT, f"INT64_C({int(known)})" if abs(int(known)) > 2**31 else f"{int(known)}", True)
+        if isinstance(known, float):
+            return Value(DOUBLE, _number(known), True)
+        if isinstance(operand, Items) or isinstance(known, tuple):
+            values = [self.value(item, node) for item in self.items_of(operand, node)]
+            kind = Tuple(tuple(value.type for value in values))
+            return Value(kind, self.compound(kind, [value.code for value in values]))
+        return self.fail(node, "not a value")
+
+    def compound(self, kind: Type, codes: Sequence[str]) -> str:
+        """Return a tuple made of its items."""
+        inside = ", ".join(codes)
+        braces = f"{{{inside}}}" if isinstance(kind, Tuple) and kind.uniform else inside
+        return f"({self.c(kind)}){{{braces}}}"
+
+    def c(self, kind: Type) -> str:
+        """Return the C name of a type."""
+        raise NotImplementedError
+
+    def scalar(self, operand: Operand, node: ast.AST) -> Value:
+        """Return an operand that is a number."""
+        value = self.value(operand, node)
+        if not isinstance(value.type, Scalar):
+            self.fail(node, f"{name_of(value.type)}, expected a number")
+        return value
+
+    def converted(self, value: Value, kind: Type) -> str:
+        """Return the code of a number as another type of number."""
+        if value.type == kind or not isinstance(kind, Scalar):
+            return value.code
+        return f"({kind.c}){bracketed(value)}"
+
+    def items_of(self, operand: Operand, node: ast.AST) -> list[Operand]:
+        """Return the items of a tuple."""
+        match operand:
+            case Items(items):
+                return list(items)
+            case Known(tuple(items)):
+                return [Known(item) for item in items]
+            case Value(Tuple() as kind, code):
+                return [Value(item, f"{code}.{kind.item(i)}", operand.simple) for i, item in enumerate(kind.items)]
+        return self.fail(node, "expected a tuple")
+
+
+def _number(x: float) -> str:
+    if math.isnan(x):
+        return "NAN"
+    if math.isinf(x):
+        return "INFINITY" if x > 0.0 else "(-INFINITY)"
+    return repr(float(x)) if x >= 0.0 and math.copysign(1.0, x) > 0.0 else f"({float(x)!r})"
+
+
+def bracketed(value: Value, kind: Type | None = None) -> str:
+    """Return a value's code as an operand: with brackets around it unless it is a name, a number or a call."""
+    code = value.code
+    if kind is not None and kind != value.type and isinstance(kind, Scalar):
+        return f"({kind.c})({code})"
+    plain = code.replace("_", "").replace(".", "").replace("->", "")
+    return code if plain.isalnum() else f"({code})"
