@@ -6,12 +6,12 @@ limit its adaptation (27) winds up. It is here to be studied, not to be put on a
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from controller.arithmetic import length3, square
 from controller.jit.jit import compiled, jit_noalloc
 from controller.quaternion import Vector3, error_parts, rotation_rows
 
@@ -51,7 +51,7 @@ def violation(value: float) -> float:
 @compiled
 def primary_potential(value: float, k_p1: float) -> float:
     """Return P_p [N m]: (16), of f, the `value` of the goal, and `k_p1`."""
-    return 0.5 * k_p1 * violation(value) ** 2
+    return 0.5 * k_p1 * square(violation(value))
 
 
 @compiled
@@ -62,7 +62,7 @@ def secondary_potential(values: Array, alphas: Array) -> float:
     """
     total = 0.0
     for i in range(values.size):
-        total += 0.5 * alphas[i] * violation(values[i]) ** 2
+        total += 0.5 * alphas[i] * square(violation(values[i]))
     return total
 
 
@@ -78,7 +78,7 @@ def secondary_parts(values: Array, gradients: Array, alphas: Array, k_q: float) 
     x, y, z = 0.0, 0.0, 0.0
     for i in range(values.size):
         if not values[i] <= 0.0:
-            norm = math.sqrt(gradients[i, 0] ** 2 + gradients[i, 1] ** 2 + gradients[i, 2] ** 2)
+            norm = length3(gradients[i, 0], gradients[i, 1], gradients[i, 2])
             if not norm <= 0.0:
                 length = alphas[i] / k_q * values[i] / norm
                 x += length * gradients[i, 0]

@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from controller.arithmetic import length3
 from controller.jit.jit import jit_noalloc
 from controller.law import Array, VehicleState
 from controller.paper_law import violation
@@ -86,7 +87,7 @@ def evaluate_field(
 @jit_noalloc
 def along(gradient: Array, length: float, total: Array) -> None:
     """Add a vector of a length [N] along a gradient, shape (3,), to `total`; nothing if the gradient is zero."""
-    norm = math.sqrt(gradient[0] ** 2 + gradient[1] ** 2 + gradient[2] ** 2)
+    norm = length3(gradient[0], gradient[1], gradient[2])
     if not norm <= 0.0:
         for axis in range(3):
             total[axis] += length / norm * gradient[axis]
@@ -116,7 +117,7 @@ def set_point_error(field: Field, inset: float, most: float) -> None:
 @jit_noalloc
 def shorten(vector: Array, most: float) -> None:
     """Scale a vector, shape (3,), in place so that it is no longer than `most`; NaN stays."""
-    norm = math.sqrt(vector[0] ** 2 + vector[1] ** 2 + vector[2] ** 2)
+    norm = length3(vector[0], vector[1], vector[2])
     if norm > most:
         for axis in range(3):
             vector[axis] *= most / norm

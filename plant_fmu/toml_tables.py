@@ -124,7 +124,7 @@ def hint(received: str, known: typing.Iterable[str]) -> str:
 
     Parameters
     ----------
-    came : str
+    received : str
         The name.
     known : iterable of str
         What was expected.

@@ -7,6 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from controller.arithmetic import hypotenuse
 from controller.jit.jit import jit_noalloc
 
 Array = NDArray[np.float64]
@@ -57,7 +58,7 @@ def product_distance(first: float, second: float) -> tuple[float, float, float]:
     if math.isnan(first) or math.isnan(second):  # a lost position is no safe one
         return math.nan, math.nan, math.nan
     if first > 0.0 and second > 0.0:
-        distance = math.hypot(first, second)
+        distance = hypotenuse(first, second)
         return distance, first / distance, second / distance
     if first >= second:
         return first, 1.0, 0.0

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from controller.arithmetic import hypotenuse
 from controller.jit.jit import compiled
 from controller.regions.kinds import FIRST_OF_ATTITUDE, evaluate_shape
 from controller.regions.region_set import PackedRegions
@@ -94,7 +95,7 @@ def _meet(
     at = np.empty(3)
     for k in range(distances.size):
         dx, dy, dz = directions[k, 0], directions[k, 1], directions[k, 2]
-        if notched and abs(x * dy - y * dx) > radius * math.hypot(dx, dy):
+        if notched and abs(x * dy - y * dx) > radius * hypotenuse(dx, dy):
             continue  # it passes by the circle: no need to look
         nearest = farthest if distances[k] > farthest else distances[k]
         here, way = first, 0.0
@@ -131,7 +132,7 @@ def _circle_about(prism: Array) -> tuple[float, float, float]:
     """Return middle and radius of a circle that holds all corners of a packed prism [m]."""
     x, y, radius = float(np.mean(prism[2::2])), float(np.mean(prism[3::2])), 0.0
     for i in range(2, prism.size, 2):
-        radius = max(radius, math.hypot(prism[i] - x, prism[i + 1] - y))
+        radius = max(radius, hypotenuse(prism[i] - x, prism[i + 1] - y))
     return x, y, radius
 
 

@@ -64,8 +64,8 @@ def require(good: bool, shape: str, key: str, received: object, expected: str) -
         The condition.
     shape, key : str
         What is wrong.
-    came : object
-        The value that came.
+    received : object
+        The value received.
     expected : str
         What was expected.
 

@@ -68,7 +68,13 @@ class Function(Statements):
         self.result: Type = Nothing()
 
     def fail(self, node: ast.AST, what: str) -> NoReturn:
-        """Refuse a construct by its place."""
+        """Refuse a construct by its place.
+
+        Raises
+        ------
+        TranslationError
+            In any case.
+        """
         line = self._first + getattr(node, "lineno", 1) - 1
         raise TranslationError(f"{self._file}:{line}: {what}, which is not translated to C")
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from types import FunctionType
 from typing import Any
 
@@ -18,17 +18,18 @@ _HEAD = """\
 #include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
-
-/* As Python orders them: the first of equals, and the first where one is no number. */
-static inline double min_f64(double a, double b) { return b < a ? b : a; }
-static inline double max_f64(double a, double b) { return b > a ? b : a; }
-static inline int64_t min_i64(int64_t a, int64_t b) { return b < a ? b : a; }
-static inline int64_t max_i64(int64_t a, int64_t b) { return b > a ? b : a; }
-
-/* Rounded down, as Python divides. */
-static inline int64_t floor_div(int64_t a, int64_t b) { return a / b - (a % b != 0 && (a < 0) != (b < 0)); }
-static inline int64_t floor_mod(int64_t a, int64_t b) { return a - b * floor_div(a, b); }
 """
+
+# by name, in the order in which one may call another; of equals, and of what is no number, Python takes the first
+_HELPERS = {
+    "min_f64": "static inline double min_f64(double a, double b) { return b < a ? b : a; }\n",
+    "max_f64": "static inline double max_f64(double a, double b) { return b > a ? b : a; }\n",
+    "min_i64": "static inline int64_t min_i64(int64_t a, int64_t b) { return b < a ? b : a; }\n",
+    "max_i64": "static inline int64_t max_i64(int64_t a, int64_t b) { return b > a ? b : a; }\n",
+    "floor_div": "static inline int64_t floor_div(int64_t a, int64_t b)\n"
+    "{\n    return a / b - (a % b != 0 && (a < 0) != (b < 0));\n}\n",
+    "floor_mod": "static inline int64_t floor_mod(int64_t a, int64_t b) { return a - b * floor_div(a, b); }\n",
+}
 
 
 class Program:
@@ -52,7 +53,7 @@ class Program:
         self._reserved: set[str] = set()
         self._functions: list[str] = []
         self._types: dict[Type, str] = {}
-        self._definitions: list[str] = []
+        self._definitions: list[tuple[str, str]] = []  # helpers by their names; types by none
         self._exports: list[str] = []
 
     def export(self, name: str, function: Any, arguments: tuple[Type, ...]) -> None:
@@ -84,10 +85,20 @@ class Program:
 
     def text(self) -> str:
         """Return the file."""
-        return "\n".join([_HEAD, *self._definitions, *self._functions, *self._exports])
+        code = [*self._functions, *self._exports]
+        for name, text in reversed([*_HELPERS.items(), *self._definitions]):
+            if not name or any(f"{name}(" in part for part in code):  # a type, or a helper that is called
+                code.insert(0, text)
+        return "\n".join([_HEAD, *code])
 
     def instance(self, function: FunctionType, arguments: tuple[Type, ...]) -> tuple[str, Type]:
-        """Return the C name of a function for some arguments, and the type of what it returns."""
+        """Return the C name of a function for some arguments, and the type of what it returns.
+
+        Raises
+        ------
+        TranslationError
+            If it, or what it calls, is beyond the subset.
+        """
         key = (function, arguments)
         if key not in self._instances:
             if function in self._under_way:
@@ -113,7 +124,7 @@ class Program:
         if kind not in self._types:
             name, text = self._defined(kind)
             self._types[kind] = name
-            self._definitions.append(text)
+            self._definitions += [("", text), *(_helpers_of(kind) if isinstance(kind, Array) else ())]
         return self._types[kind]
 
     def _defined(self, kind: Type) -> tuple[str, str]:
@@ -135,7 +146,7 @@ class Program:
         return name, f"typedef struct {{\n{inside}}} {name};\n"
 
 
-def _numbered(stem: str) -> Any:
+def _numbered(stem: str) -> Iterator[str]:
     yield stem
     n = 2
     while True:
@@ -144,21 +155,26 @@ def _numbered(stem: str) -> Any:
 
 
 def _array(kind: Array) -> str:
-    """Return the struct of a view, and what copies and fills it."""
-    name, item, n = kind.c, kind.item.c, kind.ndim
-    sizes = "".join(f"    int64_t n{i};\n" for i in range(n))
-    strides = "" if kind.contiguous else "".join(f"    int64_t s{i};\n" for i in range(n))
-    text = f"typedef struct {{\n    {item} *data;\n{sizes}{strides}}} {name};\n"
-    if n == 1 and kind.contiguous:
-        text += (
-            f"\nstatic inline {name} {name}_slice({name} a, int64_t from, int64_t to)\n{{\n"
+    """Return the struct of a view."""
+    sizes = "".join(f"    int64_t n{i};\n" for i in range(kind.ndim))
+    strides = "" if kind.contiguous else "".join(f"    int64_t s{i};\n" for i in range(kind.ndim))
+    return f"typedef struct {{\n    {kind.item.c} *data;\n{sizes}{strides}}} {kind.c};\n"
+
+
+def _helpers_of(kind: Array) -> Iterator[tuple[str, str]]:
+    """Yield what slices, fills and copies contiguous views of a type, by name."""
+    if not kind.contiguous:
+        return
+    name, item = kind.c, kind.item.c
+    if kind.ndim == 1:
+        yield (
+            f"{name}_slice",
+            f"static inline {name} {name}_slice({name} a, int64_t from, int64_t to)\n{{\n"
             "    from = from < 0 ? max_i64(from + a.n0, 0) : min_i64(from, a.n0);\n"
             "    to = to < 0 ? max_i64(to + a.n0, 0) : min_i64(to, a.n0);\n"
-            f"    return ({name}){{a.data + from, max_i64(to - from, 0)}};\n}}\n"
+            f"    return ({name}){{a.data + from, max_i64(to - from, 0)}};\n}}\n",
         )
-    if kind.contiguous:
-        total = " * ".join(f"a.n{i}" for i in range(n))
-        loop = f"    const int64_t n = {total};\n    for (int64_t i = 0; i < n; i++)\n        a.data[i] = "
-        text += f"\nstatic inline void {name}_fill({name} a, {item} x)\n{{\n{loop}x;\n}}\n"
-        text += f"\nstatic inline void {name}_copy({name} a, {name} b)\n{{\n{loop}b.data[i];\n}}\n"
-    return text
+    total = " * ".join(f"a.n{i}" for i in range(kind.ndim))
+    loop = f"    const int64_t n = {total};\n    for (int64_t i = 0; i < n; i++)\n        a.data[i] = "
+    yield f"{name}_fill", f"static inline void {name}_fill({name} a, {item} x)\n{{\n{loop}x;\n}}\n"
+    yield f"{name}_copy", f"static inline void {name}_copy({name} a, {name} b)\n{{\n{loop}b.data[i];\n}}\n"

@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from controller.arithmetic import cosine, length3, square
 from controller.jit.jit import part
 from controller.jit.stack_array import zeros
 from controller.laws.deployable.gains import DeployableGains
@@ -130,7 +131,7 @@ def update_desired(
         if regions.kinds[i] < _ATTITUDE:
             continue
         clearance = attitude_clearance(regions, i, position, attitude.desired, gradient)
-        size = np.sqrt(gradient[0] ** 2 + gradient[1] ** 2 + gradient[2] ** 2)
+        size = length3(gradient[0], gradient[1], gradient[2])
         if clearance < gains.comfort:
             limited = True
             if size > 0.0:
@@ -140,14 +141,14 @@ def update_desired(
                 _add_scaled(_TURN * (gains.comfort - clearance), k, omega)
     if not limited and error[0] > 1.0 - 1e-15:
         return
-    size = np.sqrt(omega[0] ** 2 + omega[1] ** 2 + omega[2] ** 2)
+    size = length3(omega[0], omega[1], omega[2])
     if size > gains.turning_rate:
         for axis in range(3):
             omega[axis] *= gains.turning_rate / size
     integrate_attitude(attitude.desired, omega, period, attitude.desired)
     # within the allowed tilt: only the turn about the vertical remains
     upright = down_parts(attitude.desired)[2]
-    if upright < np.cos(gains.tilt) and upright < down_parts(attitude.preferred)[2]:
+    if upright < cosine(gains.tilt) and upright < down_parts(attitude.preferred)[2]:
         for axis in range(3):
             omega[axis] = -omega[axis]
         integrate_attitude(attitude.desired, omega, period, attitude.desired)
@@ -171,7 +172,7 @@ def integrate_attitude(quaternion: Array, omega: Array, period: float, out: Arra
     rate = rate_parts(quaternion, omega)
     for i in range(4):
         out[i] = quaternion[i] + period * rate[i]
-    length = np.sqrt(out[0] ** 2 + out[1] ** 2 + out[2] ** 2 + out[3] ** 2)
+    length = np.sqrt(square(out[0]) + square(out[1]) + square(out[2]) + square(out[3]))
     for i in range(4):
         out[i] /= length
 

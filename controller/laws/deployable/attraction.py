@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from controller.arithmetic import length3, square
 from controller.jit.jit import part
 from controller.jit.stack_array import zeros
 from controller.laws.deployable.gains import DeployableGains
@@ -39,7 +40,7 @@ def desired_velocity(plan: PathPlan, position: Array, goal_velocity: Array, gain
         length, direction = 0.0, zeros(3)
         for axis in range(3):
             direction[axis] = path[leg, axis] - (position[axis] if leg == 0 else path[leg - 1, axis])
-            length += direction[axis] ** 2
+            length += square(direction[axis])
         length = np.sqrt(length)
         if length > 0.0:
             for axis in range(3):
@@ -47,7 +48,7 @@ def desired_velocity(plan: PathPlan, position: Array, goal_velocity: Array, gain
         if leg > 0:  # slower round a corner
             turn = before[0] * direction[0] + before[1] * direction[1] + before[2] * direction[2]
             at_corner = gains.speed * max(_SLOWEST_CORNER, 0.5 * (1.0 + turn))
-            speed = min(speed, np.sqrt(at_corner**2 + 2.0 * gains.acceleration * travelled))
+            speed = min(speed, np.sqrt(square(at_corner) + 2.0 * gains.acceleration * travelled))
         part = min(to_go, length)
         for axis in range(3):
             heading[axis] += part * direction[axis]
@@ -56,7 +57,7 @@ def desired_velocity(plan: PathPlan, position: Array, goal_velocity: Array, gain
         copy(direction, before)
     remaining = travelled
     speed = min(speed, approach_speed(remaining, gains.acceleration, gains.position_bandwidth))
-    size = np.sqrt(heading[0] ** 2 + heading[1] ** 2 + heading[2] ** 2)
+    size = length3(heading[0], heading[1], heading[2])
     for axis in range(3):
         out[axis] = goal_velocity[axis] + (speed * heading[axis] / size if size > 1e-9 else 0.0)
 
@@ -67,7 +68,7 @@ def desired_acceleration(desired: Array, velocity: Array, gains: DeployableGains
     size = 0.0
     for axis in range(3):
         out[axis] = gains.velocity_bandwidth * (desired[axis] - velocity[axis])
-        size += out[axis] ** 2
+        size += square(out[axis])
     size = np.sqrt(size)
     if size > gains.acceleration:
         for axis in range(3):

@@ -24,6 +24,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from controller.arithmetic import exponential, length3, square
 from controller.jit.jit import part
 from controller.jit.stack_array import zeros
 from controller.laws.deployable.attitude import integrate_attitude
@@ -40,6 +41,7 @@ Array = NDArray[np.float64]
 
 _ATTITUDE = FIRST_OF_ATTITUDE  # shapes from it on depend on attitude
 _FLAT = (Box.kind, Prism.kind, DepthBand.kind, HalfSpace.kind)
+_LN_10 = 2.302585092994046
 _AHEAD = 0.1  # s, over which the rate of a gradient is measured
 _FIRM = (3.0, 3.0)  # decades: price of slack against missing the desired force, at weight 0, and added at weight 1
 _LEAP = 0.5  # cosine of the turn of a gradient within that time, beyond which it is a jump
@@ -108,8 +110,8 @@ def pose_gradient(gradients: Array, rotation_gradients: Array, i: int, of_attitu
 
     A distance has the direction of g's gradient and length 1, whatever the unit of g; an angle is -g itself.
     """
-    size = np.sqrt(gradients[i, 0] ** 2 + gradients[i, 1] ** 2 + gradients[i, 2] ** 2)
-    turning = np.sqrt(rotation_gradients[i, 0] ** 2 + rotation_gradients[i, 1] ** 2 + rotation_gradients[i, 2] ** 2)
+    size = length3(gradients[i, 0], gradients[i, 1], gradients[i, 2])
+    turning = length3(rotation_gradients[i, 0], rotation_gradients[i, 1], rotation_gradients[i, 2])
     if not size + turning > 0.0:
         return False
     scale = 1.0 if of_attitude else 1.0 / size
@@ -177,12 +179,15 @@ def write_rows(
             observation.gradients, observation.rotation_gradients, i, of_attitude, n
         ):
             continue
-        braking, margin, scale = motion.braking, gains.margin + motion.position_spread, motion.mass**2
+        braking, margin, scale = motion.braking, gains.margin + motion.position_spread, square(motion.mass)
         if of_attitude:
-            along, turned = n[0] ** 2 + n[1] ** 2 + n[2] ** 2, n[3] ** 2 + n[4] ** 2 + n[5] ** 2  # rad2/m2, 1
+            along, turned = (
+                square(n[0]) + square(n[1]) + square(n[2]),
+                square(n[3]) + square(n[4]) + square(n[5]),
+            )  # rad2/m2, 1
             braking, margin = gains.turning_deceleration, _MARGIN_OF_ATTITUDE + np.sqrt(along) * motion.position_spread
-            scale = motion.mass**2 * along + motion.inertia**2 * turned
-        price = 10.0 ** (-_FIRM[0] - _FIRM[1] * weights[i]) / max(scale, 1e-9)
+            scale = square(motion.mass) * along + square(motion.inertia) * turned
+        price = exponential(_LN_10 * (-_FIRM[0] - _FIRM[1] * weights[i])) / max(scale, 1e-9)
         for axis in range(6):
             relative[axis] = motion.velocity[axis] - (regions.velocities[i, axis] if axis < 3 else 0.0)
         turning = 0.0
@@ -193,7 +198,7 @@ def write_rows(
         distance, reach, faces = observation.clearances[i], 0.0, 1
         if not of_attitude and has_faces(regions.kinds[i]):
             copy(relative, path_velocity)
-            speed = np.sqrt(path_velocity[0] ** 2 + path_velocity[1] ** 2 + path_velocity[2] ** 2)
+            speed = length3(path_velocity[0], path_velocity[1], path_velocity[2])
             reach = margin + speed * (speed / (2.0 * braking) + 1.0 / gains.barrier_slope + 1.0 / gains.barrier_rate)
             if 0.0 < distance < reach:
                 faces = 1 + FACES

@@ -11,6 +11,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from controller.arithmetic import square
 from controller.jit.jit import inlined, part
 from controller.jit.stack_array import zeros
 from controller.regions import Ellipsoid, HalfSpace, Sphere
@@ -63,7 +64,7 @@ def face_ahead(
         approach_speed += velocity[axis] * nearest[axis]
     for axis in range(3):
         velocity[axis] -= min(approach_speed, 0.0) * nearest[axis]
-        speed += velocity[axis] ** 2
+        speed += square(velocity[axis])
     speed = np.sqrt(speed)
     if not speed > 1e-6:
         return np.inf

@@ -22,6 +22,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from controller.arithmetic import square
 from controller.jit.jit import part
 from controller.jit.stack_array import zeros
 from controller.laws.deployable.gains import DeployableGains
@@ -97,11 +98,11 @@ def detect_fault(
     m, variance = thrusters.health.size, zeros(3)
     for axis in range(3):
         variance[axis] = (
-            0.0 if axis == 2 else (_BELOW * dynamics.translational_mass[0] * norm(estimate.acceleration)) ** 2
+            0.0 if axis == 2 else square(_BELOW * dynamics.translational_mass[0] * norm(estimate.acceleration))
         )
-        variance[axis] += (_UNMODELLED * dynamics.mass[3 + axis, 3 + axis]) ** 2
+        variance[axis] += square(_UNMODELLED * dynamics.mass[3 + axis, 3 + axis])
         for i in range(m):
-            variance[axis] += (_EFFECTIVENESS * thrusters.matrix[3 + axis, i] * thrusters.forces[i]) ** 2
+            variance[axis] += square(_EFFECTIVENESS * thrusters.matrix[3 + axis, i] * thrusters.forces[i])
     mass, weight = dynamics.translational_mass[0], min(period / _CORRELATED, 1.0)
     best, next_best, at = 0.0, 0.0, -1
     for i in range(m):
@@ -153,7 +154,7 @@ def _by_velocity(
     for axis in range(3):
         lag[axis] -= (R[axis, 0] * effect[0] + R[axis, 1] * effect[1] + R[axis, 2] * effect[2]) * impulse
         if measured:
-            step += lag[axis] * (2.0 * innovation[axis] - lag[axis]) / (2.0 * innovation_deviation[axis] ** 2)
+            step += lag[axis] * (2.0 * innovation[axis] - lag[axis]) / (2.0 * square(innovation_deviation[axis]))
             lag[axis] *= 1.0 - gain[axis]
     return min(max(step, -_MOST_A_STEP), _MOST_A_STEP)
 
@@ -170,11 +171,11 @@ def _by_moment(
     for j in range(3):
         missing = adapted[j] - effect[3 + j] * force
         along += R[2, j] * missing  # k = R^T e3
-        size += missing**2 / variance[j]
+        size += square(missing) / variance[j]
         step += missing * (2.0 * residual[j] - missing) / (2.0 * variance[j])
     for j in range(3):
         adapted[j] -= adaptation * (adapted[j] - effect[3 + j] * force - along * R[2, j])
-    if not size > _STANDS_OUT**2:
+    if not size > square(_STANDS_OUT):
         return 0.0
     return min(max(step, -_MOST_A_STEP), _MOST_A_STEP)
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from controller.arithmetic import square
 from controller.jit.jit import part
 from controller.jit.stack_array import zeros
 from controller.law import VehicleState
@@ -64,7 +65,7 @@ def process_measurement(memory: DeployableMemory, state: VehicleState, gains: De
     valid = _is_plausible_attitude(state.quaternion, state.velocity_body)
     if valid:
         e = state.quaternion
-        length = np.sqrt(e[0] ** 2 + e[1] ** 2 + e[2] ** 2 + e[3] ** 2)
+        length = np.sqrt(square(e[0]) + square(e[1]) + square(e[2]) + square(e[3]))
         for i in range(4):
             memory.quaternion[i] = e[i] / length
         copy(state.velocity_body[3:], memory.omega)
@@ -109,7 +110,7 @@ def _is_plausible_attitude(quaternion: Array, velocity_body: Array) -> bool:
     """Return whether a quaternion has length 1 and the rates are plausible."""
     size, fastest = 0.0, 0.0
     for i in range(4):
-        size += quaternion[i] ** 2
+        size += square(quaternion[i])
     for i in range(3):
         fastest += abs(velocity_body[3 + i])
     return abs(size - 1.0) < 1e-2 and fastest < _FASTEST

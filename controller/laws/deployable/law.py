@@ -10,6 +10,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from controller.arithmetic import length3, square
 from controller.jit.function_pointer import call, pointer_to
 from controller.jit.jit import jit_noalloc, part
 from controller.jit.stack_array import zeros
@@ -162,7 +163,7 @@ def step(
         dynamics.translational_mass[0],
         (dynamics.mass[3, 3] + dynamics.mass[4, 4] + dynamics.mass[5, 5]) / 3.0,
         gains.braking_share * _braking(dynamics, thrusters),
-        _SPREADS * observer.position_spread(estimate) + 0.5 * gains.acceleration * period**2,
+        _SPREADS * observer.position_spread(estimate) + 0.5 * gains.acceleration * square(period),
     )
     rows = call(
         memory.stages.write_rows,
@@ -207,9 +208,7 @@ def _soft_forces(
     for i in range(regions.kinds.size):
         if regions.hard[i] or not observation.values[i] > 0.0 or regions.kinds[i] >= _ATTITUDE:
             continue
-        size = np.sqrt(
-            observation.gradients[i, 0] ** 2 + observation.gradients[i, 1] ** 2 + observation.gradients[i, 2] ** 2
-        )
+        size = length3(observation.gradients[i, 0], observation.gradients[i, 1], observation.gradients[i, 2])
         if not size > 0.0:
             continue
         thruster_acceleration = min(regions.gains[i] * weights[i] * observation.values[i], most)
@@ -264,7 +263,7 @@ def _report(report: Array, estimate: Estimate, cost: float, points: int, health:
     copy(estimate.position, report[:3])
     copy(estimate.velocity, report[3:6])
     copy(estimate.water_velocity, report[6:8])
-    report[8] = np.sqrt(desired[0] ** 2 + desired[1] ** 2 + desired[2] ** 2)
+    report[8] = length3(desired[0], desired[1], desired[2])
     report[9] = cost
     report[10] = points - 1
     report[14] = 0.0

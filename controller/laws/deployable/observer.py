@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from controller.arithmetic import square
 from controller.jit.jit import part
 from controller.jit.stack_array import zeros
 from controller.laws.deployable.gains import DeployableGains
@@ -73,9 +74,9 @@ def initialize(estimate: Estimate, position: Array, velocity: Array, gains: Depl
         P = estimate.covariance[axis]
         unknown = P[2, 2]
         if first:
-            unknown = _FIRST_RESTORING**2 if axis == 2 else _FIRST_CURRENT**2
+            unknown = square(_FIRST_RESTORING) if axis == 2 else square(_FIRST_CURRENT)
         P[:, :] = 0.0
-        P[0, 0], P[1, 1], P[2, 2] = gains.position_noise**2, gains.velocity_noise**2, unknown
+        P[0, 0], P[1, 1], P[2, 2] = square(gains.position_noise), square(gains.velocity_noise), unknown
     estimate.innovation[:] = 0.0
     estimate.time_since_measurement[0] = 0.0
 
@@ -111,8 +112,8 @@ def predict(
         p12 = f11 * P[1, 2] + f12 * P[2, 2]
         drift = gains.restoring_drift if axis == 2 else gains.current_drift
         P[0, 0], P[0, 1], P[0, 2] = p00, p01, p02
-        P[1, 0], P[1, 1], P[1, 2] = p01, p11 + _UNMODELLED**2 * T, p12
-        P[2, 0], P[2, 1], P[2, 2] = p02, p12, P[2, 2] + drift**2 * T
+        P[1, 0], P[1, 1], P[1, 2] = p01, p11 + square(_UNMODELLED) * T, p12
+        P[2, 0], P[2, 1], P[2, 2] = p02, p12, P[2, 2] + square(drift) * T
         acceleration = free[axis] + by_thrusters[axis]
         estimate.acceleration[axis] = acceleration
         estimate.position[axis] += T * (estimate.velocity[axis] + 0.5 * T * acceleration)
@@ -127,22 +128,22 @@ def correct(estimate: Estimate, position: Array, velocity: Array, gains: Deploya
         P = estimate.covariance[axis]
         off = abs(position[axis] - estimate.position[axis])
         fast = abs(velocity[axis] - estimate.velocity[axis])
-        if not off <= _GATE * np.sqrt(P[0, 0] + gains.position_noise**2) + 0.05:
+        if not off <= _GATE * np.sqrt(P[0, 0] + square(gains.position_noise)) + 0.05:
             return False
-        if not fast <= _GATE * np.sqrt(P[1, 1] + gains.velocity_noise**2) + 0.05:
+        if not fast <= _GATE * np.sqrt(P[1, 1] + square(gains.velocity_noise)) + 0.05:
             return False
     for axis in range(3):
         P = estimate.covariance[axis]
         estimate.innovation[axis] = velocity[axis] - estimate.velocity[axis]
-        estimate.innovation_deviation[axis] = np.sqrt(P[1, 1] + gains.velocity_noise**2)
-        estimate.gain[axis] = P[1, 1] / (P[1, 1] + gains.velocity_noise**2)
+        estimate.innovation_deviation[axis] = np.sqrt(P[1, 1] + square(gains.velocity_noise))
+        estimate.gain[axis] = P[1, 1] / (P[1, 1] + square(gains.velocity_noise))
         unknown = estimate.net_weight[0] if axis == 2 else estimate.water_velocity[axis]
         for row in range(2):  # first by the position, then by the velocity
             measured = (
                 position[axis] - estimate.position[axis] if row == 0 else velocity[axis] - estimate.velocity[axis]
             )
             noise = gains.position_noise if row == 0 else gains.velocity_noise
-            total = P[row, row] + noise**2
+            total = P[row, row] + square(noise)
             k0, k1, k2 = P[0, row] / total, P[1, row] / total, P[2, row] / total
             estimate.position[axis] += k0 * measured
             estimate.velocity[axis] += k1 * measured

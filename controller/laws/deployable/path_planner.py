@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from controller.arithmetic import exponential, length3, square
 from controller.jit.jit import part
 from controller.jit.stack_array import zeros
 from controller.laws.deployable.gains import DeployableGains
@@ -32,6 +33,7 @@ from controller.regions.region_set import (
 
 Array = NDArray[np.float64]
 
+_LN_30 = 3.4011973816621555
 CORNERS = 8  # at most
 _SAMPLES = 64  # evaluations of the regions along a path at most
 _STRIDE = (0.08, 0.6)  # m, least and greatest distance between two
@@ -133,9 +135,7 @@ def path_cost(
     place, point, room = zeros(3), zeros(3), zeros(3)
     for leg in range(count):
         begin = start if leg == 0 else path[leg - 1]
-        length = np.sqrt(
-            (path[leg, 0] - begin[0]) ** 2 + (path[leg, 1] - begin[1]) ** 2 + (path[leg, 2] - begin[2]) ** 2
-        )
+        length = length3(path[leg, 0] - begin[0], path[leg, 1] - begin[1], path[leg, 2] - begin[2])
         total += length
         s = 0.0
         while s < length:
@@ -166,7 +166,7 @@ def path_cost(
             stride = min(max(_TRUST * (free - gains.clearance), _STRIDE[0]), _STRIDE[1], length - s + 1e-9)
             lack = gains.clearance - free
             if lack > 0.0:
-                total += stride * _NEAR * (lack / gains.clearance) ** 2
+                total += stride * _NEAR * square(lack / gains.clearance)
                 if free < gains.margin:
                     total += stride * _INSIDE * (1.0 + gains.margin - free)
             s += stride
@@ -263,7 +263,7 @@ def _length(path: Array, count: int, start: Array) -> float:
 
 @part
 def _distance(a: Array, b: Array) -> float:
-    return float(np.sqrt((a[0] - b[0]) ** 2 + (a[1] - b[1]) ** 2 + (a[2] - b[2]) ** 2))
+    return float(length3(a[0] - b[0], a[1] - b[1], a[2] - b[2]))
 
 
 @part
@@ -291,7 +291,7 @@ def _mutate_path(plan: PathPlan, start: Array, goal: PackedRegions, gains: Deplo
         count -= 1
     elif choice < 0.65 and count > 1:  # a corner moved
         moved = int(uniform(random) * last)
-        reach = 0.03 * 30.0 ** uniform(random)
+        reach = 0.03 * exponential(_LN_30 * uniform(random))
         for axis in range(3):
             candidate[moved, axis] += reach * _bell_shaped(random)
     elif choice < 0.9 and count <= CORNERS:  # a corner more, anywhere about

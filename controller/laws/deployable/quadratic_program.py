@@ -26,6 +26,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from controller.arithmetic import square
 from controller.jit.jit import part
 from controller.laws.deployable.linear_algebra import copy
 
@@ -344,7 +345,7 @@ def _append_factor_row(work: Workspace, barriers: int, a: int) -> bool:
         if b < a:
             L[a, b] = total / L[b, b]
         else:
-            least = _DEPENDENT * work.size[i] ** 2
+            least = _DEPENDENT * square(work.size[i])
             L[a, a] = np.sqrt(max(total, least))
             return bool(total > least)
     return False

@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from controller.arithmetic import length3, square
 from controller.jit.jit import inlined, part
 from controller.jit.stack_array import zeros
 from controller.laws.deployable.gains import DeployableGains
@@ -67,7 +68,7 @@ def is_line_free(start: Array, end: Array, regions: PackedRegions, margin: float
 
     Parameters
     ----------
-    begin, end : ndarray, shape (3,)
+    start, end : ndarray, shape (3,)
         Ends of the line [m, NED].
     regions : PackedRegions
         The hard ones among them count.
@@ -80,7 +81,7 @@ def is_line_free(start: Array, end: Array, regions: PackedRegions, margin: float
         Also False if the line needs more than `_LOOKS` evaluations.
     """
     point, gradient = zeros(3), zeros(3)
-    length = np.sqrt((end[0] - start[0]) ** 2 + (end[1] - start[1]) ** 2 + (end[2] - start[2]) ** 2)
+    length = length3(end[0] - start[0], end[1] - start[1], end[2] - start[2])
     s = 0.0
     for _ in range(_LOOKS):
         for axis in range(3):
@@ -129,8 +130,8 @@ def grow_tree(
     nodes, parents = tree.nodes, tree.parents
     moved = 0.0
     for axis in range(3):
-        moved += (nodes[0, axis] - end[axis]) ** 2
-    if tree.size[0] == 0 or tree.size[0] == _NODES or moved > _MOVED**2:
+        moved += square(nodes[0, axis] - end[axis])
+    if tree.size[0] == 0 or tree.size[0] == _NODES or moved > square(_MOVED):
         copy(end, nodes[0])
         parents[0] = -1
         tree.size[0] = 1
@@ -143,11 +144,11 @@ def grow_tree(
         target[axis] = start[axis] if random_numbers[3] < 0.2 else low + random_numbers[axis] * (high - low)
     nearest, least = 0, np.inf
     for i in range(tree.size[0]):
-        square = 0.0
+        squared = 0.0
         for axis in range(3):
-            square += (nodes[i, axis] - target[axis]) ** 2
-        if square < least:
-            nearest, least = i, square
+            squared += square(nodes[i, axis] - target[axis])
+        if squared < least:
+            nearest, least = i, squared
     distance = np.sqrt(least)
     if distance < _STRIDE:
         return 0

@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import ClassVar
 
+from controller.arithmetic import hypotenuse
 from controller.jit.jit import jit_noalloc
 from controller.regions.entry import Entry
 from controller.regions.geometry import clamp
@@ -70,12 +71,12 @@ def cone(p: Array, q: Array) -> Evaluation:
     aside = math.sqrt(x * x + y * y + z * z)
     sine, cosine, reach = q[6], q[7], q[8]
 
-    from_feature = math.hypot(along, aside)
+    from_feature = hypotenuse(along, aside)
     beyond = from_feature - reach
     # the nearest point of the flank
     on_flank = clamp(aside * sine + along * cosine, 0.0, reach)
     to_aside, to_along = aside - on_flank * sine, along - on_flank * cosine
-    flank = math.hypot(to_aside, to_along)
+    flank = hypotenuse(to_aside, to_along)
     outside = 1.0 if cosine * aside - sine * along >= 0.0 else -1.0
 
     if beyond > outside * flank:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
 
+from controller.arithmetic import length3, square
 from controller.jit.jit import jit_noalloc
 from controller.quaternion import rotation_matrix
 from controller.regions.entry import Entry
@@ -64,7 +64,7 @@ def ellipsoid(p: Array, q: Array) -> Evaluation:
     """Evaluate a packed `Ellipsoid` at the position `p`."""
     x, y, z = to_local(p, q, 0)
     a, b, c = q[12], q[13], q[14]
-    g = (x / a) ** 2 + (y / b) ** 2 + (z / c) ** 2 - 1.0
+    g = square(x / a) + square(y / b) + square(z / c) - 1.0
     wx, wy, wz = to_world(q, 3, 2.0 * x / (a * a), 2.0 * y / (b * b), 2.0 * z / (c * c))
     distance = _surface_distance(abs(x), abs(y), abs(z), a, b, c)
     return g, wx, wy, wz, distance if g > 0.0 else -distance
@@ -78,7 +78,7 @@ def _surface_distance(x: float, y: float, z: float, a: float, b: float, c: float
     (Eberly). With s = t + min a_i^2 as unknown, nothing cancels near the centre. The sum falls and is convex: Newton's
     method from a point left of the root only grows towards it.
     """
-    least = min(a, b, c) ** 2
+    least = square(min(a, b, c))
     da, db, dc = a * a - least, b * b - least, c * c - least
     # a point in a plane of symmetry is moved out of it by less than rounding shows
     x, y, z = max(x, 1e-14 * a), max(y, 1e-14 * b), max(z, 1e-14 * c)
@@ -92,7 +92,7 @@ def _surface_distance(x: float, y: float, z: float, a: float, b: float, c: float
             break
         s = new
     nearest_x, nearest_y, nearest_z = x * a * a / (s + da), y * b * b / (s + db), z * c * c / (s + dc)
-    return math.sqrt((x - nearest_x) ** 2 + (y - nearest_y) ** 2 + (z - nearest_z) ** 2)
+    return length3(x - nearest_x, y - nearest_y, z - nearest_z)
 
 
 def surface(shape: Ellipsoid, limits: Bounds) -> Mesh:

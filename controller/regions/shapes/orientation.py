@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from math import inf
 from typing import ClassVar
 
+from controller.arithmetic import arctangent
 from controller.jit.jit import jit_noalloc
 from controller.quaternion import error_parts
 from controller.regions.entry import Entry
@@ -55,7 +56,7 @@ def orientation(p: Array, e: Array, q: Array) -> EvaluationOfAttitude:
     """Evaluate a packed `Orientation` at the attitude `e`, wherever that is."""
     turn = error_parts(q[:4], e)
     sine = math.sqrt(turn[1] * turn[1] + turn[2] * turn[2] + turn[3] * turn[3])
-    g = 2.0 * math.atan2(sine, turn[0]) - q[4]
+    g = 2.0 * arctangent(sine, turn[0]) - q[4]
     if sine == 0.0 or turn[0] == 0.0:
         return g, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     return g, 0.0, 0.0, 0.0, turn[1] / sine, turn[2] / sine, turn[3] / sine

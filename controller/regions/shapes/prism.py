@@ -8,6 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from controller.arithmetic import hypotenuse
 from controller.jit.jit import jit_noalloc
 from controller.regions.entry import Entry
 from controller.regions.geometry import clamp, product_distance
@@ -114,11 +115,11 @@ def prism(p: Array, q: Array) -> Evaluation:
         j = i + 1 if i + 1 < n else 0
         ax, ay, bx, by = q[2 + 2 * i], q[3 + 2 * i], q[2 + 2 * j], q[3 + 2 * j]
         ex, ey = bx - ax, by - ay
-        length = math.hypot(ex, ey)
+        length = hypotenuse(ex, ey)
         x, y = p[0] - ax, p[1] - ay
         along = clamp((x * ex + y * ey) / (length * length), 0.0, 1.0)
         dx, dy = x - along * ex, y - along * ey
-        distance = math.hypot(dx, dy)
+        distance = hypotenuse(dx, dy)
         if not distance >= nearest:  # so that NaN comes through
             nearest = distance
             at_corner = distance > 0.0 and (along == 0.0 or along == 1.0)

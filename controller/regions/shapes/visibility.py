@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from math import inf
 from typing import ClassVar
 
+from controller.arithmetic import arctangent
 from controller.jit.jit import jit_noalloc
 from controller.quaternion import rotation_rows
 from controller.regions.entry import Entry
@@ -86,7 +87,7 @@ def visibility(p: Array, e: Array, q: Array) -> EvaluationOfAttitude:
     along = ax * bx + ay * by + az * bz
     cx, cy, cz = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
     aside = math.sqrt(cx * cx + cy * cy + cz * cz)
-    g = math.atan2(aside, along) - q[9]
+    g = arctangent(aside, along) - q[9]
     if aside == 0.0:
         return g, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     k = along / square

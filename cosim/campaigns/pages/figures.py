@@ -102,7 +102,7 @@ def distributions(columns: Mapping[str, Mapping[str, Array]], addition: str) -> 
     ----------
     columns : mapping from str to mapping from str to ndarray, shape (n,)
         By column, then by group; NaN where there is no number.
-    told : str
+    addition : str
         What the caption adds.
 
     Yields

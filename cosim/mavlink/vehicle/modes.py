@@ -25,8 +25,8 @@ def mode_name(heartbeat: Any, names: Mapping[int, str]) -> str:
     ----------
     heartbeat : Any
         Its HEARTBEAT.
-    told : mapping of int to str
-        Names that the vehicle told itself, by their custom mode; these come first.
+    names : mapping of int to str
+        Names that the vehicle sent, by their custom mode; these come first.
 
     Returns
     -------

@@ -1,0 +1,52 @@
+"""C libraries of translated functions, built and called in tests."""
+
+import ctypes
+import subprocess
+
+import pytest
+
+from controller.translator.arguments import words_of
+from controller.translator.program import Program
+from controller.translator.types import type_of
+from plant_fmu.compiling.compiler import find_compiler
+from plant_fmu.errors import BuildError
+
+FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fPIC", "-shared")
+WARNINGS = ("-Wall", "-Wextra", "-Wpedantic", "-Werror")
+
+
+def translated(function, arguments):
+    """Return the C text of a function for arguments such as these, which is called as ``entry``."""
+    program = Program()
+    program.export("entry", function, tuple(map(type_of, arguments)))
+    return program.text()
+
+
+def compiled(text, folder, *flags, compiler=None):
+    """Return the library that a compiler makes of C text."""
+    try:
+        command = compiler or find_compiler()
+    except BuildError as error:
+        pytest.skip(str(error))
+    source, library = folder / "translated.c", folder / "translated.so"
+    source.write_text(text, encoding="utf-8")
+    done = subprocess.run(
+        [*command, *FLAGS, *WARNINGS, *flags, str(source), "-o", str(library), "-lm"],
+        capture_output=True, text=True, timeout=300, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr[:4000]
+    return library
+
+
+class Called:
+    """A function of a library, bound to arguments."""
+
+    def __init__(self, library, arguments):
+        self._library, self._arguments = ctypes.CDLL(str(library)), arguments
+        self._entry, self._words = self._library.entry, words_of(arguments)
+        self._entry.argtypes, self._entry.restype = [ctypes.c_void_p], None
+        self._at = self._words.ctypes.data
+
+    def __call__(self):
+        """Call it: numbers in the arguments' arrays change."""
+        self._entry(self._at)

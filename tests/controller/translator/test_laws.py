@@ -1,0 +1,129 @@
+"""Shipped laws as C against their Python text: run by Numba, and by Python without any compiler."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from controller import LAWS
+from tests.controller.translator.building import Called, compiled, translated
+from tests.controller.translator.flights import Flight, same_bits
+
+HERE = Path(__file__).parent
+
+
+@pytest.fixture(scope="module", params=sorted(LAWS))
+def library(request, tmp_path_factory):
+    """The name of a law, its C text, and the library that this makes."""
+    flight = Flight(request.param)
+    text = translated(flight.function, flight.arguments)
+    return request.param, text, compiled(text, tmp_path_factory.mktemp(request.param))
+
+
+def first_difference(law, library, steps, seed):
+    """Return the first step after which C and Numba differ in forces or memory; None if none does."""
+    own, other = Flight(law, seed), Flight(law, seed)
+    call = Called(library, other.arguments)
+    for k in range(steps):
+        own.advance()
+        other.advance()
+        own.function(*own.arguments)
+        call()
+        if not (same_bits(own.forces, other.forces) and same_bits(own.memory[:-1], other.memory[:-1])):
+            return k
+    return None
+
+
+def test_forces_and_memory_are_those_of_numba(library):
+    law, _, built = library
+    assert first_difference(law, built, 800, seed=1) is None
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(2, 5))
+def test_forces_and_memory_are_those_of_numba_for_long(library, seed):
+    law, _, built = library
+    assert first_difference(law, built, 20_000, seed) is None
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "flags", [("-O0",), ("-O3",), ("-O3", "-march=native", "-fno-tree-slp-vectorize")], ids=" ".join
+)
+def test_any_optimisation_gives_the_same_bits(library, flags, tmp_path):
+    law, text, _ = library
+    assert first_difference(law, compiled(text, tmp_path, *flags), 3000, seed=6) is None
+
+
+@pytest.mark.slow
+def test_another_compiler_gives_the_same_bits(library, tmp_path):
+    pytest.importorskip("ziglang", reason="the build extra is not installed")
+    law, text, _ = library
+    built = compiled(text, tmp_path, compiler=[sys.executable, "-m", "ziglang", "cc"])
+    assert first_difference(law, built, 3000, seed=7) is None
+
+
+@pytest.mark.slow
+def test_steps_are_those_of_python_without_a_compiler(library, tmp_path):
+    law, _, built = library
+    code = f"""
+import sys
+import numpy as np
+from tests.controller.translator.building import Called
+from tests.controller.translator.flights import Flight, same_bits
+own, other = Flight({law!r}, 8), Flight({law!r}, 8)
+call = Called({str(built)!r}, other.arguments)
+assert not hasattr(own.function, "overloads"), "Numba compiles"
+np.seterr(all="ignore")
+for k in range(200):
+    own.advance(), other.advance()
+    own.function(*own.arguments)
+    call()
+    same = same_bits(own.forces, other.forces) and same_bits(own.memory[:-1], other.memory[:-1])
+    assert same, k
+"""
+    environment = {"NUMBA_DISABLE_JIT": "1", "PATH": "/usr/bin:/bin", "HOME": str(tmp_path)}
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=HERE.parents[2], env=environment,
+        capture_output=True, text=True, timeout=600, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr[-3000:]
+
+
+def test_the_code_asks_for_no_heap(library):
+    law, _, built = library
+    done = subprocess.run(["nm", "-D", "--undefined-only", str(built)], capture_output=True, text=True, check=False)
+    if done.returncode:
+        pytest.skip("nm is not there")
+    wanted = {line.split()[-1].partition("@")[0] for line in done.stdout.splitlines()}
+    ours = {name for name in wanted if not name.startswith("_")}
+    assert ours <= {"sqrt", "pow", "cos", "sin", "acos", "atan2", "hypot", "memset", "memcpy", "memmove"}, law
+
+
+@pytest.mark.slow
+def test_sanitizers_find_nothing(library, tmp_path):
+    """The library with its checks, in a Python of its own: who loads it late needs the runtime first."""
+    law, text, _ = library
+    flags = ("-fsanitize=address,undefined", "-fno-sanitize-recover=all", "-g", "-O1")
+    runtime = subprocess.run(["cc", "-print-file-name=libasan.so"], capture_output=True, text=True, check=False)
+    if runtime.returncode or not Path(runtime.stdout.strip()).is_absolute():
+        pytest.skip("the compiler has no sanitizers")
+    built = compiled(text, tmp_path, *flags, compiler=["cc"])
+    code = f"""
+from tests.controller.translator.building import Called
+from tests.controller.translator.flights import Flight
+flight = Flight({law!r}, 9)
+call = Called({str(built)!r}, flight.arguments)
+for _ in range(3000):
+    flight.advance()
+    call()
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=HERE.parents[2], capture_output=True, text=True, timeout=600, check=False,
+        env={
+            "LD_PRELOAD": runtime.stdout.strip(), "ASAN_OPTIONS": "detect_leaks=0", "NUMBA_DISABLE_JIT": "1",
+            "PATH": "/usr/bin:/bin", "HOME": str(tmp_path),
+        },
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr[-3000:]
