@@ -1,11 +1,12 @@
 """Region-reaching control: state, regions and weights in, forces out."""
 
-from controller.errors import ControllerError, LawError
+from controller.errors import ControllerError, LawError, TranslationError
 from controller.function_law import FunctionLaw, RegionsSeen
 from controller.law import CompiledLaw, Law, VehicleModel, VehicleState
 from controller.laws import LAWS
 from controller.laws.ismail_dunnigan import IsmailDunniganLaw
 from controller.paper_law import Gains
+from controller.translator.laws import translate_law
 
 __all__ = [
     "LAWS",
@@ -17,6 +18,8 @@ __all__ = [
     "Law",
     "LawError",
     "RegionsSeen",
+    "TranslationError",
     "VehicleModel",
     "VehicleState",
+    "translate_law",
 ]

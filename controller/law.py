@@ -205,6 +205,11 @@ class CompiledLaw:
         self.memory.desired_quaternion[:] = validate_quaternion(quaternion)
 
     @property
+    def plain_memory(self) -> Any:
+        """Its memory, without addresses of compiled code."""
+        return self.memory
+
+    @property
     def estimate(self) -> Array:
         """phi-hat (12), shape (4,) [N, N m]."""
         estimate: Array = self.memory.estimate

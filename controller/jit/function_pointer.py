@@ -8,13 +8,15 @@ Addresses come as integers in arguments: captured ones would defeat Numba's cach
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NewType
 
 import numba
 from numba import types
 from numba.core import cgutils, config, errors
 from numba.core.typing import templates
 from numba.extending import lower_builtin
+
+Address = NewType("Address", int)  # of a compiled function in this process; 0 for none
 
 _templates: Any = templates
 _lower: Any = lower_builtin
@@ -45,7 +47,7 @@ def declare(function: Any, arguments: tuple[Any, ...], result: Any) -> None:
         raise TypeError(f"{function.__name__} is called by address with {arguments}, expected {_signatures[function]}")
 
 
-def pointer_to(function: Any, arguments: tuple[Any, ...] | None = None) -> int:
+def pointer_to(function: Any, arguments: tuple[Any, ...] | None = None) -> Address:
     """Compile a function, and return its address.
 
     Parameters
@@ -57,7 +59,7 @@ def pointer_to(function: Any, arguments: tuple[Any, ...] | None = None) -> int:
 
     Returns
     -------
-    int
+    Address
         For `call`; 0 where nothing is compiled.
 
     Raises
@@ -66,7 +68,7 @@ def pointer_to(function: Any, arguments: tuple[Any, ...] | None = None) -> int:
         If it is declared for arguments of other types.
     """
     if _DISABLED:
-        return 0
+        return Address(0)
     kinds = _signatures[function][0] if arguments is None else tuple(_typeof(argument) for argument in arguments)
     function.compile(kinds)
     compiled = function.overloads[kinds]
@@ -74,7 +76,7 @@ def pointer_to(function: Any, arguments: tuple[Any, ...] | None = None) -> int:
     return address_of(compiled)
 
 
-def address_of(overload: Any) -> int:
+def address_of(overload: Any) -> Address:
     """Return the address of a function as compiled for arguments of some types.
 
     Parameters
@@ -84,10 +86,10 @@ def address_of(overload: Any) -> int:
 
     Returns
     -------
-    int
+    Address
         Where `called` finds it.
     """
-    address: int = overload.library.get_pointer_to_function(overload.fndesc.llvm_func_name)
+    address: Address = overload.library.get_pointer_to_function(overload.fndesc.llvm_func_name)
     return address
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
-from controller.jit.function_pointer import declare, pointer_to
+from controller.jit.function_pointer import Address, declare, pointer_to
 from controller.jit.jit import part
 from controller.regions.shapes import ENTRIES
 from controller.regions.shapes.depth_band import DepthBand
@@ -48,10 +48,10 @@ declare(evaluate_shape, (types.int64, _NUMBERS, _NUMBERS), _Tuple(types.float64,
 declare(evaluate_shape_of_attitude, (types.int64, _NUMBERS, _NUMBERS, _NUMBERS), _Tuple(types.float64, 7))
 
 
-def addresses_of(kinds: NDArray[np.int64]) -> tuple[int, int]:
+def addresses_of(kinds: NDArray[np.int64]) -> tuple[Address, Address]:
     """Return the addresses of what evaluates shapes of place and of attitude; 0 where these kinds need it not."""
     place = np.any((kinds != SPHERE) & (kinds != DEPTH_BAND) & (kinds < FIRST_OF_ATTITUDE))
     return (
-        pointer_to(evaluate_shape) if place else 0,
-        pointer_to(evaluate_shape_of_attitude) if np.any(kinds >= FIRST_OF_ATTITUDE) else 0,
+        pointer_to(evaluate_shape) if place else Address(0),
+        pointer_to(evaluate_shape_of_attitude) if np.any(kinds >= FIRST_OF_ATTITUDE) else Address(0),
     )

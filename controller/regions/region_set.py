@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controller.errors import RegionError
-from controller.jit.function_pointer import call
+from controller.jit.function_pointer import Address, call
 from controller.jit.jit import inlined, jit_noalloc, part
 from controller.jit.stack_array import zeros
 from controller.regions.entry import Entry
@@ -143,8 +143,8 @@ class PackedRegions(NamedTuple):
     velocities: Array  # (n, 3) m/s, NED
     gains: Array  # (n,) alpha_i
     hard: NDArray[np.bool_]  # (n,)
-    place: int  # address of what evaluates shapes of position alone; 0 where there are but spheres and bands of depth
-    pose: int  # address of what evaluates shapes of attitude; 0 where there are none
+    place: Address  # of what evaluates shapes of position; 0 where there are but spheres and depth bands
+    pose: Address  # of what evaluates shapes of attitude; 0 where there are none
 
     def evaluate(
         self,

@@ -1,8 +1,8 @@
 """Compiled laws as portable C: a translator of the Python in which laws are written.
 
-`program` translates functions with all that they call into one C99 file without heap, `functions` one of them,
-`statements`, `expressions`, `subscripts` and `calls` are the constructs, `operands` and `types` what they are made of,
-`arguments` makes words of arrays and tuples.
+`laws` gives the C of a law, with its numbers from `static_data`. `program` translates functions with all that they
+call into one C99 file without heap, `functions` one of them; `statements`, `expressions`, `subscripts` and `calls` are
+the constructs, `operands` and `types` what they are made of; `arguments` makes words of arrays and tuples.
 
-Imports: nothing.
+Imports: jit, regions.
 """

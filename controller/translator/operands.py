@@ -106,7 +106,7 @@ class Operands:
         if isinstance(known, int | np.integer):
             return Value(INT, f"INT64_C({int(known)})" if abs(int(known)) > 2**31 else f"{int(known)}", True)
         if isinstance(known, float):
-            return Value(DOUBLE, _number(known), True)
+            return Value(DOUBLE, number(known), True)
         if isinstance(operand, Items) or isinstance(known, tuple):
             values = [self.value(item, node) for item in self.items_of(operand, node)]
             kind = Tuple(tuple(value.type for value in values))
@@ -148,7 +148,8 @@ class Operands:
         return self.fail(node, "expected a tuple")
 
 
-def _number(x: float) -> str:
+def number(x: float) -> str:
+    """Return a number as C writes it."""
     if math.isnan(x):
         return "NAN"
     if math.isinf(x):

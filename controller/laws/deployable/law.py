@@ -374,6 +374,11 @@ class DeployableLaw(CompiledLaw):
         """State between steps, with the addresses of the stages, which are compiled at the first access."""
         return self._memory._replace(stages=_stages(self._memory, self.gains))
 
+    @property
+    def plain_memory(self) -> DeployableMemory:
+        """Its memory, without the addresses of the stages."""
+        return self._memory
+
     def __getstate__(self) -> dict[str, Any]:
         """Return the picklable state, without addresses, which hold in this process alone."""
         return {name: value for name, value in vars(self).items() if name != "memory"}

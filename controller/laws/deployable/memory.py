@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from controller.jit.function_pointer import Address
 from controller.laws.deployable.attitude import Attitude
 from controller.laws.deployable.barrier import RegionObservation
 from controller.laws.deployable.fault_detection import FaultState
@@ -21,12 +22,12 @@ Array = NDArray[np.float64]
 class Stages(NamedTuple):
     """Addresses of the long stages of a step, each compiled on its own."""
 
-    process_measurement: int = 0
-    detect_fault: int = 0
-    improve_path: int = 0
-    update_desired: int = 0
-    write_rows: int = 0
-    solve: int = 0
+    process_measurement: Address = Address(0)
+    detect_fault: Address = Address(0)
+    improve_path: Address = Address(0)
+    update_desired: Address = Address(0)
+    write_rows: Address = Address(0)
+    solve: Address = Address(0)
 
 
 class DeployableMemory(NamedTuple):
