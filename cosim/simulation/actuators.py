@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from controller.allocation import Allocation
+from controller.laws.deployable.linear_algebra import product
 from cosim.scenario.scenario import Scenario
 from cosim.simulation.signals import Array, Signals
 from plant_fmu import Plant
@@ -77,7 +78,7 @@ class Actuators:
 
     def apply_thrusts(self) -> None:
         """Bring the forces `thrusts` to the plant's inputs, and write the wrench that they amount to."""
-        self.command[:] = self._scenario.vehicle.thruster_matrix @ self.thrusts
+        product(self._scenario.vehicle.thruster_matrix, self.thrusts, self.command)
 
     def write_inputs(self) -> None:
         """Hand the inputs to the plant."""

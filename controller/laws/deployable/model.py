@@ -61,9 +61,11 @@ def make_dynamics(vehicle: VehicleModel, braking: Array) -> Dynamics:
     """
     mass = vehicle.rigid_mass + vehicle.added_mass
     mean = float(np.trace(mass[:3, :3])) / 3.0
+    inverse = 0.5 * (mass + mass.T)
+    invert_symmetric(inverse)
     return Dynamics(
         mass=mass,
-        inverse_mass=np.linalg.inv(mass).astype(np.float64),
+        inverse_mass=inverse,
         linear_damping=vehicle.linear_damping.copy(),
         quadratic_damping=vehicle.quadratic_damping.copy(),
         translational_mass=np.array([mean]),
