@@ -169,7 +169,7 @@ class CompiledLaw:
         raise NotImplementedError
 
     @classmethod
-    def checked(cls, gains: G) -> G:
+    def validate(cls, gains: G) -> G:
         """Return gains if the law can work with them.
 
         Parameters
@@ -281,17 +281,17 @@ class WrenchLaw(CompiledLaw):
         return cls(gains, desired_quaternion, period, n_regions)
 
     @classmethod
-    def checked(cls, gains: G) -> G:
+    def validate(cls, gains: G) -> G:
         """Return gains if the law can work with them."""
-        return checked_gains(gains, cls.above_zero)
+        return validate_gains(gains, cls.above_zero)
 
     def __init__(self, gains: Any, desired_quaternion: Array, period: float, n_regions: int) -> None:
-        self.gains = self.checked(gains)
-        desired, lasting = validate_quaternion(desired_quaternion), np.array([checked_period(period)])
+        self.gains = self.validate(gains)
+        desired, lasting = validate_quaternion(desired_quaternion), np.array([validate_period(period)])
         self.memory = type(self).memory_of(desired, lasting, n_regions)
 
 
-def checked_period(period: float) -> float:
+def validate_period(period: float) -> float:
     """Return a control period [s] if it can be one.
 
     Parameters
@@ -338,7 +338,7 @@ def validate_quaternion(quaternion: Array) -> Array:
     return desired
 
 
-def checked_gains(gains: G, above_zero: Container[str]) -> G:
+def validate_gains(gains: G, above_zero: Container[str]) -> G:
     """Return the gains if a law can work with them.
 
     Parameters

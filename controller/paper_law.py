@@ -40,7 +40,7 @@ class Gains(NamedTuple):
 
 
 @jit_noalloc
-def violation(value: float) -> float:
+def positive_part(value: float) -> float:
     """Return max(0, g) of a `value` g, as in (16), (17), (20) and (22).
 
     NaN stays NaN, lest a lost measurement looked like safety.
@@ -51,7 +51,7 @@ def violation(value: float) -> float:
 @compiled
 def primary_potential(value: float, k_p1: float) -> float:
     """Return P_p [N m]: (16), of f, the `value` of the goal, and `k_p1`."""
-    return 0.5 * k_p1 * square(violation(value))
+    return 0.5 * k_p1 * square(positive_part(value))
 
 
 @compiled
@@ -62,14 +62,14 @@ def secondary_potential(values: Array, alphas: Array) -> float:
     """
     total = 0.0
     for i in range(values.size):
-        total += 0.5 * alphas[i] * square(violation(values[i]))
+        total += 0.5 * alphas[i] * square(positive_part(values[i]))
     return total
 
 
 @compiled
 def primary_error(value: float, gradient: Array) -> Array:
     """Return e_p, shape (3,): (20), of f, `value`, and its `gradient`; k_p1 times it is (18), the potential's."""
-    return violation(value) * gradient
+    return positive_part(value) * gradient
 
 
 @jit_noalloc
@@ -217,7 +217,7 @@ def step(
     tau : ndarray, shape (6,)
         Receives the wrench [N, N m], body frame.
     """
-    f = violation(goal_value)
+    f = positive_part(goal_value)
     e_p = (f * goal_gradient[0], f * goal_gradient[1], f * goal_gradient[2])
     e_s = secondary_parts(values, gradients, alphas, gains.k_q)
     e_att = error_parts(desired_quaternion, quaternion)[1:]

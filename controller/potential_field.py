@@ -16,7 +16,7 @@ import numpy as np
 from controller.arithmetic import length3
 from controller.jit.jit import jit_noalloc
 from controller.law import Array, VehicleState
-from controller.paper_law import violation
+from controller.paper_law import positive_part
 from controller.quaternion import Vector3
 from controller.regions.kinds import FIRST_OF_ATTITUDE
 from controller.regions.region_set import PackedRegions, evaluate_packed
@@ -81,7 +81,9 @@ def evaluate_field(
     for i in range(field.values.size):
         if regions.kinds[i] >= _ATTITUDE:
             continue
-        along(field.gradients[i], -repulsion * regions.gains[i] * violation(reach - field.clearances[i]), field.push)
+        along(
+            field.gradients[i], -repulsion * regions.gains[i] * positive_part(reach - field.clearances[i]), field.push
+        )
 
 
 @jit_noalloc
@@ -110,7 +112,7 @@ def set_point_error(field: Field, inset: float, most: float) -> None:
         Greatest length of the error [m].
     """
     field.error[:] = 0.0
-    along(field.goal_gradient[0], violation(inset - field.goal_clearance[0]), field.error)
+    along(field.goal_gradient[0], positive_part(inset - field.goal_clearance[0]), field.error)
     shorten(field.error, most)
 
 

@@ -150,7 +150,7 @@ speed = Arbiter(
             "if temperature is hot and not (outdoors is warm or outdoors is cold) then fan is full with 0.6",
         ),
         name="fan",
-        normalisation="none",  # the centroid itself: a speed
+        normalization="none",  # the centroid itself: a speed
         outside="clip",
     )
 )

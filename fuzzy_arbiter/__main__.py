@@ -114,7 +114,7 @@ def _parser() -> argparse.ArgumentParser:
         "out", metavar="OUT", help=".json, .toml, .fcl, .fis, .fll, or .c, .py for code that evaluates it"
     )
     other.add_argument(
-        "--native", action="store_true", help="make the centroids the weights, for tools that do not normalise"
+        "--native", action="store_true", help="make the centroids the weights, for tools that do not normalize"
     )
 
     plot = verb("plot", "draw terms, rules at a sample, weights over inputs, or which output is the greatest where")

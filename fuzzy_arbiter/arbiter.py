@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from numpy.typing import ArrayLike
 
-from fuzzy_arbiter.definition import Normalisation, Output, Outside, System
+from fuzzy_arbiter.definition import Normalization, Output, Outside, System
 from fuzzy_arbiter.engines import choose
 from fuzzy_arbiter.engines.firing import Array
 from fuzzy_arbiter.errors import DefinitionError
@@ -29,7 +29,7 @@ class Arbiter:
     ----------
     criteria : sequence of Criterion
         In order of priority, the highest first; default: obstacle, shape, depth of the paper's section VI.
-    form, weight, normalisation, outside, points
+    form, weight, normalization, outside, points
         How the criteria become a system, as of `prioritised`.
     system : System, optional
         Any other Mamdani system, in the place of all of the above.
@@ -56,7 +56,7 @@ class Arbiter:
         *,
         form: Form = "hierarchical",
         weight: Output = WEIGHT,
-        normalisation: Normalisation = "range",
+        normalization: Normalization = "range",
         outside: Outside = "refuse",
         points: int = 101,
         system: System | None = None,
@@ -65,10 +65,10 @@ class Arbiter:
         if isinstance(criteria, System):
             raise DefinitionError("criteria: a System came, expected Arbiter(system=...)")
         if system is None:
-            system = prioritised(criteria, form, weight, normalisation, outside, points)
-        elif (criteria, form, weight, normalisation, outside, points) != (*_DEFAULTS,):
+            system = prioritised(criteria, form, weight, normalization, outside, points)
+        elif (criteria, form, weight, normalization, outside, points) != (*_DEFAULTS,):
             raise DefinitionError(
-                "system: came with criteria, form, weight, normalisation, outside or points, which it has"
+                "system: came with criteria, form, weight, normalization, outside or points, which it has"
             )
         self._system = system
         self._engine, self._why = choose(system, engine)
@@ -144,7 +144,7 @@ class Arbiter:
         return self._engine.weights_of_many(self._samples.many(inputs))
 
     def centroids(self, inputs: Sample) -> tuple[float, ...]:
-        """Return the raw value of each output for one sample, before normalisation.
+        """Return the raw value of each output for one sample, before normalization.
 
         Parameters
         ----------

@@ -17,7 +17,7 @@ from fuzzy_arbiter.shapes import Shape
 Conjunction = Literal["min", "prod"]
 Disjunction = Literal["max", "probor"]
 Implication = Literal["min", "prod"]
-Normalisation = Literal["range", "none", "sum", "max"]
+Normalization = Literal["range", "none", "sum", "max"]
 Outside = Literal["refuse", "clip"]
 
 MAX_POINTS = 1_000_000_000
@@ -189,7 +189,7 @@ class System:
         Degree of *or*; ``probor`` is a + b - a b.
     implication : {"min", "prod"}
         Whether an output's term is clipped at a rule's strength, or scaled by it.
-    normalisation : {"range", "none", "sum", "max"}
+    normalization : {"range", "none", "sum", "max"}
         What is done to the centroids: ``none`` leaves them; ``range`` maps those of the least and of the greatest term
         alone to 0 and 1; ``sum`` and ``max`` then divide by all weights' sum or greatest.
     outside : {"refuse", "clip"}
@@ -217,7 +217,7 @@ class System:
     conjunction: Conjunction = "min"
     disjunction: Disjunction = "max"
     implication: Implication = "min"
-    normalisation: Normalisation = "range"
+    normalization: Normalization = "range"
     outside: Outside = "refuse"
     points: int = 101
 
@@ -262,7 +262,7 @@ CHOICES = {
     "conjunction": get_args(Conjunction),
     "disjunction": get_args(Disjunction),
     "implication": get_args(Implication),
-    "normalisation": get_args(Normalisation),
+    "normalization": get_args(Normalization),
     "outside": get_args(Outside),
 }
 _N = TypeVar("_N", bound=str)

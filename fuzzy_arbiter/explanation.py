@@ -61,7 +61,7 @@ class OutputDecision:
     cuts : dict from str to float
         For each term, the greatest strength of the rules that conclude it.
     centroid : float
-        Value in the universe, before it is normalised.
+        Value in the universe, before it is normalized.
     weight : float
         As the arbiter gives it.
     decided_by : str or None

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from typing import Literal, get_args
 
 from fuzzy_arbiter.checks import all_of, require_name, shown
-from fuzzy_arbiter.definition import Normalisation, Output, Outside, System, Term, Variable
+from fuzzy_arbiter.definition import Normalization, Output, Outside, System, Term, Variable
 from fuzzy_arbiter.errors import DefinitionError
 from fuzzy_arbiter.propositions import And, Is, Or, Proposition
 from fuzzy_arbiter.rule import Rule
@@ -88,7 +88,7 @@ def prioritised(
     criteria: Sequence[Criterion] = SECTION_VI,
     form: Form = "hierarchical",
     weight: Output = WEIGHT,
-    normalisation: Normalisation = "range",
+    normalization: Normalization = "range",
     outside: Outside = "refuse",
     points: int = 101,
     name: str = "arbiter",
@@ -105,7 +105,7 @@ def prioritised(
         always, the complete table on crisp inputs (see ``docs/arbiter.md``).
     weight : Output
         Pattern of the outputs, whose names get the criterion's number: the first term is the low one.
-    normalisation, outside, points, name
+    normalization, outside, points, name
         As of `System`.
 
     Returns
@@ -138,7 +138,7 @@ def prioritised(
     off = tuple(Is(c.name, c.off) for c in criteria)
     rules = _RULES[form](on, off, outputs)
     inputs = tuple(c.variable for c in criteria)
-    return System(inputs, outputs, rules, name, normalisation=normalisation, outside=outside, points=points)
+    return System(inputs, outputs, rules, name, normalization=normalization, outside=outside, points=points)
 
 
 Statements = tuple[Is, ...]

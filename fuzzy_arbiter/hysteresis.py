@@ -145,7 +145,7 @@ class HysteresisArbiter:
         UndefinedOutputError
             If no rule fires for an output without default; the state is then as before.
         """
-        now = self._time if time is None and not any(self._dwell) else _checked_time(time, self._time)
+        now = self._time if time is None and not any(self._dwell) else _validate_time(time, self._time)
         values = self.arbiter.samples.one(inputs)
         degrees = [shape(x) for shape, x in zip(self._shapes, values, strict=True)]
         closed, since, places = self._next(self._closed, self._since, values, degrees, now)
@@ -180,7 +180,7 @@ class HysteresisArbiter:
         if times is None and not any(self._dwell):
             moments = np.full(len(values), self._time)
         else:
-            moments = _checked_times(times, len(values), self._time)
+            moments = _validate_times(times, len(values), self._time)
         degrees = np.column_stack([degrees_of_many(s, values[:, i]) for i, s in enumerate(self._shapes)])
         closed, since = self._closed, self._since
         places = np.empty_like(values)
@@ -305,7 +305,7 @@ def _place(variable: Variable, shape: Shape, degree: float) -> float:
     raise DefinitionError(f"input {variable.name!r}: it is {what} nowhere in [{low:g}, {high:g}]")
 
 
-def _checked_time(time: float | None, last: float) -> float:
+def _validate_time(time: float | None, last: float) -> float:
     if time is None:
         raise InputError("time is missing, expected seconds, as there is a dwell")
     if not isinstance(time, Real) or isinstance(time, bool) or not math.isfinite(time):
@@ -315,7 +315,7 @@ def _checked_time(time: float | None, last: float) -> float:
     return float(time)
 
 
-def _checked_times(times: ArrayLike | None, rows: int, last: float) -> Array:
+def _validate_times(times: ArrayLike | None, rows: int, last: float) -> Array:
     if times is None:
         raise InputError("times are missing, expected seconds for each row, as there is a dwell")
     try:
@@ -326,7 +326,7 @@ def _checked_times(times: ArrayLike | None, rows: int, last: float) -> Array:
         raise InputError(f"times have the shape {moments.shape}, expected ({rows},), one for each row of the inputs")
     for row, (before, now) in enumerate(zip([last, *moments.tolist()], moments.tolist(), strict=False)):
         try:
-            _checked_time(now, before)
+            _validate_time(now, before)
         except InputError as error:
             raise InputError(f"row {row}: {error}") from None
     return moments

@@ -23,7 +23,7 @@ class Autopilot:
     curve: Literal["linear", "quadratic"] = "quadratic"  # of the force, over the part of the span
 
 
-def checked_autopilot(
+def validate_autopilot(
     autopilot: Autopilot, n_thrusters: int, require: Callable[[bool, str, object, str], None]
 ) -> Autopilot:
     """Return the table with a channel and a sign for each thruster.

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from plant_fmu.autopilot import Autopilot, checked_autopilot
+from plant_fmu.autopilot import Autopilot, validate_autopilot
 from plant_fmu.errors import TableError, VehicleError
 from plant_fmu.toml_tables import decode, read_toml
 
@@ -283,7 +283,7 @@ def _check(file: _File, where: str) -> Vehicle:
         thrust_dead_band=per_thruster(thrusters.dead_band, "dead_band"),
         thrust_curve=per_thruster(thrusters.curve, "curve"),
         hull_radius=file.hull.radius,
-        autopilot=file.autopilot and checked_autopilot(file.autopilot, n, require),
+        autopilot=file.autopilot and validate_autopilot(file.autopilot, n, require),
     )
 
     for key, value in vars(vehicle).items():

@@ -2,7 +2,7 @@
 #include "law.h"
 
 /* max(0, g), as in (16), (17), (20) and (22); NaN stays NaN, lest a lost measurement looked like safety. */
-static Real violation(Real value)
+static Real positive_part(Real value)
 {
     return choose(value <= 0.0, splat(0.0), value);
 }
@@ -66,7 +66,7 @@ void law_step(const Real quaternion[4], const Real velocity[6], const Real desir
 
     /* (20) to (23) */
     for (int j = 0; j < 3; j++)
-        e_p[j] = violation(goal_value) * goal_gradient[j];
+        e_p[j] = positive_part(goal_value) * goal_gradient[j];
     secondary_error(n, values, gradients, alphas, gains->k_q, e_s);
     attitude_error(desired, quaternion, e_att);
 

@@ -32,7 +32,7 @@ def declare(function: Any, arguments: tuple[Any, ...], result: Any) -> None:
     Parameters
     ----------
     function : callable
-        As `part`, `jit_noalloc` or `compiled` give it.
+        As `jit_internal`, `jit_noalloc` or `compiled` give it.
     arguments : tuple of Numba types
         Which it takes, and no others.
     result : Numba type
@@ -53,7 +53,7 @@ def pointer_to(function: Any, arguments: tuple[Any, ...] | None = None) -> Addre
     Parameters
     ----------
     function : callable
-        As `part`, `jit_noalloc` or `compiled` give it; alive as long as the address is used.
+        As `jit_internal`, `jit_noalloc` or `compiled` give it; alive as long as the address is used.
     arguments : tuple, optional
         Such as it will be given; where not, it is declared.
 

@@ -78,10 +78,10 @@ def jit_noalloc(function: F, *others: Path) -> F:
     return _kept_on_disk(function, others, counting=False)
 
 
-def part(function: F) -> F:
+def jit_internal(function: F) -> F:
     """Compile as `jit_noalloc` does what compiled functions call.
 
-    What Python needs to call a function takes as long to compile as a short function does. A part has it only where
+    What Python needs to call a function takes as long to compile as a short function does. It has that only where
     Python calls it, as tests do.
 
     Parameters
@@ -106,9 +106,9 @@ class _Internal(CPUDispatcher):
 
 
 @functools.cache
-def _callable(part: _Internal) -> Any:
+def _callable(internal: _Internal) -> Any:
     """Return the same function compiled for Python, too, under a name of its own on disk."""
-    function = part.py_func
+    function = internal.py_func
     twin = types.FunctionType(
         function.__code__, function.__globals__, function.__name__, function.__defaults__, function.__closure__
     )

@@ -14,7 +14,7 @@ import numpy as np
 from controller import paper_law
 from controller.jit.jit import jit_noalloc
 from controller.law import Array, VehicleState, WrenchLaw
-from controller.paper_law import Gains, violation
+from controller.paper_law import Gains, positive_part
 from controller.potential_field import Field, evaluate_field, field_of, keep_within, shorten
 from controller.quaternion import error_parts, rotation_rows
 from controller.regions.region_set import PackedRegions
@@ -63,7 +63,7 @@ def step(
     k_q = 1.0  # cancels
     g = Gains(gains.k_p1, gains.k_p2, k_q, gains.k_v1, gains.k_v2, gains.sigma_p, gains.sigma_a, gains.gamma)
     evaluate_field(state, goal, regions, gains.repulsion, gains.reach, field)
-    f = violation(field.goal_value[0] + gains.margin)
+    f = positive_part(field.goal_value[0] + gains.margin)
     for axis in range(3):
         field.error[axis] = f * field.goal_gradient[0, axis]  # (20)
     shorten(field.error, gains.limit / gains.k_p1)

@@ -10,7 +10,7 @@ from numba import types
 from numpy.typing import NDArray
 
 from controller.jit.function_pointer import Address, declare, pointer_to
-from controller.jit.jit import part
+from controller.jit.jit import jit_internal
 from controller.regions.shapes import ENTRIES
 from controller.regions.shapes.depth_band import DepthBand
 from controller.regions.shapes.sphere import Sphere
@@ -32,7 +32,7 @@ def _by_kind(name: str, arguments: str, of_attitude: bool) -> Callable[..., Any]
     names["__name__"] = __name__
     exec(compile(source, __file__, "exec"), names)  # noqa: S102 -- of the names of this package's files
     names[name].source = source  # which stands in no file
-    made: Callable[..., Any] = part(names[name])
+    made: Callable[..., Any] = jit_internal(names[name])
     return made
 
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from controller.errors import RegionError
 from controller.jit.function_pointer import Address, call
-from controller.jit.jit import inlined, jit_noalloc, part
+from controller.jit.jit import inlined, jit_internal, jit_noalloc
 from controller.jit.stack_array import zeros
 from controller.regions.entry import Entry
 from controller.regions.kinds import (
@@ -264,7 +264,7 @@ def evaluate_packed(
         rotation_gradients[i, 0], rotation_gradients[i, 1], rotation_gradients[i, 2] = sign * tx, sign * ty, sign * tz
 
 
-@part
+@jit_internal
 def evaluate_place(regions: PackedRegions, i: int, position: Array, at: Array) -> Evaluation:
     """Evaluate the shape of region `i`, of position alone, where it is now, at a `position`, shape (3,) [m, NED].
 
@@ -284,7 +284,7 @@ def evaluate_place(regions: PackedRegions, i: int, position: Array, at: Array) -
     return evaluation
 
 
-@part
+@jit_internal
 def evaluate_pose(regions: PackedRegions, i: int, position: Array, e: Array, at: Array) -> EvaluationOfAttitude:
     """Evaluate the shape of region `i`, of attitude, where it is now, at a `position`, shape (3,) [m, NED].
 
@@ -299,7 +299,7 @@ def evaluate_pose(regions: PackedRegions, i: int, position: Array, e: Array, at:
     return evaluation
 
 
-@part
+@jit_internal
 def clearance_of_place(regions: PackedRegions, i: int, position: Array, room: Array) -> float:
     """Return what `clearance_at` does, of a region known to be of position alone; `room` has shape (3,)."""
     clearance: float = -regions.signs[i] * evaluate_place(regions, i, position, room)[4]

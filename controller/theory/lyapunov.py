@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controller.jit.jit import compiled
-from controller.paper_law import Gains, violation
+from controller.paper_law import Gains, positive_part
 from controller.quaternion import rate, skew
 from controller.theory.model import Model, coriolis, damping
 
@@ -113,7 +113,7 @@ def primary_value(
         + np.sum(weighted(y, gains) * momentum)
         + 0.5 * gains.gamma * np.sum(wrong * wrong)
         + (gains.k_p2 + gains.sigma_a * gains.k_v2) * turned
-        + 0.5 * (gains.k_p1 + gains.sigma_p * gains.k_v1) * violation(goal_value) ** 2  # (32)
+        + 0.5 * (gains.k_p1 + gains.sigma_p * gains.k_v1) * positive_part(goal_value) ** 2  # (32)
     )
     return value
 
@@ -152,7 +152,7 @@ def unit_gradient_secondary(values: Array, betas: Array, gains: Gains) -> float:
     """Return what (33) says the last sum of (31) is; so it is where |dg_i/dp| = 1. Arguments as `printed_secondary`."""
     total = 0.0
     for i in range(values.size):
-        total += betas[i] * violation(values[i]) ** 2
+        total += betas[i] * positive_part(values[i]) ** 2
     return 0.5 * secondary_gain(gains) * total
 
 

@@ -130,10 +130,10 @@ class Expressions(Operands):
 
     def _boolop(self, node: ast.BoolOp) -> Operand:
         sign = "&&" if isinstance(node.op, ast.And) else "||"
-        result = self.truth(node.values[0])
+        result = self.condition(node.values[0])
         for other in node.values[1:]:
             mark = len(self.lines)
-            value = self.truth(other)
+            value = self.condition(other)
             if len(self.lines) == mark:
                 result = Value(BOOL, f"{bracketed(result)} {sign} {bracketed(value)}")
                 continue
@@ -144,13 +144,13 @@ class Expressions(Operands):
             result = held
         return result
 
-    def truth(self, node: ast.expr) -> Value:
+    def condition(self, node: ast.expr) -> Value:
         """Return an expression as a truth value."""
         value = self.scalar(self.expression(node), node)
         return value if value.type == BOOL else Value(BOOL, f"{bracketed(value)} != 0")
 
     def _ifexp(self, node: ast.IfExp) -> Operand:
-        condition = self.truth(node.test)
+        condition = self.condition(node.test)
         branches = []
         for branch in (node.body, node.orelse):
             mark = len(self.lines)

@@ -190,7 +190,7 @@ class Statements(Calls):
         if node.orelse:
             self.fail(node, "else of a loop")
         mark = len(self.lines)
-        condition = self.truth(node.test).code
+        condition = self.condition(node.test).code
         if len(self.lines) == mark:
             self.lines.append(f"while ({condition}) {{")
         else:

@@ -12,7 +12,7 @@ from typing import Any
 from cosim.errors import RunError
 
 
-def plain(value: Any) -> Any:
+def nan_to_none(value: Any) -> Any:
     """Return a value with None for each number that is none.
 
     Parameters
@@ -26,9 +26,9 @@ def plain(value: Any) -> Any:
         The same, tuples as lists.
     """
     if isinstance(value, dict):
-        return {key: plain(item) for key, item in value.items()}
+        return {key: nan_to_none(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
-        return [plain(item) for item in value]
+        return [nan_to_none(item) for item in value]
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
@@ -38,14 +38,14 @@ def json_text(value: Any) -> str:
     Parameters
     ----------
     value : Any
-        As for `plain`.
+        As for `nan_to_none`.
 
     Returns
     -------
     str
         With null for each number that is none, and a newline at its end.
     """
-    return json.dumps(plain(value), indent=2, allow_nan=False) + "\n"
+    return json.dumps(nan_to_none(value), indent=2, allow_nan=False) + "\n"
 
 
 @contextlib.contextmanager

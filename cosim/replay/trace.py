@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cosim.io.strict_json import plain
+from cosim.io.strict_json import nan_to_none
 from cosim.replay.events import events_of
 from cosim.replay.header import header_of
 from cosim.replay.sampling import sampled_rows
@@ -92,7 +92,7 @@ def trace_of(run: Run) -> Trace:
         "events": [dataclasses.asdict(event) for event in events],
         "gaps": {name: int(count) for name, count in zip(names, missing, strict=True) if count},
     }
-    return Trace(plain(header), viewing.extended(picked), steps)
+    return Trace(nan_to_none(header), viewing.extended(picked), steps)
 
 
 def _read(record: Rows, names: Sequence[str], steps: NDArray[np.intp]) -> tuple[Array, NDArray[np.intp]]:

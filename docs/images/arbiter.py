@@ -35,7 +35,7 @@ def main() -> None:
     save(pictures.surface(building, "alpha_2", ("smoke", "co2"), {"temperature": 26.0}), "surface")
     save(pictures.decisions(building, ("smoke", "co2"), {"temperature": 25.6}), "decisions")
     at = {"co2": 1280.0, "temperature": 25.2}
-    save(next(iter(pictures.normalisations(building, "smoke", at).values())), "normalisations")
+    save(next(iter(pictures.normalizations(building, "smoke", at).values())), "normalizations")
     save(forms(), "forms")
     save(chatter(), "chatter")
 

@@ -59,7 +59,7 @@ def described(arbiter: Arbiter) -> str:
         for variable in variables:
             lines += _described(variable)
     lines += ["", "rules", *(f"  {line}" for line in str(system).splitlines()), ""]
-    norms = ("conjunction", "disjunction", "implication", "normalisation", "outside", "points")
+    norms = ("conjunction", "disjunction", "implication", "normalization", "outside", "points")
     lines += [f"{name:14} {getattr(system, name)}" for name in norms]
     lines += [f"{'engine':14} {arbiter.engine}: {arbiter.engine_reason}"]
     return "\n".join(lines)
@@ -88,7 +88,7 @@ def convert(file: str, out: str, native: bool) -> None:
     out : str
         File to write, whose suffix says how.
     native : bool
-        Whether its centroids shall be the weights, so that other tools give them without a normalisation.
+        Whether its centroids shall be the weights, so that other tools give them without a normalization.
 
     Raises
     ------

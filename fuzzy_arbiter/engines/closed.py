@@ -76,12 +76,12 @@ class ClosedEngine(Engine):
         self.clauses = clauses
         self.ladder = ladder(system, clauses)
         self.raw, scaled = _pieces(system.outputs)
-        self.scaled = self.raw if system.normalisation == "none" else scaled
+        self.scaled = self.raw if system.normalization == "none" else scaled
         super().__init__(system)
         self._index = {v.name: i for i, v in enumerate(system.inputs)}
         self._shapes = {(v.name, t.name): t.shape for v in system.inputs for t in v.terms}
         self._cubic = _one_cubic(self.scaled)
-        self.clips = system.normalisation != "none" and self._cubic != SMOOTHSTEP
+        self.clips = system.normalization != "none" and self._cubic != SMOOTHSTEP
         # prioritised criteria in the order of the inputs, which are the degrees themselves: nothing to look up
         self._plain = self._cubic is not None and self.ladder is not None and len(self.ladder) == len(system.inputs)
         for step, variable in zip(self.ladder or (), system.inputs, strict=False):
@@ -107,14 +107,14 @@ class ClosedEngine(Engine):
         return np.stack([_values(forms, h) for forms, h in zip(self.raw, highs, strict=True)], axis=1)
 
     def weights(self, inputs: Sequence[float]) -> tuple[float, ...]:
-        """Return the normalised value of each output for one sample; as of `Engine`."""
+        """Return the normalized value of each output for one sample; as of `Engine`."""
         result = [_value(forms, h) for forms, h in zip(self.scaled, self._highs(inputs), strict=True)]
         if self.clips:
             result = [min(max(weight, 0.0), 1.0) for weight in result]
-        return normalize_weights(result, self.system.normalisation)
+        return normalize_weights(result, self.system.normalization)
 
     def weights_of_many(self, inputs: Array) -> Array:
-        """Return the normalised value of each output for many samples; as of `Engine`."""
+        """Return the normalized value of each output for many samples; as of `Engine`."""
         result = np.empty((len(inputs), len(self.system.outputs)))
         for start in range(0, len(inputs), _BLOCK):
             block = inputs[start : start + _BLOCK]
@@ -126,11 +126,11 @@ class ClosedEngine(Engine):
             if self.clips:
                 np.clip(values, 0.0, 1.0, out=values)
             result[start : start + _BLOCK] = values.T
-        return normalize_weights_of_many(result, self.system.normalisation)
+        return normalize_weights_of_many(result, self.system.normalization)
 
     def shortcut(self) -> Shortcut | None:
         """Return a faster way to the weights of prioritised criteria whose degrees are the inputs; as of `Engine`."""
-        whole = self.clips or self.system.normalisation not in ("range", "none")  # more to be done with the weights
+        whole = self.clips or self.system.normalization not in ("range", "none")  # more to be done with the weights
         if self._plain and not whole and self._cubic is not None and self._cubic[:2] == (0.0, 0.0):
             return _smooth_ladder(len(self.system.inputs), *self._cubic[2:])
         return None

@@ -15,7 +15,7 @@ from fuzzy_arbiter.engines.firing import Array, Firing
 from fuzzy_arbiter.errors import EngineError, UndefinedOutputError
 
 Shortcut = Callable[[Sequence[float]], tuple[float, ...] | None]
-_EACH_BY_ITSELF = ("range", "none")  # normalisations that look at one output at a time
+_EACH_BY_ITSELF = ("range", "none")  # normalizations that look at one output at a time
 
 
 class Engine(ABC):
@@ -31,7 +31,7 @@ class Engine(ABC):
     Attributes
     ----------
     scale : list of (float, float)
-        For each output the centroids that become 0 and 1; none if they are not normalised.
+        For each output the centroids that become 0 and 1; none if they are not normalized.
 
     Raises
     ------
@@ -44,7 +44,7 @@ class Engine(ABC):
     def __init__(self, system: System) -> None:
         self.system = system
         self.firing = Firing(system)
-        self.scale = [] if system.normalisation == "none" else [self._ends(k) for k in range(len(system.outputs))]
+        self.scale = [] if system.normalization == "none" else [self._ends(k) for k in range(len(system.outputs))]
 
     @abstractmethod
     def centroid(self, k: int, cuts: Sequence[float]) -> float:
@@ -138,7 +138,7 @@ class Engine(ABC):
         return result
 
     def weights(self, inputs: Sequence[float]) -> tuple[float, ...]:
-        """Return the normalised value of each output for one sample.
+        """Return the normalized value of each output for one sample.
 
         Parameters
         ----------
@@ -148,7 +148,7 @@ class Engine(ABC):
         Returns
         -------
         tuple of float
-            As the system's normalisation says.
+            As the system's normalization says.
 
         Raises
         ------
@@ -159,10 +159,10 @@ class Engine(ABC):
         if not self.scale:
             return tuple(raw)
         scaled = [min(max((c - low) / (high - low), 0.0), 1.0) for c, (low, high) in zip(raw, self.scale, strict=True)]
-        return normalize_weights(scaled, self.system.normalisation)
+        return normalize_weights(scaled, self.system.normalization)
 
     def weights_of_many(self, inputs: Array) -> Array:
-        """Return the normalised value of each output for many samples.
+        """Return the normalized value of each output for many samples.
 
         Parameters
         ----------
@@ -172,7 +172,7 @@ class Engine(ABC):
         Returns
         -------
         ndarray, shape (n, outputs)
-            As the system's normalisation says.
+            As the system's normalization says.
 
         Raises
         ------
@@ -183,7 +183,7 @@ class Engine(ABC):
         if not self.scale:
             return raw
         low, high = np.array(self.scale).T
-        return normalize_weights_of_many(np.clip((raw - low) / (high - low), 0.0, 1.0), self.system.normalisation)
+        return normalize_weights_of_many(np.clip((raw - low) / (high - low), 0.0, 1.0), self.system.normalization)
 
     def shortcut(self) -> Shortcut | None:
         """Return a faster way to `weights` for samples that are plain, if there is one.
@@ -203,20 +203,20 @@ class Engine(ABC):
         low, high = min(alone), max(alone)
         if not low < high:
             raise EngineError(
-                f"output {output.name!r}: its terms have one centroid, {low:g}, which leaves no range to normalise; "
-                "expected normalisation 'none'"
+                f"output {output.name!r}: its terms have one centroid, {low:g}, which leaves no range to normalize; "
+                "expected normalization 'none'"
             )
         return low, high
 
 
-def normalize_weights(weights: Sequence[float], normalisation: str) -> tuple[float, ...]:
-    """Return range-normalised weights as a normalisation over all outputs wants them.
+def normalize_weights(weights: Sequence[float], normalization: str) -> tuple[float, ...]:
+    """Return range-normalized weights as a normalization over all outputs wants them.
 
     Parameters
     ----------
     weights : sequence of float
         In [0, 1].
-    normalisation : {"range", "none", "sum", "max"}
+    normalization : {"range", "none", "sum", "max"}
         The first two leave them.
 
     Returns
@@ -224,21 +224,21 @@ def normalize_weights(weights: Sequence[float], normalisation: str) -> tuple[flo
     tuple of float
         Divided by their sum or their greatest; all 0 if that is 0.
     """
-    if normalisation in _EACH_BY_ITSELF:
+    if normalization in _EACH_BY_ITSELF:
         return tuple(weights)
     # not sum(), which newer Pythons round otherwise than exported code
-    whole = functools.reduce(operator.add, weights) if normalisation == "sum" else max(weights)
+    whole = functools.reduce(operator.add, weights) if normalization == "sum" else max(weights)
     return tuple(w / whole for w in weights) if whole > 0.0 else (0.0,) * len(weights)
 
 
-def normalize_weights_of_many(weights: Array, normalisation: str) -> Array:
-    """Return range-normalised weights of many samples as a normalisation over all outputs wants them.
+def normalize_weights_of_many(weights: Array, normalization: str) -> Array:
+    """Return range-normalized weights of many samples as a normalization over all outputs wants them.
 
     Parameters
     ----------
     weights : ndarray, shape (n, outputs)
         In [0, 1].
-    normalisation : {"range", "none", "sum", "max"}
+    normalization : {"range", "none", "sum", "max"}
         The first two leave them.
 
     Returns
@@ -246,9 +246,9 @@ def normalize_weights_of_many(weights: Array, normalisation: str) -> Array:
     ndarray, shape (n, outputs)
         Each row divided by its sum or its greatest; all 0 if that is 0.
     """
-    if normalisation in _EACH_BY_ITSELF:
+    if normalization in _EACH_BY_ITSELF:
         return weights
-    whole = (np.sum if normalisation == "sum" else np.max)(weights, axis=1, keepdims=True)
+    whole = (np.sum if normalization == "sum" else np.max)(weights, axis=1, keepdims=True)
     return np.asarray(np.divide(weights, whole, out=np.zeros_like(weights), where=whole > 0.0))
 
 

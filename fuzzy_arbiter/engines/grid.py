@@ -31,7 +31,7 @@ class GridEngine(Engine):
     """Gives the centroid that scikit-fuzzy gives on `System.points` points, to rounding.
 
     For the two triangles of section VI, with D the distance of two points as a part of the universe, the centroid is at
-    most D^2/6 of the universe off the exact one, and a range-normalised weight D^2/2: 1.7e-5 and 5e-5 at 101 points.
+    most D^2/6 of the universe off the exact one, and a range-normalized weight D^2/2: 1.7e-5 and 5e-5 at 101 points.
 
     As sampling does it, a jump of an output's term becomes a slope over one cell, and a knot between two points is cut
     off. Terms of inputs are not sampled. Areas below 2.2e-16 count as that much, as they do in scikit-fuzzy.

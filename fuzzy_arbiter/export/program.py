@@ -298,12 +298,12 @@ def _swept(engine: Engine) -> Iterator[Statement]:
 
 
 def _shared(system: System) -> Iterator[Statement]:
-    """Divide by the sum or the greatest of all, if that is the normalisation."""
-    if system.normalisation not in ("sum", "max"):
+    """Divide by the sum or the greatest of all, if that is the normalization."""
+    if system.normalization not in ("sum", "max"):
         return
     ys = [f"y{k}" for k in range(1, len(system.outputs) + 1)]
     logic = _Expressions()
-    whole = " + ".join(ys) if system.normalisation == "sum" else logic.join("max", ys)
+    whole = " + ".join(ys) if system.normalization == "sum" else logic.join("max", ys)
     yield from logic.assign("whole", whole, "")
     # where all are 0 they stay so
     yield Choose((("whole > 0.0", tuple(Assign(y, f"{y} / whole") for y in ys)),))

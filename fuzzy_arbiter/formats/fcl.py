@@ -13,7 +13,7 @@ from fuzzy_arbiter.formats.settings import read_settings, say_settings
 from fuzzy_arbiter.rule import Rule
 from fuzzy_arbiter.shapes import Shape
 
-_SETTINGS = ("normalisation", "outside", "points")
+_SETTINGS = ("normalization", "outside", "points")
 
 
 def write(system: System) -> str:

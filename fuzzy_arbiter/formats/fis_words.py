@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 from fuzzy_arbiter.shapes import Shape, falling, rising, trapezoid, triangle
 
-SETTINGS = ("normalisation", "outside", "points")
+SETTINGS = ("normalization", "outside", "points")
 
 # what a key may say, and what it means; algebraic_... are Octave's words, and fuzzylite leaves empty what no rule needs
 METHODS: dict[str, dict[str, str]] = {

@@ -26,7 +26,7 @@ def write(system: System) -> str:
     Returns
     -------
     str
-        Text of a file; the normalisation, for which the language has no word, stands in a comment.
+        Text of a file; the normalization, for which the language has no word, stands in a comment.
 
     Raises
     ------

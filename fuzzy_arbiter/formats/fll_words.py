@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-SETTINGS = ("normalisation",)
+SETTINGS = ("normalization",)
 CONJUNCTIONS = {"Minimum": "min", "AlgebraicProduct": "prod"}  # and implications
 DISJUNCTIONS = {"Maximum": "max", "AlgebraicSum": "probor"}
 RESOLUTION = 1000  # of fuzzylite's Centroid, where none is said

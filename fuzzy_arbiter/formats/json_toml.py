@@ -12,7 +12,7 @@ from fuzzy_arbiter.errors import FormatError
 from fuzzy_arbiter.formats.schema import system_of
 from fuzzy_arbiter.shapes import Shape
 
-_SETTINGS = ("name", "conjunction", "disjunction", "implication", "normalisation", "outside", "points")
+_SETTINGS = ("name", "conjunction", "disjunction", "implication", "normalization", "outside", "points")
 
 
 def read_json(text: str) -> System:

@@ -1,4 +1,4 @@
-"""Range normalisation said in the outputs' universe, for tools that know nothing of it."""
+"""Range normalization said in the outputs' universe, for tools that know nothing of it."""
 
 from __future__ import annotations
 
@@ -12,26 +12,26 @@ from fuzzy_arbiter.shapes import Shape
 
 
 def fold_normalization(system: System) -> System:
-    """Return the system whose raw centroids are the weights of a range-normalised one.
+    """Return the system whose raw centroids are the weights of a range-normalized one.
 
-    Normalising to the range maps the centroids of an output's least and greatest term, each alone, to 0 and 1. The same
-    map of the output's universe, terms and default gives a system that needs no normalising: low and high triangles on
+    Normalizing to the range maps the centroids of an output's least and greatest term, each alone, to 0 and 1. The same
+    map of the output's universe, terms and default gives a system that needs no normalizing: low and high triangles on
     [0, 1] become triangles on [-1, 2]. The ends of the map are exact, the places are rounded once.
 
     Parameters
     ----------
     system : System
-        With the normalisation ``range`` or ``none``.
+        With the normalization ``range`` or ``none``.
 
     Returns
     -------
     System
-        With the normalisation ``none``; the same system if it has that.
+        With the normalization ``none``; the same system if it has that.
 
     Raises
     ------
     UnsupportedError
-        If the normalisation is over all outputs, an output's terms have one centroid and so no range, or floating point
+        If the normalization is over all outputs, an output's terms have one centroid and so no range, or floating point
         has no room for the mapped terms.
 
     Notes
@@ -46,18 +46,18 @@ def fold_normalization(system: System) -> System:
     >>> fold_normalization(prioritised()).outputs[0].universe
     (-1.0, 2.0)
     """
-    if system.normalisation == "none":
+    if system.normalization == "none":
         return system
-    if system.normalisation != "range":
+    if system.normalization != "range":
         raise UnsupportedError(
-            f"no universe can say the normalisation {system.normalisation!r}, which is over all outputs; "
+            f"no universe can say the normalization {system.normalization!r}, which is over all outputs; "
             "expected 'range' or 'none'"
         )
-    return replace(system, outputs=tuple(map(_mapped, system.outputs)), normalisation="none")
+    return replace(system, outputs=tuple(map(_mapped, system.outputs)), normalization="none")
 
 
 def range_ends(output: Output) -> tuple[Fraction, Fraction]:
-    """Return the centroids that range normalisation maps to 0 and 1.
+    """Return the centroids that range normalization maps to 0 and 1.
 
     Parameters
     ----------
@@ -77,7 +77,7 @@ def _mapped(output: Output) -> Output:
     low, high = range_ends(output)
     if low == high:
         raise UnsupportedError(
-            f"output {output.name!r}: its terms have one centroid, {float(low):g}, which leaves no range to normalise"
+            f"output {output.name!r}: its terms have one centroid, {float(low):g}, which leaves no range to normalize"
         )
 
     def place(x: float) -> float:

@@ -15,9 +15,9 @@ from fuzzy_arbiter.propositions import is_identifier
 from fuzzy_arbiter.rule_text import parse_rule
 from fuzzy_arbiter.shapes import Shape, falling, rising, trapezoid, triangle
 
-_SETTINGS = ("conjunction", "disjunction", "implication", "normalisation", "outside", "points")
+_SETTINGS = ("conjunction", "disjunction", "implication", "normalization", "outside", "points")
 _LONG = ("name", *_SETTINGS, "inputs", "outputs", "rules")
-_SHORT = ("name", "criteria", "form", "weight", "normalisation", "outside", "points")
+_SHORT = ("name", "criteria", "form", "weight", "normalization", "outside", "points")
 _VARIABLE = ("name", "universe", "terms")
 _CRITERION = ("name", "on", "off", "membership")
 _SHAPES: dict[str, tuple[int, Callable[..., Shape]]] = {

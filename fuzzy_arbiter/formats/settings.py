@@ -13,7 +13,7 @@ from fuzzy_arbiter.formats.notation import refuse, say_number
 
 MARK = "fuzzy_arbiter:"
 # what a file means that says nothing of it
-PLAIN: dict[str, Any] = {"normalisation": "none", "outside": "refuse", "points": 101}
+PLAIN: dict[str, Any] = {"normalization": "none", "outside": "refuse", "points": 101}
 
 
 def say_settings(system: System, keys: Sequence[str]) -> list[str]:
@@ -34,15 +34,15 @@ def say_settings(system: System, keys: Sequence[str]) -> list[str]:
     """
     said = [f"{key} = {getattr(system, key)}" for key in keys if getattr(system, key) != PLAIN[key]]
     texts = [f"{MARK} {', '.join(said)}"] if said else []
-    if system.normalisation == "none":
+    if system.normalization == "none":
         return texts
     texts.append("other tools give the raw centroid c of each output; the weights are")
     for output in system.outputs:
         low, high = map(float, range_ends(output))
         zero, scale = say_number(low), say_number(high - low)
         texts.append(f"  (c - {zero}) / {scale}, held within [0, 1], for {output.name}")
-    if system.normalisation in ("sum", "max"):
-        whole = "sum" if system.normalisation == "sum" else "greatest"
+    if system.normalization in ("sum", "max"):
+        whole = "sum" if system.normalization == "sum" else "greatest"
         texts.append(f"  and then each divided by the {whole} of all, unless that is 0")
     return texts
 

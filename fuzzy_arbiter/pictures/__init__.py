@@ -8,13 +8,13 @@ Imports: engines.
 
 from fuzzy_arbiter.pictures.fields import decisions, surface
 from fuzzy_arbiter.pictures.firing import rules
-from fuzzy_arbiter.pictures.lines import normalisations, profile, terms
+from fuzzy_arbiter.pictures.lines import normalizations, profile, terms
 from fuzzy_arbiter.pictures.style import COLOURS
 
 __all__ = [
     "COLOURS",
     "decisions",
-    "normalisations",
+    "normalizations",
     "profile",
     "rules",
     "surface",

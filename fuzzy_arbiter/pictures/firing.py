@@ -181,5 +181,5 @@ def _alone(arbiter: Arbiter, output: Output) -> Arbiter:
     system = arbiter.system
     parts = [(rule, tuple(c for c in rule.conclusions if c.variable == output.name)) for rule in system.rules]
     rules = tuple(replace(rule, conclusions=conclusions) for rule, conclusions in parts if conclusions)
-    alone = replace(system, outputs=(output,), rules=rules, normalisation="none")
+    alone = replace(system, outputs=(output,), rules=rules, normalization="none")
     return Arbiter(system=alone, engine=arbiter.engine)

@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from fuzzy_arbiter.arbiter import Arbiter
-from fuzzy_arbiter.definition import Normalisation, Term, variable_names
+from fuzzy_arbiter.definition import Normalization, Term, variable_names
 from fuzzy_arbiter.errors import DefinitionError, InputError
 from fuzzy_arbiter.pictures.places import fixed_inputs, one_of, places_in, said, weights_at
 from fuzzy_arbiter.pictures.style import FAINT, INK, legend_above, legend_style, line_style, new_axes, room, tidy
@@ -15,7 +15,7 @@ from fuzzy_arbiter.pictures.style import FAINT, INK, legend_above, legend_style,
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-_MEANING: dict[Normalisation, str] = {
+_MEANING: dict[Normalization, str] = {
     "none": "the centroids themselves",
     "range": "each from its least to its greatest",
     "sum": "then divided by their sum",
@@ -143,50 +143,50 @@ def profile(
     ax = new_axes(6.0, 3.2) if ax is None else ax
     for k, output in enumerate(system.outputs):
         ax.plot(x, weights[:, k], label=output.name, clip_on=False, **line_style(k))
-    ax.set(xlim=(low, high), xlabel=over, ylabel="centroid" if system.normalisation == "none" else "weight")
-    if system.normalisation != "none":
+    ax.set(xlim=(low, high), xlabel=over, ylabel="centroid" if system.normalization == "none" else "weight")
+    if system.normalization != "none":
         ax.set_ylim(0.0, 1.0)
     tidy(ax)
     legend_above(ax, variable_names(system.outputs), f"at {said(fixed)}" if fixed else "")
     return ax
 
 
-def normalisations(
+def normalizations(
     arbiter: Arbiter,
     over: str,
     at: Mapping[str, float] | None = None,
-    axes: Mapping[Normalisation, Axes] | None = None,
-) -> dict[Normalisation, Axes]:
-    """Draw all weights along one input, once under each normalisation.
+    axes: Mapping[Normalization, Axes] | None = None,
+) -> dict[Normalization, Axes]:
+    """Draw all weights along one input, once under each normalization.
 
     Parameters
     ----------
     arbiter : Arbiter
-        What is drawn; its own normalisation does not matter.
+        What is drawn; its own normalization does not matter.
     over : str
         Name of the input along which.
     at : mapping from str to float, optional
         Values of the others; default: the middle of each universe.
     axes : mapping from str to Axes, optional
-        For each normalisation that is to be drawn; default: four of a new figure.
+        For each normalization that is to be drawn; default: four of a new figure.
 
     Returns
     -------
     dict of Axes by str
-        On which it was drawn, by normalisation.
+        On which it was drawn, by normalization.
 
     Raises
     ------
     DefinitionError
-        If there is no such input, or no such normalisation.
+        If there is no such input, or no such normalization.
     InputError
         If a value is not a number in its universe.
 
     Examples
     --------
     >>> from fuzzy_arbiter import Arbiter
-    >>> from fuzzy_arbiter.pictures import normalisations
-    >>> sorted(normalisations(Arbiter(), over="obstacle"))
+    >>> from fuzzy_arbiter.pictures import normalizations
+    >>> sorted(normalizations(Arbiter(), over="obstacle"))
     ['max', 'none', 'range', 'sum']
     """
     fixed = fixed_inputs(arbiter, (over,), at)
@@ -198,8 +198,8 @@ def normalisations(
         axes = dict(zip(_MEANING, figure.subplots(2, 2, sharex=True).flat, strict=True))
     for name, ax in axes.items():
         if name not in _MEANING:
-            raise DefinitionError(f"no normalisation {name!r}, expected one of {', '.join(_MEANING)}")
-        system = replace(arbiter.system, normalisation=name)
+            raise DefinitionError(f"no normalization {name!r}, expected one of {', '.join(_MEANING)}")
+        system = replace(arbiter.system, normalization=name)
         profile(Arbiter(system=system, engine=arbiter.engine), over, fixed, ax)
         legend = ax.get_legend()
         assert legend is not None

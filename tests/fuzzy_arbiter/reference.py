@@ -92,7 +92,7 @@ def centroids(system, inputs):
 
 
 def weights(system, inputs):
-    """Exact range-normalised weight of every output."""
+    """Exact range-normalized weight of every output."""
     result = []
     for output, raw in zip(system.outputs, centroids(system, inputs), strict=True):
         alone = [

@@ -37,7 +37,7 @@ def variables(kind, prefix, jumps=True):
 
 @st.composite
 def systems(draw, jumps=True, norms=True):
-    """A system with normalisation none and random rules."""
+    """A system with normalization none and random rules."""
     inputs = draw(variables(Variable, "x", jumps))
     outputs = draw(variables(Output, "y", jumps))
     statements = st.sampled_from([Is(v.name, t) for v in inputs for t in v.term_names])
@@ -63,5 +63,5 @@ def systems(draw, jumps=True, norms=True):
         conjunction=draw(st.sampled_from(["min", "prod"])) if norms else "min",
         disjunction=draw(st.sampled_from(["max", "probor"])) if norms else "max",
         implication=draw(st.sampled_from(["min", "prod"])) if norms else "min",
-        normalisation="none",
+        normalization="none",
     )

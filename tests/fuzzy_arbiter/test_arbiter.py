@@ -1,4 +1,4 @@
-"""The arbiter itself: section VI, inputs and their faults, normalisation, threads, memory, imports."""
+"""The arbiter itself: section VI, inputs and their faults, normalization, threads, memory, imports."""
 
 import copy
 import gc
@@ -151,7 +151,7 @@ def test_inputs_outside_may_be_clipped():
         ({"engine": "fast"}, "auto, closed, exact, grid, skfuzzy"),
         ({"points": 2}, "points is 2, expected a whole number, 3 or more"),
         ({"points": 101.5}, "points"),
-        ({"normalisation": "sun"}, "normalisation is 'sun', expected one of range, none, sum, max"),
+        ({"normalization": "sun"}, "normalization is 'sun', expected one of range, none, sum, max"),
         ({"outside": "wrap"}, "refuse, clip"),
         ({"system": prioritised(), "points": 11}, "system: came with"),
         ({"engine": "closed", "form": "complete"}, "engine 'closed'"),
@@ -171,15 +171,15 @@ def test_criteria_that_cannot_be():
         Arbiter(engine="")
 
 
-def test_normalisation():
+def test_normalization():
     inputs = [0.5, 0.25, 0.75]  # h = 1/2, 1/4, 1/2
-    assert Arbiter(normalisation="none")(inputs) == pytest.approx([1 / 2, (1 + 5 / 32) / 3, 1 / 2])
+    assert Arbiter(normalization="none")(inputs) == pytest.approx([1 / 2, (1 + 5 / 32) / 3, 1 / 2])
     assert Arbiter()(inputs) == pytest.approx([1 / 2, 5 / 32, 1 / 2])
-    assert Arbiter(normalisation="sum")(inputs) == pytest.approx([16 / 37, 5 / 37, 16 / 37])
-    assert Arbiter(normalisation="max")(inputs) == pytest.approx([1, 5 / 16, 1])
-    for normalisation in ("sum", "max"):
+    assert Arbiter(normalization="sum")(inputs) == pytest.approx([16 / 37, 5 / 37, 16 / 37])
+    assert Arbiter(normalization="max")(inputs) == pytest.approx([1, 5 / 16, 1])
+    for normalization in ("sum", "max"):
         for engine in ENGINES:
-            assert Arbiter(normalisation=normalisation, engine=engine)([0, 0, 0]) == (0, 0, 0)  # not 0/0
+            assert Arbiter(normalization=normalization, engine=engine)([0, 0, 0]) == (0, 0, 0)  # not 0/0
 
 
 def test_without_scikit_fuzzy_it_is_said(monkeypatch):
@@ -204,7 +204,7 @@ def test_it_does_not_change_and_can_be_copied(arbiter):
     for other in (copy.copy(arbiter), copy.deepcopy(arbiter), pickle.loads(pickle.dumps(arbiter))):
         assert other == arbiter and hash(other) == hash(arbiter)
         assert other([0.3, 0.6, 0.2]) == arbiter([0.3, 0.6, 0.2])
-    assert arbiter != Arbiter(normalisation="max")
+    assert arbiter != Arbiter(normalization="max")
 
 
 @pytest.mark.slow

@@ -73,7 +73,7 @@ def test_show_says_all_of_a_definition(run):
         "alpha_3 in [0.0, 1.0], no default",
         "R6: if obstacle is exist or shape is complex then alpha_3 is low",
         "conjunction    min",
-        "normalisation  range",
+        "normalization  range",
         "engine         closed: ",
     ):
         assert part in out
@@ -231,7 +231,7 @@ def test_convert_refuses_whole(refused, tmp_path):
     Arbiter(weight=replace(WEIGHT, default=0.5)).save(tmp_path / "default.toml")
     (tmp_path / "old.fis").write_text("old")
     assert "fis cannot say the default 0.5" in refused("convert", "default.toml", "old.fis")
-    Arbiter(normalisation="sum").save(tmp_path / "sum.toml")
+    Arbiter(normalization="sum").save(tmp_path / "sum.toml")
     assert "'sum'" in refused("convert", "sum.toml", "old.fis", "--native")
 
 

@@ -79,7 +79,7 @@ def nested(depth):
         (lambda: system(None), "rules: None came among them, expected a sequence of Rule or text"),
         (lambda: system(inputs=wind), r"inputs: Variable\(.* came, expected a sequence of Variable"),
         (lambda: system(outputs=(wind,)), r"outputs: Variable\(.* came among them, expected a sequence of Output"),
-        (lambda: system(normalisation=np.array(["sum", "max"])), "normalisation is array.*, expected one of range"),
+        (lambda: system(normalization=np.array(["sum", "max"])), "normalization is array.*, expected one of range"),
         (lambda: system(points=HUGE), "points is a int that is too long to show, expected a whole number, 3 or more"),
         (lambda: system(points=True), "points is True"),
         (lambda: prioritised(["a", "b"]), "criteria: 'a' came among them, expected a sequence of Criterion"),

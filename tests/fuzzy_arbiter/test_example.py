@@ -153,9 +153,9 @@ def test_scikit_fuzzy_is_off_by_no_more_than_the_manual_says():
     inputs[0] = 1e-4, 0.0, 0.0  # the bound is come near to where h is next to 0
     for points in (3, 11, 101):
         step = 1.0 / (points - 1)
-        for normalisation, bound in (("none", step**2 / 6.0), ("range", step**2 / 2.0)):
+        for normalization, bound in (("none", step**2 / 6.0), ("range", step**2 / 2.0)):
             gap = [
-                Arbiter(points=points, normalisation=normalisation, engine=engine).batch(inputs)
+                Arbiter(points=points, normalization=normalization, engine=engine).batch(inputs)
                 for engine in ("grid", "exact")
             ]
             assert 0.3 * bound < abs(gap[0] - gap[1]).max() <= bound + 1e-15
@@ -163,7 +163,7 @@ def test_scikit_fuzzy_is_off_by_no_more_than_the_manual_says():
 
 def changed(what):
     """The rules of section VI with one thing that formats may not be able to say."""
-    system = prioritised(normalisation="none")
+    system = prioritised(normalization="none")
     a, b, c = (v.terms[1].name for v in system.inputs)
     obstacle, shape, depth = Is("obstacle", a), Is("shape", b), Is("depth", c)
     low = (Is("alpha_1", "low"),)
@@ -182,7 +182,7 @@ def changed(what):
     if what == "prod with max":
         return replace(system, conjunction="prod")
     assert what == "names with spaces"
-    return prioritised([Criterion("a wall", on="near by", off="far off")], normalisation="none")
+    return prioritised([Criterion("a wall", on="near by", off="far off")], normalization="none")
 
 
 @pytest.mark.parametrize("row", table("Formats")[2:-1], ids=lambda row: row[0])

@@ -10,12 +10,12 @@ from fuzzy_arbiter.engines.firing import Firing
 SAMPLES = [(0.0, 0.0, 0.0), (1.0, 1.0, 0.0), (0.3, 0.6, 0.5), (0.5, 0.5, 0.5), (0.25, 1.0, 0.75)]
 
 
-def lamp(rules, default=None, normalisation="range", outputs=1):
+def lamp(rules, default=None, normalization="range", outputs=1):
     """Return a system of one input, with a gap between dark and bright, and lamps."""
     light = Variable("light", (0, 10), (Term("dark", falling(2, 4)), Term("bright", rising(6, 8))))
     low_high = (Term("low", falling(0, 1)), Term("high", rising(0, 1)))
     lamps = tuple(Output(f"lamp_{k + 1}", (0, 1), low_high, default) for k in range(outputs))
-    return Arbiter(system=System((light,), lamps, rules, normalisation=normalisation))
+    return Arbiter(system=System((light,), lamps, rules, normalization=normalization))
 
 
 def test_strengths_and_decisions_by_hand():
@@ -33,7 +33,7 @@ def test_strengths_and_decisions_by_hand():
     assert (one.decided_by, one.runner_up, one.margin) == ("R2", "R1", pytest.approx(0.4))
     assert (two.decided_by, two.runner_up, two.margin) == ("R5", "R4", pytest.approx(0.2))
     assert (three.decided_by, three.runner_up) == ("R6", "R8")
-    # alpha = smoothstep(h), and before normalising (1 + alpha) / 3
+    # alpha = smoothstep(h), and before normalizing (1 + alpha) / 3
     for output, h in zip(e.outputs, (0.3, 0.6, 0.4), strict=True):
         alpha = 3 * h**2 - 2 * h**3
         assert output.weight == pytest.approx(alpha, abs=1e-15)
@@ -105,7 +105,7 @@ def test_weights_of_rules_count():
 
 
 def test_a_default_is_said():
-    arbiter = lamp(("if light is dark then lamp_1 is high",), default=0.25, normalisation="none")
+    arbiter = lamp(("if light is dark then lamp_1 is high",), default=0.25, normalization="none")
     e = arbiter.explain([5.0])
     (output,) = e.outputs
     assert output.default_used

@@ -54,7 +54,7 @@ WIDE = System(
         'if a is z and b is p then q is "*/ v\\"',
     ),
     name="3 odd */*/ systems ???/\\",
-    normalisation="none",
+    normalization="none",
 )
 PAIR = Output("w", (0, 1), (Term("low", falling(0.2, 0.55)), Term("high", rising(0.37, 0.83))))
 DIP = Output(
@@ -64,16 +64,16 @@ DIP = Output(
 )
 SYSTEMS = {
     "section VI": prioritised(),
-    "raw": prioritised(normalisation="none"),
+    "raw": prioritised(normalization="none"),
     "complete table": prioritised(form="complete"),
-    "rational": prioritised(weight=PAIR, normalisation="sum"),
+    "rational": prioritised(weight=PAIR, normalization="sum"),
     "measured": prioritised([Criterion("d", membership=falling(0.1, 0.7)), Criterion("e")], outside="clip"),
     "beyond its ends": prioritised(weight=DIP),
-    "one": prioritised([Criterion("only")], normalisation="max"),
+    "one": prioritised([Criterion("only")], normalization="max"),
     "wide": WIDE,
-    "wide, scaled": replace(WIDE, normalisation="range"),
-    "wide, shared": replace(WIDE, normalisation="sum", outside="clip"),
-    "wide, greatest": replace(WIDE, normalisation="max", implication="prod"),
+    "wide, scaled": replace(WIDE, normalization="range"),
+    "wide, shared": replace(WIDE, normalization="sum", outside="clip"),
+    "wide, greatest": replace(WIDE, normalization="max", implication="prod"),
     "coding: of no file": prioritised([Criterion("é")], name="coding: of no file"),
     "long": System(
         tuple(Variable(f"v{i}", (0, 1), (Term("t", rising(0, 1)), Term("u", falling(0, 1)))) for i in range(250)),
@@ -83,13 +83,13 @@ SYSTEMS = {
             f"if {' and '.join(f'v{i} is not u' for i in range(250))} or v0 is t then o is h",
         ),
         conjunction="prod",
-        normalisation="none",
+        normalization="none",
     ),
     "many points": System(
         (Variable("v", (0, 10), (Term("t", Shape(tuple((i / 10, i % 7 / 7) for i in range(100)))),)),),
         (Output("o", (0, 1), (Term("h", rising(0, 1)),), default=0.0),),
         ("if v is t then o is h",),
-        normalisation="none",
+        normalization="none",
     ),
     "wide, products": replace(WIDE, conjunction="prod", disjunction="probor", implication="prod"),
 }

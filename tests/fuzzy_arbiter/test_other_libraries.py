@@ -16,7 +16,7 @@ from tests.fuzzy_arbiter.engines.test_grid import exact_centroid
 from tests.fuzzy_arbiter.engines.test_scikit import TIP, TIPPING
 
 DATA = Path(__file__).parents[1] / "data" / "fuzzy" / "libraries"
-SYSTEMS = {"section_vi": prioritised(normalisation="none"), "tipping": TIPPING}
+SYSTEMS = {"section_vi": prioritised(normalization="none"), "tipping": TIPPING}
 # greatest error, as a part of the universe, for a step of 1 / resolution: a sum at the middles of cells is of second
 # order, a sum that gives both ends the weight of the other places of first order
 BOUNDS = {

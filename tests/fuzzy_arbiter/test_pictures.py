@@ -81,7 +81,7 @@ def test_every_picture_draws_on_new_axes_or_on_those_given(criteria):
         assert isinstance(drawn(draw()).figure, Figure)
         ax = Figure().add_subplot()
         assert draw(ax) is ax
-    for ax in pictures.normalisations(arbiter, arbiter.system.inputs[0].name).values():
+    for ax in pictures.normalizations(arbiter, arbiter.system.inputs[0].name).values():
         drawn(ax)
 
 
@@ -112,7 +112,7 @@ def test_the_package_comes_without_matplotlib():
         lambda a: pictures.profile(a, "obstacle", {"speed": 1.0}),
         lambda a: pictures.surface(a, "alpha_1", ("obstacle", "speed")),
         lambda a: pictures.decisions(a, ("speed", "depth")),
-        lambda a: pictures.normalisations(a, "speed"),
+        lambda a: pictures.normalizations(a, "speed"),
     ],
 )
 def test_unknown_inputs_are_answered_with_the_known(arbiter, draw):
@@ -143,8 +143,8 @@ def test_inputs_that_cannot_be_gone_over(arbiter):
         pictures.profile(arbiter, "obstacle", {"depth": 2.0})
     with pytest.raises(InputError, match=r"obstacle: place is 2\.0"):
         pictures.terms(arbiter, "obstacle", at=2.0)
-    with pytest.raises(DefinitionError, match="no normalisation 'softmax', expected one of none, range, sum, max"):
-        pictures.normalisations(arbiter, "obstacle", axes={"softmax": Figure().add_subplot()})
+    with pytest.raises(DefinitionError, match="no normalization 'softmax', expected one of none, range, sum, max"):
+        pictures.normalizations(arbiter, "obstacle", axes={"softmax": Figure().add_subplot()})
     alone = replace(SAIL, outputs=SAIL.outputs[:1], rules=("if wind is calm then sail is full",))
     with pytest.raises(DefinitionError, match="two or more to decide between"):
         pictures.decisions(Arbiter(system=alone, engine="exact"), ("wind", "waves"))
@@ -169,7 +169,7 @@ def test_a_legend_is_no_wider_than_its_axes(arbiter):
     legend = drawn(pictures.terms(Arbiter(system=many, engine="exact"), "level", ax=ax)).get_legend()
     assert legend.get_window_extent().width < 1.1 * ax.bbox.width
     axes = Figure(figsize=(8.0, 6.0)).subplots(2, 1)
-    pictures.normalisations(arbiter, "obstacle", axes=dict(zip(("range", "sum"), axes, strict=True)))
+    pictures.normalizations(arbiter, "obstacle", axes=dict(zip(("range", "sum"), axes, strict=True)))
     assert [ax.get_legend() is not None for ax in axes] == [True, False] and not axes[0].figure.legends
     texts = wrapped("the first = 1, the second = 2, the third = 3", 16).split("\n")
     assert not any(text.startswith("=") or text.endswith("=") for text in texts)
@@ -194,17 +194,17 @@ def test_a_profile_has_a_gap_where_an_output_is_undefined(sail):
 
 def test_a_profile_jumps_where_the_default_begins(sail):
     outputs = tuple(replace(output, default=0.0) for output in SAIL.outputs)
-    raw = Arbiter(system=replace(SAIL, outputs=outputs, normalisation="none"))
+    raw = Arbiter(system=replace(SAIL, outputs=outputs, normalization="none"))
     ax = pictures.profile(raw, "wind", {"waves": 0.5})
     x, y = ax.get_lines()[0].get_data()
     (jump,) = np.flatnonzero(np.abs(np.diff(y)) > 10.0)[-1:]
     assert x[jump + 1] - x[jump] < 1e-6 and x[jump] == pytest.approx(12.0)
 
 
-def test_each_normalisation_is_that_of_the_system(arbiter):
+def test_each_normalization_is_that_of_the_system(arbiter):
     at = {"shape": 0.8, "depth": 0.3}
-    for name, ax in pictures.normalisations(arbiter, "obstacle", at).items():
-        other = Arbiter(normalisation=name, engine="exact")
+    for name, ax in pictures.normalizations(arbiter, "obstacle", at).items():
+        other = Arbiter(normalization=name, engine="exact")
         for k, line in enumerate(ax.get_lines()):
             for x, y in line.get_xydata()[::53]:
                 assert y == pytest.approx(other({"obstacle": x} | at)[k], abs=1e-12)

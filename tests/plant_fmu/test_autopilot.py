@@ -4,7 +4,7 @@ import dataclasses
 
 import pytest
 
-from plant_fmu.autopilot import LONGEST, SHORTEST, Autopilot, checked_autopilot
+from plant_fmu.autopilot import LONGEST, SHORTEST, Autopilot, validate_autopilot
 
 
 def require(good, key, came, expected):
@@ -13,7 +13,7 @@ def require(good, key, came, expected):
 
 
 def checked(**change):
-    return checked_autopilot(dataclasses.replace(Autopilot("vectored_6dof"), **change), 4, require)
+    return validate_autopilot(dataclasses.replace(Autopilot("vectored_6dof"), **change), 4, require)
 
 
 def test_each_thruster_has_a_channel_and_a_sign():

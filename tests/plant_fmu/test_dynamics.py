@@ -126,7 +126,7 @@ def test_quaternion_stays_a_unit(make_slave):
         assert np.linalg.norm(slave.get(*STATES[3:7])) == pytest.approx(1.0, abs=1e-15)
 
 
-def test_quaternion_is_normalised_when_initialisation_ends(make_slave):
+def test_quaternion_is_normalized_when_initialisation_ends(make_slave):
     slave = make_slave().start(**{"quaternion.e0": 0.5, "quaternion.e1": 0.5})
     assert slave.get("quaternion.e0", "quaternion.e1") == pytest.approx([np.sqrt(0.5)] * 2)
 
@@ -145,7 +145,7 @@ def test_drifts_with_the_current(make_slave):
 
 @pytest.mark.parametrize("initialised", [True, False])
 def test_euler_angles_are_those_of_the_quaternion(make_slave, initialised):
-    """Also while the quaternion is not normalised yet."""
+    """Also while the quaternion is not normalized yet."""
     slave = make_slave()
     if initialised:
         slave.start(**START)

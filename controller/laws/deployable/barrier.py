@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controller.arithmetic import exponential, length3, square
-from controller.jit.jit import part
+from controller.jit.jit import jit_internal
 from controller.jit.stack_array import zeros
 from controller.laws.deployable.attitude import integrate_attitude
 from controller.laws.deployable.attraction import approach_speed
@@ -83,7 +83,7 @@ def empty_observation(n: int) -> RegionObservation:
     )  # fmt: skip
 
 
-@part
+@jit_internal
 def observe_regions(
     observation: RegionObservation, regions: PackedRegions, position: Array, quaternion: Array, velocity: Array
 ) -> None:
@@ -104,7 +104,7 @@ def observe_regions(
     )
 
 
-@part
+@jit_internal
 def pose_gradient(gradients: Array, rotation_gradients: Array, i: int, of_attitude: bool, out: Array) -> bool:
     """Write the gradient of a clearance over the pose, shape (6,); return False where it vanishes.
 
@@ -121,7 +121,7 @@ def pose_gradient(gradients: Array, rotation_gradients: Array, i: int, of_attitu
     return True
 
 
-@part
+@jit_internal
 def gradient_rate(kind: int, n: Array, later: Array, velocity: Array) -> float:
     """Return (dn/dt)^T v, from a gradient now and later, (6,) each, along a velocity [m/s, rad/s] against the region.
 
@@ -137,7 +137,7 @@ def gradient_rate(kind: int, n: Array, later: Array, velocity: Array) -> float:
     return turning
 
 
-@part
+@jit_internal
 def write_rows(
     work: Workspace,
     observation: RegionObservation,

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controller.arithmetic import square
-from controller.jit.jit import inlined, part
+from controller.jit.jit import inlined, jit_internal
 from controller.jit.stack_array import zeros
 from controller.regions import Ellipsoid, HalfSpace, Sphere
 from controller.regions.region_set import PackedRegions, clearance_of_place, place_clearance
@@ -25,13 +25,13 @@ _LOOKS = 16  # along a line at most
 _HALVINGS = 6  # of the interval in which it leaves the region
 
 
-@part
+@jit_internal
 def has_faces(kind: int) -> bool:
     """Return whether the clearance of a kind of region has a kink where two faces are equally near."""
     return kind not in _SMOOTH
 
 
-@part
+@jit_internal
 def face_ahead(
     regions: PackedRegions, i: int, position: Array, nearest: Array, velocity: Array, reach: float, face: Array
 ) -> float:

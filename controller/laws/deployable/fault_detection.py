@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controller.arithmetic import square
-from controller.jit.jit import part
+from controller.jit.jit import jit_internal
 from controller.jit.stack_array import zeros
 from controller.laws.deployable.gains import DeployableGains
 from controller.laws.deployable.linear_algebra import norm
@@ -55,7 +55,7 @@ def empty_fault_state(m: int) -> FaultState:
     return FaultState(np.zeros(m), np.zeros((m, 3)), np.zeros((m, 3)), np.full(1, -1))
 
 
-@part
+@jit_internal
 def detect_fault(
     fault_state: FaultState,
     estimate: Estimate,
@@ -135,7 +135,7 @@ def detect_fault(
     return -1
 
 
-@part
+@jit_internal
 def _by_velocity(
     lag: Array,
     effect: Array,
@@ -159,7 +159,7 @@ def _by_velocity(
     return min(max(step, -_MOST_A_STEP), _MOST_A_STEP)
 
 
-@part
+@jit_internal
 def _by_moment(
     adapted: Array, effect: Array, force: float, residual: Array, variance: Array, R: Array, adaptation: float
 ) -> float:
@@ -180,7 +180,7 @@ def _by_moment(
     return min(max(step, -_MOST_A_STEP), _MOST_A_STEP)
 
 
-@part
+@jit_internal
 def isolate_thruster(fault_state: FaultState, thrusters: Thrusters, failed: int) -> None:
     """Mark a thruster as failed in `health`, and restore the one that was isolated before it.
 

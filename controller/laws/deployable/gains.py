@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from controller.errors import LawError
-from controller.law import checked_gains
+from controller.law import validate_gains
 
 
 class DeployableGains(NamedTuple):
@@ -77,7 +77,7 @@ def check_gains(gains: DeployableGains) -> DeployableGains:
     LawError
         If one is negative or not finite, one that divides is zero, or a share is above 1.
     """
-    checked_gains(gains, above_zero=set(gains._fields) - _MAY_BE_ZERO)
+    validate_gains(gains, above_zero=set(gains._fields) - _MAY_BE_ZERO)
     if gains.braking_share > 1.0:
         raise LawError(f"law.gains.braking_share is {gains.braking_share}, expected at most 1")
     return gains

@@ -12,7 +12,7 @@ import numpy as np
 
 from controller.arithmetic import length3, square
 from controller.jit.function_pointer import call, pointer_to
-from controller.jit.jit import jit_noalloc, part
+from controller.jit.jit import jit_internal, jit_noalloc
 from controller.jit.stack_array import zeros
 from controller.law import (
     Array,
@@ -21,7 +21,7 @@ from controller.law import (
     Output,
     VehicleModel,
     VehicleState,
-    checked_period,
+    validate_period,
     validate_quaternion,
 )
 from controller.laws.deployable import attitude as attitude_loop
@@ -184,7 +184,7 @@ def step(
     _report_program(memory.report, work.multipliers, work.price, rows, steps)
 
 
-@part
+@jit_internal
 def _force_of(dynamics: Dynamics, R: Array, acceleration: Array, out: Array) -> None:
     """Write the body force [N] that gives an acceleration, world frame, into out[:3]."""
     for i in range(3):
@@ -196,7 +196,7 @@ def _force_of(dynamics: Dynamics, R: Array, acceleration: Array, out: Array) -> 
             out[i] += dynamics.mass[i, k] * along
 
 
-@part
+@jit_internal
 def _soft_forces(
     observation: RegionObservation, regions: PackedRegions, weights: Array, R: Array, dynamics: Dynamics, wrench: Array
 ) -> None:
@@ -217,7 +217,7 @@ def _soft_forces(
                 wrench[k] -= thruster_acceleration * R[axis, k] * observation.gradients[i, axis] / size
 
 
-@part
+@jit_internal
 def _write_thruster_acceleration(
     dynamics: Dynamics, thrusters: Thrusters, R: Array, thruster_acceleration: Array
 ) -> None:
@@ -235,7 +235,7 @@ def _write_thruster_acceleration(
                     thruster_acceleration[axis, j] += R[axis, i] * body
 
 
-@part
+@jit_internal
 def _smallest(values: Array) -> float:
     smallest: float = values[0]
     for i in range(values.size):
@@ -243,7 +243,7 @@ def _smallest(values: Array) -> float:
     return smallest
 
 
-@part
+@jit_internal
 def _braking(dynamics: Dynamics, thrusters: Thrusters) -> float:
     """Return the deceleration [m/s2] in the worst direction with one thruster lost: the failed one, or any.
 
@@ -257,7 +257,7 @@ def _braking(dynamics: Dynamics, thrusters: Thrusters) -> float:
     return worst
 
 
-@part
+@jit_internal
 def _report(report: Array, estimate: Estimate, cost: float, points: int, health: Array, desired: Array) -> None:
     """Write the `DIAGNOSTICS` of estimate, path and thrusters."""
     copy(estimate.position, report[:3])
@@ -273,7 +273,7 @@ def _report(report: Array, estimate: Estimate, cost: float, points: int, health:
     report[15] = estimate.time_since_measurement[0]
 
 
-@part
+@jit_internal
 def _report_program(report: Array, multipliers: Array, price: Array, rows: int, steps: int) -> None:
     """Write the `DIAGNOSTICS` of barriers and quadratic program."""
     active, yielding = 0, 0.0
@@ -345,11 +345,11 @@ class DeployableLaw(CompiledLaw):
         period: float,
         n_regions: int,
     ) -> None:
-        self.gains = self.checked(gains)
+        self.gains = self.validate(gains)
         desired = validate_quaternion(desired_quaternion)
         m = vehicle.thruster_matrix.shape[1]
         self._memory = DeployableMemory(
-            period=np.array([checked_period(period)]),
+            period=np.array([validate_period(period)]),
             estimate=np.zeros(4),
             report=np.zeros(len(DIAGNOSTICS)),
             dynamics=make_dynamics(vehicle, least_forces(vehicle)),
@@ -391,7 +391,7 @@ class DeployableLaw(CompiledLaw):
         return cls(vehicle, gains, desired_quaternion, period, n_regions)
 
     @classmethod
-    def checked(cls, gains: Any) -> Any:
+    def validate(cls, gains: Any) -> Any:
         """Return gains if the law can work with them."""
         return check_gains(gains)
 

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controller.arithmetic import length3, square
-from controller.jit.jit import inlined, part
+from controller.jit.jit import inlined, jit_internal
 from controller.jit.stack_array import zeros
 from controller.laws.deployable.gains import DeployableGains
 from controller.laws.deployable.linear_algebra import copy
@@ -62,7 +62,7 @@ def _clearance_at(point: Array, regions: PackedRegions, gradient: Array) -> floa
     return least
 
 
-@part
+@jit_internal
 def is_line_free(start: Array, end: Array, regions: PackedRegions, margin: float) -> bool:
     """Return whether a straight line keeps a clearance [m] of all hard regions at their present places.
 
@@ -95,7 +95,7 @@ def is_line_free(start: Array, end: Array, regions: PackedRegions, margin: float
     return False
 
 
-@part
+@jit_internal
 def grow_tree(
     tree: Tree,
     start: Array,

@@ -24,7 +24,7 @@ from cosim.report.figures.layout import (
     new_figure,
     plain_numbers,
 )
-from cosim.report.figures.shape_outlines import cover, drawing_of
+from cosim.report.figures.shape_outlines import cover, lines_of_shape
 from cosim.report.figures.style import (
     BLACK,
     PATH_COLOUR,
@@ -125,11 +125,11 @@ def path_plane(data: FigureData) -> Figure:
 
 def _region(ax: Axes, place: Place, low: Array, high: Array, view: Array, clip: Path | None = None) -> list[Array]:
     """Draw a region as it is seen, with edges where it is clipped; return the areas in sight."""
-    drawing = drawing_of(place.region.shape, low - place.shift, high - place.shift, view)
-    if drawing is None:
+    lines = lines_of_shape(place.region.shape, low - place.shift, high - place.shift, view)
+    if lines is None:
         return []
     areas, outline, edges = (
-        [line + view @ place.shift for line in lines] for lines in (drawing.areas, drawing.outline, drawing.edges)
+        [line + view @ place.shift for line in part] for part in (lines.areas, lines.outline, lines.edges)
     )
     if clip is None and cover(areas, view @ low, view @ high):
         return []  # what leaves nothing of a picture free would tell nothing

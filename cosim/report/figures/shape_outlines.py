@@ -27,7 +27,7 @@ _PIECES = 4  # of an edge of an outline, each hidden or not
 
 
 @dataclass(frozen=True)
-class Drawing:
+class ShapeLines:
     """A shape as it is seen, in lines of the picture, shape (n, 2)."""
 
     areas: list[Array]  # closed: what any of them goes around is filled
@@ -35,7 +35,7 @@ class Drawing:
     edges: list[Array]
 
 
-def drawing_of(shape: Shape, low: Array, high: Array, view: Array) -> Drawing | None:
+def lines_of_shape(shape: Shape, low: Array, high: Array, view: Array) -> ShapeLines | None:
     """Return a shape as it is seen.
 
     Parameters
@@ -49,7 +49,7 @@ def drawing_of(shape: Shape, low: Array, high: Array, view: Array) -> Drawing | 
 
     Returns
     -------
-    Drawing
+    ShapeLines
         None if no part of it is in the box.
     """
     entry = shape_entry(shape)
@@ -62,18 +62,18 @@ def drawing_of(shape: Shape, low: Array, high: Array, view: Array) -> Drawing | 
     if not _meet(mesh.vertices.min(axis=0), mesh.vertices.max(axis=0), low, high):
         return None
     areas = _silhouettes(mesh, view)
-    return Drawing(areas, [_seen_part(area, areas) for area in areas], list(_sharp_edges(mesh, view)))
+    return ShapeLines(areas, [_seen_part(area, areas) for area in areas], list(_sharp_edges(mesh, view)))
 
 
 def hull_of(points: Array, view: Array) -> Array:
-    """Return the closed line about points [m, NED], shape (n, 3), as they are seen from a side as for `drawing_of`."""
+    """Return the closed line about points [m, NED], shape (n, 3), in a view as of `lines_of_shape`."""
     flat = points @ view.T
     farthest: Array = flat[np.argmax(_AROUND @ flat.T, axis=1)]  # in each direction
     return farthest
 
 
 def cover(areas: Sequence[Array], low: Array, high: Array) -> bool:
-    """Return whether areas of a `Drawing` leave nothing free of a rectangle, as far as a grid of points tells."""
+    """Return whether areas of a `ShapeLines` leave nothing free of a rectangle, as far as a grid of points tells."""
     shares = np.linspace(0.01, 0.99, _GRID)
     points = np.array([[x, y] for x in low[0] + shares * (high - low)[0] for y in low[1] + shares * (high - low)[1]])
     return bool(_within(points, areas).all())
@@ -83,17 +83,17 @@ def _meet(least: Array, most: Array, low: Array, high: Array) -> bool:
     return bool((least < high).all() and (most > low).all())
 
 
-def _ellipsoid(centre: Array, half_axes: Array, low: Array, high: Array, view: Array) -> Drawing | None:
+def _ellipsoid(centre: Array, half_axes: Array, low: Array, high: Array, view: Array) -> ShapeLines | None:
     reach = np.linalg.norm(half_axes, axis=0)
     if not _meet(centre - reach, centre + reach, low, high):
         return None
     middle, flat = view @ centre, half_axes @ view.T
     outline = middle + _AROUND @ np.linalg.cholesky(flat.T @ flat).T
     circles = [middle + _AROUND @ flat[[i, j]] for i, j in ((0, 1), (0, 2), (1, 2))]
-    return Drawing([outline], [outline], circles)
+    return ShapeLines([outline], [outline], circles)
 
 
-def _between_planes(planes: Sequence[tuple[Array, Array]], low: Array, high: Array, view: Array) -> Drawing | None:
+def _between_planes(planes: Sequence[tuple[Array, Array]], low: Array, high: Array, view: Array) -> ShapeLines | None:
     corners = (low + high) / 2.0 + (high - low) / 2.0 * _CORNERS
     for point, normal in planes:
         corners = _cut(corners, point, normal)
@@ -101,7 +101,7 @@ def _between_planes(planes: Sequence[tuple[Array, Array]], low: Array, high: Arr
         return None
     hull = hull_of(corners, view)
     sections = [_section(low, high, point, normal) @ view.T for point, normal in planes]
-    return Drawing([hull], [hull], sections)
+    return ShapeLines([hull], [hull], sections)
 
 
 def _cut(corners: Array, point: Array, normal: Array) -> Array:

@@ -130,7 +130,7 @@ class LiveSettings:
                 name = key.removeprefix("law.gains.")
                 if name not in self.gains._fields:
                     raise CommandError(f"{key} is no setting")
-                self.gains = self._law.checked(self.gains._replace(**{name: value}))
+                self.gains = self._law.validate(self.gains._replace(**{name: value}))
             elif key in self._numbers:
                 self._change_number(key, value)
             else:

@@ -9,7 +9,7 @@ from numba.core.errors import TypingError
 
 from controller import ControllerError
 from controller.jit.function_pointer import call, pointer_to
-from controller.jit.jit import part
+from controller.jit.jit import jit_internal
 from controller.regions import Box, DepthBand, Orientation, Region, Sphere, pack
 from cosim.scenario.law_factory import law_of
 from cosim.scenario.scenario import load_scenario
@@ -42,7 +42,7 @@ def test_a_strided_array_is_refused():
         packed.evaluate(np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]), np.zeros(4)[::2], room, room.copy(), np.zeros(2))
 
 
-@part
+@jit_internal
 def scaled(numbers, scale):
     total = 0.0
     for number in numbers:

@@ -14,7 +14,7 @@ from controller.theory import (
     lower_bound,
     mapped_error,
     mapped_error_rate,
-    normalised_secondary,
+    normalized_secondary,
     primary_value,
     printed_secondary,
     unit_gradient_secondary,
@@ -88,7 +88,7 @@ class Loop:
         return (
             base + printed_secondary(g[1:], dg[1:], self.betas, GAINS),
             base + unit_gradient_secondary(g[1:], self.betas, GAINS),
-            base + normalised_secondary(g[1:], dg[1:], clearance[1:], self.betas, GAINS),
+            base + normalized_secondary(g[1:], dg[1:], clearance[1:], self.betas, GAINS),
         )
 
     def rate(self, x):
@@ -114,9 +114,9 @@ def followed(loop, until=0.6, samples=25):
 
 @pytest.mark.slow
 def test_rate_is_minus_w_where_the_force_has_the_potential():
-    expected, (printed, unit_gradient, normalised) = followed(Loop([SPHERE, FLAT], BETAS))
+    expected, (printed, unit_gradient, normalized) = followed(Loop([SPHERE, FLAT], BETAS))
     scale = np.abs(expected).max()
-    assert np.abs(normalised - expected).max() < 1e-6 * scale
+    assert np.abs(normalized - expected).max() < 1e-6 * scale
     # inside the ball |dg/dp| is not 1: (31) and (33) are not the potential of (22)
     assert np.abs(printed - expected).max() > 1e-3 * scale
     assert np.abs(unit_gradient - expected).max() > 1e-3 * scale
@@ -146,7 +146,7 @@ def test_potential_is_the_integral_of_g_along_the_normal(region, position, inwar
     length = np.linalg.norm(inward)
     assert clearance[0] == pytest.approx(-length)
     expected, _ = quad(lambda t: evaluated([region], position + t * np.array(inward))[0][0] * length, 0.0, 1.0)
-    came = normalised_secondary(g, dg, clearance, np.array([0.7]), GAINS)
+    came = normalized_secondary(g, dg, clearance, np.array([0.7]), GAINS)
     assert came == pytest.approx(0.7 * (100.0 + 0.08 * 100.0 * 90.0 / 18.8) * expected, rel=1e-9)
 
 
@@ -159,10 +159,10 @@ def test_the_printed_sum_is_by_the_square_of_the_whole_gradient():
 
 def test_what_is_satisfied_or_has_no_weight_counts_nothing():
     g, dg, clearance = evaluated([SPHERE, FLAT], (5.0, 0.0, 0.0))
-    assert printed_secondary(g, dg, BETAS, GAINS) == normalised_secondary(g, dg, clearance, BETAS, GAINS) == 0.0
+    assert printed_secondary(g, dg, BETAS, GAINS) == normalized_secondary(g, dg, clearance, BETAS, GAINS) == 0.0
     g, dg, clearance = evaluated([SPHERE, FLAT], (0.3, 0.0, 0.0))
     none = np.zeros(2)
-    assert printed_secondary(g, dg, none, GAINS) == normalised_secondary(g, dg, clearance, none, GAINS) == 0.0
+    assert printed_secondary(g, dg, none, GAINS) == normalized_secondary(g, dg, clearance, none, GAINS) == 0.0
     assert unit_gradient_secondary(g, none, GAINS) == 0.0
 
 

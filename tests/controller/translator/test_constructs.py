@@ -138,6 +138,10 @@ def order(x, n, out):
     out[2] = count_calls(out[9:]) if out[9] < 2.0 or count_calls(out[9:]) > 100.0 else -1.0
     out[3] = 1.0 if x[0] < -1e9 and count_calls(out[9:]) > 0.0 else 0.0
     count_calls(out[9:])
+    out[9] = 0.0
+    out[3 + int(count_calls(out[9:]))] = 10.0 * out[9] + x[1]  # the value first
+    out[5 + int(count_calls(out[9:]) - 2.0)] += 10.0 * count_calls(out[9:])  # the place first
+    out[6] = out[9] + (x[0] if count_calls(out[9:]) > 3.0 else count_calls(out[9:]))
 
 
 def records(x, n, out):

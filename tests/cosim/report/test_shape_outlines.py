@@ -18,7 +18,7 @@ from controller.regions import (
 from controller.regions.region_set import clearances_at
 from controller.regions.shapes import ENTRIES
 from cosim.report.figures.path import ABOVE, SIDE
-from cosim.report.figures.shape_outlines import drawing_of
+from cosim.report.figures.shape_outlines import lines_of_shape
 
 TURNED = (0.9, 0.1, -0.3, 0.2)
 LOW, HIGH = np.array([-4.0, -4.0, -4.0]), np.array([4.0, 4.0, 4.0])
@@ -49,7 +49,7 @@ def within(areas, points):
 @pytest.mark.parametrize("name", SHAPES)
 def test_an_area_is_what_lines_of_sight_meet(name, view):
     shape = SHAPES[name]
-    drawing = drawing_of(shape, LOW, HIGH, view)
+    lines = lines_of_shape(shape, LOW, HIGH, view)
     places = np.random.default_rng(5).uniform(-4.0, 4.0, (300, 2))
     along = np.linspace(-9.0, 9.0, 721)[:, None] * np.cross(view[0], view[1])
     clear = np.full(len(places), np.inf)
@@ -58,7 +58,7 @@ def test_an_area_is_what_lines_of_sight_meet(name, view):
         line = line[((line >= LOW) & (line <= HIGH)).all(axis=1)]
         if len(line):
             clear[i] = clearances_at(line, Region("it", shape, "out")).min()
-    covered = within(drawing.areas, places)
+    covered = within(lines.areas, places)
     told = np.abs(clear) > 0.06  # flat faces cut some cm off what is round
     assert (clear[told] < 0.0).sum() > 5
     assert (covered == (clear < 0.0))[told].all()
@@ -66,19 +66,19 @@ def test_an_area_is_what_lines_of_sight_meet(name, view):
 
 @pytest.mark.parametrize("name", ["star", "bent pipe", "cylinder", "box", "cone"])
 def test_an_outline_is_drawn_where_it_is_seen_alone(name):
-    drawing = drawing_of(SHAPES[name], LOW, HIGH, ASLANT)
+    lines = lines_of_shape(SHAPES[name], LOW, HIGH, ASLANT)
     size = 8e-3
-    for outline in drawing.outline:
+    for outline in lines.outline:
         ends = np.stack([outline[:-1], outline[1:]], axis=1)
         for a, b in ends[np.isfinite(ends).all(axis=(1, 2))]:
             across = np.array([(b - a)[1], -(b - a)[0]]) / np.linalg.norm(b - a)
             sides = (a + b) / 2.0 + size * np.array([[1.0], [-1.0]]) * across
-            assert not within(drawing.areas, sides).all()
+            assert not within(lines.areas, sides).all()
 
 
 def test_a_shape_beyond_the_box_is_not_drawn():
     for shape in (Sphere((9.0, 0.0, 0.0), 1.0), Box((9.0, 0.0, 0.0), (1.0, 1.0, 1.0)), DepthBand(9.0, 1.0)):
-        assert drawing_of(shape, LOW, HIGH, SIDE) is None
+        assert lines_of_shape(shape, LOW, HIGH, SIDE) is None
 
 
 @pytest.mark.parametrize("name", [name for name, entry in ENTRIES.items() if entry.half_axes or entry.planes])

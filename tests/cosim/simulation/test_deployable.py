@@ -136,7 +136,7 @@ def test_without_any_measurement_the_thrusters_rest():
     assert not flight.forces.any()
 
 
-def test_infinite_and_unnormalised_measurements_are_none():
+def test_infinite_and_unnormalized_measurements_are_none():
     bad = VehicleState(np.array([np.inf, 0.0, 0.0]), np.array([5.0, 0.0, 0.0, 0.0]), np.full(6, np.inf), np.ones(8))
     flight = fly([ROCK], spoil=lambda t, s: bad if 2.0 < t < 3.0 else s)
     assert reached(flight) and within_limits(flight) and flight.clearance(ROCK).min() > 0.0

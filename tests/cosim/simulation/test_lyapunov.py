@@ -67,10 +67,10 @@ def test_first_value_is_that_of_the_start():
 @pytest.mark.slow
 def test_rate_is_that_of_v_up_to_the_sampling():
     """Held control is the only difference: it shrinks with the step."""
-    coarse = defect(run("time.duration=1.0", *ALONE), "normalised", 1e-3)
+    coarse = defect(run("time.duration=1.0", *ALONE), "normalized", 1e-3)
     fine = defect(
         run("time.duration=1.0", *(f"time.{key}=0.0001" for key in ("step", "control", "arbiter")), *ALONE),
-        "normalised",
+        "normalized",
         1e-4,
     )
     assert fine == pytest.approx(0.1 * coarse, rel=0.1)
@@ -80,11 +80,11 @@ def test_rate_is_that_of_v_up_to_the_sampling():
 def test_rate_is_not_that_of_v_where_the_theory_does_not_reach():
     """A limit on the force; weights that change (d alpha/dt neglected); gradients that are not 1 (as printed)."""
     strong = ("regions.SR1.gain=1e5", "regions.SR2.gain=1e5", "time.duration=0.3")
-    assert defect(run("time.duration=1.0", *ALONE, "limit.force=108"), "normalised", 1e-3) > 0.3
+    assert defect(run("time.duration=1.0", *ALONE, "limit.force=108"), "normalized", 1e-3) > 0.3
     changing = run(*strong)
-    assert defect(changing, "normalised", 1e-3) > 0.05
+    assert defect(changing, "normalized", 1e-3) > 0.05
     constant = run(*strong, "regions=[]", "intersection=[]")
-    assert defect(constant, "normalised", 1e-3) < 2e-3
+    assert defect(constant, "normalized", 1e-3) < 2e-3
     assert defect(changing, "printed", 1e-3) > 0.05
 
 
@@ -105,16 +105,16 @@ def test_summary_counts_rises():
     signals = {"time": np.arange(6) * 0.5, "lyapunov.rate": np.zeros(6)}
     signals |= {
         "lyapunov.printed": np.array([5.0, 4.0, 4.0, 4.5, 4.6, 1.0]),
-        "lyapunov.normalised": np.array([5.0, 4.0, 3.0, -1.0, -1.0 + 1e-12, -2.0]),  # rises by rounding alone
+        "lyapunov.normalized": np.array([5.0, 4.0, 3.0, -1.0, -1.0 + 1e-12, -2.0]),  # rises by rounding alone
         "lyapunov.primary": np.array([5.0, 4.0, 3.0, 2.0, 1.0, 0.0]),
     }
     summary = summarise_lyapunov(Rows([Column(name, "", "") for name in signals], signals))
     assert summary["printed"]["increases"] == 2
     assert summary["printed"]["first_rise"] == 1.0
     assert summary["printed"]["first_negative"] is None
-    assert summary["normalised"]["increases"] == 0 and summary["normalised"]["first_rise"] is None
-    assert summary["normalised"]["first_negative"] == 1.5
-    assert summary["normalised"]["threshold"] == 5e-12
+    assert summary["normalized"]["increases"] == 0 and summary["normalized"]["first_rise"] is None
+    assert summary["normalized"]["first_negative"] == 1.5
+    assert summary["normalized"]["threshold"] == 5e-12
     assert summary["primary"] == {
         "start": 5.0, "end": 0.0, "least": 0.0, "threshold": 5e-12,
         "increases": 0, "first_rise": None, "first_negative": None,

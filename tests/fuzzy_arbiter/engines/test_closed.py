@@ -52,11 +52,11 @@ def test_it_is_the_exact_centroid_on_100_000_inputs():
     area = (w * (f[:-1] + f[1:]) / 2).sum(axis=0)
     moment = (w * (y[:-1] * (2 * f[:-1] + f[1:]) + y[1:] * (f[:-1] + 2 * f[1:])) / 6).sum(axis=0)
     exact = moment / area
-    raw = Arbiter(normalisation="none", engine="closed").batch(inputs)
+    raw = Arbiter(normalization="none", engine="closed").batch(inputs)
     assert np.abs(raw - exact).max() <= 4 * EPS
     scaled = Arbiter(engine="closed").batch(inputs)
     assert np.abs(scaled - (3 * exact - 1)).max() <= 4 * EPS
-    swept = Arbiter(normalisation="none", engine="exact").batch(inputs[:10_000])
+    swept = Arbiter(normalization="none", engine="exact").batch(inputs[:10_000])
     assert np.abs(raw[:10_000] - swept).max() <= 8 * EPS  # both are rounded
 
 
@@ -74,22 +74,22 @@ def test_it_is_the_centroid_by_definition_in_rational_numbers(memberships):
 def test_any_pair_of_output_terms_has_its_pieces(low, high, h):
     output = Output("y", (0, 1), (Term("low", low), Term("high", high)))
     exact = reference.centroid(output, [1 - Fraction(h), Fraction(h)])
-    engine = ClosedEngine(prioritised(criteria(1), weight=output, normalisation="none"))
+    engine = ClosedEngine(prioritised(criteria(1), weight=output, normalization="none"))
     assert engine.weights([h])[0] == pytest.approx(float(exact), abs=16 * EPS)
     assert engine.weights_of_many(np.array([[h]]))[0] == pytest.approx(engine.weights([h]), abs=EPS)
 
 
 @settings(max_examples=examples(30), deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(shapes(), shapes(), st.floats(0.0, 1.0), st.sampled_from(["range", "sum", "max"]))
-def test_weights_of_any_pair_are_those_of_the_exact_engine(low, high, h, normalisation):
+def test_weights_of_any_pair_are_those_of_the_exact_engine(low, high, h, normalization):
     """Between its ends a C(h) may lie beyond them; weights are in [0, 1] even so."""
     output = Output("y", (0, 1), (Term("low", low), Term("high", high)))
     ends = [reference.centroid(output, [Fraction(1 - i), Fraction(i)]) for i in (0, 1)]
     assume(abs(ends[1] - ends[0]) > Fraction(1, 64))
-    system = prioritised(criteria(2), weight=output, normalisation=normalisation)
+    system = prioritised(criteria(2), weight=output, normalization=normalization)
     inputs = [h, 0.25]
     expected = np.array([float(w) for w in reference.weights(system, inputs)])
-    whole = {"range": 1.0, "sum": expected.sum(), "max": expected.max()}[normalisation]
+    whole = {"range": 1.0, "sum": expected.sum(), "max": expected.max()}[normalization]
     assume(whole > 0.01)  # where all vanish shares are of roundings
     expected = expected / whole
     arbiter = Arbiter(system=system, engine="closed")
@@ -121,7 +121,7 @@ def test_terms_of_very_different_areas(height):
     for low, high in ((plateau, low_triangle), (low_triangle, plateau), (plateau, narrow), (narrow, plateau)):
         output = Output("y", (0, 1), (Term("low", low), Term("high", high)))
         raw, _ = pieces(output)
-        engine = ClosedEngine(prioritised(criteria(1), weight=output, normalisation="none"))
+        engine = ClosedEngine(prioritised(criteria(1), weight=output, normalization="none"))
         starts = [x for p in raw for x in (p.start, math.nextafter(p.start, 0), math.nextafter(p.start, 1))]
         for h in [*near, *(1 - x for x in near), *starts]:
             exact = float(reference.centroid(output, [1 - Fraction(h), Fraction(h)]))
@@ -134,7 +134,7 @@ def test_no_number_is_taken_for_one_of_the_next_piece(height):
     low = Shape(((0, 1), (0.01, 1), (0.01, height), (1, height)))
     high = Shape(((0.7, 0), (0.7, 3 * height), (0.9, 3 * height), (0.9, 0)))
     output = Output("y", (0, 1), (Term("low", low), Term("high", high)))
-    engine = ClosedEngine(prioritised(criteria(1), weight=output, normalisation="none"))
+    engine = ClosedEngine(prioritised(criteria(1), weight=output, normalization="none"))
     for piece in engine.raw[0][1:]:
         for h in (piece.start, math.nextafter(piece.start, 0)):
             exact = float(reference.centroid(output, [1 - Fraction(h), Fraction(h)]))

@@ -59,7 +59,7 @@ def test_the_tipping_answer():
             "if service is average then tip is medium",
             "if service is good or quality is good then tip is high",
         ),
-        normalisation="none",
+        normalization="none",
     )
     assert Arbiter(system=system, engine="exact")([6.5, 9.8])[0] == pytest.approx(12118694 / 610275, abs=8 * EPS * 20)
     assert reference.centroids(system, [Fraction(13, 2), Fraction(49, 5)]) == [Fraction(12118694, 610275)]
@@ -71,7 +71,7 @@ def test_degrees_next_to_nothing_do_not_underflow(implication):
     output = Output("y", (0, 1), (Term("low", falling(0, 1)), Term("high", rising(0, 1))))
     rules = ("if x is on then y is low", "if x is on then y is high")
     inputs = (Variable("x", (0, 1), (Term("on", rising(0, 1)),)),)
-    arbiter = Arbiter(system=System(inputs, (output,), rules, normalisation="none", implication=implication))
+    arbiter = Arbiter(system=System(inputs, (output,), rules, normalization="none", implication=implication))
     assert arbiter.engine == "exact"
     for x in (5e-324, 1e-310, 1e-121, 1e-119, 1e-30):
         assert arbiter([x]) == pytest.approx([0.5], abs=4 * EPS)
@@ -90,7 +90,7 @@ def test_cuts_of_any_size(terms, data, scaled):
     assert found == pytest.approx(float(reference.centroid(output, list(map(Fraction, cuts)), scaled)), abs=8 * EPS)
     rule = "if x is on then y is t0"
     on = (Variable("x", (0, 1), (Term("on", rising(0, 1)),)),)
-    engine = ExactEngine(System(on, (output,), (rule,), normalisation="none", implication="prod" if scaled else "min"))
+    engine = ExactEngine(System(on, (output,), (rule,), normalization="none", implication="prod" if scaled else "min"))
     assert engine.centroid_of_many(0, np.array([cuts, cuts]).T).tolist() == [found, found]
 
 
@@ -98,7 +98,7 @@ def test_cuts_of_any_size(terms, data, scaled):
 def test_a_term_alone_has_its_middle_however_low_it_is_cut(cut):
     output = Output("y", (0, 1), (Term("mid", triangle(0, 0.5, 1)),))
     inputs = (Variable("x", (0, 1), (Term("on", rising(0, 1)),)),)
-    arbiter = Arbiter(system=System(inputs, (output,), ("if x is on then y is mid",), normalisation="none"))
+    arbiter = Arbiter(system=System(inputs, (output,), ("if x is on then y is mid",), normalization="none"))
     assert arbiter([cut]) == pytest.approx([0.5], abs=4 * EPS)
     assert arbiter.batch([[cut]])[0].tolist() == list(arbiter([cut]))
 
@@ -109,7 +109,7 @@ def test_lines_whose_slopes_differ_by_less_than_rounding():
     inputs = (Variable("x", (0, 1), (Term("on", rising(0, 1)),)),)
     rules = ("if x is on then y is a", "if x is on then y is b")
     for implication in ("min", "prod"):
-        arbiter = Arbiter(system=System(inputs, (output,), rules, normalisation="none", implication=implication))
+        arbiter = Arbiter(system=System(inputs, (output,), rules, normalization="none", implication=implication))
         assert arbiter([1.0]) == pytest.approx([1 / 3], abs=4 * EPS)
         assert arbiter.batch([[1.0]])[0].tolist() == list(arbiter([1.0]))
 
@@ -125,7 +125,7 @@ def test_a_default_stands_where_no_rule_fires():
     output = Output("y", (0, 10), (Term("a", falling(0, 5)), Term("b", rising(5, 10))), default=7.0)
     inputs = (Variable("x", (0, 1), (Term("on", rising(0.5, 1)),)),)
     rules = ("if x is on then y is b",)
-    raw = Arbiter(system=System(inputs, (output,), rules, normalisation="none"))
+    raw = Arbiter(system=System(inputs, (output,), rules, normalization="none"))
     assert raw([0.25]) == (7.0,)
     assert raw.batch([[0.25], [1.0]])[:, 0] == pytest.approx([7.0, 25 / 3])
     scaled = Arbiter(system=System(inputs, (output,), rules))
@@ -155,5 +155,5 @@ def test_shapes_that_jump():
     """A box clipped at 1/2 is a box: its centroid is the middle."""
     output = Output("y", (0, 10), (Term("box", Shape(((2, 0), (2, 1), (5, 1), (5, 0)))), Term("b", rising(9, 10))))
     inputs = (Variable("x", (0, 1), (Term("on", rising(0, 1)),)),)
-    system = System(inputs, (output,), ("if x is on then y is box",), normalisation="none")
+    system = System(inputs, (output,), ("if x is on then y is box",), normalization="none")
     assert Arbiter(system=system)([0.5]) == pytest.approx([3.5])

@@ -24,7 +24,7 @@ def one_output(output, points):
     """A system whose cuts the tests choose themselves."""
     x = Variable("x", (0, 1), (Term("any", triangle(0, 1, 1)),))
     rule = Rule(x["any"], (output[output.terms[0].name],))
-    return System((x,), (output,), (rule,), normalisation="none", points=points)
+    return System((x,), (output,), (rule,), normalization="none", points=points)
 
 
 def exact_centroid(output, cuts):
@@ -224,7 +224,7 @@ def test_areas_below_the_least_are_divided_by_it_as_scikit_fuzzy_does():
 def test_a_jump_of_an_input_is_exact_and_of_an_output_a_slope_over_one_cell():
     x = Variable("x", (0, 1), (Term("step", Shape(((0.5, 0), (0.5, 1)))),))
     y = Output("y", (0, 1), (Term("half", Shape(((0.5, 0), (0.5, 1)))),))
-    engine = GridEngine(System((x,), (y,), (Rule(x["step"], y["half"]),), normalisation="none", points=11))
+    engine = GridEngine(System((x,), (y,), (Rule(x["step"], y["half"]),), normalization="none", points=11))
     # the triangle over (0.4, 0.5) and the rectangle over (0.5, 1)
     assert engine.centroids([0.5])[0] == pytest.approx((0.05 * (0.4 + 0.2 / 3) + 0.5 * 0.75) / 0.55)
 

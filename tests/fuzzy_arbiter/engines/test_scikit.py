@@ -65,7 +65,7 @@ TIPPING = System(
         parse_rule("if service is good or quality is good then tip is high"),
     ),
     name="tipping",
-    normalisation="none",
+    normalization="none",
     points=26,
 )
 # nested conditions, weights, two conclusions, knots off the grid, a jump, a term that no rule concludes
@@ -95,7 +95,7 @@ MIXED_RULES = (
 
 def mixed(conjunction="min", disjunction="max", points=101):
     options = {"conjunction": conjunction, "disjunction": disjunction, "points": points}
-    return System((QUALITY, SERVICE), MIXED_OUTPUTS, MIXED_RULES, normalisation="none", **options)
+    return System((QUALITY, SERVICE), MIXED_OUTPUTS, MIXED_RULES, normalization="none", **options)
 
 
 def stock(system):
@@ -184,7 +184,7 @@ def gap(default=None):
     """No rule fires between 4 and 6."""
     x = Variable("x", (0, 10), (Term("a", falling(0, 4)), Term("b", rising(6, 10))))
     y = Output("y", (5, 6), (Term("a", triangle(5, 5.2, 5.4)), Term("b", triangle(5.4, 5.8, 6))), default=default)
-    return System((x,), (y,), (Rule(x["a"], y["a"]), Rule(x["b"], y["b"])), normalisation="none")
+    return System((x,), (y,), (Rule(x["a"], y["a"]), Rule(x["b"], y["b"])), normalization="none")
 
 
 def test_an_output_for_which_no_rule_fires_is_never_an_earlier_value():
@@ -214,7 +214,7 @@ def test_a_batch_is_its_rows_and_may_be_empty():
                 (Variable("x", (0, 1), (Term("step", Shape(((0.5, 0), (0.5, 1)))),)),),
                 (TIP,),
                 ("if x is step then tip is low",),
-                normalisation="none",
+                normalization="none",
             ),
             "input 'x': term 'step' jumps",
         ),
@@ -223,7 +223,7 @@ def test_a_batch_is_its_rows_and_may_be_empty():
                 (QUALITY,),
                 (Output("y", (0, 1), (Term("thin", triangle(0.501, 0.505, 0.509)),)),),
                 ("if quality is poor then y is thin",),
-                normalisation="none",
+                normalization="none",
             ),
             "term 'thin' is 0 at all 101 points; expected more points",
         ),
@@ -232,7 +232,7 @@ def test_a_batch_is_its_rows_and_may_be_empty():
                 (QUALITY,),
                 (Output("y", (1, 1 + 1e-15), (Term("all", Shape(((1, 1),))),)),),
                 ("if quality is poor then y is all",),
-                normalisation="none",
+                normalization="none",
             ),
             "101 points do not fit",
         ),
@@ -245,7 +245,7 @@ def test_what_scikit_fuzzy_cannot_run_is_refused_by_name(system, words):
 
 def test_edges_at_the_ends_of_an_input_are_no_jumps():
     x = Variable("x", (0, 1), (Term("low", triangle(0, 0, 1)), Term("high", triangle(0, 1, 1))))
-    engine = ScikitEngine(System((x,), (TIP,), ("if x is low then tip is low",), normalisation="none"))
+    engine = ScikitEngine(System((x,), (TIP,), ("if x is low then tip is low",), normalization="none"))
     assert engine.centroids([0.0]) == [engine.centroid(0, [1, 0, 0])]
 
 

@@ -30,7 +30,7 @@ TIPPING = System(
         "if quality is good or service is good then tip is high",
     ),
     name="tipping",
-    normalisation="none",
+    normalization="none",
 )
 
 WORDS = ("low", "high", "a", "B2", "wind_speed", "x__y", "Zz", "mid")

@@ -55,7 +55,7 @@ def test_a_block_of_others_is_read():
     assert system.outputs[0].terms[1].shape == triangle(10, 15, 20)
     assert system.outputs[0].default == 0.0
     assert (system.conjunction, system.disjunction, system.implication) == ("min", "max", "min")
-    assert (system.normalisation, system.outside, system.points) == ("none", "refuse", 101)
+    assert (system.normalization, system.outside, system.points) == ("none", "refuse", 101)
     assert str(system.rules[1]) == "if service is good then tip is average with 0.5"
     assert str(system.rules[2].condition) == "not (service is not excellent or food is not delicious)"
 

@@ -70,7 +70,7 @@ def test_points_and_clipping_are_said_in_its_own_words():
     text = writes(system, "fll")
     assert text.count("lock-range: true") == 3
     assert text.count("defuzzifier: Centroid 64\n") == 3
-    assert text.splitlines()[0] == "# fuzzy_arbiter: normalisation = range"
+    assert text.splitlines()[0] == "# fuzzy_arbiter: normalization = range"
 
 
 def test_terms_are_triangles_trapezoids_and_ramps_where_they_can_be():

@@ -78,7 +78,7 @@ def test_a_default_may_be_null_in_json():
 SHORT = """
 name = "regions"
 form = "minimal"
-normalisation = "sum"
+normalization = "sum"
 outside = "clip"
 points = 55
 criteria = [{name = "obstacle", on = "near", off = "far", membership = {falling = [1, 3]}}, {name = "depth"}]
@@ -236,7 +236,7 @@ def test_text_that_is_no_toml(text, fault):
 def test_a_system_is_written_whole():
     data = json.loads(writes(replace(TIPPING, outside="clip"), "json"))
     assert list(data) == [
-        *("name", "conjunction", "disjunction", "implication", "normalisation", "outside", "points"),
+        *("name", "conjunction", "disjunction", "implication", "normalization", "outside", "points"),
         *("inputs", "outputs", "rules"),
     ]
     assert tomllib.loads(writes(replace(TIPPING, outside="clip"), "toml")) == data

@@ -1,4 +1,4 @@
-"""Range normalisation, said in the universe."""
+"""Range normalization, said in the universe."""
 
 from dataclasses import replace
 from fractions import Fraction
@@ -51,15 +51,15 @@ def test_a_default_is_mapped_and_held_within_the_range():
         assert output.default == pytest.approx(mapped, abs=EPS)
 
 
-def test_what_has_no_normalisation_stays():
-    system = prioritised(normalisation="none")
+def test_what_has_no_normalization_stays():
+    system = prioritised(normalization="none")
     assert fold_normalization(system) is system
 
 
-@pytest.mark.parametrize("normalisation", ["sum", "max"])
-def test_a_normalisation_over_all_outputs_is_refused(normalisation):
-    with pytest.raises(UnsupportedError, match=f"no universe can say the normalisation '{normalisation}'"):
-        fold_normalization(prioritised(normalisation=normalisation))
+@pytest.mark.parametrize("normalization", ["sum", "max"])
+def test_a_normalization_over_all_outputs_is_refused(normalization):
+    with pytest.raises(UnsupportedError, match=f"no universe can say the normalization '{normalization}'"):
+        fold_normalization(prioritised(normalization=normalization))
 
 
 def test_terms_with_one_centroid_are_refused():
@@ -78,4 +78,4 @@ def test_terms_too_close_for_floating_point_are_refused():
 def test_every_format_can_say_it(format):
     system = fold_normalization(prioritised(form="minimal"))
     assert reads(writes(system, format), format) == system
-    assert reads(writes(system, format), format) == replace(system, normalisation="none")
+    assert reads(writes(system, format), format) == replace(system, normalization="none")

@@ -124,7 +124,7 @@ RuleBlock:
 """
 TOML = '''
 name = "tipper" # comment
-normalisation = 'none'
+normalization = 'none'
 rules = ["""if service is poor or
   food is rancid then tip is cheap""", 'if service is good then tip is average',
   "IF service IS excellent OR food IS delicious THEN tip IS generous",]
@@ -146,7 +146,7 @@ name = "tip"
 universe = [+0, 30]
 terms = {cheap = {triangle=[0,5,10]}, average = {triangle=[10,15,20]}, generous={triangle=[20,25,30]}}
 '''
-JSON = """{"name":"tipper","normalisation":"none","points":101,
+JSON = """{"name":"tipper","normalization":"none","points":101,
 "inputs":[
 {"name":"service","universe":[0,10],"terms":{"poor":[[0,1],[4,0]],"good":{"triangle":[1,5,9]},"excellent":{"rising":[6,10]}}},
 {"name":"food","universe":[0,10],"terms":{"rancid":{"falling":[1,3]},"delicious":[[7,0],[9,1]]}}],

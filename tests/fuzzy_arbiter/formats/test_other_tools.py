@@ -24,7 +24,7 @@ NEEDED = {
 
 
 def centroids(system, samples):
-    return np.array([ExactEngine(replace(system, normalisation="none")).centroids(sample) for sample in samples])
+    return np.array([ExactEngine(replace(system, normalization="none")).centroids(sample) for sample in samples])
 
 
 def test_the_tip_of_the_manuals():
@@ -62,7 +62,7 @@ ALL_CAN_SAY = System(
         "if service is great or food is fine then tip is high and kick is no with 0.25",
         "if food is not bad then tip is mid and kick is no with 1e-05",
     ),
-    normalisation="none",
+    normalization="none",
     points=1000,
 )
 WILD = replace(

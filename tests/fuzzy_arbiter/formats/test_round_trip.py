@@ -20,7 +20,7 @@ relaxed = settings(max_examples=examples(40), suppress_health_check=[HealthCheck
 @pytest.mark.parametrize("format", FORMATS)
 @pytest.mark.parametrize("form", FORMS)
 def test_prioritised_systems_come_back(format, form):
-    for system in (prioritised(form=form), prioritised(form=form, normalisation="sum", outside="clip", points=77)):
+    for system in (prioritised(form=form), prioritised(form=form, normalization="sum", outside="clip", points=77)):
         assert reads(writes(system, format), format) == system
 
 
@@ -149,9 +149,9 @@ def test_numbers_are_not_rounded(format):
 @pytest.mark.parametrize("format", ["fcl", "fis", "fll"])
 def test_settings_stand_in_one_comment_that_is_read_back(format):
     text = writes(prioritised(), format)
-    assert "fuzzy_arbiter: normalisation = range" in text.splitlines()[0]
+    assert "fuzzy_arbiter: normalization = range" in text.splitlines()[0]
     assert "(c - 0.3333333333333333) / 0.3333333333333333, held within [0, 1], for alpha_1" in text
-    plain = replace(prioritised(), normalisation="none")
+    plain = replace(prioritised(), normalization="none")
     assert "fuzzy_arbiter" not in writes(plain, format)
     assert reads(writes(plain, format), format) == plain
 
@@ -161,21 +161,21 @@ def test_settings_stand_in_one_comment_that_is_read_back(format):
     ("said", "fault"),
     [
         (
-            "fuzzy_arbiter: normalisation = ranje",
-            "line 1: normalisation is 'ranje', expected one of range, none, sum, max",
+            "fuzzy_arbiter: normalization = ranje",
+            "line 1: normalization is 'ranje', expected one of range, none, sum, max",
         ),
-        ("fuzzy_arbiter: scale = range", "line 1: 'scale = range', expected each once, with = and its value: normalis"),
-        ("fuzzy_arbiter: normalisation", "line 1: 'normalisation', expected each once"),
+        ("fuzzy_arbiter: scale = range", "line 1: 'scale = range', expected each once, with = and its value: normaliz"),
+        ("fuzzy_arbiter: normalization", "line 1: 'normalization', expected each once"),
         (
-            "fuzzy_arbiter: normalisation = sum, normalisation = sum",
-            "line 1: 'normalisation = sum', expected each once",
+            "fuzzy_arbiter: normalization = sum, normalization = sum",
+            "line 1: 'normalization = sum', expected each once",
         ),
-        ("fuzy_arbiter: normalisation = range", "line 1: .* is almost such a comment, expected 'fuzzy_arbiter:'"),
-        ("fuzzy_arbiter normalisation = range", "line 1: .* is almost such a comment, expected 'fuzzy_arbiter:'"),
+        ("fuzy_arbiter: normalization = range", "line 1: .* is almost such a comment, expected 'fuzzy_arbiter:'"),
+        ("fuzzy_arbiter normalization = range", "line 1: .* is almost such a comment, expected 'fuzzy_arbiter:'"),
     ],
 )
 def test_settings_that_there_are_not_are_refused(format, said, fault):
-    text = writes(prioritised(), format).replace("fuzzy_arbiter: normalisation = range", said)
+    text = writes(prioritised(), format).replace("fuzzy_arbiter: normalization = range", said)
     with pytest.raises(FormatError, match=fault):
         reads(text, format)
 

@@ -224,7 +224,7 @@ def varied(seeds: Seeds) -> Case:
 
 @reader("gain", "text", "cosim.campaigns.scenes.law_gains:gains_from")
 def gain(seeds: Seeds) -> Case:
-    return _argument(lambda text: LAWS["pd"].checked(gains_from("pd", [text])), "k_p1=10", "k_v1 = 1.5e2")
+    return _argument(lambda text: LAWS["pd"].validate(gains_from("pd", [text])), "k_p1=10", "k_v1 = 1.5e2")
 
 
 @reader("endpoint", "text", "cosim.mavlink.wire.endpoint:parse_endpoint")
