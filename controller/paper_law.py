@@ -58,7 +58,7 @@ def primary_potential(value: float, k_p1: float) -> float:
 def secondary_potential(values: Array, alphas: Array) -> float:
     """Return P_s: (17), of the g_i, `values`, and the alpha_i, `alphas`, each of shape (n,).
 
-    The law follows its gradient only where |dg_i/dp| = 1: (19) normalises each gradient.
+    The law follows its gradient only where |dg_i/dp| = 1: (19) normalizes each gradient.
     """
     total = 0.0
     for i in range(values.size):

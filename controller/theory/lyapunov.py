@@ -3,8 +3,8 @@
 Throughout y = J^+ e_Ts = [R^T (e_p + (k_q/k_p1) e_s); e_e] with J^+ = blkdiag(R^T, I), and sigma = diag(sigma_p I,
 sigma_a I). The lost dots of (39), (41) and (43) are put back: dy/dt is the sum of both terms with M nu.
 
-The last term of V comes in three forms, since (31) and (33) agree with each other, and with the normalised force of
-(22), only where |dg_i/dp| = 1: `printed_secondary` (31), `unit_gradient_secondary` (33), and `normalised_secondary`,
+The last term of V comes in three forms, since (31) and (33) agree with each other, and with the normalized force of
+(22), only where |dg_i/dp| = 1: `printed_secondary` (31), `unit_gradient_secondary` (33), and `normalized_secondary`,
 the true potential of the force. (40) is an identity for the last one alone, with constant weights, in still water,
 and where the wrench (25) is what acts.
 """
@@ -126,7 +126,7 @@ def secondary_gain(gains: Gains) -> float:
 
 @compiled
 def printed_secondary(values: Array, gradients: Array, betas: Array, gains: Gains) -> float:
-    """Return the last sum of (31): of (1/beta_i) |e_si|^2 / |dg_i/dp|^2, with the normalised e_si of (22).
+    """Return the last sum of (31): of (1/beta_i) |e_si|^2 / |dg_i/dp|^2, with the normalized e_si of (22).
 
     Parameters
     ----------
@@ -157,12 +157,12 @@ def unit_gradient_secondary(values: Array, betas: Array, gains: Gains) -> float:
 
 
 @compiled
-def normalised_secondary(values: Array, gradients: Array, clearances: Array, betas: Array, gains: Gains) -> float:
-    """Return the potential of the normalised force (22) in the place of the last sum of (31).
+def normalized_secondary(values: Array, gradients: Array, clearances: Array, betas: Array, gains: Gains) -> float:
+    """Return the potential of the normalized force (22) in the place of the last sum of (31).
 
     It is beta_i times the integral of g_i along the normal, from the surface to the vehicle. Where g is at most
     quadratic in the distance, with g = 0 on the surface, that is d (4 g - |dg/dp| d) / 6 at the distance d: exact for
-    spheres and depth bands, and for all shapes whose g is a distance. The normalised force of an ellipsoid has no
+    spheres and depth bands, and for all shapes whose g is a distance. The normalized force of an ellipsoid has no
     potential, because |dg/dp| varies over its level surfaces; for it this is an estimate.
 
     Parameters

@@ -11,7 +11,7 @@ from controller.regions.region_set import PackedRegions
 from controller.theory import (
     mapped_error,
     mapped_error_rate,
-    normalised_secondary,
+    normalized_secondary,
     primary_value,
     printed_secondary,
     value_rate,
@@ -20,7 +20,7 @@ from cosim.scenario.scenario import Scenario
 from cosim.scenario.true_vehicle import true_model
 from cosim.simulation.signals import Array, Column
 
-FORMS = ("printed", "normalised", "primary")  # in the order of the columns
+FORMS = ("printed", "normalized", "primary")  # in the order of the columns
 
 _STEP = 1e-4  # m, by which the errors are differentiated along the motion
 
@@ -31,7 +31,7 @@ def lyapunov_columns(scenario: Scenario) -> list[Column]:
         return []
     return [
         Column("lyapunov.printed", "N.m", "V of (31) as printed"),
-        Column("lyapunov.normalised", "N.m", "V of (31) with the potential of the normalised force (22)"),
+        Column("lyapunov.normalized", "N.m", "V of (31) with the potential of the normalized force (22)"),
         Column("lyapunov.primary", "N.m", "V of (31) without secondary regions"),
         Column("lyapunov.rate", "W", "dV/dt = -W of (40), (41)"),
     ]
@@ -87,7 +87,7 @@ class LyapunovSignals:
         alone = mapped_error(e_p, np.zeros(3), turned[1:], R, gains)
         value = primary_value(model, gains, f, turned, y, velocity, estimate)
         out[0] = value + printed_secondary(g, g_gradients, betas, gains)
-        out[1] = value + normalised_secondary(g, g_gradients, clearances, betas, gains)
+        out[1] = value + normalized_secondary(g, g_gradients, clearances, betas, gains)
         out[2] = primary_value(model, gains, f, turned, alone, velocity, estimate)
         y_rate = mapped_error_rate(region_rate, y, turned, R, velocity[3:])
         out[3] = value_rate(model, gains, y, y_rate, velocity)

@@ -65,7 +65,7 @@ def _figures(data: FigureData) -> Iterator[tuple[str, str, Callable[[FigureData]
     if data.summary["intersection_windows"]:
         yield (
             "weights-overlap",
-            "Normalised weights around each overlap of regions (after Fig. 8; assumed).",
+            "Normalized weights around each overlap of regions (after Fig. 8; assumed).",
             over_time.weights_overlap,
         )
     yield "weights", f"Memberships and weights of the criteria.{_zoom(data)}", over_time.weights

@@ -168,7 +168,7 @@ def weights_overlap(data: FigureData) -> Figure:
         ax.set_xlim(float(time[shown][0]), float(time[shown][-1]) + 1e-9)
         ax.xaxis.set_major_locator(MaxNLocator(8 // len(windows), steps=[1, 2, 5, 10]))
         ax.set_xlabel(_TIME)
-    axes[0, 0].set_ylabel("normalised weight [–]")
+    axes[0, 0].set_ylabel("normalized weight [–]")
     axes[0, 0].set_ylim(-0.05, 1.05)
     legend(figure, entries)
     return figure
@@ -251,14 +251,14 @@ def control_mode(data: FigureData) -> Figure:
 
 def lyapunov(data: FigureData) -> Figure:
     """Draw V in its three forms, and its rate."""
-    forms = {form: data.record[f"lyapunov.{form}"] for form in ("printed", "normalised", "primary")}
+    forms = {form: data.record[f"lyapunov.{form}"] for form in ("printed", "normalized", "primary")}
     labels = ("V as printed", "V, potential of the force", "V, primary region alone")
     figure, axes = _zoomed(data, [1.8, 1.8], labels)
     styles = zip(forms.values(), (ORANGE, BLUE, BLACK), DASHES, strict=False)
     lines = [curve(axes[0], data, V, color=colour, linestyle=style) for V, colour, style in styles]
     rate = data.record["lyapunov.rate"]
     curve(axes[1], data, rate, color=BLUE)
-    for row, signal, bad in ((axes[0], forms["normalised"], -1.0), (axes[1], rate, 1.0)):
+    for row, signal, bad in ((axes[0], forms["normalized"], -1.0), (axes[1], rate, 1.0)):
         size = np.abs(signal[np.isfinite(signal)])
         largest, typical = (float(size.max()), float(np.percentile(size, 50))) if size.size else (0.0, 0.0)
         if largest > 20.0 * max(typical, 1.0):  # the beginning would flatten all the rest

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from cosim.replay.activity import active_regions
 from cosim.replay.sampling import sampled_rows
-from cosim.replay.trace import plain, trace_of
+from cosim.replay.trace import nan_to_none, trace_of
 from cosim.replay.viewing import Viewing
 from cosim.results.record import Rows
 from cosim.results.run_result import load_run
@@ -131,7 +131,7 @@ def test_runs_of_all_kinds_have_a_trace(name, overrides, shipped_run):
 
 def test_what_is_no_number_becomes_none():
     mixed = {"a": (1.0, float("nan")), "b": [float("-inf"), {"c": True}], "d": "nan", "e": None, "f": 7}
-    assert plain(mixed) == {"a": [1.0, None], "b": [None, {"c": True}], "d": "nan", "e": None, "f": 7}
+    assert nan_to_none(mixed) == {"a": [1.0, None], "b": [None, {"c": True}], "d": "nan", "e": None, "f": 7}
 
 
 def test_a_trace_is_of_the_run_as_it_came(docking):
