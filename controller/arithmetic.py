@@ -10,9 +10,10 @@ import math
 
 from controller.jit.jit import jit_internal
 
-_QUARTER, _REST_OF_QUARTER = 1.5707963267948966, 6.123233995736766e-17  # pi / 2 as a sum
-_SHORT_QUARTER, _LONG_REST = 1.57079632673412561417, 6.07710050650619224932e-11  # again; k times the first is exact
-_LN_2, _REST_OF_LN_2 = 0.693147180369123816490, 1.90821492927058770002e-10  # ln 2 as a sum; k times the first is exact
+_QUARTER = 1.5707963267948966  # pi / 2
+# pi / 2 and ln 2 as sums: whole multiples of the first number of each are exact
+_SHORT_QUARTER, _REST_OF_QUARTER = 1.57079632673412561417, 6.07710050650619224932e-11
+_LN_2, _REST_OF_LN_2 = 0.693147180369123816490, 1.90821492927058770002e-10
 _ARCTANGENTS = (0.0, 0.24497866312686414, 0.4636476090008061, 0.6435011087932844, 0.7853981633974483)  # of 0, 1/4 .. 1
 
 
@@ -44,7 +45,7 @@ def nearest_integer(x: float) -> int:
 def cosine(x: float) -> float:
     """Return cos x, within 2e-16, of an angle below 1e6 [rad]: Taylor's series of what is left of quarter turns."""
     turns = nearest_integer(x / _QUARTER)
-    r = (x - turns * _SHORT_QUARTER) - turns * _LONG_REST
+    r = (x - turns * _SHORT_QUARTER) - turns * _REST_OF_QUARTER
     s, cos_r, sin_r = r * r, 1.0, 1.0
     for k in range(9, 0, -1):
         cos_r = 1.0 - s / ((2.0 * k - 1.0) * (2.0 * k)) * cos_r
@@ -88,7 +89,7 @@ def arctangent(y: float, x: float) -> float:
         series = 1.0 / n - s * series
     angle = _ARCTANGENTS[near] + rest * series
     if abs(y) > abs(x):
-        angle = _QUARTER - (angle - _REST_OF_QUARTER)
+        angle = _QUARTER - angle
     if x < 0.0:
-        angle = 2.0 * _QUARTER - (angle - 2.0 * _REST_OF_QUARTER)
+        angle = 2.0 * _QUARTER - angle
     return -angle if y < 0.0 else angle

@@ -141,6 +141,9 @@ def order(x, n, out):
     out[9] = 0.0
     out[3 + int(count_calls(out[9:]))] = 10.0 * out[9] + x[1]  # the value first
     out[5 + int(count_calls(out[9:]) - 2.0)] += 10.0 * count_calls(out[9:])  # the place first
+    total = x[0]
+    total += count_calls(out[9:])
+    out[10] = total
     out[6] = out[9] + (x[0] if count_calls(out[9:]) > 3.0 else count_calls(out[9:]))
 
 
