@@ -85,9 +85,7 @@ def type_of(value: Any) -> Type:
     TypeError
         If it is of another type.
     """
-    if isinstance(value, bool | np.bool):
-        return BOOL
-    if isinstance(value, int | np.int64):
+    if isinstance(value, int | np.int64):  # and truth values: each takes a word
         return INT
     if isinstance(value, float):
         return DOUBLE

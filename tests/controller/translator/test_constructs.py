@@ -147,6 +147,17 @@ def order(x, n, out):
     out[6] = out[9] + (x[0] if count_calls(out[9:]) > 3.0 else count_calls(out[9:]))
 
 
+class Flags(NamedTuple):
+    first: bool
+    second: bool
+    numbers: np.ndarray
+
+
+def flagged(flags):
+    flags.numbers[0] = 3.0 if flags.first and not flags.second else -1.0
+    flags.numbers[1] = flags.first + 2.0 * flags.second
+
+
 def records(x, n, out):
     nested = Nested(Pair(x, out), 2.0, 3)
     pair = nested.pair
@@ -190,6 +201,14 @@ def test_c_does_what_python_does(function, tmp_path):
         call()
         np.testing.assert_array_equal(given[2], expected[2])
         assert given[2].tobytes() == expected[2].tobytes()
+
+
+@pytest.mark.parametrize(("first", "second"), [(True, False), (True, True), (False, True)])
+def test_truth_values_take_a_word_each(first, second, tmp_path):
+    given, expected = ((Flags(first, second, np.zeros(2)),) for _ in range(2))
+    Called(compiled(translated(flagged, given), tmp_path), given)()
+    flagged(*expected)
+    assert given[0].numbers.tolist() == expected[0].numbers.tolist()
 
 
 def test_random_numbers_wrap_around(tmp_path):
