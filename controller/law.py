@@ -118,6 +118,8 @@ class CompiledLaw:
         Numbers that stay.
     memory : NamedTuple of ndarray
         What it keeps between steps; has at least ``estimate`` and ``report``.
+    n_regions, n_forces : int
+        How many secondary regions it is made for, and how many numbers it gives.
 
     Examples
     --------
@@ -135,6 +137,8 @@ class CompiledLaw:
     diagnostics: tuple[Diagnostic, ...] = ()
     gains: Any
     memory: Any
+    n_regions: int
+    n_forces: int = 6
     _state: VehicleState | None = None  # of the last step
 
     @classmethod
@@ -286,7 +290,7 @@ class WrenchLaw(CompiledLaw):
         return validate_gains(gains, cls.above_zero)
 
     def __init__(self, gains: Any, desired_quaternion: Array, period: float, n_regions: int) -> None:
-        self.gains = self.validate(gains)
+        self.gains, self.n_regions = self.validate(gains), n_regions
         desired, lasting = validate_quaternion(desired_quaternion), np.array([validate_period(period)])
         self.memory = type(self).memory_of(desired, lasting, n_regions)
 

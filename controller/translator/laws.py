@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from controller.errors import LawError
 from controller.law import CompiledLaw, VehicleState
 from controller.regions.region_set import PackedRegions
 from controller.translator.program import Program
@@ -11,9 +12,7 @@ from controller.translator.static_data import static_data
 from controller.translator.types import type_of
 
 
-def translate_law(
-    law: CompiledLaw, goal: PackedRegions, regions: PackedRegions, n_thrusters: int, name: str = "law"
-) -> str:
+def translate_law(law: CompiledLaw, goal: PackedRegions, regions: PackedRegions, name: str = "law") -> str:
     """Translate a law into one file of C99 without heap.
 
     Parameters
@@ -24,8 +23,6 @@ def translate_law(
         The goal region alone.
     regions : PackedRegions
         The secondary regions, as many as the law was made for.
-    n_thrusters : int
-        Of the vehicle: entries of the health that is measured, and of forces where the law gives them.
     name : str, optional
         Of the function ``void name(const void *)`` and of ``name_data``, its arguments in static memory: before each
         call write what is measured into them, and read the forces from the last one after it.
@@ -37,6 +34,8 @@ def translate_law(
 
     Raises
     ------
+    LawError
+        If it is a law of one's own in plain Python, or made for another number of regions.
     TranslationError
         If the law is written in Python that is not translated; with file and line.
 
@@ -47,13 +46,18 @@ def translate_law(
     >>> goal = pack([Region("goal", Sphere((5.0, 0.0, 2.0), 0.5), "in")])
     >>> rocks = pack([Region("rock", Sphere((2.0, 0.0, 2.0), 0.5), "out")])
     >>> law = IsmailDunniganLaw(Gains(), desired_quaternion=[1.0, 0.0, 0.0, 0.0], period=0.02, n_regions=1)
-    >>> code = translate_law(law, goal, rocks, n_thrusters=8)
+    >>> code = translate_law(law, goal, rocks)
     >>> code.count("static law_arguments law_data")
     1
     """
-    state = VehicleState(np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]), np.zeros(6), np.ones(n_thrusters))
-    forces = np.zeros(n_thrusters if law.output == "thrusters" else 6)
-    arguments = (state, goal, regions, np.ones(regions.kinds.size), law.gains, law.plain_memory, forces)
+    if not isinstance(law, CompiledLaw):
+        raise LawError(f"law is of type {type(law).__name__}, expected one of controller.LAWS, compiled")
+    n = regions.kinds.size
+    if n != law.n_regions or goal.kinds.size != 1:
+        raise LawError(f"{goal.kinds.size} goals and {n} regions, expected 1 and the {law.n_regions} of the law")
+    health = np.ones(law.n_forces if law.output == "thrusters" else 0)
+    state = VehicleState(np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]), np.zeros(6), health)
+    arguments = (state, goal, regions, np.ones(n), law.gains, law.plain_memory, np.zeros(law.n_forces))
     program = Program()
     program.export(name, type(law).function, tuple(map(type_of, arguments)))
     return f"{program.text()}\n{static_data(program, name, arguments)}"

@@ -345,9 +345,9 @@ class DeployableLaw(CompiledLaw):
         period: float,
         n_regions: int,
     ) -> None:
-        self.gains = self.validate(gains)
+        self.gains, self.n_regions = self.validate(gains), n_regions
         desired = validate_quaternion(desired_quaternion)
-        m = vehicle.thruster_matrix.shape[1]
+        self.n_forces = m = vehicle.thruster_matrix.shape[1]
         self._memory = DeployableMemory(
             period=np.array([validate_period(period)]),
             estimate=np.zeros(4),

@@ -8,11 +8,12 @@ import sys
 import numpy as np
 import pytest
 
-from controller import LAWS
+from controller import LAWS, FunctionLaw, Gains, IsmailDunniganLaw, LawError, translate_law
+from controller.regions import pack
 from controller.translator.program import Program
 from controller.translator.static_data import static_data
 from controller.translator.types import type_of
-from tests.controller.translator.flights import Flight
+from tests.controller.translator.flights import GOAL, PERIOD, REGIONS, Flight
 
 STEPS = 1500
 # reads what each step is given, and writes forces, estimate and report
@@ -89,6 +90,18 @@ def test_bits_are_those_of_this_machine(law, target, tmp_path):
             done = subprocess.run(command, stdin=file, capture_output=True, check=True, timeout=300)
         found = np.frombuffer(done.stdout)
     np.testing.assert_array_equal(found, np.concatenate(outputs))
+
+
+def test_a_law_that_does_not_fit_is_refused():
+    goal, rocks = pack([GOAL]), pack(REGIONS[:2])
+    law = IsmailDunniganLaw(Gains(), [1.0, 0.0, 0.0, 0.0], PERIOD, n_regions=2)
+    assert "void dock(const void *words)" in translate_law(law, goal, rocks, name="dock")
+    with pytest.raises(LawError, match="1 goals and 1 regions, expected 1 and the 2 of the law"):
+        translate_law(law, goal, pack(REGIONS[:1]))
+    with pytest.raises(LawError, match="2 goals"):
+        translate_law(law, rocks, rocks)
+    with pytest.raises(LawError, match=r"of type FunctionLaw, expected one of controller\.LAWS"):
+        translate_law(FunctionLaw(lambda *_: [0.0] * 6), goal, rocks)
 
 
 def test_what_has_no_numbers_begins_as_null():
