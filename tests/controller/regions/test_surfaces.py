@@ -24,6 +24,7 @@ from controller.regions import (
 )
 from controller.regions.mesh import ball, closed_grid, patches, sector
 from controller.regions.region_set import clearances_at, surface_of
+from controller.regions.shapes import ENTRIES
 
 LIMITS = ((-4.0, -3.0, 0.0), (4.0, 5.0, 6.0))
 TURNED = (0.9, 0.1, -0.3, 0.2)
@@ -183,3 +184,21 @@ def test_patches_are_squares_about_the_middle_that_reach_across_the_limits():
 def test_shapes_of_attitude_have_no_surface():
     with pytest.raises(RegionError, match="'orientation' has no surface"):
         surface_of(Orientation((1.0, 0.0, 0.0, 0.0), 0.5), LIMITS)
+
+
+@pytest.mark.parametrize("name", [name for name, entry in ENTRIES.items() if entry.half_axes or entry.planes])
+def test_half_axes_and_planes_of_an_entry_are_on_its_surface(name):
+    entry = ENTRIES[name]
+    shape = entry.example
+    if entry.half_axes:
+        centre, axes = entry.half_axes(shape)
+        ways = np.random.default_rng(6).normal(size=(50, 3))
+        points = centre + ways / np.linalg.norm(ways, axis=1, keepdims=True) @ axes
+        outward = np.empty((0, 3))
+    else:
+        points = np.array([point for point, _ in entry.planes(shape)])
+        outward = points + 1e-3 * np.array([normal for _, normal in entry.planes(shape)])
+    region = Region("it", shape, "out")
+    np.testing.assert_allclose(clearances_at(points, region), 0.0, atol=1e-9)
+    if len(outward):
+        np.testing.assert_allclose(clearances_at(outward, region), 1e-3, atol=1e-9)

@@ -16,7 +16,6 @@ from controller.regions import (
     Sphere,
 )
 from controller.regions.region_set import clearances_at
-from controller.regions.shapes import ENTRIES
 from cosim.report.figures.path import ABOVE, SIDE
 from cosim.report.figures.shape_outlines import lines_of_shape
 
@@ -79,21 +78,3 @@ def test_an_outline_is_drawn_where_it_is_seen_alone(name):
 def test_a_shape_beyond_the_box_is_not_drawn():
     for shape in (Sphere((9.0, 0.0, 0.0), 1.0), Box((9.0, 0.0, 0.0), (1.0, 1.0, 1.0)), DepthBand(9.0, 1.0)):
         assert lines_of_shape(shape, LOW, HIGH, SIDE) is None
-
-
-@pytest.mark.parametrize("name", [name for name, entry in ENTRIES.items() if entry.half_axes or entry.planes])
-def test_half_axes_and_planes_of_an_entry_are_on_its_surface(name):
-    entry = ENTRIES[name]
-    shape = entry.example
-    if entry.half_axes:
-        centre, axes = entry.half_axes(shape)
-        ways = np.random.default_rng(6).normal(size=(50, 3))
-        points = centre + ways / np.linalg.norm(ways, axis=1, keepdims=True) @ axes
-        outward = np.empty((0, 3))
-    else:
-        points = np.array([point for point, _ in entry.planes(shape)])
-        outward = points + 1e-3 * np.array([normal for _, normal in entry.planes(shape)])
-    region = Region("it", shape, "out")
-    np.testing.assert_allclose(clearances_at(points, region), 0.0, atol=1e-9)
-    if len(outward):
-        np.testing.assert_allclose(clearances_at(outward, region), 1e-3, atol=1e-9)
