@@ -99,7 +99,7 @@ class Operands:
         if isinstance(operand, Value):
             return operand
         known = operand.value if isinstance(operand, Known) else None
-        if isinstance(known, bool | np.bool):
+        if isinstance(known, bool | np.bool_):
             return Value(BOOL, "true" if known else "false", True)
         if isinstance(known, np.uint64):
             return Value(UINT, f"UINT64_C({int(known)})", True)

@@ -64,7 +64,7 @@ def _is_address(value: tuple[Any, ...], key: Any) -> bool:
 
 
 def _number(x: Any) -> str:
-    if isinstance(x, bool | np.bool):
+    if isinstance(x, bool | np.bool_):
         return "true" if x else "false"
     if isinstance(x, np.uint64):
         return f"UINT64_C({int(x)})"
