@@ -58,7 +58,7 @@ KEYS = {
     ),
     "law.desired_quaternion": Key("", "attitude to be kept, body to world, scalar first"),
     "law.gains": Key(
-        "", "of that law", "; of the printed one section VII: `k_p1 k_p2 k_q k_v1 k_v2 sigma_p sigma_a gamma`",
+        "", "of that law", "; of the paper's law section VII: `k_p1 k_p2 k_q k_v1 k_v2 sigma_p sigma_a gamma`",
         default="the law's own",
     ),
     "arbiter.engine": Key("", "`closed`, `exact`, `grid` or `skfuzzy`", "; see [arbiter.md](arbiter.md#engines)"),
