@@ -48,6 +48,7 @@ class Actuators:
         # views of their memory, which are copied in a third of the time of arrays
         self._asked, self._given = self.command.data, self._wrench.data
         self._decided, self._sent = inputs.data, plant.inputs.values.data
+        self._delayed = np.zeros(inputs.size).data if scenario.master.order == "jacobi" else None
         self.health: Array = np.ones(vehicle.n_thrusters)
         self._limits = {"thrust_min": vehicle.thrust_min.copy(), "thrust_max": vehicle.thrust_max.copy()}
         self._allocate_to_the_healthy()
@@ -81,8 +82,12 @@ class Actuators:
         product(self._scenario.vehicle.thruster_matrix, self.thrusts, self.command)
 
     def write_inputs(self) -> None:
-        """Hand the inputs to the plant."""
-        self._sent[:] = self._decided
+        """Write the inputs of a step to the plant: those of this step, or under Jacobi those of the step before."""
+        if self._delayed is None:
+            self._sent[:] = self._decided
+        else:
+            self._sent[:] = self._delayed
+            self._delayed[:] = self._decided
 
     def _allocate_to_the_healthy(self) -> None:
         actuation = self._scenario.actuation

@@ -244,17 +244,14 @@ class Master:
         ):
             self._apply_commands(self.command_handler, ())  # what the next item of the mission changes
             self._evaluate_regions()
-        if jacobi:
-            self.actuators.write_inputs()  # what was asked for in the step before
-        elif k % scenario.arbiter_every == 0:
+        if not jacobi and k % scenario.arbiter_every == 0:
             self._arbitrate()
         if k % scenario.control_every == 0:
             self._control()
         if self._lyapunov is not None:
             self._lyapunov.write()
         if k < scenario.steps:
-            if not jacobi:
-                self.actuators.write_inputs()
+            self.actuators.write_inputs()
             self._step_plant(step)
         self._boundary = (k + 1) * step
 
