@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from benchmarks.table import Row, compared
 from benchmarks.timing import Timing
 from controller import LAWS, VehicleState
-from controller.jit.jit import compiled
 from controller.regions import DepthBand, Region, Sphere, pack
 from controller.regions.region_set import PackedRegions
 from cosim.batch.c_calls import Clock, seconds

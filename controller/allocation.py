@@ -8,26 +8,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controller.errors import LawError
-from controller.jit.jit import jit_noalloc
 
 Array = NDArray[np.float64]
 
 _ROUNDING = 1e-12  # of the greatest force: what is smaller asks for nothing
 
 
-@jit_noalloc
 def _greatest(forces: Array) -> float:
     """Return the greatest magnitude [N]; NaN if there is one."""
     greatest = 0.0
-    for force in forces:
-        if not abs(force) <= greatest:
-            greatest = abs(force)
+    for i in range(forces.size):
+        if not abs(forces[i]) <= greatest:
+            greatest = abs(forces[i])
             if np.isnan(greatest):
                 break
     return greatest
 
 
-@jit_noalloc
 def clip_each(forces: Array, lower: Array, upper: Array) -> bool:
     """Cut thruster forces [N], shape (n,), in place, each at its own limits, and return whether any was beyond them.
 
@@ -41,7 +38,6 @@ def clip_each(forces: Array, lower: Array, upper: Array) -> bool:
     return cut
 
 
-@jit_noalloc
 def keep_direction(forces: Array, lower: Array, upper: Array) -> bool:
     """Scale thruster forces [N], shape (n,), in place until all are within limits, and return whether any was beyond.
 
@@ -59,7 +55,6 @@ def keep_direction(forces: Array, lower: Array, upper: Array) -> bool:
     return scale < 1.0
 
 
-@jit_noalloc
 def allocate(inverse: Array, lower: Array, upper: Array, direction: bool, tau: Array, forces: Array) -> bool:
     """Write the least-squares thruster forces for a wrench, within limits, into `forces`.
 

@@ -8,8 +8,6 @@ from __future__ import annotations
 
 import math
 
-from controller.jit.jit import jit_internal
-
 _QUARTER = 1.5707963267948966  # pi / 2
 # pi / 2 and ln 2 as sums: whole multiples of the first number of each are exact
 _SHORT_QUARTER, _REST_OF_QUARTER = 1.57079632673412561417, 6.07710050650619224932e-11
@@ -17,31 +15,26 @@ _LN_2, _REST_OF_LN_2 = 0.693147180369123816490, 1.90821492927058770002e-10
 _ARCTANGENTS = (0.0, 0.24497866312686414, 0.4636476090008061, 0.6435011087932844, 0.7853981633974483)  # of 0, 1/4 .. 1
 
 
-@jit_internal
 def square(x: float) -> float:
     """Return x x."""
     return x * x
 
 
-@jit_internal
 def hypotenuse(x: float, y: float) -> float:
     """Return sqrt(x^2 + y^2), of numbers below 1e154."""
     return math.sqrt(x * x + y * y)
 
 
-@jit_internal
 def length3(x: float, y: float, z: float) -> float:
     """Return sqrt(x^2 + y^2 + z^2), of numbers below 1e154."""
     return math.sqrt(x * x + y * y + z * z)
 
 
-@jit_internal
 def nearest_integer(x: float) -> int:
     """Return the integer nearest to a number below 2^53, of two the one farther from 0."""
     return int(x + 0.5) if x >= 0.0 else -int(0.5 - x)
 
 
-@jit_internal
 def cosine(x: float) -> float:
     """Return cos x, within 2e-16, of an angle below 1e6 [rad]: Taylor's series of what is left of quarter turns."""
     turns = nearest_integer(x / _QUARTER)
@@ -56,7 +49,6 @@ def cosine(x: float) -> float:
     return -r * sin_r if quarter == 1 else r * sin_r
 
 
-@jit_internal
 def exponential(x: float) -> float:
     """Return e^x of a number between -700 and 700, within 4e-16 of itself: Taylor's series, doubled or halved."""
     doublings = nearest_integer(x / _LN_2)
@@ -70,7 +62,6 @@ def exponential(x: float) -> float:
     return result
 
 
-@jit_internal
 def arctangent(y: float, x: float) -> float:
     """Return the angle of the point (x, y) [rad], within 5e-16 of itself; 0 of (0, 0), and NaN of NaN.
 

@@ -74,3 +74,7 @@ def _cut(text: str, most: int) -> str:
 
 class TranslationError(ControllerError):
     """Python that is not translated to C; the message names file and line."""
+
+
+class CompilationError(ControllerError):
+    """There is no C compiler where one is needed, or it fails."""

@@ -16,8 +16,8 @@ from typing import Any, ClassVar, Literal, NamedTuple, Protocol, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from controller.compiling.function import BoundCall, CompiledFunction
 from controller.errors import LawError
-from controller.jit.bound_call import BoundCall
 from controller.regions.region_set import PackedRegions
 
 Array = NDArray[np.float64]
@@ -209,11 +209,6 @@ class CompiledLaw:
         self.memory.desired_quaternion[:] = validate_quaternion(quaternion)
 
     @property
-    def plain_memory(self) -> Any:
-        """Its memory, without addresses of compiled code."""
-        return self.memory
-
-    @property
     def estimate(self) -> Array:
         """phi-hat (12), shape (4,) [N, N m]."""
         estimate: Array = self.memory.estimate
@@ -243,14 +238,20 @@ class CompiledLaw:
         forces : ndarray, shape (6,) or (m,)
             Receives the wrench [N, N m], body frame, or the thruster forces [N], as `output` says.
         """
-        if state is not self._state and not all(part.flags.writeable for part in state):
-            state = VehicleState(*(part.copy() for part in state))  # compiled code is made for what can be written
+        if state is not self._state and not all(part.flags.c_contiguous for part in state):
+            state = VehicleState(*(part.copy() for part in state))  # the numbers in C stand side by side
         self._state = state
         self._step(state, goal, regions, weights, self.gains, self.memory, forces)
 
+    def bound(
+        self, state: VehicleState, goal: PackedRegions, regions: PackedRegions, weights: Array, forces: Array
+    ) -> BoundCall:
+        """Return its step with these arguments, those of `step`, to be called by whoever calls C."""
+        return BoundCall(type(self).function, (state, goal, regions, weights, self.gains, self.memory, forces))
+
     @functools.cached_property
-    def _step(self) -> BoundCall:
-        return BoundCall(type(self).function)
+    def _step(self) -> CompiledFunction:
+        return CompiledFunction(type(self).function)
 
 
 class WrenchLaw(CompiledLaw):

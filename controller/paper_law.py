@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controller.arithmetic import length3, square
-from controller.jit.jit import compiled, jit_noalloc
 from controller.quaternion import Vector3, error_parts, rotation_rows
 
 Array = NDArray[np.float64]
@@ -39,7 +38,6 @@ class Gains(NamedTuple):
     gamma: float = 2.0  # s2/kg, s2/(kg m2): Gamma = gamma I (27)
 
 
-@jit_noalloc
 def positive_part(value: float) -> float:
     """Return max(0, g) of a `value` g, as in (16), (17), (20) and (22).
 
@@ -48,13 +46,11 @@ def positive_part(value: float) -> float:
     return 0.0 if value <= 0.0 else value
 
 
-@compiled
 def primary_potential(value: float, k_p1: float) -> float:
     """Return P_p [N m]: (16), of f, the `value` of the goal, and `k_p1`."""
     return 0.5 * k_p1 * square(positive_part(value))
 
 
-@compiled
 def secondary_potential(values: Array, alphas: Array) -> float:
     """Return P_s: (17), of the g_i, `values`, and the alpha_i, `alphas`, each of shape (n,).
 
@@ -66,13 +62,11 @@ def secondary_potential(values: Array, alphas: Array) -> float:
     return total
 
 
-@compiled
 def primary_error(value: float, gradient: Array) -> Array:
     """Return e_p, shape (3,): (20), of f, `value`, and its `gradient`; k_p1 times it is (18), the potential's."""
     return positive_part(value) * gradient
 
 
-@jit_noalloc
 def secondary_parts(values: Array, gradients: Array, alphas: Array, k_q: float) -> Vector3:
     """Return e_s as `secondary_error` does, of alphas, shape (n,), of which beta_i = alpha_i / k_q."""
     x, y, z = 0.0, 0.0, 0.0
@@ -87,7 +81,6 @@ def secondary_parts(values: Array, gradients: Array, alphas: Array, k_q: float) 
     return x, y, z
 
 
-@compiled
 def secondary_error(values: Array, gradients: Array, betas: Array) -> Array:
     """Return e_s, shape (3,): (21), (22); k_q times it is (19).
 
@@ -105,7 +98,6 @@ def secondary_error(values: Array, gradients: Array, betas: Array) -> Array:
     return e_s
 
 
-@jit_noalloc
 def in_body(R: Rows, x: Vector3) -> Vector3:
     """Return R^T x, a world vector seen from the body."""
     return (
@@ -115,7 +107,6 @@ def in_body(R: Rows, x: Vector3) -> Vector3:
     )
 
 
-@jit_noalloc
 def apply(
     e_p: Vector3,
     e_s: Vector3,
@@ -171,13 +162,11 @@ def apply(
         estimate[1 + i] += period / gains.gamma * turning[i]
 
 
-@jit_noalloc
 def turned_by(k: Vector3, x: float, y: float, z: float) -> Vector3:
     """Return S(k) [x y z]^T = k x [x y z]^T: (4)."""
     return k[1] * z - k[2] * y, k[2] * x - k[0] * z, k[0] * y - k[1] * x
 
 
-@jit_noalloc
 def step(
     quaternion: Array,
     velocity_body: Array,

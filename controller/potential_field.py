@@ -14,7 +14,6 @@ from typing import NamedTuple
 import numpy as np
 
 from controller.arithmetic import length3
-from controller.jit.jit import jit_noalloc
 from controller.law import Array, VehicleState
 from controller.paper_law import positive_part
 from controller.quaternion import Vector3
@@ -55,7 +54,6 @@ def field_of(n_regions: int) -> Field:
     )
 
 
-@jit_noalloc
 def evaluate_field(
     state: VehicleState, goal: PackedRegions, regions: PackedRegions, repulsion: float, reach: float, field: Field
 ) -> None:
@@ -86,7 +84,6 @@ def evaluate_field(
         )
 
 
-@jit_noalloc
 def along(gradient: Array, length: float, total: Array) -> None:
     """Add a vector of a length [N] along a gradient, shape (3,), to `total`; nothing if the gradient is zero."""
     norm = length3(gradient[0], gradient[1], gradient[2])
@@ -95,7 +92,6 @@ def along(gradient: Array, length: float, total: Array) -> None:
             total[axis] += length / norm * gradient[axis]
 
 
-@jit_noalloc
 def set_point_error(field: Field, inset: float, most: float) -> None:
     """Write into `field.error` how far the vehicle is from its set point [m, NED], cut at a length.
 
@@ -116,7 +112,6 @@ def set_point_error(field: Field, inset: float, most: float) -> None:
     shorten(field.error, most)
 
 
-@jit_noalloc
 def shorten(vector: Array, most: float) -> None:
     """Scale a vector, shape (3,), in place so that it is no longer than `most`; NaN stays."""
     norm = length3(vector[0], vector[1], vector[2])
@@ -125,14 +120,12 @@ def shorten(vector: Array, most: float) -> None:
             vector[axis] *= most / norm
 
 
-@jit_noalloc
 def add_turned(R: Array, force: Array, factor: float, wrench: Array) -> None:
     """Add `factor` times R^T `force`, a force of the world [N], shape (3,), to a body wrench, shape (6,) [N, N m]."""
     for i in range(3):
         wrench[i] += factor * (R[0, i] * force[0] + R[1, i] * force[1] + R[2, i] * force[2])
 
 
-@jit_noalloc
 def damp(velocity_body: Array, attitude_error: Vector3, k_p2: float, k_v1: float, k_v2: float, wrench: Array) -> None:
     """Write the part of (25) that every law has, (6,) [N, N m]: -K_v nu, and -k_p2 times the attitude error (26)."""
     for i in range(3):
@@ -140,7 +133,6 @@ def damp(velocity_body: Array, attitude_error: Vector3, k_p2: float, k_v1: float
         wrench[3 + i] = -k_p2 * attitude_error[i] - k_v2 * velocity_body[3 + i]
 
 
-@jit_noalloc
 def keep_within(estimate: Array, first: int, last: int, bound: float) -> None:
     """Cut the numbers from `first` up to, not including, `last` of an estimate at -`bound` and `bound`; NaN stays.
 

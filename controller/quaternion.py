@@ -10,14 +10,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from controller.jit.jit import compiled, jit_noalloc
-
 Array = NDArray[np.float64]
 Vector3 = tuple[float, float, float]
 Vector4 = tuple[float, float, float, float]
 
 
-@compiled
 def from_axis_angle(axis: Array, angle: float) -> Array:
     """Return the quaternion of a rotation by `angle` [rad] about a unit `axis`, shape (3,): (1), (2).
 
@@ -34,13 +31,11 @@ def from_axis_angle(axis: Array, angle: float) -> Array:
     return e
 
 
-@compiled
 def skew(a: Array) -> Array:
     """Return S(a), shape (3, 3), such that S(a) b = a x b: (4), with the property (5)."""
     return np.array([[0.0, -a[2], a[1]], [a[2], 0.0, -a[0]], [-a[1], a[0], 0.0]])
 
 
-@jit_noalloc
 def rotation_rows(e: Array) -> tuple[Vector3, Vector3, Vector3]:
     """Return the rows of R, from body to world, of a unit quaternion `e`: (3)."""
     e0, e1, e2, e3 = e[0], e[1], e[2], e[3]
@@ -51,13 +46,11 @@ def rotation_rows(e: Array) -> tuple[Vector3, Vector3, Vector3]:
     )
 
 
-@jit_noalloc
 def write_rotation(e: Array, R: Array) -> None:
     """Write R, shape (3, 3), from body to world, of a unit quaternion: (3)."""
     (R[0, 0], R[0, 1], R[0, 2]), (R[1, 0], R[1, 1], R[1, 2]), (R[2, 0], R[2, 1], R[2, 2]) = rotation_rows(e)
 
 
-@compiled
 def rotation_matrix(e: Array) -> Array:
     """Return R, shape (3, 3), from body to world, of a unit quaternion `e`: (3).
 
@@ -73,14 +66,12 @@ def rotation_matrix(e: Array) -> Array:
     return R
 
 
-@compiled
 def kinematic_matrix(e: Array) -> Array:
     """Return E(e), shape (4, 3): (7), with the properties (8)."""
     e0, e1, e2, e3 = e
     return np.array([[-e1, -e2, -e3], [e0, -e3, e2], [e3, e0, -e1], [-e2, e1, e0]])
 
 
-@jit_noalloc
 def rate_parts(e: Array, omega: Array) -> Vector4:
     """Return the parts of de/dt of `e` at the body angular velocity `omega` [rad/s]: (6), (24)."""
     e0, e1, e2, e3, p, q, r = e[0], e[1], e[2], e[3], omega[0], omega[1], omega[2]
@@ -92,7 +83,6 @@ def rate_parts(e: Array, omega: Array) -> Vector4:
     )
 
 
-@compiled
 def rate(e: Array, omega: Array) -> Array:
     """Return de/dt, shape (4,), of `e` at the body angular velocity `omega` [rad/s]: (6), (24)."""
     e_dot = np.empty(4)
@@ -100,13 +90,11 @@ def rate(e: Array, omega: Array) -> Array:
     return e_dot
 
 
-@compiled
 def angular_velocity(e: Array, e_dot: Array) -> Array:
     """Return the body angular velocity [rad/s], shape (3,), that turns `e` at `e_dot`: (9)."""
     return 2.0 * kinematic_matrix(e).T @ e_dot
 
 
-@compiled
 def multiply(a: Array, b: Array) -> Array:
     """Return the quaternion product of `a` and `b`, shape (4,), for (23): first the rotation `b`, then `a`."""
     return np.array(
@@ -119,7 +107,6 @@ def multiply(a: Array, b: Array) -> Array:
     )
 
 
-@jit_noalloc
 def error_parts(desired: Array, actual: Array) -> Vector4:
     """Return the parts of desired^-1 * actual, the error of the shortest rotation (scalar part >= 0): (23)."""
     d0, d1, d2, d3 = desired[0], desired[1], desired[2], desired[3]
@@ -131,7 +118,6 @@ def error_parts(desired: Array, actual: Array) -> Vector4:
     return (-e0, -e1, -e2, -e3) if e0 < 0.0 else (e0, e1, e2, e3)
 
 
-@compiled
 def error(desired: Array, actual: Array) -> Array:
     """Return the error quaternion desired^-1 * actual, shape (4,), of the shortest rotation (scalar part >= 0): (23).
 
@@ -142,14 +128,12 @@ def error(desired: Array, actual: Array) -> Array:
     return e
 
 
-@jit_noalloc
 def down_parts(e: Array) -> Vector3:
     """Return the parts of k = R^T e3: the direction of gravity seen from the body, for (12)."""
     e0, e1, e2, e3 = e[0], e[1], e[2], e[3]
     return 2.0 * (e1 * e3 - e0 * e2), 2.0 * (e2 * e3 + e0 * e1), 1.0 - 2.0 * (e1 * e1 + e2 * e2)
 
 
-@compiled
 def down_in_body(e: Array) -> Array:
     """Return k = R^T e3, shape (3,), at the attitude `e`: the direction of gravity seen from the body, for (12)."""
     k = np.empty(3)

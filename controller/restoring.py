@@ -8,13 +8,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from controller.jit.jit import compiled, jit_noalloc
 from controller.quaternion import down_parts
 
 Array = NDArray[np.float64]
 
 
-@jit_noalloc
 def write_regressor(e: Array, Z: Array) -> None:
     """Write Z(eta), shape (6, 4), of a unit quaternion `e`: (12), Z = [-k 0; 0 S(k)] with k = R^T e3."""
     x, y, z = down_parts(e)
@@ -25,7 +23,6 @@ def write_regressor(e: Array, Z: Array) -> None:
     Z[5, 1], Z[5, 2] = -y, x
 
 
-@compiled
 def regressor(e: Array) -> Array:
     """Return Z(eta), shape (6, 4), as `write_regressor` writes it."""
     Z = np.empty((6, 4))
@@ -33,7 +30,6 @@ def regressor(e: Array) -> Array:
     return Z
 
 
-@compiled
 def parameters(weight: float, buoyancy: float, r_G: Array, r_B: Array) -> Array:
     """Return phi (12), shape (4,) [N, N m], from `weight` and `buoyancy` [N], their centres `r_G` and `r_B` [m]."""
     phi = np.empty(4)

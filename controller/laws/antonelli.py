@@ -21,8 +21,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from controller.jit.jit import jit_noalloc
-from controller.jit.stack_array import zeros
 from controller.law import Array, VehicleState, WrenchLaw
 from controller.potential_field import (
     Field,
@@ -35,6 +33,7 @@ from controller.potential_field import (
 )
 from controller.quaternion import down_parts, error_parts, write_rotation
 from controller.regions.region_set import PackedRegions
+from controller.stack_array import zeros
 
 
 class AntonelliGains(NamedTuple):
@@ -68,7 +67,6 @@ class AntonelliMemory(NamedTuple):
     field: Field
 
 
-@jit_noalloc
 def write_regressor(quaternion: Array, R: Array, Phi: Array) -> None:
     """Write Phi, shape (6, 9), of a unit quaternion, shape (4,), and its rotation, shape (3, 3), over zeros."""
     x, y, z = down_parts(quaternion)
@@ -80,7 +78,6 @@ def write_regressor(quaternion: Array, R: Array, Phi: Array) -> None:
             Phi[i, 3 + j] = Phi[3 + i, 6 + j] = R[j, i]
 
 
-@jit_noalloc
 def step(
     state: VehicleState,
     goal: PackedRegions,

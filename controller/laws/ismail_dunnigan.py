@@ -7,7 +7,6 @@ from typing import NamedTuple
 import numpy as np
 
 from controller import paper_law
-from controller.jit.jit import jit_noalloc
 from controller.law import Array, VehicleState, WrenchLaw
 from controller.paper_law import Gains
 from controller.regions.region_set import PackedRegions, evaluate_packed
@@ -31,7 +30,6 @@ class IsmailDunniganMemory(NamedTuple):
     alphas: Array  # (n,) gains of the regions times their weights
 
 
-@jit_noalloc
 def step(
     state: VehicleState,
     goal: PackedRegions,

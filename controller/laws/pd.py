@@ -15,8 +15,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from controller.jit.jit import jit_noalloc
-from controller.jit.stack_array import zeros
 from controller.law import Array, VehicleState, WrenchLaw
 from controller.potential_field import (
     Field,
@@ -28,6 +26,7 @@ from controller.potential_field import (
 )
 from controller.quaternion import error_parts, write_rotation
 from controller.regions.region_set import PackedRegions
+from controller.stack_array import zeros
 
 
 class PdGains(NamedTuple):
@@ -52,7 +51,6 @@ class PdMemory(NamedTuple):
     field: Field
 
 
-@jit_noalloc
 def step(
     state: VehicleState,
     goal: PackedRegions,

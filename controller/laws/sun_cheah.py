@@ -17,8 +17,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from controller.jit.jit import jit_noalloc
-from controller.jit.stack_array import zeros
 from controller.law import Array, VehicleState, WrenchLaw
 from controller.potential_field import (
     Field,
@@ -32,6 +30,7 @@ from controller.potential_field import (
 from controller.quaternion import error_parts, write_rotation
 from controller.regions.region_set import PackedRegions
 from controller.restoring import write_regressor
+from controller.stack_array import zeros
 
 
 class SunCheahGains(NamedTuple):
@@ -63,7 +62,6 @@ class SunCheahMemory(NamedTuple):
     field: Field
 
 
-@jit_noalloc
 def step(
     state: VehicleState,
     goal: PackedRegions,

@@ -12,7 +12,6 @@ from typing import NamedTuple
 import numpy as np
 
 from controller import paper_law
-from controller.jit.jit import jit_noalloc
 from controller.law import Array, VehicleState, WrenchLaw
 from controller.paper_law import Gains, positive_part
 from controller.potential_field import Field, evaluate_field, field_of, keep_within, shorten
@@ -48,7 +47,6 @@ class UnarbitratedMemory(NamedTuple):
     field: Field
 
 
-@jit_noalloc
 def step(
     state: VehicleState,
     goal: PackedRegions,

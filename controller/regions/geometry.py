@@ -8,18 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controller.arithmetic import hypotenuse
-from controller.jit.jit import jit_noalloc
 
 Array = NDArray[np.float64]
 
 
-@jit_noalloc
 def clamp(x: float, low: float, high: float) -> float:
     """Return `x` moved into [low, high]."""
     return min(max(x, low), high)
 
 
-@jit_noalloc
 def to_local(p: Array, q: Array, at: int) -> tuple[float, float, float]:
     """Return R^T (p - c) for a centre packed at `at` and a rotation matrix, row by row, behind it."""
     d0, d1, d2 = p[0] - q[at], p[1] - q[at + 1], p[2] - q[at + 2]
@@ -31,7 +28,6 @@ def to_local(p: Array, q: Array, at: int) -> tuple[float, float, float]:
     )
 
 
-@jit_noalloc
 def to_world(q: Array, at: int, x: float, y: float, z: float) -> tuple[float, float, float]:
     """Return R (x, y, z) for a rotation matrix packed at `at`."""
     return (
@@ -41,7 +37,6 @@ def to_world(q: Array, at: int, x: float, y: float, z: float) -> tuple[float, fl
     )
 
 
-@jit_noalloc
 def product_distance(first: float, second: float) -> tuple[float, float, float]:
     """Return the signed distance to the product of two sets in perpendicular directions, and how it follows each.
 

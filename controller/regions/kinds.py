@@ -5,15 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-import numpy as np
-from numba import types
-from numpy.typing import NDArray
-
-from controller.jit.function_pointer import Address, declare, pointer_to
-from controller.jit.jit import jit_internal
 from controller.regions.shapes import ENTRIES
 from controller.regions.shapes.depth_band import DepthBand
 from controller.regions.shapes.sphere import Sphere
+from controller.translator.generated import functions_of
 
 SPHERE, DEPTH_BAND = Sphere.kind, DepthBand.kind
 FIRST_OF_ATTITUDE = sum(not entry.of_attitude for entry in ENTRIES.values())  # kinds from it on depend on attitude
@@ -22,17 +17,14 @@ FIRST_OF_ATTITUDE = sum(not entry.of_attitude for entry in ENTRIES.values())  # 
 def _by_kind(name: str, arguments: str, of_attitude: bool) -> Callable[..., Any]:
     """Return a function that evaluates the shape of a kind, its first argument, at the `arguments`.
 
-    Numba compiles no table of functions, so that it is written: a choice of each kind by its number.
+    C has no table of functions that take tuples, so that it is written: a choice of each kind by its number.
     """
     entries = {kind: entry for kind, entry in ENTRIES.items() if entry.of_attitude == of_attitude}
     names: dict[str, Any] = {f"_{kind}": entry.evaluate for kind, entry in entries.items()}
     choices = [f"    if kind == {entry.shape.kind}: return _{kind}({arguments})\n" for kind, entry in entries.items()]
     last = f"    return _{list(entries)[-1]}({arguments})\n"  # there are no other kinds: `pack` takes shapes alone
     source = f"def {name}(kind, {arguments}):\n{''.join(choices[:-1])}{last}"
-    names["__name__"] = __name__
-    exec(compile(source, __file__, "exec"), names)  # noqa: S102 -- of the names of this package's files
-    names[name].source = source  # which stands in no file
-    made: Callable[..., Any] = jit_internal(names[name])
+    made: Callable[..., Any] = functions_of(source, names | {"__name__": __name__})[name]
     return made
 
 
@@ -41,17 +33,3 @@ evaluate_shape = _by_kind("evaluate_shape", "p, q", of_attitude=False)
 
 # of a packed shape of attitude, told by its kind, at the position `p` [m, NED] and the attitude `e`
 evaluate_shape_of_attitude = _by_kind("evaluate_shape_of_attitude", "p, e, q", of_attitude=True)
-
-_NUMBERS: Any = types.float64[::1]
-_Tuple: Any = types.UniTuple
-declare(evaluate_shape, (types.int64, _NUMBERS, _NUMBERS), _Tuple(types.float64, 5))
-declare(evaluate_shape_of_attitude, (types.int64, _NUMBERS, _NUMBERS, _NUMBERS), _Tuple(types.float64, 7))
-
-
-def addresses_of(kinds: NDArray[np.int64]) -> tuple[Address, Address]:
-    """Return the addresses of what evaluates shapes of place and of attitude; 0 where these kinds need it not."""
-    place = np.any((kinds != SPHERE) & (kinds != DEPTH_BAND) & (kinds < FIRST_OF_ATTITUDE))
-    return (
-        pointer_to(evaluate_shape) if place else Address(0),
-        pointer_to(evaluate_shape_of_attitude) if np.any(kinds >= FIRST_OF_ATTITUDE) else Address(0),
-    )

@@ -4,10 +4,7 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from controller.arithmetic import hypotenuse
-from controller.jit.jit import compiled
 from controller.regions.kinds import FIRST_OF_ATTITUDE, evaluate_shape
 from controller.regions.region_set import PackedRegions
 from controller.regions.shape import Array, Evaluation
@@ -15,6 +12,7 @@ from controller.regions.shapes import ENTRIES
 from controller.regions.shapes.ellipsoid import Ellipsoid
 from controller.regions.shapes.pipe import Pipe
 from controller.regions.shapes.prism import Prism
+from controller.stack_array import zeros
 
 TOUCHING = 1e-4  # m; so near a surface a ray has met it
 LOOKS = 64  # along a ray, at a region
@@ -25,7 +23,6 @@ _PRISM = Prism.kind
 _CONVEX = tuple(entry.shape.kind for entry in ENTRIES.values() if entry.convex)
 
 
-@compiled
 def ray_distances(regions: PackedRegions, origin: Array, directions: Array, farthest: float, distances: Array) -> None:
     """Find how far it is along rays to where a region, as it is now, is violated.
 
@@ -50,7 +47,7 @@ def ray_distances(regions: PackedRegions, origin: Array, directions: Array, fart
         that has used up its `LOOKS` ends where it is: nearer than what it would meet, never farther.
     """
     distances[:] = math.inf
-    start, piece = np.empty(3), np.empty(7)
+    start, piece = zeros(3), zeros(7)
     for i in range(regions.kinds.size):
         kind = regions.kinds[i]
         if kind >= FIRST_OF_ATTITUDE:
@@ -69,7 +66,6 @@ def ray_distances(regions: PackedRegions, origin: Array, directions: Array, fart
             _meet(kind, numbers, -sign, convex, start, directions, farthest, distances)
 
 
-@compiled
 def _meet(
     kind: int,
     numbers: Array,
@@ -92,7 +88,7 @@ def _meet(
     notched = kind == _PRISM and not convex and outward > 0.0
     x, y, radius = _circle_about(numbers) if notched else (0.0, 0.0, 0.0)
     x, y = x - start[0], y - start[1]
-    at = np.empty(3)
+    at = zeros(3)
     for k in range(distances.size):
         dx, dy, dz = directions[k, 0], directions[k, 1], directions[k, 2]
         if notched and abs(x * dy - y * dx) > radius * hypotenuse(dx, dy):
@@ -111,7 +107,6 @@ def _meet(
             distances[k] = way
 
 
-@compiled
 def _stride(kind: int, convex: bool, outward: float, here: Evaluation, dx: float, dy: float, dz: float) -> float:
     """Return how far one may go on [m] from where a shape is `here` as evaluated, outside, and not meet it."""
     g, gx, gy, gz, distance = here
@@ -127,16 +122,17 @@ def _stride(kind: int, convex: bool, outward: float, here: Evaluation, dx: float
     return -distance * math.sqrt(gx * gx + gy * gy + gz * gz) / along
 
 
-@compiled
 def _circle_about(prism: Array) -> tuple[float, float, float]:
     """Return middle and radius of a circle that holds all corners of a packed prism [m]."""
-    x, y, radius = float(np.mean(prism[2::2])), float(np.mean(prism[3::2])), 0.0
+    x, y, radius, n = 0.0, 0.0, 0.0, (prism.size - 2) // 2
+    for i in range(2, prism.size, 2):
+        x += prism[i] / n
+        y += prism[i + 1] / n
     for i in range(2, prism.size, 2):
         radius = max(radius, hypotenuse(prism[i] - x, prism[i + 1] - y))
     return x, y, radius
 
 
-@compiled
 def _is_convex(prism: Array) -> bool:
     """Return whether no corner of a packed prism turns inwards."""
     n = (prism.size - 2) // 2

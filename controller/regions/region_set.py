@@ -8,21 +8,18 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Literal, NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from controller.compiling.function import BoundCall, CompiledFunction
 from controller.errors import RegionError
-from controller.jit.function_pointer import Address, call
-from controller.jit.jit import inlined, jit_internal, jit_noalloc
-from controller.jit.stack_array import zeros
 from controller.regions.entry import Entry
 from controller.regions.kinds import (
     DEPTH_BAND,
     FIRST_OF_ATTITUDE,
     SPHERE,
-    addresses_of,
     evaluate_shape,
     evaluate_shape_of_attitude,
 )
@@ -41,6 +38,7 @@ from controller.regions.shapes import ENTRIES
 from controller.regions.shapes.depth_band import band_about
 from controller.regions.shapes.orientation import Orientation
 from controller.regions.shapes.sphere import sphere_about
+from controller.stack_array import zeros
 
 SHAPES: dict[str, type[Shape]] = {name: entry.shape for name, entry in ENTRIES.items()}
 
@@ -143,8 +141,6 @@ class PackedRegions(NamedTuple):
     velocities: Array  # (n, 3) m/s, NED
     gains: Array  # (n,) alpha_i
     hard: NDArray[np.bool_]  # (n,)
-    place: Address  # of what evaluates shapes of position; 0 where there are but spheres and depth bands
-    pose: Address  # of what evaluates shapes of attitude; 0 where there are none
 
     def evaluate(
         self,
@@ -181,13 +177,7 @@ class PackedRegions(NamedTuple):
         """
         for array in (position, quaternion, values, gradients, rotation_gradients, clearances):
             require(array.flags.c_contiguous, "evaluate", "array", "a strided one", "contiguous ones")
-        if not (position.flags.writeable and quaternion.flags.writeable):  # which compiled code is not made for
-            position, quaternion = position.copy(), quaternion.copy()
-        evaluate_packed(self, position, quaternion, values, gradients, rotation_gradients, clearances)
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        """Pickle what holds in another process too: addresses do not."""
-        return _unpickled, (tuple(self)[:-2],)
+        _evaluate(self, position, quaternion, values, gradients, rotation_gradients, clearances)
 
     def move_to(self, time: float) -> None:
         """Put every region where its velocity has brought it at a time [s]."""
@@ -219,7 +209,6 @@ def pack(regions: Sequence[Region]) -> PackedRegions:
     """
     packed = [region.shape.packed() for region in regions]
     kinds = np.array([region.shape.kind for region in regions], dtype=np.int64)
-    place, pose = addresses_of(kinds)
     return PackedRegions(
         kinds=kinds,
         signs=np.array([1.0 if region.keep == "in" else -1.0 for region in regions]),
@@ -229,17 +218,10 @@ def pack(regions: Sequence[Region]) -> PackedRegions:
         velocities=np.array([region.velocity for region in regions], dtype=float).reshape(-1, 3),
         gains=np.array([region.gain for region in regions], dtype=float),
         hard=np.array([region.hard for region in regions], dtype=np.bool_),
-        place=place,
-        pose=pose,
     )
 
 
-def _unpickled(arrays: tuple[Any, ...]) -> PackedRegions:
-    fields: tuple[Any, ...] = (*arrays, *addresses_of(arrays[0]))
-    return PackedRegions(*fields)
 
-
-@jit_noalloc
 def evaluate_packed(
     regions: PackedRegions,
     position: Array,
@@ -249,7 +231,7 @@ def evaluate_packed(
     rotation_gradients: Array,
     clearances: Array,
 ) -> None:
-    """Do what `PackedRegions.evaluate` says, with these `regions`, for compiled callers."""
+    """Do what `PackedRegions.evaluate` says, with these `regions`, for functions that are run as C themselves."""
     at = zeros(3)
     for i in range(regions.kinds.size):
         tx, ty, tz = 0.0, 0.0, 0.0
@@ -264,12 +246,10 @@ def evaluate_packed(
         rotation_gradients[i, 0], rotation_gradients[i, 1], rotation_gradients[i, 2] = sign * tx, sign * ty, sign * tz
 
 
-@jit_internal
 def evaluate_place(regions: PackedRegions, i: int, position: Array, at: Array) -> Evaluation:
     """Evaluate the shape of region `i`, of position alone, where it is now, at a `position`, shape (3,) [m, NED].
 
-    Spheres and bands of depth are evaluated here, by numbers alone; the others are called by address. `at` is
-    room of shape (3,).
+    Spheres and bands of depth, the most frequent, need no array; for the others `at` is room of shape (3,).
     """
     x = position[0] - regions.shifts[i, 0]
     y = position[1] - regions.shifts[i, 1]
@@ -280,11 +260,10 @@ def evaluate_place(regions: PackedRegions, i: int, position: Array, at: Array) -
     if kind == DEPTH_BAND:
         return band_about(z - q[first], q[first + 1])
     at[0], at[1], at[2] = x, y, z
-    evaluation: Evaluation = call(regions.place, evaluate_shape, (kind, at, q[first : regions.offsets[i + 1]]))
+    evaluation: Evaluation = evaluate_shape(kind, at, q[first : regions.offsets[i + 1]])
     return evaluation
 
 
-@jit_internal
 def evaluate_pose(regions: PackedRegions, i: int, position: Array, e: Array, at: Array) -> EvaluationOfAttitude:
     """Evaluate the shape of region `i`, of attitude, where it is now, at a `position`, shape (3,) [m, NED].
 
@@ -293,20 +272,16 @@ def evaluate_pose(regions: PackedRegions, i: int, position: Array, e: Array, at:
     for axis in range(3):
         at[axis] = position[axis] - regions.shifts[i, axis]
     numbers = regions.numbers[regions.offsets[i] : regions.offsets[i + 1]]
-    evaluation: EvaluationOfAttitude = call(
-        regions.pose, evaluate_shape_of_attitude, (regions.kinds[i], at, e, numbers)
-    )
+    evaluation: EvaluationOfAttitude = evaluate_shape_of_attitude(regions.kinds[i], at, e, numbers)
     return evaluation
 
 
-@jit_internal
 def clearance_of_place(regions: PackedRegions, i: int, position: Array, room: Array) -> float:
     """Return what `clearance_at` does, of a region known to be of position alone; `room` has shape (3,)."""
     clearance: float = -regions.signs[i] * evaluate_place(regions, i, position, room)[4]
     return clearance
 
 
-@jit_noalloc
 def clearance_at(regions: PackedRegions, i: int, position: Array) -> float:
     """Return the clearance [m] of one of the `regions`, `i`, where it is now, at a position, shape (3,) [m, NED].
 
@@ -317,7 +292,6 @@ def clearance_at(regions: PackedRegions, i: int, position: Array) -> float:
     return clearance_of_place(regions, i, position, zeros(3))
 
 
-@jit_noalloc
 def clearance_of_pose(regions: PackedRegions, i: int, position: Array, quaternion: Array, room: Array) -> float:
     """Return the clearance of one of the `regions`, `i`, of any kind, [m] or [rad], at a pose; `room` has shape (3,).
 
@@ -329,7 +303,6 @@ def clearance_of_pose(regions: PackedRegions, i: int, position: Array, quaternio
     return clearance
 
 
-@inlined
 def clearance_of_sphere(regions: PackedRegions, i: int, position: Array) -> float:
     """Return what `clearance_at` does, of a region known to be a sphere, twenty times as fast as for any shape."""
     first = regions.offsets[i]
@@ -340,7 +313,6 @@ def clearance_of_sphere(regions: PackedRegions, i: int, position: Array) -> floa
     return clearance
 
 
-@jit_noalloc
 def attitude_clearance(regions: PackedRegions, i: int, position: Array, quaternion: Array, slope: Array) -> float:
     """Return the clearance [rad] of one of the `regions`, `i`, of attitude.
 
@@ -354,7 +326,6 @@ def attitude_clearance(regions: PackedRegions, i: int, position: Array, quaterni
     return clearance
 
 
-@jit_noalloc
 def place_clearance(regions: PackedRegions, i: int, position: Array, slope: Array) -> float:
     """Return the clearance [m] of one of the `regions`, `i`, of position alone.
 
@@ -384,14 +355,17 @@ def clearances_at(points: Array, region: Region) -> Array:
         As `clearance_at` gives it [m].
     """
     clearances = np.empty(len(points))
-    _clearances_at(pack([region]), np.ascontiguousarray(points, dtype=float), np.empty(3), clearances)
+    arguments = pack([region]), np.ascontiguousarray(points, dtype=float), np.empty(3), clearances
+    BoundCall(_write_clearances, arguments).call()
     return clearances
 
 
-@jit_noalloc
-def _clearances_at(regions: PackedRegions, points: Array, room: Array, clearances: Array) -> None:
+def _write_clearances(regions: PackedRegions, points: Array, room: Array, clearances: Array) -> None:
     for i in range(points.shape[0]):
         if regions.kinds[0] < FIRST_OF_ATTITUDE:
             clearances[i] = clearance_of_place(regions, 0, points[i], room)
         else:
             clearances[i] = math.inf
+
+
+_evaluate = CompiledFunction(evaluate_packed)

@@ -16,7 +16,6 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from controller.jit.jit import compiled
 from controller.paper_law import Gains, positive_part
 from controller.quaternion import rate, skew
 from controller.theory.model import Model, coriolis, damping
@@ -24,7 +23,6 @@ from controller.theory.model import Model, coriolis, damping
 Array = NDArray[np.float64]
 
 
-@compiled
 def mapped_error(e_p: Array, e_s: Array, e_att: Array, R: Array, gains: Gains) -> Array:
     """Return y = J^+ e_Ts, shape (6,): (28).
 
@@ -45,7 +43,6 @@ def mapped_error(e_p: Array, e_s: Array, e_att: Array, R: Array, gains: Gains) -
     return y
 
 
-@compiled
 def mapped_error_rate(region_rate: Array, y: Array, error_quaternion: Array, R: Array, omega: Array) -> Array:
     """Return dy/dt, shape (6,): both dotted terms of (39).
 
@@ -68,7 +65,6 @@ def mapped_error_rate(region_rate: Array, y: Array, error_quaternion: Array, R: 
     return result
 
 
-@compiled
 def weighted(y: Array, gains: Gains) -> Array:
     """Return sigma y, shape (6,)."""
     result = gains.sigma_p * y
@@ -76,7 +72,6 @@ def weighted(y: Array, gains: Gains) -> Array:
     return result
 
 
-@compiled
 def primary_value(
     model: Model,
     gains: Gains,
@@ -118,13 +113,11 @@ def primary_value(
     return value
 
 
-@compiled
 def secondary_gain(gains: Gains) -> float:
     """Return k_q + sigma_p k_w of (31), with k_w = k_q k_v1 / k_p1."""
     return gains.k_q * (1.0 + gains.sigma_p * gains.k_v1 / gains.k_p1)
 
 
-@compiled
 def printed_secondary(values: Array, gradients: Array, betas: Array, gains: Gains) -> float:
     """Return the last sum of (31): of (1/beta_i) |e_si|^2 / |dg_i/dp|^2, with the normalized e_si of (22).
 
@@ -147,7 +140,6 @@ def printed_secondary(values: Array, gradients: Array, betas: Array, gains: Gain
     return 0.5 * secondary_gain(gains) * total
 
 
-@compiled
 def unit_gradient_secondary(values: Array, betas: Array, gains: Gains) -> float:
     """Return what (33) says the last sum of (31) is; so it is where |dg_i/dp| = 1. Arguments as `printed_secondary`."""
     total = 0.0
@@ -156,7 +148,6 @@ def unit_gradient_secondary(values: Array, betas: Array, gains: Gains) -> float:
     return 0.5 * secondary_gain(gains) * total
 
 
-@compiled
 def normalized_secondary(values: Array, gradients: Array, clearances: Array, betas: Array, gains: Gains) -> float:
     """Return the potential of the normalized force (22) in the place of the last sum of (31).
 
@@ -181,7 +172,6 @@ def normalized_secondary(values: Array, gradients: Array, clearances: Array, bet
     return secondary_gain(gains) * total
 
 
-@compiled
 def bracket(model: Model, gains: Gains, y: Array, y_rate: Array, velocity_body: Array) -> float:
     """Return the terms in braces of W [W]: (41), those that (43) bounds. Arguments as `value_rate`."""
     forces = coriolis(model.mass, velocity_body) @ velocity_body
@@ -189,7 +179,6 @@ def bracket(model: Model, gains: Gains, y: Array, y_rate: Array, velocity_body: 
     return np.sum(weighted(y, gains) * forces) - np.sum(weighted(y_rate, gains) * (model.mass @ velocity_body))
 
 
-@compiled
 def value_rate(model: Model, gains: Gains, y: Array, y_rate: Array, velocity_body: Array) -> float:
     """Return dV/dt = -W [W]: (40), (41), read with the weights constant and J_v^+ K_0 e_T = [k_p1 R^T e_p; k_p2 e_e].
 
@@ -212,7 +201,6 @@ def value_rate(model: Model, gains: Gains, y: Array, y_rate: Array, velocity_bod
     return -(spent + bracket(model, gains, y, y_rate, velocity_body))
 
 
-@compiled
 def lower_bound(
     model: Model,
     gains: Gains,

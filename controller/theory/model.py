@@ -7,7 +7,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from controller.jit.jit import compiled
 from controller.quaternion import down_in_body, skew
 from controller.restoring import parameters, regressor
 
@@ -23,7 +22,6 @@ class Model(NamedTuple):
     phi: Array  # (4,) true restoring parameters (12) [N, N m]
 
 
-@compiled
 def coriolis(mass: Array, velocity_body: Array) -> Array:
     """Return C(nu), shape (6, 6), of `mass`, a constant matrix M, and nu, `velocity_body`, in Kirchhoff's form: (11).
 
@@ -40,7 +38,6 @@ def coriolis(mass: Array, velocity_body: Array) -> Array:
     return C
 
 
-@compiled
 def damping(linear: Array, quadratic: Array, velocity_body: Array) -> Array:
     """Return the diagonal of D(nu), shape (6,) [N s/m, N m s/rad]: (11), of nu, `velocity_body`, in SI units.
 

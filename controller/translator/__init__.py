@@ -2,7 +2,9 @@
 
 `laws` gives the C of a law, with its numbers from `static_data`. `program` translates functions with all that they
 call into one C99 file without heap, `functions` one of them; `statements`, `expressions`, `subscripts` and `calls` are
-the constructs, `operands` and `types` what they are made of; `arguments` makes words of arrays and tuples.
+the constructs, `operands` and `types` what they are made of; `arguments` makes words of arrays and tuples,
+`foreign` calls C by address, `generated` defines functions
+of a text.
 
-Imports: jit, regions.
+Imports: regions.
 """

@@ -10,9 +10,11 @@ from typing import Any
 
 import numpy as np
 
+from controller.stack_array import zeros
+from controller.translator.foreign import POINTER, call_c
 from controller.translator.operands import Known, Operand, Value, bracketed
 from controller.translator.subscripts import Subscripts
-from controller.translator.types import BOOL, DOUBLE, INT, UINT, name_of, unified
+from controller.translator.types import BOOL, DOUBLE, INT, UINT, Array, name_of, unified
 
 _MATH = {
     "sqrt": "sqrt", "cos": "cos", "sin": "sin", "acos": "acos", "atan2": "atan2", "hypot": "hypot",
@@ -34,13 +36,11 @@ class Calls(Subscripts):
         function = called.value
         if node.keywords and not hasattr(function, "_fields"):
             self.fail(node, "an argument by its name")
-        if getattr(function, "__name__", "") == "call" and "jit" in getattr(function, "__module__", ""):
-            _, target, arguments = self.in_order(node.args)
-            assert isinstance(target, Known)
-            return self.call_translated(_plain(target.value), self.items_of(arguments, node), node)
         operands = self.in_order([*node.args, *(keyword.value for keyword in node.keywords)])
         name = getattr(function, "__name__", "")
-        if name == "zeros" and "stack_array" in function.__module__:
+        if function is call_c:
+            return self._foreign(operands, node)
+        if function is zeros:
             shape = [operand.value for operand in operands if isinstance(operand, Known)]
             if len(shape) != len(operands):
                 self.fail(node, "zeros of a shape that is not written as numbers")
@@ -60,10 +60,18 @@ class Calls(Subscripts):
             return Value(kind, self.converted(value, kind))
         if _is_of(function, _MODULES) or isinstance(function, np.ufunc):
             return self._of_math(name, operands, node)
-        function = _plain(function)
         if isinstance(function, python_types.FunctionType):
             return self.call_translated(function, operands, node)
         return self.fail(node, f"a call of {name or function!r}")
+
+    def _foreign(self, operands: Sequence[Operand], node: ast.AST) -> Value:
+        address, kinds, *given = operands
+        if not isinstance(kinds, Known) or len(kinds.value) != len(given):
+            self.fail(node, "a call of C whose kinds are no constant, one for each argument")
+        values = [self.value(operand, node) for operand in given]
+        codes = [_as_kind(value, kind) for value, kind in zip(values, kinds.value, strict=True)]
+        function = f"(int (*)({', '.join(kinds.value)}))(intptr_t)"
+        return self.temporary(INT, f"({function}{self.scalar(address, node).code})({', '.join(codes)})")
 
     def _of_math(self, name: str, operands: Sequence[Operand], node: ast.AST) -> Value:
         codes = [self.converted(self.scalar(operand, node), DOUBLE) for operand in operands]
@@ -87,9 +95,11 @@ class Calls(Subscripts):
         return Value(kind, code)
 
 
-def _plain(function: Any) -> Any:
-    """Return the function as it is written, of a compiled one."""
-    return getattr(function, "py_func", function)
+def _as_kind(value: Value, kind: str) -> str:
+    """Return the code of an argument of a C function."""
+    if isinstance(value.type, Array):
+        return f"({value.code}).data"
+    return f"({kind}){'(intptr_t)' if kind == POINTER else ''}{bracketed(value)}"
 
 
 def _is_of(function: Any, modules: Sequence[Any]) -> bool:

@@ -57,7 +57,7 @@ def translate_law(law: CompiledLaw, goal: PackedRegions, regions: PackedRegions,
         raise LawError(f"{goal.kinds.size} goals and {n} regions, expected 1 and the {law.n_regions} of the law")
     health = np.ones(law.n_forces if law.output == "thrusters" else 0)
     state = VehicleState(np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]), np.zeros(6), health)
-    arguments = (state, goal, regions, np.ones(n), law.gains, law.plain_memory, np.zeros(law.n_forces))
+    arguments = (state, goal, regions, np.ones(n), law.gains, law.memory, np.zeros(law.n_forces))
     program = Program()
     program.export(name, type(law).function, tuple(map(type_of, arguments)))
     return f"{program.text()}\n{static_data(program, name, arguments)}"

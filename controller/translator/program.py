@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from types import FunctionType
-from typing import Any
 
 from controller.errors import TranslationError
 from controller.translator.functions import Function
@@ -56,15 +55,15 @@ class Program:
         self._definitions: list[tuple[str, str]] = []  # helpers by their names; types by none
         self._exports: list[str] = []
 
-    def export(self, name: str, function: Any, arguments: tuple[Type, ...]) -> None:
+    def export(self, name: str, function: FunctionType, arguments: tuple[Type, ...]) -> None:
         """Translate a function, and let it be called by a name, with its arguments as words.
 
         Parameters
         ----------
         name : str
             In C, of ``void name(const void *words)``.
-        function : callable
-            Plain, or compiled; it returns nothing.
+        function : function
+            Plain Python; it returns nothing.
         arguments : tuple of Type
             That it is called with.
 
@@ -74,7 +73,7 @@ class Program:
             If it, or what it calls, is beyond the subset; with file and line.
         """
         self._reserved.add(name)
-        called, _ = self.instance(getattr(function, "py_func", function), arguments)
+        called, _ = self.instance(function, arguments)
         fields = "".join(f"    {self.name(kind)} a{i};\n" for i, kind in enumerate(arguments))
         given = ", ".join(f"{'&' if isinstance(kind, Record) else ''}w->a{i}" for i, kind in enumerate(arguments))
         self._exports.append(
@@ -166,14 +165,15 @@ def _helpers_of(kind: Array) -> Iterator[tuple[str, str]]:
     if not kind.contiguous:
         return
     name, item = kind.c, kind.item.c
-    if kind.ndim == 1:
-        yield (
-            f"{name}_slice",
-            f"static inline {name} {name}_slice({name} a, int64_t from, int64_t to)\n{{\n"
-            "    from = from < 0 ? max_i64(from + a.n0, 0) : min_i64(from, a.n0);\n"
-            "    to = to < 0 ? max_i64(to + a.n0, 0) : min_i64(to, a.n0);\n"
-            f"    return ({name}){{a.data + from, max_i64(to - from, 0)}};\n}}\n",
-        )
+    row = "".join(f" * a.n{i}" for i in range(1, kind.ndim))
+    rest = "".join(f", a.n{i}" for i in range(1, kind.ndim))
+    yield (
+        f"{name}_slice",
+        f"static inline {name} {name}_slice({name} a, int64_t from, int64_t to)\n{{\n"
+        "    from = from < 0 ? max_i64(from + a.n0, 0) : min_i64(from, a.n0);\n"
+        "    to = to < 0 ? max_i64(to + a.n0, 0) : min_i64(to, a.n0);\n"
+        f"    return ({name}){{a.data + from{row}, max_i64(to - from, 0){rest}}};\n}}\n",
+    )
     total = " * ".join(f"a.n{i}" for i in range(kind.ndim))
     loop = f"    const int64_t n = {total};\n    for (int64_t i = 0; i < n; i++)\n        a.data[i] = "
     yield f"{name}_fill", f"static inline void {name}_fill({name} a, {item} x)\n{{\n{loop}x;\n}}\n"

@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 
-from controller.jit.function_pointer import Address
 from controller.translator.operands import number
 from controller.translator.program import Program
 from controller.translator.types import type_of
@@ -42,8 +41,7 @@ def static_data(program: Program, name: str, arguments: tuple[Any, ...]) -> str:
 def _value(program: Program, path: str, value: Any, arrays: list[str]) -> str:
     if isinstance(value, tuple):
         keys = getattr(value, "_fields", range(len(value)))
-        stay = [0 if _is_address(value, key) else item for key, item in zip(keys, value, strict=True)]
-        items = [_value(program, f"{path}_{key}", item, arrays) for key, item in zip(keys, stay, strict=True)]
+        items = [_value(program, f"{path}_{key}", item, arrays) for key, item in zip(keys, value, strict=True)]
         return f"{{{', '.join(items)}}}"
     kind = type_of(value)
     if isinstance(value, np.ndarray):
@@ -56,11 +54,6 @@ def _value(program: Program, path: str, value: Any, arrays: list[str]) -> str:
         return f"{{{path}, {sizes}}}"
     return _number(value)
 
-
-def _is_address(value: tuple[Any, ...], key: Any) -> bool:
-    """Return whether a field is the address of compiled code, which C calls by its name."""
-    hint = getattr(type(value), "__annotations__", {}).get(key)
-    return hint is Address or getattr(hint, "__forward_arg__", "") == Address.__name__
 
 
 def _number(x: Any) -> str:

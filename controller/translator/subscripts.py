@@ -49,7 +49,7 @@ class Subscripts(Expressions):
         assert isinstance(kind, Array)
         if len(places) > kind.ndim:
             self.fail(node, f"{len(places)} indices of {name_of(kind)}")
-        if isinstance(places[0], ast.Slice) and len(places) == 1 and kind.ndim == 1:
+        if isinstance(places[0], ast.Slice) and len(places) == 1 and (kind.contiguous or kind.ndim == 1):
             return self._sliced(array, places[0])
         if all(isinstance(place, ast.Slice) for place in places) and all(map(_is_whole, places)):
             return array

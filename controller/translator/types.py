@@ -16,8 +16,9 @@ class Scalar:
 
 
 DOUBLE, INT, UINT, BOOL = Scalar("double"), Scalar("int64_t"), Scalar("uint64_t"), Scalar("bool")
-_ITEMS = {"float64": DOUBLE, "int64": INT, "uint64": UINT, "bool": BOOL}
-_SHORT = {DOUBLE: "f64", INT: "i64", UINT: "u64", BOOL: "b8"}
+REFERENCE = Scalar("uint32_t")  # of a variable of an FMU
+_ITEMS = {"float64": DOUBLE, "int64": INT, "uint64": UINT, "uint32": REFERENCE, "bool": BOOL}
+_SHORT = {DOUBLE: "f64", INT: "i64", UINT: "u64", REFERENCE: "u32", BOOL: "b8"}
 
 
 @dataclass(frozen=True)
@@ -78,7 +79,7 @@ def type_of(value: Any) -> Type:
     Parameters
     ----------
     value : object
-        A number, a C-contiguous array of float64, int64, uint64 or bool, or a tuple of such.
+        A number, a C-contiguous array of float64, int64, uint64, uint32 or bool, or a tuple of such.
 
     Raises
     ------

@@ -1,111 +1,50 @@
-"""How compiled code calls C functions by address: those of an FMI 3.0 FMU, and the clock.
-
-Addresses come as integers in arguments: captured ctypes objects would defeat Numba's cache on disk.
-"""
+"""How the fused loop calls C functions by address: those of an FMI 3.0 FMU, the law, and the clock."""
 
 from __future__ import annotations
 
 import ctypes
 import sys
-from typing import Any
 
 import numpy as np
-from llvmlite import ir
-from numba import types
-from numba.core import cgutils
-from numba.extending import intrinsic
 from numpy.typing import NDArray
 
-from controller.jit.jit import jit_noalloc
+from controller.translator.foreign import BOOL, DOUBLE, INT, POINTER, SIZE, call_c
 from plant_fmu.running.native import Native
 
 _WARNING = 1  # the highest status that is no failure
 _ENDED = 1  # place among the results of fmi3DoStep of terminateSimulation
 
-_I32, _I64, _F64 = ir.IntType(32), ir.IntType(64), ir.DoubleType()
+# arguments of the C functions
+_TRANSFER = (POINTER, POINTER, SIZE, POINTER, SIZE)  # fmi3SetFloat64, fmi3GetFloat64
+_DO_STEP = (POINTER, DOUBLE, DOUBLE, BOOL, POINTER, POINTER, POINTER, POINTER)  # fmi3DoStep
+_CLOCK_GETTIME, _QUERY_COUNTER = (INT, POINTER), (POINTER,)
 
 
-def _call(builder: Any, address: Any, result: Any, arguments: list[Any]) -> Any:
-    function = ir.FunctionType(result, [a.type for a in arguments])
-    return builder.call(builder.inttoptr(address, function.as_pointer()), arguments)
-
-
-def _transfer_code(_context: Any, _address: Any, _instance: Any, _references: Any, _n: Any, _values: Any) -> Any:
-    """Call fmi3SetFloat64 or fmi3GetFloat64: (instance, references, n, values, n), all pointers as integers."""
-
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        address, instance, references, n, values = arguments
-        return _call(builder, address, _I32, [instance, references, n, values, n])
-
-    return types.int32(*[types.int64] * 5), generate
-
-
-def _do_step_code(_context: Any, _address: Any, _instance: Any, _now: Any, _step: Any, _results: Any) -> Any:
-    """Call fmi3DoStep: (instance, now, step, no state before it is restored, four results by pointer).
-
-    The Boolean goes as a whole int, which every calling convention reads a C bool out of; the results, three of them
-    Booleans of one byte, go to places of eight bytes each.
-    """
-
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        address, instance, now, step, results = arguments
-        places = [builder.add(results, ir.Constant(_I64, 8 * i)) for i in range(4)]
-        return _call(builder, address, _I32, [instance, now, step, ir.Constant(_I32, 1), *places])
-
-    return types.int32(types.int64, types.int64, types.float64, types.float64, types.int64), generate
-
-
-def _read_clock_code(_context: Any, _address: Any, _which: Any, _place: Any) -> Any:
-    """Call clock_gettime(which, place), or QueryPerformanceCounter(place) where `which` is negative."""
-
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        address, which, place = arguments
-        allocate: Any = cgutils.alloca_once
-        status = allocate(builder, _I32)
-        negative = builder.icmp_signed("<", which, ir.Constant(_I64, 0))
-        with builder.if_else(negative) as (windows, posix):
-            with windows:
-                builder.store(_call(builder, address, _I32, [place]), status)
-            with posix:
-                number = builder.trunc(which, _I32)
-                builder.store(_call(builder, address, _I32, [number, place]), status)
-        return builder.load(status)
-
-    return types.int32(types.int64, types.int64, types.int64), generate
-
-
-_transfer: Any = intrinsic(_transfer_code)
-_do_step: Any = intrinsic(_do_step_code)
-_read_clock: Any = intrinsic(_read_clock_code)
-
-
-@jit_noalloc
 def fmi_set(native: Native) -> bool:
     """Send the inputs, and return whether the FMU took them."""
-    n = native.inputs.size
-    references, values = native.input_references.ctypes.data, native.inputs.ctypes.data
-    status: int = _transfer(native.set_values, native.instance, references, n, values)
-    return status <= _WARNING
+    references, values, n = native.input_references, native.inputs, native.inputs.size
+    return call_c(native.set_values, _TRANSFER, native.instance, references, n, values, n) <= _WARNING
 
 
-@jit_noalloc
 def fmi_get(native: Native) -> bool:
     """Read the outputs, and return whether the FMU gave them."""
-    n = native.outputs.size
-    references, values = native.output_references.ctypes.data, native.outputs.ctypes.data
-    status: int = _transfer(native.get_values, native.instance, references, n, values)
-    return status <= _WARNING
+    references, values, n = native.output_references, native.outputs, native.outputs.size
+    return call_c(native.get_values, _TRANSFER, native.instance, references, n, values, n) <= _WARNING
 
 
-@jit_noalloc
 def fmi_do_step(native: Native, now: float, step: float) -> bool:
-    """Step from `now` [s] by `step` [s], and return whether the FMU did, and does not ask to end the simulation."""
-    status: int = _do_step(native.do_step, native.instance, now, step, native.results.ctypes.data)
-    return status <= _WARNING and native.results[_ENDED] == 0
+    """Step from `now` [s] by `step` [s], and return whether the FMU did, and does not ask to end the simulation.
+
+    What it returns by pointer, three of them Booleans of one byte, goes to places of eight bytes each. No state before
+    the step will be restored.
+    """
+    out = native.results
+    status = call_c(native.do_step, _DO_STEP, native.instance, now, step, True, out, out[1:], out[2:], out[3:])
+    return status <= _WARNING and out[_ENDED] == 0
 
 
 class Clock:
-    """A monotonic clock that compiled code can read.
+    """A monotonic clock that C can read.
 
     Attributes
     ----------
@@ -126,11 +65,10 @@ class Clock:
         self.numbers = np.array([address, which, ticks], dtype=np.int64)
 
 
-@jit_noalloc
 def seconds(clock: NDArray[np.int64], workspace: NDArray[np.int64]) -> float:
     """Return the time [s] of a `Clock`'s numbers; `workspace`, shape (2,), is what the C function fills."""
-    _read_clock(clock[0], clock[1], workspace.ctypes.data)
-    whole, rest = float(workspace[0]), float(workspace[1])
     if clock[1] < 0:
-        return whole / float(clock[2])
-    return whole + 1e-9 * rest
+        call_c(clock[0], _QUERY_COUNTER, workspace)
+        return workspace[0] / clock[2]
+    call_c(clock[0], _CLOCK_GETTIME, clock[1], workspace)
+    return workspace[0] + 1e-9 * workspace[1]

@@ -10,7 +10,15 @@ from numpy.typing import NDArray
 
 from controller.allocation import Allocation
 from controller.regions import pack
-from cosim.batch.fused_loop import OUTPUTS, Allocator, Array, FlightConfig, FlightMetrics, fused_loop_of, make_workspace
+from cosim.batch.fused_loop import (
+    OUTPUTS,
+    Allocator,
+    Array,
+    FlightConfig,
+    FlightMetrics,
+    fly_law,
+    make_workspace,
+)
 from cosim.batch.outcome import OUTCOME, Flown, nothing
 from cosim.batch.variation import Variation
 from cosim.errors import RunError, ScenarioError
@@ -59,7 +67,6 @@ class FusedFlyer:
             if key in variation.keys:
                 raise RunError(f"{key} varies, expected {expected!r} for flights without a record")
         require_builtin_law(base)
-        self._flight = fused_loop_of(base.law.name)
         self._plant = Plant(base.vehicle)
 
     def fly(self, values: Array, seeds: NDArray[np.int64]) -> Flown:
@@ -122,13 +129,11 @@ class FusedFlyer:
         effectiveness = plant.native(names, ())
         effectiveness.inputs[:] = [plant[name] for name in names] if scenario.failures else 1.0
         setup = _setup(scenario, n if through else 0)
-        allocator, estimate = _allocator(scenario, setup) if through else _NONE, np.zeros(4)
+        allocator = _allocator(scenario, setup) if through else _NONE
         decisions = -(-scenario.steps // scenario.control_every)
         rows = np.zeros((decisions, 20 + len(inputs) + law.report.size) if trace else (0, 0))
         workspace = make_workspace(len(scenario.regions), len(inputs), n)
-        metrics = self._flight(
-            setup, native, effectiveness, allocator, law.gains, law.memory, workspace, estimate, rows
-        )
+        metrics, estimate = fly_law(setup, native, effectiveness, allocator, law, workspace, rows)
         return _outcome(metrics, setup, native, estimate), rows
 
     def close(self) -> None:

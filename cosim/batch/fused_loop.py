@@ -1,4 +1,4 @@
-"""The fused loop: a flight from start to end in compiled code, stepping the FMU through its C functions.
+"""The fused loop: a flight from start to end as C, stepping the FMU through its functions.
 
 The stages are those of `cosim.simulation.master`, by the same functions: measure, regions, arbiter, law, allocation,
 FMU; then the marks that the flight gets, of the true motion at every plant step.
@@ -6,39 +6,28 @@ FMU; then the marks that the flight gets, of the true motion at every plant step
 
 from __future__ import annotations
 
-import functools
 import math
-import types
-from collections.abc import Callable
-from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
-import plant_fmu
-from controller import LAWS, CompiledLaw, VehicleState
+from controller import CompiledLaw, VehicleState
 from controller.allocation import allocate
-from controller.jit.jit import compiled, jit_noalloc
-from controller.laws import ismail_dunnigan
+from controller.compiling.function import BoundCall
 from controller.regions import Sphere
 from controller.regions.kinds import FIRST_OF_ATTITUDE
 from controller.regions.region_set import PackedRegions, clearance_of_pose, clearance_of_sphere
+from controller.translator.foreign import POINTER, call_c
 from cosim.batch.c_calls import fmi_do_step, fmi_get, fmi_set, seconds
-from cosim.simulation.memberships import SOURCES, compute_memberships
-from fuzzy_arbiter import Arbiter
+from cosim.simulation.closed_arbiter import weigh
+from cosim.simulation.memberships import compute_memberships
 from plant_fmu.running.native import Native
 
 Array = NDArray[np.float64]
 
-# the folders of what the compiled loop is made of beside this one and that of the laws
-_FOREIGN = (*SOURCES, Path(plant_fmu.__file__).parent / "running")
-
-_weigh: Any = numba.njit(_nrt=False)(Arbiter().compiled().py_func)  # type: ignore[call-overload]
-_step: Any = ismail_dunnigan.step  # of a law; `fused_loop_of` puts others in its place
-_is_wrench = True
 _SPHERE, _ATTITUDE = Sphere.kind, FIRST_OF_ATTITUDE
+_LAW = (POINTER,)  # what a law's function is given
 
 
 class FlightConfig(NamedTuple):
@@ -72,6 +61,16 @@ class Allocator(NamedTuple):
     lower: Array  # (stages, m)
     upper: Array  # (stages, m)
     direction: bool
+
+
+class BoundLaw(NamedTuple):
+    """A law as the loop calls it: a function of C, with its arguments, of which some are the loop's own."""
+
+    address: int
+    words: int
+    is_wrench: bool  # what it gives; the forces of the thrusters otherwise
+    estimate: Array  # (4,) in its memory
+    report: Array  # (r,) likewise
 
 
 class Workspace(NamedTuple):
@@ -129,6 +128,15 @@ class FlightMetrics(NamedTuple):
     failed_step: float  # that the FMU refused
 
 
+class Outputs(NamedTuple):
+    """What a flight fills."""
+
+    metrics: Array  # (13,) in the order of `FlightMetrics`
+    estimate: Array  # (4,) that the last decision rests on
+    trace: Array  # (control steps, 20 + i + r), or (0, 0) if none is kept; a row: time, true position, quaternion and
+    # velocity, position as measured, the weights of the three criteria, the i inputs, the law's r reports
+
+
 OUTPUTS = (
     *(f"position.{axis}" for axis in "xyz"),
     *(f"quaternion.e{i}" for i in range(4)),
@@ -136,18 +144,16 @@ OUTPUTS = (
 )
 
 
-def _fly(  # noqa: C901 - one loop, as a whole
+def fly(  # noqa: C901 - one loop, as a whole
     setup: FlightConfig,
     native: Native,
     effectiveness: Native,
     allocator: Allocator,
-    gains: Any,
-    memory: Any,
+    law: BoundLaw,
     workspace: Workspace,
-    estimate: Array,
-    trace: Array,
-) -> tuple[float, ...]:
-    """Fly by the law whose compiled function stands in the place of the global `_step`.
+    out: Outputs,
+) -> None:
+    """Fly from start to end.
 
     Parameters
     ----------
@@ -160,21 +166,13 @@ def _fly(  # noqa: C901 - one loop, as a whole
         The same plant: inputs are the thrusters' effectivenesses, as they are before anything fails.
     allocator : Allocator
         For a wrench that thrusters carry.
-    gains, memory : NamedTuple
-        The law's.
-    room : Workspace
+    law : BoundLaw
+        Bound to the workspace's state and weights, to goal and regions of the setup, and to the plant's inputs as its
+        forces; to the workspace's wrench if thrusters carry that.
+    workspace : Workspace
         Of `make_workspace`, anew for each flight.
-    estimate : ndarray, shape (4,)
-        Receives the estimate that the last decision rests on.
-    trace : ndarray, shape (control steps, 20 + i + r) or (0, 0)
-        Receives a row for each control step: time, true position, quaternion and velocity, position as measured, the
-        weights of the three criteria, the i inputs, the law's r reports.
-
-    Returns
-    -------
-    tuple
-        The fields of `FlightMetrics`, of the whole flight, or up to where the FMU failed. Numba would call Python to
-        make a named tuple, and crash where that raises, as after Ctrl-C in mid-flight.
+    out : Outputs
+        Of the whole flight, or up to where the FMU failed.
     """
     m, n, inputs = setup.thrusters, setup.regions.kinds.size, native.inputs
     state, weights, clearances, seen = workspace.state, workspace.weights, workspace.clearances, workspace.seen
@@ -224,7 +222,7 @@ def _fly(  # noqa: C901 - one loop, as a whole
         controls = k % setup.control_every == 0
         if controls:
             for i in range(4):
-                estimate[i] = memory.estimate[i]
+                out.estimate[i] = law.estimate[i]
         if k == setup.steps or refused >= 0:
             break
         # measure
@@ -238,22 +236,20 @@ def _fly(  # noqa: C901 - one loop, as a whole
                 _clearances(setup.regions, state.position, state.quaternion, seen, workspace.at)
                 told_clearances = seen
             compute_memberships(told_clearances, setup.criteria, setup.ramp, memberships)
-            _weigh(memberships, by_criterion)
+            weigh(memberships, by_criterion)
             for i in range(n):
                 weights[i] = by_criterion[setup.criteria[i]]
         # law and allocation
         if controls:
             started = seconds(setup.clock, workspace.ticks) if timed else 0.0
-            if m == 0 or not _is_wrench:
-                _step(state, setup.goal, setup.regions, weights, gains, memory, inputs)
-            else:
-                _step(state, setup.goal, setup.regions, weights, gains, memory, workspace.wrench)
+            call_c(law.address, _LAW, law.words)
+            if m > 0 and law.is_wrench:
                 lower, upper = allocator.lower[known_failures], allocator.upper[known_failures]
                 allocate(allocator.inverse[known_failures], lower, upper, allocator.direction, workspace.wrench, inputs)
             if timed:
                 worst = max(worst, seconds(setup.clock, workspace.ticks) - started)
-            if trace.shape[0]:
-                _trace(trace[k // setup.control_every], now, native, state.position, by_criterion, memory.report)
+            if out.trace.shape[0]:
+                _trace(out.trace[k // setup.control_every], now, native, state.position, by_criterion, law.report)
             for j in range(inputs.size):
                 variation += abs(inputs[j] - workspace.before[j])
                 workspace.before[j] = inputs[j]
@@ -270,13 +266,13 @@ def _fly(  # noqa: C901 - one loop, as a whole
         force = math.sqrt(x * x + y * y + z * z)
         effort += force * setup.step
         max_force = max(max_force, force)
-    return (
-        first_inside, last_entered, inside, least, least_angle, most, effort, thrust_effort, variation,
-        max_force, max_speed, worst, refused,
-    )  # fmt: skip
+    metrics = out.metrics
+    metrics[0], metrics[1], metrics[2] = first_inside, last_entered, inside
+    metrics[3], metrics[4], metrics[5] = least, least_angle, most
+    metrics[6], metrics[7], metrics[8] = effort, thrust_effort, variation
+    metrics[9], metrics[10], metrics[11], metrics[12] = max_force, max_speed, worst, refused
 
 
-@jit_noalloc
 def _measure(setup: FlightConfig, k: int, now: float, true_state: Array, state: VehicleState) -> None:
     """Write what is told at plant step `k` as `sensing.Sensor` does."""
     for i in range(4):
@@ -296,12 +292,10 @@ def _measure(setup: FlightConfig, k: int, now: float, true_state: Array, state: 
             state.velocity_body[i] += setup.noise[control, 3 + i]
 
 
-@jit_noalloc
 def _is_finite(position: Array) -> bool:
     return math.isfinite(position[0]) and math.isfinite(position[1]) and math.isfinite(position[2])
 
 
-@jit_noalloc
 def _move(setup: FlightConfig, now: float) -> None:
     """Put all regions where they are at a time [s]."""
     for regions in (setup.goal, setup.regions):
@@ -310,7 +304,6 @@ def _move(setup: FlightConfig, now: float) -> None:
                 regions.shifts[i, axis] = regions.velocities[i, axis] * now
 
 
-@jit_noalloc
 def _clearances(
     regions: PackedRegions, position: Array, quaternion: Array, clearances: Array, workspace: Array
 ) -> None:
@@ -322,13 +315,11 @@ def _clearances(
             clearances[i] = clearance_of_pose(regions, i, position, quaternion, workspace)
 
 
-@jit_noalloc
 def _least(clearance: float, least: float) -> float:
     """Return the lesser of two numbers; what is no number stays."""
     return clearance if clearance < least or np.isnan(clearance) else least
 
 
-@compiled
 def _trace(row: Array, now: float, native: Native, position: Array, weights: Array, report: Array) -> None:
     m = native.inputs.size
     row[0] = now
@@ -339,35 +330,42 @@ def _trace(row: Array, now: float, native: Native, position: Array, weights: Arr
     row[20 + m :] = report
 
 
-def fused_loop_of(law: str) -> Callable[..., FlightMetrics]:
-    """Return the loop of `_fly` compiled for a law.
-
-    Numba keeps nothing on disk of a function that is given another one, or closes over it. So each law has a copy of
-    the loop with its own function among the globals, under a name of its own.
+def fly_law(
+    setup: FlightConfig,
+    native: Native,
+    effectiveness: Native,
+    allocator: Allocator,
+    law: CompiledLaw,
+    workspace: Workspace,
+    trace: Array,
+) -> tuple[FlightMetrics, Array]:
+    """Fly by a law, compiled, as `fly` says.
 
     Parameters
     ----------
-    law : str
-        One of those in `controller.LAWS`.
+    setup, native, effectiveness, allocator, workspace
+        As for `fly`.
+    law : CompiledLaw
+        Anew for each flight.
+    trace : ndarray
+        As of `Outputs`.
 
     Returns
     -------
-    callable
-        ``(setup, native, effectiveness, allocator, gains, memory, workspace, estimate, trace) -> FlightMetrics``.
+    FlightMetrics, ndarray, shape (4,)
+        What it came to, and the estimate at its end.
+
+    Raises
+    ------
+    CompilationError
+        If the loop or the law is to be compiled, and there is no compiler.
     """
-    chosen: Any = LAWS[law]
-    loop = _compiled(law, chosen)
-    return lambda *arguments: FlightMetrics(*loop(*arguments))
-
-
-@functools.cache
-def _compiled(name: str, law: type[CompiledLaw]) -> Callable[..., tuple[Any, ...]]:
-    return jit_noalloc(_plain(name, law), *_FOREIGN)
-
-
-def _plain(name: str, law: type[CompiledLaw]) -> Callable[..., tuple[Any, ...]]:
-    """Return the loop for a law, left to Python."""
-    names = globals() | {"_step": law.function, "_is_wrench": law.output == "wrench"}
-    copy = types.FunctionType(_fly.__code__, names, f"_fly_{name}")
-    copy.__qualname__ = copy.__name__
-    return copy
+    is_wrench = law.output == "wrench"
+    forces = workspace.wrench if setup.thrusters and is_wrench else native.inputs
+    decide = law.bound(workspace.state, setup.goal, setup.regions, workspace.weights, forces)
+    bound = BoundLaw(decide.address, decide.words, is_wrench, law.estimate, law.report)
+    out = Outputs(np.zeros(len(FlightMetrics._fields)), np.zeros(4), trace)
+    BoundCall(fly, (setup, native, effectiveness, allocator, bound, workspace, out)).call()
+    decide.raise_error()
+    metrics = FlightMetrics(*out.metrics.tolist())
+    return metrics._replace(inside=bool(metrics.inside)), out.estimate

@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from controller.jit.bound_call import BoundCall
-from controller.jit.jit import jit_noalloc
-from cosim.simulation.memberships import SOURCES, compute_memberships
+from controller.compiling.function import CompiledFunction
+from cosim.simulation.memberships import compute_memberships
 from cosim.simulation.signals import Array
 from fuzzy_arbiter import Arbiter
 
@@ -50,7 +49,7 @@ class Arbitration:
         self._arbiter, self._clearances, self._criteria = arbiter, clearances, criteria
         self._memberships, self._weights = memberships, weights
         self._computed: Array = np.zeros(memberships.size)
-        self._compute = BoundCall(_compute)
+        self._compute = CompiledFunction(compute_memberships)
         self._weighed: list[float] | None = None  # memberships that the weights are of
 
     def decide(self) -> None:
@@ -78,10 +77,3 @@ class Arbitration:
     def _weigh(self, memberships: list[float]) -> None:
         self._weights[:] = self._arbiter(memberships)
         self.region_weights[:] = self._weights[self._criteria]
-
-
-def _compute(clearances: Array, criteria: NDArray[np.int64], width: float, memberships: Array) -> None:
-    compute_memberships(clearances, criteria, width, memberships)
-
-
-_compute = jit_noalloc(_compute, *SOURCES)

@@ -10,8 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from controller import VehicleState
-from controller.jit.bound_call import BoundCall
-from controller.jit.jit import jit_noalloc
+from controller.compiling.function import CompiledFunction
 from controller.regions import Sphere, pack
 from controller.regions.region_set import PackedRegions, evaluate_packed
 from controller.regions.shape import Shape
@@ -81,7 +80,7 @@ class RegionEnvironment:
         self._seen = [i for i, region in enumerate(scenario.regions) if region.is_dynamic]
         # m, NED: where each would have been at time 0, had it always moved as it does now
         self._origins: Array = np.zeros((len(secondary), 3))
-        self._evaluate_places = BoundCall(_evaluate)
+        self._evaluate_places = CompiledFunction(evaluate_places)
 
     @property
     def goal(self) -> PackedRegions:
@@ -274,14 +273,11 @@ class RegionEnvironment:
         regions.numbers[regions.offsets[i] : regions.offsets[i + 1]] = shape.packed()
 
 
-def _evaluate(places: _Places, state: VehicleState, found: RegionEvaluation) -> None:
+def evaluate_places(places: _Places, state: VehicleState, found: RegionEvaluation) -> None:
     """Evaluate the goal into the first places, and the regions into those behind, in one call."""
     p, e, g, c = state.position, state.quaternion, found.values, found.clearances
     evaluate_packed(places.goal, p, e, g[:1], found.gradients[:1], found.rotation_gradients[:1], c[:1])
     evaluate_packed(places.regions, p, e, g[1:], found.gradients[1:], found.rotation_gradients[1:], c[1:])
-
-
-_evaluate = jit_noalloc(_evaluate)
 
 
 def shape_center(shape: Shape) -> Vector3:

@@ -2,26 +2,13 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import Any
-
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
-import fuzzy_arbiter
-from controller.jit.jit import inlined
 from cosim.simulation.signals import Array
 from fuzzy_arbiter import ramp
 
-SOURCES = (
-    Path(fuzzy_arbiter.__file__).parent,
-    Path(__file__).parent,
-)  # folders that the code of `compute_memberships` stands in
-_ramp: Any = numba.njit(ramp)
 
-
-@inlined
 def compute_memberships(clearances: Array, criteria: NDArray[np.int64], width: float, memberships: Array) -> None:
     """Write the membership of each criterion, that of its most pressing region.
 
@@ -39,4 +26,4 @@ def compute_memberships(clearances: Array, criteria: NDArray[np.int64], width: f
     for i in range(memberships.size):
         memberships[i] = 0.0
     for i in range(criteria.size):
-        memberships[criteria[i]] = max(memberships[criteria[i]], _ramp(clearances[i], width))
+        memberships[criteria[i]] = max(memberships[criteria[i]], ramp(clearances[i], width))

@@ -16,14 +16,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controller.arithmetic import cosine, length3, square
-from controller.jit.jit import jit_internal
-from controller.jit.stack_array import zeros
 from controller.laws.deployable.gains import DeployableGains
 from controller.laws.deployable.linear_algebra import copy, product
 from controller.laws.deployable.model import Dynamics, Thrusters
 from controller.quaternion import down_parts, error_parts, rate_parts
 from controller.regions.kinds import FIRST_OF_ATTITUDE
 from controller.regions.region_set import PackedRegions, attitude_clearance
+from controller.stack_array import zeros
 
 Array = NDArray[np.float64]
 
@@ -49,7 +48,6 @@ def empty_attitude(preferred: Array) -> Attitude:
     return Attitude(preferred.copy(), preferred.copy(), np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(1))
 
 
-@jit_internal
 def adapt(
     attitude: Attitude,
     dynamics: Dynamics,
@@ -86,7 +84,6 @@ def adapt(
     attitude.started[0] = 1.0
 
 
-@jit_internal
 def update_munk_moment(
     attitude: Attitude, dynamics: Dynamics, R: Array, velocity: Array, water_velocity: Array
 ) -> None:
@@ -103,7 +100,6 @@ def update_munk_moment(
         attitude.munk_moment[i] = relative[b] * momentum[a] - relative[a] * momentum[b]  # -nu_r x (M nu_r)
 
 
-@jit_internal
 def update_desired(
     attitude: Attitude, regions: PackedRegions, position: Array, gains: DeployableGains, period: float
 ) -> None:
@@ -159,14 +155,12 @@ def update_desired(
         integrate_attitude(attitude.desired, omega, period, attitude.desired)
 
 
-@jit_internal
 def _add_scaled(scale: float, values: Array, out: Array) -> None:
     """Add `scale` times the values, shape (3,), to `out`."""
     for axis in range(3):
         out[axis] += scale * values[axis]
 
 
-@jit_internal
 def integrate_attitude(quaternion: Array, omega: Array, period: float, out: Array) -> None:
     """Integrate a body rate [rad/s] over a period [s] into `out`, shape (4,), which may be `quaternion` itself."""
     rate = rate_parts(quaternion, omega)
@@ -177,7 +171,6 @@ def integrate_attitude(quaternion: Array, omega: Array, period: float, out: Arra
         out[i] /= length
 
 
-@jit_internal
 def free_angular_acceleration(
     attitude: Attitude, dynamics: Dynamics, quaternion: Array, omega: Array, out: Array
 ) -> None:
@@ -198,7 +191,6 @@ def free_angular_acceleration(
             out[i] += dynamics.inverse_mass[3 + i, 3 + j] * moments[j]
 
 
-@jit_internal
 def compute_moment(
     attitude: Attitude, dynamics: Dynamics, quaternion: Array, omega: Array, gains: DeployableGains, out: Array
 ) -> None:

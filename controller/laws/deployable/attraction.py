@@ -6,11 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controller.arithmetic import length3, square
-from controller.jit.jit import jit_internal
-from controller.jit.stack_array import zeros
 from controller.laws.deployable.gains import DeployableGains
 from controller.laws.deployable.linear_algebra import copy
 from controller.laws.deployable.path_planner import PathPlan
+from controller.stack_array import zeros
 
 Array = NDArray[np.float64]
 
@@ -18,7 +17,6 @@ _AHEAD = 0.4  # m along the path, lookahead distance
 _SLOWEST_CORNER = 0.25  # of the full speed, at a corner of 180 degrees
 
 
-@jit_internal
 def approach_speed(distance: float, deceleration: float, slope: float) -> float:
     """Return the greatest speed [m/s] from which the vehicle can stop within a distance [m].
 
@@ -30,7 +28,6 @@ def approach_speed(distance: float, deceleration: float, slope: float) -> float:
     return float(np.sqrt(2.0 * deceleration * distance + offset * offset)) - offset
 
 
-@jit_internal
 def desired_velocity(plan: PathPlan, position: Array, goal_velocity: Array, gains: DeployableGains, out: Array) -> None:
     """Write the velocity [m/s], NED, shape (3,), that follows the path from a position [m, NED], shape (3,)."""
     count, path = plan.counts[0], plan.path
@@ -62,7 +59,6 @@ def desired_velocity(plan: PathPlan, position: Array, goal_velocity: Array, gain
         out[axis] = goal_velocity[axis] + (speed * heading[axis] / size if size > 1e-9 else 0.0)
 
 
-@jit_internal
 def desired_acceleration(desired: Array, velocity: Array, gains: DeployableGains, out: Array) -> None:
     """Write the acceleration [m/s2], NED, that brings the velocity to the desired one, bounded in length."""
     size = 0.0

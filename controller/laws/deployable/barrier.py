@@ -25,8 +25,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controller.arithmetic import exponential, length3, square
-from controller.jit.jit import jit_internal
-from controller.jit.stack_array import zeros
 from controller.laws.deployable.attitude import integrate_attitude
 from controller.laws.deployable.attraction import approach_speed
 from controller.laws.deployable.faces import FACES, face_ahead, has_faces
@@ -36,6 +34,7 @@ from controller.laws.deployable.quadratic_program import Workspace
 from controller.regions import Box, DepthBand, HalfSpace, Prism
 from controller.regions.kinds import FIRST_OF_ATTITUDE
 from controller.regions.region_set import PackedRegions, evaluate_packed
+from controller.stack_array import zeros
 
 Array = NDArray[np.float64]
 
@@ -83,7 +82,6 @@ def empty_observation(n: int) -> RegionObservation:
     )  # fmt: skip
 
 
-@jit_internal
 def observe_regions(
     observation: RegionObservation, regions: PackedRegions, position: Array, quaternion: Array, velocity: Array
 ) -> None:
@@ -96,15 +94,12 @@ def observe_regions(
         for i in range(r.kinds.size):
             s.later_shifts[i, axis] = r.shifts[i, axis] + _AHEAD * r.velocities[i, axis]
     integrate_attitude(quaternion, velocity[3:], _AHEAD, attitude)
-    moved = PackedRegions(
-        r.kinds, r.signs, r.offsets, r.numbers, s.later_shifts, r.velocities, r.gains, r.hard, r.place, r.pose
-    )
+    moved = PackedRegions(r.kinds, r.signs, r.offsets, r.numbers, s.later_shifts, r.velocities, r.gains, r.hard)
     evaluate_packed(
         moved, place, attitude, s.later_values, s.later_gradients, s.later_rotation_gradients, s.later_clearances
     )
 
 
-@jit_internal
 def pose_gradient(gradients: Array, rotation_gradients: Array, i: int, of_attitude: bool, out: Array) -> bool:
     """Write the gradient of a clearance over the pose, shape (6,); return False where it vanishes.
 
@@ -121,7 +116,6 @@ def pose_gradient(gradients: Array, rotation_gradients: Array, i: int, of_attitu
     return True
 
 
-@jit_internal
 def gradient_rate(kind: int, n: Array, later: Array, velocity: Array) -> float:
     """Return (dn/dt)^T v, from a gradient now and later, (6,) each, along a velocity [m/s, rad/s] against the region.
 
@@ -137,7 +131,6 @@ def gradient_rate(kind: int, n: Array, later: Array, velocity: Array) -> float:
     return turning
 
 
-@jit_internal
 def write_rows(
     work: Workspace,
     observation: RegionObservation,

@@ -12,10 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controller.arithmetic import square
-from controller.jit.jit import inlined, jit_internal
-from controller.jit.stack_array import zeros
 from controller.regions import Ellipsoid, HalfSpace, Sphere
 from controller.regions.region_set import PackedRegions, clearance_of_place, place_clearance
+from controller.stack_array import zeros
 
 Array = NDArray[np.float64]
 
@@ -25,13 +24,11 @@ _LOOKS = 16  # along a line at most
 _HALVINGS = 6  # of the interval in which it leaves the region
 
 
-@jit_internal
 def has_faces(kind: int) -> bool:
     """Return whether the clearance of a kind of region has a kink where two faces are equally near."""
     return kind not in _SMOOTH
 
 
-@jit_internal
 def face_ahead(
     regions: PackedRegions, i: int, position: Array, nearest: Array, velocity: Array, reach: float, face: Array
 ) -> float:
@@ -89,7 +86,6 @@ def face_ahead(
     return distance
 
 
-@inlined
 def _clearance_along(
     regions: PackedRegions, i: int, position: Array, velocity: Array, time: float, point: Array, gradient: Array
 ) -> float:

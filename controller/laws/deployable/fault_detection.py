@@ -23,12 +23,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controller.arithmetic import square
-from controller.jit.jit import jit_internal
-from controller.jit.stack_array import zeros
 from controller.laws.deployable.gains import DeployableGains
 from controller.laws.deployable.linear_algebra import norm
 from controller.laws.deployable.model import Dynamics, Thrusters
 from controller.laws.deployable.observer import Estimate
+from controller.stack_array import zeros
 
 Array = NDArray[np.float64]
 
@@ -55,7 +54,6 @@ def empty_fault_state(m: int) -> FaultState:
     return FaultState(np.zeros(m), np.zeros((m, 3)), np.zeros((m, 3)), np.full(1, -1))
 
 
-@jit_internal
 def detect_fault(
     fault_state: FaultState,
     estimate: Estimate,
@@ -135,7 +133,6 @@ def detect_fault(
     return -1
 
 
-@jit_internal
 def _by_velocity(
     lag: Array,
     effect: Array,
@@ -159,7 +156,6 @@ def _by_velocity(
     return min(max(step, -_MOST_A_STEP), _MOST_A_STEP)
 
 
-@jit_internal
 def _by_moment(
     adapted: Array, effect: Array, force: float, residual: Array, variance: Array, R: Array, adaptation: float
 ) -> float:
@@ -180,7 +176,6 @@ def _by_moment(
     return min(max(step, -_MOST_A_STEP), _MOST_A_STEP)
 
 
-@jit_internal
 def isolate_thruster(fault_state: FaultState, thrusters: Thrusters, failed: int) -> None:
     """Mark a thruster as failed in `health`, and restore the one that was isolated before it.
 

@@ -9,8 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controller.arithmetic import square
-from controller.jit.jit import jit_internal
-from controller.jit.stack_array import zeros
 from controller.law import VehicleState
 from controller.laws.deployable import attitude as attitude_loop
 from controller.laws.deployable import fault_detection, model, observer
@@ -18,6 +16,7 @@ from controller.laws.deployable.gains import DeployableGains
 from controller.laws.deployable.linear_algebra import copy
 from controller.laws.deployable.memory import DeployableMemory
 from controller.quaternion import write_rotation
+from controller.stack_array import zeros
 
 Array = NDArray[np.float64]
 
@@ -25,14 +24,12 @@ _FARTHEST = 1e6  # m, of a plausible position
 _FASTEST = 100.0  # m/s, rad/s
 
 
-@jit_internal
 def sanitize_weights(weights: Array, sanitized: Array) -> None:
     """Write the arbiter's weights, each clipped to [0, 1]; NaN becomes 1, the cautious value."""
     for i in range(weights.size):
         sanitized[i] = 1.0 if np.isnan(weights[i]) else min(max(weights[i], 0.0), 1.0)
 
 
-@jit_internal
 def reports_change(reported: Array, before: Array, health: Array) -> bool:
     """Return whether the reported health differs from the last report, or from the assumed health of a failed thruster.
 
@@ -45,7 +42,6 @@ def reports_change(reported: Array, before: Array, health: Array) -> bool:
     return changed
 
 
-@jit_internal
 def update_thrusters(memory: DeployableMemory, reported: Array, failed: int) -> None:
     """Apply the reported health of the thrusters, and isolate a thruster that was detected as failed, -1 for none."""
     health = memory.thrusters.health
@@ -58,7 +54,6 @@ def update_thrusters(memory: DeployableMemory, reported: Array, failed: int) -> 
     model.reallocate(memory.thrusters)
 
 
-@jit_internal
 def process_measurement(memory: DeployableMemory, state: VehicleState, gains: DeployableGains) -> bool:
     """Propagate the estimate over the last period and correct it; return whether the measurement was accepted."""
     estimate, period = memory.state_estimate, memory.period[0]
@@ -105,7 +100,6 @@ def process_measurement(memory: DeployableMemory, state: VehicleState, gains: De
     return False
 
 
-@jit_internal
 def _is_plausible_attitude(quaternion: Array, velocity_body: Array) -> bool:
     """Return whether a quaternion has length 1 and the rates are plausible."""
     size, fastest = 0.0, 0.0
@@ -116,7 +110,6 @@ def _is_plausible_attitude(quaternion: Array, velocity_body: Array) -> bool:
     return abs(size - 1.0) < 1e-2 and fastest < _FASTEST
 
 
-@jit_internal
 def _propagate_attitude(memory: DeployableMemory) -> None:
     """Propagate attitude and rates over the last period by the model."""
     R, turning, thrust_acceleration, period = zeros(3, 3), zeros(3), zeros(6), memory.period[0]
@@ -129,7 +122,6 @@ def _propagate_attitude(memory: DeployableMemory) -> None:
     attitude_loop.integrate_attitude(memory.quaternion, memory.omega, period, memory.quaternion)
 
 
-@jit_internal
 def _is_plausible_motion(position: Array, velocity: Array) -> bool:
     """Return whether position [m] and velocity [m/s] are finite and plausible."""
     can = True
@@ -138,7 +130,6 @@ def _is_plausible_motion(position: Array, velocity: Array) -> bool:
     return can
 
 
-@jit_internal
 def _reset_estimate(memory: DeployableMemory) -> None:
     """Reset the estimate to its state before the first measurement."""
     estimate = memory.state_estimate

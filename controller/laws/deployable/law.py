@@ -5,15 +5,11 @@ estimate -> fault detection -> path planner -> bounded attraction -> barriers ->
 
 from __future__ import annotations
 
-from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
 
 from controller.arithmetic import length3, square
-from controller.jit.function_pointer import call, pointer_to
-from controller.jit.jit import jit_internal, jit_noalloc
-from controller.jit.stack_array import zeros
 from controller.law import (
     Array,
     CompiledLaw,
@@ -41,15 +37,15 @@ from controller.laws.deployable.faces import FACES
 from controller.laws.deployable.fault_detection import empty_fault_state
 from controller.laws.deployable.gains import DeployableGains, check_gains
 from controller.laws.deployable.linear_algebra import copy
-from controller.laws.deployable.memory import DeployableMemory, Stages
+from controller.laws.deployable.memory import DeployableMemory
 from controller.laws.deployable.model import Dynamics, Thrusters, make_dynamics, make_thrusters
 from controller.laws.deployable.observer import Estimate, empty_estimate
 from controller.laws.deployable.path_planner import empty_plan
 from controller.laws.deployable.quadratic_program import empty_workspace
 from controller.quaternion import write_rotation
-from controller.regions import pack
 from controller.regions.kinds import FIRST_OF_ATTITUDE
 from controller.regions.region_set import PackedRegions
+from controller.stack_array import zeros
 
 _SPREADS = 3.0  # standard deviations of the position that the margin adds
 _STALE = 0.15  # s without a valid measurement, after which the vehicle is brought to a stop
@@ -76,7 +72,6 @@ DIAGNOSTICS = (
 )
 
 
-@jit_noalloc
 def step(
     state: VehicleState,
     goal: PackedRegions,
@@ -93,7 +88,7 @@ def step(
     free_acceleration, wrench, velocity = zeros(6), zeros(6), zeros(6)
 
     # estimate
-    measured = call(memory.stages.process_measurement, input_validation.process_measurement, (memory, state, gains))
+    measured = input_validation.process_measurement(memory, state, gains)
     write_rotation(memory.quaternion, R)
     if (
         estimate.time_since_measurement[0] < 0.0 or estimate.time_since_measurement[0] > gains.coast
@@ -104,21 +99,13 @@ def step(
         return
 
     # fault detection
-    failed = call(
-        memory.stages.detect_fault,
-        fault_detection.detect_fault,
-        (memory.fault_state, estimate, memory.attitude.residual, dynamics, thrusters, R, gains, period, measured),
-    )
+    failed = fault_detection.detect_fault(memory.fault_state, estimate, memory.attitude.residual, dynamics, thrusters, R, gains, period, measured)
     if failed >= 0 or input_validation.reports_change(state.thruster_health, memory.reported, thrusters.health):
         input_validation.update_thrusters(memory, state.thruster_health, failed)
         observer.inflate_covariance(estimate, 0.01)
 
     # path planner, bounded attraction
-    call(
-        memory.stages.improve_path,
-        path_planner.improve_path,
-        (memory.plan, estimate.position, goal, regions, gains, period),
-    )
+    path_planner.improve_path(memory.plan, estimate.position, goal, regions, gains, period)
     if estimate.time_since_measurement[0] <= _STALE:
         desired_velocity(memory.plan, estimate.position, goal.velocities[0], gains, desired)
     desired_acceleration(desired, estimate.velocity, gains, acceleration)
@@ -141,11 +128,7 @@ def step(
         )
     _force_of(dynamics, R, memory.filtered_acceleration, wrench)
     _soft_forces(memory.observation, regions, memory.weights, R, dynamics, wrench)
-    call(
-        memory.stages.update_desired,
-        attitude_loop.update_desired,
-        (memory.attitude, regions, estimate.position, gains, period),
-    )
+    attitude_loop.update_desired(memory.attitude, regions, estimate.position, gains, period)
     attitude_loop.compute_moment(memory.attitude, dynamics, memory.quaternion, memory.omega, gains, wrench[3:])
     work = memory.program
     for j in range(forces.size):
@@ -165,18 +148,10 @@ def step(
         gains.braking_share * _braking(dynamics, thrusters),
         _SPREADS * observer.position_spread(estimate) + 0.5 * gains.acceleration * square(period),
     )
-    rows = call(
-        memory.stages.write_rows,
-        write_rows,
-        (work, memory.observation, regions, memory.weights, motion, thrusters.lower, thrusters.upper, gains),
-    )
+    rows = write_rows(work, memory.observation, regions, memory.weights, motion, thrusters.lower, thrusters.upper, gains)
 
     # quadratic program
-    steps = call(
-        memory.stages.solve,
-        quadratic_program.solve,
-        (work, rows, thrusters.inverse, thrusters.lower, thrusters.upper, forces),
-    )
+    steps = quadratic_program.solve(work, rows, thrusters.inverse, thrusters.lower, thrusters.upper, forces)
     copy(forces, thrusters.forces)
     memory.estimate[0] = estimate.net_weight[0]
     copy(memory.attitude.moments, memory.estimate[1:])
@@ -184,7 +159,6 @@ def step(
     _report_program(memory.report, work.multipliers, work.price, rows, steps)
 
 
-@jit_internal
 def _force_of(dynamics: Dynamics, R: Array, acceleration: Array, out: Array) -> None:
     """Write the body force [N] that gives an acceleration, world frame, into out[:3]."""
     for i in range(3):
@@ -196,7 +170,6 @@ def _force_of(dynamics: Dynamics, R: Array, acceleration: Array, out: Array) -> 
             out[i] += dynamics.mass[i, k] * along
 
 
-@jit_internal
 def _soft_forces(
     observation: RegionObservation, regions: PackedRegions, weights: Array, R: Array, dynamics: Dynamics, wrench: Array
 ) -> None:
@@ -217,7 +190,6 @@ def _soft_forces(
                 wrench[k] -= thruster_acceleration * R[axis, k] * observation.gradients[i, axis] / size
 
 
-@jit_internal
 def _write_thruster_acceleration(
     dynamics: Dynamics, thrusters: Thrusters, R: Array, thruster_acceleration: Array
 ) -> None:
@@ -235,7 +207,6 @@ def _write_thruster_acceleration(
                     thruster_acceleration[axis, j] += R[axis, i] * body
 
 
-@jit_internal
 def _smallest(values: Array) -> float:
     smallest: float = values[0]
     for i in range(values.size):
@@ -243,7 +214,6 @@ def _smallest(values: Array) -> float:
     return smallest
 
 
-@jit_internal
 def _braking(dynamics: Dynamics, thrusters: Thrusters) -> float:
     """Return the deceleration [m/s2] in the worst direction with one thruster lost: the failed one, or any.
 
@@ -257,7 +227,6 @@ def _braking(dynamics: Dynamics, thrusters: Thrusters) -> float:
     return worst
 
 
-@jit_internal
 def _report(report: Array, estimate: Estimate, cost: float, points: int, health: Array, desired: Array) -> None:
     """Write the `DIAGNOSTICS` of estimate, path and thrusters."""
     copy(estimate.position, report[:3])
@@ -273,7 +242,6 @@ def _report(report: Array, estimate: Estimate, cost: float, points: int, health:
     report[15] = estimate.time_since_measurement[0]
 
 
-@jit_internal
 def _report_program(report: Array, multipliers: Array, price: Array, rows: int, steps: int) -> None:
     """Write the `DIAGNOSTICS` of barriers and quadratic program."""
     active, yielding = 0, 0.0
@@ -283,31 +251,6 @@ def _report_program(report: Array, multipliers: Array, price: Array, rows: int, 
             yielding = max(yielding, multipliers[i] * price[i])
     report[11], report[12], report[13] = active, yielding, steps
 
-
-def _stages(memory: DeployableMemory, gains: DeployableGains) -> Stages:
-    """Return the addresses of the stages, for arguments such as a step gives them."""
-    m, n = memory.reported.size, memory.weights.size
-    three, forces, R, regions = np.zeros(3), np.zeros(m), np.zeros((3, 3)), pack([])
-    state, thrusters, estimate = (
-        VehicleState(three, np.zeros(4), np.zeros(6), forces),
-        memory.thrusters,
-        memory.state_estimate,
-    )
-    motion, bounds = (
-        Motion(three, np.zeros(6), np.zeros(6), memory.thruster_acceleration, 0.0, 0.0, 0.0, 0.0),
-        (forces, forces),
-    )
-    reason = (memory.fault_state, estimate, three, memory.dynamics, thrusters, R, gains, 0.0, False)
-    return Stages(
-        process_measurement=pointer_to(input_validation.process_measurement, (memory, state, gains)),
-        detect_fault=pointer_to(fault_detection.detect_fault, reason),
-        improve_path=pointer_to(path_planner.improve_path, (memory.plan, three, regions, regions, gains, 0.0)),
-        update_desired=pointer_to(attitude_loop.update_desired, (memory.attitude, regions, three, gains, 0.0)),
-        write_rows=pointer_to(
-            write_rows, (memory.program, memory.observation, regions, np.zeros(n), motion, *bounds, gains)
-        ),
-        solve=pointer_to(quadratic_program.solve, (memory.program, 0, R, *bounds, forces)),
-    )
 
 
 class DeployableLaw(CompiledLaw):
@@ -348,7 +291,7 @@ class DeployableLaw(CompiledLaw):
         self.gains, self.n_regions = self.validate(gains), n_regions
         desired = validate_quaternion(desired_quaternion)
         self.n_forces = m = vehicle.thruster_matrix.shape[1]
-        self._memory = DeployableMemory(
+        self.memory = DeployableMemory(
             period=np.array([validate_period(period)]),
             estimate=np.zeros(4),
             report=np.zeros(len(DIAGNOSTICS)),
@@ -366,22 +309,7 @@ class DeployableLaw(CompiledLaw):
             reported=np.ones(m),
             filtered_acceleration=np.zeros(3),
             thruster_acceleration=np.zeros((6, m)),
-            stages=Stages(),
         )
-
-    @cached_property
-    def memory(self) -> DeployableMemory:
-        """State between steps, with the addresses of the stages, which are compiled at the first access."""
-        return self._memory._replace(stages=_stages(self._memory, self.gains))
-
-    @property
-    def plain_memory(self) -> DeployableMemory:
-        """Its memory, without the addresses of the stages."""
-        return self._memory
-
-    def __getstate__(self) -> dict[str, Any]:
-        """Return the picklable state, without addresses, which hold in this process alone."""
-        return {name: value for name, value in vars(self).items() if name != "memory"}
 
     @classmethod
     def for_vehicle(

@@ -5,12 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from controller.jit.jit import jit_internal
-
 Array = NDArray[np.float64]
 
 
-@jit_internal
 def product(A: Array, x: Array, out: Array) -> None:
     """Write A x into `out`."""
     for i in range(A.shape[0]):
@@ -20,14 +17,12 @@ def product(A: Array, x: Array, out: Array) -> None:
         out[i] = total
 
 
-@jit_internal
 def copy(values: Array, out: Array) -> None:
     """Write values, shape (n,), into `out`. A loop compiles in a tenth of the time of a slice."""
     for i in range(out.size):
         out[i] = values[i]
 
 
-@jit_internal
 def norm(a: Array) -> float:
     """Return |a|."""
     total = 0.0
@@ -36,7 +31,6 @@ def norm(a: Array) -> float:
     return float(np.sqrt(total))
 
 
-@jit_internal
 def invert_symmetric(A: Array) -> None:
     """Replace a symmetric positive definite matrix, shape (n, n), by its inverse, which is symmetric to the last bit.
 

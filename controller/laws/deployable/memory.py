@@ -7,7 +7,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from controller.jit.function_pointer import Address
 from controller.laws.deployable.attitude import Attitude
 from controller.laws.deployable.barrier import RegionObservation
 from controller.laws.deployable.fault_detection import FaultState
@@ -19,19 +18,8 @@ from controller.laws.deployable.quadratic_program import Workspace
 Array = NDArray[np.float64]
 
 
-class Stages(NamedTuple):
-    """Addresses of the long stages of a step, each compiled on its own."""
-
-    process_measurement: Address = Address(0)
-    detect_fault: Address = Address(0)
-    improve_path: Address = Address(0)
-    update_desired: Address = Address(0)
-    write_rows: Address = Address(0)
-    solve: Address = Address(0)
-
-
 class DeployableMemory(NamedTuple):
-    """Arrays, and addresses that stay, so that compiled code can take it."""
+    """Arrays, so that C can take it."""
 
     period: Array  # (1,) s
     estimate: Array  # (4,) phi_hat [N, N m]
@@ -50,4 +38,3 @@ class DeployableMemory(NamedTuple):
     reported: Array  # (m,) health of the thrusters as last reported
     filtered_acceleration: Array  # (3,) m/s2, NED, desired of the thrusters, low-pass filtered
     thruster_acceleration: Array  # (6, m) as `barrier.Motion` has it
-    stages: Stages

@@ -7,10 +7,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from controller.jit.jit import jit_internal
-from controller.jit.stack_array import zeros
 from controller.law import VehicleModel
 from controller.laws.deployable.linear_algebra import invert_symmetric, product
+from controller.stack_array import zeros
 
 Array = NDArray[np.float64]
 
@@ -106,7 +105,6 @@ def make_thrusters(vehicle: VehicleModel) -> Thrusters:
     return thrusters
 
 
-@jit_internal
 def reallocate(thrusters: Thrusters) -> None:
     """Update matrix, limits and inverses to `health`."""
     m = thrusters.health.size
@@ -135,7 +133,6 @@ def reallocate(thrusters: Thrusters) -> None:
             thrusters.allocator[i, k] = total * thrusters.metric[k]
 
 
-@jit_internal
 def free_acceleration(
     dynamics: Dynamics,
     R: Array,
@@ -192,7 +189,6 @@ def free_acceleration(
             out[i] += R[i, k] * body[k]
 
 
-@jit_internal
 def thrust_acceleration(dynamics: Dynamics, thrusters: Thrusters, R: Array, forces: Array, out: Array) -> None:
     """Write the acceleration by thruster forces [N], shape (6,): linear in NED, angular in body axes."""
     wrench, body = zeros(6), zeros(6)

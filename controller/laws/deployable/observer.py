@@ -14,11 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controller.arithmetic import square
-from controller.jit.jit import jit_internal
-from controller.jit.stack_array import zeros
 from controller.laws.deployable.gains import DeployableGains
 from controller.laws.deployable.linear_algebra import copy
 from controller.laws.deployable.model import Dynamics, Thrusters, free_acceleration, thrust_acceleration
+from controller.stack_array import zeros
 
 Array = NDArray[np.float64]
 
@@ -61,7 +60,6 @@ def empty_estimate() -> Estimate:
     )
 
 
-@jit_internal
 def initialize(estimate: Estimate, position: Array, velocity: Array, gains: DeployableGains) -> None:
     """Initialize from a measurement [m, m/s, NED]: the first one, or one after a loss.
 
@@ -81,7 +79,6 @@ def initialize(estimate: Estimate, position: Array, velocity: Array, gains: Depl
     estimate.time_since_measurement[0] = 0.0
 
 
-@jit_internal
 def predict(
     estimate: Estimate,
     dynamics: Dynamics,
@@ -121,7 +118,6 @@ def predict(
     estimate.time_since_measurement[0] += period
 
 
-@jit_internal
 def correct(estimate: Estimate, position: Array, velocity: Array, gains: DeployableGains) -> bool:
     """Correct by a measurement of position [m] and velocity [m/s], shape (3,) each, NED; return False if rejected."""
     for axis in range(3):
@@ -161,7 +157,6 @@ def correct(estimate: Estimate, position: Array, velocity: Array, gains: Deploya
     return True
 
 
-@jit_internal
 def inflate_covariance(estimate: Estimate, variance: float) -> None:
     """Add variance to velocity [m2/s2] and unknowns, after the assumed health of a thruster has changed."""
     for axis in range(3):
@@ -169,7 +164,6 @@ def inflate_covariance(estimate: Estimate, variance: float) -> None:
         estimate.covariance[axis, 2, 2] += 25.0 if axis == 2 else 0.04
 
 
-@jit_internal
 def position_spread(estimate: Estimate) -> float:
     """Return the greatest standard deviation [m] of the position among the axes."""
     worst = 0.0

@@ -16,8 +16,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controller.arithmetic import exponential, length3, square
-from controller.jit.jit import jit_internal
-from controller.jit.stack_array import zeros
 from controller.laws.deployable.gains import DeployableGains
 from controller.laws.deployable.linear_algebra import copy, norm
 from controller.laws.deployable.search import Tree, empty_tree, grow_tree
@@ -30,6 +28,7 @@ from controller.regions.region_set import (
     clearance_of_sphere,
     evaluate_packed,
 )
+from controller.stack_array import zeros
 
 Array = NDArray[np.float64]
 
@@ -83,7 +82,6 @@ def empty_plan(n_regions: int, seed: int) -> PathPlan:
     )
 
 
-@jit_internal
 def uniform(random: NDArray[np.uint64]) -> float:
     """Return the next random number in [0, 1): xorshift64*, Vigna 2016."""
     x = random[0]
@@ -94,13 +92,11 @@ def uniform(random: NDArray[np.uint64]) -> float:
     return float((x * np.uint64(0x2545F4914F6CDD1D)) >> np.uint64(11)) / 9007199254740992.0
 
 
-@jit_internal
 def _bell_shaped(random: NDArray[np.uint64]) -> float:
     """Return a bell-shaped random number with mean 0 and standard deviation 1."""
     return (uniform(random) + uniform(random) + uniform(random) + uniform(random) - 2.0) * 1.7320508075688772
 
 
-@jit_internal
 def path_cost(
     path: Array, count: int, start: Array, regions: PackedRegions, clear_until: Array, gains: DeployableGains
 ) -> float:
@@ -174,7 +170,6 @@ def path_cost(
     return total
 
 
-@jit_internal
 def nearest_goal_point(goal: PackedRegions, position: Array, depth: float, end: Array) -> None:
     """Write the point of the goal region nearest to a position, `depth` [m] inside where the region is that deep.
 
@@ -204,7 +199,6 @@ def nearest_goal_point(goal: PackedRegions, position: Array, depth: float, end: 
             part *= 0.5
 
 
-@jit_internal
 def improve_path(
     plan: PathPlan, start: Array, goal: PackedRegions, regions: PackedRegions, gains: DeployableGains, period: float
 ) -> None:
@@ -247,13 +241,11 @@ def improve_path(
         plan.cost[0] = cost
 
 
-@jit_internal
 def _copy_path(path: Array, out: Array) -> None:
     for i in range(CORNERS + 1):
         copy(path[i], out[i])
 
 
-@jit_internal
 def _length(path: Array, count: int, start: Array) -> float:
     length = _distance(path[0], start)
     for i in range(1, count):
@@ -261,12 +253,10 @@ def _length(path: Array, count: int, start: Array) -> float:
     return float(length)
 
 
-@jit_internal
 def _distance(a: Array, b: Array) -> float:
     return float(length3(a[0] - b[0], a[1] - b[1], a[2] - b[2]))
 
 
-@jit_internal
 def _mutate_path(plan: PathPlan, start: Array, goal: PackedRegions, gains: DeployableGains) -> None:
     """Write a mutation of the path into `candidate`."""
     path, candidate, random = plan.path, plan.candidate, plan.random

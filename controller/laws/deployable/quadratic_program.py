@@ -27,7 +27,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controller.arithmetic import square
-from controller.jit.jit import jit_internal
 from controller.laws.deployable.linear_algebra import copy
 
 Array = NDArray[np.float64]
@@ -93,7 +92,6 @@ def empty_workspace(barriers: int, thrusters: int) -> Workspace:
     )
 
 
-@jit_internal
 def solve(work: Workspace, barriers: int, inverse: Array, lower: Array, upper: Array, forces: Array) -> int:
     """Solve the program whose first `barriers` rows, right sides and prices stand in `work`, with u0 in `nominal`.
 
@@ -160,7 +158,6 @@ def solve(work: Workspace, barriers: int, inverse: Array, lower: Array, upper: A
     return steps if row < 0 and finite else -steps
 
 
-@jit_internal
 def _clip_to_limits(work: Workspace, lower: Array, upper: Array, forces: Array) -> bool:
     """Clip the forces to their limits; return False if any was not finite, which its nominal force then replaces."""
     finite = True
@@ -175,7 +172,6 @@ def _clip_to_limits(work: Workspace, lower: Array, upper: Array, forces: Array) 
     return finite
 
 
-@jit_internal
 def _prepare(work: Workspace, barriers: int, inverse: Array, lower: Array, upper: Array) -> float:
     """Prepare all rows, none of them passive, and return the greatest |d_i| / sqrt(G_ii)."""
     m, scale = lower.size, 0.0
@@ -217,7 +213,6 @@ def _prepare(work: Workspace, barriers: int, inverse: Array, lower: Array, upper
     return scale
 
 
-@jit_internal
 def _most_violated(work: Workspace, barriers: int, lower: Array, upper: Array, forces: Array, tolerance: float) -> int:
     """Return the free row that is violated most, -1 if none is by more than the tolerance."""
     m, worst, row = forces.size, tolerance, -1
@@ -237,7 +232,6 @@ def _most_violated(work: Workspace, barriers: int, lower: Array, upper: Array, f
     return row
 
 
-@jit_internal
 def _refine(
     work: Workspace, barriers: int, count: int, inverse: Array, lower: Array, upper: Array, forces: Array
 ) -> None:
@@ -275,7 +269,6 @@ def _refine(
             forces[i - barriers - m] = upper[i - barriers - m]
 
 
-@jit_internal
 def _sum_dual_force(work: Workspace, barriers: int, count: int) -> None:
     """Write A^T y into `dual_force`, summed over the passive rows in twice the precision."""
     m, dual_force, rest = work.nominal.size, work.dual_force, work.refined
@@ -294,7 +287,6 @@ def _sum_dual_force(work: Workspace, barriers: int, count: int) -> None:
         dual_force[j] += rest[j]
 
 
-@jit_internal
 def _row_residual(work: Workspace, barriers: int, i: int, lower: Array, upper: Array, forces: Array) -> float:
     """Return the residual of row i at these forces and its multiplier, summed in twice the precision."""
     m = forces.size
@@ -308,7 +300,6 @@ def _row_residual(work: Workspace, barriers: int, i: int, lower: Array, upper: A
     return total + rest
 
 
-@jit_internal
 def _add_product(total: float, rest: float, a: float, b: float) -> tuple[float, float]:
     """Return total + a b, rounded, and rest plus the rounding errors of product and sum.
 
@@ -324,7 +315,6 @@ def _add_product(total: float, rest: float, a: float, b: float) -> tuple[float, 
     return after, rest + (of_product + ((total - (after - there)) + (product - there)))
 
 
-@jit_internal
 def _append_factor_row(work: Workspace, barriers: int, a: int) -> bool:
     """Write row `a` of the Cholesky factor, of the passive row in that place; return False if it is dependent."""
     m, L, i = work.nominal.size, work.factor, work.passive[a]
@@ -351,7 +341,6 @@ def _append_factor_row(work: Workspace, barriers: int, a: int) -> bool:
     return False
 
 
-@jit_internal
 def _solve_passive(work: Workspace, count: int) -> None:
     """Write the multipliers that minimise over the passive rows into `trial`."""
     L = work.factor
@@ -367,7 +356,6 @@ def _solve_passive(work: Workspace, count: int) -> None:
         work.trial[a] = total / L[a, a]
 
 
-@jit_internal
 def _advance(work: Workspace, count: int) -> int:
     """Move the multipliers towards `trial` as far as all stay >= 0; return the place of the row that leaves, or -1."""
     reach, drop = 1.0, -1

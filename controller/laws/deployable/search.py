@@ -14,13 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controller.arithmetic import length3, square
-from controller.jit.jit import inlined, jit_internal
-from controller.jit.stack_array import zeros
 from controller.laws.deployable.gains import DeployableGains
 from controller.laws.deployable.linear_algebra import copy
 from controller.regions import Sphere
 from controller.regions.kinds import FIRST_OF_ATTITUDE
 from controller.regions.region_set import PackedRegions, clearance_of_place, clearance_of_sphere
+from controller.stack_array import zeros
 
 Array = NDArray[np.float64]
 
@@ -49,7 +48,6 @@ def empty_tree() -> Tree:
     return Tree(np.zeros((_NODES, 3)), np.zeros(_NODES, dtype=np.int64), np.zeros(1, dtype=np.int64))
 
 
-@inlined
 def _clearance_at(point: Array, regions: PackedRegions, gradient: Array) -> float:
     least = np.inf
     for i in range(regions.kinds.size):
@@ -62,7 +60,6 @@ def _clearance_at(point: Array, regions: PackedRegions, gradient: Array) -> floa
     return least
 
 
-@jit_internal
 def is_line_free(start: Array, end: Array, regions: PackedRegions, margin: float) -> bool:
     """Return whether a straight line keeps a clearance [m] of all hard regions at their present places.
 
@@ -95,7 +92,6 @@ def is_line_free(start: Array, end: Array, regions: PackedRegions, margin: float
     return False
 
 
-@jit_internal
 def grow_tree(
     tree: Tree,
     start: Array,

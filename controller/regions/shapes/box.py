@@ -7,7 +7,6 @@ from typing import ClassVar
 
 import numpy as np
 
-from controller.jit.jit import jit_noalloc
 from controller.quaternion import rotation_matrix
 from controller.regions.entry import Entry
 from controller.regions.geometry import product_distance, to_local, to_world
@@ -56,7 +55,6 @@ class Box:
         return about(self.centre, reach.tolist())
 
 
-@jit_noalloc
 def box(p: Array, q: Array) -> Evaluation:
     """Evaluate a packed `Box` at the position `p`."""
     x, y, z = to_local(p, q, 0)

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from controller.arithmetic import hypotenuse
-from controller.jit.jit import jit_noalloc
 from controller.regions.entry import Entry
 from controller.regions.geometry import clamp
 from controller.regions.mesh import Mesh, sector
@@ -61,7 +60,6 @@ class Cone:
         return ball_bounds(self.feature, self.range)
 
 
-@jit_noalloc
 def cone(p: Array, q: Array) -> Evaluation:
     """Evaluate a packed `Cone` at the position `p`."""
     # in the half-plane through the axis: `along` it, and `aside` from it

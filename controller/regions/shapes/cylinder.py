@@ -8,7 +8,6 @@ from typing import ClassVar
 
 import numpy as np
 
-from controller.jit.jit import jit_noalloc
 from controller.regions.entry import Entry
 from controller.regions.geometry import product_distance
 from controller.regions.mesh import Mesh, circle, frame, lathe
@@ -72,7 +71,6 @@ class Cylinder:
         return join(discs)
 
 
-@jit_noalloc
 def cylinder(p: Array, q: Array) -> Evaluation:
     """Evaluate a packed `Cylinder` at the position `p`."""
     x, y, z = p[0] - q[0], p[1] - q[1], p[2] - q[2]

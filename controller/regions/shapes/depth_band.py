@@ -8,7 +8,6 @@ from typing import ClassVar
 
 import numpy as np
 
-from controller.jit.jit import jit_noalloc
 from controller.regions.entry import Entry
 from controller.regions.mesh import Mesh, patches
 from controller.regions.numbers import LENGTH, SIZE, Number
@@ -48,13 +47,11 @@ class DepthBand:
         return (-inf, -inf, self.depth - self.tolerance), (inf, inf, self.depth + self.tolerance)
 
 
-@jit_noalloc
 def band_about(z: float, tolerance: float) -> Evaluation:
     """Evaluate a band of a tolerance at a depth told from its middle [m]."""
     return z * z - tolerance * tolerance, 0.0, 0.0, 2.0 * z, abs(z) - tolerance
 
 
-@jit_noalloc
 def depth_band(p: Array, q: Array) -> Evaluation:
     """Evaluate a packed `DepthBand` at the position `p`."""
     return band_about(p[2] - q[0], q[1])

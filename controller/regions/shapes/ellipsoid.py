@@ -8,7 +8,6 @@ from typing import ClassVar
 import numpy as np
 
 from controller.arithmetic import length3, square
-from controller.jit.jit import jit_noalloc
 from controller.quaternion import rotation_matrix
 from controller.regions.entry import Entry
 from controller.regions.geometry import to_local, to_world
@@ -59,7 +58,6 @@ class Ellipsoid:
         return about(self.centre, reach.tolist())
 
 
-@jit_noalloc
 def ellipsoid(p: Array, q: Array) -> Evaluation:
     """Evaluate a packed `Ellipsoid` at the position `p`."""
     x, y, z = to_local(p, q, 0)
@@ -70,7 +68,6 @@ def ellipsoid(p: Array, q: Array) -> Evaluation:
     return g, wx, wy, wz, distance if g > 0.0 else -distance
 
 
-@jit_noalloc
 def _surface_distance(x: float, y: float, z: float, a: float, b: float, c: float) -> float:
     """Distance from a point of the first octant to the surface.
 

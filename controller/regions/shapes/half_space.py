@@ -8,7 +8,6 @@ from typing import ClassVar
 
 import numpy as np
 
-from controller.jit.jit import jit_noalloc
 from controller.regions.entry import Entry
 from controller.regions.mesh import Mesh, patches
 from controller.regions.numbers import LENGTH, PART, Number, vector
@@ -48,7 +47,6 @@ class HalfSpace:
         return (-inf, -inf, -inf), (inf, inf, inf)
 
 
-@jit_noalloc
 def half_space(p: Array, q: Array) -> Evaluation:
     """Evaluate a packed `HalfSpace` at the position `p`."""
     g = q[3] * (p[0] - q[0]) + q[4] * (p[1] - q[1]) + q[5] * (p[2] - q[2])

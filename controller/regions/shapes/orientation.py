@@ -8,7 +8,6 @@ from math import inf
 from typing import ClassVar
 
 from controller.arithmetic import arctangent
-from controller.jit.jit import jit_noalloc
 from controller.quaternion import error_parts
 from controller.regions.entry import Entry
 from controller.regions.numbers import ANGLE, PART, Number
@@ -51,7 +50,6 @@ class Orientation:
         return (-inf, -inf, -inf), (inf, inf, inf)
 
 
-@jit_noalloc
 def orientation(p: Array, e: Array, q: Array) -> EvaluationOfAttitude:
     """Evaluate a packed `Orientation` at the attitude `e`, wherever that is."""
     turn = error_parts(q[:4], e)

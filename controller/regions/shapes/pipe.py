@@ -9,7 +9,6 @@ from typing import ClassVar
 
 import numpy as np
 
-from controller.jit.jit import jit_noalloc
 from controller.regions.entry import Entry
 from controller.regions.geometry import clamp
 from controller.regions.mesh import AROUND, Mesh, lathe, welded
@@ -65,7 +64,6 @@ class Pipe:
         return join([ball_bounds(point, self.radius) for point in self.points])
 
 
-@jit_noalloc
 def pipe(p: Array, q: Array) -> Evaluation:
     """Evaluate a packed `Pipe` at the position `p`."""
     nearest = math.inf

@@ -9,7 +9,6 @@ from typing import ClassVar
 import numpy as np
 
 from controller.arithmetic import hypotenuse
-from controller.jit.jit import jit_noalloc
 from controller.regions.entry import Entry
 from controller.regions.geometry import clamp, product_distance
 from controller.regions.mesh import Mesh
@@ -103,7 +102,6 @@ def _touches_itself(corners: tuple[Vector2, ...]) -> bool:
     return False
 
 
-@jit_noalloc
 def prism(p: Array, q: Array) -> Evaluation:
     """Evaluate a packed `Prism` at the position `p`."""
     n = (q.size - 2) // 2

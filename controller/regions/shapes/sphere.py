@@ -8,7 +8,6 @@ from typing import ClassVar
 
 import numpy as np
 
-from controller.jit.jit import jit_noalloc
 from controller.regions.entry import Entry
 from controller.regions.mesh import Mesh, ball
 from controller.regions.numbers import LENGTH, SIZE, Number, vector
@@ -48,14 +47,12 @@ class Sphere:
         return ball_bounds(self.centre, self.radius)
 
 
-@jit_noalloc
 def sphere_about(x: float, y: float, z: float, radius: float) -> Evaluation:
     """Evaluate a sphere of a radius at a place told from its centre [m]."""
     square = x * x + y * y + z * z
     return square - radius * radius, 2.0 * x, 2.0 * y, 2.0 * z, math.sqrt(square) - radius
 
 
-@jit_noalloc
 def sphere(p: Array, q: Array) -> Evaluation:
     """Evaluate a packed `Sphere` at the position `p`."""
     return sphere_about(p[0] - q[0], p[1] - q[1], p[2] - q[2], q[3])

@@ -8,7 +8,6 @@ from math import inf
 from typing import ClassVar
 
 from controller.arithmetic import arctangent
-from controller.jit.jit import jit_noalloc
 from controller.quaternion import rotation_rows
 from controller.regions.entry import Entry
 from controller.regions.numbers import ANGLE, LENGTH, PART, Number, vector
@@ -66,7 +65,6 @@ class Visibility:
         return (-inf, -inf, -inf), (inf, inf, inf)
 
 
-@jit_noalloc
 def visibility(p: Array, e: Array, q: Array) -> EvaluationOfAttitude:
     """Evaluate a packed `Visibility` at the position `p` and the attitude `e`."""
     # the feature in the body frame: u from the origin, b from the camera

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from controller import LAWS
 from cosim.batch.c_calls import Clock
-from cosim.batch.fused_loop import OUTPUTS, Allocator, FlightConfig, FlightMetrics, fused_loop_of, make_workspace
+from cosim.batch.fused_loop import OUTPUTS, Allocator, FlightConfig, FlightMetrics, fly_law, make_workspace
 from cosim.campaigns.scenes.scene import KnownScene, Scene, known_scene, plant_values
 from cosim.errors import RunError
 from cosim.scenario.vehicle_model import vehicle_model
@@ -109,7 +109,6 @@ class SceneFlyer:
         self._model = vehicle_model(self._vehicle)
         self._law(0)  # says now what it cannot work with
         self._clock = Clock()
-        self._flight = fused_loop_of(law)
         self._plant = Plant(self._vehicle)
 
     def fly(self, scene: Scene, trace: bool = False) -> tuple[Score, NDArray[np.float64]]:
@@ -145,10 +144,8 @@ class SceneFlyer:
         effectiveness.inputs[:] = 1.0
         setup = self._setup(scene, known)
         rows = np.zeros((c.controls, 20 + m + law.report.size) if trace else (0, 0))
-        workspace, estimate, allocator = make_workspace(known.regions.kinds.size, m, m), np.zeros(4), self._allocator()
-        metrics = self._flight(
-            setup, native, effectiveness, allocator, law.gains, law.memory, workspace, estimate, rows
-        )
+        workspace = make_workspace(known.regions.kinds.size, m, m)
+        metrics, _ = fly_law(setup, native, effectiveness, self._allocator(), law, workspace, rows)
         return self._score(metrics, setup), rows
 
     def _score(self, metrics: FlightMetrics, setup: FlightConfig) -> Score:

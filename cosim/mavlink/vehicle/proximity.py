@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from controller.compiling.function import CompiledFunction
 from controller.regions import pack
 from controller.regions.rays import ray_distances
 from controller.regions.region_set import of_attitude
@@ -51,6 +52,7 @@ class Proximity:
         self._angles = (np.arange(SECTORS * _RAYS) - _RAYS // 2) * (2.0 * math.pi / (SECTORS * _RAYS))
         self._directions, self._distances = np.zeros((SECTORS * _RAYS, 3)), np.zeros(SECTORS * _RAYS)
         self._position, self._level = np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0])
+        self._ray_distances = CompiledFunction(ray_distances)
         self.inwards(_AT_REST)
         self.scan(_AT_REST, 0.0)
 
@@ -117,7 +119,7 @@ class Proximity:
         self._position[:] = position_ned
         np.cos(self._angles + heading, out=self._directions[:, 0])
         np.sin(self._angles + heading, out=self._directions[:, 1])
-        ray_distances(self._regions, self._position, self._directions, REACH, self._distances)
+        self._ray_distances(self._regions, self._position, self._directions, REACH, self._distances)
         nearest: list[float] = self._distances.reshape(SECTORS, _RAYS).min(axis=1).tolist()
         return nearest
 

@@ -1,0 +1,68 @@
+"""The C compiler of this machine, and what it is told."""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import shlex
+import shutil
+import subprocess
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from controller.errors import CompilationError
+
+# no contraction of a*b+c, and no debug information, which would name the folder of the build
+FLAGS = ("-std=c99", "-O2", "-fno-math-errno", "-g0", "-ffp-contract=off", "-fPIC", "-shared")
+
+
+def compiler_command() -> list[str]:
+    """Return the command of a C compiler: ``CC``, else ``cc``, else that of the ziglang package.
+
+    Raises
+    ------
+    CompilationError
+        If there is none.
+    """
+    named = os.environ.get("CC")
+    if named:
+        try:
+            words = shlex.split(named)
+        except ValueError as error:
+            raise CompilationError(f"no C compiler: CC is {named!r}: {error}") from error
+        if not words or shutil.which(words[0]) is None:
+            raise CompilationError(f"no C compiler: CC is {named!r}, which is not on the PATH")
+        return words
+    if path := shutil.which("cc"):
+        return [path]
+    if importlib.util.find_spec("ziglang"):
+        return [sys.executable, "-m", "ziglang", "cc"]
+    hint = f"{shlex.quote(sys.executable)} -m pip install ziglang"
+    raise CompilationError(f"no C compiler: neither cc nor the ziglang package was found; {hint}")
+
+
+def compile_file(source: Path, library: Path, flags: Sequence[str] = ()) -> None:
+    """Compile one C file into a shared library.
+
+    Parameters
+    ----------
+    source, library : Path
+        What is read, and what is written.
+    flags : sequence of str, optional
+        After `FLAGS`.
+
+    Raises
+    ------
+    CompilationError
+        If there is no compiler, or it fails; its first complaint is in the message.
+    """
+    command = [*compiler_command(), *FLAGS, *flags, str(source), "-o", str(library), "-lm"]
+    try:
+        done = subprocess.run(command, capture_output=True, text=True, check=False)  # noqa: S603
+    except OSError as error:
+        raise CompilationError(f"C compiler {command[0]}: {error.strerror or error}") from error
+    if done.returncode != 0 or not library.is_file():
+        lines = done.stderr.splitlines()
+        said = [line for line in lines if "error" in line] or lines or ["it wrote no library, and no word"]
+        raise CompilationError(f"C compiler {command[0]} failed: {said[0].strip()}")

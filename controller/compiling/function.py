@@ -1,0 +1,172 @@
+"""Plain functions called as C, again and again with the same arrays, in which the numbers change.
+
+A law is given about forty arrays; to look at each at each call would take several times as long as its mathematics.
+Here they are looked at once, and kept as words that the C function makes its arguments of.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import functools
+import os
+from collections.abc import Callable
+from types import FunctionType
+from typing import Any
+
+from controller.compiling.library import library_of
+from controller.translator.arguments import words_of
+from controller.translator.program import Program
+from controller.translator.types import Type, type_of
+
+INTERPRETED = "SUBREACH_INTERPRETED"  # set in the environment: Python itself runs all functions, which needs no compiler
+
+_MOST = 8  # sets of arguments that are kept
+_NONE = (None,) * 7
+_CALLBACK = ctypes.PYFUNCTYPE(None, ctypes.c_void_p)
+
+
+def c_text(function: FunctionType, arguments: tuple[Any, ...]) -> str:
+    """Return the C of a function for arguments such as these, as its library is compiled from it.
+
+    Parameters
+    ----------
+    function : function
+        Plain Python in the translator's subset, which returns nothing.
+    arguments : tuple
+        Numbers, C-contiguous arrays, and tuples of such; their types count.
+
+    Returns
+    -------
+    str
+        One file, in which ``entry`` is called with the address of the arguments' words.
+
+    Raises
+    ------
+    TranslationError
+        If it, or what it calls, is beyond the subset; with file and line.
+    TypeError
+        If an argument is of another type.
+    """
+    return _text(function, tuple(map(type_of, arguments)))
+
+
+@functools.cache
+def _text(function: FunctionType, types: tuple[Type, ...]) -> str:
+    program = Program()
+    program.export("entry", function, types)
+    return program.text()
+
+
+@functools.cache
+def _entry(function: FunctionType, types: tuple[Type, ...]) -> Any:
+    entry = library_of(_text(function, types)).entry
+    entry.argtypes, entry.restype = [ctypes.c_void_p], None
+    return entry
+
+
+class BoundCall:
+    """A function with its arguments, which stay alive as long as it can be called.
+
+    Parameters
+    ----------
+    function : callable
+        Plain Python in the translator's subset; anything else that can be called is called as it is.
+    arguments : tuple
+        Numbers, C-contiguous arrays, and tuples of such; no array is resized in place.
+
+    Attributes
+    ----------
+    call : callable
+        Calls it.
+    address, words : int
+        Of the C function ``void (*)(const void *)``, and of what it is given.
+    """
+
+    def __init__(self, function: Any, arguments: tuple[Any, ...]) -> None:
+        self._arguments = arguments
+        self._raised: BaseException | None = None
+        if isinstance(function, FunctionType) and not os.environ.get(INTERPRETED):
+            self._entry = _entry(function, tuple(map(type_of, arguments)))
+            self._words = words_of(arguments)
+            self.words: int = self._words.ctypes.data
+            self.call: Callable[[], None] = functools.partial(self._entry, self.words)
+        else:
+            self.words, self.call = 0, functools.partial(function, *arguments)
+            self._entry = _CALLBACK(self._called_back)
+        self.address: int = ctypes.cast(self._entry, ctypes.c_void_p).value or 0
+
+    def _called_back(self, _: int | None) -> None:
+        try:
+            if self._raised is None:
+                self.call()
+        except BaseException as error:  # noqa: BLE001 -- C cannot pass it on; `raise_error` does
+            self._raised = error
+
+    def raise_error(self) -> None:
+        """Raise what the function raised when it was called by its address, if it did."""
+        if self._raised is not None:
+            raise self._raised
+
+
+class CompiledFunction:
+    """A plain function, run as C: translated and compiled when it is first called, fast when called with the same objects.
+
+    Parameters
+    ----------
+    function : callable
+        Plain Python in the translator's subset, which returns nothing, of at most seven parameters.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from controller.compiling.function import CompiledFunction
+    >>> from controller.quaternion import write_rotation
+    >>> write, R = CompiledFunction(write_rotation), np.empty((3, 3))
+    >>> write(np.array([0.0, 1.0, 0.0, 0.0]), R)
+    >>> R.diagonal()
+    array([ 1., -1., -1.])
+    """
+
+    def __init__(self, function: Any) -> None:
+        self._function = function
+        self._bound: dict[tuple[int, ...], BoundCall] = {}  # by the ids of arguments, which are theirs while kept
+        self._last: tuple[Any, ...] = (_nothing, *_NONE)  # the last call, and the seven arguments it is for
+
+    def __call__(
+        self, a: Any, b: Any = None, c: Any = None, d: Any = None, e: Any = None, f: Any = None, g: Any = None
+    ) -> None:
+        """Call it.
+
+        Parameters
+        ----------
+        a, b, c, d, e, f, g : object
+            Arguments of the function; None for those that it has not.
+
+        Raises
+        ------
+        TranslationError, CompilationError
+            If it cannot be translated, or there is no compiler where one is needed.
+        """
+        # one by one: to compare two tuples item by item takes twice as long
+        call, a0, b0, c0, d0, e0, f0, g0 = self._last
+        if not (a is a0 and b is b0 and c is c0 and d is d0 and e is e0 and f is f0 and g is g0):
+            call = self._call_of(tuple(argument for argument in (a, b, c, d, e, f, g) if argument is not None))
+        call()
+
+    def _call_of(self, arguments: tuple[Any, ...]) -> Callable[[], None]:
+        key = tuple(map(id, arguments))
+        bound = self._bound.get(key)
+        if bound is None:
+            if len(self._bound) == _MOST:
+                self._bound = {}
+            bound = self._bound[key] = BoundCall(self._function, arguments)
+        self._last = (bound.call, *arguments, *_NONE[len(arguments) :])
+        return bound.call
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Leave out, of a copy, what is kept of these very arrays."""
+        return CompiledFunction, (self._function,)
+
+
+def _nothing() -> None:
+    raise TypeError("called without arguments")

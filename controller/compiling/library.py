@@ -1,0 +1,150 @@
+"""C libraries by their text: with the package, in the user's cache, or compiled now.
+
+A library's name is a digest of the C text that it is made from, so that it is never taken for another one's. Beside it
+lies its checksum: loading half of one could end the process.
+"""
+
+from __future__ import annotations
+
+import atexit
+import ctypes
+import functools
+import hashlib
+import logging
+import os
+import shutil
+import stat
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import platformdirs
+
+from controller.compiling.compiler import FLAGS, compile_file
+
+log = logging.getLogger(__name__)
+
+PREBUILT = Path(__file__).parents[1] / "prebuilt"  # in a wheel; a checkout has none
+_SUFFIX = {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")
+
+
+@functools.cache
+def library_of(text: str) -> ctypes.PyDLL:
+    """Return the library of a C text, loaded; it is compiled where neither the package nor the cache has it.
+
+    Parameters
+    ----------
+    text : str
+        One file of C99.
+
+    Returns
+    -------
+    PyDLL
+        Its functions are called without giving up Python's lock: they take microseconds, and to get it back can take
+        milliseconds.
+
+    Raises
+    ------
+    CompilationError
+        If it has to be compiled, and there is no compiler or it fails.
+    """
+    name = library_name(text)
+    for folder in (PREBUILT, _cache()):
+        path = folder / f"{name}{_SUFFIX}"
+        if _is_trusted(path) and _is_whole(path):
+            return ctypes.PyDLL(str(path))
+    return ctypes.PyDLL(str(_compiled(text, name)))
+
+
+def library_name(text: str) -> str:
+    """Return the name of the library of a C text, without what the system puts behind it.
+
+    Parameters
+    ----------
+    text : str
+        One file of C99.
+
+    Returns
+    -------
+    str
+        A digest.
+    """
+    return hashlib.sha256("\n".join((*FLAGS, text)).encode()).hexdigest()[:32]
+
+
+def checksum_path(path: Path) -> Path:
+    """Return where the checksum of a library lies: beside it."""
+    return path.with_name(f"{path.name}.sha256")
+
+
+def _cache() -> Path:
+    return Path(platformdirs.user_cache_dir("subreach")) / "functions"
+
+
+def _is_whole(path: Path) -> bool:
+    try:
+        expected, library = checksum_path(path).read_bytes(), path.read_bytes()
+    except OSError:
+        return False
+    whole = expected == hashlib.sha256(library).hexdigest().encode()
+    if not whole:
+        log.warning("%s: damaged; compiled anew", path)
+    return whole
+
+
+def _is_trusted(path: Path) -> bool:
+    """Return whether none but the user, or who installed the package, may change what is about to be run."""
+    try:
+        about, trusted = path.parent.stat(), {Path(__file__).stat().st_uid}
+    except OSError:
+        return False
+    if os.name != "posix":
+        return True
+    if about.st_uid in trusted | {os.geteuid()} and not about.st_mode & stat.S_IWOTH:
+        return True
+    log.warning("%s: others can write there; compiled for this process alone", path.parent)
+    return False
+
+
+def _compiled(text: str, name: str) -> Path:
+    """Return a library that is compiled now, in the cache if there is a place for it."""
+    log.info("compiling what this machine runs for the first time")
+    started = time.perf_counter()
+    own = _own_folder()
+    source, built = own / f"{name}.c", own / f"{name}{_SUFFIX}"
+    source.write_text(text, encoding="utf-8")
+    compile_file(source, built)
+    log.debug("%s: compiled in %.2f s", name, time.perf_counter() - started)
+    kept = _cache() / built.name
+    try:
+        kept.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
+        if not _is_trusted(kept):
+            return built
+        library = built.read_bytes()
+        _write_whole(checksum_path(kept), hashlib.sha256(library).hexdigest().encode())
+        _write_whole(kept, library)
+    except OSError as error:
+        log.warning("cache %s: %s; compiled for this process alone", kept.parent, error.strerror or error)
+        return built
+    return kept
+
+
+def _write_whole(path: Path, data: bytes) -> None:
+    """Write a file that appears whole or not at all."""
+    handle, scratch = tempfile.mkstemp(dir=path.parent, prefix=".", suffix=".part")
+    try:
+        with open(handle, "wb") as file:
+            file.write(data)
+        os.replace(scratch, path)
+    except BaseException:
+        Path(scratch).unlink(missing_ok=True)
+        raise
+
+
+@functools.cache
+def _own_folder() -> Path:
+    """Return a folder that goes with the process."""
+    folder = tempfile.mkdtemp(prefix="subreach-")
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    return Path(folder)

@@ -1,0 +1,39 @@
+"""Calls of C functions by their address, out of translated functions."""
+
+from __future__ import annotations
+
+import ctypes
+from typing import Any
+
+# kinds of arguments, as C writes them
+POINTER, SIZE, INT, DOUBLE, BOOL = "void *", "size_t", "int", "double", "bool"
+
+_TYPES = {
+    POINTER: ctypes.c_void_p,
+    SIZE: ctypes.c_size_t,
+    INT: ctypes.c_int,
+    DOUBLE: ctypes.c_double,
+    BOOL: ctypes.c_bool,
+}
+
+
+def call_c(address: int, kinds: tuple[str, ...], *arguments: Any) -> int:
+    """Call a C function that returns an int, by its address.
+
+    Parameters
+    ----------
+    address : int
+        Of the function.
+    kinds : tuple of str
+        Of its arguments; a constant.
+    *arguments : int, float, bool or ndarray
+        One for each kind; an address, or an array, for a pointer.
+
+    Returns
+    -------
+    int
+        What it returns.
+    """
+    function = ctypes.PYFUNCTYPE(ctypes.c_int, *(_TYPES[kind] for kind in kinds))(address)
+    returned: int = function(*(getattr(argument, "ctypes", argument) for argument in arguments))
+    return returned
