@@ -6,7 +6,7 @@ from controller.law import CompiledLaw, Law, VehicleModel, VehicleState
 from controller.laws import LAWS
 from controller.laws.ismail_dunnigan import IsmailDunniganLaw
 from controller.paper_law import Gains
-from controller.translator.laws import translate_law
+from controller.law_in_c import translate_law
 
 __all__ = [
     "LAWS",

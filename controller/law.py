@@ -132,7 +132,7 @@ class CompiledLaw:
 
     name: ClassVar[str]  # of its module, given when the laws are loaded
     output: ClassVar[Output]
-    function: ClassVar[Callable[..., None]]
+    function: ClassVar[Any]  # plain Python in the translator's subset, or anything that can be called
     gains_type: ClassVar[type[Any]]  # a NamedTuple of floats with defaults
     diagnostics: tuple[Diagnostic, ...] = ()
     gains: Any

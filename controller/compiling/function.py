@@ -18,7 +18,9 @@ from controller.translator.arguments import words_of
 from controller.translator.program import Program
 from controller.translator.types import Type, type_of
 
-INTERPRETED = "SUBREACH_INTERPRETED"  # set in the environment: Python itself runs all functions, which needs no compiler
+INTERPRETED = (
+    "SUBREACH_INTERPRETED"  # set in the environment: Python itself runs all functions, which needs no compiler
+)
 
 _MOST = 8  # sets of arguments that are kept
 _NONE = (None,) * 7
@@ -109,7 +111,7 @@ class BoundCall:
 
 
 class CompiledFunction:
-    """A plain function, run as C: translated and compiled when it is first called, fast when called with the same objects.
+    """A plain function, run as C: compiled when it is first called, fast when it is called with the same objects.
 
     Parameters
     ----------

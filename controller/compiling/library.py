@@ -24,6 +24,7 @@ import platformdirs
 from controller.compiling.compiler import FLAGS, compile_file
 
 log = logging.getLogger(__name__)
+first_use = logging.getLogger("controller.compiling.first_use")  # at INFO, before something is compiled
 
 PREBUILT = Path(__file__).parents[1] / "prebuilt"  # in a wheel; a checkout has none
 _SUFFIX = {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")
@@ -109,7 +110,7 @@ def _is_trusted(path: Path) -> bool:
 
 def _compiled(text: str, name: str) -> Path:
     """Return a library that is compiled now, in the cache if there is a place for it."""
-    log.info("compiling what this machine runs for the first time")
+    first_use.info("compiling %s", name)
     started = time.perf_counter()
     own = _own_folder()
     source, built = own / f"{name}.c", own / f"{name}{_SUFFIX}"

@@ -221,7 +221,6 @@ def pack(regions: Sequence[Region]) -> PackedRegions:
     )
 
 
-
 def evaluate_packed(
     regions: PackedRegions,
     position: Array,

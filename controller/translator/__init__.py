@@ -1,10 +1,9 @@
-"""Compiled laws as portable C: a translator of the Python in which laws are written.
+"""A translator of the Python in which laws are written to portable C.
 
-`laws` gives the C of a law, with its numbers from `static_data`. `program` translates functions with all that they
+`program` translates functions with all that they
 call into one C99 file without heap, `functions` one of them; `statements`, `expressions`, `subscripts` and `calls` are
-the constructs, `operands` and `types` what they are made of; `arguments` makes words of arrays and tuples,
-`foreign` calls C by address, `generated` defines functions
-of a text.
+the constructs, `operands` and `types` what they are made of; `arguments` makes words of arrays and tuples, and
+`static_data` makes data of them; `foreign` calls C by address, `generated` defines functions of a text.
 
-Imports: regions.
+Imports: nothing.
 """

@@ -8,7 +8,7 @@ from typing import Any
 
 
 def functions_of(text: str, names: dict[str, Any]) -> dict[str, FunctionType]:
-    """Define the functions of a text, so that they can be translated.
+    r"""Define the functions of a text, so that they can be translated.
 
     Parameters
     ----------
@@ -25,7 +25,7 @@ def functions_of(text: str, names: dict[str, Any]) -> dict[str, FunctionType]:
     Examples
     --------
     >>> from controller.translator.generated import functions_of
-    >>> functions_of("def double(x):\\n    return 2.0 * x\\n", {"__name__": __name__})["double"](3.0)
+    >>> functions_of("def double(x):\n    return 2.0 * x\n", {"__name__": __name__})["double"](3.0)
     6.0
     """
     found = dict(names)

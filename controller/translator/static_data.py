@@ -55,7 +55,6 @@ def _value(program: Program, path: str, value: Any, arrays: list[str]) -> str:
     return _number(value)
 
 
-
 def _number(x: Any) -> str:
     if isinstance(x, bool | np.bool_):
         return "true" if x else "false"

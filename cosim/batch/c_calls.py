@@ -69,6 +69,6 @@ def seconds(clock: NDArray[np.int64], workspace: NDArray[np.int64]) -> float:
     """Return the time [s] of a `Clock`'s numbers; `workspace`, shape (2,), is what the C function fills."""
     if clock[1] < 0:
         call_c(clock[0], _QUERY_COUNTER, workspace)
-        return workspace[0] / clock[2]
+        return float(workspace[0]) / float(clock[2])
     call_c(clock[0], _CLOCK_GETTIME, clock[1], workspace)
-    return workspace[0] + 1e-9 * workspace[1]
+    return float(workspace[0]) + 1e-9 * float(workspace[1])

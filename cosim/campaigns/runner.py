@@ -118,7 +118,7 @@ def _flown(
     batches, n, refused = Batches(np.flatnonzero(left)), int(left.sum()), 0
     with (
         contextlib.closing(_pool(work.task, workers, executor) if n else InProcess()) as pool,
-        _bar(work, len(work) - n, progress, pool) as bar,
+        _bar(work, len(work) - n, progress) as bar,
         contextlib.closing(fly_all(work, batches, pool)) as tables,
     ):
         for table in tables:
@@ -146,8 +146,8 @@ def _tell(table: Any, before: int) -> int:
     return before + len(rows)
 
 
-def _bar(work: Work, done: int, progress: bool, pool: WorkerPool) -> ProgressBar:
+def _bar(work: Work, done: int, progress: bool) -> ProgressBar:
     return ProgressBar(
-        progress, compiling=pool.compiling, total=len(work), initial=done, desc=work.name, unit=work.unit,
+        progress, total=len(work), initial=done, desc=work.name, unit=work.unit,
         bar_format="{desc} {percentage:3.0f}%|{bar}| {n}/{total} [{elapsed}<{remaining}, {rate_fmt}]",
     )  # fmt: skip

@@ -1,8 +1,7 @@
 """How much of the code its own fast tests go through, against floors: ``make coverage``.
 
-Only where the number means something. Code that Numba compiles is seen by nobody unless compiling is switched off, and
-without it whatever calls a shape by its address cannot run; what the fused loop, other processes and browsers do goes
-unseen as well. The floors stand a little below what was measured.
+Only where the number means something. What is run as C is seen by nobody unless Python runs it itself; what other
+processes and browsers do goes unseen as well. The floors stand a little below what was measured.
 """
 
 import os
@@ -24,7 +23,7 @@ class Part:
     floor: int  # per cent of lines and branches
     tests: tuple[str, ...]
     include: tuple[str, ...]
-    compiled: bool = True  # whether Numba may compile
+    compiled: bool = True  # whether functions are run as C
     omit: str = ""
 
 
@@ -72,9 +71,9 @@ PARTS = (
 def measure(part: Part, folder: Path) -> tuple[bool, str]:
     """Run the tests of a part; return whether they pass and reach its floor, and what there is to say."""
     data = folder / part.name.replace(" ", "-")
-    environment = {**os.environ, "COVERAGE_FILE": str(data), "NUMBA_DISABLE_JIT": str(int(not part.compiled))}
+    environment = {**os.environ, "COVERAGE_FILE": str(data), "SUBREACH_INTERPRETED": "" if part.compiled else "1"}
     coverage = [sys.executable, "-m", "coverage"]
-    # without Numba a lost digit or a division by zero is NumPy's, which warns
+    # in Python a lost digit or a division by zero is NumPy's, which warns
     quiet = [] if part.compiled else ["-W", "ignore::RuntimeWarning"]
     run = [
         *coverage,

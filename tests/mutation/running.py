@@ -106,7 +106,7 @@ class Server:
         objects = copy.parent / "objects"
         objects.mkdir(exist_ok=True)
         environment = {
-            **os.environ, "NUMBA_DISABLE_JIT": "1", "PYTHONDONTWRITEBYTECODE": "1", "PYTHONPATH": str(copy),
+            **os.environ, "SUBREACH_INTERPRETED": "1", "PYTHONDONTWRITEBYTECODE": "1", "PYTHONPATH": str(copy),
             OBJECTS: str(objects), "PATH": f"{_compiler(copy.parent)}{os.pathsep}{os.environ['PATH']}",
             "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1",
         }  # fmt: skip

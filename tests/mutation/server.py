@@ -17,7 +17,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 THIRD_PARTIES = (
-    "pytest", "hypothesis.strategies", "hypothesis.extra.numpy", "numpy", "numba", "numba.extending", "scipy.linalg",
+    "pytest", "hypothesis.strategies", "hypothesis.extra.numpy", "numpy", "scipy.linalg",
     "scipy.optimize", "scipy.spatial.transform", "scipy.integrate", "fmpy.fmi2", "fmpy.fmi3", "platformdirs",
 )  # fmt: skip
 TEST_SECONDS = 30  # of processor time, which no test that ends takes

@@ -52,20 +52,6 @@ def _kernels() -> dict[str, str]:
     return found
 
 
-def _wide() -> bool:
-    """Return whether the code for a loop that could be vectorised has registers of AVX or AVX-512."""
-    import numba
-    import numpy as np
-
-    @numba.njit
-    def add(a, b):
-        for i in range(a.size):
-            a[i] += b[i]
-
-    add(np.zeros(3), np.ones(3))
-    return any(re.search(r"%[yz]mm\d", text) for text in add.inspect_asm().values())
-
-
 if __name__ == "__main__":
-    about = {"kernels": _kernels(), "features": _features(), "dispatched": _dispatched(), "wide": _wide()}
+    about = {"kernels": _kernels(), "features": _features(), "dispatched": _dispatched()}
     sys.stdout.write(json.dumps(about) + "\n")

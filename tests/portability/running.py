@@ -29,10 +29,9 @@ class BrokenError(Exception):
 
 
 def environment_of(variant: Variant, machine: Machine) -> dict[str, str]:
-    """Return the variables of a variant's processes; what Numba compiles for it, it keeps in a folder of its own."""
+    """Return the variables of a variant's processes."""
     outside = {name: value for name, value in os.environ.items() if name not in CHOICES}
-    settings = variant.settings(machine)
-    return {**outside, **settings, "NUMBA_CACHE_DIR": str(FOLDER / variant.name / "numba")}
+    return {**outside, **variant.settings(machine)}
 
 
 def look(python: Path, environment: dict[str, str]) -> Machine:
@@ -42,7 +41,7 @@ def look(python: Path, environment: dict[str, str]) -> Machine:
     if asked.returncode:
         raise BrokenError(f"what it computes with cannot be told: {_last(asked.stderr)}")
     about = json.loads(asked.stdout)
-    return Machine(about["kernels"], frozenset(about["features"]), tuple(about["dispatched"]), about["wide"])
+    return Machine(about["kernels"], frozenset(about["features"]), tuple(about["dispatched"]))
 
 
 def run(variant: Variant, machine: Machine, tests: Sequence[str], limit: float, extras: Sequence[str] = ()) -> Result:

@@ -11,13 +11,13 @@ import pytest
 from tests.portability import running
 from tests.portability.kernels import features_of
 from tests.portability.running import BrokenError, NotToBeHadError, counted, environment_of, run
-from tests.portability.variants import NUMBA, NUMPY, VARIANTS, Machine, Result, by_turns, chosen, table
+from tests.portability.variants import NUMPY, VARIANTS, Machine, Result, by_turns, chosen, table
 
 BY_NAME = {variant.name: variant for variant in VARIANTS}
 AVX2 = frozenset({"sse3", "avx2", "fma3"})
 AVX512 = AVX2 | {"avx512f", "avx512cd", "avx512bw", "avx512dq", "avx512vl"}
-OLD = Machine({"numpy": "Haswell", "scipy": "Haswell"}, AVX2, ("AVX2",), True)
-NEW = Machine({"numpy": "SkylakeX", "scipy": "SkylakeX"}, AVX512, ("X86_V3", "X86_V4"), True)
+OLD = Machine({"numpy": "Haswell", "scipy": "Haswell"}, AVX2, ("AVX2",))
+NEW = Machine({"numpy": "SkylakeX", "scipy": "SkylakeX"}, AVX512, ("X86_V3", "X86_V4"))
 
 
 def test_a_list_of_names_chooses_variants():
@@ -39,7 +39,7 @@ def test_what_the_processor_lacks_is_named():
     assert BY_NAME["skylakex"].reason_to_skip(NEW) == ""
     assert BY_NAME["skylakex"].reason_to_skip(OLD).startswith("the processor lacks avx512f, avx512cd")
     assert BY_NAME["zen"].reason_to_skip(OLD) == ""
-    apple = Machine({}, frozenset({"neon"}), (), False)
+    apple = Machine({}, frozenset({"neon"}), ())
     assert BY_NAME["haswell"].reason_to_skip(apple) == "neither NumPy nor SciPy brings an OpenBLAS along"
     assert "beyond the least" in BY_NAME[NUMPY].reason_to_skip(apple)
     assert BY_NAME["py312"].reason_to_skip(apple) == ""
@@ -53,22 +53,18 @@ def test_features_are_read_from_linux():
 
 
 def test_a_kernel_of_only_one_package_is_not_enough():
-    half = Machine({"numpy": "Haswell", "scipy": "SkylakeX"}, AVX512, (), True)
+    half = Machine({"numpy": "Haswell", "scipy": "SkylakeX"}, AVX512, ())
     assert BY_NAME["haswell"].not_taken(half) == "OpenBLAS of scipy runs its kernels for SkylakeX"
     assert BY_NAME["zen"].not_taken(OLD) == ""
     assert BY_NAME["py311"].not_taken(half) == ""
-    assert BY_NAME[NUMBA].not_taken(OLD) == "Numba still makes code for wide registers"
     assert BY_NAME[NUMPY].not_taken(NEW) == "NumPy still takes its code for X86_V3, X86_V4"
 
 
 def test_the_environment_is_the_variant_s_alone(monkeypatch):
     monkeypatch.setenv("OPENBLAS_CORETYPE", "Zen")
-    monkeypatch.setenv("NUMBA_CPU_FEATURES", "+avx2")
     there = environment_of(BY_NAME[NUMPY], NEW)
     assert there["NPY_DISABLE_CPU_FEATURES"] == "X86_V3,X86_V4"
-    assert "OPENBLAS_CORETYPE" not in there and "NUMBA_CPU_FEATURES" not in there
-    folders = {environment_of(variant, NEW)["NUMBA_CACHE_DIR"] for variant in VARIANTS}
-    assert len(folders) == len(VARIANTS)
+    assert "OPENBLAS_CORETYPE" not in there
 
 
 REPORT = """<testsuites><testsuite tests="4">
@@ -160,7 +156,6 @@ def test_a_reason_is_the_error_and_its_first_cause():
 def test_libraries_are_asked_what_they_run():
     pytest.importorskip("threadpoolctl")
     command = [sys.executable, "-m", "tests.portability.kernels"]
-    environment = os.environ | {"NUMBA_CPU_NAME": "generic", "NUMBA_DISABLE_JIT": "0"}
-    about = json.loads(subprocess.run(command, env=environment, capture_output=True, text=True, check=True).stdout)
-    assert about["features"] and not about["wide"]
+    about = json.loads(subprocess.run(command, capture_output=True, text=True, check=True).stdout)
+    assert about["features"]
     assert all(about["kernels"].values())

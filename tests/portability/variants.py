@@ -1,4 +1,4 @@
-"""What the tests are run with, one at a time: kernels of OpenBLAS, processors that Numba and NumPy see, Pythons."""
+"""What the tests are run with, one at a time: kernels of OpenBLAS, the processor that NumPy sees, Pythons."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
 # what chooses a variant; none of it is taken over from outside
-CHOICES = ("OPENBLAS_CORETYPE", "NUMBA_CPU_NAME", "NUMBA_CPU_FEATURES", "NPY_DISABLE_CPU_FEATURES")
+CHOICES = ("OPENBLAS_CORETYPE", "NPY_DISABLE_CPU_FEATURES")
 
 
 @dataclass(frozen=True)
@@ -16,7 +16,6 @@ class Machine:
     kernels: dict[str, str]  # of the OpenBLAS that each package brings along, by package; none where it brings none
     features: frozenset[str]  # of the processor, as NumPy and Linux name them, in lower case
     dispatched: tuple[str, ...]  # those for which NumPy has code of its own, that it takes
-    wide: bool  # whether Numba makes code for more than SSE2's registers
 
 
 @dataclass(frozen=True)
@@ -52,12 +51,10 @@ class Variant:
                 return f"OpenBLAS of {package} runs its kernels for {kernel}"
         if self.name == NUMPY and seen.dispatched:
             return f"NumPy still takes its code for {', '.join(seen.dispatched)}"
-        if self.name == NUMBA and seen.wide:
-            return "Numba still makes code for wide registers"
         return ""
 
 
-NUMBA, NUMPY = "numba-generic", "numpy-baseline"
+NUMPY = "numpy-baseline"
 _AVX2 = ("avx2", "fma3")
 _AVX512 = ("avx512f", "avx512cd", "avx512bw", "avx512dq", "avx512vl")
 
@@ -67,7 +64,6 @@ VARIANTS = (
     # kernels that an OpenBLAS is built without are others by another name, and it tells the first name that they have
     Variant("zen", {"OPENBLAS_CORETYPE": "Zen"}, _AVX2, ("Zen", "Haswell")),
     Variant("prescott", {"OPENBLAS_CORETYPE": "Prescott"}, ("sse3",), ("Prescott", "Katmai")),
-    Variant(NUMBA, {"NUMBA_CPU_NAME": "generic"}),
     Variant(NUMPY),
     *(Variant(f"py{version.replace('.', '')}", python=version) for version in ("3.11", "3.12", "3.13", "3.14")),
 )

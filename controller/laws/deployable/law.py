@@ -99,7 +99,9 @@ def step(
         return
 
     # fault detection
-    failed = fault_detection.detect_fault(memory.fault_state, estimate, memory.attitude.residual, dynamics, thrusters, R, gains, period, measured)
+    failed = fault_detection.detect_fault(
+        memory.fault_state, estimate, memory.attitude.residual, dynamics, thrusters, R, gains, period, measured
+    )
     if failed >= 0 or input_validation.reports_change(state.thruster_health, memory.reported, thrusters.health):
         input_validation.update_thrusters(memory, state.thruster_health, failed)
         observer.inflate_covariance(estimate, 0.01)
@@ -148,7 +150,9 @@ def step(
         gains.braking_share * _braking(dynamics, thrusters),
         _SPREADS * observer.position_spread(estimate) + 0.5 * gains.acceleration * square(period),
     )
-    rows = write_rows(work, memory.observation, regions, memory.weights, motion, thrusters.lower, thrusters.upper, gains)
+    rows = write_rows(
+        work, memory.observation, regions, memory.weights, motion, thrusters.lower, thrusters.upper, gains
+    )
 
     # quadratic program
     steps = quadratic_program.solve(work, rows, thrusters.inverse, thrusters.lower, thrusters.upper, forces)
@@ -250,7 +254,6 @@ def _report_program(report: Array, multipliers: Array, price: Array, rows: int, 
             active += 1
             yielding = max(yielding, multipliers[i] * price[i])
     report[11], report[12], report[13] = active, yielding, steps
-
 
 
 class DeployableLaw(CompiledLaw):

@@ -91,10 +91,6 @@ class Cluster:
         if time.monotonic() - self._seen > _PATIENCE:
             raise RunError(f"the cluster has had no workers for {_PATIENCE:g} s; what is flown is kept")
 
-    def compiling(self) -> bool:
-        """Say no: what the cluster compiles is not told."""
-        return False
-
     def _look(self) -> None:
         try:
             self._workers = sum(self._client.nthreads().values())

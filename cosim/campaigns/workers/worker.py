@@ -13,7 +13,6 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from cosim.campaigns.workers.work import Flyer, Task
-from cosim.run.progress import CompileCounter
 
 
 @dataclass
@@ -98,18 +97,11 @@ def flyer_held(task: Task) -> Iterator[None]:
         _held.free()
 
 
-def begin_worker(compiling: Any) -> None:
-    """Leave Ctrl-C and a closed terminal to the parent, tell it what is compiled, and end when it does.
-
-    Parameters
-    ----------
-    compiling : shared int
-        Becomes how many functions are being compiled.
-    """
+def begin_worker() -> None:
+    """Leave Ctrl-C and a closed terminal to the parent, and end when it does."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     if hasattr(signal, "SIGHUP"):
         signal.signal(signal.SIGHUP, signal.SIG_IGN)
-    CompileCounter(lambda depth: setattr(compiling, "value", depth))
     signal.signal(signal.SIGTERM, _end_worker)
     threading.Thread(target=_follow_parent, name="follow-parent", daemon=True).start()
 

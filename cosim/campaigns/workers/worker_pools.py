@@ -46,9 +46,6 @@ class WorkerPool(Protocol):
     def check(self) -> None:
         """Raise an error if nothing that is under way will ever come home."""
 
-    def compiling(self) -> bool:
-        """Return whether one of its processes, other than this one, is compiling, as far as that is known."""
-
     def close(self) -> None:
         """Send everybody home; what is under way is lost."""
 
@@ -71,10 +68,6 @@ class InProcess:
     def check(self) -> None:
         """Wait for nobody."""
 
-    def compiling(self) -> bool:
-        """Leave what this process compiles to who listens here."""
-        return False
-
     def close(self) -> None:
         """Nobody to send home."""
 
@@ -84,7 +77,6 @@ class _Worker:
     """One process. Each has a pool of its own, so that when it dies, we know of what, and the others go on."""
 
     pool: ProcessPoolExecutor
-    compiling: Any  # shared with the process: how many functions it is compiling, each within another one
     under_way: list[Flight] = field(default_factory=list)  # in order of submission: the first is being flown
     fatal: Flight | None = None  # what the process has died of
 
@@ -143,10 +135,6 @@ class Processes:
     def check(self) -> None:
         """Be sure to hear of every death."""
 
-    def compiling(self) -> bool:
-        """Return whether one of the processes is compiling."""
-        return any(worker.compiling.value for worker in self._workers)
-
     def _replace(self, worker: _Worker) -> _Worker:
         new = self._free_worker()
         self._workers[self._workers.index(worker)] = new
@@ -156,11 +144,10 @@ class Processes:
     def _free_worker(self) -> _Worker:
         """Start a process, and have it get ready, which takes it a second."""
         context = multiprocessing.get_context("spawn")
-        compiling = context.RawValue("i", 0)
         with interrupts_held():
-            pool = ProcessPoolExecutor(1, mp_context=context, initializer=begin_worker, initargs=(compiling,))
+            pool = ProcessPoolExecutor(1, mp_context=context, initializer=begin_worker)
             pool.submit(prepare, self._task)
-        return _Worker(pool, compiling)
+        return _Worker(pool)
 
     def close(self) -> None:
         """Send everybody home."""
@@ -201,10 +188,6 @@ class ExternalExecutor:
 
     def check(self) -> None:
         """Believe the executor."""
-
-    def compiling(self) -> bool:
-        """Say no: whoever has made the executor does not tell."""
-        return False
 
     def close(self) -> None:
         """Leave the executor to whom it belongs."""

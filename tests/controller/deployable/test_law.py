@@ -46,7 +46,7 @@ def test_the_law_without_its_compiler_is_the_same_to_rounding():
         "from tests.controller.deployable.scenery import *\n"
         "print(fly(law_for(REGIONS), Sea(noise=(0.02, 0.01)), steps=12).tolist())\n"
     )
-    environment = os.environ | {"NUMBA_DISABLE_JIT": "1", "PYTHONPATH": str(ROOT), "PYTHONWARNINGS": "ignore"}
+    environment = os.environ | {"SUBREACH_INTERPRETED": "1", "PYTHONPATH": str(ROOT), "PYTHONWARNINGS": "ignore"}
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=environment, check=False)
     assert done.returncode == 0, done.stderr
     plain = np.array(eval(done.stdout))

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from controller.errors import TranslationError
-from controller.jit.stack_array import zeros
+from controller.stack_array import zeros
 from controller.translator.types import type_of
 from tests.controller.translator.building import Called, compiled, translated
 

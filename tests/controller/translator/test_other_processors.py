@@ -107,7 +107,4 @@ def test_a_law_that_does_not_fit_is_refused():
 def test_what_has_no_numbers_begins_as_null():
     flight, program = Flight("pd"), Program()
     program.export("law", flight.function, tuple(map(type_of, flight.arguments)))
-    data = static_data(program, "law", flight.arguments)
-    assert "{NULL, 0}" in data  # its report
-    address = flight.regions.place
-    assert address and str(address) not in data
+    assert "{NULL, 0}" in static_data(program, "law", flight.arguments)  # its report

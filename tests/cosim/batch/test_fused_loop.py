@@ -11,7 +11,6 @@ import pytest
 
 from controller import LAWS, IsmailDunniganLaw, VehicleState
 from controller.allocation import Allocation
-from cosim.batch import fused_loop
 from cosim.batch.c_calls import Clock, fmi_do_step, seconds
 from cosim.campaigns.scenes.flyer import Conditions, SceneFlyer
 from cosim.campaigns.scenes.scene import Failure, Obstacle, SphereSpec, known_scene, plant_values, read_scenes
@@ -192,7 +191,6 @@ class _Loose(IsmailDunniganLaw):
 @pytest.fixture
 def loose(monkeypatch):
     monkeypatch.setitem(LAWS, "loose", _Loose)
-    monkeypatch.setattr(fused_loop, "_compiled", fused_loop._plain)
     monkeypatch.setattr(_Loose, "calls", 0)
     with SceneFlyer("loose", SHORT) as flyer:
         yield flyer

@@ -7,7 +7,6 @@ import pytest
 
 from controller import LAWS, IsmailDunniganLaw
 from controller.paper_law import Gains
-from cosim.batch import fused_loop
 from cosim.campaigns import compare
 from cosim.campaigns.comparison import difference, pair
 from cosim.campaigns.pages.comparison_page import write_comparison_page
@@ -30,7 +29,6 @@ class Idle(IsmailDunniganLaw):
 @pytest.fixture
 def idle(monkeypatch):
     monkeypatch.setitem(LAWS, "idle", Idle)
-    monkeypatch.setattr(fused_loop, "_compiled", fused_loop._plain)
 
 
 @pytest.fixture

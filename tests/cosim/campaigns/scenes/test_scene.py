@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from controller import LAWS, IsmailDunniganLaw
-from cosim.batch import fused_loop
 from cosim.campaigns.scenes.flyer import Conditions, SceneFlyer
 from cosim.campaigns.scenes.scene import Failure, known_scene, plant_values, read_scenes
 from cosim.errors import ScenarioError
@@ -135,7 +134,6 @@ def _frozen(value):
 def spied(monkeypatch):
     """Return a function that flies a scene for half a second, and what the law was made of and given."""
     monkeypatch.setitem(LAWS, "spy", _Spy)
-    monkeypatch.setattr(fused_loop, "_compiled", fused_loop._plain)
 
     def fly(scene, tell=False):
         with SceneFlyer("spy", Conditions(duration=0.5, tell_failures=tell)) as flyer:
