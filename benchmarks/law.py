@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import time
-import types
-from collections.abc import Callable
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,8 +11,10 @@ from numpy.typing import NDArray
 from benchmarks.table import Row, compared
 from benchmarks.timing import Timing
 from controller import LAWS, VehicleState
+from controller.compiling.function import BoundCall
 from controller.regions import DepthBand, Region, Sphere, pack
 from controller.regions.region_set import PackedRegions
+from controller.translator.foreign import POINTER, call_c
 from cosim.batch.c_calls import Clock, seconds
 from cosim.scenario.vehicle_model import vehicle_model
 from plant_fmu.vehicle import load_vehicle
@@ -24,7 +24,6 @@ RATIO = "how many times as long as the paper's law"
 OBSTACLES = (1, 6, 14, 40)
 _PERIOD = 0.02  # s
 _SPEED = 0.6  # m/s
-_step: Any = None  # of a law: `_loop_of` puts it there
 
 
 def _scenery(obstacles: int) -> tuple[PackedRegions, PackedRegions]:
@@ -39,37 +38,26 @@ def _scenery(obstacles: int) -> tuple[PackedRegions, PackedRegions]:
     return pack([Region("goal", Sphere((10.0, 0.0, 3.0), 0.5), "in")]), pack([*balls, band])
 
 
-def _steps(
-    state: VehicleState,
-    places: Any,
-    velocities: Any,
-    goal: PackedRegions,
-    regions: PackedRegions,
-    weights: Any,
-    gains: Any,
-    memory: Any,
-    forces: Any,
-    clock: Any,
-    times: Any,
-) -> None:
-    """Take a law's steps at places along its way, with velocities as measured there, and write what each took [s]."""
-    room = np.zeros(2, np.int64)
-    for k in range(places.shape[0]):
-        state.position[:] = places[k]
-        state.velocity_body[:3] = velocities[k]
+class _Track(NamedTuple):
+    """What a law is told step by step, and where it reads that."""
+
+    state: VehicleState
+    places: Any  # (k, 3) m
+    velocities: Any  # (k, 3) m/s, as measured there
+
+
+def _steps(track: _Track, law: int, words: int, room: Any, clock: Any, times: Any) -> None:
+    """Take a law's steps along its way, and write what each took [s]; `law` is called with its `words` by address."""
+    state = track.state
+    for k in range(track.places.shape[0]):
+        for axis in range(3):
+            state.position[axis] = track.places[k, axis]
+            state.velocity_body[axis] = track.velocities[k, axis]
         before = seconds(clock, room)
-        _step(state, goal, regions, weights, gains, memory, forces)
+        call_c(law, (POINTER,), words)
         times[k, 0] = seconds(clock, room) - before
         before = seconds(clock, room)
         times[k, 1] = seconds(clock, room) - before  # what reading the clock takes
-
-
-def _loop_of(law: str) -> Callable[..., None]:
-    """Return `_steps` compiled for a law: a call from Python costs more than the step."""
-    names = globals() | {"_step": LAWS[law].function}
-    copy = types.FunctionType(_steps.__code__, names, f"_steps_{law}")
-    copy.__qualname__ = copy.__name__
-    return compiled(copy)
 
 
 class LawSteps:
@@ -85,7 +73,7 @@ class LawSteps:
 
     def __init__(self, law: str, obstacles: int) -> None:
         self._vehicle, self._scenery = vehicle_model(load_vehicle("odin")), _scenery(obstacles)
-        self._kind, self._loop, self._clock = LAWS[law], _loop_of(law), _process_clock()
+        self._kind, self._clock = LAWS[law], _process_clock()
         self.each(1)  # compiles
 
     def seconds(self, count: int) -> float:
@@ -98,14 +86,14 @@ class LawSteps:
         gains, n, m = kind.gains_type(), regions.kinds.size, vehicle.thruster_matrix.shape[1]
         forces, level = np.zeros(m if kind.output == "thrusters" else 6), np.array([1.0, 0.0, 0.0, 0.0])
         state = VehicleState(np.zeros(3), level, np.zeros(6), np.ones(m))
-        rng, times = np.random.default_rng(0), np.zeros((count, 2))
+        rng, times, room = np.random.default_rng(0), np.zeros((count, 2)), np.zeros(2, np.int64)
         gone = np.arange(count) * _PERIOD * _SPEED
         along = np.abs((gone + 8.0) % 16.0 - 8.0)
         places = np.c_[along, 0.1 * np.sin(along), np.full(count, 3.0)] + 0.02 * rng.normal(size=(count, 3))
         velocities = np.c_[np.where(gone % 16.0 < 8.0, _SPEED, -_SPEED), np.zeros((count, 2))]
         velocities += 0.01 * rng.normal(size=(count, 3))
-        memory = kind.for_vehicle(vehicle, gains, level, _PERIOD, n).memory
-        self._loop(state, places, velocities, goal, regions, np.ones(n), gains, memory, forces, self._clock, times)
+        law = kind.for_vehicle(vehicle, gains, level, _PERIOD, n).bound(state, goal, regions, np.ones(n), forces)
+        BoundCall(_steps, (_Track(state, places, velocities), law.address, law.words, room, self._clock, times)).call()
         taken: NDArray[np.float64] = times[:, 0] - np.median(times[:, 1])
         return taken
 

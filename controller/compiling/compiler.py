@@ -38,8 +38,7 @@ def compiler_command() -> list[str]:
         return [path]
     if importlib.util.find_spec("ziglang"):
         return [sys.executable, "-m", "ziglang", "cc"]
-    hint = f"{shlex.quote(sys.executable)} -m pip install ziglang"
-    raise CompilationError(f"no C compiler: neither cc nor the ziglang package was found; {hint}")
+    raise CompilationError("no C compiler: neither cc nor the ziglang package was found")
 
 
 def compile_file(source: Path, library: Path, flags: Sequence[str] = ()) -> None:

@@ -67,7 +67,7 @@ def _entry(function: FunctionType, types: tuple[Type, ...]) -> Any:
 
 
 class BoundCall:
-    """A function with its arguments, which stay alive as long as it can be called.
+    """A function with its arguments, which stay alive as long as it, or its `call`, does.
 
     Parameters
     ----------
@@ -85,13 +85,14 @@ class BoundCall:
     """
 
     def __init__(self, function: Any, arguments: tuple[Any, ...]) -> None:
-        self._arguments = arguments
         self._raised: BaseException | None = None
         if isinstance(function, FunctionType) and not os.environ.get(INTERPRETED):
             self._entry = _entry(function, tuple(map(type_of, arguments)))
             self._words = words_of(arguments)
             self.words: int = self._words.ctypes.data
-            self.call: Callable[[], None] = functools.partial(self._entry, self.words)
+            call: Any = functools.partial(self._entry, self.words)
+            call.kept = self._words, arguments  # whoever has it alone can call it
+            self.call: Callable[[], None] = call
         else:
             self.words, self.call = 0, functools.partial(function, *arguments)
             self._entry = _CALLBACK(self._called_back)

@@ -53,7 +53,7 @@ def library_of(text: str) -> ctypes.PyDLL:
     name = library_name(text)
     for folder in (PREBUILT, _cache()):
         path = folder / f"{name}{_SUFFIX}"
-        if _is_trusted(path) and _is_whole(path):
+        if _is_trusted(folder) and _is_whole(path):
             return ctypes.PyDLL(str(path))
     return ctypes.PyDLL(str(_compiled(text, name)))
 
@@ -94,25 +94,31 @@ def _is_whole(path: Path) -> bool:
     return whole
 
 
-def _is_trusted(path: Path) -> bool:
-    """Return whether none but the user, or who installed the package, may change what is about to be run."""
+def _is_trusted(folder: Path) -> bool:
+    """Return whether none but the user, or who installed the package, may change what lies there and is to be run."""
     try:
-        about, trusted = path.parent.stat(), {Path(__file__).stat().st_uid}
+        about, trusted = folder.stat(), {Path(__file__).stat().st_uid}
     except OSError:
         return False
     if os.name != "posix":
         return True
     if about.st_uid in trusted | {os.geteuid()} and not about.st_mode & stat.S_IWOTH:
         return True
-    log.warning("%s: others can write there; compiled for this process alone", path.parent)
+    _tell_of_others(folder)
     return False
+
+
+@functools.cache
+def _tell_of_others(folder: Path) -> None:
+    """Say it once, however many libraries there are."""
+    log.warning("%s: others can write there; compiled for this process alone", folder)
 
 
 def _compiled(text: str, name: str) -> Path:
     """Return a library that is compiled now, in the cache if there is a place for it."""
     first_use.info("compiling %s", name)
     started = time.perf_counter()
-    own = _own_folder()
+    own = Path(tempfile.mkdtemp(dir=_own_folder()))
     source, built = own / f"{name}.c", own / f"{name}{_SUFFIX}"
     source.write_text(text, encoding="utf-8")
     compile_file(source, built)
@@ -120,7 +126,7 @@ def _compiled(text: str, name: str) -> Path:
     kept = _cache() / built.name
     try:
         kept.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
-        if not _is_trusted(kept):
+        if not _is_trusted(kept.parent):
             return built
         library = built.read_bytes()
         _write_whole(checksum_path(kept), hashlib.sha256(library).hexdigest().encode())

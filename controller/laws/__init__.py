@@ -2,7 +2,7 @@
 
 A module that is put here is a law, known by the module's name.
 
-Imports: jit, regions.
+Imports: regions.
 """
 
 from importlib import import_module

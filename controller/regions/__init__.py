@@ -1,6 +1,6 @@
 """Regions: where the vehicle shall be, and where it shall not.
 
-Imports: jit.
+Imports: compiling, translator.
 """
 
 from controller.regions.region_set import Region, pack

@@ -1,6 +1,6 @@
 """The stability analysis of the paper's law, (30)-(45), as functions that can be asked where it holds.
 
-Imports: jit.
+Imports: nothing.
 """
 
 from controller.theory.bounds import decay_bound, norm_bound, square_bound

@@ -65,12 +65,13 @@ class Calls(Subscripts):
         return self.fail(node, f"a call of {name or function!r}")
 
     def _foreign(self, operands: Sequence[Operand], node: ast.AST) -> Value:
-        address, kinds, *given = operands
-        if not isinstance(kinds, Known) or len(kinds.value) != len(given):
-            self.fail(node, "a call of C whose kinds are no constant, one for each argument")
+        address, listed, *given = operands
+        kinds = [kind.value for kind in self.items_of(listed, node) if isinstance(kind, Known)]
+        if len(kinds) != len(given):
+            self.fail(node, "a call of C whose kinds are no constants, one for each argument")
         values = [self.value(operand, node) for operand in given]
-        codes = [_as_kind(value, kind) for value, kind in zip(values, kinds.value, strict=True)]
-        function = f"(int (*)({', '.join(kinds.value)}))(intptr_t)"
+        codes = [_as_kind(value, kind) for value, kind in zip(values, kinds, strict=True)]
+        function = f"(int (*)({', '.join(kinds)}))(intptr_t)"
         return self.temporary(INT, f"({function}{self.scalar(address, node).code})({', '.join(codes)})")
 
     def _of_math(self, name: str, operands: Sequence[Operand], node: ast.AST) -> Value:

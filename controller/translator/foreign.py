@@ -34,6 +34,6 @@ def call_c(address: int, kinds: tuple[str, ...], *arguments: Any) -> int:
     int
         What it returns.
     """
-    function = ctypes.PYFUNCTYPE(ctypes.c_int, *(_TYPES[kind] for kind in kinds))(address)
+    function = ctypes.PYFUNCTYPE(ctypes.c_int, *(_TYPES[kind] for kind in kinds))(int(address))
     returned: int = function(*(getattr(argument, "ctypes", argument) for argument in arguments))
     return returned

@@ -9,7 +9,7 @@ from tests.mutation.mutants import mutants_of
 from tests.mutation.plan import ROOT, all_mutants, equivalent, part_of, parts
 from tests.mutation.running import sample
 
-NO_MATHEMATICS = {"controller/jit/jit.py", "controller/errors.py"}  # of messages and of files that are kept
+NO_MATHEMATICS = {"controller/errors.py", "controller/stack_array.py"}
 
 PYTHON = """
 x = "a - b" + f"{1 - 2}"  # a - b

@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-import controller.jit.jit
+from controller.compiling import library
 from cosim.campaigns.store.folder import PLAN, read_plan
 from cosim.errors import RunError
 from cosim.io.atomic_file import atomic_file, write_atomic
@@ -226,15 +226,13 @@ def test_what_fails_leaves_what_was(tmp_path):
 
 @pytest.mark.skipif(os.name != "posix", reason="of POSIX")
 def test_code_kept_where_others_write_is_not_loaded(tmp_path, monkeypatch):
-    source = tmp_path / "it.py"
-    source.write_text("")
     folder = tmp_path / "kept"
     folder.mkdir(mode=0o755)
-    assert controller.jit.jit._is_ours(folder, source)
+    assert library._is_trusted(folder)
     folder.chmod(0o777)
     assert stat.S_IMODE(folder.stat().st_mode) == 0o777
-    assert not controller.jit.jit._is_ours(folder, source)
+    assert not library._is_trusted(folder)
     folder.chmod(0o755)
-    monkeypatch.setattr(os, "geteuid", lambda: source.stat().st_uid + 1)
-    assert controller.jit.jit._is_ours(folder, source)  # who owns the code owns what is kept of it
-    assert controller.jit.jit._is_ours(tmp_path / "none yet", source)
+    monkeypatch.setattr(os, "geteuid", lambda: folder.stat().st_uid + 1)
+    assert library._is_trusted(folder) == (os.stat(library.__file__).st_uid == folder.stat().st_uid)
+    assert not library._is_trusted(tmp_path / "none yet")

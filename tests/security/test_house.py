@@ -11,10 +11,15 @@ CALLS = {"eval", "exec", "compile", "__import__", "input"}
 MAY = {
     ("exec", "fuzzy_arbiter/compiled.py"),  # text of our own making
     ("compile", "fuzzy_arbiter/compiled.py"),
-    ("exec", "controller/regions/kinds.py"),  # likewise: a choice among the shapes that there are
-    ("compile", "controller/regions/kinds.py"),
+    ("exec", "controller/translator/generated.py"),  # likewise
+    ("compile", "controller/translator/generated.py"),
 }
-PROCESSES = {"plant_fmu/compiling/compiler.py", "plant_fmu/importers/process.py", "cosim/batch/lanes_library.py"}
+PROCESSES = {
+    "controller/compiling/compiler.py",
+    "plant_fmu/compiling/compiler.py",
+    "plant_fmu/importers/process.py",
+    "cosim/batch/lanes_library.py",
+}
 XML = {"plant_fmu/unpacking.py"}
 ZIPS = {
     "plant_fmu/unpacking.py",

@@ -1,6 +1,6 @@
 """The deployable law: keeps the paper's idea and works within real thrusters.
 
-Imports: jit, regions.
+Imports: regions.
 """
 
 from controller.laws.deployable.gains import DeployableGains

@@ -2,7 +2,7 @@
 
 A file that is put here is a shape, known by the name of the file; C code of the same name may stand beside it.
 
-Imports: jit.
+Imports: nothing.
 """
 
 from importlib import import_module

@@ -19,6 +19,9 @@ from controller.laws.deployable.path_planner import (
 from controller.regions import Box, DepthBand, HalfSpace, Region, Sphere, pack
 from controller.regions.region_set import clearance_at
 
+# of the generator of random numbers, on purpose
+pytestmark = pytest.mark.filterwarnings("ignore:overflow encountered:RuntimeWarning")
+
 GAINS = DeployableGains()
 START = np.array([0.0, 0.0, 2.5])
 GOAL = Region("goal", Sphere((9.0, 0.0, 2.5), 0.5), "in")
@@ -201,11 +204,11 @@ def test_looks_are_bounded(monkeypatch):
         looked.append(i)
         return clearance_at(regions, i, point)
 
-    monkeypatch.setitem(way_round.path_cost.py_func.__globals__, "clearance_of_place", counting)
+    monkeypatch.setitem(way_round.path_cost.__globals__, "clearance_of_place", counting)
     regions = pack([Region(f"floor {i}", HalfSpace((0.0, 0.0, -1.0), (0.0, 0.0, 2.55)), "in") for i in range(3)])
     way = np.zeros((CORNERS + 1, 3))
     way[:] = [(100.0 * (i + 1), 50.0 * (-1.0) ** i, 2.5) for i in range(CORNERS + 1)]
-    way_round.path_cost.py_func(way, CORNERS + 1, START, regions, np.zeros(3), GAINS)
+    way_round.path_cost(way, CORNERS + 1, START, regions, np.zeros(3), GAINS)
     assert len(looked) == 64 * 3
 
 

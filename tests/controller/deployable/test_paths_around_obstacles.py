@@ -17,6 +17,9 @@ from controller.laws.deployable.path_planner import (
 from controller.regions import Box, DepthBand, Orientation, Region, Sphere, pack
 from controller.regions.region_set import clearance_at
 
+# of the generator of random numbers, on purpose
+pytestmark = pytest.mark.filterwarnings("ignore:overflow encountered:RuntimeWarning")
+
 GAINS = DeployableGains()
 START = np.array([0.0, 0.2, 2.5])
 REGIONS = [

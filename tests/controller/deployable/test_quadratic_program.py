@@ -231,9 +231,9 @@ def test_forces_stay_within_their_limits_whatever_the_numbers():
         thrusters, rows, right, price, wanted = program(rng, str(rng.choice(KINDS)))
         n = len(right)
         rows, wanted = rows * rng.choice(far, (n, 1)), wanted * rng.choice(far, 8)
-        with np.errstate(over="ignore"):
+        with np.errstate(over="ignore", invalid="ignore"):
             right, price = right * rng.choice(far, n), price * rng.choice(far, n)
-        forces, y, steps = ask(thrusters, rows, right, price, wanted)
+            forces, y, steps = ask(thrusters, rows, right, price, wanted)
         ended += steps < 0
         assert np.all(forces >= thrusters.lower) and np.all(forces <= thrusters.upper)
         assert np.all(y >= 0.0)

@@ -13,6 +13,9 @@ from controller.quaternion import rotation_matrix
 from controller.regions import Orientation, Region, pack
 from tests.controller.deployable.scenery import GOAL, REGIONS, Sea, fly, law_for
 
+# of the generator of random numbers, on purpose
+pytestmark = pytest.mark.filterwarnings("ignore:overflow encountered:RuntimeWarning")
+
 GAINS = DeployableGains()
 ALL = [*REGIONS, Region("face", Orientation((0.98, 0.0, 0.0, 0.2), 0.1), "in")]
 

@@ -2,17 +2,14 @@
 
 import math
 
-import numba
 import numpy as np
 import pytest
 from pymavlink.dialects.v20 import all as mavlink
 from scipy.spatial.transform import Rotation
 
-from controller.regions.rays import ray_distances
-from cosim.mavlink.autopilot import Autopilot
-from cosim.mavlink.wire.options import PROFILES, MavlinkOptions
+from cosim.mavlink.wire.options import PROFILES
 from cosim.scenario.tables import PARKED_POSITION
-from tests.cosim.mavlink.station import COLUMNS, Station, scenario
+from tests.cosim.mavlink.station import Station, scenario
 
 NOTHING, UNKNOWN = 2001, 0xFFFF
 AHEAD, RIGHT, BEHIND, LEFT = 0, 18, 36, 54
@@ -219,23 +216,3 @@ def test_the_nearest_points_are_those_of_the_scan():
     assert (second.x, second.y, second.z) == pytest.approx((5.0, 0.0, 0.0), abs=1e-6)
     (message,) = asked(stood)
     assert message.distances[AHEAD] == 500 and message.distances[RIGHT] == 350
-
-
-# ---- compiled code -------------------------------------------------------------------------------------------------
-
-
-def test_all_that_is_compiled_is_loaded_when_it_is_made(monkeypatch):
-    called = []
-
-    def noted(*args):
-        called.append(tuple(map(numba.typeof, args)))
-        ray_distances(*args)
-
-    monkeypatch.setattr("cosim.mavlink.vehicle.proximity.ray_distances", noted)
-    none = scenario("commands.enabled=false", "regions.SR1.criterion='shape'")
-    for known in (none, scenario()):
-        called.clear()
-        Autopilot(known, COLUMNS, MavlinkOptions(), None)
-        assert len(called) == 1
-        scan(Station(of=known))
-        assert len(called) > 2 and len(set(called)) == 1

@@ -41,7 +41,7 @@ def test_it_is_said_once_and_only_if_it_happens():
 def test_a_function_that_is_compiled_says_so_and_one_that_is_kept_does_not(monkeypatch, tmp_path):
     from controller.compiling import library
 
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    monkeypatch.setattr("platformdirs.user_cache_dir", lambda name: str(tmp_path / name))
     text = "void entry(const void *words);\nvoid entry(const void *words) { (void)words; }\n"
     told = []
     for expected in ([WORDS], [WORDS, WORDS][:1]):

@@ -23,7 +23,6 @@ METHODS = {
     "ParquetFile", "read_table", "read_metadata", "read_schema", "fromstring", "iterparse", "unpack", "unpack_from",
 }  # fmt: skip
 ITS_OWN = {  # what parses nothing that comes from outside: why
-    "controller.jit.function_pointer:_lowered": "arguments of a compiled call",
     "controller.laws.deployable.braking:_least_forces": "an array in memory",
     "cosim.campaigns.reruns.repeat:_of_sweep": "a copy of the plan, which was read",
     "cosim.campaigns.store.folder:CampaignFolder._claim": "a copy of its own plan",

@@ -105,22 +105,26 @@ TOLD = {
 }
 
 
+class _Noting:
+    """A step that Python runs: what is no plain function is not translated."""
+
+    def __call__(self, *arguments):
+        _Spy.steps.append(_frozen(arguments))
+        IsmailDunniganLaw.function(*arguments)
+
+
 class _Spy(IsmailDunniganLaw):
     """Notes all that it is made of, and all that it is given at each step."""
 
     name = "spy"
     made = ()
     steps = ()
+    function = _Noting()
 
     @classmethod
     def for_vehicle(cls, *arguments):
         _Spy.made, _Spy.steps = _frozen(arguments), []
         return super().for_vehicle(*arguments)
-
-    @staticmethod
-    def function(*arguments):
-        _Spy.steps.append(_frozen(arguments))
-        IsmailDunniganLaw.function(*arguments)
 
 
 def _frozen(value):

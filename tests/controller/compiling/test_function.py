@@ -1,0 +1,144 @@
+"""Plain functions run as C: the same numbers, arguments that stay alive, and what is no plain function."""
+
+import copy
+import gc
+import weakref
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+
+from controller.compiling.function import INTERPRETED, BoundCall, CompiledFunction, c_text
+from controller.errors import TranslationError
+from controller.translator.foreign import POINTER, call_c
+
+
+class Pair(NamedTuple):
+    first: np.ndarray
+    factor: float
+
+
+def scale(pair, count, out):
+    for i in range(out.size):
+        out[i] = pair.factor * pair.first[i] + count
+
+
+def read(references, out):
+    for i in range(out.size):
+        out[i] = references[i]
+
+
+def call_twice(address, words):
+    call_c(address, (POINTER,), words)
+    call_c(address, (POINTER,), words)
+
+
+def grow(out):
+    out[0] += 1.0
+
+
+def recursive(out):
+    recursive(out)
+
+
+class TestOneFunction:
+    def test_numbers_are_those_of_python(self):
+        first, out = np.array([0.1, -3.0, np.inf]), np.empty(3)
+        CompiledFunction(scale)(Pair(first, 0.3), 2, out)
+        expected = np.empty(3)
+        scale(Pair(first, 0.3), 2, expected)
+        assert out.tobytes() == expected.tobytes()
+
+    def test_numbers_in_arrays_may_change_between_calls_and_arguments_too(self):
+        function, first, out, other = CompiledFunction(scale), np.ones(2), np.empty(2), np.empty(1)
+        pair = Pair(first, 2.0)
+        for value in (1.0, 5.0):
+            first[:] = value
+            function(pair, 0, out)
+            assert out.tolist() == [2.0 * value] * 2
+            function(Pair(first, -1.0), 1, other)
+            assert other.tolist() == [1.0 - value]
+        for count in range(20):  # more sets of arguments than are kept
+            function(pair, count + 1000, out)
+            assert out.tolist() == [1010.0 + count] * 2
+
+    def test_unsigned_references_of_32_bits_are_read(self):
+        out = np.empty(2)
+        CompiledFunction(read)(np.array([7, 2**32 - 1], dtype=np.uint32), out)
+        assert out.tolist() == [7.0, 2.0**32 - 1.0]
+
+    def test_a_strided_array_and_an_object_are_refused(self):
+        with pytest.raises(TypeError, match="contiguous"):
+            CompiledFunction(grow)(np.zeros(6)[::2])
+        with pytest.raises(TypeError, match="argument is dict"):
+            CompiledFunction(grow)({})
+
+    def test_what_is_not_in_the_subset_is_named_with_its_line(self):
+        with pytest.raises(TranslationError, match=r"recursive calls itself"):
+            CompiledFunction(recursive)(np.zeros(1))
+        with pytest.raises(TypeError, match="without arguments"):
+            CompiledFunction(grow)(None)
+
+    def test_a_copy_is_another_one_of_the_same_function(self):
+        function, out = CompiledFunction(grow), np.zeros(1)
+        function(out)
+        copy.deepcopy(function)(out)
+        assert out[0] == 2.0
+
+    def test_the_text_is_that_of_the_library(self):
+        assert "void entry(const void *words)" in c_text(grow, (np.zeros(1),))
+
+
+class TestBoundCalls:
+    def test_arguments_live_as_long_as_the_call_alone(self):
+        out = np.zeros(1)
+        call = BoundCall(scale, (Pair(np.array([4.0]), 0.5), 1, out)).call
+        gc.collect()
+        call()
+        assert out[0] == 3.0
+
+    def test_and_no_longer(self):
+        out = np.zeros(1)
+        bound, gone = BoundCall(grow, (out,)), weakref.ref(out)
+        del out
+        assert gone() is not None
+        del bound
+        gc.collect()
+        assert gone() is None
+
+    def test_another_c_function_calls_it_by_its_address(self):
+        out = np.zeros(1)
+        bound = BoundCall(grow, (out,))
+        BoundCall(call_twice, (bound.address, bound.words)).call()
+        call_twice(bound.address, bound.words)
+        assert out[0] == 4.0
+
+    def test_what_is_no_plain_function_is_called_as_it_is_even_from_c(self):
+        class Grow:
+            def __call__(self, out):
+                out[0] += 1.0
+                if out[0] > 2.5:
+                    raise KeyError("too many")
+
+        out = np.zeros(1)
+        bound = BoundCall(Grow(), (out,))
+        bound.call()
+        BoundCall(call_twice, (bound.address, bound.words)).call()
+        assert out[0] == 3.0
+        with pytest.raises(KeyError, match="too many"):
+            bound.raise_error()
+        BoundCall(call_twice, (bound.address, bound.words)).call()
+        assert out[0] == 3.0  # what has failed is not called again
+
+    def test_python_runs_all_where_it_is_told_to(self, monkeypatch):
+        monkeypatch.setenv(INTERPRETED, "1")
+        monkeypatch.setenv("CC", "/nowhere")
+        seen, out = [], np.zeros(1)
+
+        def note(out):
+            seen.append(1)
+
+        CompiledFunction(note)(out)
+        bound = BoundCall(note, (out,))
+        BoundCall(call_twice, (bound.address, bound.words)).call()
+        assert len(seen) == 3

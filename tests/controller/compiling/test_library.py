@@ -1,0 +1,135 @@
+"""Where C libraries come from, and what becomes of damaged ones, of no compiler, and of no place."""
+
+import ctypes
+import os
+import subprocess
+import sys
+
+import pytest
+
+from controller.compiling import library
+from controller.compiling.library import library_name, library_of
+from controller.errors import CompilationError
+
+TEXT = "int answer(void);\nint answer(void) { return 42; }\n"
+
+
+@pytest.fixture
+def cache(tmp_path, monkeypatch):
+    """The folder in which libraries are kept, empty."""
+    monkeypatch.setattr("platformdirs.user_cache_dir", lambda name: str(tmp_path / name))
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))  # for other processes
+    yield tmp_path / "subreach" / "functions"
+    library_of.cache_clear()
+
+
+@pytest.fixture
+def compiled(monkeypatch):
+    """Names of what is compiled."""
+    names, real = [], library._compiled
+
+    def noted(text, name):
+        names.append(name)
+        return real(text, name)
+
+    monkeypatch.setattr(library, "_compiled", noted)
+    return names
+
+
+def answer(text=TEXT):
+    library_of.cache_clear()
+    return library_of(text).answer()
+
+
+def test_what_was_compiled_once_is_loaded_and_another_text_is_another_library(cache, compiled):
+    assert [answer(), answer(), answer(TEXT.replace("42", "43"))] == [42, 42, 43]
+    assert len(compiled) == 2 and compiled[0] == library_name(TEXT) != compiled[1]
+    assert len(list(cache.iterdir())) == 4  # each with its checksum
+
+
+@pytest.mark.parametrize("share", [0.0, 0.3, 0.9, 0.999])
+def test_a_damaged_library_is_compiled_anew(cache, compiled, caplog, share):
+    answer()
+    (path,) = cache.glob("*.so")
+    whole = path.read_bytes()
+    path.unlink()
+    path.write_bytes(whole[: int(share * len(whole))])
+    assert answer() == 42 and len(compiled) == 2
+    assert [record.getMessage() for record in caplog.records] == [f"{path}: damaged; compiled anew"]
+    assert path.read_bytes() == whole
+
+
+def test_a_changed_bit_and_a_lost_checksum_are_noticed(cache, compiled):
+    answer()
+    (path,) = cache.glob("*.so")
+    whole = bytearray(path.read_bytes())
+    whole[len(whole) // 2] ^= 1
+    path.unlink()
+    path.write_bytes(whole)
+    assert answer() == 42
+    library.checksum_path(path).unlink()
+    assert answer() == 42 and len(compiled) == 3
+
+
+@pytest.mark.skipif(os.name != "posix", reason="of POSIX")
+def test_a_cache_that_others_can_write_is_not_used(cache, compiled, caplog):
+    answer()
+    cache.chmod(0o777)
+    assert answer() == answer() == 42 and len(compiled) == 3
+    assert "others can write there" in caplog.records[0].getMessage() and len(caplog.records) == 1
+
+
+def test_without_a_place_it_is_compiled_for_the_process(tmp_path, monkeypatch, compiled, caplog):
+    (tmp_path / "file").touch()
+    monkeypatch.setattr("platformdirs.user_cache_dir", lambda name: str(tmp_path / "file" / name))
+    assert answer() == 42 and len(compiled) == 1
+    assert caplog.records[0].getMessage().endswith("Not a directory; compiled for this process alone")
+
+
+def test_what_comes_with_the_package_needs_no_compiler(cache, tmp_path, monkeypatch, compiled):
+    answer()
+    monkeypatch.setattr(library, "PREBUILT", cache.rename(tmp_path / "prebuilt"))
+    monkeypatch.setenv("CC", "/nowhere/cc")
+    assert answer() == 42 and len(compiled) == 1
+
+
+@pytest.mark.parametrize(
+    ("command", "words"),
+    [
+        ("/nowhere/cc", "no C compiler: CC is '/nowhere/cc', which is not on the PATH"),
+        ("'", 'no C compiler: CC is "\'": No closing quotation'),
+        ("true", "C compiler true failed: it wrote no library, and no word"),
+        ("false", "C compiler false failed: it wrote no library, and no word"),
+    ],
+)
+def test_no_compiler_is_one_line(cache, monkeypatch, command, words):
+    monkeypatch.setenv("CC", command)
+    with pytest.raises(CompilationError) as refused:
+        answer()
+    assert str(refused.value) == words
+    assert not cache.exists()
+
+
+def test_without_any_compiler_it_is_said_what_would_do(monkeypatch):
+    monkeypatch.delenv("CC", raising=False)
+    monkeypatch.setenv("PATH", "/nowhere")
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
+    with pytest.raises(CompilationError, match="neither cc nor the ziglang package was found"):
+        library_of("none")
+
+
+def test_an_error_of_the_compiler_is_its_first(cache):
+    with pytest.raises(CompilationError, match=r"error: .*unknown"):
+        library_of("unknown answer;\n")
+
+
+def test_processes_that_compile_the_same_at_once_leave_one_whole_library(cache):
+    code = f"from controller.compiling.library import library_of; print(library_of({TEXT!r}).answer())"
+    several = [
+        subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        for _ in range(3)
+    ]
+    assert [process.communicate(timeout=120) for process in several] == [("42\n", "")] * 3
+    (path,) = cache.glob("*.so")
+    assert ctypes.CDLL(str(path)).answer() == 42 and library._is_whole(path)
+    assert len(list(cache.iterdir())) == 2
