@@ -25,6 +25,7 @@ from controller.compiling.compiler import FLAGS, compile_file
 
 log = logging.getLogger(__name__)
 first_use = logging.getLogger("controller.compiling.first_use")  # at INFO, before something is compiled
+first_use.propagate = False  # for who listens to it by its name
 
 PREBUILT = Path(__file__).parents[1] / "prebuilt"  # in a wheel; a checkout has none
 _SUFFIX = {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")

@@ -73,10 +73,11 @@ def compiling_told(tell: Callable[[str], None]) -> Iterator[None]:
         Says a line.
     """
     notice, logger = _Notice(tell), logging.getLogger("controller.compiling.first_use")
+    before = logger.level
     logger.setLevel(logging.INFO)
-    logger.propagate = False
     logger.addHandler(notice)
     try:
         yield
     finally:
         logger.removeHandler(notice)
+        logger.setLevel(before)
