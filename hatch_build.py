@@ -1,8 +1,8 @@
 """The build backend: hatchling, with a hook that puts compiled libraries into wheels and source distributions.
 
-With them the FMUs of vehicles need no compiler where the package is used. A source distribution gets those of all
-platforms, compiled by the ziglang package; a wheel that is built from it holds them too, and nothing is compiled then.
-A wheel that is built from a checkout, as ``pip install .`` does, gets those of this machine alone, compiled by ``cc``
+With them vehicles' FMUs and the laws need no compiler where the package is used. A source distribution gets those of
+all platforms, compiled by the ziglang package; a wheel that is built from it holds them too, and nothing is compiled
+then. A wheel that is built from a checkout, as ``pip install .`` does, gets those of this machine alone, compiled by ``cc``
 where there is one, and its name says for which machine it is. An editable installation has none and compiles when it
 must.
 """
@@ -21,18 +21,23 @@ from hatchling import build
 from hatchling.build import *  # noqa: F403 the functions of PEP 517
 from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 
-_NEEDED = ("fmpy", "msgspec", "numpy", "platformdirs")  # of the dependencies, by what writes the libraries
+_NEEDED = ("fmpy", "msgspec", "numpy", "platformdirs", "scipy")  # of the dependencies, by what writes the libraries
 _COMPILE = """
 import pathlib, sys
 from plant_fmu.compiling.prebuilt import shipped_structures, write_prebuilt
+from cosim.batch.shipped_functions import write_libraries
+platforms, folder = sys.argv[1], pathlib.Path(sys.argv[2])
+for package in ("plant_fmu", "controller"):
+    (folder / package / "prebuilt").mkdir(parents=True)
 for structure in shipped_structures():
     for fmi in (2, 3):
-        write_prebuilt(structure, fmi, sys.argv[1], pathlib.Path(sys.argv[2]))
+        write_prebuilt(structure, fmi, platforms, folder / "plant_fmu" / "prebuilt")
+write_libraries(platforms, folder / "controller" / "prebuilt")
 """
 
 
 class PrebuiltLibraries(BuildHookInterface):  # type: ignore[type-arg]
-    """Adds ``plant_fmu/prebuilt``."""
+    """Adds ``plant_fmu/prebuilt`` and ``controller/prebuilt``."""
 
     PLUGIN_NAME = "custom"
     _folder: tempfile.TemporaryDirectory[str] | None = None
@@ -54,8 +59,8 @@ class PrebuiltLibraries(BuildHookInterface):  # type: ignore[type-arg]
         folder = self._folder.name
         platforms = "native" if self._for_this_machine() else "all"
         subprocess.run([sys.executable, "-c", _COMPILE, platforms, folder], cwd=self.root, check=True)  # noqa: S603 - our own code
-        for file in sorted(Path(folder).iterdir()):
-            build_data["force_include"][str(file)] = f"plant_fmu/prebuilt/{file.name}"
+        for file in sorted(file for file in Path(folder).rglob("*") if file.is_file()):
+            build_data["force_include"][str(file)] = file.relative_to(folder).as_posix()
         if self._for_this_machine():
             build_data |= {"pure_python": False, "infer_tag": True}
 

@@ -41,22 +41,24 @@ def compiler_command() -> list[str]:
     raise CompilationError("no C compiler: neither cc nor the ziglang package was found")
 
 
-def compile_file(source: Path, library: Path, flags: Sequence[str] = ()) -> None:
+def compile_file(source: Path, library: Path, compiler: Sequence[str] | None = None) -> None:
     """Compile one C file into a shared library.
 
     Parameters
     ----------
     source, library : Path
         What is read, and what is written.
-    flags : sequence of str, optional
-        After `FLAGS`.
+    compiler : sequence of str, optional
+        Its command and first arguments; default: that of this machine.
 
     Raises
     ------
     CompilationError
         If there is no compiler, or it fails; its first complaint is in the message.
     """
-    command = [*compiler_command(), *FLAGS, *flags, str(source), "-o", str(library), "-lm"]
+    # named, for Apple's linker else writes the place of the build into the library; for others without a table of names
+    link = f"-Wl,-install_name,@rpath/{library.name}" if library.suffix == ".dylib" else "-s"
+    command = [*(compiler or compiler_command()), *FLAGS, link, str(source), "-o", str(library), "-lm"]
     try:
         done = subprocess.run(command, capture_output=True, text=True, check=False)  # noqa: S603
     except OSError as error:

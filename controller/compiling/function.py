@@ -27,7 +27,7 @@ _NONE = (None,) * 7
 _CALLBACK = ctypes.PYFUNCTYPE(None, ctypes.c_void_p)
 
 
-def c_text(function: FunctionType, arguments: tuple[Any, ...]) -> str:
+def c_text(function: Callable[..., None], arguments: tuple[Any, ...]) -> str:
     """Return the C of a function for arguments such as these, as its library is compiled from it.
 
     Parameters
@@ -53,7 +53,7 @@ def c_text(function: FunctionType, arguments: tuple[Any, ...]) -> str:
 
 
 @functools.cache
-def _text(function: FunctionType, types: tuple[Type, ...]) -> str:
+def _text(function: Callable[..., None], types: tuple[Type, ...]) -> str:
     program = Program()
     program.export("entry", function, types)
     return program.text()

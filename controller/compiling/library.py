@@ -7,11 +7,13 @@ lies its checksum: loading half of one could end the process.
 from __future__ import annotations
 
 import atexit
+import contextlib
 import ctypes
 import functools
 import hashlib
 import logging
 import os
+import platform
 import shutil
 import stat
 import sys
@@ -27,7 +29,9 @@ log = logging.getLogger(__name__)
 first_use = logging.getLogger("controller.compiling.first_use")  # at INFO, before something is compiled
 first_use.propagate = False  # for who listens to it by its name
 
-PREBUILT = Path(__file__).parents[1] / "prebuilt"  # in a wheel; a checkout has none
+PREBUILT = Path(__file__).parents[1] / "prebuilt"  # in a wheel, with a folder for each platform; a checkout has none
+_MACHINE = {"amd64": "x86_64", "arm64": "aarch64"}
+_SYSTEM = {"win32": "windows"}
 _SUFFIX = {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")
 
 
@@ -52,10 +56,11 @@ def library_of(text: str) -> ctypes.PyDLL:
         If it has to be compiled, and there is no compiler or it fails.
     """
     name = library_name(text)
-    for folder in (PREBUILT, _cache()):
+    for folder in (PREBUILT / _platform(), _cache()):
         path = folder / f"{name}{_SUFFIX}"
         if _is_trusted(folder) and _is_whole(path):
-            return ctypes.PyDLL(str(path))
+            with contextlib.suppress(OSError):  # such as one for another C library
+                return ctypes.PyDLL(str(path))
     return ctypes.PyDLL(str(_compiled(text, name)))
 
 
@@ -80,6 +85,17 @@ def checksum_path(path: Path) -> Path:
     return path.with_name(f"{path.name}.sha256")
 
 
+def digest_of(library: bytes) -> str:
+    """Return the checksum of a library's bytes."""
+    return hashlib.sha256(library).hexdigest()
+
+
+def _platform() -> str:
+    """Return the name of this machine and system, as FMI 3.0 has it."""
+    machine = platform.machine().lower()
+    return f"{_MACHINE.get(machine, machine)}-{_SYSTEM.get(sys.platform, sys.platform)}"
+
+
 def _cache() -> Path:
     return Path(platformdirs.user_cache_dir("subreach")) / "functions"
 
@@ -89,7 +105,7 @@ def _is_whole(path: Path) -> bool:
         expected, library = checksum_path(path).read_bytes(), path.read_bytes()
     except OSError:
         return False
-    whole = expected == hashlib.sha256(library).hexdigest().encode()
+    whole = expected == digest_of(library).encode()
     if not whole:
         log.warning("%s: damaged; compiled anew", path)
     return whole
@@ -130,7 +146,7 @@ def _compiled(text: str, name: str) -> Path:
         if not _is_trusted(kept.parent):
             return built
         library = built.read_bytes()
-        _write_whole(checksum_path(kept), hashlib.sha256(library).hexdigest().encode())
+        _write_whole(checksum_path(kept), digest_of(library).encode())
         _write_whole(kept, library)
     except OSError as error:
         log.warning("cache %s: %s; compiled for this process alone", kept.parent, error.strerror or error)

@@ -355,11 +355,12 @@ def clearances_at(points: Array, region: Region) -> Array:
     """
     clearances = np.empty(len(points))
     arguments = pack([region]), np.ascontiguousarray(points, dtype=float), np.empty(3), clearances
-    BoundCall(_write_clearances, arguments).call()
+    BoundCall(write_clearances, arguments).call()
     return clearances
 
 
-def _write_clearances(regions: PackedRegions, points: Array, room: Array, clearances: Array) -> None:
+def write_clearances(regions: PackedRegions, points: Array, room: Array, clearances: Array) -> None:
+    """Write what `clearance_at` says of the first of the `regions` at each of the points; `room` has shape (3,)."""
     for i in range(points.shape[0]):
         if regions.kinds[0] < FIRST_OF_ATTITUDE:
             clearances[i] = clearance_of_place(regions, 0, points[i], room)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from types import FunctionType
 
 from controller.errors import TranslationError
@@ -55,7 +55,7 @@ class Program:
         self._definitions: list[tuple[str, str]] = []  # helpers by their names; types by none
         self._exports: list[str] = []
 
-    def export(self, name: str, function: FunctionType, arguments: tuple[Type, ...]) -> None:
+    def export(self, name: str, function: Callable[..., None], arguments: tuple[Type, ...]) -> None:
         """Translate a function, and let it be called by a name, with its arguments as words.
 
         Parameters
@@ -73,6 +73,8 @@ class Program:
             If it, or what it calls, is beyond the subset; with file and line.
         """
         self._reserved.add(name)
+        if not isinstance(function, FunctionType):
+            raise TranslationError(f"{function!r} is no plain function, which is not translated to C")
         called, _ = self.instance(function, arguments)
         fields = "".join(f"    {self.name(kind)} a{i};\n" for i, kind in enumerate(arguments))
         given = ", ".join(f"{'&' if isinstance(kind, Record) else ''}w->a{i}" for i, kind in enumerate(arguments))

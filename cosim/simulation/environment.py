@@ -41,7 +41,7 @@ class RegionEvaluation(NamedTuple):
     clearances: Array  # (n + 1,) m, or rad of attitude
 
 
-class _Places(NamedTuple):
+class RegionPlaces(NamedTuple):
     """All that is evaluated, where it is now."""
 
     goal: PackedRegions
@@ -70,7 +70,7 @@ class RegionEnvironment:
         self.criteria = np.array([CRITERIA.index(region.criterion) for region in scenario.regions], dtype=np.int64)
         self._goal_region, self._middle = scenario.goal_region, shape_center(scenario.goal)
         self._target = self._reached = self._new_target(None, self._middle)
-        self._places = _Places(self.goal, self.regions)
+        self._places = RegionPlaces(self.goal, self.regions)
         self._names = ["goal", *(region.name for region in secondary)]
         self._streamed = ["goal"] if scenario.goal_streamed else []
         self._streamed += [
@@ -273,7 +273,7 @@ class RegionEnvironment:
         regions.numbers[regions.offsets[i] : regions.offsets[i + 1]] = shape.packed()
 
 
-def evaluate_places(places: _Places, state: VehicleState, found: RegionEvaluation) -> None:
+def evaluate_places(places: RegionPlaces, state: VehicleState, found: RegionEvaluation) -> None:
     """Evaluate the goal into the first places, and the regions into those behind, in one call."""
     p, e, g, c = state.position, state.quaternion, found.values, found.clearances
     evaluate_packed(places.goal, p, e, g[:1], found.gradients[:1], found.rotation_gradients[:1], c[:1])

@@ -88,7 +88,9 @@ def test_without_a_place_it_is_compiled_for_the_process(tmp_path, monkeypatch, c
 
 def test_what_comes_with_the_package_needs_no_compiler(cache, tmp_path, monkeypatch, compiled):
     answer()
-    monkeypatch.setattr(library, "PREBUILT", cache.rename(tmp_path / "prebuilt"))
+    (tmp_path / "prebuilt").mkdir()
+    cache.rename(tmp_path / "prebuilt" / library._platform())
+    monkeypatch.setattr(library, "PREBUILT", tmp_path / "prebuilt")
     monkeypatch.setenv("CC", "/nowhere/cc")
     assert answer() == 42 and len(compiled) == 1
 

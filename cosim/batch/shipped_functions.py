@@ -1,0 +1,110 @@
+"""All functions of the package that are run as C, compiled ahead for where there is no compiler."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from controller import LAWS, CompiledLaw, VehicleState
+from controller.compiling.compiler import compile_file
+from controller.compiling.function import c_text
+from controller.compiling.library import checksum_path, digest_of, library_name
+from controller.regions import Region, Sphere, pack
+from controller.regions.rays import ray_distances
+from controller.regions.region_set import PackedRegions, evaluate_packed, write_clearances
+from cosim.batch.c_calls import Clock
+from cosim.batch.fused_loop import Allocator, BoundLaw, FlightConfig, FlightMetrics, Outputs, fly, make_workspace
+from cosim.scenario.vehicle_model import vehicle_model
+from cosim.simulation.environment import RegionEvaluation, RegionPlaces, evaluate_places
+from cosim.simulation.memberships import compute_memberships
+from plant_fmu.compiling.compiler import cross_compiler, find_compiler
+from plant_fmu.compiling.platforms import NATIVE, Platform, cross_platforms, native_platform
+from plant_fmu.running.native import Native
+from plant_fmu.vehicle import load_vehicle
+
+_VEHICLE = "bluerov2_heavy"  # any: a function is the same for all
+_PERIOD = 0.02  # s
+_INTEGERS, _FLAT, _TABLE = np.zeros(1, np.int64), np.zeros(1), np.zeros((1, 3))
+
+
+def shipped_functions() -> Iterator[tuple[Callable[..., None], tuple[Any, ...]]]:
+    """Yield each function, with arguments of the types that it is called with."""
+    goal, regions = (pack([Region(name, Sphere((0.0, 0.0, 0.0), 1.0), "in")]) for name in ("goal", "region"))
+    state = VehicleState(np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]), np.zeros(6), np.ones(1))
+    for law in LAWS.values():
+        yield law.function, _of_law(law, state, goal, regions)
+    found = RegionEvaluation(_FLAT, _TABLE, _TABLE, _FLAT)
+    yield evaluate_places, (RegionPlaces(goal, regions), state, found)
+    yield evaluate_packed, (regions, state.position, state.quaternion, _FLAT, _TABLE, _TABLE, _FLAT)
+    yield write_clearances, (regions, _TABLE, _FLAT, _FLAT)
+    yield ray_distances, (regions, state.position, _TABLE, 1.0, _FLAT)
+    yield compute_memberships, (_FLAT, _INTEGERS, 1.0, _FLAT)
+    yield fly, _of_flight(goal, regions)
+
+
+def _of_law(
+    law: type[CompiledLaw], state: VehicleState, goal: PackedRegions, regions: PackedRegions
+) -> tuple[Any, ...]:
+    gains, level = law.gains_type(), np.array([1.0, 0.0, 0.0, 0.0])
+    made = law.for_vehicle(vehicle_model(load_vehicle(_VEHICLE)), gains, level, _PERIOD, 1)
+    return state, goal, regions, _FLAT, gains, made.memory, np.zeros(made.n_forces)
+
+
+def _of_flight(goal: PackedRegions, regions: PackedRegions) -> tuple[Any, ...]:
+    references = np.zeros(1, np.uint32)
+    native = Native(0, 0, 0, 0, references, _FLAT, references, _FLAT, _INTEGERS)
+    setup = FlightConfig(
+        goal, regions, _INTEGERS, 1.0, 1.0, 1, 1, 1, False, True, np.zeros((0, 6)), 0.0, 0.0, False,
+        _INTEGERS, _INTEGERS, False, 1, Clock().numbers,
+    )  # fmt: skip
+    out = Outputs(np.zeros(len(FlightMetrics._fields)), _FLAT, np.zeros((0, 0)))
+    law, allocator = BoundLaw(0, 0, True, _FLAT, _FLAT), Allocator(np.zeros((1, 1, 6)), _TABLE, _TABLE, True)
+    return setup, native, native, allocator, law, make_workspace(1, 1, 1), out
+
+
+def write_libraries(platforms: str, folder: Path) -> None:
+    """Compile all of them.
+
+    Parameters
+    ----------
+    platforms : str
+        ``all``, by the compiler of the ziglang package, or ``native``, by any.
+    folder : Path
+        Where they go, each into the folder of its platform.
+
+    Raises
+    ------
+    BuildError, CompilationError
+        If there is no such compiler, or it fails.
+    """
+    if platforms == NATIVE:
+        compilers = [(native_platform(), find_compiler())]
+    else:
+        compilers = [(platform, cross_compiler(platform)) for platform in cross_platforms(platforms)]
+    for platform, _ in compilers:
+        (folder / platform.name).mkdir()
+    texts = sorted({c_text(function, arguments) for function, arguments in shipped_functions()})
+    with tempfile.TemporaryDirectory(prefix="subreach-") as scratch, ThreadPoolExecutor(os.cpu_count()) as pool:
+        sources = [_written(text, Path(scratch)) for text in texts]
+        made = [pool.submit(_compile, source, folder, *compiler) for source in sources for compiler in compilers]
+        for library in made:
+            library.result()
+
+
+def _written(text: str, folder: Path) -> Path:
+    source = folder / f"{library_name(text)}.c"
+    source.write_text(text, encoding="utf-8")
+    return source
+
+
+def _compile(source: Path, folder: Path, platform: Platform, compiler: list[str]) -> None:
+    library = folder / platform.name / f"{source.stem}{platform.suffix}"
+    compile_file(source, library, compiler)
+    library.with_suffix(".lib").unlink(missing_ok=True)  # which Windows would link with
+    checksum_path(library).write_text(digest_of(library.read_bytes()))

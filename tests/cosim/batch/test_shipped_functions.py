@@ -1,0 +1,76 @@
+"""All that a user's flights run as C comes compiled with the package."""
+
+import ctypes
+import platform
+import sys
+
+import numpy as np
+import pytest
+
+from controller import LAWS, FunctionLaw
+from controller.compiling import function, library
+from controller.regions import Sphere
+from controller.regions.region_set import Region, clearances_at
+from controller.translator.types import type_of
+from cosim.batch.fused import FusedFlyer
+from cosim.batch.shipped_functions import shipped_functions, write_libraries
+from cosim.batch.variation import Variation
+from cosim.campaigns.scenes.flyer import Conditions, SceneFlyer
+from cosim.campaigns.scenes.generator import generate_scenes
+from cosim.campaigns.scenes.scene import read_scenes
+from cosim.mavlink.vehicle.proximity import Proximity
+from cosim.scenario.scenario import load_scenario
+from cosim.simulation.master import Master
+
+SHORT = ["time.duration=0.1", "arbiter.engine=closed"]
+
+
+@pytest.fixture
+def called(monkeypatch):
+    """Functions with the types of their arguments, as they are bound."""
+    found, bind = set(), function.BoundCall.__init__
+
+    def noted(self, called, arguments):
+        found.add((called, tuple(map(type_of, arguments))))
+        bind(self, called, arguments)
+
+    monkeypatch.setattr(function.BoundCall, "__init__", noted)
+    return found
+
+
+def test_what_flights_call_is_shipped_and_what_is_shipped_is_called(called, tmp_path):
+    for name in ("docking", "harbour", "pipe-inspection", "moving-obstacle"):
+        scenario = load_scenario(name, ["time.duration=0.1"])
+        with Master(scenario) as master:
+            master.run()
+        Proximity(scenario)
+    (tmp_path / "scenes").write_text("\n".join(generate_scenes(1)))
+    for scene in read_scenes(tmp_path / "scenes"):
+        for law in LAWS:
+            with SceneFlyer(law, Conditions(duration=0.1)) as flyer:
+                flyer.fly(scene, trace=True)
+    for law in ("ismail_dunnigan", "deployable"):
+        variation = Variation(load_scenario("paper", [*SHORT, f"law.name={law}", "actuation.through=thrusters"]), ())
+        with FusedFlyer(variation) as flyer:
+            flyer.fly(np.zeros((1, 0)), np.zeros(1, np.int64))
+    with Master(load_scenario("paper", SHORT), FunctionLaw(lambda *_: np.zeros(6))) as master:
+        master.run()
+    clearances_at(np.zeros((2, 3)), Region("ball", Sphere((0.0, 0.0, 0.0), 1.0), "out"))
+    assert called == {(one, tuple(map(type_of, arguments))) for one, arguments in shipped_functions()}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("platforms", ["native", "all"])
+def test_libraries_are_written_for_each_platform(tmp_path, platforms):
+    if platforms == "all":
+        pytest.importorskip("ziglang", reason="the build extra is not installed")
+    write_libraries(platforms, tmp_path)
+    n = len(list(shipped_functions()))
+    folders = sorted(folder.name for folder in tmp_path.iterdir())
+    assert len(folders) == (1 if platforms == "native" else 5)
+    for folder in folders:
+        names = {path.name for path in (tmp_path / folder).iterdir()}
+        assert len(names) == 2 * n and sum(name.endswith(".sha256") for name in names) == n
+    if sys.platform == "linux" and platform.machine() == "x86_64":
+        for path in (tmp_path / library._platform()).glob("*.so"):
+            assert library._is_whole(path) and ctypes.CDLL(str(path)).entry
