@@ -2,9 +2,9 @@
 
 With them vehicles' FMUs and the laws need no compiler where the package is used. A source distribution gets those of
 all platforms, compiled by the ziglang package; a wheel that is built from it holds them too, and nothing is compiled
-then. A wheel that is built from a checkout, as ``pip install .`` does, gets those of this machine alone, compiled by ``cc``
-where there is one, and its name says for which machine it is. An editable installation has none and compiles when it
-must.
+then. A wheel that is built from a checkout, as ``pip install .`` does, gets those of this machine alone, compiled by
+``cc`` where there is one, and its name says for which machine it is. An editable installation has none and compiles
+when it must.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from hatchling import build
 from hatchling.build import *  # noqa: F403 the functions of PEP 517
 from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 
-_NEEDED = ("fmpy", "msgspec", "numpy", "platformdirs", "scipy")  # of the dependencies, by what writes the libraries
+_NEEDED = ("fmpy", "msgspec", "numpy", "platformdirs", "scipy", "tomli-w")  # of the dependencies, by what writes the libraries
 _COMPILE = """
 import pathlib, sys
 from plant_fmu.compiling.prebuilt import shipped_structures, write_prebuilt

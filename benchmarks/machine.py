@@ -10,7 +10,7 @@ from importlib import metadata
 from pathlib import Path
 
 CALM = 0.6  # load average above which figures are not to be trusted
-_PACKAGES = ("numpy", "numba", "fmpy", "scikit-fuzzy", "pymavlink")
+_PACKAGES = ("numpy", "fmpy", "scikit-fuzzy", "pymavlink")
 
 
 def processor() -> str:

@@ -58,7 +58,7 @@ def library_of(text: str) -> ctypes.PyDLL:
     name = library_name(text)
     for folder in (PREBUILT / _platform(), _cache()):
         path = folder / f"{name}{_SUFFIX}"
-        if _is_trusted(folder) and _is_whole(path):
+        if _is_trusted(folder) and is_whole(path):
             with contextlib.suppress(OSError):  # such as one for another C library
                 return ctypes.PyDLL(str(path))
     return ctypes.PyDLL(str(_compiled(text, name)))
@@ -100,7 +100,8 @@ def _cache() -> Path:
     return Path(platformdirs.user_cache_dir("subreach")) / "functions"
 
 
-def _is_whole(path: Path) -> bool:
+def is_whole(path: Path) -> bool:
+    """Return whether a library is there, and what was written: loading half of one can end the process."""
     try:
         expected, library = checksum_path(path).read_bytes(), path.read_bytes()
     except OSError:
@@ -140,16 +141,34 @@ def _compiled(text: str, name: str) -> Path:
     source.write_text(text, encoding="utf-8")
     compile_file(source, built)
     log.debug("%s: compiled in %.2f s", name, time.perf_counter() - started)
-    kept = _cache() / built.name
+    return keep(built, _cache())
+
+
+def keep(built: Path, folder: Path) -> Path:
+    """Copy a library with its checksum into a folder of the cache, whole or not at all.
+
+    Parameters
+    ----------
+    built : Path
+        The library.
+    folder : Path
+        Made if it is not there.
+
+    Returns
+    -------
+    Path
+        Where it is: in the folder, or where it was if there is no place.
+    """
+    kept = folder / built.name
     try:
-        kept.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
-        if not _is_trusted(kept.parent):
+        folder.mkdir(parents=True, exist_ok=True, mode=0o700)
+        if not _is_trusted(folder):
             return built
         library = built.read_bytes()
         _write_whole(checksum_path(kept), digest_of(library).encode())
         _write_whole(kept, library)
     except OSError as error:
-        log.warning("cache %s: %s; compiled for this process alone", kept.parent, error.strerror or error)
+        log.warning("cache %s: %s; compiled for this process alone", folder, error.strerror or error)
         return built
     return kept
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import ctypes
 import functools
 import hashlib
-import logging
 import os
 import subprocess
 import tempfile
@@ -16,8 +15,8 @@ from pathlib import Path
 
 import platformdirs
 
+from controller.compiling.library import is_whole, keep
 from controller.regions.in_c import c_sources as law_sources
-from cosim.io.atomic_file import write_atomic
 from fuzzy_arbiter import Arbiter
 from fuzzy_arbiter.export import to_c
 from plant_fmu.compiling.compiler import FLAGS, compile_library, find_compiler
@@ -26,8 +25,6 @@ from plant_fmu.compiling.sources import c_sources, header
 from plant_fmu.errors import BuildError
 from plant_fmu.vehicle import Vehicle
 from plant_fmu.vehicle_component import of_vehicle
-
-log = logging.getLogger(__name__)
 
 _TOKEN = "lanes"  # noqa: S105 -- no secret: there is no description that the library could go with
 _NARROW = ("-Wno-psabi",)  # nothing but this library calls its functions with vectors
@@ -77,7 +74,7 @@ def lanes_library(vehicle: Vehicle, flags: tuple[str, ...] = (), beside: Path | 
         made_from.update(f"\n{name} {len(text)}\n".encode() + text)
     name = f"{vehicle.name}-{made_from.hexdigest()[:16]}{native_platform().suffix}"
     path = Path(platformdirs.user_cache_dir("subreach")) / "lanes" / name
-    if _is_whole(path):
+    if is_whole(path):
         return ctypes.CDLL(str(path))
     with tempfile.TemporaryDirectory(prefix="lanes-", ignore_cleanup_errors=True) as scratch:
         folder = Path(scratch)
@@ -87,32 +84,7 @@ def lanes_library(vehicle: Vehicle, flags: tuple[str, ...] = (), beside: Path | 
         sources = [folder / file for file in sorted(files) if file.endswith(".c") and not file.startswith("many/")]
         built = folder / name
         compile_library(compiler, native_platform(), sources, [], built, flags)
-        return ctypes.CDLL(str(_kept(built, path)))
-
-
-def _is_whole(path: Path) -> bool:
-    """Return whether a library in the cache is what was written there: loading half of one can end the process."""
-    try:
-        return _checksum(path).read_bytes() == hashlib.sha256(path.read_bytes()).hexdigest().encode()
-    except OSError:
-        return False
-
-
-def _checksum(path: Path) -> Path:
-    return path.with_name(f"{path.name}.sha256")
-
-
-def _kept(built: Path, path: Path) -> Path:
-    """Move a library to its place in the cache, whole or not at all; where there is no place, leave it where it is."""
-    library = built.read_bytes()
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        for place, data in ((path, library), (_checksum(path), hashlib.sha256(library).hexdigest().encode())):
-            write_atomic(place, data)
-    except OSError as error:
-        log.warning("cache %s: %s; built for this process alone", path.parent, error.strerror or error)
-        return built
-    return path
+        return ctypes.CDLL(str(keep(built, path.parent)))
 
 
 def _files(vehicle: Vehicle, beside: Path | None = None) -> dict[str, bytes]:

@@ -16,7 +16,7 @@ import fuzzy_arbiter
 import plant_fmu
 
 _SOURCES = (".py", ".c", ".h", ".toml")
-_LIBRARIES = ("subreach", "numba", "llvmlite", "numpy", "pyarrow", "scipy")
+_LIBRARIES = ("subreach", "numpy", "pyarrow", "scipy")
 SCENES, SWEEP = "scenes", "sweep"  # kinds of campaigns
 _NAMED = 3  # differences that a message names
 

@@ -133,5 +133,5 @@ def test_processes_that_compile_the_same_at_once_leave_one_whole_library(cache):
     ]
     assert [process.communicate(timeout=120) for process in several] == [("42\n", "")] * 3
     (path,) = cache.glob("*.so")
-    assert ctypes.CDLL(str(path)).answer() == 42 and library._is_whole(path)
+    assert ctypes.CDLL(str(path)).answer() == 42 and library.is_whole(path)
     assert len(list(cache.iterdir())) == 2
