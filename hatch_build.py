@@ -21,7 +21,14 @@ from hatchling import build
 from hatchling.build import *  # noqa: F403 the functions of PEP 517
 from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 
-_NEEDED = ("fmpy", "msgspec", "numpy", "platformdirs", "scipy", "tomli-w")  # of the dependencies, by what writes the libraries
+_NEEDED = (
+    "fmpy",
+    "msgspec",
+    "numpy",
+    "platformdirs",
+    "scipy",
+    "tomli-w",
+)  # of the dependencies, by what writes the libraries
 _COMPILE = """
 import pathlib, sys
 from plant_fmu.compiling.prebuilt import shipped_structures, write_prebuilt

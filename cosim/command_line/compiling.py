@@ -1,4 +1,4 @@
-"""Compiling ahead of runs what the first of them would wait for: laws, regions, the compiled loop; building the FMU."""
+"""Compiling ahead of runs what the first of them would wait for: laws, regions, the fused loop; building the FMU."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from cosim.errors import RunError
 from cosim.run.run import run_scenario
 from cosim.scenario.scenario import load_scenario
 
-_STEPS = 4  # from the third on, the master calls what it has bound to its arrays
+_STEPS = 2
 
 
 def compile_ahead(scenario: str, overrides: Sequence[str] = ()) -> None:

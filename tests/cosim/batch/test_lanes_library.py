@@ -1,6 +1,5 @@
 """The library of the lanes: built once, whole, and anew where it is damaged."""
 
-import hashlib
 import logging
 
 import platformdirs
@@ -60,20 +59,10 @@ def test_it_is_built_once_and_anew_where_it_is_damaged(cache, tmp_path, monkeypa
     assert (elsewhere / library.name).stat().st_size > 1000
 
 
-@pytest.mark.parametrize("checksum", [None, b"", b"\xff" * 64, b"0" * 64])
-def test_a_library_is_whole_if_its_checksum_says_so(tmp_path, checksum):
-    (library := tmp_path / "lanes.so").write_bytes(b"library")
-    beside = tmp_path / "lanes.so.sha256"
-    beside.write_text(hashlib.sha256(b"library").hexdigest())
-    assert module._is_whole(library)
-    beside.unlink() if checksum is None else beside.write_bytes(checksum)
-    assert not module._is_whole(library)
-
-
 @pytest.mark.slow
 def test_where_there_is_no_place_for_it_it_serves_the_process(cache, caplog):
     cache.parent.mkdir()
     cache.write_text("a file, no folder")
     with caplog.at_level(logging.WARNING):
         assert lanes_library(load_vehicle("odin"), QUICK).lanes_count() in (4, 8)
-    assert "built for this process alone" in caplog.text
+    assert "compiled for this process alone" in caplog.text

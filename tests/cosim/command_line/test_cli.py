@@ -146,8 +146,7 @@ def test_without_a_place_to_keep_compiled_code_it_runs_all_the_same(tmp_path):
     arguments = ["run", "paper", "--no-report", "--out", str(tmp_path / "run"), *QUICK]
     code = f"""
 import sys
-import numba.core.caching, platformdirs
-numba.core.caching.CacheImpl._locator_classes = []
+import platformdirs
 platformdirs.user_cache_dir = lambda *_, **__: "/proc/nowhere"
 from cosim.command_line.cli import main
 sys.exit(main({arguments!r}))
