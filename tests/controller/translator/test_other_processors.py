@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from controller import LAWS, FunctionLaw, Gains, IsmailDunniganLaw, LawError, translate_law
+from controller.compiling.function import BoundCall
 from controller.regions import pack
 from controller.translator.program import Program
 from controller.translator.static_data import static_data
@@ -74,11 +75,11 @@ def test_bits_are_those_of_this_machine(law, target, tmp_path):
         ],
         check=True, timeout=300,
     )  # fmt: skip
-    inputs, outputs = bytearray(), []
+    inputs, outputs, step = bytearray(), [], BoundCall(flight.function, flight.arguments).call
     for _ in range(STEPS):
         flight.advance()
         inputs += b"".join(x.tobytes() for x in (*flight.state, flight.weights, flight.regions.shifts))
-        flight.function(*flight.arguments)
+        step()
         outputs += [flight.forces.copy(), flight.memory.estimate.copy(), flight.memory.report.copy()]
     given.write_bytes(inputs)
     if target.startswith("wasm"):
