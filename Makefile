@@ -31,7 +31,7 @@ export PYTHONDONTWRITEBYTECODE =
 run: $(VENV)/installed
 	$(BIN)/cosim run paper
 
-test: $(VENV)/ready
+test: $(VENV)/extras
 	$(BIN)/python -m pytest -q --numprocesses auto --dist worksteal $(PYTEST_FLAGS)
 
 lint: $(VENV)/extras
@@ -52,7 +52,7 @@ docs: $(VENV)/extras
 	$(INSTALL) --editable '.[docs]'
 	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict
 
-bench: $(VENV)/ready
+bench: $(VENV)/extras
 	$(BIN)/python -m benchmarks all
 	$(BIN)/python -m benchmarks scaling
 
@@ -66,7 +66,7 @@ dist: $(VENV)/extras
 packaging: $(VENV)/extras
 	$(BIN)/python -m pytest -q --slow tests/packaging
 
-tour: $(VENV)/ready
+tour: $(VENV)/extras
 	$(BIN)/python -m tests.docs.tour
 
 LOWEST := build/lowest
@@ -96,11 +96,6 @@ $(VENV)/installed: pyproject.toml
 
 $(VENV)/extras: $(VENV)/installed
 	$(INSTALL) --editable '.[$(EXTRAS)]'
-	@touch $@
-
-$(VENV)/ready: $(VENV)/extras
-	@echo 'Compiling the laws, which takes most of a minute, once'
-	$(BIN)/cosim compile paper-deployable & $(BIN)/cosim compile && wait # the longest of them beside the others
 	@touch $@
 
 clean:

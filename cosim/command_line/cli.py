@@ -15,7 +15,6 @@ from collections.abc import Sequence
 from typing import Any, NoReturn
 
 from cosim.command_line import (
-    ahead,
     campaigns,
     completion,
     export,
@@ -119,7 +118,6 @@ def _parser() -> argparse.ArgumentParser:
     calibrate = verbs.add_parser("calibrate", help="fit the force limit and lag that bring the paper's window about")
     calibrate.add_argument("--scenario", default="paper", help="scenario to fit (default: paper)")
 
-    ahead.add_verb(verbs)
     export.add_verb(verbs)
     package.add_verb(verbs)
     scenes.add_verb(verbs)
@@ -262,7 +260,6 @@ _VERBS = {
     "show": _show,
     "check": _check,
     "calibrate": _calibrate,
-    "compile": ahead.compile_all,
     "export": export.export,
     "package": package.package,
     "scenes": scenes.scenes,

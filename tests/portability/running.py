@@ -10,7 +10,6 @@ import sys
 import time
 import xml.etree.ElementTree as ET
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 
@@ -85,16 +84,7 @@ def _tested(variant: Variant, python: Path, environment: dict[str, str], tests: 
     numbers = ["--numprocesses", "auto", "--dist", "worksteal", f"--junitxml={report}", "--verbose"]
     command = [str(python), "-m", "pytest", *numbers, *tests]
     with output.open("w") as file:
-        some = any(not word.startswith("-") for word in tests)  # which compile what they need
-        compiling = (
-            [] if some else [[str(python), "-m", "cosim", "compile", *law] for law in ([], ["paper-deployable"])]
-        )
-
-        def ended(one: list[str]) -> bool:
-            return _ended(one, environment, file, limit - (time.monotonic() - begin))
-
-        with ThreadPoolExecutor() as beside:  # the longest law beside the others
-            in_time = all(beside.map(ended, compiling)) and ended(command)
+        in_time = _ended(command, environment, file, limit - (time.monotonic() - begin))
     if not in_time:
         last = _last(output.read_text(errors="replace"))
         raise BrokenError(f"ended after {limit:.0f} s; last in {output.relative_to(ROOT)}: {last}")

@@ -147,7 +147,7 @@ _COMPLETE = {
         ("cosim run", "paper-l", {"paper-limited"}),
         ("cosim run", "mi", {"mine.toml"}),
         ("cosim run", "sce", {"scenes"}),
-        ("cosim compile paper", "dock", {"docking"}),
+        ("cosim run --set x", "dock", {"docking"}),
         ("cosim run --profile", "a", {"ardusub"}),
         ("cosim sweep paper", "--sche", {"--scheduler"}),
         ("cosim help", "sw", {"sweep"}),

@@ -243,7 +243,6 @@ VERBS = {  # {run}: a run folder
     "show": ["paper"],
     "check": ["paper"],
     "calibrate": [],
-    "compile": ["paper"],
     "export": ["{run}", "--to", "npz"],
     "package": ["paper", "--set", "arbiter.engine=closed"],
     "scenes": ["--count", "3"],
@@ -258,7 +257,7 @@ VERBS = {  # {run}: a run folder
     "completion": ["bash"],
     "help": [],
 }
-SLOW = {"report", "check", "calibrate", "compile", "package", "campaign", "compare", "sweep", "rerun", "mavlink-check"}
+SLOW = {"report", "check", "calibrate", "package", "campaign", "compare", "sweep", "rerun", "mavlink-check"}
 NEED = {"watch": "rich", "listen": "pymavlink", "stream": "pymavlink", "mavlink-check": "pymavlink"}
 
 
