@@ -13,6 +13,8 @@ from collections.abc import Callable
 from types import FunctionType
 from typing import Any
 
+import numpy as np
+
 from controller.compiling.library import library_of
 from controller.translator.arguments import words_of
 from controller.translator.program import Program
@@ -94,7 +96,7 @@ class BoundCall:
             call.kept = self._words, arguments  # whoever has it alone can call it
             self.call: Callable[[], None] = call
         else:
-            self.words, self.call = 0, functools.partial(function, *arguments)
+            self.words, self.call = 0, functools.partial(_quietly, function, arguments)
             self._entry = _CALLBACK(self._called_back)
         self.address: int = ctypes.cast(self._entry, ctypes.c_void_p).value or 0
 
@@ -169,6 +171,12 @@ class CompiledFunction:
     def __reduce__(self) -> tuple[Any, ...]:
         """Leave out, of a copy, what is kept of these very arrays."""
         return CompiledFunction, (self._function,)
+
+
+def _quietly(function: Any, arguments: tuple[Any, ...]) -> None:
+    """Call a function; what overflows or is divided by 0 is no news, as in C."""
+    with np.errstate(all="ignore"):
+        function(*arguments)
 
 
 def _nothing() -> None:
