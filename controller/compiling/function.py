@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from controller.compiling.library import library_of
-from controller.translator.arguments import words_of
+from controller.translator.arguments import list_of_words
 from controller.translator.program import Program
 from controller.translator.types import Type, type_of
 
@@ -68,6 +68,16 @@ def _entry(function: FunctionType, types: tuple[Type, ...]) -> Any:
     return entry
 
 
+Described = dict[int, tuple[Any, Type, list[int]]]  # arguments with their types and words, by their ids
+
+
+def _described(argument: Any, known: Described) -> tuple[Any, Type, list[int]]:
+    found = known.get(id(argument))
+    if found is None:
+        found = known[id(argument)] = argument, type_of(argument), list_of_words(argument)
+    return found
+
+
 class BoundCall:
     """A function with its arguments, which stay alive as long as it, or its `call`, does.
 
@@ -77,6 +87,8 @@ class BoundCall:
         Plain Python in the translator's subset; anything else that can be called is called as it is.
     arguments : tuple
         Numbers, C-contiguous arrays, and tuples of such; no array is resized in place.
+    known : dict, optional
+        What is known of arguments by their ids, which are theirs while it holds them; more is put there.
 
     Attributes
     ----------
@@ -86,11 +98,12 @@ class BoundCall:
         Of the C function ``void (*)(const void *)``, and of what it is given.
     """
 
-    def __init__(self, function: Any, arguments: tuple[Any, ...]) -> None:
+    def __init__(self, function: Any, arguments: tuple[Any, ...], known: Described | None = None) -> None:
         self._raised: BaseException | None = None
         if isinstance(function, FunctionType) and not os.environ.get(INTERPRETED):
-            self._entry = _entry(function, tuple(map(type_of, arguments)))
-            self._words = words_of(arguments)
+            described = [_described(argument, {} if known is None else known) for argument in arguments]
+            self._entry = _entry(function, tuple(kind for _, kind, _ in described))
+            self._words = np.array([word for _, _, words in described for word in words], dtype=np.uint64)
             self.words: int = self._words.ctypes.data
             call: Any = functools.partial(self._entry, self.words)
             call.kept = self._words, arguments  # whoever has it alone can call it
@@ -135,6 +148,7 @@ class CompiledFunction:
     def __init__(self, function: Any) -> None:
         self._function = function
         self._bound: dict[tuple[int, ...], BoundCall] = {}  # by the ids of arguments, which are theirs while kept
+        self._known: Described = {}
         self._last: tuple[Any, ...] = (_nothing, *_NONE)  # the last call, and the seven arguments it is for
 
     def __call__(
@@ -163,8 +177,8 @@ class CompiledFunction:
         bound = self._bound.get(key)
         if bound is None:
             if len(self._bound) == _MOST:
-                self._bound = {}
-            bound = self._bound[key] = BoundCall(self._function, arguments)
+                self._bound, self._known = {}, {}
+            bound = self._bound[key] = BoundCall(self._function, arguments, self._known)
         self._last = (bound.call, *arguments, *_NONE[len(arguments) :])
         return bound.call
 

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import operator
-from collections.abc import Iterator
+import struct
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+_NUMBER, _BITS = struct.Struct("=d"), struct.Struct("=Q")
 
 
 def words_of(arguments: tuple[Any, ...]) -> NDArray[np.uint64]:
@@ -23,17 +25,15 @@ def words_of(arguments: tuple[Any, ...]) -> NDArray[np.uint64]:
     ndarray, shape (n,)
         A number is one word; an array is its address and its shape.
     """
-    return np.array(list(_words(arguments)), dtype=np.uint64)
+    return np.array(list_of_words(arguments), dtype=np.uint64)
 
 
-def _words(value: Any) -> Iterator[int]:
+def list_of_words(value: Any) -> list[int]:
+    """Return the words of one argument."""
+    if isinstance(value, np.ndarray):
+        return [value.ctypes.data, *value.shape]
     if isinstance(value, tuple):
-        for item in value:
-            yield from _words(item)
-    elif isinstance(value, np.ndarray):
-        yield value.ctypes.data
-        yield from value.shape
-    elif isinstance(value, float):
-        yield int(np.float64(value).view(np.uint64))
-    else:
-        yield operator.index(value) % 2**64
+        return [word for item in value for word in list_of_words(item)]
+    if isinstance(value, float):
+        return [_BITS.unpack(_NUMBER.pack(value))[0]]
+    return [operator.index(value) % 2**64]

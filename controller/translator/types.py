@@ -17,7 +17,7 @@ class Scalar:
 
 DOUBLE, INT, UINT, BOOL = Scalar("double"), Scalar("int64_t"), Scalar("uint64_t"), Scalar("bool")
 REFERENCE = Scalar("uint32_t")  # of a variable of an FMU
-_ITEMS = {"float64": DOUBLE, "int64": INT, "uint64": UINT, "uint32": REFERENCE, "bool": BOOL}
+_ITEMS = {np.dtype(n): c for n, c in (("f8", DOUBLE), ("i8", INT), ("u8", UINT), ("u4", REFERENCE), ("?", BOOL))}
 _SHORT = {DOUBLE: "f64", INT: "i64", UINT: "u64", REFERENCE: "u32", BOOL: "b8"}
 
 
@@ -86,15 +86,17 @@ def type_of(value: Any) -> Type:
     TypeError
         If it is of another type.
     """
-    if isinstance(value, int | np.int64):  # and truth values: each takes a word
-        return INT
-    if isinstance(value, float):
-        return DOUBLE
-    if isinstance(value, np.ndarray) and value.dtype.name in _ITEMS and value.flags.c_contiguous:
-        return Array(_ITEMS[value.dtype.name], value.ndim)
-    if isinstance(value, tuple):
+    if isinstance(value, np.ndarray):
+        item = _ITEMS.get(value.dtype)
+        if item is not None and value.flags.c_contiguous:
+            return Array(item, value.ndim)
+    elif isinstance(value, tuple):
         items = tuple(map(type_of, value))
         return Record(type(value), items) if hasattr(value, "_fields") else Tuple(items)
+    elif isinstance(value, float):
+        return DOUBLE
+    elif isinstance(value, int | np.int64):  # and truth values: each takes a word
+        return INT
     kind = f"an array of {value.dtype}" if isinstance(value, np.ndarray) else type(value).__name__
     raise TypeError(f"argument is {kind}, expected a number, a contiguous array of numbers, or a tuple of such")
 
