@@ -70,7 +70,6 @@ def test_the_reference_names_nothing_twice_and_nothing_that_is_not_there():
 # what a shape or a law of one's own, in the package, stands on: modules that are not public
 WITHIN = {
     "controller.stack_array",
-    "controller.jit.jit",
     "controller.law",
     "controller.potential_field",
     "controller.quaternion",

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import operator
 import struct
+import sys
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-_NUMBER, _BITS = struct.Struct("=d"), struct.Struct("=Q")
+_NUMBER = struct.Struct("=d")
 
 
 def words_of(arguments: tuple[Any, ...]) -> NDArray[np.uint64]:
@@ -35,5 +36,5 @@ def list_of_words(value: Any) -> list[int]:
     if isinstance(value, tuple):
         return [word for item in value for word in list_of_words(item)]
     if isinstance(value, float):
-        return [_BITS.unpack(_NUMBER.pack(value))[0]]
+        return [int.from_bytes(_NUMBER.pack(value), sys.byteorder)]
     return [operator.index(value) % 2**64]

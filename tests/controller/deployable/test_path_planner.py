@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from controller.compiling.function import CompiledFunction
 from controller.laws.deployable import path_planner as way_round
 from controller.laws.deployable.attraction import approach_speed, desired_acceleration, desired_velocity
 from controller.laws.deployable.gains import DeployableGains
@@ -124,12 +125,15 @@ def test_the_end_of_a_ball_is_the_nearest_point():
     assert end == pytest.approx([9.0 - 0.2, 0.0, 2.5], abs=1e-9)
 
 
+improve = CompiledFunction(improve_path)
+
+
 def run(regions, steps=400, goal=GOAL, start=START, plan=None, moved=None):
     plan, packed = plan or empty_plan(regions.kinds.size, 1), pack([goal])
     for k in range(steps):
         if moved:
             moved(k, packed)
-        improve_path(plan, start, packed, regions, GAINS, 0.02)
+        improve(plan, start, packed, regions, GAINS, 0.02)
     return plan, packed
 
 

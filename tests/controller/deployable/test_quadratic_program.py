@@ -6,6 +6,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
+from controller.compiling.function import BoundCall
 from controller.laws.deployable.model import make_thrusters, reallocate
 from controller.laws.deployable.quadratic_program import _add_product, _row_residual, empty_workspace, solve
 from cosim.scenario.vehicle_model import vehicle_model
@@ -44,13 +45,18 @@ def program(rng, kind):
     return thrusters, rows, right, price, wanted
 
 
+def _solve(work, count, inverse, lower, upper, forces, steps):
+    steps[0] = solve(work, count, inverse, lower, upper, forces)
+
+
 def ask(thrusters, rows, right, price, wanted):
     """Return forces, multipliers and steps of our own solver."""
     count, m = rows.shape
     work, forces = empty_workspace(count + 2, m), np.full(m, np.nan)
     work.rows[:count], work.right[:count], work.price[:count], work.nominal[:] = rows, right, price, wanted
-    steps = solve(work, count, thrusters.inverse, thrusters.lower, thrusters.upper, forces)
-    return forces, work.multipliers[: count + 2 * m].copy(), steps
+    steps = np.zeros(1, np.int64)
+    BoundCall(_solve, (work, count, thrusters.inverse, thrusters.lower, thrusters.upper, forces, steps)).call()
+    return forces, work.multipliers[: count + 2 * m].copy(), steps[0]
 
 
 def by_quadprog(thrusters, rows, right, price, wanted):

@@ -30,9 +30,9 @@ def called(monkeypatch):
     """Functions with the types of their arguments, as they are bound."""
     found, bind = set(), function.BoundCall.__init__
 
-    def noted(self, called, arguments):
+    def noted(self, called, arguments, *known):
         found.add((called, tuple(map(type_of, arguments))))
-        bind(self, called, arguments)
+        bind(self, called, arguments, *known)
 
     monkeypatch.setattr(function.BoundCall, "__init__", noted)
     return found
