@@ -12,6 +12,9 @@ import packaging.utils
 import pytest
 from fmpy.validation import validate_fmu
 
+from controller.compiling.function import c_text
+from controller.compiling.library import library_name
+from cosim.batch.shipped_functions import shipped_functions
 from plant_fmu import build_fmu, load_vehicle, shipped_vehicles
 from plant_fmu.build import cached_fmu
 from plant_fmu.compiling import prebuilt
@@ -36,6 +39,13 @@ def expected_libraries():
     return {prebuilt.file_name(structure, fmi) for structure in structures for fmi in (2, 3)}
 
 
+def expected_functions(platforms):
+    """Libraries of what is run as C, with their checksums."""
+    names = {library_name(c_text(function, arguments)) for function, arguments in shipped_functions()}
+    files = {f"{platform.name}/{name}{platform.suffix}" for platform in platforms for name in names}
+    return {f"controller/prebuilt/{file}{end}" for file in files for end in ("", ".sha256")}
+
+
 def of_packages(tracked):
     return {name for name in tracked if PurePosixPath(name).parts[0] in PACKAGES}
 
@@ -45,6 +55,7 @@ def test_the_wheel_holds_the_packages_and_nothing_else(wheel, unpacked, tracked,
     names = {path.relative_to(unpacked).as_posix() for path in unpacked.rglob("*") if path.is_file()}
     own = {name for name in names if not name.startswith(info)}
     libraries = {f"plant_fmu/prebuilt/{name}" for name in expected_libraries()}
+    libraries |= expected_functions(PLATFORMS.values())
     assert own == of_packages(tracked) | {"plant_fmu/LICENSE"} | libraries
     assert {f"{package}/py.typed" for package in PACKAGES} <= own
     assert all((unpacked / name).read_bytes() == (ROOT / name).read_bytes() for name in of_packages(tracked))
@@ -65,6 +76,7 @@ def test_the_source_distribution_holds_what_a_wheel_is_built_from(dist, tracked)
     with tarfile.open(path) as archive:
         names = {member.name.partition("/")[2] for member in archive.getmembers() if member.isfile()}
     libraries = {f"plant_fmu/prebuilt/{name}" for name in expected_libraries()}
+    libraries |= expected_functions(PLATFORMS.values())
     assert names - {"PKG-INFO", ".gitignore"} == of_packages(tracked) | set(BESIDE) | libraries
     assert path.stat().st_size < MOST
 
@@ -85,7 +97,7 @@ def test_each_dependency_has_a_lower_bound(project):
     extras = [text for texts in project["optional-dependencies"].values() for text in texts]
     for text in (*project["dependencies"], *extras):
         assert ">=" in text or text.startswith("subreach["), text
-    wanted = {"build", "campaign", "importers", "mcap", "rerun"}
+    wanted = {"build", "campaign", "importers", "mcap", "numba", "rerun"}
     (everything,) = project["optional-dependencies"]["all"]
     assert set(everything.removeprefix("subreach[").removesuffix("]").split(",")) == wanted
 
@@ -101,8 +113,8 @@ def test_a_wheel_of_a_checkout_is_for_this_machine_and_says_so(own_wheel, wheel)
         names, everywhere = (
             {name for name in archive.namelist() if ".dist-info/" not in name} for archive in (ours, released)
         )
-        assert names == everywhere
         here = native_platform()
+        assert names == everywhere - expected_functions(PLATFORMS.values()) | expected_functions([here])
         for name in {f"plant_fmu/prebuilt/{name}" for name in expected_libraries()}:
             with zipfile.ZipFile(ours.open(name)) as libraries:
                 assert libraries.namelist() == [f"{here.name}{here.suffix}"]
@@ -118,7 +130,7 @@ def test_a_checkout_needs_ziglang_for_this_machine_only_without_a_compiler(monke
     def asks(what):
         return {text.partition(">")[0] for text in getattr(hatch_build, f"get_requires_for_build_{what}")()}
 
-    plant = {"fmpy", "msgspec", "numpy", "platformdirs"}
+    plant = {"fmpy", "msgspec", "numpy", "platformdirs", "scipy", "tomli-w"}
     monkeypatch.setattr("shutil.which", lambda name: "/usr/bin/cc")
     assert asks("wheel") == plant
     assert asks("sdist") == plant | {"ziglang"}

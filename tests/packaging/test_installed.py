@@ -27,12 +27,19 @@ def test_nothing_is_missing(bare):
     assert "No broken requirements found" in bare("python", "-m", "pip", "check")
 
 
-def test_the_paper_runs_to_a_report(bare, tmp_path):
-    bare("cosim", "run", "paper", "--set", "time.duration=0.5", "--out", "run")
+@pytest.mark.parametrize("scenario", ["paper", "docking"])
+def test_a_run_comes_to_a_report(bare, tmp_path, scenario):
+    bare("cosim", "run", scenario, "--set", "time.duration=0.5", "--out", "run")
     assert json.loads((tmp_path / "run" / "summary.json").read_text())
     assert all(
         (tmp_path / "run" / name).stat().st_size > 1000 for name in ("report.html", "replay.html", "record.parquet")
     )
+
+
+def test_scenes_are_flown_by_laws(bare, tmp_path):
+    bare("cosim", "scenes", "--count", "2", "--out", "scenes.jsonl")
+    bare("cosim", "compare", "scenes.jsonl", "--laws", "deployable,pd", "--replays", "0", "--out", "side")
+    assert (tmp_path / "side" / "deployable" / "results.parquet").exists()
 
 
 @pytest.mark.parametrize("fmi", ["2", "3"])
