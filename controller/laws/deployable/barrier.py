@@ -40,6 +40,7 @@ Array = NDArray[np.float64]
 
 _ATTITUDE = FIRST_OF_ATTITUDE  # shapes from it on depend on attitude
 _FLAT = (Box.kind, Prism.kind, DepthBand.kind, HalfSpace.kind)
+_IMPULSE = 0.5  # s, for which what is asked for is taken to act where faces ahead are looked for
 _LN_10 = 2.302585092994046
 _AHEAD = 0.1  # s, over which the rate of a gradient is measured
 _FIRM = (3.0, 3.0)  # decades: price of slack against missing the desired force, at weight 0, and added at weight 1
@@ -166,6 +167,11 @@ def write_rows(
         Rows written, (1 + FACES) n at most.
     """
     rows, n, later_gradient, relative, path_velocity = 0, zeros(6), zeros(6), zeros(6), zeros(3)
+    wanted = zeros(3)  # m/s2, acceleration that is asked for
+    for axis in range(3):
+        wanted[axis] = motion.free_acceleration[axis]
+        for j in range(lower.size):
+            wanted[axis] += motion.thruster_acceleration[axis, j] * work.nominal[j]
     for i in range(regions.kinds.size):
         of_attitude = regions.kinds[i] >= _ATTITUDE
         if not regions.hard[i] or not pose_gradient(
@@ -188,9 +194,12 @@ def write_rows(
             observation.later_gradients, observation.later_rotation_gradients, i, of_attitude, later_gradient
         ):
             turning = gradient_rate(regions.kinds[i], n, later_gradient, relative)
+            if regions.signs[i] > 0.0 and regions.kinds[i] in _FLAT:
+                turning = 0.0
         distance, reach, faces = observation.clearances[i], 0.0, 1
-        if not of_attitude and has_faces(regions.kinds[i]):
-            copy(relative, path_velocity)
+        if not of_attitude and has_faces(regions.kinds[i], regions.signs[i]):
+            for axis in range(3):
+                path_velocity[axis] = relative[axis] + _IMPULSE * wanted[axis]
             speed = length3(path_velocity[0], path_velocity[1], path_velocity[2])
             reach = margin + speed * (speed / (2.0 * braking) + 1.0 / gains.barrier_slope + 1.0 / gains.barrier_rate)
             if 0.0 < distance < reach:

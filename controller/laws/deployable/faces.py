@@ -18,15 +18,20 @@ from controller.stack_array import zeros
 
 Array = NDArray[np.float64]
 
-_SMOOTH = (Sphere.kind, HalfSpace.kind, Ellipsoid.kind)
+_SMOOTH = (Sphere.kind, Ellipsoid.kind)  # from outside
+_HALF_SPACE = HalfSpace.kind
 FACES = 2  # searched for beside the nearest
 _LOOKS = 16  # along a line at most
 _HALVINGS = 6  # of the interval in which it leaves the region
 
 
-def has_faces(kind: int) -> bool:
-    """Return whether the clearance of a kind of region has a kink where two faces are equally near."""
-    return kind not in _SMOOTH
+def has_faces(kind: int, sign: float) -> bool:
+    """Return whether the clearance of a region has a kink where two faces are equally near.
+
+    Within a region that is kept in (`sign` above 0) that is so for all but a half space: within an ellipsoid along its
+    long axes, within a sphere in its middle.
+    """
+    return kind != _HALF_SPACE and (sign > 0.0 or kind not in _SMOOTH)
 
 
 def face_ahead(
