@@ -218,3 +218,14 @@ def test_lost_numbers_are_told():
     packed.shifts[0] = math.nan
     ray_distances(packed, np.array([-6.0, 0.0, 1.0]), NORTH[None], FARTHEST, met)
     assert math.isnan(met[0])
+
+
+@pytest.mark.parametrize("bearing", np.linspace(0.0, 2.0 * np.pi, 9)[:-1])
+def test_a_notched_shape_is_met_from_afar_on_every_side(bearing):
+    """Its circle passes by the rays that cannot meet it, and by no other."""
+    origin = np.array([1.5 + 8.0 * np.cos(bearing), 0.9 + 8.0 * np.sin(bearing), 2.0])
+    towards = np.array([0.5, 1.0, 2.0]) - origin
+    length = np.linalg.norm(towards)
+    distances, rays = np.empty(2), np.array([towards / length, -towards / length])
+    ray_distances(pack([Region("notched", L_SHAPED, "out")]), origin, rays, 50.0, distances)
+    assert 0.0 < distances[0] < length and distances[1] == np.inf
