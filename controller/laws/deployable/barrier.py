@@ -132,6 +132,14 @@ def gradient_rate(kind: int, n: Array, later: Array, velocity: Array) -> float:
     return turning
 
 
+def _desired_acceleration(motion: Motion, nominal: Array, out: Array) -> None:
+    """Write the acceleration [m/s2] that desired thruster forces [N] give, shape (3,)."""
+    for axis in range(3):
+        out[axis] = motion.free_acceleration[axis]
+        for j in range(nominal.size):
+            out[axis] += motion.thruster_acceleration[axis, j] * nominal[j]
+
+
 def write_rows(
     work: Workspace,
     observation: RegionObservation,
@@ -167,11 +175,8 @@ def write_rows(
         Rows written, (1 + FACES) n at most.
     """
     rows, n, later_gradient, relative, path_velocity = 0, zeros(6), zeros(6), zeros(6), zeros(3)
-    wanted = zeros(3)  # m/s2, acceleration that is asked for
-    for axis in range(3):
-        wanted[axis] = motion.free_acceleration[axis]
-        for j in range(lower.size):
-            wanted[axis] += motion.thruster_acceleration[axis, j] * work.nominal[j]
+    wanted = zeros(3)
+    _desired_acceleration(motion, work.nominal, wanted)
     for i in range(regions.kinds.size):
         of_attitude = regions.kinds[i] >= _ATTITUDE
         if not regions.hard[i] or not pose_gradient(
@@ -194,8 +199,7 @@ def write_rows(
             observation.later_gradients, observation.later_rotation_gradients, i, of_attitude, later_gradient
         ):
             turning = gradient_rate(regions.kinds[i], n, later_gradient, relative)
-            if regions.signs[i] > 0.0 and regions.kinds[i] in _FLAT:
-                turning = 0.0
+            turning = min(turning, 0.0) if regions.signs[i] > 0.0 else turning  # from inside it is a jump
         distance, reach, faces = observation.clearances[i], 0.0, 1
         if not of_attitude and has_faces(regions.kinds[i], regions.signs[i]):
             for axis in range(3):

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from controller.arithmetic import exponential, length3, square
 from controller.laws.deployable.gains import DeployableGains
 from controller.laws.deployable.linear_algebra import copy, norm
-from controller.laws.deployable.search import Tree, empty_tree, grow_tree
+from controller.laws.deployable.search import ROOM, Tree, empty_tree, grow_tree, limits_along
 from controller.regions import Sphere
 from controller.regions.kinds import FIRST_OF_ATTITUDE
 from controller.regions.region_set import (
@@ -35,7 +35,7 @@ Array = NDArray[np.float64]
 _LN_30 = 3.4011973816621555
 CORNERS = 8  # at most
 _SAMPLES = 64  # evaluations of the regions along a path at most
-_STRIDE = (0.08, 0.6)  # m, least and greatest distance between two
+_STRIDE = (0.08, 3.0)  # m, least and greatest distance between two
 _TRUST = 0.7  # of the clearance beyond the desired one, travelled before the next evaluation
 _INSIDE = 200.0  # m of path, cost of a metre within a hard region
 _NEAR = 3.0  # m of path, cost of a metre on the surface
@@ -48,7 +48,7 @@ _ATTITUDE = FIRST_OF_ATTITUDE  # shapes from it on do not depend on position alo
 _CLIMBS = 12  # towards the inside of the goal region
 _PAYS = 0.05  # m deeper for each metre that a climb must bring; straight up it brings 1
 _DEEP_ENOUGH = 1e-3  # m, tolerance of the depth of an end
-_ROOM = 2.5  # m beyond start and end, in which corners are drawn
+_LESS = 0.5  # m, by which corners are drawn nearer to start and end than nodes of the tree
 
 
 class PathPlan(NamedTuple):
@@ -226,7 +226,10 @@ def improve_path(
     random_numbers = plan.random_numbers
     for i in range(random_numbers.size):
         random_numbers[i] = uniform(plan.random)
-    if plan.cost[0] > _BLOCKED * _length(path, plan.counts[0], start) and random_numbers[4] < 0.7:
+    blocked = plan.cost[0] > _BLOCKED * _length(path, plan.counts[0], start)
+    if not blocked:
+        plan.tree.room[0] = ROOM[0]
+    if blocked and random_numbers[4] < 0.7:
         plan.counts[1] = grow_tree(
             plan.tree, start, path[plan.counts[0] - 1], random_numbers, regions, gains, candidate
         )
@@ -259,7 +262,7 @@ def _distance(a: Array, b: Array) -> float:
 
 def _mutate_path(plan: PathPlan, start: Array, goal: PackedRegions, gains: DeployableGains) -> None:
     """Write a mutation of the path into `candidate`."""
-    path, candidate, random = plan.path, plan.candidate, plan.random
+    path, candidate, random, room = plan.path, plan.candidate, plan.random, plan.tree.room[0] - _LESS
     _copy_path(path, candidate)
     count = plan.counts[0]
     last = count - 1
@@ -289,15 +292,13 @@ def _mutate_path(plan: PathPlan, start: Array, goal: PackedRegions, gains: Deplo
         for i in range(count, at, -1):
             copy(candidate[i - 1], candidate[i])
         for axis in range(3):
-            low = min(start[axis], path[last, axis]) - _ROOM
-            high = max(start[axis], path[last, axis]) + _ROOM
+            low, high = limits_along(axis, start, path[last], room)
             candidate[at, axis] = low + uniform(random) * (high - low)
         count += 1
     else:  # one corner alone, anywhere about
         copy(path[last], candidate[1])
         for axis in range(3):
-            low = min(start[axis], path[last, axis]) - _ROOM
-            high = max(start[axis], path[last, axis]) + _ROOM
+            low, high = limits_along(axis, start, path[last], room)
             candidate[0, axis] = low + uniform(random) * (high - low)
         count = 2
     plan.counts[1] = count

@@ -25,9 +25,10 @@ Array = NDArray[np.float64]
 
 _SPHERE = Sphere.kind
 _ATTITUDE = FIRST_OF_ATTITUDE  # shapes from it on do not depend on position alone
-_NODES = 256  # after which the tree starts anew
-_REACH = 1.5  # m, longest edge
-_ROOM = 3.0  # m beyond start and end, in which nodes are drawn
+_NODES = 512  # after which the tree starts anew
+_REACH = (1.5, 0.1)  # m, longest edge; or as part of the distance from start to end, where that is more
+ROOM = (3.0, 16.0)  # m beyond start and end, in which nodes are drawn: at first, and at most
+_GROWS = 1.006  # that room, with each look for a node
 _STRIDE = 0.05  # m, least distance between two evaluations along a line
 _LOOKS = 32  # evaluations along a line at most
 _ANCESTORS = 2  # tested beside its parent
@@ -41,11 +42,13 @@ class Tree(NamedTuple):
     nodes: Array  # (_NODES, 3) m, NED
     parents: NDArray[np.int64]  # (_NODES,)
     size: NDArray[np.int64]  # (1,) number of nodes
+    room: Array  # (1,) m beyond start and end, in which nodes are drawn
 
 
 def empty_tree() -> Tree:
     """Return a tree without nodes."""
-    return Tree(np.zeros((_NODES, 3)), np.zeros(_NODES, dtype=np.int64), np.zeros(1, dtype=np.int64))
+    size, room = np.zeros(1, dtype=np.int64), np.array([ROOM[0]])
+    return Tree(np.zeros((_NODES, 3)), np.zeros(_NODES, dtype=np.int64), size, room)
 
 
 def _clearance_at(point: Array, regions: PackedRegions, gradient: Array) -> float:
@@ -92,6 +95,14 @@ def is_line_free(start: Array, end: Array, regions: PackedRegions, margin: float
     return False
 
 
+def limits_along(axis: int, start: Array, end: Array, room: float) -> tuple[float, float]:
+    """Return within what places are drawn along an axis [m, NED]: `room` beyond both ends, but not out of the water."""
+    low, high = min(start[axis], end[axis]), max(start[axis], end[axis])
+    if axis == 2:
+        return max(low - room, min(low, 0.0)), high + room
+    return low - room, high + room
+
+
 def grow_tree(
     tree: Tree,
     start: Array,
@@ -124,9 +135,11 @@ def grow_tree(
         Points of the path.
     """
     nodes, parents = tree.nodes, tree.parents
-    moved = 0.0
+    moved, far = 0.0, 0.0
     for axis in range(3):
         moved += square(nodes[0, axis] - end[axis])
+        far += square(start[axis] - end[axis])
+    tree.room[0] = min(_GROWS * tree.room[0], ROOM[1])
     if tree.size[0] == 0 or tree.size[0] == _NODES or moved > square(_MOVED):
         copy(end, nodes[0])
         parents[0] = -1
@@ -136,7 +149,7 @@ def grow_tree(
     # from the nearest node towards a random point, or the vehicle
     target, new = zeros(3), zeros(3)
     for axis in range(3):
-        low, high = min(start[axis], end[axis]) - _ROOM, max(start[axis], end[axis]) + _ROOM
+        low, high = limits_along(axis, start, end, tree.room[0])
         target[axis] = start[axis] if random_numbers[3] < 0.2 else low + random_numbers[axis] * (high - low)
     nearest, least = 0, np.inf
     for i in range(tree.size[0]):
@@ -149,7 +162,7 @@ def grow_tree(
     if distance < _STRIDE:
         return 0
     for axis in range(3):
-        part = min(1.0, _REACH / distance)
+        part = min(1.0, max(_REACH[0], _REACH[1] * np.sqrt(far)) / distance)
         new[axis] = nodes[nearest, axis] + part * (target[axis] - nodes[nearest, axis])
     if not is_line_free(new, nodes[nearest], regions, margin):
         return 0

@@ -1,0 +1,163 @@
+"""Regions that are hard to keep and ways that are hard to find: those of a list, and families drawn at random."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from cosim.batch.fused import FusedFlyer
+from cosim.batch.variation import Variation
+from cosim.scenario.scenario import load_scenario
+
+DATA = Path(__file__).parents[2] / "data" / "hard_regions"
+VEHICLES = ("odin", "bluerov2_heavy", "rexrov")
+MIDDLE = np.array([0.0, 0.0, 10.0])
+FLIGHT = """
+vehicle = "{vehicle}"
+[time]
+duration = {duration}
+step = 0.01
+control = 0.02
+arbiter = 0.02
+[initial]
+position = {start}
+[goal]
+type = "sphere"
+centre = {goal}
+radius = 0.5
+[law]
+name = "deployable"
+[actuation]
+through = "thrusters"
+[sensing]
+position_noise = {noise}
+velocity_noise = {half}
+seed = {seed}
+"""
+REGION = """
+[[regions]]
+name = "{name}"
+criterion = "shape"
+keep = "{keep}"
+gain = 100.0
+shape = {{ {shape} }}
+"""
+
+
+def text(numbers):
+    return str([float(x) for x in numbers])
+
+
+def unit(rng, n=3):
+    found = rng.normal(size=n)
+    return found / np.linalg.norm(found)
+
+
+def room(kind, rng):
+    """Return the shape of a room, a start within it, and a goal that lies beyond its surface or near it."""
+    quaternion, way = unit(rng, 4), unit(rng)
+    R = Rotation.from_quat(np.roll(quaternion, -1)).as_matrix()
+    if kind == "ellipsoid":
+        axes = rng.uniform(0.6, 4.0, 3)
+        shape = f"centre = {text(MIDDLE)}, semi_axes = {text(axes)}, quaternion = {text(quaternion)}"
+        start, goal = MIDDLE + R @ (0.4 * rng.uniform() * axes * way), MIDDLE + R @ (rng.uniform(1.2, 3.0) * axes * way)
+    elif kind == "sphere":
+        radius = rng.uniform(0.6, 3.0)
+        shape = f"centre = {text(MIDDLE)}, radius = {radius}"
+        start, goal = MIDDLE - rng.uniform(-0.5, 0.5) * radius * way, MIDDLE + rng.uniform(1.5, 4.0) * radius * way
+    elif kind == "box":
+        half = rng.uniform(0.7, 4.0, 3)
+        shape = f"centre = {text(MIDDLE)}, size = {text(2.0 * half)}, quaternion = {text(quaternion)}"
+        corner = R @ (half * rng.choice([-1.0, 1.0], 3) * rng.uniform(0.9, 2.0, 3))
+        start, goal = MIDDLE + R @ (half * rng.uniform(-0.4, 0.4, 3)), MIDDLE + corner
+    elif kind == "cylinder":
+        half, radius = rng.uniform(1.2, 4.0) * unit(rng), rng.uniform(0.7, 3.0)
+        shape = f"start = {text(MIDDLE - half)}, end = {text(MIDDLE + half)}, radius = {radius}"
+        start, goal = MIDDLE + rng.uniform(-0.4, 0.4) * half, MIDDLE + rng.uniform(2.0, 8.0) * way
+    else:
+        axis, length, angle = unit(rng), rng.uniform(2.5, 5.0), rng.uniform(0.3, 0.9)
+        feature = MIDDLE - 0.7 * length * axis
+        shape = f"feature = {text(feature)}, axis = {text(axis)}, half_angle = {angle}, range = {length}"
+        start, goal = MIDDLE, MIDDLE + rng.uniform(2.0, 8.0) * way
+    return f'type = "{kind}", {shape}', start, [goal[0], goal[1], max(goal[2], 1.5)]
+
+
+def kept_in(kind, vehicle, seed):
+    rng = np.random.default_rng([seed, *kind.encode()])
+    shape, start, goal = room(kind, rng)
+    noise = 0.02 * rng.integers(2)
+    flight = FLIGHT.format(
+        vehicle=vehicle, duration=40.0, start=text(start), goal=text(goal), noise=noise, half=noise / 2.0, seed=seed
+    )
+    return flight + REGION.format(name="room", keep="in", shape=shape)
+
+
+def block(name, x, y, half):
+    size = 2.0 * np.array(half)
+    return REGION.format(name=name, keep="out", shape=f'type = "box", centre = {[x, y, 12.0]}, size = {text(size)}')
+
+
+def barred(kind, vehicle, seed):
+    """Return a flight whose straight way is closed, though there is another one."""
+    rng = np.random.default_rng([seed, *kind.encode()])
+    length, blocks = 12.0, ""
+    if kind == "wall":
+        width = rng.uniform(4.0, 20.0)
+        blocks = block("wall", 6.0, rng.uniform(-0.3, 0.3) * width, [0.3, width / 2.0, 12.0])
+    elif kind == "door":
+        middle, gap = rng.uniform(-5.0, 5.0), rng.uniform(1.2, 2.0)
+        for name, side in (("left", -1.0), ("right", 1.0)):
+            blocks += block(name, 6.0, middle + side * (gap / 2.0 + 15.0), [0.3, 15.0, 12.0])
+    else:
+        length = rng.uniform(40.0, 60.0)
+        for i in range(int(rng.integers(1, 5))):
+            half = [rng.uniform(0.2, 1.0), rng.uniform(1.5, 4.0), rng.uniform(2.0, 12.0)]
+            blocks += block(f"slab {i}", rng.uniform(5.0, length - 5.0), rng.uniform(-1.0, 1.0), half)
+    flight = FLIGHT.format(
+        vehicle=vehicle, duration=240.0, start=[0.0, 0.0, 12.0], goal=[length, rng.uniform(-2.0, 2.0), 12.0],
+        noise=0.02, half=0.01, seed=seed,
+    )  # fmt: skip
+    return flight + blocks
+
+
+@pytest.fixture
+def flown(tmp_path):
+    """Return what flies a scenario's text, or its file, and gives the outcome."""
+
+    def fly(scenario):
+        file = scenario
+        if isinstance(scenario, str):
+            file = tmp_path / "flight.toml"
+            file.write_text(scenario)
+        whole = load_scenario(file, ["arbiter.engine=closed"])
+        with FusedFlyer(Variation(whole, ())) as flyer:
+            return flyer.fly_one(whole)[0]
+
+    return fly
+
+
+@pytest.mark.parametrize(
+    ("name", "reached"),
+    [("ellipsoid", False), ("bluerov2-box-corner", False), ("wall", True), ("transit60-slab4", True)],
+)
+def test_what_once_broke_the_law_is_kept(flown, name, reached):
+    outcome = flown(DATA / f"{name}.toml")
+    assert outcome["min_clearance"] > 0.0 and bool(outcome["settled"]) == reached
+
+
+@pytest.mark.parametrize("vehicle", VEHICLES)
+@pytest.mark.parametrize("kind", ["ellipsoid", "sphere", "box", "cylinder", "cone"])
+@pytest.mark.parametrize("seeds", [range(3), pytest.param(range(3, 60), marks=pytest.mark.slow)], ids=["few", "many"])
+def test_a_room_is_kept_wherever_its_goal_lies(flown, kind, vehicle, seeds):
+    left = [seed for seed in seeds if not flown(kept_in(kind, vehicle, seed))["min_clearance"] > 0.0]
+    assert left == []
+
+
+@pytest.mark.parametrize("vehicle", VEHICLES)
+@pytest.mark.parametrize("kind", ["wall", "door", "transit"])
+@pytest.mark.parametrize("seeds", [range(2), pytest.param(range(2, 40), marks=pytest.mark.slow)], ids=["few", "many"])
+def test_a_way_round_is_found(flown, kind, vehicle, seeds):
+    for seed in seeds:
+        outcome = flown(barred(kind, vehicle, seed))
+        assert outcome["settled"] and outcome["min_clearance"] > 0.0, seed
