@@ -199,7 +199,8 @@ def write_rows(
             observation.later_gradients, observation.later_rotation_gradients, i, of_attitude, later_gradient
         ):
             turning = gradient_rate(regions.kinds[i], n, later_gradient, relative)
-            turning = min(turning, 0.0) if regions.signs[i] > 0.0 else turning  # from inside it is a jump
+            if regions.signs[i] > 0.0 and not of_attitude:
+                turning = min(turning, 0.0)  # from inside, what turns away is a jump
         distance, reach, faces = observation.clearances[i], 0.0, 1
         if not of_attitude and has_faces(regions.kinds[i], regions.signs[i]):
             for axis in range(3):

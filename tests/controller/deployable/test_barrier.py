@@ -78,7 +78,7 @@ def test_rows_are_those_of_the_equations():
                 )
                 for i in range(3)
             ),
-            Region("pen", Sphere(tuple(rng.normal(size=3)), 6.0), "in"),
+            Region("pen", HalfSpace(tuple(rng.normal(size=3)), tuple(rng.normal(size=3))), "in"),
             Region("soft", Sphere((0.0, 0.0, 0.0), 0.5), "out", hard=False),
             Region("wall", HalfSpace(tuple(rng.normal(size=3)), tuple(rng.normal(size=3))), "in"),
             Region("face", Orientation(tuple(rng.normal(size=4)), 2.0), "in"),
