@@ -117,17 +117,20 @@ def pose_gradient(gradients: Array, rotation_gradients: Array, i: int, of_attitu
     return True
 
 
-def gradient_rate(kind: int, n: Array, later: Array, velocity: Array) -> float:
+def gradient_rate(kind: int, sign: float, n: Array, later: Array, velocity: Array) -> float:
     """Return (dn/dt)^T v, from a gradient now and later, (6,) each, along a velocity [m/s, rad/s] against the region.
 
     The gradient of a flat face is constant, and jumps where another face becomes the nearest. So with flat faces only a
-    gradient that turns away counts, as round an edge; with others, no jump towards the vehicle counts.
+    gradient that turns away counts, as round an edge; with others, no jump towards the vehicle counts. Within a region
+    that is kept in (`sign` above 0) what turns away is a jump, too.
     """
     turning, alike = 0.0, 0.0
     for axis in range(6):
         turning += (later[axis] - n[axis]) / _AHEAD * velocity[axis]
         alike += later[axis] * n[axis]
     if turning < 0.0 and kind < _ATTITUDE and (kind in _FLAT or alike < _LEAP):
+        return 0.0
+    if turning > 0.0 and kind < _ATTITUDE and sign > 0.0:
         return 0.0
     return turning
 
@@ -198,9 +201,7 @@ def write_rows(
         if pose_gradient(
             observation.later_gradients, observation.later_rotation_gradients, i, of_attitude, later_gradient
         ):
-            turning = gradient_rate(regions.kinds[i], n, later_gradient, relative)
-            if regions.signs[i] > 0.0 and not of_attitude:
-                turning = min(turning, 0.0)  # from inside, what turns away is a jump
+            turning = gradient_rate(regions.kinds[i], regions.signs[i], n, later_gradient, relative)
         distance, reach, faces = observation.clearances[i], 0.0, 1
         if not of_attitude and has_faces(regions.kinds[i], regions.signs[i]):
             for axis in range(3):

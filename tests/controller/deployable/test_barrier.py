@@ -118,13 +118,15 @@ def test_rows_are_those_of_the_equations():
 def test_the_slope_of_a_flat_face_leaps_and_does_not_turn():
     n, later, v = np.eye(6)[0], np.eye(6)[1], np.array([1.0, 0.5, 0.0, 0.0, 0.0, 0.0])
     for kind in (Box.kind, Sphere.kind):
-        assert barrier.gradient_rate(kind, n, later, v) == 0.0  # towards: a leap
-        assert barrier.gradient_rate(kind, n, later, -v) == pytest.approx(0.5 / AHEAD)
+        assert barrier.gradient_rate(kind, -1.0, n, later, v) == 0.0  # towards: a leap
+        assert barrier.gradient_rate(kind, -1.0, n, later, -v) == pytest.approx(0.5 / AHEAD)
     near = unit(np.array([0.9, 0.3, 0.0, 0.0, 0.0, 0.0]))
     back = np.array([1.0, 0.0, 0.0, 0.0, 0.0, 0.0])
-    assert barrier.gradient_rate(Sphere.kind, n, near, back) == pytest.approx((near[0] - 1.0) / AHEAD)
-    assert barrier.gradient_rate(Box.kind, n, near, back) == 0.0
-    assert barrier.gradient_rate(Orientation.kind, n, later, v) == pytest.approx(-0.5 / AHEAD)
+    assert barrier.gradient_rate(Sphere.kind, -1.0, n, near, back) == pytest.approx((near[0] - 1.0) / AHEAD)
+    assert barrier.gradient_rate(Box.kind, -1.0, n, near, back) == 0.0
+    assert barrier.gradient_rate(Orientation.kind, 1.0, n, later, v) == pytest.approx(-0.5 / AHEAD)
+    assert barrier.gradient_rate(Orientation.kind, 1.0, n, later, -v) == pytest.approx(0.5 / AHEAD)
+    assert barrier.gradient_rate(Box.kind, 1.0, n, later, -v) == 0.0  # from inside
 
 
 def planes(box, position):
