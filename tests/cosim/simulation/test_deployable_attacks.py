@@ -221,14 +221,14 @@ def test_a_slope_turns_by_the_motion_against_the_region():
         line, step = HERE - [2.0, 0.0, 2.0], 1e-3
         distances = [np.linalg.norm(line + k * step * relative[:3]) for k in (-1, 0, 1)]
         truth = (distances[0] - 2.0 * distances[1] + distances[2]) / step**2
-        assert gradient_rate(Sphere.kind, n, later, relative) == pytest.approx(truth, abs=0.003)
+        assert gradient_rate(Sphere.kind, -1.0, n, later, relative) == pytest.approx(truth, abs=0.003)
 
 
 def test_no_turn_is_seen_where_another_face_becomes_the_nearest():
     """In the middle between two walls the slope leaps to the opposite, which is no acceleration."""
     one, other = np.array([0.0, 1.0, 0.0, 0.0, 0.0, 0.0]), np.array([0.0, -1.0, 0.0, 0.0, 0.0, 0.0])
     for kind in (Box.kind, DepthBand.kind, Cylinder.kind, Sphere.kind):
-        assert gradient_rate(kind, one, other, 0.5 * one) == 0.0
+        assert gradient_rate(kind, 1.0, one, other, 0.5 * one) == 0.0
 
 
 @pytest.mark.parametrize(
