@@ -3,6 +3,7 @@
 # make lint   formatter, linter and type checker
 # make coverage  how much of the code the tests go through, against floors
 # make docs   the documents as a site, in build/site
+# make laws   the C of all that is run as C, in build/laws
 # make dist   source distribution and wheel, in dist/
 # make packaging  what is shipped: its contents, and runs from the wheel in an empty environment
 # make tour       every command of README and tutorial as printed, in fresh clones; most of an hour
@@ -26,7 +27,7 @@ INSTALL := $(if $(shell command -v uv),uv pip install --python $(BIN)/python,$(B
 # tests start hundreds of processes: where bytecode is not kept, each compiles what it imports again
 export PYTHONDONTWRITEBYTECODE =
 
-.PHONY: run test lint coverage mutation mutation-sample docs bench dist packaging tour lowest portable clean
+.PHONY: run test lint coverage mutation mutation-sample docs laws bench dist packaging tour lowest portable clean
 
 run: $(VENV)/installed
 	$(BIN)/cosim run paper
@@ -55,6 +56,9 @@ docs: $(VENV)/extras
 bench: $(VENV)/extras
 	$(BIN)/python -m benchmarks all
 	$(BIN)/python -m benchmarks scaling
+
+laws: $(VENV)/installed
+	$(BIN)/python -m cosim.batch.shipped_functions build/laws
 
 dist: $(VENV)/extras
 	rm -rf dist

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import sys
 import tempfile
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -108,3 +109,15 @@ def _compile(source: Path, folder: Path, platform: Platform, compiler: list[str]
     compile_file(source, library, compiler)
     library.with_suffix(".lib").unlink(missing_ok=True)  # which Windows would link with
     checksum_path(library).write_text(digest_of(library.read_bytes()))
+
+
+def write_sources(folder: Path) -> None:
+    """Write the C of each into a folder, which is made if it is not there."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for function, arguments in shipped_functions():
+        stem = f"{function.__module__.rpartition('.')[2]}_{function.__name__}"
+        (folder / f"{stem}.c").write_text(c_text(function, arguments), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    write_sources(Path(sys.argv[1]))

@@ -13,7 +13,7 @@ from controller.regions import Sphere
 from controller.regions.region_set import Region, clearances_at
 from controller.translator.types import type_of
 from cosim.batch.fused import FusedFlyer
-from cosim.batch.shipped_functions import shipped_functions, write_libraries
+from cosim.batch.shipped_functions import shipped_functions, write_libraries, write_sources
 from cosim.batch.variation import Variation
 from cosim.campaigns.scenes.flyer import Conditions, SceneFlyer
 from cosim.campaigns.scenes.generator import generate_scenes
@@ -57,6 +57,12 @@ def test_what_flights_call_is_shipped_and_what_is_shipped_is_called(called, tmp_
         master.run()
     clearances_at(np.zeros((2, 3)), Region("ball", Sphere((0.0, 0.0, 0.0), 1.0), "out"))
     assert called == {(one, tuple(map(type_of, arguments))) for one, arguments in shipped_functions()}
+
+
+def test_their_c_is_written_a_file_each(tmp_path):
+    write_sources(tmp_path / "laws")
+    names = {path.stem for path in (tmp_path / "laws").iterdir()}
+    assert len(names) == len(list(shipped_functions())) and {"law_step", "fused_loop_fly"} <= names
 
 
 @pytest.mark.slow
