@@ -175,7 +175,10 @@ def test_a_row_that_thrusters_hardly_move_is_paid_for_in_part():
     assert forces == pytest.approx(wanted + shaped * expected)
 
 
-@pytest.mark.parametrize("kind", KINDS)
+QUICK = ("any", "enclosed")
+
+
+@pytest.mark.parametrize("kind", [*QUICK, *(pytest.param(k, marks=pytest.mark.slow) for k in KINDS if k not in QUICK)])
 def test_the_solution_fulfils_the_conditions_of_kuhn_and_tucker(kind):
     """Stationary, within the limits, multipliers >= 0 and only where a row holds; steps within their bound."""
     rng = np.random.default_rng(100 + KINDS.index(kind))

@@ -148,7 +148,7 @@ def test_what_once_broke_the_law_is_kept(flown, name, reached):
 
 @pytest.mark.parametrize("vehicle", VEHICLES)
 @pytest.mark.parametrize("kind", ["ellipsoid", "sphere", "box", "cylinder", "cone"])
-@pytest.mark.parametrize("seeds", [range(3), pytest.param(range(3, 60), marks=pytest.mark.slow)], ids=["few", "many"])
+@pytest.mark.parametrize("seeds", [range(1), pytest.param(range(1, 60), marks=pytest.mark.slow)], ids=["few", "many"])
 def test_a_room_is_kept_wherever_its_goal_lies(flown, kind, vehicle, seeds):
     left = [seed for seed in seeds if not flown(kept_in(kind, vehicle, seed))["min_clearance"] > 0.0]
     assert left == []
@@ -156,7 +156,7 @@ def test_a_room_is_kept_wherever_its_goal_lies(flown, kind, vehicle, seeds):
 
 @pytest.mark.parametrize("vehicle", VEHICLES)
 @pytest.mark.parametrize("kind", ["wall", "door", "transit"])
-@pytest.mark.parametrize("seeds", [range(2), pytest.param(range(2, 40), marks=pytest.mark.slow)], ids=["few", "many"])
+@pytest.mark.parametrize("seeds", [range(1), pytest.param(range(1, 40), marks=pytest.mark.slow)], ids=["few", "many"])
 def test_a_way_round_is_found(flown, kind, vehicle, seeds):
     for seed in seeds:
         outcome = flown(barred(kind, vehicle, seed))
