@@ -55,6 +55,7 @@ def test_what_an_extra_brings_is_named_whole():
     assert named | {text for text in extras["importers"] if text.startswith("tbb")} == extras["importers"]
 
 
+@pytest.mark.slow
 def test_pip_takes_it_from_a_shell(monkeypatch):
     """For what is there already, without a network."""
     monkeypatch.setenv("PIP_NO_INDEX", "1")

@@ -138,7 +138,7 @@ def test_pd_droops_by_the_net_weight_over_its_gain():
 
 
 @pytest.mark.parametrize("name", ["sun_cheah", "antonelli"])
-@pytest.mark.parametrize("net_weight", [-12.0, 12.0])
+@pytest.mark.parametrize("net_weight", [-12.0, pytest.param(12.0, marks=pytest.mark.slow)])
 def test_adaptive_set_points_cancel_the_net_weight(name, net_weight):
     law = law_of(name, k_p1=100.0, k_v1=150.0, limit=40.0, **ADAPTING[name])
     positions, estimates = fly(law, net_weight, seconds=150.0)

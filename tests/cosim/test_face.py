@@ -22,6 +22,7 @@ def run(tmp_path_factory):
     return cosim.run_scenario(cosim.load_scenario("paper").replace(SHORT), tmp_path_factory.mktemp("face") / "run")
 
 
+@pytest.mark.slow
 def test_every_name_is_what_it_says_whatever_was_imported_before():
     modules = sorted(module for module in FILES if not module.endswith("__main__"))
     code = (

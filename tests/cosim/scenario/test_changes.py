@@ -131,6 +131,7 @@ def test_a_title_that_is_shown_stays_printable(tmp_path):
         load_scenario(file)
 
 
+@pytest.mark.slow
 def test_the_pages_of_a_run_say_so_when_it_is_flown_and_when_it_is_reported_again(tmp_path):
     scenario = load_scenario("paper-limited", ["limit.force=500", "time.duration=0.05", "arbiter.engine=closed"])
     folder = run_scenario(scenario, tmp_path / "run").folder
