@@ -39,7 +39,7 @@ def _scenery(obstacles: int) -> tuple[PackedRegions, PackedRegions]:
 
 
 class _Track(NamedTuple):
-    """What a law is told step by step, and where it reads that."""
+    """The inputs of a law step by step, and the arrays that it reads them from."""
 
     state: VehicleState
     places: Any  # (k, 3) m

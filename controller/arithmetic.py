@@ -1,7 +1,7 @@
-"""Arithmetic whose bits are the same in Python, in Numba's code and in C, whatever the C library.
+"""Arithmetic whose bits are the same in Python and in C, whatever the C library.
 
 Only +, -, *, / and square roots round alike everywhere. Powers, angles and their cosines are made of these here, for
-compiled laws and shapes: the functions of C libraries, and of Python, differ in their last bits.
+laws and shapes: the functions of C libraries, and of Python, differ in their last bits.
 """
 
 from __future__ import annotations

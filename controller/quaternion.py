@@ -1,6 +1,6 @@
 """Unit quaternions, scalar first, rotating body vectors into the world: equations (1)-(9), (23), (24).
 
-Functions take and return float64 arrays; those of parts and rows return tuples, which compiled code keeps in registers,
+Functions take and return float64 arrays; those of parts and rows return tuples, which C keeps in registers,
 where an array costs it a place in memory. The sign of the last term of (3) is that which (6), (7) and (10) need: the
 printed matrix is the transpose.
 """

@@ -1,4 +1,4 @@
-"""The C compiler of this machine, and what it is told."""
+"""The C compiler of this machine, and its command line."""
 
 from __future__ import annotations
 

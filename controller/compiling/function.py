@@ -16,13 +16,12 @@ from typing import Any
 import numpy as np
 
 from controller.compiling.library import library_of
-from controller.translator.arguments import list_of_words
+from controller.translator.arguments import words_of
 from controller.translator.program import Program
 from controller.translator.types import Type, type_of
 
-INTERPRETED = (
-    "SUBREACH_INTERPRETED"  # set in the environment: Python itself runs all functions, which needs no compiler
-)
+INTERPRETED = "SUBREACH_INTERPRETED"  # where the environment has it, Python runs all functions: no compiler is needed
+Described = dict[int, tuple[Any, Type, list[int]]]  # arguments with their types and words, by their ids
 
 _MOST = 8  # sets of arguments that are kept
 _NONE = (None,) * 7
@@ -68,13 +67,10 @@ def _entry(function: FunctionType, types: tuple[Type, ...]) -> Any:
     return entry
 
 
-Described = dict[int, tuple[Any, Type, list[int]]]  # arguments with their types and words, by their ids
-
-
 def _described(argument: Any, known: Described) -> tuple[Any, Type, list[int]]:
     found = known.get(id(argument))
     if found is None:
-        found = known[id(argument)] = argument, type_of(argument), list_of_words(argument)
+        found = known[id(argument)] = argument, type_of(argument), words_of(argument)
     return found
 
 

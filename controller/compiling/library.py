@@ -122,12 +122,12 @@ def _is_trusted(folder: Path) -> bool:
         return True
     if about.st_uid in trusted | {os.geteuid()} and not about.st_mode & stat.S_IWOTH:
         return True
-    _tell_of_others(folder)
+    _warn_of_others(folder)
     return False
 
 
 @functools.cache
-def _tell_of_others(folder: Path) -> None:
+def _warn_of_others(folder: Path) -> None:
     """Say it once, however many libraries there are."""
     log.warning("%s: others can write there; compiled for this process alone", folder)
 

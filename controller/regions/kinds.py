@@ -1,4 +1,4 @@
-"""Shapes told by their kind: the one that is meant is evaluated, and all but the simplest are compiled only once."""
+"""Evaluate a packed shape by the number of its kind."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ def _by_kind(name: str, arguments: str, of_attitude: bool) -> Callable[..., Any]
     return made
 
 
-# of a packed shape of position alone, told by its kind, at the position `p` [m, NED]
+# of a packed shape of position alone, at the position `p` [m, NED]
 evaluate_shape = _by_kind("evaluate_shape", "p, q", of_attitude=False)
 
-# of a packed shape of attitude, told by its kind, at the position `p` [m, NED] and the attitude `e`
+# of a packed shape of attitude, at the position `p` [m, NED] and the attitude `e`
 evaluate_shape_of_attitude = _by_kind("evaluate_shape_of_attitude", "p, e, q", of_attitude=True)

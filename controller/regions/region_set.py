@@ -128,7 +128,7 @@ def of_attitude(shape: Shape) -> bool:
 
 
 class PackedRegions(NamedTuple):
-    """Regions as arrays, which compiled code reads.
+    """Regions as arrays, which C reads.
 
     Who moves regions writes `shifts` and `velocities`; all else stays.
     """

@@ -1,4 +1,4 @@
-"""Flights by the fused loop: the vehicle's own FMU, stepped in compiled code by the functions of the master."""
+"""Flights by the fused loop: the vehicle's own FMU, stepped in C by the functions of the master."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from controller.allocation import Allocation
 from controller.regions import pack
 from cosim.batch.fused_loop import (
-    OUTPUTS,
+    PLANT_OUTPUTS,
     Allocator,
     Array,
     FlightConfig,
@@ -124,7 +124,7 @@ class FusedFlyer:
         else:
             inputs = tuple(f"wrench.{axis}" for axis in "XYZKMN")
             forces = tuple(f"actuator.wrench.{axis}" for axis in "XYZ")  # states: they cost no evaluation
-        native = plant.native(inputs, (*OUTPUTS, *forces))
+        native = plant.native(inputs, (*PLANT_OUTPUTS, *forces))
         names = [f"thrust_effectiveness[{i + 1}]" for i in range(n)]
         effectiveness = plant.native(names, ())
         effectiveness.inputs[:] = [plant[name] for name in names] if scenario.failures else 1.0

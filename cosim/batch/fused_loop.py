@@ -128,7 +128,7 @@ class FlightMetrics(NamedTuple):
     failed_step: float  # that the FMU refused
 
 
-class Outputs(NamedTuple):
+class FlightOutputs(NamedTuple):
     """What a flight fills."""
 
     metrics: Array  # (13,) in the order of `FlightMetrics`
@@ -137,7 +137,7 @@ class Outputs(NamedTuple):
     # velocity, position as measured, the weights of the three criteria, the i inputs, the law's r reports
 
 
-OUTPUTS = (
+PLANT_OUTPUTS = (
     *(f"position.{axis}" for axis in "xyz"),
     *(f"quaternion.e{i}" for i in range(4)),
     *(f"velocity.{axis}" for axis in "uvwpqr"),
@@ -151,7 +151,7 @@ def fly(  # noqa: C901 - one loop, as a whole
     allocator: Allocator,
     law: BoundLaw,
     workspace: Workspace,
-    out: Outputs,
+    out: FlightOutputs,
 ) -> None:
     """Fly from start to end.
 
@@ -160,8 +160,8 @@ def fly(  # noqa: C901 - one loop, as a whole
     setup : FlightConfig
         What is flown.
     native : Native
-        The plant: inputs are the thrust commands, or the wrench; outputs `OUTPUTS`, then the thrusters' forces if they
-        are used, then the force on the body, its three components.
+        The plant: inputs are the thrust commands, or the wrench; outputs `PLANT_OUTPUTS`, then the thrusters'
+        forces if they are used, then the force on the body, its three components.
     effectiveness : Native
         The same plant: inputs are the thrusters' effectivenesses, as they are before anything fails.
     allocator : Allocator
@@ -171,7 +171,7 @@ def fly(  # noqa: C901 - one loop, as a whole
         forces; to the workspace's wrench if thrusters carry that.
     workspace : Workspace
         Of `make_workspace`, anew for each flight.
-    out : Outputs
+    out : FlightOutputs
         Of the whole flight, or up to where the FMU failed.
     """
     m, n, inputs = setup.thrusters, setup.regions.kinds.size, native.inputs
@@ -348,7 +348,7 @@ def fly_law(
     law : CompiledLaw
         Anew for each flight.
     trace : ndarray
-        As of `Outputs`.
+        As of `FlightOutputs`.
 
     Returns
     -------
@@ -364,7 +364,7 @@ def fly_law(
     forces = workspace.wrench if setup.thrusters and is_wrench else native.inputs
     decide = law.bound(workspace.state, setup.goal, setup.regions, workspace.weights, forces)
     bound = BoundLaw(decide.address, decide.words, is_wrench, law.estimate, law.report)
-    out = Outputs(np.zeros(len(FlightMetrics._fields)), np.zeros(4), trace)
+    out = FlightOutputs(np.zeros(len(FlightMetrics._fields)), np.zeros(4), trace)
     BoundCall(fly, (setup, native, effectiveness, allocator, bound, workspace, out)).call()
     decide.raise_error()
     metrics = FlightMetrics(*out.metrics.tolist())

@@ -20,7 +20,7 @@ from controller.regions import Region, Sphere, pack
 from controller.regions.rays import ray_distances
 from controller.regions.region_set import PackedRegions, evaluate_packed, write_clearances
 from cosim.batch.c_calls import Clock
-from cosim.batch.fused_loop import Allocator, BoundLaw, FlightConfig, FlightMetrics, Outputs, fly, make_workspace
+from cosim.batch.fused_loop import Allocator, BoundLaw, FlightConfig, FlightMetrics, FlightOutputs, fly, make_workspace
 from cosim.scenario.vehicle_model import vehicle_model
 from cosim.simulation.environment import RegionEvaluation, RegionPlaces, evaluate_places
 from cosim.simulation.memberships import compute_memberships
@@ -64,7 +64,7 @@ def _of_flight(goal: PackedRegions, regions: PackedRegions) -> tuple[Any, ...]:
         goal, regions, _INTEGERS, 1.0, 1.0, 1, 1, 1, False, True, np.zeros((0, 6)), 0.0, 0.0, False,
         _INTEGERS, _INTEGERS, False, 1, Clock().numbers,
     )  # fmt: skip
-    out = Outputs(np.zeros(len(FlightMetrics._fields)), _FLAT, np.zeros((0, 0)))
+    out = FlightOutputs(np.zeros(len(FlightMetrics._fields)), _FLAT, np.zeros((0, 0)))
     law, allocator = BoundLaw(0, 0, True, _FLAT, _FLAT), Allocator(np.zeros((1, 1, 6)), _TABLE, _TABLE, True)
     return setup, native, native, allocator, law, make_workspace(1, 1, 1), out
 

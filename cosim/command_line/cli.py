@@ -168,9 +168,9 @@ def _run(arguments: Sequence[str]) -> int:
             with signals_held():
                 for package in _ERRORS:
                     importlib.import_module(package)
-                from cosim.run.progress import compiling_told
+                from cosim.run.progress import announce_compilation
             if not options.quiet:
-                stack.enter_context(compiling_told(tell))
+                stack.enter_context(announce_compilation(tell))
         try:
             return _VERBS[options.verb](options)
         except _mendable() as error:

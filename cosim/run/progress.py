@@ -53,18 +53,18 @@ class _Notice(logging.Handler):
 
     def __init__(self, tell: Callable[[str], None]) -> None:
         super().__init__()
-        self._tell, self._told = tell, False
+        self._tell, self._announced = tell, False
 
     def emit(self, record: logging.LogRecord) -> None:
         """Say it, beside a bar if there is one."""
-        if not self._told:
-            self._told = True
+        if not self._announced:
+            self._announced = True
             with tqdm.external_write_mode(file=sys.stderr):
                 self._tell(WORDS)
 
 
 @contextlib.contextmanager
-def compiling_told(tell: Callable[[str], None]) -> Iterator[None]:
+def announce_compilation(tell: Callable[[str], None]) -> Iterator[None]:
     """Say once if something is compiled within a block.
 
     Parameters

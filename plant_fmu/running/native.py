@@ -14,7 +14,7 @@ from plant_fmu.running.instance import Instance
 
 
 class Native(NamedTuple):
-    """An FMI 3.0 instance for compiled callers: addresses of C functions, and the buffers that they read and fill.
+    """An FMI 3.0 instance for callers in C: addresses of C functions, and the buffers that they read and fill.
 
     It holds while the plant is open, and only one caller may step at a time.
     """

@@ -1,4 +1,4 @@
-"""Small dense products without allocation: cheaper than `@`, for which Numba calls BLAS."""
+"""Small dense products without allocation: in the order in which they are written, as C adds them."""
 
 from __future__ import annotations
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from controller import LAWS
 from cosim.batch.c_calls import Clock
-from cosim.batch.fused_loop import OUTPUTS, Allocator, FlightConfig, FlightMetrics, fly_law, make_workspace
+from cosim.batch.fused_loop import PLANT_OUTPUTS, Allocator, FlightConfig, FlightMetrics, fly_law, make_workspace
 from cosim.campaigns.scenes.scene import KnownScene, Scene, known_scene, plant_values
 from cosim.errors import RunError
 from cosim.scenario.vehicle_model import vehicle_model
@@ -139,7 +139,7 @@ class SceneFlyer:
         plant.initialise()
         thrusts = [f"thrust[{i + 1}]" for i in range(m)]
         forces = [f"thruster_force[{i + 1}]" for i in range(m)]
-        native = plant.native(thrusts, (*OUTPUTS, *forces, *(f"actuation.{axis}" for axis in "XYZ")))
+        native = plant.native(thrusts, (*PLANT_OUTPUTS, *forces, *(f"actuation.{axis}" for axis in "XYZ")))
         effectiveness = plant.native([f"thrust_effectiveness[{i + 1}]" for i in range(m)], ())
         effectiveness.inputs[:] = 1.0
         setup = self._setup(scene, known)

@@ -25,7 +25,7 @@ _AT_REST = (0.0, 0.0, 0.0)
 class Proximity:
     """Obstacles, packed once; only what changed is written anew.
 
-    Making one loads all compiled code that it uses, which may take seconds: not to be done beside a running simulation.
+    Making one loads the libraries that it uses, which may take seconds: not to be done beside a running simulation.
 
     Parameters
     ----------

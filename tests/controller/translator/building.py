@@ -3,23 +3,15 @@
 import ctypes
 import subprocess
 
+import numpy as np
 import pytest
 
 from controller.translator.arguments import words_of
-from controller.translator.program import Program
-from controller.translator.types import type_of
 from plant_fmu.compiling.compiler import find_compiler
 from plant_fmu.errors import BuildError
 
 FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fPIC", "-shared")
 WARNINGS = ("-Wall", "-Wextra", "-Wpedantic", "-Werror")
-
-
-def translated(function, arguments):
-    """Return the C text of a function for arguments such as these, which is called as ``entry``."""
-    program = Program()
-    program.export("entry", function, tuple(map(type_of, arguments)))
-    return program.text()
 
 
 def compiled(text, folder, *flags, compiler=None):
@@ -43,7 +35,7 @@ class Called:
 
     def __init__(self, library, arguments):
         self._library, self._arguments = ctypes.CDLL(str(library)), arguments
-        self._entry, self._words = self._library.entry, words_of(arguments)
+        self._entry, self._words = self._library.entry, np.array(words_of(arguments), dtype=np.uint64)
         self._entry.argtypes, self._entry.restype = [ctypes.c_void_p], None
         self._at = self._words.ctypes.data
 

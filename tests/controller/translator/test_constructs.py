@@ -7,10 +7,11 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
+from controller.compiling.function import c_text
 from controller.errors import TranslationError
 from controller.stack_array import zeros
 from controller.translator.types import type_of
-from tests.controller.translator.building import Called, compiled, translated
+from tests.controller.translator.building import Called, compiled
 
 FACTORS = (2.0, -3.0, 0.5)
 KINDS = (3, 5)
@@ -186,7 +187,7 @@ def shifts(random, out):
 def test_c_does_what_python_does(function, tmp_path):
     rng = np.random.default_rng(4)
     given = (np.zeros(3), np.zeros(2, dtype=np.int64), np.zeros(11))
-    library = compiled(translated(function, given), tmp_path)
+    library = compiled(c_text(function, given), tmp_path)
     call = Called(library, given)
     for _ in range(60):
         x, n = rng.normal(size=3), rng.integers(-6, 7, 2)
@@ -206,14 +207,14 @@ def test_c_does_what_python_does(function, tmp_path):
 @pytest.mark.parametrize(("first", "second"), [(True, False), (True, True), (False, True)])
 def test_truth_values_take_a_word_each(first, second, tmp_path):
     given, expected = ((Flags(first, second, np.zeros(2)),) for _ in range(2))
-    Called(compiled(translated(flagged, given), tmp_path), given)()
+    Called(compiled(c_text(flagged, given), tmp_path), given)()
     flagged(*expected)
     assert given[0].numbers.tolist() == expected[0].numbers.tolist()
 
 
 def test_random_numbers_wrap_around(tmp_path):
     given, expected = ((np.array([12345], dtype=np.uint64), np.zeros(1)) for _ in range(2))
-    call = Called(compiled(translated(shifts, given), tmp_path), given)
+    call = Called(compiled(c_text(shifts, given), tmp_path), given)
     with np.errstate(over="ignore"):
         for _ in range(50):
             shifts(*expected)
@@ -226,7 +227,7 @@ def test_code_is_silent_under_other_compilers(tmp_path):
     import sys
 
     given = (np.zeros(3), np.zeros(2, dtype=np.int64), np.zeros(11))
-    compiled(translated(loops, given), tmp_path, compiler=[sys.executable, "-m", "ziglang", "cc"])
+    compiled(c_text(loops, given), tmp_path, compiler=[sys.executable, "-m", "ziglang", "cc"])
 
 
 # ---- what is refused ----
@@ -288,7 +289,7 @@ def raises(x):
 )
 def test_what_is_beyond_the_subset_is_refused_by_file_and_line(function, line, word):
     with pytest.raises(TranslationError, match=word) as caught:
-        translated(function, (np.zeros(4),))
+        c_text(function, (np.zeros(4),))
     if word != "calls itself":
         assert f"{__file__}:{inspect.getsourcelines(function)[1] + line}:" in str(caught.value)
     assert "\n" not in str(caught.value)

@@ -10,7 +10,7 @@ import pytest
 from controller import LAWS
 from controller.compiling.function import BoundCall, c_text
 from controller.compiling.library import library_of
-from tests.controller.translator.building import Called, compiled, translated
+from tests.controller.translator.building import Called, compiled
 from tests.controller.translator.flights import Flight, same_bits
 from tests.controller.translator.numba_reference import by_numba
 
@@ -21,7 +21,7 @@ HERE = Path(__file__).parent
 def library(request, tmp_path_factory):
     """The name of a law, its C text, and the library that this makes."""
     flight = Flight(request.param)
-    text = translated(flight.function, flight.arguments)
+    text = c_text(flight.function, flight.arguments)
     return request.param, text, compiled(text, tmp_path_factory.mktemp(request.param))
 
 

@@ -7,12 +7,12 @@ import sys
 import pytest
 
 from cosim.command_line import cli
-from cosim.run.progress import WORDS, ProgressBar, compiling_told
+from cosim.run.progress import WORDS, ProgressBar, announce_compilation
 
 
 @pytest.fixture(autouse=True)
 def untold_compiling():
-    """Here it is told."""
+    """Let compilation be announced, which other tests silence."""
 
 
 def compiles():
@@ -29,7 +29,7 @@ class Terminal(io.StringIO):
 
 def test_it_is_said_once_and_only_if_it_happens():
     told = []
-    with compiling_told(told.append):
+    with announce_compilation(told.append):
         assert told == []
         compiles()
         compiles()
@@ -46,7 +46,7 @@ def test_a_function_that_is_compiled_says_so_and_one_that_is_kept_does_not(monke
     told = []
     for expected in ([WORDS], [WORDS, WORDS][:1]):
         library.library_of.cache_clear()
-        with compiling_told(told.append):
+        with announce_compilation(told.append):
             library.library_of(text)
         assert told == expected
 
@@ -54,7 +54,7 @@ def test_a_function_that_is_compiled_says_so_and_one_that_is_kept_does_not(monke
 def test_the_line_stands_beside_the_bar(monkeypatch):
     terminal = Terminal()
     monkeypatch.setattr(sys, "stderr", terminal)
-    with compiling_told(lambda words: terminal.write(f"{words}\n")):
+    with announce_compilation(lambda words: terminal.write(f"{words}\n")):
         with ProgressBar(True, "{desc} {n:.0f}/{total:.0f}", desc="paper", total=10.0, mininterval=0.0) as bar:
             bar.update_to(2.0)
             compiles()
