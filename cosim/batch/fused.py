@@ -156,7 +156,10 @@ def _setup(scenario: Scenario, thrusters: int) -> FlightConfig:
     if not sensing.exact:
         deviation = np.repeat([sensing.position_noise, sensing.velocity_noise], 3)
         noise = deviation * np.random.default_rng([sensing.seed, STREAM]).standard_normal((decisions, 6))
-    failures = sorted((math.ceil(f.time / step - _ROUNDING), f.thruster - 1) for f in scenario.failures)
+    failures = sorted(
+        (math.ceil(f.time / step - _ROUNDING), f.thruster - 1, math.nan if f.stuck else f.effectiveness)
+        for f in scenario.failures
+    )
     return FlightConfig(
         goal=pack([scenario.goal_region]),
         regions=pack([secondary.region for secondary in scenario.regions]),
@@ -172,8 +175,9 @@ def _setup(scenario: Scenario, thrusters: int) -> FlightConfig:
         dead_from=sensing.dead_from,
         dead_until=sensing.dead_from + sensing.dead_for,
         frozen=sensing.frozen,
-        failed=np.array([thruster for _, thruster in failures], np.int64),
-        failure_steps=np.array([at for at, _ in failures], np.int64),
+        failed=np.array([thruster for _, thruster, _ in failures], np.int64),
+        failure_steps=np.array([at for at, _, _ in failures], np.int64),
+        remaining=np.array([remaining for _, _, remaining in failures]),
         tell=scenario.tell_failures,
         thrusters=thrusters,
         clock=_NO_CLOCK,
@@ -181,10 +185,11 @@ def _setup(scenario: Scenario, thrusters: int) -> FlightConfig:
 
 
 def _allocator(scenario: Scenario, setup: FlightConfig) -> Allocator:
-    """Return a stage for each number of failures that have been told."""
+    """Return a stage for each number of failures that have been reported."""
     vehicle, limits = scenario.vehicle, scenario.actuation.limits
     health, stages = np.ones(vehicle.n_thrusters), []
-    for failed in (None, *setup.failed) if setup.tell else (None,):
+    total = setup.failed[~(setup.remaining > 0.0)]
+    for failed in (None, *total) if setup.tell else (None,):
         if failed is not None:
             health[failed] = 0.0
         lower, upper = vehicle.thrust_min * health, vehicle.thrust_max * health

@@ -49,6 +49,7 @@ class FlightConfig(NamedTuple):
     frozen: bool  # their last values are held in that time; otherwise they are NaN
     failed: NDArray[np.int64]  # (f,) thrusters that fail, from 0, in the order of their failures
     failure_steps: NDArray[np.int64]  # (f,) plant steps before which they do
+    remaining: Array  # (f,) effectiveness that is left; NaN of one that is stuck at its last force
     tell: bool  # whether the law is told
     thrusters: int  # that carry the wrench; 0: it acts on the body directly
     clock: NDArray[np.int64]  # of `native.Clock`; (0,) if the law is not to be timed
@@ -85,12 +86,13 @@ class Workspace(NamedTuple):
     goal_clearance: Array  # (1,) m or rad
     wrench: Array  # (6,) N, N m, body frame
     before: Array  # (i,) inputs of the step before
+    stuck: Array  # (i,) inputs of thrusters that are stuck, NaN of others
     at: Array  # (3,)
     ticks: NDArray[np.int64]  # (2,)
 
 
 def make_workspace(regions: int, inputs: int, thrusters: int) -> Workspace:
-    """Return room for a flight.
+    """Return the workspace of a flight.
 
     Parameters
     ----------
@@ -99,14 +101,22 @@ def make_workspace(regions: int, inputs: int, thrusters: int) -> Workspace:
 
     Returns
     -------
-    Room
+    Workspace
         All zero, all thrusters healthy.
     """
     n = regions
     state = VehicleState(np.zeros(3), np.zeros(4), np.zeros(6), np.ones(thrusters))
     of_regions = np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(1)
     return Workspace(
-        state, np.zeros(3), np.zeros(3), *of_regions, np.zeros(6), np.zeros(inputs), np.zeros(3), np.zeros(2, np.int64)
+        state,
+        np.zeros(3),
+        np.zeros(3),
+        *of_regions,
+        np.zeros(6),
+        np.zeros(inputs),
+        np.full(inputs, np.nan),
+        np.zeros(3),
+        np.zeros(2, np.int64),
     )
 
 
@@ -193,9 +203,13 @@ def fly(  # noqa: C901 - one loop, as a whole
         now = k * setup.step
         # what fails
         while failures < setup.failed.size and k == setup.failure_steps[failures]:
-            effectiveness.inputs[setup.failed[failures]] = 0.0
-            if setup.tell:
-                state.thruster_health[setup.failed[failures]] = 0.0
+            j, remaining = setup.failed[failures], setup.remaining[failures]
+            if remaining >= 0.0:
+                effectiveness.inputs[j] = remaining
+            else:
+                workspace.stuck[j] = inputs[j]
+            if setup.tell and not remaining > 0.0:
+                state.thruster_health[j] = 0.0
                 known_failures = min(known_failures + 1, allocator.lower.shape[0] - 1)
             failures += 1
             if not fmi_set(effectiveness):
@@ -253,6 +267,8 @@ def fly(  # noqa: C901 - one loop, as a whole
             for j in range(inputs.size):
                 variation += abs(inputs[j] - workspace.before[j])
                 workspace.before[j] = inputs[j]
+                if math.isfinite(workspace.stuck[j]):
+                    inputs[j] = workspace.stuck[j]
             if not fmi_set(native):
                 refused = k
                 break

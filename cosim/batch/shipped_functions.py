@@ -62,7 +62,7 @@ def _of_flight(goal: PackedRegions, regions: PackedRegions) -> tuple[Any, ...]:
     native = Native(0, 0, 0, 0, references, _FLAT, references, _FLAT, _INTEGERS)
     setup = FlightConfig(
         goal, regions, _INTEGERS, 1.0, 1.0, 1, 1, 1, False, True, np.zeros((0, 6)), 0.0, 0.0, False,
-        _INTEGERS, _INTEGERS, False, 1, Clock().numbers,
+        _INTEGERS, _INTEGERS, _FLAT, False, 1, Clock().numbers,
     )  # fmt: skip
     out = FlightOutputs(np.zeros(len(FlightMetrics._fields)), _FLAT, np.zeros((0, 0)))
     law, allocator = BoundLaw(0, 0, True, _FLAT, _FLAT), Allocator(np.zeros((1, 1, 6)), _TABLE, _TABLE, True)

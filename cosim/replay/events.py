@@ -115,7 +115,10 @@ def _failures(run: Run) -> Iterator[Event]:
     end = run.record.value("time", -1)
     for failure in run.scenario.failures:
         if failure.time <= end:
-            yield Event(failure.time, "failure", f"Thruster {failure.thruster} fails")
+            what = "gets stuck" if failure.stuck else "fails"
+            if not failure.is_total:
+                what = f"keeps {failure.effectiveness:.0%} of its force"
+            yield Event(failure.time, "failure", f"Thruster {failure.thruster} {what}")
 
 
 def _saturation(run: Run) -> Iterator[Event]:

@@ -67,10 +67,17 @@ class Actuation:
 
 @dataclass(frozen=True)
 class Failure:
-    """A thruster that gives nothing from some time on."""
+    """A thruster that gives less force, or always the same, from some time on."""
 
     thruster: int  # from 1
     time: float  # s
+    effectiveness: float = 0.0  # part of its force that is left
+    stuck: bool = False  # it keeps the force that was commanded last
+
+    @property
+    def is_total(self) -> bool:
+        """Whether it no longer follows its command at all."""
+        return self.stuck or self.effectiveness == 0.0
 
 
 @dataclass(frozen=True)

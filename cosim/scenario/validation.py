@@ -113,6 +113,11 @@ def check_failures(failures: tuple[Failure, ...], through: str, vehicle: Vehicle
         known = 1 <= failure.thruster <= vehicle.n_thrusters
         _require(known, f"failures.{i}.thruster", failure.thruster, f"1 to {vehicle.n_thrusters}")
         _require(0.0 <= failure.time < math.inf, f"failures.{i}.time", failure.time, "0 s or above")
+        _require(0.0 <= failure.effectiveness <= 1.0, f"failures.{i}.effectiveness", failure.effectiveness, "0 to 1")
+        _require(
+            not (failure.stuck and failure.effectiveness), f"failures.{i}.effectiveness", failure.effectiveness,
+            "none of a thruster that is stuck",
+        )  # fmt: skip
 
 
 def check_record(record: RecordSetup, law: LawSetup, regions: tuple[SecondaryRegion, ...]) -> None:

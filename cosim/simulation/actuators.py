@@ -7,6 +7,7 @@ import numpy as np
 from controller.allocation import Allocation
 from controller.laws.deployable.linear_algebra import product
 from cosim.scenario.scenario import Scenario
+from cosim.scenario.tables import Failure
 from cosim.simulation.signals import Array, Signals
 from plant_fmu import Plant
 
@@ -49,15 +50,19 @@ class Actuators:
         self._asked, self._given = self.command.data, self._wrench.data
         self._decided, self._sent = inputs.data, plant.inputs.values.data
         self._delayed = np.zeros(inputs.size).data if scenario.master.order == "jacobi" else None
+        self._stuck: dict[int, float] = {}  # force [N] of each stuck thruster, from 0
         self.health: Array = np.ones(vehicle.n_thrusters)
         self._limits = {"thrust_min": vehicle.thrust_min.copy(), "thrust_max": vehicle.thrust_max.copy()}
         self._allocate_to_the_healthy()
 
-    def fail(self, thruster: int) -> None:
-        """Let a thruster, from 1, give nothing from now on, and tell the law if it is to be told."""
-        self._plant.set({f"thrust_effectiveness[{thruster}]": 0.0})
-        if self._scenario.tell_failures:
-            self.health[thruster - 1] = 0.0
+    def fail(self, failure: Failure) -> None:
+        """Let a thruster fail now, and report it if failures are reported and it no longer follows its command."""
+        if failure.stuck:
+            self._stuck[failure.thruster - 1] = float(self._plant.inputs.values[failure.thruster - 1])
+        else:
+            self._plant.set({f"thrust_effectiveness[{failure.thruster}]": failure.effectiveness})
+        if self._scenario.tell_failures and failure.is_total:
+            self.health[failure.thruster - 1] = 0.0
             self._allocate_to_the_healthy()
 
     def limit(self, parameter: str, value: float) -> None:
@@ -88,6 +93,8 @@ class Actuators:
         else:
             self._sent[:] = self._delayed
             self._delayed[:] = self._decided
+        for j, force in self._stuck.items():
+            self._plant.inputs.values[j] = force
 
     def _allocate_to_the_healthy(self) -> None:
         actuation = self._scenario.actuation

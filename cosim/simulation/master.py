@@ -261,7 +261,7 @@ class Master:
         """Fail the thrusters that are scheduled for step `k`."""
         for failure in self.scenario.failures:
             if k == math.ceil(failure.time / self.scenario.time.step - _ROUNDING):
-                self.actuators.fail(failure.thruster)
+                self.actuators.fail(failure)
 
     def _measure(self, k: int) -> None:
         self._measured[:] = self._plant_measured

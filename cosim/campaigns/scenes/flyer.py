@@ -186,6 +186,7 @@ class SceneFlyer:
             frozen=False,
             failed=np.array([failure.index - 1] if failure else [], np.int64),
             failure_steps=np.array([fails_at] if failure else [], np.int64),
+            remaining=np.zeros(1 if failure else 0),
             tell=c.tell_failures,
             thrusters=self._vehicle.n_thrusters,
             clock=self._clock.numbers,

@@ -81,8 +81,14 @@ def test_noise_and_gaps_in_what_is_measured_are_the_masters(frozen):
 
 
 @pytest.mark.parametrize("told", ["true", "false"])
-def test_thrusters_that_fail_are_the_masters(told):
-    failures = "failures=[{thruster=3, time=2.0}, {thruster=6, time=4.005}]"
+@pytest.mark.parametrize(
+    "failures",
+    [
+        "failures=[{thruster=3, time=2.0}, {thruster=6, time=4.005}]",
+        "failures=[{thruster=3, time=2.0, effectiveness=0.3}, {thruster=6, time=4.005, stuck=true}]",
+    ],
+)
+def test_thrusters_that_fail_are_the_masters(told, failures):
     given = [*BRISK, "actuation.through=thrusters", failures, f"tell_failures={told}"]
     assert_same_flight(load_scenario("paper", [*given, "law.name=pd"]))
 

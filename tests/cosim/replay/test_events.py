@@ -111,8 +111,13 @@ def test_a_brief_look_back_is_no_change_but_a_brief_visit_on_the_way_is(paper):
 def test_a_failure_is_told_if_the_run_came_so_far(paper):
     from cosim.scenario.tables import Failure
 
-    run = made(paper, [0.0, 1.0, 2.0], failures=(Failure(3, 1.5), Failure(1, 2.5)))
-    assert told(run, "failure") == [(1.5, "Thruster 3 fails")]
+    failed = Failure(3, 1.5), Failure(1, 2.5), Failure(2, 1.6, effectiveness=0.4), Failure(4, 1.7, stuck=True)
+    run = made(paper, [0.0, 1.0, 2.0], failures=failed)
+    assert told(run, "failure") == [
+        (1.5, "Thruster 3 fails"),
+        (1.6, "Thruster 2 keeps 40% of its force"),
+        (1.7, "Thruster 4 gets stuck"),
+    ]
 
 
 @pytest.mark.parametrize(

@@ -206,6 +206,11 @@ def test_faults_are_named_in_one_line(override, words):
         ("failures.0.thruster=9", "failures.0.thruster is 9, expected 1 to 8"),
         ("failures.0.thruster=0", "failures.0.thruster is 0, expected 1 to 8"),
         ("failures.0.time=-1.0", "failures.0.time is -1.0, expected 0 s or above"),
+        ("failures.0.effectiveness=1.5", "failures.0.effectiveness is 1.5, expected 0 to 1"),
+        (
+            "failures=[{thruster=1,time=1.0,stuck=true,effectiveness=0.5}]",
+            "failures.0.effectiveness is 0.5, expected none of a thruster that is stuck",
+        ),
         ("failures.0.when=3", r"failures.0.when: unknown key"),
         ("law.gains.k_p1=3", r"law.gains.k_p1: unknown key"),
         ("law.gains.speed=0", "law.gains.speed is 0.0, expected a finite number above 0"),

@@ -1,0 +1,41 @@
+"""Thrusters that fail in a run: what they are commanded, and what they give."""
+
+import numpy as np
+import pytest
+
+from cosim import load_scenario
+from cosim.simulation.master import Master
+
+GIVEN = ["actuation.through=thrusters", "time.duration=3.0", "law.name=pd"]
+
+
+def flown(failures, *more):
+    """Return what each thruster was commanded and what it gave, a row a step."""
+    rows = []
+
+    class Watch:
+        def observe(self, k, row):
+            rows.append(row.copy())
+
+    with Master(load_scenario("paper", [*GIVEN, f"failures={failures}", *more])) as master:
+        names = [column.name for column in master.signals.columns]
+        master.run([Watch()])
+    table = np.array(rows)
+    columns = [[names.index(f"{kind}[{j + 1}]") for j in range(8)] for kind in ("thrust", "thruster_force")]
+    return table[:, columns[0]], table[:, columns[1]]
+
+
+def test_a_thruster_that_loses_part_of_its_force_gives_the_rest():
+    asked, given = flown("[{thruster=3, time=1.0, effectiveness=0.3}]")
+    left = np.array([1.0, 1.0, 0.3, 1.0, 1.0, 1.0, 1.0, 1.0])
+    ratio = given[1100:] / asked[1100:]  # a step apart, which changes little
+    assert np.median(ratio, axis=0) == pytest.approx(left, rel=1e-3)
+    assert np.median(given[100:900] / asked[100:900], axis=0) == pytest.approx(np.ones(8), rel=1e-3)
+
+
+@pytest.mark.parametrize("order", ["gauss-seidel", "jacobi"])
+def test_a_thruster_that_is_stuck_keeps_the_force_it_was_given_last(order):
+    asked, given = flown("[{thruster=5, time=1.0, stuck=true}]", f"master.order={order}")
+    assert np.ptp(given[1003:, 4]) == 0.0 and np.ptp(asked[1003:, 4]) > 1.0  # while it is asked for another
+    assert given[1003, 4] == pytest.approx(asked[1000, 4], abs=0.05)
+    assert np.ptp(given[1003:, 0]) > 1.0
