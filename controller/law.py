@@ -50,7 +50,7 @@ class VehicleModel(NamedTuple):
     --------
     >>> from controller import VehicleModel
     >>> VehicleModel._fields[-3:]
-    ('thruster_matrix', 'thrust_min', 'thrust_max')
+    ('thrust_min', 'thrust_max', 'thrust_time_constant')
     """
 
     rigid_mass: Array  # (6, 6) kg, kg m2, with the centre of gravity taken to be the origin
@@ -60,6 +60,7 @@ class VehicleModel(NamedTuple):
     thruster_matrix: Array  # (6, m) body wrench of one newton of each thruster
     thrust_min: Array  # (m,) N
     thrust_max: Array  # (m,) N
+    thrust_time_constant: Array  # (m,) s, of the thrusters' lag
 
 
 @dataclass(frozen=True)

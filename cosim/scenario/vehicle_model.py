@@ -32,4 +32,5 @@ def vehicle_model(vehicle: Vehicle) -> VehicleModel:
         thruster_matrix=np.ascontiguousarray(vehicle.thruster_matrix, dtype=float),
         thrust_min=np.array(vehicle.thrust_min, dtype=float),
         thrust_max=np.array(vehicle.thrust_max, dtype=float),
+        thrust_time_constant=np.array(vehicle.thrust_time_constant, dtype=float),
     )

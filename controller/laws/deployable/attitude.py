@@ -1,8 +1,8 @@
 """Attitude: held by proportional and rate feedback, with the restoring moments adapted from the body rates.
 
-Rates are measured well, and a moment that the model lacks shows within a period: I omega' = tau - D omega -
-S(k) phi_{2..4} - nu_r x (M nu_r) + residual, where the fourth is Munk's moment, which added mass causes in oblique
-motion. The residual drives the three moments of phi (12), within their bounds.
+Rates are measured well, and the moment that moved the vehicle shows within a period: I omega' = tau - D omega -
+S(k) phi_{2..4} - nu_r x (M nu_r), where the fourth is Munk's moment, which added mass causes in oblique motion. The
+observer makes of it the three moments of phi (12).
 
 The desired attitude is the preferred one unless a region of attitude asks for another: where its clearance would be
 less than `comfort`, the desired attitude turns until it has that much, within the allowed tilt, and returns afterwards.
@@ -16,9 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controller.arithmetic import cosine, length3, square
+from controller.laws.deployable.estimate import Estimate
 from controller.laws.deployable.gains import DeployableGains
-from controller.laws.deployable.linear_algebra import copy, product
-from controller.laws.deployable.model import Dynamics, Thrusters
+from controller.laws.deployable.linear_algebra import copy
+from controller.laws.deployable.model import Dynamics, free_wrench
 from controller.quaternion import down_parts, error_parts, rate_parts
 from controller.regions.kinds import FIRST_OF_ATTITUDE
 from controller.regions.region_set import PackedRegions, attitude_clearance
@@ -28,6 +29,7 @@ Array = NDArray[np.float64]
 
 _ATTITUDE = FIRST_OF_ATTITUDE  # shapes from it on depend on attitude
 _RETURN = 0.2  # 1/s, rate of return to the preferred attitude
+_CURRENT_STEP = 0.01  # m/s, of the difference quotient
 _TURN = 4.0  # 1/s, rate of turning to where a region has its comfort
 
 
@@ -36,68 +38,73 @@ class Attitude(NamedTuple):
 
     preferred: Array  # (4,) attitude where no region asks for another, from body to world
     desired: Array  # (4,) setpoint of the loop
-    moments: Array  # (3,) phi_2..phi_4 [N m]
     last_omega: Array  # (3,) rad/s
-    munk_moment: Array  # (3,) N m, Munk's moment, body axes
-    residual: Array  # (3,) N m, moment that the model lacked in the last period, within the bound
+    by_current: Array  # (3, 2) N s, how the moment that the model knows grows with the current
+    measured_moment: Array  # (3,) N m, of thrusters and weight, over the last period, body axes
     started: Array  # (1,) 1 once last_omega is there
 
 
 def empty_attitude(preferred: Array) -> Attitude:
     """Return the state before the first step, for a preferred attitude, shape (4,)."""
-    return Attitude(preferred.copy(), preferred.copy(), np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(1))
+    return Attitude(preferred.copy(), preferred.copy(), np.zeros(3), np.zeros((3, 2)), np.zeros(3), np.zeros(1))
 
 
-def adapt(
+def measure_moment(
     attitude: Attitude,
     dynamics: Dynamics,
-    thrusters: Thrusters,
-    quaternion: Array,
+    R: Array,
     omega: Array,
-    gains: DeployableGains,
+    estimate: Estimate,
     period: float,
-) -> None:
-    """Adapt the restoring moments to the difference between measured and predicted rates.
+) -> bool:
+    """Measure the moment of thrusters and weight by the change of the rates over the period [s].
 
-    `omega` is in [rad/s], body axes, and the period in [s].
+    Parameters
+    ----------
+    attitude : Attitude
+        `measured_moment` is updated.
+    dynamics : Dynamics
+        Of the vehicle.
+    R : ndarray, shape (3, 3)
+        From body to world.
+    omega : ndarray, shape (3,)
+        Measured rates [rad/s], body axes.
+    estimate : Estimate
+        Of the velocities of vehicle and water, and the acceleration predicted for the period.
+    period : float
+        [s].
+
+    Returns
+    -------
+    bool
+        False before rates were measured twice.
     """
-    if attitude.started[0] > 0.0:
-        wrench, k = zeros(6), zeros(3)
-        product(thrusters.matrix, thrusters.forces, wrench)
-        k[0], k[1], k[2] = down_parts(quaternion)
-        phi, last, mass = attitude.moments, attitude.last_omega, dynamics.mass
-        for i in range(3):
-            a, b = (i + 1) % 3, (i + 2) % 3
-            damping = (dynamics.linear_damping[3 + i] + dynamics.quadratic_damping[3 + i] * abs(last[i])) * last[i]
-            restoring = k[a] * phi[b] - k[b] * phi[a]  # S(k) phi: (12)
-            change = 0.0
-            for j in range(3):
-                change += mass[3 + i, 3 + j] * (omega[j] - last[j]) / period
-            missed = change - (wrench[3 + i] + attitude.munk_moment[i] - damping - restoring)
-            attitude.residual[i] = min(max(missed, -gains.moment_bound), gains.moment_bound)
-        for i in range(3):  # phi' = -rate S(k)^T residual
-            a, b = (i + 1) % 3, (i + 2) % 3
-            drive = k[a] * attitude.residual[b] - k[b] * attitude.residual[a]  # S(k) r = -S(k)^T r
-            phi[i] += gains.adaptation * period * drive
-            phi[i] = min(max(phi[i], -gains.moment_bound), gains.moment_bound)
-    copy(omega, attitude.last_omega)
-    attitude.started[0] = 1.0
-
-
-def update_munk_moment(
-    attitude: Attitude, dynamics: Dynamics, R: Array, velocity: Array, water_velocity: Array
-) -> None:
-    """Update Munk's moment from the velocities [m/s] of vehicle and water, shape (3,) each, NED."""
-    relative, momentum = zeros(3), zeros(3)
+    started = bool(attitude.started[0] > 0.0)
+    mean, none, water, known, other, rate = zeros(3), zeros(3), zeros(3), zeros(6), zeros(6), zeros(6)
     for i in range(3):
-        for axis in range(3):
-            relative[i] += R[axis, i] * (velocity[axis] - water_velocity[axis])
-    for i in range(3):
-        for j in range(3):
-            momentum[i] += dynamics.mass[i, j] * relative[j]
+        mean[i] = 0.5 * (attitude.last_omega[i] + omega[i])
+    free_wrench(dynamics, R, estimate.velocity, mean, estimate.water_velocity, 0.0, none, known)
     for i in range(3):
         a, b = (i + 1) % 3, (i + 2) % 3
-        attitude.munk_moment[i] = relative[b] * momentum[a] - relative[a] * momentum[b]  # -nu_r x (M nu_r)
+        rate[3 + i] = (omega[i] - attitude.last_omega[i]) / period
+        for k in range(3):  # nu_r' = R^T a - omega x nu_r
+            turning = R[k, a] * mean[b] - R[k, b] * mean[a]
+            rate[i] += R[k, i] * estimate.acceleration[k] + turning * (
+                estimate.velocity[k] - estimate.water_velocity[k]
+            )
+    for axis in range(2):  # Munk's moment depends on the current
+        copy(estimate.water_velocity, water)
+        water[axis] += _CURRENT_STEP
+        free_wrench(dynamics, R, estimate.velocity, mean, water, 0.0, none, other)
+        for i in range(3):
+            attitude.by_current[i, axis] = (other[3 + i] - known[3 + i]) / _CURRENT_STEP
+    for i in range(3):
+        attitude.measured_moment[i] = -known[3 + i]
+        for j in range(6):
+            attitude.measured_moment[i] += dynamics.mass[3 + i, j] * rate[j]
+    copy(omega, attitude.last_omega)
+    attitude.started[0] = 1.0
+    return started
 
 
 def update_desired(
@@ -171,36 +178,20 @@ def integrate_attitude(quaternion: Array, omega: Array, period: float, out: Arra
         out[i] /= length
 
 
-def free_angular_acceleration(
-    attitude: Attitude, dynamics: Dynamics, quaternion: Array, omega: Array, out: Array
-) -> None:
-    """Write the angular acceleration without thrust, shape (3,) [rad/s2], body axes."""
-    k, moments, momentum = zeros(3), zeros(3), zeros(3)
-    k[0], k[1], k[2] = down_parts(quaternion)
-    for i in range(3):
-        for j in range(3):
-            momentum[i] += dynamics.mass[3 + i, 3 + j] * omega[j]
-    for i in range(3):
-        a, b = (i + 1) % 3, (i + 2) % 3
-        damping = (dynamics.linear_damping[3 + i] + dynamics.quadratic_damping[3 + i] * abs(omega[i])) * omega[i]
-        restoring = k[a] * attitude.moments[b] - k[b] * attitude.moments[a]
-        moments[i] = attitude.munk_moment[i] - damping - restoring - (omega[a] * momentum[b] - omega[b] * momentum[a])
-    for i in range(3):
-        out[i] = 0.0
-        for j in range(3):
-            out[i] += dynamics.inverse_mass[3 + i, 3 + j] * moments[j]
-
-
 def compute_moment(
-    attitude: Attitude, dynamics: Dynamics, quaternion: Array, omega: Array, gains: DeployableGains, out: Array
+    attitude: Attitude,
+    dynamics: Dynamics,
+    quaternion: Array,
+    omega: Array,
+    free: Array,
+    gains: DeployableGains,
+    out: Array,
 ) -> None:
-    """Write the desired moment, shape (3,) [N m], body axes."""
-    e, k = zeros(4), zeros(3)
+    """Write the desired moment, shape (3,) [N m], body axes: against the `free` wrench, but for its damping."""
+    e = zeros(4)
     e[0], e[1], e[2], e[3] = error_parts(attitude.desired, quaternion)
-    k[0], k[1], k[2] = down_parts(quaternion)
     w = gains.attitude_bandwidth
     for i in range(3):
-        a, b = (i + 1) % 3, (i + 2) % 3
+        damping = (dynamics.linear_damping[3 + i] + dynamics.quadratic_damping[3 + i] * abs(omega[i])) * omega[i]
         inertia = dynamics.mass[3 + i, 3 + i]
-        restoring = k[a] * attitude.moments[b] - k[b] * attitude.moments[a]
-        out[i] = restoring - attitude.munk_moment[i] - 2.0 * inertia * w * w * e[1 + i] - 2.0 * inertia * w * omega[i]
+        out[i] = -free[3 + i] - damping - 2.0 * inertia * w * (w * e[1 + i] + omega[i])

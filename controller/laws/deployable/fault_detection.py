@@ -1,18 +1,19 @@
-"""Detection of a failed thruster from measured rates and velocity.
+"""Detection of failed thrusters, by the innovations of the observer.
 
-The hypothesis about each thruster is that it gives no force. Then the moment that the model lacks is -b_i f_i, less the
-part that the restoring moments have adapted to since; and the velocity lags its prediction by the effect of -b_i f_i
-within the observer's loop. The log-likelihood ratio against "all work" is summed, never below zero: Page's test, whose
-hypothesis starts anew whenever the sum is at zero, the supposed time of the failure. The thruster is isolated when its
-sum passes the threshold, well ahead of every other.
+There are two hypotheses about each thruster: it loses its force, or it is stuck at the force that it has. If one holds,
+the true state deviates from the estimate: at first by the effectiveness that is lost, or by the force that no longer
+changes; from then on as the filter propagates any error of its state (Willsky and Jones, 1976). So what the filter
+adapts to by mistake, or blames on other causes, is part of the deviation. The log-likelihood ratio of a hypothesis
+against "as before" is summed, never below zero: Page's test. At zero the hypothesis starts anew; that is the supposed
+time of the failure.
 
-A moment counts only where the thruster's part of it exceeds the model's own uncertainty: an angular acceleration; more
-of it in roll and pitch while the vehicle accelerates, for the height of the centre of gravity is unknown; and a tenth
-of the force that each thruster is assumed to give. So a thruster that fails at low thrust is found when it is used.
+A moment or a velocity that can have other causes counts little, since the covariance of the innovation includes them:
+an uncertain effectiveness or lag, restoring moments not yet found, W - B, current, the height of the centre of gravity.
+So a thruster that fails at low thrust is found when it is used.
 
-A single failure is assumed: isolating a thruster restores the one that was isolated before, but never one that was
-reported as failed. A thruster that was isolated wrongly is only idle; the one that has failed is found afterwards, and
-takes its place.
+A thruster fails when its sum passes the threshold, well ahead of that of every other thruster. The likeliest loss then
+says whether it goes on with what is left, or is isolated. The deviation is taken into the state. A thruster that was
+isolated by a narrow lead is tried again, once, when another one is isolated; one that is reported as failed never is.
 """
 
 from __future__ import annotations
@@ -23,68 +24,46 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controller.arithmetic import square
+from controller.laws.deployable.estimate import EFFECTIVENESS, Estimate, inflate_effectiveness, set_effectiveness
 from controller.laws.deployable.gains import DeployableGains
-from controller.laws.deployable.linear_algebra import norm
-from controller.laws.deployable.model import Dynamics, Thrusters
-from controller.laws.deployable.observer import Estimate
-from controller.stack_array import zeros
+from controller.laws.deployable.model import Thrusters
 
 Array = NDArray[np.float64]
 
-_UNMODELLED = 0.06  # rad/s2, standard deviation of the angular acceleration that the model lacks
-_BELOW = 0.02  # m, standard deviation of how far the centre of gravity lies above or below the origin
-_EFFECTIVENESS = 0.1  # standard deviation of a working thruster's force, as part of the assumed one
-_STANDS_OUT = 2.0  # standard deviations that a thruster's moment must exceed to count
-_CORRELATED = 0.1  # s, correlation time of the moment that the model lacks
-_MOST_A_STEP = 3.0  # of the log-likelihood ratio of either kind, so that no single outlier decides
+_MOST_A_STEP = 3.0  # of the log-likelihood ratio, so that no single outlier decides
+_LOSS = 0.6  # part of its force that a thruster loses by the hypothesis: it is near for a half and for all
+_USEFUL = 0.15  # effectiveness below which a thruster is isolated
+_SPREADS = 3.0  # standard deviations below that
 _LEAD = 8.0  # of the likeliest thruster before the next
+_CERTAIN = 40.0  # such a lead is never doubted
 
 
 class FaultState(NamedTuple):
     """The hypotheses, one for each thruster."""
 
-    ratio: Array  # (m,) summed log-likelihood ratio
-    lag: Array  # (m, 3) m/s, lag of the velocity behind its prediction, NED
-    adapted: Array  # (m, 3) N m, body axes: part of the failure that the restoring moments have adapted to
-    isolated: NDArray[np.int64]  # (1,) the isolated thruster, -1 for none
+    ratio: Array  # (2 m,) summed log-likelihood ratio: thruster j gives nothing; m + j: is stuck
+    sums: Array  # (2, 2 m) of the evidence since the supposed time of the failure
+    doubted: NDArray[np.int64]  # (m,) 1 of an isolated thruster that is to be tried again
 
 
 def empty_fault_state(m: int) -> FaultState:
     """Return the state for `m` thrusters, all sums at zero."""
-    return FaultState(np.zeros(m), np.zeros((m, 3)), np.zeros((m, 3)), np.full(1, -1))
+    return FaultState(np.zeros(2 * m), np.zeros((2, 2 * m)), np.zeros(m, dtype=np.int64))
 
 
-def detect_fault(
-    fault_state: FaultState,
-    estimate: Estimate,
-    residual: Array,
-    dynamics: Dynamics,
-    thrusters: Thrusters,
-    R: Array,
-    gains: DeployableGains,
-    period: float,
-    measured: bool,
-) -> int:
-    """Test the last period, and return the thruster that has failed, or -1.
+def detect_fault(fault_state: FaultState, estimate: Estimate, thrusters: Thrusters, gains: DeployableGains) -> int:
+    """Test the last measurements, isolate a thruster that has failed, and return it, or -1.
 
     Parameters
     ----------
     fault_state : FaultState
         Updated in place.
     estimate : Estimate
-        With the innovation of the last correction.
-    residual : ndarray, shape (3,)
-        Moment that the model lacked [N m].
-    dynamics, thrusters : Dynamics, Thrusters
-        Of the vehicle.
-    R : ndarray, shape (3, 3)
-        From body to world.
+        With the evidence of the last measurements. Its state changes if a thruster has failed.
+    thrusters : Thrusters
+        Whose `health` and `stuck` change if one is isolated; the caller calls `model.reallocate`.
     gains : DeployableGains
-        The threshold, and the rate of adaptation.
-    period : float
-        [s].
-    measured : bool
-        Whether there was a valid measurement; without one, only the lags are propagated.
+        The threshold.
 
     Returns
     -------
@@ -93,105 +72,91 @@ def detect_fault(
     """
     if gains.failure_threshold <= 0.0:
         return -1
-    m, variance = thrusters.health.size, zeros(3)
-    for axis in range(3):
-        variance[axis] = (
-            0.0 if axis == 2 else square(_BELOW * dynamics.translational_mass[0] * norm(estimate.acceleration))
-        )
-        variance[axis] += square(_UNMODELLED * dynamics.mass[3 + axis, 3 + axis])
-        for i in range(m):
-            variance[axis] += square(_EFFECTIVENESS * thrusters.matrix[3 + axis, i] * thrusters.forces[i])
-    mass, weight = dynamics.translational_mass[0], min(period / _CORRELATED, 1.0)
+    m, ratio, x = thrusters.health.size, fault_state.ratio, estimate.state
     best, next_best, at = 0.0, 0.0, -1
-    for i in range(m):
-        if thrusters.health[i] == 0.0:
+    for j in range(m):
+        if thrusters.health[j] == 0.0:
+            ratio[j] = ratio[m + j] = 0.0
             continue
-        effect, force = thrusters.nominal_matrix[:, i], thrusters.forces[i]
-        step = _by_velocity(
-            fault_state.lag[i],
-            effect,
-            force * period / mass,
-            R,
-            estimate.innovation,
-            estimate.innovation_deviation,
-            estimate.gain,
-            measured,
-        )
-        if measured:
-            step += weight * _by_moment(
-                fault_state.adapted[i], effect, force, residual, variance, R, gains.adaptation * period
-            )
-        fault_state.ratio[i] += step
-        if not fault_state.ratio[i] > 0.0:
-            fault_state.ratio[i], fault_state.lag[i, :], fault_state.adapted[i, :] = 0.0, 0.0, 0.0
-        if fault_state.ratio[i] > best:
-            best, next_best, at = fault_state.ratio[i], best, i
-        elif fault_state.ratio[i] > next_best:
-            next_best = fault_state.ratio[i]
+        for kind in range(2):
+            _add_evidence(fault_state, estimate, thrusters, j, kind * m + j)
+        likelihood = max(ratio[j], ratio[m + j])
+        if likelihood > best:
+            best, next_best, at = likelihood, best, j
+        elif likelihood > next_best:
+            next_best = likelihood
     if best > gains.failure_threshold and best > next_best + _LEAD:
+        hypothesis = _likelier(fault_state, at, m)
+        fault_state.doubted[at] += 1 if best < next_best + _CERTAIN else 2
+        loss = 1.0
+        if hypothesis == at:
+            loss = fault_state.sums[0, at] / fault_state.sums[1, at]
+        remaining = x[EFFECTIVENESS + at] * (1.0 - loss)
+        for i in range(x.size):
+            x[i] += loss * estimate.deviation[hypothesis, i]
+        force = np.nan
+        if hypothesis > at:
+            force = estimate.supposed[0, at] * estimate.supposed[1, at]
+        elif remaining > _USEFUL:  # it goes on with what is left
+            fault_state.doubted[at] = 0
+            inflate_effectiveness(estimate, at)
+            _start_all_anew(fault_state, estimate, thrusters)
+            return -1
+        _isolate(fault_state, estimate, thrusters, at, force)
         return at
+    for j in range(m):
+        spread = np.sqrt(estimate.covariance[EFFECTIVENESS + j, EFFECTIVENESS + j])
+        if thrusters.health[j] > 0.0 and x[EFFECTIVENESS + j] + _SPREADS * spread < _USEFUL:
+            fault_state.doubted[j] += 1
+            _isolate(fault_state, estimate, thrusters, j, np.nan)
+            return j
     return -1
 
 
-def _by_velocity(
-    lag: Array,
-    effect: Array,
-    impulse: float,
-    R: Array,
-    innovation: Array,
-    innovation_deviation: Array,
-    gain: Array,
-    measured: bool,
-) -> float:
-    """Return the log-likelihood ratio of the last innovation, and propagate a thruster's lag over the period.
-
-    Takes arrays, not named tuples, which would cost more to pass than the work itself.
-    """
-    step = 0.0
-    for axis in range(3):
-        lag[axis] -= (R[axis, 0] * effect[0] + R[axis, 1] * effect[1] + R[axis, 2] * effect[2]) * impulse
-        if measured:
-            step += lag[axis] * (2.0 * innovation[axis] - lag[axis]) / (2.0 * square(innovation_deviation[axis]))
-            lag[axis] *= 1.0 - gain[axis]
-    return min(max(step, -_MOST_A_STEP), _MOST_A_STEP)
+def _likelier(fault_state: FaultState, j: int, m: int) -> int:
+    """Return which hypothesis about thruster j is likelier: that it lost some of its force, or is stuck."""
+    sums = fault_state.sums
+    lost = 0.5 * square(sums[0, j]) / sums[1, j] if sums[0, j] > 0.0 else 0.0
+    stuck = sums[0, m + j] - 0.5 * sums[1, m + j]
+    return j if lost > stuck else m + j
 
 
-def _by_moment(
-    adapted: Array, effect: Array, force: float, residual: Array, variance: Array, R: Array, adaptation: float
-) -> float:
-    """Return the log-likelihood ratio of the last residual, and propagate the adapted part over the period.
-
-    The adaptation moves S(k) phi_hat towards the residual at its rate, in all directions but k: S(k) S(k) = k k^T - I.
-    """
-    step, size, along = 0.0, 0.0, 0.0
-    for j in range(3):
-        missing = adapted[j] - effect[3 + j] * force
-        along += R[2, j] * missing  # k = R^T e3
-        size += square(missing) / variance[j]
-        step += missing * (2.0 * residual[j] - missing) / (2.0 * variance[j])
-    for j in range(3):
-        adapted[j] -= adaptation * (adapted[j] - effect[3 + j] * force - along * R[2, j])
-    if not size > square(_STANDS_OUT):
-        return 0.0
-    return min(max(step, -_MOST_A_STEP), _MOST_A_STEP)
+def _add_evidence(fault_state: FaultState, estimate: Estimate, thrusters: Thrusters, j: int, hypothesis: int) -> None:
+    """Add the evidence of the last measurements for a hypothesis about thruster j."""
+    innovations, squares = estimate.evidence[0, hypothesis], estimate.evidence[1, hypothesis]
+    loss = _LOSS if hypothesis == j else 1.0
+    step = loss * innovations - 0.5 * square(loss) * squares
+    fault_state.ratio[hypothesis] += min(max(step, -_MOST_A_STEP), _MOST_A_STEP)
+    fault_state.sums[0, hypothesis] += innovations
+    fault_state.sums[1, hypothesis] += squares
+    if not fault_state.ratio[hypothesis] > 0.0:
+        _start_anew(fault_state, estimate, thrusters, j, hypothesis)
 
 
-def isolate_thruster(fault_state: FaultState, thrusters: Thrusters, failed: int) -> None:
-    """Mark a thruster as failed in `health`, and restore the one that was isolated before it.
+def _start_anew(fault_state: FaultState, estimate: Estimate, thrusters: Thrusters, j: int, hypothesis: int) -> None:
+    """Suppose that thruster j fails now, if it does."""
+    fault_state.ratio[hypothesis] = fault_state.sums[0, hypothesis] = fault_state.sums[1, hypothesis] = 0.0
+    estimate.deviation[hypothesis, :] = 0.0
+    if hypothesis == j:
+        estimate.deviation[j, EFFECTIVENESS + j] = -estimate.state[EFFECTIVENESS + j]
+    else:
+        estimate.supposed[0, j], estimate.supposed[1, j] = estimate.state[EFFECTIVENESS + j], thrusters.acting_now[j]
 
-    Parameters
-    ----------
-    fault_state : FaultState
-        Reset.
-    thrusters : Thrusters
-        Whose `health` changes; the caller calls `model.reallocate`.
-    failed : int
-        From 0.
-    """
-    if fault_state.isolated[0] >= 0:
-        thrusters.health[fault_state.isolated[0]] = 1.0
-    fault_state.isolated[0] = failed
-    thrusters.health[failed] = 0.0
-    fault_state.ratio[:] = 0.0
-    fault_state.lag[:, :] = 0.0
-    fault_state.adapted[:, :] = 0.0
+
+def _start_all_anew(fault_state: FaultState, estimate: Estimate, thrusters: Thrusters) -> None:
+    """Suppose that any thruster fails now, if it does."""
+    m = thrusters.health.size
+    for j in range(m):
+        _start_anew(fault_state, estimate, thrusters, j, j)
+        _start_anew(fault_state, estimate, thrusters, j, m + j)
+
+
+def _isolate(fault_state: FaultState, estimate: Estimate, thrusters: Thrusters, failed: int, force: float) -> None:
+    """Mark a thruster as failed, stuck at a force [N] or NaN; restore those that were isolated by a narrow lead."""
+    for j in range(thrusters.health.size):
+        if thrusters.health[j] == 0.0 and fault_state.doubted[j] == 1:
+            thrusters.health[j], thrusters.stuck[j] = 1.0, np.nan
+            set_effectiveness(estimate, j, 1.0)
+    thrusters.health[failed], thrusters.stuck[failed] = 0.0, force
+    set_effectiveness(estimate, failed, 0.0 if np.isnan(force) else 1.0)
+    _start_all_anew(fault_state, estimate, thrusters)

@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from controller.arithmetic import square
 from controller.law import VehicleState
+from controller.laws.deployable import actuator_lag, model, observer
 from controller.laws.deployable import attitude as attitude_loop
-from controller.laws.deployable import fault_detection, model, observer
+from controller.laws.deployable import estimate as estimate_state
 from controller.laws.deployable.gains import DeployableGains
 from controller.laws.deployable.linear_algebra import copy
 from controller.laws.deployable.memory import DeployableMemory
@@ -42,15 +43,18 @@ def reports_change(reported: Array, before: Array, health: Array) -> bool:
     return changed
 
 
-def update_thrusters(memory: DeployableMemory, reported: Array, failed: int) -> None:
-    """Apply the reported health of the thrusters, and isolate a thruster that was detected as failed, -1 for none."""
+def update_thrusters(memory: DeployableMemory, reported: Array) -> None:
+    """Apply the reported health of the thrusters, and allocate to those that work."""
     health = memory.thrusters.health
-    if failed >= 0:
-        fault_detection.isolate_thruster(memory.fault_state, memory.thrusters, failed)
     for j in range(reported.size):
         working = 0.0 if reported[j] <= 0.0 else 1.0
         if working != memory.reported[j] or working == 0.0:
+            if working != health[j]:
+                estimate_state.set_effectiveness(memory.state_estimate, j, working)
             health[j] = memory.reported[j] = working
+            if working > 0.0:
+                memory.thrusters.stuck[j] = np.nan
+            memory.fault_state.doubted[j] = 0 if working > 0.0 else 2
     model.reallocate(memory.thrusters)
 
 
@@ -58,6 +62,7 @@ def process_measurement(memory: DeployableMemory, state: VehicleState, gains: De
     """Propagate the estimate over the last period and correct it; return whether the measurement was accepted."""
     estimate, period = memory.state_estimate, memory.period[0]
     valid = _is_plausible_attitude(state.quaternion, state.velocity_body)
+    valid_attitude = valid
     if valid:
         e = state.quaternion
         length = np.sqrt(square(e[0]) + square(e[1]) + square(e[2]) + square(e[3]))
@@ -77,18 +82,19 @@ def process_measurement(memory: DeployableMemory, state: VehicleState, gains: De
         frozen = frozen and state.velocity_body[i] == estimate.last_measured[3 + i]
         estimate.last_measured[i], estimate.last_measured[3 + i] = state.position[i], state.velocity_body[i]
 
+    actuator_lag.update_forces(estimate, memory.thrusters, period)
     started = estimate.time_since_measurement[0] >= 0.0
     if started:
-        observer.predict(estimate, memory.dynamics, memory.thrusters, R, memory.omega, gains, period)
+        acceleration = memory.thruster_acceleration
+        observer.predict(estimate, memory.dynamics, memory.thrusters, acceleration, R, memory.omega, gains, period)
         if not _is_plausible_motion(estimate.position, estimate.velocity):  # diverged after a false measurement
             _reset_estimate(memory)
             started = False
-    attitude_loop.adapt(
-        memory.attitude, memory.dynamics, memory.thrusters, memory.quaternion, memory.omega, gains, period
-    )
+    if valid_attitude:
+        _correct_by_rates(memory, R, started, gains)
     if not started:
         if valid:
-            observer.initialize(estimate, state.position, velocity, gains)
+            estimate_state.initialize(estimate, state.position, velocity, gains)
         return valid
     moving = abs(estimate.velocity[0]) + abs(estimate.velocity[1]) + abs(estimate.velocity[2]) > 0.02
     if not valid or (frozen and moving):
@@ -96,8 +102,27 @@ def process_measurement(memory: DeployableMemory, state: VehicleState, gains: De
     if observer.correct(estimate, state.position, velocity, gains):
         return True
     if estimate.time_since_measurement[0] > gains.coast:  # consistently elsewhere: start from there
-        observer.initialize(estimate, state.position, velocity, gains)
+        estimate_state.initialize(estimate, state.position, velocity, gains)
     return False
+
+
+def _correct_by_rates(memory: DeployableMemory, R: Array, predicted: bool, gains: DeployableGains) -> None:
+    """Correct the estimate by the moment that the change of the rates shows; `predicted` says that there is one."""
+    estimate, attitude, period = memory.state_estimate, memory.attitude, memory.period[0]
+    known = attitude_loop.measure_moment(attitude, memory.dynamics, R, memory.omega, estimate, period)
+    if known and predicted:
+        observer.correct_by_moment(
+            estimate,
+            attitude.measured_moment,
+            attitude.by_current,
+            memory.dynamics,
+            memory.thrusters,
+            R,
+            memory.quaternion,
+            memory.omega,
+            gains,
+            period,
+        )
 
 
 def _is_plausible_attitude(quaternion: Array, velocity_body: Array) -> bool:
@@ -112,12 +137,22 @@ def _is_plausible_attitude(quaternion: Array, velocity_body: Array) -> bool:
 
 def _propagate_attitude(memory: DeployableMemory) -> None:
     """Propagate attitude and rates over the last period by the model."""
-    R, turning, thrust_acceleration, period = zeros(3, 3), zeros(3), zeros(6), memory.period[0]
+    R, free, thrust_acceleration, period = zeros(3, 3), zeros(6), zeros(6), memory.period[0]
+    estimate = memory.state_estimate
     write_rotation(memory.quaternion, R)
-    attitude_loop.free_angular_acceleration(memory.attitude, memory.dynamics, memory.quaternion, memory.omega, turning)
-    model.thrust_acceleration(memory.dynamics, memory.thrusters, R, memory.thrusters.forces, thrust_acceleration)
+    model.free_acceleration(
+        memory.dynamics,
+        R,
+        estimate.velocity,
+        memory.omega,
+        estimate.water_velocity,
+        estimate.net_weight[0],
+        estimate.moments,
+        free,
+    )
+    model.thrust_acceleration(memory.dynamics, memory.thrusters, R, memory.thrusters.acting, thrust_acceleration)
     for i in range(3):
-        memory.omega[i] += period * (turning[i] + thrust_acceleration[3 + i])
+        memory.omega[i] += period * (free[3 + i] + thrust_acceleration[3 + i])
         memory.omega[i] = min(max(memory.omega[i], -_FASTEST), _FASTEST)
     attitude_loop.integrate_attitude(memory.quaternion, memory.omega, period, memory.quaternion)
 
@@ -132,10 +167,5 @@ def _is_plausible_motion(position: Array, velocity: Array) -> bool:
 
 def _reset_estimate(memory: DeployableMemory) -> None:
     """Reset the estimate to its state before the first measurement."""
-    estimate = memory.state_estimate
-    estimate.position[:], estimate.velocity[:], estimate.water_velocity[:], estimate.net_weight[0] = 0.0, 0.0, 0.0, 0.0
-    estimate.covariance[:, :, :] = 0.0
-    estimate.innovation[:], estimate.innovation_deviation[:], estimate.gain[:] = 0.0, 1.0, 0.0
-    estimate.time_since_measurement[0] = -1.0
+    estimate_state.reset(memory.state_estimate)
     memory.fault_state.ratio[:] = 0.0
-    memory.fault_state.lag[:, :] = 0.0

@@ -25,7 +25,6 @@ from controller.laws.deployable import (
     fault_detection,
     input_validation,
     model,
-    observer,
     path_planner,
     quadratic_program,
 )
@@ -33,14 +32,15 @@ from controller.laws.deployable.attitude import empty_attitude
 from controller.laws.deployable.attraction import desired_acceleration, desired_velocity
 from controller.laws.deployable.barrier import Motion, RegionObservation, empty_observation, observe_regions, write_rows
 from controller.laws.deployable.braking import least_forces
+from controller.laws.deployable.estimate import LAG, Estimate, make_estimate, position_spread
 from controller.laws.deployable.faces import FACES
 from controller.laws.deployable.fault_detection import empty_fault_state
 from controller.laws.deployable.gains import DeployableGains, check_gains
 from controller.laws.deployable.linear_algebra import copy
 from controller.laws.deployable.memory import DeployableMemory
 from controller.laws.deployable.model import Dynamics, Thrusters, make_dynamics, make_thrusters
-from controller.laws.deployable.observer import Estimate, empty_estimate
 from controller.laws.deployable.path_planner import empty_plan
+from controller.laws.deployable.prediction import empty_prediction, predict_state
 from controller.laws.deployable.quadratic_program import empty_workspace
 from controller.quaternion import write_rotation
 from controller.regions.kinds import FIRST_OF_ATTITUDE
@@ -50,6 +50,7 @@ from controller.stack_array import zeros
 _SPREADS = 3.0  # standard deviations of the position that the margin adds
 _STALE = 0.15  # s without a valid measurement, after which the vehicle is brought to a stop
 _SEED = 1
+_LEAST_EFFECTIVENESS = 0.5  # by which more force is commanded
 _ATTITUDE = FIRST_OF_ATTITUDE  # shapes from it on depend on attitude
 
 DIAGNOSTICS = (
@@ -84,11 +85,10 @@ def step(
     """Do what `CompiledLaw.step` says, by the deployable law."""
     estimate, thrusters, dynamics, period = memory.state_estimate, memory.thrusters, memory.dynamics, memory.period[0]
     input_validation.sanitize_weights(weights, memory.weights)
-    R, desired, acceleration = zeros(3, 3), zeros(3), zeros(3)
-    free_acceleration, wrench, velocity = zeros(6), zeros(6), zeros(6)
+    R, desired, acceleration, free, against, wrench = zeros(3, 3), zeros(3), zeros(6), zeros(6), zeros(6), zeros(6)
 
     # estimate
-    measured = input_validation.process_measurement(memory, state, gains)
+    input_validation.process_measurement(memory, state, gains)
     write_rotation(memory.quaternion, R)
     if (
         estimate.time_since_measurement[0] < 0.0 or estimate.time_since_measurement[0] > gains.coast
@@ -99,56 +99,61 @@ def step(
         return
 
     # fault detection
-    failed = fault_detection.detect_fault(
-        memory.fault_state, estimate, memory.attitude.residual, dynamics, thrusters, R, gains, period, measured
-    )
+    failed = fault_detection.detect_fault(memory.fault_state, estimate, thrusters, gains)
     if failed >= 0 or input_validation.reports_change(state.thruster_health, memory.reported, thrusters.health):
-        input_validation.update_thrusters(memory, state.thruster_health, failed)
-        observer.inflate_covariance(estimate, 0.01)
+        input_validation.update_thrusters(memory, state.thruster_health)
+
+    # prediction
+    lag, ahead = estimate.state[LAG], memory.predicted
+    _free_acceleration(memory, R, estimate.velocity, memory.omega, free)
+    if lag > 0.0:
+        model.thrust_acceleration(dynamics, thrusters, R, thrusters.acting_now, acceleration)
+        for i in range(6):
+            acceleration[i] += free[i]
+    predict_state(ahead, estimate.position, estimate.velocity, memory.quaternion, memory.omega, acceleration, lag)
+    _free_acceleration(memory, R, ahead.velocity[:3], ahead.velocity[3:], free)
 
     # path planner, bounded attraction
-    path_planner.improve_path(memory.plan, estimate.position, goal, regions, gains, period)
+    path_planner.improve_path(memory.plan, ahead.position, goal, regions, gains, period)
     if estimate.time_since_measurement[0] <= _STALE:
-        desired_velocity(memory.plan, estimate.position, goal.velocities[0], gains, desired)
-    desired_acceleration(desired, estimate.velocity, gains, acceleration)
+        desired_velocity(memory.plan, ahead.position, goal.velocities[0], gains, desired)
+    desired_acceleration(desired, ahead.velocity[:3], gains, acceleration[:3])
 
     # desired wrench
-    model.free_acceleration(
-        dynamics, R, estimate.velocity, memory.omega, estimate.water_velocity, estimate.net_weight[0], free_acceleration
-    )
-    attitude_loop.update_munk_moment(memory.attitude, dynamics, R, estimate.velocity, estimate.water_velocity)
-    attitude_loop.free_angular_acceleration(
-        memory.attitude, dynamics, memory.quaternion, memory.omega, free_acceleration[3:]
-    )
-    copy(estimate.velocity, velocity[:3])
-    copy(memory.omega, velocity[3:])
-    observe_regions(memory.observation, regions, estimate.position, memory.quaternion, velocity)
+    observe_regions(memory.observation, regions, ahead.position, ahead.quaternion, ahead.velocity)
     share = period / (period + gains.smoothing)
     for axis in range(3):
         memory.filtered_acceleration[axis] += share * (
-            acceleration[axis] - free_acceleration[axis] - memory.filtered_acceleration[axis]
+            acceleration[axis] - free[axis] - memory.filtered_acceleration[axis]
         )
     _force_of(dynamics, R, memory.filtered_acceleration, wrench)
     _soft_forces(memory.observation, regions, memory.weights, R, dynamics, wrench)
-    attitude_loop.update_desired(memory.attitude, regions, estimate.position, gains, period)
-    attitude_loop.compute_moment(memory.attitude, dynamics, memory.quaternion, memory.omega, gains, wrench[3:])
+    attitude_loop.update_desired(memory.attitude, regions, ahead.position, gains, period)
+    _free_wrench(memory, R, ahead.velocity, against)
+    attitude_loop.compute_moment(
+        memory.attitude, dynamics, ahead.quaternion, ahead.velocity[3:], against, gains, wrench[3:]
+    )
     work = memory.program
     for j in range(forces.size):
         work.nominal[j] = 0.0
         for k in range(6):
             work.nominal[j] += thrusters.allocator[j, k] * wrench[k]
+        work.nominal[j] /= max(thrusters.effectiveness[j], _LEAST_EFFECTIVENESS)
 
     # barriers
     _write_thruster_acceleration(dynamics, thrusters, R, memory.thruster_acceleration)
+    for i in range(6):
+        for j in range(forces.size):
+            memory.effective_acceleration[i, j] = memory.thruster_acceleration[i, j] * thrusters.effectiveness[j]
     motion = Motion(
-        estimate.position,
-        velocity,
-        free_acceleration,
-        memory.thruster_acceleration,
+        ahead.position,
+        ahead.velocity,
+        free,
+        memory.effective_acceleration,
         dynamics.translational_mass[0],
         (dynamics.mass[3, 3] + dynamics.mass[4, 4] + dynamics.mass[5, 5]) / 3.0,
         gains.braking_share * _braking(dynamics, thrusters),
-        _SPREADS * observer.position_spread(estimate) + 0.5 * gains.acceleration * square(period),
+        _SPREADS * position_spread(estimate) + 0.5 * gains.acceleration * (square(period) + square(lag)),
     )
     rows = write_rows(
         work, memory.observation, regions, memory.weights, motion, thrusters.lower, thrusters.upper, gains
@@ -158,9 +163,39 @@ def step(
     steps = quadratic_program.solve(work, rows, thrusters.inverse, thrusters.lower, thrusters.upper, forces)
     copy(forces, thrusters.forces)
     memory.estimate[0] = estimate.net_weight[0]
-    copy(memory.attitude.moments, memory.estimate[1:])
+    copy(estimate.moments, memory.estimate[1:])
     _report(memory.report, estimate, memory.plan.cost[0], memory.plan.counts[0], thrusters.health, desired)
     _report_program(memory.report, work.multipliers, work.price, rows, steps)
+
+
+def _free_wrench(memory: DeployableMemory, R: Array, velocity: Array, out: Array) -> None:
+    """Write the wrench [N, N m] without thrust at a velocity, shape (6,) as in `Motion`."""
+    estimate = memory.state_estimate
+    model.free_wrench(
+        memory.dynamics,
+        R,
+        velocity[:3],
+        velocity[3:],
+        estimate.water_velocity,
+        estimate.net_weight[0],
+        estimate.moments,
+        out,
+    )
+
+
+def _free_acceleration(memory: DeployableMemory, R: Array, velocity: Array, omega: Array, out: Array) -> None:
+    """Write the acceleration [m/s2, rad/s2] without thrust at velocities [m/s, rad/s], shape (3,) each."""
+    estimate = memory.state_estimate
+    model.free_acceleration(
+        memory.dynamics,
+        R,
+        velocity,
+        omega,
+        estimate.water_velocity,
+        estimate.net_weight[0],
+        estimate.moments,
+        out,
+    )
 
 
 def _force_of(dynamics: Dynamics, R: Array, acceleration: Array, out: Array) -> None:
@@ -300,18 +335,20 @@ class DeployableLaw(CompiledLaw):
             report=np.zeros(len(DIAGNOSTICS)),
             dynamics=make_dynamics(vehicle, least_forces(vehicle)),
             thrusters=make_thrusters(vehicle),
-            state_estimate=empty_estimate(),
+            state_estimate=make_estimate(vehicle),
             attitude=empty_attitude(desired),
             fault_state=empty_fault_state(m),
             plan=empty_plan(n_regions, _SEED),
             observation=empty_observation(n_regions),
             program=empty_workspace((1 + FACES) * n_regions, m),
+            predicted=empty_prediction(),
             quaternion=desired.copy(),
             omega=np.zeros(3),
             weights=np.ones(n_regions),
             reported=np.ones(m),
             filtered_acceleration=np.zeros(3),
             thruster_acceleration=np.zeros((6, m)),
+            effective_acceleration=np.zeros((6, m)),
         )
 
     @classmethod

@@ -24,6 +24,7 @@ class Dynamics(NamedTuple):
     linear_damping: Array  # (6,) N s/m, N m s/rad
     quadratic_damping: Array  # (6,) N s2/m2, N m s2/rad2
     translational_mass: Array  # (1,) kg, mean of the three
+    rigid_mass: Array  # (1,) kg, without the added one
     braking: Array  # (m + 1,) m/s2, worst direction: with thruster j lost, and last with all working
 
 
@@ -40,7 +41,11 @@ class Thrusters(NamedTuple):
     allocator: Array  # (m, 6) H^-1 B^T Q: from wrench to nearest forces
     metric: Array  # (6,) Q: cost of an error of the wrench, 1/N2, 1/(N m)2
     health: Array  # (m,) 1 working, 0 failed
+    stuck: Array  # (m,) N, that a thruster gives which no longer follows its command; NaN of all others
+    effectiveness: Array  # (m,) estimated part of its force that each gives
     forces: Array  # (m,) N, commanded in the last period
+    acting: Array  # (m,) N, mean over that period behind the lag
+    acting_now: Array  # (m,) N, at its end
 
 
 def make_dynamics(vehicle: VehicleModel, braking: Array) -> Dynamics:
@@ -68,6 +73,7 @@ def make_dynamics(vehicle: VehicleModel, braking: Array) -> Dynamics:
         linear_damping=vehicle.linear_damping.copy(),
         quadratic_damping=vehicle.quadratic_damping.copy(),
         translational_mass=np.array([mean]),
+        rigid_mass=np.array([vehicle.rigid_mass[0, 0]]),
         braking=np.asarray(braking) / mean,
     )
 
@@ -99,16 +105,25 @@ def make_thrusters(vehicle: VehicleModel) -> Thrusters:
         allocator=np.zeros((m, 6)),
         metric=np.array([1.0] * 3 + [4.0 / arm**2] * 3),
         health=np.ones(m),
+        stuck=np.full(m, np.nan),
+        effectiveness=np.ones(m),
         forces=np.zeros(m),
+        acting=np.zeros(m),
+        acting_now=np.zeros(m),
     )
     reallocate(thrusters)
     return thrusters
 
 
 def reallocate(thrusters: Thrusters) -> None:
-    """Update matrix, limits and inverses to `health`."""
+    """Update matrix, limits and inverses to `health` and `stuck`."""
     m = thrusters.health.size
     for j in range(m):
+        if not np.isnan(thrusters.stuck[j]):  # it gives its force whatever is commanded
+            for k in range(6):
+                thrusters.matrix[k, j] = thrusters.nominal_matrix[k, j]
+            thrusters.lower[j] = thrusters.upper[j] = thrusters.stuck[j]
+            continue
         for k in range(6):
             thrusters.matrix[k, j] = thrusters.nominal_matrix[k, j] * thrusters.health[j]
         thrusters.lower[j] = thrusters.nominal_lower[j] * thrusters.health[j]
@@ -133,20 +148,20 @@ def reallocate(thrusters: Thrusters) -> None:
             thrusters.allocator[i, k] = total * thrusters.metric[k]
 
 
-def free_acceleration(
+def free_wrench(
     dynamics: Dynamics,
     R: Array,
     velocity: Array,
     omega_body: Array,
     water_velocity: Array,
     net_weight: float,
+    moments: Array,
     out: Array,
 ) -> None:
-    """Write the acceleration over ground without thrust, NED, shape (3,) [m/s2].
+    """Write the wrench on the body without thrust, shape (6,) [N, N m]: all of (11) but thrust and M nu_r'.
 
-    The translational part of (11): drag against the water, W - B, and the rotation of the body axes, in which mass and
-    drag are given. The coupling of rotation into translation through added mass is neglected, except for the thrusters'
-    moments in `thrust_acceleration`.
+    Drag against the water, weight and buoyancy, and the momentum M nu_r in the rotating body axes, which with oblique
+    motion has a moment, Munk's.
 
     Parameters
     ----------
@@ -162,37 +177,67 @@ def free_acceleration(
         Velocity of the water [m/s], world frame.
     net_weight : float
         W - B [N].
-    out : ndarray, shape (3,)
-        Receives the acceleration.
+    moments : ndarray, shape (3,)
+        phi_2..phi_4 of (12) [N m].
+    out : ndarray, shape (6,)
+        Receives the wrench, body axes.
     """
-    force, relative, momentum = zeros(6), zeros(3), zeros(3)
+    relative, momentum = zeros(6), zeros(6)
     for i in range(3):
+        relative[3 + i] = omega_body[i]
         for k in range(3):
             relative[i] += R[k, i] * (velocity[k] - water_velocity[k])
+    product(dynamics.mass, relative, momentum)
+    for i in range(6):
+        out[i] = -(dynamics.linear_damping[i] + dynamics.quadratic_damping[i] * abs(relative[i])) * relative[i]
     for i in range(3):
-        for k in range(3):
-            momentum[i] += dynamics.mass[i, k] * relative[k]
+        a, b = (i + 1) % 3, (i + 2) % 3
+        out[i] += net_weight * R[2, i] - (omega_body[a] * momentum[b] - omega_body[b] * momentum[a])
+        out[3 + i] -= R[2, a] * moments[b] - R[2, b] * moments[a]  # S(k) phi with k = R^T e3
+        out[3 + i] -= omega_body[a] * momentum[3 + b] - omega_body[b] * momentum[3 + a]
+        out[3 + i] -= relative[a] * momentum[b] - relative[b] * momentum[a]
+
+
+def free_acceleration(
+    dynamics: Dynamics,
+    R: Array,
+    velocity: Array,
+    omega_body: Array,
+    water_velocity: Array,
+    net_weight: float,
+    moments: Array,
+    out: Array,
+) -> None:
+    """Write the acceleration without thrust, shape (6,): linear over ground, NED [m/s2]; angular in body axes [rad/s2].
+
+    Parameters are those of `free_wrench`.
+    """
+    wrench, body = zeros(6), zeros(6)
+    free_wrench(dynamics, R, velocity, omega_body, water_velocity, net_weight, moments, wrench)
+    product(dynamics.inverse_mass, wrench, body)
     for i in range(3):
-        drag = (dynamics.linear_damping[i] + dynamics.quadratic_damping[i] * abs(relative[i])) * relative[i]
-        j, k = (i + 1) % 3, (i + 2) % 3
-        # d(M nu_r)/dt + omega x (M nu_r) = force
-        force[i] = net_weight * R[2, i] - drag - (omega_body[j] * momentum[k] - omega_body[k] * momentum[j])
-    body = zeros(6)
-    product(dynamics.inverse_mass, force, body)
+        out[i], out[3 + i] = 0.0, body[3 + i]
     for i in range(3):  # the body axes rotate: omega x nu_r
-        j, k = (i + 1) % 3, (i + 2) % 3
-        relative_turning = omega_body[j] * relative[k] - omega_body[k] * relative[j]
-        body[i] += relative_turning
-    for i in range(3):
-        out[i] = 0.0
+        a, b = (i + 1) % 3, (i + 2) % 3
         for k in range(3):
-            out[i] += R[i, k] * body[k]
+            turning = omega_body[a] * R[k, b] - omega_body[b] * R[k, a]  # d R[k, i] / dt, negative
+            out[k] += R[k, i] * body[i] - turning * _relative(R, velocity, water_velocity, i)
+
+
+def _relative(R: Array, velocity: Array, water_velocity: Array, i: int) -> float:
+    """Return a component [m/s] of the velocity against the water, body axes."""
+    total = 0.0
+    for k in range(3):
+        total += R[k, i] * (velocity[k] - water_velocity[k])
+    return total
 
 
 def thrust_acceleration(dynamics: Dynamics, thrusters: Thrusters, R: Array, forces: Array, out: Array) -> None:
-    """Write the acceleration by thruster forces [N], shape (6,): linear in NED, angular in body axes."""
+    """Write the acceleration by thruster forces [N], less what they lose: (6,), linear in NED, angular in body axes."""
     wrench, body = zeros(6), zeros(6)
-    product(thrusters.matrix, forces, wrench)
+    for k in range(6):
+        for j in range(forces.size):
+            wrench[k] += thrusters.matrix[k, j] * (thrusters.effectiveness[j] * forces[j])
     product(dynamics.inverse_mass, wrench, body)
     for i in range(3):
         out[i] = 0.0

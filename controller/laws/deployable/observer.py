@@ -1,172 +1,249 @@
-"""Observer of position, velocity, current and W - B: a Kalman filter for each world axis.
+"""Observer: one Kalman filter of the motion and of all that moves the vehicle and is not known.
 
-Each filter has three states: position, velocity over ground, and an unknown input: the current north and east, W - B
-downwards. The prediction couples them by the translational part of the model (11), see `model.free_acceleration`; the
-covariances are propagated axis by axis. Projection keeps current and W - B within their bounds. The prediction uses the
-commanded forces within their limits, so that a saturated thruster causes no wind-up.
+The states: position (3), velocity over ground (3), current (2), W - B, the restoring moments phi_2..phi_4 of (12),
+height of the centre of gravity below the origin, lag of the thrusters, and the effectiveness of each. The prediction is
+the model (11) with its coupled mass matrix, under the commanded forces within their limits behind the lag, so that a
+saturated thruster causes no wind-up. The states are corrected by the moment that measured rates show, and by measured
+position and velocity. What one of them explains is not blamed on another: the hypotheses of `fault_detection` are
+tested by the innovations of this filter. Projection keeps current, W - B, moments, lag and effectiveness in bounds.
 """
 
 from __future__ import annotations
-
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from controller.arithmetic import square
+from controller.laws.deployable.estimate import (
+    CURRENT,
+    EFFECTIVENESS,
+    HEIGHT,
+    LAG,
+    MOMENTS,
+    NET_WEIGHT,
+    VELOCITY,
+    Estimate,
+    project,
+    publish,
+)
 from controller.laws.deployable.gains import DeployableGains
-from controller.laws.deployable.linear_algebra import copy
-from controller.laws.deployable.model import Dynamics, Thrusters, free_acceleration, thrust_acceleration
+from controller.laws.deployable.model import Dynamics, Thrusters, free_acceleration
+from controller.quaternion import down_parts
 from controller.stack_array import zeros
 
 Array = NDArray[np.float64]
 
+
 _UNMODELLED = 0.03  # m/s2/sqrt(Hz), acceleration noise of the model
 _SLOWEST = 0.15  # m/s against the water, least speed at which drag is linearized
 _GATE = 6.0  # standard deviations beyond which a measurement is rejected
-_FIRST_CURRENT, _FIRST_RESTORING = 0.3, 15.0  # m/s, N: standard deviations at the start
-
-
-class Estimate(NamedTuple):
-    """State and covariance of the three filters."""
-
-    position: Array  # (3,) m, NED
-    velocity: Array  # (3,) m/s over ground, NED
-    water_velocity: Array  # (3,) m/s, NED; its down component is 0
-    net_weight: Array  # (1,) N, W - B
-    covariance: Array  # (3, 3, 3) of each axis: position, velocity, unknown
-    acceleration: Array  # (3,) m/s2 over ground, NED, predicted for the last period
-    innovation: Array  # (3,) m/s, measured less predicted velocity, NED
-    innovation_deviation: Array  # (3,) m/s, standard deviation of the innovation
-    gain: Array  # (3,) Kalman gain of the velocity for its innovation
-    time_since_measurement: Array  # (1,) s since the last valid measurement; negative before the first
-    last_measured: Array  # (6,) position and velocity, as last measured
-
-
-def empty_estimate() -> Estimate:
-    """Return the estimate before the first measurement."""
-    return Estimate(
-        position=np.zeros(3),
-        velocity=np.zeros(3),
-        water_velocity=np.zeros(3),
-        net_weight=np.zeros(1),
-        covariance=np.zeros((3, 3, 3)),
-        acceleration=np.zeros(3),
-        innovation=np.zeros(3),
-        innovation_deviation=np.ones(3),
-        gain=np.zeros(3),
-        time_since_measurement=np.array([-1.0]),
-        last_measured=np.full(6, np.nan),
-    )
-
-
-def initialize(estimate: Estimate, position: Array, velocity: Array, gains: DeployableGains) -> None:
-    """Initialize from a measurement [m, m/s, NED]: the first one, or one after a loss.
-
-    Current and W - B keep their estimates.
-    """
-    copy(position, estimate.position)
-    copy(velocity, estimate.velocity)
-    first = estimate.time_since_measurement[0] < 0.0
-    for axis in range(3):
-        P = estimate.covariance[axis]
-        unknown = P[2, 2]
-        if first:
-            unknown = square(_FIRST_RESTORING) if axis == 2 else square(_FIRST_CURRENT)
-        P[:, :] = 0.0
-        P[0, 0], P[1, 1], P[2, 2] = square(gains.position_noise), square(gains.velocity_noise), unknown
-    estimate.innovation[:] = 0.0
-    estimate.time_since_measurement[0] = 0.0
+_ANGULAR = 0.019  # rad/s2/sqrt(Hz), angular acceleration noise of the model
+_RIPPLE = 0.05  # standard deviation of a thruster's force in one period, as part of it
+_WEAR = 0.01  # 1/sqrt(s), drift of an effectiveness
+_LAG_DRIFT = 0.003  # s/sqrt(s)
+_OUTLIER = 3.0  # standard deviations, beyond which an innovation counts as if it had that many
 
 
 def predict(
     estimate: Estimate,
     dynamics: Dynamics,
     thrusters: Thrusters,
+    thruster_acceleration: Array,
     R: Array,
     omega_body: Array,
     gains: DeployableGains,
     period: float,
 ) -> None:
-    """Predict the estimate over a control period [s] under the last commanded forces."""
-    free, by_thrusters = zeros(3), zeros(6)
-    free_acceleration(dynamics, R, estimate.velocity, omega_body, estimate.water_velocity, estimate.net_weight[0], free)
-    thrust_acceleration(dynamics, thrusters, R, thrusters.forces, by_thrusters)
-    mass = dynamics.translational_mass[0]
+    """Predict over a period [s] under the forces that acted in it.
+
+    `thruster_acceleration` has shape (6, m), as in `barrier.Motion`.
+    """
+    x, P, F = estimate.state, estimate.covariance, estimate.transition
+    mass, T = dynamics.translational_mass[0], period
+    free = zeros(6)
+    free_acceleration(
+        dynamics, R, estimate.velocity, omega_body, estimate.water_velocity, x[NET_WEIGHT], estimate.moments, free
+    )
     linear = (dynamics.linear_damping[0] + dynamics.linear_damping[1] + dynamics.linear_damping[2]) / 3.0
     quadratic = (dynamics.quadratic_damping[0] + dynamics.quadratic_damping[1] + dynamics.quadratic_damping[2]) / 3.0
+    F[:, :] = 0.0
     for axis in range(3):
         relative = abs(estimate.velocity[axis] - estimate.water_velocity[axis])
         slope = (linear + 2.0 * quadratic * max(relative, _SLOWEST)) / mass
-        by_unknown = slope if axis < 2 else 1.0 / mass
-        # F = [1 T 0; 0 1 - slope T, by_unknown T; 0 0 1]
-        T, P = period, estimate.covariance[axis]
-        f11, f12 = 1.0 - slope * T, by_unknown * T
-        p00 = P[0, 0] + 2.0 * T * P[0, 1] + T * T * P[1, 1]
-        p01 = f11 * (P[0, 1] + T * P[1, 1]) + f12 * (P[0, 2] + T * P[1, 2])
-        p02 = P[0, 2] + T * P[1, 2]
-        p11 = f11 * f11 * P[1, 1] + 2.0 * f11 * f12 * P[1, 2] + f12 * f12 * P[2, 2]
-        p12 = f11 * P[1, 2] + f12 * P[2, 2]
-        drift = gains.restoring_drift if axis == 2 else gains.current_drift
-        P[0, 0], P[0, 1], P[0, 2] = p00, p01, p02
-        P[1, 0], P[1, 1], P[1, 2] = p01, p11 + square(_UNMODELLED) * T, p12
-        P[2, 0], P[2, 1], P[2, 2] = p02, p12, P[2, 2] + square(drift) * T
-        acceleration = free[axis] + by_thrusters[axis]
+        F[axis, VELOCITY + axis] = 1.0 - slope * T
+        if axis < 2:
+            F[axis, CURRENT + axis] = slope * T
+        else:
+            F[axis, NET_WEIGHT] = T / mass
+        acceleration = free[axis]
+        for j in range(thrusters.acting.size):
+            effectiveness, by_force = x[EFFECTIVENESS + j], thruster_acceleration[axis, j]
+            acceleration += by_force * thrusters.acting[j] * effectiveness
+            F[axis, EFFECTIVENESS + j] = T * by_force * thrusters.acting[j]
+            F[axis, LAG] += T * by_force * estimate.by_lag[j] * effectiveness
         estimate.acceleration[axis] = acceleration
-        estimate.position[axis] += T * (estimate.velocity[axis] + 0.5 * T * acceleration)
-        estimate.velocity[axis] += T * acceleration
+        x[axis] += T * (estimate.velocity[axis] + 0.5 * T * acceleration)
+        x[VELOCITY + axis] += T * acceleration
+    _propagate_covariance(estimate, T)
+    for axis in range(3):
+        # by its uncertainty the lag acts in a curve, of which the secant is a part
+        curved = square(F[axis, LAG]) * P[LAG, LAG]
+        P[VELOCITY + axis, VELOCITY + axis] += square(_UNMODELLED) * T + curved
+        # so that the moments follow at the rate of adaptation
+        P[MOMENTS + axis, MOMENTS + axis] += square(gains.adaptation * _ANGULAR * dynamics.mass[3 + axis, 3 + axis]) * T
+    for axis in range(2):
+        P[CURRENT + axis, CURRENT + axis] += square(gains.current_drift) * T
+    P[NET_WEIGHT, NET_WEIGHT] += square(gains.restoring_drift * estimate.heaviness[0]) * T
+    P[LAG, LAG] += square(_LAG_DRIFT) * T
+    for j in range(thrusters.health.size):
+        thrusters.effectiveness[j] = x[EFFECTIVENESS + j]
+        if P[EFFECTIVENESS + j, EFFECTIVENESS + j] > 0.0:
+            P[EFFECTIVENESS + j, EFFECTIVENESS + j] += square(_WEAR) * T
+    _propagate_deviations(estimate, thrusters, thruster_acceleration, T)
+    estimate.evidence[:, :] = 0.0
     estimate.time_since_measurement[0] += period
+    publish(estimate)
+
+
+def _propagate_covariance(estimate: Estimate, period: float) -> None:
+    """Propagate the covariance over a period [s]: first the positions, then the velocities by `transition`."""
+    P, F, W = estimate.covariance, estimate.transition, estimate.product
+    n = estimate.state.size
+    for axis in range(3):
+        for k in range(n):
+            P[axis, k] += period * P[VELOCITY + axis, k]
+        for k in range(n):
+            P[k, axis] += period * P[k, VELOCITY + axis]
+    for i in range(3):
+        W[i, :] = 0.0
+        for q in range(VELOCITY, n):
+            share = F[i, q]
+            if share != 0.0:
+                for k in range(n):
+                    W[i, k] += share * P[q, k]
+    for i in range(3):
+        for k in range(n):
+            P[VELOCITY + i, k] = P[k, VELOCITY + i] = W[i, k]
+    for i in range(3):
+        for k in range(3):
+            total = 0.0
+            for q in range(VELOCITY, n):
+                total += W[i, q] * F[k, q]
+            P[VELOCITY + i, VELOCITY + k] = total
+
+
+def _propagate_deviations(
+    estimate: Estimate, thrusters: Thrusters, thruster_acceleration: Array, period: float
+) -> None:
+    """Propagate the deviations of all hypotheses over a period [s]; a thruster that is stuck lacks force besides."""
+    F, deviation, m = estimate.transition, estimate.deviation, thrusters.acting.size
+    for j in range(2 * m):
+        for axis in range(3):
+            deviation[j, axis] += period * deviation[j, VELOCITY + axis]
+            estimate.gain[axis] = 0.0
+            for q in range(VELOCITY, estimate.state.size):
+                estimate.gain[axis] += F[axis, q] * deviation[j, q]
+        for axis in range(3):
+            deviation[j, VELOCITY + axis] = estimate.gain[axis]
+    for j in range(m):
+        estimate.missing[j] = estimate.supposed[0, j] * (estimate.supposed[1, j] - thrusters.acting[j])
+        for axis in range(3):
+            deviation[m + j, VELOCITY + axis] += period * thruster_acceleration[axis, j] * estimate.missing[j]
+
+
+def correct_by_moment(
+    estimate: Estimate,
+    moment: Array,
+    by_current: Array,
+    dynamics: Dynamics,
+    thrusters: Thrusters,
+    R: Array,
+    quaternion: Array,
+    omega_body: Array,
+    gains: DeployableGains,
+    period: float,
+) -> None:
+    """Correct by the moment [N m] of thrusters and weight that the rates showed over a period [s], shape (3,).
+
+    `by_current`, shape (3, 2), is how the moment that the model knows grows with the current [N s].
+    """
+    row, x, lag_variance = estimate.row, estimate.state, estimate.covariance[LAG, LAG]
+    k, middle, body = zeros(3), zeros(3), zeros(3)
+    k[0], k[1], k[2] = down_parts(quaternion)
+    for i in range(3):  # as it was in the middle of the period
+        a, b = (i + 1) % 3, (i + 2) % 3
+        middle[i] = k[i] + 0.5 * period * (omega_body[a] * k[b] - omega_body[b] * k[a])
+        for axis in range(3):
+            body[i] += R[axis, i] * estimate.acceleration[axis]
+    for i in range(3):
+        a, b = (i + 1) % 3, (i + 2) % 3
+        row[:] = 0.0
+        row[MOMENTS + b] = -middle[a]  # moment = B (f e) - S(k) phi - m z e3 x a
+        row[MOMENTS + a] = middle[b]
+        if i == 0:
+            row[HEIGHT] = dynamics.rigid_mass[0] * body[1]
+        elif i == 1:
+            row[HEIGHT] = -dynamics.rigid_mass[0] * body[0]
+        expected = row[MOMENTS + a] * x[MOMENTS + a] + row[MOMENTS + b] * x[MOMENTS + b] + row[HEIGHT] * x[HEIGHT]
+        row[CURRENT], row[CURRENT + 1] = by_current[i, 0], by_current[i, 1]
+        variance = square(_ANGULAR * dynamics.mass[3 + i, 3 + i]) / period
+        m = thrusters.acting.size
+        for j in range(m):
+            estimate.direct[m + j] = thrusters.matrix[3 + i, j] * estimate.missing[j]
+            given = thrusters.matrix[3 + i, j] * thrusters.acting[j]
+            row[EFFECTIVENESS + j] = given
+            expected += given * x[EFFECTIVENESS + j]
+            row[LAG] += thrusters.matrix[3 + i, j] * estimate.by_lag[j] * x[EFFECTIVENESS + j]
+            variance += square(_RIPPLE * given)
+            variance += square(thrusters.matrix[3 + i, j] * estimate.by_lag[j]) * lag_variance
+        _correct(estimate, moment[i] - expected, variance)
+    estimate.direct[:] = 0.0
+    project(estimate, gains)
 
 
 def correct(estimate: Estimate, position: Array, velocity: Array, gains: DeployableGains) -> bool:
     """Correct by a measurement of position [m] and velocity [m/s], shape (3,) each, NED; return False if rejected."""
+    P, x = estimate.covariance, estimate.state
     for axis in range(3):
-        P = estimate.covariance[axis]
-        off = abs(position[axis] - estimate.position[axis])
-        fast = abs(velocity[axis] - estimate.velocity[axis])
-        if not off <= _GATE * np.sqrt(P[0, 0] + square(gains.position_noise)) + 0.05:
+        off, fast = abs(position[axis] - x[axis]), abs(velocity[axis] - x[VELOCITY + axis])
+        if not off <= _GATE * np.sqrt(P[axis, axis] + square(gains.position_noise)) + 0.05:
             return False
-        if not fast <= _GATE * np.sqrt(P[1, 1] + square(gains.velocity_noise)) + 0.05:
+        spread = P[VELOCITY + axis, VELOCITY + axis]
+        if not fast <= _GATE * np.sqrt(spread + square(gains.velocity_noise)) + 0.05:
             return False
     for axis in range(3):
-        P = estimate.covariance[axis]
-        estimate.innovation[axis] = velocity[axis] - estimate.velocity[axis]
-        estimate.innovation_deviation[axis] = np.sqrt(P[1, 1] + square(gains.velocity_noise))
-        estimate.gain[axis] = P[1, 1] / (P[1, 1] + square(gains.velocity_noise))
-        unknown = estimate.net_weight[0] if axis == 2 else estimate.water_velocity[axis]
-        for row in range(2):  # first by the position, then by the velocity
-            measured = (
-                position[axis] - estimate.position[axis] if row == 0 else velocity[axis] - estimate.velocity[axis]
-            )
-            noise = gains.position_noise if row == 0 else gains.velocity_noise
-            total = P[row, row] + square(noise)
-            k0, k1, k2 = P[0, row] / total, P[1, row] / total, P[2, row] / total
-            estimate.position[axis] += k0 * measured
-            estimate.velocity[axis] += k1 * measured
-            unknown += k2 * measured
-            r0, r1, r2 = P[row, 0], P[row, 1], P[row, 2]
-            for column, r in enumerate((r0, r1, r2)):
-                P[0, column] -= k0 * r
-                P[1, column] -= k1 * r
-                P[2, column] -= k2 * r
-        if axis == 2:
-            estimate.net_weight[0] = min(max(unknown, -gains.restoring_bound), gains.restoring_bound)
-        else:
-            estimate.water_velocity[axis] = min(max(unknown, -gains.current_bound), gains.current_bound)
+        estimate.row[:] = 0.0
+        estimate.row[axis] = 1.0
+        _correct(estimate, position[axis] - x[axis], square(gains.position_noise))
+        estimate.row[axis], estimate.row[VELOCITY + axis] = 0.0, 1.0
+        _correct(estimate, velocity[axis] - x[VELOCITY + axis], square(gains.velocity_noise))
+    project(estimate, gains)
     estimate.time_since_measurement[0] = 0.0
     return True
 
 
-def inflate_covariance(estimate: Estimate, variance: float) -> None:
-    """Add variance to velocity [m2/s2] and unknowns, after the assumed health of a thruster has changed."""
-    for axis in range(3):
-        estimate.covariance[axis, 1, 1] += variance
-        estimate.covariance[axis, 2, 2] += 25.0 if axis == 2 else 0.04
-
-
-def position_spread(estimate: Estimate) -> float:
-    """Return the greatest standard deviation [m] of the position among the axes."""
-    worst = 0.0
-    for axis in range(3):
-        worst = max(worst, estimate.covariance[axis, 0, 0])
-    return float(np.sqrt(worst))
+def _correct(estimate: Estimate, innovation: float, noise: float) -> None:
+    """Correct by one number, whose `row` is set; add the evidence of each hypothesis, and propagate its deviation."""
+    P, row, gain = estimate.covariance, estimate.row, estimate.gain
+    n, variance = row.size, noise
+    gain[:] = 0.0
+    for k in range(n):
+        if row[k] != 0.0:
+            for i in range(n):
+                gain[i] += P[k, i] * row[k]
+    for i in range(n):
+        variance += gain[i] * row[i]
+    variance = max(variance, square(innovation / _OUTLIER))
+    for i in range(n):
+        share = gain[i] / variance
+        estimate.state[i] += share * innovation
+        for k in range(n):
+            P[i, k] -= share * gain[k]
+    for j in range(estimate.direct.size):
+        expected = estimate.direct[j]
+        for k in range(n):
+            expected += row[k] * estimate.deviation[j, k]
+        estimate.evidence[0, j] += expected * innovation / variance
+        estimate.evidence[1, j] += square(expected) / variance
+        for k in range(n):
+            estimate.deviation[j, k] -= gain[k] / variance * expected

@@ -20,13 +20,17 @@ REGIONS = [
 ]
 
 
+RIGHTING = np.array([0.0, 0.0, 30.0])  # N m, phi_2..phi_4 of the sea's vehicle
+
+
 class Sea:
     """ODIN in a steady current, integrated in small steps by the law's own model: what is tested is what the law does
-    with it. The wrench of a failed thruster is missing."""
+    with it. Its thrusters may lag, lose part of their force (`left`), or be stuck at a force."""
 
-    def __init__(self, current=(0.1, -0.15, 0.0), restoring=-8.0, noise=(0.0, 0.0), failed=-1, seed=0):
+    def __init__(self, current=(0.1, -0.15, 0.0), restoring=-8.0, noise=(0.0, 0.0), lag=0.0, seed=0):
         self.dynamics, self.thrusters = make_dynamics(ODIN, np.ones(9)), make_thrusters(ODIN)
-        self.current, self.net_weight, self.noise, self.failed = np.array(current), restoring, noise, failed
+        self.current, self.net_weight, self.noise, self.lag = np.array(current), restoring, noise, lag
+        self.left, self.stuck, self.given = np.ones(8), np.full(8, np.nan), np.zeros(8)
         self.position, self.quaternion = np.array([0.0, 0.0, 2.5]), LEVEL.copy()
         self.velocity, self.omega = np.zeros(3), np.zeros(3)
         self.rng = np.random.default_rng(seed)
@@ -38,21 +42,20 @@ class Sea:
         return VehicleState(position, self.quaternion.copy(), np.r_[body, self.omega], np.ones(8))
 
     def step(self, forces, period, substeps=4):
-        given = forces.copy()
-        if self.failed >= 0:
-            given[self.failed] = 0.0
+        commanded = np.where(np.isnan(self.stuck), forces, self.stuck)
         h = period / substeps
         for _ in range(substeps):
-            R, free, pushed = rotation_matrix(self.quaternion), np.empty(3), np.empty(6)
-            free_acceleration(self.dynamics, R, self.velocity, self.omega, self.current, self.net_weight, free)
-            thrust_acceleration(self.dynamics, self.thrusters, R, given, pushed)
-            drag = (ODIN.linear_damping[3:] + ODIN.quadratic_damping[3:] * abs(self.omega)) * self.omega
-            righting = 30.0 * np.cross(R[2], [0.0, 0.0, 1.0])  # N m, back to level
+            remains = np.exp(-h / self.lag) if self.lag else 0.0
+            self.given = commanded + remains * (self.given - commanded)
+            R, free, pushed = rotation_matrix(self.quaternion), np.empty(6), np.empty(6)
+            state = R, self.velocity, self.omega, self.current
+            free_acceleration(self.dynamics, *state, self.net_weight, RIGHTING, free)
+            thrust_acceleration(self.dynamics, self.thrusters, R, self.given * self.left, pushed)
             self.position += h * self.velocity
-            self.velocity += h * (free + pushed[:3])
+            self.velocity += h * (free + pushed)[:3]
             self.quaternion += h * rate(self.quaternion, self.omega)
             self.quaternion /= np.linalg.norm(self.quaternion)
-            self.omega += h * (pushed[3:] + (righting - drag) / np.diag(ODIN.rigid_mass + ODIN.added_mass)[3:])
+            self.omega += h * (free + pushed)[3:]
 
 
 def law_for(regions, gains=None, period=0.02):

@@ -42,17 +42,20 @@ def test_acceleration_is_that_of_the_plant(name):
             values |= {f"thrust_time_constant[{i + 1}]": 0.0 for i in range(8)}
             plant.set(values)
             plant.initialise()
+            # phi_2..phi_4 of (12): r_G W - r_B B, with r_G at the origin
+            moments = -(vehicle.weight - restoring) * np.array([plant[f"r_B.{a}"] for a in "xyz"])
             for j in range(8):
                 plant[f"thrust[{j + 1}]"] = forces[j]
             plant.step(step)
             after = np.array([plant[name] for name in POSE])
-            R, free, pushed = rotation_matrix(e), np.empty(3), np.empty(6)
+            R, free, pushed = rotation_matrix(e), np.empty(6), np.empty(6)
             before = R @ nu[:3]
-            there = (rotation_matrix(after[:4]) @ after[4:7] - before) / step
-            free_acceleration(dynamics, R, before, nu[3:], current, restoring, free)
+            there = np.r_[rotation_matrix(after[:4]) @ after[4:7] - before, after[7:] - nu[3:]] / step
+            free_acceleration(dynamics, R, before, nu[3:], current, restoring, moments, free)
             thrust_acceleration(dynamics, thrusters, R, forces, pushed)
             # a step is a difference quotient: it is off by half a step times what the acceleration changes in a second
-            assert free + pushed[:3] == pytest.approx(there, abs=2e-3 * (0.1 + np.abs(there).max()))
+            assert (free + pushed)[:3] == pytest.approx(there[:3], abs=2e-3 * (0.1 + np.abs(there[:3]).max()))
+            assert (free + pushed)[3:] == pytest.approx(there[3:], abs=2e-3 * (0.1 + np.abs(there[3:]).max()))
 
 
 def test_a_lost_thruster_gives_nothing_and_the_others_give_the_wrench():
@@ -130,3 +133,22 @@ def test_the_least_force_of_uneven_thrusters_is_that_of_the_weaker_way():
         down = np.sort(uneven.thruster_matrix[2, vertical] * low)
         assert down.size == 4 and np.all(down == down[0])
         assert least_forces(uneven)[-1] == pytest.approx(20.0)
+
+
+def test_lost_effectiveness_takes_force_away():
+    thrusters, dynamics = make_thrusters(MODELS["odin"]), make_dynamics(MODELS["odin"], np.ones(9))
+    thrusters.effectiveness[:] = np.linspace(0.3, 1.0, 8)
+    forces, out, expected = np.linspace(-20.0, 25.0, 8), np.empty(6), np.empty(6)
+    thrust_acceleration(dynamics, thrusters, np.eye(3), forces, out)
+    given = forces * thrusters.effectiveness
+    thrusters.effectiveness[:] = 1.0
+    thrust_acceleration(dynamics, thrusters, np.eye(3), given, expected)
+    assert out == pytest.approx(expected, rel=1e-12)
+
+
+def test_a_thruster_that_is_stuck_stays_in_the_matrix_with_its_force_alone():
+    thrusters = make_thrusters(MODELS["odin"])
+    thrusters.health[3], thrusters.stuck[3] = 0.0, -7.0
+    reallocate(thrusters)
+    assert thrusters.lower[3] == thrusters.upper[3] == -7.0
+    assert np.array_equal(thrusters.matrix[:, 3], thrusters.nominal_matrix[:, 3])

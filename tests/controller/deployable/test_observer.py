@@ -4,105 +4,217 @@ import copy
 
 import numpy as np
 import pytest
+from scipy.optimize import minimize
 from scipy.spatial.transform import Rotation
 
-from controller.laws.deployable import observer
+from controller.laws.deployable import actuator_lag, observer
+from controller.laws.deployable.estimate import (
+    CURRENT,
+    EFFECTIVENESS,
+    HEIGHT,
+    LAG,
+    MOMENTS,
+    NET_WEIGHT,
+    VELOCITY,
+    initialize,
+    make_estimate,
+    position_spread,
+    project,
+    publish,
+    reset,
+    set_effectiveness,
+)
 from controller.laws.deployable.gains import DeployableGains
-from controller.laws.deployable.model import free_acceleration, make_dynamics, make_thrusters, thrust_acceleration
-from tests.controller.deployable.scenery import ODIN, Sea
+from controller.laws.deployable.model import (
+    free_acceleration,
+    make_dynamics,
+    make_thrusters,
+    thrust_acceleration,
+)
+from tests.controller.deployable.scenery import MODELS, ODIN, Sea, fly, law_for
 
 GAINS = DeployableGains()
 PERIOD = 0.02
+N = EFFECTIVENESS + 8
 
 
 def started(position=(0.0, 0.0, 2.0), velocity=(0.0, 0.0, 0.0), model=ODIN):
-    estimate = observer.empty_estimate()
-    observer.initialize(estimate, np.array(position), np.array(velocity), GAINS)
+    estimate = make_estimate(model)
+    initialize(estimate, np.array(position), np.array(velocity), GAINS)
     return estimate, make_dynamics(model, np.ones(9)), make_thrusters(model)
 
 
-def predict(estimate, dynamics, thrusters):
-    observer.predict(estimate, dynamics, thrusters, np.eye(3), np.zeros(3), GAINS, PERIOD)
+def pushes(dynamics, thrusters, R):
+    """Return the acceleration of one newton of each thruster, (6, m)."""
+    body = dynamics.inverse_mass @ thrusters.matrix
+    return np.ascontiguousarray(np.vstack([R @ body[:3], body[3:]]))
 
 
-def test_covariance_and_gains_are_those_of_a_kalman_filter():
-    """F P F^T + Q, and a joint update with both measurements, of which ours takes one after the other."""
-    rng = np.random.default_rng(1)
-    model = ODIN._replace(linear_damping=np.array([4.0, 6.0, 11.0, 30.0, 30.0, 30.0]))  # ODIN has none along its axes
-    estimate, dynamics, thrusters = started(velocity=(0.6, -0.4, 0.1), model=model)
-    mass = dynamics.translational_mass[0]
-    linear, quadratic = model.linear_damping[:3].mean(), model.quadratic_damping[:3].mean()
-    H, N = np.eye(3)[:2], np.diag([GAINS.position_noise**2, GAINS.velocity_noise**2])
-    for _ in range(60):
-        P, speed = estimate.covariance.copy(), abs(estimate.velocity - estimate.water_velocity)
+def predict(estimate, dynamics, thrusters, R=None, omega=(0.0, 0.0, 0.0)):
+    R = np.eye(3) if R is None else R
+    actuator_lag.update_forces(estimate, thrusters, PERIOD)
+    given = pushes(dynamics, thrusters, R), R, np.array(omega)
+    observer.predict(estimate, dynamics, thrusters, *given, GAINS, PERIOD)
+
+
+def transition(estimate, dynamics, thrusters, by_force):
+    """Return F of a period, from what the estimate is before it."""
+    x, F, mass = estimate.state, np.eye(N), dynamics.translational_mass[0]
+    linear, quadratic = dynamics.linear_damping[:3].mean(), dynamics.quadratic_damping[:3].mean()
+    for axis in range(3):
+        speed = abs(estimate.velocity[axis] - estimate.water_velocity[axis])
+        slope = (linear + 2.0 * quadratic * max(speed, 0.15)) / mass
+        F[axis, VELOCITY + axis] = PERIOD
+        row = F[VELOCITY + axis]
+        row[VELOCITY + axis] -= slope * PERIOD
+        row[CURRENT + axis if axis < 2 else NET_WEIGHT] = PERIOD * (slope if axis < 2 else 1.0 / mass)
+        row[EFFECTIVENESS:] = PERIOD * by_force[axis] * thrusters.acting
+        row[LAG] = PERIOD * np.sum(by_force[axis] * estimate.by_lag * x[EFFECTIVENESS:])
+    return F
+
+
+def random_estimate(rng, thrusters):
+    estimate, dynamics, _ = started(velocity=rng.normal(size=3) * 0.4)
+    root = rng.normal(size=(N, N)) * 0.05
+    estimate.covariance[:] = root @ root.T
+    estimate.state[CURRENT : CURRENT + 2], estimate.state[NET_WEIGHT] = rng.normal(size=2) * 0.2, 4.0
+    estimate.state[EFFECTIVENESS:], estimate.state[LAG] = rng.uniform(0.6, 1.0, 8), 0.15
+    publish(estimate)
+    thrusters.forces[:] = rng.uniform(-20.0, 20.0, 8)
+    estimate.bracket[:] = rng.uniform(-20.0, 20.0, (2, 8))
+    estimate.lags[:] = 0.1, 0.3
+    return estimate, dynamics
+
+
+def test_the_covariance_of_a_prediction_is_that_of_a_kalman_filter():
+    """F P F^T + Q; the position goes by the velocity before the period, which enters P in two steps: G F."""
+    rng, thrusters = np.random.default_rng(1), make_thrusters(ODIN)
+    for _ in range(20):
+        estimate, dynamics = random_estimate(rng, thrusters)
+        before, P = copy.deepcopy(estimate), estimate.covariance.copy()
         predict(estimate, dynamics, thrusters)
-        before = [
-            estimate.position.copy(),
-            estimate.velocity.copy(),
-            np.r_[estimate.water_velocity[:2], estimate.net_weight],
-        ]
-        expected = np.empty((3, 3, 3))
-        for axis in range(3):
-            slope = (linear + 2.0 * quadratic * max(speed[axis], 0.15)) / mass
-            unknown = slope if axis < 2 else 1.0 / mass
-            F = np.array([[1.0, PERIOD, 0.0], [0.0, 1.0 - slope * PERIOD, unknown * PERIOD], [0.0, 0.0, 1.0]])
-            drift = GAINS.restoring_drift if axis == 2 else GAINS.current_drift
-            expected[axis] = F @ P[axis] @ F.T + np.diag([0.0, 0.03**2, drift**2]) * PERIOD
-        assert estimate.covariance == pytest.approx(expected, rel=1e-10, abs=1e-18)
-        position = estimate.position + 0.02 * rng.normal(size=3)
-        velocity = estimate.velocity + 0.01 * rng.normal(size=3)
-        assert observer.correct(estimate, position, velocity, GAINS)
-        after = np.array(
-            [estimate.position, estimate.velocity, np.r_[estimate.water_velocity[:2], estimate.net_weight]]
+        before.by_lag[:] = estimate.by_lag
+        F = transition(before, dynamics, thrusters, pushes(dynamics, thrusters, np.eye(3)))
+        expected = F @ P @ F.T
+        Q = np.zeros(N)
+        Q[VELOCITY:CURRENT] = 0.03**2 * PERIOD + F[VELOCITY:CURRENT, LAG] ** 2 * P[LAG, LAG]
+        Q[CURRENT:NET_WEIGHT] = GAINS.current_drift**2 * PERIOD
+        Q[NET_WEIGHT] = (GAINS.restoring_drift * 125.0 / 50.0) ** 2 * PERIOD
+        Q[MOMENTS:HEIGHT] = (GAINS.adaptation * 0.019 * np.diag(dynamics.mass)[3:]) ** 2 * PERIOD
+        Q[LAG], Q[EFFECTIVENESS:] = 0.003**2 * PERIOD, 0.01**2 * PERIOD
+        assert estimate.covariance == pytest.approx(expected + np.diag(Q), rel=1e-9, abs=1e-13)
+        assert np.array_equal(estimate.covariance, estimate.covariance.T) or np.allclose(
+            estimate.covariance, estimate.covariance.T, rtol=1e-12, atol=1e-18
         )
-        for axis in range(3):
-            S = H @ expected[axis] @ H.T + N
-            K = expected[axis] @ H.T @ np.linalg.inv(S)
-            x = np.array([b[axis] for b in before])
-            x = x + K @ (np.array([position[axis], velocity[axis]]) - H @ x)
-            assert after[:, axis] == pytest.approx(x, rel=1e-9, abs=1e-12)
-            assert estimate.covariance[axis] == pytest.approx((np.eye(3) - K @ H) @ expected[axis], rel=1e-8, abs=1e-16)
 
 
-def test_current_and_weight_are_found():
-    """To the accuracy that the filter itself states, in noise."""
-    sea = Sea(current=(0.3, -0.2, 0.0), restoring=11.0, noise=(0.02, 0.01))
-    estimate, dynamics, thrusters = started(sea.position)
-    rng = np.random.default_rng(4)
-    for k in range(3000):
-        if k % 50 == 0:
-            thrusters.forces[:] = rng.uniform(-12.0, 12.0, 8)
-            thrusters.forces[5:] = thrusters.forces[4]
-            thrusters.forces[2:4] = -thrusters.forces[:2]
-        sea.step(thrusters.forces, PERIOD)
-        sea.omega[:], sea.quaternion[:] = 0.0, (1.0, 0.0, 0.0, 0.0)
-        predict(estimate, dynamics, thrusters)
-        assert observer.correct(estimate, *noisy(sea), GAINS)
-    spread = np.sqrt(estimate.covariance[:, 2, 2])
-    assert np.all(spread < [0.1, 0.1, 3.0])
-    assert np.all(abs(estimate.water_velocity[:2] - sea.current[:2]) < 4.0 * spread[:2])
-    assert abs(estimate.net_weight[0] - 11.0) < 4.0 * spread[2]
+def test_a_correction_is_the_joint_update_of_a_kalman_filter():
+    """With both measurements of three axes at once, of which ours takes one number after the other."""
+    rng, thrusters = np.random.default_rng(2), make_thrusters(ODIN)
+    H, noise = np.eye(6, N), np.diag([GAINS.position_noise**2] * 3 + [GAINS.velocity_noise**2] * 3)
+    for _ in range(20):
+        estimate, _ = random_estimate(rng, thrusters)
+        P, x = estimate.covariance.copy(), estimate.state.copy()
+        spread = np.sqrt(np.diag(P)[:6] + np.diag(noise))
+        measured = x[:6] + spread * rng.uniform(-0.5, 0.5, 6)  # none so far off that it counts less
+        assert observer.correct(estimate, measured[:3], measured[3:], GAINS._replace(current_bound=9.0))
+        K = P @ H.T @ np.linalg.inv(H @ P @ H.T + noise)
+        theirs = x + K @ (measured - x[:6])
+        if np.all((theirs[EFFECTIVENESS:] > 0.0) & (theirs[EFFECTIVENESS:] < 1.1)) and 0.0 < theirs[LAG] < 1.0:
+            assert estimate.state == pytest.approx(theirs, rel=1e-8, abs=1e-10)
+        assert estimate.covariance == pytest.approx((np.eye(N) - K @ H) @ P, rel=1e-6, abs=1e-12)
 
 
-def noisy(sea):
-    return sea.position + 0.02 * sea.rng.normal(size=3), sea.velocity + 0.01 * sea.rng.normal(size=3)
+def test_a_moment_corrects_by_its_row():
+    """moment = B diag(f) e - S(k) phi - m e3 x a z + what the current changes, by plain matrices; k of mid-period."""
+    rng, thrusters = np.random.default_rng(3), make_thrusters(ODIN)
+    for _ in range(20):
+        estimate, dynamics = random_estimate(rng, thrusters)
+        thrusters.acting[:] = rng.uniform(-20.0, 20.0, 8)
+        estimate.by_lag[:], estimate.acceleration[:] = rng.normal(size=8), rng.normal(size=3)
+        turned, omega, by_current = Rotation.random(random_state=rng), rng.normal(size=3), rng.normal(size=(3, 2))
+        R, x, P = turned.as_matrix(), estimate.state.copy(), estimate.covariance.copy()
+        k, e = R[2] + 0.5 * PERIOD * np.cross(omega, R[2]), x[EFFECTIVENESS:]
+        H, given = np.zeros((3, N)), thrusters.matrix[3:] * thrusters.acting
+        H[:, CURRENT:NET_WEIGHT] = by_current
+        H[:, MOMENTS:HEIGHT] = -np.array([[0.0, -k[2], k[1]], [k[2], 0.0, -k[0]], [-k[1], k[0], 0.0]])
+        H[:, HEIGHT] = -dynamics.rigid_mass[0] * np.cross([0.0, 0.0, 1.0], R.T @ estimate.acceleration)
+        H[:, LAG], H[:, EFFECTIVENESS:] = thrusters.matrix[3:] @ (estimate.by_lag * e), given
+        noise = (0.019 * np.diag(dynamics.mass)[3:]) ** 2 / PERIOD + np.sum((0.05 * given) ** 2, axis=1)
+        noise += np.sum((thrusters.matrix[3:] * estimate.by_lag) ** 2, axis=1) * P[LAG, LAG]
+        expected = H @ x - H[:, CURRENT:NET_WEIGHT] @ x[CURRENT:NET_WEIGHT] - H[:, LAG] * x[LAG]
+        moment = expected + 0.1 * np.sqrt(noise) * rng.uniform(-1.0, 1.0, 3)
+        quaternion = turned.as_quat()[[3, 0, 1, 2]]
+        seen = copy.deepcopy(estimate)
+        given = seen, moment, by_current, dynamics, thrusters, R, quaternion, omega
+        observer.correct_by_moment(*given, GAINS, PERIOD)
+        K = P @ H.T @ np.linalg.inv(H @ P @ H.T + np.diag(noise))
+        # each axis takes the row of the lag where the axis before has left the effectiveness
+        assert seen.covariance == pytest.approx((np.eye(N) - K @ H) @ P, rel=1e-2, abs=2e-5)
+        assert np.abs(seen.covariance - P).max() > 1e-2
 
 
-def test_unknowns_stay_within_their_bounds():
-    """A vehicle that is held fast while the thrusters push: nothing winds up."""
+def test_bounds_are_kept_where_the_likeliest_state_within_them_is():
+    """The least of (x - x0)^T P^-1 (x - x0) with one number at its bound, by SciPy."""
+    rng, thrusters = np.random.default_rng(4), make_thrusters(ODIN)
+    for _ in range(5):
+        estimate, _ = random_estimate(rng, thrusters)
+        estimate.state[EFFECTIVENESS:] = 0.9
+        estimate.state[EFFECTIVENESS + 3] = 1.13
+        before, weight = estimate.state.copy(), np.linalg.inv(estimate.covariance)
+        project(estimate, GAINS._replace(current_bound=9.0))
+        free = [i for i in range(N) if i != EFFECTIVENESS + 3]
+
+        def cost(rest, before=before, weight=weight, free=free):
+            off = np.zeros(N)
+            off[free], off[EFFECTIVENESS + 3] = rest, 1.1 - 1.13
+            return off @ weight @ off, 2.0 * (weight @ off)[free]
+
+        found = minimize(cost, np.zeros(N - 1), jac=True, method="BFGS", options={"gtol": 1e-9})
+        assert estimate.state[EFFECTIVENESS + 3] == 1.1
+        assert estimate.state[free] - before[free] == pytest.approx(found.x, abs=2e-4)
+
+
+@pytest.mark.parametrize(("index", "bound"), [(CURRENT, 1.0), (NET_WEIGHT, 125.0), (MOMENTS, 937.5)])
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_unknowns_keep_their_bounds_on_either_side(index, bound, sign):
+    """In N and N m those of the gains, for ODIN's mass of 125 kg: 50 N times 2.5, 150 N m times its square."""
+    estimate, _, _ = started()
+    estimate.state[index] = 1e5 * sign
+    project(estimate, GAINS)
+    assert estimate.state[index] == pytest.approx(sign * bound)
+
+
+def test_what_drives_the_vehicle_is_found_to_the_accuracy_that_is_stated():
+    """Current, W - B, righting moment, lag and effectiveness, in noise, while the law flies."""
+    for name, lag in (("quick", 0.0), ("slow", 0.25)):
+        sea, law = Sea(current=(0.1, -0.08, 0.0), restoring=11.0, noise=(0.02, 0.01), lag=lag), law_for([])
+        sea.left[:] = np.linspace(0.75, 1.0, 8)
+        sea.quaternion[:] = np.array([0.9, 0.3, -0.2, 0.1]) / np.linalg.norm([0.9, 0.3, -0.2, 0.1])
+        fly(law, sea, regions=[], steps=900)
+        x, spread = law.memory.state_estimate.state, np.sqrt(np.diag(law.memory.state_estimate.covariance))
+        truth = {CURRENT: 0.1, CURRENT + 1: -0.08, NET_WEIGHT: 11.0, MOMENTS + 2: 30.0, LAG: lag}
+        truth |= {EFFECTIVENESS + j: sea.left[j] for j in range(8)}
+        for index, value in truth.items():
+            assert abs(x[index] - value) < 4.0 * spread[index] + 0.02 * max(1.0, abs(value)), (name, index)
+        assert np.all(spread[EFFECTIVENESS : EFFECTIVENESS + 4] < 0.1) and spread[LAG] < 0.15
+
+
+def test_unknowns_do_not_wind_up():
+    """A vehicle that is held fast while the thrusters push."""
     estimate, dynamics, thrusters = started()
     thrusters.forces[:] = 27.0
     for _ in range(2000):
         predict(estimate, dynamics, thrusters)
         observer.correct(estimate, np.array([0.0, 0.0, 2.0]), np.zeros(3), GAINS)
         if estimate.time_since_measurement[0] > GAINS.coast:
-            observer.initialize(estimate, np.array([0.0, 0.0, 2.0]), np.zeros(3), GAINS)
-        assert np.all(abs(estimate.water_velocity) <= GAINS.current_bound)
-        assert abs(estimate.net_weight[0]) <= GAINS.restoring_bound
+            initialize(estimate, np.array([0.0, 0.0, 2.0]), np.zeros(3), GAINS)
+        assert np.all(np.isfinite(estimate.state)) and np.all(abs(estimate.water_velocity) <= GAINS.current_bound)
+    assert np.all(np.diag(estimate.covariance) >= 0.0)
 
 
 @pytest.mark.parametrize("which", [0, 1])
-def test_a_measurement_that_cannot_be_is_not_believed_and_changes_nothing(which):
+def test_a_measurement_that_cannot_be_is_rejected_and_changes_nothing(which):
     estimate, dynamics, thrusters = started()
     predict(estimate, dynamics, thrusters)
     before = [np.copy(part) for part in estimate]
@@ -118,39 +230,31 @@ def test_a_measurement_that_cannot_be_is_not_believed_and_changes_nothing(which)
 def test_the_prediction_follows_the_vehicles_model():
     """Turned and turning, with thrust: position and velocity after a period of steady acceleration."""
     rng, omega = np.random.default_rng(5), np.array([0.2, -0.3, 0.4])
-    estimate, dynamics, thrusters = started(velocity=(0.6, -0.4, 0.1))
-    R = Rotation.from_euler("zyx", [0.7, -0.3, 0.2]).as_matrix()
-    estimate.water_velocity[:2], estimate.net_weight[0] = (0.2, -0.1), 7.0
-    thrusters.forces[:] = rng.uniform(-20.0, 20.0, 8)
-    free, pushed = np.empty(3), np.empty(6)
-    free_acceleration(dynamics, R, estimate.velocity, omega, estimate.water_velocity, 7.0, free)
-    thrust_acceleration(dynamics, thrusters, R, thrusters.forces, pushed)
-    a, v, p = free + pushed[:3], estimate.velocity.copy(), estimate.position.copy()
-    observer.predict(estimate, dynamics, thrusters, R, omega, GAINS, PERIOD)
-    assert estimate.acceleration == pytest.approx(a, rel=1e-12)
-    assert estimate.position == pytest.approx(p + PERIOD * v + 0.5 * PERIOD**2 * a, rel=1e-12)
-    assert estimate.velocity == pytest.approx(v + PERIOD * a, rel=1e-12)
-    assert estimate.time_since_measurement[0] == PERIOD
+    for model in MODELS.values():
+        estimate, dynamics, thrusters = started(velocity=(0.6, -0.4, 0.1), model=model)
+        R, x = Rotation.from_euler("zyx", [0.7, -0.3, 0.2]).as_matrix(), estimate.state
+        x[CURRENT:NET_WEIGHT], x[NET_WEIGHT], x[MOMENTS:HEIGHT] = (0.2, -0.1), 7.0, (0.3, -0.2, 4.0)
+        x[EFFECTIVENESS:] = rng.uniform(0.5, 1.0, 8)
+        publish(estimate)
+        thrusters.forces[:] = rng.uniform(-20.0, 20.0, 8)
+        free, pushed = np.empty(6), np.empty(6)
+        free_acceleration(dynamics, R, estimate.velocity, omega, estimate.water_velocity, 7.0, estimate.moments, free)
+        thrust_acceleration(dynamics, thrusters, R, thrusters.forces * x[EFFECTIVENESS:], pushed)
+        a, v, p = (free + pushed)[:3], estimate.velocity.copy(), estimate.position.copy()
+        predict(estimate, dynamics, thrusters, R, omega)
+        assert estimate.acceleration == pytest.approx(a, rel=1e-10)
+        assert estimate.position == pytest.approx(p + PERIOD * v + 0.5 * PERIOD**2 * a, rel=1e-12)
+        assert estimate.velocity == pytest.approx(v + PERIOD * a, rel=1e-12)
+        assert thrusters.effectiveness == pytest.approx(x[EFFECTIVENESS:], rel=1e-12)
+        assert estimate.time_since_measurement[0] == PERIOD
 
 
-def test_innovation_spread_and_gain_are_those_of_the_velocity():
-    estimate, dynamics, thrusters = started(velocity=(0.1, -0.2, 0.3))
-    for _ in range(3):
-        predict(estimate, dynamics, thrusters)
-    P, before, off = estimate.covariance[:, 1, 1].copy(), estimate.velocity.copy(), np.array([0.01, -0.02, 0.005])
-    assert observer.correct(estimate, estimate.position.copy(), before + off, GAINS)
-    variance = P + GAINS.velocity_noise**2
-    assert estimate.innovation == pytest.approx(off, abs=1e-12)
-    assert estimate.innovation_deviation == pytest.approx(np.sqrt(variance), rel=1e-12)
-    assert estimate.gain == pytest.approx(P / variance, rel=1e-12)
-
-
-def test_what_is_measured_is_believed_up_to_six_standard_deviations_and_five_hundredths():
+def test_measurements_count_up_to_six_standard_deviations_and_five_hundredths():
     for which, noise in ((0, GAINS.position_noise), (1, GAINS.velocity_noise)):
         for part, believed in ((0.98, True), (1.02, False)):
             estimate, dynamics, thrusters = started()
             predict(estimate, dynamics, thrusters)
-            gate = 6.0 * np.sqrt(estimate.covariance[1, which, which] + noise**2) + 0.05
+            gate = 6.0 * np.sqrt(estimate.covariance[3 * which + 1, 3 * which + 1] + noise**2) + 0.05
             for sign in (1.0, -1.0):
                 seen = copy.deepcopy(estimate)
                 measured = [seen.position.copy(), seen.velocity.copy()]
@@ -158,22 +262,23 @@ def test_what_is_measured_is_believed_up_to_six_standard_deviations_and_five_hun
                 assert observer.correct(seen, *measured, GAINS) == believed
 
 
-def test_bounds_hold_on_either_side():
-    for sign in (1.0, -1.0):
-        estimate, _, _ = started()
-        estimate.covariance[:, 2, 2] = 1e9
-        estimate.covariance[:, 1, 2] = estimate.covariance[:, 2, 1] = 1e3
-        assert observer.correct(estimate, estimate.position.copy(), np.full(3, 0.04 * sign), GAINS)
-        bound = [GAINS.current_bound, GAINS.current_bound, GAINS.restoring_bound]
-        assert [*estimate.water_velocity[:2], estimate.net_weight[0]] == (sign * np.array(bound)).tolist()
+def test_a_reset_forgets_all_but_the_effectiveness_of_thrusters():
+    estimate, dynamics, thrusters = started(velocity=(0.3, 0.0, 0.0))
+    for _ in range(20):
+        predict(estimate, dynamics, thrusters)
+        observer.correct(estimate, estimate.position + 0.01, estimate.velocity + 0.01, GAINS)
+    set_effectiveness(estimate, 2, 0.0)
+    kept = estimate.state[EFFECTIVENESS:].copy()
+    reset(estimate)
+    fresh = make_estimate(ODIN)
+    assert np.array_equal(estimate.state[:EFFECTIVENESS], fresh.state[:EFFECTIVENESS])
+    assert np.array_equal(estimate.covariance[:EFFECTIVENESS], fresh.covariance[:EFFECTIVENESS])
+    assert np.array_equal(estimate.state[EFFECTIVENESS:], kept) and kept[2] == 0.0
+    assert estimate.time_since_measurement[0] == -1.0
 
 
-def test_doubt_widens_what_is_to_be_found_anew():
+def test_the_spread_of_the_position_is_that_of_its_worst_axis():
     estimate, _, _ = started()
-    before = estimate.covariance.copy()
-    observer.inflate_covariance(estimate, 0.01)
-    widened = np.zeros((3, 3, 3))
-    widened[:, 1, 1], widened[:, 2, 2] = 0.01, (0.04, 0.04, 25.0)
-    assert estimate.covariance == pytest.approx(before + widened, rel=1e-12)
-    estimate.covariance[:, 0, 0] = 0.04, 0.09, 0.01
-    assert observer.position_spread(estimate) == pytest.approx(0.3)
+    for axis, variance in enumerate((0.04, 0.09, 0.01)):
+        estimate.covariance[axis, axis] = variance
+    assert position_spread(estimate) == pytest.approx(0.3)

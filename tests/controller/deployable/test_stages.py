@@ -7,12 +7,12 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from controller import VehicleState
-from controller.laws.deployable import input_validation, law, observer
-from controller.laws.deployable.attitude import free_angular_acceleration
+from controller.laws.deployable import actuator_lag, input_validation, law, observer
 from controller.laws.deployable.attraction import desired_velocity
 from controller.laws.deployable.barrier import empty_observation, observe_regions
+from controller.laws.deployable.estimate import VELOCITY, initialize, make_estimate
 from controller.laws.deployable.gains import DeployableGains
-from controller.laws.deployable.model import Dynamics, make_thrusters, reallocate
+from controller.laws.deployable.model import Dynamics, free_acceleration, make_thrusters, reallocate
 from controller.laws.deployable.path_planner import CORNERS, empty_plan
 from controller.regions import HalfSpace, Orientation, Region, Sphere, pack
 from tests.controller.deployable.scenery import LEVEL, ODIN, law_for
@@ -26,7 +26,9 @@ def askew(rng):
     root = rng.normal(size=(6, 6))
     mass = root @ root.T + np.diag([90.0, 80.0, 70.0, 9.0, 8.0, 7.0])
     damping, braking = rng.uniform(1.0, 30.0, (2, 6)), rng.uniform(0.1, 0.4, 9)
-    return Dynamics(mass, np.linalg.inv(mass), *damping, np.array([np.trace(mass[:3, :3]) / 3.0]), braking)
+    return Dynamics(
+        mass, np.linalg.inv(mass), *damping, np.array([np.trace(mass[:3, :3]) / 3.0]), np.array([70.0]), braking
+    )
 
 
 def approach(distance, a, slope):
@@ -109,7 +111,7 @@ def test_what_deceleration_is_relied_on(lost):
 
 
 def test_the_report_says_what_it_is_of():
-    seen, report = observer.empty_estimate(), np.full(len(law.DIAGNOSTICS), np.nan)
+    seen, report = make_estimate(ODIN), np.full(len(law.DIAGNOSTICS), np.nan)
     seen.position[:], seen.velocity[:], seen.water_velocity[:2] = (1.0, 2.0, 3.0), (4.0, 5.0, 6.0), (7.0, 8.0)
     health = np.array([1.0, 1.0, 0.0, 1.0])
     law._report(report, seen, 9.5, 4, health, np.array([2.0, -3.0, 6.0]))
@@ -125,18 +127,19 @@ def test_the_report_says_what_it_is_of():
 def begun():
     memory = law_for([]).memory
     thrust = np.random.default_rng(6).uniform(-15.0, 15.0, 8)
-    memory.state_estimate.time_since_measurement[0], memory.thrusters.forces[:] = 0.0, thrust
-    observer.initialize(memory.state_estimate, np.array([1.0, 2.0, 3.0]), np.array([0.4, -0.3, 0.2]), GAINS)
+    memory.thrusters.forces[:] = memory.thrusters.acting[:] = thrust
+    initialize(memory.state_estimate, np.array([1.0, 2.0, 3.0]), np.array([0.4, -0.3, 0.2]), GAINS)
     memory.quaternion[:], memory.omega[:] = ATTITUDE, (0.3, -0.2, 0.1)
     return memory
 
 
 def test_attitude_and_rates_that_are_not_measured_are_carried_by_the_model():
     memory = begun()
-    turning = np.empty(3)
-    free_angular_acceleration(memory.attitude, memory.dynamics, memory.quaternion, memory.omega, turning)
+    free, seen = np.empty(6), memory.state_estimate
+    moving = seen.velocity, memory.omega, seen.water_velocity
+    free_acceleration(memory.dynamics, TURNED, *moving, seen.net_weight[0], seen.moments, free)
     wrench = memory.thrusters.matrix @ memory.thrusters.forces
-    omega = memory.omega + 0.02 * (turning + (memory.dynamics.inverse_mass @ wrench)[3:])
+    omega = memory.omega + 0.02 * (free[3:] + (memory.dynamics.inverse_mass @ wrench)[3:])
     turned = Rotation.from_matrix(TURNED) * Rotation.from_rotvec(0.02 * omega)
     input_validation._propagate_attitude(memory)
     assert memory.omega == pytest.approx(omega, rel=1e-12)
@@ -165,7 +168,9 @@ def test_a_measurement_is_turned_into_the_world():
     assert input_validation.process_measurement(memory, state, GAINS)
     assert memory.quaternion == pytest.approx(ATTITUDE, abs=1e-12)
     assert np.array_equal(memory.omega, body[3:])
-    observer.predict(theirs.state_estimate, theirs.dynamics, theirs.thrusters, TURNED, body[3:], GAINS, 0.02)
+    actuator_lag.update_forces(theirs.state_estimate, theirs.thrusters, 0.02)
+    given = theirs.dynamics, theirs.thrusters, theirs.thruster_acceleration
+    observer.predict(theirs.state_estimate, *given, TURNED, body[3:], GAINS, 0.02)
     assert observer.correct(theirs.state_estimate, state.position, np.array([0.41, -0.31, 0.21]), GAINS)
     assert memory.state_estimate.velocity == pytest.approx(theirs.state_estimate.velocity, rel=1e-9)
     assert memory.state_estimate.position == pytest.approx(theirs.state_estimate.position, rel=1e-9)
@@ -175,7 +180,7 @@ def test_what_repeats_itself_to_the_last_bit_while_moving_is_not_believed():
     for moving in ((-0.05, 0.0, 0.0), (0.0, -0.05, 0.0), (0.0, 0.0, -0.05), (0.0, 0.0, 0.0)):
         memory = begun()
         memory.thrusters.forces[:] = 0.0
-        memory.state_estimate.velocity[:] = moving
+        memory.state_estimate.velocity[:] = memory.state_estimate.state[VELOCITY : VELOCITY + 3] = moving
         state = state_of(memory)
         assert input_validation.process_measurement(memory, state, GAINS)
         assert input_validation.process_measurement(memory, state, GAINS) == (not any(moving))
@@ -208,7 +213,7 @@ def test_what_no_vehicle_can_have_is_not_believed(change):
 
 def test_an_estimate_that_was_led_away_is_forgotten():
     memory = begun()
-    memory.state_estimate.position[1], memory.fault_state.ratio[2] = 2e6, 5.0
+    memory.state_estimate.state[1], memory.fault_state.ratio[2] = 2e6, 5.0
     bad = state_of(memory, position=np.full(3, np.nan))
     assert not input_validation.process_measurement(memory, bad, GAINS)
     assert memory.state_estimate.time_since_measurement[0] == -1.0
@@ -231,11 +236,12 @@ def test_weights_and_health_are_taken_for_what_they_can_be():
     input_validation.sanitize_weights(np.array([-1.0, 0.3, 2.0, np.nan]), believed)
     assert believed.tolist() == [0.0, 0.3, 1.0, 1.0]
     memory = law_for([]).memory
-    input_validation.update_thrusters(memory, np.ones(8), 2)
+    memory.thrusters.health[2] = 0.0  # isolated
+    input_validation.update_thrusters(memory, np.ones(8))
     assert np.flatnonzero(memory.thrusters.health == 0.0).tolist() == [2]
     told = np.array([1.0, -1.0, 1.0, np.nan, 1.0, 1.0, 1.0, 0.5])
     assert input_validation.reports_change(told, memory.reported, memory.thrusters.health)
-    input_validation.update_thrusters(memory, told, -1)
+    input_validation.update_thrusters(memory, told)
     assert np.flatnonzero(memory.thrusters.health == 0.0).tolist() == [1, 2]
     assert not input_validation.reports_change(told, memory.reported, memory.thrusters.health)
     assert np.array_equal(memory.quaternion, LEVEL)

@@ -5,8 +5,9 @@ import copy
 import numpy as np
 import pytest
 
-from controller.laws.deployable import attitude, barrier, input_validation, law, model, observer, path_planner
+from controller.laws.deployable import attitude, barrier, input_validation, law, model, path_planner, prediction
 from controller.laws.deployable.attraction import desired_acceleration, desired_velocity
+from controller.laws.deployable.estimate import CURRENT, LAG, MOMENTS, VELOCITY, position_spread, publish
 from controller.laws.deployable.gains import DeployableGains
 from controller.laws.deployable.quadratic_program import solve
 from controller.quaternion import rotation_matrix
@@ -24,29 +25,33 @@ def expected(memory, state, goal, regions, weights):
     """Return what the second half of a step should write, from the memory before it."""
     thrusters, dynamics, seen = memory.thrusters, memory.dynamics, memory.state_estimate
     input_validation.process_measurement(memory, state, GAINS)
-    R, omega = rotation_matrix(memory.quaternion), memory.omega
-    wanted, acceleration, free, moment = np.empty(3), np.empty(3), np.empty(6), np.empty(3)
-    path_planner.improve_path(memory.plan, seen.position, goal, regions, GAINS, 0.02)
-    desired_velocity(memory.plan, seen.position, goal.velocities[0], GAINS, wanted)
-    desired_acceleration(wanted, seen.velocity, GAINS, acceleration)
-    model.free_acceleration(dynamics, R, seen.velocity, omega, seen.water_velocity, seen.net_weight[0], free)
-    attitude.update_munk_moment(memory.attitude, dynamics, R, seen.velocity, seen.water_velocity)
-    attitude.free_angular_acceleration(memory.attitude, dynamics, memory.quaternion, omega, free[3:])
-    velocity = np.r_[seen.velocity, omega]
-    barrier.observe_regions(memory.observation, regions, seen.position, memory.quaternion, velocity)
+    R, omega, ahead = rotation_matrix(memory.quaternion), memory.omega, memory.predicted
+    wanted, acceleration, free, moment, pushing, against = (np.empty(n) for n in (3, 3, 6, 3, 6, 6))
+    waters = seen.water_velocity, seen.net_weight[0], seen.moments
+    model.free_acceleration(dynamics, R, seen.velocity, omega, *waters, free)
+    model.thrust_acceleration(dynamics, thrusters, R, thrusters.acting_now, pushing)
+    motion = seen.position, seen.velocity, memory.quaternion, omega, free + pushing
+    prediction.predict_state(ahead, *motion, seen.state[LAG])
+    position, velocity, turn = ahead.position, ahead.velocity[:3], ahead.velocity[3:]
+    model.free_acceleration(dynamics, R, velocity, turn, *waters, free)
+    path_planner.improve_path(memory.plan, position, goal, regions, GAINS, 0.02)
+    desired_velocity(memory.plan, position, goal.velocities[0], GAINS, wanted)
+    desired_acceleration(wanted, velocity, GAINS, acceleration)
+    barrier.observe_regions(memory.observation, regions, position, ahead.quaternion, ahead.velocity)
     pushed = memory.filtered_acceleration + 0.02 / (0.02 + GAINS.smoothing) * (
         acceleration - free[:3] - memory.filtered_acceleration
     )
-    attitude.update_desired(memory.attitude, regions, seen.position, GAINS, 0.02)
-    attitude.compute_moment(memory.attitude, dynamics, memory.quaternion, omega, GAINS, moment)
+    attitude.update_desired(memory.attitude, regions, position, GAINS, 0.02)
+    model.free_wrench(dynamics, R, velocity, turn, *waters, against)
+    attitude.compute_moment(memory.attitude, dynamics, ahead.quaternion, turn, against, GAINS, moment)
     wrench = np.r_[dynamics.mass[:3, :3] @ R.T @ pushed, moment]
-    memory.program.nominal[:] = thrusters.allocator @ wrench
+    memory.program.nominal[:] = thrusters.allocator @ wrench / thrusters.effectiveness
     turned = np.kron(np.diag([1, 0]), R) + np.kron(np.diag([0, 1]), np.eye(3))
     motion = barrier.Motion(
-        seen.position, velocity, free, turned @ dynamics.inverse_mass @ thrusters.matrix,
+        position, ahead.velocity, free, turned @ dynamics.inverse_mass @ thrusters.matrix * thrusters.effectiveness,
         np.trace(dynamics.mass[:3, :3]) / 3.0, np.trace(dynamics.mass[3:, 3:]) / 3.0,
         GAINS.braking_share * dynamics.braking.min(),
-        3.0 * observer.position_spread(seen) + 0.5 * GAINS.acceleration * 0.02**2,
+        3.0 * position_spread(seen) + 0.5 * GAINS.acceleration * (0.02**2 + seen.state[LAG] ** 2),
     )  # fmt: skip
     rows = barrier.write_rows(
         memory.program, memory.observation, regions, weights, motion, thrusters.lower, thrusters.upper, GAINS
@@ -60,10 +65,12 @@ def test_a_step_is_its_stages():
     own, sea, weights = law_for(ALL), Sea(noise=(0.02, 0.01)), np.array([1.0, 0.3, 0.7, 0.5])
     fly(own, sea, regions=ALL, steps=4)
     sea.quaternion[:] = np.array([0.95, 0.1, -0.2, 0.15]) / np.linalg.norm([0.95, 0.1, -0.2, 0.15])
-    own.memory.state_estimate.water_velocity[:2], own.memory.attitude.moments[:] = (0.2, -0.1), (3.0, -2.0, 1.0)
+    state = own.memory.state_estimate.state
+    state[CURRENT : CURRENT + 2], state[MOMENTS : MOMENTS + 3], state[LAG] = (0.2, -0.1), (3.0, -2.0, 1.0), 0.05
     # three steps of drag beside the ball, which then has a row
-    own.memory.state_estimate.position[:] = sea.position = np.array([3.1, 0.2, 2.4])
-    own.memory.state_estimate.velocity[:] = sea.velocity = np.array([0.5, 0.1, -0.05])
+    state[:3] = sea.position = np.array([3.1, 0.2, 2.4])
+    state[VELOCITY : VELOCITY + 3] = sea.velocity = np.array([0.5, 0.1, -0.05])
+    publish(own.memory.state_estimate)
     goal, regions, forces, most = pack([GOAL]), pack(ALL), np.empty(8), 0
     for _ in range(4):
         state, memory = sea.measured(), copy.deepcopy(own.memory)
@@ -77,7 +84,7 @@ def test_a_step_is_its_stages():
         assert own.memory.program.nominal == pytest.approx(program.nominal, rel=1e-8, abs=1e-9)
         assert forces == pytest.approx(wanted_forces, abs=1e-6)
         assert np.array_equal(own.memory.thrusters.forces, forces)
-        assert own.estimate.tolist() == [own.memory.state_estimate.net_weight[0], *own.memory.attitude.moments]
+        assert own.estimate.tolist() == [own.memory.state_estimate.net_weight[0], *own.memory.state_estimate.moments]
     assert most >= 2
 
 

@@ -1,0 +1,112 @@
+"""Flights of the deployable law whose thrusters fail, or do not: what it isolates, and when.
+
+``python -m benchmarks.thruster_failures VEHICLE CASE N [--lag S] [--seed K]``; the law is not given the lag.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+from typing import Any
+
+import numpy as np
+
+from controller import LAWS
+from cosim.batch.fused import FusedFlyer
+from cosim.batch.variation import Variation
+from cosim.scenario.scenario import validate_scenario
+from plant_fmu.vehicle import Vehicle, load_vehicle
+
+CASES = ("healthy", "worn", "rolled", "lost", "two lost", "part lost", "stuck")
+_FAILURES = {"lost": 1, "part lost": 1, "stuck": 1, "two lost": 2}
+_FAILED = 14  # place of `law.failed_thruster` among the law's reports
+
+
+def scene(vehicle: Vehicle, case: str, seed: int, lag: float | None, weight: float) -> dict[str, Any]:
+    """Return a random scenario: spheres, a depth band, a current, noise, W - B up to a weight [N], and the case."""
+    rng, m = np.random.default_rng([seed, 7]), vehicle.n_thrusters
+    start = np.array([0.0, 0.0, rng.uniform(3.0, 5.0)])
+    away, heading = rng.uniform(8.0, 20.0), rng.uniform(-0.5, 0.5)
+    goal = start + np.array([away * math.cos(heading), away * math.sin(heading), rng.uniform(-0.8, 0.8)])
+    tilt, axis = math.pi if case == "rolled" else 0.0, rng.normal(size=3)
+    quaternion = np.r_[math.cos(tilt / 2.0), math.sin(tilt / 2.0) * axis / np.linalg.norm(axis)]
+    speed, direction = rng.uniform(0.0, 0.15), rng.uniform(0.0, 2.0 * math.pi)
+    parameters = {"buoyancy": vehicle.weight - rng.uniform(-weight, weight)}
+    if lag is not None:
+        parameters |= {f"thrust_time_constant[{j + 1}]": lag for j in range(m)}
+    if case == "worn":
+        parameters |= {f"thrust_effectiveness[{j + 1}]": rng.uniform(0.7, 1.0) for j in range(m)}
+    band = {"type": "depth_band", "depth": start[2], "tolerance": 2.2}
+    shapes = [("band", "depth", "in", band)]
+    for i in range(int(rng.integers(2, 6))):
+        centre = start + (goal - start) * rng.uniform(0.2, 0.85) + rng.uniform(-1.0, 1.0, 3) * [1.5, 1.5, 0.6]
+        radius = rng.uniform(0.3, 0.7)
+        if min(np.linalg.norm(centre - start), np.linalg.norm(centre - goal)) > radius + 1.5:
+            ball = {"type": "sphere", "centre": centre.tolist(), "radius": radius}
+            shapes.append((f"rock{i}", "obstacle", "out", ball))
+    first = rng.uniform(1.0, 8.0)
+    times = [first, first + rng.uniform(2.0, 8.0)][
+        : {"lost": 1, "part lost": 1, "stuck": 1, "two lost": 2}.get(case, 0)
+    ]
+    kind = {"effectiveness": 0.4 if case == "part lost" else 0.0, "stuck": case == "stuck"}
+    failed = zip(rng.permutation(m) + 1, times, strict=False)
+    return {
+        "vehicle": "",
+        "time": {"duration": 60.0, "step": 0.01, "control": 0.02, "arbiter": 0.02},
+        "initial": {"position": start.tolist(), "quaternion": quaternion.tolist()},
+        "goal": {"type": "sphere", "centre": goal.tolist(), "radius": 0.5},
+        "law": {"name": "deployable"},
+        "actuation": {"through": "thrusters"},
+        "arbiter": {"engine": "closed"},
+        "sensing": {"position_noise": 0.02, "velocity_noise": 0.01, "seed": seed},
+        "plant": {
+            "current": [speed * math.cos(direction), speed * math.sin(direction), 0.0],
+            "parameters": parameters,
+        },
+        "failures": [{"thruster": int(j), "time": float(t), **kind} for j, t in failed],
+        "regions": [
+            {"name": name, "criterion": criterion, "keep": keep, "gain": 100.0, "hard": True, "shape": shape}
+            for name, criterion, keep, shape in shapes
+        ],
+    }
+
+
+def main() -> None:
+    """Fly, and print what came of it."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("vehicle")
+    parser.add_argument("case", choices=CASES)
+    parser.add_argument("flights", type=int)
+    parser.add_argument("--lag", type=float, help="of all thrusters [s]; default: the vehicle's own")
+    parser.add_argument("--weight", type=float, help="greatest |W - B| [N]; default: 15, of the BlueROV2 22")
+    parser.add_argument("--seed", type=int, default=0, help="of the first flight")
+    given = parser.parse_args()
+    vehicle = load_vehicle(given.vehicle)
+    weight = given.weight or (22.0 if "bluerov2" in given.vehicle else 15.0)
+    delays, failures, wrong, violated, late, least = [], 0, 0, 0, 0, math.inf
+    for seed in range(given.seed, given.seed + given.flights):
+        table = scene(vehicle, given.case, seed, given.lag, weight) | {"vehicle": given.vehicle}
+        scenario = validate_scenario(json.loads(json.dumps(table)), f"{given.case} {seed}")
+        with FusedFlyer(Variation(scenario, ())) as flyer:
+            outcome, trace = flyer.fly_one(scenario, trace=True)
+        reports = trace[:, trace.shape[1] - len(LAWS[scenario.law.name].diagnostics) + _FAILED]
+        isolated = {int(j): float(trace[np.argmax(reports == j), 0]) for j in np.unique(reports) if j}
+        failed = {failure.thruster: failure.time for failure in scenario.failures}
+        failures += len(failed)
+        delays += [isolated[j] - time for j, time in failed.items() if isolated.get(j, -1.0) >= time]
+        wrong += any(time < failed.get(j, math.inf) for j, time in isolated.items())
+        least = min(least, float(outcome["min_clearance"]))
+        violated += bool(outcome["min_clearance"] < 0.0)
+        late += not outcome["settled"]
+    print(f"{given.vehicle}, {given.case}, lag {given.lag}: {given.flights} flights from seed {given.seed}")
+    print(f"  regions violated in {violated}, least clearance {least:.3f} m; {late} not at rest in the goal")
+    print(f"  a working thruster isolated in {wrong}")
+    if failures:
+        soon = sum(delay <= 3.0 for delay in delays)
+        median = np.median(delays) if delays else math.nan
+        print(f"  {len(delays)} of {failures} isolated, {soon} within 3 s, after {median:.2f} s (median)")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,54 @@
+"""Forces behind the lag of the thrusters, which the observer estimates.
+
+Forces f follow commands u by tau f' = u - f. They are propagated for the estimated lag, and for a standard deviation
+less and more: the secant between these is how the forces depend on the lag. Where the estimate has moved, the forces
+move with it, to what they would be now had the lag always been that.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from controller.arithmetic import exponential
+from controller.laws.deployable.estimate import LAG, Estimate
+from controller.laws.deployable.model import Thrusters
+
+Array = NDArray[np.float64]
+
+
+def update_forces(estimate: Estimate, thrusters: Thrusters, period: float) -> None:
+    """Propagate the acting forces over the last period [s], behind the estimated lag and behind its bracket."""
+    lag, spread = estimate.state[LAG], np.sqrt(estimate.covariance[LAG, LAG])
+    lags, bracket = estimate.lags, estimate.bracket
+    least, most = max(lag - spread, 0.0), lag + spread
+    remains, average = _of_lag(lag, period)
+    remains_least, average_least = _of_lag(least, period)
+    remains_most, average_most = _of_lag(most, period)
+    for j in range(thrusters.forces.size):
+        commanded = thrusters.forces[j]
+        # what the forces would be now, had the lag been what it is now taken for
+        behind = _between(bracket[0, j], bracket[1, j], lags, lag) - commanded
+        behind_least = _between(bracket[0, j], bracket[1, j], lags, least) - commanded
+        behind_most = _between(bracket[0, j], bracket[1, j], lags, most) - commanded
+        thrusters.acting[j] = commanded + average * behind
+        thrusters.acting_now[j] = commanded + remains * behind
+        bracket[0, j] = commanded + remains_least * behind_least
+        bracket[1, j] = commanded + remains_most * behind_most
+        estimate.by_lag[j] = (average_most * behind_most - average_least * behind_least) / (most - least)
+    lags[0], lags[1] = least, most
+
+
+def _between(least: float, most: float, lags: Array, lag: float) -> float:
+    """Return the force behind a lag, of those behind two `lags`; the nearer one beyond them."""
+    share = (lag - lags[0]) / (lags[1] - lags[0])
+    between: float = least + min(max(share, 0.0), 1.0) * (most - least)
+    return between
+
+
+def _of_lag(lag: float, period: float) -> tuple[float, float]:
+    """Return how much of a force remains after a period [s] behind a lag [s], and on average within it."""
+    if lag < 0.03 * period:  # exp(-33) is nothing
+        return 0.0, lag / period
+    remains = exponential(-period / lag)
+    return remains, lag / period * (1.0 - remains)

@@ -1,0 +1,191 @@
+"""What the observer estimates: the state, its covariance, and what others read of them."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from controller.arithmetic import square
+from controller.law import VehicleModel
+from controller.laws.deployable.gains import DeployableGains
+from controller.laws.deployable.linear_algebra import copy
+
+Array = NDArray[np.float64]
+
+# first of each kind in the state; the position is at 0
+VELOCITY, CURRENT, NET_WEIGHT, MOMENTS, HEIGHT, LAG, EFFECTIVENESS = 3, 6, 8, 9, 12, 13, 14
+
+_LIGHT = 50.0  # kg, up to which numbers in N are as they stand
+_FIRST_CURRENT, _FIRST_RESTORING = 0.3, 15.0  # m/s, N: standard deviations at the start
+_GRAVITY = 9.81  # m/s2
+_FIRST_HEIGHT, _FIRST_ARM = 0.05, 0.15  # m, standard deviations at the start; the second of the weight's moments
+_FIRST_EFFECTIVENESS, _FIRST_COMMON = 0.12, 0.12  # of each thruster, and of all together
+_FIRST_LAG = 0.2  # s, of a vehicle whose file names none; else as much as it names
+_GREATEST_LAG = 1.0  # s
+_GREATEST_EFFECTIVENESS = 1.1
+
+
+class Estimate(NamedTuple):
+    """State and covariance of the filter, and what others read of them."""
+
+    first_state: Array  # (14 + m,) before the first measurement
+    first_covariance: Array  # (14 + m, 14 + m) likewise
+    state: Array  # (14 + m,) as the module says; SI, NED, body axes
+    covariance: Array  # (14 + m, 14 + m)
+    position: Array  # (3,) m, NED
+    velocity: Array  # (3,) m/s over ground, NED
+    water_velocity: Array  # (3,) m/s, NED; its down component is 0
+    net_weight: Array  # (1,) N, W - B
+    moments: Array  # (3,) phi_2..phi_4 [N m], body axes
+    acceleration: Array  # (3,) m/s2 over ground, NED, predicted for the last period
+    time_since_measurement: Array  # (1,) s since the last valid measurement; negative before the first
+    last_measured: Array  # (6,) position and velocity, as last measured
+    heaviness: Array  # (1,) mass over 50 kg, at least 1: a heavier vehicle's W - B is less well known
+    lags: Array  # (2,) s, a standard deviation below and above the estimated lag
+    bracket: Array  # (2, m) N, forces behind those lags
+    by_lag: Array  # (m,) N/s, by how much the acting forces grow with the lag, between those
+    transition: Array  # (3, 14 + m) of the velocity over a period
+    product: Array  # (3, 14 + m) transition times covariance
+    row: Array  # (14 + m,) of a measurement
+    gain: Array  # (14 + m,) of a measurement
+    deviation: Array  # (2 m, 14 + m) of the true state from the estimate, if thruster j gives nothing; m + j: is stuck
+    supposed: Array  # (2, m) effectiveness, and force [N] before it, with which each got stuck by its hypothesis
+    missing: Array  # (m,) N, by which the force of a thruster that is stuck differed from the expected one
+    direct: Array  # (2 m,) of the last number by what is missing
+    evidence: (
+        Array  # (2, 2 m) of the last measurements: innovations times deviations, deviations squared; over variances
+    )
+
+
+def make_estimate(vehicle: VehicleModel) -> Estimate:
+    """Return the estimate before the first measurement."""
+    mass, m = vehicle.rigid_mass[0, 0], vehicle.thruster_matrix.shape[1]
+    heaviness, n = max(mass / _LIGHT, 1.0), EFFECTIVENESS + m
+    state, deviations = np.zeros(n), np.zeros(n)
+    state[EFFECTIVENESS:], state[LAG] = 0.95, np.mean(vehicle.thrust_time_constant)
+    deviations[CURRENT:NET_WEIGHT] = _FIRST_CURRENT
+    deviations[NET_WEIGHT] = _FIRST_RESTORING * heaviness
+    deviations[MOMENTS:HEIGHT] = _FIRST_ARM * _GRAVITY * mass
+    deviations[HEIGHT], deviations[LAG] = _FIRST_HEIGHT, state[LAG] or _FIRST_LAG
+    deviations[EFFECTIVENESS:] = _FIRST_EFFECTIVENESS
+    covariance = np.diag(deviations**2)
+    covariance[EFFECTIVENESS:, EFFECTIVENESS:] += _FIRST_COMMON**2
+    return Estimate(
+        first_state=state,
+        first_covariance=covariance,
+        state=state.copy(),
+        covariance=covariance.copy(),
+        position=np.zeros(3),
+        velocity=np.zeros(3),
+        water_velocity=np.zeros(3),
+        net_weight=np.zeros(1),
+        moments=np.zeros(3),
+        acceleration=np.zeros(3),
+        time_since_measurement=np.array([-1.0]),
+        last_measured=np.full(6, np.nan),
+        heaviness=np.array([heaviness]),
+        lags=np.array([0.0, 1.0]),
+        bracket=np.zeros((2, m)),
+        by_lag=np.zeros(m),
+        transition=np.zeros((3, n)),
+        product=np.zeros((3, n)),
+        row=np.zeros(n),
+        gain=np.zeros(n),
+        deviation=np.zeros((2 * m, n)),
+        supposed=np.zeros((2, m)),
+        missing=np.zeros(m),
+        direct=np.zeros(2 * m),
+        evidence=np.zeros((2, 2 * m)),
+    )
+
+
+def reset(estimate: Estimate) -> None:
+    """Reset all to before the first measurement, but the effectiveness of the thrusters."""
+    for i in range(EFFECTIVENESS):
+        estimate.state[i] = estimate.first_state[i]
+        for k in range(estimate.state.size):
+            estimate.covariance[i, k] = estimate.covariance[k, i] = estimate.first_covariance[i, k]
+    estimate.deviation[:, :] = 0.0
+    estimate.time_since_measurement[0] = -1.0
+    publish(estimate)
+
+
+def initialize(estimate: Estimate, position: Array, velocity: Array, gains: DeployableGains) -> None:
+    """Initialize from a measurement [m, m/s, NED]: the first one, or one after a loss.
+
+    All but position and velocity keeps its estimate.
+    """
+    P = estimate.covariance
+    for axis in range(3):
+        estimate.state[axis], estimate.state[VELOCITY + axis] = position[axis], velocity[axis]
+        for k in range(estimate.state.size):
+            P[axis, k] = P[k, axis] = P[VELOCITY + axis, k] = P[k, VELOCITY + axis] = 0.0
+        for j in range(estimate.direct.size):
+            estimate.deviation[j, axis] = estimate.deviation[j, VELOCITY + axis] = 0.0
+    for axis in range(3):
+        P[axis, axis] = square(gains.position_noise)
+        P[VELOCITY + axis, VELOCITY + axis] = square(gains.velocity_noise)
+    estimate.time_since_measurement[0] = 0.0
+    publish(estimate)
+
+
+def publish(estimate: Estimate) -> None:
+    """Copy the parts of the state."""
+    x = estimate.state
+    copy(x[:3], estimate.position)
+    copy(x[VELOCITY:CURRENT], estimate.velocity)
+    copy(x[MOMENTS:HEIGHT], estimate.moments)
+    estimate.water_velocity[0], estimate.water_velocity[1] = x[CURRENT], x[CURRENT + 1]
+    estimate.net_weight[0] = x[NET_WEIGHT]
+
+
+def set_effectiveness(estimate: Estimate, j: int, value: float) -> None:
+    """Set the effectiveness of a thruster: 0 of one that is isolated, 1 of one that works again."""
+    P, k = estimate.covariance, EFFECTIVENESS + j
+    estimate.state[k] = value
+    for i in range(estimate.state.size):
+        P[i, k] = P[k, i] = 0.0
+    P[k, k] = square(_FIRST_EFFECTIVENESS) * value
+    for i in range(estimate.direct.size):
+        estimate.deviation[i, k] = 0.0
+
+
+def inflate_effectiveness(estimate: Estimate, j: int) -> None:
+    """Widen the spread of an effectiveness that has changed."""
+    estimate.covariance[EFFECTIVENESS + j, EFFECTIVENESS + j] += square(_FIRST_EFFECTIVENESS)
+
+
+def project(estimate: Estimate, gains: DeployableGains) -> None:
+    """Project the unknowns onto their bounds."""
+    bound = gains.restoring_bound * estimate.heaviness[0]
+    _bound(estimate, NET_WEIGHT, -bound, bound)
+    bound = gains.moment_bound * square(estimate.heaviness[0])
+    for i in range(MOMENTS, HEIGHT):
+        _bound(estimate, i, -bound, bound)
+    for i in range(CURRENT, NET_WEIGHT):
+        _bound(estimate, i, -gains.current_bound, gains.current_bound)
+    for i in range(EFFECTIVENESS, estimate.state.size):
+        _bound(estimate, i, 0.0, _GREATEST_EFFECTIVENESS)
+    _bound(estimate, LAG, 0.0, _GREATEST_LAG)
+    publish(estimate)
+
+
+def _bound(estimate: Estimate, i: int, least: float, most: float) -> None:
+    """Bring one state within its bounds, and the others to what is likeliest then."""
+    x, P = estimate.state, estimate.covariance
+    excess = x[i] - min(max(x[i], least), most)
+    if excess != 0.0:
+        if P[i, i] > 0.0:
+            for k in range(x.size):
+                x[k] -= P[k, i] / P[i, i] * excess
+        x[i] = min(max(x[i], least), most)
+
+
+def position_spread(estimate: Estimate) -> float:
+    """Return the greatest standard deviation [m] of the position among the axes."""
+    worst = 0.0
+    for axis in range(3):
+        worst = max(worst, estimate.covariance[axis, axis])
+    return float(np.sqrt(worst))
