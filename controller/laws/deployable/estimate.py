@@ -11,13 +11,15 @@ from controller.arithmetic import square
 from controller.law import VehicleModel
 from controller.laws.deployable.gains import DeployableGains
 from controller.laws.deployable.linear_algebra import copy
+from controller.stack_array import zeros
 
 Array = NDArray[np.float64]
 
-# first of each kind in the state; the position is at 0
-VELOCITY, CURRENT, NET_WEIGHT, MOMENTS, HEIGHT, LAG, EFFECTIVENESS = 3, 6, 8, 9, 12, 13, 14
+# first of each kind in the state
+POSITION, VELOCITY, CURRENT, NET_WEIGHT, MOMENTS, HEIGHT, LAG, EFFECTIVENESS = 0, 3, 6, 8, 9, 12, 13, 14
 
 _LIGHT = 50.0  # kg, up to which numbers in N are as they stand
+_FIRST_VELOCITY = 0.3  # m/s, of one that is not measured
 _FIRST_CURRENT, _FIRST_RESTORING = 0.3, 15.0  # m/s, N: standard deviations at the start
 _GRAVITY = 9.81  # m/s2
 _FIRST_HEIGHT, _FIRST_ARM = 0.05, 0.15  # m, standard deviations at the start; the second of the weight's moments
@@ -41,6 +43,8 @@ class Estimate(NamedTuple):
     moments: Array  # (3,) phi_2..phi_4 [N m], body axes
     acceleration: Array  # (3,) m/s2 over ground, NED, predicted for the last period
     time_since_measurement: Array  # (1,) s since the last valid measurement; negative before the first
+    silence: Array  # (2,) s since the last valid position, and velocity
+    gap: Array  # (1,) s, longest time without a measurement of late
     last_measured: Array  # (6,) position and velocity, as last measured
     heaviness: Array  # (1,) mass over 50 kg, at least 1: a heavier vehicle's W - B is less well known
     lags: Array  # (2,) s, a standard deviation below and above the estimated lag
@@ -84,6 +88,8 @@ def make_estimate(vehicle: VehicleModel) -> Estimate:
         moments=np.zeros(3),
         acceleration=np.zeros(3),
         time_since_measurement=np.array([-1.0]),
+        silence=np.zeros(2),
+        gap=np.zeros(1),
         last_measured=np.full(6, np.nan),
         heaviness=np.array([heaviness]),
         lags=np.array([0.0, 1.0]),
@@ -113,21 +119,27 @@ def reset(estimate: Estimate) -> None:
 
 
 def initialize(estimate: Estimate, position: Array, velocity: Array, gains: DeployableGains) -> None:
-    """Initialize from a measurement [m, m/s, NED]: the first one, or one after a loss.
+    """Initialize from the first measurement [m, m/s, NED]; a velocity that is not measured is taken for zero."""
+    start_from(estimate, POSITION, position, gains.position_noise)
+    if np.isnan(velocity[0] + velocity[1] + velocity[2]):
+        start_from(estimate, VELOCITY, zeros(3), _FIRST_VELOCITY)
+    else:
+        start_from(estimate, VELOCITY, velocity, gains.velocity_noise)
+    estimate.time_since_measurement[0] = 0.0
 
-    All but position and velocity keeps its estimate.
-    """
+
+def start_from(estimate: Estimate, first: int, measured: Array, deviation: float) -> None:
+    """Start anew from a measured position or velocity, whatever was estimated; all else keeps its estimate."""
     P = estimate.covariance
     for axis in range(3):
-        estimate.state[axis], estimate.state[VELOCITY + axis] = position[axis], velocity[axis]
+        i = first + axis
+        estimate.state[i] = measured[axis]
         for k in range(estimate.state.size):
-            P[axis, k] = P[k, axis] = P[VELOCITY + axis, k] = P[k, VELOCITY + axis] = 0.0
+            P[i, k] = P[k, i] = 0.0
+        P[i, i] = square(deviation)
         for j in range(estimate.direct.size):
-            estimate.deviation[j, axis] = estimate.deviation[j, VELOCITY + axis] = 0.0
-    for axis in range(3):
-        P[axis, axis] = square(gains.position_noise)
-        P[VELOCITY + axis, VELOCITY + axis] = square(gains.velocity_noise)
-    estimate.time_since_measurement[0] = 0.0
+            estimate.deviation[j, i] = 0.0
+    estimate.silence[0 if first == POSITION else 1] = 0.0
     publish(estimate)
 
 

@@ -13,6 +13,7 @@ from controller.law import VehicleState
 from controller.laws.deployable import actuator_lag, model, observer
 from controller.laws.deployable import attitude as attitude_loop
 from controller.laws.deployable import estimate as estimate_state
+from controller.laws.deployable.estimate import Estimate
 from controller.laws.deployable.gains import DeployableGains
 from controller.laws.deployable.linear_algebra import copy
 from controller.laws.deployable.memory import DeployableMemory
@@ -62,7 +63,6 @@ def process_measurement(memory: DeployableMemory, state: VehicleState, gains: De
     """Propagate the estimate over the last period and correct it; return whether the measurement was accepted."""
     estimate, period = memory.state_estimate, memory.period[0]
     valid = _is_plausible_attitude(state.quaternion, state.velocity_body)
-    valid_attitude = valid
     if valid:
         e = state.quaternion
         length = np.sqrt(square(e[0]) + square(e[1]) + square(e[2]) + square(e[3]))
@@ -71,16 +71,17 @@ def process_measurement(memory: DeployableMemory, state: VehicleState, gains: De
         copy(state.velocity_body[3:], memory.omega)
     else:
         _propagate_attitude(memory)
-    R, velocity, frozen = zeros(3, 3), zeros(3), True
+    R, position, velocity = zeros(3, 3), zeros(3), zeros(3)
     write_rotation(memory.quaternion, R)
     for i in range(3):
         for k in range(3):
             velocity[i] += R[i, k] * state.velocity_body[k]
-    valid = valid and _is_plausible_motion(state.position, velocity)
+        position[i] = state.position[i] if abs(state.position[i]) < _FARTHEST else np.nan
     for i in range(3):
-        frozen = frozen and state.position[i] == estimate.last_measured[i]
-        frozen = frozen and state.velocity_body[i] == estimate.last_measured[3 + i]
-        estimate.last_measured[i], estimate.last_measured[3 + i] = state.position[i], state.velocity_body[i]
+        if not (valid and _is_plausible_velocity(velocity)):
+            velocity[i] = np.nan
+    position_repeats = _repeats(state.position, estimate.last_measured[:3])
+    velocity_repeats = _repeats(state.velocity_body[:3], estimate.last_measured[3:])
 
     actuator_lag.update_forces(estimate, memory.thrusters, period)
     started = estimate.time_since_measurement[0] >= 0.0
@@ -90,20 +91,53 @@ def process_measurement(memory: DeployableMemory, state: VehicleState, gains: De
         if not _is_plausible_motion(estimate.position, estimate.velocity):  # diverged after a false measurement
             _reset_estimate(memory)
             started = False
-    if valid_attitude:
+    if valid:
         _correct_by_rates(memory, R, started, gains)
     if not started:
-        if valid:
-            estimate_state.initialize(estimate, state.position, velocity, gains)
-        return valid
-    moving = abs(estimate.velocity[0]) + abs(estimate.velocity[1]) + abs(estimate.velocity[2]) > 0.02
-    if not valid or (frozen and moving):
-        return False
-    if observer.correct(estimate, state.position, velocity, gains):
+        if np.isnan(position[0] + position[1] + position[2]):
+            return False
+        estimate_state.initialize(estimate, position, velocity, gains)
         return True
-    if estimate.time_since_measurement[0] > gains.coast:  # consistently elsewhere: start from there
-        estimate_state.initialize(estimate, state.position, velocity, gains)
+    # what a sensor repeats to the last bit while the vehicle moves is old, or the sensor is dead
+    moving = abs(estimate.velocity[0]) + abs(estimate.velocity[1]) + abs(estimate.velocity[2]) > 0.02
+    placed = not (position_repeats and moving) and _correct_group(
+        estimate, estimate_state.POSITION, position, gains.position_noise, gains
+    )
+    timed = not (velocity_repeats and moving) and _correct_group(
+        estimate, estimate_state.VELOCITY, velocity, gains.velocity_noise, gains
+    )
+    if placed or timed:
+        estimate.gap[0] = max(estimate.gap[0], estimate.time_since_measurement[0])
+        estimate.time_since_measurement[0] = 0.0
+    return placed or timed
+
+
+def _correct_group(estimate: Estimate, first: int, measured: Array, noise: float, gains: DeployableGains) -> bool:
+    """Correct by a position or a velocity; start from it where it has long been consistently elsewhere."""
+    group = 0 if first == estimate_state.POSITION else 1
+    if observer.correct(estimate, first, measured, noise, gains):
+        estimate.silence[group] = 0.0
+        return True
+    if estimate.silence[group] > gains.coast and not np.isnan(measured[0] + measured[1] + measured[2]):
+        estimate_state.start_from(estimate, first, measured, noise)
     return False
+
+
+def _repeats(measured: Array, last: Array) -> bool:
+    """Return whether what is measured is to the bit what was measured last, which it then becomes."""
+    repeats = True
+    for i in range(3):
+        repeats = repeats and (measured[i] == last[i] or (np.isnan(measured[i]) and np.isnan(last[i])))
+        last[i] = measured[i]
+    return repeats
+
+
+def _is_plausible_velocity(velocity: Array) -> bool:
+    """Return whether a velocity [m/s] is finite and plausible."""
+    can = True
+    for i in range(3):
+        can = can and abs(velocity[i]) < _FASTEST
+    return can
 
 
 def _correct_by_rates(memory: DeployableMemory, R: Array, predicted: bool, gains: DeployableGains) -> None:
@@ -159,9 +193,9 @@ def _propagate_attitude(memory: DeployableMemory) -> None:
 
 def _is_plausible_motion(position: Array, velocity: Array) -> bool:
     """Return whether position [m] and velocity [m/s] are finite and plausible."""
-    can = True
+    can = _is_plausible_velocity(velocity)
     for i in range(3):
-        can = can and abs(position[i]) < _FARTHEST and abs(velocity[i]) < _FASTEST
+        can = can and abs(position[i]) < _FARTHEST
     return can
 
 

@@ -48,7 +48,8 @@ from controller.regions.region_set import PackedRegions
 from controller.stack_array import zeros
 
 _SPREADS = 3.0  # standard deviations of the position that the margin adds
-_STALE = 0.15  # s without a valid measurement, after which the vehicle is brought to a stop
+_STALE = 0.15  # s without a measurement, after which the vehicle goes slower
+_SURE = 0.3  # m, of those deviations, beyond which it does too; at twice as much it stops
 _SEED = 1
 _LEAST_EFFECTIVENESS = 0.5  # by which more force is commanded
 _ATTITUDE = FIRST_OF_ATTITUDE  # shapes from it on depend on attitude
@@ -115,8 +116,8 @@ def step(
 
     # path planner, bounded attraction
     path_planner.improve_path(memory.plan, ahead.position, goal, regions, gains, period)
-    if estimate.time_since_measurement[0] <= _STALE:
-        desired_velocity(memory.plan, ahead.position, goal.velocities[0], gains, desired)
+    desired_velocity(memory.plan, ahead.position, goal.velocities[0], gains, desired)
+    _limit_speed(estimate, gains, desired)
     desired_acceleration(desired, ahead.velocity[:3], gains, acceleration[:3])
 
     # desired wrench
@@ -196,6 +197,20 @@ def _free_acceleration(memory: DeployableMemory, R: Array, velocity: Array, omeg
         estimate.moments,
         out,
     )
+
+
+def _limit_speed(estimate: Estimate, gains: DeployableGains, desired: Array) -> None:
+    """Limit the wanted velocity to what `acceleration` stops before the law has coasted too long, or knows no place."""
+    gap, spread = max(estimate.time_since_measurement[0], estimate.gap[0]), _SPREADS * position_spread(estimate)
+    most = gains.speed
+    if gap > _STALE:
+        most = min(most, gains.acceleration * max(gains.coast - gap, 0.0))
+    if spread > _SURE:
+        most = min(most, gains.speed * max(2.0 - spread / _SURE, 0.0))
+    speed = length3(desired[0], desired[1], desired[2])
+    if speed > most:
+        for axis in range(3):
+            desired[axis] *= most / speed
 
 
 def _force_of(dynamics: Dynamics, R: Array, acceleration: Array, out: Array) -> None:

@@ -38,6 +38,7 @@ _UNMODELLED = 0.03  # m/s2/sqrt(Hz), acceleration noise of the model
 _SLOWEST = 0.15  # m/s against the water, least speed at which drag is linearized
 _GATE = 6.0  # standard deviations beyond which a measurement is rejected
 _ANGULAR = 0.019  # rad/s2/sqrt(Hz), angular acceleration noise of the model
+_GAP_MEMORY = 1.0  # s, over which a gap in the measurements is forgotten
 _RIPPLE = 0.05  # standard deviation of a thruster's force in one period, as part of it
 _WEAR = 0.01  # 1/sqrt(s), drift of an effectiveness
 _LAG_DRIFT = 0.003  # s/sqrt(s)
@@ -102,6 +103,9 @@ def predict(
     _propagate_deviations(estimate, thrusters, thruster_acceleration, T)
     estimate.evidence[:, :] = 0.0
     estimate.time_since_measurement[0] += period
+    for group in range(2):
+        estimate.silence[group] += period
+    estimate.gap[0] *= 1.0 - period / _GAP_MEMORY
     publish(estimate)
 
 
@@ -201,24 +205,43 @@ def correct_by_moment(
     project(estimate, gains)
 
 
-def correct(estimate: Estimate, position: Array, velocity: Array, gains: DeployableGains) -> bool:
-    """Correct by a measurement of position [m] and velocity [m/s], shape (3,) each, NED; return False if rejected."""
-    P, x = estimate.covariance, estimate.state
+def correct(estimate: Estimate, first: int, measured: Array, noise: float, gains: DeployableGains) -> bool:
+    """Correct by what is measured of a position or a velocity, as far as it is a number.
+
+    Parameters
+    ----------
+    estimate : Estimate
+        Corrected in place.
+    first : int
+        `POSITION` or `VELOCITY`.
+    measured : ndarray, shape (3,)
+        [m] or [m/s], NED; what is NaN is not measured.
+    noise : float
+        Standard deviation of one measurement, in the same unit.
+    gains : DeployableGains
+        The bounds.
+
+    Returns
+    -------
+    bool
+        False, and nothing is changed, if nothing is measured, or one number cannot be.
+    """
+    P, x, known = estimate.covariance, estimate.state, 0
     for axis in range(3):
-        off, fast = abs(position[axis] - x[axis]), abs(velocity[axis] - x[VELOCITY + axis])
-        if not off <= _GATE * np.sqrt(P[axis, axis] + square(gains.position_noise)) + 0.05:
+        if np.isnan(measured[axis]):
+            continue
+        known += 1
+        spread = np.sqrt(P[first + axis, first + axis] + square(noise))
+        if not abs(measured[axis] - x[first + axis]) <= _GATE * spread + 0.05:
             return False
-        spread = P[VELOCITY + axis, VELOCITY + axis]
-        if not fast <= _GATE * np.sqrt(spread + square(gains.velocity_noise)) + 0.05:
-            return False
+    if known == 0:
+        return False
     for axis in range(3):
-        estimate.row[:] = 0.0
-        estimate.row[axis] = 1.0
-        _correct(estimate, position[axis] - x[axis], square(gains.position_noise))
-        estimate.row[axis], estimate.row[VELOCITY + axis] = 0.0, 1.0
-        _correct(estimate, velocity[axis] - x[VELOCITY + axis], square(gains.velocity_noise))
+        if not np.isnan(measured[axis]):
+            estimate.row[:] = 0.0
+            estimate.row[first + axis] = 1.0
+            _correct(estimate, measured[axis] - x[first + axis], square(noise))
     project(estimate, gains)
-    estimate.time_since_measurement[0] = 0.0
     return True
 
 
