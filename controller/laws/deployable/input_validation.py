@@ -94,7 +94,7 @@ def process_measurement(memory: DeployableMemory, state: VehicleState, gains: De
     if valid:
         _correct_by_rates(memory, R, started, gains)
     if not started:
-        if np.isnan(position[0] + position[1] + position[2]):
+        if not valid or np.isnan(position[0] + position[1] + position[2]):
             return False
         estimate_state.initialize(estimate, position, velocity, gains)
         return True

@@ -7,7 +7,7 @@ import pytest
 from scipy.stats import norm
 
 from controller.laws.deployable import actuator_lag, fault_detection, observer
-from controller.laws.deployable.estimate import EFFECTIVENESS, initialize, make_estimate
+from controller.laws.deployable.estimate import EFFECTIVENESS, POSITION, VELOCITY, initialize, make_estimate
 from controller.laws.deployable.gains import DeployableGains
 from controller.laws.deployable.model import make_dynamics, make_thrusters, reallocate
 from tests.controller.deployable.scenery import LEVEL, ODIN, REGIONS, Sea, fly, law_for
@@ -125,7 +125,8 @@ def periods(count, rng, left, stuck):
         given = thrusters.matrix[3:] @ actual, np.zeros((3, 2)), dynamics, thrusters, R, LEVEL, still
         before = copy.deepcopy(estimate)
         observer.correct_by_moment(estimate, *given, GAINS, 0.02)
-        observer.correct(estimate, estimate.position.copy(), velocity, GAINS)
+        observer.correct(estimate, POSITION, estimate.position.copy(), 0.02, GAINS)
+        observer.correct(estimate, VELOCITY, velocity, 0.01, GAINS)
         yield k, state, before, estimate
 
 

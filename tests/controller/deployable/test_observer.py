@@ -15,6 +15,7 @@ from controller.laws.deployable.estimate import (
     LAG,
     MOMENTS,
     NET_WEIGHT,
+    POSITION,
     VELOCITY,
     initialize,
     make_estimate,
@@ -42,6 +43,12 @@ def started(position=(0.0, 0.0, 2.0), velocity=(0.0, 0.0, 0.0), model=ODIN):
     estimate = make_estimate(model)
     initialize(estimate, np.array(position), np.array(velocity), GAINS)
     return estimate, make_dynamics(model, np.ones(9)), make_thrusters(model)
+
+
+def correct(estimate, position, velocity, gains=GAINS):
+    """Correct by both, and return whether both were accepted."""
+    placed = observer.correct(estimate, POSITION, np.asarray(position, float), GAINS.position_noise, gains)
+    return observer.correct(estimate, VELOCITY, np.asarray(velocity, float), GAINS.velocity_noise, gains) and placed
 
 
 def pushes(dynamics, thrusters, R):
@@ -117,7 +124,7 @@ def test_a_correction_is_the_joint_update_of_a_kalman_filter():
         P, x = estimate.covariance.copy(), estimate.state.copy()
         spread = np.sqrt(np.diag(P)[:6] + np.diag(noise))
         measured = x[:6] + spread * rng.uniform(-0.5, 0.5, 6)  # none so far off that it counts less
-        assert observer.correct(estimate, measured[:3], measured[3:], GAINS._replace(current_bound=9.0))
+        assert correct(estimate, measured[:3], measured[3:], GAINS._replace(current_bound=9.0))
         K = P @ H.T @ np.linalg.inv(H @ P @ H.T + noise)
         theirs = x + K @ (measured - x[:6])
         if np.all((theirs[EFFECTIVENESS:] > 0.0) & (theirs[EFFECTIVENESS:] < 1.1)) and 0.0 < theirs[LAG] < 1.0:
@@ -206,25 +213,35 @@ def test_unknowns_do_not_wind_up():
     thrusters.forces[:] = 27.0
     for _ in range(2000):
         predict(estimate, dynamics, thrusters)
-        observer.correct(estimate, np.array([0.0, 0.0, 2.0]), np.zeros(3), GAINS)
-        if estimate.time_since_measurement[0] > GAINS.coast:
+        if not correct(estimate, [0.0, 0.0, 2.0], np.zeros(3)):
             initialize(estimate, np.array([0.0, 0.0, 2.0]), np.zeros(3), GAINS)
         assert np.all(np.isfinite(estimate.state)) and np.all(abs(estimate.water_velocity) <= GAINS.current_bound)
     assert np.all(np.diag(estimate.covariance) >= 0.0)
 
 
-@pytest.mark.parametrize("which", [0, 1])
-def test_a_measurement_that_cannot_be_is_rejected_and_changes_nothing(which):
+@pytest.mark.parametrize(("first", "noise"), [(POSITION, GAINS.position_noise), (VELOCITY, GAINS.velocity_noise)])
+def test_a_measurement_that_cannot_be_is_rejected_and_changes_nothing(first, noise):
     estimate, dynamics, thrusters = started()
     predict(estimate, dynamics, thrusters)
     before = [np.copy(part) for part in estimate]
-    for wrong in (5.0, np.nan, np.inf):
-        measured = [estimate.position.copy(), estimate.velocity.copy()]
-        measured[which][1] += wrong
-        assert not observer.correct(estimate, *measured, GAINS)
+    for wrong in (np.array([0.0, 5.0, 0.0]), np.array([np.nan, np.inf, 0.0]), np.full(3, np.nan)):
+        measured = estimate.state[first : first + 3] + wrong
+        assert not observer.correct(estimate, first, measured, noise, GAINS)
     for part, was in zip(estimate, before, strict=True):
         assert np.array_equal(part, was, equal_nan=True)
     assert estimate.time_since_measurement[0] == pytest.approx(PERIOD)
+
+
+def test_numbers_that_are_not_measured_leave_the_others():
+    """A depth without a position corrects as the row of the depth alone does."""
+    rng, thrusters = np.random.default_rng(6), make_thrusters(ODIN)
+    estimate, _ = random_estimate(rng, thrusters)
+    P, x = estimate.covariance.copy(), estimate.state.copy()
+    measured = np.array([np.nan, np.nan, x[2] + 0.03])
+    assert observer.correct(estimate, POSITION, measured, 0.02, GAINS._replace(current_bound=9.0))
+    K = P[:, 2] / (P[2, 2] + 0.02**2)
+    assert estimate.state[:EFFECTIVENESS] == pytest.approx((x + 0.03 * K)[:EFFECTIVENESS], rel=1e-9, abs=1e-12)
+    assert estimate.covariance == pytest.approx(P - np.outer(K, P[2]), rel=1e-8, abs=1e-13)
 
 
 def test_the_prediction_follows_the_vehicles_model():
@@ -250,23 +267,29 @@ def test_the_prediction_follows_the_vehicles_model():
 
 
 def test_measurements_count_up_to_six_standard_deviations_and_five_hundredths():
-    for which, noise in ((0, GAINS.position_noise), (1, GAINS.velocity_noise)):
+    for first, noise in ((POSITION, GAINS.position_noise), (VELOCITY, GAINS.velocity_noise)):
         for part, believed in ((0.98, True), (1.02, False)):
             estimate, dynamics, thrusters = started()
             predict(estimate, dynamics, thrusters)
-            gate = 6.0 * np.sqrt(estimate.covariance[3 * which + 1, 3 * which + 1] + noise**2) + 0.05
+            gate = 6.0 * np.sqrt(estimate.covariance[first + 1, first + 1] + noise**2) + 0.05
             for sign in (1.0, -1.0):
                 seen = copy.deepcopy(estimate)
-                measured = [seen.position.copy(), seen.velocity.copy()]
-                measured[which][1] += sign * part * gate
-                assert observer.correct(seen, *measured, GAINS) == believed
+                measured = seen.state[first : first + 3] + np.array([0.0, sign * part * gate, 0.0])
+                assert observer.correct(seen, first, measured, noise, GAINS) == believed
+
+
+def test_it_can_start_without_a_velocity():
+    estimate = make_estimate(ODIN)
+    initialize(estimate, np.array([1.0, 2.0, 3.0]), np.full(3, np.nan), GAINS)
+    assert estimate.position.tolist() == [1.0, 2.0, 3.0] and not estimate.velocity.any()
+    assert np.diag(estimate.covariance)[:6] == pytest.approx([0.02**2] * 3 + [0.3**2] * 3)
 
 
 def test_a_reset_forgets_all_but_the_effectiveness_of_thrusters():
     estimate, dynamics, thrusters = started(velocity=(0.3, 0.0, 0.0))
     for _ in range(20):
         predict(estimate, dynamics, thrusters)
-        observer.correct(estimate, estimate.position + 0.01, estimate.velocity + 0.01, GAINS)
+        correct(estimate, estimate.position + 0.01, estimate.velocity + 0.01)
     set_effectiveness(estimate, 2, 0.0)
     kept = estimate.state[EFFECTIVENESS:].copy()
     reset(estimate)

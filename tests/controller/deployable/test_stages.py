@@ -10,7 +10,7 @@ from controller import VehicleState
 from controller.laws.deployable import actuator_lag, input_validation, law, observer
 from controller.laws.deployable.attraction import desired_velocity
 from controller.laws.deployable.barrier import empty_observation, observe_regions
-from controller.laws.deployable.estimate import VELOCITY, initialize, make_estimate
+from controller.laws.deployable.estimate import POSITION, VELOCITY, initialize, make_estimate
 from controller.laws.deployable.gains import DeployableGains
 from controller.laws.deployable.model import Dynamics, free_acceleration, make_thrusters, reallocate
 from controller.laws.deployable.path_planner import CORNERS, empty_plan
@@ -171,7 +171,8 @@ def test_a_measurement_is_turned_into_the_world():
     actuator_lag.update_forces(theirs.state_estimate, theirs.thrusters, 0.02)
     given = theirs.dynamics, theirs.thrusters, theirs.thruster_acceleration
     observer.predict(theirs.state_estimate, *given, TURNED, body[3:], GAINS, 0.02)
-    assert observer.correct(theirs.state_estimate, state.position, np.array([0.41, -0.31, 0.21]), GAINS)
+    for first, measured, noise in ((POSITION, state.position, 0.02), (VELOCITY, np.array([0.41, -0.31, 0.21]), 0.01)):
+        assert observer.correct(theirs.state_estimate, first, measured, noise, GAINS)
     assert memory.state_estimate.velocity == pytest.approx(theirs.state_estimate.velocity, rel=1e-9)
     assert memory.state_estimate.position == pytest.approx(theirs.state_estimate.position, rel=1e-9)
 
@@ -195,20 +196,43 @@ def test_what_repeats_itself_to_the_last_bit_while_moving_is_not_believed():
 
 
 @pytest.mark.parametrize(
-    "change",
+    ("change", "accepted"),
     [
-        {"quaternion": 1.006 * ATTITUDE}, {"quaternion": 0.994 * ATTITUDE}, {"position": np.array([1e7, 0.0, 0.0])},
-        {"velocity_body": np.array([0.0, -200.0, 0.0, 0.0, 0.0, 0.0])},
-        {"velocity_body": np.array([0.0, 0.0, 0.0, 60.0, -60.0, 0.0])},
-        {"velocity_body": np.array([0.0, 0.0, 0.0, -200.0, 0.0, 0.0])},
+        ({"quaternion": 1.006 * ATTITUDE}, {"position"}), ({"quaternion": 0.994 * ATTITUDE}, {"position"}),
+        ({"position": np.array([1e7, 2.0, 3.0])}, {"position", "velocity"}),  # of the position the other two
+        ({"position": np.full(3, np.nan)}, {"velocity"}),
+        ({"velocity_body": np.array([0.0, -200.0, 0.0, 0.0, 0.0, 0.0])}, {"position"}),
+        ({"velocity_body": np.array([0.0, 0.0, 0.0, 60.0, -60.0, 0.0])}, {"position"}),
+        ({"velocity_body": np.array([0.0, 0.0, 0.0, -200.0, 0.0, 0.0])}, {"position"}),
+        ({"position": np.full(3, np.nan), "velocity_body": np.full(6, np.nan)}, set()),
     ],
 )  # fmt: skip
-def test_what_no_vehicle_can_have_is_not_believed(change):
+def test_what_no_vehicle_can_have_is_not_believed_and_all_else_is(change, accepted):
     fresh, memory = law_for([]).memory, begun()
-    assert not input_validation.process_measurement(memory, state_of(memory, **change), GAINS)
-    assert not input_validation.process_measurement(fresh, state_of(memory, **change), GAINS)
-    assert fresh.state_estimate.time_since_measurement[0] < 0.0
-    assert input_validation.process_measurement(fresh, state_of(memory, quaternion=0.999 * ATTITUDE), GAINS)
+    seen = memory.state_estimate
+    assert input_validation.process_measurement(memory, state_of(memory, **change), GAINS) == bool(accepted)
+    assert (seen.silence == 0.0).tolist() == ["position" in accepted, "velocity" in accepted]
+    assert (seen.time_since_measurement[0] == 0.0) == bool(accepted)
+    rates = state_of(memory, **change).velocity_body[3:]  # it starts with attitude, rates and place
+    starts = "quaternion" not in change and "position" not in change and np.abs(rates).sum() < 100.0
+    assert input_validation.process_measurement(fresh, state_of(memory, **change), GAINS) == starts
+    assert (fresh.state_estimate.time_since_measurement[0] < 0.0) != starts
+    assert starts or input_validation.process_measurement(fresh, state_of(memory, quaternion=0.999 * ATTITUDE), GAINS)
+
+
+def test_gaps_in_what_is_measured_are_remembered_for_a_second():
+    memory = begun()
+    nothing = state_of(memory, position=np.full(3, np.nan), velocity_body=np.full(6, np.nan))
+    for _ in range(24):
+        assert not input_validation.process_measurement(memory, nothing, GAINS)
+    seen = memory.state_estimate
+    assert seen.time_since_measurement[0] == pytest.approx(0.48)
+    depth = np.array([np.nan, np.nan, seen.position[2]])
+    assert input_validation.process_measurement(memory, nothing._replace(position=depth), GAINS)
+    assert seen.gap[0] == pytest.approx(0.5) and seen.silence.tolist() == pytest.approx([0.0, 0.5])
+    given = memory.dynamics, memory.thrusters, memory.thruster_acceleration
+    observer.predict(seen, *given, TURNED, memory.omega, GAINS, 0.02)
+    assert seen.gap[0] == pytest.approx(0.5 * 0.98)
 
 
 def test_an_estimate_that_was_led_away_is_forgotten():
@@ -225,10 +249,11 @@ def test_what_is_said_for_long_is_believed_in_the_end():
     memory = begun()
     elsewhere = state_of(memory, position=np.array([30.0, 2.0, 3.0]))
     for silence, begins in ((1.0, False), (GAINS.coast + 0.1, True)):
-        memory.state_estimate.time_since_measurement[0] = silence
-        assert not input_validation.process_measurement(memory, elsewhere, GAINS)
+        memory.state_estimate.silence[0] = silence
+        assert input_validation.process_measurement(memory, elsewhere, GAINS)  # its velocity
         assert (memory.state_estimate.position[0] == 30.0) == begins
         elsewhere.velocity_body[0] += 1e-6
+        elsewhere.position[2] += 1e-6
 
 
 def test_weights_and_health_are_taken_for_what_they_can_be():

@@ -88,16 +88,30 @@ def test_a_step_is_its_stages():
     assert most >= 2
 
 
-def test_without_measurements_it_stops_and_then_drifts():
-    """Within 0.15 s it goes on, then wants no speed, and after `coast` no force."""
+def test_without_measurements_it_goes_no_faster_than_it_stops_in_time_and_then_drifts():
+    """Within 0.15 s it goes on; then at most at what `acceleration` stops within `coast`; then it rests."""
     own, sea = law_for([]), Sea()
     fly(own, sea, regions=[], steps=100)
-    state = sea.measured()._replace(position=np.full(3, np.nan))
+    lost = sea.measured()._replace(position=np.full(3, np.nan), velocity_body=np.full(6, np.nan))
     goal, nothing, forces, wanted = pack([GOAL]), pack([]), np.empty(8), []
     for _ in range(105):
-        own.step(state, goal, nothing, np.empty(0), forces)
-        wanted.append((own.report[8], forces.any()))
-    assert all(speed > 0.1 for speed, _ in wanted[:7])
-    assert all(speed == 0.0 for speed, _ in wanted[8:99])
-    assert all(pushes for _, pushes in wanted[:99]) and not any(pushes for _, pushes in wanted[102:])
+        own.step(lost, goal, nothing, np.empty(0), forces)
+        wanted.append((own.report[15], own.report[8], forces.any()))
+    for since, speed, pushes in wanted:
+        if since < 0.15:
+            assert speed == pytest.approx(GAINS.speed)
+        elif since < GAINS.coast - 1e-9:
+            assert speed == pytest.approx(min(GAINS.speed, GAINS.acceleration * (GAINS.coast - since)), abs=1e-9)
+        assert pushes == (since <= GAINS.coast)
     assert law.DIAGNOSTICS[8].name == "desired_speed"
+
+
+def test_it_goes_slower_where_it_hardly_knows_its_place():
+    speeds = []
+    for spread in (0.01, 0.09, 0.15, 0.25):
+        own = law_for([])
+        desired, seen = np.array([GAINS.speed, 0.0, 0.0]), own.memory.state_estimate
+        seen.time_since_measurement[0], seen.covariance[:3, :3] = 0.0, spread**2 * np.eye(3)
+        law._limit_speed(seen, GAINS, desired)
+        speeds.append(desired[0])
+    assert speeds == pytest.approx([GAINS.speed, GAINS.speed, 0.5 * GAINS.speed, 0.0])
