@@ -44,6 +44,8 @@ class Estimate(NamedTuple):
     acceleration: Array  # (3,) m/s2 over ground, NED, predicted for the last period
     time_since_measurement: Array  # (1,) s since the last valid measurement; negative before the first
     silence: Array  # (2,) s since the last valid position, and velocity
+    repeated: Array  # (2,) 1 if the last position, and velocity, repeated the one before to the bit
+    slow: Array  # (2,) 1 if they do so while the vehicle moves: new ones come more seldom than steps
     gap: Array  # (1,) s, longest time without a measurement of late
     last_measured: Array  # (6,) position and velocity, as last measured
     heaviness: Array  # (1,) mass over 50 kg, at least 1: a heavier vehicle's W - B is less well known
@@ -89,6 +91,8 @@ def make_estimate(vehicle: VehicleModel) -> Estimate:
         acceleration=np.zeros(3),
         time_since_measurement=np.array([-1.0]),
         silence=np.zeros(2),
+        repeated=np.zeros(2),
+        slow=np.zeros(2),
         gap=np.zeros(1),
         last_measured=np.full(6, np.nan),
         heaviness=np.array([heaviness]),

@@ -24,6 +24,7 @@ Array = NDArray[np.float64]
 
 _FARTHEST = 1e6  # m, of a plausible position
 _FASTEST = 100.0  # m/s, rad/s
+_RESTING, _PUSHED = 0.02, 0.05  # m/s, m/s2, sums over the axes: below and above, the vehicle rests and is about to move
 
 
 def sanitize_weights(weights: Array, sanitized: Array) -> None:
@@ -98,18 +99,31 @@ def process_measurement(memory: DeployableMemory, state: VehicleState, gains: De
             return False
         estimate_state.initialize(estimate, position, velocity, gains)
         return True
-    # what a sensor repeats to the last bit while the vehicle moves is old, or the sensor is dead
-    moving = abs(estimate.velocity[0]) + abs(estimate.velocity[1]) + abs(estimate.velocity[2]) > 0.02
-    placed = not (position_repeats and moving) and _correct_group(
+    placed = _is_new(estimate, 0, position_repeats, gains) and _correct_group(
         estimate, estimate_state.POSITION, position, gains.position_noise, gains
     )
-    timed = not (velocity_repeats and moving) and _correct_group(
+    timed = _is_new(estimate, 1, velocity_repeats, gains) and _correct_group(
         estimate, estimate_state.VELOCITY, velocity, gains.velocity_noise, gains
     )
     if placed or timed:
         estimate.gap[0] = max(estimate.gap[0], estimate.time_since_measurement[0])
         estimate.time_since_measurement[0] = 0.0
     return placed or timed
+
+
+def _is_new(estimate: Estimate, group: int, repeats: bool, gains: DeployableGains) -> bool:
+    """Return whether a position or velocity is new: what repeats itself is old, but of a fast sensor of what rests."""
+    v, a = estimate.velocity, estimate.acceleration
+    rests = abs(v[0]) + abs(v[1]) + abs(v[2]) < _RESTING
+    moves = not rests or abs(a[0]) + abs(a[1]) + abs(a[2]) > _PUSHED
+    if repeats and moves:
+        estimate.slow[group] = 1.0
+    elif not repeats and estimate.repeated[group] == 0.0:
+        estimate.slow[group] = 0.0
+    estimate.repeated[group] = 1.0 if repeats else 0.0
+    if not repeats or (not moves and estimate.slow[group] == 0.0):
+        return True
+    return bool(rests and estimate.silence[group] > gains.coast)
 
 
 def _correct_group(estimate: Estimate, first: int, measured: Array, noise: float, gains: DeployableGains) -> bool:

@@ -100,6 +100,46 @@ def test_a_measurement_of_nan_is_bridged_then_waited_for(length):
     assert rests.any() == (length > 2.0) and not flight.forces[rests].any()
 
 
+@pytest.mark.parametrize("lost", ["velocity", "position"])
+def test_what_is_left_of_the_measurements_is_enough(lost):
+    """From 2 s to the end: a position without a velocity, or a velocity without a position."""
+
+    def spoil(now, state):
+        if now < 2.0:
+            return state
+        if lost == "velocity":
+            return state._replace(velocity_body=np.r_[np.full(3, np.nan), state.velocity_body[3:]])
+        return state._replace(position=np.full(3, np.nan))
+
+    flight = fly([ROCK], spoil=spoil)
+    assert within_limits(flight) and reached(flight)
+    assert flight.clearance(ROCK).min() > 0.0
+    assert flight.report("time_since_measurement").max() < 0.05
+
+
+@pytest.mark.parametrize("held", [False, True])
+def test_navigation_at_one_hertz_is_slower_but_keeps_clear(held):
+    """Between two measurements there is nothing, or the last one again."""
+    last = {}
+
+    def spoil(now, state):
+        if round(now / 0.02) % 50 == 0:
+            last["state"] = state
+            return state
+        if not held:
+            return NOWHERE._replace(
+                quaternion=state.quaternion, velocity_body=np.r_[[np.nan] * 3, state.velocity_body[3:]]
+            )
+        rates = np.r_[last["state"].velocity_body[:3], state.velocity_body[3:]]
+        return state._replace(position=last["state"].position, velocity_body=rates)
+
+    flight = fly([ROCK], duration=60.0, spoil=spoil)
+    assert within_limits(flight) and reached(flight)
+    assert flight.clearance(ROCK).min() > 0.0
+    assert flight.report("time_since_measurement").max() < 1.1
+    assert flight.report("desired_speed")[flight.time > 3.0].max() < 0.6
+
+
 def test_a_frozen_sensor_is_a_dead_one():
     held = {}
 
