@@ -137,7 +137,7 @@ def test_a_reader_that_goes_away_is_no_trouble():
 def test_verbose_tells_of_us_alone(tmp_path):
     command = [sys.executable, "-m", "cosim", "-v", "run", "paper", "--out", str(tmp_path / "run"), *QUICK]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
-    assert all(line.startswith(("cosim", "plant_fmu")) for line in done.stderr.splitlines())
+    assert all(line.startswith(("cosim", "controller", "plant_fmu")) for line in done.stderr.splitlines())
 
 
 @pytest.mark.slow
