@@ -26,7 +26,7 @@ def update_forces(estimate: Estimate, thrusters: Thrusters, period: float) -> No
     remains_least, average_least = _of_lag(least, period)
     remains_most, average_most = _of_lag(most, period)
     for j in range(thrusters.forces.size):
-        commanded = thrusters.forces[j]
+        commanded = thrusters.forces[j] if np.isnan(thrusters.stuck[j]) else thrusters.stuck[j]
         # what the forces would be now, had the lag been what it is now taken for
         behind = _between(bracket[0, j], bracket[1, j], lags, lag) - commanded
         behind_least = _between(bracket[0, j], bracket[1, j], lags, least) - commanded

@@ -35,6 +35,7 @@ _LOSS = 0.6  # part of its force that a thruster loses by the hypothesis: it is 
 _USEFUL = 0.15  # effectiveness below which a thruster is isolated
 _SPREADS = 3.0  # standard deviations below that
 _LEAD = 8.0  # of the likeliest thruster before the next
+_UNSURE = 0.5  # standard deviation of the force at which a thruster is stuck, as part of it
 _CERTAIN = 40.0  # such a lead is never doubted
 
 
@@ -159,4 +160,6 @@ def _isolate(fault_state: FaultState, estimate: Estimate, thrusters: Thrusters, 
             set_effectiveness(estimate, j, 1.0)
     thrusters.health[failed], thrusters.stuck[failed] = 0.0, force
     set_effectiveness(estimate, failed, 0.0 if np.isnan(force) else 1.0)
+    if not np.isnan(force):  # which is hardly known, and may be none
+        estimate.covariance[EFFECTIVENESS + failed, EFFECTIVENESS + failed] = square(_UNSURE)
     _start_all_anew(fault_state, estimate, thrusters)

@@ -140,12 +140,17 @@ def step(
         for k in range(6):
             work.nominal[j] += thrusters.allocator[j, k] * wrench[k]
         work.nominal[j] /= max(thrusters.effectiveness[j], _LEAST_EFFECTIVENESS)
+        if not np.isnan(thrusters.stuck[j]):
+            thrusters.lower[j] = thrusters.upper[j] = thrusters.stuck[j] * thrusters.effectiveness[j]
 
     # barriers
     _write_thruster_acceleration(dynamics, thrusters, R, memory.thruster_acceleration)
     for i in range(6):
         for j in range(forces.size):
-            memory.effective_acceleration[i, j] = memory.thruster_acceleration[i, j] * thrusters.effectiveness[j]
+            follows = np.isnan(thrusters.stuck[j])  # the limits of others are what they give
+            memory.effective_acceleration[i, j] = memory.thruster_acceleration[i, j] * (
+                thrusters.effectiveness[j] if follows else 1.0
+            )
     motion = Motion(
         ahead.position,
         ahead.velocity,

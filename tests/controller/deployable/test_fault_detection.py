@@ -70,6 +70,19 @@ def test_a_thruster_that_is_stuck_is_found_with_its_force():
         assert np.linalg.norm(sea.position - (8.0, 0.5, 2.5)) < 0.6
 
 
+def test_a_dead_thruster_that_was_taken_for_a_stuck_one_does_not_carry_the_vehicle_away():
+    """The force that it is supposed to give is estimated on, and found to be none."""
+    law, sea = law_for([]), Sea(noise=NOISE)
+    fly(law, sea, regions=[], steps=100)
+    memory = law.memory
+    sea.left[2] = 0.0
+    fault_detection._isolate(memory.fault_state, memory.state_estimate, memory.thrusters, 2, 15.0)
+    reallocate(memory.thrusters)
+    fly(law, sea, regions=[], steps=1300, first=100)
+    assert memory.thrusters.stuck[2] * memory.state_estimate.state[EFFECTIVENESS + 2] == pytest.approx(0.0, abs=2.0)
+    assert np.linalg.norm(sea.position - (8.0, 0.5, 2.5)) < 0.6
+
+
 def test_it_can_be_switched_off():
     law, sea = law_for(REGIONS, DeployableGains(failure_threshold=0.0)), Sea()
     sea.left[2] = 0.0
