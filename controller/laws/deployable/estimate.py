@@ -43,12 +43,12 @@ class Estimate(NamedTuple):
     moments: Array  # (3,) phi_2..phi_4 [N m], body axes
     acceleration: Array  # (3,) m/s2 over ground, NED, predicted for the last period
     time_since_measurement: Array  # (1,) s since the last valid measurement; negative before the first
-    silence: Array  # (2,) s since the last valid position, and velocity
+    time_since_valid: Array  # (2,) s since the last valid position, and velocity
     repeated: Array  # (2,) 1 if the last position, and velocity, repeated the one before to the bit
     slow: Array  # (2,) 1 if they do so while the vehicle moves: new ones come more seldom than steps
-    gap: Array  # (1,) s, longest time without a measurement of late
+    longest_gap: Array  # (1,) s, longest time without a measurement of late
     last_measured: Array  # (6,) position and velocity, as last measured
-    heaviness: Array  # (1,) mass over 50 kg, at least 1: a heavier vehicle's W - B is less well known
+    mass_scale: Array  # (1,) mass over 50 kg, at least 1: a heavier vehicle's W - B is less well known
     lags: Array  # (2,) s, a standard deviation below and above the estimated lag
     bracket: Array  # (2, m) N, forces behind those lags
     by_lag: Array  # (m,) N/s, by how much the acting forces grow with the lag, between those
@@ -68,11 +68,11 @@ class Estimate(NamedTuple):
 def make_estimate(vehicle: VehicleModel) -> Estimate:
     """Return the estimate before the first measurement."""
     mass, m = vehicle.rigid_mass[0, 0], vehicle.thruster_matrix.shape[1]
-    heaviness, n = max(mass / _LIGHT, 1.0), EFFECTIVENESS + m
+    mass_scale, n = max(mass / _LIGHT, 1.0), EFFECTIVENESS + m
     state, deviations = np.zeros(n), np.zeros(n)
     state[EFFECTIVENESS:], state[LAG] = 0.95, np.mean(vehicle.thrust_time_constant)
     deviations[CURRENT:NET_WEIGHT] = _FIRST_CURRENT
-    deviations[NET_WEIGHT] = _FIRST_RESTORING * heaviness
+    deviations[NET_WEIGHT] = _FIRST_RESTORING * mass_scale
     deviations[MOMENTS:HEIGHT] = _FIRST_ARM * _GRAVITY * mass
     deviations[HEIGHT], deviations[LAG] = _FIRST_HEIGHT, state[LAG] or _FIRST_LAG
     deviations[EFFECTIVENESS:] = _FIRST_EFFECTIVENESS
@@ -90,12 +90,12 @@ def make_estimate(vehicle: VehicleModel) -> Estimate:
         moments=np.zeros(3),
         acceleration=np.zeros(3),
         time_since_measurement=np.array([-1.0]),
-        silence=np.zeros(2),
+        time_since_valid=np.zeros(2),
         repeated=np.zeros(2),
         slow=np.zeros(2),
-        gap=np.zeros(1),
+        longest_gap=np.zeros(1),
         last_measured=np.full(6, np.nan),
-        heaviness=np.array([heaviness]),
+        mass_scale=np.array([mass_scale]),
         lags=np.array([0.0, 1.0]),
         bracket=np.zeros((2, m)),
         by_lag=np.zeros(m),
@@ -143,7 +143,7 @@ def start_from(estimate: Estimate, first: int, measured: Array, deviation: float
         P[i, i] = square(deviation)
         for j in range(estimate.direct.size):
             estimate.deviation[j, i] = 0.0
-    estimate.silence[0 if first == POSITION else 1] = 0.0
+    estimate.time_since_valid[0 if first == POSITION else 1] = 0.0
     publish(estimate)
 
 
@@ -175,9 +175,9 @@ def inflate_effectiveness(estimate: Estimate, j: int) -> None:
 
 def project(estimate: Estimate, gains: DeployableGains) -> None:
     """Project the unknowns onto their bounds."""
-    bound = gains.restoring_bound * estimate.heaviness[0]
+    bound = gains.restoring_bound * estimate.mass_scale[0]
     _bound(estimate, NET_WEIGHT, -bound, bound)
-    bound = gains.moment_bound * square(estimate.heaviness[0])
+    bound = gains.moment_bound * square(estimate.mass_scale[0])
     for i in range(MOMENTS, HEIGHT):
         _bound(estimate, i, -bound, bound)
     for i in range(CURRENT, NET_WEIGHT):

@@ -35,8 +35,8 @@ _LOSS = 0.6  # part of its force that a thruster loses by the hypothesis: it is 
 _USEFUL = 0.15  # effectiveness below which a thruster is isolated
 _SPREADS = 3.0  # standard deviations below that
 _LEAD = 8.0  # of the likeliest thruster before the next
-_UNSURE = 0.5  # standard deviation of the force at which a thruster is stuck, as part of it
-_CERTAIN = 40.0  # such a lead is never doubted
+_STUCK_SPREAD = 0.5  # standard deviation of the force at which a thruster is stuck, as part of it
+_CERTAIN = 40.0  # with such a lead it is isolated for good
 
 
 class FaultState(NamedTuple):
@@ -44,7 +44,7 @@ class FaultState(NamedTuple):
 
     ratio: Array  # (2 m,) summed log-likelihood ratio: thruster j gives nothing; m + j: is stuck
     sums: Array  # (2, 2 m) of the evidence since the supposed time of the failure
-    doubted: NDArray[np.int64]  # (m,) 1 of an isolated thruster that is to be tried again
+    tentative: NDArray[np.int64]  # (m,) 1 of a thruster isolated tentatively, more of one isolated for good
 
 
 def empty_fault_state(m: int) -> FaultState:
@@ -88,7 +88,7 @@ def detect_fault(fault_state: FaultState, estimate: Estimate, thrusters: Thruste
             next_best = likelihood
     if best > gains.failure_threshold and best > next_best + _LEAD:
         hypothesis = _likelier(fault_state, at, m)
-        fault_state.doubted[at] += 1 if best < next_best + _CERTAIN else 2
+        fault_state.tentative[at] += 1 if best < next_best + _CERTAIN else 2
         loss = 1.0
         if hypothesis == at:
             loss = fault_state.sums[0, at] / fault_state.sums[1, at]
@@ -99,7 +99,7 @@ def detect_fault(fault_state: FaultState, estimate: Estimate, thrusters: Thruste
         if hypothesis > at:
             force = estimate.supposed[0, at] * estimate.supposed[1, at]
         elif remaining > _USEFUL:  # it goes on with what is left
-            fault_state.doubted[at] = 0
+            fault_state.tentative[at] = 0
             inflate_effectiveness(estimate, at)
             _start_all_anew(fault_state, estimate, thrusters)
             return -1
@@ -108,7 +108,7 @@ def detect_fault(fault_state: FaultState, estimate: Estimate, thrusters: Thruste
     for j in range(m):
         spread = np.sqrt(estimate.covariance[EFFECTIVENESS + j, EFFECTIVENESS + j])
         if thrusters.health[j] > 0.0 and x[EFFECTIVENESS + j] + _SPREADS * spread < _USEFUL:
-            fault_state.doubted[j] += 1
+            fault_state.tentative[j] += 1
             _isolate(fault_state, estimate, thrusters, j, np.nan)
             return j
     return -1
@@ -155,11 +155,11 @@ def _start_all_anew(fault_state: FaultState, estimate: Estimate, thrusters: Thru
 def _isolate(fault_state: FaultState, estimate: Estimate, thrusters: Thrusters, failed: int, force: float) -> None:
     """Mark a thruster as failed, stuck at a force [N] or NaN; restore those that were isolated by a narrow lead."""
     for j in range(thrusters.health.size):
-        if thrusters.health[j] == 0.0 and fault_state.doubted[j] == 1:
+        if thrusters.health[j] == 0.0 and fault_state.tentative[j] == 1:
             thrusters.health[j], thrusters.stuck[j] = 1.0, np.nan
             set_effectiveness(estimate, j, 1.0)
     thrusters.health[failed], thrusters.stuck[failed] = 0.0, force
     set_effectiveness(estimate, failed, 0.0 if np.isnan(force) else 1.0)
     if not np.isnan(force):  # which is hardly known, and may be none
-        estimate.covariance[EFFECTIVENESS + failed, EFFECTIVENESS + failed] = square(_UNSURE)
+        estimate.covariance[EFFECTIVENESS + failed, EFFECTIVENESS + failed] = square(_STUCK_SPREAD)
     _start_all_anew(fault_state, estimate, thrusters)

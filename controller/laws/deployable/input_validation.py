@@ -56,7 +56,7 @@ def update_thrusters(memory: DeployableMemory, reported: Array) -> None:
             health[j] = memory.reported[j] = working
             if working > 0.0:
                 memory.thrusters.stuck[j] = np.nan
-            memory.fault_state.doubted[j] = 0 if working > 0.0 else 2
+            memory.fault_state.tentative[j] = 0 if working > 0.0 else 2
     model.reallocate(memory.thrusters)
 
 
@@ -99,16 +99,16 @@ def process_measurement(memory: DeployableMemory, state: VehicleState, gains: De
             return False
         estimate_state.initialize(estimate, position, velocity, gains)
         return True
-    placed = _is_new(estimate, 0, position_repeats, gains) and _correct_group(
+    position_used = _is_new(estimate, 0, position_repeats, gains) and _correct_group(
         estimate, estimate_state.POSITION, position, gains.position_noise, gains
     )
-    timed = _is_new(estimate, 1, velocity_repeats, gains) and _correct_group(
+    velocity_used = _is_new(estimate, 1, velocity_repeats, gains) and _correct_group(
         estimate, estimate_state.VELOCITY, velocity, gains.velocity_noise, gains
     )
-    if placed or timed:
-        estimate.gap[0] = max(estimate.gap[0], estimate.time_since_measurement[0])
+    if position_used or velocity_used:
+        estimate.longest_gap[0] = max(estimate.longest_gap[0], estimate.time_since_measurement[0])
         estimate.time_since_measurement[0] = 0.0
-    return placed or timed
+    return position_used or velocity_used
 
 
 def _is_new(estimate: Estimate, group: int, repeats: bool, gains: DeployableGains) -> bool:
@@ -123,16 +123,16 @@ def _is_new(estimate: Estimate, group: int, repeats: bool, gains: DeployableGain
     estimate.repeated[group] = 1.0 if repeats else 0.0
     if not repeats or (not moves and estimate.slow[group] == 0.0):
         return True
-    return bool(rests and estimate.silence[group] > gains.coast)
+    return bool(rests and estimate.time_since_valid[group] > gains.coast)
 
 
 def _correct_group(estimate: Estimate, first: int, measured: Array, noise: float, gains: DeployableGains) -> bool:
     """Correct by a position or a velocity; start from it where it has long been consistently elsewhere."""
     group = 0 if first == estimate_state.POSITION else 1
     if observer.correct(estimate, first, measured, noise, gains):
-        estimate.silence[group] = 0.0
+        estimate.time_since_valid[group] = 0.0
         return True
-    if estimate.silence[group] > gains.coast and not np.isnan(measured[0] + measured[1] + measured[2]):
+    if estimate.time_since_valid[group] > gains.coast and not np.isnan(measured[0] + measured[1] + measured[2]):
         estimate_state.start_from(estimate, first, measured, noise)
     return False
 

@@ -49,7 +49,7 @@ from controller.stack_array import zeros
 
 _SPREADS = 3.0  # standard deviations of the position that the margin adds
 _STALE = 0.15  # s without a measurement, after which the vehicle goes slower
-_SURE = 0.3  # m, of those deviations, beyond which it does too; at twice as much it stops
+_TRUSTED_SPREAD = 0.3  # m, of those deviations, beyond which it does too; at twice as much it stops
 _SEED = 1
 _LEAST_EFFECTIVENESS = 0.5  # by which more force is commanded
 _ATTITUDE = FIRST_OF_ATTITUDE  # shapes from it on depend on attitude
@@ -206,12 +206,12 @@ def _free_acceleration(memory: DeployableMemory, R: Array, velocity: Array, omeg
 
 def _limit_speed(estimate: Estimate, gains: DeployableGains, desired: Array) -> None:
     """Limit the wanted velocity to what `acceleration` stops before the law has coasted too long, or knows no place."""
-    gap, spread = max(estimate.time_since_measurement[0], estimate.gap[0]), _SPREADS * position_spread(estimate)
+    gap, spread = max(estimate.time_since_measurement[0], estimate.longest_gap[0]), _SPREADS * position_spread(estimate)
     most = gains.speed
     if gap > _STALE:
         most = min(most, gains.acceleration * max(gains.coast - gap, 0.0))
-    if spread > _SURE:
-        most = min(most, gains.speed * max(2.0 - spread / _SURE, 0.0))
+    if spread > _TRUSTED_SPREAD:
+        most = min(most, gains.speed * max(2.0 - spread / _TRUSTED_SPREAD, 0.0))
     speed = length3(desired[0], desired[1], desired[2])
     if speed > most:
         for axis in range(3):

@@ -94,7 +94,7 @@ def predict(
         P[MOMENTS + axis, MOMENTS + axis] += square(gains.adaptation * _ANGULAR * dynamics.mass[3 + axis, 3 + axis]) * T
     for axis in range(2):
         P[CURRENT + axis, CURRENT + axis] += square(gains.current_drift) * T
-    P[NET_WEIGHT, NET_WEIGHT] += square(gains.restoring_drift * estimate.heaviness[0]) * T
+    P[NET_WEIGHT, NET_WEIGHT] += square(gains.restoring_drift * estimate.mass_scale[0]) * T
     P[LAG, LAG] += square(_LAG_DRIFT) * T
     for j in range(thrusters.health.size):
         thrusters.effectiveness[j] = x[EFFECTIVENESS + j]
@@ -104,8 +104,8 @@ def predict(
     estimate.evidence[:, :] = 0.0
     estimate.time_since_measurement[0] += period
     for group in range(2):
-        estimate.silence[group] += period
-    estimate.gap[0] *= 1.0 - period / _GAP_MEMORY
+        estimate.time_since_valid[group] += period
+    estimate.longest_gap[0] *= 1.0 - period / _GAP_MEMORY
     publish(estimate)
 
 

@@ -94,7 +94,7 @@ def test_a_thruster_that_was_isolated_wrongly_is_tried_again():
     law, sea = law_for(REGIONS), Sea(noise=NOISE)
     fly(law, sea, steps=100)
     memory = law.memory
-    memory.fault_state.doubted[3], memory.thrusters.health[3] = 1, 0.0
+    memory.fault_state.tentative[3], memory.thrusters.health[3] = 1, 0.0
     reallocate(memory.thrusters)
     sea.left[0] = 0.0
     fly(law, sea, steps=500, first=100)
@@ -102,12 +102,12 @@ def test_a_thruster_that_was_isolated_wrongly_is_tried_again():
 
 
 def test_one_that_is_certain_or_was_reported_is_not_tried_again():
-    for doubted in (0, 2):
+    for tentative in (0, 2):
         estimate, thrusters, state = started()
-        state.doubted[1], thrusters.health[1] = doubted, 0.0
+        state.tentative[1], thrusters.health[1] = tentative, 0.0
         fault_detection._isolate(state, estimate, thrusters, 4, np.nan)
         assert np.flatnonzero(thrusters.health == 0.0).tolist() == [1, 4]
-    state.doubted[4] = 1
+    state.tentative[4] = 1
     fault_detection._isolate(state, estimate, thrusters, 6, -3.0)
     assert np.flatnonzero(thrusters.health == 0.0).tolist() == [1, 6]
     assert thrusters.stuck[6] == -3.0 and np.isnan(thrusters.stuck[[0, 1, 2, 3, 4, 5, 7]]).all()

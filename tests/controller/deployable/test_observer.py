@@ -47,8 +47,10 @@ def started(position=(0.0, 0.0, 2.0), velocity=(0.0, 0.0, 0.0), model=ODIN):
 
 def correct(estimate, position, velocity, gains=GAINS):
     """Correct by both, and return whether both were accepted."""
-    placed = observer.correct(estimate, POSITION, np.asarray(position, float), GAINS.position_noise, gains)
-    return observer.correct(estimate, VELOCITY, np.asarray(velocity, float), GAINS.velocity_noise, gains) and placed
+    position_used = observer.correct(estimate, POSITION, np.asarray(position, float), GAINS.position_noise, gains)
+    return (
+        observer.correct(estimate, VELOCITY, np.asarray(velocity, float), GAINS.velocity_noise, gains) and position_used
+    )
 
 
 def pushes(dynamics, thrusters, R):

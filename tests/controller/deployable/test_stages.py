@@ -211,7 +211,7 @@ def test_what_no_vehicle_can_have_is_not_believed_and_all_else_is(change, accept
     fresh, memory = law_for([]).memory, begun()
     seen = memory.state_estimate
     assert input_validation.process_measurement(memory, state_of(memory, **change), GAINS) == bool(accepted)
-    assert (seen.silence == 0.0).tolist() == ["position" in accepted, "velocity" in accepted]
+    assert (seen.time_since_valid == 0.0).tolist() == ["position" in accepted, "velocity" in accepted]
     assert (seen.time_since_measurement[0] == 0.0) == bool(accepted)
     rates = state_of(memory, **change).velocity_body[3:]  # it starts with attitude, rates and place
     starts = "quaternion" not in change and "position" not in change and np.abs(rates).sum() < 100.0
@@ -229,10 +229,10 @@ def test_gaps_in_what_is_measured_are_remembered_for_a_second():
     assert seen.time_since_measurement[0] == pytest.approx(0.48)
     depth = np.array([np.nan, np.nan, seen.position[2]])
     assert input_validation.process_measurement(memory, nothing._replace(position=depth), GAINS)
-    assert seen.gap[0] == pytest.approx(0.5) and seen.silence.tolist() == pytest.approx([0.0, 0.5])
+    assert seen.longest_gap[0] == pytest.approx(0.5) and seen.time_since_valid.tolist() == pytest.approx([0.0, 0.5])
     given = memory.dynamics, memory.thrusters, memory.thruster_acceleration
     observer.predict(seen, *given, TURNED, memory.omega, GAINS, 0.02)
-    assert seen.gap[0] == pytest.approx(0.5 * 0.98)
+    assert seen.longest_gap[0] == pytest.approx(0.5 * 0.98)
 
 
 def test_an_estimate_that_was_led_away_is_forgotten():
@@ -249,7 +249,7 @@ def test_what_is_said_for_long_is_believed_in_the_end():
     memory = begun()
     elsewhere = state_of(memory, position=np.array([30.0, 2.0, 3.0]))
     for silence, begins in ((1.0, False), (GAINS.coast + 0.1, True)):
-        memory.state_estimate.silence[0] = silence
+        memory.state_estimate.time_since_valid[0] = silence
         assert input_validation.process_measurement(memory, elsewhere, GAINS)  # its velocity
         assert (memory.state_estimate.position[0] == 30.0) == begins
         elsewhere.velocity_body[0] += 1e-6
