@@ -23,14 +23,14 @@ _FAILURES = {"lost": 1, "part lost": 1, "stuck": 1, "two lost": 2}
 _FAILED = 14  # place of `law.failed_thruster` among the law's reports
 
 
-def scene(vehicle: Vehicle, case: str, seed: int, lag: float | None, weight: float) -> dict[str, Any]:
+def scene(vehicle: Vehicle, case: str, seed: int, lag: float | None, weight: float, tilt: float) -> dict[str, Any]:
     """Return a random scenario: spheres, a depth band, a current, noise, W - B up to a weight [N], and the case."""
     rng, m = np.random.default_rng([seed, 7]), vehicle.n_thrusters
     start = np.array([0.0, 0.0, rng.uniform(3.0, 5.0)])
     away, heading = rng.uniform(8.0, 20.0), rng.uniform(-0.5, 0.5)
     goal = start + np.array([away * math.cos(heading), away * math.sin(heading), rng.uniform(-0.8, 0.8)])
-    tilt, axis = math.pi if case == "rolled" else 0.0, rng.normal(size=3)
-    quaternion = np.r_[math.cos(tilt / 2.0), math.sin(tilt / 2.0) * axis / np.linalg.norm(axis)]
+    angle, axis = math.radians(tilt) if case == "rolled" else 0.0, rng.normal(size=3)
+    quaternion = np.r_[math.cos(angle / 2.0), math.sin(angle / 2.0) * axis / np.linalg.norm(axis)]
     speed, direction = rng.uniform(0.0, 0.15), rng.uniform(0.0, 2.0 * math.pi)
     parameters = {"buoyancy": vehicle.weight - rng.uniform(-weight, weight)}
     if lag is not None:
@@ -80,13 +80,14 @@ def main() -> None:
     parser.add_argument("flights", type=int)
     parser.add_argument("--lag", type=float, help="of all thrusters [s]; default: the vehicle's own")
     parser.add_argument("--weight", type=float, help="greatest |W - B| [N]; default: 15, of the BlueROV2 22")
+    parser.add_argument("--tilt", type=float, default=180.0, help="of a rolled start [degrees]")
     parser.add_argument("--seed", type=int, default=0, help="of the first flight")
     given = parser.parse_args()
     vehicle = load_vehicle(given.vehicle)
     weight = given.weight or (22.0 if "bluerov2" in given.vehicle else 15.0)
     delays, failures, wrong, violated, late, least = [], 0, 0, 0, 0, math.inf
     for seed in range(given.seed, given.seed + given.flights):
-        table = scene(vehicle, given.case, seed, given.lag, weight) | {"vehicle": given.vehicle}
+        table = scene(vehicle, given.case, seed, given.lag, weight, given.tilt) | {"vehicle": given.vehicle}
         scenario = validate_scenario(json.loads(json.dumps(table)), f"{given.case} {seed}")
         with FusedFlyer(Variation(scenario, ())) as flyer:
             outcome, trace = flyer.fly_one(scenario, trace=True)
