@@ -215,6 +215,9 @@ def test_nothing_is_found_where_it_is_switched_off():
 def test_a_useless_thruster_is_isolated_without_a_jump():
     estimate, thrusters, state = started()
     estimate.state[EFFECTIVENESS + 5] = 0.05
+    estimate.covariance[EFFECTIVENESS:, :EFFECTIVENESS] = 0.0
+    estimate.covariance[EFFECTIVENESS + 5, EFFECTIVENESS + 5] = 0.1**2  # it may give a third
+    assert fault_detection.detect_fault(state, estimate, thrusters, GAINS) == -1
     estimate.covariance[EFFECTIVENESS + 5, EFFECTIVENESS + 5] = 0.03**2
     assert fault_detection.detect_fault(state, estimate, thrusters, GAINS) == 5
     assert thrusters.health[5] == 0.0 and estimate.state[EFFECTIVENESS + 5] == 0.0
