@@ -109,6 +109,9 @@ GRAVITY = Quantity("m/s2", 0.0, 100.0)
 TIME_CONSTANT = Quantity("s", 0.0, 1e3)
 FORCE_RATE = Quantity("N/s", 0.0, 1e9)
 SAMPLE_RATE = Quantity("Hz", 0.0, 1e4)
+DELAY = Quantity("s", 0.0, 10.0)
+SCALE = Quantity("", 0.0, 1e6)
+SCALE_ERROR = Quantity("", -0.5, 0.5)
 SUBSTEP = Quantity("s", 1e-6, 1.0)
 FORCE_LIMIT = Quantity("N", 0.0, 1e10)  # its maximum is above the norm of any force: no limit
 

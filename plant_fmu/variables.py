@@ -17,6 +17,13 @@ Type = Literal["real", "integer", "boolean"]
 AXES = "xyz"
 VELOCITIES = "uvwpqr"
 FORCES = "XYZKMN"
+_SENSORS = (
+    ("depth_sensor", "the pressure sensor"),
+    ("dvl", "the DVL"),
+    ("imu", "the IMU"),
+    ("compass", "the compass"),
+    ("usbl", "the USBL"),
+)
 
 
 @dataclass(frozen=True)
@@ -137,6 +144,7 @@ def _inputs(vehicle: Vehicle) -> Iterator[Variable]:
 
 _THRUSTER = ("thrust", "thrust_min", "thrust_max", "thrust_dead_band", "thrust_curve", "thrust_time_constant")
 _WRENCH = ("wrench.X", "wrench.Y", "wrench.Z", "wrench_force_limit", "wrench_time_constant")
+_RANDOM = ("seed", "outlier_scale")
 _WATER = ("time", "position.z", "current*", "seed")
 _BOTTOM = ("position.z", "bottom_depth")
 _MOTION = (
@@ -184,7 +192,7 @@ def _measured(output: Callable[..., Variable]) -> Iterator[Variable]:
     def measured(name: str, unit: str, description: str, sensor: str, *depends: str) -> Variable:
         member = f"measured[{len(channels)}]"
         channels.append(name)
-        return output(f"measured.{name}", member, q.unbounded(unit), description, f"{sensor}.*", "seed", *depends)
+        return output(f"measured.{name}", member, q.unbounded(unit), description, f"{sensor}.*", *_RANDOM, *depends)
 
     channels: list[str] = []
     yield measured("depth", "m", "Depth from the pressure sensor", "depth_sensor", "position.z")
@@ -201,6 +209,9 @@ def _measured(output: Callable[..., Variable]) -> Iterator[Variable]:
     yield measured("heading", "rad", "Compass heading, that of yaw", "compass", "quaternion.*")
     for i, where in enumerate(("north", "east", "down")):
         yield measured(f"position.{AXES[i]}", "m", f"USBL's position, {where}", "usbl", f"position.{AXES[i]}")
+    for i, (sensor, what) in enumerate(_SENSORS):
+        description = f"Time at which {what} measured what it tells; -1e12 before its first sample"
+        yield output(f"measured.time.{sensor}", f"stamp[{i}]", q.unbounded("s"), description, f"{sensor}.rate", "time")
 
 
 def _derivatives(vehicle: Vehicle) -> Iterator[Variable]:
@@ -313,12 +324,15 @@ def _environment(vehicle: Vehicle) -> Iterator[Variable]:
 
 
 def _sensors() -> Iterator[Variable]:
-    for i, (sensor, what) in enumerate((
-        ("depth_sensor", "the pressure sensor"), ("dvl", "the DVL"), ("imu", "the IMU"), ("compass", "the compass"),
-        ("usbl", "the USBL"),
-    )):  # fmt: skip
+    for i, (sensor, what) in enumerate(_SENSORS):
         description = f"Samples a second of {what}; 0: continuous, without noise"
         yield _parameter(f"{sensor}.rate", f"sensor_rate[{i}]", q.SAMPLE_RATE, description)
+        yield _parameter(f"{sensor}.delay", f"delay[{i}]", q.DELAY, "Time from a sample to when it is told")
+        for event, description in (("loss", "is lost"), ("outlier", "is an outlier")):
+            name, member = f"{sensor}.{event}_probability", f"{event}_probability[{i}]"
+            yield _parameter(name, member, q.FRACTION, f"Probability that a sample {description}")
+    description = "Standard deviation of an outlier, as a multiple of that of the noise"
+    yield _parameter("outlier_scale", "outlier_scale", q.SCALE, description, 20.0)
     for i, (name, unit) in enumerate((
         ("depth_sensor.noise", "m"), ("dvl.velocity_noise", "m/s"), ("dvl.altitude_noise", "m"),
         ("imu.acceleration_noise", "m/s2"), ("imu.angular_velocity_noise", "rad/s"), ("compass.noise", "rad"),
@@ -335,6 +349,8 @@ def _sensors() -> Iterator[Variable]:
         ("compass.bias", "MEASURED_HEADING", "rad"),
     ):
         yield _parameter(name, f"bias[{channel}]", q.bias(unit), "Constant error")
+    description = "Part of the velocity that the DVL tells too much"
+    yield _parameter("dvl.scale_error", "velocity_scale_error", q.SCALE_ERROR, description)
 
 
 def _discrete(vehicle: Vehicle) -> Iterator[Variable]:

@@ -25,6 +25,7 @@ _DESCRIPTIONS = {
     "measured.acceleration": "Specific force from the IMU, body frame",
     "measured.angular_velocity": "Angular velocity from the IMU, body frame",
     "measured.position": "Position from the USBL, world frame NED",
+    "measured.time": "When each sensor measured what it tells",
 }
 _POSE = ("position", "quaternion", "attitude")
 # of thruster i: variables name[i], and what they are called within its terminal

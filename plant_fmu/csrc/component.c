@@ -33,6 +33,15 @@ static Status check_parameters(const Instance *instance)
         if (p->noise[PAIRS[i].deviation] > 0.0 && !(p->sensor_rate[PAIRS[i].sensor] > 0.0))
             return instance_refuse(instance, "%s = %.9g needs the sensor's rate to be above 0, so that there are samples",
                                    PAIRS[i].noise, p->noise[PAIRS[i].deviation]);
+    for (int i = 0; i < N_SENSORS; i++) {
+        static const char *const NAMES[N_SENSORS] = {"depth_sensor", "dvl", "imu", "compass", "usbl"};
+        if (p->delay[i] > 0.0 && !(p->sensor_rate[i] > 0.0))
+            return instance_refuse(instance, "%s.delay = %.9g needs the sensor's rate to be above 0, so that there are samples",
+                                   NAMES[i], p->delay[i]);
+        if (p->delay[i] * p->sensor_rate[i] > MAX_PENDING)
+            return instance_refuse(instance, "%s.delay = %.9g s at %.9g Hz leaves more than %d samples under way", NAMES[i],
+                                   p->delay[i], p->sensor_rate[i], MAX_PENDING);
+    }
     if (p->free_surface && !(p->hull_radius >= 1e-3))
         return instance_refuse(instance, "free_surface needs hull_radius to be 1 mm or more, so that buoyancy can fade");
     return STATUS_OK;
@@ -125,6 +134,17 @@ static bool possible(const Model *m)
     }
     for (int i = 0; i < N_MEASURED; i++)
         good = good && fabs(m->held.samples[i]) < 1e15;
+    for (int i = 0; i < N_SENSORS; i++) {
+        const double pending = m->held.pending[i];
+        good = good && m->held.told[i] >= 0.0 && m->held.told[i] < 1e15 && fabs(m->held.taken[i]) <= MAX_TIME &&
+               pending >= 0.0 && pending <= MAX_PENDING;
+        for (int j = 0; good && j < (int)pending; j++) {
+            const Pending *sample = &m->held.queue[i][j];
+            good = fabs(sample->taken) <= MAX_TIME && fabs(sample->due) <= 2.0 * MAX_TIME;
+            for (int k = 0; k < MAX_SENSOR_CHANNELS; k++)
+                good = good && fabs(sample->values[k]) < 1e15;
+        }
+    }
     for (int i = 0; i < 3; i++)
         good = good && fabs(m->held.drift.value[i]) < 1e6 && fabs(m->held.drift.slope[i]) < 1e9 &&
                m->held.drift.deviation[i] >= 0.0 && m->held.drift.deviation[i] < 1e6;

@@ -38,6 +38,9 @@ static void note_next_tick(Held *held)
     held->next_tick = INFINITY;
     for (int i = 0; i < N_CLOCKS; i++)
         held->next_tick = fmin(held->next_tick, next_tick_of(&held->clocks[i]));
+    for (int i = 0; i < N_SENSORS; i++)
+        if (held->pending[i] > 0.0)
+            held->next_tick = fmin(held->next_tick, held->queue[i][0].due);
 }
 
 const char *model_prepare(Model *m)
@@ -85,7 +88,7 @@ static void tick_current(Model *m, unsigned long long count)
     hold_current(m);
     for (int i = 0; i < 3; i++) {
         const double deviation = p->current_variation[i];
-        const unsigned stream = (unsigned)(N_MEASURED + i);
+        const unsigned stream = (unsigned)(CURRENT_STREAM + i);
         if (deviation == 0.0)
             continue;
         if (drift->deviation[i] == 0.0) /* an axis begins: from the process's own distribution */
@@ -97,9 +100,45 @@ static void tick_current(Model *m, unsigned long long count)
     drift->until = m->time + period;
 }
 
+/* Tells the oldest pending sample of a sensor. */
+static void tell(Held *held, int sensor)
+{
+    Pending *queue = held->queue[sensor];
+    int next = 0;
+
+    for (int i = 0; i < N_MEASURED; i++)
+        if (sensors_of_channel(i) == sensor)
+            held->samples[i] = queue[0].values[next++];
+    held->taken[sensor] = queue[0].taken;
+    held->told[sensor] += 1.0;
+    held->pending[sensor] -= 1.0;
+    memmove(queue, queue + 1, (MAX_PENDING - 1) * sizeof *queue);
+}
+
+/* Takes the sample number `count` of a sensor, to be told after its delay. */
+static void take_sample(Model *m, int sensor, unsigned long long count, const double ideal[N_MEASURED])
+{
+    Held *held = &m->held;
+    double sample[N_MEASURED];
+    int next = 0;
+
+    if (!sensors_sample(&m->plant.parameters, sensor, count, ideal, sample))
+        return;
+    if (held->pending[sensor] >= MAX_PENDING) /* the delay was longer when they were taken */
+        tell(held, sensor);
+    Pending *last = &held->queue[sensor][(int)held->pending[sensor]];
+    for (int i = 0; i < N_MEASURED; i++)
+        if (sensors_of_channel(i) == sensor)
+            last->values[next++] = sample[i];
+    last->taken = m->time;
+    last->due = m->time + m->plant.parameters.delay[sensor];
+    held->pending[sensor] += 1.0;
+}
+
 int model_tick(Model *m)
 {
     int ticked = 0, measured = 0;
+    double ideal[N_MEASURED];
 
     if (m->held.next_tick == INFINITY) /* no clock runs */
         return 0;
@@ -118,26 +157,35 @@ int model_tick(Model *m)
         if (i == CURRENT_CLOCK)
             tick_current(m, count);
         else {
-            if (!measured)
+            if (!measured) {
                 model_evaluate(m);
+                sensors_measure(&m->plant.parameters, m->state.rigid, m->outputs.rate.rigid, m->outputs.euler[2],
+                                m->outputs.altitude, ideal);
+            }
             measured = 1;
-            double ideal[N_MEASURED];
-            sensors_measure(&m->plant.parameters, m->state.rigid, m->outputs.rate.rigid, m->outputs.euler[2],
-                            m->outputs.altitude, ideal);
-            sensors_sample(&m->plant.parameters, i, count, ideal, m->held.samples);
+            take_sample(m, i, count, ideal);
         }
     }
+    for (int i = 0; i < N_SENSORS; i++)
+        while (m->held.pending[i] > 0.0 && m->held.queue[i][0].due <= m->time + 1e-9 + 1e-15 * fabs(m->time)) {
+            tell(&m->held, i);
+            ticked = 1;
+        }
     note_next_tick(&m->held);
     return ticked;
 }
 
 /* ---- evaluation -------------------------------------------------------------------------------------------- */
 
+/* Whether a sensor shows a sample. */
+static int holds(const Model *m, int sensor)
+{
+    return m->held.clocks[sensor].period > 0.0 && m->held.told[sensor] > 0.0;
+}
+
 int model_holds(const Model *m, int channel)
 {
-    const Clock *clock = &m->held.clocks[sensors_of_channel(channel)];
-
-    return clock->period > 0.0 && clock->samples > 0.0;
+    return holds(m, sensors_of_channel(channel));
 }
 
 /* Roll, pitch, yaw (zyx) of a quaternion. */
@@ -178,6 +226,8 @@ void model_evaluate(Model *m)
     for (int i = 0; i < N_MEASURED; i++)
         if (model_holds(m, i))
             o->measured[i] = m->held.samples[i];
+    for (int i = 0; i < N_SENSORS; i++)
+        o->stamp[i] = holds(m, i) ? m->held.taken[i] : m->held.clocks[i].period > 0.0 ? NO_SAMPLE : m->time;
 }
 
 int model_settle(Model *m)

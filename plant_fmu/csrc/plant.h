@@ -78,6 +78,11 @@ typedef struct {
     Real sensor_rate[N_SENSORS];             /* Hz, 0: continuous and without noise */
     Real noise[N_NOISES];                    /* standard deviations, in the channel's unit */
     Real bias[N_MEASURED];
+    Real velocity_scale_error;               /* of the DVL: part of the velocity that it tells too much */
+    Real delay[N_SENSORS];                   /* s, from a sample to when it is told */
+    Real loss_probability[N_SENSORS];        /* of each sample */
+    Real outlier_probability[N_SENSORS];     /* of each sample */
+    Real outlier_scale;                      /* standard deviation of an outlier, over that of the noise */
     int seed;                                /* of all noise and of the current's variation */
     Real substep;                            /* s, greatest integration step */
 } Parameters;
@@ -214,14 +219,21 @@ void actuators_tangent(const Parameters *parameters, const Parameters *dparamete
 void sensors_measure(const Parameters *parameters, const double rigid[N_RIGID], const double rate[N_RIGID],
                      double heading, double altitude, double measured[N_MEASURED]);
 
-/* Makes the sample number `count` of one sensor: what is measured now, with noise. */
-void sensors_sample(const Parameters *parameters, int sensor, unsigned long long count,
-                    const double measured[N_MEASURED], double held[N_MEASURED]);
+/* Makes the sample number `count` of one sensor: what is measured now, with noise. False if it is lost; nothing is then
+ * changed. Numbers that do not belong to the sensor stay. */
+int sensors_sample(const Parameters *parameters, int sensor, unsigned long long count,
+                   const double measured[N_MEASURED], double sample[N_MEASURED]);
 
 /* Which sensor a channel belongs to. */
 int sensors_of_channel(int channel);
 
 /* ---- random.c ---- */
+
+/* Streams of random numbers: noise of each channel, three of the current's knots and three of its beginning, then chances. */
+enum { CURRENT_STREAM = N_MEASURED, CHANCE_STREAM = CURRENT_STREAM + 6 };
+
+/* Two independent numbers, uniform in [0, 1), at a place of a seeded stream. */
+void random_uniform(int seed, unsigned stream, unsigned long long count, double out[2]);
 
 /* The standard normal number at a place of a seeded stream: the same at every call (Philox 4x32-10, Box-Muller). */
 double random_normal(int seed, unsigned stream, unsigned long long count);

@@ -19,13 +19,38 @@ static void philox(uint32_t c[4], uint32_t key0, uint32_t key1)
     }
 }
 
+/* Four words at a place of a stream. */
+static void draw(int seed, unsigned stream, unsigned long long count, uint32_t c[4])
+{
+    c[0] = (uint32_t)count;
+    c[1] = (uint32_t)(count >> 32);
+    c[2] = stream;
+    c[3] = 0;
+    philox(c, (uint32_t)seed, 0);
+}
+
+/* A number of 53 bits, uniform in [0, 1). */
+static double uniform(const uint32_t high, const uint32_t low)
+{
+    return ((double)(high >> 5) * 67108864.0 + (double)(low >> 6)) / 9007199254740992.0;
+}
+
+void random_uniform(int seed, unsigned stream, unsigned long long count, double out[2])
+{
+    uint32_t c[4];
+
+    draw(seed, stream, count, c);
+    out[0] = uniform(c[0], c[1]);
+    out[1] = uniform(c[2], c[3]);
+}
+
 double random_normal(int seed, unsigned stream, unsigned long long count)
 {
-    uint32_t c[4] = {(uint32_t)count, (uint32_t)(count >> 32), stream, 0};
+    uint32_t c[4];
 
-    philox(c, (uint32_t)seed, 0);
-    /* two uniform numbers of 53 bits, the first in (0, 1] */
+    draw(seed, stream, count, c);
+    /* the first in (0, 1] */
     const double u = ((double)(c[0] >> 5) * 67108864.0 + (double)(c[1] >> 6) + 1.0) / 9007199254740992.0;
-    const double v = ((double)(c[2] >> 5) * 67108864.0 + (double)(c[3] >> 6)) / 9007199254740992.0;
+    const double v = uniform(c[2], c[3]);
     return sqrt(-2.0 * log(u)) * cos(6.283185307179586 * v); /* Box-Muller */
 }

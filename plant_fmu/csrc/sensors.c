@@ -31,7 +31,7 @@ void sensors_measure(const Parameters *p, const double rigid[N_RIGID], const dou
     measured[MEASURED_ALTITUDE] = altitude;
     measured[MEASURED_HEADING] = heading;
     for (int i = 0; i < 3; i++) {
-        measured[MEASURED_VELOCITY + i] = nu[i];
+        measured[MEASURED_VELOCITY + i] = (1.0 + p->velocity_scale_error) * nu[i];
         /* specific force: acceleration less gravity, v' + w x v - g R^T e3 */
         measured[MEASURED_ACCELERATION + i] = rate[7 + i] + turning[i] - p->gravity * R[2][i];
         measured[MEASURED_ANGULAR_VELOCITY + i] = omega[i];
@@ -42,13 +42,24 @@ void sensors_measure(const Parameters *p, const double rigid[N_RIGID], const dou
     measured[MEASURED_HEADING] = remainder(measured[MEASURED_HEADING], TURN);
 }
 
-void sensors_sample(const Parameters *p, int sensor, unsigned long long count, const double measured[N_MEASURED],
-                    double held[N_MEASURED])
+int sensors_sample(const Parameters *p, int sensor, unsigned long long count, const double measured[N_MEASURED],
+                   double sample[N_MEASURED])
 {
+    double chance[2], scale = 1.0;
+
+    if (p->loss_probability[sensor] > 0.0 || p->outlier_probability[sensor] > 0.0) {
+        random_uniform(p->seed, CHANCE_STREAM + (unsigned)sensor, count, chance);
+        if (chance[0] < p->loss_probability[sensor])
+            return 0;
+        if (chance[1] < p->outlier_probability[sensor])
+            scale = p->outlier_scale;
+    }
     for (int i = 0; i < N_MEASURED; i++)
         if (SENSOR[i] == sensor) {
-            const double deviation = p->noise[NOISE[i]];
-            held[i] = measured[i] + (deviation > 0.0 ? deviation * random_normal(p->seed, (unsigned)i, count) : 0.0);
+            const double deviation = scale * p->noise[NOISE[i]];
+            sample[i] = measured[i] + (deviation > 0.0 ? deviation * random_normal(p->seed, (unsigned)i, count) : 0.0);
         }
-    held[MEASURED_HEADING] = remainder(held[MEASURED_HEADING], TURN);
+    if (sensor == COMPASS)
+        sample[MEASURED_HEADING] = remainder(sample[MEASURED_HEADING], TURN);
+    return 1;
 }

@@ -238,7 +238,7 @@ static void measured_tangent(const Model *m, const Model *seed, int starting, co
     dmeasured[MEASURED_ALTITUDE] = d->altitude;
     dmeasured[MEASURED_HEADING] = d->euler[2];
     for (int i = 0; i < 3; i++) {
-        dmeasured[MEASURED_VELOCITY + i] = dnu[i];
+        dmeasured[MEASURED_VELOCITY + i] = (1.0 + p->velocity_scale_error) * dnu[i] + dp->velocity_scale_error * nu[i];
         dmeasured[MEASURED_ACCELERATION + i] =
             d->rate.rigid[7 + i] + left[i] + right[i] - dp->gravity * R[2][i] - p->gravity * dR[2][i];
         dmeasured[MEASURED_ANGULAR_VELOCITY + i] = domega[i];
@@ -265,4 +265,6 @@ void model_tangent(const Model *m, const Model *seed, int starting, Model *tange
     euler_tangent((const double(*)[3])R, (const double(*)[3])dR, d->euler);
     d->altitude = dp->bottom_depth - seed->state.rigid[2];
     measured_tangent(m, seed, starting, (const double(*)[3])R, (const double(*)[3])dR, d, d->measured);
+    for (int i = 0; i < N_SENSORS; i++)
+        d->stamp[i] = m->held.clocks[i].period > 0.0 && !(starting && m->held.told[i] > 0.0) ? 0.0 : seed->time;
 }

@@ -21,7 +21,7 @@ FAMILIES = {
     "thrusters": ("thruster_matrix", "thrust_"),
     "wrench input": ("wrench_",),
     "surroundings": ("current", "bottom_", "free_surface", "gravity"),
-    "sensors": ("depth_sensor.", "dvl.", "imu.", "compass.", "usbl."),
+    "sensors": ("depth_sensor.", "dvl.", "imu.", "compass.", "usbl.", "outlier_scale"),
     "calculation": ("substep", "seed"),
 }
 _COLOURS = {"input": "#e69f00", "state": "#0072b2", "output": "#009e73", "parameter": "#cc79a7"}

@@ -26,3 +26,9 @@ def normal(seed, stream, count):
     u = ((c[0] >> 5) * 2**26 + (c[1] >> 6) + 1) / 2**53
     v = ((c[2] >> 5) * 2**26 + (c[3] >> 6)) / 2**53
     return math.sqrt(-2 * math.log(u)) * math.cos(2 * math.pi * v)
+
+
+def uniform(seed, stream, count):
+    """Two numbers in [0, 1)."""
+    c = philox((count & MASK, count >> 32, stream, 0), (seed, 0))
+    return [((c[i] >> 5) * 2**26 + (c[i + 1] >> 6)) / 2**53 for i in (0, 2)]

@@ -60,6 +60,7 @@ def random_values(slave, rng):
         "bottom_depth": 2.0,
         "bottom_time_constant": rng.choice([0.01, 0.3]),
         "compass.bias": 0.01,
+        "dvl.scale_error": 0.02,
     }
 
 

@@ -7,7 +7,7 @@ from scipy import stats
 from scipy.spatial.transform import Rotation
 
 from tests.plant_fmu.conftest import STATES
-from tests.plant_fmu.philox import KNOWN, normal, philox
+from tests.plant_fmu.philox import KNOWN, normal, philox, uniform
 
 CHANNELS = [
     "depth",
@@ -208,3 +208,99 @@ def test_late_in_a_long_run_a_sample_just_before_the_end_of_a_step_keeps_its_tim
     slave.fmu.doStep(1000.0, 0.01)
     measured, depth, speed = slave.get("measured.depth", "position.z", "der(position.z)")
     assert depth - measured == pytest.approx(1e-6 * speed, rel=1e-3)
+
+
+def test_a_sample_is_told_after_its_delay_with_the_time_it_was_taken(make_slave, fmi):
+    """Of a vehicle that sinks at 1 m/s, from a USBL of 2 Hz with 0.3 s of delay."""
+    slave = make_slave(fmi=fmi).start(
+        weight=1228.25, **{"velocity.w": 1.0, "usbl.rate": 2.0, "usbl.delay": 0.3, "depth_sensor.rate": 0.0}
+    )
+    depths = {}
+    for k in range(200):
+        depths[round(0.01 * k, 2)] = slave.get("position.z")[0]
+        told, taken, continuous = slave.get("measured.position.z", "measured.time.usbl", "measured.time.depth_sensor")
+        expected = np.floor((0.01 * k - 0.3 + 1e-9) / 0.5) * 0.5
+        if expected < 0.0:
+            assert taken == -1e12
+        else:
+            assert taken == pytest.approx(expected, abs=1e-9)
+            assert told == pytest.approx(depths[round(expected, 2)], abs=1e-12)
+        assert continuous == pytest.approx(0.01 * k, abs=1e-9)
+        slave.step(0.01)
+
+
+def test_samples_are_lost_and_outliers_by_their_own_numbers(make_slave, fmi):
+    """Sample k of sensor i has the chances at that place of stream 21 + i: of being lost, of being an outlier."""
+    slave = make_slave(fmi=fmi).start(
+        weight=1228.25,
+        outlier_scale=50.0,
+        seed=3,
+        **{
+            "usbl.rate": 10.0, "usbl.noise": 0.1, "usbl.loss_probability": 0.3, "usbl.outlier_probability": 0.2,
+            "r_G.z": 0.0, "compass.rate": 10.0, "compass.noise": 0.001, "compass.outlier_probability": 0.5,
+        },
+    )  # fmt: skip
+    told, lost, outliers = None, 0, 0
+    for k in range(60):
+        is_lost, is_outlier = uniform(3, 21 + 4, k)[0] < 0.3, uniform(3, 21 + 4, k)[1] < 0.2
+        if not is_lost:
+            told = 0.1 * (50.0 if is_outlier else 1.0) * normal(3, 12, k), pytest.approx(0.1 * k, abs=1e-9)
+        if told is not None:
+            assert slave.get("measured.position.x", "measured.time.usbl") == [pytest.approx(told[0], abs=1e-9), told[1]]
+        scale = 0.05 if uniform(3, 21 + 3, k)[1] < 0.5 else 0.001
+        assert slave.get("measured.heading")[0] == pytest.approx(scale * normal(3, 11, k), abs=1e-9)
+        lost, outliers = lost + is_lost, outliers + (is_outlier and not is_lost)
+        slave.step(0.1)
+    assert lost > 5 and outliers > 5
+
+
+def test_an_outage_begins_and_ends_while_it_runs(make_slave, fmi):
+    slave = make_slave(fmi=fmi).start(**{"dvl.rate": 10.0, "velocity.u": 1.0})
+    slave.step(0.95)
+    slave.set_values({"dvl.loss_probability": 1.0})
+    before = slave.get("measured.velocity.u", "measured.time.dvl")
+    slave.step(5.0)
+    assert slave.get("measured.velocity.u", "measured.time.dvl") == before
+    slave.set_values({"dvl.loss_probability": 0.0})
+    slave.step(0.1)
+    assert slave.get("measured.time.dvl")[0] == pytest.approx(6.0)
+
+
+def test_a_restored_state_has_the_samples_that_were_under_way(make_slave, fmi):
+    slave = make_slave(fmi=fmi).start(
+        **{"dvl.rate": 20.0, "dvl.delay": 0.3, "dvl.velocity_noise": 0.1, "dvl.loss_probability": 0.3, "wrench.X": 50.0}
+    )
+    names = ("measured.velocity.u", "measured.velocity.w", "measured.time.dvl")
+    slave.step(1.0)
+    state = slave.fmu.getFMUState() if fmi == 3 else slave.fmu.getFMUstate()
+    rows = []
+    for _ in range(2):
+        if fmi == 3:
+            slave.fmu.setFMUState(state)
+        else:
+            slave.fmu.setFMUstate(state)
+        rows.append([])
+        for k in range(20):
+            slave.fmu.doStep(1.0 + 0.05 * k, 0.05)
+            rows[-1].append(slave.get(*names))
+    assert rows[0] == rows[1]
+    assert len({tuple(row) for row in rows[0]}) > 8
+
+
+@pytest.mark.parametrize(
+    ("values", "said"),
+    [
+        ({"dvl.delay": 0.1}, "dvl.delay = 0.1 needs the sensor's rate"),
+        ({"imu.rate": 100.0, "imu.delay": 0.1}, "imu.delay = 0.1 s at 100 Hz leaves more than 8 samples under way"),
+    ],
+)
+def test_a_delay_that_cannot_be_is_refused(make_slave, fmi, values, said):
+    slave = make_slave(fmi=fmi)
+    with pytest.raises(FMICallException):
+        slave.start(**values)
+    assert said in slave.said[-1][1]
+
+
+def test_a_scale_error_is_part_of_the_velocity(make_slave, fmi):
+    slave = make_slave(fmi=fmi).start(**{"velocity.u": 2.0, "velocity.w": -1.0, "dvl.scale_error": 0.01})
+    assert slave.get("measured.velocity.u", "measured.velocity.w") == pytest.approx([2.02, -1.01])

@@ -161,9 +161,12 @@ def evaluate(v, n_thrusters, drift=(0, 0, 0), drift_slope=(0, 0, 0)):
     out["measured.altitude"] = out["altitude"]
     out["measured.heading"] = yaw + v["compass.bias"]
     for i, a in enumerate(AXES):
-        out[f"measured.velocity.{'uvw'[i]}"] = nu[i]
+        out[f"measured.velocity.{'uvw'[i]}"] = (1 + v["dvl.scale_error"]) * nu[i]
         out[f"measured.acceleration.{a}"] = specific[i] + v[f"imu.acceleration_bias.{a}"]
         rate = "pqr"[i]
         out[f"measured.angular_velocity.{rate}"] = omega[i] + v[f"imu.angular_velocity_bias.{rate}"]
         out[f"measured.position.{a}"] = v[f"position.{a}"]
+    out |= {
+        f"measured.time.{sensor}": v.get("time", 0.0) for sensor in ("depth_sensor", "dvl", "imu", "compass", "usbl")
+    }
     return out
