@@ -25,6 +25,10 @@ Output = Literal["wrench", "thrusters"]
 G = TypeVar("G", bound=tuple[float, ...])
 
 
+_AS_THE_GAINS_SAY = np.zeros(12)
+_AS_THE_GAINS_SAY.flags.writeable = False
+
+
 class VehicleState(NamedTuple):
     """What is measured of the vehicle.
 
@@ -41,6 +45,8 @@ class VehicleState(NamedTuple):
     quaternion: Array  # (4,) from body to world
     velocity_body: Array  # (6,) over ground, m/s, rad/s
     thruster_health: Array  # (m,) 1 working as far as one is told, 0 known to give nothing
+    deviation: Array = _AS_THE_GAINS_SAY  # (12,) standard deviations of position [m], velocity [m/s], attitude [rad],
+    # world axes, and rates [rad/s], body, of an estimate; 0: a measurement, whose noise is that of the law's gains
 
 
 class VehicleModel(NamedTuple):

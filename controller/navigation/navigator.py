@@ -1,0 +1,204 @@
+"""The navigation filter: pose, motion and their standard deviations from sensors alone.
+
+An error-state Kalman filter. The IMU moves the estimate, pressure sensor, DVL, compass and USBL correct it, each
+at its own rate, each sample at the time at which it was taken. It needs no model of the vehicle.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from controller.arithmetic import arctangent, cosine, hypotenuse, square
+from controller.compiling.function import CompiledFunction
+from controller.law import VehicleState
+from controller.navigation.corrections import CONFIRMED, correct_by_sensor
+from controller.navigation.estimate import (
+    ATTITUDE,
+    GYRO_BIAS,
+    POSITION,
+    VELOCITY,
+    NavigationMemory,
+    empty_memory,
+    set_first_covariance,
+)
+from controller.navigation.inertial import estimate_at, propagate
+from controller.navigation.measurements import (
+    ACCELERATION,
+    ANGULAR_VELOCITY,
+    COMPASS,
+    DEPTH,
+    DEPTH_SENSOR,
+    HEADING,
+    IMU,
+    N_SENSORS,
+    USBL,
+    Measurements,
+    SensorModel,
+    empty_measurements,
+)
+from controller.navigation.measurements import POSITION as MEASURED_POSITION
+from controller.quaternion import write_rotation
+from controller.stack_array import zeros
+
+Array = NDArray[np.float64]
+
+_NEVER = -1e11  # s, before any sample
+_FIX_DEVIATIONS, _FIX_DISTANCE = 6.0, 0.5  # standard deviations, and m, within which two fixes agree
+_LONGEST = 1.0  # s between two IMU samples, beyond which the filter starts anew
+_FAR = 3.0  # m, standard deviation of a coordinate beyond which it is called unknown
+_FAST = 0.5  # m/s, the same of the velocity
+_QUARTER_TURN = 1.5707963267948966  # rad
+
+
+def navigate(
+    measurements: Measurements, now: Array, sensors: SensorModel, memory: NavigationMemory, state: VehicleState
+) -> None:
+    """Take in what is new, and write the estimated state at this time, shape (1,) [s]; NaN where nothing is known."""
+    if measurements.times[IMU] > memory.sample_times[IMU]:
+        _take_imu_sample(measurements, sensors, memory)
+    if memory.started[0] == 0.0:
+        _start(measurements, sensors, memory)
+    else:
+        for sensor in range(N_SENSORS):
+            if sensor != IMU and measurements.times[sensor] > memory.sample_times[sensor]:
+                memory.sample_times[sensor] = measurements.times[sensor]
+                correct_by_sensor(memory, measurements, sensor, sensors)
+    _write_state(memory, sensors, now[0], state)
+
+
+def _take_imu_sample(measurements: Measurements, sensors: SensorModel, memory: NavigationMemory) -> None:
+    """Propagate to the new sample of the IMU, or begin at it."""
+    time, force, omega = measurements.times[IMU], zeros(3), zeros(3)
+    for i in range(3):
+        omega[i] = measurements.values[ANGULAR_VELOCITY + i] - memory.constants[i]
+        force[i] = measurements.values[ACCELERATION + i] - memory.constants[3 + i]
+    period = time - memory.time[0]
+    if memory.started[0] > 0.0 and period <= _LONGEST:
+        propagate(memory, force, omega, sensors, period)
+    else:
+        if memory.started[0] > 0.0:  # too long without a sample
+            memory.started[0] = 0.0
+            memory.previous_fix[:] = np.nan
+        for i in range(3):
+            memory.omega[i] = omega[i]
+    memory.time[0] = memory.sample_times[IMU] = time
+
+
+def _start(measurements: Measurements, sensors: SensorModel, memory: NavigationMemory) -> None:
+    """Start once IMU, compass, pressure sensor and USBL have given a sample, at rest, level by the accelerometers.
+
+    The USBL must have given two positions that agree, since the first may be an outlier.
+    """
+    times = measurements.times
+    latest = min(times[IMU], times[COMPASS], times[DEPTH_SENSOR], times[USBL])
+    if not latest > _NEVER or times[IMU] != memory.time[0] or not times[USBL] > memory.sample_times[USBL]:
+        return
+    memory.sample_times[USBL], agree = times[USBL], True
+    for i in range(3):
+        fix = measurements.values[MEASURED_POSITION + i]
+        agree = agree and abs(fix - memory.previous_fix[i]) < _FIX_DEVIATIONS * sensors.position + _FIX_DISTANCE
+        memory.previous_fix[i] = fix
+    if not agree:
+        return
+    for i in range(9):
+        memory.constants[i] = 0.0
+    f, memory.started[0] = measurements.values[ACCELERATION : ACCELERATION + 3], 1.0
+    roll, pitch = arctangent(-f[1], -f[2]), arctangent(f[0], hypotenuse(f[1], f[2]))
+    _set_attitude(memory.quaternion, roll, pitch, measurements.values[HEADING])
+    for i in range(3):
+        memory.position[i] = measurements.values[MEASURED_POSITION + i]
+        memory.velocity[i] = memory.acceleration[i] = 0.0
+    memory.position[2] = measurements.values[DEPTH]
+    memory.recorded[0] = 0
+    set_first_covariance(memory, sensors)
+    for sensor in range(N_SENSORS):
+        memory.rejected[sensor] = memory.accepted[sensor] = 0.0
+        memory.sample_times[sensor] = times[sensor]
+    memory.accepted[USBL] = CONFIRMED
+
+
+def _set_attitude(quaternion: Array, roll: float, pitch: float, yaw: float) -> None:
+    """Write the quaternion of Euler angles (zyx) [rad]."""
+    cr, sr = cosine(0.5 * roll), cosine(0.5 * roll - _QUARTER_TURN)
+    cp, sp = cosine(0.5 * pitch), cosine(0.5 * pitch - _QUARTER_TURN)
+    cy, sy = cosine(0.5 * yaw), cosine(0.5 * yaw - _QUARTER_TURN)
+    quaternion[0] = cr * cp * cy + sr * sp * sy
+    quaternion[1] = sr * cp * cy - cr * sp * sy
+    quaternion[2] = cr * sp * cy + sr * cp * sy
+    quaternion[3] = cr * cp * sy - sr * sp * cy
+
+
+def _write_state(memory: NavigationMemory, sensors: SensorModel, now: float, state: VehicleState) -> None:
+    """Write the state at a time [s] with its standard deviations."""
+    velocity, R, P = zeros(3), zeros(3, 3), memory.covariance
+    known = memory.started[0] > 0.0 and now - memory.time[0] <= _LONGEST
+    if known:
+        estimate_at(memory, now, state.position, velocity, state.quaternion)
+        write_rotation(state.quaternion, R)
+    fastest = 0.0
+    for i in range(3):
+        fastest = max(fastest, P[VELOCITY + i, VELOCITY + i])
+    for i in range(3):
+        state.deviation[i] = np.sqrt(P[POSITION + i, POSITION + i])
+        state.deviation[3 + i] = np.sqrt(P[VELOCITY + i, VELOCITY + i])
+        state.deviation[6 + i] = np.sqrt(P[ATTITUDE + i, ATTITUDE + i])
+        state.deviation[9 + i] = np.sqrt(P[GYRO_BIAS + i, GYRO_BIAS + i] + square(sensors.angular_velocity))
+        if not known or state.deviation[i] > _FAR:
+            state.position[i] = np.nan
+        state.velocity_body[i] = state.velocity_body[3 + i] = np.nan
+        if known:
+            state.velocity_body[3 + i] = memory.omega[i]
+            if fastest <= square(_FAST):
+                state.velocity_body[i] = R[0, i] * velocity[0] + R[1, i] * velocity[1] + R[2, i] * velocity[2]
+    if not known:
+        for i in range(4):
+            state.quaternion[i] = np.nan
+
+
+class Navigator:
+    """An estimate of the vehicle's state from samples of its sensors.
+
+    Parameters
+    ----------
+    sensors : SensorModel
+        Standard deviations of the sensors' errors.
+    state : VehicleState
+        Receives the estimate.
+
+    Attributes
+    ----------
+    measurements : Measurements
+        To be filled before each call of `step`.
+    memory : NavigationMemory
+        Estimate and covariance.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from controller import VehicleState
+    >>> from controller.navigation import Navigator, SensorModel
+    >>> state = VehicleState(np.zeros(3), np.zeros(4), np.zeros(6), np.ones(8), np.zeros(12))
+    >>> navigator = Navigator(SensorModel(), state)
+    >>> navigator.measurements.values[:] = [5.0, *[0.0] * 6, -9.81, *[0.0] * 4, 1.0, 2.0, 5.0]
+    >>> for time in (0.0, 1.0):  # a first position is not believed before the second
+    ...     navigator.measurements.times[:] = time
+    ...     navigator.step(time)
+    >>> state.position
+    array([1., 2., 5.])
+    """
+
+    def __init__(self, sensors: SensorModel, state: VehicleState) -> None:
+        self.sensors, self.state = sensors, state
+        self.measurements, self.memory = empty_measurements(), empty_memory()
+        self._now, self._step = np.zeros(1), CompiledFunction(navigate)
+
+    @property
+    def started(self) -> bool:
+        """Whether there is an estimate."""
+        return bool(self.memory.started[0] > 0.0)
+
+    def step(self, time: float) -> None:
+        """Take in the measurements, and write the state at a time [s]."""
+        self._now[0] = time
+        self._step(self.measurements, self._now, self.sensors, self.memory, self.state)

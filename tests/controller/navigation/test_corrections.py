@@ -1,0 +1,163 @@
+"""Corrections against differences of what a sensor would tell, and against a Kalman filter of plain matrices."""
+
+import copy
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from controller.navigation.corrections import correct_by_sensor
+from controller.navigation.estimate import N_ERRORS, empty_memory, set_first_covariance
+from controller.navigation.inertial import propagate
+from controller.navigation.measurements import COMPASS, DEPTH_SENSOR, DVL, USBL, SensorModel, empty_measurements
+
+SENSORS = SensorModel()
+PLACES = {DEPTH_SENSOR: slice(0, 1), DVL: slice(1, 4), COMPASS: slice(11, 12), USBL: slice(12, 15)}
+NOISE = {DEPTH_SENSOR: 0.002, DVL: 0.005, COMPASS: 0.0035, USBL: 0.15}
+
+
+def rotation(quaternion):
+    return Rotation.from_quat(np.asarray(quaternion)[[1, 2, 3, 0]])
+
+
+def told(memory, sensor):
+    """What a sensor without noise tells of the state that a memory has as its estimate."""
+    R = rotation(memory.quaternion)
+    if sensor == DEPTH_SENSOR:
+        return np.array([memory.position[2] + memory.constants[7]])
+    if sensor == DVL:
+        return (1.0 + memory.constants[8]) * R.inv().apply(memory.velocity)
+    if sensor == COMPASS:
+        return np.array([R.as_euler("ZYX")[0] + memory.constants[6]])
+    return memory.position.copy()
+
+
+def moved(memory, error):
+    """The state that is an error off the estimate of a memory."""
+    off = copy.deepcopy(memory)
+    off.position[:] += error[:3]
+    off.velocity[:] += error[3:6]
+    off.quaternion[:] = (Rotation.from_rotvec(error[6:9]) * rotation(off.quaternion)).as_quat()[[3, 0, 1, 2]]
+    off.constants[:] += error[9:]
+    return off
+
+
+def begun(rng, age=0.0):
+    """An estimate that has moved for some time; with what it was `age` before, and what it was told since."""
+    memory = empty_memory()
+    memory.position[:], memory.velocity[:] = rng.normal(size=3), rng.normal(size=3)
+    tilted = Rotation.from_euler("ZYX", rng.uniform([-3.0, -0.6, -0.6], [3.0, 0.6, 0.6]))
+    memory.quaternion[:] = tilted.as_quat()[[3, 0, 1, 2]]
+    memory.constants[:] = rng.normal(size=9) * [*[0.01] * 3, *[0.1] * 3, 0.02, 0.02, 0.01]
+    memory.time[0] = memory.started[0] = 1.0
+    samples = rng.normal(size=3) * 0.3 + [0.0, 0.0, -9.8], rng.normal(size=3) * 0.2
+    memory.omega[:] = samples[1]
+    propagate(memory, *samples, SENSORS, 0.01)
+    before = copy.deepcopy(memory)
+    for _ in range(round(age / 0.01)):
+        propagate(memory, *samples, SENSORS, 0.01)
+    half = rng.normal(size=(N_ERRORS, N_ERRORS))
+    scale = np.sqrt([*[0.1] * 3, *[0.05] * 3, *[0.02] * 3, *[0.002] * 3, *[0.02] * 3, 0.02, 0.02, 0.005])
+    memory.covariance[:] = half @ half.T / N_ERRORS * np.outer(scale, scale) * 0.002
+    return memory, before, samples
+
+
+def rows_by_differences(memory, sensor):
+    step, rows = 1e-6, []
+    for i in range(N_ERRORS):
+        error = np.zeros(N_ERRORS)
+        error[i] = step
+        difference = told(moved(memory, error), sensor) - told(moved(memory, -error), sensor)
+        rows.append((difference + np.pi) % (2.0 * np.pi) - np.pi if sensor == COMPASS else difference)
+    return np.array(rows).T / (2.0 * step)
+
+
+@pytest.mark.parametrize("sensor", list(PLACES))
+def test_a_sample_corrects_as_by_plain_matrices(sensor):
+    rng = np.random.default_rng(sensor)
+    for _ in range(10):
+        memory, _, _ = begun(rng)
+        H, P = rows_by_differences(memory, sensor), memory.covariance.copy()
+        S = H @ P @ H.T + NOISE[sensor] ** 2 * np.eye(len(H))
+        off = rng.multivariate_normal(np.zeros(len(H)), S) * 0.5
+        measurements = empty_measurements()
+        measurements.values[PLACES[sensor]] = told(memory, sensor) + off
+        K = P @ H.T @ np.linalg.inv(S)
+        expected, error = moved(memory, K @ off), np.linalg.inv(S)
+        measurements.times[sensor] = memory.time[0]
+        correct_by_sensor(memory, measurements, sensor, SENSORS)
+        assert memory.covariance == pytest.approx((np.eye(N_ERRORS) - K @ H) @ P, rel=1e-5, abs=1e-9)
+        for ours, theirs in zip(memory[:4], expected[:4], strict=True):
+            assert ours == pytest.approx(theirs, abs=2e-6)
+        assert memory.innovations[sensor, 0] == pytest.approx(off @ error @ off, rel=1e-5)
+        assert memory.innovations[sensor, 1] == len(H)
+
+
+@pytest.mark.parametrize("sensor", list(PLACES))
+def test_a_late_sample_corrects_what_has_become_of_its_error(sensor):
+    """Errors 0.1 s ago, carried on: a sample of then, told now, corrects what has become of them, to second order."""
+    rng, late = np.random.default_rng(10 + sensor), []
+    for _ in range(6):
+        memory, before, samples = begun(rng, age=0.1)
+        error = rng.normal(size=N_ERRORS) * [*[1e-4] * 3, *[1e-3] * 3, *[1e-4] * 3, *[1e-3] * 3, *[1e-4] * 6]
+        truth = moved(before, error)  # with the same samples of the IMU, of which it knows the errors
+        for _ in range(10):
+            propagate(truth, samples[0] - error[12:15], samples[1] - error[9:12], SENSORS, 0.01)
+        R = (rotation(truth.quaternion) * rotation(memory.quaternion).inv()).as_rotvec()
+        now = np.r_[truth.position - memory.position, truth.velocity - memory.velocity, R, error[9:]]
+        # where the errors of now are all that is uncertain, and are known to be a multiple of these
+        memory.covariance[:] = np.outer(now, now) * 1e12
+        measurements = empty_measurements()
+        measurements.values[PLACES[sensor]] = told(moved(before, error), sensor)
+        exact = SENSORS._replace(depth=0.0, velocity=0.0, heading=0.0, position=0.0)
+        measurements.times[sensor] = before.time[0]
+        correct_by_sensor(memory, measurements, sensor, exact)
+        left = np.r_[truth.position - memory.position, truth.velocity - memory.velocity]
+        # a part g of the error was taken away: its row made `expected` of it, of the samples' `off`
+        off = np.linalg.norm(told(moved(before, error), sensor) - told(before, sensor))
+        g = 1.0 - left @ now[:6] / (now[:6] @ now[:6])
+        assert off / g == pytest.approx(off, rel=0.05, abs=1.2e-5)
+        late.append(off)
+    assert np.mean(late) > 5e-5  # to which what came later adds up to 1e-4
+
+
+def test_an_outlier_is_rejected_and_a_third_in_a_row_believed():
+    memory, _, _ = begun(np.random.default_rng(5))
+    set_first_covariance(memory, SENSORS)
+    memory.covariance[:3, :3], memory.accepted[USBL] = 1e-4 * np.eye(3), 3.0
+    before, measurements = memory.position.copy(), empty_measurements()
+    measurements.values[12:15] = before + np.array([5.0, 0.0, 0.0])
+    for k in range(2):
+        measurements.times[USBL] = memory.time[0]
+        correct_by_sensor(memory, measurements, USBL, SENSORS)
+        assert np.array_equal(memory.position, before) and memory.rejected[USBL] == k + 1.0
+    measurements.times[USBL] = memory.time[0]
+    correct_by_sensor(memory, measurements, USBL, SENSORS)
+    assert memory.position[0] == pytest.approx(before[0] + 5.0, abs=0.05) and memory.rejected[USBL] == 0.0
+    assert memory.innovations[USBL, 2] == 3.0
+    measurements.values[12:15] = before  # which was an outlier, too: the next contradicts it
+    correct_by_sensor(memory, measurements, USBL, SENSORS)
+    assert memory.position[0] == pytest.approx(before[0], abs=0.05)
+
+
+def test_headings_are_compared_round_the_circle():
+    memory, _, _ = begun(np.random.default_rng(6))
+    set_first_covariance(memory, SENSORS)
+    memory.quaternion[:] = Rotation.from_euler("Z", np.pi - 0.01).as_quat()[[3, 0, 1, 2]]
+    memory.constants[6] = 0.0
+    measurements = empty_measurements()
+    measurements.values[11] = -np.pi + 0.01
+    measurements.times[COMPASS] = memory.time[0]
+    correct_by_sensor(memory, measurements, COMPASS, SENSORS)
+    yaw = rotation(memory.quaternion).as_euler("ZYX")[0] + memory.constants[6]
+    assert abs((yaw - (np.pi + 0.01) + np.pi) % (2 * np.pi) - np.pi) < 1e-3
+
+
+def test_a_compass_tells_nothing_of_a_vehicle_that_stands_on_its_stern():
+    memory, _, _ = begun(np.random.default_rng(7))
+    memory.quaternion[:] = Rotation.from_euler("Y", 1.5).as_quat()[[3, 0, 1, 2]]
+    before = copy.deepcopy(memory)
+    measurements = empty_measurements()
+    measurements.times[COMPASS] = memory.time[0]
+    correct_by_sensor(memory, measurements, COMPASS, SENSORS)
+    assert np.array_equal(memory.covariance, before.covariance)

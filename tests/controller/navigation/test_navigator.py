@@ -1,0 +1,151 @@
+"""The navigation filter as a whole, on measurements of a motion that is known."""
+
+import numpy as np
+import pytest
+from scipy.integrate import cumulative_trapezoid
+from scipy.spatial.transform import Rotation
+
+from controller import VehicleState
+from controller.navigation import Navigator, SensorModel
+from controller.navigation.measurements import COMPASS, DEPTH_SENSOR, DVL, IMU, SENSORS, USBL
+
+MODEL = SensorModel()
+
+
+def told():
+    return VehicleState(np.zeros(3), np.zeros(4), np.zeros(6), np.ones(8), np.zeros(12))
+
+
+def level(navigator, time, position=(1.0, 2.0, 5.0), heading=0.4, sensors=range(5)):
+    """Write what sensors of a vehicle at rest tell."""
+    values, times = navigator.measurements
+    values[0], values[1:4], values[5:8], values[8:11] = position[2], 0.0, (0.0, 0.0, -9.81), 0.0
+    values[11], values[12:15] = heading, position
+    for sensor in sensors:
+        times[sensor] = time
+
+
+def rest(navigator, seconds, first=0.0, sensors=range(5)):
+    for k in range(round(seconds / 0.01)):  # the USBL once a second
+        level(navigator, first + 0.01 * k, sensors=[sensor for sensor in sensors if sensor != USBL or k % 100 == 0])
+        navigator.step(first + 0.01 * k)
+    return navigator.state
+
+
+@pytest.mark.parametrize("missing", [DEPTH_SENSOR, IMU, COMPASS, USBL])
+def test_nothing_is_known_before_each_sensor_that_is_needed_has_told_something(missing):
+    navigator = Navigator(MODEL, told())
+    state = rest(navigator, 0.1, sensors=[sensor for sensor in range(5) if sensor != missing])
+    for part in state[:3]:
+        assert np.isnan(part).all(), SENSORS[missing]
+
+
+def test_a_vehicle_at_rest_is_found():
+    state = rest(Navigator(MODEL, told()), 5.0)
+    assert state.position == pytest.approx([1.0, 2.0, 5.0], abs=1e-3)
+    assert state.velocity_body == pytest.approx(np.zeros(6), abs=1e-3)
+    yaw, pitch, roll = Rotation.from_quat(state.quaternion[[1, 2, 3, 0]]).as_euler("ZYX")
+    assert (yaw, pitch, roll) == pytest.approx((0.4, 0.0, 0.0), abs=1e-3)
+    assert state.deviation[2] == pytest.approx(MODEL.depth_bias, rel=0.1)  # a constant error is not averaged out
+    assert state.deviation[8] == pytest.approx(MODEL.heading_bias, rel=0.1)
+    assert state.deviation[:2].max() < 0.08 and state.deviation[3:6].max() < 0.002
+
+
+@pytest.mark.parametrize("tilt", [0.0, 1.0, 3.0])
+def test_it_starts_however_the_vehicle_lies(tilt):
+    navigator, turned = Navigator(MODEL, told()), Rotation.from_euler("ZYX", [0.4, 0.3, tilt])
+    for time in (0.0, 0.5):
+        level(navigator, time)
+        navigator.measurements.values[5:8] = turned.inv().apply([0.0, 0.0, -9.81])
+        navigator.step(time)
+    ours = Rotation.from_quat(navigator.state.quaternion[[1, 2, 3, 0]])
+    assert (ours * turned.inv()).magnitude() < 1e-9
+
+
+def test_what_is_lost_for_long_is_called_unknown_and_what_is_measured_stays():
+    """DVL and USBL tell nothing any more: velocity and position get lost, depth and attitude do not."""
+    navigator = Navigator(MODEL, told())
+    rest(navigator, 3.0)
+    lost_velocity = lost_position = None
+    for k in range(60):
+        state = rest(navigator, 1.0, 3.0 + k, sensors=[DEPTH_SENSOR, IMU, COMPASS])
+        if lost_velocity is None and np.isnan(state.velocity_body[0]):
+            lost_velocity = k
+        if lost_position is None and np.isnan(state.position[0]):
+            lost_position = k
+        assert state.position[2] == pytest.approx(5.0, abs=0.01)
+        assert np.isfinite(state.quaternion).all() and np.isfinite(state.velocity_body[3:]).all()
+    assert lost_velocity is not None and lost_velocity > 10
+    assert lost_position is not None and lost_position > 10
+    state = rest(navigator, 3.0, 63.0)
+    assert state.position == pytest.approx([1.0, 2.0, 5.0], abs=0.05)
+
+
+def test_without_the_imu_nothing_is_known_and_afterwards_it_starts_anew():
+    navigator = Navigator(MODEL, told())
+    rest(navigator, 1.0)
+    state = rest(navigator, 2.0, 1.0, sensors=[DEPTH_SENSOR, DVL, COMPASS, USBL])
+    assert np.isnan(state.position).all() and np.isnan(state.quaternion).all()
+    state = rest(navigator, 2.0, 3.0)
+    assert state.position == pytest.approx([1.0, 2.0, 5.0], abs=0.01)
+
+
+def test_a_first_fix_that_the_next_contradicts_is_not_believed():
+    navigator = Navigator(MODEL, told())
+    for k in range(301):
+        level(navigator, 0.01 * k, sensors=[DEPTH_SENSOR, DVL, IMU, COMPASS])
+        if k % 100 == 0:
+            level(navigator, 0.01 * k, position=(1.0, 2.0 + (7.0 if k == 0 else 0.0), 5.0), sensors=[USBL])
+        navigator.step(0.01 * k)
+        assert np.isnan(navigator.state.position[0]) == (k < 200)
+    assert navigator.state.position[1] == pytest.approx(2.0, abs=1e-3)
+
+
+def test_a_filter_is_consistent_on_a_motion_of_its_own():
+    """Circles with a swell, by 30 sets of noise and constant errors; NEES and NIS within 99.9 % of a consistent one."""
+    rng, h, runs = np.random.default_rng(11), 0.01, 30
+    nees, nis = [], np.zeros((5, 2))
+    for _ in range(runs):
+        state = told()
+        navigator = Navigator(MODEL, state)
+        scale = [*[MODEL.angular_velocity_bias] * 3, *[MODEL.acceleration_bias] * 3, MODEL.heading_bias,
+                 MODEL.depth_bias, MODEL.velocity_scale]  # fmt: skip
+        constants, phase = rng.normal(size=9) * scale, rng.uniform(0.0, 6.0)
+        values, times = navigator.measurements
+        yaw = 0.3 * np.arange(0, 12.0, h) + phase
+        R = Rotation.from_euler("ZYX", np.c_[yaw, 0.1 * np.sin(yaw), 0.15 * np.cos(2.0 * yaw)])
+        t = np.arange(len(yaw)) * h
+        velocity = np.c_[0.6 * np.cos(yaw), 0.6 * np.sin(yaw), 0.1 * np.sin(0.7 * t)]
+        position = np.array([1.0, 2.0, 5.0]) + cumulative_trapezoid(velocity, dx=h, axis=0, initial=0.0)
+        acceleration = np.diff(velocity, axis=0, prepend=velocity[:1]) / h
+        turn = (R[:-1].inv() * R[1:]).as_rotvec() / h
+        omega = np.r_[turn[:1], 0.5 * (turn + np.r_[turn[1:], turn[-1:]])]
+        middle = Rotation.concatenate([R[:1], R[:-1] * Rotation.from_rotvec(0.5 * h * turn)])
+        for k in range(len(t)):
+            values[5:8] = middle[k].inv().apply(acceleration[k] - [0.0, 0.0, 9.81]) + constants[3:6]
+            values[5:8] += rng.normal(size=3) * MODEL.acceleration
+            values[8:11] = omega[k] + constants[:3] + rng.normal(size=3) * MODEL.angular_velocity
+            times[IMU] = t[k]
+            if k % 5 == 0:
+                values[0], times[DEPTH_SENSOR] = position[k, 2] + constants[7] + rng.normal() * MODEL.depth, t[k]
+            if k % 12 == 0:
+                body = (1.0 + constants[8]) * R[k].inv().apply(velocity[k])
+                values[1:4], times[DVL] = body + rng.normal(size=3) * MODEL.velocity, t[k]
+            if k % 10 == 0:
+                values[11], times[COMPASS] = yaw[k] + constants[6] + rng.normal() * MODEL.heading, t[k]
+            if k % 100 == 30 or k == 35:  # told 0.3 s late; the first twice, to be believed
+                values[12:15] = position[k - 30] + rng.normal(size=3) * MODEL.position
+                times[USBL] = t[k] - 0.3
+            navigator.step(t[k])
+        memory = navigator.memory
+        left = (R[-1] * Rotation.from_quat(memory.quaternion[[1, 2, 3, 0]]).inv()).as_rotvec()
+        error = np.r_[
+            position[-1] - memory.position, velocity[-1] - memory.velocity, left, constants - memory.constants
+        ]
+        nees.append(error @ np.linalg.solve(memory.covariance, error))
+        nis += memory.innovations[:, :2]
+    deviation = np.sqrt(2.0 * 18.0 / runs)
+    assert np.mean(nees) == pytest.approx(18.0, abs=3.3 * deviation)
+    for sensor in (DEPTH_SENSOR, DVL, COMPASS, USBL):
+        total, degrees = nis[sensor]
+        assert total / degrees == pytest.approx(1.0, abs=3.3 * np.sqrt(2.0 / degrees) + 0.02), SENSORS[sensor]
