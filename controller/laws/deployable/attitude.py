@@ -19,7 +19,7 @@ from controller.arithmetic import cosine, length3, square
 from controller.laws.deployable.estimate import Estimate
 from controller.laws.deployable.gains import DeployableGains
 from controller.laws.deployable.linear_algebra import copy
-from controller.laws.deployable.model import Dynamics, free_wrench
+from controller.laws.deployable.model import Dynamics, Loads, free_wrench
 from controller.quaternion import down_parts, error_parts, rate_parts
 from controller.regions.kinds import FIRST_OF_ATTITUDE
 from controller.regions.region_set import PackedRegions, attitude_clearance
@@ -80,10 +80,12 @@ def measure_moment(
         False before rates were measured twice.
     """
     started = bool(attitude.started[0] > 0.0)
-    mean, none, water, known, other, rate = zeros(3), zeros(3), zeros(3), zeros(6), zeros(6), zeros(6)
+    mean, water, known, other, rate = zeros(3), zeros(3), zeros(6), zeros(6), zeros(6)
+    loads = Loads(water, zeros(1), zeros(3))  # current alone: weight and buoyancy are what is looked for
+    copy(estimate.water_velocity, water)
     for i in range(3):
         mean[i] = 0.5 * (attitude.last_omega[i] + omega[i])
-    free_wrench(dynamics, R, estimate.velocity, mean, estimate.water_velocity, 0.0, none, known)
+    free_wrench(dynamics, R, estimate.velocity, mean, loads, known)
     for i in range(3):
         a, b = (i + 1) % 3, (i + 2) % 3
         rate[3 + i] = (omega[i] - attitude.last_omega[i]) / period
@@ -95,7 +97,7 @@ def measure_moment(
     for axis in range(2):  # Munk's moment depends on the current
         copy(estimate.water_velocity, water)
         water[axis] += _CURRENT_STEP
-        free_wrench(dynamics, R, estimate.velocity, mean, water, 0.0, none, other)
+        free_wrench(dynamics, R, estimate.velocity, mean, loads, other)
         for i in range(3):
             attitude.by_current[i, axis] = (other[3 + i] - known[3 + i]) / _CURRENT_STEP
     for i in range(3):

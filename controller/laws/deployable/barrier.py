@@ -28,7 +28,7 @@ from controller.arithmetic import exponential, length3, square
 from controller.laws.deployable.attitude import integrate_attitude
 from controller.laws.deployable.attraction import approach_speed
 from controller.laws.deployable.faces import FACES, face_ahead, has_faces
-from controller.laws.deployable.gains import DeployableGains
+from controller.laws.deployable.gains import SPREADS, DeployableGains
 from controller.laws.deployable.linear_algebra import copy
 from controller.laws.deployable.quadratic_program import Workspace
 from controller.regions import Box, DepthBand, HalfSpace, Prism
@@ -42,7 +42,7 @@ _ATTITUDE = FIRST_OF_ATTITUDE  # shapes from it on depend on attitude
 _FLAT = (Box.kind, Prism.kind, DepthBand.kind, HalfSpace.kind)
 _IMPULSE = 0.5  # s, for which what is asked for is taken to act where faces ahead are looked for
 _LN_10 = 2.302585092994046
-_AHEAD = 0.1  # s, over which the rate of a gradient is measured
+_AHEAD = 1e-4  # s, of the difference quotient of a gradient: exact to a part of 1e-4, rounding included
 _FIRM = (3.0, 3.0)  # decades: price of slack against missing the desired force, at weight 0, and added at weight 1
 _LEAP = 0.5  # cosine of the turn of a gradient within that time, beyond which it is a jump
 _MARGIN_OF_ATTITUDE = 0.02  # rad
@@ -60,6 +60,7 @@ class RegionObservation(NamedTuple):
     later_gradients: Array  # (n, 3)
     later_rotation_gradients: Array  # (n, 3)
     later_clearances: Array  # (n,)
+    bound: Array  # (1,) m, of `write_rows`: what clearances may fall to, if no barrier yields
 
 
 class Motion(NamedTuple):
@@ -68,18 +69,20 @@ class Motion(NamedTuple):
     position: Array  # (3,) m, NED
     velocity: Array  # (6,) m/s over ground, rad/s
     free_acceleration: Array  # (6,) m/s2, rad/s2: acceleration without thrust
-    thruster_acceleration: Array  # (6, m) m/s2, rad/s2: acceleration of one newton of each thruster
+    thruster_acceleration: Array  # (6, m) m/s2, rad/s2: acceleration of one commanded newton of each thruster
     mass: float  # kg
     inertia: float  # kg m2, mean
     braking: float  # m/s2 that is always available
-    position_spread: float  # m, uncertainty of the position: of the estimate, and between two steps
+    position_spread: float  # m, by which the position is uncertain between two steps
+    position_variance: Array  # (3,) m2, NED, of the estimate
+    attitude_deviation: float  # rad, of the estimate, standard deviation
 
 
 def empty_observation(n: int) -> RegionObservation:
     """Return an observation of `n` regions, all zero."""
     return RegionObservation(
         np.zeros(n), np.zeros((n, 3)), np.zeros((n, 3)), np.zeros(n), np.zeros((n, 3)),
-        np.zeros(n), np.zeros((n, 3)), np.zeros((n, 3)), np.zeros(n),
+        np.zeros(n), np.zeros((n, 3)), np.zeros((n, 3)), np.zeros(n), np.zeros(1),
     )  # fmt: skip
 
 
@@ -95,7 +98,9 @@ def observe_regions(
         for i in range(r.kinds.size):
             s.later_shifts[i, axis] = r.shifts[i, axis] + _AHEAD * r.velocities[i, axis]
     integrate_attitude(quaternion, velocity[3:], _AHEAD, attitude)
-    moved = PackedRegions(r.kinds, r.signs, r.offsets, r.numbers, s.later_shifts, r.velocities, r.gains, r.hard)
+    moved = PackedRegions(
+        r.kinds, r.signs, r.offsets, r.numbers, s.later_shifts, r.velocities, r.gains, r.hard, r.deviations
+    )
     evaluate_packed(
         moved, place, attitude, s.later_values, s.later_gradients, s.later_rotation_gradients, s.later_clearances
     )
@@ -135,6 +140,32 @@ def gradient_rate(kind: int, sign: float, n: Array, later: Array, velocity: Arra
     return turning
 
 
+def _margin(n: Array, motion: Motion, deviation: float, of_attitude: bool, gains: DeployableGains) -> float:
+    """Return the margin [m, or rad] of a clearance with slope n, by how uncertain vehicle and region are.
+
+    `deviation` [m] is that of the region.
+    """
+    variance, along, turned = 0.0, 0.0, 0.0
+    for axis in range(3):
+        variance += square(n[axis]) * (motion.position_variance[axis] + square(deviation))
+        along += square(n[axis])
+        turned += square(n[3 + axis])
+    spread: float = SPREADS * np.sqrt(variance) + np.sqrt(along) * motion.position_spread
+    if not of_attitude:
+        return gains.margin + spread
+    return _MARGIN_OF_ATTITUDE + spread + SPREADS * motion.attitude_deviation * float(np.sqrt(turned))
+
+
+def _stopping_distance(
+    relative: Array, wanted: Array, braking: float, gains: DeployableGains, path_velocity: Array
+) -> float:
+    """Return the distance [m] in which the vehicle stops, from the velocity that it will have, which it writes."""
+    for axis in range(3):
+        path_velocity[axis] = relative[axis] + _IMPULSE * wanted[axis]
+    speed = length3(path_velocity[0], path_velocity[1], path_velocity[2])
+    return speed * (speed / (2.0 * braking) + 1.0 / gains.barrier_slope + 1.0 / gains.barrier_rate)
+
+
 def _desired_acceleration(motion: Motion, nominal: Array, out: Array) -> None:
     """Write the acceleration [m/s2] that desired thruster forces [N] give, shape (3,)."""
     for axis in range(3):
@@ -155,11 +186,14 @@ def write_rows(
 ) -> int:
     """Write the constraint of each hard region that the thrusters could violate; return the number of rows.
 
+    And the bound of the clearances [m], by h and psi, whose fall below zero lasts: min(h, psi / kappa) beside `margin`,
+    which covers an acceleration that is wrong by rate kappa margin.
+
     Parameters
     ----------
     work : Workspace
         Receives rows, right sides and prices.
-    observation : Sight
+    observation : RegionObservation
         From `observe_regions`.
     regions : PackedRegions
         The n regions.
@@ -178,7 +212,7 @@ def write_rows(
         Rows written, (1 + FACES) n at most.
     """
     rows, n, later_gradient, relative, path_velocity = 0, zeros(6), zeros(6), zeros(6), zeros(3)
-    wanted = zeros(3)
+    wanted, bound = zeros(3), 0.0
     _desired_acceleration(motion, work.nominal, wanted)
     for i in range(regions.kinds.size):
         of_attitude = regions.kinds[i] >= _ATTITUDE
@@ -186,14 +220,12 @@ def write_rows(
             observation.gradients, observation.rotation_gradients, i, of_attitude, n
         ):
             continue
-        braking, margin, scale = motion.braking, gains.margin + motion.position_spread, square(motion.mass)
-        if of_attitude:
-            along, turned = (
-                square(n[0]) + square(n[1]) + square(n[2]),
-                square(n[3]) + square(n[4]) + square(n[5]),
-            )  # rad2/m2, 1
-            braking, margin = gains.turning_deceleration, _MARGIN_OF_ATTITUDE + np.sqrt(along) * motion.position_spread
-            scale = square(motion.mass) * along + square(motion.inertia) * turned
+        braking = gains.turning_deceleration if of_attitude else motion.braking
+        margin = _margin(n, motion, regions.deviations[i], of_attitude, gains)
+        scale = square(motion.mass)
+        if of_attitude:  # by the slopes over place [rad2/m2] and attitude [1]
+            scale *= square(n[0]) + square(n[1]) + square(n[2])
+            scale += square(motion.inertia) * (square(n[3]) + square(n[4]) + square(n[5]))
         price = exponential(_LN_10 * (-_FIRM[0] - _FIRM[1] * weights[i])) / max(scale, 1e-9)
         for axis in range(6):
             relative[axis] = motion.velocity[axis] - (regions.velocities[i, axis] if axis < 3 else 0.0)
@@ -204,10 +236,7 @@ def write_rows(
             turning = gradient_rate(regions.kinds[i], regions.signs[i], n, later_gradient, relative)
         distance, reach, faces = observation.clearances[i], 0.0, 1
         if not of_attitude and has_faces(regions.kinds[i], regions.signs[i]):
-            for axis in range(3):
-                path_velocity[axis] = relative[axis] + _IMPULSE * wanted[axis]
-            speed = length3(path_velocity[0], path_velocity[1], path_velocity[2])
-            reach = margin + speed * (speed / (2.0 * braking) + 1.0 / gains.barrier_slope + 1.0 / gains.barrier_rate)
+            reach = margin + _stopping_distance(relative, wanted, braking, gains, path_velocity)
             if 0.0 < distance < reach:
                 faces = 1 + FACES
         for face in range(faces):  # the nearest, and those ahead
@@ -216,6 +245,7 @@ def write_rows(
                 if not distance < np.inf:
                     break
                 copy(later_gradient, n[:3])
+                margin = _margin(n, motion, regions.deviations[i], of_attitude, gains)
                 turning = 0.0  # flat
 
             # h, its rate, and its second derivative without thrust
@@ -224,6 +254,8 @@ def write_rows(
                 rate += n[axis] * relative[axis]
                 falling += n[axis] * motion.free_acceleration[axis]
             allowed = approach_speed(h, braking, gains.barrier_slope)
+            if not of_attitude:
+                bound = min(bound, gains.margin + h, (rate + allowed) / gains.barrier_slope)
             slope = gains.barrier_slope if h <= 0.0 else braking / (allowed + braking / gains.barrier_slope)  # phi'
             right = -gains.barrier_rate * (rate + allowed) - slope * rate - falling - turning
 
@@ -238,4 +270,5 @@ def write_rows(
             if right > least:
                 work.right[rows], work.price[rows] = right, price
                 rows += 1
+    observation.bound[0] = bound
     return rows

@@ -47,6 +47,7 @@ class Estimate(NamedTuple):
     repeated: Array  # (2,) 1 if the last position, and velocity, repeated the one before to the bit
     slow: Array  # (2,) 1 if they do so while the vehicle moves: new ones come more seldom than steps
     longest_gap: Array  # (1,) s, longest time without a measurement of late
+    weight: Array  # (1,) of positions and velocities as evidence of failures: less than 1 of one whose error lasts
     last_measured: Array  # (6,) position and velocity, as last measured
     mass_scale: Array  # (1,) mass over 50 kg, at least 1: a heavier vehicle's W - B is less well known
     lags: Array  # (2,) s, a standard deviation below and above the estimated lag
@@ -94,6 +95,7 @@ def make_estimate(vehicle: VehicleModel) -> Estimate:
         repeated=np.zeros(2),
         slow=np.zeros(2),
         longest_gap=np.zeros(1),
+        weight=np.ones(1),
         last_measured=np.full(6, np.nan),
         mass_scale=np.array([mass_scale]),
         lags=np.array([0.0, 1.0]),
@@ -197,11 +199,3 @@ def _bound(estimate: Estimate, i: int, least: float, most: float) -> None:
             for k in range(x.size):
                 x[k] -= P[k, i] / P[i, i] * excess
         x[i] = min(max(x[i], least), most)
-
-
-def position_spread(estimate: Estimate) -> float:
-    """Return the greatest standard deviation [m] of the position among the axes."""
-    worst = 0.0
-    for axis in range(3):
-        worst = max(worst, estimate.covariance[axis, axis])
-    return float(np.sqrt(worst))

@@ -40,7 +40,7 @@ _CERTAIN = 40.0  # with such a lead it is isolated for good
 
 
 class FaultState(NamedTuple):
-    """The hypotheses, one for each thruster."""
+    """The hypotheses, two for each thruster."""
 
     ratio: Array  # (2 m,) summed log-likelihood ratio: thruster j gives nothing; m + j: is stuck
     sums: Array  # (2, 2 m) of the evidence since the supposed time of the failure

@@ -7,6 +7,8 @@ from typing import NamedTuple
 from controller.errors import LawError
 from controller.law import validate_gains
 
+SPREADS = 3.0  # standard deviations of a place, by which margins are wider
+
 
 class DeployableGains(NamedTuple):
     """Gains of the deployable law; all are choices of this project, none is from the paper."""
@@ -34,6 +36,7 @@ class DeployableGains(NamedTuple):
     # estimates
     position_noise: float = 0.02  # m, standard deviation of one measurement
     velocity_noise: float = 0.01  # m/s
+    # of a vehicle of up to 50 kg; of a heavier one greater in proportion to its mass, moment_bound to its square
     restoring_drift: float = 0.3  # N/sqrt(s), how fast W - B may change
     current_drift: float = 0.01  # m/s/sqrt(s)
     restoring_bound: float = 50.0  # N, of |W - B|
@@ -41,8 +44,9 @@ class DeployableGains(NamedTuple):
     current_bound: float = 1.0  # m/s
     adaptation: float = 0.5  # 1/s, of the moments
     # lost measurements and thrusters
-    coast: float = 2.0  # s that the law goes on without valid measurements before it lets the vehicle drift
-    failure_threshold: float = 12.0  # log-likelihood ratio at which a thruster is given up; 0: never
+    coast: float = 2.0  # s that the law goes on without valid measurements before it only holds W - B
+    rise: float = 0.0  # N, lift once all but attitude is lost for that long, beside the force against W - B
+    failure_threshold: float = 12.0  # log-likelihood ratio at which a thruster is isolated; 0: never
 
 
 _MAY_BE_ZERO = {
@@ -52,6 +56,7 @@ _MAY_BE_ZERO = {
     "tilt",
     "depth",
     "coast",
+    "rise",
     "failure_threshold",
     "restoring_drift",
     "current_drift",

@@ -23,6 +23,8 @@ from controller.stack_array import zeros
 Array = NDArray[np.float64]
 
 _FARTHEST = 1e6  # m, of a plausible position
+_JUMP = 0.5  # of the standard deviation of a position that is an estimate, taken for noise
+_STEADY = 0.01  # m/s, deviation of a velocity, beyond which its error lasts, and counts as noise that much greater
 _FASTEST = 100.0  # m/s, rad/s
 _RESTING, _PUSHED = 0.02, 0.05  # m/s, m/s2, sums over the axes: below and above, the vehicle rests and is about to move
 
@@ -72,8 +74,17 @@ def process_measurement(memory: DeployableMemory, state: VehicleState, gains: De
         copy(state.velocity_body[3:], memory.omega)
     else:
         _propagate_attitude(memory)
+        memory.attitude.started[0] = 0.0  # a change over several periods is no rate of one
     R, position, velocity = zeros(3, 3), zeros(3), zeros(3)
     write_rotation(memory.quaternion, R)
+    position_noise, velocity_noise, lasting = gains.position_noise, gains.velocity_noise, 0.0
+    for i in range(12):
+        memory.deviation[i] = min(max(state.deviation[i], 0.0), _FARTHEST) if state.deviation[i] >= 0.0 else _FARTHEST
+    for i in range(3):  # an estimate drifts, and jumps by a part of its deviation
+        position_noise = max(position_noise, _JUMP * memory.deviation[i])
+        velocity_noise = max(velocity_noise, square(memory.deviation[3 + i]) / _STEADY)
+        lasting = max(lasting, memory.deviation[3 + i])
+    estimate.weight[0] = 1.0 if lasting <= _STEADY else square(_STEADY / lasting)
     for i in range(3):
         for k in range(3):
             velocity[i] += R[i, k] * state.velocity_body[k]
@@ -100,10 +111,10 @@ def process_measurement(memory: DeployableMemory, state: VehicleState, gains: De
         estimate_state.initialize(estimate, position, velocity, gains)
         return True
     position_used = _is_new(estimate, 0, position_repeats, gains) and _correct_group(
-        estimate, estimate_state.POSITION, position, gains.position_noise, gains
+        estimate, estimate_state.POSITION, position, position_noise, gains
     )
     velocity_used = _is_new(estimate, 1, velocity_repeats, gains) and _correct_group(
-        estimate, estimate_state.VELOCITY, velocity, gains.velocity_noise, gains
+        estimate, estimate_state.VELOCITY, velocity, velocity_noise, gains
     )
     if position_used or velocity_used:
         estimate.longest_gap[0] = max(estimate.longest_gap[0], estimate.time_since_measurement[0])
@@ -163,6 +174,7 @@ def _correct_by_rates(memory: DeployableMemory, R: Array, predicted: bool, gains
             estimate,
             attitude.measured_moment,
             attitude.by_current,
+            memory.deviation[9:],
             memory.dynamics,
             memory.thrusters,
             R,
@@ -188,16 +200,8 @@ def _propagate_attitude(memory: DeployableMemory) -> None:
     R, free, thrust_acceleration, period = zeros(3, 3), zeros(6), zeros(6), memory.period[0]
     estimate = memory.state_estimate
     write_rotation(memory.quaternion, R)
-    model.free_acceleration(
-        memory.dynamics,
-        R,
-        estimate.velocity,
-        memory.omega,
-        estimate.water_velocity,
-        estimate.net_weight[0],
-        estimate.moments,
-        free,
-    )
+    loads = model.Loads(estimate.water_velocity, estimate.net_weight, estimate.moments)
+    model.free_acceleration(memory.dynamics, R, estimate.velocity, memory.omega, loads, free)
     model.thrust_acceleration(memory.dynamics, memory.thrusters, R, memory.thrusters.acting, thrust_acceleration)
     for i in range(3):
         memory.omega[i] += period * (free[3 + i] + thrust_acceleration[3 + i])

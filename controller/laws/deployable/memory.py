@@ -7,13 +7,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from controller.laws.deployable.actuator_lag import PredictedState
 from controller.laws.deployable.attitude import Attitude
 from controller.laws.deployable.barrier import RegionObservation
 from controller.laws.deployable.estimate import Estimate
 from controller.laws.deployable.fault_detection import FaultState
 from controller.laws.deployable.model import Dynamics, Thrusters
 from controller.laws.deployable.path_planner import PathPlan
-from controller.laws.deployable.prediction import PredictedState
 from controller.laws.deployable.quadratic_program import Workspace
 
 Array = NDArray[np.float64]
@@ -36,8 +36,10 @@ class DeployableMemory(NamedTuple):
     predicted: PredictedState
     quaternion: Array  # (4,) from body to world, measured, or propagated by the model
     omega: Array  # (3,) rad/s, likewise
+    deviation: Array  # (12,) of the measured state, as `VehicleState` has it
+    position_variance: Array  # (3,) m2, NED, of the estimated position
     weights: Array  # (n,) of the arbiter, sanitized
     reported: Array  # (m,) health of the thrusters as last reported
     filtered_acceleration: Array  # (3,) m/s2, NED, desired of the thrusters, low-pass filtered
     thruster_acceleration: Array  # (6, m) m/s2, rad/s2: of one newton of each thruster
-    effective_acceleration: Array  # (6, m) the same of one commanded newton, as `barrier.Motion` has it
+    effective_acceleration: Array  # (6, m) the same of one commanded newton

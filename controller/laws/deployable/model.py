@@ -148,16 +148,15 @@ def reallocate(thrusters: Thrusters) -> None:
             thrusters.allocator[i, k] = total * thrusters.metric[k]
 
 
-def free_wrench(
-    dynamics: Dynamics,
-    R: Array,
-    velocity: Array,
-    omega_body: Array,
-    water_velocity: Array,
-    net_weight: float,
-    moments: Array,
-    out: Array,
-) -> None:
+class Loads(NamedTuple):
+    """What acts on the vehicle beside its thrusters."""
+
+    water_velocity: Array  # (3,) m/s, NED
+    net_weight: Array  # (1,) N, W - B
+    moments: Array  # (3,) phi_2..phi_4 of (12) [N m], body axes
+
+
+def free_wrench(dynamics: Dynamics, R: Array, velocity: Array, omega_body: Array, loads: Loads, out: Array) -> None:
     """Write the wrench on the body without thrust, shape (6,) [N, N m]: all of (11) but thrust and M nu_r'.
 
     Drag against the water, weight and buoyancy, and the momentum M nu_r in the rotating body axes, which with oblique
@@ -173,63 +172,120 @@ def free_wrench(
         Over ground [m/s], world frame.
     omega_body : ndarray, shape (3,)
         [rad/s].
-    water_velocity : ndarray, shape (3,)
-        Velocity of the water [m/s], world frame.
-    net_weight : float
-        W - B [N].
-    moments : ndarray, shape (3,)
-        phi_2..phi_4 of (12) [N m].
+    loads : Loads
+        What acts on it.
     out : ndarray, shape (6,)
         Receives the wrench, body axes.
     """
     relative, momentum = zeros(6), zeros(6)
+    _relative_velocity(R, velocity, loads, relative)
     for i in range(3):
         relative[3 + i] = omega_body[i]
-        for k in range(3):
-            relative[i] += R[k, i] * (velocity[k] - water_velocity[k])
     product(dynamics.mass, relative, momentum)
     for i in range(6):
         out[i] = -(dynamics.linear_damping[i] + dynamics.quadratic_damping[i] * abs(relative[i])) * relative[i]
     for i in range(3):
         a, b = (i + 1) % 3, (i + 2) % 3
-        out[i] += net_weight * R[2, i] - (omega_body[a] * momentum[b] - omega_body[b] * momentum[a])
-        out[3 + i] -= R[2, a] * moments[b] - R[2, b] * moments[a]  # S(k) phi with k = R^T e3
+        out[i] += loads.net_weight[0] * R[2, i] - (omega_body[a] * momentum[b] - omega_body[b] * momentum[a])
+        out[3 + i] -= R[2, a] * loads.moments[b] - R[2, b] * loads.moments[a]  # S(k) phi with k = R^T e3
         out[3 + i] -= omega_body[a] * momentum[3 + b] - omega_body[b] * momentum[3 + a]
         out[3 + i] -= relative[a] * momentum[b] - relative[b] * momentum[a]
 
 
-def free_acceleration(
-    dynamics: Dynamics,
-    R: Array,
-    velocity: Array,
-    omega_body: Array,
-    water_velocity: Array,
-    net_weight: float,
-    moments: Array,
-    out: Array,
+def to_acceleration(
+    dynamics: Dynamics, R: Array, velocity: Array, omega_body: Array, loads: Loads, wrench: Array, out: Array
 ) -> None:
-    """Write the acceleration without thrust, shape (6,): linear over ground, NED [m/s2]; angular in body axes [rad/s2].
+    """Write the acceleration by a wrench, shape (6,) [N, N m], of a moving vehicle.
 
-    Parameters are those of `free_wrench`.
+    Parameters
+    ----------
+    dynamics, R, velocity, omega_body, loads
+        As for `free_wrench`.
+    wrench : ndarray, shape (6,)
+        Of all that acts, that of `free_wrench` included, body axes.
+    out : ndarray, shape (6,)
+        Receives the linear acceleration over ground, NED [m/s2], and the angular one in body axes [rad/s2].
     """
-    wrench, body = zeros(6), zeros(6)
-    free_wrench(dynamics, R, velocity, omega_body, water_velocity, net_weight, moments, wrench)
+    body, relative = zeros(6), zeros(3)
+    _relative_velocity(R, velocity, loads, relative)
     product(dynamics.inverse_mass, wrench, body)
-    for i in range(3):
-        out[i], out[3 + i] = 0.0, body[3 + i]
     for i in range(3):  # the body axes rotate: omega x nu_r
         a, b = (i + 1) % 3, (i + 2) % 3
+        out[3 + i] = body[3 + i]
+        body[3 + i] = body[i] + omega_body[a] * relative[b] - omega_body[b] * relative[a]
+    for i in range(3):
+        out[i] = 0.0
         for k in range(3):
-            turning = omega_body[a] * R[k, b] - omega_body[b] * R[k, a]  # d R[k, i] / dt, negative
-            out[k] += R[k, i] * body[i] - turning * _relative(R, velocity, water_velocity, i)
+            out[i] += R[i, k] * body[3 + k]
 
 
-def _relative(R: Array, velocity: Array, water_velocity: Array, i: int) -> float:
-    """Return a component [m/s] of the velocity against the water, body axes."""
-    total = 0.0
-    for k in range(3):
-        total += R[k, i] * (velocity[k] - water_velocity[k])
-    return total
+def _relative_velocity(R: Array, velocity: Array, loads: Loads, out: Array) -> None:
+    """Write the velocity [m/s] against the water, body axes, into out[:3]."""
+    for i in range(3):
+        out[i] = 0.0
+        for k in range(3):
+            out[i] += R[k, i] * (velocity[k] - loads.water_velocity[k])
+
+
+def free_acceleration(
+    dynamics: Dynamics, R: Array, velocity: Array, omega_body: Array, loads: Loads, out: Array
+) -> None:
+    """Write the acceleration without thrust, shape (6,), as `to_acceleration` has it."""
+    wrench = zeros(6)
+    free_wrench(dynamics, R, velocity, omega_body, loads, wrench)
+    to_acceleration(dynamics, R, velocity, omega_body, loads, wrench, out)
+
+
+def write_thruster_acceleration(
+    dynamics: Dynamics, thrusters: Thrusters, R: Array, of_force: Array, of_command: Array
+) -> None:
+    """Write the acceleration of one newton of each thruster, and of one commanded newton, shape (6, m) each.
+
+    Linear in NED [m/s2], angular in body axes [rad/s2]. A thruster that is stuck follows no command: its limits are the
+    force that it gives.
+    """
+    of_force[:, :] = 0.0
+    for j in range(thrusters.health.size):
+        for i in range(6):
+            body = 0.0
+            for k in range(6):
+                body += dynamics.inverse_mass[i, k] * thrusters.matrix[k, j]
+            if i >= 3:
+                of_force[i, j] = body
+            else:
+                for axis in range(3):
+                    of_force[axis, j] += R[axis, i] * body
+        given = thrusters.effectiveness[j] if np.isnan(thrusters.stuck[j]) else 1.0
+        for i in range(6):
+            of_command[i, j] = of_force[i, j] * given
+
+
+def limit_stuck_thrusters(thrusters: Thrusters) -> None:
+    """Set both limits of each thruster that is stuck to the force that it is estimated to give."""
+    for j in range(thrusters.health.size):
+        if not np.isnan(thrusters.stuck[j]):
+            thrusters.lower[j] = thrusters.upper[j] = thrusters.stuck[j] * thrusters.effectiveness[j]
+
+
+def smallest(values: Array) -> float:
+    """Return the smallest of values."""
+    least: float = values[0]
+    for i in range(values.size):
+        least = min(least, values[i])
+    return least
+
+
+def available_braking(dynamics: Dynamics, thrusters: Thrusters) -> float:
+    """Return the deceleration [m/s2] in the worst direction with one thruster lost: the failed one, or any.
+
+    Each further failure halves it, which is a rule of thumb.
+    """
+    worst, lost = smallest(dynamics.braking), 0
+    for j in range(thrusters.health.size):
+        if thrusters.health[j] == 0.0:
+            worst = dynamics.braking[j] if lost == 0 else 0.5 * min(worst, dynamics.braking[j])
+            lost += 1
+    return worst
 
 
 def thrust_acceleration(dynamics: Dynamics, thrusters: Thrusters, R: Array, forces: Array, out: Array) -> None:

@@ -27,7 +27,7 @@ from controller.laws.deployable.estimate import (
     publish,
 )
 from controller.laws.deployable.gains import DeployableGains
-from controller.laws.deployable.model import Dynamics, Thrusters, free_acceleration
+from controller.laws.deployable.model import Dynamics, Loads, Thrusters, free_acceleration
 from controller.quaternion import down_parts
 from controller.stack_array import zeros
 
@@ -57,14 +57,13 @@ def predict(
 ) -> None:
     """Predict over a period [s] under the forces that acted in it.
 
-    `thruster_acceleration` has shape (6, m), as in `barrier.Motion`.
+    `thruster_acceleration`, shape (6, m), is that of one newton of each thruster.
     """
     x, P, F = estimate.state, estimate.covariance, estimate.transition
     mass, T = dynamics.translational_mass[0], period
     free = zeros(6)
-    free_acceleration(
-        dynamics, R, estimate.velocity, omega_body, estimate.water_velocity, x[NET_WEIGHT], estimate.moments, free
-    )
+    loads = Loads(estimate.water_velocity, estimate.net_weight, estimate.moments)
+    free_acceleration(dynamics, R, estimate.velocity, omega_body, loads, free)
     linear = (dynamics.linear_damping[0] + dynamics.linear_damping[1] + dynamics.linear_damping[2]) / 3.0
     quadratic = (dynamics.quadratic_damping[0] + dynamics.quadratic_damping[1] + dynamics.quadratic_damping[2]) / 3.0
     F[:, :] = 0.0
@@ -159,6 +158,7 @@ def correct_by_moment(
     estimate: Estimate,
     moment: Array,
     by_current: Array,
+    rate_deviation: Array,
     dynamics: Dynamics,
     thrusters: Thrusters,
     R: Array,
@@ -169,7 +169,8 @@ def correct_by_moment(
 ) -> None:
     """Correct by the moment [N m] of thrusters and weight that the rates showed over a period [s], shape (3,).
 
-    `by_current`, shape (3, 2), is how the moment that the model knows grows with the current [N s].
+    `by_current`, shape (3, 2), is how the moment that the model knows grows with the current [N s]; `rate_deviation`,
+    shape (3,), the standard deviation [rad/s] of the rates.
     """
     row, x, lag_variance = estimate.row, estimate.state, estimate.covariance[LAG, LAG]
     k, middle, body = zeros(3), zeros(3), zeros(3)
@@ -191,6 +192,7 @@ def correct_by_moment(
         expected = row[MOMENTS + a] * x[MOMENTS + a] + row[MOMENTS + b] * x[MOMENTS + b] + row[HEIGHT] * x[HEIGHT]
         row[CURRENT], row[CURRENT + 1] = by_current[i, 0], by_current[i, 1]
         variance = square(_ANGULAR * dynamics.mass[3 + i, 3 + i]) / period
+        variance += 2.0 * square(rate_deviation[i] * dynamics.mass[3 + i, 3 + i] / period)  # of the change of two
         m = thrusters.acting.size
         for j in range(m):
             estimate.direct[m + j] = thrusters.matrix[3 + i, j] * estimate.missing[j]
@@ -200,7 +202,7 @@ def correct_by_moment(
             row[LAG] += thrusters.matrix[3 + i, j] * estimate.by_lag[j] * x[EFFECTIVENESS + j]
             variance += square(_RIPPLE * given)
             variance += square(thrusters.matrix[3 + i, j] * estimate.by_lag[j]) * lag_variance
-        _correct(estimate, moment[i] - expected, variance)
+        _correct(estimate, moment[i] - expected, variance, 1.0)
     estimate.direct[:] = 0.0
     project(estimate, gains)
 
@@ -240,13 +242,13 @@ def correct(estimate: Estimate, first: int, measured: Array, noise: float, gains
         if not np.isnan(measured[axis]):
             estimate.row[:] = 0.0
             estimate.row[first + axis] = 1.0
-            _correct(estimate, measured[axis] - x[first + axis], square(noise))
+            _correct(estimate, measured[axis] - x[first + axis], square(noise), estimate.weight[0])
     project(estimate, gains)
     return True
 
 
-def _correct(estimate: Estimate, innovation: float, noise: float) -> None:
-    """Correct by one number, whose `row` is set; add the evidence of each hypothesis, and propagate its deviation."""
+def _correct(estimate: Estimate, innovation: float, noise: float, weight: float) -> None:
+    """Correct by one number, whose `row` is set; add weighted evidence of each hypothesis, propagate its deviation."""
     P, row, gain = estimate.covariance, estimate.row, estimate.gain
     n, variance = row.size, noise
     gain[:] = 0.0
@@ -266,7 +268,7 @@ def _correct(estimate: Estimate, innovation: float, noise: float) -> None:
         expected = estimate.direct[j]
         for k in range(n):
             expected += row[k] * estimate.deviation[j, k]
-        estimate.evidence[0, j] += expected * innovation / variance
-        estimate.evidence[1, j] += square(expected) / variance
+        estimate.evidence[0, j] += weight * expected * innovation / variance
+        estimate.evidence[1, j] += weight * square(expected) / variance
         for k in range(n):
             estimate.deviation[j, k] -= gain[k] / variance * expected

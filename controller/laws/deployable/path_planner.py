@@ -16,9 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controller.arithmetic import exponential, length3, square
-from controller.laws.deployable.gains import DeployableGains
+from controller.laws.deployable.gains import SPREADS
 from controller.laws.deployable.linear_algebra import copy, norm
-from controller.laws.deployable.search import ROOM, Tree, empty_tree, grow_tree, limits_along
+from controller.laws.deployable.search import ROOM, PathLimits, Tree, empty_tree, grow_tree, limits_along
 from controller.regions import Sphere
 from controller.regions.kinds import FIRST_OF_ATTITUDE
 from controller.regions.region_set import (
@@ -98,7 +98,7 @@ def _bell_shaped(random: NDArray[np.uint64]) -> float:
 
 
 def path_cost(
-    path: Array, count: int, start: Array, regions: PackedRegions, clear_until: Array, gains: DeployableGains
+    path: Array, count: int, start: Array, regions: PackedRegions, clear_until: Array, limits: PathLimits
 ) -> float:
     """Return the cost of a path [m].
 
@@ -117,7 +117,7 @@ def path_cost(
         The n regions.
     clear_until : ndarray, shape (n,)
         Written: the length of path until which each region is far.
-    gains : DeployableGains
+    limits : PathLimits
         Clearance, margin, speed.
 
     Returns
@@ -125,7 +125,7 @@ def path_cost(
     float
         [m].
     """
-    enough = gains.clearance + _STRIDE[1] / _TRUST  # m, of clearance, beyond which it does not matter
+    enough = limits.clearance + _STRIDE[1] / _TRUST  # m, of clearance, beyond which it does not matter
     clear_until[:] = 0.0
     total, travelled, samples = 0.0, 0.0, 0
     place, point, room = zeros(3), zeros(3), zeros(3)
@@ -141,7 +141,7 @@ def path_cost(
                 return float(total + _INSIDE * (length - s))  # what is not evaluated counts as blocked
             samples += 1
             path_length, free = travelled + s, enough
-            later = path_length / gains.speed  # s
+            later = path_length / limits.speed  # s
             for axis in range(3):
                 place[axis] = begin[axis] + (path[leg, axis] - begin[axis]) * (s / length)
             for i in range(regions.kinds.size):
@@ -156,15 +156,16 @@ def path_cost(
                         clearance = clearance_of_place(regions, i, point, room)
                     else:
                         clearance = enough
+                    clearance -= SPREADS * regions.deviations[i]
                     if clearance >= enough:
-                        clear_until[i] = path_length + (clearance - enough) / (1.0 + own / gains.speed)
+                        clear_until[i] = path_length + (clearance - enough) / (1.0 + own / limits.speed)
                     free = min(free, clearance)
-            stride = min(max(_TRUST * (free - gains.clearance), _STRIDE[0]), _STRIDE[1], length - s + 1e-9)
-            lack = gains.clearance - free
+            stride = min(max(_TRUST * (free - limits.clearance), _STRIDE[0]), _STRIDE[1], length - s + 1e-9)
+            lack = limits.clearance - free
             if lack > 0.0:
-                total += stride * _NEAR * square(lack / gains.clearance)
-                if free < gains.margin:
-                    total += stride * _INSIDE * (1.0 + gains.margin - free)
+                total += stride * _NEAR * square(lack / limits.clearance)
+                if free < limits.margin:
+                    total += stride * _INSIDE * (1.0 + limits.margin - free)
             s += stride
         travelled += length
     return total
@@ -200,19 +201,19 @@ def nearest_goal_point(goal: PackedRegions, position: Array, depth: float, end: 
 
 
 def improve_path(
-    plan: PathPlan, start: Array, goal: PackedRegions, regions: PackedRegions, gains: DeployableGains, period: float
+    plan: PathPlan, start: Array, goal: PackedRegions, regions: PackedRegions, limits: PathLimits, period: float
 ) -> None:
     """Update the path to vehicle and regions, and try one candidate; to be called once a period [s]."""
     path, candidate = plan.path, plan.candidate
     if plan.counts[0] == 0:
         plan.counts[0] = 1
-        nearest_goal_point(goal, start, gains.depth, path[0])
+        nearest_goal_point(goal, start, limits.depth, path[0])
     else:
         end = plan.counts[0] - 1
         for axis in range(3):  # the end moves with the goal, and is corrected where the goal moved otherwise
             path[end, axis] += goal.velocities[0, axis] * period
         if not clearance_at(goal, 0, path[end]) > 0.0:
-            nearest_goal_point(goal, path[end], gains.depth, path[end])
+            nearest_goal_point(goal, path[end], limits.depth, path[end])
     while plan.counts[0] > 1 and _distance(path[0], start) < _PASSED:
         for i in range(plan.counts[0] - 1):
             copy(path[i + 1], path[i])
@@ -220,7 +221,7 @@ def improve_path(
     # one evaluation a period: path and candidate in turn
     if plan.phase[0] == 0:
         plan.phase[0] = 1
-        plan.cost[0] = path_cost(path, plan.counts[0], start, regions, plan.clear_until, gains)
+        plan.cost[0] = path_cost(path, plan.counts[0], start, regions, plan.clear_until, limits)
         return
     plan.phase[0] = 0
     random_numbers = plan.random_numbers
@@ -231,13 +232,13 @@ def improve_path(
         plan.tree.room[0] = ROOM[0]
     if blocked and random_numbers[4] < 0.7:
         plan.counts[1] = grow_tree(
-            plan.tree, start, path[plan.counts[0] - 1], random_numbers, regions, gains, candidate
+            plan.tree, start, path[plan.counts[0] - 1], random_numbers, regions, limits, candidate
         )
         if plan.counts[1] == 0:
             return
     else:
-        _mutate_path(plan, start, goal, gains)
-    cost = path_cost(candidate, plan.counts[1], start, regions, plan.clear_until, gains)
+        _mutate_path(plan, start, goal, limits)
+    cost = path_cost(candidate, plan.counts[1], start, regions, plan.clear_until, limits)
     if cost < plan.cost[0] - _BETTER - _BETTER_PART * plan.cost[0]:
         _copy_path(candidate, path)
         plan.counts[0] = plan.counts[1]
@@ -260,7 +261,7 @@ def _distance(a: Array, b: Array) -> float:
     return float(length3(a[0] - b[0], a[1] - b[1], a[2] - b[2]))
 
 
-def _mutate_path(plan: PathPlan, start: Array, goal: PackedRegions, gains: DeployableGains) -> None:
+def _mutate_path(plan: PathPlan, start: Array, goal: PackedRegions, limits: PathLimits) -> None:
     """Write a mutation of the path into `candidate`."""
     path, candidate, random, room = plan.path, plan.candidate, plan.random, plan.tree.room[0] - _LESS
     _copy_path(path, candidate)
@@ -268,7 +269,7 @@ def _mutate_path(plan: PathPlan, start: Array, goal: PackedRegions, gains: Deplo
     last = count - 1
     choice = uniform(random)
     if choice < 0.1:  # straight to the nearest end
-        nearest_goal_point(goal, start if count == 1 else path[count - 2], gains.depth, candidate[last])
+        nearest_goal_point(goal, start if count == 1 else path[count - 2], limits.depth, candidate[last])
         if uniform(random) < 0.5:
             copy(candidate[last], candidate[0])
             count = 1
@@ -276,7 +277,7 @@ def _mutate_path(plan: PathPlan, start: Array, goal: PackedRegions, gains: Deplo
         reach = 0.05 + uniform(random) * 0.5
         for axis in range(3):
             candidate[last, axis] += reach * _bell_shaped(random)
-        nearest_goal_point(goal, candidate[last], gains.depth, candidate[last])
+        nearest_goal_point(goal, candidate[last], limits.depth, candidate[last])
     elif choice < 0.3 and count > 1:  # a corner less
         drop = int(uniform(random) * last)
         for i in range(drop, last):

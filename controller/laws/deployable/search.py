@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controller.arithmetic import length3, square
-from controller.laws.deployable.gains import DeployableGains
+from controller.laws.deployable.gains import SPREADS
 from controller.laws.deployable.linear_algebra import copy
 from controller.regions import Sphere
 from controller.regions.kinds import FIRST_OF_ATTITUDE
@@ -34,6 +34,15 @@ _LOOKS = 32  # evaluations along a line at most
 _ANCESTORS = 2  # tested beside its parent
 _SLACK = 0.005  # m
 _MOVED = 0.3  # m, by which the end may move before the tree starts anew
+
+
+class PathLimits(NamedTuple):
+    """What a path shall keep."""
+
+    clearance: float  # m, of hard regions where there is room, beside the margin
+    margin: float  # m, at least
+    speed: float  # m/s, of the vehicle
+    depth: float  # m, in the goal region at which it ends
 
 
 class Tree(NamedTuple):
@@ -59,7 +68,7 @@ def _clearance_at(point: Array, regions: PackedRegions, gradient: Array) -> floa
                 clearance = clearance_of_sphere(regions, i, point)
             else:
                 clearance = clearance_of_place(regions, i, point, gradient)
-            least = min(least, clearance)
+            least = min(least, clearance - SPREADS * regions.deviations[i])
     return least
 
 
@@ -109,7 +118,7 @@ def grow_tree(
     end: Array,
     random_numbers: Array,
     regions: PackedRegions,
-    gains: DeployableGains,
+    limits: PathLimits,
     path: Array,
 ) -> int:
     """Grow the tree by at most one node, and return the number of points of a path that it found, 0 for none.
@@ -124,7 +133,7 @@ def grow_tree(
         Random numbers in [0, 1).
     regions : PackedRegions
         At their present places.
-    gains : DeployableGains
+    limits : PathLimits
         Clearance and margin.
     path : ndarray, shape (k, 3)
         Receives corners and end, if there are at most k.
@@ -144,7 +153,7 @@ def grow_tree(
         copy(end, nodes[0])
         parents[0] = -1
         tree.size[0] = 1
-    margin = gains.margin + 0.4 * gains.clearance
+    margin = limits.margin + 0.4 * limits.clearance
 
     # from the nearest node towards a random point, or the vehicle
     target, new = zeros(3), zeros(3)

@@ -3,7 +3,13 @@
 import numpy as np
 
 from controller import LAWS, VehicleState
-from controller.laws.deployable.model import free_acceleration, make_dynamics, make_thrusters, thrust_acceleration
+from controller.laws.deployable.model import (
+    Loads,
+    free_acceleration,
+    make_dynamics,
+    make_thrusters,
+    thrust_acceleration,
+)
 from controller.quaternion import rate, rotation_matrix
 from controller.regions import DepthBand, Region, Sphere, pack
 from cosim.scenario.vehicle_model import vehicle_model
@@ -48,8 +54,8 @@ class Sea:
             remains = np.exp(-h / self.lag) if self.lag else 0.0
             self.given = commanded + remains * (self.given - commanded)
             R, free, pushed = rotation_matrix(self.quaternion), np.empty(6), np.empty(6)
-            state = R, self.velocity, self.omega, self.current
-            free_acceleration(self.dynamics, *state, self.net_weight, RIGHTING, free)
+            loads = Loads(self.current, np.array([self.net_weight]), RIGHTING)
+            free_acceleration(self.dynamics, R, self.velocity, self.omega, loads, free)
             thrust_acceleration(self.dynamics, self.thrusters, R, self.given * self.left, pushed)
             self.position += h * self.velocity
             self.velocity += h * (free + pushed)[:3]

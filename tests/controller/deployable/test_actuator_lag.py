@@ -5,9 +5,9 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from controller.laws.deployable import actuator_lag
+from controller.laws.deployable.actuator_lag import empty_prediction, predict_state
 from controller.laws.deployable.estimate import LAG, make_estimate
 from controller.laws.deployable.model import make_thrusters
-from controller.laws.deployable.prediction import empty_prediction, predict_state
 from tests.controller.deployable.scenery import LEVEL, ODIN
 
 PERIOD = 0.02
@@ -28,7 +28,10 @@ def test_forces_follow_their_commands_as_the_equation_says(lag):
         mean, end = commanded, commanded
         if lag:
             start = np.r_[actual, np.zeros(8)]
-            rates = lambda t, y, u=commanded: np.r_[(u - y[:8]) / lag, y[:8]]  # noqa: E731
+
+            def rates(t, y, u=commanded):
+                return np.r_[(u - y[:8]) / lag, y[:8]]
+
             solved = solve_ivp(rates, (0.0, PERIOD), start, rtol=1e-9, atol=1e-9).y[:, -1]
             end, mean = solved[:8], solved[8:] / PERIOD
         actuator_lag.update_forces(estimate, thrusters, PERIOD)

@@ -6,10 +6,11 @@ import pytest
 from controller.laws.deployable import barrier, faces
 from controller.laws.deployable.gains import DeployableGains
 from controller.laws.deployable.quadratic_program import empty_workspace
-from controller.regions import Box, HalfSpace, Orientation, Region, Sphere, Visibility, pack
+from controller.regions import Box, Ellipsoid, HalfSpace, Orientation, Region, Sphere, Visibility, pack
+from tests.controller.deployable.scenery import LEVEL
 
 GAINS = DeployableGains()
-AHEAD = 0.1  # s
+AHEAD = 1e-4  # s
 
 
 def unit(x):
@@ -53,8 +54,13 @@ def expected_row(n, distance, margin, relative, turning, braking, motion):
 def moving(rng, velocity, position_spread=0.1):
     return barrier.Motion(
         rng.normal(size=3), np.asarray(velocity), rng.normal(size=6) * 0.1, rng.normal(size=(6, 8)) * 0.01,
-        180.0, 9.0, 0.25, position_spread,
+        180.0, 9.0, 0.25, position_spread, np.array([4e-4, 9e-4, 1e-4]), 0.01,
     )  # fmt: skip
+
+
+def spread(n, motion, deviation=0.0):
+    """Three deviations of a clearance, by the covariances of vehicle and region."""
+    return 3.0 * np.sqrt(n[:3] @ np.diag(motion.position_variance + deviation**2) @ n[:3])
 
 
 def written(regions, motion, quaternion, weights, limits=(-30.0, 25.0), time=1.5):
@@ -74,7 +80,11 @@ def test_rows_are_those_of_the_equations():
         regions = [
             *(
                 Region(
-                    f"ball {i}", Sphere(tuple(rng.normal(size=3) * 2.0), 0.6), "out", tuple(rng.normal(size=3) * 0.3)
+                    f"ball {i}",
+                    Sphere(tuple(rng.normal(size=3) * 2.0), 0.6),
+                    "out",
+                    tuple(rng.normal(size=3) * 0.3),
+                    deviation=0.05 * i,
                 )
                 for i in range(3)
             ),
@@ -94,9 +104,11 @@ def test_rows_are_those_of_the_equations():
             relative = motion.velocity - np.r_[region.velocity, np.zeros(3)]
             turning = (later[i] - n[i]) / AHEAD @ relative
             braking, margin, scale = motion.braking, GAINS.margin + motion.position_spread, motion.mass**2
+            margin += spread(n[i], motion, region.deviation)
             if region.shape.unit == "rad":
                 along = np.linalg.norm(n[i, :3])
                 braking, margin = GAINS.turning_deceleration, 0.02 + along * motion.position_spread
+                margin += spread(n[i], motion) + 3.0 * 0.01 * np.linalg.norm(n[i, 3:])
                 scale = (motion.mass * along) ** 2 + (motion.inertia * np.linalg.norm(n[i, 3:])) ** 2
             elif turning < 0.0 and (isinstance(region.shape, HalfSpace) or later[i] @ n[i] < 0.5):
                 turning = 0.0
@@ -111,8 +123,53 @@ def test_rows_are_those_of_the_equations():
         n_rows += len(rows)
         ours = written(regions, motion, quaternion, weights)
         for given, expected in zip(ours, (np.reshape(rows, (-1, 8)), right, price), strict=True):
-            np.testing.assert_allclose(given, expected, rtol=1e-8, atol=1e-10)
+            np.testing.assert_allclose(given, expected, rtol=1e-8, atol=1e-7)
     assert n_rows > 100 and n_dropped > 20 and n_inside > 10
+
+
+@pytest.mark.parametrize("keep", ["out", "in"])
+def test_the_rate_of_a_gradient_is_the_curvature(keep):
+    """Of a ball, (v^2 - (n v)^2) / r; of an ellipsoid, v^T (I - n n^T) A v / |A p| with the level function p^T A p."""
+    rng, axes, largest = np.random.default_rng(6), np.array([2.0, 0.6, 0.9]), 0.0
+    shapes = Sphere((0.0, 0.0, 0.0), 0.7), Ellipsoid((0.0, 0.0, 0.0), tuple(axes))
+    for _ in range(40):
+        direction, v = unit(rng.normal(size=3)), rng.normal(size=3)
+        for shape, size in zip(shapes, (np.full(3, 0.7), axes), strict=True):
+            at = direction * size * (rng.uniform(1.02, 1.5) if keep == "out" else rng.uniform(0.6, 0.98))
+            A = np.diag(size**-2.0)
+            n = unit(A @ at) * (1.0 if keep == "out" else -1.0)
+            exact = v @ (np.eye(3) - np.outer(n, n)) @ A @ v / np.linalg.norm(A @ at) * (1.0 if keep == "out" else -1.0)
+            packed, sight = pack([Region("one", shape, keep)]), barrier.empty_observation(1)
+            barrier.observe_regions(sight, packed, at, LEVEL, np.r_[v, np.zeros(3)])
+            now, later = np.zeros(6), np.zeros(6)
+            barrier.pose_gradient(sight.gradients, sight.rotation_gradients, 0, False, now)
+            barrier.pose_gradient(sight.later_gradients, sight.later_rotation_gradients, 0, False, later)
+            rate = barrier.gradient_rate(shape.kind, packed.signs[0], now, later, np.r_[v, np.zeros(3)])
+            assert now[:3] == pytest.approx(n, abs=1e-12)
+            # of one that is kept within what would help is left out
+            assert rate == pytest.approx(exact if keep == "out" else min(exact, 0.0), rel=5e-3, abs=1e-6)
+            largest = max(largest, abs(exact))
+    assert largest > 3.0
+
+
+def test_the_bound_is_what_clearances_may_fall_to():
+    """Of a wall: 0 where h and its rate are well; else the clearance less its spread, or psi / kappa."""
+    rng, wall, fallen = np.random.default_rng(5), Region("wall", HalfSpace((0.0, 0.0, 0.0), (1.0, 0.0, 0.0)), "in"), 0
+    for _ in range(60):
+        motion = moving(rng, np.r_[rng.normal(size=3) * 0.8, np.zeros(3)])
+        packed, sight, work = pack([wall]), barrier.empty_observation(1), empty_workspace(1 + faces.FACES, 8)
+        barrier.observe_regions(sight, packed, motion.position, np.array([1.0, 0.0, 0.0, 0.0]), motion.velocity)
+        limits = np.full(8, -30.0), np.full(8, 25.0)
+        barrier.write_rows(work, sight, packed, np.ones(1), motion, *limits, GAINS)
+        inwards = -np.eye(3)[0]
+        distance = float(inwards @ motion.position)
+        h = distance - GAINS.margin - motion.position_spread - spread(inwards, motion)
+        psi = inwards @ motion.velocity[:3] + allowed(h, motion.braking, GAINS.barrier_slope)
+        expected = min(0.0, float(h + GAINS.margin), float(np.ravel(psi)[0] / GAINS.barrier_slope))
+        assert sight.clearances[0] == pytest.approx(distance)
+        assert sight.bound[0] == pytest.approx(expected, abs=1e-12)
+        fallen += expected < 0.0
+    assert 10 < fallen < 60
 
 
 def test_the_slope_of_a_flat_face_leaps_and_does_not_turn():
@@ -147,8 +204,10 @@ def test_faces_ahead_are_planes_of_the_box():
         relative = motion.velocity - np.r_[region.velocity, np.zeros(3)]
         margin, way = GAINS.margin + motion.position_spread, relative[:3].copy()
         speed = np.linalg.norm(way)
-        reach = margin + speed * (speed / (2 * motion.braking) + 1 / GAINS.barrier_slope + 1 / GAINS.barrier_rate)
-        found = [min(planes(box, at), key=lambda plane: plane[0])]
+        nearest = min(planes(box, at), key=lambda plane: plane[0])
+        braked = speed * (speed / (2 * motion.braking) + 1 / GAINS.barrier_slope + 1 / GAINS.barrier_rate)
+        reach = margin + spread(nearest[1], motion) + braked
+        found = [nearest]
         for _face in range(2 if found[0][0] < reach else 0):
             way -= min(way @ found[-1][1], 0.0) * found[-1][1]
             speed = np.linalg.norm(way)
@@ -163,7 +222,10 @@ def test_faces_ahead_are_planes_of_the_box():
             found.append((distance, slope))
         else:
             two, three = two + (len(found) == 2), three + (len(found) == 3)
-        rows = [expected_row(np.r_[s, np.zeros(3)], d, margin, relative, 0.0, motion.braking, motion) for d, s in found]
+        rows = [
+            expected_row(np.r_[s, np.zeros(3)], d, margin + spread(s, motion), relative, 0.0, motion.braking, motion)
+            for d, s in found
+        ]
         ours = written([region], motion, np.array([1.0, 0.0, 0.0, 0.0]), np.ones(1), (-1e4, 1e4))
         assert len(ours[0]) == 0 or np.isfinite(ours[0]).all()
         kept = [(row, bound) for row, bound in rows if bound > -1e4 * np.abs(row).sum()]

@@ -135,7 +135,7 @@ def periods(count, rng, left, stuck):
         observer.predict(estimate, dynamics, thrusters, body, R, still, GAINS, 0.02)
         drag = ODIN.quadratic_damping[:3] * abs(velocity) * velocity / mass
         velocity = velocity + 0.02 * ((body @ actual)[:3] - drag)
-        given = thrusters.matrix[3:] @ actual, np.zeros((3, 2)), dynamics, thrusters, R, LEVEL, still
+        given = thrusters.matrix[3:] @ actual, np.zeros((3, 2)), np.zeros(3), dynamics, thrusters, R, LEVEL, still
         before = copy.deepcopy(estimate)
         observer.correct_by_moment(estimate, *given, GAINS, 0.02)
         observer.correct(estimate, POSITION, estimate.position.copy(), 0.02, GAINS)
@@ -168,7 +168,7 @@ def test_the_evidence_is_the_log_likelihood_ratio():
         variance = 1.0 + estimate.row @ estimate.covariance @ estimate.row
         innovation = rng.normal() * np.sqrt(variance)
         expected = estimate.deviation @ estimate.row
-        observer._correct(estimate, innovation, 1.0)
+        observer._correct(estimate, innovation, 1.0, 1.0)
         ratio = estimate.evidence[0] - 0.5 * estimate.evidence[1]
         densities = norm.logpdf(innovation, expected, np.sqrt(variance)) - norm.logpdf(
             innovation, 0.0, np.sqrt(variance)
@@ -183,7 +183,7 @@ def test_an_innovation_beyond_three_standard_deviations_counts_as_three():
         spread = np.sqrt(1.0 + estimate.covariance[3, 3])
         estimate.deviation[0, 3] = 1.0
         before, gain = estimate.state[3], estimate.covariance[3, 3]
-        observer._correct(estimate, sigmas * spread, 1.0)
+        observer._correct(estimate, sigmas * spread, 1.0, 1.0)
         effective = spread * sigmas / counted
         assert estimate.state[3] - before == pytest.approx(gain / effective**2 * sigmas * spread, rel=1e-9)
         assert estimate.evidence[0, 0] == pytest.approx(counted / effective, rel=1e-9)

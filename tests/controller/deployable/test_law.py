@@ -1,6 +1,7 @@
 """The deployable law as a whole: memory, repeatability, what it does with nonsense."""
 
 import copy
+import dataclasses
 import os
 import subprocess
 import sys
@@ -10,8 +11,9 @@ import numpy as np
 import pytest
 
 from controller import VehicleState
+from controller.laws.deployable import DeployableGains
 from controller.regions import Region, Sphere
-from tests.controller.deployable.scenery import GOAL, REGIONS, Sea, fly, law_for
+from tests.controller.deployable.scenery import GOAL, ODIN, REGIONS, Sea, fly, law_for
 
 ROOT = Path(__file__).parents[3]
 NOISE = (0.02, 0.01)
@@ -117,6 +119,55 @@ def test_without_any_measurement_it_pushes_nothing():
         return VehicleState(*(np.full_like(part, np.nan) for part in state[:3]), state.thruster_health)
 
     assert not fly(law_for(REGIONS), Sea(), steps=50, change=nothing).any()
+
+
+@pytest.mark.parametrize("rise", [0.0, 5.0])
+def test_with_all_but_its_attitude_lost_it_holds_its_weight(rise):
+    """The vertical speed settles where drag balances `rise`; without one it is the estimate's error that is left."""
+    own, sea = law_for([], gains=DeployableGains(rise=rise)), Sea(current=(0.0, 0.0, 0.0), noise=NOISE)
+
+    def lost(t, state):
+        if t < 10.0:
+            return state
+        return state._replace(position=np.full(3, np.nan), velocity_body=np.r_[np.full(3, np.nan), sea.omega])
+
+    pushed = fly(own, sea, regions=[], steps=1100, change=lost)[-1]
+    assert (ODIN.thruster_matrix @ pushed)[2] == pytest.approx(-sea.net_weight - rise, abs=1.0)
+    assert own.memory.report[15] > 2.0 and own.memory.report[16] == -1e6
+
+
+def test_an_uncertain_state_is_flown_with_wider_margins():
+    """Past a ball, by an estimate whose deviations are told: farther off, and slower where they are large."""
+    clear, times = [], []
+    for deviation in (0.0, 0.05, 0.15):
+        own, sea, least = law_for(REGIONS), Sea(), []
+        ball = REGIONS[0].shape
+
+        def check(t, least=least, sea=sea, ball=ball):
+            least.append(np.linalg.norm(sea.position - ball.centre) - ball.radius)
+            if np.linalg.norm(sea.position - GOAL.shape.centre) > 0.5:
+                times[-1] = t
+
+        times.append(0.0)
+        told = np.r_[np.full(3, deviation), np.full(9, 1e-3)]
+        fly(own, sea, steps=2500, change=lambda t, state, told=told: state._replace(deviation=told), each=check)
+        clear.append(min(least))
+    assert clear[1] > clear[0] + 0.1 and clear[2] > clear[1]
+    assert times[0] < 30.0 and times[1] < 30.0 and times[0] < times[2] < 49.0
+
+
+def test_a_region_whose_place_is_uncertain_is_kept_farther_off():
+    clear = []
+    for deviation in (0.0, 0.1):
+        regions, least, sea = [dataclasses.replace(REGIONS[0], deviation=deviation), *REGIONS[1:]], [], Sea()
+
+        def check(t, least=least, sea=sea, ball=REGIONS[0].shape):
+            least.append(np.linalg.norm(sea.position - ball.centre) - ball.radius)
+
+        fly(law_for(regions), sea, regions=regions, steps=1500, each=check)
+        assert np.linalg.norm(sea.position - GOAL.shape.centre) < 0.5
+        clear.append(min(least))
+    assert clear[1] > clear[0] + 0.2
 
 
 def test_without_regions_it_reaches_the_goal():

@@ -7,6 +7,7 @@ from scipy.optimize import linprog, minimize
 from controller import LawError
 from controller.laws.deployable.braking import least_forces
 from controller.laws.deployable.model import (
+    Loads,
     free_acceleration,
     make_dynamics,
     make_thrusters,
@@ -51,7 +52,7 @@ def test_acceleration_is_that_of_the_plant(name):
             R, free, pushed = rotation_matrix(e), np.empty(6), np.empty(6)
             before = R @ nu[:3]
             there = np.r_[rotation_matrix(after[:4]) @ after[4:7] - before, after[7:] - nu[3:]] / step
-            free_acceleration(dynamics, R, before, nu[3:], current, restoring, moments, free)
+            free_acceleration(dynamics, R, before, nu[3:], Loads(current, np.array([restoring]), moments), free)
             thrust_acceleration(dynamics, thrusters, R, forces, pushed)
             # a step is a difference quotient: it is off by half a step times what the acceleration changes in a second
             assert (free + pushed)[:3] == pytest.approx(there[:3], abs=2e-3 * (0.1 + np.abs(there[:3]).max()))

@@ -19,7 +19,6 @@ from controller.laws.deployable.estimate import (
     VELOCITY,
     initialize,
     make_estimate,
-    position_spread,
     project,
     publish,
     reset,
@@ -27,6 +26,7 @@ from controller.laws.deployable.estimate import (
 )
 from controller.laws.deployable.gains import DeployableGains
 from controller.laws.deployable.model import (
+    Loads,
     free_acceleration,
     make_dynamics,
     make_thrusters,
@@ -36,6 +36,7 @@ from tests.controller.deployable.scenery import MODELS, ODIN, Sea, fly, law_for
 
 GAINS = DeployableGains()
 PERIOD = 0.02
+RATES = np.array([0.001, 0.002, 0.0015])  # rad/s, standard deviation
 N = EFFECTIVENESS + 8
 
 
@@ -151,11 +152,12 @@ def test_a_moment_corrects_by_its_row():
         H[:, LAG], H[:, EFFECTIVENESS:] = thrusters.matrix[3:] @ (estimate.by_lag * e), given
         noise = (0.019 * np.diag(dynamics.mass)[3:]) ** 2 / PERIOD + np.sum((0.05 * given) ** 2, axis=1)
         noise += np.sum((thrusters.matrix[3:] * estimate.by_lag) ** 2, axis=1) * P[LAG, LAG]
+        noise += 2.0 * (np.diag(dynamics.mass)[3:] * RATES / PERIOD) ** 2
         expected = H @ x - H[:, CURRENT:NET_WEIGHT] @ x[CURRENT:NET_WEIGHT] - H[:, LAG] * x[LAG]
         moment = expected + 0.1 * np.sqrt(noise) * rng.uniform(-1.0, 1.0, 3)
         quaternion = turned.as_quat()[[3, 0, 1, 2]]
         seen = copy.deepcopy(estimate)
-        given = seen, moment, by_current, dynamics, thrusters, R, quaternion, omega
+        given = seen, moment, by_current, RATES, dynamics, thrusters, R, quaternion, omega
         observer.correct_by_moment(*given, GAINS, PERIOD)
         K = P @ H.T @ np.linalg.inv(H @ P @ H.T + np.diag(noise))
         # each axis takes the row of the lag where the axis before has left the effectiveness
@@ -257,7 +259,8 @@ def test_the_prediction_follows_the_vehicles_model():
         publish(estimate)
         thrusters.forces[:] = rng.uniform(-20.0, 20.0, 8)
         free, pushed = np.empty(6), np.empty(6)
-        free_acceleration(dynamics, R, estimate.velocity, omega, estimate.water_velocity, 7.0, estimate.moments, free)
+        loads = Loads(estimate.water_velocity, np.array([7.0]), estimate.moments)
+        free_acceleration(dynamics, R, estimate.velocity, omega, loads, free)
         thrust_acceleration(dynamics, thrusters, R, thrusters.forces * x[EFFECTIVENESS:], pushed)
         a, v, p = (free + pushed)[:3], estimate.velocity.copy(), estimate.position.copy()
         predict(estimate, dynamics, thrusters, R, omega)
@@ -300,10 +303,3 @@ def test_a_reset_forgets_all_but_the_effectiveness_of_thrusters():
     assert np.array_equal(estimate.covariance[:EFFECTIVENESS], fresh.covariance[:EFFECTIVENESS])
     assert np.array_equal(estimate.state[EFFECTIVENESS:], kept) and kept[2] == 0.0
     assert estimate.time_since_measurement[0] == -1.0
-
-
-def test_the_spread_of_the_position_is_that_of_its_worst_axis():
-    estimate, _, _ = started()
-    for axis, variance in enumerate((0.04, 0.09, 0.01)):
-        estimate.covariance[axis, axis] = variance
-    assert position_spread(estimate) == pytest.approx(0.3)

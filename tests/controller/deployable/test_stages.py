@@ -7,17 +7,27 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from controller import VehicleState
-from controller.laws.deployable import actuator_lag, input_validation, law, observer
+from controller.laws.deployable import actuator_lag, diagnostics, input_validation, law, observer
 from controller.laws.deployable.attraction import desired_velocity
 from controller.laws.deployable.barrier import empty_observation, observe_regions
 from controller.laws.deployable.estimate import POSITION, VELOCITY, initialize, make_estimate
 from controller.laws.deployable.gains import DeployableGains
-from controller.laws.deployable.model import Dynamics, free_acceleration, make_thrusters, reallocate
+from controller.laws.deployable.model import (
+    Dynamics,
+    Loads,
+    available_braking,
+    free_acceleration,
+    make_thrusters,
+    reallocate,
+    write_thruster_acceleration,
+)
 from controller.laws.deployable.path_planner import CORNERS, empty_plan
 from controller.regions import HalfSpace, Orientation, Region, Sphere, pack
 from tests.controller.deployable.scenery import LEVEL, ODIN, law_for
 
 GAINS = DeployableGains()
+
+
 TURNED = Rotation.from_euler("zyx", [0.7, -0.3, 0.2]).as_matrix()
 ATTITUDE = Rotation.from_matrix(TURNED).as_quat()[[3, 0, 1, 2]]
 
@@ -70,9 +80,12 @@ def test_what_a_newton_of_each_thruster_does():
     dynamics, thrusters = askew(np.random.default_rng(3)), make_thrusters(ODIN)
     body = dynamics.inverse_mass @ thrusters.matrix
     expected = np.vstack([TURNED @ body[:3], body[3:]])
-    push = np.zeros((6, thrusters.health.size))
-    law._write_thruster_acceleration(dynamics, thrusters, TURNED, push)
+    push, asked = np.zeros((6, thrusters.health.size)), np.zeros((6, thrusters.health.size))
+    thrusters.effectiveness[:], thrusters.stuck[5] = np.linspace(0.2, 0.9, 8), 4.0
+    write_thruster_acceleration(dynamics, thrusters, TURNED, push, asked)
     assert push == pytest.approx(expected, rel=1e-12, abs=1e-15)
+    given = np.where(np.arange(8) == 5, 1.0, thrusters.effectiveness)  # the limits of one that is stuck are its force
+    assert asked == pytest.approx(expected * given, rel=1e-12, abs=1e-15)
 
 
 def test_violated_soft_regions_push_out_of_them():
@@ -107,18 +120,20 @@ def test_what_deceleration_is_relied_on(lost):
     expected = dynamics.braking.min() if not lost else dynamics.braking[lost[0]]
     for j in lost[1:]:
         expected = 0.5 * min(expected, dynamics.braking[j])
-    assert law._braking(dynamics, thrusters) == pytest.approx(expected)
+    assert available_braking(dynamics, thrusters) == pytest.approx(expected)
 
 
 def test_the_report_says_what_it_is_of():
     seen, report = make_estimate(ODIN), np.full(len(law.DIAGNOSTICS), np.nan)
     seen.position[:], seen.velocity[:], seen.water_velocity[:2] = (1.0, 2.0, 3.0), (4.0, 5.0, 6.0), (7.0, 8.0)
     health = np.array([1.0, 1.0, 0.0, 1.0])
-    law._report(report, seen, 9.5, 4, health, np.array([2.0, -3.0, 6.0]))
+    diagnostics.write_report(report, seen, 9.5, 4, health, np.array([2.0, -3.0, 6.0]))
     assert report[:11].tolist() == [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 7.0, 9.5, 3.0]
-    assert report[14:].tolist() == [3.0, -1.0]
-    law._report_program(report, np.array([0.0, 2.0, 3.0, 9.0]), np.array([1.0, 0.5, 0.1, 9.0]), 3, -6)
+    assert report[14:16].tolist() == [3.0, -1.0]
+    program = np.array([0.0, 2.0, 3.0, 9.0]), np.array([1.0, 0.5, 0.1, 9.0]), 3, -6
+    diagnostics.write_program_report(report, *program, -0.2, GAINS._replace(barrier_rate=5.0, barrier_slope=2.0))
     assert report[11:14].tolist() == [2.0, 1.0, -6.0]
+    assert report[16] == pytest.approx(-0.2 - 1.0 / 10.0)
 
 
 # ---- what is believed ----
@@ -136,8 +151,8 @@ def begun():
 def test_attitude_and_rates_that_are_not_measured_are_carried_by_the_model():
     memory = begun()
     free, seen = np.empty(6), memory.state_estimate
-    moving = seen.velocity, memory.omega, seen.water_velocity
-    free_acceleration(memory.dynamics, TURNED, *moving, seen.net_weight[0], seen.moments, free)
+    loads = Loads(seen.water_velocity, seen.net_weight, seen.moments)
+    free_acceleration(memory.dynamics, TURNED, seen.velocity, memory.omega, loads, free)
     wrench = memory.thrusters.matrix @ memory.thrusters.forces
     omega = memory.omega + 0.02 * (free[3:] + (memory.dynamics.inverse_mass @ wrench)[3:])
     turned = Rotation.from_matrix(TURNED) * Rotation.from_rotvec(0.02 * omega)

@@ -5,11 +5,12 @@ import copy
 import numpy as np
 import pytest
 
-from controller.laws.deployable import attitude, barrier, input_validation, law, model, path_planner, prediction
+from controller.laws.deployable import actuator_lag, attitude, barrier, input_validation, law, model, path_planner
 from controller.laws.deployable.attraction import desired_acceleration, desired_velocity
-from controller.laws.deployable.estimate import CURRENT, LAG, MOMENTS, VELOCITY, position_spread, publish
+from controller.laws.deployable.estimate import CURRENT, LAG, MOMENTS, VELOCITY, publish
 from controller.laws.deployable.gains import DeployableGains
 from controller.laws.deployable.quadratic_program import solve
+from controller.laws.deployable.search import PathLimits
 from controller.quaternion import rotation_matrix
 from controller.regions import Orientation, Region, pack
 from tests.controller.deployable.scenery import GOAL, REGIONS, Sea, fly, law_for
@@ -27,14 +28,17 @@ def expected(memory, state, goal, regions, weights):
     input_validation.process_measurement(memory, state, GAINS)
     R, omega, ahead = rotation_matrix(memory.quaternion), memory.omega, memory.predicted
     wanted, acceleration, free, moment, pushing, against = (np.empty(n) for n in (3, 3, 6, 3, 6, 6))
-    waters = seen.water_velocity, seen.net_weight[0], seen.moments
-    model.free_acceleration(dynamics, R, seen.velocity, omega, *waters, free)
+    loads = model.Loads(seen.water_velocity, seen.net_weight, seen.moments)
+    model.free_acceleration(dynamics, R, seen.velocity, omega, loads, free)
     model.thrust_acceleration(dynamics, thrusters, R, thrusters.acting_now, pushing)
     motion = seen.position, seen.velocity, memory.quaternion, omega, free + pushing
-    prediction.predict_state(ahead, *motion, seen.state[LAG])
+    actuator_lag.predict_state(ahead, *motion, seen.state[LAG])
     position, velocity, turn = ahead.position, ahead.velocity[:3], ahead.velocity[3:]
-    model.free_acceleration(dynamics, R, velocity, turn, *waters, free)
-    path_planner.improve_path(memory.plan, position, goal, regions, GAINS, 0.02)
+    model.free_acceleration(dynamics, R, velocity, turn, loads, free)
+    variance = np.diag(seen.covariance)[:3] + state.deviation[:3] ** 2
+    wider = 3.0 * np.sqrt(variance.max())
+    limits = PathLimits(GAINS.clearance + wider, GAINS.margin + wider, GAINS.speed, GAINS.depth)
+    path_planner.improve_path(memory.plan, position, goal, regions, limits, 0.02)
     desired_velocity(memory.plan, position, goal.velocities[0], GAINS, wanted)
     desired_acceleration(wanted, velocity, GAINS, acceleration)
     barrier.observe_regions(memory.observation, regions, position, ahead.quaternion, ahead.velocity)
@@ -42,7 +46,7 @@ def expected(memory, state, goal, regions, weights):
         acceleration - free[:3] - memory.filtered_acceleration
     )
     attitude.update_desired(memory.attitude, regions, position, GAINS, 0.02)
-    model.free_wrench(dynamics, R, velocity, turn, *waters, against)
+    model.free_wrench(dynamics, R, velocity, turn, loads, against)
     attitude.compute_moment(memory.attitude, dynamics, ahead.quaternion, turn, against, GAINS, moment)
     wrench = np.r_[dynamics.mass[:3, :3] @ R.T @ pushed, moment]
     memory.program.nominal[:] = thrusters.allocator @ wrench / thrusters.effectiveness
@@ -51,7 +55,7 @@ def expected(memory, state, goal, regions, weights):
         position, ahead.velocity, free, turned @ dynamics.inverse_mass @ thrusters.matrix * thrusters.effectiveness,
         np.trace(dynamics.mass[:3, :3]) / 3.0, np.trace(dynamics.mass[3:, 3:]) / 3.0,
         GAINS.braking_share * dynamics.braking.min(),
-        3.0 * position_spread(seen) + 0.5 * GAINS.acceleration * (0.02**2 + seen.state[LAG] ** 2),
+        0.5 * GAINS.acceleration * (0.02**2 + seen.state[LAG] ** 2), variance, state.deviation[6:9].max(),
     )  # fmt: skip
     rows = barrier.write_rows(
         memory.program, memory.observation, regions, weights, motion, thrusters.lower, thrusters.upper, GAINS
@@ -111,7 +115,7 @@ def test_it_goes_slower_where_it_hardly_knows_its_place():
     for spread in (0.01, 0.09, 0.15, 0.25):
         own = law_for([])
         desired, seen = np.array([GAINS.speed, 0.0, 0.0]), own.memory.state_estimate
-        seen.time_since_measurement[0], seen.covariance[:3, :3] = 0.0, spread**2 * np.eye(3)
-        law._limit_speed(seen, GAINS, desired)
+        seen.time_since_measurement[0] = 0.0
+        law._limit_speed(seen, 3.0 * spread, GAINS, desired)
         speeds.append(desired[0])
     assert speeds == pytest.approx([GAINS.speed, GAINS.speed, 0.5 * GAINS.speed, 0.0])

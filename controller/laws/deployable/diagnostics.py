@@ -1,0 +1,64 @@
+"""What the deployable law reports after each step."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from controller.arithmetic import length3
+from controller.law import Diagnostic
+from controller.laws.deployable.estimate import Estimate
+from controller.laws.deployable.gains import DeployableGains
+from controller.laws.deployable.linear_algebra import copy
+
+Array = NDArray[np.float64]
+
+NO_BOUND = -1e6  # m
+
+DIAGNOSTICS = (
+    Diagnostic("position.x", "m", "Estimated position, north"),
+    Diagnostic("position.y", "m", "Estimated position, east"),
+    Diagnostic("position.z", "m", "Estimated position, down"),
+    Diagnostic("velocity.x", "m/s", "Estimated velocity over ground, north"),
+    Diagnostic("velocity.y", "m/s", "Estimated velocity over ground, east"),
+    Diagnostic("velocity.z", "m/s", "Estimated velocity over ground, down"),
+    Diagnostic("current.x", "m/s", "Estimated current, north"),
+    Diagnostic("current.y", "m/s", "Estimated current, east"),
+    Diagnostic("desired_speed", "m/s", "Speed that the attraction wants"),
+    Diagnostic("path_cost", "m", "Length of the path into the goal region, and what it costs to pass close"),
+    Diagnostic("path_corners", "", "Corners of the path"),
+    Diagnostic("barriers", "", "Active barriers"),
+    Diagnostic("constraint_slack", "m/s2", "Greatest slack of a barrier"),
+    Diagnostic("qp_steps", "", "Steps of the quadratic program, negative if it was cut short"),
+    Diagnostic("failed_thruster", "", "Isolated thruster, from 1; 0 for none"),
+    Diagnostic("time_since_measurement", "s", "Time since the last measurement that was accepted"),
+    Diagnostic("bound", "m", "What the clearance of a hard region may fall to from here; -1e6 without an estimate"),
+)
+
+
+def write_report(report: Array, estimate: Estimate, cost: float, points: int, health: Array, desired: Array) -> None:
+    """Write the `DIAGNOSTICS` of estimate, path and thrusters."""
+    copy(estimate.position, report[:3])
+    copy(estimate.velocity, report[3:6])
+    copy(estimate.water_velocity, report[6:8])
+    report[8] = length3(desired[0], desired[1], desired[2])
+    report[9] = cost
+    report[10] = points - 1
+    report[14] = 0.0
+    for j in range(health.size):
+        if health[j] == 0.0:
+            report[14] = j + 1
+    report[15] = estimate.time_since_measurement[0]
+
+
+def write_program_report(
+    report: Array, multipliers: Array, price: Array, rows: int, steps: int, bound: float, gains: DeployableGains
+) -> None:
+    """Write the `DIAGNOSTICS` of barriers and quadratic program; `bound` [m] is that of barriers that do not yield."""
+    active, yielding = 0, 0.0
+    for i in range(rows):
+        if multipliers[i] > 0.0:
+            active += 1
+            yielding = max(yielding, multipliers[i] * price[i])
+    report[11], report[12], report[13] = active, yielding, steps
+    report[16] = bound - yielding / (gains.barrier_rate * gains.barrier_slope)
