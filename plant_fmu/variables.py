@@ -210,7 +210,7 @@ def _measured(output: Callable[..., Variable]) -> Iterator[Variable]:
     for i, where in enumerate(("north", "east", "down")):
         yield measured(f"position.{AXES[i]}", "m", f"USBL's position, {where}", "usbl", f"position.{AXES[i]}")
     for i, (sensor, what) in enumerate(_SENSORS):
-        description = f"Time at which {what} measured what it tells; -1e12 before its first sample"
+        description = f"Time at which {what} took the sample that it gives; -1e12 before the first"
         yield output(f"measured.time.{sensor}", f"stamp[{i}]", q.unbounded("s"), description, f"{sensor}.rate", "time")
 
 
@@ -327,7 +327,7 @@ def _sensors() -> Iterator[Variable]:
     for i, (sensor, what) in enumerate(_SENSORS):
         description = f"Samples a second of {what}; 0: continuous, without noise"
         yield _parameter(f"{sensor}.rate", f"sensor_rate[{i}]", q.SAMPLE_RATE, description)
-        yield _parameter(f"{sensor}.delay", f"delay[{i}]", q.DELAY, "Time from a sample to when it is told")
+        yield _parameter(f"{sensor}.delay", f"delay[{i}]", q.DELAY, "Time from a sample to its delivery")
         for event, description in (("loss", "is lost"), ("outlier", "is an outlier")):
             name, member = f"{sensor}.{event}_probability", f"{event}_probability[{i}]"
             yield _parameter(name, member, q.FRACTION, f"Probability that a sample {description}")
@@ -349,7 +349,7 @@ def _sensors() -> Iterator[Variable]:
         ("compass.bias", "MEASURED_HEADING", "rad"),
     ):
         yield _parameter(name, f"bias[{channel}]", q.bias(unit), "Constant error")
-    description = "Part of the velocity that the DVL tells too much"
+    description = "Part of the velocity that the DVL measures too much"
     yield _parameter("dvl.scale_error", "velocity_scale_error", q.SCALE_ERROR, description)
 
 

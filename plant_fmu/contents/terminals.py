@@ -20,12 +20,12 @@ _DESCRIPTIONS = {
     "wrench": "Commanded wrench on the body, beside the thrusters",
     "actuation": "Wrench of all actuators on the body",
     "water_velocity": "Velocity of the water at the vehicle, world frame NED",
-    "measured": "What the sensors tell",
+    "measured": "Samples of the sensors",
     "measured.velocity": "Velocity over ground from the DVL, body frame",
     "measured.acceleration": "Specific force from the IMU, body frame",
     "measured.angular_velocity": "Angular velocity from the IMU, body frame",
     "measured.position": "Position from the USBL, world frame NED",
-    "measured.time": "When each sensor measured what it tells",
+    "measured.time": "Time of each sensor's sample",
 }
 _POSE = ("position", "quaternion", "attitude")
 # of thruster i: variables name[i], and what they are called within its terminal

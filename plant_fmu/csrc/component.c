@@ -136,7 +136,7 @@ static bool possible(const Model *m)
         good = good && fabs(m->held.samples[i]) < 1e15;
     for (int i = 0; i < N_SENSORS; i++) {
         const double pending = m->held.pending[i];
-        good = good && m->held.told[i] >= 0.0 && m->held.told[i] < 1e15 && fabs(m->held.taken[i]) <= MAX_TIME &&
+        good = good && m->held.delivered[i] >= 0.0 && m->held.delivered[i] < 1e15 && fabs(m->held.sample_time[i]) <= MAX_TIME &&
                pending >= 0.0 && pending <= MAX_PENDING;
         for (int j = 0; good && j < (int)pending; j++) {
             const Pending *sample = &m->held.queue[i][j];

@@ -100,8 +100,8 @@ static void tick_current(Model *m, unsigned long long count)
     drift->until = m->time + period;
 }
 
-/* Tells the oldest pending sample of a sensor. */
-static void tell(Held *held, int sensor)
+/* Delivers the oldest pending sample of a sensor. */
+static void deliver_sample(Held *held, int sensor)
 {
     Pending *queue = held->queue[sensor];
     int next = 0;
@@ -109,13 +109,13 @@ static void tell(Held *held, int sensor)
     for (int i = 0; i < N_MEASURED; i++)
         if (sensors_of_channel(i) == sensor)
             held->samples[i] = queue[0].values[next++];
-    held->taken[sensor] = queue[0].taken;
-    held->told[sensor] += 1.0;
+    held->sample_time[sensor] = queue[0].taken;
+    held->delivered[sensor] += 1.0;
     held->pending[sensor] -= 1.0;
     memmove(queue, queue + 1, (MAX_PENDING - 1) * sizeof *queue);
 }
 
-/* Takes the sample number `count` of a sensor, to be told after its delay. */
+/* Takes the sample number `count` of a sensor, to be delivered after its delay. */
 static void take_sample(Model *m, int sensor, unsigned long long count, const double ideal[N_MEASURED])
 {
     Held *held = &m->held;
@@ -125,7 +125,7 @@ static void take_sample(Model *m, int sensor, unsigned long long count, const do
     if (!sensors_sample(&m->plant.parameters, sensor, count, ideal, sample))
         return;
     if (held->pending[sensor] >= MAX_PENDING) /* the delay was longer when they were taken */
-        tell(held, sensor);
+        deliver_sample(held, sensor);
     Pending *last = &held->queue[sensor][(int)held->pending[sensor]];
     for (int i = 0; i < N_MEASURED; i++)
         if (sensors_of_channel(i) == sensor)
@@ -168,7 +168,7 @@ int model_tick(Model *m)
     }
     for (int i = 0; i < N_SENSORS; i++)
         while (m->held.pending[i] > 0.0 && m->held.queue[i][0].due <= m->time + 1e-9 + 1e-15 * fabs(m->time)) {
-            tell(&m->held, i);
+            deliver_sample(&m->held, i);
             ticked = 1;
         }
     note_next_tick(&m->held);
@@ -180,7 +180,7 @@ int model_tick(Model *m)
 /* Whether a sensor shows a sample. */
 static int holds(const Model *m, int sensor)
 {
-    return m->held.clocks[sensor].period > 0.0 && m->held.told[sensor] > 0.0;
+    return m->held.clocks[sensor].period > 0.0 && m->held.delivered[sensor] > 0.0;
 }
 
 int model_holds(const Model *m, int channel)
@@ -227,7 +227,7 @@ void model_evaluate(Model *m)
         if (model_holds(m, i))
             o->measured[i] = m->held.samples[i];
     for (int i = 0; i < N_SENSORS; i++)
-        o->stamp[i] = holds(m, i) ? m->held.taken[i] : m->held.clocks[i].period > 0.0 ? NO_SAMPLE : m->time;
+        o->stamp[i] = holds(m, i) ? m->held.sample_time[i] : m->held.clocks[i].period > 0.0 ? NO_SAMPLE : m->time;
 }
 
 int model_settle(Model *m)

@@ -4,7 +4,7 @@
 
 #include "plant.h"
 
-#define NO_SAMPLE -1e12 /* s, stamp of a sensor that has told none yet */
+#define NO_SAMPLE -1e12 /* s, stamp before the first sample */
 #define UPRIGHT 1e-12 /* cosine of pitch below which roll and yaw are one */
 
 enum { CURRENT_CLOCK = N_SENSORS, N_CLOCKS }; /* one for each sensor, one for the current's variation */
@@ -16,20 +16,20 @@ typedef struct {
     double samples; /* in all: the place in the stream of random numbers */
 } Clock;
 
-enum { MAX_PENDING = 8, MAX_SENSOR_CHANNELS = 6 }; /* samples of a sensor that are not told yet; channels of the IMU */
+enum { MAX_PENDING = 8, MAX_SENSOR_CHANNELS = 6 }; /* samples of a sensor that are not delivered yet; channels of the IMU */
 
-typedef struct { /* a sample that is not told yet */
+typedef struct { /* a sample that is not delivered yet */
     double taken, due; /* s */
     double values[MAX_SENSOR_CHANNELS];
 } Pending;
 
 typedef struct { /* what changes at ticks alone */
     Clock clocks[N_CLOCKS];
-    double next_tick; /* s, of any clock or sample that is to be told; INFINITY if there is none */
+    double next_tick; /* s, of any clock or pending sample; INFINITY if there is none */
     double samples[N_MEASURED];
-    double taken[N_SENSORS];               /* s, when the sample that is told was taken */
-    double told[N_SENSORS];                /* how many samples have been */
-    double pending[N_SENSORS];             /* how many are not yet, in the order of their times */
+    double sample_time[N_SENSORS];         /* s, of the last delivered sample */
+    double delivered[N_SENSORS];           /* number of samples */
+    double pending[N_SENSORS];             /* number of samples taken, but not delivered yet, in the order of their times */
     Pending queue[N_SENSORS][MAX_PENDING];
     Drift drift;
 } Held;
@@ -48,7 +48,7 @@ typedef struct {
     double water[3];             /* m/s, world frame */
     double altitude;             /* m */
     double measured[N_MEASURED];
-    double stamp[N_SENSORS];     /* s, when what is measured was so */
+    double stamp[N_SENSORS];     /* s, when what is measured was sampled */
     Flags flags;
 } Outputs;
 

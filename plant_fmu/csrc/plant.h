@@ -78,8 +78,8 @@ typedef struct {
     Real sensor_rate[N_SENSORS];             /* Hz, 0: continuous and without noise */
     Real noise[N_NOISES];                    /* standard deviations, in the channel's unit */
     Real bias[N_MEASURED];
-    Real velocity_scale_error;               /* of the DVL: part of the velocity that it tells too much */
-    Real delay[N_SENSORS];                   /* s, from a sample to when it is told */
+    Real velocity_scale_error;               /* of the DVL: part of the velocity that it measures too much */
+    Real delay[N_SENSORS];                   /* s, from a sample to its delivery */
     Real loss_probability[N_SENSORS];        /* of each sample */
     Real outlier_probability[N_SENSORS];     /* of each sample */
     Real outlier_scale;                      /* standard deviation of an outlier, over that of the noise */

@@ -266,5 +266,5 @@ void model_tangent(const Model *m, const Model *seed, int starting, Model *tange
     d->altitude = dp->bottom_depth - seed->state.rigid[2];
     measured_tangent(m, seed, starting, (const double(*)[3])R, (const double(*)[3])dR, d, d->measured);
     for (int i = 0; i < N_SENSORS; i++)
-        d->stamp[i] = m->held.clocks[i].period > 0.0 && !(starting && m->held.told[i] > 0.0) ? 0.0 : seed->time;
+        d->stamp[i] = m->held.clocks[i].period > 0.0 && !(starting && m->held.delivered[i] > 0.0) ? 0.0 : seed->time;
 }
