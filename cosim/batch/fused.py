@@ -8,23 +8,28 @@ from types import TracebackType
 import numpy as np
 from numpy.typing import NDArray
 
+from controller import LAWS
 from controller.allocation import Allocation
 from controller.regions import pack
-from cosim.batch.fused_loop import (
+from cosim.batch.flight_config import (
+    LOSSES,
     PLANT_OUTPUTS,
+    SENSOR_OUTPUTS,
     Allocator,
     Array,
     FlightConfig,
     FlightMetrics,
-    fly_law,
+    find_bound,
     make_workspace,
 )
+from cosim.batch.fused_loop import fly_law
 from cosim.batch.outcome import OUTCOME, Flown, nothing
 from cosim.batch.variation import Variation
 from cosim.errors import RunError, ScenarioError
 from cosim.results.summary import SETTLED_FOR
 from cosim.scenario.law_factory import law_of, require_builtin_law
 from cosim.scenario.scenario import CRITERIA, Scenario
+from cosim.scenario.sensor_suite import outage_schedule, scenario_sensors, sensor_model
 from cosim.scenario.start_values import start_values
 from cosim.simulation.sensor import STREAM
 from plant_fmu import Plant, PlantError
@@ -124,16 +129,19 @@ class FusedFlyer:
         else:
             inputs = tuple(f"wrench.{axis}" for axis in "XYZKMN")
             forces = tuple(f"actuator.wrench.{axis}" for axis in "XYZ")  # states: they cost no evaluation
-        native = plant.native(inputs, (*PLANT_OUTPUTS, *forces))
+        through_sensors = scenario.sensing.through == "sensors"
+        native = plant.native(inputs, (*PLANT_OUTPUTS, *forces, *(SENSOR_OUTPUTS if through_sensors else ())))
         names = [f"thrust_effectiveness[{i + 1}]" for i in range(n)]
         effectiveness = plant.native(names, ())
         effectiveness.inputs[:] = [plant[name] for name in names] if scenario.failures else 1.0
+        losses = plant.native(LOSSES, ())
+        losses.inputs[:] = [plant[name] for name in LOSSES] if scenario.outages else 0.0
         setup = _setup(scenario, n if through else 0)
         allocator = _allocator(scenario, setup) if through else _NONE
         decisions = -(-scenario.steps // scenario.control_every)
         rows = np.zeros((decisions, 20 + len(inputs) + law.report.size) if trace else (0, 0))
         workspace = make_workspace(len(scenario.regions), len(inputs), n)
-        metrics, estimate = fly_law(setup, native, effectiveness, allocator, law, workspace, rows)
+        metrics, estimate = fly_law(setup, native, effectiveness, losses, allocator, law, workspace, rows)
         return _outcome(metrics, setup, native, estimate), rows
 
     def close(self) -> None:
@@ -153,9 +161,11 @@ def _setup(scenario: Scenario, thrusters: int) -> FlightConfig:
     sensing, step = scenario.sensing, scenario.time.step
     decisions = -(-scenario.steps // scenario.control_every)
     noise = np.zeros((0, 6))
-    if not sensing.exact:
+    if sensing.through == "state" and not sensing.exact:
         deviation = np.repeat([sensing.position_noise, sensing.velocity_noise], 3)
         noise = deviation * np.random.default_rng([sensing.seed, STREAM]).standard_normal((decisions, 6))
+    sensors = scenario_sensors(scenario)
+    outages = outage_schedule(scenario.outages, sensors, step)
     failures = sorted(
         (math.ceil(f.time / step - _ROUNDING), f.thruster - 1, math.nan if f.stuck else f.effectiveness)
         for f in scenario.failures
@@ -175,11 +185,17 @@ def _setup(scenario: Scenario, thrusters: int) -> FlightConfig:
         dead_from=sensing.dead_from,
         dead_until=sensing.dead_from + sensing.dead_for,
         frozen=sensing.frozen,
+        through_sensors=sensing.through == "sensors",
+        sensors=sensor_model(sensors),
+        outage_steps=np.array([step for step, _, _ in outages], np.int64),
+        outage_sensors=np.array([sensor for _, sensor, _ in outages], np.int64),
+        outage_losses=np.array([loss for _, _, loss in outages]),
         failed=np.array([thruster for _, thruster, _ in failures], np.int64),
         failure_steps=np.array([at for at, _, _ in failures], np.int64),
         remaining=np.array([remaining for _, _, remaining in failures]),
         tell=scenario.tell_failures,
         thrusters=thrusters,
+        bound=find_bound(LAWS[scenario.law.name].diagnostics),
         clock=_NO_CLOCK,
     )
 

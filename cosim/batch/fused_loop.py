@@ -7,7 +7,6 @@ FMU; then the marks that the flight gets, of the true motion at every plant step
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,11 +14,13 @@ from numpy.typing import NDArray
 from controller import CompiledLaw, VehicleState
 from controller.allocation import allocate
 from controller.compiling.function import BoundCall
+from controller.navigation.navigator import navigate
 from controller.regions import Sphere
 from controller.regions.kinds import FIRST_OF_ATTITUDE
 from controller.regions.region_set import PackedRegions, clearance_of_pose, clearance_of_sphere
 from controller.translator.foreign import POINTER, call_c
 from cosim.batch.c_calls import fmi_do_step, fmi_get, fmi_set, seconds
+from cosim.batch.flight_config import Allocator, BoundLaw, FlightConfig, FlightMetrics, FlightOutputs, Workspace
 from cosim.simulation.closed_arbiter import weigh
 from cosim.simulation.memberships import compute_memberships
 from plant_fmu.running.native import Native
@@ -30,134 +31,11 @@ _SPHERE, _ATTITUDE = Sphere.kind, FIRST_OF_ATTITUDE
 _LAW = (POINTER,)  # what a law's function is given
 
 
-class FlightConfig(NamedTuple):
-    """What a flight is made of, beside law and plant."""
-
-    goal: PackedRegions
-    regions: PackedRegions
-    criteria: NDArray[np.int64]  # (n,) of each region
-    ramp: float  # m, width of the memberships
-    step: float  # s, of the plant
-    steps: int  # of the plant
-    control_every: int  # plant steps
-    arbiter_every: int  # plant steps
-    moving: bool  # whether any region moves
-    exact: bool  # what is measured is the truth
-    noise: Array  # (control steps, 6) added to position and linear velocity, anew at each of them; (0, 6) if exact
-    dead_from: float  # s, when position and linear velocity are lost
-    dead_until: float  # s
-    frozen: bool  # their last values are held in that time; otherwise they are NaN
-    failed: NDArray[np.int64]  # (f,) thrusters that fail, from 0, in the order of their failures
-    failure_steps: NDArray[np.int64]  # (f,) plant steps before which they do
-    remaining: Array  # (f,) effectiveness that is left; NaN of one that is stuck at its last force
-    tell: bool  # whether the law is told
-    thrusters: int  # that carry the wrench; 0: it acts on the body directly
-    clock: NDArray[np.int64]  # of `native.Clock`; (0,) if the law is not to be timed
-
-
-class Allocator(NamedTuple):
-    """Arguments of `controller.allocation.allocate`, one stage after another as thrusters are told to have failed."""
-
-    inverse: Array  # (stages, m, 6)
-    lower: Array  # (stages, m)
-    upper: Array  # (stages, m)
-    direction: bool
-
-
-class BoundLaw(NamedTuple):
-    """A law as the loop calls it: a function of C, with its arguments, of which some are the loop's own."""
-
-    address: int
-    words: int
-    is_wrench: bool  # what it gives; the forces of the thrusters otherwise
-    estimate: Array  # (4,) in its memory
-    report: Array  # (r,) likewise
-
-
-class Workspace(NamedTuple):
-    """Where a flight is computed."""
-
-    state: VehicleState  # as it is told
-    memberships: Array  # (3,)
-    by_criterion: Array  # (3,) weights
-    weights: Array  # (n,)
-    clearances: Array  # (n,) true ones
-    seen: Array  # (n,) those that the arbiter is told
-    goal_clearance: Array  # (1,) m or rad
-    wrench: Array  # (6,) N, N m, body frame
-    before: Array  # (i,) inputs of the step before
-    stuck: Array  # (i,) inputs of thrusters that are stuck, NaN of others
-    at: Array  # (3,)
-    ticks: NDArray[np.int64]  # (2,)
-
-
-def make_workspace(regions: int, inputs: int, thrusters: int) -> Workspace:
-    """Return the workspace of a flight.
-
-    Parameters
-    ----------
-    regions, inputs, thrusters : int
-        How many there are.
-
-    Returns
-    -------
-    Workspace
-        All zero, all thrusters healthy.
-    """
-    n = regions
-    state = VehicleState(np.zeros(3), np.zeros(4), np.zeros(6), np.ones(thrusters))
-    of_regions = np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(1)
-    return Workspace(
-        state,
-        np.zeros(3),
-        np.zeros(3),
-        *of_regions,
-        np.zeros(6),
-        np.zeros(inputs),
-        np.full(inputs, np.nan),
-        np.zeros(3),
-        np.zeros(2, np.int64),
-    )
-
-
-class FlightMetrics(NamedTuple):
-    """What a flight came to. Steps are those of the plant; -1: there was none."""
-
-    first_inside: float  # step at which it was inside the goal region first
-    last_entered: float  # step since when it was inside the last time
-    inside: bool  # it still was at the end
-    least_clearance: float  # m, of all hard regions of place; negative: violated; inf: there is none
-    least_angle: float  # rad, the same of hard regions of attitude
-    goal_clearance: float  # m, greatest
-    effort: float  # N s, integral of the magnitude of the force on the body
-    thrust_effort: float  # N s, sum over thrusters of the integral of the given force's magnitude
-    thrust_variation: float  # N, sum of the changes of what is commanded, from 0 on
-    max_force: float  # N, on the body
-    max_speed: float  # m/s, over ground
-    worst_step: float  # s of the wall clock, the longest that law and allocation took
-    failed_step: float  # that the FMU refused
-
-
-class FlightOutputs(NamedTuple):
-    """What a flight fills."""
-
-    metrics: Array  # (13,) in the order of `FlightMetrics`
-    estimate: Array  # (4,) that the last decision rests on
-    trace: Array  # (control steps, 20 + i + r), or (0, 0) if none is kept; a row: time, true position, quaternion and
-    # velocity, position as measured, the weights of the three criteria, the i inputs, the law's r reports
-
-
-PLANT_OUTPUTS = (
-    *(f"position.{axis}" for axis in "xyz"),
-    *(f"quaternion.e{i}" for i in range(4)),
-    *(f"velocity.{axis}" for axis in "uvwpqr"),
-)
-
-
 def fly(  # noqa: C901 - one loop, as a whole
     setup: FlightConfig,
     native: Native,
     effectiveness: Native,
+    losses: Native,
     allocator: Allocator,
     law: BoundLaw,
     workspace: Workspace,
@@ -171,9 +49,11 @@ def fly(  # noqa: C901 - one loop, as a whole
         What is flown.
     native : Native
         The plant: inputs are the thrust commands, or the wrench; outputs `PLANT_OUTPUTS`, then the thrusters'
-        forces if they are used, then the force on the body, its three components.
+        forces if they are used, then the force on the body, its three components; through sensors, `SENSOR_OUTPUTS`.
     effectiveness : Native
         The same plant: inputs are the thrusters' effectivenesses, as they are before anything fails.
+    losses : Native
+        The same plant: inputs are the sensors' probabilities of loss, `LOSSES`, as they are before any outage.
     allocator : Allocator
         For a wrench that thrusters carry.
     law : BoundLaw
@@ -192,7 +72,8 @@ def fly(  # noqa: C901 - one loop, as a whole
     least, least_angle, most = np.inf, np.inf, -np.inf
     effort, thrust_effort, variation = 0.0, 0.0, 0.0
     max_force, max_speed, worst, refused = 0.0, 0.0, 0.0, -1
-    failures, known_failures = 0, 0
+    failures, known_failures, outages = 0, 0, 0
+    bound, excess = np.nan, -np.inf
     timed = setup.clock.size > 0
     if not fmi_get(native):
         refused = 0
@@ -214,6 +95,11 @@ def fly(  # noqa: C901 - one loop, as a whole
             failures += 1
             if not fmi_set(effectiveness):
                 refused = k
+        while outages < setup.outage_steps.size and k == setup.outage_steps[outages]:
+            losses.inputs[setup.outage_sensors[outages]] = setup.outage_losses[outages]
+            outages += 1
+            if not fmi_set(losses):
+                refused = k
         # marks
         if setup.moving or k == 0:
             _move(setup, now)
@@ -223,6 +109,8 @@ def fly(  # noqa: C901 - one loop, as a whole
             if setup.regions.hard[i]:
                 if setup.regions.kinds[i] < _ATTITUDE:
                     least = _least(clearances[i], least)
+                    if not np.isnan(bound):
+                        excess = max(excess, bound - clearances[i])
                 else:
                     least_angle = _least(clearances[i], least_angle)
         most = max(most, goal_clearance[0])
@@ -241,7 +129,9 @@ def fly(  # noqa: C901 - one loop, as a whole
             break
         # measure
         arbitrates = k % setup.arbiter_every == 0
-        if not setup.exact or controls or arbitrates:
+        if setup.through_sensors:
+            _navigate(setup, now, native.outputs[16 + m :], workspace)
+        elif not setup.exact or controls or arbitrates:
             _measure(setup, k, now, native.outputs, state)
         # regions and arbiter: while the position is lost there is nothing to decide by, and the last weights hold
         if arbitrates and _is_finite(state.position):
@@ -256,8 +146,13 @@ def fly(  # noqa: C901 - one loop, as a whole
         # law and allocation
         if controls:
             started = seconds(setup.clock, workspace.ticks) if timed else 0.0
-            call_c(law.address, _LAW, law.words)
-            if m > 0 and law.is_wrench:
+            steers = not setup.through_sensors or workspace.navigation.started[0] > 0.0  # else nothing is known to
+            if steers:
+                call_c(law.address, _LAW, law.words)
+                bound = law.report[setup.bound] if setup.bound >= 0 else np.nan
+            else:
+                inputs[:] = 0.0
+            if steers and m > 0 and law.is_wrench:
                 lower, upper = allocator.lower[known_failures], allocator.upper[known_failures]
                 allocate(allocator.inverse[known_failures], lower, upper, allocator.direction, workspace.wrench, inputs)
             if timed:
@@ -287,6 +182,7 @@ def fly(  # noqa: C901 - one loop, as a whole
     metrics[3], metrics[4], metrics[5] = least, least_angle, most
     metrics[6], metrics[7], metrics[8] = effort, thrust_effort, variation
     metrics[9], metrics[10], metrics[11], metrics[12] = max_force, max_speed, worst, refused
+    metrics[13] = excess
 
 
 def _measure(setup: FlightConfig, k: int, now: float, true_state: Array, state: VehicleState) -> None:
@@ -306,6 +202,17 @@ def _measure(setup: FlightConfig, k: int, now: float, true_state: Array, state: 
         elif not (lost or setup.exact):
             state.position[i] += setup.noise[control, i]
             state.velocity_body[i] += setup.noise[control, 3 + i]
+
+
+def _navigate(setup: FlightConfig, now: float, sensed: Array, workspace: Workspace) -> None:
+    """Write the estimated state at a time [s] as `SensorNavigation` does; `sensed` are `SENSOR_OUTPUTS`."""
+    samples = workspace.measurements
+    for i in range(samples.values.size):
+        samples.values[i] = sensed[i]
+    for i in range(samples.times.size):
+        samples.times[i] = sensed[samples.values.size + i]
+    workspace.now[0] = now
+    navigate(samples, workspace.now, setup.sensors, workspace.navigation, workspace.state)
 
 
 def _is_finite(position: Array) -> bool:
@@ -350,6 +257,7 @@ def fly_law(
     setup: FlightConfig,
     native: Native,
     effectiveness: Native,
+    losses: Native,
     allocator: Allocator,
     law: CompiledLaw,
     workspace: Workspace,
@@ -359,7 +267,7 @@ def fly_law(
 
     Parameters
     ----------
-    setup, native, effectiveness, allocator, workspace
+    setup, native, effectiveness, losses, allocator, workspace
         As for `fly`.
     law : CompiledLaw
         Anew for each flight.
@@ -381,7 +289,7 @@ def fly_law(
     decide = law.bound(workspace.state, setup.goal, setup.regions, workspace.weights, forces)
     bound = BoundLaw(decide.address, decide.words, is_wrench, law.estimate, law.report)
     out = FlightOutputs(np.zeros(len(FlightMetrics._fields)), np.zeros(4), trace)
-    BoundCall(fly, (setup, native, effectiveness, allocator, bound, workspace, out)).call()
+    BoundCall(fly, (setup, native, effectiveness, losses, allocator, bound, workspace, out)).call()
     decide.raise_error()
     metrics = FlightMetrics(*out.metrics.tolist())
     return metrics._replace(inside=bool(metrics.inside)), out.estimate

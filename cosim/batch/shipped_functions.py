@@ -16,11 +16,15 @@ from controller import LAWS, CompiledLaw, VehicleState
 from controller.compiling.compiler import compile_file
 from controller.compiling.function import c_text
 from controller.compiling.library import checksum_path, digest_of, library_name
+from controller.navigation import SensorModel, empty_measurements
+from controller.navigation.estimate import empty_memory
+from controller.navigation.navigator import navigate
 from controller.regions import Region, Sphere, pack
 from controller.regions.rays import ray_distances
 from controller.regions.region_set import PackedRegions, evaluate_packed, write_clearances
 from cosim.batch.c_calls import Clock
-from cosim.batch.fused_loop import Allocator, BoundLaw, FlightConfig, FlightMetrics, FlightOutputs, fly, make_workspace
+from cosim.batch.flight_config import Allocator, BoundLaw, FlightConfig, FlightMetrics, FlightOutputs, make_workspace
+from cosim.batch.fused_loop import fly
 from cosim.scenario.vehicle_model import vehicle_model
 from cosim.simulation.environment import RegionEvaluation, RegionPlaces, evaluate_places
 from cosim.simulation.memberships import compute_memberships
@@ -38,6 +42,7 @@ def shipped_functions() -> Iterator[tuple[Callable[..., None], tuple[Any, ...]]]
     """Yield each function, with arguments of the types that it is called with."""
     goal, regions = (pack([Region(name, Sphere((0.0, 0.0, 0.0), 1.0), "in")]) for name in ("goal", "region"))
     state = VehicleState(np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]), np.zeros(6), np.ones(1))
+    yield navigate, (empty_measurements(), _FLAT, SensorModel(), empty_memory(), state)
     for law in LAWS.values():
         yield law.function, _of_law(law, state, goal, regions)
     found = RegionEvaluation(_FLAT, _TABLE, _TABLE, _FLAT)
@@ -62,11 +67,11 @@ def _of_flight(goal: PackedRegions, regions: PackedRegions) -> tuple[Any, ...]:
     native = Native(0, 0, 0, 0, references, _FLAT, references, _FLAT, _INTEGERS)
     setup = FlightConfig(
         goal, regions, _INTEGERS, 1.0, 1.0, 1, 1, 1, False, True, np.zeros((0, 6)), 0.0, 0.0, False,
-        _INTEGERS, _INTEGERS, _FLAT, False, 1, Clock().numbers,
+        False, SensorModel(), _INTEGERS, _INTEGERS, _FLAT, _INTEGERS, _INTEGERS, _FLAT, False, 1, -1, Clock().numbers,
     )  # fmt: skip
     out = FlightOutputs(np.zeros(len(FlightMetrics._fields)), _FLAT, np.zeros((0, 0)))
     law, allocator = BoundLaw(0, 0, True, _FLAT, _FLAT), Allocator(np.zeros((1, 1, 6)), _TABLE, _TABLE, True)
-    return setup, native, native, allocator, law, make_workspace(1, 1, 1), out
+    return setup, native, native, native, allocator, law, make_workspace(1, 1, 1), out
 
 
 def write_libraries(platforms: str, folder: Path) -> None:

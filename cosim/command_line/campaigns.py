@@ -48,6 +48,11 @@ def _add_scenes(verb: argparse.ArgumentParser) -> None:
     verb.add_argument("--workers", type=WORKERS, default=1, metavar="N", help="processes (default: 1)")
     add_replays(verb)
     verb.add_argument("--tell-failures", action="store_true", help="tell the law which thruster fails, and when")
+    verb.add_argument(
+        "--sensing", choices=("state", "sensors"), default="state",
+        help="what the law is given: the state with the scenes' noise, or what a navigation filter makes of IMU, DVL, "
+        "compass, pressure sensor and USBL (default: state)",
+    )  # fmt: skip
 
 
 def add_replays(verb: argparse.ArgumentParser) -> None:
@@ -66,7 +71,7 @@ def campaign(options: argparse.Namespace) -> int:
     from cosim.campaigns.scenes.law_gains import gains_from
 
     gains = gains_from(options.law, options.settings)
-    conditions = Conditions(tell_failures=options.tell_failures)
+    conditions = Conditions(tell_failures=options.tell_failures, sensing=options.sensing)
 
     def run() -> None:
         done = run_campaign(
@@ -89,7 +94,7 @@ def compare(options: argparse.Namespace) -> int:
 
     laws = [law.strip() for law in options.laws.split(",") if law.strip()]
     gains = gains_by_law(laws, options.settings)
-    conditions = Conditions(tell_failures=options.tell_failures)
+    conditions = Conditions(tell_failures=options.tell_failures, sensing=options.sensing)
 
     def run() -> None:
         done = compare_laws(

@@ -17,6 +17,7 @@ from cosim.replay.steering import Log
 from cosim.results.run_result import Run
 from cosim.results.spans import Flags, Span, Spans
 from cosim.scenario.scenario import CRITERIA
+from cosim.scenario.sensor_suite import SENSOR_NAMES
 from cosim.simulation.signals import Array
 
 _MOST = 12  # events of a kind; what comes closer together than that allows is told as one
@@ -53,7 +54,15 @@ def events_of(run: Run, log: Log) -> list[Event]:
     # a killed run has logged commands of rows that it did not save; a reset comes behind the last row
     log = [(min(k, rows - 1), order) for k, order in log if k <= rows]
     commands = [Event(time, "command", text) for time, text in command_events(log, step, _MOST)]
-    found = [*commands, *_goal(run), *_violations(run), *_active(run), *_failures(run), *_saturation(run)]
+    found = [
+        *commands,
+        *_goal(run),
+        *_violations(run),
+        *_active(run),
+        *_failures(run),
+        *_outages(run),
+        *_saturation(run),
+    ]
     return [*sorted(found, key=lambda event: event.time), _end(run)]
 
 
@@ -119,6 +128,14 @@ def _failures(run: Run) -> Iterator[Event]:
             if not failure.is_total:
                 what = f"keeps {failure.effectiveness:.0%} of its force"
             yield Event(failure.time, "failure", f"Thruster {failure.thruster} {what}")
+
+
+def _outages(run: Run) -> Iterator[Event]:
+    end = run.record.value("time", -1)
+    for outage in run.scenario.outages:
+        for time, what in ((outage.time, "is lost"), (outage.time + outage.duration, "is back")):
+            if time <= end:
+                yield Event(time, "failure", f"{SENSOR_NAMES[outage.sensor]} {what}")
 
 
 def _saturation(run: Run) -> Iterator[Event]:

@@ -13,6 +13,7 @@ from cosim.results.record import PARTS, RECORD
 from cosim.results.run_result import COMMANDS_LOG, SCENARIO, SUMMARY, Run
 from cosim.results.spans import Spans
 from cosim.results.wording import asked, kind_of, number, verdict
+from cosim.scenario.tables import Sensing
 from cosim.simulation.signals import Array
 
 
@@ -233,15 +234,25 @@ def _setting(run: Run) -> Table:
         ("planned for [s], in steps of [s]", f"{s.time.duration:g}, {s.time.step:g}"),
         ("start: north, east, down [m]", ", ".join(number(x, 6) for x in s.initial.position)),
         ("current: north, east, down [m/s]", ", ".join(number(x, 6) for x in s.plant.current)),
-        ("what the law is told", "the true state" if s.sensing.exact else "what sensors measure"),
+        ("what the law is told", _told(s.sensing)),
     ]
     if math.isfinite(s.limit.force) or s.limit.time_constant > 0.0:
         rows.append(("limit on the force [N], lag [s]", f"{s.limit.force:g}, {s.limit.time_constant:g}"))
     if s.failures:
         rows.append(("failures", f"{len(s.failures)}, {'told' if s.tell_failures else 'not told'} to the law"))
+    if s.outages:
+        rows.append(
+            ("outages of sensors", ", ".join(f"{o.sensor} {o.time:g} to {o.time + o.duration:g} s" for o in s.outages))
+        )
     if s.commands.enabled:
         rows.append(("commands", f"could be given while it ran; {run.summary.get('commands', 0)} were"))
     return Table("Scenario", (), tuple(rows), (1.0, 2.4))
+
+
+def _told(sensing: Sensing) -> str:
+    if sensing.through == "sensors":
+        return "what the navigation filter makes of the sensors"
+    return "the true state" if sensing.exact else "position and velocity with noise or gaps"
 
 
 def _repeating(run: Run) -> tuple[tuple[str, ...], str]:

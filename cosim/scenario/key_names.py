@@ -82,8 +82,8 @@ def key_name(key: str, table: dict[str, Any], vehicle: Vehicle) -> KeyName:
     if head == "goal" and rest:
         own = rest[0] in ("velocity", "streamed")
         return _of_region("the goal", table["goal"] | {"shape": table["goal"]}, rest if own else ["shape", *rest])
-    if head == "failures" and len(rest) == 2:
-        return KeyName(f"{rest[1]} of failure {rest[0]}", KEYS[f"failures[].{rest[1]}"].unit)
+    if head in ("failures", "outages") and len(rest) == 2:
+        return KeyName(f"{rest[1]} of {head[:-1]} {rest[0]}", KEYS[f"{head}[].{rest[1]}"].unit)
     if key not in KEYS and (vector := key.rpartition(".")[0]) in _WORDS:
         place, count = int(rest[-1]), len(table[head][rest[0]])
         linear, _, angular = KEYS[vector].unit.partition(", ")

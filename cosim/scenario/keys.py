@@ -73,6 +73,10 @@ KEYS = {
         ": through the allocation, or set by a law that drives thrusters",
     ),
     "actuation.limits": Key("", "`direction` scales all thrusters together, `per-thruster` cuts each"),
+    "sensing.through": Key(
+        "", "`state`, with noise on position and velocity, or `sensors`",
+        ": what the navigation filter makes of them, see [navigation.md](navigation.md)",
+    ),
     "sensing.position_noise": Key("m", "standard deviation of each told coordinate"),
     "sensing.velocity_noise": Key("m/s", "the same of each told linear velocity, body frame"),
     "sensing.seed": Key("", "of the noise"),
@@ -102,6 +106,10 @@ KEYS = {
     "failures[].time": Key("s", "from when on it fails"),
     "failures[].effectiveness": Key("", "part of its force that is left, 0 to 1"),
     "failures[].stuck": Key("", "it goes on with the force that was commanded last"),
+    "outages": Key("", "times in which a sensor gives no samples; where sensing is through `sensors`", default="none"),
+    "outages[].sensor": Key("", "`depth_sensor`, `dvl`, `imu`, `compass` or `usbl`"),
+    "outages[].time": Key("s", "when it begins"),
+    "outages[].duration": Key("s", "for how long"),
     "regions": Key("", "secondary regions", default="none"),
     "regions[].name": Key("", "its own: letters, digits, blanks, - and _"),
     "regions[].criterion": Key("", "`obstacle`, `shape` or `depth`", ": whose weight multiplies its gain"),
@@ -110,6 +118,7 @@ KEYS = {
     "regions[].shape": Key("", "a shape", ", below"),
     "regions[].velocity": Key("m/s", "north east down; the law is told"),
     "regions[].streamed": Key("", "moved from outside while the run goes on", ", below"),
+    "regions[].deviation": Key("m", "standard deviation of its place", ": margins of the deployable law heed it"),
     "regions[].hard": Key(
         "", "must not be violated", "; the paper's law, and a law of plain potentials, do not ask"
     ),

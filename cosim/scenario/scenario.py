@@ -31,6 +31,7 @@ from cosim.scenario.tables import (
     LawSetup,
     Limit,
     MasterSetup,
+    Outage,
     PlantSetup,
     RecordSetup,
     SecondaryRegion,
@@ -48,6 +49,7 @@ from cosim.scenario.validation import (
     check_intersection,
     check_law,
     check_numbers,
+    check_outages,
     check_parameters,
     check_record,
     check_regions,
@@ -91,6 +93,7 @@ class Scenario:
     actuation: Actuation
     sensing: Sensing
     failures: tuple[Failure, ...]
+    outages: tuple[Outage, ...]
     master: MasterSetup
     record: RecordSetup
     commands: Commands
@@ -282,6 +285,7 @@ def validate_scenario(table: dict[str, Any], name: str, vehicle: Vehicle | None 
     check_parameters(file.plant.parameters, vehicle)
     law = check_law(file.law, file.actuation.through, vehicle, time.control, len(regions) + len(seen))
     check_failures(file.failures, file.actuation.through, vehicle)
+    check_outages(file.outages, file.sensing.through)
     check_record(file.record, law, regions)
 
     filled = dataclasses.replace(
@@ -307,6 +311,7 @@ def validate_scenario(table: dict[str, Any], name: str, vehicle: Vehicle | None 
         actuation=file.actuation,
         sensing=file.sensing,
         failures=file.failures,
+        outages=file.outages,
         master=file.master,
         record=file.record,
         commands=file.commands,

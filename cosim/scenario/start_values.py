@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from cosim.scenario.scenario import Scenario
+from cosim.scenario.sensor_suite import scenario_sensors
 
 
 def start_values(scenario: Scenario) -> dict[str, float]:
@@ -31,4 +32,4 @@ def start_values(scenario: Scenario) -> dict[str, float]:
         ("velocity", "uvwpqr", initial.velocity),
     ):
         values |= {f"{prefix}.{name}": number for name, number in zip(names, numbers, strict=True)}
-    return values | plant.parameters
+    return values | scenario_sensors(scenario) | plant.parameters

@@ -81,9 +81,22 @@ class Failure:
 
 
 @dataclass(frozen=True)
-class Sensing:
-    """What law and arbiter are told of position and linear velocity; attitude and body rates they know exactly."""
+class Outage:
+    """A time in which a sensor gives no samples."""
 
+    sensor: Literal["depth_sensor", "dvl", "imu", "compass", "usbl"]
+    time: float  # s, when it begins
+    duration: float  # s
+
+
+@dataclass(frozen=True)
+class Sensing:
+    """What law and arbiter are given: the state, or what a navigation filter makes of the plant's sensors.
+
+    Of the state, position and linear velocity may have noise; attitude and body rates are exact.
+    """
+
+    through: Literal["state", "sensors"] = "state"
     position_noise: float = 0.0  # m, standard deviation of each coordinate, white, drawn anew at each control step
     velocity_noise: float = 0.0  # m/s, the same of each linear velocity
     seed: int = 0
@@ -94,7 +107,7 @@ class Sensing:
     @property
     def exact(self) -> bool:
         """Whether what is told is the truth."""
-        noisy = self.position_noise > 0.0 or self.velocity_noise > 0.0
+        noisy = self.position_noise > 0.0 or self.velocity_noise > 0.0 or self.through == "sensors"
         return not noisy and (self.dead_for == 0.0 or self.dead_from == math.inf)
 
 
@@ -161,6 +174,7 @@ class RegionEntry:
     velocity: Vector3 = (0.0, 0.0, 0.0)  # m/s, NED
     streamed: bool = False  # moved from outside while the run goes on
     hard: bool = True  # must not be violated, for laws that tell hard regions from soft ones
+    deviation: float = 0.0  # m, standard deviation of its place, for laws whose margins heed it
 
 
 @dataclass(frozen=True)
@@ -183,6 +197,7 @@ class File:
     actuation: Actuation = Actuation()
     sensing: Sensing = Sensing()
     failures: tuple[Failure, ...] = ()
+    outages: tuple[Outage, ...] = ()
     master: MasterSetup = MasterSetup()
     record: RecordSetup = RecordSetup()
     commands: Commands = Commands()

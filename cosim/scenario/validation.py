@@ -26,6 +26,7 @@ from cosim.scenario.tables import (
     LawSetup,
     Limit,
     NoGains,
+    Outage,
     RecordSetup,
     RegionEntry,
     SecondaryRegion,
@@ -103,6 +104,10 @@ def _check_sensing(sensing: Sensing) -> None:
         _require(0.0 <= value < math.inf, f"sensing.{key}", value, "a finite number, 0 or above")
     _require(sensing.dead_from >= 0.0, "sensing.dead_from", sensing.dead_from, "0 s or above (inf for never)")
     _require(sensing.seed >= 0, "sensing.seed", sensing.seed, "a whole number, 0 or above")
+    if sensing.through == "sensors":
+        for key in ("position_noise", "velocity_noise", "dead_for"):
+            expected = "0 with sensing.through = 'sensors': plant.parameters and outages say it"
+            _require(getattr(sensing, key) == 0.0, f"sensing.{key}", getattr(sensing, key), expected)
 
 
 def check_failures(failures: tuple[Failure, ...], through: str, vehicle: Vehicle) -> None:
@@ -118,6 +123,20 @@ def check_failures(failures: tuple[Failure, ...], through: str, vehicle: Vehicle
             not (failure.stuck and failure.effectiveness), f"failures.{i}.effectiveness", failure.effectiveness,
             "none of a thruster that is stuck",
         )  # fmt: skip
+
+
+def check_outages(outages: tuple[Outage, ...], through: str) -> None:
+    """Raise `ScenarioError` unless the run uses the sensors, and each outage comes after the last one of its sensor."""
+    if outages and through != "sensors":
+        raise ScenarioError("outages are given, expected none with sensing.through = 'state': no sensor is used")
+    ends: dict[str, float] = {}
+    for i, outage in sorted(enumerate(outages), key=lambda item: item[1].time):
+        for key in ("time", "duration"):
+            value = getattr(outage, key)
+            _require(0.0 <= value < math.inf, f"outages.{i}.{key}", value, "a finite number, 0 s or above")
+        last = ends.get(outage.sensor, -math.inf)
+        _require(outage.time > last, f"outages.{i}.time", outage.time, f"above {last} s, the end of the one before")
+        ends[outage.sensor] = outage.time + outage.duration
 
 
 def check_record(record: RecordSetup, law: LawSetup, regions: tuple[SecondaryRegion, ...]) -> None:
@@ -178,9 +197,11 @@ def check_regions(entries: tuple[RegionEntry, ...]) -> tuple[SecondaryRegion, ..
         _require(good, f"{key}.name", repr(entry.name), "at most 40 letters, digits, blanks, - and _, and not goal")
         _require(names.count(entry.name) == 1, f"{key}.name", "used twice", "a name of its own")
         _require(0.0 <= entry.gain < math.inf, f"{key}.gain", entry.gain, "a finite number, 0 or above")
+        good = 0.0 <= entry.deviation < math.inf
+        _require(good, f"{key}.deviation", entry.deviation, "a finite number, 0 m or above")
         _require(all(map(math.isfinite, entry.velocity)), f"{key}.velocity", entry.velocity, "finite numbers")
         shape = _shape(entry.shape, f"{key}.shape")
-        region = Region(entry.name, shape, entry.keep, entry.velocity, entry.gain, entry.hard)
+        region = Region(entry.name, shape, entry.keep, entry.velocity, entry.gain, entry.hard, entry.deviation)
         regions.append(SecondaryRegion(region, entry.criterion, entry.streamed))
     return tuple(regions)
 

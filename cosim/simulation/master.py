@@ -27,7 +27,7 @@ from cosim.simulation.commands.commands import Command
 from cosim.simulation.commands.sources import CommandSource
 from cosim.simulation.environment import RegionEnvironment
 from cosim.simulation.lyapunov_signals import LyapunovSignals
-from cosim.simulation.sensor import Sensor
+from cosim.simulation.sensor_navigation import SensorNavigation, make_sensing
 from cosim.simulation.signals import Array, Signals
 from fuzzy_arbiter import Arbiter
 from plant_fmu import Plant
@@ -64,6 +64,8 @@ class Master:
         The row that each step fills.
     truth, state : VehicleState
         The vehicle as it is, and as law and arbiter are told; the same where sensing is exact.
+    navigator : Navigator or None
+        The filter that estimates the state, where sensing is through sensors.
 
     Raises
     ------
@@ -126,12 +128,9 @@ class Master:
             velocity_body=s.view("velocity.u", 6),
             thruster_health=self.actuators.health,
         )
-        self.true_state = self.state = true_state
-        self._sensor: Sensor | None = None
-        if not self.scenario.sensing.exact:
-            position, velocity = s.view("sensed.x", 3), s.view("sensed.u", 6)
-            self.state = VehicleState(position, np.zeros(4), velocity, self.actuators.health)
-            self._sensor = Sensor(self.scenario.sensing, true_state, self.state)
+        self.true_state = true_state
+        self.state, self._sensor = make_sensing(self.scenario, self.plant, s, true_state)
+        self.navigator = self._sensor.navigator if isinstance(self._sensor, SensorNavigation) else None
 
         values, clearances = s.view("goal.value", n + 1), s.view("goal.clearance", n + 1)
         # where sensing is exact, what the arbiter sees is what is recorded
@@ -335,6 +334,10 @@ class Master:
         actuators = self.actuators
         if self.command_handler is not None and not self.command_handler.automatic_control:
             actuators.command[:] = self.command_handler.wrench
+            actuators.allocate()
+            return
+        if self.navigator is not None and not self.navigator.started:  # nothing is known to steer by
+            actuators.command[:] = actuators.thrusts[:] = 0.0
             actuators.allocate()
             return
         self._estimate[...] = self.law.estimate

@@ -34,6 +34,7 @@ from cosim.results.run_result import SCENARIO
 from cosim.results.spans import spans
 from cosim.scenario.scenario import VEHICLE_COPY, Scenario, load_scenario
 from plant_fmu import PlantFmuError
+from plant_fmu.toml_tables import decode
 
 Outcome = dict[str, Any]  # some columns of a row
 _ROUNDING = 1e-6  # of a number, relative and absolute, that two flights of one scenario may differ by
@@ -151,7 +152,8 @@ def _of_sweep(folder: Path, plan: dict[str, Any], stored: dict[str, Any]) -> Rep
 
 
 def _of_scene(folder: Path, plan: dict[str, Any], stored: dict[str, Any]) -> Repeat:
-    gains, conditions = law_named(plan["law"]).gains_type(**plan["gains"]), Conditions(**plan["conditions"])
+    gains = law_named(plan["law"]).gains_type(**plan["gains"])
+    conditions = decode(plan["conditions"], Conditions, "conditions")
     line = stored["scene"].encode()
     scenario = None
     if stored["refused"] is None:

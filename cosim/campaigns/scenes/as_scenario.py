@@ -62,16 +62,21 @@ def scene_scenario(scene: Scene, law: str, gains: Any, conditions: Conditions) -
         "law": {"name": law, "gains": gains._asdict()},
         "arbiter": {"ramp": conditions.ramp},
         "actuation": {"through": "thrusters"},
-        "sensing": {
-            "seed": scene.seed,
-            "position_noise": scene.noise.position,
-            "velocity_noise": scene.noise.velocity,
-        },
+        "sensing": _sensing(scene, conditions),
+        "outages": [dataclasses.asdict(outage) for outage in conditions.outages],
         "failures": _failures(scene, conditions),
         "tell_failures": conditions.tell_failures,
         "regions": _regions(scene),
     }
     return validate_scenario(table, f"{law}-scene-{scene.seed}", vehicle)
+
+
+def _sensing(scene: Scene, conditions: Conditions) -> dict[str, Any]:
+    """Return what the law is told: through sensors, their noise is that of data sheets, not of the scene."""
+    sensing: dict[str, Any] = {"through": conditions.sensing, "seed": scene.seed}
+    if conditions.sensing == "state":
+        sensing |= {"position_noise": scene.noise.position, "velocity_noise": scene.noise.velocity}
+    return sensing
 
 
 def _failures(scene: Scene, conditions: Conditions) -> list[dict[str, float]]:

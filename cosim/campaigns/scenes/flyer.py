@@ -5,16 +5,28 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from types import TracebackType
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from controller import LAWS
 from cosim.batch.c_calls import Clock
-from cosim.batch.fused_loop import PLANT_OUTPUTS, Allocator, FlightConfig, FlightMetrics, fly_law, make_workspace
+from cosim.batch.flight_config import (
+    LOSSES,
+    PLANT_OUTPUTS,
+    SENSOR_OUTPUTS,
+    Allocator,
+    FlightConfig,
+    FlightMetrics,
+    find_bound,
+    make_workspace,
+)
+from cosim.batch.fused_loop import fly_law
 from cosim.campaigns.scenes.scene import KnownScene, Scene, known_scene, plant_values
 from cosim.errors import RunError
+from cosim.scenario.sensor_suite import outage_schedule, sensor_model, sensor_parameters
+from cosim.scenario.tables import Outage
 from cosim.scenario.vehicle_model import vehicle_model
 from plant_fmu import Plant
 from plant_fmu.vehicle import load_vehicle
@@ -34,6 +46,8 @@ class Conditions:
     settled: float = 10.0  # s at the end inside the goal region
     ramp: float = 0.2  # m, width of the arbiter's memberships
     tell_failures: bool = False
+    sensing: Literal["state", "sensors"] = "state"  # what the law is told, as `Sensing.through`
+    outages: tuple[Outage, ...] = ()  # of sensors
 
     def __post_init__(self) -> None:
         for key in ("duration", "control"):
@@ -63,6 +77,9 @@ class Score(NamedTuple):
     thrust_variation: float  # N, sum over thrusters of the changes of the commanded force, from 0 on
     worst_step: float  # s of the wall clock, the longest that law and allocation took
     failed_step: int  # plant step that the FMU refused, -1 for none
+    bound_excess: float = (
+        -math.inf
+    )  # m, by which a clearance was below the law's last bound, greatest; -inf: it gives none
 
 
 class SceneFlyer:
@@ -119,7 +136,7 @@ class SceneFlyer:
         scene : Scene
             With all that the plant needs.
         trace : bool
-            Whether to keep what happened, see `cosim.batch.fused_loop`.
+            Whether to keep what happened, see `cosim.batch.flight_config`.
 
         Returns
         -------
@@ -135,17 +152,23 @@ class SceneFlyer:
         plant, known = self._plant, known_scene(scene)
         law = self._law(known.regions.kinds.size)
         plant.reset()
-        plant.set(plant_values(scene, self._vehicle, c.plant_step))
+        values, sensors = plant_values(scene, self._vehicle, c.plant_step), {}
+        if c.sensing == "sensors":
+            sensors = sensor_parameters(scene.seed, values)
+        plant.set(values | sensors)
         plant.initialise()
         thrusts = [f"thrust[{i + 1}]" for i in range(m)]
         forces = [f"thruster_force[{i + 1}]" for i in range(m)]
-        native = plant.native(thrusts, (*PLANT_OUTPUTS, *forces, *(f"actuation.{axis}" for axis in "XYZ")))
+        outputs = (*PLANT_OUTPUTS, *forces, *(f"actuation.{axis}" for axis in "XYZ"))
+        native = plant.native(thrusts, (*outputs, *(SENSOR_OUTPUTS if sensors else ())))
         effectiveness = plant.native([f"thrust_effectiveness[{i + 1}]" for i in range(m)], ())
         effectiveness.inputs[:] = 1.0
-        setup = self._setup(scene, known)
+        losses = plant.native(LOSSES, ())
+        losses.inputs[:] = [sensors.get(name, 0.0) for name in LOSSES]
+        setup = self._setup(scene, known, sensors)
         rows = np.zeros((c.controls, 20 + m + law.report.size) if trace else (0, 0))
         workspace = make_workspace(known.regions.kinds.size, m, m)
-        metrics, _ = fly_law(setup, native, effectiveness, self._allocator(), law, workspace, rows)
+        metrics, _ = fly_law(setup, native, effectiveness, losses, self._allocator(), law, workspace, rows)
         return self._score(metrics, setup), rows
 
     def _score(self, metrics: FlightMetrics, setup: FlightConfig) -> Score:
@@ -158,17 +181,19 @@ class SceneFlyer:
             thrust_variation=metrics.thrust_variation,
             worst_step=metrics.worst_step,
             failed_step=int(metrics.failed_step),
+            bound_excess=metrics.bound_excess,
         )
 
     def _law(self, n_regions: int) -> Any:
         return LAWS[self.law].for_vehicle(self._model, self.gains, np.array(LEVEL), self.conditions.control, n_regions)
 
-    def _setup(self, scene: Scene, known: KnownScene) -> FlightConfig:
+    def _setup(self, scene: Scene, known: KnownScene, sensors: dict[str, float]) -> FlightConfig:
         c, failure = self.conditions, scene.failed_thruster
         noise = np.random.default_rng([scene.seed, 1]).standard_normal((c.controls, 6))
         noise[:, :3] *= scene.noise.position
         noise[:, 3:] *= scene.noise.velocity
         fails_at = math.ceil(min(failure.time, c.duration) / c.control) * c.plant_steps if failure else 0
+        outages = outage_schedule(c.outages, sensors, c.plant_step)
         return FlightConfig(
             goal=known.goal,
             regions=known.regions,
@@ -179,16 +204,22 @@ class SceneFlyer:
             control_every=c.plant_steps,
             arbiter_every=c.plant_steps,
             moving=any(any(obstacle.velocity) for obstacle in scene.obstacles),
-            exact=not (scene.noise.position or scene.noise.velocity),
+            exact=not (scene.noise.position or scene.noise.velocity or sensors),
             noise=noise,
             dead_from=math.inf,
             dead_until=math.inf,
             frozen=False,
+            through_sensors=bool(sensors),
+            sensors=sensor_model(sensors),
+            outage_steps=np.array([step for step, _, _ in outages], np.int64),
+            outage_sensors=np.array([sensor for _, sensor, _ in outages], np.int64),
+            outage_losses=np.array([loss for _, _, loss in outages]),
             failed=np.array([failure.index - 1] if failure else [], np.int64),
             failure_steps=np.array([fails_at] if failure else [], np.int64),
             remaining=np.zeros(1 if failure else 0),
             tell=c.tell_failures,
             thrusters=self._vehicle.n_thrusters,
+            bound=find_bound(LAWS[self.law].diagnostics),
             clock=self._clock.numbers,
         )
 

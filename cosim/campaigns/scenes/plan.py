@@ -23,7 +23,8 @@ class Plan:
 
     def table(self) -> dict[str, Any]:
         """Return it as a table for JSON."""
-        return {"kind": SCENES} | asdict(self)
+        outages = [asdict(outage) for outage in self.conditions.outages]  # a list, as JSON reads them
+        return {"kind": SCENES} | asdict(self) | {"conditions": asdict(self.conditions) | {"outages": outages}}
 
 
 def plan_of(law: str, gains: Any, conditions: Conditions, scenes: int, digest: str) -> Plan:

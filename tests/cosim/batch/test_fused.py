@@ -80,6 +80,13 @@ def test_noise_and_gaps_in_what_is_measured_are_the_masters(frozen):
     assert_same_flight(scenario_of(law, *BRISK, *NOISY, f"sensing.frozen={frozen}", "limit.force=150.0", *gap))
 
 
+def test_flights_by_sensors_are_the_masters():
+    """With noise, delays, lost samples and outliers of the data sheets, and two outages."""
+    outages = "outages=[{sensor='dvl', time=3.0, duration=1.5}, {sensor='usbl', time=2.015, duration=9.0}]"
+    sensors = ["sensing.through=sensors", "sensing.seed=4", outages, "time.step=0.005", "time.control=0.02"]
+    assert_same_flight(scenario_of("pd", *BRISK, *sensors, "limit.force=150.0"))
+
+
 @pytest.mark.parametrize("told", ["true", "false"])
 @pytest.mark.parametrize(
     "failures",

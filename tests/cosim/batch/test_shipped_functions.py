@@ -22,6 +22,7 @@ from cosim.mavlink.vehicle.proximity import Proximity
 from cosim.scenario.scenario import load_scenario
 from cosim.simulation.master import Master
 
+THROUGH_SENSORS = ["sensing.through=sensors", "sensing.position_noise=0.0", "sensing.velocity_noise=0.0"]
 SHORT = ["time.duration=0.1", "arbiter.engine=closed"]
 
 
@@ -44,6 +45,8 @@ def test_what_flights_call_is_shipped_and_what_is_shipped_is_called(called, tmp_
         with Master(scenario) as master:
             master.run()
         Proximity(scenario)
+    with Master(load_scenario("pipe-inspection", ["time.duration=0.1", *THROUGH_SENSORS])) as master:
+        master.run()
     (tmp_path / "scenes").write_text("\n".join(generate_scenes(1)))
     for scene in read_scenes(tmp_path / "scenes"):
         for law in LAWS:

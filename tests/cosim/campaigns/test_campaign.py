@@ -45,8 +45,8 @@ def test_a_row_a_scene_in_order_of_seed(tmp_path, scenes):
     assert table["seed"].to_pylist() == list(range(1000, 1020))
     units = {f.name: f.metadata[b"unit"].decode() for f in table.schema}
     assert units == {
-        "seed": "", "reached": "", "violation": "", "min_clearance": "m", "reach_time": "s", "effort": "N.s",
-        "thrust_variation": "N", "worst_step_time": "s", "stopped_at": "s", "refused": "", "scene": "",
+        "seed": "", "reached": "", "violation": "", "min_clearance": "m", "bound_excess": "m", "reach_time": "s",
+        "effort": "N.s", "thrust_variation": "N", "worst_step_time": "s", "stopped_at": "s", "refused": "", "scene": "",
     }  # fmt: skip
     assert all(f.metadata[b"description"] for f in table.schema)
 

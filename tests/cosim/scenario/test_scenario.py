@@ -201,6 +201,24 @@ def test_faults_are_named_in_one_line(override, words):
 
 
 @pytest.mark.parametrize(
+    ("overrides", "words"),
+    [
+        (["sensing.position_noise=0.1"], "sensing.position_noise is 0.1, expected 0 with sensing.through = 'sensors'"),
+        (["outages=[{sensor='gps',time=1,duration=1}]"], "outages.0.sensor: expected one of .*'gps'"),
+        (["outages=[{sensor='dvl',time=-1,duration=1}]"], "outages.0.time is -1.0, expected a finite number, 0 s"),
+        (["outages=[{sensor='dvl',time=1}]"], "outages.0: table missing required field 'duration'"),
+        (
+            ["outages=[{sensor='dvl',time=1,duration=3},{sensor='dvl',time=2,duration=3}]"],
+            "outages.1.time is 2.0, expected above 4.0 s, the end of the one before",
+        ),
+    ],
+)
+def test_faults_about_sensors_are_named(overrides, words):
+    with pytest.raises(ScenarioError, match=words):
+        load_scenario("paper", ["sensing.through=sensors", *overrides])
+
+
+@pytest.mark.parametrize(
     ("override", "words"),
     [
         ("failures.0.thruster=9", "failures.0.thruster is 9, expected 1 to 8"),
@@ -212,6 +230,7 @@ def test_faults_are_named_in_one_line(override, words):
             "failures.0.effectiveness is 0.5, expected none of a thruster that is stuck",
         ),
         ("failures.0.when=3", r"failures.0.when: unknown key"),
+        ("outages=[{sensor='dvl',time=1.0,duration=2.0}]", "outages are given, expected none with sensing.through"),
         ("law.gains.k_p1=3", r"law.gains.k_p1: unknown key"),
         ("law.gains.speed=0", "law.gains.speed is 0.0, expected a finite number above 0"),
         ("actuation.through=wrench", "'wrench', expected 'thrusters'"),

@@ -1,0 +1,138 @@
+"""The sensors of a vehicle that navigates by them: figures of data sheets, as parameters of the FMU.
+
+`DATA_SHEETS` is what the plant has unless a scenario's ``plant.parameters`` say otherwise; the navigation filter is
+given the standard deviations that the plant then has, and those from which constant errors are drawn. A number that no
+data sheet says is called assumed.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+
+import numpy as np
+
+from controller.navigation import SensorModel
+from controller.navigation.measurements import SENSORS
+from cosim.scenario.scenario import Scenario
+from cosim.scenario.tables import Outage
+
+SENSOR_NAMES = dict(zip(SENSORS, ("Pressure sensor", "DVL", "IMU", "Compass", "USBL"), strict=True))
+
+DATA_SHEETS: dict[str, float] = {
+    # pressure: TE Connectivity MS5837-30BA (Blue Robotics Bar30), resolution 0.2 mbar; rate and delay assumed
+    "depth_sensor.rate": 20.0,
+    "depth_sensor.noise": 0.002,
+    "depth_sensor.delay": 0.02,
+    # DVL: Water Linked A50, 4 to 26 Hz by altitude; noise of a ping, delay, lost pings and outliers assumed
+    "dvl.rate": 8.0,
+    "dvl.velocity_noise": 0.005,
+    "dvl.altitude_noise": 0.02,
+    "dvl.delay": 0.1,
+    "dvl.loss_probability": 0.05,
+    "dvl.outlier_probability": 0.01,
+    # IMU: Movella MTi-300, 60 ug/sqrt(Hz) and 0.01 deg/s/sqrt(Hz), here at 100 Hz
+    "imu.rate": 100.0,
+    "imu.acceleration_noise": 0.0059,
+    "imu.angular_velocity_noise": 0.00175,
+    # compass: of the same, 1 deg RMS, taken as constant; noise, rate and delay assumed
+    "compass.rate": 10.0,
+    "compass.noise": 0.0035,
+    "compass.delay": 0.02,
+    # USBL: LinkQuest TrackLink, 0.1 deg of bearing, at 85 m; rate, delay, lost fixes and outliers assumed
+    "usbl.rate": 1.0,
+    "usbl.noise": 0.15,
+    "usbl.delay": 0.3,
+    "usbl.loss_probability": 0.05,
+    "usbl.outlier_probability": 0.02,
+}
+
+# constant errors, drawn from the seed; of the DVL 0.1 % (A50 Performance) to 1 % (A50), the compass as above; those of
+# IMU and pressure sensor, after calibration, assumed
+_CONSTANT = SensorModel(
+    depth_bias=0.02, velocity_scale=0.005, acceleration_bias=0.02, angular_velocity_bias=0.0017, heading_bias=0.0175
+)
+_STREAM = 2  # beside the seed
+_ROUNDING = 1e-6  # of a step
+
+
+def sensor_parameters(seed: int, over: Mapping[str, float]) -> dict[str, float]:
+    """Return the FMU's parameters of all sensors, by name: data sheets, and constant errors drawn from the seed.
+
+    Parameters
+    ----------
+    seed : int
+        Of the constant errors and of all noise.
+    over : mapping of str to float
+        Parameters that go before them.
+
+    Returns
+    -------
+    dict of str to float
+        SI units; with those of `over`.
+    """
+    draw = np.random.default_rng([seed, _STREAM]).standard_normal(9)
+    names = (
+        *((f"imu.acceleration_bias.{axis}", _CONSTANT.acceleration_bias) for axis in "xyz"),
+        *((f"imu.angular_velocity_bias.{axis}", _CONSTANT.angular_velocity_bias) for axis in "pqr"),
+        ("compass.bias", _CONSTANT.heading_bias),
+        ("depth_sensor.bias", _CONSTANT.depth_bias),
+        ("dvl.scale_error", _CONSTANT.velocity_scale),
+    )
+    constant = {name: float(x * deviation) for x, (name, deviation) in zip(draw, names, strict=True)}
+    return DATA_SHEETS | constant | {"seed": float(seed % 2**31)} | dict(over)
+
+
+def scenario_sensors(scenario: Scenario) -> dict[str, float]:
+    """Return the FMU's parameters of all sensors of a scenario, by name; none if its sensing is not through them."""
+    if scenario.sensing.through != "sensors":
+        return {}
+    return sensor_parameters(scenario.sensing.seed, {k: float(v) for k, v in scenario.plant.parameters.items()})
+
+
+def sensor_model(parameters: Mapping[str, float]) -> SensorModel:
+    """Return what the navigation filter is given of the sensors: their noise, and how large constant errors may be.
+
+    Parameters
+    ----------
+    parameters : mapping of str to float
+        Of `sensor_parameters`; of no sensors, noise is that of `SensorModel`.
+    """
+    usual = SensorModel()
+    return _CONSTANT._replace(
+        depth=parameters.get("depth_sensor.noise", usual.depth),
+        velocity=parameters.get("dvl.velocity_noise", usual.velocity),
+        acceleration=parameters.get("imu.acceleration_noise", usual.acceleration),
+        angular_velocity=parameters.get("imu.angular_velocity_noise", usual.angular_velocity),
+        heading=parameters.get("compass.noise", usual.heading),
+        position=parameters.get("usbl.noise", usual.position),
+        gravity=parameters.get("gravity", usual.gravity),
+    )
+
+
+def outage_schedule(
+    outages: Iterable[Outage], parameters: Mapping[str, float], step: float
+) -> list[tuple[int, int, float]]:
+    """Return when a sensor's probability of loss changes.
+
+    Parameters
+    ----------
+    outages : iterable of Outage
+        Outages.
+    parameters : mapping of str to float
+        With the probabilities that are so otherwise.
+    step : float
+        Of the plant [s].
+
+    Returns
+    -------
+    list of tuple
+        Step of the plant, sensor as in `SENSORS`, probability; in order of time.
+    """
+    changes = []
+    for outage in outages:
+        usual = parameters.get(f"{outage.sensor}.loss_probability", 0.0)
+        sensor = SENSORS.index(outage.sensor)
+        begin, end = (math.ceil(t / step - _ROUNDING) for t in (outage.time, outage.time + outage.duration))
+        changes += [(begin, sensor, 1.0), (end, sensor, usual)]
+    return sorted(changes)

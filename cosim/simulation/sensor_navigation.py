@@ -1,0 +1,96 @@
+"""Sensing through sensors: law and arbiter are given the estimate of the navigation filter."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from controller import VehicleState
+from controller.navigation import Navigator
+from controller.navigation.measurements import SENSORS
+from cosim.scenario.scenario import Scenario
+from cosim.scenario.sensor_suite import outage_schedule, scenario_sensors, sensor_model
+from cosim.simulation.sensor import Sensor
+from cosim.simulation.signals import Signals
+from plant_fmu import Plant
+
+_ROUNDING = 1e-6  # of a step
+FIRST, FIRST_TIME = "measured.depth", f"measured.time.{SENSORS[0]}"  # outputs of the plant, the others follow
+
+
+class SensorNavigation:
+    """The plant's sensors and the navigation filter, step by step.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        Of the sensors and their outages.
+    plant : Plant
+        Its sensors.
+    signals : Signals
+        Where its outputs stand.
+    true_state : VehicleState
+        Views of the true state.
+    given : VehicleState
+        Receives the estimate.
+    """
+
+    def __init__(
+        self, scenario: Scenario, plant: Plant, signals: Signals, true_state: VehicleState, given: VehicleState
+    ) -> None:
+        self._true_state, self._given, self._plant = true_state, given, plant
+        parameters = scenario_sensors(scenario)
+        self.navigator = Navigator(sensor_model(parameters), given)
+        samples = self.navigator.measurements
+        self._values, self._times = (
+            signals.view(FIRST, samples.values.size),
+            signals.view(FIRST_TIME, samples.times.size),
+        )
+        self._changes = outage_schedule(scenario.outages, parameters, scenario.time.step)
+        self._step = scenario.time.step
+
+    def give_true_state(self) -> None:
+        """Write the true state, as before the first measurement."""
+        self._given.position[:] = self._true_state.position
+        self._given.quaternion[:] = self._true_state.quaternion
+        self._given.velocity_body[:] = self._true_state.velocity_body
+
+    def measure(self, time: float, anew: bool) -> None:
+        """Write the estimate for a time [s] by the sensors' samples; outages begin and end. `anew` is not used."""
+        while self._changes and self._changes[0][0] * self._step <= time + _ROUNDING * self._step:
+            _, sensor, probability = self._changes.pop(0)
+            self._plant.set({f"{SENSORS[sensor]}.loss_probability": probability})
+        samples = self.navigator.measurements
+        samples.values[:], samples.times[:] = self._values, self._times
+        self.navigator.step(time)
+
+
+def make_sensing(
+    scenario: Scenario, plant: Plant, signals: Signals, true_state: VehicleState
+) -> tuple[VehicleState, Sensor | SensorNavigation | None]:
+    """Return the state that law and arbiter are given, and what writes it.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        How the vehicle is sensed.
+    plant : Plant
+        Its sensors.
+    signals : Signals
+        Where it stands.
+    true_state : VehicleState
+        Views of the true state.
+
+    Returns
+    -------
+    VehicleState, and Sensor, SensorNavigation or None
+        The true state itself and None where sensing is exact.
+    """
+    if scenario.sensing.exact:
+        return true_state, None
+    position, velocity, health = signals.view("sensed.x", 3), signals.view("sensed.u", 6), true_state.thruster_health
+    if scenario.sensing.through == "state":
+        given = VehicleState(position, np.zeros(4), velocity, health)
+        return given, Sensor(scenario.sensing, true_state, given)
+    quaternion, deviation = signals.view("sensed.e0", 4), signals.view("deviation.position.x", 12)
+    given = VehicleState(position, quaternion, velocity, health, deviation)
+    return given, SensorNavigation(scenario, plant, signals, true_state, given)
