@@ -1,6 +1,7 @@
 """Flights of the deployable law whose thrusters fail, or do not: what it isolates, and when.
 
-``python -m benchmarks.thruster_failures VEHICLE CASE N [--lag S] [--seed K]``; the law is not given the lag.
+``python -m benchmarks.thruster_failures VEHICLE CASE N [--lag S] [--seed K]``; the law is not given the lag. With
+``--sensors`` it navigates by sensors, with ``--lost dvl`` without one of them for 30 s, with ``--slow`` at 1 Hz.
 """
 
 from __future__ import annotations
@@ -46,9 +47,7 @@ def scene(vehicle: Vehicle, case: str, seed: int, lag: float | None, weight: flo
             ball = {"type": "sphere", "centre": centre.tolist(), "radius": radius}
             shapes.append((f"rock{i}", "obstacle", "out", ball))
     first = rng.uniform(1.0, 8.0)
-    times = [first, first + rng.uniform(2.0, 8.0)][
-        : {"lost": 1, "part lost": 1, "stuck": 1, "two lost": 2}.get(case, 0)
-    ]
+    times = [first, first + rng.uniform(2.0, 8.0)][: _FAILURES.get(case, 0)]
     kind = {"effectiveness": 0.4 if case == "part lost" else 0.0, "stuck": case == "stuck"}
     failed = zip(rng.permutation(m) + 1, times, strict=False)
     return {
@@ -72,6 +71,17 @@ def scene(vehicle: Vehicle, case: str, seed: int, lag: float | None, weight: flo
     }
 
 
+def through_sensors(table: dict[str, Any], lost: list[str], slow: bool) -> dict[str, Any]:
+    """Return what is other in a scenario that navigates by sensors, without some of them from 6 s on for 30 s."""
+    rates = {"dvl.rate": 1.0, "usbl.rate": 1.0} if slow else {}
+    return {
+        "sensing": {"through": "sensors", "seed": table["sensing"]["seed"]},
+        "outages": [{"sensor": sensor, "time": 6.0, "duration": 30.0} for sensor in lost],
+        "time": table["time"] | {"duration": 120.0},
+        "plant": table["plant"] | {"parameters": table["plant"]["parameters"] | rates},
+    }
+
+
 def main() -> None:
     """Fly, and print what came of it."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -82,12 +92,17 @@ def main() -> None:
     parser.add_argument("--weight", type=float, help="greatest |W - B| [N]; default: 15, of the BlueROV2 22")
     parser.add_argument("--tilt", type=float, default=180.0, help="of a rolled start [degrees]")
     parser.add_argument("--seed", type=int, default=0, help="of the first flight")
+    parser.add_argument("--sensors", action="store_true", help="navigate by sensors")
+    parser.add_argument("--lost", action="append", default=[], metavar="SENSOR", help="lost for 30 s")
+    parser.add_argument("--slow", action="store_true", help="DVL and USBL of 1 Hz")
     given = parser.parse_args()
     vehicle = load_vehicle(given.vehicle)
     weight = given.weight or (22.0 if "bluerov2" in given.vehicle else 15.0)
     delays, failures, wrong, violated, late, least = [], 0, 0, 0, 0, math.inf
     for seed in range(given.seed, given.seed + given.flights):
         table = scene(vehicle, given.case, seed, given.lag, weight, given.tilt) | {"vehicle": given.vehicle}
+        if given.sensors:
+            table |= through_sensors(table, given.lost, given.slow)
         scenario = validate_scenario(json.loads(json.dumps(table)), f"{given.case} {seed}")
         with FusedFlyer(Variation(scenario, ())) as flyer:
             outcome, trace = flyer.fly_one(scenario, trace=True)
