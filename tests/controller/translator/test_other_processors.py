@@ -26,7 +26,8 @@ int main(void)
     law_arguments *a = &law_data;
     while (filled(a->a0.position.data, 3)) {
         if (!filled(a->a0.quaternion.data, 4) || !filled(a->a0.velocity_body.data, 6)
-            || !filled(a->a0.thruster_health.data, a->a0.thruster_health.n0) || !filled(a->a3.data, a->a3.n0)
+            || !filled(a->a0.thruster_health.data, a->a0.thruster_health.n0) || !filled(a->a0.deviation.data, 12)
+            || !filled(a->a3.data, a->a3.n0)
             || !filled(a->a2.shifts.data, a->a2.shifts.n0 * 3))
             return 1;
         law(a);
