@@ -15,17 +15,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from controller.arithmetic import exponential, length3, square
-from controller.laws.deployable.gains import SPREADS
+from controller.arithmetic import exponential, length3
 from controller.laws.deployable.linear_algebra import copy, norm
-from controller.laws.deployable.search import ROOM, PathLimits, Tree, empty_tree, grow_tree, limits_along
-from controller.regions import Sphere
-from controller.regions.kinds import FIRST_OF_ATTITUDE
+from controller.laws.deployable.path_cost import PathCost, add_cost, begin_cost, empty_cost
+from controller.laws.deployable.search import ROOM, PathLimits, Search, empty_search, limits_along, look_for_path
 from controller.regions.region_set import (
     PackedRegions,
     clearance_at,
-    clearance_of_place,
-    clearance_of_sphere,
     evaluate_packed,
 )
 from controller.stack_array import zeros
@@ -34,21 +30,15 @@ Array = NDArray[np.float64]
 
 _LN_30 = 3.4011973816621555
 CORNERS = 8  # at most
-_SAMPLES = 64  # evaluations of the regions along a path at most
-_STRIDE = (0.08, 3.0)  # m, least and greatest distance between two
-_TRUST = 0.7  # of the clearance beyond the desired one, travelled before the next evaluation
-_INSIDE = 200.0  # m of path, cost of a metre within a hard region
-_NEAR = 3.0  # m of path, cost of a metre on the surface
 _BETTER = 0.03  # m, and
 _BETTER_PART = 0.01  # of its cost, that a candidate must save to be taken
-_BLOCKED = 1.3  # of its length, cost of a path above which the tree searches for another
+_BLOCKED = 0.3  # of its length, cost of passing hard regions above which the trees search for another path
 _PASSED = 0.25  # m from a corner, within which it counts as passed
-_SPHERE = Sphere.kind
-_ATTITUDE = FIRST_OF_ATTITUDE  # shapes from it on do not depend on position alone
 _CLIMBS = 12  # towards the inside of the goal region
 _PAYS = 0.05  # m deeper for each metre that a climb must bring; straight up it brings 1
 _DEEP_ENOUGH = 1e-3  # m, tolerance of the depth of an end
-_LESS = 0.5  # m, by which corners are drawn nearer to start and end than nodes of the tree
+_BEGIN, _PATH, _CANDIDATE = 0, 1, 2  # phases: what the next evaluation is of
+_LESS = 0.5  # m, by which corners are drawn nearer to start and end than nodes of the trees
 
 
 class PathPlan(NamedTuple):
@@ -56,12 +46,13 @@ class PathPlan(NamedTuple):
 
     path: Array  # (CORNERS + 1, 3) m, NED: corners, then the end; the end moves with the goal
     candidate: Array  # (CORNERS + 1, 3)
-    counts: NDArray[np.int64]  # (2,) points of path and candidate, the end included; 0: none yet
-    cost: Array  # (1,) of the path
-    clear_until: Array  # (n,) m of path until which each region is far
-    tree: Tree
+    found: Array  # (CORNERS + 1, 3), by the search
+    counts: NDArray[np.int64]  # (3,) points of path, candidate and found, the end included; 0: none yet
+    cost: Array  # (2,) m, of the path, and what of it hard regions add
+    new_cost: PathCost  # of path or candidate, whichever is evaluated
+    search: Search
     random_numbers: Array  # (5,) in [0, 1)
-    phase: NDArray[np.int64]  # (1,) 0: evaluate the path, 1: a candidate
+    phase: NDArray[np.int64]  # (1,) `_BEGIN`, `_PATH` or `_CANDIDATE`
     random: NDArray[np.uint64]  # (1,) state of the generator
 
 
@@ -72,10 +63,11 @@ def empty_plan(n_regions: int, seed: int) -> PathPlan:
     return PathPlan(
         path=np.zeros((n, 3)),
         candidate=np.zeros((n, 3)),
-        counts=np.zeros(2, dtype=np.int64),
-        cost=np.zeros(1),
-        clear_until=np.zeros(n_regions),
-        tree=empty_tree(),
+        found=np.zeros((n, 3)),
+        counts=np.zeros(3, dtype=np.int64),
+        cost=np.zeros(2),
+        new_cost=empty_cost(n_regions),
+        search=empty_search(),
         random_numbers=np.zeros(5),
         phase=np.zeros(1, dtype=np.int64),
         random=state,
@@ -95,80 +87,6 @@ def uniform(random: NDArray[np.uint64]) -> float:
 def _bell_shaped(random: NDArray[np.uint64]) -> float:
     """Return a bell-shaped random number with mean 0 and standard deviation 1."""
     return (uniform(random) + uniform(random) + uniform(random) + uniform(random) - 2.0) * 1.7320508075688772
-
-
-def path_cost(
-    path: Array, count: int, start: Array, regions: PackedRegions, clear_until: Array, limits: PathLimits
-) -> float:
-    """Return the cost of a path [m].
-
-    A clearance changes by at most the distance travelled: a region that is far is not evaluated before it could be
-    near.
-
-    Parameters
-    ----------
-    path : ndarray, shape (CORNERS + 1, 3)
-        Points [m, NED].
-    count : int
-        Number of points in use.
-    start : ndarray, shape (3,)
-        Start of the path [m, NED].
-    regions : PackedRegions
-        The n regions.
-    clear_until : ndarray, shape (n,)
-        Written: the length of path until which each region is far.
-    limits : PathLimits
-        Clearance, margin, speed.
-
-    Returns
-    -------
-    float
-        [m].
-    """
-    enough = limits.clearance + _STRIDE[1] / _TRUST  # m, of clearance, beyond which it does not matter
-    clear_until[:] = 0.0
-    total, travelled, samples = 0.0, 0.0, 0
-    place, point, room = zeros(3), zeros(3), zeros(3)
-    for leg in range(count):
-        begin = start if leg == 0 else path[leg - 1]
-        length = length3(path[leg, 0] - begin[0], path[leg, 1] - begin[1], path[leg, 2] - begin[2])
-        total += length
-        s = 0.0
-        while s < length:
-            if samples == _SAMPLES:
-                for rest in range(leg + 1, count):
-                    total += (1.0 + _INSIDE) * _distance(path[rest - 1], path[rest])
-                return float(total + _INSIDE * (length - s))  # what is not evaluated counts as blocked
-            samples += 1
-            path_length, free = travelled + s, enough
-            later = path_length / limits.speed  # s
-            for axis in range(3):
-                place[axis] = begin[axis] + (path[leg, axis] - begin[axis]) * (s / length)
-            for i in range(regions.kinds.size):
-                if path_length >= clear_until[i] and regions.hard[i]:
-                    own = 0.0  # m/s, of the region
-                    for axis in range(3):
-                        point[axis] = place[axis] - regions.velocities[i, axis] * later
-                        own += abs(regions.velocities[i, axis])
-                    if regions.kinds[i] == _SPHERE:
-                        clearance = clearance_of_sphere(regions, i, point)
-                    elif regions.kinds[i] < _ATTITUDE:
-                        clearance = clearance_of_place(regions, i, point, room)
-                    else:
-                        clearance = enough
-                    clearance -= SPREADS * regions.deviations[i]
-                    if clearance >= enough:
-                        clear_until[i] = path_length + (clearance - enough) / (1.0 + own / limits.speed)
-                    free = min(free, clearance)
-            stride = min(max(_TRUST * (free - limits.clearance), _STRIDE[0]), _STRIDE[1], length - s + 1e-9)
-            lack = limits.clearance - free
-            if lack > 0.0:
-                total += stride * _NEAR * square(lack / limits.clearance)
-                if free < limits.margin:
-                    total += stride * _INSIDE * (1.0 + limits.margin - free)
-            s += stride
-        travelled += length
-    return total
 
 
 def nearest_goal_point(goal: PackedRegions, position: Array, depth: float, end: Array) -> None:
@@ -218,31 +136,44 @@ def improve_path(
         for i in range(plan.counts[0] - 1):
             copy(path[i + 1], path[i])
         plan.counts[0] -= 1
-    # one evaluation a period: path and candidate in turn
-    if plan.phase[0] == 0:
-        plan.phase[0] = 1
-        plan.cost[0] = path_cost(path, plan.counts[0], start, regions, plan.clear_until, limits)
-        return
-    plan.phase[0] = 0
-    random_numbers = plan.random_numbers
-    for i in range(random_numbers.size):
-        random_numbers[i] = uniform(plan.random)
-    blocked = plan.cost[0] > _BLOCKED * _length(path, plan.counts[0], start)
-    if not blocked:
-        plan.tree.room[0] = ROOM[0]
-    if blocked and random_numbers[4] < 0.7:
-        plan.counts[1] = grow_tree(
-            plan.tree, start, path[plan.counts[0] - 1], random_numbers, regions, limits, candidate
-        )
-        if plan.counts[1] == 0:
-            return
+        if plan.phase[0] == _PATH:
+            plan.phase[0] = _BEGIN
+    cost = plan.new_cost
+    if plan.phase[0] == _BEGIN:
+        begin_cost(cost, start)
+        plan.phase[0] = _PATH
+    if plan.phase[0] == _PATH:
+        if add_cost(cost, path, plan.counts[0], regions, limits, np.inf):
+            copy(cost.cost, plan.cost)
+            _choose_candidate(plan, start, goal, limits)
+            begin_cost(cost, cost.start)
+            plan.phase[0] = _CANDIDATE
     else:
+        most = plan.cost[0] - _BETTER - _BETTER_PART * plan.cost[0]
+        if add_cost(cost, candidate, plan.counts[1], regions, limits, most):
+            plan.phase[0] = _BEGIN
+            if cost.cost[0] < most:
+                _copy_path(candidate, path)
+                plan.counts[0] = plan.counts[1]
+                copy(cost.cost, plan.cost)
+    if not plan.cost[1] > _BLOCKED * _length(path, plan.counts[0], start):
+        plan.search.room[0] = ROOM[0]
+    elif plan.counts[2] == 0:
+        for i in range(plan.random_numbers.size):
+            plan.random_numbers[i] = uniform(plan.random)
+        plan.counts[2] = look_for_path(
+            plan.search, start, path[plan.counts[0] - 1], plan.random_numbers, regions, limits, plan.found
+        )
+
+
+def _choose_candidate(plan: PathPlan, start: Array, goal: PackedRegions, limits: PathLimits) -> None:
+    """Make what the search found the candidate, or else a mutation of the path."""
+    if plan.counts[2] == 0:
         _mutate_path(plan, start, goal, limits)
-    cost = path_cost(candidate, plan.counts[1], start, regions, plan.clear_until, limits)
-    if cost < plan.cost[0] - _BETTER - _BETTER_PART * plan.cost[0]:
-        _copy_path(candidate, path)
-        plan.counts[0] = plan.counts[1]
-        plan.cost[0] = cost
+        return
+    _copy_path(plan.found, plan.candidate)
+    plan.counts[1] = plan.counts[2]
+    plan.counts[2] = 0
 
 
 def _copy_path(path: Array, out: Array) -> None:
@@ -263,7 +194,7 @@ def _distance(a: Array, b: Array) -> float:
 
 def _mutate_path(plan: PathPlan, start: Array, goal: PackedRegions, limits: PathLimits) -> None:
     """Write a mutation of the path into `candidate`."""
-    path, candidate, random, room = plan.path, plan.candidate, plan.random, plan.tree.room[0] - _LESS
+    path, candidate, random, room = plan.path, plan.candidate, plan.random, plan.search.room[0] - _LESS
     _copy_path(path, candidate)
     count = plan.counts[0]
     last = count - 1

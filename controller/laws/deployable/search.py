@@ -1,9 +1,9 @@
-"""Tree search out of pockets: a tree of free straight lines that grows from the end of the path towards the vehicle.
+"""Tree search out of pockets: two trees of free straight lines, one from the goal and one from the vehicle.
 
-Changing one corner at a time finds no path that needs several changes at once. So while the path is blocked, a tree
-(RRT: LaValle, Planning Algorithms, 2006, ch. 5) grows by at most one node a period. Its root is the goal, so that it
-stays valid while the vehicle moves. Each node connects to the farthest visible one of its ancestors, which saves
-corners. When the vehicle sees a new node, the chain of its ancestors is a path.
+Changing one corner at a time finds no path that needs several changes at once. So while the path is blocked, two trees
+(RRT-Connect: Kuffner and LaValle, ICRA 2000) grow in turn, each by at most one node a look. A new node connects to the
+farthest visible one of its ancestors, which saves corners. When it sees the nearest node of the other tree, the two
+chains are a path. The tree of the vehicle gets a new root as the vehicle moves.
 """
 
 from __future__ import annotations
@@ -25,15 +25,19 @@ Array = NDArray[np.float64]
 
 _SPHERE = Sphere.kind
 _ATTITUDE = FIRST_OF_ATTITUDE  # shapes from it on do not depend on position alone
-_NODES = 512  # after which the tree starts anew
+_NODES = 512  # of a tree, after which it starts anew
+_CHAIN = 64  # points of a path before it is shortened, at most
 _REACH = (1.5, 0.1)  # m, longest edge; or as part of the distance from start to end, where that is more
-ROOM = (3.0, 16.0)  # m beyond start and end, in which nodes are drawn: at first, and at most
-_GROWS = 1.006  # that room, with each look for a node
+ROOM = (3.0, 32.0)  # m beyond start and end, in which nodes are drawn: at first, and at most
+_GROWS = 1.003  # that room, with each look
 _STRIDE = 0.05  # m, least distance between two evaluations along a line
 _LOOKS = 32  # evaluations along a line at most
 _ANCESTORS = 2  # tested beside its parent
 _SLACK = 0.005  # m
-_MOVED = 0.3  # m, by which the end may move before the tree starts anew
+_MOVED = 0.3  # m, by which start or end may move before the root of its tree does
+_TO_OTHER = 0.2  # probability that a tree grows towards the root of the other one
+_NEAR_A_NODE = 0.4  # and towards a place near one of its nodes, for narrow passages
+_BEFORE_A_WALL = 0.8  # part of the free length of a line at which a node stands that would reach farther
 
 
 class PathLimits(NamedTuple):
@@ -46,34 +50,49 @@ class PathLimits(NamedTuple):
 
 
 class Tree(NamedTuple):
-    """Nodes, each with its parent; the root is the end of the path."""
+    """Nodes, each with its parent."""
 
     nodes: Array  # (_NODES, 3) m, NED
-    parents: NDArray[np.int64]  # (_NODES,)
+    parents: NDArray[np.int64]  # (_NODES,), -1 of the root
     size: NDArray[np.int64]  # (1,) number of nodes
+    root: NDArray[np.int64]  # (1,)
+
+
+class Search(NamedTuple):
+    """State of the search."""
+
+    of_goal: Tree
+    of_vehicle: Tree
+    turn: NDArray[np.int64]  # (1,) 0: the tree of the goal grows next, 1: that of the vehicle
     room: Array  # (1,) m beyond start and end, in which nodes are drawn
+    chain: Array  # (_CHAIN, 3) m, NED: the path found last, before it is shortened
 
 
-def empty_tree() -> Tree:
-    """Return a tree without nodes."""
-    size, room = np.zeros(1, dtype=np.int64), np.array([ROOM[0]])
-    return Tree(np.zeros((_NODES, 3)), np.zeros(_NODES, dtype=np.int64), size, room)
+def empty_search() -> Search:
+    """Return a search whose trees have no nodes."""
+    return Search(_empty_tree(), _empty_tree(), np.zeros(1, dtype=np.int64), np.array([ROOM[0]]), np.zeros((_CHAIN, 3)))
 
 
-def _clearance_at(point: Array, regions: PackedRegions, gradient: Array) -> float:
+def _empty_tree() -> Tree:
+    size, root = np.zeros(1, dtype=np.int64), np.zeros(1, dtype=np.int64)
+    return Tree(np.zeros((_NODES, 3)), np.zeros(_NODES, dtype=np.int64), size, root)
+
+
+def clearance_of_all(point: Array, regions: PackedRegions, room: Array) -> float:
+    """Return the least clearance [m] of the hard regions of position at a point; `room` has shape (3,)."""
     least = np.inf
     for i in range(regions.kinds.size):
         if regions.hard[i] and regions.kinds[i] < _ATTITUDE:
             if regions.kinds[i] == _SPHERE:
                 clearance = clearance_of_sphere(regions, i, point)
             else:
-                clearance = clearance_of_place(regions, i, point, gradient)
+                clearance = clearance_of_place(regions, i, point, room)
             least = min(least, clearance - SPREADS * regions.deviations[i])
     return least
 
 
-def is_line_free(start: Array, end: Array, regions: PackedRegions, margin: float) -> bool:
-    """Return whether a straight line keeps a clearance [m] of all hard regions at their present places.
+def free_length(start: Array, end: Array, regions: PackedRegions, margin: float) -> float:
+    """Return up to which length a straight line keeps a clearance of all hard regions at their present places.
 
     Parameters
     ----------
@@ -86,22 +105,29 @@ def is_line_free(start: Array, end: Array, regions: PackedRegions, margin: float
 
     Returns
     -------
-    bool
-        Also False if the line needs more than `_LOOKS` evaluations.
+    float
+        [m]: the whole length where the line is free; -1 if its start is not. No more is known than `_LOOKS` evaluations
+        show.
     """
-    point, gradient = zeros(3), zeros(3)
+    point, room = zeros(3), zeros(3)
     length = length3(end[0] - start[0], end[1] - start[1], end[2] - start[2])
-    s = 0.0
+    s, free = 0.0, -1.0
     for _ in range(_LOOKS):
         for axis in range(3):
             point[axis] = start[axis] + (end[axis] - start[axis]) * (s / length if length > 0.0 else 0.0)
-        least = _clearance_at(point, regions, gradient)
+        least = clearance_of_all(point, regions, room)
         if not least >= margin:
-            return False
+            return free
+        free = s
         if s >= length:
-            return True
+            return float(length)
         s = min(length, s + max(least - margin, _STRIDE))
-    return False
+    return free
+
+
+def is_line_free(start: Array, end: Array, regions: PackedRegions, margin: float) -> bool:
+    """Return whether a straight line keeps a clearance all along, as `free_length` measures it."""
+    return free_length(start, end, regions, margin) >= length3(end[0] - start[0], end[1] - start[1], end[2] - start[2])
 
 
 def limits_along(axis: int, start: Array, end: Array, room: float) -> tuple[float, float]:
@@ -112,8 +138,8 @@ def limits_along(axis: int, start: Array, end: Array, room: float) -> tuple[floa
     return low - room, high + room
 
 
-def grow_tree(
-    tree: Tree,
+def look_for_path(
+    search: Search,
     start: Array,
     end: Array,
     random_numbers: Array,
@@ -121,15 +147,15 @@ def grow_tree(
     limits: PathLimits,
     path: Array,
 ) -> int:
-    """Grow the tree by at most one node, and return the number of points of a path that it found, 0 for none.
+    """Grow one of the trees by at most one node, and return the number of points of a path that it found, 0 for none.
 
     Parameters
     ----------
-    tree : Tree
-        Grown in place.
+    search : Search
+        Its trees grow in place, in turn.
     start, end : ndarray, shape (3,)
         Positions of the vehicle and of the end of the path [m, NED].
-    random_numbers : ndarray, shape (4,)
+    random_numbers : ndarray, shape (5,)
         Random numbers in [0, 1).
     regions : PackedRegions
         At their present places.
@@ -143,59 +169,162 @@ def grow_tree(
     int
         Points of the path.
     """
-    nodes, parents = tree.nodes, tree.parents
-    moved, far = 0.0, 0.0
-    for axis in range(3):
-        moved += square(nodes[0, axis] - end[axis])
-        far += square(start[axis] - end[axis])
-    tree.room[0] = min(_GROWS * tree.room[0], ROOM[1])
-    if tree.size[0] == 0 or tree.size[0] == _NODES or moved > square(_MOVED):
-        copy(end, nodes[0])
-        parents[0] = -1
-        tree.size[0] = 1
-    margin = limits.margin + 0.4 * limits.clearance
+    margin, of_goal, of_vehicle = limits.margin + 0.4 * limits.clearance, search.of_goal, search.of_vehicle
+    move_root(of_goal, end, regions, margin)
+    move_root(of_vehicle, start, regions, margin)
+    search.room[0] = min(_GROWS * search.room[0], ROOM[1])
+    target = zeros(3)
+    reach = max(_REACH[0], _REACH[1] * length3(start[0] - end[0], start[1] - end[1], start[2] - end[2]))
+    if search.turn[0] == 0:
+        search.turn[0] = 1
+        _draw_target(of_goal, start, end, start, search.room[0], reach, random_numbers, target)
+        grown = extend_tree(of_goal, target, reach, regions, margin)
+        if grown < 0:
+            return 0
+        met = nearest_node(of_vehicle, of_goal.nodes[grown])
+        if not _sees(of_vehicle, met, of_goal.nodes[grown], regions, margin):
+            return 0
+        return _write_path(search, grown, met, start, regions, margin, path)
+    search.turn[0] = 0
+    _draw_target(of_vehicle, start, end, end, search.room[0], reach, random_numbers, target)
+    grown = extend_tree(of_vehicle, target, reach, regions, margin)
+    if grown < 0:
+        return 0
+    met = nearest_node(of_goal, of_vehicle.nodes[grown])
+    if not _sees(of_goal, met, of_vehicle.nodes[grown], regions, margin):
+        return 0
+    return _write_path(search, met, grown, start, regions, margin, path)
 
-    # from the nearest node towards a random point, or the vehicle
-    target, new = zeros(3), zeros(3)
-    for axis in range(3):
-        low, high = limits_along(axis, start, end, tree.room[0])
-        target[axis] = start[axis] if random_numbers[3] < 0.2 else low + random_numbers[axis] * (high - low)
+
+def _draw_target(
+    tree: Tree, start: Array, end: Array, other: Array, room: float, reach: float, random_numbers: Array, target: Array
+) -> None:
+    """Write a place towards which a tree grows: the root of the other one, near any of its nodes, or anywhere."""
+    if random_numbers[3] < _TO_OTHER:
+        copy(other, target)
+    elif random_numbers[3] < _TO_OTHER + _NEAR_A_NODE:
+        node = int(random_numbers[4] * tree.size[0])
+        for axis in range(3):
+            target[axis] = tree.nodes[node, axis] + reach * (2.0 * random_numbers[axis] - 1.0)
+    else:
+        for axis in range(3):
+            low, high = limits_along(axis, start, end, room)
+            target[axis] = low + random_numbers[axis] * (high - low)
+
+
+def move_root(tree: Tree, place: Array, regions: PackedRegions, margin: float) -> None:
+    """Make a place the root of a tree: one more node if the old root sees it, else of a new tree."""
+    nodes, parents, root = tree.nodes, tree.parents, tree.root[0]
+    if tree.size[0] > 0:
+        moved = length3(nodes[root, 0] - place[0], nodes[root, 1] - place[1], nodes[root, 2] - place[2])
+        if tree.size[0] < _NODES and moved <= _MOVED:
+            return
+        least = min(_margin_at(tree, root, regions, margin), clearance_of_all(place, regions, zeros(3)) - _SLACK)
+        if tree.size[0] < _NODES and is_line_free(nodes[root], place, regions, least):
+            new = tree.size[0]
+            copy(place, nodes[new])
+            parents[new] = -1
+            parents[root] = new
+            tree.size[0] += 1
+            tree.root[0] = new
+            return
+    copy(place, nodes[0])
+    parents[0] = -1
+    tree.size[0] = 1
+    tree.root[0] = 0
+
+
+def _sees(tree: Tree, node: int, place: Array, regions: PackedRegions, margin: float) -> bool:
+    """Return whether the line from a node to a place is free, as `_margin_at` asks of the node."""
+    return is_line_free(tree.nodes[node], place, regions, _margin_at(tree, node, regions, margin))
+
+
+def _margin_at(tree: Tree, node: int, regions: PackedRegions, margin: float) -> float:
+    """Return the clearance [m] asked of lines from a node: a root may be closer, its lines must not come closer."""
+    if node != tree.root[0]:
+        return margin
+    return min(margin, clearance_of_all(tree.nodes[node], regions, zeros(3)) - _SLACK)
+
+
+def nearest_node(tree: Tree, place: Array) -> int:
+    """Return the node of a tree nearest to a place [m, NED]."""
     nearest, least = 0, np.inf
     for i in range(tree.size[0]):
         squared = 0.0
         for axis in range(3):
-            squared += square(nodes[i, axis] - target[axis])
+            squared += square(tree.nodes[i, axis] - place[axis])
         if squared < least:
             nearest, least = i, squared
-    distance = np.sqrt(least)
-    if distance < _STRIDE:
-        return 0
-    for axis in range(3):
-        part = min(1.0, max(_REACH[0], _REACH[1] * np.sqrt(far)) / distance)
-        new[axis] = nodes[nearest, axis] + part * (target[axis] - nodes[nearest, axis])
-    if not is_line_free(new, nodes[nearest], regions, margin):
-        return 0
+    return nearest
 
-    # connect to the farthest visible ancestor
+
+def extend_tree(tree: Tree, target: Array, reach: float, regions: PackedRegions, margin: float) -> int:
+    """Add a node on the way from the nearest node to a target, and return it; -1 where there is no room for one.
+
+    `reach` is the longest edge, and `margin` the clearance of edges, both in m.
+    """
+    nodes, parents, new = tree.nodes, tree.parents, zeros(3)
+    nearest = nearest_node(tree, target)
+    before = nodes[nearest]
+    distance = length3(target[0] - before[0], target[1] - before[1], target[2] - before[2])
+    if distance < _STRIDE:
+        return -1
+    length = min(reach, distance)
+    for axis in range(3):
+        new[axis] = before[axis] + length / distance * (target[axis] - before[axis])
+    free = free_length(before, new, regions, _margin_at(tree, nearest, regions, margin))
+    if free < length:
+        free *= _BEFORE_A_WALL
+        if free < _MOVED:
+            return -1
+        for axis in range(3):
+            new[axis] = before[axis] + free / distance * (target[axis] - before[axis])
     parent = nearest
     for _ in range(_ANCESTORS):
-        before = parents[parent]
-        if before < 0 or not is_line_free(new, nodes[before], regions, margin):
+        ancestor = parents[parent]
+        if ancestor < 0 or not _sees(tree, ancestor, new, regions, margin):
             break
-        parent = before
+        parent = ancestor
     at = tree.size[0]
     copy(new, nodes[at])
     parents[at] = parent
     tree.size[0] += 1
+    return int(at)
 
-    # a path, if the vehicle sees the node; it may start closer to a region, but must not come closer
-    if not is_line_free(new, start, regions, min(0.5 * margin, _clearance_at(start, regions, target) - _SLACK)):
+
+def _write_path(
+    search: Search, of_goal: int, of_vehicle: int, start: Array, regions: PackedRegions, margin: float, path: Array
+) -> int:
+    """Write the path through two nodes that see each other, without the corners that it does not need.
+
+    A corner goes if the one before it, or the vehicle at its `start`, sees the one behind it. Return the number of
+    points, 0 if there are too many.
+    """
+    chain, tree = search.chain, search.of_vehicle
+    count, node = 0, of_vehicle
+    while node != tree.root[0]:
+        count, node = count + 1, tree.parents[node]
+    length = count
+    if length >= _CHAIN:
         return 0
-    count, node = 0, at
+    node = of_vehicle
+    while count > 0:
+        count -= 1
+        copy(tree.nodes[node], chain[count])
+        node = tree.parents[node]
+    node = of_goal
     while node >= 0:
+        if length == _CHAIN:
+            return 0
+        copy(search.of_goal.nodes[node], chain[length])
+        length, node = length + 1, search.of_goal.parents[node]
+    least = min(margin, clearance_of_all(start, regions, zeros(3)) - _SLACK)
+    before, count = start, 0
+    for i in range(length):
+        if i + 1 < length and is_line_free(before, chain[i + 1], regions, least):
+            continue
         if count == path.shape[0]:
             return 0
-        copy(nodes[node], path[count])
-        count += 1
-        node = parents[node]
+        copy(chain[i], path[count])
+        before, least, count = path[count], margin, count + 1
     return count

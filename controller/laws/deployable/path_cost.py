@@ -1,0 +1,154 @@
+"""Cost of a path: its length, and what passing close to hard regions, or through soft ones, adds.
+
+Regions are evaluated along the path, each at the place to which it will have moved by then. A clearance changes by at
+most the distance travelled: so strides are long where there is room, and a region that is far is not evaluated before
+it could be near. An evaluation may take several periods, each with a bounded number of strides.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from controller.arithmetic import length3, square
+from controller.laws.deployable.gains import SPREADS
+from controller.laws.deployable.linear_algebra import copy
+from controller.laws.deployable.search import PathLimits
+from controller.regions import Sphere
+from controller.regions.kinds import FIRST_OF_ATTITUDE
+from controller.regions.region_set import PackedRegions, clearance_of_place, clearance_of_sphere
+from controller.stack_array import zeros
+
+Array = NDArray[np.float64]
+
+_SAMPLES = (
+    64,
+    512,
+)  # evaluations of the regions along a path at most: in a call, and before the rest counts as blocked
+_STRIDE = (0.08, 3.0)  # m, least and greatest distance between two
+_TRUST = 0.7  # of the clearance beyond the desired one, travelled before the next evaluation
+_INSIDE = 200.0  # m of path, cost of a metre within a hard region
+_NEAR = 3.0  # m of path, cost of a metre on the surface
+_SOFT = 2.0  # m of path, cost of a metre through a soft region that is violated by
+_SHALLOW = 0.2  # m, or more; in proportion where by less
+_COARSE = 0.25  # m, least distance between two evaluations near the surface of a soft region
+_SPHERE = Sphere.kind
+_ATTITUDE = FIRST_OF_ATTITUDE  # shapes from it on do not depend on position alone
+
+
+class PathCost(NamedTuple):
+    """The cost of a path, complete or not yet."""
+
+    start: Array  # (3,) m, NED: of the path, when the evaluation began
+    counts: NDArray[np.int64]  # (2,) leg that is evaluated next, evaluations so far
+    travelled: Array  # (2,) m: of the legs before, and of this leg
+    cost: Array  # (2,) m: so far, and what of it hard regions add
+    clear_until: Array  # (n,) m of path until which each region is far
+
+
+def empty_cost(n_regions: int) -> PathCost:
+    """Return the cost of no path, among `n_regions`."""
+    return PathCost(np.zeros(3), np.zeros(2, dtype=np.int64), np.zeros(2), np.zeros(2), np.zeros(n_regions))
+
+
+def begin_cost(cost: PathCost, start: Array) -> None:
+    """Begin the evaluation of a path from a start, shape (3,) [m, NED]."""
+    copy(start, cost.start)
+    cost.counts[:] = 0
+    cost.travelled[:] = 0.0
+    cost.cost[:] = 0.0
+    cost.clear_until[:] = 0.0
+
+
+def add_cost(cost: PathCost, path: Array, count: int, regions: PackedRegions, limits: PathLimits, most: float) -> bool:
+    """Evaluate a path further, and return whether that is done: all of it, or a cost above `most`.
+
+    Parameters
+    ----------
+    cost : PathCost
+        Begun by `begin_cost`; updated.
+    path : ndarray, shape (k, 3)
+        Points [m, NED].
+    count : int
+        Number of points in use.
+    regions : PackedRegions
+        The n regions.
+    limits : PathLimits
+        Clearance, margin, speed.
+    most : float
+        Cost [m] beyond which no more is asked.
+
+    Returns
+    -------
+    bool
+        False while strides are left.
+    """
+    place = zeros(3)
+    for _ in range(_SAMPLES[0]):
+        leg, s = cost.counts[0], cost.travelled[1]
+        if leg == count or cost.cost[0] > most:
+            return True
+        begin = cost.start if leg == 0 else path[leg - 1]
+        length = length3(path[leg, 0] - begin[0], path[leg, 1] - begin[1], path[leg, 2] - begin[2])
+        if s >= length:
+            cost.counts[0] += 1
+            cost.travelled[0] += length
+            cost.travelled[1] = 0.0
+            continue
+        if cost.counts[1] == _SAMPLES[1]:
+            _add_stride(cost, length - s, 0.0, _INSIDE)
+            continue
+        cost.counts[1] += 1
+        for axis in range(3):
+            place[axis] = begin[axis] + (path[leg, axis] - begin[axis]) * (s / length)
+        free, soft, reach = _evaluate_place(cost, place, regions, limits)
+        spare = max(_TRUST * (free - limits.clearance), abs(free - limits.margin))  # m, without a surface in between
+        stride = min(max(spare, _STRIDE[0]), reach)
+        penalty, lack = 0.0, limits.clearance - free
+        if lack > 0.0:
+            penalty = _NEAR * square(lack / limits.clearance)
+            if free < limits.margin:
+                penalty += _INSIDE * (1.0 + limits.margin - free)
+        _add_stride(cost, min(stride, length - s + 1e-9), _SOFT * soft, penalty)
+    return False
+
+
+def _add_stride(cost: PathCost, stride: float, soft: float, penalty: float) -> None:
+    """Add a stride [m], each metre of which costs so much more."""
+    cost.travelled[1] += stride
+    cost.cost[0] += stride * (1.0 + soft + penalty)
+    cost.cost[1] += stride * penalty
+
+
+def _evaluate_place(
+    cost: PathCost, place: Array, regions: PackedRegions, limits: PathLimits
+) -> tuple[float, float, float]:
+    """Return the least clearance of hard regions [m], how many soft ones are violated, and the longest stride [m]."""
+    travelled = cost.travelled[0] + cost.travelled[1]
+    later = travelled / limits.speed  # s
+    far = limits.clearance + _STRIDE[1] / _TRUST  # m, of clearance, beyond which it does not matter
+    free, soft, reach, point, room = far, 0.0, _STRIDE[1], zeros(3), zeros(3)
+    for i in range(regions.kinds.size):
+        if travelled < cost.clear_until[i] or regions.kinds[i] >= _ATTITUDE:
+            continue
+        own = 0.0  # m/s, of the region
+        for axis in range(3):
+            point[axis] = place[axis] - regions.velocities[i, axis] * later
+            own += abs(regions.velocities[i, axis])
+        if regions.kinds[i] == _SPHERE:
+            clearance = clearance_of_sphere(regions, i, point)
+        else:
+            clearance = clearance_of_place(regions, i, point, room)
+        beyond = clearance - _STRIDE[1]
+        if regions.hard[i]:
+            clearance -= SPREADS * regions.deviations[i]
+            beyond = clearance - far
+            free = min(free, clearance)
+        else:
+            soft += min(max(-clearance / _SHALLOW, 0.0), 1.0)
+            reach = min(reach, max(abs(clearance), _COARSE))
+        if beyond >= 0.0:
+            cost.clear_until[i] = travelled + beyond / (1.0 + own / limits.speed)
+    return free, soft, reach
