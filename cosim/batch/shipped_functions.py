@@ -16,6 +16,8 @@ from controller import LAWS, CompiledLaw, VehicleState
 from controller.compiling.compiler import compile_file
 from controller.compiling.function import c_text
 from controller.compiling.library import checksum_path, digest_of, library_name
+from controller.laws.deployable.path_planner import empty_plan, search_path
+from controller.laws.deployable.search import PathLimits
 from controller.navigation import SensorModel, empty_measurements
 from controller.navigation.estimate import empty_memory
 from controller.navigation.navigator import navigate
@@ -50,6 +52,7 @@ def shipped_functions() -> Iterator[tuple[Callable[..., None], tuple[Any, ...]]]
     yield evaluate_packed, (regions, state.position, state.quaternion, _FLAT, _TABLE, _TABLE, _FLAT)
     yield write_clearances, (regions, _TABLE, _FLAT, _FLAT)
     yield ray_distances, (regions, state.position, _TABLE, 1.0, _FLAT)
+    yield search_path, (empty_plan(1, 1), state.position, goal, regions, PathLimits(1.0, 1.0, 1.0, 1.0), 1.0, _INTEGERS)
     yield compute_memberships, (_FLAT, _INTEGERS, 1.0, _FLAT)
     yield fly, _of_flight(goal, regions)
 

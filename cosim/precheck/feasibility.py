@@ -8,11 +8,14 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from controller.laws.deployable.gains import DeployableGains
+from controller.laws.deployable.search import line_margin
 from controller.regions import Region
 from controller.regions.region_set import of_attitude
 from cosim.precheck.finding import Finding, status
-from cosim.precheck.region_intersection import Overlap, box_about, box_within, search, way_exists
+from cosim.precheck.region_intersection import Overlap, box_about, box_within, search
 from cosim.precheck.region_values import evaluated
+from cosim.precheck.way import Way, find_way, path_limits
 from cosim.scenario.scenario import Scenario
 
 Array = NDArray[np.float64]
@@ -43,7 +46,7 @@ def region_findings(scenario: Scenario) -> Iterator[Finding]:
     yield from (_start(region, scenario) for region in violated)
     yield from _common(goal, placed, low, high, moving)
     yield from _between(placed, low, high)
-    yield _way(goal, [r for r in placed if r not in violated], [r.name for r in violated], start, low, high)
+    yield _way(scenario, [r for r in placed if r not in violated], [r.name for r in violated])
 
 
 def _box(goal: Region, regions: Sequence[Region], start: tuple[float, float, float]) -> tuple[Array, Array]:
@@ -131,25 +134,44 @@ def _between(regions: Sequence[Region], low: Array, high: Array) -> Iterator[Fin
         yield Finding("regions", "overlaps", "note", text, numbers=numbers)
 
 
-def _way(
-    goal: Region,
-    kept: Sequence[Region],
-    left_out: Sequence[str],
-    start: tuple[float, float, float],
-    low: Array,
-    high: Array,
-) -> Finding:
-    exists, width = way_exists(kept, goal, start, low, high)
+def _way(scenario: Scenario, kept: Sequence[Region], left_out: Sequence[str]) -> Finding:
+    """Return whether the deployable law's search finds a way that satisfies all regions, or else the hard ones."""
     but = f", {', '.join(left_out)} left aside (violated at the start)" if left_out else ""
-    if exists:
-        text = f"There is a way from the start into the goal that satisfies the regions all along{but}."
-    else:
+    soft = [region.name for region in kept if not region.hard]
+    way = _search(scenario, kept)
+    if way.found:
+        text = f"The deployable law's search finds a way that satisfies the regions all along{but}: {_measures(way)}."
+        return Finding("regions", "way", "holds", text, numbers=_way_numbers(way))
+    if soft and (way := _search(scenario, [region for region in kept if region.hard])).found:
         text = (
-            f"No way from the start into the goal was found{but}, in cells of {width:.2f} m, within {_point(low)} to "
-            f"{_point(high)}."
+            f"The deployable law's search finds a way that satisfies the hard regions all along{but}, but none that "
+            f"satisfies {', '.join(soft)} too: {_measures(way)}."
         )
-    advice = "" if exists else f"Open a passage at least {2.0 * width:.2f} m wide between the regions."
-    return Finding("regions", "way", status(exists), text, advice, {"found": exists, "cell": width})
+        return Finding("regions", "way", "note", text, numbers=_way_numbers(way))
+    text = f"The deployable law's search finds no way from the start into the goal{but}, within {way.searched:g} s."
+    width = 2.0 * line_margin(path_limits(_gains(scenario)))
+    advice = f"Open a passage of at least {width:.2f} m between the regions."
+    return Finding("regions", "way", "fails", text, advice, _way_numbers(way))
+
+
+def _search(scenario: Scenario, regions: Sequence[Region]) -> Way:
+    start = scenario.initial.position
+    return find_way(regions, scenario.goal_region, start, _gains(scenario), scenario.time.duration)
+
+
+def _gains(scenario: Scenario) -> DeployableGains:
+    gains = scenario.law.gains
+    return gains if isinstance(gains, DeployableGains) else DeployableGains()
+
+
+def _measures(way: Way) -> str:
+    corners = len(way.corners) - 2
+    turns = "straight" if corners == 0 else f"{corners} corner{'s' if corners > 1 else ''}"
+    return f"{way.length:.1f} m, {turns}"
+
+
+def _way_numbers(way: Way) -> dict[str, float | bool]:
+    return {"found": way.found, "length": way.length, "clearance": way.clearance, "searched": way.searched}
 
 
 def _said(overlap: Overlap, what: str) -> str:

@@ -13,7 +13,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage
 from scipy.optimize import minimize
 
 from controller.regions import Region
@@ -24,7 +23,6 @@ Vector3 = tuple[float, float, float]
 
 TOLERANCE = 0.01  # m, to which the common depth is known
 _MOST_BOXES = 400_000  # in one round of halving
-_CELLS = 400_000  # of the grid in which a way is sought
 
 
 @dataclass(frozen=True)
@@ -139,42 +137,3 @@ def box_within(region: Region, low: Array, high: Array) -> tuple[Array, Array]:
     """Return the box cut to the bounds of a region that is kept within, which must meet it."""
     lowest, highest = np.array(region.shape.bounds())
     return np.maximum(low, np.minimum(lowest, high)), np.minimum(high, np.maximum(highest, low))
-
-
-def way_exists(regions: Sequence[Region], goal: Region, start: Vector3, low: Array, high: Array) -> tuple[bool, float]:
-    """Say whether a way from the start to the goal region satisfies the regions all along.
-
-    Cells of a grid are free where the clearance at their centre is at least half their width: then the straight line
-    to a free neighbour's centre is free too. So a way that is found is one; one that is not may be narrower than a
-    cell.
-
-    Parameters
-    ----------
-    regions : sequence of Region
-        To be satisfied on the way.
-    goal : Region
-        Where it shall end.
-    start : tuple of float
-        [m, NED].
-    low, high : ndarray, shape (3,)
-        Corners of the box in which the way is sought.
-
-    Returns
-    -------
-    tuple of bool and float
-        Whether one was found, and the width of a cell [m].
-    """
-    extent = high - low
-    width = float(np.cbrt(np.prod(extent) / _CELLS))
-    counts = np.ceil(extent / width).astype(int)
-    first = np.asarray(start) - np.floor((np.asarray(start) - low) / width) * width  # the start is a centre
-    axes = [first[i] + width * np.arange(counts[i]) for i in range(3)]
-    points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
-    free = common_depth(points, regions) >= 0.5 * width if regions else np.ones(len(points), dtype=bool)
-    # the start may be closer to a surface than half a cell: then its own neighbours begin the way
-    begins = np.linalg.norm(points - start, axis=1) < 0.5 * width
-    free |= begins
-    labels, _ = ndimage.label(free.reshape(counts))
-    there = clearances_at(points, goal) >= 0.0
-    reached = np.unique(labels.ravel()[there & free])
-    return bool(np.isin(labels.ravel()[begins], reached[reached > 0]).any()), width

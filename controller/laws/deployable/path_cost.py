@@ -104,7 +104,7 @@ def add_cost(cost: PathCost, path: Array, count: int, regions: PackedRegions, li
         for axis in range(3):
             place[axis] = begin[axis] + (path[leg, axis] - begin[axis]) * (s / length)
         free, soft, reach = _evaluate_place(cost, place, regions, limits)
-        spare = max(_TRUST * (free - limits.clearance), abs(free - limits.margin))  # m, without a surface in between
+        spare = max(_TRUST * (free - limits.clearance), 0.5 * abs(free - limits.margin))  # m, no surface in between
         stride = min(max(spare, _STRIDE[0]), reach)
         penalty, lack = 0.0, limits.clearance - free
         if lack > 0.0:

@@ -38,6 +38,7 @@ _CLIMBS = 12  # towards the inside of the goal region
 _PAYS = 0.05  # m deeper for each metre that a climb must bring; straight up it brings 1
 _DEEP_ENOUGH = 1e-3  # m, tolerance of the depth of an end
 _BEGIN, _PATH, _CANDIDATE = 0, 1, 2  # phases: what the next evaluation is of
+_USED = -1  # points of a found path that was the last candidate
 _LESS = 0.5  # m, by which corners are drawn nearer to start and end than nodes of the trees
 
 
@@ -156,7 +157,7 @@ def improve_path(
                 _copy_path(candidate, path)
                 plan.counts[0] = plan.counts[1]
                 copy(cost.cost, plan.cost)
-    if not plan.cost[1] > _BLOCKED * _length(path, plan.counts[0], start):
+    if not is_blocked(plan, start):
         plan.search.room[0] = ROOM[0]
     elif plan.counts[2] == 0:
         for i in range(plan.random_numbers.size):
@@ -166,14 +167,54 @@ def improve_path(
         )
 
 
+def is_blocked(plan: PathPlan, start: Array) -> bool:
+    """Return whether passing hard regions is so much of the cost that the trees search for another path."""
+    return bool(plan.cost[1] > _BLOCKED * _length(plan.path, plan.counts[0], start))
+
+
+def search_path(
+    plan: PathPlan,
+    start: Array,
+    goal: PackedRegions,
+    regions: PackedRegions,
+    limits: PathLimits,
+    period: float,
+    periods: NDArray[np.int64],
+) -> None:
+    """Improve a path for some periods, or until it is not blocked, while vehicle and regions rest.
+
+    Parameters
+    ----------
+    plan : PathPlan
+        Updated.
+    start : ndarray, shape (3,)
+        Position of the vehicle [m, NED].
+    goal, regions : PackedRegions
+        As they are.
+    limits : PathLimits
+        What the path shall keep.
+    period : float
+        [s].
+    periods : ndarray, shape (2,)
+        How many at most; receives how many it took.
+    """
+    periods[1] = 0
+    while periods[1] < periods[0]:
+        improve_path(plan, start, goal, regions, limits, period)
+        periods[1] += 1
+        if plan.phase[0] == _CANDIDATE and not is_blocked(plan, start):
+            return
+
+
 def _choose_candidate(plan: PathPlan, start: Array, goal: PackedRegions, limits: PathLimits) -> None:
-    """Make what the search found the candidate, or else a mutation of the path."""
-    if plan.counts[2] == 0:
+    """Make what the search found the candidate, and then, or else, a mutation of the path."""
+    if plan.counts[2] > 0:
+        _copy_path(plan.found, plan.candidate)
+        plan.counts[1] = plan.counts[2]
+        plan.counts[2] = _USED
+    else:
         _mutate_path(plan, start, goal, limits)
-        return
-    _copy_path(plan.found, plan.candidate)
-    plan.counts[1] = plan.counts[2]
-    plan.counts[2] = 0
+        plan.counts[2] = 0
 
 
 def _copy_path(path: Array, out: Array) -> None:

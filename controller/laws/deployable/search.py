@@ -37,6 +37,7 @@ _SLACK = 0.005  # m
 _MOVED = 0.3  # m, by which start or end may move before the root of its tree does
 _TO_OTHER = 0.2  # probability that a tree grows towards the root of the other one
 _NEAR_A_NODE = 0.4  # and towards a place near one of its nodes, for narrow passages
+_ALL = 1.0 - 1e-9  # part of a length that is all of it, but for rounding
 _BEFORE_A_WALL = 0.8  # part of the free length of a line at which a node stands that would reach farther
 
 
@@ -47,6 +48,11 @@ class PathLimits(NamedTuple):
     margin: float  # m, at least
     speed: float  # m/s, of the vehicle
     depth: float  # m, in the goal region at which it ends
+
+
+def line_margin(limits: PathLimits) -> float:
+    """Return the clearance [m] that the trees' lines keep: with more, they find no narrow passage."""
+    return limits.margin + 0.4 * limits.clearance
 
 
 class Tree(NamedTuple):
@@ -117,12 +123,12 @@ def free_length(start: Array, end: Array, regions: PackedRegions, margin: float)
             point[axis] = start[axis] + (end[axis] - start[axis]) * (s / length if length > 0.0 else 0.0)
         least = clearance_of_all(point, regions, room)
         if not least >= margin:
-            return free
-        free = s
+            return float(free)
         if s >= length:
             return float(length)
+        free = min(length, s + least - margin)
         s = min(length, s + max(least - margin, _STRIDE))
-    return free
+    return float(min(free, s))
 
 
 def is_line_free(start: Array, end: Array, regions: PackedRegions, margin: float) -> bool:
@@ -169,11 +175,12 @@ def look_for_path(
     int
         Points of the path.
     """
-    margin, of_goal, of_vehicle = limits.margin + 0.4 * limits.clearance, search.of_goal, search.of_vehicle
+    margin, of_goal, of_vehicle, target = line_margin(limits), search.of_goal, search.of_vehicle, zeros(3)
+    if clearance_of_all(end, regions, target) < 0.0:  # no path leads there
+        return 0
     move_root(of_goal, end, regions, margin)
     move_root(of_vehicle, start, regions, margin)
     search.room[0] = min(_GROWS * search.room[0], ROOM[1])
-    target = zeros(3)
     reach = max(_REACH[0], _REACH[1] * length3(start[0] - end[0], start[1] - end[1], start[2] - end[2]))
     if search.turn[0] == 0:
         search.turn[0] = 1
@@ -273,7 +280,7 @@ def extend_tree(tree: Tree, target: Array, reach: float, regions: PackedRegions,
     for axis in range(3):
         new[axis] = before[axis] + length / distance * (target[axis] - before[axis])
     free = free_length(before, new, regions, _margin_at(tree, nearest, regions, margin))
-    if free < length:
+    if free < _ALL * length:
         free *= _BEFORE_A_WALL
         if free < _MOVED:
             return -1

@@ -9,6 +9,7 @@ import pytest
 
 from controller import LAWS, FunctionLaw
 from controller.compiling import function, library
+from controller.laws.deployable.gains import DeployableGains
 from controller.regions import Sphere
 from controller.regions.region_set import Region, clearances_at
 from controller.translator.types import type_of
@@ -19,6 +20,7 @@ from cosim.campaigns.scenes.flyer import Conditions, SceneFlyer
 from cosim.campaigns.scenes.generator import generate_scenes
 from cosim.campaigns.scenes.scene import read_scenes
 from cosim.mavlink.vehicle.proximity import Proximity
+from cosim.precheck.way import find_way
 from cosim.scenario.scenario import load_scenario
 from cosim.simulation.master import Master
 
@@ -58,6 +60,7 @@ def test_what_flights_call_is_shipped_and_what_is_shipped_is_called(called, tmp_
             flyer.fly(np.zeros((1, 0)), np.zeros(1, np.int64))
     with Master(load_scenario("paper", SHORT), FunctionLaw(lambda *_: np.zeros(6))) as master:
         master.run()
+    find_way([], load_scenario("paper").goal_region, (0.0, 0.0, 0.0), DeployableGains(), 0.1)
     clearances_at(np.zeros((2, 3)), Region("ball", Sphere((0.0, 0.0, 0.0), 1.0), "out"))
     assert called == {(one, tuple(map(type_of, arguments))) for one, arguments in shipped_functions()}
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from controller.regions import Box, DepthBand, Ellipsoid, Region, Sphere
-from cosim.precheck.region_intersection import TOLERANCE, box_about, box_within, common_depth, search, way_exists
+from cosim.precheck.region_intersection import TOLERANCE, box_about, box_within, common_depth, search
 
 ORIGIN = (0.0, 0.0, 0.0)
 
@@ -63,31 +63,3 @@ def test_the_band_and_all_else_are_found_by_brute_force_too():
 def test_box_within_is_cut_to_what_has_an_end():
     low, high = box_within(Region("band", DepthBand(2.0, 0.5), "in"), np.full(3, -9.0), np.full(3, 9.0))
     assert low.tolist() == [-9.0, -9.0, 1.5] and high.tolist() == [9.0, 9.0, 2.5]
-
-
-WALL = Region("wall", Box((3.0, 0.0, 0.0), (0.5, 100.0, 100.0)), "out")
-GOAL = ball("goal", 6.0, 0.5)
-
-
-@pytest.mark.parametrize(
-    ("regions", "found"),
-    [
-        ([], True),
-        ([ball("rock", 3.0, 1.0, "out")], True),
-        ([WALL], False),
-        # a shell about the start, closed, and one that ends above the goal
-        ([Region("lid", Sphere(ORIGIN, 2.0), "in")], False),
-        ([Region("tube", Box((3.0, 0.0, 0.0), (8.0, 1.2, 1.2)), "in")], True),
-        ([Region("tube", Box((3.0, 0.0, 0.0), (8.0, 1.2, 1.2)), "in"), ball("plug", 3.0, 1.0, "out")], False),
-    ],
-    ids=["open", "rock", "wall", "shut in", "tube", "plugged tube"],
-)
-def test_way(regions, found):
-    low, high = box_about([GOAL], [ORIGIN], 3.0)
-    assert way_exists(regions, GOAL, ORIGIN, low, high)[0] is found
-
-
-def test_start_at_a_surface_is_no_dead_end():
-    near = ball("rock", -1.001, 1.0, "out")
-    low, high = box_about([GOAL], [ORIGIN], 3.0)
-    assert way_exists([near], GOAL, ORIGIN, low, high)[0]

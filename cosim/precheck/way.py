@@ -1,0 +1,99 @@
+"""Whether there is a way from the start into the goal: by the very search that the deployable law flies with."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from controller.compiling.function import BoundCall
+from controller.laws.deployable.gains import DeployableGains
+from controller.laws.deployable.path_planner import empty_plan, search_path
+from controller.laws.deployable.search import PathLimits
+from controller.regions import Region, pack
+from cosim.precheck.region_intersection import Vector3, common_depth
+
+Array = NDArray[np.float64]
+
+SEARCH_TIME = 120.0  # s of flight, for which is searched at most
+PERIOD = 0.02  # s
+_SEED = 1
+_SAMPLE = 0.02  # m, between the places of a path at which its clearance is measured
+
+
+@dataclass(frozen=True)
+class Way:
+    """A path that was found, or the search that found none."""
+
+    corners: tuple[Vector3, ...]  # m, NED: the start, corners, and an end in the goal; empty if none was found
+    clearance: float  # m, the least that it keeps, of all regions; negative if none was found
+    searched: float  # s of flight, the law's, that the search took
+
+    @property
+    def found(self) -> bool:
+        """Whether there is one."""
+        return len(self.corners) > 0
+
+    @property
+    def length(self) -> float:
+        """Its length [m]."""
+        return float(np.linalg.norm(np.diff(self.corners, axis=0), axis=1).sum()) if self.found else math.inf
+
+
+def path_limits(gains: DeployableGains) -> PathLimits:
+    """Return what a path keeps of regions that are known exactly."""
+    return PathLimits(gains.clearance, gains.margin, gains.speed, gains.depth)
+
+
+def find_way(regions: Sequence[Region], goal: Region, start: Vector3, gains: DeployableGains, duration: float) -> Way:
+    """Search a path from a start into the goal that satisfies regions all along, as they are at time 0.
+
+    Parameters
+    ----------
+    regions : sequence of Region
+        All of them count, hard or soft.
+    goal : Region
+        Where the path shall end.
+    start : tuple of float
+        [m, NED].
+    gains : DeployableGains
+        Of the law: what the path shall keep clear.
+    duration : float
+        For which the law would search at most [s].
+
+    Returns
+    -------
+    Way
+        With the path if there is one.
+    """
+    at_rest = [dataclasses.replace(region, hard=True, velocity=(0.0, 0.0, 0.0)) for region in regions]
+    plan, place = empty_plan(len(at_rest), _SEED), np.array(start, dtype=float)
+    limits = path_limits(gains)
+    left, taken = math.ceil(min(duration, SEARCH_TIME) / PERIOD), 0
+    periods = np.zeros(2, dtype=np.int64)
+    goal_at_rest = dataclasses.replace(goal, velocity=(0.0, 0.0, 0.0))
+    search = BoundCall(search_path, (plan, place, pack([goal_at_rest]), pack(at_rest), limits, PERIOD, periods)).call
+    least = -math.inf
+    while left > 0:
+        periods[0] = left
+        search()
+        left, taken = left - int(periods[1]), taken + int(periods[1])
+        points = np.array([place, *plan.path[: plan.counts[0]]])
+        least = float(common_depth(_samples(points), at_rest).min()) if at_rest else math.inf
+        if least >= 0.0:
+            corners = tuple((float(x), float(y), float(z)) for x, y, z in points)
+            return Way(corners, least, taken * PERIOD)
+    return Way((), min(least, 0.0), taken * PERIOD)
+
+
+def _samples(points: Array) -> Array:
+    """Return places along a polyline, its corners included."""
+    legs = [
+        a + (b - a) * np.linspace(0.0, 1.0, 2 + int(np.linalg.norm(b - a) / _SAMPLE))[:, None]
+        for a, b in zip(points[:-1], points[1:], strict=True)
+    ]
+    return np.concatenate(legs)
