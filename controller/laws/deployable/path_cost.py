@@ -29,7 +29,8 @@ _SAMPLES = (
 )  # evaluations of the regions along a path at most: in a call, and before the rest counts as blocked
 _STRIDE = (0.08, 3.0)  # m, least and greatest distance between two
 _TRUST = 0.7  # of the clearance beyond the desired one, travelled before the next evaluation
-_INSIDE = 200.0  # m of path, cost of a metre within a hard region
+_INSIDE = 200.0  # m of path, cost of a metre within a hard region, by
+_EDGE = 0.1  # m, or more; in proportion where by less, so that the cost does not depend on where the strides end
 _NEAR = 3.0  # m of path, cost of a metre on the surface
 _SOFT = 2.0  # m of path, cost of a metre through a soft region that is violated by
 _SHALLOW = 0.2  # m, or more; in proportion where by less
@@ -104,13 +105,14 @@ def add_cost(cost: PathCost, path: Array, count: int, regions: PackedRegions, li
         for axis in range(3):
             place[axis] = begin[axis] + (path[leg, axis] - begin[axis]) * (s / length)
         free, soft, reach = _evaluate_place(cost, place, regions, limits)
-        spare = max(_TRUST * (free - limits.clearance), 0.5 * abs(free - limits.margin))  # m, no surface in between
+        spare = max(_TRUST * (free - limits.clearance), 0.5 * (free - limits.margin))  # m, no surface in between
         stride = min(max(spare, _STRIDE[0]), reach)
         penalty, lack = 0.0, limits.clearance - free
         if lack > 0.0:
             penalty = _NEAR * square(lack / limits.clearance)
             if free < limits.margin:
-                penalty += _INSIDE * (1.0 + limits.margin - free)
+                deep = limits.margin - free
+                penalty += _INSIDE * (min(deep / _EDGE, 1.0) + deep)
         _add_stride(cost, min(stride, length - s + 1e-9), _SOFT * soft, penalty)
     return False
 

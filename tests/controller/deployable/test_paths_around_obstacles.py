@@ -53,12 +53,13 @@ def expected_cost(points, packed, gains=GAINS):
             free = min(enough, clearance(packed, at, gone / gains.speed))
             soft = soft_clearance(packed, at, gone / gains.speed)
             room = min(3.0, max(0.25, abs(soft)))
-            stride = max(0.7 * (free - gains.clearance), 0.5 * abs(free - gains.margin), 0.08)
+            stride = max(0.7 * (free - gains.clearance), 0.5 * (free - gains.margin), 0.08)
             stride = min(stride, room, length - s + 1e-9)
             total += stride * 2.0 * np.clip(-soft / 0.2, 0.0, 1.0)
             penalty += stride * 3.0 * (max(gains.clearance - free, 0.0) / gains.clearance) ** 2
             if free < gains.margin:
-                penalty += stride * 200.0 * (1.0 + gains.margin - free)
+                deep = gains.margin - free
+                penalty += stride * 200.0 * (min(deep / 0.1, 1.0) + deep)
             s += stride
     return total + penalty, penalty
 
