@@ -12,15 +12,20 @@ import math
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from controller import LAWS
 from cosim.batch.fused import FusedFlyer
 from cosim.batch.variation import Variation
 from cosim.scenario.scenario import validate_scenario
+from cosim.scenario.tables import Failure
+from cosim.scenario.vehicle_model import vehicle_model
 from plant_fmu.vehicle import Vehicle, load_vehicle
 
 CASES = ("healthy", "worn", "rolled", "lost", "two lost", "part lost", "stuck")
 _FAILURES = {"lost": 1, "part lost": 1, "stuck": 1, "two lost": 2}
+_INPUTS = 20  # place of the first thruster's command in a row of the trace
+_WINDOW = 25  # control steps, half a second
 _FAILED = 14  # place of `law.failed_thruster` among the law's reports
 
 
@@ -82,6 +87,20 @@ def through_sensors(table: dict[str, Any], lost: list[str], slow: bool) -> dict[
     }
 
 
+def since_it_matters(trace: NDArray[np.float64], failure: Failure, limit: float) -> float:
+    """Return when [s] a thruster first lacks a tenth of its limit [N], in the mean over half a second; inf if never."""
+    j = failure.thruster - 1
+    times, commands = trace[:, 0], trace[:, _INPUTS + j]
+    after = times >= failure.time
+    given = failure.effectiveness * commands
+    if failure.stuck:
+        given = np.full(commands.size, commands[np.argmax(after) - 1])
+    lack, window = np.abs(np.convolve(commands - given, np.ones(_WINDOW) / _WINDOW)[: times.size]), after.copy()
+    window[: np.argmax(after) + _WINDOW] = False
+    matters = window & (lack > 0.1 * limit)
+    return float(times[np.argmax(matters)]) if matters.any() else math.inf
+
+
 def main() -> None:
     """Fly, and print what came of it."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -97,8 +116,10 @@ def main() -> None:
     parser.add_argument("--slow", action="store_true", help="DVL and USBL of 1 Hz")
     given = parser.parse_args()
     vehicle = load_vehicle(given.vehicle)
+    model = vehicle_model(vehicle)
+    limits = np.minimum(-model.thrust_min, model.thrust_max)
     weight = given.weight or (22.0 if "bluerov2" in given.vehicle else 15.0)
-    delays, failures, wrong, violated, late, least = [], 0, 0, 0, 0, math.inf
+    delays, of_use, failures, wrong, violated, late, least = [], [], 0, 0, 0, 0, math.inf
     for seed in range(given.seed, given.seed + given.flights):
         table = scene(vehicle, given.case, seed, given.lag, weight, given.tilt) | {"vehicle": given.vehicle}
         if given.sensors:
@@ -111,6 +132,10 @@ def main() -> None:
         failed = {failure.thruster: failure.time for failure in scenario.failures}
         failures += len(failed)
         delays += [isolated[j] - time for j, time in failed.items() if isolated.get(j, -1.0) >= time]
+        for failure in scenario.failures:
+            matters = since_it_matters(trace, failure, limits[failure.thruster - 1])
+            if matters < math.inf and isolated.get(failure.thruster, math.inf) >= failure.time:
+                of_use.append(isolated.get(failure.thruster, math.inf) - matters)
         wrong += any(time < failed.get(j, math.inf) for j, time in isolated.items())
         least = min(least, float(outcome["min_clearance"]))
         violated += bool(outcome["min_clearance"] < 0.0)
@@ -122,6 +147,8 @@ def main() -> None:
         soon = sum(delay <= 3.0 for delay in delays)
         median = np.median(delays) if delays else math.nan
         print(f"  {len(delays)} of {failures} isolated, {soon} within 3 s, after {median:.2f} s (median)")
+        soon = sum(delay <= 3.0 for delay in of_use)
+        print(f"  of {len(of_use)} that came to matter, {soon} within 3 s from then on")
 
 
 if __name__ == "__main__":
