@@ -136,7 +136,7 @@ class FlightMetrics(NamedTuple):
     max_speed: float  # m/s, over ground
     worst_step: float  # s of the wall clock, the longest that law and allocation took
     failed_step: float  # that the FMU refused
-    bound_excess: float  # m, by which a clearance was below the law's last bound, greatest; -inf: no bound
+    bound_excess: float  # m, by which a clearance was below the law's bound, greatest; -inf: no bound
 
 
 class FlightOutputs(NamedTuple):

@@ -46,6 +46,8 @@ _AHEAD = 1e-4  # s, of the difference quotient of a gradient: exact to a part of
 _FIRM = (3.0, 3.0)  # decades: price of slack against missing the desired force, at weight 0, and added at weight 1
 _LEAP = 0.5  # cosine of the turn of a gradient within that time, beyond which it is a jump
 _MARGIN_OF_ATTITUDE = 0.02  # rad
+KEPT = 0.01  # m/s2, slack up to which a barrier counts as kept
+_BOUND_LEAP = 0.05  # m, by which no motion of the vehicle lowers the bound within a step
 
 
 class RegionObservation(NamedTuple):
@@ -272,3 +274,14 @@ def write_rows(
                 rows += 1
     observation.bound[0] = bound
     return rows
+
+
+def update_promise(promised: Array, bound: float, slack: float) -> None:
+    """Raise what is promised of the clearances, shape (2,) [m], to the bound of this step, if that is higher.
+
+    A bound that falls is no excuse: it would follow whatever happens. The promise begins anew where a barrier yields by
+    more than counts as kept, and where the bound leaps, since then regions or estimate did.
+    """
+    if slack > KEPT or not bound >= promised[1] - _BOUND_LEAP:
+        promised[0] = bound
+    promised[0], promised[1] = max(promised[0], bound), bound

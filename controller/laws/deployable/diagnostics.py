@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 from controller.arithmetic import length3
 from controller.law import Diagnostic
 from controller.laws.deployable.estimate import Estimate
-from controller.laws.deployable.gains import DeployableGains
 from controller.laws.deployable.linear_algebra import copy
 
 Array = NDArray[np.float64]
@@ -51,14 +50,11 @@ def write_report(report: Array, estimate: Estimate, cost: float, points: int, he
     report[15] = estimate.time_since_measurement[0]
 
 
-def write_program_report(
-    report: Array, multipliers: Array, price: Array, rows: int, steps: int, bound: float, gains: DeployableGains
-) -> None:
-    """Write the `DIAGNOSTICS` of barriers and quadratic program; `bound` [m] is that of barriers that do not yield."""
+def write_program_report(report: Array, multipliers: Array, price: Array, rows: int, steps: int) -> None:
+    """Write the `DIAGNOSTICS` of barriers and quadratic program."""
     active, yielding = 0, 0.0
     for i in range(rows):
         if multipliers[i] > 0.0:
             active += 1
             yielding = max(yielding, multipliers[i] * price[i])
     report[11], report[12], report[13] = active, yielding, steps
-    report[16] = bound - yielding / (gains.barrier_rate * gains.barrier_slope)

@@ -30,7 +30,14 @@ from controller.laws.deployable import (
 from controller.laws.deployable.actuator_lag import empty_prediction, predict_state
 from controller.laws.deployable.attitude import empty_attitude
 from controller.laws.deployable.attraction import desired_acceleration, desired_velocity
-from controller.laws.deployable.barrier import Motion, RegionObservation, empty_observation, observe_regions, write_rows
+from controller.laws.deployable.barrier import (
+    Motion,
+    RegionObservation,
+    empty_observation,
+    observe_regions,
+    update_promise,
+    write_rows,
+)
 from controller.laws.deployable.braking import least_forces
 from controller.laws.deployable.diagnostics import DIAGNOSTICS, NO_BOUND, write_program_report, write_report
 from controller.laws.deployable.estimate import LAG, Estimate, make_estimate
@@ -78,6 +85,7 @@ def step(
         _hold_weight(memory, R, gains, forces)
         copy(forces, thrusters.forces)
         memory.report[15], memory.report[16] = estimate.time_since_measurement[0], NO_BOUND
+        memory.promised[:] = np.nan
         return
 
     # fault detection
@@ -158,9 +166,11 @@ def step(
     memory.estimate[0] = estimate.net_weight[0]
     copy(estimate.moments, memory.estimate[1:])
     write_report(memory.report, estimate, memory.plan.cost[0], memory.plan.counts[0], thrusters.health, desired)
+    write_program_report(memory.report, work.multipliers, work.price, rows, steps)
     beyond = max(spread - 2.0 * _TRUSTED_SPREAD, 0.0)  # the margins'
-    bound = memory.observation.bound[0] - beyond
-    write_program_report(memory.report, work.multipliers, work.price, rows, steps, bound, gains)
+    slack = memory.report[12]
+    update_promise(memory.promised, memory.observation.bound[0], slack)
+    memory.report[16] = memory.promised[0] - beyond - slack / (gains.barrier_rate * gains.barrier_slope)
 
 
 def _hold_weight(memory: DeployableMemory, R: Array, gains: DeployableGains, forces: Array) -> None:
@@ -279,6 +289,7 @@ class DeployableLaw(CompiledLaw):
             omega=np.zeros(3),
             deviation=np.zeros(12),
             position_variance=np.zeros(3),
+            promised=np.full(2, np.nan),
             weights=np.ones(n_regions),
             reported=np.ones(m),
             filtered_acceleration=np.zeros(3),

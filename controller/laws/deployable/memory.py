@@ -38,6 +38,7 @@ class DeployableMemory(NamedTuple):
     omega: Array  # (3,) rad/s, likewise
     deviation: Array  # (12,) of the measured state, as `VehicleState` has it
     position_variance: Array  # (3,) m2, NED, of the estimated position
+    promised: Array  # (2,) m, NaN if none: what clearances may fall to, promised since; and by the last step alone
     weights: Array  # (n,) of the arbiter, sanitized
     reported: Array  # (m,) health of the thrusters as last reported
     filtered_acceleration: Array  # (3,) m/s2, NED, desired of the thrusters, low-pass filtered

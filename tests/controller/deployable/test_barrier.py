@@ -172,6 +172,24 @@ def test_the_bound_is_what_clearances_may_fall_to():
     assert 10 < fallen < 60
 
 
+def test_a_promise_rises_with_the_bound_and_falls_only_where_it_says_why():
+    promised = np.full(2, np.nan)
+
+    def promise(bound, slack=0.0):
+        barrier.update_promise(promised, bound, slack)
+        return promised[0]
+
+    assert promise(-0.2) == -0.2  # the first: a start within a region
+    assert promise(-0.16) == -0.16
+    assert promise(-0.19) == -0.16  # falls without a reason: the promise stands, and can turn out false
+    assert promise(-0.23) == -0.16
+    assert promise(-0.24, slack=0.009) == -0.16
+    assert promise(-0.25, slack=0.011) == -0.25  # a barrier yields
+    assert promise(0.0) == 0.0
+    assert promise(-0.06) == -0.06  # more than any motion within a step: a region has leapt
+    assert promise(-0.02) == -0.02
+
+
 def test_the_slope_of_a_flat_face_leaps_and_does_not_turn():
     n, later, v = np.eye(6)[0], np.eye(6)[1], np.array([1.0, 0.5, 0.0, 0.0, 0.0, 0.0])
     for kind in (Box.kind, Sphere.kind):

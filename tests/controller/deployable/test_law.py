@@ -12,7 +12,8 @@ import pytest
 
 from controller import VehicleState
 from controller.laws.deployable import DeployableGains
-from controller.regions import Region, Sphere
+from controller.regions import Box, DepthBand, Region, Sphere, pack
+from controller.regions.region_set import clearance_at
 from tests.controller.deployable.scenery import GOAL, ODIN, REGIONS, Sea, fly, law_for
 
 ROOT = Path(__file__).parents[3]
@@ -147,6 +148,22 @@ def test_an_uncertain_state_is_flown_with_wider_margins():
         waits.append(np.linalg.norm(sea.position - ball.shape.centre) - ball.shape.radius)
     assert 0.03 <= waits[0] < 0.04
     assert np.diff(waits) == pytest.approx([0.15, 0.15], abs=0.01)
+
+
+def test_where_regions_exclude_each_other_clearances_keep_what_is_promised():
+    """A plate comes down onto the band in which the vehicle is: one of them must be violated, and says so before."""
+    plate = Region("plate", Box((0.0, 0.0, -1.2), (40.0, 40.0, 1.0)), "out", (0.0, 0.0, 0.1))
+    band, own, sea, rows = Region("band", DepthBand(2.5, 1.0), "in"), law_for([0, 1]), Sea(noise=NOISE), []
+    packed = pack([plate, band])
+
+    def check(t):
+        packed.move_to(t)
+        rows.append((min(clearance_at(packed, i, sea.position) for i in range(2)), own.memory.report[16]))
+
+    fly(own, sea, regions=[plate, band], steps=2500, each=check)
+    clearance, bound = np.array(rows).T
+    assert clearance.min() < -0.05 and bound[:500].max() == 0.0
+    assert np.all(clearance[1:] >= bound[:-1] - 1e-3)
 
 
 def test_a_region_whose_place_is_uncertain_is_kept_farther_off():

@@ -131,9 +131,8 @@ def test_the_report_says_what_it_is_of():
     assert report[:11].tolist() == [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 7.0, 9.5, 3.0]
     assert report[14:16].tolist() == [3.0, -1.0]
     program = np.array([0.0, 2.0, 3.0, 9.0]), np.array([1.0, 0.5, 0.1, 9.0]), 3, -6
-    diagnostics.write_program_report(report, *program, -0.2, GAINS._replace(barrier_rate=5.0, barrier_slope=2.0))
+    diagnostics.write_program_report(report, *program)
     assert report[11:14].tolist() == [2.0, 1.0, -6.0]
-    assert report[16] == pytest.approx(-0.2 - 1.0 / 10.0)
 
 
 # ---- what is believed ----
