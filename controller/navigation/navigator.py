@@ -44,6 +44,7 @@ from controller.stack_array import zeros
 Array = NDArray[np.float64]
 
 _NEVER = -1e11  # s, before any sample
+_UNEXPLAINED = 4.0  # standard deviations of a fix, by which two differ by more than noise
 _FIX_DEVIATIONS, _FIX_DISTANCE = 6.0, 0.5  # standard deviations, and m, within which two fixes agree
 _LONGEST = 1.0  # s between two IMU samples, beyond which the filter starts anew
 _FAR = 3.0  # m, standard deviation of a coordinate beyond which it is called unknown
@@ -88,16 +89,18 @@ def _take_imu_sample(measurements: Measurements, sensors: SensorModel, memory: N
 def _start(measurements: Measurements, sensors: SensorModel, memory: NavigationMemory) -> None:
     """Start once IMU, compass, pressure sensor and USBL have given a sample, at rest, level by the accelerometers.
 
-    The USBL must have given two positions that agree, since the first may be an outlier.
+    The USBL must have given two positions that agree, since either may be an outlier. The vehicle is taken to be between
+    them, and its place to be as uncertain as they are apart where noise does not explain that.
     """
     times = measurements.times
     latest = min(times[IMU], times[COMPASS], times[DEPTH_SENSOR], times[USBL])
     if not latest > _NEVER or times[IMU] != memory.time[0] or not times[USBL] > memory.sample_times[USBL]:
         return
-    memory.sample_times[USBL], agree = times[USBL], True
+    memory.sample_times[USBL], agree, apart = times[USBL], True, zeros(3)
     for i in range(3):
         fix = measurements.values[MEASURED_POSITION + i]
-        agree = agree and abs(fix - memory.previous_fix[i]) < _FIX_DEVIATIONS * sensors.position + _FIX_DISTANCE
+        apart[i] = fix - memory.previous_fix[i]
+        agree = agree and abs(apart[i]) < _FIX_DEVIATIONS * sensors.position + _FIX_DISTANCE
         memory.previous_fix[i] = fix
     if not agree:
         return
@@ -107,11 +110,15 @@ def _start(measurements: Measurements, sensors: SensorModel, memory: NavigationM
     roll, pitch = arctangent(-f[1], -f[2]), arctangent(f[0], hypotenuse(f[1], f[2]))
     _set_attitude(memory.quaternion, roll, pitch, measurements.values[HEADING])
     for i in range(3):
-        memory.position[i] = measurements.values[MEASURED_POSITION + i]
+        memory.position[i] = measurements.values[MEASURED_POSITION + i] - 0.5 * apart[i]
         memory.velocity[i] = memory.acceleration[i] = 0.0
     memory.position[2] = measurements.values[DEPTH]
     memory.recorded[0] = 0
     set_first_covariance(memory, sensors)
+    for i in range(2):  # of the mean of two; and where noise does not explain them, of a mean with a wrong one
+        memory.covariance[POSITION + i, POSITION + i] -= 0.5 * square(sensors.position)
+        if abs(apart[i]) > _UNEXPLAINED * sensors.position:
+            memory.covariance[POSITION + i, POSITION + i] += 0.25 * square(apart[i])
     for sensor in range(N_SENSORS):
         memory.rejected[sensor] = memory.accepted[sensor] = 0.0
         memory.sample_times[sensor] = times[sensor]
