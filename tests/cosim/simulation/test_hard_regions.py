@@ -1,5 +1,6 @@
 """Regions that are hard to keep and ways that are hard to find: those of a list, and families drawn at random."""
 
+import functools
 from pathlib import Path
 
 import numpy as np
@@ -49,9 +50,12 @@ def text(numbers):
     return str([float(x) for x in numbers])
 
 
+def unit_of(vector):
+    return vector / np.linalg.norm(vector)
+
+
 def unit(rng, n=3):
-    found = rng.normal(size=n)
-    return found / np.linalg.norm(found)
+    return unit_of(rng.normal(size=n))
 
 
 def room(kind, rng):
@@ -121,6 +125,63 @@ def barred(kind, vehicle, seed):
     return flight + blocks
 
 
+def pocket(vehicle, seed):
+    """Return a flight that starts deep in a pocket of three tall walls, whose mouth is away from the goal."""
+    rng = np.random.default_rng([seed, 77])
+    depth, width, y = rng.uniform(3.0, 10.0), rng.uniform(2.0, 5.0), rng.uniform(-1.0, 1.0)
+    thick, tall = 0.3, 12.0
+    walls = block("end", 1.5, y, [thick, width / 2.0 + 2.0 * thick, tall])
+    for name, side in (("left", -1.0), ("right", 1.0)):
+        walls += block(name, 1.5 - depth / 2.0, y + side * (width / 2.0 + thick), [depth / 2.0, thick, tall])
+    goal = [rng.uniform(6.0, 12.0), rng.uniform(-3.0, 3.0), 12.0]
+    flight = FLIGHT.format(
+        vehicle=vehicle, duration=240.0, start=[0.0, y, 12.0], goal=goal, noise=0.02, half=0.01, seed=seed
+    )
+    return flight + walls
+
+
+def bent_pipe(vehicle, seed):
+    """Return a flight through a pipe of five bends, that is kept in, to its other end."""
+    rng = np.random.default_rng([seed, 78])
+    points, way = [np.array([0.0, 0.0, 20.0])], np.array([1.0, 0.0, 0.0])
+    for _ in range(6):
+        points.append(points[-1] + rng.uniform(3.0, 7.0) * way)
+        while True:  # turned by 40 to 95 degrees, clear of what is there
+            turned = unit(rng) * [1.0, 1.0, 0.5]
+            turned /= np.linalg.norm(turned)
+            ahead = points[-1] + 5.0 * turned
+            bend = np.degrees(np.arccos(turned @ way))
+            if 40.0 < bend < 95.0 and ahead[2] > 3.0 and all(np.linalg.norm(ahead - p) > 3.5 for p in points[:-1]):
+                break
+        way = turned
+    shape = f'type = "pipe", points = [{", ".join(map(text, points))}], radius = {rng.uniform(1.0, 1.6)}'
+    goal = text(points[-1] - 0.2 * unit_of(points[-1] - points[-2]))
+    flight = FLIGHT.format(
+        vehicle=vehicle, duration=240.0, start=[0.3, 0.0, 20.0], goal=goal, noise=0.02, half=0.01, seed=seed
+    )
+    return flight + REGION.format(name="pipe", keep="in", shape=shape)
+
+
+def rocks(vehicle, seed):
+    """Return a flight through two hundred spheres."""
+    rng, length, rocks = np.random.default_rng([seed, 79]), 30.0, ""
+    start, goal, count = np.array([0.0, 0.0, 15.0]), np.array([length, rng.uniform(-4.0, 4.0), 15.0]), 0
+    while count < 200:
+        centre, radius = rng.uniform([1.0, -8.0, 8.0], [length - 1.0, 8.0, 22.0]), rng.uniform(0.2, 0.9)
+        if min(np.linalg.norm(centre - start), np.linalg.norm(centre - goal)) > radius + 1.4:
+            shape = f'type = "sphere", centre = {text(centre)}, radius = {radius}'
+            rocks, count = rocks + REGION.format(name=f"rock {count}", keep="out", shape=shape), count + 1
+    flight = FLIGHT.format(
+        vehicle=vehicle, duration=120.0, start=text(start), goal=text(goal), noise=0.02, half=0.01, seed=seed
+    )
+    return flight + rocks
+
+
+FAMILIES = {"pocket": pocket, "bent pipe": bent_pipe, "rocks": rocks} | {
+    kind: functools.partial(barred, kind) for kind in ("wall", "door", "transit")
+}
+
+
 @pytest.fixture
 def flown(tmp_path):
     """Return what flies a scenario's text, or its file, and gives the outcome."""
@@ -155,9 +216,9 @@ def test_a_room_is_kept_wherever_its_goal_lies(flown, kind, vehicle, seeds):
 
 
 @pytest.mark.parametrize("vehicle", VEHICLES)
-@pytest.mark.parametrize("kind", ["wall", "door", "transit"])
+@pytest.mark.parametrize("kind", FAMILIES)
 @pytest.mark.parametrize("seeds", [range(1), pytest.param(range(1, 40), marks=pytest.mark.slow)], ids=["few", "many"])
 def test_a_way_round_is_found(flown, kind, vehicle, seeds):
     for seed in seeds:
-        outcome = flown(barred(kind, vehicle, seed))
+        outcome = flown(FAMILIES[kind](vehicle, seed))
         assert outcome["settled"] and outcome["min_clearance"] > 0.0, seed
