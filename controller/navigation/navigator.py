@@ -89,8 +89,8 @@ def _take_imu_sample(measurements: Measurements, sensors: SensorModel, memory: N
 def _start(measurements: Measurements, sensors: SensorModel, memory: NavigationMemory) -> None:
     """Start once IMU, compass, pressure sensor and USBL have given a sample, at rest, level by the accelerometers.
 
-    The USBL must have given two positions that agree, since either may be an outlier. The vehicle is taken to be between
-    them, and its place to be as uncertain as they are apart where noise does not explain that.
+    The USBL must have given two positions that agree, since either may be an outlier. The vehicle is taken to be
+    between them, and its place to be as uncertain as they are apart where noise does not explain that.
     """
     times = measurements.times
     latest = min(times[IMU], times[COMPASS], times[DEPTH_SENSOR], times[USBL])

@@ -1,11 +1,10 @@
 """Path planner: a polyline from the vehicle into the goal region that keeps clear of the hard regions.
 
-A potential alone leads into pockets between obstacles. So the law keeps a path of a few corners, and each period tries
-one change of it: a corner moved, added or dropped, or another end in the goal region. The cheaper path stays. The cost
-is the length, plus a penalty where the path passes too close to a hard region, taken at the place to which the region
-will have moved by then. One candidate a period bounds the cost of a step; the random numbers are the law's own, so that
-a run repeats bit for bit. The path only sets the direction: the barriers keep the vehicle out of regions, whatever the
-path.
+A potential alone leads into pockets between obstacles. So the law keeps a path of a few corners, and tries one change
+after the other: a corner moved, added or dropped, or another end in the goal region; what `search.py` finds while the
+path is blocked is a change, too. The path that costs less stays, by `path_cost.py`. Each period does a bounded part of
+the work. The random numbers are the law's own, so that a run repeats bit for bit. The path only sets the direction: the
+barriers keep the vehicle out of regions, whatever the path.
 """
 
 from __future__ import annotations
@@ -19,11 +18,7 @@ from controller.arithmetic import exponential, length3
 from controller.laws.deployable.linear_algebra import copy, norm
 from controller.laws.deployable.path_cost import PathCost, add_cost, begin_cost, empty_cost
 from controller.laws.deployable.search import ROOM, PathLimits, Search, empty_search, limits_along, look_for_path
-from controller.regions.region_set import (
-    PackedRegions,
-    clearance_at,
-    evaluate_packed,
-)
+from controller.regions.region_set import PackedRegions, clearance_at, evaluate_packed
 from controller.stack_array import zeros
 
 Array = NDArray[np.float64]
@@ -122,8 +117,21 @@ def nearest_goal_point(goal: PackedRegions, position: Array, depth: float, end: 
 def improve_path(
     plan: PathPlan, start: Array, goal: PackedRegions, regions: PackedRegions, limits: PathLimits, period: float
 ) -> None:
-    """Update the path to vehicle and regions, and try one candidate; to be called once a period [s]."""
-    path, candidate = plan.path, plan.candidate
+    """Update the path to vehicle and regions, and try a candidate; to be called once a period [s]."""
+    _follow(plan, start, goal, limits, period)
+    _evaluate(plan, start, goal, regions, limits)
+    if not is_blocked(plan, start):
+        plan.search.room[0] = ROOM[0]
+    elif plan.counts[2] == 0:
+        end, random_numbers = plan.path[plan.counts[0] - 1], plan.random_numbers
+        for i in range(random_numbers.size):
+            random_numbers[i] = uniform(plan.random)
+        plan.counts[2] = look_for_path(plan.search, start, end, random_numbers, regions, limits, plan.found)
+
+
+def _follow(plan: PathPlan, start: Array, goal: PackedRegions, limits: PathLimits, period: float) -> None:
+    """Begin a path, or move its end with the goal and drop corners that the vehicle has passed."""
+    path = plan.path
     if plan.counts[0] == 0:
         plan.counts[0] = 1
         nearest_goal_point(goal, start, limits.depth, path[0])
@@ -139,32 +147,28 @@ def improve_path(
         plan.counts[0] -= 1
         if plan.phase[0] == _PATH:
             plan.phase[0] = _BEGIN
+
+
+def _evaluate(plan: PathPlan, start: Array, goal: PackedRegions, regions: PackedRegions, limits: PathLimits) -> None:
+    """Go on with the evaluation of path or candidate, in turn; the candidate becomes the path if it costs less."""
     cost = plan.new_cost
     if plan.phase[0] == _BEGIN:
         begin_cost(cost, start)
         plan.phase[0] = _PATH
     if plan.phase[0] == _PATH:
-        if add_cost(cost, path, plan.counts[0], regions, limits, np.inf):
+        if add_cost(cost, plan.path, plan.counts[0], regions, limits, np.inf):
             copy(cost.cost, plan.cost)
             _choose_candidate(plan, start, goal, limits)
             begin_cost(cost, cost.start)
             plan.phase[0] = _CANDIDATE
-    else:
-        most = plan.cost[0] - _BETTER - _BETTER_PART * plan.cost[0]
-        if add_cost(cost, candidate, plan.counts[1], regions, limits, most):
-            plan.phase[0] = _BEGIN
-            if cost.cost[0] < most:
-                _copy_path(candidate, path)
-                plan.counts[0] = plan.counts[1]
-                copy(cost.cost, plan.cost)
-    if not is_blocked(plan, start):
-        plan.search.room[0] = ROOM[0]
-    elif plan.counts[2] == 0:
-        for i in range(plan.random_numbers.size):
-            plan.random_numbers[i] = uniform(plan.random)
-        plan.counts[2] = look_for_path(
-            plan.search, start, path[plan.counts[0] - 1], plan.random_numbers, regions, limits, plan.found
-        )
+        return
+    most = plan.cost[0] - _BETTER - _BETTER_PART * plan.cost[0]
+    if add_cost(cost, plan.candidate, plan.counts[1], regions, limits, most):
+        plan.phase[0] = _BEGIN
+        if cost.cost[0] < most:
+            _copy_path(plan.candidate, plan.path)
+            plan.counts[0] = plan.counts[1]
+            copy(cost.cost, plan.cost)
 
 
 def is_blocked(plan: PathPlan, start: Array) -> bool:
