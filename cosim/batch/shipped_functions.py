@@ -16,8 +16,8 @@ from controller import LAWS, CompiledLaw, VehicleState
 from controller.compiling.compiler import compile_file
 from controller.compiling.function import c_text
 from controller.compiling.library import checksum_path, digest_of, library_name
-from controller.laws.deployable.path_planner import empty_plan, search_path
-from controller.laws.deployable.search import PathLimits
+from controller.laws.deployable.path_planning.planner import empty_plan, search_path
+from controller.laws.deployable.path_planning.search import PathLimits
 from controller.navigation import SensorModel, empty_measurements
 from controller.navigation.estimate import empty_memory
 from controller.navigation.navigator import navigate

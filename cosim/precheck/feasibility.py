@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controller.laws.deployable.gains import DeployableGains
-from controller.laws.deployable.search import line_margin
+from controller.laws.deployable.path_planning.search import line_margin
 from controller.regions import Region
 from controller.regions.region_set import of_attitude
 from cosim.precheck.finding import Finding, status

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from controller.compiling.function import BoundCall
 from controller.laws.deployable.gains import DeployableGains
-from controller.laws.deployable.path_planner import empty_plan, search_path
-from controller.laws.deployable.search import PathLimits
+from controller.laws.deployable.path_planning.planner import empty_plan, search_path
+from controller.laws.deployable.path_planning.search import PathLimits
 from controller.regions import Region, pack
 from cosim.precheck.region_intersection import Vector3, common_depth
 

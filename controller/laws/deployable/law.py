@@ -24,7 +24,6 @@ from controller.laws.deployable import (
     fault_detection,
     input_validation,
     model,
-    path_planner,
     quadratic_program,
 )
 from controller.laws.deployable.actuator_lag import empty_prediction, predict_state
@@ -47,9 +46,9 @@ from controller.laws.deployable.gains import SPREADS, DeployableGains, check_gai
 from controller.laws.deployable.linear_algebra import copy
 from controller.laws.deployable.memory import DeployableMemory
 from controller.laws.deployable.model import Dynamics, Loads, make_dynamics, make_thrusters
-from controller.laws.deployable.path_planner import empty_plan
+from controller.laws.deployable.path_planning.planner import empty_plan, improve_path
+from controller.laws.deployable.path_planning.search import PathLimits
 from controller.laws.deployable.quadratic_program import empty_workspace
-from controller.laws.deployable.search import PathLimits
 from controller.quaternion import write_rotation
 from controller.regions.kinds import FIRST_OF_ATTITUDE
 from controller.regions.region_set import PackedRegions
@@ -114,7 +113,7 @@ def step(
         memory.position_variance[axis] = min(memory.position_variance[axis], square(2.0 * _TRUSTED_SPREAD / SPREADS))
     wider = min(spread, _TRUSTED_SPREAD)
     limits = PathLimits(gains.clearance + wider, gains.margin + wider, gains.speed, gains.depth)
-    path_planner.improve_path(memory.plan, ahead.position, goal, regions, limits, period)
+    improve_path(memory.plan, ahead.position, goal, regions, limits, period)
     desired_velocity(memory.plan, ahead.position, goal.velocities[0], gains, desired)
     _limit_speed(estimate, spread, gains, desired)
     desired_acceleration(desired, ahead.velocity[:3], gains, acceleration[:3])

@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 from controller.compiling.function import CompiledFunction
 from controller.laws.deployable.attraction import approach_speed, desired_acceleration, desired_velocity
 from controller.laws.deployable.gains import DeployableGains
-from controller.laws.deployable.path_cost import add_cost, begin_cost, empty_cost
-from controller.laws.deployable.path_planner import (
+from controller.laws.deployable.path_planning.cost import add_cost, begin_cost, empty_cost
+from controller.laws.deployable.path_planning.planner import (
     CORNERS,
     empty_plan,
     improve_path,

@@ -3,11 +3,17 @@
 import numpy as np
 import pytest
 
-from controller.laws.deployable import path_planner as way_round
-from controller.laws.deployable import search
 from controller.laws.deployable.gains import DeployableGains
-from controller.laws.deployable.path_cost import add_cost, begin_cost, empty_cost
-from controller.laws.deployable.path_planner import CORNERS, empty_plan, improve_path, nearest_goal_point, uniform
+from controller.laws.deployable.path_planning import planner as way_round
+from controller.laws.deployable.path_planning import search
+from controller.laws.deployable.path_planning.cost import add_cost, begin_cost, empty_cost
+from controller.laws.deployable.path_planning.planner import (
+    CORNERS,
+    empty_plan,
+    improve_path,
+    nearest_goal_point,
+    uniform,
+)
 from controller.regions import Box, DepthBand, Orientation, Region, Sphere, pack
 from controller.regions.region_set import clearance_at
 
@@ -318,7 +324,7 @@ def test_a_tree_that_is_full_starts_anew_and_a_chain_too_long_is_no_path():
 
 
 class Change:
-    """`path_planner._mutate_path`, from the same random numbers."""
+    """`planner._mutate_path`, from the same random numbers."""
 
     def __init__(self, plan, goal):
         self.random, self.goal = plan.random.copy(), goal

@@ -21,7 +21,7 @@ from controller.laws.deployable.model import (
     reallocate,
     write_thruster_acceleration,
 )
-from controller.laws.deployable.path_planner import CORNERS, empty_plan
+from controller.laws.deployable.path_planning.planner import CORNERS, empty_plan
 from controller.regions import HalfSpace, Orientation, Region, Sphere, pack
 from tests.controller.deployable.scenery import LEVEL, ODIN, law_for
 

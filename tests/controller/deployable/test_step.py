@@ -5,12 +5,13 @@ import copy
 import numpy as np
 import pytest
 
-from controller.laws.deployable import actuator_lag, attitude, barrier, input_validation, law, model, path_planner
+from controller.laws.deployable import actuator_lag, attitude, barrier, input_validation, law, model
 from controller.laws.deployable.attraction import desired_acceleration, desired_velocity
 from controller.laws.deployable.estimate import CURRENT, LAG, MOMENTS, VELOCITY, publish
 from controller.laws.deployable.gains import DeployableGains
+from controller.laws.deployable.path_planning.planner import improve_path
+from controller.laws.deployable.path_planning.search import PathLimits
 from controller.laws.deployable.quadratic_program import solve
-from controller.laws.deployable.search import PathLimits
 from controller.quaternion import rotation_matrix
 from controller.regions import Orientation, Region, pack
 from tests.controller.deployable.scenery import GOAL, REGIONS, Sea, fly, law_for
@@ -38,7 +39,7 @@ def expected(memory, state, goal, regions, weights):
     variance = np.diag(seen.covariance)[:3] + state.deviation[:3] ** 2
     wider = 3.0 * np.sqrt(variance.max())
     limits = PathLimits(GAINS.clearance + wider, GAINS.margin + wider, GAINS.speed, GAINS.depth)
-    path_planner.improve_path(memory.plan, position, goal, regions, limits, 0.02)
+    improve_path(memory.plan, position, goal, regions, limits, 0.02)
     desired_velocity(memory.plan, position, goal.velocities[0], GAINS, wanted)
     desired_acceleration(wanted, velocity, GAINS, acceleration)
     barrier.observe_regions(memory.observation, regions, position, ahead.quaternion, ahead.velocity)

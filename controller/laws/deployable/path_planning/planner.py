@@ -2,7 +2,7 @@
 
 A potential alone leads into pockets between obstacles. So the law keeps a path of a few corners, and tries one change
 after the other: a corner moved, added or dropped, or another end in the goal region; what `search.py` finds while the
-path is blocked is a change, too. The path that costs less stays, by `path_cost.py`. Each period does a bounded part of
+path is blocked is a change, too. The path that costs less stays, by `cost.py`. Each period does a bounded part of
 the work. The random numbers are the law's own, so that a run repeats bit for bit. The path only sets the direction: the
 barriers keep the vehicle out of regions, whatever the path.
 """
@@ -16,8 +16,15 @@ from numpy.typing import NDArray
 
 from controller.arithmetic import exponential, length3
 from controller.laws.deployable.linear_algebra import copy, norm
-from controller.laws.deployable.path_cost import PathCost, add_cost, begin_cost, empty_cost
-from controller.laws.deployable.search import ROOM, PathLimits, Search, empty_search, limits_along, look_for_path
+from controller.laws.deployable.path_planning.cost import PathCost, add_cost, begin_cost, empty_cost
+from controller.laws.deployable.path_planning.search import (
+    ROOM,
+    PathLimits,
+    Search,
+    empty_search,
+    limits_along,
+    look_for_path,
+)
 from controller.regions.region_set import PackedRegions, clearance_at, evaluate_packed
 from controller.stack_array import zeros
 

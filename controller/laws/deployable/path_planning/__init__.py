@@ -1,0 +1,1 @@
+"""A path from the vehicle into the goal region: the planner that keeps one, its cost, and the search for another."""
