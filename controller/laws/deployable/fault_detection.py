@@ -13,7 +13,9 @@ So a thruster that fails at low thrust is found when it is used.
 
 A thruster fails when its sum passes the threshold, well ahead of that of every other thruster. The likeliest loss then
 says whether it goes on with what is left, or is isolated. The deviation is taken into the state. A thruster that was
-isolated by a narrow lead is tried again, once, when another one is isolated; one that is reported as failed never is.
+isolated by a narrow lead is tried again, once, when another one is isolated. Where several are isolated, one of them
+may be wrongly accused: each is tried again after a while, in turn, while no barrier is active; one that gives nothing
+is soon isolated again. One that is reported as failed is never tried.
 """
 
 from __future__ import annotations
@@ -36,7 +38,8 @@ _USEFUL = 0.15  # effectiveness below which a thruster is isolated
 _SPREADS = 3.0  # standard deviations below that
 _LEAD = 8.0  # of the likeliest thruster before the next
 _STUCK_SPREAD = 0.5  # standard deviation of the force at which a thruster is stuck, as part of it
-_CERTAIN = 40.0  # with such a lead it is isolated for good
+_CERTAIN = 40.0  # with such a lead it is isolated for good, but for trials
+_TRIAL = 5.0  # s after the last isolation or trial, and as long again for each trial before
 
 
 class FaultState(NamedTuple):
@@ -45,11 +48,14 @@ class FaultState(NamedTuple):
     ratio: Array  # (2 m,) summed log-likelihood ratio: thruster j gives nothing; m + j: is stuck
     sums: Array  # (2, 2 m) of the evidence since the supposed time of the failure
     tentative: NDArray[np.int64]  # (m,) 1 of a thruster isolated tentatively, more of one isolated for good
+    trials: NDArray[np.int64]  # (m,) of each thruster
+    waited: Array  # (1,) s since the last isolation or trial
 
 
 def empty_fault_state(m: int) -> FaultState:
     """Return the state for `m` thrusters, all sums at zero."""
-    return FaultState(np.zeros(2 * m), np.zeros((2, 2 * m)), np.zeros(m, dtype=np.int64))
+    counts = np.zeros((2, m), dtype=np.int64)
+    return FaultState(np.zeros(2 * m), np.zeros((2, 2 * m)), counts[0].copy(), counts[1].copy(), np.zeros(1))
 
 
 def detect_fault(fault_state: FaultState, estimate: Estimate, thrusters: Thrusters, gains: DeployableGains) -> int:
@@ -114,6 +120,45 @@ def detect_fault(fault_state: FaultState, estimate: Estimate, thrusters: Thruste
     return -1
 
 
+def try_again(
+    fault_state: FaultState, estimate: Estimate, thrusters: Thrusters, reported: Array, quiet: bool, period: float
+) -> int:
+    """Try one of several isolated thrusters again after a while, and return it, or -1.
+
+    Parameters
+    ----------
+    fault_state, estimate, thrusters
+        As for `detect_fault`.
+    reported : ndarray, shape (m,)
+        Health of the thrusters as reported: one that is reported as failed is not tried.
+    quiet : bool
+        Whether no barrier was active in the last step.
+    period : float
+        [s].
+
+    Returns
+    -------
+    int
+        From 0; the caller calls `model.reallocate`.
+    """
+    fault_state.waited[0] += period
+    isolated, least = 0, -1
+    for j in range(thrusters.health.size):
+        if thrusters.health[j] == 0.0 and reported[j] > 0.0:
+            isolated += 1
+            if least < 0 or fault_state.trials[j] < fault_state.trials[least]:
+                least = j
+    if isolated < 2 or not quiet or fault_state.waited[0] < _TRIAL * (1.0 + fault_state.trials[least]):
+        return -1
+    fault_state.waited[0] = 0.0
+    fault_state.trials[least] += 1
+    fault_state.tentative[least] = 0
+    thrusters.health[least], thrusters.stuck[least] = 1.0, np.nan
+    set_effectiveness(estimate, least, 1.0)
+    _start_all_anew(fault_state, estimate, thrusters)
+    return least
+
+
 def _likelier(fault_state: FaultState, j: int, m: int) -> int:
     """Return which hypothesis about thruster j is likelier: that it lost some of its force, or is stuck."""
     sums = fault_state.sums
@@ -158,6 +203,7 @@ def _isolate(fault_state: FaultState, estimate: Estimate, thrusters: Thrusters, 
         if thrusters.health[j] == 0.0 and fault_state.tentative[j] == 1:
             thrusters.health[j], thrusters.stuck[j] = 1.0, np.nan
             set_effectiveness(estimate, j, 1.0)
+    fault_state.waited[0] = 0.0
     thrusters.health[failed], thrusters.stuck[failed] = 0.0, force
     set_effectiveness(estimate, failed, 0.0 if np.isnan(force) else 1.0)
     if not np.isnan(force):  # which is hardly known, and may be none

@@ -88,8 +88,11 @@ def step(
         return
 
     # fault detection
-    failed = fault_detection.detect_fault(memory.fault_state, estimate, thrusters, gains)
-    if failed >= 0 or input_validation.reports_change(state.thruster_health, memory.reported, thrusters.health):
+    changed = fault_detection.detect_fault(memory.fault_state, estimate, thrusters, gains)
+    if changed < 0:
+        quiet = memory.report[11] == 0.0
+        changed = fault_detection.try_again(memory.fault_state, estimate, thrusters, memory.reported, quiet, period)
+    if changed >= 0 or input_validation.reports_change(state.thruster_health, memory.reported, thrusters.health):
         input_validation.update_thrusters(memory, state.thruster_health)
 
     # prediction
@@ -161,6 +164,9 @@ def step(
 
     # quadratic program
     steps = quadratic_program.solve(work, rows, thrusters.inverse, thrusters.lower, thrusters.upper, forces)
+    for j in range(forces.size):  # else a working one would give what it is wrongly thought to be stuck at
+        if not np.isnan(thrusters.stuck[j]):
+            forces[j] = 0.0
     copy(forces, thrusters.forces)
     memory.estimate[0] = estimate.net_weight[0]
     copy(estimate.moments, memory.estimate[1:])
