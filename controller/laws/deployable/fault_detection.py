@@ -39,7 +39,8 @@ _SPREADS = 3.0  # standard deviations below that
 _LEAD = 8.0  # of the likeliest thruster before the next
 _STUCK_SPREAD = 0.5  # standard deviation of the force at which a thruster is stuck, as part of it
 _CERTAIN = 40.0  # with such a lead it is isolated for good, but for trials
-_TRIAL = 5.0  # s after the last isolation or trial, and as long again for each trial before
+_TRIAL = 5.0  # s after the last isolation or trial, for each the first time
+_RARER = 8  # as long for each the next time
 
 
 class FaultState(NamedTuple):
@@ -148,7 +149,7 @@ def try_again(
             isolated += 1
             if least < 0 or fault_state.trials[j] < fault_state.trials[least]:
                 least = j
-    if isolated < 2 or not quiet or fault_state.waited[0] < _TRIAL * (1.0 + fault_state.trials[least]):
+    if isolated < 2 or not quiet or fault_state.waited[0] < _TRIAL * _RARER ** fault_state.trials[least]:
         return -1
     fault_state.waited[0] = 0.0
     fault_state.trials[least] += 1
