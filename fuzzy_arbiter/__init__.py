@@ -9,11 +9,13 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from fuzzy_arbiter.arbiter import Arbiter
+    from fuzzy_arbiter.automatic_terms import auto_terms
     from fuzzy_arbiter.definition import Output, System, Term, Variable
-    from fuzzy_arbiter.errors import ArbiterError, UndefinedOutputError
+    from fuzzy_arbiter.errors import ArbiterError
     from fuzzy_arbiter.hierarchy import SECTION_VI, Criterion, prioritised
     from fuzzy_arbiter.hysteresis import HysteresisArbiter
     from fuzzy_arbiter.membership import ramp
+    from fuzzy_arbiter.result import Result
     from fuzzy_arbiter.rule import Rule
     from fuzzy_arbiter.shapes import Shape, falling, rising, trapezoid, triangle
 
@@ -24,12 +26,13 @@ __all__ = [
     "Criterion",
     "HysteresisArbiter",
     "Output",
+    "Result",
     "Rule",
     "Shape",
     "System",
     "Term",
-    "UndefinedOutputError",
     "Variable",
+    "auto_terms",
     "falling",
     "prioritised",
     "ramp",
@@ -41,11 +44,13 @@ __all__ = [
 # imported when asked for, so that the command can say what is not installed
 _HOMES = {
     "arbiter": {"Arbiter"},
+    "automatic_terms": {"auto_terms"},
     "definition": {"Output", "System", "Term", "Variable"},
-    "errors": {"ArbiterError", "UndefinedOutputError"},
+    "errors": {"ArbiterError"},
     "hierarchy": {"SECTION_VI", "Criterion", "prioritised"},
     "hysteresis": {"HysteresisArbiter"},
     "membership": {"ramp"},
+    "result": {"Result"},
     "rule": {"Rule"},
     "shapes": {"Shape", "falling", "rising", "trapezoid", "triangle"},
 }

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, fields
 from numbers import Integral
 from typing import Literal, TypeVar, get_args
 
+from fuzzy_arbiter.automatic_terms import AutomaticTerms
 from fuzzy_arbiter.checks import all_of, finite, require_name, shown
 from fuzzy_arbiter.errors import DefinitionError
 from fuzzy_arbiter.propositions import Is
@@ -17,7 +18,7 @@ from fuzzy_arbiter.shapes import Shape
 Conjunction = Literal["min", "prod"]
 Disjunction = Literal["max", "probor"]
 Implication = Literal["min", "prod"]
-Normalization = Literal["range", "none", "sum", "max"]
+Normalization = Literal["none", "range", "sum", "max"]
 Outside = Literal["refuse", "clip"]
 
 MAX_POINTS = 1_000_000_000
@@ -62,7 +63,7 @@ class Variable:
     universe : (float, float)
         Least and greatest value.
     terms : tuple of Term
-        At least one.
+        At least one. A mapping from names to shapes becomes that, and so does what `auto_terms` gives.
 
     Raises
     ------
@@ -71,10 +72,12 @@ class Variable:
 
     Examples
     --------
-    >>> from fuzzy_arbiter import Term, Variable, falling, rising
-    >>> wind = Variable("wind", (0, 20), (Term("calm", falling(2, 6)), Term("strong", rising(4, 12))))
+    >>> from fuzzy_arbiter import Variable, falling, rising
+    >>> wind = Variable("wind", (0, 20), {"calm": falling(2, 6), "strong": rising(4, 12)})
     >>> print(~wind["calm"])
     wind is not calm
+    >>> wind["calm"](3)  # the degree of 3 m/s
+    0.75
     """
 
     name: str
@@ -93,7 +96,10 @@ class Variable:
         if finite(high - low) is None:
             raise DefinitionError(f"{what}: universe is [{low}, {high}], expected a finite width")
         object.__setattr__(self, "universe", (low, high))
-        terms = all_of(Term, self.terms, f"{what}: terms", "a sequence of Term")
+        given = self.terms.over((low, high)) if isinstance(self.terms, AutomaticTerms) else self.terms
+        if isinstance(given, Mapping):
+            given = tuple(Term(term, shape) for term, shape in given.items())
+        terms = all_of(Term, given, f"{what}: terms", "a mapping from names to shapes, or a sequence of Term")
         if not terms:
             raise DefinitionError(f"{what}: no terms came, expected at least one")
         for term in terms:
@@ -104,18 +110,17 @@ class Variable:
         object.__setattr__(self, "terms", tuple(Term(term.name, term.shape.within((low, high))) for term in terms))
 
     def __getitem__(self, term: str) -> Is:
-        """Return the proposition that this variable is in a term.
+        """Return the proposition that this variable is in a term; called with a value, it gives the term's degree.
 
         Raises
         ------
         DefinitionError
             If there is no such term.
         """
-        if term not in self.term_names:
-            raise DefinitionError(
-                f"{self.name!r} has no term {shown(term)}, expected one of {', '.join(self.term_names)}"
-            )
-        return Is(self.name, term)
+        for known in self.terms:
+            if known.name == term:
+                return Is(self.name, term, known.shape)
+        raise DefinitionError(f"{self.name!r} has no term {shown(term)}, expected one of {', '.join(self.term_names)}")
 
     @property
     def term_names(self) -> tuple[str, ...]:
@@ -136,18 +141,18 @@ class Output(Variable):
     Attributes
     ----------
     default : float or None
-        Value where no rule fires; with None that is an error.
+        Value in the universe where no rule fires; with None that is NaN.
 
     Raises
     ------
     DefinitionError
-        If a term has no area in the universe, so that it has no centroid, or the universe is wider than 1e100 or
-        narrower than 1e-100, so that floating point cannot hold its moments.
+        If a term has no area in the universe, and so no centroid; if the default lies outside the universe; or if that
+        is wider than 1e100 or narrower than 1e-100, so that floating point cannot hold its moments.
 
     Examples
     --------
-    >>> from fuzzy_arbiter import Output, Term, falling, rising
-    >>> Output("speed", (0.0, 2.0), (Term("slow", falling(0.0, 2.0)), Term("fast", rising(0.0, 2.0)))).term_names
+    >>> from fuzzy_arbiter import Output, falling, rising
+    >>> Output("speed", (0.0, 2.0), {"slow": falling(0.0, 2.0), "fast": rising(0.0, 2.0)}, default=0.5).term_names
     ('slow', 'fast')
     """
 
@@ -164,8 +169,10 @@ class Output(Variable):
                 raise DefinitionError(f"{what}: term {term.name!r} has no area in [{_span(self)}]")
         if self.default is not None:
             default = finite(self.default)
-            if default is None:
-                raise DefinitionError(f"{what}: default is {shown(self.default)}, expected a finite number")
+            if default is None or not self.universe[0] <= default <= self.universe[1]:
+                raise DefinitionError(
+                    f"{what}: default is {shown(self.default)}, expected a number in [{_span(self)}], its universe"
+                )
             object.__setattr__(self, "default", default)
 
 
@@ -189,13 +196,15 @@ class System:
         Degree of *or*; ``probor`` is a + b - a b.
     implication : {"min", "prod"}
         Whether an output's term is clipped at a rule's strength, or scaled by it.
-    normalization : {"range", "none", "sum", "max"}
+    normalization : {"none", "range", "sum", "max"}
         What is done to the centroids: ``none`` leaves them; ``range`` maps those of the least and of the greatest term
         alone to 0 and 1; ``sum`` and ``max`` then divide by all weights' sum or greatest.
     outside : {"refuse", "clip"}
         What happens to an input outside its universe.
     points : int
         Points of an output's universe, 3 to 1 000 000 000, for those engines and formats that sample it.
+    weights_of : tuple of str
+        Names of the criteria whose weights the outputs are, which results carry; empty if they carry the outputs' own.
 
     Raises
     ------
@@ -206,8 +215,8 @@ class System:
     --------
     >>> from fuzzy_arbiter import Arbiter
     >>> system = Arbiter().system
-    >>> [variable.name for variable in system.inputs], len(system.rules)
-    (['obstacle', 'shape', 'depth'], 8)
+    >>> [variable.name for variable in system.inputs], len(system.rules), system["shape"].term_names
+    (['obstacle', 'shape', 'depth'], 8, ('simple', 'complex'))
     """
 
     inputs: tuple[Variable, ...]
@@ -217,9 +226,10 @@ class System:
     conjunction: Conjunction = "min"
     disjunction: Disjunction = "max"
     implication: Implication = "min"
-    normalization: Normalization = "range"
+    normalization: Normalization = "none"
     outside: Outside = "refuse"
     points: int = 101
+    weights_of: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         rules: tuple[Rule | str, ...] = all_of((Rule, str), self.rules, "rules", "a sequence of Rule or text")
@@ -237,6 +247,7 @@ class System:
                 f"points is {shown(self.points)}, expected a whole number, 3 or more, to {MAX_POINTS}"
             )
         object.__setattr__(self, "points", int(self.points))
+        self._require_names_of_weights()
         for key in ("inputs", "outputs", "rules"):
             if not getattr(self, key):
                 raise DefinitionError(f"{key}: none came, expected at least one")
@@ -254,8 +265,46 @@ class System:
             if len({statement.variable for statement in rule.conclusions}) < len(rule.conclusions):
                 raise DefinitionError(f"{where}: two conclusions on one output, expected each output once")
 
+    def _require_names_of_weights(self) -> None:
+        names = all_of(str, self.weights_of, "weights_of", "names of criteria")
+        for name in names:
+            require_name(name, "weights_of")
+        if len(names) not in (0, len(self.outputs)) or _repeated(names) is not None:
+            raise DefinitionError(
+                f"weights_of is {shown(names)}, expected a name for each of the {len(self.outputs)} outputs, each once"
+            )
+        object.__setattr__(self, "weights_of", names)
+
+    @property
+    def result_names(self) -> tuple[str, ...]:
+        """Names that results carry: those of the criteria whose weights the outputs are, else the outputs' own."""
+        return self.weights_of or variable_names(self.outputs)
+
+    def __getitem__(self, variable: str) -> Variable:
+        """Return the input or output of a name.
+
+        Raises
+        ------
+        DefinitionError
+            If there is none.
+        """
+        for known in (*self.inputs, *self.outputs):
+            if known.name == variable:
+                return known
+        expected = ", ".join(variable_names((*self.inputs, *self.outputs)))
+        raise DefinitionError(f"no variable {shown(variable)}, expected one of {expected}")
+
     def __str__(self) -> str:
         return "\n".join(f"R{i + 1}: {rule}" for i, rule in enumerate(self.rules))
+
+    def __repr__(self) -> str:
+        """Return what makes an equal system; rules are texts, and settings at their defaults are left out."""
+        rules = tuple(map(str, self.rules))
+        said = [
+            f"{key.name}={getattr(self, key.name)!r}" for key in fields(self) if getattr(self, key.name) != key.default
+        ]
+        said[2] = f"rules={rules!r}"
+        return f"System({', '.join(said)})"
 
 
 CHOICES = {

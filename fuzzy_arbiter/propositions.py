@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 
 from fuzzy_arbiter.checks import all_of, shown
 from fuzzy_arbiter.errors import DefinitionError
+from fuzzy_arbiter.shapes import Shape
 
 MAX_NESTING = 100  # parentheses and negations within each other; what is deeper is no rule that a person wrote
 KEYWORDS = ("if", "then", "and", "or", "not", "is", "with")
@@ -77,14 +78,27 @@ class Proposition:
 
 @dataclass(frozen=True, slots=True)
 class Is(Proposition):
-    """A variable is in a term."""
+    """A variable is in a term; one that a variable gave knows the term's shape and can be called with a value."""
 
     variable: str
     term: str
+    shape: Shape | None = field(default=None, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         if not (isinstance(self.variable, str) and isinstance(self.term, str)):
             raise DefinitionError(f"{shown(self.variable)} is {shown(self.term)}: expected the names of both")
+
+    def __call__(self, value: float) -> float:
+        """Return the degree to which a value is in the term.
+
+        Raises
+        ------
+        DefinitionError
+            If the statement was made of names alone, and so knows no shape.
+        """
+        if self.shape is None:
+            raise DefinitionError(f"{self}: made of names alone, expected such as variable['term'], to be called")
+        return self.shape(value)
 
     def terms(self) -> Iterator[Is]:
         """Yield this statement."""

@@ -64,6 +64,6 @@ def _engine(name: str) -> type[Engine]:
         from fuzzy_arbiter.engines.scikit import ScikitEngine  # a second of imports, for those who ask for it
     except ModuleNotFoundError as error:
         raise EngineError(
-            f"engine 'skfuzzy': {error.name} is not installed, expected scikit-fuzzy, SciPy and networkx"
+            f"engine 'skfuzzy': {error.name} is not installed, expected the extra fuzzy-arbiter[skfuzzy]"
         ) from None
     return ScikitEngine

@@ -207,7 +207,7 @@ def _one_cubic(forms: Sequence[tuple[Piece, ...]]) -> tuple[float, ...] | None:
 def _smooth_ladder(n: int, n2: float, n3: float) -> Shortcut:
     """Return what gives the weights (n2 + n3 h) h^2 of n criteria."""
 
-    def weights(degrees: Sequence[float]) -> tuple[float, ...] | None:
+    def weights(degrees: Sequence[float]) -> list[float] | None:
         if len(degrees) != n:
             return None
         result = []
@@ -219,7 +219,7 @@ def _smooth_ladder(n: int, n2: float, n3: float) -> Shortcut:
             result.append((n2 + n3 * h) * h * h)
             if 1.0 - m < unclaimed:
                 unclaimed = 1.0 - m
-        return tuple(result)
+        return result
 
     return weights
 

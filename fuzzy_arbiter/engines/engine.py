@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import functools
+import math
 import operator
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from typing import ClassVar
 
 import numpy as np
 
-from fuzzy_arbiter.definition import Output, System, variable_names
+from fuzzy_arbiter.definition import Output, System
 from fuzzy_arbiter.engines.firing import Array, Firing
-from fuzzy_arbiter.errors import EngineError, UndefinedOutputError
+from fuzzy_arbiter.errors import EngineError
 
-Shortcut = Callable[[Sequence[float]], tuple[float, ...] | None]
+Shortcut = Callable[[Sequence[float]], list[float] | None]
 _EACH_BY_ITSELF = ("range", "none")  # normalizations that look at one output at a time
 
 
@@ -91,18 +92,11 @@ class Engine(ABC):
         Returns
         -------
         list of float
-            Centroids, or the output's default where no rule fires.
-
-        Raises
-        ------
-        UndefinedOutputError
-            If no rule fires for an output without default.
+            Centroids; where no rule fires the output's default, or NaN.
         """
         cuts = self.firing.cuts(self.firing.strengths(inputs))
         return [
-            self.centroid(k, cut)
-            if any(cut)
-            else default_of(output, dict(zip(variable_names(self.system.inputs), inputs, strict=True)))
+            self.centroid(k, cut) if any(cut) else default_of(output)
             for k, (output, cut) in enumerate(zip(self.system.outputs, cuts, strict=True))
         ]
 
@@ -117,12 +111,7 @@ class Engine(ABC):
         Returns
         -------
         ndarray, shape (n, outputs)
-            Centroids, or the output's default where no rule fires.
-
-        Raises
-        ------
-        UndefinedOutputError
-            If no rule fires for an output without default; the first such row is named.
+            Centroids; where no rule fires the output's default, or NaN.
         """
         result = np.empty((len(inputs), len(self.system.outputs)))
         for k, cuts in enumerate(self.firing.cuts_of_many(self.firing.strengths_of_many(inputs))):
@@ -130,10 +119,7 @@ class Engine(ABC):
             if fires.all():
                 result[:, k] = self.centroid_of_many(k, cuts)
                 continue
-            row = int(np.argmin(fires))
-            names = variable_names(self.system.inputs)
-            default = default_of(self.system.outputs[k], dict(zip(names, inputs[row].tolist(), strict=True)), row)
-            result[~fires, k] = default
+            result[~fires, k] = default_of(self.system.outputs[k])
             result[fires, k] = self.centroid_of_many(k, cuts[:, fires])
         return result
 
@@ -148,12 +134,7 @@ class Engine(ABC):
         Returns
         -------
         tuple of float
-            As the system's normalization says.
-
-        Raises
-        ------
-        UndefinedOutputError
-            If no rule fires for an output without default.
+            As the system's normalization says; NaN for an output without default if no rule fires for it.
         """
         raw = self.centroids(inputs)
         if not self.scale:
@@ -172,12 +153,7 @@ class Engine(ABC):
         Returns
         -------
         ndarray, shape (n, outputs)
-            As the system's normalization says.
-
-        Raises
-        ------
-        UndefinedOutputError
-            If no rule fires for an output without default; the first such row is named.
+            As the system's normalization says; NaN where no rule fires for an output without default.
         """
         raw = self.centroids_of_many(inputs)
         if not self.scale:
@@ -191,7 +167,7 @@ class Engine(ABC):
         Returns
         -------
         callable, or None
-            Takes a list or tuple of anything; gives its weights, or None unless it is a sample with all inputs in their
+            Takes a sequence of anything; gives its weights, or None unless it is a sample with all inputs in their
             universes.
         """
         return None
@@ -215,8 +191,8 @@ def normalize_weights(weights: Sequence[float], normalization: str) -> tuple[flo
     Parameters
     ----------
     weights : sequence of float
-        In [0, 1].
-    normalization : {"range", "none", "sum", "max"}
+        In [0, 1], or NaN, which stays and counts for nothing.
+    normalization : {"none", "range", "sum", "max"}
         The first two leave them.
 
     Returns
@@ -226,9 +202,10 @@ def normalize_weights(weights: Sequence[float], normalization: str) -> tuple[flo
     """
     if normalization in _EACH_BY_ITSELF:
         return tuple(weights)
+    known = [w for w in weights if w == w] or [0.0]
     # not sum(), which newer Pythons round otherwise than exported code
-    whole = functools.reduce(operator.add, weights) if normalization == "sum" else max(weights)
-    return tuple(w / whole for w in weights) if whole > 0.0 else (0.0,) * len(weights)
+    whole = functools.reduce(operator.add, known) if normalization == "sum" else max(known)
+    return tuple(w / whole if whole > 0.0 else w * 0.0 for w in weights)
 
 
 def normalize_weights_of_many(weights: Array, normalization: str) -> Array:
@@ -237,8 +214,8 @@ def normalize_weights_of_many(weights: Array, normalization: str) -> Array:
     Parameters
     ----------
     weights : ndarray, shape (n, outputs)
-        In [0, 1].
-    normalization : {"range", "none", "sum", "max"}
+        In [0, 1], or NaN, which stays and counts for nothing.
+    normalization : {"none", "range", "sum", "max"}
         The first two leave them.
 
     Returns
@@ -248,34 +225,22 @@ def normalize_weights_of_many(weights: Array, normalization: str) -> Array:
     """
     if normalization in _EACH_BY_ITSELF:
         return weights
-    whole = (np.sum if normalization == "sum" else np.max)(weights, axis=1, keepdims=True)
-    return np.asarray(np.divide(weights, whole, out=np.zeros_like(weights), where=whole > 0.0))
+    known = np.where(np.isnan(weights), 0.0, weights)
+    whole = (np.sum if normalization == "sum" else np.max)(known, axis=1, keepdims=True)
+    return np.asarray(np.divide(weights, whole, out=weights * 0.0, where=whole > 0.0))
 
 
-def default_of(output: Output, inputs: Mapping[str, float], row: int | None = None) -> float:
+def default_of(output: Output) -> float:
     """Return the value of an output for which no rule fires.
 
     Parameters
     ----------
     output : Output
         Of which no rule fires.
-    inputs : mapping from input's name to float
-        Where that is.
-    row : int, optional
-        Which of many samples.
 
     Returns
     -------
     float
-        Its default.
-
-    Raises
-    ------
-    UndefinedOutputError
-        If it has none.
+        Its default; NaN if it has none.
     """
-    if output.default is not None:
-        return output.default
-    where = "" if row is None else f"row {row}, "
-    values = ", ".join(f"{name} = {value:g}" for name, value in inputs.items())
-    raise UndefinedOutputError(f"output {output.name!r}: no rule fires at {where}{values}, and it has no default")
+    return math.nan if output.default is None else output.default

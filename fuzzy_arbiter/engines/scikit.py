@@ -70,17 +70,15 @@ class ScikitEngine(Engine):
 
     def centroids_of_many(self, inputs: Array) -> Array:
         """Return the raw value of each output for many samples, one by one."""
-        rows = [self._centroids(inputs, row) for row, inputs in enumerate(inputs.tolist())]
+        rows = [self._centroids(row) for row in inputs.tolist()]
         return np.array(rows).reshape(len(rows), len(self.system.outputs))
 
-    def _centroids(self, inputs: Sequence[float], row: int | None = None) -> list[float]:
+    def _centroids(self, inputs: Sequence[float]) -> list[float]:
         # each thread has a simulation, since scikit-fuzzy keeps inputs and results in the system itself
         if not hasattr(self._local, "runner"):
             self._local.runner = _Runner(self.system, self._samples)
         return [
-            default_of(output, dict(zip(variable_names(self.system.inputs), inputs, strict=True)), row)
-            if value is None
-            else value
+            default_of(output) if value is None else value
             for output, value in zip(self.system.outputs, self._local.runner(inputs), strict=True)
         ]
 

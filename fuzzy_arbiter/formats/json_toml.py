@@ -97,11 +97,16 @@ def write_json(system: System) -> str:
     str
         Indented, with the points of a term on one line.
     """
-    lines = [f"  {_text(key)}: {_text(getattr(system, key))}," for key in _SETTINGS]
+    lines = [f"  {_text(key)}: {_text(value)}," for key, value in _settings(system)]
     for key, variables in (("inputs", system.inputs), ("outputs", system.outputs)):
         lines += [f'  "{key}": [', ",\n".join(map(_json_variable, variables)), "  ],"]
     lines += ['  "rules": [', ",\n".join(f"    {_text(str(rule))}" for rule in system.rules), "  ]"]
     return "\n".join(["{", *lines, "}", ""])
+
+
+def _settings(system: System) -> list[tuple[str, Any]]:
+    names = [("weights_of", list(system.weights_of))] if system.weights_of else []
+    return [*((key, getattr(system, key)) for key in _SETTINGS), *names]
 
 
 def _json_variable(v: Variable) -> str:
@@ -126,7 +131,7 @@ def write_toml(system: System) -> str:
         With a table for each variable, and the points of a term on one line.
     """
     # by hand, for tomli_w gives every number in a list a line of its own, and with that a triangle 14
-    lines = [f"{key} = {_text(getattr(system, key))}" for key in _SETTINGS]
+    lines = [f"{key} = {_text(value)}" for key, value in _settings(system)]
     lines += ["rules = [", *(f"  {_text(str(rule))}," for rule in system.rules), "]"]
     for key, variables in (("inputs", system.inputs), ("outputs", system.outputs)):
         for v in variables:

@@ -16,7 +16,7 @@ from fuzzy_arbiter.rule_text import parse_rule
 from fuzzy_arbiter.shapes import Shape, falling, rising, trapezoid, triangle
 
 _SETTINGS = ("conjunction", "disjunction", "implication", "normalization", "outside", "points")
-_LONG = ("name", *_SETTINGS, "inputs", "outputs", "rules")
+_LONG = ("name", *_SETTINGS, "weights_of", "inputs", "outputs", "rules")
 _SHORT = ("name", "criteria", "form", "weight", "normalization", "outside", "points")
 _VARIABLE = ("name", "universe", "terms")
 _CRITERION = ("name", "on", "off", "membership")
@@ -70,6 +70,9 @@ def system_of(data: object) -> System:
     for i, text in enumerate(_list(table, "rules", "")):
         with located(f"rules[{i}]"):
             rules.append(parse_rule(_string(text, f"rules[{i}]")))
+    if "weights_of" in table:
+        names = _list(table, "weights_of", "")
+        settings["weights_of"] = tuple(_string(name, f"weights_of[{i}]") for i, name in enumerate(names))
     return System(inputs, outputs, tuple(rules), **settings)
 
 

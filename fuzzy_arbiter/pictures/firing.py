@@ -10,9 +10,8 @@ import numpy as np
 from fuzzy_arbiter.arbiter import Arbiter
 from fuzzy_arbiter.definition import Output, variable_names
 from fuzzy_arbiter.engines.firing import Array, Firing, degrees_of_many
-from fuzzy_arbiter.errors import UndefinedOutputError
 from fuzzy_arbiter.pictures.lines import corners
-from fuzzy_arbiter.pictures.places import one_of, places_in, said
+from fuzzy_arbiter.pictures.places import output_place, places_in, said
 from fuzzy_arbiter.pictures.style import FAINT, INK, colour, hatch, new_axes, wrapped
 from fuzzy_arbiter.rule import Rule
 from fuzzy_arbiter.samples import Sample
@@ -64,7 +63,7 @@ def rules(arbiter: Arbiter, inputs: Sample, output: str | None = None, ax: Axes 
     'alpha_1'
     """
     system = arbiter.system
-    k = one_of(system.outputs, system.outputs[0].name if output is None else output, "output")
+    k = 0 if output is None else output_place(system, output)
     drawn = system.outputs[k]
     values = arbiter.samples.one(inputs)
     firing = Firing(system)
@@ -170,10 +169,7 @@ def _centroid(ax: Axes, arbiter: Arbiter, values: Sample, k: int, place: tuple[f
         ha="right" if side < 0 else "left", va="top", fontsize=9.5, color=INK,
         bbox={"facecolor": "white", "edgecolor": "none", "pad": 1.0, "alpha": 0.85},
     )  # fmt: skip
-    try:
-        return f"{output.name} = {arbiter(values)[k]:.4g}"
-    except UndefinedOutputError:
-        return f"{output.name}: another output is undefined"
+    return f"{output.name} = {arbiter(values)[k]:.4g}"
 
 
 def _alone(arbiter: Arbiter, output: Output) -> Arbiter:
@@ -181,5 +177,5 @@ def _alone(arbiter: Arbiter, output: Output) -> Arbiter:
     system = arbiter.system
     parts = [(rule, tuple(c for c in rule.conclusions if c.variable == output.name)) for rule in system.rules]
     rules = tuple(replace(rule, conclusions=conclusions) for rule, conclusions in parts if conclusions)
-    alone = replace(system, outputs=(output,), rules=rules, normalization="none")
+    alone = replace(system, outputs=(output,), rules=rules, normalization="none", weights_of=())
     return Arbiter(system=alone, engine=arbiter.engine)

@@ -7,10 +7,20 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from fuzzy_arbiter.arbiter import Arbiter
-from fuzzy_arbiter.definition import Normalization, Term, variable_names
+from fuzzy_arbiter.definition import Normalization, Term
 from fuzzy_arbiter.errors import DefinitionError, InputError
 from fuzzy_arbiter.pictures.places import fixed_inputs, one_of, places_in, said, weights_at
-from fuzzy_arbiter.pictures.style import FAINT, INK, legend_above, legend_style, line_style, new_axes, room, tidy
+from fuzzy_arbiter.pictures.style import (
+    FAINT,
+    INK,
+    legend_above,
+    legend_style,
+    line_style,
+    new_axes,
+    require_matplotlib,
+    room,
+    tidy,
+)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -141,13 +151,13 @@ def profile(
     x = places_in(variable, 301)
     weights = weights_at(arbiter, fixed, {over: x})
     ax = new_axes(6.0, 3.2) if ax is None else ax
-    for k, output in enumerate(system.outputs):
-        ax.plot(x, weights[:, k], label=output.name, clip_on=False, **line_style(k))
+    for k, name in enumerate(system.result_names):
+        ax.plot(x, weights[:, k], label=name, clip_on=False, **line_style(k))
     ax.set(xlim=(low, high), xlabel=over, ylabel="centroid" if system.normalization == "none" else "weight")
     if system.normalization != "none":
         ax.set_ylim(0.0, 1.0)
     tidy(ax)
-    legend_above(ax, variable_names(system.outputs), f"at {said(fixed)}" if fixed else "")
+    legend_above(ax, system.result_names, f"at {said(fixed)}" if fixed else "")
     return ax
 
 
@@ -192,6 +202,7 @@ def normalizations(
     fixed = fixed_inputs(arbiter, (over,), at)
     new = axes is None
     if axes is None:
+        require_matplotlib()
         from matplotlib.figure import Figure
 
         figure = Figure(figsize=(8.2, 5.4), layout="constrained")

@@ -151,7 +151,7 @@ def test_inputs_outside_may_be_clipped():
         ({"engine": "fast"}, "auto, closed, exact, grid, skfuzzy"),
         ({"points": 2}, "points is 2, expected a whole number, 3 or more"),
         ({"points": 101.5}, "points"),
-        ({"normalization": "sun"}, "normalization is 'sun', expected one of range, none, sum, max"),
+        ({"normalization": "sun"}, "normalization is 'sun', expected one of none, range, sum, max"),
         ({"outside": "wrap"}, "refuse, clip"),
         ({"system": prioritised(), "points": 11}, "system: came with"),
         ({"engine": "closed", "form": "complete"}, "engine 'closed'"),

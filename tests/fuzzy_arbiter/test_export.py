@@ -17,7 +17,6 @@ from fuzzy_arbiter import (
     Shape,
     System,
     Term,
-    UndefinedOutputError,
     Variable,
     falling,
     prioritised,
@@ -114,11 +113,8 @@ def expected(system):
     """Weights of the arbiter, or the number of the output that is undefined."""
     arbiter = Arbiter(system=system)
     for x in samples(system).tolist():
-        try:
-            yield x, arbiter(x)
-        except UndefinedOutputError as error:
-            name = re.search(r"output '(.*?)'", str(error)).group(1)
-            yield x, [v.name for v in system.outputs].index(name) + 1
+        undefined = np.flatnonzero(np.isnan(arbiter(x)))
+        yield x, int(undefined[0]) + 1 if len(undefined) else arbiter(x)
 
 
 def bad(system):

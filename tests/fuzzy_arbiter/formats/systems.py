@@ -84,7 +84,7 @@ def variables(draw, name, names, plain, output=False):
         terms.append(Term(term, shape))
     if not output:
         return Variable(name, (low, high), tuple(terms))
-    default = None if plain else draw(st.none() | places)
+    default = None if plain else draw(st.none() | st.sampled_from((low, high)) | st.floats(low, high))
     return Output(name, (low, high), tuple(terms), default)
 
 
@@ -128,6 +128,7 @@ def systems(draw, plain=False):
         conclusions = tuple(Is(o.name, draw(st.sampled_from(o.term_names))) for o in chosen)
         weight = draw(st.just(1.0) | st.floats(0, 1, exclude_min=True))
         rules.append(Rule(draw(conditions(inputs, plain)), conclusions, weight))
+    weights_of = draw(st.just(()) | st.just(tuple(f"criterion of {o.name}" for o in outputs)))
     conjunction, disjunction = draw(st.sampled_from((("min", "max"), ("prod", "probor"))))
     return System(
         inputs,
@@ -140,4 +141,5 @@ def systems(draw, plain=False):
         draw(st.sampled_from(("range", "none", "sum", "max"))),
         draw(st.sampled_from(("refuse", "clip"))),
         draw(st.integers(3, 2000)),
+        weights_of,
     )

@@ -70,7 +70,8 @@ def test_points_and_clipping_are_said_in_its_own_words():
     text = writes(system, "fll")
     assert text.count("lock-range: true") == 3
     assert text.count("defuzzifier: Centroid 64\n") == 3
-    assert text.splitlines()[0] == "# fuzzy_arbiter: normalization = range"
+    said = 'weights_of = "obstacle" "shape" "depth"'
+    assert text.splitlines()[0] == f"# fuzzy_arbiter: normalization = range, {said}"
 
 
 def test_terms_are_triangles_trapezoids_and_ramps_where_they_can_be():

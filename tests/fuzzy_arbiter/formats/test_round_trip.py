@@ -151,7 +151,7 @@ def test_settings_stand_in_one_comment_that_is_read_back(format):
     text = writes(prioritised(), format)
     assert "fuzzy_arbiter: normalization = range" in text.splitlines()[0]
     assert "(c - 0.3333333333333333) / 0.3333333333333333, held within [0, 1], for alpha_1" in text
-    plain = replace(prioritised(), normalization="none")
+    plain = replace(prioritised(), normalization="none", weights_of=())
     assert "fuzzy_arbiter" not in writes(plain, format)
     assert reads(writes(plain, format), format) == plain
 
@@ -162,7 +162,7 @@ def test_settings_stand_in_one_comment_that_is_read_back(format):
     [
         (
             "fuzzy_arbiter: normalization = ranje",
-            "line 1: normalization is 'ranje', expected one of range, none, sum, max",
+            "line 1: normalization is 'ranje', expected one of none, range, sum, max",
         ),
         ("fuzzy_arbiter: scale = range", "line 1: 'scale = range', expected each once, with = and its value: normaliz"),
         ("fuzzy_arbiter: normalization", "line 1: 'normalization', expected each once"),
@@ -170,6 +170,7 @@ def test_settings_stand_in_one_comment_that_is_read_back(format):
             "fuzzy_arbiter: normalization = sum, normalization = sum",
             "line 1: 'normalization = sum', expected each once",
         ),
+        ("fuzzy_arbiter: normalization = range, normalization", "line 1: 'normalization', expected each once"),
         ("fuzy_arbiter: normalization = range", "line 1: .* is almost such a comment, expected 'fuzzy_arbiter:'"),
         ("fuzzy_arbiter normalization = range", "line 1: .* is almost such a comment, expected 'fuzzy_arbiter:'"),
     ],

@@ -6,7 +6,7 @@ from typing import Any
 
 from fuzzy_arbiter.definition import System
 from fuzzy_arbiter.errors import EngineError
-from fuzzy_arbiter.export import to_python
+from fuzzy_arbiter.export.python import to_python
 
 
 def compiled(system: System) -> Any:
@@ -30,7 +30,7 @@ def compiled(system: System) -> Any:
     try:
         import numba
     except ImportError:
-        raise EngineError("compiled: Numba is not installed") from None
+        raise EngineError("compiled: Numba is not installed, expected the extra fuzzy-arbiter[numba]") from None
     namespace: dict[str, Any] = {}
 
     exec(compile(to_python(system), f"<{system.name}>", "exec"), namespace)  # noqa: S102
