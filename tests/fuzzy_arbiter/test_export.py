@@ -1,7 +1,10 @@
 """Exported code gives the arbiter's own bits: C, plain Python, and what Numba makes of it."""
 
 import ctypes
+import os
 import re
+import shlex
+import shutil
 import subprocess
 import sys
 from dataclasses import replace
@@ -26,7 +29,16 @@ from fuzzy_arbiter import (
 )
 from fuzzy_arbiter.errors import EngineError
 from fuzzy_arbiter.export import to_c, to_python
-from plant_fmu.compiling.compiler import find_compiler
+
+
+def compiler():
+    """Return the command of a C compiler, by the ziglang package where the machine has none."""
+    command = os.environ.get("CC") or shutil.which("cc") or shutil.which("gcc")
+    if command is None:
+        pytest.importorskip("ziglang", reason="there is no C compiler")
+        return [sys.executable, "-m", "ziglang", "cc"]
+    return shlex.split(command)
+
 
 WIDE = System(
     (
@@ -139,7 +151,7 @@ def test_c(system, tmp_path):
     library = tmp_path / "arbiter.so"
     flags = ["-std=c99", "-O2", "-ffp-contract=off", "-Wall", "-Wextra", "-Wpedantic", "-Werror", "-fPIC", "-shared"]
     flags += ["-Wconversion", "-Wshadow"]
-    subprocess.run([*find_compiler(), *flags, "-o", library, source], check=True)
+    subprocess.run([*compiler(), *flags, "-o", library, source], check=True)
     evaluate = getattr(ctypes.CDLL(str(library)), name)
     inputs = (ctypes.c_double * len(system.inputs))()
     outputs = (ctypes.c_double * len(system.outputs))()
@@ -159,7 +171,7 @@ def test_systems_of_several_files_go_into_one_program(tmp_path):
         sources.append(tmp_path / f"{i}.c")
         sources[-1].write_text(to_c(replace(system, name=f"{system.name}{i}")))
     flags = ["-std=c99", "-fPIC", "-shared", "-o", tmp_path / "all.so"]
-    subprocess.run([*find_compiler(), *flags, *sources], check=True)
+    subprocess.run([*compiler(), *flags, *sources], check=True)
 
 
 def test_python(system):
