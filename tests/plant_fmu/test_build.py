@@ -63,7 +63,8 @@ def test_so_is_one_whose_dependencies_alone_are_there(tmp_path, capsys, monkeypa
 
     monkeypatch.setattr(metadata, "version", version)
     assert main(["build", "--vehicle", "odin", "--out", str(tmp_path / "odin.fmu")]) == 2
-    said = f"plant_fmu: subreach is not installed: run {install_hint('./fuzzy_arbiter', '.')} in the checkout of subreach\n"
+    command = install_hint("./fuzzy_arbiter", ".")
+    said = f"plant_fmu: subreach is not installed: run {command} in the checkout of subreach\n"
     assert capsys.readouterr() == ("", said)
     assert list(tmp_path.iterdir()) == []
 
