@@ -14,6 +14,7 @@ from fuzzy_arbiter.errors import UnsupportedError
 from fuzzy_arbiter.formats import reads, writes
 from fuzzy_arbiter.hierarchy import FORMS
 from fuzzy_arbiter.propositions import And, Is, Not, Or
+from tests.fuzzy_arbiter.test_inputs_and_results import TIPPING
 
 ROOT = Path(__file__).parents[2]
 EXAMPLE = ROOT / "examples" / "ventilation.py"
@@ -94,10 +95,12 @@ def test_the_definitions_of_the_manual_are_those_of_its_code():
         for statement in ast.parse(block).body:  # its expressions are compared with what they show where all pages are
             if not isinstance(statement, ast.Expr):
                 exec(compile(ast.Module([statement], []), "arbiter.md", "exec"), names)
-    of_criteria, of_rules = (reads(text, "toml") for text in re.findall(r"```toml\n(.*?)```", MANUAL, re.S))
+    (of_criteria,) = (reads(text, "toml") for text in re.findall(r"```toml\n(.*?)```", MANUAL, re.S))
     assert of_criteria == names["arbiter"].system
-    assert of_rules.inputs == names["system"].inputs[:1]
-    assert of_rules.outputs == (replace(names["sail"], default=None),)
+    assert names["system"] == TIPPING
+    poor = names["service"]["poor"]
+    assert names["system"].rules[0] == Rule(poor | names["food"]["poor"], names["tip"]["low"])
+    assert poor(3) == pytest.approx(0.4)  # as the text says
 
 
 def table(heading):
