@@ -104,7 +104,7 @@ class Arbiter:
 
         Parameters
         ----------
-        inputs : sequence of float, array of shape (inputs,), or mapping from input's name to float
+        inputs : sequence of float, array of shape (inputs,), mapping from input's name to float, or row of a data frame
             One value for each input; for plain criteria the degree in [0, 1] to which each asks for attention.
         **named : float
             The same by keywords, in the place of `inputs`.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping, Sequence, Sized
 from numbers import Real
 from operator import itemgetter
 from typing import Any, Protocol
@@ -231,9 +231,13 @@ class Samples:
             values = [min(max(x, low), high) for x, (low, high) in zip(values, self._limits, strict=True)]
         return list(map(float, values))
 
-    def _in_order(self, inputs: Sample) -> list[float]:
+    def _in_order(self, inputs: Any) -> list[float]:
         if isinstance(inputs, Mapping):
             self._require_names(inputs)
+            return [inputs[name] for name in self._names]
+        if hasattr(inputs, "keys"):  # a row of a data frame, of which other columns are passed over
+            known = set(inputs.keys())
+            self._require_names({name: None for name in self._names if name in known})
             return [inputs[name] for name in self._names]
         if isinstance(inputs, np.ndarray):
             return list(inputs.tolist())
@@ -267,6 +271,6 @@ class Samples:
         for name, x, (low, high) in zip(self._names, values, self._limits, strict=True):
             if not isinstance(x, _NUMBER) or x != x or (not self._clips and not low <= x <= high):
                 came = "masked" if masked and x is None else shown(x)
-                hint = "; for columns there is batch" if isinstance(x, np.ndarray | list) and len(x) > 1 else ""
+                hint = "; for columns there is batch" if isinstance(x, Sized) and not isinstance(x, str) else ""
                 return InputError(f"{name}: input is {came}, expected a number in [{low:g}, {high:g}]{hint}")
         return InputError(f"inputs are {inputs!r}, expected {len(self._names)} numbers")

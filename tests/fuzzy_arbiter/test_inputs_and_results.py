@@ -38,6 +38,7 @@ RULES = (
     "if service is good or food is good then tip is high",
 )
 TIPPING = System((SERVICE, FOOD), (TIP,), RULES)
+ROW = pd.DataFrame({"who": ["a"], "food": [6.5], "service": [9.8]}).iloc[0]
 ROWS = [[9.8, 6.5], [3.0, 8.0], [0.0, 0.0]]
 
 
@@ -56,7 +57,7 @@ def test_a_system_gives_the_quantity_and_prioritised_criteria_a_share(tipping):
 
 @pytest.mark.parametrize(
     "sample",
-    [(9.8, 6.5), {"food": 6.5, "service": 9.8}, np.array([9.8, 6.5])],
+    [(9.8, 6.5), {"food": 6.5, "service": 9.8}, np.array([9.8, 6.5]), ROW],
 )
 def test_a_sample_comes_in_any_of_these_forms(tipping, sample):
     assert tipping(sample) == tipping(service=9.8, food=6.5) == tipping([9.8, 6.5])
@@ -147,6 +148,8 @@ def test_columns_by_keyword_and_one_value_for_all_rows(tipping):
         (lambda a: a(service=3), "food: input is missing, expected service, food"),
         (lambda a: a(service=3, food=4, fod=4), "fod: unknown input, expected service, food"),
         (lambda a: a(service=[3, 4], food=[4, 5]), r"service: input is \[3, 4\], .*; for columns there is batch"),
+        (lambda a: a(pd.DataFrame({"service": [3], "food": [4]})), "service: input is .*; for columns there is batch"),
+        (lambda a: a(pd.Series([3.0, 4.0])), "service: input is missing"),
         (lambda a: a(), "inputs are None, expected 2 numbers"),
         (lambda a: a.batch(service=[3]), "food: input is missing"),
         (lambda a: a.batch(service=[3], food=[4], fod=[4]), "fod: unknown input"),
