@@ -145,6 +145,8 @@ class Samples:
             received = np.asarray(inputs)
             if received.dtype.kind not in "biufO":  # NumPy would read numbers from texts, too
                 raise TypeError(f"values of the type {received.dtype.name} came")
+            if received.dtype.kind == "O" and any(isinstance(x, str | bytes) for x in received.flat):
+                raise TypeError("a text came among the values")
             masked = self._masked(inputs)
             if masked is not None and masked.shape == received.shape == (len(received), len(self._names)):
                 masked = np.asarray(masked.any(axis=1))

@@ -9,7 +9,6 @@ import subprocess
 import sys
 from dataclasses import replace
 
-import numba
 import numpy as np
 import pytest
 
@@ -192,6 +191,7 @@ def test_python(system):
     "name", ["section VI", *(pytest.param(name, marks=pytest.mark.slow) for name in ("rational", "wide, shared"))]
 )
 def test_from_a_compiled_loop(name):
+    numba = pytest.importorskip("numba")
     system = SYSTEMS[name]
     evaluate = Arbiter(system=system).compiled()
 

@@ -7,7 +7,6 @@ from dataclasses import replace
 from fractions import Fraction
 
 import numpy as np
-import pandas as pd
 import pytest
 
 import fuzzy_arbiter
@@ -38,7 +37,6 @@ RULES = (
     "if service is good or food is good then tip is high",
 )
 TIPPING = System((SERVICE, FOOD), (TIP,), RULES)
-ROW = pd.DataFrame({"who": ["a"], "food": [6.5], "service": [9.8]}).iloc[0]
 ROWS = [[9.8, 6.5], [3.0, 8.0], [0.0, 0.0]]
 
 
@@ -57,7 +55,7 @@ def test_a_system_gives_the_quantity_and_prioritised_criteria_a_share(tipping):
 
 @pytest.mark.parametrize(
     "sample",
-    [(9.8, 6.5), {"food": 6.5, "service": 9.8}, np.array([9.8, 6.5]), ROW],
+    [(9.8, 6.5), {"food": 6.5, "service": 9.8}, np.array([9.8, 6.5])],
 )
 def test_a_sample_comes_in_any_of_these_forms(tipping, sample):
     assert tipping(sample) == tipping(service=9.8, food=6.5) == tipping([9.8, 6.5])
@@ -120,7 +118,6 @@ def test_names_of_weights_may_hold_what_the_comment_is_made_of(format):
     "table",
     [
         {"food": [6.5, 8.0, 0.0], "service": np.array([9.8, 3.0, 0.0])},
-        pd.DataFrame({"who": ["a", "b", "c"], "food": [6.5, 8.0, 0.0], "service": [9.8, 3.0, 0.0]}, index=[7, 5, 3]),
         np.array([(6.5, 1, 9.8), (8, 2, 3), (0, 3, 0)], dtype=[("food", "f4"), ("n", "i4"), ("service", "f8")]),
     ],
 )
@@ -148,18 +145,11 @@ def test_columns_by_keyword_and_one_value_for_all_rows(tipping):
         (lambda a: a(service=3), "food: input is missing, expected service, food"),
         (lambda a: a(service=3, food=4, fod=4), "fod: unknown input, expected service, food"),
         (lambda a: a(service=[3, 4], food=[4, 5]), r"service: input is \[3, 4\], .*; for columns there is batch"),
-        (lambda a: a(pd.DataFrame({"service": [3], "food": [4]})), "service: input is .*; for columns there is batch"),
-        (lambda a: a(pd.Series([3.0, 4.0])), "service: input is missing"),
         (lambda a: a(), "inputs are None, expected 2 numbers"),
         (lambda a: a.batch(service=[3]), "food: input is missing"),
         (lambda a: a.batch(service=[3], food=[4], fod=[4]), "fod: unknown input"),
         (lambda a: a.batch(service=[3], food=[4, 5]), r"columns have the shapes service \(1,\), food \(2,\), expected"),
         (lambda a: a.batch(service=3, food=4), r"columns have the shapes service \(\), food \(\), expected"),
-        (lambda a: a.batch(pd.DataFrame({"service": [1.0]})), "food: column is missing in service; expected"),
-        (
-            lambda a: a.batch(pd.DataFrame([[1, 2, 3]], columns=["food", "food", "service"])),
-            "food: column stands twice",
-        ),
         (lambda a: a.batch(service=[3, 11], food=[4, 5]), r"row 1: service is 11.0, expected a number in \[0, 10\]"),
         (lambda a: a.batch(service=["3"], food=["4"]), "values of the type str"),
         (lambda a: a.batch({"service": [3, None], "food": [4, 5]}), "row 1: service is nan"),
