@@ -152,7 +152,7 @@ class Samples:
                 masked = np.asarray(masked.any(axis=1))
                 received = np.where(masked[:, None], np.array(self._limits).T[0], received)
             values = received.astype(np.float64, copy=False)
-        except (TypeError, ValueError) as error:
+        except (TypeError, ValueError, OverflowError) as error:
             raise InputError(f"inputs: {error}; expected rows of numbers for {', '.join(self._names)}") from None
         if values.ndim != 2 or values.shape[1] != len(self._names):
             raise InputError(f"inputs have the shape {values.shape}, expected (n, {len(self._names)})")

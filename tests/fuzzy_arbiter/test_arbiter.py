@@ -120,6 +120,7 @@ def test_bad_inputs_are_errors(arbiter, inputs, words):
         ([[0.1, "0.2", 0.3]], r"values of the type str\d+ came; expected rows of numbers for obstacle"),
         ([[1j, 0.0, 0.0]], "values of the type complex128 came"),
         (np.array([[0.1, "0.2", 0.3]], dtype=object), "a text came among the values"),
+        ([[10**400, 0, 0]], "int too large to convert to float; expected rows of numbers"),
         ([["a", "b", "c"]], "expected rows of numbers for obstacle"),
         ([[0.1, 0.2, 0.3], [0.1]], "expected rows of numbers for obstacle"),
     ],
