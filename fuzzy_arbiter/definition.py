@@ -1,22 +1,43 @@
-"""The definition of a Mamdani system, immutable and standing once for all engines, formats and pictures."""
+"""The definition of a fuzzy system, immutable and standing once for all engines, formats and pictures."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 from numbers import Integral
 from typing import Literal, TypeVar, get_args
 
 from fuzzy_arbiter.checks import all_of, finite, require_name, shown
 from fuzzy_arbiter.errors import DefinitionError
-from fuzzy_arbiter.propositions import Is
+from fuzzy_arbiter.norms import AGGREGATIONS
+from fuzzy_arbiter.propositions import Is, anything
 from fuzzy_arbiter.rule import Rule
 from fuzzy_arbiter.rule_text import parse_rule
-from fuzzy_arbiter.shapes import Shape
+from fuzzy_arbiter.shapes import Membership
+from fuzzy_arbiter.terms.values import Formula, Value, invertible
 
-Conjunction = Literal["min", "prod"]
-Disjunction = Literal["max", "probor"]
-Implication = Literal["min", "prod"]
+Conjunction = Literal[
+    "min",
+    "prod",
+    "bounded_difference",
+    "drastic_product",
+    "einstein_product",
+    "hamacher_product",
+    "nilpotent_minimum",
+]
+Disjunction = Literal[
+    "max",
+    "probor",
+    "bounded_sum",
+    "drastic_sum",
+    "einstein_sum",
+    "hamacher_sum",
+    "nilpotent_maximum",
+    "normalized_sum",
+]
+Implication = Conjunction
+Defuzzifier = Literal["centroid", "bisector", "mom", "som", "lom", "average", "sum"]
+WEIGHTED = ("average", "sum")  # defuzzifiers that take each term's value times its strength
 Normalization = Literal["range", "none", "sum", "max"]
 Outside = Literal["refuse", "clip"]
 
@@ -27,7 +48,15 @@ WIDTHS = (1e-100, 1e100)
 
 @dataclass(frozen=True, slots=True)
 class Term:
-    """A word for a part of a universe, and to what degree each place belongs to it.
+    """A word for a part of a universe, and to what degree each place belongs to it; or, of an output, for a value.
+
+    Attributes
+    ----------
+    name : str
+        The word.
+    shape : Membership or Value
+        A `Shape` of points, a curve such as ``curve("gaussian", 5, 2)``, or, of an output whose terms are values, a
+        `Constant`, a `Linear` or a `Formula`.
 
     Raises
     ------
@@ -42,10 +71,10 @@ class Term:
     """
 
     name: str
-    shape: Shape
+    shape: Membership | Value
 
     def __post_init__(self) -> None:
-        if not isinstance(self.shape, Shape):
+        if not isinstance(self.shape, Membership | Value):
             raise DefinitionError(
                 f"term {shown(self.name)}: shape is {shown(self.shape)}, expected such as triangle(0, 1, 2)"
             )
@@ -101,7 +130,20 @@ class Variable:
         twice = _repeated(term.name for term in terms)
         if twice is not None:
             raise DefinitionError(f"{what}: two terms are named {twice!r}, expected each name once")
-        object.__setattr__(self, "terms", tuple(Term(term.name, term.shape.within((low, high))) for term in terms))
+        if not isinstance(self, Output):
+            for term in terms:
+                if not isinstance(term.shape, Membership):
+                    raise DefinitionError(f"{what}: term {term.name!r} is a value, expected a membership function")
+            object.__setattr__(self, "terms", tuple(map(self._within, terms)))
+        else:
+            object.__setattr__(self, "terms", terms)
+
+    def _within(self, term: Term) -> Term:
+        assert isinstance(term.shape, Membership)
+        try:
+            return Term(term.name, term.shape.within(self.universe))
+        except DefinitionError as error:
+            raise DefinitionError(f"variable {self.name!r}: term {term.name!r}: {error}") from None
 
     def __getitem__(self, term: str) -> Is:
         """Return the proposition that this variable is in a term.
@@ -124,9 +166,10 @@ class Variable:
 
     @property
     def knots(self) -> tuple[float, ...]:
-        """Ends of the universe and the places of all points in it, which increase; between two, terms are straight."""
+        """Ends of the universe and all places in it where a term bends or jumps, which increase."""
         low, high = self.universe
-        return (low, *sorted({x for term in self.terms for x, _ in term.shape.points if low < x < high}), high)
+        shapes = [term.shape for term in self.terms if isinstance(term.shape, Membership)]
+        return (low, *sorted({x for shape in shapes for x in shape.breaks((low, high))}), high)
 
 
 @dataclass(frozen=True, slots=True)
@@ -137,12 +180,23 @@ class Output(Variable):
     ----------
     default : float or None
         Value where no rule fires; with None that is an error.
+    defuzzifier : {"centroid", "bisector", "mom", "som", "lom", "average", "sum"}
+        How the joined terms become a number: their centroid, the place that halves their area, or the mean, smallest or
+        largest of the places where they are greatest; for terms that are values (Sugeno), or that only rise or only
+        fall (Tsukamoto), the mean of the values, weighted by strength, or their sum.
+    aggregation : str
+        How the rules' conclusions are joined: one of `fuzzy_arbiter.norms.AGGREGATIONS`. Of values it joins the
+        strengths of those rules that conclude one term.
+    lock_range : bool
+        Whether the value is held within the universe.
+    lock_previous : bool
+        Whether, in a batch, an output for which no rule fires keeps the value of the row before.
 
     Raises
     ------
     DefinitionError
         If a term has no area in the universe, so that it has no centroid, or the universe is wider than 1e100 or
-        narrower than 1e-100, so that floating point cannot hold its moments.
+        narrower than 1e-100, so that floating point cannot hold its moments; or the terms do not suit the defuzzifier.
 
     Examples
     --------
@@ -152,6 +206,10 @@ class Output(Variable):
     """
 
     default: float | None = None
+    defuzzifier: Defuzzifier = "centroid"
+    aggregation: str = "max"
+    lock_range: bool = False
+    lock_previous: bool = False
 
     def __post_init__(self) -> None:
         # not super(): the decorator makes the class anew for its slots, and the method keeps the old one
@@ -159,19 +217,49 @@ class Output(Variable):
         what = f"output {self.name!r}"
         if not WIDTHS[0] <= self.universe[1] - self.universe[0] <= WIDTHS[1]:
             raise DefinitionError(f"{what}: universe is [{_span(self)}], expected a width from 1e-100 to 1e+100")
-        for term in self.terms:
-            if not term.shape.area(self.universe) > 0.0:
-                raise DefinitionError(f"{what}: term {term.name!r} has no area in [{_span(self)}]")
+        for key, known in (("defuzzifier", get_args(Defuzzifier)), ("aggregation", tuple(AGGREGATIONS))):
+            if not isinstance(getattr(self, key), str) or getattr(self, key) not in known:
+                raise DefinitionError(f"{what}: {key} is {shown(getattr(self, key))}, expected one of {', '.join(known)}")
+        for key in ("lock_range", "lock_previous"):
+            if not isinstance(getattr(self, key), bool):
+                raise DefinitionError(f"{what}: {key} is {shown(getattr(self, key))}, expected True or False")
+        if not self.weighted:
+            object.__setattr__(self, "terms", tuple(map(self._joinable, self.terms)))
+        for term in self.terms if self.weighted else ():
+            if not isinstance(term.shape, Value) and not invertible(term.shape):
+                raise DefinitionError(
+                    f"{what}: term {term.name!r} is no value, nor does it only rise or only fall, expected such for the "
+                    f"defuzzifier {self.defuzzifier!r}"
+                )
         if self.default is not None:
             default = finite(self.default)
             if default is None:
                 raise DefinitionError(f"{what}: default is {shown(self.default)}, expected a finite number")
             object.__setattr__(self, "default", default)
 
+    def _joinable(self, term: Term) -> Term:
+        """Return a term as it is in the universe, if it can be joined with others there."""
+        what = f"output {self.name!r}: term {term.name!r}"
+        if not isinstance(term.shape, Membership) or isinstance(term.shape, Formula) and term.shape.names - {"x"}:
+            raise DefinitionError(
+                f"{what} is a value, expected a membership function, or one of the defuzzifiers {', '.join(WEIGHTED)}"
+            )
+        made = self._within(term)
+        if not term.shape.area(self.universe) > 0.0:
+            raise DefinitionError(f"{what} has no area in [{_span(self)}]")
+        return made
+
+    @property
+    def weighted(self) -> bool:
+        """Whether its terms are values, weighted by strength, and not sets that are joined."""
+        return self.defuzzifier in WEIGHTED
+
 
 @dataclass(frozen=True, slots=True)
 class System:
-    """A Mamdani system: clipped (or scaled) output terms, joined by their maximum, of which the centroid is taken.
+    """A fuzzy system: rules, and outputs that join what these conclude and make one number of it.
+
+    By default of Mamdani's kind: clipped output terms, joined by their maximum, of which the centroid is taken.
 
     Attributes
     ----------
@@ -183,12 +271,12 @@ class System:
         At least one; a text such as ``if wind is calm then sail is full`` is a rule too.
     name : str
         What the system is called in files.
-    conjunction : {"min", "prod"}
-        Degree of *and*.
-    disjunction : {"max", "probor"}
-        Degree of *or*; ``probor`` is a + b - a b.
-    implication : {"min", "prod"}
-        Whether an output's term is clipped at a rule's strength, or scaled by it.
+    conjunction : str
+        Degree of *and*: ``min``, ``prod`` or another of `fuzzy_arbiter.norms.T_NORMS`.
+    disjunction : str
+        Degree of *or*: ``max``, ``probor``, which is a + b - a b, or another of `fuzzy_arbiter.norms.S_NORMS`.
+    implication : str
+        How a rule's strength bounds its output's term: ``min`` clips it, ``prod`` scales it; or another of the first.
     normalization : {"range", "none", "sum", "max"}
         What is done to the centroids: ``none`` leaves them; ``range`` maps those of the least and of the greatest term
         alone to 0 and 1; ``sum`` and ``max`` then divide by all weights' sum or greatest.
@@ -248,11 +336,21 @@ class System:
         for i, rule in enumerate(self.rules):
             where = f"R{i + 1} {str(rule)!r}"
             for statement in rule.condition.terms():
-                _require_known(statement, inputs, "input", where)
+                _require_known(statement, inputs, "input", where, outputs)
+            for name in anything(rule.condition):
+                if name not in inputs:
+                    raise DefinitionError(f"{where}: no input {name!r}, expected one of {', '.join(inputs)}")
             for statement in rule.conclusions:
                 _require_known(statement, outputs, "output", where)
             if len({statement.variable for statement in rule.conclusions}) < len(rule.conclusions):
                 raise DefinitionError(f"{where}: two conclusions on one output, expected each output once")
+        for output in self.outputs:
+            for term in output.terms if output.weighted else ():
+                if isinstance(term.shape, Value):
+                    try:
+                        term.shape.expression(tuple(inputs))
+                    except DefinitionError as error:
+                        raise DefinitionError(f"output {output.name!r}: term {term.name!r}: {error}") from None
 
     def __str__(self) -> str:
         return "\n".join(f"R{i + 1}: {rule}" for i, rule in enumerate(self.rules))
@@ -268,7 +366,13 @@ CHOICES = {
 _N = TypeVar("_N", bound=str)
 
 
-def _require_known(statement: Is, known: dict[str, frozenset[str]], kind: str, where: str) -> None:
+def _require_known(
+    statement: Is, known: dict[str, frozenset[str]], kind: str, where: str, others: Collection[str] = ()
+) -> None:
+    if statement.variable in others:
+        raise DefinitionError(
+            f"{where}: asks for the output {statement.variable!r}, expected conditions on inputs: {', '.join(known)}"
+        )
     if statement.variable not in known:
         raise DefinitionError(f"{where}: no {kind} {statement.variable!r}, expected one of {', '.join(known)}")
     if statement.term not in known[statement.variable]:

@@ -6,7 +6,36 @@ from dataclasses import dataclass
 
 from fuzzy_arbiter.checks import all_of, finite, shown
 from fuzzy_arbiter.errors import DefinitionError
+from fuzzy_arbiter.norms import S_NORMS, T_NORMS
 from fuzzy_arbiter.propositions import Is, Proposition
+
+
+@dataclass(frozen=True, slots=True)
+class Operators:
+    """The norms of a block of rules.
+
+    Attributes
+    ----------
+    conjunction, implication : str
+        One of `fuzzy_arbiter.norms.T_NORMS`.
+    disjunction : str
+        One of `fuzzy_arbiter.norms.S_NORMS`.
+
+    Raises
+    ------
+    DefinitionError
+        If there is no such norm.
+    """
+
+    conjunction: str = "min"
+    disjunction: str = "max"
+    implication: str = "min"
+
+    def __post_init__(self) -> None:
+        for key, known in (("conjunction", T_NORMS), ("disjunction", S_NORMS), ("implication", T_NORMS)):
+            word = getattr(self, key)
+            if not isinstance(word, str) or word not in known:
+                raise DefinitionError(f"{key} is {shown(word)}, expected one of {', '.join(known)}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,6 +50,8 @@ class Rule:
         On outputs, at least one.
     weight : float
         Above 0, at most 1.
+    operators : Operators or None
+        Those of its block, where a system has several; None for those of the system.
 
     Raises
     ------
@@ -38,6 +69,7 @@ class Rule:
     condition: Proposition
     conclusions: tuple[Is, ...]
     weight: float = 1.0
+    operators: Operators | None = None
 
     def __post_init__(self) -> None:
         if not isinstance(self.condition, Proposition):
@@ -50,6 +82,8 @@ class Rule:
         if weight is None or not 0.0 < weight <= 1.0:
             rule = str(Rule(self.condition, conclusions))
             raise DefinitionError(f"{rule!r}: weight is {shown(self.weight)}, expected above 0 and at most 1")
+        if not isinstance(self.operators, Operators | None):
+            raise DefinitionError(f"rule: operators are {shown(self.operators)}, expected Operators or None")
         object.__setattr__(self, "conclusions", conclusions)
         object.__setattr__(self, "weight", weight)
 

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 from fuzzy_arbiter.checks import shown
 from fuzzy_arbiter.errors import DefinitionError
-from fuzzy_arbiter.propositions import KEYWORDS, MAX_NESTING, And, Is, Not, Or, Proposition
+from fuzzy_arbiter.norms import HEDGES
+from fuzzy_arbiter.propositions import KEYWORDS, MAX_NESTING, And, Anything, Hedged, Is, Not, Or, Proposition
 from fuzzy_arbiter.rule import Rule
 
 _TOKEN = re.compile(
@@ -22,7 +24,7 @@ _SIGNS = {"&": "and", "|": "or", "~": "not", ",": ","}
 def parse_rule(text: str) -> Rule:
     """Return the rule that a text says.
 
-    Words of rules may be in any case; ``&``, ``|``, ``~`` stand for *and*, *or*, *not*; *not* binds before *and*, *and*
+    Words of rules may be in any case; the hedges very, somewhat, extremely and seldom stand before a term; ``&``, ``|``, ``~`` stand for *and*, *or*, *not*; *not* binds before *and*, *and*
     before *or*. Names that are no identifiers stand in double quotes.
 
     Parameters
@@ -106,6 +108,8 @@ class _Parser:
     def conclusion(self) -> Is:
         variable = self.take("name", "an output's name")
         self.take("is", "'is'")
+        if self.accept("any"):  # which in a conclusion is a name like others
+            return Is(variable, self.tokens[self.at - 1][1])
         return Is(variable, self.take("name", "a term's name"))
 
     def disjunction(self) -> Proposition:
@@ -145,10 +149,23 @@ class _Parser:
             return inner
         variable = self.take("name", "an input's name, 'not' or '('")
         self.take("is", "'is'")
-        negations = 0
-        while self.accept("not"):
-            negations += 1
-        statement: Proposition = Is(variable, self.take("name", "a term's name"))
-        for _ in range(negations):
-            statement = self.made(Not, statement)
+        return self.term(variable)
+
+    def term(self, variable: str) -> Proposition:
+        """Read what is said of a variable: a term, or *any*, perhaps with hedges or *not* before it."""
+        bends: list[str] = []
+        while True:
+            if self.accept("not"):
+                bends.append("not")
+            elif self.tokens[self.at][1].lower() in HEDGES and self.tokens[self.at + 1][0] in ("name", "not", "any"):
+                bends.append(self.tokens[self.at][1].lower())
+                self.at += 1
+            else:
+                break
+        anything = self.accept("any")
+        statement: Proposition = (
+            Anything(variable) if anything else Is(variable, self.take("name", "a term's name"))
+        )
+        for word in reversed(bends):
+            statement = self.made(Not if word == "not" else partial(Hedged, word), statement)
         return statement

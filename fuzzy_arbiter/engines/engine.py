@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import functools
+import math
 import operator
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
 from fuzzy_arbiter.definition import Output, System, variable_names
 from fuzzy_arbiter.engines.firing import Array, Firing
 from fuzzy_arbiter.errors import EngineError, UndefinedOutputError
+from fuzzy_arbiter.terms.values import Constant, Value
 
 Shortcut = Callable[[Sequence[float]], tuple[float, ...] | None]
 _EACH_BY_ITSELF = ("range", "none")  # normalizations that look at one output at a time
@@ -99,12 +101,48 @@ class Engine(ABC):
             If no rule fires for an output without default.
         """
         cuts = self.firing.cuts(self.firing.strengths(inputs))
-        return [
-            self.centroid(k, cut)
-            if any(cut)
-            else default_of(output, dict(zip(variable_names(self.system.inputs), inputs, strict=True)))
-            for k, (output, cut) in enumerate(zip(self.system.outputs, cuts, strict=True))
-        ]
+        result = []
+        for k, (output, cut) in enumerate(zip(self.system.outputs, cuts, strict=True)):
+            value = self.value(k, cut, inputs) if any(cut) else math.nan
+            if not math.isfinite(value):
+                named = dict(zip(variable_names(self.system.inputs), inputs, strict=True))
+                value = default_of(output, named, fires=any(cut))
+            result.append(min(max(value, output.universe[0]), output.universe[1]) if output.lock_range else value)
+        return result
+
+    def value(self, k: int, cuts: Sequence[float], inputs: Sequence[float]) -> float:
+        """Return the raw value of an output for one sample.
+
+        Parameters
+        ----------
+        k, cuts
+            As of `centroid`.
+        inputs : sequence of float
+            The sample, of which the terms of some outputs are functions.
+
+        Returns
+        -------
+        float
+            The centroid; not finite where there is none.
+        """
+        return self.centroid(k, cuts)
+
+    def values(self, k: int, cuts: Array, inputs: Array) -> Array:
+        """Return the raw values of an output for many samples.
+
+        Parameters
+        ----------
+        k, cuts
+            As of `centroid_of_many`.
+        inputs : ndarray, shape (n, inputs)
+            The samples.
+
+        Returns
+        -------
+        ndarray, shape (n,)
+            Each as of `value`.
+        """
+        return self.centroid_of_many(k, cuts)
 
     def centroids_of_many(self, inputs: Array) -> Array:
         """Return the raw value of each output for many samples.
@@ -126,15 +164,24 @@ class Engine(ABC):
         """
         result = np.empty((len(inputs), len(self.system.outputs)))
         for k, cuts in enumerate(self.firing.cuts_of_many(self.firing.strengths_of_many(inputs))):
-            fires = cuts.any(axis=0)
+            output, fires = self.system.outputs[k], cuts.any(axis=0)
+            values = result[:, k]
             if fires.all():
-                result[:, k] = self.centroid_of_many(k, cuts)
-                continue
-            row = int(np.argmin(fires))
-            names = variable_names(self.system.inputs)
-            default = default_of(self.system.outputs[k], dict(zip(names, inputs[row].tolist(), strict=True)), row)
-            result[~fires, k] = default
-            result[fires, k] = self.centroid_of_many(k, cuts[:, fires])
+                values[:] = self.values(k, cuts, inputs)
+            else:
+                values[:] = math.nan
+                values[fires] = self.values(k, cuts[:, fires], inputs[fires])
+            defined = np.isfinite(values)
+            if output.lock_previous and defined.any():
+                last = np.maximum.accumulate(np.where(defined, np.arange(len(values)), -1))
+                values[last >= 0] = values[last[last >= 0]]
+                defined = last >= 0
+            if not defined.all():
+                row = int(np.argmin(defined))
+                named = dict(zip(variable_names(self.system.inputs), inputs[row].tolist(), strict=True))
+                values[~defined] = default_of(output, named, row, fires=bool(fires[row]))
+            if output.lock_range:
+                np.clip(values, *output.universe, out=values)
         return result
 
     def weights(self, inputs: Sequence[float]) -> tuple[float, ...]:
@@ -196,10 +243,22 @@ class Engine(ABC):
         """
         return None
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), (self.system,)
+
+    def _concluded(self, k: int) -> Sequence[int]:
+        """Return the terms of an output that can be joined alone."""
+        return sorted({slot.term for slot in self.firing.slots[k]})
+
     def _ends(self, k: int) -> tuple[float, float]:
         """Return the centroids that become 0 and 1: of the least and of the greatest term, each alone and whole."""
         output = self.system.outputs[k]
-        alone = [self.centroid(k, [float(i == j) for i in range(len(output.terms))]) for j in range(len(output.terms))]
+        if any(isinstance(term.shape, Value) and not isinstance(term.shape, Constant) for term in output.terms):
+            raise EngineError(
+                f"output {output.name!r}: its terms depend on the inputs, which leaves no range to normalize; expected "
+                "normalization 'none'"
+            )
+        alone = [self.centroid(k, [float(slot.term == j) for slot in self.firing.slots[k]]) for j in self._concluded(k)]
         low, high = min(alone), max(alone)
         if not low < high:
             raise EngineError(
@@ -252,8 +311,8 @@ def normalize_weights_of_many(weights: Array, normalization: str) -> Array:
     return np.asarray(np.divide(weights, whole, out=np.zeros_like(weights), where=whole > 0.0))
 
 
-def default_of(output: Output, inputs: Mapping[str, float], row: int | None = None) -> float:
-    """Return the value of an output for which no rule fires.
+def default_of(output: Output, inputs: Mapping[str, float], row: int | None = None, fires: bool = False) -> float:
+    """Return the value of an output for which no rule fires, or what the rules conclude is no number.
 
     Parameters
     ----------
@@ -263,6 +322,8 @@ def default_of(output: Output, inputs: Mapping[str, float], row: int | None = No
         Where that is.
     row : int, optional
         Which of many samples.
+    fires : bool
+        Whether a rule does fire.
 
     Returns
     -------
@@ -278,4 +339,5 @@ def default_of(output: Output, inputs: Mapping[str, float], row: int | None = No
         return output.default
     where = "" if row is None else f"row {row}, "
     values = ", ".join(f"{name} = {value:g}" for name, value in inputs.items())
-    raise UndefinedOutputError(f"output {output.name!r}: no rule fires at {where}{values}, and it has no default")
+    what = "what the rules conclude has no value" if fires else "no rule fires"
+    raise UndefinedOutputError(f"output {output.name!r}: {what} at {where}{values}, and it has no default")

@@ -17,7 +17,7 @@ from skfuzzy.fuzzymath.fuzzy_ops import _interp_universe_fast, interp_membership
 from fuzzy_arbiter.definition import System, Variable, variable_names
 from fuzzy_arbiter.engines.engine import Engine, default_of
 from fuzzy_arbiter.engines.firing import Array
-from fuzzy_arbiter.engines.grid import require_clipping, sampled
+from fuzzy_arbiter.engines.grid import require_plain, sampled
 from fuzzy_arbiter.errors import EngineError
 from fuzzy_arbiter.propositions import And, Is, Not, Or, Proposition
 
@@ -43,7 +43,7 @@ class ScikitEngine(Engine):
     name: ClassVar[str] = "skfuzzy"
 
     def __init__(self, system: System) -> None:
-        require_clipping(system, self.name)
+        require_plain(system, self.name, curved_inputs=False)
         for variable in system.inputs:
             for term in variable.terms:
                 if term.shape.jumps:
@@ -83,9 +83,6 @@ class ScikitEngine(Engine):
             else value
             for output, value in zip(self.system.outputs, self._local.runner(inputs), strict=True)
         ]
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        return ScikitEngine, (self.system,)
 
 
 class _Runner:

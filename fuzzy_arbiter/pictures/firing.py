@@ -9,7 +9,7 @@ import numpy as np
 
 from fuzzy_arbiter.arbiter import Arbiter
 from fuzzy_arbiter.definition import Output, variable_names
-from fuzzy_arbiter.engines.firing import Array, Firing, degrees_of_many
+from fuzzy_arbiter.engines.firing import Array, Firing
 from fuzzy_arbiter.errors import UndefinedOutputError
 from fuzzy_arbiter.pictures.lines import corners
 from fuzzy_arbiter.pictures.places import one_of, places_in, said
@@ -87,10 +87,10 @@ def rules(arbiter: Arbiter, inputs: Sample, output: str | None = None, ax: Axes 
 
     x = places_in(drawn, 801)
     scaled = system.implication == "prod"
-    clipped = [_cut(degrees_of_many(term.shape, x), cut, scaled) for term, cut in zip(drawn.terms, cuts, strict=True)]
+    clipped = [_cut(term.shape.of_many(x), cut, scaled) for term, cut in zip(drawn.terms, cuts, strict=True)]
     for place, row in enumerate(rows):  # rows are counted downwards
         shape = drawn.terms[row.term].shape
-        _draw_row(ax, drawn, place, row, (x, _cut(degrees_of_many(shape, x), row.strength, scaled)), cuts[row.term])
+        _draw_row(ax, drawn, place, row, (x, _cut(shape.of_many(x), row.strength, scaled)), cuts[row.term])
     foot = len(rows) + _TALL - 0.6
     tall = _TALL * _HEIGHT
     joined = np.max(clipped, axis=0)
