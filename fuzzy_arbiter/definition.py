@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from numbers import Integral
 from typing import Literal, TypeVar, get_args
@@ -14,7 +14,7 @@ from fuzzy_arbiter.propositions import Is, anything
 from fuzzy_arbiter.rule import Rule
 from fuzzy_arbiter.rule_text import parse_rule
 from fuzzy_arbiter.shapes import Membership
-from fuzzy_arbiter.terms.values import Formula, Value, invertible
+from fuzzy_arbiter.terms.values import Formula, Linear, Value, invertible
 
 Conjunction = Literal[
     "min",
@@ -91,7 +91,7 @@ class Variable:
     universe : (float, float)
         Least and greatest value.
     terms : tuple of Term
-        At least one.
+        At least one, unless it is an input that only the values of outputs depend on.
 
     Raises
     ------
@@ -123,7 +123,7 @@ class Variable:
             raise DefinitionError(f"{what}: universe is [{low}, {high}], expected a finite width")
         object.__setattr__(self, "universe", (low, high))
         terms = all_of(Term, self.terms, f"{what}: terms", "a sequence of Term")
-        if not terms:
+        if not terms and isinstance(self, Output):
             raise DefinitionError(f"{what}: no terms came, expected at least one")
         for term in terms:
             require_name(term.name, f"{what}: term")
@@ -336,7 +336,15 @@ class System:
         for i, rule in enumerate(self.rules):
             where = f"R{i + 1} {str(rule)!r}"
             for statement in rule.condition.terms():
-                _require_known(statement, inputs, "input", where, outputs)
+                if statement.variable not in outputs:
+                    _require_known(statement, inputs, "input", where)
+                    continue
+                _require_known(statement, outputs, "output", where)
+                if not any(c.variable == statement.variable for r in self.rules[:i] for c in r.conclusions):
+                    raise DefinitionError(
+                        f"{where}: asks for the output {statement.variable!r}, expected rules before it that conclude on "
+                        "that"
+                    )
             for name in anything(rule.condition):
                 if name not in inputs:
                     raise DefinitionError(f"{where}: no input {name!r}, expected one of {', '.join(inputs)}")
@@ -344,13 +352,18 @@ class System:
                 _require_known(statement, outputs, "output", where)
             if len({statement.variable for statement in rule.conclusions}) < len(rule.conclusions):
                 raise DefinitionError(f"{where}: two conclusions on one output, expected each output once")
-        for output in self.outputs:
+        used: set[str] = set()
+        for k, output in enumerate(self.outputs):
             for term in output.terms if output.weighted else ():
                 if isinstance(term.shape, Value):
                     try:
-                        term.shape.expression(tuple(inputs))
+                        whole = term.shape.expression(tuple(inputs), variable_names(self.outputs[:k]))
                     except DefinitionError as error:
                         raise DefinitionError(f"output {output.name!r}: term {term.name!r}: {error}") from None
+                    used |= whole.names | (inputs.keys() if isinstance(term.shape, Linear) else set())
+        for variable in self.inputs:
+            if not variable.terms and variable.name not in used:
+                raise DefinitionError(f"variable {variable.name!r}: no terms came, expected at least one")
 
     def __str__(self) -> str:
         return "\n".join(f"R{i + 1}: {rule}" for i, rule in enumerate(self.rules))
@@ -366,13 +379,7 @@ CHOICES = {
 _N = TypeVar("_N", bound=str)
 
 
-def _require_known(
-    statement: Is, known: dict[str, frozenset[str]], kind: str, where: str, others: Collection[str] = ()
-) -> None:
-    if statement.variable in others:
-        raise DefinitionError(
-            f"{where}: asks for the output {statement.variable!r}, expected conditions on inputs: {', '.join(known)}"
-        )
+def _require_known(statement: Is, known: dict[str, frozenset[str]], kind: str, where: str) -> None:
     if statement.variable not in known:
         raise DefinitionError(f"{where}: no {kind} {statement.variable!r}, expected one of {', '.join(known)}")
     if statement.term not in known[statement.variable]:

@@ -103,7 +103,7 @@ class Engine(ABC):
         cuts = self.firing.cuts(self.firing.strengths(inputs))
         result = []
         for k, (output, cut) in enumerate(zip(self.system.outputs, cuts, strict=True)):
-            value = self.value(k, cut, inputs) if any(cut) else math.nan
+            value = self.value(k, cut, (*inputs, *result)) if any(cut) else math.nan
             if not math.isfinite(value):
                 named = dict(zip(variable_names(self.system.inputs), inputs, strict=True))
                 value = default_of(output, named, fires=any(cut))
@@ -118,7 +118,7 @@ class Engine(ABC):
         k, cuts
             As of `centroid`.
         inputs : sequence of float
-            The sample, of which the terms of some outputs are functions.
+            The sample, and the values of the outputs before; of these the terms of some outputs are functions.
 
         Returns
         -------
@@ -134,8 +134,8 @@ class Engine(ABC):
         ----------
         k, cuts
             As of `centroid_of_many`.
-        inputs : ndarray, shape (n, inputs)
-            The samples.
+        inputs : ndarray, shape (n, inputs and k outputs)
+            The samples, and the values of the outputs before.
 
         Returns
         -------
@@ -166,11 +166,12 @@ class Engine(ABC):
         for k, cuts in enumerate(self.firing.cuts_of_many(self.firing.strengths_of_many(inputs))):
             output, fires = self.system.outputs[k], cuts.any(axis=0)
             values = result[:, k]
+            known = np.column_stack([inputs, result[:, :k]]) if output.weighted else inputs
             if fires.all():
-                values[:] = self.values(k, cuts, inputs)
+                values[:] = self.values(k, cuts, known)
             else:
                 values[:] = math.nan
-                values[fires] = self.values(k, cuts[:, fires], inputs[fires])
+                values[fires] = self.values(k, cuts[:, fires], known[fires])
             defined = np.isfinite(values)
             if output.lock_previous and defined.any():
                 last = np.maximum.accumulate(np.where(defined, np.arange(len(values)), -1))

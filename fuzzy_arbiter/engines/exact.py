@@ -35,13 +35,13 @@ class ExactEngine(Engine):
         self._ways: list[Outline | Weighted | Quadrature] = []
         self._scaled: list[bool] = []
         inputs = variable_names(system.inputs)
-        for output in system.outputs:
+        for k, output in enumerate(system.outputs):
             slots = slots_of(system, output)
             implications = {slot.implication for slot in slots}
             self._scaled.append(implications == {"prod"})
             straight = not curved(output) and implications <= {"min", "prod"} and len(implications) == 1
             if output.weighted:
-                self._ways.append(Weighted(output, inputs))
+                self._ways.append(Weighted(output, inputs, variable_names(system.outputs[:k])))
                 self.methods[output.name] = "weighted values, to rounding"
             elif straight and (output.defuzzifier, output.aggregation) == ("centroid", "max"):
                 self._ways.append(outline(output))
@@ -62,7 +62,7 @@ class ExactEngine(Engine):
         if isinstance(way, Quadrature):
             return way.value(cuts)
         if isinstance(way, Weighted):
-            return way.value(cuts, [math.nan] * len(self.system.inputs))
+            return way.value(cuts, [math.nan] * (len(self.system.inputs) + k))
         return float(centroid(cuts, *way, self._scaled[k]))
 
     def centroid_of_many(self, k: int, cuts: Array) -> Array:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Generic, TypeVar
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -184,9 +184,23 @@ class Firing:
         """
 
         def of(statement: Is) -> float:
-            return self._shapes[statement.variable, statement.term](inputs[self._inputs[statement.variable]])
+            place = self._inputs.get(statement.variable)
+            if place is None:  # an output, as the rules before have concluded on it
+                return self._concluded(statement, result, number=True)
+            return self._shapes[statement.variable, statement.term](inputs[place])
 
-        return [logic.degree(condition, of) * weight for condition, logic, weight in self._rules]
+        result: list[float] = []
+        for condition, logic, weight in self._rules:
+            result.append(logic.degree(condition, of) * weight)
+        return result
+
+    def _concluded(self, statement: Is, strengths: Sequence[Any], number: bool) -> Any:
+        """Return how strongly the rules so far conclude that an output is in a term."""
+        found = [s for s, rule in zip(strengths, self.system.rules, strict=False) if statement in rule.conclusions]
+        if not found:
+            return 0.0 if number else np.zeros_like(strengths[0])
+        k = next(k for k, output in enumerate(self.system.outputs) if output.name == statement.variable)
+        return functools.reduce(self._joins[k].number if number else self._joins[k].array, found)
 
     def strengths_of_many(self, inputs: Array) -> list[Array]:
         """Return how strongly each rule fires for each of many samples.
@@ -205,14 +219,17 @@ class Firing:
 
         def of(statement: Is) -> Array:
             key = (statement.variable, statement.term)
+            if statement.variable not in self._inputs:
+                return np.asarray(self._concluded(statement, result, number=False))
             if key not in known:
                 known[key] = self._shapes[key].of_many(inputs[:, self._inputs[statement.variable]])
             return known[key]
 
-        return [
-            array_logic(rule.operators or self.system, len(inputs)).degree(rule.condition, of) * rule.weight
-            for rule in self.system.rules
-        ]
+        result: list[Array] = []
+        for rule in self.system.rules:
+            logic = array_logic(rule.operators or self.system, len(inputs))
+            result.append(logic.degree(rule.condition, of) * rule.weight)
+        return result
 
     def cuts(self, strengths: Sequence[float]) -> list[list[float]]:
         """Return the strength of each slot of each output.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from fuzzy_arbiter.definition import System, Variable
+from fuzzy_arbiter.definition import System, Variable, variable_names
 from fuzzy_arbiter.propositions import And, Anything, Hedged, Not, Or, Proposition
 from fuzzy_arbiter.shapes import Shape
 from fuzzy_arbiter.terms.curves import Curve
@@ -28,9 +28,13 @@ def beyond_plain(system: System, curved_inputs: bool = False) -> str:
     for key, known in PLAIN.items():
         if getattr(system, key) not in known:
             return f"the {key} is {getattr(system, key)}, expected {' or '.join(known)}"
+    outputs = variable_names(system.outputs)
     for i, rule in enumerate(system.rules):
         if rule.operators is not None:
             return f"R{i + 1} has operators of its own, expected those of the system"
+        asked = next((s.variable for s in rule.condition.terms() if s.variable in outputs), None)
+        if asked is not None:
+            return f"R{i + 1} asks for the output {asked!r}, expected conditions on inputs alone"
         if bent(rule.condition):
             return f"R{i + 1} has a hedge or 'any', expected 'not' alone"
     for output in system.outputs:

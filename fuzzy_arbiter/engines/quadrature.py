@@ -26,6 +26,7 @@ _SCAN = 16  # places in each smooth part of the terms, between which bends are l
 _BESIDE = 1e-9  # of a part's width: how far from its ends the first and last of these are
 _HALVINGS = 45
 _MOST = 20_000  # parts
+_NEAR = 1e-11  # of the universe: how near to a bend is near enough, as what is missed is the square of that
 _EQUAL = 1e-12  # heights that differ by less are equal
 
 
@@ -127,39 +128,53 @@ class _Joined:
             height = self.of._join(height, self.of._implications[i](np.full(len(places), cut), self.of._shapes[i].of_many(places)))
         return height
 
-    def _bends(self, degrees: Array) -> Array:
+    def _signs(self) -> list[tuple[int, int]]:
+        """Return what may bend the joined terms: a slot with itself, at its cut, or two slots where they change places."""
+        own = ("min", "bounded_difference", "nilpotent_minimum")
+        signs = [(a, a) for a, i in enumerate(self.active) if self.of._slots[i].implication in own]
+        if self.of._output.aggregation in ("max", "nilpotent_maximum"):
+            signs += [(a, b) for a in range(len(self.active)) for b in range(a)]
+        if self.of._output.aggregation in ("bounded_sum", "normalized_sum", "nilpotent_maximum"):
+            signs += [(a, -1) for a in range(1, len(self.active))]  # where the sum of the first slots passes 1
+        return signs
+
+    def _bends(self, signs: Sequence[tuple[int, int]], degrees: Array, implied: Array) -> Array:
         """Return what changes its sign where the joined terms bend, shape (signs, ..)."""
-        implied = self.implied(degrees)
-        signs = []
-        for i, cut, degree in zip(self.active, self.cuts, degrees, strict=True):
-            if self.of._slots[i].implication == "min":
-                signs.append(degree - cut)
-            elif self.of._slots[i].implication in ("bounded_difference", "nilpotent_minimum"):
-                signs.append(degree + cut - 1.0)
-        aggregation = self.of._output.aggregation
-        if aggregation in ("max", "nilpotent_maximum"):
-            signs += [implied[a] - implied[b] for a in range(len(implied)) for b in range(a)]
-        if aggregation in ("bounded_sum", "normalized_sum", "nilpotent_maximum"):
-            signs += list(np.cumsum(implied, axis=0)[1:] - 1.0)
-        return np.array(signs).reshape(len(signs), *degrees.shape[1:])
+        bends = np.empty((len(signs), *degrees.shape[1:]))
+        for row, (a, b) in zip(bends, signs, strict=True):
+            if a == b:
+                clips = self.of._slots[self.active[a]].implication == "min"
+                row[...] = degrees[a] - self.cuts[a] if clips else degrees[a] + self.cuts[a] - 1.0
+            else:
+                row[...] = implied[: a + 1].sum(axis=0) - 1.0 if b < 0 else implied[a] - implied[b]
+        return bends
 
     def _breaks(self) -> Array:
         of = self.of
-        bends = self._bends(of._scanned[self.active])
+        scanned, signs = of._scanned[self.active], self._signs()
+        implied = self.implied(scanned)
+        bends = self._bends(signs, scanned, implied)
         above = bends >= 0.0
-        which, part, at = np.nonzero(above[..., 1:] != above[..., :-1])
+        changes = above[..., 1:] != above[..., :-1]
+        if of._output.aggregation == "max":  # of slots below the greatest nothing is seen
+            top = implied >= implied.max(axis=0) - _EQUAL
+            seen = top[..., 1:] | top[..., :-1]
+            changes &= np.array([seen[a] | seen[b] for a, b in signs]).reshape(changes.shape)
+        which, part, at = np.nonzero(changes)
         if len(which) == 0:
             return of._knots
+        asked = [signs[i] for i in np.unique(which)]
+        rows = np.searchsorted(np.unique(which), which)
         x0, x1 = of._scan[part, at], of._scan[part, at + 1]
         f0, f1 = bends[which, part, at], bends[which, part, at + 1]
         x = x0
         for _ in range(60):  # regula falsi, in which an end that stays counts half
             x, before = (x0 * f1 - x1 * f0) / (f1 - f0), x
             x = np.where((x0 <= x) & (x <= x1), x, (x0 + x1) / 2)
-            if np.abs(x - before).max() <= 1e-15 * of._width:
+            if np.abs(x - before).max() <= _NEAR * of._width:
                 break
             degrees = np.array([of._shapes[i].of_many(x) for i in self.active])
-            f = self._bends(degrees)[which, np.arange(len(x))]
+            f = self._bends(asked, degrees, self.implied(degrees))[rows, np.arange(len(x))]
             right = (f >= 0.0) == (f1 >= 0.0)
             f0, f1 = np.where(right, f0 / 2, f), np.where(right, f, f1 / 2)
             x0, x1 = np.where(right, x0, x), np.where(right, x, x1)
@@ -175,8 +190,6 @@ class _Joined:
         """Return area and moment in parts, which together are as exact as is promised."""
         starts, ends = self.breaks[:-1], self.breaks[1:]
         areas, moments = self._integrals(starts, ends)
-        if self.of.exact:
-            return Parts(starts, ends, areas, moments)
         done: list[Parts] = []
         whole, count = areas.sum(), 0
         for _ in range(_HALVINGS):

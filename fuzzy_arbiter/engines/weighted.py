@@ -22,15 +22,15 @@ class Weighted:
     ----------
     output : Output
         With the defuzzifier ``average`` or ``sum``.
-    inputs : sequence of str
-        Names of the system's inputs, in order.
+    inputs, outputs : sequence of str
+        Names of the system's inputs, and of the outputs before this one, in order.
     """
 
-    def __init__(self, output: Output, inputs: Sequence[str]) -> None:
+    def __init__(self, output: Output, inputs: Sequence[str], outputs: Sequence[str]) -> None:
         self._mean = output.defuzzifier == "average"
         shapes = [term.shape for term in output.terms]
-        self._numbers = [_number(shape, inputs) for shape in shapes]
-        self._arrays = [_array(shape, inputs) for shape in shapes]
+        self._numbers = [_number(shape, inputs, outputs) for shape in shapes]
+        self._arrays = [_array(shape, inputs, outputs) for shape in shapes]
 
     def value(self, cuts: Sequence[float], inputs: Sequence[float]) -> float:
         """Return the output's value for one sample.
@@ -40,7 +40,7 @@ class Weighted:
         cuts : sequence of float, length terms
             Strength of each term; not all are 0.
         inputs : sequence of float
-            The sample.
+            The sample, and the values of the outputs before this one.
 
         Returns
         -------
@@ -61,8 +61,8 @@ class Weighted:
         ----------
         cuts : ndarray, shape (terms, n)
             Strengths; not all of one sample are 0.
-        inputs : ndarray, shape (n, inputs)
-            The samples.
+        inputs : ndarray, shape (n, inputs and outputs)
+            The samples, and the values of the outputs before this one.
 
         Returns
         -------
@@ -78,19 +78,19 @@ class Weighted:
         return total / weight if self._mean else total
 
 
-def _number(shape: object, inputs: Sequence[str]) -> Callable[[float, Sequence[float]], float]:
+def _number(shape: object, inputs: Sequence[str], outputs: Sequence[str]) -> Callable[[float, Sequence[float]], float]:
     if isinstance(shape, Constant):
         value = shape.value
         return lambda cut, sample: value
     if isinstance(shape, Value):
-        of = shape.number(inputs)
+        of = shape.number(inputs, outputs)
         return lambda cut, sample: of(sample)
     return lambda cut, sample: place_of(shape, cut)  # type: ignore[arg-type]  # which the output has checked
 
 
-def _array(shape: object, inputs: Sequence[str]) -> Callable[[Array, Array], Array]:
+def _array(shape: object, inputs: Sequence[str], outputs: Sequence[str]) -> Callable[[Array, Array], Array]:
     if isinstance(shape, Value):
-        of = shape.array(inputs)
+        of = shape.array(inputs, outputs)
         return lambda cut, samples: of(samples)
     # a strength of 0 has no place that matters
     return lambda cut, samples: np.array([place_of(shape, w) if w > 0.0 else 0.0 for w in cut.tolist()])  # type: ignore[arg-type]

@@ -1,11 +1,23 @@
-"""The words of the FuzzyLite Language: keys of its blocks, and operators."""
+"""The words of the FuzzyLite Language: keys of its blocks, operators and defuzzifiers."""
 
 from __future__ import annotations
 
+from fuzzy_arbiter.norms import AGGREGATIONS, S_NORMS, T_NORMS
+
 SETTINGS = ("normalization",)
-CONJUNCTIONS = {"Minimum": "min", "AlgebraicProduct": "prod"}  # and implications
-DISJUNCTIONS = {"Maximum": "max", "AlgebraicSum": "probor"}
-RESOLUTION = 1000  # of fuzzylite's Centroid, where none is said
+CONJUNCTIONS = {norm.fll: name for name, norm in T_NORMS.items()}  # and implications
+DISJUNCTIONS = {norm.fll: name for name, norm in S_NORMS.items()}
+JOINS = {norm.fll: name for name, norm in AGGREGATIONS.items()}
+RESOLUTION = 1000  # of fuzzylite's defuzzifiers, where none is said
+DEFUZZIFIERS = {
+    "Centroid": "centroid",
+    "Bisector": "bisector",
+    "MeanOfMaximum": "mom",
+    "SmallestOfMaximum": "som",
+    "LargestOfMaximum": "lom",
+    "WeightedAverage": "average",
+    "WeightedSum": "sum",
+}
 
 KEYS: dict[str, tuple[str, ...]] = {
     "Engine": ("description",),
@@ -17,3 +29,4 @@ KEYS: dict[str, tuple[str, ...]] = {
     "RuleBlock": ("description", "enabled", "conjunction", "disjunction", "implication", "activation", "rule"),
 }
 MANY = ("term", "rule")  # keys that may come again in one block
+OLD = {"accumulation": "aggregation"}  # keys of fuzzylite 5

@@ -36,7 +36,7 @@ class CurveKind:
     expected : str
         What the parameters have to be, in words.
     fll, fis, fcl : Word, optional
-        How fuzzylite, MATLAB or fuzzylite, and jFuzzyLogic spell it.
+        How fuzzylite, MATLAB or fuzzylite, and jFuzzyLogic spell it; an empty word is none.
     polynomial : bool
         Whether its pieces are polynomials.
     inverse : callable, optional
@@ -264,6 +264,14 @@ KINDS: dict[str, CurveKind] = {
             (_END, f"end {'-' if start < end else '+'} sqrt((end - start) ^ 2 * (1 - w ^ 2))"),
         ],
     ),
+    "singleton": CurveKind(
+        ("place",),
+        lambda place: [(_END, "eq(x, place)")],
+        lambda place: True,
+        "a place",
+        fll=("", (0,)),
+        fis=("", (0,)),
+    ),
     "semi_ellipse": CurveKind(
         ("start", "end"),
         _ellipse,
@@ -307,6 +315,8 @@ class Curve(Membership):
     ends: tuple[float, ...] = field(init=False, repr=False, compare=False)
     trees: tuple[Node, ...] = field(init=False, repr=False, compare=False)
     _numbers: tuple[Callable[..., float], ...] = field(init=False, repr=False, compare=False)
+    _arrays: tuple[Callable[..., Any], ...] = field(init=False, repr=False, compare=False)
+    _jumps: tuple[float, ...] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         kind = KINDS.get(self.kind) if isinstance(self.kind, str) else None
@@ -328,7 +338,9 @@ class Curve(Membership):
         object.__setattr__(self, "height", height)
         object.__setattr__(self, "ends", tuple(end for end, _ in pieces))
         object.__setattr__(self, "trees", tuple(tree for _, tree in pieces))
-        object.__setattr__(self, "_numbers", tuple(number_function(tree) for tree in self.trees))
+        object.__setattr__(self, "_numbers", tuple(map(number_function, self.trees)))
+        object.__setattr__(self, "_arrays", tuple(map(array_function, self.trees)))
+        object.__setattr__(self, "_jumps", tuple(x for i, x in enumerate(self.ends[:-1]) if self._jump(i, x)))
 
     @property
     def polynomial(self) -> bool:  # type: ignore[override]  # by kind
@@ -338,13 +350,12 @@ class Curve(Membership):
     @property
     def jumps(self) -> bool:
         """Whether there is a jump."""
-        return any(map(self._jump, range(len(self.ends) - 1)))
+        return bool(self._jumps)
 
     def _side(self, i: int, x: float) -> float:
         return self._numbers[i]({"x": x})
 
-    def _jump(self, i: int) -> bool:
-        end = self.ends[i]
+    def _jump(self, i: int, end: float) -> bool:
         return abs(self._side(i, end) - self._side(i + 1, end)) > 1e-9
 
     def __call__(self, x: float) -> float:
@@ -360,20 +371,20 @@ class Curve(Membership):
     def of_many(self, places: Array) -> Array:
         """Return the degrees at many places, each as a call gives it, to rounding."""
         result = np.empty(len(places))
-        piece = np.searchsorted(self.ends, places)
         with np.errstate(all="ignore"):
-            for i, tree in enumerate(self.trees):
-                if len(self.trees) == 1:
-                    result[:] = array_function(tree)({"x": places})
-                    break
-                inside = piece == i
-                if inside.any():
-                    result[inside] = array_function(tree)({"x": places[inside]})
-        for i, end in enumerate(self.ends[:-1]):
-            if self._jump(i):
-                result[places == end] = self(end)
-        result = np.clip(result, 0.0, 1.0)
-        result[np.isnan(places)] = np.nan
+            if len(self._arrays) == 1:
+                result[:] = self._arrays[0]({"x": places})
+            else:
+                piece = np.searchsorted(self.ends, places)
+                for i, of in enumerate(self._arrays):
+                    inside = piece == i
+                    if inside.any():
+                        result[inside] = of({"x": places[inside]})
+        for end in self._jumps:
+            result[places == end] = self(end)
+        np.minimum(np.maximum(result, 0.0, out=result), 1.0, out=result)
+        if len(self._arrays) > 1:
+            result[places != places] = np.nan
         return result
 
     def breaks(self, universe: tuple[float, float]) -> tuple[float, ...]:
@@ -423,7 +434,8 @@ def curve(kind: str, *parameters: float, height: float = 1.0) -> Membership:
         One of ``gaussian`` (mean, deviation), ``gaussian2`` (mean1, deviation1, mean2, deviation2), ``bell`` (center,
         width, slope), ``sigmoid`` (inflection, slope), ``sigmoid_difference`` and ``sigmoid_product`` (left, rising,
         falling, right), ``z_shape``, ``s_shape`` (start, end), ``pi_shape`` (foot1, top1, top2, foot2), ``cosine`` and
-        ``spike`` (center, width), ``concave`` (inflection, end), ``arc`` and ``semi_ellipse`` (start, end).
+        ``spike`` (center, width), ``concave`` (inflection, end), ``arc`` and ``semi_ellipse`` (start, end), ``singleton`` (place), which is 1 there
+        and 0 elsewhere.
     *parameters : float
         As many as the kind has.
     height : float

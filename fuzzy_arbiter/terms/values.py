@@ -22,8 +22,8 @@ class Value(ABC):
     __slots__ = ()
 
     @abstractmethod
-    def expression(self, inputs: Sequence[str]) -> Expression:
-        """Return it as arithmetic on the inputs' names.
+    def expression(self, inputs: Sequence[str], outputs: Sequence[str] = ()) -> Expression:
+        """Return it as arithmetic on the names of the inputs, and of the outputs that come before its own.
 
         Raises
         ------
@@ -31,17 +31,17 @@ class Value(ABC):
             If it does not fit these inputs.
         """
 
-    def number(self, inputs: Sequence[str]) -> Callable[[Sequence[float]], float]:
-        """Return what gives the number for one sample of these inputs."""
-        whole = self.expression(inputs)
-        return lambda sample: whole(dict(zip(inputs, sample, strict=True)))
+    def number(self, inputs: Sequence[str], outputs: Sequence[str]) -> Callable[[Sequence[float]], float]:
+        """Return what gives the number for one sample, of the inputs and these outputs."""
+        whole, names = self.expression(inputs, outputs), (*inputs, *outputs)
+        return lambda sample: whole(dict(zip(names, sample, strict=True)))
 
-    def array(self, inputs: Sequence[str]) -> Callable[[Array], Array]:
-        """Return what gives the numbers for many samples of these inputs, shape (n, inputs)."""
-        whole = self.expression(inputs)
+    def array(self, inputs: Sequence[str], outputs: Sequence[str]) -> Callable[[Array], Array]:
+        """Return what gives the numbers for many samples, shape (n, inputs and outputs)."""
+        whole, names = self.expression(inputs, outputs), (*inputs, *outputs)
 
         def numbers(samples: Array) -> Array:
-            values: Mapping[str, Any] = dict(zip(inputs, samples.T, strict=True))
+            values: Mapping[str, Any] = dict(zip(names, samples.T, strict=True))
             return np.broadcast_to(whole.of_many(values), len(samples))
 
         return numbers
@@ -71,7 +71,7 @@ class Constant(Value):
             raise DefinitionError(f"constant is {shown(self.value)}, expected a finite number")
         object.__setattr__(self, "value", value)
 
-    def expression(self, inputs: Sequence[str]) -> Expression:
+    def expression(self, inputs: Sequence[str], outputs: Sequence[str] = ()) -> Expression:
         """Return the number."""
         return Expression("", self.value)
 
@@ -110,7 +110,7 @@ class Linear(Value):
         object.__setattr__(self, "coefficients", numbers[:-1])
         object.__setattr__(self, "constant", numbers[-1])
 
-    def expression(self, inputs: Sequence[str]) -> Expression:
+    def expression(self, inputs: Sequence[str], outputs: Sequence[str] = ()) -> Expression:
         """Return the sum, if there are as many inputs as coefficients."""
         if len(inputs) != len(self.coefficients):
             raise DefinitionError(
@@ -160,18 +160,19 @@ class Formula(Value, Membership):
         """The names whose numbers it needs."""
         return self._whole.names
 
-    def expression(self, inputs: Sequence[str]) -> Expression:
-        """Return it, if it speaks of these inputs alone."""
-        whole = self._whole
-        unknown = sorted(whole.names - set(inputs))
+    def expression(self, inputs: Sequence[str], outputs: Sequence[str] = ()) -> Expression:
+        """Return it, if it speaks of these names alone."""
+        whole, known = self._whole, (*inputs, *outputs)
+        unknown = sorted(whole.names - set(known))
         if unknown:
             raise DefinitionError(
-                f"expression {shown(self.text)} asks for {', '.join(unknown)}, expected inputs: {', '.join(inputs)}"
+                f"expression {shown(self.text)} asks for {', '.join(unknown)}, expected inputs, or outputs before its "
+                f"own: {', '.join(known)}"
             )
         return whole
 
     def __call__(self, x: float) -> float:
-        """Return the degree at a place, held within [0, 1]."""
+        """Return the degree at a place, held within [0, 1]; NaN for a place that is NaN."""
         return x if x != x else min(max(self._whole({"x": x}), 0.0), 1.0)
 
     def of_many(self, places: Array) -> Array:
@@ -189,15 +190,15 @@ class Formula(Value, Membership):
         Raises
         ------
         DefinitionError
-            If at one of 1001 places it gives no number from 0 to 1.
+            If at one of 1001 places it gives no number, or one above 1; below 0 it counts as 0.
         """
         places = np.linspace(*universe, 1001)
         values = np.broadcast_to(self.expression(["x"]).of_many({"x": places}), places.shape)
-        bad = ~((values >= -1e-9) & (values <= 1.0 + 1e-9))
+        bad = ~(values <= 1.0 + 1e-9) | ~np.isfinite(values)
         if bad.any():
             i = int(np.argmax(bad))
             raise DefinitionError(
-                f"expression {shown(self.text)} gives {float(values[i]):g} at x = {places[i]:g}, expected 0 to 1"
+                f"expression {shown(self.text)} gives {float(values[i]):g} at x = {places[i]:g}, expected at most 1"
             )
         return self
 
