@@ -14,6 +14,7 @@ from fuzzy_arbiter.propositions import Is, anything
 from fuzzy_arbiter.rule import Rule
 from fuzzy_arbiter.rule_text import parse_rule
 from fuzzy_arbiter.shapes import Membership
+from fuzzy_arbiter.terms.curves import Curve
 from fuzzy_arbiter.terms.values import Formula, Linear, Value, invertible
 
 Conjunction = Literal[
@@ -195,7 +196,8 @@ class Output(Variable):
     Raises
     ------
     DefinitionError
-        If a term has no area in the universe, so that it has no centroid, or the universe is wider than 1e100 or
+        If a term has no area in the universe, so that it has no centroid, unless it is a singleton, which counts where
+        nothing else fires; if the universe is wider than 1e100 or
         narrower than 1e-100, so that floating point cannot hold its moments; or the terms do not suit the defuzzifier.
 
     Examples
@@ -245,7 +247,9 @@ class Output(Variable):
                 f"{what} is a value, expected a membership function, or one of the defuzzifiers {', '.join(WEIGHTED)}"
             )
         made = self._within(term)
-        if not term.shape.area(self.universe) > 0.0:
+        point = isinstance(term.shape, Curve) and term.shape.kind == "singleton"
+        inside = point and self.universe[0] <= term.shape.parameters[0] <= self.universe[1]
+        if not inside and not term.shape.area(self.universe) > 0.0:
             raise DefinitionError(f"{what} has no area in [{_span(self)}]")
         return made
 

@@ -153,7 +153,7 @@ class Not(Proposition):
         yield from self.part.terms()
 
     def __str__(self) -> str:
-        if isinstance(self.part, Is | Anything | Hedged):
+        if not isinstance(self.part, Not) and _on_one(self.part):
             variable, words = _said(self.part)
             return f"{quoted(variable)} is not {words}"
         return f"not ({self.part})"
@@ -179,13 +179,13 @@ class Anything(Proposition):
 
 @dataclass(frozen=True, slots=True)
 class Hedged(Proposition):
-    """A statement, bent by a hedge: ``service is very poor``.
+    """A statement or a whole condition, bent by a hedge: ``service is very poor``, ``very (a is b or c is d)``.
 
     Attributes
     ----------
     hedge : {"very", "somewhat", "extremely", "seldom"}
         How it bends the degree, see `fuzzy_arbiter.norms.HEDGES`.
-    part : Is, Anything, Hedged, or Not of one of these
+    part : Proposition
         What is bent.
     """
 
@@ -196,18 +196,17 @@ class Hedged(Proposition):
     def __post_init__(self) -> None:
         if not isinstance(self.hedge, str) or self.hedge not in HEDGES:
             raise DefinitionError(f"hedge is {shown(self.hedge)}, expected one of {', '.join(HEDGES)}")
-        inner = self.part
-        while isinstance(inner, Not | Hedged):
-            inner = inner.part
-        if not isinstance(inner, Is | Anything):
-            raise DefinitionError(f"{self.hedge}: {shown(self.part)} came, expected a statement on one term")
-        _set_nesting(self, self.part.nesting + 1)
+        if not isinstance(self.part, Proposition):
+            raise DefinitionError(f"{self.hedge}: {shown(self.part)} came, expected such as variable['term']")
+        _set_nesting(self, self.part.nesting + (1 if _on_one(self.part) else 2))
 
     def terms(self) -> Iterator[Is]:
         """Yield the statement of the part."""
         yield from self.part.terms()
 
     def __str__(self) -> str:
+        if not _on_one(self.part):
+            return f"{self.hedge} ({self.part})"
         variable, words = _said(self)
         return f"{quoted(variable)} is {words}"
 
@@ -232,6 +231,13 @@ def anything(p: Proposition) -> Iterator[str]:
     elif isinstance(p, _Join):
         for part in p.parts:
             yield from anything(part)
+
+
+def _on_one(p: Proposition) -> bool:
+    """Return whether a proposition is a statement on one term, perhaps with hedges and negations."""
+    while isinstance(p, Not | Hedged):
+        p = p.part
+    return isinstance(p, Is | Anything)
 
 
 def _said(p: Proposition) -> tuple[str, str]:

@@ -18,6 +18,7 @@ from fuzzy_arbiter.engines.firing import Slot
 from fuzzy_arbiter.errors import EngineError
 from fuzzy_arbiter.norms import AGGREGATIONS, T_NORMS
 from fuzzy_arbiter.shapes import Array, Membership
+from fuzzy_arbiter.terms.curves import Curve
 
 BOUND = 1e-9  # of the universe's width: more than a centroid is off
 _TOLERANCE = 1e-13  # of the area, for each part
@@ -98,7 +99,7 @@ class Quadrature:
         parts = joined.parts()
         area = parts.areas.sum()
         if not area > 0.0:
-            return float("nan")
+            return joined.of_points()
         if self._output.defuzzifier == "bisector":
             return joined.bisector(parts)
         return float(min(max(self._low + parts.moments.sum() / area, self._low), self._low + self._width))
@@ -215,6 +216,16 @@ class _Joined:
         joined = Parts(*map(np.concatenate, zip(*done, strict=True)))
         order = np.argsort(joined.starts)
         return Parts(*(column[order] for column in joined))
+
+    def of_points(self) -> float:
+        """Return the mean of the singletons, weighted by their heights: what very narrow terms of one width tend to."""
+        found = [
+            (shape.parameters[0], float(self.of._implications[i](np.array([cut]), np.array([shape.height]))[0]))
+            for i, cut in zip(self.active, self.cuts, strict=True)
+            if isinstance(shape := self.of._shapes[i], Curve) and shape.kind == "singleton"
+        ]
+        weight = sum(height for _, height in found)
+        return sum(place * height for place, height in found) / weight if weight > 0.0 else float("nan")
 
     def bisector(self, parts: Parts) -> float:
         """Return the place that halves the area; of several the middle one."""

@@ -25,7 +25,7 @@ from fuzzy_arbiter.formats.notation import assembled, located, read_number, refu
 from fuzzy_arbiter.formats.settings import read_settings
 from fuzzy_arbiter.propositions import And, Not, Or, Proposition
 from fuzzy_arbiter.rule import Operators, Rule
-from fuzzy_arbiter.rule_text import parse_rule
+from fuzzy_arbiter.rule_text import parse_rules
 
 
 @dataclass
@@ -201,7 +201,7 @@ def _rules(block: _Block, values: set[str]) -> tuple[list[tuple[int, Rule]], Ope
     rules: list[tuple[int, Rule]] = []
     for line, content in block.many:
         with located(f"line {line}"):
-            rules.append((line, parse_rule(content)))
+            rules += [(line, rule) for rule in parse_rules(content)]
     if block.entries.get("activation", (0, ""))[1] in CONJUNCTIONS and "implication" not in block.entries:
         block.entries["implication"] = block.entries.pop("activation")  # the word of fuzzylite 5
     block.word("activation", {"General": None, "": None})

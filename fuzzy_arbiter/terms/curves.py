@@ -266,7 +266,7 @@ KINDS: dict[str, CurveKind] = {
     ),
     "singleton": CurveKind(
         ("place",),
-        lambda place: [(_END, "eq(x, place)")],
+        lambda place: [(place, "eq(x, place)"), (_END, "0")],
         lambda place: True,
         "a place",
         fll=("", (0,)),
