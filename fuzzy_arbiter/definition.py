@@ -118,7 +118,8 @@ class Variable:
         if len(bounds) != 2 or bounds[0] is None or bounds[1] is None:
             raise DefinitionError(f"{what}: universe is {shown(self.universe)}, expected two finite numbers")
         low, high = bounds[0], bounds[1]
-        if not low < high:
+        # of values the universe is no more than what they are held in
+        if not (low < high or (low == high and isinstance(self, Output) and self.weighted)):
             raise DefinitionError(f"{what}: universe is [{low}, {high}], expected the first below the second")
         if finite(high - low) is None:
             raise DefinitionError(f"{what}: universe is [{low}, {high}], expected a finite width")
@@ -217,7 +218,7 @@ class Output(Variable):
         # not super(): the decorator makes the class anew for its slots, and the method keeps the old one
         Variable.__post_init__(self)
         what = f"output {self.name!r}"
-        if not WIDTHS[0] <= self.universe[1] - self.universe[0] <= WIDTHS[1]:
+        if not self.weighted and not WIDTHS[0] <= self.universe[1] - self.universe[0] <= WIDTHS[1]:
             raise DefinitionError(f"{what}: universe is [{_span(self)}], expected a width from 1e-100 to 1e+100")
         for key, known in (("defuzzifier", get_args(Defuzzifier)), ("aggregation", tuple(AGGREGATIONS))):
             if not isinstance(getattr(self, key), str) or getattr(self, key) not in known:

@@ -243,13 +243,15 @@ def bent_rules(
     list of Rule
         One for each row of hedges, each bending the condition.
     """
-    rows: dict[tuple[str, ...], list[Is]] = {}
+    rows: dict[tuple[tuple[str, ...], int], list[Is]] = {}
     carried: tuple[str, ...] = ()
-    for hedges, conclusion in conclusions:
+    for k, (hedges, conclusion) in enumerate(conclusions):
         carried = hedges + carried
-        rows.setdefault(carried, []).append(conclusion)
+        # a second conclusion on one output is another rule, too
+        before = sum(c.variable == conclusion.variable for _, c in conclusions[:k])
+        rows.setdefault((carried, before), []).append(conclusion)
     rules = []
-    for row, concluded in rows.items():
+    for (row, _), concluded in rows.items():
         bent = condition
         for word in reversed(row):
             bent = Not(bent) if word == "not" else Hedged(word, bent)

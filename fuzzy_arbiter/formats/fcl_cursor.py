@@ -12,7 +12,7 @@ from fuzzy_arbiter.formats.fll_terms import TYPES, read_shape
 from fuzzy_arbiter.formats.notation import read_number, refuse
 from fuzzy_arbiter.shapes import Membership, Point, Shape
 from fuzzy_arbiter.terms.curves import Curve
-from fuzzy_arbiter.terms.values import Constant, Formula, Value
+from fuzzy_arbiter.terms.values import Constant, Formula, Linear, Value
 
 _T = TypeVar("_T")
 
@@ -131,7 +131,7 @@ class Cursor:
             if word in COUNTS and token.text not in TYPES:
                 return read_curve(word, [self.number("a parameter") for _ in range(COUNTS[word])])
             if token.text == "FUNCTION":  # jFuzzyLogic's, whose LOG is that to the base of 10
-                return Formula(_decimal_logs(self.rest())), []
+                return self.function(), []
             require_known(token.text, token.line, ("FUNCTION", *COUNTS, *TYPES))
             self.fuzzylite = True
             shape = read_shape(token.text, self.rest(), token.line, inputs)
@@ -146,6 +146,16 @@ class Cursor:
         if not points:
             self.unexpected("points such as (0, 0) (5, 1), a number or a function such as GAUSS")
         return Shape(tuple(points)), [x for x, _ in points]
+
+    def function(self) -> Formula | Linear:
+        """Take jFuzzyLogic's function of the inputs, as a linear one where it is said as such."""
+        formula = Formula(_decimal_logs(self.rest()))
+        linear = Linear.of(formula.expression(sorted(formula.names)).tree, self.input_names())
+        return linear or formula
+
+    def input_names(self) -> tuple[str, ...]:
+        """Return the names of the inputs so far."""
+        return ()
 
 
 def _decimal_logs(text: str) -> str:

@@ -81,6 +81,9 @@ class _Reader(Cursor):
     outputs: dict[str, _Draft] = field(default_factory=dict)
     blocks: list[_Block] = field(default_factory=list)
 
+    def input_names(self) -> tuple[str, ...]:
+        return tuple(self.inputs)
+
     def system(self, settings: dict[str, Any]) -> System:
         begin = self.take("FUNCTION_BLOCK")
         name = self.title(begin.line) or "arbiter"

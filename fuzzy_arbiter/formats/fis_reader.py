@@ -16,7 +16,7 @@ from fuzzy_arbiter.propositions import And, Anything, Hedged, Is, Not, Or, Propo
 from fuzzy_arbiter.rule import Rule
 from fuzzy_arbiter.rule_text import bent_rules
 from fuzzy_arbiter.shapes import Membership
-from fuzzy_arbiter.terms.values import Formula
+from fuzzy_arbiter.terms.values import Formula, Value
 
 _SECTION = re.compile(r"\[\s*(System|Input|Output|Rules)\s*([1-9][0-9]{0,8})?\s*\]", re.ASCII)
 _ENTRY = re.compile(r"(\w+)\s*=\s*(.*)", re.ASCII)
@@ -53,7 +53,7 @@ class _Section:
 def read(text: str) -> System:
     """Return the system that MATLAB's text defines.
 
-    In a file of Sugeno's kind the strengths of rules that conclude one term are added, whatever AggMethod says, as MATLAB
+    Values of one name are numbered, as rules speak of them by their place. In a file of Sugeno's kind the strengths of rules that conclude one term are added, whatever AggMethod says, as MATLAB
     does it.
 
     Parameters
@@ -80,12 +80,12 @@ def read(text: str) -> System:
     system = sections["System"]
     norms, defuzzifier, name = _norms(system), _defuzzifier(system), system.string("Name")
     aggregation = norms.pop("aggregation")
+    fuzzylite = any("generated with fuzzylite" in text for _, text in comments)
     inputs = [Variable(*parts) for parts in _variables(sections, "Input", None)]
     outputs = _outputs(sections, len(inputs), defuzzifier, aggregation)
-    system.require_count("NumInputs", len(inputs))
-    system.require_count("NumOutputs", len(outputs))
-    system.require_count("NumRules", len(sections["Rules"].rows))
-    fuzzylite = any("generated with fuzzylite" in text for _, text in comments)
+    counted = {"NumInputs": len(inputs), "NumOutputs": len(outputs), "NumRules": len(sections["Rules"].rows)}
+    for key, count in counted.items():
+        system.require_count(key, count)
     rules: list[tuple[int, Rule]] = []
     for line, row in sections["Rules"].rows:
         with located(f"line {line}: {row!r}"):
@@ -214,11 +214,26 @@ def _variable(section: _Section, inputs: int | None) -> _Parts:
         term, function, places = match.groups()
         with located(f"line {line}: term {term!r}"):
             terms.append(Term(term, read_function(function, places, line, term, inputs)))
-    parts = name, (bounds[0], bounds[1]), tuple(terms)
+    parts = name, (bounds[0], bounds[1]), _told_apart(terms)
     with located(f"line {section.line}"):
         if inputs is None:
             Variable(*parts)
     return parts
+
+
+def _told_apart(terms: Sequence[Term]) -> tuple[Term, ...]:
+    """Return values with a number after a name that came before: rules speak of their places, and MATLAB names all alike."""
+    if not all(isinstance(term.shape, Value) for term in terms):
+        return tuple(terms)
+    found: list[Term] = []
+    for term in terms:
+        name, names = term.name, {other.name for other in found}
+        for k in range(2, len(terms) + 2):
+            if name not in names:
+                break
+            name = f"{term.name}_{k}"
+        found.append(Term(name, term.shape))
+    return tuple(found)
 
 
 def _rules(

@@ -6,7 +6,7 @@ from fuzzy_arbiter.definition import Output, System, Variable
 from fuzzy_arbiter.errors import UnsupportedError
 from fuzzy_arbiter.formats.fll_reader import read
 from fuzzy_arbiter.formats.fll_terms import RESERVED, say_shape
-from fuzzy_arbiter.formats.fll_words import DEFUZZIFIERS, SETTINGS
+from fuzzy_arbiter.formats.fll_words import DEFUZZIFIERS, settings_of
 from fuzzy_arbiter.formats.notation import blocks, cannot_say, require_words, say_number, say_numbers
 from fuzzy_arbiter.formats.settings import say_settings
 from fuzzy_arbiter.norms import AGGREGATIONS, S_NORMS, T_NORMS
@@ -38,7 +38,7 @@ def write(system: System) -> str:
         raise UnsupportedError(f"fll cannot say the name {system.name!r}: what follows # is a comment")
     require_words(system, "fll", RESERVED)
     lock = "true" if system.outside == "clip" else "false"
-    lines = [f"# {text}" for text in say_settings(system, SETTINGS)]
+    lines = [f"# {text}" for text in say_settings(system, settings_of(system.outputs))]
     lines.append(f"Engine: {system.name}")
     for v in system.inputs:
         lines += [f"InputVariable: {v.name}", "  enabled: true", f"  range: {say_numbers(v.universe)}"]

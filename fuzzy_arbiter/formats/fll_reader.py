@@ -19,7 +19,7 @@ from fuzzy_arbiter.formats.fll_words import (
     MANY,
     OLD,
     RESOLUTION,
-    SETTINGS,
+    settings_of,
 )
 from fuzzy_arbiter.formats.notation import assembled, located, read_number, refuse
 from fuzzy_arbiter.formats.settings import read_settings
@@ -74,7 +74,6 @@ def read(text: str) -> System:
         If what it defines cannot be.
     """
     blocks, comments = _blocks(text)
-    settings = read_settings(comments, SETTINGS)
     engines = [b for b in blocks if b.kind == "Engine"]
     if len(engines) != 1:
         raise FormatError(f"expected one Engine in a FLL file, {len(engines) or 'none'} came")
@@ -85,6 +84,7 @@ def read(text: str) -> System:
     made = [_output(b, len(inputs)) for b in outputs]
     results = [output for output, _ in made]
     clips = _alike(inputs, [b.word("lock-range", {"true": "clip", "false": "refuse"}, "false") for b in inputs])
+    settings = read_settings(comments, settings_of(results))
     values = {output.name for output in results if output.weighted}
     said = [_rules(block, values) for block in rule_blocks]
     # the system has the operators of the first block, and a rule of another its own
@@ -95,7 +95,7 @@ def read(text: str) -> System:
     name = engines[0].name or "arbiter"
     options = {
         "outside": clips or "refuse",
-        "points": max((points for _, points in made), default=RESOLUTION),
+        "points": max((points for _, points in made), default=0) or RESOLUTION,
         **{key: getattr(first, key) for key in ("conjunction", "disjunction", "implication")},
         **settings,
     }
@@ -160,7 +160,7 @@ def _variable(block: _Block, inputs: int | None = None) -> tuple[str, tuple[floa
 
 
 def _output(block: _Block, inputs: int) -> tuple[Output, int]:
-    """Return an output, and the points of its defuzzifier."""
+    """Return an output, and the points of its defuzzifier, 0 for values."""
     parts = _variable(block, inputs)
     defuzzifier, points = _defuzzifier(block)
     none = {"none": "sum", "": "sum"} if defuzzifier in ("average", "sum") else {}
@@ -189,7 +189,7 @@ def _defuzzifier(block: _Block) -> tuple[Any, int]:
         wrong = {"TakagiSugeno": False, "Tsukamoto": True}.get(option)
         if wrong in kinds:
             refuse(line, f"{word} has the type {option}, for which a term of {block.name!r} is not made")
-        return name, RESOLUTION
+        return name, 0
     if not re.fullmatch(r"[0-9]{0,4000}", option):
         refuse(line, f"defuzzifier of {block.name!r} is {value}, expected {word} and its resolution")
     return name, int(option or RESOLUTION)

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
+from fuzzy_arbiter.definition import Output
 from fuzzy_arbiter.norms import AGGREGATIONS, S_NORMS, T_NORMS
 
-SETTINGS = ("normalization",)
 CONJUNCTIONS = {norm.fll: name for name, norm in T_NORMS.items()}  # and implications
 DISJUNCTIONS = {norm.fll: name for name, norm in S_NORMS.items()}
 JOINS = {norm.fll: name for name, norm in AGGREGATIONS.items()}
@@ -30,3 +32,19 @@ KEYS: dict[str, tuple[str, ...]] = {
 }
 MANY = ("term", "rule")  # keys that may come again in one block
 OLD = {"accumulation": "aggregation"}  # keys of fuzzylite 5
+
+
+def settings_of(outputs: Sequence[Output]) -> tuple[str, ...]:
+    """Return the settings of a system that the language has no words for.
+
+    Parameters
+    ----------
+    outputs : sequence of Output
+        Of the system; where all are of values, none has points.
+
+    Returns
+    -------
+    tuple of str
+        Names of attributes of `System`.
+    """
+    return ("normalization", "points") if all(output.weighted for output in outputs) else ("normalization",)

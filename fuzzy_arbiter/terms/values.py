@@ -13,7 +13,7 @@ from fuzzy_arbiter.checks import all_of, finite, shown
 from fuzzy_arbiter.errors import DefinitionError
 from fuzzy_arbiter.shapes import Array, Membership, Shape
 from fuzzy_arbiter.terms.curves import Curve
-from fuzzy_arbiter.terms.expressions import Expression
+from fuzzy_arbiter.terms.expressions import Expression, Node
 
 
 class Value(ABC):
@@ -124,6 +124,37 @@ class Linear(Value):
         if tree is None:
             return Expression("", self.constant)
         return Expression("", ("+", tree, self.constant) if self.constant else tree)
+
+
+    @classmethod
+    def of(cls, tree: Node, inputs: Sequence[str]) -> Linear | None:
+        """Return the linear value that a tree says, if it says it as `expression` does.
+
+        Parameters
+        ----------
+        tree : Node
+            Of an expression.
+        inputs : sequence of str
+            Names of the inputs.
+
+        Returns
+        -------
+        Linear or None
+            None if the tree says something else, or the same in another way.
+        """
+        coefficients = dict.fromkeys(inputs, 0.0)
+        constant = 0.0
+        node = tree
+        while node is not None:
+            node, part = (node[1], node[2]) if isinstance(node, tuple) and node[0] == "+" else (None, node)
+            if isinstance(part, float):
+                constant = part
+            elif isinstance(part, tuple) and part[0] == "*" and isinstance(part[1], float) and part[2] in coefficients:
+                coefficients[part[2]] = part[1]
+            else:
+                return None
+        made = cls(tuple(coefficients.values()), constant)
+        return made if made.expression(inputs).tree == tree else None
 
 
 @dataclass(frozen=True, slots=True)
