@@ -9,13 +9,14 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from fuzzy_arbiter.arbiter import Arbiter
-    from fuzzy_arbiter.definition import Output, System, Term, Variable
+    from fuzzy_arbiter.definition import Output, System, Variable
     from fuzzy_arbiter.errors import ArbiterError, UndefinedOutputError
     from fuzzy_arbiter.hierarchy import SECTION_VI, Criterion, prioritised
     from fuzzy_arbiter.hysteresis import HysteresisArbiter
     from fuzzy_arbiter.membership import ramp
     from fuzzy_arbiter.rule import Rule
     from fuzzy_arbiter.shapes import Shape, falling, rising, trapezoid, triangle
+    from fuzzy_arbiter.terms.term import Term
 
 __all__ = [
     "SECTION_VI",
@@ -41,12 +42,13 @@ __all__ = [
 # imported when asked for, so that the command can say what is not installed
 _HOMES = {
     "arbiter": {"Arbiter"},
-    "definition": {"Output", "System", "Term", "Variable"},
+    "definition": {"Output", "System", "Variable"},
     "errors": {"ArbiterError", "UndefinedOutputError"},
     "hierarchy": {"SECTION_VI", "Criterion", "prioritised"},
     "hysteresis": {"HysteresisArbiter"},
     "membership": {"ramp"},
     "rule": {"Rule"},
+    "terms.term": {"Term"},
     "shapes": {"Shape", "falling", "rising", "trapezoid", "triangle"},
 }
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from numbers import Integral
@@ -9,34 +10,18 @@ from typing import Literal, TypeVar, get_args
 
 from fuzzy_arbiter.checks import all_of, finite, require_name, shown
 from fuzzy_arbiter.errors import DefinitionError
-from fuzzy_arbiter.norms import AGGREGATIONS
+from fuzzy_arbiter.norms import AGGREGATIONS, S_NORMS, T_NORMS
 from fuzzy_arbiter.propositions import Is, anything
 from fuzzy_arbiter.rule import Rule
 from fuzzy_arbiter.rule_text import parse_rule
 from fuzzy_arbiter.shapes import Membership
 from fuzzy_arbiter.terms.curves import Curve
+from fuzzy_arbiter.terms.term import Term
 from fuzzy_arbiter.terms.values import Formula, Linear, Value, invertible
 
-Conjunction = Literal[
-    "min",
-    "prod",
-    "bounded_difference",
-    "drastic_product",
-    "einstein_product",
-    "hamacher_product",
-    "nilpotent_minimum",
-]
-Disjunction = Literal[
-    "max",
-    "probor",
-    "bounded_sum",
-    "drastic_sum",
-    "einstein_sum",
-    "hamacher_sum",
-    "nilpotent_maximum",
-    "normalized_sum",
-]
-Implication = Conjunction
+Conjunction = str  # one of norms.T_NORMS, which are those for implication, too
+Disjunction = str  # one of norms.S_NORMS
+Implication = str
 Defuzzifier = Literal["centroid", "bisector", "mom", "som", "lom", "average", "sum"]
 WEIGHTED = ("average", "sum")  # defuzzifiers that take each term's value times its strength
 Normalization = Literal["range", "none", "sum", "max"]
@@ -45,40 +30,6 @@ Outside = Literal["refuse", "clip"]
 MAX_POINTS = 1_000_000_000
 # of an output's universe; moments are products of such widths, which must not over- or underflow
 WIDTHS = (1e-100, 1e100)
-
-
-@dataclass(frozen=True, slots=True)
-class Term:
-    """A word for a part of a universe, and to what degree each place belongs to it; or, of an output, for a value.
-
-    Attributes
-    ----------
-    name : str
-        The word.
-    shape : Membership or Value
-        A `Shape` of points, a curve such as ``curve("gaussian", 5, 2)``, or, of an output whose terms are values, a
-        `Constant`, a `Linear` or a `Formula`.
-
-    Raises
-    ------
-    DefinitionError
-        If the shape is none.
-
-    Examples
-    --------
-    >>> from fuzzy_arbiter import Term, triangle
-    >>> Term("medium", triangle(0.0, 0.5, 1.0)).shape(0.25)
-    0.5
-    """
-
-    name: str
-    shape: Membership | Value
-
-    def __post_init__(self) -> None:
-        if not isinstance(self.shape, Membership | Value):
-            raise DefinitionError(
-                f"term {shown(self.name)}: shape is {shown(self.shape)}, expected such as triangle(0, 1, 2)"
-            )
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,17 +84,13 @@ class Variable:
         if twice is not None:
             raise DefinitionError(f"{what}: two terms are named {twice!r}, expected each name once")
         if not isinstance(self, Output):
-            for term in terms:
-                if not isinstance(term.shape, Membership):
-                    raise DefinitionError(f"{what}: term {term.name!r} is a value, expected a membership function")
             object.__setattr__(self, "terms", tuple(map(self._within, terms)))
         else:
             object.__setattr__(self, "terms", terms)
 
     def _within(self, term: Term) -> Term:
-        assert isinstance(term.shape, Membership)
         try:
-            return Term(term.name, term.shape.within(self.universe))
+            return Term(term.name, term.membership.within(self.universe))
         except DefinitionError as error:
             raise DefinitionError(f"variable {self.name!r}: term {term.name!r}: {error}") from None
 
@@ -222,7 +169,9 @@ class Output(Variable):
             raise DefinitionError(f"{what}: universe is [{_span(self)}], expected a width from 1e-100 to 1e+100")
         for key, known in (("defuzzifier", get_args(Defuzzifier)), ("aggregation", tuple(AGGREGATIONS))):
             if not isinstance(getattr(self, key), str) or getattr(self, key) not in known:
-                raise DefinitionError(f"{what}: {key} is {shown(getattr(self, key))}, expected one of {', '.join(known)}")
+                raise DefinitionError(
+                    f"{what}: {key} is {shown(getattr(self, key))}, expected one of {', '.join(known)}"
+                )
         for key in ("lock_range", "lock_previous"):
             if not isinstance(getattr(self, key), bool):
                 raise DefinitionError(f"{what}: {key} is {shown(getattr(self, key))}, expected True or False")
@@ -231,8 +180,8 @@ class Output(Variable):
         for term in self.terms if self.weighted else ():
             if not isinstance(term.shape, Value) and not invertible(term.shape):
                 raise DefinitionError(
-                    f"{what}: term {term.name!r} is no value, nor does it only rise or only fall, expected such for the "
-                    f"defuzzifier {self.defuzzifier!r}"
+                    f"{what}: term {term.name!r} is no value, nor does it only rise or only fall, as the defuzzifier "
+                    f"{self.defuzzifier!r} expects it"
                 )
         if self.default is not None:
             default = finite(self.default)
@@ -243,14 +192,14 @@ class Output(Variable):
     def _joinable(self, term: Term) -> Term:
         """Return a term as it is in the universe, if it can be joined with others there."""
         what = f"output {self.name!r}: term {term.name!r}"
-        if not isinstance(term.shape, Membership) or isinstance(term.shape, Formula) and term.shape.names - {"x"}:
+        if not isinstance(term.shape, Membership) or (isinstance(term.shape, Formula) and term.shape.names - {"x"}):
             raise DefinitionError(
                 f"{what} is a value, expected a membership function, or one of the defuzzifiers {', '.join(WEIGHTED)}"
             )
         made = self._within(term)
-        point = isinstance(term.shape, Curve) and term.shape.kind == "singleton"
-        inside = point and self.universe[0] <= term.shape.parameters[0] <= self.universe[1]
-        if not inside and not term.shape.area(self.universe) > 0.0:
+        shape = made.membership
+        point = shape.parameters[0] if isinstance(shape, Curve) and shape.kind == "singleton" else math.nan
+        if not self.universe[0] <= point <= self.universe[1] and not shape.area(self.universe) > 0.0:
             raise DefinitionError(f"{what} has no area in [{_span(self)}]")
         return made
 
@@ -336,52 +285,61 @@ class System:
         twice = _repeated(v.name for v in (*self.inputs, *self.outputs))
         if twice is not None:
             raise DefinitionError(f"variables: two are named {twice!r}, expected each name once")
-        inputs = {v.name: frozenset(v.term_names) for v in self.inputs}
-        outputs = {v.name: frozenset(v.term_names) for v in self.outputs}
         for i, rule in enumerate(self.rules):
-            where = f"R{i + 1} {str(rule)!r}"
-            for statement in rule.condition.terms():
-                if statement.variable not in outputs:
-                    _require_known(statement, inputs, "input", where)
-                    continue
-                _require_known(statement, outputs, "output", where)
-                if not any(c.variable == statement.variable for r in self.rules[:i] for c in r.conclusions):
-                    raise DefinitionError(
-                        f"{where}: asks for the output {statement.variable!r}, expected rules before it that conclude on "
-                        "that"
-                    )
-            for name in anything(rule.condition):
-                if name not in inputs:
-                    raise DefinitionError(f"{where}: no input {name!r}, expected one of {', '.join(inputs)}")
-            for statement in rule.conclusions:
-                _require_known(statement, outputs, "output", where)
-            if len({statement.variable for statement in rule.conclusions}) < len(rule.conclusions):
-                raise DefinitionError(f"{where}: two conclusions on one output, expected each output once")
-        used: set[str] = set()
-        for k, output in enumerate(self.outputs):
-            for term in output.terms if output.weighted else ():
-                if isinstance(term.shape, Value):
-                    try:
-                        whole = term.shape.expression(tuple(inputs), variable_names(self.outputs[:k]))
-                    except DefinitionError as error:
-                        raise DefinitionError(f"output {output.name!r}: term {term.name!r}: {error}") from None
-                    used |= whole.names | (inputs.keys() if isinstance(term.shape, Linear) else set())
-        for variable in self.inputs:
-            if not variable.terms and variable.name not in used:
-                raise DefinitionError(f"variable {variable.name!r}: no terms came, expected at least one")
+            _require_rule(self, i, rule)
+        _require_values(self)
 
     def __str__(self) -> str:
         return "\n".join(f"R{i + 1}: {rule}" for i, rule in enumerate(self.rules))
 
 
 CHOICES = {
-    "conjunction": get_args(Conjunction),
-    "disjunction": get_args(Disjunction),
-    "implication": get_args(Implication),
+    "conjunction": tuple(T_NORMS),
+    "disjunction": tuple(S_NORMS),
+    "implication": tuple(T_NORMS),
     "normalization": get_args(Normalization),
     "outside": get_args(Outside),
 }
 _N = TypeVar("_N", bound=str)
+
+
+def _require_rule(system: System, i: int, rule: Rule) -> None:
+    """Refuse a rule that speaks of what there is not."""
+    inputs = {v.name: frozenset(v.term_names) for v in system.inputs}
+    outputs = {v.name: frozenset(v.term_names) for v in system.outputs}
+    where = f"R{i + 1} {str(rule)!r}"
+    before = {c.variable for earlier in system.rules[:i] for c in earlier.conclusions}
+    for statement in rule.condition.terms():
+        if statement.variable not in outputs:
+            _require_known(statement, inputs, "input", where)
+            continue
+        _require_known(statement, outputs, "output", where)
+        if statement.variable not in before:
+            raise DefinitionError(f"{where}: asks for output {statement.variable!r}, on which no rule before concludes")
+    for name in anything(rule.condition):
+        if name not in inputs:
+            raise DefinitionError(f"{where}: no input {name!r}, expected one of {', '.join(inputs)}")
+    for statement in rule.conclusions:
+        _require_known(statement, outputs, "output", where)
+    if len({statement.variable for statement in rule.conclusions}) < len(rule.conclusions):
+        raise DefinitionError(f"{where}: two conclusions on one output, expected each output once")
+
+
+def _require_values(system: System) -> None:
+    """Refuse values that speak of what there is not, and inputs that nothing speaks of."""
+    inputs = variable_names(system.inputs)
+    used: set[str] = set()
+    for k, output in enumerate(system.outputs):
+        for term in output.terms if output.weighted else ():
+            if isinstance(term.shape, Value):
+                try:
+                    whole = term.shape.expression(inputs, variable_names(system.outputs[:k]))
+                except DefinitionError as error:
+                    raise DefinitionError(f"output {output.name!r}: term {term.name!r}: {error}") from None
+                used |= whole.names | (set(inputs) if isinstance(term.shape, Linear) else set())
+    for variable in system.inputs:
+        if not variable.terms and variable.name not in used:
+            raise DefinitionError(f"variable {variable.name!r}: no terms came, expected at least one")
 
 
 def _require_known(statement: Is, known: dict[str, frozenset[str]], kind: str, where: str) -> None:

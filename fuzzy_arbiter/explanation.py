@@ -184,7 +184,7 @@ def explain(engine: Engine, inputs: Sequence[float]) -> Explanation:
         for k, (centroid, weight) in enumerate(zip(centroids, weights, strict=True))
     )
     degrees = tuple(
-        InputDegrees(v.name, float(x), {t.name: t.shape(x) for t in v.terms})
+        InputDegrees(v.name, float(x), {t.name: t.membership(x) for t in v.terms})
         for v, x in zip(system.inputs, inputs, strict=True)
     )
     return Explanation(degrees, rules, outputs, *_ranking(variable_names(system.outputs), weights))

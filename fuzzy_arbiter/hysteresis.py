@@ -292,7 +292,7 @@ def _on_terms(system: System, on: Mapping[str, str] | None) -> list[str]:
 
 
 def _shape(variable: Variable, term: str) -> Shape:
-    return next(t.shape for t in variable.terms if t.name == term)
+    return next(t.straight for t in variable.terms if t.name == term)
 
 
 def _place(variable: Variable, shape: Shape, degree: float) -> float:

@@ -92,7 +92,7 @@ def normalized_sum(a: float, b: float) -> float:
 
 
 def _quotient(above: Array, below: Array, good: NDArray[np.bool_], otherwise: float) -> Array:
-    return np.divide(above, below, out=np.full(np.shape(above), otherwise), where=good)
+    return np.asarray(np.divide(above, below, out=np.full(np.shape(above), otherwise), where=good))
 
 
 T_NORMS: dict[str, Norm] = {
@@ -217,9 +217,7 @@ def seldom(a: float) -> float:
 HEDGES: dict[str, HedgeKind] = {
     "very": HedgeKind(very, lambda a: a * a),
     "somewhat": HedgeKind(somewhat, np.sqrt),
-    "extremely": HedgeKind(
-        extremely, lambda a: np.where(a <= 0.5, 2.0 * a * a, 1.0 - 2.0 * (1.0 - a) * (1.0 - a))
-    ),
+    "extremely": HedgeKind(extremely, lambda a: np.where(a <= 0.5, 2.0 * a * a, 1.0 - 2.0 * (1.0 - a) * (1.0 - a))),
     "seldom": HedgeKind(seldom, lambda a: np.where(a <= 0.5, np.sqrt(0.5 * a), 1.0 - np.sqrt(0.5 * (1.0 - a)))),
 }
 """Hedges by their word; *not* and *any* are propositions of their own."""

@@ -216,17 +216,13 @@ class _Parser:
             else:
                 break
         anything = self.accept("any")
-        statement: Proposition = (
-            Anything(variable) if anything else Is(variable, self.take("name", "a term's name"))
-        )
+        statement: Proposition = Anything(variable) if anything else Is(variable, self.take("name", "a term's name"))
         for word in reversed(bends):
             statement = self.made(Not if word == "not" else partial(Hedged, word), statement)
         return statement
 
 
-def bent_rules(
-    condition: Proposition, conclusions: Sequence[tuple[tuple[str, ...], Is]], weight: float
-) -> list[Rule]:
+def bent_rules(condition: Proposition, conclusions: Sequence[tuple[tuple[str, ...], Is]], weight: float) -> list[Rule]:
     """Return a rule whose conclusions have hedges as rules whose conclusions have none, as fuzzylite takes it.
 
     Parameters

@@ -80,7 +80,7 @@ class ClosedEngine(Engine):
         self.scaled = self.raw if system.normalization == "none" else scaled
         super().__init__(system)
         self._index = {v.name: i for i, v in enumerate(system.inputs)}
-        self._shapes = {(v.name, t.name): t.shape for v in system.inputs for t in v.terms}
+        self._shapes = {(v.name, t.name): t.membership for v in system.inputs for t in v.terms}
         self._cubic = _one_cubic(self.scaled)
         self.clips = system.normalization != "none" and self._cubic != SMOOTHSTEP
         # prioritised criteria in the order of the inputs, which are the degrees themselves: nothing to look up

@@ -101,7 +101,7 @@ class Engine(ABC):
             If no rule fires for an output without default.
         """
         cuts = self.firing.cuts(self.firing.strengths(inputs))
-        result = []
+        result: list[float] = []
         for k, (output, cut) in enumerate(zip(self.system.outputs, cuts, strict=True)):
             value = self.value(k, cut, (*inputs, *result)) if any(cut) else math.nan
             if not math.isfinite(value):
@@ -164,7 +164,7 @@ class Engine(ABC):
         """
         result = np.empty((len(inputs), len(self.system.outputs)))
         for k, cuts in enumerate(self.firing.cuts_of_many(self.firing.strengths_of_many(inputs))):
-            output, fires = self.system.outputs[k], cuts.any(axis=0)
+            output, fires = self.system.outputs[k], np.asarray(cuts.any(axis=0))
             values = result[:, k]
             known = np.column_stack([inputs, result[:, :k]]) if output.weighted else inputs
             if fires.all():

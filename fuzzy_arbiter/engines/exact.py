@@ -20,7 +20,7 @@ _BLOCK = 1024  # samples evaluated at a time
 
 
 class ExactEngine(Engine):
-    """Evaluates any system: what is piecewise linear exactly, over all its breakpoints, values as they are, else by quadrature.
+    """Evaluates any system: straight terms exactly, over all their breakpoints; values as they are; else by quadrature.
 
     Attributes
     ----------
@@ -55,6 +55,12 @@ class ExactEngine(Engine):
                     else f"adaptive quadrature, within {BOUND:g} of the universe's width"
                 )
         super().__init__(system)
+
+    def quadrature(self, name: str) -> bool:
+        """Return whether an output is integrated by quadrature."""
+        return any(
+            o.name == name and isinstance(w, Quadrature) for o, w in zip(self.system.outputs, self._ways, strict=True)
+        )
 
     def centroid(self, k: int, cuts: Sequence[float]) -> float:
         """Return the value of an output, as exact as `methods` says."""

@@ -164,7 +164,7 @@ class Firing:
         self.system = system
         self.slots = tuple(slots_of(system, output) for output in system.outputs)
         self._inputs = {v.name: i for i, v in enumerate(system.inputs)}
-        self._shapes = {(v.name, t.name): t.shape for v in system.inputs for t in v.terms}
+        self._shapes = {(v.name, t.name): t.membership for v in system.inputs for t in v.terms}
         logics = {o: number_logic(o or system) for o in {rule.operators for rule in system.rules}}
         self._rules = [(rule.condition, logics[rule.operators], rule.weight) for rule in system.rules]
         self._joins = [AGGREGATIONS[output.aggregation] for output in system.outputs]
@@ -186,7 +186,7 @@ class Firing:
         def of(statement: Is) -> float:
             place = self._inputs.get(statement.variable)
             if place is None:  # an output, as the rules before have concluded on it
-                return self._concluded(statement, result, number=True)
+                return float(self._concluded(statement, result, number=True))
             return self._shapes[statement.variable, statement.term](inputs[place])
 
         result: list[float] = []
@@ -248,7 +248,9 @@ class Firing:
         result = []
         for slots, norm in zip(self.slots, self._joins, strict=True):
             join = norm.number
-            result.append([functools.reduce(join, [strengths[i] for i in slot.rules]) if slot.rules else 0.0 for slot in slots])
+            result.append(
+                [functools.reduce(join, [strengths[i] for i in slot.rules]) if slot.rules else 0.0 for slot in slots]
+            )
         return result
 
     def cuts_of_many(self, strengths: Sequence[Array]) -> list[Array]:

@@ -167,7 +167,7 @@ def sampled(output: Output, points: int) -> tuple[Array, Array]:
     grid = np.linspace(*output.universe, points)
     if not (np.diff(grid) > 0.0).all():
         raise EngineError(f"output {output.name!r}: {points} points do not fit in {output.universe}")
-    samples = np.array([term.shape.of_many(grid) for term in output.terms])
+    samples = np.array([term.membership.of_many(grid) for term in output.terms])
     for term, degrees in zip(output.terms, samples, strict=True):
         if not degrees.any():
             raise EngineError(
@@ -195,7 +195,7 @@ def _pieces(output: Output, points: int) -> tuple[_Piece, ...]:
 def _bends(output: Output, grid: Array, samples: Array) -> list[int]:
     """Return the grid's ends and the grid places where a sampled term bends by more than rounding."""
     last = len(grid) - 1
-    knots = [x for term in output.terms for x, _ in term.shape.points]
+    knots = [x for term in output.terms for x, _ in term.straight.points]
     # of a cell with a knot both ends may bend; of a jump at a grid place the cells on both sides
     nearest = {int(i) + side for i in np.searchsorted(grid, knots) for side in (-1, 0, 1)}
     candidates = [*sorted(i for i in nearest if 0 < i < last), last]

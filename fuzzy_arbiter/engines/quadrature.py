@@ -126,11 +126,13 @@ class _Joined:
         """Return the joined height at many places, shape (n,)."""
         height = np.zeros(len(places))
         for i, cut in zip(self.active, self.cuts, strict=True):
-            height = self.of._join(height, self.of._implications[i](np.full(len(places), cut), self.of._shapes[i].of_many(places)))
+            height = self.of._join(
+                height, self.of._implications[i](np.full(len(places), cut), self.of._shapes[i].of_many(places))
+            )
         return height
 
     def _signs(self) -> list[tuple[int, int]]:
-        """Return what may bend the joined terms: a slot with itself, at its cut, or two slots where they change places."""
+        """Return what may bend the joined terms: a slot at its cut, or two slots that change places."""
         own = ("min", "bounded_difference", "nilpotent_minimum")
         signs = [(a, a) for a, i in enumerate(self.active) if self.of._slots[i].implication in own]
         if self.of._output.aggregation in ("max", "nilpotent_maximum"):
@@ -199,7 +201,10 @@ class _Joined:
             off = np.abs(left[0] + right[0] - areas) * self.of._width + np.abs(left[1] + right[1] - moments)
             good = off <= _TOLERANCE * whole * self.of._width
             halves = Parts(
-                *(np.concatenate(pair) for pair in ((starts, middles), (middles, ends), (left[0], right[0]), (left[1], right[1])))
+                *(
+                    np.concatenate(pair)
+                    for pair in ((starts, middles), (middles, ends), (left[0], right[0]), (left[1], right[1]))
+                )
             )
             twice = np.concatenate([good, good])
             done.append(Parts(*(column[twice] for column in halves)))

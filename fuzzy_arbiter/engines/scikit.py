@@ -46,7 +46,7 @@ class ScikitEngine(Engine):
         require_plain(system, self.name, curved_inputs=False)
         for variable in system.inputs:
             for term in variable.terms:
-                if term.shape.jumps:
+                if term.straight.jumps:
                     raise EngineError(
                         f"engine {self.name!r}: input {variable.name!r}: term {term.name!r} jumps, where scikit-fuzzy "
                         "interpolates; expected a continuous shape, or engine 'exact' or 'grid'"
@@ -181,7 +181,7 @@ def _antecedent(variable: Variable) -> Any:
     """Return an input, sampled at its ends and at the knots of its terms, between which all are straight lines."""
     antecedent = control.Antecedent(np.array(variable.knots), variable.name)
     for term in variable.terms:
-        antecedent[term.name] = np.array([term.shape(x) for x in variable.knots])
+        antecedent[term.name] = np.array([term.straight(x) for x in variable.knots])
     return antecedent
 
 

@@ -53,7 +53,13 @@ def write(system: System) -> str:
     for v in system.inputs:
         lines += [f"FUZZIFY {v.name}", *_say_terms(v, names), "END_FUZZIFY", ""]
     for output in system.outputs:
-        lines += [f"DEFUZZIFY {output.name}", *_say_terms(output, names), *_say_output(output, system), "END_DEFUZZIFY", ""]
+        lines += [
+            f"DEFUZZIFY {output.name}",
+            *_say_terms(output, names),
+            *_say_output(output, system),
+            "END_DEFUZZIFY",
+            "",
+        ]
     accumulations = {AGGREGATIONS[output.aggregation].fcl for output in system.outputs}
     for k, (operators, rules) in enumerate(blocks(system)):
         lines += [f"RULEBLOCK rules{k + 1 if k else ''}", f"  AND : {T_NORMS[operators.conjunction].fcl};"]

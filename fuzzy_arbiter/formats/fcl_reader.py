@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from fuzzy_arbiter.definition import WEIGHTED, Output, System, Term, Variable
+from fuzzy_arbiter.definition import WEIGHTED, Output, System, Variable
 from fuzzy_arbiter.formats.fcl_cursor import Cursor
 from fuzzy_arbiter.formats.fcl_terms import universe_of
 from fuzzy_arbiter.formats.fcl_words import CONJUNCTIONS, DISJUNCTIONS, JOINS, METHODS, PAIRS, Token
@@ -14,6 +14,7 @@ from fuzzy_arbiter.formats.notation import assembled, located, refuse
 from fuzzy_arbiter.propositions import quoted
 from fuzzy_arbiter.rule import Operators, Rule
 from fuzzy_arbiter.rule_text import parse_rules
+from fuzzy_arbiter.terms.term import Term
 from fuzzy_arbiter.terms.values import Formula, Value
 
 _SECTIONS = ("VAR_INPUT", "VAR_OUTPUT", "FUZZIFY", "DEFUZZIFY", "RULEBLOCK", "END_FUNCTION_BLOCK")
@@ -270,7 +271,10 @@ class _Reader(Cursor):
                 break
             self.at += 1
         # as names, except the words of rules, for the language has no others
-        words = [token if token.text.lower() in _RULE_WORDS else self.as_name(token) for token in self.tokens[start : self.at]]
+        words = [
+            token if token.text.lower() in _RULE_WORDS else self.as_name(token)
+            for token in self.tokens[start : self.at]
+        ]
         if not self.fuzzylite or self.here.text == ";":
             self.take(";")
         with located(f"line {line}"):

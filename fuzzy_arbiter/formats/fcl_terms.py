@@ -7,7 +7,8 @@ from collections.abc import Sequence
 from fuzzy_arbiter.errors import UnsupportedError
 from fuzzy_arbiter.formats.notation import refuse, say_number, say_numbers
 from fuzzy_arbiter.shapes import Membership, Shape, trapezoid, triangle
-from fuzzy_arbiter.terms.curves import KINDS, Curve
+from fuzzy_arbiter.terms.curves import Curve
+from fuzzy_arbiter.terms.kinds import KINDS
 from fuzzy_arbiter.terms.values import Constant, Formula, Linear, Value
 
 CURVES = {kind.fcl[0]: (name, kind.fcl[1]) for name, kind in KINDS.items() if kind.fcl}
@@ -48,7 +49,9 @@ def read_curve(word: str, numbers: Sequence[float]) -> tuple[Membership, list[fl
     if word == "DSIGM" and not _rises_first(*numbers):
         rising, left, falling, right = map(say_number, numbers)  # where jFuzzyLogic takes 0 for what is below 0
         first, second = f"1/(1+exp(-({rising})*(x-({left}))))", f"1/(1+exp(-({falling})*(x-({right}))))"
-        return Formula(f"max({first} - {second}, 0)"), _extent("sigmoid_difference", (numbers[1], *numbers[::2], numbers[3]))
+        return Formula(f"max({first} - {second}, 0)"), _extent(
+            "sigmoid_difference", (numbers[1], *numbers[::2], numbers[3])
+        )
     name, order = CURVES[word]
     parameters = tuple(number for _, number in sorted(zip(order, numbers, strict=True)))
     return Curve(name, parameters), _extent(name, parameters)
@@ -160,4 +163,5 @@ def require_known(word: str, line: int, known: Sequence[str]) -> None:
         Unless it is known.
     """
     if word not in known:
-        refuse(line, f"{word!r} is no membership function, expected points such as (0, 0) (5, 1), a number, or one of {', '.join(known)}")
+        expected = f"points such as (0, 0) (5, 1), a number, or one of {', '.join(known)}"
+        refuse(line, f"{word!r} is no membership function, expected {expected}")

@@ -21,11 +21,16 @@ RESERVED = frozenset(_WORDS.split())
 # jFuzzyLogic's words; fuzzylite has others for some
 CONJUNCTIONS = {
     **{norm.fcl: name for name, norm in T_NORMS.items()},
-    **{"DPROD": "drastic_product", "HPROD": "hamacher_product", "NMIN": "nilpotent_minimum"},
+    "DPROD": "drastic_product",
+    "HPROD": "hamacher_product",
+    "NMIN": "nilpotent_minimum",
 }  # of AND, and of ACT
 DISJUNCTIONS = {
     **{norm.fcl: name for name, norm in S_NORMS.items()},
-    **{"DSUM": "drastic_sum", "ESUM": "einstein_sum", "NMAX": "nilpotent_maximum", "PROBOR": "probor"},
+    "DSUM": "drastic_sum",
+    "ESUM": "einstein_sum",
+    "NMAX": "nilpotent_maximum",
+    "PROBOR": "probor",
 }
 JOINS = {**DISJUNCTIONS, "SUM": "sum"}
 # which the standard and jFuzzyLogic pair, where one alone is said

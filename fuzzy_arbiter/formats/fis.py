@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from fuzzy_arbiter.definition import WEIGHTED, Output, System, Term, Variable, variable_names
+from fuzzy_arbiter.definition import WEIGHTED, Output, System, Variable, variable_names
 from fuzzy_arbiter.errors import UnsupportedError
 from fuzzy_arbiter.formats.fis_reader import read
 from fuzzy_arbiter.formats.fis_words import DEFUZZIFIERS, MATLAB, SETTINGS
@@ -13,7 +13,9 @@ from fuzzy_arbiter.formats.settings import say_settings
 from fuzzy_arbiter.norms import AGGREGATIONS, S_NORMS, T_NORMS
 from fuzzy_arbiter.propositions import And, Is, Not, Or, Proposition
 from fuzzy_arbiter.shapes import Shape
-from fuzzy_arbiter.terms.curves import KINDS, Curve
+from fuzzy_arbiter.terms.curves import Curve
+from fuzzy_arbiter.terms.kinds import KINDS
+from fuzzy_arbiter.terms.term import Term
 from fuzzy_arbiter.terms.values import Constant, Linear
 
 __all__ = ["read", "write"]
@@ -142,7 +144,9 @@ def _named(term: Term, v: Variable) -> str:
         return f"'trimf',[{say_numbers(shape.parameters * 3)}]"
     word, order = KINDS[shape.kind].fis
     if word not in MATLAB or shape.height != 1.0:
-        raise UnsupportedError(f"{what}, {shape.kind} of the height {shape.height:g}: expected one of {', '.join(MATLAB)}")
+        raise UnsupportedError(
+            f"{what}, {shape.kind} of the height {shape.height:g}: expected one of {', '.join(MATLAB)}"
+        )
     return f"'{word}',[{say_numbers(shape.parameters[i] for i in order)}]"
 
 

@@ -6,7 +6,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from fuzzy_arbiter.definition import WEIGHTED, Output, System, Term, Variable
+from fuzzy_arbiter.definition import WEIGHTED, Output, System, Variable
 from fuzzy_arbiter.errors import FormatError
 from fuzzy_arbiter.formats.fis_terms import numbers_of, read_function
 from fuzzy_arbiter.formats.fis_words import DEFUZZIFIERS, HEDGES, METHODS, OCTAVE_HEDGES, SETTINGS, TYPES
@@ -16,6 +16,7 @@ from fuzzy_arbiter.propositions import And, Anything, Hedged, Is, Not, Or, Propo
 from fuzzy_arbiter.rule import Rule
 from fuzzy_arbiter.rule_text import bent_rules
 from fuzzy_arbiter.shapes import Membership
+from fuzzy_arbiter.terms.term import Term
 from fuzzy_arbiter.terms.values import Formula, Value
 
 _SECTION = re.compile(r"\[\s*(System|Input|Output|Rules)\s*([1-9][0-9]{0,8})?\s*\]", re.ASCII)
@@ -53,8 +54,8 @@ class _Section:
 def read(text: str) -> System:
     """Return the system that MATLAB's text defines.
 
-    Values of one name are numbered, as rules speak of them by their place. In a file of Sugeno's kind the strengths of rules that conclude one term are added, whatever AggMethod says, as MATLAB
-    does it.
+    Values of one name are numbered, as rules speak of them by their place. The strengths of rules that conclude one
+    value are added, whatever AggMethod says, as MATLAB does it.
 
     Parameters
     ----------
@@ -222,7 +223,7 @@ def _variable(section: _Section, inputs: int | None) -> _Parts:
 
 
 def _told_apart(terms: Sequence[Term]) -> tuple[Term, ...]:
-    """Return values with a number after a name that came before: rules speak of their places, and MATLAB names all alike."""
+    """Return values with a number after a name that came before, for rules speak of their places."""
     if not all(isinstance(term.shape, Value) for term in terms):
         return tuple(terms)
     found: list[Term] = []
@@ -236,9 +237,7 @@ def _told_apart(terms: Sequence[Term]) -> tuple[Term, ...]:
     return tuple(found)
 
 
-def _rules(
-    line: int, row: str, inputs: Sequence[Variable], outputs: Sequence[Variable], fuzzylite: bool
-) -> list[Rule]:
+def _rules(line: int, row: str, inputs: Sequence[Variable], outputs: Sequence[Variable], fuzzylite: bool) -> list[Rule]:
     match = _RULE.fullmatch(row)
     if not match:
         refuse(line, f"{row!r}, expected a rule such as 1 -2, 1 (1) : 1")

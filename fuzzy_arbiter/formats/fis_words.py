@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from fuzzy_arbiter.norms import AGGREGATIONS, S_NORMS, T_NORMS
 from fuzzy_arbiter.shapes import falling, rising
-from fuzzy_arbiter.terms.curves import KINDS
+from fuzzy_arbiter.terms.kinds import KINDS
 
 SETTINGS = ("normalization", "outside", "points")
 

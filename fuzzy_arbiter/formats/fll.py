@@ -46,7 +46,10 @@ def write(system: System) -> str:
     for output in system.outputs:
         lines += [f"OutputVariable: {output.name}", "  enabled: true", f"  range: {say_numbers(output.universe)}"]
         lines += [f"  lock-range: {_truth(output.lock_range)}"]
-        lines += [f"  aggregation: {AGGREGATIONS[output.aggregation].fll}", f"  defuzzifier: {_defuzzifier(output, system)}"]
+        lines += [
+            f"  aggregation: {AGGREGATIONS[output.aggregation].fll}",
+            f"  defuzzifier: {_defuzzifier(output, system)}",
+        ]
         lines += [f"  default: {_default(output)}", f"  lock-previous: {_truth(output.lock_previous)}", *_terms(output)]
     for k, (operators, rules) in enumerate(blocks(system)):
         lines += [f"RuleBlock: rules{k + 1 if k else ''}", "  enabled: true"]

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from fuzzy_arbiter.definition import Output, System, Term, Variable
+from fuzzy_arbiter.definition import Output, System, Variable
 from fuzzy_arbiter.errors import FormatError
 from fuzzy_arbiter.formats.fll_terms import VALUES, read_shape
 from fuzzy_arbiter.formats.fll_words import (
@@ -26,6 +26,7 @@ from fuzzy_arbiter.formats.settings import read_settings
 from fuzzy_arbiter.propositions import And, Not, Or, Proposition
 from fuzzy_arbiter.rule import Operators, Rule
 from fuzzy_arbiter.rule_text import parse_rules
+from fuzzy_arbiter.terms.term import Term
 
 
 @dataclass
@@ -90,7 +91,9 @@ def read(text: str) -> System:
     # the system has the operators of the first block, and a rule of another its own
     first = said[0][1] if said else Operators()
     rules = [
-        (line, rule if norms == first else replace(rule, operators=norms)) for found, norms in said for line, rule in found
+        (line, rule if norms == first else replace(rule, operators=norms))
+        for found, norms in said
+        for line, rule in found
     ]
     name = engines[0].name or "arbiter"
     options = {
@@ -180,7 +183,9 @@ def _defuzzifier(block: _Block) -> tuple[Any, int]:
     word, _, option = value.partition(" ")
     option = option.strip()
     if word not in DEFUZZIFIERS:
-        refuse(line, f"defuzzifier of {block.name!r} is {value or 'missing'}, expected one of {', '.join(DEFUZZIFIERS)}")
+        refuse(
+            line, f"defuzzifier of {block.name!r} is {value or 'missing'}, expected one of {', '.join(DEFUZZIFIERS)}"
+        )
     name = DEFUZZIFIERS[word]
     if name in ("average", "sum"):
         if option not in ("", "Automatic", "TakagiSugeno", "Tsukamoto"):

@@ -1,4 +1,4 @@
-"""The terms of the FuzzyLite Language, which its dialects of FIS and FCL share, and the words that it keeps for itself."""
+"""The terms of the FuzzyLite Language, which fuzzylite's FIS and FCL share, and the words that it keeps for itself."""
 
 from __future__ import annotations
 
@@ -9,8 +9,9 @@ from fuzzy_arbiter.errors import UnsupportedError
 from fuzzy_arbiter.formats.notation import read_number, refuse, say_number, say_numbers
 from fuzzy_arbiter.norms import HEDGES
 from fuzzy_arbiter.shapes import Membership, Point, Shape
-from fuzzy_arbiter.terms.curves import KINDS, Curve
-from fuzzy_arbiter.terms.expressions import WORDS
+from fuzzy_arbiter.terms.curves import Curve
+from fuzzy_arbiter.terms.functions import WORDS
+from fuzzy_arbiter.terms.kinds import KINDS
 from fuzzy_arbiter.terms.values import Constant, Formula, Linear, Value
 
 _FUNCTIONS = "acosh asinh atanh gt lt le ge eq neq abs fabs"

@@ -8,7 +8,7 @@ from dataclasses import replace
 from typing import Any, NoReturn
 
 from fuzzy_arbiter.checks import finite, shown
-from fuzzy_arbiter.definition import Output, System, Term, Variable
+from fuzzy_arbiter.definition import Output, System, Variable
 from fuzzy_arbiter.errors import FormatError
 from fuzzy_arbiter.formats.notation import located
 from fuzzy_arbiter.hierarchy import DEGREE, WEIGHT, Criterion, prioritised
@@ -16,7 +16,9 @@ from fuzzy_arbiter.propositions import is_identifier
 from fuzzy_arbiter.rule import Operators, Rule
 from fuzzy_arbiter.rule_text import parse_rule
 from fuzzy_arbiter.shapes import Membership, Shape, falling, rising, trapezoid, triangle
-from fuzzy_arbiter.terms.curves import KINDS, Curve
+from fuzzy_arbiter.terms.curves import Curve
+from fuzzy_arbiter.terms.kinds import KINDS
+from fuzzy_arbiter.terms.term import Term
 from fuzzy_arbiter.terms.values import Constant, Formula, Linear, Value
 
 _SETTINGS = ("conjunction", "disjunction", "implication", "normalization", "outside", "points")
@@ -86,6 +88,8 @@ def system_of(data: object) -> System:
 def _rule(data: object, where: str) -> Rule:
     if isinstance(data, str):
         return parse_rule(data)
+    if not isinstance(data, dict):
+        _refuse(where, data, "text, or a table of a rule and its operators")
     table = _table(data, where, ("rule", *_OPERATORS))
     operators = Operators(**{key: _string(table[key], f"{where}.{key}") for key in _OPERATORS if key in table})
     return replace(parse_rule(_string(_needed(table, "rule", where), f"{where}.rule")), operators=operators)

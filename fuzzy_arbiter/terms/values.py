@@ -13,7 +13,8 @@ from fuzzy_arbiter.checks import all_of, finite, shown
 from fuzzy_arbiter.errors import DefinitionError
 from fuzzy_arbiter.shapes import Array, Membership, Shape
 from fuzzy_arbiter.terms.curves import Curve
-from fuzzy_arbiter.terms.expressions import Expression, Node
+from fuzzy_arbiter.terms.expressions import Expression
+from fuzzy_arbiter.terms.parser import Node
 
 
 class Value(ABC):
@@ -125,7 +126,6 @@ class Linear(Value):
             return Expression("", self.constant)
         return Expression("", ("+", tree, self.constant) if self.constant else tree)
 
-
     @classmethod
     def of(cls, tree: Node, inputs: Sequence[str]) -> Linear | None:
         """Return the linear value that a tree says, if it says it as `expression` does.
@@ -144,7 +144,7 @@ class Linear(Value):
         """
         coefficients = dict.fromkeys(inputs, 0.0)
         constant = 0.0
-        node = tree
+        node: Node | None = tree
         while node is not None:
             node, part = (node[1], node[2]) if isinstance(node, tuple) and node[0] == "+" else (None, node)
             if isinstance(part, float):
@@ -247,7 +247,7 @@ def invertible(shape: object) -> bool:
     bool
         True for curves such as sigmoids, and for ramps.
     """
-    return isinstance(shape, Curve) and shape.invertible or isinstance(shape, Shape) and _is_ramp(shape)
+    return (isinstance(shape, Curve) and shape.invertible) or (isinstance(shape, Shape) and _is_ramp(shape))
 
 
 def _is_ramp(shape: Shape) -> bool:
