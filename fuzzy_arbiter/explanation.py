@@ -182,11 +182,11 @@ def explain(engine: Engine, inputs: Sequence[float]) -> Explanation:
         for i, (rule, strength) in enumerate(zip(system.rules, strengths, strict=True))
     )
     outputs = tuple(
-        _decided(system, rules, k, cut, centroid, weight)
-        for k, (cut, centroid, weight) in enumerate(zip(firing.cuts(strengths), centroids, weights, strict=True))
+        _decided(system, rules, k, firing.term_cuts(k, strengths), centroid, weight)
+        for k, (centroid, weight) in enumerate(zip(centroids, weights, strict=True))
     )
     degrees = tuple(
-        InputDegrees(v.name, float(x), {t.name: t.shape(x) for t in v.terms})
+        InputDegrees(v.name, float(x), {t.name: t.membership(x) for t in v.terms})
         for v, x in zip(system.inputs, inputs, strict=True)
     )
     return Explanation(degrees, rules, outputs, *_ranking(system.result_names, weights))

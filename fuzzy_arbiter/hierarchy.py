@@ -8,11 +8,12 @@ from dataclasses import dataclass, replace
 from typing import Literal, get_args
 
 from fuzzy_arbiter.checks import all_of, require_name, shown
-from fuzzy_arbiter.definition import Normalization, Output, Outside, System, Term, Variable
+from fuzzy_arbiter.definition import Normalization, Output, Outside, System, Variable
 from fuzzy_arbiter.errors import DefinitionError
 from fuzzy_arbiter.propositions import And, Is, Or, Proposition
 from fuzzy_arbiter.rule import Rule
 from fuzzy_arbiter.shapes import Shape, falling, rising
+from fuzzy_arbiter.terms.term import Term
 
 Form = Literal["hierarchical", "minimal", "conjunctive", "complete"]
 FORMS: tuple[str, ...] = get_args(Form)

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from fuzzy_arbiter.arbiter import Arbiter
 from fuzzy_arbiter.definition import System, Variable, variable_names
-from fuzzy_arbiter.engines.firing import Array, degrees_of_many
+from fuzzy_arbiter.engines.firing import Array
 from fuzzy_arbiter.errors import DefinitionError, InputError
 from fuzzy_arbiter.propositions import Is
 from fuzzy_arbiter.result import Result
@@ -178,7 +178,7 @@ class HysteresisArbiter:
             moments = np.full(len(values), self._time)
         else:
             moments = _validate_times(times, len(values), self._time)
-        degrees = np.column_stack([degrees_of_many(s, values[:, i]) for i, s in enumerate(self._shapes)])
+        degrees = np.column_stack([s.of_many(values[:, i]) for i, s in enumerate(self._shapes)])
         closed, since = self._closed, self._since
         places = np.empty_like(values)
         for i, (row, degree, now) in enumerate(zip(values.tolist(), degrees.tolist(), moments.tolist(), strict=True)):
@@ -289,7 +289,7 @@ def _on_terms(system: System, on: Mapping[str, str] | None) -> list[str]:
 
 
 def _shape(variable: Variable, term: str) -> Shape:
-    return next(t.shape for t in variable.terms if t.name == term)
+    return next(t.straight for t in variable.terms if t.name == term)
 
 
 def _place(variable: Variable, shape: Shape, degree: float) -> float:

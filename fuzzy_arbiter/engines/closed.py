@@ -23,9 +23,10 @@ import numpy as np
 
 from fuzzy_arbiter.definition import Output, System
 from fuzzy_arbiter.engines.engine import Engine, Shortcut, normalize_weights, normalize_weights_of_many
-from fuzzy_arbiter.engines.firing import Array, degrees_of_many
+from fuzzy_arbiter.engines.firing import Array
 from fuzzy_arbiter.engines.normal_form import Clause, Literal, high_clauses, ladder
 from fuzzy_arbiter.engines.pieces import Piece, pieces
+from fuzzy_arbiter.engines.plain import beyond_plain
 from fuzzy_arbiter.errors import EngineError
 from fuzzy_arbiter.hierarchy import DEGREE
 
@@ -79,7 +80,7 @@ class ClosedEngine(Engine):
         self.scaled = self.raw if system.normalization == "none" else scaled
         super().__init__(system)
         self._index = {v.name: i for i, v in enumerate(system.inputs)}
-        self._shapes = {(v.name, t.name): t.shape for v in system.inputs for t in v.terms}
+        self._shapes = {(v.name, t.name): t.membership for v in system.inputs for t in v.terms}
         self._cubic = _one_cubic(self.scaled)
         self.clips = system.normalization != "none" and self._cubic != SMOOTHSTEP
         # prioritised criteria in the order of the inputs, which are the degrees themselves: nothing to look up
@@ -172,12 +173,14 @@ class ClosedEngine(Engine):
 
     def _degrees(self, literal: Literal, inputs: Array) -> Array:
         variable, term, affirmed = literal
-        degrees = degrees_of_many(self._shapes[variable, term], inputs[:, self._index[variable]])
+        degrees = self._shapes[variable, term].of_many(inputs[:, self._index[variable]])
         return degrees if affirmed else 1.0 - degrees
 
 
 def _proved(system: System) -> tuple[tuple[Clause, ...], ...] | str:
     """Return the clauses of each output's h, or why there is no h."""
+    if reason := beyond_plain(system, curved_inputs=True):
+        return reason
     if (system.conjunction, system.disjunction, system.implication) != ("min", "max", "min"):
         return f"norms are {system.conjunction}, {system.disjunction}, {system.implication}, expected min, max, min"
     for i, rule in enumerate(system.rules):

@@ -7,13 +7,14 @@ import math
 import operator
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
 from fuzzy_arbiter.definition import Output, System
 from fuzzy_arbiter.engines.firing import Array, Firing
 from fuzzy_arbiter.errors import EngineError
+from fuzzy_arbiter.terms.values import Constant, Value
 
 Shortcut = Callable[[Sequence[float]], list[float] | None]
 _EACH_BY_ITSELF = ("range", "none")  # normalizations that look at one output at a time
@@ -95,10 +96,47 @@ class Engine(ABC):
             Centroids; where no rule fires the output's default, or NaN.
         """
         cuts = self.firing.cuts(self.firing.strengths(inputs))
-        return [
-            self.centroid(k, cut) if any(cut) else default_of(output)
-            for k, (output, cut) in enumerate(zip(self.system.outputs, cuts, strict=True))
-        ]
+        result: list[float] = []
+        for k, (output, cut) in enumerate(zip(self.system.outputs, cuts, strict=True)):
+            value = self.value(k, cut, (*inputs, *result)) if any(cut) else math.nan
+            if not math.isfinite(value):
+                value = default_of(output)
+            result.append(min(max(value, output.universe[0]), output.universe[1]) if output.lock_range else value)
+        return result
+
+    def value(self, k: int, cuts: Sequence[float], inputs: Sequence[float]) -> float:
+        """Return the raw value of an output for one sample.
+
+        Parameters
+        ----------
+        k, cuts
+            As of `centroid`.
+        inputs : sequence of float
+            The sample, and the values of the outputs before; of these the terms of some outputs are functions.
+
+        Returns
+        -------
+        float
+            The centroid; not finite where there is none.
+        """
+        return self.centroid(k, cuts)
+
+    def values(self, k: int, cuts: Array, inputs: Array) -> Array:
+        """Return the raw values of an output for many samples.
+
+        Parameters
+        ----------
+        k, cuts
+            As of `centroid_of_many`.
+        inputs : ndarray, shape (n, inputs and k outputs)
+            The samples, and the values of the outputs before.
+
+        Returns
+        -------
+        ndarray, shape (n,)
+            Each as of `value`.
+        """
+        return self.centroid_of_many(k, cuts)
 
     def centroids_of_many(self, inputs: Array) -> Array:
         """Return the raw value of each output for many samples.
@@ -115,12 +153,22 @@ class Engine(ABC):
         """
         result = np.empty((len(inputs), len(self.system.outputs)))
         for k, cuts in enumerate(self.firing.cuts_of_many(self.firing.strengths_of_many(inputs))):
-            fires = cuts.any(axis=0)
+            output, fires = self.system.outputs[k], np.asarray(cuts.any(axis=0))
+            values = result[:, k]
+            known = np.column_stack([inputs, result[:, :k]]) if output.weighted else inputs
             if fires.all():
-                result[:, k] = self.centroid_of_many(k, cuts)
-                continue
-            result[~fires, k] = default_of(self.system.outputs[k])
-            result[fires, k] = self.centroid_of_many(k, cuts[:, fires])
+                values[:] = self.values(k, cuts, known)
+            else:
+                values[:] = math.nan
+                values[fires] = self.values(k, cuts[:, fires], known[fires])
+            defined = np.isfinite(values)
+            if output.lock_previous and defined.any():
+                last = np.maximum.accumulate(np.where(defined, np.arange(len(values)), -1))
+                values[last >= 0] = values[last[last >= 0]]
+                defined = last >= 0
+            values[~defined] = default_of(output)
+            if output.lock_range:
+                np.clip(values, *output.universe, out=values)
         return result
 
     def weights(self, inputs: Sequence[float]) -> tuple[float, ...]:
@@ -172,10 +220,22 @@ class Engine(ABC):
         """
         return None
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), (self.system,)
+
+    def _concluded(self, k: int) -> Sequence[int]:
+        """Return the terms of an output that can be joined alone."""
+        return sorted({slot.term for slot in self.firing.slots[k]})
+
     def _ends(self, k: int) -> tuple[float, float]:
         """Return the centroids that become 0 and 1: of the least and of the greatest term, each alone and whole."""
         output = self.system.outputs[k]
-        alone = [self.centroid(k, [float(i == j) for i in range(len(output.terms))]) for j in range(len(output.terms))]
+        if any(isinstance(term.shape, Value) and not isinstance(term.shape, Constant) for term in output.terms):
+            raise EngineError(
+                f"output {output.name!r}: its terms depend on the inputs, which leaves no range to normalize; expected "
+                "normalization 'none'"
+            )
+        alone = [self.centroid(k, [float(slot.term == j) for slot in self.firing.slots[k]]) for j in self._concluded(k)]
         low, high = min(alone), max(alone)
         if not low < high:
             raise EngineError(
@@ -231,7 +291,7 @@ def normalize_weights_of_many(weights: Array, normalization: str) -> Array:
 
 
 def default_of(output: Output) -> float:
-    """Return the value of an output for which no rule fires.
+    """Return the value of an output for which no rule fires, or what the rules conclude is no number.
 
     Parameters
     ----------

@@ -17,7 +17,7 @@ from skfuzzy.fuzzymath.fuzzy_ops import _interp_universe_fast, interp_membership
 from fuzzy_arbiter.definition import System, Variable, variable_names
 from fuzzy_arbiter.engines.engine import Engine, default_of
 from fuzzy_arbiter.engines.firing import Array
-from fuzzy_arbiter.engines.grid import require_clipping, sampled
+from fuzzy_arbiter.engines.grid import require_plain, sampled
 from fuzzy_arbiter.errors import EngineError
 from fuzzy_arbiter.propositions import And, Is, Not, Or, Proposition
 
@@ -43,10 +43,10 @@ class ScikitEngine(Engine):
     name: ClassVar[str] = "skfuzzy"
 
     def __init__(self, system: System) -> None:
-        require_clipping(system, self.name)
+        require_plain(system, self.name, curved_inputs=False)
         for variable in system.inputs:
             for term in variable.terms:
-                if term.shape.jumps:
+                if term.straight.jumps:
                     raise EngineError(
                         f"engine {self.name!r}: input {variable.name!r}: term {term.name!r} jumps, where scikit-fuzzy "
                         "interpolates; expected a continuous shape, or engine 'exact' or 'grid'"
@@ -81,9 +81,6 @@ class ScikitEngine(Engine):
             default_of(output) if value is None else value
             for output, value in zip(self.system.outputs, self._local.runner(inputs), strict=True)
         ]
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        return ScikitEngine, (self.system,)
 
 
 class _Runner:
@@ -182,7 +179,7 @@ def _antecedent(variable: Variable) -> Any:
     """Return an input, sampled at its ends and at the knots of its terms, between which all are straight lines."""
     antecedent = control.Antecedent(np.array(variable.knots), variable.name)
     for term in variable.terms:
-        antecedent[term.name] = np.array([term.shape(x) for x in variable.knots])
+        antecedent[term.name] = np.array([term.straight(x) for x in variable.knots])
     return antecedent
 
 

@@ -51,7 +51,7 @@ def outline(variable: Variable, number: Callable[[float], Any] = float) -> Outli
         In these numbers.
     """
     places = tuple(map(number, variable.knots))
-    shapes = [[(number(x), number(y)) for x, y in term.shape.points] for term in variable.terms]
+    shapes = [[(number(x), number(y)) for x, y in term.straight.points] for term in variable.terms]
     left, right = [], []
     for a, b in zip(places, places[1:], strict=False):
         for points in shapes:

@@ -7,13 +7,8 @@ from collections.abc import Iterator, Sequence
 from importlib.resources import files
 
 from fuzzy_arbiter.definition import System
+from fuzzy_arbiter.export.functions import in_c
 from fuzzy_arbiter.export.program import Assign, Choose, Program, Return, Statement, Sweep, program
-
-_HEAD = """
-static inline double least(double a, double b) { return a < b ? a : b; }
-static inline double greatest(double a, double b) { return a > b ? a : b; }
-static inline double either(double a, double b) { return a + b - a * b; }
-"""
 
 
 def to_c(system: System) -> str:
@@ -31,7 +26,8 @@ def to_c(system: System) -> str:
         0, or -i if the i-th input is not in its universe, or k if no rule fires for the k-th output; NAME is the
         system's, with an underscore for each sign that C has not in names. Files of different names go into one
         program. It gives what the arbiter's own engine does, to the last bit if the compiler does not contract
-        operations (``-ffp-contract=off``) and keeps to the rules of NaN (no ``-ffast-math``).
+        operations (``-ffp-contract=off``) and keeps to the rules of NaN (no ``-ffast-math``); functions of ``math.h``
+        to their rounding.
 
     Examples
     --------
@@ -57,9 +53,12 @@ def _file(code: Program) -> Iterator[str]:
     yield f"{signature};"
     text = "\n".join(_block(code.statements, system, "    "))
     yield ""
-    yield from (line for line in _HEAD.strip().splitlines() if f"{line.split('(')[0].split()[-1]}(" in text)
-    if code.outlines:
+    yield from (["#include <math.h>", ""] if code.mathematical else [])
+    yield from filter(None, map(in_c, code.functions))
+    if any(code.outlines):
         for k, shape in enumerate(code.outlines, 1):
+            if shape is None:
+                continue
             name = _safe(system.outputs[k - 1].name)
             yield f"\n/* knots of the terms of {name}, and degrees right and left of them */"
             for table, side in zip(("PLACES", "LEFT", "RIGHT"), shape, strict=True):

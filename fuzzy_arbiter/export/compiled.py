@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from types import FunctionType
 from typing import Any
 
 from fuzzy_arbiter.definition import System
@@ -35,7 +36,7 @@ def compiled(system: System) -> Any:
 
     exec(compile(to_python(system), f"<{system.name}>", "exec"), namespace)  # noqa: S102
     # each function finds those it calls in the same namespace
-    for name in ("least", "greatest", "either", "envelope", "area_and_moment", "centroid", "evaluate"):
-        if name in namespace:
-            namespace[name] = numba.njit(namespace[name])
+    for name, function in list(namespace.items()):
+        if isinstance(function, FunctionType) and name != "weights":
+            namespace[name] = numba.njit(function)
     return namespace["evaluate"]

@@ -6,8 +6,10 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from fuzzy_arbiter.arbiter import Arbiter
-from fuzzy_arbiter.definition import Normalization, Term
+from fuzzy_arbiter.definition import Normalization
 from fuzzy_arbiter.errors import DefinitionError, InputError
 from fuzzy_arbiter.pictures.places import fixed_inputs, one_of, places_in, said, weights_at
 from fuzzy_arbiter.pictures.style import (
@@ -21,6 +23,8 @@ from fuzzy_arbiter.pictures.style import (
     room,
     tidy,
 )
+from fuzzy_arbiter.shapes import Shape
+from fuzzy_arbiter.terms.term import Term
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -76,7 +80,7 @@ def terms(arbiter: Arbiter, variable: str, at: float | None = None, ax: Axes | N
         x, y = corners(term, (low, high))
         ax.plot(x, y, label=term.name, clip_on=False, **line_style(i))
         if at is not None:
-            ax.plot(at, term.shape(at), "o", color=line_style(i)["color"], clip_on=False, zorder=4)
+            ax.plot(at, term.membership(at), "o", color=line_style(i)["color"], clip_on=False, zorder=4)
     if at is not None:
         ax.axvline(at, color=FAINT, linewidth=1.0, zorder=1)
     ax.set(xlim=(low, high), ylim=(0.0, 1.0), xlabel=variable, ylabel="degree")
@@ -101,8 +105,11 @@ def corners(term: Term, universe: tuple[float, float]) -> tuple[list[float], lis
         From one end of the universe to the other.
     """
     low, high = universe
-    inside = [(x, y) for x, y in term.shape.points if low < x < high]
-    x, y = zip((low, term.shape(low)), *inside, (high, term.shape(high)), strict=True)
+    if not isinstance(term.shape, Shape):  # as many corners as make it look smooth
+        places = np.unique([*np.linspace(low, high, 401), *term.membership.breaks((low, high))])
+        return places.tolist(), term.membership.of_many(places).tolist()
+    inside = [(x, y) for x, y in term.straight.points if low < x < high]
+    x, y = zip((low, term.straight(low)), *inside, (high, term.straight(high)), strict=True)
     return list(x), list(y)
 
 

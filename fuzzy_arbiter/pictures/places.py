@@ -161,7 +161,7 @@ def places_in(variable: Variable, count: int) -> Array:
         Increasing, from one end of the universe to the other.
     """
     low, high = variable.universe
-    knots = np.array([x for term in variable.terms for x, _ in term.shape.points])
+    knots = np.array(variable.knots)
     beside = (high - low) * 1e-9
     x: Array = np.unique(np.concatenate([np.linspace(low, high, count), knots, knots - beside, knots + beside]))
     return x[(low <= x) & (x <= high)]

@@ -13,12 +13,18 @@ import fuzzy_arbiter
 from fuzzy_arbiter import (
     Arbiter,
     ArbiterError,
+    Constant,
     Criterion,
+    Formula,
+    Linear,
+    Operators,
     Output,
     Result,
+    Rule,
     System,
     Variable,
     auto_terms,
+    curve,
     falling,
     prioritised,
     rising,
@@ -271,6 +277,14 @@ def test_a_file_may_be_read_with_another_default_and_outside(tmp_path):
         prioritised([Criterion("a wall", on="near by", off="far off")], outside="clip", points=7),
         System(
             (SERVICE,), (replace(TIP, default=3.0),), ("if not (service is poor) then tip is low with 0.25",), "x y"
+        ),
+        System(
+            (Variable("x", (0, 1), {"a": curve("gaussian", 0.3, 0.1)}),),
+            (
+                Output("y", (0, 10), {"c": Constant(2.0), "f": Formula("2*x")}, defuzzifier="average"),
+                Output("z", (0, 10), {"l": Linear((1.0,), 0.5)}, defuzzifier="sum", aggregation="sum"),
+            ),
+            (Rule.parse("if x is very a then y is c and z is l", Operators("prod", "probor")), "if x is a then y is f"),
         ),
     ],
 )

@@ -31,7 +31,6 @@ from fuzzy_arbiter import (
     trapezoid,
     triangle,
 )
-from fuzzy_arbiter.engines.firing import degrees_of_many
 from fuzzy_arbiter.engines.scikit import ScikitEngine
 from fuzzy_arbiter.errors import EngineError
 from fuzzy_arbiter.propositions import And, Is, Not, Or
@@ -103,7 +102,7 @@ def stock(system):
     def variable(kind, definition, universe):
         made = kind(universe, definition.name)
         for term in definition.terms:
-            made[term.name] = degrees_of_many(term.shape, universe)
+            made[term.name] = term.shape.of_many(universe)
         return made
 
     def condition(proposition):
