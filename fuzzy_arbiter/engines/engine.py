@@ -10,6 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any, ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fuzzy_arbiter.definition import Output, System, variable_names
 from fuzzy_arbiter.engines.firing import Array, Firing
@@ -17,6 +18,7 @@ from fuzzy_arbiter.errors import EngineError, UndefinedOutputError
 from fuzzy_arbiter.terms.values import Constant, Value
 
 Shortcut = Callable[[Sequence[float]], tuple[float, ...] | None]
+_BLOCK = 4096  # samples at a time, so that what is worked on stays in the cache
 _EACH_BY_ITSELF = ("range", "none")  # normalizations that look at one output at a time
 
 
@@ -162,28 +164,47 @@ class Engine(ABC):
         UndefinedOutputError
             If no rule fires for an output without default; the first such row is named.
         """
-        result = np.empty((len(inputs), len(self.system.outputs)))
+        outputs = self.system.outputs
+        if not any(output.weighted for output in outputs):  # whose values may depend on those before
+            result = np.empty((len(inputs), len(outputs)))
+            fired = np.empty(result.shape, dtype=np.bool_)
+            for start in range(0, len(inputs), _BLOCK):
+                block = slice(start, start + _BLOCK)
+                for k, cuts in enumerate(self.firing.cuts_of_many(self.firing.strengths_of_many(inputs[block]))):
+                    fired[block, k] = self._some(k, cuts, inputs[block], result[block, k])
+            for k in range(len(outputs)):
+                self._complete(k, inputs, result[:, k], fired[:, k])
+            return result
+        result = np.empty((len(inputs), len(outputs)))
         for k, cuts in enumerate(self.firing.cuts_of_many(self.firing.strengths_of_many(inputs))):
-            output, fires = self.system.outputs[k], np.asarray(cuts.any(axis=0))
-            values = result[:, k]
-            known = np.column_stack([inputs, result[:, :k]]) if output.weighted else inputs
-            if fires.all():
-                values[:] = self.values(k, cuts, known)
-            else:
-                values[:] = math.nan
-                values[fires] = self.values(k, cuts[:, fires], known[fires])
-            defined = np.isfinite(values)
-            if output.lock_previous and defined.any():
-                last = np.maximum.accumulate(np.where(defined, np.arange(len(values)), -1))
-                values[last >= 0] = values[last[last >= 0]]
-                defined = last >= 0
-            if not defined.all():
-                row = int(np.argmin(defined))
-                named = dict(zip(variable_names(self.system.inputs), inputs[row].tolist(), strict=True))
-                values[~defined] = default_of(output, named, row, fires=bool(fires[row]))
-            if output.lock_range:
-                np.clip(values, *output.universe, out=values)
+            fires = self._some(k, cuts, np.column_stack([inputs, result[:, :k]]), result[:, k])
+            self._complete(k, inputs, result[:, k], fires)
         return result
+
+    def _some(self, k: int, cuts: Array, known: Array, values: Array) -> NDArray[np.bool_]:
+        """Fill in the values of an output where rules fire, and return where they do."""
+        fires = np.asarray(cuts.any(axis=0))
+        if fires.all():
+            values[:] = self.values(k, cuts, known)
+        else:
+            values[:] = math.nan
+            values[fires] = self.values(k, cuts[:, fires], known[fires])
+        return fires
+
+    def _complete(self, k: int, inputs: Array, values: Array, fires: NDArray[np.bool_]) -> None:
+        """Fill in the values before or the default of an output where it has no value, and hold it in its range."""
+        output = self.system.outputs[k]
+        defined = np.isfinite(values)
+        if output.lock_previous and defined.any():
+            last = np.maximum.accumulate(np.where(defined, np.arange(len(values)), -1))
+            values[last >= 0] = values[last[last >= 0]]
+            defined = last >= 0
+        if not defined.all():
+            row = int(np.argmin(defined))
+            named = dict(zip(variable_names(self.system.inputs), inputs[row].tolist(), strict=True))
+            values[~defined] = default_of(output, named, row, fires=bool(fires[row]))
+        if output.lock_range:
+            np.clip(values, *output.universe, out=values)
 
     def weights(self, inputs: Sequence[float]) -> tuple[float, ...]:
         """Return the normalized value of each output for one sample.
