@@ -159,7 +159,7 @@ class Shape(Membership):
         if len(x) == 1:
             return np.full(len(places), y[0])
         if len(x) == 2 and x[0] < x[1]:  # a ramp, which is met most often: nothing to look up
-            degrees = places - x[0]
+            degrees: Array = np.asarray(places - x[0])
             degrees /= x[1] - x[0]
             degrees *= y[1] - y[0]
             degrees += y[0]

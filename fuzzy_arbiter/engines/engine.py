@@ -18,7 +18,7 @@ from fuzzy_arbiter.errors import EngineError, UndefinedOutputError
 from fuzzy_arbiter.terms.values import Constant, Value
 
 Shortcut = Callable[[Sequence[float]], tuple[float, ...] | None]
-_BLOCK = 4096  # samples at a time, so that what is worked on stays in the cache
+_BLOCK = 8192  # samples at a time, so that what is worked on stays in the cache
 _EACH_BY_ITSELF = ("range", "none")  # normalizations that look at one output at a time
 
 

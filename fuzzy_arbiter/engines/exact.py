@@ -17,7 +17,7 @@ from fuzzy_arbiter.engines.quadrature import BOUND, Quadrature
 from fuzzy_arbiter.engines.sweep import LARGER, TINY, Outline, centroid, outline
 from fuzzy_arbiter.engines.weighted import Weighted
 
-_BLOCK = 1024  # samples evaluated at a time
+_BLOCK = 8192  # samples evaluated at a time
 
 
 class ExactEngine(Engine):

@@ -214,11 +214,16 @@ def centroid(cuts: Numbers, places: Numbers, left: Numbers, right: Numbers, orde
     largest = cuts[0]
     for cut in cuts:
         largest = max(largest, cut)
-    larger = [cut * LARGER for cut in cuts] if largest < TINY else [cut for cut in cuts]  # noqa: C416 - for Numba
-    if scales:
-        area, moment = scaled(larger, places, left, right)
+    if largest < TINY:
+        larger = [cut * LARGER for cut in cuts]
+        if scales:
+            area, moment = scaled(larger, places, left, right)
+        else:
+            area, moment = clipped(larger, places, left, right, order)
+    elif scales:
+        area, moment = scaled(cuts, places, left, right)
     else:
-        area, moment = clipped(larger, places, left, right, order)
+        area, moment = clipped(cuts, places, left, right, order)
     return places[0] + moment / area
 
 
