@@ -17,6 +17,7 @@ from fuzzy_arbiter.engines.quadrature import BOUND, Quadrature
 from fuzzy_arbiter.engines.sweep import LARGER, TINY, Outline, centroid, outline
 from fuzzy_arbiter.engines.weighted import Weighted
 
+EXACTLY = "exact integrals, to rounding"
 _BLOCK = 8192  # samples evaluated at a time
 
 
@@ -46,7 +47,7 @@ class ExactEngine(Engine):
                 self.methods[output.name] = "weighted values, to rounding"
             elif straight and (output.defuzzifier, output.aggregation) == ("centroid", "max"):
                 self._ways.append(outline(output))
-                self.methods[output.name] = "exact integrals, to rounding"
+                self.methods[output.name] = EXACTLY
             else:
                 way = Quadrature(output, slots)
                 self._ways.append(way)
