@@ -17,6 +17,7 @@ from fuzzy_arbiter.errors import EngineError
 from fuzzy_arbiter.terms.values import Constant, Value
 
 Shortcut = Callable[[Sequence[float]], list[float] | None]
+_BLOCK = 8192  # samples at a time, so that what is worked on stays in the cache
 _EACH_BY_ITSELF = ("range", "none")  # normalizations that look at one output at a time
 
 
@@ -151,25 +152,42 @@ class Engine(ABC):
         ndarray, shape (n, outputs)
             Centroids; where no rule fires the output's default, or NaN.
         """
-        result = np.empty((len(inputs), len(self.system.outputs)))
+        outputs = self.system.outputs
+        if not any(output.weighted for output in outputs):  # whose values may depend on those before
+            result = np.empty((len(inputs), len(outputs)))
+            for start in range(0, len(inputs), _BLOCK):
+                block = slice(start, start + _BLOCK)
+                for k, cuts in enumerate(self.firing.cuts_of_many(self.firing.strengths_of_many(inputs[block]))):
+                    self._some(k, cuts, inputs[block], result[block, k])
+            for k in range(len(outputs)):
+                self._complete(k, result[:, k])
+            return result
+        result = np.empty((len(inputs), len(outputs)))
         for k, cuts in enumerate(self.firing.cuts_of_many(self.firing.strengths_of_many(inputs))):
-            output, fires = self.system.outputs[k], np.asarray(cuts.any(axis=0))
-            values = result[:, k]
-            known = np.column_stack([inputs, result[:, :k]]) if output.weighted else inputs
-            if fires.all():
-                values[:] = self.values(k, cuts, known)
-            else:
-                values[:] = math.nan
-                values[fires] = self.values(k, cuts[:, fires], known[fires])
-            defined = np.isfinite(values)
-            if output.lock_previous and defined.any():
-                last = np.maximum.accumulate(np.where(defined, np.arange(len(values)), -1))
-                values[last >= 0] = values[last[last >= 0]]
-                defined = last >= 0
-            values[~defined] = default_of(output)
-            if output.lock_range:
-                np.clip(values, *output.universe, out=values)
+            self._some(k, cuts, np.column_stack([inputs, result[:, :k]]), result[:, k])
+            self._complete(k, result[:, k])
         return result
+
+    def _some(self, k: int, cuts: Array, known: Array, values: Array) -> None:
+        """Fill in the values of an output where rules fire, and NaN where none does."""
+        fires = np.asarray(cuts.any(axis=0))
+        if fires.all():
+            values[:] = self.values(k, cuts, known)
+        else:
+            values[:] = math.nan
+            values[fires] = self.values(k, cuts[:, fires], known[fires])
+
+    def _complete(self, k: int, values: Array) -> None:
+        """Fill in the values before or the default of an output where it has no value, and hold it in its range."""
+        output = self.system.outputs[k]
+        defined = np.isfinite(values)
+        if output.lock_previous and defined.any():
+            last = np.maximum.accumulate(np.where(defined, np.arange(len(values)), -1))
+            values[last >= 0] = values[last[last >= 0]]
+            defined = last >= 0
+        values[~defined] = default_of(output)
+        if output.lock_range:
+            np.clip(values, *output.universe, out=values)
 
     def weights(self, inputs: Sequence[float]) -> tuple[float, ...]:
         """Return the normalized value of each output for one sample.

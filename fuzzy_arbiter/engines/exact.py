@@ -9,6 +9,7 @@ from typing import ClassVar
 import numpy as np
 
 from fuzzy_arbiter.definition import System, variable_names
+from fuzzy_arbiter.engines.bands import centroids
 from fuzzy_arbiter.engines.engine import Engine
 from fuzzy_arbiter.engines.firing import Array, slots_of
 from fuzzy_arbiter.engines.plain import curved
@@ -16,7 +17,8 @@ from fuzzy_arbiter.engines.quadrature import BOUND, Quadrature
 from fuzzy_arbiter.engines.sweep import LARGER, TINY, Outline, centroid, outline
 from fuzzy_arbiter.engines.weighted import Weighted
 
-_BLOCK = 1024  # samples evaluated at a time
+EXACTLY = "exact integrals, to rounding"
+_BLOCK = 8192  # samples evaluated at a time
 
 
 class ExactEngine(Engine):
@@ -45,7 +47,7 @@ class ExactEngine(Engine):
                 self.methods[output.name] = "weighted values, to rounding"
             elif straight and (output.defuzzifier, output.aggregation) == ("centroid", "max"):
                 self._ways.append(outline(output))
-                self.methods[output.name] = "exact integrals, to rounding"
+                self.methods[output.name] = EXACTLY
             else:
                 way = Quadrature(output, slots)
                 self._ways.append(way)
@@ -81,7 +83,7 @@ class ExactEngine(Engine):
         result = np.empty(cuts.shape[1])
         for start in range(0, len(result), _BLOCK):
             block = slice(start, start + _BLOCK)
-            result[block] = _centroids(cuts[:, block], way, self._scaled[k])
+            result[block] = _centroids(cuts[:, block], way) if self._scaled[k] else centroids(cuts[:, block], way)
         return result
 
     def value(self, k: int, cuts: Sequence[float], inputs: Sequence[float]) -> float:
@@ -95,36 +97,26 @@ class ExactEngine(Engine):
         return way.values(cuts, inputs) if isinstance(way, Weighted) else self.centroid_of_many(k, cuts)
 
 
-def _centroids(cuts: Array, shape: Outline, scaled: bool) -> Array:
-    """Return what `sweep.centroid` does, for each column of the cuts."""
+def _centroids(cuts: Array, shape: Outline) -> Array:
+    """Return what `sweep.scaled` does, as centroids, for each column of the cuts."""
     terms, n = cuts.shape
     area, moment = np.zeros(n), np.zeros(n)
     left, right = (np.reshape(side, (-1, terms, 1)) for side in (shape.left, shape.right))
     for piece, (a, b) in enumerate(zip(left, right, strict=True)):
         start, width = shape.places[piece] - shape.places[0], shape.places[piece + 1] - shape.places[piece]
-        start_at, end_at = (a * cuts, b * cuts) if scaled else (a, b)
-        levels = [] if scaled else [(a, b, cut, cut) for cut in cuts]  # each term against each cut
-        # and each against those before it
+        start_at, end_at = a * cuts, b * cuts
+        # each against those before it
         others = [(start_at[t], end_at[t], start_at[:t], end_at[:t]) for t in range(1, terms)]
-        breaks = [np.zeros((1, n)), np.ones((1, n)), *(_crossings(*pair, n) for pair in (*levels, *others))]
+        breaks = [np.zeros((1, n)), np.ones((1, n)), *(_crossings(*pair, n) for pair in others)]
         places = np.sort(np.concatenate(breaks), axis=0)
         middles = (places[:-1] + places[1:]) / 2
         heights, starts, ends = np.zeros((3, *middles.shape))
         for t in range(terms):
             cut, rise = cuts[t], b[t] - a[t]
-            degrees = a[t] + rise * middles
-            lines = a[t] + rise * places
-            if scaled:
-                degrees, lines = degrees * cut, lines * cut
-                greatest = degrees > heights
-                np.copyto(starts, lines[:-1], where=greatest)
-                np.copyto(ends, lines[1:], where=greatest)
-            else:
-                level = degrees >= cut
-                degrees = np.minimum(degrees, cut)
-                greatest = degrees > heights
-                np.copyto(starts, np.where(level, cut, lines[:-1]), where=greatest)
-                np.copyto(ends, np.where(level, cut, lines[1:]), where=greatest)
+            degrees, lines = (a[t] + rise * middles) * cut, (a[t] + rise * places) * cut
+            greatest = degrees > heights
+            np.copyto(starts, lines[:-1], where=greatest)
+            np.copyto(ends, lines[1:], where=greatest)
             np.maximum(heights, degrees, out=heights)
         x, w = start + places * width, np.diff(places, axis=0) * width
         for i, (width_i, y0, y1) in enumerate(zip(w, starts, ends, strict=True)):

@@ -27,6 +27,8 @@ _SCAN = 16  # places in each smooth part of the terms, between which bends are l
 _BESIDE = 1e-9  # of a part's width: how far from its ends the first and last of these are
 _HALVINGS = 45
 _MOST = 20_000  # parts
+# a slot meets its cut; it and its cut sum to 1; it and those before it sum to 1; it passes those before it
+_CUT, _REST, _FULL, _PASSED = -1, -2, -3, -4
 _NEAR = 1e-11  # of the universe: how near to a bend is near enough, as what is missed is the square of that
 _EQUAL = 1e-12  # heights that differ by less are equal
 
@@ -132,24 +134,35 @@ class _Joined:
         return height
 
     def _signs(self) -> list[tuple[int, int]]:
-        """Return what may bend the joined terms: a slot at its cut, or two slots that change places."""
-        own = ("min", "bounded_difference", "nilpotent_minimum")
-        signs = [(a, a) for a, i in enumerate(self.active) if self.of._slots[i].implication in own]
-        if self.of._output.aggregation in ("max", "nilpotent_maximum"):
-            signs += [(a, b) for a in range(len(self.active)) for b in range(a)]
-        if self.of._output.aggregation in ("bounded_sum", "normalized_sum", "nilpotent_maximum"):
-            signs += [(a, -1) for a in range(1, len(self.active))]  # where the sum of the first slots passes 1
+        """Return what may bend the joined terms, as a slot and another or one of `_CUT`, `_REST`, `_FULL`, `_PASSED`."""
+        signs: list[tuple[int, int]] = []
+        for a, i in enumerate(self.active):
+            implication = self.of._slots[i].implication
+            signs += [(a, _CUT)] if implication in ("min", "nilpotent_minimum") else []
+            signs += [(a, _REST)] if implication in ("bounded_difference", "nilpotent_minimum") else []
+        aggregation = self.of._output.aggregation
+        for a in range(1, len(self.active)):
+            signs += [(a, b) for b in range(a)] if aggregation == "max" else []
+            signs += [(a, _FULL)] if aggregation in ("bounded_sum", "normalized_sum", "nilpotent_maximum") else []
+            signs += [(a, _PASSED)] if aggregation == "nilpotent_maximum" else []
         return signs
 
     def _bends(self, signs: Sequence[tuple[int, int]], degrees: Array, implied: Array) -> Array:
         """Return what changes its sign where the joined terms bend, shape (signs, ..)."""
         bends = np.empty((len(signs), *degrees.shape[1:]))
+        before = [np.zeros(degrees.shape[1:])]  # what the slots before each have joined to
+        if any(b in (_FULL, _PASSED) for _, b in signs):
+            for height in implied[:-1]:
+                before.append(self.of._join(before[-1], height))
         for row, (a, b) in zip(bends, signs, strict=True):
-            if a == b:
-                clips = self.of._slots[self.active[a]].implication == "min"
-                row[...] = degrees[a] - self.cuts[a] if clips else degrees[a] + self.cuts[a] - 1.0
+            if b == _CUT:
+                row[...] = degrees[a] - self.cuts[a]
+            elif b == _REST:
+                row[...] = degrees[a] + self.cuts[a] - 1.0
+            elif b == _FULL:
+                row[...] = before[a] + implied[a] - 1.0
             else:
-                row[...] = implied[: a + 1].sum(axis=0) - 1.0 if b < 0 else implied[a] - implied[b]
+                row[...] = implied[a] - (before[a] if b == _PASSED else implied[b])
         return bends
 
     def _breaks(self) -> Array:
@@ -162,7 +175,7 @@ class _Joined:
         if of._output.aggregation == "max":  # of slots below the greatest nothing is seen
             top = implied >= implied.max(axis=0) - _EQUAL
             seen = top[..., 1:] | top[..., :-1]
-            changes &= np.array([seen[a] | seen[b] for a, b in signs]).reshape(changes.shape)
+            changes &= np.array([seen[a] | seen[b if b >= 0 else a] for a, b in signs]).reshape(changes.shape)
         which, part, at = np.nonzero(changes)
         if len(which) == 0:
             return of._knots

@@ -58,6 +58,7 @@ class Sweep:
     name: str
     k: int
     cuts: tuple[str, ...]
+    scales: bool  # whether a cut scales its term in the place of clipping it
 
 
 @dataclass(frozen=True, slots=True)
@@ -357,7 +358,8 @@ def _swept(engine: Engine) -> Iterator[Statement]:
         default = Return(k) if output.default is None else Assign(f"y{k}", repr(output.default))
         yield Assign(f"y{k}", "0.0", output.name)
         any_fires = " or ".join(f"{cut} > 0.0" for cut in cuts)
-        fired = _valued(output, k, cuts, system) if output.weighted else (Sweep(f"y{k}", k, tuple(cuts)),)
+        scales = any(slot.implication == "prod" for slot in engine.firing.slots[k - 1])
+        fired = _valued(output, k, cuts, system) if output.weighted else (Sweep(f"y{k}", k, tuple(cuts), scales),)
         yield Choose(((any_fires, fired), ("", (default,))))
         if output.weighted:  # which may be no number
             yield Choose(((f"not (fabs(y{k}) < INFINITY)", (default,)),))
