@@ -23,11 +23,22 @@ from controller.regions import Region, Sphere, pack
 from controller.regions.rays import ray_distances
 from controller.regions.region_set import PackedRegions, evaluate_packed, write_clearances
 from cosim.batch.c_calls import Clock
-from cosim.batch.flight_config import Allocator, BoundLaw, FlightConfig, FlightMetrics, FlightOutputs, make_workspace
+from cosim.batch.flight_config import (
+    Allocator,
+    BoundArbiter,
+    BoundLaw,
+    FlightConfig,
+    FlightMetrics,
+    FlightOutputs,
+    make_workspace,
+)
 from cosim.batch.fused_loop import fly
+from cosim.scenario.arbiter_rules import PAPER_RULES
+from cosim.scenario.criteria import PAPER
 from cosim.scenario.vehicle_model import vehicle_model
+from cosim.simulation.arbiter_inputs import compute_inputs, empty_signals, pack_inputs
+from cosim.simulation.compiled_rules import weigher_of
 from cosim.simulation.environment import RegionEvaluation, RegionPlaces, evaluate_places
-from cosim.simulation.memberships import compute_memberships
 from plant_fmu.compiling.compiler import cross_compiler, find_compiler
 from plant_fmu.compiling.platforms import NATIVE, Platform, cross_platforms, native_platform
 from plant_fmu.running.native import Native
@@ -50,7 +61,11 @@ def shipped_functions() -> Iterator[tuple[Callable[..., None], tuple[Any, ...]]]
     yield evaluate_packed, (regions, state.position, state.quaternion, _FLAT, _TABLE, _TABLE, _FLAT)
     yield write_clearances, (regions, _TABLE, _FLAT, _FLAT)
     yield ray_distances, (regions, state.position, _TABLE, 1.0, _FLAT)
-    yield compute_memberships, (_FLAT, _INTEGERS, 1.0, _FLAT)
+    yield (
+        compute_inputs,
+        (pack_inputs((), PAPER, PAPER_RULES, 1.0), goal, regions, state, _FLAT, _FLAT, empty_signals(1, 3, 3)),
+    )
+    yield weigher_of(PAPER_RULES.system), (_FLAT, _FLAT)
     yield fly, _of_flight(goal, regions)
 
 
@@ -65,13 +80,15 @@ def _of_law(
 def _of_flight(goal: PackedRegions, regions: PackedRegions) -> tuple[Any, ...]:
     references = np.zeros(1, np.uint32)
     native = Native(0, 0, 0, 0, references, _FLAT, references, _FLAT, _INTEGERS)
+    inputs = pack_inputs((), PAPER, PAPER_RULES, 1.0)
     setup = FlightConfig(
-        goal, regions, _INTEGERS, 1.0, 1.0, 1, 1, 1, False, True, np.zeros((0, 6)), 0.0, 0.0, False,
+        goal, regions, _INTEGERS, inputs, 1.0, 1, 1, 1, False, True, np.zeros((0, 6)), 0.0, 0.0, False,
         False, SensorModel(), _INTEGERS, _INTEGERS, _FLAT, _INTEGERS, _INTEGERS, _FLAT, False, 1, -1, Clock().numbers,
     )  # fmt: skip
     out = FlightOutputs(np.zeros(len(FlightMetrics._fields)), _FLAT, np.zeros((0, 0)))
     law, allocator = BoundLaw(0, 0, True, _FLAT, _FLAT), Allocator(np.zeros((1, 1, 6)), _TABLE, _TABLE, True)
-    return setup, native, native, native, allocator, law, make_workspace(1, 1, 1), out
+    arbiter = BoundArbiter(0, 0)
+    return setup, native, native, native, allocator, law, arbiter, make_workspace(1, 1, 1), out
 
 
 def write_libraries(platforms: str, folder: Path) -> None:

@@ -16,7 +16,6 @@ from cosim.replay.command_words import command_events
 from cosim.replay.steering import Log
 from cosim.results.run_result import Run
 from cosim.results.spans import Flags, Span, Spans
-from cosim.scenario.scenario import CRITERIA
 from cosim.scenario.sensor_suite import SENSOR_NAMES
 from cosim.simulation.signals import Array
 
@@ -109,12 +108,14 @@ def _active(run: Run) -> Iterator[Event]:
 def _takeovers(run: Run) -> Iterator[tuple[float, int]]:
     """Yield when another region takes over and which, the goal being 0; first what is so at first."""
     regions, before = run.scenario.regions, -1
-    memberships, weights = ([f"{of}.{name}" for name in CRITERIA] for of in ("membership", "weight"))
+    memberships, weights = (
+        [f"{of}.{name}" for name in run.scenario.criterion_names] for of in ("membership", "weight")
+    )
     clearances = [f"{secondary.region.name}.clearance" for secondary in regions]
     for block in run.record.blocks(["time", *memberships, *weights, *clearances]):
         by_region = block.stack(clearances) if clearances else np.empty((len(block), 0))
-        criteria = [secondary.criterion for secondary in regions]
-        active = active_regions(criteria, block.stack(memberships), block.stack(weights), by_region).astype(int)
+        places = run.scenario.criterion_places
+        active = active_regions(places, block.stack(memberships), block.stack(weights), by_region).astype(int)
         for row in np.flatnonzero(np.diff(active, prepend=before)).tolist():
             yield float(block["time"][row]), int(active[row])
         before = int(active[-1])

@@ -166,7 +166,7 @@ def test_overrides_reach_every_depth(tmp_path):
         ("regions.SR1.gain=-1", ["regions.SR1.gain"]),
         ("regions.SR1.name=SR2", ["SR2", "own"]),
         ("regions.SR1.keep=on", ["keep", "'in', 'out'"]),
-        ("regions.SR1.criterion=fear", ["criterion", "'obstacle', 'shape', 'depth'"]),
+        ("regions.SR1.criterion=fear", ["criterion", "expected one of depth, obstacle, shape"]),
         ("regions.SR1.shape.radius=nan", ["SR1", "radius", "nan"]),
         ('intersection=["SR7"]', ["intersection", "SR7"]),
         ("tme.duration=3", ["tme", "'time'"]),
