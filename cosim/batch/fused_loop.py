@@ -30,7 +30,7 @@ from cosim.batch.flight_config import (
     Workspace,
 )
 from cosim.simulation.arbiter_inputs import compute_inputs
-from cosim.simulation.compiled_rules import weigher_of
+from cosim.simulation.compiled_rules import BoundRules
 from fuzzy_arbiter import System
 from plant_fmu.running.native import Native
 
@@ -307,7 +307,7 @@ def fly_law(
     forces = workspace.wrench if setup.thrusters and is_wrench else native.inputs
     decide = law.bound(workspace.state, setup.goal, setup.regions, workspace.weights, forces)
     bound = BoundLaw(decide.address, decide.words, is_wrench, law.estimate, law.report)
-    weigh = BoundCall(weigher_of(rules), (workspace.signals.inputs, workspace.by_criterion))
+    weigh = BoundRules(rules, workspace.signals.inputs, workspace.by_criterion)
     arbiter = BoundArbiter(weigh.address, weigh.words)
     out = FlightOutputs(np.zeros(len(FlightMetrics._fields)), np.zeros(4), trace)
     BoundCall(fly, (setup, native, effectiveness, losses, allocator, bound, arbiter, workspace, out)).call()

@@ -37,7 +37,7 @@ from cosim.scenario.arbiter_rules import PAPER_RULES
 from cosim.scenario.criteria import PAPER
 from cosim.scenario.vehicle_model import vehicle_model
 from cosim.simulation.arbiter_inputs import compute_inputs, empty_signals, pack_inputs
-from cosim.simulation.compiled_rules import weigher_of
+from cosim.simulation.compiled_rules import rules_text
 from cosim.simulation.environment import RegionEvaluation, RegionPlaces, evaluate_places
 from plant_fmu.compiling.compiler import cross_compiler, find_compiler
 from plant_fmu.compiling.platforms import NATIVE, Platform, cross_platforms, native_platform
@@ -65,7 +65,6 @@ def shipped_functions() -> Iterator[tuple[Callable[..., None], tuple[Any, ...]]]
         compute_inputs,
         (pack_inputs((), PAPER, PAPER_RULES, 1.0), goal, regions, state, _FLAT, _FLAT, empty_signals(1, 3, 3)),
     )
-    yield weigher_of(PAPER_RULES.system), (_FLAT, _FLAT)
     yield fly, _of_flight(goal, regions)
 
 
@@ -91,6 +90,15 @@ def _of_flight(goal: PackedRegions, regions: PackedRegions) -> tuple[Any, ...]:
     return setup, native, native, native, allocator, law, arbiter, make_workspace(1, 1, 1), out
 
 
+def shipped_texts() -> dict[str, str]:
+    """Return the C of each function, and of the paper's arbiter, by the name of its file."""
+    texts = {
+        f"{function.__module__.rpartition('.')[2]}_{function.__name__}": c_text(function, arguments)
+        for function, arguments in shipped_functions()
+    }
+    return texts | {"arbiter": rules_text(PAPER_RULES.system)}
+
+
 def write_libraries(platforms: str, folder: Path) -> None:
     """Compile all of them.
 
@@ -112,7 +120,7 @@ def write_libraries(platforms: str, folder: Path) -> None:
         compilers = [(platform, cross_compiler(platform)) for platform in cross_platforms(platforms)]
     for platform, _ in compilers:
         (folder / platform.name).mkdir()
-    texts = sorted({c_text(function, arguments) for function, arguments in shipped_functions()})
+    texts = sorted(set(shipped_texts().values()))
     with tempfile.TemporaryDirectory(prefix="subreach-") as scratch, ThreadPoolExecutor(os.cpu_count()) as pool:
         sources = [_written(text, Path(scratch)) for text in texts]
         made = [pool.submit(_compile, source, folder, *compiler) for source in sources for compiler in compilers]
@@ -136,9 +144,8 @@ def _compile(source: Path, folder: Path, platform: Platform, compiler: list[str]
 def write_sources(folder: Path) -> None:
     """Write the C of each into a folder, which is made if it is not there."""
     folder.mkdir(parents=True, exist_ok=True)
-    for function, arguments in shipped_functions():
-        stem = f"{function.__module__.rpartition('.')[2]}_{function.__name__}"
-        (folder / f"{stem}.c").write_text(c_text(function, arguments), encoding="utf-8")
+    for stem, text in shipped_texts().items():
+        (folder / f"{stem}.c").write_text(text, encoding="utf-8")
 
 
 if __name__ == "__main__":
