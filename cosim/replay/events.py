@@ -95,9 +95,25 @@ def _violations(run: Run) -> Iterator[Event]:
             yield Event(span.start, "violation", text, span.end)
 
 
+def turns_of(run: Run) -> list[tuple[float, int]]:
+    """Return when the arbiter gave way to another region and which, the goal being 0; of many turns the longest.
+
+    Parameters
+    ----------
+    run : Run
+        Finished, interrupted or killed.
+
+    Returns
+    -------
+    list of (float, int)
+        Time [s] and region; the first is what was so at first.
+    """
+    return _turns(_takeovers(run))
+
+
 def _active(run: Run) -> Iterator[Event]:
     regions = run.scenario.regions
-    for i, (time, index) in enumerate(_turns(_takeovers(run))):
+    for i, (time, index) in enumerate(turns_of(run)):
         if index:
             secondary = regions[index - 1]
             yield Event(time, "active", f"Gives way to {secondary.region.name} ({secondary.criterion})")

@@ -45,6 +45,14 @@ class Reason:
         other = "clearance" if of_attitude(region.region.shape) else "angle"
         return self.quantity != other
 
+    def words(self, width: float) -> str:
+        """Return it in words; `width` is that of the arbiter's ramp [m or rad]."""
+        if self.term is None:
+            return f"within {width if self.ramp is None else self.ramp:g} m or rad"
+        unit = QUANTITIES[self.quantity]
+        points = ", ".join(f"{degree:g} at {place:g} {unit}" for place, degree in self.term.points)
+        return f"{self.quantity.replace('_', ' ')}: {points}"
+
 
 @dataclass(frozen=True)
 class CriterionSetup:
@@ -107,9 +115,10 @@ def _require_word(name: str, key: str) -> None:
 def _filled(entry: CriterionEntry, place: int, entries: Sequence[CriterionEntry]) -> CriterionEntry:
     taken = {other.colour.upper() for other in entries}
     free = [colour for colour in _COLOURS if colour not in taken] or list(_COLOURS)
-    without = sum(not other.colour for other in entries[:place])
+    of_paper = {c.name: c.colour for c in PAPER_CRITERIA if c.colour not in taken}
+    without = sum(not other.colour and other.name not in of_paper for other in entries[:place])
     order = place + 1 if entry.order is None else entry.order
-    return replace(entry, order=order, colour=entry.colour or free[without % len(free)])
+    return replace(entry, order=order, colour=entry.colour or of_paper.get(entry.name) or free[without % len(free)])
 
 
 def _reasons(membership: dict[str, Any], key: str) -> Iterator[Reason]:
