@@ -15,6 +15,7 @@ from cosim.errors import ScenarioError
 from cosim.scenario.tables import PAPER_CRITERIA, CriterionEntry, SecondaryRegion
 from fuzzy_arbiter import SECTION_VI, ArbiterError, Criterion, Shape, System, prioritised
 from fuzzy_arbiter.formats import reads
+from fuzzy_arbiter.propositions import is_identifier
 from plant_fmu.toml_tables import hint
 
 Quantity = Literal["ramp", "clearance", "angle", "approach_time"]
@@ -65,7 +66,7 @@ class CriterionSetup:
     @property
     def fuzzy(self) -> Criterion:
         """The same as an input of an arbiter, which is the degree itself."""
-        return _fuzzy(self.name)
+        return _PAPER.get(self.name) or Criterion(self.name, on="pressing", off="satisfied")
 
 
 def check_criteria(
@@ -84,8 +85,8 @@ def check_criteria(
     filled = tuple(_filled(entry, i, entries) for i, entry in enumerate(entries))
     for i, entry in enumerate(filled):
         key = f"criteria.{entry.name}"
-        if not _NAME.fullmatch(entry.name):
-            expected = "a letter, then at most 23 letters, digits and _"
+        if not (_NAME.fullmatch(entry.name) and is_identifier(entry.name)):
+            expected = "a letter, then at most 23 letters, digits and _, no word of rules"
             raise ScenarioError(f"criteria.{i}.name is {entry.name!r}, expected {expected}")
         if names.count(entry.name) > 1:
             raise ScenarioError(f"{key}.name is used twice, expected a name of its own")
@@ -94,22 +95,9 @@ def check_criteria(
         before = next((other for other in filled[:i] if other.order == entry.order), None)
         if before is not None:
             raise ScenarioError(f"{key}.order is {entry.order}, as that of {before.name}: expected one of its own")
-        _require_word(entry.name, key)
     setups = [CriterionSetup(e.name, e.colour, tuple(_reasons(e.membership, f"criteria.{e.name}"))) for e in filled]
     order = sorted(range(len(filled)), key=lambda i: filled[i].order or 0)
     return filled, tuple(setups[i] for i in order)
-
-
-def _fuzzy(name: str) -> Criterion:
-    return _PAPER.get(name) or Criterion(name, on="pressing", off="satisfied")
-
-
-def _require_word(name: str, key: str) -> None:
-    """Refuse a name that rules cannot have, such as one of their own words."""
-    try:
-        _fuzzy(name)
-    except ArbiterError as error:
-        raise ScenarioError(f"{key}.name: {error}") from error
 
 
 def _filled(entry: CriterionEntry, place: int, entries: Sequence[CriterionEntry]) -> CriterionEntry:
@@ -144,7 +132,7 @@ def _term(value: str, where: str) -> Shape:
     try:
         (variable,) = reads(text, "json").inputs
     except ArbiterError as error:
-        said = re.sub(r"criteria\[0\](?:\.membership)?|criterion 'x'", where, str(error))
+        said = re.sub(r"^criteria\[0\](?:\.membership)?(?:: criterion 'x')?", where, str(error))
         raise ScenarioError(said if said.startswith(where) else f"{where}: {said}") from error
     return variable.terms[-1].shape
 
@@ -154,6 +142,10 @@ def check_criteria_of_regions(regions: Sequence[SecondaryRegion], criteria: Sequ
     known = {criterion.name: criterion for criterion in criteria}
     for region in regions:
         key, name = f"regions.{region.region.name}.criterion", region.criterion
+        if name not in known and region.is_dynamic:
+            raise ScenarioError(
+                f"commands.obstacles is above 0, expected 0 without a criterion {name!r}, which they have"
+            )
         if name not in known:
             raise ScenarioError(f"{key} is {name!r}, which is none of criteria; {hint(name, known)}")
         if not any(reason.is_of(region) for reason in known[name].reasons):

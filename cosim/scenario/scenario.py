@@ -245,7 +245,7 @@ def load_scenario(name_or_file: str | Path, overrides: Sequence[str] = ()) -> Sc
     try:
         table, name, titled = read_table(text)
         for one in (table, titled):  # so that keys of the default can be set
-            one.setdefault("criteria", msgspec.to_builtins(PAPER_CRITERIA))
+            one.setdefault("criteria", [dataclasses.asdict(entry) for entry in PAPER_CRITERIA])
         for change in overrides:
             override(table, change)
         require_modest(table)
