@@ -143,7 +143,7 @@ def test_the_record_has_what_the_rules_got(own, tmp_path):
         assert {name: record[f"weight.{name}"][k] for name in names} == weights
     np.testing.assert_allclose(inputs[0][::2], np.minimum(record["mooring.clearance"], 5.0)[::2])
     np.testing.assert_allclose(inputs[2][::2], np.interp(record["time"], [0, 10, 20], [1.0, 0.6, 0.1])[::2], atol=1e-12)
-    again = run_scenario(tmp_path / "run" / "scenario.toml", tmp_path / "again", report=False)
+    again = run_scenario(load_scenario(tmp_path / "run" / "scenario.toml"), tmp_path / "again", report=False)
     assert (again.folder / "record.parquet").read_bytes() == (tmp_path / "run" / "record.parquet").read_bytes()
 
 
